@@ -1,0 +1,89 @@
+// The charge in a cell, counted in integers: a float32 sum of 10 mA over 10 ms into a cell of 6 Ah would stay where it is.
+//
+//   charge += current_ua * duration_us        exact, in 1e-12 A s
+//   soc     = charge / capacity               read in counts of 2^shift (model::ChargeScale), below 4e-9
+//
+// Held within -1/4 .. 5/4 of the capacity: nothing overflows however long a sensor lies. (5/4 of the largest capacity and one
+// count of the largest current over the longest step are below 2^63.)
+// A dual number (an unknown of a fit) keeps its derivatives instead: Charge<Jet> sums in Jets.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+
+#include "model/cell.hpp"
+
+namespace bms {
+
+template <class S>
+inline constexpr bool counts_in_integers = std::floating_point<S> || std::same_as<S, model::FixedPoint>;
+
+template <class S>
+class Charge {
+  using Soc = model::Soc<S>;
+  using Scale = model::ChargeScale<S>;
+
+ public:
+  constexpr void set(const Soc& soc, const Scale& scale) {
+    uaus_ = 0;
+    correct(soc, scale);
+  }
+
+  /// current_ua: not below -2^31 + 1; duration_us: at most 2e9.
+  constexpr void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
+    uaus_ += static_cast<std::int64_t>(current_ua) * static_cast<std::int64_t>(duration_us);
+    hold(scale);
+  }
+
+  /// Moves soc by delta, to a count.
+  constexpr void correct(const Soc& delta, const Scale& scale) {
+    uaus_ += static_cast<std::int64_t>(to_counts(delta, scale)) << scale.shift;
+    hold(scale);
+  }
+
+  constexpr Soc soc(const Scale& scale) const {
+    const auto counts = static_cast<std::int32_t>(uaus_ >> scale.shift);
+    if constexpr (model::is_q<Soc>) {
+      return Soc::from_raw(counts) * scale.soc_per_count;
+    } else {
+      return static_cast<Soc>(counts) * scale.soc_per_count;
+    }
+  }
+
+ private:
+  static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
+    const Soc most(1.5);
+    const Soc held = delta > most ? most : delta < -most ? -most : delta;
+    if constexpr (model::is_q<Soc>) {
+      return Soc(held * scale.counts_per_soc).raw();
+    } else {
+      return static_cast<std::int32_t>(held * scale.counts_per_soc);
+    }
+  }
+
+  constexpr void hold(const Scale& scale) {
+    if (uaus_ > scale.highest_uaus) uaus_ = scale.highest_uaus;
+    if (uaus_ < scale.lowest_uaus) uaus_ = scale.lowest_uaus;
+  }
+
+  std::int64_t uaus_ = 0;
+};
+
+template <class S>
+  requires(!counts_in_integers<S>)
+class Charge<S> {
+  using Scale = model::ChargeScale<S>;
+
+ public:
+  void set(const S& soc, const Scale&) { soc_ = soc; }
+  void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
+    soc_ += S(static_cast<double>(current_ua) * static_cast<double>(duration_us) / static_cast<double>(scale.capacity_uaus));
+  }
+  void correct(const S& delta, const Scale&) { soc_ += delta; }
+  S soc(const Scale&) const { return soc_; }
+
+ private:
+  S soc_{};
+};
+
+}  // namespace bms

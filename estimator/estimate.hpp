@@ -1,0 +1,55 @@
+// What the estimator says after each sample.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <concepts>
+#include <cstdint>
+
+#include "model/scalar.hpp"
+
+namespace bms {
+
+/// Why an estimate is worth less than usual; several at once are or-ed. Bits 0-7: the sample; 8-15: the estimator.
+enum Flag : std::uint32_t {
+  voltage_missing = 1U << 0,
+  voltage_implausible = 1U << 1,  ///< outside what the cell can have
+  voltage_stuck = 1U << 2,        ///< the same reading while the model moves
+  current_missing = 1U << 3,
+  current_implausible = 1U << 4,
+  time_gap = 1U << 5,             ///< more than ten times the usual step: charge in between is uncertain
+  time_not_later = 1U << 6,       ///< the sample was ignored
+  not_started = 1U << 8,          ///< no usable voltage yet and no starting point
+};
+
+template <class S>
+struct Estimate {
+  model::Soc<S> soc{};                         ///< fraction, after the correction by this sample's voltage
+  model::Soc<S> soc_sigma{};                   ///< its standard deviation
+  model::Voltage<S> v_rc_v{};                  ///< after the correction
+  model::Voltage<S> voltage_predicted_v{};     ///< before it: what the model expected of this sample
+  std::uint32_t flags = 0;                     ///< Flag
+};
+
+/// Number of 32-bit words of an estimate, and their names in that order: the unit of comparison between host and board.
+inline constexpr std::size_t estimate_words = 5;
+inline constexpr std::array<const char*, estimate_words> estimate_word_names = {"soc", "soc_sigma", "v_rc_v", "voltage_predicted_v", "flags"};
+using EstimateWords = std::array<std::uint32_t, estimate_words>;
+
+/// One number of an estimate as the bits that both sides must share.
+template <class T>
+constexpr std::uint32_t word(const T& value) {
+  if constexpr (model::is_q<T>) {
+    return static_cast<std::uint32_t>(value.raw());
+  } else {
+    static_assert(std::same_as<T, float>, "a board computes in float or in fixed point");
+    return std::bit_cast<std::uint32_t>(value);
+  }
+}
+
+template <class S>
+constexpr EstimateWords words(const Estimate<S>& e) {
+  return {word(e.soc), word(e.soc_sigma), word(e.v_rc_v), word(e.voltage_predicted_v), e.flags};
+}
+
+}  // namespace bms

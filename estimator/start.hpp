@@ -1,0 +1,62 @@
+// Where an estimate begins when nobody says where: the state of charge that a first voltage tells, with what it leaves open.
+//
+// The voltage, less half of what the present current may have built up in the RC branch, is a reading of the OCV curve with
+// a standard deviation. Every soc from 0 to 1 is held possible and weighed by how well its OCV fits; mean and standard
+// deviation of that distribution are the start. On the plateau that is a wide band, as it should be.
+//
+// Cost: one pass over 256 points, once.
+#pragma once
+
+#include <cstddef>
+
+#include "model/one_rc.hpp"
+
+namespace bms {
+
+/// A state of charge and how sure it is.
+template <class S>
+struct SocBelief {
+  model::Soc<S> soc;
+  model::Variance<S> variance;
+};
+
+/// ocv_v: the reading; variance_v2: of it.
+template <class S, class Cell>
+constexpr SocBelief<S> soc_from_ocv(const Cell& cell, const model::Voltage<S>& ocv_v, const model::Variance<S>& variance_v2) {
+  using namespace model;
+  constexpr int points = 256;
+  const Fraction<S> spacing(1.0 / points);
+  const auto point = [&](int k) { return Soc<S>(Current<S>(2 * k + 1) * Fraction<S>(0.5 / points)); };
+  // misfit of the best point is taken off all of them, so that a voltage outside the curve still has weights
+  std::uint8_t interval = 0;
+  const auto misfit = [&](int k) {
+    const auto at = look_up(cell, point(k), interval);
+    const Voltage<S> off_v = ocv_v - at.ocv_v;
+    // half a point's width on the curve counts as uncertainty too: steep parts have few points
+    const Voltage<S> half_width_v = at.ocv_slope_v * Fraction<S>(0.5 / points);
+    const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
+    return ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
+  };
+  Exponent<S> least = misfit(0);
+  for (int k = 1; k < points; ++k) {
+    const Exponent<S> m = misfit(k);
+    if (m < least) least = m;
+  }
+  Variance<S> weights{}, first{}, second{};  // the widest type: sums of 256 weights of at most 1/256
+  for (int k = 0; k < points; ++k) {
+    const Fraction<S> weight = (Fraction<S>(1) - settled<S>(Exponent<S>(misfit(k) - least))) * spacing;
+    weights = Variance<S>(weights + weight);
+    first = Variance<S>(first + weight * point(k));
+  }
+  const Soc<S> mean = ratio<Soc<S>>(first, weights);
+  for (int k = 0; k < points; ++k) {
+    const Soc<S> off = point(k) - mean;
+    const Fraction<S> weight = (Fraction<S>(1) - settled<S>(Exponent<S>(misfit(k) - least))) * spacing;
+    second = Variance<S>(second + weight * Fraction<S>(off * off));
+  }
+  // the points' own spacing is the least that can be known
+  const Variance<S> variance = Variance<S>(ratio<Fraction<S>>(second, weights)) + Variance<S>(spacing * spacing);
+  return {mean, variance};
+}
+
+}  // namespace bms

@@ -1,0 +1,134 @@
+// Covariance of the state as P = U D U', U unit upper triangular, D diagonal: symmetric by construction, and positive as
+// long as every entry of D is, which each of the two operations below only ever makes from sums and quotients of positive numbers.
+// The same digits carry twice the range of P itself, so that float and fixed point are enough.
+//
+// propagate: P <- F P F' + diag(q), F upper triangular      modified weighted Gram-Schmidt (Thornton 1976)
+// observe:   one scalar measurement z = h x + noise(r)       Bierman 1977
+//
+// Both as in G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation" (1977), chapters V and VI.
+// The last state's variance is D's last entry, with no arithmetic: that place is soc's.
+// State: N (N + 1) / 2 numbers. Cost: in estimator/README.md.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "model/scalar.hpp"
+
+namespace bms {
+
+template <class S, std::size_t N>
+class UdCovariance {
+  using Variance = model::Variance<S>;
+  using Coupling = model::Coupling<S>;
+  using Fraction = model::Fraction<S>;
+  using Gain = model::Gain<S>;
+
+ public:
+  using Matrix = std::array<std::array<Coupling, N>, N>;
+  using Row = std::array<model::VoltagePerSoc<S>, N>;
+  using Variances = std::array<Variance, N>;
+
+  constexpr void set_diagonal(const Variances& variances) {
+    d_ = variances;
+    u_ = {};
+  }
+
+  constexpr const Variance& last_variance() const { return d_[N - 1]; }
+
+  constexpr void propagate(const Matrix& f, const Variances& q) {
+    // rows of [F U | I], weighted by [D | q]; both blocks are upper triangular and stay so
+    Matrix state{}, noise{};
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < N; ++i) {
+#pragma GCC unroll 8
+      for (std::size_t j = i; j < N; ++j) {
+        Coupling sum = f[i][j];  // U's diagonal is 1
+#pragma GCC unroll 8
+        for (std::size_t k = i; k < j; ++k) sum = Coupling(sum + f[i][k] * u(k, j));
+        state[i][j] = sum;
+      }
+    }
+    const Variances d = d_;
+#pragma GCC unroll 8
+    for (std::size_t last = 0; last < N; ++last) {
+      const std::size_t j = N - 1 - last;
+      Variances weighted;  // row j times its weights
+      Variance sum = q[j];
+#pragma GCC unroll 8
+      for (std::size_t k = j; k < N; ++k) {
+        weighted[k] = model::product<Variance>(d[k], state[j][k]);
+        sum = Variance(sum + model::product<Variance>(weighted[k], state[j][k]));
+      }
+#pragma GCC unroll 8
+      for (std::size_t k = j + 1; k < N; ++k) sum = Variance(sum + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[j][k]));
+      d_[j] = sum;
+#pragma GCC unroll 8
+      for (std::size_t i = 0; i < j; ++i) {
+        Variance cross{};
+#pragma GCC unroll 8
+        for (std::size_t k = j; k < N; ++k) cross = Variance(cross + model::product<Variance>(weighted[k], state[i][k]));
+#pragma GCC unroll 8
+        for (std::size_t k = j + 1; k < N; ++k) cross = Variance(cross + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[i][k]));
+        const Coupling projected = model::ratio<Coupling>(cross, sum);
+        u(i, j) = projected;
+#pragma GCC unroll 8
+        for (std::size_t k = j; k < N; ++k) state[i][k] = Coupling(state[i][k] - projected * state[j][k]);
+        noise[i][j] = -projected;  // row j's own noise has weight 1
+#pragma GCC unroll 8
+        for (std::size_t k = j + 1; k < N; ++k) noise[i][k] = Coupling(noise[i][k] - projected * noise[j][k]);
+      }
+    }
+  }
+
+  /// Takes in a measurement with sensitivity h and noise variance r > 0; returns the gain for each state.
+  constexpr std::array<Gain, N> observe(const Row& h, const Variance& r) {
+    std::array<Variance, N> b{};  // U D U' h', built column by column
+    Variance alpha = r;           // variance of the innovation, of the states so far
+#pragma GCC unroll 8
+    for (std::size_t j = 0; j < N; ++j) {
+      Coupling f = h[j];
+#pragma GCC unroll 8
+      for (std::size_t k = 0; k < j; ++k) f = Coupling(f + u(k, j) * h[k]);
+      const Variance g = model::product<Variance>(d_[j], f);
+      const Variance before = alpha;
+      alpha = Variance(alpha + model::product<Variance>(g, f));
+      d_[j] = model::product<Variance>(d_[j], model::ratio<Fraction>(before, alpha));
+#pragma GCC unroll 8
+      for (std::size_t i = 0; i < j; ++i) {
+        const Coupling old = u(i, j);
+        u(i, j) = Coupling(old - f * model::ratio<Gain>(b[i], before));
+        b[i] = Variance(b[i] + model::product<Variance>(g, old));
+      }
+      b[j] = g;
+    }
+    std::array<Gain, N> gain;
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < N; ++i) gain[i] = model::ratio<Gain>(b[i], alpha);
+    return gain;
+  }
+
+  /// P itself, row by row: for reports and tests.
+  constexpr std::array<std::array<double, N>, N> dense() const {
+    std::array<std::array<double, N>, N> p{};
+    for (std::size_t i = 0; i < N; ++i) {
+      for (std::size_t j = 0; j < N; ++j) {
+        for (std::size_t k = i > j ? i : j; k < N; ++k) {
+          const double left = i == k ? 1.0 : model::as_double(u(i, k)), right = j == k ? 1.0 : model::as_double(u(j, k));
+          p[i][j] += left * right * model::as_double(d_[k]);
+        }
+      }
+    }
+    return p;
+  }
+
+ private:
+  static constexpr std::size_t place(std::size_t i, std::size_t j) { return j * (j - 1) / 2 + i; }
+  constexpr Coupling& u(std::size_t i, std::size_t j) { return u_[place(i, j)]; }
+  constexpr const Coupling& u(std::size_t i, std::size_t j) const { return u_[place(i, j)]; }
+
+  std::array<Variance, N> d_{};
+  std::array<Coupling, N * (N - 1) / 2> u_{};  // above the diagonal, column by column
+};
+
+}  // namespace bms

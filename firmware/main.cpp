@@ -1,0 +1,24 @@
+// The firmware: start what the board has, then sample after sample.
+#include "firmware/application.hpp"
+#include "hal/clock.hpp"
+#include "hal/samples.hpp"
+
+namespace {
+
+constexpr std::uint32_t watchdog_ms = 2'000;
+
+}  // namespace
+
+int main() {
+  using namespace bms;
+  hal::clock_start();
+  hal::can_start();
+  hal::watchdog_start(watchdog_ms);
+  Sample sample;
+  if (!hal::next_sample(sample)) return 0;
+  static Application application(hal::starting_point());
+  do {
+    application.take(sample);
+  } while (hal::next_sample(sample));
+  return 0;
+}

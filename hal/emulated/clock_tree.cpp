@@ -1,0 +1,15 @@
+// QEMU has no clock control: its registers read 0, and the core's clock is 168 MHz from the start.
+#include "hal/stm32f4/clock_tree.hpp"
+
+namespace bms::hal::stm32f4 {
+
+namespace {
+
+constexpr Clocks fixed{168'000'000, 84'000'000};
+
+}  // namespace
+
+Clocks start_clocks() { return fixed; }
+const Clocks& clocks() { return fixed; }
+
+}  // namespace bms::hal::stm32f4

@@ -1,0 +1,37 @@
+// Samples from CAN frames (hal/sample_frames.hpp): the measuring chain of a board that has none. Closing the channel ends them.
+#include "hal/can.hpp"
+#include "hal/clock.hpp"
+#include "hal/sample_frames.hpp"
+#include "hal/samples.hpp"
+#include "hal/watchdog.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+Sample building;
+std::optional<StartingPoint> start;
+bool was_listening = false;
+
+}  // namespace
+
+bool next_sample(Sample& sample) {
+  while (true) {
+    CanFrame frame;
+    while (can_receive(frame)) {
+      if (is_start(frame)) start = start_of(frame);
+      if (completes(frame, building)) {
+        sample = building;
+        return true;
+      }
+    }
+    if (was_listening && !can_listening()) return false;
+    was_listening = can_listening();
+    watchdog_feed();  // waiting for the other side is no fault of this one
+    wait_for_interrupt();
+  }
+}
+
+std::optional<StartingPoint> starting_point() { return start; }
+
+}  // namespace bms::hal

@@ -1,0 +1,82 @@
+// A recording through the debugger's files, in blocks, as fast as the core computes: command line "fw SAMPLES ESTIMATES".
+// Formats in hal/stream_format.hpp. Exit code 3: no such files, or not a stream.
+#include <array>
+#include <cstring>
+
+#include "hal/emulated/semihosting.hpp"
+#include "hal/power.hpp"
+#include "hal/record.hpp"
+#include "hal/samples.hpp"
+#include "hal/stream_format.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+constexpr std::size_t block = 512;
+constexpr int bad_stream = 3;
+
+template <class T>
+std::span<unsigned char> bytes_of(std::span<T> items) {
+  return {reinterpret_cast<unsigned char*>(items.data()), items.size_bytes()};
+}
+
+std::array<Sample, block> samples;
+std::size_t sample_count = 0, next = 0;
+std::array<EstimateWords, block> estimates;
+std::size_t estimate_count = 0;
+StreamHeader header;
+int in = -1, out = -1;
+
+/// Fills all of `into` unless the stream ends: a pipe gives what it has.
+std::size_t read_fully(std::span<unsigned char> into) {
+  std::size_t have = 0;
+  while (have < into.size()) {
+    const std::size_t n = semihosting::read(in, into.subspan(have));
+    if (n == 0) break;
+    have += n;
+  }
+  return have;
+}
+
+void open_streams() {
+  static std::array<char, 512> text;
+  std::array<const char*, 3> words{};
+  if (semihosting::arguments(text, words) != words.size()) finish(bad_stream);
+  out = semihosting::open(words[2], semihosting::Open::write);
+  in = semihosting::open(words[1], semihosting::Open::read);
+  const StreamHeader expected;
+  if (in < 0 || out < 0 || read_fully(bytes_of(std::span(&header, 1))) != sizeof header) finish(bad_stream);
+  if (header.magic != expected.magic || header.version != expected.version) finish(bad_stream);
+}
+
+void write_estimates() {
+  if (!semihosting::write(out, bytes_of(std::span(estimates.data(), estimate_count)))) finish(bad_stream);
+  estimate_count = 0;
+}
+
+}  // namespace
+
+bool next_sample(Sample& sample) {
+  if (next == sample_count) {
+    if (in < 0) open_streams();
+    if (estimate_count > 0) write_estimates();
+    sample_count = read_fully(bytes_of(std::span(samples.data(), samples.size()))) / sizeof(Sample);
+    next = 0;
+    if (sample_count == 0) return false;
+  }
+  sample = samples[next++];
+  return true;
+}
+
+std::optional<StartingPoint> starting_point() {
+  if (header.has_start == 0) return std::nullopt;
+  return StartingPoint{header.soc_ppb, header.soc_sigma_ppb};
+}
+
+void record(const EstimateWords& words) {
+  estimates[estimate_count++] = words;
+  if (estimate_count == estimates.size()) write_estimates();
+}
+
+}  // namespace bms::hal

@@ -1,0 +1,86 @@
+// SLCAN, the text that cheap CAN adapters speak (Lawicel CAN232 manual): portable, for the firmware and for the host.
+//
+//   tIIILDD..\r   standard frame: 3 hex digits of id, length, data      O, C   open, close the channel
+//   Sn, V, v, N, F, others with \r   adapter commands, acknowledged      \a     refused
+//
+// A line that is too long, not hexadecimal or of the wrong length is refused as a whole and harms nothing.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "hal/can.hpp"
+
+namespace bms::hal::slcan {
+
+inline constexpr std::size_t longest_frame = 1 + 3 + 1 + 16 + 1;
+
+/// A frame as text; the part of `text` that is in use.
+constexpr std::string_view encode(const CanFrame& frame, std::array<char, longest_frame>& text) {
+  constexpr std::string_view hex = "0123456789ABCDEF";
+  std::size_t n = 0;
+  text[n++] = 't';
+  for (int shift = 8; shift >= 0; shift -= 4) text[n++] = hex[static_cast<std::size_t>(frame.id >> shift) & 15U];
+  text[n++] = hex[frame.length & 15U];
+  for (std::size_t k = 0; k < frame.length && k < 8; ++k) {
+    text[n++] = hex[static_cast<std::size_t>(frame.data[k] >> 4)];
+    text[n++] = hex[frame.data[k] & 15U];
+  }
+  text[n++] = '\r';
+  return {text.data(), n};
+}
+
+/// A hex digit's value; 16 when it is none.
+constexpr unsigned digit(char c) {
+  if (c >= '0' && c <= '9') return static_cast<unsigned>(c - '0');
+  if (c >= 'A' && c <= 'F') return static_cast<unsigned>(c - 'A') + 10;
+  if (c >= 'a' && c <= 'f') return static_cast<unsigned>(c - 'a') + 10;
+  return 16;
+}
+
+/// A line without its end; false: not a standard data frame.
+constexpr bool decode(std::string_view line, CanFrame& frame) {
+  if (line.size() < 5 || line[0] != 't') return false;
+  const unsigned high = digit(line[1]), middle = digit(line[2]), low = digit(line[3]), length = digit(line[4]);
+  if (high > 7 || middle > 15 || low > 15 || length > 8 || line.size() != 5 + 2 * length) return false;
+  CanFrame decoded{static_cast<std::uint16_t>(high << 8 | middle << 4 | low), static_cast<std::uint8_t>(length), {}};
+  for (std::size_t k = 0; k < length; ++k) {
+    const unsigned upper = digit(line[5 + 2 * k]), lower = digit(line[6 + 2 * k]);
+    if (upper > 15 || lower > 15) return false;
+    decoded.data[k] = static_cast<std::uint8_t>(upper << 4 | lower);
+  }
+  frame = decoded;
+  return true;
+}
+
+/// Collects bytes to lines.
+class LineReader {
+ public:
+  /// True when `byte` ended a line, which line() then holds until the next call. A line that was too long comes out empty.
+  constexpr bool take(char byte) {
+    if (ended_) {
+      length_ = 0;
+      ended_ = too_long_ = false;
+    }
+    if (byte == '\n') return false;
+    if (byte != '\r') {
+      if (length_ < text_.size()) text_[length_++] = byte;
+      else too_long_ = true;
+      return false;
+    }
+    if (too_long_) length_ = 0;
+    ended_ = true;
+    return true;
+  }
+  constexpr std::string_view line() const { return {text_.data(), length_}; }
+
+ private:
+  std::array<char, 32> text_{};
+  std::size_t length_ = 0;
+  bool too_long_ = false, ended_ = false;
+};
+
+}  // namespace bms::hal::slcan

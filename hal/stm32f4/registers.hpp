@@ -1,0 +1,59 @@
+// Registers of the STM32F405 that this firmware touches, by hand from ST's RM0090 (section in brackets) and ARM's ARMv7-M manual.
+#pragma once
+
+#include <cstdint>
+
+namespace bms::hal::stm32f4 {
+
+using Register = volatile std::uint32_t;
+
+template <std::uint32_t Address>
+inline Register& at() {
+  return *reinterpret_cast<Register*>(Address);
+}
+
+// reset and clock control [7.3]
+inline Register& rcc_cr() { return at<0x40023800>(); }
+inline Register& rcc_pllcfgr() { return at<0x40023804>(); }
+inline Register& rcc_cfgr() { return at<0x40023808>(); }
+inline Register& rcc_ahb1enr() { return at<0x40023830>(); }
+inline Register& rcc_apb1enr() { return at<0x40023840>(); }
+inline Register& rcc_apb2enr() { return at<0x40023844>(); }
+inline Register& rcc_csr() { return at<0x40023874>(); }
+
+// flash interface [3.9.1], power [5.4.1]
+inline Register& flash_acr() { return at<0x40023C00>(); }
+inline Register& pwr_cr() { return at<0x40007000>(); }
+
+// GPIOB [8.4]
+inline Register& gpiob_moder() { return at<0x40020400>(); }
+inline Register& gpiob_afrl() { return at<0x40020420>(); }
+
+// USART1 [30.6]
+inline Register& usart1_sr() { return at<0x40011000>(); }
+inline Register& usart1_dr() { return at<0x40011004>(); }
+inline Register& usart1_brr() { return at<0x40011008>(); }
+inline Register& usart1_cr1() { return at<0x4001100C>(); }
+inline constexpr unsigned usart1_interrupt = 37;
+
+// independent watchdog [21.4]
+inline Register& iwdg_kr() { return at<0x40003000>(); }
+inline Register& iwdg_pr() { return at<0x40003004>(); }
+inline Register& iwdg_rlr() { return at<0x40003008>(); }
+
+// ARMv7-M: SysTick [B3.3], NVIC [B3.4], system control [B3.2]
+inline Register& syst_csr() { return at<0xE000E010>(); }
+inline Register& syst_rvr() { return at<0xE000E014>(); }
+inline Register& syst_cvr() { return at<0xE000E018>(); }
+inline Register& nvic_iser1() { return at<0xE000E104>(); }
+inline Register& scb_icsr() { return at<0xE000ED04>(); }
+inline Register& scb_vtor() { return at<0xE000ED08>(); }
+inline Register& scb_aircr() { return at<0xE000ED0C>(); }
+inline Register& scb_shcsr() { return at<0xE000ED24>(); }
+inline Register& scb_cfsr() { return at<0xE000ED28>(); }
+inline Register& scb_hfsr() { return at<0xE000ED2C>(); }
+inline Register& scb_mmfar() { return at<0xE000ED34>(); }
+inline Register& scb_bfar() { return at<0xE000ED38>(); }
+inline Register& scb_cpacr() { return at<0xE000ED88>(); }
+
+}  // namespace bms::hal::stm32f4

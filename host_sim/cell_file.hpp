@@ -1,0 +1,35 @@
+// Cell files: TOML in, checked parameters out. The format is described in model/cells/README.md; what is refused, and in which
+// words, by model::first_fault. Unknown keys are refused too: a misspelt one would otherwise be silently ignored.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "model/cell_parameters.hpp"
+
+namespace bms {
+
+struct CellFile {
+  std::string name;
+  std::string chemistry;
+  std::string source;          ///< where its values come from
+  std::string path;            ///< as given; built-in cells: their name
+  std::string text;            ///< the file itself
+  std::uint32_t hash = 0;      ///< first 32 bits of the text's SHA-256: tells on CAN which file is on the board
+  model::CellParameters<> parameters;
+};
+
+/// name_or_path: the name of a built-in cell or the path of a file. Throws BadInput.
+CellFile read_cell(const std::string& name_or_path);
+
+/// The same from text; `path` is for messages only.
+CellFile parse_cell(const std::string& text, const std::string& path);
+
+struct BuiltInCell {
+  std::string name;
+  std::string text;
+};
+const std::vector<BuiltInCell>& built_in_cells();
+
+}  // namespace bms

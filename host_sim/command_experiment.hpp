@@ -1,0 +1,23 @@
+// bms experiment: a current profile by name, as CSV.
+#pragma once
+
+#include <string>
+
+#include "host_sim/output.hpp"
+
+namespace bms {
+
+struct ExperimentCommandOptions {
+  std::string name;
+  double capacity_ah = 6;
+  unsigned long seed = 1;
+  std::string out;
+  Output output;
+};
+
+int run(const ExperimentCommandOptions& options);
+
+/// Names and descriptions, one a line.
+std::string experiment_list();
+
+}  // namespace bms

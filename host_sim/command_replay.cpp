@@ -1,0 +1,100 @@
+#include "host_sim/command_replay.hpp"
+
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "host_sim/bad_input.hpp"
+#include "host_sim/emulator.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "host_sim/json_results.hpp"
+#include "host_sim/report_page.hpp"
+#include "host_sim/text_file.hpp"
+
+namespace bms {
+
+namespace {
+
+ScalarKind scalar_of(const std::string& name) {
+  if (name == "fixed") return ScalarKind::fixed;
+  if (name == "double") return ScalarKind::twice;
+  return ScalarKind::single;
+}
+
+const EmulatedBoard& board_named(const std::string& name) {
+  std::string names;
+  for (const EmulatedBoard& board : emulated_boards()) {
+    if (board.name == name) return board;
+    names += ", " + board.name;
+  }
+  throw BadInput(name, 1, "no such target, expected one of: host" + names);
+}
+
+Track run_on(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar) {
+  if (scalar != board.scalar) {
+    throw BadInput(board.name, 1, fmt::format("computes in {}, expected --scalar {}", name_of(board.scalar), name_of(board.scalar)));
+  }
+  BoardRun run = run_on_board(board, replay_image(board.name, cell), samples, start);
+  Track track;
+  track.rows = rows_of(run.words, scalar);
+  track.words = std::move(run.words);
+  track.steps_per_second = run.steps_per_second;
+  return track;
+}
+
+std::string summary(const ReplayResult& r) {
+  std::string text = statement(r);
+  text += fmt::format("\nOne-step voltage prediction {:.2f} mV RMS; open loop {:.2f} mV RMS, fit {:.1f} %. {:.2f} million steps/s ({}, {}).",
+                      1e3 * r.voltage.prediction_rmse_v, 1e3 * r.voltage.open_loop_rmse_v, r.voltage.open_loop_fit_percent, r.track.steps_per_second / 1e6,
+                      r.target, name_of(r.scalar));
+  return text;
+}
+
+}  // namespace
+
+int run(const ReplayOptions& options) {
+  ReplayResult result;
+  result.scalar = scalar_of(options.scalar);
+  result.target = options.target;
+  const EmulatedBoard* board = options.target == "host" ? nullptr : &board_named(options.target);
+  if (options.verify && board == nullptr) throw BadInput("--verify", 1, "nothing to compare the host with, expected --target with a board");
+  result.cell = read_cell(options.cell);
+  result.recording = read_recording(options.recording);
+  compare_with_cell(result.recording, result.cell.parameters);
+  for (const Warning& warning : result.recording.warnings) warn(options.recording + ": " + warning.text);
+
+  const auto samples = bms::samples(result.recording);
+  std::optional<Belief> belief;
+  if (options.initial_soc) belief = Belief{*options.initial_soc, options.initial_soc_sigma};
+  const auto start = starting_point(belief);
+
+  if (board != nullptr) {
+    const CellFile board_cell = options.board_cell.empty() ? result.cell : read_cell(options.board_cell);
+    result.track = run_on(*board, board_cell, samples, start, result.scalar);
+  }
+  if (board == nullptr || options.verify) {
+    Track host = run_on_host(result.cell, samples, start, result.scalar);
+    if (board == nullptr) {
+      result.track = std::move(host);
+    } else if (const auto d = first_difference(host, result.track, result.scalar)) {
+      const double at_s = d->sample < result.recording.rows() ? result.recording.time_s[d->sample] : 0;
+      fmt::print(stderr, "{}: host and {} differ first at sample {} (time {:g} s) in {}: host {:.9g}, board {:.9g}\n", options.recording, board->name, d->sample,
+                 at_s, d->field, d->host, d->board);
+      return 1;
+    } else {
+      result.verified_against = board->name;
+    }
+  }
+  evaluate(result);
+
+  const std::string trace = trace_csv(result);
+  if (!options.trace.empty()) put(options.trace, trace);
+  if (!options.output.report.empty()) put(options.output.report, replay_report(result));
+  if (!options.output.json.empty()) put(options.output.json, json_of(result, sha256(trace)));
+  tell(options.output, summary(result));
+  if (result.verified_against) tell(options.output, fmt::format("Verified: {} estimates, every bit equal on {}.", result.track.words.size(), *result.verified_against));
+  if (!options.output.report.empty()) tell(options.output, "Report: " + options.output.report);
+  return 0;
+}
+
+}  // namespace bms

@@ -1,0 +1,24 @@
+// bms simulate: a current (of a recording or a profile) through the model, open loop.
+#pragma once
+
+#include <string>
+
+#include "host_sim/output.hpp"
+
+namespace bms {
+
+struct SimulateOptions {
+  std::string cell;
+  std::string recording;    ///< one of the two
+  std::string profile;
+  double initial_soc = 0.5;
+  double noise_v = 0;       ///< standard deviation of noise added to the voltage
+  double noise_a = 0;       ///< and to the current that is written
+  unsigned long seed = 1;
+  std::string out;
+  Output output;
+};
+
+int run(const SimulateOptions& options);
+
+}  // namespace bms

@@ -1,0 +1,11 @@
+// Files that are part of the tool, put into it by cmake/embed.cmake.
+#pragma once
+
+#include <string_view>
+
+namespace bms::embedded {
+
+extern const std::string_view dygraph_js, dygraph_css, synchronizer_js;  // dygraphs, MIT licence, from the system's package
+extern const std::string_view replay_html, replay_js, page_css;         // host_sim/report/
+
+}  // namespace bms::embedded

@@ -1,0 +1,117 @@
+#include "host_sim/emulator.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstring>
+#include <stdexcept>
+
+#include "hal/stream_format.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/text_file.hpp"
+
+namespace bms {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int silence_ms = 30'000;  // an emulator that says nothing for so long has hung
+
+/// The recording as the image reads it.
+void write_stream(const std::filesystem::path& path, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
+  hal::StreamHeader header;
+  if (start) {
+    header.has_start = 1;
+    header.soc_ppb = start->soc_ppb;
+    header.soc_sigma_ppb = start->soc_sigma_ppb;
+  }
+  std::string bytes(sizeof header + samples.size() * sizeof(Sample), '\0');
+  std::memcpy(bytes.data(), &header, sizeof header);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    Sample clean{};
+    std::memset(static_cast<void*>(&clean), 0, sizeof clean);  // no stray bytes in the padding: the file is reproducible
+    clean = samples[k];
+    std::memcpy(bytes.data() + sizeof header + k * sizeof(Sample), &clean, sizeof clean);
+  }
+  write_file(path, bytes);
+}
+
+/// Read end of a named pipe; opening it does not wait for the writer.
+class Pipe {
+ public:
+  explicit Pipe(const std::filesystem::path& path) {
+    if (mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error("no pipe in " + path.parent_path().string());
+    fd_ = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  }
+  ~Pipe() { close(fd_); }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+
+  bool wait(int timeout_ms) const {
+    pollfd p{fd_, POLLIN, 0};
+    return poll(&p, 1, timeout_ms) > 0;
+  }
+  /// Bytes read; 0: the writer has gone (or never came); -1: nothing yet.
+  ssize_t read(char* into, std::size_t size) const { return ::read(fd_, into, size); }
+
+ private:
+  int fd_ = -1;
+};
+
+}  // namespace
+
+const std::vector<EmulatedBoard>& emulated_boards() {
+  static const std::vector<EmulatedBoard> boards = {{"netduinoplus2", "netduinoplus2", ScalarKind::single}};
+  return boards;
+}
+
+BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<Sample>& samples,
+                      const std::optional<StartingPoint>& start) {
+  const TemporaryFolder folder;
+  const auto in = folder.path() / "samples", out = folder.path() / "estimates", log = folder.path() / "log";
+  write_stream(in, samples, start);
+  const Pipe pipe(out);
+  ChildProcess qemu({"qemu-system-arm", "-M", board.machine, "-display", "none", "-monitor", "none", "-serial", "none", "-kernel", image.string(),
+                     "-semihosting-config", "enable=on,target=native,arg=fw,arg=" + in.string() + ",arg=" + out.string()},
+                    log);
+
+  BoardRun run;
+  std::string bytes(samples.size() * sizeof(EstimateWords), '\0');
+  std::size_t have = 0, first_block = 0;
+  Clock::time_point first_at, last_at;
+  auto heard_at = Clock::now();
+  for (bool more = true; more && have < bytes.size();) {
+    pipe.wait(20);
+    const bool running = qemu.running();  // asked before reading: what a finished emulator has written is still read
+    const ssize_t n = pipe.read(bytes.data() + have, bytes.size() - have);
+    if (n > 0) {
+      have += static_cast<std::size_t>(n);
+      last_at = heard_at = Clock::now();
+      if (first_block == 0) {
+        first_block = have;
+        first_at = last_at;
+      }
+    } else {
+      more = running && Clock::now() - heard_at < std::chrono::milliseconds(silence_ms);
+      if (n == 0 && running) usleep(1'000);  // no writer yet: poll() returns at once
+    }
+  }
+  if (have == bytes.size()) {
+    const int status = qemu.wait();
+    if (status != 0) throw std::runtime_error("the firmware on " + board.name + " ended with " + std::to_string(status));
+  } else {
+    throw std::runtime_error("the emulated " + board.name + " stopped after " + std::to_string(have / sizeof(EstimateWords)) + " of " +
+                             std::to_string(samples.size()) + " estimates: " + read_file(log));
+  }
+  run.words.resize(samples.size());
+  std::memcpy(run.words.data(), bytes.data(), bytes.size());
+  const double seconds = std::chrono::duration<double>(last_at - first_at).count();
+  if (seconds > 0) run.steps_per_second = static_cast<double>(have - first_block) / sizeof(EstimateWords) / seconds;
+  return run;
+}
+
+}  // namespace bms

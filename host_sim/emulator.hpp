@@ -1,0 +1,32 @@
+// An emulated board: the firmware's replay image in QEMU, samples in, estimates out.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/estimate.hpp"
+#include "estimator/sample.hpp"
+#include "host_sim/replay.hpp"
+
+namespace bms {
+
+struct BoardRun {
+  std::vector<EstimateWords> words;
+  double steps_per_second = 0;  ///< from the first block of estimates to the last: the emulator's start-up is not in it
+};
+
+/// Boards that can be emulated: folder in boards/, QEMU's name, arithmetic.
+struct EmulatedBoard {
+  std::string name;
+  std::string machine;
+  ScalarKind scalar;
+};
+const std::vector<EmulatedBoard>& emulated_boards();
+
+/// Streams samples through `image` (a *_replay.elf). Throws std::runtime_error when the emulator fails or stops answering.
+BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<Sample>& samples,
+                      const std::optional<StartingPoint>& start);
+
+}  // namespace bms

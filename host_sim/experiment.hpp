@@ -1,0 +1,43 @@
+// Current profiles by name: what to drive a cell through, as numbers. Writing them to a file is command_experiment's.
+//
+// A design is one function in experiment.cpp that lays out a course, in multiples of the 1C current and whole seconds, and one
+// line in the table there. Sampling is common to all: row k holds the mean current over the step_s that end at time_s, rounded
+// to 1 mA, so the charge of a course does not depend on the step. Row 0, at time 0, is 0 A; a last step not filled is left out.
+//
+// |current_a| <= capacity_ah: Table 2 of the paper, 1C continuous either way. The same name, options and seed give the same rows
+// on every machine: integers for chance and time, plain IEEE arithmetic (no fused multiply-add) for the rest. No I/O.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace bms {
+
+/// Mean current over the interval that ends at time_s.
+struct ProfileRow {
+  double time_s;
+  double current_a;  ///< > 0 charges
+};
+
+struct ExperimentOptions {
+  double capacity_ah = 6;  ///< the paper's cell; its 1C current scales every current of the course
+  std::uint64_t seed = 1;  ///< for designs with chance in them
+  double step_s = 1;       ///< rounded to milliseconds, at least one
+};
+
+class Course;
+
+struct Experiment {
+  std::string_view name;
+  std::string_view description;
+  void (*lay_out)(Course&);
+};
+
+const std::vector<Experiment>& experiments();
+
+/// Nothing when there is no experiment of that name.
+std::optional<std::vector<ProfileRow>> experiment(std::string_view name, const ExperimentOptions& options = {});
+
+}  // namespace bms

@@ -1,0 +1,52 @@
+#include "host_sim/firmware_image.hpp"
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "host_sim/bad_input.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/text_file.hpp"
+
+namespace bms {
+
+namespace {
+
+/// The source tree: where the tool was built from, or BMS_ROOT.
+std::filesystem::path source_tree() {
+  const char* root = std::getenv("BMS_ROOT");
+  return root != nullptr ? root : BMS_SOURCE_DIR;
+}
+
+void run_step(const std::vector<std::string>& argv, const std::filesystem::path& log) {
+  if (ChildProcess(argv, log).wait() == 0) return;
+  throw std::runtime_error("the firmware does not build, see " + log.string());
+}
+
+}  // namespace
+
+std::filesystem::path replay_image(const std::string& board, const CellFile& cell) {
+  const auto root = source_tree();
+  if (!std::filesystem::exists(root / "boards" / board / "board.cmake")) {
+    throw BadInput(board, 1, "no such board in " + (root / "boards").string() + ", expected the folder name of a board");
+  }
+  const auto folder = root / "build" / "firmware" / fmt::format("{}-{}-{:08x}", board, cell.name, cell.hash);
+  for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++"}) {
+    if (!in_path(tool)) throw BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
+  }
+  std::filesystem::create_directories(folder);
+  const auto cell_path = folder / "cell.toml", log = folder / "build.log";
+  if (!std::filesystem::exists(cell_path) || read_file(cell_path) != cell.text) write_file(cell_path, cell.text);
+  if (!std::filesystem::exists(folder / "build.ninja")) {
+    if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", board, cell.name);
+    run_step({"cmake", "-S", root.string(), "-B", folder.string(), "-G", "Ninja", "-DBMS_BOARD=" + board, "-DBMS_CELL=" + cell_path.string(),
+              "--toolchain", (root / "cmake" / "toolchain-arm-none-eabi.cmake").string(), "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL}, log);
+  }
+  run_step({"cmake", "--build", folder.string()}, log);
+  return folder / fmt::format("bms_{}_replay.elf", board);
+}
+
+}  // namespace bms

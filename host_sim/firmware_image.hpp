@@ -1,0 +1,15 @@
+// Firmware images made on demand: one per board and cell file, kept under build/.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "host_sim/cell_file.hpp"
+
+namespace bms {
+
+/// The replay image of `board` with the tables of `cell`, built if it is not there yet. Needs the source tree, CMake and the board's
+/// cross compiler; throws BadInput when they are missing and std::runtime_error when the build fails.
+std::filesystem::path replay_image(const std::string& board, const CellFile& cell);
+
+}  // namespace bms

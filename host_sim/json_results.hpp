@@ -1,0 +1,28 @@
+// Results as JSON objects, one per command; the names are relied on from outside.
+#pragma once
+
+#include <string>
+
+#include "host_sim/replay.hpp"
+
+namespace bms {
+
+std::string json_of(const ReplayResult& result, const std::string& trace_sha256);
+
+struct SimulateResult {
+  std::string cell, input, out;
+  std::size_t samples = 0;
+  double duration_s = 0, initial_soc = 0, final_soc = 0, final_voltage_v = 0;
+  double steps_per_second = 0;
+  std::vector<Warning> warnings;
+};
+std::string json_of(const SimulateResult& result);
+
+struct ExperimentResult {
+  std::string name, out;
+  std::size_t samples = 0;
+  double duration_s = 0, charged_ah = 0, discharged_ah = 0, largest_current_a = 0;
+};
+std::string json_of(const ExperimentResult& result);
+
+}  // namespace bms

@@ -1,0 +1,98 @@
+// The bms tool: command line in, one command run, exit code out.
+//
+//   0 done; 1 ran, and the answer is no; 2 bad usage or bad input; 3 a fault of ours
+#include <cstdio>
+#include <exception>
+#include <functional>
+
+#include <CLI/CLI.hpp>
+
+#include "host_sim/bad_input.hpp"
+#include "host_sim/command_experiment.hpp"
+#include "host_sim/command_replay.hpp"
+#include "host_sim/command_simulate.hpp"
+
+namespace {
+
+void add_output(CLI::App& command, bms::Output& output, bool report) {
+  command.add_option("--json", output.json, "write the result as one JSON object to FILE, '-' for standard output")->type_name("FILE");
+  if (report) command.add_option("--report", output.report, "write a page with plots to FILE.html")->type_name("FILE");
+  command.add_flag("--quiet", output.quiet, "no summary");
+}
+
+void add_replay(CLI::App& app, bms::ReplayOptions& o) {
+  CLI::App& c = *app.add_subcommand("replay", "Run the state-of-charge estimator over a recording, on this machine or on an emulated board");
+  c.footer("Example: bms replay recordings/forklift_shift.csv --target netduinoplus2 --verify --report shift.html");
+  c.add_option("recording", o.recording, "CSV with time_s, current_a (> 0 charges), voltage_v, and maybe temperature_c, soc_ref")->required();
+  c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell: table9, a123_26650")->capture_default_str();
+  c.add_option("--initial-soc", o.initial_soc, "state of charge believed at the start, 0..1; without it the first voltage tells")->check(CLI::Range(0.0, 1.0));
+  c.add_option("--initial-soc-sigma", o.initial_soc_sigma, "how far that is to be believed (standard deviation)")->check(CLI::Range(1e-4, 1.0))->capture_default_str();
+  c.add_option("--target", o.target, "host, or an emulated board by its folder in boards/: netduinoplus2")->capture_default_str();
+  c.add_option("--scalar", o.scalar, "arithmetic: float, fixed or double")->check(CLI::IsMember({"float", "fixed", "double"}))->capture_default_str();
+  c.add_flag("--verify", o.verify, "run host and board and compare every estimate bit by bit; exit 1 where they differ");
+  c.add_option("--board-cell", o.board_cell, "cell file for the board's firmware when it is not the host's: shows what --verify finds")->type_name("CELL");
+  c.add_option("--trace", o.trace, "write every estimate to a CSV file")->type_name("FILE");
+  add_output(c, o.output, true);
+}
+
+void add_simulate(CLI::App& app, bms::SimulateOptions& o) {
+  CLI::App& c = *app.add_subcommand("simulate", "Run a current through the model, open loop");
+  c.footer("Example: bms simulate --cell table9 --profile shift.csv --initial-soc 0.9 --out simulated.csv");
+  c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell: table9, a123_26650")->required();
+  auto* recording = c.add_option("--recording", o.recording, "recording whose current is used")->type_name("FILE");
+  c.add_option("--profile", o.profile, "current profile: a recording without voltage_v")->type_name("FILE")->excludes(recording);
+  c.add_option("--initial-soc", o.initial_soc, "state of charge at the start")->check(CLI::Range(0.0, 1.0))->capture_default_str();
+  c.add_option("--noise-v", o.noise_v, "standard deviation of noise added to the voltage")->check(CLI::NonNegativeNumber);
+  c.add_option("--noise-a", o.noise_a, "standard deviation of noise added to the current that is written")->check(CLI::NonNegativeNumber);
+  c.add_option("--seed", o.seed, "of the noise")->capture_default_str();
+  c.add_option("--out", o.out, "CSV file to write: time_s, current_a, voltage_v, soc")->required()->type_name("FILE");
+  add_output(c, o.output, false);
+}
+
+void add_experiment(CLI::App& app, bms::ExperimentCommandOptions& o) {
+  CLI::App& c = *app.add_subcommand("experiment", "Write a current profile");
+  c.footer("Experiments:\n" + bms::experiment_list() + "\nExample: bms experiment forklift_shift --out shift.csv");
+  c.add_option("name", o.name, "which one")->required();
+  c.add_option("--capacity-ah", o.capacity_ah, "of the cell; currents scale with it")->check(CLI::Range(0.01, 1000.0))->capture_default_str();
+  c.add_option("--seed", o.seed, "of what is random in it")->capture_default_str();
+  c.add_option("--out", o.out, "CSV file to write: time_s, current_a")->required()->type_name("FILE");
+  add_output(c, o.output, false);
+}
+
+/// A usage error in one line.
+int usage(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+  std::fprintf(stderr, "bms: %s (see bms --help)\n", error.what());
+  return 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"greybox-bms: a battery model inside a battery management system, and the same model over recordings"};
+  app.name("bms");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", BMS_VERSION);
+  app.footer("bms COMMAND --help tells more. Conventions: current > 0 charges; state of charge is a fraction 0..1.");
+
+  bms::ReplayOptions replay;
+  bms::SimulateOptions simulate;
+  bms::ExperimentCommandOptions experiment;
+  add_replay(app, replay);
+  add_simulate(app, simulate);
+  add_experiment(app, experiment);
+  try {
+    app.parse(argc, argv);
+    if (app.got_subcommand("replay")) return bms::run(replay);
+    if (app.got_subcommand("simulate")) return bms::run(simulate);
+    return bms::run(experiment);
+  } catch (const CLI::ParseError& error) {
+    return usage(app, error);
+  } catch (const bms::BadInput& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bms: %s\n", error.what());
+    return 3;
+  }
+}

@@ -1,0 +1,23 @@
+// Where results go: what every command offers in the same way.
+#pragma once
+
+#include <string>
+
+namespace bms {
+
+struct Output {
+  std::string json;    ///< file, "-" for standard output, empty: none
+  std::string report;  ///< HTML file, empty: none
+  bool quiet = false;  ///< no summary on standard output
+};
+
+/// Writes `text` to the file, or to standard output for "-".
+void put(const std::string& file, const std::string& text);
+
+/// A summary for a person; not when quiet, nor when standard output carries JSON.
+void tell(const Output& output, const std::string& text);
+
+/// A warning: one line on standard error.
+void warn(const std::string& text);
+
+}  // namespace bms

@@ -1,0 +1,167 @@
+#include "host_sim/replay.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "estimator/soc_estimator.hpp"
+#include "host_sim/figures.hpp"
+#include "host_sim/simulation.hpp"
+
+namespace bms {
+
+namespace {
+
+constexpr double thirty_minutes_s = 1'800;
+constexpr double timing_s = 0.03;  // long enough that a clock and a cold cache do not matter
+
+template <class S>
+EstimateRow row_of(const Estimate<S>& e) {
+  return {model::as_double(e.soc), model::as_double(e.soc_sigma), model::as_double(e.v_rc_v), model::as_double(e.voltage_predicted_v), e.flags};
+}
+
+template <class S>
+void run_once(const HostCell<S>& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<Estimate<S>>& estimates) {
+  SocEstimator<S> estimator = start ? SocEstimator<S>(*start) : SocEstimator<S>();
+  for (std::size_t k = 0; k < samples.size(); ++k) estimates[k] = estimator.step(cell, samples[k]);
+}
+
+template <class S>
+Track run(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
+  const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
+  std::vector<Estimate<S>> estimates(samples.size());
+  double best_s = std::numeric_limits<double>::infinity(), total_s = 0;
+  do {
+    const auto begin = std::chrono::steady_clock::now();
+    run_once(cell, samples, start, estimates);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    best_s = std::min(best_s, seconds);
+    total_s += seconds;
+  } while (total_s < timing_s);
+
+  Track track;
+  track.steps_per_second = static_cast<double>(samples.size()) / best_s;
+  track.rows.reserve(samples.size());
+  for (const Estimate<S>& e : estimates) {
+    track.rows.push_back(row_of(e));
+    if constexpr (!std::same_as<S, double>) track.words.push_back(words(e));
+  }
+  return track;
+}
+
+/// The value of an estimate's word as a board writes it.
+double number_of(std::uint32_t word, ScalarKind scalar) {
+  if (scalar == ScalarKind::single) return std::bit_cast<float>(word);
+  return static_cast<double>(model::Soc<model::FixedPoint>::from_raw(static_cast<std::int32_t>(word)));  // all four are Q3.28
+}
+
+std::string formatted(double value, ScalarKind scalar) {
+  return scalar == ScalarKind::single ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{}", value);
+}
+
+}  // namespace
+
+const char* name_of(ScalarKind scalar) {
+  switch (scalar) {
+    case ScalarKind::single: return "float";
+    case ScalarKind::fixed: return "fixed";
+    case ScalarKind::twice: return "double";
+  }
+  return "";
+}
+
+std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief) {
+  if (!belief) return std::nullopt;
+  return StartingPoint{static_cast<std::int32_t>(std::lround(belief->soc * 1e9)), static_cast<std::int32_t>(std::lround(belief->sigma * 1e9))};
+}
+
+Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar) {
+  switch (scalar) {
+    case ScalarKind::fixed: return run<model::FixedPoint>(cell, samples, start);
+    case ScalarKind::twice: return run<double>(cell, samples, start);
+    default: return run<float>(cell, samples, start);
+  }
+}
+
+std::vector<EstimateRow> rows_of(const std::vector<EstimateWords>& words, ScalarKind scalar) {
+  static_assert(std::same_as<model::Soc<model::FixedPoint>, model::Voltage<model::FixedPoint>>, "one conversion serves all four numbers");
+  std::vector<EstimateRow> rows;
+  rows.reserve(words.size());
+  for (const EstimateWords& w : words) {
+    rows.push_back({number_of(w[0], scalar), number_of(w[1], scalar), number_of(w[2], scalar), number_of(w[3], scalar), w[4]});
+  }
+  return rows;
+}
+
+std::optional<Difference> first_difference(const Track& host, const Track& board, ScalarKind scalar) {
+  const std::size_t both = std::min(host.words.size(), board.words.size());
+  for (std::size_t k = 0; k < both; ++k) {
+    for (std::size_t w = 0; w < estimate_words; ++w) {
+      const std::uint32_t a = host.words[k][w], b = board.words[k][w];
+      if (a == b) continue;
+      const bool flags = w + 1 == estimate_words;
+      return Difference{k, estimate_word_names[w], flags ? a : number_of(a, scalar), flags ? b : number_of(b, scalar)};
+    }
+  }
+  if (host.words.size() != board.words.size()) return Difference{both, "number of estimates", static_cast<double>(host.words.size()), static_cast<double>(board.words.size())};
+  return std::nullopt;
+}
+
+void evaluate(ReplayResult& result) {
+  const Recording& r = result.recording;
+  const std::vector<EstimateRow>& rows = result.track.rows;
+  const bool has_reference = !r.soc_ref.empty();
+
+  ErrorFigure soc, soc_later, prediction, open_loop;
+  FitFigure fit;
+  std::size_t inside = 0;
+  const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
+  result.initial_soc = rows.front().soc;
+  const bool start_known = has_reference && !std::isnan(r.soc_ref.front());
+  const auto open = simulate(cell, result.cell.parameters.capacity_ah, r.time_s, r.current_a, start_known ? r.soc_ref.front() : result.initial_soc);
+
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const EstimateRow& e = rows[k];
+    if (has_reference && !std::isnan(r.soc_ref[k])) {
+      const double error = e.soc - r.soc_ref[k];
+      soc.add(error);
+      if (r.time_s[k] - r.time_s.front() >= thirty_minutes_s) soc_later.add(error);
+      if (std::abs(error) <= 2 * e.soc_sigma) ++inside;
+    }
+    // a reading that the filter did not believe says nothing about its prediction
+    constexpr std::uint32_t not_believed = voltage_missing | voltage_implausible | voltage_stuck | time_not_later | not_started;
+    if (k > 0 && (e.flags & not_believed) == 0) prediction.add(r.voltage_v[k] - e.voltage_predicted_v);
+    open_loop.add(r.voltage_v[k] - open[k].voltage_v);
+    fit.add(r.voltage_v[k], open[k].voltage_v);
+    result.open_loop_v.push_back(open[k].voltage_v);
+  }
+  result.soc.final = rows.back().soc;
+  result.soc.final_sigma = rows.back().soc_sigma;
+  if (soc.count() > 0) {
+    result.soc.rmse = soc.rms();
+    result.soc.max_error = soc.max();
+    result.soc.within_2_sigma = static_cast<double>(inside) / static_cast<double>(soc.count());
+  }
+  if (soc_later.count() > 0) {
+    result.soc.rmse_after_30min = soc_later.rms();
+    result.soc.max_error_after_30min = soc_later.max();
+  }
+  result.voltage = {prediction.rms(), prediction.max(), open_loop.rms(), fit.percent()};
+}
+
+std::string trace_csv(const ReplayResult& result) {
+  std::string csv = "time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags\n";
+  csv.reserve(result.track.rows.size() * 80);
+  const ScalarKind s = result.scalar;
+  for (std::size_t k = 0; k < result.track.rows.size(); ++k) {
+    const EstimateRow& e = result.track.rows[k];
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{}\n", result.recording.time_s[k], formatted(e.soc, s), formatted(e.soc_sigma, s),
+                   formatted(e.v_rc_v, s), formatted(e.voltage_predicted_v, s), result.recording.voltage_v[k], e.flags);
+  }
+  return csv;
+}
+
+}  // namespace bms

@@ -1,0 +1,81 @@
+// Replay: a recording through the estimator, on the host or on an emulated board, and how well it did.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/estimate.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/recording.hpp"
+
+namespace bms {
+
+enum class ScalarKind { single, fixed, twice };  ///< float, fixed point, double
+
+/// One estimate as numbers, whatever the scalar was.
+struct EstimateRow {
+  double soc = 0, soc_sigma = 0, v_rc_v = 0, voltage_predicted_v = 0;
+  std::uint32_t flags = 0;
+};
+
+/// The estimates of one run.
+struct Track {
+  std::vector<EstimateRow> rows;
+  std::vector<EstimateWords> words;  ///< the bits behind them; empty for double
+  double steps_per_second = 0;
+};
+
+/// What the user believes of the state of charge before the first sample.
+struct Belief {
+  double soc = 0;
+  double sigma = 0.02;
+};
+std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief);
+
+/// Runs the estimator on this machine. The measuring of its speed repeats the run; the estimates are those of the first.
+Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar);
+
+/// Numbers of the words that a board has sent.
+std::vector<EstimateRow> rows_of(const std::vector<EstimateWords>& words, ScalarKind scalar);
+
+/// Where two runs part, or nothing.
+struct Difference {
+  std::size_t sample = 0;
+  std::string field;
+  double host = 0, board = 0;
+};
+std::optional<Difference> first_difference(const Track& host, const Track& board, ScalarKind scalar);
+
+struct SocFigures {
+  double final = 0, final_sigma = 0;
+  std::optional<double> rmse, max_error, rmse_after_30min, max_error_after_30min, within_2_sigma;
+};
+struct VoltageFigures {
+  double prediction_rmse_v = 0, prediction_max_v = 0, open_loop_rmse_v = 0, open_loop_fit_percent = 0;
+};
+
+struct ReplayResult {
+  Recording recording;
+  CellFile cell;
+  std::string target;
+  ScalarKind scalar = ScalarKind::single;
+  double initial_soc = 0;                        ///< of the estimator, after the first sample
+  Track track;
+  std::vector<double> open_loop_v;
+  SocFigures soc;
+  VoltageFigures voltage;
+  std::optional<std::string> verified_against;   ///< board that gave the same bits
+};
+
+/// Figures of `result.track` over `result.recording`; the open loop starts at soc_ref where there is one, else where the estimator does.
+void evaluate(ReplayResult& result);
+
+/// time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags
+std::string trace_csv(const ReplayResult& result);
+
+const char* name_of(ScalarKind scalar);
+
+}  // namespace bms

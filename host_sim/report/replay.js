@@ -1,0 +1,54 @@
+// Draws the page from `report`: {title, statement, warnings, figures: [[name, value] | [group]], columns: {...}}.
+(() => {
+  'use strict';
+  document.getElementById('title').textContent = report.title;
+  document.getElementById('statement').textContent = report.statement;
+  document.getElementById('warnings').textContent = report.warnings.join(' \u00b7 ');
+
+  const table = document.getElementById('figures');
+  for (const row of report.figures) {
+    const tr = table.insertRow();
+    if (row.length === 1) tr.className = 'group';
+    row.forEach((text, k) => {
+      const td = tr.insertCell();
+      td.textContent = text;
+      if (row.length === 1) td.colSpan = 2;
+    });
+  }
+
+  const c = report.columns;
+  const hours = c.time_s.map(t => t / 3600);
+  const clock = h => {
+    const s = Math.round(h * 3600), two = n => String(n).padStart(2, '0');
+    return Math.floor(s / 3600) + ':' + two(Math.floor(s / 60) % 60) + (s % 60 ? ':' + two(s % 60) : '');
+  };
+  const rows = series => hours.map((h, k) => [h, ...series.map(f => f(k))]);
+  const at = column => k => column[k];
+  const band = (middle, half) => k => [100 * (middle[k] - half[k]), 100 * middle[k], 100 * (middle[k] + half[k])];
+
+  const chart = (name, labels, data, options) => new Dygraph(document.getElementById('chart-' + name), data, Object.assign({
+    labels: ['time', ...labels],
+    labelsDiv: document.getElementById('legend-' + name),
+    legend: 'always',
+    axisLabelFontSize: 12,
+    gridLineColor: '#e3e8ee',
+    strokeWidth: 1.3,
+    axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58}},
+  }, options));
+
+  const soc_labels = ['estimate with two sigma, %'], soc_series = [band(c.soc, c.two_sigma)];
+  if (c.soc_ref) {
+    soc_labels.push('reference, %');
+    soc_series.push(k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * c.soc_ref[k]));
+  }
+  const two_decimals = {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, valueFormatter: v => v.toFixed(2)}};
+  const charts = [
+    chart('soc', soc_labels, rows(soc_series), {customBars: true, colors: ['#0b63b5', '#d1495b'], axes: two_decimals, fillAlpha: 0.22}),
+    chart('voltage', ['measured, V', 'predicted one step ahead, V', 'open loop, V'], rows([at(c.voltage_v), at(c.predicted_v), at(c.open_loop_v)]),
+          {colors: ['#2a2f36', '#0b63b5', '#c9a227']}),
+    chart('current', ['A'], rows([at(c.current_a)]), {colors: ['#2e7d4f'], fillGraph: true, fillAlpha: 0.15}),
+    chart('innovation', ['mV'], rows([at(c.innovation_mv)]), {colors: ['#7a4fb0']}),
+  ];
+  Dygraph.synchronize(charts, {selection: true, zoom: true, range: false});
+  window.charts = charts;
+})();

@@ -1,0 +1,128 @@
+#include "host_sim/report_page.hpp"
+
+#include <cmath>
+#include <functional>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "host_sim/embedded_files.hpp"
+
+namespace bms {
+
+namespace {
+
+/// More rows than this are thinned, evenly: a screen has a few thousand columns.
+constexpr std::size_t most_rows = 40'000;
+
+using nlohmann::json;
+using Value = std::function<double(std::size_t)>;
+
+/// Every `every`-th value, rounded: digits that no screen shows would only make the page larger.
+json column(std::size_t rows, std::size_t every, int decimals, const Value& value) {
+  const double scale = std::pow(10, decimals);
+  json values = json::array();
+  for (std::size_t k = 0; k < rows; k += every) values.push_back(std::round(value(k) * scale) / scale);  // NaN becomes null
+  return values;
+}
+
+std::string percent(double fraction) { return fmt::format("{:.2f} %", 100 * fraction); }
+std::string file_name(const ReplayResult& r) { return r.recording.path.substr(r.recording.path.rfind('/') + 1); }
+std::string millivolts(double v) { return fmt::format("{:.2f} mV", 1e3 * v); }
+
+json figures(const ReplayResult& r) {
+  json f = json::array();
+  const auto group = [&](const char* name) { f.push_back(json::array({name})); };
+  const auto row = [&](const char* name, const std::string& value) { f.push_back(json::array({name, value})); };
+  const auto percent_row = [&](const char* name, const std::optional<double>& value) {
+    if (value) row(name, percent(*value));
+  };
+  group("State of charge");
+  row("at the end", percent(r.soc.final));
+  row("its standard deviation", percent(r.soc.final_sigma));
+  percent_row("RMS error against the reference", r.soc.rmse);
+  percent_row("largest error", r.soc.max_error);
+  percent_row("RMS error after 30 minutes", r.soc.rmse_after_30min);
+  percent_row("largest error after 30 minutes", r.soc.max_error_after_30min);
+  percent_row("reference within two sigma", r.soc.within_2_sigma);
+  group("Voltage");
+  row("one-step prediction, RMS", millivolts(r.voltage.prediction_rmse_v));
+  row("one-step prediction, largest", millivolts(r.voltage.prediction_max_v));
+  row("open loop, RMS", millivolts(r.voltage.open_loop_rmse_v));
+  row("open loop, fit (Eq. A6)", fmt::format("{:.2f} %", r.voltage.open_loop_fit_percent));
+  group("Run");
+  row("recording", file_name(r));
+  row("cell", r.cell.name);
+  row("samples", fmt::format("{}", r.track.rows.size()));
+  row("duration", fmt::format("{:.2f} h", r.recording.duration_s() / 3600));
+  row("computed by", r.target == "host" ? "this machine" : "emulated " + r.target);
+  row("arithmetic", name_of(r.scalar));
+  if (r.verified_against) row("bit for bit equal on", *r.verified_against);
+  return f;
+}
+
+std::string data(const ReplayResult& r) {
+  const std::size_t rows = r.track.rows.size(), every = (rows + most_rows - 1) / most_rows;
+  const auto& e = r.track.rows;
+  const Recording& rec = r.recording;
+  json page = {{"title", "State of charge over " + file_name(r)}, {"statement", statement(r)}, {"warnings", json::array()}, {"figures", figures(r)}};
+  for (const Warning& w : rec.warnings) page["warnings"].push_back(w.text);
+  json& columns = page["columns"];
+  const auto add = [&](const char* name, int decimals, const Value& value) { columns[name] = column(rows, every, decimals, value); };
+  add("time_s", 1, [&](std::size_t k) { return rec.time_s[k] - rec.time_s.front(); });
+  add("current_a", 3, [&](std::size_t k) { return rec.current_a[k]; });
+  add("voltage_v", 4, [&](std::size_t k) { return rec.voltage_v[k]; });
+  add("predicted_v", 4, [&](std::size_t k) { return e[k].voltage_predicted_v; });
+  add("open_loop_v", 4, [&](std::size_t k) { return r.open_loop_v[k]; });
+  add("innovation_mv", 2, [&](std::size_t k) { return 1e3 * (rec.voltage_v[k] - e[k].voltage_predicted_v); });
+  add("soc", 5, [&](std::size_t k) { return e[k].soc; });
+  add("two_sigma", 5, [&](std::size_t k) { return 2 * e[k].soc_sigma; });
+  if (!rec.soc_ref.empty()) add("soc_ref", 5, [&](std::size_t k) { return rec.soc_ref[k]; });
+
+  std::string text = page.dump(-1, ' ', false, json::error_handler_t::replace);
+  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");  // no </script> from a file's name
+  return text;
+}
+
+/// The page with its places filled in, each once.
+std::string filled(std::string_view page, const std::function<std::string(std::string_view)>& content) {
+  std::string out;
+  while (true) {
+    const std::size_t begin = page.find('@');
+    const std::size_t end = begin == std::string_view::npos ? begin : page.find('@', begin + 1);
+    if (end == std::string_view::npos) break;
+    out += page.substr(0, begin);
+    out += content(page.substr(begin + 1, end - begin - 1));
+    page.remove_prefix(end + 1);
+  }
+  return out += page;
+}
+
+}  // namespace
+
+std::string statement(const ReplayResult& r) {
+  std::string text = fmt::format("After {:.1f} hours the battery is at {:.1f} % (standard deviation {:.1f} %).", r.recording.duration_s() / 3600,
+                                 100 * r.soc.final, 100 * r.soc.final_sigma);
+  if (r.soc.rmse) {
+    text += fmt::format(" Against the reference the estimate was off by {:.2f} % RMS, {:.2f} % at most; the reference lies within two sigma in {:.0f} % of the samples.",
+                        100 * *r.soc.rmse, 100 * *r.soc.max_error, 100 * *r.soc.within_2_sigma);
+  }
+  if (r.verified_against) text += fmt::format(" The emulated {} computed the same bits.", *r.verified_against);
+  return text;
+}
+
+std::string replay_report(const ReplayResult& r) {
+  return filled(embedded::replay_html, [&](std::string_view place) -> std::string {
+    if (place == "TITLE") return "bms replay";
+    if (place == "DYGRAPH_CSS") return std::string(embedded::dygraph_css);
+    if (place == "DYGRAPH_JS") return std::string(embedded::dygraph_js);
+    if (place == "SYNCHRONIZER_JS") return std::string(embedded::synchronizer_js);
+    if (place == "PAGE_CSS") return std::string(embedded::page_css);
+    if (place == "PAGE_JS") return std::string(embedded::replay_js);
+    if (place == "DATA") return data(r);
+    return "";
+  });
+}
+
+}  // namespace bms

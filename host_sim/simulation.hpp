@@ -1,0 +1,40 @@
+// Open loop: what voltage the model says for a current, with nothing measured fed back.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "model/one_rc.hpp"
+
+namespace bms {
+
+/// A cell for the host: any number of intervals that a file may have.
+template <class S>
+using HostCell = model::Cell<S, model::max_intervals>;
+
+struct SimulatedRow {
+  double voltage_v;
+  double soc;
+};
+
+/// Integrates the model over rows of (time_s, mean current_a since the row before) from a cell at rest at initial_soc.
+/// Row 0 has no interval before it: its voltage is the rested one plus R0 I. Rows whose time is not later repeat the state.
+inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double capacity_ah, std::span<const double> time_s,
+                                          std::span<const double> current_a, double initial_soc) {
+  using Model = model::OneRc<double>;
+  std::vector<SimulatedRow> rows(time_s.size());
+  Model::Polarisation x{};
+  double soc = initial_soc;
+  std::uint8_t interval = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const double duration_s = k == 0 ? 0 : time_s[k] - time_s[k - 1];
+    const model::Drive<double> drive{current_a[k] == current_a[k] ? current_a[k] : 0, duration_s};
+    soc += drive.current_a * duration_s / (3'600 * capacity_ah);
+    const auto at = model::look_up(cell, soc, interval);
+    if (duration_s > 0) x = Model::advance(x, at, Model::settling(at, duration_s), drive);
+    rows[k] = {Model::voltage(x, at, drive), soc};
+  }
+  return rows;
+}
+
+}  // namespace bms

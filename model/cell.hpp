@@ -1,0 +1,224 @@
+// A cell prepared for stepping with one scalar: the tables of its file merged into one row of intervals over soc, each with what
+// a step needs, and the noise figures turned into the units of the filter.
+//
+//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) / width,  value = value at start + t * delta
+//
+// The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on (a clamp
+// would have slope 0 just where an estimate that has overshot needs one to find back) and R0, R1, C1 stay constant.
+// An edge belongs to the interval above it, so does the slope there.
+//
+// prepare() is constexpr: firmware runs it in the compiler, the host at run time, with the same digits in the same order.
+// Cost of look_up: in estimator/README.md with the step.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "model/cell_parameters.hpp"
+#include "model/scalar.hpp"
+
+namespace bms::model {
+
+/// All that the tables say about one interval of soc.
+template <class S>
+struct Interval {
+  Soc<S> start{};
+  PerSoc<S> per_width{};  ///< 1 / width
+  Voltage<S> ocv_v{}, ocv_delta_v{};
+  Resistance<S> r0_ohm{}, r0_delta_ohm{};
+  Resistance<S> r1_ohm{}, r1_delta_ohm{};
+  Capacitance<S> c1_f{}, c1_delta_f{};
+};
+
+/// Charge is counted in microampere-microseconds [1e-12 A s], in 64-bit integers, and read in counts of 2^shift of them: fine
+/// enough that nothing is lost (one count is below 4e-9 of the capacity), coarse enough for 32 bits.
+template <class S>
+struct ChargeScale {
+  std::int64_t capacity_uaus = 0;
+  std::int64_t lowest_uaus = 0;      ///< where counting stops: -1/4 of the capacity
+  std::int64_t highest_uaus = 0;     ///< and 5/4 of it
+  int shift = 0;
+  Soc<S> soc_per_count{};            ///< fixed point: per 2^28 counts, 0.5 .. 1
+  Soc<S> counts_per_soc{};           ///< its inverse; fixed point: in 2^28 counts
+};
+
+/// Noise as the filter uses it, in its own units.
+template <class S>
+struct FilterNoise {
+  Variance<S> voltage_v2{};             ///< white, per sample
+  Variance<S> model_v2{};               ///< lasting
+  Duration<S> model_correlation_s{};
+  Variance<S> v_rc_v2{};                ///< in the steady state
+  Variance<S> rest_v2{};
+  Soc<S> white_soc_per_s{};             ///< current_a over the capacity
+  Variance<S> walk_soc2_per_s{};        ///< slow current error: 2 offset^2 correlation / capacity^2
+  Soc<S> unknown_soc_per_s{};           ///< current_unknown_a over the capacity
+};
+
+/// A reading outside is not a measurement.
+struct Plausible {
+  std::int32_t voltage_min_uv = 0, voltage_max_uv = 0;
+  std::int32_t current_max_ua = 0;  ///< either way
+};
+
+template <class S, std::size_t Max>
+struct Cell {
+  using Scalar = S;
+
+  std::array<Interval<S>, Max> interval{};
+  ChargeScale<S> charge;
+  FilterNoise<S> noise;
+  Plausible plausible;
+  std::size_t size = 0;                          ///< intervals in use
+};
+
+/// What the tables say at one soc, and how fast it changes there (d / d soc).
+template <class S>
+struct TablePoint {
+  Voltage<S> ocv_v;
+  VoltagePerSoc<S> ocv_slope_v;
+  Resistance<S> r0_ohm, r1_ohm;
+  ResistancePerSoc<S> r0_slope_ohm, r1_slope_ohm;
+  Capacitance<S> c1_f;
+  CapacitancePerSoc<S> c1_slope_f;
+};
+
+namespace cell_detail {
+
+/// OCV edges and RC nodes, ascending, each once.
+template <class Real>
+constexpr auto merged_edges(const CellParameters<Real>& p) {
+  Column<double, max_ocv_edges + max_rc_nodes + 2> merged;
+  std::size_t o = 0, r = 0;
+  while (o < p.ocv.soc.size || r < p.rc.soc.size) {
+    const bool take_ocv = r >= p.rc.soc.size || (o < p.ocv.soc.size && p.ocv.soc[o] <= p.rc.soc[r]);
+    const double edge = take_ocv ? p.ocv.soc[o++] : p.rc.soc[r++];
+    if (merged.size == 0 || edge - merged[merged.size - 1] > 1e-9) merged.push_back(edge);
+  }
+  return merged;
+}
+
+/// Column of the RC table at soc: linear between nodes, constant outside.
+template <class Real, std::size_t Max>
+constexpr Real rc_value(const RcTable<Real>& rc, const Column<Real, Max>& column, double soc) {
+  if (soc <= rc.soc[0]) return column[0];
+  for (std::size_t k = 1; k < rc.soc.size; ++k) {
+    if (soc <= rc.soc[k]) {
+      const double t = (soc - rc.soc[k - 1]) / (rc.soc[k] - rc.soc[k - 1]);
+      return column[k - 1] + (column[k] - column[k - 1]) * t;
+    }
+  }
+  return column[rc.soc.size - 1];
+}
+
+template <class Real>
+constexpr std::size_t ocv_piece(const OcvTable<Real>& ocv, double soc) {
+  std::size_t k = 0;
+  while (k + 2 < ocv.soc.size && soc >= ocv.soc[k + 1]) ++k;
+  return k;
+}
+
+}  // namespace cell_detail
+
+/// Number of intervals that prepare() will make: two outside and one between each pair of edges or nodes.
+template <class Real>
+constexpr std::size_t interval_count(const CellParameters<Real>& p) {
+  return cell_detail::merged_edges(p).size + 1;
+}
+
+inline constexpr std::size_t max_intervals = max_ocv_edges + max_rc_nodes + 3;
+
+/// Prepares p, which first_fault() has found good, for scalar S. Max >= interval_count(p).
+template <class S, std::size_t Max, class Real>
+constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
+  namespace d = cell_detail;
+  Cell<S, Max> cell;
+
+  const auto edges = d::merged_edges(p);
+  const auto add = [&](double from, double to) {
+    const double width = to - from;
+    const std::size_t piece = d::ocv_piece(p.ocv, from);
+    Interval<S>& i = cell.interval[cell.size];
+    const auto line = [&]<class Value>(const auto& column, Value& at_start, Value& delta) {
+      const Real start = d::rc_value(p.rc, column, from);
+      at_start = Value(start);
+      delta = Value(d::rc_value(p.rc, column, to) - start);
+    };
+    i.start = Soc<S>(from);
+    i.per_width = PerSoc<S>(1.0 / width);
+    i.ocv_v = Voltage<S>(p.ocv.b0_v[piece] + p.ocv.b1_v[piece] * from);
+    i.ocv_delta_v = Voltage<S>(p.ocv.b1_v[piece] * width);
+    line(p.rc.r0_ohm, i.r0_ohm, i.r0_delta_ohm);
+    line(p.rc.r1_ohm, i.r1_ohm, i.r1_delta_ohm);
+    line(p.rc.c1_f, i.c1_f, i.c1_delta_f);
+    ++cell.size;
+  };
+  // outside, a width of 1/8 stands for "from there on": t goes on beyond 0 and 1
+  add(-0.125, 0);
+  for (std::size_t k = 0; k + 1 < edges.size; ++k) add(edges[k], edges[k + 1]);
+  add(1, 1.125);
+
+  const double capacity_as = p.capacity_ah * 3'600;
+  cell.charge.capacity_uaus = static_cast<std::int64_t>(capacity_as * 1e12 + 0.5);
+  while ((cell.charge.capacity_uaus >> cell.charge.shift) >= (std::int64_t{1} << 29)) ++cell.charge.shift;
+  cell.charge.lowest_uaus = -(cell.charge.capacity_uaus / 4);
+  cell.charge.highest_uaus = cell.charge.capacity_uaus + cell.charge.capacity_uaus / 4;
+  const double per_soc = static_cast<double>(cell.charge.capacity_uaus) / (268'435'456.0 * static_cast<double>(std::int64_t{1} << cell.charge.shift));
+  const double unit = is_q<Soc<S>> ? 1 : 268'435'456.0;
+  cell.charge.counts_per_soc = Soc<S>(per_soc * unit);
+  cell.charge.soc_per_count = Soc<S>(1 / (per_soc * unit));
+
+  const Noise& n = p.noise;
+  const auto square = [](double v) { return v * v; };
+  cell.noise.voltage_v2 = Variance<S>(square(n.voltage_v));
+  cell.noise.model_v2 = Variance<S>(square(n.model_v));
+  cell.noise.model_correlation_s = Duration<S>(n.model_correlation_s);
+  cell.noise.v_rc_v2 = Variance<S>(square(n.v_rc_v));
+  cell.noise.rest_v2 = Variance<S>(square(n.rest_v));
+  cell.noise.white_soc_per_s = Soc<S>(n.current_a / capacity_as);
+  cell.noise.walk_soc2_per_s = Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
+  cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
+
+  // half a volt and ten times the current beyond the limits of use: a sensor still tells the truth there, a fault does not
+  cell.plausible.voltage_min_uv = static_cast<std::int32_t>((p.limits.voltage_min_v - 0.5) * 1e6);
+  cell.plausible.voltage_max_uv = static_cast<std::int32_t>((p.limits.voltage_max_v + 0.5) * 1e6);
+  const double larger = p.limits.charge_current_max_a > p.limits.discharge_current_max_a ? p.limits.charge_current_max_a
+                                                                                         : p.limits.discharge_current_max_a;
+  cell.plausible.current_max_ua = static_cast<std::int32_t>(larger < 200 ? larger * 1e7 : 2e9);
+  return cell;
+}
+
+/// Interval that holds soc, found from a nearby one: a step moves soc by little. The result does not depend on `from`.
+template <class S, std::size_t Max>
+constexpr std::size_t interval_of(const Cell<S, Max>& cell, const Soc<S>& soc, std::size_t from) {
+  std::size_t k = from;
+  while (k + 1 < cell.size && soc >= cell.interval[k + 1].start) ++k;
+  while (k > 0 && soc < cell.interval[k].start) --k;
+  return k;
+}
+
+/// interval: where the last look-up ended, 0 at first; updated.
+template <class S, std::size_t Max>
+constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std::uint8_t& interval) {
+  const std::size_t k = interval_of(cell, soc, interval);
+  interval = static_cast<std::uint8_t>(k);
+  const Interval<S>& i = cell.interval[k];
+  const Soc<S> t = (soc - i.start) * i.per_width;
+  return {.ocv_v = i.ocv_v + t * i.ocv_delta_v,
+          .ocv_slope_v = i.ocv_delta_v * i.per_width,
+          .r0_ohm = i.r0_ohm + t * i.r0_delta_ohm,
+          .r1_ohm = i.r1_ohm + t * i.r1_delta_ohm,
+          .r0_slope_ohm = i.r0_delta_ohm * i.per_width,
+          .r1_slope_ohm = i.r1_delta_ohm * i.per_width,
+          .c1_f = i.c1_f + t * i.c1_delta_f,
+          .c1_slope_f = i.c1_delta_f * i.per_width};
+}
+
+template <class S, std::size_t Max>
+constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc) {
+  std::uint8_t interval = 0;
+  return look_up(cell, soc, interval);
+}
+
+}  // namespace bms::model

@@ -1,0 +1,161 @@
+// A cell as its file describes it: the tables of the paper and the figures around them, in SI units, before they are prepared
+// for a scalar (model/cell.hpp). The host fills it from TOML at run time; for firmware a generator writes the same
+// structure as a constexpr header, so that both start from the same digits.
+//
+//   Real: double, or ceres::Jet where a parameter is an unknown of a fit
+//
+// first_fault() is the one list of what a cell file may hold; host and build refuse by it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace bms::model {
+
+/// Up to Max values of one table column.
+template <class Real, std::size_t Max>
+struct Column {
+  std::array<Real, Max> value{};
+  std::size_t size = 0;
+
+  constexpr const Real& operator[](std::size_t k) const { return value[k]; }
+  constexpr Real& operator[](std::size_t k) { return value[k]; }
+  constexpr void push_back(const Real& v) { value[size++] = v; }
+};
+
+inline constexpr std::size_t max_ocv_edges = 64;
+inline constexpr std::size_t max_rc_nodes = 64;
+
+/// Piecewise linear open-circuit voltage (Eq. 4): b0_v[k] + b1_v[k] * soc holds for soc[k] <= soc < soc[k + 1].
+template <class Real>
+struct OcvTable {
+  Column<double, max_ocv_edges> soc;   ///< edges, ascending, first 0, last 1
+  Column<Real, max_ocv_edges> b0_v;    ///< [V], one less than edges
+  Column<Real, max_ocv_edges> b1_v;    ///< [V per unit of soc], > 0
+};
+
+/// Equivalent circuit at nodes of soc; linear in between, constant outside.
+template <class Real>
+struct RcTable {
+  Column<double, max_rc_nodes> soc;    ///< nodes, ascending, within 0 .. 1
+  Column<Real, max_rc_nodes> r0_ohm;
+  Column<Real, max_rc_nodes> r1_ohm;
+  Column<Real, max_rc_nodes> c1_f;
+};
+
+/// Limits of use, from the manufacturer.
+struct Limits {
+  double voltage_min_v = 0;
+  double voltage_max_v = 0;
+  double charge_current_max_a = 0;     ///< continuous, > 0
+  double discharge_current_max_a = 0;  ///< continuous, > 0
+  double temperature_min_c = 0;
+  double temperature_max_c = 0;
+};
+
+/// Errors that the estimator reckons with, as standard deviations.
+struct Noise {
+  double voltage_v = 0;                     ///< voltage reading, new in every sample
+  double model_v = 0;                       ///< model's own voltage error, lasting
+  double model_correlation_s = 0;           ///< how long it lasts
+  double v_rc_v = 0;                        ///< error of the RC voltage in the steady state
+  double rest_v = 0;                        ///< voltage read at rest against the OCV curve (hysteresis, relaxation)
+  double current_a = 0;                     ///< current reading, new in every sample
+  double current_offset_a = 0;              ///< slow error of the current reading
+  double current_offset_correlation_s = 0;  ///< how long it lasts
+  double current_unknown_a = 0;             ///< current to be expected while there is no reading
+};
+
+/// What the calibration is good for: a difference inside it is not a mismatch.
+struct Tolerance {
+  double ocv_v = 0;
+  double resistance_fraction = 0;
+  double initial_soc = 0;
+  double drift_v = 0;
+};
+
+template <class Real = double>
+struct CellParameters {
+  double capacity_ah = 0;
+  Limits limits;
+  OcvTable<Real> ocv;
+  RcTable<Real> rc;
+  Noise noise;
+  Tolerance tolerance;
+};
+
+/// Why a set of parameters is refused; what == nullptr: it is not.
+struct CellFault {
+  const char* key = nullptr;       ///< as in the cell file, e.g. "ocv.b1_v"
+  std::size_t index = 0;           ///< of the table entry
+  const char* what = nullptr;      ///< what is expected
+};
+
+/// Wide enough for any lithium cell from a coin to 1,000 Ah (Table 3 of the paper bounds the fit of one of 6 Ah), narrow enough
+/// that no scalar leaves its range.
+constexpr CellFault first_fault(const CellParameters<double>& p) {
+  // written so that NaN is outside
+  const auto outside = [](double v, double low, double high) { return !(v >= low && v <= high); };
+
+  if (outside(p.capacity_ah, 0.01, 1'000)) return {"capacity_ah", 0, "0.01 to 1000 Ah"};
+
+  const Limits& l = p.limits;
+  if (outside(l.voltage_min_v, 0.5, 5)) return {"limits.voltage_min_v", 0, "0.5 to 5 V"};
+  if (outside(l.voltage_max_v, l.voltage_min_v + 0.1, 5)) return {"limits.voltage_max_v", 0, "voltage_min_v + 0.1 to 5 V"};
+  if (outside(l.charge_current_max_a, 1e-3, 2'000)) return {"limits.charge_current_max_a", 0, "0.001 to 2000 A"};
+  if (outside(l.discharge_current_max_a, 1e-3, 2'000)) return {"limits.discharge_current_max_a", 0, "0.001 to 2000 A"};
+  if (outside(l.temperature_min_c, -60, 100)) return {"limits.temperature_min_c", 0, "-60 to 100 degrees C"};
+  if (outside(l.temperature_max_c, l.temperature_min_c, 150)) return {"limits.temperature_max_c", 0, "temperature_min_c to 150 degrees C"};
+
+  const auto& o = p.ocv;
+  if (o.soc.size < 2) return {"ocv.soc", 0, "two edges or more"};
+  if (o.b0_v.size + 1 != o.soc.size) return {"ocv.b0_v", 0, "one value less than ocv.soc"};
+  if (o.b1_v.size + 1 != o.soc.size) return {"ocv.b1_v", 0, "one value less than ocv.soc"};
+  if (o.soc[0] != 0) return {"ocv.soc", 0, "0 as the first edge"};
+  if (o.soc[o.soc.size - 1] != 1) return {"ocv.soc", o.soc.size - 1, "1 as the last edge"};
+  for (std::size_t k = 0; k + 1 < o.soc.size; ++k) {
+    if (outside(o.soc[k + 1] - o.soc[k], 0.001, 1)) return {"ocv.soc", k + 1, "edges that ascend by 0.001 or more"};
+    if (outside(o.b1_v[k], 1e-6, 60)) return {"ocv.b1_v", k, "a curve that rises: 0.000001 to 60 V per unit of soc"};
+    for (const double soc : {o.soc[k], o.soc[k + 1]}) {
+      if (outside(o.b0_v[k] + o.b1_v[k] * soc, 0.5, 5)) return {"ocv.b0_v", k, "an open-circuit voltage of 0.5 to 5 V"};
+    }
+    if (k > 0 && outside(o.b0_v[k] + o.b1_v[k] * o.soc[k] - o.b0_v[k - 1] - o.b1_v[k - 1] * o.soc[k], -0.005, 0.005)) {
+      return {"ocv.b0_v", k, "pieces that meet within 5 mV at their common edge"};
+    }
+  }
+
+  const auto& r = p.rc;
+  if (r.soc.size < 1) return {"rc.soc", 0, "one node or more"};
+  if (r.r0_ohm.size != r.soc.size) return {"rc.r0_ohm", 0, "as many values as rc.soc"};
+  if (r.r1_ohm.size != r.soc.size) return {"rc.r1_ohm", 0, "as many values as rc.soc"};
+  if (r.c1_f.size != r.soc.size) return {"rc.c1_f", 0, "as many values as rc.soc"};
+  for (std::size_t k = 0; k < r.soc.size; ++k) {
+    if (outside(r.soc[k], 0, 1)) return {"rc.soc", k, "0 to 1"};
+    if (k > 0 && outside(r.soc[k] - r.soc[k - 1], 0.001, 1)) return {"rc.soc", k, "nodes that ascend by 0.001 or more"};
+    if (outside(r.r0_ohm[k], 1e-5, 0.5)) return {"rc.r0_ohm", k, "0.00001 to 0.5 ohm"};
+    if (outside(r.r1_ohm[k], 1e-5, 0.5)) return {"rc.r1_ohm", k, "0.00001 to 0.5 ohm"};
+    if (outside(r.c1_f[k], 100, 100'000)) return {"rc.c1_f", k, "100 to 100000 F"};
+    if (outside(r.r1_ohm[k] * r.c1_f[k], 0.2, 50'000)) return {"rc.c1_f", k, "a time constant r1 * c1 of 0.2 to 50000 s"};
+  }
+
+  const Noise& n = p.noise;
+  if (outside(n.voltage_v, 1e-5, 0.5)) return {"noise.voltage_v", 0, "0.00001 to 0.5 V"};
+  if (outside(n.model_v, 1e-5, 0.5)) return {"noise.model_v", 0, "0.00001 to 0.5 V"};
+  if (outside(n.model_correlation_s, 0, 86'400)) return {"noise.model_correlation_s", 0, "0 to 86400 s"};
+  if (outside(n.v_rc_v, 1e-5, 0.5)) return {"noise.v_rc_v", 0, "0.00001 to 0.5 V"};
+  if (outside(n.rest_v, 1e-4, 0.5)) return {"noise.rest_v", 0, "0.0001 to 0.5 V"};
+  const double c_rate_1_a = p.capacity_ah;
+  if (outside(n.current_a, 1e-7 * c_rate_1_a, c_rate_1_a)) return {"noise.current_a", 0, "1e-7 to 1 times the 1C current"};
+  if (outside(n.current_offset_a, 1e-6 * c_rate_1_a, c_rate_1_a)) return {"noise.current_offset_a", 0, "1e-6 to 1 times the 1C current"};
+  if (outside(n.current_offset_correlation_s, 1, 1e6)) return {"noise.current_offset_correlation_s", 0, "1 to 1000000 s"};
+  if (outside(n.current_unknown_a, 1e-3 * c_rate_1_a, 10 * c_rate_1_a)) return {"noise.current_unknown_a", 0, "0.001 to 10 times the 1C current"};
+
+  const Tolerance& t = p.tolerance;
+  if (outside(t.ocv_v, 0, 0.1)) return {"tolerance.ocv_v", 0, "0 to 0.1 V"};
+  if (outside(t.resistance_fraction, 0, 1)) return {"tolerance.resistance_fraction", 0, "0 to 1"};
+  if (outside(t.initial_soc, 0, 1)) return {"tolerance.initial_soc", 0, "0 to 1"};
+  if (outside(t.drift_v, 0, 0.1)) return {"tolerance.drift_v", 0, "0 to 0.1 V"};
+  return {};
+}
+
+}  // namespace bms::model

@@ -1,0 +1,86 @@
+// The paper's grey-box model: one RC branch behind a resistance and an open-circuit voltage (Fig. 1, Eq. 1-2, 8-9).
+//
+//   d v_rc / dt = -v_rc / (R1 C1) + I / C1        d soc / dt = I / (3600 C_n)        V = OCV(soc) + v_rc + R0 I
+//
+// Current > 0 charges; v_rc > 0 while charging (v_rc = -x1 of Eq. 9; the sign of R0 u in Eq. 3 and 5 is an erratum).
+// One step is exact for a current that is constant over it (zero-order hold), with R1 and C1 taken at the soc after the step:
+//
+//   p = 1 - exp(-dt / (R1 C1))        v_rc' = v_rc + p (R1 I - v_rc)
+//
+// A model gives the filter: `states` (soc is always the last), how the states before soc advance, the voltage, and the derivatives
+// of both. A state may depend on itself and on later states only, so that the transition matrix is upper triangular; a second RC
+// or a hysteresis voltage comes before soc, a sensor offset would come after.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "model/cell.hpp"
+#include "model/exponential.hpp"
+
+namespace bms::model {
+
+/// What acts on the cell during one step.
+template <class S>
+struct Drive {
+  Current<S> current_a;      ///< mean over the step, > 0 charges
+  TimeStep<S> duration_s;    ///< > 0
+};
+
+template <class S>
+struct OneRc {
+  static constexpr std::size_t states = 2;  ///< v_rc [V], soc
+
+  using Polarisation = std::array<Voltage<S>, states - 1>;  ///< the states before soc
+  using Transition = std::array<std::array<Coupling<S>, states>, states>;
+  using Sensitivity = std::array<VoltagePerSoc<S>, states>;
+
+  /// How far the RC branch settles within a step, for the tables at one soc.
+  struct Settling {
+    Rate<S> rate_per_s;       ///< 1 / (R1 C1)
+    Exponent<S> exponent;     ///< duration / (R1 C1)
+    Fraction<S> settled;      ///< p
+  };
+
+  static constexpr Settling settling(const TablePoint<S>& at, const TimeStep<S>& duration_s) {
+    const Duration<S> tau_s = at.r1_ohm * at.c1_f;
+    const Rate<S> rate_per_s = ratio<Rate<S>>(Duration<S>(1), tau_s);
+    const Exponent<S> exponent = duration_s * rate_per_s;
+    return {rate_per_s, exponent, bms::model::settled<S>(exponent)};
+  }
+
+  /// v_rc and soc at the start of the step; `at` and `settling` belong to the soc at its end.
+  static constexpr Polarisation advance(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
+    const Voltage<S> target_v = at.r1_ohm * drive.current_a;
+    return {Voltage<S>(x[0] + settling.settled * Voltage<S>(target_v - x[0]))};
+  }
+
+  /// Terminal voltage (Eq. 9).
+  static constexpr Voltage<S> voltage(const Polarisation& x, const TablePoint<S>& at, const Drive<S>& drive) {
+    return at.ocv_v + x[0] + at.r0_ohm * drive.current_a;
+  }
+
+  /// d (state after) / d (state before), upper triangular. The derivative by soc runs through R1, C1 and dp/dx = exp(-x).
+  static constexpr Transition transition(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
+    const Fraction<S> remaining = Fraction<S>(1) - settling.settled;
+    const Voltage<S> gap_v = at.r1_ohm * drive.current_a - x[0];
+    // d exponent / d soc = -exponent * rate * d(R1 C1)/d soc
+    const TauPerSoc tau_slope_s = at.r1_slope_ohm * at.c1_f + at.r1_ohm * at.c1_slope_f;
+    const PerSoc<S> rate_slope = tau_slope_s * settling.rate_per_s;
+    const PerSoc<S> settled_slope = -(PerSoc<S>(remaining * Short(settling.exponent)) * rate_slope);
+    const VoltagePerSoc<S> target_slope_v = at.r1_slope_ohm * drive.current_a;
+    return {{{Coupling<S>(remaining), Coupling<S>(settled_slope * gap_v + settling.settled * target_slope_v)},
+             {Coupling<S>(0), Coupling<S>(1)}}};
+  }
+
+  /// d voltage / d state, at the state after the step.
+  static constexpr Sensitivity sensitivity(const TablePoint<S>& at, const Drive<S>& drive) {
+    return {VoltagePerSoc<S>(1), VoltagePerSoc<S>(at.ocv_slope_v + at.r0_slope_ohm * drive.current_a)};
+  }
+
+ private:
+  using Short = Current<S>;                 // exponents below 2,048 in 32 bits
+  using TauPerSoc = CapacitancePerSoc<S>;   // s per unit of soc
+};
+
+}  // namespace bms::model

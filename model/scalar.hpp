@@ -1,0 +1,129 @@
+// The numbers the physics is written in: one type per quantity, chosen by the scalar.
+//
+//   float, double, ceres::Jet   every quantity is that type; the names below only document
+//   FixedPoint                  every quantity has its own range and step (model/fixed.hpp)
+//
+// An expression of quantities is plain algebra. Storing it in a named quantity is where a fixed-point value is rounded:
+//
+//   const Voltage<S> drop_v = r0_ohm * current_a;
+//
+// The ranges below cover every cell file that model/cell_parameters.hpp accepts.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+
+#include "model/fixed.hpp"
+
+namespace bms::model {
+
+/// Selects the integer arithmetic of cores without an FPU.
+struct FixedPoint {};
+
+template <class S>
+struct Quantities {  // a floating-point or dual number: one type for all
+  using Soc = S;
+  using PerSoc = S;
+  using Voltage = S;
+  using VoltagePerSoc = S;
+  using Current = S;
+  using Resistance = S;
+  using ResistancePerSoc = S;
+  using Capacitance = S;
+  using CapacitancePerSoc = S;
+  using Duration = S;
+  using TimeStep = S;
+  using Exponent = S;
+  using Rate = S;
+  using Fraction = S;
+  using Variance = S;
+  using Coupling = S;
+  using Gain = S;
+  using Count = S;
+};
+
+template <>
+struct Quantities<FixedPoint> {
+  using Soc = Q<3, 28>;                 // +-8, step 3.7e-9
+  using PerSoc = Q<11, 20>;             // 1 / width of an interval: up to 2,048
+  using Voltage = Q<3, 28>;             // +-8 V, step 3.7 nV; also every other state but soc
+  using VoltagePerSoc = Q<7, 24>;       // +-128 V
+  using Current = Q<11, 20>;            // +-2,048 A, step 1 uA
+  using Resistance = Q<0, 31>;          // below 1 ohm, step 0.5 nohm
+  using ResistancePerSoc = Q<6, 25>;    // +-64 ohm
+  using Capacitance = Q<17, 14>;        // below 131 kF
+  using CapacitancePerSoc = Q<28, 3>;   // +-268 MF
+  using Duration = Q<17, 14>;           // time constants, below 131,072 s
+  using TimeStep = Q<12, 19>;           // one step, below 4,096 s (a longer one counts as 4,096 s: everything has settled), step 1.9 us
+  using Rate = Q<3, 28>;                // 1 / time constant: 0.125 s and longer
+  using Exponent = Q<15, 47>;           // time step times rate
+  using Fraction = Q<1, 30>;            // +-2
+  using Variance = Q<1, 62>;            // below 2 V^2 or 2 soc^2, step 2.2e-19
+  using Coupling = Q<7, 24>;            // one state per unit of another: +-128
+  using Gain = Q<10, 21>;               // correction of a state per volt: +-1,024
+  using Count = Q<24, 7>;               // samples that share one error: below 16,777,216
+};
+
+template <class S> using Soc = typename Quantities<S>::Soc;                              ///< 0 empty .. 1 full
+template <class S> using PerSoc = typename Quantities<S>::PerSoc;                        ///< 1 per unit of soc
+template <class S> using Voltage = typename Quantities<S>::Voltage;                      ///< V
+template <class S> using VoltagePerSoc = typename Quantities<S>::VoltagePerSoc;          ///< V per unit of soc
+template <class S> using Current = typename Quantities<S>::Current;                      ///< A, > 0 charges
+template <class S> using Resistance = typename Quantities<S>::Resistance;                ///< ohm
+template <class S> using ResistancePerSoc = typename Quantities<S>::ResistancePerSoc;    ///< ohm per unit of soc
+template <class S> using Capacitance = typename Quantities<S>::Capacitance;              ///< F
+template <class S> using CapacitancePerSoc = typename Quantities<S>::CapacitancePerSoc;  ///< F per unit of soc
+template <class S> using Duration = typename Quantities<S>::Duration;                    ///< s
+template <class S> using TimeStep = typename Quantities<S>::TimeStep;                    ///< s
+template <class S> using Exponent = typename Quantities<S>::Exponent;                    ///< 1
+template <class S> using Rate = typename Quantities<S>::Rate;                            ///< 1/s
+template <class S> using Fraction = typename Quantities<S>::Fraction;                    ///< 1
+template <class S> using Variance = typename Quantities<S>::Variance;                    ///< square of a state's unit
+template <class S> using Coupling = typename Quantities<S>::Coupling;                    ///< state per state
+template <class S> using Gain = typename Quantities<S>::Gain;                            ///< state per volt
+template <class S> using Count = typename Quantities<S>::Count;                          ///< 1
+
+/// a * b stored in R. Needed only where both operands are wide (variances); elsewhere write a * b.
+template <class R, class A, class B>
+constexpr R product(const A& a, const B& b) {
+  return R(a * b);
+}
+
+template <class R, class S>
+  requires(!is_q<R>)
+constexpr R ratio(const S& numerator, const S& denominator) {
+  return numerator / denominator;
+}
+
+template <class R, class S>
+  requires(!is_q<R>)
+R root(const S& x) {
+  using std::sqrt;  // IEEE 754: correctly rounded, equal on every core; a Jet brings its own
+  return sqrt(x);
+}
+
+/// The quantity that belongs to a measurement in integer micro-units, e.g. microamperes to amperes.
+template <class R>
+constexpr R from_micro(std::int32_t micro) {
+  if constexpr (is_q<R>) {
+    constexpr std::int64_t factor = 4'503'599'627;  // 2^52 / 10^6
+    // |micro| < 2^31: split so that 64 bits are enough
+    const std::int64_t high = (static_cast<std::int64_t>(micro) >> 16) * factor;      // < 2^48
+    const std::int64_t low = (static_cast<std::int64_t>(micro) & 0xFFFF) * factor;    // < 2^49
+    return Q<11, 36>::from_raw(high + (low >> 16));                                   // micro * 2^36 / 10^6
+  } else if constexpr (std::same_as<R, float>) {
+    return static_cast<float>(micro) * 1e-6F;
+  } else {
+    return R(static_cast<double>(micro) * 1e-6);
+  }
+}
+
+/// Number without its derivatives, as double: for reports and tests, never in the step.
+template <class T>
+  requires(is_q<T> || std::floating_point<T>)
+constexpr double as_double(const T& x) {
+  return static_cast<double>(x);
+}
+
+}  // namespace bms::model

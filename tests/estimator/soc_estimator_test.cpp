@@ -1,0 +1,184 @@
+#include "estimator/soc_estimator.hpp"
+
+#include <ceres/jet.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "host_sim/cell_file.hpp"
+
+namespace bms {
+namespace {
+
+template <class S>
+auto table9() {
+  return model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
+}
+
+/// Samples of an hour of work at 1 Hz. The voltage is rough on purpose (R0 only): these tests are about the filter's manners.
+std::vector<Sample> work(std::size_t count) {
+  std::vector<Sample> samples(count);
+  std::mt19937 random(5);
+  double soc = 0.8;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::int32_t current_ua = k < 60 ? 0 : (k / 40) % 3 == 0 ? -5'000'000 : (k / 40) % 3 == 1 ? 1'000'000 : -200'000;
+    soc += current_ua * 1e-6 / 3'600 / 6;
+    const double voltage_v = 3.25 + 0.09 * soc + 0.015 * current_ua * 1e-6;
+    samples[k] = {k * 1'000'000, current_ua, static_cast<std::int32_t>(voltage_v * 1e6) + static_cast<std::int32_t>(random() % 2'000) - 1'000, 2'500};
+  }
+  return samples;
+}
+
+template <class S>
+std::vector<Estimate<S>> run(const std::vector<Sample>& samples, SocEstimator<S> estimator = SocEstimator<S>()) {
+  const auto cell = table9<S>();
+  std::vector<Estimate<S>> estimates;
+  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  return estimates;
+}
+
+void expect_finite(const Estimate<float>& e, const std::string& where) {
+  EXPECT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) && std::isfinite(e.voltage_predicted_v)) << where;
+  EXPECT_GT(e.soc_sigma, 0) << where;
+}
+
+TEST(SocEstimator, StateOfOneCellFitsIn24Bytes) {
+  EXPECT_EQ(sizeof(CellState<float, model::OneRc>), 24U);
+}
+
+TEST(SocEstimator, EveryScalarTellsTheSameStory) {
+  const auto samples = work(3'600);
+  const StartingPoint start{810'000'000, 20'000'000};  // not on an edge, where a count of charge decides on the slope
+  const auto single = run<float>(samples, SocEstimator<float>(start));
+  const auto twice = run<double>(samples, SocEstimator<double>(start));
+  const auto fixed = run<model::FixedPoint>(samples, SocEstimator<model::FixedPoint>(start));
+  using Jet = ceres::Jet<double, 3>;
+  const auto jets = run<Jet>(samples, SocEstimator<Jet>(start));
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    ASSERT_NEAR(single[k].soc, twice[k].soc, 2e-5) << k;
+    ASSERT_NEAR(model::as_double(fixed[k].soc), twice[k].soc, 1e-4) << k;  // a tenth of what is asked of fixed point in the end
+    ASSERT_NEAR(model::as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
+    ASSERT_NEAR(jets[k].soc.a, twice[k].soc, 1e-5) << k;  // Charge<Jet> does not cut its corrections to counts of 4e-9
+    ASSERT_NEAR(jets[k].voltage_predicted_v.a, twice[k].voltage_predicted_v, 1e-5) << k;
+  }
+}
+
+TEST(SocEstimator, FirstEstimateIsTheStartingPoint) {
+  const auto cell = table9<float>();
+  SocEstimator<float> estimator(StartingPoint{650'000'000, 50'000'000});
+  const auto e = estimator.step(cell, {0, 0, 3'300'000, 2'500});
+  EXPECT_NEAR(e.soc, 0.65, 1e-6);
+  EXPECT_NEAR(e.soc_sigma, 0.05, 1e-6);
+}
+
+TEST(SocEstimator, WaitsForAVoltageWhenNothingIsKnown) {
+  const auto cell = table9<float>();
+  SocEstimator<float> estimator;
+  auto e = estimator.step(cell, {0, 0, no_reading, no_temperature});
+  EXPECT_EQ(e.flags, not_started | voltage_missing);
+  EXPECT_NEAR(e.soc_sigma, 1 / std::sqrt(12.0), 1e-3);
+  e = estimator.step(cell, {1'000'000, 0, 3'400'000, no_temperature});
+  EXPECT_EQ(e.flags, 0U);
+  EXPECT_GT(e.soc, 0.9);
+}
+
+TEST(SocEstimator, PredictsThroughAMissingVoltageWhileSigmaGrows) {
+  auto samples = work(1'200);
+  for (std::size_t k = 600; k < 1'200; ++k) samples[k].voltage_uv = no_reading;
+  const auto e = run<float>(samples);
+  for (std::size_t k = 600; k < 1'200; ++k) {
+    ASSERT_EQ(e[k].flags, voltage_missing);
+    ASSERT_GT(e[k].soc_sigma, e[k - 1].soc_sigma) << k;
+  }
+  double charge_ah = 0;
+  for (std::size_t k = 600; k < 1'200; ++k) charge_ah += samples[k].current_ua * 1e-6 / 3'600;
+  EXPECT_NEAR(e[1'199].soc - e[599].soc, charge_ah / 6, 1e-6);
+}
+
+TEST(SocEstimator, GoesOnWithTheLastCurrentWhileItIsMissingAndSigmaGrowsFast) {
+  auto samples = work(1'200);
+  for (std::size_t k = 600; k < 1'200; ++k) {
+    samples[k].current_ua = no_reading;
+    samples[k].voltage_uv = no_reading;
+  }
+  const auto e = run<float>(samples);
+  // ten minutes of an unknown 1.2 A (cell file) are 3.3 % of 6 Ah
+  EXPECT_NEAR(e[1'199].soc_sigma - e[599].soc_sigma, 1.2 / 6 / 6, 0.003);
+  EXPECT_NEAR(e[1'199].soc - e[599].soc, samples[599].current_ua * 1e-6 / 6 / 6, 1e-5);
+}
+
+TEST(SocEstimator, AGapIsFlaggedOnceAndMakesSigmaGrow) {
+  auto samples = work(1'200);
+  for (std::size_t k = 600; k < 1'200; ++k) samples[k].time_us += 600'000'000;
+  samples[600].current_ua = 0;
+  const auto e = run<float>(samples, SocEstimator<float>(StartingPoint{800'000'000, 5'000'000}));
+  EXPECT_EQ(e[600].flags, time_gap);
+  EXPECT_EQ(e[601].flags, 0U);
+  EXPECT_EQ(e[599].flags, 0U);
+  EXPECT_GT(e[600].soc_sigma, e[599].soc_sigma);
+}
+
+TEST(SocEstimator, IgnoresASampleThatIsNotLater) {
+  const auto cell = table9<float>();
+  SocEstimator<float> estimator;
+  const auto samples = work(100);
+  Estimate<float> last;
+  for (const Sample& s : samples) last = estimator.step(cell, s);
+  auto again = samples.back();
+  again.voltage_uv = 2'500'000;
+  const auto e = estimator.step(cell, again);
+  EXPECT_EQ(e.flags, time_not_later);
+  EXPECT_EQ(e.soc, last.soc);
+  again.time_us = 5;
+  EXPECT_EQ(estimator.step(cell, again).flags, time_not_later);
+}
+
+TEST(SocEstimator, AStuckVoltageDoesNotDragTheEstimateAlong) {
+  auto samples = work(3'600);
+  for (std::size_t k = 600; k < samples.size(); ++k) samples[k].voltage_uv = samples[599].voltage_uv;
+  const auto stuck = run<float>(samples, SocEstimator<float>(StartingPoint{800'000'000, 20'000'000}));
+  std::size_t flagged = 0;
+  for (const auto& e : stuck) flagged += (e.flags & voltage_stuck) != 0 ? 1 : 0;
+  EXPECT_GT(flagged, 1'000U);
+  double charge_ah = 0;
+  for (std::size_t k = 600; k < samples.size(); ++k) charge_ah += samples[k].current_ua * 1e-6 / 3'600;
+  EXPECT_NEAR(stuck.back().soc - stuck[599].soc, charge_ah / 6, 0.005);
+}
+
+TEST(SocEstimator, NothingThatComesInMakesTheStateNotANumber) {
+  const auto cell = table9<float>();
+  std::mt19937_64 random(11);
+  for (int run = 0; run < 50; ++run) {
+    SocEstimator<float> estimator;
+    std::uint64_t time_us = 0;
+    for (int k = 0; k < 2'000; ++k) {
+      time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
+      const auto anything = [&](std::int32_t usual) { return random() % 3 == 0 ? static_cast<std::int32_t>(random()) : random() % 7 == 0 ? no_reading : usual; };
+      const Sample sample{time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())};
+      const auto e = estimator.step(cell, sample);
+      expect_finite(e, "run " + std::to_string(run) + " step " + std::to_string(k));
+      ASSERT_GE(e.soc, -0.26F);
+      ASSERT_LE(e.soc, 1.26F);
+      if (HasFailure()) return;
+    }
+  }
+}
+
+TEST(SocEstimator, TheSameSamplesGiveTheSameBits) {
+  const auto samples = work(2'000);
+  const auto a = run<float>(samples), b = run<float>(samples);
+  for (std::size_t k = 0; k < samples.size(); ++k) ASSERT_EQ(words(a[k]), words(b[k]));
+}
+
+TEST(SocEstimator, AFirmwareTableOfExactSizeGivesTheSameBitsAsTheHostsLargeOne) {
+  static const auto parameters = read_cell("table9").parameters;
+  ASSERT_EQ(model::interval_count(parameters), 12U);
+  const auto exact = model::prepare<float, 12>(parameters);
+  const auto large = table9<float>();
+  SocEstimator<float> a, b;
+  for (const Sample& s : work(2'000)) ASSERT_EQ(words(a.step(exact, s)), words(b.step(large, s)));
+}
+
+}  // namespace
+}  // namespace bms

@@ -1,0 +1,51 @@
+// What stands between the cell and the recording: gain error, slow drift of the zero, noise, steps.
+//
+//   reading = round_to_step((1 + gain_error) * true value + drift + noise)
+//
+// The drift is an Ornstein-Uhlenbeck process: it stays around zero with drift_sigma and forgets itself within
+// drift_correlation_s; it is not known at the start either. Seeded, the same on every machine.
+#pragma once
+
+#include <cstdint>
+
+#include "tests/truth/random.hpp"
+
+namespace truth {
+
+/// drift_sigma, noise_sigma and step in the unit of what is measured.
+struct ChannelParameters {
+  double gain_error = 0;  ///< fraction
+  double drift_sigma = 0;
+  double drift_correlation_s = 3'600;
+  double noise_sigma = 0;
+  double step = 0;  ///< 0: not quantised
+};
+
+class Channel {
+ public:
+  Channel(const ChannelParameters& parameters, std::uint64_t seed);
+
+  /// elapsed_s since the reading before, far less than drift_correlation_s.
+  double read(double true_value, double elapsed_s);
+  double drift() const { return drift_; }
+
+ private:
+  ChannelParameters parameters_;
+  Random random_;
+  double drift_;
+};
+
+/// A forklift's measuring chain: shunt with amplifier, cell monitor IC, thermistor.
+struct InstrumentParameters {
+  ChannelParameters current_a = {.gain_error = 0.002, .drift_sigma = 0.015, .drift_correlation_s = 3'600, .noise_sigma = 0.010, .step = 0.005};
+  ChannelParameters voltage_v = {.gain_error = 0, .drift_sigma = 0.0005, .drift_correlation_s = 7'200, .noise_sigma = 0.001, .step = 0.001};
+  ChannelParameters temperature_c = {.gain_error = 0, .drift_sigma = 0, .drift_correlation_s = 3'600, .noise_sigma = 0.05, .step = 0.1};
+};
+
+struct Instruments {
+  Instruments(const InstrumentParameters& parameters, std::uint64_t seed);
+
+  Channel current_a, voltage_v, temperature_c;
+};
+
+}  // namespace truth
