@@ -140,10 +140,10 @@ class SocEstimator {
 
   template <class Cell, class Row>
   constexpr void correct(const Cell& cell, const Row& sensitivity, const Voltage& innovation_v) {
-    const auto gain = state_.covariance.observe(sensitivity, voltage_noise_);
+    const auto correction = state_.covariance.observe(sensitivity, voltage_noise_, innovation_v);
 #pragma GCC unroll 8
-    for (std::size_t i = 0; i + 1 < states; ++i) state_.polarisation[i] = Voltage(state_.polarisation[i] + gain[i] * innovation_v);
-    state_.charge.correct(Soc(gain[states - 1] * innovation_v), cell.charge);
+    for (std::size_t i = 0; i + 1 < states; ++i) state_.polarisation[i] += correction[i];
+    state_.charge.correct(correction[states - 1], cell.charge);
   }
 
   template <class Cell>

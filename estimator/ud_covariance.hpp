@@ -22,7 +22,7 @@ class UdCovariance {
   using Variance = model::Variance<S>;
   using Coupling = model::Coupling<S>;
   using Fraction = model::Fraction<S>;
-  using Gain = model::Gain<S>;
+  using State = model::Voltage<S>;  // also soc: the same range in every scalar
 
  public:
   using Matrix = std::array<std::array<Coupling, N>, N>;
@@ -81,8 +81,9 @@ class UdCovariance {
     }
   }
 
-  /// Takes in a measurement with sensitivity h and noise variance r > 0; returns the gain for each state.
-  constexpr std::array<Gain, N> observe(const Row& h, const Variance& r) {
+  /// Takes in a measurement with sensitivity h, noise variance r > 0 and innovation e (measured less predicted); returns the
+  /// correction of each state, P h' e / (h P h' + r). Multiplied first, divided last: fixed point keeps the digits of a small gain.
+  constexpr std::array<State, N> observe(const Row& h, const Variance& r, const State& e) {
     std::array<Variance, N> b{};  // U D U' h', built column by column
     Variance alpha = r;           // variance of the innovation, of the states so far
 #pragma GCC unroll 8
@@ -97,15 +98,15 @@ class UdCovariance {
 #pragma GCC unroll 8
       for (std::size_t i = 0; i < j; ++i) {
         const Coupling old = u(i, j);
-        u(i, j) = Coupling(old - f * model::ratio<Gain>(b[i], before));
+        u(i, j) = Coupling(old - model::ratio<Coupling>(model::product<Variance>(b[i], f), before));
         b[i] = Variance(b[i] + model::product<Variance>(g, old));
       }
       b[j] = g;
     }
-    std::array<Gain, N> gain;
+    std::array<State, N> correction;
 #pragma GCC unroll 8
-    for (std::size_t i = 0; i < N; ++i) gain[i] = model::ratio<Gain>(b[i], alpha);
-    return gain;
+    for (std::size_t i = 0; i < N; ++i) correction[i] = model::ratio<State>(model::product<Variance>(b[i], e), alpha);
+    return correction;
   }
 
   /// P itself, row by row: for reports and tests.

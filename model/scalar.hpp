@@ -39,7 +39,6 @@ struct Quantities {  // a floating-point or dual number: one type for all
   using Fraction = S;
   using Variance = S;
   using Coupling = S;
-  using Gain = S;
   using Count = S;
 };
 
@@ -59,9 +58,8 @@ struct Quantities<FixedPoint> {
   using Rate = Q<3, 28>;                // 1 / time constant: 0.125 s and longer
   using Exponent = Q<15, 47>;           // time step times rate
   using Fraction = Q<1, 30>;            // +-2
-  using Variance = Q<1, 62>;            // below 2 V^2 or 2 soc^2, step 2.2e-19
+  using Variance = Q<3, 60>;            // below 8 V^2 or 8 soc^2, step 8.7e-19
   using Coupling = Q<7, 24>;            // one state per unit of another: +-128
-  using Gain = Q<10, 21>;               // correction of a state per volt: +-1,024
   using Count = Q<24, 7>;               // samples that share one error: below 16,777,216
 };
 
@@ -81,7 +79,6 @@ template <class S> using Rate = typename Quantities<S>::Rate;                   
 template <class S> using Fraction = typename Quantities<S>::Fraction;                    ///< 1
 template <class S> using Variance = typename Quantities<S>::Variance;                    ///< square of a state's unit
 template <class S> using Coupling = typename Quantities<S>::Coupling;                    ///< state per state
-template <class S> using Gain = typename Quantities<S>::Gain;                            ///< state per volt
 template <class S> using Count = typename Quantities<S>::Count;                          ///< 1
 
 /// a * b stored in R. Needed only where both operands are wide (variances); elsewhere write a * b.

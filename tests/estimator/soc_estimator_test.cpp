@@ -48,8 +48,8 @@ TEST(SocEstimator, StateOfOneCellFitsIn24Bytes) {
 }
 
 TEST(SocEstimator, EveryScalarTellsTheSameStory) {
-  const auto samples = work(3'600);
-  const StartingPoint start{810'000'000, 20'000'000};  // not on an edge, where a count of charge decides on the slope
+  const auto samples = work(1'000);
+  const StartingPoint start{770'000'000, 5'000'000};  // between two edges: on one, the last bit decides which slope holds
   const auto single = run<float>(samples, SocEstimator<float>(start));
   const auto twice = run<double>(samples, SocEstimator<double>(start));
   const auto fixed = run<model::FixedPoint>(samples, SocEstimator<model::FixedPoint>(start));

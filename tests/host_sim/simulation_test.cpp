@@ -1,0 +1,55 @@
+#include "host_sim/simulation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/experiment.hpp"
+#include "host_sim/figures.hpp"
+
+namespace bms {
+namespace {
+
+TEST(Simulation, CountsTheChargeAndRestsAtTheOpenCircuitVoltage) {
+  const auto p = read_cell("table9").parameters;
+  const auto cell = model::prepare<double, model::max_intervals>(p);
+  std::vector<double> time_s, current_a;
+  for (int k = 0; k <= 7'200; ++k) {
+    time_s.push_back(k);
+    current_a.push_back(k > 0 && k <= 1'800 ? -6 : 0);  // half an hour at 1C, then rest
+  }
+  const auto rows = simulate(cell, p.capacity_ah, time_s, current_a, 0.95);
+  EXPECT_NEAR(rows.back().soc, 0.45, 1e-12);
+  EXPECT_NEAR(rows.back().voltage_v, 3.281 + 0.01 * 0.45, 1e-9);
+  EXPECT_NEAR(rows[1'800].voltage_v - rows[1'801].voltage_v, -6 * 0.0132 - 0.0085 * 6 * 0.082, 0.005);
+}
+
+TEST(Figures, FitIsA6AndIgnoresMissingReadings) {
+  FitFigure fit;
+  ErrorFigure error;
+  const double measured[] = {1, 2, 3, std::nan(""), 4}, simulated[] = {1, 2, 3, 7, 3};
+  for (int k = 0; k < 5; ++k) {
+    fit.add(measured[k], simulated[k]);
+    error.add(measured[k] - simulated[k]);
+  }
+  EXPECT_NEAR(fit.percent(), 100 * (1 - 1 / std::sqrt(5.0)), 1e-12);
+  EXPECT_EQ(error.count(), 4U);
+  EXPECT_NEAR(error.rms(), 0.5, 1e-12);
+  EXPECT_EQ(error.max(), 1);
+}
+
+TEST(Experiment, EveryProfileStaysWithin1CAndIsTheSameEachTime) {
+  for (const Experiment& e : experiments()) {
+    const auto a = *experiment(e.name, {.capacity_ah = 2.5}), b = *experiment(e.name, {.capacity_ah = 2.5});
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      ASSERT_LE(std::abs(a[k].current_a), 2.5) << e.name << " at " << a[k].time_s;
+      ASSERT_EQ(a[k].current_a, b[k].current_a);
+    }
+  }
+  EXPECT_FALSE(experiment("no_such_thing", {}).has_value());
+}
+
+}  // namespace
+}  // namespace bms
