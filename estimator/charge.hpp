@@ -62,8 +62,10 @@ class Charge {
   }
 
   constexpr void hold(const Scale& scale) {
-    if (uaus_ > scale.highest_uaus) uaus_ = scale.highest_uaus;
-    if (uaus_ < scale.lowest_uaus) uaus_ = scale.lowest_uaus;
+    // the upper half tells, to less than a five-thousandth of the smallest cell
+    const auto upper = static_cast<std::uint32_t>(uaus_ >> 32), lowest = static_cast<std::uint32_t>(scale.lowest_uaus >> 32);
+    if (upper - lowest < static_cast<std::uint32_t>(scale.highest_uaus >> 32) - lowest) [[likely]] return;
+    uaus_ = uaus_ < 0 ? scale.lowest_uaus : scale.highest_uaus;
   }
 
   std::int64_t uaus_ = 0;

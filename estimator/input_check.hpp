@@ -31,14 +31,11 @@ class InputCheck {
   static constexpr double stuck_move_v = 0.02;  // far above any ADC's step, below any load's effect
 
   constexpr BelievedCurrent current(std::int32_t current_ua, const model::Plausible& plausible, std::uint32_t& flags) {
-    if (current_ua == no_reading) {
-      flags |= current_missing;
-    } else if (current_ua > plausible.current_max_ua || current_ua < -plausible.current_max_ua) {
-      flags |= current_implausible;
-    } else {
+    if (within(current_ua, -plausible.current_max_ua, plausible.current_max_ua)) [[likely]] {
       current_ua_ = current_ua;
       return {current_ua, true};
     }
+    flags |= current_ua == no_reading ? current_missing : current_implausible;
     return {current_ua_, false};
   }
 
@@ -48,7 +45,6 @@ class InputCheck {
     if (voltage_uv != voltage_uv_) {
       voltage_uv_ = voltage_uv;
       repeats_ = 0;
-      stuck_ = false;
       predicted_then_v_ = predicted_v;
       return true;
     }
@@ -58,37 +54,37 @@ class InputCheck {
     }
     const model::Voltage<S> moved_v = predicted_v - predicted_then_v_;
     const auto limit_v = model::Voltage<S>(stuck_move_v);
-    if (moved_v > limit_v || moved_v < -limit_v) stuck_ = true;
-    if (stuck_) flags |= voltage_stuck;
-    return !stuck_;
+    if (moved_v > limit_v || moved_v < -limit_v) repeats_ = stuck;
+    if (repeats_ == stuck) flags |= voltage_stuck;
+    return repeats_ != stuck;
   }
 
   static constexpr bool voltage_present(std::int32_t voltage_uv, const model::Plausible& plausible, std::uint32_t& flags) {
-    if (voltage_uv == no_reading) {
-      flags |= voltage_missing;
-    } else if (voltage_uv > plausible.voltage_max_uv || voltage_uv < plausible.voltage_min_uv) {
-      flags |= voltage_implausible;
-    } else {
-      return true;
-    }
+    if (within(voltage_uv, plausible.voltage_min_uv, plausible.voltage_max_uv)) [[likely]] return true;
+    flags |= voltage_uv == no_reading ? voltage_missing : voltage_implausible;
     return false;
   }
 
-  /// step_us: time since the previous sample, > 0.
-  constexpr bool gap(std::uint64_t step_us, std::uint32_t& flags) {
-    const bool gap = usual_step_us_ != 0 && step_us > usual_step_us_ * gap_factor;
+  /// step_us: time since the previous sample, > 0. To be asked when it is another than before.
+  constexpr bool gap(std::uint32_t step_us, std::uint32_t& flags) {
+    const bool gap = usual_step_us_ != 0 && step_us / gap_factor > usual_step_us_;
     usual_step_us_ = step_us;
     if (gap) flags |= time_gap;
     return gap;
   }
 
  private:
-  std::uint64_t usual_step_us_ = 0;
+  static constexpr std::uint8_t stuck = 0xFF;
+
+  static constexpr bool within(std::int32_t value, std::int32_t low, std::int32_t high) {
+    return static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(low) <= static_cast<std::uint32_t>(high) - static_cast<std::uint32_t>(low);
+  }
+
+  std::uint32_t usual_step_us_ = 0;
   std::int32_t current_ua_ = 0;
   std::int32_t voltage_uv_ = no_reading;
   model::Voltage<S> predicted_then_v_{};
-  std::uint8_t repeats_ = 0;
-  bool stuck_ = false;
+  std::uint8_t repeats_ = 0;  // of the same voltage; or `stuck`
 };
 
 }  // namespace bms

@@ -55,10 +55,9 @@ class SocEstimator {
     Estimate<S> estimate;
     const std::uint64_t step_us = sample.time_us - time_us_;
     time_us_ = sample.time_us;
-    const bool gap = check_.gap(step_us, estimate.flags);
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
+    if (step_us != paced_us_) change_pace(cell, step_us, estimate.flags);
     count_charge(cell, current.ua, step_us);
-    pace(cell, step_us);
 
     const Soc soc = state_.charge.soc(cell.charge);
     const auto at = model::look_up(cell, soc, interval_);
@@ -69,7 +68,7 @@ class SocEstimator {
     // steady state v_rc variance: what decays in a step, 1 - (1 - p)^2, comes back
     noise[0] = model::product<Variance>(cell.noise.v_rc_v2, Fraction(settling.settled * Fraction(Fraction(2) - settling.settled)));
     noise[states - 1] = soc_noise_;
-    if (gap || !current.measured) [[unlikely]] noise[states - 1] = Variance(soc_noise_ + unknown_charge(cell));
+    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[states - 1] = Variance(soc_noise_ + unknown_charge(cell));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
 
@@ -78,7 +77,8 @@ class SocEstimator {
       const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - estimate.voltage_predicted_v;
       correct(cell, Model::sensitivity(at, drive), innovation_v);
     }
-    return completed(cell, estimate);
+    complete(cell, estimate);
+    return estimate;
   }
 
   constexpr const CellState<S, ModelOf>& state() const { return state_; }
@@ -96,19 +96,22 @@ class SocEstimator {
 
   template <class Cell>
   constexpr void count_charge(const Cell& cell, std::int32_t current_ua, std::uint64_t step_us) {
-    for (int counts = 0; step_us > longest_count_us && counts < longest_gap_counts; ++counts) [[unlikely]] {
-      state_.charge.count(current_ua, longest_count_us, cell.charge);
-      step_us -= longest_count_us;
+    if (step_us > longest_count_us) [[unlikely]] {
+      for (int counts = 0; step_us > longest_count_us && counts < longest_gap_counts; ++counts) {
+        state_.charge.count(current_ua, longest_count_us, cell.charge);
+        step_us -= longest_count_us;
+      }
+      if (step_us > longest_count_us) step_us = longest_count_us;
     }
-    state_.charge.count(current_ua, step_us < longest_count_us ? static_cast<std::uint32_t>(step_us) : longest_count_us, cell.charge);
+    state_.charge.count(current_ua, static_cast<std::uint32_t>(step_us), cell.charge);
   }
 
   /// What depends on the step's length alone is computed when the length changes.
   template <class Cell>
-  constexpr void pace(const Cell& cell, std::uint64_t step_us) {
+  [[gnu::noinline]] constexpr void change_pace(const Cell& cell, std::uint64_t step_us, std::uint32_t& flags) {
+    paced_us_ = step_us;
     const std::uint32_t capped_us = step_us < longest_step_us ? static_cast<std::uint32_t>(step_us) : longest_step_us;
-    if (capped_us == paced_us_) return;
-    paced_us_ = capped_us;
+    check_.gap(capped_us, flags);
     duration_s_ = seconds(capped_us);
     const model::FilterNoise<S>& n = cell.noise;
     const auto shared_by = model::ratio<model::Count<S>>(n.model_correlation_s, duration_s_);
@@ -147,24 +150,24 @@ class SocEstimator {
   }
 
   template <class Cell>
-  constexpr Estimate<S> completed(const Cell& cell, Estimate<S> estimate) const {
+  constexpr void complete(const Cell& cell, Estimate<S>& estimate) const {
     estimate.soc = state_.charge.soc(cell.charge);
     estimate.soc_sigma = model::root<Soc>(state_.covariance.last_variance());
     estimate.v_rc_v = state_.polarisation[0];
-    return estimate;
   }
 
   template <class Cell>
-  constexpr Estimate<S> unchanged(const Cell& cell, std::uint32_t flags) const {
+  [[gnu::noinline]] constexpr Estimate<S> unchanged(const Cell& cell, std::uint32_t flags) const {
     Estimate<S> estimate;
     estimate.flags = flags;
     const auto at = model::look_up(cell, state_.charge.soc(cell.charge));
     estimate.voltage_predicted_v = at.ocv_v + state_.polarisation[0];
-    return completed(cell, estimate);
+    complete(cell, estimate);
+    return estimate;
   }
 
   template <class Cell>
-  constexpr Estimate<S> start(const Cell& cell, const Sample& sample) {
+  [[gnu::noinline]] constexpr Estimate<S> start(const Cell& cell, const Sample& sample) {
     Estimate<S> estimate;
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
     const bool voltage = InputCheck<S>::voltage_present(sample.voltage_uv, cell.plausible, estimate.flags);
@@ -197,7 +200,8 @@ class SocEstimator {
     variances[states - 1] = belief.variance;
     state_.covariance.set_diagonal(variances);
     estimate.voltage_predicted_v = Model::voltage(state_.polarisation, at, drive);
-    return completed(cell, estimate);
+    complete(cell, estimate);
+    return estimate;
   }
 
   static constexpr Soc soc_of_ppb(std::int32_t ppb) {
@@ -207,7 +211,7 @@ class SocEstimator {
   CellState<S, ModelOf> state_;
   InputCheck<S> check_;
   std::uint64_t time_us_ = 0;
-  std::uint32_t paced_us_ = 0;
+  std::uint64_t paced_us_ = 0;
   std::uint8_t interval_ = 0;
   TimeStep duration_s_{};
   Variance voltage_noise_{}, soc_noise_{};

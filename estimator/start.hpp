@@ -33,7 +33,7 @@ constexpr SocBelief<S> soc_from_ocv(const Cell& cell, const model::Voltage<S>& o
     const auto at = look_up(cell, point(k), interval);
     const Voltage<S> off_v = ocv_v - at.ocv_v;
     // half a point's width on the curve counts as uncertainty too: steep parts have few points
-    const Voltage<S> half_width_v = at.ocv_slope_v * Fraction<S>(0.5 / points);
+    const Voltage<S> half_width_v = VoltagePerSoc<S>(at.ocv_delta_v * at.per_width) * Fraction<S>(0.5 / points);
     const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
     return ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
   };

@@ -1,5 +1,7 @@
 #include "host_sim/firmware_image.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -21,6 +23,20 @@ std::filesystem::path source_tree() {
   return root != nullptr ? root : BMS_SOURCE_DIR;
 }
 
+/// Held while a folder is built in: two runs at once would build over each other.
+class Lock {
+ public:
+  explicit Lock(const std::filesystem::path& path) : fd_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+    if (fd_ < 0 || flock(fd_, LOCK_EX) != 0) throw std::runtime_error("cannot lock " + path.string());
+  }
+  ~Lock() { close(fd_); }
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+
+ private:
+  int fd_;
+};
+
 void run_step(const std::vector<std::string>& argv, const std::filesystem::path& log) {
   if (ChildProcess(argv, log).wait() == 0) return;
   throw std::runtime_error("the firmware does not build, see " + log.string());
@@ -38,6 +54,7 @@ std::filesystem::path replay_image(const std::string& board, const CellFile& cel
     if (!in_path(tool)) throw BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
   }
   std::filesystem::create_directories(folder);
+  const Lock lock(folder / "lock");
   const auto cell_path = folder / "cell.toml", log = folder / "build.log";
   if (!std::filesystem::exists(cell_path) || read_file(cell_path) != cell.text) write_file(cell_path, cell.text);
   if (!std::filesystem::exists(folder / "build.ninja")) {

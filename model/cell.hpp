@@ -67,21 +67,21 @@ struct Cell {
   using Scalar = S;
 
   std::array<Interval<S>, Max> interval{};
+  std::array<Soc<S>, Max + 1> edge{};            ///< interval k is [edge k, edge k + 1); the outermost are out of reach
   ChargeScale<S> charge;
   FilterNoise<S> noise;
   Plausible plausible;
   std::size_t size = 0;                          ///< intervals in use
 };
 
-/// What the tables say at one soc, and how fast it changes there (d / d soc).
+/// What the tables say at one soc, and how much it changes over the interval: d / d soc = delta * per_width.
 template <class S>
 struct TablePoint {
-  Voltage<S> ocv_v;
-  VoltagePerSoc<S> ocv_slope_v;
-  Resistance<S> r0_ohm, r1_ohm;
-  ResistancePerSoc<S> r0_slope_ohm, r1_slope_ohm;
-  Capacitance<S> c1_f;
-  CapacitancePerSoc<S> c1_slope_f;
+  PerSoc<S> per_width;
+  Voltage<S> ocv_v, ocv_delta_v;
+  Resistance<S> r0_ohm, r0_delta_ohm;
+  Resistance<S> r1_ohm, r1_delta_ohm;
+  Capacitance<S> c1_f, c1_delta_f;
 };
 
 namespace cell_detail {
@@ -146,6 +146,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
       delta = Value(d::rc_value(p.rc, column, to) - start);
     };
     i.start = Soc<S>(from);
+    cell.edge[cell.size] = i.start;
     i.per_width = PerSoc<S>(1.0 / width);
     i.ocv_v = Voltage<S>(p.ocv.b0_v[piece] + p.ocv.b1_v[piece] * from);
     i.ocv_delta_v = Voltage<S>(p.ocv.b1_v[piece] * width);
@@ -158,6 +159,8 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   add(-0.125, 0);
   for (std::size_t k = 0; k + 1 < edges.size; ++k) add(edges[k], edges[k + 1]);
   add(1, 1.125);
+  cell.edge[0] = Soc<S>(-7.9);
+  cell.edge[cell.size] = Soc<S>(7.9);
 
   const double capacity_as = p.capacity_ah * 3'600;
   cell.charge.capacity_uaus = static_cast<std::int64_t>(capacity_as * 1e12 + 0.5);
@@ -189,12 +192,12 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   return cell;
 }
 
-/// Interval that holds soc, found from a nearby one: a step moves soc by little. The result does not depend on `from`.
+/// Interval that holds soc (within +-7.9), found from a nearby one: a step moves soc by little. The result does not depend on `from`.
 template <class S, std::size_t Max>
 constexpr std::size_t interval_of(const Cell<S, Max>& cell, const Soc<S>& soc, std::size_t from) {
   std::size_t k = from;
-  while (k + 1 < cell.size && soc >= cell.interval[k + 1].start) ++k;
-  while (k > 0 && soc < cell.interval[k].start) --k;
+  while (soc >= cell.edge[k + 1]) ++k;
+  while (soc < cell.edge[k]) --k;
   return k;
 }
 
@@ -205,14 +208,15 @@ constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std
   interval = static_cast<std::uint8_t>(k);
   const Interval<S>& i = cell.interval[k];
   const Soc<S> t = (soc - i.start) * i.per_width;
-  return {.ocv_v = i.ocv_v + t * i.ocv_delta_v,
-          .ocv_slope_v = i.ocv_delta_v * i.per_width,
+  return {.per_width = i.per_width,
+          .ocv_v = i.ocv_v + t * i.ocv_delta_v,
+          .ocv_delta_v = i.ocv_delta_v,
           .r0_ohm = i.r0_ohm + t * i.r0_delta_ohm,
+          .r0_delta_ohm = i.r0_delta_ohm,
           .r1_ohm = i.r1_ohm + t * i.r1_delta_ohm,
-          .r0_slope_ohm = i.r0_delta_ohm * i.per_width,
-          .r1_slope_ohm = i.r1_delta_ohm * i.per_width,
+          .r1_delta_ohm = i.r1_delta_ohm,
           .c1_f = i.c1_f + t * i.c1_delta_f,
-          .c1_slope_f = i.c1_delta_f * i.per_width};
+          .c1_delta_f = i.c1_delta_f};
 }
 
 template <class S, std::size_t Max>

@@ -49,10 +49,9 @@ struct OneRc {
     return {rate_per_s, exponent, bms::model::settled<S>(exponent)};
   }
 
-  /// v_rc and soc at the start of the step; `at` and `settling` belong to the soc at its end.
+  /// v_rc at the start of the step; `at` and `settling` belong to the soc at its end.
   static constexpr Polarisation advance(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
-    const Voltage<S> target_v = at.r1_ohm * drive.current_a;
-    return {Voltage<S>(x[0] + settling.settled * Voltage<S>(target_v - x[0]))};
+    return {Voltage<S>(x[0] + settling.settled * gap_v(x, at, drive))};
   }
 
   /// Terminal voltage (Eq. 9).
@@ -63,24 +62,28 @@ struct OneRc {
   /// d (state after) / d (state before), upper triangular. The derivative by soc runs through R1, C1 and dp/dx = exp(-x).
   static constexpr Transition transition(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
     const Fraction<S> remaining = Fraction<S>(1) - settling.settled;
-    const Voltage<S> gap_v = at.r1_ohm * drive.current_a - x[0];
-    // d exponent / d soc = -exponent * rate * d(R1 C1)/d soc
-    const TauPerSoc tau_slope_s = at.r1_slope_ohm * at.c1_f + at.r1_ohm * at.c1_slope_f;
-    const PerSoc<S> rate_slope = tau_slope_s * settling.rate_per_s;
-    const PerSoc<S> settled_slope = -(PerSoc<S>(remaining * Short(settling.exponent)) * rate_slope);
-    const VoltagePerSoc<S> target_slope_v = at.r1_slope_ohm * drive.current_a;
-    return {{{Coupling<S>(remaining), Coupling<S>(settled_slope * gap_v + settling.settled * target_slope_v)},
-             {Coupling<S>(0), Coupling<S>(1)}}};
+    // over one interval: tau, p, and what v_rc goes to
+    const Duration<S> tau_delta_s = at.r1_delta_ohm * at.c1_f + at.r1_ohm * at.c1_delta_f;
+    const Ratio tau_change = tau_delta_s * settling.rate_per_s;
+    const Ratio settled_delta = -(Ratio(remaining * Short(settling.exponent)) * tau_change);
+    const Voltage<S> target_delta_v = at.r1_delta_ohm * drive.current_a;
+    const Voltage<S> delta_v = settled_delta * gap_v(x, at, drive) + settling.settled * target_delta_v;
+    return {{{Coupling<S>(remaining), Coupling<S>(delta_v * at.per_width)}, {Coupling<S>(0), Coupling<S>(1)}}};
   }
 
   /// d voltage / d state, at the state after the step.
   static constexpr Sensitivity sensitivity(const TablePoint<S>& at, const Drive<S>& drive) {
-    return {VoltagePerSoc<S>(1), VoltagePerSoc<S>(at.ocv_slope_v + at.r0_slope_ohm * drive.current_a)};
+    return {VoltagePerSoc<S>(1), VoltagePerSoc<S>(Voltage<S>(at.ocv_delta_v + at.r0_delta_ohm * drive.current_a) * at.per_width)};
   }
 
  private:
-  using Short = Current<S>;                 // exponents below 2,048 in 32 bits
-  using TauPerSoc = CapacitancePerSoc<S>;   // s per unit of soc
+  using Short = Current<S>;  // exponents below 2,048 in 32 bits
+  using Ratio = PerSoc<S>;   // relative changes over an interval
+
+  /// How far v_rc is from where the current leads it.
+  static constexpr Voltage<S> gap_v(const Polarisation& x, const TablePoint<S>& at, const Drive<S>& drive) {
+    return at.r1_ohm * drive.current_a - x[0];
+  }
 };
 
 }  // namespace bms::model

@@ -40,22 +40,25 @@ TYPED_TEST(CellOfEveryScalar, InterpolatesResistancesBetweenNodesAndHoldsThemBel
   EXPECT_NEAR(as_double(at(0.02).r1_ohm), 0.027101, 1e-8);
   EXPECT_NEAR(as_double(at(-0.1).c1_f), 420.558, 1e-3);
   EXPECT_NEAR(as_double(at(1.1).r0_ohm), 0.0153566, 1e-8);
-  EXPECT_EQ(as_double(at(0.05).r1_slope_ohm), 0);
+  EXPECT_EQ(as_double(at(0.05).r1_delta_ohm), 0);
 }
 
 TYPED_TEST(CellOfEveryScalar, GoesOnAlongTheEndLinesOutside) {
   const auto cell = prepare<TypeParam, max_intervals>(table9());
   EXPECT_NEAR(as_double(look_up(cell, Soc<TypeParam>(-0.2)).ocv_v), 2.871 - 0.2 * 3.35, 1e-6);
   EXPECT_NEAR(as_double(look_up(cell, Soc<TypeParam>(1.2)).ocv_v), 2.126 + 1.2 * 1.33, 1e-6);
-  EXPECT_NEAR(as_double(look_up(cell, Soc<TypeParam>(1.2)).ocv_slope_v), 1.33, 1e-5);
+  const auto above = look_up(cell, Soc<TypeParam>(1.2));
+  EXPECT_NEAR(as_double(above.ocv_delta_v) * as_double(above.per_width), 1.33, 1e-5);
 }
+
+double slope_v(const auto& at) { return at.ocv_delta_v * at.per_width; }
 
 TEST(Cell, AnEdgeBelongsToTheIntervalAboveItAndSoDoesItsSlope) {
   const auto cell = prepare<double, max_intervals>(table9());
   const double b1_v[] = {3.35, 0.39, 0.32, 0.08, 0.01, 0.04, 0.23, 0.09, 0.01, 1.33};
   for (std::size_t k = 0; k < 10; ++k) {
-    EXPECT_NEAR(look_up(cell, static_cast<double>(k) / 10).ocv_slope_v, b1_v[k], 1e-9) << k;
-    EXPECT_NEAR(look_up(cell, std::nextafter(static_cast<double>(k + 1) / 10, 0.0)).ocv_slope_v, b1_v[k], 1e-9) << k;
+    EXPECT_NEAR(slope_v(look_up(cell, static_cast<double>(k) / 10)), b1_v[k], 1e-9) << k;
+    EXPECT_NEAR(slope_v(look_up(cell, std::nextafter(static_cast<double>(k + 1) / 10, 0.0))), b1_v[k], 1e-9) << k;
   }
 }
 
@@ -66,10 +69,10 @@ TEST(Cell, SlopesAreTheDerivatives) {
   for (double soc = -0.2; soc < 1.2; soc += 0.0123) {
     const auto at = look_up(cell, soc);
     const auto jet = look_up(jets, Jet(soc, 0));
-    EXPECT_NEAR(jet.ocv_v.v[0], at.ocv_slope_v, 1e-12);
-    EXPECT_NEAR(jet.r0_ohm.v[0], at.r0_slope_ohm, 1e-12);
-    EXPECT_NEAR(jet.r1_ohm.v[0], at.r1_slope_ohm, 1e-12);
-    EXPECT_NEAR(jet.c1_f.v[0], at.c1_slope_f, 1e-9);
+    EXPECT_NEAR(jet.ocv_v.v[0], at.ocv_delta_v * at.per_width, 1e-12);
+    EXPECT_NEAR(jet.r0_ohm.v[0], at.r0_delta_ohm * at.per_width, 1e-12);
+    EXPECT_NEAR(jet.r1_ohm.v[0], at.r1_delta_ohm * at.per_width, 1e-12);
+    EXPECT_NEAR(jet.c1_f.v[0], at.c1_delta_f * at.per_width, 1e-9);
   }
 }
 
@@ -89,8 +92,8 @@ TEST(Cell, UnevenEdgesAndNodesShareOneRow) {
   const auto cell = prepare<double, max_intervals>(p);
   EXPECT_EQ(cell.size, interval_count(p));
   EXPECT_EQ(cell.size, 13U);  // 0, 0.07, 0.1 ... 1.0 and the two outside
-  EXPECT_NEAR(look_up(cell, 0.08).ocv_slope_v, 0.39, 1e-9);
-  EXPECT_NEAR(look_up(cell, 0.06).ocv_slope_v, 3.35, 1e-9);
+  EXPECT_NEAR(slope_v(look_up(cell, 0.08)), 0.39, 1e-9);
+  EXPECT_NEAR(slope_v(look_up(cell, 0.06)), 3.35, 1e-9);
   EXPECT_NEAR(look_up(cell, 0.15).r1_ohm, (0.027101 + 0.012339) / 2, 1e-12);
 }
 
