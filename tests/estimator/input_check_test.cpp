@@ -56,8 +56,8 @@ TEST(InputCheck, AGapIsAStepTenTimesTheUsual) {
   InputCheck<float> check;
   std::uint32_t flags = 0;
   EXPECT_FALSE(check.gap(1'000'000, flags)) << "the first step has nothing to be compared with";
-  EXPECT_FALSE(check.gap(10'999'999, flags));
-  EXPECT_TRUE(check.gap(110'000'000, flags));
+  EXPECT_FALSE(check.gap(10'000'000, flags));
+  EXPECT_TRUE(check.gap(101'000'000, flags));
   EXPECT_EQ(flags, time_gap);
 }
 

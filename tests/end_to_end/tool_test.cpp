@@ -1,0 +1,147 @@
+// The tool from the outside: exit codes, one-line errors, files written whole, the same output twice.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+
+const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
+
+class Tool : public ::testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name), std::ios::binary) << text;
+    return path(name);
+  }
+  std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder_.path()), std::filesystem::directory_iterator{}));
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+/// Without what the contract lets differ.
+std::string steady(const std::string& json) {
+  return std::regex_replace(json, std::regex("\"[a-z_]*_per_second\": [-0-9.e+]+"), "");
+}
+
+TEST_F(Tool, HelpOfEveryCommandShowsAnExample) {
+  EXPECT_THAT(run_tool("--help").out, HasSubstr("replay"));
+  for (const char* command : {"replay", "simulate", "experiment"}) {
+    const ToolRun run = run_tool(std::string(command) + " --help");
+    EXPECT_EQ(run.exit_code, 0);
+    EXPECT_THAT(run.out, HasSubstr(std::string("Example: bms ") + command));
+    EXPECT_EQ(run.err, "");
+  }
+}
+
+TEST_F(Tool, BadUsageIsOneLineAndExitCode2) {
+  const std::vector<std::string> wrong = {
+      "",
+      "no_such_command",
+      "replay",
+      "replay " + shift + " --no-such-option",
+      "replay " + shift + " --initial-soc 80",
+      "replay " + shift + " --scalar half",
+      "replay " + shift + " --target no_such_board",
+      "replay " + shift + " --verify",
+      "replay " + shift + " --cell no_such_cell",
+      "replay /no/such/recording.csv",
+      "replay /",
+      "simulate --cell table9 --out x.csv",
+      "experiment no_such_experiment --out x.csv",
+  };
+  for (const std::string& arguments : wrong) {
+    const ToolRun run = run_tool(arguments);
+    EXPECT_EQ(run.exit_code, 2) << arguments;
+    EXPECT_THAT(run.err, MatchesRegex("[^\n]+\n")) << arguments;
+    EXPECT_EQ(run.out, "") << arguments;
+  }
+}
+
+TEST_F(Tool, ABadRecordingIsRefusedInOneLineAndLeavesNothingBehind) {
+  const std::string bad = write("bad.csv", "time_s,current_a,voltage_v\n0,0,3.3\n1,x,3.3\n");
+  const ToolRun run = run_tool("replay " + bad + " --json " + path("r.json") + " --trace " + path("t.csv") + " --report " + path("p.html"));
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.err, bad + ":3: 'x' in column 'current_a' is not a number, expected a number\n");
+  EXPECT_EQ(files(), 1U) << "only the recording itself";
+}
+
+TEST_F(Tool, AnUnwritablePlaceIsRefusedInOneLine) {
+  const ToolRun run = run_tool("replay " + shift + " --json /no/such/folder/r.json");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, MatchesRegex("/no/such/folder/r.json:1: [^\n]+\n"));
+}
+
+TEST_F(Tool, TheSameReplayGivesTheSameBytes) {
+  for (const char* scalar : {"float", "fixed", "double"}) {
+    const std::string arguments = "replay " + shift + " --initial-soc 0.98 --scalar " + scalar;
+    const ToolRun a = run_tool(arguments + " --json - --trace " + path("a.csv") + " --report " + path("a.html"));
+    const ToolRun b = run_tool(arguments + " --json - --trace " + path("b.csv") + " --report " + path("b.html"));
+    ASSERT_EQ(a.exit_code, 0) << a.err;
+    EXPECT_EQ(steady(a.out), steady(b.out));
+    EXPECT_EQ(content(path("a.csv")), content(path("b.csv")));
+    EXPECT_EQ(content(path("a.html")), content(path("b.html")));
+    EXPECT_THAT(a.out, HasSubstr("\"command\": \"replay\""));
+  }
+}
+
+TEST_F(Tool, TraceHashIsThatOfTheTraceFile) {
+  const ToolRun run = run_tool("replay " + shift + " --json - --trace " + path("t.csv"));
+  EXPECT_EQ(std::system(("sha256sum " + path("t.csv") + " > " + path("sum")).c_str()), 0);
+  EXPECT_THAT(run.out, HasSubstr("\"trace_sha256\": \"" + content(path("sum")).substr(0, 64) + "\""));
+}
+
+TEST_F(Tool, QuietSaysNothing) {
+  const ToolRun run = run_tool("replay " + shift + " --quiet");
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_EQ(run.out + run.err, "");
+}
+
+TEST_F(Tool, WarningsAreOnStandardErrorAndInTheJson) {
+  std::string text = "time_s,current_a,voltage_v\n";
+  for (int k = 0; k < 20; ++k) text += std::to_string(k) + "," + (k % 4 < 2 ? "-1,3.30" : "0,3.31") + "\n";
+  text += "900,0,3.31\n";
+  const ToolRun run = run_tool("replay " + write("gap.csv", text) + " --json -");
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(run.err, HasSubstr("1 gaps longer than 10 s"));
+  EXPECT_THAT(run.out, HasSubstr("\"gap: 1 gaps longer than 10 s"));
+}
+
+TEST_F(Tool, AProfileSimulatedAndReplayedComesBack) {
+  ASSERT_EQ(run_tool("experiment forklift_shift --out " + path("p.csv")).exit_code, 0);
+  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.95 --out " + path("s.csv")).exit_code, 0);
+  EXPECT_TRUE(content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc\n"));
+  const ToolRun run = run_tool("replay " + path("s.csv") + " --initial-soc 0.95 --json -");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  // the model's own voltage, written with ten digits and read in microvolts: the filter has nothing to correct
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(run.out, found, std::regex("\"prediction_rmse_v\": ([-0-9.e]+)")));
+  EXPECT_LT(std::stod(found[1]), 2e-6);
+}
+
+TEST_F(Tool, SimulatedNoiseHasTheSizeAskedForAndFollowsTheSeed) {
+  ASSERT_EQ(run_tool("experiment forklift_shift --out " + path("p.csv")).exit_code, 0);
+  const std::string simulate = "simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.95 --noise-v 0.002 --out ";
+  run_tool(simulate + path("a.csv"));
+  run_tool(simulate + path("b.csv"));
+  run_tool(simulate + path("c.csv") + " --seed 2");
+  EXPECT_EQ(content(path("a.csv")), content(path("b.csv")));
+  EXPECT_NE(content(path("a.csv")), content(path("c.csv")));
+  const ToolRun run = run_tool("replay " + path("a.csv") + " --initial-soc 0.95 --json -");
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(run.out, found, std::regex("\"open_loop_rmse_v\": ([-0-9.e]+)")));
+  EXPECT_NEAR(std::stod(found[1]), 0.002, 0.0001);
+}
+
+}  // namespace
+}  // namespace bms
