@@ -2,8 +2,10 @@
 #
 #   bms_<board>.elf          the application; telemetry and samples as SLCAN text on the UART
 #   bms_<board>_replay.elf   the same application; samples and estimates stream through the emulator's files
+#   bms_<board>_bench.elf    as the first, for the chip itself: its clock tree, reset instead of the emulator's exit
+#   bms_<board>_fault.elf    tests/firmware/fault_image.cpp; only when asked for
 #
-# What does not depend on the cell is compiled once for both.
+# The first two run in QEMU only (hal/README.md). What does not depend on the cell is compiled once for all.
 include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
@@ -36,32 +38,47 @@ add_custom_command(OUTPUT ${cell_header}
   DEPENDS ${cell_header_tool} ${cell_file}
   COMMENT "Cell ${BMS_CELL}" VERBATIM)
 
-add_compile_options(${BMS_CPU_FLAGS} -O2 -g -ffunction-sections -fdata-sections -fno-common -fstack-usage
+add_compile_options(${BMS_CPU_FLAGS} -g -ffunction-sections -fdata-sections -fno-common -fstack-usage
   $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions> $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> $<$<COMPILE_LANGUAGE:CXX>:-fno-threadsafe-statics> $<$<COMPILE_LANGUAGE:CXX>:-fno-use-cxa-atexit>
   -Wsign-conversion -Wdouble-promotion -Wfloat-conversion)
 add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs -T${BMS_LINKER_SCRIPT}
   -Wl,--gc-sections,--no-warn-rwx-segments,--fatal-warnings)
 
-set(chip ${CMAKE_SOURCE_DIR}/hal/${BMS_CHIP})
-set(emulated ${CMAKE_SOURCE_DIR}/hal/emulated)
-add_library(hal_core OBJECT ${chip}/startup.cpp ${chip}/power.cpp ${chip}/clock.cpp ${chip}/watchdog.cpp ${emulated}/clock_tree.cpp ${emulated}/semihosting.cpp)
-add_library(hal_slcan OBJECT ${CMAKE_SOURCE_DIR}/hal/slcan/can.cpp ${chip}/uart.cpp ${emulated}/samples_can.cpp ${CMAKE_SOURCE_DIR}/hal/absent/record.cpp)
-add_library(hal_stream OBJECT ${CMAKE_SOURCE_DIR}/hal/absent/can.cpp ${emulated}/samples_stream.cpp)
-# what only a real board needs compiles all the same
-add_library(hal_board OBJECT ${chip}/clock_tree.cpp ${chip}/finish.cpp)
+# bms_objects(NAME OPTIMISATION SOURCE...)
+function(bms_objects name optimisation)
+  add_library(${name} OBJECT ${ARGN})
+  target_link_libraries(${name} PUBLIC bms_estimator)
+  target_compile_definitions(${name} PUBLIC ${BMS_SCALAR_DEFINITION})
+  target_compile_options(${name} PRIVATE ${optimisation})
+endfunction()
 
-add_library(application OBJECT ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header})
-target_include_directories(application PRIVATE ${CMAKE_BINARY_DIR}/generated)
-foreach(part hal_core hal_slcan hal_stream hal_board application)
-  target_link_libraries(${part} PUBLIC bms_estimator)
-  target_compile_definitions(${part} PUBLIC ${BMS_SCALAR_DEFINITION})
-endforeach()
+set(hal ${CMAKE_SOURCE_DIR}/hal)
+set(chip ${hal}/${BMS_CHIP})
+bms_objects(hal_core -Os ${chip}/startup.cpp ${chip}/power.cpp ${chip}/clock.cpp)
+bms_objects(hal_chip -Os ${chip}/clock_tree.cpp ${chip}/finish.cpp)
+bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semihosting.cpp)
+bms_objects(hal_slcan -Os ${hal}/slcan/can.cpp ${chip}/uart.cpp ${chip}/watchdog.cpp ${hal}/emulated/samples_can.cpp ${hal}/absent/record.cpp)
+bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/watchdog.cpp)
 
+bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp)
+bms_objects(estimator_step -O2 ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header})
+target_include_directories(estimator_step PRIVATE ${CMAKE_BINARY_DIR}/generated)
+math(EXPR version "${PROJECT_VERSION_MAJOR} * 65536 + ${PROJECT_VERSION_MINOR} * 256 + ${PROJECT_VERSION_PATCH}" OUTPUT_FORMAT HEXADECIMAL)
+target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
+
+# bms_image(NAME OBJECTS...)
 function(bms_image name)
-  add_executable(${name} ${ARGN})
+  list(TRANSFORM ARGN PREPEND "$<TARGET_OBJECTS:" OUTPUT_VARIABLE objects)
+  list(TRANSFORM objects APPEND ">")
+  add_executable(${name} ${objects})
   target_link_options(${name} PRIVATE -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
   set_target_properties(${name} PROPERTIES LINK_DEPENDS ${BMS_LINKER_SCRIPT} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
 endfunction()
 
-bms_image(bms_${BMS_BOARD} $<TARGET_OBJECTS:hal_core> $<TARGET_OBJECTS:hal_slcan> $<TARGET_OBJECTS:application>)
-bms_image(bms_${BMS_BOARD}_replay $<TARGET_OBJECTS:hal_core> $<TARGET_OBJECTS:hal_stream> $<TARGET_OBJECTS:application>)
+bms_image(bms_${BMS_BOARD} hal_core hal_emulated hal_slcan application estimator_step)
+bms_image(bms_${BMS_BOARD}_replay hal_core hal_emulated hal_stream application estimator_step)
+bms_image(bms_${BMS_BOARD}_bench hal_core hal_chip hal_slcan application estimator_step)
+
+bms_objects(fault_image -Os ${CMAKE_SOURCE_DIR}/tests/firmware/fault_image.cpp)
+bms_image(bms_${BMS_BOARD}_fault hal_core hal_emulated fault_image)
+set_target_properties(fault_image bms_${BMS_BOARD}_fault PROPERTIES EXCLUDE_FROM_ALL ON)

@@ -4,10 +4,11 @@
 
 namespace bms {
 
-Estimate<BoardScalar> estimator_step(SocEstimator<BoardScalar>& estimator, const Sample& sample) {
+// flatten: with everything inline the cell is a constant, which saves one instruction in seven
+[[gnu::flatten]] Estimate<BoardScalar> estimator_step(SocEstimator<BoardScalar>& estimator, const Sample& sample) {
   return estimator.step(generated::cell<BoardScalar>, sample);
 }
 
-std::uint32_t cell_hash() { return generated::cell_hash; }
+messages::Identity identity() { return {.cell_hash = generated::cell_hash, .version = BMS_VERSION}; }
 
 }  // namespace bms

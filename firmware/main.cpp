@@ -1,5 +1,6 @@
 // The firmware: start what the board has, then sample after sample.
 #include "firmware/application.hpp"
+#include "firmware/estimator_step.hpp"
 #include "hal/clock.hpp"
 #include "hal/samples.hpp"
 
@@ -16,7 +17,7 @@ int main() {
   hal::watchdog_start(watchdog_ms);
   Sample sample;
   if (!hal::next_sample(sample)) return 0;
-  static Application application(hal::starting_point());
+  Application<BoardScalar, estimator_step> application(hal::starting_point(), identity());
   do {
     application.take(sample);
   } while (hal::next_sample(sample));

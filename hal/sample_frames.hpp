@@ -31,7 +31,8 @@ constexpr CanFrame frame_of(const StartingPoint& p) {
   return frame;
 }
 
-/// Takes in a frame; true when it completed `sample`. Frames of another length or number change nothing.
+/// Takes in a frame; true when it completed `sample`, which begins as Sample{} each time. Frames of another length or number
+/// change nothing.
 constexpr bool completes(const CanFrame& frame, Sample& sample) {
   if (frame.length != 8) return false;
   if (frame.id == reading_frame_id) {

@@ -5,6 +5,8 @@
 #include "hal/samples.hpp"
 #include "hal/watchdog.hpp"
 
+#include <utility>
+
 namespace bms::hal {
 
 namespace {
@@ -21,7 +23,7 @@ bool next_sample(Sample& sample) {
     while (can_receive(frame)) {
       if (is_start(frame)) start = start_of(frame);
       if (completes(frame, building)) {
-        sample = building;
+        sample = std::exchange(building, Sample{});  // a frame that gets lost later is a missing reading, not the old one again
         return true;
       }
     }

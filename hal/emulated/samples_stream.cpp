@@ -1,5 +1,6 @@
 // A recording through the debugger's files, in blocks, as fast as the core computes: command line "fw SAMPLES ESTIMATES".
-// Formats in hal/stream_format.hpp. Exit code 3: no such files, or not a stream.
+// Formats in hal/stream_format.hpp; either file may be a named pipe, OUT is opened first. A part of a sample at the end is left out.
+// Exit code 3: no such files, not a stream, or estimates that could not be written.
 #include <array>
 #include <cstring>
 
@@ -21,7 +22,8 @@ std::span<unsigned char> bytes_of(std::span<T> items) {
   return {reinterpret_cast<unsigned char*>(items.data()), items.size_bytes()};
 }
 
-std::array<Sample, block> samples;
+// bytes, not Samples: those are not zero at first, so that the whole block would be kept in flash
+std::array<unsigned char, block * sizeof(Sample)> samples;
 std::size_t sample_count = 0, next = 0;
 std::array<EstimateWords, block> estimates;
 std::size_t estimate_count = 0;
@@ -61,11 +63,11 @@ bool next_sample(Sample& sample) {
   if (next == sample_count) {
     if (in < 0) open_streams();
     if (estimate_count > 0) write_estimates();
-    sample_count = read_fully(bytes_of(std::span(samples.data(), samples.size()))) / sizeof(Sample);
+    sample_count = read_fully(samples) / sizeof(Sample);
     next = 0;
     if (sample_count == 0) return false;
   }
-  sample = samples[next++];
+  std::memcpy(&sample, &samples[sizeof(Sample) * next++], sizeof(Sample));
   return true;
 }
 

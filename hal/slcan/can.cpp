@@ -9,27 +9,33 @@ namespace bms::hal {
 namespace {
 
 constexpr std::uint32_t baud = 921'600;
-constexpr char done = '\r', refused = '\a';
 
 slcan::LineReader reader;
 bool listening = false;
 
-void answer(char c) { uart_write({&c, 1}); }
+void answer(std::string_view text) { uart_write({text.data(), text.size()}); }
 
-/// A line that is not a frame.
-void command(std::string_view line) {
-  const char what = line.empty() ? '\0' : line[0];
-  if (what == 'O') listening = true;
-  if (what == 'C') listening = false;
-  constexpr std::string_view known = "OCSsVvNFMmWQZ";
-  answer(known.find(what) != std::string_view::npos ? done : refused);
+/// What an adapter answers to a line that is no frame for us; \a where it refuses.
+std::string_view answer_to(std::string_view line) {
+  if (slcan::is_other_frame(line)) return listening ? "\r" : "\a";
+  if (line.size() == 2 && line[0] == 'S' && line[1] >= '0' && line[1] <= '8') return listening ? "\a" : "\r";  // not while open
+  if (line.size() != 1) return "\a";
+  switch (line[0]) {
+    case 'O': listening = true; return "\r";
+    case 'C': listening = false; return "\r";
+    case 'V': return "V1010\r";  // hardware and software 1.0
+    case 'v': return "v1010\r";
+    case 'N': return "N0000\r";  // no serial number
+    case 'F': return listening ? "F00\r" : "\a";  // a UART has no bus errors
+    default: return "\a";
+  }
 }
 
 }  // namespace
 
 void can_start() {
   uart_start(baud);
-  answer(done);  // "ready": an emulated UART drops what comes earlier
+  answer("\r");  // "ready": an emulated UART drops what comes earlier
 }
 
 bool can_listening() { return listening; }
@@ -37,7 +43,7 @@ bool can_listening() { return listening; }
 bool can_send(const CanFrame& frame) {
   if (!listening) return false;
   std::array<char, slcan::longest_frame> text;
-  uart_write(slcan::encode(frame, text));
+  answer(slcan::encode(frame, text));
   return true;
 }
 
@@ -45,8 +51,12 @@ bool can_receive(CanFrame& frame) {
   char byte = 0;
   while (uart_read(byte)) {
     if (!reader.take(byte)) continue;
-    if (slcan::decode(reader.line(), frame)) return true;
-    command(reader.line());
+    const bool is_frame = slcan::decode(reader.line(), frame);
+    if (is_frame && listening) {
+      answer("\r");
+      return true;
+    }
+    answer(is_frame ? "\a" : answer_to(reader.line()));
   }
   return false;
 }

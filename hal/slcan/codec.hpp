@@ -1,8 +1,11 @@
 // SLCAN, the text that cheap CAN adapters speak (Lawicel CAN232 manual): portable, for the firmware and for the host.
 //
-//   tIIILDD..\r   standard frame: 3 hex digits of id, length, data      O, C   open, close the channel
-//   Sn, V, v, N, F, others with \r   adapter commands, acknowledged      \a     refused
+//   tIIILDD..\r        standard frame: 3 hex digits of id, length, data; upper case when sent, either case when received
+//   TIIIIIIIILDD..\r   29-bit frame     rIIIL\r, RIIIIIIIIL\r   remote request: well known, of no use here
+//   O\r, C\r           open and close the channel
+//   Sn\r, V\r, v\r, N\r, F\r   bit rate, versions, serial number, status
 //
+// Each line is answered by \r (after the text that was asked for, if any) or, refused, by \a.
 // A line that is too long, not hexadecimal or of the wrong length is refused as a whole and harms nothing.
 #pragma once
 
@@ -18,14 +21,15 @@ namespace bms::hal::slcan {
 
 inline constexpr std::size_t longest_frame = 1 + 3 + 1 + 16 + 1;
 
-/// A frame as text; the part of `text` that is in use.
+/// A frame as text; the part of `text` that is in use. frame.length above 8 counts as 8.
 constexpr std::string_view encode(const CanFrame& frame, std::array<char, longest_frame>& text) {
   constexpr std::string_view hex = "0123456789ABCDEF";
   std::size_t n = 0;
   text[n++] = 't';
   for (int shift = 8; shift >= 0; shift -= 4) text[n++] = hex[static_cast<std::size_t>(frame.id >> shift) & 15U];
-  text[n++] = hex[frame.length & 15U];
-  for (std::size_t k = 0; k < frame.length && k < 8; ++k) {
+  const std::size_t length = frame.length < 8 ? frame.length : 8;
+  text[n++] = hex[length];
+  for (std::size_t k = 0; k < length; ++k) {
     text[n++] = hex[static_cast<std::size_t>(frame.data[k] >> 4)];
     text[n++] = hex[frame.data[k] & 15U];
   }
@@ -54,6 +58,20 @@ constexpr bool decode(std::string_view line, CanFrame& frame) {
   }
   frame = decoded;
   return true;
+}
+
+/// Whether a line is a frame that decode() does not return: 29-bit or a remote request.
+constexpr bool is_other_frame(std::string_view line) {
+  if (line.empty()) return false;
+  const char what = line[0];
+  if (what != 'T' && what != 'r' && what != 'R') return false;
+  const std::size_t id_digits = what == 'r' ? 3 : 8;
+  if (line.size() < 2 + id_digits) return false;
+  for (const char c : line.substr(1)) {
+    if (digit(c) > 15) return false;
+  }
+  const unsigned length = digit(line[1 + id_digits]);
+  return length <= 8 && line.size() == 2 + id_digits + (what == 'T' ? 2 * length : 0) && digit(line[1]) <= (id_digits == 3 ? 7U : 1U);
 }
 
 /// Collects bytes to lines.

@@ -10,7 +10,7 @@
 extern "C" {
 
 // from the linker script
-extern std::uint32_t image_data_load[], image_data_begin[], image_data_end[], image_bss_begin[], image_bss_end[], image_stack_top[], image_ram_begin[];
+extern std::uint32_t image_vectors[], image_data_load[], image_data_begin[], image_data_end[], image_bss_begin[], image_bss_end[], image_stack_top[], image_ram_begin[];
 extern void (*image_constructors_begin[])();
 extern void (*image_constructors_end[])();
 
@@ -18,15 +18,16 @@ int main();
 void systick_interrupt();
 
 [[noreturn]] void reset_handler() {
-  bms::hal::stm32f4::scb_cpacr() = bms::hal::stm32f4::scb_cpacr() | 15U << 20;  // FPU, before anything can use it
+  using namespace bms::hal::stm32f4;
+  scb_cpacr() = scb_cpacr() | 15U << 20;  // FPU, before anything can use it
+  scb_vtor() = reinterpret_cast<std::uint32_t>(image_vectors);  // flash is at 0 too, unless the boot pins say otherwise
   asm volatile("dsb\n isb" ::: "memory");
   for (std::uint32_t *from = image_data_load, *to = image_data_begin; to < image_data_end;) *to++ = *from++;
   for (std::uint32_t* to = image_bss_begin; to < image_bss_end;) *to++ = 0;
-  bms::hal::stm32f4::scb_shcsr() = bms::hal::stm32f4::scb_shcsr() | 7U << 16;   // memory, bus and usage faults under their own name
-  bms::hal::stm32f4::read_reset_cause();
+  scb_shcsr() = scb_shcsr() | 7U << 16;  // memory, bus and usage faults under their own name
+  read_reset_cause();
   for (auto construct = image_constructors_begin; construct < image_constructors_end; ++construct) (*construct)();
-  main();
-  bms::hal::finish(0);
+  bms::hal::finish(main());
 }
 
 /// frame: r0-r3, r12, lr, pc, psr as the core stacked them (ARMv7-M, B1.5.6).
