@@ -33,22 +33,30 @@
     axisLabelFontSize: 12,
     gridLineColor: '#e3e8ee',
     strokeWidth: 1.3,
-    axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58}},
+    axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
   }, options));
 
+  const in_percent = {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24, valueFormatter: v => v.toFixed(2)}};
   const soc_labels = ['estimate with two sigma, %'], soc_series = [band(c.soc, c.two_sigma)];
   if (c.soc_ref) {
     soc_labels.push('reference, %');
     soc_series.push(k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * c.soc_ref[k]));
   }
-  const two_decimals = {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, valueFormatter: v => v.toFixed(2)}};
   const charts = [
-    chart('soc', soc_labels, rows(soc_series), {customBars: true, colors: ['#0b63b5', '#d1495b'], axes: two_decimals, fillAlpha: 0.22}),
-    chart('voltage', ['measured, V', 'predicted one step ahead, V', 'open loop, V'], rows([at(c.voltage_v), at(c.predicted_v), at(c.open_loop_v)]),
-          {colors: ['#2a2f36', '#0b63b5', '#c9a227']}),
+    chart('soc', soc_labels, rows(soc_series), {customBars: true, colors: ['#0b63b5', '#d1495b'], axes: in_percent, fillAlpha: 0.22}),
+    chart('voltage', ['open loop, V', 'measured, V', 'predicted one step ahead, V'], rows([at(c.open_loop_v), at(c.voltage_v), at(c.predicted_v)]),
+          {colors: ['#c9a227', '#2a2f36', '#0b63b5']}),
     chart('current', ['A'], rows([at(c.current_a)]), {colors: ['#2e7d4f'], fillGraph: true, fillAlpha: 0.15}),
     chart('innovation', ['mV'], rows([at(c.innovation_mv)]), {colors: ['#7a4fb0']}),
   ];
+  if (c.soc_ref) {
+    // zero with the filter's own band: the error should stay inside
+    const zeros = c.soc.map(() => 0), error = k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * (c.soc[k] - c.soc_ref[k]));
+    charts.push(chart('error', ['two sigma, %', 'error, %'], rows([band(zeros, c.two_sigma), error]),
+                      {customBars: true, colors: ['#9db8d2', '#d1495b'], axes: in_percent, fillAlpha: 0.35}));
+  } else {
+    document.getElementById('figure-error').remove();
+  }
   Dygraph.synchronize(charts, {selection: true, zoom: true, range: false});
   window.charts = charts;
 })();

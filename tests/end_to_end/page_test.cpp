@@ -1,0 +1,61 @@
+// The report in a real browser: every chart drawn, the figures filled in, no error.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// The page's document after its scripts ran, as the browser serialises it. Script errors are appended to it.
+std::string document_of(const std::filesystem::path& page, const std::filesystem::path& folder) {
+  std::string html = content(page);
+  const std::string listener = "<script>window.addEventListener('error', e => { const p = document.createElement('p'); p.textContent = 'SCRIPT ERROR ' + e.message; "
+                               "document.documentElement.appendChild(p); });</script>";
+  html.insert(html.find("<style>"), listener);
+  const auto watched = folder / "watched.html", out = folder / "dom";
+  std::ofstream(watched) << html;
+  const std::string command = "chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+                              "--disable-component-update --disable-sync --window-size=1400,1100 --virtual-time-budget=5000 --user-data-dir=" +
+                              (folder / "profile").string() + " --dump-dom file://" + watched.string() + " > " + out.string() + " 2>/dev/null";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  return content(out);
+}
+
+std::size_t count(const std::string& text, const std::string& what) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+  return n;
+}
+
+TEST(ReportPage, DrawsFiveChartsAndTheFiguresWithoutAnError) {
+  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const TemporaryFolder folder;
+  const auto page = folder.path() / "report.html";
+  ASSERT_EQ(run_tool("replay " BMS_SOURCE_DIR "/recordings/forklift_shift.csv --report " + page.string()).exit_code, 0);
+  const std::string dom = document_of(page, folder.path());
+  EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U) << "only the listener's own text";
+  EXPECT_GE(count(dom, "<canvas"), 10U);  // two a chart
+  EXPECT_THAT(dom, HasSubstr("one-step prediction, RMS</td>"));
+  EXPECT_THAT(dom, HasSubstr("After 8.0 hours the battery is at"));
+}
+
+TEST(ReportPage, WithoutAReferenceThereIsNoErrorChart) {
+  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const TemporaryFolder folder;
+  const auto page = folder.path() / "report.html", recording = folder.path() / "r.csv";
+  std::ofstream csv(recording);
+  csv << "time_s,current_a,voltage_v\n";
+  for (int k = 0; k < 100; ++k) csv << k << "," << -(k % 3) << "," << 3.3 - 0.013 * (k % 3) << "\n";
+  csv.close();
+  ASSERT_EQ(run_tool("replay " + recording.string() + " --report " + page.string()).exit_code, 0);
+  const std::string dom = document_of(page, folder.path());
+  EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
+  EXPECT_EQ(count(dom, "id=\"figure-error\""), 0U);
+  EXPECT_GE(count(dom, "<canvas"), 8U);
+}
+
+}  // namespace
+}  // namespace bms
