@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "host_sim/text_file.hpp"
+
 extern char** environ;
 
 namespace bms {
@@ -51,6 +53,15 @@ bool ChildProcess::running() {
 int ChildProcess::wait() {
   while (!ended_) ended_ = waitpid(pid_, &status_, 0) == pid_ || errno != EINTR;
   return decoded(status_);
+}
+
+std::string output_of(const std::vector<std::string>& argv) {
+  const TemporaryFolder folder;
+  const auto log = folder.path() / "log";
+  const int status = ChildProcess(argv, log).wait();
+  std::string text = read_file(log);
+  if (status != 0) throw std::runtime_error(argv[0] + " failed: " + text);
+  return text;
 }
 
 bool in_path(const std::string& program) {

@@ -28,6 +28,9 @@ class ChildProcess {
   bool ended_ = false;
 };
 
+/// Runs a program to its end; what it printed on both streams. Throws std::runtime_error, with that, when it fails.
+std::string output_of(const std::vector<std::string>& argv);
+
 bool in_path(const std::string& program);
 
 /// A folder of its own for temporary files, removed with its content.

@@ -34,7 +34,7 @@ Track run_on(const EmulatedBoard& board, const CellFile& cell, const std::vector
   if (scalar != board.scalar) {
     throw BadInput(board.name, 1, fmt::format("computes in {}, expected --scalar {}", name_of(board.scalar), name_of(board.scalar)));
   }
-  BoardRun run = run_on_board(board, replay_image(board.name, cell), samples, start);
+  BoardRun run = run_on_board(board, firmware_image(board.name, cell, Image::replay), samples, start);
   Track track;
   track.rows = rows_of(run.words, scalar);
   track.words = std::move(run.words);

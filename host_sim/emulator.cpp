@@ -69,22 +69,29 @@ const std::vector<EmulatedBoard>& emulated_boards() {
   return boards;
 }
 
+std::vector<std::string> emulator_command(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<std::string>& semihosting) {
+  std::string config = "enable=on,target=native,arg=fw";
+  for (const std::string& argument : semihosting) config += ",arg=" + argument;
+  return {"qemu-system-arm", "-M", board.machine, "-display", "none", "-monitor", "none", "-kernel", image.string(), "-semihosting-config", config};
+}
+
 BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<Sample>& samples,
-                      const std::optional<StartingPoint>& start) {
+                      const std::optional<StartingPoint>& start, const std::vector<std::string>& more) {
   const TemporaryFolder folder;
   const auto in = folder.path() / "samples", out = folder.path() / "estimates", log = folder.path() / "log";
   write_stream(in, samples, start);
   const Pipe pipe(out);
-  ChildProcess qemu({"qemu-system-arm", "-M", board.machine, "-display", "none", "-monitor", "none", "-serial", "none", "-kernel", image.string(),
-                     "-semihosting-config", "enable=on,target=native,arg=fw,arg=" + in.string() + ",arg=" + out.string()},
-                    log);
+  auto command = emulator_command(board, image, {in.string(), out.string()});
+  command.insert(command.end(), {"-serial", "none"});
+  command.insert(command.end(), more.begin(), more.end());
+  ChildProcess qemu(command, log);
 
   BoardRun run;
   std::string bytes(samples.size() * sizeof(EstimateWords), '\0');
   std::size_t have = 0, first_block = 0;
   Clock::time_point first_at, last_at;
   auto heard_at = Clock::now();
-  for (bool more = true; more && have < bytes.size();) {
+  for (bool answering = true; answering && have < bytes.size();) {
     pipe.wait(20);
     const bool running = qemu.running();  // asked before reading: what a finished emulator has written is still read
     const ssize_t n = pipe.read(bytes.data() + have, bytes.size() - have);
@@ -96,7 +103,7 @@ BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& i
         first_at = last_at;
       }
     } else {
-      more = running && Clock::now() - heard_at < std::chrono::milliseconds(silence_ms);
+      answering = running && Clock::now() - heard_at < std::chrono::milliseconds(silence_ms);
       if (n == 0 && running) usleep(1'000);  // no writer yet: poll() returns at once
     }
   }

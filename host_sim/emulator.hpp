@@ -25,8 +25,12 @@ struct EmulatedBoard {
 };
 const std::vector<EmulatedBoard>& emulated_boards();
 
-/// Streams samples through `image` (a *_replay.elf). Throws std::runtime_error when the emulator fails or stops answering.
+/// Command line of the emulator for `image`; `semihosting`: the program's arguments.
+std::vector<std::string> emulator_command(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<std::string>& semihosting);
+
+/// Streams samples through `image` (a *_replay.elf). `more`: further options of the emulator.
+/// Throws std::runtime_error when the emulator fails or stops answering.
 BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<Sample>& samples,
-                      const std::optional<StartingPoint>& start);
+                      const std::optional<StartingPoint>& start, const std::vector<std::string>& more = {});
 
 }  // namespace bms

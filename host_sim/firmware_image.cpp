@@ -42,9 +42,17 @@ void run_step(const std::vector<std::string>& argv, const std::filesystem::path&
   throw std::runtime_error("the firmware does not build, see " + log.string());
 }
 
+const char* ending(Image image) {
+  switch (image) {
+    case Image::replay: return "_replay";
+    case Image::fault: return "_fault";
+    default: return "";
+  }
+}
+
 }  // namespace
 
-std::filesystem::path replay_image(const std::string& board, const CellFile& cell) {
+std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image) {
   const auto root = source_tree();
   if (!std::filesystem::exists(root / "boards" / board / "board.cmake")) {
     throw BadInput(board, 1, "no such board in " + (root / "boards").string() + ", expected the folder name of a board");
@@ -62,8 +70,9 @@ std::filesystem::path replay_image(const std::string& board, const CellFile& cel
     run_step({"cmake", "-S", root.string(), "-B", folder.string(), "-G", "Ninja", "-DBMS_BOARD=" + board, "-DBMS_CELL=" + cell_path.string(),
               "--toolchain", (root / "cmake" / "toolchain-arm-none-eabi.cmake").string(), "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL}, log);
   }
-  run_step({"cmake", "--build", folder.string()}, log);
-  return folder / fmt::format("bms_{}_replay.elf", board);
+  const std::string name = fmt::format("bms_{}{}.elf", board, ending(image));
+  run_step({"cmake", "--build", folder.string(), "--target", name}, log);
+  return folder / name;
 }
 
 }  // namespace bms

@@ -8,8 +8,11 @@
 
 namespace bms {
 
-/// The replay image of `board` with the tables of `cell`, built if it is not there yet. Needs the source tree, CMake and the board's
-/// cross compiler; throws BadInput when they are missing and std::runtime_error when the build fails.
-std::filesystem::path replay_image(const std::string& board, const CellFile& cell);
+/// What an image is for: its end after "bms_<board>" (cmake/firmware.cmake).
+enum class Image { application, replay, fault };
+
+/// `image` of `board` with the tables of `cell`, built if it is not there yet. Needs the source tree, CMake and the board's cross
+/// compiler; throws BadInput when they are missing and std::runtime_error when the build fails.
+std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image);
 
 }  // namespace bms

@@ -38,7 +38,8 @@ void systick_interrupt();
   record.cfsr = stm32f4::scb_cfsr();
   record.hfsr = stm32f4::scb_hfsr();
   record.address = (record.cfsr & 1U << 7) != 0 ? stm32f4::scb_mmfar() : stm32f4::scb_bfar();
-  if (frame >= image_ram_begin && frame + 8 <= image_stack_top) {  // else the stack itself was the fault
+  const auto at = reinterpret_cast<std::uintptr_t>(frame), ram = reinterpret_cast<std::uintptr_t>(image_ram_begin), top = reinterpret_cast<std::uintptr_t>(image_stack_top);
+  if (at >= ram && at <= top - 8 * sizeof *frame) {  // else the stack itself was the fault
     record.lr = frame[5];
     record.pc = frame[6];
     record.psr = frame[7];

@@ -1,0 +1,141 @@
+// The firmware images of the emulated board: what is in them, what a step costs, what they say on CAN, what a fault leaves behind.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "host_sim/recording.hpp"
+#include "host_sim/replay.hpp"
+#include "host_sim/text_file.hpp"
+#include "tests/figures/committed_figures.hpp"
+#include "tests/firmware/elf_image.hpp"
+#include "tests/firmware/slcan_board.hpp"
+#include "tests/firmware/step_cost.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+std::filesystem::path image(Image kind, const char* cell = "table9") { return firmware_image("netduinoplus2", read_cell(cell), kind); }
+
+std::vector<Sample> shift() { return samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv")); }
+
+TEST(FirmwareImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
+  EXPECT_THAT(forbidden_in(symbols_of(image(Image::application))), IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(image(Image::replay))), IsEmpty());
+}
+
+TEST(FirmwareImage, WhatIsForbiddenIsFoundWhereItIs) {
+  const auto found = forbidden_in(symbols_of(BMS_TOOL, ""));
+  EXPECT_THAT(found, ::testing::Contains(StartsWith("operator new")));
+  EXPECT_THAT(found, ::testing::Contains(StartsWith("__cxa_throw")));
+  EXPECT_THAT(found, ::testing::Contains(StartsWith("typeinfo ")));
+  EXPECT_THAT(found, ::testing::Contains(StartsWith("vtable ")));
+  EXPECT_EQ(forbidden_in({{0, 0, 'T', "__aeabi_dadd"}, {0, 0, 'T', "__aeabi_f2d"}, {0, 0, 'T', "__muldf3"}, {0, 0, 'T', "_malloc_r"}, {0, 0, 'T', "_sbrk"},
+                          {0, 0, 'T', "__aeabi_fadd"}, {0, 0, 'T', "memcpy"}, {0, 0, 'T', "__aeabi_uldivmod"}}).size(), 5U);
+}
+
+/// The table in estimator/README.md, which `./bms figures` writes, against what is measured here.
+TEST(FirmwareImage, CostsNoMoreThanTheTableSays) {
+  const CommittedFigures table(BMS_SOURCE_DIR "/estimator/README.md", "netduinoplus2");
+  const auto measured = step_figures(emulated_boards().front(), read_cell("table9"), shift());
+  ASSERT_FALSE(measured.empty());
+  for (const auto& [name, value] : measured) {
+    ASSERT_TRUE(table.has(name)) << name;
+    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": run ./bms figures if it is worth it";
+  }
+}
+
+TEST(FirmwareImage, AStepStaysInsideItsBudget) {
+  const StepCost cost = count_instructions(emulated_boards().front(), image(Image::replay), shift());
+  EXPECT_EQ(cost.calls, 28801U);
+  EXPECT_LE(cost.mean, 300);  // design budget of a step
+  EXPECT_LT(cost.least, cost.mean);
+  EXPECT_GT(cost.least, 100U);
+}
+
+TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
+  const auto all = shift();
+  const std::vector<Sample> part(all.begin() + 3000, all.begin() + 4200);
+  const StartingPoint start = starting_point(Belief{0.8, 0.05}).value();
+  const Track host = run_on_host(read_cell("table9"), part, start, ScalarKind::single);
+
+  SlcanBoard board(image(Image::application));
+  EXPECT_EQ(board.read(), "");  // ready
+  board.write("S6\rO\r");
+  EXPECT_EQ(board.read(), "");
+  EXPECT_EQ(board.read(), "");
+  board.write("t31280008AF2F80F0FA02\r");  // 800,000,000 and 50,000,000 ppb, little-endian
+  for (std::size_t k = 0; k < part.size(); ++k) {
+    board.send_sample(part[k].time_us, part[k].current_ua, part[k].voltage_uv, part[k].temperature_cdegc);
+    const BoardTelemetry t = board.telemetry();
+    const EstimateRow& expected = host.rows[k];
+    ASSERT_NEAR(t.soc, 1e4 * expected.soc, 0.501) << k;
+    ASSERT_NEAR(t.soc_sigma, 1e4 * expected.soc_sigma, 0.501) << k;
+    ASSERT_EQ(t.voltage, static_cast<unsigned>(std::lround(1e-3 * part[k].voltage_uv))) << k;
+    ASSERT_NEAR(t.current, 1e-4 * part[k].current_ua, 0.501) << k;
+    ASSERT_NEAR(t.v_rc_uv, 1e6 * expected.v_rc_v, 1.0) << k;
+    ASSERT_NEAR(t.voltage_predicted_uv, 1e6 * expected.voltage_predicted_v, 1.0) << k;
+    ASSERT_EQ(t.flags, expected.flags) << k;
+    ASSERT_EQ(t.sample_counter, (k + 1) % 65536) << k;
+    ASSERT_EQ(t.status_counter, (k + 1) % 256) << k;
+  }
+  EXPECT_NE(std::lround(1e4 * host.rows.back().soc), 8000) << "the part was to move the state of charge";
+  board.write("C\r");
+  EXPECT_EQ(board.wait(), 0);
+}
+
+TEST(SlcanBoard, TellsWhichCellFileItHolds) {
+  const CellFile cell = read_cell("table9");
+  SlcanBoard board(image(Image::application));
+  board.read();
+  board.write("O\r");
+  board.read();
+  board.send_sample(0, 0, 3'300'000, 2500);
+  const std::string identity = board.read_until("t1838");
+  EXPECT_EQ(identity.substr(5, 8), fmt::format("{:02X}{:02X}{:02X}{:02X}", cell.hash & 255, cell.hash >> 8 & 255, cell.hash >> 16 & 255, cell.hash >> 24));
+  EXPECT_EQ(identity.substr(13), "00010000");  // 0.1.0
+}
+
+TEST(SlcanBoard, HostileBytesAreRefusedAndTheNextSampleIsTaken) {
+  SlcanBoard board(image(Image::application));
+  board.read();
+  board.write("t3108\rO\r");
+  EXPECT_EQ(board.read(), "\a") << "closed";
+  EXPECT_EQ(board.read(), "");
+  for (const std::string& line : {std::string("t31"), std::string("t3109"), std::string("t310800"), std::string("t310G00000000000000"), std::string("t8108") + std::string(16, '0'),
+                                  std::string(3000, 't'), std::string("\xff\x00\x80\n\t;", 6), std::string("t3108zzzzzzzzzzzzzzzz"), std::string("O0"), std::string("S9")}) {
+    board.write(line + "\r");
+    EXPECT_EQ(board.read(), "\a") << line.substr(0, 20);
+  }
+  board.write("T0000031080011223344556677\rt3114" + std::string(8, '0') + "\rt3008" + std::string(16, '0') + "\r");  // well formed, not ours
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(board.read(), "");
+  // a time frame whose reading got lost: flagged as missing, not the last reading again
+  board.send_sample(0, 0, 3'300'000, 2500);
+  const BoardTelemetry first = board.telemetry();
+  EXPECT_NE(first.soc, 0xFFFFU);
+  board.write("t3118" "40420F000000" "C409\r");
+  const BoardTelemetry lost = board.telemetry();
+  EXPECT_NE(lost.flags & (current_missing | voltage_missing), 0U);
+  EXPECT_EQ(lost.voltage, 0xFFFFU);
+  board.send_sample(2'000'000, 0, 3'300'000, 2500);
+  EXPECT_EQ(board.telemetry().flags & (current_missing | voltage_missing), 0U);
+}
+
+class Fault : public ::testing::TestWithParam<const char*> {};
+
+/// The image exits with the number of its check that failed (tests/firmware/fault_image.cpp).
+TEST_P(Fault, LeavesARecordThatTheNextRunReads) {
+  const TemporaryFolder folder;
+  auto command = emulator_command(emulated_boards().front(), image(Image::fault), {GetParam()});
+  command.insert(command.end(), {"-serial", "none"});
+  EXPECT_EQ(ChildProcess(command, folder.path() / "log").wait(), 0) << read_file(folder.path() / "log");
+}
+INSTANTIATE_TEST_SUITE_P(Kinds, Fault, ::testing::Values("address", "undefined", "stack"), [](const auto& kind) { return std::string(kind.param); });
+
+}  // namespace
+}  // namespace bms

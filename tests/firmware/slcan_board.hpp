@@ -1,0 +1,50 @@
+// The firmware's application image in the emulator, talked to as a CAN adapter on a serial line is. Numbers and ids are those of
+// the pages in hal/slcan/codec.hpp, hal/sample_frames.hpp and firmware/messages.hpp, written here a second time on purpose.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host_sim/child_process.hpp"
+
+namespace bms {
+
+/// What one sample was answered with.
+struct BoardTelemetry {
+  unsigned soc = 0, soc_sigma = 0, voltage = 0;
+  int current = 0;
+  std::int32_t v_rc_uv = 0, voltage_predicted_uv = 0;
+  std::uint32_t flags = 0;
+  unsigned sample_counter = 0, status_counter = 0, reset_cause = 0;
+};
+
+class SlcanBoard {
+ public:
+  explicit SlcanBoard(const std::filesystem::path& application_image);
+  ~SlcanBoard();
+  SlcanBoard(const SlcanBoard&) = delete;
+  SlcanBoard& operator=(const SlcanBoard&) = delete;
+
+  void write(const std::string& bytes) const;
+  /// The next answer: a line up to \r (without it), or "\a". Throws std::runtime_error after ten seconds of silence.
+  std::string read();
+  /// Lines until one begins with `what`; that one.
+  std::string read_until(const std::string& what);
+
+  void send_sample(std::uint64_t time_us, std::int32_t current_ua, std::int32_t voltage_uv, std::int16_t temperature_cdegc) const;
+  /// The frames up to the status frame that ends a sample.
+  BoardTelemetry telemetry();
+
+  /// Exit code of the emulator, after the firmware has ended.
+  int wait() { return emulator_.wait(); }
+
+ private:
+  TemporaryFolder folder_;
+  ChildProcess emulator_;
+  int line_ = -1;
+  std::string received_;
+};
+
+}  // namespace bms

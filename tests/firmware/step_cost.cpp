@@ -1,0 +1,69 @@
+#include "tests/firmware/step_cost.hpp"
+
+#include <cstdio>
+#include <regex>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "estimator/soc_estimator.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "host_sim/text_file.hpp"
+#include "tests/firmware/elf_image.hpp"
+
+namespace bms {
+
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples) {
+  const auto symbols = symbols_of(replay_image);
+  const Symbol step = symbol_named(symbols, "bms::estimator_step("), interrupt = symbol_named(symbols, "systick_interrupt");
+  const TemporaryFolder folder;
+  const std::string log = (folder.path() / "count").string();
+  run_on_board(board, replay_image, samples, std::nullopt,
+               {"-plugin", fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, step.address & ~1ULL, interrupt.address & ~1ULL,
+                                       (interrupt.address & ~1ULL) + interrupt.size),
+                "-d", "plugin", "-D", log});
+  StepCost cost;
+  unsigned long long calls = 0, first = 0, least = 0, most = 0, sum = 0;
+  const std::string text = read_file(log);
+  if (std::sscanf(text.c_str(), "calls %llu first %llu min %llu max %llu sum %llu", &calls, &first, &least, &most, &sum) != 5 || calls < 2) {
+    throw std::runtime_error("the instruction counter said: " + text);
+  }
+  return {calls, first, least, most, static_cast<double>(sum) / static_cast<double>(calls - 1)};
+}
+
+Footprint footprint(const std::filesystem::path& application_image) {
+  const auto symbols = symbols_of(application_image);
+  const ImageSize size = size_of(application_image);
+  Footprint f;
+  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|soc_from_ocv<|model::|UdCovariance<|InputCheck).*");
+  for (const Symbol& s : symbols) {
+    if (s.name.starts_with("bms::generated::cell<")) f.cell_tables += s.size;
+    else if (std::regex_match(s.name, of_estimator)) f.estimator_text += s.size;
+  }
+  f.image_text = size.text;
+  f.image_ram = size.data + size.bss;
+  const std::string usage = read_file(application_image.parent_path() / "CMakeFiles/estimator_step.dir/firmware/estimator_step.cpp.su");
+  std::smatch found;
+  if (!std::regex_search(usage, found, std::regex("bms::estimator_step[^\t]*\t([0-9]+)\tstatic"))) throw std::runtime_error("no stack usage in " + usage);
+  f.step_stack = std::stoull(found[1]);
+  return f;
+}
+
+std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
+  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples);
+  const Footprint f = footprint(firmware_image(board.name, cell, Image::application));
+  const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
+  return {{"step, mean [instructions]", cost.mean},
+          {"step, longest [instructions]", number(cost.most)},
+          {"first step, which starts the filter [instructions]", number(cost.first)},
+          {"stack of a step [bytes]", number(f.step_stack)},
+          {"code of estimator and model [bytes]", number(f.estimator_text)},
+          {"the cell's tables [bytes]", number(f.cell_tables)},
+          {"state of one cell [bytes]", number(sizeof(CellState<float, model::OneRc>))},
+          {"state of one estimator with its input checks [bytes]", number(sizeof(SocEstimator<float>))},
+          {"flash of the whole application [bytes]", number(f.image_text)},
+          {"RAM of the whole application, without stack [bytes]", number(f.image_ram)}};
+}
+
+}  // namespace bms

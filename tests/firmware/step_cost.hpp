@@ -1,0 +1,37 @@
+// What an estimator step costs on an emulated board, counted in instructions (tests/firmware/instruction_count.c).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimator/sample.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/emulator.hpp"
+
+namespace bms {
+
+struct StepCost {
+  std::uint64_t calls = 0, first = 0, least = 0, most = 0;
+  double mean = 0;  ///< of all calls but the first, which starts the estimator
+};
+
+/// Instructions inside bms::estimator_step and all that it calls, interrupts left out.
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples);
+
+/// Bytes.
+struct Footprint {
+  std::uint64_t estimator_text = 0;   ///< code of estimator and model, start-up of the filter included
+  std::uint64_t cell_tables = 0;      ///< the cell's constants
+  std::uint64_t step_stack = 0;       ///< frame of a step; what it calls is inline
+  std::uint64_t image_text = 0;       ///< code and constants of the whole application
+  std::uint64_t image_ram = 0;        ///< its data and bss, without the stack
+};
+Footprint footprint(const std::filesystem::path& application_image);
+
+/// The rows of the table in estimator/README.md: what it is, and the figure.
+std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples);
+
+}  // namespace bms
