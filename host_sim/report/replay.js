@@ -37,6 +37,13 @@
   }, options));
 
   const in_percent = {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24, valueFormatter: v => v.toFixed(2)}};
+  // a range that the first moments of a wrong start do not blow up: what 99.5 % of the values need, and half as much again
+  const range = values => {
+    const sizes = values.filter(Number.isFinite).map(Math.abs).sort((a, b) => a - b);
+    if (sizes.length === 0) return null;
+    const most = Math.min(sizes[sizes.length - 1], 1.5 * sizes[Math.floor(0.995 * (sizes.length - 1))]);
+    return most > 0 ? [-1.05 * most, 1.05 * most] : null;
+  };
   const soc_labels = ['estimate with two sigma, %'], soc_series = [band(c.soc, c.two_sigma)];
   if (c.soc_ref) {
     soc_labels.push('reference, %');
@@ -47,13 +54,14 @@
     chart('voltage', ['open loop, V', 'measured, V', 'predicted one step ahead, V'], rows([at(c.open_loop_v), at(c.voltage_v), at(c.predicted_v)]),
           {colors: ['#c9a227', '#2a2f36', '#0b63b5']}),
     chart('current', ['A'], rows([at(c.current_a)]), {colors: ['#2e7d4f'], fillGraph: true, fillAlpha: 0.15}),
-    chart('innovation', ['mV'], rows([at(c.innovation_mv)]), {colors: ['#7a4fb0']}),
+    chart('innovation', ['mV'], rows([at(c.innovation_mv)]), {colors: ['#7a4fb0'], valueRange: range(c.innovation_mv)}),
   ];
   if (c.soc_ref) {
     // zero with the filter's own band: the error should stay inside
     const zeros = c.soc.map(() => 0), error = k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * (c.soc[k] - c.soc_ref[k]));
     charts.push(chart('error', ['two sigma, %', 'error, %'], rows([band(zeros, c.two_sigma), error]),
-                      {customBars: true, colors: ['#9db8d2', '#d1495b'], axes: in_percent, fillAlpha: 0.35}));
+                      {customBars: true, colors: ['#9db8d2', '#d1495b'], axes: in_percent, fillAlpha: 0.35,
+                       valueRange: range(c.soc.map((v, k) => 100 * Math.max(Math.abs(v - c.soc_ref[k]), c.two_sigma[k])))}));
   } else {
     document.getElementById('figure-error').remove();
   }
