@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/end_to_end/run_tool.hpp"
+#include "tests/host_sim/refusal.hpp"
 
 namespace bms {
 namespace {
@@ -41,14 +42,9 @@ TEST(Board, ComputesARealRecordingBitForBitLikeTheHost) {
 TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
   const TemporaryFolder folder;
   const auto other = folder.path() / "ulp.toml";
-  std::string text = content(BMS_SOURCE_DIR "/model/cells/table9.toml");
-  const std::size_t at = text.find("0.0135692,  0.0153566");
-  ASSERT_NE(at, std::string::npos);
   ASSERT_EQ(std::nextafter(0.0135692F, 1.0F), 0.013569201F);
   ASSERT_NE(0.0135692F, 0.013569201F);
-  text.replace(at, 9, "0.013569201");
-  text.replace(text.find("\"table9\""), 8, "\"ulp\"");
-  std::ofstream(other) << text;
+  std::ofstream(other) << replaced(replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0135692, ", "0.013569201, "), "\"table9\"", "\"ulp\"");
   const ToolRun run = run_tool("replay " + shift + on_board + " --board-cell " + other.string());
   EXPECT_EQ(run.exit_code, 1);
   EXPECT_THAT(run.err, ::testing::MatchesRegex(".*host and netduinoplus2 differ first at sample [0-9]+ \\(time [0-9]+ s\\) in [a-z_]+: host [^\n]+\n"));
@@ -56,10 +52,8 @@ TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
 
 TEST(Board, ACellThatIsOutOfRangeIsRefusedByTheFirmwareBuild) {
   const TemporaryFolder folder;
-  std::string text = content(BMS_SOURCE_DIR "/model/cells/table9.toml");
-  text.replace(text.find("0.0140197"), 9, "0.9");
   const auto bad = folder.path() / "bad.toml";
-  std::ofstream(bad) << text;
+  std::ofstream(bad) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0140197", "0.9");
   const std::string log = (folder.path() / "log").string();
   const int status = std::system(("\"" BMS_CELL_HEADER_TOOL "\" " + bad.string() + " " + (folder.path() / "out.hpp").string() + " 2> " + log).c_str());
   EXPECT_EQ(WEXITSTATUS(status), 2);

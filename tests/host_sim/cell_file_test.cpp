@@ -5,33 +5,19 @@
 
 #include <functional>
 
-#include "host_sim/bad_input.hpp"
 #include "host_sim/text_file.hpp"
+#include "tests/host_sim/refusal.hpp"
 
 namespace bms {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 
 std::string table9_text() { return read_file(BMS_SOURCE_DIR "/model/cells/table9.toml"); }
 
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), by);
-}
-
 /// The one line that a bad file is refused with.
 std::string refusal(const std::string& text) {
-  try {
-    parse_cell(text, "cell.toml");
-  } catch (const BadInput& error) {
-    EXPECT_THAT(error.what(), MatchesRegex("cell.toml:[0-9]+: [^\n]+")) << "one line, with file and line number";
-    return error.what();
-  }
-  ADD_FAILURE() << "accepted";
-  return "";
+  return refusal_by("cell.toml", [&] { parse_cell(text, "cell.toml"); });
 }
 
 TEST(CellFile, HoldsThePapersTable9AndLimits) {

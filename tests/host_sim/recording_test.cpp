@@ -6,14 +6,13 @@
 #include <cmath>
 #include <random>
 
-#include "host_sim/bad_input.hpp"
 #include "host_sim/cell_file.hpp"
+#include "tests/host_sim/refusal.hpp"
 
 namespace bms {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 
 /// Twenty good rows with a load that the voltage follows.
 std::string rows(const std::string& separator = ",", const std::string& end = "\n") {
@@ -26,21 +25,10 @@ std::string rows(const std::string& separator = ",", const std::string& end = "\
 }
 const std::string header = "time_s,current_a,voltage_v\n";
 
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), by);
-}
-
 std::string refusal(const std::string& text) {
-  try {
-    parse_recording(text, "log.csv");
-  } catch (const BadInput& error) {
-    EXPECT_THAT(error.what(), MatchesRegex("log.csv:[0-9]+: [^\n]+, expected [^\n]+")) << "one line, with file, line number and what was expected";
-    return error.what();
-  }
-  ADD_FAILURE() << "accepted";
-  return "";
+  const std::string line = refusal_by("log.csv", [&] { parse_recording(text, "log.csv"); });
+  EXPECT_THAT(line, HasSubstr(", expected "));
+  return line;
 }
 
 /// Ids of the warnings that an accepted recording carries.
