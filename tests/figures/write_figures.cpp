@@ -1,10 +1,11 @@
-// Measures what the READMEs quote and writes it there: `./bms figures`.
+// Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on the board.
 //
 // Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
 #include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -110,9 +111,10 @@ void run() {
 }  // namespace
 }  // namespace bms
 
-int main() {
+int main(int argc, char** argv) {
   try {
-    bms::run();
+    if (argc > 1 && std::string_view(argv[1]) == "step") fmt::print("{}", bms::step_cost());
+    else bms::run();
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "figures: {}\n", e.what());
