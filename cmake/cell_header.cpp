@@ -7,33 +7,49 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "host_sim/bad_input.hpp"
+#include "host_sim/cell_fields.hpp"
 #include "host_sim/cell_file.hpp"
 #include "host_sim/text_file.hpp"
 
 namespace {
 
-std::string literal(double value) {
-  std::string text = fmt::format("{}", value);
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
-}
+/// Designated initialisers of model::CellParameters: its members are called as the keys of the file.
+class Initialiser {
+ public:
+  void table(const std::string& key) { text_ += (std::exchange(inside_, true) ? "},\n" : "\n") + ("    ." + key + " = {"); }
+  void number(const std::string& key, double value) { text_ += "." + key + " = " + literal(value) + ", "; }
+  void optional_number(const std::string& key, double value) { number(key, value); }
+  template <class Column>
+  void column(const std::string& key, const Column& column) {
+    std::string values;
+    for (std::size_t k = 0; k < column.size; ++k) values += (k == 0 ? "" : ", ") + literal(column[k]);
+    text_ += "\n        ." + key + " = {{" + values + "}, " + std::to_string(column.size) + "}, ";
+  }
+  /// What the firmware does without stays empty.
+  template <class Column>
+  void optional_column(const std::string&, const Column&) {}
 
-template <class Column>
-std::string initialiser(const Column& column) {
-  std::string values;
-  for (std::size_t k = 0; k < column.size; ++k) values += (k == 0 ? "" : ", ") + literal(column[k]);
-  return "{{" + values + "}, " + std::to_string(column.size) + "}";
-}
+  std::string text() const { return text_ + "}"; }
+
+ private:
+  static std::string literal(double value) {
+    std::string text = fmt::format("{}", value);
+    if (text.find_first_of(".e") == std::string::npos) text += ".0";
+    return text;
+  }
+
+  std::string text_;
+  bool inside_ = false;
+};
 
 std::string header(const bms::CellFile& file) {
-  const bms::model::CellParameters<>& p = file.parameters;
-  const auto& l = p.limits;
-  const auto& n = p.noise;
-  const auto& t = p.tolerance;
+  Initialiser values;
+  bms::visit_cell(values, file.parameters);
   return fmt::format(
       R"(// Made at build time from the cell file '{name}'; do not edit.
 #pragma once
@@ -47,18 +63,7 @@ namespace bms::generated {{
 inline constexpr char cell_name[] = "{name}";
 inline constexpr std::uint32_t cell_hash = 0x{hash:08x};  // first 32 bits of the file's SHA-256
 
-inline constexpr model::CellParameters<double> parameters{{
-    .capacity_ah = {capacity},
-    .limits = {{.voltage_min_v = {vmin}, .voltage_max_v = {vmax}, .charge_current_max_a = {imax}, .discharge_current_max_a = {imin}, .temperature_min_c = {tmin}, .temperature_max_c = {tmax}}},
-    .ocv = {{.soc = {ocv_soc},
-            .b0_v = {b0},
-            .b1_v = {b1}}},
-    .rc = {{.soc = {rc_soc},
-           .r0_ohm = {r0},
-           .r1_ohm = {r1},
-           .c1_f = {c1}}},
-    .noise = {{.voltage_v = {nv}, .model_v = {nm}, .model_correlation_s = {nmc}, .v_rc_v = {nrc}, .rest_v = {nr}, .current_a = {ni}, .current_offset_a = {nio}, .current_offset_correlation_s = {nioc}, .current_unknown_a = {niu}}},
-    .tolerance = {{.ocv_v = {to}, .resistance_fraction = {tr}, .initial_soc = {ts}, .drift_v = {td}}}}};
+inline constexpr model::CellParameters<double> parameters{{{values}}};
 
 static_assert(model::first_fault(parameters).what == nullptr, "a parameter of the cell file is out of range");
 
@@ -67,16 +72,7 @@ inline constexpr auto cell = model::prepare<S, model::interval_count(parameters)
 
 }}  // namespace bms::generated
 )",
-      fmt::arg("name", file.name), fmt::arg("hash", file.hash), fmt::arg("capacity", literal(p.capacity_ah)),
-      fmt::arg("vmin", literal(l.voltage_min_v)), fmt::arg("vmax", literal(l.voltage_max_v)), fmt::arg("imax", literal(l.charge_current_max_a)),
-      fmt::arg("imin", literal(l.discharge_current_max_a)), fmt::arg("tmin", literal(l.temperature_min_c)), fmt::arg("tmax", literal(l.temperature_max_c)),
-      fmt::arg("ocv_soc", initialiser(p.ocv.soc)), fmt::arg("b0", initialiser(p.ocv.b0_v)), fmt::arg("b1", initialiser(p.ocv.b1_v)),
-      fmt::arg("rc_soc", initialiser(p.rc.soc)), fmt::arg("r0", initialiser(p.rc.r0_ohm)), fmt::arg("r1", initialiser(p.rc.r1_ohm)),
-      fmt::arg("c1", initialiser(p.rc.c1_f)), fmt::arg("nv", literal(n.voltage_v)), fmt::arg("nm", literal(n.model_v)),
-      fmt::arg("nmc", literal(n.model_correlation_s)), fmt::arg("nrc", literal(n.v_rc_v)), fmt::arg("nr", literal(n.rest_v)),
-      fmt::arg("ni", literal(n.current_a)), fmt::arg("nio", literal(n.current_offset_a)), fmt::arg("nioc", literal(n.current_offset_correlation_s)),
-      fmt::arg("niu", literal(n.current_unknown_a)), fmt::arg("to", literal(t.ocv_v)), fmt::arg("tr", literal(t.resistance_fraction)),
-      fmt::arg("ts", literal(t.initial_soc)), fmt::arg("td", literal(t.drift_v)));
+      fmt::arg("name", file.name), fmt::arg("hash", file.hash), fmt::arg("values", values.text()));
 }
 
 }  // namespace

@@ -1,12 +1,15 @@
 #include "host_sim/cell_file.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <sstream>
 
+#include <fmt/format.h>
 #include <toml++/toml.h>
 
 #include "host_sim/bad_input.hpp"
+#include "host_sim/cell_fields.hpp"
 #include "host_sim/text_file.hpp"
 
 namespace bms {
@@ -37,6 +40,11 @@ class Table {
     if (list == nullptr) refuse(node, key, "a list of numbers");
     if (list->size() > into.value.size()) refuse(node, key, "at most " + std::to_string(into.value.size()) + " numbers");
     for (const toml::node& entry : *list) into.push_back(number_of(entry, key));
+  }
+
+  bool has(const std::string& key) {
+    read_.insert(key);
+    return table_.contains(key);
   }
 
   Table table(const std::string& key) {
@@ -92,7 +100,95 @@ std::size_t line_of(const toml::table& root, const model::CellFault& fault) {
   return node.node()->source().begin.line;
 }
 
+class Reader {
+ public:
+  Reader(Table& top, std::map<std::string, std::string>& sources) : top_(top), sources_(sources) {}
+
+  void table(const std::string& key) {
+    finish();
+    inner_.emplace(top_.table(key));
+    sources_[key] = inner_->text("source");
+  }
+  void number(const std::string& key, double& into) { into = here().number(key); }
+  void optional_number(const std::string& key, double& into) {
+    if (here().has(key)) number(key, into);
+  }
+  template <class Column>
+  void column(const std::string& key, Column& into) {
+    here().column(key, into);
+  }
+  template <class Column>
+  void optional_column(const std::string& key, Column& into) {
+    if (here().has(key)) column(key, into);
+  }
+  void finish() const {
+    if (inner_) inner_->finish();
+  }
+
+ private:
+  Table& here() { return inner_ ? *inner_ : top_; }
+
+  Table& top_;
+  std::optional<Table> inner_;
+  std::map<std::string, std::string>& sources_;
+};
+
+class Writer {
+ public:
+  Writer(std::string& text, const std::map<std::string, std::string>& sources) : text_(text), sources_(sources) {}
+
+  void table(const std::string& key) {
+    const auto source = sources_.find(key);
+    text_ += fmt::format("\n[{}]\nsource = {}\n", key, quoted(source == sources_.end() ? "" : source->second));
+  }
+  void number(const std::string& key, double value) { text_ += key + " = " + literal(value) + "\n"; }
+  void optional_number(const std::string& key, double value) {
+    if (value != 0) number(key, value);
+  }
+  template <class Column>
+  void column(const std::string& key, const Column& column) {
+    text_ += key + " = [";
+    for (std::size_t k = 0; k < column.size; ++k) {
+      if (k % 10 == 0 && column.size > 10) text_ += k == 0 ? "\n  " : ",\n  ";
+      else if (k > 0) text_ += ", ";
+      text_ += literal(column[k]);
+    }
+    text_ += column.size > 10 ? ",\n]\n" : "]\n";
+  }
+  template <class Column>
+  void optional_column(const std::string& key, const Column& values) {
+    if (values.size > 0) column(key, values);
+  }
+
+  static std::string quoted(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) {
+      if (c == '"' || c == '\\') out += '\\';
+      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+    return out + "\"";
+  }
+
+ private:
+  /// The shortest digits that give back the same double; a float in TOML needs a point or an exponent.
+  static std::string literal(double value) {
+    std::string text = fmt::format("{}", value);
+    if (text.find_first_of(".en") == std::string::npos) text += ".0";
+    return text;
+  }
+
+  std::string& text_;
+  const std::map<std::string, std::string>& sources_;
+};
+
 }  // namespace
+
+std::string cell_text(const CellFile& file) {
+  std::string text = fmt::format("name = {}\nchemistry = {}\nsource = {}\n", Writer::quoted(file.name), Writer::quoted(file.chemistry), Writer::quoted(file.source));
+  Writer writer(text, file.sources);
+  visit_cell(writer, file.parameters);
+  return text;
+}
 
 CellFile parse_cell(const std::string& text, const std::string& path) {
   CellFile file;
@@ -117,53 +213,9 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   file.chemistry = top.text("chemistry");
   file.source = top.text("source");
   model::CellParameters<>& p = file.parameters;
-  p.capacity_ah = top.number("capacity_ah");
-
-  Table limits = top.table("limits");
-  limits.text("source");
-  p.limits.voltage_min_v = limits.number("voltage_min_v");
-  p.limits.voltage_max_v = limits.number("voltage_max_v");
-  p.limits.charge_current_max_a = limits.number("charge_current_max_a");
-  p.limits.discharge_current_max_a = limits.number("discharge_current_max_a");
-  p.limits.temperature_min_c = limits.number("temperature_min_c");
-  p.limits.temperature_max_c = limits.number("temperature_max_c");
-  limits.finish();
-
-  Table ocv = top.table("ocv");
-  ocv.text("source");
-  ocv.column("soc", p.ocv.soc);
-  ocv.column("b0_v", p.ocv.b0_v);
-  ocv.column("b1_v", p.ocv.b1_v);
-  ocv.finish();
-
-  Table rc = top.table("rc");
-  rc.text("source");
-  rc.column("soc", p.rc.soc);
-  rc.column("r0_ohm", p.rc.r0_ohm);
-  rc.column("r1_ohm", p.rc.r1_ohm);
-  rc.column("c1_f", p.rc.c1_f);
-  rc.finish();
-
-  Table noise = top.table("noise");
-  noise.text("source");
-  p.noise.voltage_v = noise.number("voltage_v");
-  p.noise.model_v = noise.number("model_v");
-  p.noise.model_correlation_s = noise.number("model_correlation_s");
-  p.noise.v_rc_v = noise.number("v_rc_v");
-  p.noise.rest_v = noise.number("rest_v");
-  p.noise.current_a = noise.number("current_a");
-  p.noise.current_offset_a = noise.number("current_offset_a");
-  p.noise.current_offset_correlation_s = noise.number("current_offset_correlation_s");
-  p.noise.current_unknown_a = noise.number("current_unknown_a");
-  noise.finish();
-
-  Table tolerance = top.table("tolerance");
-  tolerance.text("source");
-  p.tolerance.ocv_v = tolerance.number("ocv_v");
-  p.tolerance.resistance_fraction = tolerance.number("resistance_fraction");
-  p.tolerance.initial_soc = tolerance.number("initial_soc");
-  p.tolerance.drift_v = tolerance.number("drift_v");
-  tolerance.finish();
+  Reader reader(top, file.sources);
+  visit_cell(reader, p);
+  reader.finish();
   top.finish();
 
   if (const model::CellFault fault = model::first_fault(p); fault.what != nullptr) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ struct CellFile {
   std::string name;
   std::string chemistry;
   std::string source;          ///< where its values come from
+  std::map<std::string, std::string> sources;  ///< the same, table by table
   std::string path;            ///< as given; built-in cells: their name
   std::string text;            ///< the file itself
   std::uint32_t hash = 0;      ///< first 32 bits of the text's SHA-256: tells on CAN which file is on the board
@@ -25,6 +27,9 @@ CellFile read_cell(const std::string& name_or_path);
 
 /// The same from text; `path` is for messages only.
 CellFile parse_cell(const std::string& text, const std::string& path);
+
+/// A cell file with these values: parse_cell() of it gives them back, digit for digit.
+std::string cell_text(const CellFile& file);
 
 struct BuiltInCell {
   std::string name;

@@ -32,6 +32,9 @@ struct OcvTable {
   Column<double, max_ocv_edges> soc;   ///< edges, ascending, first 0, last 1
   Column<Real, max_ocv_edges> b0_v;    ///< [V], one less than edges
   Column<Real, max_ocv_edges> b1_v;    ///< [V per unit of soc], > 0
+  // where slow charge and discharge part (hysteresis), if it is known; the 1RC model does without
+  Column<double, max_ocv_edges> half_gap_v{};  ///< [V] at the edges, half of charge less discharge; or empty
+  double lean = 0;                     ///< -1..1: b0, b1 are the middle of both plus lean * half_gap
 };
 
 /// Equivalent circuit at nodes of soc; linear in between, constant outside.
@@ -41,6 +44,7 @@ struct RcTable {
   Column<Real, max_rc_nodes> r0_ohm;
   Column<Real, max_rc_nodes> r1_ohm;
   Column<Real, max_rc_nodes> c1_f;
+  Column<double, max_rc_nodes> r0_std_ohm{}, r1_std_ohm{}, c1_std_f{};  ///< standard deviations of an identification, or empty
 };
 
 /// Limits of use, from the manufacturer.
@@ -124,11 +128,28 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
     }
   }
 
+  if (o.half_gap_v.size != 0 && o.half_gap_v.size != o.soc.size) return {"ocv.half_gap_v", 0, "as many values as ocv.soc"};
+  for (std::size_t k = 0; k < o.half_gap_v.size; ++k) {
+    if (outside(o.half_gap_v[k], -0.5, 1)) return {"ocv.half_gap_v", k, "-0.5 to 1 V"};
+  }
+  if (outside(o.lean, -1, 1)) return {"ocv.lean", 0, "-1 to 1"};
+
   const auto& r = p.rc;
   if (r.soc.size < 1) return {"rc.soc", 0, "one node or more"};
   if (r.r0_ohm.size != r.soc.size) return {"rc.r0_ohm", 0, "as many values as rc.soc"};
   if (r.r1_ohm.size != r.soc.size) return {"rc.r1_ohm", 0, "as many values as rc.soc"};
   if (r.c1_f.size != r.soc.size) return {"rc.c1_f", 0, "as many values as rc.soc"};
+  const auto deviations = [&](const auto& column) {
+    if (column.size != 0 && column.size != r.soc.size) return false;
+    for (std::size_t k = 0; k < column.size; ++k) {
+      if (outside(column[k], 0, 1e9)) return false;
+    }
+    return true;
+  };
+  constexpr const char* as_many = "as many values as rc.soc, none negative";
+  if (!deviations(r.r0_std_ohm)) return {"rc.r0_std_ohm", 0, as_many};
+  if (!deviations(r.r1_std_ohm)) return {"rc.r1_std_ohm", 0, as_many};
+  if (!deviations(r.c1_std_f)) return {"rc.c1_std_f", 0, as_many};
   for (std::size_t k = 0; k < r.soc.size; ++k) {
     if (outside(r.soc[k], 0, 1)) return {"rc.soc", k, "0 to 1"};
     if (k > 0 && outside(r.soc[k] - r.soc[k - 1], 0.001, 1)) return {"rc.soc", k, "nodes that ascend by 0.001 or more"};

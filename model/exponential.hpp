@@ -3,7 +3,7 @@
 // A polynomial of its own instead of libm, whose last bit differs between libraries and cores. 1 - exp(-x) rather than
 // exp(-x), because steps are short against the time constant and the difference to 1 would have lost its digits.
 //
-//   x <= 1/4:  x (c0 + x (c1 + ...))         relative error 2.4e-7 for float and fixed point (two roundings), 1e-15 for double and Jet
+//   x <= 1/4:  x (c0 + x (c1 + ...))         relative error 2.4e-7 for float and fixed point (two roundings), 1e-15 for double
 //   x >  1/4:  halved until it is not, then   settled(2x) = settled(x) (2 - settled(x))   as often
 //   x > 32:    1
 //
@@ -39,10 +39,23 @@ inline constexpr auto converted(const std::array<double, N>& from) {
 
 }  // namespace exponential_detail
 
+/// A dual number: value `a`, derivatives `v` (ceres::Jet).
+template <class S>
+concept Dual = requires(S s) {
+  s.a;
+  s.v;
+};
+
 template <class S>
 constexpr Fraction<S> settled(Exponent<S> x) {
   using F = Fraction<S>;
   namespace d = exponential_detail;
+  if constexpr (Dual<S>) {
+    const auto p = settled<decltype(x.a)>(x.a);
+    x.v *= 1 - p;  // d settled / dx = exp(-x)
+    x.a = p;
+    return x;
+  }
   const Exponent<S> quarter(0.25);
   if (x > quarter) [[unlikely]] {
     if (x > Exponent<S>(32)) return F(1);

@@ -48,6 +48,23 @@ TEST(CellFile, TellsWhichFileItIsByAHash) {
   EXPECT_NE(parse_cell(text, "a").hash, parse_cell(text + "\n", "a").hash);
 }
 
+TEST(CellFile, WhatIsWrittenIsReadBackDigitForDigit) {
+  for (const BuiltInCell& built_in : built_in_cells()) {
+    CellFile cell = read_cell(built_in.name);
+    cell.source = "with \"quotes\", a \\ and\na line";
+    cell.parameters.ocv.half_gap_v.size = 0;
+    for (std::size_t k = 0; k < cell.parameters.ocv.soc.size; ++k) cell.parameters.ocv.half_gap_v.push_back(0.01 / (1.0 + static_cast<double>(k)));
+    cell.parameters.ocv.lean = -0.7;
+    const std::string text = cell_text(cell);
+    const CellFile again = parse_cell(text, "again");
+    EXPECT_EQ(cell_text(again), replaced(text, "a \\\\ and a line", "a \\\\ and a line"));
+    EXPECT_EQ(again.parameters.rc.c1_f[2], cell.parameters.rc.c1_f[2]);
+    EXPECT_EQ(again.parameters.ocv.half_gap_v[3], cell.parameters.ocv.half_gap_v[3]);
+    EXPECT_EQ(again.parameters.noise.current_unknown_a, cell.parameters.noise.current_unknown_a);
+    EXPECT_EQ(again.sources.at("rc"), cell.sources.at("rc"));
+  }
+}
+
 TEST(CellFile, RefusesWhatIsOutOfRangeAndNamesKeyLineAndExpectation) {
   const std::string good = table9_text();
   EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = -6.0")), HasSubstr("'capacity_ah' is out of range, expected 0.01 to 1000 Ah"));
