@@ -3,8 +3,8 @@
 //   charge += current_ua * duration_us        exact, in 1e-12 A s
 //   soc     = charge / capacity               read in counts of 2^shift (model::ChargeScale), below 4e-9
 //
-// Held within -1/4 .. 5/4 of the capacity: nothing overflows however long a sensor lies. (5/4 of the largest capacity and one
-// count of the largest current over the longest step are below 2^63.)
+// Held within -1/4 .. 5/4 of the capacity: nothing overflows however long a sensor lies. (5/4 of the largest capacity and as much
+// again, or one count of the largest current over the longest step, are below 2^63.)
 // A dual number (an unknown of a fit) keeps its derivatives instead: Charge<Jet> sums in Jets.
 #pragma once
 
@@ -35,7 +35,7 @@ class Charge {
     hold(scale);
   }
 
-  /// Moves soc by delta, to a count.
+  /// Moves soc by delta, to the nearest count.
   constexpr void correct(const Soc& delta, const Scale& scale) {
     uaus_ += static_cast<std::int64_t>(to_counts(delta, scale)) << scale.shift;
     hold(scale);
@@ -52,13 +52,19 @@ class Charge {
 
  private:
   static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
-    const Soc most(1.5);
+    const Soc most(1.25);  // with what is there already, below 2^63 even in the largest cell
     const Soc held = delta > most ? most : delta < -most ? -most : delta;
     if constexpr (model::is_q<Soc>) {
       return Soc(held * scale.counts_per_soc).raw();
     } else {
-      return static_cast<std::int32_t>(held * scale.counts_per_soc);
+      return static_cast<std::int32_t>(held * scale.counts_per_soc + half_signed(held));
     }
+  }
+
+  /// 1/2 with the sign of x. A builtin, because it takes the sign without a branch, which noise would mispredict every other time.
+  static constexpr Soc half_signed(Soc x) {
+    if constexpr (std::same_as<Soc, float>) return __builtin_copysignf(0.5F, x);
+    else return __builtin_copysign(0.5, x);
   }
 
   constexpr void hold(const Scale& scale) {

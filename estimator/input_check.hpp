@@ -2,9 +2,9 @@
 //
 //   missing       no_reading
 //   implausible   outside what the cell and its sensor can have (model::Plausible)
-//   stuck         the same voltage to the last digit for `stuck_after` samples while the model's moved by `stuck_move_v`;
+//   stuck         the same voltage to the last digit for `stuck_after` samples while the drop over R0 moved by `stuck_move_v`;
 //                 believed again when it changes
-//   gap           a step more than `gap_factor` times the one before
+//   gap           a step more than `gap_factor` times the usual one
 //
 // A current that is left out is replaced by the last one believed, and its uncertainty by the cell file's current_unknown_a.
 #pragma once
@@ -39,20 +39,20 @@ class InputCheck {
     return {current_ua_, false};
   }
 
-  /// predicted_v: what the model expects of this reading.
-  constexpr bool voltage_usable(std::int32_t voltage_uv, const model::Voltage<S>& predicted_v, const model::Plausible& plausible, std::uint32_t& flags) {
+  /// drop_v: R0 times the present current, which a live reading follows.
+  constexpr bool voltage_usable(std::int32_t voltage_uv, const model::Voltage<S>& drop_v, const model::Plausible& plausible, std::uint32_t& flags) {
     if (!voltage_present(voltage_uv, plausible, flags)) return false;
     if (voltage_uv != voltage_uv_) {
       voltage_uv_ = voltage_uv;
       repeats_ = 0;
-      predicted_then_v_ = predicted_v;
+      drop_then_v_ = drop_v;
       return true;
     }
     if (repeats_ < stuck_after) {
       ++repeats_;
       return true;
     }
-    const model::Voltage<S> moved_v = predicted_v - predicted_then_v_;
+    const model::Voltage<S> moved_v = drop_v - drop_then_v_;
     const auto limit_v = model::Voltage<S>(stuck_move_v);
     if (moved_v > limit_v || moved_v < -limit_v) repeats_ = stuck;
     if (repeats_ == stuck) flags |= voltage_stuck;
@@ -67,8 +67,15 @@ class InputCheck {
 
   /// step_us: time since the previous sample, > 0. To be asked when it is another than before.
   constexpr bool gap(std::uint32_t step_us, std::uint32_t& flags) {
-    const bool gap = usual_step_us_ != 0 && step_us / gap_factor > usual_step_us_;
-    usual_step_us_ = step_us;
+    if (usual_step_us_ == 0) {
+      usual_step_us_ = step_us;
+      return false;
+    }
+    const bool gap = step_us / gap_factor > usual_step_us_;
+    // drifts towards what comes; steps that stay long become usual after a while
+    if (gap) usual_step_us_ += usual_step_us_ / 4 + 1;
+    else if (step_us > usual_step_us_) usual_step_us_ += (step_us - usual_step_us_) / 8;
+    else usual_step_us_ -= (usual_step_us_ - step_us) / 8;
     if (gap) flags |= time_gap;
     return gap;
   }
@@ -83,7 +90,7 @@ class InputCheck {
   std::uint32_t usual_step_us_ = 0;
   std::int32_t current_ua_ = 0;
   std::int32_t voltage_uv_ = no_reading;
-  model::Voltage<S> predicted_then_v_{};
+  model::Voltage<S> drop_then_v_{};
   std::uint8_t repeats_ = 0;  // of the same voltage; or `stuck`
 };
 

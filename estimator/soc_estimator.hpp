@@ -61,7 +61,7 @@ class SocEstimator {
 
     const Soc soc = state_.charge.soc(cell.charge);
     const auto at = model::look_up(cell, soc, interval_);
-    const model::Drive<S> drive{model::from_micro<model::Current<S>>(current.ua), duration_s_};
+    const Drive drive{model::from_micro<model::Current<S>>(current.ua), duration_s_};
     const auto settling = Model::settling(at, drive.duration_s);
 
     std::array<Variance, states> noise{};
@@ -73,9 +73,9 @@ class SocEstimator {
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
 
     estimate.voltage_predicted_v = Model::voltage(state_.polarisation, at, drive);
-    if (check_.voltage_usable(sample.voltage_uv, estimate.voltage_predicted_v, cell.plausible, estimate.flags)) {
+    if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * drive.current_a), cell.plausible, estimate.flags)) {
       const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - estimate.voltage_predicted_v;
-      correct(cell, Model::sensitivity(at, drive), innovation_v);
+      correct(cell, at, drive, soc, innovation_v);
     }
     complete(cell, estimate);
     return estimate;
@@ -86,11 +86,12 @@ class SocEstimator {
  private:
   using Soc = model::Soc<S>;
   using Voltage = model::Voltage<S>;
+  using Current = model::Current<S>;
   using Variance = model::Variance<S>;
   using Fraction = model::Fraction<S>;
   using TimeStep = model::TimeStep<S>;
 
-  static constexpr std::uint32_t longest_step_us = 4'095'000'000U;  // a longer one has settled everything; TimeStep's range
+  static constexpr std::uint32_t longest_step_us = 4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
   static constexpr std::uint32_t longest_count_us = 2'000'000'000U;
   static constexpr int longest_gap_counts = 1'000;                   // 23 days; nothing is known after that
 
@@ -116,8 +117,16 @@ class SocEstimator {
     const model::FilterNoise<S>& n = cell.noise;
     const auto shared_by = model::ratio<model::Count<S>>(n.model_correlation_s, duration_s_);
     voltage_noise_ = n.voltage_v2 + (shared_by > model::Count<S>(1) ? model::product<Variance>(n.model_v2, shared_by) : n.model_v2);
-    const Soc white = n.white_soc_per_s * duration_s_;
+    const Soc white = over_step(n.white_soc_per_s);
     soc_noise_ = Variance(white * white) + model::product<Variance>(n.walk_soc2_per_s, duration_s_);
+  }
+
+  /// What adds up to by the end of the step, 1 at most.
+  constexpr Soc over_step(const Soc& per_s) const {
+    const Soc most(1), once = per_s * duration_s_;
+    Soc sum = once;
+    for (std::uint64_t left_us = paced_us_; left_us > longest_step_us && sum < most; left_us -= longest_step_us) sum += once;
+    return sum < most ? sum : most;
   }
 
   static constexpr TimeStep seconds(std::uint32_t us) {
@@ -134,19 +143,46 @@ class SocEstimator {
   /// direction, so standard deviations add: (sigma + d)^2 - sigma^2.
   template <class Cell>
   constexpr Variance unknown_charge(const Cell& cell) const {
-    const Soc most(1);
-    Soc d = cell.noise.unknown_soc_per_s * duration_s_;
-    if (d > most) d = most;
+    const Soc d = over_step(cell.noise.unknown_soc_per_s);
     const Soc sigma = model::root<Soc>(state_.covariance.last_variance());
     return Variance(d * d) + Variance((sigma + sigma) * d);
   }
 
-  template <class Cell, class Row>
-  constexpr void correct(const Cell& cell, const Row& sensitivity, const Voltage& innovation_v) {
-    const auto correction = state_.covariance.observe(sensitivity, voltage_noise_, innovation_v);
+  static constexpr double wide_soc = 0.03;
+  using Correction = std::array<Voltage, states>;
+  using At = model::TablePoint<S>;
+  using Drive = model::Drive<S>;
+
+  template <class Cell>
+  constexpr void correct(const Cell& cell, const At& at, const Drive& drive, const Soc& soc, const Voltage& innovation_v) {
+    const bool wide = state_.covariance.last_variance() > Variance(wide_soc * wide_soc);
+    const Correction correction = wide ? over_edges(cell, drive.current_a, soc, innovation_v) : state_.covariance.observe(Model::sensitivity(at, drive), voltage_noise_, innovation_v);
 #pragma GCC unroll 8
     for (std::size_t i = 0; i + 1 < states; ++i) state_.polarisation[i] += correction[i];
     state_.charge.correct(correction[states - 1], cell.charge);
+  }
+
+  /// The slope at one point says little about a curve with knees while soc is not known better than this (one sigma): a correction
+  /// would be as sure of itself as the curve is steep there, where beside it the curve is flat. So the line is laid through the
+  /// voltages at soc and at sqrt(3) sigma to either side, and what the curve deviates from it counts as noise (statistical
+  /// linearisation: A. Gelb, Applied Optimal Estimation, 1974, 6.2; with the points of S. Julier, J. Uhlmann and H. Durrant-Whyte, 2000).
+  /// Arguments by value: one passed by address would be kept in memory in every step.
+  template <class Cell>
+  [[gnu::noinline]] constexpr Correction over_edges(const Cell& cell, Current current_a, Soc soc, Voltage innovation_v) {
+    const Drive drive{current_a, duration_s_};
+    const At at = model::look_up(cell, soc);
+    const Variance variance = state_.covariance.last_variance();
+    Soc reach = model::product<Soc>(model::root<Soc>(variance), Fraction(1.7320508));
+    const auto most = Soc(0.5), least = Soc(0.002);
+    reach = reach > most ? most : reach < least ? least : reach;
+    const auto voltage_at = [&](const Soc& there) { return Voltage(Model::voltage(state_.polarisation, model::look_up(cell, there), drive)); };
+    const Voltage middle_v = Model::voltage(state_.polarisation, at, drive);
+    const Voltage above_v = voltage_at(Soc(soc + reach)) - middle_v, below_v = voltage_at(Soc(soc - reach)) - middle_v;
+    auto h = Model::sensitivity(at, drive);
+    h[states - 1] = model::ratio<model::VoltagePerSoc<S>>(Voltage(above_v - below_v), Soc(reach + reach));
+    const Voltage bend_v = above_v + below_v;  // weights 1/6, 2/3, 1/6: mean bend / 6, variance about the line bend^2 / 18
+    const Variance noise_v2 = Variance(voltage_noise_ + model::product<Variance>(Variance(bend_v * bend_v), Fraction(1.0 / 18)));
+    return state_.covariance.observe(h, noise_v2, Voltage(innovation_v - model::product<Voltage>(bend_v, Fraction(1.0 / 6))));
   }
 
   template <class Cell>
@@ -180,7 +216,7 @@ class SocEstimator {
     started_ = true;
     time_us_ = sample.time_us;
 
-    const model::Drive<S> drive{model::from_micro<model::Current<S>>(current.ua), TimeStep(1)};
+    const Drive drive{model::from_micro<model::Current<S>>(current.ua), TimeStep(1)};
     SocBelief<S> belief{soc_of_ppb(from_.soc_ppb), Variance{}};
     const Soc believed_sigma = soc_of_ppb(from_.soc_sigma_ppb);
     belief.variance = Variance(believed_sigma * believed_sigma);
@@ -188,9 +224,16 @@ class SocEstimator {
     auto at = model::look_up(cell, has_start_ ? belief.soc : Soc(0.5));
     const Voltage half_v = at.r1_ohm * Fraction(0.5) * drive.current_a;
     const Variance half_v2 = half_v * half_v;
-    if (!has_start_) {
+    // a belief finer than the points of the grid needs no help from a voltage
+    const auto finest = Soc(2.0 / start_points);
+    if (voltage && (!has_start_ || believed_sigma > finest)) {
       const Voltage load_v = half_v + at.r0_ohm * drive.current_a;
-      belief = soc_from_ocv<S>(cell, Voltage(model::from_micro<Voltage>(sample.voltage_uv) - load_v), Variance(cell.noise.rest_v2 + half_v2));
+      Variance reading_v2 = cell.noise.rest_v2 + half_v2;
+      if (!current.measured) {
+        const Voltage unknown_v = Voltage(at.r0_ohm * cell.noise.unknown_a) + Voltage(at.r1_ohm * cell.noise.unknown_a);
+        reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
+      }
+      belief = soc_from_ocv<S>(cell, Voltage(model::from_micro<Voltage>(sample.voltage_uv) - load_v), reading_v2, has_start_ ? &belief : nullptr);
       at = model::look_up(cell, belief.soc);
     }
     state_.charge.set(belief.soc, cell.charge);

@@ -20,11 +20,13 @@ struct SocBelief {
   model::Variance<S> variance;
 };
 
-/// ocv_v: the reading; variance_v2: of it.
+inline constexpr int start_points = 256;
+
+/// ocv_v: the reading; variance_v2: of it. before: nullptr, or a belief with a deviation of at least two points' spacing.
 template <class S, class Cell>
-constexpr SocBelief<S> soc_from_ocv(const Cell& cell, const model::Voltage<S>& ocv_v, const model::Variance<S>& variance_v2) {
+constexpr SocBelief<S> soc_from_ocv(const Cell& cell, const model::Voltage<S>& ocv_v, const model::Variance<S>& variance_v2, const SocBelief<S>* before = nullptr) {
   using namespace model;
-  constexpr int points = 256;
+  constexpr int points = start_points;
   const Fraction<S> spacing(1.0 / points);
   const auto point = [&](int k) { return Soc<S>(Current<S>(2 * k + 1) * Fraction<S>(0.5 / points)); };
   // misfit of the best point is taken off all of them, so that a voltage outside the curve still has weights
@@ -35,7 +37,12 @@ constexpr SocBelief<S> soc_from_ocv(const Cell& cell, const model::Voltage<S>& o
     // half a point's width on the curve counts as uncertainty too: steep parts have few points
     const Voltage<S> half_width_v = VoltagePerSoc<S>(at.ocv_delta_v * at.per_width) * Fraction<S>(0.5 / points);
     const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
-    return ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
+    const auto of_voltage = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
+    if (before == nullptr) return of_voltage;
+    const Soc<S> off = point(k) - before->soc;
+    const auto of_belief = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
+    const Exponent<S> mistaken(8);  // one belief in 3,000 is wrong altogether: a voltage that speaks clearly against it wins
+    return Exponent<S>(of_voltage + (of_belief < mistaken ? of_belief : mistaken));
   };
   Exponent<S> least = misfit(0);
   for (int k = 1; k < points; ++k) {

@@ -15,11 +15,9 @@ int main() {
   hal::clock_start();
   hal::can_start();
   hal::watchdog_start(watchdog_ms);
-  Sample sample;
-  if (!hal::next_sample(sample)) return 0;
+  const Sample* sample = hal::next_sample();
+  if (sample == nullptr) return 0;
   Application<BoardScalar, estimator_step> application(hal::starting_point(), identity());
-  do {
-    application.take(sample);
-  } while (hal::next_sample(sample));
+  for (; sample != nullptr; sample = hal::next_sample()) application.take(*sample);
   return 0;
 }

@@ -1,4 +1,4 @@
-// A classic CAN bus: standard frames out and in, nothing blocks.
+// A classic CAN bus: standard frames out and in. Sending may wait for the line, receiving never does.
 // Back ends: slcan/ (text over a UART), absent/ (nobody listens).
 #pragma once
 

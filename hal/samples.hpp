@@ -8,8 +8,8 @@
 
 namespace bms::hal {
 
-/// Waits for the next sample. False: there will be none (a replay has ended); never on a truck.
-bool next_sample(Sample& sample);
+/// Waits for the next sample; it stays until the next call. nullptr: there will be none (a replay has ended); never on a truck.
+const Sample* next_sample();
 
 /// What is known of the state of charge before the first sample. Asked once, after the first next_sample().
 std::optional<StartingPoint> starting_point();

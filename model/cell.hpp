@@ -54,6 +54,7 @@ struct FilterNoise {
   Soc<S> white_soc_per_s{};             ///< current_a over the capacity
   Variance<S> walk_soc2_per_s{};        ///< slow current error: 2 offset^2 correlation / capacity^2
   Soc<S> unknown_soc_per_s{};           ///< current_unknown_a over the capacity
+  Current<S> unknown_a{};
 };
 
 /// A reading outside is not a measurement.
@@ -159,8 +160,10 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   add(-0.125, 0);
   for (std::size_t k = 0; k + 1 < edges.size; ++k) add(edges[k], edges[k + 1]);
   add(1, 1.125);
-  cell.edge[0] = Soc<S>(-7.9);
-  cell.edge[cell.size] = Soc<S>(7.9);
+  // out of reach: a simulation's soc may be anywhere, the estimator's is held within -1/4 .. 5/4
+  const double nowhere = is_q<Soc<S>> ? 7.9 : 1e30;
+  cell.edge[0] = Soc<S>(-nowhere);
+  cell.edge[cell.size] = Soc<S>(nowhere);
 
   const double capacity_as = p.capacity_ah * 3'600;
   cell.charge.capacity_uaus = static_cast<std::int64_t>(capacity_as * 1e12 + 0.5);
@@ -182,6 +185,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.white_soc_per_s = Soc<S>(n.current_a / capacity_as);
   cell.noise.walk_soc2_per_s = Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
   cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
+  cell.noise.unknown_a = Current<S>(n.current_unknown_a);
 
   // half a volt and ten times the current beyond the limits of use: a sensor still tells the truth there, a fault does not
   cell.plausible.voltage_min_uv = static_cast<std::int32_t>((p.limits.voltage_min_v - 0.5) * 1e6);
@@ -192,7 +196,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   return cell;
 }
 
-/// Interval that holds soc (within +-7.9), found from a nearby one: a step moves soc by little. The result does not depend on `from`.
+/// Interval that holds soc (fixed point: within +-7.9), found from a nearby one: a step moves soc by little. The result does not depend on `from`.
 template <class S, std::size_t Max>
 constexpr std::size_t interval_of(const Cell<S, Max>& cell, const Soc<S>& soc, std::size_t from) {
   std::size_t k = from;

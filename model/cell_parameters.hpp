@@ -152,6 +152,10 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (!deviations(r.c1_std_f)) return {"rc.c1_std_f", 0, as_many};
   for (std::size_t k = 0; k < r.soc.size; ++k) {
     if (outside(r.soc[k], 0, 1)) return {"rc.soc", k, "0 to 1"};
+    for (std::size_t e = 0; e < o.soc.size; ++e) {
+      const double apart = r.soc[k] < o.soc[e] ? o.soc[e] - r.soc[k] : r.soc[k] - o.soc[e];
+      if (apart > 1e-9 && apart < 0.0005) return {"rc.soc", k, "nodes on an edge of ocv.soc or 0.0005 or more away from it"};
+    }
     if (k > 0 && outside(r.soc[k] - r.soc[k - 1], 0.001, 1)) return {"rc.soc", k, "nodes that ascend by 0.001 or more"};
     if (outside(r.r0_ohm[k], 1e-5, 0.5)) return {"rc.r0_ohm", k, "0.00001 to 0.5 ohm"};
     if (outside(r.r1_ohm[k], 1e-5, 0.5)) return {"rc.r1_ohm", k, "0.00001 to 0.5 ohm"};

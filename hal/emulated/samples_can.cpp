@@ -11,23 +11,23 @@ namespace bms::hal {
 
 namespace {
 
-Sample building;
+Sample building, complete;
 std::optional<StartingPoint> start;
 bool was_listening = false;
 
 }  // namespace
 
-bool next_sample(Sample& sample) {
+const Sample* next_sample() {
   while (true) {
     CanFrame frame;
     while (can_receive(frame)) {
       if (is_start(frame)) start = start_of(frame);
       if (completes(frame, building)) {
-        sample = std::exchange(building, Sample{});  // a frame that gets lost later is a missing reading, not the old one again
-        return true;
+        complete = std::exchange(building, Sample{});  // a frame that gets lost later is a missing reading, not the old one again
+        return &complete;
       }
     }
-    if (was_listening && !can_listening()) return false;
+    if (was_listening && !can_listening()) return nullptr;
     was_listening = can_listening();
     watchdog_feed();  // waiting for the other side is no fault of this one
     wait_for_interrupt();

@@ -2,7 +2,6 @@
 // Formats in hal/stream_format.hpp; either file may be a named pipe, OUT is opened first. A part of a sample at the end is left out.
 // Exit code 3: no such files, not a stream, or estimates that could not be written.
 #include <array>
-#include <cstring>
 
 #include "hal/emulated/semihosting.hpp"
 #include "hal/power.hpp"
@@ -23,7 +22,7 @@ std::span<unsigned char> bytes_of(std::span<T> items) {
 }
 
 // bytes, not Samples: those are not zero at first, so that the whole block would be kept in flash
-std::array<unsigned char, block * sizeof(Sample)> samples;
+alignas(Sample) std::array<unsigned char, block * sizeof(Sample)> samples;
 std::size_t sample_count = 0, next = 0;
 std::array<EstimateWords, block> estimates;
 std::size_t estimate_count = 0;
@@ -59,16 +58,15 @@ void write_estimates() {
 
 }  // namespace
 
-bool next_sample(Sample& sample) {
+const Sample* next_sample() {
   if (next == sample_count) {
     if (in < 0) open_streams();
     if (estimate_count > 0) write_estimates();
     sample_count = read_fully(samples) / sizeof(Sample);
     next = 0;
-    if (sample_count == 0) return false;
+    if (sample_count == 0) return nullptr;
   }
-  std::memcpy(&sample, &samples[sizeof(Sample) * next++], sizeof(Sample));
-  return true;
+  return reinterpret_cast<const Sample*>(&samples[sizeof(Sample) * next++]);  // read() has put one there
 }
 
 std::optional<StartingPoint> starting_point() {

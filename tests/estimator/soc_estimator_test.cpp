@@ -64,12 +64,69 @@ TEST(SocEstimator, EveryScalarTellsTheSameStory) {
   }
 }
 
-TEST(SocEstimator, FirstEstimateIsTheStartingPoint) {
+TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   const auto cell = table9<float>();
-  SocEstimator<float> estimator(StartingPoint{650'000'000, 50'000'000});
-  const auto e = estimator.step(cell, {0, 0, 3'300'000, 2'500});
+  SocEstimator<float> without_voltage(StartingPoint{650'000'000, 50'000'000});
+  auto e = without_voltage.step(cell, {0, 0, no_reading, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.05, 1e-6);
+  SocEstimator<float> sure(StartingPoint{650'000'000, 5'000'000});
+  e = sure.step(cell, {0, 0, 3'300'000, 2'500});
+  EXPECT_NEAR(e.soc, 0.65, 1e-6);
+  EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
+}
+
+TEST(SocEstimator, AWideBeliefAndTheFirstVoltageAreWeighedTogether) {
+  const auto cell = table9<float>();
+  const auto started = [&](std::int32_t soc_ppb, std::int32_t sigma_ppb, std::int32_t voltage_uv) {
+    return SocEstimator<float>(StartingPoint{soc_ppb, sigma_ppb}).step(cell, {0, 0, voltage_uv, 2'500});
+  };
+  // 3.23 V is 16 %: where the curve is steep the voltage decides
+  auto e = started(400'000'000, 200'000'000, 3'230'000);
+  EXPECT_NEAR(e.soc, 0.16, 0.02);
+  EXPECT_LT(e.soc_sigma, 0.03);
+  // 3.283 V is anything from 37 to 53 %: there the belief does
+  e = started(450'000'000, 30'000'000, 3'285'000);
+  EXPECT_NEAR(e.soc, 0.45, 0.01);
+  EXPECT_NEAR(e.soc_sigma, 0.03, 0.006);
+  // a belief that the voltage flatly contradicts was wrong altogether
+  e = started(980'000'000, 20'000'000, 3'230'000);
+  EXPECT_NEAR(e.soc, 0.16, 0.03);
+}
+
+/// A wide start above the knee at 90 %, where the curve is 130 times as steep as below it.
+TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
+  const auto cell = table9<double>();
+  for (const double truth : {0.55, 0.65, 0.75, 0.85}) {
+    const auto at = model::look_up(cell, truth);
+    SocEstimator<double> estimator(StartingPoint{930'000'000, 150'000'000});
+    Estimate<double> e = estimator.step(cell, {0, 0, no_reading, 2'500});
+    for (std::uint64_t s = 1; s <= 600; ++s) e = estimator.step(cell, {s * 1'000'000, 0, static_cast<std::int32_t>(1e6 * at.ocv_v), 2'500});
+    EXPECT_LE(std::abs(e.soc - truth), 3 * e.soc_sigma) << truth;
+  }
+}
+
+TEST(SocEstimator, SigmaGoesOnGrowingOverAGapOfHours) {
+  const auto cell = table9<float>();
+  double before = 0;
+  for (const std::uint64_t hours : {1U, 3U, 10U, 1'000U}) {
+    SocEstimator<float> estimator(StartingPoint{500'000'000, 5'000'000});
+    estimator.step(cell, {0, 0, 3'285'000, 2'500});
+    estimator.step(cell, {1'000'000, 0, 3'285'000, 2'500});
+    const auto e = estimator.step(cell, {hours * 3'600'000'000, no_reading, no_reading, 2'500});
+    EXPECT_GT(e.soc_sigma, before) << hours;
+    before = e.soc_sigma;
+    if (hours == 1'000) break;
+    EXPECT_NEAR(e.soc_sigma, std::min(1.0, 1.2 * static_cast<double>(hours) / 6), 0.12) << hours;
+  }
+}
+
+TEST(SocEstimator, AStartWithoutACurrentIsLessSureOfTheVoltage) {
+  const auto cell = table9<float>();
+  SocEstimator<float> with, without;
+  const auto known = with.step(cell, {0, -3'000'000, 3'200'000, 2'500}), unknown = without.step(cell, {0, no_reading, 3'200'000, 2'500});
+  EXPECT_GT(unknown.soc_sigma, 0.02);
+  EXPECT_NEAR(unknown.soc, known.soc, 2.5 * (unknown.soc_sigma + known.soc_sigma));
 }
 
 TEST(SocEstimator, WaitsForAVoltageWhenNothingIsKnown) {

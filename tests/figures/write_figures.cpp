@@ -43,7 +43,7 @@ ReplayResult replayed(const Case& c) {
 std::string accuracy_row(const Case& c) {
   const ReplayResult r = replayed(c);
   return fmt::format("| {} | {} | {} | {} | {} | {:.2f} mV |\n", c.title, percent(r.soc.rmse), percent(r.soc.max_error), percent(r.soc.rmse_after_30min),
-                     percent(r.soc.within_2_sigma), 1e3 * r.voltage.prediction_rmse_v);
+                     percent(r.soc.within_2_sigma), 1e3 * r.voltage.prediction_rmse_v.value_or(0));
 }
 
 const std::string accuracy_heading =
