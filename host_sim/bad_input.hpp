@@ -9,8 +9,17 @@ namespace bms {
 
 class BadInput : public std::runtime_error {
  public:
-  explicit BadInput(const std::string& line) : std::runtime_error(line) {}
-  BadInput(const std::string& file, std::size_t line, const std::string& what) : std::runtime_error(file + ":" + std::to_string(line) + ": " + what) {}
+  BadInput(const std::string& file, std::size_t line, const std::string& what)
+      : std::runtime_error(in_one_line(file + ":" + std::to_string(line) + ": " + what)) {}
+
+ private:
+  /// A name may hold anything.
+  static std::string in_one_line(std::string text) {
+    for (char& c : text) {
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
+    }
+    return text;
+  }
 };
 
 }  // namespace bms

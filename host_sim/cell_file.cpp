@@ -77,8 +77,9 @@ class Table {
   }
 
   double number_of(const toml::node& node, const std::string& key) const {
-    if (!node.is_number()) refuse(node, key, "a number");
-    return *node.value<double>();
+    const auto value = node.value<double>();  // none for an integer that no double holds
+    if (!node.is_number() || !value) refuse(node, key, "a number");
+    return *value;
   }
 
   std::string expected() const {
@@ -224,14 +225,18 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   return file;
 }
 
+std::string cell_names() {
+  std::string names;
+  for (const BuiltInCell& cell : built_in_cells()) names += (names.empty() ? "" : ", ") + cell.name;
+  return names;
+}
+
 CellFile read_cell(const std::string& name_or_path) {
   for (const BuiltInCell& cell : built_in_cells()) {
     if (cell.name == name_or_path) return parse_cell(cell.text, cell.name);
   }
   if (name_or_path.find('/') == std::string::npos && !std::filesystem::exists(name_or_path)) {
-    std::string names;
-    for (const BuiltInCell& cell : built_in_cells()) names += (names.empty() ? "" : ", ") + cell.name;
-    throw BadInput(name_or_path, 1, "no such cell, expected a cell file or one of: " + names);
+    throw BadInput(name_or_path, 1, "no such cell, expected a cell file or one of: " + cell_names());
   }
   return parse_cell(read_file(name_or_path), name_or_path);
 }

@@ -37,4 +37,7 @@ struct BuiltInCell {
 };
 const std::vector<BuiltInCell>& built_in_cells();
 
+/// Their names, for a person.
+std::string cell_names();
+
 }  // namespace bms

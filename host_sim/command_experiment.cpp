@@ -19,7 +19,7 @@ std::string experiment_list() {
 }
 
 int run(const ExperimentCommandOptions& options) {
-  const auto rows = experiment(options.name, {options.capacity_ah, options.seed});
+  const auto rows = experiment(options.name, {options.capacity_ah, options.seed, options.step_s, options.high_c_rate, options.low_c_rate});
   if (!rows) {
     std::string names;
     for (const Experiment& e : experiments()) names += (names.empty() ? "" : ", ") + std::string(e.name);

@@ -45,8 +45,8 @@ Track run_on(const EmulatedBoard& board, const CellFile& cell, const std::vector
 std::string summary(const ReplayResult& r) {
   std::string text = statement(r);
   text += fmt::format("\nOne-step voltage prediction {:.2f} mV RMS; open loop {:.2f} mV RMS, fit {:.1f} %. {:.2f} million steps/s ({}, {}).",
-                      1e3 * r.voltage.prediction_rmse_v, 1e3 * r.voltage.open_loop_rmse_v, r.voltage.open_loop_fit_percent, r.track.steps_per_second / 1e6,
-                      r.target, name_of(r.scalar));
+                      1e3 * r.voltage.prediction_rmse_v.value_or(0), 1e3 * r.voltage.open_loop_rmse_v.value_or(0), r.voltage.open_loop_fit_percent.value_or(0),
+                      r.track.steps_per_second / 1e6, r.target, name_of(r.scalar));
   return text;
 }
 
@@ -57,6 +57,7 @@ int run(const ReplayOptions& options) {
   result.scalar = scalar_of(options.scalar);
   result.target = options.target;
   const EmulatedBoard* board = options.target == "host" ? nullptr : &board_named(options.target);
+  if (!options.board_cell.empty() && board == nullptr) throw BadInput("--board-cell", 1, "no board to flash it to, expected --target with a board");
   if (options.verify && board == nullptr) throw BadInput("--verify", 1, "nothing to compare the host with, expected --target with a board");
   result.cell = read_cell(options.cell);
   result.recording = read_recording(options.recording);
@@ -64,9 +65,11 @@ int run(const ReplayOptions& options) {
   for (const Warning& warning : result.recording.warnings) warn(options.recording + ": " + warning.text);
 
   const auto samples = bms::samples(result.recording);
-  std::optional<Belief> belief;
-  if (options.initial_soc) belief = Belief{*options.initial_soc, options.initial_soc_sigma};
-  const auto start = starting_point(belief);
+  if (options.initial_soc) {
+    result.belief = Belief{*options.initial_soc, options.initial_soc_sigma};
+    result.initial_soc = *options.initial_soc;
+  }
+  const auto start = starting_point(result.belief);
 
   if (board != nullptr) {
     const CellFile board_cell = options.board_cell.empty() ? result.cell : read_cell(options.board_cell);
@@ -78,9 +81,8 @@ int run(const ReplayOptions& options) {
       result.track = std::move(host);
     } else if (const auto d = first_difference(host, result.track, result.scalar)) {
       const double at_s = d->sample < result.recording.rows() ? result.recording.time_s[d->sample] : 0;
-      fmt::print(stderr, "{}: host and {} differ first at sample {} (time {:g} s) in {}: host {:.9g}, board {:.9g}\n", options.recording, board->name, d->sample,
-                 at_s, d->field, d->host, d->board);
-      return 1;
+      result.difference = fmt::format("host and {} differ first at sample {} (time {:g} s) in {}: host {:.9g}, board {:.9g}", board->name, d->sample, at_s, d->field,
+                                      d->host, d->board);
     } else {
       result.verified_against = board->name;
     }
@@ -91,6 +93,10 @@ int run(const ReplayOptions& options) {
   if (!options.trace.empty()) put(options.trace, trace);
   if (!options.output.report.empty()) put(options.output.report, replay_report(result));
   if (!options.output.json.empty()) put(options.output.json, json_of(result, sha256(trace)));
+  if (result.difference) {
+    fmt::print(stderr, "{}: {}\n", options.recording, *result.difference);
+    return 1;
+  }
   tell(options.output, summary(result));
   if (result.verified_against) tell(options.output, fmt::format("Verified: {} estimates, every bit equal on {}.", result.track.words.size(), *result.verified_against));
   if (!options.output.report.empty()) tell(options.output, "Report: " + options.output.report);

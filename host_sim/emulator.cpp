@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "hal/stream_format.hpp"
+#include "host_sim/bad_input.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/text_file.hpp"
 
@@ -71,7 +72,11 @@ const std::vector<EmulatedBoard>& emulated_boards() {
 
 std::vector<std::string> emulator_command(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<std::string>& semihosting) {
   std::string config = "enable=on,target=native,arg=fw";
-  for (const std::string& argument : semihosting) config += ",arg=" + argument;
+  for (const std::string& argument : semihosting) {
+    if (argument.find(' ') != std::string::npos) throw BadInput(argument, 1, "a space in the name, expected a TMPDIR without");  // it parts the program's words
+    config += ",arg=";
+    for (const char c : argument) config += c == ',' ? std::string(",,") : std::string(1, c);
+  }
   return {"qemu-system-arm", "-M", board.machine, "-display", "none", "-monitor", "none", "-kernel", image.string(), "-semihosting-config", config};
 }
 

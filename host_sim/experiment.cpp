@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/splitmix.hpp"
+
 namespace bms {
 
 /// What a design writes on: straight pieces of current over time, and a source of chance.
 class Course {
  public:
-  explicit Course(std::uint64_t seed) : random_(seed) {}
+  explicit Course(const ExperimentOptions& options) : high_c_rate(options.high_c_rate), low_c_rate(options.low_c_rate), random_(options.seed) {}
+
+  const double high_c_rate, low_c_rate;
 
   void ramp(int duration_s, double from_c_rate, double to_c_rate) {
     pieces_.push_back({duration_s, std::clamp(from_c_rate, -1.0, 1.0), std::clamp(to_c_rate, -1.0, 1.0)});
@@ -21,9 +25,9 @@ class Course {
   /// Whole number, both ends included.
   int between(int low, int high) {
     const auto choices = static_cast<std::uint64_t>(high - low + 1);
-    return low + static_cast<int>((bits() >> 32) * choices >> 32);
+    return low + static_cast<int>((random_.bits() >> 32) * choices >> 32);
   }
-  double between(double low, double high) { return low + (high - low) * (static_cast<double>(bits() >> 11) * 0x1p-53); }
+  double between(double low, double high) { return low + (high - low) * (static_cast<double>(random_.bits() >> 11) * 0x1p-53); }
 
   std::vector<ProfileRow> sampled(double capacity_ah, double step_s) const {
     const int step_ms = std::max(1, static_cast<int>(std::lround(step_s * 1e3)));
@@ -54,14 +58,7 @@ class Course {
     double from_c_rate, to_c_rate;
   };
 
-  std::uint64_t bits() {  // splitmix64
-    std::uint64_t z = random_ += 0x9E3779B97F4A7C15U;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    return z ^ (z >> 31);
-  }
-
-  std::uint64_t random_;
+  SplitMix random_;
   std::vector<Piece> pieces_;
   int time_s_ = 0;
 };
@@ -190,10 +187,64 @@ void forklift_shift(Course& truck) {
   truck.hold(480 * minute_s - truck.time_s(), 0);
 }
 
+// The designs of Tables 7 and 8, as current pulses around one state of charge: what is taken is given back, twenty minutes of it.
+// The paper shows them (Fig. 9-11) without numbers.
+
+constexpr int design_s = 1'200, lead_s = 60;
+
+/// Short pulses out and in, of two heights, with rests between.
+template <int rest_s>
+void short_pulses(Course& cell) {
+  constexpr int pulse_s = 10;
+  cell.hold(lead_s, 0);
+  for (int k = 0; cell.time_s() < design_s - lead_s; ++k) {
+    const double c_rate = k % 2 == 0 ? cell.high_c_rate : 0.5 * cell.high_c_rate;
+    for (const double direction : {-1.0, 1.0}) {
+      cell.hold(pulse_s, direction * c_rate);
+      cell.hold(rest_s, 0);
+    }
+  }
+  cell.hold(lead_s, 0);
+}
+
+/// Long bursts that never rest: HIGH, LOW, and the same back.
+template <int high_s, int low_s>
+void long_bursts(Course& cell) {
+  cell.hold(lead_s, 0);
+  while (cell.time_s() < design_s - lead_s) {
+    for (const double direction : {-1.0, 1.0}) {
+      cell.hold(high_s, direction * cell.high_c_rate);
+      cell.hold(low_s, direction * cell.low_c_rate);
+    }
+  }
+  cell.hold(lead_s, 0);
+}
+
+/// From full to empty and back in ten steps each way, with a rest after each.
+template <int rest_s>
+void ocv_test(Course& cell) {
+  cell.hold(rest_s, 0);
+  const int tenth_s = static_cast<int>(360 / cell.high_c_rate);
+  for (const double direction : {-1.0, 1.0}) {
+    for (int step = 0; step < 10; ++step) {
+      cell.hold(tenth_s, direction * cell.high_c_rate);
+      cell.hold(rest_s, 0);
+    }
+  }
+}
+
 }  // namespace
 
 const std::vector<Experiment>& experiments() {
   static const std::vector<Experiment> all = {
+      {"rest_30s", "pulses of 10 s and rests of 30 s, 20 minutes around one state of charge", short_pulses<30>},
+      {"rest_18s", "the same with rests of 18 s", short_pulses<18>},
+      {"rest_5s", "the same with rests of 5 s", short_pulses<5>},
+      {"high_1m_low_30s", "bursts of 1 min at HIGH and 30 s at LOW current, both ways, 20 minutes around one state of charge", long_bursts<60, 30>},
+      {"high_30s_low_30s", "the same with 30 s and 30 s", long_bursts<30, 30>},
+      {"high_30s_low_1m", "the same with 30 s and 1 min", long_bursts<30, 60>},
+      {"ocv_1h_rest", "from full to empty and back in tenths, with rests of 1 h", ocv_test<3'600>},
+      {"ocv_10min_rest", "the same with rests of 10 min", ocv_test<600>},
       {"forklift_shift", "eight hours of an electric forklift: driving, lifting, regeneration, breaks with opportunity charge", forklift_shift},
   };
   return all;
@@ -202,7 +253,7 @@ const std::vector<Experiment>& experiments() {
 std::optional<std::vector<ProfileRow>> experiment(std::string_view name, const ExperimentOptions& options) {
   for (const Experiment& e : experiments()) {
     if (e.name != name) continue;
-    Course course(options.seed);
+    Course course(options);
     e.lay_out(course);
     return course.sampled(options.capacity_ah, options.step_s);
   }

@@ -4,7 +4,7 @@
 // line in the table there. Sampling is common to all: row k holds the mean current over the step_s that end at time_s, rounded
 // to 1 mA, so the charge of a course does not depend on the step. Row 0, at time 0, is 0 A; a last step not filled is left out.
 //
-// |current_a| <= capacity_ah: Table 2 of the paper, 1C continuous either way. The same name, options and seed give the same rows
+// |current_a| <= capacity_ah, rounded up to the next mA: Table 2 of the paper, 1C continuous either way. The same name, options and seed give the same rows
 // on every machine: integers for chance and time, plain IEEE arithmetic (no fused multiply-add) for the rest. No I/O.
 #pragma once
 
@@ -25,6 +25,8 @@ struct ExperimentOptions {
   double capacity_ah = 6;  ///< the paper's cell; its 1C current scales every current of the course
   std::uint64_t seed = 1;  ///< for designs with chance in them
   double step_s = 1;       ///< rounded to milliseconds, at least one
+  double high_c_rate = 1;  ///< amplitude of pulses; the paper does not publish its own. 0..1
+  double low_c_rate = 0.25;  ///< of what LOW means in high_*_low_*. 0..1
 };
 
 class Course;

@@ -58,7 +58,7 @@ std::filesystem::path firmware_image(const std::string& board, const CellFile& c
     throw BadInput(board, 1, "no such board in " + (root / "boards").string() + ", expected the folder name of a board");
   }
   const auto folder = root / "build" / "firmware" / fmt::format("{}-{}-{:08x}", board, cell.name, cell.hash);
-  for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++"}) {
+  for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
     if (!in_path(tool)) throw BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
   }
   std::filesystem::create_directories(folder);

@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <numbers>
 
+#include "host_sim/splitmix.hpp"
+
 namespace bms {
 
 class GaussianNoise {
  public:
-  explicit GaussianNoise(std::uint64_t seed) : state_(seed) {}
+  explicit GaussianNoise(std::uint64_t seed) : random_(seed) {}
 
   /// Standard normal; Box-Muller, one of the pair.
   double next() {
@@ -18,15 +20,10 @@ class GaussianNoise {
   }
 
  private:
-  /// 0 <= u < 1, splitmix64.
-  double uniform() {
-    std::uint64_t z = state_ += 0x9E3779B97F4A7C15U;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-  }
+  /// 0 <= u < 1.
+  double uniform() { return static_cast<double>(random_.bits() >> 11) * 0x1p-53; }
 
-  std::uint64_t state_;
+  SplitMix random_;
 };
 
 }  // namespace bms

@@ -37,12 +37,13 @@ std::string json_of(const ReplayResult& r, const std::string& trace_sha256) {
                  {"rmse_after_30min", optional(r.soc.rmse_after_30min)},
                  {"max_error_after_30min", optional(r.soc.max_error_after_30min)},
                  {"within_2_sigma", optional(r.soc.within_2_sigma)}};
-  json["voltage"] = {{"prediction_rmse_v", r.voltage.prediction_rmse_v},
-                     {"prediction_max_v", r.voltage.prediction_max_v},
-                     {"open_loop_rmse_v", r.voltage.open_loop_rmse_v},
-                     {"open_loop_fit_percent", r.voltage.open_loop_fit_percent}};
+  json["voltage"] = {{"prediction_rmse_v", optional(r.voltage.prediction_rmse_v)},
+                     {"prediction_max_v", optional(r.voltage.prediction_max_v)},
+                     {"open_loop_rmse_v", optional(r.voltage.open_loop_rmse_v)},
+                     {"open_loop_fit_percent", optional(r.voltage.open_loop_fit_percent)}};
   json["trace_sha256"] = trace_sha256;
   json["verified_against"] = r.verified_against ? Json(*r.verified_against) : Json(nullptr);
+  if (r.difference) json["difference"] = *r.difference;
   json["steps_per_second"] = r.track.steps_per_second;
   json["read_mb_per_second"] = r.recording.read_mb_per_second;
   json["warnings"] = warnings_of(r.recording.warnings);
@@ -72,6 +73,74 @@ std::string json_of(const ExperimentResult& r) {
                   {"charged_ah", r.charged_ah},
                   {"discharged_ah", r.discharged_ah},
                   {"largest_current_a", r.largest_current_a}});
+}
+
+namespace {
+
+Json fit_of(const identification::Fit& f) {
+  const identification::ResidualAnalysis& r = f.residuals;
+  return {{"fit_percent", f.fit_percent},
+          {"rmse_v", f.rmse_v},
+          {"largest_v", f.largest_v},
+          {"one_step_fit_percent", f.one_step_fit_percent},
+          {"output_variance_v2", f.output_variance_v2},
+          {"samples", f.samples},
+          {"residuals",
+           {{"mean_v", r.mean_v},
+            {"mean_band_v", r.mean_band_v},
+            {"biased", r.biased()},
+            {"correlation_length", r.correlation_length},
+            {"white_band", r.white_band},
+            {"autocorrelated", r.autocorrelated},
+            {"input_correlated", r.input_correlated},
+            {"autocorrelation", r.autocorrelation},
+            {"input_correlation", r.input_correlation}}}};
+}
+
+}  // namespace
+
+std::string json_of(const IdentifyResult& r) {
+  const identification::Identification& i = r.identification;
+  Json json;
+  json["command"] = "identify";
+  json["model"] = r.model;
+  json["optimizer"] = r.optimizer;
+  json["cell"] = r.cell;
+  json["out"] = r.out;
+  json["samples"] = i.estimation.samples;
+  json["parameters"] = Json::array();
+  for (const identification::Parameter& p : i.parameters) {
+    json["parameters"].push_back({{"name", p.name}, {"soc", p.soc}, {"value", p.value}, {"std", p.std}, {"std_white", p.std_white}, {"by_ocv_tolerance", p.by_ocv_tolerance}, {"at_bound", p.at_bound}, {"seen", p.seen}});
+  }
+  json["correlation"] = Json::array();
+  for (Eigen::Index row = 0; row < i.correlation.rows(); ++row) {
+    const Eigen::VectorXd values = i.correlation.row(row);
+    json["correlation"].push_back(std::vector<double>(values.data(), values.data() + values.size()));
+  }
+  json["estimation"] = fit_of(i.estimation);
+  json["validation"] = r.validation ? fit_of(*r.validation) : Json(nullptr);
+  json["validations"] = Json::array();
+  for (const auto& [path, fit] : r.validations) {
+    json["validations"].push_back(fit_of(fit));
+    json["validations"].back()["recording"] = path;
+  }
+  const auto state = [](const identification::InitialState& s) {
+    return Json{{"soc", s.soc}, {"soc_std", s.soc_std}, {"v_rc_v", s.v_rc_v}, {"observable", s.observable}};
+  };
+  json["initial_state"] = i.initial.empty() ? Json(nullptr) : state(i.initial.front());
+  json["initial_states"] = Json::array();
+  for (const identification::InitialState& s : i.initial) json["initial_states"].push_back(state(s));
+  json["coulombic_efficiency"] = optional(r.coulombic_efficiency);
+  json["iterations"] = i.optimum.iterations;
+  json["evaluations"] = i.optimum.evaluations;
+  json["gradient"] = i.optimum.gradient;
+  json["converged"] = i.optimum.converged;
+  json["reason"] = i.optimum.reason;
+  json["starts"] = i.starts;
+  json["starts_agreeing"] = i.agreeing;
+  json["wall_s"] = r.wall_s;
+  json["warnings"] = warnings_of(r.warnings);
+  return text_of(json);
 }
 
 }  // namespace bms

@@ -1,9 +1,13 @@
 // Results as JSON objects, one per command; the names are relied on from outside.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "host_sim/replay.hpp"
+#include "identification/identify.hpp"
 
 namespace bms {
 
@@ -24,5 +28,16 @@ struct ExperimentResult {
   double duration_s = 0, charged_ah = 0, discharged_ah = 0, largest_current_a = 0;
 };
 std::string json_of(const ExperimentResult& result);
+
+struct IdentifyResult {
+  std::string model, optimizer, cell, out;
+  identification::Identification identification;
+  std::optional<identification::Fit> validation;                        ///< of the first recording that was asked for
+  std::vector<std::pair<std::string, identification::Fit>> validations;  ///< of all
+  std::optional<double> coulombic_efficiency;
+  double wall_s = 0;
+  std::vector<Warning> warnings;
+};
+std::string json_of(const IdentifyResult& result);
 
 }  // namespace bms

@@ -8,15 +8,31 @@
 #include <CLI/CLI.hpp>
 
 #include "host_sim/bad_input.hpp"
+#include "host_sim/cell_file.hpp"
 #include "host_sim/command_experiment.hpp"
+#include "host_sim/command_identify.hpp"
 #include "host_sim/command_replay.hpp"
 #include "host_sim/command_simulate.hpp"
 
 namespace {
 
+/// A number within both ends. CLI::Range lets nan through.
+struct Within : CLI::Validator {
+  Within(double low, double high) {
+    name_ = "from " + CLI::detail::to_string(low) + " to " + CLI::detail::to_string(high);
+    func_ = [low, high, range = name_](std::string& input) -> std::string {
+      double value = 0;
+      const bool inside = CLI::detail::lexical_cast(input, value) && value >= low && value <= high;
+      return inside ? "" : "'" + input + "' is not acceptable, expected a number " + range;
+    };
+  }
+};
+
+const CLI::Validator not_empty([](std::string& name) { return name.empty() ? std::string("an empty name, expected a file") : std::string(); }, "FILE");
+
 void add_output(CLI::App& command, bms::Output& output, bool report) {
-  command.add_option("--json", output.json, "write the result as one JSON object to FILE, '-' for standard output")->type_name("FILE");
-  if (report) command.add_option("--report", output.report, "write a page with plots to FILE.html")->type_name("FILE");
+  command.add_option("--json", output.json, "write the result as one JSON object to FILE, '-' for standard output")->check(not_empty)->type_name("FILE");
+  if (report) command.add_option("--report", output.report, "write a page with plots to FILE.html")->check(not_empty)->type_name("FILE");
   command.add_flag("--quiet", output.quiet, "no summary");
 }
 
@@ -24,11 +40,12 @@ void add_replay(CLI::App& app, bms::ReplayOptions& o) {
   CLI::App& c = *app.add_subcommand("replay", "Run the state-of-charge estimator over a recording, on this machine or on an emulated board");
   c.footer("Example: bms replay recordings/forklift_shift.csv --target netduinoplus2 --verify --report shift.html");
   c.add_option("recording", o.recording, "CSV with time_s, current_a (> 0 charges), voltage_v, and maybe temperature_c, soc_ref")->required();
-  c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell: table9, a123_26650")->capture_default_str();
-  c.add_option("--initial-soc", o.initial_soc, "state of charge believed at the start, 0..1; without it the first voltage tells")->check(CLI::Range(0.0, 1.0));
-  c.add_option("--initial-soc-sigma", o.initial_soc_sigma, "how far that is to be believed (standard deviation)")->check(CLI::Range(1e-4, 1.0))->capture_default_str();
+  c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell: " + bms::cell_names())->capture_default_str();
+  c.add_option("--initial-soc", o.initial_soc, "state of charge believed at the start, 0..1; without it the first voltage tells")->check(Within(0.0, 1.0));
+  c.add_option("--initial-soc-sigma", o.initial_soc_sigma, "how far that is to be believed (standard deviation)")->check(Within(1e-4, 1.0))->capture_default_str();
   c.add_option("--target", o.target, "host, or an emulated board by its folder in boards/: netduinoplus2")->capture_default_str();
   c.add_option("--scalar", o.scalar, "arithmetic: float, fixed or double")->check(CLI::IsMember({"float", "fixed", "double"}))->capture_default_str();
+  c.get_option("--initial-soc-sigma")->needs("--initial-soc");
   c.add_flag("--verify", o.verify, "run host and board and compare every estimate bit by bit; exit 1 where they differ");
   c.add_option("--board-cell", o.board_cell, "cell file for the board's firmware when it is not the host's: shows what --verify finds")->type_name("CELL");
   c.add_option("--trace", o.trace, "write every estimate to a CSV file")->type_name("FILE");
@@ -38,12 +55,12 @@ void add_replay(CLI::App& app, bms::ReplayOptions& o) {
 void add_simulate(CLI::App& app, bms::SimulateOptions& o) {
   CLI::App& c = *app.add_subcommand("simulate", "Run a current through the model, open loop");
   c.footer("Example: bms simulate --cell table9 --profile shift.csv --initial-soc 0.9 --out simulated.csv");
-  c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell: table9, a123_26650")->required();
+  c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell: " + bms::cell_names())->required();
   auto* recording = c.add_option("--recording", o.recording, "recording whose current is used")->type_name("FILE");
   c.add_option("--profile", o.profile, "current profile: a recording without voltage_v")->type_name("FILE")->excludes(recording);
-  c.add_option("--initial-soc", o.initial_soc, "state of charge at the start")->check(CLI::Range(0.0, 1.0))->capture_default_str();
-  c.add_option("--noise-v", o.noise_v, "standard deviation of noise added to the voltage")->check(CLI::NonNegativeNumber);
-  c.add_option("--noise-a", o.noise_a, "standard deviation of noise added to the current that is written")->check(CLI::NonNegativeNumber);
+  c.add_option("--initial-soc", o.initial_soc, "state of charge at the start")->check(Within(0.0, 1.0))->capture_default_str();
+  c.add_option("--noise-v", o.noise_v, "standard deviation of noise added to the voltage")->check(Within(0.0, 1e6));
+  c.add_option("--noise-a", o.noise_a, "standard deviation of noise added to the current that is written")->check(Within(0.0, 1e6));
   c.add_option("--seed", o.seed, "of the noise")->capture_default_str();
   c.add_option("--out", o.out, "CSV file to write: time_s, current_a, voltage_v, soc")->required()->type_name("FILE");
   add_output(c, o.output, false);
@@ -53,10 +70,43 @@ void add_experiment(CLI::App& app, bms::ExperimentCommandOptions& o) {
   CLI::App& c = *app.add_subcommand("experiment", "Write a current profile");
   c.footer("Experiments:\n" + bms::experiment_list() + "\nExample: bms experiment forklift_shift --out shift.csv");
   c.add_option("name", o.name, "which one")->required();
-  c.add_option("--capacity-ah", o.capacity_ah, "of the cell; currents scale with it")->check(CLI::Range(0.01, 1000.0))->capture_default_str();
+  c.add_option("--capacity-ah", o.capacity_ah, "of the cell; currents scale with it")->check(Within(0.01, 1000.0))->capture_default_str();
+  c.add_option("--high-c", o.high_c_rate, "height of the pulses, in multiples of the 1C current")->check(Within(0.01, 1.0))->capture_default_str();
+  c.add_option("--low-c", o.low_c_rate, "what LOW means in high_*_low_*")->check(Within(0.0, 1.0))->capture_default_str();
+  c.add_option("--step-s", o.step_s, "sampling interval")->check(Within(0.001, 60.0))->capture_default_str();
   c.add_option("--seed", o.seed, "of what is random in it")->capture_default_str();
   c.add_option("--out", o.out, "CSV file to write: time_s, current_a")->required()->type_name("FILE");
   add_output(c, o.output, false);
+}
+
+void add_identify(CLI::App& app, bms::IdentifyOptions& o) {
+  CLI::App& c = *app.add_subcommand("identify", "Find a cell's parameters, and how far they can be believed, from recordings");
+  c.footer("Example: bms identify --ocv slow_discharge.csv --ocv slow_charge.csv --recording pulses.csv --validate shift.csv --start table9 --out my_cell.toml");
+  c.add_option("--recording", o.recordings, "recordings to identify from")->required()->type_name("FILE");
+  c.add_option("--ocv", o.ocv, "slow charge and discharge (C/10 or slower) to take OCV and capacity from")->type_name("FILE");
+  c.add_option("--model", o.model, "nlgr: nonlinear grey box")->capture_default_str();
+  c.add_option("--optimizer", o.optimizer, "gn, agn: (adaptive) subspace Gauss-Newton; lm: Levenberg-Marquardt; sd: steepest descent; nls: trust region, reflective")->capture_default_str();
+  c.add_option("--start", o.start, "cell file to begin from: limits, first values, and what is not identified")->capture_default_str();
+  c.add_option("--initial-soc", o.initial_soc, "state of charge at the start, or 'estimate'; without it soc_ref if there is one")->type_name("X");
+  c.add_option("--window", o.window, "state of charge that counts, as in 0.8:0.5")->type_name("HI:LO");
+  c.add_option("--validate", o.validate, "recordings to judge the result by; nothing is identified from them")->type_name("FILE");
+  c.add_option("--validate-window", o.validate_window, "the same for those; as --window if not given")->type_name("HI:LO");
+  c.add_option("--nodes", o.nodes, "state of charge at which R0, R1, C1 are identified, as in 0.2,0.5,0.8; linear in between")->delimiter(',')->check(Within(0.0, 1.0));
+  c.add_option("--lean", o.lean, "where the OCV lies between slow discharge (-1) and charge (1); identified if not given")->check(Within(-1.0, 1.0));
+  c.add_option("--ocv-error-v", o.ocv_error_v, "largest error of the OCV's straight pieces")->check(Within(0.0002, 0.05))->capture_default_str();
+  c.add_option("--capacity-ah", o.capacity_ah, "capacity; of the OCV recordings if not given")->check(Within(0.01, 1000.0));
+  c.add_option("--name", o.name, "of the cell; that of the file if not given");
+  c.add_option("--out", o.out, "cell file to write")->required()->type_name("C.toml");
+  add_output(c, o.output, false);
+}
+
+/// own_file: what the command writes beside JSON and report.
+template <class Options>
+int run(Options& options, const std::string& own_file) {
+  bms::Output& output = options.output;
+  output.main = own_file;
+  if ((output.json == "-") + (output.report == "-") + (output.main == "-") > 1) throw bms::BadInput("-", 1, "more than one result for standard output, expected one");
+  return bms::run(options);
 }
 
 /// A usage error in one line.
@@ -81,11 +131,14 @@ int main(int argc, char** argv) {
   add_replay(app, replay);
   add_simulate(app, simulate);
   add_experiment(app, experiment);
+  bms::IdentifyOptions identify;
+  add_identify(app, identify);
   try {
     app.parse(argc, argv);
-    if (app.got_subcommand("replay")) return bms::run(replay);
-    if (app.got_subcommand("simulate")) return bms::run(simulate);
-    return bms::run(experiment);
+    if (app.got_subcommand("replay")) return run(replay, replay.trace);
+    if (app.got_subcommand("simulate")) return run(simulate, simulate.out);
+    if (app.got_subcommand("identify")) return run(identify, identify.out);
+    return run(experiment, experiment.out);
   } catch (const CLI::ParseError& error) {
     return usage(app, error);
   } catch (const bms::BadInput& error) {

@@ -9,12 +9,15 @@ struct Output {
   std::string json;    ///< file, "-" for standard output, empty: none
   std::string report;  ///< HTML file, empty: none
   bool quiet = false;  ///< no summary on standard output
+  std::string main;    ///< the command's own file (--out, --trace); "-" for standard output
+
+  bool standard_output_is_taken() const { return json == "-" || report == "-" || main == "-"; }
 };
 
-/// Writes `text` to the file, or to standard output for "-".
+/// Writes `text` to the file, or to standard output for "-". Throws BadInput when it cannot be written.
 void put(const std::string& file, const std::string& text);
 
-/// A summary for a person; not when quiet, nor when standard output carries JSON.
+/// A summary for a person; not when quiet, nor when standard output carries a result.
 void tell(const Output& output, const std::string& text);
 
 /// A warning: one line on standard error.

@@ -55,9 +55,11 @@ std::optional<double> number(std::string_view text) {
     return negative ? -value : value;
   }
   text = trimmed(text);
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  if (text.size() > 1 && text.front() == '+' && text[1] != '-') text.remove_prefix(1);
   double value = 0;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool too_small = error == std::errc::result_out_of_range && text.find("e-") != std::string_view::npos;
+  if (too_small && stop == text.data() + text.size()) return 0.0;
   if (text.empty() || error != std::errc() || stop != text.data() + text.size() || std::isinf(value)) return std::nullopt;
   return value;
 }
@@ -100,7 +102,8 @@ class Parser {
       line_ = rest_.substr(0, end);
       rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
       if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
-      if (!line_.empty() && line_.front() != '#') return true;
+      const std::string_view content = trimmed(line_);
+      if (!content.empty() && content.front() != '#') return true;
     }
     return false;
   }
@@ -192,7 +195,9 @@ class Parser {
   Recording recording_;
 };
 
+/// Of those that are numbers; 0 when there is none.
 double median(std::vector<double> values) {
+  std::erase_if(values, [](double v) { return std::isnan(v); });
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -285,7 +290,8 @@ void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
     if (std::abs(i) > 0) magnitudes.push_back(std::abs(i));
   }
   const double larger_a = std::max(l.charge_current_max_a, l.discharge_current_max_a);
-  if (median(magnitudes) > 20 * larger_a) {
+  // no cell takes sixty times its capacity an hour
+  if (const double usual_a = median(magnitudes); usual_a > 20 * larger_a || usual_a > 60 * cell.capacity_ah) {
     r.warnings.push_back({"current_in_ma", fmt::format("currents around {:g} look like milliamperes, expected amperes", median(magnitudes))});
   } else if (const std::size_t n = count_outside(r.current_a, -1.05 * l.discharge_current_max_a, 1.05 * l.charge_current_max_a); n > 0) {
     r.warnings.push_back({"outside_cell_range", fmt::format("{} currents are outside the cell's continuous {} to {} A", n, -l.discharge_current_max_a, l.charge_current_max_a)});

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "estimator/soc_estimator.hpp"
-#include "host_sim/figures.hpp"
+#include "identification/figures.hpp"
 #include "host_sim/simulation.hpp"
 
 namespace bms {
@@ -24,7 +24,7 @@ EstimateRow row_of(const Estimate<S>& e) {
 }
 
 template <class S>
-void run_once(const HostCell<S>& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<Estimate<S>>& estimates) {
+[[gnu::flatten]] void run_once(const HostCell<S>& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<Estimate<S>>& estimates) {
   SocEstimator<S> estimator = start ? SocEstimator<S>(*start) : SocEstimator<S>();
   for (std::size_t k = 0; k < samples.size(); ++k) estimates[k] = estimator.step(cell, samples[k]);
 }
@@ -119,8 +119,8 @@ void evaluate(ReplayResult& result) {
   FitFigure fit;
   std::size_t inside = 0;
   const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
-  result.initial_soc = rows.front().soc;
-  const bool start_known = has_reference && !std::isnan(r.soc_ref.front());
+  if (!result.belief) result.initial_soc = rows.front().soc;
+  const bool start_known = has_reference && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1;
   const auto open = simulate(cell, result.cell.parameters.capacity_ah, r.time_s, r.current_a, start_known ? r.soc_ref.front() : result.initial_soc);
 
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -134,8 +134,10 @@ void evaluate(ReplayResult& result) {
     // a reading that the filter did not believe says nothing about its prediction
     constexpr std::uint32_t not_believed = voltage_missing | voltage_implausible | voltage_stuck | time_not_later | not_started;
     if (k > 0 && (e.flags & not_believed) == 0) prediction.add(r.voltage_v[k] - e.voltage_predicted_v);
-    open_loop.add(r.voltage_v[k] - open[k].voltage_v);
-    fit.add(r.voltage_v[k], open[k].voltage_v);
+    if ((e.flags & (voltage_missing | voltage_implausible)) == 0) {
+      open_loop.add(r.voltage_v[k] - open[k].voltage_v);
+      fit.add(r.voltage_v[k], open[k].voltage_v);
+    }
     result.open_loop_v.push_back(open[k].voltage_v);
   }
   result.soc.final = rows.back().soc;
@@ -149,7 +151,15 @@ void evaluate(ReplayResult& result) {
     result.soc.rmse_after_30min = soc_later.rms();
     result.soc.max_error_after_30min = soc_later.max();
   }
-  result.voltage = {prediction.rms(), prediction.max(), open_loop.rms(), fit.percent()};
+  result.voltage = {};
+  if (prediction.count() > 0) {
+    result.voltage.prediction_rmse_v = prediction.rms();
+    result.voltage.prediction_max_v = prediction.max();
+  }
+  if (open_loop.count() > 0) {
+    result.voltage.open_loop_rmse_v = open_loop.rms();
+    result.voltage.open_loop_fit_percent = fit.percent();
+  }
 }
 
 std::string trace_csv(const ReplayResult& result) {

@@ -35,7 +35,7 @@ struct Belief {
 };
 std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief);
 
-/// Runs the estimator on this machine. The measuring of its speed repeats the run; the estimates are those of the first.
+/// Runs the estimator on this machine. The measuring of its speed repeats the run; the estimates are those of the last.
 Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar);
 
 /// Numbers of the words that a board has sent.
@@ -54,7 +54,7 @@ struct SocFigures {
   std::optional<double> rmse, max_error, rmse_after_30min, max_error_after_30min, within_2_sigma;
 };
 struct VoltageFigures {
-  double prediction_rmse_v = 0, prediction_max_v = 0, open_loop_rmse_v = 0, open_loop_fit_percent = 0;
+  std::optional<double> prediction_rmse_v, prediction_max_v, open_loop_rmse_v, open_loop_fit_percent;  ///< nothing: no voltage to judge by
 };
 
 struct ReplayResult {
@@ -62,15 +62,17 @@ struct ReplayResult {
   CellFile cell;
   std::string target;
   ScalarKind scalar = ScalarKind::single;
-  double initial_soc = 0;                        ///< of the estimator, after the first sample
+  std::optional<Belief> belief;                  ///< of the user
+  double initial_soc = 0;                        ///< believed, or of the estimator after the first sample
   Track track;
   std::vector<double> open_loop_v;
   SocFigures soc;
   VoltageFigures voltage;
   std::optional<std::string> verified_against;   ///< board that gave the same bits
+  std::optional<std::string> difference;         ///< or where it did not, in words
 };
 
-/// Figures of `result.track` over `result.recording`; the open loop starts at soc_ref where there is one, else where the estimator does.
+/// Figures of `result.track` over `result.recording`; the open loop starts at soc_ref where there is one, else at initial_soc.
 void evaluate(ReplayResult& result);
 
 /// time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags

@@ -1,7 +1,9 @@
 #include "host_sim/report_page.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -13,17 +15,37 @@ namespace bms {
 
 namespace {
 
-/// More rows than this are thinned, evenly: a screen has a few thousand columns.
+/// More rows than this are thinned: a screen has a few thousand columns.
 constexpr std::size_t most_rows = 40'000;
 
 using nlohmann::json;
 using Value = std::function<double(std::size_t)>;
 
-/// Every `every`-th value, rounded: digits that no screen shows would only make the page larger.
-json column(std::size_t rows, std::size_t every, int decimals, const Value& value) {
+/// Rows to show: all, or of each stretch its first and last and where voltage and current are lowest and highest, so that no peak is
+/// lost.
+std::vector<std::size_t> shown_rows(const Recording& r) {
+  std::vector<std::size_t> shown;
+  const std::size_t stretch = 6 * r.rows() / most_rows;
+  for (std::size_t from = 0; from < r.rows(); from += std::max<std::size_t>(1, stretch)) {
+    const std::size_t to = std::min(r.rows(), from + std::max<std::size_t>(1, stretch));
+    std::set<std::size_t> picked = {from, to - 1};
+    for (const auto* values : {&r.voltage_v, &r.current_a}) {
+      if (stretch == 0) break;
+      const auto begin = values->begin() + static_cast<std::ptrdiff_t>(from), end = values->begin() + static_cast<std::ptrdiff_t>(to);
+      const auto [lowest, highest] = std::minmax_element(begin, end);
+      picked.insert(from + static_cast<std::size_t>(lowest - begin));
+      picked.insert(from + static_cast<std::size_t>(highest - begin));
+    }
+    shown.insert(shown.end(), picked.begin(), picked.end());
+  }
+  return shown;
+}
+
+/// Rounded: digits that no screen shows would only make the page larger.
+json column(const std::vector<std::size_t>& rows, int decimals, const Value& value) {
   const double scale = std::pow(10, decimals);
   json values = json::array();
-  for (std::size_t k = 0; k < rows; k += every) values.push_back(std::round(value(k) * scale) / scale);  // NaN becomes null
+  for (const std::size_t k : rows) values.push_back(std::round(value(k) * scale) / scale);  // NaN becomes null
   return values;
 }
 
@@ -47,10 +69,11 @@ json figures(const ReplayResult& r) {
   percent_row("largest error after 30 minutes", r.soc.max_error_after_30min);
   percent_row("reference within two sigma", r.soc.within_2_sigma);
   group("Voltage");
-  row("one-step prediction, RMS", millivolts(r.voltage.prediction_rmse_v));
-  row("one-step prediction, largest", millivolts(r.voltage.prediction_max_v));
-  row("open loop, RMS", millivolts(r.voltage.open_loop_rmse_v));
-  row("open loop, fit (Eq. A6)", fmt::format("{:.2f} %", r.voltage.open_loop_fit_percent));
+  const VoltageFigures& v = r.voltage;
+  if (v.prediction_rmse_v) row("one-step prediction, RMS", millivolts(*v.prediction_rmse_v));
+  if (v.prediction_max_v) row("one-step prediction, largest", millivolts(*v.prediction_max_v));
+  if (v.open_loop_rmse_v) row("open loop, RMS", millivolts(*v.open_loop_rmse_v));
+  if (v.open_loop_fit_percent) row("open loop, fit (Eq. A6)", fmt::format("{:.2f} %", *v.open_loop_fit_percent));
   group("Run");
   row("recording", file_name(r));
   row("cell", r.cell.name);
@@ -63,14 +86,14 @@ json figures(const ReplayResult& r) {
 }
 
 std::string data(const ReplayResult& r) {
-  const std::size_t rows = r.track.rows.size(), every = (rows + most_rows - 1) / most_rows;
+  const auto rows = shown_rows(r.recording);
   const auto& e = r.track.rows;
   const Recording& rec = r.recording;
   json page = {{"title", "State of charge over " + file_name(r)}, {"statement", statement(r)}, {"warnings", json::array()}, {"figures", figures(r)}};
   for (const Warning& w : rec.warnings) page["warnings"].push_back(w.text);
   json& columns = page["columns"];
-  const auto add = [&](const char* name, int decimals, const Value& value) { columns[name] = column(rows, every, decimals, value); };
-  add("time_s", 1, [&](std::size_t k) { return rec.time_s[k] - rec.time_s.front(); });
+  const auto add = [&](const char* name, int decimals, const Value& value) { columns[name] = column(rows, decimals, value); };
+  add("time_s", 3, [&](std::size_t k) { return rec.time_s[k] - rec.time_s.front(); });
   add("current_a", 3, [&](std::size_t k) { return rec.current_a[k]; });
   add("voltage_v", 4, [&](std::size_t k) { return rec.voltage_v[k]; });
   add("predicted_v", 4, [&](std::size_t k) { return e[k].voltage_predicted_v; });

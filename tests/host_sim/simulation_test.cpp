@@ -6,7 +6,7 @@
 
 #include "host_sim/cell_file.hpp"
 #include "host_sim/experiment.hpp"
-#include "host_sim/figures.hpp"
+#include "identification/figures.hpp"
 
 namespace bms {
 namespace {

@@ -1,0 +1,203 @@
+#include "host_sim/command_identify.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "host_sim/bad_input.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/identification_data.hpp"
+#include "host_sim/json_results.hpp"
+#include "host_sim/recording.hpp"
+#include "identification/identify.hpp"
+#include "identification/ocv_curve.hpp"
+
+namespace bms {
+
+namespace {
+
+namespace id = identification;
+
+id::Method method_of(const std::string& name) {
+  for (const id::Method m : {id::Method::subspace_gauss_newton, id::Method::adaptive_subspace_gauss_newton, id::Method::levenberg_marquardt,
+                             id::Method::steepest_descent, id::Method::trust_region_reflective}) {
+    if (name == id::name_of(m)) return m;
+  }
+  throw BadInput("--optimizer", 1, "no such optimiser '" + name + "', expected one of: gn, agn, lm, sd, nls");
+}
+
+/// OCV and capacity of slow runs put into the cell.
+void take_ocv(const IdentifyOptions& options, CellFile& cell, IdentifyResult& result) {
+  std::vector<id::SlowRun> runs;
+  std::string files;
+  for (const std::string& path : options.ocv) {
+    const Recording r = read_recording(path);
+    runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
+    files += (files.empty() ? "" : ", ") + std::filesystem::path(path).filename().string();
+  }
+  id::OcvCurve curve;
+  try {
+    curve = id::ocv_curve(runs);
+  } catch (const std::invalid_argument& error) {
+    throw BadInput(options.ocv.front(), 1, error.what());
+  }
+  double error_v = options.ocv_error_v;
+  auto pieces = id::fewest_pieces(curve, error_v);
+  while (!pieces || pieces->soc.size() > model::max_ocv_edges) {
+    error_v *= 1.5;
+    if (error_v > 0.05) throw BadInput(options.ocv.front(), 1, "the open-circuit voltage does not rise with the state of charge, expected slow runs of a whole charge or discharge");
+    pieces = id::fewest_pieces(curve, error_v);
+  }
+  if (error_v > options.ocv_error_v) {
+    result.warnings.push_back({"ocv_error", fmt::format("the straight pieces of the OCV are up to {:.1f} mV off, {:.1f} were asked for", 1e3 * pieces->largest_error_v, 1e3 * options.ocv_error_v)});
+  }
+  auto& ocv = cell.parameters.ocv;
+  ocv = {};
+  for (std::size_t k = 0; k < pieces->soc.size(); ++k) {
+    ocv.soc.push_back(pieces->soc[k]);
+    if (curve.coulombic_efficiency) ocv.half_gap_v.push_back(pieces->half_gap_v[k]);
+    if (k == 0) continue;
+    const double b1_v = (pieces->ocv_v[k] - pieces->ocv_v[k - 1]) / (pieces->soc[k] - pieces->soc[k - 1]);
+    ocv.b0_v.push_back(pieces->ocv_v[k] - b1_v * pieces->soc[k]);
+    ocv.b1_v.push_back(b1_v);
+  }
+  cell.parameters.tolerance.ocv_v = std::max(0.0005, pieces->largest_error_v);
+  cell.parameters.capacity_ah = curve.capacity_ah;
+  result.coulombic_efficiency = curve.coulombic_efficiency;
+  cell.sources["ocv"] = fmt::format("{} of {}; {} straight pieces, within {:.1f} mV", curve.coulombic_efficiency ? "middle of slow charge and discharge" : "slow run", files,
+                                    pieces->soc.size() - 1, 1e3 * pieces->largest_error_v);
+}
+
+/// What the recordings say of the measuring chain and of what the model leaves over.
+void take_noise(const std::vector<Recording>& recordings, const IdentifyResult& result, model::CellParameters<>& p) {
+  std::vector<double> voltage_steps, current_steps;
+  double step_s = 1;
+  for (const Recording& r : recordings) {
+    const double quiet_a = 0.02 * p.capacity_ah;
+    for (std::size_t k = 2; k < r.rows(); ++k) {
+      if (std::abs(r.current_a[k]) > quiet_a || std::abs(r.current_a[k - 1]) > quiet_a || std::abs(r.current_a[k - 2]) > quiet_a) continue;
+      // second differences: what relaxes slowly is not noise
+      const double v = r.voltage_v[k] - 2 * r.voltage_v[k - 1] + r.voltage_v[k - 2], i = r.current_a[k] - 2 * r.current_a[k - 1] + r.current_a[k - 2];
+      if (std::isfinite(v) && std::isfinite(i)) voltage_steps.push_back(v * v), current_steps.push_back(i * i);
+    }
+    step_s = std::max(0.01, r.duration_s() / static_cast<double>(r.rows() - 1));
+  }
+  const auto sigma = [](const std::vector<double>& squares) {
+    double sum = 0;
+    for (const double s : squares) sum += s;
+    return std::sqrt(sum / static_cast<double>(squares.size()) / 6);  // 1 + 4 + 1
+  };
+  constexpr std::size_t enough = 30;
+  if (voltage_steps.size() >= enough) {
+    p.noise.voltage_v = std::clamp(sigma(voltage_steps), 0.0002, 0.05);
+    p.noise.current_a = std::clamp(sigma(current_steps), 1e-4 * p.capacity_ah, 0.1 * p.capacity_ah);
+  }
+  const id::Fit& judge = result.validation ? *result.validation : result.identification.estimation;
+  p.noise.model_v = std::clamp(judge.rmse_v, 0.0005, 0.2);
+  p.noise.model_correlation_s = std::clamp(judge.residuals.correlation_length * step_s, 1.0, 20'000.0);
+  if (p.ocv.half_gap_v.size > 0) {
+    double gap = 0;
+    for (std::size_t k = 0; k < p.ocv.half_gap_v.size; ++k) {
+      if (p.ocv.soc[k] > 0.1 && p.ocv.soc[k] < 0.95) gap = std::max(gap, p.ocv.half_gap_v[k]);
+    }
+    p.noise.rest_v = std::clamp(gap, p.noise.rest_v, 0.2);  // a rested voltage may lie anywhere between both curves
+  }
+  double largest = 0.005;
+  for (const id::Parameter& q : result.identification.parameters) {
+    if (q.name == "r0_ohm" && q.value > 0) largest = std::max(largest, std::min(0.5, 2 * q.std / q.value));
+  }
+  p.tolerance.resistance_fraction = largest;
+}
+
+std::string warning_text(const std::string& warning) { return warning.substr(warning.find(": ") + 2); }
+
+}  // namespace
+
+int run(const IdentifyOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  IdentifyResult result;
+  result.model = options.model;
+  result.optimizer = options.optimizer;
+  if (options.model != "nlgr") throw BadInput("--model", 1, "no such model '" + options.model + "', expected nlgr");
+  const id::Method method = method_of(options.optimizer);
+  CellFile cell = read_cell(options.start);
+  const double start_capacity_ah = cell.parameters.capacity_ah;
+  if (!options.ocv.empty()) take_ocv(options, cell, result);
+  if (options.capacity_ah > 0) cell.parameters.capacity_ah = options.capacity_ah;
+  if (options.lean && cell.parameters.ocv.half_gap_v.size > 0) cell.parameters = id::leaning(cell.parameters, *options.lean);
+
+  DataOptions data{initial_soc_of(options.initial_soc), window_of("--window", options.window), cell.parameters};
+  std::vector<Recording> recordings;
+  std::vector<id::Record> records;
+  double soc_min = 1, soc_max = 0;
+  for (const std::string& path : options.recordings) {
+    recordings.push_back(read_recording(path));
+    Recording& r = recordings.back();
+    compare_with_cell(r, cell.parameters);
+    for (const Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
+    const IdentificationData d = identification_data(r, data);
+    records.push_back(d.record);
+    soc_min = std::min(soc_min, d.soc_min);
+    soc_max = std::max(soc_max, d.soc_max);
+  }
+
+  id::GreyBoxOptions grey_box;
+  grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(soc_min, soc_max) : options.nodes;
+  grey_box.bounds = circuit_bounds(cell.parameters.capacity_ah);
+  grey_box.estimate_lean = !options.lean && cell.parameters.ocv.half_gap_v.size > 0;
+  grey_box.voltage_sigma_v = cell.parameters.noise.voltage_v;
+  try {
+    result.identification = id::identify_grey_box(cell.parameters, records, grey_box, method);
+  } catch (const std::invalid_argument& error) {
+    throw BadInput(options.recordings.front(), 1, error.what());
+  }
+  for (const std::string& w : result.identification.warnings) result.warnings.push_back({w.substr(0, w.find(':')), warning_text(w)});
+
+  data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
+  for (const std::string& path : options.validate) {
+    const Recording r = read_recording(path);
+    result.validations.push_back({path, id::validate(result.identification.cell, identification_data(r, data).record, result.identification.fading)});
+  }
+  if (!result.validations.empty()) result.validation = result.validations.front().second;
+
+  cell.parameters = result.identification.cell;
+  take_noise(recordings, result, cell.parameters);
+  const auto& nodes = cell.parameters.rc.soc;
+  std::string files;
+  for (const std::string& path : options.recordings) files += (files.empty() ? "" : ", ") + std::filesystem::path(path).filename().string();
+  cell.name = !options.name.empty() ? options.name : std::filesystem::path(options.out).stem().string();
+  cell.source = fmt::format("identified from {}; limits and the rest from {}", files, options.start);
+  cell.sources["rc"] = fmt::format("{} by {} from {}, {} node{}: {:.2f} mV RMS, fit {:.1f} %; deviations count runs of residuals", options.model, options.optimizer, files,
+                                   nodes.size, nodes.size == 1 ? "" : "s", 1e3 * result.identification.estimation.rmse_v, result.identification.estimation.fit_percent);
+  if (cell.parameters.ocv.lean != 0) cell.sources["ocv"] += fmt::format("; leaning by {:.2f} of the way to slow {}", std::abs(cell.parameters.ocv.lean), cell.parameters.ocv.lean < 0 ? "discharge" : "charge");
+  cell.sources["noise"] = fmt::format("voltage and current: rests of {}; model: what {} left over; current offset as in {}", files,
+                                      result.validations.empty() ? files : std::filesystem::path(options.validate.front()).filename().string(), options.start);
+  cell.parameters.noise.current_offset_a *= cell.parameters.capacity_ah / start_capacity_ah;
+  cell.parameters.noise.current_unknown_a *= cell.parameters.capacity_ah / start_capacity_ah;
+  if (const model::CellFault fault = model::first_fault(cell.parameters); fault.what != nullptr) {
+    throw BadInput(options.out, 1, fmt::format("what was identified is no cell: '{}' is out of range, expected {}; more or other recordings, or fewer --nodes, may help", fault.key, fault.what));
+  }
+  put(options.out, cell_text(cell));
+
+  for (const Warning& w : result.warnings) warn(w.text);
+  result.cell = cell.name;
+  result.out = options.out;
+  result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (!options.output.json.empty()) put(options.output.json, json_of(result));
+  const id::Identification& found = result.identification;
+  std::string text = fmt::format("{} samples, {} nodes: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}.\n", found.estimation.samples, nodes.size,
+                                 1e3 * found.estimation.rmse_v, found.estimation.fit_percent, found.estimation.one_step_fit_percent, found.optimum.reason);
+  for (const id::Parameter& p : found.parameters) {
+    text += fmt::format("  {:8} {:3.0f} %  {:10.5g} +- {:.2g}{}\n", p.name, 100 * p.soc, p.value, p.std, p.at_bound ? "  at its bound" : "");
+  }
+  for (const auto& [path, fit] : result.validations) text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
+  if (options.out != "-") tell(options.output, text + "Cell file: " + options.out);
+  return 0;
+}
+
+}  // namespace bms

@@ -1,0 +1,54 @@
+// Levenberg-Marquardt: scaling after More, "The Levenberg-Marquardt algorithm", LNM 630 (1978); damping after Nielsen, "Damping
+// parameter in Marquardt's method", IMM-REP-1999-05.
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/QR>
+
+#include "identification/optimisers/methods.hpp"
+
+namespace bms::identification {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Minimises |A p + b|^2 + damping |D p|^2, by QR of both on top of each other.
+VectorXd damped_step(const MatrixXd& a, const VectorXd& b, const VectorXd& weights, double damping) {
+  const Index n = a.rows(), columns = a.cols();
+  MatrixXd both = MatrixXd::Zero(n + columns, columns);
+  both.topRows(n) = a;
+  both.bottomRows(columns).diagonal() = std::sqrt(damping) * weights;
+  VectorXd right = VectorXd::Zero(n + columns);
+  right.head(n) = -b;
+  return both.householderQr().solve(right);
+}
+
+}  // namespace
+
+void search_levenberg_marquardt(Search& search) {
+  constexpr double largest_damping = 1e30;  // relative to J'J: no step is left
+  double damping = 1e-3, raise = 2;
+  while (!search.settled()) {
+    const VectorXd step = step_within_bounds(search, [&](const MatrixXd& a, const VectorXd& b, const Indices& free) {
+      return damped_step(a, b, search.column_norms()(free), damping);
+    });
+    const double before = search.cost(), expected = -search.expected_change(step);
+    const VectorXd x = search.after(step);
+    const double cost = search.cost_at(x);
+    if (cost < before && search.move_to(x)) {
+      const double gain = (before - cost) / expected;
+      damping *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
+      damping = std::max(damping, 1e-30);
+      raise = 2;
+    } else {
+      damping *= raise;
+      raise *= 2;
+      if (!(damping < largest_damping) || x == search.x()) search.stuck();
+    }
+  }
+}
+
+}  // namespace bms::identification

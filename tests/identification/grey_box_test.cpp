@@ -1,0 +1,113 @@
+#include "identification/grey_box.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/simulation.hpp"
+#include "tests/identification/plant.hpp"
+
+namespace bms::identification {
+namespace {
+
+model::CellParameters<> table9() { return read_cell("table9").parameters; }
+
+/// An irregular drive that crosses edges of the tables.
+Data irregular(std::size_t samples) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  Data d;
+  d.capacity_ah = 6;
+  double time_s = 0;
+  for (std::size_t k = 0; k < samples; ++k) {
+    d.time_s.push_back(time_s);
+    d.current_a.push_back(k == 0 ? 0 : 6 * uniform(random) - 2);
+    d.voltage_v.push_back(3.2 + 0.05 * uniform(random));
+    time_s += 1 + 30 * (1 + uniform(random));
+  }
+  return d;
+}
+
+TEST(GreyBox, SimulatesWhatTheModelSimulates) {
+  const auto cell = table9();
+  GreyBoxOptions options;
+  for (std::size_t k = 0; k < cell.rc.soc.size; ++k) options.soc_nodes.push_back(cell.rc.soc[k]);
+  Record record;
+  record.data = irregular(300);
+  record.initial_soc = 0.85;
+  record.estimate_initial_v_rc = false;
+  const GreyBox grey_box(cell, {record}, options);
+  Eigen::VectorXd voltage(300);
+  ASSERT_TRUE(grey_box.simulate(grey_box.start(), 0, voltage, nullptr));
+  const auto expected = simulate(model::prepare<double, model::max_intervals>(cell), 6, record.data.time_s, record.data.current_a, 0.85);
+  for (Eigen::Index k = 0; k < 300; ++k) ASSERT_NEAR(voltage[k], expected[static_cast<std::size_t>(k)].voltage_v, 1e-12);
+}
+
+TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
+  model::CellParameters<> cell = table9();
+  for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.02 + 0.01 * static_cast<double>(k % 3));
+  GreyBoxOptions options;
+  options.soc_nodes = {0.15, 0.35, 0.62, 0.9};
+  options.estimate_lean = true;
+  options.tie_v = 0.01;
+  Record first, second;
+  first.data = irregular(200);
+  first.initial_soc = 0.86;
+  first.estimate_initial_soc = true;
+  first.initial_soc_sigma = 0.02;
+  first.data.voltage_v[17] = std::nan("");
+  second.data = irregular(120);
+  second.initial_soc = 0.4;
+  const GreyBox grey_box(cell, {first, second}, options);
+  const LeastSquares problem = grey_box.problem();
+  const Eigen::VectorXd x = grey_box.start();
+  ASSERT_EQ(x.size(), 4 * 3 + 1 + 2 + 1);
+  Eigen::VectorXd r, above, below;
+  Eigen::MatrixXd jacobian;
+  ASSERT_TRUE(problem.evaluate(x, r, &jacobian));
+  ASSERT_EQ(r.size(), 200 + 120 + 1 + 9);
+  EXPECT_EQ(r[17], 0);
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double h = 1e-5 * problem.scale[k];
+    Eigen::VectorXd moved = x;
+    moved[k] += h;
+    ASSERT_TRUE(problem.evaluate(moved, above, nullptr));
+    moved[k] -= 2 * h;
+    ASSERT_TRUE(problem.evaluate(moved, below, nullptr));
+    const Eigen::VectorXd numeric = (above - below) / (2 * h);
+    EXPECT_LT((numeric - jacobian.col(k)).norm(), 2e-6 * (numeric.norm() + 1e-9)) << grey_box.unknowns()[static_cast<std::size_t>(k)].name << " " << k;
+  }
+}
+
+TEST(GreyBox, LeaningMovesTheCurveByItsGap) {
+  model::CellParameters<> cell = table9();
+  for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.03);
+  const auto leant = leaning(cell, -0.5);
+  for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) {
+    EXPECT_NEAR(leant.ocv.b0_v[k], cell.ocv.b0_v[k] - 0.015, 1e-12);
+    EXPECT_NEAR(leant.ocv.b1_v[k], cell.ocv.b1_v[k], 1e-12);
+  }
+  const auto back = leaning(leant, 0);
+  for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) EXPECT_NEAR(back.ocv.b0_v[k], cell.ocv.b0_v[k], 1e-12);
+}
+
+TEST(GreyBox, RefusesWhatIsNoProblem) {
+  Record record;
+  record.data = irregular(20);
+  EXPECT_THROW(GreyBox(table9(), {record}, {}), std::invalid_argument);
+  GreyBoxOptions options;
+  options.soc_nodes = {0.5};
+  EXPECT_THROW(GreyBox(table9(), {}, options), std::invalid_argument);
+  options.estimate_lean = true;
+  EXPECT_THROW(GreyBox(table9(), {record}, options), std::invalid_argument);
+}
+
+TEST(GreyBox, NodesFollowWhatTheDataCovers) {
+  EXPECT_EQ(nodes_for(0.48, 0.52), (std::vector<double>{0.5}));
+  EXPECT_EQ(nodes_for(0.22, 0.98).size(), 9U);
+  EXPECT_EQ(nodes_for(0.0, 1.0).size(), 11U);
+}
+
+}  // namespace
+}  // namespace bms::identification

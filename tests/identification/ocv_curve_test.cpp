@@ -1,0 +1,90 @@
+#include "identification/ocv_curve.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/identification/plant.hpp"
+
+namespace bms::identification {
+namespace {
+
+constexpr double gap_v = 0.025;
+
+/// A slow run of the truth cell with `gap_v` of hysteresis added, rests at both ends.
+SlowRun slow_run(bool charges, double noise_v = 0.0005) {
+  constexpr double c_rate = 1.0 / 25;
+  std::vector<ProfileRow> profile;
+  const int moving = 25 * 360;
+  for (int k = 0; k <= moving + 720; ++k) profile.push_back({10.0 * k, k > 360 && k <= 360 + moving ? (charges ? 6 : -6) * c_rate : 0.0});
+  PlantRun run = run_plant(profile, charges ? 0.0 : 1.0);
+  std::mt19937_64 random(charges ? 1 : 2);
+  std::normal_distribution<double> normal;
+  for (std::size_t k = 0; k < run.data.size(); ++k) run.data.voltage_v[k] += (profile[k].current_a > 0 ? gap_v : profile[k].current_a < 0 ? -gap_v : 0) + noise_v * normal(random);
+  return {run.data, {}};
+}
+
+TEST(OcvCurve, IsTheMiddleOfChargeAndDischargeAndKeepsTheGap) {
+  const OcvCurve curve = ocv_curve({slow_run(false), slow_run(true)});
+  EXPECT_NEAR(curve.capacity_ah, 6, 0.001);
+  EXPECT_NEAR(*curve.coulombic_efficiency, 1, 1e-6);
+  const auto truth_v = truth::table9_ocv_v();
+  for (std::size_t k = 20; k + 20 < curve.soc.size(); k += 7) {
+    ASSERT_NEAR(curve.ocv_v[k], truth_v.at(curve.soc[k]), 0.0015) << curve.soc[k];
+    ASSERT_NEAR(curve.half_gap_v[k], gap_v + 0.24 * 0.022, 0.005) << curve.soc[k];  // what C/25 drops over R0 + R1 is part of it
+  }
+}
+
+TEST(OcvCurve, OneRunAloneIsTakenAsItIs) {
+  const OcvCurve curve = ocv_curve({slow_run(false)});
+  EXPECT_FALSE(curve.coulombic_efficiency);
+  EXPECT_EQ(curve.half_gap_v[500], 0);
+  EXPECT_NEAR(curve.ocv_v[500], truth::table9_ocv_v().at(0.5) - gap_v - 0.005, 0.002);
+}
+
+TEST(OcvCurve, RefusesWhatIsNoSlowRun) {
+  const auto profile = *experiment("high_1m_low_30s");
+  EXPECT_THROW(ocv_curve({{run_plant(profile, 0.5).data, {}}}), std::invalid_argument);
+  EXPECT_THROW(ocv_curve({}), std::invalid_argument);
+  SlowRun half = slow_run(false);
+  half.soc.assign(half.data.size(), 0.5);
+  EXPECT_THROW(ocv_curve({half}), std::invalid_argument);
+}
+
+TEST(OcvPieces, AreFewRisingAndWithinTheError) {
+  const OcvCurve curve = ocv_curve({slow_run(false), slow_run(true)});
+  std::size_t before = 1000;
+  for (const double error_v : {0.002, 0.004, 0.01}) {
+    const auto pieces = fewest_pieces(curve, error_v);
+    ASSERT_TRUE(pieces) << error_v;
+    EXPECT_LE(pieces->largest_error_v, error_v);
+    EXPECT_EQ(pieces->soc.front(), 0);
+    EXPECT_EQ(pieces->soc.back(), 1);
+    for (std::size_t k = 1; k < pieces->soc.size(); ++k) {
+      EXPECT_GT(pieces->ocv_v[k], pieces->ocv_v[k - 1]);
+      EXPECT_GE(pieces->soc[k] - pieces->soc[k - 1], 0.001 - 1e-12);
+    }
+    EXPECT_LE(pieces->soc.size(), before);
+    before = pieces->soc.size();
+  }
+}
+
+TEST(OcvPieces, FindTheCornersOfWhatIsMadeOfPieces) {
+  OcvCurve curve;
+  for (int k = 0; k <= 1000; ++k) {
+    const double s = k / 1000.0;
+    curve.soc.push_back(s);
+    curve.ocv_v.push_back(s < 0.2 ? 3 + s : s < 0.7 ? 3.2 + 0.02 * (s - 0.2) : 3.21 + 0.5 * (s - 0.7));
+    curve.half_gap_v.push_back(0);
+  }
+  const auto pieces = fewest_pieces(curve, 0.001);
+  ASSERT_TRUE(pieces);
+  ASSERT_EQ(pieces->soc.size(), 4U);
+  EXPECT_NEAR(pieces->soc[1], 0.2, 0.004);
+  EXPECT_NEAR(pieces->soc[2], 0.7, 0.004);
+  EXPECT_LT(pieces->largest_error_v, 0.001);
+}
+
+}  // namespace
+}  // namespace bms::identification
