@@ -15,7 +15,9 @@
 #include "host_sim/json_results.hpp"
 #include "host_sim/recording.hpp"
 #include "identification/identify.hpp"
+#include "identification/linear_models.hpp"
 #include "identification/ocv_curve.hpp"
+#include "identification/prefilter.hpp"
 
 namespace bms {
 
@@ -98,15 +100,21 @@ void take_noise(const std::vector<Recording>& recordings, const IdentifyResult& 
     p.noise.current_a = std::clamp(sigma(current_steps), 1e-4 * p.capacity_ah, 0.1 * p.capacity_ah);
   }
   const id::Fit& judge = result.validation ? *result.validation : result.identification.estimation;
-  p.noise.model_v = std::clamp(judge.rmse_v, 0.0005, 0.2);
-  p.noise.model_correlation_s = std::clamp(judge.residuals.correlation_length * step_s, 1.0, 20'000.0);
+  double model_v = judge.rmse_v;
+  // with its mean, which is an error that lasts
+  p.noise.model_correlation_s = std::clamp(id::correlation_length(id::without_missing(judge.error_v)) * step_s, 1.0, 20'000.0);
   if (p.ocv.half_gap_v.size > 0) {
-    double gap = 0;
+    double gap_v = 0;
     for (std::size_t k = 0; k < p.ocv.half_gap_v.size; ++k) {
-      if (p.ocv.soc[k] > 0.1 && p.ocv.soc[k] < 0.95) gap = std::max(gap, p.ocv.half_gap_v[k]);
+      if (p.ocv.soc[k] > 0.1 && p.ocv.soc[k] < 0.95) gap_v = std::max(gap_v, p.ocv.half_gap_v[k]);
     }
-    p.noise.rest_v = std::clamp(gap, p.noise.rest_v, 0.2);  // a rested voltage may lie anywhere between both curves
+    // The voltage is somewhere between the slow curves, and the model leans: how far it is off on the other side no recording needs to
+    // have shown. As evenly distributed; and it lasts until the current has turned for a good part of an hour.
+    model_v = std::max(model_v, (1 + std::abs(p.ocv.lean)) * gap_v / std::sqrt(3.0));
+    p.noise.model_correlation_s = std::max(p.noise.model_correlation_s, 3'000.0);
+    p.noise.rest_v = std::clamp((1 + std::abs(p.ocv.lean)) * gap_v, p.noise.rest_v, 0.2);
   }
+  p.noise.model_v = std::clamp(model_v, 0.0005, 0.2);
   double largest = 0.005;
   for (const id::Parameter& q : result.identification.parameters) {
     if (q.name == "r0_ohm" && q.value > 0) largest = std::max(largest, std::min(0.5, 2 * q.std / q.value));
@@ -114,7 +122,79 @@ void take_noise(const std::vector<Recording>& recordings, const IdentifyResult& 
   p.tolerance.resistance_fraction = largest;
 }
 
+void filter(const IdentifyOptions& options, const std::string& path, id::Data& data) {
+  try {
+    if (options.remove_offset) {
+      const id::Offset offset = id::offset_at_rest(data);
+      if (offset.samples == 0) warn(path + ": no rest to read the current's offset from, nothing was subtracted");
+      for (double& i : data.current_a) i -= offset.current_a;
+    }
+    if (options.filter_hz > 0) data.current_a = id::filter_zero_phase(id::butterworth_low_pass(options.filter_hz, 1 / id::even_step_s(data.time_s)), data.current_a);
+  } catch (const std::invalid_argument& error) {
+    throw BadInput(path, 1, error.what());
+  }
+}
+
 std::string warning_text(const std::string& warning) { return warning.substr(warning.find(": ") + 2); }
+
+void add_warnings(IdentifyResult& result) {
+  for (const std::string& w : result.identification.warnings) result.warnings.push_back({w.substr(0, w.find(':')), warning_text(w)});
+}
+
+void finish(const IdentifyOptions& options, std::chrono::steady_clock::time_point begin, IdentifyResult& result) {
+  for (const Warning& w : result.warnings) warn(w.text);
+  result.out = options.out;
+  result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (!options.output.json.empty()) put(options.output.json, json_of(result));
+  const id::Identification& found = result.identification;
+  std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n", found.estimation.samples, 1e3 * found.estimation.rmse_v,
+                                 found.estimation.fit_percent, found.estimation.one_step_fit_percent, found.optimum.reason);
+  for (const id::Parameter& p : found.parameters) {
+    text += fmt::format("  {:8} {:3.0f} %  {:10.5g} +- {:.2g}{}\n", p.name, 100 * p.soc, p.value, p.std, p.at_bound ? "  at its bound" : "");
+  }
+  for (const auto& [path, fit] : result.validations) text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
+  tell(options.output, text + (result.cell.empty() ? "No cell file." : "Cell file: " + options.out));
+}
+
+/// tf, oe, hw: one record. Exit code 1 when what follows the voltage is no circuit: there is no cell file then.
+int run_linear(const IdentifyOptions& options, id::Method method, CellFile cell, const id::Record& record, double soc, const DataOptions& given, IdentifyResult& result) {
+  const auto begin = std::chrono::steady_clock::now();
+  const id::LinearKind kind = options.model == "tf" ? id::LinearKind::transfer_function : options.model == "oe" ? id::LinearKind::output_error : id::LinearKind::hammerstein_wiener;
+  id::LinearIdentification found;
+  try {
+    found = id::identify_linear(kind, cell.parameters, record.data, soc, method);
+  } catch (const std::invalid_argument& error) {
+    throw BadInput(options.recordings.front(), 1, error.what());
+  }
+  result.identification = found.identification;
+  add_warnings(result);
+  if (options.recordings.size() > 1) result.warnings.push_back({"first_recording_only", "a linear model is identified from one recording, the first was taken"});
+  DataOptions data = given;
+  data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
+  for (const std::string& path : options.validate) {
+    const Recording r = read_recording(path);
+    result.validations.push_back({path, id::validate(found.model, identification_data(r, data).record.data, found.identification.fading)});
+  }
+  if (!result.validations.empty()) result.validation = result.validations.front().second;
+  const auto& p = result.identification.parameters;  // b1, R0, R1, C1
+  cell.parameters.rc = {};
+  cell.parameters.rc.soc.push_back(std::clamp(std::round(100 * soc) / 100, 0.0, 1.0));
+  cell.parameters.rc.r0_ohm.push_back(p[1].value);
+  cell.parameters.rc.r1_ohm.push_back(p[2].value);
+  cell.parameters.rc.c1_f.push_back(p[3].value);
+  cell.name = !options.name.empty() ? options.name : std::filesystem::path(options.out).stem().string();
+  cell.source = fmt::format("R0, R1, C1 identified from {}; the rest from {}", std::filesystem::path(options.recordings.front()).filename().string(), options.start);
+  cell.sources["rc"] = fmt::format("{} by {}, {:.2f} mV RMS", options.model, options.optimizer, 1e3 * result.identification.estimation.rmse_v);
+  const model::CellFault fault = model::first_fault(cell.parameters);
+  if (fault.what == nullptr) {
+    put(options.out, cell_text(cell));
+    result.cell = cell.name;
+  } else {
+    result.warnings.push_back({"no_cell_file", fmt::format("what was identified is no cell: '{}' is out of range, expected {}; there is no cell file", fault.key, fault.what)});
+  }
+  finish(options, begin, result);
+  return fault.what == nullptr ? 0 : 1;
+}
 
 }  // namespace
 
@@ -123,7 +203,6 @@ int run(const IdentifyOptions& options) {
   IdentifyResult result;
   result.model = options.model;
   result.optimizer = options.optimizer;
-  if (options.model != "nlgr") throw BadInput("--model", 1, "no such model '" + options.model + "', expected nlgr");
   const id::Method method = method_of(options.optimizer);
   CellFile cell = read_cell(options.start);
   const double start_capacity_ah = cell.parameters.capacity_ah;
@@ -140,11 +219,14 @@ int run(const IdentifyOptions& options) {
     Recording& r = recordings.back();
     compare_with_cell(r, cell.parameters);
     for (const Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
-    const IdentificationData d = identification_data(r, data);
-    records.push_back(d.record);
+    IdentificationData d = identification_data(r, data);
+    filter(options, path, d.record.data);
+    records.push_back(std::move(d.record));
     soc_min = std::min(soc_min, d.soc_min);
     soc_max = std::max(soc_max, d.soc_max);
   }
+
+  if (options.model != "nlgr") return run_linear(options, method, cell, records.front(), (soc_min + soc_max) / 2, data, result);
 
   id::GreyBoxOptions grey_box;
   grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(soc_min, soc_max) : options.nodes;
@@ -156,7 +238,7 @@ int run(const IdentifyOptions& options) {
   } catch (const std::invalid_argument& error) {
     throw BadInput(options.recordings.front(), 1, error.what());
   }
-  for (const std::string& w : result.identification.warnings) result.warnings.push_back({w.substr(0, w.find(':')), warning_text(w)});
+  add_warnings(result);
 
   data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
   for (const std::string& path : options.validate) {
@@ -184,19 +266,8 @@ int run(const IdentifyOptions& options) {
   }
   put(options.out, cell_text(cell));
 
-  for (const Warning& w : result.warnings) warn(w.text);
   result.cell = cell.name;
-  result.out = options.out;
-  result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (!options.output.json.empty()) put(options.output.json, json_of(result));
-  const id::Identification& found = result.identification;
-  std::string text = fmt::format("{} samples, {} nodes: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}.\n", found.estimation.samples, nodes.size,
-                                 1e3 * found.estimation.rmse_v, found.estimation.fit_percent, found.estimation.one_step_fit_percent, found.optimum.reason);
-  for (const id::Parameter& p : found.parameters) {
-    text += fmt::format("  {:8} {:3.0f} %  {:10.5g} +- {:.2g}{}\n", p.name, 100 * p.soc, p.value, p.std, p.at_bound ? "  at its bound" : "");
-  }
-  for (const auto& [path, fit] : result.validations) text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
-  if (options.out != "-") tell(options.output, text + "Cell file: " + options.out);
+  finish(options, begin, result);
   return 0;
 }
 

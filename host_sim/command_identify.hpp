@@ -20,6 +20,8 @@ struct IdentifyOptions {
   std::vector<std::string> validate;
   std::string validate_window;             ///< empty: as `window`
   std::vector<double> nodes;               ///< soc nodes of R0, R1, C1; empty: by what the recordings cover
+  double filter_hz = 0;                    ///< low-pass on the current, zero phase; 0: none
+  bool remove_offset = false;              ///< of the current, as its rests show it
   double ocv_error_v = 0.002;              ///< largest error of the OCV's straight pieces
   std::optional<double> lean;              ///< of the OCV between slow discharge (-1) and charge (1); not given: identified where it can be
   double capacity_ah = 0;                  ///< 0: of the OCV recordings, else of `start`

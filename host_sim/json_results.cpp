@@ -143,4 +143,31 @@ std::string json_of(const IdentifyResult& r) {
   return text_of(json);
 }
 
+std::string json_of(const StudyResult& r) {
+  Json json;
+  json["command"] = "study";
+  json["source"] = r.source;
+  json["tables"] = Json::array();
+  for (const StudyTable& t : r.tables) {
+    Json rows = Json::array();
+    for (const auto& row : t.rows) {
+      Json cells = Json::array();
+      for (const StudyCell& c : row) {
+        Json cell = {{"text", c.text}};
+        if (c.value) cell["value"] = *c.value;
+        if (c.paper) cell["paper"] = *c.paper;
+        cells.push_back(std::move(cell));
+      }
+      rows.push_back(std::move(cells));
+    }
+    json["tables"].push_back({{"id", t.id}, {"title", t.title}, {"head", t.head}, {"rows", std::move(rows)}, {"note", t.note}});
+  }
+  json["claims"] = Json::array();
+  for (const StudyClaim& c : r.claims) json["claims"].push_back({{"claim", c.claim}, {"holds", c.holds}, {"evidence", c.evidence}});
+  json["identifications"] = r.fits;
+  json["wall_s"] = r.seconds;
+  json["warnings"] = warnings_of(r.warnings);
+  return text_of(json);
+}
+
 }  // namespace bms

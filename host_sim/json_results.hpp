@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_sim/replay.hpp"
+#include "host_sim/study.hpp"
 #include "identification/identify.hpp"
 
 namespace bms {
@@ -39,5 +40,7 @@ struct IdentifyResult {
   std::vector<Warning> warnings;
 };
 std::string json_of(const IdentifyResult& result);
+
+std::string json_of(const StudyResult& result);
 
 }  // namespace bms

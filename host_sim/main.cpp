@@ -13,6 +13,7 @@
 #include "host_sim/command_identify.hpp"
 #include "host_sim/command_replay.hpp"
 #include "host_sim/command_simulate.hpp"
+#include "host_sim/command_study.hpp"
 
 namespace {
 
@@ -84,7 +85,7 @@ void add_identify(CLI::App& app, bms::IdentifyOptions& o) {
   c.footer("Example: bms identify --ocv slow_discharge.csv --ocv slow_charge.csv --recording pulses.csv --validate shift.csv --start table9 --out my_cell.toml");
   c.add_option("--recording", o.recordings, "recordings to identify from")->required()->type_name("FILE");
   c.add_option("--ocv", o.ocv, "slow charge and discharge (C/10 or slower) to take OCV and capacity from")->type_name("FILE");
-  c.add_option("--model", o.model, "nlgr: nonlinear grey box")->capture_default_str();
+  c.add_option("--model", o.model, "nlgr: nonlinear grey box; tf: transfer function; oe: output error; hw: Hammerstein-Wiener")->check(CLI::IsMember({"nlgr", "tf", "oe", "hw"}))->capture_default_str();
   c.add_option("--optimizer", o.optimizer, "gn, agn: (adaptive) subspace Gauss-Newton; lm: Levenberg-Marquardt; sd: steepest descent; nls: trust region, reflective")->capture_default_str();
   c.add_option("--start", o.start, "cell file to begin from: limits, first values, and what is not identified")->capture_default_str();
   c.add_option("--initial-soc", o.initial_soc, "state of charge at the start, or 'estimate'; without it soc_ref if there is one")->type_name("X");
@@ -94,10 +95,22 @@ void add_identify(CLI::App& app, bms::IdentifyOptions& o) {
   c.add_option("--nodes", o.nodes, "state of charge at which R0, R1, C1 are identified, as in 0.2,0.5,0.8; linear in between")->delimiter(',')->check(Within(0.0, 1.0));
   c.add_option("--lean", o.lean, "where the OCV lies between slow discharge (-1) and charge (1); identified if not given")->check(Within(-1.0, 1.0));
   c.add_option("--ocv-error-v", o.ocv_error_v, "largest error of the OCV's straight pieces")->check(Within(0.0002, 0.05))->capture_default_str();
+  c.add_option("--filter-hz", o.filter_hz, "Butterworth low-pass of second order on the current, forward and backward; none if not given")->check(Within(1e-4, 1e3));
+  c.add_flag("--remove-offset", o.remove_offset, "subtract what the current reads at rest");
   c.add_option("--capacity-ah", o.capacity_ah, "capacity; of the OCV recordings if not given")->check(Within(0.01, 1000.0));
   c.add_option("--name", o.name, "of the cell; that of the file if not given");
   c.add_option("--out", o.out, "cell file to write")->required()->type_name("C.toml");
   add_output(c, o.output, false);
+}
+
+void add_study(CLI::App& app, bms::StudyOptions& o) {
+  CLI::App& c = *app.add_subcommand("study", "Compare models, optimisers and experiments as the paper does (Tables 4 to 9)");
+  c.footer("Example: bms study --out study");
+  c.add_option("--recordings", o.recordings, "folder with recordings; without it the simulated plant is studied")->type_name("DIR");
+  c.add_option("--cell", o.cell, "OCV, capacity and start values: cell file, or the name of a built-in cell: " + bms::cell_names())->capture_default_str();
+  c.add_option("--seed", o.seed, "of the plant's noise")->capture_default_str();
+  c.add_option("--out", o.out, "folder to write tables (CSV, JSON) and the page to")->required()->type_name("DIR");
+  add_output(c, o.output, true);
 }
 
 /// own_file: what the command writes beside JSON and report.
@@ -133,11 +146,14 @@ int main(int argc, char** argv) {
   add_experiment(app, experiment);
   bms::IdentifyOptions identify;
   add_identify(app, identify);
+  bms::StudyOptions study;
+  add_study(app, study);
   try {
     app.parse(argc, argv);
     if (app.got_subcommand("replay")) return run(replay, replay.trace);
     if (app.got_subcommand("simulate")) return run(simulate, simulate.out);
     if (app.got_subcommand("identify")) return run(identify, identify.out);
+    if (app.got_subcommand("study")) return run(study, "");
     return run(experiment, experiment.out);
   } catch (const CLI::ParseError& error) {
     return usage(app, error);

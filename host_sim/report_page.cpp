@@ -53,6 +53,13 @@ std::string percent(double fraction) { return fmt::format("{:.2f} %", 100 * frac
 std::string file_name(const ReplayResult& r) { return r.recording.path.substr(r.recording.path.rfind('/') + 1); }
 std::string millivolts(double v) { return fmt::format("{:.2f} mV", 1e3 * v); }
 
+/// As the page's script has it.
+std::string in_script(const json& page) {
+  std::string text = page.dump(-1, ' ', false, json::error_handler_t::replace);
+  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");  // no </script> from a file's name
+  return text;
+}
+
 json figures(const ReplayResult& r) {
   json f = json::array();
   const auto group = [&](const char* name) { f.push_back(json::array({name})); };
@@ -102,10 +109,7 @@ std::string data(const ReplayResult& r) {
   add("soc", 5, [&](std::size_t k) { return e[k].soc; });
   add("two_sigma", 5, [&](std::size_t k) { return 2 * e[k].soc_sigma; });
   if (!rec.soc_ref.empty()) add("soc_ref", 5, [&](std::size_t k) { return rec.soc_ref[k]; });
-
-  std::string text = page.dump(-1, ' ', false, json::error_handler_t::replace);
-  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");  // no </script> from a file's name
-  return text;
+  return in_script(page);
 }
 
 /// The page with its places filled in, each once.
@@ -135,17 +139,59 @@ std::string statement(const ReplayResult& r) {
   return text;
 }
 
-std::string replay_report(const ReplayResult& r) {
-  return filled(embedded::replay_html, [&](std::string_view place) -> std::string {
-    if (place == "TITLE") return "bms replay";
+namespace {
+
+std::string page(std::string_view html, std::string_view script, std::string_view title, const std::string& data) {
+  return filled(html, [&](std::string_view place) -> std::string {
+    if (place == "TITLE") return std::string(title);
     if (place == "DYGRAPH_CSS") return std::string(embedded::dygraph_css);
     if (place == "DYGRAPH_JS") return std::string(embedded::dygraph_js);
     if (place == "SYNCHRONIZER_JS") return std::string(embedded::synchronizer_js);
     if (place == "PAGE_CSS") return std::string(embedded::page_css);
-    if (place == "PAGE_JS") return std::string(embedded::replay_js);
-    if (place == "DATA") return data(r);
+    if (place == "PAGE_JS") return std::string(script);
+    if (place == "DATA") return data;
     return "";
   });
+}
+
+json table_of(const StudyTable& t) {
+  json rows = json::array();
+  for (const auto& row : t.rows) {
+    json cells = json::array();
+    for (const StudyCell& c : row) {
+      json cell = {{"text", c.text}};
+      if (c.paper) cell["paper"] = fmt::format("{:g}", *c.paper);
+      cells.push_back(std::move(cell));
+    }
+    rows.push_back(std::move(cells));
+  }
+  return {{"title", t.title}, {"note", t.note}, {"table", {{"head", t.head}, {"rows", std::move(rows)}}}};
+}
+
+json chart_of(const StudyChart& c) {
+  json rows = json::array();
+  const std::size_t every = std::max<std::size_t>(1, c.time_s.size() / 8'000);
+  for (std::size_t k = 0; k < c.time_s.size(); k += every) {
+    json row = json::array({c.time_s[k] - c.time_s.front()});
+    for (const auto& column : c.columns) row.push_back(k < column.size() ? json(std::round(column[k] * 1e5) / 1e5) : json(nullptr));
+    rows.push_back(std::move(row));
+  }
+  return {{"title", c.title}, {"chart", {{"labels", c.labels}, {"rows", std::move(rows)}}}};
+}
+
+}  // namespace
+
+std::string replay_report(const ReplayResult& r) { return page(embedded::replay_html, embedded::replay_js, "bms replay", data(r)); }
+
+std::string study_report(const StudyResult& r) {
+  json content = {{"title", "Models, optimisers and experiments"}, {"statement", fmt::format("{} identifications of {}.", r.fits, r.source)}, {"warnings", json::array()}, {"sections", json::array()}};
+  for (const Warning& w : r.warnings) content["warnings"].push_back(w.text);
+  StudyTable claims{"claims", "What the paper says, and whether it holds here", {"statement", "holds", "evidence"}, {}, ""};
+  for (const StudyClaim& c : r.claims) claims.rows.push_back({{c.claim, {}, {}}, {c.holds ? "yes" : "no", {}, {}}, {c.evidence, {}, {}}});
+  content["sections"].push_back(table_of(claims));
+  for (const StudyTable& t : r.tables) content["sections"].push_back(table_of(t));
+  for (const StudyChart& c : r.charts) content["sections"].push_back(chart_of(c));
+  return page(embedded::study_html, embedded::study_js, "bms study", in_script(content));
 }
 
 }  // namespace bms

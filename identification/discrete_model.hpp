@@ -65,7 +65,8 @@ bool stable(const std::vector<double>& f, double margin = 1e-3);
 std::vector<double> mirrored_inside(const std::vector<double>& f);
 
 /// Simulation error: residuals simulated less measured [V]; zero, with a zero row, where the voltage is not finite, and with a free response
-/// estimated in the first nk + nb - 1 - nf samples, which it does not reach. Not defined at poles beyond 1 + 1 / N. No bounds. `start` gives the scale. Throws std::invalid_argument: uneven sampling, current not finite, fewer measured samples than unknowns.
+/// estimated in the first nk + nb - 1 - nf samples, which it does not reach. Not defined at poles beyond 1 + 1 / N. No bounds. `start` gives the
+/// scale. Throws std::invalid_argument: uneven sampling, current not finite, fewer measured samples than unknowns.
 LeastSquares simulation_error(const Data& data, const Structure& structure, const Eigen::VectorXd& start);
 
 /// Values to start from: of several F the one that simulates best, with b, offset and free response by linear least squares for each. The F:

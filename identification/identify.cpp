@@ -13,7 +13,8 @@ namespace bms::identification {
 
 namespace {
 
-Eigen::VectorXd without_missing(const Eigen::VectorXd& values, const Eigen::VectorXd& by) {
+/// Those of `values` where `by` is a number.
+Eigen::VectorXd where(const Eigen::VectorXd& values, const Eigen::VectorXd& by) {
   std::vector<double> kept;
   for (Eigen::Index k = 0; k < values.size(); ++k) {
     if (std::isfinite(by[k])) kept.push_back(values[k]);
@@ -141,7 +142,7 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
     grey_box.simulate(x, r, simulated, nullptr);
     if (r == 0) {
       result.estimation = fit_of(data.voltage_v, simulated, data.current_a, 0);
-      result.fading = fading(without_missing(result.estimation.error_v, result.estimation.error_v));
+      result.fading = fading(without_missing(result.estimation.error_v));
     }
     double last_error = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t k = 0; k < data.size(); ++k) {
@@ -182,8 +183,8 @@ Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulat
   fit.largest_v = error.max();
   fit.samples = error.count();
   fit.output_variance_v2 = fit.rmse_v * fit.rmse_v;
-  fit.residuals = analyse(without_missing(fit.error_v, fit.error_v),
-                          without_missing(Eigen::Map<const Eigen::VectorXd>(current_a.data(), simulated_v.size()), fit.error_v));
+  fit.residuals = analyse(without_missing(fit.error_v),
+                          where(Eigen::Map<const Eigen::VectorXd>(current_a.data(), simulated_v.size()), fit.error_v));
   return fit;
 }
 

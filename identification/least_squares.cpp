@@ -133,8 +133,12 @@ double Search::relative(const VectorXd& gradient) const {
 }
 
 bool Search::is_short(const VectorXd& step, double tolerance) const {
-  // + tolerance: an optimum at 0 ends, too
-  return step.norm() <= tolerance * (x_.cwiseQuotient(scale_).norm() + tolerance);
+  const auto is_short_times = [&](const VectorXd& weights) {
+    const VectorXd size = x_.cwiseQuotient(scale_).cwiseAbs() + VectorXd::Constant(x_.size(), tolerance);  // an optimum at 0 ends, too
+    return weights.cwiseProduct(step).norm() <= tolerance * weights.cwiseProduct(size).norm();
+  };
+  // also as the residuals see it: without `scale` a large unknown would hide a small one
+  return is_short_times(VectorXd::Ones(x_.size())) && is_short_times(column_norms_);
 }
 
 VectorXd Search::after(const VectorXd& step) const {
@@ -191,9 +195,13 @@ bool Search::settled() {
 
 void Search::stuck() {
   if (ended_) return;
-  const double decrease = outlook(free()).decrease;
+  const Outlook here = outlook(free());
+  const double decrease = here.decrease;
   if (decrease <= std::max(stopping_.cost, rounding)) {
     end(true, sentence("No smaller cost is found, nor expected: the decrease would be, relative, ", decrease));
+  } else if (here.gradient <= std::sqrt(rounding)) {
+    // less cannot be seen in the cost, which is of second order in x; where J loses rank at the optimum, `decrease` is no guide
+    end(true, sentence("No smaller cost is found, and the gradient is as small as can be told from the cost, relative ", here.gradient));
   } else {
     end(false, sentence("Not converged: no smaller cost is found, though the derivatives promise a decrease of, relative, ", decrease));
   }

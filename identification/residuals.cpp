@@ -15,6 +15,14 @@ double product(const Eigen::VectorXd& a, const Eigen::VectorXd& b, Eigen::Index 
 
 }  // namespace
 
+Eigen::VectorXd without_missing(const Eigen::VectorXd& values) {
+  std::vector<double> kept;
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    if (std::isfinite(values[k])) kept.push_back(values[k]);
+  }
+  return Eigen::Map<const Eigen::VectorXd>(kept.data(), static_cast<Eigen::Index>(kept.size()));
+}
+
 double correlation_length(const Eigen::VectorXd& residuals) {
   const double power = residuals.squaredNorm();
   if (!(power > 0)) return 1;

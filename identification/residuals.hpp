@@ -20,6 +20,9 @@ struct ResidualAnalysis {
 /// Residuals and currents of one record, in order.
 ResidualAnalysis analyse(const Eigen::VectorXd& residuals, const Eigen::VectorXd& current, int lags = 25);
 
+/// Those that are numbers, in order.
+Eigen::VectorXd without_missing(const Eigen::VectorXd& values);
+
 /// How many samples in a row are alike: 1 + 2 * sum of the autocorrelation up to its first zero. 1: white.
 double correlation_length(const Eigen::VectorXd& residuals);
 

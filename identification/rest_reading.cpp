@@ -1,7 +1,6 @@
 #include "identification/rest_reading.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>

@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_bisections = 25;
+constexpr int most_bisections = 10;  // a step still too long then says that J has lost rank
 constexpr double sufficient = 1e-4;  // part of the linear decrease that must be reached (Armijo)
 
 VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
@@ -42,31 +42,41 @@ int move_along(Search& search, const VectorXd& step) {
   return most_bisections + 1;
 }
 
+/// The last resort where J has lost rank and its step leads too far: down the gradient, columns of J brought to one length.
+bool move_down_gradient(Search& search) {
+  VectorXd step = VectorXd::Zero(search.size());
+  for (const Index i : search.free()) step[i] = -search.gradient()[i] / (search.column_norms()[i] * search.column_norms()[i]);
+  const double curvature = (search.factor() * step).squaredNorm();
+  if (curvature > 0) step *= -search.gradient().dot(step) / curvature;
+  return move_along(search, step.cwiseMax(search.below()).cwiseMin(search.above())) <= most_bisections;
+}
+
 }  // namespace
 
 void search_gauss_newton(Search& search) {
   // what the toolbox leaves out, GnPinvConst = 1e4
   const double tolerance = 1e4 * static_cast<double>(std::max(search.rows(), search.size())) * std::numeric_limits<double>::epsilon();
   while (!search.settled()) {
-    if (move_along(search, subspace_step(search, tolerance)) > most_bisections) search.stuck();
+    if (move_along(search, subspace_step(search, tolerance)) > most_bisections && !move_down_gradient(search)) search.stuck();
   }
 }
 
 void search_adaptive_gauss_newton(Search& search) {
   // The paper's are for the eigenvalues of J'J: start 1e-4, up by 2, down by 4. Here their roots.
-  constexpr double start = 1e-2, up = 1.4142135623730951, down = 2, smallest = 1e-12;
+  constexpr double start = 1e-2, up = 1.4142135623730951, down = 2, smallest = 1e-12, largest = 0.5;
   double gamma = start;
+  bool in_vain = false;  // the last search, in a larger subspace
   while (!search.settled()) {
     const VectorXd step = subspace_step(search, gamma);
     const bool exhausted = -search.expected_change(step) <= search.stopping().cost * search.cost();  // nothing left in this subspace
-    const int bisections = exhausted ? 0 : move_along(search, step);
-    if (bisections == 0) {
-      if (exhausted && gamma <= smallest) search.stuck();
-      gamma = std::max(gamma / down, smallest);
-    } else {
-      if (bisections > most_bisections && gamma >= 1) search.stuck();
-      gamma = std::min(gamma * up, 1.0);
+    if ((exhausted && (in_vain || gamma <= smallest)) || (in_vain && gamma >= largest)) {
+      if (!move_down_gradient(search)) search.stuck();
+      in_vain = false;
+      continue;
     }
+    const int bisections = exhausted ? 0 : move_along(search, step);
+    in_vain = bisections > most_bisections;
+    gamma = bisections == 0 ? std::max(gamma / down, smallest) : std::min(gamma * (in_vain ? 8 : up), largest);
   }
 }
 

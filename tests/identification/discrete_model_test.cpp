@@ -62,9 +62,10 @@ VectorXd search(const LeastSquares& problem, VectorXd x, VectorXd* deviation = n
     right.head(r.size()) = -r;
     const VectorXd tried = x + size.cwiseInverse().cwiseProduct(stacked.colPivHouseholderQr().solve(right));
     if (problem.evaluate(tried, tried_r, nullptr) && tried_r.squaredNorm() < r.squaredNorm()) {
+      if (tried_r.squaredNorm() > (1 - 1e-12) * r.squaredNorm()) damping = 1e12;  // the last
       x = tried;
       EXPECT_TRUE(problem.evaluate(x, r, &jacobian));
-      damping = std::max(damping / 10, 1e-20);
+      if (damping < 1e12) damping = std::max(damping / 10, 1e-20);
     } else {
       damping *= 10;
     }

@@ -7,7 +7,7 @@
 
 #include "host_sim/experiment.hpp"
 #include "identification/data.hpp"
-#include "tests/truth/truth_cell.hpp"
+#include "plant/truth_cell.hpp"
 
 namespace bms::identification {
 

@@ -147,9 +147,9 @@ TEST(EvenStep, TakesOnePercentOfJitterAndNoMore) {
 /// 100 s rest, 100 s at -6 A, 100 s rest, with a sensor 40 mA off.
 Data rest_load_rest(double offset_a, double noise_a) {
   std::mt19937 random(5);
-  std::normal_distribution<double> noise(0, noise_a);
+  std::normal_distribution<double> noise(0, 1);
   Data data{evenly(300, 1), {}, std::vector<double>(300, 3.3), 6};
-  for (std::size_t k = 0; k < 300; ++k) data.current_a.push_back((k >= 100 && k < 200 ? -6.0 : 0.0) + offset_a + noise(random));
+  for (std::size_t k = 0; k < 300; ++k) data.current_a.push_back((k >= 100 && k < 200 ? -6.0 : 0.0) + offset_a + noise_a * noise(random));
   return data;
 }
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "host_sim/experiment.hpp"
-#include "tests/truth/instruments.hpp"
-#include "tests/truth/truth_cell.hpp"
+#include "plant/instruments.hpp"
+#include "plant/truth_cell.hpp"
 
 namespace truth {
 

@@ -1,4 +1,4 @@
-#include "tests/truth/truth_cell.hpp"
+#include "plant/truth_cell.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "tests/truth/instruments.hpp"
-#include "tests/truth/random.hpp"
+#include "plant/instruments.hpp"
+#include "plant/random.hpp"
 
 namespace truth {
 namespace {

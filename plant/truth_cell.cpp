@@ -1,4 +1,4 @@
-#include "tests/truth/truth_cell.hpp"
+#include "plant/truth_cell.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tests/truth/instruments.hpp"
+#include "plant/instruments.hpp"
 
 #include <cmath>
 

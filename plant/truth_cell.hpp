@@ -9,7 +9,7 @@
 // mistake there cannot hide by being made twice. No libm: with -ffp-contract=off the same bits everywhere.
 #pragma once
 
-#include "tests/truth/monotone_curve.hpp"
+#include "plant/monotone_curve.hpp"
 
 namespace truth {
 

@@ -1,4 +1,4 @@
-#include "tests/truth/monotone_curve.hpp"
+#include "plant/monotone_curve.hpp"
 
 #include <algorithm>
 #include <cassert>

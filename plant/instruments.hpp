@@ -8,7 +8,7 @@
 
 #include <cstdint>
 
-#include "tests/truth/random.hpp"
+#include "plant/random.hpp"
 
 namespace truth {
 

@@ -1,0 +1,96 @@
+#include "host_sim/command_study.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "host_sim/bad_input.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/json_results.hpp"
+#include "host_sim/report_page.hpp"
+#include "host_sim/study.hpp"
+
+namespace bms {
+
+namespace {
+
+/// Quoted where a spreadsheet would stumble.
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+/// Numbers where there are numbers; the paper's in columns of their own.
+std::string csv_of(const StudyTable& table) {
+  std::vector<bool> beside(table.head.size(), false);
+  for (const auto& row : table.rows) {
+    for (std::size_t k = 0; k < row.size(); ++k) beside[k] = beside[k] || row[k].paper;
+  }
+  std::string csv;
+  for (std::size_t k = 0; k < table.head.size(); ++k) {
+    csv += (k > 0 ? "," : "") + field(table.head[k]);
+    if (beside[k]) csv += "," + field("paper: " + table.head[k]);
+  }
+  csv += "\n";
+  for (const auto& row : table.rows) {
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      csv += (k > 0 ? "," : "") + (row[k].value ? fmt::format("{:.8g}", *row[k].value) : field(row[k].text));
+      if (beside[k]) csv += row[k].paper ? fmt::format(",{:.8g}", *row[k].paper) : ",";
+    }
+    csv += "\n";
+  }
+  return csv;
+}
+
+StudyProgress progress_on_terminal() {
+  if (!isatty(2)) return {};
+  const auto begin = std::chrono::steady_clock::now();
+  return [begin](std::size_t done, std::size_t all) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    fmt::print(stderr, "\r{} of {} identifications, about {:.0f} s left   {}", done, all, seconds / static_cast<double>(done) * static_cast<double>(all - done), done == all ? "\n" : "");
+  };
+}
+
+}  // namespace
+
+int run(const StudyOptions& options) {
+  const CellFile cell = read_cell(options.cell);
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) throw BadInput(options.out, 1, "cannot be made (" + error.message() + "), expected a folder to write to");
+
+  StudyResult result;
+  if (options.recordings.empty()) {
+    result = study_plant(cell.parameters, options.seed, progress_on_terminal());
+  } else {
+    if (!std::filesystem::is_directory(options.recordings, error)) throw BadInput(options.recordings, 1, "no folder, expected one with recordings in CSV");
+    std::vector<std::string> paths;
+    for (const auto& entry : std::filesystem::directory_iterator(options.recordings)) {
+      if (entry.path().extension() == ".csv") paths.push_back(entry.path().string());
+    }
+    std::sort(paths.begin(), paths.end());
+    result = study_recordings(cell.parameters, paths, progress_on_terminal());
+  }
+  const std::filesystem::path folder = options.out;
+  for (const StudyTable& table : result.tables) put((folder / (table.id + ".csv")).string(), csv_of(table));
+  const std::string json = json_of(result), page = study_report(result);
+  put((folder / "study.json").string(), json);
+  put((folder / "study.html").string(), page);
+  if (!options.output.json.empty()) put(options.output.json, json);
+  if (!options.output.report.empty()) put(options.output.report, page);
+
+  for (const Warning& w : result.warnings) warn(w.text);
+  std::string text = fmt::format("{} identifications in {:.1f} s, of {}.\n", result.fits, result.seconds, result.source);
+  for (const StudyClaim& c : result.claims) text += fmt::format("  {} {}: {}\n", c.holds ? "yes" : "no ", c.claim, c.evidence);
+  tell(options.output, text + "Report: " + (folder / "study.html").string());
+  return 0;
+}
+
+}  // namespace bms

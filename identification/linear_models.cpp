@@ -1,0 +1,162 @@
+#include "identification/linear_models.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
+
+#include "identification/circuit_from_discrete.hpp"
+#include "identification/prefilter.hpp"
+
+namespace bms::identification {
+
+namespace {
+
+constexpr Eigen::Index pieces = 10;  // as the OCV of the paper has
+
+/// Where w lies on the curve.
+struct Place {
+  Eigen::Index below = 0;
+  double weight_above = 0;
+};
+
+Place place(const StaticCurve& curve, double w_v) {
+  const double at = (w_v - curve.w_from_v) / curve.w_step_v;
+  const auto last = static_cast<double>(curve.y_v.size() - 2);
+  const double below = std::clamp(std::floor(at), 0.0, last);
+  return {static_cast<Eigen::Index>(below), at - below};
+}
+
+double through(const StaticCurve& curve, double w_v) {
+  if (curve.y_v.empty()) return w_v;
+  const Place p = place(curve, w_v);
+  const auto k = static_cast<std::size_t>(p.below);
+  return curve.y_v[k] + p.weight_above * (curve.y_v[k + 1] - curve.y_v[k]);
+}
+
+/// The problem of the linear block with the curve's inner values as further unknowns; its ends stay, or gain and offset would be there twice.
+LeastSquares with_curve(const Data& data, const Structure& structure, const StaticCurve& start, const Eigen::VectorXd& linear_start) {
+  const LeastSquares linear = simulation_error(data, structure, linear_start);
+  const Eigen::Index n = linear_start.size(), inner = pieces - 1;
+  LeastSquares p;
+  p.scale.resize(n + inner);
+  p.scale << linear.scale, Eigen::VectorXd::Constant(inner, 0.01);
+  p.evaluate = [=](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
+    Eigen::MatrixXd of_linear;
+    if (!linear.evaluate(x.head(n), r, jacobian != nullptr ? &of_linear : nullptr)) return false;
+    StaticCurve curve = start;
+    for (Eigen::Index k = 0; k < inner; ++k) curve.y_v[static_cast<std::size_t>(k + 1)] = x[n + k];
+    if (jacobian != nullptr) jacobian->setZero(r.size(), n + inner);
+    for (Eigen::Index k = 0; k < r.size(); ++k) {
+      const double measured_v = data.voltage_v[static_cast<std::size_t>(k)];
+      if (!std::isfinite(measured_v)) continue;
+      const double w_v = r[k] + measured_v;
+      const Place at = place(curve, w_v);
+      r[k] = through(curve, w_v) - measured_v;
+      if (jacobian == nullptr) continue;
+      const auto below = static_cast<std::size_t>(at.below);
+      jacobian->row(k).head(n) = of_linear.row(k) * ((curve.y_v[below + 1] - curve.y_v[below]) / curve.w_step_v);
+      if (at.below > 0) (*jacobian)(k, n + at.below - 1) += 1 - at.weight_above;
+      if (at.below < inner) (*jacobian)(k, n + at.below) += at.weight_above;
+    }
+    return true;
+  };
+  return p;
+}
+
+Eigen::VectorXd simulated(const LinearModel& m, const Data& data) {
+  Eigen::VectorXd v = simulate(m.model, data.current_a);
+  for (Eigen::Index k = 0; k < v.size(); ++k) v[k] = through(m.curve, v[k]);
+  return v;
+}
+
+}  // namespace
+
+LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc, Method method, const Stopping& stopping) {
+  LinearIdentification out;
+  LinearModel& m = out.model;
+  Identification& found = out.identification;
+  m.kind = kind;
+  m.structure = kind == LinearKind::transfer_function ? transfer_function(cell.ocv.b0_v[model::cell_detail::ocv_piece(cell.ocv, soc)]) : output_error();
+  if (kind == LinearKind::transfer_function) m.structure.estimate_initial = true;
+  Eigen::VectorXd start = to_unknowns(start_values(data, m.structure), m.structure);
+  LeastSquares problem = simulation_error(data, m.structure, start);
+  const Eigen::Index linear = start.size();
+  if (kind == LinearKind::hammerstein_wiener) {
+    // from the best linear block on
+    start = minimise(problem, start, Method::trust_region_reflective, stopping).x;
+    const Eigen::VectorXd w = simulate(to_model(start, m.structure), data.current_a);
+    m.curve.w_from_v = w.minCoeff();
+    m.curve.w_step_v = std::max(1e-6, (w.maxCoeff() - w.minCoeff()) / static_cast<double>(pieces));
+    for (Eigen::Index k = 0; k <= pieces; ++k) m.curve.y_v.push_back(m.curve.w_from_v + static_cast<double>(k) * m.curve.w_step_v);
+    problem = with_curve(data, m.structure, m.curve, start);
+    start.conservativeResize(linear + pieces - 1);
+    for (Eigen::Index k = 1; k < pieces; ++k) start[linear + k - 1] = m.curve.y_v[static_cast<std::size_t>(k)];
+  }
+  found.optimum = minimise(problem, start, method, stopping);
+  const Eigen::VectorXd& x = found.optimum.x;
+  m.model = to_model(x.head(linear), m.structure);
+  for (Eigen::Index k = linear; k < x.size(); ++k) m.curve.y_v[static_cast<std::size_t>(k - linear + 1)] = x[k];
+
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd jacobian;
+  if (!problem.evaluate(x, residuals, &jacobian)) throw std::invalid_argument("the simulation of the identified model is not finite");
+  const Uncertainty u = uncertainty(residuals, jacobian, residuals.size(), found.optimum.at_bound, 0);
+  found.correlation = u.correlation;
+  found.correlation_length = u.correlation_length;
+  found.estimation = fit_of(data.voltage_v, simulated(m, data), data.current_a, 0);
+  found.fading = fading(residuals);
+  found.estimation = fit_of(data.voltage_v, simulated(m, data), data.current_a, found.fading);
+  found.estimation.output_variance_v2 = u.output_variance_v2;
+
+  const double step_s = even_step_s(data.time_s), capacity_c = 3'600 * data.capacity_ah;
+  const DiscreteCoefficients c{m.model.b[0], m.model.b[1], m.model.b[2], m.model.f[0], m.model.f[1]};
+  const Input input = kind == LinearKind::transfer_function ? Input::held : Input::straight;
+  const CircuitReading reading = circuit_from_discrete(c, step_s, capacity_c, input);
+  const Circuit std = circuit_std(c, u.covariance.topLeftCorner<5, 5>(), step_s, capacity_c, input);
+  const Circuit std_white = circuit_std(c, u.covariance_white.topLeftCorner<5, 5>(), step_s, capacity_c, input);
+  const auto add = [&](const char* name, double Circuit::*value) {
+    found.parameters.push_back({name, soc, reading.circuit.*value, std.*value, std_white.*value, 0, false, true});
+  };
+  add("b1_v", &Circuit::b1_v);
+  add("r0_ohm", &Circuit::r0_ohm);
+  add("r1_ohm", &Circuit::r1_ohm);
+  add("c1_f", &Circuit::c1_f);
+  for (const std::string& what : reading.implausible) found.warnings.push_back("no_circuit: " + what + ": the model follows the voltage, but is no circuit");
+  if (!stable(m.model.f)) found.warnings.push_back(fmt::format("unstable: a pole lies at {:.6f}", largest_pole(m.model.f)));
+  if (!found.optimum.converged) found.warnings.push_back("not_converged: " + found.optimum.reason);
+  return out;
+}
+
+Fit validate(const LinearModel& model, const Data& data, double fading) {
+  LinearModel m = model;
+  m.model.initial_v.assign(m.model.f.size(), 0);
+  Eigen::MatrixXd jacobian;
+  const Eigen::VectorXd w = simulate(m.model, data.current_a, &jacobian);
+  const auto nf = static_cast<Eigen::Index>(m.model.f.size());
+  // The free response is linear in its start; behind the curve it is fitted where the curve is straight: measured voltages are taken back
+  // through it by its own slope, a few times.
+  Eigen::VectorXd initial = Eigen::VectorXd::Zero(nf);
+  const auto free = jacobian.rightCols(nf);
+  for (int pass = 0; pass < (m.curve.y_v.empty() ? 1 : 10); ++pass) {
+    const Eigen::VectorXd now = w + free * initial;
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(nf, nf);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(nf);
+    for (Eigen::Index k = 0; k < now.size(); ++k) {
+      const double measured_v = data.voltage_v[static_cast<std::size_t>(k)];
+      if (!std::isfinite(measured_v) || !std::isfinite(now[k])) continue;
+      constexpr double h = 1e-6;
+      const double slope = m.curve.y_v.empty() ? 1 : (through(m.curve, now[k] + h) - through(m.curve, now[k] - h)) / (2 * h);
+      const Eigen::VectorXd row = slope * free.row(k).transpose();
+      normal += row * row.transpose();
+      right += row * (measured_v - through(m.curve, now[k]));
+    }
+    initial += normal.completeOrthogonalDecomposition().solve(right);
+  }
+  m.model.initial_v.assign(initial.data(), initial.data() + nf);
+  return fit_of(data.voltage_v, simulated(m, data), data.current_a, fading);
+}
+
+}  // namespace bms::identification
