@@ -9,6 +9,7 @@
 #include "host_sim/bad_input.hpp"
 #include "host_sim/experiment.hpp"
 #include "host_sim/json_results.hpp"
+#include "host_sim/report_page.hpp"
 
 namespace bms {
 
@@ -37,6 +38,14 @@ int run(const ExperimentCommandOptions& options) {
   }
   put(options.out, csv);
   if (!options.output.json.empty()) put(options.output.json, json_of(result));
+  if (!options.output.report.empty()) {
+    PageChart current{"Current, charging up", {"A"}, {}, {{}}};
+    for (const ProfileRow& row : *rows) {
+      current.time_s.push_back(row.time_s);
+      current.columns[0].push_back(row.current_a);
+    }
+    put(options.output.report, page_of({"Experiment " + options.name, "", {}, {}, {current}}));
+  }
   if (options.out != "-") {
     tell(options.output, fmt::format("{} rows in {}: {:.2f} h, {:.2f} Ah charged, {:.2f} Ah discharged, {:.2f} A at most.", result.samples, options.out,
                                      result.duration_s / 3'600, result.charged_ah, result.discharged_ah, result.largest_current_a));

@@ -14,6 +14,7 @@
 #include "host_sim/identification_data.hpp"
 #include "host_sim/json_results.hpp"
 #include "host_sim/recording.hpp"
+#include "host_sim/report_page.hpp"
 #include "identification/identify.hpp"
 #include "identification/linear_models.hpp"
 #include "identification/ocv_curve.hpp"
@@ -141,11 +142,49 @@ void add_warnings(IdentifyResult& result) {
   for (const std::string& w : result.identification.warnings) result.warnings.push_back({w.substr(0, w.find(':')), warning_text(w)});
 }
 
-void finish(const IdentifyOptions& options, std::chrono::steady_clock::time_point begin, IdentifyResult& result) {
+/// Parameters, figures, and how the first recording and the validations are followed.
+std::string page_of_identification(const IdentifyResult& r, const std::vector<id::Data>& recordings) {
+  const id::Identification& found = r.identification;
+  PageContent content{"Identification by " + r.model + " and " + r.optimizer,
+                      fmt::format("{} samples, {:.2f} mV RMS open loop, fit {:.1f} %. {}", found.estimation.samples, 1e3 * found.estimation.rmse_v, found.estimation.fit_percent, found.optimum.reason),
+                      {}, {}, {}};
+  for (const Warning& w : r.warnings) content.warnings.push_back(w.text);
+  const auto cell = [](const std::string& text) { return PageCell{text, {}, {}}; };
+  PageTable parameters{"parameters", "Parameters", {"name", "soc", "value", "standard deviation", "if residuals were white", "if the OCV were off by its tolerance", "remarks"}, {}, ""};
+  for (const id::Parameter& p : found.parameters) {
+    parameters.rows.push_back({cell(p.name), cell(fmt::format("{:.0f} %", 100 * p.soc)), cell(fmt::format("{:.5g}", p.value)), cell(fmt::format("{:.2g}", p.std)), cell(fmt::format("{:.2g}", p.std_white)),
+                               cell(fmt::format("{:.2g}", p.by_ocv_tolerance)), cell(!p.seen ? "not seen" : p.at_bound ? "at its bound" : "")});
+  }
+  PageTable fits{"fits", "How the voltage is followed, open loop", {"recording", "RMSE", "largest", "fit", "one step ahead", "bias and its band", "lags outside the white band"}, {}, ""};
+  const auto add_fit = [&](const std::string& name, const id::Fit& f) {
+    fits.rows.push_back({cell(name), cell(fmt::format("{:.2f} mV", 1e3 * f.rmse_v)), cell(fmt::format("{:.2f} mV", 1e3 * f.largest_v)), cell(fmt::format("{:.1f} %", f.fit_percent)),
+                         cell(fmt::format("{:.1f} %", f.one_step_fit_percent)), cell(fmt::format("{:.2f}, {:.2f} mV", 1e3 * f.residuals.mean_v, 1e3 * f.residuals.mean_band_v)),
+                         cell(fmt::format("{:.0f} % of itself, {:.0f} % with the current", 100 * f.residuals.autocorrelated, 100 * f.residuals.input_correlated))});
+  };
+  add_fit("identified from", found.estimation);
+  for (const auto& [path, fit] : r.validations) add_fit(path, fit);
+  content.tables = {std::move(parameters), std::move(fits)};
+  const auto add_charts = [&](const std::string& name, const id::Data& data, const id::Fit& f) {
+    PageChart voltage{name + ": voltage", {"measured, V", "simulated, V"}, data.time_s, {data.voltage_v, {}}}, error{name + ": measured less simulated, mV", {"mV"}, data.time_s, {{}}};
+    for (Eigen::Index k = 0; k < f.error_v.size(); ++k) {
+      voltage.columns[1].push_back(data.voltage_v[static_cast<std::size_t>(k)] - f.error_v[k]);
+      error.columns[0].push_back(1e3 * f.error_v[k]);
+    }
+    content.charts.push_back(std::move(voltage));
+    content.charts.push_back(std::move(error));
+  };
+  add_charts("Identified from", recordings.front(), found.estimation);
+  for (std::size_t k = 0; k < r.validations.size(); ++k) add_charts(r.validations[k].first, recordings[k + 1], r.validations[k].second);
+  return page_of(content);
+}
+
+/// recordings: the first that was identified from, then those that validate.
+void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordings, std::chrono::steady_clock::time_point begin, IdentifyResult& result) {
   for (const Warning& w : result.warnings) warn(w.text);
   result.out = options.out;
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (!options.output.json.empty()) put(options.output.json, json_of(result));
+  if (!options.output.report.empty()) put(options.output.report, page_of_identification(result, recordings));
   const id::Identification& found = result.identification;
   std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n", found.estimation.samples, 1e3 * found.estimation.rmse_v,
                                  found.estimation.fit_percent, found.estimation.one_step_fit_percent, found.optimum.reason);
@@ -171,9 +210,10 @@ int run_linear(const IdentifyOptions& options, id::Method method, CellFile cell,
   if (options.recordings.size() > 1) result.warnings.push_back({"first_recording_only", "a linear model is identified from one recording, the first was taken"});
   DataOptions data = given;
   data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
+  std::vector<id::Data> shown = {record.data};
   for (const std::string& path : options.validate) {
-    const Recording r = read_recording(path);
-    result.validations.push_back({path, id::validate(found.model, identification_data(r, data).record.data, found.identification.fading)});
+    shown.push_back(identification_data(read_recording(path), data).record.data);
+    result.validations.push_back({path, id::validate(found.model, shown.back(), found.identification.fading)});
   }
   if (!result.validations.empty()) result.validation = result.validations.front().second;
   const auto& p = result.identification.parameters;  // b1, R0, R1, C1
@@ -192,7 +232,7 @@ int run_linear(const IdentifyOptions& options, id::Method method, CellFile cell,
   } else {
     result.warnings.push_back({"no_cell_file", fmt::format("what was identified is no cell: '{}' is out of range, expected {}; there is no cell file", fault.key, fault.what)});
   }
-  finish(options, begin, result);
+  finish(options, shown, begin, result);
   return fault.what == nullptr ? 0 : 1;
 }
 
@@ -241,9 +281,11 @@ int run(const IdentifyOptions& options) {
   add_warnings(result);
 
   data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
+  std::vector<id::Data> shown = {records.front().data};
   for (const std::string& path : options.validate) {
-    const Recording r = read_recording(path);
-    result.validations.push_back({path, id::validate(result.identification.cell, identification_data(r, data).record, result.identification.fading)});
+    const id::Record record = identification_data(read_recording(path), data).record;
+    result.validations.push_back({path, id::validate(result.identification.cell, record, result.identification.fading)});
+    shown.push_back(record.data);
   }
   if (!result.validations.empty()) result.validation = result.validations.front().second;
 
@@ -267,7 +309,7 @@ int run(const IdentifyOptions& options) {
   put(options.out, cell_text(cell));
 
   result.cell = cell.name;
-  finish(options, begin, result);
+  finish(options, shown, begin, result);
   return 0;
 }
 

@@ -11,6 +11,7 @@
 #include "host_sim/gaussian_noise.hpp"
 #include "host_sim/json_results.hpp"
 #include "host_sim/recording.hpp"
+#include "host_sim/report_page.hpp"
 #include "host_sim/simulation.hpp"
 
 namespace bms {
@@ -48,6 +49,15 @@ int run(const SimulateOptions& options) {
   SimulateResult result{cell_file.name, input, options.out, rows.size(), recording.duration_s(), options.initial_soc, rows.back().soc, rows.back().voltage_v,
                         static_cast<double>(rows.size()) / seconds, recording.warnings};
   if (!options.output.json.empty()) put(options.output.json, json_of(result));
+  if (!options.output.report.empty()) {
+    PageChart voltage{"Voltage, open loop", {"simulated, V"}, recording.time_s, {{}}}, current{"Current, charging up", {"A"}, recording.time_s, {recording.current_a}}, soc{"State of charge", {"%"}, recording.time_s, {{}}};
+    if (!recording.voltage_v.empty()) voltage.labels.push_back("measured, V"), voltage.columns.push_back(recording.voltage_v);
+    for (const SimulatedRow& row : rows) {
+      voltage.columns[0].push_back(row.voltage_v);
+      soc.columns[0].push_back(100 * row.soc);
+    }
+    put(options.output.report, page_of({"Simulation of " + input, "Cell " + cell_file.name + ", open loop.", {}, {}, {voltage, current, soc}}));
+  }
   if (options.out != "-") {
     tell(options.output, fmt::format("{} rows in {}: from {:.1f} % to {:.1f} % in {:.2f} h.", rows.size(), options.out, 100 * options.initial_soc,
                                      100 * rows.back().soc, recording.duration_s() / 3600));

@@ -28,7 +28,7 @@ std::string field(const std::string& text) {
 }
 
 /// Numbers where there are numbers; the paper's in columns of their own.
-std::string csv_of(const StudyTable& table) {
+std::string csv_of(const PageTable& table) {
   std::vector<bool> beside(table.head.size(), false);
   for (const auto& row : table.rows) {
     for (std::size_t k = 0; k < row.size(); ++k) beside[k] = beside[k] || row[k].paper;
@@ -47,6 +47,16 @@ std::string csv_of(const StudyTable& table) {
     csv += "\n";
   }
   return csv;
+}
+
+std::string page_of_study(const StudyResult& r) {
+  PageContent content{"Models, optimisers and experiments", fmt::format("{} identifications of {}.", r.fits, r.source), {}, {}, r.charts};
+  for (const Warning& w : r.warnings) content.warnings.push_back(w.text);
+  PageTable claims{"claims", "What the paper says, and whether it holds here", {"statement", "holds", "evidence"}, {}, ""};
+  for (const StudyClaim& c : r.claims) claims.rows.push_back({{c.claim, {}, {}}, {c.holds ? "yes" : "no", {}, {}}, {c.evidence, {}, {}}});
+  content.tables.push_back(std::move(claims));
+  content.tables.insert(content.tables.end(), r.tables.begin(), r.tables.end());
+  return page_of(content);
 }
 
 StudyProgress progress_on_terminal() {
@@ -79,8 +89,8 @@ int run(const StudyOptions& options) {
     result = study_recordings(cell.parameters, paths, progress_on_terminal());
   }
   const std::filesystem::path folder = options.out;
-  for (const StudyTable& table : result.tables) put((folder / (table.id + ".csv")).string(), csv_of(table));
-  const std::string json = json_of(result), page = study_report(result);
+  for (const PageTable& table : result.tables) put((folder / (table.id + ".csv")).string(), csv_of(table));
+  const std::string json = json_of(result), page = page_of_study(result);
   put((folder / "study.json").string(), json);
   put((folder / "study.html").string(), page);
   if (!options.output.json.empty()) put(options.output.json, json);

@@ -148,11 +148,11 @@ std::string json_of(const StudyResult& r) {
   json["command"] = "study";
   json["source"] = r.source;
   json["tables"] = Json::array();
-  for (const StudyTable& t : r.tables) {
+  for (const PageTable& t : r.tables) {
     Json rows = Json::array();
     for (const auto& row : t.rows) {
       Json cells = Json::array();
-      for (const StudyCell& c : row) {
+      for (const PageCell& c : row) {
         Json cell = {{"text", c.text}};
         if (c.value) cell["value"] = *c.value;
         if (c.paper) cell["paper"] = *c.paper;

@@ -31,9 +31,9 @@ struct Within : CLI::Validator {
 
 const CLI::Validator not_empty([](std::string& name) { return name.empty() ? std::string("an empty name, expected a file") : std::string(); }, "FILE");
 
-void add_output(CLI::App& command, bms::Output& output, bool report) {
+void add_output(CLI::App& command, bms::Output& output) {
   command.add_option("--json", output.json, "write the result as one JSON object to FILE, '-' for standard output")->check(not_empty)->type_name("FILE");
-  if (report) command.add_option("--report", output.report, "write a page with plots to FILE.html")->check(not_empty)->type_name("FILE");
+  command.add_option("--report", output.report, "write a page with plots to FILE.html")->check(not_empty)->type_name("FILE");
   command.add_flag("--quiet", output.quiet, "no summary");
 }
 
@@ -50,7 +50,7 @@ void add_replay(CLI::App& app, bms::ReplayOptions& o) {
   c.add_flag("--verify", o.verify, "run host and board and compare every estimate bit by bit; exit 1 where they differ");
   c.add_option("--board-cell", o.board_cell, "cell file for the board's firmware when it is not the host's: shows what --verify finds")->type_name("CELL");
   c.add_option("--trace", o.trace, "write every estimate to a CSV file")->type_name("FILE");
-  add_output(c, o.output, true);
+  add_output(c, o.output);
 }
 
 void add_simulate(CLI::App& app, bms::SimulateOptions& o) {
@@ -64,7 +64,7 @@ void add_simulate(CLI::App& app, bms::SimulateOptions& o) {
   c.add_option("--noise-a", o.noise_a, "standard deviation of noise added to the current that is written")->check(Within(0.0, 1e6));
   c.add_option("--seed", o.seed, "of the noise")->capture_default_str();
   c.add_option("--out", o.out, "CSV file to write: time_s, current_a, voltage_v, soc")->required()->type_name("FILE");
-  add_output(c, o.output, false);
+  add_output(c, o.output);
 }
 
 void add_experiment(CLI::App& app, bms::ExperimentCommandOptions& o) {
@@ -77,7 +77,7 @@ void add_experiment(CLI::App& app, bms::ExperimentCommandOptions& o) {
   c.add_option("--step-s", o.step_s, "sampling interval")->check(Within(0.001, 60.0))->capture_default_str();
   c.add_option("--seed", o.seed, "of what is random in it")->capture_default_str();
   c.add_option("--out", o.out, "CSV file to write: time_s, current_a")->required()->type_name("FILE");
-  add_output(c, o.output, false);
+  add_output(c, o.output);
 }
 
 void add_identify(CLI::App& app, bms::IdentifyOptions& o) {
@@ -100,7 +100,7 @@ void add_identify(CLI::App& app, bms::IdentifyOptions& o) {
   c.add_option("--capacity-ah", o.capacity_ah, "capacity; of the OCV recordings if not given")->check(Within(0.01, 1000.0));
   c.add_option("--name", o.name, "of the cell; that of the file if not given");
   c.add_option("--out", o.out, "cell file to write")->required()->type_name("C.toml");
-  add_output(c, o.output, false);
+  add_output(c, o.output);
 }
 
 void add_study(CLI::App& app, bms::StudyOptions& o) {
@@ -110,7 +110,7 @@ void add_study(CLI::App& app, bms::StudyOptions& o) {
   c.add_option("--cell", o.cell, "OCV, capacity and start values: cell file, or the name of a built-in cell: " + bms::cell_names())->capture_default_str();
   c.add_option("--seed", o.seed, "of the plant's noise")->capture_default_str();
   c.add_option("--out", o.out, "folder to write tables (CSV, JSON) and the page to")->required()->type_name("DIR");
-  add_output(c, o.output, true);
+  add_output(c, o.output);
 }
 
 /// own_file: what the command writes beside JSON and report.

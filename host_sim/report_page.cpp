@@ -154,11 +154,11 @@ std::string page(std::string_view html, std::string_view script, std::string_vie
   });
 }
 
-json table_of(const StudyTable& t) {
+json table_of(const PageTable& t) {
   json rows = json::array();
   for (const auto& row : t.rows) {
     json cells = json::array();
-    for (const StudyCell& c : row) {
+    for (const PageCell& c : row) {
       json cell = {{"text", c.text}};
       if (c.paper) cell["paper"] = fmt::format("{:g}", *c.paper);
       cells.push_back(std::move(cell));
@@ -168,7 +168,7 @@ json table_of(const StudyTable& t) {
   return {{"title", t.title}, {"note", t.note}, {"table", {{"head", t.head}, {"rows", std::move(rows)}}}};
 }
 
-json chart_of(const StudyChart& c) {
+json chart_of(const PageChart& c) {
   json rows = json::array();
   const std::size_t every = std::max<std::size_t>(1, c.time_s.size() / 8'000);
   for (std::size_t k = 0; k < c.time_s.size(); k += every) {
@@ -183,15 +183,11 @@ json chart_of(const StudyChart& c) {
 
 std::string replay_report(const ReplayResult& r) { return page(embedded::replay_html, embedded::replay_js, "bms replay", data(r)); }
 
-std::string study_report(const StudyResult& r) {
-  json content = {{"title", "Models, optimisers and experiments"}, {"statement", fmt::format("{} identifications of {}.", r.fits, r.source)}, {"warnings", json::array()}, {"sections", json::array()}};
-  for (const Warning& w : r.warnings) content["warnings"].push_back(w.text);
-  StudyTable claims{"claims", "What the paper says, and whether it holds here", {"statement", "holds", "evidence"}, {}, ""};
-  for (const StudyClaim& c : r.claims) claims.rows.push_back({{c.claim, {}, {}}, {c.holds ? "yes" : "no", {}, {}}, {c.evidence, {}, {}}});
-  content["sections"].push_back(table_of(claims));
-  for (const StudyTable& t : r.tables) content["sections"].push_back(table_of(t));
-  for (const StudyChart& c : r.charts) content["sections"].push_back(chart_of(c));
-  return page(embedded::study_html, embedded::study_js, "bms study", in_script(content));
+std::string page_of(const PageContent& p) {
+  json content = {{"title", p.title}, {"statement", p.statement}, {"warnings", p.warnings}, {"sections", json::array()}};
+  for (const PageTable& t : p.tables) content["sections"].push_back(table_of(t));
+  for (const PageChart& c : p.charts) content["sections"].push_back(chart_of(c));
+  return page(embedded::study_html, embedded::study_js, p.title, in_script(content));
 }
 
 }  // namespace bms

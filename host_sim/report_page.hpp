@@ -3,13 +3,14 @@
 
 #include <string>
 
+#include "host_sim/page_content.hpp"
 #include "host_sim/replay.hpp"
-#include "host_sim/study.hpp"
 
 namespace bms {
 
 std::string replay_report(const ReplayResult& result);
-std::string study_report(const StudyResult& result);
+/// Tables and charts one below the other.
+std::string page_of(const PageContent& content);
 
 /// One sentence for a person: where the state of charge ended, and how far it can be trusted.
 std::string statement(const ReplayResult& result);

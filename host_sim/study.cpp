@@ -56,10 +56,10 @@ constexpr double table9[10][3] = {{0.0140197, 0.027101, 420.558}, {0.013602, 0.0
                                   {0.013237, 0.00825815, 1399.3}, {0.0131549, 0.00771709, 1473.69}, {0.0131347, 0.00740307, 1526.64}, {0.0132971, 0.00777491, 1509.14},
                                   {0.0135692, 0.00822862, 1445.43}, {0.0153566, 0.0072376, 1927.32}};
 
-StudyCell label(std::string text) { return {std::move(text), std::nullopt, std::nullopt}; }
-StudyCell percent(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.2f} %", value), value, paper}; }
-StudyCell number(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.5g}", value), value, paper}; }
-StudyCell failed(const std::string& why, std::optional<double> paper = std::nullopt) { return {why, std::nullopt, paper}; }
+PageCell label(std::string text) { return {std::move(text), std::nullopt, std::nullopt}; }
+PageCell percent(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.2f} %", value), value, paper}; }
+PageCell number(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.5g}", value), value, paper}; }
+PageCell failed(const std::string& why, std::optional<double> paper = std::nullopt) { return {why, std::nullopt, paper}; }
 
 /// What one model and one optimiser came to.
 struct Outcome {
@@ -150,11 +150,11 @@ class Study {
 
 /// Tables 4 to 6 of an estimation and a validation record, and the figures to them.
 void compare_models(Study& study, const Part& estimation, const Part& validation, bool beside_paper, StudyResult& result) {
-  StudyTable fits{"table4", fmt::format("Fit to the estimation data ({}), open loop", estimation.name), {"optimiser", model_names[0], model_names[1], model_names[2], model_names[3]}, {}, ""};
+  PageTable fits{"table4", fmt::format("Fit to the estimation data ({}), open loop", estimation.name), {"optimiser", model_names[0], model_names[1], model_names[2], model_names[3]}, {}, ""};
   std::array<Outcome, 4> best;
   std::array<Outcome, 4> steepest;
   for (std::size_t m = 0; m < methods.size(); ++m) {
-    std::vector<StudyCell> row = {label(method_names[m])};
+    std::vector<PageCell> row = {label(method_names[m])};
     for (std::size_t k = 0; k < 4; ++k) {
       Outcome out = k < 3 ? study.linear(linear_kinds[k], estimation, methods[m], validation) : study.grey_box(estimation, methods[m], &validation);
       const auto paper = beside_paper ? std::optional(table4[m][k]) : std::nullopt;
@@ -172,9 +172,9 @@ void compare_models(Study& study, const Part& estimation, const Part& validation
   fits.note = "The optimisers start from values that need no search: Appendix A's reading of the rests for the grey box, equation error refined by Steiglitz and McBride "
               "for the linear models. That is why the Gauss-Newton methods do better here than in the paper, and why steepest descent does not end far below zero: it stays near where it began.";
 
-  StudyTable both{"table5", fmt::format("Fit of each model with its best optimiser: estimation and validation ({})", validation.name),
+  PageTable both{"table5", fmt::format("Fit of each model with its best optimiser: estimation and validation ({})", validation.name),
                   {"model", "estimation", "validation", "estimation RMSE", "validation RMSE", "one step ahead, validation", "bias on validation"}, {}, ""};
-  StudyTable circuits{"table6", "Parameters of each model", {"model", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "remarks"}, {}, ""};
+  PageTable circuits{"table6", "Parameters of each model", {"model", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "remarks"}, {}, ""};
   for (std::size_t k = 0; k < 4; ++k) {
     const auto paper = [&](double value) { return beside_paper ? std::optional(value) : std::nullopt; };
     const Outcome& o = best[k];
@@ -188,7 +188,7 @@ void compare_models(Study& study, const Part& estimation, const Part& validation
                          label(fmt::format("{:.2f} mV, band {:.2f} mV", 1e3 * r.mean_v, 1e3 * r.mean_band_v))});
     both.rows.back()[3].text += " mV";
     both.rows.back()[4].text += " mV";
-    std::vector<StudyCell> row = {label(model_names[k])};
+    std::vector<PageCell> row = {label(model_names[k])};
     int column = 0;
     for (const char* name : {"r0_ohm", "r1_ohm", "c1_f"}) {
       const auto p = std::find_if(o.parameters.begin(), o.parameters.end(), [&](const id::Parameter& q) { return q.name == name; });
@@ -220,9 +220,9 @@ void compare_models(Study& study, const Part& estimation, const Part& validation
   // Fig. 5 to 8
   for (const auto& [part, of, title] : {std::tuple{&estimation, &Outcome::estimation, "Estimation data: error of each model (measured less simulated, mV)"},
                                         std::tuple{&validation, &Outcome::validation, "Validation data: error of each model (measured less simulated, mV)"}}) {
-    StudyChart voltage{fmt::format("{}: current and voltage", part->name), {"voltage, V", "current / 10, A"}, part->data.time_s, {part->data.voltage_v, {}}};
+    PageChart voltage{fmt::format("{}: current and voltage", part->name), {"voltage, V", "current / 10, A"}, part->data.time_s, {part->data.voltage_v, {}}};
     for (const double i : part->data.current_a) voltage.columns[1].push_back(i / 10);
-    StudyChart error{title, {}, part->data.time_s, {}};
+    PageChart error{title, {}, part->data.time_s, {}};
     for (std::size_t k = 0; k < 4; ++k) {
       if (!best[k].usable) continue;
       const Eigen::VectorXd& e = (best[k].*of).error_v;
@@ -237,15 +237,15 @@ void compare_models(Study& study, const Part& estimation, const Part& validation
 
 /// Tables 7 and 8: each part identified, each judged by all.
 void cross(Study& study, const std::vector<Part>& parts, bool beside_paper, StudyResult& result) {
-  StudyTable matrix{"table7", "Grey box identified from the row, judged by the column: fit", {"identified from"}, {}, ""};
-  StudyTable spread{"table8", "Standard deviation of the parameters, and what is left over", {"identified from", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "output variance [V]", "if residuals were white: C1 [F]"}, {}, ""};
+  PageTable matrix{"table7", "Grey box identified from the row, judged by the column: fit", {"identified from"}, {}, ""};
+  PageTable spread{"table8", "Standard deviation of the parameters, and what is left over", {"identified from", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "output variance [V]", "if residuals were white: C1 [F]"}, {}, ""};
   for (const Part& p : parts) matrix.head.push_back(p.name);
   matrix.head.push_back("mean of the others, RMSE");
   std::vector<double> others_v;
   std::size_t c1_largest = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const id::Identification found = study.identified(parts[i], id::Method::trust_region_reflective);
-    std::vector<StudyCell> row = {label(parts[i].name)};
+    std::vector<PageCell> row = {label(parts[i].name)};
     double sum_v = 0;
     for (std::size_t j = 0; j < parts.size(); ++j) {
       const id::Fit fit = i == j ? found.estimation : study.validated(found.cell, parts[j], found.fading);
@@ -255,7 +255,7 @@ void cross(Study& study, const std::vector<Part>& parts, bool beside_paper, Stud
     others_v.push_back(sum_v);
     row.push_back({fmt::format("{:.2f} mV", 1e3 * sum_v), sum_v, std::nullopt});
     matrix.rows.push_back(std::move(row));
-    std::vector<StudyCell> deviations = {label(parts[i].name)};
+    std::vector<PageCell> deviations = {label(parts[i].name)};
     double relative[3] = {};
     for (std::size_t k = 0; k < 3; ++k) {
       const id::Parameter& p = found.parameters[k];
@@ -283,11 +283,11 @@ void cross(Study& study, const std::vector<Part>& parts, bool beside_paper, Stud
 }
 
 /// What filtering the current does to the parameters (3.1): the same record, not filtered and filtered.
-StudyTable filters(Study& study, const Part& part) {
-  StudyTable table{"filter", fmt::format("The current's filter and the parameters ({}, grey box)", part.name), {"filter", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "RMSE"}, {}, ""};
+PageTable filters(Study& study, const Part& part) {
+  PageTable table{"filter", fmt::format("The current's filter and the parameters ({}, grey box)", part.name), {"filter", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "RMSE"}, {}, ""};
   const auto add = [&](const std::string& name, const Part& filtered) {
     const id::Identification found = study.identified(filtered, id::Method::trust_region_reflective);
-    std::vector<StudyCell> row = {label(name)};
+    std::vector<PageCell> row = {label(name)};
     for (std::size_t k = 0; k < 3; ++k) {
       row.push_back(number(found.parameters[k].value));
       row.back().text += fmt::format(" +- {:.2g}", found.parameters[k].std);
@@ -372,13 +372,13 @@ StudyResult study_plant(const model::CellParameters<>& cell, std::uint64_t seed,
   cross(study, parts, true, result);
   result.tables.push_back(filters(study, parts[3]));
 
-  StudyTable all_soc{"table9", "Grey box from 1 min HIGH, 30 s LOW at ten states of charge", {"soc", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "RMSE"}, {}, ""};
+  PageTable all_soc{"table9", "Grey box from 1 min HIGH, 30 s LOW at ten states of charge", {"soc", "R0 [ohm]", "R1 [ohm]", "C1 [F]", "RMSE"}, {}, ""};
   double worst_r0 = 0, worst_rc = 0;
   for (int tenth = 1; tenth <= 10; ++tenth) {
     // the pulses go down from where they start
     const Part part = measured("high_1m_low_30s", std::min(1.0, tenth / 10.0 + 0.01), ++seed);
     const id::Identification found = study.identified(part, id::Method::trust_region_reflective);
-    std::vector<StudyCell> row = {label(fmt::format("{} %", 10 * tenth))};
+    std::vector<PageCell> row = {label(fmt::format("{} %", 10 * tenth))};
     for (std::size_t k = 0; k < 3; ++k) {
       const id::Parameter& p = found.parameters[k];
       const double paper = table9[tenth - 1][k];
@@ -389,8 +389,8 @@ StudyResult study_plant(const model::CellParameters<>& cell, std::uint64_t seed,
     row.push_back({fmt::format("{:.2f} mV", 1e3 * found.estimation.rmse_v), found.estimation.rmse_v, std::nullopt});
     all_soc.rows.push_back(std::move(row));
     if (tenth == 4) {
-      StudyChart best{"1 min HIGH, 30 s LOW at 40 %: measured and simulated (Fig. 12)", {"measured, V", "simulated, V"}, part.data.time_s, {part.data.voltage_v, {}}};
-      StudyChart error{"Its error (Fig. 13) and that one step ahead (Fig. 14), mV", {"simulated", "one step ahead"}, part.data.time_s, {{}, {nothing}}};
+      PageChart best{"1 min HIGH, 30 s LOW at 40 %: measured and simulated (Fig. 12)", {"measured, V", "simulated, V"}, part.data.time_s, {part.data.voltage_v, {}}};
+      PageChart error{"Its error (Fig. 13) and that one step ahead (Fig. 14), mV", {"simulated", "one step ahead"}, part.data.time_s, {{}, {nothing}}};
       const Eigen::VectorXd& e = found.estimation.error_v;
       for (Eigen::Index k = 0; k < e.size(); ++k) {
         best.columns[1].push_back(part.data.voltage_v[static_cast<std::size_t>(k)] - e[k]);

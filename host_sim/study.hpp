@@ -9,25 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "host_sim/page_content.hpp"
 #include "host_sim/recording.hpp"
 #include "identification/data.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms {
-
-/// One number of a table, and the paper's in its place.
-struct StudyCell {
-  std::string text;                  ///< what stands there; a number with its digits
-  std::optional<double> value, paper;
-};
-
-struct StudyTable {
-  std::string id;                    ///< "table4"
-  std::string title;
-  std::vector<std::string> head;
-  std::vector<std::vector<StudyCell>> rows;  ///< the first cell names the row
-  std::string note;                  ///< where it differs from the paper, and why
-};
 
 /// A statement of the paper and whether it holds here.
 struct StudyClaim {
@@ -35,18 +22,11 @@ struct StudyClaim {
   bool holds = false;
 };
 
-struct StudyChart {
-  std::string title;
-  std::vector<std::string> labels;   ///< of the columns after time
-  std::vector<double> time_s;
-  std::vector<std::vector<double>> columns;  ///< NaN: nothing there
-};
-
 struct StudyResult {
   std::string source;                ///< what was studied
-  std::vector<StudyTable> tables;
+  std::vector<PageTable> tables;
   std::vector<StudyClaim> claims;
-  std::vector<StudyChart> charts;
+  std::vector<PageChart> charts;
   std::vector<Warning> warnings;
   std::size_t fits = 0;              ///< identifications done
   double seconds = 0;

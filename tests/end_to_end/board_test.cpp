@@ -38,6 +38,15 @@ TEST(Board, ComputesARealRecordingBitForBitLikeTheHost) {
   }
 }
 
+TEST(Board, AnIdentifiedCellGoesThroughTheGeneratorAndComputesTheSameBits) {
+  const TemporaryFolder folder;
+  const std::string cell = (folder.path() / "identified.toml").string();
+  ASSERT_EQ(run_tool("identify --recording " + shift + " --out " + cell).exit_code, 0);
+  const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("every bit equal"));
+}
+
 /// table9 with R0 at 90 % one float step larger: 0.0135692 is 0x3c5e5128 as a float.
 TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
   const TemporaryFolder folder;

@@ -57,5 +57,16 @@ TEST(ReportPage, WithoutAReferenceThereIsNoErrorChart) {
   EXPECT_GE(count(dom, "<canvas"), 8U);
 }
 
+TEST(StudyPage, DrawsTablesAndChartsWithoutAnError) {
+  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_tool("study --out " + (folder.path() / "study").string()).exit_code, 0);
+  const std::string dom = document_of(folder.path() / "study/study.html", folder.path());
+  EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
+  EXPECT_EQ(count(dom, "<table"), 8U);  // statements, tables 4 to 9, filters
+  EXPECT_GE(count(dom, "<canvas"), 12U);
+  EXPECT_THAT(dom, HasSubstr("paper 93.09"));
+}
+
 }  // namespace
 }  // namespace bms

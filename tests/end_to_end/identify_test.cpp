@@ -1,0 +1,149 @@
+// bms identify and bms study from the outside: contract, real cells, bad data.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+
+const std::filesystem::path data = BMS_DATA_DIR;
+const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
+
+class IdentifyTool : public ::testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  std::string real(const std::string& name) const { return (data / "a123_26650" / name).string(); }
+  json result(const std::string& arguments) const {
+    const ToolRun run = run_tool("identify " + arguments + " --out " + path("cell.toml") + " --json " + path("r.json"));
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return run.exit_code == 0 ? json::parse(content(path("r.json"))) : json();
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(IdentifyTool, GivesWhatTheContractNames) {
+  const json r = result("--recording " + shift + " --validate " + shift + " --validate-window 0.6:0.3");
+  for (const char* key : {"command", "model", "optimizer", "samples", "parameters", "estimation", "validation", "initial_state", "iterations", "evaluations", "converged", "reason", "wall_s", "warnings"}) {
+    EXPECT_TRUE(r.contains(key)) << key;
+  }
+  for (const char* key : {"name", "soc", "value", "std", "at_bound"}) EXPECT_TRUE(r["parameters"][0].contains(key)) << key;
+  for (const char* key : {"fit_percent", "rmse_v", "one_step_fit_percent", "output_variance_v2"}) EXPECT_TRUE(r["estimation"].contains(key)) << key;
+  for (const char* key : {"soc", "soc_std", "v_rc_v", "observable"}) EXPECT_TRUE(r["initial_state"].contains(key)) << key;
+  EXPECT_EQ(r["command"], "identify");
+  EXPECT_EQ(r["samples"], 28801);
+  EXPECT_LT(r["estimation"]["rmse_v"], 0.0014);
+  EXPECT_GT(r["validation"]["fit_percent"], 90);
+  EXPECT_TRUE(r["converged"]);
+}
+
+TEST_F(IdentifyTool, TheSameInputGivesTheSameCellFile) {
+  run_tool("identify --recording " + shift + " --window 0.6:0.4 --out " + path("a.toml") + " --name x");
+  run_tool("identify --recording " + shift + " --window 0.6:0.4 --out " + path("b.toml") + " --name x");
+  EXPECT_GT(content(path("a.toml")).size(), 1'000U);
+  EXPECT_EQ(content(path("a.toml")), content(path("b.toml")));
+}
+
+TEST_F(IdentifyTool, EveryModelAndEveryOptimiserRuns) {
+  ASSERT_EQ(run_tool("experiment ocv_10min_rest --out " + path("p.csv")).exit_code, 0);
+  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 1 --noise-v 0.001 --out " + path("s.csv")).exit_code, 0);
+  for (const char* model : {"tf", "oe", "hw", "nlgr"}) {
+    for (const char* optimizer : {"gn", "agn", "lm", "sd", "nls"}) {
+      const ToolRun run = run_tool("identify --recording " + path("s.csv") + " --initial-soc 1 --window 0.8:0.5 --nodes 0.65 --model " + model + " --optimizer " + optimizer + " --out " + path("c.toml") +
+                                   " --json " + path("r.json"));
+      ASSERT_LE(run.exit_code, 1) << model << " " << optimizer << ": " << run.err;  // 1: no circuit
+      const json r = json::parse(content(path("r.json")));
+      EXPECT_EQ(r["model"], model);
+      EXPECT_EQ(r["optimizer"], optimizer);
+      if (std::string(model) == "nlgr" && std::string(optimizer) != "sd") {
+        EXPECT_GT(r["estimation"]["fit_percent"], 97) << optimizer;
+      }
+    }
+  }
+}
+
+TEST_F(IdentifyTool, BadDataIsRefusedInOneLineThatNamesIt) {
+  std::ofstream(path("rest.csv")) << [] {
+    std::string t = "time_s,current_a,voltage_v\n";
+    for (int k = 0; k < 600; ++k) t += std::to_string(k) + ",0,3.3\n";
+    return t;
+  }();
+  const auto refused = [&](const std::string& arguments, const std::string& what) {
+    const ToolRun run = run_tool("identify " + arguments + " --out " + path("none.toml"));
+    EXPECT_EQ(run.exit_code, 2) << arguments;
+    EXPECT_THAT(run.err, HasSubstr(what)) << arguments;
+    EXPECT_FALSE(std::filesystem::exists(path("none.toml"))) << arguments;
+  };
+  refused("--recording " + path("rest.csv"), "r0_ohm, r1_ohm and c1_f cannot be seen, expected current pulses");
+  refused("--recording " + shift + " --window 0.1:0.05", "0 samples in the window of 0.1 to 0.05");
+  refused("--recording " + shift + " --window 0.1", "expected HI:LO");
+  refused("--recording " + shift + " --window 0.2:0.8", "expected HI:LO");
+  refused("--recording " + shift + " --initial-soc 40", "expected a number from 0 to 1 or 'estimate'");
+  refused("--recording " + shift + " --optimizer simplex", "expected one of: gn, agn, lm, sd, nls");
+  refused("--recording " + shift + " --ocv " + shift, "both charges and discharges");
+  refused("--recording " + shift + " --model linear", "--model");
+}
+
+TEST_F(IdentifyTool, AnInvertedCurrentIsWarnedOf) {
+  std::istringstream lines(content(shift));
+  std::ofstream out(path("inverted.csv"));
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t first = line.find(','), second = line.find(',', first + 1);
+    if (line.starts_with("#") || line.starts_with("time_s")) out << line << "\n";
+    else out << line.substr(0, first + 1) << -std::stod(line.substr(first + 1, second - first - 1)) << line.substr(second) << "\n";
+  }
+  out.close();
+  const ToolRun run = run_tool("identify --recording " + path("inverted.csv") + " --window 0.6:0.5 --out " + path("c.toml"));
+  EXPECT_THAT(run.err, HasSubstr("the current's sign looks inverted"));
+  EXPECT_THAT(run.err, HasSubstr("ended at its bound"));
+}
+
+TEST_F(IdentifyTool, ARealCellIsPredictedOnRecordingsItWasNotIdentifiedFrom) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
+  const std::string common = "--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") + " --start a123_26650 --window 0.95:0.10 --recording ";
+  const json from_udds = result(common + real("udds_P25_A002.csv") + " --validate " + real("dyn20_P25_A002.csv"));
+  EXPECT_LE(from_udds["validation"]["rmse_v"], 0.008);
+  const json from_others = result(common + real("cccv2C_P25_A002.csv") + " " + real("dyn20_P25_A002.csv") + " --validate " + real("udds_P25_A002.csv"));
+  EXPECT_LE(from_others["validation"]["rmse_v"], 0.018);
+  EXPECT_NEAR(from_udds["coulombic_efficiency"], 0.998, 0.003);
+}
+
+TEST_F(IdentifyTool, StudyWritesTablesAndAPageAndFindsTheOrderOfThePaper) {
+  const ToolRun run = run_tool("study --out " + path("study") + " --json " + path("study.json"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  for (const char* table : {"table4", "table5", "table6", "table7", "table8", "table9", "filter"}) {
+    EXPECT_GT(content(path("study") + "/" + table + ".csv").size(), 200U) << table;
+  }
+  EXPECT_GT(content(path("study") + "/study.html").size(), 100'000U);
+  const json r = json::parse(content(path("study.json")));
+  EXPECT_EQ(r["identifications"], 42);
+  int hold = 0;
+  for (const json& claim : r["claims"]) hold += claim["holds"].get<bool>() ? 1 : 0;
+  EXPECT_GE(hold, 6);
+  for (const json& claim : r["claims"]) {
+    if (claim["claim"] == "The grey box is the best model on validation data" || claim["claim"] == "The identified parameters are the plant's") {
+      EXPECT_TRUE(claim["holds"]) << claim["evidence"];
+    }
+  }
+}
+
+TEST_F(IdentifyTool, StudyTakesAFolderOfRecordings) {
+  for (const char* name : {"rest_5s", "high_1m_low_30s"}) {
+    ASSERT_EQ(run_tool(std::string("experiment ") + name + " --out " + path("p.csv")).exit_code, 0);
+    std::filesystem::create_directories(path("in"));
+    ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.4 --noise-v 0.001 --out " + path("in") + "/" + name + ".csv").exit_code, 0);
+  }
+  const ToolRun run = run_tool("study --recordings " + path("in") + " --out " + path("out"));
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(content(path("out") + "/table7.csv"), HasSubstr("high_1m_low_30s,rest_5s"));
+  EXPECT_EQ(run_tool("study --recordings " + path("nowhere") + " --out " + path("out")).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace bms
