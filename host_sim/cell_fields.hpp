@@ -5,6 +5,18 @@
 
 namespace bms {
 
+/// Keys of an RC table: of [rc] and of each [[at_temperature]].
+template <class Visitor, class Table>
+void visit_rc(Visitor& visitor, Table& rc) {
+  visitor.column("soc", rc.soc);
+  visitor.column("r0_ohm", rc.r0_ohm);
+  visitor.column("r1_ohm", rc.r1_ohm);
+  visitor.column("c1_f", rc.c1_f);
+  visitor.optional_column("r0_std_ohm", rc.r0_std_ohm);
+  visitor.optional_column("r1_std_ohm", rc.r1_std_ohm);
+  visitor.optional_column("c1_std_f", rc.c1_std_f);
+}
+
 /// visitor.number(key, double&), .column(key, Column&), .optional_column(key, Column&), and .table(key) before a table's own keys.
 template <class Visitor, class Parameters>
 void visit_cell(Visitor& visitor, Parameters& p) {
@@ -26,13 +38,7 @@ void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.optional_number("lean", p.ocv.lean);
 
   visitor.table("rc");
-  visitor.column("soc", p.rc.soc);
-  visitor.column("r0_ohm", p.rc.r0_ohm);
-  visitor.column("r1_ohm", p.rc.r1_ohm);
-  visitor.column("c1_f", p.rc.c1_f);
-  visitor.optional_column("r0_std_ohm", p.rc.r0_std_ohm);
-  visitor.optional_column("r1_std_ohm", p.rc.r1_std_ohm);
-  visitor.optional_column("c1_std_f", p.rc.c1_std_f);
+  visit_rc(visitor, p.rc);
 
   visitor.table("noise");
   visitor.number("voltage_v", p.noise.voltage_v);

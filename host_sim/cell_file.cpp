@@ -47,6 +47,17 @@ class Table {
     return table_.contains(key);
   }
 
+  /// [[key]], as often as it stands there; none is none.
+  std::vector<Table> tables(const std::string& key) {
+    std::vector<Table> all;
+    if (!has(key)) return all;
+    const toml::node& node = *table_.get(key);
+    const toml::array* list = node.as_array();
+    if (list == nullptr || !list->is_array_of_tables()) refuse(node, key, "tables, [[" + key + "]]");
+    for (const toml::node& entry : *list) all.emplace_back(*entry.as_table(), file_, full(key));
+    return all;
+  }
+
   Table table(const std::string& key) {
     const toml::node& node = required(key, "a table");
     if (!node.is_table()) refuse(node, key, "a table");
@@ -103,12 +114,14 @@ std::size_t line_of(const toml::table& root, const model::CellFault& fault) {
 
 class Reader {
  public:
-  Reader(Table& top, std::map<std::string, std::string>& sources) : top_(top), sources_(sources) {}
+  /// Of one table alone.
+  explicit Reader(Table& table) : top_(table) {}
+  Reader(Table& top, std::map<std::string, std::string>& sources) : top_(top), sources_(&sources) {}
 
   void table(const std::string& key) {
     finish();
     inner_.emplace(top_.table(key));
-    sources_[key] = inner_->text("source");
+    (*sources_)[key] = inner_->text("source");
   }
   void number(const std::string& key, double& into) { into = here().number(key); }
   void optional_number(const std::string& key, double& into) {
@@ -131,7 +144,7 @@ class Reader {
 
   Table& top_;
   std::optional<Table> inner_;
-  std::map<std::string, std::string>& sources_;
+  std::map<std::string, std::string>* sources_ = nullptr;
 };
 
 class Writer {
@@ -188,6 +201,11 @@ std::string cell_text(const CellFile& file) {
   std::string text = fmt::format("name = {}\nchemistry = {}\nsource = {}\n", Writer::quoted(file.name), Writer::quoted(file.chemistry), Writer::quoted(file.source));
   Writer writer(text, file.sources);
   visit_cell(writer, file.parameters);
+  for (const TemperatureTable& at : file.at_temperature) {
+    text += "\n[[at_temperature]]\n";
+    writer.number("temperature_c", at.temperature_c);
+    visit_rc(writer, at.rc);
+  }
   return text;
 }
 
@@ -217,6 +235,23 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   Reader reader(top, file.sources);
   visit_cell(reader, p);
   reader.finish();
+  for (Table& table : top.tables("at_temperature")) {
+    TemperatureTable& at = file.at_temperature.emplace_back();
+    at.temperature_c = table.number("temperature_c");
+    Reader rc(table);
+    visit_rc(rc, at.rc);
+    table.finish();
+    model::CellParameters<> there = p;
+    there.rc = at.rc;
+    const model::CellFault fault = model::first_fault(there);
+    if (fault.what != nullptr && std::string_view(fault.key).starts_with("rc.")) {
+      throw BadInput(path, line_of(root, {"at_temperature", file.at_temperature.size() - 1, ""}),
+                     fmt::format("'at_temperature.{}' at {:g} degrees C is out of range, expected {}", std::string_view(fault.key).substr(3), at.temperature_c, fault.what));
+    }
+    if (!(at.temperature_c > -60 && at.temperature_c < 100) || (file.at_temperature.size() > 1 && !(at.temperature_c > file.at_temperature.end()[-2].temperature_c))) {
+      throw BadInput(path, line_of(root, {"at_temperature", file.at_temperature.size() - 1, ""}), "'at_temperature.temperature_c' is out of range, expected temperatures that ascend, -60 to 100 degrees C");
+    }
+  }
   top.finish();
 
   if (const model::CellFault fault = model::first_fault(p); fault.what != nullptr) {

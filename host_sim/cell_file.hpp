@@ -11,6 +11,12 @@
 
 namespace bms {
 
+/// R0, R1, C1 at a temperature: identified, kept for what will use it; the model runs on [rc].
+struct TemperatureTable {
+  double temperature_c = 25;
+  model::RcTable<double> rc;
+};
+
 struct CellFile {
   std::string name;
   std::string chemistry;
@@ -20,6 +26,7 @@ struct CellFile {
   std::string text;            ///< the file itself
   std::uint32_t hash = 0;      ///< first 32 bits of the text's SHA-256: tells on CAN which file is on the board
   model::CellParameters<> parameters;
+  std::vector<TemperatureTable> at_temperature;  ///< ascending; empty: not known
 };
 
 /// name_or_path: the name of a built-in cell or the path of a file. Throws BadInput.

@@ -189,10 +189,70 @@ void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordi
   std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n", found.estimation.samples, 1e3 * found.estimation.rmse_v,
                                  found.estimation.fit_percent, found.estimation.one_step_fit_percent, found.optimum.reason);
   for (const id::Parameter& p : found.parameters) {
-    text += fmt::format("  {:8} {:3.0f} %  {:10.5g} +- {:.2g}{}\n", p.name, 100 * p.soc, p.value, p.std, p.at_bound ? "  at its bound" : "");
+    text += fmt::format("  {:8} {:3.0f} %{}  {:10.5g} +- {:.2g}{}\n", p.name, 100 * p.soc, p.temperature_c ? fmt::format(" {:5.1f} C", *p.temperature_c) : "", p.value, p.std,
+                        p.at_bound ? "  at its bound" : "");
   }
   for (const auto& [path, fit] : result.validations) text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
   tell(options.output, text + (result.cell.empty() ? "No cell file." : "Cell file: " + options.out));
+}
+
+/// Recordings of like temperature.
+struct Group {
+  double temperature_c = 25;
+  std::vector<id::Record> records;
+};
+
+/// Ascending; one when temperatures are not recorded or lie within a few kelvins.
+std::vector<Group> grouped(const std::vector<Recording>& recordings, const std::vector<id::Record>& records) {
+  constexpr double alike_k = 5;
+  std::vector<std::pair<double, std::size_t>> means;
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (const double t : recordings[k].temperature_c) {
+      if (std::isfinite(t)) sum += t, ++count;
+    }
+    if (count == 0) return {{25, records}};
+    means.emplace_back(sum / static_cast<double>(count), k);
+  }
+  std::sort(means.begin(), means.end());
+  std::vector<Group> groups;
+  std::vector<double> begins;
+  for (const auto& [temperature_c, k] : means) {
+    if (groups.empty() || temperature_c - begins.back() > alike_k) {
+      groups.emplace_back();
+      begins.push_back(temperature_c);
+      groups.back().temperature_c = 0;
+    }
+    Group& group = groups.back();
+    const auto n = static_cast<double>(group.records.size());
+    group.temperature_c = (group.temperature_c * n + temperature_c) / (n + 1);
+    group.records.push_back(records[k]);
+  }
+  for (Group& group : groups) group.temperature_c = std::round(10 * group.temperature_c) / 10;
+  return groups;
+}
+
+/// Each group's table. The OCV and its lean are those of the main group.
+std::vector<TemperatureTable> at_temperatures(const std::vector<Group>& groups, std::size_t main_group, id::GreyBoxOptions options, id::Method method, IdentifyResult& result) {
+  std::vector<TemperatureTable> tables;
+  const model::CellParameters<> main_cell = result.identification.cell;
+  options.estimate_lean = false;
+  for (id::Parameter& p : result.identification.parameters) p.temperature_c = groups[main_group].temperature_c;
+  for (std::size_t k = 0; k < groups.size(); ++k) {
+    if (k == main_group) {
+      tables.push_back({groups[k].temperature_c, main_cell.rc});
+      continue;
+    }
+    id::Identification found = id::identify_grey_box(main_cell, groups[k].records, options, method);
+    tables.push_back({groups[k].temperature_c, found.cell.rc});
+    for (id::Parameter& p : found.parameters) {
+      p.temperature_c = groups[k].temperature_c;
+      result.identification.parameters.push_back(p);
+    }
+    for (const std::string& w : found.warnings) result.warnings.push_back({w.substr(0, w.find(':')), fmt::format("{:g} degrees C: {}", groups[k].temperature_c, warning_text(w))});
+  }
+  return tables;
 }
 
 /// tf, oe, hw: one record. Exit code 1 when what follows the voltage is no circuit: there is no cell file then.
@@ -266,6 +326,12 @@ int run(const IdentifyOptions& options) {
     soc_max = std::max(soc_max, d.soc_max);
   }
 
+  // the model's own table comes from the recordings nearest to 25 degrees C, where several temperatures are given
+  const auto groups = grouped(recordings, records);
+  std::size_t main_group = 0;
+  for (std::size_t k = 0; k < groups.size(); ++k) {
+    if (std::abs(groups[k].temperature_c - 25) < std::abs(groups[main_group].temperature_c - 25)) main_group = k;
+  }
   if (options.model != "nlgr") return run_linear(options, method, cell, records.front(), (soc_min + soc_max) / 2, data, result);
 
   id::GreyBoxOptions grey_box;
@@ -274,11 +340,12 @@ int run(const IdentifyOptions& options) {
   grey_box.estimate_lean = !options.lean && cell.parameters.ocv.half_gap_v.size > 0;
   grey_box.voltage_sigma_v = cell.parameters.noise.voltage_v;
   try {
-    result.identification = id::identify_grey_box(cell.parameters, records, grey_box, method);
+    result.identification = id::identify_grey_box(cell.parameters, groups[main_group].records, grey_box, method);
   } catch (const std::invalid_argument& error) {
     throw BadInput(options.recordings.front(), 1, error.what());
   }
   add_warnings(result);
+  if (groups.size() > 1) cell.at_temperature = at_temperatures(groups, main_group, grey_box, method, result);
 
   data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
   std::vector<id::Data> shown = {records.front().data};

@@ -111,6 +111,7 @@ std::string json_of(const IdentifyResult& r) {
   json["parameters"] = Json::array();
   for (const identification::Parameter& p : i.parameters) {
     json["parameters"].push_back({{"name", p.name}, {"soc", p.soc}, {"value", p.value}, {"std", p.std}, {"std_white", p.std_white}, {"by_ocv_tolerance", p.by_ocv_tolerance}, {"at_bound", p.at_bound}, {"seen", p.seen}});
+    if (p.temperature_c) json["parameters"].back()["temperature_c"] = *p.temperature_c;
   }
   json["correlation"] = Json::array();
   for (Eigen::Index row = 0; row < i.correlation.rows(); ++row) {

@@ -21,6 +21,7 @@ struct Parameter {
   double by_ocv_tolerance = 0;  ///< how far it would move if the OCV were off by its tolerance
   bool at_bound = false;
   bool seen = true;             ///< false: the data does not depend on it
+  std::optional<double> temperature_c = std::nullopt;  ///< where recordings of several were identified
 };
 
 /// How well a model follows the voltage of recordings.

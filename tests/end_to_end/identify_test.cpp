@@ -114,6 +114,23 @@ TEST_F(IdentifyTool, ARealCellIsPredictedOnRecordingsItWasNotIdentifiedFrom) {
   EXPECT_NEAR(from_udds["coulombic_efficiency"], 0.998, 0.003);
 }
 
+TEST_F(IdentifyTool, SeveralTemperaturesGiveATableEach) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
+  const json r = result("--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") + " --start a123_26650 --window 0.9:0.2 --nodes 0.5 --recording " + real("dyn10_P05_A002.csv") + " " +
+                        real("dyn20_P25_A002.csv") + " " + real("dyn10_P45_A002.csv"));
+  const std::string cell = content(path("cell.toml"));
+  EXPECT_THAT(cell, HasSubstr("[[at_temperature]]\ntemperature_c = 5.0"));
+  EXPECT_THAT(cell, HasSubstr("[[at_temperature]]\ntemperature_c = 45.0"));
+  std::map<double, double> r0_ohm;
+  for (const json& p : r["parameters"]) {
+    if (p["name"] == "r0_ohm") r0_ohm[p["temperature_c"]] = p["value"];
+  }
+  ASSERT_EQ(r0_ohm.size(), 3U);
+  EXPECT_GT(r0_ohm[5], r0_ohm[25]) << "cold cells resist";
+  EXPECT_GT(r0_ohm[25], r0_ohm[45]);
+  EXPECT_EQ(run_tool("replay " + shift + " --cell " + path("cell.toml")).exit_code, 0);
+}
+
 TEST_F(IdentifyTool, StudyWritesTablesAndAPageAndFindsTheOrderOfThePaper) {
   const ToolRun run = run_tool("study --out " + path("study") + " --json " + path("study.json"));
   ASSERT_EQ(run.exit_code, 0) << run.err;

@@ -2,18 +2,25 @@
 //
 // Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <string_view>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "host_sim/cell_file.hpp"
+#include "host_sim/child_process.hpp"
 #include "host_sim/emulator.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/recording.hpp"
 #include "host_sim/replay.hpp"
+#include "host_sim/simulation.hpp"
+#include "host_sim/study.hpp"
+#include "host_sim/text_file.hpp"
+#include "identification/identify.hpp"
 #include "tests/figures/committed_figures.hpp"
 #include "tests/firmware/step_cost.hpp"
 
@@ -99,6 +106,73 @@ std::string speed() {
   return table;
 }
 
+/// Identified and judged as a user does it: bms identify, its JSON.
+std::string identified_row(const std::vector<std::string>& from, const std::vector<std::string>& judges, const std::string& more) {
+  const TemporaryFolder folder;
+  const auto real = [](const std::string& name) { return (data / "a123_26650" / (name + ".csv")).string(); };
+  std::vector<std::string> command = {BMS_TOOL, "identify", "--ocv", real("ocv_P25_dis"), real("ocv_P25_chg"), "--start", "a123_26650", "--window", "0.95:0.10", "--quiet",
+                                      "--out", (folder.path() / "c.toml").string(), "--json", (folder.path() / "r.json").string()};
+  if (!more.empty()) command.insert(command.end(), {"--nodes", more});
+  command.push_back("--recording");
+  for (const std::string& name : from) command.push_back(real(name));
+  command.push_back("--validate");
+  for (const std::string& name : judges) command.push_back(real(name));
+  output_of(command);
+  const nlohmann::json r = nlohmann::json::parse(read_file(folder.path() / "r.json"));
+  std::string row, names;
+  for (const std::string& name : from) names += (names.empty() ? "" : " + ") + name;
+  for (const nlohmann::json& v : r["validations"]) {
+    row += fmt::format("| {} | {} | {:.2f} mV, {:.1f} % | {} | {:.2f} mV, {:.1f} % |\n", names, more.empty() ? "tenths" : more, 1e3 * r["estimation"]["rmse_v"].get<double>(),
+                       r["estimation"]["fit_percent"].get<double>(), std::filesystem::path(v["recording"].get<std::string>()).stem().string(), 1e3 * v["rmse_v"].get<double>(), v["fit_percent"].get<double>());
+  }
+  return row;
+}
+
+std::string real_identification() {
+  std::string table = "| identified from | nodes | RMSE, fit there | judged on | RMSE, fit there |\n|---|---|---|---|---|\n";
+  const std::string udds = "udds_P25_A002", dyn = "dyn20_P25_A002", pulse = "pulse_P25_A002", charge = "cccv2C_P25_A002";
+  table += identified_row({udds}, {dyn, pulse}, "");
+  table += identified_row({dyn}, {udds, pulse}, "");
+  table += identified_row({dyn}, {udds}, "0.5");
+  table += identified_row({charge, dyn}, {udds}, "");
+  table += identified_row({pulse}, {udds, dyn}, "");
+  return table;
+}
+
+std::string identification_speed() {
+  namespace id = identification;
+  constexpr std::size_t samples_used = 20'000;
+  const CellFile cell = read_cell("table9");
+  const Recording recording = read_recording(shift);
+  id::Record r;
+  r.data = {{recording.time_s.begin(), recording.time_s.begin() + samples_used}, {recording.current_a.begin(), recording.current_a.begin() + samples_used},
+            {recording.voltage_v.begin(), recording.voltage_v.begin() + samples_used}, 6};
+  r.initial_soc = 0.98;
+  r.estimate_initial_soc = true;
+  r.initial_soc_sigma = 0.01;
+  const auto fastest_s = [](const auto& work) {
+    double best_s = 1e9;
+    for (int k = 0; k < 5; ++k) {
+      const auto begin = std::chrono::steady_clock::now();
+      work();
+      best_s = std::min(best_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    }
+    return best_s;
+  };
+  const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
+  const double simulation_s = fastest_s([&] { simulate(tables, 6, r.data.time_s, r.data.current_a, 0.98); });
+  std::string table = fmt::format("| 20,000 samples | time | as many simulations |\n|---|---|---|\n| simulation, open loop | {:.2f} ms | 1 |\n", 1e3 * simulation_s);
+  for (const auto& [name, nodes] : {std::pair{"grey box, R0, R1, C1 and both initial states, from three starts", std::vector{0.6}}, std::pair{"grey box, the same at nine nodes", id::nodes_for(0.22, 0.98)}}) {
+    id::GreyBoxOptions options;
+    options.soc_nodes = nodes;
+    const double s = fastest_s([&] { id::identify_grey_box(cell.parameters, {r}, options, id::Method::trust_region_reflective); });
+    table += fmt::format("| {} | {:.0f} ms | {:.0f} |\n", name, 1e3 * s, s / simulation_s);
+  }
+  const double study_s = study_plant(cell.parameters, 1, {}).seconds;
+  table += fmt::format("| `bms study`, all of it (42 identifications, other lengths) | {:.1f} s | |\n", study_s);
+  return table;
+}
+
 void run() {
   const auto estimator = source / "estimator/README.md";
   replace_figures(estimator, "netduinoplus2", step_cost());
@@ -106,6 +180,8 @@ void run() {
   if (std::filesystem::exists(data)) replace_figures(estimator, "real", real_accuracy());
   else fmt::print(stderr, "{} is not there: the figures of real recordings stay\n", data.string());
   replace_figures(source / "host_sim/README.md", "speed", speed());
+  if (std::filesystem::exists(data)) replace_figures(source / "identification/README.md", "real", real_identification());
+  replace_figures(source / "identification/README.md", "speed", identification_speed());
 }
 
 }  // namespace

@@ -55,6 +55,8 @@ TEST(CellFile, WhatIsWrittenIsReadBackDigitForDigit) {
     cell.parameters.ocv.half_gap_v.size = 0;
     for (std::size_t k = 0; k < cell.parameters.ocv.soc.size; ++k) cell.parameters.ocv.half_gap_v.push_back(0.01 / (1.0 + static_cast<double>(k)));
     cell.parameters.ocv.lean = -0.7;
+    cell.at_temperature = {{-5, cell.parameters.rc}, {25, cell.parameters.rc}};
+    cell.at_temperature[0].rc.r0_ohm[0] = 0.0371;
     const std::string text = cell_text(cell);
     const CellFile again = parse_cell(text, "again");
     EXPECT_EQ(cell_text(again), replaced(text, "a \\\\ and a line", "a \\\\ and a line"));
@@ -62,6 +64,10 @@ TEST(CellFile, WhatIsWrittenIsReadBackDigitForDigit) {
     EXPECT_EQ(again.parameters.ocv.half_gap_v[3], cell.parameters.ocv.half_gap_v[3]);
     EXPECT_EQ(again.parameters.noise.current_unknown_a, cell.parameters.noise.current_unknown_a);
     EXPECT_EQ(again.sources.at("rc"), cell.sources.at("rc"));
+    ASSERT_EQ(again.at_temperature.size(), 2U);
+    EXPECT_EQ(again.at_temperature[0].rc.r0_ohm[0], 0.0371);
+    EXPECT_THAT(refusal(replaced(text, "temperature_c = 25.0", "temperature_c = -25.0")), HasSubstr("temperatures that ascend"));
+    EXPECT_THAT(refusal(replaced(text, "0.0371", "7.0")), HasSubstr("'at_temperature.r0_ohm' at -5 degrees C is out of range"));
   }
 }
 
