@@ -155,10 +155,13 @@ std::string page_of_identification(const IdentifyResult& r, const std::vector<id
     parameters.rows.push_back({cell(p.name), cell(fmt::format("{:.0f} %", 100 * p.soc)), cell(fmt::format("{:.5g}", p.value)), cell(fmt::format("{:.2g}", p.std)), cell(fmt::format("{:.2g}", p.std_white)),
                                cell(fmt::format("{:.2g}", p.by_ocv_tolerance)), cell(!p.seen ? "not seen" : p.at_bound ? "at its bound" : "")});
   }
-  PageTable fits{"fits", "How the voltage is followed, open loop", {"recording", "RMSE", "largest", "fit", "one step ahead", "bias and its band", "lags outside the white band"}, {}, ""};
+  PageTable fits{"fits", "How the voltage is followed, open loop", {"recording", "RMSE", "largest", "fit", "1, 10 and 60 steps ahead, RMSE", "bias and its band", "lags outside the white band"}, {}, ""};
   const auto add_fit = [&](const std::string& name, const id::Fit& f) {
+    std::string ahead;
+    for (const id::Fit::Ahead& a : f.ahead) ahead += fmt::format("{}{:.2f}", ahead.empty() ? "" : ", ", 1e3 * a.rmse_v);
+    ahead += " mV";
     fits.rows.push_back({cell(name), cell(fmt::format("{:.2f} mV", 1e3 * f.rmse_v)), cell(fmt::format("{:.2f} mV", 1e3 * f.largest_v)), cell(fmt::format("{:.1f} %", f.fit_percent)),
-                         cell(fmt::format("{:.1f} %", f.one_step_fit_percent)), cell(fmt::format("{:.2f}, {:.2f} mV", 1e3 * f.residuals.mean_v, 1e3 * f.residuals.mean_band_v)),
+                         cell(ahead), cell(fmt::format("{:.2f}, {:.2f} mV", 1e3 * f.residuals.mean_v, 1e3 * f.residuals.mean_band_v)),
                          cell(fmt::format("{:.0f} % of itself, {:.0f} % with the current", 100 * f.residuals.autocorrelated, 100 * f.residuals.input_correlated))});
   };
   add_fit("identified from", found.estimation);
@@ -340,7 +343,7 @@ int run(const IdentifyOptions& options) {
   grey_box.estimate_lean = !options.lean && cell.parameters.ocv.half_gap_v.size > 0;
   grey_box.voltage_sigma_v = cell.parameters.noise.voltage_v;
   try {
-    result.identification = id::identify_grey_box(cell.parameters, groups[main_group].records, grey_box, method);
+    result.identification = id::identify_grey_box(id::started_from_rests(cell.parameters, groups[main_group].records.front().data, grey_box.bounds), groups[main_group].records, grey_box, method);
   } catch (const std::invalid_argument& error) {
     throw BadInput(options.recordings.front(), 1, error.what());
   }

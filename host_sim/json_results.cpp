@@ -79,10 +79,13 @@ namespace {
 
 Json fit_of(const identification::Fit& f) {
   const identification::ResidualAnalysis& r = f.residuals;
+  Json ahead = Json::array();
+  for (const identification::Fit::Ahead& a : f.ahead) ahead.push_back({{"steps", a.steps}, {"rmse_v", a.rmse_v}});
   return {{"fit_percent", f.fit_percent},
           {"rmse_v", f.rmse_v},
           {"largest_v", f.largest_v},
           {"one_step_fit_percent", f.one_step_fit_percent},
+          {"ahead", std::move(ahead)},
           {"output_variance_v2", f.output_variance_v2},
           {"samples", f.samples},
           {"residuals",

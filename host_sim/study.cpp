@@ -15,7 +15,6 @@
 #include "host_sim/identification_data.hpp"
 #include "identification/linear_models.hpp"
 #include "identification/prefilter.hpp"
-#include "identification/rest_reading.hpp"
 #include "plant/truth_cell.hpp"
 
 namespace bms {
@@ -90,7 +89,7 @@ class Study {
     id::GreyBoxOptions options;
     options.soc_nodes = {std::round(100 * part.middle()) / 100};
     options.bounds = circuit_bounds(cell_.capacity_ah);
-    id::Identification found = id::identify_grey_box(started(part), {record(part)}, options, method);
+    id::Identification found = id::identify_grey_box(id::started_from_rests(cell_, part.data, options.bounds), {record(part)}, options, method);
     step();
     return found;
   }
@@ -123,19 +122,6 @@ class Study {
     r.data = part.data;
     r.initial_soc = part.soc_from;
     return r;
-  }
-
-  /// The cell with R0, R1, C1 as Appendix A reads them from the record, where it has rests to read.
-  model::CellParameters<> started(const Part& part) const {
-    model::CellParameters<> cell = cell_;
-    const id::RestReadings readings = id::read_rests(part.data);
-    const id::CircuitBounds b = circuit_bounds(cell.capacity_ah);
-    for (std::size_t k = 0; k < cell.rc.soc.size; ++k) {
-      if (std::isfinite(readings.r0_ohm)) cell.rc.r0_ohm[k] = std::clamp(readings.r0_ohm, b.r0_min_ohm, b.r0_max_ohm);
-      if (std::isfinite(readings.r1_ohm)) cell.rc.r1_ohm[k] = std::clamp(readings.r1_ohm, b.r1_min_ohm, b.r1_max_ohm);
-      if (std::isfinite(readings.c1_f)) cell.rc.c1_f[k] = std::clamp(readings.c1_f, b.c1_min_f, b.c1_max_f);
-    }
-    return cell;
   }
 
   void step() {
@@ -362,6 +348,18 @@ StudyResult study_plant(const model::CellParameters<>& cell, std::uint64_t seed,
   result.source = "the plant (Table 9 made smooth), readings every second with 1 mV and 10 mA of noise";
   constexpr std::size_t all = 20 + 7 + 5 + 10;
   Study study(cell, all, progress);
+
+  // Fig. 9 to 11
+  for (const auto& [name, title] : {std::pair{"forklift_shift", "The forklift's current (Fig. 9), A"}, std::pair{"rest_30s", "Short pulses with rests (Fig. 10), A"},
+                                    std::pair{"high_1m_low_30s", "Long bursts without (Fig. 11), A"}}) {
+    PageChart chart{title, {"A"}, {}, {{}}};
+    const auto profile = experiment(name).value();
+    for (const ProfileRow& row : profile) {
+      chart.time_s.push_back(row.time_s);
+      chart.columns[0].push_back(row.current_a);
+    }
+    result.charts.push_back(std::move(chart));
+  }
 
   const Part ocv = measured("ocv_10min_rest", 1, seed);
   compare_models(study, window(ocv, "OCV test with 10 min rest, 80 to 50 %", 0.8, 0.5), window(ocv, "OCV test with 10 min rest, 50 to 20 %", 0.5, 0.2), true, result);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "identification/figures.hpp"
+#include "identification/rest_reading.hpp"
 
 namespace bms::identification {
 
@@ -141,8 +142,8 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
     Eigen::VectorXd simulated(static_cast<Eigen::Index>(data.size()));
     grey_box.simulate(x, r, simulated, nullptr);
     if (r == 0) {
-      result.estimation = fit_of(data.voltage_v, simulated, data.current_a, 0);
-      result.fading = fading(without_missing(result.estimation.error_v));
+      result.fading = fading(without_missing(fit_of(data.voltage_v, simulated, data.current_a, 0).error_v));
+      result.estimation = fit_of(data.voltage_v, simulated, data.current_a, result.fading);
     }
     double last_error = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t k = 0; k < data.size(); ++k) {
@@ -183,6 +184,12 @@ Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulat
   fit.largest_v = error.max();
   fit.samples = error.count();
   fit.output_variance_v2 = fit.rmse_v * fit.rmse_v;
+  for (const int steps : {1, 10, 60}) {
+    ErrorFigure prediction;
+    const Eigen::VectorXd e = prediction_error(fit.error_v, steps, fading);
+    for (Eigen::Index k = 0; k < e.size(); ++k) prediction.add(e[k]);
+    if (prediction.count() > 0) fit.ahead.push_back({steps, prediction.rms()});
+  }
   fit.residuals = analyse(without_missing(fit.error_v),
                           where(Eigen::Map<const Eigen::VectorXd>(current_a.data(), simulated_v.size()), fit.error_v));
   return fit;
@@ -203,6 +210,22 @@ Identification identify_grey_box(const model::CellParameters<>& start, const std
   result.optimum.iterations += first.optimum.iterations;
   result.optimum.evaluations += first.optimum.evaluations;
   return result;
+}
+
+model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, const Data& data, const CircuitBounds& b) {
+  model::CellParameters<> started = cell;
+  RestReadings readings;
+  try {
+    readings = read_rests(data);
+  } catch (const std::invalid_argument&) {
+    return started;  // times or currents that it cannot read; the fit says what is wrong with them
+  }
+  for (std::size_t k = 0; k < started.rc.soc.size; ++k) {
+    if (std::isfinite(readings.r0_ohm)) started.rc.r0_ohm[k] = std::clamp(readings.r0_ohm, b.r0_min_ohm, b.r0_max_ohm);
+    if (std::isfinite(readings.r1_ohm)) started.rc.r1_ohm[k] = std::clamp(readings.r1_ohm, b.r1_min_ohm, b.r1_max_ohm);
+    if (std::isfinite(readings.c1_f)) started.rc.c1_f[k] = std::clamp(readings.c1_f, b.c1_min_f, b.c1_max_f);
+  }
+  return started;
 }
 
 Fit validate(const model::CellParameters<>& cell, const Record& record, double fading) {

@@ -30,6 +30,11 @@ struct Fit {
   double rmse_v = 0;                ///< the same in volts: comparable between recordings, as the fit is not
   double largest_v = 0;
   double one_step_fit_percent = 0;  ///< of the one-step prediction (residuals.hpp)
+  struct Ahead {
+    int steps = 0;
+    double rmse_v = 0;
+  };
+  std::vector<Ahead> ahead;         ///< k-step predictions, 1, 10 and 60 samples ahead
   double output_variance_v2 = 0;
   std::size_t samples = 0;
   ResidualAnalysis residuals;       ///< of the first recording
@@ -63,6 +68,10 @@ inline constexpr double observable_soc_std = 0.05;
 /// or a record is empty.
 Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<Record>& records, const GreyBoxOptions& options, Method method,
                                  const Stopping& stopping = {});
+
+/// The cell with R0, R1, C1 as Appendix A reads them from the rests of a record (rest_reading.hpp), moved inside the bounds; as it was where no
+/// rest can be read.
+model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, const Data& data, const CircuitBounds& bounds);
 
 /// Open loop over a record that was not identified from. Only v_rc at its start is fitted, and only if the record says so.
 Fit validate(const model::CellParameters<>& cell, const Record& record, double fading);

@@ -106,7 +106,6 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
   const Uncertainty u = uncertainty(residuals, jacobian, residuals.size(), found.optimum.at_bound, 0);
   found.correlation = u.correlation;
   found.correlation_length = u.correlation_length;
-  found.estimation = fit_of(data.voltage_v, simulated(m, data), data.current_a, 0);
   found.fading = fading(residuals);
   found.estimation = fit_of(data.voltage_v, simulated(m, data), data.current_a, found.fading);
   found.estimation.output_variance_v2 = u.output_variance_v2;

@@ -16,31 +16,12 @@
 
 #include "identification/circuit_from_discrete.hpp"
 
+#include "tests/identification/scipy.hpp"
+
 namespace bms::identification {
 namespace {
 
 using Eigen::VectorXd;
-
-/// Columns that tests/identification/scipy_linear_reference.py prints; empty where no Python with scipy is installed.
-std::map<std::string, std::vector<double>> scipy_reference() {
-  std::map<std::string, std::vector<double>> columns;
-  for (const std::string python : {"python3", "/usr/bin/python3"}) {  // the second: a distribution's, beside one that a person installed
-    if (std::system((python + " -c 'import scipy' > /dev/null 2>&1").c_str()) != 0) continue;
-    FILE* pipe = popen((python + " " BMS_SOURCE_DIR "/tests/identification/scipy_linear_reference.py").c_str(), "r");
-    if (pipe == nullptr) return columns;
-    std::string text;
-    for (int c; (c = std::fgetc(pipe)) != EOF;) text += static_cast<char>(c);
-    EXPECT_EQ(pclose(pipe), 0);
-    std::istringstream lines(text);
-    for (std::string line, name; std::getline(lines, line);) {
-      std::istringstream words(line);
-      words >> name;
-      for (double v; words >> v;) columns[name].push_back(v);
-    }
-    return columns;
-  }
-  return columns;
-}
 
 void expect_near(const VectorXd& ours, const std::vector<double>& theirs, double tolerance, const std::string& what) {
   ASSERT_EQ(static_cast<std::size_t>(ours.size()), theirs.size()) << what;

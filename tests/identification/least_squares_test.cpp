@@ -21,6 +21,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/identification/scipy.hpp"
+
 namespace bms::identification {
 namespace {
 
@@ -558,14 +560,6 @@ TEST(LeastSquares, AlgebraOfOneIterationIsSmall) {
     EXPECT_LE(algebra_s, 2e-3) << name_of(method);
 #endif
   }
-}
-
-/// A python3 with scipy, or nothing.
-std::string python_with_scipy() {
-  for (const std::string python : {"python3", "/usr/bin/python3"}) {
-    if (std::system((python + " -c 'import scipy.optimize' > /dev/null 2>&1").c_str()) == 0) return python;
-  }
-  return "";
 }
 
 class BesideScipy : public ::testing::Test {
