@@ -12,12 +12,12 @@
 #include "host_sim/bad_input.hpp"
 #include "host_sim/cell_file.hpp"
 #include "host_sim/identification_data.hpp"
+#include "host_sim/identified_cell.hpp"
+#include "host_sim/identify_page.hpp"
 #include "host_sim/json_results.hpp"
 #include "host_sim/recording.hpp"
-#include "host_sim/report_page.hpp"
 #include "identification/identify.hpp"
 #include "identification/linear_models.hpp"
-#include "identification/ocv_curve.hpp"
 #include "identification/prefilter.hpp"
 
 namespace bms {
@@ -32,95 +32,6 @@ id::Method method_of(const std::string& name) {
     if (name == id::name_of(m)) return m;
   }
   throw BadInput("--optimizer", 1, "no such optimiser '" + name + "', expected one of: gn, agn, lm, sd, nls");
-}
-
-/// OCV and capacity of slow runs put into the cell.
-void take_ocv(const IdentifyOptions& options, CellFile& cell, IdentifyResult& result) {
-  std::vector<id::SlowRun> runs;
-  std::string files;
-  for (const std::string& path : options.ocv) {
-    const Recording r = read_recording(path);
-    runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
-    files += (files.empty() ? "" : ", ") + std::filesystem::path(path).filename().string();
-  }
-  id::OcvCurve curve;
-  try {
-    curve = id::ocv_curve(runs);
-  } catch (const std::invalid_argument& error) {
-    throw BadInput(options.ocv.front(), 1, error.what());
-  }
-  double error_v = options.ocv_error_v;
-  auto pieces = id::fewest_pieces(curve, error_v);
-  while (!pieces || pieces->soc.size() > model::max_ocv_edges) {
-    error_v *= 1.5;
-    if (error_v > 0.05) throw BadInput(options.ocv.front(), 1, "the open-circuit voltage does not rise with the state of charge, expected slow runs of a whole charge or discharge");
-    pieces = id::fewest_pieces(curve, error_v);
-  }
-  if (error_v > options.ocv_error_v) {
-    result.warnings.push_back({"ocv_error", fmt::format("the straight pieces of the OCV are up to {:.1f} mV off, {:.1f} were asked for", 1e3 * pieces->largest_error_v, 1e3 * options.ocv_error_v)});
-  }
-  auto& ocv = cell.parameters.ocv;
-  ocv = {};
-  for (std::size_t k = 0; k < pieces->soc.size(); ++k) {
-    ocv.soc.push_back(pieces->soc[k]);
-    if (curve.coulombic_efficiency) ocv.half_gap_v.push_back(pieces->half_gap_v[k]);
-    if (k == 0) continue;
-    const double b1_v = (pieces->ocv_v[k] - pieces->ocv_v[k - 1]) / (pieces->soc[k] - pieces->soc[k - 1]);
-    ocv.b0_v.push_back(pieces->ocv_v[k] - b1_v * pieces->soc[k]);
-    ocv.b1_v.push_back(b1_v);
-  }
-  cell.parameters.tolerance.ocv_v = std::max(0.0005, pieces->largest_error_v);
-  cell.parameters.capacity_ah = curve.capacity_ah;
-  result.coulombic_efficiency = curve.coulombic_efficiency;
-  cell.sources["ocv"] = fmt::format("{} of {}; {} straight pieces, within {:.1f} mV", curve.coulombic_efficiency ? "middle of slow charge and discharge" : "slow run", files,
-                                    pieces->soc.size() - 1, 1e3 * pieces->largest_error_v);
-}
-
-/// What the recordings say of the measuring chain and of what the model leaves over.
-void take_noise(const std::vector<Recording>& recordings, const IdentifyResult& result, model::CellParameters<>& p) {
-  std::vector<double> voltage_steps, current_steps;
-  double step_s = 1;
-  for (const Recording& r : recordings) {
-    const double quiet_a = 0.02 * p.capacity_ah;
-    for (std::size_t k = 2; k < r.rows(); ++k) {
-      if (std::abs(r.current_a[k]) > quiet_a || std::abs(r.current_a[k - 1]) > quiet_a || std::abs(r.current_a[k - 2]) > quiet_a) continue;
-      // second differences: what relaxes slowly is not noise
-      const double v = r.voltage_v[k] - 2 * r.voltage_v[k - 1] + r.voltage_v[k - 2], i = r.current_a[k] - 2 * r.current_a[k - 1] + r.current_a[k - 2];
-      if (std::isfinite(v) && std::isfinite(i)) voltage_steps.push_back(v * v), current_steps.push_back(i * i);
-    }
-    step_s = std::max(0.01, r.duration_s() / static_cast<double>(r.rows() - 1));
-  }
-  const auto sigma = [](const std::vector<double>& squares) {
-    double sum = 0;
-    for (const double s : squares) sum += s;
-    return std::sqrt(sum / static_cast<double>(squares.size()) / 6);  // 1 + 4 + 1
-  };
-  constexpr std::size_t enough = 30;
-  if (voltage_steps.size() >= enough) {
-    p.noise.voltage_v = std::clamp(sigma(voltage_steps), 0.0002, 0.05);
-    p.noise.current_a = std::clamp(sigma(current_steps), 1e-4 * p.capacity_ah, 0.1 * p.capacity_ah);
-  }
-  const id::Fit& judge = result.validation ? *result.validation : result.identification.estimation;
-  double model_v = judge.rmse_v;
-  // with its mean, which is an error that lasts
-  p.noise.model_correlation_s = std::clamp(id::correlation_length(id::without_missing(judge.error_v)) * step_s, 1.0, 20'000.0);
-  if (p.ocv.half_gap_v.size > 0) {
-    double gap_v = 0;
-    for (std::size_t k = 0; k < p.ocv.half_gap_v.size; ++k) {
-      if (p.ocv.soc[k] > 0.1 && p.ocv.soc[k] < 0.95) gap_v = std::max(gap_v, p.ocv.half_gap_v[k]);
-    }
-    // The voltage is somewhere between the slow curves, and the model leans: how far it is off on the other side no recording needs to
-    // have shown. As evenly distributed; and it lasts until the current has turned for a good part of an hour.
-    model_v = std::max(model_v, (1 + std::abs(p.ocv.lean)) * gap_v / std::sqrt(3.0));
-    p.noise.model_correlation_s = std::max(p.noise.model_correlation_s, 3'000.0);
-    p.noise.rest_v = std::clamp((1 + std::abs(p.ocv.lean)) * gap_v, p.noise.rest_v, 0.2);
-  }
-  p.noise.model_v = std::clamp(model_v, 0.0005, 0.2);
-  double largest = 0.005;
-  for (const id::Parameter& q : result.identification.parameters) {
-    if (q.name == "r0_ohm" && q.value > 0) largest = std::max(largest, std::min(0.5, 2 * q.std / q.value));
-  }
-  p.tolerance.resistance_fraction = largest;
 }
 
 void filter(const IdentifyOptions& options, const std::string& path, id::Data& data) {
@@ -142,52 +53,13 @@ void add_warnings(IdentifyResult& result) {
   for (const std::string& w : result.identification.warnings) result.warnings.push_back({w.substr(0, w.find(':')), warning_text(w)});
 }
 
-/// Parameters, figures, and how the first recording and the validations are followed.
-std::string page_of_identification(const IdentifyResult& r, const std::vector<id::Data>& recordings) {
-  const id::Identification& found = r.identification;
-  PageContent content{"Identification by " + r.model + " and " + r.optimizer,
-                      fmt::format("{} samples, {:.2f} mV RMS open loop, fit {:.1f} %. {}", found.estimation.samples, 1e3 * found.estimation.rmse_v, found.estimation.fit_percent, found.optimum.reason),
-                      {}, {}, {}};
-  for (const Warning& w : r.warnings) content.warnings.push_back(w.text);
-  const auto cell = [](const std::string& text) { return PageCell{text, {}, {}}; };
-  PageTable parameters{"parameters", "Parameters", {"name", "soc", "value", "standard deviation", "if residuals were white", "if the OCV were off by its tolerance", "remarks"}, {}, ""};
-  for (const id::Parameter& p : found.parameters) {
-    parameters.rows.push_back({cell(p.name), cell(fmt::format("{:.0f} %", 100 * p.soc)), cell(fmt::format("{:.5g}", p.value)), cell(fmt::format("{:.2g}", p.std)), cell(fmt::format("{:.2g}", p.std_white)),
-                               cell(fmt::format("{:.2g}", p.by_ocv_tolerance)), cell(!p.seen ? "not seen" : p.at_bound ? "at its bound" : "")});
-  }
-  PageTable fits{"fits", "How the voltage is followed, open loop", {"recording", "RMSE", "largest", "fit", "1, 10 and 60 steps ahead, RMSE", "bias and its band", "lags outside the white band"}, {}, ""};
-  const auto add_fit = [&](const std::string& name, const id::Fit& f) {
-    std::string ahead;
-    for (const id::Fit::Ahead& a : f.ahead) ahead += fmt::format("{}{:.2f}", ahead.empty() ? "" : ", ", 1e3 * a.rmse_v);
-    ahead += " mV";
-    fits.rows.push_back({cell(name), cell(fmt::format("{:.2f} mV", 1e3 * f.rmse_v)), cell(fmt::format("{:.2f} mV", 1e3 * f.largest_v)), cell(fmt::format("{:.1f} %", f.fit_percent)),
-                         cell(ahead), cell(fmt::format("{:.2f}, {:.2f} mV", 1e3 * f.residuals.mean_v, 1e3 * f.residuals.mean_band_v)),
-                         cell(fmt::format("{:.0f} % of itself, {:.0f} % with the current", 100 * f.residuals.autocorrelated, 100 * f.residuals.input_correlated))});
-  };
-  add_fit("identified from", found.estimation);
-  for (const auto& [path, fit] : r.validations) add_fit(path, fit);
-  content.tables = {std::move(parameters), std::move(fits)};
-  const auto add_charts = [&](const std::string& name, const id::Data& data, const id::Fit& f) {
-    PageChart voltage{name + ": voltage", {"measured, V", "simulated, V"}, data.time_s, {data.voltage_v, {}}}, error{name + ": measured less simulated, mV", {"mV"}, data.time_s, {{}}};
-    for (Eigen::Index k = 0; k < f.error_v.size(); ++k) {
-      voltage.columns[1].push_back(data.voltage_v[static_cast<std::size_t>(k)] - f.error_v[k]);
-      error.columns[0].push_back(1e3 * f.error_v[k]);
-    }
-    content.charts.push_back(std::move(voltage));
-    content.charts.push_back(std::move(error));
-  };
-  add_charts("Identified from", recordings.front(), found.estimation);
-  for (std::size_t k = 0; k < r.validations.size(); ++k) add_charts(r.validations[k].first, recordings[k + 1], r.validations[k].second);
-  return page_of(content);
-}
-
 /// recordings: the first that was identified from, then those that validate.
 void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordings, std::chrono::steady_clock::time_point begin, IdentifyResult& result) {
   for (const Warning& w : result.warnings) warn(w.text);
   result.out = options.out;
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (!options.output.json.empty()) put(options.output.json, json_of(result));
-  if (!options.output.report.empty()) put(options.output.report, page_of_identification(result, recordings));
+  if (!options.output.report.empty()) put(options.output.report, identify_report(result, recordings));
   const id::Identification& found = result.identification;
   std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n", found.estimation.samples, 1e3 * found.estimation.rmse_v,
                                  found.estimation.fit_percent, found.estimation.one_step_fit_percent, found.optimum.reason);
@@ -290,6 +162,7 @@ int run_linear(const IdentifyOptions& options, id::Method method, CellFile cell,
   cell.sources["rc"] = fmt::format("{} by {}, {:.2f} mV RMS", options.model, options.optimizer, 1e3 * result.identification.estimation.rmse_v);
   const model::CellFault fault = model::first_fault(cell.parameters);
   if (fault.what == nullptr) {
+    round_digits(cell);
     put(options.out, cell_text(cell));
     result.cell = cell.name;
   } else {
@@ -309,7 +182,11 @@ int run(const IdentifyOptions& options) {
   const id::Method method = method_of(options.optimizer);
   CellFile cell = read_cell(options.start);
   const double start_capacity_ah = cell.parameters.capacity_ah;
-  if (!options.ocv.empty()) take_ocv(options, cell, result);
+  if (!options.ocv.empty()) {
+    const OcvTaken taken = take_ocv(options.ocv, options.ocv_error_v, cell);
+    result.coulombic_efficiency = taken.coulombic_efficiency;
+    result.warnings = taken.warnings;
+  }
   if (options.capacity_ah > 0) cell.parameters.capacity_ah = options.capacity_ah;
   if (options.lean && cell.parameters.ocv.half_gap_v.size > 0) cell.parameters = id::leaning(cell.parameters, *options.lean);
 
@@ -344,14 +221,14 @@ int run(const IdentifyOptions& options) {
   grey_box.voltage_sigma_v = cell.parameters.noise.voltage_v;
   try {
     result.identification = id::identify_grey_box(id::started_from_rests(cell.parameters, groups[main_group].records.front().data, grey_box.bounds), groups[main_group].records, grey_box, method);
+    add_warnings(result);
+    if (groups.size() > 1) cell.at_temperature = at_temperatures(groups, main_group, grey_box, method, result);
   } catch (const std::invalid_argument& error) {
     throw BadInput(options.recordings.front(), 1, error.what());
   }
-  add_warnings(result);
-  if (groups.size() > 1) cell.at_temperature = at_temperatures(groups, main_group, grey_box, method, result);
 
   data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
-  std::vector<id::Data> shown = {records.front().data};
+  std::vector<id::Data> shown = {groups[main_group].records.front().data};
   for (const std::string& path : options.validate) {
     const id::Record record = identification_data(read_recording(path), data).record;
     result.validations.push_back({path, id::validate(result.identification.cell, record, result.identification.fading)});
@@ -360,7 +237,7 @@ int run(const IdentifyOptions& options) {
   if (!result.validations.empty()) result.validation = result.validations.front().second;
 
   cell.parameters = result.identification.cell;
-  take_noise(recordings, result, cell.parameters);
+  take_noise(recordings, result.validation ? *result.validation : result.identification.estimation, result.identification.parameters, cell.parameters);
   const auto& nodes = cell.parameters.rc.soc;
   std::string files;
   for (const std::string& path : options.recordings) files += (files.empty() ? "" : ", ") + std::filesystem::path(path).filename().string();
@@ -376,6 +253,7 @@ int run(const IdentifyOptions& options) {
   if (const model::CellFault fault = model::first_fault(cell.parameters); fault.what != nullptr) {
     throw BadInput(options.out, 1, fmt::format("what was identified is no cell: '{}' is out of range, expected {}; more or other recordings, or fewer --nodes, may help", fault.key, fault.what));
   }
+  round_digits(cell);
   put(options.out, cell_text(cell));
 
   result.cell = cell.name;
