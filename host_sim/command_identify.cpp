@@ -53,6 +53,12 @@ void add_warnings(IdentifyResult& result) {
   for (const std::string& w : result.identification.warnings) result.warnings.push_back({w.substr(0, w.find(':')), warning_text(w)});
 }
 
+std::string name_of_cell(const IdentifyOptions& options) { return !options.name.empty() ? options.name : std::filesystem::path(options.out).stem().string(); }
+
+SocWindow validation_window(const IdentifyOptions& options) {
+  return window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
+}
+
 /// recordings: the first that was identified from, then those that validate.
 void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordings, std::chrono::steady_clock::time_point begin, IdentifyResult& result) {
   for (const Warning& w : result.warnings) warn(w.text);
@@ -144,7 +150,7 @@ int run_linear(const IdentifyOptions& options, id::Method method, CellFile cell,
   add_warnings(result);
   if (options.recordings.size() > 1) result.warnings.push_back({"first_recording_only", "a linear model is identified from one recording, the first was taken"});
   DataOptions data = given;
-  data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
+  data.window = validation_window(options);
   std::vector<id::Data> shown = {record.data};
   for (const std::string& path : options.validate) {
     shown.push_back(identification_data(read_recording(path), data).record.data);
@@ -157,7 +163,7 @@ int run_linear(const IdentifyOptions& options, id::Method method, CellFile cell,
   cell.parameters.rc.r0_ohm.push_back(p[1].value);
   cell.parameters.rc.r1_ohm.push_back(p[2].value);
   cell.parameters.rc.c1_f.push_back(p[3].value);
-  cell.name = !options.name.empty() ? options.name : std::filesystem::path(options.out).stem().string();
+  cell.name = name_of_cell(options);
   cell.source = fmt::format("R0, R1, C1 identified from {}; the rest from {}", std::filesystem::path(options.recordings.front()).filename().string(), options.start);
   cell.sources["rc"] = fmt::format("{} by {}, {:.2f} mV RMS", options.model, options.optimizer, 1e3 * result.identification.estimation.rmse_v);
   const model::CellFault fault = model::first_fault(cell.parameters);
@@ -206,14 +212,14 @@ int run(const IdentifyOptions& options) {
     soc_max = std::max(soc_max, d.soc_max);
   }
 
+  if (options.model != "nlgr") return run_linear(options, method, cell, records.front(), (soc_min + soc_max) / 2, data, result);
+
   // the model's own table comes from the recordings nearest to 25 degrees C, where several temperatures are given
   const auto groups = grouped(recordings, records);
   std::size_t main_group = 0;
   for (std::size_t k = 0; k < groups.size(); ++k) {
     if (std::abs(groups[k].temperature_c - 25) < std::abs(groups[main_group].temperature_c - 25)) main_group = k;
   }
-  if (options.model != "nlgr") return run_linear(options, method, cell, records.front(), (soc_min + soc_max) / 2, data, result);
-
   id::GreyBoxOptions grey_box;
   grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(soc_min, soc_max) : options.nodes;
   grey_box.bounds = circuit_bounds(cell.parameters.capacity_ah);
@@ -227,7 +233,7 @@ int run(const IdentifyOptions& options) {
     throw BadInput(options.recordings.front(), 1, error.what());
   }
 
-  data.window = window_of("--validate-window", options.validate_window.empty() ? options.window : options.validate_window);
+  data.window = validation_window(options);
   std::vector<id::Data> shown = {groups[main_group].records.front().data};
   for (const std::string& path : options.validate) {
     const id::Record record = identification_data(read_recording(path), data).record;
@@ -241,7 +247,7 @@ int run(const IdentifyOptions& options) {
   const auto& nodes = cell.parameters.rc.soc;
   std::string files;
   for (const std::string& path : options.recordings) files += (files.empty() ? "" : ", ") + std::filesystem::path(path).filename().string();
-  cell.name = !options.name.empty() ? options.name : std::filesystem::path(options.out).stem().string();
+  cell.name = name_of_cell(options);
   cell.source = fmt::format("identified from {}; limits and the rest from {}", files, options.start);
   cell.sources["rc"] = fmt::format("{} by {} from {}, {} node{}: {:.2f} mV RMS, fit {:.1f} %; deviations count runs of residuals", options.model, options.optimizer, files,
                                    nodes.size, nodes.size == 1 ? "" : "s", 1e3 * result.identification.estimation.rmse_v, result.identification.estimation.fit_percent);

@@ -25,7 +25,7 @@ Eigen::VectorXd where(const Eigen::VectorXd& values, const Eigen::VectorXd& by) 
 
 bool measured(const Data& data, std::size_t k) { return std::isfinite(data.voltage_v[k]); }
 
-/// A quarter of a volt of nothing: what is refused before the search.
+/// Refuses what no search could find anything in.
 void require_excitation(const std::vector<Record>& records) {
   double largest_step_a = 0, capacity_ah = 0;
   std::size_t samples = 0;
