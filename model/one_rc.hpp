@@ -25,6 +25,7 @@ template <class S>
 struct Drive {
   Current<S> current_a;      ///< mean over the step, > 0 charges
   TimeStep<S> duration_s;    ///< > 0
+  Temperature<S> temperature_c = Temperature<S>(25);  ///< of the cell; read by mechanisms only
 };
 
 template <class S>

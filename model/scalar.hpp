@@ -38,6 +38,8 @@ struct Quantities {  // a floating-point or dual number: one type for all
   using Variance = S;
   using Coupling = S;
   using Count = S;
+  using Temperature = S;
+  using Factor = S;
 };
 
 template <>
@@ -57,6 +59,8 @@ struct Quantities<FixedPoint> {
   using Variance = Q<3, 60>;            // below 8 V^2 or 8 soc^2, step 8.7e-19
   using Coupling = Q<7, 24>;            // one state per unit of another: +-128
   using Count = Q<24, 7>;               // samples that share one error: below 16,777,216
+  using Temperature = Q<9, 22>;         // +-512 degrees C or K, step 0.24 uK
+  using Factor = Q<7, 24>;              // what a resistance is multiplied by: below 128
 };
 
 template <class S> using Soc = typename Quantities<S>::Soc;                              ///< 0 empty .. 1 full
@@ -74,6 +78,8 @@ template <class S> using Fraction = typename Quantities<S>::Fraction;           
 template <class S> using Variance = typename Quantities<S>::Variance;                    ///< square of a state's unit
 template <class S> using Coupling = typename Quantities<S>::Coupling;                    ///< state per state
 template <class S> using Count = typename Quantities<S>::Count;                          ///< 1
+template <class S> using Temperature = typename Quantities<S>::Temperature;              ///< degrees C
+template <class S> using Factor = typename Quantities<S>::Factor;                        ///< 1
 
 /// a * b stored in R. Needed only where both operands are wide (variances); elsewhere write a * b.
 template <class R, class A, class B>

@@ -1,0 +1,81 @@
+// The mechanisms there are, each once. Adding one: its file in model/mechanisms/, its line here (model/README.md).
+// The order is that in which laws act: sensors first, then what warms, then what changes the tables.
+#pragma once
+
+#include <tuple>
+
+#include "model/mechanisms/capacity_change.hpp"
+#include "model/mechanisms/channel_skew.hpp"
+#include "model/mechanisms/charge_transfer.hpp"
+#include "model/mechanisms/contact_intermittent.hpp"
+#include "model/mechanisms/contact_step.hpp"
+#include "model/mechanisms/coulombic_loss.hpp"
+#include "model/mechanisms/current_clipping.hpp"
+#include "model/mechanisms/current_gain.hpp"
+#include "model/mechanisms/current_offset.hpp"
+#include "model/mechanisms/direction_asymmetry.hpp"
+#include "model/mechanisms/entropic_ocv.hpp"
+#include "model/mechanisms/fast_polarisation.hpp"
+#include "model/mechanisms/initial_soc.hpp"
+#include "model/mechanisms/leakage.hpp"
+#include "model/mechanisms/ocv_hysteresis.hpp"
+#include "model/mechanisms/ocv_shape.hpp"
+#include "model/mechanisms/polarisation_growth.hpp"
+#include "model/mechanisms/resistance_growth.hpp"
+#include "model/mechanisms/self_heating.hpp"
+#include "model/mechanisms/slow_polarisation.hpp"
+#include "model/mechanisms/temperature_resistance.hpp"
+#include "model/mechanisms/temperature_sensor.hpp"
+#include "model/mechanisms/voltage_gain.hpp"
+#include "model/mechanisms/voltage_offset.hpp"
+
+namespace bms::model {
+
+using Catalogue = std::tuple<
+    ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,      // readings
+    InitialSoc, CapacityChange, CoulombicLoss, Leakage,                               // charge
+    SlowPolarisation, FastPolarisation, OcvHysteresis, SelfHeating,                   // states
+    ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance, ChargeTransfer, ContactStep, ContactIntermittent,
+    OcvShape, EntropicOcv,                                                            // tables
+    VoltageOffset, VoltageGain>;                                                      // the reading of the voltage
+
+inline constexpr std::size_t mechanism_count = std::tuple_size_v<Catalogue>;
+
+/// What can be said of a mechanism without its type.
+struct MechanismInfo {
+  std::string_view id;
+  Domain domain = Domain::physics;
+  bool on_board = false, needs_fpu = false;
+  std::array<Parameter, max_mechanism_parameters> parameter{};
+  std::size_t parameters = 0;
+  std::size_t states = 0;
+};
+
+namespace mechanism_detail {
+
+template <class M>
+constexpr MechanismInfo info() {
+  MechanismInfo i{M::id, M::domain, M::on_board, false, {}, M::parameters.size(), 0};
+  for (std::size_t k = 0; k < M::parameters.size(); ++k) i.parameter[k] = M::parameters[k];
+  if constexpr (requires { M::needs_fpu; }) i.needs_fpu = M::needs_fpu;
+  if constexpr (requires { M::template Law<double>::states; }) i.states = M::template Law<double>::states;
+  return i;
+}
+
+template <class... M>
+constexpr std::array<MechanismInfo, sizeof...(M)> infos(std::tuple<M...>*) {
+  return {info<M>()...};
+}
+
+}  // namespace mechanism_detail
+
+inline constexpr std::array<MechanismInfo, mechanism_count> catalogue = mechanism_detail::infos(static_cast<Catalogue*>(nullptr));
+
+/// Place in the catalogue; mechanism_count when there is none of that id.
+constexpr std::size_t mechanism_index(std::string_view id) {
+  std::size_t k = 0;
+  while (k < mechanism_count && catalogue[k].id != id) ++k;
+  return k;
+}
+
+}  // namespace bms::model

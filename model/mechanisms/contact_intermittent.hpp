@@ -1,0 +1,44 @@
+// A loose contact: R0 plus a constant in bursts. Which bursts is read off a recording and says nothing about another one.
+#pragma once
+
+#include <span>
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+/// A stretch of time, both ends included.
+struct Span {
+  double start_s = 0, end_s = 0;
+};
+
+struct ContactIntermittent {
+  static constexpr std::string_view id = "contact_intermittent";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = false;
+  static constexpr std::array parameters = {
+      Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 1, Per::siemens, "added to R0 in a burst"},
+      Parameter{"share", "1", Role::given, 0, 0, 1, Per::cell, "of the time that is bursts"},
+  };
+
+  template <class S>
+  struct Law {
+    Resistance<S> added_ohm;
+    std::span<const Span> bursts;  ///< ascending, of the recording at hand; none: a contact that holds
+    std::size_t next = 0;
+    bool there = false;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(p[0]) {}
+
+    constexpr void at(double time_s) {
+      while (next < bursts.size() && time_s > bursts[next].end_s) ++next;
+      there = next < bursts.size() && time_s >= bursts[next].start_s;
+    }
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const {
+      if (there) at.r0_ohm = Resistance<S>(at.r0_ohm + added_ohm);
+    }
+  };
+};
+
+}  // namespace bms::model

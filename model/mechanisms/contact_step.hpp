@@ -1,0 +1,38 @@
+// A contact has become worse at a moment and stays so: R0 plus a constant from then on. On a board, where recordings do not begin
+// again, it is there all the time.
+#pragma once
+
+#include "model/exponential.hpp"
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct ContactStep {
+  static constexpr std::string_view id = "contact_step";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"resistance_ohm", "ohm", Role::strength, 0, -0.05, 0.5, Per::siemens, "added to R0"},
+      Parameter{"onset_s", "s", Role::given, 0, -1e12, 1e12, Per::cell, "time in the recording; later recordings have it from their start"},
+  };
+
+  template <class S>
+  struct Law {
+    Resistance<S> added_ohm;
+    double onset_s = 0;
+    bool there = true;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(p[0]) {
+      if constexpr (Dual<Real>) onset_s = p[1].a;
+      else onset_s = p[1];
+    }
+
+    constexpr void at(double time_s) { there = time_s >= onset_s; }
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const {
+      if (there) at.r0_ohm = Resistance<S>(at.r0_ohm + added_ohm);
+    }
+  };
+};
+
+}  // namespace bms::model

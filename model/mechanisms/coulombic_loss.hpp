@@ -1,0 +1,27 @@
+// Not all charge that goes in comes out: a part of the charging current ends in side reactions.
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct CoulombicLoss {
+  static constexpr std::string_view id = "coulombic_loss";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"loss_fraction", "1", Role::strength, 0, -0.02, 0.1, Per::cell, "1 - eta"},
+  };
+
+  template <class S>
+  struct Law {
+    Fraction<S> stays;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 1>& p, double) : stays(Real(1) - p[0]) {}
+
+    constexpr Current<S> counted(const Current<S>& counted_a, const Drive<S>&) const { return counted_a > Current<S>(0) ? Current<S>(counted_a * stays) : counted_a; }
+  };
+};
+
+}  // namespace bms::model

@@ -1,0 +1,37 @@
+// The current sensor ends at +-L: what it reads there is less than what flows, on average by e. Beyond L the reading is bent
+// before it stops: from (1 - knee) L on.
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct CurrentClipping {
+  static constexpr std::string_view id = "current_clipping";
+  static constexpr Domain domain = Domain::instrument;
+  static constexpr bool on_board = false;
+  static constexpr bool needs_fpu = true;
+  static constexpr std::array parameters = {
+      Parameter{"excess_a", "A", Role::strength, 0, 0, 8, Per::ah, "e: current beyond L, mean over the time at the end; bounds in multiples of 1C"},
+      Parameter{"limit_a", "A", Role::given, 1, 0, 100, Per::ah, "L, where readings pile up"},
+      Parameter{"knee", "1", Role::given, 0.01, 0.0005, 0.5, Per::cell, "part of L over which the sensor bends"},
+  };
+
+  template <class S>
+  struct Law {
+    Current<S> excess_a, limit_a, from_a;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 3>& p, double) : excess_a(p[0]), limit_a(p[1]), from_a(p[1] * (Real(1) - p[2])) {}
+
+    constexpr Current<S> true_current(const Current<S>& read_a) const {
+      const bool negative = read_a < Current<S>(0);
+      const Current<S> size_a = negative ? Current<S>(-read_a) : read_a;
+      if (!(size_a > from_a)) return read_a;
+      const Current<S> more_a = excess_a * ((size_a - from_a) / (limit_a - from_a));
+      return negative ? Current<S>(read_a - more_a) : Current<S>(read_a + more_a);
+    }
+  };
+};
+
+}  // namespace bms::model

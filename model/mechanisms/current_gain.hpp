@@ -1,0 +1,27 @@
+// The current sensor reads too much by a fraction: I = I_read / (1 + g).
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct CurrentGain {
+  static constexpr std::string_view id = "current_gain";
+  static constexpr Domain domain = Domain::instrument;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"gain_error", "1", Role::strength, 0, -0.4, 0.4, Per::cell, "g"},
+  };
+
+  template <class S>
+  struct Law {
+    Factor<S> times;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 1>& p, double) : times(Real(1) / (Real(1) + p[0])) {}
+
+    constexpr Current<S> true_current(const Current<S>& read_a) const { return read_a * times; }
+  };
+};
+
+}  // namespace bms::model

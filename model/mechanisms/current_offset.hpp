@@ -1,0 +1,27 @@
+// The current sensor reads a constant too much: I = I_read - b.
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct CurrentOffset {
+  static constexpr std::string_view id = "current_offset";
+  static constexpr Domain domain = Domain::instrument;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"offset_a", "A", Role::strength, 0, -0.1, 0.1, Per::ah, "b; bounds in multiples of 1C"},
+  };
+
+  template <class S>
+  struct Law {
+    Current<S> offset_a;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 1>& p, double) : offset_a(p[0]) {}
+
+    constexpr Current<S> true_current(const Current<S>& read_a) const { return read_a - offset_a; }
+  };
+};
+
+}  // namespace bms::model

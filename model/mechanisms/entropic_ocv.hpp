@@ -1,0 +1,53 @@
+// The open-circuit voltage follows the temperature (entropy of the reaction):
+//
+//   V += dU/dT(soc) (T - T_ref),  dU/dT linear in soc between 10, 40, 70 and 95 %, constant outside
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct EntropicOcv {
+  static constexpr std::string_view id = "entropic_ocv";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"at_10_v_per_k", "V/K", Role::strength, 0, -0.002, 0.002, Per::cell, "dU/dT at 10 % of soc; -0.6 to 0.4 mV/K is usual for LFP and graphite"},
+      Parameter{"at_40_v_per_k", "V/K", Role::strength, 0, -0.002, 0.002, Per::cell, "the same at 40 %"},
+      Parameter{"at_70_v_per_k", "V/K", Role::strength, 0, -0.002, 0.002, Per::cell, "the same at 70 %"},
+      Parameter{"at_95_v_per_k", "V/K", Role::strength, 0, -0.002, 0.002, Per::cell, "the same at 95 %"},
+      Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell, "temperature of the cell file's OCV"},
+  };
+
+  template <class S>
+  struct Law {
+    static constexpr std::array<double, 4> node = {0.10, 0.40, 0.70, 0.95};
+    std::array<Voltage<S>, 4> v_per_k;
+    std::array<Voltage<S>, 3> delta_v_per_k;
+    Temperature<S> reference_c;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 5>& p, double)
+        : v_per_k{Voltage<S>(p[0]), Voltage<S>(p[1]), Voltage<S>(p[2]), Voltage<S>(p[3])},
+          delta_v_per_k{Voltage<S>(p[1] - p[0]), Voltage<S>(p[2] - p[1]), Voltage<S>(p[3] - p[2])},
+          reference_c(p[4]) {}
+
+    constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const Drive<S>& drive) const {
+      const Temperature<S> warmer_k = drive.temperature_c - reference_c;
+      Voltage<S> here = v_per_k[3];
+      if (soc < Soc<S>(node[0])) {
+        here = v_per_k[0];
+      } else {
+        for (std::size_t k = 0; k < 3; ++k) {
+          if (!(soc < Soc<S>(node[k + 1]))) continue;
+          const Fraction<S> t = Soc<S>(soc - Soc<S>(node[k])) * Coupling<S>(1 / (node[k + 1] - node[k]));
+          here = v_per_k[k] + t * delta_v_per_k[k];
+          break;
+        }
+      }
+      at.ocv_v = at.ocv_v + here * warmer_k;
+    }
+  };
+};
+
+}  // namespace bms::model

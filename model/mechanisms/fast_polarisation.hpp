@@ -1,0 +1,37 @@
+// A polarisation faster than R1 C1: double layer and charge transfer, seen in the first seconds after an edge.
+//
+//   du/dt = (R I - u) / tau        V += u
+#pragma once
+
+#include "model/exponential.hpp"
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct FastPolarisation {
+  static constexpr std::string_view id = "fast_polarisation";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 0.06, Per::siemens, "R"},
+      Parameter{"time_constant_s", "s", Role::shape, 1.5, 0.2, 6, Per::cell, "tau"},
+  };
+
+  template <class S>
+  struct Law {
+    static constexpr std::size_t states = 1;
+    static constexpr bool voltage_states = true;
+    Resistance<S> r_ohm;
+    Rate<S> rate_per_s;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 2>& p, double) : r_ohm(p[0]), rate_per_s(Real(1) / p[1]) {}
+
+    constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
+    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive) const {
+      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s)), Voltage<S>(r_ohm * drive.current_a)};
+    }
+  };
+};
+
+}  // namespace bms::model

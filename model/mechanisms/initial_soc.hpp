@@ -1,0 +1,25 @@
+// The state of charge at the start was another than believed.
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct InitialSoc {
+  static constexpr std::string_view id = "initial_soc";
+  static constexpr Domain domain = Domain::start;
+  static constexpr bool on_board = false;
+  static constexpr std::array parameters = {
+      Parameter{"shift", "1", Role::strength, 0, -0.5, 0.5, Per::cell, "true less believed soc"},
+  };
+
+  template <class S>
+  struct Law {
+    Soc<S> shift;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 1>& p, double) : shift(p[0]) {}
+  };
+};
+
+}  // namespace bms::model

@@ -1,0 +1,27 @@
+// An ohmic resistance larger everywhere than the cell file's: ageing, or a lead.
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct ResistanceGrowth {
+  static constexpr std::string_view id = "resistance_growth";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"fraction", "1", Role::strength, 0, -0.6, 5, Per::cell, "R0 times 1 + this"},
+  };
+
+  template <class S>
+  struct Law {
+    Factor<S> times;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 1>& p, double) : times(Real(1) + p[0]) {}
+
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const { mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, times); }
+  };
+};
+
+}  // namespace bms::model

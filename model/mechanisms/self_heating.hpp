@@ -1,0 +1,51 @@
+// The cell's inside is warmer than its surface by what the current heats it, and its resistances follow (Arrhenius):
+//
+//   dw/dt = (R_th I^2 (R0 + R1) - w) / tau        R = R exp(E / R_gas (1 / (T + w) - 1 / T))
+//
+// The state carried is w in units of 100 K. What follows the temperature that is measured belongs to temperature_resistance.
+#pragma once
+
+#include "model/exponential.hpp"
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct SelfHeating {
+  static constexpr std::string_view id = "self_heating";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"thermal_resistance_k_per_w", "K/W", Role::strength, 0, 0, 300, Per::siemens, "R_th from inside to where the temperature is measured"},
+      Parameter{"time_constant_s", "s", Role::shape, 900, 60, 6000, Per::cell, "tau"},
+      Parameter{"activation_j_per_mol", "J/mol", Role::given, 25000, 5000, 80000, Per::cell, "E of R0 and R1; only its product with R_th shows"},
+  };
+
+  template <class S>
+  struct Law {
+    static constexpr std::size_t states = 1;
+    static constexpr bool voltage_states = false;
+    Factor<S> energy;             ///< over R T, T at 25 degrees C
+    Coupling<S> per_w;            ///< 100 K per W
+    Rate<S> rate_per_s;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 3>& p, double)
+        : energy(mechanism_detail::energy_over_rt(p[2], Real(25))), per_w(p[0] / Real(100)), rate_per_s(Real(1) / p[1]) {}
+
+    constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
+    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {
+      const Voltage<S> drop_v = Resistance<S>(at.r0_ohm + at.r1_ohm) * drive.current_a;
+      const Coupling<S> heat_w = drop_v * drive.current_a;
+      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s)), Voltage<S>(heat_w * per_w)};
+    }
+    constexpr void warm(TablePoint<S>& at, const Voltage<S>& hundred_k, const Drive<S>&) const {
+      const Temperature<S> reference_c(25);
+      const Temperature<S> inside_c = reference_c + Temperature<S>(Coupling<S>(hundred_k) * Coupling<S>(100));
+      const Factor<S> less = mechanism_detail::arrhenius<S>(energy, reference_c, inside_c);
+      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, less);
+      mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, less);
+    }
+  };
+};
+
+}  // namespace bms::model

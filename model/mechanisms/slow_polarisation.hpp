@@ -1,0 +1,42 @@
+// Diffusion that is slower than R1 C1, as the first two modes of a ladder:
+//
+//   du_k/dt = (R_k I - u_k) / tau_k,  R_1 = (1 - w) R, tau_1 = tau,  R_2 = w R, tau_2 = tau / 9        V += u_1 + u_2
+//
+// w = 0 is a second RC branch; diffusion into a plate or a sphere has modes at 1, 1/9, 1/25 ... of the longest time constant
+// (Warburg element of finite length).
+#pragma once
+
+#include "model/exponential.hpp"
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct SlowPolarisation {
+  static constexpr std::string_view id = "slow_polarisation";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 0.12, Per::siemens, "R of both modes, after a pulse that is long against tau"},
+      Parameter{"time_constant_s", "s", Role::shape, 600, 60, 20000, Per::cell, "tau of the slowest mode"},
+      Parameter{"faster_share", "1", Role::place, 0.1, 0, 0.6, Per::cell, "w: share of the mode that is nine times faster"},
+  };
+
+  template <class S>
+  struct Law {
+    static constexpr std::size_t states = 2;
+    static constexpr bool voltage_states = true;
+    std::array<Resistance<S>, 2> r_ohm;
+    std::array<Rate<S>, 2> rate_per_s;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 3>& p, double)
+        : r_ohm{Resistance<S>(p[0] * (Real(1) - p[2])), Resistance<S>(p[0] * p[2])}, rate_per_s{Rate<S>(Real(1) / p[1]), Rate<S>(Real(9) / p[1])} {}
+
+    constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
+    constexpr Relaxation<S> settle(std::size_t i, const TablePoint<S>&, const Drive<S>& drive) const {
+      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s[i])), Voltage<S>(r_ohm[i] * drive.current_a)};
+    }
+  };
+};
+
+}  // namespace bms::model

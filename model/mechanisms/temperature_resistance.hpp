@@ -1,0 +1,39 @@
+// Resistances that follow the temperature by Arrhenius:
+//
+//   R(T) = R exp(E / R_gas (1 / T - 1 / T_ref)),  T_ref: where the cell file was made
+//
+// C1 stays, so the time constant follows R1.
+#pragma once
+
+#include "model/exponential.hpp"
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct TemperatureResistance {
+  static constexpr std::string_view id = "temperature_resistance";
+  static constexpr Domain domain = Domain::physics;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, -20000, 60000, Per::cell, "E of R0; 5 to 30 kJ/mol is usual"},
+      Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, -20000, 90000, Per::cell, "E of R1; 30 to 70 kJ/mol is usual"},
+      Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell, "temperature of the cell file's resistances"},
+  };
+
+  template <class S>
+  struct Law {
+    Factor<S> r0_energy, r1_energy;  ///< over R T_ref
+    Temperature<S> reference_c;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 3>& p, double)
+        : r0_energy(mechanism_detail::energy_over_rt(p[0], p[2])), r1_energy(mechanism_detail::energy_over_rt(p[1], p[2])), reference_c(p[2]) {}
+
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
+      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, mechanism_detail::arrhenius<S>(r0_energy, reference_c, drive.temperature_c));
+      mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, mechanism_detail::arrhenius<S>(r1_energy, reference_c, drive.temperature_c));
+    }
+  };
+};
+
+}  // namespace bms::model

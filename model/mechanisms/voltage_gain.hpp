@@ -1,0 +1,27 @@
+// The voltage sensor reads too much by a fraction: V_read = (1 + g) V.
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct VoltageGain {
+  static constexpr std::string_view id = "voltage_gain";
+  static constexpr Domain domain = Domain::instrument;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"gain_error", "1", Role::strength, 0, -0.03, 0.03, Per::cell, "g"},
+  };
+
+  template <class S>
+  struct Law {
+    Factor<S> times;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 1>& p, double) : times(Real(1) + p[0]) {}
+
+    constexpr Voltage<S> reading(const Voltage<S>& v) const { return v * times; }
+  };
+};
+
+}  // namespace bms::model

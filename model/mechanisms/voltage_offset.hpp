@@ -1,0 +1,27 @@
+// The voltage sensor reads a constant too much: V_read = V + b.
+#pragma once
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+struct VoltageOffset {
+  static constexpr std::string_view id = "voltage_offset";
+  static constexpr Domain domain = Domain::instrument;
+  static constexpr bool on_board = true;
+  static constexpr std::array parameters = {
+      Parameter{"offset_v", "V", Role::strength, 0, -0.1, 0.1, Per::cell, "b"},
+  };
+
+  template <class S>
+  struct Law {
+    Voltage<S> offset_v;
+
+    template <class Real>
+    constexpr Law(const std::array<Real, 1>& p, double) : offset_v(p[0]) {}
+
+    constexpr Voltage<S> reading(const Voltage<S>& v) const { return v + offset_v; }
+  };
+};
+
+}  // namespace bms::model
