@@ -1,0 +1,71 @@
+#include "diagnosis/calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bms::diagnosis {
+
+namespace {
+
+/// Knots over the soc that the records pass through, and one step beyond.
+std::vector<double> knots(double low, double high, double step) {
+  std::vector<double> at;
+  for (double soc = std::floor(low / step) * step; soc < high + step * 0.999; soc += step) at.push_back(soc);
+  if (at.size() < 2) at.push_back(at.front() + step);
+  return at;
+}
+
+}  // namespace
+
+Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Record> records) {
+  double low = 2, high = -1;
+  for (const Record& r : records) {
+    double soc = r.initial_soc, known_a = 0;
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      if (std::isfinite(r.current_a[k])) known_a = r.current_a[k];
+      if (k > 0) soc += known_a * (r.time_s[k] - r.time_s[k - 1]) / (3'600 * cell.capacity_ah);
+      low = std::min(low, soc);
+      high = std::max(high, soc);
+    }
+  }
+  low = std::clamp(low, -0.1, 1.0);
+  high = std::clamp(high, low, 1.1);
+
+  const model::Tolerance& t = cell.tolerance;
+  ocv_v_ = std::max(t.ocv_v, 2e-4);
+  const double fraction = std::max(t.resistance_fraction, 2e-3);
+  r0_fraction_ = fraction;
+  r1_fraction_ = 2 * fraction;
+  c1_fraction_ = 4 * fraction;
+  offset_a_ = std::min(cell.noise.current_offset_a, 1e-3 * cell.capacity_ah);
+
+  const auto hats = [&](std::vector<double> at) {
+    Hats made(std::move(at), size_);
+    size_ += made.size();
+    return made;
+  };
+  ocv_ = hats(knots(low, high, 0.05));
+  const auto& ocv = cell.ocv;
+  for (std::size_t k = 1; k + 1 < ocv.soc.size; ++k) {
+    const double bend = std::abs(ocv.b1_v[k] - ocv.b1_v[k - 1]), between = std::min(ocv.soc[k + 1] - ocv.soc[k], ocv.soc[k] - ocv.soc[k - 1]);
+    // a curve that follows both lines but for a quarter of the pieces beside the corner passes it at bend * width / 4
+    const double width = std::min(0.025, between / 2), deviation_v = bend * width / 6;
+    if (deviation_v > ocv_v_ / 2 && ocv.soc[k] > low - width && ocv.soc[k] < high + width) corners_.push_back({ocv.soc[k], width, deviation_v, size_++});
+  }
+  r0_ = hats(knots(low, high, 0.1));
+  r1_ = hats(knots(low, high, 0.2));
+  c1_ = hats(knots(low, high, 0.2));
+  capacity_ = size_++;
+  gain_ = size_++;
+  for (const Record& r : records) {
+    initial_soc_.push_back(size_++);
+    initial_soc_sigma_.push_back(std::max(r.initial_soc_sigma, 1e-4));
+    const double every_s = std::max(cell.noise.current_offset_correlation_s, r.duration_s() / 12);
+    std::vector<double> at;
+    for (double s = r.time_s.front(); s < r.time_s.back() + every_s; s += every_s) at.push_back(s);
+    if (at.size() < 2) at.push_back(at.front() + every_s);
+    offset_.push_back(hats(std::move(at)));
+  }
+}
+
+}  // namespace bms::diagnosis

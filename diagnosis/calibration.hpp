@@ -1,0 +1,112 @@
+// The control hypothesis: every base parameter free within what the calibration is good for (the cell file's [tolerance]).
+//
+// A mechanism must beat this, not the frozen model: a table that is 1 mV or 2 % off is no missing physics. Each unknown is a
+// standard normal one; its size in the model is its deviation:
+//
+//   OCV         at knots every 5 % of soc: tolerance.ocv_v; where the table bends sharply, another one beside the corner: a smooth
+//               curve cuts a corner of straight lines by its change of slope times some soc
+//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction
+//   capacity    0.5 %;  gain of the current 0.2 %
+//   per record  initial soc; a slow wander of the current's zero, 0.1 % of 1C at most, in hours
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "diagnosis/record.hpp"
+#include "model/cell_parameters.hpp"
+#include "model/extended.hpp"
+
+namespace bms::diagnosis {
+
+/// Values between knots, straight lines; constant outside.
+class Hats {
+ public:
+  Hats() = default;
+  Hats(std::vector<double> knots, std::size_t first) : knots_(std::move(knots)), first_(first) {}
+  std::size_t size() const { return knots_.size(); }
+
+  /// Sum of the unknowns u weighed at x.
+  template <class S>
+  S at(const S& x, const std::vector<S>& u) const {
+    const double v = value(x);
+    if (v <= knots_.front()) return u[first_];
+    if (v >= knots_.back()) return u[first_ + knots_.size() - 1];
+    std::size_t k = 0;
+    while (v >= knots_[k + 1]) ++k;
+    const S t = (x - S(knots_[k])) * (1 / (knots_[k + 1] - knots_[k]));
+    return u[first_ + k] + t * (u[first_ + k + 1] - u[first_ + k]);
+  }
+
+ private:
+  template <class S>
+  static double value(const S& x) {
+    if constexpr (model::Dual<S>) return x.a;
+    else return x;
+  }
+  std::vector<double> knots_;
+  std::size_t first_ = 0;
+};
+
+class Calibration {
+ public:
+  Calibration(const model::CellParameters<>& cell, std::span<const Record> records);
+
+  std::size_t size() const { return size_; }
+
+  /// Applies the unknowns to the tables at a soc.
+  template <class S>
+  void adjust(model::TablePoint<S>& at, const S& soc, const std::vector<S>& u) const {
+    at.ocv_v += ocv_.at(soc, u) * ocv_v_;
+    for (const Corner& c : corners_) {
+      const double apart = (value(soc) - c.soc) / c.width;
+      if (apart <= -1 || apart >= 1) continue;
+      const S t = (soc - S(c.soc)) * (1 / c.width);
+      at.ocv_v += u[c.unknown] * (c.deviation_v * (apart < 0 ? S(1) + t : S(1) - t));
+    }
+    at.r0_ohm *= S(1) + r0_.at(soc, u) * r0_fraction_;
+    at.r1_ohm *= S(1) + r1_.at(soc, u) * r1_fraction_;
+    at.c1_f *= S(1) + c1_.at(soc, u) * c1_fraction_;
+  }
+  /// Error of the current's zero.
+  template <class S>
+  S offset_a(std::size_t record, double time_s, const std::vector<S>& u) const {
+    return offset_[record].at(S(time_s), u) * offset_a_;
+  }
+  template <class S>
+  S initial_soc_shift(std::size_t record, const std::vector<S>& u) const {
+    return u[initial_soc_[record]] * initial_soc_sigma_[record];
+  }
+  template <class S>
+  S capacity_loss(const std::vector<S>& u) const {
+    return u[capacity_] * 0.005;
+  }
+  template <class S>
+  S gain_error(const std::vector<S>& u) const {
+    return u[gain_] * 0.002;
+  }
+  /// Deviation of the error of the current's zero; its memory is current_offset_correlation_s of the cell file.
+  double offset_a() const { return offset_a_; }
+
+ private:
+  struct Corner {
+    double soc, width, deviation_v;
+    std::size_t unknown;
+  };
+  template <class S>
+  static double value(const S& x) {
+    if constexpr (model::Dual<S>) return x.a;
+    else return x;
+  }
+
+  Hats ocv_, r0_, r1_, c1_;
+  std::vector<Corner> corners_;
+  std::vector<Hats> offset_;
+  std::vector<std::size_t> initial_soc_;
+  std::vector<double> initial_soc_sigma_;
+  std::size_t capacity_ = 0, gain_ = 0, size_ = 0;
+  double ocv_v_ = 0, r0_fraction_ = 0, r1_fraction_ = 0, c1_fraction_ = 0, offset_a_ = 0;
+};
+
+}  // namespace bms::diagnosis

@@ -1,0 +1,19 @@
+// Every number that a verdict hangs on, in one place. Costs and gains are differences of -2 log posterior: a gain of x^2 is an effect
+// of x standard deviations. Where they come from: README.md, "How the thresholds were found".
+#pragma once
+
+#include <cstddef>
+
+namespace bms::diagnosis::decision {
+
+inline constexpr double detected = 18;          ///< gain of one mechanism over the calibration that chance does not reach
+inline constexpr double worth_a_fit = 5;        ///< first-order gain below which a mechanism is not fitted
+inline constexpr std::size_t most_fits = 6;     ///< of mechanisms beside each other
+inline constexpr double same = 7;               ///< rivals this close cannot be told apart
+inline constexpr double per_unknown = 3;        ///< cost of every unknown after the first
+inline constexpr double explained = 0.65;       ///< share of the mismatch that a cause must explain
+inline constexpr double much_left = 40;         ///< what must remain, in gain, to say that something unknown is there
+inline constexpr double temper = 3;             ///< log-likelihoods are this much too sure of themselves
+inline constexpr double fast_excess = 0.25;     ///< variance of the whitened residual above 1 that noise does not reach
+
+}  // namespace bms::diagnosis::decision

@@ -1,0 +1,398 @@
+#include "diagnosis/diagnose.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "diagnosis/decision.hpp"
+#include "diagnosis/locate.hpp"
+#include "diagnosis/remainder.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+using model::catalogue;
+using model::Role;
+
+constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
+
+/// What its unknowns cost a mechanism.
+double price(std::size_t mechanism, std::size_t bursts) {
+  double unknowns = 0;
+  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) unknowns += catalogue[mechanism].parameter[p].role != Role::given ? 1 : 0;
+  if (catalogue[mechanism].id == "contact_step") unknowns += 2;  // its moment was sought too
+  return decision::per_unknown * (unknowns - 1) + 16.0 * static_cast<double>(bursts);
+}
+
+double price(const Hypothesis& h) {
+  double sum = 0;
+  std::size_t bursts = 0;
+  for (const auto& spans : h.bursts) bursts += spans.size();
+  for (const std::size_t m : h.added()) sum += price(m, m == index_of("contact_intermittent") ? bursts : 0);
+  return sum;
+}
+
+/// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other resistances.
+double known_before(const Evidence& evidence, const Hypothesis& h) {
+  if (h.find(index_of("temperature_resistance")) == nullptr || h.own > 0) return 0;
+  double away_k = 0;
+  for (const Record& r : evidence.records()) {
+    for (const double c : r.temperature_c) {
+      if (std::isfinite(c)) away_k = std::max(away_k, std::abs(c - 25));
+    }
+  }
+  return std::clamp((away_k - 5) * 1.5, 0.0, 15.0);
+}
+
+class Chain {
+ public:
+  Chain(Evidence& evidence, const Options& options) : evidence_(evidence), options_(options) {}
+
+  double score(const Fit& f) const { return f.cost + price(f.hypothesis) - known_before(evidence_, f.hypothesis); }
+
+  /// A candidate added to what is there and fitted from its estimate; shapes far apart are tried from two sides.
+  Fit fit_with(const Fit& around, const Candidate& c) {
+    Hypothesis h = with(around.hypothesis, c.start);
+    if (!c.bursts.empty()) h.bursts = c.bursts;
+    Fit best = evidence_.fit(h, around.calibration);
+    if (catalogue[c.mechanism].id == "contact_step") best = refined_onset(best);
+    tell(catalogue[c.mechanism].id);
+    return best;
+  }
+
+  /// The moment of a contact's step, to the sample.
+  Fit refined_onset(Fit best) {
+    const Record& r = evidence_.records().front();
+    const auto setting = [](Fit& f) -> MechanismSetting& { return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(), [](const MechanismSetting& s) { return s.index == index_of("contact_step"); }); };
+    double reach_s = r.duration_s() / 40;
+    Eigen::VectorXd residual;
+    while (reach_s > 1.5 * r.duration_s() / static_cast<double>(r.size())) {
+      const double middle_s = setting(best).value[1];
+      for (const double step : {-1.0, -0.5, 0.5, 1.0}) {
+        Hypothesis h = best.hypothesis;
+        for (MechanismSetting& s : h.settings) {
+          if (s.index == index_of("contact_step")) s.value[1] = middle_s + step * reach_s;
+        }
+        residual = evidence_.residual(h, best.calibration);
+        const double cost = residual.squaredNorm() + (best.cost - best.residual.squaredNorm());
+        if (cost < best.cost) {
+          best.cost = cost;
+          best.residual = residual;
+          best.hypothesis = h;
+        }
+      }
+      reach_s /= 2;
+    }
+    return evidence_.fit(best.hypothesis, best.calibration, 4);
+  }
+
+  /// The best of adding one mechanism to what is there, and its rivals.
+  std::vector<Fit> one_more(const Fit& around, const std::vector<std::size_t>& over, std::size_t most) {
+    const Screen screen(evidence_, around, over);
+    std::vector<Fit> fits;
+    for (const Candidate& c : screen.candidates()) {
+      if (fits.size() >= most || c.gain < decision::worth_a_fit) break;
+      fits.push_back(fit_with(around, c));
+    }
+    std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return score(a) < score(b); });
+    return fits;
+  }
+
+  Fit refit(const Fit& f, int iterations = 6) { return evidence_.fit(f.hypothesis, f.calibration, iterations); }
+
+  void tell(std::string_view what) {
+    ++steps_;
+    if (options_.progress) options_.progress(1 - std::exp(-static_cast<double>(steps_) / 20), std::string(what));
+  }
+
+ private:
+  Evidence& evidence_;
+  const Options& options_;
+  int steps_ = 0;
+};
+
+/// The noise that a residual speaks of, at least the nominal: amplitude of the fast and the slow part by maximum likelihood.
+NoiseModel noise_of(const Evidence& evidence, const Fit& fit, const NoiseModel& least) {
+  Columns raw(static_cast<Eigen::Index>(evidence.samples()), 1);
+  Eigen::Index row = 0;
+  for (std::size_t r = 0; r < evidence.records().size(); ++r) {
+    const std::vector<double> v = evidence.voltage(fit.hypothesis, fit.calibration, r);
+    for (std::size_t k = 0; k < v.size(); ++k, ++row) raw(row, 0) = evidence.usable(r)[k] != 0 ? evidence.records()[r].voltage_v[k] - v[k] : 0;
+  }
+  NoiseModel best = least;
+  Evidence trial = evidence;
+  const auto likelihood = [&](const NoiseModel& n) {
+    trial.set_noise(n);
+    Columns e = raw;
+    trial.whiten(e);
+    return e.squaredNorm() + trial.log_determinant();
+  };
+  double best_cost = likelihood(best);
+  const auto improve = [&](auto member, std::initializer_list<double> factors) {
+    const NoiseModel from = best;
+    for (const double factor : factors) {
+      NoiseModel n = from;
+      n.*member = std::max(from.*member * factor, least.*member);
+      const double cost = likelihood(n);
+      if (cost < best_cost) {
+        best_cost = cost;
+        best = n;
+      }
+    }
+  };
+  for (int round = 0; round < 2; ++round) {
+    improve(&NoiseModel::fast_v, {1.5, 2.25, 3.5, 5.0, 8.0, 0.7});
+    improve(&NoiseModel::slow_v, {1.5, 2.25, 3.5, 5.0, 8.0, 0.7});
+    improve(&NoiseModel::white_v, {1.25, 1.6, 2.0, 3.0});
+  }
+  return best;
+}
+
+
+}  // namespace
+
+const char* name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::no_mismatch: return "NO_MISMATCH";
+    case Verdict::cause: return "CAUSE";
+    case Verdict::causes: return "CAUSES";
+    case Verdict::ambiguous: return "AMBIGUOUS";
+    case Verdict::unknown: return "UNKNOWN";
+    case Verdict::data_fault: return "DATA_FAULT";
+    case Verdict::not_testable: return "NOT_TESTABLE";
+  }
+  return "";
+}
+
+std::vector<MechanismSetting> later_recording(const Hypothesis& extended) {
+  std::vector<MechanismSetting> later;
+  for (MechanismSetting s : extended.settings) {
+    if (s.index == index_of("initial_soc") || s.index == index_of("contact_intermittent")) continue;
+    if (s.index == index_of("contact_step")) s.value[1] = 0;
+    later.push_back(s);
+  }
+  return later;
+}
+
+std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings, const Record& record, std::vector<double>* soc) {
+  const Evidence evidence(cell, settings, {record}, NoiseModel{});
+  return evidence.voltage(evidence.base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())), 0, soc);
+}
+
+Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own, std::vector<Record> records, const Options& options) {
+  Diagnosis d;
+  for (Record& r : records) {
+    Trust trust = examine(r, cell);
+    for (DataFault& f : trust.faults) d.faults.push_back(std::move(f));
+    for (std::string& w : trust.warnings) d.warnings.push_back(std::move(w));
+  }
+  if (!d.faults.empty()) {
+    d.verdict = Verdict::data_fault;
+    d.statement = d.faults.front().text;
+    for (const DataFault& f : d.faults) d.spans.insert(d.spans.end(), f.spans.begin(), f.spans.end());
+    return d;
+  }
+
+  // noise before any hypothesis
+  std::vector<double> white;
+  for (const Record& r : records) white.push_back(white_noise(r.voltage_v, r.current_a, 0.01 * cell.capacity_ah, cell.noise.voltage_v));
+  NoiseModel noise;
+  noise.white_v = *std::max_element(white.begin(), white.end());
+  noise.fast_v = std::max(cell.tolerance.ocv_v, 5e-4);
+  noise.slow_v = 1.3 * std::max(cell.tolerance.drift_v, 5e-4);
+  Evidence evidence(cell, own, std::move(records), noise);
+
+  std::vector<std::size_t> testable;
+  for (std::size_t m = 0; m < model::mechanism_count; ++m) {
+    const auto reason = not_testable(evidence, m);
+    if (reason) d.not_testable.push_back({m, *reason});
+    else if (evidence.base().find(m) == nullptr) testable.push_back(m);
+  }
+  std::size_t moving = 0;
+  double duration_s = 0;
+  for (const Record& r : evidence.records()) {
+    duration_s += r.duration_s();
+    for (const double a : r.current_a) moving += std::isfinite(a) && std::abs(a) > 0.02 * cell.capacity_ah ? 1 : 0;
+  }
+  const auto cannot = [&](std::string why) {
+    d.verdict = Verdict::not_testable;
+    d.statement = "Nothing can be said: " + std::move(why) + ".";
+    d.not_testable.clear();
+    for (std::size_t m = 0; m < model::mechanism_count; ++m) d.not_testable.push_back({m, d.statement.substr(23, d.statement.size() - 24)});
+    return d;
+  };
+  if (evidence.used() < 50) return cannot(fmt::format("there are {} usable voltage readings", evidence.used()));
+  if (duration_s < 300) return cannot(fmt::format("the recording lasts {:.0f} s", duration_s));
+  if (moving < 10) return cannot("the cell rests all the time");
+  double low_a = 1e9, high_a = -1e9;
+  for (const Record& r : evidence.records()) {
+    for (const double a : r.current_a) {
+      if (std::isfinite(a)) low_a = std::min(low_a, a), high_a = std::max(high_a, a);
+    }
+  }
+  if (high_a - low_a < 0.02 * cell.capacity_ah) return cannot("the current does not change");
+
+  Chain chain(evidence, options);
+  Fit base = evidence.fit(evidence.base());
+  chain.tell("calibration");
+
+  // one mechanism after the other, as long as chance would not do it
+  std::vector<Fit> singles;
+  Fit current = base;
+  const auto grow = [&] {
+    while (current.hypothesis.added().size() < options.most_mechanisms) {
+      std::vector<Fit> more = chain.one_more(current, testable, decision::most_fits);
+      if (current.hypothesis.added().empty()) singles = more;
+      if (more.empty() || chain.score(current) - chain.score(more.front()) < decision::detected) break;
+      current = more.front();
+    }
+  };
+  grow();
+  {
+    // the first screen tells the limits
+    const Screen screen(evidence, base, testable);
+    for (const Candidate& c : screen.candidates()) {
+      if (c.limit > 0) d.limits.push_back({c.mechanism, 0, c.limit});
+    }
+  }
+
+  // what the best still leaves is the noise by which rivals are judged
+  const NoiseModel nominal = evidence.noise();
+  const double base_cost_nominal = base.cost;
+  const Fit best_nominal = current;
+  const Remainder remainder = what_remains(evidence, current);
+  NoiseModel seen = nominal;
+  if (!current.hypothesis.added().empty()) {
+    seen = noise_of(evidence, current, nominal);
+    evidence.set_noise(seen);
+    base = chain.refit(base);
+    current = chain.refit(current);
+  }
+  chain.tell("noise");
+
+  // take away what does not carry, try each one's rivals
+  std::map<std::size_t, std::vector<Fit>> rivals;
+  std::map<std::size_t, double> gains;
+  for (int round = 0; round < 4; ++round) {
+    bool changed = false;
+    rivals.clear();
+    gains.clear();
+    std::vector<std::pair<double, Fit>> reduced;
+    for (const std::size_t m : current.hypothesis.added()) {
+      Fit less = chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, {}, {}, false}, 8);
+      if (current.hypothesis.added().size() == 1) less = base;
+      gains[m] = chain.score(less) - chain.score(current);
+      if (gains[m] < decision::detected) {
+        reduced.emplace_back(gains[m], less);
+        continue;
+      }
+      for (Fit& rival : chain.one_more(less, testable, 5)) {
+        if (rival.hypothesis.find(m) != nullptr) {
+          if (chain.score(rival) < chain.score(current) - 1) current = rival, changed = true;  // the same from another start
+          continue;
+        }
+        if (chain.score(rival) < chain.score(current) - 0.5) {
+          current = rival;
+          changed = true;
+        }
+        rivals[m].push_back(std::move(rival));
+      }
+      if (changed) break;
+    }
+    if (!changed && !reduced.empty()) {
+      std::sort(reduced.begin(), reduced.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+      current = reduced.front().second;
+      changed = true;
+    }
+    if (!changed) break;
+  }
+
+  // is it enough?
+  d.base_cost = base_cost_nominal;
+  d.best_cost = best_nominal.cost;
+  const double gained = base_cost_nominal - best_nominal.cost;
+  d.remaining = remainder.gain;
+  d.fast_excess = remainder.fast_excess;
+  d.adequacy = gained + d.remaining > 0 ? std::max(gained, 0.0) / (std::max(gained, 0.0) + d.remaining) : 1;
+  const bool something = !current.hypothesis.added().empty();
+  const bool unknown = d.remaining > decision::much_left && (!something || d.adequacy < decision::explained);
+
+  // findings
+  d.extended = current.hypothesis;
+  const Contributions parts = contributions(evidence, base, current);
+  d.explained_share = parts.explained_share;
+  d.unexplained_rmse_v = parts.remaining_rmse_v;
+  d.unexplained_share = 1 - parts.explained_share;
+  d.noise_floor_v = std::sqrt(nominal.white_v * nominal.white_v + nominal.fast_v * nominal.fast_v + nominal.slow_v * nominal.slow_v);
+  std::vector<std::vector<std::size_t>> sets;
+  for (const std::size_t m : current.hypothesis.added()) {
+    Finding f;
+    f.setting = *current.hypothesis.find(m);
+    f.gain = gains[m];
+    double sum = 1;
+    std::vector<std::pair<double, std::size_t>> near;
+    for (const Fit& rival : rivals[m]) {
+      const double behind = chain.score(rival) - chain.score(current);
+      std::size_t other = m;
+      for (const std::size_t a : rival.hypothesis.added()) {
+        if (current.hypothesis.find(a) == nullptr) other = a;
+      }
+      sum += std::exp(-behind / (2 * decision::temper));
+      if (behind < decision::same) near.emplace_back(behind, other);
+    }
+    std::sort(near.begin(), near.end());
+    for (const auto& [behind, other] : near) {
+      if (std::find(f.equivalent_to.begin(), f.equivalent_to.end(), other) == f.equivalent_to.end()) f.equivalent_to.push_back(other);
+    }
+    f.probability = 1 / sum;
+    f.rms_contribution_v = parts.rms_v.contains(m) ? parts.rms_v.at(m) : 0;
+    d.findings.push_back(std::move(f));
+  }
+  std::stable_sort(d.findings.begin(), d.findings.end(), [](const Finding& a, const Finding& b) { return a.gain > b.gain; });
+
+  const auto rank = [&](const Fit& f) {
+    Ranked r{f.hypothesis.added(), 0, chain.score(base) - chain.score(f), 0};
+    r.explained_share = contributions(evidence, base, f).explained_share;
+    d.candidates.push_back(r);
+  };
+  if (something) {
+    rank(current);
+    for (const auto& [m, fits] : rivals) {
+      for (const Fit& f : fits) rank(f);
+    }
+  } else {
+    for (const Fit& f : singles) rank(f);
+  }
+  std::stable_sort(d.candidates.begin(), d.candidates.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
+  double total = something ? 0 : 1;
+  for (const Ranked& r : d.candidates) total += std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper));
+  for (Ranked& r : d.candidates) r.probability = std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper)) / total;
+
+  d.spans = unknown || !something ? remainder.spans : parts.spans;
+  d.regimes = regimes(evidence, current, unknown || !something ? remainder.energy : parts.energy);
+  for (std::size_t r = 0; r < evidence.records().size(); ++r) {
+    RecordView view;
+    view.base_v = evidence.voltage(evidence.base(), Eigen::VectorXd::Zero(base.calibration.size()), r);
+    view.extended_v = evidence.voltage(current.hypothesis, current.calibration, r, &view.soc);
+    d.views.push_back(std::move(view));
+  }
+
+  if (unknown) d.verdict = Verdict::unknown;
+  else if (!something) d.verdict = Verdict::no_mismatch;
+  else if (d.findings.size() > 1) d.verdict = Verdict::causes;
+  else d.verdict = d.findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
+  if (d.verdict == Verdict::no_mismatch || d.verdict == Verdict::unknown) {
+    if (d.verdict == Verdict::no_mismatch) d.spans.clear(), d.regimes.clear(), d.unexplained_share = 0;
+  }
+  if (options.progress) options.progress(1, "done");
+  return d;
+}
+
+}  // namespace bms::diagnosis

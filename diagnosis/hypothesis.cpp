@@ -1,0 +1,375 @@
+#include "diagnosis/hypothesis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include <Eigen/Cholesky>
+#include <ceres/jet.h>
+
+#include "model/readings.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+using model::catalogue;
+constexpr std::size_t skew = model::mechanism_index("channel_skew");
+constexpr std::size_t sensor = model::mechanism_index("temperature_sensor");
+constexpr std::size_t capacity_change = model::mechanism_index("capacity_change");
+constexpr std::size_t current_gain = model::mechanism_index("current_gain");
+constexpr std::size_t initial_soc = model::mechanism_index("initial_soc");
+constexpr std::size_t intermittent = model::mechanism_index("contact_intermittent");
+
+constexpr std::size_t lanes = 8;
+using Jet = ceres::Jet<double, static_cast<int>(lanes)>;
+
+/// Reading beside a step of the current: voltage and current are never read at quite the same moment. Share of a sample's step.
+constexpr double edge_jitter = 0.05;
+
+double log_prior_width = 1.5;  // of a shape: e^1.5, between its usual and an unusual value
+
+}  // namespace
+
+std::vector<std::size_t> Hypothesis::added() const {
+  std::vector<std::size_t> ids;
+  for (std::size_t k = own; k < settings.size(); ++k) ids.push_back(settings[k].index);
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+const MechanismSetting* Hypothesis::find(std::size_t index) const {
+  for (const MechanismSetting& s : settings) {
+    if (s.index == index) return &s;
+  }
+  return nullptr;
+}
+
+std::vector<Sought> Hypothesis::sought() const {
+  std::vector<Sought> all;
+  for (std::size_t k = own; k < settings.size(); ++k) {
+    const model::MechanismInfo& info = catalogue[settings[k].index];
+    for (std::size_t p = 0; p < info.parameters; ++p) {
+      if (info.parameter[p].role != model::Role::given) all.push_back({k, p});
+    }
+  }
+  return all;
+}
+
+std::string Hypothesis::name() const {
+  std::string text;
+  for (const std::size_t id : added()) text += (text.empty() ? "" : "+") + std::string(catalogue[id].id);
+  return text.empty() ? "calibration" : text;
+}
+
+Hypothesis with(const Hypothesis& h, const MechanismSetting& setting) {
+  Hypothesis more = h;
+  more.settings.push_back(setting);
+  return more;
+}
+
+Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah) {
+  MechanismSetting setting{mechanism, {}, {}};
+  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) setting.value[p] = catalogue[mechanism].parameter[p].by_default(capacity_ah);
+  return with(h, setting);
+}
+
+Hypothesis without(const Hypothesis& h, std::size_t mechanism) {
+  Hypothesis less = h;
+  std::erase_if(less.settings, [&](const MechanismSetting& s) { return s.index == mechanism && &s - less.settings.data() >= static_cast<std::ptrdiff_t>(h.own); });
+  return less;
+}
+
+struct Evidence::Linear {
+  Columns columns;                 ///< white
+  Eigen::LLT<Eigen::MatrixXd> normal;  ///< columns' columns + 1
+};
+
+Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSetting> own, std::vector<Record> records, const NoiseModel& noise)
+    : cell_(cell), tables_(model::prepare<double, model::max_intervals>(cell)), own_(std::move(own)), records_(std::move(records)), calibration_(cell, records_) {
+  for (const Record& r : records_) {
+    if (r.size() < 2) throw std::invalid_argument("a recording of less than two rows");
+    samples_ += r.size();
+    std::vector<char>& usable = usable_.emplace_back(r.size(), 1);
+    std::vector<double>& edge = edge_v2_.emplace_back(r.size(), 0.0);
+    double known_a = 0;
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      if (!std::isfinite(r.voltage_v[k])) usable[k] = 0;
+      const double step_a = std::isfinite(r.current_a[k]) && k > 0 ? r.current_a[k] - known_a : 0;
+      if (std::isfinite(r.current_a[k])) known_a = r.current_a[k];
+      const double r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
+      edge[k] = std::pow(edge_jitter * r0_ohm * step_a, 2);
+      if (k > 0) edge[k - 1] = std::max(edge[k - 1], edge[k]);
+    }
+  }
+  set_noise(noise);
+}
+
+void Evidence::set_noise(const NoiseModel& noise) {
+  noise_ = noise;
+  whiteners_.clear();
+  for (std::size_t r = 0; r < records_.size(); ++r) whiteners_.emplace_back(noise, records_[r].time_s, edge_v2_[r], usable_[r]);
+  base_linear_.reset();
+}
+
+std::size_t Evidence::used() const {
+  std::size_t n = 0;
+  for (const Whitener& w : whiteners_) n += w.used();
+  return n;
+}
+
+double Evidence::log_determinant() const {
+  double sum = 0;
+  for (const Whitener& w : whiteners_) sum += w.log_determinant();
+  return sum;
+}
+
+Hypothesis Evidence::base() const { return {own_, own_.size(), {}}; }
+
+template <class S, class Row>
+void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row) const {
+  const Record& r = records_[record];
+  model::ChosenLaws<S> laws;
+  S delay_s(0), lag_s(0), start(r.initial_soc);
+  start += calibration_.initial_soc_shift(record, u);
+  model::MechanismValues<S> capacity{calibration_.capacity_loss(u)}, gain{calibration_.gain_error(u)};
+  for (std::size_t k = 0; k < h.settings.size(); ++k) {
+    const std::size_t index = h.settings[k].index;
+    if (index == skew) delay_s = values[k][0];
+    else if (index == initial_soc) start += values[k][0];
+    else if (index == capacity_change) capacity[0] += values[k][0];
+    else if (index == current_gain) gain[0] += values[k][0];
+    else model::choose<S>(laws, index, values[k], cell_.capacity_ah);
+    if (index == sensor) lag_s = values[k][1];
+    if (index == intermittent && record < h.bursts.size()) (*laws.template slot<intermittent>()).bursts = h.bursts[record];
+  }
+  model::choose<S>(laws, capacity_change, capacity, cell_.capacity_ah);
+  model::choose<S>(laws, current_gain, gain, cell_.capacity_ah);
+  const model::CorrectedReadings<S> readings(r.time_s, r.current_a, r.temperature_c, delay_s, lag_s);
+  model::Course<S> course(tables_, cell_.capacity_ah, laws, start);
+  const auto adjust = [&](model::TablePoint<S>& at, const S& soc) { calibration_.adjust(at, soc, u); };
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    const double duration_s = k == 0 ? 0 : r.time_s[k] - r.time_s[k - 1];
+    const S read_a = readings.current(k) - calibration_.offset_a(record, r.time_s[k], u);
+    row(k, course.step(r.time_s[k], duration_s, read_a, readings.temperature(k), adjust), course.soc());
+  }
+}
+
+std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc) const {
+  std::vector<double> v(records_[record].size());
+  if (soc != nullptr) soc->resize(v.size());
+  std::vector<model::MechanismValues<double>> values;
+  for (const MechanismSetting& s : h.settings) values.push_back(s.value);
+  run<double>(values, h, std::vector<double>(u.data(), u.data() + u.size()), record, [&](std::size_t k, double volt, double z) {
+    v[k] = volt;
+    if (soc != nullptr) (*soc)[k] = z;
+  });
+  return v;
+}
+
+Eigen::VectorXd Evidence::residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  Columns e(static_cast<Eigen::Index>(samples_), 1);
+  Eigen::Index row = 0;
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    const std::vector<double> v = voltage(h, u, r);
+    for (std::size_t k = 0; k < v.size(); ++k, ++row) {
+      const double error_v = usable_[r][k] != 0 ? records_[r].voltage_v[k] - v[k] : 0;
+      e(row, 0) = std::isfinite(error_v) ? error_v : 1e3;
+    }
+  }
+  whiten(e);
+  return e.col(0);
+}
+
+void Evidence::whiten(Columns& columns) const {
+  Eigen::Index row = 0;
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    const auto rows = static_cast<Eigen::Index>(records_[r].size());
+    whiteners_[r].whiten(columns.middleRows(row, rows));
+    row += rows;
+  }
+}
+
+Columns Evidence::derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const {
+  const std::size_t count = by.size() + base.size();
+  Columns columns(static_cast<Eigen::Index>(samples_), static_cast<Eigen::Index>(count));
+  for (std::size_t first = 0; first < count; first += lanes) {
+    const std::size_t here = std::min(lanes, count - first);
+    std::vector<model::MechanismValues<Jet>> values;
+    for (const MechanismSetting& s : h.settings) {
+      auto& v = values.emplace_back();
+      for (std::size_t p = 0; p < v.size(); ++p) v[p] = Jet(s.value[p]);
+    }
+    std::vector<Jet> unknowns(static_cast<std::size_t>(u.size()));
+    for (std::size_t k = 0; k < unknowns.size(); ++k) unknowns[k] = Jet(u[static_cast<Eigen::Index>(k)]);
+    for (std::size_t lane = 0; lane < here; ++lane) {
+      const std::size_t c = first + lane;
+      Jet& seeded = c < by.size() ? values[by[c].setting][by[c].parameter] : unknowns[base[c - by.size()]];
+      seeded.v[static_cast<Eigen::Index>(lane)] = 1;
+    }
+    Eigen::Index row = 0;
+    for (std::size_t r = 0; r < records_.size(); ++r) {
+      run<Jet>(values, h, unknowns, r, [&](std::size_t, const Jet& v, const Jet&) {
+        for (std::size_t lane = 0; lane < here; ++lane) columns(row, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
+        ++row;
+      });
+    }
+  }
+  whiten(columns);
+  return columns;
+}
+
+Columns Evidence::derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const { return derivative_columns(h, u, by, {}); }
+
+Columns Evidence::calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  std::vector<std::size_t> all(calibration_.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return derivative_columns(h, u, {}, all);
+}
+
+std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  auto made = std::make_shared<Linear>();
+  made->columns = calibration_derivatives(h, u);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(made->columns.cols(), made->columns.cols());
+  normal.noalias() += made->columns.transpose() * made->columns;
+  made->normal.compute(normal);
+  return made;
+}
+
+Fit Evidence::fit(const Hypothesis& start, int iterations) const { return fit(start, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())), iterations); }
+
+Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations) const {
+  const std::vector<Sought> sought = start.sought();
+  const auto m = static_cast<Eigen::Index>(sought.size());
+  const auto info = [&](Eigen::Index j) -> const model::Parameter& {
+    const Sought& s = sought[static_cast<std::size_t>(j)];
+    return catalogue[start.settings[s.setting].index].parameter[s.parameter];
+  };
+  const auto value = [&](Hypothesis& h, Eigen::Index j) -> double& {
+    const Sought& s = sought[static_cast<std::size_t>(j)];
+    return h.settings[s.setting].value[s.parameter];
+  };
+  const auto prior = [&](Hypothesis& h) {
+    double sum = 0;
+    for (Eigen::Index j = 0; j < m; ++j) {
+      if (info(j).role == model::Role::shape) sum += std::pow(std::log(value(h, j) / (info(j).by_default(cell_.capacity_ah))) / log_prior_width, 2);
+    }
+    return sum;
+  };
+
+  Fit fit{start, calibration, {}, 0, {}, std::vector<char>(sought.size(), 0), false};
+  for (Eigen::Index j = 0; j < m; ++j) value(fit.hypothesis, j) = std::clamp(value(fit.hypothesis, j), info(j).lower(cell_.capacity_ah), info(j).upper(cell_.capacity_ah));
+  const auto cost_of = [&](Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& r) { return r.squaredNorm() + u.squaredNorm() + prior(h); };
+  fit.residual = residual(fit.hypothesis, fit.calibration);
+  fit.cost = cost_of(fit.hypothesis, fit.calibration, fit.residual);
+  const double cost_at_start = fit.cost;
+
+  if (!base_linear_) base_linear_ = linear(base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())));
+  std::shared_ptr<const Linear> around = base_linear_;
+  bool renewed = false;
+  double damping = 1e-3;
+  Eigen::MatrixXd schur;
+  Eigen::VectorXd natural = Eigen::VectorXd::Ones(m);  // d parameter / d internal
+  int quiet = 0;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    Columns j_theta = derivatives(fit.hypothesis, fit.calibration, sought);
+    for (Eigen::Index j = 0; j < m; ++j) {
+      natural[j] = info(j).role == model::Role::shape ? value(fit.hypothesis, j) : (info(j).upper(cell_.capacity_ah) - info(j).lower(cell_.capacity_ah)) / 100;
+      j_theta.col(j) *= natural[j];
+    }
+    const Columns& j_u = around->columns;
+    const Eigen::VectorXd g_u = j_u.transpose() * fit.residual - fit.calibration;
+    Eigen::VectorXd g = j_theta.transpose() * fit.residual;
+    Eigen::MatrixXd a = j_theta.transpose() * j_theta;
+    for (Eigen::Index j = 0; j < m; ++j) {
+      if (info(j).role != model::Role::shape) continue;
+      const double width2 = log_prior_width * log_prior_width;
+      g[j] -= std::log(value(fit.hypothesis, j) / (info(j).by_default(cell_.capacity_ah))) / width2;
+      a(j, j) += 1 / width2;
+    }
+    const Eigen::MatrixXd cross = j_u.transpose() * j_theta;
+    const Eigen::MatrixXd solved = around->normal.solve(cross);
+    const Eigen::VectorXd u_alone = around->normal.solve(g_u);
+    schur = a - cross.transpose() * solved;
+    const Eigen::VectorXd rhs = g - cross.transpose() * u_alone;
+
+    bool better = false;
+    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+      // those that would leave their bounds are held at them, one round after the other
+      std::vector<char> held(sought.size(), 0);
+      Eigen::VectorXd step = Eigen::VectorXd::Zero(m);
+      for (int round = 0; round <= static_cast<int>(m); ++round) {
+        Eigen::MatrixXd s = schur;
+        Eigen::VectorXd b = rhs;
+        for (Eigen::Index j = 0; j < m; ++j) s(j, j) += damping * schur(j, j) + 1e-9 + 1e-12 * schur.diagonal().maxCoeff();
+        for (Eigen::Index j = 0; j < m; ++j) {
+          if (held[static_cast<std::size_t>(j)] == 0) continue;
+          s.row(j).setZero();
+          s.col(j).setZero();
+          s(j, j) = 1;
+          b[j] = 0;
+        }
+        step = s.ldlt().solve(b);
+        bool more = false;
+        for (Eigen::Index j = 0; j < m; ++j) {
+          const double v = value(fit.hypothesis, j), low = info(j).lower(cell_.capacity_ah), high = info(j).upper(cell_.capacity_ah), reach = 1e-9 * (high - low);
+          if (held[static_cast<std::size_t>(j)] == 0 && ((v <= low + reach && step[j] < 0) || (v >= high - reach && step[j] > 0))) held[static_cast<std::size_t>(j)] = 1, more = true;
+        }
+        if (!more) break;
+      }
+      Hypothesis trial = fit.hypothesis;
+      Eigen::VectorXd taken = step;
+      for (Eigen::Index j = 0; j < m; ++j) {
+        const bool shape = info(j).role == model::Role::shape;
+        const double v = value(fit.hypothesis, j), held_step = shape ? std::clamp(step[j], -1.5, 1.5) : step[j];
+        double& next = value(trial, j);
+        next = std::clamp(shape ? v * std::exp(held_step) : v + natural[j] * step[j], info(j).lower(cell_.capacity_ah), info(j).upper(cell_.capacity_ah));
+        taken[j] = shape ? std::log(next / v) : (next - v) / natural[j];
+      }
+      const Eigen::VectorXd u = fit.calibration + u_alone - solved * taken;
+      const Eigen::VectorXd r = residual(trial, u);
+      const double cost = cost_of(trial, u, r);
+      if (cost < fit.cost) {
+        better = true;
+        quiet = fit.cost - cost < 0.05 + 1e-5 * fit.cost ? quiet + 1 : 0;
+        fit.hypothesis = trial;
+        fit.calibration = u;
+        fit.residual = r;
+        fit.cost = cost;
+        for (std::size_t j = 0; j < held.size(); ++j) fit.at_bound[j] = held[j];
+        damping = std::max(damping / 5, 1e-9);
+      } else {
+        damping *= 8;
+        if (m == 0) break;
+      }
+    }
+    if (better && quiet == 0) continue;
+    // far from where the base parameters were linearised: once more from here
+    if (!renewed && cost_at_start - fit.cost > 50) {
+      renewed = true;
+      quiet = 0;
+      damping = 1e-3;
+      around = linear(fit.hypothesis, fit.calibration);
+      iterations = std::max(iterations, iteration + 5);
+      continue;
+    }
+    fit.converged = true;
+    break;
+  }
+
+  fit.covariance = Eigen::MatrixXd::Zero(m, m);
+  if (m > 0) {
+    Eigen::MatrixXd s = schur;
+    for (Eigen::Index j = 0; j < m; ++j) s(j, j) += 1e-12 * schur.diagonal().maxCoeff() + 1e-12;
+    const Eigen::MatrixXd inverse = s.ldlt().solve(Eigen::MatrixXd::Identity(m, m));
+    fit.covariance = natural.asDiagonal() * inverse * natural.asDiagonal();
+    for (Eigen::Index j = 0; j < m; ++j) {
+      const Sought& s_j = sought[static_cast<std::size_t>(j)];
+      fit.hypothesis.settings[s_j.setting].deviation[s_j.parameter] = std::sqrt(std::max(fit.covariance(j, j), 0.0));
+    }
+  }
+  return fit;
+}
+
+}  // namespace bms::diagnosis

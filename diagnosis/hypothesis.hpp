@@ -1,0 +1,115 @@
+// A hypothesis: the cell with a set of mechanisms, each with unknown parameters; its fit to recordings, and what the fit leaves.
+//
+// Maximum a posteriori: the residual whitened (noise.hpp), the base parameters free within their tolerance (calibration.hpp), the
+// mechanisms' parameters within their bounds. Gauss-Newton with Levenberg's damping; derivatives by dual numbers through the same
+// laws that the firmware runs. The base parameters are eliminated first (Schur complement), which makes a step cheap.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "diagnosis/calibration.hpp"
+#include "diagnosis/noise.hpp"
+#include "diagnosis/record.hpp"
+#include "model/cell_parameters.hpp"
+#include "model/extended.hpp"
+
+namespace bms::diagnosis {
+
+using model::MechanismSetting;
+
+/// A parameter that is sought.
+struct Sought {
+  std::size_t setting = 0;    ///< in the hypothesis
+  std::size_t parameter = 0;  ///< of its mechanism
+  bool operator==(const Sought&) const = default;
+};
+
+struct Hypothesis {
+  std::vector<MechanismSetting> settings;  ///< the cell's own, then those it adds
+  std::size_t own = 0;                     ///< how many are the cell's own: these are not sought
+  std::vector<std::vector<model::Span>> bursts;  ///< of a loose contact, by record
+
+  std::vector<std::size_t> added() const;  ///< catalogue indices, ascending
+  const MechanismSetting* find(std::size_t index) const;
+  std::vector<Sought> sought() const;
+  std::string name() const;                ///< ids joined by '+', "calibration" when it adds none
+};
+
+/// With this mechanism, its strengths at their neutral values.
+Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah);
+/// With a setting of it.
+Hypothesis with(const Hypothesis& h, const MechanismSetting& setting);
+Hypothesis without(const Hypothesis& h, std::size_t mechanism);
+
+struct Fit {
+  Hypothesis hypothesis;             ///< with the values found
+  Eigen::VectorXd calibration;       ///< the base parameters' unknowns, in standard deviations
+  Eigen::VectorXd residual;          ///< whitened, all records after another
+  double cost = 0;                   ///< |residual|^2 + |calibration|^2 + priors: -2 log posterior but for a constant
+  Eigen::MatrixXd covariance;        ///< of what is sought, base parameters marginalised; in the parameters' units
+  std::vector<char> at_bound;        ///< of what is sought
+  bool converged = false;
+};
+
+/// Everything that stays the same from hypothesis to hypothesis.
+class Evidence {
+ public:
+  /// own: mechanisms of the cell file. Records that are empty or have no voltage: std::invalid_argument.
+  Evidence(const model::CellParameters<>& cell, std::vector<MechanismSetting> own, std::vector<Record> records, const NoiseModel& noise);
+
+  const model::CellParameters<>& cell() const { return cell_; }
+  const std::vector<Record>& records() const { return records_; }
+  const Calibration& calibration() const { return calibration_; }
+  const NoiseModel& noise() const { return noise_; }
+  std::size_t samples() const { return samples_; }
+  std::size_t used() const;
+  const std::vector<char>& usable(std::size_t record) const { return usable_[record]; }
+  double log_determinant() const;
+  Hypothesis base() const;           ///< the cell as its file says
+
+  /// The same with other noise.
+  void set_noise(const NoiseModel& noise);
+
+  /// Voltage that would be read, record by record. u: base parameters' unknowns. socs: if asked for.
+  std::vector<double> voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc = nullptr) const;
+  /// Measured less predicted, whitened, all records.
+  Eigen::VectorXd residual(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  /// Derivatives of the predicted voltage, whitened: by what is sought, in the parameters' units.
+  Columns derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const;
+  /// By the base parameters' unknowns.
+  Columns calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  /// Any columns over all records, made white.
+  void whiten(Columns& columns) const;
+
+  Fit fit(const Hypothesis& start, int iterations = 12) const;
+  /// From where another fit ended, e.g. with other noise.
+  Fit fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations = 12) const;
+
+ private:
+  struct Linear;  // base parameters' derivatives and their factorised normal matrix
+  template <class S, class Row>
+  void run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row) const;
+  Columns derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const;
+  std::shared_ptr<const Linear> linear(const Hypothesis& h, const Eigen::VectorXd& u) const;
+
+  model::CellParameters<> cell_;
+  model::Cell<double, model::max_intervals> tables_;
+  std::vector<MechanismSetting> own_;
+  std::vector<Record> records_;
+  Calibration calibration_;
+  NoiseModel noise_;
+  std::vector<Whitener> whiteners_;
+  std::vector<std::vector<char>> usable_;
+  std::vector<std::vector<double>> edge_v2_;  ///< variance of readings beside a step of the current
+  std::size_t samples_ = 0;
+  mutable std::shared_ptr<const Linear> base_linear_;
+};
+
+}  // namespace bms::diagnosis

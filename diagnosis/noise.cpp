@@ -1,0 +1,81 @@
+#include "diagnosis/noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bms::diagnosis {
+
+Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const char> usable) : gains_(time_s.size()) {
+  double ff = n.fast_v * n.fast_v, ss = n.slow_v * n.slow_v, fs = 0;  // covariance of (fast, slow), stationary at first
+  const double fast_v2 = ff, slow_v2 = ss;
+  for (std::size_t k = 0; k < gains_.size(); ++k) {
+    Gain& g = gains_[k];
+    const double to_next_s = k + 1 < gains_.size() ? time_s[k + 1] - time_s[k] : 0;
+    g = {0, 0, std::exp(-to_next_s / n.fast_s), std::exp(-to_next_s / n.slow_s), 0};
+    if (usable[k] != 0) {
+      const double variance = ff + 2 * fs + ss + n.white_v * n.white_v + more_white_v2[k];
+      const double with_fast = ff + fs, with_slow = fs + ss;
+      g.fast = with_fast / variance;
+      g.slow = with_slow / variance;
+      g.weight = 1 / std::sqrt(variance);
+      log_determinant_ += std::log(variance);
+      ++used_;
+      ff -= g.fast * with_fast;
+      fs -= g.fast * with_slow;
+      ss -= g.slow * with_slow;
+    }
+    ff = fast_v2 + g.fast_left * g.fast_left * (ff - fast_v2);
+    ss = slow_v2 + g.slow_left * g.slow_left * (ss - slow_v2);
+    fs *= g.fast_left * g.slow_left;
+  }
+}
+
+void Whitener::whiten(Eigen::Ref<Columns> columns) const {
+  Eigen::RowVectorXd fast = Eigen::RowVectorXd::Zero(columns.cols()), slow = fast, news = fast;
+  for (std::size_t k = 0; k < gains_.size(); ++k) {
+    const Gain& g = gains_[k];
+    auto row = columns.row(static_cast<Eigen::Index>(k));
+    if (g.weight > 0) {
+      news = row - fast - slow;
+      fast = g.fast_left * (fast + g.fast * news);
+      slow = g.slow_left * (slow + g.slow * news);
+      row = g.weight * news;
+    } else {
+      fast *= g.fast_left;
+      slow *= g.slow_left;
+      row.setZero();
+    }
+  }
+}
+
+double quantisation_step(std::span<const double> values) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < values.size(); ++k) {
+    const double step = std::abs(values[k] - values[k - 1]);
+    if (step > 1e-9) steps.push_back(step);
+  }
+  if (steps.size() < 20) return 0;
+  const auto low = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 50);
+  std::nth_element(steps.begin(), low, steps.end());
+  return *low;
+}
+
+double white_noise(std::span<const double> v, std::span<const double> i, double quiet_a, double fallback_v) {
+  std::vector<double> bends;
+  for (std::size_t k = 2; k < v.size(); ++k) {
+    const bool quiet = std::abs(i[k] - i[k - 1]) < quiet_a && std::abs(i[k - 1] - i[k - 2]) < quiet_a;
+    const double bend = v[k] - 2 * v[k - 1] + v[k - 2];
+    if (quiet && std::isfinite(bend)) bends.push_back(std::abs(bend));
+  }
+  if (bends.size() < 100) return fallback_v;
+  const auto at = [&](double share) {
+    const auto nth = bends.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(bends.size() - 1));
+    std::nth_element(bends.begin(), nth, bends.end());
+    return *nth;
+  };
+  // of a normal distribution's absolute values 50 % lie below 0.674 and 80 % below 1.282 sigma; second differences have sqrt(6) sigma
+  const double spread_v = std::max(at(0.5) / 0.6745, at(0.8) / 1.2816) / std::sqrt(6.0);
+  return std::max({spread_v, quantisation_step(v) / std::sqrt(12.0), 5e-5});
+}
+
+}  // namespace bms::diagnosis

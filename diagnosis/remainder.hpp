@@ -1,0 +1,22 @@
+// What a fit leaves, asked with no physics in mind: columns over time, soc, current and temperature that could follow anything.
+//
+// If these gain much on top of the best hypothesis, something is there that the catalogue does not have (UNKNOWN). A part that is
+// faster than any of them shows as a whitened residual whose variance is above 1.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/hypothesis.hpp"
+
+namespace bms::diagnosis {
+
+struct Remainder {
+  double gain = 0;                         ///< of the generic columns, less what they gain on noise
+  double fast_excess = 0;                  ///< variance of the whitened residual above 1, robust against single samples
+  std::vector<std::vector<double>> energy; ///< by record and row: squares of what the generic columns explain, V^2
+  std::vector<model::Span> spans;          ///< where most of it lies, of the first record
+};
+
+Remainder what_remains(const Evidence& evidence, const Fit& fit);
+
+}  // namespace bms::diagnosis
