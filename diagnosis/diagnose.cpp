@@ -12,6 +12,7 @@
 
 #include "diagnosis/decision.hpp"
 #include "diagnosis/locate.hpp"
+#include "diagnosis/quiet_current.hpp"
 #include "diagnosis/remainder.hpp"
 
 namespace bms::diagnosis {
@@ -27,7 +28,7 @@ constexpr std::size_t index_of(std::string_view id) { return model::mechanism_in
 double price(std::size_t mechanism, std::size_t bursts) {
   double unknowns = 0;
   for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) unknowns += catalogue[mechanism].parameter[p].role != Role::given ? 1 : 0;
-  if (catalogue[mechanism].id == "contact_step") unknowns += 2;  // its moment was sought too
+  if (catalogue[mechanism].id == "contact_step") unknowns += 4;  // its moment was sought too
   return decision::per_unknown * (unknowns - 1) + 16.0 * static_cast<double>(bursts);
 }
 
@@ -57,13 +58,43 @@ class Chain {
 
   double score(const Fit& f) const { return f.cost + price(f.hypothesis) - known_before(evidence_, f.hypothesis); }
 
+  /// What a hypothesis gains over a smaller one, whatever was known before.
+  double gain(const Fit& less, const Fit& more) const { return less.cost + price(less.hypothesis) - more.cost - price(more.hypothesis); }
+
   /// A candidate added to what is there and fitted from its estimate; shapes far apart are tried from two sides.
   Fit fit_with(const Fit& around, const Candidate& c) {
     Hypothesis h = with(around.hypothesis, c.start);
     if (!c.bursts.empty()) h.bursts = c.bursts;
     Fit best = evidence_.fit(h, around.calibration);
+    if (const auto farther = far_start(h, around.calibration)) {
+      Fit other = evidence_.fit(*farther, around.calibration);
+      if (other.cost < best.cost) best = std::move(other);
+    }
     if (catalogue[c.mechanism].id == "contact_step") best = refined_onset(best);
     tell(catalogue[c.mechanism].id);
+    return best;
+  }
+
+  /// Where a knee of the OCV is passed, an effect on the charge is not linear: the best of some strengths far from the estimate.
+  std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u) {
+    MechanismSetting& s = h.settings.back();
+    const std::string_view id = catalogue[s.index].id;
+    std::vector<std::vector<double>> tries;
+    if (id == "capacity_change") tries = {{-0.1}, {0.04}, {0.08}, {0.14}, {0.2}, {0.28}};
+    else if (id == "current_gain") tries = {{-0.12}, {-0.06}, {0.06}, {0.12}};
+    else if (id == "initial_soc") tries = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
+    else if (id == "ocv_shape") tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
+    if (tries.empty()) return std::nullopt;
+    const std::vector<double> near(s.value.begin(), s.value.end());
+    double least = evidence_.residual(h, u).squaredNorm();
+    std::optional<Hypothesis> best;
+    for (const auto& t : tries) {
+      for (std::size_t p = 0; p < t.size(); ++p) s.value[p] = t[p];
+      const double cost = evidence_.residual(h, u).squaredNorm();
+      if (cost >= least) continue;
+      least = cost;
+      best = h;
+    }
     return best;
   }
 
@@ -207,13 +238,14 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   noise.white_v = *std::max_element(white.begin(), white.end());
   noise.fast_v = std::max(cell.tolerance.ocv_v, 5e-4);
   noise.slow_v = 1.3 * std::max(cell.tolerance.drift_v, 5e-4);
+  for (Record& r : records) r.current_a = quiet_current(r.current_a, std::min(current_noise(r.current_a), 1.5 * cell.noise.current_a));
   Evidence evidence(cell, own, std::move(records), noise);
 
   std::vector<std::size_t> testable;
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
-    const auto reason = not_testable(evidence, m);
+    const auto reason = not_testable(evidence, evidence.base(), m);
     if (reason) d.not_testable.push_back({m, *reason});
-    else if (evidence.base().find(m) == nullptr) testable.push_back(m);
+    if (evidence.base().find(m) == nullptr) testable.push_back(m);  // the screen asks again, beside what has been found
   }
   std::size_t moving = 0;
   double duration_s = 0;
@@ -250,7 +282,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     while (current.hypothesis.added().size() < options.most_mechanisms) {
       std::vector<Fit> more = chain.one_more(current, testable, decision::most_fits);
       if (current.hypothesis.added().empty()) singles = more;
-      if (more.empty() || chain.score(current) - chain.score(more.front()) < decision::detected) break;
+      if (more.empty() || chain.gain(current, more.front()) < decision::detected) break;
       current = more.front();
     }
   };
@@ -280,7 +312,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   // take away what does not carry, try each one's rivals
   std::map<std::size_t, std::vector<Fit>> rivals;
   std::map<std::size_t, double> gains;
-  for (int round = 0; round < 4; ++round) {
+  for (int round = 0; round < 6; ++round) {
     bool changed = false;
     rivals.clear();
     gains.clear();
@@ -288,7 +320,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     for (const std::size_t m : current.hypothesis.added()) {
       Fit less = chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, {}, {}, false}, 8);
       if (current.hypothesis.added().size() == 1) less = base;
-      gains[m] = chain.score(less) - chain.score(current);
+      gains[m] = chain.gain(less, current);
       if (gains[m] < decision::detected) {
         reduced.emplace_back(gains[m], less);
         continue;

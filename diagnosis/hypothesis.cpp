@@ -28,6 +28,9 @@ using Jet = ceres::Jet<double, static_cast<int>(lanes)>;
 /// Reading beside a step of the current: voltage and current are never read at quite the same moment. Share of a sample's step.
 constexpr double edge_jitter = 0.05;
 
+/// How much of resistance_fraction differs from one step of the current to the next.
+constexpr double edge_error = 0.4;
+
 double log_prior_width = 1.5;  // of a shape: e^1.5, between its usual and an unusual value
 
 }  // namespace
@@ -92,6 +95,7 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
     if (r.size() < 2) throw std::invalid_argument("a recording of less than two rows");
     samples_ += r.size();
     std::vector<char>& usable = usable_.emplace_back(r.size(), 1);
+    std::vector<double>& jitter = jitter_v2_.emplace_back(r.size(), 0.0);
     std::vector<double>& edge = edge_v2_.emplace_back(r.size(), 0.0);
     double known_a = 0;
     for (std::size_t k = 0; k < r.size(); ++k) {
@@ -99,8 +103,9 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
       const double step_a = std::isfinite(r.current_a[k]) && k > 0 ? r.current_a[k] - known_a : 0;
       if (std::isfinite(r.current_a[k])) known_a = r.current_a[k];
       const double r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
-      edge[k] = std::pow(edge_jitter * r0_ohm * step_a, 2);
-      if (k > 0) edge[k - 1] = std::max(edge[k - 1], edge[k]);
+      jitter[k] = std::pow(edge_jitter * r0_ohm * step_a, 2);
+      if (k > 0) jitter[k - 1] = std::max(jitter[k - 1], jitter[k]);
+      edge[k] = std::pow(edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
     }
   }
   set_noise(noise);
@@ -109,7 +114,7 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
 void Evidence::set_noise(const NoiseModel& noise) {
   noise_ = noise;
   whiteners_.clear();
-  for (std::size_t r = 0; r < records_.size(); ++r) whiteners_.emplace_back(noise, records_[r].time_s, edge_v2_[r], usable_[r]);
+  for (std::size_t r = 0; r < records_.size(); ++r) whiteners_.emplace_back(noise, records_[r].time_s, jitter_v2_[r], edge_v2_[r], usable_[r]);
   base_linear_.reset();
 }
 

@@ -107,7 +107,8 @@ class Evidence {
   NoiseModel noise_;
   std::vector<Whitener> whiteners_;
   std::vector<std::vector<char>> usable_;
-  std::vector<std::vector<double>> edge_v2_;  ///< variance of readings beside a step of the current
+  std::vector<std::vector<double>> jitter_v2_;  ///< variance of readings beside a step of the current
+  std::vector<std::vector<double>> edge_v2_;    ///< variance of the error that a step of the current brings
   std::size_t samples_ = 0;
   mutable std::shared_ptr<const Linear> base_linear_;
 };

@@ -55,7 +55,7 @@ std::vector<model::Span> strongest_spans(const Record& r, const std::vector<doub
   std::sort(sorted.begin(), sorted.end());
   if (sorted.empty() || !(sorted.back() > 0)) return {};
   const double most = sorted[sorted.size() - 1 - sorted.size() / 500];
-  const double enough = most / 25, apart_s = 0.02 * r.duration_s();
+  const double enough = most / 25, apart_s = 0.1 * r.duration_s();
   std::vector<model::Span> spans;
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (energy[k] < enough) continue;

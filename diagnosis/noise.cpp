@@ -5,13 +5,14 @@
 
 namespace bms::diagnosis {
 
-Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const char> usable) : gains_(time_s.size()) {
+Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const double> more_fast_v2, std::span<const char> usable) : gains_(time_s.size()) {
   double ff = n.fast_v * n.fast_v, ss = n.slow_v * n.slow_v, fs = 0;  // covariance of (fast, slow), stationary at first
   const double fast_v2 = ff, slow_v2 = ss;
   for (std::size_t k = 0; k < gains_.size(); ++k) {
     Gain& g = gains_[k];
     const double to_next_s = k + 1 < gains_.size() ? time_s[k + 1] - time_s[k] : 0;
     g = {0, 0, std::exp(-to_next_s / n.fast_s), std::exp(-to_next_s / n.slow_s), 0};
+    ff += more_fast_v2[k];
     if (usable[k] != 0) {
       const double variance = ff + 2 * fs + ss + n.white_v * n.white_v + more_white_v2[k];
       const double with_fast = ff + fs, with_slow = fs + ss;

@@ -2,6 +2,8 @@
 //
 //   residual = white + fast + slow        white: new in every sample; fast, slow: Ornstein-Uhlenbeck, each with its own memory
 //
+// A step of the current brings a new error with it (a resistance that is good to some per cent): the fast part is widened there.
+//
 // The white part alone would take every slow drift for physics; residuals of a drift are white from sample to sample and still
 // wrong for hours. The filter is the Kalman filter of the two slow parts: what it does not foresee, over how well it can know,
 // is white with variance 1. O(n), any sampling. (Astrom, Introduction to Stochastic Control Theory, 1970, ch. 7.)
@@ -25,8 +27,8 @@ using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Row
 
 class Whitener {
  public:
-  /// more_white_v2: white variance to add row by row; usable[k] == 0: no voltage in row k.
-  Whitener(const NoiseModel& noise, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const char> usable);
+  /// Row by row: white variance to add, variance that the fast part gains; usable[k] == 0: no voltage in row k.
+  Whitener(const NoiseModel& noise, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const double> more_fast_v2, std::span<const char> usable);
 
   /// In place, rows first .. first + size of columns.
   void whiten(Eigen::Ref<Columns> columns) const;

@@ -26,9 +26,9 @@ constexpr double free_v = 0.02;  // prior deviation of a generic voltage
 Remainder what_remains(const Evidence& evidence, const Fit& fit) {
   const auto rows = static_cast<Eigen::Index>(evidence.samples());
   const double c_rate_a = evidence.cell().capacity_ah;
-  constexpr Eigen::Index time_knots = 16, soc_knots = 8, current_knots = 7, memory = 6, soc_current = 4, time_current = 6;
+  constexpr Eigen::Index time_knots = 30, soc_knots = 8, fine_knots = 24, volt_knots = 30, current_knots = 7, memory = 6, soc_current = 4, time_current = 6;
   constexpr Eigen::Index per_record = time_knots + time_current;
-  const Eigen::Index shared = 2 * soc_knots + current_knots + memory + soc_current + 1;
+  const Eigen::Index shared = 2 * soc_knots + fine_knots + volt_knots + current_knots + memory + soc_current + 1;
   const Eigen::Index generic = shared + per_record * static_cast<Eigen::Index>(evidence.records().size());
   Columns raw = Columns::Zero(rows, generic);
   double largest_a = 1e-9;
@@ -41,8 +41,9 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
   for (std::size_t n = 0; n < evidence.records().size(); ++n) {
     const Record& r = evidence.records()[n];
     std::vector<double> soc;
-    evidence.voltage(fit.hypothesis, fit.calibration, n, &soc);
+    const std::vector<double> volts = evidence.voltage(fit.hypothesis, fit.calibration, n, &soc);
     const auto [lowest, highest] = std::minmax_element(soc.begin(), soc.end());
+    const auto [lowest_v, highest_v] = std::minmax_element(volts.begin(), volts.end());
     std::array<double, memory> slow{};
     constexpr std::array<double, memory> tau_s = {4, 15, 60, 250, 1'000, 4'000};
     double known_a = 0, heading = 0, heat = 0;
@@ -57,6 +58,10 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
       hat(here, at, soc_knots, *lowest, *highest, soc[k], free_v);
       hat(here, at + soc_knots, soc_knots, *lowest, *highest, soc[k], free_v * heading);
       at += 2 * soc_knots;
+      hat(here, at, fine_knots, *lowest, *highest, soc[k], free_v / 4);
+      at += fine_knots;
+      hat(here, at, volt_knots, *lowest_v, *highest_v, volts[k], free_v / 4);
+      at += volt_knots;
       hat(here, at, current_knots, -1, 1, c, free_v);
       at += current_knots;
       for (std::size_t t = 0; t < memory; ++t) {

@@ -26,6 +26,7 @@ std::vector<double> shape_grid(std::string_view id, double capacity_ah) {
   if (id == "fast_polarisation") return {0.5, 1.5, 4};
   if (id == "charge_transfer") return {0.2 * capacity_ah, 0.7 * capacity_ah, 2.5 * capacity_ah};
   if (id == "self_heating") return {200, 900, 3'000};
+  if (id == "current_clipping") return {0.02, 0.15, 0.5};
   return {};
 }
 
@@ -79,7 +80,7 @@ Excitation excitation_of(const Evidence& evidence) {
   return x;
 }
 
-/// Readings that pile up at the largest current of either direction: where a sensor may end.
+/// The largest current, where it is reached often enough to show whether the sensor ends there.
 std::optional<double> rail_a(const Evidence& evidence) {
   double largest = 0;
   for (const Record& r : evidence.records()) {
@@ -92,18 +93,18 @@ std::optional<double> rail_a(const Evidence& evidence) {
   for (const Record& r : evidence.records()) {
     bool inside = false;
     for (const double a : r.current_a) {
-      const bool now = std::isfinite(a) && std::abs(a) > 0.985 * largest;
+      const bool now = std::isfinite(a) && std::abs(a) > 0.9 * largest;
       near += now ? 1 : 0;
       runs += now && !inside ? 1 : 0;
       inside = now;
     }
   }
-  return near >= 10 && runs >= 3 ? std::optional(largest) : std::nullopt;
+  return near >= 4 && runs >= 2 ? std::optional(largest) : std::nullopt;
 }
 
 }  // namespace
 
-std::optional<std::string> not_testable(const Evidence& evidence, std::size_t mechanism) {
+std::optional<std::string> not_testable(const Evidence& evidence, const Hypothesis& given, std::size_t mechanism) {
   const Excitation x = excitation_of(evidence);
   const std::string_view id = catalogue[mechanism].id;
   const double c_rate = evidence.cell().capacity_ah;
@@ -111,7 +112,7 @@ std::optional<std::string> not_testable(const Evidence& evidence, std::size_t me
   const double span_k = temperature ? x.temperature_max_c - x.temperature_min_c : 0;
   const double away_k = temperature ? std::max(std::abs(x.temperature_max_c - 25), std::abs(x.temperature_min_c - 25)) : 0;
   const auto needs_current = [&](double c) { return x.current_max_a < c * c_rate; };
-  const bool follows = evidence.base().find(index_of("temperature_resistance")) != nullptr || evidence.base().find(index_of("entropic_ocv")) != nullptr;
+  const bool follows = given.find(index_of("temperature_resistance")) != nullptr || given.find(index_of("entropic_ocv")) != nullptr;
 
   if (id == "temperature_resistance" || id == "entropic_ocv" || id == "temperature_sensor") {
     if (!temperature) return "no temperature was recorded";
@@ -124,7 +125,7 @@ std::optional<std::string> not_testable(const Evidence& evidence, std::size_t me
   if (id == "fast_polarisation" && x.step_s > 3) return fmt::format("a sample every {:g} s is too slow", x.step_s);
   if (id == "channel_skew" && (x.edges < 5 || x.step_s > 20)) return "too few steps of the current";
   if ((id == "direction_asymmetry" || id == "coulombic_loss") && x.charged_soc < 0.01) return "the cell is not charged";
-  if (id == "current_clipping" && !rail_a(evidence)) return "no readings pile up at the largest current";
+  if (id == "current_clipping" && !rail_a(evidence)) return "the largest current is reached too seldom";
   if (id == "initial_soc" && std::none_of(evidence.records().begin(), evidence.records().end(), [](const Record& r) { return r.initial_soc_told; })) {
     return "no initial state of charge was given";
   }
@@ -161,7 +162,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
   Eigen::Index count = 0;
 
   for (const std::size_t mechanism : over) {
-    if (h.find(mechanism) != nullptr || not_testable(evidence, mechanism)) continue;
+    if (h.find(mechanism) != nullptr || not_testable(evidence, h, mechanism)) continue;
     const model::MechanismInfo& info = catalogue[mechanism];
     if (info.id == "contact_intermittent" || info.id == "contact_step") continue;  // below
     std::vector<double> shapes = shape_grid(info.id, capacity_ah);
@@ -194,7 +195,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
 
   // a contact that changes at a moment: one column per moment
   const std::size_t step = index_of("contact_step");
-  const bool wants_step = std::find(over.begin(), over.end(), step) != over.end() && h.find(step) == nullptr && !not_testable(evidence, step);
+  const bool wants_step = std::find(over.begin(), over.end(), step) != over.end() && h.find(step) == nullptr && !not_testable(evidence, h, step);
   if (wants_step) {
     const Record& r = evidence.records().front();
     constexpr std::size_t moments = 40;
@@ -277,7 +278,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
 
   // bursts of a loose contact
   const std::size_t loose = index_of("contact_intermittent");
-  if (std::find(over.begin(), over.end(), loose) != over.end() && h.find(loose) == nullptr && !not_testable(evidence, loose)) {
+  if (std::find(over.begin(), over.end(), loose) != over.end() && h.find(loose) == nullptr && !not_testable(evidence, h, loose)) {
     Candidate c{loose, {loose, {}, {}}, {}, 0, 0};
     std::size_t bursts = 0;
     double sum_ohm = 0, in_s = 0;

@@ -22,8 +22,8 @@ struct Candidate {
   double limit = 0;                ///< of its first strength, in its unit; 0: not estimated
 };
 
-/// Why a mechanism cannot be judged by these recordings, or nothing.
-std::optional<std::string> not_testable(const Evidence& evidence, std::size_t mechanism);
+/// Why a mechanism cannot be judged by these recordings beside those given, or nothing.
+std::optional<std::string> not_testable(const Evidence& evidence, const Hypothesis& given, std::size_t mechanism);
 
 class Screen {
  public:

@@ -25,9 +25,16 @@ double covered_s(const std::vector<model::Span>& spans) {
   return sum;
 }
 
-/// Stretches where a reading does not change although the cell is loaded and unloaded.
+/// Stretches where a reading does not change although the cell is loaded and unloaded, or its noise should show.
 std::vector<model::Span> stuck_voltage(const Record& r, double c_rate_a) {
   std::vector<model::Span> spans;
+  // a converter whose last digit flickers does not stand still for long: how long, its other readings tell
+  std::vector<std::size_t> runs;
+  for (std::size_t k = 1, length = 1; k < r.size(); ++k) {
+    length = r.voltage_v[k] == r.voltage_v[k - 1] ? length + 1 : (runs.push_back(length), 1);
+  }
+  std::sort(runs.begin(), runs.end());
+  const std::size_t usual = runs.size() > 200 ? runs[runs.size() * 99 / 100] : r.size();
   std::size_t from = 0;
   for (std::size_t k = 1; k <= r.size(); ++k) {
     if (k < r.size() && r.voltage_v[k] == r.voltage_v[from]) continue;
@@ -37,7 +44,7 @@ std::vector<model::Span> stuck_voltage(const Record& r, double c_rate_a) {
       low = std::min(low, r.current_a[j]);
       high = std::max(high, r.current_a[j]);
     }
-    if (k - from >= 8 && high - low > 0.25 * c_rate_a) spans.push_back({r.time_s[from], r.time_s[k - 1]});
+    if ((k - from >= 8 && high - low > 0.25 * c_rate_a) || (k - from >= 60 && k - from > 12 * usual)) spans.push_back({r.time_s[from], r.time_s[k - 1]});
     from = k;
   }
   return spans;
@@ -140,7 +147,7 @@ Trust examine(Record& r, const model::CellParameters<>& cell) {
     ++edges;
     against += di * dv < 0 ? 1 : 0;
   }
-  if (edges >= 10 && together < -0.5 * std::sqrt(current2 * voltage2) && against > edges * 7 / 10) {
+  if (edges >= 2 && together < -0.5 * std::sqrt(current2 * voltage2) && against > edges * 7 / 10) {
     fault("current_inverted", "The voltage falls where the current rises: the current's sign is inverted, expected > 0 while charging.");
   }
   return trust;

@@ -1,0 +1,49 @@
+// A diagnosis in words: what each mechanism is to a technician, one sentence for the verdict, and why this cause and not its neighbour.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/diagnose.hpp"
+
+namespace bms::diagnosis {
+
+/// A mechanism of the catalogue, told.
+struct Words {
+  std::string_view id;
+  std::string_view name;     ///< "OCV hysteresis"
+  std::string_view meaning;  ///< what goes on
+  std::string_view action;   ///< what to do about it
+};
+const Words& words_of(std::size_t mechanism);
+
+/// A number with its deviation in a unit that suits its size: "12.4 +- 0.8 mV". deviation 0: the number alone. Its sign as it stands.
+std::string quantity(double value, double deviation, std::string_view unit);
+
+/// What a finding says, with its number, as the beginning of a sentence: "the cell holds 8.1 +- 0.5 % less charge than its file says".
+std::string claim(const MechanismSetting& setting);
+
+/// What the recordings hold that tells neighbours apart.
+struct Occasions {
+  double error_v = 0;             ///< RMS of measured less cell file's voltage
+  double longest_rest_s = 0;
+  double duration_s = 0;
+  double charged_soc = 0, discharged_soc = 0;  ///< moved in each direction
+  std::size_t reversals = 0;      ///< of the charge's direction, 1 % of the capacity or more each way
+  std::size_t rates = 0;          ///< kinds of current, told apart by a third
+  double temperature_span_k = 0;  ///< 0: not recorded, or constant
+  double first_soc = 0, soc_span = 0;
+};
+Occasions occasions_of(const model::CellParameters<>& cell, const std::vector<Record>& records, const std::vector<RecordView>& views);
+
+/// One sentence for the verdict.
+std::string statement(const Diagnosis& diagnosis, const Occasions& occasions);
+
+/// Why this finding and not its best rival: the fact that parts them, and by how much the rival fits worse.
+std::string because(const Diagnosis& diagnosis, const Finding& finding, const Occasions& occasions);
+
+/// Fills in what the diagnosis leaves empty of statement and Finding::because.
+void describe(Diagnosis& diagnosis, const model::CellParameters<>& cell, const std::vector<Record>& records);
+
+}  // namespace bms::diagnosis
