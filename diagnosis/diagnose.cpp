@@ -54,12 +54,36 @@ double known_before(const Evidence& evidence, const Hypothesis& h) {
 
 class Chain {
  public:
-  Chain(Evidence& evidence, const Options& options) : evidence_(evidence), options_(options) {}
+  Chain(Evidence& evidence, const Options& options) : evidence_(evidence), options_(options), nominal_(evidence.noise()) {}
 
-  double score(const Fit& f) const { return f.cost + price(f.hypothesis) - known_before(evidence_, f.hypothesis); }
+  /// -2 log posterior with the noise that the residual speaks of, at its price.
+  double total(const Fit& f) const {
+    double cost = 0;
+    evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+    return cost + f.cost - f.residual.squaredNorm();
+  }
+  double score(const Fit& f) {
+    const auto known = totals_.find(f.cost);
+    const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
+    return sum + price(f.hypothesis) - known_before(evidence_, f.hypothesis);
+  }
+
+  /// Fitted again under the noise that its own residual speaks of.
+  Fit settled(Fit f) {
+    for (int round = 0; round < 2; ++round) {
+      double cost = 0;
+      const NoiseModel noise = evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+      if (noise == f.noise) break;
+      evidence_.set_noise(noise);
+      f = evidence_.fit(f.hypothesis, f.calibration, 5);
+    }
+    return f;
+  }
 
   /// What a hypothesis gains over a smaller one, whatever was known before.
-  double gain(const Fit& less, const Fit& more) const { return less.cost + price(less.hypothesis) - more.cost - price(more.hypothesis); }
+  double gain(const Fit& less, const Fit& more) {
+    return score(less) + known_before(evidence_, less.hypothesis) - score(more) - known_before(evidence_, more.hypothesis);
+  }
 
   /// A candidate added to what is there and fitted from its estimate; shapes far apart are tried from two sides.
   Fit fit_with(const Fit& around, const Candidate& c) {
@@ -125,18 +149,35 @@ class Chain {
   }
 
   /// The best of adding one mechanism to what is there, and its rivals.
-  std::vector<Fit> one_more(const Fit& around, const std::vector<std::size_t>& over, std::size_t most) {
+  /// likeness: of each to the mechanism `to`, if asked for.
+  std::vector<Fit> one_more(const Fit& around, const std::vector<std::size_t>& over, std::size_t most, std::size_t to = model::mechanism_count,
+                            std::vector<std::pair<std::size_t, double>>* likeness = nullptr) {
+    evidence_.set_noise(around.noise);
     const Screen screen(evidence_, around, over);
+    if (likeness != nullptr) {
+      const auto& all = screen.candidates();
+      for (std::size_t a = 0; a < all.size(); ++a) {
+        if (all[a].mechanism != to) continue;
+        for (std::size_t b = 0; b < all.size(); ++b) likeness->emplace_back(all[b].mechanism, screen.alike(a, b));
+      }
+    }
     std::vector<Fit> fits;
     for (const Candidate& c : screen.candidates()) {
       if (fits.size() >= most || c.gain < decision::worth_a_fit) break;
+      evidence_.set_noise(around.noise);
       fits.push_back(fit_with(around, c));
     }
+    // the noise of what is left is smaller when much has been explained: the foremost again with theirs
+    std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
+    for (std::size_t k = 0; k < fits.size() && k < 3; ++k) fits[k] = settled(fits[k]);
     std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return score(a) < score(b); });
     return fits;
   }
 
-  Fit refit(const Fit& f, int iterations = 6) { return evidence_.fit(f.hypothesis, f.calibration, iterations); }
+  Fit refit(const Fit& f, int iterations = 6) {
+    evidence_.set_noise(f.noise);
+    return settled(evidence_.fit(f.hypothesis, f.calibration, iterations));
+  }
 
   void tell(std::string_view what) {
     ++steps_;
@@ -146,46 +187,10 @@ class Chain {
  private:
   Evidence& evidence_;
   const Options& options_;
+  NoiseModel nominal_;
+  std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
   int steps_ = 0;
 };
-
-/// The noise that a residual speaks of, at least the nominal: amplitude of the fast and the slow part by maximum likelihood.
-NoiseModel noise_of(const Evidence& evidence, const Fit& fit, const NoiseModel& least) {
-  Columns raw(static_cast<Eigen::Index>(evidence.samples()), 1);
-  Eigen::Index row = 0;
-  for (std::size_t r = 0; r < evidence.records().size(); ++r) {
-    const std::vector<double> v = evidence.voltage(fit.hypothesis, fit.calibration, r);
-    for (std::size_t k = 0; k < v.size(); ++k, ++row) raw(row, 0) = evidence.usable(r)[k] != 0 ? evidence.records()[r].voltage_v[k] - v[k] : 0;
-  }
-  NoiseModel best = least;
-  Evidence trial = evidence;
-  const auto likelihood = [&](const NoiseModel& n) {
-    trial.set_noise(n);
-    Columns e = raw;
-    trial.whiten(e);
-    return e.squaredNorm() + trial.log_determinant();
-  };
-  double best_cost = likelihood(best);
-  const auto improve = [&](auto member, std::initializer_list<double> factors) {
-    const NoiseModel from = best;
-    for (const double factor : factors) {
-      NoiseModel n = from;
-      n.*member = std::max(from.*member * factor, least.*member);
-      const double cost = likelihood(n);
-      if (cost < best_cost) {
-        best_cost = cost;
-        best = n;
-      }
-    }
-  };
-  for (int round = 0; round < 2; ++round) {
-    improve(&NoiseModel::fast_v, {1.5, 2.25, 3.5, 5.0, 8.0, 0.7});
-    improve(&NoiseModel::slow_v, {1.5, 2.25, 3.5, 5.0, 8.0, 0.7});
-    improve(&NoiseModel::white_v, {1.25, 1.6, 2.0, 3.0});
-  }
-  return best;
-}
-
 
 }  // namespace
 
@@ -272,7 +277,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   if (high_a - low_a < 0.02 * cell.capacity_ah) return cannot("the current does not change");
 
   Chain chain(evidence, options);
-  Fit base = evidence.fit(evidence.base());
+  Fit base = chain.settled(evidence.fit(evidence.base()));
   chain.tell("calibration");
 
   // one mechanism after the other, as long as chance would not do it
@@ -289,43 +294,35 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   grow();
   {
     // the first screen tells the limits
+    evidence.set_noise(noise);
     const Screen screen(evidence, base, testable);
     for (const Candidate& c : screen.candidates()) {
       if (c.limit > 0) d.limits.push_back({c.mechanism, 0, c.limit});
     }
   }
 
-  // what the best still leaves is the noise by which rivals are judged
-  const NoiseModel nominal = evidence.noise();
-  const double base_cost_nominal = base.cost;
-  const Fit best_nominal = current;
-  const Remainder remainder = what_remains(evidence, current);
-  NoiseModel seen = nominal;
-  if (!current.hypothesis.added().empty()) {
-    seen = noise_of(evidence, current, nominal);
-    evidence.set_noise(seen);
-    base = chain.refit(base);
-    current = chain.refit(current);
-  }
+  const NoiseModel nominal = noise;
   chain.tell("noise");
 
   // take away what does not carry, try each one's rivals
   std::map<std::size_t, std::vector<Fit>> rivals;
   std::map<std::size_t, double> gains;
+  std::map<std::pair<std::size_t, std::size_t>, double> alike;
   for (int round = 0; round < 6; ++round) {
     bool changed = false;
     rivals.clear();
     gains.clear();
     std::vector<std::pair<double, Fit>> reduced;
     for (const std::size_t m : current.hypothesis.added()) {
-      Fit less = chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, {}, {}, false}, 8);
+      Fit less = chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, current.noise, {}, {}, false}, 8);
       if (current.hypothesis.added().size() == 1) less = base;
       gains[m] = chain.gain(less, current);
       if (gains[m] < decision::detected) {
         reduced.emplace_back(gains[m], less);
         continue;
       }
-      for (Fit& rival : chain.one_more(less, testable, 5)) {
+      std::vector<std::pair<std::size_t, double>> likeness;
+      for (Fit& rival : chain.one_more(less, testable, 5, m, &likeness)) {
         if (rival.hypothesis.find(m) != nullptr) {
           if (chain.score(rival) < chain.score(current) - 1) current = rival, changed = true;  // the same from another start
           continue;
@@ -336,6 +333,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
         }
         rivals[m].push_back(std::move(rival));
       }
+      for (const auto& [other, value] : likeness) alike[{m, other}] = value;
       if (changed) break;
     }
     if (!changed && !reduced.empty()) {
@@ -347,9 +345,13 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   }
 
   // is it enough?
-  d.base_cost = base_cost_nominal;
+  evidence.set_noise(nominal);
+  const Fit base_nominal = evidence.fit(base.hypothesis, base.calibration, 6), best_nominal = evidence.fit(current.hypothesis, current.calibration, 6);
+  const Remainder remainder = what_remains(evidence, best_nominal);
+  evidence.set_noise(current.noise);
+  d.base_cost = base_nominal.cost;
   d.best_cost = best_nominal.cost;
-  const double gained = base_cost_nominal - best_nominal.cost;
+  const double gained = base_nominal.cost - best_nominal.cost;
   d.remaining = remainder.gain;
   d.fast_excess = remainder.fast_excess;
   d.adequacy = gained + d.remaining > 0 ? std::max(gained, 0.0) / (std::max(gained, 0.0) + d.remaining) : 1;
@@ -377,7 +379,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
         if (current.hypothesis.find(a) == nullptr) other = a;
       }
       sum += std::exp(-behind / (2 * decision::temper));
-      if (behind < decision::same) near.emplace_back(behind, other);
+      // what goes through the same few numbers of a recording differs by how well its equation fits, not by what was seen
+      if (behind < decision::same || (alike[{m, other}] > decision::inseparable && behind < decision::same_inseparable)) near.emplace_back(behind, other);
     }
     std::sort(near.begin(), near.end());
     for (const auto& [behind, other] : near) {

@@ -111,11 +111,49 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
   set_noise(noise);
 }
 
+std::vector<Whitener> Evidence::whiteners_for(const NoiseModel& noise) const {
+  std::vector<Whitener> made;
+  for (std::size_t r = 0; r < records_.size(); ++r) made.emplace_back(noise, records_[r].time_s, jitter_v2_[r], edge_v2_[r], usable_[r]);
+  return made;
+}
+
 void Evidence::set_noise(const NoiseModel& noise) {
+  if (!whiteners_.empty() && noise == noise_) return;
   noise_ = noise;
-  whiteners_.clear();
-  for (std::size_t r = 0; r < records_.size(); ++r) whiteners_.emplace_back(noise, records_[r].time_s, jitter_v2_[r], edge_v2_[r], usable_[r]);
+  whiteners_ = whiteners_for(noise);
   base_linear_.reset();
+}
+
+NoiseModel Evidence::likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const {
+  const auto cost_of = [&](const NoiseModel& n) {
+    const std::vector<Whitener> by = whiteners_for(n);
+    Columns e = raw;
+    whiten(e, by);
+    double sum = e.squaredNorm() + price_of_noise(n, nominal);
+    for (const Whitener& w : by) sum += w.log_determinant();
+    return sum;
+  };
+  NoiseModel best = nominal;
+  cost = cost_of(best);
+  // the three amplitudes in turn, in ever smaller factors
+  for (const double factor : {2.0, 1.41, 1.19, 1.09}) {
+    for (bool moved = true; moved;) {
+      moved = false;
+      for (const auto member : {&NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::white_v}) {
+        for (const double by : {factor, 1 / factor}) {
+          NoiseModel n = best;
+          n.*member = std::max(best.*member * by, nominal.*member);
+          if (n == best) continue;
+          const double c = cost_of(n);
+          if (c >= cost) continue;
+          cost = c;
+          best = n;
+          moved = true;
+        }
+      }
+    }
+  }
+  return best;
 }
 
 std::size_t Evidence::used() const {
@@ -173,7 +211,7 @@ std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd
   return v;
 }
 
-Eigen::VectorXd Evidence::residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
+Columns Evidence::raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
   Columns e(static_cast<Eigen::Index>(samples_), 1);
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < records_.size(); ++r) {
@@ -183,15 +221,22 @@ Eigen::VectorXd Evidence::residual(const Hypothesis& h, const Eigen::VectorXd& u
       e(row, 0) = std::isfinite(error_v) ? error_v : 1e3;
     }
   }
+  return e;
+}
+
+Eigen::VectorXd Evidence::residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  Columns e = raw_residual(h, u);
   whiten(e);
   return e.col(0);
 }
 
-void Evidence::whiten(Columns& columns) const {
+void Evidence::whiten(Columns& columns) const { whiten(columns, whiteners_); }
+
+void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < records_.size(); ++r) {
     const auto rows = static_cast<Eigen::Index>(records_[r].size());
-    whiteners_[r].whiten(columns.middleRows(row, rows));
+    by[r].whiten(columns.middleRows(row, rows));
     row += rows;
   }
 }
@@ -251,6 +296,19 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     const Sought& s = sought[static_cast<std::size_t>(j)];
     return catalogue[start.settings[s.setting].index].parameter[s.parameter];
   };
+  const auto is = [&](Eigen::Index j, std::string_view id, std::string_view name) {
+    return catalogue[start.settings[sought[static_cast<std::size_t>(j)].setting].index].id == id && info(j).name == name;
+  };
+  // what is neither faster nor slower than R1 C1 is R1 C1
+  const double rc_s = model::cell_detail::rc_value(cell_.rc, cell_.rc.r1_ohm, 0.5) * model::cell_detail::rc_value(cell_.rc, cell_.rc.c1_f, 0.5);
+  const auto low_of = [&](Eigen::Index j) {
+    const double low = info(j).lower(cell_.capacity_ah);
+    return is(j, "slow_polarisation", "time_constant_s") ? std::clamp(2 * rc_s, low, 600.0) : low;
+  };
+  const auto high_of = [&](Eigen::Index j) {
+    const double high = info(j).upper(cell_.capacity_ah);
+    return is(j, "fast_polarisation", "time_constant_s") ? std::clamp(rc_s / 3, 1.0, high) : high;
+  };
   const auto value = [&](Hypothesis& h, Eigen::Index j) -> double& {
     const Sought& s = sought[static_cast<std::size_t>(j)];
     return h.settings[s.setting].value[s.parameter];
@@ -263,8 +321,8 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     return sum;
   };
 
-  Fit fit{start, calibration, {}, 0, {}, std::vector<char>(sought.size(), 0), false};
-  for (Eigen::Index j = 0; j < m; ++j) value(fit.hypothesis, j) = std::clamp(value(fit.hypothesis, j), info(j).lower(cell_.capacity_ah), info(j).upper(cell_.capacity_ah));
+  Fit fit{start, calibration, {}, 0, noise_, {}, std::vector<char>(sought.size(), 0), false};
+  for (Eigen::Index j = 0; j < m; ++j) value(fit.hypothesis, j) = std::clamp(value(fit.hypothesis, j), low_of(j), high_of(j));
   const auto cost_of = [&](Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& r) { return r.squaredNorm() + u.squaredNorm() + prior(h); };
   fit.residual = residual(fit.hypothesis, fit.calibration);
   fit.cost = cost_of(fit.hypothesis, fit.calibration, fit.residual);
@@ -280,7 +338,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Columns j_theta = derivatives(fit.hypothesis, fit.calibration, sought);
     for (Eigen::Index j = 0; j < m; ++j) {
-      natural[j] = info(j).role == model::Role::shape ? value(fit.hypothesis, j) : (info(j).upper(cell_.capacity_ah) - info(j).lower(cell_.capacity_ah)) / 100;
+      natural[j] = info(j).role == model::Role::shape ? value(fit.hypothesis, j) : (high_of(j) - low_of(j)) / 100;
       j_theta.col(j) *= natural[j];
     }
     const Columns& j_u = around->columns;
@@ -318,7 +376,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
         step = s.ldlt().solve(b);
         bool more = false;
         for (Eigen::Index j = 0; j < m; ++j) {
-          const double v = value(fit.hypothesis, j), low = info(j).lower(cell_.capacity_ah), high = info(j).upper(cell_.capacity_ah), reach = 1e-9 * (high - low);
+          const double v = value(fit.hypothesis, j), low = low_of(j), high = high_of(j), reach = 1e-9 * (high - low);
           if (held[static_cast<std::size_t>(j)] == 0 && ((v <= low + reach && step[j] < 0) || (v >= high - reach && step[j] > 0))) held[static_cast<std::size_t>(j)] = 1, more = true;
         }
         if (!more) break;
@@ -329,7 +387,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
         const bool shape = info(j).role == model::Role::shape;
         const double v = value(fit.hypothesis, j), held_step = shape ? std::clamp(step[j], -1.5, 1.5) : step[j];
         double& next = value(trial, j);
-        next = std::clamp(shape ? v * std::exp(held_step) : v + natural[j] * step[j], info(j).lower(cell_.capacity_ah), info(j).upper(cell_.capacity_ah));
+        next = std::clamp(shape ? v * std::exp(held_step) : v + natural[j] * step[j], low_of(j), high_of(j));
         taken[j] = shape ? std::log(next / v) : (next - v) / natural[j];
       }
       const Eigen::VectorXd u = fit.calibration + u_alone - solved * taken;

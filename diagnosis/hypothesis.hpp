@@ -52,7 +52,8 @@ struct Fit {
   Hypothesis hypothesis;             ///< with the values found
   Eigen::VectorXd calibration;       ///< the base parameters' unknowns, in standard deviations
   Eigen::VectorXd residual;          ///< whitened, all records after another
-  double cost = 0;                   ///< |residual|^2 + |calibration|^2 + priors: -2 log posterior but for a constant
+  double cost = 0;                   ///< |residual|^2 + |calibration|^2 + priors: -2 log posterior but for what the noise adds
+  NoiseModel noise;                  ///< by which the residual was whitened
   Eigen::MatrixXd covariance;        ///< of what is sought, base parameters marginalised; in the parameters' units
   std::vector<char> at_bound;        ///< of what is sought
   bool converged = false;
@@ -85,6 +86,11 @@ class Evidence {
   Columns derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const;
   /// By the base parameters' unknowns.
   Columns calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  /// Measured less predicted, V; 0 where there is no voltage.
+  Columns raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  /// The noise that makes a raw residual likeliest, at least the nominal, at its price; cost: -2 log likelihood with it.
+  NoiseModel likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const;
+
   /// Any columns over all records, made white.
   void whiten(Columns& columns) const;
 
@@ -106,6 +112,8 @@ class Evidence {
   Calibration calibration_;
   NoiseModel noise_;
   std::vector<Whitener> whiteners_;
+  std::vector<Whitener> whiteners_for(const NoiseModel& noise) const;
+  void whiten(Columns& columns, const std::vector<Whitener>& by) const;
   std::vector<std::vector<char>> usable_;
   std::vector<std::vector<double>> jitter_v2_;  ///< variance of readings beside a step of the current
   std::vector<std::vector<double>> edge_v2_;    ///< variance of the error that a step of the current brings

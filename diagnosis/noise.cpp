@@ -5,13 +5,24 @@
 
 namespace bms::diagnosis {
 
+double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
+  const auto of = [](double ratio) { return ratio > 1 ? std::pow(std::log(ratio) / 0.15, 2) : 0; };
+  return of(n.white_v / nominal.white_v) + of(n.fast_v / nominal.fast_v) + of(n.slow_v / nominal.slow_v);
+}
+
 Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const double> more_fast_v2, std::span<const char> usable) : gains_(time_s.size()) {
   double ff = n.fast_v * n.fast_v, ss = n.slow_v * n.slow_v, fs = 0;  // covariance of (fast, slow), stationary at first
   const double fast_v2 = ff, slow_v2 = ss;
+  double last_s = -1, fast_left = 1, slow_left = 1;
   for (std::size_t k = 0; k < gains_.size(); ++k) {
     Gain& g = gains_[k];
     const double to_next_s = k + 1 < gains_.size() ? time_s[k + 1] - time_s[k] : 0;
-    g = {0, 0, std::exp(-to_next_s / n.fast_s), std::exp(-to_next_s / n.slow_s), 0};
+    if (to_next_s != last_s) {  // steps are mostly equal
+      last_s = to_next_s;
+      fast_left = std::exp(-to_next_s / n.fast_s);
+      slow_left = std::exp(-to_next_s / n.slow_s);
+    }
+    g = {0, 0, fast_left, slow_left, 0};
     ff += more_fast_v2[k];
     if (usable[k] != 0) {
       const double variance = ff + 2 * fs + ss + n.white_v * n.white_v + more_white_v2[k];

@@ -23,7 +23,7 @@ constexpr std::size_t index_of(std::string_view id) { return model::mechanism_in
 std::vector<double> shape_grid(std::string_view id, double capacity_ah) {
   if (id == "ocv_hysteresis") return {8, 25, 80, 250};
   if (id == "slow_polarisation") return {120, 400, 1'300, 4'500};
-  if (id == "fast_polarisation") return {0.5, 1.5, 4};
+  if (id == "fast_polarisation") return {0.5, 1.5, 4, 12};
   if (id == "charge_transfer") return {0.2 * capacity_ah, 0.7 * capacity_ah, 2.5 * capacity_ah};
   if (id == "self_heating") return {200, 900, 3'000};
   if (id == "current_clipping") return {0.02, 0.15, 0.5};

@@ -13,6 +13,8 @@ namespace bms::diagnosis {
 struct Words {
   std::string_view id;
   std::string_view name;     ///< "OCV hysteresis"
+  std::string_view brief;    ///< the claim without a number, as part of a sentence
+  std::string_view mark;     ///< how it shows, after its name: "turns with ..."
   std::string_view meaning;  ///< what goes on
   std::string_view action;   ///< what to do about it
 };
@@ -21,21 +23,26 @@ const Words& words_of(std::size_t mechanism);
 /// A number with its deviation in a unit that suits its size: "12.4 +- 0.8 mV". deviation 0: the number alone. Its sign as it stands.
 std::string quantity(double value, double deviation, std::string_view unit);
 
+/// The same for a parameter of a mechanism; shares and fractions in percent.
+std::string parameter_text(const model::Parameter& parameter, double value, double deviation);
+
 /// What a finding says, with its number, as the beginning of a sentence: "the cell holds 8.1 +- 0.5 % less charge than its file says".
 std::string claim(const MechanismSetting& setting);
 
 /// What the recordings hold that tells neighbours apart.
 struct Occasions {
+  double capacity_ah = 1;
   double error_v = 0;             ///< RMS of measured less cell file's voltage
   double longest_rest_s = 0;
-  double duration_s = 0;
-  double charged_soc = 0, discharged_soc = 0;  ///< moved in each direction
   std::size_t reversals = 0;      ///< of the charge's direction, 1 % of the capacity or more each way
   std::size_t rates = 0;          ///< kinds of current, told apart by a third
   double temperature_span_k = 0;  ///< 0: not recorded, or constant
-  double first_soc = 0, soc_span = 0;
+  double soc_span = 0;
 };
 Occasions occasions_of(const model::CellParameters<>& cell, const std::vector<Record>& records, const std::vector<RecordView>& views);
+
+/// "2:14 h", "3:05 min", "12 s".
+std::string clock_text(double seconds);
 
 /// One sentence for the verdict.
 std::string statement(const Diagnosis& diagnosis, const Occasions& occasions);

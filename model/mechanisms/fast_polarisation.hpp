@@ -14,7 +14,7 @@ struct FastPolarisation {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 0.06, Per::siemens, "R"},
-      Parameter{"time_constant_s", "s", Role::shape, 1.5, 0.2, 6, Per::cell, "tau"},
+      Parameter{"time_constant_s", "s", Role::shape, 1.5, 0.2, 30, Per::cell, "tau, below a third of R1 C1"},
   };
 
   template <class S>
@@ -25,7 +25,7 @@ struct FastPolarisation {
     Rate<S> rate_per_s;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 2>& p, double) : r_ohm(p[0]), rate_per_s(Real(1) / p[1]) {}
+    constexpr Law(const std::array<Real, 2>& p, double) : r_ohm(Resistance<S>(p[0])), rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
     constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive) const {

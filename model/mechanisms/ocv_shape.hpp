@@ -1,7 +1,9 @@
 // The open-circuit voltage's steps lie at another soc than in the cell file: one electrode has slipped against the other (loss of
 // lithium) or lost material. The curve is read elsewhere:
 //
-//   V = OCV(soc + d(soc)),  d linear between 0 at empty, d_1 at 1/3, d_2 at 2/3 and 0 at full
+//   V = OCV(soc + d(soc)),  d linear between 0 at empty, d_1 at 20 %, d_2 at 80 % and 0 at full
+//
+// Empty and full stay where the voltage limits put them; in between the stages of the graphite slide together.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -13,8 +15,8 @@ struct OcvShape {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"slide_at_33", "1", Role::strength, 0, -0.2, 0.2, Per::cell, "d_1, in soc"},
-      Parameter{"slide_at_67", "1", Role::strength, 0, -0.2, 0.2, Per::cell, "d_2, in soc"},
+      Parameter{"slide_at_20", "1", Role::strength, 0, -0.15, 0.15, Per::cell, "d_1, in soc"},
+      Parameter{"slide_at_80", "1", Role::strength, 0, -0.15, 0.15, Per::cell, "d_2, in soc"},
   };
 
   template <class S>
@@ -22,14 +24,22 @@ struct OcvShape {
     Soc<S> low, high;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 2>& p, double) : low(p[0]), high(p[1]) {}
+    constexpr Law(const std::array<Real, 2>& p, double) : low(Soc<S>(p[0])), high(Soc<S>(p[1])) {}
 
     constexpr Soc<S> read_at(const Soc<S>& soc) const {
-      const Soc<S> third(1.0 / 3), two(2.0 / 3), one(1), none(0), three(3);
+      const auto one = Soc<S>(1), none = Soc<S>(0), five = Soc<S>(5);
       if (!(soc > none) || !(soc < one)) return soc;
-      if (soc < third) return soc + Soc<S>(soc * three) * low;
-      if (soc < two) return soc + (low + Soc<S>(Soc<S>(soc - third) * three) * Soc<S>(high - low));
-      return soc + Soc<S>(Soc<S>(one - soc) * three) * high;
+      if (soc < Soc<S>(0.2)) return soc + Soc<S>(soc * five) * low;
+      if (soc < Soc<S>(0.8)) return soc + (low + Soc<S>(Soc<S>(soc - Soc<S>(0.2)) * Soc<S>(1 / 0.6)) * Soc<S>(high - low));
+      return soc + Soc<S>(Soc<S>(one - soc) * five) * high;
+    }
+    /// d read_at / d soc
+    constexpr Coupling<S> read_slope(const Soc<S>& soc) const {
+      const auto one = Soc<S>(1), none = Soc<S>(0), five = Soc<S>(5);
+      if (!(soc > none) || !(soc < one)) return Coupling<S>(1);
+      if (soc < Soc<S>(0.2)) return Coupling<S>(one + low * five);
+      if (soc < Soc<S>(0.8)) return Coupling<S>(one + Soc<S>(high - low) * Soc<S>(1 / 0.6));
+      return Coupling<S>(one - high * five);
     }
   };
 };

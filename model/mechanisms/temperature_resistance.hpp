@@ -15,8 +15,8 @@ struct TemperatureResistance {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, -20000, 60000, Per::cell, "E of R0; 5 to 30 kJ/mol is usual"},
-      Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, -20000, 90000, Per::cell, "E of R1; 30 to 70 kJ/mol is usual"},
+      Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 60000, Per::cell, "E of R0; 5 to 30 kJ/mol is usual"},
+      Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell, "E of R1; 30 to 70 kJ/mol is usual"},
       Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell, "temperature of the cell file's resistances"},
   };
 
@@ -27,7 +27,7 @@ struct TemperatureResistance {
 
     template <class Real>
     constexpr Law(const std::array<Real, 3>& p, double)
-        : r0_energy(mechanism_detail::energy_over_rt(p[0], p[2])), r1_energy(mechanism_detail::energy_over_rt(p[1], p[2])), reference_c(p[2]) {}
+        : r0_energy(Factor<S>(mechanism_detail::energy_over_rt(p[0], p[2]))), r1_energy(Factor<S>(mechanism_detail::energy_over_rt(p[1], p[2]))), reference_c(Temperature<S>(p[2])) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
       mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, mechanism_detail::arrhenius<S>(r0_energy, reference_c, drive.temperature_c));

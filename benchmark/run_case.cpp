@@ -1,0 +1,87 @@
+#include "benchmark/run_case.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace bms::benchmark {
+
+namespace {
+
+diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma) {
+  return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true};
+}
+
+double rmse(const std::vector<double>& predicted, const std::vector<double>& measured) {
+  double sum = 0;
+  for (std::size_t k = 0; k < predicted.size(); ++k) sum += (predicted[k] - measured[k]) * (predicted[k] - measured[k]);
+  return std::sqrt(sum / static_cast<double>(predicted.size()));
+}
+
+double overlap(const std::vector<model::Span>& spans, double start_s, double end_s) {
+  double inside = 0, covered = 0;
+  for (const model::Span& s : spans) {
+    covered += s.end_s - s.start_s;
+    inside += std::max(0.0, std::min(s.end_s, end_s) - std::max(s.start_s, start_s));
+  }
+  const double all = covered + (end_s - start_s) - inside;
+  return all > 0 ? inside / all : 0;
+}
+
+}  // namespace
+
+model::CellParameters<> cell_of(const truth::CalibratedCell& c) {
+  model::CellParameters<> p;
+  p.capacity_ah = c.capacity_ah;
+  p.limits = {2.0, 3.65, 2 * c.capacity_ah, 10 * c.capacity_ah, -20, 60};
+  for (const double soc : c.ocv_soc) p.ocv.soc.push_back(soc);
+  for (const double v : c.ocv_b0_v) p.ocv.b0_v.push_back(v);
+  for (const double v : c.ocv_b1_v) p.ocv.b1_v.push_back(v);
+  for (std::size_t k = 0; k < c.rc_soc.size(); ++k) {
+    p.rc.soc.push_back(c.rc_soc[k]);
+    p.rc.r0_ohm.push_back(c.r0_ohm[k]);
+    p.rc.r1_ohm.push_back(c.r1_ohm[k]);
+    p.rc.c1_f.push_back(c.c1_f[k]);
+  }
+  p.noise = {0.001, 0.003, 60, 0.002, 0.005, 0.002 * c.capacity_ah, 5e-4 * c.capacity_ah, 3'600, 0.2 * c.capacity_ah};
+  p.tolerance = {c.ocv_tolerance_v, c.resistance_tolerance, c.initial_soc_tolerance, c.drift_tolerance_v};
+  return p;
+}
+
+Outcome run_case(const truth::Case& c) {
+  const model::CellParameters<> cell = cell_of(c.cell);
+  const auto begin = std::chrono::steady_clock::now();
+  const diagnosis::Diagnosis d = diagnosis::diagnose(cell, {}, {record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc)});
+  Outcome o;
+  o.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  o.name = c.name;
+  o.verdict = d.verdict;
+  const auto id = [](std::size_t m) { return std::string(model::catalogue[m].id); };
+  for (const diagnosis::Finding& f : d.findings) {
+    o.found.push_back(id(f.setting.index));
+    auto& set = o.sets.emplace_back(1, id(f.setting.index));
+    for (const std::size_t e : f.equivalent_to) set.push_back(id(e));
+  }
+  o.probability = d.findings.empty() ? 0 : d.findings.front().probability;
+  o.figures = fmt::format("base {:.0f} best {:.0f} remaining {:.0f} adequacy {:.2f} fast {:.2f}", d.base_cost, d.best_cost, d.remaining, d.adequacy, d.fast_excess);
+  for (const diagnosis::Finding& f : d.findings) {
+    o.figures += fmt::format(" | {} {:.0f}", id(f.setting.index), f.gain);
+    for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p) o.figures += fmt::format(" {:.3g}", f.setting.value[p]);
+  }
+  if (d.findings.empty() && !d.candidates.empty()) o.figures += fmt::format(" | nearest {} {:.1f}", id(d.candidates.front().ids.front()), d.candidates.front().gain);
+
+  if (!c.holdout.time_s.empty()) {
+    const auto later = diagnosis::later_recording(d.extended);
+    const diagnosis::Record h = record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc);
+    o.holdout_before_v = rmse(diagnosis::predict(cell, {}, h), h.voltage_v);
+    o.holdout_after_v = rmse(diagnosis::predict(cell, later, h), h.voltage_v);
+  }
+  o.overlap = overlap(d.spans, c.answer.start_s, c.answer.end_s);
+  o.holdout_floor_v = std::sqrt(std::pow(c.answer.noise_floor_v, 2) + std::pow(c.cell.ocv_tolerance_v, 2) + std::pow(c.cell.drift_tolerance_v, 2));
+  o.answer = c.answer;
+  return o;
+}
+
+}  // namespace bms::benchmark

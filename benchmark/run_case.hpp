@@ -1,0 +1,32 @@
+// One concealed case through the diagnosis, and through simpler rules beside it. What the case's answer is stays in the answer: it is
+// copied to the outcome after the diagnosis has ended.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "benchmark/truth/cases.hpp"
+#include "diagnosis/diagnose.hpp"
+#include "model/cell_parameters.hpp"
+
+namespace bms::benchmark {
+
+struct Outcome {
+  std::string name;
+  truth::Answer answer;
+  diagnosis::Verdict verdict = diagnosis::Verdict::not_testable;
+  std::vector<std::string> found;             ///< most certain first
+  std::vector<std::vector<std::string>> sets; ///< of each: itself and what cannot be told from it
+  double probability = 0;                     ///< of the first
+  double overlap = 0;                         ///< of the located time and the true one, intersection over union
+  double holdout_before_v = 0, holdout_after_v = 0, holdout_floor_v = 0;
+  double wall_s = 0;
+  std::string figures;                        ///< what the decision was made from, for a person
+};
+
+/// The cell file that a case comes with, as the tool would read it.
+model::CellParameters<> cell_of(const truth::CalibratedCell& cell);
+
+Outcome run_case(const truth::Case& c);
+
+}  // namespace bms::benchmark

@@ -1,0 +1,28 @@
+// The outcomes of many cases in the figures that the README quotes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "benchmark/run_case.hpp"
+
+namespace bms::benchmark {
+
+/// A share of cases, and of how many.
+struct Share {
+  std::size_t hits = 0, of = 0;
+  void count(bool hit) { hits += hit ? 1 : 0, ++of; }
+  double value() const { return of == 0 ? 0 : static_cast<double>(hits) / static_cast<double>(of); }
+};
+
+struct Score {
+  Share false_alarms, detected, detected_all, first, first_class, in_set, pair_both, pair_one_none_wrong, outside_unknown, data_fault, holdout;
+  double mean_set_size = 0, median_overlap = 0, calibration_error = 0, mean_wall_s = 0;
+};
+
+/// Ids that no recording, or hardly any, can tell apart are one class.
+std::string class_of(const std::string& id);
+
+Score score(const std::vector<Outcome>& outcomes);
+
+}  // namespace bms::benchmark

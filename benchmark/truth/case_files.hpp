@@ -1,0 +1,16 @@
+// A case as files, to be looked at with the ordinary tool.
+#pragma once
+
+#include <string>
+
+#include "benchmark/truth/cases.hpp"
+
+namespace truth {
+
+/// Columns time_s, current_a, voltage_v, temperature_c (unless empty), soc_ref.
+std::string csv_of(const Series& series);
+
+/// A cell file that `bms` takes.
+std::string cell_toml(const CalibratedCell& cell, const std::string& name);
+
+}  // namespace truth

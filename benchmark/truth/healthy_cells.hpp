@@ -1,0 +1,14 @@
+// Healthy cells by chance: LiFePO4 of 2 to 280 Ah, around Table 9 of the paper, no two alike.
+#pragma once
+
+#include "benchmark/truth/chance.hpp"
+#include "benchmark/truth/concealed_cell.hpp"
+
+namespace truth {
+
+/// Resistances go with 6 Ah / Q, C1 with Q / 6 Ah, each times a chance of its own; the thermal node with Q and Q^(2/3).
+/// Half of the OCV curves follow Table 9 with chance steps, rounded or not; the others are made of two plateaus, logistic
+/// stages and two exponential knees.
+HealthyCell draw_healthy_cell(Random& random);
+
+}  // namespace truth
