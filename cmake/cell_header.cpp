@@ -1,12 +1,14 @@
 // Cell file -> constexpr header for firmware.
 //
-//   cell_header CELL OUT.hpp      CELL: a built-in name or a path
+//   cell_header CELL OUT.hpp [fixed]      CELL: a built-in name or a path; fixed: for a board that computes in integers
 //
+// Mechanisms that an estimator cannot run (model/mechanism.hpp, on_board) are left out, as the host's estimator leaves them out.
 // Numbers are written with the digits that give back the very same double; the compiler then prepares the tables for the
 // board's scalar by the same constexpr function that the host runs. Exit code 2 and one line when the cell is refused.
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -17,6 +19,12 @@
 #include "host_sim/text_file.hpp"
 
 namespace {
+
+std::string literal(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";
+  return text;
+}
 
 /// Designated initialisers of model::CellParameters: its members are called as the keys of the file.
 class Initialiser {
@@ -37,15 +45,43 @@ class Initialiser {
   std::string text() const { return text_ + "}"; }
 
  private:
-  static std::string literal(double value) {
-    std::string text = fmt::format("{}", value);
-    if (text.find_first_of(".e") == std::string::npos) text += ".0";
-    return text;
-  }
-
   std::string text_;
   bool inside_ = false;
 };
+
+/// The mechanisms' part: which model the estimator runs, and the cell's constants.
+std::string extension(const bms::CellFile& file) {
+  const auto acting = bms::on_board(file.mechanisms);
+  if (acting.empty()) {
+    return R"(/// The model that the estimator steps.
+template <class S>
+using Model = model::ExtendedRc<0, 0>::Of<S>;
+
+template <class S>
+inline constexpr auto cell = model::prepare<S, model::interval_count(parameters)>(parameters);
+)";
+  }
+  std::string types, values;
+  for (const bms::model::MechanismSetting& m : acting) {
+    const bms::model::MechanismInfo& info = bms::model::catalogue[m.index];
+    std::string list;
+    for (std::size_t k = 0; k < info.parameters; ++k) list += (k == 0 ? "" : ", ") + literal(m.value[k]);
+    const std::string type = fmt::format("model::MechanismAt<model::mechanism_index(\"{}\")>", info.id);
+    types += ", " + type;
+    values += fmt::format("{}\n        typename {}::template Law<S>(std::array<double, {}>{{{}}}, parameters.capacity_ah)", values.empty() ? "" : ",", type, info.parameters, list);
+  }
+  return fmt::format(R"(template <class S>
+using Laws = model::Laws<S{types}>;
+
+/// The model that the estimator steps.
+template <class S>
+using Model = typename model::ExtendedRc<Laws<float>::most_voltage_states, Laws<float>::most_states>::template Of<S>;
+
+template <class S>
+inline constexpr model::ExtendedCell<S, model::interval_count(parameters), Laws<S>> cell{{
+    model::prepare<S, model::interval_count(parameters)>(parameters), Laws<S>({values})}};
+)", fmt::arg("types", types), fmt::arg("values", values));
+}
 
 std::string header(const bms::CellFile& file) {
   Initialiser values;
@@ -56,7 +92,8 @@ std::string header(const bms::CellFile& file) {
 
 #include <cstdint>
 
-#include "model/cell.hpp"
+#include "model/{model}.hpp"
+#include "model/extended_rc.hpp"
 
 namespace bms::generated {{
 
@@ -67,23 +104,25 @@ inline constexpr model::CellParameters<double> parameters{{{values}}};
 
 static_assert(model::first_fault(parameters).what == nullptr, "a parameter of the cell file is out of range");
 
-template <class S>
-inline constexpr auto cell = model::prepare<S, model::interval_count(parameters)>(parameters);
-
+{extension}
 }}  // namespace bms::generated
 )",
+      fmt::arg("model", bms::on_board(file.mechanisms).empty() ? "cell" : "extended"), fmt::arg("extension", extension(file)),
       fmt::arg("name", file.name), fmt::arg("hash", file.hash), fmt::arg("values", values.text()));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fputs("usage: cell_header CELL OUT.hpp\n", stderr);
+  const bool fixed = argc == 4 && argv[3] == std::string_view("fixed");
+  if (argc != 3 && !fixed) {
+    std::fputs("usage: cell_header CELL OUT.hpp [fixed]\n", stderr);
     return 2;
   }
   try {
-    bms::write_file(argv[2], header(bms::read_cell(argv[1])));
+    const bms::CellFile cell = bms::read_cell(argv[1]);
+    if (fixed) bms::refuse_without_fpu(cell);
+    bms::write_file(argv[2], header(cell));
   } catch (const bms::BadInput& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;

@@ -33,8 +33,12 @@ set(cell_file "")
 if(EXISTS ${BMS_CELL})
   set(cell_file ${BMS_CELL})
 endif()
+set(cell_header_scalar "")
+if(BMS_SCALAR_DEFINITION MATCHES BMS_FIXED_POINT)
+  set(cell_header_scalar fixed)
+endif()
 add_custom_command(OUTPUT ${cell_header}
-  COMMAND ${cell_header_tool} ${BMS_CELL} ${cell_header}
+  COMMAND ${cell_header_tool} ${BMS_CELL} ${cell_header} ${cell_header_scalar}
   DEPENDS ${cell_header_tool} ${cell_file}
   COMMENT "Cell ${BMS_CELL}" VERBATIM)
 
@@ -60,7 +64,8 @@ bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semi
 bms_objects(hal_slcan -Os ${hal}/slcan/can.cpp ${chip}/uart.cpp ${chip}/watchdog.cpp ${hal}/emulated/samples_can.cpp ${hal}/absent/record.cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/watchdog.cpp)
 
-bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp)
+bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${cell_header})  # the cell says which model
+target_include_directories(application PRIVATE ${CMAKE_BINARY_DIR}/generated)
 bms_objects(estimator_step -O2 ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header})
 target_include_directories(estimator_step PRIVATE ${CMAKE_BINARY_DIR}/generated)
 math(EXPR version "${PROJECT_VERSION_MAJOR} * 65536 + ${PROJECT_VERSION_MINOR} * 256 + ${PROJECT_VERSION_PATCH}" OUTPUT_FORMAT HEXADECIMAL)

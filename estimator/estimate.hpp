@@ -31,6 +31,12 @@ struct Estimate {
   std::uint32_t flags = 0;                     ///< Flag
 };
 
+/// The same with the states of N mechanisms (model/extended_rc.hpp), after the correction.
+template <class S, std::size_t N>
+struct ExtendedEstimate : Estimate<S> {
+  std::array<model::Voltage<S>, N> mechanism{};
+};
+
 /// Number of 32-bit words of an estimate, and their names in that order: the unit of comparison between host and board.
 inline constexpr std::size_t estimate_words = 5;
 inline constexpr std::array<const char*, estimate_words> estimate_word_names = {"soc", "soc_sigma", "v_rc_v", "voltage_predicted_v", "flags"};
@@ -50,6 +56,16 @@ constexpr std::uint32_t word(const T& value) {
 template <class S>
 constexpr EstimateWords words(const Estimate<S>& e) {
   return {word(e.soc), word(e.soc_sigma), word(e.v_rc_v), word(e.voltage_predicted_v), e.flags};
+}
+
+/// Those of the mechanisms come after the others.
+template <class S, std::size_t N>
+constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEstimate<S, N>& e) {
+  std::array<std::uint32_t, estimate_words + N> all{};
+  const EstimateWords first = words(static_cast<const Estimate<S>&>(e));
+  for (std::size_t k = 0; k < estimate_words; ++k) all[k] = first[k];
+  for (std::size_t k = 0; k < N; ++k) all[estimate_words + k] = word(e.mechanism[k]);
+  return all;
 }
 
 }  // namespace bms

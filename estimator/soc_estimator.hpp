@@ -3,7 +3,8 @@
 //   predict   charge counted in integers, other states by the model's exact step, covariance by its analytic transition
 //   correct   by the voltage, if it may be believed; otherwise the prediction stands and sigma grows
 //
-// One body for every scalar and every model with the interface of model::OneRc (N states, soc last among the physical ones).
+// One body for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states, soc last). The laws of the
+// mechanisms come with the cell; where it has none, nothing of them is left.
 // No heap, no exceptions, no libm but sqrt, no clock: the same samples give the same bits on every core (float and
 // fixed point; compile with -ffp-contract=off).
 //
@@ -23,7 +24,7 @@
 #include "estimator/sample.hpp"
 #include "estimator/start.hpp"
 #include "estimator/ud_covariance.hpp"
-#include "model/one_rc.hpp"
+#include "model/extended_rc.hpp"
 
 namespace bms {
 
@@ -35,11 +36,14 @@ struct CellState {
   typename Model<S>::Polarisation polarisation{};
 };
 
-template <class S, template <class> class ModelOf = model::OneRc>
+template <class S, template <class> class ModelOf = model::ExtendedRc<0, 0>::Of>
 class SocEstimator {
  public:
   using Model = ModelOf<S>;
+  using Scalar = S;
   static constexpr std::size_t states = Model::states;
+  static constexpr std::size_t mechanism_states = Model::mechanism_states;
+  using Result = std::conditional_t<mechanism_states == 0, Estimate<S>, ExtendedEstimate<S, mechanism_states>>;
 
   constexpr SocEstimator() = default;
 
@@ -48,31 +52,30 @@ class SocEstimator {
 
   /// The only call. cell: prepared for S, the same in every call.
   template <class Cell>
-  constexpr Estimate<S> step(const Cell& cell, const Sample& sample) {
+  constexpr Result step(const Cell& cell, const Sample& sample) {
     if (!started_) return start(cell, sample);
     if (sample.time_us <= time_us_) return unchanged(cell, time_not_later);
 
-    Estimate<S> estimate;
+    Result estimate;
     const std::uint64_t step_us = sample.time_us - time_us_;
     time_us_ = sample.time_us;
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
     if (step_us != paced_us_) change_pace(cell, step_us, estimate.flags);
-    count_charge(cell, current.ua, step_us);
+    const auto& laws = laws_of(cell);
+    const Drive drive{laws.true_current(model::from_micro<Current>(current.ua)), duration_s_, temperature(laws, sample)};
+    count_charge(cell, counted_ua(laws, drive, current.ua), step_us);
 
     const Soc soc = state_.charge.soc(cell.charge);
-    const auto at = model::look_up(cell, soc, interval_);
-    const Drive drive{model::from_micro<model::Current<S>>(current.ua), duration_s_};
-    const auto settling = Model::settling(at, drive.duration_s);
+    const auto at = look_up(model::CellUnder{cell, drive, state_.polarisation}, soc, interval_);
+    const auto settling = Model::settling(laws, at, drive);
 
-    std::array<Variance, states> noise{};
-    // steady state v_rc variance: what decays in a step, 1 - (1 - p)^2, comes back
-    noise[0] = model::product<Variance>(cell.noise.v_rc_v2, Fraction(settling.settled * Fraction(Fraction(2) - settling.settled)));
+    auto noise = Model::noise(laws, settling, cell.noise.v_rc_v2);
     noise[states - 1] = soc_noise_;
     if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[states - 1] = Variance(soc_noise_ + unknown_charge(cell));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
 
-    estimate.voltage_predicted_v = Model::voltage(state_.polarisation, at, drive);
+    estimate.voltage_predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
     if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * drive.current_a), cell.plausible, estimate.flags)) {
       const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - estimate.voltage_predicted_v;
       correct(cell, at, drive, soc, innovation_v);
@@ -84,6 +87,7 @@ class SocEstimator {
   constexpr const CellState<S, ModelOf>& state() const { return state_; }
 
  private:
+  using Drive = model::Drive<S>;
   using Soc = model::Soc<S>;
   using Voltage = model::Voltage<S>;
   using Current = model::Current<S>;
@@ -93,7 +97,22 @@ class SocEstimator {
 
   static constexpr std::uint32_t longest_step_us = 4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
   static constexpr std::uint32_t longest_count_us = 2'000'000'000U;
+  static constexpr std::int16_t coldest_cdegc = -6'000, warmest_cdegc = 15'000;
   static constexpr int longest_gap_counts = 1'000;                   // 23 days; nothing is known after that
+
+  /// Current that ends as charge. Without a law that makes another of it, the reading itself.
+  template <class Laws>
+  static constexpr std::int32_t counted_ua(const Laws& laws, const Drive& drive, std::int32_t read_ua) {
+    return laws.changes_charge() ? model::to_micro(laws.counted(drive)) : read_ua;
+  }
+
+  /// The last one that can be, 25 degrees C at first.
+  template <class Laws>
+  constexpr model::Temperature<S> temperature(const Laws& laws, const Sample& sample) {
+    if constexpr (std::same_as<Laws, model::LawSet<S>>) return model::Temperature<S>(25);  // nobody asks
+    if (sample.temperature_cdegc >= coldest_cdegc && sample.temperature_cdegc <= warmest_cdegc) temperature_cdegc_ = sample.temperature_cdegc;
+    return laws.true_temperature(model::from_centi<model::Temperature<S>>(temperature_cdegc_));
+  }
 
   template <class Cell>
   constexpr void count_charge(const Cell& cell, std::int32_t current_ua, std::uint64_t step_us) {
@@ -151,12 +170,12 @@ class SocEstimator {
   static constexpr double wide_soc = 0.03;
   using Correction = std::array<Voltage, states>;
   using At = model::TablePoint<S>;
-  using Drive = model::Drive<S>;
 
   template <class Cell>
   constexpr void correct(const Cell& cell, const At& at, const Drive& drive, const Soc& soc, const Voltage& innovation_v) {
     const bool wide = state_.covariance.last_variance() > Variance(wide_soc * wide_soc);
-    const Correction correction = wide ? over_edges(cell, drive.current_a, soc, innovation_v) : state_.covariance.observe(Model::sensitivity(at, drive), voltage_noise_, innovation_v);
+    const Correction correction = wide ? over_edges(cell, drive.current_a, drive.temperature_c, soc, innovation_v)
+                                       : state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), voltage_noise_, innovation_v);
 #pragma GCC unroll 8
     for (std::size_t i = 0; i + 1 < states; ++i) state_.polarisation[i] += correction[i];
     state_.charge.correct(correction[states - 1], cell.charge);
@@ -168,17 +187,20 @@ class SocEstimator {
   /// linearisation: A. Gelb, Applied Optimal Estimation, 1974, 6.2; with the points of S. Julier, J. Uhlmann and H. Durrant-Whyte, 2000).
   /// Arguments by value: one passed by address would be kept in memory in every step.
   template <class Cell>
-  [[gnu::noinline]] constexpr Correction over_edges(const Cell& cell, Current current_a, Soc soc, Voltage innovation_v) {
-    const Drive drive{current_a, duration_s_};
-    const At at = model::look_up(cell, soc);
+  [[gnu::noinline]] constexpr Correction over_edges(const Cell& cell, Current current_a, model::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
+    const auto& laws = laws_of(cell);
+    const Drive drive{current_a, duration_s_, temperature_c};
+    std::uint8_t interval = interval_;
+    const auto tables_at = [&](const Soc& there) { return look_up(model::CellUnder{cell, drive, state_.polarisation}, there, interval); };
+    const At at = tables_at(soc);
     const Variance variance = state_.covariance.last_variance();
     Soc reach = model::product<Soc>(model::root<Soc>(variance), Fraction(1.7320508));
     const auto most = Soc(0.5), least = Soc(0.002);
     reach = reach > most ? most : reach < least ? least : reach;
-    const auto voltage_at = [&](const Soc& there) { return Voltage(Model::voltage(state_.polarisation, model::look_up(cell, there), drive)); };
-    const Voltage middle_v = Model::voltage(state_.polarisation, at, drive);
+    const auto voltage_at = [&](const Soc& there) { return Voltage(Model::voltage(laws, state_.polarisation, tables_at(there), drive)); };
+    const Voltage middle_v = Model::voltage(laws, state_.polarisation, at, drive);
     const Voltage above_v = voltage_at(Soc(soc + reach)) - middle_v, below_v = voltage_at(Soc(soc - reach)) - middle_v;
-    auto h = Model::sensitivity(at, drive);
+    auto h = Model::sensitivity(laws, at, drive);
     h[states - 1] = model::ratio<model::VoltagePerSoc<S>>(Voltage(above_v - below_v), Soc(reach + reach));
     const Voltage bend_v = above_v + below_v;  // weights 1/6, 2/3, 1/6: mean bend / 6, variance about the line bend^2 / 18
     const Variance noise_v2 = Variance(voltage_noise_ + model::product<Variance>(Variance(bend_v * bend_v), Fraction(1.0 / 18)));
@@ -186,25 +208,30 @@ class SocEstimator {
   }
 
   template <class Cell>
-  constexpr void complete(const Cell& cell, Estimate<S>& estimate) const {
+  constexpr void complete(const Cell& cell, Result& estimate) const {
     estimate.soc = state_.charge.soc(cell.charge);
     estimate.soc_sigma = model::root<Soc>(state_.covariance.last_variance());
     estimate.v_rc_v = state_.polarisation[0];
+    if constexpr (mechanism_states > 0) {
+      for (std::size_t k = 0; k < mechanism_states; ++k) estimate.mechanism[k] = state_.polarisation[1 + k];
+    }
   }
 
   template <class Cell>
-  [[gnu::noinline]] constexpr Estimate<S> unchanged(const Cell& cell, std::uint32_t flags) const {
-    Estimate<S> estimate;
+  [[gnu::noinline]] constexpr Result unchanged(const Cell& cell, std::uint32_t flags) const {
+    Result estimate;
     estimate.flags = flags;
-    const auto at = model::look_up(cell, state_.charge.soc(cell.charge));
-    estimate.voltage_predicted_v = at.ocv_v + state_.polarisation[0];
+    const Drive rest{Current(0), TimeStep(1)};
+    std::uint8_t interval = interval_;
+    const auto at = look_up(model::CellUnder{cell, rest, state_.polarisation}, state_.charge.soc(cell.charge), interval);
+    estimate.voltage_predicted_v = Model::voltage(laws_of(cell), state_.polarisation, at, rest);
     complete(cell, estimate);
     return estimate;
   }
 
   template <class Cell>
-  [[gnu::noinline]] constexpr Estimate<S> start(const Cell& cell, const Sample& sample) {
-    Estimate<S> estimate;
+  [[gnu::noinline]] constexpr Result start(const Cell& cell, const Sample& sample) {
+    Result estimate;
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
     const bool voltage = InputCheck<S>::voltage_present(sample.voltage_uv, cell.plausible, estimate.flags);
     if (!voltage && !has_start_) {
@@ -216,33 +243,38 @@ class SocEstimator {
     started_ = true;
     time_us_ = sample.time_us;
 
-    const Drive drive{model::from_micro<model::Current<S>>(current.ua), TimeStep(1)};
+    const auto& laws = laws_of(cell);
+    const Drive drive{laws.true_current(model::from_micro<Current>(current.ua)), TimeStep(1), temperature(laws, sample)};
     SocBelief<S> belief{soc_of_ppb(from_.soc_ppb), Variance{}};
     const Soc believed_sigma = soc_of_ppb(from_.soc_sigma_ppb);
     belief.variance = Variance(believed_sigma * believed_sigma);
     // how much the current has built up is unknown: half of what it can, give or take the same
-    auto at = model::look_up(cell, has_start_ ? belief.soc : Soc(0.5));
+    const model::CellUnder under{cell, drive, state_.polarisation};
+    auto at = look_up(under, has_start_ ? belief.soc : Soc(0.5), interval_);
     const Voltage half_v = at.r1_ohm * Fraction(0.5) * drive.current_a;
     const Variance half_v2 = half_v * half_v;
+    std::array<Variance, states> variances{};
+    variances[0] = cell.noise.v_rc_v2 + half_v2;
+    Model::start(laws, state_.polarisation, variances, at, drive, cell.noise.v_rc_v2);
     // a belief finer than the points of the grid needs no help from a voltage
     const auto finest = Soc(2.0 / start_points);
     if (voltage && (!has_start_ || believed_sigma > finest)) {
-      const Voltage load_v = half_v + at.r0_ohm * drive.current_a;
+      const Voltage load_v = half_v + Model::sum_v(state_.polarisation) + at.r0_ohm * drive.current_a;
       Variance reading_v2 = cell.noise.rest_v2 + half_v2;
+      for (std::size_t k = 1; k + 1 < states; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
       if (!current.measured) {
         const Voltage unknown_v = Voltage(at.r0_ohm * cell.noise.unknown_a) + Voltage(at.r1_ohm * cell.noise.unknown_a);
         reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
       }
-      belief = soc_from_ocv<S>(cell, Voltage(model::from_micro<Voltage>(sample.voltage_uv) - load_v), reading_v2, has_start_ ? &belief : nullptr);
-      at = model::look_up(cell, belief.soc);
+      const Voltage terminal_v = Model::true_voltage(laws, model::from_micro<Voltage>(sample.voltage_uv));
+      belief = soc_from_ocv<S>(under, Voltage(terminal_v - load_v), reading_v2, has_start_ ? &belief : nullptr);
+      at = look_up(under, belief.soc, interval_);
     }
     state_.charge.set(belief.soc, cell.charge);
     state_.polarisation[0] = half_v;
-    std::array<Variance, states> variances{};
-    variances[0] = cell.noise.v_rc_v2 + half_v2;
     variances[states - 1] = belief.variance;
     state_.covariance.set_diagonal(variances);
-    estimate.voltage_predicted_v = Model::voltage(state_.polarisation, at, drive);
+    estimate.voltage_predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
     complete(cell, estimate);
     return estimate;
   }
@@ -256,6 +288,7 @@ class SocEstimator {
   std::uint64_t time_us_ = 0;
   std::uint64_t paced_us_ = 0;
   std::uint8_t interval_ = 0;
+  std::int16_t temperature_cdegc_ = 2'500;
   TimeStep duration_s_{};
   Variance voltage_noise_{}, soc_noise_{};
   StartingPoint from_;

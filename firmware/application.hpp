@@ -14,22 +14,22 @@
 
 namespace bms {
 
-template <class S, Estimate<S> (*step)(SocEstimator<S>&, const Sample&)>
+template <class Estimator, typename Estimator::Result (*step)(Estimator&, const Sample&)>
 class Application {
  public:
   Application(const std::optional<StartingPoint>& start, const messages::Identity& identity)
-      : estimator_{start ? SocEstimator<S>(*start) : SocEstimator<S>()}, telemetry_{identity} {}
+      : estimator_{start ? Estimator(*start) : Estimator()}, telemetry_{identity} {}
 
   void take(const Sample& sample) {
-    const Estimate<S> estimate = step(estimator_, sample);
+    const auto estimate = step(estimator_, sample);
     hal::record(words(estimate));
     telemetry_.tell(sample, estimate);
     hal::watchdog_feed();
   }
 
  private:
-  SocEstimator<S> estimator_;
-  Telemetry<S> telemetry_;
+  Estimator estimator_;
+  Telemetry<typename Estimator::Scalar> telemetry_;
 };
 
 }  // namespace bms

@@ -1,8 +1,9 @@
-// The estimator with this board's cell: the one place where generated tables come in.
+// The estimator with this board's cell: the one place where what is generated comes in, the model's type here, its tables in the .cpp.
 #pragma once
 
 #include <cstdint>
 
+#include "cell_constants.hpp"  // generated from the cell file
 #include "estimator/soc_estimator.hpp"
 #include "firmware/messages.hpp"
 
@@ -14,8 +15,10 @@ using BoardScalar = model::FixedPoint;  // a core without an FPU
 using BoardScalar = float;
 #endif
 
+using BoardEstimator = SocEstimator<BoardScalar, generated::Model>;
+
 /// One step. A function of its own so that its cost can be counted.
-Estimate<BoardScalar> estimator_step(SocEstimator<BoardScalar>& estimator, const Sample& sample);
+BoardEstimator::Result estimator_step(BoardEstimator& estimator, const Sample& sample);
 
 messages::Identity identity();
 

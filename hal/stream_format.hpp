@@ -1,5 +1,7 @@
 // A recording on its way into the replay image and the estimates on their way out, as both sides have them in memory
-// (little-endian):   in: StreamHeader, Sample...      out: EstimateWords...
+// (little-endian):   in: StreamHeader, Sample...      out: words of an estimate, ...
+//
+// An estimate is EstimateWords and one word more for each state of a mechanism (estimator/estimate.hpp).
 #pragma once
 
 #include <array>

@@ -42,6 +42,8 @@ class Table {
     for (const toml::node& entry : *list) into.push_back(number_of(entry, key));
   }
 
+  const toml::node& node(const std::string& key) const { return *table_.get(key); }
+
   bool has(const std::string& key) {
     read_.insert(key);
     return table_.contains(key);
@@ -103,6 +105,38 @@ class Table {
   std::string file_, name_;
   std::set<std::string> read_;
 };
+
+/// [mechanism.*] and [instrument.*]. A mechanism's parameters are its table's keys.
+void read_mechanisms(Table& top, CellFile& file) {
+  const double capacity_ah = file.parameters.capacity_ah;
+  for (const char* kind : {"mechanism", "instrument"}) {
+    if (!top.has(kind)) continue;
+    Table group = top.table(kind);
+    for (std::size_t index = 0; index < model::mechanism_count; ++index) {
+      const model::MechanismInfo& info = model::catalogue[index];
+      const std::string id(info.id), name = table_of(info);
+      if (!name.starts_with(kind) || !group.has(id)) continue;
+      Table table = group.table(id);
+      if (table.has("source")) file.sources[name] = table.text("source");
+      model::MechanismSetting setting = model::unsaid(index, capacity_ah);
+      for (std::size_t k = 0; k < info.parameters; ++k) {
+        const std::string key(info.parameter[k].name), deviation = key + "_std";
+        if (table.has(key)) setting.value[k] = table.number(key);
+        if (table.has(deviation)) setting.deviation[k] = table.number(deviation);
+      }
+      table.finish();
+      if (const std::size_t k = model::first_fault(setting, capacity_ah); k < info.parameters) {
+        const std::string key(info.parameter[k].name);
+        const bool deviates = setting.value[k] >= info.parameter[k].lower(capacity_ah) && setting.value[k] <= info.parameter[k].upper(capacity_ah);
+        const std::string at = deviates ? key + "_std" : key;
+        throw BadInput(file.path, table.node(at).source().begin.line,
+                       fmt::format("'{}.{}' is out of range, expected {}", name, at, deviates ? "0 or more" : range_of(info.parameter[k], capacity_ah)));
+      }
+      put_mechanism(file, setting);
+    }
+    group.finish();
+  }
+}
 
 /// Line of the entry that a fault is about.
 std::size_t line_of(const toml::table& root, const model::CellFault& fault) {
@@ -206,7 +240,47 @@ std::string cell_text(const CellFile& file) {
     writer.number("temperature_c", at.temperature_c);
     visit_rc(writer, at.rc);
   }
+  for (const model::MechanismSetting& setting : file.mechanisms) {
+    const model::MechanismInfo& info = model::catalogue[setting.index];
+    const std::string name = table_of(info);
+    text += fmt::format("\n[{}]\n", name);
+    if (const auto source = file.sources.find(name); source != file.sources.end()) text += fmt::format("source = {}\n", Writer::quoted(source->second));
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      const std::string key(info.parameter[k].name);
+      writer.number(key, setting.value[k]);
+      writer.optional_number(key + "_std", setting.deviation[k]);
+    }
+  }
   return text;
+}
+
+std::string table_of(const model::MechanismInfo& mechanism) {
+  return (mechanism.domain == model::Domain::instrument ? "instrument." : "mechanism.") + std::string(mechanism.id);
+}
+
+std::string range_of(const model::Parameter& parameter, double capacity_ah) {
+  return fmt::format("{:g} to {:g}{}", parameter.lower(capacity_ah), parameter.upper(capacity_ah), parameter.unit == "1" ? "" : " " + std::string(parameter.unit));
+}
+
+void put_mechanism(CellFile& file, const model::MechanismSetting& setting) {
+  const auto at = std::find_if(file.mechanisms.begin(), file.mechanisms.end(), [&](const auto& m) { return m.index >= setting.index; });
+  if (at != file.mechanisms.end() && at->index == setting.index) *at = setting;
+  else file.mechanisms.insert(at, setting);
+}
+
+std::vector<model::MechanismSetting> on_board(const std::vector<model::MechanismSetting>& mechanisms) {
+  std::vector<model::MechanismSetting> acting;
+  for (const model::MechanismSetting& m : mechanisms) {
+    if (model::catalogue[m.index].on_board) acting.push_back(m);
+  }
+  return acting;
+}
+
+void refuse_without_fpu(const CellFile& file) {
+  for (const model::MechanismSetting& m : on_board(file.mechanisms)) {
+    const model::MechanismInfo& info = model::catalogue[m.index];
+    if (info.needs_fpu) throw BadInput(file.path, 1, fmt::format("'{}' does not compute in fixed point, expected a cell without it or arithmetic in float", table_of(info)));
+  }
 }
 
 CellFile parse_cell(const std::string& text, const std::string& path) {
@@ -252,11 +326,13 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
       throw BadInput(path, line_of(root, {"at_temperature", file.at_temperature.size() - 1, ""}), "'at_temperature.temperature_c' is out of range, expected temperatures that ascend, -60 to 100 degrees C");
     }
   }
+  for (const char* kind : {"mechanism", "instrument"}) top.has(kind);  // known, and read when the capacity is known to be good
   top.finish();
 
   if (const model::CellFault fault = model::first_fault(p); fault.what != nullptr) {
     throw BadInput(path, line_of(root, fault), std::string("'") + fault.key + "' is out of range, expected " + fault.what);
   }
+  read_mechanisms(top, file);
   return file;
 }
 

@@ -9,6 +9,7 @@
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/json_results.hpp"
 #include "host_sim/report_page.hpp"
+#include "host_sim/simulation.hpp"
 #include "host_sim/text_file.hpp"
 
 namespace bms {
@@ -34,12 +35,25 @@ Track run_on(const EmulatedBoard& board, const CellFile& cell, const std::vector
   if (scalar != board.scalar) {
     throw BadInput(board.name, 1, fmt::format("computes in {}, expected --scalar {}", name_of(board.scalar), name_of(board.scalar)));
   }
-  BoardRun run = run_on_board(board, firmware_image(board.name, cell, Image::replay), samples, start);
   Track track;
+  track.state_names = state_names(cell);
+  BoardRun run = run_on_board(board, firmware_image(board.name, cell, Image::replay), samples, start, {}, track.state_names.size());
   track.rows = rows_of(run.words, scalar);
   track.words = std::move(run.words);
+  track.state_words = std::move(run.state_words);
+  number_states(track, scalar);
   track.steps_per_second = run.steps_per_second;
   return track;
+}
+
+/// Mechanisms that do not act in the estimator; a shift of the start does, through what it is told.
+std::string not_estimated(const CellFile& cell) {
+  std::string ids;
+  for (const model::MechanismSetting& m : cell.mechanisms) {
+    const model::MechanismInfo& info = model::catalogue[m.index];
+    if (!info.on_board && info.domain != model::Domain::start) ids += (ids.empty() ? "" : ", ") + std::string(info.id);
+  }
+  return ids;
 }
 
 std::string summary(const ReplayResult& r) {
@@ -62,6 +76,9 @@ int run(const ReplayOptions& options) {
   result.cell = read_cell(options.cell);
   result.recording = read_recording(options.recording);
   compare_with_cell(result.recording, result.cell.parameters);
+  if (const std::string ids = not_estimated(result.cell); !ids.empty()) {
+    result.recording.warnings.push_back({"not_in_estimator", ids + ": in the cell file, but the estimator does without (it sees no readings to come and no bursts)"});
+  }
   for (const Warning& warning : result.recording.warnings) warn(options.recording + ": " + warning.text);
 
   const auto samples = bms::samples(result.recording);
@@ -69,7 +86,7 @@ int run(const ReplayOptions& options) {
     result.belief = Belief{*options.initial_soc, options.initial_soc_sigma};
     result.initial_soc = *options.initial_soc;
   }
-  const auto start = starting_point(result.belief);
+  const auto start = starting_point(result.belief, value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
 
   if (board != nullptr) {
     const CellFile board_cell = options.board_cell.empty() ? result.cell : read_cell(options.board_cell);

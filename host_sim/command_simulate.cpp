@@ -1,5 +1,6 @@
 #include "host_sim/command_simulate.hpp"
 
+#include <charconv>
 #include <chrono>
 #include <iterator>
 #include <random>
@@ -20,14 +21,58 @@ namespace {
 
 std::string csv_of(const Recording& r, const std::vector<SimulatedRow>& rows, const SimulateOptions& options) {
   GaussianNoise noise(options.seed);
-  std::string csv = "time_s,current_a,voltage_v,soc\n";
+  const bool temperature = !r.temperature_c.empty();  // what mechanisms followed goes along: a replay needs it
+  std::string csv = temperature ? "time_s,current_a,voltage_v,soc,temperature_c\n" : "time_s,current_a,voltage_v,soc\n";
   csv.reserve(rows.size() * 48);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double current_a = r.current_a[k] + options.noise_a * noise.next(), voltage_v = rows[k].voltage_v + options.noise_v * noise.next();
     // digits below a nanovolt and a nanoampere carry nothing
-    fmt::format_to(std::back_inserter(csv), "{},{:.10g},{:.10g},{:.10g}\n", r.time_s[k], current_a, voltage_v, rows[k].soc);
+    fmt::format_to(std::back_inserter(csv), "{},{:.10g},{:.10g},{:.10g}", r.time_s[k], current_a, voltage_v, rows[k].soc);
+    if (temperature) fmt::format_to(std::back_inserter(csv), ",{}", r.temperature_c[k]);
+    csv += '\n';
   }
   return csv;
+}
+
+bool bursts_unknown(const CellFile& file) {
+  return std::any_of(file.mechanisms.begin(), file.mechanisms.end(), [](const auto& m) { return model::catalogue[m.index].id == model::ContactIntermittent::id; });
+}
+
+/// "ID:param=value,..." as a cell file would have it.
+model::MechanismSetting mechanism_of(const std::string& text, double capacity_ah) {
+  const auto refuse = [&](const std::string& what) { throw BadInput("--with", 1, what); };
+  const std::size_t colon = text.find(':');
+  const std::string id = text.substr(0, colon);
+  const std::size_t index = model::mechanism_index(id);
+  if (index == model::mechanism_count) {
+    std::string ids;
+    for (const model::MechanismInfo& info : model::catalogue) ids += (ids.empty() ? "" : ", ") + std::string(info.id);
+    refuse("no such mechanism '" + id + "', expected one of: " + ids);
+  }
+  if (colon == std::string::npos) refuse("'" + id + "' without parameters, expected ID:param=value,...");
+  const model::MechanismInfo& info = model::catalogue[index];
+  model::MechanismSetting setting = model::unsaid(index, capacity_ah);
+  for (std::size_t at = colon; at < text.size();) {
+    const std::size_t end = std::min(text.find(',', at + 1), text.size());
+    const std::string part = text.substr(at + 1, end - at - 1);
+    at = end;
+    const std::size_t equals = std::min(part.find('='), part.size());
+    const std::string name = part.substr(0, equals);
+    std::size_t k = 0;
+    while (k < info.parameters && info.parameter[k].name != name) ++k;
+    if (k == info.parameters) {
+      std::string names;
+      for (std::size_t i = 0; i < info.parameters; ++i) names += (i == 0 ? "" : ", ") + std::string(info.parameter[i].name);
+      refuse("no such parameter '" + name + "' of " + id + ", expected one of: " + names);
+    }
+    const char *first = part.data() + std::min(equals + 1, part.size()), *last = part.data() + part.size();
+    const auto [stopped, error] = std::from_chars(first, last, setting.value[k]);
+    if (first == last || stopped != last || error != std::errc{}) refuse("no value of '" + name + "', expected " + name + "=NUMBER");
+  }
+  if (const std::size_t k = model::first_fault(setting, capacity_ah); k < info.parameters) {
+    refuse(fmt::format("'{}' is out of range, expected {}", info.parameter[k].name, range_of(info.parameter[k], capacity_ah)));
+  }
+  return setting;
 }
 
 }  // namespace
@@ -35,14 +80,16 @@ std::string csv_of(const Recording& r, const std::vector<SimulatedRow>& rows, co
 int run(const SimulateOptions& options) {
   const std::string& input = options.recording.empty() ? options.profile : options.recording;
   if (options.recording.empty() == options.profile.empty()) throw BadInput("bms simulate", 1, "one input needed, expected --recording or --profile");
-  const CellFile cell_file = read_cell(options.cell);
+  CellFile cell_file = read_cell(options.cell);
+  for (const std::string& mechanism : options.with) put_mechanism(cell_file, mechanism_of(mechanism, cell_file.parameters.capacity_ah));
   Recording recording = read_recording(input, options.recording.empty() ? VoltageColumn::optional : VoltageColumn::required);
   compare_with_cell(recording, cell_file.parameters);
+  if (bursts_unknown(cell_file)) recording.warnings.push_back({"bursts_unknown", "contact_intermittent does not act: when its bursts are is not in a cell file"});
   for (const Warning& warning : recording.warnings) warn(input + ": " + warning.text);
 
   const auto cell = model::prepare<double, model::max_intervals>(cell_file.parameters);
   const auto begin = std::chrono::steady_clock::now();
-  const auto rows = simulate(cell, cell_file.parameters.capacity_ah, recording.time_s, recording.current_a, options.initial_soc);
+  const auto rows = simulate(cell, cell_file.parameters.capacity_ah, cell_file.mechanisms, recording.time_s, recording.current_a, recording.temperature_c, options.initial_soc);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   put(options.out, csv_of(recording, rows, options));
 

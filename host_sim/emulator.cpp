@@ -81,7 +81,7 @@ std::vector<std::string> emulator_command(const EmulatedBoard& board, const std:
 }
 
 BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<Sample>& samples,
-                      const std::optional<StartingPoint>& start, const std::vector<std::string>& more) {
+                      const std::optional<StartingPoint>& start, const std::vector<std::string>& more, std::size_t states) {
   const TemporaryFolder folder;
   const auto in = folder.path() / "samples", out = folder.path() / "estimates", log = folder.path() / "log";
   write_stream(in, samples, start);
@@ -92,7 +92,8 @@ BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& i
   ChildProcess qemu(command, log);
 
   BoardRun run;
-  std::string bytes(samples.size() * sizeof(EstimateWords), '\0');
+  const std::size_t row = sizeof(EstimateWords) + states * sizeof(std::uint32_t);
+  std::string bytes(samples.size() * row, '\0');
   std::size_t have = 0, first_block = 0;
   Clock::time_point first_at, last_at;
   auto heard_at = Clock::now();
@@ -116,13 +117,17 @@ BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& i
     const int status = qemu.wait();
     if (status != 0) throw std::runtime_error("the firmware on " + board.name + " ended with " + std::to_string(status));
   } else {
-    throw std::runtime_error("the emulated " + board.name + " stopped after " + std::to_string(have / sizeof(EstimateWords)) + " of " +
+    throw std::runtime_error("the emulated " + board.name + " stopped after " + std::to_string(have / row) + " of " +
                              std::to_string(samples.size()) + " estimates: " + read_file(log));
   }
   run.words.resize(samples.size());
-  std::memcpy(run.words.data(), bytes.data(), bytes.size());
+  run.state_words.resize(samples.size() * states);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    std::memcpy(&run.words[k], &bytes[k * row], sizeof(EstimateWords));
+    if (states > 0) std::memcpy(&run.state_words[k * states], &bytes[k * row + sizeof(EstimateWords)], states * sizeof(std::uint32_t));
+  }
   const double seconds = std::chrono::duration<double>(last_at - first_at).count();
-  if (seconds > 0) run.steps_per_second = static_cast<double>(have - first_block) / sizeof(EstimateWords) / seconds;
+  if (seconds > 0) run.steps_per_second = static_cast<double>(have - first_block) / static_cast<double>(row) / seconds;
   return run;
 }
 

@@ -14,6 +14,7 @@ namespace bms {
 
 struct BoardRun {
   std::vector<EstimateWords> words;
+  std::vector<std::uint32_t> state_words;  ///< of mechanisms, row by row
   double steps_per_second = 0;  ///< from the first block of estimates to the last: the emulator's start-up is not in it
 };
 
@@ -29,8 +30,8 @@ const std::vector<EmulatedBoard>& emulated_boards();
 std::vector<std::string> emulator_command(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<std::string>& semihosting);
 
 /// Streams samples through `image` (a *_replay.elf). `more`: further options of the emulator.
-/// Throws std::runtime_error when the emulator fails or stops answering.
+/// states: of mechanisms, in each estimate. Throws std::runtime_error when the emulator fails or stops answering.
 BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<Sample>& samples,
-                      const std::optional<StartingPoint>& start, const std::vector<std::string>& more = {});
+                      const std::optional<StartingPoint>& start, const std::vector<std::string>& more = {}, std::size_t states = 0);
 
 }  // namespace bms

@@ -1,5 +1,6 @@
 #include "host_sim/replay.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <iterator>
@@ -16,6 +17,7 @@ namespace bms {
 namespace {
 
 constexpr double thirty_minutes_s = 1'800;
+constexpr const char* kelvin = "_k";
 constexpr double timing_s = 0.03;  // long enough that a clock and a cold cache do not matter
 
 template <class S>
@@ -23,20 +25,26 @@ EstimateRow row_of(const Estimate<S>& e) {
   return {model::as_double(e.soc), model::as_double(e.soc_sigma), model::as_double(e.v_rc_v), model::as_double(e.voltage_predicted_v), e.flags};
 }
 
-template <class S>
-[[gnu::flatten]] void run_once(const HostCell<S>& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<Estimate<S>>& estimates) {
-  SocEstimator<S> estimator = start ? SocEstimator<S>(*start) : SocEstimator<S>();
+template <class Estimator, class Cell>
+void step_through(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<typename Estimator::Result>& estimates) {
+  Estimator estimator = start ? Estimator(*start) : Estimator();
   for (std::size_t k = 0; k < samples.size(); ++k) estimates[k] = estimator.step(cell, samples[k]);
 }
 
-template <class S>
-Track run(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
-  const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
-  std::vector<Estimate<S>> estimates(samples.size());
+template <class Estimator, class Cell>
+[[gnu::flatten]] void step_through_flat(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<typename Estimator::Result>& estimates) {
+  step_through<Estimator>(cell, samples, start, estimates);
+}
+
+template <class Estimator, class Cell>
+Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::size_t states) {
+  using S = typename Estimator::Scalar;
+  std::vector<typename Estimator::Result> estimates(samples.size());
   double best_s = std::numeric_limits<double>::infinity(), total_s = 0;
   do {
     const auto begin = std::chrono::steady_clock::now();
-    run_once(cell, samples, start, estimates);
+    if constexpr (Estimator::mechanism_states == 0) step_through_flat<Estimator>(cell, samples, start, estimates);
+    else step_through<Estimator>(cell, samples, start, estimates);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     best_s = std::min(best_s, seconds);
     total_s += seconds;
@@ -45,11 +53,35 @@ Track run(const CellFile& file, const std::vector<Sample>& samples, const std::o
   Track track;
   track.steps_per_second = static_cast<double>(samples.size()) / best_s;
   track.rows.reserve(samples.size());
-  for (const Estimate<S>& e : estimates) {
-    track.rows.push_back(row_of(e));
-    if constexpr (!std::same_as<S, double>) track.words.push_back(words(e));
+  for (const auto& e : estimates) {
+    track.rows.push_back(row_of<S>(e));
+    if constexpr (!std::same_as<S, double>) track.words.push_back(words(static_cast<const Estimate<S>&>(e)));
+    if constexpr (Estimator::mechanism_states > 0) {
+      for (std::size_t k = 0; k < states; ++k) {
+        if constexpr (std::same_as<S, double>) track.states.push_back(e.mechanism[k]);
+        else track.state_words.push_back(word(e.mechanism[k]));
+      }
+    }
   }
   return track;
+}
+
+/// A cell with mechanisms: as many states in the filter as they have voltages.
+template <class S, std::size_t Voltages = 0>
+Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
+  using Laws = model::ChosenLaws<S>;
+  if constexpr (Voltages < Laws::most_voltage_states) {
+    if (cell.laws.voltage_states() > Voltages) return run_extended<S, Voltages + 1>(cell, samples, start);
+  }
+  return run_estimator<SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states>::template Of>>(cell, samples, start, cell.laws.states());
+}
+
+template <class S>
+Track run(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
+  const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
+  const auto mechanisms = on_board(file.mechanisms);
+  if (mechanisms.empty()) return run_estimator<SocEstimator<S>>(cell, samples, start, 0);
+  return run_extended<S>({cell, model::chosen<S>(mechanisms, file.parameters.capacity_ah)}, samples, start);
 }
 
 /// The value of an estimate's word as a board writes it.
@@ -73,16 +105,42 @@ const char* name_of(ScalarKind scalar) {
   return "";
 }
 
-std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief) {
+std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief, double shift) {
   if (!belief) return std::nullopt;
-  return StartingPoint{static_cast<std::int32_t>(std::lround(belief->soc * 1e9)), static_cast<std::int32_t>(std::lround(belief->sigma * 1e9))};
+  return StartingPoint{static_cast<std::int32_t>(std::lround(std::clamp(belief->soc + shift, 0.0, 1.0) * 1e9)), static_cast<std::int32_t>(std::lround(belief->sigma * 1e9))};
 }
 
 Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar) {
-  switch (scalar) {
-    case ScalarKind::fixed: return run<model::FixedPoint>(cell, samples, start);
-    case ScalarKind::twice: return run<double>(cell, samples, start);
-    default: return run<float>(cell, samples, start);
+  Track track = [&] {
+    switch (scalar) {
+      case ScalarKind::fixed: refuse_without_fpu(cell); return run<model::FixedPoint>(cell, samples, start);
+      case ScalarKind::twice: return run<double>(cell, samples, start);
+      default: return run<float>(cell, samples, start);
+    }
+  }();
+  track.state_names = state_names(cell);
+  number_states(track, scalar);
+  return track;
+}
+
+std::vector<std::string> state_names(const CellFile& cell) {
+  std::vector<std::string> names;
+  for (const model::MechanismSetting& m : on_board(cell.mechanisms)) {
+    const model::MechanismInfo& info = model::catalogue[m.index];
+    for (std::size_t k = 0; k < info.states; ++k) {
+      names.push_back(fmt::format("{}{}{}", info.id, info.states > 1 ? fmt::format("_{}", k + 1) : "", info.id == model::SelfHeating::id ? kelvin : "_v"));
+    }
+  }
+  return names;
+}
+
+void number_states(Track& track, ScalarKind scalar) {
+  if (scalar != ScalarKind::twice) {
+    track.states.clear();
+    for (const std::uint32_t w : track.state_words) track.states.push_back(number_of(w, scalar));
+  }
+  for (std::size_t k = 0; k < track.states.size(); ++k) {
+    if (track.state_names[k % track.state_names.size()].ends_with(kelvin)) track.states[k] *= 100;  // model/mechanisms/self_heating.hpp
   }
 }
 
@@ -105,6 +163,10 @@ std::optional<Difference> first_difference(const Track& host, const Track& board
       const bool flags = w + 1 == estimate_words;
       return Difference{k, estimate_word_names[w], flags ? a : number_of(a, scalar), flags ? b : number_of(b, scalar)};
     }
+    for (std::size_t s = 0; s < host.state_names.size() && host.state_names == board.state_names; ++s) {
+      const std::uint32_t a = host.state_words[k * host.state_names.size() + s], b = board.state_words[k * host.state_names.size() + s];
+      if (a != b) return Difference{k, host.state_names[s], number_of(a, scalar), number_of(b, scalar)};
+    }
   }
   if (host.words.size() != board.words.size()) return Difference{both, "number of estimates", static_cast<double>(host.words.size()), static_cast<double>(board.words.size())};
   return std::nullopt;
@@ -121,7 +183,10 @@ void evaluate(ReplayResult& result) {
   const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
   if (!result.belief) result.initial_soc = rows.front().soc;
   const bool start_known = has_reference && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1;
-  const auto open = simulate(cell, result.cell.parameters.capacity_ah, r.time_s, r.current_a, start_known ? r.soc_ref.front() : result.initial_soc);
+  // a shift of the start is about what was believed
+  const double shift = value_of(result.cell.mechanisms, model::InitialSoc::id, 0), started = result.belief ? result.initial_soc : result.initial_soc - shift;
+  const auto open = simulate(cell, result.cell.parameters.capacity_ah, result.cell.mechanisms, r.time_s, r.current_a, r.temperature_c,
+                             start_known ? r.soc_ref.front() - shift : started);
 
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const EstimateRow& e = rows[k];
@@ -163,13 +228,18 @@ void evaluate(ReplayResult& result) {
 }
 
 std::string trace_csv(const ReplayResult& result) {
-  std::string csv = "time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags\n";
+  const auto& names = result.track.state_names;
+  std::string csv = "time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,";
+  for (const std::string& name : names) csv += name + ",";
+  csv += "flags\n";
   csv.reserve(result.track.rows.size() * 80);
   const ScalarKind s = result.scalar;
   for (std::size_t k = 0; k < result.track.rows.size(); ++k) {
     const EstimateRow& e = result.track.rows[k];
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{}\n", result.recording.time_s[k], formatted(e.soc, s), formatted(e.soc_sigma, s),
-                   formatted(e.v_rc_v, s), formatted(e.voltage_predicted_v, s), result.recording.voltage_v[k], e.flags);
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},", result.recording.time_s[k], formatted(e.soc, s), formatted(e.soc_sigma, s),
+                   formatted(e.v_rc_v, s), formatted(e.voltage_predicted_v, s), result.recording.voltage_v[k]);
+    for (std::size_t i = 0; i < names.size(); ++i) fmt::format_to(std::back_inserter(csv), "{},", formatted(result.track.states[k * names.size() + i], s));
+    fmt::format_to(std::back_inserter(csv), "{}\n", e.flags);
   }
   return csv;
 }

@@ -21,10 +21,13 @@ struct EstimateRow {
   std::uint32_t flags = 0;
 };
 
-/// The estimates of one run.
+/// The estimates of one run. States of mechanisms stand row by row, state_names.size() to a row.
 struct Track {
   std::vector<EstimateRow> rows;
   std::vector<EstimateWords> words;  ///< the bits behind them; empty for double
+  std::vector<std::string> state_names;      ///< "ocv_hysteresis_v", "slow_polarisation_1_v", "self_heating_k"
+  std::vector<double> states;                ///< V, K
+  std::vector<std::uint32_t> state_words;
   double steps_per_second = 0;
 };
 
@@ -33,10 +36,17 @@ struct Belief {
   double soc = 0;
   double sigma = 0.02;
 };
-std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief);
+/// shift: what a cell file knows of the truth of such beliefs.
+std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief, double shift = 0);
+
+/// States that the estimator has for the mechanisms of this cell file.
+std::vector<std::string> state_names(const CellFile& cell);
 
 /// Runs the estimator on this machine. The measuring of its speed repeats the run; the estimates are those of the last.
 Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar);
+
+/// Fills a track's numbers from its words.
+void number_states(Track& track, ScalarKind scalar);
 
 /// Numbers of the words that a board has sent.
 std::vector<EstimateRow> rows_of(const std::vector<EstimateWords>& words, ScalarKind scalar);
@@ -75,7 +85,7 @@ struct ReplayResult {
 /// Figures of `result.track` over `result.recording`; the open loop starts at soc_ref where there is one, else at initial_soc.
 void evaluate(ReplayResult& result);
 
-/// time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags
+/// time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v, states of mechanisms, flags
 std::string trace_csv(const ReplayResult& result);
 
 const char* name_of(ScalarKind scalar);

@@ -5,7 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "model/extended.hpp"
 #include "model/one_rc.hpp"
+#include "model/readings.hpp"
 
 namespace bms {
 
@@ -36,6 +38,32 @@ inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double c
     const auto at = model::look_up(cell, soc, interval);
     if (duration_s > 0) x = Model::advance(x, at, Model::settling(at, duration_s), drive);
     rows[k] = {Model::voltage(x, at, drive), soc};
+  }
+  return rows;
+}
+
+/// The value of one parameter of a mechanism that may be there; 0 if it is not.
+inline double value_of(std::span<const model::MechanismSetting> mechanisms, std::string_view id, std::size_t parameter) {
+  for (const model::MechanismSetting& m : mechanisms) {
+    if (model::catalogue[m.index].id == id) return m.value[parameter];
+  }
+  return 0;
+}
+
+/// The same with mechanisms and faults of the measuring chain, over currents and temperatures that were *measured*: the voltage that
+/// *would be measured*. initial_soc is what is believed; a shift among the mechanisms is added to it. temperature_c may be empty.
+inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double capacity_ah, std::span<const model::MechanismSetting> mechanisms,
+                                          std::span<const double> time_s, std::span<const double> current_a, std::span<const double> temperature_c,
+                                          double initial_soc) {
+  if (mechanisms.empty()) return simulate(cell, capacity_ah, time_s, current_a, initial_soc);
+  const model::CorrectedReadings<double> readings(time_s, current_a, temperature_c, value_of(mechanisms, model::ChannelSkew::id, 0),
+                                                  value_of(mechanisms, model::TemperatureSensor::id, 1));
+  model::Course<double> course(cell, capacity_ah, model::chosen<double>(mechanisms, capacity_ah), initial_soc + value_of(mechanisms, model::InitialSoc::id, 0));
+  std::vector<SimulatedRow> rows(time_s.size());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const double duration_s = k == 0 ? 0 : time_s[k] - time_s[k - 1];
+    const double voltage_v = course.step(time_s[k], duration_s, readings.current(k), readings.temperature(k), [](auto&, const auto&) {});
+    rows[k] = {voltage_v, course.soc()};
   }
   return rows;
 }

@@ -3,164 +3,67 @@
 //   Laws<S, M...>        the mechanisms of a cell known at compile time, all acting (firmware)
 //   ChosenLaws<S>        any of the catalogue, chosen at run time (host)
 //
-// Both call the same laws in the same order, that of model/catalogue.hpp.
+// Both call the same laws in the same order, that of model/catalogue.hpp: the same digits. What no law of a set touches costs nothing in
+// Laws and an `if` per mechanism in ChosenLaws.
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <optional>
 #include <span>
 #include <tuple>
 
 #include "model/catalogue.hpp"
+#include "model/law_set.hpp"
 #include "model/one_rc.hpp"
 
 namespace bms::model {
 
-inline constexpr std::size_t most_states = 6;  ///< of mechanisms at once
-
-template <class S, class... Slots>
-class LawSet {
- public:
-  using States = std::array<Voltage<S>, most_states>;
-
-  constexpr LawSet() = default;
-  constexpr explicit LawSet(const Slots&... slots) : slots_(slots...) {}
-
-  template <std::size_t K>
-  constexpr auto& slot() {
-    return std::get<K>(slots_);
-  }
-
-  constexpr void at(double time_s) {
-    each([&](auto& law) {
-      if constexpr (requires { law.at(time_s); }) law.at(time_s);
-    });
-  }
-  constexpr Current<S> true_current(Current<S> a) const {
-    each([&](const auto& law) {
-      if constexpr (requires { law.true_current(a); }) a = law.true_current(a);
-    });
-    return a;
-  }
-  constexpr Temperature<S> true_temperature(Temperature<S> c) const {
-    each([&](const auto& law) {
-      if constexpr (requires { law.true_temperature(c); }) c = law.true_temperature(c);
-    });
-    return c;
-  }
-  constexpr Current<S> counted(const Drive<S>& drive) const {
-    Current<S> a = drive.current_a;
-    each([&](const auto& law) {
-      if constexpr (requires { law.counted(a, drive); }) a = law.counted(a, drive);
-    });
-    return a;
-  }
-  constexpr Soc<S> read_at(Soc<S> soc) const {
-    each([&](const auto& law) {
-      if constexpr (requires { law.read_at(soc); }) soc = law.read_at(soc);
-    });
-    return soc;
-  }
-  constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const Drive<S>& drive, const States& x) const {
-    each_with_states([&](const auto& law, std::size_t first) {
-      if constexpr (requires { law.warm(at, x[first], drive); }) law.warm(at, x[first], drive);
-      if constexpr (requires { law.tables(at, soc, drive); }) law.tables(at, soc, drive);
-    });
-  }
-  constexpr Voltage<S> reading(Voltage<S> v) const {
-    each([&](const auto& law) {
-      if constexpr (requires { law.reading(v); }) v = law.reading(v);
-    });
-    return v;
-  }
-
-  constexpr std::size_t states() const {
-    std::size_t count = 0;
-    each_with_states([&](const auto& law, std::size_t first) { count = first + states_of(law); });
-    return count;
-  }
-  constexpr States initial() const {
-    States x{};
-    each_with_states([&](const auto& law, std::size_t first) {
-      for (std::size_t i = 0; i < states_of(law); ++i) {
-        if constexpr (requires { law.initial(i); }) x[first + i] = law.initial(i);
-      }
-    });
-    return x;
-  }
-  /// Voltage states advanced, and what they add to the terminal's voltage.
-  constexpr Voltage<S> advance(States& x, const TablePoint<S>& at, const Drive<S>& drive, bool moving) const {
-    Voltage<S> sum(0);
-    each_with_states([&](const auto& law, std::size_t first) {
-      for (std::size_t i = 0; i < states_of(law); ++i) {
-        if constexpr (requires { law.settle(i, at, drive); }) {
-          if (moving) {
-            const Relaxation<S> r = law.settle(i, at, drive);
-            x[first + i] = Voltage<S>(x[first + i] + r.settled * Voltage<S>(r.target - x[first + i]));
-          }
-          if (adds_voltage(law)) sum = Voltage<S>(sum + x[first + i]);
-        }
-      }
-    });
-    return sum;
-  }
-
- private:
-  template <class Law>
-  static constexpr std::size_t states_of(const Law&) {
-    if constexpr (requires(Law l, TablePoint<S> p, Drive<S> d) { l.settle(0, p, d); }) return Law::states;
-    else return 0;
-  }
-  template <class Law>
-  static constexpr bool adds_voltage(const Law&) {
-    if constexpr (requires { Law::voltage_states; }) return Law::voltage_states;
-    else return false;
-  }
-
-  template <class F, class Law>
-  static constexpr void call(F& f, Law& law) {
-    f(law);
-  }
-  template <class F, class Law>
-  static constexpr void call(F& f, std::optional<Law>& law) {
-    if (law) f(*law);
-  }
-  template <class F, class Law>
-  static constexpr void call(F& f, const std::optional<Law>& law) {
-    if (law) f(*law);
-  }
-  template <class F>
-  constexpr void each(F f) {
-    std::apply([&](auto&... slot) { (call(f, slot), ...); }, slots_);
-  }
-  template <class F>
-  constexpr void each(F f) const {
-    std::apply([&](const auto&... slot) { (call(f, slot), ...); }, slots_);
-  }
-  template <class F>
-  constexpr void each_with_states(F f) const {
-    std::size_t first = 0;
-    each([&](const auto& law) {
-      f(law, first);
-      first += states_of(law);
-    });
-  }
-
-  std::tuple<Slots...> slots_;
-};
+/// The mechanism of that id.
+template <std::size_t index>
+using MechanismAt = std::tuple_element_t<index, Catalogue>;
 
 template <class S, class... M>
 using Laws = LawSet<S, typename M::template Law<S>...>;
 
 namespace extended_detail {
 
+/// The place of a law that integers cannot compute.
+struct NoLaw {
+  template <class... Any>
+  constexpr explicit NoLaw(const Any&...) {}
+};
+
+template <class S, class M>
+struct LawFor {
+  using type = typename M::template Law<S>;
+};
+template <class S, class M>
+  requires(std::same_as<S, FixedPoint> && requires { M::needs_fpu; })
+struct LawFor<S, M> {
+  using type = NoLaw;
+};
+
 template <class S, class List>
 struct Chosen;
 template <class S, class... M>
 struct Chosen<S, std::tuple<M...>> {
-  using type = LawSet<S, std::optional<typename M::template Law<S>>...>;
+  using type = LawSet<S, std::optional<typename LawFor<S, M>::type>...>;
 };
+
+/// Laws that add to the voltage come before those whose states do something else: the filter's states are then the first ones.
+template <class... M>
+constexpr bool voltage_states_first(std::tuple<M...>*) {
+  bool others = false, good = true;
+  const auto see = [&](bool has_states, bool adds) {
+    if (has_states && !adds) others = true;
+    if (adds && others) good = false;
+  };
+  (see(states_of<typename M::template Law<double>>() > 0, adds_voltage<typename M::template Law<double>>()), ...);
+  return good;
+}
+static_assert(voltage_states_first(static_cast<Catalogue*>(nullptr)));
 
 }  // namespace extended_detail
 
@@ -177,6 +80,24 @@ struct MechanismSetting {
   MechanismValues<> value{};
   MechanismValues<> deviation{};  ///< standard deviations; 0: not known, or given
 };
+
+/// Place of the first parameter whose value is out of its bounds or whose deviation is none; the number of parameters: all are good.
+constexpr std::size_t first_fault(const MechanismSetting& setting, double capacity_ah) {
+  const MechanismInfo& info = catalogue[setting.index];
+  std::size_t k = 0;
+  for (; k < info.parameters; ++k) {
+    const double v = setting.value[k], deviation = setting.deviation[k];
+    if (!(v >= info.parameter[k].lower(capacity_ah) && v <= info.parameter[k].upper(capacity_ah)) || !(deviation >= 0 && deviation < 1e300)) break;
+  }
+  return k;
+}
+
+/// All parameters as a cell file means them that says nothing of them: no effect.
+constexpr MechanismSetting unsaid(std::size_t index, double capacity_ah) {
+  MechanismSetting setting{index, {}, {}};
+  for (std::size_t k = 0; k < catalogue[index].parameters; ++k) setting.value[k] = catalogue[index].parameter[k].unsaid(capacity_ah);
+  return setting;
+}
 
 namespace extended_detail {
 
@@ -197,6 +118,14 @@ constexpr void choose_at(ChosenLaws<S>& laws, std::size_t index, const Mechanism
 template <class S, class Real>
 constexpr void choose(ChosenLaws<S>& laws, std::size_t index, const MechanismValues<Real>& values, double capacity_ah) {
   extended_detail::choose_at<S, Real, 0>(laws, index, values, capacity_ah);
+}
+
+/// All of a cell file.
+template <class S>
+constexpr ChosenLaws<S> chosen(std::span<const MechanismSetting> settings, double capacity_ah) {
+  ChosenLaws<S> laws;
+  for (const MechanismSetting& m : settings) choose<S, double>(laws, m.index, m.value, capacity_ah);
+  return laws;
 }
 
 /// What the tables say for a dual number, from tables that are not unknowns themselves.
@@ -234,7 +163,7 @@ class Course {
     hold();
     TablePoint<S> at = tables_at(soc_);
     const S elsewhere = laws_.read_at(soc_);
-    if (value(elsewhere) != value(soc_)) {
+    if (differs(elsewhere, soc_)) {
       const TablePoint<S> there = tables_at(elsewhere);
       at.ocv_v = there.ocv_v;
     }
@@ -252,6 +181,11 @@ class Course {
   static double value(const S& s) {
     if constexpr (Dual<S>) return s.a;
     else return s;
+  }
+  /// In value, or as a function of what is sought.
+  static bool differs(const S& a, const S& b) {
+    if constexpr (Dual<S>) return a.a != b.a || a.v != b.v;
+    else return a != b;
   }
   TablePoint<S> tables_at(const S& soc) {
     if constexpr (Dual<S>) return look_up_dual(cell_, soc, interval_);

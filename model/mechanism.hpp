@@ -7,15 +7,19 @@
 //   Temperature<S> true_temperature(Temperature<S> read)           the same for the temperature
 //   Current<S> counted(Current<S> counted, const Drive<S>&)        current that ends as charge
 //   Soc<S> read_at(Soc<S>)                                         where the OCV table is read
+//   Coupling<S> read_slope(Soc<S>)                                 its derivative; with read_at only
 //   void tables(TablePoint<S>&, Soc<S>, const Drive<S>&)           changes OCV, R0, R1, C1 at this soc under this drive
 //   Voltage<S> initial(std::size_t i)                              state i before the first step
 //   Relaxation<S> settle(std::size_t i, const TablePoint<S>&, const Drive<S>&)     how state i moves in a step
 //   void warm(TablePoint<S>&, Voltage<S> state, const Drive<S>&)   changes the tables by the law's own state
-//   Voltage<S> reading(Voltage<S>)                                 what the voltage sensor makes of the voltage
+//   Voltage<S> reading(Voltage<S>)                                 what the voltage sensor makes of the voltage: a straight line
+//   Voltage<S> error_at_first(), lasting_error()                   standard deviations of its voltage states, for the filter; without
+//                                                                  them: half of what the current can have built up, and noise.v_rc_v
 //   void at(double time_s)                                         host only: where in the recording the step ends
 //
 // Every state is relaxed towards a target, x' = x + p (target - x). With `voltage_states` it is a voltage that adds to the
-// terminal's; otherwise it is what warm() reads. States come between v_rc and soc (model/one_rc.hpp).
+// terminal's and the filter corrects it; otherwise it is what warm() reads, and as sure as what drives it. States come between v_rc and
+// soc (model/one_rc.hpp).
 //
 // model/catalogue.hpp lists the mechanisms; model/extended.hpp composes them with the base model. model/README.md tells how to add one.
 #pragma once
@@ -49,14 +53,19 @@ enum class Per {
 struct Parameter {
   std::string_view name, unit;
   Role role = Role::strength;
-  double neutral = 0;        ///< value when nothing is said
+  double neutral = 0;        ///< value when nothing is said, as by_default() scales it
   double low = 0, high = 0;
   Per per = Per::cell;
   std::string_view meaning;  ///< and its source, where the bounds have one
 
   constexpr double scale(double capacity_ah) const { return per == Per::cell ? 1 : per == Per::ah ? capacity_ah : 1 / capacity_ah; }
+  constexpr double by_default(double capacity_ah) const { return neutral * scale(capacity_ah); }
   constexpr double lower(double capacity_ah) const { return low * scale(capacity_ah); }
   constexpr double upper(double capacity_ah) const { return high * scale(capacity_ah); }
+  /// neutral, held within the bounds: what a cell file that is silent about it means.
+  constexpr double unsaid(double capacity_ah) const {
+    return neutral < lower(capacity_ah) ? lower(capacity_ah) : neutral > upper(capacity_ah) ? upper(capacity_ah) : neutral;
+  }
 };
 
 inline constexpr std::size_t max_mechanism_parameters = 5;
@@ -71,6 +80,11 @@ struct Relaxation {
   Fraction<S> settled;   ///< p
   Voltage<S> target;     ///< where it goes
 };
+
+template <class S>
+constexpr Voltage<S> relaxed(const Voltage<S>& x, const Relaxation<S>& r) {
+  return Voltage<S>(x + r.settled * Voltage<S>(r.target - x));
+}
 
 namespace mechanism_detail {
 

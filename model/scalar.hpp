@@ -116,6 +116,30 @@ constexpr R from_micro(std::int32_t micro) {
   }
 }
 
+/// Hundredths, e.g. of a degree.
+template <class R>
+constexpr R from_centi(std::int16_t centi) {
+  if constexpr (is_q<R>) return ratio<R>(Q<16, 0>::from_raw(centi), Q<7, 0>(100));
+  else if constexpr (std::same_as<R, float>) return static_cast<float>(centi) * 0.01F;
+  else return R(static_cast<double>(centi) * 0.01);
+}
+
+/// The measurement in integer micro-units that is nearest to a quantity, held within +-2,147 of its units.
+template <class T>
+constexpr std::int32_t to_micro(const T& x) {
+  if constexpr (is_q<T>) {
+    static_assert(T::integer_bits + T::fraction_bits <= 31);
+    constexpr std::int64_t most = 2'147'483'647, half = std::int64_t{1} << (T::fraction_bits - 1);
+    const std::int64_t micro = (static_cast<std::int64_t>(x.raw()) * 1'000'000 + half) >> T::fraction_bits;
+    return static_cast<std::int32_t>(micro > most ? most : micro < -most ? -most : micro);
+  } else if constexpr (std::floating_point<T>) {
+    const T most(2'147), held = x > most ? most : x < -most ? -most : x;
+    return static_cast<std::int32_t>(held * T(1'000'000) + (held < T(0) ? T(-0.5) : T(0.5)));
+  } else {
+    return to_micro(x.a);  // a dual number
+  }
+}
+
 /// Number without its derivatives, as double: for reports and tests, never in the step.
 template <class T>
   requires(is_q<T> || std::floating_point<T>)

@@ -3,6 +3,6 @@
 
 namespace bms::hal {
 
-void record(const EstimateWords&) {}
+void record(std::span<const std::uint32_t>) {}
 
 }  // namespace bms::hal

@@ -1,6 +1,7 @@
 // A recording through the debugger's files, in blocks, as fast as the core computes: command line "fw SAMPLES ESTIMATES".
 // Formats in hal/stream_format.hpp; either file may be a named pipe, OUT is opened first. A part of a sample at the end is left out.
 // Exit code 3: no such files, not a stream, or estimates that could not be written.
+#include <algorithm>
 #include <array>
 
 #include "hal/emulated/semihosting.hpp"
@@ -24,8 +25,8 @@ std::span<unsigned char> bytes_of(std::span<T> items) {
 // bytes, not Samples: those are not zero at first, so that the whole block would be kept in flash
 alignas(Sample) std::array<unsigned char, block * sizeof(Sample)> samples;
 std::size_t sample_count = 0, next = 0;
-std::array<EstimateWords, block> estimates;
-std::size_t estimate_count = 0;
+std::array<std::uint32_t, block * estimate_words> estimates;
+std::size_t estimate_size = 0;
 StreamHeader header;
 int in = -1, out = -1;
 
@@ -52,8 +53,8 @@ void open_streams() {
 }
 
 void write_estimates() {
-  if (!semihosting::write(out, bytes_of(std::span(estimates.data(), estimate_count)))) finish(bad_stream);
-  estimate_count = 0;
+  if (!semihosting::write(out, bytes_of(std::span(estimates.data(), estimate_size)))) finish(bad_stream);
+  estimate_size = 0;
 }
 
 }  // namespace
@@ -61,7 +62,7 @@ void write_estimates() {
 const Sample* next_sample() {
   if (next == sample_count) {
     if (in < 0) open_streams();
-    if (estimate_count > 0) write_estimates();
+    if (estimate_size > 0) write_estimates();
     sample_count = read_fully(samples) / sizeof(Sample);
     next = 0;
     if (sample_count == 0) return nullptr;
@@ -74,9 +75,10 @@ std::optional<StartingPoint> starting_point() {
   return StartingPoint{header.soc_ppb, header.soc_sigma_ppb};
 }
 
-void record(const EstimateWords& words) {
-  estimates[estimate_count++] = words;
-  if (estimate_count == estimates.size()) write_estimates();
+void record(std::span<const std::uint32_t> words) {
+  if (estimate_size + words.size() > estimates.size()) write_estimates();
+  std::copy(words.begin(), words.end(), &estimates[estimate_size]);
+  estimate_size += words.size();
 }
 
 }  // namespace bms::hal

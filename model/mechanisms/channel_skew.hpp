@@ -21,7 +21,7 @@ struct ChannelSkew {
     S delay_s;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : delay_s(p[0]) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : delay_s(S(p[0])) {}
   };
 };
 

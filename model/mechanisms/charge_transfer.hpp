@@ -27,7 +27,7 @@ struct ChargeTransfer {
     Current<S> twice_i0_a;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 3>& p, double) : r0_share(p[0]), r1_share(p[1]), twice_i0_a(p[2] * Real(2)) {}
+    constexpr Law(const std::array<Real, 3>& p, double) : r0_share(Factor<S>(p[0])), r1_share(Factor<S>(p[1])), twice_i0_a(Current<S>(p[2] * Real(2))) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
       const S less = S(1) - flattening(drive.current_a / twice_i0_a);
@@ -44,7 +44,7 @@ struct ChargeTransfer {
         times = times * S(2);
       }
       const S y2 = y * y;
-      const S series = S(1) + y2 * (S(-1.0 / 6) + y2 * (S(3.0 / 40) + y2 * S(-15.0 / 336)));
+      const S series = S(1) + y2 * (S(-1.0 / 6) + y2 * (S(3.0 / 40) + y2 * (S(-15.0 / 336) + y2 * S(105.0 / 3456))));
       return x > S(0.25) || x < S(-0.25) ? S(times * y * series / x) : series;
     }
   };

@@ -29,7 +29,7 @@ struct ContactIntermittent {
     bool there = false;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(p[0]) {}
+    constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(Resistance<S>(p[0])) {}
 
     constexpr void at(double time_s) {
       while (next < bursts.size() && time_s > bursts[next].end_s) ++next;

@@ -23,7 +23,7 @@ struct ContactStep {
     bool there = true;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(p[0]) {
+    constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(Resistance<S>(p[0])) {
       if constexpr (Dual<Real>) onset_s = p[1].a;
       else onset_s = p[1];
     }

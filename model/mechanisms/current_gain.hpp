@@ -18,7 +18,7 @@ struct CurrentGain {
     Factor<S> times;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : times(Real(1) / (Real(1) + p[0])) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : times(Factor<S>(Real(1) / (Real(1) + p[0]))) {}
 
     constexpr Current<S> true_current(const Current<S>& read_a) const { return read_a * times; }
   };

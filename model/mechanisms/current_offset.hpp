@@ -18,7 +18,7 @@ struct CurrentOffset {
     Current<S> offset_a;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : offset_a(p[0]) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : offset_a(Current<S>(p[0])) {}
 
     constexpr Current<S> true_current(const Current<S>& read_a) const { return read_a - offset_a; }
   };

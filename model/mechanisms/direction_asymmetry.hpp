@@ -18,7 +18,7 @@ struct DirectionAsymmetry {
     Factor<S> charging;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : charging(Real(1) + p[0]) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : charging(Factor<S>(Real(1) + p[0])) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
       if (!(drive.current_a > Current<S>(0))) return;  // no current, no drop: its sign near zero does not matter

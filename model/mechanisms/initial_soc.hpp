@@ -18,7 +18,7 @@ struct InitialSoc {
     Soc<S> shift;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : shift(p[0]) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : shift(Soc<S>(p[0])) {}
   };
 };
 

@@ -18,7 +18,7 @@ struct Leakage {
     Current<S> lost_a;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : lost_a(p[0]) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : lost_a(Current<S>(p[0])) {}
 
     constexpr Current<S> counted(const Current<S>& counted_a, const Drive<S>&) const { return counted_a - lost_a; }
   };

@@ -30,7 +30,7 @@ struct SelfHeating {
 
     template <class Real>
     constexpr Law(const std::array<Real, 3>& p, double)
-        : energy(mechanism_detail::energy_over_rt(p[2], Real(25))), per_w(p[0] / Real(100)), rate_per_s(Real(1) / p[1]) {}
+        : energy(Factor<S>(mechanism_detail::energy_over_rt(p[2], Real(25)))), per_w(Coupling<S>(p[0] / Real(100))), rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
     constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {

@@ -22,7 +22,7 @@ struct TemperatureSensor {
     Duration<S> lag_s;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 2>& p, double) : offset_k(p[0]), lag_s(p[1]) {}
+    constexpr Law(const std::array<Real, 2>& p, double) : offset_k(Temperature<S>(p[0])), lag_s(Duration<S>(p[1])) {}
 
     constexpr Temperature<S> true_temperature(const Temperature<S>& read_c) const { return read_c - offset_k; }
   };

@@ -18,7 +18,7 @@ struct VoltageGain {
     Factor<S> times;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : times(Real(1) + p[0]) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : times(Factor<S>(Real(1) + p[0])) {}
 
     constexpr Voltage<S> reading(const Voltage<S>& v) const { return v * times; }
   };

@@ -18,7 +18,7 @@ struct VoltageOffset {
     Voltage<S> offset_v;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : offset_v(p[0]) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : offset_v(Voltage<S>(p[0])) {}
 
     constexpr Voltage<S> reading(const Voltage<S>& v) const { return v + offset_v; }
   };

@@ -47,6 +47,101 @@ TEST(Board, AnIdentifiedCellGoesThroughTheGeneratorAndComputesTheSameBits) {
   EXPECT_THAT(run.out, HasSubstr("every bit equal"));
 }
 
+/// table9 with these tables behind it.
+std::filesystem::path extended_cell(const TemporaryFolder& folder, const std::string& name, const std::string& tables) {
+  const auto path = folder.path() / (name + ".toml");
+  std::ofstream(path) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\"table9\"", "\"" + name + "\"") << tables;
+  return path;
+}
+
+const std::string four_mechanisms = R"(
+[mechanism.ocv_hysteresis]
+half_gap_v = 0.006
+decay = 40
+initial = -0.5
+[mechanism.slow_polarisation]
+resistance_ohm = 0.004
+[mechanism.temperature_resistance]
+r0_activation_j_per_mol = 15000
+r1_activation_j_per_mol = 30000
+[instrument.current_offset]
+offset_a = 0.02
+)";
+
+TEST(Board, ComputesAnExtendedCellBitForBitLikeTheHostAndShowsItsStates) {
+  const TemporaryFolder folder;
+  const std::string cell = extended_cell(folder, "extended", four_mechanisms).string(), trace = (folder.path() / "t.csv").string();
+  const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("Verified: 28801 estimates, every bit equal on netduinoplus2."));
+  ASSERT_EQ(run_tool("replay " + shift + " --cell " + cell + " --trace " + trace).exit_code, 0);
+  const std::string host = content(trace);
+  ASSERT_EQ(run_tool("replay " + shift + " --target netduinoplus2 --cell " + cell + " --trace " + trace).exit_code, 0);
+  EXPECT_EQ(content(trace), host);
+  EXPECT_THAT(host, HasSubstr(",voltage_measured_v,slow_polarisation_1_v,slow_polarisation_2_v,ocv_hysteresis_v,flags\n"));
+  // integers, on the host alone
+  EXPECT_EQ(run_tool("replay " + shift + " --scalar fixed --cell " + cell).exit_code, 0);
+}
+
+/// Every mechanism that a board runs, at once; with another order than the catalogue's.
+TEST(Board, ComputesEveryMechanismBitForBitLikeTheHost) {
+  const TemporaryFolder folder;
+  const std::string cell = extended_cell(folder, "everything", four_mechanisms + R"(
+[instrument.voltage_gain]
+gain_error = 0.002
+[instrument.voltage_offset]
+offset_v = 0.001
+[instrument.current_gain]
+gain_error = 0.01
+[instrument.temperature_sensor]
+offset_k = 2
+[mechanism.capacity_change]
+loss_fraction = 0.05
+[mechanism.coulombic_loss]
+loss_fraction = 0.003
+[mechanism.leakage]
+current_a = 0.001
+[mechanism.fast_polarisation]
+resistance_ohm = 0.002
+[mechanism.self_heating]
+thermal_resistance_k_per_w = 3
+[mechanism.resistance_growth]
+fraction = 0.1
+[mechanism.polarisation_growth]
+r1_fraction = 0.1
+c1_fraction = -0.1
+[mechanism.direction_asymmetry]
+charge_fraction = 0.1
+[mechanism.charge_transfer]
+r0_share = 0.3
+r1_share = 0.5
+[mechanism.contact_step]
+resistance_ohm = 0.001
+[mechanism.ocv_shape]
+slide_at_20 = 0.02
+slide_at_80 = -0.01
+[mechanism.entropic_ocv]
+at_10_v_per_k = 1e-4
+at_40_v_per_k = -2e-4
+at_70_v_per_k = 1e-4
+at_95_v_per_k = 1e-4
+)").string();
+  const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("Verified: 28801 estimates, every bit equal on netduinoplus2."));
+}
+
+TEST(Board, TheGeneratorRefusesForIntegersWhatNeedsAnFpu) {
+  const TemporaryFolder folder;
+  const auto cell = extended_cell(folder, "transfer", "\n[mechanism.charge_transfer]\nr0_share = 0.3\n");
+  const std::string log = (folder.path() / "log").string(), out = (folder.path() / "out.hpp").string();
+  const std::string command = "\"" BMS_CELL_HEADER_TOOL "\" " + cell.string() + " " + out;
+  EXPECT_EQ(WEXITSTATUS(std::system((command + " fixed 2> " + log).c_str())), 2);
+  EXPECT_THAT(content(log), ::testing::MatchesRegex("[^\n]*'mechanism.charge_transfer' does not compute in fixed point[^\n]*\n"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 0);
+}
+
 /// table9 with R0 at 90 % one float step larger: 0.0135692 is 0x3c5e5128 as a float.
 TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
   const TemporaryFolder folder;

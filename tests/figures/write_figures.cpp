@@ -1,4 +1,5 @@
-// Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on the board.
+// Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on the board;
+// with "board": writes that and the keys of mechanisms, nothing of recordings and speeds.
 //
 // Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
 #include <algorithm>
@@ -89,6 +90,48 @@ std::string step_cost() {
   return table;
 }
 
+/// table9 with mechanisms at usual values, as a cell file would have them.
+CellFile table9_with(const std::vector<std::pair<const char*, std::vector<double>>>& mechanisms) {
+  CellFile cell = read_cell("table9");
+  for (const auto& [id, values] : mechanisms) {
+    model::MechanismSetting m = model::unsaid(model::mechanism_index(id), cell.parameters.capacity_ah);
+    std::copy(values.begin(), values.end(), m.value.begin());
+    put_mechanism(cell, m);
+  }
+  return parse_cell(cell_text(cell), "table9 with mechanisms");
+}
+
+std::string mechanism_cost() {
+  const std::pair<const char*, std::vector<double>> hysteresis{"ocv_hysteresis", {0.006}}, slow{"slow_polarisation", {0.004}}, fast{"fast_polarisation", {0.002}},
+      warm{"temperature_resistance", {15'000, 30'000}}, heat{"self_heating", {1}}, shape{"ocv_shape", {0.02, -0.01}}, entropic{"entropic_ocv", {1e-4, 2e-4, -1e-4, 1e-4}},
+      transfer{"charge_transfer", {0.3, 0.5}}, offset{"current_offset", {0.02}}, gain{"voltage_gain", {0.001}};
+  const auto all = samples(read_recording(shift));
+  const EmulatedBoard& board = emulated_boards().front();
+  std::string table = "| table9 with | step, mean [instructions] | step, longest |\n|---|---|---|\n";
+  for (const auto& set : std::vector<std::vector<std::pair<const char*, std::vector<double>>>>{
+           {}, {offset}, {warm}, {transfer}, {entropic}, {shape}, {gain}, {heat}, {hysteresis}, {fast}, {slow}, {hysteresis, slow}, {hysteresis, slow, warm, offset}}) {
+    const CellFile cell = table9_with(set);
+    const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), all, state_names(cell).size());
+    std::string names;
+    for (const auto& [id, values] : set) names += fmt::format("{}`{}`", names.empty() ? "" : ", ", id);
+    table += fmt::format("| {} | {:.0f} | {} |\n", names.empty() ? "nothing" : names, cost.mean, cost.most);
+  }
+  return table;
+}
+
+/// Keys of the mechanisms' tables in a cell file.
+std::string mechanism_tables() {
+  std::string table = "| table | key | unit | bounds | what |\n|---|---|---|---|---|\n";
+  for (const model::MechanismInfo& info : model::catalogue) {
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      const model::Parameter& p = info.parameter[k];
+      const char* per = p.per == model::Per::ah ? " per Ah" : p.per == model::Per::siemens ? ", over Ah" : "";
+      table += fmt::format("| {} | `{}` | {} | {:g} .. {:g}{} | {} |\n", k > 0 ? "" : "`[" + table_of(info) + "]`" + (info.on_board ? "" : " *host*"), p.name, p.unit == "1" ? "" : p.unit, p.low, p.high, per, p.meaning);
+    }
+  }
+  return table;
+}
+
 std::string speed() {
   std::string table = "| what | figure |\n|---|---|\n";
   const CellFile cell = read_cell("table9");
@@ -173,9 +216,16 @@ std::string identification_speed() {
   return table;
 }
 
+/// What is the same on every machine and depends on the code alone.
+void write_board() {
+  replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
+  replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
+  replace_figures(source / "model/cells/README.md", "mechanisms", mechanism_tables());
+}
+
 void run() {
   const auto estimator = source / "estimator/README.md";
-  replace_figures(estimator, "netduinoplus2", step_cost());
+  write_board();
   replace_figures(estimator, "shift", shift_accuracy());
   if (std::filesystem::exists(data)) replace_figures(estimator, "real", real_accuracy());
   else fmt::print(stderr, "{} is not there: the figures of real recordings stay\n", data.string());
@@ -189,7 +239,8 @@ void run() {
 
 int main(int argc, char** argv) {
   try {
-    if (argc > 1 && std::string_view(argv[1]) == "step") fmt::print("{}", bms::step_cost());
+    if (argc > 1 && std::string_view(argv[1]) == "step") fmt::print("{}\n{}", bms::step_cost(), bms::mechanism_cost());
+    else if (argc > 1 && std::string_view(argv[1]) == "board") bms::write_board();
     else bms::run();
     return 0;
   } catch (const std::exception& e) {

@@ -14,7 +14,7 @@
 
 namespace bms {
 
-StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples) {
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states) {
   const auto symbols = symbols_of(replay_image);
   const Symbol step = symbol_named(symbols, "bms::estimator_step("), interrupt = symbol_named(symbols, "systick_interrupt");
   const TemporaryFolder folder;
@@ -22,7 +22,7 @@ StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::p
   run_on_board(board, replay_image, samples, std::nullopt,
                {"-plugin", fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, step.address & ~1ULL, interrupt.address & ~1ULL,
                                        (interrupt.address & ~1ULL) + interrupt.size),
-                "-d", "plugin", "-D", log});
+                "-d", "plugin", "-D", log}, states);
   StepCost cost;
   unsigned long long calls = 0, first = 0, least = 0, most = 0, sum = 0;
   const std::string text = read_file(log);
@@ -51,7 +51,7 @@ Footprint footprint(const std::filesystem::path& application_image) {
 }
 
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
-  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples);
+  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_names(cell).size());
   const Footprint f = footprint(firmware_image(board.name, cell, Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},

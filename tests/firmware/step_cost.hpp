@@ -18,8 +18,8 @@ struct StepCost {
   double mean = 0;  ///< of all calls but the first, which starts the estimator
 };
 
-/// Instructions inside bms::estimator_step and all that it calls, interrupts left out.
-StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples);
+/// Instructions inside bms::estimator_step and all that it calls, interrupts left out. states: of the cell's mechanisms.
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states = 0);
 
 /// Bytes.
 struct Footprint {

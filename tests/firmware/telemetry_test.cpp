@@ -10,7 +10,7 @@ namespace {
 
 bool listening = true;
 std::vector<hal::CanFrame> sent;
-std::vector<EstimateWords> recorded;
+std::vector<std::vector<std::uint32_t>> recorded;
 int fed = 0;
 std::optional<hal::FaultRecord> fault;
 
@@ -24,7 +24,7 @@ bool can_send(const CanFrame& frame) {
 }
 ResetCause reset_cause() { return ResetCause::watchdog; }
 std::optional<FaultRecord> last_fault() { return fault; }
-void record(const EstimateWords& words) { recorded.push_back(words); }
+void record(std::span<const std::uint32_t> words) { recorded.emplace_back(words.begin(), words.end()); }
 void watchdog_feed() { ++fed; }
 }  // namespace hal
 
@@ -56,7 +56,7 @@ class Telemetry : public ::testing::Test {
     for (const hal::CanFrame& f : sent) all.push_back(f.id);
     return all;
   }
-  Application<float, fixed_answer> application{std::nullopt, {0xCE110001, 0x000100}};
+  Application<SocEstimator<float>, fixed_answer> application{std::nullopt, {0xCE110001, 0x000100}};
   Sample sample{};
 };
 

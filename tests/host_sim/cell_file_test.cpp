@@ -107,6 +107,90 @@ TEST(CellFile, RefusesWhatIsMissingMisspeltOrOfTheWrongKind) {
   EXPECT_THAT(refusal(replaced(good, "1927.32]", many + "]")), HasSubstr("at most 64 numbers"));
 }
 
+constexpr const char* mechanisms = R"(
+[instrument.current_offset]
+offset_a = 0.03
+offset_a_std = 0.002
+
+[mechanism.initial_soc]
+shift = -0.04
+
+[mechanism.ocv_hysteresis]
+source = "seen in \"the\" lab"
+half_gap_v = 0.0123456789012345
+half_gap_v_std = 0.001
+decay = 55
+)";
+
+const model::MechanismSetting& setting_of(const CellFile& file, std::string_view id) {
+  for (const model::MechanismSetting& m : file.mechanisms) {
+    if (model::catalogue[m.index].id == id) return m;
+  }
+  throw std::runtime_error("not there");
+}
+
+TEST(CellFile, HoldsMechanismsInTheOrderOfTheCatalogueAndTakesWhatIsNotSaidAsNeutral) {
+  const CellFile cell = parse_cell(table9_text() + mechanisms, "cell.toml");
+  ASSERT_EQ(cell.mechanisms.size(), 3U);
+  for (std::size_t k = 1; k < 3; ++k) EXPECT_GT(cell.mechanisms[k].index, cell.mechanisms[k - 1].index);
+  const auto& hysteresis = setting_of(cell, "ocv_hysteresis");
+  EXPECT_EQ(hysteresis.value[0], 0.0123456789012345);
+  EXPECT_EQ(hysteresis.deviation[0], 0.001);
+  EXPECT_EQ(hysteresis.value[1], 55);
+  EXPECT_EQ(hysteresis.value[2], 0);
+  EXPECT_EQ(setting_of(cell, "current_offset").deviation[0], 0.002);
+  EXPECT_EQ(setting_of(cell, "initial_soc").value[0], -0.04);
+  EXPECT_TRUE(read_cell("table9").mechanisms.empty());
+}
+
+TEST(CellFile, EveryMechanismIsWrittenAndReadBackDigitForDigit) {
+  CellFile cell = read_cell("table9");
+  for (std::size_t index = model::mechanism_count; index-- > 0;) {
+    model::MechanismSetting m = model::unsaid(index, cell.parameters.capacity_ah);
+    for (std::size_t k = 0; k < model::catalogue[index].parameters; ++k) {
+      const model::Parameter& p = model::catalogue[index].parameter[k];
+      m.value[k] = p.lower(6) + (p.upper(6) - p.lower(6)) * (k == 0 ? 1.0 : 0.123456789);  // a value on a bound is inside
+      m.deviation[k] = k == 1 ? 0 : 0.1 / 3;
+    }
+    put_mechanism(cell, m);
+  }
+  cell.sources["mechanism.leakage"] = "a drawer";
+  const CellFile again = parse_cell(cell_text(cell), "again");
+  ASSERT_EQ(again.mechanisms.size(), model::mechanism_count);
+  for (std::size_t index = 0; index < model::mechanism_count; ++index) {
+    EXPECT_EQ(again.mechanisms[index].index, index);
+    EXPECT_EQ(again.mechanisms[index].value, cell.mechanisms[index].value) << model::catalogue[index].id;
+    EXPECT_EQ(again.mechanisms[index].deviation, cell.mechanisms[index].deviation) << model::catalogue[index].id;
+  }
+  EXPECT_EQ(again.sources.at("mechanism.leakage"), "a drawer");
+  EXPECT_EQ(cell_text(again), cell_text(cell));
+}
+
+TEST(CellFile, WhatIsSilentAboutAParameterIsAcceptedForACellOfAnySize) {
+  for (const double capacity_ah : {0.01, 2.5, 1'000.0}) {
+    for (std::size_t index = 0; index < model::mechanism_count; ++index) {
+      EXPECT_EQ(model::first_fault(model::unsaid(index, capacity_ah), capacity_ah), model::catalogue[index].parameters) << model::catalogue[index].id;
+    }
+  }
+}
+
+TEST(CellFile, RefusesAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable) {
+  const std::string good = table9_text() + mechanisms;
+  EXPECT_THAT(refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")), HasSubstr("unknown key 'mechanism.hysteresis', expected one of: "));
+  EXPECT_THAT(refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")), HasSubstr("ocv_hysteresis"));
+  EXPECT_THAT(refusal(replaced(good, "instrument.current_offset", "mechanism.current_offset")), HasSubstr("unknown key 'mechanism.current_offset'"));
+  EXPECT_THAT(refusal(replaced(good, "mechanism.initial_soc", "instrument.initial_soc")), HasSubstr("unknown key 'instrument.initial_soc'"));
+  EXPECT_THAT(refusal(replaced(good, "decay = 55", "dekay = 55")), HasSubstr("unknown key 'mechanism.ocv_hysteresis.dekay', expected one of: decay, decay_std, half_gap_v"));
+  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = \"fast\"")), HasSubstr("expected a number"));
+  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = nan")), HasSubstr("'mechanism.ocv_hysteresis.decay' is out of range, expected 4 to 600"));
+  EXPECT_THAT(refusal(replaced(good, "offset_a = 0.03", "offset_a = 3")), HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -0.6 to 0.6 A"));
+  EXPECT_THAT(refusal(replaced(good, "half_gap_v_std = 0.001", "half_gap_v_std = -1")), HasSubstr("'mechanism.ocv_hysteresis.half_gap_v_std' is out of range, expected 0 or more"));
+  EXPECT_THAT(refusal("mechanism = 1\n" + table9_text()), HasSubstr("'mechanism' is not acceptable, expected a table"));
+  const std::string line = refusal(replaced(good, "decay = 55", "decay = 1"));
+  const auto number = std::count(good.begin(), good.end(), '\n');
+  EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
+}
+
 TEST(CellFile, AMissingFileIsRefusedWithTheNamesOfTheBuiltInCells) {
   try {
     read_cell("table10");

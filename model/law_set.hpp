@@ -1,0 +1,239 @@
+// A set of mechanisms' laws, called one after the other. What no law of the set touches costs nothing; what is optional costs an `if`.
+//
+//   LawSet<S, Law...>                   laws that all act
+//   LawSet<S, std::optional<Law>...>    laws of which some act
+//
+// States stand one behind the other in the order of the laws; those of laws that do not act take no place.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <tuple>
+#include <type_traits>
+
+#include "model/mechanism.hpp"
+
+namespace bms::model {
+
+namespace extended_detail {
+
+/// A law as it stands in a slot.
+template <class Slot>
+struct LawIn {
+  using type = Slot;
+};
+template <class Law>
+struct LawIn<std::optional<Law>> {
+  using type = Law;
+};
+
+template <class Law>
+constexpr bool adds_voltage() {
+  if constexpr (requires { Law::voltage_states; }) return Law::voltage_states;
+  else return false;
+}
+template <class Law, class S>
+constexpr bool reads_elsewhere() {
+  return requires(Law law, Soc<S> soc) { law.read_at(soc); };
+}
+template <class Law>
+constexpr std::size_t states_of() {
+  if constexpr (requires { Law::states; }) return Law::states;
+  else return 0;
+}
+
+template <class Law>
+constexpr std::size_t voltage_states_of() {
+  return adds_voltage<Law>() ? states_of<Law>() : 0;
+}
+
+}  // namespace extended_detail
+
+template <class S, class... Slots>
+class LawSet {
+ public:
+  static constexpr std::size_t most_states = (std::size_t{0} + ... + extended_detail::states_of<typename extended_detail::LawIn<Slots>::type>());
+  static constexpr std::size_t most_voltage_states = (std::size_t{0} + ... + extended_detail::voltage_states_of<typename extended_detail::LawIn<Slots>::type>());
+  static constexpr bool reads_elsewhere = (false || ... || extended_detail::reads_elsewhere<typename extended_detail::LawIn<Slots>::type, S>());
+  using States = std::array<Voltage<S>, most_states>;
+  using Relaxations = std::array<Relaxation<S>, most_states>;
+
+  constexpr LawSet() = default;
+  constexpr explicit LawSet(const Slots&... slots)
+    requires(sizeof...(Slots) > 0)
+      : slots_(slots...) {}
+
+  template <std::size_t K>
+  constexpr auto& slot() {
+    return std::get<K>(slots_);
+  }
+
+  constexpr void at(double time_s) {
+    each([&](auto& law) {
+      if constexpr (requires { law.at(time_s); }) law.at(time_s);
+    });
+  }
+  constexpr Current<S> true_current(Current<S> a) const {
+    each([&](const auto& law) {
+      if constexpr (requires { law.true_current(a); }) a = law.true_current(a);
+    });
+    return a;
+  }
+  constexpr Temperature<S> true_temperature(Temperature<S> c) const {
+    each([&](const auto& law) {
+      if constexpr (requires { law.true_temperature(c); }) c = law.true_temperature(c);
+    });
+    return c;
+  }
+  constexpr Current<S> counted(const Drive<S>& drive) const {
+    Current<S> a = drive.current_a;
+    each([&](const auto& law) {
+      if constexpr (requires { law.counted(a, drive); }) a = law.counted(a, drive);
+    });
+    return a;
+  }
+  constexpr Soc<S> read_at(Soc<S> soc) const {
+    each([&](const auto& law) {
+      if constexpr (requires { law.read_at(soc); }) soc = law.read_at(soc);
+    });
+    return soc;
+  }
+  constexpr Coupling<S> read_slope(Soc<S> soc) const {
+    Coupling<S> slope(1);
+    each([&](const auto& law) {
+      if constexpr (requires { law.read_at(soc); }) {
+        slope = Coupling<S>(slope * law.read_slope(soc));
+        soc = law.read_at(soc);
+      }
+    });
+    return slope;
+  }
+  template <class X>
+  constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const Drive<S>& drive, const X& x) const {
+    each_with_states([&](const auto& law, std::size_t first) {
+      if constexpr (requires { law.warm(at, x[first], drive); }) law.warm(at, x[first], drive);
+      if constexpr (requires { law.tables(at, soc, drive); }) law.tables(at, soc, drive);
+    });
+  }
+  constexpr Voltage<S> reading(Voltage<S> v) const {
+    each([&](const auto& law) {
+      if constexpr (requires { law.reading(v); }) v = law.reading(v);
+    });
+    return v;
+  }
+
+  /// Whether any law makes another current of the one that is read, on its way to the charge.
+  constexpr bool changes_charge() const {
+    bool any = false;
+    each([&](const auto& law) { any = any || requires(Current<S> a) { law.true_current(a); } || requires(Current<S> a, Drive<S> d) { law.counted(a, d); }; });
+    return any;
+  }
+  constexpr bool changes_reading() const {
+    bool any = false;
+    each([&](const auto& law) { any = any || requires(Voltage<S> v) { law.reading(v); }; });
+    return any;
+  }
+
+  constexpr std::size_t states() const {
+    std::size_t count = 0;
+    each([&](const auto& law) { count += states_of(law); });
+    return count;
+  }
+  /// Those that add to the voltage: the first ones.
+  constexpr std::size_t voltage_states() const {
+    std::size_t count = 0;
+    each([&](const auto& law) { count += extended_detail::voltage_states_of<std::remove_cvref_t<decltype(law)>>(); });
+    return count;
+  }
+  constexpr States initial() const {
+    States x{};
+    each_with_states([&](const auto& law, std::size_t first) {
+      for (std::size_t i = 0; i < states_of(law); ++i) {
+        if constexpr (requires { law.initial(i); }) x[first + i] = law.initial(i);
+      }
+    });
+    return x;
+  }
+  /// How each state moves in a step.
+  constexpr Relaxations settling(const TablePoint<S>& at, const Drive<S>& drive) const {
+    Relaxations r{};
+    each_with_states([&](const auto& law, std::size_t first) {
+      if constexpr (requires { law.settle(0, at, drive); }) {
+        for (std::size_t i = 0; i < states_of(law); ++i) r[first + i] = law.settle(i, at, drive);
+      }
+    });
+    return r;
+  }
+  /// Variances of the voltage states: of each, its law's own or otherwise(state).
+  template <class Variances, class Own, class Otherwise>
+  constexpr void variances(Variances& out, Own own, Otherwise otherwise) const {
+    each_with_states([&](const auto& law, std::size_t first) {
+      if (!adds_voltage(law)) return;
+      for (std::size_t i = 0; i < states_of(law) && first + i < out.size(); ++i) {
+        if constexpr (requires { own(law); }) {
+          const Voltage<S> error_v = own(law);
+          out[first + i] = Variance<S>(error_v * error_v);
+        } else {
+          out[first + i] = otherwise(first + i);
+        }
+      }
+    });
+  }
+  /// Voltage states advanced, and what they add to the terminal's voltage.
+  constexpr Voltage<S> advance(States& x, const TablePoint<S>& at, const Drive<S>& drive, bool moving) const {
+    Voltage<S> sum(0);
+    each_with_states([&](const auto& law, std::size_t first) {
+      for (std::size_t i = 0; i < states_of(law); ++i) {
+        if constexpr (requires { law.settle(i, at, drive); }) {
+          if (moving) x[first + i] = relaxed<S>(x[first + i], law.settle(i, at, drive));
+          if (adds_voltage(law)) sum = Voltage<S>(sum + x[first + i]);
+        }
+      }
+    });
+    return sum;
+  }
+
+ private:
+  template <class Law>
+  static constexpr std::size_t states_of(const Law&) {
+    return extended_detail::states_of<Law>();
+  }
+  template <class Law>
+  static constexpr bool adds_voltage(const Law&) {
+    return extended_detail::adds_voltage<Law>();
+  }
+
+  template <class F, class Law>
+  static constexpr void call(F& f, Law& law) {
+    f(law);
+  }
+  template <class F, class Law>
+  static constexpr void call(F& f, std::optional<Law>& law) {
+    if (law) f(*law);
+  }
+  template <class F, class Law>
+  static constexpr void call(F& f, const std::optional<Law>& law) {
+    if (law) f(*law);
+  }
+  template <class F>
+  constexpr void each(F f) {
+    std::apply([&](auto&... slot) { (call(f, slot), ...); }, slots_);
+  }
+  template <class F>
+  constexpr void each(F f) const {
+    std::apply([&](const auto&... slot) { (call(f, slot), ...); }, slots_);
+  }
+  template <class F>
+  constexpr void each_with_states(F f) const {
+    std::size_t first = 0;
+    each([&](const auto& law) {
+      f(law, first);
+      first += states_of(law);
+    });
+  }
+
+  std::tuple<Slots...> slots_;
+};
+
+}  // namespace bms::model

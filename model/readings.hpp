@@ -1,0 +1,124 @@
+// The readings of a recording with what needs the readings around them undone: a current that comes late, a temperature that lags.
+//
+//   current      mean over (t[k - 1] + delay, t[k] + delay] of what was read: the charge read by then, interpolated linearly.
+//                Before the first row and after the last the current is taken to go on.
+//   temperature  T + lag dT/dt, dT/dt the least-squares slope over half a minute to either side
+//
+// A missing current (NaN) is the last one known, 0 at first; a missing temperature the last one known, 25 degrees C at first.
+// Undone by laws instead, one reading at a time: offset, gain, clipping (model/extended.hpp).
+//
+// S: double or a dual number, of the delay and the lag. Host only: it holds copies of the columns.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "model/exponential.hpp"
+
+namespace bms::model {
+
+template <class S>
+class CorrectedReadings {
+ public:
+  /// Columns of equal length, time ascending; temperature_c may be empty. time_s must outlive this.
+  CorrectedReadings(std::span<const double> time_s, std::span<const double> current_a, std::span<const double> temperature_c, S delay_s, S lag_s)
+      : time_s_(time_s), current_a_(known(current_a, 0)), delay_s_(delay_s), lag_s_(lag_s), late_(acts(delay_s)), lagging_(acts(lag_s)) {
+    temperature_c_ = temperature_c.empty() ? std::vector<double>(time_s.size(), usual_c) : known(temperature_c, usual_c);
+    if (late_) add_up();
+    if (lagging_) slopes();
+  }
+
+  /// What flowed in the interval that ends at row k; of the first row, which has none, and of a row that is not later than the one
+  /// before: what is read at that moment.
+  S current(std::size_t k) const {
+    if (!late_) return S(current_a_[k]);
+    const double duration_s = k == 0 ? 0 : time_s_[k] - time_s_[k - 1];
+    if (!(duration_s > 0)) return S(value(delay_s_) == 0 ? current_a_[k] : current_a_[row_at(time_s_[k] + value(delay_s_), k)]);
+    const S mean_a = S(S(charge_by(k) - charge_by(k - 1)) / duration_s);
+    return value(delay_s_) == 0 ? with_value(mean_a, current_a_[k]) : mean_a;  // not a digit differs where nothing is late
+  }
+
+  S temperature(std::size_t k) const {
+    if (!lagging_) return S(temperature_c_[k]);
+    return S(lag_s_ * c_per_s_[k] + temperature_c_[k]);
+  }
+
+ private:
+  static constexpr double usual_c = 25;
+  static constexpr double half_window_s = 30;
+
+  static double value(const S& s) {
+    if constexpr (Dual<S>) return s.a;
+    else return s;
+  }
+  static S with_value(S s, double v) {
+    if constexpr (Dual<S>) s.a = v;
+    else s = v;
+    return s;
+  }
+  /// Something to undo, or to differentiate by.
+  static bool acts(const S& s) {
+    if constexpr (!Dual<S>) return s != 0;
+    else if constexpr (requires { s.v.isZero(0.0); }) return s.a != 0 || !s.v.isZero(0.0);
+    else return true;
+  }
+  static std::vector<double> known(std::span<const double> column, double at_first) {
+    std::vector<double> all(column.begin(), column.end());
+    double last = at_first;
+    for (double& v : all) {
+      if (v == v) last = v;
+      else v = last;
+    }
+    return all;
+  }
+
+  void add_up() {
+    charge_as_.resize(time_s_.size());
+    for (std::size_t k = 1; k < time_s_.size(); ++k) charge_as_[k] = charge_as_[k - 1] + current_a_[k] * (time_s_[k] - time_s_[k - 1]);
+  }
+
+  /// Row whose interval holds the time, looked for from row `near`; the last one for what comes after.
+  std::size_t row_at(double time_s, std::size_t near) const {
+    std::size_t j = near;
+    while (j + 1 < time_s_.size() && time_s_[j] < time_s) ++j;
+    while (j > 0 && time_s_[j - 1] >= time_s) --j;
+    return j;
+  }
+
+  /// Charge read by t[k] + delay. Its derivative by the delay is the current there; between two rows' intervals, their mean.
+  S charge_by(std::size_t k) const {
+    const double moved_s = time_s_[k] + value(delay_s_);
+    const std::size_t j = row_at(moved_s, k);
+    const bool between = moved_s == time_s_[j] && j + 1 < time_s_.size();
+    const double slope_a = between ? (current_a_[j] + current_a_[j + 1]) / 2 : current_a_[j];
+    S charge = S(delay_s_ * slope_a);
+    return with_value(charge, charge_as_[j] + current_a_[j] * (moved_s - time_s_[j]));
+  }
+
+  /// Sums over a window that moves along: each row comes in once and leaves once. At least the neighbours are in it.
+  void slopes() {
+    const std::size_t rows = time_s_.size();
+    c_per_s_.assign(rows, 0);
+    if (rows < 2) return;
+    double n = 0, t = 0, tt = 0, c = 0, tc = 0;
+    const auto take = [&](std::size_t k, double sign) {
+      const double s = time_s_[k] - time_s_[0], warm = temperature_c_[k] - temperature_c_[0];
+      n += sign, t += sign * s, tt += sign * s * s, c += sign * warm, tc += sign * s * warm;
+    };
+    std::size_t from = 0, to = 0;  // rows in the sums: from .. to - 1
+    for (std::size_t k = 0; k < rows; ++k) {
+      while (to < rows && (time_s_[to] <= time_s_[k] + half_window_s || to <= k + 1)) take(to++, 1);
+      while (from + 1 < k && time_s_[from] < time_s_[k] - half_window_s) take(from++, -1);
+      const double spread = n * tt - t * t;
+      c_per_s_[k] = spread > 1e-9 * n * n ? (n * tc - t * c) / spread : 0;
+    }
+  }
+
+  std::span<const double> time_s_;
+  std::vector<double> current_a_, temperature_c_, charge_as_, c_per_s_;
+  S delay_s_, lag_s_;
+  bool late_, lagging_;
+};
+
+}  // namespace bms::model

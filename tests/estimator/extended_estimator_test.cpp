@@ -1,0 +1,195 @@
+// The filter over cells with mechanisms.
+#include <ceres/jet.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "estimator/soc_estimator.hpp"
+#include "host_sim/cell_file.hpp"
+#include "model/extended.hpp"
+#include "tests/model/usual_mechanisms.hpp"
+
+namespace bms {
+namespace {
+
+using namespace model;
+
+constexpr double capacity_ah = 6;
+
+template <class S>
+using HostLaws = ChosenLaws<S>;
+template <class S>
+using Cells = ExtendedCell<S, max_intervals, HostLaws<S>>;
+constexpr std::size_t held = HostLaws<double>::most_states;
+
+template <class S>
+Cells<S> table9_with(const std::vector<MechanismSetting>& mechanisms) {
+  return {prepare<S, max_intervals>(read_cell("table9").parameters), chosen<S>(mechanisms, capacity_ah)};
+}
+
+/// All that a board runs.
+std::vector<MechanismSetting> everything() {
+  std::vector<std::string_view> ids;
+  for (const MechanismInfo& info : catalogue) {
+    if (info.on_board) ids.push_back(info.id);
+  }
+  return usual(ids);
+}
+
+TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates) {
+  constexpr std::size_t voltages = HostLaws<double>::most_voltage_states, states = voltages + 2;
+  ASSERT_EQ(voltages, 4U);
+  using Jet = ceres::Jet<double, static_cast<int>(states)>;
+  using Model = ExtendedRc<voltages, held>::Of<double>;
+  using JetModel = ExtendedRc<voltages, held>::Of<Jet>;
+  const auto cell = table9_with<double>(everything());
+  const auto jets = table9_with<Jet>(everything());
+  ASSERT_EQ(cell.laws.voltage_states(), voltages);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int run = 0; run < 1'000; ++run) {
+    const double soc = -0.05 + 1.1 * uniform(random);
+    Model::Polarisation x;
+    for (double& v : x) v = 0.05 * (uniform(random) - 0.5);
+    x.back() = 0.05 * uniform(random);  // warmth, 5 K at most
+    const Drive<double> drive{30 * (uniform(random) - 0.5), std::pow(10, 3 * uniform(random) - 2), 40 * uniform(random)};
+    std::uint8_t interval = 0;
+    const auto at = look_up(CellUnder{cell, drive, x}, soc, interval);
+    const auto settling = Model::settling(cell.laws, at, drive);
+    const auto f = Model::transition(x, at, settling, drive);
+    const auto h = Model::sensitivity(cell.laws, at, drive);
+
+    typename JetModel::Polarisation y;
+    for (std::size_t k = 0; k < y.size(); ++k) y[k] = k <= voltages ? Jet(x[k], static_cast<int>(k)) : Jet(x[k]);
+    const Drive<Jet> drive_j{Jet(drive.current_a), Jet(drive.duration_s), Jet(drive.temperature_c)};
+    const Jet soc_j(soc, static_cast<int>(states - 1));
+    const auto at_j = look_up(CellUnder{jets, drive_j, y}, soc_j, interval);
+    const auto settling_j = JetModel::settling(jets.laws, at_j, drive_j);
+    const auto moved = JetModel::advance(y, at_j, settling_j, drive_j);
+    const Jet v = JetModel::voltage(jets.laws, y, at_j, drive_j);
+    EXPECT_NEAR(v.a, Model::voltage(cell.laws, x, at, drive), 1e-12);
+    for (std::size_t j = 0; j < states; ++j) {
+      for (std::size_t i = 0; i + 1 < states; ++i) ASSERT_NEAR(f[i][j], moved[i].v[static_cast<int>(j)], 1e-12 * (1 + std::abs(f[i][j]))) << i << j << " soc " << soc;
+      ASSERT_EQ(f[states - 1][j], j + 1 == states ? 1 : 0);
+      ASSERT_NEAR(h[j], v.v[static_cast<int>(j)], 1e-10 * (1 + std::abs(h[j]))) << j << " soc " << soc << " current " << drive.current_a;
+    }
+  }
+}
+
+struct Work {
+  std::vector<Sample> samples;
+  std::vector<double> soc;
+};
+/// A shift of pulses as a cell with these mechanisms answers it, read with noise of 1 mV.
+Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, double soc) {
+  const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  Course<double> course(cell, capacity_ah, chosen<double>(mechanisms, capacity_ah), soc);
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.001);
+  Work w;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double current_a = k < 60 ? 0 : (k / 40) % 3 == 0 ? -5 : (k / 40) % 3 == 1 ? 1.5 : -0.2, temperature_c = 15 + 1e-3 * static_cast<double>(k);
+    const double v = course.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, temperature_c, [](auto&, const auto&) {}) + noise(random);
+    w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround(current_a * 1e6)), static_cast<std::int32_t>(std::lround(v * 1e6)),
+                         static_cast<std::int16_t>(std::lround(temperature_c * 100))});
+    w.soc.push_back(course.soc());
+  }
+  return w;
+}
+
+template <class S, std::size_t Voltages, class AnyCell>
+auto run(const AnyCell& cell, const std::vector<Sample>& samples, const StartingPoint& start) {
+  using Estimator = SocEstimator<S, ExtendedRc<Voltages, held>::template Of>;
+  Estimator estimator(start);
+  std::vector<typename Estimator::Result> estimates;
+  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  return estimates;
+}
+
+const std::vector<std::string_view> some = {"ocv_hysteresis", "slow_polarisation", "temperature_resistance", "current_offset"};
+
+TEST(ExtendedEstimator, FollowsACellThatThePlainModelLoses) {
+  const Work w = work(usual(some), 10'000, 0.9);
+  const StartingPoint start{900'000'000, 50'000'000};
+  const auto with = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
+  SocEstimator<double> estimator(start);
+  const auto plain_cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  double with_rms = 0, plain_rms = 0;
+  std::size_t inside = 0;
+  for (std::size_t k = 0; k < w.samples.size(); ++k) {
+    const double error = with[k].soc - w.soc[k];
+    with_rms += error * error;
+    plain_rms += std::pow(estimator.step(plain_cell, w.samples[k]).soc - w.soc[k], 2);
+    if (std::abs(error) < 2 * with[k].soc_sigma) ++inside;
+  }
+  with_rms = std::sqrt(with_rms / 10'000), plain_rms = std::sqrt(plain_rms / 10'000);
+  EXPECT_LT(with_rms, 0.02);  // nobody knows the branch at the start: 8 mV of it are a few percent there
+  EXPECT_GT(plain_rms, 2 * with_rms);
+  EXPECT_GT(inside, 9'500U);
+}
+
+TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
+  std::vector<MechanismSetting> truth = {usual("ocv_hysteresis")}, told = truth;
+  truth[0].value = {0.02, 40, 0, 1};
+  told[0].value = {0.02, 40, 0, -1};
+  const Work w = work(truth, 6'000, 0.93);  // where the curve is steep, soc is known and the rest is hysteresis
+  const auto e = run<float, 1>(table9_with<float>(told), w.samples, {930'000'000, 5'000'000});
+  EXPECT_NEAR(e.front().mechanism[0], -0.02, 1e-6);
+  EXPECT_NEAR(e[50].mechanism[0], 0.02, 0.012);
+  EXPECT_NEAR(e.back().soc, w.soc.back(), 0.02);
+}
+
+TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
+  const Work w = work(usual(some), 1'500, 0.77);
+  const StartingPoint start{770'000'000, 5'000'000};
+  const auto twice = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
+  const auto single = run<float, 3>(table9_with<float>(usual(some)), w.samples, start);
+  const auto fixed = run<FixedPoint, 3>(table9_with<FixedPoint>(usual(some)), w.samples, start);
+  for (std::size_t k = 0; k < w.samples.size(); ++k) {
+    ASSERT_NEAR(single[k].soc, twice[k].soc, 5e-5) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 1e-4) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(single[k].mechanism[i], as_double(fixed[k].mechanism[i]), 2e-5) << k;
+  }
+}
+
+TEST(ExtendedEstimator, ACellWhoseMechanismsAreNeutralGivesThePlainCellsBits) {
+  const Work w = work({}, 2'000, 0.77);
+  auto neutral = unsaid(mechanism_index("resistance_growth"), capacity_ah);
+  const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, {770'000'000, 20'000'000});
+  SocEstimator<float> plain(StartingPoint{770'000'000, 20'000'000});
+  const auto cell = prepare<float, max_intervals>(read_cell("table9").parameters);
+  for (std::size_t k = 0; k < w.samples.size(); ++k) ASSERT_EQ(words(static_cast<const Estimate<float>&>(e[k])), words(plain.step(cell, w.samples[k]))) << k;
+}
+
+TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
+  const auto cell = table9_with<float>(everything());
+  std::mt19937_64 random(11);
+  for (int round = 0; round < 30; ++round) {
+    SocEstimator<float, ExtendedRc<4, held>::Of> estimator;
+    std::uint64_t time_us = 0;
+    for (int k = 0; k < 2'000; ++k) {
+      time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
+      const auto anything = [&](std::int32_t normal) { return random() % 3 == 0 ? static_cast<std::int32_t>(random()) : random() % 7 == 0 ? no_reading : normal; };
+      const auto e = estimator.step(cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
+      ASSERT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) && std::isfinite(e.voltage_predicted_v)) << round << " " << k;
+      for (const float x : e.mechanism) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
+      ASSERT_GT(e.soc_sigma, 0);
+    }
+  }
+}
+
+TEST(ExtendedEstimator, CountsThroughASensorThatIsOff) {
+  auto off = usual({"current_offset", "current_gain", "capacity_change"});
+  const auto cell = table9_with<float>(off);
+  SocEstimator<float, ExtendedRc<0, held>::Of> estimator(StartingPoint{500'000'000, 5'000'000});
+  estimator.step(cell, {0, 0, no_reading, 2'500});
+  Estimate<float> e;
+  for (std::uint64_t k = 1; k <= 3'600; ++k) e = estimator.step(cell, {k * 1'000'000, -1'200'000, no_reading, 2'500});
+  const double true_a = (-1.2 - off[0].value[0]) / (1 + off[1].value[0]);
+  EXPECT_NEAR(e.soc, 0.5 + true_a / (6 * (1 - 0.1)), 1e-6);
+}
+
+}  // namespace
+}  // namespace bms

@@ -1,0 +1,297 @@
+#include "model/extended.hpp"
+
+#include <ceres/jet.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "host_sim/cell_file.hpp"
+#include "model/extended_rc.hpp"
+#include "tests/model/usual_mechanisms.hpp"
+
+namespace bms::model {
+namespace {
+
+constexpr double capacity_ah = 6;
+
+template <class S>
+double number(const S& x) {
+  if constexpr (Dual<S>) return x.a;
+  else return as_double(x);
+}
+
+/// An hour of work: current, temperature, soc after the row.
+struct Row {
+  double time_s, duration_s, current_a, temperature_c;
+};
+std::vector<Row> drive_of(std::size_t rows) {
+  std::mt19937 random(17);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<Row> all;
+  double time_s = 0, current_a = 0;
+  for (std::size_t k = 0; k < rows; ++k) {
+    const double duration_s = k == 0 ? 0 : k % 50 == 0 ? 0.1 : 1;
+    time_s += duration_s;
+    if (k % 20 == 0) current_a = k % 100 == 0 ? 0 : std::round(1e3 * (14 * uniform(random) - 8)) * 1e-3;
+    all.push_back({time_s, duration_s, current_a, 20 + 10 * std::sin(1e-3 * time_s)});
+  }
+  return all;
+}
+
+class EveryMechanism : public ::testing::TestWithParam<std::size_t> {
+ protected:
+  const MechanismInfo& info() const { return catalogue[GetParam()]; }
+};
+INSTANTIATE_TEST_SUITE_P(Catalogue, EveryMechanism, ::testing::Range(std::size_t{0}, mechanism_count),
+                         [](const auto& p) { return std::string(catalogue[p.param].id); });
+
+/// `usual` values but strengths at their neutral ones.
+MechanismValues<> without_strength(std::size_t index) {
+  MechanismValues<> values = usual(catalogue[index].id).value;
+  for (std::size_t k = 0; k < catalogue[index].parameters; ++k) {
+    if (catalogue[index].parameter[k].role == Role::strength) values[k] = catalogue[index].parameter[k].neutral;
+  }
+  return values;
+}
+
+template <class S>
+void expect_no_effect(std::size_t index) {
+  ChosenLaws<S> laws;
+  choose<S>(laws, index, without_strength(index), capacity_ah);
+  const auto cell = prepare<S, max_intervals>(read_cell("table9").parameters);
+  auto x = laws.initial();
+  for (const Row& row : drive_of(200)) {
+    const Current<S> a = Current<S>(row.current_a);
+    const Temperature<S> c = Temperature<S>(row.temperature_c);
+    const Soc<S> soc = Soc<S>(0.05 + 0.9 * row.time_s / 200);
+    laws.at(row.time_s);
+    ASSERT_EQ(number(laws.true_current(a)), number(a));
+    ASSERT_EQ(number(laws.true_temperature(c)), number(c));
+    const Drive<S> drive{a, TimeStep<S>(row.duration_s), c};
+    ASSERT_EQ(number(laws.counted(drive)), number(a));
+    ASSERT_EQ(number(laws.read_at(soc)), number(soc));
+    ASSERT_EQ(number(laws.read_slope(soc)), 1);
+    const TablePoint<S> before = look_up(cell, soc);
+    TablePoint<S> at = before;
+    laws.tables(at, soc, drive, x);
+    for (const auto& [now, was] : {std::pair{number(at.ocv_v), number(before.ocv_v)}, {number(at.ocv_delta_v), number(before.ocv_delta_v)},
+                                   {number(at.r0_ohm), number(before.r0_ohm)}, {number(at.r0_delta_ohm), number(before.r0_delta_ohm)},
+                                   {number(at.r1_ohm), number(before.r1_ohm)}, {number(at.r1_delta_ohm), number(before.r1_delta_ohm)},
+                                   {number(at.c1_f), number(before.c1_f)}, {number(at.c1_delta_f), number(before.c1_delta_f)}}) {
+      ASSERT_EQ(now, was);
+    }
+    ASSERT_EQ(number(laws.advance(x, at, drive, row.duration_s > 0)), 0);
+    ASSERT_EQ(number(laws.reading(at.ocv_v)), number(at.ocv_v));
+  }
+}
+
+TEST_P(EveryMechanism, ChangesNothingInAnyScalarWhileItsStrengthIsNeutral) {
+  expect_no_effect<double>(GetParam());
+  expect_no_effect<float>(GetParam());
+  expect_no_effect<FixedPoint>(GetParam());
+  expect_no_effect<ceres::Jet<double, 2>>(GetParam());
+}
+
+/// The filter's model over a drive, its soc given; and what ends as charge [A s].
+template <class S>
+struct Walk {
+  std::vector<double> voltage_v;
+  double charge_as = 0;
+};
+template <class S>
+Walk<S> walk(const std::vector<MechanismSetting>& mechanisms, const std::vector<Row>& rows) {
+  using Laws = ChosenLaws<S>;
+  using Model = typename ExtendedRc<Laws::most_voltage_states, Laws::most_states>::template Of<S>;
+  const ExtendedCell<S, max_intervals, Laws> cell{prepare<S, max_intervals>(read_cell("table9").parameters), chosen<S>(mechanisms, capacity_ah)};
+  const Laws& laws = cell.laws;
+  typename Model::Polarisation x{};
+  const auto initial = laws.initial();
+  for (std::size_t k = 0; k < initial.size(); ++k) x[1 + k] = initial[k];
+  std::uint8_t interval = 0;
+  double soc = 0.815;
+  Walk<S> result;
+  for (const Row& row : rows) {
+    if (!(row.duration_s > 0)) continue;
+    const Drive<S> drive{laws.true_current(Current<S>(row.current_a)), TimeStep<S>(row.duration_s), laws.true_temperature(Temperature<S>(row.temperature_c))};
+    result.charge_as += number(laws.counted(drive)) * row.duration_s;
+    soc += row.current_a * row.duration_s / 3'600 / capacity_ah;
+    const auto at = look_up(CellUnder{cell, drive, x}, Soc<S>(soc), interval);
+    x = Model::advance(x, at, Model::settling(laws, at, drive), drive);
+    result.voltage_v.push_back(number(Model::voltage(laws, x, at, drive)));
+  }
+  return result;
+}
+
+TEST_P(EveryMechanism, ComputesTheSameVoltageInFloatAndFixedPointAsInDouble) {
+  const auto rows = drive_of(3'600);
+  const std::vector<MechanismSetting> with = {usual(info().id)};
+  const auto exact = walk<double>(with, rows), plain = walk<double>({}, rows);
+  const auto single = walk<float>(with, rows);
+  // 24 bits of 3.4 V are 0.2 uV; a state of an hour sums up as much as again at every step, most of which decays
+  // fixed point: 4 nV, but currents, factors and rates in steps of 1e-6, 6e-8 and 4e-9
+  constexpr double float_v = 3e-6, fixed_v = 1e-5;
+  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k) ASSERT_NEAR(single.voltage_v[k], exact.voltage_v[k], float_v) << k;
+  EXPECT_NEAR(single.charge_as, exact.charge_as, 1e-6 * 6 * 3'600);
+  if (info().needs_fpu) return;
+  const auto fixed = walk<FixedPoint>(with, rows);
+  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k) ASSERT_NEAR(fixed.voltage_v[k], exact.voltage_v[k], fixed_v) << k;
+  EXPECT_NEAR(fixed.charge_as, exact.charge_as, 1e-6 * 6 * 3'600);
+  if (!info().on_board || info().id == TemperatureSensor::id) return;  // a temperature alone does nothing
+  double most_v = 0;
+  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k) most_v = std::max(most_v, std::abs(exact.voltage_v[k] - plain.voltage_v[k]));
+  EXPECT_GT(most_v + std::abs(exact.charge_as - plain.charge_as), 1e-4) << "it acts";
+}
+
+/// Open loop; parameters as they come.
+template <class S>
+std::vector<S> course(std::size_t index, const MechanismValues<S>& values, const std::vector<Row>& rows) {
+  static const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  ChosenLaws<S> laws;
+  choose<S>(laws, index, values, capacity_ah);
+  S start(0.815);
+  if (index == mechanism_index("initial_soc")) start += values[0];
+  Course<S> c(cell, capacity_ah, laws, start);
+  std::vector<S> v;
+  for (const Row& row : rows) v.push_back(c.step(row.time_s, row.duration_s, S(row.current_a), S(row.temperature_c), [](auto&, const auto&) {}));
+  return v;
+}
+
+TEST_P(EveryMechanism, DerivativesOfTheVoltageByItsParametersAreDifferenceQuotients) {
+  using Jet = ceres::Jet<double, max_mechanism_parameters>;
+  const auto rows = drive_of(1'200);
+  const std::size_t index = GetParam();
+  const MechanismValues<> base = usual(info().id).value;
+  MechanismValues<Jet> jets;
+  for (std::size_t p = 0; p < info().parameters; ++p) jets[p] = Jet(base[p], static_cast<int>(p));
+  const auto v = course<Jet>(index, jets, rows);
+  const auto plain = course<double>(index, base, rows);
+  for (std::size_t p = 0; p < info().parameters; ++p) {
+    if (info().parameter[p].role == Role::given) continue;
+    const double step = 1e-5 * std::max(std::abs(base[p]), 1e-3);
+    MechanismValues<> more = base, less = base;
+    more[p] += step;
+    less[p] -= step;
+    const auto above = course<double>(index, more, rows), below = course<double>(index, less, rows);
+    double scale = 1e-9;
+    for (const Jet& j : v) scale = std::max(scale, std::abs(j.v[static_cast<int>(p)]));
+    std::size_t off = 0;
+    for (std::size_t k = 0; k < v.size(); ++k) {
+      ASSERT_NEAR(v[k].a, plain[k], 1e-12);
+      const double difference = (above[k] - below[k]) / (2 * step);
+      if (std::abs(v[k].v[static_cast<int>(p)] - difference) > 2e-5 * scale + 1e-11 / step) ++off;
+    }
+    EXPECT_LE(off, v.size() / 100) << info().parameter[p].name << ": only where the quotient reaches over a kink of the tables";
+  }
+}
+
+TEST(Catalogue, EveryMechanismHasBoundsThatHoldItsNeutralValueAndAtLeastOneStrength) {
+  ASSERT_EQ(usual_mechanisms().size(), mechanism_count);
+  for (std::size_t k = 0; k < mechanism_count; ++k) {
+    const MechanismInfo& info = catalogue[k];
+    EXPECT_EQ(mechanism_index(info.id), k) << "each id once";
+    bool strength = false;
+    for (std::size_t p = 0; p < info.parameters; ++p) {
+      strength = strength || info.parameter[p].role == Role::strength;
+      EXPECT_LT(info.parameter[p].low, info.parameter[p].high) << info.id;
+    }
+    EXPECT_TRUE(strength) << info.id;
+    EXPECT_EQ(first_fault(usual(info.id), capacity_ah), info.parameters) << info.id;
+  }
+}
+
+TEST(Laws, KnownAtCompileTimeGiveTheSameDigitsAsChosenAtRunTime) {
+  const auto chosen_laws = chosen<float>(usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance", "current_offset"}), capacity_ah);
+  const auto law = []<class M>(M) {
+    std::array<double, M::parameters.size()> p{};
+    for (std::size_t k = 0; k < p.size(); ++k) p[k] = usual(M::id).value[k];
+    return typename M::template Law<float>(p, capacity_ah);
+  };
+  const Laws<float, CurrentOffset, SlowPolarisation, OcvHysteresis, TemperatureResistance> laws(law(CurrentOffset{}), law(SlowPolarisation{}), law(OcvHysteresis{}), law(TemperatureResistance{}));
+  EXPECT_EQ(laws.most_states, 3U);
+  EXPECT_EQ(laws.voltage_states(), chosen_laws.voltage_states());
+  const auto cell = prepare<float, max_intervals>(read_cell("table9").parameters);
+  auto x = laws.initial();
+  auto y = chosen_laws.initial();
+  for (const Row& row : drive_of(1'000)) {
+    const Drive<float> drive{laws.true_current(static_cast<float>(row.current_a)), static_cast<float>(row.duration_s), static_cast<float>(row.temperature_c)};
+    ASSERT_EQ(drive.current_a, chosen_laws.true_current(static_cast<float>(row.current_a)));
+    TablePoint<float> at = look_up(cell, 0.63F), there = at;
+    laws.tables(at, 0.63F, drive, x);
+    chosen_laws.tables(there, 0.63F, drive, y);
+    ASSERT_EQ(at.r1_ohm, there.r1_ohm);
+    ASSERT_EQ(laws.advance(x, at, drive, true), chosen_laws.advance(y, there, drive, true));
+  }
+}
+
+TEST(OcvHysteresis, SaturatesAtTheBranchesAndForgetsNothingAtRest) {
+  const OcvHysteresis::Law<double> law(std::array<double, 4>{0.01, 40, 0, 0}, capacity_ah);
+  const TablePoint<double> at{};
+  double x = 0;
+  for (int k = 0; k < 3'600; ++k) x = relaxed<double>(x, law.settle(0, at, {6, 1}));
+  EXPECT_NEAR(x, 0.01, 1e-12);
+  for (int k = 0; k < 180; ++k) x = relaxed<double>(x, law.settle(0, at, {-3, 1}));  // 1/40 of the capacity
+  const double moved = x;
+  EXPECT_NEAR(x, -0.01 + 0.02 * std::exp(-1), 1e-12);
+  for (int k = 0; k < 1'000; ++k) x = relaxed<double>(x, law.settle(0, at, {0, 3'600}));
+  EXPECT_EQ(x, moved);
+}
+
+TEST(Arrhenius, IsTheExponentialLaw) {
+  const auto off = []<class S>(S, double energy, double reference_c, double c) {
+    const double exact = std::exp(energy / mechanism_detail::gas_constant_j_per_mol_k * (1 / (c + 273.15) - 1 / (reference_c + 273.15)));
+    const auto factor = mechanism_detail::arrhenius<S>(Factor<S>(mechanism_detail::energy_over_rt(energy, reference_c)), Temperature<S>(reference_c), Temperature<S>(c));
+    return std::abs(number(factor) / exact - 1);
+  };
+  for (const double energy : {-20'000.0, 0.0, 15'000.0, 60'000.0}) {
+    for (double c = -20; c <= 60; c += 3.7) {
+      EXPECT_LT(off(double{}, energy, 25, c), 1e-13) << energy << " " << c;
+      EXPECT_LT(off(float{}, energy, 25, c), 1e-5) << energy << " " << c;
+      EXPECT_LT(off(FixedPoint{}, energy, 25, c), 2e-6) << energy << " " << c;
+    }
+  }
+  EXPECT_EQ(mechanism_detail::arrhenius<double>(20, 25, -273), 1) << "no temperature";
+}
+
+TEST(ChargeTransfer, FlattensByTheInverseHyperbolicSine) {
+  const ChargeTransfer::Law<double> law(std::array<double, 3>{1, 0.5, 2}, capacity_ah);
+  const ChargeTransfer::Law<float> single(std::array<double, 3>{1, 0.5, 2}, capacity_ah);
+  for (double a = -300; a <= 300; a += 0.37) {
+    const double x = a / 4, exact = std::abs(x) < 1e-9 ? 1 : std::asinh(x) / x;
+    TablePoint<double> at{};
+    at.r0_ohm = at.r1_ohm = 1;
+    law.tables(at, 0.5, {a, 1});
+    ASSERT_NEAR(at.r0_ohm / exact, 1, 1e-7) << a;
+    ASSERT_NEAR(at.r1_ohm, 0.5 + 0.5 * exact, 1e-7) << a;
+    TablePoint<float> f{};
+    f.r0_ohm = f.r1_ohm = 1;
+    single.tables(f, 0.5F, {static_cast<float>(a), 1});
+    ASSERT_NEAR(f.r0_ohm, exact, 1e-6) << a;
+  }
+}
+
+TEST(OcvShape, KeepsTheEndsAndSlidesByWhatItSaysInBetween) {
+  const OcvShape::Law<double> law(std::array<double, 2>{0.05, -0.03}, capacity_ah);
+  EXPECT_EQ(law.read_at(0), 0);
+  EXPECT_EQ(law.read_at(1), 1);
+  EXPECT_EQ(law.read_at(-0.1), -0.1);
+  EXPECT_EQ(law.read_at(1.1), 1.1);
+  EXPECT_NEAR(law.read_at(0.2), 0.25, 1e-12);
+  EXPECT_NEAR(law.read_at(0.8), 0.77, 1e-12);
+  for (double soc = 0.01; soc < 1; soc += 0.017) EXPECT_NEAR(law.read_slope(soc), (law.read_at(soc + 1e-6) - law.read_at(soc - 1e-6)) / 2e-6, 1e-8) << soc;
+}
+
+TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
+  const SelfHeating::Law<double> law(std::array<double, 3>{10, 900, 25'000}, capacity_ah);
+  TablePoint<double> at{};
+  at.r0_ohm = 0.03;
+  at.r1_ohm = 0.02;
+  double w = 0;
+  for (int k = 0; k < 20'000; ++k) w = relaxed<double>(w, law.settle(0, at, {-6, 1}));
+  EXPECT_NEAR(100 * w, 10 * 36 * 0.05, 1e-6);
+  law.warm(at, w, {});
+  EXPECT_NEAR(at.r0_ohm / 0.03, std::exp(25'000 / 8.314462618 * (1 / (298.15 + 18) - 1 / 298.15)), 1e-9);
+}
+
+}  // namespace
+}  // namespace bms::model
