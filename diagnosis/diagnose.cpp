@@ -133,7 +133,8 @@ class Chain {
       for (const double step : {-1.0, -0.5, 0.5, 1.0}) {
         Hypothesis h = best.hypothesis;
         for (MechanismSetting& s : h.settings) {
-          if (s.index == index_of("contact_step")) s.value[1] = middle_s + step * reach_s;
+          // a step at either end is no step
+          if (s.index == index_of("contact_step")) s.value[1] = std::clamp(middle_s + step * reach_s, r.time_s.front() + 0.04 * r.duration_s(), r.time_s.back() - 0.04 * r.duration_s());
         }
         residual = evidence_.residual(h, best.calibration);
         const double cost = residual.squaredNorm() + (best.cost - best.residual.squaredNorm());
@@ -148,28 +149,40 @@ class Chain {
     return evidence_.fit(best.hypothesis, best.calibration, 4);
   }
 
+  static bool alike(const NoiseModel& a, const NoiseModel& b) {
+    const auto near = [](double x, double y) { return x < 1.25 * y && y < 1.25 * x; };
+    return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
+  }
+
   /// The best of adding one mechanism to what is there, and its rivals.
   /// likeness: of each to the mechanism `to`, if asked for.
   std::vector<Fit> one_more(const Fit& around, const std::vector<std::size_t>& over, std::size_t most, std::size_t to = model::mechanism_count,
-                            std::vector<std::pair<std::size_t, double>>* likeness = nullptr) {
-    evidence_.set_noise(around.noise);
-    const Screen screen(evidence_, around, over);
-    if (likeness != nullptr) {
+                            std::vector<std::pair<std::size_t, double>>* likeness = nullptr, double worth = 0) {
+    // by the nominal noise, which asks for everything to be explained, and by that of what is left, which asks for the large first
+    std::vector<Fit> fits;
+    std::set<std::size_t> tried;
+    for (const NoiseModel& noise : {nominal_, around.noise}) {
+      if (!fits.empty() && alike(noise, nominal_)) break;
+      evidence_.set_noise(noise);
+      const Fit from = noise == around.noise ? around : evidence_.fit(around.hypothesis, around.calibration, 5);
+      const Screen screen(evidence_, from, over);
       const auto& all = screen.candidates();
-      for (std::size_t a = 0; a < all.size(); ++a) {
+      for (std::size_t a = 0; likeness != nullptr && a < all.size(); ++a) {
         if (all[a].mechanism != to) continue;
         for (std::size_t b = 0; b < all.size(); ++b) likeness->emplace_back(all[b].mechanism, screen.alike(a, b));
       }
+      std::vector<Fit> here;
+      for (const Candidate& c : all) {
+        if (here.size() >= most || c.gain < std::max(decision::worth_a_fit, worth)) break;
+        if (!tried.insert(c.mechanism).second && noise == nominal_) continue;
+        evidence_.set_noise(noise);
+        here.push_back(fit_with(from, c));
+      }
+      // the noise of what is left is smaller when much has been explained: the foremost again with theirs
+      std::stable_sort(here.begin(), here.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
+      for (std::size_t k = 0; k < here.size() && k < 3; ++k) here[k] = settled(here[k]);
+      fits.insert(fits.end(), here.begin(), here.end());
     }
-    std::vector<Fit> fits;
-    for (const Candidate& c : screen.candidates()) {
-      if (fits.size() >= most || c.gain < decision::worth_a_fit) break;
-      evidence_.set_noise(around.noise);
-      fits.push_back(fit_with(around, c));
-    }
-    // the noise of what is left is smaller when much has been explained: the foremost again with theirs
-    std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
-    for (std::size_t k = 0; k < fits.size() && k < 3; ++k) fits[k] = settled(fits[k]);
     std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return score(a) < score(b); });
     return fits;
   }
@@ -322,7 +335,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
         continue;
       }
       std::vector<std::pair<std::size_t, double>> likeness;
-      for (Fit& rival : chain.one_more(less, testable, 5, m, &likeness)) {
+      for (Fit& rival : chain.one_more(less, testable, 5, m, &likeness, 0.1 * gains[m])) {
         if (rival.hypothesis.find(m) != nullptr) {
           if (chain.score(rival) < chain.score(current) - 1) current = rival, changed = true;  // the same from another start
           continue;

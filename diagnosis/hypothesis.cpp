@@ -31,7 +31,7 @@ constexpr double edge_jitter = 0.05;
 /// How much of resistance_fraction differs from one step of the current to the next.
 constexpr double edge_error = 0.4;
 
-double log_prior_width = 1.5;  // of a shape: e^1.5, between its usual and an unusual value
+constexpr double log_prior_width = 1;  // of a shape: a factor of e between its usual and an unusual value
 
 }  // namespace
 
@@ -72,11 +72,7 @@ Hypothesis with(const Hypothesis& h, const MechanismSetting& setting) {
   return more;
 }
 
-Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah) {
-  MechanismSetting setting{mechanism, {}, {}};
-  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) setting.value[p] = catalogue[mechanism].parameter[p].by_default(capacity_ah);
-  return with(h, setting);
-}
+Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah) { return with(h, model::unsaid(mechanism, capacity_ah)); }
 
 Hypothesis without(const Hypothesis& h, std::size_t mechanism) {
   Hypothesis less = h;
@@ -100,6 +96,7 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
     double known_a = 0;
     for (std::size_t k = 0; k < r.size(); ++k) {
       if (!std::isfinite(r.voltage_v[k])) usable[k] = 0;
+      if (k == 0 && !(std::abs(r.current_a[k]) < 0.01 * cell_.capacity_ah)) usable[k] = 0;  // what flowed before is not known
       const double step_a = std::isfinite(r.current_a[k]) && k > 0 ? r.current_a[k] - known_a : 0;
       if (std::isfinite(r.current_a[k])) known_a = r.current_a[k];
       const double r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
@@ -135,11 +132,11 @@ NoiseModel Evidence::likeliest_noise(const Columns& raw, const NoiseModel& nomin
   };
   NoiseModel best = nominal;
   cost = cost_of(best);
-  // the three amplitudes in turn, in ever smaller factors
+  // the amplitudes in turn, in ever smaller factors
   for (const double factor : {2.0, 1.41, 1.19, 1.09}) {
     for (bool moved = true; moved;) {
       moved = false;
-      for (const auto member : {&NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::white_v}) {
+      for (const auto member : {&NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::white_v, &NoiseModel::edge}) {
         for (const double by : {factor, 1 / factor}) {
           NoiseModel n = best;
           n.*member = std::max(best.*member * by, nominal.*member);
@@ -282,7 +279,7 @@ std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, co
   auto made = std::make_shared<Linear>();
   made->columns = calibration_derivatives(h, u);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(made->columns.cols(), made->columns.cols());
-  normal.noalias() += made->columns.transpose() * made->columns;
+  normal.selfadjointView<Eigen::Lower>().rankUpdate(made->columns.transpose());
   made->normal.compute(normal);
   return made;
 }
@@ -316,7 +313,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
   const auto prior = [&](Hypothesis& h) {
     double sum = 0;
     for (Eigen::Index j = 0; j < m; ++j) {
-      if (info(j).role == model::Role::shape) sum += std::pow(std::log(value(h, j) / (info(j).by_default(cell_.capacity_ah))) / log_prior_width, 2);
+      if (info(j).role == model::Role::shape) sum += std::pow(std::log(value(h, j) / (info(j).unsaid(cell_.capacity_ah))) / log_prior_width, 2);
     }
     return sum;
   };
@@ -330,7 +327,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
 
   if (!base_linear_) base_linear_ = linear(base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())));
   std::shared_ptr<const Linear> around = base_linear_;
-  bool renewed = false;
+  int renewals = 0;
   double damping = 1e-3;
   Eigen::MatrixXd schur;
   Eigen::VectorXd natural = Eigen::VectorXd::Ones(m);  // d parameter / d internal
@@ -348,7 +345,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     for (Eigen::Index j = 0; j < m; ++j) {
       if (info(j).role != model::Role::shape) continue;
       const double width2 = log_prior_width * log_prior_width;
-      g[j] -= std::log(value(fit.hypothesis, j) / (info(j).by_default(cell_.capacity_ah))) / width2;
+      g[j] -= std::log(value(fit.hypothesis, j) / (info(j).unsaid(cell_.capacity_ah))) / width2;
       a(j, j) += 1 / width2;
     }
     const Eigen::MatrixXd cross = j_u.transpose() * j_theta;
@@ -358,7 +355,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     const Eigen::VectorXd rhs = g - cross.transpose() * u_alone;
 
     bool better = false;
-    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+    for (int attempt = 0; attempt < 8 && !better; ++attempt) {
       // those that would leave their bounds are held at them, one round after the other
       std::vector<char> held(sought.size(), 0);
       Eigen::VectorXd step = Eigen::VectorXd::Zero(m);
@@ -390,7 +387,9 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
         next = std::clamp(shape ? v * std::exp(held_step) : v + natural[j] * step[j], low_of(j), high_of(j));
         taken[j] = shape ? std::log(next / v) : (next - v) / natural[j];
       }
-      const Eigen::VectorXd u = fit.calibration + u_alone - solved * taken;
+      // where the base parameters' derivatives are stale, a shorter way is taken with theirs too
+      const double way = 1 / (1 + 0.02 * damping);
+      const Eigen::VectorXd u = fit.calibration + way * (u_alone - solved * taken);
       const Eigen::VectorXd r = residual(trial, u);
       const double cost = cost_of(trial, u, r);
       if (cost < fit.cost) {
@@ -404,13 +403,12 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
         damping = std::max(damping / 5, 1e-9);
       } else {
         damping *= 8;
-        if (m == 0) break;
       }
     }
     if (better && quiet == 0) continue;
     // far from where the base parameters were linearised: once more from here
-    if (!renewed && cost_at_start - fit.cost > 50) {
-      renewed = true;
+    if (renewals < 2 && (!better || cost_at_start - fit.cost > 50)) {
+      ++renewals;
       quiet = 0;
       damping = 1e-3;
       around = linear(fit.hypothesis, fit.calibration);

@@ -7,7 +7,7 @@ namespace bms::diagnosis {
 
 double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
   const auto of = [](double ratio) { return ratio > 1 ? std::pow(std::log(ratio) / 0.15, 2) : 0; };
-  return of(n.white_v / nominal.white_v) + of(n.fast_v / nominal.fast_v) + of(n.slow_v / nominal.slow_v);
+  return of(n.white_v / nominal.white_v) + of(n.fast_v / nominal.fast_v) + of(n.slow_v / nominal.slow_v) + of(n.edge / nominal.edge);
 }
 
 Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const double> more_fast_v2, std::span<const char> usable) : gains_(time_s.size()) {
@@ -23,9 +23,9 @@ Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::spa
       slow_left = std::exp(-to_next_s / n.slow_s);
     }
     g = {0, 0, fast_left, slow_left, 0};
-    ff += more_fast_v2[k];
+    ff += n.edge * n.edge * more_fast_v2[k];
     if (usable[k] != 0) {
-      const double variance = ff + 2 * fs + ss + n.white_v * n.white_v + more_white_v2[k];
+      const double variance = ff + 2 * fs + ss + n.white_v * n.white_v + n.edge * n.edge * more_white_v2[k];
       const double with_fast = ff + fs, with_slow = fs + ss;
       g.fast = with_fast / variance;
       g.slow = with_slow / variance;

@@ -20,6 +20,7 @@ struct NoiseModel {
   double white_v = 0.001;
   double fast_v = 0.0015, fast_s = 60;
   double slow_v = 0.001, slow_s = 3'600;
+  double edge = 1;                   ///< times what a step of the current is reckoned to bring
   bool operator==(const NoiseModel&) const = default;
 };
 

@@ -21,7 +21,7 @@ constexpr std::size_t index_of(std::string_view id) { return model::mechanism_in
 
 /// Shapes at which signatures are taken: every combination is one probe.
 std::vector<double> shape_grid(std::string_view id, double capacity_ah) {
-  if (id == "ocv_hysteresis") return {8, 25, 80, 250};
+  if (id == "ocv_hysteresis") return {12, 30, 80, 220};
   if (id == "slow_polarisation") return {120, 400, 1'300, 4'500};
   if (id == "fast_polarisation") return {0.5, 1.5, 4, 12};
   if (id == "charge_transfer") return {0.2 * capacity_ah, 0.7 * capacity_ah, 2.5 * capacity_ah};
@@ -201,7 +201,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     constexpr std::size_t moments = 40;
     Columns steps = Columns::Zero(static_cast<Eigen::Index>(evidence.samples()), moments);
     for (std::size_t m = 0; m < moments; ++m) {
-      const std::size_t onset = (m + 1) * r.size() / (moments + 2);
+      const std::size_t onset = (m + 2) * r.size() / (moments + 4);
       for (std::size_t k = onset; k < r.size(); ++k) {
         if (std::isfinite(r.current_a[k])) steps(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(m)) = r.current_a[k];
       }
@@ -222,13 +222,17 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
   const Columns base = evidence.calibration_derivatives(h, around.calibration), own = evidence.derivatives(h, around.calibration, sought);
   Columns known(base.rows(), base.cols() + own.cols());
   known << base, own;
-  Eigen::MatrixXd normal = known.transpose() * known;
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(known.cols(), known.cols());
+  normal.selfadjointView<Eigen::Lower>().rankUpdate(known.transpose());
+  normal = Eigen::MatrixXd(normal.selfadjointView<Eigen::Lower>());
   for (Eigen::Index k = 0; k < normal.rows(); ++k) normal(k, k) += k < base.cols() ? 1 : 1e-9 * (1 + normal(k, k));
   const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
   const Eigen::MatrixXd cross = known.transpose() * all;
   Eigen::VectorXd pull = known.transpose() * around.residual;
   pull.head(base.cols()) -= around.calibration;
-  gram_ = all.transpose() * all - cross.transpose() * factor.solve(cross);
+  gram_ = Eigen::MatrixXd::Zero(count, count);
+  gram_.selfadjointView<Eigen::Lower>().rankUpdate(all.transpose());
+  gram_ = Eigen::MatrixXd(gram_.selfadjointView<Eigen::Lower>()) - cross.transpose() * factor.solve(cross);
   toward_ = all.transpose() * around.residual - cross.transpose() * factor.solve(pull);
 
   std::map<std::size_t, std::size_t> of;  // mechanism -> candidate

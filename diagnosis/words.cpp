@@ -18,7 +18,7 @@ using model::catalogue;
 constexpr std::array<Words, model::mechanism_count> vocabulary = {{
     {"channel_skew", "a time skew of the channels", "current and voltage are not read at the same moment", "shows as spikes at the edges of the current, up at one and down at the next, and nowhere else",
      "The current that stands in a row was flowing a moment before or after its voltage was read.", "Synchronise the two channels, or shift the current by the time found before anything else is concluded."},
-    {"current_offset", "an offset of the current sensor", "the current sensor's zero is off", "lets the charge run away with time, whatever the load, rests included",
+    {"current_offset", "an offset of the current sensor", "the current sensor's zero is off", "lets the counted charge run away with time and can be read off the sensor when nothing flows",
      "The sensor reads a current where none flows; the charge count drifts as long as it runs.", "Zero the current sensor with the contactor open, or let the extended cell file subtract the offset."},
     {"current_gain", "a gain error of the current sensor", "the current sensor's scale is off", "scales the voltage drop and the counted charge alike",
      "Shunt value or amplifier gain is not what the software believes.", "Check the shunt's value and the scaling against a reference current."},
@@ -32,7 +32,7 @@ constexpr std::array<Words, model::mechanism_count> vocabulary = {{
      "The cell has aged, or its file was made for another one.", "Measure the capacity with one full slow discharge and put it into the cell file."},
     {"coulombic_loss", "a coulombic loss", "part of the charge put in does not come back", "grows with the charge put in, not with time",
      "Side reactions take part of the charging current.", "Give the charge count a coulombic efficiency; look at charging voltage and temperature if it is more than 1 %."},
-    {"leakage", "a leakage", "the cell loses charge by itself", "lets the charge run away with time, also with nothing connected",
+    {"leakage", "a leakage", "the cell loses charge by itself", "empties the cell with time, so that it is lower after a rest with nothing connected",
      "A current inside the cell or beside the sensor empties it all the time.", "Look for loads that bypass the sensor and for balancing resistors that stay on; if there are none, watch the cell for an internal short."},
     {"slow_polarisation", "a slow polarisation", "the voltage goes on relaxing for long", "builds up under load and fades in every rest, with the time and not with the charge",
      "Diffusion in the cell: the voltage needs minutes to hours to settle, one RC element is too few.", "Use the extended cell file: its second, slow element follows the relaxation."},
@@ -92,9 +92,9 @@ Scaled scaled(double size, std::string_view unit) {
   return {1, unit == "1" ? "" : unit == "K" ? " K" : unit == "K/W" ? " K/W" : ""};
 }
 
-/// One digit of the deviation, two where it begins with 1; without one three digits of the value.
+/// One digit of the deviation, two where it begins with 1; without one two or three digits of the value.
 int decimals(double value, double deviation) {
-  const double last = deviation > 0 ? deviation : std::abs(value) / 100;
+  const double last = deviation > 0 ? deviation : std::abs(value) / 30;
   if (!(last > 0) || !std::isfinite(last)) return 0;
   const double power = std::floor(std::log10(last));
   const bool begins_with_1 = last < 1.95 * std::pow(10, power);
@@ -104,6 +104,15 @@ int decimals(double value, double deviation) {
 std::string strength(const MechanismSetting& s, std::size_t k, std::string_view unit = "") {
   const model::Parameter& p = catalogue[s.index].parameter[k];
   return quantity(std::abs(s.value[k]), s.deviation[k], unit.empty() ? p.unit : unit);
+}
+
+/// The digits of a parameter's name: the place that it speaks of.
+std::string number_in(std::string_view name) {
+  std::string digits;
+  for (const char c : name) {
+    if (c >= '0' && c <= '9') digits += c;
+  }
+  return digits;
 }
 
 std::string capital(std::string text) {
@@ -248,15 +257,15 @@ std::string claim(const MechanismSetting& s) {
   if (id == "contact_step") return fmt::format("a contact has {} resistance since {}, by {}", more, clock_text(s.value[1]), strength(s, 0));
   if (id == "contact_intermittent") return fmt::format("a contact opens in bursts, {} of the time and by {}", quantity(s.value[1], 0, "%"), strength(s, 0));
   if (id == "ocv_shape") {
-    return fmt::format("the OCV curve has slid along the state of charge, by {} at a third and {} at two thirds", quantity(s.value[0], s.deviation[0], "%"), quantity(s.value[1], s.deviation[1], "%"));
+    return fmt::format("the OCV curve has slid along the state of charge, by {} at {} % and {} at {} %", quantity(s.value[0], s.deviation[0], "%"), number_in(catalogue[s.index].parameter[0].name),
+                       quantity(s.value[1], s.deviation[1], "%"), number_in(catalogue[s.index].parameter[1].name));
   }
   if (id == "entropic_ocv") {
-    constexpr std::array<int, 4> at = {10, 40, 70, 95};
     std::size_t k = 0;
     for (std::size_t j = 1; j < 4; ++j) {
       if (std::abs(s.value[j]) > std::abs(s.value[k])) k = j;
     }
-    return fmt::format("the open-circuit voltage follows the temperature, {} at {} % state of charge", quantity(s.value[k], s.deviation[k], "V/K"), at[k]);
+    return fmt::format("the open-circuit voltage follows the temperature, {} at {} % state of charge", quantity(s.value[k], s.deviation[k], "V/K"), number_in(catalogue[s.index].parameter[k].name));
   }
   if (id == "voltage_offset") return fmt::format("the voltage sensor reads {} too {}", strength(s, 0), positive ? "high" : "low");
   if (id == "voltage_gain") return fmt::format("the voltage sensor reads {} too {}", strength(s, 0, "%"), much);
@@ -317,15 +326,17 @@ std::string statement(const Diagnosis& d, const Occasions& o) {
       return fmt::format("Either {}; this recording cannot tell ({}).", listed(parts, "or"), share_of_error(f, o));
     }
     case Verdict::causes: {
+      // two in full, the others by name: a sentence must end
+      constexpr std::array<std::string_view, 7> count = {"No cause", "One cause", "Two causes", "Three causes", "Four causes", "Five causes", "Six causes"};
       std::vector<std::string> parts;
       for (const Finding& f : d.findings) {
-        std::string part = fmt::format("{} ({}", claim(f.setting), millivolts(f.rms_contribution_v));
+        std::string part = fmt::format("{} ({}", parts.size() < 2 ? claim(f.setting) : std::string(words_of(f.setting.index).name), millivolts(f.rms_contribution_v));
         std::vector<std::string> rivals;
         for (const std::size_t m : f.equivalent_to) rivals.emplace_back(words_of(m).brief);
         part += rivals.empty() ? ")" : ", or " + listed(rivals, "or") + ")";
         parts.push_back(std::move(part));
       }
-      return fmt::format("{} at once, of an error of {}: {}.", parts.size() == 2 ? "Two causes" : parts.size() == 3 ? "Three causes" : fmt::format("{} causes", parts.size()), millivolts(o.error_v), listed(parts, "and"));
+      return fmt::format("{} at once in an error of {}: {}.", count[std::min(parts.size(), count.size() - 1)], millivolts(o.error_v), listed(parts, "and"));
     }
     case Verdict::unknown: {
       const std::string where = place(d);

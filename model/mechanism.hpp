@@ -53,18 +53,18 @@ enum class Per {
 struct Parameter {
   std::string_view name, unit;
   Role role = Role::strength;
-  double neutral = 0;        ///< value when nothing is said, as by_default() scales it
+  double neutral = 0;        ///< value when nothing is said, as unsaid() scales it
   double low = 0, high = 0;
   Per per = Per::cell;
   std::string_view meaning;  ///< and its source, where the bounds have one
 
   constexpr double scale(double capacity_ah) const { return per == Per::cell ? 1 : per == Per::ah ? capacity_ah : 1 / capacity_ah; }
-  constexpr double by_default(double capacity_ah) const { return neutral * scale(capacity_ah); }
   constexpr double lower(double capacity_ah) const { return low * scale(capacity_ah); }
   constexpr double upper(double capacity_ah) const { return high * scale(capacity_ah); }
-  /// neutral, held within the bounds: what a cell file that is silent about it means.
+  /// neutral, scaled as the bounds are and held within them: what a cell file that is silent about it means.
   constexpr double unsaid(double capacity_ah) const {
-    return neutral < lower(capacity_ah) ? lower(capacity_ah) : neutral > upper(capacity_ah) ? upper(capacity_ah) : neutral;
+    const double usual = neutral * scale(capacity_ah);
+    return usual < lower(capacity_ah) ? lower(capacity_ah) : usual > upper(capacity_ah) ? upper(capacity_ah) : usual;
   }
 };
 

@@ -46,19 +46,36 @@ TEST(CorrectedReadings, WithNothingToUndoAreTheReadings) {
 TEST(CorrectedReadings, ADelayOfWholeStepsMovesTheRows) {
   Columns c = uneven(100);
   for (std::size_t k = 0; k < 100; ++k) c.time_s[k] = static_cast<double>(k);
-  const auto late = corrected(c, 3, 0), early = corrected(c, -2, 0), half = corrected(c, 0.5, 0);
+  const auto late = corrected(c, 3, 0), early = corrected(c, -2, 0);
   for (std::size_t k = 2; k < 97; ++k) {
     ASSERT_NEAR(late.current(k), c.current_a[k + 3], 1e-12);
     if (k > 3) {
       ASSERT_NEAR(early.current(k), c.current_a[k - 2], 1e-12);
     }
-    ASSERT_NEAR(half.current(k), (c.current_a[k] + c.current_a[k + 1]) / 2, 1e-12);
   }
   EXPECT_NEAR(late.current(99), c.current_a[99], 1e-12) << "after the end the last current goes on";
 }
 
+TEST(CorrectedReadings, APartOfAStepIsUndone) {
+  Columns c = uneven(200);
+  for (std::size_t k = 0; k < 200; ++k) c.time_s[k] = static_cast<double>(k);
+  for (const double part : {0.3, -0.2}) {
+    for (const double whole : {0.0, 2.0, -3.0}) {
+      // a channel that is late: each reading has a part of the interval before (early: after) in it
+      Columns late = c;
+      for (std::size_t k = 10; k < 190; ++k) {
+        const std::size_t from = k - static_cast<std::size_t>(static_cast<int>(whole) + 3) + 3;
+        late.current_a[k] = (1 - std::abs(part)) * c.current_a[from] + std::abs(part) * c.current_a[part > 0 ? from - 1 : from + 1];
+      }
+      const auto r = corrected(late, whole + part, 0);
+      for (std::size_t k = 60; k < 140; ++k) ASSERT_NEAR(r.current(k), c.current_a[k], 1e-6) << k << " " << whole << " " << part;
+    }
+  }
+}
+
 TEST(CorrectedReadings, MoveChargeAndLoseNone) {
-  const Columns c = uneven(500);
+  Columns c = uneven(500);
+  for (std::size_t k = 0; k < 500; ++k) c.time_s[k] = static_cast<double>(k + 40 * (k / 37));
   for (const double delay_s : {-7.3, 0.4, 11.0}) {
     const auto r = corrected(c, delay_s, 0);
     double by = 0, read = 0;
@@ -73,8 +90,8 @@ TEST(CorrectedReadings, MoveChargeAndLoseNone) {
 
 TEST(CorrectedReadings, DerivativeByTheDelayIsADifferenceQuotient) {
   using Jet = ceres::Jet<double, 2>;
-  const Columns c = uneven(300, 0.3);
-  for (const double delay_s : {0.0, 0.77, -4.2}) {
+  const Columns c = uneven(300, 0.9);
+  for (const double delay_s : {0.11, 0.27, -4.2}) {
     const CorrectedReadings<Jet> jets(c.time_s, c.current_a, c.temperature_c, Jet(delay_s, 0), Jet(120, 1));
     const auto more = corrected(c, delay_s + 1e-6, 120), less = corrected(c, delay_s - 1e-6, 120);
     for (std::size_t k = 1; k < 300; ++k) {

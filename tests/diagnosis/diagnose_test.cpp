@@ -1,0 +1,75 @@
+// The chain on the plant's cell, whose equations are not those of the catalogue.
+#include "diagnosis/diagnose.hpp"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+#include "tests/diagnosis/evidence.hpp"
+
+namespace bms::diagnosis {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::Field;
+
+std::vector<std::string> ids_of(const Diagnosis& d) {
+  std::vector<std::string> ids;
+  for (const Finding& f : d.findings) ids.emplace_back(model::catalogue[f.setting.index].id);
+  return ids;
+}
+
+TEST(Diagnose, AHealthyCellHasNoMismatchAndLimits) {
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 11), 0.7, 11)});
+  EXPECT_EQ(d.verdict, Verdict::no_mismatch);
+  EXPECT_THAT(ids_of(d), ElementsAre());
+  EXPECT_THAT(d.limits, Contains(Field(&DetectionLimit::mechanism, model::mechanism_index("ocv_hysteresis"))));
+  EXPECT_THAT(d.not_testable, Contains(Field(&NotTestable::mechanism, model::mechanism_index("temperature_resistance")))) << "no temperature was recorded";
+}
+
+TEST(Diagnose, NamesALargerResistanceAndWhereItsEffectIs) {
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 12), 0.7, 12, [](std::size_t, double current_a, double) { return 0.003 * current_a; })});
+  EXPECT_THAT(ids_of(d), ElementsAre("resistance_growth"));
+  EXPECT_NE(d.verdict, Verdict::unknown);
+  EXPECT_NEAR(d.findings.front().setting.value[0], 0.003 / 0.0133, 0.04);
+}
+
+TEST(Diagnose, NamesAContactThatHasChangedAndWhen) {
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 13), 0.7, 13, [](std::size_t k, double current_a, double) { return k >= 4'000 ? 0.002 * current_a : 0; })});
+  ASSERT_THAT(ids_of(d), ElementsAre("contact_step"));
+  EXPECT_NEAR(d.findings.front().setting.value[0], 0.002, 0.0003);
+  EXPECT_NEAR(d.findings.front().setting.value[1], 4'000, 60);
+}
+
+TEST(Diagnose, VoltageOffsetAndGainAreTheSameToAnLfpCell) {
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 14), 0.7, 14, [](std::size_t, double, double) { return 0.015; })});
+  EXPECT_EQ(d.verdict, Verdict::ambiguous);
+  ASSERT_EQ(d.findings.size(), 1U);
+  std::vector<std::string> set = ids_of(d);
+  for (const std::size_t e : d.findings.front().equivalent_to) set.emplace_back(model::catalogue[e].id);
+  EXPECT_THAT(set, testing::IsSupersetOf({"voltage_offset", "voltage_gain"}));
+}
+
+TEST(Diagnose, WhatNoMechanismExplainsIsUnknown) {
+  // a converter's nonlinearity: a wave over the voltage
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 15), 0.7, 15, [](std::size_t, double current_a, double soc) {
+                                 return 0.012 * std::sin(2 * 3.14159265 * (3.25 + 0.3 * (soc - 0.5) + 0.02 * current_a) / 0.05);
+                               })});
+  EXPECT_EQ(d.verdict, Verdict::unknown);
+}
+
+TEST(Diagnose, WithoutInformationNothingIsSaid) {
+  Record rest = test::recorded(std::vector<double>(3'000, 0.0), 0.7, 16);
+  EXPECT_EQ(diagnose(test::table9(), {}, {rest}).verdict, Verdict::not_testable);
+  Record constant = test::recorded(std::vector<double>(3'000, -3.0), 0.9, 17);
+  constant.current_a[0] = -3;
+  const Diagnosis d = diagnose(test::table9(), {}, {constant});
+  EXPECT_EQ(d.verdict, Verdict::not_testable);
+  EXPECT_EQ(d.not_testable.size(), model::mechanism_count);
+  Record brief = test::recorded(test::drive(0.05, 18), 0.7, 18);
+  EXPECT_EQ(diagnose(test::table9(), {}, {brief}).verdict, Verdict::not_testable);
+}
+
+}  // namespace
+}  // namespace bms::diagnosis
