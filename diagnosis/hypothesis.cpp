@@ -22,8 +22,8 @@ constexpr std::size_t current_gain = model::mechanism_index("current_gain");
 constexpr std::size_t initial_soc = model::mechanism_index("initial_soc");
 constexpr std::size_t intermittent = model::mechanism_index("contact_intermittent");
 
-constexpr std::size_t lanes = 8;
-using Jet = ceres::Jet<double, static_cast<int>(lanes)>;
+/// Derivatives that go through the simulation at once.
+constexpr std::size_t few_lanes = 4, lanes = 8;
 
 /// Reading beside a step of the current: voltage and current are never read at quite the same moment. Share of a sample's step.
 constexpr double edge_jitter = 0.05;
@@ -238,30 +238,40 @@ void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
   }
 }
 
+template <std::size_t Lanes>
+void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base, std::size_t first, std::size_t here,
+                      Columns& columns) const {
+  using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
+  std::vector<model::MechanismValues<Jet>> values;
+  for (const MechanismSetting& s : h.settings) {
+    auto& v = values.emplace_back();
+    for (std::size_t p = 0; p < v.size(); ++p) v[p] = Jet(s.value[p]);
+  }
+  std::vector<Jet> unknowns(static_cast<std::size_t>(u.size()));
+  for (std::size_t k = 0; k < unknowns.size(); ++k) unknowns[k] = Jet(u[static_cast<Eigen::Index>(k)]);
+  for (std::size_t lane = 0; lane < here; ++lane) {
+    const std::size_t c = first + lane;
+    Jet& seeded = c < by.size() ? values[by[c].setting][by[c].parameter] : unknowns[base[c - by.size()]];
+    seeded.v[static_cast<Eigen::Index>(lane)] = 1;
+  }
+  Eigen::Index row = 0;
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    run<Jet>(values, h, unknowns, r, [&](std::size_t, const Jet& v, const Jet&) {
+      for (std::size_t lane = 0; lane < here; ++lane) columns(row, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
+      ++row;
+    });
+  }
+}
+
 Columns Evidence::derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const {
   const std::size_t count = by.size() + base.size();
   Columns columns(static_cast<Eigen::Index>(samples_), static_cast<Eigen::Index>(count));
-  for (std::size_t first = 0; first < count; first += lanes) {
-    const std::size_t here = std::min(lanes, count - first);
-    std::vector<model::MechanismValues<Jet>> values;
-    for (const MechanismSetting& s : h.settings) {
-      auto& v = values.emplace_back();
-      for (std::size_t p = 0; p < v.size(); ++p) v[p] = Jet(s.value[p]);
-    }
-    std::vector<Jet> unknowns(static_cast<std::size_t>(u.size()));
-    for (std::size_t k = 0; k < unknowns.size(); ++k) unknowns[k] = Jet(u[static_cast<Eigen::Index>(k)]);
-    for (std::size_t lane = 0; lane < here; ++lane) {
-      const std::size_t c = first + lane;
-      Jet& seeded = c < by.size() ? values[by[c].setting][by[c].parameter] : unknowns[base[c - by.size()]];
-      seeded.v[static_cast<Eigen::Index>(lane)] = 1;
-    }
-    Eigen::Index row = 0;
-    for (std::size_t r = 0; r < records_.size(); ++r) {
-      run<Jet>(values, h, unknowns, r, [&](std::size_t, const Jet& v, const Jet&) {
-        for (std::size_t lane = 0; lane < here; ++lane) columns(row, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
-        ++row;
-      });
-    }
+  for (std::size_t first = 0; first < count;) {
+    const bool few = count - first <= few_lanes;
+    const std::size_t here = std::min(few ? few_lanes : lanes, count - first);
+    if (few) derive<few_lanes>(h, u, by, base, first, here, columns);
+    else derive<lanes>(h, u, by, base, first, here, columns);
+    first += here;
   }
   whiten(columns);
   return columns;
@@ -353,6 +363,12 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     const Eigen::VectorXd u_alone = around->normal.solve(g_u);
     schur = a - cross.transpose() * solved;
     const Eigen::VectorXd rhs = g - cross.transpose() * u_alone;
+    // what a step could gain at most, were all linear and no bound in the way
+    const double within_reach = g_u.dot(u_alone) + (m > 0 ? rhs.dot((schur + Eigen::MatrixXd((schur.diagonal().array() * 1e-6 + 1e-9).matrix().asDiagonal())).ldlt().solve(rhs)) : 0.0);
+    if (within_reach < 0.2) {
+      fit.converged = true;
+      break;
+    }
 
     bool better = false;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {

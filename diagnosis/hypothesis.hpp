@@ -102,6 +102,10 @@ class Evidence {
   struct Linear;  // base parameters' derivatives and their factorised normal matrix
   template <class S, class Row>
   void run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row) const;
+  /// Columns first .. first + here, in one run.
+  template <std::size_t Lanes>
+  void derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base, std::size_t first, std::size_t here,
+              Columns& columns) const;
   Columns derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const;
   std::shared_ptr<const Linear> linear(const Hypothesis& h, const Eigen::VectorXd& u) const;
 

@@ -43,6 +43,18 @@ Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::spa
 }
 
 void Whitener::whiten(Eigen::Ref<Columns> columns) const {
+  if (columns.cols() == 1) {  // the residual itself, most often
+    double fast = 0, slow = 0;
+    for (std::size_t k = 0; k < gains_.size(); ++k) {
+      const Gain& g = gains_[k];
+      double& value = columns(static_cast<Eigen::Index>(k), 0);
+      const double news = g.weight > 0 ? value - fast - slow : 0;
+      fast = g.fast_left * (fast + g.fast * news);
+      slow = g.slow_left * (slow + g.slow * news);
+      value = g.weight * news;
+    }
+    return;
+  }
   Eigen::RowVectorXd fast = Eigen::RowVectorXd::Zero(columns.cols()), slow = fast, news = fast;
   for (std::size_t k = 0; k < gains_.size(); ++k) {
     const Gain& g = gains_[k];

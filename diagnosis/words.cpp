@@ -297,8 +297,8 @@ Occasions occasions_of(const model::CellParameters<>& cell, const std::vector<Re
       o.longest_rest_s = std::max(o.longest_rest_s, rested_s);
       if (c_rate > 0.05) rates.insert(static_cast<int>(std::lround(std::log(c_rate) / std::log(1.33))));
       // the charge turns where it has gone back by 1 %
-      if (heading >= 0) turn = std::max(turn, soc);
-      if (heading <= 0) turn = heading == 0 ? turn : std::min(turn, soc);
+      if (heading > 0) turn = std::max(turn, soc);
+      if (heading < 0) turn = std::min(turn, soc);
       if (heading == 0 && std::abs(soc - r.initial_soc) > 0.01) heading = soc > r.initial_soc ? 1 : -1, turn = soc;
       else if (heading != 0 && (turn - soc) * heading > 0.01) heading = -heading, turn = soc, ++o.reversals;
       if (!r.temperature_c.empty() && std::isfinite(r.temperature_c[k])) low_c = std::min(low_c, r.temperature_c[k]), high_c = std::max(high_c, r.temperature_c[k]);
@@ -341,10 +341,8 @@ std::string statement(const Diagnosis& d, const Occasions& o) {
     case Verdict::unknown: {
       const std::string where = place(d);
       std::string text = fmt::format("Something that the catalogue does not have parts the recording from the cell file, by {}{}", millivolts(o.error_v), where.empty() ? "" : ", most of it " + where);
-      if (!d.candidates.empty() && d.candidates.front().ids.size() >= 1) {
-        std::vector<std::string> names;
-        for (const std::size_t m : d.candidates.front().ids) names.emplace_back(words_of(m).name);
-        text += fmt::format("; {} comes nearest and explains {:.0f} % of it", listed(names, "with"), 100 * d.candidates.front().explained_share);
+      if (!d.candidates.empty() && d.candidates.front().ids.size() == 1 && d.candidates.front().explained_share >= 0.2) {
+        text += fmt::format("; {} comes nearest and explains {:.0f} % of it", words_of(d.candidates.front().ids.front()).name, 100 * d.candidates.front().explained_share);
       }
       return text + ".";
     }
