@@ -207,8 +207,9 @@ const Words& words_of(std::size_t mechanism) { return vocabulary[mechanism]; }
 
 std::string quantity(double value, double deviation, std::string_view unit) {
   const Scaled s = scaled(std::abs(value), unit);
-  const double v = value * s.factor, e = deviation * s.factor;
-  const int digits = decimals(v, e);
+  const double e = deviation * s.factor;
+  const int digits = decimals(value * s.factor, e);
+  const double v = std::abs(value * s.factor) < 0.5 * std::pow(10, -digits) ? 0 : value * s.factor;  // no "-0.0"
   if (!(deviation > 0) || !std::isfinite(deviation)) return fmt::format("{:.{}f}{}", v, digits, s.unit);
   return fmt::format("{:.{}f} +- {:.{}f}{}", v, digits, e, digits, s.unit);
 }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "host_sim/diagnosis_result.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/study.hpp"
 #include "identification/identify.hpp"
@@ -42,5 +43,7 @@ struct IdentifyResult {
 std::string json_of(const IdentifyResult& result);
 
 std::string json_of(const StudyResult& result);
+
+std::string json_of(const DiagnoseResult& result);
 
 }  // namespace bms

@@ -9,6 +9,7 @@
 
 #include "host_sim/bad_input.hpp"
 #include "host_sim/cell_file.hpp"
+#include "host_sim/command_diagnose.hpp"
 #include "host_sim/command_experiment.hpp"
 #include "host_sim/command_identify.hpp"
 #include "host_sim/command_replay.hpp"
@@ -60,6 +61,10 @@ void add_simulate(CLI::App& app, bms::SimulateOptions& o) {
   auto* recording = c.add_option("--recording", o.recording, "recording whose current is used")->type_name("FILE");
   c.add_option("--profile", o.profile, "current profile: a recording without voltage_v")->type_name("FILE")->excludes(recording);
   c.add_option("--initial-soc", o.initial_soc, "state of charge at the start")->check(Within(0.0, 1.0))->capture_default_str();
+  c.add_option("--with", o.with, "mechanism to add to the cell's, or to put in its place, as in ocv_hysteresis:half_gap_v=0.01,decay=40; may be repeated")
+      ->type_name("ID:param=value,...")
+      ->expected(1)
+      ->take_all();
   c.add_option("--noise-v", o.noise_v, "standard deviation of noise added to the voltage")->check(Within(0.0, 1e6));
   c.add_option("--noise-a", o.noise_a, "standard deviation of noise added to the current that is written")->check(Within(0.0, 1e6));
   c.add_option("--seed", o.seed, "of the noise")->capture_default_str();
@@ -113,6 +118,17 @@ void add_study(CLI::App& app, bms::StudyOptions& o) {
   add_output(c, o.output);
 }
 
+void add_diagnose(CLI::App& app, bms::DiagnoseOptions& o) {
+  CLI::App& c = *app.add_subcommand("diagnose", "Say where recordings and the calibrated cell part, and which physics or fault of an instrument does it");
+  c.footer("Example: bms diagnose --cell my_cell.toml --recording monday.csv --holdout tuesday.csv --initial-soc 0.95 --out extended.toml --report monday.html");
+  c.add_option("--cell", o.cell, "calibrated cell: a file, or the name of a built-in cell: " + bms::cell_names())->required();
+  c.add_option("--recording", o.recordings, "recordings to diagnose")->required()->type_name("FILE");
+  c.add_option("--holdout", o.holdouts, "later recordings of the same cell and instruments: their voltage is compared with at the end, nothing else")->type_name("FILE");
+  c.add_option("--initial-soc", o.initial_soc, "state of charge believed at the start; without it soc_ref's first value, else the first voltage tells")->check(Within(0.0, 1.0));
+  c.add_option("--out", o.out, "cell file to write, with what was found")->type_name("EXTENDED.toml");
+  add_output(c, o.output);
+}
+
 /// own_file: what the command writes beside JSON and report.
 template <class Options>
 int run(Options& options, const std::string& own_file) {
@@ -148,11 +164,14 @@ int main(int argc, char** argv) {
   add_identify(app, identify);
   bms::StudyOptions study;
   add_study(app, study);
+  bms::DiagnoseOptions diagnose;
+  add_diagnose(app, diagnose);
   try {
     app.parse(argc, argv);
     if (app.got_subcommand("replay")) return run(replay, replay.trace);
     if (app.got_subcommand("simulate")) return run(simulate, simulate.out);
     if (app.got_subcommand("identify")) return run(identify, identify.out);
+    if (app.got_subcommand("diagnose")) return run(diagnose, diagnose.out);
     if (app.got_subcommand("study")) return run(study, "");
     return run(experiment, experiment.out);
   } catch (const CLI::ParseError& error) {

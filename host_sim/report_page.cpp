@@ -13,19 +13,9 @@
 
 namespace bms {
 
-namespace {
-
-/// More rows than this are thinned: a screen has a few thousand columns.
-constexpr std::size_t most_rows = 40'000;
-
-using nlohmann::json;
-using Value = std::function<double(std::size_t)>;
-
-/// Rows to show: all, or of each stretch its first and last and where voltage and current are lowest and highest, so that no peak is
-/// lost.
-std::vector<std::size_t> shown_rows(const Recording& r) {
+std::vector<std::size_t> shown_rows(const Recording& r, std::size_t most) {
   std::vector<std::size_t> shown;
-  const std::size_t stretch = 6 * r.rows() / most_rows;
+  const std::size_t stretch = 6 * r.rows() / most;
   for (std::size_t from = 0; from < r.rows(); from += std::max<std::size_t>(1, stretch)) {
     const std::size_t to = std::min(r.rows(), from + std::max<std::size_t>(1, stretch));
     std::set<std::size_t> picked = {from, to - 1};
@@ -41,6 +31,16 @@ std::vector<std::size_t> shown_rows(const Recording& r) {
   return shown;
 }
 
+std::string in_script(std::string json) {
+  for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) json.replace(at, 1, "\\u003c");  // no </script> from a file's name
+  return json;
+}
+
+namespace {
+
+using nlohmann::json;
+using Value = std::function<double(std::size_t)>;
+
 /// Rounded: digits that no screen shows would only make the page larger.
 json column(const std::vector<std::size_t>& rows, int decimals, const Value& value) {
   const double scale = std::pow(10, decimals);
@@ -49,16 +49,11 @@ json column(const std::vector<std::size_t>& rows, int decimals, const Value& val
   return values;
 }
 
+std::string text_of(const json& page) { return page.dump(-1, ' ', false, json::error_handler_t::replace); }
+
 std::string percent(double fraction) { return fmt::format("{:.2f} %", 100 * fraction); }
 std::string file_name(const ReplayResult& r) { return r.recording.path.substr(r.recording.path.rfind('/') + 1); }
 std::string millivolts(double v) { return fmt::format("{:.2f} mV", 1e3 * v); }
-
-/// As the page's script has it.
-std::string in_script(const json& page) {
-  std::string text = page.dump(-1, ' ', false, json::error_handler_t::replace);
-  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");  // no </script> from a file's name
-  return text;
-}
 
 json figures(const ReplayResult& r) {
   json f = json::array();
@@ -109,7 +104,7 @@ std::string data(const ReplayResult& r) {
   add("soc", 5, [&](std::size_t k) { return e[k].soc; });
   add("two_sigma", 5, [&](std::size_t k) { return 2 * e[k].soc_sigma; });
   if (!rec.soc_ref.empty()) add("soc_ref", 5, [&](std::size_t k) { return rec.soc_ref[k]; });
-  return in_script(page);
+  return in_script(text_of(page));
 }
 
 /// The page with its places filled in, each once.
@@ -139,11 +134,10 @@ std::string statement(const ReplayResult& r) {
   return text;
 }
 
-namespace {
-
-std::string page(std::string_view html, std::string_view script, std::string_view title, const std::string& data) {
-  return filled(html, [&](std::string_view place) -> std::string {
+std::string page(std::string_view body, std::string_view script, std::string_view title, const std::string& data) {
+  return filled(embedded::page_html, [&](std::string_view place) -> std::string {
     if (place == "TITLE") return std::string(title);
+    if (place == "BODY") return std::string(body);
     if (place == "DYGRAPH_CSS") return std::string(embedded::dygraph_css);
     if (place == "DYGRAPH_JS") return std::string(embedded::dygraph_js);
     if (place == "SYNCHRONIZER_JS") return std::string(embedded::synchronizer_js);
@@ -153,6 +147,8 @@ std::string page(std::string_view html, std::string_view script, std::string_vie
     return "";
   });
 }
+
+namespace {
 
 json table_of(const PageTable& t) {
   json rows = json::array();
@@ -187,7 +183,7 @@ std::string page_of(const PageContent& p) {
   json content = {{"title", p.title}, {"statement", p.statement}, {"warnings", p.warnings}, {"sections", json::array()}};
   for (const PageTable& t : p.tables) content["sections"].push_back(table_of(t));
   for (const PageChart& c : p.charts) content["sections"].push_back(chart_of(c));
-  return page(embedded::study_html, embedded::study_js, p.title, in_script(content));
+  return page(embedded::study_html, embedded::study_js, p.title, in_script(text_of(content)));
 }
 
 }  // namespace bms

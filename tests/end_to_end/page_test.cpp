@@ -68,5 +68,38 @@ TEST(StudyPage, DrawsTablesAndChartsWithoutAnError) {
   EXPECT_THAT(dom, HasSubstr("paper 93.09"));
 }
 
+/// The shift's current through a cell with a hysteresis, diagnosed; with a later recording to prove it on.
+std::string diagnosis_dom(const std::string& with, const std::string& holdout, const TemporaryFolder& folder) {
+  const std::string recording = (folder.path() / "r.csv").string(), page = (folder.path() / "report.html").string();
+  EXPECT_EQ(run_tool("simulate --cell table9 --recording " BMS_SOURCE_DIR "/recordings/forklift_shift.csv --initial-soc 0.98 --noise-v 0.001 " + with + " --out " + recording).exit_code, 0);
+  EXPECT_EQ(run_tool("diagnose --cell table9 --initial-soc 0.98 --recording " + recording + (holdout.empty() ? "" : " --holdout " + recording) + " --report " + page).exit_code, 0);
+  EXPECT_EQ(count(content(page), " src=") + count(content(page), "<link"), 0U) << "nothing is fetched";
+  return document_of(page, folder.path());
+}
+
+TEST(DiagnosisPage, ShowsWhatWhereHowMuchBeforeAndAfterWhyAndWhatRemains) {
+  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const TemporaryFolder folder;
+  const std::string dom = diagnosis_dom("--with ocv_hysteresis:half_gap_v=0.015,decay=40", "itself", folder);
+  EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
+  EXPECT_GE(count(dom, "<canvas"), 8U);      // voltage and error of both recordings, two a chart
+  EXPECT_GE(count(dom, "<svg"), 8U);         // strip and its scale, how much, before and after, why, remains, regimes, limits
+  EXPECT_THAT(dom, HasSubstr("charged or discharged last"));
+  EXPECT_THAT(dom, HasSubstr("of the mismatch explained"));
+  EXPECT_THAT(dom, HasSubstr("not used: r.csv"));
+  EXPECT_THAT(dom, HasSubstr("slow_polarisation"));
+  EXPECT_EQ(count(dom, "NaN"), count(content(folder.path() / "report.html"), "NaN")) << "no coordinate is lost";
+}
+
+TEST(DiagnosisPage, WithoutAMismatchItShowsWhatWouldHaveShown) {
+  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const TemporaryFolder folder;
+  const std::string dom = diagnosis_dom("", "", folder);
+  EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
+  EXPECT_THAT(dom, HasSubstr("NO MISMATCH"));
+  EXPECT_THAT(dom, HasSubstr("what chance does not reach"));
+  EXPECT_GE(count(dom, "<canvas"), 4U);
+}
+
 }  // namespace
 }  // namespace bms

@@ -1,0 +1,265 @@
+#include "host_sim/command_diagnose.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "diagnosis/words.hpp"
+#include "identification/figures.hpp"
+#include "host_sim/bad_input.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/diagnosis_page.hpp"
+#include "host_sim/diagnosis_result.hpp"
+#include "host_sim/json_results.hpp"
+#include "host_sim/recording.hpp"
+#include "host_sim/replay.hpp"
+
+namespace bms {
+
+namespace {
+
+using diagnosis::Finding;
+using diagnosis::Record;
+using diagnosis::Verdict;
+using model::catalogue;
+
+std::string name_of_file(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+
+/// Where a recording began, and how far that is known.
+struct Start {
+  double soc = 0.5, sigma = 0.3;
+  bool told = false;
+  std::string from;  ///< empty: of the user
+};
+
+Start told_start(const CellFile& cell, double soc, const std::string& from) { return {soc, std::max(cell.parameters.tolerance.initial_soc, 1e-4), true, from}; }
+
+std::optional<Start> reference_start(const Recording& r, const CellFile& cell) {
+  if (r.soc_ref.empty() || !(r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1)) return std::nullopt;
+  return told_start(cell, r.soc_ref.front(), fmt::format("starts at soc_ref's first value, {:.1f} %", 100 * r.soc_ref.front()));
+}
+
+/// As the estimator reads it: the OCV curve asked with what the present current leaves open.
+Start voltage_start(const Recording& r, const CellFile& cell) {
+  const auto first = std::find_if(r.voltage_v.begin(), r.voltage_v.end(), [](double v) { return std::isfinite(v); });
+  if (first == r.voltage_v.end()) return {};
+  Recording one;
+  const auto k = static_cast<std::size_t>(first - r.voltage_v.begin());
+  one.time_s = {0};
+  one.current_a = {r.current_a[k]};
+  one.voltage_v = {r.voltage_v[k]};
+  if (!r.temperature_c.empty()) one.temperature_c = {r.temperature_c[k]};
+  const EstimateRow row = run_on_host(cell, samples(one), std::nullopt, ScalarKind::twice).rows.front();
+  return {row.soc, row.soc_sigma, false, fmt::format("starts where the first voltage says, {:.0f} % give or take {:.0f} %", 100 * row.soc, 100 * row.soc_sigma)};
+}
+
+Start start_of(const Recording& r, const CellFile& cell, const std::optional<double>& given) {
+  if (given) return told_start(cell, *given, "");
+  if (const auto start = reference_start(r, cell)) return *start;
+  return voltage_start(r, cell);
+}
+
+/// A later recording's own reference goes before what was said of the first.
+Start start_of_holdout(const Recording& r, const CellFile& cell, const std::optional<double>& given) {
+  if (const auto start = reference_start(r, cell)) return *start;
+  return start_of(r, cell, given);
+}
+
+Compared opened(const std::string& path, const CellFile& cell, const std::optional<double>& given, Start (*rule)(const Recording&, const CellFile&, const std::optional<double>&),
+                std::vector<Warning>& warnings) {
+  Compared c{read_recording(path), {}, {}, {}};
+  compare_with_cell(c.recording, cell.parameters);
+  for (const Warning& w : c.recording.warnings) warnings.push_back({w.id, path + ": " + w.text});
+  const Start start = rule(c.recording, cell, given);
+  if (!start.from.empty()) warnings.push_back({"initial_soc", path + ": " + start.from});
+  const Recording& r = c.recording;
+  const bool any_temperature = std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
+  c.record = {name_of_file(path), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{}, start.soc, start.sigma, start.told};
+  return c;
+}
+
+std::function<void(double, const std::string&)> progress_on_terminal() {
+  if (!isatty(2)) return {};
+  const auto begin = std::chrono::steady_clock::now();
+  const auto shown_s = std::make_shared<double>(-1);
+  return [begin, shown_s](double done, const std::string& what) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (done >= 1) {
+      fmt::print(stderr, "\r{:70}\r", "");
+    } else if (done > 0 && seconds - *shown_s > 0.1) {
+      *shown_s = seconds;
+      fmt::print(stderr, "\r{:3.0f} %, about {:.0f} s left: {:40}", 100 * done, seconds / done * (1 - done), what);
+    }
+    std::fflush(stderr);
+  };
+}
+
+/// What both models say, open loop from where each recording begins.
+void compare(DiagnoseResult& r) {
+  const model::CellParameters<>& cell = r.cell.parameters;
+  const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
+  const auto simulated = [&](const diagnosis::Hypothesis& h, std::vector<Compared>& list, std::vector<double> Compared::* into) {
+    for (Compared& c : list) {
+      diagnosis::Hypothesis here = h;
+      here.bursts.clear();
+      if (&list == &r.recordings && h.bursts.size() == list.size()) here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
+      const diagnosis::Evidence evidence(cell, own, {c.record}, {});
+      c.*into = evidence.voltage(here, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())), 0);
+    }
+  };
+  const diagnosis::Hypothesis base{own, own.size(), {}};
+  diagnosis::Hypothesis extended = r.named() ? r.diagnosis.extended : base;
+  simulated(base, r.recordings, &Compared::base_v);
+  simulated(base, r.holdouts, &Compared::base_v);
+  simulated(extended, r.recordings, &Compared::extended_v);
+  if (r.named()) extended.settings = diagnosis::later_recording(r.diagnosis.extended);
+  simulated(extended, r.holdouts, &Compared::extended_v);
+}
+
+std::optional<OpenLoopFigures> figures(const std::vector<Compared>& list, std::vector<double> Compared::* simulated) {
+  ErrorFigure error;
+  FitFigure fit;
+  for (const Compared& c : list) {
+    for (std::size_t k = 0; k < c.record.size(); ++k) {
+      error.add(c.record.voltage_v[k] - (c.*simulated)[k]);
+      fit.add(c.record.voltage_v[k], (c.*simulated)[k]);
+    }
+  }
+  if (error.count() == 0) return std::nullopt;
+  return OpenLoopFigures{error.rms(), fit.percent()};
+}
+
+/// The state of charge, as a board would estimate it, on the hold-outs that have a reference.
+std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
+  ErrorFigure base, extended;
+  const auto add = [](const CellFile& cell, const Compared& c, ErrorFigure& figure) {
+    const auto start = starting_point(Belief{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)});
+    const Track track = run_on_host(cell, samples(c.recording), start, ScalarKind::single);
+    for (std::size_t k = 0; k < track.rows.size(); ++k) figure.add(track.rows[k].soc - c.recording.soc_ref[k]);
+  };
+  for (const Compared& c : r.holdouts) {
+    if (c.recording.soc_ref.empty()) continue;
+    add(r.cell, c, base);
+    add(r.extended_cell, c, extended);
+  }
+  if (base.count() == 0) return std::nullopt;
+  return SocErrors{base.rms(), extended.rms()};
+}
+
+/// Digits that say something; a value that rounding would carry over its bound stays.
+double rounded(double value, int digits) { return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.{}g}", value, digits)); }
+
+std::string ids_of(const std::vector<std::size_t>& mechanisms) {
+  std::string ids;
+  for (const std::size_t m : mechanisms) ids += (ids.empty() ? "" : ", ") + std::string(catalogue[m].id);
+  return ids;
+}
+
+CellFile extended_cell(const DiagnoseResult& r) {
+  CellFile cell = r.cell;
+  std::string files;
+  for (const Compared& c : r.recordings) files += (files.empty() ? "" : ", ") + c.record.name;
+  if (!r.named()) {
+    cell.source += fmt::format("; bms diagnose of {}: {}, nothing was added", files, name_of(r.diagnosis.verdict));
+    return cell;
+  }
+  if (!cell.name.ends_with("_extended")) cell.name += "_extended";
+  cell.source += fmt::format("; what bms diagnose found in {} added: {:.2f} mV RMS open loop, before {:.2f}", files, 1e3 * r.extended->rmse_v, 1e3 * r.baseline->rmse_v);
+  const double capacity_ah = cell.parameters.capacity_ah;
+  for (const Finding& f : r.diagnosis.findings) {
+    const model::MechanismInfo& info = catalogue[f.setting.index];
+    model::MechanismSetting setting = f.setting;
+    std::string source = fmt::format("bms diagnose of {}: {:.2f} mV RMS of the voltage, gain {:.0f}", files, 1e3 * f.rms_contribution_v, f.gain);
+    if (info.id == model::ContactStep::id) {
+      source += fmt::format("; since {:.0f} s of {}", setting.value[1], r.recordings.front().record.name);
+      setting.value[1] = 0;
+    }
+    if (!f.equivalent_to.empty()) source += "; these recordings cannot tell it from " + ids_of(f.equivalent_to);
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      const double short_value = rounded(setting.value[k], 6);
+      if (short_value >= info.parameter[k].lower(capacity_ah) && short_value <= info.parameter[k].upper(capacity_ah)) setting.value[k] = short_value;
+      setting.deviation[k] = std::isfinite(setting.deviation[k]) ? rounded(setting.deviation[k], 3) : 0;
+    }
+    put_mechanism(cell, setting);
+    cell.sources[table_of(info)] = source;
+  }
+  return cell;
+}
+
+/// What would separate the rivals. Nothing plans experiments yet.
+std::optional<NextExperiment> next_experiment(const diagnosis::Diagnosis&) { return std::nullopt; }
+
+std::string summary(const DiagnoseResult& r) {
+  std::string text = fmt::format("{}: {}\n", name_of(r.diagnosis.verdict), r.diagnosis.statement);
+  for (const Finding& f : r.diagnosis.findings) {
+    if (!r.named()) break;
+    const model::MechanismInfo& info = catalogue[f.setting.index];
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      text += fmt::format("  {:24} {:24} {:10.5g}{} {}\n", k == 0 ? info.id : "", info.parameter[k].name, f.setting.value[k],
+                          f.setting.deviation[k] > 0 ? fmt::format(" +- {:.2g}", f.setting.deviation[k]) : "", info.parameter[k].unit == "1" ? "" : info.parameter[k].unit);
+    }
+    if (!f.because.empty()) text += "  " + f.because + "\n";
+  }
+  if (r.baseline && r.extended && r.named()) text += fmt::format("Open loop: {:.2f} mV RMS before, {:.2f} mV with what was found.\n", 1e3 * r.baseline->rmse_v, 1e3 * r.extended->rmse_v);
+  if (r.baseline_holdout && r.extended_holdout) {
+    text += fmt::format("On recordings not used: {:.2f} mV RMS before, {:.2f} mV after; the noise floor is {:.2f} mV.\n", 1e3 * r.baseline_holdout->rmse_v,
+                        1e3 * r.extended_holdout->rmse_v, 1e3 * r.diagnosis.noise_floor_v);
+  }
+  if (r.soc) text += fmt::format("State of charge on them: {:.2f} % RMS before, {:.2f} % after.\n", 100 * r.soc->baseline_rmse, 100 * r.soc->extended_rmse);
+  if (!r.out.empty()) text += "Cell file: " + r.out + "\n";
+  text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+int run(const DiagnoseOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  DiagnoseResult result;
+  result.out = options.out;
+  result.cell = read_cell(options.cell);
+  std::vector<Record> records;
+  for (const std::string& path : options.recordings) {
+    result.recordings.push_back(opened(path, result.cell, options.initial_soc, start_of, result.warnings));
+    records.push_back(result.recordings.back().record);
+  }
+  for (const std::string& path : options.holdouts) result.holdouts.push_back(opened(path, result.cell, options.initial_soc, start_of_holdout, result.warnings));
+
+  diagnosis::Options how;
+  how.progress = progress_on_terminal();
+  result.diagnosis = diagnosis::diagnose(result.cell.parameters, result.cell.mechanisms, records, how);
+  diagnosis::describe(result.diagnosis, result.cell.parameters, records);
+  for (const std::string& text : result.diagnosis.warnings) result.warnings.push_back({"readings", text});
+  if (result.diagnosis.verdict == Verdict::ambiguous) result.next = next_experiment(result.diagnosis);
+
+  compare(result);
+  result.baseline = figures(result.recordings, &Compared::base_v);
+  result.extended = figures(result.recordings, &Compared::extended_v);
+  result.baseline_holdout = figures(result.holdouts, &Compared::base_v);
+  result.extended_holdout = figures(result.holdouts, &Compared::extended_v);
+  result.extended_cell = extended_cell(result);
+  result.soc = soc_errors(result);
+  if (result.named() && result.baseline_holdout && result.extended_holdout && result.extended_holdout->rmse_v > 1.05 * result.baseline_holdout->rmse_v) {
+    result.warnings.push_back({"holdout_worse", fmt::format("what was found makes the recordings that were not used worse, {:.1f} mV in place of {:.1f} mV: do not rely on it",
+                                                            1e3 * result.extended_holdout->rmse_v, 1e3 * result.baseline_holdout->rmse_v)});
+  }
+  if (result.named() && result.soc && result.soc->extended_rmse > 1.05 * result.soc->baseline_rmse) {
+    result.warnings.push_back({"soc_worse", fmt::format("the estimated state of charge is worse with it, {:.2f} % in place of {:.2f} %", 100 * result.soc->extended_rmse, 100 * result.soc->baseline_rmse)});
+  }
+
+  for (const Warning& w : result.warnings) warn(w.text);
+  if (!options.out.empty()) put(options.out, cell_text(result.extended_cell));
+  result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (!options.output.json.empty()) put(options.output.json, json_of(result));
+  if (!options.output.report.empty()) put(options.output.report, diagnosis_report(result));
+  tell(options.output, summary(result));
+  return 0;
+}
+
+}  // namespace bms

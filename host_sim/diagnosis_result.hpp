@@ -1,0 +1,56 @@
+// What bms diagnose has found, before it is JSON, a page or a cell file.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/diagnose.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/recording.hpp"
+
+namespace bms {
+
+/// How far an open loop is from what was measured; of several recordings together.
+struct OpenLoopFigures {
+  double rmse_v = 0, fit_percent = 0;
+};
+
+/// RMSE of the estimator's state of charge against soc_ref.
+struct SocErrors {
+  double baseline_rmse = 0, extended_rmse = 0;
+};
+
+/// One recording and what both models say of it, nothing fitted to it but the mechanisms found.
+struct Compared {
+  Recording recording;
+  diagnosis::Record record;
+  std::vector<double> base_v, extended_v;  ///< empty: no voltage to compare with
+};
+
+/// What would settle which of several causes it is.
+struct NextExperiment {
+  std::string profile;                     ///< file or name
+  std::vector<std::size_t> separates;      ///< catalogue indices
+  std::string why;
+};
+
+struct DiagnoseResult {
+  CellFile cell, extended_cell;
+  diagnosis::Diagnosis diagnosis;
+  std::vector<Compared> recordings, holdouts;
+  std::optional<OpenLoopFigures> baseline, extended, baseline_holdout, extended_holdout;
+  std::optional<SocErrors> soc;            ///< of the hold-outs that have a reference
+  std::optional<NextExperiment> next;
+  std::string out;
+  double wall_s = 0;
+  std::vector<Warning> warnings;
+
+  /// Whether the verdict names mechanisms: then they are in the extended cell.
+  bool named() const {
+    using diagnosis::Verdict;
+    return diagnosis.verdict == Verdict::cause || diagnosis.verdict == Verdict::causes || diagnosis.verdict == Verdict::ambiguous;
+  }
+};
+
+}  // namespace bms

@@ -1,0 +1,240 @@
+// bms diagnose from the outside: contract, verdicts on recordings whose answer is known, data that says nothing, bad input.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <regex>
+
+#include <nlohmann/json.hpp>
+
+#include "model/catalogue.hpp"
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using nlohmann::json;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+
+const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
+
+class DiagnoseTool : public ::testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  json result(const std::string& arguments) const {
+    const ToolRun run = run_tool("diagnose --quiet --json " + path("r.json") + " " + arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return run.exit_code == 0 ? json::parse(content(path("r.json"))) : json();
+  }
+  /// The first hours of the shift, with its first charge: a diagnosis of it takes a third of the time.
+  std::string morning() const {
+    std::istringstream lines(content(shift));
+    std::ofstream out(path("morning.csv"));
+    int rows = 0;
+    for (std::string line; rows < 12'000 && std::getline(lines, line);) {
+      out << line << "\n";
+      rows += line.starts_with("#") ? 0 : 1;
+    }
+    return path("morning.csv");
+  }
+  /// Its current through the cell with a mechanism. `seed`: of the noise.
+  std::string simulated(const std::string& name, const std::string& with, int seed = 1, const std::string& initial_soc = "0.98") const {
+    const ToolRun run = run_tool("simulate --cell table9 --recording " + morning() + " --initial-soc " + initial_soc + " --with " + with + " --noise-v 0.001 --seed " + std::to_string(seed) + " --out " + path(name));
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return path(name);
+  }
+  /// A recording of n rows, one each step_s seconds: current and voltage by row.
+  std::string made(const std::string& name, int rows, double step_s, const std::function<double(int)>& current_a, const std::function<double(int)>& voltage_v) const {
+    std::ofstream out(path(name));
+    out << "time_s,current_a,voltage_v\n";
+    for (int k = 0; k < rows; ++k) out << step_s * k << "," << current_a(k) << "," << voltage_v(k) << "\n";
+    return path(name);
+  }
+  TemporaryFolder folder_;
+};
+
+/// Without what the contract lets differ.
+std::string steady(const std::string& text) { return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), ""); }
+
+constexpr const char* hysteresis = "ocv_hysteresis:half_gap_v=0.015,decay=40";
+
+TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndProvesItOnALaterRecording) {
+  const std::string later = simulated("later.csv", hysteresis, 2, "0.9");
+  std::string text = content(later);
+  text.replace(text.find(",soc"), 4, ",soc_ref");
+  std::ofstream(later) << text;
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", hysteresis) + " --holdout " + later + " --out " + path("x.toml"));
+  EXPECT_EQ(r["verdict"], "CAUSE");
+  ASSERT_EQ(r["mechanisms"].size(), 1U);
+  const json& m = r["mechanisms"][0];
+  EXPECT_EQ(m["id"], "ocv_hysteresis");
+  EXPECT_EQ(m["parameters"][0]["name"], "half_gap_v");
+  const double half_gap_v = m["parameters"][0]["value"], std_v = m["parameters"][0]["std"];
+  EXPECT_NEAR(half_gap_v, 0.015, 3 * std_v);
+  EXPECT_LT(std_v, 0.001);
+  EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("charged or discharged last"));
+  EXPECT_THAT(m["because"].get<std::string>(), HasSubstr("the charge turns"));
+  EXPECT_GT(r["baseline"]["holdout"]["rmse_v"], 0.008);
+  EXPECT_LT(r["extended"]["holdout"]["rmse_v"], 0.0013) << "1 mV of noise";
+  EXPECT_LT(r["soc"]["extended_rmse"], r["soc"]["baseline_rmse"]);
+  // the cell file goes on to others
+  const std::string cell = content(path("x.toml"));
+  EXPECT_THAT(cell, HasSubstr("name = \"table9_extended\""));
+  EXPECT_THAT(cell, HasSubstr("[mechanism.ocv_hysteresis]\nsource = \"bms diagnose of now.csv"));
+  EXPECT_EQ(run_tool("simulate --cell " + path("x.toml") + " --recording " + shift + " --out " + path("s.csv")).exit_code, 0);
+  EXPECT_EQ(run_tool("replay " + shift + " --cell " + path("x.toml")).exit_code, 0);
+  EXPECT_EQ(result("--cell " + path("x.toml") + " --initial-soc 0.98 --recording " + path("now.csv"))["verdict"], "NO_MISMATCH") << "what the cell file has is no mismatch";
+}
+
+TEST_F(DiagnoseTool, AContactThatGotWorseIsThereFromTheStartOfALaterRecording) {
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", "contact_step:resistance_ohm=0.002,onset_s=5000") + " --holdout " +
+                        simulated("later.csv", "contact_step:resistance_ohm=0.002,onset_s=0", 2) + " --out " + path("x.toml"));
+  ASSERT_EQ(r["verdict"], "CAUSE");
+  EXPECT_EQ(r["mechanisms"][0]["id"], "contact_step");
+  EXPECT_NEAR(r["mechanisms"][0]["parameters"][1]["value"], 5'000, 60);
+  EXPECT_LT(r["extended"]["holdout"]["rmse_v"], 0.0013);
+  EXPECT_THAT(content(path("x.toml")), HasSubstr("onset_s = 0"));
+  EXPECT_THAT(content(path("x.toml")), MatchesRegex("[^@]*since [45][0-9]{3} s of now.csv[^@]*"));
+}
+
+TEST_F(DiagnoseTool, TheShiftItselfIsNoMismatchAndLeavesTheCellAsItWas) {
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + shift + " --out " + path("x.toml"));
+  EXPECT_EQ(r["verdict"], "NO_MISMATCH");
+  EXPECT_TRUE(r["mechanisms"].empty());
+  EXPECT_GT(r["detection_limits"].size(), 10U);
+  EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("it would have shown"));
+  EXPECT_TRUE(r["baseline"]["holdout"].is_null());
+  EXPECT_EQ(r["baseline"]["recording"], r["extended"]["recording"]);
+  EXPECT_THAT(content(path("x.toml")), HasSubstr("name = \"table9\"\n"));
+  EXPECT_THAT(content(path("x.toml")), HasSubstr("NO_MISMATCH, nothing was added"));
+}
+
+TEST_F(DiagnoseTool, GivesWhatTheContractNamesWhateverTheVerdict) {
+  const auto complete = [](const json& r) {
+    for (const char* key : {"command", "verdict", "statement", "location", "mechanisms", "candidates", "baseline", "extended", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
+                            "next_experiment", "wall_s", "warnings"}) {
+      EXPECT_TRUE(r.contains(key)) << key;
+    }
+    EXPECT_EQ(r["command"], "diagnose");
+    EXPECT_FALSE(r["statement"].get<std::string>().empty());
+    for (const char* key : {"spans", "regimes", "explained_share"}) EXPECT_TRUE(r["location"].contains(key)) << key;
+    for (const char* key : {"rmse_v", "share"}) EXPECT_TRUE(r["unexplained"][key].is_number()) << key;
+    for (const char* model : {"baseline", "extended"}) {
+      for (const char* key : {"recording", "holdout"}) EXPECT_TRUE(r[model].contains(key)) << model << key;
+    }
+    for (const json& m : r["mechanisms"]) {
+      for (const char* key : {"id", "probability", "equivalent_to", "parameters", "rms_contribution_v"}) EXPECT_TRUE(m.contains(key)) << key;
+      for (const json& p : m["parameters"]) EXPECT_TRUE(p["value"].is_number() && p["std"].is_number() && p["name"].is_string() && p["unit"].is_string()) << p;
+    }
+    for (const json& c : r["candidates"]) {
+      for (const char* key : {"probability", "log_likelihood_gain", "explained_share"}) EXPECT_TRUE(c[key].is_number()) << key;
+      for (const json& id : c["ids"]) EXPECT_LT(model::mechanism_index(id.get<std::string>()), model::mechanism_count) << id;
+    }
+    for (const json& l : r["detection_limits"]) EXPECT_TRUE(l["value"].is_number() && l["id"].is_string() && l["parameter"].is_string() && l["unit"].is_string()) << l;
+    for (const json& n : r["not_testable"]) EXPECT_FALSE(n["reason"].get<std::string>().empty()) << n;
+  };
+  complete(result("--cell table9 --initial-soc 0.98 --recording " + shift));
+  complete(result("--cell table9 --initial-soc 0.98 --recording " + simulated("gap.csv", hysteresis)));
+  complete(result("--cell table9 --recording " + made("rest.csv", 2'000, 1, [](int) { return 0.0; }, [](int) { return 3.3; })));
+  complete(result("--cell table9 --recording " + made("mv.csv", 2'000, 1, [](int k) { return -(k / 60 % 3); }, [](int k) { return 3'300 - 10.0 * (k / 60 % 3); })));
+}
+
+TEST_F(DiagnoseTool, DataThatSaysNothingIsNotTestableAndNeverAGuess) {
+  const auto level = [](int k) { return 3.29 + 0.001 * (k % 2); };
+  const struct {
+    const char* what;
+    std::string file;
+  } cases[] = {
+      {"constant voltage and current", made("constant.csv", 3'000, 1, [](int) { return -2.0; }, [](int) { return 3.2; })},
+      {"constant current", made("flat.csv", 3'000, 1, [](int) { return -2.0; }, [](int k) { return 3.28 - 1e-6 * k + 0.001 * (k % 2); })},
+      {"all rest", made("rest.csv", 5'000, 1, [](int) { return 0.0; }, level)},
+      {"ten rows", made("ten.csv", 10, 1, [](int k) { return -(k % 3); }, level)},
+      {"a minute", made("minute.csv", 60, 1, [](int k) { return -(k % 3); }, [](int k) { return 3.29 - 0.01 * (k % 3); })},
+      {"no voltage that can be read", made("blind.csv", 2'000, 1, [](int k) { return -(k % 3); }, [](int) { return std::nan(""); })},
+      {"no current that can be read", made("still.csv", 2'000, 1, [](int) { return std::nan(""); }, level)},
+  };
+  for (const auto& c : cases) {
+    const json r = result("--cell table9 --recording " + c.file);
+    EXPECT_THAT(r["verdict"].get<std::string>(), AnyOf("NOT_TESTABLE", "DATA_FAULT")) << c.what;
+    EXPECT_TRUE(r["mechanisms"].empty()) << c.what;
+  }
+}
+
+TEST_F(DiagnoseTool, WithoutTemperatureWhatNeedsItIsListed) {
+  std::string text;
+  std::istringstream lines(content(shift));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("#")) continue;
+    std::size_t end = 0;
+    for (int k = 0; k < 3; ++k) end = line.find(',', end + 1);
+    text += line.substr(0, end) + "\n";
+  }
+  std::ofstream(path("bare.csv")) << text;
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + path("bare.csv"));
+  EXPECT_EQ(r["verdict"], "NO_MISMATCH");
+  std::size_t about_temperature = 0;
+  for (const json& n : r["not_testable"]) about_temperature += n["reason"] == "no temperature was recorded" ? 1 : 0;
+  EXPECT_EQ(about_temperature, 3U);
+}
+
+TEST_F(DiagnoseTool, ABrokenRecordingIsADataFaultWithItsPlace) {
+  std::string text = "time_s,current_a,voltage_v\n";
+  for (int k = 0; k < 4'000; ++k) text += std::to_string(k) + "," + std::to_string(k / 50 % 2 == 0 ? 3 : -3) + "," + std::to_string(k / 50 % 2 == 0 ? 3.25 : 3.33) + "\n";
+  std::ofstream(path("inverted.csv")) << text;
+  const json r = result("--cell table9 --recording " + path("inverted.csv"));
+  EXPECT_EQ(r["verdict"], "DATA_FAULT");
+  ASSERT_EQ(r["faults"].size(), 1U);
+  EXPECT_EQ(r["faults"][0]["id"], "current_inverted");
+  EXPECT_EQ(r["statement"], r["faults"][0]["text"]);
+}
+
+TEST_F(DiagnoseTool, SaysWhereTheStartWasTakenFrom) {
+  const json referenced = result("--cell table9 --recording " + shift);
+  EXPECT_THAT(referenced["warnings"].dump(), HasSubstr("starts at soc_ref's first value, 98.0 %"));
+  const json read = result("--cell table9 --recording " + simulated("now.csv", hysteresis));
+  EXPECT_THAT(read["warnings"].dump(), HasSubstr("starts where the first voltage says"));
+  EXPECT_GT(read["recordings"][0]["initial_soc_sigma"], 0.005);
+  const json told = result("--cell table9 --initial-soc 0.97 --recording " + shift);
+  EXPECT_EQ(told["recordings"][0]["initial_soc"], 0.97);
+}
+
+TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
+  const std::vector<std::string> wrong = {
+      "",
+      "--cell table9",
+      "--recording " + shift,
+      "--cell no_such_cell --recording " + shift,
+      "--cell table9 --recording /no/such/file.csv",
+      "--cell table9 --recording " + shift + " --holdout /no/such/file.csv",
+      "--cell table9 --recording " + shift + " --initial-soc 98",
+      "--cell table9 --recording " + shift + " --initial-soc nan",
+      "--cell table9 --recording " + made("nine.csv", 9, 1, [](int) { return 0.0; }, [](int) { return 3.3; }),
+      "--cell table9 --recording " + shift + " --json - --report -",
+  };
+  for (const std::string& arguments : wrong) {
+    const ToolRun run = run_tool("diagnose " + arguments);
+    EXPECT_EQ(run.exit_code, 2) << arguments;
+    EXPECT_THAT(run.err, MatchesRegex("[^\n]+\n")) << arguments;
+    EXPECT_EQ(run.out, "") << arguments;
+  }
+  const ToolRun help = run_tool("diagnose --help");
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.out, HasSubstr("Example: bms diagnose"));
+}
+
+TEST_F(DiagnoseTool, TheSameInputGivesTheSameBytes) {
+  const std::string arguments = "diagnose --cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", hysteresis) + " --json - --out " + path("x.toml") + " --report " + path("x.html");
+  const ToolRun a = run_tool(arguments);
+  const std::string cell = content(path("x.toml")), page = content(path("x.html"));
+  const ToolRun b = run_tool(arguments);
+  ASSERT_EQ(a.exit_code, 0) << a.err;
+  EXPECT_EQ(steady(a.out), steady(b.out));
+  EXPECT_EQ(cell, content(path("x.toml")));
+  EXPECT_EQ(page, content(path("x.html")));
+}
+
+}  // namespace
+}  // namespace bms
