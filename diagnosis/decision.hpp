@@ -15,6 +15,8 @@ inline constexpr double same_inseparable = 30;  ///< and of a class all this clo
 inline constexpr double per_unknown = 3;        ///< cost of every unknown after the first
 inline constexpr double explained = 0.65;       ///< share of the mismatch that a cause must explain
 inline constexpr double much_left = 40;         ///< what must remain, in gain, to say that something unknown is there
+inline constexpr double larger_than_error = 2; ///< one of several causes does not move the voltage by more than this times the error
+inline constexpr double may_grow = 1.15;       ///< of the plain error, by adding a cause
 inline constexpr double temper = 3;             ///< log-likelihoods are this much too sure of themselves
 inline constexpr double fast_excess = 0.25;     ///< variance of the whitened residual above 1 that noise does not reach
 

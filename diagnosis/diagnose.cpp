@@ -52,6 +52,12 @@ double known_before(const Evidence& evidence, const Hypothesis& h) {
   return std::clamp((away_k - 5) * 1.5, 0.0, 15.0);
 }
 
+/// RMS of measured less predicted by a hypothesis with the cell file's own base parameters: what an extended cell file will do.
+double plain_error_v(const Evidence& evidence, const Hypothesis& h) {
+  const Columns raw = evidence.raw_residual(h, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())));
+  return std::sqrt(raw.squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+}
+
 class Chain {
  public:
   Chain(Evidence& evidence, const Options& options) : evidence_(evidence), options_(options), nominal_(evidence.noise()) {}
@@ -187,6 +193,13 @@ class Chain {
     return fits;
   }
 
+  /// Whether a cell file with it would do as well as with what was there: what only helps together with base parameters that have
+  /// moved as far as they may is no cause.
+  bool carries(const Fit& before, const Fit& f) const {
+    const double was_v = std::min(plain_error_v(evidence_, before.hypothesis), plain_error_v(evidence_, evidence_.base()));
+    return plain_error_v(evidence_, f.hypothesis) <= decision::may_grow * was_v + 3e-4;
+  }
+
   Fit refit(const Fit& f, int iterations = 6) {
     evidence_.set_noise(f.noise);
     return settled(evidence_.fit(f.hypothesis, f.calibration, iterations));
@@ -240,7 +253,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   for (Record& r : records) {
     Trust trust = examine(r, cell);
     for (DataFault& f : trust.faults) d.faults.push_back(std::move(f));
-    for (std::string& w : trust.warnings) d.warnings.push_back(std::move(w));
+    for (const std::string& w : trust.warnings) d.warnings.push_back(r.name.empty() ? w : r.name + ": " + w);
   }
   if (!d.faults.empty()) {
     d.verdict = Verdict::data_fault;
@@ -300,6 +313,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     while (current.hypothesis.added().size() < options.most_mechanisms) {
       std::vector<Fit> more = chain.one_more(current, testable, decision::most_fits);
       if (current.hypothesis.added().empty()) singles = more;
+      std::erase_if(more, [&](const Fit& f) { return !chain.carries(current, f); });
       if (more.empty() || chain.gain(current, more.front()) < decision::detected) break;
       current = more.front();
     }
@@ -318,6 +332,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   chain.tell("noise");
 
   // take away what does not carry, try each one's rivals
+  const double error_v = plain_error_v(evidence, evidence.base());
   std::map<std::size_t, std::vector<Fit>> rivals;
   std::map<std::size_t, double> gains;
   std::map<std::pair<std::size_t, std::size_t>, double> alike;
@@ -326,10 +341,14 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     rivals.clear();
     gains.clear();
     std::vector<std::pair<double, Fit>> reduced;
+    // causes that are larger than the error and cancel each other are none
+    const std::map<std::size_t, double> sizes_v = contributions(evidence, base, current).rms_v;
     for (const std::size_t m : current.hypothesis.added()) {
       Fit less = chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, current.noise, {}, {}, false}, 8);
       if (current.hypothesis.added().size() == 1) less = base;
       gains[m] = chain.gain(less, current);
+      const bool cancels = current.hypothesis.added().size() > 1 && sizes_v.at(m) > decision::larger_than_error * error_v;
+      if (cancels) gains[m] = std::min(gains[m], decision::detected - sizes_v.at(m) / error_v);
       if (gains[m] < decision::detected) {
         reduced.emplace_back(gains[m], less);
         continue;
@@ -337,9 +356,10 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       std::vector<std::pair<std::size_t, double>> likeness;
       for (Fit& rival : chain.one_more(less, testable, 5, m, &likeness, 0.1 * gains[m])) {
         if (rival.hypothesis.find(m) != nullptr) {
-          if (chain.score(rival) < chain.score(current) - 1) current = rival, changed = true;  // the same from another start
+          if (chain.score(rival) < chain.score(current) - 1 && chain.carries(less, rival)) current = rival, changed = true;  // the same from another start
           continue;
         }
+        if (!chain.carries(less, rival)) continue;
         if (chain.score(rival) < chain.score(current) - 0.5) {
           current = rival;
           changed = true;
@@ -355,6 +375,10 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       changed = true;
     }
     if (!changed) break;
+  }
+
+  for (const std::size_t m : current.hypothesis.added()) {
+    if (!gains.contains(m)) gains[m] = chain.gain(chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, current.noise, {}, {}, false}, 8), current);
   }
 
   // is it enough?
@@ -406,13 +430,17 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   std::stable_sort(d.findings.begin(), d.findings.end(), [](const Finding& a, const Finding& b) { return a.gain > b.gain; });
 
   const auto rank = [&](const Fit& f) {
+    for (const Ranked& r : d.candidates) {
+      if (r.ids == f.hypothesis.added()) return;  // the same from another start
+    }
     Ranked r{f.hypothesis.added(), 0, chain.score(base) - chain.score(f), 0};
     r.explained_share = contributions(evidence, base, f).explained_share;
     d.candidates.push_back(r);
   };
   if (something) {
     rank(current);
-    for (const auto& [m, fits] : rivals) {
+    for (auto& [m, fits] : rivals) {
+      std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return chain.score(a) < chain.score(b); });
       for (const Fit& f : fits) rank(f);
     }
   } else {

@@ -34,7 +34,7 @@ struct CellFile {
 /// The table that a mechanism stands in: "mechanism.ID" or "instrument.ID".
 std::string table_of(const model::MechanismInfo& mechanism);
 
-/// What is expected of a parameter, for a person: "0 to 0.09 V".
+/// What is expected of a parameter, for a person: "0 to 0.07 V".
 std::string range_of(const model::Parameter& parameter, double capacity_ah);
 
 /// Adds the mechanism to the file, or puts it in the place of the one of its kind.

@@ -166,7 +166,7 @@ TEST_F(Tool, AMechanismThatCannotBeIsRefusedInOneLineThatSaysWhatCan) {
       {"ocv_hysteresis:gap=0.01", "no such parameter 'gap' of ocv_hysteresis, expected one of: half_gap_v, decay, ocv_at, initial"},
       {"ocv_hysteresis:half_gap_v=", "no value of 'half_gap_v', expected half_gap_v=NUMBER"},
       {"ocv_hysteresis:half_gap_v=0.01,decay=x", "no value of 'decay', expected decay=NUMBER"},
-      {"ocv_hysteresis:half_gap_v=1", "'half_gap_v' is out of range, expected 0 to 0.09 V"}};
+      {"ocv_hysteresis:half_gap_v=1", "'half_gap_v' is out of range, expected 0 to 0.07 V"}};
   for (const auto& [with, what] : wrong) {
     const ToolRun run = run_tool("simulate --cell table9 --recording " + shift + " --out " + path("x.csv") + " --with " + with);
     EXPECT_EQ(run.exit_code, 2) << with;

@@ -182,7 +182,7 @@ TEST(CellFile, RefusesAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable
   EXPECT_THAT(refusal(replaced(good, "mechanism.initial_soc", "instrument.initial_soc")), HasSubstr("unknown key 'instrument.initial_soc'"));
   EXPECT_THAT(refusal(replaced(good, "decay = 55", "dekay = 55")), HasSubstr("unknown key 'mechanism.ocv_hysteresis.dekay', expected one of: decay, decay_std, half_gap_v"));
   EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = \"fast\"")), HasSubstr("expected a number"));
-  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = nan")), HasSubstr("'mechanism.ocv_hysteresis.decay' is out of range, expected 4 to 600"));
+  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = nan")), HasSubstr("'mechanism.ocv_hysteresis.decay' is out of range, expected 8 to 400"));
   EXPECT_THAT(refusal(replaced(good, "offset_a = 0.03", "offset_a = 3")), HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -0.6 to 0.6 A"));
   EXPECT_THAT(refusal(replaced(good, "half_gap_v_std = 0.001", "half_gap_v_std = -1")), HasSubstr("'mechanism.ocv_hysteresis.half_gap_v_std' is out of range, expected 0 or more"));
   EXPECT_THAT(refusal("mechanism = 1\n" + table9_text()), HasSubstr("'mechanism' is not acceptable, expected a table"));
