@@ -266,6 +266,7 @@ void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<c
 Columns Evidence::derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const {
   const std::size_t count = by.size() + base.size();
   Columns columns(static_cast<Eigen::Index>(samples_), static_cast<Eigen::Index>(count));
+  if (count == 0) return columns;
   for (std::size_t first = 0; first < count;) {
     const bool few = count - first <= few_lanes;
     const std::size_t here = std::min(few ? few_lanes : lanes, count - first);
@@ -343,28 +344,37 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
   Eigen::VectorXd natural = Eigen::VectorXd::Ones(m);  // d parameter / d internal
   int quiet = 0;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    Columns j_theta = derivatives(fit.hypothesis, fit.calibration, sought);
+    Columns j_theta = derivatives(fit.hypothesis, fit.calibration, sought);  // of nothing sought: no columns
     for (Eigen::Index j = 0; j < m; ++j) {
       natural[j] = info(j).role == model::Role::shape ? value(fit.hypothesis, j) : (high_of(j) - low_of(j)) / 100;
       j_theta.col(j) *= natural[j];
     }
     const Columns& j_u = around->columns;
     const Eigen::VectorXd g_u = j_u.transpose() * fit.residual - fit.calibration;
-    Eigen::VectorXd g = j_theta.transpose() * fit.residual;
-    Eigen::MatrixXd a = j_theta.transpose() * j_theta;
+    const Eigen::VectorXd u_alone = around->normal.solve(g_u);
+    Eigen::VectorXd g(m), rhs(m);
+    Eigen::MatrixXd a(m, m), cross, solved;
+    if (m > 0) {
+      g = j_theta.transpose() * fit.residual;
+      a = j_theta.transpose() * j_theta;
+    }
     for (Eigen::Index j = 0; j < m; ++j) {
       if (info(j).role != model::Role::shape) continue;
       const double width2 = log_prior_width * log_prior_width;
       g[j] -= std::log(value(fit.hypothesis, j) / (info(j).unsaid(cell_.capacity_ah))) / width2;
       a(j, j) += 1 / width2;
     }
-    const Eigen::MatrixXd cross = j_u.transpose() * j_theta;
-    const Eigen::MatrixXd solved = around->normal.solve(cross);
-    const Eigen::VectorXd u_alone = around->normal.solve(g_u);
-    schur = a - cross.transpose() * solved;
-    const Eigen::VectorXd rhs = g - cross.transpose() * u_alone;
     // what a step could gain at most, were all linear and no bound in the way
-    const double within_reach = g_u.dot(u_alone) + (m > 0 ? rhs.dot((schur + Eigen::MatrixXd((schur.diagonal().array() * 1e-6 + 1e-9).matrix().asDiagonal())).ldlt().solve(rhs)) : 0.0);
+    double within_reach = g_u.dot(u_alone);
+    if (m > 0) {
+      cross = j_u.transpose() * j_theta;
+      solved = around->normal.solve(cross);
+      schur = a - cross.transpose() * solved;
+      rhs = g - cross.transpose() * u_alone;
+      Eigen::MatrixXd regular = schur;
+      for (Eigen::Index j = 0; j < m; ++j) regular(j, j) += 1e-6 * schur(j, j) + 1e-9;
+      within_reach += rhs.dot(regular.ldlt().solve(rhs));
+    }
     if (within_reach < 0.2) {
       fit.converged = true;
       break;
@@ -375,7 +385,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
       // those that would leave their bounds are held at them, one round after the other
       std::vector<char> held(sought.size(), 0);
       Eigen::VectorXd step = Eigen::VectorXd::Zero(m);
-      for (int round = 0; round <= static_cast<int>(m); ++round) {
+      for (int round = 0; m > 0 && round <= static_cast<int>(m); ++round) {
         Eigen::MatrixXd s = schur;
         Eigen::VectorXd b = rhs;
         for (Eigen::Index j = 0; j < m; ++j) s(j, j) += damping * schur(j, j) + 1e-9 + 1e-12 * schur.diagonal().maxCoeff();
@@ -405,7 +415,9 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
       }
       // where the base parameters' derivatives are stale, a shorter way is taken with theirs too
       const double way = 1 / (1 + 0.02 * damping);
-      const Eigen::VectorXd u = fit.calibration + way * (u_alone - solved * taken);
+      Eigen::VectorXd toward = u_alone;
+      if (m > 0) toward -= solved * taken;
+      const Eigen::VectorXd u = fit.calibration + way * toward;
       const Eigen::VectorXd r = residual(trial, u);
       const double cost = cost_of(trial, u, r);
       if (cost < fit.cost) {

@@ -82,7 +82,8 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
   const std::vector<Sought> sought = fit.hypothesis.sought();
   const Columns base = evidence.calibration_derivatives(fit.hypothesis, fit.calibration), own = evidence.derivatives(fit.hypothesis, fit.calibration, sought);
   Columns known(rows, base.cols() + own.cols());
-  known << base, own;
+  known.leftCols(base.cols()) = base;
+  if (own.cols() > 0) known.rightCols(own.cols()) = own;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(known.cols(), known.cols());
   normal.selfadjointView<Eigen::Lower>().rankUpdate(known.transpose());
   normal = Eigen::MatrixXd(normal.selfadjointView<Eigen::Lower>());

@@ -221,7 +221,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
   const std::vector<Sought> sought = h.sought();
   const Columns base = evidence.calibration_derivatives(h, around.calibration), own = evidence.derivatives(h, around.calibration, sought);
   Columns known(base.rows(), base.cols() + own.cols());
-  known << base, own;
+  known.leftCols(base.cols()) = base;
+  if (own.cols() > 0) known.rightCols(own.cols()) = own;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(known.cols(), known.cols());
   normal.selfadjointView<Eigen::Lower>().rankUpdate(known.transpose());
   normal = Eigen::MatrixXd(normal.selfadjointView<Eigen::Lower>());

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace truth {
 
@@ -56,7 +57,7 @@ double hat(double soc, double centre, double spacing) { return std::max(0.0, 1 -
 struct Yardstick::Columns {
   Whitener whitener;
   Eigen::MatrixXd nuisance;  ///< whitened, each times its standard deviation
-  Eigen::LDLT<Eigen::MatrixXd> gram;
+  std::optional<Eigen::LDLT<Eigen::MatrixXd>> gram;
 };
 
 Yardstick::~Yardstick() = default;
@@ -94,13 +95,13 @@ Yardstick::Yardstick(const HealthyCell& cell, const Drive& drive, const CellTrac
   for (std::size_t n = 0; n < columns.size(); ++n) nuisance.col(static_cast<Eigen::Index>(n)) = columns_->whitener.white(columns[n]);
   Eigen::MatrixXd gram = nuisance.transpose() * nuisance;
   gram.diagonal().array() += 1;
-  columns_->gram.compute(gram);
+  columns_->gram.emplace(gram);
 }
 
 double Yardstick::overlap_root(const std::vector<double>& a_v, const std::vector<double>& b_v) const {
   const Eigen::VectorXd a = columns_->whitener.white(a_v), b = columns_->whitener.white(b_v);
   const Eigen::VectorXd to_a = columns_->nuisance.transpose() * a, to_b = columns_->nuisance.transpose() * b;
-  const double lambda = a.dot(b) - to_a.dot(columns_->gram.solve(to_b));
+  const double lambda = a.dot(b) - to_a.dot(columns_->gram->solve(to_b));
   return std::copysign(std::sqrt(std::abs(lambda)), lambda) / 4.76;
 }
 
