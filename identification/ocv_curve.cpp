@@ -167,15 +167,18 @@ std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
   // as some line stays within the error all the way (Imai and Iri, 1986); fewest pieces first, least squared error second.
   constexpr std::array<double, 7> heights = {-0.9, -0.6, -0.3, 0, 0.3, 0.6, 0.9};  // of error_v
   constexpr double flattest = 1e-4;                                                 // V per unit of soc
-  constexpr std::size_t narrowest = 1;                                              // grid steps
+  constexpr std::size_t narrowest = 2;                                              // grid steps: a cell file asks for one at least
+  constexpr double error_soc = 0.002;                                               // where the curve plunges, this far aside is near enough
   const std::size_t points = curve.soc.size(), levels = heights.size();
+  std::vector<double> near_v(points, error_v);
+  for (std::size_t k = 1; k + 1 < points; ++k) near_v[k] = std::max(error_v, error_soc * (curve.ocv_v[k + 1] - curve.ocv_v[k - 1]) / (curve.soc[k + 1] - curve.soc[k - 1]));
   struct Best {
     int pieces = std::numeric_limits<int>::max();
     double squares = 0;
     std::size_t from = 0;
   };
   std::vector<Best> best(points * levels);
-  const auto height = [&](std::size_t point, std::size_t level) { return curve.ocv_v[point] + heights[level] * error_v; };
+  const auto height = [&](std::size_t point, std::size_t level) { return curve.ocv_v[point] + heights[level] * near_v[point]; };
   // sums over the curve, so that a piece's squared error costs no loop
   std::vector<double> sum_v(points + 1, 0), sum_vv(points + 1, 0), sum_vs(points + 1, 0), sum_s(points + 1, 0), sum_ss(points + 1, 0);
   for (std::size_t k = 0; k < points; ++k) {
@@ -199,8 +202,8 @@ std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
       double lowest = flattest, highest = std::numeric_limits<double>::infinity();
       for (std::size_t to = from + 1; to < points && lowest <= highest; ++to) {
         const double width = curve.soc[to] - curve.soc[from];
-        lowest = std::max(lowest, (curve.ocv_v[to] - error_v - height(from, level)) / width);
-        highest = std::min(highest, (curve.ocv_v[to] + error_v - height(from, level)) / width);
+        lowest = std::max(lowest, (curve.ocv_v[to] - near_v[to] - height(from, level)) / width);
+        highest = std::min(highest, (curve.ocv_v[to] + near_v[to] - height(from, level)) / width);
         if (to % narrowest != 0) continue;
         for (std::size_t end = 0; end < levels; ++end) {
           const double slope = (height(to, end) - height(from, level)) / width;
@@ -229,7 +232,8 @@ std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
   for (std::size_t k = 0, piece = 0; k < points; ++k) {
     while (piece + 2 < pieces.soc.size() && curve.soc[k] > pieces.soc[piece + 1]) ++piece;
     const double t = (curve.soc[k] - pieces.soc[piece]) / (pieces.soc[piece + 1] - pieces.soc[piece]);
-    pieces.largest_error_v = std::max(pieces.largest_error_v, std::abs(pieces.ocv_v[piece] + t * (pieces.ocv_v[piece + 1] - pieces.ocv_v[piece]) - curve.ocv_v[k]));
+    const double off_v = std::abs(pieces.ocv_v[piece] + t * (pieces.ocv_v[piece + 1] - pieces.ocv_v[piece]) - curve.ocv_v[k]);
+    pieces.largest_error_v = std::max(pieces.largest_error_v, off_v * error_v / near_v[k]);
   }
   return pieces;
 }

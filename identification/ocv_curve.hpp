@@ -33,10 +33,10 @@ struct OcvPieces {
   std::vector<double> soc;         ///< first 0, last 1
   std::vector<double> ocv_v;       ///< at the corners
   std::vector<double> half_gap_v;  ///< at the corners
-  double largest_error_v = 0;      ///< of the polyline against the curve
+  double largest_error_v = 0;      ///< of the polyline against the curve; where the curve is steep, what 0.2 % of soc do not explain
 };
 
-/// The fewest pieces that stay within error_v of the curve and rise everywhere; of those the one with the least squared error.
+/// The fewest pieces that stay within error_v of the curve, or 0.2 % of soc aside where it plunges, and rise everywhere; of those the one with the least squared error.
 /// Nothing when the curve falls by more than that error allows.
 std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v);
 
