@@ -7,6 +7,9 @@ namespace bms::diagnosis {
 
 namespace {
 
+/// soc beyond the resistances' outermost node within which their error doubles.
+constexpr double beyond_nodes = 0.1;
+
 /// Knots over the soc that the records pass through, and one step beyond.
 std::vector<double> knots(double low, double high, double step) {
   std::vector<double> at;
@@ -32,29 +35,28 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Re
   high = std::clamp(high, low, 1.1);
 
   const model::Tolerance& t = cell.tolerance;
-  ocv_v_ = std::max(t.ocv_v, 2e-4);
-  const double fraction = std::max(t.resistance_fraction, 2e-3);
-  r0_fraction_ = fraction;
-  r1_fraction_ = 2 * fraction;
-  c1_fraction_ = 4 * fraction;
+  const double ocv_v = std::max(t.ocv_v, 2e-4), fraction = std::max(t.resistance_fraction, 2e-3);
+  // a table of few nodes stands for the middle
+  const double first_node = std::min(cell.rc.soc[0], 0.2), last_node = std::max(cell.rc.soc[cell.rc.soc.size - 1], 0.9);
+  const auto fraction_at = [&](double soc) { return fraction * (1 + std::max({0.0, first_node - soc, soc - last_node}) / beyond_nodes); };
   offset_a_ = std::min(cell.noise.current_offset_a, 1e-3 * cell.capacity_ah);
 
-  const auto hats = [&](std::vector<double> at) {
+  const auto hats = [&](std::vector<double> at, const auto& deviation) {
     Hats made(std::move(at), size_);
     size_ += made.size();
-    return made;
+    return made.scaled(deviation);
   };
-  ocv_ = hats(knots(low, high, 0.05));
+  ocv_ = hats(knots(low, high, 0.05), [&](double) { return ocv_v; });
   const auto& ocv = cell.ocv;
   for (std::size_t k = 1; k + 1 < ocv.soc.size; ++k) {
     const double bend = std::abs(ocv.b1_v[k] - ocv.b1_v[k - 1]), between = std::min(ocv.soc[k + 1] - ocv.soc[k], ocv.soc[k] - ocv.soc[k - 1]);
     // a curve that follows both lines but for a quarter of the pieces beside the corner passes it at bend * width / 4
     const double width = std::min(0.025, between / 2), deviation_v = bend * width / 6;
-    if (deviation_v > ocv_v_ / 2 && ocv.soc[k] > low - width && ocv.soc[k] < high + width) corners_.push_back({ocv.soc[k], width, deviation_v, size_++});
+    if (deviation_v > ocv_v / 2 && ocv.soc[k] > low - width && ocv.soc[k] < high + width) corners_.push_back({ocv.soc[k], width, deviation_v, size_++});
   }
-  r0_ = hats(knots(low, high, 0.1));
-  r1_ = hats(knots(low, high, 0.2));
-  c1_ = hats(knots(low, high, 0.2));
+  r0_ = hats(knots(low, high, 0.1), fraction_at);
+  r1_ = hats(knots(low, high, 0.2), [&](double soc) { return 2 * fraction_at(soc); });
+  c1_ = hats(knots(low, high, 0.2), [&](double soc) { return 4 * fraction_at(soc); });
   capacity_ = size_++;
   gain_ = size_++;
   for (const Record& r : records) {
@@ -64,7 +66,7 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Re
     std::vector<double> at;
     for (double s = r.time_s.front(); s < r.time_s.back() + every_s; s += every_s) at.push_back(s);
     if (at.size() < 2) at.push_back(at.front() + every_s);
-    offset_.push_back(hats(std::move(at)));
+    offset_.push_back(hats(std::move(at), [&](double) { return offset_a_; }));
   }
 }
 

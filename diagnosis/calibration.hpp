@@ -5,7 +5,8 @@
 //
 //   OCV         at knots every 5 % of soc: tolerance.ocv_v; where the table bends sharply, another one beside the corner: a smooth
 //               curve cuts a corner of straight lines by its change of slope times some soc
-//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction
+//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction; more beyond the table's nodes, where it
+//               only carries on: towards empty resistances grow
 //   capacity    0.5 %;  gain of the current 0.2 %
 //   per record  initial soc; a slow wander of the current's zero, 0.1 % of 1C at most, in hours
 #pragma once
@@ -26,17 +27,23 @@ class Hats {
   Hats() = default;
   Hats(std::vector<double> knots, std::size_t first) : knots_(std::move(knots)), first_(first) {}
   std::size_t size() const { return knots_.size(); }
+  /// What an unknown of 1 makes of the value at knot k: deviation(knot's x).
+  template <class Deviation>
+  Hats& scaled(Deviation deviation) {
+    for (const double x : knots_) size_.push_back(deviation(x));
+    return *this;
+  }
 
-  /// Sum of the unknowns u weighed at x.
+  /// The unknowns u between the knots around x, in their deviations.
   template <class S>
   S at(const S& x, const std::vector<S>& u) const {
     const double v = value(x);
-    if (v <= knots_.front()) return u[first_];
-    if (v >= knots_.back()) return u[first_ + knots_.size() - 1];
+    if (v <= knots_.front()) return u[first_] * size_.front();
+    if (v >= knots_.back()) return u[first_ + knots_.size() - 1] * size_.back();
     std::size_t k = 0;
     while (v >= knots_[k + 1]) ++k;
-    const S t = (x - S(knots_[k])) * (1 / (knots_[k + 1] - knots_[k]));
-    return u[first_ + k] + t * (u[first_ + k + 1] - u[first_ + k]);
+    const S t = (x - S(knots_[k])) * (1 / (knots_[k + 1] - knots_[k])), low = u[first_ + k] * size_[k];
+    return low + t * (u[first_ + k + 1] * size_[k + 1] - low);
   }
 
  private:
@@ -45,7 +52,7 @@ class Hats {
     if constexpr (model::Dual<S>) return x.a;
     else return x;
   }
-  std::vector<double> knots_;
+  std::vector<double> knots_, size_;
   std::size_t first_ = 0;
 };
 
@@ -58,21 +65,21 @@ class Calibration {
   /// Applies the unknowns to the tables at a soc.
   template <class S>
   void adjust(model::TablePoint<S>& at, const S& soc, const std::vector<S>& u) const {
-    at.ocv_v += ocv_.at(soc, u) * ocv_v_;
+    at.ocv_v += ocv_.at(soc, u);
     for (const Corner& c : corners_) {
       const double apart = (value(soc) - c.soc) / c.width;
       if (apart <= -1 || apart >= 1) continue;
       const S t = (soc - S(c.soc)) * (1 / c.width);
       at.ocv_v += u[c.unknown] * (c.deviation_v * (apart < 0 ? S(1) + t : S(1) - t));
     }
-    at.r0_ohm *= S(1) + r0_.at(soc, u) * r0_fraction_;
-    at.r1_ohm *= S(1) + r1_.at(soc, u) * r1_fraction_;
-    at.c1_f *= S(1) + c1_.at(soc, u) * c1_fraction_;
+    at.r0_ohm *= S(1) + r0_.at(soc, u);
+    at.r1_ohm *= S(1) + r1_.at(soc, u);
+    at.c1_f *= S(1) + c1_.at(soc, u);
   }
   /// Error of the current's zero.
   template <class S>
   S offset_a(std::size_t record, double time_s, const std::vector<S>& u) const {
-    return offset_[record].at(S(time_s), u) * offset_a_;
+    return offset_[record].at(S(time_s), u);
   }
   template <class S>
   S initial_soc_shift(std::size_t record, const std::vector<S>& u) const {
@@ -106,7 +113,7 @@ class Calibration {
   std::vector<std::size_t> initial_soc_;
   std::vector<double> initial_soc_sigma_;
   std::size_t capacity_ = 0, gain_ = 0, size_ = 0;
-  double ocv_v_ = 0, r0_fraction_ = 0, r1_fraction_ = 0, c1_fraction_ = 0, offset_a_ = 0;
+  double offset_a_ = 0;
 };
 
 }  // namespace bms::diagnosis

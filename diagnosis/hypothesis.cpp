@@ -31,6 +31,9 @@ constexpr double edge_jitter = 0.05;
 /// How much of resistance_fraction differs from one step of the current to the next.
 constexpr double edge_error = 0.4;
 
+/// Error along the soc of the OCV table, as a share of what the start may be off; and how far around the counted soc its slope is taken.
+constexpr double soc_error_share = 0.3, slope_reach = 0.01;
+
 constexpr double log_prior_width = 1;  // of a shape: a factor of e between its usual and an unusual value
 
 }  // namespace
@@ -91,18 +94,21 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
     if (r.size() < 2) throw std::invalid_argument("a recording of less than two rows");
     samples_ += r.size();
     std::vector<char>& usable = usable_.emplace_back(r.size(), 1);
-    std::vector<double>& jitter = jitter_v2_.emplace_back(r.size(), 0.0);
-    std::vector<double>& edge = edge_v2_.emplace_back(r.size(), 0.0);
-    double known_a = 0;
+    RowNoise& more = row_noise_.emplace_back(r.size());
+    const double soc_error = soc_error_share * r.initial_soc_sigma, r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
+    double known_a = 0, soc = r.initial_soc;
+    std::uint8_t interval = 0;
+    const auto ocv_v = [&](double at) { return model::look_up(tables_, at, interval).ocv_v; };
     for (std::size_t k = 0; k < r.size(); ++k) {
       if (!std::isfinite(r.voltage_v[k])) usable[k] = 0;
       if (k == 0 && !(std::abs(r.current_a[k]) < 0.01 * cell_.capacity_ah)) usable[k] = 0;  // what flowed before is not known
       const double step_a = std::isfinite(r.current_a[k]) && k > 0 ? r.current_a[k] - known_a : 0;
       if (std::isfinite(r.current_a[k])) known_a = r.current_a[k];
-      const double r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
-      jitter[k] = std::pow(edge_jitter * r0_ohm * step_a, 2);
-      if (k > 0) jitter[k - 1] = std::max(jitter[k - 1], jitter[k]);
-      edge[k] = std::pow(edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
+      more.white_v2[k] = std::pow(edge_jitter * r0_ohm * step_a, 2);
+      if (k > 0) more.white_v2[k - 1] = std::max(more.white_v2[k - 1], more.white_v2[k]);
+      more.edge_v2[k] = std::pow(edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
+      if (k > 0) soc = std::clamp(soc + known_a * (r.time_s[k] - r.time_s[k - 1]) / (3'600 * cell_.capacity_ah), 0.0, 1.0);
+      more.slow_v2[k] = std::pow(soc_error * (ocv_v(soc + slope_reach) - ocv_v(soc - slope_reach)) / (2 * slope_reach), 2);
     }
   }
   set_noise(noise);
@@ -110,7 +116,7 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
 
 std::vector<Whitener> Evidence::whiteners_for(const NoiseModel& noise) const {
   std::vector<Whitener> made;
-  for (std::size_t r = 0; r < records_.size(); ++r) made.emplace_back(noise, records_[r].time_s, jitter_v2_[r], edge_v2_[r], usable_[r]);
+  for (std::size_t r = 0; r < records_.size(); ++r) made.emplace_back(noise, records_[r].time_s, row_noise_[r], usable_[r]);
   return made;
 }
 

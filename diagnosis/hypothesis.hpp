@@ -119,8 +119,7 @@ class Evidence {
   std::vector<Whitener> whiteners_for(const NoiseModel& noise) const;
   void whiten(Columns& columns, const std::vector<Whitener>& by) const;
   std::vector<std::vector<char>> usable_;
-  std::vector<std::vector<double>> jitter_v2_;  ///< variance of readings beside a step of the current
-  std::vector<std::vector<double>> edge_v2_;    ///< variance of the error that a step of the current brings
+  std::vector<RowNoise> row_noise_;
   std::size_t samples_ = 0;
   mutable std::shared_ptr<const Linear> base_linear_;
 };

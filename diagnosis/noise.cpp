@@ -10,7 +10,7 @@ double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
   return of(n.white_v / nominal.white_v) + of(n.fast_v / nominal.fast_v) + of(n.slow_v / nominal.slow_v) + of(n.edge / nominal.edge);
 }
 
-Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const double> more_fast_v2, std::span<const char> usable) : gains_(time_s.size()) {
+Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows, std::span<const char> usable) : gains_(time_s.size()) {
   double ff = n.fast_v * n.fast_v, ss = n.slow_v * n.slow_v, fs = 0;  // covariance of (fast, slow), stationary at first
   const double fast_v2 = ff, slow_v2 = ss;
   double last_s = -1, fast_left = 1, slow_left = 1;
@@ -22,11 +22,12 @@ Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, std::spa
       fast_left = std::exp(-to_next_s / n.fast_s);
       slow_left = std::exp(-to_next_s / n.slow_s);
     }
-    g = {0, 0, fast_left, slow_left, 0};
-    ff += n.edge * n.edge * more_fast_v2[k];
+    const double size = std::sqrt(1 + rows.slow_v2[k] / slow_v2);
+    g = {0, 0, fast_left, slow_left, size, 0};
+    ff += n.edge * n.edge * rows.edge_v2[k];
     if (usable[k] != 0) {
-      const double variance = ff + 2 * fs + ss + n.white_v * n.white_v + n.edge * n.edge * more_white_v2[k];
-      const double with_fast = ff + fs, with_slow = fs + ss;
+      const double with_fast = ff + size * fs, with_slow = fs + size * ss;
+      const double variance = with_fast + size * with_slow + n.white_v * n.white_v + n.edge * n.edge * rows.white_v2[k];
       g.fast = with_fast / variance;
       g.slow = with_slow / variance;
       g.weight = 1 / std::sqrt(variance);
@@ -48,7 +49,7 @@ void Whitener::whiten(Eigen::Ref<Columns> columns) const {
     for (std::size_t k = 0; k < gains_.size(); ++k) {
       const Gain& g = gains_[k];
       double& value = columns(static_cast<Eigen::Index>(k), 0);
-      const double news = g.weight > 0 ? value - fast - slow : 0;
+      const double news = g.weight > 0 ? value - fast - g.slow_size * slow : 0;
       fast = g.fast_left * (fast + g.fast * news);
       slow = g.slow_left * (slow + g.slow * news);
       value = g.weight * news;
@@ -60,7 +61,7 @@ void Whitener::whiten(Eigen::Ref<Columns> columns) const {
     const Gain& g = gains_[k];
     auto row = columns.row(static_cast<Eigen::Index>(k));
     if (g.weight > 0) {
-      news = row - fast - slow;
+      news = row - fast - g.slow_size * slow;
       fast = g.fast_left * (fast + g.fast * news);
       slow = g.slow_left * (slow + g.slow * news);
       row = g.weight * news;
@@ -81,7 +82,10 @@ double quantisation_step(std::span<const double> values) {
   if (steps.size() < 20) return 0;
   const auto low = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 50);
   std::nth_element(steps.begin(), low, steps.end());
-  return *low;
+  // a converter's steps are multiples of one; those of a reading that sticks until it leaps are not
+  const double step = *low;
+  const auto multiples = std::count_if(steps.begin(), steps.end(), [&](double s) { return std::abs(s / step - std::round(s / step)) < 0.1; });
+  return 2 * static_cast<std::size_t>(multiples) > steps.size() ? step : 0;
 }
 
 double white_noise(std::span<const double> v, std::span<const double> i, double quiet_a, double fallback_v) {

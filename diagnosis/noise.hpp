@@ -2,7 +2,8 @@
 //
 //   residual = white + fast + slow        white: new in every sample; fast, slow: Ornstein-Uhlenbeck, each with its own memory
 //
-// A step of the current brings a new error with it (a resistance that is good to some per cent): the fast part is widened there.
+// A step of the current brings a new error with it (a resistance that is good to some per cent): the fast part is widened there. Where
+// the OCV is steep the slow part is: what is known of soc to some tenths of a per cent is not known of the voltage to a millivolt.
 //
 // The white part alone would take every slow drift for physics; residuals of a drift are white from sample to sample and still
 // wrong for hours. The filter is the Kalman filter of the two slow parts: what it does not foresee, over how well it can know,
@@ -24,6 +25,15 @@ struct NoiseModel {
   bool operator==(const NoiseModel&) const = default;
 };
 
+/// What comes on top of it row by row, variances.
+struct RowNoise {
+  std::vector<double> white_v2;  ///< added to the white part
+  std::vector<double> edge_v2;   ///< what the fast part gains at a step of the current, before NoiseModel::edge
+  std::vector<double> slow_v2;   ///< added to the slow part: where the OCV is steep, a small error of soc is a large one of the voltage
+
+  explicit RowNoise(std::size_t rows = 0) : white_v2(rows, 0.0), edge_v2(rows, 0.0), slow_v2(rows, 0.0) {}
+};
+
 /// What it costs a hypothesis, in -2 log likelihood, that its residual is larger than the nominal noise: 0 where it is not. A factor
 /// of 2 costs 21, of 4 85, of 10 240: small against a gross mismatch, large against chance.
 double price_of_noise(const NoiseModel& noise, const NoiseModel& nominal);
@@ -33,8 +43,8 @@ using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Row
 
 class Whitener {
  public:
-  /// Row by row: white variance to add, variance that the fast part gains; usable[k] == 0: no voltage in row k.
-  Whitener(const NoiseModel& noise, std::span<const double> time_s, std::span<const double> more_white_v2, std::span<const double> more_fast_v2, std::span<const char> usable);
+  /// As many rows as time_s has.
+  Whitener(const NoiseModel& noise, std::span<const double> time_s, const RowNoise& rows, std::span<const char> usable);
 
   /// In place, rows first .. first + size of columns.
   void whiten(Eigen::Ref<Columns> columns) const;
@@ -47,6 +57,7 @@ class Whitener {
   struct Gain {
     double fast, slow;           ///< of the filter
     double fast_left, slow_left; ///< what remains of each until the next row
+    double slow_size;            ///< the slow part in units of its deviation far from any slope
     double weight;               ///< 1 / standard deviation of what is not foreseen; 0: row not used
   };
   std::vector<Gain> gains_;
@@ -58,7 +69,7 @@ class Whitener {
 /// quiet_a: how far the current may move. Returns fallback_v when there are too few such rows.
 double white_noise(std::span<const double> voltage_v, std::span<const double> current_a, double quiet_a, double fallback_v);
 
-/// Smallest step between two different readings that occurs often; 0: none found.
+/// Smallest step between two different readings that occurs often, where most others are multiples of it; 0: none found.
 double quantisation_step(std::span<const double> values);
 
 }  // namespace bms::diagnosis

@@ -11,7 +11,8 @@ namespace bms::diagnosis {
 namespace {
 
 struct Drawn {
-  std::vector<double> time_s, more_v2, edge_v2;
+  std::vector<double> time_s;
+  RowNoise rows;
   std::vector<char> usable;
   Columns residual;
 };
@@ -19,7 +20,7 @@ struct Drawn {
 /// Noise exactly as the model has it.
 Drawn drawn(const NoiseModel& n, std::size_t samples, std::uint64_t seed) {
   truth::Random random(seed);
-  Drawn d{{}, std::vector<double>(samples, 0), std::vector<double>(samples, 0), std::vector<char>(samples, 1), Columns(static_cast<Eigen::Index>(samples), 1)};
+  Drawn d{{}, RowNoise(samples), std::vector<char>(samples, 1), Columns(static_cast<Eigen::Index>(samples), 1)};
   double fast = n.fast_v * random.normal(), slow = n.slow_v * random.normal(), t = 0;
   for (std::size_t k = 0; k < samples; ++k) {
     const double dt = k % 7 == 0 ? 3 : 1;
@@ -37,7 +38,7 @@ TEST(Whitener, MakesItsOwnNoiseWhite) {
   const NoiseModel n{.white_v = 0.001, .fast_v = 0.003, .fast_s = 60, .slow_v = 0.005, .slow_s = 3'600};
   Drawn d = drawn(n, 40'000, 1);
   d.usable[100] = 0;
-  const Whitener whitener(n, d.time_s, d.more_v2, d.edge_v2, d.usable);
+  const Whitener whitener(n, d.time_s, d.rows, d.usable);
   whitener.whiten(d.residual);
   const Eigen::VectorXd w = d.residual.col(0);
   EXPECT_EQ(w[100], 0);
@@ -55,9 +56,23 @@ TEST(Whitener, ASlowDriftIsWorthFewSamplesAndAStepMany) {
     columns(k, 0) = 0.001;
     columns(k, 1) = k / 30 % 2 == 0 ? 0.001 : -0.001;
   }
-  Whitener(n, d.time_s, d.more_v2, d.edge_v2, d.usable).whiten(columns);
+  Whitener(n, d.time_s, d.rows, d.usable).whiten(columns);
   EXPECT_LT(columns.col(0).squaredNorm(), 30);
   EXPECT_GT(columns.col(1).squaredNorm(), 1'000);
+}
+
+TEST(Whitener, WhereTheOcvPlungesALargeErrorIsLittle) {
+  NoiseModel n;
+  const std::size_t samples = 2'000;
+  Drawn d = drawn(n, samples, 4);
+  Columns jump = Columns::Zero(static_cast<Eigen::Index>(samples), 1);
+  for (Eigen::Index k = 1'000; k < 2'000; ++k) jump(k, 0) = 0.02;
+  Columns steep = jump;
+  Whitener(n, d.time_s, d.rows, d.usable).whiten(jump);
+  for (std::size_t k = 1'000; k < samples; ++k) d.rows.slow_v2[k] = 0.02 * 0.02;
+  Whitener(n, d.time_s, d.rows, d.usable).whiten(steep);
+  EXPECT_GT(jump.squaredNorm(), 100);
+  EXPECT_LT(steep.squaredNorm(), 10);
 }
 
 TEST(WhiteNoise, IsReadWhereTheCurrentIsQuiet) {
