@@ -1,19 +1,38 @@
-// The concealed benchmark: every case of a split through the diagnosis, the score, and what each case came to.
+// The concealed benchmark: every case of a split through the diagnosis and through simpler rules, a line per case, then the tables.
 //
-//   benchmark development|final SEED [FIRST [COUNT]]
+//   0 done; 2 bad usage; 3 a fault of ours
 #include <atomic>
-#include <cstdlib>
+#include <cstdio>
+#include <exception>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
-#include "benchmark/run_case.hpp"
-#include "benchmark/score.hpp"
+#include "benchmark/baselines.hpp"
+#include "benchmark/tables.hpp"
+#include "host_sim/bad_input.hpp"
+#include "host_sim/committed_figures.hpp"
+#include "host_sim/text_file.hpp"
 
 namespace {
+
+using bms::benchmark::Column;
+using bms::benchmark::Outcome;
+
+struct Options {
+  std::string split;
+  std::uint64_t seed = 1;
+  std::size_t first = 0;
+  std::optional<std::size_t> count;
+  bool no_baselines = false;
+  std::string json, readme;
+};
 
 std::string joined(const std::vector<std::string>& ids, const char* by) {
   std::string text;
@@ -21,40 +40,91 @@ std::string joined(const std::vector<std::string>& ids, const char* by) {
   return text;
 }
 
-std::string share(const bms::benchmark::Share& s) { return fmt::format("{:5.1f} % ({} of {})", 100 * s.value(), s.hits, s.of); }
+std::string line_of(std::size_t index, const Outcome& o) {
+  std::string found;
+  for (const auto& set : o.sets) found += (found.empty() ? "" : " + ") + joined(set, "~");
+  return fmt::format("{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n", index, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength,
+                     o.answer.profile, bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v, 1e3 * o.holdout_floor_v, o.wall_s, o.figures);
+}
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  if (argc < 3) {
-    fmt::print(stderr, "usage: benchmark development|final SEED [FIRST [COUNT]]\n");
-    return 2;
+std::string json_of(const Options& options, const std::vector<Column>& columns) {
+  using Json = nlohmann::ordered_json;
+  Json json;
+  json["split"] = options.split;
+  json["seed"] = options.seed;
+  json["first"] = options.first;
+  for (const Column& c : columns) {
+    Json& list = json["methods"][c.method] = Json::array();
+    for (const Outcome& o : c.outcomes) {
+      list.push_back({{"kind", o.answer.kind}, {"ids", o.answer.ids}, {"strength", o.answer.strength}, {"profile", o.answer.profile}, {"verdict", bms::diagnosis::name_of(o.verdict)},
+                      {"found", o.found}, {"sets", o.sets}, {"probability", o.probability}, {"overlap", o.overlap}, {"holdout_before_v", o.holdout_before_v},
+                      {"holdout_after_v", o.holdout_after_v}, {"holdout_floor_v", o.holdout_floor_v}, {"wall_s", o.wall_s}, {"figures", o.figures}});
+    }
   }
-  const truth::Split split = std::string(argv[1]) == "final" ? truth::Split::final : truth::Split::development;
-  const auto seed = static_cast<std::uint64_t>(std::strtoull(argv[2], nullptr, 10));
-  const std::size_t first = argc > 3 ? std::strtoul(argv[3], nullptr, 10) : 0;
-  const std::size_t count = argc > 4 ? std::strtoul(argv[4], nullptr, 10) : truth::case_count(split) - first;
-  std::vector<bms::benchmark::Outcome> outcomes(count);
+  return json.dump(1) + "\n";
+}
+
+void run(const Options& options) {
+  const truth::Split split = options.split == "final" ? truth::Split::final : truth::Split::development;
+  const std::size_t cases = truth::case_count(split);
+  if (options.first >= cases) throw bms::BadInput("--first", 1, fmt::format("there are {} cases", cases));
+  const std::size_t count = std::min(options.count.value_or(cases), cases - options.first);
+  // a run takes long: is there a place for its tables?
+  if (!options.readme.empty()) bms::CommittedFigures(options.readme, options.split);
+
+  std::vector<Column> columns;
+  for (const auto& method : bms::benchmark::methods) {
+    columns.push_back({method.name, std::vector<Outcome>(count)});
+    if (options.no_baselines) break;
+  }
   std::atomic<std::size_t> next = 0;
   std::mutex printing;
   const auto work = [&] {
     for (std::size_t k = next++; k < count; k = next++) {
-      outcomes[k] = bms::benchmark::run_case(truth::make_case(split, seed, first + k));
-      const auto& o = outcomes[k];
-      std::string found;
-      for (const auto& set : o.sets) found += (found.empty() ? "" : " + ") + joined(set, "~");
+      const truth::Case c = truth::make_case(split, options.seed, options.first + k);
+      for (std::size_t m = 0; m < columns.size(); ++m) columns[m].outcomes[k] = bms::benchmark::methods[m].run(c);
       const std::scoped_lock lock(printing);
-      fmt::print("{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n", first + k, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength,
-                 o.answer.profile, bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v, 1e3 * o.holdout_floor_v, o.wall_s, o.figures);
+      fmt::print("{}", line_of(options.first + k, columns.front().outcomes[k]));
       std::fflush(stdout);
     }
   };
   std::vector<std::thread> threads;
   for (unsigned k = 0; k < std::max(1U, std::thread::hardware_concurrency()); ++k) threads.emplace_back(work);
   for (std::thread& t : threads) t.join();
-  const auto s = bms::benchmark::score(outcomes);
-  fmt::print("false alarms on nulls        {}\ndetected at twice the limit  {}\n  at any strength            {}\nright first                  {}\nright class first            {}\ntruth in the set             {}\nmean set size                {:.2f}\n"
-             "pairs: both                  {}\npairs: one and none wrong    {}\noutside: unknown             {}\ndata faults                  {}\nhold-out                     {}\noverlap, median              {:.2f}\ncalibration error            {:.3f}\nseconds a case               {:.1f}\n",
-             share(s.false_alarms), share(s.detected), share(s.detected_all), share(s.first), share(s.first_class), share(s.in_set), s.mean_set_size, share(s.pair_both), share(s.pair_one_none_wrong), share(s.outside_unknown),
-             share(s.data_fault), share(s.holdout), s.median_overlap, s.calibration_error, s.mean_wall_s);
+
+  const std::string report = bms::benchmark::report(options.split, options.seed, columns);
+  fmt::print("\n{}", report);
+  if (!options.json.empty()) bms::write_file(options.json, json_of(options, columns));
+  if (!options.readme.empty()) bms::replace_figures(options.readme, options.split, report);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"The diagnosis and simpler rules on concealed cases, scored by what was concealed"};
+  app.name("benchmark");
+  app.footer("Example: benchmark development 1 --readme benchmark/README.md");
+  Options o;
+  app.add_option("split", o.split, "development: cases to look at; final: cases to count once")->required()->check(CLI::IsMember({"development", "final"}));
+  app.add_option("seed", o.seed, "of the cases")->required()->type_name("SEED");
+  app.add_option("--first", o.first, "first case")->capture_default_str();
+  app.add_option("--count", o.count, "how many; without it all that are left")->check(CLI::PositiveNumber);
+  app.add_flag("--no-baselines", o.no_baselines, "the diagnosis alone");
+  app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
+  app.add_option("--readme", o.readme, "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")->type_name("FILE");
+  try {
+    app.parse(argc, argv);
+    run(o);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    fmt::print(stderr, "benchmark: {} (see --help)\n", error.what());
+    return 2;
+  } catch (const bms::BadInput& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "benchmark: {}\n", error.what());
+    return 3;
+  }
 }

@@ -10,10 +10,6 @@ namespace bms::benchmark {
 
 namespace {
 
-diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma) {
-  return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true};
-}
-
 double rmse(const std::vector<double>& predicted, const std::vector<double>& measured) {
   double sum = 0;
   for (std::size_t k = 0; k < predicted.size(); ++k) sum += (predicted[k] - measured[k]) * (predicted[k] - measured[k]);
@@ -50,6 +46,21 @@ model::CellParameters<> cell_of(const truth::CalibratedCell& c) {
   return p;
 }
 
+diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma) {
+  return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true};
+}
+
+void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& spans, const std::vector<double>& holdout_v) {
+  if (!holdout_v.empty()) {
+    const model::CellParameters<> cell = cell_of(c.cell);
+    o.holdout_before_v = rmse(diagnosis::predict(cell, {}, record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc)), c.holdout.voltage_v);
+    o.holdout_after_v = rmse(holdout_v, c.holdout.voltage_v);
+  }
+  o.overlap = overlap(spans, c.answer.start_s, c.answer.end_s);
+  o.holdout_floor_v = std::sqrt(std::pow(c.answer.noise_floor_v, 2) + std::pow(c.cell.ocv_tolerance_v, 2) + std::pow(c.cell.drift_tolerance_v, 2));
+  o.answer = c.answer;
+}
+
 Outcome run_case(const truth::Case& c) {
   const model::CellParameters<> cell = cell_of(c.cell);
   const auto begin = std::chrono::steady_clock::now();
@@ -72,15 +83,11 @@ Outcome run_case(const truth::Case& c) {
   }
   if (d.findings.empty() && !d.candidates.empty()) o.figures += fmt::format(" | nearest {} {:.1f}", id(d.candidates.front().ids.front()), d.candidates.front().gain);
 
+  std::vector<double> holdout_v;
   if (!c.holdout.time_s.empty()) {
-    const auto later = diagnosis::later_recording(d.extended);
-    const diagnosis::Record h = record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc);
-    o.holdout_before_v = rmse(diagnosis::predict(cell, {}, h), h.voltage_v);
-    o.holdout_after_v = rmse(diagnosis::predict(cell, later, h), h.voltage_v);
+    holdout_v = diagnosis::predict(cell, diagnosis::later_recording(d.extended), record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
-  o.overlap = overlap(d.spans, c.answer.start_s, c.answer.end_s);
-  o.holdout_floor_v = std::sqrt(std::pow(c.answer.noise_floor_v, 2) + std::pow(c.cell.ocv_tolerance_v, 2) + std::pow(c.cell.drift_tolerance_v, 2));
-  o.answer = c.answer;
+  compare(o, c, d.spans, holdout_v);
   return o;
 }
 

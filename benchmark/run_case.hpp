@@ -27,6 +27,13 @@ struct Outcome {
 /// The cell file that a case comes with, as the tool would read it.
 model::CellParameters<> cell_of(const truth::CalibratedCell& cell);
 
+diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma);
+
+/// Copies the answer and measures by it what was said; only when all has been said. spans: where; holdout_v: predicted for the
+/// hold-out, row by row; empty: there is none.
+void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& spans, const std::vector<double>& holdout_v);
+
+/// Our diagnosis.
 Outcome run_case(const truth::Case& c);
 
 }  // namespace bms::benchmark

@@ -12,6 +12,14 @@ bool contains(const std::vector<std::string>& list, const std::string& id) { ret
 
 }  // namespace
 
+Interval wilson(const Share& share) {
+  if (share.of == 0) return {};
+  constexpr double z2 = 1.96 * 1.96;
+  const auto n = static_cast<double>(share.of);
+  const double p = share.value(), middle = (p + z2 / (2 * n)) / (1 + z2 / n), half = std::sqrt(z2 * (p * (1 - p) / n + z2 / (4 * n * n))) / (1 + z2 / n);
+  return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
+}
+
 std::string class_of(const std::string& id) {
   if (id == "voltage_gain") return "voltage_offset";
   if (id == "coulombic_loss" || id == "leakage") return "current_offset";
@@ -79,6 +87,7 @@ Score score(const std::vector<Outcome>& outcomes) {
       b.said += o.probability;
       b.right += o.answer.kind == "single" && o.found.front() == ids.front() ? 1 : 0;
       b.count += 1;
+      ++s.named;
     }
   }
   double all = 0;

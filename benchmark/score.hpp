@@ -15,8 +15,15 @@ struct Share {
   double value() const { return of == 0 ? 0 : static_cast<double>(hits) / static_cast<double>(of); }
 };
 
+/// Wilson's 95 % interval of a share, 0..1; (0, 1) of nothing. (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927.)
+struct Interval {
+  double low = 0, high = 1;
+};
+Interval wilson(const Share& share);
+
 struct Score {
   Share false_alarms, detected, detected_all, first, first_class, in_set, pair_both, pair_one_none_wrong, outside_unknown, data_fault, holdout;
+  std::size_t named = 0;              ///< cases that the calibration error is of
   double mean_set_size = 0, median_overlap = 0, calibration_error = 0, mean_wall_s = 0;
 };
 

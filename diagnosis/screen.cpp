@@ -104,6 +104,26 @@ std::optional<double> rail_a(const Evidence& evidence) {
 
 }  // namespace
 
+std::vector<MechanismSetting> probe_settings(const Evidence& evidence, std::size_t mechanism) {
+  const double capacity_ah = evidence.cell().capacity_ah;
+  const model::MechanismInfo& info = catalogue[mechanism];
+  std::vector<double> shapes = shape_grid(info.id, capacity_ah);
+  const bool shaped = !shapes.empty();
+  if (!shaped) shapes = {0};
+  std::vector<MechanismSetting> settings;
+  for (const double shape : shapes) {
+    MechanismSetting& setting = settings.emplace_back(model::unsaid(mechanism, capacity_ah));
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      const model::Parameter& parameter = info.parameter[k];
+      if (parameter.role == Role::shape && shaped) setting.value[k] = shape;
+      if (parameter.role == Role::strength && parameter.low >= 0) setting.value[k] = 1e-6 * parameter.upper(capacity_ah);
+      if (info.id == "ocv_hysteresis" && k == 0) setting.value[k] = probing_share * parameter.upper(capacity_ah);
+      if (info.id == "current_clipping" && parameter.name == "limit_a") setting.value[k] = rail_a(evidence).value_or(setting.value[k]);
+    }
+  }
+  return settings;
+}
+
 std::optional<std::string> not_testable(const Evidence& evidence, const Hypothesis& given, std::size_t mechanism) {
   const Excitation x = excitation_of(evidence);
   const std::string_view id = catalogue[mechanism].id;
@@ -165,20 +185,12 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     if (h.find(mechanism) != nullptr || not_testable(evidence, h, mechanism)) continue;
     const model::MechanismInfo& info = catalogue[mechanism];
     if (info.id == "contact_intermittent" || info.id == "contact_step") continue;  // below
-    std::vector<double> shapes = shape_grid(info.id, capacity_ah);
-    const bool shaped = !shapes.empty();
-    if (!shaped) shapes = {0};
-    for (const double shape : shapes) {
-      Hypothesis probe = with(h, mechanism, capacity_ah);
-      MechanismSetting& setting = probe.settings.back();
+    for (const MechanismSetting& setting : probe_settings(evidence, mechanism)) {
+      const Hypothesis probe = with(h, setting);
       Probe p;
       std::vector<Sought> by;
       for (std::size_t k = 0; k < info.parameters; ++k) {
         const model::Parameter& parameter = info.parameter[k];
-        if (parameter.role == Role::shape && shaped) setting.value[k] = shape;
-        if (parameter.role == Role::strength && parameter.low >= 0) setting.value[k] = 1e-6 * parameter.upper(capacity_ah);
-        if (info.id == "ocv_hysteresis" && k == 0) setting.value[k] = probing_share * parameter.upper(capacity_ah);
-        if (info.id == "current_clipping" && parameter.name == "limit_a") setting.value[k] = *rail_a(evidence);
         const bool place = parameter.role == Role::place && info.id == "ocv_hysteresis";
         if (parameter.role == Role::strength || place) {
           p.parameters.push_back(k);

@@ -22,6 +22,9 @@ struct Candidate {
   double limit = 0;                ///< of its first strength, in its unit; 0: not estimated
 };
 
+/// Settings at which the signature of a testable mechanism is taken: every shape of its grid, strengths just off a bound at 0.
+std::vector<MechanismSetting> probe_settings(const Evidence& evidence, std::size_t mechanism);
+
 /// Why a mechanism cannot be judged by these recordings beside those given, or nothing.
 std::optional<std::string> not_testable(const Evidence& evidence, const Hypothesis& given, std::size_t mechanism);
 

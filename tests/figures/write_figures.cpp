@@ -14,6 +14,7 @@
 
 #include "host_sim/cell_file.hpp"
 #include "host_sim/child_process.hpp"
+#include "host_sim/committed_figures.hpp"
 #include "host_sim/emulator.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/recording.hpp"
@@ -22,7 +23,6 @@
 #include "host_sim/study.hpp"
 #include "host_sim/text_file.hpp"
 #include "identification/identify.hpp"
-#include "tests/figures/committed_figures.hpp"
 #include "tests/firmware/step_cost.hpp"
 
 namespace bms {

@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include "host_sim/cell_file.hpp"
+#include "host_sim/committed_figures.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/recording.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/text_file.hpp"
-#include "tests/figures/committed_figures.hpp"
 #include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/slcan_board.hpp"
 #include "tests/firmware/step_cost.hpp"

@@ -1,4 +1,4 @@
-#include "tests/figures/committed_figures.hpp"
+#include "host_sim/committed_figures.hpp"
 
 #include <cstdlib>
 #include <sstream>

@@ -1,0 +1,137 @@
+// Every baseline does what its name says, on some cases of the development split.
+#include "benchmark/baselines.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "benchmark/score.hpp"
+#include "benchmark/tables.hpp"
+#include "host_sim/committed_figures.hpp"
+#include "host_sim/text_file.hpp"
+
+namespace bms::benchmark {
+namespace {
+
+using diagnosis::Verdict;
+using testing::HasSubstr;
+
+constexpr auto split = truth::Split::development;
+
+/// Six cases with nothing to find, made once; of each the first two hours or so, which is enough and quicker.
+const std::vector<truth::Case>& nulls() {
+  static const std::vector<truth::Case> made = [] {
+    std::vector<truth::Case> chosen;
+    for (std::size_t k = 0; chosen.size() < 6 && k < truth::case_count(split); ++k) {
+      truth::Case c = truth::make_case(split, 1, k);
+      if (c.answer.kind != "null") continue;
+      for (auto* column : {&c.recording.time_s, &c.recording.current_a, &c.recording.voltage_v, &c.recording.temperature_c, &c.recording.soc}) column->resize(std::min<std::size_t>(column->size(), 8'000));
+      chosen.push_back(std::move(c));
+    }
+    return chosen;
+  }();
+  return made;
+}
+
+/// A plain large resistance growth.
+const truth::Case& grown() {
+  static const truth::Case made = truth::make_case(split, 1, 39);
+  EXPECT_EQ(made.answer.ids, std::vector<std::string>{"resistance_growth"});
+  EXPECT_GT(made.answer.strength, 4);
+  return made;
+}
+
+TEST(Baselines, AWhiteLikelihoodFindsCausesInHealthyCells) {
+  std::size_t named = 0;
+  for (const truth::Case& c : nulls()) {
+    const Outcome o = aicc_forward(c);
+    named += o.found.empty() ? 0 : 1;
+    EXPECT_EQ(o.answer.kind, "null");
+    EXPECT_LE(o.found.size(), 5U);
+    EXPECT_EQ(o.found.size(), o.sets.size());
+  }
+  EXPECT_GE(named, 4U);
+}
+
+TEST(Baselines, TheFrozenModelTellsALargeEffectAndNamesNothing) {
+  const Outcome o = frozen_model(grown());
+  EXPECT_EQ(o.verdict, Verdict::unknown);
+  EXPECT_TRUE(o.found.empty());
+  EXPECT_EQ(o.holdout_before_v, o.holdout_after_v);
+  EXPECT_GT(o.holdout_floor_v, 0);
+  std::size_t alarms = 0;
+  for (const truth::Case& c : nulls()) alarms += frozen_model(c).verdict != Verdict::no_mismatch ? 1 : 0;
+  EXPECT_LE(alarms, 2U);
+}
+
+TEST(Baselines, AFreeRefitTakesALargeResistanceIntoItsTablesAndTheHoldoutHasIt) {
+  const Outcome held = base_refit(grown()), o = free_refit(grown());
+  EXPECT_TRUE(o.found.empty());
+  EXPECT_LT(o.holdout_after_v, 0.6 * o.holdout_before_v);
+  EXPECT_GT(held.holdout_after_v, o.holdout_after_v) << "the tolerance holds it back";
+}
+
+TEST(Baselines, TheNearestSignatureOfAPlainLargeResistanceIsAResistance) {
+  const Outcome o = nearest_signature(grown());
+  ASSERT_EQ(o.verdict, Verdict::cause);
+  EXPECT_EQ(o.found, std::vector<std::string>{"resistance_growth"});
+  EXPECT_LT(o.holdout_after_v, 0.6 * o.holdout_before_v);
+  for (const truth::Case& c : nulls()) {
+    EXPECT_EQ(nearest_signature(c).verdict == Verdict::no_mismatch, frozen_model(c).verdict == Verdict::no_mismatch) << "one detects as the other";
+  }
+}
+
+TEST(Tables, AWilsonIntervalIsNarrowerForMoreCasesAndInsideZeroToOne) {
+  const Interval none = wilson({0, 36});  // 0 of 36: 0 to 9.6 % (tables of binomial intervals)
+  EXPECT_EQ(none.low, 0);
+  EXPECT_NEAR(none.high, 0.0964, 5e-4);
+  const Interval half = wilson({50, 100});
+  EXPECT_NEAR(half.low, 0.4038, 5e-4);
+  EXPECT_NEAR(half.high, 0.5962, 5e-4);
+  EXPECT_EQ(wilson({0, 0}).high, 1);
+}
+
+Outcome said(const std::string& kind, const std::vector<std::string>& ids, double strength, Verdict verdict, const std::vector<std::string>& found) {
+  Outcome o;
+  o.answer.kind = kind;
+  o.answer.ids = ids;
+  o.answer.strength = strength;
+  o.verdict = verdict;
+  o.found = found;
+  for (const std::string& id : found) o.sets.push_back({id});
+  o.probability = 1;
+  return o;
+}
+
+TEST(Tables, EveryMethodHasItsColumnAndEveryMistakeItsPlace) {
+  const std::vector<Outcome> ours = {said("null", {}, 0, Verdict::no_mismatch, {}), said("single", {"leakage"}, 3, Verdict::cause, {"current_offset"}),
+                                     said("single", {"resistance_growth"}, 5, Verdict::cause, {"contact_step"}), said("outside", {"memory_bump"}, 3, Verdict::unknown, {})};
+  std::vector<Outcome> theirs = ours;
+  theirs[0].verdict = Verdict::unknown;
+  const std::string text = report("development", 7, {{"ours", ours}, {"theirs", theirs}});
+  EXPECT_THAT(text, HasSubstr("development split, seed 7, 4 cases"));
+  EXPECT_THAT(text, HasSubstr("| false alarms on nulls | <= 2 % | 0 of 1: 0 % (0-79) | 1 of 1: 100 % (21-100) |"));
+  EXPECT_THAT(text, HasSubstr("| right class first | >= 90 % | 1 of 2: 50 %"));
+  EXPECT_THAT(text, HasSubstr("| 2 to 4 | 1 of 1")) << "detection by strength";
+  EXPECT_THAT(text, HasSubstr("| resistance_growth | 1 | 0 | contact_step 1 |"));
+  EXPECT_THAT(text, HasSubstr("| current_offset | 1 | 1 |  |")) << "leakage is of its class";
+  EXPECT_THAT(text, HasSubstr("| (outside the catalogue) | 1 | 1 |  |"));
+}
+
+TEST(Tables, AReadmeKeepsWhatStandsAroundThem) {
+  const std::filesystem::path readme = std::filesystem::temp_directory_path() / "bms_benchmark_readme_test.md";
+  const std::string before = "# x\n<!-- figures: development -->\n", after = "<!-- end of figures -->\n<!-- figures: final -->\nNot run yet.\n<!-- end of figures -->\n";
+  write_file(readme, before + "old\n" + after);
+  const std::string text = report("development", 1, {{"ours", {said("null", {}, 0, Verdict::no_mismatch, {})}}});
+  for (int times = 0; times < 2; ++times) {
+    replace_figures(readme, "development", text);
+    EXPECT_EQ(read_file(readme), before + text + after);
+  }
+  EXPECT_THROW(replace_figures(readme, "validation", text), std::runtime_error);
+  std::filesystem::remove(readme);
+}
+
+}  // namespace
+}  // namespace bms::benchmark
