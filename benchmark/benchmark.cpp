@@ -46,6 +46,12 @@ int main(int argc, char** argv) {
       const std::scoped_lock lock(printing);
       fmt::print("{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n", first + k, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength,
                  o.answer.profile, bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v, 1e3 * o.holdout_floor_v, o.wall_s, o.figures);
+      if (o.next) {
+        std::string after;
+        for (const auto& set : o.next->sets) after += (after.empty() ? "" : " + ") + joined(set, "~");
+        fmt::print("{:3} {:10} {:40} next: {} ({:.1f} h, gain {:.0f}, planned in {:.1f} s) -> {}{}\n", first + k, "", joined(o.answer.ids, "+"), o.next->profile.empty() ? "none" : o.next->profile, o.next->duration_s / 3'600,
+                   o.next->expected_gain, o.next->plan_wall_s, after, o.next->separated ? "" : "  NOT SEPARATED");
+      }
       std::fflush(stdout);
     }
   };
@@ -54,7 +60,7 @@ int main(int argc, char** argv) {
   for (std::thread& t : threads) t.join();
   const auto s = bms::benchmark::score(outcomes);
   fmt::print("false alarms on nulls        {}\ndetected at twice the limit  {}\n  at any strength            {}\nright first                  {}\nright class first            {}\ntruth in the set             {}\nmean set size                {:.2f}\n"
-             "pairs: both                  {}\npairs: one and none wrong    {}\noutside: unknown             {}\ndata faults                  {}\nhold-out                     {}\noverlap, median              {:.2f}\ncalibration error            {:.3f}\nseconds a case               {:.1f}\n",
+             "pairs: both                  {}\npairs: one and none wrong    {}\noutside: unknown             {}\ndata faults                  {}\nhold-out                     {}\nseparated by the next one    {}\noverlap, median              {:.2f}\ncalibration error            {:.3f}\nseconds a case               {:.1f}\n",
              share(s.false_alarms), share(s.detected), share(s.detected_all), share(s.first), share(s.first_class), share(s.in_set), s.mean_set_size, share(s.pair_both), share(s.pair_one_none_wrong), share(s.outside_unknown),
-             share(s.data_fault), share(s.holdout), s.median_overlap, s.calibration_error, s.mean_wall_s);
+             share(s.data_fault), share(s.holdout), share(s.separated), s.median_overlap, s.calibration_error, s.mean_wall_s);
 }

@@ -11,7 +11,7 @@ namespace bms::benchmark {
 namespace {
 
 diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma) {
-  return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true};
+  return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true, {}};
 }
 
 double rmse(const std::vector<double>& predicted, const std::vector<double>& measured) {
@@ -80,6 +80,7 @@ Outcome run_case(const truth::Case& c) {
   }
   o.overlap = overlap(d.spans, c.answer.start_s, c.answer.end_s);
   o.holdout_floor_v = std::sqrt(std::pow(c.answer.noise_floor_v, 2) + std::pow(c.cell.ocv_tolerance_v, 2) + std::pow(c.cell.drift_tolerance_v, 2));
+  o.next = follow_up(c, cell, record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc), d);
   o.answer = c.answer;
   return o;
 }

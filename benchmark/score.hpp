@@ -16,7 +16,7 @@ struct Share {
 };
 
 struct Score {
-  Share false_alarms, detected, detected_all, first, first_class, in_set, pair_both, pair_one_none_wrong, outside_unknown, data_fault, holdout;
+  Share false_alarms, detected, detected_all, first, first_class, in_set, pair_both, pair_one_none_wrong, outside_unknown, data_fault, holdout, separated;
   double mean_set_size = 0, median_overlap = 0, calibration_error = 0, mean_wall_s = 0;
 };
 

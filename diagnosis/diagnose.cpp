@@ -55,7 +55,7 @@ double known_before(const Evidence& evidence, const Hypothesis& h) {
 /// RMS of measured less predicted by a hypothesis with the cell file's own base parameters: what an extended cell file will do.
 double plain_error_v(const Evidence& evidence, const Hypothesis& h) {
   const Columns raw = evidence.raw_residual(h, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())));
-  return std::sqrt(raw.squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(evidence.readings())).squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
 }
 
 class Chain {
@@ -397,6 +397,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 
   // findings
   d.extended = current.hypothesis;
+  d.covariance = current.covariance;
+  d.noise = nominal;
   const Contributions parts = contributions(evidence, base, current);
   d.explained_share = parts.explained_share;
   d.unexplained_rmse_v = parts.remaining_rmse_v;
@@ -408,7 +410,12 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     f.setting = *current.hypothesis.find(m);
     f.gain = gains[m];
     double sum = 1;
-    std::vector<std::pair<double, std::size_t>> near;
+    struct Near {
+      double behind;
+      std::size_t mechanism;
+      const Fit* fit;
+    };
+    std::vector<Near> near;
     for (const Fit& rival : rivals[m]) {
       const double behind = chain.score(rival) - chain.score(current);
       std::size_t other = m;
@@ -417,11 +424,13 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       }
       sum += std::exp(-behind / (2 * decision::temper));
       // what goes through the same few numbers of a recording differs by how well its equation fits, not by what was seen
-      if (behind < decision::same || (alike[{m, other}] > decision::inseparable && behind < decision::same_inseparable)) near.emplace_back(behind, other);
+      if (behind < decision::same || (alike[{m, other}] > decision::inseparable && behind < decision::same_inseparable)) near.push_back({behind, other, &rival});
     }
-    std::sort(near.begin(), near.end());
-    for (const auto& [behind, other] : near) {
-      if (std::find(f.equivalent_to.begin(), f.equivalent_to.end(), other) == f.equivalent_to.end()) f.equivalent_to.push_back(other);
+    std::sort(near.begin(), near.end(), [](const Near& a, const Near& b) { return std::pair(a.behind, a.mechanism) < std::pair(b.behind, b.mechanism); });
+    for (const Near& n : near) {
+      if (std::find(f.equivalent_to.begin(), f.equivalent_to.end(), n.mechanism) != f.equivalent_to.end()) continue;
+      f.equivalent_to.push_back(n.mechanism);
+      f.rivals.push_back({n.fit->hypothesis, n.fit->covariance});
     }
     f.probability = 1 / sum;
     f.rms_contribution_v = parts.rms_v.contains(m) ? parts.rms_v.at(m) : 0;

@@ -24,11 +24,18 @@ struct Regime {
   double usual = 0;        ///< share of the time that is spent there
 };
 
+/// A hypothesis with the values found, and how well they are known together: the covariance of what is sought.
+struct Fitted {
+  Hypothesis hypothesis;
+  Eigen::MatrixXd covariance;
+};
+
 struct Finding {
   MechanismSetting setting;                ///< value and deviation
   std::vector<char> at_bound;              ///< by parameter
   double probability = 0;
   std::vector<std::size_t> equivalent_to;  ///< catalogue indices that these recordings cannot tell from it
+  std::vector<Fitted> rivals;              ///< all that was found, with each of equivalent_to in its place
   double gain = 0;                         ///< cost without it less with it
   double rms_contribution_v = 0;
   std::string because;                     ///< why this and not its neighbour
@@ -70,6 +77,8 @@ struct Diagnosis {
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;
   Hypothesis extended;                     ///< the cell's own mechanisms and those found
+  Eigen::MatrixXd covariance;              ///< of what is sought in it
+  NoiseModel noise;                        ///< nominal
   std::vector<RecordView> views;           ///< of each record
   // what the decision was made from
   double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, cross_gain = 0;

@@ -201,6 +201,45 @@ TEST_F(DiagnoseTool, SaysWhereTheStartWasTakenFrom) {
   EXPECT_EQ(told["recordings"][0]["initial_soc"], 0.97);
 }
 
+/// A sensor's offset, which leakage explains as well; then half an hour with the contactor open.
+TEST_F(DiagnoseTool, AsksForTheExperimentThatDecidesAndDecidesByIt) {
+  const std::string now = simulated("now.csv", "current_offset:offset_a=0.15");
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + now);
+  ASSERT_EQ(r["verdict"], "AMBIGUOUS");
+  const json& next = r["next_experiment"];
+  ASSERT_TRUE(next.is_object());
+  EXPECT_EQ(next["separates"].size(), r["mechanisms"][0]["equivalent_to"].size() + 1);
+  EXPECT_THAT(next["why"].get<std::string>(), HasSubstr("To tell "));
+  EXPECT_GT(next["expected_gain"], 7);
+  const std::string profile = next["profile"];
+  ASSERT_EQ(run_tool("experiment " + profile + " --out " + path("p.csv")).exit_code, 0);
+  // what the faulty sensor reads on it
+  std::istringstream lines(content(path("p.csv")));
+  std::ofstream read(path("read.csv"));
+  std::string line;
+  std::getline(lines, line);
+  ASSERT_EQ(line, "time_s,current_a,current_ref_a");
+  read << "time_s,current_a\n";
+  std::vector<std::string> references;
+  while (std::getline(lines, line)) {
+    const std::size_t a = line.find(','), b = line.find(',', a + 1);
+    read << line.substr(0, a) << "," << std::stod(line.substr(a + 1, b - a - 1)) + 0.15 << "\n";
+    references.push_back(line.substr(b));
+  }
+  read.close();
+  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("read.csv") + " --initial-soc 0.95 --with current_offset:offset_a=0.15 --noise-v 0.001 --seed 3 --out " + path("s.csv")).exit_code, 0);
+  std::istringstream rows(content(path("s.csv")));
+  std::ofstream later(path("later.csv"));
+  std::getline(rows, line);
+  later << line << ",current_ref_a\n";
+  for (std::size_t k = 0; std::getline(rows, line); ++k) later << line << references[k] << "\n";
+  later.close();
+  const json both = result("--cell table9 --initial-soc 0.98 --initial-soc 0.95 --recording " + now + " --recording " + path("later.csv"));
+  EXPECT_EQ(both["verdict"], "CAUSE");
+  EXPECT_EQ(both["mechanisms"][0]["id"], "current_offset");
+  EXPECT_TRUE(both["next_experiment"].is_null());
+}
+
 TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
   const std::vector<std::string> wrong = {
       "",
@@ -211,6 +250,7 @@ TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
       "--cell table9 --recording " + shift + " --holdout /no/such/file.csv",
       "--cell table9 --recording " + shift + " --initial-soc 98",
       "--cell table9 --recording " + shift + " --initial-soc nan",
+      "--cell table9 --recording " + shift + " --recording " + shift + " --initial-soc 0.9 --initial-soc 0.8 --initial-soc 0.7",
       "--cell table9 --recording " + made("nine.csv", 9, 1, [](int) { return 0.0; }, [](int) { return 3.3; }),
       "--cell table9 --recording " + shift + " --json - --report -",
   };
