@@ -199,11 +199,12 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
 
 std::string command(const NextExperiment& n) { return fmt::format("bms experiment {} --capacity-ah {:g} --out {}.csv", n.profile, n.capacity_ah, n.profile); }
 
+std::string_view instruction(const NextExperiment& n) { return find_experiment(n.profile)->instruction; }
+
 std::string why(const NextExperiment& n) {
   std::string others;
   for (std::size_t k = 1; k < n.separates.size(); ++k) others += (k == 1 ? "" : k + 1 == n.separates.size() ? " and " : ", ") + std::string(words_of(n.separates[k]).name);
-  const Experiment& e = *find_experiment(n.profile);
-  return fmt::format("To tell {} from {}: {} ({}). {}", words_of(n.separates.front()).name, others, e.description, clock_text(n.duration_s), e.instruction);
+  return fmt::format("To tell {} from {}: {} ({}).", words_of(n.separates.front()).name, others, find_experiment(n.profile)->description, clock_text(n.duration_s));
 }
 
 }  // namespace bms::diagnosis

@@ -33,8 +33,10 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
 /// For the finding that is most in need of one: the strongest that does not stand alone.
 std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& diagnosis, bool temperature);
 
-/// "To tell A from B: run ... (2:30 h). What to do." `why` in one sentence.
+/// One sentence: "To tell A from B: pulses of ... (2:30 h)."
 std::string why(const NextExperiment& next);
+/// What to prepare and what to log.
+std::string_view instruction(const NextExperiment& next);
 /// The command line that writes the profile.
 std::string command(const NextExperiment& next);
 

@@ -425,7 +425,7 @@ const std::vector<Experiment>& experiments() {
        "Open the contactor where the profile has a current_ref_a, log on, and keep that column (0 A) in the recording."},
       {"shunt_check", "charge and discharge at nearly 1C with a trusted ammeter in series, half an hour", shunt_check, almost_full,
        "Charge the cell full, take out 10 % and put back 5 %; put a trusted ammeter or shunt in series and enter what it reads as current_ref_a in place of the profile's."},
-      {"terminal_check", "the same with a trusted voltmeter on the cell's own terminals too", terminal_check, almost_full,
+      {"terminal_check", "charge and discharge at nearly 1C with a trusted ammeter in series and a voltmeter on the cell's own terminals, half an hour", terminal_check, almost_full,
        "Charge the cell full, take out 10 % and put back 5 %; put a trusted ammeter in series and a voltmeter on the cell's own terminals and enter what they read as current_ref_a and voltage_ref_v."},
       {"meter_check", "contactor open for half an hour, the voltage sense wires in turn on two voltages of a reference source", meter_check, almost_full,
        "Open the contactor; put the voltage sense wires on a reference source where the profile has a voltage_ref_v, and keep both reference columns in the recording, with what a trusted meter read there."},

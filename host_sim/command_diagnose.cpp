@@ -206,7 +206,7 @@ std::string summary(const DiagnoseResult& r) {
     }
     if (!f.because.empty()) text += "  " + f.because + "\n";
   }
-  if (r.next) text += diagnosis::why(*r.next) + "\n  " + diagnosis::command(*r.next) + "\n";
+  if (r.next) text += fmt::format("{}\n  {}\n  {}\n", diagnosis::why(*r.next), diagnosis::instruction(*r.next), diagnosis::command(*r.next));
   if (r.baseline && r.extended && r.named()) text += fmt::format("Open loop: {:.2f} mV RMS before, {:.2f} mV with what was found.\n", 1e3 * r.baseline->rmse_v, 1e3 * r.extended->rmse_v);
   if (r.baseline_holdout && r.extended_holdout) {
     text += fmt::format("On recordings not used: {:.2f} mV RMS before, {:.2f} mV after; the noise floor is {:.2f} mV.\n", 1e3 * r.baseline_holdout->rmse_v,

@@ -265,7 +265,7 @@ std::string json_of(const DiagnoseResult& r) {
                                {"leaves", ids_of(r.next->leaves)},
                                {"why", diagnosis::why(*r.next)},
                                {"command", diagnosis::command(*r.next)},
-                               {"instruction", find_experiment(r.next->profile)->instruction},
+                               {"instruction", diagnosis::instruction(*r.next)},
                                {"start_soc", number(r.next->start_soc)},
                                {"duration_s", number(r.next->duration_s)},
                                {"expected_gain", number(r.next->gain)}};

@@ -24,7 +24,7 @@ struct CalibratedCell {
 /// As measured, but soc, which is true. current_a > 0 charges and is the mean over the interval that ends at time_s.
 struct Series {
   std::vector<double> time_s, current_a, voltage_v, temperature_c /* may be empty */, soc;
-  std::vector<double> terminal_v;  ///< of an errand: at the cell's own terminals, true
+  std::vector<double> terminal_v{};  ///< of an errand: at the cell's own terminals, true
 };
 
 struct Answer {

@@ -93,7 +93,7 @@ Record with_open_contactor(double offset_a) {
 }
 
 TEST(Reference, TheReadingOfAnOpenContactorDecidesBetweenLeakageAndAnOffset) {
-  const double offset_a = 0.12;
+  const double offset_a = 0.06;
   const Record r = with_open_contactor(offset_a);
   ASSERT_GE(r.checks.size(), 5U);
   const auto cost = [](const Record& record, const char* id) {

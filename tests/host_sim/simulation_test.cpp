@@ -58,7 +58,8 @@ TEST(Experiment, WhatTellsCausesApartStaysInTheCellAndSaysWhatToLog) {
     ++designs;
     EXPECT_FALSE(e.instruction.empty()) << e.name;
     double soc = e.start_soc, before_s = 0;
-    for (const ProfileRow& row : *experiment(e.name, {.capacity_ah = 2.5, .step_s = e.step_s})) {
+    const std::vector<ProfileRow> rows = experiment(e.name, {.capacity_ah = 2.5, .step_s = e.step_s}).value();
+    for (const ProfileRow& row : rows) {
       soc += row.current_a * (row.time_s - before_s) / 3'600 / 2.5;
       before_s = row.time_s;
       ASSERT_GT(soc, 0.05) << e.name << " at " << row.time_s;
