@@ -70,6 +70,7 @@ struct ProofPoints {
   std::string title, x_title, y_title;
   std::vector<Point> measured;
   std::vector<Curve> predicted;
+  std::vector<std::string> names = {};  ///< of x = 1, 2, ...; empty: x is a number
 };
 
 /// One line of the list: what is done, and what came of it.

@@ -304,7 +304,7 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
       curve.points.push_back({t, p.value, p.sigma});
     }
     if (energy) points.predicted.push_back(std::move(curve));
-    ProofBars bars{"open loop, not used; diagnosis at " + std::string(at), "mV", {}};
+    ProofBars bars{"open loop, not used; diagnosed " + at, "mV", {}};
     for (const AtTemperature& t : temperatures) {
       if (t.temperature_c == 25 || t.temperature_c == from.temperature_c) continue;
       const Value ratio = measured_ratio(t);
@@ -379,7 +379,7 @@ void charge_balance(ProofLab& lab, ProofExperiment& e) {
   const CellFile& cell = lab.built_in("a123_26650");
   // what the cycler's counters have from full to full, Ah: the recordings' README, "soc_ref"
   const std::map<std::string, double> missing_ah = {{"dyn10_P05_A002", 0.0697}, {"dyn10_P15_A002", 0.0686}, {"dyn20_P25_A002", 0.0888}, {"dyn10_P45_A002", 0.0836}};
-  ProofPoints points{"Charge read and not arrived: measured by the idle current, and as found", "recording", "mAh", {}, {{"as found", {}}}};
+  ProofPoints points{"Charge read and not arrived: measured by the idle current, and as found", "", "mAh", {}, {{"as found", {}}}};
   for (const auto& [name, counters_ah] : missing_ah) {
     const DiagnoseResult& r = lab.diagnosed(cell, std::vector<std::string>{"a123_26650/" + name});
     claim_named(e, name + ".named", name + ": the cycler's charge does not balance", r, {"current_offset", "coulombic_loss", "leakage"}, fmt::format("{:.0f} mAh missing from full to full, by the cycler's counters", 1e3 * counters_ah));
@@ -392,7 +392,7 @@ void charge_balance(ProofLab& lab, ProofExperiment& e) {
     const double x = static_cast<double>(points.measured.size() + 1);
     points.measured.push_back({x, 1e3 * (idle_ah + counters_ah) / 2, 1e3 * std::abs(idle_ah - counters_ah) / 2});
     if (said) points.predicted[0].points.push_back({x, 1e3 * said->value, 1e3 * said->sigma});
-    e.notes.push_back(fmt::format("{:.0f}: {}", x, name));
+    points.names.push_back(name);
   }
   e.points.push_back(std::move(points));
 }
@@ -491,7 +491,7 @@ void instrument_faults(ProofLab& lab, ProofExperiment& e) {
   const std::string base = "a123_26650/udds_P25_A002";
   const DiagnoseResult& untouched = lab.diagnosed(lab.built_in("a123_26650"), {base});
   e.notes.push_back("The untouched recording: " + said_of(untouched));
-  ProofPoints points{"Size found over size put in", "fault", "found / put in", {}, {{"found", {}}}};
+  ProofPoints points{"Size found over size put in", "", "found / put in", {}, {{"found", {}}}};
   for (const Injected& fault : faults) {
     Recording r = lab.recording(base);
     const std::vector<Sizes> sizes = fault.into(r);
@@ -505,7 +505,7 @@ void instrument_faults(ProofLab& lab, ProofExperiment& e) {
       points.measured.push_back({x, 1, 0});
       if (said) points.predicted[0].points.push_back({x, said->value / s.put_in, said->sigma / std::abs(s.put_in)});
     }
-    e.notes.push_back(fmt::format("{}: {}", &fault - std::begin(faults) + 1, fault.id));
+    points.names.push_back(fault.id);
   }
   e.points.push_back(std::move(points));
 }

@@ -54,7 +54,7 @@ json experiment_of(const ProofExperiment& e) {
   for (const ProofPoints& p : e.points) {
     json predicted = json::array();
     for (const ProofPoints::Curve& c : p.predicted) predicted.push_back({{"name", c.name}, {"points", points_of(c.points)}});
-    one["points"].push_back({{"title", p.title}, {"x", p.x_title}, {"y", p.y_title}, {"measured", points_of(p.measured)}, {"predicted", std::move(predicted)}});
+    one["points"].push_back({{"title", p.title}, {"x", p.x_title}, {"y", p.y_title}, {"measured", points_of(p.measured)}, {"predicted", std::move(predicted)}, {"names", p.names}});
   }
   return one;
 }

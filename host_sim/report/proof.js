@@ -53,17 +53,31 @@
   };
 
   const colour = c => c.verdict === 'holds' ? green : c.holds ? amber : red;
+
+  // --- all claims at a glance: a square each
+  report.experiments.forEach((e, n) => {
+    const row = make(get('glance'), 'div', undefined, 'glance');
+    make(row, 'span', e.title);
+    const s = svg(row, Math.max(20, 20 * e.claims.length), 18);
+    e.claims.forEach((c, k) => {
+      const link = draw(s, 'a', {href: `#claim-${n}-${k}`});
+      const square = draw(link, 'rect', {x: 20 * k, y: 1, width: 16, height: 16, rx: 3, fill: colour(c)});
+      draw(square, 'title', {}, `${c.claim}: ${signs(c.said)} (${c.verdict})`);
+    });
+    make(row, 'span', `${e.holding} of ${e.claims.length}`);
+  });
   const table = make(get('summary'), 'table', undefined, 'wide proof');
   const head = table.insertRow();
   head.className = 'group';
   for (const name of ['claim', 'the tool said', 'measured independently', '', 'within its stated uncertainty', 'verdict']) make(head, 'td', name);
-  for (const e of report.experiments) {
+  for (const [n, e] of report.experiments.entries()) {
     const group = table.insertRow();
     group.className = 'group';
     make(group, 'td', e.title).colSpan = 5;
     make(group, 'td', `${e.holding} of ${e.claims.length}`);
-    for (const c of e.claims) {
+    for (const [k, c] of e.claims.entries()) {
       const row = table.insertRow();
+      row.id = `claim-${n}-${k}`;
       make(row, 'td', c.claim);
       make(row, 'td', signs(c.said));
       make(row, 'td', signs(c.measured));
@@ -117,7 +131,8 @@
       draw(s, 'line', {x1: left, x2: wide - 8, y1: y(t), y2: y(t), stroke: faint});
       draw(s, 'text', {x: left - 6, y: y(t) + 4, class: 'end'}, t);
     }
-    for (const t of ticks(x0, x1, 7)) draw(s, 'text', {x: x(t), y: high - bottom + 16, class: 'middle'}, t);
+    if (p.names.length) p.names.forEach((name, k) => draw(s, 'text', {x: x(k + 1), y: high - bottom + 14 + 13 * (k % 2), class: k === 0 ? '' : k + 1 === p.names.length ? 'end' : 'middle'}, name));
+    else for (const t of ticks(x0, x1, 7)) draw(s, 'text', {x: x(t), y: high - bottom + 16, class: 'middle'}, t);
     draw(s, 'text', {x: wide - 8, y: high - 2, class: 'end'}, p.x);
     draw(s, 'text', {x: 0, y: 9}, p.y);
     const whisker = (q, stroke) => draw(s, 'line', {x1: x(q[0]), x2: x(q[0]), y1: y(q[1] - 2 * q[2]), y2: y(q[1] + 2 * q[2]), stroke: stroke, 'stroke-width': 1.6});
