@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/cell.hpp"
+
 namespace bms::diagnosis {
 
 namespace {
@@ -16,6 +18,16 @@ std::vector<double> knots(double low, double high, double step) {
   for (double soc = std::floor(low / step) * step; soc < high + step * 0.999; soc += step) at.push_back(soc);
   if (at.size() < 2) at.push_back(at.front() + step);
   return at;
+}
+
+/// Two ascending lists as one, of places at least `apart` from each other; those of `first` all stay. At most `most`.
+std::vector<double> merged(std::vector<double> first, const std::vector<double>& more, double apart, std::size_t most) {
+  const auto far = [&](double x) { return std::none_of(first.begin(), first.end(), [&](double y) { return std::abs(x - y) < apart; }); };
+  for (const double x : more) {
+    if (first.size() < most && x > 0 && x < 1 && far(x)) first.push_back(x);
+  }
+  std::sort(first.begin(), first.end());
+  return first;
 }
 
 }  // namespace
@@ -68,6 +80,54 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Re
     if (at.size() < 2) at.push_back(at.front() + every_s);
     offset_.push_back(hats(std::move(at), [&](double) { return offset_a_; }));
   }
+}
+
+model::CellParameters<> Calibration::applied(const model::CellParameters<>& cell, const std::vector<double>& u) const {
+  model::CellParameters<> moved = cell;
+  model::TablePoint<double> one;
+  const auto at = [&](double soc) {
+    one.ocv_v = 0;
+    one.r0_ohm = one.r1_ohm = one.c1_f = 1;
+    adjust(one, soc, u);
+    return one;
+  };
+
+  std::vector<double> wanted = ocv_.knots();
+  for (const Corner& c : corners_) {
+    if (std::abs(u[c.unknown]) > 0.3) wanted.insert(wanted.end(), {c.soc - c.width, c.soc + c.width});
+  }
+  const model::OcvTable<double>& ocv = cell.ocv;
+  const std::vector<double> edges = merged({ocv.soc.value.begin(), ocv.soc.value.begin() + static_cast<std::ptrdiff_t>(ocv.soc.size)}, wanted, 0.004, model::max_ocv_edges);
+  moved.ocv = {};
+  moved.ocv.lean = ocv.lean;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const std::size_t here = model::cell_detail::ocv_piece(ocv, edges[k]);
+    moved.ocv.soc.push_back(edges[k]);
+    if (ocv.half_gap_v.size > 0) {
+      const double t = (edges[k] - ocv.soc[here]) / (ocv.soc[here + 1] - ocv.soc[here]);
+      moved.ocv.half_gap_v.push_back(ocv.half_gap_v[here] + t * (ocv.half_gap_v[here + 1] - ocv.half_gap_v[here]));
+    }
+    if (k + 1 == edges.size()) break;
+    const double low_v = at(edges[k]).ocv_v, high_v = at(edges[k + 1]).ocv_v, width = edges[k + 1] - edges[k];
+    // the curve goes on rising
+    const double turn_v = std::max((high_v - low_v) / width, -0.9 * ocv.b1_v[here]), middle_v = (low_v + high_v) / 2, middle = (edges[k] + edges[k + 1]) / 2;
+    moved.ocv.b1_v.push_back(ocv.b1_v[here] + turn_v);
+    moved.ocv.b0_v.push_back(ocv.b0_v[here] + middle_v - turn_v * middle);
+  }
+
+  const model::RcTable<double>& rc = cell.rc;
+  const std::vector<double> nodes = merged({rc.soc.value.begin(), rc.soc.value.begin() + static_cast<std::ptrdiff_t>(rc.soc.size)}, r0_.knots(), 0.02, model::max_rc_nodes);
+  moved.rc = {};
+  const auto value = [&](const auto& column, double soc) { return model::cell_detail::rc_value(rc, column, soc); };
+  for (const double soc : nodes) {
+    const model::TablePoint<double> by = at(soc);
+    moved.rc.soc.push_back(soc);
+    moved.rc.r0_ohm.push_back(std::clamp(value(rc.r0_ohm, soc) * std::max(by.r0_ohm, 0.1), 1e-5, 0.5));
+    moved.rc.r1_ohm.push_back(std::clamp(value(rc.r1_ohm, soc) * std::max(by.r1_ohm, 0.1), 1e-5, 0.5));
+    moved.rc.c1_f.push_back(value(rc.c1_f, soc) * std::max(by.c1_f, 0.1));
+  }
+  moved.capacity_ah = cell.capacity_ah * (1 - capacity_loss(u));
+  return moved;
 }
 
 }  // namespace bms::diagnosis

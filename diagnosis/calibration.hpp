@@ -27,6 +27,7 @@ class Hats {
   Hats() = default;
   Hats(std::vector<double> knots, std::size_t first) : knots_(std::move(knots)), first_(first) {}
   std::size_t size() const { return knots_.size(); }
+  const std::vector<double>& knots() const { return knots_; }
   /// What an unknown of 1 makes of the value at knot k: deviation(knot's x).
   template <class Deviation>
   Hats& scaled(Deviation deviation) {
@@ -93,6 +94,12 @@ class Calibration {
   S gain_error(const std::vector<S>& u) const {
     return u[gain_] * 0.002;
   }
+  /// The cell with its tables and capacity as the unknowns have them: what belongs to one recording alone (its start, its wander of the
+  /// zero, the gain of its sensor) is left out. Edges and nodes are added at the knots as far as a cell file holds them.
+  model::CellParameters<> applied(const model::CellParameters<>& cell, const std::vector<double>& u) const;
+  /// How many unknowns come before those of single recordings.
+  std::size_t shared() const { return initial_soc_.front(); }
+
   /// Deviation of the error of the current's zero; its memory is current_offset_correlation_s of the cell file.
   double offset_a() const { return offset_a_; }
 

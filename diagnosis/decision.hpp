@@ -9,6 +9,8 @@ namespace bms::diagnosis::decision {
 inline constexpr double detected = 18;          ///< gain of one mechanism over the calibration that chance does not reach
 inline constexpr double worth_a_fit = 5;        ///< first-order gain below which a mechanism is not fitted
 inline constexpr std::size_t most_fits = 6;     ///< of mechanisms beside each other
+inline constexpr std::size_t most_rivals = 5;   ///< of mechanisms in the place of another
+inline constexpr double hopeless = 80;          ///< a rival this far behind the best is not fitted to the end
 inline constexpr double same = 7;               ///< rivals this close cannot be told apart
 inline constexpr double inseparable = 0.97;     ///< signatures this much alike are one class
 inline constexpr double same_inseparable = 30;  ///< and of a class all this close are named

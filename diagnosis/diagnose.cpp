@@ -58,6 +58,13 @@ double plain_error_v(const Evidence& evidence, const Hypothesis& h) {
   return std::sqrt(raw.squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
 }
 
+/// With the base parameters where the fit has them, but for those that belong to a single recording.
+double lasting_error_v(const Evidence& evidence, const Fit& f) {
+  Eigen::VectorXd u = f.calibration;
+  u.tail(u.size() - static_cast<Eigen::Index>(evidence.calibration().shared())).setZero();
+  return std::sqrt(evidence.raw_residual(f.hypothesis, u).squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+}
+
 class Chain {
  public:
   Chain(Evidence& evidence, const Options& options) : evidence_(evidence), options_(options), nominal_(evidence.noise()) {}
@@ -92,12 +99,12 @@ class Chain {
   }
 
   /// A candidate added to what is there and fitted from its estimate; shapes far apart are tried from two sides.
-  Fit fit_with(const Fit& around, const Candidate& c) {
+  Fit fit_with(const Fit& around, const Candidate& c, double hopeless) {
     Hypothesis h = with(around.hypothesis, c.start);
     if (!c.bursts.empty()) h.bursts = c.bursts;
-    Fit best = evidence_.fit(h, around.calibration);
+    Fit best = evidence_.fit(h, around.calibration, usual_iterations, hopeless);
     if (const auto farther = far_start(h, around.calibration)) {
-      Fit other = evidence_.fit(*farther, around.calibration);
+      Fit other = evidence_.fit(*farther, around.calibration, usual_iterations, hopeless);
       if (other.cost < best.cost) best = std::move(other);
     }
     if (catalogue[c.mechanism].id == "contact_step") best = refined_onset(best);
@@ -160,10 +167,8 @@ class Chain {
     return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
   }
 
-  /// The best of adding one mechanism to what is there, and its rivals.
-  /// likeness: of each to the mechanism `to`, if asked for.
-  std::vector<Fit> one_more(const Fit& around, const std::vector<std::size_t>& over, std::size_t most, std::size_t to = model::mechanism_count,
-                            std::vector<std::pair<std::size_t, double>>* likeness = nullptr, double worth = 0) {
+  /// The best of adding one mechanism to what is there.
+  std::vector<Fit> one_more(const Fit& around, const std::vector<std::size_t>& over) {
     // by the nominal noise, which asks for everything to be explained, and by that of what is left, which asks for the large first
     std::vector<Fit> fits;
     std::set<std::size_t> tried;
@@ -172,32 +177,56 @@ class Chain {
       evidence_.set_noise(noise);
       const Fit from = noise == around.noise ? around : evidence_.fit(around.hypothesis, around.calibration, 5);
       const Screen screen(evidence_, from, over);
-      const auto& all = screen.candidates();
-      for (std::size_t a = 0; likeness != nullptr && a < all.size(); ++a) {
-        if (all[a].mechanism != to) continue;
-        for (std::size_t b = 0; b < all.size(); ++b) likeness->emplace_back(all[b].mechanism, screen.alike(a, b));
+      std::vector<Candidate> worth;
+      for (const Candidate& c : screen.candidates()) {
+        if (worth.size() >= decision::most_fits || c.gain < decision::worth_a_fit) break;
+        if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
       }
-      std::vector<Fit> here;
-      for (const Candidate& c : all) {
-        if (here.size() >= most || c.gain < std::max(decision::worth_a_fit, worth)) break;
-        if (!tried.insert(c.mechanism).second && noise == nominal_) continue;
-        evidence_.set_noise(noise);
-        here.push_back(fit_with(from, c));
-      }
-      // the noise of what is left is smaller when much has been explained: the foremost again with theirs
-      std::stable_sort(here.begin(), here.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
-      for (std::size_t k = 0; k < here.size() && k < 3; ++k) here[k] = settled(here[k]);
+      const std::vector<Fit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
       fits.insert(fits.end(), here.begin(), here.end());
     }
     std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return score(a) < score(b); });
     return fits;
   }
 
-  /// Whether a cell file with it would do as well as with what was there: what only helps together with base parameters that have
-  /// moved as far as they may is no cause.
+  /// What could stand in the place of mechanism m of the best hypothesis, and m itself from another start; less: without m.
+  /// likeness: of each to m.
+  std::vector<Fit> in_place_of(std::size_t m, const Fit& best, const Fit& less, const std::vector<std::size_t>& over, double gain_of_m, std::map<std::size_t, double>& likeness) {
+    // they must stand up to the noise that the best leaves
+    evidence_.set_noise(best.noise);
+    const Fit from = evidence_.fit(less.hypothesis, less.calibration, 5);
+    const Screen screen(evidence_, from, over);
+    const auto& all = screen.candidates();
+    std::vector<Candidate> worth;
+    for (std::size_t a = 0; a < all.size(); ++a) {
+      if (all[a].mechanism == m) {
+        for (std::size_t b = 0; b < all.size(); ++b) likeness[all[b].mechanism] = screen.alike(a, b);
+      }
+      if (worth.size() < decision::most_rivals && all[a].gain >= std::max(decision::worth_a_fit, 0.1 * gain_of_m)) worth.push_back(all[a]);
+    }
+    return fitted(from, worth, best.cost + decision::hopeless);
+  }
+
+  /// The candidates fitted; the foremost again with the noise that they leave, which is smaller when much has been explained.
+  std::vector<Fit> fitted(const Fit& around, const std::vector<Candidate>& candidates, double hopeless) {
+    std::vector<Fit> fits;
+    const NoiseModel noise = evidence_.noise();
+    for (const Candidate& c : candidates) {
+      evidence_.set_noise(noise);
+      fits.push_back(fit_with(around, c, hopeless));
+    }
+    std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
+    for (std::size_t k = 0; k < fits.size() && k < 3; ++k) {
+      if (fits[k].cost < hopeless) fits[k] = settled(fits[k]);
+    }
+    return fits;
+  }
+
+  /// Whether a cell file with it would do as well as with what was there: what only helps together with the start and the wander that
+  /// this recording needed is no cause.
   bool carries(const Fit& before, const Fit& f) const {
-    const double was_v = std::min(plain_error_v(evidence_, before.hypothesis), plain_error_v(evidence_, evidence_.base()));
-    return plain_error_v(evidence_, f.hypothesis) <= decision::may_grow * was_v + 3e-4;
+    const double was_v = std::min(lasting_error_v(evidence_, before), plain_error_v(evidence_, evidence_.base()));
+    return lasting_error_v(evidence_, f) <= decision::may_grow * was_v + 3e-4;
   }
 
   Fit refit(const Fit& f, int iterations = 6) {
@@ -214,6 +243,7 @@ class Chain {
   Evidence& evidence_;
   const Options& options_;
   NoiseModel nominal_;
+  static constexpr int usual_iterations = 12;
   std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
   int steps_ = 0;
 };
@@ -250,6 +280,7 @@ std::vector<double> predict(const model::CellParameters<>& cell, const std::vect
 
 Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own, std::vector<Record> records, const Options& options) {
   Diagnosis d;
+  d.cell = cell;
   for (Record& r : records) {
     Trust trust = examine(r, cell);
     for (DataFault& f : trust.faults) d.faults.push_back(std::move(f));
@@ -311,7 +342,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   Fit current = base;
   const auto grow = [&] {
     while (current.hypothesis.added().size() < options.most_mechanisms) {
-      std::vector<Fit> more = chain.one_more(current, testable, decision::most_fits);
+      std::vector<Fit> more = chain.one_more(current, testable);
       if (current.hypothesis.added().empty()) singles = more;
       std::erase_if(more, [&](const Fit& f) { return !chain.carries(current, f); });
       if (more.empty() || chain.gain(current, more.front()) < decision::detected) break;
@@ -353,8 +384,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
         reduced.emplace_back(gains[m], less);
         continue;
       }
-      std::vector<std::pair<std::size_t, double>> likeness;
-      for (Fit& rival : chain.one_more(less, testable, 5, m, &likeness, 0.1 * gains[m])) {
+      std::map<std::size_t, double> likeness;
+      for (Fit& rival : chain.in_place_of(m, current, less, testable, gains[m], likeness)) {
         if (rival.hypothesis.find(m) != nullptr) {
           if (chain.score(rival) < chain.score(current) - 1 && chain.carries(less, rival)) current = rival, changed = true;  // the same from another start
           continue;
@@ -390,6 +421,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.best_cost = best_nominal.cost;
   const double gained = base_nominal.cost - best_nominal.cost;
   d.remaining = remainder.gain;
+  d.remaining_goes_with = remainder.family;
   d.fast_excess = remainder.fast_excess;
   d.adequacy = gained + d.remaining > 0 ? std::max(gained, 0.0) / (std::max(gained, 0.0) + d.remaining) : 1;
   const bool something = !current.hypothesis.added().empty();
@@ -464,9 +496,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   else if (!something) d.verdict = Verdict::no_mismatch;
   else if (d.findings.size() > 1) d.verdict = Verdict::causes;
   else d.verdict = d.findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
-  if (d.verdict == Verdict::no_mismatch || d.verdict == Verdict::unknown) {
-    if (d.verdict == Verdict::no_mismatch) d.spans.clear(), d.regimes.clear(), d.unexplained_share = 0;
-  }
+  if (d.verdict == Verdict::no_mismatch) d.spans.clear(), d.regimes.clear(), d.unexplained_share = 0;
+  if (names(d.verdict)) d.cell = evidence.calibration().applied(cell, {current.calibration.data(), current.calibration.data() + current.calibration.size()});
   if (options.progress) options.progress(1, "done");
   return d;
 }

@@ -70,8 +70,10 @@ struct Diagnosis {
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;
   Hypothesis extended;                     ///< the cell's own mechanisms and those found
+  model::CellParameters<> cell;            ///< its parameters moved, within their tolerance, to where they fit beside what was found; as given when nothing was
   std::vector<RecordView> views;           ///< of each record
   // what the decision was made from
+  std::string remaining_goes_with;         ///< what remains, if much does: with the time, the soc, a period of its own
   double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, cross_gain = 0;
 };
 
@@ -86,6 +88,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 /// What holds for a later recording of the same cell and instruments: a contact that has changed stays so, where bursts fell and
 /// where the first recording began does not.
 std::vector<MechanismSetting> later_recording(const Hypothesis& extended);
+
+/// Whether the verdict names mechanisms.
+inline bool names(Verdict verdict) { return verdict == Verdict::cause || verdict == Verdict::causes || verdict == Verdict::ambiguous; }
 
 /// Open loop from its initial soc: the voltage that would be read.
 std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings, const Record& record, std::vector<double>* soc = nullptr);

@@ -303,7 +303,7 @@ std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, co
 
 Fit Evidence::fit(const Hypothesis& start, int iterations) const { return fit(start, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())), iterations); }
 
-Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations) const {
+Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations, double hopeless) const {
   const std::vector<Sought> sought = start.sought();
   const auto m = static_cast<Eigen::Index>(sought.size());
   const auto info = [&](Eigen::Index j) -> const model::Parameter& {
@@ -385,6 +385,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
       fit.converged = true;
       break;
     }
+    if (iteration >= 3 && fit.cost - 2 * within_reach > hopeless) break;
 
     bool better = false;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {

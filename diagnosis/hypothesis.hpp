@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -95,8 +96,8 @@ class Evidence {
   void whiten(Columns& columns) const;
 
   Fit fit(const Hypothesis& start, int iterations = 12) const;
-  /// From where another fit ended, e.g. with other noise.
-  Fit fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations = 12) const;
+  /// From where another fit ended, e.g. with other noise. Ends early when even a step that keeps all it promises stays above hopeless.
+  Fit fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations = 12, double hopeless = std::numeric_limits<double>::infinity()) const;
 
  private:
   struct Linear;  // base parameters' derivatives and their factorised normal matrix

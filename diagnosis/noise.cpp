@@ -82,10 +82,16 @@ double quantisation_step(std::span<const double> values) {
   if (steps.size() < 20) return 0;
   const auto low = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 50);
   std::nth_element(steps.begin(), low, steps.end());
-  // a converter's steps are multiples of one; those of a reading that sticks until it leaps are not
-  const double step = *low;
-  const auto multiples = std::count_if(steps.begin(), steps.end(), [&](double s) { return std::abs(s / step - std::round(s / step)) < 0.1; });
-  return 2 * static_cast<std::size_t>(multiples) > steps.size() ? step : 0;
+  // a converter's readings lie on a grid of its step; those of a reading that sticks until it leaps do not
+  const double step = *low, zero = *std::find_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  std::size_t moved = 0, on_grid = 0;
+  for (std::size_t k = 1; k < values.size(); ++k) {
+    if (!(std::abs(values[k] - values[k - 1]) > 1e-9)) continue;
+    const double at = (values[k] - zero) / step;
+    ++moved;
+    if (std::abs(at - std::round(at)) < 0.15) ++on_grid;
+  }
+  return on_grid * 5 > moved * 3 ? step : 0;
 }
 
 double white_noise(std::span<const double> v, std::span<const double> i, double quiet_a, double fallback_v) {

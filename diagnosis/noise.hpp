@@ -69,7 +69,7 @@ class Whitener {
 /// quiet_a: how far the current may move. Returns fallback_v when there are too few such rows.
 double white_noise(std::span<const double> voltage_v, std::span<const double> current_a, double quiet_a, double fallback_v);
 
-/// Smallest step between two different readings that occurs often, where most others are multiples of it; 0: none found.
+/// Smallest step between two different readings that occurs often, where readings lie on a grid of it; 0: none found.
 double quantisation_step(std::span<const double> values);
 
 }  // namespace bms::diagnosis

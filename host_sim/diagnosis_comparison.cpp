@@ -18,6 +18,17 @@ using model::catalogue;
 /// Digits that say something; a value that rounding would carry over its bound stays.
 double rounded(double value, int digits) { return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.{}g}", value, digits)); }
 
+model::CellParameters<> with_short_numbers(model::CellParameters<> p) {
+  for (auto* column : {&p.ocv.b0_v, &p.ocv.b1_v, &p.ocv.half_gap_v, &p.ocv.soc}) {
+    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = rounded((*column)[k], 8);
+  }
+  for (auto* column : {&p.rc.r0_ohm, &p.rc.r1_ohm, &p.rc.c1_f}) {
+    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = rounded((*column)[k], 6);
+  }
+  p.capacity_ah = rounded(p.capacity_ah, 7);
+  return p;
+}
+
 std::string ids_of(const std::vector<std::size_t>& mechanisms) {
   std::string ids;
   for (const std::size_t m : mechanisms) ids += (ids.empty() ? "" : ", ") + std::string(catalogue[m].id);
@@ -27,9 +38,8 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
 }  // namespace
 
 void compare(DiagnoseResult& r) {
-  const model::CellParameters<>& cell = r.cell.parameters;
   const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
-  const auto simulated = [&](const diagnosis::Hypothesis& h, std::vector<Compared>& list, std::vector<double> Compared::* into) {
+  const auto simulated = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h, std::vector<Compared>& list, std::vector<double> Compared::* into) {
     for (Compared& c : list) {
       diagnosis::Hypothesis here = h;
       here.bursts.clear();
@@ -40,11 +50,11 @@ void compare(DiagnoseResult& r) {
   };
   const diagnosis::Hypothesis base{own, own.size(), {}};
   diagnosis::Hypothesis extended = r.named() ? r.diagnosis.extended : base;
-  simulated(base, r.recordings, &Compared::base_v);
-  simulated(base, r.holdouts, &Compared::base_v);
-  simulated(extended, r.recordings, &Compared::extended_v);
+  simulated(r.cell.parameters, base, r.recordings, &Compared::base_v);
+  simulated(r.cell.parameters, base, r.holdouts, &Compared::base_v);
+  simulated(r.diagnosis.cell, extended, r.recordings, &Compared::extended_v);
   if (r.named()) extended.settings = diagnosis::later_recording(r.diagnosis.extended);
-  simulated(extended, r.holdouts, &Compared::extended_v);
+  simulated(r.diagnosis.cell, extended, r.holdouts, &Compared::extended_v);
 }
 
 std::optional<OpenLoopFigures> figures(const std::vector<Compared>& list, std::vector<double> Compared::* simulated) {
@@ -86,7 +96,9 @@ CellFile extended_cell(const DiagnoseResult& r) {
   }
   if (!cell.name.ends_with("_extended")) cell.name += "_extended";
   cell.source += fmt::format("; what bms diagnose found in {} added: {:.2f} mV RMS open loop, before {:.2f}", files, 1e3 * r.extended->rmse_v, 1e3 * r.baseline->rmse_v);
-  const double capacity_ah = cell.parameters.capacity_ah;
+  cell.parameters = with_short_numbers(r.diagnosis.cell);
+  for (const char* table : {"ocv", "rc"}) cell.sources[table] += fmt::format("; moved within its tolerance to fit {} beside what was found", files);
+  const double capacity_ah = r.cell.parameters.capacity_ah;
   for (const Finding& f : r.diagnosis.findings) {
     const model::MechanismInfo& info = catalogue[f.setting.index];
     model::MechanismSetting setting = f.setting;

@@ -47,10 +47,7 @@ struct DiagnoseResult {
   std::vector<Warning> warnings;
 
   /// Whether the verdict names mechanisms: then they are in the extended cell.
-  bool named() const {
-    using diagnosis::Verdict;
-    return diagnosis.verdict == Verdict::cause || diagnosis.verdict == Verdict::causes || diagnosis.verdict == Verdict::ambiguous;
-  }
+  bool named() const { return diagnosis::names(diagnosis.verdict); }
 };
 
 }  // namespace bms
