@@ -279,4 +279,35 @@ std::string json_of(const DiagnoseResult& r) {
   return text_of(json);
 }
 
+std::string json_of(const ProofResult& r) {
+  Json json;
+  json["command"] = "proof";
+  json["claims"] = r.claims();
+  json["holding"] = r.holding();
+  json["experiments"] = Json::array();
+  for (const ProofExperiment& e : r.experiments) {
+    Json one = {{"id", e.id}, {"title", e.title}, {"method", e.method}, {"holding", e.holding()}, {"claims", Json::array()}, {"notes", e.notes}};
+    for (const ProofClaim& c : e.claims) {
+      Json claim = {{"id", c.id}, {"claim", c.claim}, {"said", c.said}, {"measured", c.measured}, {"tolerance", c.tolerance}};
+      claim["number"] = nullptr;
+      if (const auto& n = c.number) {
+        claim["number"] = {{"said", optional(n->said)}, {"said_std", number(n->said_sigma)}, {"measured", number(n->measured)}, {"measured_std", number(n->measured_sigma)}, {"allowed", number(n->allowed)}, {"unit", n->unit}};
+      }
+      claim["errors"] = nullptr;
+      if (c.errors) claim["errors"] = {{"before_v", number(c.errors->before_v)}, {"after_v", number(c.errors->after_v)}, {"allowed_ratio", c.errors->allowed}};
+      claim["within_uncertainty"] = c.within_uncertainty ? Json(*c.within_uncertainty) : Json(nullptr);
+      claim["holds"] = c.holds;
+      claim["verdict"] = c.verdict();
+      one["claims"].push_back(std::move(claim));
+    }
+    json["experiments"].push_back(std::move(one));
+  }
+  json["diagnoses"] = Json::array();
+  for (const ProofDiagnosis& d : r.diagnoses) {
+    json["diagnoses"].push_back({{"name", d.name}, {"verdict", d.verdict}, {"statement", d.statement}, {"found", d.found}, {"before_v", number(d.before_v)}, {"after_v", number(d.after_v)}, {"wall_s", d.wall_s}});
+  }
+  json["wall_s"] = r.wall_s;
+  return text_of(json);
+}
+
 }  // namespace bms

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_sim/diagnosis_result.hpp"
+#include "host_sim/proof.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/study.hpp"
 #include "identification/identify.hpp"
@@ -45,5 +46,7 @@ std::string json_of(const IdentifyResult& result);
 std::string json_of(const StudyResult& result);
 
 std::string json_of(const DiagnoseResult& result);
+
+std::string json_of(const ProofResult& result);
 
 }  // namespace bms

@@ -12,6 +12,7 @@
 #include "host_sim/command_diagnose.hpp"
 #include "host_sim/command_experiment.hpp"
 #include "host_sim/command_identify.hpp"
+#include "host_sim/command_proof.hpp"
 #include "host_sim/command_replay.hpp"
 #include "host_sim/command_simulate.hpp"
 #include "host_sim/command_study.hpp"
@@ -129,6 +130,14 @@ void add_diagnose(CLI::App& app, bms::DiagnoseOptions& o) {
   add_output(c, o.output);
 }
 
+void add_proof(CLI::App& app, bms::ProofOptions& o) {
+  CLI::App& c = *app.add_subcommand("proof", "Set what the diagnosis says of real recordings beside measurements that it did not see; takes minutes");
+  c.footer("Experiments: " + bms::proof_list_text() + "\nExample: bms proof --data recordings_of_a123 --report proof.html");
+  c.add_option("--data", o.data, "folder with the recordings in a123_26650 and a123_esctoolbox")->required()->type_name("DIR");
+  c.add_option("--only", o.only, "one experiment")->type_name("NAME");
+  add_output(c, o.output);
+}
+
 /// own_file: what the command writes beside JSON and report.
 template <class Options>
 int run(Options& options, const std::string& own_file) {
@@ -166,12 +175,15 @@ int main(int argc, char** argv) {
   add_study(app, study);
   bms::DiagnoseOptions diagnose;
   add_diagnose(app, diagnose);
+  bms::ProofOptions proof;
+  add_proof(app, proof);
   try {
     app.parse(argc, argv);
     if (app.got_subcommand("replay")) return run(replay, replay.trace);
     if (app.got_subcommand("simulate")) return run(simulate, simulate.out);
     if (app.got_subcommand("identify")) return run(identify, identify.out);
     if (app.got_subcommand("diagnose")) return run(diagnose, diagnose.out);
+    if (app.got_subcommand("proof")) return run(proof, "");
     if (app.got_subcommand("study")) return run(study, "");
     return run(experiment, experiment.out);
   } catch (const CLI::ParseError& error) {

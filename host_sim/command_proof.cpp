@@ -1,0 +1,72 @@
+#include "host_sim/command_proof.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "host_sim/bad_input.hpp"
+#include "host_sim/json_results.hpp"
+#include "host_sim/proof.hpp"
+#include "host_sim/proof_page.hpp"
+
+namespace bms {
+
+namespace {
+
+ProofProgress progress_on_terminal() {
+  if (!isatty(2)) return {};
+  const auto begin = std::chrono::steady_clock::now();
+  const auto shown_s = std::make_shared<double>(-1);
+  return [begin, shown_s](double done, const std::string& what) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (done >= 1) {
+      fmt::print(stderr, "\r{:110}\r", "");
+    } else if (seconds - *shown_s > 0.2) {
+      *shown_s = seconds;
+      const std::string left = done > 0.02 ? fmt::format("about {:.0f} s left", seconds / done * (1 - done)) : "";
+      fmt::print(stderr, "\r{:3.0f} %, {:20} {:80.80}", 100 * done, left, what);
+    }
+    std::fflush(stderr);
+  };
+}
+
+std::string summary(const ProofResult& r) {
+  std::string text;
+  for (const ProofExperiment& e : r.experiments) {
+    text += fmt::format("{} ({} of {} hold)\n", e.title, e.holding(), e.claims.size());
+    for (const ProofClaim& c : e.claims) text += fmt::format("  {:5} {}\n        said: {}\n        measured: {}\n        holds when {}{}\n", c.holds ? "holds" : "FAILS", c.claim, c.said, c.measured, c.tolerance, c.within_uncertainty ? *c.within_uncertainty ? "; within the stated uncertainty" : "; not within the stated uncertainty" : "");
+  }
+  return text + fmt::format("{} of {} claims hold, {} diagnoses in {:.0f} s.", r.holding(), r.claims(), r.diagnoses.size(), r.wall_s);
+}
+
+}  // namespace
+
+std::string proof_list_text() {
+  std::string text;
+  for (const std::string& name : proof_names()) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+int run(const ProofOptions& options) {
+  const auto names = proof_names();
+  if (!options.only.empty() && std::find(names.begin(), names.end(), options.only) == names.end()) {
+    throw BadInput("--only", 1, "no such experiment '" + options.only + "', expected one of: " + proof_list_text());
+  }
+  std::error_code error;
+  for (const char* folder : {".", "a123_26650", "a123_esctoolbox"}) {
+    const std::filesystem::path path = (std::filesystem::path(options.data) / folder).lexically_normal();
+    if (!std::filesystem::is_directory(path, error)) throw BadInput(path.string(), 1, "no folder, expected one with the recordings a123_26650 and a123_esctoolbox (host_sim/README.md names their source)");
+  }
+  const ProofResult result = prove(options.data, options.only, progress_on_terminal());
+  if (!options.output.json.empty()) put(options.output.json, json_of(result));
+  if (!options.output.report.empty()) put(options.output.report, proof_report(result));
+  tell(options.output, summary(result));
+  return 0;
+}
+
+}  // namespace bms

@@ -1,0 +1,117 @@
+// bms proof from the outside: what it refuses, and what it writes of recordings that are small and simulated. Whether its claims hold on
+// real recordings is for a person to look at: ./bms proof.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+
+class ProofTool : public ::testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+
+  /// A current through the built-in cell, with soc_ref and a temperature: what a folder of recordings has.
+  void simulated(const std::string& name, const std::string& profile, const std::string& initial_soc, double temperature_c, const std::string& with = "") const {
+    std::ofstream(path("profile.csv")) << profile;
+    const ToolRun run = run_tool("simulate --quiet --cell a123_26650 --profile " + path("profile.csv") + " --initial-soc " + initial_soc + " --noise-v 0.0005 " + with + " --out " + path("simulated.csv"));
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    std::istringstream rows(content(path("simulated.csv")));
+    std::ofstream out(path("data/" + name + ".csv"));
+    std::string line;
+    std::getline(rows, line);
+    out << "time_s,current_a,voltage_v,soc_ref,temperature_c\n";
+    while (std::getline(rows, line)) out << line << "," << temperature_c << "\n";
+  }
+  static std::string slow(double current_a) {
+    std::string profile = "time_s,current_a\n";
+    for (int k = 0; k <= 400; ++k) profile += std::to_string(300 * k) + "," + std::to_string(k < 5 || k > 372 ? 0 : current_a) + "\n";
+    return profile;
+  }
+  /// Pulses, and a rest at the end.
+  static std::string drive(double scale) {
+    std::string profile = "time_s,current_a\n";
+    for (int k = 0; k < 500; ++k) profile += std::to_string(k) + "," + std::to_string(k < 30 || k > 420 ? 0 : scale * (k % 60 < 30 ? -2.5 : k % 60 < 45 ? 1.5 : 0.005)) + "\n";
+    return profile;
+  }
+  void small_folder() const {
+    std::filesystem::create_directories(path("data/a123_26650"));
+    std::filesystem::create_directories(path("data/a123_esctoolbox"));
+    for (const std::string folder : {"a123_26650/", "a123_esctoolbox/"}) {
+      simulated(folder + "ocv_P25_dis", slow(-0.0838), "1", 25);
+      simulated(folder + "ocv_P25_chg", slow(0.0838), "0", 25);
+    }
+    for (const std::string name : {"a123_esctoolbox/dyn50_P25", "a123_esctoolbox/dyn45_P05", "a123_26650/dyn20_P25_A002", "a123_26650/udds_P25_A002", "a123_26650/pulse_P25_A002", "a123_26650/dyn10_N15_A002",
+                                   "a123_26650/dyn10_N05_A002", "a123_26650/dyn10_P05_A002", "a123_26650/dyn10_P15_A002", "a123_26650/dyn10_P45_A002", "a123_26650/cccv1C_P25_A002", "a123_26650/fsae_P25_A004"}) {
+      simulated(name, drive(name.find("udds") != std::string::npos ? 6 : 1), "0.7", 25);
+    }
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ProofTool, WithoutTheRecordingsThereIsOneClearLine) {
+  const ToolRun none = run_tool("proof --data " + path("nowhere"));
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, MatchesRegex("[^\n]*nowhere[^\n]*:1: no folder, expected [^\n]*a123_26650[^\n]*\n"));
+  std::filesystem::create_directories(path("half/a123_26650"));
+  std::filesystem::create_directories(path("half/a123_esctoolbox"));
+  const ToolRun half = run_tool("proof --data " + path("half") + " --json " + path("r.json"));
+  EXPECT_EQ(half.exit_code, 2);
+  EXPECT_THAT(half.err, MatchesRegex("[^\n]*\\.csv:1: no such recording, expected [^\n]*\n"));
+  EXPECT_FALSE(std::filesystem::exists(path("r.json")));
+  const ToolRun unknown = run_tool("proof --data " + path("half") + " --only colour");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("expected one of: hysteresis"));
+}
+
+TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
+  small_folder();
+  const ToolRun run = run_tool("proof --data " + path("data") + " --json " + path("r.json") + " --report " + path("r.html"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json r = json::parse(content(path("r.json")));
+  EXPECT_EQ(r["command"], "proof");
+  std::size_t claims = 0, holding = 0;
+  std::set<std::string> ids;
+  const std::string page = content(path("r.html"));
+  for (const char* name : {"hysteresis", "hysteresis_b", "temperature", "relaxation", "balance", "balance_b", "faults", "no_mismatch", "holdouts"}) {
+    const auto at = std::find_if(r["experiments"].begin(), r["experiments"].end(), [&](const json& e) { return e["id"] == name; });
+    ASSERT_NE(at, r["experiments"].end()) << name;
+    EXPECT_FALSE((*at)["claims"].empty()) << name;
+    for (const json& c : (*at)["claims"]) {
+      for (const char* key : {"id", "claim", "said", "measured", "tolerance", "number", "errors", "within_uncertainty", "holds", "verdict"}) EXPECT_TRUE(c.contains(key)) << c << key;
+      EXPECT_TRUE(ids.insert(c["id"]).second) << c["id"] << " twice";
+      EXPECT_THAT(page, HasSubstr(c["claim"].get<std::string>()));
+      EXPECT_THAT(run.out, HasSubstr(c["claim"].get<std::string>()));
+      EXPECT_EQ(c["verdict"] == "fails", !c["holds"].get<bool>());
+      EXPECT_THAT(c["id"].get<std::string>(), ::testing::Not(::testing::EndsWith(".run"))) << c["said"];
+      ++claims;
+      holding += c["holds"].get<bool>() ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(r["claims"], claims);
+  EXPECT_EQ(r["holding"], holding);
+  EXPECT_GT(claims, 40U);
+  // the cell is the one that the recordings were simulated with: nothing of it depends on the temperature
+  const auto& temperature = r["experiments"][2]["claims"][0];
+  EXPECT_EQ(temperature["holds"], false) << temperature;
+  EXPECT_FALSE(r["diagnoses"].empty());
+  // whichever experiment came first to a diagnosis that both need
+  ASSERT_EQ(run_tool("proof --quiet --data " + path("data") + " --json " + path("again.json")).exit_code, 0);
+  const auto steady = [](const std::string& text) { return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), ""); };
+  EXPECT_EQ(steady(content(path("again.json"))), steady(content(path("r.json"))));
+}
+
+}  // namespace
+}  // namespace bms
