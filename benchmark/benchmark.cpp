@@ -43,8 +43,15 @@ std::string joined(const std::vector<std::string>& ids, const char* by) {
 std::string line_of(std::size_t index, const Outcome& o) {
   std::string found;
   for (const auto& set : o.sets) found += (found.empty() ? "" : " + ") + joined(set, "~");
-  return fmt::format("{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n", index, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength,
+  std::string line = fmt::format("{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n", index, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength,
                      o.answer.profile, bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v, 1e3 * o.holdout_floor_v, o.wall_s, o.figures);
+  if (o.next) {
+    std::string after;
+    for (const auto& set : o.next->sets) after += (after.empty() ? "" : " + ") + joined(set, "~");
+    line += fmt::format("{:3} {:10} {:40} next: {} ({:.1f} h, gain {:.0f}, planned in {:.1f} s) -> {}{}\n", index, "", joined(o.answer.ids, "+"), o.next->profile.empty() ? "none" : o.next->profile, o.next->duration_s / 3'600,
+                        o.next->expected_gain, o.next->plan_wall_s, after, o.next->separated ? "" : "  NOT SEPARATED");
+  }
+  return line;
 }
 
 std::string json_of(const Options& options, const std::vector<Column>& columns) {

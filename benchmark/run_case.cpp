@@ -47,7 +47,7 @@ model::CellParameters<> cell_of(const truth::CalibratedCell& c) {
 }
 
 diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma) {
-  return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true};
+  return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true, {}};
 }
 
 void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& spans, const std::vector<double>& holdout_v) {
@@ -88,6 +88,7 @@ Outcome run_case(const truth::Case& c) {
     holdout_v = diagnosis::predict(d.cell, diagnosis::later_recording(d.extended), record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
   compare(o, c, d.spans, holdout_v);
+  o.next = follow_up(c, cell, record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc), d);
   return o;
 }
 

@@ -2,9 +2,11 @@
 // copied to the outcome after the diagnosis has ended.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "benchmark/follow_up.hpp"
 #include "benchmark/truth/cases.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "model/cell_parameters.hpp"
@@ -21,6 +23,7 @@ struct Outcome {
   double overlap = 0;                         ///< of the located time and the true one, intersection over union
   double holdout_before_v = 0, holdout_after_v = 0, holdout_floor_v = 0;
   double wall_s = 0;
+  std::optional<FollowUp> next;               ///< of an ambiguous one
   std::string figures;                        ///< what the decision was made from, for a person
 };
 

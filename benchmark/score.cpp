@@ -66,6 +66,7 @@ Score score(const std::vector<Outcome>& outcomes) {
         }
       }
     }
+    if (o.answer.kind == "single" && o.next) s.separated.count(o.next->separated);
     if (o.answer.kind == "pair" && ids.size() == 2) {
       std::size_t right = 0;
       bool wrong = false;

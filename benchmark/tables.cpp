@@ -38,6 +38,7 @@ constexpr std::array rows = {
     Row{"outside the catalogue, at twice the limit and above: UNKNOWN", ">= 70 %", [](const Score& s) { return text(s.outside_unknown); }},
     Row{"data faults", "", [](const Score& s) { return text(s.data_fault); }},
     Row{"hold-out at 1.3 times the floor, or 90 % of the error above it removed", ">= 80 %", [](const Score& s) { return text(s.holdout); }},
+    Row{"ambiguous ones separated by the experiment asked for", ">= 80 %", [](const Score& s) { return s.separated.of > 0 ? text(s.separated) : "-"; }},
     Row{"located in time: intersection over union, median", ">= 0.6", [](const Score& s) { return s.detected.hits > 0 ? fmt::format("{:.2f}", s.median_overlap) : "-"; }},
     Row{"expected calibration error of the probabilities", "<= 0.07", [](const Score& s) { return s.named > 0 ? fmt::format("{:.2f}", s.calibration_error) : "-"; }},
     Row{"seconds a case", "", [](const Score& s) { return fmt::format("{:.1f}", s.mean_wall_s); }},

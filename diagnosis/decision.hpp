@@ -20,6 +20,7 @@ inline constexpr double much_left = 40;         ///< what must remain, in gain, 
 inline constexpr double larger_than_error = 2; ///< one of several causes does not move the voltage by more than this times the error
 inline constexpr double may_grow = 1.15;       ///< of the plain error, by adding a cause
 inline constexpr double temper = 3;             ///< log-likelihoods are this much too sure of themselves
+inline constexpr double settled = 40;           ///< gain by which a next experiment should part rivals: more than same_inseparable, as no forecast is quite right
 inline constexpr double fast_excess = 0.25;     ///< variance of the whitened residual above 1 that noise does not reach
 
 }  // namespace bms::diagnosis::decision

@@ -52,17 +52,21 @@ double known_before(const Evidence& evidence, const Hypothesis& h) {
   return std::clamp((away_k - 5) * 1.5, 0.0, 15.0);
 }
 
+/// RMS of a raw residual, of the voltages that were read.
+double reading_error_v(const Evidence& evidence, const Columns& raw) {
+  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(evidence.readings())).squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+}
+
 /// RMS of measured less predicted by a hypothesis with the cell file's own base parameters: what an extended cell file will do.
 double plain_error_v(const Evidence& evidence, const Hypothesis& h) {
-  const Columns raw = evidence.raw_residual(h, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())));
-  return std::sqrt(raw.squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+  return reading_error_v(evidence, evidence.raw_residual(h, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size()))));
 }
 
 /// With the base parameters where the fit has them, but for those that belong to a single recording.
 double lasting_error_v(const Evidence& evidence, const Fit& f) {
   Eigen::VectorXd u = f.calibration;
   u.tail(u.size() - static_cast<Eigen::Index>(evidence.calibration().shared())).setZero();
-  return std::sqrt(evidence.raw_residual(f.hypothesis, u).squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+  return reading_error_v(evidence, evidence.raw_residual(f.hypothesis, u));
 }
 
 class Chain {
@@ -223,8 +227,9 @@ class Chain {
   }
 
   /// Whether a cell file with it would do as well as with what was there: what only helps together with the start and the wander that
-  /// this recording needed is no cause.
+  /// this recording needed is no cause. A first one may: of two that hide each other, one alone makes it worse.
   bool carries(const Fit& before, const Fit& f) const {
+    if (f.hypothesis.added().size() < 2) return true;
     const double was_v = std::min(lasting_error_v(evidence_, before), plain_error_v(evidence_, evidence_.base()));
     return lasting_error_v(evidence_, f) <= decision::may_grow * was_v + 3e-4;
   }
@@ -429,6 +434,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 
   // findings
   d.extended = current.hypothesis;
+  d.covariance = current.covariance;
+  d.noise = nominal;
   const Contributions parts = contributions(evidence, base, current);
   d.explained_share = parts.explained_share;
   d.unexplained_rmse_v = parts.remaining_rmse_v;
@@ -440,7 +447,12 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     f.setting = *current.hypothesis.find(m);
     f.gain = gains[m];
     double sum = 1;
-    std::vector<std::pair<double, std::size_t>> near;
+    struct Near {
+      double behind;
+      std::size_t mechanism;
+      const Fit* fit;
+    };
+    std::vector<Near> near;
     for (const Fit& rival : rivals[m]) {
       const double behind = chain.score(rival) - chain.score(current);
       std::size_t other = m;
@@ -449,11 +461,13 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       }
       sum += std::exp(-behind / (2 * decision::temper));
       // what goes through the same few numbers of a recording differs by how well its equation fits, not by what was seen
-      if (behind < decision::same || (alike[{m, other}] > decision::inseparable && behind < decision::same_inseparable)) near.emplace_back(behind, other);
+      if (behind < decision::same || (alike[{m, other}] > decision::inseparable && behind < decision::same_inseparable)) near.push_back({behind, other, &rival});
     }
-    std::sort(near.begin(), near.end());
-    for (const auto& [behind, other] : near) {
-      if (std::find(f.equivalent_to.begin(), f.equivalent_to.end(), other) == f.equivalent_to.end()) f.equivalent_to.push_back(other);
+    std::sort(near.begin(), near.end(), [](const Near& a, const Near& b) { return std::pair(a.behind, a.mechanism) < std::pair(b.behind, b.mechanism); });
+    for (const Near& n : near) {
+      if (std::find(f.equivalent_to.begin(), f.equivalent_to.end(), n.mechanism) != f.equivalent_to.end()) continue;
+      f.equivalent_to.push_back(n.mechanism);
+      f.rivals.push_back({n.fit->hypothesis, n.fit->covariance});
     }
     f.probability = 1 / sum;
     f.rms_contribution_v = parts.rms_v.contains(m) ? parts.rms_v.at(m) : 0;

@@ -24,11 +24,18 @@ struct Regime {
   double usual = 0;        ///< share of the time that is spent there
 };
 
+/// A hypothesis with the values found, and how well they are known together: the covariance of what is sought.
+struct Fitted {
+  Hypothesis hypothesis;
+  Eigen::MatrixXd covariance;
+};
+
 struct Finding {
   MechanismSetting setting;                ///< value and deviation
   std::vector<char> at_bound;              ///< by parameter
   double probability = 0;
   std::vector<std::size_t> equivalent_to;  ///< catalogue indices that these recordings cannot tell from it
+  std::vector<Fitted> rivals;              ///< all that was found, with each of equivalent_to in its place
   double gain = 0;                         ///< cost without it less with it
   double rms_contribution_v = 0;
   std::string because;                     ///< why this and not its neighbour
@@ -71,6 +78,8 @@ struct Diagnosis {
   std::vector<std::string> warnings;
   Hypothesis extended;                     ///< the cell's own mechanisms and those found
   model::CellParameters<> cell;            ///< its parameters moved, within their tolerance, to where they fit beside what was found; as given when nothing was
+  Eigen::MatrixXd covariance;              ///< of what is sought in it
+  NoiseModel noise;                        ///< nominal
   std::vector<RecordView> views;           ///< of each record
   // what the decision was made from
   std::string remaining_goes_with;         ///< what remains, if much does: with the time, the soc, a period of its own

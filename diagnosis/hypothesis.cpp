@@ -20,6 +20,8 @@ constexpr std::size_t sensor = model::mechanism_index("temperature_sensor");
 constexpr std::size_t capacity_change = model::mechanism_index("capacity_change");
 constexpr std::size_t current_gain = model::mechanism_index("current_gain");
 constexpr std::size_t initial_soc = model::mechanism_index("initial_soc");
+constexpr std::size_t contact_step = model::mechanism_index("contact_step");
+constexpr std::size_t hysteresis = model::mechanism_index("ocv_hysteresis");
 constexpr std::size_t intermittent = model::mechanism_index("contact_intermittent");
 
 /// Derivatives that go through the simulation at once.
@@ -27,6 +29,9 @@ constexpr std::size_t few_lanes = 4, lanes = 8;
 
 /// Reading beside a step of the current: voltage and current are never read at quite the same moment. Share of a sample's step.
 constexpr double edge_jitter = 0.05;
+
+/// A later recording that begins above it was charged last.
+constexpr double charged_soc = 0.9;
 
 /// How much of resistance_fraction differs from one step of the current to the next.
 constexpr double edge_error = 0.4;
@@ -93,6 +98,7 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
   for (const Record& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording of less than two rows");
     samples_ += r.size();
+    checks_ += r.checks.size();
     std::vector<char>& usable = usable_.emplace_back(r.size(), 1);
     RowNoise& more = row_noise_.emplace_back(r.size());
     const double soc_error = soc_error_share * r.initial_soc_sigma, r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
@@ -173,8 +179,8 @@ double Evidence::log_determinant() const {
 
 Hypothesis Evidence::base() const { return {own_, own_.size(), {}}; }
 
-template <class S, class Row>
-void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row) const {
+template <class S, class Row, class ForCheck>
+void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row, ForCheck&& check) const {
   const Record& r = records_[record];
   model::ChosenLaws<S> laws;
   S delay_s(0), lag_s(0), start(r.initial_soc);
@@ -183,9 +189,12 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
   for (std::size_t k = 0; k < h.settings.size(); ++k) {
     const std::size_t index = h.settings[k].index;
     if (index == skew) delay_s = values[k][0];
+    else if (index == initial_soc && record > 0) continue;  // the later ones begin elsewhere
     else if (index == initial_soc) start += values[k][0];
     else if (index == capacity_change) capacity[0] += values[k][0];
     else if (index == current_gain) gain[0] += values[k][0];
+    else if (index == contact_step && record > 0) model::choose<S>(laws, index, model::MechanismValues<S>{values[k][0], S(r.time_s.front())}, cell_.capacity_ah);  // it stays
+    else if (index == hysteresis && record > 0 && r.initial_soc > charged_soc) model::choose<S>(laws, index, model::MechanismValues<S>{values[k][0], values[k][1], values[k][2], S(1)}, cell_.capacity_ah);
     else model::choose<S>(laws, index, values[k], cell_.capacity_ah);
     if (index == sensor) lag_s = values[k][1];
     if (index == intermittent && record < h.bursts.size()) (*laws.template slot<intermittent>()).bursts = h.bursts[record];
@@ -200,9 +209,22 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
     const S read_a = readings.current(k) - calibration_.offset_a(record, r.time_s[k], u);
     row(k, course.step(r.time_s[k], duration_s, read_a, readings.temperature(k), adjust), course.soc());
   }
+  for (std::size_t j = 0; j < r.checks.size(); ++j) {
+    const Check& c = r.checks[j];
+    const bool current = c.channel == Check::Channel::current;
+    // of a current what would be true, of a voltage what would be read behind the contacts: both as the laws have it
+    S at_terminals(c.reference);
+    for (std::size_t k = 0; k < h.settings.size(); ++k) {
+      if (h.settings[k].index == contact_step && (record > 0 || c.time_s >= h.settings[k].value[1])) at_terminals += values[k][0] * c.current_a;
+    }
+    const S expected = current ? S(laws.true_current(S(c.read) - calibration_.offset_a(record, c.time_s, u)) - c.reference) : S(laws.reading(at_terminals) - c.read);
+    check(j, S(expected * (1 / c.deviation)));
+  }
 }
 
-std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc) const {
+std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc) const { return simulate(h, u, record, soc, nullptr); }
+
+std::vector<double> Evidence::simulate(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc, std::vector<double>* checks) const {
   std::vector<double> v(records_[record].size());
   if (soc != nullptr) soc->resize(v.size());
   std::vector<model::MechanismValues<double>> values;
@@ -210,20 +232,24 @@ std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd
   run<double>(values, h, std::vector<double>(u.data(), u.data() + u.size()), record, [&](std::size_t k, double volt, double z) {
     v[k] = volt;
     if (soc != nullptr) (*soc)[k] = z;
+  }, [&](std::size_t, double expected) {
+    if (checks != nullptr) checks->push_back(expected);
   });
   return v;
 }
 
 Columns Evidence::raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
-  Columns e(static_cast<Eigen::Index>(samples_), 1);
+  Columns e(static_cast<Eigen::Index>(samples()), 1);
   Eigen::Index row = 0;
+  std::vector<double> checks;
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    const std::vector<double> v = voltage(h, u, r);
+    const std::vector<double> v = simulate(h, u, r, nullptr, &checks);
     for (std::size_t k = 0; k < v.size(); ++k, ++row) {
       const double error_v = usable_[r][k] != 0 ? records_[r].voltage_v[k] - v[k] : 0;
       e(row, 0) = std::isfinite(error_v) ? error_v : 1e3;
     }
   }
+  for (const double expected : checks) e(row++, 0) = -expected;
   return e;
 }
 
@@ -241,6 +267,20 @@ void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
     const auto rows = static_cast<Eigen::Index>(records_[r].size());
     by[r].whiten(columns.middleRows(row, rows));
     row += rows;
+  }
+  if (checks_ == 0) return;
+  // checks of one voltage channel share its drift: covariance 1 + w w', taken off by (1 + w w')^-1/2
+  for (const Record& r : records_) {
+    Eigen::VectorXd w = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(r.checks.size()));
+    for (std::size_t j = 0; j < r.checks.size(); ++j) {
+      if (r.checks[j].channel == Check::Channel::voltage) w[static_cast<Eigen::Index>(j)] = cell_.tolerance.drift_v / r.checks[j].deviation;
+    }
+    if (const double shared = w.squaredNorm(); shared > 0) {
+      auto rows = columns.middleRows(row, w.size());
+      const Eigen::RowVectorXd along = w.transpose() * rows;
+      rows -= ((1 - 1 / std::sqrt(1 + shared)) / shared) * w * along;
+    }
+    row += w.size();
   }
 }
 
@@ -260,18 +300,18 @@ void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<c
     Jet& seeded = c < by.size() ? values[by[c].setting][by[c].parameter] : unknowns[base[c - by.size()]];
     seeded.v[static_cast<Eigen::Index>(lane)] = 1;
   }
-  Eigen::Index row = 0;
+  Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
+  const auto put = [&](Eigen::Index at, const Jet& v) {
+    for (std::size_t lane = 0; lane < here; ++lane) columns(at, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
+  };
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    run<Jet>(values, h, unknowns, r, [&](std::size_t, const Jet& v, const Jet&) {
-      for (std::size_t lane = 0; lane < here; ++lane) columns(row, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
-      ++row;
-    });
+    run<Jet>(values, h, unknowns, r, [&](std::size_t, const Jet& v, const Jet&) { put(row++, v); }, [&](std::size_t, const Jet& expected) { put(check_row++, expected); });
   }
 }
 
 Columns Evidence::derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const {
   const std::size_t count = by.size() + base.size();
-  Columns columns(static_cast<Eigen::Index>(samples_), static_cast<Eigen::Index>(count));
+  Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(count));
   if (count == 0) return columns;
   for (std::size_t first = 0; first < count;) {
     const bool few = count - first <= few_lanes;

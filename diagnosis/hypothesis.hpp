@@ -70,7 +70,9 @@ class Evidence {
   const std::vector<Record>& records() const { return records_; }
   const Calibration& calibration() const { return calibration_; }
   const NoiseModel& noise() const { return noise_; }
-  std::size_t samples() const { return samples_; }
+  /// Rows of a residual: one a reading of every record after another, then one a check of an instrument (Record::checks).
+  std::size_t samples() const { return samples_ + checks_; }
+  std::size_t readings() const { return samples_; }
   std::size_t used() const;
   const std::vector<char>& usable(std::size_t record) const { return usable_[record]; }
   double log_determinant() const;
@@ -87,7 +89,7 @@ class Evidence {
   Columns derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const;
   /// By the base parameters' unknowns.
   Columns calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
-  /// Measured less predicted, V; 0 where there is no voltage.
+  /// Measured less predicted, V; 0 where there is no voltage. Checks in their own deviations, as in all columns: they are white as they are.
   Columns raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// The noise that makes a raw residual likeliest, at least the nominal, at its price; cost: -2 log likelihood with it.
   NoiseModel likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const;
@@ -101,8 +103,10 @@ class Evidence {
 
  private:
   struct Linear;  // base parameters' derivatives and their factorised normal matrix
-  template <class S, class Row>
-  void run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row) const;
+  /// row(k, voltage, soc), then check(j, what the hypothesis expects in place of the trusted side, in deviations).
+  template <class S, class Row, class ForCheck>
+  void run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row, ForCheck&& check) const;
+  std::vector<double> simulate(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc, std::vector<double>* checks) const;
   /// Columns first .. first + here, in one run.
   template <std::size_t Lanes>
   void derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base, std::size_t first, std::size_t here,
@@ -121,7 +125,7 @@ class Evidence {
   void whiten(Columns& columns, const std::vector<Whitener>& by) const;
   std::vector<std::vector<char>> usable_;
   std::vector<RowNoise> row_noise_;
-  std::size_t samples_ = 0;
+  std::size_t samples_ = 0, checks_ = 0;
   mutable std::shared_ptr<const Linear> base_linear_;
 };
 

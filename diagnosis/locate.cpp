@@ -45,7 +45,7 @@ Contributions contributions(const Evidence& evidence, const Fit& base, const Fit
       for (std::size_t k = 0; k < less.size(); ++k) c.rms_v[m] += (with_all[k] - less[k]) * (with_all[k] - less[k]);
     }
   }
-  for (auto& [m, sum] : c.rms_v) sum = std::sqrt(sum / static_cast<double>(evidence.samples()));
+  for (auto& [m, sum] : c.rms_v) sum = std::sqrt(sum / static_cast<double>(evidence.readings()));
   c.spans = strongest_spans(evidence.records().front(), c.energy.front());
   return c;
 }

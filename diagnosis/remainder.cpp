@@ -73,9 +73,9 @@ std::vector<double> strange_frequencies(const Record& r) {
 Remainder what_remains(const Evidence& evidence, const Fit& fit) {
   const auto rows = static_cast<Eigen::Index>(evidence.samples());
   const double c_rate_a = evidence.cell().capacity_ah;
-  constexpr Eigen::Index time_knots = 30, soc_knots = 8, fine_knots = 24, volt_knots = 30, current_knots = 7, memory = 6, soc_current = 4, time_current = 6;
+  constexpr Eigen::Index time_knots = 30, soc_knots = 8, fine_knots = 24, volt_knots = 30, memory = 6, soc_current = 4, time_current = 6;
   constexpr Eigen::Index per_record = time_knots + time_current, leaps = leaps_v.size();
-  const Eigen::Index shared = 2 * soc_knots + fine_knots + volt_knots + current_knots + memory + soc_current + 1 + leaps;
+  const Eigen::Index shared = 2 * soc_knots + fine_knots + volt_knots + memory + soc_current + 1 + leaps;
   const Eigen::Index generic = shared + per_record * static_cast<Eigen::Index>(evidence.records().size());
   Columns raw = Columns::Zero(rows, generic);
   double largest_a = 1e-9;
@@ -111,8 +111,6 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
       at += fine_knots;
       hat(here, at, volt_knots, *lowest_v, *highest_v, volts[k], free_v / 4);
       at += volt_knots;
-      hat(here, at, current_knots, -1, 1, c, free_v);
-      at += current_knots;
       for (std::size_t t = 0; t < memory; ++t) {
         slow[t] += (1 - std::exp(-dt_s / tau_s[t])) * (c - slow[t]);
         here(0, at++) = free_v * slow[t];
@@ -161,7 +159,6 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
   family("the state of charge and the direction", 2 * soc_knots);
   family("the state of charge", fine_knots);
   family("the voltage itself", volt_knots);
-  family("the current", current_knots);
   family("the load before", memory);
   family("the load at a state of charge", soc_current);
   family("the heat of the load", 1);

@@ -217,6 +217,14 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
       for (std::size_t k = onset; k < r.size(); ++k) {
         if (std::isfinite(r.current_a[k])) steps(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(m)) = r.current_a[k];
       }
+      // later recordings have it from their start
+      Eigen::Index row = static_cast<Eigen::Index>(r.size());
+      for (std::size_t n = 1; n < evidence.records().size(); ++n) {
+        for (const double a : evidence.records()[n].current_a) {
+          if (std::isfinite(a)) steps(row, static_cast<Eigen::Index>(m)) = a;
+          ++row;
+        }
+      }
       probes.push_back({{step, {0, r.time_s[onset]}, {}}, {0}, count++});
     }
     evidence.whiten(steps);

@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/next_experiment.hpp"
+#include "diagnosis/reference.hpp"
 #include "diagnosis/words.hpp"
 #include "host_sim/bad_input.hpp"
 #include "host_sim/cell_file.hpp"
@@ -80,7 +82,8 @@ Compared opened(const std::string& path, const CellFile& cell, const std::option
   if (!start.from.empty()) warnings.push_back({"initial_soc", path + ": " + start.from});
   const Recording& r = c.recording;
   const bool any_temperature = std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
-  c.record = {name_of_file(path), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{}, start.soc, start.sigma, start.told};
+  c.record = {name_of_file(path), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{}, start.soc, start.sigma, start.told, {}};
+  diagnosis::take_references(c.record, r.current_ref_a, r.voltage_ref_v, cell.parameters);
   return c;
 }
 
@@ -100,9 +103,6 @@ std::function<void(double, const std::string&)> progress_on_terminal() {
   };
 }
 
-/// What would separate the rivals. Nothing plans experiments yet.
-std::optional<NextExperiment> next_experiment(const diagnosis::Diagnosis&) { return std::nullopt; }
-
 std::string summary(const DiagnoseResult& r) {
   std::string text = fmt::format("{}: {}\n", name_of(r.diagnosis.verdict), r.diagnosis.statement);
   for (const Finding& f : r.diagnosis.findings) {
@@ -114,6 +114,7 @@ std::string summary(const DiagnoseResult& r) {
     }
     if (!f.because.empty()) text += "  " + f.because + "\n";
   }
+  if (r.next) text += fmt::format("{}\n  {}\n  {}\n", diagnosis::why(*r.next), diagnosis::instruction(*r.next), diagnosis::command(*r.next));
   if (r.baseline && r.extended && r.named()) text += fmt::format("Open loop: {:.2f} mV RMS before, {:.2f} mV with what was found.\n", 1e3 * r.baseline->rmse_v, 1e3 * r.extended->rmse_v);
   if (r.baseline_holdout && r.extended_holdout) {
     text += fmt::format("On recordings not used: {:.2f} mV RMS before, {:.2f} mV after; the noise floor is {:.2f} mV.\n", 1e3 * r.baseline_holdout->rmse_v,
@@ -133,18 +134,26 @@ int run(const DiagnoseOptions& options) {
   result.out = options.out;
   result.cell = read_cell(options.cell);
   std::vector<Record> records;
+  const std::vector<double>& told = options.initial_soc;
+  if (told.size() > 1 && told.size() != options.recordings.size()) {
+    throw BadInput("--initial-soc", 1, fmt::format("{} values for {} recordings, expected one for all or one for each", told.size(), options.recordings.size()));
+  }
+  const auto told_of = [&](std::size_t n) { return told.empty() ? std::nullopt : std::optional(told[std::min(n, told.size() - 1)]); };
   for (const std::string& path : options.recordings) {
-    result.recordings.push_back(opened(path, result.cell, options.initial_soc, start_of, result.warnings));
+    result.recordings.push_back(opened(path, result.cell, told_of(result.recordings.size()), start_of, result.warnings));
     records.push_back(result.recordings.back().record);
   }
-  for (const std::string& path : options.holdouts) result.holdouts.push_back(opened(path, result.cell, options.initial_soc, start_of_holdout, result.warnings));
+  for (const std::string& path : options.holdouts) result.holdouts.push_back(opened(path, result.cell, told.size() == 1 ? told_of(0) : std::nullopt, start_of_holdout, result.warnings));
 
   diagnosis::Options how;
   how.progress = progress_on_terminal();
   result.diagnosis = diagnosis::diagnose(result.cell.parameters, result.cell.mechanisms, records, how);
   diagnosis::describe(result.diagnosis, result.cell.parameters, records);
   for (const std::string& text : result.diagnosis.warnings) result.warnings.push_back({"readings", text});
-  if (result.diagnosis.verdict == Verdict::ambiguous) result.next = next_experiment(result.diagnosis);
+  if (result.named()) {
+    const bool temperature = std::any_of(records.begin(), records.end(), [](const Record& r) { return !r.temperature_c.empty(); });
+    result.next = diagnosis::next_experiment(result.cell.parameters, result.diagnosis, temperature);
+  }
 
   compare(result);
   result.baseline = figures(result.recordings, &Compared::base_v);

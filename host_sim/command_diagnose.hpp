@@ -2,7 +2,6 @@
 // recordings that were not used.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,7 +13,7 @@ struct DiagnoseOptions {
   std::string cell;
   std::vector<std::string> recordings;
   std::vector<std::string> holdouts;   ///< later recordings: compared with, nothing else
-  std::optional<double> initial_soc;   ///< what the user believes; not given: soc_ref's first value, else the first voltage tells
+  std::vector<double> initial_soc;     ///< what the user believes, of all recordings or of each; not given: soc_ref's first value, else the first voltage tells
   std::string out;                     ///< cell file with what was found; empty: none
   Output output;
 };

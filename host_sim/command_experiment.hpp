@@ -11,7 +11,7 @@ struct ExperimentCommandOptions {
   std::string name;
   double capacity_ah = 6;
   unsigned long seed = 1;
-  double step_s = 1;
+  double step_s = 0;        ///< 0: as the design wants it, mostly 1
   double high_c_rate = 1;   ///< of pulses, in multiples of the 1C current
   double low_c_rate = 0.25;
   std::string out;

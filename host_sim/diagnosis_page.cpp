@@ -297,7 +297,7 @@ std::string diagnosis_report(const DiagnoseResult& r) {
   report["limits"] = limits(r);
   report["not_testable"] = json::array();
   for (const diagnosis::NotTestable& n : d.not_testable) report["not_testable"].push_back({{"id", catalogue[n.mechanism].id}, {"name", words_of(n.mechanism).name}, {"reason", n.reason}});
-  report["next"] = r.next ? json{{"profile", r.next->profile}, {"why", r.next->why}} : json(nullptr);
+  report["next"] = r.next ? json{{"why", diagnosis::why(*r.next)}, {"instruction", diagnosis::instruction(*r.next)}, {"command", diagnosis::command(*r.next)}} : json(nullptr);
   report["charts"] = charts(r);
   return page(embedded::diagnosis_html, embedded::diagnosis_js, "bms diagnose", in_script(report.dump(-1, ' ', false, json::error_handler_t::replace)));
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/next_experiment.hpp"
 #include "host_sim/cell_file.hpp"
 #include "host_sim/recording.hpp"
 
@@ -28,20 +29,13 @@ struct Compared {
   std::vector<double> base_v, extended_v;  ///< empty: no voltage to compare with
 };
 
-/// What would settle which of several causes it is.
-struct NextExperiment {
-  std::string profile;                     ///< file or name
-  std::vector<std::size_t> separates;      ///< catalogue indices
-  std::string why;
-};
-
 struct DiagnoseResult {
   CellFile cell, extended_cell;
   diagnosis::Diagnosis diagnosis;
   std::vector<Compared> recordings, holdouts;
   std::optional<OpenLoopFigures> baseline, extended, baseline_holdout, extended_holdout;
   std::optional<SocErrors> soc;            ///< of the hold-outs that have a reference
-  std::optional<NextExperiment> next;
+  std::optional<diagnosis::NextExperiment> next;  ///< what would settle which of several causes it is
   std::string out;
   double wall_s = 0;
   std::vector<Warning> warnings;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "host_sim/splitmix.hpp"
+#include "experiments/splitmix.hpp"
 
 namespace bms {
 

@@ -259,7 +259,17 @@ std::string json_of(const DiagnoseResult& r) {
   json["not_testable"] = Json::array();
   for (const diagnosis::NotTestable& n : d.not_testable) json["not_testable"].push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});
   json["next_experiment"] = nullptr;
-  if (r.next) json["next_experiment"] = {{"profile", r.next->profile}, {"separates", ids_of(r.next->separates)}, {"why", r.next->why}};
+  if (r.next) {
+    json["next_experiment"] = {{"profile", r.next->profile},
+                               {"separates", ids_of(r.next->separates)},
+                               {"leaves", ids_of(r.next->leaves)},
+                               {"why", diagnosis::why(*r.next)},
+                               {"command", diagnosis::command(*r.next)},
+                               {"instruction", diagnosis::instruction(*r.next)},
+                               {"start_soc", number(r.next->start_soc)},
+                               {"duration_s", number(r.next->duration_s)},
+                               {"expected_gain", number(r.next->gain)}};
+  }
   json["faults"] = Json::array();
   for (const diagnosis::DataFault& f : d.faults) json["faults"].push_back({{"id", f.id}, {"text", f.text}, {"spans", spans_of(f.spans)}});
   json["decision"] = {{"base_cost", number(d.base_cost)}, {"best_cost", number(d.best_cost)}, {"remaining", number(d.remaining)}, {"adequacy", number(d.adequacy)}, {"fast_excess", number(d.fast_excess)}};

@@ -80,9 +80,9 @@ void add_experiment(CLI::App& app, bms::ExperimentCommandOptions& o) {
   c.add_option("--capacity-ah", o.capacity_ah, "of the cell; currents scale with it")->check(Within(0.01, 1000.0))->capture_default_str();
   c.add_option("--high-c", o.high_c_rate, "height of the pulses, in multiples of the 1C current")->check(Within(0.01, 1.0))->capture_default_str();
   c.add_option("--low-c", o.low_c_rate, "what LOW means in high_*_low_*")->check(Within(0.0, 1.0))->capture_default_str();
-  c.add_option("--step-s", o.step_s, "sampling interval")->check(Within(0.001, 60.0))->capture_default_str();
+  c.add_option("--step-s", o.step_s, "sampling interval; as the design wants it if not given, mostly 1")->check(Within(0.001, 60.0));
   c.add_option("--seed", o.seed, "of what is random in it")->capture_default_str();
-  c.add_option("--out", o.out, "CSV file to write: time_s, current_a")->required()->type_name("FILE");
+  c.add_option("--out", o.out, "CSV file to write: time_s, current_a; temperature_c of a climate chamber, current_ref_a where the contactor is open, voltage_ref_v of a source where the design wants them")->required()->type_name("FILE");
   add_output(c, o.output);
 }
 
@@ -123,9 +123,9 @@ void add_diagnose(CLI::App& app, bms::DiagnoseOptions& o) {
   CLI::App& c = *app.add_subcommand("diagnose", "Say where recordings and the calibrated cell part, and which physics or fault of an instrument does it");
   c.footer("Example: bms diagnose --cell my_cell.toml --recording monday.csv --holdout tuesday.csv --initial-soc 0.95 --out extended.toml --report monday.html");
   c.add_option("--cell", o.cell, "calibrated cell: a file, or the name of a built-in cell: " + bms::cell_names())->required();
-  c.add_option("--recording", o.recordings, "recordings to diagnose")->required()->type_name("FILE");
+  c.add_option("--recording", o.recordings, "recordings to diagnose, the earliest first")->required()->type_name("FILE");
   c.add_option("--holdout", o.holdouts, "later recordings of the same cell and instruments: their voltage is compared with at the end, nothing else")->type_name("FILE");
-  c.add_option("--initial-soc", o.initial_soc, "state of charge believed at the start; without it soc_ref's first value, else the first voltage tells")->check(Within(0.0, 1.0));
+  c.add_option("--initial-soc", o.initial_soc, "state of charge believed at the start, of all recordings or one for each; without it soc_ref's first value, else the first voltage tells")->check(Within(0.0, 1.0));
   c.add_option("--out", o.out, "cell file to write, with what was found")->type_name("EXTENDED.toml");
   add_output(c, o.output);
 }

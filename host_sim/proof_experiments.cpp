@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "diagnosis/words.hpp"
+#include "experiments/splitmix.hpp"
 #include "host_sim/proof_lab.hpp"
-#include "host_sim/splitmix.hpp"
 #include "identification/figures.hpp"
 #include "model/cell.hpp"
 

@@ -24,7 +24,7 @@ Compared begun(const Recording& r, const CellFile& cell) {
   const bool any_temperature = std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
   return {r,
           {std::filesystem::path(r.path).stem().string(), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{}, r.soc_ref.front(),
-           std::max(cell.parameters.tolerance.initial_soc, 1e-4), true},
+           std::max(cell.parameters.tolerance.initial_soc, 1e-4), true, {}},
           {},
           {}};
 }

@@ -68,6 +68,7 @@ std::optional<double> number(std::string_view text) {
 struct Column {
   std::vector<double>* into = nullptr;  // nullptr: ignored
   std::string name;
+  bool sparse = false;                  // mostly empty, NaN where it is
 };
 
 class Parser {
@@ -133,10 +134,12 @@ class Parser {
     if (name == "voltage_v") into = &recording_.voltage_v;
     if (name == "temperature_c") into = &recording_.temperature_c;
     if (name == "soc_ref") into = &recording_.soc_ref;
+    if (name == "current_ref_a") into = &recording_.current_ref_a;
+    if (name == "voltage_ref_v") into = &recording_.voltage_ref_v;
     for (const Column& other : columns_) {
       if (into != nullptr && other.into == into) refuse("column " + in_quotes(name) + " twice", "each column once");
     }
-    return {into, name};
+    return {into, name, into == &recording_.current_ref_a || into == &recording_.voltage_ref_v};
   }
 
   void require(const char* name, const std::vector<double>& column) const {
@@ -163,7 +166,7 @@ class Parser {
         refuse("more fields than the header has", fmt::format("{}", columns_.size()));
       }
       const std::size_t length = found == nullptr ? fields.size() : static_cast<std::size_t>(found - fields.data());
-      if (columns_[k].into != nullptr) columns_[k].into->push_back(value(fields.substr(0, length), columns_[k].name));
+      if (columns_[k].into != nullptr) columns_[k].into->push_back(value(fields.substr(0, length), columns_[k]));
       if (!last) fields.remove_prefix(length + 1);
     }
     const std::vector<double>& t = recording_.time_s;
@@ -172,10 +175,11 @@ class Parser {
     if (std::abs(t.back() - t.front()) > longest_s) refuse(fmt::format("time_s = {:g}", t.back()), "a recording of less than ten years");
   }
 
-  double value(std::string_view field, const std::string& name) {
+  double value(std::string_view field, const Column& column) {
+    if (column.sparse && trimmed(field).empty()) return std::numeric_limits<double>::quiet_NaN();
     const auto v = number(field);
-    if (!v) refuse(fmt::format("{} in column '{}' is not a number", in_quotes(field), name), "a number");
-    if (std::isnan(*v) && missing_++ == 0) first_missing_line_ = line_number_;
+    if (!v) refuse(fmt::format("{} in column '{}' is not a number", in_quotes(field), column.name), column.sparse ? "a number or nothing" : "a number");
+    if (std::isnan(*v) && !column.sparse && missing_++ == 0) first_missing_line_ = line_number_;
     return *v;
   }
 
@@ -306,7 +310,8 @@ std::vector<Sample> samples(const Recording& r) {
   for (std::size_t k = 0; k < r.rows(); ++k) {
     out[k].time_us = static_cast<std::uint64_t>(std::llround((r.time_s[k] - r.time_s.front()) * 1e6));
     out[k].current_ua = micro(r.current_a[k]);
-    if (!r.voltage_v.empty()) out[k].voltage_uv = micro(r.voltage_v[k]);
+    const bool of_the_cell = r.voltage_ref_v.empty() || r.current_ref_a.empty() || !(r.current_ref_a[k] == 0 && std::isfinite(r.voltage_ref_v[k]));
+    if (!r.voltage_v.empty() && of_the_cell) out[k].voltage_uv = micro(r.voltage_v[k]);
     if (!r.temperature_c.empty()) out[k].temperature_cdegc = centidegrees(r.temperature_c[k]);
   }
   return out;

@@ -1,8 +1,12 @@
 // Recordings: current, voltage and temperature over time, as CSV.
 //
-//   time_s,current_a,voltage_v[,temperature_c][,soc_ref]    header by name in any order; ',' or ';'; '#' starts a comment line
+//   time_s,current_a,voltage_v[,temperature_c][,soc_ref][,current_ref_a][,voltage_ref_v]
+//   header by name in any order; ',' or ';'; '#' starts a comment line
 //
 // Row k: current_a is the mean current over the interval that ends at time_s (> 0 charges); voltage_v is sampled at time_s.
+// current_ref_a, voltage_ref_v: what a trusted instrument says of the same row, empty where there was none. An open contactor is 0 A.
+// voltage_ref_v is at the cell's own terminals, or, with the contactor open, of a reference source in place of the cell: a row with
+// current_ref_a = 0 and a voltage_ref_v is not taken for the cell's voltage.
 // Refused (BadInput): missing column, non-number, time going backwards, fewer than 10 rows, empty or binary file.
 // Accepted with a warning: what looks wrong but can be read (Warning::id below). 'nan' is a missing reading; time must be there.
 #pragma once
@@ -31,6 +35,7 @@ struct Recording {
   std::vector<double> voltage_v;      ///< empty: a profile
   std::vector<double> temperature_c;  ///< empty: not recorded
   std::vector<double> soc_ref;        ///< empty: not known
+  std::vector<double> current_ref_a, voltage_ref_v;  ///< NaN where there was none; empty: no such column
   std::vector<Warning> warnings;
   double read_mb_per_second = 0;      ///< of this file, read and parsed
 
@@ -48,7 +53,7 @@ Recording parse_recording(const std::string& text, const std::string& path, Volt
 /// Adds the warnings that need to know the cell: values outside its range.
 void compare_with_cell(Recording& recording, const model::CellParameters<>& cell);
 
-/// What the estimator sees of it: rounded to micro-units, time from the first row.
+/// What the estimator sees of it: rounded to micro-units, time from the first row; a voltage that may be a reference source's is left out.
 std::vector<Sample> samples(const Recording& recording);
 
 }  // namespace bms

@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "experiments/experiment.hpp"
 #include "host_sim/bad_input.hpp"
-#include "host_sim/experiment.hpp"
 #include "host_sim/gaussian_noise.hpp"
 #include "host_sim/identification_data.hpp"
 #include "identification/linear_models.hpp"

@@ -80,10 +80,14 @@ struct Seen {
   CellTrace trace;
 };
 
-Seen observe(const HealthyCell& cell, const World& world) {
+/// source_v: what the voltage channel is connected to where that is not the cell; empty: always the cell.
+Seen observe(const HealthyCell& cell, const World& world, const std::vector<double>& source_v = {}) {
   const double step_s = world.drive.step_s;
   Seen seen;
   seen.trace = run_cell(cell, world.cell, world.drive, world.start_soc);
+  for (std::size_t k = 0; k < source_v.size(); ++k) {
+    if (std::isfinite(source_v[k])) seen.trace.voltage_v[k] = source_v[k];
+  }
   seen.current_a = faulty_current_a(world.faults.current, step_s, world.drive.current_a);
   seen.voltage_v = faulty_voltage_v(world.faults.voltage, step_s, seen.trace.voltage_v);
   seen.temperature_c = faulty_temperature_c(world.faults.temperature, step_s, seen.trace.temperature_c);
@@ -231,6 +235,26 @@ Series measure(const World& world, const Seen& seen, const Laboratory& lab, std:
   if (lab.measures_temperature) series.temperature_c = read_by(instruments.temperature_c, step_s, seen.temperature_c);
   series.soc = seen.trace.soc;
   for (std::size_t k = 0; k < seen.current_a.size(); ++k) series.time_s.push_back(static_cast<double>(k) * step_s);
+  return series;
+}
+
+/// Run later: what chance does is new, what is wrong has stayed.
+Series driven(const HealthyCell& cell, const std::vector<Sized>& effects, Laboratory lab, std::uint64_t seed, const Errand& errand) {
+  Random random(seed);
+  World world;
+  world.holdout = true;
+  world.start_soc = errand.start_soc;
+  world.drive = {.step_s = errand.step_s, .current_a = errand.current_a, .ambient_c = errand.ambient_c, .told_temperature_c = {}};
+  const double laboratory_c = between(random, 21, 29);
+  for (double& c : world.drive.ambient_c) c = std::isfinite(c) ? c : laboratory_c;
+  world = with_effects(std::move(world), effects);
+  lab.measures_temperature = lab.measures_temperature || errand.measures_temperature;
+  const Seen seen = observe(cell, world, errand.source_v);
+  Series series = measure(world, seen, lab, random.bits());
+  series.terminal_v = seen.trace.voltage_v;
+  if (world.cell.contact_scale != 0) {
+    for (std::size_t k = 0; k < series.terminal_v.size(); ++k) series.terminal_v[k] -= world.cell.contact_scale * world.cell.contact_ohm[k] * errand.current_a[k];
+  }
   return series;
 }
 
@@ -468,6 +492,7 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
 
   made.recording = measure(full, seen, lab, instrument_seed);
   made.holdout = measure(later_world, later_seen, lab, mixed(instrument_seed, 1));
+  made.drive = [cell, sized, lab, seed = mixed(instrument_seed, 2)](const Errand& errand) { return driven(cell, sized, lab, seed, errand); };
   made.cell = calibrate(cell, lab.calibration_share, random);
   const double told = std::clamp(0.0025 * random.normal(), -0.005, 0.005);
   made.believed_initial_soc = std::clamp(full.start_soc + full.believed_soc_excess + told, 0.0, 1.0);
@@ -505,6 +530,7 @@ Case make_case(Split split, std::uint64_t seed, std::size_t index) {
   constexpr std::array kinds = {"null", "single", "pair", "outside", "data_fault"};
   made.answer.kind = kinds[static_cast<std::size_t>(slot.kind)];
   if (slot.kind == Kind::data_fault) {
+    made.drive = nullptr;
     made.answer.ids = {data_faults[(slot.number + turn) % data_faults.size()]};
     spoil(made.answer.ids.front(), made.recording, made.holdout, made.answer, random);
   }

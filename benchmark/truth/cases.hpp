@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct CalibratedCell {
 /// As measured, but soc, which is true. current_a > 0 charges and is the mean over the interval that ends at time_s.
 struct Series {
   std::vector<double> time_s, current_a, voltage_v, temperature_c /* may be empty */, soc;
+  std::vector<double> terminal_v{};  ///< of an errand: at the cell's own terminals, true
 };
 
 struct Answer {
@@ -38,12 +40,22 @@ struct Answer {
   std::vector<double> amplitudes;        ///< one per id: the parameter that was scaled, in the unit of effects.hpp
 };
 
+/// What somebody drives a cell through on purpose. Columns of equal length.
+struct Errand {
+  double step_s = 1, start_soc = 0.95;
+  std::vector<double> current_a;      ///< true; [0] is 0
+  std::vector<double> ambient_c;      ///< NaN: as warm as the laboratory happens to be
+  std::vector<double> source_v;       ///< what the voltage channel is connected to in place of the cell; NaN: the cell
+  bool measures_temperature = false;  ///< even if the case's recording does not
+};
+
 struct Case {
   std::string name;  ///< says nothing about the answer
   CalibratedCell cell;
   double believed_initial_soc = 0, holdout_initial_soc = 0;  ///< the latter is true to 0.5 %
   Series recording, holdout;
   Answer answer;
+  std::function<Series(const Errand&)> drive;  ///< the same cell and instruments with the same effects, later; empty for data faults
 };
 
 enum class Split { development, final };

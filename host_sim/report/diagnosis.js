@@ -269,7 +269,7 @@
     } else if (report.error_mv !== null) {
       make(box, 'p', mv(report.error_mv) + ' RMS between recording and cell file' + (report.floor_mv > 0 ? '; a healthy cell leaves up to ' + mv(report.floor_mv) : '') + '.', 'why');
     }
-    if (report.next) make(box, 'p', 'Next: ' + report.next.profile + '. ' + report.next.why, 'action');
+    if (report.next) make(box, 'p', [report.next.why, report.next.instruction, report.next.command].join(' '), 'action');
     report.mechanisms.forEach(m => {
       const p = make(box, 'p', undefined, 'action');
       make(p, 'b', bare(m.name) + ': ');

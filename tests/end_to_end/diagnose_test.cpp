@@ -201,6 +201,38 @@ TEST_F(DiagnoseTool, SaysWhereTheStartWasTakenFrom) {
   EXPECT_EQ(told["recordings"][0]["initial_soc"], 0.97);
 }
 
+/// An offset of the voltage, which a gain explains as well on an LFP cell; then the sense wires on a source.
+TEST_F(DiagnoseTool, AsksForTheExperimentThatDecidesAndDecidesByIt) {
+  const std::string now = simulated("now.csv", "voltage_offset:offset_v=0.012");
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + now + " --report " + path("r.html"));
+  ASSERT_EQ(r["verdict"], "AMBIGUOUS");
+  const json& next = r["next_experiment"];
+  ASSERT_TRUE(next.is_object());
+  EXPECT_EQ(next["profile"], "meter_check");
+  EXPECT_EQ(next["separates"].size(), r["mechanisms"][0]["equivalent_to"].size() + 1);
+  EXPECT_GT(next["expected_gain"], 7);
+  EXPECT_THAT(next["why"].get<std::string>(), HasSubstr("To tell "));
+  EXPECT_THAT(content(path("r.html")), HasSubstr("bms experiment meter_check"));
+  ASSERT_EQ(run_tool("experiment meter_check --out " + path("p.csv")).exit_code, 0);
+  // what the faulty channel reads of the source, and of the resting cell
+  std::istringstream profile(content(path("p.csv")));
+  std::ofstream later(path("later.csv"));
+  std::string line;
+  std::getline(profile, line);
+  ASSERT_EQ(line, "time_s,current_a,current_ref_a,voltage_ref_v");
+  later << "time_s,current_a,current_ref_a,voltage_ref_v,voltage_v\n";
+  for (int k = 0; std::getline(profile, line); ++k) {
+    const std::string source = line.substr(line.rfind(',') + 1);
+    later << line << "," << (source.empty() ? 3.3895 : std::stod(source)) + 0.012 + 0.001 * ((7 * k) % 5 - 2) << "\n";
+  }
+  later.close();
+  const json both = result("--cell table9 --initial-soc 0.98 --initial-soc 0.95 --recording " + now + " --recording " + path("later.csv"));
+  EXPECT_EQ(both["verdict"], "CAUSE");
+  EXPECT_EQ(both["mechanisms"][0]["id"], "voltage_offset");
+  EXPECT_NEAR(both["mechanisms"][0]["parameters"][0]["value"], 0.012, 0.001);
+  EXPECT_TRUE(both["next_experiment"].is_null());
+}
+
 TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
   const std::vector<std::string> wrong = {
       "",
@@ -211,6 +243,7 @@ TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
       "--cell table9 --recording " + shift + " --holdout /no/such/file.csv",
       "--cell table9 --recording " + shift + " --initial-soc 98",
       "--cell table9 --recording " + shift + " --initial-soc nan",
+      "--cell table9 --recording " + shift + " --recording " + shift + " --initial-soc 0.9 --initial-soc 0.8 --initial-soc 0.7",
       "--cell table9 --recording " + made("nine.csv", 9, 1, [](int) { return 0.0; }, [](int) { return 3.3; }),
       "--cell table9 --recording " + shift + " --json - --report -",
   };

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include "host_sim/cell_file.hpp"
@@ -38,6 +39,31 @@ std::vector<std::string> warnings(const std::string& text) {
   std::vector<std::string> ids;
   for (const Warning& w : r.warnings) ids.push_back(w.id);
   return ids;
+}
+
+/// Rows with columns of trusted instruments; `reference` by row.
+std::string with_references(const std::function<std::string(int)>& reference) {
+  std::string text = "time_s,current_a,voltage_v,current_ref_a,voltage_ref_v\n";
+  for (int k = 0; k < 20; ++k) text += std::to_string(k) + ",0.01,3.3," + reference(k) + "\n";
+  return text;
+}
+
+TEST(Recording, ReferencesAreThereWhereTheyAreGivenAndNoReadingIsMissing) {
+  const Recording r = parse_recording(with_references([](int k) { return std::string(k < 5 ? "0,3.6" : k < 10 ? ",3.31" : k == 12 ? "nan," : ","); }), "log.csv");
+  EXPECT_EQ(r.current_ref_a[4], 0);
+  EXPECT_TRUE(std::isnan(r.current_ref_a[5]));
+  EXPECT_EQ(r.voltage_ref_v[9], 3.31);
+  EXPECT_TRUE(std::isnan(r.voltage_ref_v[12]));
+  EXPECT_TRUE(r.warnings.empty());
+  const std::vector<Sample> seen = samples(r);
+  EXPECT_EQ(seen[4].voltage_uv, no_reading) << "contactor open, a source on the sense wires";
+  EXPECT_EQ(seen[9].voltage_uv, 3'300'000) << "a meter on the cell";
+}
+
+TEST(Recording, ABadReferenceIsRefusedAndOnlyAReferenceMayBeEmpty) {
+  EXPECT_THAT(refusal(with_references([](int k) { return std::string(k == 3 ? "0.1V," : ","); })), HasSubstr("log.csv:5: '0.1V' in column 'current_ref_a' is not a number, expected a number or nothing"));
+  EXPECT_THAT(refusal(with_references([](int k) { return std::string(k == 3 ? "0" : ","); })), HasSubstr("log.csv:5: 4 fields"));
+  EXPECT_THAT(refusal(header + rows() + "20,,3.3\n"), HasSubstr("'' in column 'current_a'"));
 }
 
 TEST(Recording, ReadsColumnsByNameInAnyOrder) {

@@ -1,3 +1,4 @@
+#include "experiments/experiment.hpp"
 #include "host_sim/simulation.hpp"
 
 #include <gtest/gtest.h>
@@ -5,7 +6,6 @@
 #include <cmath>
 
 #include "host_sim/cell_file.hpp"
-#include "host_sim/experiment.hpp"
 #include "identification/figures.hpp"
 
 namespace bms {
@@ -49,6 +49,27 @@ TEST(Experiment, EveryProfileStaysWithin1CAndIsTheSameEachTime) {
     }
   }
   EXPECT_FALSE(experiment("no_such_thing", {}).has_value());
+}
+
+TEST(Experiment, WhatTellsCausesApartStaysInTheCellAndSaysWhatToLog) {
+  int designs = 0;
+  for (const Experiment& e : experiments()) {
+    if (std::isnan(e.start_soc)) continue;
+    ++designs;
+    EXPECT_FALSE(e.instruction.empty()) << e.name;
+    double soc = e.start_soc, before_s = 0;
+    const std::vector<ProfileRow> rows = experiment(e.name, {.capacity_ah = 2.5, .step_s = e.step_s}).value();
+    for (const ProfileRow& row : rows) {
+      soc += row.current_a * (row.time_s - before_s) / 3'600 / 2.5;
+      before_s = row.time_s;
+      ASSERT_GT(soc, 0.05) << e.name << " at " << row.time_s;
+      ASSERT_LT(soc, 0.98) << e.name << " at " << row.time_s;
+      if (row.contactor_open) { ASSERT_EQ(row.current_a, 0) << e.name; }
+      if (std::isfinite(row.source_v)) { ASSERT_TRUE(row.contactor_open) << "nobody takes the sense wires off a cell that is loaded: " << e.name; }
+    }
+    EXPECT_LE(before_s, 12 * 3'600) << e.name;
+  }
+  EXPECT_GE(designs, 10);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "host_sim/experiment.hpp"
+#include "experiments/experiment.hpp"
 #include "identification/data.hpp"
 #include "plant/truth_cell.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/experiment.hpp"
+#include "experiments/experiment.hpp"
 #include "plant/instruments.hpp"
 #include "plant/truth_cell.hpp"
 

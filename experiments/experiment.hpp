@@ -1,4 +1,5 @@
-// Current profiles by name: what to drive a cell through, as numbers. Writing them to a file is command_experiment's.
+// Experiments by name: what to drive a cell through, as numbers. Writing them to a file is host_sim/command_experiment's; which of
+// them would tell two causes apart is asked by diagnosis/next_experiment.
 //
 // A design is one function in experiment.cpp that lays out a course, in multiples of the 1C current and whole seconds, and one
 // line in the table there. Sampling is common to all: row k holds the mean current over the step_s that end at time_s, rounded
@@ -8,6 +9,7 @@
 // on every machine: integers for chance and time, plain IEEE arithmetic (no fused multiply-add) for the rest. No I/O.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -15,10 +17,18 @@
 
 namespace bms {
 
-/// Mean current over the interval that ends at time_s.
+/// What the equipment does in the interval that ends at time_s.
 struct ProfileRow {
   double time_s;
-  double current_a;  ///< > 0 charges
+  double current_a;                  ///< mean, > 0 charges
+  double temperature_c = std::nan("");  ///< of the climate chamber; NaN: as it comes
+  bool contactor_open = false;       ///< all the while: what the current sensor reads is its own
+  bool ammeter = false;              ///< a trusted one in series, to be read
+  bool voltmeter = false;            ///< a trusted one on the cell's own terminals, to be read
+  double source_v = std::nan("");    ///< at time_s the voltage sense wires are on a reference source of this voltage; NaN: on the cell
+
+  /// What is known of the current beside what the sensor reads: 0 with the contactor open, as set with an ammeter; else NaN.
+  double current_ref_a() const { return contactor_open ? 0 : ammeter ? current_a : std::nan(""); }
 };
 
 struct ExperimentOptions {
@@ -35,9 +45,15 @@ struct Experiment {
   std::string_view name;
   std::string_view description;
   void (*lay_out)(Course&);
+  double start_soc = std::nan("");  ///< where it wants to begin; NaN: wherever the cell is
+  std::string_view instruction = {};     ///< to the technician: what to prepare and what to log; empty: run it
+  double step_s = 1;                     ///< longest interval at which logging it makes sense
 };
 
 const std::vector<Experiment>& experiments();
+
+/// nullptr when there is no experiment of that name.
+const Experiment* find_experiment(std::string_view name);
 
 /// Nothing when there is no experiment of that name.
 std::optional<std::vector<ProfileRow>> experiment(std::string_view name, const ExperimentOptions& options = {});

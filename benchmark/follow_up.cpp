@@ -1,0 +1,77 @@
+#include "benchmark/follow_up.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "diagnosis/next_experiment.hpp"
+#include "diagnosis/reference.hpp"
+
+namespace bms::benchmark {
+
+namespace {
+
+std::vector<std::vector<std::string>> sets_of(const diagnosis::Diagnosis& d) {
+  std::vector<std::vector<std::string>> sets;
+  const auto id = [](std::size_t m) { return std::string(model::catalogue[m].id); };
+  for (const diagnosis::Finding& f : d.findings) {
+    auto& set = sets.emplace_back(1, id(f.setting.index));
+    for (const std::size_t e : f.equivalent_to) set.push_back(id(e));
+  }
+  return sets;
+}
+
+bool contains(const std::vector<std::string>& list, const std::string& id) { return std::find(list.begin(), list.end(), id) != list.end(); }
+
+/// As the technician does it: the profile at the recording's own rate, references where it has them.
+diagnosis::Record carried_out(const truth::Case& c, const model::CellParameters<>& cell, const diagnosis::NextExperiment& next) {
+  const double step_s = std::min(next.step_s, c.recording.time_s[1] - c.recording.time_s[0]);
+  ExperimentOptions options;
+  options.capacity_ah = next.capacity_ah;
+  options.step_s = step_s;
+  truth::Errand errand;
+  errand.step_s = step_s;
+  errand.start_soc = next.start_soc;
+  std::vector<double> current_ref_a, voltage_ref_v;
+  const std::vector<ProfileRow> rows = experiment(next.profile, options).value();
+  for (const ProfileRow& row : rows) {
+    errand.current_a.push_back(row.current_a);
+    errand.ambient_c.push_back(row.temperature_c);
+    errand.source_v.push_back(row.source_v);
+    errand.measures_temperature = errand.measures_temperature || std::isfinite(row.temperature_c);
+    current_ref_a.push_back(row.current_ref_a());
+  }
+  const truth::Series s = c.drive(errand);
+  for (std::size_t k = 0; k < rows.size(); ++k) voltage_ref_v.push_back(rows[k].voltmeter ? s.terminal_v[k] : rows[k].source_v);
+  diagnosis::Record r{next.profile, s.time_s, s.current_a, s.voltage_v, s.temperature_c, next.start_soc, cell.tolerance.initial_soc, true, {}};
+  diagnosis::take_references(r, current_ref_a, voltage_ref_v, cell);
+  return r;
+}
+
+}  // namespace
+
+std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell, const diagnosis::Record& recording, const diagnosis::Diagnosis& first) {
+  if (first.verdict != diagnosis::Verdict::ambiguous || !c.drive) return std::nullopt;
+  FollowUp up;
+  const auto begin = std::chrono::steady_clock::now();
+  const auto next = diagnosis::next_experiment(cell, first, !recording.temperature_c.empty());
+  up.plan_wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (!next) return up;
+  up.profile = next->profile;
+  up.expected_gain = next->gain;
+  up.duration_s = next->duration_s;
+  up.sets = sets_of(diagnosis::diagnose(cell, {}, {recording, carried_out(c, cell, *next)}));
+
+  if (c.answer.ids.size() != 1) return up;
+  const std::string& truth = c.answer.ids.front();
+  const std::vector<std::string> confused = sets_of(first).front();
+  bool named = false, rival = false;
+  for (const auto& set : up.sets) {
+    named = named || contains(set, truth);
+    for (const std::string& id : set) rival = rival || (id != truth && contains(confused, id));
+  }
+  up.separated = named && !rival;
+  return up;
+}
+
+}  // namespace bms::benchmark

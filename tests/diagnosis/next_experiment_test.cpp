@@ -1,0 +1,158 @@
+// Which experiment is asked for, and whether what it adds decides.
+#include "diagnosis/next_experiment.hpp"
+
+#include <gmock/gmock.h>
+
+#include "diagnosis/reference.hpp"
+#include "tests/diagnosis/evidence.hpp"
+
+namespace bms::diagnosis {
+namespace {
+
+constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
+
+MechanismSetting setting(std::string_view id, std::initializer_list<double> values) {
+  MechanismSetting s = model::unsaid(index_of(id), 6);
+  std::copy(values.begin(), values.end(), s.value.begin());
+  return s;
+}
+
+/// A diagnosis that has found these, each as well known as a recording tells it, and cannot tell them apart.
+Diagnosis undecided(const std::vector<MechanismSetting>& set, double deviation) {
+  const Evidence evidence(test::table9(), {}, {test::recorded(test::drive(0.1, 1), 0.7, 1)}, NoiseModel{});
+  Diagnosis d;
+  d.verdict = Verdict::ambiguous;
+  const auto fitted = [&](const MechanismSetting& s) {
+    Fitted f{with(evidence.base(), s), {}};
+    const auto n = static_cast<Eigen::Index>(f.hypothesis.sought().size());
+    f.covariance = Eigen::MatrixXd::Identity(n, n) * deviation * deviation;
+    return f;
+  };
+  d.extended = fitted(set.front()).hypothesis;
+  d.covariance = fitted(set.front()).covariance;
+  Finding f;
+  f.setting = set.front();
+  for (std::size_t k = 1; k < set.size(); ++k) {
+    f.equivalent_to.push_back(set[k].index);
+    f.rivals.push_back(fitted(set[k]));
+  }
+  d.findings = {f};
+  return d;
+}
+
+TEST(NextExperiment, LeakageAndAnOffsetArePartedByAnOpenContactor) {
+  const auto next = next_experiment(test::table9(), undecided({setting("leakage", {0.05}), setting("current_offset", {-0.05})}, 0.003), false);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->profile, "zero_current") << "the shortest in which nothing flows";
+  EXPECT_THAT(next->separates, testing::ElementsAre(index_of("leakage"), index_of("current_offset")));
+  EXPECT_GE(next->gain, 40);
+  EXPECT_THAT(why(*next), testing::StartsWith("To tell "));
+}
+
+TEST(NextExperiment, EveryUsualSetHasADesignThatPartsIt) {
+  const std::vector<std::vector<MechanismSetting>> sets = {
+      {setting("voltage_offset", {0.01}), setting("voltage_gain", {0.003})},
+      {setting("current_gain", {0.03}), setting("capacity_change", {0.03})},
+      {setting("resistance_growth", {0.3}), setting("contact_step", {0.004})},
+      {setting("resistance_growth", {0.3}), setting("fast_polarisation", {0.004, 0.6})},
+      {setting("self_heating", {4, 900, 30'000}), setting("temperature_resistance", {20'000})},
+      {setting("ocv_hysteresis", {0.01}), setting("slow_polarisation", {0.004, 1'300})},
+      {setting("initial_soc", {0.04}), setting("capacity_change", {0.08}), setting("ocv_shape", {0.03, 0.03})},
+      {setting("coulombic_loss", {0.01}), setting("leakage", {0.02})},
+  };
+  for (const auto& set : sets) {
+    const auto next = next_experiment(test::table9(), undecided(set, 1e-4), true);
+    const std::string_view first = model::catalogue[set.front().index].id;
+    ASSERT_TRUE(next) << first;
+    EXPECT_EQ(next->separates.size(), set.size()) << first << " by " << next->profile;
+  }
+}
+
+TEST(NextExperiment, IsLaidOutForTheChargeThatTheCellMayHoldAtLeast) {
+  const auto next = next_experiment(test::table9(), undecided({setting("capacity_change", {0.25}), setting("ocv_shape", {0.05, 0.05})}, 1e-3), false);
+  ASSERT_TRUE(next);
+  EXPECT_LE(next->capacity_ah, 4.5);
+  EXPECT_THAT(command(*next), testing::HasSubstr("--capacity-ah 4.5"));
+}
+
+TEST(NextExperiment, WhatStandsAloneNeedsNone) {
+  Diagnosis d = undecided({setting("leakage", {0.05})}, 0.003);
+  EXPECT_FALSE(next_experiment(test::table9(), d, true));
+}
+
+/// An hour's drive, then half an hour with the contactor open; read_a: what the sensor says there.
+Record with_open_contactor(double offset_a) {
+  std::vector<double> current_a = test::drive(2, 31);
+  for (std::size_t k = 3'600; k < 5'400; ++k) current_a[k] = 0;
+  Record r = test::recorded(current_a, 0.7, 31);
+  std::vector<double> reference_a(r.size(), std::nan(""));
+  for (std::size_t k = 0; k < r.size(); ++k) r.current_a[k] += offset_a;
+  for (std::size_t k = 3'600; k < 5'400; ++k) reference_a[k] = 0;
+  take_references(r, reference_a, {}, test::table9());
+  return r;
+}
+
+TEST(Reference, TheReadingOfAnOpenContactorDecidesBetweenLeakageAndAnOffset) {
+  const double offset_a = 0.06;
+  const Record r = with_open_contactor(offset_a);
+  ASSERT_GE(r.checks.size(), 5U);
+  const auto cost = [](const Record& record, const char* id) {
+    const Evidence evidence(test::table9(), {}, {record}, NoiseModel{});
+    return evidence.fit(with(evidence.base(), index_of(id), 6)).cost;
+  };
+  Record without = r;
+  without.checks.clear();
+  EXPECT_LT(std::abs(cost(without, "leakage") - cost(without, "current_offset")), 7) << "the voltage alone does not tell";
+  EXPECT_GT(cost(r, "leakage") - cost(r, "current_offset"), 30);
+}
+
+TEST(Reference, ChecksOfTheVoltageTellAnOffsetFromAGainAndAContact) {
+  Record r = test::recorded(test::drive(1, 32), 0.7, 32, [](std::size_t, double, double) { return 0.01; });
+  std::vector<double> reference_a(r.size(), std::nan("")), reference_v(r.size(), std::nan(""));
+  for (std::size_t k = 600; k < 1'800; ++k) {
+    reference_a[k] = 0;
+    reference_v[k] = k / 120 % 2 == 0 ? 2.5 : 3.6;
+    r.voltage_v[k] = reference_v[k] + 0.01;
+  }
+  take_references(r, reference_a, reference_v, test::table9());
+  EXPECT_TRUE(std::isnan(r.voltage_v[700])) << "a source's voltage is not the cell's";
+  const Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
+  EXPECT_EQ(evidence.used(), r.size() - 1'200 - (std::abs(r.current_a[0]) < 0.06 ? 0 : 1));
+  const auto cost = [&](const char* id) { return evidence.fit(with(evidence.base(), index_of(id), 6)).cost; };
+  EXPECT_GT(cost("voltage_gain") - cost("voltage_offset"), 30);
+  EXPECT_GT(cost("contact_step") - cost("voltage_offset"), 30);
+}
+
+/// The derivatives of the checks, all mechanisms that they see.
+TEST(Reference, DerivativesOfChecksAreThoseOfTheSimulation) {
+  Record r = with_open_contactor(0.1);
+  r.checks.push_back({Check::Channel::voltage, 4'000, 2, 3.31, 3.3, 0.001});
+  r.checks.push_back({Check::Channel::voltage, 4'100, -2, 3.21, 3.2, 0.001});
+  const Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
+  const auto checks = static_cast<Eigen::Index>(r.checks.size());
+  const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(evidence.calibration().size()), 0.2);
+  for (const char* id : {"current_offset", "current_gain", "voltage_offset", "voltage_gain", "contact_step"}) {
+    Hypothesis h = with(evidence.base(), index_of(id), 6);
+    h.settings.back().value[0] = 0.01;
+    const Eigen::VectorXd exact = evidence.derivatives(h, u, std::vector<Sought>{{0, 0}}).col(0).tail(checks);
+    Hypothesis more = h, less = h;
+    more.settings.back().value[0] += 1e-6;
+    less.settings.back().value[0] -= 1e-6;
+    const Eigen::VectorXd difference = (evidence.residual(less, u) - evidence.residual(more, u)).tail(checks) / 2e-6;
+    EXPECT_GT(exact.norm(), 0.1) << id;
+    EXPECT_LT((difference - exact).norm(), 1e-4 * exact.norm()) << id;
+  }
+}
+
+TEST(Evidence, ALaterRecordingKeepsTheContactAndForgetsTheWrongStart) {
+  const Record r = test::recorded(test::drive(0.5, 33), 0.7, 33);
+  const Evidence evidence(test::table9(), {}, {r, r}, NoiseModel{});
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size()));
+  const std::vector<double> plain = evidence.voltage(evidence.base(), none, 1);
+  EXPECT_EQ(evidence.voltage(with(evidence.base(), setting("initial_soc", {0.1})), none, 1), plain);
+  const std::vector<double> contact = evidence.voltage(with(evidence.base(), setting("contact_step", {0.005, 1'000})), none, 1);
+  EXPECT_NEAR(contact[500] - plain[500], 0.005 * r.current_a[500], 1e-9) << "before the moment at which the first one got it";
+}
+
+}  // namespace
+}  // namespace bms::diagnosis
