@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "diagnosis/words.hpp"
-#include "host_sim/proof_lab.hpp"
 #include "experiments/splitmix.hpp"
+#include "host_sim/proof_lab.hpp"
 #include "identification/figures.hpp"
 #include "model/cell.hpp"
 
@@ -90,7 +90,8 @@ void claim_number(ProofExperiment& e, const std::string& id, const std::string& 
     c.number->said_sigma = said->sigma;
     c.said = text(said->value, said->sigma);
     const double apart = std::abs(said->value - measured.value);
-    c.within_uncertainty = apart <= 2 * std::hypot(said->sigma, measured.sigma);
+    // what is read off the data, as a moment or a limit, has no deviation
+    if (said->sigma > 0) c.within_uncertainty = apart <= 2 * std::hypot(said->sigma, measured.sigma);
     c.holds = apart <= allowed;
   }
   e.claims.push_back(std::move(c));
@@ -402,9 +403,11 @@ void charge_balance_of_another(ProofLab& lab, ProofExperiment& e) {
   for (const char* name : {"dyn50_P25", "dyn45_P05"}) {
     const DiagnoseResult& r = lab.diagnosed(cell, std::vector<std::string>{std::string("a123_esctoolbox/") + name});
     const bool any = found(r, "current_offset") || found(r, "coulombic_loss") || found(r, "leakage");
+    // who has refused to look has not found it in order
+    const bool looked = r.diagnosis.verdict != diagnosis::Verdict::data_fault && r.diagnosis.verdict != diagnosis::Verdict::not_testable;
     const Idle idle = idle_of(lab.recording(std::string("a123_esctoolbox/") + name));
     e.claims.push_back({e.id + "." + name, std::string(name) + ": charge that balances is not called lost", said_of(r), fmt::format("{:+.1f} mA read while idle; the counters balance within 0.6 %", 1e3 * idle.reading_a.value),
-                        "none of current_offset, coulombic_loss, leakage", {}, {}, {}, !any});
+                        "diagnosed, and none of current_offset, coulombic_loss, leakage", {}, {}, {}, looked && !any});
     if (const auto said = lost_charge(r)) e.notes.push_back(fmt::format("{}: {:.0f} +- {:.0f} mAh as found", name, 1e3 * said->value, 1e3 * said->sigma));
   }
   e.notes.push_back("dyn50_P25 as sampled ends 2.1 % (43 mAh) higher than the cycler's counters: its current was resampled. A loss of that size is in the recording, though not in the cell.");
