@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/bursts.hpp"
 #include "diagnosis/hypothesis.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/noise.hpp"
@@ -203,8 +204,7 @@ Outcome nearest_signature(const truth::Case& c) {
       Hypothesis h = with(base, setting);
       if (m == contact_intermittent) {
         double ohm = 0;
-        h.bursts = {find_bursts(q.recording, std::vector<double>(error_v.data(), error_v.data() + error_v.size()), q.noise,
-                                model::cell_detail::rc_value(q.cell.rc, q.cell.rc.r0_ohm, 0.5), ohm)};
+        h.bursts = {find_bursts(q.recording, std::vector<double>(error_v.data(), error_v.data() + error_v.size()), evidence.whitener(0), ohm)};
       }
       // one strength, one signature
       for (std::size_t p = 0; p < catalogue[m].parameters; ++p) {

@@ -15,6 +15,7 @@ inline constexpr double same = 7;               ///< rivals this close cannot be
 inline constexpr double inseparable = 0.97;     ///< signatures this much alike are one class
 inline constexpr double same_inseparable = 30;  ///< and of a class all this close are named
 inline constexpr double per_unknown = 3;        ///< cost of every unknown after the first
+inline constexpr double per_burst = 12;         ///< cost of every burst of a loose contact: two moments that were sought
 inline constexpr double explained = 0.65;       ///< share of the mismatch that a cause must explain
 inline constexpr double much_left = 40;         ///< what must remain, in gain, to say that something unknown is there
 inline constexpr double larger_than_error = 3; ///< one of several causes does not move the voltage by more than this times the error

@@ -29,7 +29,7 @@ double price(std::size_t mechanism, std::size_t bursts) {
   double unknowns = 0;
   for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) unknowns += catalogue[mechanism].parameter[p].role != Role::given ? 1 : 0;
   if (catalogue[mechanism].id == "contact_step") unknowns += 4;  // its moment was sought too
-  return decision::per_unknown * (unknowns - 1) + 16.0 * static_cast<double>(bursts);
+  return decision::per_unknown * (unknowns - 1) + decision::per_burst * static_cast<double>(bursts);
 }
 
 double price(const Hypothesis& h) {

@@ -45,15 +45,7 @@ Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const Ro
 
 void Whitener::whiten(Eigen::Ref<Columns> columns) const {
   if (columns.cols() == 1) {  // the residual itself, most often
-    double fast = 0, slow = 0;
-    for (std::size_t k = 0; k < gains_.size(); ++k) {
-      const Gain& g = gains_[k];
-      double& value = columns(static_cast<Eigen::Index>(k), 0);
-      const double news = g.weight > 0 ? value - fast - g.slow_size * slow : 0;
-      fast = g.fast_left * (fast + g.fast * news);
-      slow = g.slow_left * (slow + g.slow * news);
-      value = g.weight * news;
-    }
+    whiten(0, {columns.data(), gains_.size()});
     return;
   }
   Eigen::RowVectorXd fast = Eigen::RowVectorXd::Zero(columns.cols()), slow = fast, news = fast;
@@ -70,6 +62,17 @@ void Whitener::whiten(Eigen::Ref<Columns> columns) const {
       slow *= g.slow_left;
       row.setZero();
     }
+  }
+}
+
+void Whitener::whiten(std::size_t first, std::span<double> values) const {
+  double fast = 0, slow = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const Gain& g = gains_[first + k];
+    const double news = g.weight > 0 ? values[k] - fast - g.slow_size * slow : 0;
+    fast = g.fast_left * (fast + g.fast * news);
+    slow = g.slow_left * (slow + g.slow * news);
+    values[k] = g.weight * news;
   }
 }
 

@@ -48,6 +48,8 @@ class Whitener {
 
   /// In place, rows first .. first + size of columns.
   void whiten(Eigen::Ref<Columns> columns) const;
+  /// The same for one column that is 0 before row first.
+  void whiten(std::size_t first, std::span<double> values) const;
   /// Sum of the logarithms of the variances: the part of -2 log likelihood that does not depend on the residual.
   double log_determinant() const { return log_determinant_; }
   /// Rows that count.

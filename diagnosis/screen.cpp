@@ -10,6 +10,9 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "diagnosis/bursts.hpp"
+#include "diagnosis/decision.hpp"
+
 namespace bms::diagnosis {
 
 namespace {
@@ -314,7 +317,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
       std::vector<double> e = evidence.voltage(h, around.calibration, r);
       for (std::size_t k = 0; k < e.size(); ++k) e[k] = record.voltage_v[k] - e[k];
       double found_ohm = 0;
-      c.bursts.push_back(find_bursts(record, e, evidence.noise(), model::cell_detail::rc_value(evidence.cell().rc, evidence.cell().rc.r0_ohm, 0.5), found_ohm));
+      c.bursts.push_back(find_bursts(record, e, evidence.whitener(r), found_ohm));
       bursts += c.bursts.back().size();
       sum_ohm = std::max(sum_ohm, found_ohm);
       std::size_t next = 0;
@@ -330,7 +333,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
       const Eigen::VectorXd cross_b = known.transpose() * column, solved_b = factor.solve(cross_b);
       const double g = column.squaredNorm() - cross_b.dot(solved_b), b = column.col(0).dot(around.residual) - solved_b.dot(pull);
       // every burst is two moments that were sought
-      if (g > 0 && b > 0) c.gain = b * b / g - 2 * 8.0 * static_cast<double>(bursts);
+      if (g > 0 && b > 0) c.gain = b * b / g - decision::per_burst * static_cast<double>(bursts);
       c.start.value = {sum_ohm, in_s / std::max(evidence.records().front().duration_s(), 1.0)};
       if (c.gain > 0) {
         candidates_.push_back(c);
@@ -383,90 +386,6 @@ double Screen::alike(std::size_t a, std::size_t b) const {
     g(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) *= 1 + 1e-6;
   }
   return norm > 0 ? std::sqrt(std::clamp(toward.dot(g.ldlt().solve(toward)) / norm, 0.0, 1.0)) : 0;
-}
-
-std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v, const NoiseModel& noise, double resistance_ohm, double& found_ohm) {
-  const std::size_t n = record.size();
-  // what lasts longer than a burst: the median of a quarter of an hour around
-  std::vector<double> quick_v(n, 0.0);
-  const double half_s = 450;
-  std::vector<double> window;
-  std::size_t from = 0, to = 0;
-  double level = 0, level_until = -1e300;
-  for (std::size_t k = 0; k < n; ++k) {
-    if (record.time_s[k] >= level_until) {
-      while (from < n && record.time_s[from] < record.time_s[k] - half_s) ++from;
-      to = std::max(to, k);
-      while (to < n && record.time_s[to] < record.time_s[k] + half_s) ++to;
-      window.clear();
-      for (std::size_t j = from; j < to; ++j) {
-        if (std::isfinite(residual_v[j])) window.push_back(residual_v[j]);
-      }
-      if (!window.empty()) {
-        std::nth_element(window.begin(), window.begin() + static_cast<std::ptrdiff_t>(window.size() / 2), window.end());
-        level = window[window.size() / 2];
-      }
-      level_until = record.time_s[k] + half_s / 10;
-    }
-    quick_v[k] = std::isfinite(residual_v[k]) ? residual_v[k] - level : 0;
-  }
-  const double s2 = noise.white_v * noise.white_v + noise.fast_v * noise.fast_v;
-  const double change = 12;  // cost of a change between closed and open, in log likelihood
-  std::vector<model::Span> best;
-  double best_score = 0;
-  for (double ohm : {0.2 * resistance_ohm, resistance_ohm, 5 * resistance_ohm}) {
-    std::vector<char> open(n, 0), came_closed(n, 0), came_open(n, 0);
-    double score = 0;
-    for (int round = 0; round < 6; ++round) {
-      // the likeliest sequence of two states (Viterbi)
-      double closed_score = 0, open_score = -change;
-      for (std::size_t k = 0; k < n; ++k) {
-        const double drop_v = std::isfinite(record.current_a[k]) ? ohm * record.current_a[k] : 0;
-        const double evidence = std::clamp((quick_v[k] * drop_v - drop_v * drop_v / 2) / s2, -30.0, 30.0) / 4;  // residuals last for some samples
-        came_closed[k] = closed_score >= open_score - change ? 1 : 0;   // into closed
-        came_open[k] = open_score >= closed_score - change ? 1 : 0;     // into open
-        const double closed_next = std::max(closed_score, open_score - change), open_next = std::max(open_score, closed_score - change) + evidence;
-        closed_score = closed_next;
-        open_score = open_next;
-      }
-      bool is_open = open_score > closed_score;
-      score = std::max(open_score, closed_score);
-      double up = 0, down = 0;
-      for (std::size_t k = n; k-- > 0;) {
-        open[k] = is_open ? 1 : 0;
-        if (is_open && std::isfinite(record.current_a[k])) {
-          up += quick_v[k] * record.current_a[k];
-          down += record.current_a[k] * record.current_a[k];
-        }
-        is_open = is_open ? came_open[k] != 0 : came_closed[k] == 0;
-      }
-      if (down <= 0 || up <= 0) break;
-      const double next = up / down;
-      if (std::abs(next - ohm) < 1e-3 * ohm) break;
-      ohm = next;
-    }
-    if (score <= best_score) continue;
-    // bursts are the exception, and a contact explains what happens in them
-    double loaded = 0, in_bursts = 0, before = 0, after = 0;
-    for (std::size_t k = 0; k < n; ++k) {
-      if (!std::isfinite(record.current_a[k]) || std::abs(ohm * record.current_a[k]) < noise.white_v) continue;
-      ++loaded;
-      if (open[k] == 0) continue;
-      ++in_bursts;
-      before += quick_v[k] * quick_v[k];
-      after += std::pow(quick_v[k] - ohm * record.current_a[k], 2);
-    }
-    if (in_bursts > 0.35 * loaded || after > 0.4 * before) continue;
-    best_score = score;
-    found_ohm = ohm;
-    best.clear();
-    for (std::size_t k = 0; k < n; ++k) {
-      if (open[k] == 0) continue;
-      if (k > 0 && open[k - 1] != 0) best.back().end_s = record.time_s[k];
-      else best.push_back({record.time_s[k], record.time_s[k]});
-    }
-  }
-  return best;
 }
 
 }  // namespace bms::diagnosis

@@ -55,7 +55,4 @@ class Screen {
   Eigen::VectorXd toward_;                ///< their products with the residual
 };
 
-/// Times at which a loose contact seems to have been open: residual_v in proportion to the current, in bursts.
-std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v, const NoiseModel& noise, double resistance_ohm, double& found_ohm);
-
 }  // namespace bms::diagnosis

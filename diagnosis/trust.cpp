@@ -44,7 +44,8 @@ std::vector<model::Span> stuck_voltage(const Record& r, double c_rate_a) {
       low = std::min(low, r.current_a[j]);
       high = std::max(high, r.current_a[j]);
     }
-    if ((k - from >= 8 && high - low > 0.25 * c_rate_a) || (k - from >= 60 && k - from > 12 * usual)) spans.push_back({r.time_s[from], r.time_s[k - 1]});
+    // at constant current on a flat curve a good reading stands still too
+    if ((k - from >= 8 && high - low > 0.25 * c_rate_a) || (k - from >= 60 && k - from > 12 * usual && high - low > 0.02 * c_rate_a)) spans.push_back({r.time_s[from], r.time_s[k - 1]});
     from = k;
   }
   return spans;
