@@ -24,6 +24,8 @@ using model::Role;
 
 constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 
+constexpr std::size_t temperature_resistance = index_of("temperature_resistance");
+
 /// What its unknowns cost a mechanism.
 double price(std::size_t mechanism, std::size_t bursts) {
   double unknowns = 0;
@@ -40,16 +42,21 @@ double price(const Hypothesis& h) {
   return sum;
 }
 
-/// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other resistances.
-double known_before(const Evidence& evidence, const Hypothesis& h) {
-  if (h.find(index_of("temperature_resistance")) == nullptr || h.own > 0) return 0;
-  double away_k = 0;
+/// How far the cell was from the temperature that its file is for.
+double away_k(const Evidence& evidence) {
+  double away = 0;
   for (const Record& r : evidence.records()) {
     for (const double c : r.temperature_c) {
-      if (std::isfinite(c)) away_k = std::max(away_k, std::abs(c - 25));
+      if (std::isfinite(c)) away = std::max(away, std::abs(c - 25));
     }
   }
-  return std::clamp((away_k - 5) * 1.5, 0.0, 15.0);
+  return away;
+}
+
+/// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other resistances.
+double known_before(const Evidence& evidence, const Hypothesis& h) {
+  if (h.find(temperature_resistance) == nullptr || h.own > 0) return 0;
+  return std::clamp((away_k(evidence) - 5) * 1.5, 0.0, 15.0);
 }
 
 /// RMS of a raw residual, of the voltages that were read.
@@ -354,6 +361,12 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       current = more.front();
     }
   };
+  // every cell's resistances follow the temperature: far from its file's that comes before anything that would stand in for it
+  const bool expected = away_k(evidence) > decision::far_k && evidence.base().find(temperature_resistance) == nullptr;
+  if (expected) {
+    const std::vector<Fit> with_it = chain.one_more(base, {temperature_resistance});
+    if (!with_it.empty() && chain.gain(base, with_it.front()) > decision::detected) current = with_it.front();
+  }
   grow();
   {
     // the first screen tells the limits
@@ -385,7 +398,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       gains[m] = chain.gain(less, current);
       const bool cancels = current.hypothesis.added().size() > 1 && sizes_v.at(m) > decision::larger_than_error * error_v;
       if (cancels) gains[m] = std::min(gains[m], decision::detected - sizes_v.at(m) / error_v);
-      if (gains[m] < decision::detected) {
+      if (gains[m] < decision::detected && !(expected && m == temperature_resistance)) {
         reduced.emplace_back(gains[m], less);
         continue;
       }
@@ -396,7 +409,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
           continue;
         }
         if (!chain.carries(less, rival)) continue;
-        if (chain.score(rival) < chain.score(current) - 0.5) {
+        if (chain.score(rival) < chain.score(current) - 0.5 && !(expected && m == temperature_resistance)) {
           current = rival;
           changed = true;
         }
