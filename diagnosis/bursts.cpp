@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "diagnosis/decision.hpp"
 
@@ -50,28 +51,36 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
   for (std::size_t k = 0; k < n; ++k) largest_a = std::max(largest_a, std::abs(current_a(k)));
   for (std::size_t k = 0; k < n; ++k) loaded += std::abs(current_a(k)) > 0.02 * largest_a ? 1 : 0;
 
-  std::vector<Stretch> more, less;  // resistance
+  // every stretch in which the residual asks for more (or for less) resistance than its price
   std::vector<double> column;
-  for (const std::size_t length : lengths) {
-    for (std::size_t first = 0; first + length < n; first += std::max<std::size_t>(1, length / 4)) {
-      column.assign(std::min(length + tail, n - first), 0);
-      bool any = false;
-      for (std::size_t k = 0; k < length; ++k) {
-        column[k] = current_a(first + k);
-        any = any || std::abs(column[k]) > 0.02 * largest_a;
-      }
-      if (!any) continue;
-      whitener.whiten(first, column);
-      Stretch s{first, first + length, 0, 0};
-      for (std::size_t k = 0; k < column.size(); ++k) {
-        s.toward += column[k] * residual[first + k];
-        s.size += column[k] * column[k];
-      }
-      if (!(s.size > 0) || s.toward * s.toward <= decision::per_burst * s.size) continue;
-      if (s.toward < 0) s.toward = -s.toward, less.push_back(s);
-      else more.push_back(s);
+  const auto stretch = [&](std::size_t first, std::size_t end) {
+    Stretch s{first, end, 0, 0};
+    column.assign(std::min(end - first + tail, n - first), 0);
+    bool any = false;
+    for (std::size_t k = 0; k < end - first; ++k) {
+      column[k] = current_a(first + k);
+      any = any || std::abs(column[k]) > 0.02 * largest_a;
     }
-  }
+    if (!any) return s;
+    whitener.whiten(first, column);
+    for (std::size_t k = 0; k < column.size(); ++k) {
+      s.toward += column[k] * residual[first + k];
+      s.size += column[k] * column[k];
+    }
+    return s;
+  };
+  const auto stretches = [&](bool more) {
+    std::vector<Stretch> found;
+    for (const std::size_t length : lengths) {
+      for (std::size_t first = 0; first + length < n; first += std::max<std::size_t>(1, length / 4)) {
+        Stretch s = stretch(first, first + length);
+        if (!more) s.toward = -s.toward;
+        if (s.toward > 0 && s.toward * s.toward > decision::per_burst * s.size) found.push_back(s);
+      }
+    }
+    return found;
+  };
+  const std::vector<Stretch> more = stretches(true);
   if (more.empty()) return {};
 
   // one resistance for all
@@ -91,15 +100,45 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
       r = toward / size;
     }
   }
-  chosen(less, ohm, n, total);
+  if (best.empty()) return {};
+  // where each begins and ends, to the row
+  for (int round = 0; round < 2; ++round) {
+    double toward = 0, size = 0;
+    for (Stretch& s : best) {
+      for (bool moved = true; moved;) {
+        moved = false;
+        for (const auto& [by_first, by_end] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {
+          const auto first = static_cast<std::ptrdiff_t>(s.first) + by_first, end = static_cast<std::ptrdiff_t>(s.end) + by_end;
+          if (first < 0 || end <= first || end >= static_cast<std::ptrdiff_t>(n)) continue;
+          const Stretch there = stretch(static_cast<std::size_t>(first), static_cast<std::size_t>(end));
+          if (there.gain(ohm) <= s.gain(ohm) + 1e-9) continue;
+          s = there;
+          moved = true;
+        }
+      }
+      toward += s.toward, size += s.size;
+    }
+    ohm = toward / size;
+  }
+  // what then still asks for less than there is: as much as that chance does for more
+  column.assign(n, 0);
+  for (const Stretch& s : best) {
+    for (std::size_t k = s.first; k < s.end; ++k) column[k] = ohm * current_a(k);
+  }
+  whitener.whiten(0, column);
+  for (std::size_t k = 0; k < n; ++k) residual[k] -= column[k];
+  chosen(stretches(false), ohm, n, total);
   std::size_t inside = 0;
   for (const Stretch& s : best) inside += s.end - s.first;
-  if (best.empty() || best_total < 2 * total + decision::detected || static_cast<double>(inside) > most_loaded_share * static_cast<double>(loaded)) return {};
+  if (best_total < 2 * total + decision::detected || static_cast<double>(inside) > most_loaded_share * static_cast<double>(loaded)) return {};
 
   found_ohm = ohm;
   std::sort(best.begin(), best.end(), [](const Stretch& a, const Stretch& b) { return a.first < b.first; });
   std::vector<model::Span> spans;
-  for (const Stretch& s : best) spans.push_back({record.time_s[s.first], record.time_s[s.end - 1]});
+  for (const Stretch& s : best) {
+    if (!spans.empty() && record.time_s[s.first] <= spans.back().end_s) spans.back().end_s = std::max(spans.back().end_s, record.time_s[s.end - 1]);
+    else spans.push_back({record.time_s[s.first], record.time_s[s.end - 1]});
+  }
   return spans;
 }
 

@@ -22,7 +22,7 @@ Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const Ro
       fast_left = std::exp(-to_next_s / n.fast_s);
       slow_left = std::exp(-to_next_s / n.slow_s);
     }
-    const double size = std::sqrt(1 + rows.slow_v2[k] / slow_v2);
+    const double size = slow_v2 > 0 ? std::sqrt(1 + rows.slow_v2[k] / slow_v2) : 1;
     g = {0, 0, fast_left, slow_left, size, 0};
     ff += n.edge * n.edge * rows.edge_v2[k];
     if (usable[k] != 0) {

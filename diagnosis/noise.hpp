@@ -29,7 +29,7 @@ struct NoiseModel {
 struct RowNoise {
   std::vector<double> white_v2;  ///< added to the white part
   std::vector<double> edge_v2;   ///< what the fast part gains at a step of the current, before NoiseModel::edge
-  std::vector<double> slow_v2;   ///< added to the slow part: where the OCV is steep, a small error of soc is a large one of the voltage
+  std::vector<double> slow_v2;   ///< added to the slow part, if there is one: where the OCV is steep, a small error of soc is a large one of the voltage
 
   explicit RowNoise(std::size_t rows = 0) : white_v2(rows, 0.0), edge_v2(rows, 0.0), slow_v2(rows, 0.0) {}
 };

@@ -33,6 +33,9 @@ std::vector<double> shape_grid(std::string_view id, double capacity_ah) {
   return {};
 }
 
+/// How near to the moment of a contact's step its own imprecision reaches.
+constexpr double beside_step_s = 120;
+
 /// Strength small enough to be linear, for the derivatives of places by it.
 constexpr double probing_share = 0.02;
 
@@ -318,6 +321,10 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
       for (std::size_t k = 0; k < e.size(); ++k) e[k] = record.voltage_v[k] - e[k];
       double found_ohm = 0;
       c.bursts.push_back(find_bursts(record, e, evidence.whitener(r), found_ohm));
+      // where a contact has changed for good, the rows beside that moment are no burst
+      if (const MechanismSetting* changed = h.find(step)) {
+        std::erase_if(c.bursts.back(), [&](const model::Span& s) { return s.end_s > changed->value[1] - beside_step_s && s.start_s < changed->value[1] + beside_step_s; });
+      }
       bursts += c.bursts.back().size();
       sum_ohm = std::max(sum_ohm, found_ohm);
       std::size_t next = 0;

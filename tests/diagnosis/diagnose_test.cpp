@@ -59,6 +59,41 @@ TEST(Diagnose, WhatNoMechanismExplainsIsUnknown) {
   EXPECT_EQ(d.verdict, Verdict::unknown);
 }
 
+TEST(Diagnose, APeriodThatTheLoadDoesNotHaveIsUnknownAndTold) {
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 18), 0.7, 18, [](std::size_t k, double, double) { return 0.003 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 173); })});
+  EXPECT_EQ(d.verdict, Verdict::unknown);
+  EXPECT_EQ(d.remaining_goes_with, "a period of its own");
+}
+
+TEST(Diagnose, BurstsOfALooseContactAreFoundWhereTheyAre) {
+  const auto loose = [](std::size_t k) { return k % 400 >= 170 && k % 400 < 182; };
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 19), 0.7, 19, [&](std::size_t k, double current_a, double) { return loose(k) ? 0.002 * current_a : 0; })});
+  ASSERT_THAT(ids_of(d), ElementsAre("contact_intermittent"));
+  EXPECT_NEAR(d.findings.front().setting.value[0], 0.002, 0.0005);
+  std::size_t inside = 0, outside = 0;
+  for (const model::Span& s : d.extended.bursts.front()) {
+    for (auto k = static_cast<std::size_t>(s.start_s); k <= static_cast<std::size_t>(s.end_s); ++k) ++(loose(k) ? inside : outside);
+  }
+  EXPECT_GT(inside, 60U);
+  EXPECT_LT(outside, inside / 3);
+}
+
+TEST(Diagnose, TheExtendedCellHasItsTablesWhereTheyFitBesideWhatWasFound) {
+  // 2 mV of the table are its own error, a third of the resistance is not
+  const auto add_v = [](std::size_t, double current_a, double) { return 0.002 + 0.004 * current_a; };
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 20), 0.7, 20, add_v)});
+  ASSERT_THAT(ids_of(d), ElementsAre("resistance_growth"));
+  const Record later = test::recorded(test::drive(1, 21), 0.6, 21, add_v);
+  const auto rms_v = [&](const model::CellParameters<>& cell) {
+    const std::vector<double> v = predict(cell, later_recording(d.extended), later);
+    double sum = 0;
+    for (std::size_t k = 0; k < v.size(); ++k) sum += std::pow(v[k] - later.voltage_v[k], 2);
+    return std::sqrt(sum / static_cast<double>(v.size()));
+  };
+  EXPECT_LT(rms_v(d.cell), 0.9 * rms_v(test::table9()));
+  EXPECT_EQ(model::first_fault(d.cell).what, nullptr) << model::first_fault(d.cell).key;
+}
+
 TEST(Diagnose, WithoutInformationNothingIsSaid) {
   Record rest = test::recorded(std::vector<double>(3'000, 0.0), 0.7, 16);
   EXPECT_EQ(diagnose(test::table9(), {}, {rest}).verdict, Verdict::not_testable);

@@ -26,6 +26,15 @@ TEST(Trust, AHealthyRecordingHasNoFault) {
   EXPECT_TRUE(trust.warnings.empty());
 }
 
+TEST(Trust, AReadingThatStandsStillAtConstantCurrentOnAFlatCurveIsNoFault) {
+  Record r = healthy();
+  for (std::size_t k = 1'000; k < 1'400; ++k) {
+    r.current_a[k] = -6 + 0.003 * (k % 2 == 0 ? 1 : -1);
+    r.voltage_v[k] = 3.2;
+  }
+  EXPECT_TRUE(examine(r, test::table9()).faults.empty());
+}
+
 TEST(Trust, FindsWhatNoPhysicsExplains) {
   Record inverted = healthy();
   for (double& a : inverted.current_a) a = -a;

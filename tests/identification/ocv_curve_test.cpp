@@ -70,6 +70,23 @@ TEST(OcvPieces, AreFewRisingAndWithinTheError) {
   }
 }
 
+TEST(OcvPieces, FollowACurveThatPlunges) {
+  OcvCurve curve;
+  for (int k = 0; k <= 1000; ++k) {
+    const double s = k / 1000.0;
+    curve.soc.push_back(s);
+    curve.ocv_v.push_back(3.2 + 0.1 * s - 1.2 * std::exp(-s / 0.006));  // a volt within the last percent
+    curve.half_gap_v.push_back(0);
+  }
+  const auto pieces = fewest_pieces(curve, 0.002);
+  ASSERT_TRUE(pieces);
+  for (std::size_t k = 1; k < pieces->soc.size(); ++k) {
+    EXPECT_GE(pieces->soc[k] - pieces->soc[k - 1], 0.002 - 1e-12) << "a cell file holds no narrower ones";
+    EXPECT_LT((pieces->ocv_v[k] - pieces->ocv_v[k - 1]) / (pieces->soc[k] - pieces->soc[k - 1]), 250);
+  }
+  EXPECT_LE(pieces->largest_error_v, 0.002);
+}
+
 TEST(OcvPieces, FindTheCornersOfWhatIsMadeOfPieces) {
   OcvCurve curve;
   for (int k = 0; k <= 1000; ++k) {
