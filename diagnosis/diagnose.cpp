@@ -443,7 +443,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.fast_excess = remainder.fast_excess;
   d.adequacy = gained + d.remaining > 0 ? std::max(gained, 0.0) / (std::max(gained, 0.0) + d.remaining) : 1;
   const bool something = !current.hypothesis.added().empty();
-  const bool unknown = d.remaining > decision::much_left && (!something || d.adequacy < decision::explained);
+  // what is flexible gains on anything: when it is named, what it leaves must be white
+  const bool unknown = d.remaining > decision::much_left && (!something || d.adequacy < decision::explained || d.fast_excess > decision::fast_excess);
 
   // findings
   d.extended = current.hypothesis;
