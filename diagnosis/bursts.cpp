@@ -20,6 +20,7 @@ struct Stretch {
 
 constexpr std::array<std::size_t, 6> lengths = {2, 4, 8, 16, 32, 64};  // rows
 constexpr std::size_t tail = 40;                                       // rows in which a stretch's end rings out
+constexpr std::size_t fewest_rows = 3;                                 // one bad reading is no contact
 constexpr double most_loaded_share = 0.35;                             // bursts are the exception
 
 /// Stretches that do not touch, best first, each worth its price at this resistance.
@@ -130,7 +131,7 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
   chosen(stretches(false), ohm, n, total);
   std::size_t inside = 0;
   for (const Stretch& s : best) inside += s.end - s.first;
-  if (best_total < 2 * total + decision::detected || static_cast<double>(inside) > most_loaded_share * static_cast<double>(loaded)) return {};
+  if (inside < fewest_rows || best_total < 2 * total + decision::detected || static_cast<double>(inside) > most_loaded_share * static_cast<double>(loaded)) return {};
 
   found_ohm = ohm;
   std::sort(best.begin(), best.end(), [](const Stretch& a, const Stretch& b) { return a.first < b.first; });

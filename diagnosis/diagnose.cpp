@@ -398,7 +398,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       gains[m] = chain.gain(less, current);
       const bool cancels = current.hypothesis.added().size() > 1 && sizes_v.at(m) > decision::larger_than_error * error_v;
       if (cancels) gains[m] = std::min(gains[m], decision::detected - sizes_v.at(m) / error_v);
-      if (gains[m] < decision::detected && !(expected && m == temperature_resistance)) {
+      if (gains[m] < decision::detected) {
         reduced.emplace_back(gains[m], less);
         continue;
       }
