@@ -241,9 +241,10 @@ class Chain {
     return lasting_error_v(evidence_, f) <= decision::may_grow * was_v + 3e-4;
   }
 
-  Fit refit(const Fit& f, int iterations = 6) {
+  /// The rest of a fit, fitted again from where it was.
+  Fit without_one(const Fit& f, std::size_t m) {
     evidence_.set_noise(f.noise);
-    return settled(evidence_.fit(f.hypothesis, f.calibration, iterations));
+    return settled(evidence_.fit(without(f.hypothesis, m), f.calibration, 8));
   }
 
   void tell(std::string_view what) {
@@ -393,8 +394,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     // causes that are larger than the error and cancel each other are none
     const std::map<std::size_t, double> sizes_v = contributions(evidence, base, current).rms_v;
     for (const std::size_t m : current.hypothesis.added()) {
-      Fit less = chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, current.noise, {}, {}, false}, 8);
-      if (current.hypothesis.added().size() == 1) less = base;
+      const Fit less = current.hypothesis.added().size() == 1 ? base : chain.without_one(current, m);
       gains[m] = chain.gain(less, current);
       const bool cancels = current.hypothesis.added().size() > 1 && sizes_v.at(m) > decision::larger_than_error * error_v;
       if (cancels) gains[m] = std::min(gains[m], decision::detected - sizes_v.at(m) / error_v);
@@ -427,7 +427,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   }
 
   for (const std::size_t m : current.hypothesis.added()) {
-    if (!gains.contains(m)) gains[m] = chain.gain(chain.refit({without(current.hypothesis, m), current.calibration, {}, 0, current.noise, {}, {}, false}, 8), current);
+    if (!gains.contains(m)) gains[m] = chain.gain(chain.without_one(current, m), current);
   }
 
   // is it enough?

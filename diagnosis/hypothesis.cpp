@@ -171,12 +171,6 @@ std::size_t Evidence::used() const {
   return n;
 }
 
-double Evidence::log_determinant() const {
-  double sum = 0;
-  for (const Whitener& w : whiteners_) sum += w.log_determinant();
-  return sum;
-}
-
 Hypothesis Evidence::base() const { return {own_, own_.size(), {}}; }
 
 template <class S, class Row, class ForCheck>

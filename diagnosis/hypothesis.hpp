@@ -75,7 +75,6 @@ class Evidence {
   std::size_t readings() const { return samples_; }
   std::size_t used() const;
   const std::vector<char>& usable(std::size_t record) const { return usable_[record]; }
-  double log_determinant() const;
   const Whitener& whitener(std::size_t record) const { return whiteners_[record]; }
   Hypothesis base() const;           ///< the cell as its file says
 

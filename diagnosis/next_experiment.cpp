@@ -173,7 +173,7 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
       double least = std::numeric_limits<double>::infinity();
       for (std::size_t a = 0; a < b; ++a) {
         const double gain = std::min(missed(set[b], seen[a], cell, noise), missed(set[a], seen[b], cell, noise));
-            j.sum += std::min(gain, decision::settled);
+        j.sum += std::min(gain, decision::settled);
         j.all = j.all && gain >= decision::settled;
         if (a == 0) least = gain;
       }
@@ -202,9 +202,9 @@ std::string command(const NextExperiment& n) { return fmt::format("bms experimen
 std::string_view instruction(const NextExperiment& n) { return find_experiment(n.profile)->instruction; }
 
 std::string why(const NextExperiment& n) {
-  std::string others;
-  for (std::size_t k = 1; k < n.separates.size(); ++k) others += (k == 1 ? "" : k + 1 == n.separates.size() ? " and " : ", ") + std::string(words_of(n.separates[k]).name);
-  return fmt::format("To tell {} from {}: {} ({}).", words_of(n.separates.front()).name, others, find_experiment(n.profile)->description, clock_text(n.duration_s));
+  std::vector<std::string> others;
+  for (std::size_t k = 1; k < n.separates.size(); ++k) others.emplace_back(words_of(n.separates[k]).name);
+  return fmt::format("To tell {} from {}: {} ({}).", words_of(n.separates.front()).name, listed(others, "and"), find_experiment(n.profile)->description, clock_text(n.duration_s));
 }
 
 }  // namespace bms::diagnosis

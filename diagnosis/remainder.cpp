@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "diagnosis/left_over.hpp"
 #include "diagnosis/locate.hpp"
 
 namespace bms::diagnosis {
@@ -130,25 +131,8 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
   Columns white = raw;
   evidence.whiten(white);
 
-  const std::vector<Sought> sought = fit.hypothesis.sought();
-  const Columns base = evidence.calibration_derivatives(fit.hypothesis, fit.calibration), own = evidence.derivatives(fit.hypothesis, fit.calibration, sought);
-  Columns known(rows, base.cols() + own.cols());
-  known.leftCols(base.cols()) = base;
-  if (own.cols() > 0) known.rightCols(own.cols()) = own;
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(known.cols(), known.cols());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(known.transpose());
-  normal = Eigen::MatrixXd(normal.selfadjointView<Eigen::Lower>());
-  for (Eigen::Index k = 0; k < normal.rows(); ++k) normal(k, k) += k < base.cols() ? 1 : 1e-9 * (1 + normal(k, k));
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-  const Eigen::MatrixXd cross = known.transpose() * white;
-  Eigen::VectorXd pull = known.transpose() * fit.residual;
-  pull.head(base.cols()) -= fit.calibration;
-  const Eigen::MatrixXd solved = factor.solve(cross);
-  const Eigen::VectorXd pulled = factor.solve(pull);
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(generic, generic);
-  gram.selfadjointView<Eigen::Lower>().rankUpdate(white.transpose());
-  gram = Eigen::MatrixXd(gram.selfadjointView<Eigen::Lower>()) - cross.transpose() * solved;
-  const Eigen::VectorXd toward = white.transpose() * fit.residual - cross.transpose() * pulled;
+  const LeftOver left(evidence, fit);
+  const auto [gram, toward] = left.of(white);
 
   std::vector<Family> families;
   Eigen::Index at = 0;
@@ -196,9 +180,7 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
     }
     Columns white_wave = wave;
     evidence.whiten(white_wave);
-    const Eigen::MatrixXd crossed = known.transpose() * white_wave;
-    const Eigen::Matrix2d g = white_wave.transpose() * white_wave - crossed.transpose() * factor.solve(crossed);
-    const Eigen::Vector2d b = white_wave.transpose() * fit.residual - crossed.transpose() * pulled;
+    const auto [g, b] = left.of(white_wave);
     const Eigen::Vector2d x = (g + 1e-6 * g.diagonal().maxCoeff() * Eigen::Matrix2d::Identity()).ldlt().solve(b);
     const double gain = b.dot(x) - sought_frequency;
     if (gain <= found.gain) continue;

@@ -12,6 +12,7 @@
 
 #include "diagnosis/bursts.hpp"
 #include "diagnosis/decision.hpp"
+#include "diagnosis/left_over.hpp"
 
 namespace bms::diagnosis {
 
@@ -244,23 +245,10 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     all.middleCols(at, block.cols()) = block;
     at += block.cols();
   }
-  const std::vector<Sought> sought = h.sought();
-  const Columns base = evidence.calibration_derivatives(h, around.calibration), own = evidence.derivatives(h, around.calibration, sought);
-  Columns known(base.rows(), base.cols() + own.cols());
-  known.leftCols(base.cols()) = base;
-  if (own.cols() > 0) known.rightCols(own.cols()) = own;
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(known.cols(), known.cols());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(known.transpose());
-  normal = Eigen::MatrixXd(normal.selfadjointView<Eigen::Lower>());
-  for (Eigen::Index k = 0; k < normal.rows(); ++k) normal(k, k) += k < base.cols() ? 1 : 1e-9 * (1 + normal(k, k));
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-  const Eigen::MatrixXd cross = known.transpose() * all;
-  Eigen::VectorXd pull = known.transpose() * around.residual;
-  pull.head(base.cols()) -= around.calibration;
-  gram_ = Eigen::MatrixXd::Zero(count, count);
-  gram_.selfadjointView<Eigen::Lower>().rankUpdate(all.transpose());
-  gram_ = Eigen::MatrixXd(gram_.selfadjointView<Eigen::Lower>()) - cross.transpose() * factor.solve(cross);
-  toward_ = all.transpose() * around.residual - cross.transpose() * factor.solve(pull);
+  const LeftOver left(evidence, around);
+  LeftOver::Products products = left.of(all);
+  gram_ = std::move(products.gram);
+  toward_ = std::move(products.toward);
 
   std::map<std::size_t, std::size_t> of;  // mechanism -> candidate
   for (const Probe& p : probes) {
@@ -337,8 +325,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     }
     if (bursts > 0) {
       evidence.whiten(column);
-      const Eigen::VectorXd cross_b = known.transpose() * column, solved_b = factor.solve(cross_b);
-      const double g = column.squaredNorm() - cross_b.dot(solved_b), b = column.col(0).dot(around.residual) - solved_b.dot(pull);
+      const LeftOver::Products one = left.of(column);
+      const double g = one.gram(0, 0), b = one.toward[0];
       // every burst is two moments that were sought
       if (g > 0 && b > 0) c.gain = b * b / g - decision::per_burst * static_cast<double>(bursts);
       c.start.value = {sum_ohm, in_s / std::max(evidence.records().front().duration_s(), 1.0)};
@@ -360,14 +348,6 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
   }
   candidates_ = std::move(candidates);
   best_ = std::move(best);
-}
-
-double Screen::pair_gain(std::size_t a, std::size_t b) const {
-  std::vector<Eigen::Index> columns;
-  for (const std::size_t c : {a, b}) {
-    for (std::size_t k = 0; k < best_[c].parameters.size(); ++k) columns.push_back(best_[c].first + static_cast<Eigen::Index>(k));
-  }
-  return columns.empty() ? 0 : corrected(gain_of(columns), columns.size());
 }
 
 double Screen::alike(std::size_t a, std::size_t b) const {

@@ -35,8 +35,6 @@ class Screen {
 
   /// Best first.
   const std::vector<Candidate>& candidates() const { return candidates_; }
-  /// First-order gain of two candidates at once, of those in candidates().
-  double pair_gain(std::size_t a, std::size_t b) const;
   /// 0..1; indices as in candidates().
   double alike(std::size_t a, std::size_t b) const;
 

@@ -120,13 +120,6 @@ std::string capital(std::string text) {
   return text;
 }
 
-/// "a", "a or b", "a, b or c".
-std::string listed(const std::vector<std::string>& parts, const char* last) {
-  std::string text;
-  for (std::size_t k = 0; k < parts.size(); ++k) text += (k == 0 ? "" : k + 1 == parts.size() ? std::string(" ") + last + " " : std::string(", ")) + parts[k];
-  return text;
-}
-
 std::string millivolts(double v) { return fmt::format("{:.{}f} mV", 1e3 * v, std::abs(v) < 1e-3 ? 2 : 1); }
 
 std::string share_of_error(const Finding& f, const Occasions& o) {
@@ -202,6 +195,12 @@ std::string seen_in(std::size_t a, std::size_t b, const Occasions& o) {
 }
 
 }  // namespace
+
+std::string listed(const std::vector<std::string>& parts, const char* last) {
+  std::string text;
+  for (std::size_t k = 0; k < parts.size(); ++k) text += (k == 0 ? "" : k + 1 == parts.size() ? std::string(" ") + last + " " : std::string(", ")) + parts[k];
+  return text;
+}
 
 const Words& words_of(std::size_t mechanism) { return vocabulary[mechanism]; }
 

@@ -41,6 +41,9 @@ struct Occasions {
 };
 Occasions occasions_of(const model::CellParameters<>& cell, const std::vector<Record>& records, const std::vector<RecordView>& views);
 
+/// "a, b and c"; last: "and", "or".
+std::string listed(const std::vector<std::string>& parts, const char* last);
+
 /// "2:14 h", "3:05 min", "12 s".
 std::string clock_text(double seconds);
 

@@ -1,12 +1,9 @@
 #include "host_sim/command_diagnose.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <memory>
 
 #include <fmt/format.h>
 
@@ -80,27 +77,12 @@ Compared opened(const std::string& path, const CellFile& cell, const std::option
   for (const Warning& w : c.recording.warnings) warnings.push_back({w.id, path + ": " + w.text});
   const Start start = rule(c.recording, cell, given);
   if (!start.from.empty()) warnings.push_back({"initial_soc", path + ": " + start.from});
-  const Recording& r = c.recording;
-  const bool any_temperature = std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
-  c.record = {name_of_file(path), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{}, start.soc, start.sigma, start.told, {}};
-  diagnosis::take_references(c.record, r.current_ref_a, r.voltage_ref_v, cell.parameters);
+  c.record = record_of(c.recording, name_of_file(path), cell.parameters, start.soc, start.sigma, start.told);
   return c;
 }
 
-std::function<void(double, const std::string&)> progress_on_terminal() {
-  if (!isatty(2)) return {};
-  const auto begin = std::chrono::steady_clock::now();
-  const auto shown_s = std::make_shared<double>(-1);
-  return [begin, shown_s](double done, const std::string& what) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (done >= 1) {
-      fmt::print(stderr, "\r{:70}\r", "");
-    } else if (done > 0 && seconds - *shown_s > 0.1) {
-      *shown_s = seconds;
-      fmt::print(stderr, "\r{:3.0f} %, about {:.0f} s left: {:40}", 100 * done, seconds / done * (1 - done), what);
-    }
-    std::fflush(stderr);
-  };
+std::string progress_line(double done, double left_s, const std::string& what) {
+  return std::isfinite(left_s) ? fmt::format("{:3.0f} %, about {:.0f} s left: {:40}", 100 * done, left_s, what) : "";
 }
 
 std::string summary(const DiagnoseResult& r) {
@@ -146,7 +128,7 @@ int run(const DiagnoseOptions& options) {
   for (const std::string& path : options.holdouts) result.holdouts.push_back(opened(path, result.cell, told.size() == 1 ? told_of(0) : std::nullopt, start_of_holdout, result.warnings));
 
   diagnosis::Options how;
-  how.progress = progress_on_terminal();
+  how.progress = progress_on_terminal(0.1, progress_line);
   result.diagnosis = diagnosis::diagnose(result.cell.parameters, result.cell.mechanisms, records, how);
   diagnosis::describe(result.diagnosis, result.cell.parameters, records);
   for (const std::string& text : result.diagnosis.warnings) result.warnings.push_back({"readings", text});

@@ -1,11 +1,7 @@
 #include "host_sim/command_proof.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
-#include <memory>
 
 #include <fmt/format.h>
 
@@ -18,21 +14,9 @@ namespace bms {
 
 namespace {
 
-ProofProgress progress_on_terminal() {
-  if (!isatty(2)) return {};
-  const auto begin = std::chrono::steady_clock::now();
-  const auto shown_s = std::make_shared<double>(-1);
-  return [begin, shown_s](double done, const std::string& what) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (done >= 1) {
-      fmt::print(stderr, "\r{:110}\r", "");
-    } else if (seconds - *shown_s > 0.2) {
-      *shown_s = seconds;
-      const std::string left = done > 0.02 ? fmt::format("about {:.0f} s left", seconds / done * (1 - done)) : "";
-      fmt::print(stderr, "\r{:3.0f} %, {:20} {:80.80}", 100 * done, left, what);
-    }
-    std::fflush(stderr);
-  };
+std::string progress_line(double done, double left_s, const std::string& what) {
+  const std::string left = done > 0.02 ? fmt::format("about {:.0f} s left", left_s) : "";
+  return fmt::format("{:3.0f} %, {:20} {:80.80}", 100 * done, left, what);
 }
 
 std::string summary(const ProofResult& r) {
@@ -62,7 +46,7 @@ int run(const ProofOptions& options) {
     const std::filesystem::path path = (std::filesystem::path(options.data) / folder).lexically_normal();
     if (!std::filesystem::is_directory(path, error)) throw BadInput(path.string(), 1, "no folder, expected one with the recordings a123_26650 and a123_esctoolbox (host_sim/README.md names their source)");
   }
-  const ProofResult result = prove(options.data, options.only, progress_on_terminal());
+  const ProofResult result = prove(options.data, options.only, progress_on_terminal(0.2, progress_line));
   if (!options.output.json.empty()) put(options.output.json, json_of(result));
   if (!options.output.report.empty()) put(options.output.report, proof_report(result));
   tell(options.output, summary(result));

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/reference.hpp"
 #include "identification/figures.hpp"
 #include "host_sim/replay.hpp"
 
@@ -36,6 +37,13 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
 }
 
 }  // namespace
+
+diagnosis::Record record_of(const Recording& r, std::string name, const model::CellParameters<>& cell, double initial_soc, double sigma, bool told) {
+  const bool any_temperature = std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
+  diagnosis::Record record{std::move(name), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{}, initial_soc, sigma, told, {}};
+  diagnosis::take_references(record, r.current_ref_a, r.voltage_ref_v, cell);
+  return record;
+}
 
 void compare(DiagnoseResult& r) {
   const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;

@@ -5,6 +5,9 @@
 
 namespace bms {
 
+/// A recording as the diagnosis takes it, trusted readings summed up; initial soc, its standard deviation, and whether it was told.
+diagnosis::Record record_of(const Recording& r, std::string name, const model::CellParameters<>& cell, double initial_soc, double sigma, bool told);
+
 /// What both models say, open loop from where each recording begins: fills base_v and extended_v of recordings and hold-outs.
 void compare(DiagnoseResult& r);
 

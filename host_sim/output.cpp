@@ -1,6 +1,13 @@
 #include "host_sim/output.hpp"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <limits>
+#include <memory>
+#include <utility>
 
 #include "host_sim/bad_input.hpp"
 #include "host_sim/text_file.hpp"
@@ -16,6 +23,27 @@ void put(const std::string& file, const std::string& text) {
 
 void tell(const Output& output, const std::string& text) {
   if (!output.quiet && !output.standard_output_is_taken()) std::printf("%s\n", text.c_str());
+}
+
+Progress progress_on_terminal(double every_s, std::function<std::string(double done, double left_s, const std::string& what)> line) {
+  if (!isatty(2)) return {};
+  struct Shown {
+    double at_s = -1;
+    std::size_t width = 0;
+  };
+  const auto begin = std::chrono::steady_clock::now();
+  return [begin, every_s, line = std::move(line), shown = std::make_shared<Shown>()](double done, const std::string& what) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (done >= 1) {
+      std::fprintf(stderr, "\r%*s\r", static_cast<int>(shown->width), "");
+    } else if (seconds - shown->at_s > every_s) {
+      const std::string text = line(done, done > 0 ? seconds / done * (1 - done) : std::numeric_limits<double>::infinity(), what);
+      if (text.empty()) return;
+      *shown = {seconds, std::max(shown->width, text.size())};
+      std::fprintf(stderr, "\r%s", text.c_str());
+    }
+    std::fflush(stderr);
+  };
 }
 
 void warn(const std::string& text) { std::fprintf(stderr, "warning: %s\n", text.c_str()); }

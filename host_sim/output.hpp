@@ -1,6 +1,7 @@
 // Where results go: what every command offers in the same way.
 #pragma once
 
+#include <functional>
 #include <string>
 
 namespace bms {
@@ -19,6 +20,13 @@ void put(const std::string& file, const std::string& text);
 
 /// A summary for a person; not when quiet, nor when standard output carries a result.
 void tell(const Output& output, const std::string& text);
+
+/// What a long command calls as it goes on. done: 0..1; what: it is at.
+using Progress = std::function<void(double done, const std::string& what)>;
+
+/// Progress as one line of a terminal that is written over, every_s at most; nothing where standard error is no terminal. line: what to
+/// show, left_s being a guess (infinite at first).
+Progress progress_on_terminal(double every_s, std::function<std::string(double done, double left_s, const std::string& what)> line);
 
 /// A warning: one line on standard error.
 void warn(const std::string& text);

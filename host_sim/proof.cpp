@@ -41,7 +41,7 @@ std::vector<std::string> proof_names() {
   return names;
 }
 
-ProofResult prove(const std::string& folder, const std::string& only, const ProofProgress& progress) {
+ProofResult prove(const std::string& folder, const std::string& only, const Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
   std::vector<const ProofEntry*> chosen;
   double work = 1;

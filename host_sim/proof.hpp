@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "host_sim/output.hpp"
+
 namespace bms {
 
 /// A number that the tool gave, and the same number measured by other means.
@@ -102,12 +104,10 @@ struct ProofResult {
   std::size_t holding() const;
 };
 
-using ProofProgress = std::function<void(double done, const std::string& what)>;
-
 /// Names of the experiments, in order.
 std::vector<std::string> proof_names();
 
 /// only: one experiment's name, or empty for all. Throws BadInput when a recording that is needed is not in the folder.
-ProofResult prove(const std::string& folder, const std::string& only, const ProofProgress& progress);
+ProofResult prove(const std::string& folder, const std::string& only, const Progress& progress);
 
 }  // namespace bms

@@ -21,12 +21,7 @@ using model::catalogue;
 
 Compared begun(const Recording& r, const CellFile& cell) {
   if (r.soc_ref.empty() || !std::isfinite(r.soc_ref.front())) throw BadInput(r.path, 1, "no soc_ref at the start, expected the reference state of charge");
-  const bool any_temperature = std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
-  return {r,
-          {std::filesystem::path(r.path).stem().string(), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{}, r.soc_ref.front(),
-           std::max(cell.parameters.tolerance.initial_soc, 1e-4), true, {}},
-          {},
-          {}};
+  return {r, record_of(r, std::filesystem::path(r.path).stem().string(), cell.parameters, r.soc_ref.front(), std::max(cell.parameters.tolerance.initial_soc, 1e-4), true), {}, {}};
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ class Once {
 class ProofLab {
  public:
   /// work: of all that will be asked, in rows to diagnose.
-  ProofLab(std::string folder, double work, ProofProgress progress) : folder_(std::move(folder)), work_(work), progress_(std::move(progress)) {}
+  ProofLab(std::string folder, double work, Progress progress) : folder_(std::move(folder)), work_(work), progress_(std::move(progress)) {}
 
   /// name: "a123_26650/udds_P25_A002".
   std::string path(const std::string& name) const { return folder_ + "/" + name + ".csv"; }
@@ -76,7 +76,7 @@ class ProofLab {
 
   std::string folder_;
   double work_;
-  ProofProgress progress_;
+  Progress progress_;
   std::mutex telling_;
   double done_ = 0;
   Once<Recording> recordings_;

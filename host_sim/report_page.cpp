@@ -141,6 +141,7 @@ std::string page(std::string_view body, std::string_view script, std::string_vie
     if (place == "DYGRAPH_CSS") return std::string(embedded::dygraph_css);
     if (place == "DYGRAPH_JS") return std::string(embedded::dygraph_js);
     if (place == "SYNCHRONIZER_JS") return std::string(embedded::synchronizer_js);
+    if (place == "DRAWING_JS") return std::string(embedded::drawing_js);
     if (place == "PAGE_CSS") return std::string(embedded::page_css);
     if (place == "PAGE_JS") return std::string(script);
     if (place == "DATA") return data;

@@ -1,24 +1,10 @@
 // Draws the page from `report` (host_sim/diagnosis_page.cpp). Pictures of its own as SVG, curves over time by dygraphs.
 (() => {
   'use strict';
-  const get = id => document.getElementById(id);
-  const make = (parent, tag, text, name) => {
-    const element = parent.appendChild(document.createElement(tag));
-    if (text !== undefined) element.textContent = text;
-    if (name) element.className = name;
-    return element;
-  };
-  const svg = (parent, width, height) => draw(parent, 'svg', {viewBox: `0 0 ${width} ${height}`, height: height});
-  const draw = (parent, tag, attributes, text) => {
-    const element = parent.appendChild(document.createElementNS('http://www.w3.org/2000/svg', tag));
-    for (const key in attributes) element.setAttribute(key, attributes[key]);
-    if (text !== undefined) element.textContent = text;
-    return element;
-  };
+  const {get, make, draw, svg, signs, ticks, red, blue, green, dark, faint} = drawing;
   const hint = (element, text) => draw(element, 'title', {}, text);
-  const red = '#d1495b', blue = '#0b63b5', green = '#2e7d4f', dark = '#1c2430', faint = '#e3e8ee', sand = '#f6e3b4';
+  const sand = '#f6e3b4';
   const verdicts = {NO_MISMATCH: green, CAUSE: blue, CAUSES: blue, AMBIGUOUS: '#a86a00', UNKNOWN: '#7a4fb0', DATA_FAULT: '#b3261e', NOT_TESTABLE: '#66707c'};
-  const signs = text => text.replace(/\+-/g, '\u00b1').replace(/([0-9] )(m?)Ohm/g, '$1$2\u03a9');
   const sentence = text => text.charAt(0).toUpperCase() + text.slice(1);
   const bare = name => sentence(name.replace(/^(an?) /, ''));
   const mv = v => (v < 1 ? v.toFixed(2) : v < 100 ? v.toFixed(1) : v.toFixed(0)) + ' mV';
@@ -30,14 +16,6 @@
   const quantile = (values, q) => {
     const sorted = values.filter(Number.isFinite).sort((a, b) => a - b);
     return sorted.length ? sorted[Math.floor(q * (sorted.length - 1))] : 0;
-  };
-  /// Round numbers from low to high, about `count` of them.
-  const ticks = (low, high, count) => {
-    const rough = (high - low) / count, power = Math.pow(10, Math.floor(Math.log10(rough)));
-    const step = [1, 2, 5, 10].map(m => m * power).find(s => s >= rough);
-    const all = [];
-    for (let t = Math.ceil(low / step - 1e-9) * step; t <= high + 1e-9 * step; t += step) all.push(Math.abs(t) < 1e-12 ? 0 : +t.toPrecision(10));
-    return all;
   };
   const fitted = (text, pixels) => text.length * 6.1 > pixels ? text.slice(0, Math.max(3, Math.floor(pixels / 6.1) - 1)) + '\u2026' : text;
 

@@ -1,31 +1,11 @@
 // Draws the page from `report` (host_sim/proof_page.cpp): every claim with its picture, then what each experiment shows.
 (() => {
   'use strict';
-  const get = id => document.getElementById(id);
-  const make = (parent, tag, text, name) => {
-    const element = parent.appendChild(document.createElement(tag));
-    if (text !== undefined) element.textContent = text;
-    if (name) element.className = name;
-    return element;
-  };
-  const draw = (parent, tag, attributes, text) => {
-    const element = parent.appendChild(document.createElementNS('http://www.w3.org/2000/svg', tag));
-    for (const key in attributes) element.setAttribute(key, attributes[key]);
-    if (text !== undefined) element.textContent = text;
-    return element;
-  };
-  const svg = (parent, width, height) => draw(parent, 'svg', {viewBox: `0 0 ${width} ${height}`, height: height, style: `width:${width}px`});
-  const red = '#d1495b', blue = '#0b63b5', green = '#2e7d4f', dark = '#1c2430', faint = '#e3e8ee', amber = '#a86a00';
+  const {get, make, draw, signs, ticks, red, blue, green, dark, faint} = drawing;
+  const svg = (parent, width, height) => drawing.svg(parent, width, height, {style: `width:${width}px`});
+  const amber = '#a86a00';
   const curves = [blue, '#7a4fb0', amber];
-  const signs = text => text.replace(/\+-/g, '\u00b1').replace(/([0-9] )(m?)Ohm/g, '$1$2\u03a9');
   const short = v => Math.abs(v) >= 100 ? v.toFixed(0) : Math.abs(v) >= 10 ? v.toFixed(1) : v.toFixed(2);
-  const ticks = (low, high, count) => {
-    const rough = (high - low) / count, power = Math.pow(10, Math.floor(Math.log10(rough)));
-    const step = [1, 2, 5, 10].map(m => m * power).find(s => s >= rough);
-    const all = [];
-    for (let t = Math.ceil(low / step - 1e-9) * step; t <= high + 1e-9 * step; t += step) all.push(Math.abs(t) < 1e-12 ? 0 : +t.toPrecision(10));
-    return all;
-  };
 
   get('title').textContent = 'What the diagnosis says of real recordings, and what was measured';
   get('statement').textContent = `${report.holding} of ${report.claims} claims hold.`;

@@ -1,12 +1,7 @@
 // Draws the page from `report`: {title, statement, warnings, sections: [{title, note, table: {head, rows: [[{text, paper}]]}} | {title, chart: {labels, rows}}]}.
 (() => {
   'use strict';
-  const make = (parent, tag, text, name) => {
-    const element = parent.appendChild(document.createElement(tag));
-    if (text !== undefined) element.textContent = text;
-    if (name) element.className = name;
-    return element;
-  };
+  const {make} = drawing;
   document.getElementById('title').textContent = report.title;
   document.getElementById('statement').textContent = report.statement;
   document.getElementById('warnings').textContent = report.warnings.join(' \u00b7 ');
