@@ -66,9 +66,13 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Re
     const double width = std::min(0.025, between / 2), deviation_v = bend * width / 6;
     if (deviation_v > ocv_v / 2 && ocv.soc[k] > low - width && ocv.soc[k] < high + width) corners_.push_back({ocv.soc[k], width, deviation_v, size_++});
   }
-  r0_ = hats(knots(low, high, 0.1), fraction_at);
-  r1_ = hats(knots(low, high, 0.2), [&](double soc) { return 2 * fraction_at(soc); });
-  c1_ = hats(knots(low, high, 0.2), [&](double soc) { return 4 * fraction_at(soc); });
+  // what an identification says of itself counts where it is more
+  const auto said = [&](const auto& value, const auto& deviation, double soc) {
+    return deviation.size == 0 ? 0.0 : model::cell_detail::rc_value(cell.rc, deviation, soc) / model::cell_detail::rc_value(cell.rc, value, soc);
+  };
+  r0_ = hats(knots(low, high, 0.1), [&](double soc) { return std::max(fraction_at(soc), said(cell.rc.r0_ohm, cell.rc.r0_std_ohm, soc)); });
+  r1_ = hats(knots(low, high, 0.2), [&](double soc) { return std::max(2 * fraction_at(soc), said(cell.rc.r1_ohm, cell.rc.r1_std_ohm, soc)); });
+  c1_ = hats(knots(low, high, 0.2), [&](double soc) { return std::max(4 * fraction_at(soc), said(cell.rc.c1_f, cell.rc.c1_std_f, soc)); });
   capacity_ = size_++;
   gain_ = size_++;
   for (const Record& r : records) {
@@ -122,9 +126,9 @@ model::CellParameters<> Calibration::applied(const model::CellParameters<>& cell
   for (const double soc : nodes) {
     const model::TablePoint<double> by = at(soc);
     moved.rc.soc.push_back(soc);
-    moved.rc.r0_ohm.push_back(std::clamp(value(rc.r0_ohm, soc) * std::max(by.r0_ohm, 0.1), 1e-5, 0.5));
-    moved.rc.r1_ohm.push_back(std::clamp(value(rc.r1_ohm, soc) * std::max(by.r1_ohm, 0.1), 1e-5, 0.5));
-    moved.rc.c1_f.push_back(value(rc.c1_f, soc) * std::max(by.c1_f, 0.1));
+    moved.rc.r0_ohm.push_back(std::clamp(value(rc.r0_ohm, soc) * by.r0_ohm, 1e-5, 0.5));
+    moved.rc.r1_ohm.push_back(std::clamp(value(rc.r1_ohm, soc) * by.r1_ohm, 1e-5, 0.5));
+    moved.rc.c1_f.push_back(value(rc.c1_f, soc) * by.c1_f);
   }
   moved.capacity_ah = cell.capacity_ah * (1 - capacity_loss(u));
   return moved;

@@ -5,8 +5,8 @@
 //
 //   OCV         at knots every 5 % of soc: tolerance.ocv_v; where the table bends sharply, another one beside the corner: a smooth
 //               curve cuts a corner of straight lines by its change of slope times some soc
-//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction; more beyond the table's nodes, where it
-//               only carries on: towards empty resistances grow
+//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction, or the identification's own deviation if
+//               that is more; more beyond the table's nodes, where it only carries on: towards empty resistances grow
 //   capacity    0.5 %;  gain of the current 0.2 %
 //   per record  initial soc; a slow wander of the current's zero, 0.1 % of 1C at most, in hours
 #pragma once
@@ -73,9 +73,9 @@ class Calibration {
       const S t = (soc - S(c.soc)) * (1 / c.width);
       at.ocv_v += u[c.unknown] * (c.deviation_v * (apart < 0 ? S(1) + t : S(1) - t));
     }
-    at.r0_ohm *= S(1) + r0_.at(soc, u);
-    at.r1_ohm *= S(1) + r1_.at(soc, u);
-    at.c1_f *= S(1) + c1_.at(soc, u);
+    at.r0_ohm *= factor(r0_.at(soc, u));
+    at.r1_ohm *= factor(r1_.at(soc, u));
+    at.c1_f *= factor(c1_.at(soc, u));
   }
   /// Error of the current's zero.
   template <class S>
@@ -112,6 +112,12 @@ class Calibration {
   static double value(const S& x) {
     if constexpr (model::Dual<S>) return x.a;
     else return x;
+  }
+
+  /// 1 + x, and as much less as more: no unknown makes a resistance negative.
+  template <class S>
+  static S factor(const S& x) {
+    return value(x) > 0 ? S(S(1) + x) : S(S(1) / (S(1) - x));
   }
 
   Hats ocv_, r0_, r1_, c1_;

@@ -24,6 +24,9 @@ using model::Role;
 
 constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 
+/// No model is better from sample to sample than this share of what its OCV is good to.
+constexpr double least_white = 0.2;
+
 constexpr std::size_t temperature_resistance = index_of("temperature_resistance");
 
 /// What its unknowns cost a mechanism.
@@ -221,9 +224,8 @@ class Chain {
   /// The candidates fitted; the foremost again with the noise that they leave, which is smaller when much has been explained.
   std::vector<Fit> fitted(const Fit& around, const std::vector<Candidate>& candidates, double hopeless) {
     std::vector<Fit> fits;
-    const NoiseModel noise = evidence_.noise();
+    if (!around.hypothesis.added().empty()) evidence_.linearise(around.hypothesis, around.calibration);
     for (const Candidate& c : candidates) {
-      evidence_.set_noise(noise);
       fits.push_back(fit_with(around, c, hopeless));
     }
     std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
@@ -310,7 +312,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   std::vector<double> white;
   for (const Record& r : records) white.push_back(white_noise(r.voltage_v, r.current_a, 0.01 * cell.capacity_ah, cell.noise.voltage_v));
   NoiseModel noise;
-  noise.white_v = *std::max_element(white.begin(), white.end());
+  noise.white_v = std::max(*std::max_element(white.begin(), white.end()), least_white * cell.tolerance.ocv_v);
   noise.fast_v = std::max(cell.tolerance.ocv_v, 5e-4);
   noise.slow_v = 1.3 * std::max(cell.tolerance.drift_v, 5e-4);
   for (Record& r : records) r.current_a = quiet_current(r.current_a, std::min(current_noise(r.current_a), 1.5 * cell.noise.current_a));
@@ -362,11 +364,15 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       current = more.front();
     }
   };
-  // every cell's resistances follow the temperature: far from its file's that comes before anything that would stand in for it
-  const bool expected = away_k(evidence) > decision::far_k && evidence.base().find(temperature_resistance) == nullptr;
-  if (expected) {
-    const std::vector<Fit> with_it = chain.one_more(base, {temperature_resistance});
-    if (!with_it.empty() && chain.gain(base, with_it.front()) > decision::detected) current = with_it.front();
+  // what is there for certain comes before anything that would stand in for it: every cell's resistances follow the temperature, and a
+  // file that tells how far charge and discharge lie apart tells that there is a hysteresis
+  std::set<std::size_t> expected;
+  if (away_k(evidence) > decision::far_k) expected.insert(temperature_resistance);
+  if (cell.ocv.half_gap_v.size > 0) expected.insert(index_of("ocv_hysteresis"));
+  std::erase_if(expected, [&](std::size_t m) { return evidence.base().find(m) != nullptr; });
+  for (const std::size_t m : expected) {
+    const std::vector<Fit> with_it = chain.one_more(current, {m});
+    if (!with_it.empty() && chain.gain(current, with_it.front()) > decision::detected) current = with_it.front();
   }
   grow();
   {
@@ -409,7 +415,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
           continue;
         }
         if (!chain.carries(less, rival)) continue;
-        if (chain.score(rival) < chain.score(current) - 0.5 && !(expected && m == temperature_resistance)) {
+        if (chain.score(rival) < chain.score(current) - 0.5 && !expected.contains(m)) {
           current = rival;
           changed = true;
         }
@@ -460,6 +466,11 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     Finding f;
     f.setting = *current.hypothesis.find(m);
     f.gain = gains[m];
+    f.at_bound.assign(catalogue[m].parameters, 0);
+    const std::vector<Sought> sought = current.hypothesis.sought();
+    for (std::size_t j = 0; j < sought.size(); ++j) {
+      if (current.hypothesis.settings[sought[j].setting].index == m) f.at_bound[sought[j].parameter] = current.at_bound[j];
+    }
     double sum = 1;
     struct Near {
       double behind;

@@ -39,6 +39,7 @@ constexpr double edge_error = 0.4;
 /// Error along the soc of the OCV table, as a share of what the start may be off; and how far around the counted soc its slope is taken.
 constexpr double soc_error_share = 0.3, slope_reach = 0.01;
 
+constexpr double rarity = 0.5;         // of a strength: what is beyond the common, over this share of it, in deviations
 constexpr double log_prior_width = 1;  // of a shape: a factor of e between its usual and an unusual value
 
 }  // namespace
@@ -130,7 +131,7 @@ void Evidence::set_noise(const NoiseModel& noise) {
   if (!whiteners_.empty() && noise == noise_) return;
   noise_ = noise;
   whiteners_ = whiteners_for(noise);
-  base_linear_.reset();
+  nearby_.reset();
 }
 
 NoiseModel Evidence::likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const {
@@ -335,6 +336,8 @@ std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, co
   return made;
 }
 
+void Evidence::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linear(h, u); }
+
 Fit Evidence::fit(const Hypothesis& start, int iterations) const { return fit(start, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())), iterations); }
 
 Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations, double hopeless) const {
@@ -361,10 +364,15 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     const Sought& s = sought[static_cast<std::size_t>(j)];
     return h.settings[s.setting].value[s.parameter];
   };
+  const auto is_shape = [&](Eigen::Index j) { return info(j).role == model::Role::shape; };
+  // how far a strength is beyond what is common, in deviations
+  const auto common = [&](Eigen::Index j) { return info(j).common(cell_.capacity_ah); };
+  const auto rare = [&](Eigen::Index j, double v) { return common(j) > 0 && std::abs(v) > common(j) ? (v - std::copysign(common(j), v)) / (rarity * common(j)) : 0.0; };
   const auto prior = [&](Hypothesis& h) {
     double sum = 0;
     for (Eigen::Index j = 0; j < m; ++j) {
-      if (info(j).role == model::Role::shape) sum += std::pow(std::log(value(h, j) / (info(j).unsaid(cell_.capacity_ah))) / log_prior_width, 2);
+      if (is_shape(j)) sum += std::pow(std::log(value(h, j) / (info(j).unsaid(cell_.capacity_ah))) / log_prior_width, 2);
+      else sum += std::pow(rare(j, value(h, j)), 2);
     }
     return sum;
   };
@@ -376,9 +384,10 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
   fit.cost = cost_of(fit.hypothesis, fit.calibration, fit.residual);
   const double cost_at_start = fit.cost;
 
-  if (!base_linear_) base_linear_ = linear(base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())));
-  std::shared_ptr<const Linear> around = base_linear_;
+  if (!nearby_) linearise(base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())));
+  std::shared_ptr<const Linear> around = nearby_;
   int renewals = 0;
+  constexpr int most_renewals = 6;
   double damping = 1e-3;
   Eigen::MatrixXd schur;
   Eigen::VectorXd natural = Eigen::VectorXd::Ones(m);  // d parameter / d internal
@@ -386,7 +395,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Columns j_theta = derivatives(fit.hypothesis, fit.calibration, sought);  // of nothing sought: no columns
     for (Eigen::Index j = 0; j < m; ++j) {
-      natural[j] = info(j).role == model::Role::shape ? value(fit.hypothesis, j) : (high_of(j) - low_of(j)) / 100;
+      natural[j] = is_shape(j) ? value(fit.hypothesis, j) : (high_of(j) - low_of(j)) / 100;
       j_theta.col(j) *= natural[j];
     }
     const Columns& j_u = around->columns;
@@ -399,7 +408,14 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
       a = j_theta.transpose() * j_theta;
     }
     for (Eigen::Index j = 0; j < m; ++j) {
-      if (info(j).role != model::Role::shape) continue;
+      if (!is_shape(j)) {
+        if (const double beyond = rare(j, value(fit.hypothesis, j)); beyond != 0) {
+          const double per = natural[j] / (rarity * common(j));
+          g[j] -= beyond * per;
+          a(j, j) += per * per;
+        }
+        continue;
+      }
       const double width2 = log_prior_width * log_prior_width;
       g[j] -= std::log(value(fit.hypothesis, j) / (info(j).unsaid(cell_.capacity_ah))) / width2;
       a(j, j) += 1 / width2;
@@ -421,46 +437,54 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     }
     if (iteration >= 3 && fit.cost - 2 * within_reach > hopeless) break;
 
-    bool better = false;
+    bool better = false, astray = false;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-      // those that would leave their bounds are held at them, one round after the other
+      // those that would leave their bounds go to them and no farther, and the others' steps are those beside that; one round after the other
       std::vector<char> held(sought.size(), 0);
-      Eigen::VectorXd step = Eigen::VectorXd::Zero(m);
+      Eigen::VectorXd step = Eigen::VectorXd::Zero(m), reach(m);
+      Hypothesis trial = fit.hypothesis;
       for (int round = 0; m > 0 && round <= static_cast<int>(m); ++round) {
         Eigen::MatrixXd s = schur;
         Eigen::VectorXd b = rhs;
         for (Eigen::Index j = 0; j < m; ++j) s(j, j) += damping * schur(j, j) + 1e-9 + 1e-12 * schur.diagonal().maxCoeff();
         for (Eigen::Index j = 0; j < m; ++j) {
+          if (held[static_cast<std::size_t>(j)] != 0) b -= schur.col(j) * reach[j];
+        }
+        for (Eigen::Index j = 0; j < m; ++j) {
           if (held[static_cast<std::size_t>(j)] == 0) continue;
           s.row(j).setZero();
           s.col(j).setZero();
           s(j, j) = 1;
-          b[j] = 0;
+          b[j] = reach[j];
         }
         step = s.ldlt().solve(b);
         bool more = false;
         for (Eigen::Index j = 0; j < m; ++j) {
-          const double v = value(fit.hypothesis, j), low = low_of(j), high = high_of(j), reach = 1e-9 * (high - low);
-          if (held[static_cast<std::size_t>(j)] == 0 && ((v <= low + reach && step[j] < 0) || (v >= high - reach && step[j] > 0))) held[static_cast<std::size_t>(j)] = 1, more = true;
+          if (held[static_cast<std::size_t>(j)] != 0) continue;
+          const double v = value(fit.hypothesis, j);
+          const double to_low = is_shape(j) ? std::max(std::log(low_of(j) / v), -1.5) : (low_of(j) - v) / natural[j];
+          const double to_high = is_shape(j) ? std::min(std::log(high_of(j) / v), 1.5) : (high_of(j) - v) / natural[j];
+          if (step[j] >= to_low && step[j] <= to_high) continue;
+          held[static_cast<std::size_t>(j)] = 1;
+          reach[j] = std::clamp(step[j], to_low, to_high);
+          more = true;
         }
         if (!more) break;
       }
-      Hypothesis trial = fit.hypothesis;
-      Eigen::VectorXd taken = step;
       for (Eigen::Index j = 0; j < m; ++j) {
-        const bool shape = info(j).role == model::Role::shape;
-        const double v = value(fit.hypothesis, j), held_step = shape ? std::clamp(step[j], -1.5, 1.5) : step[j];
-        double& next = value(trial, j);
-        next = std::clamp(shape ? v * std::exp(held_step) : v + natural[j] * step[j], low_of(j), high_of(j));
-        taken[j] = shape ? std::log(next / v) : (next - v) / natural[j];
+        const double v = value(fit.hypothesis, j);
+        value(trial, j) = std::clamp(is_shape(j) ? v * std::exp(step[j]) : v + natural[j] * step[j], low_of(j), high_of(j));
       }
       // where the base parameters' derivatives are stale, a shorter way is taken with theirs too
       const double way = 1 / (1 + 0.02 * damping);
       Eigen::VectorXd toward = u_alone;
-      if (m > 0) toward -= solved * taken;
+      if (m > 0) toward -= solved * step;
       const Eigen::VectorXd u = fit.calibration + way * toward;
       const Eigen::VectorXd r = residual(trial, u);
       const double cost = cost_of(trial, u, r);
+      double promised = g_u.dot(u_alone);
+      if (m > 0) promised += 2 * rhs.dot(step) - step.dot(schur * step);
+      if (fit.cost - cost < 0.3 * promised && promised > 2 + 1e-3 * fit.cost) astray = true;
       if (cost < fit.cost) {
         better = true;
         quiet = fit.cost - cost < 0.05 + 1e-5 * fit.cost ? quiet + 1 : 0;
@@ -468,18 +492,17 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
         fit.calibration = u;
         fit.residual = r;
         fit.cost = cost;
-        for (std::size_t j = 0; j < held.size(); ++j) fit.at_bound[j] = held[j];
         damping = std::max(damping / 5, 1e-9);
       } else {
         damping *= 8;
       }
     }
-    if (better && quiet == 0) continue;
-    // far from where the base parameters were linearised: once more from here
-    if (renewals < 2 && (!better || cost_at_start - fit.cost > 50)) {
+    if (better && quiet == 0 && !(astray && renewals < most_renewals)) continue;
+    // far from where the base parameters were linearised, or not what was promised: once more from here
+    if (renewals < (astray ? most_renewals : 2) && (astray || !better || cost_at_start - fit.cost > 50)) {
       ++renewals;
       quiet = 0;
-      damping = 1e-3;
+      damping = astray ? std::max(1e-3, damping / 64) : 1e-3;
       around = linear(fit.hypothesis, fit.calibration);
       iterations = std::max(iterations, iteration + 5);
       continue;
@@ -488,6 +511,10 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     break;
   }
 
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const double v = value(fit.hypothesis, j), low = low_of(j), high = high_of(j), reach = 1e-9 * (high - low);
+    fit.at_bound[static_cast<std::size_t>(j)] = v <= low + reach || v >= high - reach ? 1 : 0;
+  }
   fit.covariance = Eigen::MatrixXd::Zero(m, m);
   if (m > 0) {
     Eigen::MatrixXd s = schur;

@@ -97,6 +97,8 @@ class Evidence {
   /// Any columns over all records, made white.
   void whiten(Columns& columns) const;
 
+  /// Where the fits that follow find the base parameters' derivatives, until the noise changes; saves each of them its own.
+  void linearise(const Hypothesis& h, const Eigen::VectorXd& u) const;
   Fit fit(const Hypothesis& start, int iterations = 12) const;
   /// From where another fit ended, e.g. with other noise. Ends early when even a step that keeps all it promises stays above hopeless.
   Fit fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations = 12, double hopeless = std::numeric_limits<double>::infinity()) const;
@@ -126,7 +128,7 @@ class Evidence {
   std::vector<std::vector<char>> usable_;
   std::vector<RowNoise> row_noise_;
   std::size_t samples_ = 0, checks_ = 0;
-  mutable std::shared_ptr<const Linear> base_linear_;
+  mutable std::shared_ptr<const Linear> nearby_;  ///< where fits begin to be linear in the base parameters
 };
 
 }  // namespace bms::diagnosis

@@ -57,14 +57,16 @@ struct Parameter {
   double low = 0, high = 0;
   Per per = Per::cell;
   std::string_view meaning;  ///< and its source, where the bounds have one
+  double usual = 0;          ///< of a strength: size beyond which it is rare, scaled as the bounds are; 0: all are alike
 
   constexpr double scale(double capacity_ah) const { return per == Per::cell ? 1 : per == Per::ah ? capacity_ah : 1 / capacity_ah; }
   constexpr double lower(double capacity_ah) const { return low * scale(capacity_ah); }
   constexpr double upper(double capacity_ah) const { return high * scale(capacity_ah); }
+  constexpr double common(double capacity_ah) const { return usual * scale(capacity_ah); }
   /// neutral, scaled as the bounds are and held within them: what a cell file that is silent about it means.
   constexpr double unsaid(double capacity_ah) const {
-    const double usual = neutral * scale(capacity_ah);
-    return usual < lower(capacity_ah) ? lower(capacity_ah) : usual > upper(capacity_ah) ? upper(capacity_ah) : usual;
+    const double silent = neutral * scale(capacity_ah);
+    return silent < lower(capacity_ah) ? lower(capacity_ah) : silent > upper(capacity_ah) ? upper(capacity_ah) : silent;
   }
 };
 

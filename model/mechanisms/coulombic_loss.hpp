@@ -10,7 +10,7 @@ struct CoulombicLoss {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"loss_fraction", "1", Role::strength, 0, -0.02, 0.1, Per::cell, "1 - eta"},
+      Parameter{"loss_fraction", "1", Role::strength, 0, -0.02, 0.1, Per::cell, "1 - eta", 0.03},
   };
 
   template <class S>

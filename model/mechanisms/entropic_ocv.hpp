@@ -13,10 +13,10 @@ struct EntropicOcv {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"at_10_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "dU/dT at 10 % of soc; -0.6 to 0.4 mV/K is usual for LFP and graphite"},
-      Parameter{"at_40_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 40 %"},
-      Parameter{"at_70_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 70 %"},
-      Parameter{"at_95_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 95 %"},
+      Parameter{"at_10_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "dU/dT at 10 % of soc; -0.6 to 0.4 mV/K is usual for LFP and graphite", 0.0005},
+      Parameter{"at_40_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 40 %", 0.0005},
+      Parameter{"at_70_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 70 %", 0.0005},
+      Parameter{"at_95_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 95 %", 0.0005},
       Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell, "temperature of the cell file's OCV"},
   };
 

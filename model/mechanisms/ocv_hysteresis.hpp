@@ -16,7 +16,7 @@ struct OcvHysteresis {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"half_gap_v", "V", Role::strength, 0, 0, 0.07, Per::cell, "half of charge less discharge branch, M; 3 to 40 mV is usual for LFP"},
+      Parameter{"half_gap_v", "V", Role::strength, 0, 0, 0.07, Per::cell, "half of charge less discharge branch, M; 3 to 40 mV is usual for LFP", 0.04},
       Parameter{"decay", "1", Role::shape, 40, 8, 400, Per::cell, "gamma: 1 / decay of the capacity moved leads from one branch to 63 % of the way to the other"},
       Parameter{"ocv_at", "1", Role::place, 0, -1, 1, Per::cell, "h_0: where the OCV of the cell file lies, -1 discharge .. 1 charge branch"},
       Parameter{"initial", "1", Role::place, 0, -1, 1, Per::cell, "h at the start of a recording"},

@@ -15,7 +15,7 @@ struct SelfHeating {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"thermal_resistance_k_per_w", "K/W", Role::strength, 0, 0, 300, Per::siemens, "R_th from inside to where the temperature is measured"},
+      Parameter{"thermal_resistance_k_per_w", "K/W", Role::strength, 0, 0, 300, Per::siemens, "R_th from inside to where the temperature is measured", 20},
       Parameter{"time_constant_s", "s", Role::shape, 900, 60, 6000, Per::cell, "tau"},
       Parameter{"activation_j_per_mol", "J/mol", Role::given, 25000, 5000, 80000, Per::cell, "E of R0 and R1; only its product with R_th shows"},
   };

@@ -15,8 +15,8 @@ struct TemperatureResistance {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 60000, Per::cell, "E of R0; 5 to 30 kJ/mol is usual"},
-      Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell, "E of R1; 30 to 70 kJ/mol is usual"},
+      Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 60000, Per::cell, "E of R0; 5 to 30 kJ/mol is usual", 40000},
+      Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell, "E of R1; 30 to 70 kJ/mol is usual", 70000},
       Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell, "temperature of the cell file's resistances"},
   };
 
