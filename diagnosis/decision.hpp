@@ -17,11 +17,13 @@ inline constexpr double inseparable = 0.97;     ///< signatures this much alike 
 inline constexpr double same_inseparable = 30;  ///< and of a class all this close are named
 inline constexpr double per_unknown = 3;        ///< cost of every unknown after the first
 inline constexpr double per_burst = 12;         ///< cost of every burst of a loose contact: two moments that were sought
-inline constexpr double explained = 0.65;       ///< share of the mismatch that a cause must explain
+inline constexpr double explained = 0.8;        ///< share of the mismatch that a cause must explain
+inline constexpr double explained_by_bursts = 0.9;  ///< and one that may come and go as it likes
 inline constexpr double much_left = 40;         ///< what must remain, in gain, to say that something unknown is there
 inline constexpr double larger_than_error = 3; ///< one of several causes does not move the voltage by more than this times the error
+inline constexpr double noticeable = 0.02;      ///< share of the error that one of several causes moves the voltage by at least
 inline constexpr double may_grow = 1.15;       ///< of the plain error, by adding a cause
-inline constexpr double temper = 3;             ///< log-likelihoods are this much too sure of themselves
+inline constexpr double temper = 1.5;            ///< log-likelihoods are this much too sure of themselves
 inline constexpr double settled = 40;           ///< gain by which a next experiment should part rivals: more than same_inseparable, as no forecast is quite right
 inline constexpr double fast_excess = 0.25;     ///< variance of the whitened residual above 1 that noise does not reach
 

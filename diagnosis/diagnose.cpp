@@ -402,7 +402,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     for (const std::size_t m : current.hypothesis.added()) {
       const Fit less = current.hypothesis.added().size() == 1 ? base : chain.without_one(current, m);
       gains[m] = chain.gain(less, current);
-      const bool cancels = current.hypothesis.added().size() > 1 && sizes_v.at(m) > decision::larger_than_error * error_v;
+      const bool one_of_several = current.hypothesis.added().size() > 1;
+      const bool cancels = one_of_several && sizes_v.at(m) > decision::larger_than_error * error_v;
+      if (one_of_several && sizes_v.at(m) < decision::noticeable * error_v) gains[m] = std::min(gains[m], decision::detected - 1);
       if (cancels) gains[m] = std::min(gains[m], decision::detected - sizes_v.at(m) / error_v);
       if (gains[m] < decision::detected) {
         reduced.emplace_back(gains[m], less);
@@ -450,7 +452,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.adequacy = gained + d.remaining > 0 ? std::max(gained, 0.0) / (std::max(gained, 0.0) + d.remaining) : 1;
   const bool something = !current.hypothesis.added().empty();
   // what is flexible gains on anything: when it is named, what it leaves must be white
-  const bool unknown = d.remaining > decision::much_left && (!something || d.adequacy < decision::explained || d.fast_excess > decision::fast_excess);
+  const bool bursts = current.hypothesis.find(index_of("contact_intermittent")) != nullptr;
+  const bool unknown = d.remaining > decision::much_left &&
+                       (!something || d.adequacy < (bursts ? decision::explained_by_bursts : decision::explained) || d.fast_excess > decision::fast_excess);
 
   // findings
   d.extended = current.hypothesis;

@@ -87,7 +87,7 @@ struct Diagnosis {
 };
 
 struct Options {
-  std::size_t most_mechanisms = 6;
+  std::size_t most_mechanisms = 5;
   std::function<void(double done, const std::string& what)> progress;  ///< done: 0..1
 };
 
