@@ -20,6 +20,7 @@ struct Stretch {
 
 constexpr std::array<std::size_t, 6> lengths = {2, 4, 8, 16, 32, 64};  // rows
 constexpr std::size_t tail = 40;                                       // rows in which a stretch's end rings out
+constexpr double no_voltage_v = 1e3;                                   // of a simulation that has run away
 constexpr std::size_t fewest_rows = 3;                                 // one bad reading is no contact
 constexpr double most_loaded_share = 0.35;                             // bursts are the exception
 
@@ -44,7 +45,7 @@ std::vector<Stretch> chosen(std::vector<Stretch> all, double ohm, std::size_t ro
 std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v, const Whitener& whitener, double& found_ohm) {
   const std::size_t n = record.size();
   std::vector<double> residual(residual_v);
-  for (double& v : residual) v = std::isfinite(v) ? v : 0;
+  for (double& v : residual) v = std::abs(v) < no_voltage_v ? v : 0;
   whitener.whiten(0, residual);
   double largest_a = 0;
   std::size_t loaded = 0;
@@ -112,7 +113,7 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
           const auto first = static_cast<std::ptrdiff_t>(s.first) + by_first, end = static_cast<std::ptrdiff_t>(s.end) + by_end;
           if (first < 0 || end <= first || end >= static_cast<std::ptrdiff_t>(n)) continue;
           const Stretch there = stretch(static_cast<std::size_t>(first), static_cast<std::size_t>(end));
-          if (there.gain(ohm) <= s.gain(ohm) + 1e-9) continue;
+          if (!(there.gain(ohm) > s.gain(ohm) + 1e-9)) continue;  // nor where there is no number: it would go to and fro for ever
           s = there;
           moved = true;
         }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 
 #include <Eigen/Cholesky>
@@ -41,6 +40,57 @@ constexpr double soc_error_share = 0.3, slope_reach = 0.01;
 
 constexpr double rarity = 0.5;         // of a strength: what is beyond the common, over this share of it, in deviations
 constexpr double log_prior_width = 1;  // of a shape: a factor of e between its usual and an unusual value
+
+/// The base parameters in a run, at the unknowns u.
+template <class S>
+struct AtUnknowns {
+  const Calibration& calibration;
+  const std::vector<double>& u;
+
+  S initial_soc_shift(std::size_t record) const { return S(calibration.initial_soc_shift(record, u)); }
+  S capacity_loss() const { return S(calibration.capacity_loss(u)); }
+  S gain_error() const { return S(calibration.gain_error(u)); }
+  S offset_a(std::size_t record, double time_s) const { return S(calibration.offset_a(record, time_s, u)); }
+  void adjust(model::TablePoint<S>& at, const S& soc) const { calibration.adjust(at, soc, u); }
+  void before_row(model::Course<S>&) const {}
+};
+
+/// The same for derivatives along one row: a lane for each lever, then one for each state as it was before the row.
+template <class S>
+struct OnLevers : AtUnknowns<S> {
+  using Plain = AtUnknowns<S>;
+
+  S capacity_loss() const { return pulled(Plain::capacity_loss(), Lever::capacity); }
+  S gain_error() const { return pulled(Plain::gain_error(), Lever::gain); }
+  S offset_a(std::size_t record, double time_s) const { return pulled(Plain::offset_a(record, time_s), Lever::zero); }
+  void adjust(model::TablePoint<S>& at, const S& soc) const {
+    this->calibration.adjust(at, soc, this->u, [](std::size_t lever, const S& x) { return pulled(x, lever); });
+  }
+  void before_row(model::Course<S>& course) const {
+    Eigen::Index lane = Lever::count;
+    course.each_state([&](S& state) {
+      state.v.setZero();
+      state.v[lane++] = 1;
+    });
+  }
+
+ private:
+  static S pulled(S s, std::size_t lever) {
+    s.v[static_cast<Eigen::Index>(lever)] += 1;
+    return s;
+  }
+};
+
+/// The hypothesis' settings as dual numbers.
+template <class Jet>
+std::vector<model::MechanismValues<Jet>> dual_values(const Hypothesis& h) {
+  std::vector<model::MechanismValues<Jet>> values;
+  for (const MechanismSetting& s : h.settings) {
+    auto& v = values.emplace_back();
+    for (std::size_t p = 0; p < v.size(); ++p) v[p] = Jet(s.value[p]);
+  }
+  return values;
+}
 
 }  // namespace
 
@@ -174,13 +224,13 @@ std::size_t Evidence::used() const {
 
 Hypothesis Evidence::base() const { return {own_, own_.size(), {}}; }
 
-template <class S, class Row, class ForCheck>
-void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row, ForCheck&& check) const {
+template <class S, class Base, class Row, class ForCheck>
+void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const Base& base, std::size_t record, Row&& row, ForCheck&& check) const {
   const Record& r = records_[record];
   model::ChosenLaws<S> laws;
   S delay_s(0), lag_s(0), start(r.initial_soc);
-  start += calibration_.initial_soc_shift(record, u);
-  model::MechanismValues<S> capacity{calibration_.capacity_loss(u)}, gain{calibration_.gain_error(u)};
+  start += base.initial_soc_shift(record);
+  model::MechanismValues<S> capacity{base.capacity_loss()}, gain{base.gain_error()};
   for (std::size_t k = 0; k < h.settings.size(); ++k) {
     const std::size_t index = h.settings[k].index;
     if (index == skew) delay_s = values[k][0];
@@ -198,11 +248,12 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
   model::choose<S>(laws, current_gain, gain, cell_.capacity_ah);
   const model::CorrectedReadings<S> readings(r.time_s, r.current_a, r.temperature_c, delay_s, lag_s);
   model::Course<S> course(tables_, cell_.capacity_ah, laws, start);
-  const auto adjust = [&](model::TablePoint<S>& at, const S& soc) { calibration_.adjust(at, soc, u); };
+  const auto adjust = [&](model::TablePoint<S>& at, const S& soc) { base.adjust(at, soc); };
   for (std::size_t k = 0; k < r.size(); ++k) {
     const double duration_s = k == 0 ? 0 : r.time_s[k] - r.time_s[k - 1];
-    const S read_a = readings.current(k) - calibration_.offset_a(record, r.time_s[k], u);
-    row(k, course.step(r.time_s[k], duration_s, read_a, readings.temperature(k), adjust), course.soc());
+    const S read_a = readings.current(k) - base.offset_a(record, r.time_s[k]);
+    base.before_row(course);
+    row(k, course.step(r.time_s[k], duration_s, read_a, readings.temperature(k), adjust), course);
   }
   for (std::size_t j = 0; j < r.checks.size(); ++j) {
     const Check& c = r.checks[j];
@@ -212,7 +263,7 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
     for (std::size_t k = 0; k < h.settings.size(); ++k) {
       if (h.settings[k].index == contact_step && (record > 0 || c.time_s >= h.settings[k].value[1])) at_terminals += values[k][0] * c.current_a;
     }
-    const S expected = current ? S(laws.true_current(S(c.read) - calibration_.offset_a(record, c.time_s, u)) - c.reference) : S(laws.reading(at_terminals) - c.read);
+    const S expected = current ? S(laws.true_current(S(c.read) - base.offset_a(record, c.time_s)) - c.reference) : S(laws.reading(at_terminals) - c.read);
     check(j, S(expected * (1 / c.deviation)));
   }
 }
@@ -224,9 +275,10 @@ std::vector<double> Evidence::simulate(const Hypothesis& h, const Eigen::VectorX
   if (soc != nullptr) soc->resize(v.size());
   std::vector<model::MechanismValues<double>> values;
   for (const MechanismSetting& s : h.settings) values.push_back(s.value);
-  run<double>(values, h, std::vector<double>(u.data(), u.data() + u.size()), record, [&](std::size_t k, double volt, double z) {
+  const std::vector<double> unknowns(u.data(), u.data() + u.size());
+  run<double>(values, h, AtUnknowns<double>{calibration_, unknowns}, record, [&](std::size_t k, double volt, const auto& course) {
     v[k] = volt;
-    if (soc != nullptr) (*soc)[k] = z;
+    if (soc != nullptr) (*soc)[k] = course.soc();
   }, [&](std::size_t, double expected) {
     if (checks != nullptr) checks->push_back(expected);
   });
@@ -280,51 +332,96 @@ void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
 }
 
 template <std::size_t Lanes>
-void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base, std::size_t first, std::size_t here,
-                      Columns& columns) const {
+void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::size_t first, std::size_t here, Columns& columns) const {
   using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
-  std::vector<model::MechanismValues<Jet>> values;
-  for (const MechanismSetting& s : h.settings) {
-    auto& v = values.emplace_back();
-    for (std::size_t p = 0; p < v.size(); ++p) v[p] = Jet(s.value[p]);
-  }
-  std::vector<Jet> unknowns(static_cast<std::size_t>(u.size()));
-  for (std::size_t k = 0; k < unknowns.size(); ++k) unknowns[k] = Jet(u[static_cast<Eigen::Index>(k)]);
-  for (std::size_t lane = 0; lane < here; ++lane) {
-    const std::size_t c = first + lane;
-    Jet& seeded = c < by.size() ? values[by[c].setting][by[c].parameter] : unknowns[base[c - by.size()]];
-    seeded.v[static_cast<Eigen::Index>(lane)] = 1;
-  }
+  std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
+  const std::vector<double> unknowns(u.data(), u.data() + u.size());
+  for (std::size_t lane = 0; lane < here; ++lane) values[by[first + lane].setting][by[first + lane].parameter].v[static_cast<Eigen::Index>(lane)] = 1;
   Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
   const auto put = [&](Eigen::Index at, const Jet& v) {
     for (std::size_t lane = 0; lane < here; ++lane) columns(at, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
   };
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    run<Jet>(values, h, unknowns, r, [&](std::size_t, const Jet& v, const Jet&) { put(row++, v); }, [&](std::size_t, const Jet& expected) { put(check_row++, expected); });
+    run<Jet>(values, h, AtUnknowns<Jet>{calibration_, unknowns}, r, [&](std::size_t, const Jet& v, const auto&) { put(row++, v); },
+             [&](std::size_t, const Jet& expected) { put(check_row++, expected); });
   }
 }
 
-Columns Evidence::derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const {
-  const std::size_t count = by.size() + base.size();
-  Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(count));
-  if (count == 0) return columns;
-  for (std::size_t first = 0; first < count;) {
-    const bool few = count - first <= few_lanes;
-    const std::size_t here = std::min(few ? few_lanes : lanes, count - first);
-    if (few) derive<few_lanes>(h, u, by, base, first, here, columns);
-    else derive<lanes>(h, u, by, base, first, here, columns);
+Columns Evidence::derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const {
+  Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(by.size()));
+  if (by.empty()) return columns;
+  for (std::size_t first = 0; first < by.size();) {
+    const bool few = by.size() - first <= few_lanes;
+    const std::size_t here = std::min(few ? few_lanes : lanes, by.size() - first);
+    if (few) derive<few_lanes>(h, u, by, first, here, columns);
+    else derive<lanes>(h, u, by, first, here, columns);
     first += here;
   }
   whiten(columns);
   return columns;
 }
 
-Columns Evidence::derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const { return derivative_columns(h, u, by, {}); }
+template <std::size_t Lanes>
+void Evidence::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const {
+  using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
+  struct Pull {
+    Eigen::Index lever, unknown;
+    double size;
+  };
+  const std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
+  const std::vector<double> unknowns(u.data(), u.data() + u.size());
+  const OnLevers<Jet> base{{calibration_, unknowns}};
+  const auto still = static_cast<Eigen::Index>(calibration_.ocv_unknowns()), moving = columns.cols() - still;
+  std::vector<Pull> pulls;
+  const auto pull = [&](std::size_t record, double time_s, double soc) {
+    pulls.clear();
+    calibration_.each_lever(record, time_s, soc, [&](std::size_t lever, std::size_t unknown, double size) { pulls.push_back({static_cast<Eigen::Index>(lever), static_cast<Eigen::Index>(unknown), size}); });
+  };
+  Columns states(static_cast<Eigen::Index>(Lanes - Lever::count), moving), next = states;  // d state / d unknown
+  Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    const Record& record = records_[r];
+    states.setZero();
+    states(0, static_cast<Eigen::Index>(calibration_.initial_soc_unknown(r)) - still) = calibration_.initial_soc_size(r);
+    run<Jet>(values, h, base, r, [&](std::size_t k, const Jet& v, auto& course) {
+      pull(r, record.time_s[k], course.soc().a);
+      Eigen::Index count = 0;
+      const auto through_states = [&](const Jet& of, auto to) {
+        to.setZero();
+        for (Eigen::Index s = 0; s + static_cast<Eigen::Index>(Lever::count) < of.v.size(); ++s) {
+          if (const double by = of.v[s + static_cast<Eigen::Index>(Lever::count)]; by != 0) to += by * states.row(s);  // most are 0
+        }
+      };
+      course.each_state([&](const Jet& state) {
+        auto to = next.row(count++);
+        through_states(state, to);
+        for (const Pull& p : pulls) {
+          if (p.unknown >= still) to[p.unknown - still] += state.v[p.lever] * p.size;
+        }
+      });
+      auto out = columns.row(row++);
+      out.head(still).setZero();
+      through_states(v, out.tail(moving));
+      for (const Pull& p : pulls) out[p.unknown] += v.v[p.lever] * p.size;
+      states.swap(next);
+    }, [&](std::size_t j, const Jet& expected) {
+      pull(r, record.checks[j].time_s, 0);
+      auto out = columns.row(check_row++);
+      out.setZero();
+      for (const Pull& p : pulls) out[p.unknown] += expected.v[p.lever] * p.size;
+    });
+  }
+}
 
 Columns Evidence::calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const {
-  std::vector<std::size_t> all(calibration_.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  return derivative_columns(h, u, {}, all);
+  Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(calibration_.size()));
+  std::size_t states = 0;
+  for (const MechanismSetting& s : h.settings) states += catalogue[s.index].states;
+  constexpr std::size_t one_law = Lever::count + model::OneRc<double>::states + 1, all_laws = Lever::count + model::Course<double>::most_states;
+  if (states <= 1) carry<one_law>(h, u, columns);
+  else carry<all_laws>(h, u, columns);
+  whiten(columns);
+  return columns;
 }
 
 std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, const Eigen::VectorXd& u) const {

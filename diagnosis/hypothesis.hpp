@@ -105,15 +105,16 @@ class Evidence {
 
  private:
   struct Linear;  // base parameters' derivatives and their factorised normal matrix
-  /// row(k, voltage, soc), then check(j, what the hypothesis expects in place of the trusted side, in deviations).
-  template <class S, class Row, class ForCheck>
-  void run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const std::vector<S>& u, std::size_t record, Row&& row, ForCheck&& check) const;
+  /// row(k, voltage, course), then check(j, what the hypothesis expects in place of the trusted side, in deviations).
+  template <class S, class Base, class Row, class ForCheck>
+  void run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const Base& base, std::size_t record, Row&& row, ForCheck&& check) const;
   std::vector<double> simulate(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc, std::vector<double>* checks) const;
   /// Columns first .. first + here, in one run.
   template <std::size_t Lanes>
-  void derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base, std::size_t first, std::size_t here,
-              Columns& columns) const;
-  Columns derivative_columns(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::span<const std::size_t> base) const;
+  void derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::size_t first, std::size_t here, Columns& columns) const;
+  /// By all base parameters, in one run: what each row makes of the states before it and of the levers, carried on from row to row.
+  template <std::size_t Lanes>
+  void carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const;
   std::shared_ptr<const Linear> linear(const Hypothesis& h, const Eigen::VectorXd& u) const;
 
   model::CellParameters<> cell_;

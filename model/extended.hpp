@@ -177,6 +177,15 @@ class Course {
   const S& soc() const { return soc_; }
   const S& v_rc_v() const { return v_rc_[0]; }
 
+  /// All that the next row knows of those before it: soc, v_rc, the laws' states. f(S&).
+  template <class F>
+  void each_state(F&& f) {
+    f(soc_);
+    for (S& v : v_rc_) f(v);
+    for (std::size_t k = 0; k < laws_.states(); ++k) f(x_[k]);
+  }
+  static constexpr std::size_t most_states = OneRc<S>::states + ChosenLaws<S>::most_states;
+
  private:
   static double value(const S& s) {
     if constexpr (Dual<S>) return s.a;
