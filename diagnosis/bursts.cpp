@@ -23,6 +23,8 @@ constexpr std::size_t tail = 40;                                       // rows i
 constexpr double no_voltage_v = 1e3;                                   // of a simulation that has run away
 constexpr std::size_t fewest_rows = 3;                                 // one bad reading is no contact
 constexpr double most_loaded_share = 0.35;                             // bursts are the exception
+constexpr std::size_t beside = 64;                                     // rows around a step of the current in which the model itself may be off
+constexpr double chance = 0.01;                                        // of loose moments that fall beside steps as often as these
 
 /// Stretches that do not touch, best first, each worth its price at this resistance.
 std::vector<Stretch> chosen(std::vector<Stretch> all, double ohm, std::size_t rows, double& total) {
@@ -38,6 +40,16 @@ std::vector<Stretch> chosen(std::vector<Stretch> all, double ohm, std::size_t ro
     best.push_back(s);
   }
   return best;
+}
+
+/// Probability that at least `hits` of `of` fall where a share of all is.
+double as_many(std::size_t of, std::size_t hits, double share) {
+  double sum = 0;
+  for (std::size_t k = hits; k <= of; ++k) {
+    const double n = static_cast<double>(of), h = static_cast<double>(k);
+    sum += std::exp(std::lgamma(n + 1) - std::lgamma(h + 1) - std::lgamma(n - h + 1)) * std::pow(share, h) * std::pow(1 - share, n - h);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -130,6 +142,18 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
   whitener.whiten(0, column);
   for (std::size_t k = 0; k < n; ++k) residual[k] -= column[k];
   chosen(stretches(false), ohm, n, total);
+  // a contact opens when it likes; what comes with the steps of the current is how the cell answers them
+  std::vector<char> near_step(n, 0);
+  for (std::size_t k = 1; k < n; ++k) {
+    if (std::abs(current_a(k) - current_a(k - 1)) < 0.2 * largest_a) continue;
+    for (std::size_t j = k > beside ? k - beside : 0; j < std::min(n, k + beside); ++j) near_step[j] = 1;
+  }
+  double loaded_near = 0;
+  for (std::size_t k = 0; k < n; ++k) loaded_near += near_step[k] != 0 && std::abs(current_a(k)) > 0.02 * largest_a ? 1 : 0;
+  std::size_t bursts_near = 0;
+  for (const Stretch& s : best) bursts_near += near_step[(s.first + s.end) / 2] != 0 ? 1 : 0;
+  if (as_many(best.size(), bursts_near, loaded_near / static_cast<double>(std::max<std::size_t>(loaded, 1))) < chance) return {};
+
   std::size_t inside = 0;
   for (const Stretch& s : best) inside += s.end - s.first;
   if (inside < fewest_rows || best_total < 2 * total + decision::detected || static_cast<double>(inside) > most_loaded_share * static_cast<double>(loaded)) return {};
