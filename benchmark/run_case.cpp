@@ -76,7 +76,7 @@ Outcome run_case(const truth::Case& c) {
     for (const std::size_t e : f.equivalent_to) set.push_back(id(e));
   }
   o.probability = d.findings.empty() ? 0 : d.findings.front().probability;
-  o.figures = fmt::format("base {:.0f} best {:.0f} remaining {:.0f} ({}) adequacy {:.2f} fast {:.2f}", d.base_cost, d.best_cost, d.remaining, d.remaining_goes_with, d.adequacy, d.fast_excess);
+  o.figures = fmt::format("base {:.0f} best {:.0f} remaining {:.0f} ({}) adequacy {:.2f} fast {:.2f} far {:.4f}", d.base_cost, d.best_cost, d.remaining, d.remaining_goes_with, d.adequacy, d.fast_excess, d.far_out);
   for (const diagnosis::Finding& f : d.findings) {
     o.figures += fmt::format(" | {} {:.0f}", id(f.setting.index), f.gain);
     for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p) o.figures += fmt::format(" {:.3g}", f.setting.value[p]);

@@ -25,6 +25,8 @@ inline constexpr double noticeable = 0.02;      ///< share of the error that one
 inline constexpr double may_grow = 1.15;       ///< of the plain error, by adding a cause
 inline constexpr double temper = 1.5;            ///< log-likelihoods are this much too sure of themselves
 inline constexpr double settled = 40;           ///< gain by which a next experiment should part rivals: more than same_inseparable, as no forecast is quite right
+inline constexpr double far_out = 0.003;        ///< share of the whitened residual beyond 4 deviations that single bad readings do not reach
+inline constexpr double surely = 0.93;          ///< no probability is larger: of what nothing in the catalogue came near, as many were right
 inline constexpr double fast_excess = 0.25;     ///< variance of the whitened residual above 1 that noise does not reach
 
 }  // namespace bms::diagnosis::decision

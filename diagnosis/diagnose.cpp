@@ -449,11 +449,12 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.remaining = remainder.gain;
   d.remaining_goes_with = remainder.family;
   d.fast_excess = remainder.fast_excess;
+  d.far_out = remainder.far_out;
   d.adequacy = gained + d.remaining > 0 ? std::max(gained, 0.0) / (std::max(gained, 0.0) + d.remaining) : 1;
   const bool something = !current.hypothesis.added().empty();
   // what is flexible gains on anything: when it is named, what it leaves must be white
   const bool bursts = current.hypothesis.find(index_of("contact_intermittent")) != nullptr;
-  const bool unknown = d.remaining > decision::much_left &&
+  const bool unknown = (d.remaining > decision::much_left || d.far_out > decision::far_out) &&
                        (!something || d.adequacy < (bursts ? decision::explained_by_bursts : decision::explained) || d.fast_excess > decision::fast_excess);
 
   // findings
@@ -498,7 +499,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       f.equivalent_to.push_back(n.mechanism);
       f.rivals.push_back({n.fit->hypothesis, n.fit->covariance});
     }
-    f.probability = 1 / sum;
+    f.probability = decision::surely / sum;
     f.rms_contribution_v = parts.rms_v.contains(m) ? parts.rms_v.at(m) : 0;
     d.findings.push_back(std::move(f));
   }
@@ -524,7 +525,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   std::stable_sort(d.candidates.begin(), d.candidates.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
   double total = something ? 0 : 1;
   for (const Ranked& r : d.candidates) total += std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper));
-  for (Ranked& r : d.candidates) r.probability = std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper)) / total;
+  for (Ranked& r : d.candidates) r.probability = decision::surely * std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper)) / total;
 
   d.spans = unknown || !something ? remainder.spans : parts.spans;
   d.regimes = regimes(evidence, current, unknown || !something ? remainder.energy : parts.energy);

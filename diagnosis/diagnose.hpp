@@ -83,11 +83,11 @@ struct Diagnosis {
   std::vector<RecordView> views;           ///< of each record
   // what the decision was made from
   std::string remaining_goes_with;         ///< what remains, if much does: with the time, the soc, a period of its own
-  double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0;
+  double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, far_out = 0;
 };
 
 struct Options {
-  std::size_t most_mechanisms = 5;
+  std::size_t most_mechanisms = 6;
   std::function<void(double done, const std::string& what)> progress;  ///< done: 0..1
 };
 

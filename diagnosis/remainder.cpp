@@ -198,6 +198,10 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
     double sum = 0;
     for (const double s : squares) sum += std::min(s, 16.0);
     found.fast_excess = sum / static_cast<double>(squares.size()) - 1;
+    const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+    std::nth_element(squares.begin(), middle, squares.end());
+    const double variance = *middle / 0.4549;  // median of a chi-square of one degree of freedom
+    found.far_out = static_cast<double>(std::count_if(squares.begin(), squares.end(), [&](double s) { return s > 16 * variance; })) / static_cast<double>(squares.size());
   }
   row = 0;
   for (const Record& r : evidence.records()) {

@@ -272,7 +272,7 @@ std::string json_of(const DiagnoseResult& r) {
   }
   json["faults"] = Json::array();
   for (const diagnosis::DataFault& f : d.faults) json["faults"].push_back({{"id", f.id}, {"text", f.text}, {"spans", spans_of(f.spans)}});
-  json["decision"] = {{"base_cost", number(d.base_cost)}, {"best_cost", number(d.best_cost)}, {"remaining", number(d.remaining)}, {"adequacy", number(d.adequacy)}, {"fast_excess", number(d.fast_excess)}};
+  json["decision"] = {{"base_cost", number(d.base_cost)}, {"best_cost", number(d.best_cost)}, {"remaining", number(d.remaining)}, {"adequacy", number(d.adequacy)}, {"fast_excess", number(d.fast_excess)}, {"far_out", number(d.far_out)}};
   json["out"] = r.out;
   json["wall_s"] = r.wall_s;
   json["warnings"] = warnings_of(r.warnings);
