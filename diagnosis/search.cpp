@@ -1,0 +1,229 @@
+#include "diagnosis/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "diagnosis/decision.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+using model::catalogue;
+using model::Role;
+
+constexpr int usual_iterations = 12;
+constexpr std::size_t temperature_resistance = index_of("temperature_resistance");
+
+/// What its unknowns cost a mechanism.
+double price(std::size_t mechanism, std::size_t bursts) {
+  double unknowns = 0;
+  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) unknowns += catalogue[mechanism].parameter[p].role != Role::given ? 1 : 0;
+  if (catalogue[mechanism].id == "contact_step") unknowns += 4;  // its moment was sought too
+  return decision::per_unknown * (unknowns - 1) + decision::per_burst * static_cast<double>(bursts);
+}
+
+double price(const Hypothesis& h) {
+  double sum = 0;
+  std::size_t bursts = 0;
+  for (const auto& spans : h.bursts) bursts += spans.size();
+  for (const std::size_t m : h.added()) sum += price(m, m == index_of("contact_intermittent") ? bursts : 0);
+  return sum;
+}
+
+/// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other resistances.
+double known_before(const Evidence& evidence, const Hypothesis& h) {
+  if (h.find(temperature_resistance) == nullptr || h.own > 0) return 0;
+  return std::clamp((away_k(evidence) - 5) * 1.5, 0.0, 15.0);
+}
+
+/// RMS of a raw residual, of the voltages that were read.
+double reading_error_v(const Evidence& evidence, const Columns& raw) {
+  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(evidence.readings())).squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+}
+
+/// With the base parameters where a fit has them, but for those that belong to a single recording.
+double lasting_error_v(const Evidence& evidence, const Fit& f) {
+  Eigen::VectorXd u = f.calibration;
+  u.tail(u.size() - static_cast<Eigen::Index>(evidence.calibration().shared())).setZero();
+  return reading_error_v(evidence, evidence.raw_residual(f.hypothesis, u));
+}
+
+}  // namespace
+
+double away_k(const Evidence& evidence) {
+  double away = 0;
+  for (const Record& r : evidence.records()) {
+    for (const double c : r.temperature_c) {
+      if (std::isfinite(c)) away = std::max(away, std::abs(c - 25));
+    }
+  }
+  return away;
+}
+
+double plain_error_v(const Evidence& evidence, const Hypothesis& h) {
+  return reading_error_v(evidence, evidence.raw_residual(h, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size()))));
+}
+
+double Search::total(const Fit& f) const {
+  double cost = 0;
+  evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+  return cost + f.cost - f.residual.squaredNorm();
+}
+
+double Search::score(const Fit& f) {
+  const auto known = totals_.find(f.cost);
+  const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
+  return sum + price(f.hypothesis) - known_before(evidence_, f.hypothesis);
+}
+
+Fit Search::settled(Fit f) {
+  for (int round = 0; round < 2; ++round) {
+    double cost = 0;
+    const NoiseModel noise = evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+    if (noise == f.noise) break;
+    evidence_.set_noise(noise);
+    f = evidence_.fit(f.hypothesis, f.calibration, 5);
+  }
+  return f;
+}
+
+double Search::gain(const Fit& less, const Fit& more) {
+  return score(less) + known_before(evidence_, less.hypothesis) - score(more) - known_before(evidence_, more.hypothesis);
+}
+
+Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {
+  Hypothesis h = with(around.hypothesis, c.start);
+  if (!c.bursts.empty()) h.bursts = c.bursts;
+  Fit best = evidence_.fit(h, around.calibration, usual_iterations, hopeless);
+  if (const auto farther = far_start(h, around.calibration)) {
+    Fit other = evidence_.fit(*farther, around.calibration, usual_iterations, hopeless);
+    if (other.cost < best.cost) best = std::move(other);
+  }
+  if (catalogue[c.mechanism].id == "contact_step") best = refined_onset(best);
+  tell(catalogue[c.mechanism].id);
+  return best;
+}
+
+std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) {
+  MechanismSetting& s = h.settings.back();
+  const std::string_view id = catalogue[s.index].id;
+  std::vector<std::vector<double>> tries;
+  if (id == "capacity_change") tries = {{-0.1}, {0.04}, {0.08}, {0.14}, {0.2}, {0.28}};
+  else if (id == "current_gain") tries = {{-0.12}, {-0.06}, {0.06}, {0.12}};
+  else if (id == "initial_soc") tries = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
+  else if (id == "ocv_shape") tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
+  if (tries.empty()) return std::nullopt;
+  const std::vector<double> near(s.value.begin(), s.value.end());
+  double least = evidence_.residual(h, u).squaredNorm();
+  std::optional<Hypothesis> best;
+  for (const auto& t : tries) {
+    for (std::size_t p = 0; p < t.size(); ++p) s.value[p] = t[p];
+    const double cost = evidence_.residual(h, u).squaredNorm();
+    if (cost >= least) continue;
+    least = cost;
+    best = h;
+  }
+  return best;
+}
+
+Fit Search::refined_onset(Fit best) {
+  const Record& r = evidence_.records().front();
+  const auto setting = [](Fit& f) -> MechanismSetting& { return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(), [](const MechanismSetting& s) { return s.index == index_of("contact_step"); }); };
+  double reach_s = r.duration_s() / 40;
+  Eigen::VectorXd residual;
+  while (reach_s > 1.5 * r.duration_s() / static_cast<double>(r.size())) {
+    const double middle_s = setting(best).value[1];
+    for (const double step : {-1.0, -0.5, 0.5, 1.0}) {
+      Hypothesis h = best.hypothesis;
+      for (MechanismSetting& s : h.settings) {
+        // a step at either end is no step
+        if (s.index == index_of("contact_step")) s.value[1] = std::clamp(middle_s + step * reach_s, r.time_s.front() + 0.04 * r.duration_s(), r.time_s.back() - 0.04 * r.duration_s());
+      }
+      residual = evidence_.residual(h, best.calibration);
+      const double cost = residual.squaredNorm() + (best.cost - best.residual.squaredNorm());
+      if (cost < best.cost) {
+        best.cost = cost;
+        best.residual = residual;
+        best.hypothesis = h;
+      }
+    }
+    reach_s /= 2;
+  }
+  return evidence_.fit(best.hypothesis, best.calibration, 4);
+}
+
+bool Search::alike(const NoiseModel& a, const NoiseModel& b) {
+  const auto near = [](double x, double y) { return x < 1.25 * y && y < 1.25 * x; };
+  return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
+}
+
+std::vector<Fit> Search::one_more(const Fit& around, const std::vector<std::size_t>& over) {
+  // by the nominal noise, which asks for everything to be explained, and by that of what is left, which asks for the large first
+  std::vector<Fit> fits;
+  std::set<std::size_t> tried;
+  for (const NoiseModel& noise : {nominal_, around.noise}) {
+    if (!fits.empty() && alike(noise, nominal_)) break;
+    evidence_.set_noise(noise);
+    const Fit from = noise == around.noise ? around : evidence_.fit(around.hypothesis, around.calibration, 5);
+    const Screen screen(evidence_, from, over);
+    std::vector<Candidate> worth;
+    for (const Candidate& c : screen.candidates()) {
+      if (worth.size() >= decision::most_fits || c.gain < decision::worth_a_fit) break;
+      if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
+    }
+    const std::vector<Fit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
+    fits.insert(fits.end(), here.begin(), here.end());
+  }
+  std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return score(a) < score(b); });
+  return fits;
+}
+
+std::vector<Fit> Search::in_place_of(std::size_t m, const Fit& best, const Fit& less, const std::vector<std::size_t>& over, double gain_of_m, std::map<std::size_t, double>& likeness) {
+  // they must stand up to the noise that the best leaves
+  evidence_.set_noise(best.noise);
+  const Fit from = evidence_.fit(less.hypothesis, less.calibration, 5);
+  const Screen screen(evidence_, from, over);
+  const auto& all = screen.candidates();
+  std::vector<Candidate> worth;
+  for (std::size_t a = 0; a < all.size(); ++a) {
+    if (all[a].mechanism == m) {
+      for (std::size_t b = 0; b < all.size(); ++b) likeness[all[b].mechanism] = screen.alike(a, b);
+    }
+    if (worth.size() < decision::most_rivals && all[a].gain >= std::max(decision::worth_a_fit, 0.1 * gain_of_m)) worth.push_back(all[a]);
+  }
+  return fitted(from, worth, best.cost + decision::hopeless);
+}
+
+std::vector<Fit> Search::fitted(const Fit& around, const std::vector<Candidate>& candidates, double hopeless) {
+  std::vector<Fit> fits;
+  if (!around.hypothesis.added().empty()) evidence_.linearise(around.hypothesis, around.calibration);
+  for (const Candidate& c : candidates) {
+    fits.push_back(fit_with(around, c, hopeless));
+  }
+  std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
+  for (std::size_t k = 0; k < fits.size() && k < 3; ++k) {
+    if (fits[k].cost < hopeless) fits[k] = settled(fits[k]);
+  }
+  return fits;
+}
+
+bool Search::carries(const Fit& before, const Fit& f) const {
+  if (f.hypothesis.added().size() < 2) return true;
+  const double was_v = std::min(lasting_error_v(evidence_, before), plain_error_v(evidence_, evidence_.base()));
+  return lasting_error_v(evidence_, f) <= decision::may_grow * was_v + 3e-4;
+}
+
+Fit Search::without_one(const Fit& f, std::size_t m) {
+  evidence_.set_noise(f.noise);
+  return settled(evidence_.fit(without(f.hypothesis, m), f.calibration, 8));
+}
+
+void Search::tell(std::string_view what) {
+  ++steps_;
+  if (progress_) progress_(1 - std::exp(-static_cast<double>(steps_) / 20), std::string(what));
+}
+
+}  // namespace bms::diagnosis
