@@ -23,7 +23,7 @@ double plain_error_v(const Evidence& evidence, const Hypothesis& h);
 class Search {
  public:
   /// Both must outlive it.
-  Search(Evidence& evidence, const std::function<void(double, std::string)>& progress) : evidence_(evidence), progress_(progress), nominal_(evidence.noise()) {}
+  Search(Evidence& evidence, const std::function<void(double, const std::string&)>& progress) : evidence_(evidence), progress_(progress), nominal_(evidence.noise()) {}
 
   /// -2 log posterior, what its unknowns cost included, less what was known before: the smaller the better.
   double score(const Fit& f);
@@ -65,7 +65,7 @@ class Search {
   std::vector<Fit> fitted(const Fit& around, const std::vector<Candidate>& candidates, double hopeless);
 
   Evidence& evidence_;
-  const std::function<void(double, std::string)>& progress_;
+  const std::function<void(double, const std::string&)>& progress_;
   NoiseModel nominal_;
   std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
   int steps_ = 0;
