@@ -83,6 +83,7 @@ struct TablePoint {
   Resistance<S> r0_ohm, r0_delta_ohm;
   Resistance<S> r1_ohm, r1_delta_ohm;
   Capacitance<S> c1_f, c1_delta_f;
+  Factor<S> activation{1};  ///< by how much resistances that the tables do not hold differ with the temperature
 };
 
 namespace cell_detail {

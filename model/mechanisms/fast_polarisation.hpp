@@ -1,6 +1,8 @@
 // A polarisation faster than R1 C1: double layer and charge transfer, seen in the first seconds after an edge.
 //
 //   du/dt = (R I - u) / tau        V += u
+//
+// R is that at the temperature of the cell file, where the file has a temperature_resistance.
 #pragma once
 
 #include "model/exponential.hpp"
@@ -28,8 +30,8 @@ struct FastPolarisation {
     constexpr Law(const std::array<Real, 2>& p, double) : r_ohm(Resistance<S>(p[0])), rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
-    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive) const {
-      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s)), Voltage<S>(r_ohm * drive.current_a)};
+    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {
+      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s)), Voltage<S>(Resistance<S>(r_ohm * at.activation) * drive.current_a)};
     }
   };
 };

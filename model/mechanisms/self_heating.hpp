@@ -44,6 +44,7 @@ struct SelfHeating {
       const Factor<S> less = mechanism_detail::arrhenius<S>(energy, reference_c, inside_c);
       mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, less);
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, less);
+      at.activation = Factor<S>(at.activation * less);
     }
   };
 };

@@ -2,6 +2,8 @@
 //
 //   du_k/dt = (R_k I - u_k) / tau_k,  R_1 = (1 - w) R, tau_1 = tau,  R_2 = w R, tau_2 = tau / 9        V += u_1 + u_2
 //
+// R is that at the temperature of the cell file, where the file has a temperature_resistance.
+//
 // w = 0 is a second RC branch; diffusion into a plate or a sphere has modes at 1, 1/9, 1/25 ... of the longest time constant
 // (Warburg element of finite length).
 #pragma once
@@ -33,8 +35,8 @@ struct SlowPolarisation {
         : r_ohm{Resistance<S>(p[0] * (Real(1) - p[2])), Resistance<S>(p[0] * p[2])}, rate_per_s{Rate<S>(Real(1) / p[1]), Rate<S>(Real(9) / p[1])} {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
-    constexpr Relaxation<S> settle(std::size_t i, const TablePoint<S>&, const Drive<S>& drive) const {
-      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s[i])), Voltage<S>(r_ohm[i] * drive.current_a)};
+    constexpr Relaxation<S> settle(std::size_t i, const TablePoint<S>& at, const Drive<S>& drive) const {
+      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s[i])), Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * drive.current_a)};
     }
   };
 };

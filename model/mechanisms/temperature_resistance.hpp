@@ -2,7 +2,7 @@
 //
 //   R(T) = R exp(E / R_gas (1 / T - 1 / T_ref)),  T_ref: where the cell file was made
 //
-// C1 stays, so the time constant follows R1.
+// C1 stays, so the time constant follows R1. Fast and slow polarisation follow R0's energy, their time constants stay.
 #pragma once
 
 #include "model/exponential.hpp"
@@ -30,7 +30,9 @@ struct TemperatureResistance {
         : r0_energy(Factor<S>(mechanism_detail::energy_over_rt(p[0], p[2]))), r1_energy(Factor<S>(mechanism_detail::energy_over_rt(p[1], p[2]))), reference_c(Temperature<S>(p[2])) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
-      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, mechanism_detail::arrhenius<S>(r0_energy, reference_c, drive.temperature_c));
+      const Factor<S> more = mechanism_detail::arrhenius<S>(r0_energy, reference_c, drive.temperature_c);
+      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, more);
+      at.activation = Factor<S>(at.activation * more);
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, mechanism_detail::arrhenius<S>(r1_energy, reference_c, drive.temperature_c));
     }
   };
