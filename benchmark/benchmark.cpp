@@ -31,6 +31,7 @@ struct Options {
   std::size_t first = 0;
   std::optional<std::size_t> count;
   bool no_baselines = false;
+  std::string kind;
   std::string json, readme;
 };
 
@@ -89,6 +90,7 @@ void run(const Options& options) {
   const auto work = [&] {
     for (std::size_t k = next++; k < count; k = next++) {
       const truth::Case c = truth::make_case(split, options.seed, options.first + k);
+      if (!options.kind.empty() && c.answer.kind != options.kind) continue;
       for (std::size_t m = 0; m < columns.size(); ++m) columns[m].outcomes[k] = bms::benchmark::methods[m].run(c);
       const std::scoped_lock lock(printing);
       fmt::print("{}", line_of(options.first + k, columns.front().outcomes[k]));
@@ -99,6 +101,7 @@ void run(const Options& options) {
   for (unsigned k = 0; k < std::max(1U, std::thread::hardware_concurrency()); ++k) threads.emplace_back(work);
   for (std::thread& t : threads) t.join();
 
+  for (Column& c : columns) std::erase_if(c.outcomes, [](const Outcome& o) { return o.answer.kind.empty(); });
   const std::string report = bms::benchmark::report(options.split, options.seed, columns);
   fmt::print("\n{}", report);
   if (!options.json.empty()) bms::write_file(options.json, json_of(options, columns));
@@ -116,6 +119,7 @@ int main(int argc, char** argv) {
   app.add_option("seed", o.seed, "of the cases")->required()->type_name("SEED");
   app.add_option("--first", o.first, "first case")->capture_default_str();
   app.add_option("--count", o.count, "how many; without it all that are left")->check(CLI::PositiveNumber);
+  app.add_option("--kind", o.kind, "only cases of this kind")->check(CLI::IsMember({"null", "single", "pair", "outside", "data_fault"}));
   app.add_flag("--no-baselines", o.no_baselines, "the diagnosis alone");
   app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
   app.add_option("--readme", o.readme, "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")->type_name("FILE");
