@@ -6,7 +6,7 @@
 
 namespace bms::diagnosis::decision {
 
-inline constexpr double detected = 18;          ///< gain of one mechanism over the calibration that chance does not reach
+inline constexpr double detected = 26;          ///< gain of one mechanism over the calibration that chance reaches in 1 of 216 healthy recordings
 inline constexpr double far_k = 8;              ///< from the cell file's temperature, where resistances must have changed
 inline constexpr double worth_a_fit = 5;        ///< first-order gain below which a mechanism is not fitted
 inline constexpr std::size_t most_fits = 6;     ///< of mechanisms beside each other
