@@ -119,7 +119,7 @@ int main(int argc, char** argv) {
   app.add_option("seed", o.seed, "of the cases")->required()->type_name("SEED");
   app.add_option("--first", o.first, "first case")->capture_default_str();
   app.add_option("--count", o.count, "how many; without it all that are left")->check(CLI::PositiveNumber);
-  app.add_option("--kind", o.kind, "only cases of this kind")->check(CLI::IsMember({"null", "single", "pair", "outside", "data_fault"}));
+  app.add_option("--kind", o.kind, "only cases of this kind")->check(CLI::IsMember(std::vector<std::string>(truth::case_kinds.begin(), truth::case_kinds.end())));
   app.add_flag("--no-baselines", o.no_baselines, "the diagnosis alone");
   app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
   app.add_option("--readme", o.readme, "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")->type_name("FILE");

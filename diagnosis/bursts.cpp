@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "diagnosis/decision.hpp"
+#include "diagnosis/hypothesis.hpp"
 
 namespace bms::diagnosis {
 
@@ -20,7 +21,6 @@ struct Stretch {
 
 constexpr std::array<std::size_t, 6> lengths = {2, 4, 8, 16, 32, 64};  // rows
 constexpr std::size_t tail = 40;                                       // rows in which a stretch's end rings out
-constexpr double no_voltage_v = 1e3;                                   // of a simulation that has run away
 constexpr std::size_t fewest_rows = 3;                                 // one bad reading is no contact
 constexpr double most_loaded_share = 0.35;                             // bursts are the exception
 constexpr std::size_t beside = 64;                                     // rows around a step of the current in which the model itself may be off
@@ -57,7 +57,7 @@ double as_many(std::size_t of, std::size_t hits, double share) {
 std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v, const Whitener& whitener, double& found_ohm) {
   const std::size_t n = record.size();
   std::vector<double> residual(residual_v);
-  for (double& v : residual) v = std::abs(v) < no_voltage_v ? v : 0;
+  for (double& v : residual) v = std::abs(v) < runaway_v ? v : 0;
   whitener.whiten(0, residual);
   double largest_a = 0;
   std::size_t loaded = 0;
@@ -134,14 +134,10 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
     }
     ohm = toward / size;
   }
-  // what then still asks for less than there is: as much as that chance does for more
-  column.assign(n, 0);
-  for (const Stretch& s : best) {
-    for (std::size_t k = s.first; k < s.end; ++k) column[k] = ohm * current_a(k);
-  }
-  whitener.whiten(0, column);
-  for (std::size_t k = 0; k < n; ++k) residual[k] -= column[k];
-  chosen(stretches(false), ohm, n, total);
+  std::size_t inside = 0;
+  for (const Stretch& s : best) inside += s.end - s.first;
+  if (inside < fewest_rows || static_cast<double>(inside) > most_loaded_share * static_cast<double>(loaded)) return {};
+
   // a contact opens when it likes; what comes with the steps of the current is how the cell answers them
   std::vector<char> near_step(n, 0);
   for (std::size_t k = 1; k < n; ++k) {
@@ -154,9 +150,15 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
   for (const Stretch& s : best) bursts_near += near_step[(s.first + s.end) / 2] != 0 ? 1 : 0;
   if (as_many(best.size(), bursts_near, loaded_near / static_cast<double>(std::max<std::size_t>(loaded, 1))) < chance) return {};
 
-  std::size_t inside = 0;
-  for (const Stretch& s : best) inside += s.end - s.first;
-  if (inside < fewest_rows || best_total < 2 * total + decision::detected || static_cast<double>(inside) > most_loaded_share * static_cast<double>(loaded)) return {};
+  // what then still asks for less than there is: as much as that chance does for more
+  column.assign(n, 0);
+  for (const Stretch& s : best) {
+    for (std::size_t k = s.first; k < s.end; ++k) column[k] = ohm * current_a(k);
+  }
+  whitener.whiten(0, column);
+  for (std::size_t k = 0; k < n; ++k) residual[k] -= column[k];
+  chosen(stretches(false), ohm, n, total);
+  if (best_total < 2 * total + decision::detected) return {};
 
   found_ohm = ohm;
   std::sort(best.begin(), best.end(), [](const Stretch& a, const Stretch& b) { return a.first < b.first; });

@@ -293,7 +293,7 @@ Columns Evidence::raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) co
     const std::vector<double> v = simulate(h, u, r, nullptr, &checks);
     for (std::size_t k = 0; k < v.size(); ++k, ++row) {
       const double error_v = usable_[r][k] != 0 ? records_[r].voltage_v[k] - v[k] : 0;
-      e(row, 0) = std::isfinite(error_v) ? error_v : 1e3;
+      e(row, 0) = std::isfinite(error_v) ? error_v : runaway_v;
     }
   }
   for (const double expected : checks) e(row++, 0) = -expected;

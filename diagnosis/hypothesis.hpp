@@ -60,6 +60,9 @@ struct Fit {
   bool converged = false;
 };
 
+/// Residual of a simulation that has run away to where there are no numbers.
+inline constexpr double runaway_v = 1e3;
+
 /// Everything that stays the same from hypothesis to hypothesis.
 class Evidence {
  public:

@@ -34,9 +34,9 @@ double price(const Hypothesis& h) {
 }
 
 /// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other resistances.
-double known_before(const Evidence& evidence, const Hypothesis& h) {
+double known_before(double away_k, const Hypothesis& h) {
   if (h.find(temperature_resistance) == nullptr || h.own > 0) return 0;
-  return std::clamp((away_k(evidence) - 5) * 1.5, 0.0, 15.0);
+  return std::clamp((away_k - 5) * 1.5, 0.0, 15.0);
 }
 
 /// RMS of a raw residual, of the voltages that were read.
@@ -76,7 +76,7 @@ double Search::total(const Fit& f) const {
 double Search::score(const Fit& f) {
   const auto known = totals_.find(f.cost);
   const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
-  return sum + price(f.hypothesis) - known_before(evidence_, f.hypothesis);
+  return sum + price(f.hypothesis) - known_before(away_k_, f.hypothesis);
 }
 
 Fit Search::settled(Fit f) {
@@ -91,7 +91,7 @@ Fit Search::settled(Fit f) {
 }
 
 double Search::gain(const Fit& less, const Fit& more) {
-  return score(less) + known_before(evidence_, less.hypothesis) - score(more) - known_before(evidence_, more.hypothesis);
+  return score(less) + known_before(away_k_, less.hypothesis) - score(more) - known_before(away_k_, more.hypothesis);
 }
 
 Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {

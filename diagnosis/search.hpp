@@ -23,7 +23,7 @@ double plain_error_v(const Evidence& evidence, const Hypothesis& h);
 class Search {
  public:
   /// Both must outlive it.
-  Search(Evidence& evidence, const std::function<void(double, const std::string&)>& progress) : evidence_(evidence), progress_(progress), nominal_(evidence.noise()) {}
+  Search(Evidence& evidence, const std::function<void(double, const std::string&)>& progress) : evidence_(evidence), progress_(progress), nominal_(evidence.noise()), away_k_(away_k(evidence)) {}
 
   /// -2 log posterior, what its unknowns cost included, less what was known before: the smaller the better.
   double score(const Fit& f);
@@ -67,6 +67,7 @@ class Search {
   Evidence& evidence_;
   const std::function<void(double, const std::string&)>& progress_;
   NoiseModel nominal_;
+  double away_k_;
   std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
   int steps_ = 0;
 };

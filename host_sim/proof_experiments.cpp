@@ -210,8 +210,7 @@ ProofLines errors_over_time(const Compared& c, const std::string& title) {
 // --- 1 hysteresis
 
 struct Concealed {
-  std::string folder, cell, drive;
-  std::vector<std::vector<std::string>> diagnosed;  ///< recordings together
+  std::string folder, cell, drive, diagnosed;
 };
 
 void one_hysteresis(ProofLab& lab, ProofExperiment& e, const Concealed& what) {
@@ -221,43 +220,33 @@ void one_hysteresis(ProofLab& lab, ProofExperiment& e, const Concealed& what) {
   const double gap_v = slow_voltage(charge, 0.5) - slow_voltage(discharge, 0.5), slow_a = (slow_current(charge) + slow_current(discharge)) / 2;
   const auto& rc = cell.parameters.rc;
   ProofBars bars{"slow charge of " + what.folder + ", 20 to 90 % of charge", "mV", {}};
-  for (const auto& names : what.diagnosed) {
-    std::vector<std::string> paths;
-    std::string together;
-    for (const std::string& name : names) {
-      paths.push_back(at + name);
-      together += (together.empty() ? "" : " + ") + name;
-    }
-    const DiagnoseResult& r = lab.diagnosed(cell, paths);
-    const std::string id = what.folder + "." + together;
-    claim_named(e, id + ".named", fmt::format("{}: a cell file from discharge alone lacks hysteresis", together), r, {"ocv_hysteresis"}, "slow charge and discharge lie apart");
-    double ohm = model::cell_detail::rc_value(rc, rc.r0_ohm, 0.5) + model::cell_detail::rc_value(rc, rc.r1_ohm, 0.5);
-    if (const auto slow = value_of(r, "slow_polarisation", "resistance_ohm")) ohm += slow->value;
-    // the overvoltage is known to what is not settled about the slow resistance; the gap to 1 % of soc
-    claim_number(e, id + ".half_gap", fmt::format("{}: half the gap between charge and discharge at rest", together), value_of(r, "ocv_hysteresis", "half_gap_v"), said_of(r),
-                 {gap_v / 2 - slow_a * ohm, 0.0015}, fmt::format("C/30 at 50 % of charge: half of {:.1f} mV less {:.1f} mV of overvoltage", 1e3 * gap_v, 1e3 * slow_a * ohm), 0.005, "V");
-    claim_number(e, id + ".ocv_at", fmt::format("{}: on which branch the cell file's OCV lies", together), value_of(r, "ocv_hysteresis", "ocv_at"), said_of(r), {-1, 0}, "made from discharge", 0.5, "1");
-    const Compared slow = lab.scored(r, at + "ocv_P25_chg");
-    const double before_v = rms(slow, slow.base_v, 0.2, 0.9), after_v = rms(slow, slow.extended_v, 0.2, 0.9);
-    claim_better(e, id + ".slow_charge", fmt::format("{}: predicts the slow charge that nobody has seen", together), "ocv_P25_chg from 20 to 90 % of charge", before_v, after_v);
-    bars.rows.push_back({together, 1e3 * before_v, 1e3 * after_v});
-    if (&names == &what.diagnosed.back()) {
-      ProofLines lines{fmt::format("Slow charge, {}: not used; with what {} told", what.folder, together), {"measured, V", "cell file, V", "extended, V"}, {}, "h", {{}, {}, {}}};
-      for (std::size_t k = 0; k < slow.record.size(); k += std::max<std::size_t>(1, slow.record.size() / 2'000)) {
-        if (slow.recording.soc_ref[k] < 0.15 || slow.recording.soc_ref[k] > 0.93) continue;
-        lines.x.push_back((slow.record.time_s[k] - slow.record.time_s.front()) / 3'600);
-        lines.columns[0].push_back(slow.record.voltage_v[k]);
-        lines.columns[1].push_back(slow.base_v[k]);
-        lines.columns[2].push_back(slow.extended_v[k]);
-      }
-      e.lines.push_back(std::move(lines));
-    }
+  const DiagnoseResult& r = lab.diagnosed(cell, {at + what.diagnosed});
+  const std::string id = what.folder + "." + what.diagnosed;
+  claim_named(e, id + ".named", fmt::format("{}: a cell file from discharge alone lacks hysteresis", what.diagnosed), r, {"ocv_hysteresis"}, "slow charge and discharge lie apart");
+  double ohm = model::cell_detail::rc_value(rc, rc.r0_ohm, 0.5) + model::cell_detail::rc_value(rc, rc.r1_ohm, 0.5);
+  if (const auto slow = value_of(r, "slow_polarisation", "resistance_ohm")) ohm += slow->value;
+  // the overvoltage is known to what is not settled about the slow resistance; the gap to 1 % of soc
+  claim_number(e, id + ".half_gap", fmt::format("{}: half the gap between charge and discharge at rest", what.diagnosed), value_of(r, "ocv_hysteresis", "half_gap_v"), said_of(r),
+               {gap_v / 2 - slow_a * ohm, 0.0015}, fmt::format("C/30 at 50 % of charge: half of {:.1f} mV less {:.1f} mV of overvoltage", 1e3 * gap_v, 1e3 * slow_a * ohm), 0.005, "V");
+  claim_number(e, id + ".ocv_at", fmt::format("{}: on which branch the cell file's OCV lies", what.diagnosed), value_of(r, "ocv_hysteresis", "ocv_at"), said_of(r), {-1, 0}, "made from discharge", 0.5, "1");
+  const Compared slow = lab.scored(r, at + "ocv_P25_chg");
+  const double before_v = rms(slow, slow.base_v, 0.2, 0.9), after_v = rms(slow, slow.extended_v, 0.2, 0.9);
+  claim_better(e, id + ".slow_charge", fmt::format("{}: predicts the slow charge that nobody has seen", what.diagnosed), "ocv_P25_chg from 20 to 90 % of charge", before_v, after_v);
+  bars.rows.push_back({what.diagnosed, 1e3 * before_v, 1e3 * after_v});
+  ProofLines lines{fmt::format("Slow charge, {}: not used; with what {} told", what.folder, what.diagnosed), {"measured, V", "cell file, V", "extended, V"}, {}, "h", {{}, {}, {}}};
+  for (std::size_t k = 0; k < slow.record.size(); k += std::max<std::size_t>(1, slow.record.size() / 2'000)) {
+    if (slow.recording.soc_ref[k] < 0.15 || slow.recording.soc_ref[k] > 0.93) continue;
+    lines.x.push_back((slow.record.time_s[k] - slow.record.time_s.front()) / 3'600);
+    lines.columns[0].push_back(slow.record.voltage_v[k]);
+    lines.columns[1].push_back(slow.base_v[k]);
+    lines.columns[2].push_back(slow.extended_v[k]);
   }
+  e.lines.push_back(std::move(lines));
   e.bars.push_back(std::move(bars));
 }
 
-const Concealed discharge_a{"a123_26650", "a123_26650_from_discharge", "dyn20_P25_A002", {{"udds_P25_A002"}}};
-const Concealed discharge_b{"a123_esctoolbox", "a123_esctoolbox_from_discharge", "dyn50_P25", {{"dyn50_P25"}}};
+const Concealed discharge_a{"a123_26650", "a123_26650_from_discharge", "dyn20_P25_A002", "udds_P25_A002"};
+const Concealed discharge_b{"a123_esctoolbox", "a123_esctoolbox_from_discharge", "dyn50_P25", "dyn50_P25"};
 
 void hysteresis(ProofLab& lab, ProofExperiment& e) {
   one_hysteresis(lab, e, discharge_a);
@@ -299,24 +288,22 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
     const auto energy = value_of(r, "temperature_resistance", "r0_activation_j_per_mol");
     const auto reference = value_of(r, "temperature_resistance", "reference_c");
     // an edge shows the ohmic resistance and what is faster than a sample; the same of the simulation
-    const auto simulated_edge_ohm = [&](const AtTemperature& t) {
-      const Compared c = lab.scored(r, t.recording);
+    std::map<double, Compared> scored;
+    std::map<double, double> edge_ohm;
+    for (const AtTemperature& t : temperatures) {
+      const Compared& c = scored[t.temperature_c] = lab.scored(r, t.recording);
       Recording simulated = c.recording;
       simulated.voltage_v = c.extended_v;
-      return edge_resistance(simulated).value;
-    };
-    const double simulated_at_25_ohm = energy ? simulated_edge_ohm({25, "a123_26650/dyn20_P25_A002"}) : nothing;
-    const auto deviation_of = [&](double temperature_c, double ratio) {
-      return ratio * std::abs(1 / (temperature_c + 273.15) - 1 / (reference->value + 273.15)) / 8.314462618 * energy->sigma;
-    };
-    const auto predicted = [&](const AtTemperature& t) {
-      const double ratio = simulated_edge_ohm(t) / simulated_at_25_ohm;
-      return Value{ratio, deviation_of(t.temperature_c, ratio)};
+      edge_ohm[t.temperature_c] = edge_resistance(simulated).value;
+    }
+    const auto predicted = [&](double temperature_c) {
+      const double ratio = edge_ohm.at(temperature_c) / edge_ohm.at(25);
+      return Value{ratio, ratio * std::abs(1 / (temperature_c + 273.15) - 1 / (reference->value + 273.15)) / 8.314462618 * energy->sigma};
     };
     ProofPoints::Curve curve{at, {}};
     for (const AtTemperature& t : temperatures) {
       if (!energy) break;
-      const Value p = predicted(t);
+      const Value p = predicted(t.temperature_c);
       curve.points.push_back({t.temperature_c, p.value, p.sigma});
     }
     if (energy) points.predicted.push_back(std::move(curve));
@@ -324,9 +311,9 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
     for (const AtTemperature& t : temperatures) {
       if (t.temperature_c == 25 || t.temperature_c == from.temperature_c) continue;
       const Value ratio = measured_ratio(t);
-      claim_number(e, fmt::format("{}.r0_at_{:g}C", id, t.temperature_c), fmt::format("{}: resistance at edges at {:g} degrees C over that at 25", at, t.temperature_c), energy ? std::optional<Value>(predicted(t)) : std::nullopt,
+      claim_number(e, fmt::format("{}.r0_at_{:g}C", id, t.temperature_c), fmt::format("{}: resistance at edges at {:g} degrees C over that at 25", at, t.temperature_c), energy ? std::optional<Value>(predicted(t.temperature_c)) : std::nullopt,
                    said_of(r), ratio, "voltage over current at edges", 0.2 * ratio.value, "1");
-      const Compared other = lab.scored(r, t.recording);
+      const Compared& other = scored.at(t.temperature_c);
       const double before_v = rms(other, other.base_v), after_v = rms(other, other.extended_v);
       if (from.temperature_c == 5) claim_better(e, fmt::format("{}.rmse_at_{:g}C", id, t.temperature_c), fmt::format("{}: open loop at {:g} degrees C", at, t.temperature_c), stem(t.recording), before_v, after_v);
       bars.rows.push_back({stem(t.recording), 1e3 * before_v, 1e3 * after_v});
@@ -342,32 +329,28 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
 void relaxation(ProofLab& lab, ProofExperiment& e) {
   // the built-in cell has seen the pulse recording
   const CellFile& cell = lab.identified(discharge_a.cell, {"a123_26650/ocv_P25_dis"}, "a123_26650/" + discharge_a.drive);
-  const std::vector<std::vector<std::string>> sets = {{"a123_26650/udds_P25_A002"}};
-  for (const auto& names : sets) {
-    const DiagnoseResult& r = lab.diagnosed(cell, names);
-    std::string together;
-    for (const std::string& name : names) together += (together.empty() ? "" : " + ") + stem(name);
-    claim_named(e, together + ".named", together + ": one RC pair lacks what relaxes over minutes and hours", r, {"slow_polarisation"}, "the voltage still moves an hour into a rest");
-    const Compared c = lab.scored(r, "a123_26650/pulse_P25_A002");
-    const auto found_rests = rests(c.recording, 5'400);
-    for (std::size_t n = 0; n < found_rests.size(); ++n) {
-      const Rows rest = found_rests[n];
-      const std::size_t last = rest.to - 1;
-      ErrorFigure before, after;
-      ProofLines lines{fmt::format("Rest {} of pulse_P25_A002, relative to its end; diagnosed: {}", n + 1, together), {"measured, mV", "cell file, mV", "extended, mV"}, {}, "min", {{}, {}, {}}};
-      for (std::size_t k = rest.from; k < rest.to; ++k) {
-        const double measured = c.record.voltage_v[k] - c.record.voltage_v[last], base = c.base_v[k] - c.base_v[last], extended = c.extended_v[k] - c.extended_v[last];
-        before.add(measured - base);
-        after.add(measured - extended);
-        lines.x.push_back((c.record.time_s[k] - c.record.time_s[rest.from]) / 60);
-        lines.columns[0].push_back(1e3 * measured);
-        lines.columns[1].push_back(1e3 * base);
-        lines.columns[2].push_back(1e3 * extended);
-      }
-      claim_better(e, fmt::format("{}.rest_{}", together, n + 1), fmt::format("{}: the shape of rest {} ({:.1f} h)", together, n + 1, (c.record.time_s[last] - c.record.time_s[rest.from]) / 3'600),
-                   "pulse_P25_A002, voltage relative to the rest's end", before.rms(), after.rms());
-      e.lines.push_back(std::move(lines));
+  const std::string diagnosed = "udds_P25_A002";
+  const DiagnoseResult& r = lab.diagnosed(cell, {"a123_26650/" + diagnosed});
+  claim_named(e, diagnosed + ".named", diagnosed + ": one RC pair lacks what relaxes over minutes and hours", r, {"slow_polarisation"}, "the voltage still moves an hour into a rest");
+  const Compared c = lab.scored(r, "a123_26650/pulse_P25_A002");
+  const auto found_rests = rests(c.recording, 5'400);
+  for (std::size_t n = 0; n < found_rests.size(); ++n) {
+    const Rows rest = found_rests[n];
+    const std::size_t last = rest.to - 1;
+    ErrorFigure before, after;
+    ProofLines lines{fmt::format("Rest {} of pulse_P25_A002, relative to its end; diagnosed: {}", n + 1, diagnosed), {"measured, mV", "cell file, mV", "extended, mV"}, {}, "min", {{}, {}, {}}};
+    for (std::size_t k = rest.from; k < rest.to; ++k) {
+      const double measured = c.record.voltage_v[k] - c.record.voltage_v[last], base = c.base_v[k] - c.base_v[last], extended = c.extended_v[k] - c.extended_v[last];
+      before.add(measured - base);
+      after.add(measured - extended);
+      lines.x.push_back((c.record.time_s[k] - c.record.time_s[rest.from]) / 60);
+      lines.columns[0].push_back(1e3 * measured);
+      lines.columns[1].push_back(1e3 * base);
+      lines.columns[2].push_back(1e3 * extended);
     }
+    claim_better(e, fmt::format("{}.rest_{}", diagnosed, n + 1), fmt::format("{}: the shape of rest {} ({:.1f} h)", diagnosed, n + 1, (c.record.time_s[last] - c.record.time_s[rest.from]) / 3'600),
+                 "pulse_P25_A002, voltage relative to the rest's end", before.rms(), after.rms());
+    e.lines.push_back(std::move(lines));
   }
 }
 

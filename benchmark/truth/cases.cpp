@@ -527,8 +527,7 @@ Case make_case(Split split, std::uint64_t seed, std::size_t index) {
     if (good) break;
   }
   Case made = std::move(best.made);
-  constexpr std::array kinds = {"null", "single", "pair", "outside", "data_fault"};
-  made.answer.kind = kinds[static_cast<std::size_t>(slot.kind)];
+  made.answer.kind = case_kinds[static_cast<std::size_t>(slot.kind)];
   if (slot.kind == Kind::data_fault) {
     made.drive = nullptr;
     made.answer.ids = {data_faults[(slot.number + turn) % data_faults.size()]};

@@ -5,6 +5,7 @@
 // others go through all their effects evenly. Nothing here may come from model/, estimator/, identification/ or diagnosis/.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -27,8 +28,10 @@ struct Series {
   std::vector<double> terminal_v{};  ///< of an errand: at the cell's own terminals, true
 };
 
+inline constexpr std::array case_kinds = {"null", "single", "pair", "outside", "data_fault"};
+
 struct Answer {
-  std::string kind;              ///< "null" "single" "pair" "outside" "data_fault"
+  std::string kind;              ///< one of case_kinds
   std::vector<std::string> ids;  ///< of the contract; outside the catalogue and for a data fault a short name
   std::vector<double> strengths; ///< one per id, in detection limits (yardstick.hpp); empty for nulls and data faults
   double strength = 0;           ///< of the weaker one
