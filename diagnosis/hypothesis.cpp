@@ -462,14 +462,21 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     return h.settings[s.setting].value[s.parameter];
   };
   const auto is_shape = [&](Eigen::Index j) { return info(j).role == model::Role::shape; };
-  // how far a strength is beyond what is common, in deviations
-  const auto common = [&](Eigen::Index j) { return info(j).common(cell_.capacity_ah); };
-  const auto rare = [&](Eigen::Index j, double v) { return common(j) > 0 && std::abs(v) > common(j) ? (v - std::copysign(common(j), v)) / (rarity * common(j)) : 0.0; };
+  // how far a parameter is from what is known of most cells, in deviations, and what a deviation is
+  struct Known {
+    double away = 0, deviation = 0;
+  };
+  const auto known = [&](Eigen::Index j, double v) -> Known {
+    if (info(j).spread > 0) return {(v - info(j).typical) / info(j).spread, info(j).spread};
+    const double common = info(j).common(cell_.capacity_ah);
+    if (common <= 0 || std::abs(v) <= common) return {};
+    return {(v - std::copysign(common, v)) / (rarity * common), rarity * common};
+  };
   const auto prior = [&](Hypothesis& h) {
     double sum = 0;
     for (Eigen::Index j = 0; j < m; ++j) {
       if (is_shape(j)) sum += std::pow(std::log(value(h, j) / (info(j).unsaid(cell_.capacity_ah))) / log_prior_width, 2);
-      else sum += std::pow(rare(j, value(h, j)), 2);
+      else sum += std::pow(known(j, value(h, j)).away, 2);
     }
     return sum;
   };
@@ -506,9 +513,9 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     }
     for (Eigen::Index j = 0; j < m; ++j) {
       if (!is_shape(j)) {
-        if (const double beyond = rare(j, value(fit.hypothesis, j)); beyond != 0) {
-          const double per = natural[j] / (rarity * common(j));
-          g[j] -= beyond * per;
+        if (const Known k = known(j, value(fit.hypothesis, j)); k.deviation > 0) {
+          const double per = natural[j] / k.deviation;
+          g[j] -= k.away * per;
           a(j, j) += per * per;
         }
         continue;

@@ -285,6 +285,12 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
         c.start.value[0] = m;
         c.start.value[2] = std::clamp(found[1] * m0 / m, -1.0, 1.0);
         c.start.value[3] = std::clamp(found[2] * m0 / m, -1.0, 1.0);
+      } else if (info.id == "temperature_resistance") {
+        // a small energy of all of R0 is the usual one of a share
+        const double of_all = std::clamp(found[0], 0.0, info.parameter[0].high), usual = info.parameter[0].typical;
+        c.start.value[0] = std::max(of_all, usual);
+        c.start.value[3] = std::clamp(of_all / usual, info.parameter[3].low, 1.0);
+        c.start.value[1] = std::clamp(found[1], 0.0, 0.6 * info.parameter[1].high);
       } else {
         for (std::size_t k = 0; k < p.parameters.size(); ++k) {
           const model::Parameter& parameter = info.parameter[p.parameters[k]];

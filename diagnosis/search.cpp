@@ -115,8 +115,12 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
   else if (id == "current_gain") tries = {{-0.12}, {-0.06}, {0.06}, {0.12}};
   else if (id == "initial_soc") tries = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
   else if (id == "ocv_shape") tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
+  else if (id == "slow_polarisation") {
+    for (const double tau_s : {200.0, 600.0}) {
+      for (const double lag_s : {120.0, 300.0}) tries.push_back({s.value[0], tau_s, s.value[2], lag_s});
+    }
+  }
   if (tries.empty()) return std::nullopt;
-  const std::vector<double> near(s.value.begin(), s.value.end());
   double least = evidence_.residual(h, u).squaredNorm();
   std::optional<Hypothesis> best;
   for (const auto& t : tries) {

@@ -36,7 +36,7 @@ Track run_on(const EmulatedBoard& board, const CellFile& cell, const std::vector
     throw BadInput(board.name, 1, fmt::format("computes in {}, expected --scalar {}", name_of(board.scalar), name_of(board.scalar)));
   }
   Track track;
-  track.state_names = state_names(cell);
+  name_states(track, cell);
   BoardRun run = run_on_board(board, firmware_image(board.name, cell, Image::replay), samples, start, {}, track.state_names.size());
   track.rows = rows_of(run.words, scalar);
   track.words = std::move(run.words);

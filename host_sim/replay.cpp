@@ -17,7 +17,6 @@ namespace bms {
 namespace {
 
 constexpr double thirty_minutes_s = 1'800;
-constexpr const char* kelvin = "_k";
 constexpr double timing_s = 0.03;  // long enough that a clock and a cold cache do not matter
 
 template <class S>
@@ -118,20 +117,25 @@ Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, cons
       default: return run<float>(cell, samples, start);
     }
   }();
-  track.state_names = state_names(cell);
+  name_states(track, cell);
   number_states(track, scalar);
   return track;
 }
 
-std::vector<std::string> state_names(const CellFile& cell) {
-  std::vector<std::string> names;
+std::size_t state_count(const CellFile& cell) {
+  std::size_t count = 0;
+  for (const model::MechanismSetting& m : on_board(cell.mechanisms)) count += model::catalogue[m.index].states;
+  return count;
+}
+
+void name_states(Track& track, const CellFile& cell) {
   for (const model::MechanismSetting& m : on_board(cell.mechanisms)) {
     const model::MechanismInfo& info = model::catalogue[m.index];
     for (std::size_t k = 0; k < info.states; ++k) {
-      names.push_back(fmt::format("{}{}{}", info.id, info.states > 1 ? fmt::format("_{}", k + 1) : "", info.id == model::SelfHeating::id ? kelvin : "_v"));
+      track.state_names.push_back(fmt::format("{}{}_{}", info.id, info.states > 1 ? fmt::format("_{}", k + 1) : "", info.state_unit.name));
+      track.state_scales.push_back(info.state_unit.scale);
     }
   }
-  return names;
 }
 
 void number_states(Track& track, ScalarKind scalar) {
@@ -140,7 +144,7 @@ void number_states(Track& track, ScalarKind scalar) {
     for (const std::uint32_t w : track.state_words) track.states.push_back(number_of(w, scalar));
   }
   for (std::size_t k = 0; k < track.states.size(); ++k) {
-    if (track.state_names[k % track.state_names.size()].ends_with(kelvin)) track.states[k] *= 100;  // model/mechanisms/self_heating.hpp
+    track.states[k] *= track.state_scales[k % track.state_scales.size()];
   }
 }
 

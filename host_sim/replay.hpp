@@ -26,6 +26,7 @@ struct Track {
   std::vector<EstimateRow> rows;
   std::vector<EstimateWords> words;  ///< the bits behind them; empty for double
   std::vector<std::string> state_names;      ///< "ocv_hysteresis_v", "slow_polarisation_1_v", "self_heating_k"
+  std::vector<double> state_scales;          ///< of what the words hold to the name's unit
   std::vector<double> states;                ///< V, K
   std::vector<std::uint32_t> state_words;
   double steps_per_second = 0;
@@ -39,8 +40,9 @@ struct Belief {
 /// shift: what a cell file knows of the truth of such beliefs.
 std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief, double shift = 0);
 
-/// States that the estimator has for the mechanisms of this cell file.
-std::vector<std::string> state_names(const CellFile& cell);
+/// How many states the estimator has for the mechanisms of this cell file; name_states: which.
+std::size_t state_count(const CellFile& cell);
+void name_states(Track& track, const CellFile& cell);
 
 /// Runs the estimator on this machine. The measuring of its speed repeats the run; the estimates are those of the last.
 Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar);

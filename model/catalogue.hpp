@@ -49,16 +49,18 @@ struct MechanismInfo {
   std::array<Parameter, max_mechanism_parameters> parameter{};
   std::size_t parameters = 0;
   std::size_t states = 0;
+  StateUnit state_unit{"v", 1};
 };
 
 namespace mechanism_detail {
 
 template <class M>
 constexpr MechanismInfo info() {
-  MechanismInfo i{M::id, M::domain, M::on_board, false, {}, M::parameters.size(), 0};
+  MechanismInfo i{M::id, M::domain, M::on_board, false, {}, M::parameters.size(), 0, {"v", 1}};
   for (std::size_t k = 0; k < M::parameters.size(); ++k) i.parameter[k] = M::parameters[k];
   if constexpr (requires { M::needs_fpu; }) i.needs_fpu = M::needs_fpu;
   if constexpr (requires { M::template Law<double>::states; }) i.states = M::template Law<double>::states;
+  if constexpr (requires { M::template Law<double>::state_unit; }) i.state_unit = M::template Law<double>::state_unit;
   return i;
 }
 

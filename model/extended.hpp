@@ -162,7 +162,7 @@ class Course {
     soc_ += laws_.counted(drive) * (duration_s * per_capacity_);
     hold();
     TablePoint<S> at = tables_at(soc_);
-    const S elsewhere = laws_.read_at(soc_);
+    const S elsewhere = laws_.read_at(soc_, x_);
     if (differs(elsewhere, soc_)) {
       const TablePoint<S> there = tables_at(elsewhere);
       at.ocv_v = there.ocv_v;

@@ -35,7 +35,7 @@ constexpr bool adds_voltage() {
 }
 template <class Law, class S>
 constexpr bool reads_elsewhere() {
-  return requires(Law law, Soc<S> soc) { law.read_at(soc); };
+  return requires(Law law, Soc<S> soc) { law.read_at(soc); } || requires(Law law) { law.ahead_per_v(); };
 }
 template <class Law>
 constexpr std::size_t states_of() {
@@ -93,21 +93,29 @@ class LawSet {
     });
     return a;
   }
-  constexpr Soc<S> read_at(Soc<S> soc) const {
-    each([&](const auto& law) {
-      if constexpr (requires { law.read_at(soc); }) soc = law.read_at(soc);
-    });
+  /// Where the OCV is read: x, the laws' states.
+  template <class X>
+  constexpr Soc<S> read_at(Soc<S> soc, const X& x) const {
+    each_with_states([&](const auto& law, std::size_t first) { soc = read_at(law, soc, x, first); });
     return soc;
   }
-  constexpr Coupling<S> read_slope(Soc<S> soc) const {
+  template <class X>
+  constexpr Coupling<S> read_slope(Soc<S> soc, const X& x) const {
     Coupling<S> slope(1);
-    each([&](const auto& law) {
-      if constexpr (requires { law.read_at(soc); }) {
-        slope = Coupling<S>(slope * law.read_slope(soc));
-        soc = law.read_at(soc);
-      }
+    each_with_states([&](const auto& law, std::size_t first) {
+      if constexpr (requires { law.read_slope(soc); }) slope = Coupling<S>(slope * law.read_slope(soc));
+      soc = read_at(law, soc, x, first);
     });
     return slope;
+  }
+  /// By how much soc is read ahead per volt of each voltage state.
+  template <class Couplings>
+  constexpr void ahead_per_v(Couplings& out) const {
+    each_with_states([&](const auto& law, std::size_t first) {
+      if constexpr (requires { law.ahead_per_v(); }) {
+        for (std::size_t i = 0; i < states_of(law) && first + i < out.size(); ++i) out[first + i] = law.ahead_per_v();
+      }
+    });
   }
   template <class X>
   constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const Drive<S>& drive, const X& x) const {
@@ -195,6 +203,18 @@ class LawSet {
   }
 
  private:
+  template <class Law, class X>
+  static constexpr Soc<S> read_at(const Law& law, const Soc<S>& soc, const X& x, std::size_t first) {
+    if constexpr (requires { law.read_at(soc); }) {
+      return law.read_at(soc);
+    } else if constexpr (requires { law.ahead_per_v(); }) {
+      Voltage<S> sum = x[first];
+      for (std::size_t i = 1; i < states_of(law); ++i) sum = Voltage<S>(sum + x[first + i]);
+      return Soc<S>(soc + law.ahead_per_v() * sum);
+    } else {
+      return soc;
+    }
+  }
   template <class Law>
   static constexpr std::size_t states_of(const Law&) {
     return extended_detail::states_of<Law>();

@@ -7,6 +7,7 @@
 //   Temperature<S> true_temperature(Temperature<S> read)           the same for the temperature
 //   Current<S> counted(Current<S> counted, const Drive<S>&)        current that ends as charge
 //   Soc<S> read_at(Soc<S>)                                         where the OCV table is read
+//   Coupling<S> ahead_per_v()                                      the same by the law's voltage states: soc ahead per volt of their sum
 //   Coupling<S> read_slope(Soc<S>)                                 its derivative; with read_at only
 //   void tables(TablePoint<S>&, Soc<S>, const Drive<S>&)           changes OCV, R0, R1, C1 at this soc under this drive
 //   Voltage<S> initial(std::size_t i)                              state i before the first step
@@ -58,6 +59,7 @@ struct Parameter {
   Per per = Per::cell;
   std::string_view meaning;  ///< and its source, where the bounds have one
   double usual = 0;          ///< of a strength: size beyond which it is rare, scaled as the bounds are; 0: all are alike
+  double typical = 0, spread = 0;  ///< what it is in most cells, and its standard deviation among them; spread 0: nobody knows
 
   constexpr double scale(double capacity_ah) const { return per == Per::cell ? 1 : per == Per::ah ? capacity_ah : 1 / capacity_ah; }
   constexpr double lower(double capacity_ah) const { return low * scale(capacity_ah); }
@@ -81,6 +83,12 @@ template <class S>
 struct Relaxation {
   Fraction<S> settled;   ///< p
   Voltage<S> target;     ///< where it goes
+};
+
+/// What a law's states are where they are no voltages: the unit for people, and how much of it one unit of the state is.
+struct StateUnit {
+  std::string_view name;
+  double scale;
 };
 
 template <class S>

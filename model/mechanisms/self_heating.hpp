@@ -24,6 +24,7 @@ struct SelfHeating {
   struct Law {
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = false;
+    static constexpr StateUnit state_unit{"k", 100};
     Factor<S> energy;             ///< over R T, T at 25 degrees C
     Coupling<S> per_w;            ///< 100 K per W
     Rate<S> rate_per_s;

@@ -111,7 +111,7 @@ std::string mechanism_cost() {
   for (const auto& set : std::vector<std::vector<std::pair<const char*, std::vector<double>>>>{
            {}, {offset}, {warm}, {transfer}, {entropic}, {shape}, {gain}, {heat}, {hysteresis}, {fast}, {slow}, {hysteresis, slow}, {hysteresis, slow, warm, offset}}) {
     const CellFile cell = table9_with(set);
-    const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), all, state_names(cell).size());
+    const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), all, state_count(cell));
     std::string names;
     for (const auto& [id, values] : set) names += fmt::format("{}`{}`", names.empty() ? "" : ", ", id);
     table += fmt::format("| {} | {:.0f} | {} |\n", names.empty() ? "nothing" : names, cost.mean, cost.most);

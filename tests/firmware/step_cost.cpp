@@ -51,7 +51,7 @@ Footprint footprint(const std::filesystem::path& application_image) {
 }
 
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
-  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_names(cell).size());
+  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell));
   const Footprint f = footprint(firmware_image(board.name, cell, Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},

@@ -70,8 +70,8 @@ void expect_no_effect(std::size_t index) {
     ASSERT_EQ(number(laws.true_temperature(c)), number(c));
     const Drive<S> drive{a, TimeStep<S>(row.duration_s), c};
     ASSERT_EQ(number(laws.counted(drive)), number(a));
-    ASSERT_EQ(number(laws.read_at(soc)), number(soc));
-    ASSERT_EQ(number(laws.read_slope(soc)), 1);
+    ASSERT_EQ(number(laws.read_at(soc, x)), number(soc));
+    ASSERT_EQ(number(laws.read_slope(soc, x)), 1);
     const TablePoint<S> before = look_up(cell, soc);
     TablePoint<S> at = before;
     laws.tables(at, soc, drive, x);
@@ -291,6 +291,35 @@ TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
   EXPECT_NEAR(100 * w, 10 * 36 * 0.05, 1e-6);
   law.warm(at, w, {});
   EXPECT_NEAR(at.r0_ohm / 0.03, std::exp(25'000 / 8.314462618 * (1 / (298.15 + 18) - 1 / 298.15)), 1e-9);
+}
+
+TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
+  // the OCV is that of a cell ahead in soc by what the polarisation says; R0 and v_rc are not
+  const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  const std::vector<MechanismSetting> slow = {{mechanism_index("slow_polarisation"), {0.003, 100, 0, 8 * 0.003 * 3'600 * capacity_ah}, {}}};
+  Course<double> with(cell, capacity_ah, chosen<double>(slow, capacity_ah), 0.3), without(cell, capacity_ah, ChosenLaws<double>{}, 0.3);
+  const auto no_change = [](TablePoint<double>&, double) {};
+  double u_v = 0;
+  for (int k = 0; k < 3'000; ++k) {
+    const double a = k < 1'000 ? -3 : 0, dt = k == 0 ? 0 : 1;
+    const double before_v = u_v;
+    if (k > 0) u_v += -std::expm1(-0.01) * (0.003 * a - u_v);
+    const double v = with.step(k, dt, a, 25, no_change), base_v = without.step(k, dt, a, 25, no_change);
+    ASSERT_NEAR(v - base_v, u_v + look_up(cell, with.soc() + 8 * before_v).ocv_v - look_up(cell, with.soc()).ocv_v, 1e-12) << k;
+  }
+}
+
+TEST(TemperatureResistance, LeavesTheShareOfContactsAndFoilsAlone) {
+  const TemperatureResistance::Law<double> law(std::array<double, 4>{50'000, 40'000, 25, 0.3}, capacity_ah);
+  for (const double c : {-20.0, 0.0, 25.0, 45.0}) {
+    TablePoint<double> at{};
+    at.r0_ohm = 0.01;
+    at.r1_ohm = 0.02;
+    law.tables(at, 0.5, {1, 1, c});
+    const double by = 1 / 8.314462618 * (1 / (c + 273.15) - 1 / 298.15);
+    EXPECT_NEAR(at.r0_ohm, 0.01 * (0.7 + 0.3 * std::exp(50'000 * by)), 1e-9) << c;
+    EXPECT_NEAR(at.r1_ohm, 0.02 * std::exp(40'000 * by), 1e-9) << c;
+  }
 }
 
 }  // namespace
