@@ -10,7 +10,7 @@
 
 #include "diagnosis/decision.hpp"
 #include "diagnosis/locate.hpp"
-#include "diagnosis/quiet_current.hpp"
+#include "diagnosis/prepare.hpp"
 #include "diagnosis/remainder.hpp"
 #include "diagnosis/search.hpp"
 
@@ -19,9 +19,6 @@ namespace bms::diagnosis {
 namespace {
 
 using model::catalogue;
-
-/// No model is better from sample to sample than this share of what its OCV is good to.
-constexpr double least_white = 0.2;
 
 constexpr std::size_t temperature_resistance = index_of("temperature_resistance");
 
@@ -70,15 +67,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     return d;
   }
 
-  // noise before any hypothesis
-  std::vector<double> white;
-  for (const Record& r : records) white.push_back(white_noise(r.voltage_v, r.current_a, 0.01 * cell.capacity_ah, cell.noise.voltage_v));
-  NoiseModel noise;
-  noise.white_v = std::max(*std::max_element(white.begin(), white.end()), least_white * cell.tolerance.ocv_v);
-  noise.fast_v = std::max(cell.tolerance.ocv_v, 5e-4);
-  noise.slow_v = 1.3 * std::max(cell.tolerance.drift_v, 5e-4);
-  for (Record& r : records) r.current_a = quiet_current(r.current_a, std::min(current_noise(r.current_a), 1.5 * cell.noise.current_a));
-  Evidence evidence(cell, own, std::move(records), noise);
+  Evidence evidence = evidence_of(cell, own, std::move(records));
+  const NoiseModel nominal = evidence.noise();  // before any hypothesis
 
   std::vector<std::size_t> testable;
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
@@ -86,6 +76,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     if (reason) d.not_testable.push_back({m, *reason});
     if (evidence.base().find(m) == nullptr) testable.push_back(m);  // the screen asks again, beside what has been found
   }
+  std::vector<std::size_t> steady = testable;
+  std::erase(steady, index_of("contact_intermittent"));
   std::size_t moving = 0;
   double duration_s = 0;
   for (const Record& r : evidence.records()) {
@@ -118,12 +110,16 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   std::vector<Fit> singles;
   Fit current = base;
   const auto grow = [&] {
+    // what may come and go as it likes gains on anything: after all that may not
+    bool bursts = false;
     while (current.hypothesis.added().size() < options.most_mechanisms) {
-      std::vector<Fit> more = search.one_more(current, testable);
-      if (current.hypothesis.added().empty()) singles = more;
+      std::vector<Fit> more = search.one_more(current, bursts ? testable : steady);
+      if (current.hypothesis.added().empty()) singles.insert(singles.end(), more.begin(), more.end());
       std::erase_if(more, [&](const Fit& f) { return !search.carries(current, f); });
-      if (more.empty() || search.gain(current, more.front()) < decision::detected) break;
-      current = more.front();
+      const bool gains = !more.empty() && search.gain(current, more.front()) >= decision::detected;
+      if (gains) current = more.front();
+      else if (bursts) break;
+      bursts = !gains;
     }
   };
   // what is there for certain comes before anything that would stand in for it: every cell's resistances follow the temperature, and a
@@ -139,14 +135,13 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   grow();
   {
     // the first screen tells the limits
-    evidence.set_noise(noise);
+    evidence.set_noise(nominal);
     const Screen screen(evidence, base, testable);
     for (const Candidate& c : screen.candidates()) {
       if (c.limit > 0) d.limits.push_back({c.mechanism, 0, c.limit});
     }
   }
 
-  const NoiseModel nominal = noise;
   search.tell("noise");
 
   // take away what does not carry, try each one's rivals
@@ -163,13 +158,13 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     const std::map<std::size_t, double> sizes_v = contributions(evidence, base, current).rms_v;
     for (const std::size_t m : current.hypothesis.added()) {
       const Fit less = current.hypothesis.added().size() == 1 ? base : search.without_one(current, m);
-      gains[m] = search.gain(less, current);
+      const double lost = gains[m] = search.gain(less, current);
       const bool one_of_several = current.hypothesis.added().size() > 1;
       const bool cancels = one_of_several && sizes_v.at(m) > decision::larger_than_error * error_v;
       if (one_of_several && sizes_v.at(m) < decision::noticeable * error_v) gains[m] = std::min(gains[m], decision::detected - 1);
       if (cancels) gains[m] = std::min(gains[m], decision::detected - sizes_v.at(m) / error_v);
       if (gains[m] < decision::detected) {
-        reduced.emplace_back(gains[m], less);
+        reduced.emplace_back(lost, less);  // of two that cancel each other, the one that is missed less
         continue;
       }
       std::map<std::size_t, double> likeness;

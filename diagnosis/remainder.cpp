@@ -200,7 +200,8 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
     found.fast_excess = sum / static_cast<double>(squares.size()) - 1;
     const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
     std::nth_element(squares.begin(), middle, squares.end());
-    const double variance = *middle / 0.4549;  // median of a chi-square of one degree of freedom
+    // median of a chi-square of one degree of freedom; what lies within the tolerance is not far out
+    const double variance = std::max(*middle / 0.4549, 1.0);
     found.far_out = static_cast<double>(std::count_if(squares.begin(), squares.end(), [&](double s) { return s > 16 * variance; })) / static_cast<double>(squares.size());
   }
   row = 0;

@@ -16,7 +16,7 @@ struct Remainder {
   double gain = 0;                         ///< of the family that gains most, less what it gains on noise
   const char* family = "";                 ///< which: what the rest goes with, in words
   double fast_excess = 0;                  ///< variance of the whitened residual above 1, robust against single samples
-  double far_out = 0;                      ///< share of the whitened residual beyond 4 of its own deviations, found by its median: of a normal one 0.00006
+  double far_out = 0;                      ///< share of the whitened residual beyond 4 deviations, by its median where that is more than the noise: of a normal one 0.00006
   std::vector<std::vector<double>> energy; ///< by record and row: squares of what the generic columns explain, V^2
   std::vector<model::Span> spans;          ///< where most of it lies, of the first record
 };

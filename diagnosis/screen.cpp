@@ -147,6 +147,11 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
     if (id == "temperature_resistance" && std::max(span_k, away_k) < 3) return fmt::format("temperature is within {:.1f} K of the cell file's 25 degrees C", away_k);
     if (id == "entropic_ocv" && span_k < 4 && away_k < 8) return fmt::format("temperature spans {:.1f} K", span_k);
   }
+  // the same recording, whatever the current: beside each other they would grow without bounds
+  const bool trusted = std::any_of(evidence.records().begin(), evidence.records().end(), [](const Record& r) { return !r.checks.empty(); });
+  for (const auto& [one, other] : {std::pair{"leakage", "current_offset"}, std::pair{"current_offset", "leakage"}}) {
+    if (id == one && !trusted && given.find(index_of(other)) != nullptr) return fmt::format("without a trusted ammeter it cannot be told from {}, which is there", other);
+  }
   if (id == "self_heating" && needs_current(0.5)) return "the current is too small to heat the cell";
   if (id == "charge_transfer" && needs_current(0.5)) return "the current is too small to bend the overvoltage";
   if (id == "fast_polarisation" && x.step_s > 3) return fmt::format("a sample every {:g} s is too slow", x.step_s);

@@ -98,8 +98,11 @@ Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
   Fit best = evidence_.fit(h, around.calibration, usual_iterations, hopeless);
-  if (const auto farther = far_start(h, around.calibration)) {
-    Fit other = evidence_.fit(*farther, around.calibration, usual_iterations, hopeless);
+  // from where the base parameters have gone, and from the cell file, which they may have left because of what is missing
+  for (const Eigen::VectorXd& u : {around.calibration, Eigen::VectorXd(Eigen::VectorXd::Zero(around.calibration.size()))}) {
+    const auto farther = far_start(h, u);
+    if (!farther) continue;
+    Fit other = evidence_.fit(*farther, u, usual_iterations, hopeless);
     if (other.cost < best.cost) best = std::move(other);
   }
   if (catalogue[c.mechanism].id == "contact_step") best = refined_onset(best);
@@ -115,7 +118,14 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
   else if (id == "current_gain") tries = {{-0.12}, {-0.06}, {0.06}, {0.12}};
   else if (id == "initial_soc") tries = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
   else if (id == "ocv_shape") tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
-  else if (id == "slow_polarisation") {
+  else if (id == "current_offset" || id == "leakage") {
+    double hours = 0;
+    for (const Record& r : evidence_.records()) hours += r.duration_s() / 3'600;
+    const double per_soc_a = evidence_.cell().capacity_ah / std::max(hours, 0.1), most_a = catalogue[s.index].parameter[0].upper(evidence_.cell().capacity_ah);
+    for (const double soc : {-0.12, -0.06, -0.03, 0.03, 0.06, 0.12}) {
+      if (std::abs(soc) * per_soc_a < most_a && (soc > 0 || catalogue[s.index].parameter[0].low < 0)) tries.push_back({soc * per_soc_a});
+    }
+  } else if (id == "slow_polarisation") {
     for (const double tau_s : {200.0, 600.0}) {
       for (const double lag_s : {120.0, 300.0}) tries.push_back({s.value[0], tau_s, s.value[2], lag_s});
     }
@@ -131,6 +141,14 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
     best = h;
   }
   return best;
+}
+
+bool Search::far_better(const Fit& around, const Candidate& c) {
+  for (const Eigen::VectorXd& u : {around.calibration, Eigen::VectorXd(Eigen::VectorXd::Zero(around.calibration.size()))}) {
+    const auto far = far_start(with(around.hypothesis, c.start), u);
+    if (far && evidence_.residual(*far, u).squaredNorm() < evidence_.residual(around.hypothesis, u).squaredNorm() - decision::worth_a_fit) return true;
+  }
+  return false;
 }
 
 Fit Search::refined_onset(Fit best) {
@@ -175,7 +193,7 @@ std::vector<Fit> Search::one_more(const Fit& around, const std::vector<std::size
     const Screen screen(evidence_, from, over);
     std::vector<Candidate> worth;
     for (const Candidate& c : screen.candidates()) {
-      if (worth.size() >= decision::most_fits || c.gain < decision::worth_a_fit) break;
+      if (c.gain < decision::worth_a_fit ? !far_better(from, c) : worth.size() >= decision::most_fits) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
     const std::vector<Fit> here = fitted(from, worth, std::numeric_limits<double>::infinity());

@@ -58,6 +58,8 @@ class Search {
   Fit fit_with(const Fit& around, const Candidate& c, double hopeless);
   /// Where a knee of the OCV is passed, an effect on the charge is not linear: the best of some strengths far from the estimate.
   std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u);
+  /// Whether one is, where the screen, which is linear, sees nothing.
+  bool far_better(const Fit& around, const Candidate& c);
   /// The moment of a contact's step, to the sample.
   Fit refined_onset(Fit best);
   static bool alike(const NoiseModel& a, const NoiseModel& b);

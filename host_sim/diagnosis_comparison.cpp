@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/good_to.hpp"
 #include "diagnosis/reference.hpp"
 #include "identification/figures.hpp"
 #include "host_sim/replay.hpp"
@@ -123,6 +124,13 @@ CellFile extended_cell(const DiagnoseResult& r) {
     }
     put_mechanism(cell, setting);
     cell.sources[table_of(info)] = source;
+  }
+  std::vector<diagnosis::Record> records;
+  for (const Compared& c : r.recordings) records.push_back(c.record);
+  if (const double factor = diagnosis::widening(cell.parameters, cell.mechanisms, std::move(records)); factor > 1) {
+    cell.parameters.tolerance.ocv_v = rounded(factor * cell.parameters.tolerance.ocv_v, 4);
+    cell.parameters.tolerance.drift_v = rounded(factor * cell.parameters.tolerance.drift_v, 4);
+    cell.sources["tolerance"] += fmt::format("; of the OCV and the drift widened {:g} times, to what {} left over", factor, files);
   }
   return cell;
 }

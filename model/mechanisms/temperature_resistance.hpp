@@ -2,7 +2,9 @@
 //
 //   R0(T) = R0 (1 - s + s a_0)    R1(T) = R1 a_1    a_k = exp(E_k / R_gas (1 / T - 1 / T_ref)),  T_ref: where the cell file was made
 //
-// C1 stays, so the time constant follows R1. Fast and slow polarisation follow a_0, their time constants stay.
+// C1 stays, so the time constant follows R1. Fast and slow polarisation follow a_1, their time constants stay.
+//
+// At one temperature E_0 and s look alike: what is known of E_0 decides, and the deviations say so.
 #pragma once
 
 #include "model/exponential.hpp"
@@ -33,9 +35,10 @@ struct TemperatureResistance {
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
       const Factor<S> more = mechanism_detail::arrhenius<S>(r0_energy, reference_c, drive.temperature_c);
+      const Factor<S> slower = mechanism_detail::arrhenius<S>(r1_energy, reference_c, drive.temperature_c);
       mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, Factor<S>(Factor<S>(1) + share * Factor<S>(more - Factor<S>(1))));
-      at.activation = Factor<S>(at.activation * more);
-      mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, mechanism_detail::arrhenius<S>(r1_energy, reference_c, drive.temperature_c));
+      mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, slower);
+      at.activation = Factor<S>(at.activation * slower);
     }
   };
 };
