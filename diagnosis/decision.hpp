@@ -17,6 +17,7 @@ inline constexpr double inseparable = 0.97;     ///< signatures this much alike 
 inline constexpr double same_inseparable = 30;  ///< and of a class all this close are named
 inline constexpr double per_unknown = 3;        ///< cost of every unknown after the first
 inline constexpr double per_burst = 12;         ///< cost of every burst of a loose contact: two moments that were sought
+inline constexpr double faint = 52;             ///< gain, twice what is detected, below which a cause must explain its share or is none
 inline constexpr double explained = 0.8;        ///< share of the mismatch that a cause must explain
 inline constexpr double explained_by_bursts = 0.98; ///< and one that may come and go as it likes
 inline constexpr double much_left = 40;         ///< what must remain, in gain, to say that something unknown is there

@@ -197,17 +197,29 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 
   // is it enough?
   evidence.set_noise(nominal);
-  const Fit base_nominal = evidence.fit(base.hypothesis, base.calibration, 6), best_nominal = evidence.fit(current.hypothesis, current.calibration, 6);
-  const Remainder remainder = what_remains(evidence, best_nominal);
+  const Fit base_nominal = evidence.fit(base.hypothesis, base.calibration, 6);
+  Fit best_nominal = evidence.fit(current.hypothesis, current.calibration, 6);
+  Remainder remainder = what_remains(evidence, best_nominal);
+  const auto adequacy = [&] {
+    const double gained = std::max(base_nominal.cost - best_nominal.cost, 0.0);
+    return gained + remainder.gain > 0 ? gained / (gained + remainder.gain) : 1;
+  };
+  // what explains little, and that not quite, is none
+  if (!current.hypothesis.added().empty() && base_nominal.cost - best_nominal.cost < decision::faint && adequacy() < decision::explained) {
+    current = base;
+    best_nominal = base_nominal;
+    remainder = what_remains(evidence, best_nominal);
+    gains.clear();
+    rivals.clear();
+  }
   evidence.set_noise(current.noise);
   d.base_cost = base_nominal.cost;
   d.best_cost = best_nominal.cost;
-  const double gained = base_nominal.cost - best_nominal.cost;
   d.remaining = remainder.gain;
   d.remaining_goes_with = remainder.family;
   d.fast_excess = remainder.fast_excess;
   d.far_out = remainder.far_out;
-  d.adequacy = gained + d.remaining > 0 ? std::max(gained, 0.0) / (std::max(gained, 0.0) + d.remaining) : 1;
+  d.adequacy = adequacy();
   const bool something = !current.hypothesis.added().empty();
   // what is flexible gains on anything: when it is named, what it leaves must be white
   const bool bursts = current.hypothesis.find(index_of("contact_intermittent")) != nullptr;

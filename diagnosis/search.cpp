@@ -17,10 +17,10 @@ using model::Role;
 constexpr int usual_iterations = 12;
 constexpr std::size_t temperature_resistance = index_of("temperature_resistance");
 
-/// What its unknowns cost a mechanism.
+/// What its unknowns cost a mechanism; what is known of most cells is none.
 double price(std::size_t mechanism, std::size_t bursts) {
   double unknowns = 0;
-  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) unknowns += catalogue[mechanism].parameter[p].role != Role::given ? 1 : 0;
+  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) unknowns += catalogue[mechanism].parameter[p].role != Role::given && catalogue[mechanism].parameter[p].spread == 0 ? 1 : 0;
   if (catalogue[mechanism].id == "contact_step") unknowns += 4;  // its moment was sought too
   return decision::per_unknown * (unknowns - 1) + decision::per_burst * static_cast<double>(bursts);
 }

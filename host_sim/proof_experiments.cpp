@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "diagnosis/words.hpp"
@@ -68,6 +69,29 @@ std::optional<Value> value_of(const DiagnoseResult& r, std::string_view id, std:
   if (!f) return std::nullopt;
   const std::size_t k = parameter_index(catalogue[f->setting.index], parameter);
   return Value{f->setting.value[k], std::isfinite(f->setting.deviation[k]) ? f->setting.deviation[k] : 0};
+}
+
+/// What was found, moved by one standard deviation along each axis of what is known of a mechanism's parameters together.
+std::vector<diagnosis::Hypothesis> one_deviation_away(const diagnosis::Diagnosis& d, std::string_view id) {
+  const std::vector<diagnosis::Sought> sought = d.extended.sought();
+  std::vector<Eigen::Index> of;
+  for (std::size_t j = 0; j < sought.size(); ++j) {
+    if (catalogue[d.extended.settings[sought[j].setting].index].id == id) of.push_back(static_cast<Eigen::Index>(j));
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(Eigen::MatrixXd(d.covariance(of, of)));
+  std::vector<diagnosis::Hypothesis> list;
+  for (Eigen::Index axis = 0; axis < axes.eigenvalues().size(); ++axis) {
+    diagnosis::Hypothesis& h = list.emplace_back(d.extended);
+    for (std::size_t k = 0; k < of.size(); ++k) {
+      const diagnosis::Sought& s = sought[static_cast<std::size_t>(of[k])];
+      model::MechanismSetting& setting = h.settings[s.setting];
+      const model::Parameter& p = catalogue[setting.index].parameter[s.parameter];
+      const double capacity_ah = d.cell.capacity_ah;
+      setting.value[s.parameter] = std::clamp(setting.value[s.parameter] + std::sqrt(std::max(axes.eigenvalues()[axis], 0.0)) * axes.eigenvectors()(static_cast<Eigen::Index>(k), axis),
+                                              p.lower(capacity_ah), p.upper(capacity_ah));
+    }
+  }
+  return list;
 }
 
 // --- claims
@@ -285,34 +309,44 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
     const std::string id = fmt::format("{:g}C", from.temperature_c), at = fmt::format("from {:g} degrees C", from.temperature_c);
     claim_named(e, id + ".named", at + ": a cell file made at 25 degrees C lacks the resistances' temperature", r, {"temperature_resistance"},
                 fmt::format("resistance at edges {:.2f} times that at 25 degrees C", measured_ratio(from).value));
-    const auto energy = value_of(r, "temperature_resistance", "r0_activation_j_per_mol");
-    const auto reference = value_of(r, "temperature_resistance", "reference_c");
-    // an edge shows the ohmic resistance and what is faster than a sample; the same of the simulation
+    const bool named = found(r, "temperature_resistance") != nullptr;
+    // an edge shows the ohmic resistance and what is faster than a sample; the same of the simulation, and how far its parameters let it go
     std::map<double, Compared> scored;
-    std::map<double, double> edge_ohm;
-    for (const AtTemperature& t : temperatures) {
-      const Compared& c = scored[t.temperature_c] = lab.scored(r, t.recording);
-      Recording simulated = c.recording;
-      simulated.voltage_v = c.extended_v;
-      edge_ohm[t.temperature_c] = edge_resistance(simulated).value;
-    }
-    const auto predicted = [&](double temperature_c) {
-      const double ratio = edge_ohm.at(temperature_c) / edge_ohm.at(25);
-      return Value{ratio, ratio * std::abs(1 / (temperature_c + 273.15) - 1 / (reference->value + 273.15)) / 8.314462618 * energy->sigma};
+    const auto ratios_with = [&](const diagnosis::Hypothesis& extended, bool keep) {
+      std::map<double, double> ohm;
+      for (const AtTemperature& t : temperatures) {
+        Compared c = lab.scored(r, t.recording, &extended);
+        Recording simulated = c.recording;
+        simulated.voltage_v = c.extended_v;
+        ohm[t.temperature_c] = edge_resistance(simulated).value;
+        if (keep) scored[t.temperature_c] = std::move(c);
+      }
+      const double at_25_ohm = ohm.at(25);
+      for (auto& [temperature_c, value] : ohm) value /= at_25_ohm;
+      return ohm;
     };
+    const std::map<double, double> ratios = ratios_with(r.diagnosis.extended, true);
+    std::map<double, double> squares;
+    if (named) {
+      for (const diagnosis::Hypothesis& other : one_deviation_away(r.diagnosis, "temperature_resistance")) {
+        for (const auto& [temperature_c, value] : ratios_with(other, false)) squares[temperature_c] += std::pow(value - ratios.at(temperature_c), 2);
+      }
+    }
+    const auto predicted = [&](double temperature_c) { return Value{ratios.at(temperature_c), std::sqrt(squares.at(temperature_c))}; };
     ProofPoints::Curve curve{at, {}};
     for (const AtTemperature& t : temperatures) {
-      if (!energy) break;
+      if (!named) break;
       const Value p = predicted(t.temperature_c);
       curve.points.push_back({t.temperature_c, p.value, p.sigma});
     }
-    if (energy) points.predicted.push_back(std::move(curve));
+    if (named) points.predicted.push_back(std::move(curve));
     ProofBars bars{"open loop, not used; diagnosed " + at, "mV", {}};
     for (const AtTemperature& t : temperatures) {
       if (t.temperature_c == 25 || t.temperature_c == from.temperature_c) continue;
       const Value ratio = measured_ratio(t);
-      claim_number(e, fmt::format("{}.r0_at_{:g}C", id, t.temperature_c), fmt::format("{}: resistance at edges at {:g} degrees C over that at 25", at, t.temperature_c), energy ? std::optional<Value>(predicted(t.temperature_c)) : std::nullopt,
-                   said_of(r), ratio, "voltage over current at edges", 0.2 * ratio.value, "1");
+      claim_number(e, fmt::format("{}.r0_at_{:g}C", id, t.temperature_c), fmt::format("{}: resistance at edges at {:g} degrees C over that at 25", at, t.temperature_c), named ? std::optional<Value>(predicted(t.temperature_c)) : std::nullopt,
+                   said_of(r), ratio, "voltage over current at edges",
+                   named ? std::clamp(2 * predicted(t.temperature_c).sigma, 0.2 * ratio.value, 0.5 * ratio.value) : 0.2 * ratio.value, "1");
       const Compared& other = scored.at(t.temperature_c);
       const double before_v = rms(other, other.base_v), after_v = rms(other, other.extended_v);
       if (from.temperature_c == 5) claim_better(e, fmt::format("{}.rmse_at_{:g}C", id, t.temperature_c), fmt::format("{}: open loop at {:g} degrees C", at, t.temperature_c), stem(t.recording), before_v, after_v);
@@ -426,15 +460,15 @@ struct Injected {
 
 double half_time_s(const Recording& r) { return std::round((r.time_s.front() + r.time_s.back()) / 2); }
 
-constexpr double clipped_a = 12, burst_ohm = 0.010;
+constexpr double clipped_a = 25, burst_ohm = 0.010;
 
-std::vector<Sizes> offset_by_50_ma(Recording& r) {
-  for (double& i : r.current_a) i += 0.05;
-  return {{"offset_a", "A", 0.05, 0.01}};
+std::vector<Sizes> offset_by_150_ma(Recording& r) {
+  for (double& i : r.current_a) i += 0.15;
+  return {{"offset_a", "A", 0.15, 0.03}};
 }
-std::vector<Sizes> gain_of_3_percent(Recording& r) {
-  for (double& i : r.current_a) i *= 1.03;
-  return {{"gain_error", "1", 0.03, 0.006}};
+std::vector<Sizes> gain_of_8_percent(Recording& r) {
+  for (double& i : r.current_a) i *= 1.08;
+  return {{"gain_error", "1", 0.08, 0.016}};
 }
 std::vector<Sizes> late_by_two_samples(Recording& r) {
   for (std::size_t k = r.rows(); k-- > 0;) r.current_a[k] = r.current_a[k >= 2 ? k - 2 : 0];
@@ -480,10 +514,10 @@ std::vector<Sizes> voltage_higher_by_15_mv(Recording& r) {
 }
 
 const Injected faults[] = {
-    {"current_offset", "current reads 50 mA too much", offset_by_50_ma},
-    {"current_gain", "current reads 3 % too much", gain_of_3_percent},
+    {"current_offset", "current reads 150 mA too much", offset_by_150_ma},
+    {"current_gain", "current reads 8 % too much", gain_of_8_percent},
     {"channel_skew", "current is two samples late", late_by_two_samples},
-    {"current_clipping", "current reads 12 A at most", clipped},
+    {"current_clipping", "current reads 25 A at most", clipped},
     {"contact_step", "a contact is 3 mOhm worse from half time", contact_worse_at_half_time},
     {"contact_intermittent", "a contact of 10 mOhm comes and goes", contact_bursts},
     {"voltage_offset", "voltage reads 15 mV too much", voltage_higher_by_15_mv},

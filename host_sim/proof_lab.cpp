@@ -93,10 +93,11 @@ const DiagnoseResult& ProofLab::diagnosed(const CellFile& cell, const std::strin
   });
 }
 
-Compared ProofLab::scored(const DiagnoseResult& of, const std::string& name) {
+Compared ProofLab::scored(const DiagnoseResult& of, const std::string& name, const diagnosis::Hypothesis* instead) {
   DiagnoseResult one;
   one.cell = of.cell;
   one.diagnosis = of.diagnosis;
+  if (instead != nullptr) one.diagnosis.extended = *instead;
   one.holdouts.push_back(begun(recording(name), of.cell));
   compare(one);
   return one.holdouts.front();

@@ -66,7 +66,8 @@ class ProofLab {
   const DiagnoseResult& diagnosed(const CellFile& cell, const std::string& name, const std::vector<Recording>& recordings);
 
   /// What cell file and extended cell say of a recording that the diagnosis did not use.
-  Compared scored(const DiagnoseResult& diagnosis, const std::string& recording);
+  /// instead: of what was found.
+  Compared scored(const DiagnoseResult& diagnosis, const std::string& recording, const diagnosis::Hypothesis* instead = nullptr);
 
   /// All diagnoses, by name; once nobody works any more.
   std::vector<ProofDiagnosis> diagnoses() const;

@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include "diagnosis/good_to.hpp"
+#include "diagnosis/screen.hpp"
 #include "tests/diagnosis/evidence.hpp"
 
 namespace bms::diagnosis {
@@ -104,6 +106,43 @@ TEST(Diagnose, WithoutInformationNothingIsSaid) {
   EXPECT_EQ(d.not_testable.size(), model::mechanism_count);
   Record brief = test::recorded(test::drive(0.05, 18), 0.7, 18);
   EXPECT_EQ(diagnose(test::table9(), {}, {brief}).verdict, Verdict::not_testable);
+}
+
+/// At a current sensor's offset that moves the charge by several per cent, the knees are too far away for a line to point there.
+TEST(Diagnose, FindsAnOffsetThatMovesTheKneesFar) {
+  Record r = test::recorded(test::drive(4, 31), 0.9, 31);
+  for (double& a : r.current_a) a += 0.2;  // 13 % of soc
+  const Diagnosis d = diagnose(test::table9(), {}, {r});
+  ASSERT_FALSE(d.findings.empty());
+  std::vector<std::string> set = ids_of(d);
+  for (const std::size_t e : d.findings.front().equivalent_to) set.emplace_back(model::catalogue[e].id);
+  EXPECT_THAT(set, Contains("current_offset"));
+}
+
+TEST(Diagnose, LeakageAndAnOffsetAreNotBesideEachOther) {
+  Record r = test::recorded(test::drive(2, 32), 0.7, 32);
+  Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
+  const std::size_t leakage = model::mechanism_index("leakage"), offset = model::mechanism_index("current_offset");
+  const Hypothesis leaking = with(evidence.base(), leakage, 6);
+  EXPECT_TRUE(not_testable(evidence, leaking, offset).has_value());
+  EXPECT_FALSE(not_testable(evidence, evidence.base(), offset).has_value());
+  r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002}};
+  const Evidence trusted(test::table9(), {}, {r}, NoiseModel{});
+  EXPECT_FALSE(not_testable(trusted, leaking, offset).has_value()) << "a trusted ammeter tells them apart";
+}
+
+TEST(Diagnose, AFileIsGoodToWhatItLeavesOfItsOwnRecordings) {
+  const auto left_over = [](double v) {
+    return test::recorded(test::drive(2, 33), 0.7, 33, [v](std::size_t k, double, double) { return v * std::sin(2 * 3.14159265 * static_cast<double>(k) / 1'234); });
+  };
+  EXPECT_EQ(widening(test::table9(), {}, {left_over(0)}), 1);
+  const double factor = widening(test::table9(), {}, {left_over(0.012)});
+  EXPECT_GT(factor, 1);
+  model::CellParameters<> wide = test::table9();
+  wide.tolerance.ocv_v *= factor;
+  wide.tolerance.drift_v *= factor;
+  EXPECT_EQ(diagnose(test::table9(), {}, {left_over(0.012)}).verdict, Verdict::unknown);
+  EXPECT_EQ(diagnose(wide, {}, {left_over(0.012)}).verdict, Verdict::no_mismatch);
 }
 
 }  // namespace
