@@ -4,7 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
 #include <ceres/jet.h>
 
 #include "model/readings.hpp"
@@ -37,9 +36,6 @@ constexpr double edge_error = 0.4;
 
 /// Error along the soc of the OCV table, as a share of what the start may be off; and how far around the counted soc its slope is taken.
 constexpr double soc_error_share = 0.3, slope_reach = 0.01;
-
-constexpr double rarity = 0.5;         // of a strength: what is beyond the common, over this share of it, in deviations
-constexpr double log_prior_width = 1;  // of a shape: a factor of e between its usual and an unusual value
 
 /// The base parameters in a run, at the unknowns u.
 template <class S>
@@ -138,11 +134,6 @@ Hypothesis without(const Hypothesis& h, std::size_t mechanism) {
   std::erase_if(less.settings, [&](const MechanismSetting& s) { return s.index == mechanism && &s - less.settings.data() >= static_cast<std::ptrdiff_t>(h.own); });
   return less;
 }
-
-struct Evidence::Linear {
-  Columns columns;                 ///< white
-  Eigen::LLT<Eigen::MatrixXd> normal;  ///< columns' columns + 1
-};
 
 Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSetting> own, std::vector<Record> records, const NoiseModel& noise)
     : cell_(cell), tables_(model::prepare<double, model::max_intervals>(cell)), own_(std::move(own)), records_(std::move(records)), calibration_(cell, records_) {
@@ -422,215 +413,6 @@ Columns Evidence::calibration_derivatives(const Hypothesis& h, const Eigen::Vect
   else carry<all_laws>(h, u, columns);
   whiten(columns);
   return columns;
-}
-
-std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, const Eigen::VectorXd& u) const {
-  auto made = std::make_shared<Linear>();
-  made->columns = calibration_derivatives(h, u);
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(made->columns.cols(), made->columns.cols());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(made->columns.transpose());
-  made->normal.compute(normal);
-  return made;
-}
-
-void Evidence::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linear(h, u); }
-
-Fit Evidence::fit(const Hypothesis& start, int iterations) const { return fit(start, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())), iterations); }
-
-Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations, double hopeless) const {
-  const std::vector<Sought> sought = start.sought();
-  const auto m = static_cast<Eigen::Index>(sought.size());
-  const auto info = [&](Eigen::Index j) -> const model::Parameter& {
-    const Sought& s = sought[static_cast<std::size_t>(j)];
-    return catalogue[start.settings[s.setting].index].parameter[s.parameter];
-  };
-  const auto is = [&](Eigen::Index j, std::string_view id, std::string_view name) {
-    return catalogue[start.settings[sought[static_cast<std::size_t>(j)].setting].index].id == id && info(j).name == name;
-  };
-  // what is neither faster nor slower than R1 C1 is R1 C1
-  const double rc_s = model::cell_detail::rc_value(cell_.rc, cell_.rc.r1_ohm, 0.5) * model::cell_detail::rc_value(cell_.rc, cell_.rc.c1_f, 0.5);
-  const auto low_of = [&](Eigen::Index j) {
-    const double low = info(j).lower(cell_.capacity_ah);
-    return is(j, "slow_polarisation", "time_constant_s") ? std::clamp(2 * rc_s, low, 600.0) : low;
-  };
-  const auto high_of = [&](Eigen::Index j) {
-    const double high = info(j).upper(cell_.capacity_ah);
-    return is(j, "fast_polarisation", "time_constant_s") ? std::clamp(rc_s / 3, 1.0, high) : high;
-  };
-  const auto value = [&](Hypothesis& h, Eigen::Index j) -> double& {
-    const Sought& s = sought[static_cast<std::size_t>(j)];
-    return h.settings[s.setting].value[s.parameter];
-  };
-  const auto is_shape = [&](Eigen::Index j) { return info(j).role == model::Role::shape; };
-  // how far a parameter is from what is known of most cells, in deviations, and what a deviation is
-  struct Known {
-    double away = 0, deviation = 0;
-  };
-  const auto known = [&](Eigen::Index j, double v) -> Known {
-    if (info(j).spread > 0) return {(v - info(j).typical) / info(j).spread, info(j).spread};
-    const double common = info(j).common(cell_.capacity_ah);
-    if (common <= 0 || std::abs(v) <= common) return {};
-    return {(v - std::copysign(common, v)) / (rarity * common), rarity * common};
-  };
-  const auto prior = [&](Hypothesis& h) {
-    double sum = 0;
-    for (Eigen::Index j = 0; j < m; ++j) {
-      if (is_shape(j)) sum += std::pow(std::log(value(h, j) / (info(j).unsaid(cell_.capacity_ah))) / log_prior_width, 2);
-      else sum += std::pow(known(j, value(h, j)).away, 2);
-    }
-    return sum;
-  };
-
-  Fit fit{start, calibration, {}, 0, noise_, {}, std::vector<char>(sought.size(), 0), false};
-  for (Eigen::Index j = 0; j < m; ++j) value(fit.hypothesis, j) = std::clamp(value(fit.hypothesis, j), low_of(j), high_of(j));
-  const auto cost_of = [&](Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& r) { return r.squaredNorm() + u.squaredNorm() + prior(h); };
-  fit.residual = residual(fit.hypothesis, fit.calibration);
-  fit.cost = cost_of(fit.hypothesis, fit.calibration, fit.residual);
-  const double cost_at_start = fit.cost;
-
-  if (!nearby_) linearise(base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())));
-  std::shared_ptr<const Linear> around = nearby_;
-  int renewals = 0;
-  constexpr int most_renewals = 6;
-  double damping = 1e-3;
-  Eigen::MatrixXd schur;
-  Eigen::VectorXd natural = Eigen::VectorXd::Ones(m);  // d parameter / d internal
-  int quiet = 0;
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    Columns j_theta = derivatives(fit.hypothesis, fit.calibration, sought);  // of nothing sought: no columns
-    for (Eigen::Index j = 0; j < m; ++j) {
-      natural[j] = is_shape(j) ? value(fit.hypothesis, j) : (high_of(j) - low_of(j)) / 100;
-      j_theta.col(j) *= natural[j];
-    }
-    const Columns& j_u = around->columns;
-    const Eigen::VectorXd g_u = j_u.transpose() * fit.residual - fit.calibration;
-    const Eigen::VectorXd u_alone = around->normal.solve(g_u);
-    Eigen::VectorXd g(m), rhs(m);
-    Eigen::MatrixXd a(m, m), cross, solved;
-    if (m > 0) {
-      g = j_theta.transpose() * fit.residual;
-      a = j_theta.transpose() * j_theta;
-    }
-    for (Eigen::Index j = 0; j < m; ++j) {
-      if (!is_shape(j)) {
-        if (const Known k = known(j, value(fit.hypothesis, j)); k.deviation > 0) {
-          const double per = natural[j] / k.deviation;
-          g[j] -= k.away * per;
-          a(j, j) += per * per;
-        }
-        continue;
-      }
-      const double width2 = log_prior_width * log_prior_width;
-      g[j] -= std::log(value(fit.hypothesis, j) / (info(j).unsaid(cell_.capacity_ah))) / width2;
-      a(j, j) += 1 / width2;
-    }
-    // what a step could gain at most, were all linear and no bound in the way
-    double within_reach = g_u.dot(u_alone);
-    if (m > 0) {
-      cross = j_u.transpose() * j_theta;
-      solved = around->normal.solve(cross);
-      schur = a - cross.transpose() * solved;
-      rhs = g - cross.transpose() * u_alone;
-      Eigen::MatrixXd regular = schur;
-      for (Eigen::Index j = 0; j < m; ++j) regular(j, j) += 1e-6 * schur(j, j) + 1e-9;
-      within_reach += rhs.dot(regular.ldlt().solve(rhs));
-    }
-    if (within_reach < 0.2) {
-      fit.converged = true;
-      break;
-    }
-    if (iteration >= 3 && fit.cost - 2 * within_reach > hopeless) break;
-
-    bool better = false, astray = false;
-    for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-      // those that would leave their bounds go to them and no farther, and the others' steps are those beside that; one round after the other
-      std::vector<char> held(sought.size(), 0);
-      Eigen::VectorXd step = Eigen::VectorXd::Zero(m), reach(m);
-      Hypothesis trial = fit.hypothesis;
-      for (int round = 0; m > 0 && round <= static_cast<int>(m); ++round) {
-        Eigen::MatrixXd s = schur;
-        Eigen::VectorXd b = rhs;
-        for (Eigen::Index j = 0; j < m; ++j) s(j, j) += damping * schur(j, j) + 1e-9 + 1e-12 * schur.diagonal().maxCoeff();
-        for (Eigen::Index j = 0; j < m; ++j) {
-          if (held[static_cast<std::size_t>(j)] != 0) b -= schur.col(j) * reach[j];
-        }
-        for (Eigen::Index j = 0; j < m; ++j) {
-          if (held[static_cast<std::size_t>(j)] == 0) continue;
-          s.row(j).setZero();
-          s.col(j).setZero();
-          s(j, j) = 1;
-          b[j] = reach[j];
-        }
-        step = s.ldlt().solve(b);
-        bool more = false;
-        for (Eigen::Index j = 0; j < m; ++j) {
-          if (held[static_cast<std::size_t>(j)] != 0) continue;
-          const double v = value(fit.hypothesis, j);
-          const double to_low = is_shape(j) ? std::max(std::log(low_of(j) / v), -1.5) : (low_of(j) - v) / natural[j];
-          const double to_high = is_shape(j) ? std::min(std::log(high_of(j) / v), 1.5) : (high_of(j) - v) / natural[j];
-          if (step[j] >= to_low && step[j] <= to_high) continue;
-          held[static_cast<std::size_t>(j)] = 1;
-          reach[j] = std::clamp(step[j], to_low, to_high);
-          more = true;
-        }
-        if (!more) break;
-      }
-      for (Eigen::Index j = 0; j < m; ++j) {
-        const double v = value(fit.hypothesis, j);
-        value(trial, j) = std::clamp(is_shape(j) ? v * std::exp(step[j]) : v + natural[j] * step[j], low_of(j), high_of(j));
-      }
-      // where the base parameters' derivatives are stale, a shorter way is taken with theirs too
-      const double way = 1 / (1 + 0.02 * damping);
-      Eigen::VectorXd toward = u_alone;
-      if (m > 0) toward -= solved * step;
-      const Eigen::VectorXd u = fit.calibration + way * toward;
-      const Eigen::VectorXd r = residual(trial, u);
-      const double cost = cost_of(trial, u, r);
-      double promised = g_u.dot(u_alone);
-      if (m > 0) promised += 2 * rhs.dot(step) - step.dot(schur * step);
-      if (fit.cost - cost < 0.3 * promised && promised > 2 + 1e-3 * fit.cost) astray = true;
-      if (cost < fit.cost) {
-        better = true;
-        quiet = fit.cost - cost < 0.05 + 1e-5 * fit.cost ? quiet + 1 : 0;
-        fit.hypothesis = trial;
-        fit.calibration = u;
-        fit.residual = r;
-        fit.cost = cost;
-        damping = std::max(damping / 5, 1e-9);
-      } else {
-        damping *= 8;
-      }
-    }
-    if (better && quiet == 0 && !(astray && renewals < most_renewals)) continue;
-    // far from where the base parameters were linearised, or not what was promised: once more from here
-    if (renewals < (astray ? most_renewals : 2) && (astray || !better || cost_at_start - fit.cost > 50)) {
-      ++renewals;
-      quiet = 0;
-      damping = astray ? std::max(1e-3, damping / 64) : 1e-3;
-      around = linear(fit.hypothesis, fit.calibration);
-      iterations = std::max(iterations, iteration + 5);
-      continue;
-    }
-    fit.converged = true;
-    break;
-  }
-
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const double v = value(fit.hypothesis, j), low = low_of(j), high = high_of(j), reach = 1e-9 * (high - low);
-    fit.at_bound[static_cast<std::size_t>(j)] = v <= low + reach || v >= high - reach ? 1 : 0;
-  }
-  fit.covariance = Eigen::MatrixXd::Zero(m, m);
-  if (m > 0) {
-    Eigen::MatrixXd s = schur;
-    for (Eigen::Index j = 0; j < m; ++j) s(j, j) += 1e-12 * schur.diagonal().maxCoeff() + 1e-12;
-    const Eigen::MatrixXd inverse = s.ldlt().solve(Eigen::MatrixXd::Identity(m, m));
-    fit.covariance = natural.asDiagonal() * inverse * natural.asDiagonal();
-    for (Eigen::Index j = 0; j < m; ++j) {
-      const Sought& s_j = sought[static_cast<std::size_t>(j)];
-      fit.hypothesis.settings[s_j.setting].deviation[s_j.parameter] = std::sqrt(std::max(fit.covariance(j, j), 0.0));
-    }
-  }
-  return fit;
 }
 
 }  // namespace bms::diagnosis

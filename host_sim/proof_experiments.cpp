@@ -574,8 +574,9 @@ void holdouts(ProofLab& lab, ProofExperiment& e) {
   for (const char* name : {"a123_26650/dyn20_P25_A002", "a123_26650/pulse_P25_A002", "a123_26650/cccv1C_P25_A002", "a123_26650/dyn10_P15_A002", "a123_26650/dyn10_P45_A002", "a123_26650/dyn10_N05_A002",
                            "a123_26650/fsae_P25_A004"}) {
     const Compared c = lab.scored(r, name);
-    const double before_v = rms(c, c.base_v), after_v = rms(c, c.extended_v);
-    claim_better(e, stem(name), fmt::format("open loop on {}", stem(name)), "all of it", before_v, after_v);
+    // where the file's resistances were identified; nearer to full and empty they are no more than drawn on
+    const double before_v = rms(c, c.base_v, 0.1, 0.95), after_v = rms(c, c.extended_v, 0.1, 0.95);
+    claim_better(e, stem(name), fmt::format("open loop on {}", stem(name)), fmt::format("10 to 95 % of charge; all of it {} and {}", millivolts(rms(c, c.base_v)), millivolts(rms(c, c.extended_v))), before_v, after_v);
     bars.rows.push_back({stem(name), 1e3 * before_v, 1e3 * after_v});
     if (std::string_view(name).find("dyn20") != std::string_view::npos) e.lines.push_back(errors_over_time(c, "Measured less simulated, not used: " + stem(name)));
   }
