@@ -20,7 +20,114 @@ namespace {
 
 using model::catalogue;
 
-constexpr std::size_t temperature_resistance = index_of("temperature_resistance");
+/// Why nothing at all can be said.
+std::optional<std::string> says_nothing(const Evidence& evidence) {
+  const double capacity_ah = evidence.cell().capacity_ah;
+  std::size_t moving = 0;
+  double duration_s = 0, low_a = 1e9, high_a = -1e9;
+  for (const Record& r : evidence.records()) {
+    duration_s += r.duration_s();
+    for (const double a : r.current_a) {
+      if (!std::isfinite(a)) continue;
+      moving += std::abs(a) > 0.02 * capacity_ah ? 1 : 0;
+      low_a = std::min(low_a, a);
+      high_a = std::max(high_a, a);
+    }
+  }
+  if (evidence.used() < 50) return fmt::format("there are {} usable voltage readings", evidence.used());
+  if (duration_s < 300) return fmt::format("the recording lasts {:.0f} s", duration_s);
+  if (moving < 10) return "the cell rests all the time";
+  if (high_a - low_a < 0.02 * capacity_ah) return "the current does not change";
+  return std::nullopt;
+}
+
+/// What is there for certain, before anything that would stand in for it: every cell's resistances follow the temperature, and a file
+/// that tells how far charge and discharge lie apart tells that there is a hysteresis.
+std::set<std::size_t> expected_in(const Evidence& evidence) {
+  std::set<std::size_t> expected;
+  if (away_k(evidence) > decision::far_k) expected.insert(index_of("temperature_resistance"));
+  if (evidence.cell().ocv.half_gap_v.size > 0) expected.insert(index_of("ocv_hysteresis"));
+  std::erase_if(expected, [&](std::size_t m) { return evidence.base().find(m) != nullptr; });
+  return expected;
+}
+
+/// One mechanism after the other, as long as chance would not do it; what may come and go as it likes, which gains on anything, after
+/// all that may not. singles: what was tried alone.
+Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, std::size_t most, std::vector<Fit>& singles) {
+  std::vector<std::size_t> steady = testable;
+  std::erase(steady, index_of("contact_intermittent"));
+  bool bursts = false;
+  while (current.hypothesis.added().size() < most) {
+    std::vector<Fit> more = search.one_more(current, bursts ? testable : steady);
+    if (current.hypothesis.added().empty()) singles.insert(singles.end(), more.begin(), more.end());
+    std::erase_if(more, [&](const Fit& f) { return !search.carries(current, f); });
+    const bool gains = !more.empty() && search.gain(current, more.front()) >= decision::detected;
+    if (gains) current = more.front();
+    else if (bursts) break;
+    bursts = !gains;
+  }
+  return current;
+}
+
+/// What has stood up against everything else.
+struct Standing {
+  Fit best;
+  std::map<std::size_t, std::vector<Fit>> rivals;                  ///< with another in the place of a mechanism
+  std::map<std::size_t, double> gains;                             ///< of each over the rest
+  std::map<std::pair<std::size_t, std::size_t>, double> alike;     ///< signatures
+};
+
+/// What does not carry is taken away, and each one's rivals are tried in its place.
+Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit current, const std::vector<std::size_t>& testable, const std::set<std::size_t>& expected) {
+  const double error_v = plain_error_v(evidence, evidence.base());
+  Standing found;
+  auto& [best, rivals, gains, alike] = found;
+  for (int round = 0; round < 6; ++round) {
+    bool changed = false;
+    rivals.clear();
+    gains.clear();
+    std::vector<std::pair<double, Fit>> reduced;
+    const std::map<std::size_t, double> sizes_v = contributions(evidence, base, current).rms_v;
+    for (const std::size_t m : current.hypothesis.added()) {
+      const bool alone = current.hypothesis.added().size() == 1;
+      const Fit less = alone ? base : search.without_one(current, m);
+      gains[m] = search.gain(less, current);
+      // beside others, one that is hardly seen is none, and so are those that are larger than the error and cancel each other: of these the
+      // one goes that is missed less
+      const bool counts = alone || (sizes_v.at(m) >= decision::noticeable * error_v && sizes_v.at(m) <= decision::larger_than_error * error_v);
+      if (!counts || gains[m] < decision::detected) {
+        reduced.emplace_back(gains[m], less);
+        continue;
+      }
+      std::map<std::size_t, double> likeness;
+      for (Fit& rival : search.in_place_of(m, current, less, testable, gains[m], likeness)) {
+        if (rival.hypothesis.find(m) != nullptr) {
+          if (search.score(rival) < search.score(current) - 1 && search.carries(less, rival)) current = rival, changed = true;  // the same from another start
+          continue;
+        }
+        if (!search.carries(less, rival)) continue;
+        if (search.score(rival) < search.score(current) - 0.5 && !expected.contains(m)) {
+          current = rival;
+          changed = true;
+        }
+        rivals[m].push_back(std::move(rival));
+      }
+      for (const auto& [other, value] : likeness) alike[{m, other}] = value;
+      if (changed) break;
+    }
+    if (!changed && !reduced.empty()) {
+      std::sort(reduced.begin(), reduced.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+      current = reduced.front().second;
+      changed = true;
+    }
+    if (!changed) break;
+  }
+  for (const std::size_t m : current.hypothesis.added()) {
+    if (!gains.contains(m)) gains[m] = search.gain(search.without_one(current, m), current);
+  }
+  best = std::move(current);
+  return found;
+}
 
 }  // namespace
 
@@ -76,63 +183,26 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     if (reason) d.not_testable.push_back({m, *reason});
     if (evidence.base().find(m) == nullptr) testable.push_back(m);  // the screen asks again, beside what has been found
   }
-  std::vector<std::size_t> steady = testable;
-  std::erase(steady, index_of("contact_intermittent"));
-  std::size_t moving = 0;
-  double duration_s = 0;
-  for (const Record& r : evidence.records()) {
-    duration_s += r.duration_s();
-    for (const double a : r.current_a) moving += std::isfinite(a) && std::abs(a) > 0.02 * cell.capacity_ah ? 1 : 0;
-  }
-  const auto cannot = [&](std::string why) {
+  if (const auto why = says_nothing(evidence)) {
     d.verdict = Verdict::not_testable;
-    d.statement = "Nothing can be said: " + std::move(why) + ".";
+    d.statement = "Nothing can be said: " + *why + ".";
     d.not_testable.clear();
-    for (std::size_t m = 0; m < model::mechanism_count; ++m) d.not_testable.push_back({m, d.statement.substr(23, d.statement.size() - 24)});
+    for (std::size_t m = 0; m < model::mechanism_count; ++m) d.not_testable.push_back({m, *why});
     return d;
-  };
-  if (evidence.used() < 50) return cannot(fmt::format("there are {} usable voltage readings", evidence.used()));
-  if (duration_s < 300) return cannot(fmt::format("the recording lasts {:.0f} s", duration_s));
-  if (moving < 10) return cannot("the cell rests all the time");
-  double low_a = 1e9, high_a = -1e9;
-  for (const Record& r : evidence.records()) {
-    for (const double a : r.current_a) {
-      if (std::isfinite(a)) low_a = std::min(low_a, a), high_a = std::max(high_a, a);
-    }
   }
-  if (high_a - low_a < 0.02 * cell.capacity_ah) return cannot("the current does not change");
 
   Search search(evidence, options.progress);
   Fit base = search.settled(evidence.fit(evidence.base()));
   search.tell("calibration");
 
-  // one mechanism after the other, as long as chance would not do it
+  const std::set<std::size_t> expected = expected_in(evidence);
   std::vector<Fit> singles;
-  Fit current = base;
-  const auto grow = [&] {
-    // what may come and go as it likes gains on anything: after all that may not
-    bool bursts = false;
-    while (current.hypothesis.added().size() < options.most_mechanisms) {
-      std::vector<Fit> more = search.one_more(current, bursts ? testable : steady);
-      if (current.hypothesis.added().empty()) singles.insert(singles.end(), more.begin(), more.end());
-      std::erase_if(more, [&](const Fit& f) { return !search.carries(current, f); });
-      const bool gains = !more.empty() && search.gain(current, more.front()) >= decision::detected;
-      if (gains) current = more.front();
-      else if (bursts) break;
-      bursts = !gains;
-    }
-  };
-  // what is there for certain comes before anything that would stand in for it: every cell's resistances follow the temperature, and a
-  // file that tells how far charge and discharge lie apart tells that there is a hysteresis
-  std::set<std::size_t> expected;
-  if (away_k(evidence) > decision::far_k) expected.insert(temperature_resistance);
-  if (cell.ocv.half_gap_v.size > 0) expected.insert(index_of("ocv_hysteresis"));
-  std::erase_if(expected, [&](std::size_t m) { return evidence.base().find(m) != nullptr; });
+  Fit grown = base;
   for (const std::size_t m : expected) {
-    const std::vector<Fit> with_it = search.one_more(current, {m});
-    if (!with_it.empty() && search.gain(current, with_it.front()) > decision::detected) current = with_it.front();
+    const std::vector<Fit> with_it = search.one_more(grown, {m});
+    if (!with_it.empty() && search.gain(grown, with_it.front()) > decision::detected) grown = with_it.front();
   }
-  grow();
+  grown = grow(search, std::move(grown), testable, options.most_mechanisms, singles);
   {
     // the first screen tells the limits
     evidence.set_noise(nominal);
@@ -144,56 +214,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 
   search.tell("noise");
 
-  // take away what does not carry, try each one's rivals
-  const double error_v = plain_error_v(evidence, evidence.base());
-  std::map<std::size_t, std::vector<Fit>> rivals;
-  std::map<std::size_t, double> gains;
-  std::map<std::pair<std::size_t, std::size_t>, double> alike;
-  for (int round = 0; round < 6; ++round) {
-    bool changed = false;
-    rivals.clear();
-    gains.clear();
-    std::vector<std::pair<double, Fit>> reduced;
-    // causes that are larger than the error and cancel each other are none
-    const std::map<std::size_t, double> sizes_v = contributions(evidence, base, current).rms_v;
-    for (const std::size_t m : current.hypothesis.added()) {
-      const Fit less = current.hypothesis.added().size() == 1 ? base : search.without_one(current, m);
-      const double lost = gains[m] = search.gain(less, current);
-      const bool one_of_several = current.hypothesis.added().size() > 1;
-      const bool cancels = one_of_several && sizes_v.at(m) > decision::larger_than_error * error_v;
-      if (one_of_several && sizes_v.at(m) < decision::noticeable * error_v) gains[m] = std::min(gains[m], decision::detected - 1);
-      if (cancels) gains[m] = std::min(gains[m], decision::detected - sizes_v.at(m) / error_v);
-      if (gains[m] < decision::detected) {
-        reduced.emplace_back(lost, less);  // of two that cancel each other, the one that is missed less
-        continue;
-      }
-      std::map<std::size_t, double> likeness;
-      for (Fit& rival : search.in_place_of(m, current, less, testable, gains[m], likeness)) {
-        if (rival.hypothesis.find(m) != nullptr) {
-          if (search.score(rival) < search.score(current) - 1 && search.carries(less, rival)) current = rival, changed = true;  // the same from another start
-          continue;
-        }
-        if (!search.carries(less, rival)) continue;
-        if (search.score(rival) < search.score(current) - 0.5 && !expected.contains(m)) {
-          current = rival;
-          changed = true;
-        }
-        rivals[m].push_back(std::move(rival));
-      }
-      for (const auto& [other, value] : likeness) alike[{m, other}] = value;
-      if (changed) break;
-    }
-    if (!changed && !reduced.empty()) {
-      std::sort(reduced.begin(), reduced.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-      current = reduced.front().second;
-      changed = true;
-    }
-    if (!changed) break;
-  }
-
-  for (const std::size_t m : current.hypothesis.added()) {
-    if (!gains.contains(m)) gains[m] = search.gain(search.without_one(current, m), current);
-  }
+  auto [current, rivals, gains, alike] = stand_up(search, evidence, base, std::move(grown), testable, expected);
 
   // is it enough?
   evidence.set_noise(nominal);
