@@ -334,7 +334,10 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
       }
       for (const model::Span& s : c.bursts.back()) in_s += s.end_s - s.start_s;
     }
-    if (bursts > 0) {
+    // what the file's own resistance is not good to is no contact
+    const model::CellParameters<>& cell = evidence.cell();
+    const double least_ohm = cell.tolerance.resistance_fraction * model::cell_detail::rc_value(cell.rc, cell.rc.r0_ohm, 0.5);
+    if (bursts > 0 && sum_ohm > least_ohm) {
       evidence.whiten(column);
       const LeftOver::Products one = left.of(column);
       const double g = one.gram(0, 0), b = one.toward[0];
