@@ -84,6 +84,7 @@ struct TablePoint {
   Resistance<S> r1_ohm, r1_delta_ohm;
   Capacitance<S> c1_f, c1_delta_f;
   Factor<S> activation{1};  ///< by how much resistances that the tables do not hold differ with the temperature
+  VoltagePerSoc<S> read_slope_v{0};  ///< of the OCV, by the soc at which laws read it elsewhere
 };
 
 namespace cell_detail {

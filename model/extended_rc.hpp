@@ -49,12 +49,13 @@ constexpr TablePoint<S> look_up(const CellUnder<Tables, Drive<S>, X>& under, con
   const auto& laws = laws_of(under.cell);
   TablePoint<S> at = look_up(under.cell, soc, interval);
   if constexpr (std::remove_cvref_t<decltype(laws)>::reads_elsewhere) {
+    at.read_slope_v = at.ocv_delta_v * at.per_width;
     if (const Soc<S> elsewhere = laws.read_at(soc, under.x.data() + 1); elsewhere != soc) {
       std::uint8_t there_interval = interval;
       const TablePoint<S> there = look_up(under.cell, elsewhere, there_interval);
       at.ocv_v = there.ocv_v;
-      const VoltagePerSoc<S> slope_v = VoltagePerSoc<S>(there.ocv_delta_v * there.per_width) * laws.read_slope(soc, under.x.data() + 1);
-      at.ocv_delta_v = ratio<Voltage<S>>(slope_v, at.per_width);
+      at.read_slope_v = VoltagePerSoc<S>(VoltagePerSoc<S>(there.ocv_delta_v * there.per_width) * laws.read_slope(soc, under.x.data() + 1));
+      at.ocv_delta_v = ratio<Voltage<S>>(at.read_slope_v, at.per_width);
     }
   }
   laws.tables(at, soc, under.drive, under.x.data() + 1);
@@ -136,9 +137,8 @@ struct ExtendedRc {
       if constexpr (Voltages > 0 && SomeLaws::reads_elsewhere) {
         std::array<Coupling<S>, Voltages> ahead{};
         laws.ahead_per_v(ahead);
-        const VoltagePerSoc<S> slope_v = at.ocv_delta_v * at.per_width;
 #pragma GCC unroll 8
-        for (std::size_t k = 0; k < Voltages; ++k) h[1 + k] = VoltagePerSoc<S>(h[1 + k] + slope_v * ahead[k]);
+        for (std::size_t k = 0; k < Voltages; ++k) h[1 + k] = VoltagePerSoc<S>(h[1 + k] + at.read_slope_v * ahead[k]);
       }
       h[states - 1] = base[1];
       if (laws.changes_reading()) {
