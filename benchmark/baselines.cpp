@@ -55,8 +55,6 @@ struct Question {
   NoiseModel noise;
 };
 
-Eigen::VectorXd untouched(const Evidence& evidence) { return Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())); }
-
 double rms(const Evidence& evidence, const Columns& error_v) { return std::sqrt(error_v.squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1))); }
 
 /// Where the first recording's rows of a column are largest.
@@ -80,7 +78,7 @@ Outcome answered(const truth::Case& c, const Question& q, Outcome said, const st
 Outcome frozen_model(const truth::Case& c) {
   const Question q(c);
   const Evidence evidence(q.cell, {}, {q.recording}, white(1));
-  const Columns error_v = evidence.raw_residual(evidence.base(), untouched(evidence));
+  const Columns error_v = evidence.raw_residual(evidence.base(), evidence.unchanged());
   const double floors = rms(evidence, error_v) / q.floor_v();
   Outcome o;
   o.verdict = floors > frozen_factor ? Verdict::unknown : Verdict::no_mismatch;
@@ -179,7 +177,7 @@ Outcome nearest_signature(const truth::Case& c) {
   const Question q(c);
   const Evidence evidence(q.cell, {}, {q.recording}, white(1));
   const Hypothesis base = evidence.base();
-  const Eigen::VectorXd u = untouched(evidence);
+  const Eigen::VectorXd u = evidence.unchanged();
   const Columns error_v = evidence.raw_residual(base, u);
   const double floors = rms(evidence, error_v) / q.floor_v();
   Outcome o;

@@ -156,7 +156,7 @@ std::vector<MechanismSetting> later_recording(const Hypothesis& extended) {
 
 std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings, const Record& record, std::vector<double>* soc) {
   const Evidence evidence(cell, settings, {record}, NoiseModel{});
-  return evidence.voltage(evidence.base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())), 0, soc);
+  return evidence.voltage(evidence.base(), evidence.unchanged(), 0, soc);
 }
 
 Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own, std::vector<Record> records, const Options& options) {
@@ -321,7 +321,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.regimes = regimes(evidence, current, unknown || !something ? remainder.energy : parts.energy);
   for (std::size_t r = 0; r < evidence.records().size(); ++r) {
     RecordView view;
-    view.base_v = evidence.voltage(evidence.base(), Eigen::VectorXd::Zero(base.calibration.size()), r);
+    view.base_v = evidence.voltage(evidence.base(), evidence.unchanged(), r);
     view.extended_v = evidence.voltage(current.hypothesis, current.calibration, r, &view.soc);
     d.views.push_back(std::move(view));
   }

@@ -140,7 +140,7 @@ std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, co
 
 void Evidence::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linear(h, u); }
 
-Fit Evidence::fit(const Hypothesis& start, int iterations) const { return fit(start, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())), iterations); }
+Fit Evidence::fit(const Hypothesis& start, int iterations) const { return fit(start, unchanged(), iterations); }
 
 Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations, double hopeless) const {
   const Unknowns unknowns(cell_, start);
@@ -152,7 +152,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
   fit.cost = cost_of(fit.hypothesis, fit.calibration, fit.residual);
   const double cost_at_start = fit.cost;
 
-  if (!nearby_) linearise(base(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())));
+  if (!nearby_) linearise(base(), unchanged());
   std::shared_ptr<const Linear> around = nearby_;
   int renewals = 0;
   constexpr int most_renewals = 6;

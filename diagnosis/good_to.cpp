@@ -12,14 +12,19 @@
 
 namespace bms::diagnosis {
 
+model::Tolerance widened(model::Tolerance t, double factor) {
+  t.ocv_v *= factor;
+  t.drift_v *= factor;
+  return t;
+}
+
 double widening(const model::CellParameters<>& cell, const std::vector<model::MechanismSetting>& mechanisms, std::vector<Record> records) {
   for (Record& r : records) examine(r, cell);
   std::vector<std::size_t> all(model::mechanism_count);
   std::iota(all.begin(), all.end(), std::size_t{0});
   const auto enough = [&](double factor) {
     model::CellParameters<> wide = cell;
-    wide.tolerance.ocv_v *= factor;
-    wide.tolerance.drift_v *= factor;
+    wide.tolerance = widened(wide.tolerance, factor);
     Evidence evidence = evidence_of(wide, mechanisms, records);
     const Fit fit = evidence.fit(evidence.base());
     const Remainder left = what_remains(evidence, fit);

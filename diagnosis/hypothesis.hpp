@@ -80,6 +80,7 @@ class Evidence {
   const std::vector<char>& usable(std::size_t record) const { return usable_[record]; }
   const Whitener& whitener(std::size_t record) const { return whiteners_[record]; }
   Hypothesis base() const;           ///< the cell as its file says
+  Eigen::VectorXd unchanged() const { return Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration_.size())); }  ///< base parameters' unknowns, as the file has them
 
   /// The same with other noise.
   void set_noise(const NoiseModel& noise);

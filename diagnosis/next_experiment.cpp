@@ -121,7 +121,7 @@ Record read_under(const Rival& truth, const Plan& plan, const model::CellParamet
 /// What a rival still misses of it, by -2 log posterior.
 double missed(const Rival& rival, const Record& seen, const model::CellParameters<>& cell, const NoiseModel& noise) {
   const Evidence evidence(cell, std::vector<MechanismSetting>(rival.hypothesis.settings.begin(), rival.hypothesis.settings.begin() + static_cast<std::ptrdiff_t>(rival.hypothesis.own)), {seen}, noise);
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size()));
+  const Eigen::VectorXd none = evidence.unchanged();
   const std::vector<Sought> sought = rival.hypothesis.sought();
   const Eigen::VectorXd apart = evidence.residual(rival.hypothesis, none);
   if (apart.squaredNorm() < decision::same) return apart.squaredNorm();  // no more than that

@@ -148,9 +148,9 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
     if (id == "entropic_ocv" && span_k < 4 && away_k < 8) return fmt::format("temperature spans {:.1f} K", span_k);
   }
   // the same recording, whatever the current: beside each other they would grow without bounds
-  const bool trusted = std::any_of(evidence.records().begin(), evidence.records().end(), [](const Record& r) { return !r.checks.empty(); });
+  const auto trusted = [&] { return std::any_of(evidence.records().begin(), evidence.records().end(), [](const Record& r) { return !r.checks.empty(); }); };
   for (const auto& [one, other] : {std::pair{"leakage", "current_offset"}, std::pair{"current_offset", "leakage"}}) {
-    if (id == one && !trusted && given.find(index_of(other)) != nullptr) return fmt::format("without a trusted ammeter it cannot be told from {}, which is there", other);
+    if (id == one && given.find(index_of(other)) != nullptr && !trusted()) return fmt::format("without a trusted ammeter it cannot be told from {}, which is there", other);
   }
   if (id == "self_heating" && needs_current(0.5)) return "the current is too small to heat the cell";
   if (id == "charge_transfer" && needs_current(0.5)) return "the current is too small to bend the overvoltage";

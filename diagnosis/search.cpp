@@ -64,7 +64,7 @@ double away_k(const Evidence& evidence) {
 }
 
 double plain_error_v(const Evidence& evidence, const Hypothesis& h) {
-  return reading_error_v(evidence, evidence.raw_residual(h, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size()))));
+  return reading_error_v(evidence, evidence.raw_residual(h, evidence.unchanged()));
 }
 
 double Search::total(const Fit& f) const {
@@ -98,8 +98,7 @@ Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
   Fit best = evidence_.fit(h, around.calibration, usual_iterations, hopeless);
-  // from where the base parameters have gone, and from the cell file, which they may have left because of what is missing
-  for (const Eigen::VectorXd& u : {around.calibration, Eigen::VectorXd(Eigen::VectorXd::Zero(around.calibration.size()))}) {
+  for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto farther = far_start(h, u);
     if (!farther) continue;
     Fit other = evidence_.fit(*farther, u, usual_iterations, hopeless);
@@ -109,6 +108,8 @@ Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {
   tell(catalogue[c.mechanism].id);
   return best;
 }
+
+std::array<Eigen::VectorXd, 2> Search::far_bases(const Fit& around) const { return {around.calibration, evidence_.unchanged()}; }
 
 std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) {
   MechanismSetting& s = h.settings.back();
@@ -144,7 +145,7 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
 }
 
 bool Search::far_better(const Fit& around, const Candidate& c) {
-  for (const Eigen::VectorXd& u : {around.calibration, Eigen::VectorXd(Eigen::VectorXd::Zero(around.calibration.size()))}) {
+  for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto far = far_start(with(around.hypothesis, c.start), u);
     if (far && evidence_.residual(*far, u).squaredNorm() < evidence_.residual(around.hypothesis, u).squaredNorm() - decision::worth_a_fit) return true;
   }

@@ -1,6 +1,7 @@
 // Fits of hypotheses against each other: one mechanism more, another in its place, one less; and what each is worth.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <optional>
@@ -58,6 +59,8 @@ class Search {
   Fit fit_with(const Fit& around, const Candidate& c, double hopeless);
   /// Where a knee of the OCV is passed, an effect on the charge is not linear: the best of some strengths far from the estimate.
   std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u);
+  /// From where: where the base parameters have gone, and the cell file, which they may have left because of what is missing.
+  std::array<Eigen::VectorXd, 2> far_bases(const Fit& around) const;
   /// Whether one is, where the screen, which is linear, sees nothing.
   bool far_better(const Fit& around, const Candidate& c);
   /// The moment of a contact's step, to the sample.

@@ -54,7 +54,7 @@ void compare(DiagnoseResult& r) {
       here.bursts.clear();
       if (&list == &r.recordings && h.bursts.size() == list.size()) here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
       const diagnosis::Evidence evidence(cell, own, {c.record}, {});
-      c.*into = evidence.voltage(here, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size())), 0);
+      c.*into = evidence.voltage(here, evidence.unchanged(), 0);
     }
   };
   const diagnosis::Hypothesis base{own, own.size(), {}};
@@ -128,8 +128,8 @@ CellFile extended_cell(const DiagnoseResult& r) {
   std::vector<diagnosis::Record> records;
   for (const Compared& c : r.recordings) records.push_back(c.record);
   if (const double factor = diagnosis::widening(cell.parameters, cell.mechanisms, std::move(records)); factor > 1) {
-    cell.parameters.tolerance.ocv_v = rounded(factor * cell.parameters.tolerance.ocv_v, 4);
-    cell.parameters.tolerance.drift_v = rounded(factor * cell.parameters.tolerance.drift_v, 4);
+    cell.parameters.tolerance = diagnosis::widened(cell.parameters.tolerance, factor);
+    for (double* v : {&cell.parameters.tolerance.ocv_v, &cell.parameters.tolerance.drift_v}) *v = rounded(*v, 4);
     cell.sources["tolerance"] += fmt::format("; of the OCV and the drift widened {:g} times, to what {} left over", factor, files);
   }
   return cell;

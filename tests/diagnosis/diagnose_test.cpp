@@ -139,8 +139,7 @@ TEST(Diagnose, AFileIsGoodToWhatItLeavesOfItsOwnRecordings) {
   const double factor = widening(test::table9(), {}, {left_over(0.012)});
   EXPECT_GT(factor, 1);
   model::CellParameters<> wide = test::table9();
-  wide.tolerance.ocv_v *= factor;
-  wide.tolerance.drift_v *= factor;
+  wide.tolerance = widened(wide.tolerance, factor);
   EXPECT_EQ(diagnose(test::table9(), {}, {left_over(0.012)}).verdict, Verdict::unknown);
   EXPECT_EQ(diagnose(wide, {}, {left_over(0.012)}).verdict, Verdict::no_mismatch);
 }

@@ -115,7 +115,7 @@ TEST(Hypothesis, DerivativesByTheBaseParametersToo) {
   for (Record& r : records) r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002}, {Check::Channel::voltage, 1'800, 2, 3.3, 3.301, 0.001}};
   const Evidence evidence(one.cell(), {}, records, NoiseModel{});
   const Hypothesis h = evidence.base();
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size()));
+  Eigen::VectorXd u = evidence.unchanged();
   const Columns exact = evidence.calibration_derivatives(h, u);
   for (Eigen::Index k = 0; k < u.size(); ++k) {
     Eigen::VectorXd more = u, less = u;

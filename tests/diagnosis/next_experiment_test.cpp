@@ -147,7 +147,7 @@ TEST(Reference, DerivativesOfChecksAreThoseOfTheSimulation) {
 TEST(Evidence, ALaterRecordingKeepsTheContactAndForgetsTheWrongStart) {
   const Record r = test::recorded(test::drive(0.5, 33), 0.7, 33);
   const Evidence evidence(test::table9(), {}, {r, r}, NoiseModel{});
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evidence.calibration().size()));
+  const Eigen::VectorXd none = evidence.unchanged();
   const std::vector<double> plain = evidence.voltage(evidence.base(), none, 1);
   EXPECT_EQ(evidence.voltage(with(evidence.base(), setting("initial_soc", {0.1})), none, 1), plain);
   const std::vector<double> contact = evidence.voltage(with(evidence.base(), setting("contact_step", {0.005, 1'000})), none, 1);
