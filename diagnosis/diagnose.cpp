@@ -94,7 +94,8 @@ Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit
       gains[m] = search.gain(less, current);
       // beside others, one that is hardly seen is none, and so are those that are larger than the error and cancel each other: of these the
       // one goes that is missed less
-      const bool counts = alone || (sizes_v.at(m) >= decision::noticeable * error_v && sizes_v.at(m) <= decision::larger_than_error * error_v);
+      const bool seen = sizes_v.at(m) >= decision::noticeable * error_v || gains[m] >= decision::noticeable_gain * search.gain(base, current);
+      const bool counts = alone || (seen && sizes_v.at(m) <= decision::larger_than_error * error_v);
       if (!counts || gains[m] < decision::detected) {
         reduced.emplace_back(gains[m], less);
         continue;

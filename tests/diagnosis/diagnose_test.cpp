@@ -131,6 +131,17 @@ TEST(Diagnose, LeakageAndAnOffsetAreNotBesideEachOther) {
   EXPECT_FALSE(not_testable(trusted, leaking, offset).has_value()) << "a trusted ammeter tells them apart";
 }
 
+/// A late channel is seen at the edges alone: hardly any of the mean square, and beyond doubt.
+TEST(Diagnose, WhatIsSeenAtMomentsStandsBesideWhatIsLargeThroughout) {
+  std::vector<double> gentle = test::drive(2, 34);
+  for (double& a : gentle) a *= 0.1;
+  Record r = test::recorded(gentle, 0.7, 34);
+  for (std::size_t k = r.size() - 1; k > 0; --k) r.voltage_v[k] = r.voltage_v[k - 1] + 0.06;
+  const Diagnosis d = diagnose(test::table9(), {}, {r});
+  EXPECT_EQ(d.findings.size(), 2U);
+  EXPECT_THAT(ids_of(d), Contains("channel_skew"));
+}
+
 TEST(Diagnose, AFileIsGoodToWhatItLeavesOfItsOwnRecordings) {
   const auto left_over = [](double v) {
     return test::recorded(test::drive(2, 33), 0.7, 33, [v](std::size_t k, double, double) { return v * std::sin(2 * 3.14159265 * static_cast<double>(k) / 1'234); });
