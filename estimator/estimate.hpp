@@ -20,6 +20,8 @@ enum Flag : std::uint32_t {
   time_gap = 1U << 5,             ///< more than ten times the usual step: charge in between is uncertain
   time_not_later = 1U << 6,       ///< the sample was ignored
   not_started = 1U << 8,          ///< no usable voltage yet and no starting point
+  soc_unsettled = 1U << 9,        ///< more than one state of charge fits the voltages so far; soc_sigma spans them
+  voltage_disbelieved = 1U << 10, ///< far from all that the model can explain: not used; when it lasts, soc is sought anew
 };
 
 template <class S>

@@ -9,7 +9,10 @@
 // fixed point; compile with -ffp-contract=off).
 //
 // Voltage noise: a reading's own noise is new in every sample, the model's error is not. One that lasts for T seconds counts once
-// per T: at a step dt its variance is taken T / dt times.
+// per T: at a step dt its variance is taken T / dt times. It is larger where the OCV is steep (the soc axis of its table is good to
+// tolerance.initial_soc) and under current (R0 and R1 are good to tolerance.resistance_fraction).
+//
+// While soc is not known to 3 %, a bank of hypotheses keeps it (soc_bank.hpp): a line through the OCV curve would be sure of one.
 //
 // Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost in instructions: estimator/README.md.
 #pragma once
@@ -22,6 +25,7 @@
 #include "estimator/estimate.hpp"
 #include "estimator/input_check.hpp"
 #include "estimator/sample.hpp"
+#include "estimator/soc_bank.hpp"
 #include "estimator/start.hpp"
 #include "estimator/ud_covariance.hpp"
 #include "model/extended_rc.hpp"
@@ -61,6 +65,7 @@ class SocEstimator {
     time_us_ = sample.time_us;
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
     if (step_us != paced_us_) change_pace(cell, step_us, estimate.flags);
+    if (sample.temperature_cdegc >> 8 != heeded_) [[unlikely]] heed_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
     const Drive drive{laws.true_current(model::from_micro<Current>(current.ua)), duration_s_, temperature(laws, sample)};
     count_charge(cell, counted_ua(laws, drive, current.ua), step_us);
@@ -78,7 +83,7 @@ class SocEstimator {
     estimate.voltage_predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
     if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * drive.current_a), cell.plausible, estimate.flags)) {
       const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - estimate.voltage_predicted_v;
-      correct(cell, at, drive, soc, innovation_v);
+      correct(cell, at, drive, soc, innovation_v, estimate.flags);
     }
     complete(cell, estimate);
     return estimate;
@@ -94,10 +99,12 @@ class SocEstimator {
   using Variance = model::Variance<S>;
   using Fraction = model::Fraction<S>;
   using TimeStep = model::TimeStep<S>;
+  using Count = model::Count<S>;
+  using Coupling = model::Coupling<S>;
 
   static constexpr std::uint32_t longest_step_us = 4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
   static constexpr std::uint32_t longest_count_us = 2'000'000'000U;
-  static constexpr std::int16_t coldest_cdegc = -6'000, warmest_cdegc = 15'000;
+  static constexpr std::int16_t coldest_cdegc = -6'000, warmest_cdegc = 15'000, reference_cdegc = 2'500;
   static constexpr int longest_gap_counts = 1'000;                   // 23 days; nothing is known after that
 
   /// Current that ends as charge. Without a law that makes another of it, the reading itself.
@@ -135,10 +142,28 @@ class SocEstimator {
     duration_s_ = seconds(capped_us);
     const model::FilterNoise<S>& n = cell.noise;
     const auto shared_by = model::ratio<model::Count<S>>(n.model_correlation_s, duration_s_);
-    voltage_noise_ = n.voltage_v2 + (shared_by > model::Count<S>(1) ? model::product<Variance>(n.model_v2, shared_by) : n.model_v2);
+    shared_by_ = shared_by > model::Count<S>(1) ? shared_by : model::Count<S>(1);
+    share_resistance_error();
+    const auto most = Fraction(1.9);
+    bank_share_ = shared_by > model::Count<S>(SocBank<S>::points) ? model::ratio<Fraction>(model::Count<S>(2 * SocBank<S>::points), shared_by) : most;
     const Soc white = over_step(n.white_soc_per_s);
     soc_noise_ = Variance(white * white) + model::product<Variance>(n.walk_soc2_per_s, duration_s_);
   }
+
+  /// Every 2.56 K anew: in the cold, resistances are larger than a file says that does not follow the temperature, by some 40 kJ/mol
+  /// (lithium iron phosphate, 30 to 60); by so much they are doubted.
+  template <class Cell>
+  [[gnu::noinline]] constexpr void heed_temperature(const Cell& cell, std::int16_t cdegc) {
+    heeded_ = static_cast<std::int16_t>(cdegc >> 8);
+    resistance_error_ = Coupling(cell.noise.resistance_error);
+    if (cdegc >= coldest_cdegc && cdegc < reference_cdegc && !laws_of(cell).resistances_follow_temperature()) {
+      constexpr double usual = model::mechanism_detail::energy_over_rt(40'000.0, 25.0);
+      const auto factor = model::mechanism_detail::arrhenius<S>(model::Factor<S>(usual), model::Temperature<S>(25), model::from_centi<model::Temperature<S>>(cdegc));
+      resistance_error_ = Coupling(resistance_error_ + Coupling(factor - model::Factor<S>(1)));
+    }
+    share_resistance_error();
+  }
+  constexpr void share_resistance_error() { resistance_noise_ = model::product<Coupling>(Coupling(resistance_error_ * resistance_error_), shared_by_); }
 
   /// What adds up to by the end of the step, 1 at most.
   constexpr Soc over_step(const Soc& per_s) const {
@@ -167,44 +192,103 @@ class SocEstimator {
     return Variance(d * d) + Variance((sigma + sigma) * d);
   }
 
-  static constexpr double wide_soc = 0.03;
+  static constexpr double impossible = 8;                     // standard deviations; a cell that was emptied fast shows five of them for minutes
+  static constexpr double least_error_v = 0.01;               // of any model, whatever its file says
+  static constexpr std::uint32_t impossible_us = 600'000'000; // of it before soc is sought anew: near empty a cell needs minutes to recover
+  static constexpr std::uint32_t calm_us = 60'000'000;        // without it, and it is forgotten
+
   using Correction = std::array<Voltage, states>;
   using At = model::TablePoint<S>;
 
   template <class Cell>
-  constexpr void correct(const Cell& cell, const At& at, const Drive& drive, const Soc& soc, const Voltage& innovation_v) {
-    const bool wide = state_.covariance.last_variance() > Variance(wide_soc * wide_soc);
-    const Correction correction = wide ? over_edges(cell, drive.current_a, drive.temperature_c, soc, innovation_v)
-                                       : state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), voltage_noise_, innovation_v);
+  constexpr void correct(const Cell& cell, const At& at, const Drive& drive, const Soc& soc, const Voltage& innovation_v, std::uint32_t& flags) {
+    const Voltage drop_v = Voltage(at.r0_ohm * drive.current_a) + Voltage(at.r1_ohm * drive.current_a);
+    const Variance drop_v2 = drop_v * drop_v;
+    if (bank_.open()) [[unlikely]] {
+      flags |= soc_unsettled;
+      return ask_bank(cell, drive.current_a, drive.temperature_c, soc, innovation_v);
+    }
+    if (model::magnitude(innovation_v) > Voltage(impossible * least_error_v)) [[unlikely]] {
+      if (wonder(cell, drive.current_a, drive.temperature_c, soc, innovation_v)) {
+        flags |= voltage_disbelieved;
+        return;
+      }
+    }
+    const Variance model_v2 = Variance(model::product<Variance>(at.error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
+    const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
+    const Correction correction = state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), noise_v2, innovation_v);
 #pragma GCC unroll 8
     for (std::size_t i = 0; i + 1 < states; ++i) state_.polarisation[i] += correction[i];
     state_.charge.correct(correction[states - 1], cell.charge);
   }
 
-  /// The slope at one point says little about a curve with knees while soc is not known better than this (one sigma): a correction
-  /// would be as sure of itself as the curve is steep there, where beside it the curve is flat. So the line is laid through the
-  /// voltages at soc and at sqrt(3) sigma to either side, and what the curve deviates from it counts as noise (statistical
-  /// linearisation: A. Gelb, Applied Optimal Estimation, 1974, 6.2; with the points of S. Julier, J. Uhlmann and H. Durrant-Whyte, 2000).
-  /// Arguments by value: one passed by address would be kept in memory in every step.
+  /// An innovation that the model's error and soc's own sigma do not explain, for ten minutes, is soc's: it is sought anew. True: it is.
   template <class Cell>
-  [[gnu::noinline]] constexpr Correction over_edges(const Cell& cell, Current current_a, model::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
-    const auto& laws = laws_of(cell);
+  [[gnu::noinline]] constexpr bool wonder(const Cell& cell, Current current_a, model::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
     const Drive drive{current_a, duration_s_, temperature_c};
     std::uint8_t interval = interval_;
-    const auto tables_at = [&](const Soc& there) { return look_up(model::CellUnder{cell, drive, state_.polarisation}, there, interval); };
-    const At at = tables_at(soc);
-    const Variance variance = state_.covariance.last_variance();
-    Soc reach = model::product<Soc>(model::root<Soc>(variance), Fraction(1.7320508));
-    const auto most = Soc(0.5), least = Soc(0.002);
-    reach = reach > most ? most : reach < least ? least : reach;
-    const auto voltage_at = [&](const Soc& there) { return Voltage(Model::voltage(laws, state_.polarisation, tables_at(there), drive)); };
-    const Voltage middle_v = Model::voltage(laws, state_.polarisation, at, drive);
-    const Voltage above_v = voltage_at(Soc(soc + reach)) - middle_v, below_v = voltage_at(Soc(soc - reach)) - middle_v;
-    auto h = Model::sensitivity(laws, at, drive);
-    h[states - 1] = model::ratio<model::VoltagePerSoc<S>>(Voltage(above_v - below_v), Soc(reach + reach));
-    const Voltage bend_v = above_v + below_v;  // weights 1/6, 2/3, 1/6: mean bend / 6, variance about the line bend^2 / 18
-    const Variance noise_v2 = Variance(voltage_noise_ + model::product<Variance>(Variance(bend_v * bend_v), Fraction(1.0 / 18)));
-    return state_.covariance.observe(h, noise_v2, Voltage(innovation_v - model::product<Voltage>(bend_v, Fraction(1.0 / 6))));
+    const At at = look_up(model::CellUnder{cell, drive, state_.polarisation}, soc, interval);
+    const auto h = Model::sensitivity(laws_of(cell), at, drive);
+    const Variance of_soc_v2 = model::product<Variance>(model::product<Variance>(state_.covariance.last_variance(), h[states - 1]), h[states - 1]);
+    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) + Variance(lasting_v2(cell) + doubt_v2(at, current_a)));
+    const Variance all_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
+    if (!(Variance(innovation_v * innovation_v) > Variance(all_v2 * Count(impossible * impossible)))) return false;
+    if (time_us_ - wondered_us_ > calm_us + paced_us_) wondering_us_ = 0;
+    wondered_us_ = time_us_;
+    wondering_us_ += paced_us_ < calm_us ? static_cast<std::uint32_t>(paced_us_) : calm_us;
+    if (wondering_us_ < impossible_us) return true;  // one bad reading is not believed
+    wondering_us_ = 0;
+    const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points)), variance = state_.covariance.last_variance();
+    search(cell, {soc, variance < finest ? finest : variance});
+    return true;
+  }
+
+  /// Opens the bank around a belief that may be mistaken.
+  template <class Cell>
+  constexpr void search(const Cell& cell, const SocBelief<S>& before) {
+    const StartMisfit<S, Cell> misfit{cell, nullptr, Variance{}, &before};
+    std::uint8_t interval = 0;
+    bank_.open_at(before.soc, lasting_v2(cell), [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
+  }
+
+  /// Of the resistances' error.
+  constexpr Variance doubt_v2(const At& at, const Current& current_a) const {
+    const Voltage drop_v = Voltage(at.r0_ohm * current_a) + Voltage(at.r1_ohm * current_a), doubt_v = model::product<Voltage>(drop_v, resistance_error_);
+    return doubt_v * doubt_v;
+  }
+
+  /// Of an error that lasts while the bank is open: the model's, and of the states that are not corrected then.
+  template <class Cell>
+  constexpr Variance lasting_v2(const Cell& cell) const {
+    Variance sum = cell.noise.model_v2;
+    const auto states_v2 = state_.covariance.variances();
+    for (std::size_t k = 0; k + 1 < states; ++k) sum = Variance(sum + states_v2[k]);
+    return sum;
+  }
+
+  /// While it is open, soc is the bank's; the other states go on as predicted.
+  /// Arguments by value: one passed by address would be kept in memory in every step.
+  template <class Cell>
+  [[gnu::noinline]] constexpr void ask_bank(const Cell& cell, Current current_a, model::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
+    const Drive drive{current_a, duration_s_, temperature_c};
+    const auto& laws = laws_of(cell);
+    std::uint8_t interval = interval_;
+    const model::CellUnder under{cell, drive, state_.polarisation};
+    const At middle = look_up(under, soc, interval);
+    const Voltage expected_v = Model::voltage(laws, state_.polarisation, middle, drive);
+    // of an error that lasts, a quarter comes and goes
+    const Variance new_v2 = Variance(Variance(cell.noise.model_v2 * Fraction(1.0 / 16)) + doubt_v2(middle, current_a));
+    const auto seen = [&](const Soc& there) -> typename SocBank<S>::Seen {
+      const At at = look_up(under, there, interval);
+      return {.off_v = Voltage(innovation_v + (expected_v - Model::voltage(laws, state_.polarisation, at, drive))),
+              .half_v = Voltage(model::VoltagePerSoc<S>(at.ocv_delta_v * at.per_width) * Fraction(0.5 / SocBank<S>::points)),
+              .new_v2 = Variance(new_v2 + Variance(at.error_v2 - cell.noise.model_v2))};
+    };
+    const auto news = bank_.step(soc, bank_share_, cell.noise.voltage_v2, lasting_v2(cell), seen);
+    if (!news.any) return;
+    state_.charge.correct(news.moved, cell.charge);
+    state_.covariance.set_last(news.variance);
+    if (news.variance < Variance(SocBank<S>::narrow_soc * SocBank<S>::narrow_soc)) bank_.close();
   }
 
   template <class Cell>
@@ -258,7 +342,7 @@ class SocEstimator {
     Model::start(laws, state_.polarisation, variances, at, drive, cell.noise.v_rc_v2);
     // a belief finer than the points of the grid needs no help from a voltage
     const auto finest = Soc(2.0 / start_points);
-    if (voltage && (!has_start_ || believed_sigma > finest)) {
+    if (!has_start_ || believed_sigma > finest) {
       const Voltage load_v = half_v + Model::sum_v(state_.polarisation) + at.r0_ohm * drive.current_a;
       Variance reading_v2 = cell.noise.rest_v2 + half_v2;
       for (std::size_t k = 1; k + 1 < states; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
@@ -266,8 +350,15 @@ class SocEstimator {
         const Voltage unknown_v = Voltage(at.r0_ohm * cell.noise.unknown_a) + Voltage(at.r1_ohm * cell.noise.unknown_a);
         reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
       }
-      const Voltage terminal_v = Model::true_voltage(laws, model::from_micro<Voltage>(sample.voltage_uv));
-      belief = soc_from_ocv<S>(under, Voltage(terminal_v - load_v), reading_v2, has_start_ ? &belief : nullptr);
+      const Voltage ocv_v = voltage ? Voltage(Model::true_voltage(laws, model::from_micro<Voltage>(sample.voltage_uv)) - load_v) : Voltage(0);
+      const SocBelief<S> before = belief;
+      const StartMisfit<S, decltype(under)> misfit{under, voltage ? &ocv_v : nullptr, reading_v2, has_start_ ? &before : nullptr};
+      if (voltage) belief = soc_from(misfit);
+      if (belief.variance > Variance(SocBank<S>::wide_soc * SocBank<S>::wide_soc)) {
+        std::uint8_t interval = 0;
+        state_.covariance.set_diagonal(variances);  // what the bank is told of the other states
+        bank_.open_at(belief.soc, lasting_v2(cell), [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
+      }
       at = look_up(under, belief.soc, interval_);
     }
     state_.charge.set(belief.soc, cell.charge);
@@ -287,10 +378,17 @@ class SocEstimator {
   InputCheck<S> check_;
   std::uint64_t time_us_ = 0;
   std::uint64_t paced_us_ = 0;
+  std::uint64_t wondered_us_ = 0;
+  std::uint32_t wondering_us_ = 0;
   std::uint8_t interval_ = 0;
   std::int16_t temperature_cdegc_ = 2'500;
   TimeStep duration_s_{};
-  Variance voltage_noise_{}, soc_noise_{};
+  Variance soc_noise_{};
+  Count shared_by_{1};
+  Coupling resistance_error_{}, resistance_noise_{};  ///< of R0 + R1; and as it counts in the noise of a step
+  std::int16_t heeded_ = 0x7FFF;  ///< no temperature's
+  Fraction bank_share_{};
+  SocBank<S> bank_;
   StartingPoint from_;
   bool has_start_ = false, started_ = false;
 };

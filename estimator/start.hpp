@@ -22,28 +22,44 @@ struct SocBelief {
 
 inline constexpr int start_points = 256;
 
-/// ocv_v: the reading; variance_v2: of it. before: nullptr, or a belief with a deviation of at least two points' spacing.
+/// What speaks against a soc: a reading of the OCV, a belief, or both. All >= 0.
 template <class S, class Cell>
-constexpr SocBelief<S> soc_from_ocv(const Cell& cell, const model::Voltage<S>& ocv_v, const model::Variance<S>& variance_v2, const SocBelief<S>* before = nullptr) {
-  using namespace model;
-  constexpr int points = start_points;
-  const Fraction<S> spacing(1.0 / points);
-  const auto point = [&](int k) { return Soc<S>(Current<S>(2 * k + 1) * Fraction<S>(0.5 / points)); };
-  // misfit of the best point is taken off all of them, so that a voltage outside the curve still has weights
-  std::uint8_t interval = 0;
-  const auto misfit = [&](int k) {
-    const auto at = look_up(cell, point(k), interval);
-    const Voltage<S> off_v = ocv_v - at.ocv_v;
-    // half a point's width on the curve counts as uncertainty too: steep parts have few points
-    const Voltage<S> half_width_v = VoltagePerSoc<S>(at.ocv_delta_v * at.per_width) * Fraction<S>(0.5 / points);
-    const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
-    const auto of_voltage = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
-    if (before == nullptr) return of_voltage;
-    const Soc<S> off = point(k) - before->soc;
+struct StartMisfit {
+  const Cell& cell;
+  const model::Voltage<S>* ocv_v;        ///< the reading; nullptr: none
+  model::Variance<S> variance_v2;        ///< of it
+  const SocBelief<S>* before;            ///< nullptr: none; else with a deviation of at least two points' spacing
+
+  /// half_step: half the spacing of the points that it is asked for.
+  constexpr model::Exponent<S> operator()(const model::Soc<S>& soc, const model::Fraction<S>& half_step, std::uint8_t& interval) const {
+    using namespace model;
+    Exponent<S> misfit(0);
+    if (ocv_v != nullptr) {
+      const auto at = look_up(cell, soc, interval);
+      const Voltage<S> off_v = *ocv_v - at.ocv_v;
+      // half a point's width on the curve counts as uncertainty too: steep parts have few points
+      const Voltage<S> half_width_v = product<Voltage<S>>(VoltagePerSoc<S>(at.ocv_delta_v * at.per_width), half_step);
+      const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
+      misfit = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
+    }
+    if (before == nullptr) return misfit;
+    const Soc<S> off = soc - before->soc;
     const auto of_belief = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
     const Exponent<S> mistaken(8);  // one belief in 3,000 is wrong altogether: a voltage that speaks clearly against it wins
-    return Exponent<S>(of_voltage + (of_belief < mistaken ? of_belief : mistaken));
-  };
+    return Exponent<S>(misfit + (of_belief < mistaken ? of_belief : mistaken));
+  }
+};
+
+/// Mean and variance of soc.
+template <class S, class Cell>
+constexpr SocBelief<S> soc_from(const StartMisfit<S, Cell>& speaks_against) {
+  using namespace model;
+  constexpr int points = start_points;
+  const Fraction<S> spacing(1.0 / points), half_step(0.5 / points);
+  const auto point = [&](int k) { return Soc<S>(Current<S>(2 * k + 1) * half_step); };
+  std::uint8_t interval = 0;
+  const auto misfit = [&](int k) { return speaks_against(point(k), half_step, interval); };
+  // misfit of the best point is taken off all of them, so that a voltage outside the curve still has weights
   Exponent<S> least = misfit(0);
   for (int k = 1; k < points; ++k) {
     const Exponent<S> m = misfit(k);

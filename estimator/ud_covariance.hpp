@@ -34,6 +34,15 @@ class UdCovariance {
     u_ = {};
   }
 
+  /// D: what each state's variance is beside the later ones, the last one's all of it.
+  constexpr const Variances& variances() const { return d_; }
+
+  /// The last state is known anew, from elsewhere: that well, and from none of the others.
+  constexpr void set_last(const Variance& variance) {
+    d_[N - 1] = variance;
+    for (std::size_t i = 0; i + 1 < N; ++i) u(i, N - 1) = Coupling{};
+  }
+
   constexpr const Variance& last_variance() const { return d_[N - 1]; }
 
   constexpr void propagate(const Matrix& f, const Variances& q) {

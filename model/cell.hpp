@@ -12,6 +12,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 
@@ -29,6 +30,7 @@ struct Interval {
   Resistance<S> r0_ohm{}, r0_delta_ohm{};
   Resistance<S> r1_ohm{}, r1_delta_ohm{};
   Capacitance<S> c1_f{}, c1_delta_f{};
+  Variance<S> error_v2{};  ///< of the voltage there, lasting: noise.model_v, and the slope times what the soc axis is good to (tolerance.initial_soc)
 };
 
 /// Charge is counted in microampere-microseconds [1e-12 A s], in 64-bit integers, and read in counts of 2^shift of them: fine
@@ -47,8 +49,9 @@ struct ChargeScale {
 template <class S>
 struct FilterNoise {
   Variance<S> voltage_v2{};             ///< white, per sample
-  Variance<S> model_v2{};               ///< lasting
-  Duration<S> model_correlation_s{};
+  Variance<S> model_v2{};               ///< of all that Interval::error_v2 holds, what is the same everywhere
+  Duration<S> model_correlation_s{};    ///< how long Interval::error_v2 and the resistances' error last
+  Fraction<S> resistance_error{};       ///< of R0 + R1
   Variance<S> v_rc_v2{};                ///< in the steady state
   Variance<S> rest_v2{};
   Soc<S> white_soc_per_s{};             ///< current_a over the capacity
@@ -83,6 +86,7 @@ struct TablePoint {
   Resistance<S> r0_ohm, r0_delta_ohm;
   Resistance<S> r1_ohm, r1_delta_ohm;
   Capacitance<S> c1_f, c1_delta_f;
+  Variance<S> error_v2{};
   Factor<S> activation{1};  ///< by how much resistances that the tables do not hold differ with the temperature
   VoltagePerSoc<S> read_slope_v{0};  ///< of the OCV, by the soc at which laws read it elsewhere
 };
@@ -116,6 +120,12 @@ constexpr Real rc_value(const RcTable<Real>& rc, const Column<Real, Max>& column
 }
 
 template <class Real>
+constexpr double plain(const Real& x) {
+  if constexpr (std::floating_point<Real>) return x;
+  else return x.a;  // a dual number
+}
+
+template <class Real>
 constexpr std::size_t ocv_piece(const OcvTable<Real>& ocv, double soc) {
   std::size_t k = 0;
   while (k + 2 < ocv.soc.size && soc >= ocv.soc[k + 1]) ++k;
@@ -129,6 +139,9 @@ template <class Real>
 constexpr std::size_t interval_count(const CellParameters<Real>& p) {
   return cell_detail::merged_edges(p).size + 1;
 }
+
+/// A voltage that is known no better says nothing; held for fixed point.
+inline constexpr double largest_error_v2 = 0.04;
 
 inline constexpr std::size_t max_intervals = max_ocv_edges + max_rc_nodes + 3;
 
@@ -156,6 +169,8 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
     line(p.rc.r0_ohm, i.r0_ohm, i.r0_delta_ohm);
     line(p.rc.r1_ohm, i.r1_ohm, i.r1_delta_ohm);
     line(p.rc.c1_f, i.c1_f, i.c1_delta_f);
+    const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc, error_v2 = p.noise.model_v * p.noise.model_v + axis_v * axis_v;
+    i.error_v2 = Variance<S>(error_v2 < largest_error_v2 ? error_v2 : largest_error_v2);
     ++cell.size;
   };
   // outside, a width of 1/8 stands for "from there on": t goes on beyond 0 and 1
@@ -182,6 +197,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.voltage_v2 = Variance<S>(square(n.voltage_v));
   cell.noise.model_v2 = Variance<S>(square(n.model_v));
   cell.noise.model_correlation_s = Duration<S>(n.model_correlation_s);
+  cell.noise.resistance_error = Fraction<S>(p.tolerance.resistance_fraction);
   cell.noise.v_rc_v2 = Variance<S>(square(n.v_rc_v));
   cell.noise.rest_v2 = Variance<S>(square(n.rest_v));
   cell.noise.white_soc_per_s = Soc<S>(n.current_a / capacity_as);
@@ -222,7 +238,8 @@ constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std
           .r1_ohm = i.r1_ohm + t * i.r1_delta_ohm,
           .r1_delta_ohm = i.r1_delta_ohm,
           .c1_f = i.c1_f + t * i.c1_delta_f,
-          .c1_delta_f = i.c1_delta_f};
+          .c1_delta_f = i.c1_delta_f,
+          .error_v2 = i.error_v2};
 }
 
 template <class S, std::size_t Max>

@@ -73,8 +73,8 @@ struct Noise {
 /// What the calibration is good for: a difference inside it is not a mismatch.
 struct Tolerance {
   double ocv_v = 0;
-  double resistance_fraction = 0;
-  double initial_soc = 0;
+  double resistance_fraction = 0;  ///< of R0 and R1; the estimator believes a voltage under current as much less
+  double initial_soc = 0;          ///< of the tables' soc axis; where the OCV is steep, the estimator believes a voltage as much less
   double drift_v = 0;
 };
 

@@ -137,6 +137,12 @@ class LawSet {
     each([&](const auto& law) { any = any || requires(Current<S> a) { law.true_current(a); } || requires(Current<S> a, Drive<S> d) { law.counted(a, d); }; });
     return any;
   }
+  /// Else the resistances are those of the cell file's temperature, whatever it is.
+  constexpr bool resistances_follow_temperature() const {
+    bool any = false;
+    each([&](const auto& law) { any = any || requires { law.resistances_follow_temperature; }; });
+    return any;
+  }
   constexpr bool changes_reading() const {
     bool any = false;
     each([&](const auto& law) { any = any || requires(Voltage<S> v) { law.reading(v); }; });

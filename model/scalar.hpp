@@ -116,6 +116,13 @@ constexpr R from_micro(std::int32_t micro) {
   }
 }
 
+/// Without its sign.
+template <class T>
+constexpr T magnitude(const T& x) {
+  if constexpr (std::same_as<T, float>) return __builtin_fabsf(x);
+  else return x < T(0) ? T(-x) : x;
+}
+
 /// Hundredths, e.g. of a degree.
 template <class R>
 constexpr R from_centi(std::int16_t centi) {

@@ -25,6 +25,7 @@ struct TemperatureResistance {
 
   template <class S>
   struct Law {
+    static constexpr bool resistances_follow_temperature = true;
     Factor<S> r0_energy, r1_energy;  ///< over R T_ref
     Temperature<S> reference_c;
     Fraction<S> share;

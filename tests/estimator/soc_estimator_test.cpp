@@ -106,6 +106,34 @@ TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
   }
 }
 
+/// 20 %, told for certain, where it is 98 %: the voltage is 150 mV too high for ever. After ten minutes that is asked about.
+TEST(SocEstimator, ACertaintyThatCannotBeIsGivenUp) {
+  const auto cell = table9<double>();
+  const auto at = model::look_up(cell, 0.98);
+  SocEstimator<double> estimator(StartingPoint{200'000'000, 2'000'000});
+  estimator.step(cell, {0, 0, no_reading, 2'500});
+  Estimate<double> e;
+  std::uint32_t flags = 0;
+  for (std::uint64_t s = 1; s <= 1'800; ++s) {
+    e = estimator.step(cell, {s * 1'000'000, 0, static_cast<std::int32_t>(1e6 * at.ocv_v), 2'500});
+    flags |= e.flags;
+  }
+  EXPECT_EQ(flags, voltage_disbelieved | soc_unsettled);
+  EXPECT_NEAR(e.soc, 0.98, 0.02);
+  EXPECT_LE(std::abs(e.soc - 0.98), 2 * e.soc_sigma);
+}
+
+TEST(SocEstimator, OneReadingThatCannotBeIsFlaggedAndMovesNothing) {
+  auto samples = work(1'000);
+  const SocEstimator<float> estimator(StartingPoint{800'000'000, 5'000'000});
+  const auto without = run<float>(samples, estimator);
+  samples[500].voltage_uv += 300'000;
+  const auto with = run<float>(samples, estimator);
+  EXPECT_EQ(with[500].flags, voltage_disbelieved);
+  EXPECT_EQ(with[501].flags, 0U);
+  EXPECT_NEAR(with[501].soc, without[501].soc, 1e-4);
+}
+
 TEST(SocEstimator, SigmaGoesOnGrowingOverAGapOfHours) {
   const auto cell = table9<float>();
   double before = 0;

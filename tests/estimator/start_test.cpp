@@ -14,10 +14,16 @@ class StartOfEveryScalar : public ::testing::Test {};
 using Scalars = ::testing::Types<float, double, model::FixedPoint>;
 TYPED_TEST_SUITE(StartOfEveryScalar, Scalars);
 
+template <class Cell, class V>
+auto read(const Cell& cell, const V& ocv_v, double sigma_v) {
+  using S = typename Cell::Scalar;
+  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, model::Variance<S>(sigma_v * sigma_v), nullptr});
+}
+
 template <class S>
 std::pair<double, double> start(double voltage_v, double sigma_v) {
   const auto cell = model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
-  const auto belief = soc_from_ocv<S>(cell, model::Voltage<S>(voltage_v), model::Variance<S>(sigma_v * sigma_v));
+  const auto belief = read(cell, model::Voltage<S>(voltage_v), sigma_v);
   return {model::as_double(belief.soc), std::sqrt(model::as_double(belief.variance))};
 }
 

@@ -23,6 +23,7 @@
 #include "host_sim/study.hpp"
 #include "host_sim/text_file.hpp"
 #include "identification/identify.hpp"
+#include "tests/figures/soc_trials.hpp"
 #include "tests/firmware/step_cost.hpp"
 
 namespace bms {
@@ -227,8 +228,12 @@ void run() {
   const auto estimator = source / "estimator/README.md";
   write_board();
   replace_figures(estimator, "shift", shift_accuracy());
-  if (std::filesystem::exists(data)) replace_figures(estimator, "real", real_accuracy());
-  else fmt::print(stderr, "{} is not there: the figures of real recordings stay\n", data.string());
+  if (std::filesystem::exists(data)) {
+    replace_figures(estimator, "real", real_accuracy());
+    replace_figures(estimator, "trials", soc_trials(data));
+  } else {
+    fmt::print(stderr, "{} is not there: the figures of real recordings stay\n", data.string());
+  }
   replace_figures(source / "host_sim/README.md", "speed", speed());
   if (std::filesystem::exists(data)) replace_figures(source / "identification/README.md", "real", real_identification());
   replace_figures(source / "identification/README.md", "speed", identification_speed());

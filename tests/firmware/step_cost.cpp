@@ -36,7 +36,7 @@ Footprint footprint(const std::filesystem::path& application_image) {
   const auto symbols = symbols_of(application_image);
   const ImageSize size = size_of(application_image);
   Footprint f;
-  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|soc_from_ocv<|model::|UdCovariance<|InputCheck).*");
+  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|soc_from<|SocBank<|StartMisfit<|model::|UdCovariance<|InputCheck).*");
   for (const Symbol& s : symbols) {
     if (s.name.starts_with("bms::generated::cell<")) f.cell_tables += s.size;
     else if (std::regex_match(s.name, of_estimator)) f.estimator_text += s.size;

@@ -1,0 +1,91 @@
+#include "estimator/soc_bank.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace bms {
+namespace {
+
+template <class Scalar>
+class SocBankOfEveryScalar : public ::testing::Test {};
+using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+TYPED_TEST_SUITE(SocBankOfEveryScalar, Scalars);
+
+/// A curve that is flat but for a knee: 3.2 V, from 0.6 to 0.7 up to 3.3 V.
+double curve_v(double soc) { return 3.2 + 0.02 * soc + (soc < 0.6 ? 0 : soc > 0.7 ? 0.1 : soc - 0.6); }
+
+template <class S>
+struct Asked {
+  SocBank<S> bank;
+  double soc = 0.5, variance = 1, off_v = 0;
+
+  /// One sample of a cell that truly has that soc; all have moved by moved.
+  void sample(double truth, double moved, double share, double sigma_v) {
+    soc += moved;
+    const auto seen = [&](const model::Soc<S>& there) -> typename SocBank<S>::Seen {
+      const double at = model::as_double(there), half_v = std::abs(curve_v(at + 0.5 / 64) - curve_v(at - 0.5 / 64)) / 2;
+      return {model::Voltage<S>(curve_v(truth) + off_v - curve_v(at)), model::Voltage<S>(half_v), model::Variance<S>(sigma_v * sigma_v / 16)};
+    };
+    const auto news = bank.step(model::Soc<S>(soc), model::Fraction<S>(share), model::Variance<S>(1e-6), model::Variance<S>(sigma_v * sigma_v), seen);
+    if (!news.any) return;
+    soc += model::as_double(news.moved);
+    variance = model::as_double(news.variance);
+  }
+};
+
+template <class S>
+Asked<S> asked(double sigma_v) {
+  Asked<S> a;
+  a.bank.open_at(model::Soc<S>(0.5), model::Variance<S>(sigma_v * sigma_v), [](const model::Soc<S>&) { return model::Exponent<S>(0); });
+  return a;
+}
+
+TYPED_TEST(SocBankOfEveryScalar, KnowsNothingAtFirst) {
+  auto a = asked<TypeParam>(0.01);
+  for (int k = 0; k < 128; ++k) a.sample(0.3, 0, 0, 0.01);
+  EXPECT_NEAR(a.soc, 0.5, 0.01);
+  EXPECT_NEAR(a.variance, 1.0 / 12, 0.002);
+}
+
+TYPED_TEST(SocBankOfEveryScalar, OnAPlateauItIsAsWideAsThePlateau) {
+  auto a = asked<TypeParam>(0.01);
+  for (int k = 0; k < 128 * 40; ++k) a.sample(0.3, 0, 0.2, 0.01);
+  EXPECT_NEAR(a.soc, 0.31, 0.05) << "0 to 0.6 and a little";
+  EXPECT_NEAR(std::sqrt(a.variance), 0.6 / std::sqrt(12.0), 0.03);
+}
+
+TYPED_TEST(SocBankOfEveryScalar, AKneeThatIsPassedTellsWhichHypothesisWasRight) {
+  auto a = asked<TypeParam>(0.01);
+  double truth = 0.85;
+  for (int k = 0; k < 128 * 40; ++k, truth -= 0.3 / (128 * 40)) a.sample(truth, -0.3 / (128 * 40), 0.2, 0.01);
+  EXPECT_NEAR(a.soc, truth, 0.015);
+  EXPECT_LT(std::sqrt(a.variance), 0.015);
+}
+
+TYPED_TEST(SocBankOfEveryScalar, OneBadReadingDoesNotRuleTheTruthOut) {
+  auto a = asked<TypeParam>(0.01);
+  for (int k = 0; k < 128 * 40; ++k) {
+    const bool at_the_truth = k == 128 * 3 + 45;  // 0.71
+    a.off_v = at_the_truth ? 0.5 : 0;
+    a.sample(0.72, 0, 0.2, 0.01);
+  }
+  EXPECT_NEAR(a.soc, 0.85, 0.08) << "above the knee, wherever";
+  EXPECT_NEAR(std::sqrt(a.variance), 0.09, 0.02);
+}
+
+/// 1.5 deviations too much for 20 correlation times, on the lower plateau and over the knee: no certainty of the upper one.
+TYPED_TEST(SocBankOfEveryScalar, AnErrorThatLastsSpeaksOnce) {
+  auto a = asked<TypeParam>(0.03);
+  a.off_v = 0.045;
+  double truth = 0.5;
+  for (int k = 0; k < 128 * 100; ++k, truth -= 0.3 / (128 * 100)) {
+    a.sample(truth, -0.3 / (128 * 100), 0.2, 0.03);
+    if (k < 256) continue;
+    ASSERT_LT(std::abs(a.soc - truth), 2.1 * std::sqrt(a.variance)) << k;
+  }
+  EXPECT_GT(std::sqrt(a.variance), 0.1);
+}
+
+}  // namespace
+}  // namespace bms

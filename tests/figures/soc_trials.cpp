@@ -1,0 +1,99 @@
+#include "tests/figures/soc_trials.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/recording.hpp"
+#include "host_sim/replay.hpp"
+
+namespace bms {
+
+namespace {
+
+/// What is done to a recording, and what the estimator is told.
+struct Trial {
+  std::string title;
+  Belief belief;
+  double offset_a = 0, gain = 1, offset_v = 0;
+  std::optional<double> from_soc;
+};
+
+Recording troubled(Recording r, const Trial& t) {
+  std::size_t first = 0;
+  if (t.from_soc) first = static_cast<std::size_t>(std::find_if(r.soc_ref.begin(), r.soc_ref.end(), [&](double s) { return s < *t.from_soc; }) - r.soc_ref.begin());
+  for (auto* column : {&r.time_s, &r.current_a, &r.voltage_v, &r.temperature_c, &r.soc_ref}) {
+    if (!column->empty()) column->erase(column->begin(), column->begin() + static_cast<std::ptrdiff_t>(first));
+  }
+  const double start_s = r.time_s.front();
+  for (double& s : r.time_s) s -= start_s;
+  for (double& a : r.current_a) a = a * t.gain + t.offset_a;
+  for (double& v : r.voltage_v) v += t.offset_v;
+  return r;
+}
+
+struct Sums {
+  std::size_t samples = 0, inside = 0;
+  std::vector<float> sigmas;
+};
+
+double median(std::vector<float> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+std::string row(const std::string& name, const CellFile& cell, const Recording& original, const Trial& t, Sums& all) {
+  const Recording r = troubled(original, t);
+  const Track track = run_on_host(cell, samples(r), starting_point(t.belief), ScalarKind::single);
+  constexpr double half_an_hour_s = 1'800;
+  double square = 0, late_square = 0, late_most = 0;
+  std::size_t late = 0, inside = 0;
+  std::vector<float> sigmas;
+  for (std::size_t k = 0; k < track.rows.size(); ++k) {
+    const double error = track.rows[k].soc - r.soc_ref[k];
+    square += error * error;
+    inside += std::abs(error) <= 2 * track.rows[k].soc_sigma ? 1 : 0;
+    sigmas.push_back(static_cast<float>(track.rows[k].soc_sigma));
+    if (r.time_s[k] <= half_an_hour_s) continue;
+    ++late;
+    late_square += error * error;
+    late_most = std::max(late_most, std::abs(error));
+  }
+  const auto n = static_cast<double>(track.rows.size());
+  all.samples += track.rows.size();
+  all.inside += inside;
+  all.sigmas.insert(all.sigmas.end(), sigmas.begin(), sigmas.end());
+  return fmt::format("| {} | {} | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % |\n", name, t.title, 100 * std::sqrt(square / n), 100 * std::sqrt(late_square / static_cast<double>(std::max<std::size_t>(late, 1))),
+                     100 * late_most, 100 * static_cast<double>(inside) / n, 100 * median(sigmas));
+}
+
+}  // namespace
+
+std::string soc_trials(const std::filesystem::path& data) {
+  const Belief right{1, 0.02};
+  const std::vector<Trial> with_sensors_off = {{"started right", right, 0, 1, 0, {}},          {"current + 30 mA", right, 0.03, 1, 0, {}},   {"current - 30 mA", right, -0.03, 1, 0, {}},
+                                               {"current + 1 %", right, 0, 1.01, 0, {}},       {"current - 1 %", right, 0, 0.99, 0, {}},     {"voltage + 5 mV", right, 0, 1, 0.005, {}},
+                                               {"voltage - 5 mV", right, 0, 1, -0.005, {}}};
+  const std::vector<Trial> from_full = {{"started 30 % wrong, believed to 30 %", {0.7, 0.3}, 0, 1, 0, {}}};
+  const std::vector<Trial> from_the_middle = {{"cut at 60 %, told 35 %, believed to 25 %", {0.35, 0.25}, 0, 1, 0, 0.6}, {"cut at 60 %, told 85 %, believed to 25 %", {0.85, 0.25}, 0, 1, 0, 0.6}};
+  std::string table = "| recording | trial | SOC RMSE | after 30 min | largest after 30 min | inside two sigma | median sigma |\n|---|---|---|---|---|---|---|\n";
+  Sums all;
+  const CellFile cell = read_cell("a123_26650");
+  const auto run = [&](const char* name, std::initializer_list<const std::vector<Trial>*> lists) {
+    const Recording r = read_recording((data / "a123_26650" / (std::string(name) + ".csv")).string());
+    for (const auto* trials : lists) {
+      for (const Trial& t : *trials) table += row(name, cell, r, t, all);
+    }
+  };
+  for (const char* name : {"udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"}) run(name, {&with_sensors_off, &from_full});
+  for (const char* name : {"dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002", "dyn10_P45_A002"}) run(name, {&with_sensors_off, &from_the_middle});
+  return table + fmt::format("| all | | | | | {:.1f} % | {:.2f} % |\n", 100 * static_cast<double>(all.inside) / static_cast<double>(all.samples), 100 * median(all.sigmas));
+}
+
+}  // namespace bms
