@@ -66,6 +66,14 @@ struct Plausible {
   std::int32_t current_max_ua = 0;  ///< either way
 };
 
+/// Limits of use, and what a current makes of soc.
+template <class S>
+struct UseLimits {
+  Voltage<S> voltage_min_v{}, voltage_max_v{};
+  Current<S> charge_max_a{}, discharge_max_a{};  ///< > 0
+  Fraction<S> soc_per_as{};                      ///< 1 / (3600 capacity)
+};
+
 template <class S, std::size_t Max>
 struct Cell {
   using Scalar = S;
@@ -75,6 +83,7 @@ struct Cell {
   ChargeScale<S> charge;
   FilterNoise<S> noise;
   Plausible plausible;
+  UseLimits<S> limits;
   std::size_t size = 0;                          ///< intervals in use
 };
 
@@ -204,6 +213,8 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.walk_soc2_per_s = Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
   cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
   cell.noise.unknown_a = Current<S>(n.current_unknown_a);
+
+  cell.limits = {Voltage<S>(p.limits.voltage_min_v), Voltage<S>(p.limits.voltage_max_v), Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a), Fraction<S>(1 / capacity_as)};
 
   // half a volt and ten times the current beyond the limits of use: a sensor still tells the truth there, a fault does not
   cell.plausible.voltage_min_uv = static_cast<std::int32_t>((p.limits.voltage_min_v - 0.5) * 1e6);
