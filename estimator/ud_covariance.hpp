@@ -43,6 +43,9 @@ class UdCovariance {
     for (std::size_t i = 0; i + 1 < N; ++i) u(i, N - 1) = Coupling{};
   }
 
+  /// Process noise of the last state alone, which moves no other.
+  constexpr void widen_last(const Variance& by) { d_[N - 1] = Variance(d_[N - 1] + by); }
+
   constexpr const Variance& last_variance() const { return d_[N - 1]; }
 
   constexpr void propagate(const Matrix& f, const Variances& q) {

@@ -1,0 +1,107 @@
+// The cells of a pack beside their mean. One current flows through all: a full filter follows the mean cell, and of each cell only what
+// makes it another is estimated, its soc and its resistance, by a filter of two states without dynamics. What a model gets wrong it gets
+// wrong of all cells alike and drops out of their difference, so a difference is known better than the mean.
+//
+//   v_k - mean v = OCV(soc_k) - OCV(soc) + r_k (R0 + R1) I        r_k: resistance of cell k over the mean cell's, less 1
+//
+// G. Plett, "Efficient battery pack state estimation using bar-delta filtering", EVS24, Stavanger 2009.
+//
+// Memory: 20 bytes a cell. A cell whose voltage is missing keeps what is known of it; its sigma grows.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/ud_covariance.hpp"
+#include "model/cell.hpp"
+
+namespace bms {
+
+template <class S>
+class CellDifference {
+  using Soc = model::Soc<S>;
+  using Voltage = model::Voltage<S>;
+  using Variance = model::Variance<S>;
+  using Fraction = model::Fraction<S>;
+  using Coupling = model::Coupling<S>;
+
+ public:
+  static constexpr double first_soc = 0.05, first_resistance = 0.1;  ///< one sigma between cells of a pack that nobody has measured
+  static constexpr double of_charge = 0.02;                          ///< cells differ in capacity by that: of all soc that moves
+
+  constexpr CellDifference() { covariance_.set_diagonal({Variance(first_resistance * first_resistance), Variance(first_soc * first_soc)}); }
+
+  /// moved: how far soc of the mean has moved since the last call.
+  constexpr void predict(const Soc& moved) {
+    // the same way until the current turns: deviations add, (sigma + d)^2 - sigma^2, linear in d
+    const Soc d = Soc(model::magnitude(moved) * Fraction(of_charge)), sigma = model::root<Soc>(covariance_.last_variance());
+    covariance_.widen_last(Variance(Variance((sigma + sigma) * d) + Variance(d * d)));
+  }
+  /// off_v: this cell's voltage less the mean, less what the OCV curve says of the difference; slope: at this cell; drop_v: over R0 and
+  /// R1; noise_v2: of off_v.
+  constexpr void correct(const Voltage& off_v, const model::VoltagePerSoc<S>& slope, const Voltage& drop_v, const Variance& noise_v2) {
+    const auto correction = covariance_.observe({model::VoltagePerSoc<S>(drop_v), slope}, noise_v2, Voltage(off_v - drop_v * resistance_));
+    resistance_ = Soc(resistance_ + correction[0]);
+    soc_ = Soc(soc_ + correction[1]);
+  }
+
+  constexpr const Soc& soc() const { return soc_; }                ///< of this cell less the mean's
+  constexpr Soc soc_sigma() const { return model::root<Soc>(covariance_.last_variance()); }
+  constexpr const Soc& resistance() const { return resistance_; }  ///< over the mean's, less 1
+
+ private:
+  Soc soc_{}, resistance_{};
+  UdCovariance<S, 2> covariance_;
+};
+
+template <class S, std::size_t Cells>
+class CellDifferences {
+  using Soc = model::Soc<S>;
+  using Voltage = model::Voltage<S>;
+  using Variance = model::Variance<S>;
+
+ public:
+  /// What one sample of the pack says.
+  struct Seen {
+    std::array<Voltage, Cells> voltage_v{};
+    std::array<bool, Cells> usable{};
+  };
+
+  /// soc, sigma: of the mean cell; moved: how far it has moved since the last call; shared_by: samples that share one error of the model
+  /// (its correlation time over the step).
+  template <class Cell>
+  constexpr void step(const Cell& cell, const Soc& soc, const Soc& sigma, const model::Current<S>& current_a, const Soc& moved, const model::Count<S>& shared_by, const Seen& seen) {
+    model::Current<S> sum_v(0);
+    int count = 0;
+    for (std::size_t k = 0; k < Cells; ++k) {
+      if (seen.usable[k]) sum_v = model::Current<S>(sum_v + seen.voltage_v[k]), ++count;
+      difference_[k].predict(moved);
+    }
+    if (count < 2) return;
+    const Voltage mean_v = model::ratio<Voltage>(sum_v, model::Current<S>(count));
+    const auto at = look_up(cell, soc, interval_);
+    const auto slope = model::VoltagePerSoc<S>(at.ocv_delta_v * at.per_width);
+    const Voltage drop_v = Voltage(at.r0_ohm * current_a) + Voltage(at.r1_ohm * current_a);
+    for (std::size_t k = 0; k < Cells; ++k) {
+      if (!seen.usable[k]) continue;
+      std::uint8_t interval = interval_;
+      const auto here = look_up(cell, Soc(soc + difference_[k].soc()), interval);
+      const auto slope_here = model::VoltagePerSoc<S>(here.ocv_delta_v * here.per_width);
+      // of the model's error, a quarter is each cell's own, and stays with it: it lasts ten times as long; with a knee between cell and
+      // mean, the mean's own error counts
+      const Voltage knee_v = Voltage(model::VoltagePerSoc<S>(slope_here - slope) * sigma);
+      const Variance own_v2 = Variance(Variance(here.error_v2 * model::Fraction<S>(10.0 / 16)) + knee_v * knee_v);
+      const Variance noise_v2 = Variance(Variance(cell.noise.voltage_v2 + cell.noise.voltage_v2) + model::product<Variance>(own_v2, shared_by));
+      difference_[k].correct(Voltage((seen.voltage_v[k] - mean_v) - Voltage(here.ocv_v - at.ocv_v)), slope_here, drop_v, noise_v2);
+    }
+  }
+
+  constexpr const CellDifference<S>& operator[](std::size_t k) const { return difference_[k]; }
+
+ private:
+  std::array<CellDifference<S>, Cells> difference_;
+  std::uint8_t interval_ = 0;
+};
+
+}  // namespace bms

@@ -1,0 +1,105 @@
+#include "estimator/cell_differences.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "estimator/soc_estimator.hpp"
+#include "host_sim/cell_file.hpp"
+#include "plant/random.hpp"
+#include "plant/truth_cell.hpp"
+
+namespace bms {
+namespace {
+
+constexpr std::size_t cells = 16;
+
+/// Sixteen cells of the plant in series, each with its own soc, capacity and resistance, and the estimators beside them.
+template <class S>
+struct Pack {
+  explicit Pack(double weak_by = 0) {
+    for (std::size_t k = 0; k < cells; ++k) {
+      const double off = k == 5 ? -weak_by : 0.01 * random.normal();
+      truth.emplace_back(truth::CellParameters{.capacity_ah = 6 * (1 + 0.005 * random.normal())}, truth::CellState{.soc = 0.88 + off, .v_rc_v = 0, .temperature_c = 25});
+      more_ohm.push_back(0.0013 * random.normal());
+    }
+  }
+
+  void second(double current_a, std::size_t silent = cells) {
+    typename CellDifferences<S, cells>::Seen seen;
+    double sum = 0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      truth[k].run(current_a, 25, 1);
+      const double v = truth[k].voltage_v() + more_ohm[k] * current_a + 0.001 * random.normal();
+      sum += v;
+      seen.voltage_v[k] = model::Voltage<S>(v);
+      seen.usable[k] = k != silent;
+    }
+    time_us += 1'000'000;
+    const double read_a = current_a + 0.01 * random.normal();
+    const auto e = mean.step(tables, {time_us, static_cast<std::int32_t>(1e6 * read_a), static_cast<std::int32_t>(1e6 * sum / cells), 2'500});
+    differences.step(tables, e.soc, e.soc_sigma, model::Current<S>(read_a), model::Soc<S>(read_a / 21'600), model::Count<S>(60), seen);
+  }
+  double mean_soc() const {
+    double sum = 0;
+    for (const auto& c : truth) sum += c.soc();
+    return sum / cells;
+  }
+  double error(std::size_t k) const { return model::as_double(differences[k].soc()) - (truth[k].soc() - mean_soc()); }
+  void hours(double h) {
+    for (int k = 0; k < static_cast<int>(h * 3'600); ++k) second(k % 100 < 50 ? -6 : k % 100 < 60 ? 4 : 0);
+  }
+
+  truth::Random random{3};
+  std::vector<truth::Cell> truth;
+  std::vector<double> more_ohm;
+  model::Cell<S, model::max_intervals> tables = model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
+  SocEstimator<S> mean{StartingPoint{880'000'000, 10'000'000}};
+  CellDifferences<S, cells> differences;
+  std::uint64_t time_us = 0;
+};
+
+TEST(CellDifferences, TakeTwentyBytesACell) { EXPECT_LE(sizeof(CellDifference<float>), 24U); }
+
+template <class Scalar>
+class CellDifferencesOfEveryScalar : public ::testing::Test {};
+using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+TYPED_TEST_SUITE(CellDifferencesOfEveryScalar, Scalars);
+
+TYPED_TEST(CellDifferencesOfEveryScalar, AreFoundWhereTheCurveIsSteepAndHonestWhereItIsNot) {
+  Pack<TypeParam> pack;
+  for (int part = 0; part < 8; ++part) {
+    pack.hours(0.18);
+    for (std::size_t k = 0; k < cells; ++k) {
+      ASSERT_LE(std::abs(pack.error(k)), 3 * model::as_double(pack.differences[k].soc_sigma())) << "cell " << k << " at " << pack.mean_soc();
+    }
+  }
+  for (std::size_t k = 0; k < cells; ++k) {
+    EXPECT_LE(std::abs(pack.error(k)), 0.01) << k << " at " << pack.mean_soc();
+    EXPECT_NEAR(model::as_double(pack.differences[k].resistance()), pack.more_ohm[k] / 0.0215, 0.03) << k;
+  }
+}
+
+TYPED_TEST(CellDifferencesOfEveryScalar, OneCellWeakerIsSeen) {
+  Pack<TypeParam> pack(0.08);
+  pack.hours(1.2);
+  std::size_t weakest = 0;
+  for (std::size_t k = 0; k < cells; ++k) {
+    if (pack.differences[k].soc() < pack.differences[weakest].soc()) weakest = k;
+  }
+  EXPECT_EQ(weakest, 5U);
+  EXPECT_NEAR(model::as_double(pack.differences[5].soc()), pack.truth[5].soc() - pack.mean_soc(), 0.015);
+}
+
+TEST(CellDifferences, ACellThatIsNotHeardBecomesUncertain) {
+  Pack<double> pack;
+  pack.hours(0.5);
+  const double before = pack.differences[3].soc_sigma();
+  for (int k = 0; k < 1'800; ++k) pack.second(-3, 3);
+  EXPECT_GT(pack.differences[3].soc_sigma(), before);
+  EXPECT_LE(std::abs(pack.error(3)), 3 * pack.differences[3].soc_sigma());
+}
+
+}  // namespace
+}  // namespace bms
