@@ -14,6 +14,7 @@
 #include <cstdint>
 
 #include "estimator/ud_covariance.hpp"
+#include "estimator/voltage_doubt.hpp"
 #include "model/cell.hpp"
 
 namespace bms {
@@ -81,13 +82,13 @@ class CellDifferences {
     if (count < 2) return;
     const Voltage mean_v = model::ratio<Voltage>(sum_v, model::Current<S>(count));
     const auto at = look_up(cell, soc, interval_);
-    const auto slope = model::VoltagePerSoc<S>(at.ocv_delta_v * at.per_width);
-    const Voltage drop_v = Voltage(at.r0_ohm * current_a) + Voltage(at.r1_ohm * current_a);
+    const auto slope = ocv_slope<S>(at);
+    const Voltage drop_v = settled_drop_v<S>(at, current_a);
     for (std::size_t k = 0; k < Cells; ++k) {
       if (!seen.usable[k]) continue;
       std::uint8_t interval = interval_;
       const auto here = look_up(cell, Soc(soc + difference_[k].soc()), interval);
-      const auto slope_here = model::VoltagePerSoc<S>(here.ocv_delta_v * here.per_width);
+      const auto slope_here = ocv_slope<S>(here);
       // of the model's error, a quarter is each cell's own, and stays with it: it lasts ten times as long; with a knee between cell and
       // mean, the mean's own error counts
       const Voltage knee_v = Voltage(model::VoltagePerSoc<S>(slope_here - slope) * sigma);

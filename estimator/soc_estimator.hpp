@@ -28,6 +28,7 @@
 #include "estimator/soc_bank.hpp"
 #include "estimator/start.hpp"
 #include "estimator/ud_covariance.hpp"
+#include "estimator/voltage_doubt.hpp"
 #include "model/extended_rc.hpp"
 
 namespace bms {
@@ -202,7 +203,7 @@ class SocEstimator {
 
   template <class Cell>
   constexpr void correct(const Cell& cell, const At& at, const Drive& drive, const Soc& soc, const Voltage& innovation_v, std::uint32_t& flags) {
-    const Voltage drop_v = Voltage(at.r0_ohm * drive.current_a) + Voltage(at.r1_ohm * drive.current_a);
+    const Voltage drop_v = settled_drop_v<S>(at, drive.current_a);
     const Variance drop_v2 = drop_v * drop_v;
     if (bank_.open()) [[unlikely]] {
       flags |= soc_unsettled;
@@ -230,7 +231,7 @@ class SocEstimator {
     const At at = look_up(model::CellUnder{cell, drive, state_.polarisation}, soc, interval);
     const auto h = Model::sensitivity(laws_of(cell), at, drive);
     const Variance of_soc_v2 = model::product<Variance>(model::product<Variance>(state_.covariance.last_variance(), h[states - 1]), h[states - 1]);
-    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) + Variance(lasting_v2(cell) + doubt_v2(at, current_a)));
+    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) + Variance(lasting_v2(cell) + drop_doubt_v2<S>(at, current_a, resistance_error_)));
     const Variance all_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
     if (!(Variance(innovation_v * innovation_v) > Variance(all_v2 * Count(impossible * impossible)))) return false;
     if (time_us_ - wondered_us_ > calm_us + paced_us_) wondering_us_ = 0;
@@ -246,15 +247,12 @@ class SocEstimator {
   /// Opens the bank around a belief that may be mistaken.
   template <class Cell>
   constexpr void search(const Cell& cell, const SocBelief<S>& before) {
-    const StartMisfit<S, Cell> misfit{cell, nullptr, Variance{}, &before};
-    std::uint8_t interval = 0;
-    bank_.open_at(before.soc, lasting_v2(cell), [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
+    open_bank(cell, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
   }
-
-  /// Of the resistances' error.
-  constexpr Variance doubt_v2(const At& at, const Current& current_a) const {
-    const Voltage drop_v = Voltage(at.r0_ohm * current_a) + Voltage(at.r1_ohm * current_a), doubt_v = model::product<Voltage>(drop_v, resistance_error_);
-    return doubt_v * doubt_v;
+  template <class Cell, class Misfit>
+  constexpr void open_bank(const Cell& cell, const Soc& mean, const Misfit& misfit) {
+    std::uint8_t interval = 0;
+    bank_.open_at(mean, lasting_v2(cell), [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
   }
 
   /// Of an error that lasts while the bank is open: the model's, and of the states that are not corrected then.
@@ -277,11 +275,11 @@ class SocEstimator {
     const At middle = look_up(under, soc, interval);
     const Voltage expected_v = Model::voltage(laws, state_.polarisation, middle, drive);
     // of an error that lasts, a quarter comes and goes
-    const Variance new_v2 = Variance(Variance(cell.noise.model_v2 * Fraction(1.0 / 16)) + doubt_v2(middle, current_a));
+    const Variance new_v2 = Variance(Variance(cell.noise.model_v2 * Fraction(1.0 / 16)) + drop_doubt_v2<S>(middle, current_a, resistance_error_));
     const auto seen = [&](const Soc& there) -> typename SocBank<S>::Seen {
       const At at = look_up(under, there, interval);
       return {.off_v = Voltage(innovation_v + (expected_v - Model::voltage(laws, state_.polarisation, at, drive))),
-              .half_v = Voltage(model::VoltagePerSoc<S>(at.ocv_delta_v * at.per_width) * Fraction(0.5 / SocBank<S>::points)),
+              .half_v = Voltage(ocv_slope<S>(at) * Fraction(0.5 / SocBank<S>::points)),
               .new_v2 = Variance(new_v2 + Variance(at.error_v2 - cell.noise.model_v2))};
     };
     const auto news = bank_.step(soc, bank_share_, cell.noise.voltage_v2, lasting_v2(cell), seen);
@@ -355,9 +353,8 @@ class SocEstimator {
       const StartMisfit<S, decltype(under)> misfit{under, voltage ? &ocv_v : nullptr, reading_v2, has_start_ ? &before : nullptr};
       if (voltage) belief = soc_from(misfit);
       if (belief.variance > Variance(SocBank<S>::wide_soc * SocBank<S>::wide_soc)) {
-        std::uint8_t interval = 0;
         state_.covariance.set_diagonal(variances);  // what the bank is told of the other states
-        bank_.open_at(belief.soc, lasting_v2(cell), [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
+        open_bank(cell, belief.soc, misfit);
       }
       at = look_up(under, belief.soc, interval_);
     }

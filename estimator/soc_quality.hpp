@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "estimator/estimate.hpp"
+#include "estimator/voltage_doubt.hpp"
 #include "model/extended_rc.hpp"
 
 namespace bms {
@@ -30,9 +31,8 @@ class SocQuality {
   constexpr Now update(const Estimate<S>& estimate, const model::TablePoint<S>& at, const model::Drive<S>& drive, const Soc& counted, std::uint32_t step_ms,
                        const model::Fraction<S>& resistance_error) {
     using namespace model;
-    const Voltage<S> moves_v = VoltagePerSoc<S>(at.ocv_delta_v * at.per_width) * Fraction<S>(known_soc);
-    const Voltage<S> drop_v = Voltage<S>(at.r0_ohm * drive.current_a) + Voltage<S>(at.r1_ohm * drive.current_a), doubt_v = product<Voltage<S>>(drop_v, resistance_error);
-    const Variance<S> doubt_v2 = doubt_v * doubt_v;
+    const Voltage<S> moves_v = ocv_slope<S>(at) * Fraction<S>(known_soc);
+    const Variance<S> doubt_v2 = drop_doubt_v2<S>(at, drive.current_a, resistance_error);
     now_.observable = Variance<S>(moves_v * moves_v) > Variance<S>(at.error_v2 + doubt_v2) && (estimate.flags & not_now) == 0;
     if (now_.observable && estimate.soc_sigma < Soc(known_soc)) {
       now_.bridged_s = 0;

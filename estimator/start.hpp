@@ -9,6 +9,7 @@
 
 #include <cstddef>
 
+#include "estimator/voltage_doubt.hpp"
 #include "model/one_rc.hpp"
 
 namespace bms {
@@ -38,7 +39,7 @@ struct StartMisfit {
       const auto at = look_up(cell, soc, interval);
       const Voltage<S> off_v = *ocv_v - at.ocv_v;
       // half a point's width on the curve counts as uncertainty too: steep parts have few points
-      const Voltage<S> half_width_v = product<Voltage<S>>(VoltagePerSoc<S>(at.ocv_delta_v * at.per_width), half_step);
+      const Voltage<S> half_width_v = product<Voltage<S>>(ocv_slope<S>(at), half_step);
       const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
       misfit = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
     }

@@ -1,7 +1,6 @@
 #include "tests/figures/soc_trials.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -38,7 +37,8 @@ Recording troubled(Recording r, const Trial& t) {
 }
 
 struct Sums {
-  std::size_t samples = 0, inside = 0;
+  std::size_t samples = 0;
+  double inside = 0;
   std::vector<float> sigmas;
 };
 
@@ -49,28 +49,18 @@ double median(std::vector<float> values) {
 }
 
 std::string row(const std::string& name, const CellFile& cell, const Recording& original, const Trial& t, Sums& all) {
-  const Recording r = troubled(original, t);
-  const Track track = run_on_host(cell, samples(r), starting_point(t.belief), ScalarKind::single);
-  constexpr double half_an_hour_s = 1'800;
-  double square = 0, late_square = 0, late_most = 0;
-  std::size_t late = 0, inside = 0;
+  ReplayResult r;
+  r.cell = cell;
+  r.recording = troubled(original, t);
+  r.track = run_on_host(cell, samples(r.recording), starting_point(t.belief), r.scalar);
+  evaluate(r);
   std::vector<float> sigmas;
-  for (std::size_t k = 0; k < track.rows.size(); ++k) {
-    const double error = track.rows[k].soc - r.soc_ref[k];
-    square += error * error;
-    inside += std::abs(error) <= 2 * track.rows[k].soc_sigma ? 1 : 0;
-    sigmas.push_back(static_cast<float>(track.rows[k].soc_sigma));
-    if (r.time_s[k] <= half_an_hour_s) continue;
-    ++late;
-    late_square += error * error;
-    late_most = std::max(late_most, std::abs(error));
-  }
-  const auto n = static_cast<double>(track.rows.size());
-  all.samples += track.rows.size();
-  all.inside += inside;
+  for (const EstimateRow& e : r.track.rows) sigmas.push_back(static_cast<float>(e.soc_sigma));
+  all.samples += sigmas.size();
+  all.inside += *r.soc.within_2_sigma * static_cast<double>(sigmas.size());
   all.sigmas.insert(all.sigmas.end(), sigmas.begin(), sigmas.end());
-  return fmt::format("| {} | {} | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % |\n", name, t.title, 100 * std::sqrt(square / n), 100 * std::sqrt(late_square / static_cast<double>(std::max<std::size_t>(late, 1))),
-                     100 * late_most, 100 * static_cast<double>(inside) / n, 100 * median(sigmas));
+  return fmt::format("| {} | {} | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % |\n", name, t.title, 100 * *r.soc.rmse, 100 * *r.soc.rmse_after_30min, 100 * *r.soc.max_error_after_30min,
+                     100 * *r.soc.within_2_sigma, 100 * median(sigmas));
 }
 
 }  // namespace
@@ -93,7 +83,7 @@ std::string soc_trials(const std::filesystem::path& data) {
   };
   for (const char* name : {"udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"}) run(name, {&with_sensors_off, &from_full});
   for (const char* name : {"dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002", "dyn10_P45_A002"}) run(name, {&with_sensors_off, &from_the_middle});
-  return table + fmt::format("| all | | | | | {:.1f} % | {:.2f} % |\n", 100 * static_cast<double>(all.inside) / static_cast<double>(all.samples), 100 * median(all.sigmas));
+  return table + fmt::format("| all | | | | | {:.1f} % | {:.2f} % |\n", 100 * all.inside / static_cast<double>(all.samples), 100 * median(all.sigmas));
 }
 
 }  // namespace bms
