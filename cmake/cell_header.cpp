@@ -32,15 +32,18 @@ class Initialiser {
   void table(const std::string& key) { text_ += (std::exchange(inside_, true) ? "},\n" : "\n") + ("    ." + key + " = {"); }
   void number(const std::string& key, double value) { text_ += "." + key + " = " + literal(value) + ", "; }
   void optional_number(const std::string& key, double value) { number(key, value); }
+  void optional_flag(const std::string& key, bool value) { text_ += "." + key + " = " + (value ? "true" : "false") + ", "; }
   template <class Column>
   void column(const std::string& key, const Column& column) {
     std::string values;
     for (std::size_t k = 0; k < column.size; ++k) values += (k == 0 ? "" : ", ") + literal(column[k]);
     text_ += "\n        ." + key + " = {{" + values + "}, " + std::to_string(column.size) + "}, ";
   }
-  /// What the firmware does without stays empty.
+  /// What the firmware does without, deviations of an identification, stays empty.
   template <class Column>
-  void optional_column(const std::string&, const Column&) {}
+  void optional_column(const std::string& key, const Column& values) {
+    if (key == "half_gap_v") column(key, values);
+  }
 
   std::string text() const { return text_ + "}"; }
 
@@ -53,13 +56,13 @@ class Initialiser {
 std::string extension(const bms::CellFile& file) {
   const auto acting = bms::on_board(file.mechanisms);
   if (acting.empty()) {
-    return R"(/// The model that the estimator steps.
+    return fmt::format(R"(/// The model that the estimator steps.
 template <class S>
-using Model = model::ExtendedRc<0, 0>::Of<S>;
+using Model = model::ExtendedRc<0, 0, {}>::Of<S>;
 
 template <class S>
 inline constexpr auto cell = model::prepare<S, model::interval_count(parameters)>(parameters);
-)";
+)", file.parameters.noise.errors_are_states);
   }
   std::string types, values;
   for (const bms::model::MechanismSetting& m : acting) {
@@ -75,12 +78,12 @@ using Laws = model::Laws<S{types}>;
 
 /// The model that the estimator steps.
 template <class S>
-using Model = typename model::ExtendedRc<Laws<float>::most_voltage_states, Laws<float>::most_states>::template Of<S>;
+using Model = typename model::ExtendedRc<Laws<float>::most_voltage_states, Laws<float>::most_states, {errors}>::template Of<S>;
 
 template <class S>
 inline constexpr model::ExtendedCell<S, model::interval_count(parameters), Laws<S>> cell{{
     model::prepare<S, model::interval_count(parameters)>(parameters), Laws<S>({values})}};
-)", fmt::arg("types", types), fmt::arg("values", values));
+)", fmt::arg("types", types), fmt::arg("errors", file.parameters.noise.errors_are_states), fmt::arg("values", values));
 }
 
 std::string header(const bms::CellFile& file) {

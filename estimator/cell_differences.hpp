@@ -36,7 +36,7 @@ class CellDifference {
   /// moved: how far soc of the mean has moved since the last call.
   constexpr void predict(const Soc& moved) {
     // the same way until the current turns: deviations add, (sigma + d)^2 - sigma^2, linear in d
-    const Soc d = Soc(model::magnitude(moved) * Fraction(of_charge)), sigma = model::root<Soc>(covariance_.last_variance());
+    const Soc d = Soc(model::magnitude(moved) * Fraction(of_charge)), sigma = model::root<Soc>(covariance_.template variance<1>());
     covariance_.widen_last(Variance(Variance((sigma + sigma) * d) + Variance(d * d)));
   }
   /// off_v: this cell's voltage less the mean, less what the OCV curve says of the difference; slope: at this cell; drop_v: over R0 and
@@ -48,7 +48,7 @@ class CellDifference {
   }
 
   constexpr const Soc& soc() const { return soc_; }                ///< of this cell less the mean's
-  constexpr Soc soc_sigma() const { return model::root<Soc>(covariance_.last_variance()); }
+  constexpr Soc soc_sigma() const { return model::root<Soc>(covariance_.template variance<1>()); }
   constexpr const Soc& resistance() const { return resistance_; }  ///< over the mean's, less 1
 
  private:

@@ -30,8 +30,8 @@ constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model
     const Drive<S> drive{current_a, duration_s, temperature_c};
     const Rate<S> per_s = current_a * cell.limits.soc_per_as;
     const Soc<S> end = soc + duration_s * per_s;
-    const auto at = look_up(CellUnder{cell, drive, x}, end, interval);
-    return Voltage<S>(Model::voltage(laws, Model::advance(x, at, Model::settling(laws, at, drive), drive), at, drive));
+    const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, end, interval);
+    return Voltage<S>(Model::voltage(laws, Model::advance(x, at, Model::settling(laws, x, at, drive), drive), at, drive));
   };
   /// The largest current of that sign, up to most, that is good; 0 where none is.
   const auto largest = [&](const Current<S>& most_a, const auto& good) {

@@ -33,10 +33,11 @@ struct Estimate {
   std::uint32_t flags = 0;                     ///< Flag
 };
 
-/// The same with the states of N mechanisms (model/extended_rc.hpp), after the correction.
+/// The same with what the filter of an extended cell knows besides (model/extended_rc.hpp), after the correction: where errors are states,
+/// the voltage's [V], the current's offset [part of the capacity per hour] and its standard deviation; then the mechanisms' states.
 template <class S, std::size_t N>
 struct ExtendedEstimate : Estimate<S> {
-  std::array<model::Voltage<S>, N> mechanism{};
+  std::array<model::Voltage<S>, N> further{};
 };
 
 /// Number of 32-bit words of an estimate, and their names in that order: the unit of comparison between host and board.
@@ -60,13 +61,13 @@ constexpr EstimateWords words(const Estimate<S>& e) {
   return {word(e.soc), word(e.soc_sigma), word(e.v_rc_v), word(e.voltage_predicted_v), e.flags};
 }
 
-/// Those of the mechanisms come after the others.
+/// What is known besides comes after the others.
 template <class S, std::size_t N>
 constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEstimate<S, N>& e) {
   std::array<std::uint32_t, estimate_words + N> all{};
   const EstimateWords first = words(static_cast<const Estimate<S>&>(e));
   for (std::size_t k = 0; k < estimate_words; ++k) all[k] = first[k];
-  for (std::size_t k = 0; k < N; ++k) all[estimate_words + k] = word(e.mechanism[k]);
+  for (std::size_t k = 0; k < N; ++k) all[estimate_words + k] = word(e.further[k]);
   return all;
 }
 

@@ -3,7 +3,7 @@
 //   predict   charge counted in integers, other states by the model's exact step, covariance by its analytic transition
 //   correct   by the voltage, if it may be believed; otherwise the prediction stands and sigma grows
 //
-// One body for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states, soc last). The laws of the
+// One body for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states). The laws of the
 // mechanisms come with the cell; where it has none, nothing of them is left.
 // No heap, no exceptions, no libm but sqrt, no clock: the same samples give the same bits on every core (float and
 // fixed point; compile with -ffp-contract=off).
@@ -47,8 +47,8 @@ class SocEstimator {
   using Model = ModelOf<S>;
   using Scalar = S;
   static constexpr std::size_t states = Model::states;
-  static constexpr std::size_t mechanism_states = Model::mechanism_states;
-  using Result = std::conditional_t<mechanism_states == 0, Estimate<S>, ExtendedEstimate<S, mechanism_states>>;
+  static constexpr std::size_t further_values = Model::values - 1 + (Model::errors_are_states ? 1 : 0);
+  using Result = std::conditional_t<further_values == 0, Estimate<S>, ExtendedEstimate<S, further_values>>;
 
   constexpr SocEstimator() = default;
 
@@ -68,16 +68,16 @@ class SocEstimator {
     if (step_us != paced_us_) change_pace(cell, step_us, estimate.flags);
     if (sample.temperature_cdegc >> 8 != heeded_) [[unlikely]] heed_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
-    const Drive drive{laws.true_current(model::from_micro<Current>(current.ua)), duration_s_, temperature(laws, sample)};
+    const Drive drive{laws.true_current(Model::without_offset(model::from_micro<Current>(current.ua), state_.polarisation, cell.noise)), duration_s_, temperature(laws, sample)};
     count_charge(cell, counted_ua(laws, drive, current.ua), step_us);
 
     const Soc soc = state_.charge.soc(cell.charge);
-    const auto at = look_up(model::CellUnder{cell, drive, state_.polarisation}, soc, interval_);
-    const auto settling = Model::settling(laws, at, drive);
+    const auto at = look_up(model::CellUnder{cell, drive, Model::held(state_.polarisation)}, soc, interval_);
+    const auto settling = Model::settling(laws, state_.polarisation, at, drive, forgotten_);
 
-    auto noise = Model::noise(laws, settling, cell.noise.v_rc_v2);
-    noise[states - 1] = soc_noise_;
-    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[states - 1] = Variance(soc_noise_ + unknown_charge(cell));
+    auto noise = Model::noise(laws, settling, cell.noise);
+    noise[Model::soc] = soc_noise_;
+    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
 
@@ -111,7 +111,7 @@ class SocEstimator {
   /// Current that ends as charge. Without a law that makes another of it, the reading itself.
   template <class Laws>
   static constexpr std::int32_t counted_ua(const Laws& laws, const Drive& drive, std::int32_t read_ua) {
-    return laws.changes_charge() ? model::to_micro(laws.counted(drive)) : read_ua;
+    return Model::errors_are_states || laws.changes_charge() ? model::to_micro(laws.counted(drive)) : read_ua;
   }
 
   /// The last one that can be, 25 degrees C at first.
@@ -148,7 +148,9 @@ class SocEstimator {
     const auto most = Fraction(1.9);
     bank_share_ = shared_by > model::Count<S>(SocBank<S>::points) ? model::ratio<Fraction>(model::Count<S>(2 * SocBank<S>::points), shared_by) : most;
     const Soc white = over_step(n.white_soc_per_s);
-    soc_noise_ = Variance(white * white) + model::product<Variance>(n.walk_soc2_per_s, duration_s_);
+    soc_noise_ = Variance(white * white);
+    if constexpr (!Model::errors_are_states) soc_noise_ = soc_noise_ + model::product<Variance>(n.walk_soc2_per_s, duration_s_);
+    forgotten_ = Model::forgotten(n, duration_s_);
   }
 
   /// Every 2.56 K anew: in the cold, resistances are larger than a file says that does not follow the temperature, by some 40 kJ/mol
@@ -189,11 +191,12 @@ class SocEstimator {
   template <class Cell>
   constexpr Variance unknown_charge(const Cell& cell) const {
     const Soc d = over_step(cell.noise.unknown_soc_per_s);
-    const Soc sigma = model::root<Soc>(state_.covariance.last_variance());
+    const Soc sigma = model::root<Soc>(state_.covariance.template variance<Model::soc>());
     return Variance(d * d) + Variance((sigma + sigma) * d);
   }
 
   static constexpr double impossible = 8;                     // standard deviations; a cell that was emptied fast shows five of them for minutes
+  static constexpr double new_share = 1.0 / 4;                // of the variance of an error that lasts: half of it comes and goes
   static constexpr double least_error_v = 0.01;               // of any model, whatever its file says
   static constexpr std::uint32_t impossible_us = 600'000'000; // of it before soc is sought anew: near empty a cell needs minutes to recover
   static constexpr std::uint32_t calm_us = 60'000'000;        // without it, and it is forgotten
@@ -215,12 +218,16 @@ class SocEstimator {
         return;
       }
     }
-    const Variance model_v2 = Variance(model::product<Variance>(at.error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
+    Variance error_v2 = at.error_v2;
+    if constexpr (Model::errors_are_states) error_v2 = Variance(model::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + axis_v2(cell, at));
+    const Variance model_v2 = Variance(model::product<Variance>(error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
     const Correction correction = state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), noise_v2, innovation_v);
 #pragma GCC unroll 8
-    for (std::size_t i = 0; i + 1 < states; ++i) state_.polarisation[i] += correction[i];
-    state_.charge.correct(correction[states - 1], cell.charge);
+    for (std::size_t i = 0; i < states; ++i) {
+      if (i != Model::soc) state_.polarisation[Model::place(i)] += correction[i];
+    }
+    state_.charge.correct(correction[Model::soc], cell.charge);
   }
 
   /// An innovation that the model's error and soc's own sigma do not explain, for ten minutes, is soc's: it is sought anew. True: it is.
@@ -228,9 +235,9 @@ class SocEstimator {
   [[gnu::noinline]] constexpr bool wonder(const Cell& cell, Current current_a, model::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
     const Drive drive{current_a, duration_s_, temperature_c};
     std::uint8_t interval = interval_;
-    const At at = look_up(model::CellUnder{cell, drive, state_.polarisation}, soc, interval);
+    const At at = look_up(model::CellUnder{cell, drive, Model::held(state_.polarisation)}, soc, interval);
     const auto h = Model::sensitivity(laws_of(cell), at, drive);
-    const Variance of_soc_v2 = model::product<Variance>(model::product<Variance>(state_.covariance.last_variance(), h[states - 1]), h[states - 1]);
+    const Variance of_soc_v2 = model::product<Variance>(model::product<Variance>(state_.covariance.template variance<Model::soc>(), h[Model::soc]), h[Model::soc]);
     const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) + Variance(lasting_v2(cell) + drop_doubt_v2<S>(at, current_a, resistance_error_)));
     const Variance all_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
     if (!(Variance(innovation_v * innovation_v) > Variance(all_v2 * Count(impossible * impossible)))) return false;
@@ -239,9 +246,18 @@ class SocEstimator {
     wondering_us_ += paced_us_ < calm_us ? static_cast<std::uint32_t>(paced_us_) : calm_us;
     if (wondering_us_ < impossible_us) return true;  // one bad reading is not believed
     wondering_us_ = 0;
-    const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points)), variance = state_.covariance.last_variance();
+    const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points)), variance = state_.covariance.template variance<Model::soc>();
     search(cell, {soc, variance < finest ? finest : variance});
     return true;
+  }
+
+  /// Of what the tables' soc axis is good to, on the curve there. In the cold surfaces are further ahead of what is counted, as much as
+  /// resistances are larger: knees come elsewhere.
+  template <class Cell>
+  static constexpr Variance axis_v2(const Cell& cell, const At& at) {
+    const Variance axis_v2 = Variance(at.error_v2 - cell.noise.model_v2);
+    if constexpr (std::same_as<std::remove_cvref_t<decltype(laws_of(cell))>, model::LawSet<S>>) return axis_v2;
+    else return at.activation > model::Factor<S>(1) ? model::product<Variance>(model::product<Variance>(axis_v2, at.activation), at.activation) : axis_v2;
   }
 
   /// Opens the bank around a belief that may be mistaken.
@@ -258,9 +274,9 @@ class SocEstimator {
   /// Of an error that lasts while the bank is open: the model's, and of the states that are not corrected then.
   template <class Cell>
   constexpr Variance lasting_v2(const Cell& cell) const {
-    Variance sum = cell.noise.model_v2;
+    Variance sum = Model::errors_are_states ? Variance{} : cell.noise.model_v2;
     const auto states_v2 = state_.covariance.variances();
-    for (std::size_t k = 0; k + 1 < states; ++k) sum = Variance(sum + states_v2[k]);
+    for (std::size_t k = 0; k < Model::soc; ++k) sum = Variance(sum + states_v2[k]);
     return sum;
   }
 
@@ -271,31 +287,36 @@ class SocEstimator {
     const Drive drive{current_a, duration_s_, temperature_c};
     const auto& laws = laws_of(cell);
     std::uint8_t interval = interval_;
-    const model::CellUnder under{cell, drive, state_.polarisation};
+    const model::CellUnder under{cell, drive, Model::held(state_.polarisation)};
     const At middle = look_up(under, soc, interval);
     const Voltage expected_v = Model::voltage(laws, state_.polarisation, middle, drive);
-    // of an error that lasts, a quarter comes and goes
-    const Variance new_v2 = Variance(Variance(cell.noise.model_v2 * Fraction(1.0 / 16)) + drop_doubt_v2<S>(middle, current_a, resistance_error_));
+    const Variance new_v2 = Variance(model::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + drop_doubt_v2<S>(middle, current_a, resistance_error_));
     const auto seen = [&](const Soc& there) -> typename SocBank<S>::Seen {
       const At at = look_up(under, there, interval);
       return {.off_v = Voltage(innovation_v + (expected_v - Model::voltage(laws, state_.polarisation, at, drive))),
               .half_v = Voltage(ocv_slope<S>(at) * Fraction(0.5 / SocBank<S>::points)),
-              .new_v2 = Variance(new_v2 + Variance(at.error_v2 - cell.noise.model_v2))};
+              .new_v2 = Variance(new_v2 + axis_v2(cell, at))};
     };
-    const auto news = bank_.step(soc, bank_share_, cell.noise.voltage_v2, lasting_v2(cell), seen);
+    const auto news = bank_.step(soc, bank_share_, cell.noise.voltage_v2, Variance(lasting_v2(cell) + drop_doubt_v2<S>(middle, current_a, resistance_error_)), seen);
     if (!news.any) return;
     state_.charge.correct(news.moved, cell.charge);
-    state_.covariance.set_last(news.variance);
+    state_.covariance.template know_anew<Model::soc>(news.variance);
     if (news.variance < Variance(SocBank<S>::narrow_soc * SocBank<S>::narrow_soc)) bank_.close();
   }
 
   template <class Cell>
   constexpr void complete(const Cell& cell, Result& estimate) const {
     estimate.soc = state_.charge.soc(cell.charge);
-    estimate.soc_sigma = model::root<Soc>(state_.covariance.last_variance());
+    estimate.soc_sigma = model::root<Soc>(state_.covariance.template variance<Model::soc>());
     estimate.v_rc_v = state_.polarisation[0];
-    if constexpr (mechanism_states > 0) {
-      for (std::size_t k = 0; k < mechanism_states; ++k) estimate.mechanism[k] = state_.polarisation[1 + k];
+    if constexpr (further_values > 0) {
+      std::size_t told = 0;
+      if constexpr (Model::errors_are_states) {
+        estimate.further[told++] = state_.polarisation[Model::voltage_error];
+        estimate.further[told++] = state_.polarisation[Model::current_offset];
+        estimate.further[told++] = model::root<Voltage>(state_.covariance.template variance<Model::last>());
+      }
+      for (std::size_t k = Model::first_held; k < Model::values; ++k) estimate.further[told++] = state_.polarisation[k];
     }
   }
 
@@ -305,7 +326,7 @@ class SocEstimator {
     estimate.flags = flags;
     const Drive rest{Current(0), TimeStep(1)};
     std::uint8_t interval = interval_;
-    const auto at = look_up(model::CellUnder{cell, rest, state_.polarisation}, state_.charge.soc(cell.charge), interval);
+    const auto at = look_up(model::CellUnder{cell, rest, Model::held(state_.polarisation)}, state_.charge.soc(cell.charge), interval);
     estimate.voltage_predicted_v = Model::voltage(laws_of(cell), state_.polarisation, at, rest);
     complete(cell, estimate);
     return estimate;
@@ -331,19 +352,19 @@ class SocEstimator {
     const Soc believed_sigma = soc_of_ppb(from_.soc_sigma_ppb);
     belief.variance = Variance(believed_sigma * believed_sigma);
     // how much the current has built up is unknown: half of what it can, give or take the same
-    const model::CellUnder under{cell, drive, state_.polarisation};
+    const model::CellUnder under{cell, drive, Model::held(state_.polarisation)};
     auto at = look_up(under, has_start_ ? belief.soc : Soc(0.5), interval_);
     const Voltage half_v = at.r1_ohm * Fraction(0.5) * drive.current_a;
     const Variance half_v2 = half_v * half_v;
     std::array<Variance, states> variances{};
     variances[0] = cell.noise.v_rc_v2 + half_v2;
-    Model::start(laws, state_.polarisation, variances, at, drive, cell.noise.v_rc_v2);
+    Model::start(laws, state_.polarisation, variances, at, drive, cell.noise);
     // a belief finer than the points of the grid needs no help from a voltage
     const auto finest = Soc(2.0 / start_points);
     if (!has_start_ || believed_sigma > finest) {
       const Voltage load_v = half_v + Model::sum_v(state_.polarisation) + at.r0_ohm * drive.current_a;
       Variance reading_v2 = cell.noise.rest_v2 + half_v2;
-      for (std::size_t k = 1; k + 1 < states; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
+      for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
       if (!current.measured) {
         const Voltage unknown_v = Voltage(at.r0_ohm * cell.noise.unknown_a) + Voltage(at.r1_ohm * cell.noise.unknown_a);
         reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
@@ -360,7 +381,7 @@ class SocEstimator {
     }
     state_.charge.set(belief.soc, cell.charge);
     state_.polarisation[0] = half_v;
-    variances[states - 1] = belief.variance;
+    variances[Model::soc] = belief.variance;
     state_.covariance.set_diagonal(variances);
     estimate.voltage_predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
     complete(cell, estimate);
@@ -385,6 +406,7 @@ class SocEstimator {
   Coupling resistance_error_{}, resistance_noise_{};  ///< of R0 + R1; and as it counts in the noise of a step
   std::int16_t heeded_ = 0x7FFF;  ///< no temperature's
   Fraction bank_share_{};
+  [[no_unique_address]] typename Model::Forgotten forgotten_{};
   SocBank<S> bank_;
   StartingPoint from_;
   bool has_start_ = false, started_ = false;

@@ -6,7 +6,7 @@
 // observe:   one scalar measurement z = h x + noise(r)       Bierman 1977
 //
 // Both as in G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation" (1977), chapters V and VI.
-// The last state's variance is D's last entry, with no arithmetic: that place is soc's.
+// The last state's variance is D's last entry, with no arithmetic: soc's place, where nothing moves it.
 // State: N (N + 1) / 2 numbers. Cost: in estimator/README.md.
 #pragma once
 
@@ -37,16 +37,28 @@ class UdCovariance {
   /// D: what each state's variance is beside the later ones, the last one's all of it.
   constexpr const Variances& variances() const { return d_; }
 
-  /// The last state is known anew, from elsewhere: that well, and from none of the others.
-  constexpr void set_last(const Variance& variance) {
-    d_[N - 1] = variance;
-    for (std::size_t i = 0; i + 1 < N; ++i) u(i, N - 1) = Coupling{};
+  /// State K is known anew, from elsewhere: that well, and from none of the others.
+  template <std::size_t K>
+  constexpr void know_anew(const Variance& variance) {
+    d_[K] = variance;
+    for (std::size_t i = 0; i < K; ++i) u(i, K) = Coupling{};
+    if constexpr (K + 1 < N) {
+      for (std::size_t j = K + 1; j < N; ++j) u(K, j) = Coupling{};
+    }
   }
 
   /// Process noise of the last state alone, which moves no other.
   constexpr void widen_last(const Variance& by) { d_[N - 1] = Variance(d_[N - 1] + by); }
 
-  constexpr const Variance& last_variance() const { return d_[N - 1]; }
+  /// Of state K, all of it.
+  template <std::size_t K>
+  constexpr Variance variance() const {
+    Variance sum = d_[K];
+    if constexpr (K + 1 < N) {
+      for (std::size_t j = K + 1; j < N; ++j) sum = Variance(sum + model::product<Variance>(model::product<Variance>(d_[j], u(K, j)), u(K, j)));
+    }
+    return sum;
+  }
 
   constexpr void propagate(const Matrix& f, const Variances& q) {
     // rows of [F U | I], weighted by [D | q]; both blocks are upper triangular and stay so

@@ -17,7 +17,7 @@ void visit_rc(Visitor& visitor, Table& rc) {
   visitor.optional_column("c1_std_f", rc.c1_std_f);
 }
 
-/// visitor.number(key, double&), .column(key, Column&), .optional_column(key, Column&), and .table(key) before a table's own keys.
+/// visitor.number(key, double&), .column(key, Column&), .optional_number, _column, _flag, and .table(key) before a table's own keys.
 template <class Visitor, class Parameters>
 void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("capacity_ah", p.capacity_ah);
@@ -50,6 +50,7 @@ void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("current_offset_a", p.noise.current_offset_a);
   visitor.number("current_offset_correlation_s", p.noise.current_offset_correlation_s);
   visitor.number("current_unknown_a", p.noise.current_unknown_a);
+  visitor.optional_flag("errors_are_states", p.noise.errors_are_states);
 
   visitor.table("tolerance");
   visitor.number("ocv_v", p.tolerance.ocv_v);

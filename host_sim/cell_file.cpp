@@ -33,6 +33,12 @@ class Table {
     return number_of(node, key);
   }
 
+  bool flag(const std::string& key) {
+    const toml::node& node = required(key, "true or false");
+    if (!node.is_boolean()) refuse(node, key, "true or false");
+    return *node.value<bool>();
+  }
+
   template <class Column>
   void column(const std::string& key, Column& into) {
     const toml::node& node = required(key, "a list of numbers");
@@ -161,6 +167,9 @@ class Reader {
   void optional_number(const std::string& key, double& into) {
     if (here().has(key)) number(key, into);
   }
+  void optional_flag(const std::string& key, bool& into) {
+    if (here().has(key)) into = here().flag(key);
+  }
   template <class Column>
   void column(const std::string& key, Column& into) {
     here().column(key, into);
@@ -192,6 +201,9 @@ class Writer {
   void number(const std::string& key, double value) { text_ += key + " = " + literal(value) + "\n"; }
   void optional_number(const std::string& key, double value) {
     if (value != 0) number(key, value);
+  }
+  void optional_flag(const std::string& key, bool value) {
+    if (value) text_ += key + " = true\n";
   }
   template <class Column>
   void column(const std::string& key, const Column& column) {

@@ -88,13 +88,9 @@ std::vector<Group> grouped(const std::vector<Recording>& recordings, const std::
   constexpr double alike_k = 5;
   std::vector<std::pair<double, std::size_t>> means;
   for (std::size_t k = 0; k < recordings.size(); ++k) {
-    double sum = 0;
-    std::size_t count = 0;
-    for (const double t : recordings[k].temperature_c) {
-      if (std::isfinite(t)) sum += t, ++count;
-    }
-    if (count == 0) return {{25, records}};
-    means.emplace_back(sum / static_cast<double>(count), k);
+    const auto mean_c = mean_temperature_c(recordings[k]);
+    if (!mean_c) return {{25, records}};
+    means.emplace_back(*mean_c, k);
   }
   std::sort(means.begin(), means.end());
   std::vector<Group> groups;
@@ -188,17 +184,21 @@ int run(const IdentifyOptions& options) {
   const id::Method method = method_of(options.optimizer);
   CellFile cell = read_cell(options.start);
   const double start_capacity_ah = cell.parameters.capacity_ah;
+  OcvTaken taken;
   if (!options.ocv.empty()) {
-    const OcvTaken taken = take_ocv(options.ocv, options.ocv_error_v, cell);
+    taken = take_ocv(options.ocv, options.ocv_error_v, options.extend, cell);
     result.coulombic_efficiency = taken.coulombic_efficiency;
     result.warnings = taken.warnings;
   }
   if (options.capacity_ah > 0) cell.parameters.capacity_ah = options.capacity_ah;
+  if (options.extend) take_hysteresis(taken, cell);
+  const bool has_hysteresis = options.extend && !cell.mechanisms.empty();
   if (options.lean && cell.parameters.ocv.half_gap_v.size > 0) cell.parameters = id::leaning(cell.parameters, *options.lean);
 
   DataOptions data{initial_soc_of(options.initial_soc), window_of("--window", options.window), cell.parameters};
   std::vector<Recording> recordings;
   std::vector<id::Record> records;
+  std::vector<IdentificationData> measured;
   double soc_min = 1, soc_max = 0;
   for (const std::string& path : options.recordings) {
     recordings.push_back(read_recording(path));
@@ -207,9 +207,10 @@ int run(const IdentifyOptions& options) {
     for (const Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
     IdentificationData d = identification_data(r, data);
     filter(options, path, d.record.data);
-    records.push_back(std::move(d.record));
+    records.push_back(has_hysteresis ? without_mechanisms(cell, d) : d.record);
     soc_min = std::min(soc_min, d.soc_min);
     soc_max = std::max(soc_max, d.soc_max);
+    measured.push_back(std::move(d));
   }
 
   if (options.model != "nlgr") return run_linear(options, method, cell, records.front(), (soc_min + soc_max) / 2, data, result);
@@ -223,7 +224,7 @@ int run(const IdentifyOptions& options) {
   id::GreyBoxOptions grey_box;
   grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(soc_min, soc_max) : options.nodes;
   grey_box.bounds = circuit_bounds(cell.parameters.capacity_ah);
-  grey_box.estimate_lean = !options.lean && cell.parameters.ocv.half_gap_v.size > 0;
+  grey_box.estimate_lean = !options.lean && !has_hysteresis && cell.parameters.ocv.half_gap_v.size > 0;
   grey_box.voltage_sigma_v = cell.parameters.noise.voltage_v;
   try {
     result.identification = id::identify_grey_box(id::started_from_rests(cell.parameters, groups[main_group].records.front().data, grey_box.bounds), groups[main_group].records, grey_box, method);
@@ -252,10 +253,11 @@ int run(const IdentifyOptions& options) {
   cell.sources["rc"] = fmt::format("{} by {} from {}, {} node{}: {:.2f} mV RMS, fit {:.1f} %; deviations count runs of residuals", options.model, options.optimizer, files,
                                    nodes.size, nodes.size == 1 ? "" : "s", 1e3 * result.identification.estimation.rmse_v, result.identification.estimation.fit_percent);
   if (cell.parameters.ocv.lean != 0) cell.sources["ocv"] += fmt::format("; leaning by {:.2f} of the way to slow {}", std::abs(cell.parameters.ocv.lean), cell.parameters.ocv.lean < 0 ? "discharge" : "charge");
-  cell.sources["noise"] = fmt::format("voltage and current: rests of {}; model: what {} left over; current offset as in {}", files,
-                                      result.validations.empty() ? files : std::filesystem::path(options.validate.front()).filename().string(), options.start);
+  const std::string judged_by = result.validations.empty() ? files : std::filesystem::path(options.validate.front()).filename().string();
+  cell.sources["noise"] = fmt::format("voltage and current: rests of {}; ", files) + (options.extend ? extended_noise : fmt::format("model: what {} left over; current offset as in {}", judged_by, options.start));
   cell.parameters.noise.current_offset_a *= cell.parameters.capacity_ah / start_capacity_ah;
   cell.parameters.noise.current_unknown_a *= cell.parameters.capacity_ah / start_capacity_ah;
+  if (options.extend) extend(taken, measured, cell);
   if (const model::CellFault fault = model::first_fault(cell.parameters); fault.what != nullptr) {
     throw BadInput(options.out, 1, fmt::format("what was identified is no cell: '{}' is out of range, expected {}; more or other recordings, or fewer --nodes, may help", fault.key, fault.what));
   }

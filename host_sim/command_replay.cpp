@@ -35,15 +35,7 @@ Track run_on(const EmulatedBoard& board, const CellFile& cell, const std::vector
   if (scalar != board.scalar) {
     throw BadInput(board.name, 1, fmt::format("computes in {}, expected --scalar {}", name_of(board.scalar), name_of(board.scalar)));
   }
-  Track track;
-  name_states(track, cell);
-  BoardRun run = run_on_board(board, firmware_image(board.name, cell, Image::replay), samples, start, {}, track.state_names.size());
-  track.rows = rows_of(run.words, scalar);
-  track.words = std::move(run.words);
-  track.state_words = std::move(run.state_words);
-  number_states(track, scalar);
-  track.steps_per_second = run.steps_per_second;
-  return track;
+  return run_on_board(board, cell, samples, start);
 }
 
 /// Mechanisms that do not act in the estimator; a shift of the start does, through what it is told.

@@ -13,6 +13,7 @@
 #include "host_sim/bad_input.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/text_file.hpp"
+#include "host_sim/firmware_image.hpp"
 
 namespace bms {
 
@@ -129,6 +130,18 @@ BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& i
   const double seconds = std::chrono::duration<double>(last_at - first_at).count();
   if (seconds > 0) run.steps_per_second = static_cast<double>(have - first_block) / static_cast<double>(row) / seconds;
   return run;
+}
+
+Track run_on_board(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
+  Track track;
+  name_states(track, cell);
+  BoardRun run = run_on_board(board, firmware_image(board.name, cell, Image::replay), samples, start, {}, track.state_names.size());
+  track.rows = rows_of(run.words, board.scalar);
+  track.words = std::move(run.words);
+  track.state_words = std::move(run.state_words);
+  number_states(track, board.scalar);
+  track.steps_per_second = run.steps_per_second;
+  return track;
 }
 
 }  // namespace bms

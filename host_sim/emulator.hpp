@@ -14,7 +14,7 @@ namespace bms {
 
 struct BoardRun {
   std::vector<EstimateWords> words;
-  std::vector<std::uint32_t> state_words;  ///< of mechanisms, row by row
+  std::vector<std::uint32_t> state_words;  ///< of what the filter knows besides, row by row
   double steps_per_second = 0;  ///< from the first block of estimates to the last: the emulator's start-up is not in it
 };
 
@@ -33,5 +33,8 @@ std::vector<std::string> emulator_command(const EmulatedBoard& board, const std:
 /// states: of mechanisms, in each estimate. Throws std::runtime_error when the emulator fails or stops answering.
 BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<Sample>& samples,
                       const std::optional<StartingPoint>& start, const std::vector<std::string>& more = {}, std::size_t states = 0);
+
+/// The same with the board's firmware for this cell, which is built if need be, as numbers.
+Track run_on_board(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start);
 
 }  // namespace bms

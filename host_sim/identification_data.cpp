@@ -66,6 +66,7 @@ IdentificationData identification_data(const Recording& recording, const DataOpt
     const bool counts = soc[k] <= options.window.high && soc[k] >= options.window.low;
     data.time_s.push_back(recording.time_s[k]);
     data.current_a.push_back(recording.current_a[k]);
+    if (!recording.temperature_c.empty()) d.temperature_c.push_back(recording.temperature_c[k]);
     data.voltage_v.push_back(counts ? recording.voltage_v[k] : std::numeric_limits<double>::quiet_NaN());
   }
   d.record.initial_soc = std::clamp(soc[from], 0.0, 1.0);

@@ -6,23 +6,42 @@
 #include <vector>
 
 #include "host_sim/cell_file.hpp"
+#include "host_sim/identification_data.hpp"
 #include "host_sim/recording.hpp"
 #include "identification/identify.hpp"
+#include "identification/slow_gap.hpp"
 
 namespace bms {
 
 struct OcvTaken {
   std::optional<double> coulombic_efficiency;  ///< discharged over charged; only of a run of each kind
+  std::vector<identification::GapAt> gaps;     ///< of each temperature with a run of each kind
   std::vector<Warning> warnings;
 };
 
 /// OCV, gap and capacity of slow charge and discharge recordings, with as few straight pieces as stay within error_asked_v; with more error,
-/// and a warning, where that cannot be. Throws BadInput when they are no slow runs.
-OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, CellFile& cell);
+/// and a warning, where that cannot be. Of runs at several temperatures those nearest to 25 degrees C make the curve. both_branches: with corners where the gap
+/// bends, too. Throws BadInput when they are no slow runs.
+OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, bool both_branches, CellFile& cell);
+
+/// The hysteresis between the measured curves of charge and discharge, as a mechanism; none where there was one run.
+void take_hysteresis(const OcvTaken& ocv, CellFile& cell);
+
+/// Takes what the cell's mechanisms do to the voltage off a record, so that a circuit can be identified from the rest.
+identification::Record without_mechanisms(const CellFile& cell, const IdentificationData& of);
+
+/// What an estimator needs besides: resistances that follow the temperature, errors that last as states of the filter, and noise as it then
+/// is. data: what was identified from, as measured.
+inline constexpr const char* extended_noise =
+    "model: what they leave for longer than ten minutes, and a minor loop of the hysteresis; current offset: a sensor good to a hundredth of the 1C current, over a day's work";
+void extend(const OcvTaken& ocv, const std::vector<IdentificationData>& data, CellFile& cell);
 
 /// Noise and tolerance: of the measuring chain by the recordings' rests, of the model by what it leaves over on `judge`, and by what lies
 /// on the side of the OCV's gap that it does not lean to.
 void take_noise(const std::vector<Recording>& recordings, const identification::Fit& judge, const std::vector<identification::Parameter>& parameters, model::CellParameters<>& p);
+
+/// Mean of the temperatures that were recorded; nothing: none.
+std::optional<double> mean_temperature_c(const Recording& recording);
 
 /// Seven digits of every number: more are noise.
 void round_digits(CellFile& cell);

@@ -40,7 +40,9 @@ std::string json_of(const ReplayResult& r, const std::string& trace_sha256) {
                  {"max_error", optional(r.soc.max_error)},
                  {"rmse_after_30min", optional(r.soc.rmse_after_30min)},
                  {"max_error_after_30min", optional(r.soc.max_error_after_30min)},
-                 {"within_2_sigma", optional(r.soc.within_2_sigma)}};
+                 {"within_2_sigma", optional(r.soc.within_2_sigma)},
+                 {"current_offset_a", optional(r.soc.current_offset_a)},
+                 {"current_offset_sigma_a", optional(r.soc.current_offset_sigma_a)}};
   json["voltage"] = {{"prediction_rmse_v", optional(r.voltage.prediction_rmse_v)},
                      {"prediction_max_v", optional(r.voltage.prediction_max_v)},
                      {"open_loop_rmse_v", optional(r.voltage.open_loop_rmse_v)},

@@ -99,6 +99,7 @@ void add_identify(CLI::App& app, bms::IdentifyOptions& o) {
   c.add_option("--validate", o.validate, "recordings to judge the result by; nothing is identified from them")->type_name("FILE");
   c.add_option("--validate-window", o.validate_window, "the same for those; as --window if not given")->type_name("HI:LO");
   c.add_option("--nodes", o.nodes, "state of charge at which R0, R1, C1 are identified, as in 0.2,0.5,0.8; linear in between")->delimiter(',')->check(Within(0.0, 1.0));
+  c.add_flag("--extend", o.extend, "what an estimator needs beyond the circuit, from the same recordings: hysteresis between slow charge and discharge, resistances that follow the temperature, lasting errors as states of the filter");
   c.add_option("--lean", o.lean, "where the OCV lies between slow discharge (-1) and charge (1); identified if not given")->check(Within(-1.0, 1.0));
   c.add_option("--ocv-error-v", o.ocv_error_v, "largest error of the OCV's straight pieces")->check(Within(0.0002, 0.05))->capture_default_str();
   c.add_option("--filter-hz", o.filter_hz, "Butterworth low-pass of second order on the current, forward and backward; none if not given")->check(Within(1e-4, 1e3));

@@ -1,6 +1,7 @@
 #include "host_sim/replay.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <iterator>
@@ -17,6 +18,10 @@ namespace bms {
 namespace {
 
 constexpr double thirty_minutes_s = 1'800;
+/// As an ExtendedEstimate tells them.
+constexpr std::array error_names = {"voltage_error_v", "current_offset_a", "current_offset_sigma_a"};
+constexpr std::size_t current_offset_at = 1, current_offset_sigma_at = 2;
+
 constexpr double timing_s = 0.03;  // long enough that a clock and a cold cache do not matter
 
 template <class S>
@@ -36,13 +41,13 @@ template <class Estimator, class Cell>
 }
 
 template <class Estimator, class Cell>
-Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::size_t states) {
+Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::size_t further) {
   using S = typename Estimator::Scalar;
   std::vector<typename Estimator::Result> estimates(samples.size());
   double best_s = std::numeric_limits<double>::infinity(), total_s = 0;
   do {
     const auto begin = std::chrono::steady_clock::now();
-    if constexpr (Estimator::mechanism_states == 0) step_through_flat<Estimator>(cell, samples, start, estimates);
+    if constexpr (Estimator::further_values == 0) step_through_flat<Estimator>(cell, samples, start, estimates);
     else step_through<Estimator>(cell, samples, start, estimates);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     best_s = std::min(best_s, seconds);
@@ -55,10 +60,10 @@ Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const 
   for (const auto& e : estimates) {
     track.rows.push_back(row_of<S>(e));
     if constexpr (!std::same_as<S, double>) track.words.push_back(words(static_cast<const Estimate<S>&>(e)));
-    if constexpr (Estimator::mechanism_states > 0) {
-      for (std::size_t k = 0; k < states; ++k) {
-        if constexpr (std::same_as<S, double>) track.states.push_back(e.mechanism[k]);
-        else track.state_words.push_back(word(e.mechanism[k]));
+    if constexpr (Estimator::further_values > 0) {
+      for (std::size_t k = 0; k < further; ++k) {
+        if constexpr (std::same_as<S, double>) track.states.push_back(e.further[k]);
+        else track.state_words.push_back(word(e.further[k]));
       }
     }
   }
@@ -66,21 +71,23 @@ Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const 
 }
 
 /// A cell with mechanisms: as many states in the filter as they have voltages.
-template <class S, std::size_t Voltages = 0>
+template <class S, bool Errors, std::size_t Voltages = 0>
 Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
   using Laws = model::ChosenLaws<S>;
   if constexpr (Voltages < Laws::most_voltage_states) {
-    if (cell.laws.voltage_states() > Voltages) return run_extended<S, Voltages + 1>(cell, samples, start);
+    if (cell.laws.voltage_states() > Voltages) return run_extended<S, Errors, Voltages + 1>(cell, samples, start);
   }
-  return run_estimator<SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states>::template Of>>(cell, samples, start, cell.laws.states());
+  return run_estimator<SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>>(cell, samples, start, (Errors ? error_names.size() : 0) + cell.laws.states());
 }
 
 template <class S>
 Track run(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
   const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
   const auto mechanisms = on_board(file.mechanisms);
-  if (mechanisms.empty()) return run_estimator<SocEstimator<S>>(cell, samples, start, 0);
-  return run_extended<S>({cell, model::chosen<S>(mechanisms, file.parameters.capacity_ah)}, samples, start);
+  const bool errors = file.parameters.noise.errors_are_states;
+  if (mechanisms.empty() && !errors) return run_estimator<SocEstimator<S>>(cell, samples, start, 0);
+  const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> extended{cell, model::chosen<S>(mechanisms, file.parameters.capacity_ah)};
+  return errors ? run_extended<S, true>(extended, samples, start) : run_extended<S, false>(extended, samples, start);
 }
 
 /// The value of an estimate's word as a board writes it.
@@ -123,12 +130,16 @@ Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, cons
 }
 
 std::size_t state_count(const CellFile& cell) {
-  std::size_t count = 0;
+  std::size_t count = cell.parameters.noise.errors_are_states ? error_names.size() : 0;
   for (const model::MechanismSetting& m : on_board(cell.mechanisms)) count += model::catalogue[m.index].states;
   return count;
 }
 
 void name_states(Track& track, const CellFile& cell) {
+  if (cell.parameters.noise.errors_are_states) {
+    track.state_names.assign(error_names.begin(), error_names.end());
+    track.state_scales = {1, cell.parameters.capacity_ah, cell.parameters.capacity_ah};
+  }
   for (const model::MechanismSetting& m : on_board(cell.mechanisms)) {
     const model::MechanismInfo& info = model::catalogue[m.index];
     for (std::size_t k = 0; k < info.states; ++k) {
@@ -211,6 +222,11 @@ void evaluate(ReplayResult& result) {
   }
   result.soc.final = rows.back().soc;
   result.soc.final_sigma = rows.back().soc_sigma;
+  if (result.cell.parameters.noise.errors_are_states) {
+    const std::size_t last = (rows.size() - 1) * result.track.state_names.size();
+    result.soc.current_offset_a = result.track.states[last + current_offset_at];
+    result.soc.current_offset_sigma_a = result.track.states[last + current_offset_sigma_at];
+  }
   if (soc.count() > 0) {
     result.soc.rmse = soc.rms();
     result.soc.max_error = soc.max();

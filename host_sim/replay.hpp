@@ -21,13 +21,14 @@ struct EstimateRow {
   std::uint32_t flags = 0;
 };
 
-/// The estimates of one run. States of mechanisms stand row by row, state_names.size() to a row.
+/// The estimates of one run. What the filter of an extended cell knows besides stands row by row, state_names.size() to a row: errors that
+/// are states, states of mechanisms.
 struct Track {
   std::vector<EstimateRow> rows;
   std::vector<EstimateWords> words;  ///< the bits behind them; empty for double
-  std::vector<std::string> state_names;      ///< "ocv_hysteresis_v", "slow_polarisation_1_v", "self_heating_k"
+  std::vector<std::string> state_names;      ///< "current_offset_a", "ocv_hysteresis_v", "slow_polarisation_1_v", "self_heating_k"
   std::vector<double> state_scales;          ///< of what the words hold to the name's unit
-  std::vector<double> states;                ///< V, K
+  std::vector<double> states;                ///< V, K, A
   std::vector<std::uint32_t> state_words;
   double steps_per_second = 0;
 };
@@ -40,7 +41,7 @@ struct Belief {
 /// shift: what a cell file knows of the truth of such beliefs.
 std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief, double shift = 0);
 
-/// How many states the estimator has for the mechanisms of this cell file; name_states: which.
+/// How many of them the estimator tells with this cell file; name_states: which.
 std::size_t state_count(const CellFile& cell);
 void name_states(Track& track, const CellFile& cell);
 
@@ -64,6 +65,7 @@ std::optional<Difference> first_difference(const Track& host, const Track& board
 struct SocFigures {
   double final = 0, final_sigma = 0;
   std::optional<double> rmse, max_error, rmse_after_30min, max_error_after_30min, within_2_sigma;
+  std::optional<double> current_offset_a, current_offset_sigma_a;  ///< at the end, where errors are states
 };
 struct VoltageFigures {
   std::optional<double> prediction_rmse_v, prediction_max_v, open_loop_rmse_v, open_loop_fit_percent;  ///< nothing: no voltage to judge by

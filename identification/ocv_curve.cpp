@@ -238,4 +238,28 @@ std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
   return pieces;
 }
 
+void add_gap_corners(OcvPieces& pieces, const OcvCurve& curve, double error_v, std::size_t most) {
+  constexpr double lowest = 0.05, highest = 0.97;
+  while (pieces.soc.size() < most) {
+    // where it is off by most
+    double largest_v = error_v;
+    std::size_t worst = 0, before = 0;
+    for (std::size_t k = 0, piece = 0; k < curve.soc.size(); ++k) {
+      const double soc = curve.soc[k];
+      while (piece + 2 < pieces.soc.size() && soc > pieces.soc[piece + 1]) ++piece;
+      if (soc < lowest || soc > highest) continue;
+      const double from = pieces.soc[piece], to = pieces.soc[piece + 1], t = (soc - from) / (to - from);
+      const double off_v = std::abs(pieces.half_gap_v[piece] + t * (pieces.half_gap_v[piece + 1] - pieces.half_gap_v[piece]) - curve.half_gap_v[k]);
+      constexpr double narrowest = 0.0025;
+      if (off_v > largest_v && soc - from > narrowest && to - soc > narrowest) largest_v = off_v, worst = k, before = piece;
+    }
+    if (worst == 0) return;
+    const double t = (curve.soc[worst] - pieces.soc[before]) / (pieces.soc[before + 1] - pieces.soc[before]);
+    const auto here = static_cast<std::ptrdiff_t>(before + 1);
+    pieces.ocv_v.insert(pieces.ocv_v.begin() + here, pieces.ocv_v[before] + t * (pieces.ocv_v[before + 1] - pieces.ocv_v[before]));
+    pieces.half_gap_v.insert(pieces.half_gap_v.begin() + here, curve.half_gap_v[worst]);
+    pieces.soc.insert(pieces.soc.begin() + here, curve.soc[worst]);
+  }
+}
+
 }  // namespace bms::identification

@@ -40,4 +40,8 @@ struct OcvPieces {
 /// Nothing when the curve falls by more than that error allows.
 std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v);
 
+/// More corners on the same polyline, at most `most` in all, until the gap between them is straight to error_v from 5 to 97 % of soc: then
+/// middle plus and less half_gap_v are the curves of charge and discharge, whose knees lie apart.
+void add_gap_corners(OcvPieces& pieces, const OcvCurve& curve, double error_v, std::size_t most);
+
 }  // namespace bms::identification

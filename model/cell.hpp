@@ -30,6 +30,7 @@ struct Interval {
   Resistance<S> r0_ohm{}, r0_delta_ohm{};
   Resistance<S> r1_ohm{}, r1_delta_ohm{};
   Capacitance<S> c1_f{}, c1_delta_f{};
+  Factor<S> gap{1}, gap_delta{};  ///< of the distance between charge and discharge (ocv.half_gap_v): over what it is in the middle of the curve
   Variance<S> error_v2{};  ///< of the voltage there, lasting: noise.model_v, and the slope times what the soc axis is good to (tolerance.initial_soc)
 };
 
@@ -56,6 +57,9 @@ struct FilterNoise {
   Variance<S> rest_v2{};
   Soc<S> white_soc_per_s{};             ///< current_a over the capacity
   Variance<S> walk_soc2_per_s{};        ///< slow current error: 2 offset^2 correlation / capacity^2
+  Variance<S> offset_per_h2{};          ///< the same as a state of the filter: current_offset_a over the capacity in Ah, squared
+  Duration<S> current_offset_correlation_s{};
+  Current<S> one_c_a{};                 ///< the capacity in one hour
   Soc<S> unknown_soc_per_s{};           ///< current_unknown_a over the capacity
   Current<S> unknown_a{};
 };
@@ -96,6 +100,7 @@ struct TablePoint {
   Resistance<S> r1_ohm, r1_delta_ohm;
   Capacitance<S> c1_f, c1_delta_f;
   Variance<S> error_v2{};
+  Factor<S> gap{1}, gap_delta{};
   Factor<S> activation{1};  ///< by how much resistances that the tables do not hold differ with the temperature
   VoltagePerSoc<S> read_slope_v{0};  ///< of the OCV, by the soc at which laws read it elsewhere
 };
@@ -143,6 +148,34 @@ constexpr std::size_t ocv_piece(const OcvTable<Real>& ocv, double soc) {
 
 }  // namespace cell_detail
 
+/// Half the distance between charge and discharge in the middle of the curve [V], 20 to 90 % of soc; 0: not known.
+template <class Real>
+constexpr double middle_half_gap_v(const OcvTable<Real>& ocv) {
+  double area = 0, width = 0;
+  for (std::size_t k = 0; k + 1 < ocv.half_gap_v.size; ++k) {
+    const double from = ocv.soc[k] > 0.2 ? ocv.soc[k] : 0.2, to = ocv.soc[k + 1] < 0.9 ? ocv.soc[k + 1] : 0.9;
+    if (!(to > from)) continue;
+    const double slope = (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
+    area += (to - from) * (ocv.half_gap_v[k] + slope * ((from + to) / 2 - ocv.soc[k]));
+    width += to - from;
+  }
+  return width > 0 && area > 0 ? area / width : 0;
+}
+
+namespace cell_detail {
+
+/// The half gap over that of the middle; at the ends it is more of the current that it was measured with than of the cell.
+template <class Real>
+constexpr double gap_at(const OcvTable<Real>& ocv, double middle_v, double soc) {
+  if (!(middle_v > 0)) return 1;
+  const std::size_t k = ocv_piece(ocv, soc);
+  const double t = soc <= 0 ? 0 : soc >= 1 ? 1 : (soc - ocv.soc[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
+  const double gap = (ocv.half_gap_v[k] + t * (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k])) / middle_v;
+  return gap < 0 ? 0 : gap > 2 ? 2 : gap;
+}
+
+}  // namespace cell_detail
+
 /// Number of intervals that prepare() will make: two outside and one between each pair of edges or nodes.
 template <class Real>
 constexpr std::size_t interval_count(const CellParameters<Real>& p) {
@@ -161,6 +194,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   Cell<S, Max> cell;
 
   const auto edges = d::merged_edges(p);
+  const double middle_gap_v = middle_half_gap_v(p.ocv);
   const auto add = [&](double from, double to) {
     const double width = to - from;
     const std::size_t piece = d::ocv_piece(p.ocv, from);
@@ -178,6 +212,9 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
     line(p.rc.r0_ohm, i.r0_ohm, i.r0_delta_ohm);
     line(p.rc.r1_ohm, i.r1_ohm, i.r1_delta_ohm);
     line(p.rc.c1_f, i.c1_f, i.c1_delta_f);
+    const double gap = d::gap_at(p.ocv, middle_gap_v, from);
+    i.gap = Factor<S>(gap);
+    i.gap_delta = Factor<S>(d::gap_at(p.ocv, middle_gap_v, to) - gap);
     const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc, error_v2 = p.noise.model_v * p.noise.model_v + axis_v * axis_v;
     i.error_v2 = Variance<S>(error_v2 < largest_error_v2 ? error_v2 : largest_error_v2);
     ++cell.size;
@@ -211,6 +248,9 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.rest_v2 = Variance<S>(square(n.rest_v));
   cell.noise.white_soc_per_s = Soc<S>(n.current_a / capacity_as);
   cell.noise.walk_soc2_per_s = Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
+  cell.noise.offset_per_h2 = Variance<S>(square(n.current_offset_a / p.capacity_ah));
+  cell.noise.current_offset_correlation_s = Duration<S>(n.current_offset_correlation_s < 131'000 ? n.current_offset_correlation_s : 131'000);
+  cell.noise.one_c_a = Current<S>(p.capacity_ah);
   cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
   cell.noise.unknown_a = Current<S>(n.current_unknown_a);
 
@@ -250,7 +290,9 @@ constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std
           .r1_delta_ohm = i.r1_delta_ohm,
           .c1_f = i.c1_f + t * i.c1_delta_f,
           .c1_delta_f = i.c1_delta_f,
-          .error_v2 = i.error_v2};
+          .error_v2 = i.error_v2,
+          .gap = i.gap + t * i.gap_delta,
+          .gap_delta = i.gap_delta};
 }
 
 template <class S, std::size_t Max>

@@ -68,6 +68,7 @@ struct Noise {
   double current_offset_a = 0;              ///< slow error of the current reading
   double current_offset_correlation_s = 0;  ///< how long it lasts
   double current_unknown_a = 0;             ///< current to be expected while there is no reading
+  bool errors_are_states = false;           ///< the filter estimates the current's offset and the model's lasting error; else it widens sigma by them
 };
 
 /// What the calibration is good for: a difference inside it is not a mismatch.

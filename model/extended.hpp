@@ -140,7 +140,8 @@ TablePoint<S> look_up_dual(const Cell<double, max_intervals>& cell, const S& soc
   return {.per_width = S(p.per_width), .ocv_v = line(p.ocv_v, p.ocv_delta_v), .ocv_delta_v = S(p.ocv_delta_v),
           .r0_ohm = line(p.r0_ohm, p.r0_delta_ohm), .r0_delta_ohm = S(p.r0_delta_ohm),
           .r1_ohm = line(p.r1_ohm, p.r1_delta_ohm), .r1_delta_ohm = S(p.r1_delta_ohm),
-          .c1_f = line(p.c1_f, p.c1_delta_f), .c1_delta_f = S(p.c1_delta_f)};
+          .c1_f = line(p.c1_f, p.c1_delta_f), .c1_delta_f = S(p.c1_delta_f),
+          .gap = line(p.gap, p.gap_delta), .gap_delta = S(p.gap_delta)};
 }
 
 /// A cell on its way through a recording, open loop. S: double or a dual number.

@@ -169,13 +169,12 @@ class LawSet {
     });
     return x;
   }
-  /// How each state moves in a step.
-  constexpr Relaxations settling(const TablePoint<S>& at, const Drive<S>& drive) const {
+  /// How each state moves in a step. x: the laws' states before it.
+  template <class X>
+  constexpr Relaxations settling(const X& x, const TablePoint<S>& at, const Drive<S>& drive) const {
     Relaxations r{};
     each_with_states([&](const auto& law, std::size_t first) {
-      if constexpr (requires { law.settle(0, at, drive); }) {
-        for (std::size_t i = 0; i < states_of(law); ++i) r[first + i] = law.settle(i, at, drive);
-      }
+      for (std::size_t i = 0; i < states_of(law); ++i) r[first + i] = settle(law, i, at, drive, &x[first]);
     });
     return r;
   }
@@ -199,10 +198,8 @@ class LawSet {
     Voltage<S> sum(0);
     each_with_states([&](const auto& law, std::size_t first) {
       for (std::size_t i = 0; i < states_of(law); ++i) {
-        if constexpr (requires { law.settle(i, at, drive); }) {
-          if (moving) x[first + i] = relaxed<S>(x[first + i], law.settle(i, at, drive));
-          if (adds_voltage(law)) sum = Voltage<S>(sum + x[first + i]);
-        }
+        if (moving) x[first + i] = relaxed<S>(x[first + i], settle(law, i, at, drive, &x[first]));
+        if (adds_voltage(law)) sum = Voltage<S>(sum + x[first + i]);
       }
     });
     return sum;
@@ -220,6 +217,12 @@ class LawSet {
     } else {
       return soc;
     }
+  }
+  template <class Law>
+  static constexpr Relaxation<S> settle(const Law& law, std::size_t i, const TablePoint<S>& at, const Drive<S>& drive, const Voltage<S>* x) {
+    if constexpr (requires { law.settle(i, at, drive, x); }) return law.settle(i, at, drive, x);
+    else if constexpr (extended_detail::states_of<Law>() > 0) return law.settle(i, at, drive);
+    else return {};
   }
   template <class Law>
   static constexpr std::size_t states_of(const Law&) {

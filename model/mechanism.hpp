@@ -11,7 +11,8 @@
 //   Coupling<S> read_slope(Soc<S>)                                 its derivative; with read_at only
 //   void tables(TablePoint<S>&, Soc<S>, const Drive<S>&)           changes OCV, R0, R1, C1 at this soc under this drive
 //   Voltage<S> initial(std::size_t i)                              state i before the first step
-//   Relaxation<S> settle(std::size_t i, const TablePoint<S>&, const Drive<S>&)     how state i moves in a step
+//   Relaxation<S> settle(std::size_t i, const TablePoint<S>&, const Drive<S>&)     how state i moves in a step; with a fourth argument,
+//                                                                  const Voltage<S>* x, where that depends on the law's own states
 //   void warm(TablePoint<S>&, Voltage<S> state, const Drive<S>&)   changes the tables by the law's own state
 //   Voltage<S> reading(Voltage<S>)                                 what the voltage sensor makes of the voltage: a straight line
 //   Voltage<S> error_at_first(), lasting_error()                   standard deviations of its voltage states, for the filter; without
@@ -83,6 +84,7 @@ template <class S>
 struct Relaxation {
   Fraction<S> settled;   ///< p
   Voltage<S> target;     ///< where it goes
+  Fraction<S> renewed = settled;  ///< how much of an error in the state is gone after it
 };
 
 /// What a law's states are where they are no voltages: the unit for people, and how much of it one unit of the state is.

@@ -1,9 +1,17 @@
-// Hysteresis of the open-circuit voltage, one state (Plett, J. Power Sources 134 (2004) 252, Part 2, with its decay in charge moved):
+// Hysteresis of the open-circuit voltage, one state h:
 //
-//   dh/dt = gamma |I| / (3600 C_n) (sgn I - h)        V += M (h - h_0)
+//   V += M (h - h_0)      -1 <= h <= 1
 //
-// The state carried is M h. h_0 is where the cell file's OCV lies between the branches: -1 the discharge branch, 0 the middle,
-// 1 the charge branch. h is not changed by rest, however long.
+// h_0 is where the cell file's OCV lies between the branches: -1 the discharge branch, 0 the middle, 1 the charge branch. h is not
+// changed by rest, however long. How it moves, and M, by `measured`:
+//
+//   0   dh/dt = gamma |I| / (3600 C_n) (sgn I - h), M the same everywhere (Plett, J. Power Sources 134 (2004) 252, Part 2, with its decay
+//       in charge moved). What diagnosis seeks
+//   1   dh/dt = gamma I / (3600 C_n), stopped at -1 and 1, and M follows the cell file's half_gap_v over soc: at h = -1 and 1 the OCV is the
+//       curve that was measured in discharge and charge. Where a drive recovers some of what it takes, a cell stays near its discharge
+//       branch, knees and all; the first law, whose mean h is charge less discharge over their sum, puts it half way
+//
+// The state carried is M h, M that of the middle of the curve.
 #pragma once
 
 #include "model/exponential.hpp"
@@ -17,9 +25,10 @@ struct OcvHysteresis {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"half_gap_v", "V", Role::strength, 0, 0, 0.07, Per::cell, "half of charge less discharge branch, M; 3 to 40 mV is usual for LFP", 0.04},
-      Parameter{"decay", "1", Role::shape, 40, 8, 400, Per::cell, "gamma: 1 / decay of the capacity moved leads from one branch to 63 % of the way to the other"},
+      Parameter{"decay", "1", Role::shape, 40, 8, 400, Per::cell, "gamma: 1 / decay of the capacity moved leads from one branch to 63 % of the way to the other; measured: to half of it"},
       Parameter{"ocv_at", "1", Role::place, 0, -1, 1, Per::cell, "h_0: where the OCV of the cell file lies, -1 discharge .. 1 charge branch"},
       Parameter{"initial", "1", Role::place, 0, -1, 1, Per::cell, "h at the start of a recording"},
+      Parameter{"measured", "1", Role::given, 0, 0, 1, Per::cell, "1: between the curves of charge and discharge in the cell file; 0: exponentially, and the same gap everywhere"},
   };
 
   template <class S>
@@ -28,22 +37,37 @@ struct OcvHysteresis {
     static constexpr bool voltage_states = true;
     Voltage<S> half_gap_v, ocv_at_v, initial_v;
     Coupling<S> per_mas;  ///< gamma / (3600 C_n), per 1000 A s
+    bool measured;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 4>& p, double capacity_ah)
-        : half_gap_v(Voltage<S>(p[0])), ocv_at_v(Voltage<S>(p[0] * p[2])), initial_v(Voltage<S>(p[0] * p[3])), per_mas(Coupling<S>(p[1] / Real(3.6 * capacity_ah))) {}
+    constexpr Law(const std::array<Real, 5>& p, double capacity_ah)
+        : half_gap_v(Voltage<S>(p[0])), ocv_at_v(Voltage<S>(p[0] * p[2])), initial_v(Voltage<S>(p[0] * p[3])), per_mas(Coupling<S>(p[1] / Real(3.6 * capacity_ah))), measured(p[4] > Real(0.5)) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return initial_v; }
-    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive) const {
+    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive, const Voltage<S>* x) const {
       const bool charging = drive.current_a > Current<S>(0);
       const Current<S> size_a = charging ? drive.current_a : Current<S>(-drive.current_a);
       const Current<S> milli = size_a * Fraction<S>(0.001);
       const Exponent<S> moved = drive.duration_s * Rate<S>(milli * per_mas);
-      return {settled<S>(moved), charging ? half_gap_v : Voltage<S>(-half_gap_v)};
+      const Voltage<S> target = charging ? half_gap_v : Voltage<S>(-half_gap_v);
+      const Fraction<S> exponentially = settled<S>(moved);
+      if (!measured) return {exponentially, target};
+      const Voltage<S> left_v = charging ? Voltage<S>(target - x[0]) : Voltage<S>(x[0] - target);
+      const bool far = !(moved < Exponent<S>(2));
+      const Voltage<S> step_v = half_gap_v * Fraction<S>(far ? Exponent<S>(0) : moved);
+      return {!far && left_v > step_v ? ratio<Fraction<S>>(step_v, left_v) : Fraction<S>(1), target, exponentially};
     }
     constexpr Voltage<S> error_at_first() const { return half_gap_v; }  // h may be anything
     constexpr Voltage<S> lasting_error() const { return Voltage<S>(half_gap_v * Fraction<S>(0.25)); }  // one state is not the whole of it: minor loops
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const { at.ocv_v = at.ocv_v - ocv_at_v; }
+    constexpr void warm(TablePoint<S>& at, const Voltage<S>& state_v, const Drive<S>&) const {
+      if (!measured) {
+        at.ocv_v = at.ocv_v - ocv_at_v;
+        return;
+      }
+      // the state itself is added with the others
+      at.ocv_v = at.ocv_v + Voltage<S>(state_v * Factor<S>(at.gap - Factor<S>(1))) - Voltage<S>(ocv_at_v * at.gap);
+      at.ocv_delta_v = at.ocv_delta_v + Voltage<S>(Voltage<S>(state_v - ocv_at_v) * at.gap_delta);
+    }
   };
 };
 

@@ -83,6 +83,22 @@ TEST(Board, ComputesAnExtendedCellBitForBitLikeTheHostAndShowsItsStates) {
   EXPECT_EQ(run_tool("replay " + shift + " --scalar fixed --cell " + cell).exit_code, 0);
 }
 
+TEST(Board, EstimatesErrorsThatLastBitForBitLikeTheHost) {
+  const TemporaryFolder folder;
+  for (const char* cell : {"a123_26650_extended", "a123_esctoolbox_extended"}) {
+    const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr("every bit equal"));
+  }
+  const std::string alone = extended_cell(folder, "alone", "").string(), trace = (folder.path() / "t.csv").string();
+  std::ofstream(alone) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\n[tolerance]", "errors_are_states = true\n[tolerance]");
+  const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + alone);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("every bit equal"));
+  ASSERT_EQ(run_tool("replay " + shift + " --cell " + alone + " --trace " + trace).exit_code, 0);
+  EXPECT_THAT(content(trace), HasSubstr(",voltage_measured_v,voltage_error_v,current_offset_a,current_offset_sigma_a,flags\n"));
+}
+
 /// Every mechanism that a board runs, at once; with another order than the catalogue's.
 TEST(Board, ComputesEveryMechanismBitForBitLikeTheHost) {
   const TemporaryFolder folder;

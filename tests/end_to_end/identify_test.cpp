@@ -114,6 +114,38 @@ TEST_F(IdentifyTool, ARealCellIsPredictedOnRecordingsItWasNotIdentifiedFrom) {
   EXPECT_NEAR(from_udds["coulombic_efficiency"], 0.998, 0.003);
 }
 
+/// Lines that say something of the cell, without its name and source.
+std::string values_of(const std::string& cell) {
+  std::istringstream lines(cell);
+  std::string values;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("#") && !line.starts_with("name") && !line.starts_with("source")) values += line + "\n";
+  }
+  return values;
+}
+
+TEST_F(IdentifyTool, TheBuiltInExtendedCellsAreWhatTheirCommandsMake) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
+  const auto all = [](const std::filesystem::path& folder, std::vector<const char*> files) {
+    std::string list;
+    for (const char* file : files) list += " " + (folder / (std::string(file) + ".csv")).string();
+    return list;
+  };
+  const std::filesystem::path one = data / "a123_26650", other = data / "a123_esctoolbox";
+  const auto made = [&](const std::string& what) {
+    const ToolRun run = run_tool("identify --extend --start a123_26650 " + what + " --out " + path("made.toml"));
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return values_of(content(path("made.toml")));
+  };
+  const std::filesystem::path cells = BMS_SOURCE_DIR "/model/cells";
+  EXPECT_EQ(made("--ocv" + all(one, {"ocv_N05_chg", "ocv_N05_dis", "ocv_N15_chg", "ocv_N15_dis", "ocv_P05_chg", "ocv_P05_dis", "ocv_P15_chg", "ocv_P15_dis", "ocv_P25_chg", "ocv_P25_dis", "ocv_P35_chg",
+                                     "ocv_P35_dis", "ocv_P45_chg", "ocv_P45_dis"}) + " --recording" + all(one, {"pulse_P25_A002"})),
+            values_of(content(cells / "a123_26650_extended.toml")));
+  EXPECT_EQ(made("--ocv" + all(other, {"ocv_N05_chg", "ocv_N05_dis", "ocv_P05_chg", "ocv_P05_dis", "ocv_P25_chg", "ocv_P25_dis", "ocv_P45_chg", "ocv_P45_dis"}) + " --recording" +
+                 all(other, {"dyn30_N05", "dyn45_P05", "dyn50_P25"}) + " --window 0.8:0.5"),
+            values_of(content(cells / "a123_esctoolbox_extended.toml")));
+}
+
 TEST_F(IdentifyTool, SeveralTemperaturesGiveATableEach) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
   const json r = result("--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") + " --start a123_26650 --window 0.9:0.2 --nodes 0.5 --recording " + real("dyn10_P05_A002.csv") + " " +

@@ -163,7 +163,7 @@ TEST_F(Tool, AMechanismThatCannotBeIsRefusedInOneLineThatSaysWhatCan) {
   const std::pair<const char*, const char*> wrong[] = {
       {"hysteresis:half_gap_v=0.01", "no such mechanism 'hysteresis', expected one of: channel_skew, .*voltage_gain"},
       {"ocv_hysteresis", "'ocv_hysteresis' without parameters, expected ID:param=value,\\.\\.\\."},
-      {"ocv_hysteresis:gap=0.01", "no such parameter 'gap' of ocv_hysteresis, expected one of: half_gap_v, decay, ocv_at, initial"},
+      {"ocv_hysteresis:gap=0.01", "no such parameter 'gap' of ocv_hysteresis, expected one of: half_gap_v, decay, ocv_at, initial, measured"},
       {"ocv_hysteresis:half_gap_v=", "no value of 'half_gap_v', expected half_gap_v=NUMBER"},
       {"ocv_hysteresis:half_gap_v=0.01,decay=x", "no value of 'decay', expected decay=NUMBER"},
       {"ocv_hysteresis:half_gap_v=1", "'half_gap_v' is out of range, expected 0 to 0.07 V"}};

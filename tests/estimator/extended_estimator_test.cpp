@@ -55,8 +55,8 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
     x.back() = 0.05 * uniform(random);  // warmth, 5 K at most
     const Drive<double> drive{30 * (uniform(random) - 0.5), std::pow(10, 3 * uniform(random) - 2), 40 * uniform(random)};
     std::uint8_t interval = 0;
-    const auto at = look_up(CellUnder{cell, drive, x}, soc, interval);
-    const auto settling = Model::settling(cell.laws, at, drive);
+    const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, soc, interval);
+    const auto settling = Model::settling(cell.laws, x, at, drive);
     const auto f = Model::transition(x, at, settling, drive);
     const auto h = Model::sensitivity(cell.laws, at, drive);
 
@@ -64,8 +64,8 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
     for (std::size_t k = 0; k < y.size(); ++k) y[k] = k <= voltages ? Jet(x[k], static_cast<int>(k)) : Jet(x[k]);
     const Drive<Jet> drive_j{Jet(drive.current_a), Jet(drive.duration_s), Jet(drive.temperature_c)};
     const Jet soc_j(soc, static_cast<int>(states - 1));
-    const auto at_j = look_up(CellUnder{jets, drive_j, y}, soc_j, interval);
-    const auto settling_j = JetModel::settling(jets.laws, at_j, drive_j);
+    const auto at_j = look_up(CellUnder{jets, drive_j, JetModel::held(y)}, soc_j, interval);
+    const auto settling_j = JetModel::settling(jets.laws, y, at_j, drive_j);
     const auto moved = JetModel::advance(y, at_j, settling_j, drive_j);
     const Jet v = JetModel::voltage(jets.laws, y, at_j, drive_j);
     EXPECT_NEAR(v.a, Model::voltage(cell.laws, x, at, drive), 1e-12);
@@ -135,9 +135,93 @@ TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
   told[0].value = {0.02, 40, 0, -1};
   const Work w = work(truth, 6'000, 0.93);  // where the curve is steep, soc is known and the rest is hysteresis
   const auto e = run<float, 1>(table9_with<float>(told), w.samples, {930'000'000, 5'000'000});
-  EXPECT_NEAR(e.front().mechanism[0], -0.02, 1e-6);
-  EXPECT_NEAR(e[50].mechanism[0], 0.02, 0.012);
+  EXPECT_NEAR(e.front().further[0], -0.02, 1e-6);
+  EXPECT_NEAR(e[50].further[0], 0.02, 0.012);
   EXPECT_NEAR(e.back().soc, w.soc.back(), 0.02);
+}
+
+/// With errors as states.
+template <class S, std::size_t Voltages>
+Cells<S> table9_with_errors(const std::vector<MechanismSetting>& mechanisms) {
+  CellFile file = read_cell("table9");
+  file.parameters.noise.current_offset_a = 0.06;  // a hundredth of 1C
+  file.parameters.noise.current_offset_correlation_s = 36'000;
+  return {prepare<S, max_intervals>(file.parameters), chosen<S>(mechanisms, capacity_ah)};
+}
+template <class S, std::size_t Voltages>
+auto run_with_errors(const std::vector<MechanismSetting>& mechanisms, const std::vector<Sample>& samples, const StartingPoint& start) {
+  using Estimator = SocEstimator<S, ExtendedRc<Voltages, held, true>::template Of>;
+  const auto cell = table9_with_errors<S, Voltages>(mechanisms);
+  Estimator estimator(start);
+  std::vector<typename Estimator::Result> estimates;
+  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  return estimates;
+}
+
+TEST(ExtendedModel, ErrorsAsStatesChangeNothingElse) {
+  constexpr std::size_t voltages = 3;
+  using Plain = ExtendedRc<voltages, held>::Of<double>;
+  using Model = ExtendedRc<voltages, held, true>::Of<double>;
+  ASSERT_EQ(Model::states, Plain::states + 2);
+  const auto cell = table9_with_errors<double, voltages>(usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance"}));
+  Plain::Polarisation x;
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = 0.001 * static_cast<double>(k + 1);
+  Model::Polarisation y{x[0], 0.004, 0.002};
+  for (std::size_t k = 0; k < held; ++k) y[Model::first_held + k] = x[1 + k];
+  const Drive<double> drive{-3, 2, 10};
+  std::uint8_t interval = 0;
+  const auto at = look_up(CellUnder{cell, drive, Model::held(y)}, 0.6, interval);
+  const auto forgotten = Model::forgotten(cell.noise, drive.duration_s);
+  const auto of_plain = Plain::settling(cell.laws, x, at, drive);
+  const auto of_model = Model::settling(cell.laws, y, at, drive, forgotten);
+  const auto f = Plain::transition(x, at, of_plain, drive);
+  const auto g = Model::transition(y, at, of_model, drive);
+  const auto from_plain = [](std::size_t i) { return i == 0 ? 0 : i + 1; };
+  for (std::size_t i = 0; i < Plain::states; ++i) {
+    for (std::size_t j = 0; j < Plain::states; ++j) EXPECT_EQ(f[i][j], g[from_plain(i)][from_plain(j)]) << i << j;
+  }
+  EXPECT_DOUBLE_EQ(g[1][1], 1 - 2 / (8 * cell.noise.model_correlation_s));
+  EXPECT_DOUBLE_EQ(g[Model::last][Model::last], 1 - 2 / 36'000.0);
+  EXPECT_DOUBLE_EQ(g[Model::soc][Model::last], -2 / 3'600.0);
+  EXPECT_DOUBLE_EQ(Model::voltage(cell.laws, y, at, drive), Plain::voltage(cell.laws, x, at, drive) + 0.004);
+  EXPECT_DOUBLE_EQ(Model::without_offset(1.0, y, cell.noise), 1 - 0.002 * 6);
+  const auto h = Model::sensitivity(cell.laws, at, drive);
+  const auto p = Plain::sensitivity(cell.laws, at, drive);
+  EXPECT_EQ(h[1], h[0]);
+  EXPECT_EQ(h[Model::soc], p[Plain::soc]);
+  EXPECT_EQ(h[Model::last], 0);
+}
+
+TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
+  for (const double offset_a : {-0.08, 0.08}) {
+    Work w = work({}, 13'000, 0.95);  // to 20 % of charge
+    for (Sample& s : w.samples) s.current_ua += static_cast<std::int32_t>(1e6 * offset_a);
+    const StartingPoint start{950'000'000, 10'000'000};
+    const auto e = run_with_errors<float, 0>({}, w.samples, start);
+    SocEstimator<float> plain(start);
+    const auto plain_cell = prepare<float, max_intervals>(read_cell("table9").parameters);
+    Estimate<float> without;
+    for (const Sample& s : w.samples) without = plain.step(plain_cell, s);
+    const double found_a = 6 * e.back().further[1], sigma_a = 6 * e.back().further[2];
+    EXPECT_LT(sigma_a, 0.03);
+    EXPECT_NEAR(found_a, offset_a, 2 * sigma_a);
+    EXPECT_LE(std::abs(e.back().soc - w.soc.back()), 2 * e.back().soc_sigma);
+    EXPECT_LT(std::abs(e.back().soc - w.soc.back()), std::abs(without.soc - w.soc.back()));
+  }
+}
+
+TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
+  const Work w = work(usual(some), 1'500, 0.77);
+  const StartingPoint start{770'000'000, 5'000'000};
+  const auto twice = run_with_errors<double, 3>(usual(some), w.samples, start);
+  const auto single = run_with_errors<float, 3>(usual(some), w.samples, start);
+  const auto fixed = run_with_errors<FixedPoint, 3>(usual(some), w.samples, start);
+  for (std::size_t k = 0; k < w.samples.size(); ++k) {
+    ASSERT_NEAR(single[k].soc, twice[k].soc, 1e-4) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 2e-4) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 2e-4) << k;
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(as_double(fixed[k].further[i]), twice[k].further[i], 1e-4) << k << " " << i;
+  }
 }
 
 TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
@@ -150,7 +234,7 @@ TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
     ASSERT_NEAR(single[k].soc, twice[k].soc, 5e-5) << k;
     ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 1e-4) << k;
     ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
-    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(single[k].mechanism[i], as_double(fixed[k].mechanism[i]), 2e-5) << k;
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(single[k].further[i], as_double(fixed[k].further[i]), 2e-5) << k;
   }
 }
 
@@ -168,14 +252,18 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
   std::mt19937_64 random(11);
   for (int round = 0; round < 30; ++round) {
     SocEstimator<float, ExtendedRc<4, held>::Of> estimator;
+    SocEstimator<float, ExtendedRc<4, held, true>::Of> of_errors;
     std::uint64_t time_us = 0;
     for (int k = 0; k < 2'000; ++k) {
       time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
       const auto anything = [&](std::int32_t normal) { return random() % 3 == 0 ? static_cast<std::int32_t>(random()) : random() % 7 == 0 ? no_reading : normal; };
       const auto e = estimator.step(cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
       ASSERT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) && std::isfinite(e.voltage_predicted_v)) << round << " " << k;
-      for (const float x : e.mechanism) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
+      for (const float x : e.further) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
       ASSERT_GT(e.soc_sigma, 0);
+      const auto more = of_errors.step(cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
+      ASSERT_TRUE(std::isfinite(more.soc) && std::isfinite(more.soc_sigma)) << round << " " << k;
+      for (const float x : more.further) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
     }
   }
 }

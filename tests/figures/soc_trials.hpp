@@ -2,11 +2,27 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/recording.hpp"
+#include "host_sim/replay.hpp"
 
 namespace bms {
 
-/// Markdown: a row a trial, over recordings of data/a123_26650 with the cell file of that name; the last line over all of them.
+/// One of them: what came of the recording, and what the estimator is told.
+struct SocTrial {
+  std::string name, trouble;
+  const CellFile& cell;
+  Recording recording;
+  Belief belief;
+};
+
+/// Recordings of data/a123_26650 and data/a123_esctoolbox, with the extended cell file of that name.
+void each_soc_trial(const std::filesystem::path& data, const std::function<void(const SocTrial&)>& f);
+
+/// Markdown: a row a trial; the last line over all of them.
 std::string soc_trials(const std::filesystem::path& data);
 
 }  // namespace bms

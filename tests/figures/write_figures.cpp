@@ -92,8 +92,9 @@ std::string step_cost() {
 }
 
 /// table9 with mechanisms at usual values, as a cell file would have them.
-CellFile table9_with(const std::vector<std::pair<const char*, std::vector<double>>>& mechanisms) {
+CellFile table9_with(const std::vector<std::pair<const char*, std::vector<double>>>& mechanisms, bool errors) {
   CellFile cell = read_cell("table9");
+  cell.parameters.noise.errors_are_states = errors;
   for (const auto& [id, values] : mechanisms) {
     model::MechanismSetting m = model::unsaid(model::mechanism_index(id), cell.parameters.capacity_ah);
     std::copy(values.begin(), values.end(), m.value.begin());
@@ -109,14 +110,17 @@ std::string mechanism_cost() {
   const auto all = samples(read_recording(shift));
   const EmulatedBoard& board = emulated_boards().front();
   std::string table = "| table9 with | step, mean [instructions] | step, longest |\n|---|---|---|\n";
-  for (const auto& set : std::vector<std::vector<std::pair<const char*, std::vector<double>>>>{
-           {}, {offset}, {warm}, {transfer}, {entropic}, {shape}, {gain}, {heat}, {hysteresis}, {fast}, {slow}, {hysteresis, slow}, {hysteresis, slow, warm, offset}}) {
-    const CellFile cell = table9_with(set);
+  using Set = std::vector<std::pair<const char*, std::vector<double>>>;
+  const auto row = [&](const Set& set, bool errors) {
+    const CellFile cell = table9_with(set, errors);
     const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), all, state_count(cell));
-    std::string names;
+    std::string names = errors ? "`noise.errors_are_states`" : "";
     for (const auto& [id, values] : set) names += fmt::format("{}`{}`", names.empty() ? "" : ", ", id);
     table += fmt::format("| {} | {:.0f} | {} |\n", names.empty() ? "nothing" : names, cost.mean, cost.most);
-  }
+  };
+  for (const Set& set : std::vector<Set>{
+           {}, {offset}, {warm}, {transfer}, {entropic}, {shape}, {gain}, {heat}, {hysteresis}, {fast}, {slow}, {hysteresis, slow}, {hysteresis, slow, warm, offset}}) row(set, false);
+  for (const Set& set : std::vector<Set>{{}, {hysteresis, warm}}) row(set, true);
   return table;
 }
 

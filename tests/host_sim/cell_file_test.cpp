@@ -38,8 +38,17 @@ TEST(CellFile, HoldsThePapersTable9AndLimits) {
 }
 
 TEST(CellFile, EveryBuiltInCellIsAccepted) {
-  ASSERT_EQ(built_in_cells().size(), 2U);
+  ASSERT_EQ(built_in_cells().size(), 4U);
   for (const BuiltInCell& cell : built_in_cells()) EXPECT_EQ(read_cell(cell.name).name, cell.name);
+}
+
+TEST(CellFile, SaysWhetherErrorsAreStates) {
+  const std::string without = table9_text(), with = replaced(without, "\n[tolerance]", "errors_are_states = true\n\n[tolerance]");
+  EXPECT_FALSE(parse_cell(without, "x").parameters.noise.errors_are_states);
+  const CellFile cell = parse_cell(with, "x");
+  EXPECT_TRUE(cell.parameters.noise.errors_are_states);
+  EXPECT_TRUE(parse_cell(cell_text(cell), "x").parameters.noise.errors_are_states);
+  EXPECT_THAT(refusal(replaced(with, "errors_are_states = true", "errors_are_states = 1")), HasSubstr("'noise.errors_are_states' is not acceptable, expected true or false"));
 }
 
 TEST(CellFile, TellsWhichFileItIsByAHash) {
@@ -196,7 +205,7 @@ TEST(CellFile, AMissingFileIsRefusedWithTheNamesOfTheBuiltInCells) {
     read_cell("table10");
     FAIL();
   } catch (const BadInput& error) {
-    EXPECT_THAT(error.what(), HasSubstr("table9, a123_26650"));
+    EXPECT_THAT(error.what(), HasSubstr("table9, a123_26650, a123_26650_extended, a123_esctoolbox_extended"));
   }
   EXPECT_THROW(read_cell("/nowhere/cell.toml"), BadInput);
   EXPECT_THROW(read_cell("/tmp"), BadInput);

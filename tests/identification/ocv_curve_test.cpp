@@ -70,6 +70,30 @@ TEST(OcvPieces, AreFewRisingAndWithinTheError) {
   }
 }
 
+TEST(OcvPieces, HaveMoreCornersWhereTheGapBends) {
+  OcvCurve curve;
+  for (int k = 0; k <= 1000; ++k) {
+    const double s = k / 1000.0;
+    curve.soc.push_back(s);
+    curve.ocv_v.push_back(3.2 + 0.1 * s);
+    curve.half_gap_v.push_back(0.02 + 0.01 * std::exp(-std::pow((s - 0.7) / 0.05, 2)));  // knees that lie apart
+  }
+  auto pieces = *fewest_pieces(curve, 0.002);
+  ASSERT_EQ(pieces.soc.size(), 2U);
+  add_gap_corners(pieces, curve, 0.001, 64);
+  EXPECT_GT(pieces.soc.size(), 5U);
+  EXPECT_LT(pieces.soc.size(), 14U);
+  for (std::size_t k = 0, piece = 0; k < curve.soc.size(); ++k) {
+    while (piece + 2 < pieces.soc.size() && curve.soc[k] > pieces.soc[piece + 1]) ++piece;
+    const double t = (curve.soc[k] - pieces.soc[piece]) / (pieces.soc[piece + 1] - pieces.soc[piece]);
+    ASSERT_NEAR(pieces.half_gap_v[piece] + t * (pieces.half_gap_v[piece + 1] - pieces.half_gap_v[piece]), curve.half_gap_v[k], 0.00101) << curve.soc[k];
+    ASSERT_NEAR(pieces.ocv_v[piece] + t * (pieces.ocv_v[piece + 1] - pieces.ocv_v[piece]), curve.ocv_v[k], 0.002) << curve.soc[k];
+  }
+  pieces = *fewest_pieces(curve, 0.002);
+  add_gap_corners(pieces, curve, 0.001, 5);
+  EXPECT_EQ(pieces.soc.size(), 5U);
+}
+
 TEST(OcvPieces, FollowACurveThatPlunges) {
   OcvCurve curve;
   for (int k = 0; k <= 1000; ++k) {

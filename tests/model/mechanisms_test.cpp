@@ -116,8 +116,8 @@ Walk<S> walk(const std::vector<MechanismSetting>& mechanisms, const std::vector<
     const Drive<S> drive{laws.true_current(Current<S>(row.current_a)), TimeStep<S>(row.duration_s), laws.true_temperature(Temperature<S>(row.temperature_c))};
     result.charge_as += number(laws.counted(drive)) * row.duration_s;
     soc += row.current_a * row.duration_s / 3'600 / capacity_ah;
-    const auto at = look_up(CellUnder{cell, drive, x}, Soc<S>(soc), interval);
-    x = Model::advance(x, at, Model::settling(laws, at, drive), drive);
+    const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, Soc<S>(soc), interval);
+    x = Model::advance(x, at, Model::settling(laws, x, at, drive), drive);
     result.voltage_v.push_back(number(Model::voltage(laws, x, at, drive)));
   }
   return result;
@@ -225,16 +225,54 @@ TEST(Laws, KnownAtCompileTimeGiveTheSameDigitsAsChosenAtRunTime) {
 }
 
 TEST(OcvHysteresis, SaturatesAtTheBranchesAndForgetsNothingAtRest) {
-  const OcvHysteresis::Law<double> law(std::array<double, 4>{0.01, 40, 0, 0}, capacity_ah);
+  const OcvHysteresis::Law<double> law(std::array<double, 5>{0.01, 40, 0, 0, 0}, capacity_ah);
   const TablePoint<double> at{};
   double x = 0;
-  for (int k = 0; k < 3'600; ++k) x = relaxed<double>(x, law.settle(0, at, {6, 1}));
+  for (int k = 0; k < 3'600; ++k) x = relaxed<double>(x, law.settle(0, at, {6, 1}, &x));
   EXPECT_NEAR(x, 0.01, 1e-12);
-  for (int k = 0; k < 180; ++k) x = relaxed<double>(x, law.settle(0, at, {-3, 1}));  // 1/40 of the capacity
+  for (int k = 0; k < 180; ++k) x = relaxed<double>(x, law.settle(0, at, {-3, 1}, &x));  // 1/40 of the capacity
   const double moved = x;
   EXPECT_NEAR(x, -0.01 + 0.02 * std::exp(-1), 1e-12);
-  for (int k = 0; k < 1'000; ++k) x = relaxed<double>(x, law.settle(0, at, {0, 3'600}));
+  for (int k = 0; k < 1'000; ++k) x = relaxed<double>(x, law.settle(0, at, {0, 3'600}, &x));
   EXPECT_EQ(x, moved);
+}
+
+TEST(OcvHysteresis, BetweenMeasuredBranchesMovesWithTheChargeAndStops) {
+  const OcvHysteresis::Law<double> law(std::array<double, 5>{0.01, 40, 0, 0, 1}, capacity_ah);
+  TablePoint<double> at{};
+  double x = -0.01;
+  for (int k = 0; k < 45; ++k) x = relaxed<double>(x, law.settle(0, at, {6, 1}, &x));  // 1/80 of the capacity: half of the way to the middle
+  EXPECT_NEAR(x, -0.005, 1e-12);
+  for (int k = 0; k < 45; ++k) x = relaxed<double>(x, law.settle(0, at, {-6, 1}, &x));
+  EXPECT_NEAR(x, -0.01, 1e-12) << "what is given back is given back";
+  for (int k = 0; k < 100; ++k) x = relaxed<double>(x, law.settle(0, at, {-6, 1}, &x));
+  EXPECT_NEAR(x, -0.01, 1e-12);
+  x = relaxed<double>(x, law.settle(0, at, {6, 3'600}, &x));
+  EXPECT_EQ(x, 0.01);
+  at.ocv_v = 3.3;
+  at.gap = 1.5;
+  law.warm(at, x, {});
+  EXPECT_NEAR(at.ocv_v + x, 3.3 + 1.5 * 0.01, 1e-12) << "the state is added besides";
+}
+
+/// Charge branch and discharge branch are the curves that the file was made of.
+TEST(OcvHysteresis, FollowsTheShapeOfTheFilesGap) {
+  CellParameters<> p = read_cell("table9").parameters;
+  p.ocv.half_gap_v = {};
+  for (std::size_t k = 0; k < p.ocv.soc.size; ++k) p.ocv.half_gap_v.push_back(0.01 + 0.01 * std::abs(p.ocv.soc[k] - 0.5));
+  const double middle_v = middle_half_gap_v(p.ocv);
+  EXPECT_NEAR(middle_v, 0.012, 0.001);
+  const auto cell = prepare<double, max_intervals>(p);
+  auto setting = unsaid(mechanism_index("ocv_hysteresis"), capacity_ah);
+  setting.value = {middle_v, 40, 0, -1, 1};
+  const auto laws = chosen<double>(std::vector{setting}, capacity_ah);
+  const auto x = laws.initial();
+  for (std::size_t k = 1; k + 1 < p.ocv.soc.size; ++k) {
+    TablePoint<double> at = look_up(cell, p.ocv.soc[k]);
+    const double middle = at.ocv_v;
+    laws.tables(at, p.ocv.soc[k], Drive<double>{-1, 1, 25}, x);
+    EXPECT_NEAR(middle - (at.ocv_v + x[0]), p.ocv.half_gap_v[k], 1e-9) << p.ocv.soc[k];
+  }
 }
 
 TEST(Arrhenius, IsTheExponentialLaw) {

@@ -1,0 +1,63 @@
+// The estimator on real recordings of which no drive went into its cell files, or only a window: what it must not fall behind, and the
+// same bits on the emulated board.
+#include <gtest/gtest.h>
+
+#include "host_sim/emulator.hpp"
+#include "tests/figures/soc_trials.hpp"
+
+namespace bms {
+namespace {
+
+const std::filesystem::path data = BMS_DATA_DIR;
+
+bool there() { return std::filesystem::exists(data / "a123_26650") && std::filesystem::exists(data / "a123_esctoolbox"); }
+
+TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
+  if (!there()) GTEST_SKIP() << "the real recordings are not there: " << data;
+  double inside = 0, samples_seen = 0;
+  std::size_t trials = 0;
+  each_soc_trial(data, [&](const SocTrial& t) {
+    ReplayResult r;
+    r.cell = t.cell;
+    r.recording = t.recording;
+    r.track = run_on_host(t.cell, samples(t.recording), starting_point(t.belief), r.scalar);
+    evaluate(r);
+    SCOPED_TRACE(t.name + ", " + t.trouble);
+    ++trials;
+    const auto rows = static_cast<double>(r.track.rows.size());
+    inside += *r.soc.within_2_sigma * rows;
+    samples_seen += rows;
+    const bool balanced = t.cell.name == "a123_esctoolbox_extended";
+    if (t.trouble.starts_with("cut")) {
+      if (!balanced) {
+        EXPECT_EQ(*r.soc.within_2_sigma, 1);
+      }
+    } else if (t.trouble.starts_with("current +") || t.trouble.starts_with("current -")) {
+      EXPECT_LT(*r.soc.rmse, t.trouble.ends_with("mA") ? 0.05 : 0.02);  // 30 mA are 12 to 15 % of charge in ten hours
+    } else if (t.trouble.starts_with("voltage")) {
+      EXPECT_LT(*r.soc.rmse, 0.021);
+    } else {
+      const double most = !balanced ? (t.name.starts_with("dyn") ? 0.02 : 0.01) : t.name == "dyn50_P25" ? 0.010 : t.name == "dyn45_P05" ? 0.015 : 0.020;
+      EXPECT_LT(*r.soc.rmse, most);
+    }
+    if (t.trouble == "started right" && t.name.ends_with("_A002") && t.name.starts_with("dyn")) {
+      EXPECT_NEAR(*r.soc.current_offset_a, 0.008, 2 * *r.soc.current_offset_sigma_a) << "7 to 9 mA are read while nothing flows";
+    }
+  });
+  EXPECT_EQ(trials, 90U);
+  EXPECT_GT(inside / samples_seen, 0.95);
+}
+
+TEST(SocTrials, AreBitEqualOnTheBoard) {
+  if (!there()) GTEST_SKIP() << "the real recordings are not there: " << data;
+  const EmulatedBoard& board = emulated_boards().front();
+  each_soc_trial(data, [&](const SocTrial& t) {
+    const auto all = samples(t.recording);
+    const auto start = starting_point(t.belief);
+    const auto difference = first_difference(run_on_host(t.cell, all, start, board.scalar), run_on_board(board, t.cell, all, start), board.scalar);
+    EXPECT_FALSE(difference) << t.name << ", " << t.trouble << ": " << (difference ? difference->field : "");
+  });
+}
+
+}  // namespace
+}  // namespace bms
