@@ -23,6 +23,7 @@
 #include "host_sim/study.hpp"
 #include "host_sim/text_file.hpp"
 #include "identification/identify.hpp"
+#include "tests/figures/duty.hpp"
 #include "tests/figures/soc_trials.hpp"
 #include "tests/firmware/step_cost.hpp"
 
@@ -80,6 +81,17 @@ std::string real_accuracy() {
     table += accuracy_row({file.stem().string(), file.string(), "a123_26650", std::nullopt});
     if (file.stem() == "udds_P25_A002") table += accuracy_row({"the same, told 20 % less than it has, believed to 20 %", file.string(), "a123_26650", Belief{r.soc_ref.front() - 0.2, 0.2}});
   }
+  return table;
+}
+
+std::string thousand_hours() {
+  std::string table = "| estimator and sensors | SOC RMSE, first to last hundred hours | largest error | inside two sigma | mean sigma | subnormal numbers | time of a step, last over first |\n|---|---|---|---|---|---|---|\n";
+  const auto row = [&](const char* what, const DutyFigures& f) {
+    table += fmt::format("| {} | {:.2f} % ({:.2f} to {:.2f} %) | {:.2f} % | {:.1f} % | {:.2f} % | {} | {:.2f} |\n", what, 100 * f.rmse, 100 * f.rmse_first, 100 * f.rmse_last, 100 * f.largest, 100 * f.inside, 100 * f.mean_sigma,
+                         f.subnormal, f.slower);
+  };
+  row("as in the cell file: 20 mA over an hour, 0.5 mV over ten", duty_as_in_the_file());
+  row("errors as states, 30 mA and 2 mV over ten hours", duty_with_errors());
   return table;
 }
 
@@ -232,6 +244,7 @@ void run() {
   const auto estimator = source / "estimator/README.md";
   write_board();
   replace_figures(estimator, "shift", shift_accuracy());
+  replace_figures(estimator, "duty", thousand_hours());
   if (std::filesystem::exists(data)) {
     replace_figures(estimator, "real", real_accuracy());
     replace_figures(estimator, "trials", soc_trials(data));

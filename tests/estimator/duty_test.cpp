@@ -1,0 +1,24 @@
+#include "tests/figures/duty.hpp"
+
+#include <gtest/gtest.h>
+
+namespace bms {
+namespace {
+
+void expect_no_drift(const DutyFigures& f) {
+  EXPECT_EQ(f.steps, 3'600'000U);
+  EXPECT_TRUE(f.finite);
+  EXPECT_EQ(f.subnormal, 0U);
+  EXPECT_LT(f.rmse, 0.015);
+  EXPECT_LT(f.largest, 0.08);  // in the middle of the plateau, after hours of a sensor that is off
+  EXPECT_LT(f.rmse_last, 1.5 * f.rmse_first + 0.005) << "unbounded";
+  EXPECT_LT(f.largest_sigma, 0.15);
+  EXPECT_GT(f.inside, 0.9);
+}
+
+TEST(Duty, AThousandHoursDriftNowhere) { expect_no_drift(duty_as_in_the_file()); }
+
+TEST(Duty, AThousandHoursWithErrorsAsStates) { expect_no_drift(duty_with_errors()); }
+
+}  // namespace
+}  // namespace bms
