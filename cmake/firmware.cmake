@@ -48,6 +48,8 @@ add_compile_options(${BMS_CPU_FLAGS} -g -ffunction-sections -fdata-sections -fno
 add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs -T${BMS_LINKER_SCRIPT}
   -Wl,--gc-sections,--no-warn-rwx-segments,--fatal-warnings)
 
+include(${CMAKE_SOURCE_DIR}/cmake/can_messages.cmake)
+
 # bms_objects(NAME OPTIMISATION SOURCE...)
 function(bms_objects name optimisation)
   add_library(${name} OBJECT ${ARGN})
@@ -64,9 +66,9 @@ bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semi
 bms_objects(hal_slcan -Os ${hal}/slcan/can.cpp ${chip}/uart.cpp ${chip}/watchdog.cpp ${hal}/emulated/samples_can.cpp ${hal}/absent/record.cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/watchdog.cpp)
 
-bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${cell_header})  # the cell says which model
+bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/condition_step.cpp ${cell_header} ${can_messages})  # the cell says which model
 target_include_directories(application PRIVATE ${CMAKE_BINARY_DIR}/generated)
-bms_objects(estimator_step -O2 ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header})
+bms_objects(estimator_step -O2 ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header} ${can_messages})
 target_include_directories(estimator_step PRIVATE ${CMAKE_BINARY_DIR}/generated)
 math(EXPR version "${PROJECT_VERSION_MAJOR} * 65536 + ${PROJECT_VERSION_MINOR} * 256 + ${PROJECT_VERSION_PATCH}" OUTPUT_FORMAT HEXADECIMAL)
 target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})

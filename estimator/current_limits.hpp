@@ -17,10 +17,11 @@ struct CurrentLimits {
   model::Current<S> discharge_a{}, charge_a{};  ///< both >= 0
 };
 
-/// x: of the filter. duration_s: how long the current lasts, above 0. margin_v: by how much less than the limits the voltage may reach,
-/// e.g. one standard deviation of the model's error.
+/// x: of the filter. off: how far soc may be off, e.g. its standard deviation: what is drawn is reckoned from the lower, what is charged from
+/// the higher. duration_s: how long the current lasts, above 0. margin_v: by how much less than the limits the voltage may reach, e.g. one standard deviation
+/// of the model's error.
 template <class Model, class Cell, class S = typename Cell::Scalar>
-constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model::Polarisation& x, const model::Soc<S>& soc, const model::Temperature<S>& temperature_c,
+constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model::Polarisation& x, const model::Soc<S>& soc, const model::Soc<S>& off, const model::Temperature<S>& temperature_c,
                                           const model::TimeStep<S>& duration_s, const model::Voltage<S>& margin_v) {
   using namespace model;
   constexpr int halvings = 16;
@@ -29,7 +30,8 @@ constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model
   const auto voltage_after = [&](const Current<S>& current_a) {
     const Drive<S> drive{current_a, duration_s, temperature_c};
     const Rate<S> per_s = current_a * cell.limits.soc_per_as;
-    const Soc<S> end = soc + duration_s * per_s;
+    const Soc<S> start = current_a < Current<S>(0) ? Soc<S>(soc - off) : Soc<S>(soc + off);
+    const Soc<S> end = start + duration_s * per_s;
     const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, end, interval);
     return Voltage<S>(Model::voltage(laws, Model::advance(x, at, Model::settling(laws, x, at, drive), drive), at, drive));
   };

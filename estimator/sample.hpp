@@ -20,6 +20,9 @@ struct Sample {
   std::int16_t temperature_cdegc = no_temperature; ///< hundredths of a degree Celsius
 };
 
+/// Whether a temperature can be one: -60 to 150 degrees C.
+constexpr bool temperature_possible(std::int16_t cdegc) { return cdegc >= -6'000 && cdegc <= 15'000; }
+
 /// What is known of the state of charge before the first sample, e.g. from the last run or from a user.
 struct StartingPoint {
   std::int32_t soc_ppb = 0;        ///< 1e-9

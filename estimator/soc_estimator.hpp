@@ -105,7 +105,7 @@ class SocEstimator {
 
   static constexpr std::uint32_t longest_step_us = 4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
   static constexpr std::uint32_t longest_count_us = 2'000'000'000U;
-  static constexpr std::int16_t coldest_cdegc = -6'000, warmest_cdegc = 15'000, reference_cdegc = 2'500;
+  static constexpr std::int16_t reference_cdegc = 2'500;
   static constexpr int longest_gap_counts = 1'000;                   // 23 days; nothing is known after that
 
   /// Current that ends as charge. Without a law that makes another of it, the reading itself.
@@ -118,7 +118,7 @@ class SocEstimator {
   template <class Laws>
   constexpr model::Temperature<S> temperature(const Laws& laws, const Sample& sample) {
     if constexpr (std::same_as<Laws, model::LawSet<S>>) return model::Temperature<S>(25);  // nobody asks
-    if (sample.temperature_cdegc >= coldest_cdegc && sample.temperature_cdegc <= warmest_cdegc) temperature_cdegc_ = sample.temperature_cdegc;
+    if (temperature_possible(sample.temperature_cdegc)) temperature_cdegc_ = sample.temperature_cdegc;
     return laws.true_temperature(model::from_centi<model::Temperature<S>>(temperature_cdegc_));
   }
 
@@ -140,7 +140,7 @@ class SocEstimator {
     paced_us_ = step_us;
     const std::uint32_t capped_us = step_us < longest_step_us ? static_cast<std::uint32_t>(step_us) : longest_step_us;
     check_.gap(capped_us, flags);
-    duration_s_ = seconds(capped_us);
+    duration_s_ = model::seconds<S>(capped_us);
     const model::FilterNoise<S>& n = cell.noise;
     const auto shared_by = model::ratio<model::Count<S>>(n.model_correlation_s, duration_s_);
     shared_by_ = shared_by > model::Count<S>(1) ? shared_by : model::Count<S>(1);
@@ -159,7 +159,7 @@ class SocEstimator {
   [[gnu::noinline]] constexpr void heed_temperature(const Cell& cell, std::int16_t cdegc) {
     heeded_ = static_cast<std::int16_t>(cdegc >> 8);
     resistance_error_ = Coupling(cell.noise.resistance_error);
-    if (cdegc >= coldest_cdegc && cdegc < reference_cdegc && !laws_of(cell).resistances_follow_temperature()) {
+    if (temperature_possible(cdegc) && cdegc < reference_cdegc && !laws_of(cell).resistances_follow_temperature()) {
       constexpr double usual = model::mechanism_detail::energy_over_rt(40'000.0, 25.0);
       const auto factor = model::mechanism_detail::arrhenius<S>(model::Factor<S>(usual), model::Temperature<S>(25), model::from_centi<model::Temperature<S>>(cdegc));
       resistance_error_ = Coupling(resistance_error_ + Coupling(factor - model::Factor<S>(1)));
@@ -174,16 +174,6 @@ class SocEstimator {
     Soc sum = once;
     for (std::uint64_t left_us = paced_us_; left_us > longest_step_us && sum < most; left_us -= longest_step_us) sum += once;
     return sum < most ? sum : most;
-  }
-
-  static constexpr TimeStep seconds(std::uint32_t us) {
-    if constexpr (model::is_q<TimeStep>) {
-      return model::ratio<TimeStep>(model::Q<32, 0>::from_raw(us), model::Q<20, 0>(1'000'000));
-    } else if constexpr (std::same_as<TimeStep, float>) {
-      return static_cast<float>(us) * 1e-6F;
-    } else {
-      return TimeStep(static_cast<double>(us) * 1e-6);
-    }
   }
 
   /// Variance to add when the charge of a step may be wrong by a current that nobody measured. Such an error goes on in the same

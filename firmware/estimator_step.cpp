@@ -7,6 +7,8 @@ namespace bms {
   return estimator.step(generated::cell<BoardScalar>, sample);
 }
 
+float capacity_ah() { return static_cast<float>(generated::parameters.capacity_ah); }
+
 messages::Identity identity() { return {.cell_hash = generated::cell_hash, .version = BMS_VERSION}; }
 
 }  // namespace bms

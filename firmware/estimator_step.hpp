@@ -20,6 +20,10 @@ using BoardEstimator = SocEstimator<BoardScalar, generated::Model>;
 /// One step. A function of its own so that its cost can be counted.
 BoardEstimator::Result estimator_step(BoardEstimator& estimator, const Sample& sample);
 
+/// What is known beside the estimate, after the step.
+void condition_step(Condition<BoardEstimator>& condition, const BoardEstimator& estimator, const Sample& sample, const BoardEstimator::Result& estimate, bool limits_wanted);
+
 messages::Identity identity();
+float capacity_ah();
 
 }  // namespace bms

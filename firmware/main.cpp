@@ -17,7 +17,7 @@ int main() {
   hal::watchdog_start(watchdog_ms);
   const Sample* sample = hal::next_sample();
   if (sample == nullptr) return 0;
-  Application<BoardEstimator, estimator_step> application(hal::starting_point(), identity());
+  Application<BoardEstimator, estimator_step, condition_step> application(hal::starting_point(), identity(), capacity_ah());
   for (; sample != nullptr; sample = hal::next_sample()) application.take(*sample);
   return 0;
 }

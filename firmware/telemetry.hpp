@@ -7,61 +7,69 @@
 #include <array>
 #include <cstdint>
 
-#include "estimator/estimate.hpp"
-#include "estimator/sample.hpp"
 #include "firmware/messages.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 
 namespace bms {
 
-template <class S>
+template <class Estimator>
 class Telemetry {
  public:
-  constexpr explicit Telemetry(const messages::Identity& identity) : identity_(identity) {}
+  using Result = typename Estimator::Result;
 
-  void tell(const Sample& sample, const Estimate<S>& estimate) {
+  /// capacity_ah: of the cell file.
+  constexpr Telemetry(const messages::Identity& identity, float capacity_ah) : identity_(identity), capacity_ah_(capacity_ah) {}
+
+  void tell(const Sample& sample, const Result& estimate, const Condition<Estimator>& condition) {
     ++samples_;
     if (!hal::can_listening()) return;
     tell_fault();
-    for (std::size_t k = 0; k < plan.size(); ++k) {
-      if (plan[k].cycle_us != 0 && !due(k, sample.time_us)) continue;
-      hal::can_send(frame(plan[k].id, sample, estimate));
-    }
+    now_us_ = sample.time_us;
+    by_time(0, [&] { return messages::identity(identity_); });
+    by_time(1, [&] { return messages::current_limits(condition); });
+    by_time(2, [&] { return messages::health(condition); });
+    by_time(3, [&] { return messages::soc_anchor(condition); });
+    if constexpr (Estimator::Model::errors_are_states) by_time(4, [&] { return messages::sensor_errors(estimate, capacity_ah_); });
+    send(5, messages::pack_state(estimate, condition));
+    send(6, messages::pack_electrical(sample));
+    send(7, messages::model_detail(estimate));
+    can::Status status;
+    status.flags = estimate.flags;
+    status.sample_counter = samples_;
+    status.reset_cause = static_cast<std::uint32_t>(hal::reset_cause());
+    send(8, status);
   }
 
  private:
-  struct Cycle {
-    std::uint16_t id;
-    std::uint32_t cycle_us;  ///< 0: with every sample
-  };
-  static constexpr std::array<Cycle, 4> plan = {{
-      {messages::identity_id, 1'000'000},
-      {messages::pack_state_id, 0},
-      {messages::estimate_id, 0},
-      {messages::status_id, 0},
-  }};
+  static constexpr std::size_t by_time_count = 5, messages_count = 11;
 
-  hal::CanFrame frame(std::uint16_t id, const Sample& sample, const Estimate<S>& estimate) {
-    switch (id) {
-      case messages::identity_id: return messages::frame_of(identity_);
-      case messages::pack_state_id: return messages::frame_of(messages::pack_state(sample, estimate));
-      case messages::estimate_id: return messages::frame_of(messages::estimate_detail(estimate));
-      default: return messages::frame_of(messages::Status{estimate.flags, samples_, ++statuses_, static_cast<std::uint8_t>(hal::reset_cause())});
-    }
+  template <class Message>
+  void send(std::size_t place, const Message& message) {
+    hal::can_send(message.frame(counter_[place]));
+    counter_[place] = can::next(counter_[place]);
   }
 
-  /// Unsigned: a time that went back is due as well.
-  bool due(std::size_t k, std::uint64_t time_us) {
-    if (sent_[k].once && time_us - sent_[k].at_us < plan[k].cycle_us) return false;
-    sent_[k] = {time_us, true};
-    return true;
+  /// message(): made when it is due. Unsigned: a time that went back is due as well.
+  template <class Make>
+  void by_time(std::size_t place, Make&& message) {
+    using Message = decltype(message());
+    if (sent_[place].once && now_us_ - sent_[place].at_us < Message::cycle_us) return;
+    sent_[place] = {now_us_, true};
+    send(place, message());
   }
 
   void tell_fault() {
     if (fault_told_) return;
     fault_told_ = true;
-    if (const auto fault = hal::last_fault()) hal::can_send(messages::frame_of(messages::LastFault{fault->pc, fault->cfsr}));
+    const auto fault = hal::last_fault();
+    if (!fault) return;
+    can::LastFaultAddress address;
+    address.program_counter = fault->pc;
+    send(9, address);
+    can::LastFaultCause cause;
+    cause.configurable_fault_status = fault->cfsr;
+    send(10, cause);
   }
 
   struct Sent {
@@ -69,9 +77,11 @@ class Telemetry {
     bool once = false;
   };
   messages::Identity identity_;
-  std::array<Sent, plan.size()> sent_{};
+  float capacity_ah_ = 0;
+  std::array<Sent, by_time_count> sent_{};
+  std::array<std::uint8_t, messages_count> counter_{};
+  std::uint64_t now_us_ = 0;
   std::uint16_t samples_ = 0;
-  std::uint8_t statuses_ = 0;
   bool fault_told_ = false;
 };
 

@@ -116,6 +116,14 @@ constexpr R from_micro(std::int32_t micro) {
   }
 }
 
+/// Microseconds as a step. us < 2^32.
+template <class S>
+constexpr TimeStep<S> seconds(std::uint32_t us) {
+  if constexpr (is_q<TimeStep<S>>) return ratio<TimeStep<S>>(Q<32, 0>::from_raw(us), Q<20, 0>(1'000'000));
+  else if constexpr (std::same_as<S, float>) return static_cast<float>(us) * 1e-6F;
+  else return S(static_cast<double>(us) * 1e-6);
+}
+
 /// Without its sign.
 template <class T>
 constexpr T magnitude(const T& x) {

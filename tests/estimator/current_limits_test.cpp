@@ -19,9 +19,9 @@ model::CellParameters<> hard() {
 }
 
 template <class S>
-std::pair<double, double> limits(const model::CellParameters<>& p, double soc, double seconds, double margin_v = 0, double v_rc_v = 0) {
+std::pair<double, double> limits(const model::CellParameters<>& p, double soc, double seconds, double margin_v = 0, double v_rc_v = 0, double off = 0) {
   const auto cell = model::prepare<S, model::max_intervals>(p);
-  const auto l = current_limits<model::ExtendedRc<0, 0>::Of<S>>(cell, {model::Voltage<S>(v_rc_v)}, model::Soc<S>(soc), model::Temperature<S>(25), model::TimeStep<S>(seconds), model::Voltage<S>(margin_v));
+  const auto l = current_limits<model::ExtendedRc<0, 0>::Of<S>>(cell, {model::Voltage<S>(v_rc_v)}, model::Soc<S>(soc), model::Soc<S>(off), model::Temperature<S>(25), model::TimeStep<S>(seconds), model::Voltage<S>(margin_v));
   return {model::as_double(l.discharge_a), model::as_double(l.charge_a)};
 }
 
@@ -56,6 +56,12 @@ TEST(CurrentLimits, AreLessForLongerAndWithAMargin) {
 TEST(CurrentLimits, AFullCellTakesNothingAndAnEmptyOneGivesLittle) {
   EXPECT_EQ(limits<double>(hard(), 1.2, 10).second, 0) << "above its largest voltage at rest";
   EXPECT_LT(limits<double>(hard(), 0.002, 10).first, limits<double>(hard(), 0.3, 10).first / 2);
+}
+
+TEST(CurrentLimits, AnUncertainSocIsTakenForTheWorse) {
+  const auto sure = limits<double>(hard(), 0.06, 10), unsure = limits<double>(hard(), 0.06, 10, 0, 0, 0.04);
+  EXPECT_LT(unsure.first, sure.first - 1);
+  EXPECT_LT(limits<double>(hard(), 0.94, 10, 0, 0, 0.04).second, limits<double>(hard(), 0.94, 10).second - 1);
 }
 
 TEST(CurrentLimits, WhatHasBuiltUpCounts) {

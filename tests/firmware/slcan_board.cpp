@@ -93,17 +93,21 @@ void SlcanBoard::send_sample(std::uint64_t time_us, std::int32_t current_ua, std
 
 BoardTelemetry SlcanBoard::telemetry() {
   BoardTelemetry t;
-  const std::string state = read_until("t1808"), detail = read_until("t1818"), status = read_until("t1828");
-  t.soc = static_cast<unsigned>(little_endian(state, 0, 2));
-  t.soc_sigma = static_cast<unsigned>(little_endian(state, 2, 2));
-  t.voltage = static_cast<unsigned>(little_endian(state, 4, 2));
-  t.current = static_cast<std::int16_t>(little_endian(state, 6, 2));
-  t.v_rc_uv = static_cast<std::int32_t>(little_endian(detail, 0, 4));
-  t.voltage_predicted_uv = static_cast<std::int32_t>(little_endian(detail, 4, 4));
-  t.flags = static_cast<std::uint32_t>(little_endian(status, 0, 4));
-  t.sample_counter = static_cast<unsigned>(little_endian(status, 4, 2));
-  t.status_counter = static_cast<unsigned>(little_endian(status, 6, 1));
-  t.reset_cause = static_cast<unsigned>(little_endian(status, 7, 1));
+  const std::string state = read_until("t1808"), electrical = read_until("t1818"), detail = read_until("t1898"), status = read_until("t1828");
+  const auto signed_24 = [](std::uint64_t raw) { return static_cast<std::int32_t>(raw << 8) >> 8; };
+  t.soc_quality = static_cast<unsigned>(little_endian(state, 1, 1) >> 4);
+  t.soc = static_cast<unsigned>(little_endian(state, 2, 2));
+  t.soc_sigma = static_cast<unsigned>(little_endian(state, 4, 2));
+  t.soc_display = static_cast<unsigned>(little_endian(state, 6, 2));
+  t.voltage = static_cast<unsigned>(little_endian(electrical, 2, 2));
+  t.current = static_cast<std::int16_t>(little_endian(electrical, 4, 2));
+  t.temperature = static_cast<std::int16_t>(little_endian(electrical, 6, 2));
+  t.v_rc_uv = signed_24(little_endian(detail, 2, 3));
+  t.voltage_predicted_uv = signed_24(little_endian(detail, 5, 3));
+  t.flags = static_cast<std::uint32_t>(little_endian(status, 2, 4));
+  t.sample_counter = static_cast<unsigned>(little_endian(status, 6, 2));
+  t.status_counter = static_cast<unsigned>(little_endian(status, 1, 1) & 15);
+  t.reset_cause = static_cast<unsigned>(little_endian(status, 1, 1) >> 4);
   return t;
 }
 

@@ -1,5 +1,5 @@
 // The firmware's application image in the emulator, talked to as a CAN adapter on a serial line is. Numbers and ids are those of
-// the pages in hal/slcan/codec.hpp, hal/sample_frames.hpp and firmware/messages.hpp, written here a second time on purpose.
+// the pages in hal/slcan/codec.hpp, hal/sample_frames.hpp and of can/greybox_bms.dbc, written here a second time on purpose.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,9 @@ namespace bms {
 
 /// What one sample was answered with.
 struct BoardTelemetry {
-  unsigned soc = 0, soc_sigma = 0, voltage = 0;
-  int current = 0;
+  unsigned soc = 0, soc_sigma = 0, soc_display = 0, soc_quality = 0;  ///< raw, 0.002 %
+  unsigned voltage = 0;                                               ///< mV
+  int current = 0, temperature = 0;                                   ///< 20 mA, 0.01 degrees C
   std::int32_t v_rc_uv = 0, voltage_predicted_uv = 0;
   std::uint32_t flags = 0;
   unsigned sample_counter = 0, status_counter = 0, reset_cause = 0;

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "estimator/soc_estimator.hpp"
+#include "estimator/condition.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/text_file.hpp"
@@ -14,9 +14,9 @@
 
 namespace bms {
 
-StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states) {
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states, const char* function) {
   const auto symbols = symbols_of(replay_image);
-  const Symbol step = symbol_named(symbols, "bms::estimator_step("), interrupt = symbol_named(symbols, "systick_interrupt");
+  const Symbol step = symbol_named(symbols, function), interrupt = symbol_named(symbols, "systick_interrupt");
   const TemporaryFolder folder;
   const std::string log = (folder.path() / "count").string();
   run_on_board(board, replay_image, samples, std::nullopt,
@@ -36,7 +36,7 @@ Footprint footprint(const std::filesystem::path& application_image) {
   const auto symbols = symbols_of(application_image);
   const ImageSize size = size_of(application_image);
   Footprint f;
-  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|soc_from<|SocBank<|StartMisfit<|model::|UdCovariance<|InputCheck).*");
+  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|condition_step\\(|Condition<|current_limits<|soc_from<|SocBank<|StartMisfit<|model::|UdCovariance<|InputCheck).*");
   for (const Symbol& s : symbols) {
     if (s.name.starts_with("bms::generated::cell<")) f.cell_tables += s.size;
     else if (std::regex_match(s.name, of_estimator)) f.estimator_text += s.size;
@@ -52,16 +52,19 @@ Footprint footprint(const std::filesystem::path& application_image) {
 
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
   const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell));
+  const StepCost besides = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell), "bms::condition_step(");
   const Footprint f = footprint(firmware_image(board.name, cell, Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},
           {"step, longest [instructions]", number(cost.most)},
           {"first step, which starts the filter [instructions]", number(cost.first)},
+          {"quality, display, health beside a step, mean [instructions]", besides.mean},
           {"stack of a step [bytes]", number(f.step_stack)},
           {"code of estimator and model [bytes]", number(f.estimator_text)},
           {"the cell's tables [bytes]", number(f.cell_tables)},
           {"state of one cell [bytes]", number(sizeof(CellState<float, model::OneRc>))},
           {"state of one estimator with its input checks [bytes]", number(sizeof(SocEstimator<float>))},
+          {"state of quality, display, limits and health [bytes]", number(sizeof(Condition<SocEstimator<float>>))},
           {"flash of the whole application [bytes]", number(f.image_text)},
           {"RAM of the whole application, without stack [bytes]", number(f.image_ram)}};
 }

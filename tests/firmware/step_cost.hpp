@@ -18,8 +18,9 @@ struct StepCost {
   double mean = 0;  ///< of all calls but the first, which starts the estimator
 };
 
-/// Instructions inside bms::estimator_step and all that it calls, interrupts left out. states: of the cell's mechanisms.
-StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states = 0);
+/// Instructions inside a function of the firmware and all that it calls, interrupts left out. states: that the cell's estimates tell besides.
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states = 0,
+                            const char* function = "bms::estimator_step(");
 
 /// Bytes.
 struct Footprint {

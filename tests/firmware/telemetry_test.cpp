@@ -1,9 +1,13 @@
 // The firmware's application on this machine: the few functions of hal/ that it calls are here.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <map>
 #include <vector>
 
 #include "firmware/application.hpp"
+#include "host_sim/cell_file.hpp"
 
 namespace bms {
 namespace {
@@ -30,7 +34,7 @@ void watchdog_feed() { ++fed; }
 
 namespace {
 
-using namespace messages;
+using Plain = SocEstimator<float>;
 
 Estimate<float> fixed_answer(SocEstimator<float>&, const Sample&) {
   Estimate<float> e;
@@ -42,7 +46,11 @@ Estimate<float> fixed_answer(SocEstimator<float>&, const Sample&) {
   return e;
 }
 
-class Telemetry : public ::testing::Test {
+const auto table9 = model::prepare<float, model::max_intervals>(read_cell("table9").parameters);
+
+void looked(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const Estimate<float>& e, bool limits_wanted) { condition.update(table9, sample, e, estimator.state(), limits_wanted); }
+
+class TelemetryTest : public ::testing::Test {
  protected:
   void SetUp() override {
     listening = true;
@@ -56,65 +64,107 @@ class Telemetry : public ::testing::Test {
     for (const hal::CanFrame& f : sent) all.push_back(f.id);
     return all;
   }
-  Application<SocEstimator<float>, fixed_answer> application{std::nullopt, {0xCE110001, 0x000100}};
+  Application<Plain, fixed_answer, looked> application{std::nullopt, {0xCE110001, 0x010203}, 6};
   Sample sample{};
 };
 
-TEST_F(Telemetry, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
+TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   sample.current_ua = -12'345'678;
   sample.voltage_uv = 3'301'499;
+  sample.temperature_cdegc = -1'234;
   application.take(sample);
-  EXPECT_EQ(ids(), (std::vector<unsigned>{0x183, 0x180, 0x181, 0x182}));
-  const PackState state = pack_state_of(sent[1]);
-  EXPECT_EQ(state.soc_permyriad, 5432);
-  EXPECT_EQ(state.soc_sigma_permyriad, 100);
-  EXPECT_EQ(state.voltage_mv, 3301);
-  EXPECT_EQ(state.current_ca, -1235);
-  const EstimateDetail detail = estimate_detail_of(sent[2]);
-  EXPECT_NEAR(detail.v_rc_uv, -12346, 1);
-  EXPECT_NEAR(detail.voltage_predicted_uv, 3'299'900, 1);
-  const Status status = status_of(sent[3]);
+  EXPECT_EQ(ids(), (std::vector<unsigned>{0x183, 0x186, 0x187, 0x188, 0x180, 0x181, 0x189, 0x182}));
+  const auto state = can::PackState::of(sent[4]);
+  EXPECT_NEAR(state.soc, 54.321, 0.0011);
+  EXPECT_NEAR(state.soc_sigma, 1, 0.0011);
+  EXPECT_NEAR(state.soc_display, 54.321, 0.0011);
+  EXPECT_EQ(state.soc_quality, can::PackState::soc_quality_carried_by_counting);
+  const auto electrical = can::PackElectrical::of(sent[5]);
+  EXPECT_NEAR(electrical.voltage, 3.301, 1e-5);
+  EXPECT_NEAR(electrical.current, -12.34, 1e-4);
+  EXPECT_NEAR(electrical.temperature, -12.34, 1e-4);
+  const auto detail = can::ModelDetail::of(sent[6]);
+  EXPECT_NEAR(detail.voltage_rc, -0.0123456, 1e-6);
+  EXPECT_NEAR(detail.voltage_predicted, 3.2999, 1e-6);
+  const auto status = can::Status::of(sent[7]);
   EXPECT_EQ(status.flags, voltage_stuck);
-  EXPECT_EQ(status.sample_counter, 1);
-  EXPECT_EQ(status.reset_cause, 4);
-  EXPECT_EQ(identity_of(sent[0]).cell_hash, 0xCE110001U);
+  EXPECT_EQ(status.sample_counter, 1U);
+  EXPECT_EQ(status.reset_cause, 4U);
+  const auto identity = can::Identity::of(sent[0]);
+  EXPECT_EQ(identity.cell_hash, 0xCE110001U);
+  EXPECT_EQ(identity.version_major, 1U);
+  EXPECT_EQ(identity.version_minor, 2U);
+  EXPECT_EQ(identity.version_patch, 3U);
+  const auto limits = can::CurrentLimits::of(sent[1]);
+  EXPECT_NEAR(limits.discharge_now, 6, 0.11) << "what the cell file allows";
+  EXPECT_GE(limits.charge_now, limits.charge_ten_seconds);
+  EXPECT_NEAR(can::Health::of(sent[2]).capacity, 100, 0.03);
+  EXPECT_NEAR(can::Health::of(sent[2]).resistance_sigma, 30, 0.03);
+  EXPECT_EQ(can::SocAnchor::of(sent[3]).observable, 0U);
   EXPECT_EQ(recorded.size(), 1U);
   EXPECT_EQ(fed, 1);
 }
 
-TEST_F(Telemetry, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
+TEST_F(TelemetryTest, EveryFrameIsProtectedAndCounted) {
+  for (int k = 0; k < 40; ++k) {
+    sample.time_us = static_cast<std::uint64_t>(k) * 300'000;
+    application.take(sample);
+  }
+  std::map<unsigned, int> expected;
+  for (const hal::CanFrame& f : sent) {
+    EXPECT_TRUE(can::intact(f, f.id)) << f.id;
+    EXPECT_EQ(can::counter_of(f), expected[f.id] % 15) << f.id;
+    ++expected[f.id];
+    for (std::size_t byte = 0; byte < 8; ++byte) {
+      for (int bit = 0; bit < 8; ++bit) {
+        hal::CanFrame broken = f;
+        broken.data[byte] = static_cast<std::uint8_t>(broken.data[byte] ^ (1 << bit));
+        EXPECT_FALSE(can::intact(broken, f.id));
+      }
+    }
+    EXPECT_FALSE(can::intact(f, static_cast<std::uint16_t>(f.id + 1))) << "another message";
+  }
+  EXPECT_EQ(expected[can::PackState::id], 40);
+  EXPECT_EQ(expected[can::Identity::id], 10) << "every second, at the next sample";
+}
+
+TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
   sample.current_ua = no_reading;
   sample.voltage_uv = no_reading;
-  application.take(sample);
-  EXPECT_EQ(pack_state_of(sent[1]).voltage_mv, invalid_u16);
-  EXPECT_EQ(pack_state_of(sent[1]).current_ca, invalid_i16);
+  sample.temperature_cdegc = no_temperature;
+  const auto nothing = can::PackElectrical::of(messages::pack_electrical(sample).frame(0));
+  EXPECT_TRUE(std::isnan(nothing.voltage) && std::isnan(nothing.current) && std::isnan(nothing.temperature));
   sample.current_ua = 2'000'000'000;
   sample.voltage_uv = 2'000'000'000;
-  sample.time_us = 1;
-  application.take(sample);
-  EXPECT_EQ(pack_state_of(sent[4]).current_ca, 0x7FFF);
-  EXPECT_EQ(pack_state_of(sent[4]).voltage_mv, 0xFFFE);
+  const auto much = can::PackElectrical::of(messages::pack_electrical(sample).frame(0));
+  EXPECT_NEAR(much.current, 655.34, 1e-3);
+  EXPECT_NEAR(much.voltage, 65.534, 1e-4);
   Estimate<float> e;
   e.soc = -0.1F;
   e.soc_sigma = 9;
-  EXPECT_EQ(pack_state(sample, e).soc_permyriad, 0);
-  EXPECT_EQ(pack_state(sample, e).soc_sigma_permyriad, 0xFFFE);
+  Condition<Plain> condition;
+  EXPECT_EQ(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc, 0);
+  EXPECT_NEAR(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc_sigma, 125, 1e-3);
+  e.soc = std::nanf("");
+  EXPECT_TRUE(std::isnan(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc));
   e.flags = not_started;
-  EXPECT_EQ(pack_state(sample, e).soc_permyriad, invalid_u16);
+  const auto start = can::PackState::of(messages::pack_state(e, condition).frame(0));
+  EXPECT_TRUE(std::isnan(start.soc));
+  EXPECT_EQ(start.soc_quality, can::PackState::soc_quality_not_started);
 }
 
-TEST_F(Telemetry, NobodyListeningIsToldNothingAndTheCountersSayHowMuchWasMissed) {
+TEST_F(TelemetryTest, NobodyListeningIsToldNothingAndTheCountersSayHowMuchWasMissed) {
   listening = false;
   for (int k = 0; k < 5; ++k) application.take(sample);
   EXPECT_TRUE(sent.empty());
   EXPECT_EQ(fed, 5);
   listening = true;
   application.take(sample);
-  EXPECT_EQ(status_of(sent.back()).sample_counter, 6);
-  EXPECT_EQ(status_of(sent.back()).status_counter, 1);
+  EXPECT_EQ(can::Status::of(sent.back()).sample_counter, 6U);
+  EXPECT_EQ(can::counter_of(sent.back()), 0);
 }
 
-TEST_F(Telemetry, IdentityComesEachSecondAndAFaultOnce) {
+TEST_F(TelemetryTest, IdentityComesEachSecondAndAFaultOnce) {
   fault = hal::FaultRecord{};
   fault->pc = 0x08001234;
   fault->cfsr = 0x8200;
@@ -122,15 +172,11 @@ TEST_F(Telemetry, IdentityComesEachSecondAndAFaultOnce) {
     sample.time_us = static_cast<std::uint64_t>(k) * 100'000;
     application.take(sample);
   }
-  std::size_t identities = 0, faults = 0;
-  for (const unsigned id : ids()) {
-    identities += id == identity_id ? 1 : 0;
-    faults += id == fault_id ? 1 : 0;
-  }
-  EXPECT_EQ(identities, 3U);
-  EXPECT_EQ(faults, 1U);
-  EXPECT_EQ(sent[0].id, fault_id);
-  EXPECT_EQ(last_fault_of(sent[0]).pc, 0x08001234U);
+  const auto all = ids();
+  EXPECT_EQ(std::count(all.begin(), all.end(), can::Identity::id), 3);
+  EXPECT_EQ(std::count(all.begin(), all.end(), can::LastFaultAddress::id), 1);
+  EXPECT_EQ(can::LastFaultAddress::of(sent[0]).program_counter, 0x08001234U);
+  EXPECT_EQ(can::LastFaultCause::of(sent[1]).configurable_fault_status, 0x8200U);
 }
 
 }  // namespace

@@ -1,0 +1,19 @@
+# can/greybox_bms.dbc -> ${CMAKE_BINARY_DIR}/generated/can_messages.hpp; link bms_can to include it.
+find_program(BMS_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH DOC "python3 with canmatrix")
+if(NOT BMS_PYTHON)
+  find_program(BMS_PYTHON python3 REQUIRED)
+endif()
+execute_process(COMMAND ${BMS_PYTHON} -c "import canmatrix" OUTPUT_QUIET ERROR_QUIET RESULT_VARIABLE no_canmatrix)
+if(no_canmatrix)
+  message(FATAL_ERROR "${BMS_PYTHON} cannot import canmatrix, which the CAN messages are generated with (Debian: python3-canmatrix)")
+endif()
+set(can_messages ${CMAKE_BINARY_DIR}/generated/can_messages.hpp)
+file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated)
+add_custom_command(OUTPUT ${can_messages}
+  COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/greybox_bms.dbc ${can_messages}
+  DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/greybox_bms.dbc
+  COMMENT "CAN messages" VERBATIM)
+add_custom_target(can_messages_made DEPENDS ${can_messages})
+add_library(bms_can INTERFACE)
+target_include_directories(bms_can INTERFACE ${CMAKE_BINARY_DIR}/generated)
+add_dependencies(bms_can can_messages_made)

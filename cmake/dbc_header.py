@@ -1,0 +1,83 @@
+"""DBC file -> C++ header: a struct per message, its values in physical units, packed and unpacked by can/codec.hpp.
+
+    dbc_header.py IN.dbc OUT.hpp
+
+A signal without unit and of factor 1 is an integer, any other a float. Its attribute Invalid is the raw value that says "not known", in C++
+NaN. Signals Crc and Counter are not values: the codec fills them in. Needs python3-canmatrix.
+"""
+import contextlib
+import os
+import re
+import sys
+
+
+def load(path):
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
+        import canmatrix.formats  # says on import which formats it does without
+
+        return canmatrix.formats.loadp_flat(path)
+
+
+def snake(name):
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def is_integer(signal):
+    return signal.unit == "" and signal.factor == 1 and signal.offset == 0
+
+
+def number(value):
+    text = repr(float(value))
+    return text if any(c in text for c in ".en") else text + ".0"
+
+
+def layout(signal):
+    invalid = (signal.attributes.get("Invalid") or "").strip('"')
+    return "{{{}, {}, {}, {}F, {}F, {}F, {}F, {}, {}}}".format(
+        signal.start_bit, signal.size, str(signal.is_signed).lower(), number(signal.factor), number(signal.offset), number(signal.min), number(signal.max),
+        str(invalid != "").lower(), invalid or 0)
+
+
+def message(frame):
+    values = [s for s in frame.signals if s.name not in ("Crc", "Counter")]
+    for s in frame.signals:
+        if not s.is_little_endian:
+            raise SystemExit(f"{frame.name}.{s.name}: not little-endian, which the codec is for")
+    lines = [f"/// {frame.comment}", f"struct {frame.name} {{", f"  static constexpr const char* name = \"{frame.name}\";", f"  static constexpr std::uint16_t id = {frame.arbitration_id.id:#x};",
+             f"  static constexpr std::uint32_t cycle_us = {frame.cycle_time * 1000};  ///< 0: not by time",
+             f"  static constexpr std::uint16_t data_id = {frame.attributes['E2EDataId']};"]
+    for s in values:
+        unit = f" [{s.unit}]" if s.unit else ""
+        lines.append(f"  static constexpr SignalLayout {snake(s.name)}_layout = {layout(s)};")
+        if is_integer(s):
+            lines.append(f"  std::uint32_t {snake(s.name)} = 0;  ///< {s.comment}")
+        else:
+            lines.append(f"  float {snake(s.name)} = unknown;  ///<{unit} {s.comment}")
+        for raw, text in sorted(s.values.items()):
+            lines.append(f"  static constexpr std::uint32_t {snake(s.name)}_{re.sub(r'[^a-z0-9]+', '_', str(text).lower())} = {raw};")
+    lines += ["", "  constexpr hal::CanFrame frame(std::uint8_t counter) const {", f"    hal::CanFrame out{{id, {frame.size}, {{}}}};"]
+    lines += [f"    put<{snake(s.name)}_layout>(out, {snake(s.name)});" for s in values]
+    lines += ["    protect(out, data_id, counter);", "    return out;", "  }", f"  static constexpr {frame.name} of(const hal::CanFrame& frame) {{", f"    {frame.name} out;"]
+    lines += [f"    out.{snake(s.name)} = get<{snake(s.name)}_layout, decltype(out.{snake(s.name)})>(frame);" for s in values]
+    lines += ["    return out;", "  }", "  /// see(name, unit, value, layout) for each.", "  template <class See>", "  constexpr void each(See&& see) {"]
+    lines += [f'    see("{s.name}", "{s.unit}", {snake(s.name)}, {snake(s.name)}_layout);' for s in values]
+    lines += ["  }", "};", ""]
+    return lines
+
+
+def main():
+    source, target = sys.argv[1:]
+    frames = load(source).frames
+    lines = [f"// Made at build time from {os.path.basename(source)}; do not edit.", "#pragma once", "", "#include <cstdint>", "#include <tuple>", "", '#include "can/codec.hpp"', "", "namespace bms::can {", ""]
+    for frame in frames:
+        lines += message(frame)
+    names = ", ".join(f.name for f in frames)
+    lines += ["/// All of them.", f"using Messages = std::tuple<{names}>;", "", "}  // namespace bms::can", ""]
+    text = "\n".join(lines)
+    if os.path.exists(target) and open(target).read() == text:
+        return
+    with open(target, "w") as out:
+        out.write(text)
+
+
+main()

@@ -1,0 +1,59 @@
+// Frames of every message of the DBC file, of random values, of values beyond the range and of values that are not known:
+//
+//   random_frames SEED COUNT        a line each: {"id": 384, "data": "0f...", "values": {"Soc": 54.3, "SocSigma": null, ...}}
+//
+// values: what went in, held within the signal's range; null: not known. decode_frames.py reads them with another decoder.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "can_messages.hpp"
+
+namespace {
+
+using namespace bms;
+
+std::mt19937 chance;
+double uniform() { return std::uniform_real_distribution<double>()(chance); }
+
+template <class Message>
+void line() {
+  Message m;
+  std::string values;
+  const int kind = static_cast<int>(chance() % 8);
+  m.each([&](const char* name, const char*, auto& value, const can::SignalLayout& s) {
+    if constexpr (std::same_as<std::remove_reference_t<decltype(value)>, float>) {
+      const double span = s.highest - s.lowest;
+      const double x = kind == 0 ? s.lowest - span * uniform() : kind == 1 ? s.highest + span * uniform() : kind == 2 ? s.lowest : kind == 3 ? s.highest : s.lowest + span * uniform();
+      const bool known = !s.has_invalid || chance() % 5 != 0;
+      value = known ? static_cast<float>(x) : can::unknown;
+      const double held = std::min(std::max(x, static_cast<double>(s.lowest)), static_cast<double>(s.highest));
+      values += fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, known ? fmt::format("{}", held) : "null");
+    } else {
+      const auto most = s.bits > 24 ? static_cast<std::uint32_t>(can::mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
+      value = kind == 3 ? most : kind == 1 && s.bits <= 24 ? most + 1 + static_cast<std::uint32_t>(chance() % 100) : static_cast<std::uint32_t>(chance() % (std::uint64_t{most} + 1));
+      const bool known = value <= most || !s.has_invalid;
+      values += fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, known ? fmt::format("{}", std::min(value, most)) : "null");
+    }
+  });
+  const hal::CanFrame frame = m.frame(static_cast<std::uint8_t>(chance() % can::counters));
+  std::string data;
+  for (const std::uint8_t byte : frame.data) data += fmt::format("{:02x}", byte);
+  fmt::print("{{\"id\": {}, \"data\": \"{}\", \"counter\": {}, \"values\": {{{}}}}}\n", frame.id, data, can::counter_of(frame), values);
+}
+
+template <class... Message>
+void lines(std::tuple<Message...>*) {
+  (line<Message>(), ...);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  chance.seed(argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 1);
+  for (int k = argc > 2 ? std::atoi(argv[2]) : 100; k > 0; --k) lines(static_cast<can::Messages*>(nullptr));
+}
