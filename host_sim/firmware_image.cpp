@@ -46,6 +46,7 @@ const char* ending(Image image) {
   switch (image) {
     case Image::replay: return "_replay";
     case Image::fault: return "_fault";
+    case Image::pack: return "_pack";
     default: return "";
   }
 }

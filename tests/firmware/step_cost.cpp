@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "estimator/cell_differences.hpp"
 #include "estimator/condition.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/firmware_image.hpp"
@@ -14,22 +15,43 @@
 
 namespace bms {
 
-StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states, const char* function) {
-  const auto symbols = symbols_of(replay_image);
-  const Symbol step = symbol_named(symbols, function), interrupt = symbol_named(symbols, "systick_interrupt");
-  const TemporaryFolder folder;
-  const std::string log = (folder.path() / "count").string();
-  run_on_board(board, replay_image, samples, std::nullopt,
-               {"-plugin", fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, step.address & ~1ULL, interrupt.address & ~1ULL,
-                                       (interrupt.address & ~1ULL) + interrupt.size),
-                "-d", "plugin", "-D", log}, states);
-  StepCost cost;
+namespace {
+
+/// What the emulator needs to count the instructions of a function.
+std::vector<std::string> counting(const std::filesystem::path& image, const char* function, const std::string& log) {
+  const auto symbols = symbols_of(image);
+  const Symbol counted = symbol_named(symbols, function), interrupt = symbol_named(symbols, "systick_interrupt");
+  return {"-plugin", fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, counted.address & ~1ULL, interrupt.address & ~1ULL, (interrupt.address & ~1ULL) + interrupt.size),
+          "-d", "plugin", "-D", log};
+}
+
+StepCost counted_in(const std::string& log) {
   unsigned long long calls = 0, first = 0, least = 0, most = 0, sum = 0;
   const std::string text = read_file(log);
   if (std::sscanf(text.c_str(), "calls %llu first %llu min %llu max %llu sum %llu", &calls, &first, &least, &most, &sum) != 5 || calls < 2) {
     throw std::runtime_error("the instruction counter said: " + text);
   }
   return {calls, first, least, most, static_cast<double>(sum) / static_cast<double>(calls - 1)};
+}
+
+}  // namespace
+
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& image, const char* function) {
+  const TemporaryFolder folder;
+  const std::string log = (folder.path() / "count").string();
+  auto command = emulator_command(board, image, {});
+  const auto more = counting(image, function, log);
+  command.insert(command.end(), more.begin(), more.end());
+  command.insert(command.end(), {"-serial", "none"});
+  if (const int code = ChildProcess(command, folder.path() / "log").wait(); code != 0) throw std::runtime_error(fmt::format("{} ended with {}: {}", image.string(), code, read_file(folder.path() / "log")));
+  return counted_in(log);
+}
+
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states, const char* function) {
+  const TemporaryFolder folder;
+  const std::string log = (folder.path() / "count").string();
+  run_on_board(board, replay_image, samples, std::nullopt, counting(replay_image, function, log), states);
+  return counted_in(log);
 }
 
 Footprint footprint(const std::filesystem::path& application_image) {
@@ -53,15 +75,18 @@ Footprint footprint(const std::filesystem::path& application_image) {
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
   const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell));
   const StepCost besides = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell), "bms::condition_step(");
+  const StepCost pack = count_instructions(board, firmware_image(board.name, cell, Image::pack), "bms::pack_step(");
   const Footprint f = footprint(firmware_image(board.name, cell, Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},
           {"step, longest [instructions]", number(cost.most)},
           {"first step, which starts the filter [instructions]", number(cost.first)},
           {"quality, display, health beside a step, mean [instructions]", besides.mean},
+          {"sixteen cells beside their mean, mean [instructions]", pack.mean},
           {"stack of a step [bytes]", number(f.step_stack)},
           {"code of estimator and model [bytes]", number(f.estimator_text)},
           {"the cell's tables [bytes]", number(f.cell_tables)},
+          {"state of one of sixteen cells beside their mean [bytes]", number(sizeof(CellDifference<float>))},
           {"state of one cell [bytes]", number(sizeof(CellState<float, model::OneRc>))},
           {"state of one estimator with its input checks [bytes]", number(sizeof(SocEstimator<float>))},
           {"state of quality, display, limits and health [bytes]", number(sizeof(Condition<SocEstimator<float>>))},

@@ -22,6 +22,9 @@ struct StepCost {
 StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states = 0,
                             const char* function = "bms::estimator_step(");
 
+/// The same of an image that needs no samples and ends by itself.
+StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& image, const char* function);
+
 /// Bytes.
 struct Footprint {
   std::uint64_t estimator_text = 0;   ///< code of estimator and model, start-up of the filter included
