@@ -70,6 +70,7 @@ json figures(const ReplayResult& r) {
   percent_row("RMS error after 30 minutes", r.soc.rmse_after_30min);
   percent_row("largest error after 30 minutes", r.soc.max_error_after_30min);
   percent_row("reference within two sigma", r.soc.within_2_sigma);
+  if (r.soc.current_offset_a) row("current reads too high by, at the end", fmt::format("{:+.0f} +- {:.0f} mA", 1e3 * *r.soc.current_offset_a, 1e3 * *r.soc.current_offset_sigma_a));
   group("Voltage");
   const VoltageFigures& v = r.voltage;
   if (v.prediction_rmse_v) row("one-step prediction, RMS", millivolts(*v.prediction_rmse_v));
@@ -129,6 +130,10 @@ std::string statement(const ReplayResult& r) {
   if (r.soc.rmse) {
     text += fmt::format(" Against the reference the estimate was off by {:.2f} % RMS, {:.2f} % at most; the reference lies within two sigma in {:.0f} % of the samples.",
                         100 * *r.soc.rmse, 100 * *r.soc.max_error, 100 * *r.soc.within_2_sigma);
+  }
+  if (r.soc.current_offset_a && std::abs(*r.soc.current_offset_a) > 2 * *r.soc.current_offset_sigma_a) {
+    text += fmt::format(" By then the current seemed to read {:.0f} mA too {} (standard deviation {:.0f} mA).", 1e3 * std::abs(*r.soc.current_offset_a), *r.soc.current_offset_a < 0 ? "low" : "high",
+                        1e3 * *r.soc.current_offset_sigma_a);
   }
   if (r.verified_against) text += fmt::format(" The emulated {} computed the same bits.", *r.verified_against);
   return text;

@@ -87,6 +87,16 @@ TEST(Replay, SocFiguresAreNullWithoutAReference) {
   EXPECT_THAT(json_of(r, ""), HasSubstr("\"rmse\": null"));
 }
 
+TEST(Replay, AnOffsetThatTheFilterIsSureOfIsSaid) {
+  ReplayResult r = replayed(std::nullopt);
+  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
+  r.soc.current_offset_a = -0.05;
+  r.soc.current_offset_sigma_a = 0.02;
+  EXPECT_THAT(statement(r), HasSubstr("the current seemed to read 50 mA too low (standard deviation 20 mA)"));
+  r.soc.current_offset_sigma_a = 0.04;
+  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
+}
+
 TEST(Replay, TraceHasARowForEverySampleAndTheContractsColumns) {
   const auto r = replayed(std::nullopt);
   const std::string csv = trace_csv(r);
