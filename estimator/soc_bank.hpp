@@ -3,11 +3,12 @@
 // one of them and be sure of it.
 //
 //   e_k = |v - V(soc_k) - b_k| - w_k           beyond half a step of the grid on the curve, w_k
-//   misfit_k += e_k^2 / (2 (p + r))            b_k += p / (p + r) e_k
+//   misfit_k += e_k^2 / (2 (p + r)) + ln r / 2         b_k += p / (p + r) e_k
 //
 // The model's error is a lasting one, b, and each hypothesis has its own, of standard deviation noise.model_v at first: what is off by as
 // much for hours speaks once, and a knee of the curve that is passed, or is not, speaks for itself. r: what is new in every correlation
-// time. The variance of b, p, is the same for all.
+// time: where the curve is steep it is large, so nothing there is far off; that it could be anything is what speaks against it, ln r. The
+// variance of b, p, is the same for all.
 //
 // In turns, a point at a time: `points` samples add to the misfits, as many sum the weights exp(-misfit) up, then mean and variance are
 // known anew. So a step costs the same whenever it comes. (The point-mass filter of R. Bucy and K. Senne, Automatica 7 (1971) 287, on
@@ -103,6 +104,18 @@ class SocBank {
 
   static constexpr Fraction forgotten_in(const Fraction& share) { return share * Fraction(1.0 / lasts); }
 
+  /// ln(v2 / 1 mV^2) / 2, 0 below that; straight lines between powers of four, within 0.06.
+  static constexpr Misfit half_log(Variance v2) {
+    const auto unit = Variance(1e-6), four = Variance(4e-6);
+    const auto ln_2 = Misfit(0.69314718);
+    Misfit sum(0);
+    while (v2 > four) {
+      v2 = model::product<Variance>(v2, Fraction(0.25));
+      sum = Misfit(sum + ln_2);
+    }
+    return v2 > unit ? Misfit(sum + ln_2 * model::ratio<Fraction>(Variance(v2 - unit), Variance(four - unit))) : sum;
+  }
+
   constexpr void compare(std::size_t k, const Fraction& share, const Variance& white_v2, const Seen& seen) {
     if (k == 0) next_least_ = Misfit(2'000);
     bias_v_[k] = Voltage(bias_v_[k] - bias_v_[k] * forgotten_in(share));
@@ -115,7 +128,8 @@ class SocBank {
     const bool far = squares > Exponent(most);  // as much may be one bad reading
     if (!far) bias_v_[k] = Voltage(bias_v_[k] + gain * beyond_v);
     gained_ = Sum(gained_ + gain);
-    misfit_[k] = held(Misfit(Misfit(misfit_[k] - least_) + (far ? Misfit(most) : Misfit(squares))));
+    const Misfit width = Misfit(half_log(Variance(white_v2 + seen.new_v2)) * (share < Fraction(1) ? share : Fraction(1)));
+    misfit_[k] = held(Misfit(Misfit(Misfit(misfit_[k] - least_) + width) + (far ? Misfit(most) : Misfit(squares))));
     if (misfit_[k] < next_least_) next_least_ = misfit_[k];
   }
 

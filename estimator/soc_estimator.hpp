@@ -22,6 +22,7 @@
 #include <cstdint>
 
 #include "estimator/charge.hpp"
+#include "estimator/current_at_rest.hpp"
 #include "estimator/estimate.hpp"
 #include "estimator/input_check.hpp"
 #include "estimator/sample.hpp"
@@ -78,15 +79,18 @@ class SocEstimator {
     auto noise = Model::noise(laws, settling, cell.noise);
     noise[Model::soc] = soc_noise_;
     if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell));
+    if constexpr (Model::errors_are_states) noise[Model::soc] = Variance(noise[Model::soc] + doubt_of_gain(Soc(soc - since_anchor_.soc), cell.noise.gain));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
 
     estimate.voltage_predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
+    if constexpr (Model::errors_are_states) weigh_rest(cell, current, step_us);
     if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * drive.current_a), cell.plausible, estimate.flags)) {
       const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - estimate.voltage_predicted_v;
       correct(cell, at, drive, soc, innovation_v, estimate.flags);
     }
     complete(cell, estimate);
+    if constexpr (Model::errors_are_states) bound_gain(estimate.soc, estimate.soc_sigma, cell.noise.gain);
     return estimate;
   }
 
@@ -185,13 +189,52 @@ class SocEstimator {
     return Variance(d * d) + Variance((sigma + sigma) * d);
   }
 
+  using Correction = std::array<Voltage, states>;
+
+  constexpr void take(const Correction& correction, const model::ChargeScale<S>& scale) {
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < states; ++i) {
+      if (i != Model::soc) state_.polarisation[Model::place(i)] += correction[i];
+    }
+    state_.charge.correct(correction[Model::soc], scale);
+  }
+
+  /// A current that rests is the sensor's offset, but for what the cell file says may flow then.
+  template <class Cell>
+  constexpr void weigh_rest(const Cell& cell, const BelievedCurrent& current, std::uint64_t step_us) {
+    if (!(cell.noise.at_rest_per_h2 > Variance(0))) return;
+    if (!current.measured) return at_rest_.moves();
+    if (!at_rest_.rests(current.ua, step_us, cell.noise.at_rest)) return;
+    const auto shared_by = model::ratio<Count>(model::Duration<S>(static_cast<int>(CurrentAtRest::lasts_s)), duration_s_);
+    const Voltage read = model::ratio<Voltage>(model::from_micro<Current>(current.ua), cell.noise.one_c_a);
+    typename Model::Sensitivity h{};
+    h[Model::last] = model::VoltagePerSoc<S>(1);
+    const Variance noise = model::product<Variance>(cell.noise.at_rest_per_h2, shared_by > Count(1) ? shared_by : Count(1));
+    take(state_.covariance.observe(h, noise, Voltage(read - state_.polarisation[Model::current_offset])), cell.charge);
+  }
+
+  /// What a wrong gain makes of the charge that was counted since soc was last known, c: its standard deviation is gain c, so a step's part of
+  /// the variance is gain^2 ((c + d)^2 - c^2). Charge that comes back takes it away again, which a covariance cannot: then it stays.
+  constexpr Variance doubt_of_gain(const Soc& d, const Fraction& gain) {
+    const Soc before = since_anchor_.counted;
+    since_anchor_.counted = Soc(before + d);
+    const Variance more = Variance((before + since_anchor_.counted) * d);
+    return more > Variance(0) ? model::product<Variance>(model::product<Variance>(more, gain), gain) : Variance(0);
+  }
+  /// A gain's part of sigma is not more than sigma.
+  constexpr void bound_gain(const Soc& soc, const Soc& sigma, const Fraction& gain) {
+    since_anchor_.soc = soc;
+    if (!(model::magnitude(Soc(since_anchor_.counted * gain)) > sigma)) return;
+    const auto most = model::ratio<Soc>(sigma, Soc(gain));
+    since_anchor_.counted = since_anchor_.counted > Soc(0) ? most : Soc(-most);
+  }
+
   static constexpr double impossible = 8;                     // standard deviations; a cell that was emptied fast shows five of them for minutes
   static constexpr double new_share = 1.0 / 4;                // of the variance of an error that lasts: half of it comes and goes
   static constexpr double least_error_v = 0.01;               // of any model, whatever its file says
   static constexpr std::uint32_t impossible_us = 600'000'000; // of it before soc is sought anew: near empty a cell needs minutes to recover
   static constexpr std::uint32_t calm_us = 60'000'000;        // without it, and it is forgotten
 
-  using Correction = std::array<Voltage, states>;
   using At = model::TablePoint<S>;
 
   template <class Cell>
@@ -212,12 +255,7 @@ class SocEstimator {
     if constexpr (Model::errors_are_states) error_v2 = Variance(model::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + axis_v2(cell, at));
     const Variance model_v2 = Variance(model::product<Variance>(error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
-    const Correction correction = state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), noise_v2, innovation_v);
-#pragma GCC unroll 8
-    for (std::size_t i = 0; i < states; ++i) {
-      if (i != Model::soc) state_.polarisation[Model::place(i)] += correction[i];
-    }
-    state_.charge.correct(correction[Model::soc], cell.charge);
+    take(state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), noise_v2, innovation_v), cell.charge);
   }
 
   /// An innovation that the model's error and soc's own sigma do not explain, for ten minutes, is soc's: it is sought anew. True: it is.
@@ -341,11 +379,12 @@ class SocEstimator {
     SocBelief<S> belief{soc_of_ppb(from_.soc_ppb), Variance{}};
     const Soc believed_sigma = soc_of_ppb(from_.soc_sigma_ppb);
     belief.variance = Variance(believed_sigma * believed_sigma);
-    // how much the current has built up is unknown: half of what it can, give or take the same
+    // how much the current has built up is unknown: half of what it can, give or take the same; and what flowed before it
     const model::CellUnder under{cell, drive, Model::held(state_.polarisation)};
     auto at = look_up(under, has_start_ ? belief.soc : Soc(0.5), interval_);
     const Voltage half_v = at.r1_ohm * Fraction(0.5) * drive.current_a;
-    const Variance half_v2 = half_v * half_v;
+    const Voltage before_v = at.r1_ohm * cell.noise.unknown_a;
+    const Variance half_v2 = Variance(half_v * half_v) + Variance(before_v * before_v);
     std::array<Variance, states> variances{};
     variances[0] = cell.noise.v_rc_v2 + half_v2;
     Model::start(laws, state_.polarisation, variances, at, drive, cell.noise);
@@ -356,7 +395,7 @@ class SocEstimator {
       Variance reading_v2 = cell.noise.rest_v2 + half_v2;
       for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
       if (!current.measured) {
-        const Voltage unknown_v = Voltage(at.r0_ohm * cell.noise.unknown_a) + Voltage(at.r1_ohm * cell.noise.unknown_a);
+        const Voltage unknown_v = at.r0_ohm * cell.noise.unknown_a;
         reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
       }
       const Voltage ocv_v = voltage ? Voltage(Model::true_voltage(laws, model::from_micro<Voltage>(sample.voltage_uv)) - load_v) : Voltage(0);
@@ -375,6 +414,7 @@ class SocEstimator {
     state_.covariance.set_diagonal(variances);
     estimate.voltage_predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
     complete(cell, estimate);
+    if constexpr (Model::errors_are_states) since_anchor_.soc = estimate.soc;
     return estimate;
   }
 
@@ -384,6 +424,12 @@ class SocEstimator {
 
   CellState<S, ModelOf> state_;
   InputCheck<S> check_;
+  struct SinceAnchor {
+    Soc soc{}, counted{};
+  };
+  struct Nothing {};
+  [[no_unique_address]] std::conditional_t<Model::errors_are_states, SinceAnchor, Nothing> since_anchor_;
+  [[no_unique_address]] std::conditional_t<Model::errors_are_states, CurrentAtRest, Nothing> at_rest_;
   std::uint64_t time_us_ = 0;
   std::uint64_t paced_us_ = 0;
   std::uint64_t wondered_us_ = 0;

@@ -50,6 +50,8 @@ void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("current_offset_a", p.noise.current_offset_a);
   visitor.number("current_offset_correlation_s", p.noise.current_offset_correlation_s);
   visitor.number("current_unknown_a", p.noise.current_unknown_a);
+  visitor.optional_number("current_at_rest_a", p.noise.current_at_rest_a);
+  visitor.optional_number("current_gain", p.noise.current_gain);
   visitor.optional_flag("errors_are_states", p.noise.errors_are_states);
 
   visitor.table("tolerance");

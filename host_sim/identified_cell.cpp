@@ -258,6 +258,8 @@ void extend(const OcvTaken& ocv, const std::vector<IdentificationData>& data, Ce
   // a sensor good to a hundredth of the 1C current, whose offset stays for a day's work
   p.noise.current_offset_a = 0.01 * capacity_ah;
   p.noise.current_offset_correlation_s = 36'000;
+  p.noise.current_at_rest_a = 0.002 * capacity_ah;
+  p.noise.current_gain = 0.007;
   p.noise.errors_are_states = true;
 }
 

@@ -33,7 +33,8 @@ identification::Record without_mechanisms(const CellFile& cell, const Identifica
 /// What an estimator needs besides: resistances that follow the temperature, errors that last as states of the filter, and noise as it then
 /// is. data: what was identified from, as measured.
 inline constexpr const char* extended_noise =
-    "model: what they leave for longer than ten minutes, and a minor loop of the hysteresis; current offset: a sensor good to a hundredth of the 1C current, over a day's work";
+    "model: what they leave for longer than ten minutes, and a minor loop of the hysteresis; current offset: a sensor good to a hundredth of the 1C current, over a day's work; "
+    "at rest: an open circuit, to a fifth of that; gain: half a percent of the reading and half a percent of the capacity";
 void extend(const OcvTaken& ocv, const std::vector<IdentificationData>& data, CellFile& cell);
 
 /// Noise and tolerance: of the measuring chain by the recordings' rests, of the model by what it leaves over on `judge`, and by what lies

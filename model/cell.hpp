@@ -46,6 +46,11 @@ struct ChargeScale {
   Soc<S> counts_per_soc{};           ///< its inverse; fixed point: in 2^28 counts
 };
 
+/// A current reading that rests (estimator/current_at_rest.hpp).
+struct RestingCurrent {
+  std::int32_t largest_ua = 0, still_ua = 0;
+};
+
 /// Noise as the filter uses it, in its own units.
 template <class S>
 struct FilterNoise {
@@ -59,6 +64,9 @@ struct FilterNoise {
   Variance<S> walk_soc2_per_s{};        ///< slow current error: 2 offset^2 correlation / capacity^2
   Variance<S> offset_per_h2{};          ///< the same as a state of the filter: current_offset_a over the capacity in Ah, squared
   Duration<S> current_offset_correlation_s{};
+  Variance<S> at_rest_per_h2{};         ///< current_at_rest_a over the capacity in Ah, squared; 0: not known
+  RestingCurrent at_rest;
+  Fraction<S> gain{};                   ///< current_gain
   Current<S> one_c_a{};                 ///< the capacity in one hour
   Soc<S> unknown_soc_per_s{};           ///< current_unknown_a over the capacity
   Current<S> unknown_a{};
@@ -250,6 +258,10 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.walk_soc2_per_s = Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
   cell.noise.offset_per_h2 = Variance<S>(square(n.current_offset_a / p.capacity_ah));
   cell.noise.current_offset_correlation_s = Duration<S>(n.current_offset_correlation_s < 131'000 ? n.current_offset_correlation_s : 131'000);
+  cell.noise.at_rest_per_h2 = Variance<S>(square(n.current_at_rest_a / p.capacity_ah));
+  const auto micro = [](double a) { return static_cast<std::int32_t>(a < 2'000 ? a * 1e6 : 2e9); };
+  cell.noise.at_rest = {micro(3 * (n.current_offset_a + n.current_at_rest_a)), micro(n.current_offset_a)};
+  cell.noise.gain = Fraction<S>(n.current_gain);
   cell.noise.one_c_a = Current<S>(p.capacity_ah);
   cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
   cell.noise.unknown_a = Current<S>(n.current_unknown_a);

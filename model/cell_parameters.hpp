@@ -68,6 +68,8 @@ struct Noise {
   double current_offset_a = 0;              ///< slow error of the current reading
   double current_offset_correlation_s = 0;  ///< how long it lasts
   double current_unknown_a = 0;             ///< current to be expected while there is no reading
+  double current_at_rest_a = 0;             ///< what may still flow while the reading rests, where errors are states; 0: a resting reading is believed as it is
+  double current_gain = 0;                  ///< of the current reading and of the capacity that it is divided by, relative, lasting; where errors are states
   bool errors_are_states = false;           ///< the filter estimates the current's offset and the model's lasting error; else it widens sigma by them
 };
 
@@ -175,6 +177,9 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (outside(n.current_offset_a, 1e-6 * c_rate_1_a, c_rate_1_a)) return {"noise.current_offset_a", 0, "1e-6 to 1 times the 1C current"};
   if (outside(n.current_offset_correlation_s, 1, 1e6)) return {"noise.current_offset_correlation_s", 0, "1 to 1000000 s"};
   if (outside(n.current_unknown_a, 1e-3 * c_rate_1_a, 10 * c_rate_1_a)) return {"noise.current_unknown_a", 0, "0.001 to 10 times the 1C current"};
+
+  if (outside(n.current_at_rest_a, 0, 0.1 * c_rate_1_a)) return {"noise.current_at_rest_a", 0, "0 to 0.1 times the 1C current"};
+  if (outside(n.current_gain, 0, 0.2)) return {"noise.current_gain", 0, "0 to 0.2"};
 
   const Tolerance& t = p.tolerance;
   if (outside(t.ocv_v, 0, 0.1)) return {"tolerance.ocv_v", 0, "0 to 0.1 V"};

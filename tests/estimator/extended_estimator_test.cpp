@@ -210,6 +210,74 @@ TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
   }
 }
 
+/// An hour at rest, then the work of the others.
+Work work_after_a_rest(double sensor_a, double truly_a) {
+  Work w;
+  const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  Course<double> course(cell, capacity_ah, {}, 0.6);
+  for (std::uint64_t k = 0; k < 7'200; ++k) {
+    const double current_a = k < 3'600 ? truly_a : -1;
+    const double v = course.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, 25, [](auto&, const auto&) {});
+    w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround((current_a + sensor_a) * 1e6)), static_cast<std::int32_t>(std::lround(v * 1e6)), 2'500});
+    w.soc.push_back(course.soc());
+  }
+  return w;
+}
+
+template <class S>
+auto run_with_rest(double at_rest_a, const std::vector<Sample>& samples, const StartingPoint& start, double gain = 0) {
+  using Estimator = SocEstimator<S, ExtendedRc<0, held, true>::template Of>;
+  auto parameters = read_cell("table9").parameters;
+  parameters.noise.current_offset_a = 0.06;
+  parameters.noise.current_offset_correlation_s = 36'000;
+  parameters.noise.current_at_rest_a = at_rest_a;
+  parameters.noise.current_gain = gain;
+  parameters.noise.errors_are_states = true;
+  const Cells<S> cell{prepare<S, max_intervals>(parameters), {}};
+  Estimator estimator(start);
+  std::vector<typename Estimator::Result> estimates;
+  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  return estimates;
+}
+
+TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
+  for (const double sensor_a : {-0.07, 0.07}) {
+    const Work w = work_after_a_rest(sensor_a, 0);
+    const StartingPoint start{600'000'000, 5'000'000};
+    const auto e = run_with_rest<float>(0.012, w.samples, start);
+    EXPECT_NEAR(6 * e[59].further[1], 0, 0.005) << "a minute first";
+    EXPECT_NEAR(6 * e[3'599].further[1], sensor_a, 0.012);
+    EXPECT_LT(6 * e[3'599].further[2], 0.012);
+    EXPECT_NEAR(e.back().soc, w.soc.back(), 0.004);
+    EXPECT_LE(std::abs(e.back().soc - w.soc.back()), 2 * e.back().soc_sigma);
+    const auto fixed = run_with_rest<FixedPoint>(0.012, w.samples, start);
+    EXPECT_NEAR(as_double(fixed.back().soc), static_cast<double>(e.back().soc), 2e-4);
+    EXPECT_NEAR(as_double(fixed[3'599].further[1]), static_cast<double>(e[3'599].further[1]), 1e-4);
+  }
+}
+
+TEST(ExtendedEstimator, BelievesASmallCurrentWhereNobodySaysWhatFlowsAtRest) {
+  const Work w = work_after_a_rest(0, -0.07);  // a display that is left on
+  const auto e = run_with_rest<float>(0, w.samples, {600'000'000, 5'000'000});
+  EXPECT_NEAR(6 * e[3'599].further[1], 0, 0.01);
+  EXPECT_NEAR(e[3'599].soc, w.soc[3'599], 0.002);
+}
+
+TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
+  // on the plateau no voltage helps; 6 A for 36 minutes are 60 % of 6 Ah
+  const StartingPoint start{900'000'000, 1'000'000};
+  std::vector<Sample> out, out_and_back;
+  for (std::uint64_t k = 0; k < 2'160; ++k) {
+    out.push_back({k * 1'000'000, k == 0 ? 0 : -6'000'000, no_reading, 2'500});
+    out_and_back.push_back({k * 1'000'000, k == 0 ? 0 : k < 1'080 ? -6'000'000 : 6'000'000, no_reading, 2'500});
+  }
+  const auto without = run_with_rest<float>(0, out, start), with = run_with_rest<float>(0, out, start, 0.02);
+  const auto sigma = [](const auto& e) { return static_cast<double>(e.back().soc_sigma); };
+  EXPECT_NEAR(std::sqrt(sigma(with) * sigma(with) - sigma(without) * sigma(without)), 0.02 * 0.6, 0.0005);
+  const auto returned = run_with_rest<float>(0, out_and_back, start, 0.02);
+  EXPECT_NEAR(std::sqrt(sigma(returned) * sigma(returned) - sigma(without) * sigma(without)), 0.02 * 0.3, 0.0005) << "what it was in the middle stays";
+}
+
 TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
   const Work w = work(usual(some), 1'500, 0.77);
   const StartingPoint start{770'000'000, 5'000'000};

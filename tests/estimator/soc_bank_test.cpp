@@ -75,6 +75,23 @@ TYPED_TEST(SocBankOfEveryScalar, OneBadReadingDoesNotRuleTheTruthOut) {
 }
 
 /// 1.5 deviations too much for 20 correlation times, on the lower plateau and over the knee: no certainty of the upper one.
+/// As curve_v, and below 0.1 steep, where soc is no surer than elsewhere: nothing there is far off.
+TYPED_TEST(SocBankOfEveryScalar, WhereAnythingCouldBeReadIsNotMoreLikelyForIt) {
+  using S = TypeParam;
+  auto a = asked<S>(0.01);
+  const double truth = 0.4, off_v = 0.015;  // a lasting error of one and a half sigma
+  double soc = 0.5;
+  for (int k = 0; k < 128 * 200; ++k) {
+    const auto news = a.bank.step(model::Soc<S>(soc), model::Fraction<S>(0.2), model::Variance<S>(1e-6), model::Variance<S>(1e-4), [&](const model::Soc<S>& there) -> typename SocBank<S>::Seen {
+      const double at = model::as_double(there), steep_v = at < 0.25 ? 0.2 : 0;
+      return {model::Voltage<S>(curve_v(truth) + off_v - curve_v(at) + 0.1 * steep_v), model::Voltage<S>(0.001), model::Variance<S>(1e-5 + steep_v * steep_v)};
+    });
+    if (!news.any) continue;
+    soc += model::as_double(news.moved);
+  }
+  EXPECT_GT(soc, 0.3) << "the steep end must not draw the mean to it";
+}
+
 TYPED_TEST(SocBankOfEveryScalar, AnErrorThatLastsSpeaksOnce) {
   auto a = asked<TypeParam>(0.03);
   a.off_v = 0.045;

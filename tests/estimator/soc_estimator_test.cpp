@@ -84,7 +84,7 @@ TEST(SocEstimator, AWideBeliefAndTheFirstVoltageAreWeighedTogether) {
   // 3.23 V is 16 %: where the curve is steep the voltage decides
   auto e = started(400'000'000, 200'000'000, 3'230'000);
   EXPECT_NEAR(e.soc, 0.16, 0.02);
-  EXPECT_LT(e.soc_sigma, 0.03);
+  EXPECT_LT(e.soc_sigma, 0.035);  // 8 mV of a rested cell, 7 mV that a current before may have left, over 0.32 V
   // 3.283 V is anything from 37 to 53 %: there the belief does
   e = started(450'000'000, 30'000'000, 3'285'000);
   EXPECT_NEAR(e.soc, 0.45, 0.01);
