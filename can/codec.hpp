@@ -52,17 +52,32 @@ constexpr void put(hal::CanFrame& frame, std::uint32_t value) {
   put_raw(frame, s.start, s.bits, value <= most ? value : s.has_invalid ? static_cast<std::uint32_t>(s.invalid) : most);
 }
 
+template <SignalLayout s>
+constexpr void put(hal::CanFrame& frame, std::int32_t value) {
+  constexpr auto most = static_cast<std::int32_t>(mask(s.bits - 1));
+  const std::int32_t held = value > most ? most : value < -most - 1 ? -most - 1 : value;
+  put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(held)));
+}
+
+template <SignalLayout s>
+constexpr std::int64_t value_of(const hal::CanFrame& frame) {
+  const std::uint64_t raw = get_raw(frame, s.start, s.bits);
+  const auto value = static_cast<std::int64_t>(raw);
+  return s.is_signed && (raw >> (s.bits - 1) & 1) != 0 ? value - static_cast<std::int64_t>(mask(s.bits)) - 1 : value;
+}
 template <SignalLayout s, std::same_as<float> T>
 constexpr float get(const hal::CanFrame& frame) {
-  const std::uint64_t raw = get_raw(frame, s.start, s.bits);
-  auto value = static_cast<std::int64_t>(raw);
-  if (s.is_signed && (raw >> (s.bits - 1) & 1) != 0) value -= static_cast<std::int64_t>(mask(s.bits)) + 1;
+  const std::int64_t value = value_of<s>(frame);
   if (s.has_invalid && value == s.invalid) return unknown;
   return static_cast<float>(static_cast<std::int32_t>(value)) * s.factor + s.offset;
 }
 template <SignalLayout s, std::same_as<std::uint32_t> T>
 constexpr std::uint32_t get(const hal::CanFrame& frame) {
   return static_cast<std::uint32_t>(get_raw(frame, s.start, s.bits));
+}
+template <SignalLayout s, std::same_as<std::int32_t> T>
+constexpr std::int32_t get(const hal::CanFrame& frame) {
+  return static_cast<std::int32_t>(value_of<s>(frame));
 }
 
 // AUTOSAR end-to-end protection, profile 1: CRC-8 SAE J1850 (polynomial 0x1D, start 0, nothing inverted) over the data id, low byte first,

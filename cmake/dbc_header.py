@@ -2,7 +2,7 @@
 
     dbc_header.py IN.dbc OUT.hpp
 
-A signal without unit and of factor 1 is an integer, any other a float. Its attribute Invalid is the raw value that says "not known", in C++
+A signal of factor 1 that has no unit or more than 24 bits is an integer, any other a float. Its attribute Invalid is the raw value that says "not known", in C++
 NaN. Signals Crc and Counter are not values: the codec fills them in. Needs python3-canmatrix.
 """
 import contextlib
@@ -23,7 +23,7 @@ def snake(name):
 
 
 def is_integer(signal):
-    return signal.unit == "" and signal.factor == 1 and signal.offset == 0
+    return signal.factor == 1 and signal.offset == 0 and (signal.unit == "" or signal.size > 24)
 
 
 def number(value):
@@ -40,6 +40,8 @@ def layout(signal):
 
 def message(frame):
     values = [s for s in frame.signals if s.name not in ("Crc", "Counter")]
+    if frame.size != 8:
+        raise SystemExit(f"{frame.name}: {frame.size} bytes, the codec's frames have 8")
     for s in frame.signals:
         if not s.is_little_endian:
             raise SystemExit(f"{frame.name}.{s.name}: not little-endian, which the codec is for")
@@ -50,7 +52,7 @@ def message(frame):
         unit = f" [{s.unit}]" if s.unit else ""
         lines.append(f"  static constexpr SignalLayout {snake(s.name)}_layout = {layout(s)};")
         if is_integer(s):
-            lines.append(f"  std::uint32_t {snake(s.name)} = 0;  ///< {s.comment}")
+            lines.append(f"  std::{'' if s.is_signed else 'u'}int32_t {snake(s.name)} = 0;  ///<{unit} {s.comment}")
         else:
             lines.append(f"  float {snake(s.name)} = unknown;  ///<{unit} {s.comment}")
         for raw, text in sorted(s.values.items()):

@@ -65,7 +65,7 @@ bms_objects(hal_core -Os ${chip}/startup.cpp ${chip}/power.cpp ${chip}/clock.cpp
 bms_objects(hal_chip -Os ${chip}/clock_tree.cpp ${chip}/finish.cpp)
 bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semihosting.cpp)
 bms_objects(hal_slcan -Os ${hal}/slcan/can.cpp ${chip}/uart.cpp ${chip}/watchdog.cpp ${hal}/emulated/samples_can.cpp ${hal}/absent/record.cpp)
-bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/watchdog.cpp)
+bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp)
 
 bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/condition_step.cpp ${cell_header} ${can_messages})  # the cell says which model
 target_include_directories(application PRIVATE ${CMAKE_BINARY_DIR}/generated)

@@ -71,4 +71,20 @@ constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEsti
   return all;
 }
 
+/// A number for all estimates of a run: two runs that agree in it were equal in every bit. FNV-1a, 32 bits, over the words, low byte first
+/// (G. Fowler, L. Noll, K. Vo, draft-eastlake-fnv).
+class EstimateHash {
+ public:
+  template <std::size_t N>
+  constexpr void take(const std::array<std::uint32_t, N>& words) {
+    for (const std::uint32_t w : words) {
+      for (unsigned shift = 0; shift < 32; shift += 8) value_ = (value_ ^ (w >> shift & 0xFF)) * 16'777'619U;
+    }
+  }
+  constexpr std::uint32_t value() const { return value_; }
+
+ private:
+  std::uint32_t value_ = 2'166'136'261U;
+};
+
 }  // namespace bms

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "estimator/condition.hpp"
@@ -108,6 +109,38 @@ constexpr can::SensorErrors sensor_errors(const Result& e, float capacity_ah) {
     m.current_offset = number(e.further[1]) * capacity_ah;
     m.current_offset_sigma = number(e.further[2]) * capacity_ah;
   }
+  return m;
+}
+
+// What the estimator saw, bit for bit.
+
+constexpr can::SampleCurrent sample_current(const Sample& sample, std::uint16_t counter) {
+  can::SampleCurrent m;
+  m.current_ua = sample.current_ua;
+  m.sample_counter = counter;
+  return m;
+}
+constexpr can::SampleVoltage sample_voltage(const Sample& sample) {
+  can::SampleVoltage m;
+  m.voltage_uv = sample.voltage_uv;
+  m.temperature_cdegc = sample.temperature_cdegc;
+  return m;
+}
+constexpr can::SampleTime sample_time(const Sample& sample) {
+  can::SampleTime m;
+  m.time_low = static_cast<std::uint32_t>(sample.time_us);
+  m.time_high = static_cast<std::uint32_t>(sample.time_us >> 32) & 0xFFFF;  // nine years
+  return m;
+}
+constexpr can::StartingSoc starting_soc(const std::optional<StartingPoint>& start) {
+  can::StartingSoc m;
+  m.soc_ppb = start ? start->soc_ppb : 0;
+  m.given = start ? can::StartingSoc::given_yes : can::StartingSoc::given_no;
+  return m;
+}
+constexpr can::StartingSigma starting_sigma(const std::optional<StartingPoint>& start) {
+  can::StartingSigma m;
+  m.sigma_ppb = start ? start->soc_sigma_ppb : 0;
   return m;
 }
 

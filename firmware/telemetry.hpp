@@ -4,9 +4,11 @@
 // read it has the whole sample and may send the next (lock step).
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <optional>
+#include <tuple>
 
+#include "firmware/commands.hpp"
 #include "firmware/messages.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
@@ -18,45 +20,63 @@ class Telemetry {
  public:
   using Result = typename Estimator::Result;
 
-  /// capacity_ah: of the cell file.
-  constexpr Telemetry(const messages::Identity& identity, float capacity_ah) : identity_(identity), capacity_ah_(capacity_ah) {}
+  /// capacity_ah: of the cell file; start: where the estimator began, if somebody said.
+  constexpr Telemetry(const messages::Identity& identity, float capacity_ah, const std::optional<StartingPoint>& start) : identity_(identity), capacity_ah_(capacity_ah), start_(start) {}
 
-  void tell(const Sample& sample, const Result& estimate, const Condition<Estimator>& condition) {
+  void tell(const Sample& sample, const Result& estimate, const Condition<Estimator>& condition, bool log_samples) {
     ++samples_;
+    hash_.take(words(estimate));
     if (!hal::can_listening()) return;
     tell_fault();
-    now_us_ = sample.time_us;
-    by_time(0, [&] { return messages::identity(identity_); });
-    by_time(1, [&] { return messages::current_limits(condition); });
-    by_time(2, [&] { return messages::health(condition); });
-    by_time(3, [&] { return messages::soc_anchor(condition); });
-    if constexpr (Estimator::Model::errors_are_states) by_time(4, [&] { return messages::sensor_errors(estimate, capacity_ah_); });
-    send(5, messages::pack_state(estimate, condition));
-    send(6, messages::pack_electrical(sample));
-    send(7, messages::model_detail(estimate));
+    now_us_ = static_cast<std::uint32_t>(sample.time_us);
+    by_time<can::Identity>([&] { return messages::identity(identity_); });
+    by_time<can::CurrentLimits>([&] { return messages::current_limits(condition); });
+    by_time<can::Health>([&] { return messages::health(condition); });
+    by_time<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
+    if constexpr (Estimator::Model::errors_are_states) by_time<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
+    if (log_samples) log(sample);
+    send(messages::pack_state(estimate, condition));
+    send(messages::pack_electrical(sample));
+    send(messages::model_detail(estimate));
     can::Status status;
     status.flags = estimate.flags;
     status.sample_counter = samples_;
     status.reset_cause = static_cast<std::uint32_t>(hal::reset_cause());
-    send(8, status);
+    send(status);
   }
 
+  void answer(const can::CommandAnswer& answer) { send(answer); }
+
  private:
-  static constexpr std::size_t by_time_count = 5, messages_count = 11;
+  /// What is remembered of a message.
+  template <class Message>
+  struct Sent {
+    std::uint32_t at_us = 0;
+    std::uint8_t counter = 0;
+    bool once = false;
+  };
+  template <class>
+  struct OfAll;
+  template <class... Message>
+  struct OfAll<std::tuple<Message...>> {
+    using type = std::tuple<Sent<Message>...>;
+  };
 
   template <class Message>
-  void send(std::size_t place, const Message& message) {
-    hal::can_send(message.frame(counter_[place]));
-    counter_[place] = can::next(counter_[place]);
+  void send(const Message& message) {
+    auto& sent = std::get<Sent<Message>>(sent_);
+    hal::can_send(message.frame(sent.counter));
+    sent.counter = can::next(sent.counter);
   }
 
   /// message(): made when it is due. Unsigned: a time that went back is due as well.
-  template <class Make>
-  void by_time(std::size_t place, Make&& message) {
-    using Message = decltype(message());
-    if (sent_[place].once && now_us_ - sent_[place].at_us < Message::cycle_us) return;
-    sent_[place] = {now_us_, true};
-    send(place, message());
+  template <class Message, class Make>
+  void by_time(Make&& message) {
+    auto& sent = std::get<Sent<Message>>(sent_);
+    if (sent.once && now_us_ - sent.at_us < Message::cycle_us) return;
+    sent.at_us = now_us_;
+    sent.once = true;
+    send(message());
   }
 
   void tell_fault() {
@@ -66,21 +86,32 @@ class Telemetry {
     if (!fault) return;
     can::LastFaultAddress address;
     address.program_counter = fault->pc;
-    send(9, address);
+    send(address);
     can::LastFaultCause cause;
     cause.configurable_fault_status = fault->cfsr;
-    send(10, cause);
+    send(cause);
   }
 
-  struct Sent {
-    std::uint64_t at_us = 0;
-    bool once = false;
-  };
+  void log(const Sample& sample) {
+    if (samples_ == 1) {
+      send(messages::starting_soc(start_));
+      send(messages::starting_sigma(start_));
+    }
+    send(messages::sample_current(sample, samples_));
+    send(messages::sample_voltage(sample));
+    send(messages::sample_time(sample));
+    can::EstimateHash hash;
+    hash.hash = hash_.value();
+    hash.sample_counter = samples_;
+    send(hash);
+  }
+
   messages::Identity identity_;
   float capacity_ah_ = 0;
-  std::array<Sent, by_time_count> sent_{};
-  std::array<std::uint8_t, messages_count> counter_{};
-  std::uint64_t now_us_ = 0;
+  std::optional<StartingPoint> start_;
+  typename OfAll<can::Messages>::type sent_{};
+  EstimateHash hash_;
+  std::uint32_t now_us_ = 0;
   std::uint16_t samples_ = 0;
   bool fault_told_ = false;
 };

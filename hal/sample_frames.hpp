@@ -45,6 +45,9 @@ constexpr bool completes(const CanFrame& frame, Sample& sample) {
   return true;
 }
 
+/// Whether the frame is one of these.
+constexpr bool of_sample(const CanFrame& frame) { return frame.id >= reading_frame_id && frame.id <= start_frame_id; }
+
 constexpr bool is_start(const CanFrame& frame) { return frame.id == start_frame_id && frame.length == 8; }
 
 constexpr StartingPoint start_of(const CanFrame& frame) {

@@ -3,6 +3,7 @@
 //   random_frames SEED COUNT        a line each: {"id": 384, "data": "0f...", "values": {"Soc": 54.3, "SocSigma": null, ...}}
 //
 // values: what went in, held within the signal's range; null: not known. decode_frames.py reads them with another decoder.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -33,6 +34,10 @@ void line() {
       value = known ? static_cast<float>(x) : can::unknown;
       const double held = std::min(std::max(x, static_cast<double>(s.lowest)), static_cast<double>(s.highest));
       values += fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, known ? fmt::format("{}", held) : "null");
+    } else if constexpr (std::same_as<std::remove_reference_t<decltype(value)>, std::int32_t>) {
+      const auto most = static_cast<std::int32_t>(can::mask(s.bits - 1));
+      value = static_cast<std::int32_t>(chance());
+      values += fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, std::clamp(value, -most - 1, most));
     } else {
       const auto most = s.bits > 24 ? static_cast<std::uint32_t>(can::mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
       value = kind == 3 ? most : kind == 1 && s.bits <= 24 ? most + 1 + static_cast<std::uint32_t>(chance() % 100) : static_cast<std::uint32_t>(chance() % (std::uint64_t{most} + 1));

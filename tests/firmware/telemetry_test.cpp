@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <map>
 #include <vector>
 
@@ -17,6 +18,7 @@ std::vector<hal::CanFrame> sent;
 std::vector<std::vector<std::uint32_t>> recorded;
 int fed = 0;
 std::optional<hal::FaultRecord> fault;
+std::deque<hal::CanFrame> requests;
 
 }  // namespace
 
@@ -30,6 +32,12 @@ ResetCause reset_cause() { return ResetCause::watchdog; }
 std::optional<FaultRecord> last_fault() { return fault; }
 void record(std::span<const std::uint32_t> words) { recorded.emplace_back(words.begin(), words.end()); }
 void watchdog_feed() { ++fed; }
+bool next_request(CanFrame& frame) {
+  if (requests.empty()) return false;
+  frame = requests.front();
+  requests.pop_front();
+  return true;
+}
 }  // namespace hal
 
 namespace {
@@ -58,6 +66,21 @@ class TelemetryTest : public ::testing::Test {
     recorded.clear();
     fed = 0;
     fault.reset();
+    requests.clear();
+  }
+  /// The last frame of a message that was sent.
+  template <class Message>
+  std::optional<Message> last() const {
+    for (auto f = sent.rbegin(); f != sent.rend(); ++f) {
+      if (f->id == Message::id) return Message::of(*f);
+    }
+    return std::nullopt;
+  }
+  void ask(std::uint32_t code, std::uint32_t argument, std::uint8_t counter) {
+    can::Command command;
+    command.code = code;
+    command.argument = argument;
+    requests.push_back(command.frame(counter));
   }
   std::vector<unsigned> ids() const {
     std::vector<unsigned> all;
@@ -73,20 +96,20 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   sample.voltage_uv = 3'301'499;
   sample.temperature_cdegc = -1'234;
   application.take(sample);
-  EXPECT_EQ(ids(), (std::vector<unsigned>{0x183, 0x186, 0x187, 0x188, 0x180, 0x181, 0x189, 0x182}));
-  const auto state = can::PackState::of(sent[4]);
+  EXPECT_EQ(ids(), (std::vector<unsigned>{0x183, 0x186, 0x187, 0x188, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
+  const auto state = can::PackState::of(sent[10]);
   EXPECT_NEAR(state.soc, 54.321, 0.0011);
   EXPECT_NEAR(state.soc_sigma, 1, 0.0011);
   EXPECT_NEAR(state.soc_display, 54.321, 0.0011);
   EXPECT_EQ(state.soc_quality, can::PackState::soc_quality_carried_by_counting);
-  const auto electrical = can::PackElectrical::of(sent[5]);
+  const auto electrical = can::PackElectrical::of(sent[11]);
   EXPECT_NEAR(electrical.voltage, 3.301, 1e-5);
   EXPECT_NEAR(electrical.current, -12.34, 1e-4);
   EXPECT_NEAR(electrical.temperature, -12.34, 1e-4);
-  const auto detail = can::ModelDetail::of(sent[6]);
+  const auto detail = can::ModelDetail::of(sent[12]);
   EXPECT_NEAR(detail.voltage_rc, -0.0123456, 1e-6);
   EXPECT_NEAR(detail.voltage_predicted, 3.2999, 1e-6);
-  const auto status = can::Status::of(sent[7]);
+  const auto status = can::Status::of(sent[13]);
   EXPECT_EQ(status.flags, voltage_stuck);
   EXPECT_EQ(status.sample_counter, 1U);
   EXPECT_EQ(status.reset_cause, 4U);
@@ -126,6 +149,101 @@ TEST_F(TelemetryTest, EveryFrameIsProtectedAndCounted) {
   }
   EXPECT_EQ(expected[can::PackState::id], 40);
   EXPECT_EQ(expected[can::Identity::id], 10) << "every second, at the next sample";
+}
+
+TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
+  EstimateHash expected;
+  for (const Sample& s : {Sample{0, -12'345'678, 3'301'499, -1'234}, Sample{1'000'000, no_reading, no_reading, no_temperature}, Sample{0x1234'5678'9ABC, 2'147'483'647, -2'147'483'647, 32'767}}) {
+    application.take(s);
+    const auto current = last<can::SampleCurrent>().value();
+    const auto voltage = last<can::SampleVoltage>().value();
+    const auto time = last<can::SampleTime>().value();
+    EXPECT_EQ(current.current_ua, s.current_ua);
+    EXPECT_EQ(voltage.voltage_uv, s.voltage_uv);
+    EXPECT_EQ(voltage.temperature_cdegc, s.temperature_cdegc);
+    EXPECT_EQ(std::uint64_t{time.time_high} << 32 | time.time_low, s.time_us);
+    std::array<std::uint32_t, estimate_words> said{};
+    std::copy(recorded.back().begin(), recorded.back().end(), said.begin());
+    expected.take(said);
+    EXPECT_EQ(last<can::EstimateHash>().value().hash, expected.value());
+    EXPECT_EQ(last<can::EstimateHash>().value().sample_counter, recorded.size());
+  }
+  const auto all = ids();
+  EXPECT_EQ(std::count(all.begin(), all.end(), can::StartingSoc::id), 1) << "once";
+  EXPECT_EQ(last<can::StartingSoc>().value().given, can::StartingSoc::given_no);
+}
+
+TEST_F(TelemetryTest, TheLogSaysWhereTheEstimatorWasToldToBegin) {
+  Application<Plain, fixed_answer, looked> told{StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6};
+  told.take(sample);
+  EXPECT_EQ(last<can::StartingSoc>().value().soc_ppb, 812'345'678);
+  EXPECT_EQ(last<can::StartingSoc>().value().given, can::StartingSoc::given_yes);
+  EXPECT_EQ(last<can::StartingSigma>().value().sigma_ppb, 20'000'001);
+}
+
+TEST_F(TelemetryTest, TheHashTellsEveryBitAndEveryOrder) {
+  using Words = std::array<std::uint32_t, 2>;
+  const auto of = [](std::initializer_list<Words> all) {
+    EstimateHash h;
+    for (const Words& w : all) h.take(w);
+    return h.value();
+  };
+  EstimateHash text;  // "foobar" of the draft's test vectors begins with "foob"
+  text.take(std::array<std::uint32_t, 1>{0x626F6F66});
+  EXPECT_EQ(text.value(), 0x3F5076EFU);
+  EXPECT_NE(of({{1, 2}, {3, 4}}), of({{3, 4}, {1, 2}}));
+  for (int bit = 0; bit < 32; ++bit) EXPECT_NE(of({{1U << bit, 2}}), of({{0, 2}})) << bit;
+}
+
+TEST_F(TelemetryTest, ACommandIsHeardOnceAndAnswered) {
+  ask(can::Command::code_log_of_samples, 0, 3);
+  ask(can::Command::code_log_of_samples, 1, 3);
+  application.take(sample);
+  auto all = ids();
+  EXPECT_EQ(std::count(all.begin(), all.end(), can::CommandAnswer::id), 1) << "the same counter again is the same command again";
+  EXPECT_EQ(last<can::CommandAnswer>().value().result, can::CommandAnswer::result_done);
+  EXPECT_EQ(last<can::CommandAnswer>().value().command_counter, 3U);
+  sent.clear();
+  sample.time_us += 100'000;
+  application.take(sample);
+  EXPECT_FALSE(last<can::SampleCurrent>()) << "the log is off";
+  EXPECT_TRUE(last<can::Status>());
+  ask(can::Command::code_log_of_samples, 1, 4);
+  application.take(sample);
+  sample.time_us += 100'000;
+  application.take(sample);
+  EXPECT_TRUE(last<can::SampleCurrent>());
+}
+
+TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
+  ask(can::Command::code_log_of_samples, 0, 1);
+  requests.back().data[4] ^= 1;  // CRC wrong
+  ask(can::Command::code_log_of_samples, 0, 15);  // no counter
+  requests.push_back({0x123, 8, {}});
+  requests.push_back({can::Command::id, 3, {}});
+  application.take(sample);
+  EXPECT_FALSE(last<can::CommandAnswer>());
+  const struct {
+    std::uint32_t code, argument, result;
+  } cases[] = {{can::Command::code_log_of_samples, 2, can::CommandAnswer::result_refused},
+               {can::Command::code_clear_faults, 7, can::CommandAnswer::result_refused},
+               {can::Command::code_set_time, 0, can::CommandAnswer::result_refused},
+               {99, 0, can::CommandAnswer::result_no_such_command},
+               {can::Command::code_set_time, 1'800'000'000, can::CommandAnswer::result_done}};
+  std::uint8_t counter = 0;
+  for (const auto& c : cases) {
+    ask(c.code, c.argument, counter++);
+    application.take(sample);
+    EXPECT_EQ(last<can::CommandAnswer>().value().result, c.result) << c.code;
+    EXPECT_EQ(last<can::CommandAnswer>().value().code, c.code);
+  }
+  EXPECT_TRUE(last<can::SampleCurrent>()) << "the log is on as before";
+}
+
+TEST_F(TelemetryTest, MuchAskingMakesASampleNoLonger) {
+  for (std::uint8_t k = 0; k < 14; ++k) ask(can::Command::code_set_time, 1, k);
+  application.take(sample);
+  EXPECT_EQ(requests.size(), 10U);
 }
 
 TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {

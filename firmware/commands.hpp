@@ -1,0 +1,62 @@
+// What the vehicle or a workshop asks of the battery over CAN (Command in can/greybox_bms.dbc), and what it is answered.
+//
+// A command is heard once: a wrong CRC, a frame of another message or the counter of the command before are not. An
+// argument that makes no sense is refused, a code that nobody knows answered as such; neither changes anything.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+
+namespace bms {
+
+/// What commands set.
+struct Requested {
+  bool log_samples = true;
+  std::uint32_t unix_time_s = 0;     ///< as last set; 0: never
+  std::uint64_t time_set_at_us = 0;  ///< by the samples' clock
+  std::uint32_t faults_cleared = 0;  ///< how often
+};
+
+class Commands {
+ public:
+  /// now_us: the samples' clock. Nothing: the frame is no command that is heard.
+  constexpr std::optional<can::CommandAnswer> take(const hal::CanFrame& frame, std::uint64_t now_us, Requested& requested) {
+    if (frame.id != can::Command::id || !can::intact(frame, can::Command::data_id)) return std::nullopt;
+    const std::uint8_t counter = can::counter_of(frame);
+    if (counter >= can::counters || counter == last_counter_) return std::nullopt;
+    last_counter_ = counter;
+    const auto command = can::Command::of(frame);
+    can::CommandAnswer answer;
+    answer.code = command.code;
+    answer.command_counter = counter;
+    answer.result = carry_out(command, now_us, requested);
+    return answer;
+  }
+
+ private:
+  static constexpr std::uint32_t carry_out(const can::Command& command, std::uint64_t now_us, Requested& requested) {
+    using A = can::CommandAnswer;
+    switch (command.code) {
+      case can::Command::code_clear_faults:
+        if (command.argument != 0) return A::result_refused;
+        ++requested.faults_cleared;
+        return A::result_done;
+      case can::Command::code_log_of_samples:
+        if (command.argument > 1) return A::result_refused;
+        requested.log_samples = command.argument == 1;
+        return A::result_done;
+      case can::Command::code_set_time:
+        if (command.argument == 0) return A::result_refused;
+        requested.unix_time_s = command.argument;
+        requested.time_set_at_us = now_us;
+        return A::result_done;
+      default: return A::result_no_such_command;
+    }
+  }
+
+  std::uint8_t last_counter_ = can::counters;  // no command's
+};
+
+}  // namespace bms

@@ -1,0 +1,12 @@
+// Frames for the firmware itself: what came over CAN and is no sample.
+// Back ends: emulated/samples_can (they arrive between the samples), absent/ (nobody asks).
+#pragma once
+
+#include "hal/can.hpp"
+
+namespace bms::hal {
+
+/// The next one, if there is; in the order they came. A few are kept; of more, the oldest.
+bool next_request(CanFrame& frame);
+
+}  // namespace bms::hal
