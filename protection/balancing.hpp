@@ -1,0 +1,116 @@
+// Which cells to bleed so that all are full together: by state of charge, not by voltage, which says nothing on LFP's plateau and is
+// bent by resistance while current flows.
+//
+//   measured   once a charge, when the mean cell has reached 95 % and current does not flow out:
+//              excess = (soc of the cell) - (lowest soc) - 2 sigma of both;  bled are cells whose excess is above the dead band of 1 %
+//   bled       that charge and no more, counted by V / R, over the next hours: while charging or at rest, never while driving
+//
+// An amount that is fixed at the top is why a cell of less capacity is not chased: it is level there and low at the bottom, and at the bottom
+// nothing is measured. Of a difference the part that is not sure (2 sigma) stays. Cells of one monitoring chip that may not bleed beside
+// each other take turns of eight seconds. What is left to bleed is not stored: the next full charge finds it again.
+//
+// Voltages read while a cell bleeds are lower by the drop over its sense wires: measure with the bleeders off, or know the drop.
+// Memory: 8 bytes a cell. Integers only.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/sample.hpp"
+#include "protection/pack_design.hpp"
+
+namespace bms::protection {
+
+struct BalancingPlan {
+  std::int32_t bleed_ohm = 1, rest_ua = 0, lowest_uv = 0, warmest_cdegc = 0;
+  std::int64_t uams_per_ppb = 0;  ///< charge of 1e-9 of the capacity [uA ms]
+  bool neighbours_may_bleed = false;
+};
+
+constexpr BalancingPlan balancing_plan(const PackDesign& d) {
+  const double span_v = d.limits.voltage_max_v - d.limits.voltage_min_v;
+  return {std::max(static_cast<std::int32_t>(d.bleed_ohm + 0.5), std::int32_t{1}), in_micro(d.rest_current_c_rate * d.capacity_ah), in_micro(d.limits.voltage_min_v + 0.6 * span_v), in_centi(d.bleed_temperature_max_c),
+          static_cast<std::int64_t>(d.capacity_ah * 3'600 + 0.5), d.neighbours_may_bleed};
+}
+
+template <std::size_t Cells>
+struct BalancingInput {
+  const std::array<std::int32_t, Cells>& cell_uv;
+  const std::array<std::int32_t, Cells>& soc_ppb;    ///< of each cell less the mean's; no_reading: not known
+  const std::array<std::int32_t, Cells>& sigma_ppb;
+  std::int32_t mean_soc_ppb = no_reading, current_ua = no_reading, highest_cdegc = no_reading;
+  bool allowed = false;  ///< no fault is in the way
+};
+
+template <std::size_t Cells>
+class Balancing {
+ public:
+  static_assert(Cells <= 32, "a bit each");
+  static constexpr std::int32_t top_ppb = 950'000'000, anew_below_ppb = 850'000'000, dead_band_ppb = 10'000'000;
+  static constexpr std::uint32_t turn_us = 8'000'000;
+
+  constexpr explicit Balancing(const BalancingPlan& plan) : plan_(&plan) {}
+
+  /// Cells to bleed until the next call, a bit each.
+  constexpr std::uint32_t update(const BalancingInput<Cells>& in, std::uint32_t step_us) {
+    count_bled(in.cell_uv, step_us);
+    turn_us_ = (turn_us_ + step_us) % (2 * turn_us);
+    mask_ = 0;
+    if (in.current_ua == no_reading || in.mean_soc_ppb == no_reading) return 0;
+    const bool flows_out = in.current_ua < -plan_->rest_ua;
+    if (in.mean_soc_ppb < anew_below_ppb) measured_ = false;
+    if (!measured_ && in.mean_soc_ppb >= top_ppb && !flows_out) measure(in);
+    if (!in.allowed || flows_out || in.highest_cdegc == no_reading || in.highest_cdegc > plan_->warmest_cdegc) return 0;
+    constexpr std::uint32_t even = 0x5555'5555;
+    const std::uint32_t turn = plan_->neighbours_may_bleed ? 0xFFFF'FFFF : turn_us_ < turn_us ? even : ~even;
+    for (std::size_t k = 0; k < Cells; ++k) {
+      const std::uint32_t mask = std::uint32_t{1} << k;
+      if (left_uams_[k] > 0 && (turn & mask) != 0 && in.cell_uv[k] >= plan_->lowest_uv) mask_ |= mask;
+    }
+    return mask_;
+  }
+
+  constexpr void stop() { mask_ = 0; }
+  /// Until the last cell is done, if nothing interrupts it.
+  constexpr std::uint32_t left_s(std::int32_t cell_uv) const {
+    const std::int64_t most_uams = *std::max_element(left_uams_.begin(), left_uams_.end());
+    if (most_uams <= 0 || cell_uv <= 0) return 0;
+    const std::int64_t ms = most_uams / std::max(cell_uv / plan_->bleed_ohm, std::int32_t{1});
+    return static_cast<std::uint32_t>(std::min<std::int64_t>(ms / (plan_->neighbours_may_bleed ? 1'000 : 500), 0xFFFF'FFFF));
+  }
+
+ private:
+  constexpr void count_bled(const std::array<std::int32_t, Cells>& cell_uv, std::uint32_t step_us) {
+    left_us_ += step_us;
+    const std::uint32_t ms = left_us_ / 1'000;
+    left_us_ %= 1'000;
+    for (std::size_t k = 0; k < Cells; ++k) {
+      if ((mask_ >> k & 1) != 0 && cell_uv[k] > 0) left_uams_[k] -= static_cast<std::int64_t>(cell_uv[k] / plan_->bleed_ohm) * ms;
+    }
+  }
+
+  constexpr void measure(const BalancingInput<Cells>& in) {
+    std::size_t lowest = Cells;
+    for (std::size_t k = 0; k < Cells; ++k) {
+      if (in.soc_ppb[k] == no_reading) return;  // a cell that is not known may be the lowest
+      if (lowest == Cells || in.soc_ppb[k] < in.soc_ppb[lowest]) lowest = k;
+    }
+    for (std::size_t k = 0; k < Cells; ++k) {
+      const std::int64_t off = std::int64_t{in.soc_ppb[k]} - in.soc_ppb[lowest];
+      // root of the sum of squares, at most 12 % too large
+      const std::int64_t more = std::max(in.sigma_ppb[k], in.sigma_ppb[lowest]), less = std::min(in.sigma_ppb[k], in.sigma_ppb[lowest]);
+      const std::int64_t sure = off - 2 * (more + less / 2);
+      left_uams_[k] = sure > dead_band_ppb ? sure * plan_->uams_per_ppb : 0;
+    }
+    measured_ = true;
+  }
+
+  const BalancingPlan* plan_;
+  std::array<std::int64_t, Cells> left_uams_{};  ///< to be bled
+  std::uint32_t mask_ = 0, turn_us_ = 0, left_us_ = 0;
+  bool measured_ = false;
+};
+
+}  // namespace bms::protection

@@ -1,0 +1,231 @@
+// The pack's three contactors, their order, and whether they did what they were told.
+//
+//                 main+  main-  pre    leaves for
+//   off             -      -     -     self_test      a truck or a charger asks, anew since it was last followed, and no fault forbids it
+//                                      safe           a fault opens
+//   self_test       -      -     -     precharge      three parts, each of one test time: all open, pre-charge relay alone, main- alone. In none may
+//                                                     the link rise: the other pole would be welded
+//   precharge       -      x     x     drive, charge  link at 15/16 of the pack; on the way it has to keep to the curve of an RC
+//   drive           x      x     -     unloading      nobody asks any more; a fault opens; current flows that is forbidden
+//   charge          x      x     -     the same; here the charger is enabled
+//   unloading       x      x     -     opening        no current flows, or a fault or forbidden current has had its time of grace
+//   opening         -      -     -     off, safe      weld check: link falls by an eighth and no current flows; safe with a fault
+//   safe            -      -     -     off            no fault opens any more and nobody asks
+//
+// A severe fault opens at once from everywhere. Only what is severe, or has been told to cease and does not, is opened under load; a truck
+// that just takes its request back keeps the contactors until its current is gone. The state is kept three times; one that contradicts
+// itself or is none ends in safe, all open, with an internal fault.
+//
+//   pre-charge  link(t) = pack (1 - exp(-t / RC)). Checked against the curve of the last half time constant that is over, less a fifth of the
+//               pack: slower is a load or a short on the link, and the resistor would burn. After six time constants it has failed.
+//   links       a link that stands at 7/8 of the pack while all is open, or rises by an eighth with one pole closed, or current while open: welded
+//   not closed  0.3 s after closing (table) the link is still a sixteenth below the pack
+//
+// Times are lengths that stop at their limit: nothing wraps. Integers only.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/sample.hpp"
+#include "protection/guarded.hpp"
+#include "protection/pack_design.hpp"
+
+namespace bms::protection {
+
+enum class ContactorState : std::uint8_t { off, self_test, precharge, drive, charge, unloading, opening, safe };
+inline constexpr std::size_t contactor_state_count = 8;
+inline constexpr std::array<const char*, contactor_state_count> contactor_state_names = {"off", "self-test", "precharge", "drive", "charge", "unloading", "opening", "safe"};
+
+enum class Request : std::uint8_t { none, drive, charge };
+
+struct Outputs {
+  bool main_plus = false, main_minus = false, precharge = false, charge_enable = false;
+
+  constexpr bool any_closed() const { return main_plus || main_minus || precharge; }
+  constexpr bool operator==(const Outputs&) const = default;
+};
+
+struct ContactorPlan {
+  std::uint32_t test_us = 0, half_time_constant_us = 0, link_discharge_us = 0;
+  std::int32_t rest_ua = 0;
+};
+
+constexpr ContactorPlan contactor_plan(const PackDesign& d) {
+  const std::uint32_t half_us = in_us(d.precharge_time_constant_s / 2);
+  return {std::max(half_us, in_us(3 * d.sample_period_s)), half_us, in_us(d.link_discharge_s), in_micro(d.rest_current_c_rate * d.capacity_ah)};
+}
+
+struct ContactorInput {
+  Request request = Request::none;
+  bool open = false, open_now = false;  ///< a fault with that reaction is there
+  bool charge_forbidden = false, discharge_forbidden = false;
+  std::int32_t current_ua = no_reading, pack_uv = no_reading, link_uv = no_reading;
+  std::uint32_t step_us = 0;
+};
+
+/// What the contactors find out by themselves.
+struct ContactorEvents {
+  bool precharge_failed = false, welded = false, not_closed = false;
+};
+
+class Contactors {
+ public:
+  static constexpr std::uint32_t grace_us = 5'000'000;  ///< for a truck to ramp down when it is told 0 A
+
+  constexpr explicit Contactors(const ContactorPlan& plan) : plan_(&plan) {}
+
+  constexpr const Outputs& update(const ContactorInput& in) {
+    events_ = {};
+    if (!intact()) enter(ContactorState::safe);
+    count(in_state_us_, in.step_us, most_us);
+    step(in);
+    return outputs_ = outputs_in(in);
+  }
+
+  constexpr ContactorState state() const { return static_cast<ContactorState>(state_.value()); }
+  constexpr bool intact() const { return state_.intact() && state_.value() < contactor_state_count; }
+  constexpr const ContactorEvents& events() const { return events_; }
+  constexpr const Outputs& outputs() const { return outputs_; }
+
+ private:
+  static constexpr std::uint32_t most_us = 0xFFFF'FFFF;
+  static constexpr std::uint32_t longest_halves = 12;
+  /// 1 - exp(-k / 2) less a fifth, k = 0 .. 12, in 1/1024.
+  static constexpr std::array<std::int32_t, longest_halves + 1> slowest = {0, 198, 442, 591, 681, 735, 768, 788, 800, 808, 812, 815, 817};
+
+  constexpr void enter(ContactorState s) {
+    state_.set(static_cast<std::uint32_t>(s));
+    in_state_us_ = 0;
+    link_at_entry_uv_ = no_reading;
+    ignored_us_ = 0;
+  }
+
+  constexpr void step(const ContactorInput& in) {
+    const ContactorState s = state();
+    const bool may_close = s == ContactorState::self_test || s == ContactorState::precharge || s == ContactorState::drive || s == ContactorState::charge || s == ContactorState::unloading;
+    if (in.open_now && may_close) return enter(ContactorState::opening);
+    switch (s) {
+      case ContactorState::off: return in_off(in);
+      case ContactorState::self_test: return in_self_test(in);
+      case ContactorState::precharge: return in_precharge(in);
+      case ContactorState::drive: return closed(in, Request::drive);
+      case ContactorState::charge: return closed(in, Request::charge);
+      case ContactorState::unloading: return in_unloading(in);
+      case ContactorState::opening: return in_opening(in);
+      case ContactorState::safe: return in_safe(in);
+    }
+  }
+
+  constexpr Outputs outputs_in(const ContactorInput& in) const {
+    switch (state()) {
+      case ContactorState::self_test: return {.main_plus = false, .main_minus = part() == 2, .precharge = part() == 1};
+      case ContactorState::precharge: return {.main_plus = false, .main_minus = true, .precharge = true};
+      case ContactorState::drive:
+      case ContactorState::unloading: return {.main_plus = true, .main_minus = true};
+      case ContactorState::charge: return {.main_plus = true, .main_minus = true, .precharge = false, .charge_enable = in_state_us_ >= plan_->test_us && !in.charge_forbidden && !events_.not_closed};
+      default: return {};
+    }
+  }
+
+  constexpr bool blocked(const ContactorInput& in) const {
+    return in.open || in.open_now || (in.request == Request::drive && in.discharge_forbidden) || (in.request == Request::charge && in.charge_forbidden);
+  }
+
+  static constexpr void count(std::uint32_t& us, std::uint32_t step_us, std::uint32_t most) { us = us >= most || step_us >= most - us ? most : us + step_us; }
+
+  constexpr void in_off(const ContactorInput& in) {
+    see_open(in);
+    if (in.open || in.open_now) return enter(ContactorState::safe);
+    if (in.request != served_) served_ = Request::none;
+    if (in.request == Request::none || in.request == served_ || blocked(in) || events_.welded) return;
+    served_ = in.request;
+    enter(ContactorState::self_test);
+  }
+
+  /// Which of the three parts of the self-test.
+  constexpr std::uint32_t part() const { return in_state_us_ < plan_->test_us ? 0 : in_state_us_ - plan_->test_us < plan_->test_us ? 1 : 2; }
+
+  constexpr void in_self_test(const ContactorInput& in) {
+    see_open(in);
+    const bool known = in.link_uv != no_reading && in.pack_uv != no_reading && in.current_ua != no_reading;
+    if (known && link_at_entry_uv_ != no_reading && in.link_uv - link_at_entry_uv_ > in.pack_uv / 8) events_.welded = true;
+    if (known && (link_at_entry_uv_ == no_reading || in.link_uv < link_at_entry_uv_)) link_at_entry_uv_ = in.link_uv;
+    if (events_.welded) return enter(ContactorState::opening);
+    if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
+    if (!known && in_state_us_ >= 2 * plan_->test_us) return fail_precharge();
+    if (in_state_us_ >= 2 * plan_->test_us && in_state_us_ - 2 * plan_->test_us >= plan_->test_us) enter(ContactorState::precharge);
+  }
+
+  constexpr void fail_precharge() {
+    enter(ContactorState::opening);
+    events_.precharge_failed = true;
+  }
+
+  constexpr void in_precharge(const ContactorInput& in) {
+    if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
+    const std::uint32_t halves = in_state_us_ / plan_->half_time_constant_us;
+    if (halves >= longest_halves) return fail_precharge();
+    if (in.link_uv == no_reading || in.pack_uv == no_reading) return;
+    if (in.link_uv < part_of(in.pack_uv, slowest[halves])) return fail_precharge();
+    if (in.link_uv >= part_of(in.pack_uv, 960)) enter(in.request == Request::drive ? ContactorState::drive : ContactorState::charge);
+  }
+
+  constexpr void closed(const ContactorInput& in, Request mine) {
+    if (in.link_uv != no_reading && in.pack_uv != no_reading) events_.not_closed = in.link_uv < part_of(in.pack_uv, 960);
+    const bool flows_in = in.current_ua != no_reading && in.current_ua > plan_->rest_ua, flows_out = in.current_ua != no_reading && in.current_ua < -plan_->rest_ua;
+    const bool ignored = (in.charge_forbidden && flows_in) || (in.discharge_forbidden && flows_out);
+    if (ignored) count(ignored_us_, in.step_us, grace_us);
+    else ignored_us_ = 0;
+    if (ignored_us_ == grace_us) return enter(ContactorState::opening);
+    if (in.request != mine || in.open) enter(ContactorState::unloading);
+  }
+
+  constexpr void in_unloading(const ContactorInput& in) {
+    const bool flows = in.current_ua == no_reading || magnitude_of(in.current_ua) > plan_->rest_ua;
+    const bool ordered = in.open || (in.charge_forbidden && flows && in.current_ua > 0) || (in.discharge_forbidden && flows && in.current_ua < 0);
+    if (ordered) count(ignored_us_, in.step_us, grace_us);
+    else ignored_us_ = 0;
+    if (!flows || ignored_us_ == grace_us) enter(ContactorState::opening);
+  }
+
+  constexpr void in_opening(const ContactorInput& in) {
+    const bool faulted = in.open || in.open_now;
+    const bool fell = in.link_uv != no_reading && in.pack_uv != no_reading && in.link_uv < part_of(in.pack_uv, 896);
+    const bool rests = in.current_ua != no_reading && magnitude_of(in.current_ua) <= plan_->rest_ua;
+    if (fell && rests && in_state_us_ >= plan_->test_us) return enter(faulted ? ContactorState::safe : ContactorState::off);
+    see_open(in);
+    if (in_state_us_ < plan_->test_us || (rests && in_state_us_ < plan_->link_discharge_us)) events_.welded = false;  // it may still fall
+    if (in_state_us_ < plan_->link_discharge_us) return;
+    // nothing contradicts, nothing proves: without readings there is no way to close again either
+    if (faulted) enter(ContactorState::safe);
+    else if (!events_.welded) enter(ContactorState::off);
+  }
+
+  constexpr void in_safe(const ContactorInput& in) {
+    if (in_state_us_ >= plan_->link_discharge_us) see_open(in);
+    if (!in.open && !in.open_now && in.request == Request::none) enter(ContactorState::off);
+  }
+
+  /// While everything is open, or one pole is.
+  constexpr void see_open(const ContactorInput& in) {
+    const bool flows = in.current_ua != no_reading && magnitude_of(in.current_ua) > plan_->rest_ua;
+    const bool stands = in.link_uv != no_reading && in.pack_uv != no_reading && in.pack_uv > 0 && in.link_uv >= part_of(in.pack_uv, 896);
+    events_.welded = flows || stands;
+  }
+
+  static constexpr std::int32_t magnitude_of(std::int32_t v) { return v < 0 ? -v : v; }
+  static constexpr std::int32_t part_of(std::int32_t uv, std::int32_t of_1024) { return static_cast<std::int32_t>(static_cast<std::int64_t>(uv) * of_1024 / 1024); }
+
+  const ContactorPlan* plan_;
+  Guarded state_{static_cast<std::uint32_t>(ContactorState::off)};
+  std::uint32_t in_state_us_ = 0, ignored_us_ = 0;
+  Request served_ = Request::none;  ///< the request that was followed last: it has to be made anew to be followed again
+  std::int32_t link_at_entry_uv_ = no_reading;  ///< the lowest the link has been in the self-test
+  ContactorEvents events_;
+  Outputs outputs_;
+};
+
+}  // namespace bms::protection

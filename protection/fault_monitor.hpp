@@ -1,0 +1,142 @@
+// Applies the table to the quantities of a sample: which faults are there, which was the first.
+//
+//   comes      the first sample beyond the threshold starts the delay. From then on a step counts up when the sample at its end is beyond,
+//              down when it is not; at 0 the start is forgotten, at the delay the fault is there. So noise around the threshold counts by
+//              what it does on the whole, not by its luckiest sample (as counter-based debouncing of AUTOSAR's diagnostic event manager).
+//   goes       once every sample for so long has been at the release threshold or better; any other starts that anew.
+//   unknown    a quantity that is not known (no_reading) neither brings nor ends a fault; times stand still.
+//   first      the fault that came first since the last clear, the gravest if several came in one sample. A warning gives way to the first fault,
+//              and what has gone by itself to the next that comes.
+//   kept       faults of Recovery::service are told to be stored, and given back at the next start.
+//
+// No time of day is kept, only lengths, which stop at their limit: nothing wraps. The set of faults is guarded against flipped bits.
+// Cost: README.md. Integers only.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/sample.hpp"
+#include "protection/guarded.hpp"
+#include "protection/table.hpp"
+
+namespace bms::protection {
+
+using Quantities = std::array<std::int32_t, quantity_count>;
+
+constexpr Quantities nothing_known() {
+  Quantities q{};
+  q.fill(no_reading);
+  return q;
+}
+constexpr std::int32_t& at(Quantities& q, Quantity which) { return q[static_cast<std::size_t>(which)]; }
+constexpr std::int32_t at(const Quantities& q, Quantity which) { return q[static_cast<std::size_t>(which)]; }
+
+enum class Clear : std::uint8_t { none, user, service };
+
+struct FirstCause {
+  std::uint8_t fault = no_fault;  ///< number of a Fault
+  std::uint64_t time_us = 0;
+};
+
+class FaultMonitor {
+ public:
+  /// kept: what the last run stored of kept().
+  constexpr explicit FaultMonitor(const Rules& rules, std::uint32_t kept = 0)
+      : rules_(&rules), of_service_(faults_with(rules, Recovery::service)), active_(kept & of_service_), serviceable_(kept & of_service_) {}
+
+  /// step_us: since the last call. servable: nothing has been closed since the start. Returns the faults that came with this sample.
+  constexpr std::uint32_t update(const Quantities& quantities, std::uint32_t step_us, std::uint64_t time_us, Clear clear, bool servable) {
+    const Clear pressed = clear_before_ == Clear::none ? clear : Clear::none;  // a key that is held clears once
+    clear_before_ = clear;
+    if (!servable) serviceable_ = 0;
+    const std::uint32_t before = active_.value();
+    std::uint32_t now = before;
+    for (std::size_t k = 0; k < fault_count; ++k) {
+      const std::int32_t value = at(quantities, (*rules_)[k].quantity);
+      if (value == no_reading) continue;
+      const std::uint32_t mask = 1U << k;
+      if ((now & mask) == 0) {
+        if (comes((*rules_)[k], timer_[k], value, step_us)) now |= mask;
+      } else if (goes((*rules_)[k], timer_[k], value, step_us, pressed, (serviceable_ & mask) != 0)) {
+        now &= ~mask;
+      }
+    }
+    active_.set(now);
+    const std::uint32_t came = now & ~before;
+    if (pressed != Clear::none && (first_.fault >= fault_count || (now >> first_.fault & 1) == 0)) {
+      first_ = {};
+      note_first(before & now, 0, time_us);  // what the command could not end
+    }
+    note_first(came, before & now, time_us);
+    return came;
+  }
+
+  constexpr std::uint32_t active() const { return active_.value(); }
+  constexpr std::uint32_t kept() const { return active_.value() & of_service_; }
+  constexpr const FirstCause& first() const { return first_; }
+  constexpr bool intact() const { return active_.intact(); }
+  /// When it is not: whatever any copy says is there, and an internal fault besides.
+  constexpr void distrust() { active_.set(active_.any() | bit(Fault::internal_fault)); }
+
+ private:
+  /// Of a fault that is not there: how long its quantity has been beyond; of one that is there: how long it has been good.
+  struct Timer {
+    std::uint32_t us = 0;
+    bool runs = false;
+  };
+
+  static constexpr bool comes(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us) {
+    const bool beyond = r.sense == Sense::above ? value > r.threshold : value < r.threshold;
+    if (!beyond) {
+      if (!t.runs) return false;
+      t.runs = t.us > step_us;
+      t.us = t.runs ? t.us - step_us : 0;
+      return false;
+    }
+    count(t, step_us, r.delay_us);
+    if (t.us < r.delay_us) return false;
+    t = {};
+    return true;
+  }
+  static constexpr bool goes(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us, Clear pressed, bool serviceable) {
+    const bool good = r.sense == Sense::above ? value <= r.release : value >= r.release;
+    if (!good) {
+      t = {};
+      return false;
+    }
+    count(t, step_us, r.recover_us);
+    if (t.us < r.recover_us) return false;
+    if (r.recovery == Recovery::on_clear && pressed == Clear::none) return false;
+    if (r.recovery == Recovery::service && (pressed != Clear::service || !serviceable)) return false;
+    t = {};
+    return true;
+  }
+  /// The first sample starts, the others count, up to what is asked for.
+  static constexpr void count(Timer& t, std::uint32_t step_us, std::uint32_t most_us) {
+    if (t.runs) t.us = t.us >= most_us || step_us >= most_us - t.us ? most_us : t.us + step_us;
+    t.runs = true;
+  }
+
+  constexpr void note_first(std::uint32_t came, std::uint32_t still, std::uint64_t time_us) {
+    if (came == 0) return;
+    std::size_t gravest = fault_count;
+    for (std::size_t k = 0; k < fault_count; ++k) {
+      if ((came >> k & 1) != 0 && (gravest == fault_count || (*rules_)[k].reaction > (*rules_)[gravest].reaction)) gravest = k;
+    }
+    const auto mild = [&](std::size_t k) { return (*rules_)[k].reaction <= Reaction::derate; };
+    if (first_.fault < fault_count && (still >> first_.fault & 1) != 0 && (!mild(first_.fault) || mild(gravest))) return;
+    first_ = {static_cast<std::uint8_t>(gravest), time_us};
+  }
+
+  const Rules* rules_;
+  std::uint32_t of_service_;
+  std::array<Timer, fault_count> timer_{};
+  Guarded active_;
+  std::uint32_t serviceable_;  ///< faults that a service command may end: kept from before the start
+  FirstCause first_;
+  Clear clear_before_ = Clear::none;
+};
+
+}  // namespace bms::protection

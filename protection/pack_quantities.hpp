@@ -1,0 +1,164 @@
+// What the table compares, from what a pack measures. Nothing is mended: a reading that is missing or impossible counts as missing.
+//
+//   heat        h += ((I / limit)^2 - 1) dt while above 0, limit: 1.05 times the continuous one; a replica of what warms a cell, IEC 60255-149's
+//               idea without its exponential. Cools by itself at rest: 30 s of it are gone in 30 s.
+//   shift       a sense wire that is broken is pulled to somewhere between its neighbours: one cell reads low, the next as much too high.
+//               Counts when the two differ by less than half of it.
+//   stuck       a cell reads the same to the last digit, five samples or more, while the other cells moved by 20 mV; a temperature, while the
+//               others moved by 5 K. The others: mean without highest and lowest; of less than four cells, the pack's own reading.
+//
+// What was not measured makes its quantities unknown (no_reading). Memory: 9 bytes a cell. Cost: README.md.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/pack_sample.hpp"
+#include "protection/fault_monitor.hpp"
+#include "protection/pack_design.hpp"
+
+namespace bms::protection {
+
+/// Limits of a pack as integers.
+struct PackLimits {
+  std::int32_t charge_ua_256th = 1, discharge_ua_256th = 1;  ///< from where the current heats, over 256
+  std::uint8_t temperatures = 0;
+};
+
+constexpr PackLimits pack_limits(const PackDesign& d) {
+  const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
+  return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a), d.temperatures};
+}
+
+/// A cell's voltage that can be one, or be asked to be protected from: a reversed one reads a little below 0.
+constexpr bool cell_possible(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
+
+constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
+
+template <std::size_t Cells>
+class PackQuantities {
+ public:
+  static constexpr std::int32_t stuck_move_uv = 20'000, stuck_move_cdegc = 500;
+  static constexpr std::uint8_t stuck_after = 5;
+  static constexpr std::int32_t longest_heat_us = 2'000'000'000;
+
+  constexpr explicit PackQuantities(const PackLimits& limits) : limits_(limits) {}
+
+  /// step_us: since the last one.
+  constexpr void update(const PackSample<Cells>& sample, std::uint32_t step_us, Quantities& q) {
+    see_cells(sample, q);
+    see_current(sample.current_ua, step_us, q);
+    see_temperatures(sample.temperature_cdegc, q);
+  }
+
+  constexpr std::int32_t sum_uv() const { return sum_uv_; }  ///< of all cells of the last sample, or no_reading
+
+ private:
+  struct Repeats {
+    std::int32_t value = no_reading, others = 0;  ///< the reading, and where the others were when it last changed
+    std::uint8_t count = 0;
+  };
+
+  static constexpr bool stuck(Repeats& r, std::int32_t value, std::int32_t others, std::int32_t move) {
+    if (value != r.value) {
+      r = {value, others, 0};
+      return false;
+    }
+    if (r.count < stuck_after) ++r.count;
+    return r.count == stuck_after && magnitude(others - r.others) > move;
+  }
+
+  constexpr void see_cells(const PackSample<Cells>& sample, Quantities& q) {
+    std::int32_t high = no_reading, low = no_reading, missing = 0, sum = 0;
+    for (const std::int32_t uv : sample.cell_uv) {
+      if (!cell_possible(uv)) {
+        ++missing;
+        continue;
+      }
+      sum += uv;
+      if (high == no_reading || uv > high) high = uv;
+      if (low == no_reading || uv < low) low = uv;
+    }
+    const auto known = static_cast<std::int32_t>(Cells) - missing;
+    sum_uv_ = missing == 0 ? sum : no_reading;
+    const bool pack_known = sample.pack_uv != no_reading && sample.pack_uv >= 0;
+    at(q, Quantity::voltages_missing) = missing + (pack_known ? 0 : 1);
+    at(q, Quantity::pack_uv) = pack_known ? sample.pack_uv : no_reading;
+    at(q, Quantity::sum_error_uv) = pack_known && missing == 0 ? magnitude(sum - sample.pack_uv) : no_reading;
+    at(q, Quantity::highest_cell_uv) = high;
+    at(q, Quantity::lowest_cell_uv) = low;
+    at(q, Quantity::spread_uv) = known > 0 ? high - low : no_reading;
+    at(q, Quantity::opposite_shift_uv) = known > 0 ? opposite_shift(sample.cell_uv, sum / known) : no_reading;
+    at(q, Quantity::voltages_stuck) = known == 0                ? no_reading
+                                      : known >= 4              ? cells_stuck(sample.cell_uv, (sum - high - low) / (known - 2))
+                                      : pack_known              ? cells_stuck(sample.cell_uv, sample.pack_uv / static_cast<std::int32_t>(Cells))
+                                                                : no_reading;
+  }
+
+  static constexpr std::int32_t opposite_shift(const std::array<std::int32_t, Cells>& cell_uv, std::int32_t mean_uv) {
+    std::int32_t most = 0;
+    for (std::size_t k = 0; k + 1 < Cells; ++k) {
+      if (!cell_possible(cell_uv[k]) || !cell_possible(cell_uv[k + 1])) continue;
+      const std::int32_t a = cell_uv[k] - mean_uv, b = cell_uv[k + 1] - mean_uv;
+      if ((a < 0) == (b < 0)) continue;
+      const std::int32_t both = std::min(magnitude(a), magnitude(b));
+      if (both > most && magnitude(a + b) <= both / 2) most = both;
+    }
+    return most;
+  }
+
+  constexpr std::int32_t cells_stuck(const std::array<std::int32_t, Cells>& cell_uv, std::int32_t others_uv) {
+    std::int32_t count = 0;
+    for (std::size_t k = 0; k < Cells; ++k) {
+      if (cell_possible(cell_uv[k]) && stuck(cell_[k], cell_uv[k], others_uv, stuck_move_uv)) ++count;
+    }
+    return count;
+  }
+
+  constexpr void see_current(std::int32_t current_ua, std::uint32_t step_us, Quantities& q) {
+    const bool known = current_ua != no_reading;
+    at(q, Quantity::currents_missing) = known ? 0 : 1;
+    at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : no_reading;
+    if (known) {
+      heat(charge_heat_us_, current_ua > 0 ? current_ua / limits_.charge_ua_256th : 0, step_us);
+      heat(discharge_heat_us_, current_ua < 0 ? -current_ua / limits_.discharge_ua_256th : 0, step_us);
+    }
+    at(q, Quantity::charge_heat_us) = known ? charge_heat_us_ : no_reading;
+    at(q, Quantity::discharge_heat_us) = known ? discharge_heat_us_ : no_reading;
+  }
+
+  /// times_256: current over its limit; beyond ten it counts as ten, which is a short circuit anyway.
+  static constexpr void heat(std::int32_t& heat_us, std::int32_t times_256, std::uint32_t step_us) {
+    const std::int32_t held = std::min(times_256, std::int32_t{10 * 256});
+    const std::int64_t more_us = (static_cast<std::int64_t>(held * held - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
+    heat_us = static_cast<std::int32_t>(std::clamp<std::int64_t>(heat_us + more_us, 0, longest_heat_us));
+  }
+
+  constexpr void see_temperatures(const std::array<std::int16_t, most_temperatures>& all, Quantities& q) {
+    std::int32_t high = no_reading, low = no_reading, sum = 0, known = 0;
+    for (std::size_t k = 0; k < limits_.temperatures; ++k) {
+      if (!temperature_possible(all[k])) continue;
+      ++known;
+      sum += all[k];
+      if (high == no_reading || all[k] > high) high = all[k];
+      if (low == no_reading || all[k] < low) low = all[k];
+    }
+    at(q, Quantity::temperatures_missing) = limits_.temperatures - known;
+    at(q, Quantity::highest_cdegc) = high;
+    at(q, Quantity::lowest_cdegc) = low;
+    std::int32_t count = 0;
+    for (std::size_t k = 0; k < limits_.temperatures && known > 1; ++k) {
+      if (temperature_possible(all[k]) && stuck(temperature_[k], all[k], (sum - all[k]) / (known - 1), stuck_move_cdegc)) ++count;
+    }
+    at(q, Quantity::temperatures_stuck) = known > 1 ? count : no_reading;
+  }
+
+  PackLimits limits_;
+  std::array<Repeats, Cells> cell_{};
+  std::array<Repeats, most_temperatures> temperature_{};
+  std::int32_t charge_heat_us_ = 0, discharge_heat_us_ = 0, sum_uv_ = no_reading;
+};
+
+}  // namespace bms::protection

@@ -1,0 +1,195 @@
+// Protection of a pack of cells in series: what it measures and what the estimator knows of it go in, what may be done comes out.
+//
+//   constexpr auto pack = protection_plan(design);              in the compiler; has to outlive what uses it
+//   Protection<16> protection(pack, kept);                      kept: what the last run told to store
+//   decision = protection.update(sample, estimate, orders);     with every sample
+//   decision = protection.without_sample(now_us);               when none came: from the loop, as often as it likes, in the same clock
+//
+// Order of a step: quantities of the sample, faults by the table, allowed currents, contactors, balancing. What the contactors find out counts
+// with the next sample; they themselves act on it at once. A sample that is not later than the one before is not used; five of them
+// in a row count as none. Bounded time, no heap, integers only: the same on every core. Cost: README.md.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/pack_sample.hpp"
+#include "protection/balancing.hpp"
+#include "protection/contactors.hpp"
+#include "protection/derating.hpp"
+#include "protection/fault_monitor.hpp"
+#include "protection/pack_quantities.hpp"
+#include "protection/table.hpp"
+
+namespace bms::protection {
+
+struct ProtectionPlan {
+  Rules rules;
+  std::uint32_t derates, forbid_charge, forbid_discharge, open, open_now;  ///< faults with that reaction; who opens forbids as well
+  PackLimits limits;
+  DeratingPlan derating;
+  ContactorPlan contactors;
+  BalancingPlan balancing;
+};
+
+constexpr ProtectionPlan protection_plan(const PackDesign& design) {
+  const Rules rules = rules_of(protection_table(design));
+  const std::uint32_t open_now = faults_with(rules, Reaction::open_now), open = faults_with(rules, Reaction::open);
+  return {rules, faults_with(rules, Reaction::derate), faults_with(rules, Reaction::forbid_charge) | open | open_now, faults_with(rules, Reaction::forbid_discharge) | open | open_now, open, open_now,
+          pack_limits(design), derating_plan(design), contactor_plan(design), balancing_plan(design)};
+}
+
+/// What is known of the cells beside a sample; no_reading where it is not.
+template <std::size_t Cells>
+struct PackEstimate {
+  std::int32_t soc_ppb = no_reading, soc_sigma_ppb = 0;                             ///< of the mean cell, 1e-9
+  std::int32_t model_charge_ua = no_reading, model_discharge_ua = no_reading;       ///< CurrentLimits, both >= 0
+  bool contradicts = false;                                                         ///< Flag::voltage_disbelieved
+  std::array<std::int32_t, Cells> cell_soc_ppb = PackSample<Cells>{}.cell_uv;       ///< of each cell less the mean's
+  std::array<std::int32_t, Cells> cell_sigma_ppb{};
+};
+
+/// What others want, and what the board says of itself.
+struct Orders {
+  Request request = Request::none;
+  Clear clear = Clear::none;           ///< while it is pressed
+  std::int32_t link_uv = no_reading;   ///< on the load's side of the contactors
+  bool board_fault = false;            ///< a reset by the watchdog, with the first sample; a self-test of the board that failed
+  bool storage_fault = false;
+};
+
+struct Decision {
+  std::uint32_t faults = 0, came = 0;  ///< a bit each (Fault): there now, and those that this step brought
+  std::uint32_t kept = 0;              ///< to be stored, and given to the next start
+  FirstCause first;
+  ContactorState state = ContactorState::off;
+  Outputs outputs;
+  AllowedCurrent allowed;
+  std::uint32_t bleed = 0;             ///< cells, a bit each
+  std::uint32_t bleed_left_s = 0;
+};
+
+template <std::size_t Cells>
+class Protection {
+ public:
+  static constexpr std::uint32_t longest_step_us = 60'000'000;
+  static constexpr std::uint8_t ignored_samples = 5;
+
+  constexpr explicit Protection(const ProtectionPlan& plan, std::uint32_t kept = 0)
+      : plan_(&plan), quantities_(plan.limits), monitor_(plan.rules, kept), derating_(plan.derating), contactors_(plan.contactors), balancing_(plan.balancing) {
+    decision_.faults = monitor_.active();
+    decision_.kept = monitor_.kept();
+  }
+
+  constexpr const Decision& update(const PackSample<Cells>& sample, const PackEstimate<Cells>& estimate, const Orders& orders) {
+    if (started_ && !later(sample.time_us, sample_us_)) {
+      if (ignored_ < ignored_samples) ++ignored_;
+      return ignored_ < ignored_samples ? decision_ : blind(step_to(sample.time_us), most_age_us);
+    }
+    const std::uint32_t age_us = started_ ? clamped(sample.time_us - sample_us_) : 0, step_us = step_to(sample.time_us);
+    started_ = true;
+    sample_us_ = sample.time_us;
+    ignored_ = 0;
+    Quantities q = nothing_known();
+    quantities_.update(sample, step_us, q);
+    at(q, Quantity::contradiction) = estimate.contradicts ? 1 : 0;
+    at(q, Quantity::store_failed) = orders.storage_fault ? 1 : 0;
+    at(q, Quantity::sample_age_us) = static_cast<std::int32_t>(age_us);
+    clear_ = orders.clear;
+    find_faults(q, step_us, orders);
+    const std::uint32_t faults = monitor_.active();
+
+    const bool warmth_lost = (faults & bit(Fault::temperature_lost)) != 0 && at(q, Quantity::highest_cdegc) == no_reading;
+    const bool no_charge = (faults & plan_->forbid_charge) != 0 || warmth_lost, no_discharge = (faults & plan_->forbid_discharge) != 0;
+    const bool closed = may_drive();
+    decision_.allowed = derating_.update({at(q, Quantity::highest_cell_uv), at(q, Quantity::lowest_cell_uv), at(q, Quantity::highest_cdegc), at(q, Quantity::lowest_cdegc), estimate.soc_ppb,
+                                          estimate.soc_sigma_ppb, estimate.model_charge_ua, estimate.model_discharge_ua, (faults & plan_->derates) != 0, no_charge || !closed, no_discharge || !closed},
+                                         step_us);
+    const std::int32_t pack_uv = at(q, Quantity::pack_uv) != no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
+    switch_contactors({orders.request, false, false, no_charge, no_discharge, sample.current_ua, pack_uv, orders.link_uv, step_us});
+    if (!may_drive()) decision_.allowed = {};
+    decision_.bleed = balancing_.update({sample.cell_uv, estimate.cell_soc_ppb, estimate.cell_sigma_ppb, estimate.soc_ppb, sample.current_ua, at(q, Quantity::highest_cdegc), (faults & (plan_->open | plan_->open_now)) == 0}, step_us);
+    decision_.bleed_left_s = balancing_.left_s(at(q, Quantity::lowest_cell_uv));
+    return decision_;
+  }
+
+  constexpr const Decision& without_sample(std::uint64_t now_us) {
+    if (!started_) {
+      started_ = true;
+      sample_us_ = evaluated_us_ = now_us;
+    }
+    if (!later(now_us, sample_us_)) return decision_;
+    const std::uint32_t age_us = clamped(now_us - sample_us_);
+    const Rule& rule = plan_->rules[static_cast<std::size_t>(Fault::samples_missing)];
+    return static_cast<std::int32_t>(age_us) <= rule.threshold ? decision_ : blind(step_to(now_us), static_cast<std::int32_t>(age_us));
+  }
+
+  constexpr const Decision& decision() const { return decision_; }
+  /// For tests that flip bits.
+  constexpr Contactors& contactors() { return contactors_; }
+
+ private:
+  static constexpr std::int32_t most_age_us = 2'000'000'000;
+
+  static constexpr bool later(std::uint64_t a_us, std::uint64_t b_us) { return a_us - b_us - 1 < std::uint64_t{1} << 63; }
+  static constexpr std::uint32_t clamped(std::uint64_t us) { return us < most_age_us ? static_cast<std::uint32_t>(us) : most_age_us; }
+
+  constexpr bool may_drive() const { return contactors_.state() == ContactorState::drive || contactors_.state() == ContactorState::charge; }
+
+  constexpr std::uint32_t step_to(std::uint64_t time_us) {
+    const bool forward = started_ && later(time_us, evaluated_us_);
+    const std::uint32_t step_us = forward ? std::min(clamped(time_us - evaluated_us_), longest_step_us) : 0;
+    if (forward || !started_) evaluated_us_ = time_us;
+    return step_us;
+  }
+
+  constexpr void find_faults(Quantities& q, std::uint32_t step_us, const Orders& orders) {
+    const bool intact = monitor_.intact() && contactors_.intact();
+    if (!monitor_.intact()) monitor_.distrust();
+    const ContactorEvents& seen = contactors_.events();
+    at(q, Quantity::off_curve) = seen.precharge_failed ? 1 : 0;
+    at(q, Quantity::welded) = seen.welded ? 1 : 0;
+    at(q, Quantity::not_closed) = seen.not_closed ? 1 : 0;
+    at(q, Quantity::self_contradiction) = intact && !orders.board_fault ? 0 : 1;
+    decision_.came = monitor_.update(q, step_us, evaluated_us_, orders.clear, !closed_once_);
+    decision_.faults = monitor_.active();
+    decision_.kept = monitor_.kept();
+    decision_.first = monitor_.first();
+  }
+
+  constexpr void switch_contactors(ContactorInput in) {
+    in.open = (monitor_.active() & plan_->open) != 0;
+    in.open_now = (monitor_.active() & plan_->open_now) != 0;
+    decision_.outputs = contactors_.update(in);
+    decision_.state = contactors_.state();
+    closed_once_ = closed_once_ || decision_.outputs.any_closed();
+  }
+
+  /// A step that knows nothing but that no sample came.
+  constexpr const Decision& blind(std::uint32_t step_us, std::int32_t age_us) {
+    Quantities q = nothing_known();
+    at(q, Quantity::sample_age_us) = age_us;
+    find_faults(q, step_us, {.clear = clear_});
+    switch_contactors({Request::none, false, false, true, true, no_reading, no_reading, no_reading, step_us});
+    decision_.allowed = derating_.update({.charge_forbidden = true, .discharge_forbidden = true}, step_us);
+    decision_.bleed = 0;
+    balancing_.stop();
+    return decision_;
+  }
+
+  const ProtectionPlan* plan_;
+  PackQuantities<Cells> quantities_;
+  FaultMonitor monitor_;
+  Derating derating_;
+  Contactors contactors_;
+  Balancing<Cells> balancing_;
+  Decision decision_;
+  std::uint64_t sample_us_ = 0, evaluated_us_ = 0;
+  Clear clear_ = Clear::none;
+  std::uint8_t ignored_ = 0;
+  bool started_ = false, closed_once_ = false;
+};
+
+}  // namespace bms::protection

@@ -1,0 +1,529 @@
+// Every protection against the cases: just below its threshold, just above, noise around it, during every other fault; how fast, how it ends.
+// Once on the values of the quantities, for all rows; once on samples of a pack in a truck, for the rows that samples tell.
+#include <functional>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "plant/random.hpp"
+#include "protection/protection.hpp"
+#include "tests/protection/oracle.hpp"
+
+namespace bms::protection {
+namespace {
+
+constexpr ProtectionPlan pack = protection_plan(forklift);
+constexpr int step_ms = 100;
+constexpr std::uint32_t step_us = 100'000;
+
+bool has(std::uint32_t faults, std::size_t k) { return (faults >> k & 1) != 0; }
+
+/// A value that is good and one that is just beyond; noise: three sigma in the unit of the quantity.
+struct Levels {
+  std::int32_t good, just_below, just_above, noise;
+};
+Levels levels(const ExpectedRow& e) {
+  const int sign = e.beyond == '>' ? 1 : -1;
+  const std::int32_t width = e.threshold == 0 && e.release == 0 ? 0 : std::abs(e.threshold - e.release);
+  const std::int32_t noise = width / 4;
+  return {e.release - sign * (width > 0 ? 1 : 0), e.threshold, e.threshold + sign, noise};
+}
+
+/// A monitor with nothing wrong: every quantity that a row looks at has a good value.
+class Rig {
+ public:
+  Rig() {
+    for (const ExpectedRow& e : expected_rows) set(e, levels(e).good);
+    // rows that share a quantity: the value that is good for all
+    at(values, Quantity::highest_cell_uv) = 3'300'000;
+    at(values, Quantity::lowest_cell_uv) = 3'300'000;
+    at(values, Quantity::pack_uv) = 52'800'000;
+    at(values, Quantity::highest_cdegc) = at(values, Quantity::lowest_cdegc) = 2'500;
+  }
+  static Quantity of(const ExpectedRow& e) { return pack.rules[static_cast<std::size_t>(&e - expected_rows)].quantity; }
+  void set(const ExpectedRow& e, std::int32_t value) { at(values, of(e)) = value; }
+
+  /// One sample; what is there must be what every row's oracle says.
+  std::uint32_t step(Clear clear = Clear::none, bool may_serve = false) {
+    time_us += step_us;
+    const bool pressed = clear != Clear::none && before_ == Clear::none;
+    before_ = clear;
+    monitor.update(values, step_us, time_us, clear, may_serve);
+    for (std::size_t k = 0; k < fault_count; ++k) {
+      const std::int32_t value = at(values, of(expected_rows[k]));
+      const bool ends = pressed && (expected_rows[k].recovery == 'c' || (expected_rows[k].recovery == 's' && clear == Clear::service && has(kept, k) && may_serve));
+      const bool there = oracle_[k].see(value == no_reading ? Value() : Value(value), step_ms, ends);
+      if (there != has(monitor.active(), k)) {
+        ADD_FAILURE() << expected_rows[k].name << (there ? " missed" : " false") << " at " << time_us << " us with " << value;
+        wrong = true;
+      }
+    }
+    return monitor.active();
+  }
+  void run(int ms, Clear clear = Clear::none) {
+    for (int t = 0; t < ms && !wrong; t += step_ms) step(clear);
+  }
+
+  Quantities values = nothing_known();
+  std::uint32_t kept = 0;
+  FaultMonitor monitor{pack.rules};
+  std::uint64_t time_us = 0;
+  bool wrong = false;
+
+ private:
+  std::vector<RowOracle> oracle_{std::begin(expected_rows), std::end(expected_rows)};
+  Clear before_ = Clear::none;
+};
+
+class EveryProtection : public ::testing::TestWithParam<std::size_t> {
+ protected:
+  const ExpectedRow& row = expected_rows[GetParam()];
+  bool there(const Rig& rig) const { return has(rig.monitor.active(), GetParam()); }
+  /// Milliseconds from the first sample beyond until the fault is there; -1: not within `most`.
+  int reaction_ms(Rig& rig, int most_ms) {
+    for (int t = 0; t <= most_ms; t += step_ms) {
+      rig.step();
+      if (there(rig)) return t;
+    }
+    return -1;
+  }
+};
+/// Rows for which this holds.
+template <class Is>
+std::vector<std::size_t> rows(const Is& is) {
+  std::vector<std::size_t> all;
+  for (std::size_t k = 0; k < fault_count; ++k) {
+    if (is(k)) all.push_back(k);
+  }
+  return all;
+}
+const auto signal_name = [](const auto& row) { return std::string(expected_rows[row.param].signal); };
+INSTANTIATE_TEST_SUITE_P(Rows, EveryProtection, ::testing::Range<std::size_t>(0, fault_count), signal_name);
+
+class ClearedProtection : public EveryProtection {};
+INSTANTIATE_TEST_SUITE_P(Rows, ClearedProtection, ::testing::ValuesIn(rows([](std::size_t k) { return expected_rows[k].recovery == 'c' && expected_rows[k].recover_ms > 0; })), signal_name);
+
+class ServicedProtection : public EveryProtection {};
+INSTANTIATE_TEST_SUITE_P(Rows, ServicedProtection, ::testing::ValuesIn(rows([](std::size_t k) { return expected_rows[k].recovery == 's'; })), signal_name);
+
+TEST_P(EveryProtection, StaysSilentAtItsThreshold) {
+  Rig rig;
+  rig.set(row, levels(row).just_below);
+  for (int t = 0; t < 5 * row.delay_ms + 10'000; t += step_ms) {
+    rig.step();
+    ASSERT_FALSE(there(rig)) << t;
+  }
+}
+
+TEST_P(EveryProtection, ComesAfterItsDelayOneUnitBeyondAndNoSooner) {
+  Rig rig;
+  rig.run(5'000);
+  ASSERT_FALSE(there(rig));
+  rig.set(row, levels(row).just_above);
+  const int ms = reaction_ms(rig, row.delay_ms + 10'000);
+  EXPECT_GE(ms, row.delay_ms);
+  EXPECT_LE(ms, row.delay_ms + step_ms);
+}
+
+TEST_P(EveryProtection, IsNeitherMissedNorFalseInNoise) {
+  const Levels l = levels(row);
+  if (l.noise == 0) {  // a quantity of 0 and 1: a contact that is loose
+    truth::Random random(GetParam());
+    Rig rig;
+    for (int k = 0; k < 3'000 && !rig.wrong; ++k) {
+      rig.set(row, random.uniform() < 0.3 ? 1 : 0);
+      rig.step();
+    }
+    return;
+  }
+  const int sign = row.beyond == '>' ? 1 : -1;
+  for (const int offset : {-1, 0, 1}) {  // three sigma below, on, three sigma above
+    truth::Random random(GetParam() * 3 + static_cast<std::size_t>(offset + 1));
+    Rig rig;
+    int fired_ms = -1;
+    for (int t = 0; t < 3 * row.delay_ms + 20'000 && !rig.wrong; t += step_ms) {
+      const double bounded = std::clamp(random.normal() / 3, -1.0, 1.0);
+      rig.set(row, row.threshold + sign * offset * (l.noise + 1) + static_cast<std::int32_t>(l.noise * bounded));
+      rig.step();
+      if (fired_ms < 0 && there(rig)) fired_ms = t;
+    }
+    if (offset < 0) { EXPECT_EQ(fired_ms, -1); }
+    if (offset > 0) {
+      EXPECT_GE(fired_ms, row.delay_ms);
+      EXPECT_LE(fired_ms, row.delay_ms + step_ms);
+    }
+  }
+}
+
+TEST_P(EveryProtection, ComesInTimeDuringAnyOtherFault) {
+  for (const ExpectedRow& other : expected_rows) {
+    if (&other == &row || Rig::of(other) == Rig::of(row)) continue;
+    Rig rig;
+    rig.set(other, levels(other).just_above);
+    rig.run(other.delay_ms + 2 * step_ms);
+    ASSERT_TRUE(has(rig.monitor.active(), static_cast<std::size_t>(&other - expected_rows))) << other.name;
+    ASSERT_FALSE(there(rig)) << other.name;
+    rig.set(row, levels(row).just_above);
+    const int ms = reaction_ms(rig, row.delay_ms + 1'000);
+    EXPECT_GE(ms, row.delay_ms) << other.name;
+    EXPECT_LE(ms, row.delay_ms + step_ms) << other.name;
+    ASSERT_FALSE(rig.wrong);
+  }
+}
+
+TEST_P(EveryProtection, StaysInsideItsHysteresisAndEndsAsTheTableSays) {
+  Rig rig;
+  const Levels l = levels(row);
+  rig.set(row, l.just_above);
+  rig.run(row.delay_ms + 2 * step_ms);
+  ASSERT_TRUE(there(rig));
+  if (row.threshold != row.release) {
+    rig.set(row, row.release + (row.beyond == '>' ? 1 : -1));
+    rig.run(row.recover_ms + 20'000, Clear::none);
+    rig.step(Clear::service);
+    ASSERT_TRUE(there(rig)) << "inside the hysteresis";
+  }
+  rig.set(row, row.release);
+  int ms = 0;
+  while (there(rig) && ms <= row.recover_ms + 20'000) rig.step(), ms += step_ms;
+  if (row.recovery == 'a') {
+    EXPECT_FALSE(there(rig));
+    EXPECT_GE(ms, row.recover_ms);
+    EXPECT_LE(ms, row.recover_ms + 2 * step_ms);
+    return;
+  }
+  ASSERT_TRUE(there(rig)) << "latched";
+  rig.step(Clear::user);
+  EXPECT_EQ(there(rig), row.recovery == 's');
+  rig.step();
+  rig.step(Clear::service);
+  EXPECT_EQ(there(rig), row.recovery == 's') << "only after a power cycle";
+}
+
+TEST_P(ClearedProtection, IsNotClearedBeforeItsTimeNorByAKeyThatIsHeld) {
+  Rig rig;
+  rig.set(row, levels(row).just_above);
+  rig.run(row.delay_ms + 2 * step_ms, Clear::user);
+  rig.set(row, row.release);
+  rig.run(row.recover_ms - step_ms, Clear::user);
+  ASSERT_TRUE(there(rig));
+  rig.run(5'000, Clear::user);
+  EXPECT_TRUE(there(rig)) << "held all the time";
+  rig.step();
+  rig.step(Clear::user);
+  EXPECT_FALSE(there(rig));
+}
+
+TEST_P(ServicedProtection, IsKeptOverAPowerCycleAndEndedByServiceBeforeAnythingCloses) {
+  Rig first;
+  first.set(row, levels(row).just_above);
+  first.run(row.delay_ms + 2 * step_ms);
+  ASSERT_EQ(first.monitor.kept(), 1U << GetParam());
+  for (const bool closed_before : {false, true}) {
+    FaultMonitor next(pack.rules, first.monitor.kept());
+    Rig good;
+    const auto step = [&](Clear clear, bool may_serve) { next.update(good.values, step_us, 0, clear, may_serve); };
+    EXPECT_TRUE(has(next.active(), GetParam()));
+    if (closed_before) step(Clear::none, false);
+    for (int t = 0; t <= row.recover_ms + step_ms; t += step_ms) step(Clear::none, true);
+    step(Clear::user, true);
+    EXPECT_TRUE(has(next.active(), GetParam())) << "a driver's key is not a workshop";
+    step(Clear::none, true);
+    step(Clear::service, true);
+    EXPECT_EQ(has(next.active(), GetParam()), closed_before);
+  }
+}
+
+TEST_P(EveryProtection, NeitherComesNorGoesWhileItsQuantityIsNotKnown) {
+  Rig rig;
+  rig.set(row, no_reading);
+  rig.run(row.delay_ms + 5'000);
+  EXPECT_FALSE(there(rig));
+  rig.set(row, levels(row).just_above);
+  rig.run(row.delay_ms + 2 * step_ms);
+  ASSERT_TRUE(there(rig));
+  rig.set(row, no_reading);
+  rig.run(row.recover_ms + 5'000);
+  EXPECT_TRUE(there(rig));
+}
+
+TEST(ProtectionTable, KeepsOnlyFaultsOfServiceOverAPowerCycle) {
+  const FaultMonitor m(pack.rules, 0xFFFF'FFFF);
+  for (std::size_t k = 0; k < fault_count; ++k) EXPECT_EQ(has(m.active(), k), expected_rows[k].recovery == 's') << expected_rows[k].name;
+}
+
+// ---- first cause
+
+struct Cause {
+  FaultMonitor monitor{pack.rules};
+  Rig good;
+  std::uint64_t time_us = 0;
+  void step(Clear clear = Clear::none, int steps = 1) {
+    for (int k = 0; k < steps; ++k) monitor.update(good.values, step_us, time_us += step_us, clear, true);
+  }
+  Fault first() const { return static_cast<Fault>(monitor.first().fault); }
+};
+
+TEST(FirstCause, IsTheFaultThatCameFirstWithItsTimeUntilItIsCleared) {
+  Cause c;
+  c.step();
+  EXPECT_EQ(c.monitor.first().fault, no_fault);
+  at(c.good.values, Quantity::opposite_shift_uv) = 400'000;
+  c.step(Clear::none, 6);
+  ASSERT_EQ(c.first(), Fault::open_wire);
+  EXPECT_EQ(c.monitor.first().time_us, 7U * step_us);
+  at(c.good.values, Quantity::lowest_cell_uv) = 1'700'000;
+  c.step(Clear::none, 100);
+  EXPECT_EQ(c.first(), Fault::open_wire);
+  EXPECT_EQ(c.monitor.first().time_us, 7U * step_us);
+  at(c.good.values, Quantity::opposite_shift_uv) = 0;
+  c.step(Clear::none, 101);
+  c.step(Clear::user);
+  EXPECT_NE(c.first(), Fault::open_wire);
+  EXPECT_EQ(c.first(), Fault::cell_undervoltage_severe) << "the gravest of what the command could not end";
+}
+
+TEST(FirstCause, IsTheGravestOfOneSampleAndAWarningGivesWayToAFault) {
+  Cause c;
+  at(c.good.values, Quantity::store_failed) = 1;
+  c.step();
+  EXPECT_EQ(c.first(), Fault::storage_fault);
+  at(c.good.values, Quantity::current_magnitude_ua) = 40'000'000;
+  at(c.good.values, Quantity::charge_heat_us) = 40'000'000;
+  c.step();
+  EXPECT_EQ(c.first(), Fault::short_circuit);
+}
+
+TEST(FirstCause, ThatWentByItselfGivesWayToTheNextThatComes) {
+  Cause c;
+  at(c.good.values, Quantity::lowest_cdegc) = -100;
+  c.step(Clear::none, 60);
+  ASSERT_EQ(c.first(), Fault::charge_undertemperature);
+  at(c.good.values, Quantity::lowest_cdegc) = 2'500;
+  c.step(Clear::none, 620);
+  EXPECT_EQ(c.first(), Fault::charge_undertemperature) << "still the last that is known";
+  at(c.good.values, Quantity::currents_missing) = 1;
+  c.step(Clear::none, 10);
+  EXPECT_EQ(c.first(), Fault::current_missing);
+}
+
+// ---- samples of a pack in a truck
+
+/// Sixteen cells in a truck that drives: what the pack measures while the contactors are as protection wants them. Readings are off by noise
+/// of up to three sigma: 1 mV, 10 mA, 0.05 K, 20 mV over the pack.
+class Truck {
+ public:
+  explicit Truck(std::uint64_t seed) : random_(seed) {
+    orders.request = Request::drive;
+    while (protection.decision().state != ContactorState::drive && step_ < 100) step();
+  }
+
+  using Change = std::function<void(PackSample<16>&, PackEstimate<16>&, Orders&)>;
+
+  std::uint32_t step(const Change& change = {}) {
+    ++step_;
+    sample_ = PackSample<16>{};
+    estimate_ = PackEstimate<16>{};
+    const Outputs out = protection.decision().outputs;
+    const bool closed = out.main_plus && out.main_minus;
+    sample_.time_us = step_ * step_us;
+    const double slow = std::abs(static_cast<double>(step_ % 400) - 200) / 200;  // 0 .. 1 .. 0 in 40 s: the load moves all cells, and the air
+    sample_.current_ua = static_cast<std::int32_t>((closed ? -2e6 - 1e6 * slow : 0) + 30e3 * chance());
+    for (std::size_t k = 0; k < 16; ++k) sample_.cell_uv[k] = static_cast<std::int32_t>(3.30e6 - 60e3 * slow + 1e3 * static_cast<double>(k % 5) + 3e3 * chance());
+    for (std::size_t k = 0; k < 4; ++k) sample_.temperature_cdegc[k] = static_cast<std::int16_t>(2'000 + 1'200 * slow + 10 * static_cast<double>(k) + 15 * chance());
+    estimate_.soc_ppb = 600'000'000;
+    pack_offset_uv = 0;
+    pack_follows = true;
+    if (change) change(sample_, estimate_, orders);
+    if (pack_follows) {
+      std::int64_t sum = 0;
+      for (const std::int32_t uv : sample_.cell_uv) sum += uv == no_reading ? 3'300'000 : uv;
+      sample_.pack_uv = static_cast<std::int32_t>(sum) + pack_offset_uv;
+      if (noisy_pack) sample_.pack_uv += static_cast<std::int32_t>(60e3 * chance());
+    }
+    if (!closed && sample_.current_ua != no_reading) sample_.current_ua = static_cast<std::int32_t>(30e3 * chance());
+    const double stack_v = 52.8e6;
+    if (closed) link_uv_ = stack_v;
+    else if (out.precharge && out.main_minus) link_uv_ += (stack_v - link_uv_) * 0.18;
+    else link_uv_ *= 0.97;
+    orders.link_uv = static_cast<std::int32_t>(link_uv_);
+    if (closed && sample_.pack_uv != no_reading) orders.link_uv = sample_.pack_uv;
+    const std::uint32_t faults = protection.update(sample_, estimate_, orders).faults;
+    const auto expected = quantities_.see(sample_, estimate_.contradicts);
+    for (std::size_t k = 0; k < 26; ++k) {
+      if (k == 8 || k == 9) continue;  // heat: ProtectionAgainstHeat
+      const bool there = oracle_[k].see(expected[k], step_ms, false);
+      if (there != has(faults, k)) {
+        ADD_FAILURE() << expected_rows[k].name << (there ? " missed" : " false") << " at " << step_ * 100 << " ms, value " << expected[k].value_or(no_reading);
+        wrong = true;
+      }
+    }
+    return faults;
+  }
+
+  double chance() { return std::clamp(random_.normal() / 3, -1.0, 1.0); }
+  Protection<16> protection{pack};
+  Orders orders;
+  std::int32_t pack_offset_uv = 0;
+  bool pack_follows = true, noisy_pack = true, wrong = false;
+
+ private:
+  truth::Random random_;
+  std::uint64_t step_ = 0;
+  double link_uv_ = 0;
+  PackSample<16> sample_;
+  PackEstimate<16> estimate_;
+  QuantityOracle quantities_;
+  std::vector<RowOracle> oracle_{std::begin(expected_rows), std::end(expected_rows)};
+};
+
+/// Brings the quantity of row k to a value, as the physics would; for rows that count, 1 for there and 0 for not.
+void inject(std::size_t k, std::int32_t value, Truck& truck, PackSample<16>& s, PackEstimate<16>& e) {
+  switch (k) {
+    case 0: case 1: case 2: s.cell_uv[5] = value; break;
+    case 3: case 4: case 5: case 25: s.cell_uv[11] = value; break;
+    case 6: case 7:
+      s.cell_uv.fill(value / 16);
+      s.pack_uv = value;
+      truck.pack_follows = false;
+      break;
+    case 10: s.current_ua = -value; break;
+    case 11: case 12: case 13: s.temperature_cdegc[1] = static_cast<std::int16_t>(value); break;
+    case 14: case 15: s.temperature_cdegc[3] = static_cast<std::int16_t>(value); break;
+    case 16:
+      for (auto& uv : s.cell_uv) uv = 3'300'000 + (s.time_us / step_us % 2 == 0 ? 1'000 : -1'000);
+      s.cell_uv[7] = s.cell_uv[0] - value;
+      s.cell_uv[8] = s.cell_uv[0] + value;
+      break;
+    case 17:
+      s.cell_uv[2] = s.cell_uv[0] + 40'000;
+      s.cell_uv[9] = s.cell_uv[2] - value;
+      for (std::size_t c = 0; c < 16; ++c) {
+        if (c != 2 && c != 9) s.cell_uv[c] = s.cell_uv[0] + static_cast<std::int32_t>(c);
+      }
+      break;
+    case 18: e.contradicts = value > 0; break;
+    case 19:
+      truck.pack_offset_uv = -value;
+      truck.noisy_pack = false;
+      break;
+    case 20: if (value > 0) s.cell_uv[4] = no_reading; break;
+    case 21: if (value > 0) s.cell_uv[13] = 3'287'654; break;
+    case 22: if (value > 0) s.current_ua = no_reading; break;
+    case 23: if (value > 0) s.temperature_cdegc[2] = no_temperature; break;
+    case 24: if (value > 0) s.temperature_cdegc[0] = 2'345; break;
+    default: FAIL() << "row " << k << " is not told by samples";
+  }
+}
+bool told_by_samples(std::size_t k) { return k < 26 && k != 8 && k != 9; }
+
+class EverySampledProtection : public ::testing::TestWithParam<std::size_t> {
+ protected:
+  const ExpectedRow& row = expected_rows[GetParam()];
+};
+INSTANTIATE_TEST_SUITE_P(Rows, EverySampledProtection, ::testing::ValuesIn(rows(told_by_samples)), signal_name);
+
+class EveryMeasuredProtection : public EverySampledProtection {};
+INSTANTIATE_TEST_SUITE_P(Rows, EveryMeasuredProtection, ::testing::ValuesIn(rows([](std::size_t k) { return told_by_samples(k) && levels(expected_rows[k]).noise > 0; })), signal_name);
+
+TEST_P(EverySampledProtection, ComesOfSamplesBeyondItAndOfNoOthers) {
+  const std::size_t k = GetParam();
+  const Levels l = levels(row);
+  for (const bool beyond : {false, true}) {
+    Truck truck(k + 1);
+    ASSERT_EQ(truck.protection.decision().state, ContactorState::drive);
+    int fired_ms = -1, since_ms = -1;
+    // what stands still is found when the others have moved, within half of their 40 s
+    const int patience_ms = row.delay_ms + (k == 21 || k == 24 ? 60'000 : 3'000);
+    for (int t = 0; t < patience_ms && !truck.wrong; t += step_ms) {
+      const std::uint32_t faults = truck.step([&](auto& s, auto& e, auto&) { inject(k, beyond ? l.just_above : l.just_below, truck, s, e); });
+      if (since_ms < 0) since_ms = t;
+      if (fired_ms < 0 && has(faults, k)) fired_ms = t;
+    }
+    ASSERT_FALSE(truck.wrong);
+    if (!beyond) {
+      EXPECT_EQ(fired_ms, -1);
+    } else if (k != 21 && k != 24) {
+      EXPECT_GE(fired_ms, row.delay_ms);
+      EXPECT_LE(fired_ms, row.delay_ms + step_ms);
+    } else {
+      EXPECT_GE(fired_ms, row.delay_ms);
+    }
+  }
+}
+
+TEST_P(EveryMeasuredProtection, IsNeitherMissedNorFalseInNoiseAroundItsThreshold) {
+  const std::size_t k = GetParam();
+  // three sigma of what is measured, not of what the hysteresis could bear
+  const std::int32_t noise = k >= 11 && k <= 15 ? 15 : k == 10 ? 30'000 : k == 6 || k == 7 || k == 19 ? 60'000 : 3'000;
+  const int sign = row.beyond == '>' ? 1 : -1;
+  for (const int offset : {-1, 0, 1}) {
+    Truck truck(100 + k * 3 + static_cast<std::size_t>(offset + 1));
+    int fired_ms = -1;
+    for (int t = 0; t < row.delay_ms + 20'000 && !truck.wrong; t += step_ms) {
+      const auto value = row.threshold + sign * offset * (noise + 2) + static_cast<std::int32_t>(noise * truck.chance());
+      const std::uint32_t faults = truck.step([&](auto& s, auto& e, auto&) { inject(k, value, truck, s, e); });
+      if (fired_ms < 0 && has(faults, k)) fired_ms = t;
+    }
+    ASSERT_FALSE(truck.wrong);
+    if (offset < 0) { EXPECT_EQ(fired_ms, -1); }
+    if (offset > 0) {
+      EXPECT_GE(fired_ms, row.delay_ms);
+      EXPECT_LE(fired_ms, row.delay_ms + step_ms);
+    }
+  }
+}
+
+TEST_P(EverySampledProtection, ComesDuringEveryOtherThatSamplesTell) {
+  const std::size_t k = GetParam();
+  for (std::size_t other = 0; other < 26; ++other) {
+    if (other == k || !told_by_samples(other) || pack.rules[other].quantity == pack.rules[k].quantity) continue;
+    Truck truck(1'000 + 32 * k + other);
+    const int before_ms = std::min(expected_rows[other].delay_ms, 12'000) + 500;
+    const int long_ms = before_ms + std::min(row.delay_ms, 12'000) + 1'500;
+    for (int t = 0; t < long_ms && !truck.wrong; t += step_ms) {
+      truck.step([&](auto& s, auto& e, auto&) {
+        inject(other, levels(expected_rows[other]).just_above, truck, s, e);
+        if (t >= before_ms) inject(k, levels(row).just_above, truck, s, e);
+      });
+    }
+    ASSERT_FALSE(truck.wrong) << "during " << expected_rows[other].name;
+  }
+}
+
+TEST(ProtectionOfATruck, IsSilentForTenMinutesWithNothingWrong) {
+  Truck truck(7);
+  for (int t = 0; t < 600'000; t += step_ms) ASSERT_EQ(truck.step(), 0U) << t;
+}
+
+// ---- heat
+
+class ProtectionAgainstHeat : public ::testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Loads, ProtectionAgainstHeat, ::testing::Values(-4.0, -2.0, -1.5, -1.2, 1.2, 1.5, 2.0, 4.0), [](const auto& load) {
+  return std::string(load.param < 0 ? "Discharge" : "Charge") + std::to_string(static_cast<int>(std::abs(load.param) * 10)) + "Tenths";
+});
+
+/// Trip time of an ideal integral: 30 s over (i^2 - 1), i = I / (1.05 x 6 A). The integer one is 0.8 % off at most (a 256th in i).
+TEST_P(ProtectionAgainstHeat, TripsWhenTheIntegralOfTheSquareIsFull) {
+  const double i = GetParam() * 6 / 6.3, expected_s = 30 / (i * i - 1);
+  Truck truck(3);
+  double fired_s = -1;
+  const Fault fault = GetParam() < 0 ? Fault::discharge_overcurrent : Fault::charge_overcurrent;
+  for (int t = 0; t < 1'000 * expected_s * 1.1 + 2'000 && fired_s < 0; t += step_ms) {
+    const std::uint32_t faults = truck.step([&](auto& s, auto&, auto&) { s.current_ua = static_cast<std::int32_t>(6e6 * GetParam()); });
+    if ((faults & bit(fault)) != 0) fired_s = (t + step_ms) / 1e3;
+  }
+  EXPECT_NEAR(fired_s, expected_s, 0.1 + expected_s * 2 * i * i / (i * i - 1) / (256 * std::abs(i)) * 1.05);
+}
+
+TEST(ProtectionAgainstHeatOf, TheContinuousCurrentAndShortBurstsNeverTrips) {
+  Truck truck(4);
+  for (int t = 0; t < 600'000; t += step_ms) {
+    const bool burst = t / 1'000 % 40 < 8;  // twice the limit for 8 of 40 s
+    const std::uint32_t faults = truck.step([&](auto& s, auto&, auto&) { s.current_ua = t < 300'000 ? -6'300'000 + 30'000 : burst ? -12'000'000 : -1'000'000; });
+    ASSERT_EQ(faults, 0U) << t;
+  }
+}
+
+}  // namespace
+}  // namespace bms::protection
