@@ -5,6 +5,7 @@
 #   bms_<board>_bench.elf    as the first, for the chip itself: its clock tree, reset instead of the emulator's exit
 #   bms_<board>_fault.elf    tests/firmware/fault_image.cpp; only when asked for
 #   bms_<board>_pack.elf     tests/firmware/pack_image.cpp; only when asked for
+#   bms_<board>_protection.elf  tests/firmware/protection_image.cpp; only when asked for
 #
 # The first two run in QEMU only (hal/README.md). What does not depend on the cell is compiled once for all.
 include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
@@ -92,4 +93,7 @@ bms_image(bms_${BMS_BOARD}_fault hal_core hal_emulated fault_image)
 bms_objects(pack_image -O2 ${CMAKE_SOURCE_DIR}/tests/firmware/pack_image.cpp ${cell_header})
 target_include_directories(pack_image PRIVATE ${CMAKE_BINARY_DIR}/generated)
 bms_image(bms_${BMS_BOARD}_pack hal_core hal_emulated pack_image)
+bms_objects(protection_image -O2 ${CMAKE_SOURCE_DIR}/tests/firmware/protection_image.cpp)
+bms_image(bms_${BMS_BOARD}_protection hal_core hal_emulated protection_image)
+set_target_properties(protection_image bms_${BMS_BOARD}_protection PROPERTIES EXCLUDE_FROM_ALL ON)
 set_target_properties(fault_image bms_${BMS_BOARD}_fault pack_image bms_${BMS_BOARD}_pack PROPERTIES EXCLUDE_FROM_ALL ON)

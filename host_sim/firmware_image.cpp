@@ -47,6 +47,7 @@ const char* ending(Image image) {
     case Image::replay: return "_replay";
     case Image::fault: return "_fault";
     case Image::pack: return "_pack";
+    case Image::protection: return "_protection";
     default: return "";
   }
 }

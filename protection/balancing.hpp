@@ -1,12 +1,14 @@
 // Which cells to bleed so that all are full together: by state of charge, not by voltage, which says nothing on LFP's plateau and is
 // bent by resistance while current flows.
 //
-//   measured   once a charge, when the mean cell has reached 95 % and current does not flow out:
-//              excess = (soc of the cell) - (lowest soc) - 2 sigma of both;  bled are cells whose excess is above the dead band of 1 %
+//   measured   once a charge, when the mean cell has reached 95 %, current does not flow out and every cell is known to 1 %:
+//              excess = (soc of the cell) - (lowest soc) - 2 (sigma of the one + sigma of the other)
+//              bled are cells whose excess is above the dead band of half a percent
 //   bled       that charge and no more, counted by V / R, over the next hours: while charging or at rest, never while driving
 //
 // An amount that is fixed at the top is why a cell of less capacity is not chased: it is level there and low at the bottom, and at the bottom
-// nothing is measured. Of a difference the part that is not sure (2 sigma) stays. Cells of one monitoring chip that may not bleed beside
+// nothing is measured. Of a difference the part that is not sure stays. The sigmas are added, not their squares: the
+// lowest of sixteen is the one whose error is the largest, and a root would bleed after noise. Cells of one monitoring chip that may not bleed beside
 // each other take turns of eight seconds. What is left to bleed is not stored: the next full charge finds it again.
 //
 // Voltages read while a cell bleeds are lower by the drop over its sense wires: measure with the bleeders off, or know the drop.
@@ -48,7 +50,7 @@ template <std::size_t Cells>
 class Balancing {
  public:
   static_assert(Cells <= 32, "a bit each");
-  static constexpr std::int32_t top_ppb = 950'000'000, anew_below_ppb = 850'000'000, dead_band_ppb = 10'000'000;
+  static constexpr std::int32_t top_ppb = 950'000'000, anew_below_ppb = 850'000'000, dead_band_ppb = 5'000'000, known_to_ppb = 10'000'000;
   static constexpr std::uint32_t turn_us = 8'000'000;
 
   constexpr explicit Balancing(const BalancingPlan& plan) : plan_(&plan) {}
@@ -94,14 +96,11 @@ class Balancing {
   constexpr void measure(const BalancingInput<Cells>& in) {
     std::size_t lowest = Cells;
     for (std::size_t k = 0; k < Cells; ++k) {
-      if (in.soc_ppb[k] == no_reading) return;  // a cell that is not known may be the lowest
+      if (in.soc_ppb[k] == no_reading || in.sigma_ppb[k] > known_to_ppb) return;  // a cell that is not known may be the lowest
       if (lowest == Cells || in.soc_ppb[k] < in.soc_ppb[lowest]) lowest = k;
     }
     for (std::size_t k = 0; k < Cells; ++k) {
-      const std::int64_t off = std::int64_t{in.soc_ppb[k]} - in.soc_ppb[lowest];
-      // root of the sum of squares, at most 12 % too large
-      const std::int64_t more = std::max(in.sigma_ppb[k], in.sigma_ppb[lowest]), less = std::min(in.sigma_ppb[k], in.sigma_ppb[lowest]);
-      const std::int64_t sure = off - 2 * (more + less / 2);
+      const std::int64_t sure = std::int64_t{in.soc_ppb[k]} - in.soc_ppb[lowest] - 2 * (std::int64_t{in.sigma_ppb[k]} + in.sigma_ppb[lowest]);
       left_uams_[k] = sure > dead_band_ppb ? sure * plan_->uams_per_ppb : 0;
     }
     measured_ = true;

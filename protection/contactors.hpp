@@ -51,6 +51,9 @@ struct Outputs {
 struct ContactorPlan {
   std::uint32_t test_us = 0, half_time_constant_us = 0, link_discharge_us = 0;
   std::int32_t rest_ua = 0;
+
+  /// Time in a state is counted up to that.
+  constexpr std::uint32_t longest_us() const { return std::max({3 * test_us, 12 * half_time_constant_us, link_discharge_us}); }
 };
 
 constexpr ContactorPlan contactor_plan(const PackDesign& d) {
@@ -80,7 +83,8 @@ class Contactors {
   constexpr const Outputs& update(const ContactorInput& in) {
     events_ = {};
     if (!intact()) enter(ContactorState::safe);
-    count(in_state_us_, in.step_us, most_us);
+    count(in_state_us_, in.step_us, plan_->longest_us());
+    if (in.request != served_) served_ = Request::none;
     step(in);
     return outputs_ = outputs_in(in);
   }
@@ -91,7 +95,6 @@ class Contactors {
   constexpr const Outputs& outputs() const { return outputs_; }
 
  private:
-  static constexpr std::uint32_t most_us = 0xFFFF'FFFF;
   static constexpr std::uint32_t longest_halves = 12;
   /// 1 - exp(-k / 2) less a fifth, k = 0 .. 12, in 1/1024.
   static constexpr std::array<std::int32_t, longest_halves + 1> slowest = {0, 198, 442, 591, 681, 735, 768, 788, 800, 808, 812, 815, 817};
@@ -139,7 +142,6 @@ class Contactors {
   constexpr void in_off(const ContactorInput& in) {
     see_open(in);
     if (in.open || in.open_now) return enter(ContactorState::safe);
-    if (in.request != served_) served_ = Request::none;
     if (in.request == Request::none || in.request == served_ || blocked(in) || events_.welded) return;
     served_ = in.request;
     enter(ContactorState::self_test);

@@ -1,5 +1,5 @@
 // Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on the board;
-// with "board": writes that and the keys of mechanisms, nothing of recordings and speeds.
+// with "board": writes that and the keys of mechanisms, nothing of recordings and speeds; with "protection": only what protection costs.
 //
 // Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
 #include <algorithm>
@@ -233,8 +233,15 @@ std::string identification_speed() {
   return table;
 }
 
+std::string protection_cost() {
+  std::string table = "| what | figure |\n|---|---|\n";
+  for (const auto& [what, value] : protection_figures(emulated_boards().front(), read_cell("table9"))) table += fmt::format("| {} | {:.0f} |\n", what, value);
+  return table;
+}
+
 /// What is the same on every machine and depends on the code alone.
 void write_board() {
+  replace_figures(source / "protection/README.md", "netduinoplus2", protection_cost());
   replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
   replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
   replace_figures(source / "model/cells/README.md", "mechanisms", mechanism_tables());
@@ -263,6 +270,7 @@ int main(int argc, char** argv) {
   try {
     if (argc > 1 && std::string_view(argv[1]) == "step") fmt::print("{}\n{}", bms::step_cost(), bms::mechanism_cost());
     else if (argc > 1 && std::string_view(argv[1]) == "board") bms::write_board();
+    else if (argc > 1 && std::string_view(argv[1]) == "protection") bms::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
     else bms::run();
     return 0;
   } catch (const std::exception& e) {

@@ -50,6 +50,22 @@ TEST(FirmwareImage, CostsNoMoreThanTheTableSays) {
   }
 }
 
+TEST(ProtectionImage, CostsNoMoreThanTheTableSaysAndDecidesWhatTheHostDecides) {
+  const CommittedFigures table(BMS_SOURCE_DIR "/protection/README.md", "netduinoplus2");
+  const auto measured = protection_figures(emulated_boards().front(), read_cell("table9"));  // throws when the board decides otherwise
+  ASSERT_FALSE(measured.empty());
+  for (const auto& [name, value] : measured) {
+    ASSERT_TRUE(table.has(name)) << name;
+    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": run ./bms figures if it is worth it";
+  }
+}
+
+TEST(ProtectionImage, HasNoFloatingPoint) {
+  const auto symbols = symbols_of(image(Image::protection));
+  EXPECT_THAT(forbidden_in(symbols), IsEmpty());
+  for (const Symbol& s : symbols) EXPECT_FALSE(s.name.starts_with("__aeabi_f") || s.name.starts_with("__aeabi_i2f")) << s.name;
+}
+
 TEST(FirmwareImage, AStepStaysInsideItsBudget) {
   const StepCost cost = count_instructions(emulated_boards().front(), image(Image::replay), shift());
   EXPECT_EQ(cost.calls, 28801U);

@@ -11,6 +11,7 @@
 #include "host_sim/child_process.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/text_file.hpp"
+#include "protection/protection.hpp"
 #include "tests/firmware/elf_image.hpp"
 
 namespace bms {
@@ -92,6 +93,24 @@ std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& bo
           {"state of quality, display, limits and health [bytes]", number(sizeof(Condition<SocEstimator<float>>))},
           {"flash of the whole application [bytes]", number(f.image_text)},
           {"RAM of the whole application, without stack [bytes]", number(f.image_ram)}};
+}
+
+std::vector<std::pair<std::string, double>> protection_figures(const EmulatedBoard& board, const CellFile& cell) {
+  const auto image = firmware_image(board.name, cell, Image::protection);
+  const StepCost cost = count_instructions(board, image, "bms::protection::protection_step(");
+  std::uint64_t code = 0, plan = 0;
+  for (const Symbol& s : symbols_of(image)) {
+    if (s.name.starts_with("bms::protection::protection_step(")) code += s.size;
+    if (s.name.starts_with("bms::protection::scenario_plan")) plan += s.size;
+  }
+  const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
+  return {{"sixteen cells, mean [instructions]", cost.mean},
+          {"sixteen cells, longest [instructions]", number(cost.most)},
+          {"code [bytes]", number(code)},
+          {"the table and the other constants of a pack [bytes]", number(plan)},
+          // pointers have four bytes on the board, eight here
+          {"state of sixteen cells, at most [bytes]", number(sizeof(protection::Protection<16>))},
+          {"state of one cell, at most [bytes]", number(sizeof(protection::Protection<1>))}};
 }
 
 }  // namespace bms

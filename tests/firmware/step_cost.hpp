@@ -38,4 +38,7 @@ Footprint footprint(const std::filesystem::path& application_image);
 /// The rows of the table in estimator/README.md: what it is, and the figure.
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples);
 
+/// The rows of the table of costs in protection/README.md.
+std::vector<std::pair<std::string, double>> protection_figures(const EmulatedBoard& board, const CellFile& cell);
+
 }  // namespace bms

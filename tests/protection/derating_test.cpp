@@ -1,0 +1,127 @@
+#include "protection/derating.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "plant/random.hpp"
+#include "tests/protection/expected_rows.hpp"
+
+namespace bms::protection {
+namespace {
+
+constexpr DeratingPlan plan6a = derating_plan(forklift);
+constexpr DeratingInput good{.highest_cell_uv = 3'300'000, .lowest_cell_uv = 3'290'000, .highest_cdegc = 2'500, .lowest_cdegc = 2'400, .soc_ppb = 500'000'000};
+
+AllowedCurrent settled(const DeratingInput& in) {
+  Derating d(plan6a);
+  AllowedCurrent a;
+  for (int k = 0; k < 100; ++k) a = d.update(in, 100'000);
+  return a;
+}
+
+struct Point {
+  const char* what;
+  DeratingInput in;
+  double charge_a, discharge_a;
+};
+
+DeratingInput with(void (*change)(DeratingInput&)) {
+  DeratingInput in = good;
+  change(in);
+  return in;
+}
+
+/// Hand-reckoned from the ramps' words: span 1.65 V, -20 to 60 degrees C, 6 A.
+TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
+  const Point points[] = {
+      {"nothing near", good, 6, 6},
+      {"full at 6 % of the span below the top", with([](auto& i) { i.highest_cell_uv = 3'551'000; }), 6, 6},
+      {"half way to the top", with([](auto& i) { i.highest_cell_uv = 3'600'500; }), 3, 6},
+      {"at the top", with([](auto& i) { i.highest_cell_uv = 3'650'000; }), 0, 6},
+      {"above it", with([](auto& i) { i.highest_cell_uv = 3'900'000; }), 0, 6},
+      {"30 % of the span above the bottom", with([](auto& i) { i.lowest_cell_uv = 2'495'000; }), 6, 6},
+      {"half of that", with([](auto& i) { i.lowest_cell_uv = 2'247'500; }), 6, 3},
+      {"at the bottom", with([](auto& i) { i.lowest_cell_uv = 2'000'000; }), 6, 0},
+      {"freezing", with([](auto& i) { i.lowest_cdegc = 0; }), 0, 6},
+      {"5 degrees", with([](auto& i) { i.lowest_cdegc = 500; }), 3, 6},
+      {"10 degrees", with([](auto& i) { i.lowest_cdegc = 1'000; }), 6, 6},
+      {"-12.5 degrees", with([](auto& i) { i.lowest_cdegc = -1'250; }), 0, 3},
+      {"40 degrees", with([](auto& i) { i.highest_cdegc = 4'000; }), 6, 6},
+      {"42.5 degrees", with([](auto& i) { i.highest_cdegc = 4'250; }), 3, 6},
+      {"45 degrees", with([](auto& i) { i.highest_cdegc = 4'500; }), 0, 6},
+      {"55 degrees", with([](auto& i) { i.highest_cdegc = 5'500; }), 0, 3},
+      {"95 %", with([](auto& i) { i.soc_ppb = 950'000'000; }), 6, 6},
+      {"100 %: a fifth is left", with([](auto& i) { i.soc_ppb = 1'000'000'000; }), 1.2, 6},
+      {"120 %", with([](auto& i) { i.soc_ppb = 1'200'000'000; }), 1.2, 6},
+      {"10 %", with([](auto& i) { i.soc_ppb = 100'000'000; }), 6, 6},
+      {"0 %: a fifth is left", with([](auto& i) { i.soc_ppb = 0; }), 6, 1.2},
+      {"10 % known to 5 %", with([](auto& i) { i.soc_ppb = 100'000'000; i.soc_sigma_ppb = 50'000'000; }), 6, 3.6},
+      {"95 % known to 2.5 %", with([](auto& i) { i.soc_ppb = 950'000'000; i.soc_sigma_ppb = 25'000'000; }), 3.6, 6},
+      {"soc not known", with([](auto& i) { i.soc_ppb = no_reading; }), 6, 6},
+      {"the model allows 2 A and 4 A", with([](auto& i) { i.model_charge_ua = 2'000'000; i.model_discharge_ua = 4'000'000; }), 2, 4},
+      {"the model allows nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = 0; }), 0, 0},
+      {"a fault halves", with([](auto& i) { i.derate = true; }), 3, 3},
+      {"charge forbidden", with([](auto& i) { i.charge_forbidden = true; }), 0, 6},
+      {"discharge forbidden", with([](auto& i) { i.discharge_forbidden = true; }), 6, 0},
+      {"no temperature", with([](auto& i) { i.highest_cdegc = i.lowest_cdegc = no_reading; }), 0, 3},
+  };
+  for (const Point& p : points) {
+    const AllowedCurrent a = settled(p.in);
+    EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.012) << p.what;  // 1/1024 of 6 A, twice
+    EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.012) << p.what;
+  }
+}
+
+TEST(Derating, MovesByNoMoreThanItsSlewWhateverComes) {
+  truth::Random random(5);
+  Derating d(plan6a);
+  AllowedCurrent before;
+  const auto any = [&](std::int32_t low, std::int32_t high) { return random.uniform() < 0.05 ? no_reading : low + static_cast<std::int32_t>(random.uniform() * (high - low)); };
+  for (int k = 0; k < 20'000; ++k) {
+    DeratingInput in{any(1'000'000, 4'000'000), any(1'000'000, 4'000'000), any(-3'000, 7'000), any(-3'000, 7'000), any(-200'000'000, 1'200'000'000), any(0, 900'000'000),
+                     any(0, 10'000'000), any(0, 10'000'000), random.uniform() < 0.3, false, false};
+    const std::uint32_t step_us = static_cast<std::uint32_t>(random.uniform() * 200'000);
+    const AllowedCurrent now = d.update(in, step_us);
+    const double down_a = 6 * step_us * 1e-6 + 2e-6, up_a = down_a / 5 + 2e-6;
+    for (const auto& [a, b] : {std::pair{before.charge_ua, now.charge_ua}, std::pair{before.discharge_ua, now.discharge_ua}}) {
+      ASSERT_LE((b - a) / 1e6, up_a);
+      ASSERT_LE((a - b) / 1e6, down_a);
+      ASSERT_GE(b, 0);
+      ASSERT_LE(b, 6'000'000);
+    }
+    before = now;
+  }
+}
+
+TEST(Derating, IsContinuousInWhatItGoesBy) {
+  const auto sweep = [](std::int32_t DeratingInput::*field, std::int32_t from, std::int32_t to, std::int32_t step) {
+    DeratingInput in = good;
+    in.*field = from;
+    AllowedCurrent before = settled(in);
+    for (std::int32_t v = from; v <= to; v += step) {
+      in.*field = v;
+      const AllowedCurrent now = settled(in);
+      ASSERT_LE(std::abs(now.charge_ua - before.charge_ua), 100'000) << v;
+      ASSERT_LE(std::abs(now.discharge_ua - before.discharge_ua), 100'000) << v;
+      before = now;
+    }
+  };
+  sweep(&DeratingInput::highest_cell_uv, 3'500'000, 3'700'000, 1'000);
+  sweep(&DeratingInput::lowest_cell_uv, 1'900'000, 2'600'000, 5'000);
+  sweep(&DeratingInput::highest_cdegc, 3'500, 6'500, 5);
+  sweep(&DeratingInput::lowest_cdegc, -2'500, 1'500, 5);
+  sweep(&DeratingInput::soc_ppb, -100'000'000, 1'100'000'000, 1'000'000);
+}
+
+TEST(Derating, ForbidsAtOnceAndAllowsSlowly) {
+  Derating d(plan6a);
+  for (int k = 0; k < 100; ++k) d.update(good, 100'000);
+  DeratingInput in = good;
+  in.charge_forbidden = true;
+  EXPECT_EQ(d.update(in, 100'000).charge_ua, 0);
+  EXPECT_NEAR(d.update(good, 100'000).charge_ua, 120'000, 10'000) << "five seconds back to full";
+}
+
+}  // namespace
+}  // namespace bms::protection
