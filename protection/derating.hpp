@@ -85,7 +85,7 @@ class Derating {
     lower(discharge, plan_->discharge_cold, in.lowest_cdegc);
     lower(discharge, plan_->discharge_warm, in.highest_cdegc);
     if (in.soc_ppb != no_reading) {
-      const std::int32_t soc_ppb = std::clamp(in.soc_ppb, 0, 1'000'000'000), sigma_ppb = std::clamp(in.soc_sigma_ppb, 0, 1'000'000'000);
+      const std::int32_t soc_ppb = std::clamp<std::int32_t>(in.soc_ppb, 0, 1'000'000'000), sigma_ppb = std::clamp<std::int32_t>(in.soc_sigma_ppb, 0, 1'000'000'000);
       lower(charge, plan_->charge_soc, soc_ppb + sigma_ppb);
       lower(discharge, plan_->discharge_soc, soc_ppb - sigma_ppb);
     }
