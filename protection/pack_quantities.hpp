@@ -29,7 +29,7 @@ struct PackLimits {
 
 constexpr PackLimits pack_limits(const PackDesign& d) {
   const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
-  return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a), d.temperatures};
+  return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a), std::min<std::uint8_t>(d.temperatures, most_temperatures)};
 }
 
 /// A cell's voltage that can be one, or be asked to be protected from: a reversed one reads a little below 0.

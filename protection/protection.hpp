@@ -1,6 +1,6 @@
 // Protection of a pack of cells in series: what it measures and what the estimator knows of it go in, what may be done comes out.
 //
-//   constexpr auto pack = protection_plan(design);              in the compiler; has to outlive what uses it
+//   constexpr auto pack = protection_plan(design);              in the compiler, of as many cells; has to outlive what uses it
 //   Protection<16> protection(pack, kept);                      kept: what the last run told to store
 //   decision = protection.update(sample, estimate, orders);     with every sample
 //   decision = protection.without_sample(now_us);               when none came: from the loop, as often as it likes, in the same clock
@@ -32,13 +32,14 @@ struct ProtectionPlan {
   DeratingPlan derating;
   ContactorPlan contactors;
   BalancingPlan balancing;
+  std::uint8_t cells;
 };
 
 constexpr ProtectionPlan protection_plan(const PackDesign& design) {
   const Rules rules = rules_of(protection_table(design));
   const std::uint32_t open_now = faults_with(rules, Reaction::open_now), open = faults_with(rules, Reaction::open);
   return {rules, faults_with(rules, Reaction::derate), faults_with(rules, Reaction::forbid_charge) | open | open_now, faults_with(rules, Reaction::forbid_discharge) | open | open_now, open, open_now,
-          pack_limits(design), derating_plan(design), contactor_plan(design), balancing_plan(design)};
+          pack_limits(design), derating_plan(design), contactor_plan(design), balancing_plan(design), design.cells};
 }
 
 /// What is known of the cells beside a sample; no_reading where it is not.
@@ -146,7 +147,7 @@ class Protection {
   }
 
   constexpr void find_faults(Quantities& q, std::uint32_t step_us, const Orders& orders) {
-    const bool intact = monitor_.intact() && contactors_.intact();
+    const bool intact = monitor_.intact() && contactors_.intact() && plan_->cells == Cells;  // a plan of another pack is no plan
     if (!monitor_.intact()) monitor_.distrust();
     const ContactorEvents& seen = contactors_.events();
     at(q, Quantity::off_curve) = seen.precharge_failed ? 1 : 0;

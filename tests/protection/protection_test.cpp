@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <sstream>
+#include <functional>
+#include <set>
+#include <tuple>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -128,6 +130,40 @@ TEST(Protection, WithoutSamplesOpensAfterFivePeriodsAndTakesAnewRequestToClose) 
   b.orders.request = Request::drive;
   b.run(60);
   EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
+}
+
+TEST(Protection, WithoutSamplesOpensFromEveryState) {
+  std::set<ContactorState> tried;
+  for (int steps = 1; steps < 60; ++steps) {
+    for (const Request r : {Request::drive, Request::charge}) {
+      Bench b;
+      b.orders.request = r;
+      b.run(steps);
+      if (steps > 50) {  // and while it waits for a load to cease
+        b.load_ua = -3'000'000;
+        b.step();
+        b.orders.request = Request::none;
+        b.run(2);
+      }
+      tried.insert(b.protection.decision().state);
+      for (std::uint64_t after_us = 10'000; after_us <= 520'000; after_us += 10'000) b.protection.without_sample(b.time_us + after_us);
+      ASSERT_FALSE(b.protection.decision().outputs.any_closed()) << steps;
+      ASSERT_EQ(b.protection.decision().allowed.discharge_ua, 0);
+    }
+  }
+  EXPECT_TRUE(tried.contains(ContactorState::self_test) && tried.contains(ContactorState::precharge) && tried.contains(ContactorState::drive) && tried.contains(ContactorState::charge) &&
+              tried.contains(ContactorState::unloading));
+}
+
+TEST(Protection, WithThePlanOfAnotherPackClosesNothing) {
+  PackDesign other = forklift;
+  other.cells = 15;
+  const ProtectionPlan plan_of_15 = protection_plan(other);
+  Bench b(0, plan_of_15);
+  b.orders.request = Request::drive;
+  b.run(100);
+  EXPECT_NE(b.protection.decision().faults & bit(Fault::internal_fault), 0U);
+  EXPECT_FALSE(b.protection.decision().outputs.any_closed());
 }
 
 TEST(Protection, CountsSamplesOfAClockThatStandsOrGoesBackAsNone) {
@@ -292,6 +328,8 @@ TEST(Protection, AllowsNoCurrentUnlessTheContactorsAreClosedForIt) {
   EXPECT_EQ(b.protection.decision().allowed.discharge_ua, 0);
   b.drive_off();
   EXPECT_GT(b.protection.decision().allowed.discharge_ua, 5'900'000);
+  b.orders.request = Request::none;
+  EXPECT_EQ(b.step().allowed.discharge_ua, 0) << "in the same step";
 }
 
 TEST(Protection, BleedsWhileChargingAtTheTopAndNotWithAFaultThatOpens) {
