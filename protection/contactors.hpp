@@ -41,8 +41,9 @@ inline constexpr std::array<const char*, contactor_state_count> contactor_state_
 
 enum class Request : std::uint8_t { none, drive, charge };
 
+/// A bit each: a bool of eight has values that are neither, once a bit flips.
 struct Outputs {
-  bool main_plus = false, main_minus = false, precharge = false, charge_enable = false;
+  bool main_plus : 1 = false, main_minus : 1 = false, precharge : 1 = false, charge_enable : 1 = false;
 
   constexpr bool any_closed() const { return main_plus || main_minus || precharge; }
   constexpr bool operator==(const Outputs&) const = default;
@@ -71,7 +72,7 @@ struct ContactorInput {
 
 /// What the contactors find out by themselves.
 struct ContactorEvents {
-  bool precharge_failed = false, welded = false, not_closed = false;
+  bool precharge_failed : 1 = false, welded : 1 = false, not_closed : 1 = false;
 };
 
 class Contactors {
