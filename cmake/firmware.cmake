@@ -7,7 +7,8 @@
 #   bms_<board>_pack.elf     tests/firmware/pack_image.cpp; only when asked for
 #   bms_<board>_protection.elf  tests/firmware/protection_image.cpp; only when asked for
 #
-# The first two run in QEMU only (hal/README.md). What does not depend on the cell is compiled once for all.
+# The first two run in QEMU only (hal/README.md). A board that QEMU does not have (BMS_EMULATED OFF) has one image, bms_<board>.elf, for
+# the chip. board.cmake says which CAN back end it has: BMS_CAN slcan or bxcan, for the latter with a bit rate. What does not depend on the cell is compiled once for all.
 include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
@@ -65,7 +66,13 @@ set(chip ${hal}/${BMS_CHIP})
 bms_objects(hal_core -Os ${chip}/startup.cpp ${chip}/power.cpp ${chip}/clock.cpp)
 bms_objects(hal_chip -Os ${chip}/clock_tree.cpp ${chip}/finish.cpp)
 bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semihosting.cpp)
-bms_objects(hal_slcan -Os ${hal}/slcan/can.cpp ${chip}/uart.cpp ${chip}/watchdog.cpp ${hal}/emulated/samples_can.cpp ${hal}/absent/record.cpp)
+# the board's back ends: BMS_CAN names how it talks, and so far where its samples come from
+set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
+set(can_bxcan ${chip}/bxcan.cpp)
+set(samples_slcan ${hal}/emulated/samples_can.cpp)
+set(samples_bxcan ${hal}/remote/samples.cpp)
+bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${samples_${BMS_CAN}} ${hal}/absent/record.cpp)
+target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp)
 
 bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/condition_step.cpp ${cell_header} ${can_messages})  # the cell says which model
@@ -84,9 +91,14 @@ function(bms_image name)
   set_target_properties(${name} PROPERTIES LINK_DEPENDS ${BMS_LINKER_SCRIPT} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
 endfunction()
 
-bms_image(bms_${BMS_BOARD} hal_core hal_emulated hal_slcan application estimator_step)
+if(NOT BMS_EMULATED)
+  bms_image(bms_${BMS_BOARD} hal_core hal_chip hal_board application estimator_step)
+  target_link_options(bms_${BMS_BOARD} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)  # for a debugger, and tests/firmware
+  return()
+endif()
+bms_image(bms_${BMS_BOARD} hal_core hal_emulated hal_board application estimator_step)
 bms_image(bms_${BMS_BOARD}_replay hal_core hal_emulated hal_stream application estimator_step)
-bms_image(bms_${BMS_BOARD}_bench hal_core hal_chip hal_slcan application estimator_step)
+bms_image(bms_${BMS_BOARD}_bench hal_core hal_chip hal_board application estimator_step)
 
 bms_objects(fault_image -Os ${CMAKE_SOURCE_DIR}/tests/firmware/fault_image.cpp)
 bms_image(bms_${BMS_BOARD}_fault hal_core hal_emulated fault_image)

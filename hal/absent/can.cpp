@@ -7,5 +7,6 @@ void can_start() {}
 bool can_listening() { return false; }
 bool can_send(const CanFrame&) { return false; }
 bool can_receive(CanFrame&) { return false; }
+CanHealth can_health() { return {}; }
 
 }  // namespace bms::hal

@@ -61,4 +61,7 @@ bool can_receive(CanFrame& frame) {
   return false;
 }
 
+// a UART has no bus errors, and nobody acknowledges: state and lost bytes are all there is
+CanHealth can_health() { return {.state = listening ? CanState::active : CanState::starting, .lost = uart_lost()}; }
+
 }  // namespace bms::hal

@@ -27,7 +27,9 @@ inline Register& pwr_cr() { return at<0x40007000>(); }
 
 // GPIOB [8.4]
 inline Register& gpiob_moder() { return at<0x40020400>(); }
+inline Register& gpiob_pupdr() { return at<0x4002040C>(); }
 inline Register& gpiob_afrl() { return at<0x40020420>(); }
+inline Register& gpiob_afrh() { return at<0x40020424>(); }
 
 // USART1 [30.6]
 inline Register& usart1_sr() { return at<0x40011000>(); }
@@ -35,6 +37,30 @@ inline Register& usart1_dr() { return at<0x40011004>(); }
 inline Register& usart1_brr() { return at<0x40011008>(); }
 inline Register& usart1_cr1() { return at<0x4001100C>(); }
 inline constexpr unsigned usart1_interrupt = 37;
+
+// CAN1 [32.9]
+inline Register& can1_mcr() { return at<0x40006400>(); }
+inline Register& can1_msr() { return at<0x40006404>(); }
+inline Register& can1_tsr() { return at<0x40006408>(); }
+inline Register& can1_rf0r() { return at<0x4000640C>(); }
+inline Register& can1_ier() { return at<0x40006414>(); }
+inline Register& can1_esr() { return at<0x40006418>(); }
+inline Register& can1_btr() { return at<0x4000641C>(); }
+inline Register& can1_fmr() { return at<0x40006600>(); }
+inline Register& can1_fm1r() { return at<0x40006604>(); }
+inline Register& can1_fs1r() { return at<0x4000660C>(); }
+inline Register& can1_ffa1r() { return at<0x40006614>(); }
+inline Register& can1_fa1r() { return at<0x4000661C>(); }
+struct CanMailbox {
+  Register identifier, length_and_time, data_low, data_high;  // TIxR or RIxR, and so on
+};
+inline CanMailbox& can1_transmit_mailbox(std::uint32_t k) { return reinterpret_cast<CanMailbox*>(0x40006580)[k]; }
+inline CanMailbox& can1_receive_fifo_0() { return *reinterpret_cast<CanMailbox*>(0x400065B0); }
+struct CanFilterBank {
+  Register fr1, fr2;
+};
+inline CanFilterBank& can1_filter_bank(std::uint32_t k) { return reinterpret_cast<CanFilterBank*>(0x40006640)[k]; }
+inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20;
 
 // independent watchdog [21.4]
 inline Register& iwdg_kr() { return at<0x40003000>(); }
@@ -45,6 +71,8 @@ inline Register& iwdg_rlr() { return at<0x40003008>(); }
 inline Register& syst_csr() { return at<0xE000E010>(); }
 inline Register& syst_rvr() { return at<0xE000E014>(); }
 inline Register& syst_cvr() { return at<0xE000E018>(); }
+inline Register& nvic_iser0() { return at<0xE000E100>(); }
+inline Register& nvic_icer0() { return at<0xE000E180>(); }
 inline Register& nvic_iser1() { return at<0xE000E104>(); }
 inline Register& scb_icsr() { return at<0xE000ED04>(); }
 inline Register& scb_vtor() { return at<0xE000ED08>(); }

@@ -60,8 +60,10 @@ void systick_interrupt();
       "b record_fault\n");
 }
 
-// an image without a UART does not serve its interrupt
+// an image without a UART or CAN does not serve its interrupt
 [[gnu::weak, gnu::naked]] void usart1_interrupt() { asm volatile("b fault_handler"); }
+[[gnu::weak, gnu::alias("fault_handler")]] void can1_tx_interrupt() noexcept;
+[[gnu::weak, gnu::alias("fault_handler")]] void can1_rx0_interrupt() noexcept;
 
 }  // extern "C"
 
@@ -81,6 +83,8 @@ constexpr std::array<Handler, core_exceptions - 1 + interrupts> handlers() {
   all[1 - 1] = reset_handler;
   all[15 - 1] = systick_interrupt;
   all[core_exceptions - 1 + bms::hal::stm32f4::usart1_interrupt] = ::usart1_interrupt;
+  all[core_exceptions - 1 + bms::hal::stm32f4::can1_tx_interrupt] = ::can1_tx_interrupt;
+  all[core_exceptions - 1 + bms::hal::stm32f4::can1_rx0_interrupt] = ::can1_rx0_interrupt;
   return all;
 }
 

@@ -1,0 +1,331 @@
+// CAN1 on PB8 (RX) and PB9 (TX), alternate function 9 (datasheet, table 9). Registers: RM0090, 32.9.
+//
+// Out: three mailboxes that the controller sends by identifier (TXFP = 0), behind them a queue of 32 frames in the same order. A more
+// urgent frame that finds all three taken has the least urgent one aborted, which goes back into the queue. Two frames of one
+// identifier are never in mailboxes together: the controller would send them by the mailbox's number, not by age.
+// In: filters for accepted_ids, the controller's FIFO of three, by interrupt into a ring of 64.
+//
+// Going on the bus (32.4) and coming back after bus-off (32.7.6) are steps that service() looks at, each with a time after which it is
+// given up and tried again later; nothing here waits in a loop for the bus.
+//   bus-off         what waits is dropped; after a rest of 100 ms, doubled each time up to 1.6 s and 100 ms again once a frame got out,
+//                   the controller is told to recover, which takes 128 times 11 recessive bits
+//   nobody hears    frames wait and none got out for 100 ms (no acknowledge, a stuck wire, a bus that is full): what waits is dropped,
+//                   can_listening() is false for a second or until a frame comes in, then fresh frames try again
+//   no idle bus     100 ms after asking: counted, again after the rest
+//   no crystal      never on the bus: the internal oscillator is off by up to 8 % (datasheet, HSI), a bit may be by 0.5 %
+#include <array>
+#include <atomic>
+
+#include "hal/accepted_frames.hpp"
+#include "hal/bxcan/bit_timing.hpp"
+#include "hal/bxcan/filter_banks.hpp"
+#include "hal/bxcan/transmit_queue.hpp"
+#include "hal/can.hpp"
+#include "hal/clock.hpp"
+#include "hal/stm32f4/clock_tree.hpp"
+#include "hal/stm32f4/registers.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+using namespace stm32f4;
+
+constexpr bxcan::BitTiming timing = bxcan::bit_timing(crystal_apb1_hz, BMS_CAN_BIT_RATE);
+constexpr auto banks = bxcan::filter_banks(accepted_ids);
+
+constexpr std::uint64_t step_us = 100'000, hearing_us = 100'000, silence_us = 1'000'000;
+constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
+
+constexpr std::uint32_t mcr_inrq = 1U << 0, mcr_rflm = 1U << 3, mcr_reset = 1U << 15, msr_inak = 1U << 0;
+constexpr std::uint32_t rf_pending = 3U, rf_overrun = 1U << 4, rf_release = 1U << 5;
+constexpr std::uint32_t ier_tme = 1U << 0, ier_fmp0 = 1U << 1, ier_fov0 = 1U << 3;
+constexpr std::uint32_t esr_warning = 1U << 0, esr_passive = 1U << 1, esr_bus_off = 1U << 2;
+constexpr std::uint32_t transmit_request = 1U;
+constexpr std::uint32_t finished(std::uint32_t box) { return 1U << (8 * box); }
+constexpr std::uint32_t succeeded(std::uint32_t box) { return 2U << (8 * box); }
+constexpr std::uint32_t abort_request(std::uint32_t box) { return 0x80U << (8 * box); }
+
+// ---- out: shared with the interrupt ----
+
+struct Mailbox {
+  bxcan::WaitingFrame waiting;
+  bool taken = false, aborting = false, unwanted = false;
+};
+std::array<Mailbox, 3> mailboxes;
+bxcan::TransmitQueue<32> queue;
+std::uint32_t numbers = 0;
+std::atomic<std::uint32_t> sent{0}, dropped{0};
+
+void count(std::atomic<std::uint32_t>& counter, std::uint32_t more = 1) { counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed); }
+
+/// While one lives, the transmit interrupt waits.
+class TransmitInterruptHeld {
+ public:
+  TransmitInterruptHeld() {
+    nvic_icer0() = 1U << can1_tx_interrupt;
+    asm volatile("dsb\n isb" ::: "memory");
+  }
+  ~TransmitInterruptHeld() {
+    asm volatile("" ::: "memory");
+    nvic_iser0() = 1U << can1_tx_interrupt;
+  }
+  TransmitInterruptHeld(const TransmitInterruptHeld&) = delete;
+  TransmitInterruptHeld& operator=(const TransmitInterruptHeld&) = delete;
+};
+
+void take_back_finished() {
+  for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
+    const std::uint32_t status = can1_tsr();
+    if ((status & finished(k)) == 0) continue;
+    can1_tsr() = finished(k);
+    Mailbox& box = mailboxes[k];
+    if (!box.taken) continue;
+    if ((status & succeeded(k)) != 0) count(sent);
+    else if (box.unwanted || !queue.insert(box.waiting)) count(dropped);
+    box.taken = box.aborting = box.unwanted = false;
+  }
+}
+
+bool in_a_mailbox(std::uint16_t id) {
+  for (const Mailbox& box : mailboxes) {
+    if (box.taken && box.waiting.frame.id == id) return true;
+  }
+  return false;
+}
+
+void load(std::uint32_t k, const bxcan::WaitingFrame& waiting) {
+  mailboxes[k] = {waiting, true, false, false};
+  CanMailbox& box = can1_transmit_mailbox(k);
+  const CanFrame& frame = waiting.frame;
+  box.length_and_time = frame.length < 8 ? frame.length : 8;
+  box.data_low = get_bytes<std::uint32_t>(frame.data, 0);
+  box.data_high = get_bytes<std::uint32_t>(frame.data, 4);
+  box.identifier = static_cast<std::uint32_t>(frame.id) << 21 | transmit_request;
+}
+
+/// The least urgent mailbox goes back, if it is less urgent than the frame that waits and no other is on its way back.
+void make_room_for(const bxcan::WaitingFrame& waiting) {
+  std::uint32_t least = 0;
+  for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
+    if (mailboxes[k].aborting) return;
+    if (mailboxes[k].waiting.frame.id > mailboxes[least].waiting.frame.id) least = k;
+  }
+  if (mailboxes[least].waiting.frame.id <= waiting.frame.id) return;
+  mailboxes[least].aborting = true;
+  can1_tsr() = abort_request(least);
+}
+
+void refill() {
+  take_back_finished();
+  const auto may_go = [](const bxcan::WaitingFrame& w) { return !in_a_mailbox(w.frame.id); };
+  for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
+    bxcan::WaitingFrame next;
+    if (mailboxes[k].taken) continue;
+    if (!queue.take(next, may_go)) return;
+    load(k, next);
+  }
+  if (const bxcan::WaitingFrame* next = queue.most_urgent(may_go)) make_room_for(*next);
+}
+
+void drop_what_waits() {
+  const TransmitInterruptHeld held;
+  count(dropped, static_cast<std::uint32_t>(queue.size()));
+  queue.clear();
+  for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
+    if (!mailboxes[k].taken) continue;
+    mailboxes[k].unwanted = mailboxes[k].aborting = true;
+    can1_tsr() = abort_request(k);
+  }
+}
+
+bool anything_waits() {
+  const TransmitInterruptHeld held;
+  return queue.size() > 0 || mailboxes[0].taken || mailboxes[1].taken || mailboxes[2].taken;
+}
+
+// ---- in: one writer (the interrupt), one reader ----
+
+std::array<CanFrame, 64> ring;
+std::atomic<std::uint32_t> received{0}, taken{0}, lost{0}, overruns{0};
+
+// ---- the bus ----
+
+enum class Phase : std::uint8_t { off, resting, entering, joining, on };
+Phase phase = Phase::off;
+std::uint64_t phase_since_us = 0, progress_us = 0, silent_since_us = 0;
+std::uint32_t rest_us = first_rest_us, bus_offs = 0, failed_starts = 0, seen_sent = 0, seen_received = 0;
+bool silent = false;
+
+void go(Phase next) {
+  phase = next;
+  phase_since_us = now_us();
+}
+
+void configure() {
+  can1_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO keeps what it has: two frames make a sample
+  can1_btr() = timing.btr();
+  can1_fmr() = can1_fmr() | 1U;
+  constexpr std::uint32_t all = (1U << banks.size()) - 1;
+  can1_fa1r() = 0;
+  can1_fs1r() = 0;    // 16 bits
+  can1_fm1r() = all;  // lists
+  can1_ffa1r() = 0;   // FIFO 0
+  for (std::uint32_t k = 0; k < banks.size(); ++k) {
+    can1_filter_bank(k).fr1 = banks[k].fr1;
+    can1_filter_bank(k).fr2 = banks[k].fr2;
+  }
+  can1_fa1r() = all;
+  can1_fmr() = can1_fmr() & ~1U;
+  can1_ier() = ier_tme | ier_fmp0 | ier_fov0;
+}
+
+void ask_for_initialisation() {
+  can1_mcr() = mcr_inrq | mcr_rflm;  // and no longer asleep
+  go(Phase::entering);
+}
+
+/// The step took too long.
+void give_up() {
+  ++failed_starts;
+  if (phase == Phase::entering) {
+    const TransmitInterruptHeld held;
+    can1_mcr() = mcr_reset;
+    for (Mailbox& box : mailboxes) count(dropped, box.taken ? 1 : 0);
+    mailboxes = {};
+  } else {
+    can1_mcr() = mcr_inrq | mcr_rflm;
+  }
+  go(Phase::resting);
+}
+
+void watch_transmission() {
+  const std::uint32_t out = sent.load(std::memory_order_relaxed), in = received.load(std::memory_order_relaxed);
+  const std::uint64_t now = now_us();
+  if (out != seen_sent) rest_us = first_rest_us;
+  if (silent && (in != seen_received || now - silent_since_us >= silence_us)) {
+    silent = false;
+    progress_us = now;
+  }
+  if (out != seen_sent || !anything_waits()) progress_us = now;
+  seen_sent = out;
+  seen_received = in;
+  if (silent || now - progress_us < hearing_us) return;
+  silent = true;
+  silent_since_us = now;
+  drop_what_waits();
+}
+
+void service() {
+  const std::uint64_t elapsed = now_us() - phase_since_us;
+  const bool initialising = (can1_msr() & msr_inak) != 0, bus_off = (can1_esr() & esr_bus_off) != 0;
+  switch (phase) {
+    case Phase::off: return;
+    case Phase::resting:
+      if (elapsed < rest_us) return;
+      rest_us = rest_us < longest_rest_us ? 2 * rest_us : longest_rest_us;
+      return ask_for_initialisation();
+    case Phase::entering:
+      if (!initialising) {
+        if (elapsed >= step_us) give_up();
+        return;
+      }
+      configure();
+      can1_mcr() = mcr_rflm;
+      return go(Phase::joining);
+    case Phase::joining:
+      if (!initialising && !bus_off) {
+        silent = false;
+        progress_us = now_us();
+        return go(Phase::on);
+      }
+      if (elapsed >= step_us) give_up();
+      return;
+    case Phase::on:
+      if (!bus_off) return watch_transmission();
+      ++bus_offs;
+      drop_what_waits();
+      return go(Phase::resting);
+  }
+}
+
+bool on_the_bus() { return phase == Phase::on && (can1_esr() & esr_bus_off) == 0; }
+
+}  // namespace
+
+void can_start() {
+  if (clocks().core_hz != crystal_core_hz) return;
+  rcc_ahb1enr() = rcc_ahb1enr() | 1U << 1;
+  rcc_apb1enr() = rcc_apb1enr() | 1U << 25;
+  gpiob_pupdr() = (gpiob_pupdr() & ~(3U << 16)) | 1U << 16;  // recessive where no transceiver is
+  gpiob_afrh() = (gpiob_afrh() & ~255U) | 0x99U;
+  gpiob_moder() = (gpiob_moder() & ~(15U << 16)) | 10U << 16;
+  nvic_iser0() = 1U << can1_tx_interrupt | 1U << can1_rx0_interrupt;
+  ask_for_initialisation();
+}
+
+bool can_listening() {
+  service();
+  return on_the_bus() && !silent;
+}
+
+bool can_send(const CanFrame& frame) {
+  const TransmitInterruptHeld held;
+  if (!on_the_bus() || silent) {
+    count(dropped);
+    return false;
+  }
+  const bool kept = queue.insert({frame, numbers++});
+  if (!kept) count(dropped);
+  refill();
+  return kept;
+}
+
+bool can_receive(CanFrame& frame) {
+  service();
+  const std::uint32_t at = taken.load(std::memory_order_relaxed);
+  if (at == received.load(std::memory_order_acquire)) return false;
+  frame = ring[at % ring.size()];
+  taken.store(at + 1, std::memory_order_release);
+  return true;
+}
+
+CanHealth can_health() {
+  const std::uint32_t esr = can1_esr();
+  const auto state = [&] {
+    if ((esr & esr_bus_off) != 0) return CanState::bus_off;
+    if (phase != Phase::on) return CanState::starting;
+    if ((esr & esr_passive) != 0) return CanState::passive;
+    return (esr & esr_warning) != 0 ? CanState::warning : CanState::active;
+  };
+  return {.state = state(), .transmit_errors = static_cast<std::uint8_t>(esr >> 16), .receive_errors = static_cast<std::uint8_t>(esr >> 24),
+          .sent = sent, .received = received, .dropped = dropped, .lost = lost, .overruns = overruns, .bus_offs = bus_offs, .failed_starts = failed_starts};
+}
+
+}  // namespace bms::hal
+
+extern "C" void can1_tx_interrupt() { bms::hal::refill(); }
+
+extern "C" void can1_rx0_interrupt() {
+  using namespace bms::hal;
+  const std::uint32_t status = stm32f4::can1_rf0r();
+  if ((status & rf_overrun) != 0) {
+    stm32f4::can1_rf0r() = rf_overrun;
+    count(overruns);
+  }
+  if ((status & rf_pending) == 0) return;
+  const stm32f4::CanMailbox& box = stm32f4::can1_receive_fifo_0();
+  const std::uint32_t length = box.length_and_time & 15U;
+  CanFrame frame{static_cast<std::uint16_t>(box.identifier >> 21), static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
+  put_bytes<std::uint32_t>(frame.data, 0, box.data_low);
+  put_bytes<std::uint32_t>(frame.data, 4, box.data_high);
+  stm32f4::can1_rf0r() = rf_release;
+  for (int patience = 0; patience < 16 && (stm32f4::can1_rf0r() & rf_release) != 0; ++patience) {}
+  const std::uint32_t at = received.load(std::memory_order_relaxed);
+  if (at - taken.load(std::memory_order_acquire) == ring.size()) {
+    count(lost);
+    return;
+  }
+  ring[at % ring.size()] = frame;
+  received.store(at + 1, std::memory_order_release);
+}

@@ -1,0 +1,119 @@
+// ST's bxCAN as its registers show it, on a wire with other nodes, written from RM0090, 32, and ISO 11898-1 alone: it shares nothing with hal/.
+//
+// Time goes in bits of the bus. Frames are whole: their length is exact (CRC and stuff bits are computed), arbitration is decided at their
+// start, errors happen inside them. The test holds the other nodes: what they send, whether they acknowledge, what breaks.
+// What a driver must not do (write a mailbox that is taken, a bit timing while on the bus, a filter that is active) is in violations.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "hal/can.hpp"
+
+namespace bms {
+
+/// As on the wire, 29-bit frames and remote requests included.
+struct WireFrame {
+  std::uint32_t id = 0;
+  bool extended = false, remote = false;
+  std::uint8_t length = 0;
+  std::array<std::uint8_t, 8> data{};
+};
+WireFrame wire_frame(const hal::CanFrame& frame);
+
+/// Bits from the start of frame to the end of the intermission, with the stuff bits that its content needs.
+unsigned bits_on_the_wire(const WireFrame& frame);
+
+struct SeenFrame {
+  hal::CanFrame frame;
+  bool from_board = false;
+  std::uint64_t begin_bit = 0, end_bit = 0;
+};
+
+class BxcanModel {
+ public:
+  static constexpr std::uint32_t base = 0x40006400;
+
+  /// offset from `base`.
+  std::uint32_t read(std::uint32_t offset) const;
+  void write(std::uint32_t offset, std::uint32_t value);
+  /// One bit time of the wire passes. clock_hz: of the peripheral.
+  void bit(std::uint32_t clock_hz);
+
+  bool transmit_interrupt() const;
+  bool receive_interrupt() const;
+
+  // the wire and the other nodes
+  std::uint32_t bits_per_second = 250'000;
+  bool others_acknowledge = true;
+  bool stuck_dominant = false;
+  unsigned corrupt_sent = 0;      ///< so many of the board's next attempts meet an error
+  unsigned corrupt_received = 0;  ///< so many of the others' next frames do
+  struct Other {
+    WireFrame frame;
+    std::uint64_t from_bit = 0;  ///< not before
+  };
+  std::deque<Other> others;
+
+  // what a test looks at
+  std::uint64_t now_bit = 0;
+  std::vector<SeenFrame> seen;
+  std::vector<std::string> violations;
+  unsigned arbitrations_lost = 0, attempts_failed = 0, aborts = 0, times_off = 0;
+  std::uint64_t off_since_bit = 0, back_at_bit = 0;
+  unsigned transmit_errors() const { return tec_; }
+  unsigned receive_errors() const { return rec_; }
+  bool bus_off() const { return bus_off_; }
+  bool on_the_bus() const { return mode_ == Mode::normal && !bus_off_; }
+
+ private:
+  enum class Mode { sleep, initialisation, joining, normal };
+  struct Mailbox {
+    std::uint32_t tir = 0, tdtr = 0, tdlr = 0, tdhr = 0;
+    bool requested = false, abort = false, completed = false, ok = false, lost = false, error = false;
+    std::uint64_t order = 0;
+  };
+  struct Received {
+    std::uint32_t rir, rdtr, rdlr, rdhr;
+  };
+
+  void reset();
+  void write_mcr(std::uint32_t value);
+  void write_tsr(std::uint32_t value);
+  void write_mailbox(std::size_t box, unsigned word, std::uint32_t value);
+  void complete(Mailbox& box, bool ok);
+  std::uint32_t mailbox_status() const;
+  int scheduled() const;
+  void start_frame();
+  void end_frame();
+  void dominant_bit();
+  void recessive_bit();
+  void transmit_error(unsigned code, bool counts);
+  void receive(const WireFrame& frame);
+  bool accepted(const WireFrame& frame) const;
+  bool timing_fits(std::uint32_t clock_hz) const;
+
+  Mode mode_ = Mode::sleep;
+  std::uint32_t mcr_ = 0x00010002, ier_ = 0, btr_ = 0x01230000, fmr_ = 0x2A1C0E01, fm1r_ = 0, fs1r_ = 0, ffa1r_ = 0, fa1r_ = 0;
+  std::array<std::uint32_t, 56> banks_{};
+  std::array<Mailbox, 3> mailboxes_{};
+  std::deque<Received> fifo_;
+  bool overrun_ = false, full_ = false, bus_off_ = false, recovering_ = false, was_stuck_ = false, stuck_sender_ = false;
+  unsigned tec_ = 0, rec_ = 0, lec_ = 0;
+  unsigned recessive_run_ = 0, dominant_run_ = 0, sequences_ = 0;
+  std::uint64_t orders_ = 0, recovery_began_ = 0;
+
+  // the frame that is on the wire
+  unsigned busy_bits_ = 0, suspended_bits_ = 0;
+  int sending_ = -1;        ///< mailbox
+  bool other_sends_ = false;
+  Other other_{};
+  std::uint64_t begun_bit_ = 0;
+  unsigned outcome_ = 0;    ///< 0: arrives; else the last error code
+  std::uint32_t clock_hz_ = 0;
+};
+
+}  // namespace bms

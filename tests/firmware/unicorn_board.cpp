@@ -1,0 +1,269 @@
+#include "tests/firmware/unicorn_board.hpp"
+
+#include <elf.h>
+#include <unicorn/unicorn.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "host_sim/text_file.hpp"
+
+namespace bms {
+
+namespace {
+
+constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, systick_exception = 15, can_tx = 16 + 19, can_rx0 = 16 + 20, untouched = 0xA5A5A5A5;
+constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends a call from outside
+
+void must(uc_err error, const char* what) {
+  if (error != UC_ERR_OK) throw std::runtime_error(fmt::format("{}: {}", what, uc_strerror(error)));
+}
+
+}  // namespace
+
+UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal) : symbols_(symbols_of(image)), random_(seed), crystal_(crystal) {
+  must(uc_open(UC_ARCH_ARM, static_cast<uc_mode>(UC_MODE_THUMB | UC_MODE_MCLASS), &core_), "open");
+  must(uc_ctl_set_cpu_model(core_, UC_CPU_ARM_CORTEX_M4), "model");
+  must(uc_mem_map(core_, 0x08000000, 0x100000, UC_PROT_READ | UC_PROT_EXEC), "flash");
+  must(uc_mem_map(core_, 0x20000000, 0x20000, UC_PROT_READ | UC_PROT_WRITE), "RAM");
+  must(uc_mem_map(core_, ccm, ccm_size, UC_PROT_READ | UC_PROT_WRITE), "core-coupled RAM");
+  const auto map = [&]<std::uint32_t Base>(std::integral_constant<std::uint32_t, Base>, std::size_t size) {
+    must(uc_mmio_map(core_, Base, size,
+                     [](uc_engine*, std::uint64_t at, unsigned, void* self) -> std::uint64_t { return static_cast<UnicornBoard*>(self)->peripheral_read(Base + static_cast<std::uint32_t>(at)); }, this,
+                     [](uc_engine*, std::uint64_t at, unsigned, std::uint64_t value, void* self) { static_cast<UnicornBoard*>(self)->peripheral_write(Base + static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(value)); }, this),
+         "registers");
+  };
+  map(std::integral_constant<std::uint32_t, 0x40000000>{}, 0x30000);
+  map(std::integral_constant<std::uint32_t, scs>{}, 0x1000);
+  const std::vector<std::uint32_t> paint(ccm_size / 4, untouched);
+  must(uc_mem_write(core_, ccm, paint.data(), ccm_size), "paint");
+  load(image);
+  const std::uint64_t step = symbol_named(symbols_, "bms::estimator_step(").address & ~std::uint64_t{1};
+  uc_hook hook = 0;
+  const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* self) { ++static_cast<UnicornBoard*>(self)->estimates; };
+  must(uc_hook_add(core_, &hook, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, step, step), "hook");
+  std::array<std::uint32_t, 2> vectors{};
+  must(uc_mem_read(core_, 0x08000000, vectors.data(), sizeof vectors), "vectors");
+  set_reg(UC_ARM_REG_SP, vectors[0]);
+  set_reg(UC_ARM_REG_PC, vectors[1] | 1);
+}
+
+UnicornBoard::~UnicornBoard() { uc_close(core_); }
+
+void UnicornBoard::load(const std::filesystem::path& image) {
+  const std::string bytes = read_file(image);
+  Elf32_Ehdr head{};
+  std::memcpy(&head, bytes.data(), sizeof head);
+  for (unsigned k = 0; k < head.e_phnum; ++k) {
+    Elf32_Phdr part{};
+    std::memcpy(&part, bytes.data() + head.e_phoff + k * sizeof part, sizeof part);
+    if (part.p_type == PT_LOAD && part.p_filesz > 0) must(uc_mem_write(core_, part.p_paddr, bytes.data() + part.p_offset, part.p_filesz), "load");
+  }
+}
+
+std::uint32_t UnicornBoard::reg(int id) const {
+  std::uint32_t value = 0;
+  must(uc_reg_read(core_, id, &value), "register");
+  return value;
+}
+void UnicornBoard::set_reg(int id, std::uint32_t value) { must(uc_reg_write(core_, id, &value), "register"); }
+
+std::uint32_t UnicornBoard::register_value(std::uint32_t address) const {
+  const auto found = registers_.find(address);
+  return found == registers_.end() ? 0 : found->second;
+}
+
+std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808) & 3) == 2 ? 168'000'000 : 16'000'000; }
+
+std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
+  if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
+  std::uint32_t value = register_value(a);
+  switch (a) {
+    case 0x40023800: return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) | 3U;  // RCC_CR: what is on is ready
+    case 0x40023808: return (value & ~12U) | (value & 3) << 2;                                                                       // RCC_CFGR: the switch is at once
+    case 0x40023874: return 0x0E000000;                                                                                               // RCC_CSR: power on
+    case scs + 0x010: return systick_csr_;
+    case scs + 0x014: return systick_rvr_;
+    case scs + 0x018: return static_cast<std::uint32_t>(next_systick_ > ticks_ ? (next_systick_ - ticks_) / ticks_a_cycle() : 0);
+    case scs + 0x100: case scs + 0x180: return enabled_;
+    default: return value;
+  }
+}
+
+void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
+  if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) {
+    if ((register_value(0x40023840) & 1U << 25) != 0) can.write(a - BxcanModel::base, value);
+    else can.violations.push_back("bxCAN is written without its clock");
+    return;
+  }
+  switch (a) {
+    case 0x40003000:  // IWDG_KR
+      if (value == 0xCCCC) watchdog_ticks_ = 1;
+      if (value != 0xAAAA) return;
+      ++watchdog_feeds;
+      if (fed_at_ != 0) longest_unfed_ms = std::max(longest_unfed_ms, static_cast<double>(ticks_ - fed_at_) / (ticks_per_second / 1e3));
+      fed_at_ = ticks_;
+      watchdog_ticks_ = register_value(0x40003008) * (ticks_per_second / 500);  // a count is 2 ms
+      return;
+    case scs + 0x010:
+      if ((value & 1) != 0 && (systick_csr_ & 1) == 0) next_systick_ = ticks_ + (systick_rvr_ + std::uint64_t{1}) * ticks_a_cycle();
+      systick_csr_ = value;
+      return;
+    case scs + 0x014: systick_rvr_ = value; return;
+    case scs + 0x100: enabled_ |= value; return;
+    case scs + 0x180: enabled_ &= ~value; return;
+    case scs + 0xD0C:
+      if ((value & 4) != 0) ended_ = "the firmware has reset the core";
+      return;
+    default: registers_[a] = value;
+  }
+}
+
+void UnicornBoard::pass(std::uint64_t ticks) {
+  const std::uint64_t until = ticks_ + ticks, bit_ticks = ticks_per_second / can.bits_per_second;
+  if (next_bit_ == 0) next_bit_ = bit_ticks;
+  for (; next_bit_ <= until; next_bit_ += bit_ticks) can.bit(core_hz() == 168'000'000 ? 42'000'000 : 16'000'000);
+  ticks_ = until;
+  if ((systick_csr_ & 1) == 0) return;
+  while (next_systick_ <= ticks_) {
+    systick_pending_ = true;
+    next_systick_ += (systick_rvr_ + std::uint64_t{1}) * ticks_a_cycle();
+  }
+}
+
+int UnicornBoard::pending_exception() const {
+  if (systick_pending_ && (systick_csr_ & 2) != 0) return systick_exception;
+  if ((enabled_ & 1U << 19) != 0 && can.transmit_interrupt()) return can_tx;
+  if ((enabled_ & 1U << 20) != 0 && can.receive_interrupt()) return can_rx0;
+  return 0;
+}
+
+void UnicornBoard::deliver_interrupt() {
+  const int exception = pending_exception();
+  if (exception == 0) return;
+  sleeping_ = false;
+  if (handling_ || reg(UC_ARM_REG_PRIMASK) != 0) return;
+  if (exception == systick_exception) systick_pending_ = false;
+  enter(static_cast<std::uint32_t>(exception));
+}
+
+/// ARMv7-M, B1.5.6: the frame, with the FPU's part when the program has used it.
+void UnicornBoard::enter(std::uint32_t exception) {
+  const std::uint32_t control = reg(UC_ARM_REG_CONTROL), psr = reg(UC_ARM_REG_XPSR);
+  const bool fpu = (control & 4) != 0;
+  std::vector<std::uint32_t> frame(fpu ? 26 : 8, 0);
+  const std::array<int, 6> core{UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR};
+  for (std::size_t k = 0; k < core.size(); ++k) frame[k] = reg(core[k]);
+  frame[6] = reg(UC_ARM_REG_PC);
+  std::uint32_t sp = reg(UC_ARM_REG_SP);
+  const bool odd = (sp & 4) != 0;
+  frame[7] = (psr & ~(1U << 9)) | (odd ? 1U << 9 : 0U);
+  if (fpu) {
+    for (int k = 0; k < 16; ++k) frame[8 + static_cast<std::size_t>(k)] = reg(UC_ARM_REG_S0 + k);
+    frame[24] = reg(UC_ARM_REG_FPSCR);
+  }
+  sp = (sp & ~4U) - static_cast<std::uint32_t>(4 * frame.size());
+  must(uc_mem_write(core_, sp, frame.data(), 4 * frame.size()), "the stack of an interrupt");
+  set_reg(UC_ARM_REG_SP, sp);
+  set_reg(UC_ARM_REG_LR, fpu ? 0xFFFFFFE9 : 0xFFFFFFF9);
+  set_reg(UC_ARM_REG_CONTROL, control & ~4U);
+  set_reg(UC_ARM_REG_XPSR, 1U << 24);  // out of an IT block, flags unknown
+  // what the handler finds in them is no promise to it
+  std::uint32_t handler = 0;
+  must(uc_mem_read(core_, 0x08000000 + 4 * exception, &handler, 4), "vector");
+  set_reg(UC_ARM_REG_PC, handler | 1);
+  handling_ = true;
+  ++interrupts_taken;
+}
+
+void UnicornBoard::leave(std::uint32_t exc_return) {
+  if (!handling_) throw std::runtime_error("return from an exception that was not");
+  const bool fpu = (exc_return & 16) == 0;
+  std::vector<std::uint32_t> frame(fpu ? 26 : 8);
+  const std::uint32_t sp = reg(UC_ARM_REG_SP);
+  must(uc_mem_read(core_, sp, frame.data(), 4 * frame.size()), "the stack of an interrupt");
+  const std::array<int, 6> core{UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR};
+  for (std::size_t k = 0; k < core.size(); ++k) set_reg(core[k], frame[k]);
+  if (fpu) {
+    for (int k = 0; k < 16; ++k) set_reg(UC_ARM_REG_S0 + k, frame[8 + static_cast<std::size_t>(k)]);
+    set_reg(UC_ARM_REG_FPSCR, frame[24]);
+  }
+  set_reg(UC_ARM_REG_SP, sp + static_cast<std::uint32_t>(4 * frame.size()) + ((frame[7] & 1U << 9) != 0 ? 4U : 0U));
+  set_reg(UC_ARM_REG_PC, frame[6] | 1);
+  set_reg(UC_ARM_REG_XPSR, frame[7] & ~(1U << 9));
+  const std::uint32_t control = reg(UC_ARM_REG_CONTROL);
+  set_reg(UC_ARM_REG_CONTROL, fpu ? control | 4U : control & ~4U);
+  handling_ = false;
+}
+
+void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
+  const uc_err error = uc_emu_start(core_, from | 1, 0xFFFFFFFE, 0, count);
+  instructions += count;
+  const std::uint32_t pc = reg(UC_ARM_REG_PC);
+  if ((pc & 0xFFFFFFE0) == 0xFFFFFFE0) return leave(pc | 1);
+  if (pc >= return_of_call) return;
+  if (error != UC_ERR_OK) throw std::runtime_error(fmt::format("the firmware stops at {:08x}: {}", pc, uc_strerror(error)));
+  std::uint16_t last = 0;
+  must(uc_mem_read(core_, pc - 2, &last, 2), "code");
+  sleeping_ = last == 0xBF30;  // wfi
+}
+
+void UnicornBoard::slice() {
+  if (sleeping_) {
+    // to the next bit or tick, whichever can wake
+    pass(std::min(next_systick_ > ticks_ ? next_systick_ - ticks_ : 1, next_bit_ > ticks_ ? next_bit_ - ticks_ : 1));
+  } else {
+    const auto count = static_cast<std::size_t>(1 + random_() % 200);
+    execute(reg(UC_ARM_REG_PC), count);
+    pass(count * ticks_a_cycle());
+  }
+  deliver_interrupt();
+  if (!ended_.empty()) throw std::runtime_error(ended_);
+  if (watchdog_ticks_ > 1 && ticks_ - fed_at_ > watchdog_ticks_) throw std::runtime_error("the watchdog bites");
+}
+
+void UnicornBoard::run_for_ms(double ms) {
+  const std::uint64_t until = ticks_ + static_cast<std::uint64_t>(ms * (ticks_per_second / 1e3));
+  while (ticks_ < until) slice();
+}
+
+bool UnicornBoard::run_until(const std::function<bool()>& becomes, double within_ms) {
+  const std::uint64_t until = ticks_ + static_cast<std::uint64_t>(within_ms * (ticks_per_second / 1e3));
+  while (!becomes()) {
+    if (ticks_ >= until) return false;
+    slice();
+  }
+  return true;
+}
+
+/// Calls the firmware's own function between two of its instructions, as a debugger would.
+hal::CanHealth UnicornBoard::can_health() {
+  while (handling_) slice();
+  static_assert(sizeof(hal::CanHealth) == 32);
+  const auto function = static_cast<std::uint32_t>(symbol_named(symbols_, "bms::hal::can_health()").address);
+  uc_context* context = nullptr;
+  must(uc_context_alloc(core_, &context), "context");
+  must(uc_context_save(core_, context), "context");
+  const std::uint32_t result = ccm + 64;  // the far end of the stack
+  set_reg(UC_ARM_REG_R0, result);
+  set_reg(UC_ARM_REG_LR, return_of_call | 1);
+  uc_emu_start(core_, function | 1, return_of_call, 0, 10'000);
+  hal::CanHealth health;
+  must(uc_mem_read(core_, result, &health, sizeof health), "result");
+  must(uc_context_restore(core_, context), "context");
+  uc_context_free(context);
+  return health;
+}
+
+std::uint32_t UnicornBoard::stack_used() const {
+  std::vector<std::uint32_t> words(ccm_size / 4);
+  must(uc_mem_read(core_, ccm, words.data(), ccm_size), "stack");
+  std::size_t free = 64;  // below: can_health()
+  while (free < words.size() && words[free] == untouched) ++free;
+  return static_cast<std::uint32_t>(ccm_size - 4 * free);
+}
+
+}  // namespace bms

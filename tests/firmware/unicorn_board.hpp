@@ -1,0 +1,79 @@
+// A board's firmware image on this machine: Unicorn runs the Cortex-M4F's instructions, and what it lacks is here: exception entry and
+// return with the FPU's frame (ARMv7-M, B1.5), the NVIC's enables, SysTick, sleep until an interrupt, and of the chip the clock tree, watchdog, reset
+// and bxCAN (bxcan_model.hpp). Interrupts come between instructions, after a seeded random number of them.
+//
+// Time: an instruction is a core cycle; sleeping costs none, time goes on to the next event. All interrupts have one priority, as
+// the firmware sets them: none interrupts another.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "hal/can.hpp"
+#include "tests/firmware/bxcan_model.hpp"
+#include "tests/firmware/elf_image.hpp"
+
+struct uc_struct;
+
+namespace bms {
+
+class UnicornBoard {
+ public:
+  explicit UnicornBoard(const std::filesystem::path& image, std::uint32_t seed = 1, bool crystal = true);
+  ~UnicornBoard();
+  UnicornBoard(const UnicornBoard&) = delete;
+  UnicornBoard& operator=(const UnicornBoard&) = delete;
+
+  /// Throws std::runtime_error when the firmware faults, resets or starves the watchdog.
+  void run_for_ms(double ms);
+  /// False when it did not become so in time.
+  bool run_until(const std::function<bool()>& becomes, double within_ms);
+
+  double now_ms() const { return static_cast<double>(ticks_) / (ticks_per_second / 1e3); }
+  double ms_at_bit(std::uint64_t bit) const { return 1e3 * static_cast<double>(bit) / can.bits_per_second; }
+  hal::CanHealth can_health();
+  std::uint32_t register_value(std::uint32_t address) const;
+  /// Bytes of stack that were ever written.
+  std::uint32_t stack_used() const;
+
+  BxcanModel can;
+  unsigned estimates = 0;        ///< calls of estimator_step()
+  unsigned watchdog_feeds = 0;
+  double longest_unfed_ms = 0;
+  std::uint64_t interrupts_taken = 0, instructions = 0;
+
+ private:
+  static constexpr std::uint64_t ticks_per_second = 336'000'000;  // of 168 and 16 MHz and of bits of 125 to 500 kbit/s a multiple
+
+  void load(const std::filesystem::path& image);
+  void slice();
+  void sleep();
+  void pass(std::uint64_t ticks);
+  void deliver_interrupt();
+  void enter(std::uint32_t exception);
+  void leave(std::uint32_t exc_return);
+  int pending_exception() const;
+  std::uint32_t peripheral_read(std::uint32_t address);
+  void peripheral_write(std::uint32_t address, std::uint32_t value);
+  std::uint32_t core_hz() const;
+  std::uint64_t ticks_a_cycle() const { return ticks_per_second / core_hz(); }
+  std::uint32_t reg(int id) const;
+  void set_reg(int id, std::uint32_t value);
+  void execute(std::uint32_t from, std::size_t count);
+
+  uc_struct* core_ = nullptr;
+  std::vector<Symbol> symbols_;
+  std::mt19937 random_;
+  bool crystal_, handling_ = false, sleeping_ = false, systick_pending_ = false;
+  std::map<std::uint32_t, std::uint32_t> registers_;
+  std::uint32_t systick_csr_ = 0, systick_rvr_ = 0, enabled_ = 0;
+  std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0, fed_at_ = 0, watchdog_ticks_ = 0;
+  std::string ended_;
+};
+
+}  // namespace bms

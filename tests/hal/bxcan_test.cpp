@@ -1,0 +1,122 @@
+// What of the bxCAN back end needs no register: bit timing against a search over all settings, filters, the queue behind the mailboxes.
+#include "hal/bxcan/bit_timing.hpp"
+#include "hal/bxcan/filter_banks.hpp"
+#include "hal/bxcan/transmit_queue.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "hal/accepted_frames.hpp"
+
+namespace bms::hal::bxcan {
+namespace {
+
+// as the STM32F405 has it, written down by hand: 42 MHz / 42 / 8 = 125 kbit/s, sample after 7 of 8 quanta...
+static_assert(bit_timing(42'000'000, 250'000) == BitTiming{21, 6, 1, 1});
+static_assert(bit_timing(42'000'000, 125'000) == BitTiming{21, 13, 2, 2});
+static_assert(bit_timing(42'000'000, 500'000, cia301_allows) == BitTiming{6, 11, 2, 2});
+static_assert(bit_timing(42'000'000, 500'000, cia301_allows).sample_point_ppm() == 857'142);
+static_assert(bit_timing(42'000'000, 250'000).btr() == (0U << 24 | 0U << 20 | 5U << 16 | 20U));
+static_assert(bit_timing(40'000'000, 500'000) == BitTiming{5, 13, 2, 2}, "what a core at 160 MHz would reach");
+
+/// Whether bit_timing() compiles for it.
+template <std::uint32_t Clock, std::uint32_t Rate>
+concept Reachable = requires { typename std::integral_constant<std::uint32_t, bit_timing(Clock, Rate).brp>; };
+static_assert(Reachable<42'000'000, 250'000> && Reachable<8'000'000, 500'000>);
+static_assert(!Reachable<42'000'000, 500'000>, "84 cycles a bit: 85.7 % at best");
+static_assert(!Reachable<42'000'000, 800'000>, "not a whole number of cycles");
+static_assert(!Reachable<8'000'000, 1'000'001> && !Reachable<42'000'000, 0>);
+static_assert(!Reachable<25'000'000, 7'000>);
+
+/// All register values that give the rate exactly, by the definition of the bit in RM0090 and nothing of the header.
+struct Found {
+  double nearest = 1;   // distance of the sample point from 87.5 %
+  int most_quanta = 0;  // with that
+};
+Found search(double clock_hz, double rate) {
+  Found found;
+  for (int brp = 1; brp <= 1024; ++brp) {
+    for (int ts1 = 1; ts1 <= 16; ++ts1) {
+      for (int ts2 = 1; ts2 <= 8; ++ts2) {
+        const int quanta = 1 + ts1 + ts2;
+        if (quanta < 8 || clock_hz != rate * brp * quanta) continue;
+        const double distance = std::abs((1.0 + ts1) / quanta - 0.875);
+        if (distance < found.nearest - 1e-9) found = {distance, quanta};
+        else if (distance < found.nearest + 1e-9) found.most_quanta = std::max(found.most_quanta, quanta);
+      }
+    }
+  }
+  return found;
+}
+
+template <std::uint32_t Clock, std::uint32_t Rate>
+void is_the_best() {
+  constexpr BitTiming t = bit_timing(Clock, Rate, SamplePointRange{0, 1'000'000});
+  const Found found = search(Clock, Rate);
+  EXPECT_EQ(std::uint64_t{Rate} * t.brp * t.quanta(), Clock);
+  EXPECT_NEAR(std::abs((1.0 + t.ts1) / t.quanta() - 0.875), found.nearest, 1e-9) << Clock << " Hz, " << Rate << " bit/s";
+  EXPECT_EQ(static_cast<int>(t.quanta()), found.most_quanta) << Clock << " Hz, " << Rate << " bit/s";
+  EXPECT_LE(t.sjw, std::min(t.ts2, 4U));
+  EXPECT_GE(t.sjw, 1U);
+}
+
+TEST(BitTiming, IsTheBestThatASearchOverAllRegisterValuesFinds) {
+  is_the_best<42'000'000, 125'000>();
+  is_the_best<42'000'000, 250'000>();
+  is_the_best<42'000'000, 500'000>();
+  is_the_best<42'000'000, 1'000'000>();
+  is_the_best<45'000'000, 500'000>();
+  is_the_best<36'000'000, 250'000>();
+  is_the_best<8'000'000, 125'000>();
+  is_the_best<16'000'000, 500'000>();
+  is_the_best<25'000'000, 250'000>();
+}
+
+TEST(FilterBanks, HoldEachIdentifierOnceInBits15To5AndRepeatTheLast) {
+  constexpr auto banks = filter_banks(std::array<std::uint16_t, 5>{0x310, 0x311, 0x312, 0x7FF, 0x001});
+  ASSERT_EQ(banks.size(), 2U);
+  EXPECT_EQ(banks[0].fr1, 0x62206200U);
+  EXPECT_EQ(banks[0].fr2, 0xFFE06240U);
+  EXPECT_EQ(banks[1].fr1, 0x00200020U);
+  EXPECT_EQ(banks[1].fr2, 0x00200020U);
+}
+
+/// A reference that holds everything and sorts.
+TEST(TransmitQueue, GivesTheMostUrgentAndOfOneIdentifierTheOldestWhateverComes) {
+  TransmitQueue<8> queue;
+  std::vector<std::pair<unsigned, std::uint32_t>> expected;  // id, number
+  std::mt19937 random(7);
+  std::uint32_t number = 0xFFFFFF80;  // wraps on the way
+  std::uint32_t first = number;
+  unsigned given_up = 0;
+  for (int k = 0; k < 20'000; ++k) {
+    if (random() % 5 < 3) {
+      const auto id = static_cast<std::uint16_t>(0x100 + random() % 6);
+      const bool kept = queue.insert({{id, 0, {}}, number});
+      expected.emplace_back(id, number - first);
+      ++number;
+      std::sort(expected.begin(), expected.end());
+      EXPECT_EQ(kept, expected.size() <= 8);
+      if (expected.size() > 8) expected.pop_back(), ++given_up;
+    } else {
+      const auto forbidden = static_cast<std::uint16_t>(0x100 + random() % 6);
+      WaitingFrame out;
+      const auto found = std::find_if(expected.begin(), expected.end(), [&](const auto& e) { return e.first != forbidden; });
+      ASSERT_EQ(queue.take(out, [&](const WaitingFrame& w) { return w.frame.id != forbidden; }), found != expected.end());
+      if (found == expected.end()) continue;
+      ASSERT_EQ(out.frame.id, found->first);
+      ASSERT_EQ(out.number - first, found->second);
+      expected.erase(found);
+    }
+    ASSERT_EQ(queue.size(), expected.size());
+  }
+  EXPECT_GT(given_up, 1000U);
+}
+
+}  // namespace
+}  // namespace bms::hal::bxcan
