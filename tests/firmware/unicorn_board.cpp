@@ -137,7 +137,7 @@ void UnicornBoard::pass(std::uint64_t ticks) {
 int UnicornBoard::pending_exception() const {
   if (systick_pending_ && (systick_csr_ & 2) != 0) return systick_exception;
   if ((enabled_ & 1U << 19) != 0 && can.transmit_interrupt()) return can_tx;
-  if ((enabled_ & 1U << 20) != 0 && can.receive_interrupt()) return can_rx0;
+  if (!receive_interrupt_held && (enabled_ & 1U << 20) != 0 && can.receive_interrupt()) return can_rx0;
   return 0;
 }
 
@@ -170,8 +170,7 @@ void UnicornBoard::enter(std::uint32_t exception) {
   set_reg(UC_ARM_REG_SP, sp);
   set_reg(UC_ARM_REG_LR, fpu ? 0xFFFFFFE9 : 0xFFFFFFF9);
   set_reg(UC_ARM_REG_CONTROL, control & ~4U);
-  set_reg(UC_ARM_REG_XPSR, 1U << 24);  // out of an IT block, flags unknown
-  // what the handler finds in them is no promise to it
+  set_reg(UC_ARM_REG_XPSR, 1U << 24);  // out of an IT block
   std::uint32_t handler = 0;
   must(uc_mem_read(core_, 0x08000000 + 4 * exception, &handler, 4), "vector");
   set_reg(UC_ARM_REG_PC, handler | 1);
@@ -212,7 +211,7 @@ void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
 }
 
 void UnicornBoard::slice() {
-  if (sleeping_) {
+  if (sleeping_ || (program_held && !handling_)) {
     // to the next bit or tick, whichever can wake
     pass(std::min(next_systick_ > ticks_ ? next_systick_ - ticks_ : 1, next_bit_ > ticks_ ? next_bit_ - ticks_ : 1));
   } else {

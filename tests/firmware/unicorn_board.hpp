@@ -42,6 +42,8 @@ class UnicornBoard {
   std::uint32_t stack_used() const;
 
   BxcanModel can;
+  bool receive_interrupt_held = false;  ///< the CAN receive interrupt waits, as behind a long one
+  bool program_held = false;            ///< main() does not go on, interrupts are served
   unsigned estimates = 0;        ///< calls of estimator_step()
   unsigned watchdog_feeds = 0;
   double longest_unfed_ms = 0;

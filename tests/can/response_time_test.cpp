@@ -1,0 +1,31 @@
+#include "tests/can/response_time.hpp"
+
+#include <gtest/gtest.h>
+
+namespace bms::can_bus {
+namespace {
+
+/// Section 3.1 of the paper, table 2: what the older analysis gave as 3 ms for C.
+TEST(ResponseTime, IsThatOfThePapersExampleWhereTheSecondInstanceIsTheWorst) {
+  const std::vector<Message> messages{{"A", 1, 8, 2.5e-3, 0}, {"B", 2, 8, 3.5e-3, 0}, {"C", 3, 8, 3.5e-3, 0}};
+  const auto a_millisecond = [](const Message&) { return 1e-3; };
+  EXPECT_NEAR(response_s(messages, 0, 1e-3, 8e-6, a_millisecond), 2e-3, 1e-9);
+  EXPECT_NEAR(response_s(messages, 1, 1e-3, 8e-6, a_millisecond), 3e-3, 1e-9);
+  EXPECT_NEAR(response_s(messages, 2, 0, 8e-6, a_millisecond), 3.5e-3, 1e-9);
+}
+
+TEST(ResponseTime, OfAFullBusIsNeverAndAFrameIs135BitsAtMost) {
+  const std::vector<Message> messages{{"A", 1, 8, 1e-3, 0}, {"B", 2, 8, 1e-3, 0}};
+  EXPECT_TRUE(std::isinf(response_on_the_bus_s(messages, 1, 250e3)));
+  EXPECT_FALSE(std::isinf(response_on_the_bus_s(messages, 0, 250e3)));
+  EXPECT_EQ(worst_bits(8), 135U);
+  EXPECT_EQ(worst_bits(0), 55U);
+  EXPECT_NEAR(load(messages, 250e3), 1.08, 1e-9);
+}
+
+TEST(ResponseTime, EveryMessageOfTheFileIsInTheTable) {
+  EXPECT_EQ(messages_on_the_bus(10, 0).size(), std::tuple_size_v<can::Messages> + 2);
+}
+
+}  // namespace
+}  // namespace bms::can_bus
