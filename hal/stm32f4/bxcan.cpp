@@ -50,7 +50,7 @@ constexpr std::uint32_t abort_request(std::uint32_t box) { return 0x80U << (8 * 
 
 struct Mailbox {
   bxcan::WaitingFrame waiting;
-  bool taken = false, aborting = false, unwanted = false;
+  bool taken = false, unwanted = false;
 };
 std::array<Mailbox, 3> mailboxes;
 bxcan::TransmitQueue<32> queue;
@@ -83,7 +83,7 @@ void take_back_finished() {
     if (!box.taken) continue;
     if ((status & succeeded(k)) != 0) count(sent);
     else if (box.unwanted || !queue.insert(box.waiting)) count(dropped);
-    box.taken = box.aborting = box.unwanted = false;
+    box.taken = box.unwanted = false;
   }
 }
 
@@ -95,7 +95,7 @@ bool in_a_mailbox(std::uint16_t id) {
 }
 
 void load(std::uint32_t k, const bxcan::WaitingFrame& waiting) {
-  mailboxes[k] = {waiting, true, false, false};
+  mailboxes[k] = {waiting, true, false};
   CanMailbox& box = can1_transmit_mailbox(k);
   const CanFrame& frame = waiting.frame;
   box.length_and_time = frame.length < 8 ? frame.length : 8;
@@ -104,15 +104,13 @@ void load(std::uint32_t k, const bxcan::WaitingFrame& waiting) {
   box.identifier = static_cast<std::uint32_t>(frame.id) << 21 | transmit_request;
 }
 
-/// The least urgent mailbox goes back, if it is less urgent than the frame that waits and no other is on its way back.
+/// All are taken: the least urgent frame comes back, if it is less urgent than the one that waits; at once, or after its end if it is under way.
 void make_room_for(const bxcan::WaitingFrame& waiting) {
   std::uint32_t least = 0;
-  for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
-    if (mailboxes[k].aborting) return;
+  for (std::uint32_t k = 1; k < mailboxes.size(); ++k) {
     if (mailboxes[k].waiting.frame.id > mailboxes[least].waiting.frame.id) least = k;
   }
   if (mailboxes[least].waiting.frame.id <= waiting.frame.id) return;
-  mailboxes[least].aborting = true;
   can1_tsr() = abort_request(least);
 }
 
@@ -134,7 +132,7 @@ void drop_what_waits() {
   queue.clear();
   for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
     if (!mailboxes[k].taken) continue;
-    mailboxes[k].unwanted = mailboxes[k].aborting = true;
+    mailboxes[k].unwanted = true;
     can1_tsr() = abort_request(k);
   }
 }

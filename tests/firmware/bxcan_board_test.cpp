@@ -172,6 +172,37 @@ TEST_F(BxcanBoard, AnUrgentFrameOvertakesThoseInTheMailboxes) {
   EXPECT_EQ(board.can_health().dropped, 0U);
 }
 
+/// Samples faster than the bus can tell of them, by another way than the bus, so that frames are sent while others end.
+TEST_F(BxcanBoard, AtTheLimitOfTheBusNothingIsLostAndBeyondItTheLeastUrgent) {
+  const auto part = part_of_the_shift(1'500);
+  board.run_for_ms(20);
+  std::size_t next = 0;
+  const auto feed = [&](std::size_t count, double every_ms) {
+    for (std::size_t k = 0; k < count; ++k, ++next) {
+      for (const hal::CanFrame& f : hal::frames_of(part[next])) board.can.deliver(f);
+      board.run_for_ms(every_ms);
+    }
+  };
+  // every sample of this recording is a second after the last: all eight messages, 3.85 ms of wire each time
+  feed(500, 4.02);
+  board.run_for_ms(20);
+  expect_nothing_lost_within_an_id();
+  EXPECT_EQ(of_board(0x189).size(), 500U);
+  EXPECT_EQ(of_board().size(), board.can_health().sent);
+  EXPECT_EQ(board.can_health().dropped, 0U);
+  const std::size_t told = of_board(0x180).size();
+
+  feed(500, 2.51);
+  board.run_for_ms(50);
+  const hal::CanHealth health = board.can_health();
+  EXPECT_GT(health.dropped, 500U);
+  EXPECT_EQ(health.sent + health.dropped, 8U * 1'000);
+  EXPECT_EQ(health.sent, of_board().size());
+  EXPECT_EQ(of_board(0x180).size(), told + 500) << "the most urgent is never the one that is dropped";
+  EXPECT_EQ(of_board(0x181).size(), told + 500);
+  EXPECT_LT(of_board(0x189).size(), told + 250);
+}
+
 TEST_F(BxcanBoard, AFullFifoAndAFullRingAreCountedAndTheNextSampleIsTaken) {
   board.run_for_ms(20);
   board.receive_interrupt_held = true;
@@ -335,6 +366,21 @@ TEST(BxcanBoardAlone, AtAnotherBitRateNobodyHearsIt) {
   EXPECT_THAT(board.can.seen, IsEmpty());
   EXPECT_GT(board.can.attempts_failed, 30U);
   EXPECT_GE(board.estimates, 2U);
+}
+
+/// Against the bounds of the analysis, which knows nothing of CRC and stuff bits of a certain frame.
+TEST(BxcanModel, AFrameHasBetween111And135Bits) {
+  std::mt19937 random(5);
+  unsigned longest = 0;
+  for (int k = 0; k < 20'000; ++k) {
+    WireFrame f{static_cast<std::uint32_t>(random() % 0x800), false, false, 8, {}};
+    for (auto& byte : f.data) byte = static_cast<std::uint8_t>(k % 2 == 0 ? random() : random() % 2 * 0xFF);
+    const unsigned bits = bits_on_the_wire(f);
+    EXPECT_GE(bits, 111U);
+    EXPECT_LE(bits, can_bus::worst_bits(8));
+    longest = std::max(longest, bits);
+  }
+  EXPECT_GE(longest, 125U);
 }
 
 TEST_F(BxcanBoard, PinsAreThoseOfItsPage) {

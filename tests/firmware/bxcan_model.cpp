@@ -155,7 +155,6 @@ void BxcanModel::write_mcr(std::uint32_t value) {
     if (bus_off_) {
       recovering_ = true;
       sequences_ = 0;
-      recovery_began_ = now_bit;
     }
   }
 }
@@ -168,6 +167,11 @@ void BxcanModel::write_tsr(std::uint32_t value) {
     m.abort = true;
     if (sending_ != static_cast<int>(k)) complete(m, false);
   }
+}
+
+/// An attempt that failed is the last one when it is to be aborted, or without automatic retransmission (NART).
+void BxcanModel::given_up(Mailbox& m) {
+  if (m.abort || (mcr_ & 16) != 0) complete(m, false);
 }
 
 void BxcanModel::complete(Mailbox& m, bool ok) {
@@ -266,7 +270,7 @@ void BxcanModel::start_frame() {
   if (box >= 0) {
     mailboxes_[static_cast<std::size_t>(box)].lost = true;
     ++arbitrations_lost;
-    if (mailboxes_[static_cast<std::size_t>(box)].abort) complete(mailboxes_[static_cast<std::size_t>(box)], false);
+    given_up(mailboxes_[static_cast<std::size_t>(box)]);
   }
   other_sends_ = true;
   other_ = *other;
@@ -284,7 +288,7 @@ void BxcanModel::end_frame() {
     if (outcome_ != 0) {
       m.error = true;
       transmit_error(outcome_, outcome_ != acknowledge_error || tec_ < 128);
-      if (m.abort) complete(m, false);
+      given_up(m);
       return;
     }
     complete(m, true);
@@ -317,7 +321,7 @@ void BxcanModel::transmit_error(unsigned code, bool counts) {
   bus_off_ = true;
   ++times_off;
   off_since_bit = now_bit;
-  for (Mailbox& m : mailboxes_) m.lost = false;
+  if ((mcr_ & 64) != 0) recovering_ = true, sequences_ = 0;  // ABOM
 }
 
 /// The wire is held low: whoever sends sees it at once, whoever listens misses the stuff bit; after that every eight bits count (ISO 11898-1, 12.1.4).
@@ -337,7 +341,7 @@ void BxcanModel::dominant_bit() {
       Mailbox& m = mailboxes_[static_cast<std::size_t>(box)];
       m.error = true;
       transmit_error(bit_dominant_error, true);
-      if (m.abort) complete(m, false);
+      given_up(m);
     } else {
       ++rec_;
       lec_ = stuff_error;

@@ -57,6 +57,8 @@ class BxcanModel {
     std::uint64_t from_bit = 0;  ///< not before
   };
   std::deque<Other> others;
+  /// Into the receive FIFO without the wire: a sample that came another way.
+  void deliver(const hal::CanFrame& frame) { receive(wire_frame(frame)); }
 
   // what a test looks at
   std::uint64_t now_bit = 0;
@@ -85,6 +87,7 @@ class BxcanModel {
   void write_tsr(std::uint32_t value);
   void write_mailbox(std::size_t box, unsigned word, std::uint32_t value);
   void complete(Mailbox& box, bool ok);
+  void given_up(Mailbox& box);
   std::uint32_t mailbox_status() const;
   int scheduled() const;
   void start_frame();
@@ -104,7 +107,7 @@ class BxcanModel {
   bool overrun_ = false, full_ = false, bus_off_ = false, recovering_ = false, was_stuck_ = false, stuck_sender_ = false;
   unsigned tec_ = 0, rec_ = 0, lec_ = 0;
   unsigned recessive_run_ = 0, dominant_run_ = 0, sequences_ = 0;
-  std::uint64_t orders_ = 0, recovery_began_ = 0;
+  std::uint64_t orders_ = 0;
 
   // the frame that is on the wire
   unsigned busy_bits_ = 0, suspended_bits_ = 0;
