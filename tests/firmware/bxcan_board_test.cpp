@@ -203,6 +203,27 @@ TEST_F(BxcanBoard, AtTheLimitOfTheBusNothingIsLostAndBeyondItTheLeastUrgent) {
   EXPECT_LT(of_board(0x189).size(), told + 250);
 }
 
+TEST_F(BxcanBoard, OfOneIdentifierTheOlderFrameLeavesFirstWhateverMailboxItHas) {
+  board.run_for_ms(20);
+  std::size_t told = 0;
+  for (int time = 0; time < 20; ++time) {
+    for (int k = 0; k < 80; ++k) board.can.others.push_back({{0x100, false, false, 8, {}}, 0});  // 39 ms of the wire
+    for (const Sample& s : part_of_the_shift(5)) {
+      for (const hal::CanFrame& f : hal::frames_of(s)) board.can.deliver(f);
+      board.run_for_ms(5 + time % 3);
+    }
+    told += 5;
+    board.run_for_ms(60);
+    ASSERT_EQ(of_board(0x180).size(), told);
+    ASSERT_EQ(of_board(0x181).size(), told);
+  }
+  const auto states = of_board(0x180), electrical = of_board(0x181);
+  for (std::size_t k = 0; k < told; ++k) {
+    ASSERT_EQ(can::counter_of(states[k]), k % 15) << k;
+    ASSERT_EQ(can::counter_of(electrical[k]), k % 15) << k;
+  }
+}
+
 TEST_F(BxcanBoard, AFullFifoAndAFullRingAreCountedAndTheNextSampleIsTaken) {
   board.run_for_ms(20);
   board.receive_interrupt_held = true;
