@@ -8,8 +8,11 @@
 #include <optional>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "hal/accepted_frames.hpp"
 
 namespace bms {
+
+static_assert(can::Command::id == hal::command_frame_id, "a real bus would filter commands out");
 
 /// What commands set.
 struct Requested {

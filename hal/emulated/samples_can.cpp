@@ -1,12 +1,12 @@
 // Samples from CAN frames (hal/sample_frames.hpp): the measuring chain of a board that has none. Closing the channel ends them.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
+#include "hal/request_queue.hpp"
 #include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/samples.hpp"
 #include "hal/watchdog.hpp"
 
-#include <array>
 #include <utility>
 
 namespace bms::hal {
@@ -16,24 +16,11 @@ namespace {
 Sample building, complete;
 std::optional<StartingPoint> start;
 bool was_listening = false;
-std::array<CanFrame, 8> requests;
-std::size_t first_request = 0, request_count = 0;
-
-void keep(const CanFrame& frame) {
-  if (request_count == requests.size()) return;
-  requests[(first_request + request_count) % requests.size()] = frame;
-  ++request_count;
-}
+RequestQueue requests;
 
 }  // namespace
 
-bool next_request(CanFrame& frame) {
-  if (request_count == 0) return false;
-  frame = requests[first_request];
-  first_request = (first_request + 1) % requests.size();
-  --request_count;
-  return true;
-}
+bool next_request(CanFrame& frame) { return requests.next(frame); }
 
 const Sample* next_sample() {
   while (true) {
@@ -44,7 +31,7 @@ const Sample* next_sample() {
         complete = std::exchange(building, Sample{});  // a frame that gets lost later is a missing reading, not the old one again
         return &complete;
       }
-      if (!of_sample(frame)) keep(frame);
+      if (!of_sample(frame)) requests.keep(frame);
     }
     if (was_listening && !can_listening()) return nullptr;
     was_listening = can_listening();

@@ -7,6 +7,8 @@
 
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
+#include "hal/request_queue.hpp"
+#include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/samples.hpp"
 
@@ -18,15 +20,19 @@ constexpr std::uint64_t patience_us = 1'200'000;
 
 Sample building, complete;
 std::optional<StartingPoint> start;
+RequestQueue requests;
 std::uint64_t given_us = 0;
 
 }  // namespace
+
+bool next_request(CanFrame& frame) { return requests.next(frame); }
 
 const Sample* next_sample() {
   while (true) {
     CanFrame frame;
     while (can_receive(frame)) {
       if (is_start(frame)) start = start_of(frame);
+      if (!of_sample(frame)) requests.keep(frame);
       if (!completes(frame, building)) continue;
       complete = std::exchange(building, Sample{});  // a frame that gets lost later is a missing reading, not the old one again
       given_us = now_us();
