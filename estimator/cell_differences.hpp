@@ -2,7 +2,10 @@
 // makes it another is estimated, its soc and its resistance, by a filter of two states without dynamics. What a model gets wrong it gets
 // wrong of all cells alike and drops out of their difference, so a difference is known better than the mean.
 //
-//   v_k - mean v = OCV(soc_k) - OCV(soc) + r_k (R0 + R1) I        r_k: resistance of cell k over the mean cell's, less 1
+//   v_k - mean v = OCV(soc_k) - mean OCV(soc_j) + r_k (R0 + R1) I        r_k: resistance of cell k over the mean cell's, less 1
+//
+// With a knee of the curve among the cells the mean of their OCVs is not the OCV of their mean; by how much is taken from the sample
+// before. Differences add up to nothing: what they do add up to is taken off them.
 //
 // G. Plett, "Efficient battery pack state estimation using bar-delta filtering", EVS24, Stavanger 2009.
 //
@@ -39,6 +42,8 @@ class CellDifference {
     const Soc d = Soc(model::magnitude(moved) * Fraction(of_charge)), sigma = model::root<Soc>(covariance_.template variance<1>());
     covariance_.widen_last(Variance(Variance((sigma + sigma) * d) + Variance(d * d)));
   }
+  /// Of what all differences share, which is the mean's.
+  constexpr void centre(const Soc& shared) { soc_ = Soc(soc_ - shared); }
   /// off_v: this cell's voltage less the mean, less what the OCV curve says of the difference; slope: at this cell; drop_v: over R0 and
   /// R1; noise_v2: of off_v.
   constexpr void correct(const Voltage& off_v, const model::VoltagePerSoc<S>& slope, const Voltage& drop_v, const Variance& noise_v2) {
@@ -73,10 +78,11 @@ class CellDifferences {
   /// (its correlation time over the step).
   template <class Cell>
   constexpr void step(const Cell& cell, const Soc& soc, const Soc& sigma, const model::Current<S>& current_a, const Soc& moved, const model::Count<S>& shared_by, const Seen& seen) {
-    model::Current<S> sum_v(0);
+    model::Current<S> sum_v(0), sum_above_v(0), sum_soc(0);
     int count = 0;
     for (std::size_t k = 0; k < Cells; ++k) {
       if (seen.usable[k]) sum_v = model::Current<S>(sum_v + seen.voltage_v[k]), ++count;
+      difference_[k].centre(shared_);
       difference_[k].predict(moved);
     }
     if (count < 2) return;
@@ -89,19 +95,26 @@ class CellDifferences {
       std::uint8_t interval = interval_;
       const auto here = look_up(cell, Soc(soc + difference_[k].soc()), interval);
       const auto slope_here = ocv_slope<S>(here);
+      const Voltage above_v = here.ocv_v - at.ocv_v;
+      sum_above_v = model::Current<S>(sum_above_v + above_v);
       // of the model's error, a quarter is each cell's own, and stays with it: it lasts ten times as long; with a knee between cell and
       // mean, the mean's own error counts
       const Voltage knee_v = Voltage(model::VoltagePerSoc<S>(slope_here - slope) * sigma);
       const Variance own_v2 = Variance(Variance(here.error_v2 * model::Fraction<S>(10.0 / 16)) + knee_v * knee_v);
       const Variance noise_v2 = Variance(Variance(cell.noise.voltage_v2 + cell.noise.voltage_v2) + model::product<Variance>(own_v2, shared_by));
-      difference_[k].correct(Voltage((seen.voltage_v[k] - mean_v) - Voltage(here.ocv_v - at.ocv_v)), slope_here, drop_v, noise_v2);
+      difference_[k].correct(Voltage((seen.voltage_v[k] - mean_v) - Voltage(above_v - mean_above_v_)), slope_here, drop_v, noise_v2);
     }
+    for (const CellDifference<S>& d : difference_) sum_soc = model::Current<S>(sum_soc + d.soc());
+    mean_above_v_ = model::ratio<Voltage>(sum_above_v, model::Current<S>(count));
+    shared_ = Soc(sum_soc * model::Fraction<S>(1.0 / Cells));
   }
 
   constexpr const CellDifference<S>& operator[](std::size_t k) const { return difference_[k]; }
 
  private:
   std::array<CellDifference<S>, Cells> difference_;
+  Voltage mean_above_v_{};  ///< mean of the cells' OCVs less the OCV of their mean, in the sample before
+  Soc shared_{};
   std::uint8_t interval_ = 0;
 };
 

@@ -1,0 +1,86 @@
+// The cells of a pack: one full estimator follows their mean, and what makes each another is estimated beside it (cell_differences.hpp).
+//
+//   const Sample mean = mean_cell(sample, cell.plausible);     what the estimator of the mean cell is given: integers, the same everywhere
+//   cells.update(cell, sample, estimate);                      after its step
+//
+// A cell whose reading cannot be one does not count. Where no cell can be read, the pack's own voltage over their number stands in.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/cell_differences.hpp"
+#include "estimator/estimate.hpp"
+#include "estimator/pack_sample.hpp"
+
+namespace bms {
+
+constexpr bool readable(std::int32_t uv, const model::Plausible& plausible) { return uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv; }
+
+template <std::size_t Cells>
+constexpr Sample mean_cell(const PackSample<Cells>& pack, const model::Plausible& plausible) {
+  Sample mean{pack.time_us, pack.current_ua, no_reading, no_temperature};
+  std::int32_t sum_uv = 0, cells = 0, sum_cdegc = 0, sensors = 0;  // plausible is below 6 V: 16 of them are far from the end
+  for (const std::int32_t uv : pack.cell_uv) {
+    if (readable(uv, plausible)) sum_uv += uv, ++cells;
+  }
+  for (const std::int16_t cdegc : pack.temperature_cdegc) {
+    if (temperature_possible(cdegc)) sum_cdegc += cdegc, ++sensors;
+  }
+  if (cells > 0) mean.voltage_uv = sum_uv / cells;
+  else if constexpr (Cells == 1) mean.voltage_uv = pack.cell_uv[0];  // the estimator says what is wrong with it
+  else if (pack.pack_uv != no_reading) mean.voltage_uv = pack.pack_uv / static_cast<std::int32_t>(Cells);
+  if (sensors > 0) mean.temperature_cdegc = static_cast<std::int16_t>(sum_cdegc / sensors);
+  return mean;
+}
+
+/// A pack of one cell as it is measured without a monitor.
+constexpr PackSample<1> pack_of(const Sample& s) {
+  PackSample<1> pack;
+  pack.time_us = s.time_us;
+  pack.current_ua = s.current_ua;
+  pack.pack_uv = s.voltage_uv;
+  pack.cell_uv[0] = s.voltage_uv;
+  pack.temperature_cdegc[0] = s.temperature_cdegc;
+  return pack;
+}
+
+template <class S, std::size_t Cells>
+class PackCells {
+ public:
+  /// After the mean cell's step with the same sample.
+  template <class Cell>
+  constexpr void update(const Cell& cell, const PackSample<Cells>& pack, const Estimate<S>& mean) {
+    using namespace model;
+    if ((mean.flags & (not_started | time_not_later)) != 0) return;
+    const std::uint64_t step_us = pack.time_us - time_us_;
+    time_us_ = pack.time_us;
+    const Soc<S> moved = started_ ? Soc<S>(mean.soc - soc_) : Soc<S>(0);
+    soc_ = mean.soc;
+    if (!started_ || step_us == 0 || step_us > longest_step_us) {
+      started_ = true;
+      return;
+    }
+    typename CellDifferences<S, Cells>::Seen seen;
+    for (std::size_t k = 0; k < Cells; ++k) {
+      seen.usable[k] = readable(pack.cell_uv[k], cell.plausible);
+      if (seen.usable[k]) seen.voltage_v[k] = from_micro<Voltage<S>>(pack.cell_uv[k]);
+    }
+    constexpr std::uint32_t unmeasured = current_missing | current_implausible;
+    const Current<S> current_a = (mean.flags & unmeasured) == 0 ? from_micro<Current<S>>(pack.current_ua) : Current<S>(0);
+    const auto shared_by = ratio<Count<S>>(cell.noise.model_correlation_s, seconds<S>(static_cast<std::uint32_t>(step_us)));
+    differences_.step(cell, mean.soc, mean.soc_sigma, current_a, moved, shared_by > Count<S>(1) ? shared_by : Count<S>(1), seen);
+  }
+
+  constexpr const CellDifference<S>& operator[](std::size_t k) const { return differences_[k]; }
+
+ private:
+  static constexpr std::uint64_t longest_step_us = 4'000'000'000;
+
+  CellDifferences<S, Cells> differences_;
+  model::Soc<S> soc_{};
+  std::uint64_t time_us_ = 0;
+  bool started_ = false;
+};
+
+}  // namespace bms
