@@ -1,19 +1,45 @@
-// Samples over CAN, for boards whose measuring chain is not there: two frames a sample, the second completes it.
+// Samples over CAN, for boards whose measuring chain is not there: the last frame completes the sample.
 //
-//   0x310  i32 current_ua, i32 voltage_uv
-//   0x311  u48 time_us, i16 temperature_cdegc
-//   0x312  i32 soc_ppb, i32 soc_sigma_ppb       the starting point, before the first sample
+//   0x31E  u32 CRC-32, u16 frames, u16 counter       optional, first: over id and data of all that follow up to the time; how many they are
+//   0x310  i32 current_ua, i32 voltage_uv            of a pack: over all cells
+//   0x313  i32 link_uv, i32 0                        optional: on the load's side of the contactors
+//   0x314 to 0x31B  i32 uv, i32 uv                   of a pack: cells 1 and 2, 3 and 4, ...
+//   0x31C  4 x i16 temperature_cdegc                 of a pack
+//   0x311  u48 time_us, i16 temperature_cdegc        completes the sample; of a pack: no temperature
+//   0x312  i32 soc_ppb, i32 soc_sigma_ppb            the starting point, before the first sample
+//
+// A frame that gets lost is a missing reading; with a check before it, a sample of which a bit or a frame is wrong is none.
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 
+#include "estimator/pack_sample.hpp"
 #include "estimator/sample.hpp"
 #include "hal/bytes.hpp"
 #include "hal/can.hpp"
 
 namespace bms::hal {
 
-inline constexpr std::uint16_t reading_frame_id = 0x310, time_frame_id = 0x311, start_frame_id = 0x312;
+inline constexpr std::uint16_t reading_frame_id = 0x310, time_frame_id = 0x311, start_frame_id = 0x312, link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
+                               check_frame_id = 0x31E, last_sample_frame_id = 0x31F;
+
+/// Whether the frame is one of these.
+constexpr bool of_sample(const CanFrame& frame) { return frame.id >= reading_frame_id && frame.id <= last_sample_frame_id; }
+
+/// CRC-32 (IEEE 802.3) of what a check covers, continued: begins with ~0, ends inverted.
+constexpr std::uint32_t check_more(std::uint32_t crc, const CanFrame& frame) {
+  const auto take = [&](std::uint8_t byte) {
+    crc ^= byte;
+    for (int k = 0; k < 8; ++k) crc = crc >> 1 ^ ((crc & 1) != 0 ? 0xEDB8'8320U : 0U);
+  };
+  take(static_cast<std::uint8_t>(frame.id & 0xFF));
+  take(static_cast<std::uint8_t>(frame.id >> 8));
+  for (const std::uint8_t byte : frame.data) take(byte);
+  return crc;
+}
 
 constexpr std::array<CanFrame, 2> frames_of(const Sample& s) {
   std::array<CanFrame, 2> frames{{{reading_frame_id, 8, {}}, {time_frame_id, 8, {}}}};
@@ -24,6 +50,38 @@ constexpr std::array<CanFrame, 2> frames_of(const Sample& s) {
   return frames;
 }
 
+/// Frames of a pack's sample, cells in pairs, with a check before them.
+template <std::size_t Cells>
+inline constexpr std::size_t pack_frames = 5 + (Cells + 1) / 2;
+
+template <std::size_t Cells>
+constexpr std::array<CanFrame, pack_frames<Cells>> frames_of(const PackSample<Cells>& s, std::int32_t link_uv, std::uint16_t counter) {
+  static_assert(Cells <= 16);
+  std::array<CanFrame, pack_frames<Cells>> frames{};
+  std::size_t n = 1;
+  const auto pair = [&](std::uint16_t id, std::int32_t first, std::int32_t second) {
+    CanFrame& frame = frames[n++];
+    frame = {id, 8, {}};
+    put_bytes(frame.data, 0, first);
+    put_bytes(frame.data, 4, second);
+  };
+  pair(reading_frame_id, s.current_ua, s.pack_uv);
+  pair(link_frame_id, link_uv, 0);
+  for (std::size_t k = 0; k < Cells; k += 2) pair(static_cast<std::uint16_t>(first_cells_frame_id + k / 2), s.cell_uv[k], k + 1 < Cells ? s.cell_uv[k + 1] : no_reading);
+  frames[n] = {temperatures_frame_id, 8, {}};
+  for (std::size_t k = 0; k < most_temperatures; ++k) put_bytes(frames[n].data, 2 * k, s.temperature_cdegc[k]);
+  frames[++n] = {time_frame_id, 8, {}};
+  put_bytes(frames[n].data, 0, s.time_us, 6);
+  put_bytes(frames[n].data, 6, no_temperature);
+  std::uint32_t crc = ~0U;
+  for (std::size_t k = 1; k < frames.size(); ++k) crc = check_more(crc, frames[k]);
+  frames[0] = {check_frame_id, 8, {}};
+  put_bytes(frames[0].data, 0, ~crc);
+  put_bytes(frames[0].data, 4, static_cast<std::uint16_t>(frames.size() - 1));
+  put_bytes(frames[0].data, 6, counter);
+  return frames;
+}
+
 constexpr CanFrame frame_of(const StartingPoint& p) {
   CanFrame frame{start_frame_id, 8, {}};
   put_bytes(frame.data, 0, p.soc_ppb);
@@ -31,22 +89,64 @@ constexpr CanFrame frame_of(const StartingPoint& p) {
   return frame;
 }
 
-/// Takes in a frame; true when it completed `sample`, which begins as Sample{} each time. Frames of another length or number
-/// change nothing.
-constexpr bool completes(const CanFrame& frame, Sample& sample) {
-  if (frame.length != 8) return false;
-  if (frame.id == reading_frame_id) {
-    sample.current_ua = get_bytes<std::int32_t>(frame.data, 0);
-    sample.voltage_uv = get_bytes<std::int32_t>(frame.data, 4);
+/// Frames to samples.
+template <std::size_t Cells>
+class SampleFrames {
+ public:
+  /// True when `frame` completed a sample, which sample() then holds until the next frame. Frames of another length or number change nothing.
+  constexpr bool take(const CanFrame& frame) {
+    if (frame.length != 8 || !of_sample(frame) || frame.id == start_frame_id) return false;
+    if (done_) begin();
+    if (frame.id == check_frame_id) {
+      begin();
+      checked_ = true;
+      expected_crc_ = get_bytes<std::uint32_t>(frame.data, 0);
+      expected_frames_ = get_bytes<std::uint16_t>(frame.data, 4);
+      return false;
+    }
+    crc_ = check_more(crc_, frame);
+    ++frames_;
+    if (frame.id == reading_frame_id) {
+      building_.current_ua = get_bytes<std::int32_t>(frame.data, 0);
+      building_.pack_uv = get_bytes<std::int32_t>(frame.data, 4);
+      if constexpr (Cells == 1) building_.cell_uv[0] = building_.pack_uv;
+    } else if (frame.id == link_frame_id) {
+      link_uv_ = get_bytes<std::int32_t>(frame.data, 0);
+    } else if (frame.id >= first_cells_frame_id && frame.id < temperatures_frame_id) {
+      const std::size_t first = 2U * (frame.id - first_cells_frame_id);
+      if (first < Cells) building_.cell_uv[first] = get_bytes<std::int32_t>(frame.data, 0);
+      if (first + 1 < Cells) building_.cell_uv[first + 1] = get_bytes<std::int32_t>(frame.data, 4);
+    } else if (frame.id == temperatures_frame_id) {
+      for (std::size_t k = 0; k < most_temperatures; ++k) building_.temperature_cdegc[k] = get_bytes<std::int16_t>(frame.data, 2 * k);
+    }
+    if (frame.id != time_frame_id) return false;
+    building_.time_us = get_bytes<std::uint64_t>(frame.data, 0, 6);
+    if (const auto cdegc = get_bytes<std::int16_t>(frame.data, 6); cdegc != no_temperature) building_.temperature_cdegc[0] = cdegc;
+    done_ = true;
+    if (!checked_ || (~crc_ == expected_crc_ && frames_ == expected_frames_)) return true;
+    ++refused_;
+    return false;
   }
-  if (frame.id != time_frame_id) return false;
-  sample.time_us = get_bytes<std::uint64_t>(frame.data, 0, 6);
-  sample.temperature_cdegc = get_bytes<std::int16_t>(frame.data, 6);
-  return true;
-}
 
-/// Whether the frame is one of these.
-constexpr bool of_sample(const CanFrame& frame) { return frame.id >= reading_frame_id && frame.id <= start_frame_id; }
+  constexpr const PackSample<Cells>& sample() const { return building_; }
+  constexpr std::int32_t link_uv() const { return link_uv_; }  ///< no_reading: nobody says
+  constexpr std::uint32_t refused() const { return refused_; }  ///< samples that were not what was checked
+
+ private:
+  constexpr void begin() {
+    building_ = {};
+    link_uv_ = no_reading;
+    crc_ = ~0U;
+    frames_ = 0;
+    checked_ = done_ = false;
+  }
+
+  PackSample<Cells> building_{};
+  std::int32_t link_uv_ = no_reading;
+  std::uint32_t crc_ = ~0U, expected_crc_ = 0, refused_ = 0;
+  std::uint16_t frames_ = 0, expected_frames_ = 0;
+  bool checked_ = false, done_ = false;
+};
 
 constexpr bool is_start(const CanFrame& frame) { return frame.id == start_frame_id && frame.length == 8; }
 

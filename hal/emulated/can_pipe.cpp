@@ -1,0 +1,102 @@
+// The CAN bus of an emulated board in lock step with a program on the host: frames as records through two of the debugger's files, which
+// are named pipes. Command line "fw TO_BOARD FROM_BOARD".
+//
+//   record    u16 id, u8 length, u8 of_block, u8 data[8]        little-endian, 12 bytes
+//   block     records; of_block: how many of this block are left after this one, 255 at most
+//
+// The firmware sends until it asks for a frame and has none: then what it sent goes out as a block, and it waits for one of the other side.
+// An empty block is one record of length `nothing`. The end of the file closes the channel. So a run is the same every time, and as fast as both
+// sides compute.
+// Exit code 3: no such files.
+#include <array>
+#include <span>
+
+#include "hal/bytes.hpp"
+#include "hal/can.hpp"
+#include "hal/emulated/semihosting.hpp"
+#include "hal/power.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+constexpr std::size_t record_size = 12, most_records = 128;
+constexpr std::uint8_t nothing = 0xFF;
+constexpr int bad_pipe = 3;
+
+std::array<unsigned char, record_size * most_records> incoming, outgoing;
+std::size_t in_count = 0, in_next = 0, out_count = 0;
+int in = -1, out = -1;
+bool open = false;
+
+bool read_fully(std::span<unsigned char> into) {
+  for (std::size_t have = 0; have < into.size();) {
+    const std::size_t n = semihosting::read(in, into.subspan(have));
+    if (n == 0) return false;
+    have += n;
+  }
+  return true;
+}
+
+std::span<unsigned char> record(std::array<unsigned char, record_size * most_records>& of, std::size_t k) { return std::span(of).subspan(record_size * k, record_size); }
+
+void put(const CanFrame& frame, std::uint8_t length) {
+  const auto to = record(outgoing, out_count++);
+  put_bytes(to, 0, frame.id);
+  to[2] = length;
+  for (std::size_t k = 0; k < 8; ++k) to[4 + k] = frame.data[k];
+}
+
+void flush() {
+  if (out_count == 0) put({}, nothing);
+  for (std::size_t k = 0; k < out_count; ++k) record(outgoing, k)[3] = static_cast<unsigned char>(out_count - 1 - k);
+  if (!semihosting::write(out, std::span(outgoing).first(record_size * out_count))) open = false;
+  out_count = 0;
+}
+
+/// Waits for a block. False: there will be none.
+bool refill() {
+  in_next = in_count = 0;
+  do {
+    if (!read_fully(record(incoming, in_count))) return open = false;
+  } while (record(incoming, in_count++)[3] != 0 && in_count < most_records);
+  return true;
+}
+
+}  // namespace
+
+void can_start() {
+  static std::array<char, 512> text;
+  std::array<const char*, 3> words{};
+  if (semihosting::arguments(text, words) != words.size()) finish(bad_pipe);
+  in = semihosting::open(words[1], semihosting::Open::read);
+  out = semihosting::open(words[2], semihosting::Open::write);
+  if (in < 0 || out < 0) finish(bad_pipe);
+  open = true;
+}
+
+bool can_listening() { return open; }
+
+bool can_send(const CanFrame& frame) {
+  if (!open || out_count == most_records) return false;
+  put(frame, frame.length);
+  return true;
+}
+
+bool can_receive(CanFrame& frame) {
+  while (open) {
+    if (in_next == in_count) {
+      flush();
+      if (!refill()) return false;
+    }
+    const auto from = record(incoming, in_next++);
+    if (from[2] == nothing) continue;
+    frame.id = get_bytes<std::uint16_t>(from, 0);
+    frame.length = from[2] < 8 ? from[2] : std::uint8_t{8};
+    for (std::size_t k = 0; k < 8; ++k) frame.data[k] = from[4 + k];
+    return true;
+  }
+  return false;
+}
+
+}  // namespace bms::hal

@@ -1,0 +1,148 @@
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <stdexcept>
+
+#include "hal/bytes.hpp"
+#include "hil/board_link.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/emulator.hpp"
+#include "host_sim/text_file.hpp"
+
+namespace bms::hil {
+
+namespace {
+
+constexpr std::size_t record_size = 12, most_records = 128;
+constexpr unsigned char nothing = 0xFF;
+constexpr int silence_ms = 30'000;
+
+class File {
+ public:
+  explicit File(int fd) : fd_(fd) {
+    if (fd_ < 0) throw std::runtime_error("cannot open a pipe to the emulator");
+  }
+  ~File() { close(fd_); }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  int operator*() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+std::filesystem::path pipe_in(const std::filesystem::path& folder, const char* name) {
+  const auto path = folder / name;
+  if (mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error("no pipe in " + folder.string());
+  return path;
+}
+
+const EmulatedBoard& emulator_of(const std::string& board) {
+  for (const EmulatedBoard& b : emulated_boards()) {
+    if (b.name == board) return b;
+  }
+  return emulated_boards().front();  // of the same chip: the images of a board that no emulator knows
+}
+
+/// The formats of hal/emulated/can_pipe.cpp.
+class EmulatedLink : public BoardLink {
+ public:
+  EmulatedLink(const std::string& board, const std::filesystem::path& image)
+      : to_path_(pipe_in(folder_.path(), "to_board")),
+        from_path_(pipe_in(folder_.path(), "from_board")),
+        // opened for both ways: neither side waits for the other to come
+        to_(open(to_path_.c_str(), O_RDWR | O_CLOEXEC)),
+        from_(open(from_path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)),
+        emulator_(command(board, image), folder_.path() / "log") {}
+
+  std::vector<hal::CanFrame> exchange(std::span<const hal::CanFrame> frames) override {
+    auto answer = first_ ? read_block() : std::vector<hal::CanFrame>{};  // what it said before it was asked anything
+    first_ = false;
+    do {
+      const auto part = frames.first(std::min(frames.size(), most_records));
+      frames = frames.subspan(part.size());
+      write_block(part);
+      const auto said = read_block();
+      answer.insert(answer.end(), said.begin(), said.end());
+    } while (!frames.empty());
+    return answer;
+  }
+
+ private:
+  std::vector<std::string> command(const std::string& board, const std::filesystem::path& image) {
+    auto words = emulator_command(emulator_of(board), image, {to_path_.string(), from_path_.string()});
+    words.insert(words.end(), {"-serial", "none"});
+    return words;
+  }
+
+  void write_block(std::span<const hal::CanFrame> frames) {
+    std::vector<unsigned char> bytes(record_size * std::max<std::size_t>(frames.size(), 1));
+    if (frames.empty()) bytes[2] = nothing;
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      const std::span<unsigned char> to(bytes.data() + record_size * k, record_size);
+      hal::put_bytes(to, 0, frames[k].id);
+      to[2] = frames[k].length;
+      to[3] = static_cast<unsigned char>(frames.size() - 1 - k);
+      for (std::size_t byte = 0; byte < 8; ++byte) to[4 + byte] = frames[k].data[byte];
+    }
+    for (std::size_t done = 0; done < bytes.size();) {
+      const ssize_t n = ::write(*to_, bytes.data() + done, bytes.size() - done);
+      if (n <= 0) throw stopped();
+      done += static_cast<std::size_t>(n);
+    }
+  }
+
+  std::vector<hal::CanFrame> read_block() {
+    std::vector<hal::CanFrame> frames;
+    while (true) {
+      const auto record = read_record();
+      if (record[2] != nothing) {
+        hal::CanFrame frame{hal::get_bytes<std::uint16_t>(record, 0), record[2], {}};
+        for (std::size_t byte = 0; byte < 8; ++byte) frame.data[byte] = record[4 + byte];
+        frames.push_back(frame);
+      }
+      if (record[3] == 0) return frames;
+    }
+  }
+
+  std::span<const unsigned char> read_record() {
+    int silent_ms = 0;
+    while (end_ - begin_ < record_size) {
+      if (begin_ > 0) {
+        std::copy(bytes_.begin() + static_cast<std::ptrdiff_t>(begin_), bytes_.begin() + static_cast<std::ptrdiff_t>(end_), bytes_.begin());
+        end_ -= begin_;
+        begin_ = 0;
+      }
+      const ssize_t n = ::read(*from_, bytes_.data() + end_, bytes_.size() - end_);
+      if (n > 0) {
+        end_ += static_cast<std::size_t>(n);
+        continue;
+      }
+      pollfd p{*from_, POLLIN, 0};
+      if (poll(&p, 1, 100) > 0) continue;
+      silent_ms += 100;
+      if (!emulator_.running() || silent_ms > silence_ms) throw stopped();
+    }
+    begin_ += record_size;
+    return {bytes_.data() + begin_ - record_size, record_size};
+  }
+
+  std::runtime_error stopped() const { return std::runtime_error("the emulated board has stopped: " + read_file(folder_.path() / "log")); }
+
+  TemporaryFolder folder_;
+  std::filesystem::path to_path_, from_path_;
+  File to_, from_;
+  ChildProcess emulator_;
+  std::array<unsigned char, 65'536> bytes_{};
+  std::size_t begin_ = 0, end_ = 0;
+  bool first_ = true;
+};
+
+}  // namespace
+
+std::unique_ptr<BoardLink> emulated_link(const std::string& board, const std::filesystem::path& image) { return std::make_unique<EmulatedLink>(board, image); }
+
+}  // namespace bms::hil

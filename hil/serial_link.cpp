@@ -1,0 +1,94 @@
+#include <fcntl.h>
+#include <poll.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <stdexcept>
+#include <string_view>
+
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "hal/slcan/codec.hpp"
+#include "hil/board_link.hpp"
+#include "host_sim/bad_input.hpp"
+
+namespace bms::hil {
+
+namespace {
+
+class SerialLink : public BoardLink {
+ public:
+  explicit SerialLink(const std::string& port) : fd_(open(port.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC)) {
+    if (fd_ < 0) throw BadInput(port, 1, "cannot be opened, expected a serial port of a board or a pseudo-terminal");
+    termios line{};
+    if (tcgetattr(fd_, &line) == 0) {
+      cfmakeraw(&line);
+      cfsetspeed(&line, B921600);
+      tcsetattr(fd_, TCSANOW, &line);
+    }
+    send("\rC\rS6\rO\r");
+    listen(0, 200);
+  }
+  ~SerialLink() override {
+    try {
+      send("C\r");
+    } catch (const std::exception&) {  // it has gone already
+    }
+    close(fd_);
+  }
+
+  std::vector<hal::CanFrame> exchange(std::span<const hal::CanFrame> frames) override {
+    std::array<char, hal::slcan::longest_frame> text;
+    std::string lines;
+    bool asks = false;
+    for (const hal::CanFrame& f : frames) {
+      lines += hal::slcan::encode(f, text);
+      asks = asks || f.id == time_frame_id;
+    }
+    send(lines);
+    return listen(asks ? can::Status::id : 0, asks ? patience_ms : 20);
+  }
+
+ private:
+  static constexpr int patience_ms = 1'000;
+  static constexpr std::uint16_t time_frame_id = 0x311;
+
+  void send(std::string_view bytes) {
+    while (!bytes.empty()) {
+      const ssize_t n = ::write(fd_, bytes.data(), bytes.size());
+      if (n <= 0) throw std::runtime_error("the serial port is closed");
+      bytes.remove_prefix(static_cast<std::size_t>(n));
+    }
+  }
+
+  /// Until a frame of that id, or for so long.
+  std::vector<hal::CanFrame> listen(std::uint16_t last_id, int most_ms) {
+    std::vector<hal::CanFrame> frames;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(most_ms);
+    while (true) {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now()).count();
+      pollfd p{fd_, POLLIN, 0};
+      if (left <= 0 || poll(&p, 1, static_cast<int>(left)) <= 0) return frames;
+      std::array<char, 4096> bytes;
+      const ssize_t n = ::read(fd_, bytes.data(), bytes.size());
+      if (n <= 0) throw std::runtime_error("the board has closed its serial port");
+      bool ended = false;
+      for (const char byte : std::string_view(bytes.data(), static_cast<std::size_t>(n))) {
+        hal::CanFrame frame;
+        if (!reader_.take(byte) || !hal::slcan::decode(reader_.line(), frame)) continue;
+        frames.push_back(frame);
+        ended = ended || (last_id != 0 && frame.id == last_id);
+      }
+      if (ended) return frames;
+    }
+  }
+
+  int fd_;
+  hal::slcan::LineReader reader_;
+};
+
+}  // namespace
+
+std::unique_ptr<BoardLink> serial_link(const std::string& port) { return std::make_unique<SerialLink>(port); }
+
+}  // namespace bms::hil

@@ -1,0 +1,241 @@
+#include "hil/session.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "hal/sample_frames.hpp"
+
+namespace bms::hil {
+
+namespace {
+
+constexpr double precharge_gives_up_s = 60, trace_every_s = 10;
+
+/// Current, temperature and, replayed, voltage at a time of the drive.
+class Drive {
+ public:
+  explicit Drive(const Recording& r) : r_(r) {}
+
+  /// Times must ascend.
+  void go_to(double time_s) {
+    while (row_ + 1 < r_.rows() && r_.time_s[row_] - r_.time_s.front() < time_s) ++row_;
+  }
+  double current_a() const { return std::isfinite(r_.current_a[row_]) ? r_.current_a[row_] : 0; }  // mean over the interval that ends at the row
+  double temperature_c() const { return r_.temperature_c.empty() || !std::isfinite(r_.temperature_c[row_]) ? 25 : r_.temperature_c[row_]; }
+  double voltage_v(double time_s) const { return between(r_.voltage_v, time_s); }
+  double soc_ref(double time_s) const { return r_.soc_ref.empty() ? std::nan("") : between(r_.soc_ref, time_s); }
+
+ private:
+  double between(const std::vector<double>& column, double time_s) const {
+    if (row_ == 0) return column[0];
+    const double from_s = r_.time_s[row_ - 1] - r_.time_s.front(), to_s = r_.time_s[row_] - r_.time_s.front();
+    const double t = to_s > from_s ? std::clamp((time_s - from_s) / (to_s - from_s), 0.0, 1.0) : 1;
+    return column[row_ - 1] + t * (column[row_] - column[row_ - 1]);
+  }
+
+  const Recording& r_;
+  std::size_t row_ = 0;
+};
+
+/// What the board has said last.
+class Heard {
+ public:
+  can::PackState pack;
+  can::ContactorState contactors;
+  can::CurrentLimits limits;
+  bool said_pack = false, said_status = false;
+  std::uint64_t lost = 0, crc_errors = 0;
+  std::map<std::string, double> raised;  ///< by name, since when
+  std::vector<FaultSeen> faults;
+
+  void take(double time_s, const hal::CanFrame& frame) {
+    std::apply([&]<class... M>(const M&...) { (take_as<M>(time_s, frame) || ...); }, can::Messages{});
+  }
+
+ private:
+  template <class M>
+  bool take_as(double time_s, const hal::CanFrame& frame) {
+    if (frame.id != M::id) return false;
+    if (!can::intact(frame, M::data_id)) {
+      ++crc_errors;
+      return true;
+    }
+    const std::uint8_t counter = can::counter_of(frame);
+    if (const auto last = counters_.find(M::id); last != counters_.end()) lost += (counter + can::counters - can::next(last->second)) % can::counters;
+    counters_[M::id] = counter;
+    const M message = M::of(frame);
+    if constexpr (std::same_as<M, can::PackState>) pack = message, said_pack = true;
+    if constexpr (std::same_as<M, can::ContactorState>) contactors = message;
+    if constexpr (std::same_as<M, can::CurrentLimits>) limits = message;
+    if constexpr (std::same_as<M, can::Status>) said_status = true;
+    if constexpr (std::same_as<M, can::Faults>) see_faults(time_s, message);
+    return true;
+  }
+
+  void see_faults(double time_s, can::Faults message) {
+    message.each([&](const char* name, const char*, auto& value, const can::SignalLayout& s) {
+      if (s.bits != 1) return;
+      const auto since = raised.find(name);
+      if (value != 0 && since == raised.end()) {
+        raised[name] = time_s;
+        faults.push_back({name, time_s, {}});
+      } else if (value == 0 && since != raised.end()) {
+        raised.erase(since);
+        for (auto f = faults.rbegin(); f != faults.rend(); ++f) {
+          if (f->name != name) continue;
+          f->cleared_at_s = time_s;
+          break;
+        }
+      }
+    });
+  }
+
+  std::map<unsigned, std::uint8_t> counters_;
+};
+
+hal::CanFrame request(std::uint32_t what, std::uint8_t counter) {
+  can::Command command;
+  command.code = can::Command::code_request;
+  command.argument = what;
+  return command.frame(counter);
+}
+
+template <std::size_t Cells>
+std::vector<hal::CanFrame> frames_for(const PackSample<most_cells>& all, double link_v, std::uint16_t counter) {
+  PackSample<Cells> s;
+  s.time_us = all.time_us;
+  s.current_ua = all.current_ua;
+  s.pack_uv = Cells == 1 ? all.cell_uv[0] : all.pack_uv;
+  std::copy_n(all.cell_uv.begin(), Cells, s.cell_uv.begin());
+  s.temperature_cdegc = all.temperature_cdegc;
+  const auto frames = hal::frames_of(s, static_cast<std::int32_t>(std::lround(1e6 * link_v)), counter);
+  return {frames.begin(), frames.end()};
+}
+
+/// What the load or the charger takes.
+double demanded(const Heard& heard, double wanted_a, bool obeys) {
+  const bool ready = heard.contactors.state == can::ContactorState::state_drive || heard.contactors.state == can::ContactorState::state_charge;
+  if (!ready) return 0;
+  if (!obeys) return wanted_a;
+  const auto at_most = [](float limit_a) { return std::isfinite(limit_a) ? static_cast<double>(limit_a) : 0; };
+  return std::clamp(wanted_a, -at_most(heard.limits.discharge_now), at_most(heard.limits.charge_now));
+}
+
+}  // namespace
+
+SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::function<void(double, const hal::CanFrame&)>& frame, const std::function<void(double)>& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  SessionResult result;
+  Heard heard;
+  Drive drive(plan.drive);
+  SimulatedPack pack(plan.cell, plan.cells, plan.initial_soc, plan.spread);
+  Injector injector(plan.injections, plan.spread.seed + 1);
+  const double end_s = plan.drive.time_s.back() - plan.drive.time_s.front();
+  double drive_s = 0, squares = 0;
+  std::uint64_t judged = 0, inside = 0;
+  std::vector<float> sigmas;
+  std::uint8_t asked = 0;
+  double link_v = 0;
+
+  const auto say = [&](double time_s, const std::vector<hal::CanFrame>& frames) {
+    heard.said_status = heard.said_pack = false;
+    for (const hal::CanFrame& f : link.exchange(frames)) {
+      ++result.frames;
+      heard.take(time_s, f);
+      if (frame) frame(time_s, f);
+    }
+  };
+  if (plan.told_soc) {
+    say(0, {hal::frame_of(StartingPoint{static_cast<std::int32_t>(std::lround(1e9 * *plan.told_soc)), 20'000'000})});
+  }
+
+  for (std::uint64_t k = 0; drive_s <= end_s; ++k) {
+    const double time_s = static_cast<double>(k) * plan.sample_period_s;
+    const Closed closed{heard.contactors.main_plus != 0, heard.contactors.main_minus != 0, heard.contactors.precharge != 0};
+    const bool driving = closed.main_plus && closed.main_minus;
+    if (driving && !result.driving_after_s) result.driving_after_s = time_s;
+    // a drive begins when the contactors are closed; what is replayed does not wait, and nothing waits for ever
+    const bool moves = plan.replayed || result.driving_after_s || time_s > precharge_gives_up_s;
+    if (moves && k > 0) drive_s += plan.sample_period_s;
+    drive.go_to(drive_s);
+
+    Closed real = closed;
+    if (injector.active("precharge_open", time_s)) real.precharge = false;
+    const bool obeys = !injector.active("overcurrent", time_s);
+    const double most_a = plan.cell.parameters.limits.discharge_current_max_a;
+    pack.run(obeys ? demanded(heard, drive.current_a(), true) : demanded(heard, -1.6 * most_a, false), real, injector.active("welded", time_s), drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
+    auto sample = pack.read(static_cast<std::uint64_t>(std::llround(1e6 * time_s)), drive.temperature_c());
+    double truth = pack.soc();
+    link_v = pack.link_v();
+    if (plan.replayed) {
+      const auto volts = static_cast<std::int32_t>(std::lround(1e6 * drive.voltage_v(drive_s)));
+      sample.current_ua = static_cast<std::int32_t>(std::lround(1e6 * drive.current_a()));
+      for (std::size_t c = 0; c < plan.cells; ++c) sample.cell_uv[c] = volts;
+      sample.pack_uv = static_cast<std::int32_t>(plan.cells) * volts;
+      truth = drive.soc_ref(drive_s);
+      const double v = 1e-6 * sample.pack_uv;
+      link_v = driving ? v : closed.precharge ? v - (v - link_v) * std::exp(-plan.sample_period_s / SimulatedPack::precharge_time_constant_s) : link_v * std::exp(-plan.sample_period_s / SimulatedPack::link_falls_in_s);
+    }
+    injector.apply(time_s, sample);
+
+    std::vector<hal::CanFrame> frames;
+    if (k % 10 == 0) frames.push_back(request(can::Command::argument_request_drive, asked = can::next(asked)));
+    const auto measured = plan.cells == 1 ? frames_for<1>(sample, link_v, static_cast<std::uint16_t>(k)) : frames_for<most_cells>(sample, link_v, static_cast<std::uint16_t>(k));
+    for (const hal::CanFrame& f : injector.apply(time_s, measured)) frames.push_back(f);
+    say(time_s, frames);
+
+    ++result.samples;
+    if (!heard.said_status) ++result.unanswered;
+    if (heard.said_pack && std::isfinite(heard.pack.soc) && std::isfinite(truth)) {
+      const double error = 0.01 * static_cast<double>(heard.pack.soc) - truth, sigma = 0.01 * static_cast<double>(heard.pack.soc_sigma);
+      ++result.soc_told;
+      squares += error * error;
+      ++judged;
+      if (std::abs(error) <= 2 * sigma) ++inside;
+      if (std::abs(error) > std::max(3 * sigma, 0.02)) ++result.soc_wrong;
+      result.soc_max_error = std::max(result.soc_max_error, std::abs(error));
+      sigmas.push_back(static_cast<float>(sigma));
+    }
+    if (result.trace.empty() || time_s - result.trace.back().time_s >= trace_every_s) {
+      double lowest = std::numeric_limits<double>::infinity(), highest = 0;
+      for (std::size_t c = 0; c < plan.cells; ++c) {
+        lowest = std::min(lowest, 1e-6 * sample.cell_uv[c]);
+        highest = std::max(highest, 1e-6 * sample.cell_uv[c]);
+      }
+      result.trace.push_back({time_s, 0.01 * static_cast<double>(heard.pack.soc), 0.01 * static_cast<double>(heard.pack.soc_sigma), truth, 1e-6 * sample.current_ua, lowest, highest, link_v, {}});
+      if (progress) progress(end_s > 0 ? drive_s / end_s : 1);
+    }
+    result.duration_s = time_s;
+  }
+
+  if (judged > 0) {
+    result.soc_rmse = std::sqrt(squares / static_cast<double>(judged));
+    result.within_2_sigma = static_cast<double>(inside) / static_cast<double>(judged);
+    const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+    std::nth_element(sigmas.begin(), middle, sigmas.end());
+    result.median_sigma = static_cast<double>(*middle);
+  }
+  result.lost = heard.lost;
+  result.crc_errors = heard.crc_errors;
+  result.faults = heard.faults;
+  for (const Injection& i : injector.all()) {
+    Reaction r{i, {}, true};
+    if (!i.expected.empty() && i.from_s <= result.duration_s) {
+      for (const FaultSeen& f : result.faults) {
+        if (f.name == i.expected && f.raised_at_s >= i.from_s && !r.after_s) r.after_s = f.raised_at_s - i.from_s;
+      }
+      r.in_time = r.after_s && *r.after_s <= i.within_s;
+    }
+    result.reactions.push_back(r);
+  }
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.speedup = wall_s > 0 ? result.duration_s / wall_s : 0;
+  return result;
+}
+
+}  // namespace bms::hil
