@@ -2,13 +2,14 @@
 #
 #   bms_<board>.elf          the application; telemetry and samples as SLCAN text on the UART
 #   bms_<board>_replay.elf   the same application; samples and estimates stream through the emulator's files
+#   bms_<board>_hil.elf      the application in lock step with a program on the host: its bus is a pair of the emulator's files
 #   bms_<board>_bench.elf    as the first, for the chip itself: its clock tree, reset instead of the emulator's exit
 #   bms_<board>_fault.elf    tests/firmware/fault_image.cpp; only when asked for
 #   bms_<board>_pack.elf     tests/firmware/pack_image.cpp; only when asked for
 #   bms_<board>_protection.elf  tests/firmware/protection_image.cpp; only when asked for
 #
-# The first two run in QEMU only (hal/README.md). A board that QEMU does not have (BMS_EMULATED OFF) has one image, bms_<board>.elf, for
-# the chip. board.cmake says which CAN back end it has: BMS_CAN slcan or bxcan, for the latter with a bit rate. What does not depend on the cell is compiled once for all.
+# The first three run in QEMU only (hal/README.md). A board that QEMU does not have (BMS_EMULATED OFF) has bms_<board>.elf for the
+# chip, and bms_<board>_hil.elf for an emulated board with the same one (BMS_LOOP_BOARD). board.cmake says which CAN back end it has: BMS_CAN slcan or bxcan, for the latter with a bit rate. What does not depend on the cell is compiled once for all.
 include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
@@ -48,7 +49,7 @@ add_custom_command(OUTPUT ${cell_header}
 add_compile_options(${BMS_CPU_FLAGS} -g -ffunction-sections -fdata-sections -fno-common -fstack-usage
   $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions> $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> $<$<COMPILE_LANGUAGE:CXX>:-fno-threadsafe-statics> $<$<COMPILE_LANGUAGE:CXX>:-fno-use-cxa-atexit>
   -Wsign-conversion -Wdouble-promotion -Wfloat-conversion)
-add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs -T${BMS_LINKER_SCRIPT}
+add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs
   -Wl,--gc-sections,--no-warn-rwx-segments,--fatal-warnings)
 
 include(${CMAKE_SOURCE_DIR}/cmake/can_messages.cmake)
@@ -57,7 +58,7 @@ include(${CMAKE_SOURCE_DIR}/cmake/can_messages.cmake)
 function(bms_objects name optimisation)
   add_library(${name} OBJECT ${ARGN})
   target_link_libraries(${name} PUBLIC bms_estimator)
-  target_compile_definitions(${name} PUBLIC ${BMS_SCALAR_DEFINITION})
+  target_compile_definitions(${name} PUBLIC ${BMS_SCALAR_DEFINITION} BMS_CELLS=${BMS_CELLS} BMS_SAMPLE_PERIOD_S=${BMS_SAMPLE_PERIOD_S})
   target_compile_options(${name} PRIVATE ${optimisation})
 endfunction()
 
@@ -73,31 +74,37 @@ set(samples_slcan ${hal}/emulated/samples_can.cpp)
 set(samples_bxcan ${hal}/remote/samples.cpp)
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${samples_${BMS_CAN}} ${hal}/absent/record.cpp)
 target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
-bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp)
+bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp)
 
-bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/condition_step.cpp ${cell_header} ${can_messages})  # the cell says which model
+bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${hal}/emulated/samples_can.cpp ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp)
+
+bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/board_cell.cpp ${cell_header} ${can_messages})  # the cell says which model
 target_include_directories(application PRIVATE ${CMAKE_BINARY_DIR}/generated)
 bms_objects(estimator_step -O2 ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header} ${can_messages})
 target_include_directories(estimator_step PRIVATE ${CMAKE_BINARY_DIR}/generated)
 math(EXPR version "${PROJECT_VERSION_MAJOR} * 65536 + ${PROJECT_VERSION_MINOR} * 256 + ${PROJECT_VERSION_PATCH}" OUTPUT_FORMAT HEXADECIMAL)
 target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
 
+set(linker_script ${BMS_LINKER_SCRIPT})
 # bms_image(NAME OBJECTS...)
 function(bms_image name)
   list(TRANSFORM ARGN PREPEND "$<TARGET_OBJECTS:" OUTPUT_VARIABLE objects)
   list(TRANSFORM objects APPEND ">")
   add_executable(${name} ${objects})
-  target_link_options(${name} PRIVATE -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
-  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${BMS_LINKER_SCRIPT} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
+  target_link_options(${name} PRIVATE -T${linker_script} -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
+  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${linker_script} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
 endfunction()
 
 if(NOT BMS_EMULATED)
   bms_image(bms_${BMS_BOARD} hal_core hal_chip hal_board application estimator_step)
   target_link_options(bms_${BMS_BOARD} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)  # for a debugger, and tests/firmware
+  set(linker_script ${CMAKE_SOURCE_DIR}/boards/${BMS_LOOP_BOARD}/memory.ld)  # the memory of an emulated board with the same chip
+  bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil application estimator_step)
   return()
 endif()
 bms_image(bms_${BMS_BOARD} hal_core hal_emulated hal_board application estimator_step)
 bms_image(bms_${BMS_BOARD}_replay hal_core hal_emulated hal_stream application estimator_step)
+bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil application estimator_step)
 bms_image(bms_${BMS_BOARD}_bench hal_core hal_chip hal_board application estimator_step)
 
 bms_objects(fault_image -Os ${CMAKE_SOURCE_DIR}/tests/firmware/fault_image.cpp)

@@ -56,6 +56,7 @@ class Condition {
 
   constexpr const typename SocQuality<S>::Now& quality() const { return now_; }
   constexpr const model::Soc<S>& display_soc() const { return shown_; }
+  constexpr bool limits_known() const { return limited_; }  ///< whether they have been reckoned
   constexpr const CurrentLimits<S>& limits_now() const { return limits_now_; }     ///< for a second
   constexpr const CurrentLimits<S>& limits_10s() const { return limits_10s_; }
   constexpr Health<S> capacity() const { return capacity_.health(); }

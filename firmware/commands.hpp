@@ -9,6 +9,8 @@
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "hal/accepted_frames.hpp"
+#include "protection/contactors.hpp"
+#include "protection/fault_monitor.hpp"
 
 namespace bms {
 
@@ -16,10 +18,17 @@ static_assert(can::Command::id == hal::command_frame_id, "a real bus would filte
 
 /// What commands set.
 struct Requested {
+  static constexpr std::uint64_t request_lasts_us = 5'000'000;
+
   bool log_samples = true;
   std::uint32_t unix_time_s = 0;     ///< as last set; 0: never
   std::uint64_t time_set_at_us = 0;  ///< by the samples' clock
-  std::uint32_t faults_cleared = 0;  ///< how often
+  protection::Clear clear = protection::Clear::none;  ///< until it has been used
+  protection::Request power = protection::Request::none;
+  std::uint64_t power_at_us = 0;
+
+  /// What is still asked for: who does not repeat it has gone.
+  constexpr protection::Request power_now(std::uint64_t now_us) const { return now_us - power_at_us < request_lasts_us ? power : protection::Request::none; }
 };
 
 class Commands {
@@ -43,8 +52,8 @@ class Commands {
     using A = can::CommandAnswer;
     switch (command.code) {
       case can::Command::code_clear_faults:
-        if (command.argument != 0) return A::result_refused;
-        ++requested.faults_cleared;
+        if (command.argument > 1) return A::result_refused;
+        requested.clear = command.argument == 1 ? protection::Clear::service : protection::Clear::user;
         return A::result_done;
       case can::Command::code_log_of_samples:
         if (command.argument > 1) return A::result_refused;
@@ -54,6 +63,11 @@ class Commands {
         if (command.argument == 0) return A::result_refused;
         requested.unix_time_s = command.argument;
         requested.time_set_at_us = now_us;
+        return A::result_done;
+      case can::Command::code_request:
+        if (command.argument > static_cast<std::uint32_t>(protection::Request::charge)) return A::result_refused;
+        requested.power = static_cast<protection::Request>(command.argument);
+        requested.power_at_us = now_us;
         return A::result_done;
       default: return A::result_no_such_command;
     }

@@ -1,4 +1,4 @@
-#include "firmware/estimator_step.hpp"
+#include "firmware/board_cell.hpp"
 
 namespace bms {
 

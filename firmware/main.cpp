@@ -1,6 +1,6 @@
 // The firmware: start what the board has, then sample after sample.
 #include "firmware/application.hpp"
-#include "firmware/estimator_step.hpp"
+#include "firmware/board_cell.hpp"
 #include "hal/clock.hpp"
 #include "hal/samples.hpp"
 
@@ -15,9 +15,9 @@ int main() {
   hal::clock_start();
   hal::can_start();
   hal::watchdog_start(watchdog_ms);
-  const Sample* sample = hal::next_sample();
+  const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
-  Application<BoardEstimator, estimator_step, condition_step> application(hal::starting_point(), identity(), capacity_ah());
+  static Application<BoardCell> application(hal::starting_point(), identity(), capacity_ah());
   for (; sample != nullptr; sample = hal::next_sample()) application.take(*sample);
   return 0;
 }

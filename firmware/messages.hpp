@@ -6,6 +6,8 @@
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "estimator/condition.hpp"
+#include "estimator/pack_estimator.hpp"
+#include "protection/protection.hpp"
 
 namespace bms::messages {
 
@@ -18,6 +20,20 @@ constexpr float number(const T& value) {
 template <class T>
 constexpr float percent(const T& fraction) {
   return 100.0F * number(fraction);
+}
+
+/// In units of 1e-9, within +-2.
+template <class T>
+constexpr std::int32_t ppb(const T& value) {
+  if constexpr (model::is_q<T>) {
+    static_assert(T::fraction_bits <= 31);
+    constexpr std::int64_t most = std::int64_t{2} << T::fraction_bits;
+    const std::int64_t raw = value.raw(), held = raw > most ? most : raw < -most ? -most : raw;
+    return static_cast<std::int32_t>(held * 1'000'000'000 >> T::fraction_bits);
+  } else {
+    const float held = value > 2 ? 2.0F : value < -2 ? -2.0F : static_cast<float>(value);
+    return static_cast<std::int32_t>(held * 1e9F);
+  }
 }
 
 struct Identity {
@@ -54,11 +70,92 @@ constexpr can::PackState pack_state(const Estimate<S>& e, const Condition& condi
   return m;
 }
 
-constexpr can::PackElectrical pack_electrical(const Sample& sample) {
+/// Volts of a reading; what is none, or below 0, is not known.
+constexpr float volts(std::int32_t uv) { return uv >= 0 ? static_cast<float>(uv) * 1e-6F : can::unknown; }
+constexpr float degrees(std::int16_t cdegc) { return temperature_possible(cdegc) ? static_cast<float>(cdegc) * 0.01F : can::unknown; }
+constexpr float amperes(std::int32_t ua) { return ua != no_reading ? static_cast<float>(ua) * 1e-6F : can::unknown; }
+
+template <std::size_t Cells>
+constexpr can::PackElectrical pack_electrical(const PackSample<Cells>& pack) {
   can::PackElectrical m;
-  if (sample.voltage_uv != no_reading && sample.voltage_uv >= 0) m.voltage = static_cast<float>(sample.voltage_uv) * 1e-6F;
-  if (sample.current_ua != no_reading) m.current = static_cast<float>(sample.current_ua) * 1e-6F;
-  if (temperature_possible(sample.temperature_cdegc)) m.temperature = static_cast<float>(sample.temperature_cdegc) * 0.01F;
+  m.voltage = volts(pack.pack_uv);
+  m.current = amperes(pack.current_ua);
+  m.temperature = degrees(pack.temperature_cdegc[0]);
+  return m;
+}
+
+/// Cells From + 1 to From + 4.
+template <class Message, std::size_t From, std::size_t Cells>
+constexpr Message cell_voltages(const PackSample<Cells>& pack) {
+  Message m;
+  std::size_t k = From;
+  m.each([&](const char*, const char*, float& value, const can::SignalLayout&) {
+    value = k < Cells ? volts(pack.cell_uv[k]) : can::unknown;
+    ++k;
+  });
+  return m;
+}
+
+template <std::size_t Cells, class S>
+constexpr can::CellExtremes cell_extremes(const PackSample<Cells>& pack, const PackCells<S, Cells>& cells) {
+  can::CellExtremes m;
+  m.highest_cell = m.lowest_cell = 31;
+  std::int32_t highest_uv = -1, lowest_uv = 2'147'483'647;
+  float fullest = -1e9F, emptiest = 1e9F;
+  for (std::size_t k = 0; k < Cells; ++k) {
+    const float soc = number(cells[k].soc());
+    if (soc > fullest) fullest = soc;
+    if (soc < emptiest) emptiest = soc;
+    if (pack.cell_uv[k] < 0) continue;
+    if (pack.cell_uv[k] > highest_uv) highest_uv = pack.cell_uv[k], m.highest_cell = static_cast<std::uint32_t>(k + 1);
+    if (pack.cell_uv[k] < lowest_uv) lowest_uv = pack.cell_uv[k], m.lowest_cell = static_cast<std::uint32_t>(k + 1);
+  }
+  m.highest_voltage = volts(highest_uv);
+  m.lowest_voltage = m.lowest_cell == 31 ? can::unknown : volts(lowest_uv);
+  m.soc_spread = 100.0F * (fullest - emptiest);
+  return m;
+}
+
+template <std::size_t Cells>
+constexpr can::Temperatures temperatures(const PackSample<Cells>& pack) {
+  can::Temperatures m;
+  std::size_t k = 0;
+  m.each([&](const char*, const char*, float& value, const can::SignalLayout&) { value = degrees(pack.temperature_cdegc[k++]); });
+  return m;
+}
+
+constexpr can::Faults faults(const protection::Decision& d) {
+  can::Faults m;
+  std::size_t k = 0;
+  m.each([&](const char*, const char*, std::uint32_t& value, const can::SignalLayout& s) {
+    if (s.bits == 1) value = d.faults >> k++ & 1;
+  });
+  m.first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
+  return m;
+}
+
+constexpr can::ContactorState contactor_state(const protection::Decision& d) {
+  can::ContactorState m;
+  m.state = static_cast<std::uint32_t>(d.state);
+  m.main_plus = d.outputs.main_plus ? 1 : 0;
+  m.main_minus = d.outputs.main_minus ? 1 : 0;
+  m.precharge = d.outputs.precharge ? 1 : 0;
+  m.charge_enable = d.outputs.charge_enable ? 1 : 0;
+  if (d.first.fault != protection::no_fault) m.first_cause_time = static_cast<float>(static_cast<std::uint32_t>(d.first.time_us / 100'000)) * 0.1F;
+  return m;
+}
+
+constexpr can::AllowedCurrent allowed_current(const protection::Decision& d) {
+  can::AllowedCurrent m;
+  m.discharge = amperes(d.allowed.discharge_ua);
+  m.charge = amperes(d.allowed.charge_ua);
+  return m;
+}
+
+constexpr can::Balancing balancing(const protection::Decision& d) {
+  can::Balancing m;
+  m.cells = d.bleed;
+  m.time_left = static_cast<float>(d.bleed_left_s);
   return m;
 }
 

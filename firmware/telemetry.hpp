@@ -8,14 +8,16 @@
 #include <optional>
 #include <tuple>
 
+#include "estimator/pack_estimator.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/messages.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
+#include "protection/protection.hpp"
 
 namespace bms {
 
-template <class Estimator>
+template <class Estimator, std::size_t Cells>
 class Telemetry {
  public:
   using Result = typename Estimator::Result;
@@ -23,20 +25,24 @@ class Telemetry {
   /// capacity_ah: of the cell file; start: where the estimator began, if somebody said.
   constexpr Telemetry(const messages::Identity& identity, float capacity_ah, const std::optional<StartingPoint>& start) : identity_(identity), capacity_ah_(capacity_ah), start_(start) {}
 
-  void tell(const Sample& sample, const Result& estimate, const Condition<Estimator>& condition, bool log_samples) {
+  /// mean: what the estimator was given of the pack.
+  void tell(const PackSample<Cells>& pack, const Sample& mean, const Result& estimate, const Condition<Estimator>& condition, const PackCells<typename Estimator::Scalar, Cells>& cells,
+            const protection::Decision& decision, bool log_samples) {
     ++samples_;
     hash_.take(words(estimate));
     if (!hal::can_listening()) return;
     tell_fault();
-    now_us_ = static_cast<std::uint32_t>(sample.time_us);
+    now_us_ = static_cast<std::uint32_t>(pack.time_us);
+    tell_protection(decision);
+    if constexpr (Cells > 1) tell_cells(pack, cells, decision);
     by_time<can::Identity>([&] { return messages::identity(identity_); });
     by_time<can::CurrentLimits>([&] { return messages::current_limits(condition); });
     by_time<can::Health>([&] { return messages::health(condition); });
     by_time<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
     if constexpr (Estimator::Model::errors_are_states) by_time<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
-    if (log_samples) log(sample);
+    if (log_samples) log(mean);
     send(messages::pack_state(estimate, condition));
-    send(messages::pack_electrical(sample));
+    send(messages::pack_electrical(pack));
     send(messages::model_detail(estimate));
     can::Status status;
     status.flags = estimate.flags;
@@ -79,6 +85,32 @@ class Telemetry {
     send(message());
   }
 
+  /// When the message is due, or at once when what it says has changed.
+  template <class Message, class Make>
+  void by_time_or(bool changed, Make&& message) {
+    if (changed) std::get<Sent<Message>>(sent_).once = false;
+    by_time<Message>(message);
+  }
+
+  void tell_protection(const protection::Decision& d) {
+    by_time_or<can::Faults>(d.faults != faults_told_, [&] { return messages::faults(d); });
+    by_time_or<can::ContactorState>(d.state != state_told_ || d.outputs != outputs_told_, [&] { return messages::contactor_state(d); });
+    by_time<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
+    faults_told_ = d.faults;
+    state_told_ = d.state;
+    outputs_told_ = d.outputs;
+  }
+
+  void tell_cells(const PackSample<Cells>& pack, const PackCells<typename Estimator::Scalar, Cells>& cells, const protection::Decision& d) {
+    by_time<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(pack); });
+    if constexpr (Cells > 4) by_time<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(pack); });
+    if constexpr (Cells > 8) by_time<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(pack); });
+    if constexpr (Cells > 12) by_time<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(pack); });
+    by_time<can::CellExtremes>([&] { return messages::cell_extremes(pack, cells); });
+    by_time<can::Temperatures>([&] { return messages::temperatures(pack); });
+    by_time<can::Balancing>([&] { return messages::balancing(d); });
+  }
+
   void tell_fault() {
     if (fault_told_) return;
     fault_told_ = true;
@@ -111,7 +143,9 @@ class Telemetry {
   std::optional<StartingPoint> start_;
   typename OfAll<can::Messages>::type sent_{};
   EstimateHash hash_;
-  std::uint32_t now_us_ = 0;
+  std::uint32_t now_us_ = 0, faults_told_ = 0;
+  protection::ContactorState state_told_ = protection::ContactorState::off;
+  protection::Outputs outputs_told_;
   std::uint16_t samples_ = 0;
   bool fault_told_ = false;
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "hal/sample_frames.hpp"
@@ -10,6 +11,12 @@ namespace bms::hal {
 
 inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.hpp holds it to be the DBC file's
 
-inline constexpr std::array<std::uint16_t, 4> accepted_ids{reading_frame_id, time_frame_id, start_frame_id, command_frame_id};
+/// All of hal/sample_frames.hpp, and commands.
+inline constexpr auto accepted_ids = [] {
+  std::array<std::uint16_t, last_sample_frame_id - reading_frame_id + 2> ids{};
+  for (std::size_t k = 0; k + 1 < ids.size(); ++k) ids[k] = static_cast<std::uint16_t>(reading_frame_id + k);
+  ids.back() = command_frame_id;
+  return ids;
+}();
 
 }  // namespace bms::hal

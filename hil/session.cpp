@@ -9,6 +9,7 @@
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "hal/sample_frames.hpp"
+#include "protection/contactors.hpp"
 
 namespace bms::hil {
 
@@ -47,7 +48,7 @@ class Heard {
  public:
   can::PackState pack;
   can::ContactorState contactors;
-  can::CurrentLimits limits;
+  can::AllowedCurrent allowed;
   bool said_pack = false, said_status = false;
   std::uint64_t lost = 0, crc_errors = 0;
   std::map<std::string, double> raised;  ///< by name, since when
@@ -71,7 +72,7 @@ class Heard {
     const M message = M::of(frame);
     if constexpr (std::same_as<M, can::PackState>) pack = message, said_pack = true;
     if constexpr (std::same_as<M, can::ContactorState>) contactors = message;
-    if constexpr (std::same_as<M, can::CurrentLimits>) limits = message;
+    if constexpr (std::same_as<M, can::AllowedCurrent>) allowed = message;
     if constexpr (std::same_as<M, can::Status>) said_status = true;
     if constexpr (std::same_as<M, can::Faults>) see_faults(time_s, message);
     return true;
@@ -123,7 +124,7 @@ double demanded(const Heard& heard, double wanted_a, bool obeys) {
   if (!ready) return 0;
   if (!obeys) return wanted_a;
   const auto at_most = [](float limit_a) { return std::isfinite(limit_a) ? static_cast<double>(limit_a) : 0; };
-  return std::clamp(wanted_a, -at_most(heard.limits.discharge_now), at_most(heard.limits.charge_now));
+  return std::clamp(wanted_a, -at_most(heard.allowed.discharge), at_most(heard.allowed.charge));
 }
 
 }  // namespace
@@ -184,7 +185,7 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     injector.apply(time_s, sample);
 
     std::vector<hal::CanFrame> frames;
-    if (k % 10 == 0) frames.push_back(request(can::Command::argument_request_drive, asked = can::next(asked)));
+    if (k % 10 == 0) frames.push_back(request(static_cast<std::uint32_t>(protection::Request::drive), asked = can::next(asked)));
     const auto measured = plan.cells == 1 ? frames_for<1>(sample, link_v, static_cast<std::uint16_t>(k)) : frames_for<most_cells>(sample, link_v, static_cast<std::uint16_t>(k));
     for (const hal::CanFrame& f : injector.apply(time_s, measured)) frames.push_back(f);
     say(time_s, frames);

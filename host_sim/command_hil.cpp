@@ -25,7 +25,7 @@ std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, con
     reactions.push_back({{"fault", x.injection.text}, {"expected", x.injection.expected.empty() ? Json() : Json(x.injection.expected)}, {"within_s", x.injection.expected.empty() ? Json() : Json(x.injection.within_s)},
                          {"after_s", x.after_s ? Json(*x.after_s) : Json()}, {"in_time", x.in_time}});
   }
-  for (const Warning& w : plan.drive.warnings) warnings.push_back({{"code", w.code}, {"text", w.text}});
+  for (const Warning& w : plan.drive.warnings) warnings.push_back(w.id + ": " + w.text);
   return Json{{"command", "hil"}, {"board", options.board}, {"cell", plan.cell.name}, {"cells", plan.cells}, {"duration_s", r.duration_s}, {"speedup", r.speedup}, {"samples", r.samples}, {"frames", r.frames},
               {"lost", r.lost}, {"crc_errors", r.crc_errors}, {"unanswered", r.unanswered}, {"driving_after_s", r.driving_after_s ? Json(*r.driving_after_s) : Json()},
               {"soc", {{"rmse", r.soc_rmse}, {"max_error", r.soc_max_error}, {"within_2_sigma", r.within_2_sigma}, {"median_sigma", r.median_sigma}, {"told", r.soc_told}, {"wrong_told_as_valid", r.soc_wrong}}},
@@ -97,7 +97,7 @@ int run(const HilOptions& options) {
     dump += '\n';
   };
   const auto show = progress_on_terminal(1, [](double done, double left_s, const std::string&) { return fmt::format("in the loop: {:.0f} %, {:.0f} s left", 100 * done, std::isfinite(left_s) ? left_s : 0); });
-  const auto result = hil::run_session(*link, plan, keep, [&](double done) { show(done, ""); });
+  const auto result = hil::run_session(*link, plan, keep, [&](double done) { if (show) show(done, ""); });
 
   if (!options.candump.empty()) put(options.candump, dump);
   const std::string statement = statement_of(result);

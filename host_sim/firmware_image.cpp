@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <regex>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -21,6 +22,12 @@ namespace {
 std::filesystem::path source_tree() {
   const char* root = std::getenv("BMS_ROOT");
   return root != nullptr ? root : BMS_SOURCE_DIR;
+}
+
+std::filesystem::path board_file(const std::string& board) {
+  const auto file = source_tree() / "boards" / board / "board.cmake";
+  if (!std::filesystem::exists(file)) throw BadInput(board, 1, "no such board in " + (source_tree() / "boards").string() + ", expected the folder name of a board");
+  return file;
 }
 
 /// Held while a folder is built in: two runs at once would build over each other.
@@ -45,6 +52,7 @@ void run_step(const std::vector<std::string>& argv, const std::filesystem::path&
 const char* ending(Image image) {
   switch (image) {
     case Image::replay: return "_replay";
+    case Image::hil: return "_hil";
     case Image::fault: return "_fault";
     case Image::pack: return "_pack";
     case Image::protection: return "_protection";
@@ -54,11 +62,17 @@ const char* ending(Image image) {
 
 }  // namespace
 
+std::size_t board_cells(const std::string& board) {
+  static const std::regex cells("set\\(BMS_CELLS ([0-9]+)\\)");
+  const std::string text = read_file(board_file(board));
+  std::smatch found;
+  if (!std::regex_search(text, found, cells)) throw std::runtime_error("no BMS_CELLS in " + board_file(board).string());
+  return std::stoul(found[1]);
+}
+
 std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image) {
   const auto root = source_tree();
-  if (!std::filesystem::exists(root / "boards" / board / "board.cmake")) {
-    throw BadInput(board, 1, "no such board in " + (root / "boards").string() + ", expected the folder name of a board");
-  }
+  board_file(board);
   const auto folder = root / "build" / "firmware" / fmt::format("{}-{}-{:08x}", board, cell.name, cell.hash);
   for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
     if (!in_path(tool)) throw BadInput(tool, 1, "not installed, expected the tools that ./bms installs");

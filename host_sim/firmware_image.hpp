@@ -9,10 +9,13 @@
 namespace bms {
 
 /// What an image is for: its end after "bms_<board>" (cmake/firmware.cmake).
-enum class Image { application, replay, fault, pack, protection };
+enum class Image { application, replay, hil, fault, pack, protection };
 
 /// `image` of `board` with the tables of `cell`, built if it is not there yet. Needs the source tree, CMake and the board's cross
 /// compiler; throws BadInput when they are missing and std::runtime_error when the build fails.
 std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image);
+
+/// Cells in series that a board measures, as its board.cmake says. Throws BadInput when there is no such board.
+std::size_t board_cells(const std::string& board);
 
 }  // namespace bms

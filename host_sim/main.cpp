@@ -11,6 +11,7 @@
 #include "host_sim/cell_file.hpp"
 #include "host_sim/command_diagnose.hpp"
 #include "host_sim/command_experiment.hpp"
+#include "host_sim/command_hil.hpp"
 #include "host_sim/command_identify.hpp"
 #include "host_sim/command_proof.hpp"
 #include "host_sim/command_replay.hpp"
@@ -131,6 +132,26 @@ void add_diagnose(CLI::App& app, bms::DiagnoseOptions& o) {
   add_output(c, o.output);
 }
 
+void add_hil(CLI::App& app, bms::HilOptions& o) {
+  CLI::App& c = *app.add_subcommand("hil", "Run the firmware in the loop with a simulated pack or a recording, and set what it says on CAN beside the truth");
+  c.footer("Example: bms hil --board netduinoplus2 --cell table9 --profile shift.csv --fault cell_open=3@600-660 --report loop.html\n"
+           "Faults: drop=P corrupt=P delay=P (part of the frames to the board), cell_stuck=K cell_open=K sense_wire=K cell_high=K cell_low=K (cell K), current_stuck current_open temperature_open\n"
+           "temperature_stuck overcurrent welded precharge_open silence; each @START or @START-END in seconds");
+  c.add_option("--board", o.board, "folder in boards/; it is emulated unless --port names a real one")->capture_default_str();
+  c.add_option("--port", o.port, "serial port of a board that speaks SLCAN")->type_name("DEVICE");
+  c.add_option("--cell", o.cell, "the pack's cells: cell file, or the name of a built-in cell: " + bms::cell_names())->capture_default_str();
+  c.add_option("--board-cell", o.board_cell, "the firmware's cell file, when it believes in another")->type_name("CELL");
+  c.add_option("--profile", o.profile, "what the load takes: time_s, current_a, maybe temperature_c")->type_name("FILE");
+  c.add_option("--recording", o.recording, "a recording whose current and voltage the board is told, whatever it says")->type_name("FILE");
+  c.add_option("--initial-soc", o.initial_soc, "state of charge of the pack")->check(Within(0.0, 1.0))->capture_default_str();
+  c.add_option("--told-soc", o.told_soc, "what the board is told of it; nothing, if not given")->check(Within(0.0, 1.0));
+  c.add_option("--sample-s", o.sample_period_s, "between samples")->check(Within(0.01, 10.0))->capture_default_str();
+  c.add_option("--seed", o.seed, "of the cells' spread and the sensors' noise")->capture_default_str();
+  c.add_option("--fault", o.faults, "what to break")->type_name("NAME[=VALUE]@START[-END]");
+  c.add_option("--candump", o.candump, "keep the board's frames as candump writes them")->type_name("FILE");
+  add_output(c, o.output);
+}
+
 void add_proof(CLI::App& app, bms::ProofOptions& o) {
   CLI::App& c = *app.add_subcommand("proof", "Set what the diagnosis says of real recordings beside measurements that it did not see; takes minutes");
   c.footer("Experiments: " + bms::proof_list_text() + "\nExample: bms proof --data recordings_of_a123 --report proof.html");
@@ -178,6 +199,8 @@ int main(int argc, char** argv) {
   add_diagnose(app, diagnose);
   bms::ProofOptions proof;
   add_proof(app, proof);
+  bms::HilOptions hil;
+  add_hil(app, hil);
   try {
     app.parse(argc, argv);
     if (app.got_subcommand("replay")) return run(replay, replay.trace);
@@ -185,6 +208,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("identify")) return run(identify, identify.out);
     if (app.got_subcommand("diagnose")) return run(diagnose, diagnose.out);
     if (app.got_subcommand("proof")) return run(proof, "");
+    if (app.got_subcommand("hil")) return run(hil, hil.candump);
     if (app.got_subcommand("study")) return run(study, "");
     return run(experiment, experiment.out);
   } catch (const CLI::ParseError& error) {

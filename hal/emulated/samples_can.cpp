@@ -1,19 +1,19 @@
 // Samples from CAN frames (hal/sample_frames.hpp): the measuring chain of a board that has none. Closing the channel ends them.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
+#include "hal/power_path.hpp"
 #include "hal/request_queue.hpp"
 #include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/samples.hpp"
 #include "hal/watchdog.hpp"
 
-#include <utility>
 
 namespace bms::hal {
 
 namespace {
 
-Sample building, complete;
+SampleFrames<pack_cells> frames;
 std::optional<StartingPoint> start;
 bool was_listening = false;
 RequestQueue requests;
@@ -22,15 +22,12 @@ RequestQueue requests;
 
 bool next_request(CanFrame& frame) { return requests.next(frame); }
 
-const Sample* next_sample() {
+const PackSample<pack_cells>* next_sample() {
   while (true) {
     CanFrame frame;
     while (can_receive(frame)) {
       if (is_start(frame)) start = start_of(frame);
-      if (completes(frame, building)) {
-        complete = std::exchange(building, Sample{});  // a frame that gets lost later is a missing reading, not the old one again
-        return &complete;
-      }
+      if (frames.take(frame)) return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
       if (!of_sample(frame)) requests.keep(frame);
     }
     if (was_listening && !can_listening()) return nullptr;
@@ -41,5 +38,8 @@ const Sample* next_sample() {
 }
 
 std::optional<StartingPoint> starting_point() { return start; }
+
+void power_path_set(const PowerPath&) {}  // who simulates the load hears it on the bus
+std::int32_t link_uv() { return frames.link_uv(); }
 
 }  // namespace bms::hal

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "estimator/pack_estimator.hpp"
 #include "hal/emulated/semihosting.hpp"
 #include "hal/power.hpp"
 #include "hal/record.hpp"
@@ -59,7 +60,7 @@ void write_estimates() {
 
 }  // namespace
 
-const Sample* next_sample() {
+const PackSample<pack_cells>* next_sample() {
   if (next == sample_count) {
     if (in < 0) open_streams();
     if (estimate_size > 0) write_estimates();
@@ -67,7 +68,13 @@ const Sample* next_sample() {
     next = 0;
     if (sample_count == 0) return nullptr;
   }
-  return reinterpret_cast<const Sample*>(&samples[sizeof(Sample) * next++]);  // read() has put one there
+  const Sample& sample = *reinterpret_cast<const Sample*>(&samples[sizeof(Sample) * next++]);  // read() has put one there
+  static PackSample<pack_cells> pack;
+  pack.time_us = sample.time_us;
+  pack.current_ua = sample.current_ua;
+  pack.cell_uv.fill(sample.voltage_uv);  // a recording knows one cell
+  pack.temperature_cdegc[0] = sample.temperature_cdegc;
+  return &pack;
 }
 
 std::optional<StartingPoint> starting_point() {

@@ -1,12 +1,12 @@
-// Samples that another node on the bus measures and sends (hal/sample_frames.hpp): for a board whose own measuring chain is not there yet.
+// Samples that another node on the bus measures and sends (hal/sample_frames.hpp), for a board whose own measuring chain is not there yet. The
+// load and its contactors are on the bus, too.
 //
-// When none has come for 1.2 s, a sample without readings is given: the estimator is told that nothing is measured, goes on and loses
-// certainty as it should, and the watchdog (2 s, at least 1.36 s by its oscillator) is fed by work, not by waiting. Its time goes on
-// from the sender's last one.
-#include <utility>
-
+// When none has come for five sample periods, one without readings is given: estimator and protection are told that nothing is measured,
+// go on and lose certainty as they should, and the watchdog (2 s, at least 1.36 s by its oscillator) is fed by work, not by waiting. Its time
+// goes on from the sender's last one.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
+#include "hal/power_path.hpp"
 #include "hal/request_queue.hpp"
 #include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
@@ -16,40 +16,43 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::uint64_t patience_us = 1'200'000;
+constexpr auto patience_us = static_cast<std::uint64_t>(5 * 1e6 * sample_period_s);
+static_assert(patience_us < 1'300'000, "the watchdog would bite");
 
-Sample building, complete;
+SampleFrames<pack_cells> frames;
+PackSample<pack_cells> nothing;
 std::optional<StartingPoint> start;
 RequestQueue requests;
-std::uint64_t given_us = 0;
+std::uint64_t given_us = 0, last_us = 0;
 
 }  // namespace
 
 bool next_request(CanFrame& frame) { return requests.next(frame); }
 
-const Sample* next_sample() {
+const PackSample<pack_cells>* next_sample() {
   while (true) {
     CanFrame frame;
     while (can_receive(frame)) {
       if (is_start(frame)) start = start_of(frame);
       if (!of_sample(frame)) requests.keep(frame);
-      if (!completes(frame, building)) continue;
-      complete = std::exchange(building, Sample{});  // a frame that gets lost later is a missing reading, not the old one again
+      if (!frames.take(frame)) continue;  // a frame that gets lost later is a missing reading, not the old one again
       given_us = now_us();
-      return &complete;
+      last_us = frames.sample().time_us;
+      return &frames.sample();
     }
     const std::uint64_t now = now_us(), waited = now - given_us;
     if (waited >= patience_us) {
-      const std::uint64_t time_us = complete.time_us + waited;
-      complete = Sample{};
-      complete.time_us = time_us;
+      nothing.time_us = last_us += waited;
       given_us = now;
-      return &complete;
+      return &nothing;
     }
     wait_for_interrupt();
   }
 }
 
 std::optional<StartingPoint> starting_point() { return start; }
+
+void power_path_set(const PowerPath&) {}
+std::int32_t link_uv() { return frames.link_uv(); }
 
 }  // namespace bms::hal

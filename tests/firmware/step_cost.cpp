@@ -59,7 +59,7 @@ Footprint footprint(const std::filesystem::path& application_image) {
   const auto symbols = symbols_of(application_image);
   const ImageSize size = size_of(application_image);
   Footprint f;
-  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|condition_step\\(|Condition<|current_limits<|soc_from<|SocBank<|StartMisfit<|model::|UdCovariance<|InputCheck).*");
+  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|BoardCell::look\\(|Condition<|current_limits<|soc_from<|SocBank<|StartMisfit<|model::|UdCovariance<|InputCheck).*");
   for (const Symbol& s : symbols) {
     if (s.name.starts_with("bms::generated::cell<")) f.cell_tables += s.size;
     else if (std::regex_match(s.name, of_estimator)) f.estimator_text += s.size;
@@ -75,7 +75,7 @@ Footprint footprint(const std::filesystem::path& application_image) {
 
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
   const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell));
-  const StepCost besides = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell), "bms::condition_step(");
+  const StepCost besides = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell), "bms::BoardCell::look(");
   const StepCost pack = count_instructions(board, firmware_image(board.name, cell, Image::pack), "bms::pack_step(");
   const Footprint f = footprint(firmware_image(board.name, cell, Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };

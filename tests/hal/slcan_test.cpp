@@ -75,19 +75,78 @@ TEST(SampleFrames, CarryASampleAndAStart) {
   sent.current_ua = -123'456'789;
   sent.voltage_uv = no_reading;
   sent.temperature_cdegc = -4'000;
-  Sample received;
+  SampleFrames<1> received;
   const auto frames = frames_of(sent);
-  EXPECT_FALSE(completes(frames[0], received));
-  EXPECT_TRUE(completes(frames[1], received));
-  EXPECT_EQ(received.time_us, sent.time_us);
-  EXPECT_EQ(received.current_ua, sent.current_ua);
-  EXPECT_EQ(received.voltage_uv, no_reading);
-  EXPECT_EQ(received.temperature_cdegc, -4'000);
+  EXPECT_FALSE(received.take(frames[0]));
+  EXPECT_TRUE(received.take(frames[1]));
+  EXPECT_EQ(received.sample().time_us, sent.time_us);
+  EXPECT_EQ(received.sample().current_ua, sent.current_ua);
+  EXPECT_EQ(received.sample().cell_uv[0], no_reading);
+  EXPECT_EQ(received.sample().temperature_cdegc[0], -4'000);
   const CanFrame start = frame_of(StartingPoint{800'000'000, 20'000'000});
   EXPECT_TRUE(is_start(start));
   EXPECT_EQ(start_of(start).soc_ppb, 800'000'000);
   EXPECT_EQ(start_of(start).soc_sigma_ppb, 20'000'000);
   EXPECT_FALSE(is_start({start.id, 7, start.data}));
+}
+
+PackSample<16> some_pack() {
+  PackSample<16> p;
+  p.time_us = 123'456'789;
+  p.current_ua = -98'765'432;
+  p.pack_uv = 52'345'678;
+  for (std::size_t k = 0; k < 16; ++k) p.cell_uv[k] = 3'200'000 + static_cast<std::int32_t>(k);
+  p.cell_uv[5] = no_reading;
+  p.temperature_cdegc = {2'500, -1'000, no_temperature, 4'000};
+  return p;
+}
+
+TEST(SampleFrames, CarryAPack) {
+  const auto sent = some_pack();
+  SampleFrames<16> received;
+  const auto frames = frames_of(sent, 51'000'000, 7);
+  for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(received.take(frames[k]), k + 1 == frames.size()) << k;
+  EXPECT_EQ(received.sample().time_us, sent.time_us);
+  EXPECT_EQ(received.sample().current_ua, sent.current_ua);
+  EXPECT_EQ(received.sample().pack_uv, sent.pack_uv);
+  EXPECT_EQ(received.sample().cell_uv, sent.cell_uv);
+  EXPECT_EQ(received.sample().temperature_cdegc, sent.temperature_cdegc);
+  EXPECT_EQ(received.link_uv(), 51'000'000);
+  EXPECT_EQ(received.refused(), 0U);
+}
+
+TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
+  const auto frames = frames_of(some_pack(), 51'000'000, 7);
+  for (std::size_t broken = 0; broken < frames.size(); ++broken) {
+    for (unsigned bit = 0; bit < 64; ++bit) {
+      if (broken == 0 && bit >= 48) continue;  // its own counter
+      SampleFrames<16> received;
+      bool complete = false;
+      for (std::size_t k = 0; k < frames.size(); ++k) {
+        CanFrame frame = frames[k];
+        if (k == broken) frame.data[bit / 8] = static_cast<std::uint8_t>(frame.data[bit / 8] ^ (1U << bit % 8));
+        complete = received.take(frame) || complete;
+      }
+      EXPECT_FALSE(complete) << broken << " " << bit;
+    }
+    if (broken == 0) continue;  // without a check everything is taken
+    SampleFrames<16> received;
+    bool complete = false;
+    for (std::size_t k = 0; k < frames.size(); ++k) complete = (k != broken && received.take(frames[k])) || complete;
+    EXPECT_FALSE(complete) << broken;
+    // the next whole one is taken again
+    for (const CanFrame& frame : frames) complete = received.take(frame);
+    EXPECT_TRUE(complete) << broken;
+  }
+}
+
+TEST(SampleFrames, WhatGetsLostIsMissingAndNotTheLastReadingAgain) {
+  Sample s{1, -5, 3'300'000, 2'500};
+  SampleFrames<1> received;
+  for (const CanFrame& frame : frames_of(s)) received.take(frame);
+  EXPECT_TRUE(received.take(frames_of(s)[1]));
+  EXPECT_EQ(received.sample().current_ua, no_reading);
+  EXPECT_EQ(received.sample().cell_uv[0], no_reading);
 }
 
 }  // namespace

@@ -1,0 +1,41 @@
+// The application's parts with this board's cell: the one place where what is generated comes in, the model's type here, its tables in the
+// .cpp files.
+#pragma once
+
+#include <cstdint>
+
+#include "cell_constants.hpp"  // generated from the cell file
+#include "estimator/pack_estimator.hpp"
+#include "estimator/soc_estimator.hpp"
+#include "firmware/messages.hpp"
+#include "hal/samples.hpp"
+#include "protection/protection.hpp"
+
+namespace bms {
+
+#if defined(BMS_FIXED_POINT)
+using BoardScalar = model::FixedPoint;  // a core without an FPU
+#else
+using BoardScalar = float;
+#endif
+
+using BoardEstimator = SocEstimator<BoardScalar, generated::Model>;
+
+/// One step. A function of its own so that its cost can be counted.
+BoardEstimator::Result estimator_step(BoardEstimator& estimator, const Sample& sample);
+
+messages::Identity identity();
+float capacity_ah();
+
+struct BoardCell {
+  using Estimator = BoardEstimator;
+  static constexpr std::size_t cells = hal::pack_cells;
+
+  static Estimator::Result step(Estimator& estimator, const Sample& sample) { return estimator_step(estimator, sample); }
+  static void look(Condition<Estimator>& condition, const Estimator& estimator, const Sample& sample, const Estimator::Result& estimate, bool limits_wanted);
+  static void tell_apart(PackCells<BoardScalar, cells>& of, const PackSample<cells>& pack, const Estimator::Result& estimate);
+  static const model::Plausible& plausible();
+  static const protection::ProtectionPlan& plan();
+};
+
+}  // namespace bms

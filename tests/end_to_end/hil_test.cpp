@@ -1,0 +1,102 @@
+// bms hil from the outside: the real firmware in the emulator, in the loop with a simulated pack.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <fmt/format.h>
+
+#include "host_sim/text_file.hpp"
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+
+const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
+
+/// Five minutes of a load that comes and goes.
+std::string short_drive(const std::filesystem::path& folder) {
+  std::string csv = "time_s,current_a\n";
+  for (int k = 0; k <= 300; ++k) csv += fmt::format("{},{}\n", k, k % 60 < 30 ? -5.0 : k % 60 < 40 ? 1.5 : -0.5);
+  const auto path = folder / "drive.csv";
+  write_file(path, csv);
+  return path.string();
+}
+
+Json of(const ToolRun& r) { return Json::parse(r.out); }
+
+class Hil : public ::testing::TestWithParam<const char*> {
+ protected:
+  /// The forklift board in the loop with that; its result as JSON on standard output.
+  ToolRun loop(const std::string& arguments) const { return run_tool("hil --board stm32f405_forklift --json - --profile " + short_drive(folder_.path()) + " " + arguments); }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Hil, ADriveWithoutFaultsRaisesNoneAndTellsTheTruth) {
+  const auto r = loop("--initial-soc 0.6 --told-soc 0.6");
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const Json j = of(r);
+  EXPECT_EQ(j["cells"], 16);
+  EXPECT_TRUE(j["faults"].empty()) << j["faults"].dump();
+  EXPECT_LT(j["soc"]["rmse"], 0.01);
+  EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
+  EXPECT_EQ(j["unanswered"], 0);
+  EXPECT_EQ(j["lost"], 0);
+  EXPECT_EQ(j["crc_errors"], 0);
+  EXPECT_LT(j["driving_after_s"], 10);
+  EXPECT_GT(j["frames"], 30'000);
+}
+
+TEST_F(Hil, TheSameRunIsTheSameAgain) {
+  const auto run = [&] {
+    Json j = of(loop("--fault drop=0.01@0 --seed 5 --candump " + (folder_.path() / "dump").string()));
+    j.erase("speedup");
+    return j.dump() + read_file(folder_.path() / "dump");
+  };
+  EXPECT_EQ(run(), run());
+}
+
+class HilFault : public Hil {};
+TEST_P(HilFault, AFaultThatIsPutInIsToldInItsTime) {
+  const auto r = loop(std::string("--initial-soc 0.6 --told-soc 0.6 --fault ") + GetParam());
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const Json j = of(r);
+  ASSERT_EQ(j["reactions"].size(), 1U);
+  EXPECT_TRUE(j["reactions"][0]["in_time"]) << j["reactions"].dump() << j["faults"].dump();
+  EXPECT_TRUE(j["reactions"][0]["after_s"].is_number()) << j["faults"].dump();
+  EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
+}
+INSTANTIATE_TEST_SUITE_P(Faults, HilFault, ::testing::Values("cell_stuck=3@60", "cell_open=7@60", "sense_wire=5@60", "cell_high=1@60", "cell_low=16@60", "current_open@60", "temperature_open@60", "overcurrent@60", "welded@60", "precharge_open@0", "silence@60-65"),
+                         [](const auto& i) { return std::string(i.param).substr(0, std::string(i.param).find_first_of("=@")); });
+
+TEST_F(Hil, ABadWireMakesNoWrongStateOfChargeValid) {
+  for (const char* fault : {"drop=0.02@30", "corrupt=0.02@30", "delay=0.02@30"}) {
+    const auto r = loop(std::string("--initial-soc 0.6 --told-soc 0.6 --fault ") + fault);
+    EXPECT_EQ(r.exit_code, 0) << fault << r.err;
+    EXPECT_EQ(of(r)["soc"]["wrong_told_as_valid"], 0) << fault;
+    EXPECT_GT(of(r)["unanswered"], 100) << fault << ": samples that were not whole are none";
+  }
+}
+
+TEST_F(Hil, AFaultThatIsNotToldEndsWith1) {
+  const auto r = loop("--fault welded@60 --fault cell_open=2@299.9-299.95");
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_THAT(r.err, HasSubstr("cell_open=2@299.9-299.95: expected VoltageMissing"));
+}
+
+TEST_F(Hil, WhatItCannotRunItSaysInALine) {
+  EXPECT_EQ(run_tool("hil").exit_code, 2);
+  EXPECT_EQ(run_tool("hil --profile " + shift + " --recording " + shift).exit_code, 2);
+  const auto board = run_tool("hil --board nowhere --profile " + shift);
+  EXPECT_EQ(board.exit_code, 2);
+  EXPECT_THAT(board.err, HasSubstr("no such board"));
+  const auto fault = run_tool("hil --fault gremlins@3 --profile " + shift);
+  EXPECT_EQ(fault.exit_code, 2);
+  EXPECT_THAT(fault.err, HasSubstr("expected one of: drop, corrupt"));
+  EXPECT_EQ(run_tool("hil --port /dev/none --profile " + shift).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace bms
