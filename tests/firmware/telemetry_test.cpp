@@ -28,7 +28,12 @@ bool can_send(const CanFrame& frame) {
   sent.push_back(frame);
   return true;
 }
-ResetCause reset_cause() { return ResetCause::watchdog; }
+PowerPath switched;
+std::int32_t link = no_reading;
+void power_path_set(const PowerPath& wanted) { switched = wanted; }
+std::int32_t link_uv() { return link; }
+ResetCause cause = ResetCause::watchdog;
+ResetCause reset_cause() { return cause; }
 std::optional<FaultRecord> last_fault() { return fault; }
 void record(std::span<const std::uint32_t> words) { recorded.emplace_back(words.begin(), words.end()); }
 void watchdog_feed() { ++fed; }
@@ -56,7 +61,22 @@ Estimate<float> fixed_answer(SocEstimator<float>&, const Sample&) {
 
 const auto table9 = model::prepare<float, model::max_intervals>(read_cell("table9").parameters);
 
-void looked(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const Estimate<float>& e, bool limits_wanted) { condition.update(table9, sample, e, estimator.state(), limits_wanted); }
+/// A board whose estimator always says the same.
+template <std::size_t Cells>
+struct Board {
+  using Estimator = Plain;
+  static constexpr std::size_t cells = Cells;
+  static bms::Estimate<float> step(Plain& estimator, const Sample& sample) { return fixed_answer(estimator, sample); }
+  static void look(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const bms::Estimate<float>& e, bool limits_wanted) {
+    condition.update(table9, sample, e, estimator.state(), limits_wanted);
+  }
+  static void tell_apart(PackCells<float, Cells>& of, const PackSample<Cells>& pack, const bms::Estimate<float>& e) { of.update(table9, pack, e); }
+  static const model::Plausible& plausible() { return table9.plausible; }
+  static const protection::ProtectionPlan& plan() {
+    static const auto plan = protection::protection_plan({.limits = read_cell("table9").parameters.limits, .capacity_ah = 6, .cells = Cells, .temperatures = Cells > 1 ? 4 : 1, .sample_period_s = 1});
+    return plan;
+  }
+};
 
 class TelemetryTest : public ::testing::Test {
  protected:
@@ -67,6 +87,7 @@ class TelemetryTest : public ::testing::Test {
     fed = 0;
     fault.reset();
     requests.clear();
+    hal::cause = hal::ResetCause::watchdog;
   }
   /// The last frame of a message that was sent.
   template <class Message>
@@ -87,7 +108,7 @@ class TelemetryTest : public ::testing::Test {
     for (const hal::CanFrame& f : sent) all.push_back(f.id);
     return all;
   }
-  Application<Plain, fixed_answer, looked> application{std::nullopt, {0xCE110001, 0x010203}, 6};
+  Application<Board<1>> application{std::nullopt, {0xCE110001, 0x010203}, 6};
   Sample sample{};
 };
 
@@ -95,35 +116,35 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   sample.current_ua = -12'345'678;
   sample.voltage_uv = 3'301'499;
   sample.temperature_cdegc = -1'234;
-  application.take(sample);
-  EXPECT_EQ(ids(), (std::vector<unsigned>{0x183, 0x186, 0x187, 0x188, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
-  const auto state = can::PackState::of(sent[10]);
+  application.take(pack_of(sample));
+  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
+  const auto state = can::PackState::of(sent[13]);
   EXPECT_NEAR(state.soc, 54.321, 0.0011);
   EXPECT_NEAR(state.soc_sigma, 1, 0.0011);
   EXPECT_NEAR(state.soc_display, 54.321, 0.0011);
   EXPECT_EQ(state.soc_quality, can::PackState::soc_quality_carried_by_counting);
-  const auto electrical = can::PackElectrical::of(sent[11]);
+  const auto electrical = can::PackElectrical::of(sent[14]);
   EXPECT_NEAR(electrical.voltage, 3.301, 1e-5);
   EXPECT_NEAR(electrical.current, -12.34, 1e-4);
   EXPECT_NEAR(electrical.temperature, -12.34, 1e-4);
-  const auto detail = can::ModelDetail::of(sent[12]);
+  const auto detail = can::ModelDetail::of(sent[15]);
   EXPECT_NEAR(detail.voltage_rc, -0.0123456, 1e-6);
   EXPECT_NEAR(detail.voltage_predicted, 3.2999, 1e-6);
-  const auto status = can::Status::of(sent[13]);
+  const auto status = can::Status::of(sent[16]);
   EXPECT_EQ(status.flags, voltage_stuck);
   EXPECT_EQ(status.sample_counter, 1U);
   EXPECT_EQ(status.reset_cause, 4U);
-  const auto identity = can::Identity::of(sent[0]);
+  const auto identity = can::Identity::of(sent[3]);
   EXPECT_EQ(identity.cell_hash, 0xCE110001U);
   EXPECT_EQ(identity.version_major, 1U);
   EXPECT_EQ(identity.version_minor, 2U);
   EXPECT_EQ(identity.version_patch, 3U);
-  const auto limits = can::CurrentLimits::of(sent[1]);
+  const auto limits = can::CurrentLimits::of(sent[4]);
   EXPECT_NEAR(limits.discharge_now, 6, 0.11) << "what the cell file allows";
   EXPECT_GE(limits.charge_now, limits.charge_ten_seconds);
-  EXPECT_NEAR(can::Health::of(sent[2]).capacity, 100, 0.03);
-  EXPECT_NEAR(can::Health::of(sent[2]).resistance_sigma, 30, 0.03);
-  EXPECT_EQ(can::SocAnchor::of(sent[3]).observable, 0U);
+  EXPECT_NEAR(can::Health::of(sent[5]).capacity, 100, 0.03);
+  EXPECT_NEAR(can::Health::of(sent[5]).resistance_sigma, 30, 0.03);
+  EXPECT_EQ(can::SocAnchor::of(sent[6]).observable, 0U);
   EXPECT_EQ(recorded.size(), 1U);
   EXPECT_EQ(fed, 1);
 }
@@ -131,7 +152,7 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
 TEST_F(TelemetryTest, EveryFrameIsProtectedAndCounted) {
   for (int k = 0; k < 40; ++k) {
     sample.time_us = static_cast<std::uint64_t>(k) * 300'000;
-    application.take(sample);
+    application.take(pack_of(sample));
   }
   std::map<unsigned, int> expected;
   for (const hal::CanFrame& f : sent) {
@@ -153,8 +174,8 @@ TEST_F(TelemetryTest, EveryFrameIsProtectedAndCounted) {
 
 TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
   EstimateHash expected;
-  for (const Sample& s : {Sample{0, -12'345'678, 3'301'499, -1'234}, Sample{1'000'000, no_reading, no_reading, no_temperature}, Sample{0x1234'5678'9ABC, 2'147'483'647, -2'147'483'647, 32'767}}) {
-    application.take(s);
+  for (const Sample& s : {Sample{0, -12'345'678, 3'301'499, -1'234}, Sample{1'000'000, no_reading, no_reading, no_temperature}, Sample{0x1234'5678'9ABC, 2'147'483'647, -2'147'483'647, 15'000}}) {
+    application.take(pack_of(s));
     const auto current = last<can::SampleCurrent>().value();
     const auto voltage = last<can::SampleVoltage>().value();
     const auto time = last<can::SampleTime>().value();
@@ -174,8 +195,8 @@ TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
 }
 
 TEST_F(TelemetryTest, TheLogSaysWhereTheEstimatorWasToldToBegin) {
-  Application<Plain, fixed_answer, looked> told{StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6};
-  told.take(sample);
+  Application<Board<1>> told{StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6};
+  told.take(pack_of(sample));
   EXPECT_EQ(last<can::StartingSoc>().value().soc_ppb, 812'345'678);
   EXPECT_EQ(last<can::StartingSoc>().value().given, can::StartingSoc::given_yes);
   EXPECT_EQ(last<can::StartingSigma>().value().sigma_ppb, 20'000'001);
@@ -198,20 +219,20 @@ TEST_F(TelemetryTest, TheHashTellsEveryBitAndEveryOrder) {
 TEST_F(TelemetryTest, ACommandIsHeardOnceAndAnswered) {
   ask(can::Command::code_log_of_samples, 0, 3);
   ask(can::Command::code_log_of_samples, 1, 3);
-  application.take(sample);
+  application.take(pack_of(sample));
   auto all = ids();
   EXPECT_EQ(std::count(all.begin(), all.end(), can::CommandAnswer::id), 1) << "the same counter again is the same command again";
   EXPECT_EQ(last<can::CommandAnswer>().value().result, can::CommandAnswer::result_done);
   EXPECT_EQ(last<can::CommandAnswer>().value().command_counter, 3U);
   sent.clear();
   sample.time_us += 100'000;
-  application.take(sample);
+  application.take(pack_of(sample));
   EXPECT_FALSE(last<can::SampleCurrent>()) << "the log is off";
   EXPECT_TRUE(last<can::Status>());
   ask(can::Command::code_log_of_samples, 1, 4);
-  application.take(sample);
+  application.take(pack_of(sample));
   sample.time_us += 100'000;
-  application.take(sample);
+  application.take(pack_of(sample));
   EXPECT_TRUE(last<can::SampleCurrent>());
 }
 
@@ -221,19 +242,20 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
   ask(can::Command::code_log_of_samples, 0, 15);  // no counter
   requests.push_back({0x123, 8, {}});
   requests.push_back({can::Command::id, 3, {}});
-  application.take(sample);
+  application.take(pack_of(sample));
   EXPECT_FALSE(last<can::CommandAnswer>());
   const struct {
     std::uint32_t code, argument, result;
   } cases[] = {{can::Command::code_log_of_samples, 2, can::CommandAnswer::result_refused},
                {can::Command::code_clear_faults, 7, can::CommandAnswer::result_refused},
+               {can::Command::code_request, 3, can::CommandAnswer::result_refused},
                {can::Command::code_set_time, 0, can::CommandAnswer::result_refused},
                {99, 0, can::CommandAnswer::result_no_such_command},
                {can::Command::code_set_time, 1'800'000'000, can::CommandAnswer::result_done}};
   std::uint8_t counter = 0;
   for (const auto& c : cases) {
     ask(c.code, c.argument, counter++);
-    application.take(sample);
+    application.take(pack_of(sample));
     EXPECT_EQ(last<can::CommandAnswer>().value().result, c.result) << c.code;
     EXPECT_EQ(last<can::CommandAnswer>().value().code, c.code);
   }
@@ -242,7 +264,7 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
 
 TEST_F(TelemetryTest, MuchAskingMakesASampleNoLonger) {
   for (std::uint8_t k = 0; k < 14; ++k) ask(can::Command::code_set_time, 1, k);
-  application.take(sample);
+  application.take(pack_of(sample));
   EXPECT_EQ(requests.size(), 10U);
 }
 
@@ -250,11 +272,11 @@ TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
   sample.current_ua = no_reading;
   sample.voltage_uv = no_reading;
   sample.temperature_cdegc = no_temperature;
-  const auto nothing = can::PackElectrical::of(messages::pack_electrical(sample).frame(0));
+  const auto nothing = can::PackElectrical::of(messages::pack_electrical(pack_of(sample)).frame(0));
   EXPECT_TRUE(std::isnan(nothing.voltage) && std::isnan(nothing.current) && std::isnan(nothing.temperature));
   sample.current_ua = 2'000'000'000;
   sample.voltage_uv = 2'000'000'000;
-  const auto much = can::PackElectrical::of(messages::pack_electrical(sample).frame(0));
+  const auto much = can::PackElectrical::of(messages::pack_electrical(pack_of(sample)).frame(0));
   EXPECT_NEAR(much.current, 655.34, 1e-3);
   EXPECT_NEAR(much.voltage, 65.534, 1e-4);
   Estimate<float> e;
@@ -273,11 +295,11 @@ TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
 
 TEST_F(TelemetryTest, NobodyListeningIsToldNothingAndTheCountersSayHowMuchWasMissed) {
   listening = false;
-  for (int k = 0; k < 5; ++k) application.take(sample);
+  for (int k = 0; k < 5; ++k) application.take(pack_of(sample));
   EXPECT_TRUE(sent.empty());
   EXPECT_EQ(fed, 5);
   listening = true;
-  application.take(sample);
+  application.take(pack_of(sample));
   EXPECT_EQ(can::Status::of(sent.back()).sample_counter, 6U);
   EXPECT_EQ(can::counter_of(sent.back()), 0);
 }
@@ -288,13 +310,114 @@ TEST_F(TelemetryTest, IdentityComesEachSecondAndAFaultOnce) {
   fault->cfsr = 0x8200;
   for (int k = 0; k < 30; ++k) {
     sample.time_us = static_cast<std::uint64_t>(k) * 100'000;
-    application.take(sample);
+    application.take(pack_of(sample));
   }
   const auto all = ids();
   EXPECT_EQ(std::count(all.begin(), all.end(), can::Identity::id), 3);
   EXPECT_EQ(std::count(all.begin(), all.end(), can::LastFaultAddress::id), 1);
   EXPECT_EQ(can::LastFaultAddress::of(sent[0]).program_counter, 0x08001234U);
   EXPECT_EQ(can::LastFaultCause::of(sent[1]).configurable_fault_status, 0x8200U);
+}
+
+/// Sixteen cells at rest, contactors and link of a simulated truck.
+class PackTest : public TelemetryTest {
+ protected:
+  Application<Board<16>> pack{std::nullopt, {0, 0}, 6};
+  PackSample<16> reading{};
+  double link_v = 0;
+
+  void SetUp() override {
+    TelemetryTest::SetUp();
+    hal::link = 0;
+    hal::cause = hal::ResetCause::power_on;
+    for (std::size_t k = 0; k < 16; ++k) reading.cell_uv[k] = 3'280'000 + static_cast<std::int32_t>(k) * 100;
+    reading.pack_uv = 16 * 3'280'750;
+    reading.current_ua = 0;
+    reading.temperature_cdegc = {2'500, 2'510, 2'490, 2'500};
+  }
+  /// One second; readings live.
+  void second() {
+    reading.time_us += 1'000'000;
+    for (auto& uv : reading.cell_uv) {
+      if (uv != no_reading) uv += (reading.time_us / 1'000'000) % 2 == 0 ? 1 : -1;
+    }
+    const double pack_v = 1e-6 * reading.pack_uv;
+    const auto& c = hal::switched;
+    if (c.main_plus && c.main_minus) link_v = pack_v;
+    else if (c.precharge && c.main_minus) link_v += (pack_v - link_v) * (1 - std::exp(-1 / 0.5));
+    else link_v *= std::exp(-0.2);
+    hal::link = static_cast<std::int32_t>(1e6 * link_v);
+    pack.take(reading);
+  }
+  bool driving() const { return hal::switched.main_plus && hal::switched.main_minus; }
+};
+
+TEST_F(PackTest, TellsEachCellTheExtremesAndTheTemperatures) {
+  reading.cell_uv[4] = 3'291'000;
+  reading.cell_uv[9] = 3'201'000;
+  reading.cell_uv[15] = no_reading;
+  second();
+  EXPECT_NEAR(last<can::CellVoltages2>().value().cell5, 3.291, 1e-3);
+  EXPECT_NEAR(last<can::CellVoltages3>().value().cell10, 3.201, 1e-3);
+  EXPECT_TRUE(std::isnan(last<can::CellVoltages4>().value().cell16));
+  const auto extremes = last<can::CellExtremes>().value();
+  EXPECT_EQ(extremes.highest_cell, 5U);
+  EXPECT_EQ(extremes.lowest_cell, 10U);
+  EXPECT_NEAR(extremes.highest_voltage - extremes.lowest_voltage, 0.09, 2e-3);
+  EXPECT_NEAR(last<can::Temperatures>().value().temperature3, 24.9, 0.06);
+}
+
+TEST_F(PackTest, ClosesWhenATruckAsksAndOpensWhenItNoLongerDoes) {
+  second();
+  EXPECT_EQ(last<can::ContactorState>().value().state, can::ContactorState::state_off);
+  std::uint8_t counter = 0;
+  for (int k = 0; k < 20 && !driving(); ++k) {
+    ask(can::Command::code_request, 1, counter = can::next(counter));
+    second();
+  }
+  ASSERT_TRUE(driving());
+  EXPECT_EQ(last<can::ContactorState>().value().state, can::ContactorState::state_drive);
+  EXPECT_EQ(last<can::Faults>().value().first_cause, 0U);
+  for (int k = 0; k < 4; ++k) second();
+  EXPECT_TRUE(driving()) << "a request holds for five seconds";
+  EXPECT_GT(last<can::AllowedCurrent>().value().discharge, 1);
+  for (int k = 0; k < 4; ++k) second();
+  EXPECT_FALSE(driving()) << "who does not ask again has gone";
+  EXPECT_EQ(last<can::AllowedCurrent>().value().discharge, 0);
+}
+
+TEST_F(PackTest, AfterAResetByTheWatchdogNothingClosesBeforeItIsCleared) {
+  hal::cause = hal::ResetCause::watchdog;
+  std::uint8_t counter = 0;
+  for (int k = 0; k < 20; ++k) {
+    ask(can::Command::code_request, 1, counter = can::next(counter));
+    second();
+  }
+  EXPECT_FALSE(driving());
+  EXPECT_EQ(last<can::Faults>().value().internal_fault, 1U);
+}
+
+TEST_F(PackTest, ASevereFaultOpensAndIsToldAtOnceWithItsCause) {
+  std::uint8_t counter = 0;
+  const auto drive = [&] {
+    ask(can::Command::code_request, 1, counter = can::next(counter));
+    second();
+  };
+  for (int k = 0; k < 20 && !driving(); ++k) drive();
+  ASSERT_TRUE(driving());
+  reading.cell_uv[7] = 4'000'000;
+  drive();
+  drive();
+  EXPECT_FALSE(driving());
+  EXPECT_EQ(last<can::Faults>().value().cell_overvoltage_severe, 1U);
+  EXPECT_EQ(last<can::Faults>().value().first_cause, 1U + static_cast<unsigned>(protection::Fault::cell_overvoltage_severe));
+  reading.cell_uv[7] = 3'300'000;
+  for (int k = 0; k < 20; ++k) drive();
+  EXPECT_EQ(last<can::Faults>().value().cell_overvoltage_severe, 1U) << "it is latched";
+  ask(can::Command::code_clear_faults, 0, counter = can::next(counter));
+  drive();
+  drive();
+  EXPECT_EQ(last<can::Faults>().value().cell_overvoltage_severe, 0U);
 }
 
 }  // namespace
