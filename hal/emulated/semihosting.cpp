@@ -9,7 +9,7 @@ namespace bms::hal::semihosting {
 
 namespace {
 
-enum Operation : std::uint32_t { sys_open = 0x01, sys_write = 0x05, sys_read = 0x06, sys_get_cmdline = 0x15, sys_exit_extended = 0x20 };
+enum Operation : std::uint32_t { sys_open = 0x01, sys_write = 0x05, sys_read = 0x06, sys_seek = 0x0A, sys_time = 0x11, sys_get_cmdline = 0x15, sys_exit_extended = 0x20 };
 
 std::uint32_t call(Operation operation, const void* parameters) {
   register std::uint32_t r0 asm("r0") = operation;
@@ -37,6 +37,13 @@ bool write(int file, std::span<const unsigned char> bytes) {
   const std::array<std::uint32_t, 3> parameters{static_cast<std::uint32_t>(file), address(bytes.data()), bytes.size()};
   return call(sys_write, parameters.data()) == 0;
 }
+
+bool seek(int file, std::size_t at) {
+  const std::array<std::uint32_t, 2> parameters{static_cast<std::uint32_t>(file), at};
+  return call(sys_seek, parameters.data()) == 0;
+}
+
+std::uint32_t seconds_since_1970() { return call(sys_time, nullptr); }
 
 std::size_t arguments(std::span<char> text, std::span<const char*> words) {
   const std::array<std::uint32_t, 2> parameters{address(text.data()), text.size()};

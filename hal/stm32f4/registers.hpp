@@ -23,6 +23,9 @@ inline Register& rcc_csr() { return at<0x40023874>(); }
 
 // flash interface [3.9.1], power [5.4.1]
 inline Register& flash_acr() { return at<0x40023C00>(); }
+inline Register& flash_keyr() { return at<0x40023C04>(); }
+inline Register& flash_sr() { return at<0x40023C0C>(); }
+inline Register& flash_cr() { return at<0x40023C10>(); }
 inline Register& pwr_cr() { return at<0x40007000>(); }
 
 // GPIOB [8.4]

@@ -1,0 +1,66 @@
+// Three sectors of 16 KiB as the chip has them, kept in a file of the host: command line "fw FILE". Without one they last as long as the
+// emulator runs, resets included. A file that is new or of another size begins as bytes 0, as worn flash may.
+//
+// QEMU gives this board 192 KiB of RAM in one block where the chip has 128 KiB: the sectors lie above the chip's.
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "hal/bytes.hpp"
+#include "hal/emulated/semihosting.hpp"
+#include "hal/flash.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+constexpr FlashSize size{3, 16 * 1024};
+constexpr std::uintptr_t above_the_chips_ram = 0x20020000;
+int file = -1;
+
+std::span<unsigned char> memory() { return {reinterpret_cast<unsigned char*>(above_the_chips_ram), std::size_t{size.sectors} * size.sector_bytes}; }
+
+bool keep(std::size_t at, std::size_t bytes) { return file < 0 || (semihosting::seek(file, at) && semihosting::write(file, memory().subspan(at, bytes))); }
+
+void read_file() {
+  std::size_t have = 0;
+  while (have < memory().size()) {
+    const std::size_t n = semihosting::read(file, memory().subspan(have));
+    if (n == 0) break;
+    have += n;
+  }
+  if (have == memory().size()) return;
+  std::ranges::fill(memory(), static_cast<unsigned char>(0));
+  if (!keep(0, memory().size())) file = -1;
+}
+
+}  // namespace
+
+FlashSize flash_start() {
+  static std::array<char, 512> text;
+  std::array<const char*, 2> words{};
+  if (semihosting::arguments(text, words) != words.size()) return size;
+  file = semihosting::open(words[1], semihosting::Open::update);
+  if (file < 0) file = semihosting::open(words[1], semihosting::Open::create);
+  if (file >= 0) read_file();
+  return size;
+}
+
+bool flash_erase(std::uint32_t sector) {
+  const std::size_t at = std::size_t{sector} * size.sector_bytes;
+  std::ranges::fill(memory().subspan(at, size.sector_bytes), static_cast<unsigned char>(0xFF));
+  return keep(at, size.sector_bytes);
+}
+
+bool flash_program(std::uint32_t sector, std::uint32_t at, std::uint32_t word) {
+  const std::size_t place = std::size_t{sector} * size.sector_bytes + at;
+  const auto bytes = memory().subspan(place, sizeof word);
+  put_bytes(bytes, 0, get_bytes<std::uint32_t>(bytes, 0) & word);
+  return keep(place, sizeof word);
+}
+
+void flash_read(std::uint32_t sector, std::uint32_t at, std::span<std::uint8_t> into) {
+  std::ranges::copy(memory().subspan(std::size_t{sector} * size.sector_bytes + at, into.size()), into.begin());
+}
+
+}  // namespace bms::hal

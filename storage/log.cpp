@@ -1,0 +1,381 @@
+#include "storage/log.hpp"
+
+#include <algorithm>
+
+#include "hal/bytes.hpp"
+#include "storage/crc32.hpp"
+
+namespace bms::storage {
+
+namespace {
+
+using hal::get_bytes;
+using hal::put_bytes;
+
+constexpr std::uint32_t erased_mark = 0x44534552, format = 1;  // "RESD"
+constexpr std::uint8_t copy_bit = 0x80;
+constexpr std::size_t identity_bytes = 8, commit_at = 8, check_at = 12;  // of a header
+constexpr std::uint16_t longest_record = 1 + longest_payload / line_bytes;
+constexpr std::array<std::uint8_t, 4> zeros{};
+constexpr int tries_in_a_sector = 3, most_looks = 16;
+
+using Line = std::array<std::uint8_t, line_bytes>;
+
+constexpr std::uint16_t lines_of(std::size_t payload_bytes) { return static_cast<std::uint16_t>(1 + (payload_bytes + line_bytes - 1) / line_bytes); }
+
+/// Of numbers that wrap.
+constexpr bool later(std::uint32_t a, std::uint32_t b) { return static_cast<std::int32_t>(a - b) > 0; }
+
+Line read_line(std::uint8_t sector, std::uint32_t line) {
+  Line bytes;
+  hal::flash_read(sector, line * line_bytes, bytes);
+  return bytes;
+}
+
+Line mark_line() {
+  Line bytes{};
+  put_bytes(bytes, 0, erased_mark);
+  put_bytes(bytes, 4, format);
+  put_bytes(bytes, 12, crc32(std::span(bytes).first(12)));
+  return bytes;
+}
+
+bool replaces(const Record& later_one, const Record& r) { return later_one.kind.type == r.kind.type && later_one.kind.layout >= r.kind.layout && later(later_one.number, r.number); }
+
+/// Programs whole words, the last one filled up with ones, and reads them back.
+bool program(std::uint8_t sector, std::uint32_t at, std::span<const std::uint8_t> bytes) {
+  for (std::size_t k = 0; k < bytes.size(); k += 4) {
+    const std::size_t n = std::min<std::size_t>(4, bytes.size() - k);
+    std::uint32_t word = 0xFFFFFFFF;
+    for (std::size_t j = 0; j < n; ++j) word = (word & ~(0xFFU << (8 * j))) | static_cast<std::uint32_t>(bytes[k + j]) << (8 * j);
+    if (!hal::flash_program(sector, at + static_cast<std::uint32_t>(k), word)) return false;
+  }
+  for (std::size_t k = 0; k < bytes.size();) {
+    Line back;
+    const std::size_t n = std::min<std::size_t>(back.size(), bytes.size() - k);
+    hal::flash_read(sector, at + static_cast<std::uint32_t>(k), std::span(back).first(n));
+    if (!std::ranges::equal(std::span(back).first(n), bytes.subspan(k, n))) return false;
+    k += n;
+  }
+  return true;
+}
+
+}  // namespace
+
+void Log::open() {
+  *this = {};
+  const hal::FlashSize size = hal::flash_start();
+  const std::uint32_t lines = size.sector_bytes / line_bytes;
+  // a power of two, so that the numbers of lines still fit when they wrap
+  const bool usable = size.sectors >= 2 && lines >= 4U * longest_record && lines <= 0x8000 && (lines & (lines - 1)) == 0;
+  if (!usable) return;
+  size_ = {std::min<std::uint32_t>(size.sectors, most_sectors), size.sector_bytes};
+  lines_ = static_cast<std::uint16_t>(lines);
+  for (int k = 0; k < most_looks && !look(); ++k) {}
+}
+
+/// False: a torn record that reads now so and now otherwise has made a difference; look again.
+bool Log::look() {
+  charge_ = none;
+  kept_count_ = 0;
+  interrupted_ = false;
+  settled_ = true;
+  std::array<Survey, most_sectors> found{};
+  for (std::uint8_t s = 0; s < size_.sectors; ++s) {
+    found[s] = survey(s, [](const Record&) {});
+    if (state_[s] != Sector::broken) state_[s] = marked(s) && blank(s, 1, static_cast<std::uint16_t>(lines_ - 1)) ? Sector::erased : Sector::dirty;
+  }
+  find_sector_in_charge(std::span(found).first(size_.sectors));
+  if (charge_ == none) return true;
+  const auto taking = [this](const Record& r) { take(r); };
+  for (std::uint8_t s = 0; s < size_.sectors; ++s) {
+    if (s == charge_) continue;
+    const bool ahead = found[s].begun && later(found[s].base, base_);
+    interrupted_ = interrupted_ || ahead;
+    if (!ahead) survey(s, taking);
+  }
+  const Survey again = survey(charge_, taking);
+  last_ = again.last;
+  last_end_ = again.last_end;
+  const bool alike = again.any && again.original == found[charge_].original;
+  if (!alike) last_.reset();
+  settled_ = alike && interrupted_;  // a move is begun only when nothing is in doubt
+  return alike;
+}
+
+/// The furthest that holds more than copies; if there is none any more, the furthest with copies.
+void Log::find_sector_in_charge(std::span<const Survey> found) {
+  for (std::uint8_t s = 0; s < found.size(); ++s) {
+    if (!found[s].any) continue;
+    const bool better = charge_ == none || (found[s].original != found[charge_].original ? found[s].original : later(found[s].base, base_));
+    if (!better) continue;
+    charge_ = s;
+    base_ = found[s].base;
+  }
+}
+
+template <class See>
+Log::Survey Log::survey(std::uint8_t sector, See&& see) const {
+  Survey s;
+  for (std::uint16_t at = 1; at < lines_;) {
+    const auto header = identity_in(read_line(sector, at), at);
+    if (!header) {
+      ++at;
+      continue;
+    }
+    const std::uint32_t base = header->number - at;
+    if (!s.begun || later(base, s.base)) s.base = base;
+    s.begun = true;
+    const auto end = static_cast<std::uint16_t>(at + lines_of(header->length));
+    if (complete(*header, sector, at)) {
+      s.any = true;
+      s.original = s.original || !header->copy;
+      s.last = {header->kind, sector, header->length, at, header->number};
+      s.last_end = end;
+      see(s.last);
+    }
+    at = end;
+  }
+  return s;
+}
+
+std::optional<Log::Header> Log::identity_in(const std::array<std::uint8_t, line_bytes>& bytes, std::uint16_t line) const {
+  Header h;
+  h.number = get_bytes<std::uint32_t>(bytes, 0);
+  if ((h.number & (lines_ - 1U)) != line) return std::nullopt;
+  if (get_bytes<std::uint32_t>(bytes, check_at) != crc32(std::span(bytes).first(identity_bytes))) return std::nullopt;
+  h.kind = {static_cast<std::uint8_t>(bytes[4] & ~copy_bit), bytes[5]};
+  h.copy = (bytes[4] & copy_bit) != 0;
+  h.length = bytes[6];
+  h.crc = get_bytes<std::uint32_t>(bytes, commit_at);
+  if (h.length > longest_payload || line + lines_of(h.length) > lines_) return std::nullopt;
+  return h;
+}
+
+bool Log::complete(const Header& header, std::uint8_t sector, std::uint16_t line) const {
+  Line bytes = read_line(sector, line);
+  Crc32 sum;
+  sum.add(std::span(bytes).first(identity_bytes));
+  for (std::size_t k = 0; k < header.length; k += line_bytes) {
+    bytes = read_line(sector, line + 1 + static_cast<std::uint32_t>(k) / line_bytes);
+    sum.add(std::span(bytes).first(std::min<std::size_t>(line_bytes, header.length - k)));
+  }
+  return sum.value() == header.crc;
+}
+
+bool Log::blank(std::uint8_t sector, std::uint16_t from, std::uint16_t lines) const {
+  for (std::uint32_t line = from; line < std::uint32_t{from} + lines; ++line) {
+    if (!std::ranges::all_of(read_line(sector, line), [](std::uint8_t byte) { return byte == 0xFF; })) return false;
+  }
+  return true;
+}
+
+bool Log::marked(std::uint8_t sector) const { return read_line(sector, 0) == mark_line(); }
+bool Log::mark(std::uint8_t sector) const { return program(sector, 0, mark_line()); }
+/// Before an erase: one that is cut short must not leave the old mark over cells that are half erased.
+bool Log::unmark(std::uint8_t sector) const { return program(sector, 0, Line{}); }
+
+/// Into those in force, without those it replaces; the order of calls does not matter.
+void Log::take(const Record& record) {
+  const auto begin = kept_.begin(), end = begin + static_cast<std::ptrdiff_t>(kept_count_);
+  if (std::any_of(begin, end, [&](const Record& r) { return r.number == record.number || replaces(r, record); })) return;
+  kept_count_ = static_cast<std::size_t>(std::remove_if(begin, end, [&](const Record& r) { return replaces(record, r); }) - begin);
+  if (kept_count_ < kept_.size()) kept_[kept_count_++] = record;
+}
+
+std::optional<Record> Log::newest(std::uint8_t type, std::uint8_t known_layout) const {
+  std::optional<Record> found;
+  for (const Record& r : in_force()) {
+    if (r.kind.type == type && r.kind.layout <= known_layout && (!found || later(r.number, found->number))) found = r;
+  }
+  return found;
+}
+
+std::optional<Log::Found> Log::load(std::uint8_t type, std::uint8_t known_layout, std::span<std::uint8_t, longest_payload> into) {
+  for (int k = 0; k < most_looks; ++k) {
+    const auto record = newest(type, known_layout);
+    if (!record) return std::nullopt;
+    if (const auto payload = read(*record, into)) return Found{record->kind.layout, *payload};
+    look();  // torn: an older one is in force
+  }
+  return std::nullopt;
+}
+
+/// Nothing: it cannot be read any more.
+std::optional<std::span<const std::uint8_t>> Log::read(const Record& record, std::span<std::uint8_t, longest_payload> into) const {
+  const auto payload = into.first(record.length);
+  hal::flash_read(record.sector, (record.line + 1U) * line_bytes, payload);
+  // of what is in `into`, not of what another reading might give
+  const Line header = read_line(record.sector, record.line);
+  Crc32 sum;
+  sum.add(std::span(header).first(identity_bytes)).add(payload);
+  if (sum.value() != get_bytes<std::uint32_t>(header, commit_at)) return std::nullopt;
+  return payload;
+}
+
+Stored Log::store(Kind kind, std::span<const std::uint8_t> payload) {
+  if (lines_ == 0 || payload.size() > longest_payload || (kind.type & copy_bit) != 0) return Stored::refused;
+  if (!settle()) return Stored::refused;
+  std::uint32_t together = lines_of(payload.size()), records = 1;
+  for (const Record& r : in_force()) {
+    if (r.kind.type == kind.type && r.kind.layout <= kind.layout) continue;
+    together += lines_of(r.length);
+    ++records;
+  }
+  if (together > lines_ / 2U || records > most_kept) return Stored::refused;
+  if (append(kind, payload, longest_record) == Stored::kept) return Stored::kept;
+  return move(kind, payload);
+}
+
+bool Log::settle() {
+  for (int k = 0; k < most_looks && !settled_; ++k) {
+    std::array<std::uint8_t, longest_payload> payload;
+    const auto bytes = last_ ? read(*last_, payload) : std::nullopt;
+    if (!bytes) {
+      while (k < most_looks && !look()) ++k;
+      continue;
+    }
+    void_what_was_torn();
+    append(last_->kind, *bytes, 0);  // there is room: every other record leaves some
+    settled_ = true;
+  }
+  return settled_;
+}
+
+/// Behind the last complete record: what was begun is made certain, so that every later boot sees the same, and void. next_ is behind it.
+void Log::void_what_was_torn() {
+  next_ = last_end_;
+  for (std::uint16_t at = last_end_; at < lines_;) {
+    const Line bytes = read_line(charge_, at);
+    const std::uint32_t place = at * line_bytes;
+    const auto word = [&](std::size_t k) { return std::span(bytes).subspan(k, 4); };
+    if (const auto header = identity_in(bytes, at)) {
+      program(charge_, place + check_at, word(check_at));
+      program(charge_, place + commit_at, zeros);
+      next_ = at = static_cast<std::uint16_t>(at + lines_of(header->length));
+      continue;
+    }
+    const bool numbered = get_bytes<std::uint32_t>(bytes, 0) == base_ + at;
+    if (numbered) {
+      program(charge_, place, word(0));
+      program(charge_, place + check_at, zeros);
+    }
+    // else: nothing, or a number that was not finished: it will be begun again
+    const bool more = std::any_of(bytes.begin() + 4, bytes.end(), [](std::uint8_t byte) { return byte != 0xFF; });
+    ++at;
+    if (numbered || more) next_ = at;
+  }
+}
+
+Stored Log::append(Kind kind, std::span<const std::uint8_t> payload, std::uint16_t spare) {
+  if (charge_ == none || interrupted_) return Stored::wants_erase;
+  const std::uint16_t lines = lines_of(payload.size());
+  for (int tries = 0; tries < tries_in_a_sector; ++tries) {
+    if (next_ + lines + spare > lines_) return Stored::wants_erase;
+    const Record record{kind, charge_, static_cast<std::uint8_t>(payload.size()), next_, base_ + next_};
+    next_ = static_cast<std::uint16_t>(next_ + lines);
+    if (!write(record, false, payload)) continue;
+    take(record);
+    return Stored::kept;
+  }
+  state_[charge_] = Sector::broken;
+  next_ = lines_;
+  return Stored::wants_erase;
+}
+
+Stored Log::move(Kind kind, std::span<const std::uint8_t> payload) {
+  if ((charge_ == none || interrupted_) && wants_erase()) return Stored::wants_erase;  // what lies there may yet turn out to be a record
+  const std::uint32_t others = charge_ == none ? size_.sectors : size_.sectors - 1;
+  for (std::uint32_t steps = 1; steps <= others; ++steps) {
+    const std::uint8_t sector = after(steps);
+    if (state_[sector] != Sector::erased) continue;
+    state_[sector] = Sector::dirty;
+    if (move_into(sector, (charge_ == none ? sector : base_ / lines_ + steps) * lines_, kind, payload)) return Stored::kept;
+    state_[sector] = Sector::broken;
+  }
+  return wants_erase() ? Stored::wants_erase : Stored::refused;
+}
+
+bool Log::move_into(std::uint8_t sector, std::uint32_t base, Kind kind, std::span<const std::uint8_t> payload) {
+  interrupted_ = true;
+  std::uint16_t line = 1;
+  const auto place = [&](Kind what, std::size_t length) {
+    const Record at{what, sector, static_cast<std::uint8_t>(length), line, base + line};
+    line = static_cast<std::uint16_t>(line + lines_of(length));
+    return at;
+  };
+  std::array<Record, most_kept> moved{};
+  std::size_t count = 0;
+  for (const Record& old : in_force()) {
+    if (old.kind.type == kind.type && old.kind.layout <= kind.layout) continue;
+    std::array<std::uint8_t, longest_payload> bytes;
+    const auto content = read(old, bytes);
+    if (!content) continue;  // it has decayed since it was found
+    moved[count] = place(old.kind, old.length);
+    if (!write(moved[count], true, *content)) return false;
+    ++count;
+  }
+  const Record record = place(kind, payload.size());
+  if (!write(record, false, payload)) return false;
+  charge_ = sector;
+  base_ = base;
+  interrupted_ = false;
+  next_ = line;
+  kept_ = moved;
+  kept_count_ = count;
+  take(record);
+  return true;
+}
+
+/// The identity with its check first: whoever finds them knows how many lines are taken. The checksum of it all last: with it the record is.
+bool Log::write(const Record& record, bool copy, std::span<const std::uint8_t> payload) const {
+  Line header{};
+  put_bytes(header, 0, record.number);
+  header[4] = static_cast<std::uint8_t>(record.kind.type | (copy ? copy_bit : 0));
+  header[5] = record.kind.layout;
+  header[6] = record.length;
+  const auto identity = std::span(header).first(identity_bytes), commit = std::span(header).subspan(commit_at, 4), check = std::span(header).subspan(check_at, 4);
+  put_bytes(commit, 0, Crc32().add(identity).add(payload).value());
+  put_bytes(check, 0, crc32(identity));
+  const std::uint32_t at = record.line * line_bytes;
+  return program(record.sector, at, identity) && program(record.sector, at + check_at, check) && program(record.sector, at + line_bytes, payload) &&
+         program(record.sector, at + commit_at, commit);
+}
+
+bool Log::wants_erase() const {
+  for (std::uint8_t s = 0; s < size_.sectors; ++s) {
+    if (s != charge_ && state_[s] == Sector::dirty) return true;
+  }
+  return false;
+}
+
+bool Log::erase_one() {
+  if (!wants_erase() || !settle()) return true;
+  std::uint32_t steps = 1;
+  while (state_[after(steps)] != Sector::dirty || after(steps) == charge_) ++steps;
+  const std::uint8_t sector = after(steps);
+  rescue_from(sector);
+  const bool good = unmark(sector) && hal::flash_erase(sector) && blank(sector, 0, lines_) && mark(sector);
+  state_[sector] = good ? Sector::erased : Sector::broken;
+  return good;
+}
+
+/// Only where a record in the sector in charge has decayed is an older one of its kind in force.
+void Log::rescue_from(std::uint8_t sector) {
+  for (std::size_t k = 0; k < kept_count_; ++k) {
+    if (kept_[k].sector != sector) continue;
+    std::array<std::uint8_t, longest_payload> payload;
+    const Record record = kept_[k];
+    const auto bytes = read(record, payload);
+    if (bytes && append(record.kind, *bytes, 0) == Stored::kept) k = static_cast<std::size_t>(-1);  // those in force are others now
+  }
+}
+
+std::uint32_t Log::broken() const { return static_cast<std::uint32_t>(std::ranges::count(state_, Sector::broken)); }
+bool Log::works() const { return size_.sectors >= 2 + broken(); }
+std::uint32_t Log::rounds() const { return size_.sectors == 0 ? 0 : (charge_ == none ? 0 : base_ / lines_ / size_.sectors + 1); }
+
+/// Round the sectors from the one in charge; sector 0 is the first of all.
+std::uint8_t Log::after(std::uint32_t steps) const { return static_cast<std::uint8_t>((charge_ == none ? steps - 1 : charge_ + steps) % size_.sectors); }
+
+}  // namespace bms::storage

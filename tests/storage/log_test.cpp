@@ -1,0 +1,455 @@
+// The log on a flash that loses its power at every step, wears out and decays. What must be kept is remembered here, beside the log.
+#include "storage/log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <random>
+
+#include "storage/crc32.hpp"
+#include "tests/storage/flash_model.hpp"
+#include "tests/storage/record_bytes.hpp"
+
+#if defined(__SANITIZE_ADDRESS__)
+constexpr int sequences = 40;  // with sanitizers: a thousand would take many minutes
+#else
+constexpr int sequences = 1'000;
+#endif
+
+namespace bms {
+namespace {
+
+using storage::Kind;
+using storage::Log;
+using storage::Stored;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr hal::FlashSize small{3, 1024}, two{2, 1024};
+
+/// What the log says of a type, up to a layout.
+std::optional<Bytes> content(Log& log, std::uint8_t type, std::uint8_t layout) {
+  std::array<std::uint8_t, storage::longest_payload> into;
+  const auto found = log.load(type, layout, into);
+  if (!found) return std::nullopt;
+  return Bytes(found->payload.begin(), found->payload.end());
+}
+
+Bytes random_bytes(std::mt19937& random, std::size_t most) {
+  Bytes bytes(random() % (most + 1));
+  const bool ones = random() % 8 == 0;  // erased flash looks like that
+  for (auto& b : bytes) b = ones ? 0xFF : static_cast<std::uint8_t>(random());
+  return bytes;
+}
+
+/// Erases when it must.
+Stored keep(Log& log, Kind kind, const Bytes& bytes) {
+  Stored done = log.store(kind, bytes);
+  for (int k = 0; k < 8 && done == Stored::wants_erase; ++k) {
+    log.erase_one();
+    done = log.store(kind, bytes);
+  }
+  return done;
+}
+
+struct Step {
+  bool erase = false;
+  Kind kind;
+  Bytes bytes;
+};
+
+class PowerCuts {
+ public:
+  PowerCuts(hal::FlashSize size, unsigned seed) : random_(seed), flash_(size, seed) {
+    plug_in(&flash_);
+    log_.open();
+  }
+
+  void run() {
+    for (auto n = random_() % 150; n > 0; --n) whole(next_step());
+    for (int k = 0; k < 10 && !::testing::Test::HasFailure(); ++k) {
+      if (random_() % 6 == 0) log_.open();
+      const Step step = next_step();
+      cut_everywhere_in(step);
+      whole(step);
+    }
+    EXPECT_EQ(flash_.violations(), 0U) << "words were programmed that were not erased";
+  }
+  std::uint64_t cuts() const { return cuts_; }
+
+ private:
+  using Kept = std::map<std::pair<int, int>, Bytes>;
+
+  Step next_step() {
+    if (log_.wants_erase() && random_() % 3 == 0) return {true, {}, {}};
+    const auto type = static_cast<std::uint8_t>(1 + random_() % 4);
+    return {false, {type, static_cast<std::uint8_t>(type == 4 ? 9 : 1)}, random_bytes(random_, type == 2 ? 90 : 24)};
+  }
+
+  void whole(const Step& step) {
+    if (step.erase) {
+      EXPECT_TRUE(log_.erase_one());
+      return;
+    }
+    ASSERT_EQ(keep(log_, step.kind, step.bytes), Stored::kept);
+    kept_[{step.kind.type, step.kind.layout}] = step.bytes;
+  }
+
+  void cut_everywhere_in(const Step& step) {
+    const FlashModel before = flash_;
+    const Log log_before = log_;
+    const Kept kept_before = kept_;
+    for (std::uint64_t at = 0;; ++at) {
+      flash_ = before;
+      log_ = log_before;
+      kept_ = kept_before;
+      flash_.reseed(random_());
+      flash_.cut_in(at);
+      bool cut = false;
+      Stored done = Stored::kept;
+      try {
+        if (step.erase) log_.erase_one();
+        else done = log_.store(step.kind, step.bytes);
+      } catch (const PowerCut&) {
+        cut = true;
+        ++cuts_;
+      }
+      flash_.no_cut();
+      if (!cut) break;
+      static_cast<void>(done);
+      again_after(step);
+      if (::testing::Test::HasFailure()) {
+        std::printf("step %d of type %d at %llu\n", step.erase, step.kind.type, static_cast<unsigned long long>(at));
+        break;
+      }
+    }
+    flash_ = before;
+    log_ = log_before;
+    kept_ = kept_before;
+  }
+
+  /// What is found at boot: all that was kept, or what was being stored.
+  void look(const Step& step) {
+    log_.open();
+    for (int type = 1; type <= 4; ++type) {
+      const int layout = type == 4 ? 9 : 1;
+      const auto found = content(log_, static_cast<std::uint8_t>(type), static_cast<std::uint8_t>(layout));
+      const auto kept = kept_.find({type, layout});
+      const bool in_progress = !step.erase && step.kind.type == type && found == step.bytes;
+      if (in_progress) continue;
+      if (kept == kept_.end()) {
+        EXPECT_FALSE(found) << "of type " << type << " nothing was stored";
+      } else {
+        EXPECT_TRUE(found == kept->second) << "of type " << type << (found ? " another was found" : " nothing was found");
+      }
+    }
+  }
+
+  void again_after(const Step& step) {
+    for (int boots = 0; boots < 2; ++boots) look(step);
+    // the power goes again while the log is brought in order and something else is stored
+    Step other = next_step();
+    for (auto cuts = random_() % 3; cuts > 0; --cuts) {
+      flash_.cut_in(random_() % 24);
+      try {
+        if (random_() % 2 == 0 && log_.wants_erase()) log_.erase_one();
+        else if (!other.erase && log_.store(other.kind, other.bytes) == Stored::kept) kept_[{other.kind.type, other.kind.layout}] = other.bytes;
+      } catch (const PowerCut&) {
+        ++cuts_;
+        flash_.no_cut();
+        look_for_either(step, other);
+        // one of the two: what was found now may be found now so and now otherwise until something is stored
+      }
+      flash_.no_cut();
+    }
+    look_for_either(step, other);
+    const Bytes last = random_bytes(random_, 24);
+    ASSERT_EQ(keep(log_, {5, 1}, last), Stored::kept);
+    Kept now;
+    for (int boots = 0; boots < 3; ++boots) {
+      log_.open();
+      EXPECT_EQ(content(log_, 5, 1), last);
+      for (int type = 1; type <= 4; ++type) {
+        const auto found = content(log_, static_cast<std::uint8_t>(type), 9);
+        if (boots == 0 && found) now[{type, 0}] = *found;
+        EXPECT_EQ(found.has_value(), now.count({type, 0}) == 1);
+        if (found) {
+          EXPECT_EQ(*found, (now[{type, 0}])) << "found now so and now otherwise: type " << type;
+        }
+      }
+    }
+    EXPECT_EQ(flash_.violations(), 0U);
+  }
+
+  void look_for_either(const Step& one, const Step& other) {
+    log_.open();
+    for (int type = 1; type <= 4; ++type) {
+      const int layout = type == 4 ? 9 : 1;
+      const auto found = content(log_, static_cast<std::uint8_t>(type), static_cast<std::uint8_t>(layout));
+      const bool in_progress = (!one.erase && one.kind.type == type && found == one.bytes) || (!other.erase && other.kind.type == type && found == other.bytes);
+      const auto kept = kept_.find({type, layout});
+      if (in_progress) continue;
+      if (kept == kept_.end()) {
+        EXPECT_FALSE(found) << "of type " << type << " nothing was stored";
+      } else {
+        EXPECT_TRUE(found == kept->second) << "of type " << type << (found ? " another was found" : " nothing was found");
+      }
+    }
+  }
+
+  std::mt19937 random_;
+  FlashModel flash_;
+  Log log_;
+  Kept kept_;
+  std::uint64_t cuts_ = 0;
+};
+
+/// A quarter of the sequences each, so that they run beside each other.
+class PowerCut : public ::testing::TestWithParam<int> {};
+
+TEST_P(PowerCut, AtEveryStepOfAThousandRandomSequencesLosesNothingThatWasKept) {
+  std::uint64_t cuts = 0;
+  for (int k = GetParam(); k < sequences && !HasFailure(); k += 4) {
+    PowerCuts sequence(k % 3 == 0 ? two : small, static_cast<unsigned>(k));
+    sequence.run();
+    cuts += sequence.cuts();
+    if (HasFailure()) std::printf("sequence %d\n", k);
+  }
+  std::printf("%d sequences, %llu cuts of the power\n", sequences / 4, static_cast<unsigned long long>(cuts));
+  EXPECT_GT(cuts, static_cast<std::uint64_t>(60 * sequences / 4));
+}
+INSTANTIATE_TEST_SUITE_P(Quarter, PowerCut, ::testing::Range(0, 4));
+
+class LogTest : public ::testing::Test {
+ protected:
+  explicit LogTest(hal::FlashSize size = small) : flash(size, 1) {
+    plug_in(&flash);
+    log.open();
+  }
+  void fill_rounds(int records) {
+    for (int k = 0; k < records; ++k) ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept) << k;
+  }
+  static Bytes number(int k) {
+    Bytes bytes;
+    put(bytes, static_cast<std::uint32_t>(k));
+    return bytes;
+  }
+  FlashModel flash;
+  Log log;
+};
+
+TEST_F(LogTest, NewFlashHoldsNothingAndKeepsWhatIsStoredOnceItWasErased) {
+  EXPECT_FALSE(content(log, 1, 1));
+  EXPECT_TRUE(log.wants_erase());
+  EXPECT_EQ(log.store({1, 1}, {}), Stored::wants_erase) << "nobody knows whether it was erased to the end";
+  ASSERT_EQ(keep(log, {1, 1}, {7, 8, 9}), Stored::kept);
+  log.open();
+  EXPECT_EQ(content(log, 1, 1), (Bytes{7, 8, 9}));
+}
+
+TEST_F(LogTest, ARecordIsBytesAsTheHeaderSays) {
+  ASSERT_EQ(keep(log, {5, 3}, {1, 2, 3}), Stored::kept);
+  const Bytes expected = record_bytes(1, 5, 3, {1, 2, 3}), sector = flash.bytes(0);
+  EXPECT_EQ(Bytes(sector.begin() + 16, sector.begin() + 48), expected);
+}
+
+TEST_F(LogTest, StoringNeverErases) {
+  while (log.wants_erase()) log.erase_one();
+  const auto erases = flash.erases();
+  Stored done = Stored::kept;
+  for (int k = 0; k < 1'000 && done == Stored::kept; ++k) done = log.store({1, 1}, number(k));
+  EXPECT_EQ(done, Stored::wants_erase);
+  EXPECT_EQ(flash.erases(), erases);
+  log.erase_one();
+  EXPECT_EQ(log.store({1, 1}, number(1)), Stored::kept);
+}
+
+TEST_F(LogTest, SectorsWearAlike) {
+  fill_rounds(10'000);
+  const auto& e = flash.erases();
+  std::printf("10000 records of 4 bytes, sectors of 64 lines: erased %llu, %llu, %llu times\n", static_cast<unsigned long long>(e[0]), static_cast<unsigned long long>(e[1]), static_cast<unsigned long long>(e[2]));
+  EXPECT_GT(e[0], 100U);
+  EXPECT_LE(*std::max_element(e.begin(), e.end()) - *std::min_element(e.begin(), e.end()), 1U);
+  EXPECT_NEAR(log.rounds(), static_cast<double>(e[0]), 1.01);
+}
+
+TEST_F(LogTest, ARecordOfANewerLayoutStaysThroughAllRoundsAndAnOlderOneIsReplaced) {
+  ASSERT_EQ(keep(log, {1, 9}, {9, 9}), Stored::kept);
+  ASSERT_EQ(keep(log, {77, 1}, {7}), Stored::kept) << "a type of a later firmware";
+  ASSERT_EQ(keep(log, {2, 1}, {1}), Stored::kept);
+  ASSERT_EQ(keep(log, {2, 2}, {2}), Stored::kept);
+  fill_rounds(1'000);
+  log.open();
+  EXPECT_EQ(content(log, 1, 8), number(999));
+  EXPECT_TRUE(std::ranges::any_of(log.in_force(), [](const storage::Record& r) { return r.kind == Kind{1, 9} && r.length == 2; })) << "for a firmware that knows it";
+  EXPECT_EQ(content(log, 77, 255), (Bytes{7}));
+  EXPECT_EQ(content(log, 2, 2), (Bytes{2}));
+  EXPECT_FALSE(content(log, 2, 1)) << "migrated";
+  EXPECT_EQ(log.in_force().size(), 4U);
+}
+
+TEST_F(LogTest, NumbersWrap) {
+  Bytes sector(flash.size().sector_bytes, 0xFF);
+  const std::uint32_t line_0 = 0U - 64;  // the last round before 2^32
+  const Bytes record = record_bytes(line_0 + 1, 1, 1, number(5));
+  std::copy(record.begin(), record.end(), sector.begin() + 16);
+  flash.fill(1, sector);
+  log.open();
+  ASSERT_EQ(content(log, 1, 1), number(5));
+  for (int k = 0; k < 100; ++k) {
+    ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept) << k;
+    Log again;
+    again.open();
+    ASSERT_EQ(content(again, 1, 1), number(k));
+  }
+  EXPECT_EQ(flash.violations(), 0U);
+}
+
+TEST_F(LogTest, WhatTheLogCannotHoldIsRefusedAndNothingIsLost) {
+  ASSERT_EQ(keep(log, {1, 1}, {1}), Stored::kept);
+  EXPECT_EQ(log.store({2, 1}, Bytes(storage::longest_payload + 1)), Stored::refused);
+  EXPECT_EQ(log.store({128, 1}, Bytes(1)), Stored::refused);
+  std::uint8_t type = 2;
+  while (keep(log, {type, 1}, Bytes(100, 0xAB)) == Stored::kept) ++type;
+  EXPECT_GT(type, 3);
+  EXPECT_LT(type, 10) << "half a sector";
+  fill_rounds(200);
+  for (std::uint8_t t = 2; t < type; ++t) EXPECT_EQ(content(log, t, 1), Bytes(100, 0xAB));
+}
+
+class Worn : public ::testing::TestWithParam<FlashModel::Wear> {};
+
+TEST_P(Worn, OneSectorOfThreeIsSurvivedAndReportedAndTwoEndIt) {
+  FlashModel flash(small, 3);
+  plug_in(&flash);
+  Log log;
+  log.open();
+  const auto stored = [&](int k) { return keep(log, {1, 1}, Bytes{static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(k >> 8), 0x55, 0xAA}); };
+  int last = 0;
+  for (; last < 100; ++last) ASSERT_EQ(stored(last), Stored::kept);
+  EXPECT_TRUE(log.works());
+  EXPECT_EQ(log.broken(), 0U);
+  const auto told = [&] { return content(log, 1, 1)->at(0) | content(log, 1, 1)->at(1) << 8; };
+
+  const auto next = [&](std::uint32_t steps) { return (log.in_force().front().sector + steps) % 3; };
+  const std::uint32_t first = next(1);
+  flash.wear_out(first, GetParam());
+  for (; last < 300; ++last) ASSERT_EQ(stored(last), Stored::kept) << last;
+  EXPECT_EQ(log.broken(), 1U);
+  EXPECT_TRUE(log.works());
+  log.open();
+  EXPECT_EQ(told(), last - 1);
+
+  flash.wear_out(next(1) == first ? next(2) : next(1), GetParam());
+  Stored done = Stored::kept;
+  int kept = last - 1;
+  for (; last < 600; ++last) {
+    done = stored(last);
+    if (done == Stored::kept) kept = last;
+  }
+  EXPECT_EQ(done, Stored::refused);
+  EXPECT_EQ(log.broken(), 2U);
+  EXPECT_FALSE(log.works());
+  EXPECT_EQ(told(), kept) << "what was kept can still be read";
+  log.open();
+  EXPECT_EQ(told(), kept);
+
+  for (std::uint32_t s = 0; s < 3; ++s) flash.wear_out(s, GetParam());
+  for (std::uint32_t s = 0; s < 3; ++s) flash.fill(s, Bytes(1024, 0));
+  log.open();
+  EXPECT_EQ(stored(1), Stored::refused);
+  EXPECT_EQ(log.broken(), 3U);
+  EXPECT_FALSE(content(log, 1, 1));
+}
+INSTANTIATE_TEST_SUITE_P(Kinds, Worn, ::testing::Values(FlashModel::Wear::erase_fails, FlashModel::Wear::erase_leaves_zeros, FlashModel::Wear::bits_stuck_at_one, FlashModel::Wear::bits_stuck_at_zero));
+
+TEST(NoFlash, KeepsNothingAndSaysSo) {
+  plug_in(nullptr);
+  Log log;
+  log.open();
+  EXPECT_EQ(log.sectors(), 0U);
+  EXPECT_FALSE(log.works());
+  EXPECT_FALSE(log.wants_erase());
+  EXPECT_EQ(log.store({1, 1}, {}), Stored::refused);
+  EXPECT_FALSE(content(log, 1, 1));
+}
+
+/// What is found may be anything that is there; what is stored then is found again.
+void survives(FlashModel& flash) {
+  plug_in(&flash);
+  Log log;
+  log.open();
+  for (int type = 0; type < 256; ++type) static_cast<void>(content(log, static_cast<std::uint8_t>(type), 255));
+  const Bytes mine{1, 2, 3};
+  const Stored done = keep(log, {1, 255}, mine);
+  if (done != Stored::kept) {
+    // hostile records may take all the room there is
+    EXPECT_FALSE(log.in_force().empty());
+    return;
+  }
+  log.open();
+  EXPECT_EQ(content(log, 1, 255), mine);
+}
+
+TEST(CorruptFlash, OfAnyKindIsReadWithoutHarmAndUsedAgain) {
+  std::mt19937 random(5);
+  const auto noise = [&] {
+    Bytes bytes(1024);
+    for (auto& b : bytes) b = static_cast<std::uint8_t>(random());
+    return bytes;
+  };
+  for (int k = 0; k < 300; ++k) {
+    FlashModel flash(small, 1);
+    for (std::uint32_t s = 0; s < 3; ++s) {
+      switch (random() % 4) {
+        case 0: flash.fill(s, noise()); break;
+        case 1: flash.fill(s, Bytes(1024, 0)); break;
+        case 2: flash.fill(s, Bytes(1024, 0xFF)); break;
+        default: {
+          // well-formed records in any order, of any length, number and round, some beyond the sector's end
+          Bytes sector(16, 0xFF);
+          const std::uint32_t base = random() % 3 == 0 ? 0U - 64 * static_cast<std::uint32_t>(random() % 3) : 64 * static_cast<std::uint32_t>(random() % 5 == 0 ? random() : random() % 8);
+          while (sector.size() < 1024) {
+            const auto line = static_cast<std::uint32_t>(sector.size() / 16);
+            const Bytes record = record_bytes(base + line + (random() % 9 == 0 ? 1 : 0), static_cast<std::uint8_t>(random() % 6 == 0 ? random() : random() % 4), static_cast<std::uint8_t>(random() % 4),
+                                              random_bytes(random, random() % 5 == 0 ? 255 : 20));
+            sector.insert(sector.end(), record.begin(), record.end());
+          }
+          sector.resize(1024);
+          flash.fill(s, sector);
+        }
+      }
+    }
+    for (auto flips = random() % 20; flips > 0; --flips) flash.flip(static_cast<std::uint32_t>(random() % 3), static_cast<std::uint32_t>(random() % 1024), static_cast<std::uint8_t>(1U << random() % 8));
+    survives(flash);
+    if (::testing::Test::HasFailure()) break;
+  }
+}
+
+TEST_F(LogTest, AnyBitThatDecaysCostsAtMostTheRecordItIsIn) {
+  fill_rounds(130);
+  ASSERT_EQ(keep(log, {2, 1}, {2, 2}), Stored::kept);
+  ASSERT_EQ(keep(log, {1, 1}, number(130)), Stored::kept);
+  const FlashModel before = flash;
+  for (std::uint32_t s = 0; s < 3; ++s) {
+    for (std::uint32_t at = 0; at < 1024; ++at) {
+      flash = before;
+      flash.flip(s, at, static_cast<std::uint8_t>(1U << at % 8));
+      log.open();
+      const auto one = content(log, 1, 1), other = content(log, 2, 1);
+      ASSERT_TRUE(one == number(130) || one == number(129)) << s << " " << at;
+      ASSERT_TRUE(one == number(130) || other == (Bytes{2, 2})) << s << " " << at;
+      ASSERT_TRUE(!other || other == (Bytes{2, 2})) << s << " " << at;
+    }
+  }
+}
+
+TEST(Crc32, IsTheCataloguesCheckValue) {
+  const std::array<std::uint8_t, 9> digits{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
+  EXPECT_EQ(storage::crc32(digits), 0xCBF43926U);  // CRC-32/ISO-HDLC
+  EXPECT_EQ(crc32_by_bits({digits.begin(), digits.end()}), 0xCBF43926U);
+}
+
+}  // namespace
+}  // namespace bms
