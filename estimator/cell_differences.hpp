@@ -36,6 +36,12 @@ class CellDifference {
 
   constexpr CellDifference() { covariance_.set_diagonal({Variance(first_resistance * first_resistance), Variance(first_soc * first_soc)}); }
 
+  /// From what is known before.
+  constexpr void begin(const Soc& soc, const Soc& sigma) {
+    soc_ = soc;
+    covariance_.set_diagonal({Variance(first_resistance * first_resistance), Variance(sigma * sigma)});
+  }
+
   /// moved: how far soc of the mean has moved since the last call.
   constexpr void predict(const Soc& moved) {
     // the same way until the current turns: deviations add, (sigma + d)^2 - sigma^2, linear in d
@@ -109,6 +115,7 @@ class CellDifferences {
     shared_ = Soc(sum_soc * model::Fraction<S>(1.0 / Cells));
   }
 
+  constexpr void begin(std::size_t k, const Soc& soc, const Soc& sigma) { difference_[k].begin(soc, sigma); }
   constexpr const CellDifference<S>& operator[](std::size_t k) const { return difference_[k]; }
 
  private:

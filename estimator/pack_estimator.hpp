@@ -72,6 +72,9 @@ class PackCells {
     differences_.step(cell, mean.soc, mean.soc_sigma, current_a, moved, shared_by > Count<S>(1) ? shared_by : Count<S>(1), seen);
   }
 
+  /// What is known of a cell from before: soc less the mean's, and how far to believe it.
+  constexpr void begin(std::size_t k, const model::Soc<S>& soc, const model::Soc<S>& sigma) { differences_.begin(k, soc, sigma); }
+
   constexpr const CellDifference<S>& operator[](std::size_t k) const { return differences_[k]; }
 
  private:

@@ -1,9 +1,9 @@
-// What the firmware does with each sample: estimate, record, look at the whole, protect, tell, listen, feed the watchdog.
+// What the firmware does with each sample: estimate, record, look at the whole, protect, tell, listen, remember, feed the watchdog.
 //
 //   Board   cells, and as functions what depends on the cell file: a step of the estimator, what is known beside it, the cells beside their mean,
 //           what a reading may be, the plan of protection (firmware/board_cell.hpp; a test brings its own)
 //
-// Sees the estimator, protection and the hal, never a register; runs on a host that supplies the few functions of hal/ it calls.
+// Sees the estimator, protection, storage and the hal, never a register; runs on a host that supplies the few functions of hal/ it calls.
 #pragma once
 
 #include <optional>
@@ -12,12 +12,15 @@
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/commands.hpp"
+#include "firmware/remembered.hpp"
 #include "firmware/telemetry.hpp"
+#include "hal/calendar.hpp"
 #include "hal/power_path.hpp"
 #include "hal/record.hpp"
 #include "hal/requests.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
+#include "storage/persistence.hpp"
 
 namespace bms {
 
@@ -28,8 +31,14 @@ class Application {
   using Result = typename Estimator::Result;
   static constexpr std::size_t cells = Board::cells;
 
-  Application(const std::optional<StartingPoint>& start, const messages::Identity& identity, float capacity_ah)
-      : estimator_{start ? Estimator(*start) : Estimator()}, protection_{Board::plan()}, telemetry_{identity, capacity_ah, start} {}
+  /// start: where to begin, told from outside or remembered. persistence: started.
+  Application(const std::optional<StartingPoint>& start, const messages::Identity& identity, float capacity_ah, storage::Persistence& persistence)
+      : estimator_{start ? Estimator(*start) : Estimator()},
+        protection_{Board::plan(), static_cast<std::uint32_t>(persistence.settings().get(kept_faults_key).value_or(0))},
+        telemetry_{identity, capacity_ah, start},
+        persistence_{persistence} {
+    if constexpr (cells > 1) recall(cells_, persistence.cells());
+  }
 
   void take(const PackSample<cells>& pack) {
     const Sample mean = mean_cell(pack, Board::plausible());
@@ -39,12 +48,21 @@ class Application {
     Board::look(condition_, estimator_, mean, estimate, hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::tell_apart(cells_, pack, estimate);
     protect(pack, estimate, request);
-    telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), requested_.log_samples);
+    telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, requested_.log_samples);
     hear(pack.time_us);
+    estimate_ = estimate;
+    if (persistence_.count(mean)) [[unlikely]] remember();
     hal::watchdog_feed();
   }
 
+  /// The last that is done: the battery is switched off.
+  void end() {
+    const Remembered now(estimate_, condition_, cells_);
+    persistence_.power_failing(now.values(), hal::calendar_s());
+  }
+
  private:
+  using Remembered = RememberedOf<typename Estimator::Scalar, cells>;
   static constexpr int most_requests = 4;  // a sample must not take longer because somebody asks much
 
   void protect(const PackSample<cells>& pack, const Result& estimate, protection::Request request) {
@@ -67,9 +85,19 @@ class Application {
     orders.clear = std::exchange(requested_.clear, protection::Clear::none);
     orders.link_uv = hal::link_uv();
     orders.board_fault = first_ && hal::reset_cause() == hal::ResetCause::watchdog;
+    orders.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().works();
     first_ = false;
+    const std::uint32_t kept_before = protection_.decision().kept;
     const auto& decision = protection_.update(pack, known, orders);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge, decision.outputs.charge_enable, decision.bleed});
+    if (decision.came != 0) [[unlikely]] note_faults(decision.came);
+    if (decision.kept != kept_before) [[unlikely]] persistence_.set(kept_faults_key, static_cast<std::int32_t>(decision.kept));
+  }
+
+  [[gnu::noinline]] void note_faults(std::uint32_t came) {
+    for (std::uint16_t k = 0; k < protection::fault_count; ++k) {
+      if ((came >> k & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
+    }
   }
 
   void hear(std::uint64_t now_us) {
@@ -79,6 +107,13 @@ class Application {
     }
   }
 
+  /// An erase holds the core up for half a second: only while nothing is connected.
+  [[gnu::noinline]] void remember() {
+    const Remembered now(estimate_, condition_, cells_);
+    persistence_.keep(now.values(), hal::calendar_s());
+    if (!protection_.decision().outputs.any_closed()) persistence_.erase_one();
+  }
+
   Estimator estimator_;
   Condition<Estimator> condition_;
   PackCells<typename Estimator::Scalar, cells> cells_;
@@ -86,6 +121,8 @@ class Application {
   Telemetry<Estimator, cells> telemetry_;
   Commands commands_;
   Requested requested_;
+  Result estimate_{};
+  storage::Persistence& persistence_;
   bool first_ = true;
 };
 

@@ -13,11 +13,15 @@ constexpr std::uint32_t watchdog_ms = 2'000;
 int main() {
   using namespace bms;
   hal::clock_start();
-  hal::can_start();
   hal::watchdog_start(watchdog_ms);
+  storage::Persistence persistence;
+  persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());  // erases, up to half a second a sector: before anything waits for an answer
+  hal::can_start();
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
-  static Application<BoardCell> application(hal::starting_point(), identity(), capacity_ah());
+  const auto told = hal::starting_point();
+  static Application<BoardCell> application(told ? told : persistence.starting_point(), identity(), capacity_ah(), persistence);
   for (; sample != nullptr; sample = hal::next_sample()) application.take(*sample);
+  application.end();
   return 0;
 }

@@ -1,6 +1,7 @@
 // What the firmware tells of an estimate, in the messages of can/greybox_bms.dbc.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -8,6 +9,7 @@
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
 #include "protection/protection.hpp"
+#include "storage/persistence.hpp"
 
 namespace bms::messages {
 
@@ -194,6 +196,18 @@ constexpr can::SocAnchor soc_anchor(const Condition& condition) {
   m.observable = now.observable ? 1 : 0;
   m.seconds_since_anchor = static_cast<float>(now.bridged_s);
   m.charge_since_anchor = percent(now.bridged_soc);
+  return m;
+}
+
+inline can::Storage storage(const storage::Persistence& persistence) {
+  using M = can::Storage;
+  const auto& log = persistence.log();
+  M m;
+  m.state = log.sectors() == 0 ? M::state_no_flash : log.works() ? M::state_works : M::state_nothing_more_is_kept;
+  m.broken_sectors = std::min<std::uint32_t>(log.broken(), 15U);
+  m.newer_records = std::min<std::uint32_t>(persistence.newer_records(), 15U);
+  m.erases = std::min<std::uint32_t>(log.rounds(), 65'535U);
+  m.starts = std::min<std::uint32_t>(persistence.events().starts, 0xFF'FFFFU);
   return m;
 }
 

@@ -14,6 +14,7 @@
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
+#include "storage/persistence.hpp"
 
 namespace bms {
 
@@ -27,7 +28,7 @@ class Telemetry {
 
   /// mean: what the estimator was given of the pack.
   void tell(const PackSample<Cells>& pack, const Sample& mean, const Result& estimate, const Condition<Estimator>& condition, const PackCells<typename Estimator::Scalar, Cells>& cells,
-            const protection::Decision& decision, bool log_samples) {
+            const protection::Decision& decision, const storage::Persistence& persistence, bool log_samples) {
     ++samples_;
     hash_.take(words(estimate));
     if (!hal::can_listening()) return;
@@ -40,6 +41,7 @@ class Telemetry {
     by_time<can::Health>([&] { return messages::health(condition); });
     by_time<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
     if constexpr (Estimator::Model::errors_are_states) by_time<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
+    by_time<can::Storage>([&] { return messages::storage(persistence); });
     if (log_samples) log(mean);
     send(messages::pack_state(estimate, condition));
     send(messages::pack_electrical(pack));

@@ -23,7 +23,8 @@ struct BoardTelemetry {
 
 class SlcanBoard {
  public:
-  explicit SlcanBoard(const std::filesystem::path& application_image);
+  /// arguments: the program's; the first is the file that is its flash for data.
+  explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {});
   ~SlcanBoard();
   SlcanBoard(const SlcanBoard&) = delete;
   SlcanBoard& operator=(const SlcanBoard&) = delete;

@@ -43,6 +43,7 @@ bool next_request(CanFrame& frame) {
   requests.pop_front();
   return true;
 }
+std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
 }  // namespace hal
 
 namespace {
@@ -108,7 +109,8 @@ class TelemetryTest : public ::testing::Test {
     for (const hal::CanFrame& f : sent) all.push_back(f.id);
     return all;
   }
-  Application<Board<1>> application{std::nullopt, {0xCE110001, 0x010203}, 6};
+  storage::Persistence persistence;
+  Application<Board<1>> application{std::nullopt, {0xCE110001, 0x010203}, 6, persistence};
   Sample sample{};
 };
 
@@ -117,20 +119,20 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   sample.voltage_uv = 3'301'499;
   sample.temperature_cdegc = -1'234;
   application.take(pack_of(sample));
-  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
-  const auto state = can::PackState::of(sent[13]);
+  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
+  const auto state = can::PackState::of(sent[14]);
   EXPECT_NEAR(state.soc, 54.321, 0.0011);
   EXPECT_NEAR(state.soc_sigma, 1, 0.0011);
   EXPECT_NEAR(state.soc_display, 54.321, 0.0011);
   EXPECT_EQ(state.soc_quality, can::PackState::soc_quality_carried_by_counting);
-  const auto electrical = can::PackElectrical::of(sent[14]);
+  const auto electrical = can::PackElectrical::of(sent[15]);
   EXPECT_NEAR(electrical.voltage, 3.301, 1e-5);
   EXPECT_NEAR(electrical.current, -12.34, 1e-4);
   EXPECT_NEAR(electrical.temperature, -12.34, 1e-4);
-  const auto detail = can::ModelDetail::of(sent[15]);
+  const auto detail = can::ModelDetail::of(sent[16]);
   EXPECT_NEAR(detail.voltage_rc, -0.0123456, 1e-6);
   EXPECT_NEAR(detail.voltage_predicted, 3.2999, 1e-6);
-  const auto status = can::Status::of(sent[16]);
+  const auto status = can::Status::of(sent[17]);
   EXPECT_EQ(status.flags, voltage_stuck);
   EXPECT_EQ(status.sample_counter, 1U);
   EXPECT_EQ(status.reset_cause, 4U);
@@ -145,6 +147,7 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   EXPECT_NEAR(can::Health::of(sent[5]).capacity, 100, 0.03);
   EXPECT_NEAR(can::Health::of(sent[5]).resistance_sigma, 30, 0.03);
   EXPECT_EQ(can::SocAnchor::of(sent[6]).observable, 0U);
+  EXPECT_EQ(can::Storage::of(sent[7]).state, can::Storage::state_no_flash);
   EXPECT_EQ(recorded.size(), 1U);
   EXPECT_EQ(fed, 1);
 }
@@ -195,7 +198,7 @@ TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
 }
 
 TEST_F(TelemetryTest, TheLogSaysWhereTheEstimatorWasToldToBegin) {
-  Application<Board<1>> told{StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6};
+  Application<Board<1>> told{StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6, persistence};
   told.take(pack_of(sample));
   EXPECT_EQ(last<can::StartingSoc>().value().soc_ppb, 812'345'678);
   EXPECT_EQ(last<can::StartingSoc>().value().given, can::StartingSoc::given_yes);
@@ -322,7 +325,7 @@ TEST_F(TelemetryTest, IdentityComesEachSecondAndAFaultOnce) {
 /// Sixteen cells at rest, contactors and link of a simulated truck.
 class PackTest : public TelemetryTest {
  protected:
-  Application<Board<16>> pack{std::nullopt, {0, 0}, 6};
+  Application<Board<16>> pack{std::nullopt, {0, 0}, 6, persistence};
   PackSample<16> reading{};
   double link_v = 0;
 

@@ -1,0 +1,67 @@
+// What of an estimate and of a condition is stored (storage/persistence.hpp), as integers; and what is taken up again.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "estimator/condition.hpp"
+#include "estimator/pack_estimator.hpp"
+#include "firmware/messages.hpp"
+#include "storage/persistence.hpp"
+
+namespace bms {
+
+// Keys of the settings, and codes of the faults, that this firmware stores.
+inline constexpr std::uint16_t kept_faults_key = 1;   ///< protection::Decision::kept
+inline constexpr std::uint16_t first_fault_code = 1;  ///< of protection::Fault 0
+
+/// Not a number, or beyond what fits: the nearest that does, 0 for NaN.
+constexpr std::int32_t scaled(float value, float by) {
+  const float scaled = value * by;
+  constexpr float most = 2'147'000'000.0F;
+  if (!(scaled > -most)) return scaled <= -most ? -2'147'000'000 : 0;
+  return scaled < most ? static_cast<std::int32_t>(scaled) : 2'147'000'000;
+}
+
+template <class S, std::size_t Cells>
+class RememberedOf {
+ public:
+  template <class Estimate, class Condition>
+  constexpr RememberedOf(const Estimate& e, const Condition& condition, const PackCells<S, Cells>& cells) {
+    using messages::number;
+    constexpr float ppm = 1e6F;
+    const bool known = (e.flags & not_started) == 0 && number(e.soc_sigma) > 0;
+    if (known) values_.pack = StoredEstimate{scaled(number(e.soc), 1e9F), scaled(number(e.soc_sigma), 1e9F)};
+    const auto capacity = condition.capacity(), resistance = condition.resistance();
+    values_.health = {scaled(number(capacity.ratio), ppm), scaled(number(capacity.sigma), ppm), scaled(number(resistance.ratio), ppm), scaled(number(resistance.sigma), ppm)};
+    if constexpr (Cells > 1) {
+      for (std::size_t k = 0; k < Cells; ++k) {
+        const std::int32_t soc = messages::ppb(cells[k].soc()) / per_unit, sigma = messages::ppb(cells[k].soc_sigma()) / per_unit;
+        cells_[k] = {static_cast<std::int16_t>(soc > most ? most : soc < -most ? -most : soc), static_cast<std::uint16_t>(sigma > 0 ? sigma < 65'535 ? sigma : 65'535 : 0)};
+      }
+    }
+  }
+
+  constexpr storage::Values values() const {
+    storage::Values v = values_;
+    if constexpr (Cells > 1) v.cells = cells_;
+    return v;
+  }
+
+ private:
+  static constexpr std::int32_t per_unit = 10'000, most = 32'000;  // ppb in a unit of CellsRecord
+
+  storage::Values values_;
+  std::array<storage::CellsRecord::Cell, Cells> cells_{};
+};
+
+/// A pack of another number of cells is another pack.
+template <class S, std::size_t Cells>
+constexpr void recall(PackCells<S, Cells>& cells, const storage::CellsRecord& stored) {
+  if (stored.count != Cells) return;
+  for (std::size_t k = 0; k < Cells; ++k) {
+    if (stored.cell[k].sigma > 0) cells.begin(k, model::from_micro<model::Voltage<S>>(stored.cell[k].soc * 10), model::from_micro<model::Voltage<S>>(stored.cell[k].sigma * 10));
+  }
+}
+
+}  // namespace bms

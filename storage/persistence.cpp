@@ -1,0 +1,180 @@
+#include "storage/persistence.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "hal/watchdog.hpp"
+
+namespace bms::storage {
+
+namespace {
+
+constexpr std::int32_t moved_soc_ppb = 1'000'000;
+constexpr std::int32_t moved_cell = 100, moved_health_ppm = 1'000;     // 0.1 % each
+constexpr std::uint16_t charge_at_least_minutes = 60, cells_every_minutes = 30, health_every_minutes = 60, fault_every_minutes = 10;
+constexpr std::uint8_t most_faults_at_once = 16;
+constexpr std::uint64_t uaus_per_uah = 3'600'000'000;
+constexpr std::uint16_t processor_fault_code = 0xFF00;  // and the exception's number
+
+constexpr std::array known_kinds{ChargeRecord::kind, CellsRecord::kind, HealthRecord::kind, EventsRecord::kind, SettingsRecord::kind};
+
+template <class R>
+bool get(Log& log, R& record) {
+  std::array<std::uint8_t, longest_payload> bytes;
+  const auto found = log.load(R::kind.type, R::kind.layout, bytes);
+  return found && decode(found->payload, found->layout, record);
+}
+
+template <class R>
+bool put(Log& log, const R& record) {
+  std::array<std::uint8_t, longest_payload> bytes;
+  return log.store(R::kind, encode(record, bytes)) == Stored::kept;
+}
+
+constexpr bool apart(std::int32_t a, std::int32_t b, std::int32_t by) {
+  const std::int64_t d = std::int64_t{a} - b;
+  return d >= by || -d >= by;
+}
+
+constexpr std::uint16_t counted(std::uint16_t minutes) { return minutes < 0xFFFF ? static_cast<std::uint16_t>(minutes + 1) : minutes; }
+
+/// The power stayed on over those.
+constexpr bool only_the_core(hal::ResetCause cause) { return cause == hal::ResetCause::software || cause == hal::ResetCause::watchdog || cause == hal::ResetCause::pin; }
+
+}  // namespace
+
+void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault, std::optional<std::uint32_t> calendar_s) {
+  log_.open();
+  known_ = get(log_, charge_kept_);
+  charge_ = charge_kept_;
+  soc_before_ppb_ = charge_.pack.soc_ppb;
+  get(log_, cells_);
+  if (HealthRecord health; get(log_, health)) health_ = health;
+  get(log_, events_);
+  get(log_, settings_);
+  if (only_the_core(cause)) off_s_ = 0;
+  else if (known_ && calendar_s && charge_kept_.calendar_s != 0 && *calendar_s >= charge_kept_.calendar_s) off_s_ = *calendar_s - charge_kept_.calendar_s;
+
+  ++events_.starts;
+  auto& resets = events_.resets[static_cast<std::size_t>(cause) % EventsRecord::causes];
+  if (resets < 0xFFFF) ++resets;
+  if (processor_fault) events_.add({static_cast<std::uint16_t>(processor_fault_code | (processor_fault->exception & 0xFFU)), charge_.operating_s});
+  events_changed_ = true;
+  for (std::uint32_t k = 0; k < log_.sectors() && log_.wants_erase(); ++k) {
+    log_.erase_one();
+    hal::watchdog_feed();
+  }
+}
+
+std::optional<StartingPoint> Persistence::starting_point() const {
+  if (!known_) return std::nullopt;
+  StoredEstimate stored = charge_kept_.pack;
+  const std::int64_t sigma = std::int64_t{stored.soc_sigma_ppb} + charge_kept_.moved_ppb;
+  stored.soc_sigma_ppb = static_cast<std::int32_t>(std::min<std::int64_t>(sigma, 1'000'000'000));
+  return resumed(stored, off_s_.value_or(unknown_off_s));
+}
+
+/// What was counted since the last call, in whole units; the rest stays.
+void Persistence::pass_time() {
+  charge_.charged_uah += charged_uaus_ / uaus_per_uah;
+  charged_uaus_ %= uaus_per_uah;
+  charge_.discharged_uah += discharged_uaus_ / uaus_per_uah;
+  discharged_uaus_ %= uaus_per_uah;
+  us_ += since_us_;
+  since_us_ = 0;
+  charge_.operating_s += us_ / 1'000'000;
+  us_ %= 1'000'000;
+}
+
+void Persistence::keep(const Values& now, std::optional<std::uint32_t> calendar_s) {
+  pass_time();
+  charge_minutes_ = counted(charge_minutes_);
+  cells_minutes_ = counted(cells_minutes_);
+  health_minutes_ = counted(health_minutes_);
+  if (faults_at_once_ < most_faults_at_once && ++fault_minutes_ >= fault_every_minutes) {
+    fault_minutes_ = 0;
+    ++faults_at_once_;
+  }
+  if (now.pack) {
+    const std::int64_t moved = std::int64_t{now.pack->soc_ppb} - soc_before_ppb_;
+    soc_before_ppb_ = now.pack->soc_ppb;
+    const bool first = !known_ || !kept_in_this_run_;
+    const bool has_moved = apart(now.pack->soc_ppb, charge_kept_.pack.soc_ppb, moved_soc_ppb) ||
+                           apart(now.pack->soc_sigma_ppb, charge_kept_.pack.soc_sigma_ppb, std::max(moved_soc_ppb / 10, charge_kept_.pack.soc_sigma_ppb / 10));
+    const bool long_ago = charge_minutes_ >= charge_at_least_minutes && (charge_.charged_uah != charge_kept_.charged_uah || charge_.discharged_uah != charge_kept_.discharged_uah);
+    if (first || has_moved || long_ago) put_charge(*now.pack, static_cast<std::uint32_t>(std::min<std::int64_t>(moved < 0 ? -moved : moved, 1'000'000'000)), calendar_s);
+  }
+  if (cells_minutes_ >= cells_every_minutes) put_cells(now.cells);
+  if (health_minutes_ >= health_every_minutes) put_health(now.health);
+  if (events_changed_ && faults_at_once_ > 0) {
+    --faults_at_once_;
+    put_events();
+  }
+  if (settings_changed_) put_settings();
+}
+
+void Persistence::power_failing(const Values& now, std::optional<std::uint32_t> calendar_s) {
+  pass_time();
+  if (now.pack) put_charge(*now.pack, 0, calendar_s);
+  if (events_changed_) put_events();
+  put_cells(now.cells);
+  put_health(now.health);
+  if (settings_changed_) put_settings();
+}
+
+void Persistence::fault(std::uint16_t code) {
+  events_.add({code, charge_.operating_s});
+  events_changed_ = true;
+  if (faults_at_once_ == 0) return;
+  --faults_at_once_;
+  put_events();
+}
+
+bool Persistence::set(std::uint16_t key, std::int32_t value) {
+  const std::uint16_t before = settings_.revision;
+  if (!settings_.set(key, value)) return false;
+  settings_changed_ = settings_changed_ || settings_.revision != before;
+  if (settings_changed_) put_settings();
+  return true;
+}
+
+void Persistence::put_charge(const StoredEstimate& now, std::uint32_t moved_ppb, std::optional<std::uint32_t> calendar_s) {
+  charge_.pack = now;
+  charge_.moved_ppb = moved_ppb;
+  charge_.calendar_s = calendar_s.value_or(0);
+  if (!put(log_, charge_)) return;
+  charge_kept_ = charge_;
+  known_ = kept_in_this_run_ = true;
+  charge_minutes_ = 0;
+}
+
+void Persistence::put_cells(std::span<const CellsRecord::Cell> now) {
+  if (now.empty() || now.size() > CellsRecord::most) return;
+  bool moved = cells_.count != now.size();
+  for (std::size_t k = 0; !moved && k < now.size(); ++k) moved = apart(now[k].soc, cells_.cell[k].soc, moved_cell);
+  if (!moved) return;
+  CellsRecord next;
+  next.count = static_cast<std::uint8_t>(now.size());
+  std::ranges::copy(now, next.cell.begin());
+  if (!put(log_, next)) return;
+  cells_ = next;
+  cells_minutes_ = 0;
+}
+
+void Persistence::put_health(const HealthRecord& now) {
+  const bool moved = !health_ || apart(now.capacity_ppm, health_->capacity_ppm, moved_health_ppm) || apart(now.resistance_ppm, health_->resistance_ppm, moved_health_ppm) ||
+                     apart(now.capacity_sigma_ppm, health_->capacity_sigma_ppm, moved_health_ppm) || apart(now.resistance_sigma_ppm, health_->resistance_sigma_ppm, moved_health_ppm);
+  if (!moved || !put(log_, now)) return;
+  health_ = now;
+  health_minutes_ = 0;
+}
+
+void Persistence::put_events() { events_changed_ = !put(log_, events_); }
+void Persistence::put_settings() { settings_changed_ = !put(log_, settings_); }
+
+std::uint32_t Persistence::newer_records() const {
+  const auto newer = [](const Record& r) { return std::ranges::none_of(known_kinds, [&](const Kind& k) { return k.type == r.kind.type && k.layout >= r.kind.layout; }); };
+  return static_cast<std::uint32_t>(std::ranges::count_if(log_.in_force(), newer));
+}
+
+}  // namespace bms::storage

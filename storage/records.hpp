@@ -1,0 +1,271 @@
+// What is stored, and how it lies in a record: little-endian, field after field (hal/bytes.hpp). A record is decoded only if it has the
+// length that its layout says; a record of an older layout is read by what is left of that layout here.
+//
+//   type      layout  bytes  content
+//   charge    2       32     state of charge, charge moved, time in operation: the only one that is written often
+//             1       8      (older) state of charge alone
+//   cells     1       1+4n   each cell beside the mean
+//   health    1       16     capacity and resistance
+//   events    1       118    starts, resets by cause, the last sixteen faults
+//   settings  1       3+6n   values by key
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "estimator/restart.hpp"
+#include "hal/bytes.hpp"
+#include "storage/log.hpp"
+
+namespace bms::storage {
+
+using Payload = std::span<std::uint8_t, longest_payload>;
+using Bytes = std::span<const std::uint8_t>;
+
+/// Writes field after field.
+class Encoder {
+ public:
+  constexpr explicit Encoder(Payload into) : into_(into) {}
+  template <class T>
+  constexpr Encoder& put(T value, std::size_t size = sizeof(T)) {
+    hal::put_bytes(into_, at_, value, size);
+    at_ += size;
+    return *this;
+  }
+  constexpr Bytes bytes() const { return into_.first(at_); }
+
+ private:
+  Payload into_;
+  std::size_t at_ = 0;
+};
+
+/// Reads them again; beyond the end, zeros.
+class Decoder {
+ public:
+  constexpr explicit Decoder(Bytes from) : from_(from) {}
+  template <class T>
+  constexpr void get(T& value, std::size_t size = sizeof(T)) {
+    value = at_ + size <= from_.size() ? hal::get_bytes<T>(from_, at_, size) : T{};
+    at_ += size;
+  }
+
+ private:
+  Bytes from_;
+  std::size_t at_ = 0;
+};
+
+struct ChargeRecord {
+  static constexpr Kind kind{1, 2};
+
+  StoredEstimate pack;
+  std::uint32_t moved_ppb = 0;       ///< by which soc may have moved since: what it moved before this was written; 0 at a shutdown
+  std::uint64_t charged_uah = 0, discharged_uah = 0;
+  std::uint32_t operating_s = 0;
+  std::uint32_t calendar_s = 0;      ///< hal/calendar.hpp; 0: no clock
+
+  constexpr bool operator==(const ChargeRecord& o) const {
+    return pack.soc_ppb == o.pack.soc_ppb && pack.soc_sigma_ppb == o.pack.soc_sigma_ppb && moved_ppb == o.moved_ppb && charged_uah == o.charged_uah &&
+           discharged_uah == o.discharged_uah && operating_s == o.operating_s && calendar_s == o.calendar_s;
+  }
+};
+
+/// Thousandths of a full cycle: what was discharged over the capacity.
+constexpr std::uint64_t cycles_milli(const ChargeRecord& r, std::uint32_t capacity_uah) { return capacity_uah == 0 ? 0 : r.discharged_uah * 1'000 / capacity_uah; }
+
+constexpr Bytes encode(const ChargeRecord& r, Payload into) {
+  return Encoder(into).put(r.pack.soc_ppb).put(r.pack.soc_sigma_ppb).put(r.moved_ppb).put(r.charged_uah, 6).put(r.discharged_uah, 6).put(r.operating_s).put(r.calendar_s).bytes();
+}
+
+/// The estimator's soc goes a little beyond 0 and 1; one that goes further, or a sigma that cannot be, is nothing to go by.
+constexpr StoredEstimate possible(StoredEstimate e) {
+  constexpr std::int32_t one = 1'000'000'000, beyond = one / 4, anything = 289'000'000;
+  if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > anything) e.soc_sigma_ppb = anything;
+  e.soc_ppb = e.soc_ppb < 0 ? 0 : e.soc_ppb > one ? one : e.soc_ppb;
+  return e;
+}
+
+constexpr bool decode(Bytes from, std::uint8_t layout, ChargeRecord& r) {
+  Decoder d(from);
+  if (layout == 1 && from.size() == 8) {
+    // soc alone, by a firmware that counted nothing: counters begin at 0, and how fast soc moved was not known
+    constexpr std::uint32_t a_minute_at_1c_ppb = 16'666'667;
+    r = {};
+    r.moved_ppb = a_minute_at_1c_ppb;
+    d.get(r.pack.soc_ppb);
+    d.get(r.pack.soc_sigma_ppb);
+  } else if (layout == 2 && from.size() == 32) {
+    d.get(r.pack.soc_ppb);
+    d.get(r.pack.soc_sigma_ppb);
+    d.get(r.moved_ppb);
+    d.get(r.charged_uah, 6);
+    d.get(r.discharged_uah, 6);
+    d.get(r.operating_s);
+    d.get(r.calendar_s);
+  } else {
+    return false;
+  }
+  r.pack = possible(r.pack);
+  return true;
+}
+
+struct CellsRecord {
+  static constexpr Kind kind{2, 1};
+  static constexpr std::size_t most = 16;
+  struct Cell {
+    std::int16_t soc = 0;     ///< less the mean's, in 1e-5: +-0.32
+    std::uint16_t sigma = 0;  ///< in 1e-5
+    constexpr bool operator==(const Cell&) const = default;
+  };
+
+  std::uint8_t count = 0;
+  std::array<Cell, most> cell{};
+  constexpr bool operator==(const CellsRecord&) const = default;
+};
+
+constexpr Bytes encode(const CellsRecord& r, Payload into) {
+  Encoder e(into);
+  e.put(r.count);
+  for (std::size_t k = 0; k < r.count; ++k) e.put(r.cell[k].soc).put(r.cell[k].sigma);
+  return e.bytes();
+}
+
+constexpr bool decode(Bytes from, std::uint8_t layout, CellsRecord& r) {
+  Decoder d(from);
+  std::uint8_t count = 0;
+  d.get(count);
+  if (layout != 1 || count > CellsRecord::most || from.size() != 1 + std::size_t{4} * count) return false;
+  r = {};
+  r.count = count;
+  for (std::size_t k = 0; k < count; ++k) {
+    d.get(r.cell[k].soc);
+    d.get(r.cell[k].sigma);
+  }
+  return true;
+}
+
+/// Against the cell file, in millionths; 1,000,000 is as new.
+struct HealthRecord {
+  static constexpr Kind kind{3, 1};
+
+  std::int32_t capacity_ppm = 0, capacity_sigma_ppm = 0, resistance_ppm = 0, resistance_sigma_ppm = 0;
+  constexpr bool operator==(const HealthRecord&) const = default;
+};
+
+constexpr Bytes encode(const HealthRecord& r, Payload into) {
+  return Encoder(into).put(r.capacity_ppm).put(r.capacity_sigma_ppm).put(r.resistance_ppm).put(r.resistance_sigma_ppm).bytes();
+}
+
+constexpr bool decode(Bytes from, std::uint8_t layout, HealthRecord& r) {
+  if (layout != 1 || from.size() != 16) return false;
+  Decoder d(from);
+  d.get(r.capacity_ppm);
+  d.get(r.capacity_sigma_ppm);
+  d.get(r.resistance_ppm);
+  d.get(r.resistance_sigma_ppm);
+  return true;
+}
+
+struct EventsRecord {
+  static constexpr Kind kind{4, 1};
+  static constexpr std::size_t causes = 7, most_faults = 16;
+  struct Fault {
+    std::uint16_t code = 0;          ///< 0: none
+    std::uint32_t operating_s = 0;   ///< when
+    constexpr bool operator==(const Fault&) const = default;
+  };
+
+  std::uint32_t starts = 0;
+  std::array<std::uint16_t, causes> resets{};  ///< by hal::ResetCause; stays at 65,535
+  std::uint32_t faults = 0;                    ///< ever; the newest is at (faults - 1) modulo 16
+  std::array<Fault, most_faults> fault{};
+
+  constexpr void add(const Fault& f) { fault[faults++ % most_faults] = f; }
+  /// back: 0 for the newest, below 16.
+  constexpr Fault last(std::uint32_t back) const { return back < faults ? fault[(faults - 1 - back) % most_faults] : Fault{}; }
+  constexpr bool operator==(const EventsRecord&) const = default;
+};
+
+constexpr Bytes encode(const EventsRecord& r, Payload into) {
+  Encoder e(into);
+  e.put(r.starts);
+  for (const auto n : r.resets) e.put(n);
+  e.put(r.faults);
+  for (const auto& f : r.fault) e.put(f.code).put(f.operating_s);
+  return e.bytes();
+}
+
+constexpr bool decode(Bytes from, std::uint8_t layout, EventsRecord& r) {
+  if (layout != 1 || from.size() != 118) return false;
+  Decoder d(from);
+  d.get(r.starts);
+  for (auto& n : r.resets) d.get(n);
+  d.get(r.faults);
+  for (auto& f : r.fault) {
+    d.get(f.code);
+    d.get(f.operating_s);
+  }
+  return true;
+}
+
+/// Values that were set in the field, by key; what is not there has its default. Who gives a key a meaning never gives it another.
+struct SettingsRecord {
+  static constexpr Kind kind{5, 1};
+  static constexpr std::size_t most = 24;
+  struct Setting {
+    std::uint16_t key = 0;
+    std::int32_t value = 0;
+    constexpr bool operator==(const Setting&) const = default;
+  };
+
+  std::uint16_t revision = 0;   ///< one more with every change
+  std::uint8_t count = 0;
+  std::array<Setting, most> setting{};
+
+  constexpr std::optional<std::int32_t> get(std::uint16_t key) const {
+    for (std::size_t k = 0; k < count; ++k) {
+      if (setting[k].key == key) return setting[k].value;
+    }
+    return std::nullopt;
+  }
+  /// False: no room for another key.
+  constexpr bool set(std::uint16_t key, std::int32_t value) {
+    std::size_t k = 0;
+    while (k < count && setting[k].key != key) ++k;
+    if (k == most) return false;
+    if (k == count) ++count;
+    else if (setting[k].value == value) return true;
+    setting[k] = {key, value};
+    ++revision;
+    return true;
+  }
+  constexpr bool operator==(const SettingsRecord&) const = default;
+};
+
+constexpr Bytes encode(const SettingsRecord& r, Payload into) {
+  Encoder e(into);
+  e.put(r.revision).put(r.count);
+  for (std::size_t k = 0; k < r.count; ++k) e.put(r.setting[k].key).put(r.setting[k].value);
+  return e.bytes();
+}
+
+constexpr bool decode(Bytes from, std::uint8_t layout, SettingsRecord& r) {
+  Decoder d(from);
+  std::uint16_t revision = 0;
+  std::uint8_t count = 0;
+  d.get(revision);
+  d.get(count);
+  if (layout != 1 || count > SettingsRecord::most || from.size() != 3 + std::size_t{6} * count) return false;
+  r = {};
+  r.revision = revision;
+  r.count = count;
+  for (std::size_t k = 0; k < count; ++k) {
+    d.get(r.setting[k].key);
+    d.get(r.setting[k].value);
+  }
+  return true;
+}
+
+}  // namespace bms::storage

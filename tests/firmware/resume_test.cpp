@@ -1,0 +1,167 @@
+// The application's image in the emulator, switched off and on again: its flash is a file that both runs share.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "host_sim/recording.hpp"
+#include "host_sim/replay.hpp"
+#include "host_sim/text_file.hpp"
+#include "tests/firmware/slcan_board.hpp"
+
+namespace bms {
+namespace {
+
+constexpr double percent = 500;  // raw soc: 0.002 %
+constexpr const char* start_at_80_percent_to_1 = "t31280008AF2F80969800\r";
+
+std::filesystem::path image() { return firmware_image("netduinoplus2", read_cell("table9"), Image::application); }
+
+/// Seven minutes of the shift; a reading a second.
+std::vector<Sample> some_minutes() {
+  const auto all = samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  return {all.begin() + 3'000, all.begin() + 3'420};
+}
+
+class Board {
+ public:
+  explicit Board(const std::filesystem::path& flash) : board_(image(), {flash.string()}) {
+    board_.read();
+    board_.write("O\r");
+    board_.read();
+  }
+  void tell(const char* frame) { board_.write(frame); }
+  BoardTelemetry sample(const Sample& s) {
+    board_.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
+    return board_.telemetry();
+  }
+  BoardTelemetry drive(const std::vector<Sample>& part) {
+    BoardTelemetry last;
+    for (const Sample& s : part) last = sample(s);
+    return last;
+  }
+  /// With the first sample: state, broken sectors, newer records, erases, starts.
+  std::string storage(const Sample& s) {
+    board_.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
+    return board_.read_until("t1B88").substr(5);
+  }
+  void switch_off() {
+    board_.write("C\r");
+    EXPECT_EQ(board_.wait(), 0);
+  }
+
+ private:
+  SlcanBoard board_;
+};
+
+/// The frame that tells a start, of what telemetry said.
+std::string start(const BoardTelemetry& t) {
+  std::string frame = "t3128";
+  for (const std::uint32_t ppb : {20'000U * t.soc, 20'000U * t.soc_sigma}) {
+    for (int k = 0; k < 4; ++k) frame += fmt::format("{:02X}", ppb >> (8 * k) & 0xFF);
+  }
+  return frame + "\r";
+}
+
+class Resume : public ::testing::Test {
+ protected:
+  std::filesystem::path flash() const { return folder_.path() / "flash"; }
+  /// A board that remembers nothing and is told where to begin.
+  BoardTelemetry told_of(const BoardTelemetry& t, const Sample& s) const {
+    Board board(folder_.path() / "empty");
+    board.tell(start(t).c_str());
+    return board.sample(s);
+  }
+  TemporaryFolder folder_;
+  std::vector<Sample> part_ = some_minutes();
+};
+
+void say(const char* what, const BoardTelemetry& t) { std::printf("%s: soc %.2f %% +- %.2f %%\n", what, t.soc / percent, t.soc_sigma / percent); }
+
+TEST_F(Resume, AfterAShutdownSocGoesOnWhereItWas) {
+  BoardTelemetry before;
+  {
+    Board board(flash());
+    board.tell(start_at_80_percent_to_1);
+    before = board.drive(part_);
+    board.switch_off();
+  }
+  EXPECT_EQ(std::filesystem::file_size(flash()), 3U * 16 * 1024);
+  BoardTelemetry fresh;
+  {
+    Board board(folder_.path() / "another");
+    fresh = board.sample(part_.back());
+  }
+  const BoardTelemetry told = told_of(before, part_.back());
+  Board board(flash());
+  const BoardTelemetry after = board.sample(part_.back());
+  say("at the shutdown", before);
+  say("resumed, with the first voltage in it", after);
+  say("told what was shown at the shutdown", told);
+  say("without what was stored", fresh);
+  EXPECT_NEAR(after.soc, told.soc, 2) << "counts of 0.002 %: as if it had been told, to the last digit that is shown";
+  EXPECT_NEAR(after.soc_sigma, told.soc_sigma, 2);
+  EXPECT_LT(std::abs(static_cast<int>(after.soc) - static_cast<int>(before.soc)), static_cast<int>(before.soc_sigma));
+  EXPECT_GT(fresh.soc_sigma, 3 * after.soc_sigma) << "a voltage on the plateau says little";
+}
+
+TEST_F(Resume, AfterTheSupplyWasCutSocIsThatOfTheLastMinuteAndSigmaSaysSo) {
+  BoardTelemetry before;
+  {
+    Board board(flash());
+    board.tell(start_at_80_percent_to_1);
+    before = board.drive(part_);
+  }  // the emulator is killed
+  Board board(flash());
+  const BoardTelemetry after = board.sample(part_.back());
+  say("when the supply was cut", before);
+  say("resumed", after);
+  EXPECT_NEAR(after.soc, before.soc, 2 * percent) << "what a minute moves at 1C";
+  EXPECT_LT(std::abs(static_cast<int>(after.soc) - static_cast<int>(before.soc)), 2 * static_cast<int>(after.soc_sigma));
+}
+
+TEST_F(Resume, AStartThatIsToldWinsOverWhatWasStored) {
+  {
+    Board board(flash());
+    board.tell(start_at_80_percent_to_1);
+    board.drive({part_.begin(), part_.begin() + 200});
+    board.switch_off();
+  }
+  Board board(flash());
+  board.tell("t3128" "00E9A435" "40420F00" "\r");  // 900,000,000 and 1,000,000 ppb
+  EXPECT_NEAR(board.sample(part_[0]).soc, 90 * percent, 0.2 * percent);
+}
+
+TEST_F(Resume, TheBusIsToldHowOftenItStartedAndThatItsFlashWorks) {
+  for (int starts = 1; starts <= 3; ++starts) {
+    Board board(flash());
+    const std::string bytes = board.storage(part_[0]);
+    EXPECT_EQ(bytes[2], '1') << "works: " << bytes;
+    EXPECT_EQ(bytes.substr(4, 2), "00") << "no broken sector, no newer record: " << bytes;
+    EXPECT_EQ(bytes.substr(10), fmt::format("{:02X}0000", starts)) << bytes;
+    board.switch_off();
+  }
+}
+
+TEST_F(Resume, AFlashFileOfAnyContentIsUsed) {
+  std::string noise(3 * 16 * 1024, '\0');
+  unsigned state = 1;
+  for (char& c : noise) c = static_cast<char>((state = state * 1'664'525 + 1'013'904'223) >> 24);
+  write_file(flash(), noise);
+  BoardTelemetry before;
+  {
+    Board board(flash());
+    board.tell(start_at_80_percent_to_1);
+    before = board.drive({part_.begin(), part_.begin() + 200});
+    board.switch_off();
+  }
+  const BoardTelemetry told = told_of(before, part_[0]);
+  Board board(flash());
+  EXPECT_NEAR(board.sample(part_[0]).soc, told.soc, 2);
+}
+
+}  // namespace
+}  // namespace bms

@@ -1,0 +1,310 @@
+// What is remembered over boots, when it is written, and how long flash lasts with it.
+#include "storage/persistence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "hal/watchdog.hpp"
+#include "tests/storage/flash_model.hpp"
+#include "tests/storage/record_bytes.hpp"
+
+namespace bms {
+
+namespace hal {
+void watchdog_feed() {}
+}  // namespace hal
+
+namespace {
+
+using hal::ResetCause;
+using storage::CellsRecord;
+using storage::Persistence;
+using storage::Values;
+
+constexpr hal::FlashSize chip{3, 16 * 1024};  // as boards/netduinoplus2/memory.ld has it
+constexpr std::int32_t percent_ppb = 10'000'000;
+
+class PersistenceTest : public ::testing::Test {
+ protected:
+  PersistenceTest() { plug_in(&flash); }
+
+  Persistence& boot(ResetCause cause = ResetCause::power_on, std::optional<std::uint32_t> calendar = std::nullopt, bool processor_fault = false) {
+    time_us = 0;
+    p = {};
+    p.start(cause, processor_fault ? std::optional(hal::FaultRecord{.exception = 5}) : std::nullopt, calendar);
+    p.count(Sample{});  // from here on time counts
+    return p;
+  }
+  /// Minutes of a sample a second.
+  void drive(int minutes, std::int32_t current_ua = 0, std::int32_t soc_per_minute_ppb = 0) {
+    for (int k = 0; k < 60 * minutes; ++k) {
+      Sample s;
+      s.time_us = time_us += 1'000'000;
+      s.current_ua = current_ua;
+      if (!p.count(s)) continue;
+      pack.soc_ppb += soc_per_minute_ppb;
+      p.keep(now(), calendar_s);
+      if (erases_allowed) p.erase_one();
+    }
+  }
+  Values now() { return {known ? std::optional(pack) : std::nullopt, cells, health}; }
+  /// Steps of programming so far: nothing more is worn by what leaves it as it is.
+  std::uint64_t steps() const { return flash.steps(); }
+
+  FlashModel flash{chip, 1};
+  Persistence p;
+  std::uint64_t time_us = 0;
+  StoredEstimate pack{60 * percent_ppb, percent_ppb};
+  std::vector<CellsRecord::Cell> cells;
+  storage::HealthRecord health{1'000'000, 100'000, 1'000'000, 300'000};
+  std::optional<std::uint32_t> calendar_s;
+  bool known = true, erases_allowed = true;
+};
+
+TEST_F(PersistenceTest, NewFlashGivesNoStartAndIsErasedAtBoot) {
+  EXPECT_FALSE(boot().starting_point());
+  EXPECT_FALSE(p.wants_erase());
+  EXPECT_EQ(p.events().starts, 1U);
+}
+
+TEST_F(PersistenceTest, SocIsResumedAfterAResetWithSigmaForTheMinuteThatWasNotWritten) {
+  boot();
+  drive(3, -3'000'000, -8'000'000);
+  boot(ResetCause::watchdog);
+  ASSERT_TRUE(p.starting_point());
+  EXPECT_EQ(p.starting_point()->soc_ppb, 576'000'000);
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, 18'000'000) << "1 % and what moved in the last minute";
+  EXPECT_EQ(p.off_s(), 0U);
+}
+
+TEST_F(PersistenceTest, AfterAShutdownNothingIsMissing) {
+  boot();
+  drive(3, -3'000'000, -8'000'000);
+  pack.soc_ppb = 571'234'567;
+  p.power_failing(now(), std::nullopt);
+  boot(ResetCause::watchdog);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 571'234'567);
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, percent_ppb);
+}
+
+TEST_F(PersistenceTest, TimeOffWidensSigmaByTheCalendarOrByASeasonWithoutOne) {
+  boot();
+  calendar_s = 1'000'000;
+  drive(1);
+  p.power_failing(now(), 1'000'000);
+  boot(ResetCause::power_on, 1'000'000 + 10 * 86'400);
+  EXPECT_EQ(p.off_s(), 864'000U);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 58 * percent_ppb) << "0.2 % a day";
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, 3 * percent_ppb);
+  boot(ResetCause::power_on, std::nullopt);
+  EXPECT_FALSE(p.off_s());
+  EXPECT_EQ(p.starting_point()->soc_ppb, 42 * percent_ppb);
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, 19 * percent_ppb);
+  boot(ResetCause::power_on, 999'999);
+  EXPECT_FALSE(p.off_s()) << "a clock that went back tells nothing";
+}
+
+TEST_F(PersistenceTest, AnEstimateThatHasNotBegunIsNotStoredOverOneThatWas) {
+  boot();
+  drive(2);
+  known = false;
+  boot(ResetCause::watchdog);
+  drive(5);
+  p.power_failing(now(), std::nullopt);
+  boot(ResetCause::watchdog);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 60 * percent_ppb);
+}
+
+TEST_F(PersistenceTest, EverythingComesBack) {
+  cells.assign(16, {});
+  for (int k = 0; k < 16; ++k) cells[static_cast<std::size_t>(k)] = {static_cast<std::int16_t>(500 * k - 4'000), 700};
+  health = {930'000, 5'000, 1'200'000, 20'000};
+  boot(ResetCause::watchdog);
+  drive(120, 6'000'000);
+  drive(60, -12'000'000);
+  p.fault(0x0102);
+  EXPECT_TRUE(p.set(40, -5));
+  p.power_failing(now(), std::nullopt);
+  boot(ResetCause::power_on);
+  EXPECT_EQ(p.charge().charged_uah, 12'000'000U) << "6 A for two hours";
+  EXPECT_EQ(p.charge().discharged_uah, 12'000'000U);
+  EXPECT_EQ(p.charge().operating_s, 180U * 60);
+  EXPECT_EQ(storage::cycles_milli(p.charge(), 6'000'000), 2'000U);
+  ASSERT_EQ(p.cells().count, 16);
+  EXPECT_TRUE(std::equal(cells.begin(), cells.end(), p.cells().cell.begin()));
+  EXPECT_EQ(p.health(), health);
+  EXPECT_EQ(p.events().last(0).code, 0x0102);
+  EXPECT_EQ(p.events().last(0).operating_s, 180U * 60);
+  EXPECT_EQ(p.events().starts, 2U);
+  EXPECT_EQ(p.events().resets[static_cast<std::size_t>(ResetCause::watchdog)], 1U);
+  EXPECT_EQ(p.settings().get(40), -5);
+}
+
+TEST_F(PersistenceTest, AFaultIsWrittenAtOnceAndAProcessorsFaultWithTheNextMinute) {
+  boot();
+  drive(1);
+  p.fault(7);
+  boot();
+  EXPECT_EQ(p.events().last(0).code, 7);
+  boot(ResetCause::software, std::nullopt, true);
+  EXPECT_EQ(p.events().last(0).code, 0xFF05);
+  drive(1);
+  boot();
+  EXPECT_EQ(p.events().last(0).code, 0xFF05);
+  EXPECT_EQ(p.events().last(1).code, 7);
+}
+
+TEST_F(PersistenceTest, AStormOfFaultsAndAChainOfStartsWriteLittle) {
+  boot();
+  drive(1);
+  const auto before = steps();
+  for (int k = 0; k < 10'000; ++k) p.fault(9);
+  const auto burst = steps() - before;
+  EXPECT_LE(burst, 16 * 40U);
+  for (int minute = 0; minute < 24 * 60; ++minute) {
+    p.fault(9);
+    drive(1);
+  }
+  // sixteen and one every ten minutes, 34 words each; and charge once
+  EXPECT_LE(steps() - before, burst + (24 * 6 + 2) * 34U + 100) << "a day";
+  boot();
+  drive(1);
+  const auto started = steps();
+  for (int k = 0; k < 100; ++k) {
+    boot(ResetCause::brown_out);
+    time_us = 0;
+    for (int s = 0; s < 59; ++s) {
+      Sample sample;
+      sample.time_us = time_us += 1'000'000;
+      EXPECT_FALSE(p.count(sample));
+    }
+  }
+  EXPECT_EQ(steps(), started);
+}
+
+TEST_F(PersistenceTest, AStillBatteryIsWrittenDownOnce) {
+  boot();
+  drive(1);
+  const auto before = steps();
+  drive(600);
+  EXPECT_LE(steps() - before, 8U) << "health, after an hour";
+}
+
+TEST_F(PersistenceTest, WithoutLeaveToEraseTheReserveLastsForElevenHoursOfMovingAndThenNothingIsLost) {
+  boot();
+  erases_allowed = false;
+  const auto erases = flash.erases();
+  int minutes = 0;
+  for (std::uint64_t before = ~0ULL; before != steps() && minutes < 5'000; ++minutes) {
+    before = steps();
+    drive(1, -6'000'000, minutes % 2 == 0 ? -2'000'000 : 2'000'000);
+  }
+  std::printf("%d minutes without an erase\n", minutes);
+  EXPECT_GT(minutes, 11 * 60);
+  EXPECT_LT(minutes, 5'000);
+  EXPECT_EQ(flash.erases(), erases);
+  EXPECT_TRUE(p.wants_erase());
+  EXPECT_TRUE(p.log().works());
+  EXPECT_EQ(boot(ResetCause::watchdog).starting_point()->soc_ppb / 1'000'000, minutes % 2 == 0 ? 598 : 600) << "of the last minute that was written";
+}
+
+/// Layout 1 as the first firmware that stored anything wrote it, in flash that nobody else has touched.
+TEST_F(PersistenceTest, AnOlderFirmwaresRecordIsMigrated) {
+  std::vector<std::uint8_t> sector(16, 0), payload;
+  put(payload, 432'100'000);
+  put(payload, 15'000'000);
+  const auto record = record_bytes(1, 1, 1, payload);
+  sector.insert(sector.end(), record.begin(), record.end());
+  flash.fill(0, sector);
+  boot(ResetCause::software);
+  ASSERT_TRUE(p.starting_point());
+  EXPECT_EQ(p.starting_point()->soc_ppb, 432'100'000);
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, 15'000'000 + 16'666'667);
+  EXPECT_EQ(p.newer_records(), 0U);
+  drive(2, -6'000'000, -16'666'667);
+  boot(ResetCause::software);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 566'666'666) << "as the estimator said, in the layout of today";
+  EXPECT_EQ(p.log().in_force().size(), 2U) << "charge in the layout of today, events; health is not due";
+}
+
+TEST_F(PersistenceTest, ANewerFirmwaresRecordIsKeptReportedAndNotRead) {
+  boot();
+  drive(1);
+  const std::vector<std::uint8_t> unknown(50, 0x5A);
+  {
+    storage::Log log;
+    log.open();
+    ASSERT_EQ(log.store({1, 3}, unknown), storage::Stored::kept);
+    ASSERT_EQ(log.store({9, 1}, unknown), storage::Stored::kept);
+  }
+  boot(ResetCause::software);
+  EXPECT_EQ(p.newer_records(), 2U);
+  EXPECT_FALSE(p.starting_point()) << "the newer firmware has replaced what this one wrote";
+  for (int k = 0; k < 3'000; ++k) drive(1, -6'000'000, k % 2 == 0 ? -2'000'000 : 2'000'000);
+  EXPECT_GE(p.log().rounds(), 2U);
+  boot(ResetCause::software);
+  EXPECT_EQ(p.newer_records(), 2U);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 60 * percent_ppb) << "what this firmware has written since";
+  std::array<std::uint8_t, storage::longest_payload> bytes;
+  storage::Log log;
+  log.open();
+  const auto found = log.load(9, 1, bytes);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(std::ranges::equal(found->payload, unknown));
+}
+
+TEST_F(PersistenceTest, WithoutFlashItRunsAndSaysSo) {
+  plug_in(nullptr);
+  boot();
+  EXPECT_FALSE(p.starting_point());
+  drive(2, 1'000'000);
+  p.fault(1);
+  EXPECT_TRUE(p.set(1, 2));
+  p.power_failing(now(), std::nullopt);
+  EXPECT_EQ(p.log().sectors(), 0U);
+  EXPECT_FALSE(p.log().works());
+  EXPECT_EQ(p.settings().get(1), 2) << "in this run";
+}
+
+TEST_F(PersistenceTest, WithBrokenSectorsItRunsAndSaysSo) {
+  for (std::uint32_t s = 0; s < 3; ++s) flash.wear_out(s, FlashModel::Wear::erase_fails);
+  boot();
+  drive(3, -6'000'000, -2'000'000);
+  EXPECT_EQ(p.log().broken(), 3U);
+  EXPECT_FALSE(p.log().works());
+  boot();
+  EXPECT_FALSE(p.starting_point());
+}
+
+/// A month of a truck that never rests: soc, cells and health move all the time. Written is what the policy lets through.
+TEST_F(PersistenceTest, FlashLastsSeventeenYearsOfMovingWithoutRest) {
+  constexpr double endurance = 10'000, minutes_a_year = 365.25 * 24 * 60;  // STM32F405 datasheet DS8626, flash endurance
+  boot();
+  cells.assign(16, {});
+  constexpr int days = 60;
+  const auto before = flash.erases();
+  for (int minute = 0; minute < days * 24 * 60; ++minute) {
+    for (auto& c : cells) c.soc = static_cast<std::int16_t>(minute % 3'000 - 1'500);
+    health.resistance_ppm = 1'000'000 + minute % 2 * 5'000 + minute % 300 * 1'000;
+    drive(1, -6'000'000, minute % 2 == 0 ? -2'000'000 : 2'000'000);
+  }
+  double most = 0, least = 1e9;
+  for (std::size_t s = 0; s < 3; ++s) {
+    const auto n = static_cast<double>(flash.erases()[s] - before[s]);
+    most = std::max(most, n);
+    least = std::min(least, n);
+  }
+  const double years = endurance / (most / days) / 365.25;
+  std::printf("%d days, a record of charge a minute: erased %.0f to %.0f times a sector, %.1f years\n", days, least, most, years);
+  EXPECT_LE(most - least, 1);
+  EXPECT_GT(years, 15);
+  EXPECT_LT(years, endurance * 3 * 341 / minutes_a_year) << "more than three lines a minute are written";
+  EXPECT_EQ(flash.violations(), 0U);
+}
+
+}  // namespace
+}  // namespace bms

@@ -1,0 +1,145 @@
+// What is stored, field by field; the older layout; what is not a record.
+#include "storage/records.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+namespace bms::storage {
+namespace {
+
+using Raw = std::vector<std::uint8_t>;
+
+template <class R>
+Raw bytes_of(const R& record) {
+  std::array<std::uint8_t, longest_payload> into;
+  const Bytes bytes = encode(record, into);
+  return {bytes.begin(), bytes.end()};
+}
+
+EventsRecord full_events() {
+  EventsRecord e;
+  e.starts = 0x01020304;
+  for (std::size_t k = 0; k < e.resets.size(); ++k) e.resets[k] = static_cast<std::uint16_t>(1000 + k);
+  for (std::uint16_t k = 1; k <= 20; ++k) e.add({k, 100'000U * k});
+  return e;
+}
+
+SettingsRecord full_settings() {
+  SettingsRecord s;
+  for (std::size_t k = 0; k < SettingsRecord::most; ++k) EXPECT_TRUE(s.set(static_cast<std::uint16_t>(7 * k), -100'000 * static_cast<std::int32_t>(k)));
+  return s;
+}
+
+CellsRecord full_cells() {
+  CellsRecord c;
+  c.count = 16;
+  for (std::size_t k = 0; k < 16; ++k) c.cell[k] = {static_cast<std::int16_t>(-3000 + 400 * static_cast<int>(k)), static_cast<std::uint16_t>(40'000 + k)};
+  return c;
+}
+
+TEST(ChargeRecord, LiesLittleEndianFieldAfterField) {
+  ChargeRecord r;
+  r.pack = {0x11223344, 0x0A0B0C0D};
+  r.moved_ppb = 5;
+  r.charged_uah = 0x060504030201;
+  r.discharged_uah = 0xFFFFFFFFFFFF;
+  r.operating_s = 0x01000000;
+  r.calendar_s = 0xFFFFFFFF;
+  EXPECT_EQ(bytes_of(r), (Raw{0x44, 0x33, 0x22, 0x11, 0x0D, 0x0C, 0x0B, 0x0A, 5, 0, 0, 0, 1, 2, 3, 4, 5, 6, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 1, 0xFF, 0xFF, 0xFF, 0xFF}));
+}
+
+template <class R>
+void comes_back(const R& record) {
+  const Raw bytes = bytes_of(record);
+  EXPECT_LE(bytes.size(), longest_payload);
+  R back;
+  ASSERT_TRUE(decode(bytes, R::kind.layout, back));
+  EXPECT_TRUE(back == record);
+  for (std::size_t n = 0; n < bytes.size(); ++n) EXPECT_FALSE(decode(Bytes(bytes).first(n), R::kind.layout, back)) << "cut to " << n;
+  Raw longer = bytes;
+  longer.push_back(0);
+  EXPECT_FALSE(decode(longer, R::kind.layout, back));
+  EXPECT_FALSE(decode(bytes, R::kind.layout + 1, back)) << "a newer layout is not guessed at";
+}
+
+TEST(Records, ComeBackAsTheyWereAndAreNotReadFromAnotherLength) {
+  ChargeRecord charge;
+  charge.pack = {987'654'321, 12'345'678};
+  charge.charged_uah = 123'456'789'012;
+  comes_back(charge);
+  comes_back(full_cells());
+  comes_back(CellsRecord{});
+  comes_back(HealthRecord{912'000, 3'000, 1'430'000, 20'000});
+  comes_back(full_events());
+  comes_back(full_settings());
+  comes_back(SettingsRecord{});
+}
+
+TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithSigmaForAMinuteThatWasNotCounted) {
+  const Raw layout_1{0x00, 0x46, 0xC3, 0x23, 0x80, 0x96, 0x98, 0x00};  // 600,000,000 and 10,000,000 ppb
+  ChargeRecord r;
+  r.charged_uah = 99;
+  ASSERT_TRUE(decode(layout_1, 1, r));
+  EXPECT_EQ(r.pack.soc_ppb, 600'000'000);
+  EXPECT_EQ(r.pack.soc_sigma_ppb, 10'000'000);
+  EXPECT_EQ(r.moved_ppb, 16'666'667U) << "1C for a minute";
+  EXPECT_EQ(r.charged_uah, 0U);
+  EXPECT_FALSE(decode(layout_1, 2, r));
+}
+
+TEST(ChargeRecord, ASocThatCannotBeIsNotBelieved) {
+  EXPECT_EQ(possible({1'040'000'000, 5}).soc_ppb, 1'000'000'000);
+  EXPECT_EQ(possible({1'040'000'000, 5}).soc_sigma_ppb, 5);
+  EXPECT_EQ(possible({-2'000'000'000, 5}).soc_sigma_ppb, 289'000'000);
+  EXPECT_EQ(possible({500'000'000, -5}).soc_sigma_ppb, 289'000'000);
+  EXPECT_EQ(possible({500'000'000, 0}).soc_sigma_ppb, 289'000'000);
+}
+
+TEST(EventsRecord, HoldsTheLastSixteenFaultsNewestFirst) {
+  const EventsRecord e = full_events();
+  EXPECT_EQ(e.faults, 20U);
+  EXPECT_EQ(e.last(0).code, 20);
+  EXPECT_EQ(e.last(15).code, 5);
+  EXPECT_EQ(e.last(15).operating_s, 500'000U);
+  EventsRecord few;
+  few.add({3, 4});
+  EXPECT_EQ(few.last(0).code, 3);
+  EXPECT_EQ(few.last(1).code, 0);
+}
+
+TEST(SettingsRecord, KeepsAValueByKeyAndSaysWhenItIsFull) {
+  SettingsRecord s = full_settings();
+  EXPECT_EQ(s.get(14), -200'000);
+  EXPECT_FALSE(s.get(15));
+  EXPECT_FALSE(s.set(9'999, 1));
+  const auto revision = s.revision;
+  EXPECT_TRUE(s.set(14, -200'000));
+  EXPECT_EQ(s.revision, revision) << "nothing has changed";
+  EXPECT_TRUE(s.set(14, 5));
+  EXPECT_EQ(s.get(14), 5);
+  EXPECT_EQ(s.revision, revision + 1);
+}
+
+TEST(Records, OfRandomBytesAreReadWithoutHarm) {
+  std::mt19937 random(1);
+  for (int k = 0; k < 100'000; ++k) {
+    Raw bytes(random() % 160);
+    for (auto& b : bytes) b = static_cast<std::uint8_t>(random());
+    const auto layout = static_cast<std::uint8_t>(random() % 4);
+    ChargeRecord charge;
+    CellsRecord cells;
+    HealthRecord health;
+    EventsRecord events;
+    SettingsRecord settings;
+    EXPECT_TRUE(!decode(bytes, layout, charge) || charge.pack.soc_sigma_ppb <= 289'000'000);
+    EXPECT_TRUE(!decode(bytes, layout, cells) || cells.count <= CellsRecord::most);
+    EXPECT_TRUE(!decode(bytes, layout, settings) || settings.count <= SettingsRecord::most);
+    decode(bytes, layout, health);
+    if (decode(bytes, layout, events)) events.add(events.last(3));
+  }
+}
+
+}  // namespace
+}  // namespace bms::storage
