@@ -23,6 +23,12 @@ struct SignalLayout {
   std::int32_t invalid;  ///< raw
 };
 
+/// What a raw value means, for people.
+struct ValueName {
+  std::int32_t raw;
+  const char* text;
+};
+
 constexpr std::uint64_t mask(unsigned bits) { return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1; }
 
 constexpr std::uint64_t bits_of(const hal::CanFrame& frame) {

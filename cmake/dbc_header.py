@@ -31,6 +31,10 @@ def number(value):
     return text if any(c in text for c in ".en") else text + ".0"
 
 
+def quoted(text):
+    return " ".join((text or "").replace("\\", "\\\\").replace('"', '\\"').split())
+
+
 def layout(signal):
     invalid = (signal.attributes.get("Invalid") or "").strip('"')
     return "{{{}, {}, {}, {}F, {}F, {}F, {}F, {}, {}}}".format(
@@ -63,6 +67,11 @@ def message(frame):
     lines += [f"    out.{snake(s.name)} = get<{snake(s.name)}_layout, decltype(out.{snake(s.name)})>(frame);" for s in values]
     lines += ["    return out;", "  }", "  /// see(name, unit, value, layout) for each.", "  template <class See>", "  constexpr void each(See&& see) {"]
     lines += [f'    see("{s.name}", "{s.unit}", {snake(s.name)}, {snake(s.name)}_layout);' for s in values]
+    lines += ["  }", "  /// see(name, comment, names of values) for each: what a person reads.", "  template <class See>", "  static void each_in_words(See&& see) {"]
+    for s in values:
+        names = ", ".join(f'ValueName{{{raw}, "{quoted(str(text))}"}}' for raw, text in sorted(s.values.items()))
+        lines.append(f'    {{ static constexpr std::array<ValueName, {len(s.values)}> names{{{{{names}}}}}; see("{s.name}", "{quoted(s.comment)}", std::span<const ValueName>(names)); }}' if names else
+                     f'    see("{s.name}", "{quoted(s.comment)}", std::span<const ValueName>());')
     lines += ["  }", "};", ""]
     return lines
 
@@ -70,7 +79,7 @@ def message(frame):
 def main():
     source, target = sys.argv[1:]
     frames = load(source).frames
-    lines = [f"// Made at build time from {os.path.basename(source)}; do not edit.", "#pragma once", "", "#include <cstdint>", "#include <tuple>", "", '#include "can/codec.hpp"', "", "namespace bms::can {", ""]
+    lines = [f"// Made at build time from {os.path.basename(source)}; do not edit.", "#pragma once", "", "#include <array>", "#include <cstdint>", "#include <span>", "#include <tuple>", "", '#include "can/codec.hpp"', "", "namespace bms::can {", ""]
     for frame in frames:
         lines += message(frame)
     names = ", ".join(f.name for f in frames)

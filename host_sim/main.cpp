@@ -13,6 +13,7 @@
 #include "host_sim/command_experiment.hpp"
 #include "host_sim/command_hil.hpp"
 #include "host_sim/command_identify.hpp"
+#include "host_sim/command_monitor.hpp"
 #include "host_sim/command_proof.hpp"
 #include "host_sim/command_replay.hpp"
 #include "host_sim/command_simulate.hpp"
@@ -160,6 +161,19 @@ void add_proof(CLI::App& app, bms::ProofOptions& o) {
   add_output(c, o.output);
 }
 
+void add_monitor(CLI::App& app, bms::MonitorOptions& o) {
+  CLI::App& c = *app.add_subcommand("monitor", "Show and log what the BMS says on CAN: a live screen on a terminal, a line a second elsewhere");
+  c.footer("Example: bms monitor can0 --record monday.log    then: bms monitor file:monday.log --csv monday.csv");
+  c.add_option("source", o.source, "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter; file:DUMP.log: a log of candump -L, maybe gzip, - for standard input")->required();
+  c.add_flag("--once", o.once, "end after the first complete picture; exit 1 if it never came");
+  c.add_option("--duration", o.duration_s, "end after so many seconds")->check(Within(0.01, 1e9))->type_name("S");
+  c.add_option("--csv", o.csv, "write a row with every signal for each Status message, which ends each sample")->check(not_empty)->type_name("FILE");
+  c.add_option("--record", o.record, "write every frame as candump -L does")->check(not_empty)->type_name("FILE");
+  c.add_option("--serve", o.serve_port, "a page with live plots on 127.0.0.1, at this port or any that is free; prints its address")->expected(0, 1)->check(Within(0, 65'535))->type_name("PORT");
+  c.add_option("--json", o.output.json, "write the last picture as one JSON object to FILE, '-' for standard output")->check(not_empty)->type_name("FILE");
+  c.add_flag("--quiet", o.output.quiet, "no screen, no lines");
+}
+
 /// own_file: what the command writes beside JSON and report.
 template <class Options>
 int run(Options& options, const std::string& own_file) {
@@ -201,6 +215,8 @@ int main(int argc, char** argv) {
   add_proof(app, proof);
   bms::HilOptions hil;
   add_hil(app, hil);
+  bms::MonitorOptions monitor;
+  add_monitor(app, monitor);
   try {
     app.parse(argc, argv);
     if (app.got_subcommand("replay")) return run(replay, replay.trace);
@@ -209,6 +225,10 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("diagnose")) return run(diagnose, diagnose.out);
     if (app.got_subcommand("proof")) return run(proof, "");
     if (app.got_subcommand("hil")) return run(hil, hil.candump);
+    if (app.got_subcommand("monitor")) {
+      if (app.get_subcommand("monitor")->count("--serve") > 0 && !monitor.serve_port) monitor.serve_port = 0;
+      return run(monitor, monitor.csv);
+    }
     if (app.got_subcommand("study")) return run(study, "");
     return run(experiment, experiment.out);
   } catch (const CLI::ParseError& error) {

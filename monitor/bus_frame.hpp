@@ -1,0 +1,45 @@
+// A frame as a host sees it on a CAN bus: any kind that can be there, with the time it was received.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "hal/can.hpp"
+
+namespace bms::monitor {
+
+enum class FrameKind : std::uint8_t {
+  standard,  ///< data, 11-bit id: the only kind that the BMS sends
+  extended,  ///< data, 29-bit id
+  remote,    ///< a request, either id
+  error,     ///< what the controller of this machine reports; id holds the class (linux/can/error.h)
+  fd,        ///< CAN FD, either id
+};
+
+struct BusFrame {
+  std::int64_t time_us = 0;      ///< since 1970, or since whatever a log counts from
+  FrameKind kind = FrameKind::standard;
+  bool long_id = false;          ///< 29 bits
+  std::uint8_t length = 0;       ///< bytes of data in use, at most 8, FD at most 64; of a remote request the length asked for
+  std::uint8_t fd_flags = 0;     ///< as candump writes them
+  std::uint32_t id = 0;
+  std::array<std::uint8_t, 64> data{};
+};
+
+/// The part that decoders look at; frame.kind must be standard.
+constexpr hal::CanFrame classic(const BusFrame& frame) {
+  hal::CanFrame out{static_cast<std::uint16_t>(frame.id), frame.length, {}};
+  for (std::size_t k = 0; k < out.data.size(); ++k) out.data[k] = frame.data[k];
+  return out;
+}
+
+constexpr BusFrame on_bus(const hal::CanFrame& frame, std::int64_t time_us) {
+  BusFrame out;
+  out.time_us = time_us;
+  out.length = frame.length;
+  out.id = frame.id;
+  for (std::size_t k = 0; k < frame.data.size(); ++k) out.data[k] = frame.data[k];
+  return out;
+}
+
+}  // namespace bms::monitor

@@ -1,0 +1,176 @@
+#include "monitor/bus_state.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <type_traits>
+
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+
+namespace bms::monitor {
+
+namespace {
+
+constexpr std::int64_t stale_without_cycle_us = 3'000'000;
+constexpr std::int64_t clock_set_us = 1'000'000;
+constexpr double smoothing = 1.0 / 8;
+
+template <class Message>
+MessageInfo info_of() {
+  MessageInfo info{Message::name, Message::id, Message::data_id, Message::cycle_us, {}, [](const hal::CanFrame& frame, std::span<double> values) {
+                     Message message = Message::of(frame);
+                     std::size_t k = 0;
+                     message.each([&](const char*, const char*, const auto& value, const can::SignalLayout&) { values[k++] = static_cast<double>(value); });
+                   }};
+  Message message;
+  message.each([&](const char* name, const char* unit, const auto& value, const can::SignalLayout& layout) {
+    info.signals.push_back({name, unit, "", std::is_integral_v<std::remove_cvref_t<decltype(value)>>, layout, {}});
+  });
+  std::size_t k = 0;
+  Message::each_in_words([&](const char*, const char* comment, std::span<const can::ValueName> names) {
+    info.signals[k].comment = comment;
+    info.signals[k++].names = names;
+  });
+  return info;
+}
+
+template <class... Message>
+std::vector<MessageInfo> infos_of(std::tuple<Message...>*) {
+  static_assert(sizeof...(Message) < 255);
+  return {info_of<Message>()...};
+}
+
+}  // namespace
+
+const std::vector<MessageInfo>& messages() {
+  static const std::vector<MessageInfo> all = infos_of(static_cast<can::Messages*>(nullptr));
+  return all;
+}
+
+double shortest(double value) {
+  std::array<char, 32> text;
+  const auto written = std::to_chars(text.data(), text.data() + text.size(), static_cast<float>(value));
+  double result = value;
+  std::from_chars(text.data(), written.ptr, result);
+  return result;
+}
+
+BusState::BusState() {
+  message_of_.fill(none);
+  for (std::size_t k = 0; k < messages().size(); ++k) {
+    message_of_[messages()[k].id & 0x7FFU] = static_cast<std::uint8_t>(k);
+    states_.emplace_back().values.assign(messages()[k].signals.size(), std::numeric_limits<double>::quiet_NaN());
+  }
+}
+
+std::size_t BusState::take(const BusFrame& frame) {
+  const std::size_t none_of_ours = states_.size();
+  if (frames_++ == 0) first_us_ = last_us_ = now_us_ = frame.time_us;
+  if (frame.time_us < last_us_ - clock_set_us) clock_set_back(frame.time_us);
+  last_us_ = std::max(last_us_, frame.time_us);
+  time_is(frame.time_us);
+  switch (frame.kind) {
+    case FrameKind::remote: ++remote_; return none_of_ours;
+    case FrameKind::fd: ++fd_; return none_of_ours;
+    case FrameKind::error:
+      ++errors_;
+      error_classes_ |= frame.id;
+      return none_of_ours;
+    case FrameKind::extended: break;
+    case FrameKind::standard:
+      if (const std::uint8_t message = message_of_[frame.id & 0x7FFU]; message != none) {
+        return take_ours(message, classic(frame), frame.time_us) ? message : none_of_ours;
+      }
+  }
+  take_unknown(frame);
+  return none_of_ours;
+}
+
+void BusState::clock_set_back(std::int64_t to_us) {
+  first_us_ -= last_us_ - to_us;
+  last_us_ = now_us_ = to_us;
+  for (MessageState& state : states_) state.last_us = std::min(state.last_us, to_us);
+}
+
+bool BusState::take_ours(std::size_t message, const hal::CanFrame& frame, std::int64_t time_us) {
+  const MessageInfo& info = messages()[message];
+  MessageState& state = states_[message];
+  if (frame.length != 8) {
+    ++state.wrong_length;
+    return false;
+  }
+  const std::uint8_t counter = can::counter_of(frame);
+  if (!can::intact(frame, info.data_id) || counter >= can::counters) {
+    ++state.crc_errors;
+    return false;
+  }
+  if (state.frames > 0) {
+    if (counter == state.counter) {
+      ++state.repeated;
+      return false;
+    }
+    state.lost += static_cast<unsigned>(counter - state.counter + can::counters - 1) % can::counters;
+    const auto since_us = static_cast<double>(time_us - state.last_us);
+    if (since_us > 0) state.period_us += state.period_us > 0 ? smoothing * (since_us - state.period_us) : since_us;
+  }
+  ++good_;
+  ++state.frames;
+  state.counter = counter;
+  state.last_us = time_us;
+  info.decode(frame, state.values);
+  return true;
+}
+
+void BusState::take_unknown(const BusFrame& frame) {
+  ++unknown_frames_;
+  const auto end = unknown_.begin() + static_cast<std::ptrdiff_t>(unknown_count_);
+  const auto place = std::find_if(unknown_.begin(), end, [&](const Unknown& u) { return u.id == frame.id && u.long_id == frame.long_id; });
+  if (place != end) {
+    ++place->frames;
+  } else if (unknown_count_ < unknown_.size()) {
+    unknown_[unknown_count_++] = {frame.id, frame.long_id, 1};
+  } else {
+    ++unknown_without_place_;
+  }
+}
+
+double BusState::age_s(std::size_t message) const {
+  const MessageState& state = states_[message];
+  return state.frames == 0 ? std::numeric_limits<double>::infinity() : 1e-6 * static_cast<double>(now_us_ - state.last_us);
+}
+
+bool BusState::stale(std::size_t message) const {
+  const std::int64_t cycle_us = messages()[message].cycle_us;
+  return states_[message].frames == 0 || now_us_ - states_[message].last_us > (cycle_us > 0 ? 3 * cycle_us : stale_without_cycle_us);
+}
+
+std::size_t BusState::find(std::string_view message) {
+  const auto& all = messages();
+  return static_cast<std::size_t>(std::find_if(all.begin(), all.end(), [&](const MessageInfo& m) { return message == m.name; }) - all.begin());
+}
+
+Reading BusState::reading(std::string_view message, std::string_view signal) const {
+  const std::size_t k = find(message);
+  if (k == messages().size()) return {};
+  const auto& signals = messages()[k].signals;
+  for (std::size_t s = 0; s < signals.size(); ++s) {
+    if (signal == signals[s].name) return {shortest(states_[k].values[s]), age_s(k), stale(k)};
+  }
+  return {};
+}
+
+bool BusState::complete() const {
+  bool all = true, every_sample = true;
+  std::int64_t longest_us = 0;
+  for (std::size_t k = 0; k < states_.size(); ++k) {
+    const std::string_view name = messages()[k].name;
+    if (states_[k].frames == 0) {
+      all = false;
+      if (name == "PackState" || name == "PackElectrical" || name == "Status") every_sample = false;
+    }
+    longest_us = std::max<std::int64_t>(longest_us, messages()[k].cycle_us);
+  }
+  return all || (every_sample && last_us_ - first_us_ >= longest_us + longest_us / 5);
+}
+
+}  // namespace bms::monitor

@@ -1,0 +1,165 @@
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <string>
+#include <system_error>
+
+#include "monitor/candump_line.hpp"
+#include "monitor/frame_source.hpp"
+
+namespace bms::monitor {
+
+namespace {
+
+constexpr std::uint64_t lines_without_a_frame = 1'000'000;  // that is no log
+
+/// Bytes of a file or pipe, unpacked if they begin as gzip does. Never waits longer than asked, so that a pipe can be followed.
+class Unpacked {
+ public:
+  explicit Unpacked(int fd) : fd_(fd) {}
+  ~Unpacked() {
+    if (packed_) inflateEnd(&inflate_);
+    close(fd_);
+  }
+  Unpacked(const Unpacked&) = delete;
+  Unpacked& operator=(const Unpacked&) = delete;
+
+  enum class State { open, ended, broken };
+  State state() const { return state_; }
+
+  /// 0: nothing in wait_ms, or state() is not open any more.
+  std::size_t read(std::span<char> room, int wait_ms) {
+    if (state_ != State::open) return 0;
+    if (inflate_.avail_in == 0 && !eof_ && !fetch(wait_ms)) return 0;
+    if (!packed_) {
+      if (inflate_.avail_in == 0) state_ = State::ended;
+      const std::size_t n = std::min<std::size_t>(room.size(), inflate_.avail_in);
+      std::copy_n(inflate_.next_in, n, room.data());
+      inflate_.next_in += n;
+      inflate_.avail_in -= static_cast<uInt>(n);
+      return n;
+    }
+    inflate_.next_out = reinterpret_cast<Bytef*>(room.data());
+    inflate_.avail_out = static_cast<uInt>(room.size());
+    const int result = inflate(&inflate_, Z_NO_FLUSH);  // there may be output left of what went in before
+    if (result == Z_STREAM_END) {
+      complete_ = true;
+      inflateReset(&inflate_);  // another may follow
+    } else if (result == Z_OK) {
+      complete_ = false;
+    } else if (result != Z_BUF_ERROR) {
+      state_ = complete_ ? State::ended : State::broken;  // what follows the end of one and is none is padding
+    }
+    if (eof_ && inflate_.avail_in == 0 && inflate_.avail_out != 0 && state_ == State::open) state_ = complete_ ? State::ended : State::broken;
+    return room.size() - inflate_.avail_out;
+  }
+
+ private:
+  bool fetch(int wait_ms) {
+    pollfd p{fd_, POLLIN, 0};
+    if (poll(&p, 1, wait_ms) <= 0) return false;
+    // the first two bytes tell what it is
+    const ssize_t n = ::read(fd_, bytes_.data() + (begun_ ? 0 : head_), bytes_.size() - head_);
+    if (n < 0) {
+      if (errno != EAGAIN && errno != EINTR) state_ = State::broken;
+      return false;
+    }
+    eof_ = n == 0;
+    std::size_t held = static_cast<std::size_t>(n);
+    if (!begun_) {
+      head_ = held += head_;
+      if (held < 2 && !eof_) return false;
+      begun_ = true;
+      head_ = 0;
+      packed_ = held >= 2 && bytes_[0] == 0x1F && bytes_[1] == 0x8B;
+      if (packed_ && inflateInit2(&inflate_, 15 + 16) != Z_OK) throw std::bad_alloc();
+    }
+    inflate_.next_in = bytes_.data();
+    inflate_.avail_in = static_cast<uInt>(held);
+    return true;
+  }
+
+  int fd_;
+  bool begun_ = false, packed_ = false, eof_ = false, complete_ = false;
+  std::size_t head_ = 0;
+  State state_ = State::open;
+  z_stream inflate_{};
+  std::array<Bytef, 16'384> bytes_{};
+};
+
+class Dump : public FrameSource {
+ public:
+  Dump(const std::string& path, int fd) : path_(path), file_(fd) {}
+
+  std::size_t read(std::span<BusFrame> room, int wait_ms) override {
+    std::size_t taken = decode(room);
+    if (taken > 0 || ended_) return taken;
+    held_ = file_.read(text_, wait_ms);
+    used_ = 0;
+    taken = decode(room);
+    if (held_ == 0 && file_.state() != Unpacked::State::open) taken += finish(room[0]);
+    return taken;
+  }
+  bool ended() const override { return ended_; }
+  bool live() const override { return false; }
+
+ private:
+  std::size_t decode(std::span<BusFrame> room) {
+    std::size_t taken = 0;
+    while (used_ < held_ && taken < room.size()) {
+      if (lines_.take(text_[used_++])) taken += line(room[taken]);
+    }
+    return taken;
+  }
+  std::size_t line(BusFrame& frame) {
+    ++count_;
+    if (lines_.line().empty() && !lines_.too_long()) return 0;
+    if (parse_dump_line(lines_.line(), frame)) {
+      any_ = true;
+      return 1;
+    }
+    ++malformed_;
+    if (!any_ && count_ > lines_without_a_frame) refuse();
+    return 0;
+  }
+  /// The last line may have no end.
+  std::size_t finish(BusFrame& frame) {
+    ended_ = true;
+    const std::size_t taken = lines_.pending() && lines_.take('\n') ? line(frame) : 0;
+    if (file_.state() == Unpacked::State::broken) ++malformed_;  // cut off or damaged
+    if (!any_) refuse();
+    return taken;
+  }
+  [[noreturn]] void refuse() const {
+    throw SourceRefused(path_, 1, "no frame in " + std::to_string(count_) + " lines, expected a log of candump -L, as it is or compressed by gzip");
+  }
+
+  std::string path_;
+  Unpacked file_;
+  DumpLines lines_;
+  std::array<char, 16'384> text_{};
+  std::size_t used_ = 0, held_ = 0;
+  std::uint64_t count_ = 0;
+  bool any_ = false, ended_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSource> open_dump(const std::string& path) {
+  const int fd = path == "-" ? dup(0) : open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) throw SourceRefused(path, 1, "cannot be read, expected a log of candump -L (" + std::generic_category().message(errno) + ")");
+  struct stat status{};
+  if (fstat(fd, &status) != 0 || S_ISDIR(status.st_mode)) {
+    close(fd);
+    throw SourceRefused(path, 1, "a folder, expected a log of candump -L");
+  }
+  return std::make_unique<Dump>(path, fd);
+}
+
+}  // namespace bms::monitor

@@ -1,0 +1,50 @@
+// What the live page plots: the last 7,200 points, half a second apart at least (an hour, two at one sample a second). Fixed memory.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "monitor/bus_state.hpp"
+
+namespace bms::monitor {
+
+struct HistoryPoint {
+  static constexpr std::size_t most_cells = 32;
+  double time_s = 0;  ///< since the first frame
+  float soc_percent = nothing, soc_sigma_percent = nothing, current_a = nothing, voltage_v = nothing, temperature_c = nothing;
+  std::uint8_t cell_count = 0;
+  std::array<float, most_cells> cells_v{};
+
+  static constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+};
+
+HistoryPoint point_of(const BusState& bus);
+
+class History {
+ public:
+  static constexpr std::size_t capacity = 7'200;
+  static constexpr std::int64_t least_gap_us = 500'000;
+
+  History() { points_.reserve(capacity); }
+  /// Whether a point of that time is wanted: later than the last by the least gap, or earlier (a clock was set).
+  bool wants(std::int64_t time_us) const { return count_ == 0 || time_us - last_us_ >= least_gap_us || time_us < last_us_; }
+  void add(const HistoryPoint& point, std::int64_t time_us) {
+    if (points_.size() < capacity) points_.push_back(point);
+    else points_[count_ % capacity] = point;
+    ++count_;
+    last_us_ = time_us;
+  }
+  /// Points ever added; those from first() on are there.
+  std::uint64_t count() const { return count_; }
+  std::uint64_t first() const { return count_ - points_.size(); }
+  const HistoryPoint& at(std::uint64_t k) const { return points_[k % capacity]; }
+
+ private:
+  std::vector<HistoryPoint> points_;
+  std::uint64_t count_ = 0;
+  std::int64_t last_us_ = 0;
+};
+
+}  // namespace bms::monitor

@@ -1,0 +1,165 @@
+#include "monitor/live_page.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <iterator>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <httplib.h>
+
+#include "monitor/frame_source.hpp"
+
+namespace bms::monitor {
+
+namespace {
+
+constexpr int most_streams = 6;
+
+void append(std::string& text, const HistoryPoint& p) {
+  auto out = std::back_inserter(text);
+  fmt::format_to(out, "[{:.3f}", p.time_s);
+  const auto field = [&](float value) {
+    if (std::isfinite(value)) fmt::format_to(out, ",{}", value);
+    else text += ",null";
+  };
+  for (const float value : {p.soc_percent, 2 * p.soc_sigma_percent, p.current_a, p.voltage_v, p.temperature_c}) field(value);
+  for (std::size_t k = 0; k < p.cell_count; ++k) field(p.cells_v[k]);
+  text += ']';
+}
+
+}  // namespace
+
+struct LivePage::Server {
+  std::string html;
+  int port = 0;
+  httplib::Server http;
+  std::thread thread;
+  std::atomic<int> streams{0};
+
+  std::mutex guard;  // of what follows
+  std::condition_variable changed;
+  History history;
+  std::string picture;
+  std::uint64_t version = 0;
+  bool stopping = false;
+
+  /// What a stream has sent.
+  struct Position {
+    std::uint64_t version = 0, points = 0;
+  };
+
+  /// Waits for news, and puts them into `event`; a comment when there are none in a second. False: the end.
+  bool next(Position& at, std::string& event) {
+    std::unique_lock lock(guard);
+    changed.wait_for(lock, std::chrono::seconds(1), [&] { return stopping || version != at.version; });
+    if (stopping) return false;
+    if (version == at.version) {
+      event = ":\n\n";
+      return true;
+    }
+    event = "data: {\"picture\":";
+    for (const char c : picture) {
+      if (c != '\n') event += c;
+    }
+    event += ",\"points\":[";
+    bool first = true;
+    for (std::uint64_t k = std::max(at.points, history.first()); k < history.count(); ++k, first = false) {
+      if (!first) event += ',';
+      append(event, history.at(k));
+    }
+    event += "]}\n\n";
+    at = {version, history.count()};
+    return true;
+  }
+
+  bool ours(const std::string& host) const { return host == fmt::format("127.0.0.1:{}", port) || host == fmt::format("localhost:{}", port); }
+
+  /// True: answered here.
+  bool refused(const httplib::Request& request, httplib::Response& response) const {
+    response.set_header("Content-Security-Policy", "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response.set_header("Cross-Origin-Resource-Policy", "same-origin");
+    response.set_header("X-Content-Type-Options", "nosniff");
+    response.set_header("Referrer-Policy", "no-referrer");
+    response.set_header("Cache-Control", "no-store");
+    if (!ours(request.get_header_value("Host"))) response.status = 403;
+    else if (request.method != "GET") response.status = 405;
+    else return false;
+    return true;
+  }
+
+  void stream(httplib::Response& response) {
+    if (streams.fetch_add(1) >= most_streams) {
+      --streams;
+      response.status = 503;
+      return;
+    }
+    auto at = std::make_shared<Position>();
+    response.set_chunked_content_provider(
+        "text/event-stream",
+        [this, at](std::size_t, httplib::DataSink& sink) {
+          std::string event;
+          if (!next(*at, event)) {
+            sink.done();
+            return true;
+          }
+          return sink.write(event.data(), event.size());
+        },
+        [this](bool) { --streams; });
+  }
+};
+
+LivePage::LivePage(std::string html, int port) : server_(std::make_unique<Server>()) {
+  Server& s = *server_;
+  s.html = std::move(html);
+  s.http.new_task_queue = [] { return new httplib::ThreadPool(most_streams + 2); };
+  s.http.set_socket_options([](socket_t socket) {
+    const int on = 1;
+    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);  // not SO_REUSEPORT: a port that is taken must be seen to be
+  });
+  s.http.set_payload_max_length(1'024);
+  s.http.set_pre_routing_handler([&s](const httplib::Request& request, httplib::Response& response) {
+    return s.refused(request, response) ? httplib::Server::HandlerResponse::Handled : httplib::Server::HandlerResponse::Unhandled;
+  });
+  s.http.Get("/", [&s](const httplib::Request&, httplib::Response& response) { response.set_content(s.html, "text/html; charset=utf-8"); });
+  s.http.Get("/events", [&s](const httplib::Request&, httplib::Response& response) { s.stream(response); });
+  s.port = port > 0 ? (s.http.bind_to_port("127.0.0.1", port) ? port : -1) : s.http.bind_to_any_port("127.0.0.1");
+  if (s.port < 0) throw SourceRefused("--serve", 1, fmt::format("port {} of 127.0.0.1 is not to be had, expected one that is free", port));
+  s.thread = std::thread([&s] { s.http.listen_after_bind(); });
+}
+
+LivePage::~LivePage() {
+  {
+    const std::lock_guard lock(server_->guard);
+    server_->stopping = true;
+  }
+  server_->changed.notify_all();
+  while (!server_->http.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // stopping before it listens would be forgotten
+  server_->http.stop();
+  server_->thread.join();
+}
+
+std::string LivePage::url() const { return fmt::format("http://127.0.0.1:{}/", server_->port); }
+
+void LivePage::add(const BusState& bus) {
+  if (!server_->history.wants(bus.now_us())) return;  // only this thread writes
+  const HistoryPoint point = point_of(bus);
+  const std::lock_guard lock(server_->guard);
+  server_->history.add(point, bus.now_us());
+}
+
+void LivePage::publish(std::string picture) {
+  {
+    const std::lock_guard lock(server_->guard);
+    server_->picture = std::move(picture);
+    ++server_->version;
+  }
+  server_->changed.notify_all();
+}
+
+}  // namespace bms::monitor

@@ -1,0 +1,114 @@
+#include "monitor/pack_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "estimator/estimate.hpp"
+
+namespace bms::monitor {
+
+namespace {
+
+constexpr std::pair<Flag, const char*> flag_words[] = {
+    {voltage_missing, "voltage missing"}, {voltage_implausible, "voltage implausible"}, {voltage_stuck, "voltage stuck"}, {current_missing, "current missing"},
+    {current_implausible, "current implausible"}, {time_gap, "gap in time"}, {time_not_later, "time not later"}, {not_started, "not started"},
+    {soc_unsettled, "more than one state of charge fits"}, {voltage_disbelieved, "voltage disbelieved"}};
+
+std::vector<Words> flags_in_words(const Reading& flags) {
+  std::vector<Words> set;
+  if (!flags.known()) return set;
+  auto bits = static_cast<std::uint32_t>(flags.value);
+  for (const auto& [bit, text] : flag_words) {
+    if ((bits & bit) != 0) set.push_back({text, "", flags.stale});
+    bits &= ~static_cast<std::uint32_t>(bit);
+  }
+  if (bits != 0) set.push_back({fmt::format("unknown flags {:#x}", bits), "", flags.stale});
+  return set;
+}
+
+/// see(signal, value, stale) for each signal of a message that has been heard; false: it has not.
+template <class See>
+bool each_signal(const BusState& bus, std::string_view message, See&& see) {
+  const std::size_t k = BusState::find(message);
+  if (k == messages().size() || bus.states()[k].frames == 0) return false;
+  for (std::size_t s = 0; s < messages()[k].signals.size(); ++s) see(messages()[k].signals[s], bus.states()[k].values[s], bus.stale(k));
+  return true;
+}
+
+std::vector<Reading> cells_of(const BusState& bus) {
+  std::vector<Reading> cells;
+  for (const MessageInfo& message : messages()) {
+    if (!std::string_view(message.name).starts_with("CellVoltages")) continue;
+    const double age_s = bus.age_s(BusState::find(message.name));
+    each_signal(bus, message.name, [&](const SignalInfo& signal, double value, bool stale) {
+      const std::string_view name = signal.name;
+      if (!name.starts_with("Cell") || !std::isfinite(value)) return;
+      const int number = std::atoi(signal.name + 4);
+      if (number < 1 || number > 64) return;
+      if (cells.size() < static_cast<std::size_t>(number)) cells.resize(static_cast<std::size_t>(number));
+      cells[static_cast<std::size_t>(number) - 1] = {shortest(value), age_s, stale};
+    });
+  }
+  return cells;
+}
+
+}  // namespace
+
+std::string text_of(const SignalInfo& signal, double value) {
+  if (!std::isfinite(value)) return "-";
+  for (const can::ValueName& name : signal.names) {
+    if (std::lround((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor)) == name.raw) return name.text;
+  }
+  if (signal.integer) return signal.layout.bits > 16 ? fmt::format("{:#x}", static_cast<std::uint32_t>(value)) : fmt::format("{}", static_cast<std::uint32_t>(value));
+  const int digits = std::clamp(static_cast<int>(std::ceil(-std::log10(static_cast<double>(signal.layout.factor)) - 1e-6)), 0, 6);
+  return fmt::format("{:.{}f}{}{}", value, digits, *signal.unit != '\0' ? " " : "", signal.unit);
+}
+
+PackView::Cells PackView::cells() const {
+  Cells c;
+  for (std::size_t k = 0; k < cells_v.size(); ++k) {
+    if (!cells_v[k].known()) continue;
+    const double v = cells_v[k].value;
+    if (c.count == 0 || v < c.lowest_v) c.lowest = k, c.lowest_v = v;
+    if (c.count == 0 || v > c.highest_v) c.highest = k, c.highest_v = v;
+    c.mean_v += (v - c.mean_v) / static_cast<double>(++c.count);
+  }
+  return c;
+}
+
+PackView pack_view(const BusState& bus) {
+  PackView v;
+  v.soc_percent = bus.reading("PackState", "Soc");
+  v.soc_sigma_percent = bus.reading("PackState", "SocSigma");
+  v.soc_display_percent = bus.reading("PackState", "SocDisplay");
+  each_signal(bus, "PackState", [&](const SignalInfo& signal, double value, bool stale) {
+    if (std::string_view(signal.name) == "SocQuality") v.soc_quality = {text_of(signal, value), signal.comment, stale};
+  });
+  v.voltage_v = bus.reading("PackElectrical", "Voltage");
+  v.current_a = bus.reading("PackElectrical", "Current");
+  v.temperature_c = bus.reading("PackElectrical", "Temperature");
+  v.discharge_now_a = bus.reading("CurrentLimits", "DischargeNow");
+  v.charge_now_a = bus.reading("CurrentLimits", "ChargeNow");
+  v.discharge_10s_a = bus.reading("CurrentLimits", "DischargeTenSeconds");
+  v.charge_10s_a = bus.reading("CurrentLimits", "ChargeTenSeconds");
+  v.capacity_percent = bus.reading("Health", "Capacity");
+  v.capacity_sigma_percent = bus.reading("Health", "CapacitySigma");
+  v.resistance_percent = bus.reading("Health", "Resistance");
+  v.resistance_sigma_percent = bus.reading("Health", "ResistanceSigma");
+  v.cells_v = cells_of(bus);
+  each_signal(bus, "ContactorState", [&](const SignalInfo& signal, double value, bool stale) {
+    v.contactor.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
+  });
+  v.faults_heard = each_signal(bus, "Faults", [&](const SignalInfo& signal, double value, bool stale) {
+    if (signal.layout.bits > 1) v.faults.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
+    else if (value != 0) v.faults.push_back({signal.name, signal.comment, stale});
+  });
+  v.flags = flags_in_words(bus.reading("Status", "Flags"));
+  return v;
+}
+
+}  // namespace bms::monitor

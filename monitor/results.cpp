@@ -1,0 +1,131 @@
+#include "monitor/results.hpp"
+
+#include <cmath>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "monitor/pack_view.hpp"
+
+namespace bms::monitor {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// NaN and infinity become null.
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json fraction(const Reading& percent) { return number(percent.known() ? shortest(percent.value / 100) : percent.value); }
+Json seconds(double s) { return number(std::round(s * 1e6) / 1e6); }
+
+Json list_of(const std::vector<Words>& words) {
+  Json list = Json::array();
+  for (const Words& w : words) list.push_back(w.text);
+  return list;
+}
+
+Json pack_json(const BusState& bus) {
+  const PackView p = pack_view(bus);
+  Json json = {{"stale", p.soc_percent.stale},
+               {"soc", fraction(p.soc_percent)},
+               {"soc_sigma", fraction(p.soc_sigma_percent)},
+               {"soc_display", fraction(p.soc_display_percent)},
+               {"soc_quality", p.soc_quality.text.empty() ? Json(nullptr) : Json(p.soc_quality.text)},
+               {"voltage_v", number(p.voltage_v.value)},
+               {"current_a", number(p.current_a.value)},
+               {"temperature_c", number(p.temperature_c.value)},
+               {"limits", {{"discharge_now_a", number(p.discharge_now_a.value)}, {"charge_now_a", number(p.charge_now_a.value)},
+                           {"discharge_10s_a", number(p.discharge_10s_a.value)}, {"charge_10s_a", number(p.charge_10s_a.value)}}},
+               {"health", {{"capacity", fraction(p.capacity_percent)}, {"capacity_sigma", fraction(p.capacity_sigma_percent)},
+                           {"resistance", fraction(p.resistance_percent)}, {"resistance_sigma", fraction(p.resistance_sigma_percent)}}}};
+  json["cells_v"] = Json::array();
+  for (const Reading& cell : p.cells_v) json["cells_v"].push_back(number(cell.value));
+  json["contactor"] = list_of(p.contactor);
+  json["faults"] = p.faults_heard ? list_of(p.faults) : Json(nullptr);
+  json["flags"] = list_of(p.flags);
+  return json;
+}
+
+Json message_json(const BusState& bus, std::size_t k) {
+  const MessageInfo& info = messages()[k];
+  const MessageState& state = bus.states()[k];
+  Json json = {{"id", info.id},
+               {"frames", state.frames},
+               {"lost", state.lost},
+               {"repeated", state.repeated},
+               {"crc_errors", state.crc_errors},
+               {"wrong_length", state.wrong_length},
+               {"age_s", seconds(1e-6 * static_cast<double>(bus.last_us() - state.last_us))},
+               {"stale", bus.stale(k)},
+               {"rate_hz", number(std::round(state.rate_hz() * 1e3) / 1e3)}};
+  if (state.frames == 0) {
+    json["age_s"] = nullptr;
+    return json;
+  }
+  Json& signals = json["signals"] = Json::object();
+  for (std::size_t s = 0; s < info.signals.size(); ++s) {
+    const SignalInfo& signal = info.signals[s];
+    const double value = state.values[s];
+    Json& entry = signals[signal.name] = {{"value", signal.integer ? Json(static_cast<std::uint32_t>(value)) : number(std::isfinite(value) ? shortest(value) : value)}};
+    if (*signal.unit != '\0') entry["unit"] = signal.unit;
+    if (!signal.names.empty()) entry["words"] = text_of(signal, value);
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string json_of(const BusState& bus, const ScreenFacts& facts) {
+  Json json;
+  json["command"] = "monitor";
+  json["source"] = facts.source;
+  json["frames"] = bus.frames();
+  json["duration_s"] = seconds(bus.duration_s());
+  json["complete"] = bus.complete();
+  json["pack"] = pack_json(bus);
+  Json& all = json["messages"] = Json::object();
+  for (std::size_t k = 0; k < messages().size(); ++k) {
+    const MessageState& state = bus.states()[k];
+    if (state.frames + state.crc_errors + state.wrong_length > 0) all[messages()[k].name] = message_json(bus, k);
+  }
+  Json ids = Json::object();
+  for (const auto& u : bus.unknown_ids()) ids[fmt::format("{:0{}X}", u.id, u.long_id ? 8 : 3)] = u.frames;
+  json["other_ids"] = {{"frames", bus.unknown_frames()}, {"ids", ids}, {"without_place", bus.unknown_without_place()}};
+  json["other_kinds"] = {{"remote", bus.remote()}, {"fd", bus.fd()}, {"error_reports", bus.errors()}, {"error_classes", bus.error_classes()}};
+  json["malformed"] = facts.malformed;
+  json["dropped"] = facts.dropped;
+  json["silent_s"] = seconds(1e-6 * static_cast<double>(bus.now_us() - bus.last_us()));
+  json["frames_per_second"] = number(std::round(facts.frames_per_second * 10) / 10);
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string csv_head() {
+  std::string head = "time_s,current_a,voltage_v,temperature_c";
+  for (const MessageInfo& message : messages()) {
+    for (const SignalInfo& signal : message.signals) head += fmt::format(",{}.{}", message.name, signal.name) + (*signal.unit != '\0' ? fmt::format(" [{}]", signal.unit) : "");
+  }
+  return head + "\n";
+}
+
+std::string csv_row(const BusState& bus) {
+  std::string row = fmt::format("{:.6f}", bus.duration_s());
+  auto out = std::back_inserter(row);
+  const auto field = [&](double value, bool integer, bool there) {
+    row += ',';
+    if (!there || !std::isfinite(value)) return;
+    if (integer) fmt::format_to(out, "{}", static_cast<std::uint32_t>(value));
+    else fmt::format_to(out, "{}", static_cast<float>(value));  // as short as it comes back
+  };
+  for (const char* name : {"Current", "Voltage", "Temperature"}) {
+    const Reading r = bus.reading("PackElectrical", name);
+    field(r.value, false, !r.stale);
+  }
+  for (std::size_t k = 0; k < messages().size(); ++k) {
+    const bool stale = bus.stale(k);
+    for (std::size_t s = 0; s < messages()[k].signals.size(); ++s) field(bus.states()[k].values[s], messages()[k].signals[s].integer, !stale);
+  }
+  return row + "\n";
+}
+
+}  // namespace bms::monitor

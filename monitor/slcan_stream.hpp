@@ -1,0 +1,54 @@
+// The bytes of an SLCAN adapter, decoded to frames. Total: any bytes may come.
+//
+// Beside frames an adapter sends answers: an empty line, \a where it refuses, z or Z for a frame it sent, and what V, v, N, F ask for.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "hal/slcan/codec.hpp"
+#include "monitor/bus_frame.hpp"
+
+namespace bms::monitor {
+
+class SlcanStream {
+ public:
+  /// True when `byte` completed a frame; its time is left to the caller.
+  bool take(char byte, BusFrame& frame) {
+    if (byte == '\a' || !reader_.take(byte)) return false;
+    const std::string_view line = reader_.line();
+    hal::CanFrame standard;
+    if (hal::slcan::decode(line, standard)) {
+      frame = on_bus(standard, 0);
+      return true;
+    }
+    if (hal::slcan::is_other_frame(line)) {
+      frame = other(line);
+      return true;
+    }
+    if (!line.empty() && std::string_view("zZVvNF").find(line[0]) == std::string_view::npos) ++malformed_;
+    return false;
+  }
+  std::uint64_t malformed() const { return malformed_; }
+
+ private:
+  /// line: is_other_frame.
+  static BusFrame other(std::string_view line) {
+    BusFrame frame;
+    frame.long_id = line[0] != 'r';
+    frame.kind = line[0] == 'T' ? FrameKind::extended : FrameKind::remote;
+    const std::size_t digits = frame.long_id ? 8 : 3;
+    for (const char c : line.substr(1, digits)) frame.id = frame.id << 4 | hal::slcan::digit(c);
+    frame.length = static_cast<std::uint8_t>(hal::slcan::digit(line[1 + digits]));
+    if (frame.kind == FrameKind::remote) return frame;
+    for (std::size_t k = 0; k < frame.length; ++k) {
+      frame.data[k] = static_cast<std::uint8_t>(hal::slcan::digit(line[2 + digits + 2 * k]) << 4 | hal::slcan::digit(line[3 + digits + 2 * k]));
+    }
+    return frame;
+  }
+
+  hal::slcan::LineReader reader_;
+  std::uint64_t malformed_ = 0;
+};
+
+}  // namespace bms::monitor
