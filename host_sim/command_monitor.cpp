@@ -78,6 +78,11 @@ class Every {
   bool begun_ = false;
 };
 
+std::string live_page_html() {
+  const std::string body = "<style>\n" + std::string(embedded::live_css) + "</style>\n" + std::string(embedded::live_html);
+  return page(body, embedded::live_js, "bms monitor", "null");
+}
+
 class Monitor {
  public:
   explicit Monitor(const MonitorOptions& options)
@@ -86,7 +91,7 @@ class Monitor {
     facts_.blocks = Terminal::shows_utf8();
     csv_.text() += csv_.wanted() ? csv_head() : "";
     shown_ = !options.output.quiet && !options.output.standard_output_is_taken();
-    if (options.serve_port) page_ = std::make_unique<LivePage>(page(embedded::live_html, embedded::live_js, "bms monitor", "null"), *options.serve_port);
+    if (options.serve_port) page_ = std::make_unique<LivePage>(live_page_html(), *options.serve_port);
     if (page_) fmt::print(options.output.standard_output_is_taken() ? stderr : stdout, "Page: {}\n", page_->url());
     std::fflush(stdout);
     if (shown_ && isatty(STDOUT_FILENO)) terminal_ = std::make_unique<Terminal>();
@@ -118,7 +123,7 @@ class Monitor {
   double elapsed_s() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
 
   bool satisfied() const {
-    return (options_.once && bus_.complete()) || (options_.duration_s && !source_->live() && bus_.duration_s() >= *options_.duration_s);
+    return (options_.once && bus_.complete()) || (options_.duration_s && !source_->live() && !page_ && bus_.duration_s() >= *options_.duration_s);
   }
   bool done() const {
     if (stop_.asked() || (terminal_ && terminal_->quit_pressed())) return true;
@@ -126,7 +131,7 @@ class Monitor {
     if (page_ && !source_->live()) return page_done();
     return satisfied() || source_->ended();
   }
-  /// A log that is read is still looked at, unless it was to be read for a time.
+  /// A log that has been read is still looked at; then the time is that of the page.
   bool page_done() const { return options_.once ? satisfied() || source_->ended() : options_.duration_s && elapsed_s() >= *options_.duration_s; }
 
   void take(const BusFrame& frame) {
@@ -147,7 +152,8 @@ class Monitor {
     const double now_s = elapsed_s();
     if (rate_.due(now_s) || at_end) {
       const double since_s = now_s - rated_s_;
-      if (since_s > 0.1) facts_.frames_per_second = static_cast<double>(bus_.frames() - rated_) / since_s;
+      if (!source_->live()) facts_.frames_per_second = mean_rate();
+      else if (since_s > 0.1) facts_.frames_per_second = static_cast<double>(bus_.frames() - rated_) / since_s;
       rated_ = bus_.frames();
       rated_s_ = now_s;
       record_.write(true);
@@ -161,6 +167,8 @@ class Monitor {
     }
   }
 
+  double mean_rate() const { return bus_.duration_s() > 0 ? static_cast<double>(bus_.frames()) / bus_.duration_s() : 0; }
+
   void print_line() const {
     fmt::print("{}\n", status_line(bus_, facts_));
     std::fflush(stdout);
@@ -168,7 +176,7 @@ class Monitor {
 
   void finish() {
     show(true);
-    facts_.frames_per_second = bus_.duration_s() > 0 ? static_cast<double>(bus_.frames()) / bus_.duration_s() : 0;
+    facts_.frames_per_second = mean_rate();
     record_.write(true);
     csv_.write(true);
     if (terminal_) {

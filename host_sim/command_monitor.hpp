@@ -11,7 +11,7 @@ namespace bms {
 struct MonitorOptions {
   std::string source;                 ///< monitor/frame_source.hpp
   bool once = false;
-  std::optional<double> duration_s;   ///< of this machine's clock; of a log, of its own
+  std::optional<double> duration_s;   ///< of this machine's clock; of a log that is not served, of its own
   std::string csv, record;
   std::optional<int> serve_port;      ///< 0: any that is free
   Output output;

@@ -15,6 +15,30 @@ constexpr std::int64_t stale_without_cycle_us = 3'000'000;
 constexpr std::int64_t clock_set_us = 1'000'000;
 constexpr double smoothing = 1.0 / 8;
 
+/// 0.002 of 0.002F.
+double decimal(float value) {
+  std::array<char, 32> text;
+  const auto written = std::to_chars(text.data(), text.data() + text.size(), value);
+  double result = 0;
+  std::from_chars(text.data(), written.ptr, result);
+  return result;
+}
+
+int digits_of(double step) {
+  int digits = 0;
+  for (double scaled = step; digits < 9 && std::abs(scaled - std::round(scaled)) > 1e-9 * scaled; scaled *= 10) ++digits;
+  return digits;
+}
+
+/// What the frame's raw value is in decimals: 54.302, not the product of two floats. A float of at most 24 bits holds that raw value exactly, and
+/// its one rounding is less than half of a step.
+double exact(const SignalInfo& signal, double value) {
+  if (signal.integer || !std::isfinite(value)) return value;
+  const double raw = std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
+  const double scale = std::pow(10, signal.digits);
+  return std::round((raw * signal.factor + signal.offset) * scale) / scale;
+}
+
 template <class Message>
 MessageInfo info_of() {
   MessageInfo info{Message::name, Message::id, Message::data_id, Message::cycle_us, {}, [](const hal::CanFrame& frame, std::span<double> values) {
@@ -24,7 +48,8 @@ MessageInfo info_of() {
                    }};
   Message message;
   message.each([&](const char* name, const char* unit, const auto& value, const can::SignalLayout& layout) {
-    info.signals.push_back({name, unit, "", std::is_integral_v<std::remove_cvref_t<decltype(value)>>, layout, {}});
+    const double factor = decimal(layout.factor);
+    info.signals.push_back({name, unit, "", std::is_integral_v<std::remove_cvref_t<decltype(value)>>, layout, {}, factor, decimal(layout.offset), digits_of(factor)});
   });
   std::size_t k = 0;
   Message::each_in_words([&](const char*, const char* comment, std::span<const can::ValueName> names) {
@@ -45,14 +70,6 @@ std::vector<MessageInfo> infos_of(std::tuple<Message...>*) {
 const std::vector<MessageInfo>& messages() {
   static const std::vector<MessageInfo> all = infos_of(static_cast<can::Messages*>(nullptr));
   return all;
-}
-
-double shortest(double value) {
-  std::array<char, 32> text;
-  const auto written = std::to_chars(text.data(), text.data() + text.size(), static_cast<float>(value));
-  double result = value;
-  std::from_chars(text.data(), written.ptr, result);
-  return result;
 }
 
 BusState::BusState() {
@@ -118,6 +135,7 @@ bool BusState::take_ours(std::size_t message, const hal::CanFrame& frame, std::i
   state.counter = counter;
   state.last_us = time_us;
   info.decode(frame, state.values);
+  for (std::size_t s = 0; s < state.values.size(); ++s) state.values[s] = exact(info.signals[s], state.values[s]);
   return true;
 }
 
@@ -154,7 +172,7 @@ Reading BusState::reading(std::string_view message, std::string_view signal) con
   if (k == messages().size()) return {};
   const auto& signals = messages()[k].signals;
   for (std::size_t s = 0; s < signals.size(); ++s) {
-    if (signal == signals[s].name) return {shortest(states_[k].values[s]), age_s(k), stale(k)};
+    if (signal == signals[s].name) return {states_[k].values[s], age_s(k), stale(k)};
   }
   return {};
 }

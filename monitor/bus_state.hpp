@@ -28,9 +28,11 @@ struct SignalInfo {
   const char* name;
   const char* unit;
   const char* comment;
-  bool integer;                              ///< a number without unit; otherwise a float
+  bool integer;                              ///< by the generated code; otherwise a float
   can::SignalLayout layout;
   std::span<const can::ValueName> names;     ///< of values, if they have any
+  double factor, offset;                     ///< as the DBC file writes them: 0.002, not the float next to it
+  int digits;                                ///< after the point that a step of factor needs
 };
 
 struct MessageInfo {
@@ -43,9 +45,6 @@ struct MessageInfo {
 
 /// All of the DBC file, in its order.
 const std::vector<MessageInfo>& messages();
-
-/// A number as short as its float is: 54.3, not 54.29999923706055.
-double shortest(double value);
 
 struct MessageState {
   std::uint64_t frames = 0;                  ///< good ones

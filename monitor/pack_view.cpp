@@ -50,7 +50,7 @@ std::vector<Reading> cells_of(const BusState& bus) {
       const int number = std::atoi(signal.name + 4);
       if (number < 1 || number > 64) return;
       if (cells.size() < static_cast<std::size_t>(number)) cells.resize(static_cast<std::size_t>(number));
-      cells[static_cast<std::size_t>(number) - 1] = {shortest(value), age_s, stale};
+      cells[static_cast<std::size_t>(number) - 1] = {value, age_s, stale};
     });
   }
   return cells;
@@ -61,11 +61,10 @@ std::vector<Reading> cells_of(const BusState& bus) {
 std::string text_of(const SignalInfo& signal, double value) {
   if (!std::isfinite(value)) return "-";
   for (const can::ValueName& name : signal.names) {
-    if (std::lround((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor)) == name.raw) return name.text;
+    if (std::lround((value - signal.offset) / signal.factor) == name.raw) return name.text;
   }
-  if (signal.integer) return signal.layout.bits > 16 ? fmt::format("{:#x}", static_cast<std::uint32_t>(value)) : fmt::format("{}", static_cast<std::uint32_t>(value));
-  const int digits = std::clamp(static_cast<int>(std::ceil(-std::log10(static_cast<double>(signal.layout.factor)) - 1e-6)), 0, 6);
-  return fmt::format("{:.{}f}{}{}", value, digits, *signal.unit != '\0' ? " " : "", signal.unit);
+  if (signal.integer && signal.layout.bits > 16 && !signal.layout.is_signed && *signal.unit == '\0') return fmt::format("{:#x}", static_cast<std::int64_t>(value));
+  return fmt::format("{:.{}f}{}{}", value, signal.digits, *signal.unit != '\0' ? " " : "", signal.unit);
 }
 
 PackView::Cells PackView::cells() const {
@@ -101,11 +100,14 @@ PackView pack_view(const BusState& bus) {
   v.resistance_sigma_percent = bus.reading("Health", "ResistanceSigma");
   v.cells_v = cells_of(bus);
   each_signal(bus, "ContactorState", [&](const SignalInfo& signal, double value, bool stale) {
-    v.contactor.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
+    if (!std::isfinite(value) || (signal.layout.bits == 1 && value == 0)) return;
+    const std::string text = text_of(signal, value);
+    v.contactor.push_back({std::string_view(signal.name) == "State" ? text : signal.layout.bits == 1 ? signal.name : fmt::format("{} {}", signal.name, text), signal.comment, stale});
   });
   v.faults_heard = each_signal(bus, "Faults", [&](const SignalInfo& signal, double value, bool stale) {
-    if (signal.layout.bits > 1) v.faults.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
-    else if (value != 0) v.faults.push_back({signal.name, signal.comment, stale});
+    if (!std::isfinite(value) || value == 0) return;
+    if (signal.layout.bits == 1) v.faults.push_back({signal.name, signal.comment, stale});
+    else v.fault_details.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
   });
   v.flags = flags_in_words(bus.reading("Status", "Flags"));
   return v;

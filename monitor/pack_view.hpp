@@ -23,9 +23,10 @@ struct PackView {
   Reading discharge_now_a, charge_now_a, discharge_10s_a, charge_10s_a;
   Reading capacity_percent, capacity_sigma_percent, resistance_percent, resistance_sigma_percent;
   std::vector<Reading> cells_v;      ///< CellVoltages*.Cell1, Cell2, ... up to the highest that was ever heard
-  std::vector<Words> contactor;      ///< each signal of ContactorState
+  std::vector<Words> contactor;      ///< ContactorState: its State, the bits that are set, what else it says
   bool faults_heard = false;         ///< a message Faults is there
-  std::vector<Words> faults;         ///< its bits that are set; what is no bit, in words
+  std::vector<Words> faults;         ///< its bits that are set
+  std::vector<Words> fault_details;  ///< what is no bit and not zero, in words
   std::vector<Words> flags;          ///< why the estimate is worth less: the bits of Status.Flags
 
   /// Lowest, highest and mean of the cells that are known; count 0: none.

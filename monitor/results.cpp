@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 /// NaN and infinity become null.
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json fraction(const Reading& percent) { return number(percent.known() ? shortest(percent.value / 100) : percent.value); }
+Json fraction(const Reading& percent) { return number(std::round(percent.value * 1e7) / 1e9); }
 Json seconds(double s) { return number(std::round(s * 1e6) / 1e6); }
 
 Json list_of(const std::vector<Words>& words) {
@@ -43,6 +43,7 @@ Json pack_json(const BusState& bus) {
   for (const Reading& cell : p.cells_v) json["cells_v"].push_back(number(cell.value));
   json["contactor"] = list_of(p.contactor);
   json["faults"] = p.faults_heard ? list_of(p.faults) : Json(nullptr);
+  json["fault_details"] = list_of(p.fault_details);
   json["flags"] = list_of(p.flags);
   return json;
 }
@@ -67,7 +68,7 @@ Json message_json(const BusState& bus, std::size_t k) {
   for (std::size_t s = 0; s < info.signals.size(); ++s) {
     const SignalInfo& signal = info.signals[s];
     const double value = state.values[s];
-    Json& entry = signals[signal.name] = {{"value", signal.integer ? Json(static_cast<std::uint32_t>(value)) : number(std::isfinite(value) ? shortest(value) : value)}};
+    Json& entry = signals[signal.name] = {{"value", signal.integer ? Json(static_cast<std::int64_t>(value)) : number(value)}};
     if (*signal.unit != '\0') entry["unit"] = signal.unit;
     if (!signal.names.empty()) entry["words"] = text_of(signal, value);
   }
@@ -114,8 +115,8 @@ std::string csv_row(const BusState& bus) {
   const auto field = [&](double value, bool integer, bool there) {
     row += ',';
     if (!there || !std::isfinite(value)) return;
-    if (integer) fmt::format_to(out, "{}", static_cast<std::uint32_t>(value));
-    else fmt::format_to(out, "{}", static_cast<float>(value));  // as short as it comes back
+    if (integer) fmt::format_to(out, "{}", static_cast<std::int64_t>(value));
+    else fmt::format_to(out, "{}", value);
   };
   for (const char* name : {"Current", "Voltage", "Temperature"}) {
     const Reading r = bus.reading("PackElectrical", name);

@@ -130,6 +130,7 @@ class Drawing {
   ScreenLine limits() const {
     ScreenLine line;
     const bool stale = pack_.discharge_now_a.stale;
+    if (columns_ < 62) return line.add("Limits   ").add(fmt::format("-{}  +{}", number(pack_.discharge_now_a, 0, " A"), number(pack_.charge_now_a, 0, " A")), ink_of(stale));
     line.add("Limits   ").add(fmt::format("discharge {} (10 s {})", number(pack_.discharge_now_a, 0, " A"), number(pack_.discharge_10s_a, 0, " A")), ink_of(stale));
     line.add(fmt::format("   charge {} (10 s {})", number(pack_.charge_now_a, 0, " A"), number(pack_.charge_10s_a, 0, " A")), ink_of(stale));
     return line;
@@ -140,6 +141,7 @@ class Drawing {
       return number(value, 1, " %") + (value.known() && sigma.known() ? fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value) : "");
     };
     ScreenLine line;
+    if (columns_ < 62) return line.add("Health   ").add(fmt::format("{}  R {}", number(pack_.capacity_percent, 1, " %"), number(pack_.resistance_percent, 0, " %")), ink_of(pack_.capacity_percent.stale));
     line.add("Health   ").add("capacity " + with_band(pack_.capacity_percent, pack_.capacity_sigma_percent), ink_of(pack_.capacity_percent.stale));
     line.add("   resistance " + with_band(pack_.resistance_percent, pack_.resistance_sigma_percent), ink_of(pack_.resistance_percent.stale));
     return line;
@@ -167,6 +169,12 @@ class Drawing {
       }
     }
     return lines;
+  }
+
+  ScreenLine fault_details() const {
+    ScreenLine line;
+    for (const Words& w : pack_.fault_details) line.add(line.columns() == 0 ? "         " : ", ").add(clean(w.text), ink_of(w.stale));
+    return line;
   }
 
   ScreenLine flags() const {
@@ -298,6 +306,7 @@ std::vector<ScreenLine> pack_part(const Drawing& d, std::size_t room) {
   add(lines, d.soc_bar());
   add(lines, d.electrical());
   add(lines, d.faults(roomy ? room / 4 : 0));
+  add(lines, d.fault_details());
   add(lines, d.contactor());
   add(lines, d.flags());
   add(lines, d.limits());

@@ -113,6 +113,7 @@
     box.replaceChildren();
     const list = make(box, 'ul');
     for (const text of faults) make(list, 'li', text);
+    if (faults.length > 0) make(list, 'li', pack.fault_details.join(' · ')).className = 'detail';
   };
   const show = p => {
     const pack = p.pack, current = pack.current_a;
@@ -140,7 +141,8 @@
     message_table(p.messages, p.silent_s);
     const ids = Object.entries(p.other_ids.ids).slice(0, 12).map(([id, n]) => `${id}: ${n}`).join(', ');
     get('others').textContent = p.other_ids.frames ? `Other ids: ${p.other_ids.frames} frames (${ids})` : '';
-    say(pack.stale ? 'The BMS is silent' : p.silent_s > 3 ? 'The bus is silent' : 'Live', pack.stale || p.silent_s > 3 ? 'late' : 'live');
+    if (p.source.startsWith('file:')) say('A log', '');
+    else say(pack.stale ? 'The BMS is silent' : p.silent_s > 3 ? 'The bus is silent' : 'Live', pack.stale || p.silent_s > 3 ? 'late' : 'live');
   };
   const say = (text, name) => { get('state').textContent = text; get('state').className = name; };
 

@@ -1,0 +1,404 @@
+// bms monitor from the outside: logs, a serial adapter (a pseudo-terminal), the terminal it draws on, hostile input, files it writes.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <pty.h>
+#include <signal.h>
+#include <sys/ioctl.h>
+#include <sys/wait.h>
+#include <termios.h>
+#include <unistd.h>
+#include <utmp.h>
+
+#include <chrono>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
+
+#include "hal/slcan/codec.hpp"
+#include "monitor/candump_line.hpp"
+#include "tests/end_to_end/run_tool.hpp"
+#include "tests/monitor/traffic.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+using nlohmann::json;
+
+std::string dump_of(int samples) {
+  monitor::Traffic traffic(1'000'000'000);
+  std::string text;
+  for (int k = 0; k < samples; ++k) {
+    for (const monitor::BusFrame& frame : traffic.sample()) monitor::append_dump_line(text, frame, "can0");
+  }
+  return text;
+}
+
+class Monitor : public ::testing::Test {
+ protected:
+  std::string log(const std::string& text) const {
+    std::ofstream(folder_.path() / "bus.log", std::ios::binary) << text;
+    return "file:" + (folder_.path() / "bus.log").string();
+  }
+  std::string path(const char* name) const { return (folder_.path() / name).string(); }
+  json picture(const std::string& arguments) const {
+    const ToolRun run = run_tool("monitor " + arguments + " --json -");
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return json::parse(run.out, nullptr, false);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Monitor, TellsALogAsOneJsonObject) {
+  const json p = picture(log(dump_of(61)));
+  EXPECT_EQ(p["command"], "monitor");
+  EXPECT_EQ(p["frames"], 488);
+  EXPECT_EQ(p["duration_s"], 60.0);
+  EXPECT_EQ(p["complete"], true);
+  EXPECT_EQ(p["pack"]["soc"], 0.79992);
+  EXPECT_EQ(p["pack"]["soc_quality"], "carried by counting");
+  EXPECT_EQ(p["pack"]["faults"], nullptr) << "no such message on this bus";
+  EXPECT_EQ(p["messages"]["PackState"]["signals"]["Soc"]["value"], 79.992) << "a number of the DBC file's step, not of a float";
+  EXPECT_EQ(p["messages"]["PackState"]["signals"]["Soc"]["unit"], "%");
+  EXPECT_EQ(p["messages"]["Status"]["signals"]["ResetCause"]["words"], "power on");
+  EXPECT_FALSE(p["messages"].contains("SensorErrors")) << "never heard";
+}
+
+TEST_F(Monitor, WithoutATerminalSaysALineASecond) {
+  const ToolRun run = run_tool("monitor " + log(dump_of(61)));
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(std::count(run.out.begin(), run.out.end(), '\n'), 61);
+  EXPECT_THAT(run.out, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(run.out, HasSubstr("0:00:59  79.9"));
+  EXPECT_EQ(run_tool("monitor --quiet " + log(dump_of(61))).out, "");
+}
+
+TEST_F(Monitor, ReadsALogFromStandardInputAndPacked) {
+  const std::string file = log(dump_of(30));
+  json expected = picture(file);
+  ASSERT_EQ(std::system(("gzip -c " + path("bus.log") + " > " + path("bus.log.gz")).c_str()), 0);
+  json packed = picture("file:" + path("bus.log.gz"));
+  json piped = picture("file:- < " + path("bus.log.gz"));
+  for (json* p : {&expected, &packed, &piped}) p->erase("source");
+  EXPECT_EQ(packed, expected);
+  EXPECT_EQ(piped, expected);
+}
+
+TEST_F(Monitor, OnceEndsWithTheFirstCompletePictureOrSaysThatNoneCame) {
+  const json p = picture("--once " + log(dump_of(61)));
+  EXPECT_EQ(p["complete"], true);
+  EXPECT_LT(p["duration_s"].get<double>(), 2.1);
+  const ToolRun none = run_tool("monitor --quiet --once " + log(dump_of(1)));
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, HasSubstr("no complete picture in 0.0 s and 8 frames"));
+}
+
+TEST_F(Monitor, CsvIsARowForEachStatusMessageThatReplayReads) {
+  const ToolRun run = run_tool("monitor --quiet --csv " + path("rows.csv") + " " + log(dump_of(100)));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string csv = content(path("rows.csv"));
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 101);
+  const ToolRun replay = run_tool("replay " + path("rows.csv") + " --json -");
+  ASSERT_EQ(replay.exit_code, 0) << replay.err;
+  EXPECT_EQ(json::parse(replay.out)["samples"], 100);
+}
+
+TEST_F(Monitor, ARecordGivesTheSamePictureByteForByte) {
+  std::string text = dump_of(100);
+  text += "(1200.000000) can0 12345678#0102\n(1200.000001) can0 123#R4\n(1200.000002) can0 123##3112233445566778899001122\n(1200.000003) can0 20000040#0000000000000000\n(1200.000004) can0 182#00\n";
+  const std::string file = log(text);
+  ASSERT_EQ(run_tool("monitor --quiet --record " + path("record.log") + " --json " + path("first.json") + " " + file).exit_code, 0);
+  std::string first = content(path("first.json")), second = run_tool("monitor file:" + path("record.log") + " --json -").out;
+  const auto without_source = [](std::string text_of) { return text_of.erase(text_of.find("\"source\""), text_of.find("\"frames\"") - text_of.find("\"source\"")); };
+  EXPECT_EQ(without_source(first), without_source(second));
+  EXPECT_GT(first.size(), 1'000U);
+  const json p = json::parse(first);
+  EXPECT_EQ(p["other_kinds"]["fd"], 1);
+  EXPECT_EQ(p["other_kinds"]["remote"], 1);
+  EXPECT_EQ(p["other_kinds"]["error_reports"], 1);
+  EXPECT_EQ(p["messages"]["Status"]["wrong_length"], 1);
+}
+
+TEST_F(Monitor, RefusesInOneLineWhatItCannotUse) {
+  for (const char* arguments : {"nonesuch0", "file:/nonesuch", "file:" BMS_SOURCE_DIR "/README.md", "file:/", "slcan:/dev/null", "file:x --record -", "file:x --serve 70000", "file:x --duration 0", "file:x --csv ''"}) {
+    const ToolRun run = run_tool(std::string("monitor ") + arguments);
+    EXPECT_EQ(run.exit_code, 2) << arguments;
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  }
+  const std::string file = log(dump_of(3));
+  for (const char* out : {"--record", "--csv", "--json"}) {
+    const ToolRun run = run_tool("monitor --quiet " + file + " " + out + " /nonesuch/x");
+    EXPECT_EQ(run.exit_code, 2) << out;
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  }
+}
+
+TEST_F(Monitor, AHostileLogIsCountedAndWhatIsGoodInItIsRead) {
+  std::mt19937_64 random(5);
+  std::string text;
+  std::istringstream good(dump_of(200));
+  std::uint64_t bad = 0;
+  for (std::string line; std::getline(good, line);) {
+    std::string noise;
+    switch (random() % 4) {
+      case 0:
+        for (int k = 0; k < 40; ++k) noise += static_cast<char>(random());
+        for (char& c : noise) c = c == '\n' ? '?' : c;
+        noise += '?';
+        break;
+      case 1: noise = line.substr(0, line.size() / 2); break;
+      case 2: noise = std::string(random() % 100'000 + 600, '#'); break;
+      default: noise = "(1.000000) can0 800#00"; break;
+    }
+    ++bad;
+    text += line + "\n" + noise + "\n";
+  }
+  const json p = picture(log(text));
+  EXPECT_EQ(p["malformed"], bad);
+  EXPECT_EQ(p["frames"], 1'600);
+  EXPECT_EQ(p["messages"]["PackState"]["lost"], 0);
+}
+
+/// Where the tool's standard output is a terminal of a size, or an adapter speaks to it.
+class PseudoTerminal {
+ public:
+  explicit PseudoTerminal(unsigned short columns = 80, unsigned short rows = 24) {
+    winsize size{rows, columns, 0, 0};
+    EXPECT_EQ(openpty(&master_, &slave_, name_, nullptr, &size), 0);
+    fcntl(master_, F_SETFD, FD_CLOEXEC);
+    fcntl(slave_, F_SETFD, FD_CLOEXEC);
+    fcntl(master_, F_SETFL, O_NONBLOCK);
+  }
+  ~PseudoTerminal() {
+    close(master_);
+    close(slave_);
+  }
+  const char* name() const { return name_; }
+  int slave() const { return slave_; }
+
+  void write(const std::string& text) const {
+    for (std::size_t at = 0; at < text.size();) {
+      const ssize_t n = ::write(master_, text.data() + at, text.size() - at);
+      if (n > 0) at += static_cast<std::size_t>(n);
+      else std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  /// What is on the line until `what` is among it, five seconds at most.
+  std::string read_until(const std::string& what, std::function<void()> meanwhile = [] {}) const {
+    std::string text;
+    for (int tries = 0; tries < 500 && text.find(what) == std::string::npos; ++tries) {
+      meanwhile();
+      pollfd p{master_, POLLIN, 0};
+      char bytes[4096];
+      const ssize_t n = poll(&p, 1, 10) > 0 ? ::read(master_, bytes, sizeof bytes) : 0;
+      if (n > 0) text.append(bytes, static_cast<std::size_t>(n));
+    }
+    return text;
+  }
+  void resize(unsigned short columns, unsigned short rows) const {
+    const winsize size{rows, columns, 0, 0};
+    ioctl(master_, TIOCSWINSZ, &size);
+  }
+  termios settings() const {
+    termios now{};
+    tcgetattr(slave_, &now);
+    return now;
+  }
+
+ private:
+  int master_ = -1, slave_ = -1;
+  char name_[64] = {};
+};
+
+/// The tool with a terminal of its own, listening to an adapter that the test plays.
+class LiveScreen : public ::testing::Test {
+ protected:
+  ~LiveScreen() override {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+  }
+  void start(std::vector<std::string> more = {}) {
+    before_ = terminal_.settings();
+    std::vector<std::string> words = {BMS_TOOL, "monitor", std::string("slcan:") + adapter_.name()};
+    words.insert(words.end(), more.begin(), more.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    pid_ = fork();
+    if (pid_ == 0) {
+      login_tty(terminal_.slave());
+      setenv("LC_ALL", "C.UTF-8", 1);
+      execv(argv[0], argv.data());
+      _exit(127);
+    }
+    adapter_.read_until("O\r");
+  }
+  /// A sample every tenth of a second while called.
+  void talk() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_) return;
+    next_ = now + std::chrono::milliseconds(100);
+    for (const monitor::BusFrame& frame : traffic_.sample()) {
+      std::array<char, hal::slcan::longest_frame> text;
+      adapter_.write(std::string(hal::slcan::encode(classic(frame), text)));
+    }
+  }
+  std::string shown_until(const std::string& what) {
+    return terminal_.read_until(what, [this] { talk(); });
+  }
+  int end() {
+    int status = -1;
+    for (int tries = 0; tries < 500; ++tries) {
+      if (waitpid(pid_, &status, WNOHANG) == pid_) {
+        pid_ = -1;
+        return status;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return -1;
+  }
+  void expect_terminal_as_before() const {
+    const termios now = terminal_.settings();
+    EXPECT_EQ(now.c_lflag, before_.c_lflag);
+    EXPECT_EQ(now.c_iflag, before_.c_iflag);
+    EXPECT_EQ(now.c_oflag, before_.c_oflag);
+  }
+  static constexpr const char* restored = "\x1b[?25h\x1b[?1049l";
+
+  PseudoTerminal terminal_, adapter_;
+  termios before_{};
+  pid_t pid_ = -1;
+  monitor::Traffic traffic_{0, 100'000};
+  std::chrono::steady_clock::time_point next_{};
+};
+
+TEST_F(LiveScreen, DrawsOnTheAlternateScreenAndGivesTheTerminalBackOnCtrlC) {
+  start();
+  const std::string first = shown_until("carried by counting");
+  EXPECT_THAT(first, AllOf(HasSubstr("\x1b[?1049h\x1b[?25l"), HasSubstr("carried by counting")));
+  EXPECT_EQ(terminal_.settings().c_lflag & (ICANON | ECHO), 0U) << "keys are not shown";
+  terminal_.write("\x03");
+  const std::string last = shown_until("\x1b[?1049l");
+  EXPECT_THAT(last, HasSubstr(restored));
+  const std::string left = terminal_.read_until("no such text, all there is", [] {});
+  EXPECT_THAT(last + left, HasSubstr("Charge   "));
+  EXPECT_EQ(end(), 0);
+  expect_terminal_as_before();
+  EXPECT_THAT(adapter_.read_until("C\r"), EndsWith("C\r")) << "the adapter's channel is closed";
+}
+
+TEST_F(LiveScreen, EndsWithQ) {
+  start();
+  shown_until("carried by counting");
+  terminal_.write("q");
+  EXPECT_THAT(shown_until("\x1b[?1049l"), HasSubstr(restored));
+  EXPECT_EQ(end(), 0);
+  expect_terminal_as_before();
+}
+
+TEST_F(LiveScreen, FollowsTheTerminalsSize) {
+  start();
+  shown_until("SocAnchor");
+  terminal_.resize(40, 6);
+  shown_until("\x1b[?2026l");
+  shown_until("\x1b[?2026l");
+  const std::string small = shown_until("\x1b[?2026l");
+  const std::string frame = small.substr(small.rfind("\x1b[?2026h"));
+  EXPECT_LE(std::count(frame.begin(), frame.end(), '\n'), 5) << frame;
+  EXPECT_THAT(frame, AllOf(HasSubstr("Charge"), Not(HasSubstr("SocAnchor"))));
+}
+
+TEST_F(LiveScreen, GivesTheTerminalBackWhenItCrashes) {
+  start();
+  shown_until("carried by counting");
+  kill(pid_, SIGSEGV);
+  EXPECT_THAT(shown_until("\x1b[?1049l"), HasSubstr(restored));
+  const int status = end();
+  EXPECT_TRUE(WIFSIGNALED(status)) << "and still crashes";
+  expect_terminal_as_before();
+}
+
+TEST_F(LiveScreen, GreysWhatIsStale) {
+  start();
+  shown_until("carried by counting");
+  EXPECT_THAT(shown_until("\x1b[1m80.0 %"), HasSubstr("\x1b[1m80.0 %"));
+  EXPECT_THAT(terminal_.read_until("\x1b[90m80.0 %"), HasSubstr("\x1b[90m80.0 %")) << "after three seconds of silence";
+}
+
+TEST_F(LiveScreen, AnAdapterThatIsUnpluggedEndsItWithALine) {
+  // the adapter's side is this test's: closed, the tool reads an error
+  auto gone = std::make_unique<PseudoTerminal>();
+  const TemporaryFolder folder;
+  const std::string out = (folder.path() / "out").string();
+  const ChildProcess* child = nullptr;
+  auto tool = std::make_unique<ChildProcess>(std::vector<std::string>{BMS_TOOL, "monitor", std::string("slcan:") + gone->name()}, out);
+  child = tool.get();
+  EXPECT_NE(child, nullptr);
+  gone->read_until("O\r");
+  gone.reset();
+  EXPECT_EQ(tool->wait(), 1);
+  EXPECT_THAT(content(out), HasSubstr("has gone away"));
+}
+
+/// Resident memory of a process [kB].
+long memory_kb(pid_t pid) {
+  std::ifstream in("/proc/" + std::to_string(pid) + "/status");
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("VmRSS:")) return std::atol(line.c_str() + 6);
+  }
+  return 0;
+}
+
+TEST(MonitorLoad, TenThousandFramesASecondAreTakenWithoutLossInConstantMemory) {
+  // a shorter run of tests/vcan/load.sh: every frame of 4 s at 10,000 a second, by a pipe
+  const TemporaryFolder folder;
+  const std::string json_file = (folder.path() / "p.json").string(), count_file = (folder.path() / "count").string();
+  int line[2];
+  ASSERT_EQ(pipe(line), 0);
+  const pid_t tool = fork();
+  if (tool == 0) {
+    dup2(line[0], 0);
+    close(line[0]);
+    close(line[1]);
+    execl(BMS_TOOL, BMS_TOOL, "monitor", "file:-", "--quiet", "--json", json_file.c_str(), nullptr);
+    _exit(127);
+  }
+  const pid_t bus = fork();
+  if (bus == 0) {
+    dup2(line[1], 1);
+    dup2(open(count_file.c_str(), O_WRONLY | O_CREAT, 0600), 2);
+    close(line[0]);
+    close(line[1]);
+    execl(BMS_WRITE_TRAFFIC, BMS_WRITE_TRAFFIC, "dump", "10000", "4", nullptr);
+    _exit(127);
+  }
+  close(line[0]);
+  close(line[1]);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1'000));
+  const long early_kb = memory_kb(tool);
+  std::this_thread::sleep_for(std::chrono::milliseconds(2'500));
+  const long late_kb = memory_kb(tool);
+  waitpid(bus, nullptr, 0);
+  int status = 0;
+  waitpid(tool, &status, 0);
+  ASSERT_EQ(status, 0);
+  const json p = json::parse(content(json_file));
+  EXPECT_EQ(p["frames"], std::stoul(content(count_file)));
+  EXPECT_GT(p["frames"], 40'000);
+  for (const auto& [name, message] : p["messages"].items()) EXPECT_EQ(message["lost"], 0) << name;
+  EXPECT_GT(early_kb, 1'000);
+  EXPECT_LE(late_kb, early_kb + 256);
+}
+
+}  // namespace
+}  // namespace bms

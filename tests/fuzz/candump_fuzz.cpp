@@ -1,0 +1,45 @@
+// Any bytes as a candump log: by lines into the parser, what is a frame into the state of the bus, and that onto a screen. A frame that was read
+// comes back from the line that is written of it.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+
+#include "monitor/bus_state.hpp"
+#include "monitor/candump_line.hpp"
+#include "monitor/results.hpp"
+#include "monitor/screen.hpp"
+
+namespace {
+
+void require(bool true_of_any_input) {
+  if (!true_of_any_input) std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace bms::monitor;
+  DumpLines lines;
+  BusState bus;
+  for (std::size_t k = 0; k < size; ++k) {
+    if (!lines.take(static_cast<char>(data[k]))) continue;
+    BusFrame frame;
+    if (!parse_dump_line(lines.line(), frame)) continue;
+    require(frame.length <= (frame.kind == FrameKind::fd ? 64 : 8));
+    bus.take(frame);
+    std::string written;
+    append_dump_line(written, frame, "can0");
+    BusFrame again;
+    written.pop_back();
+    require(parse_dump_line(written, again));
+    require(again.id == frame.id && again.kind == frame.kind && again.length == frame.length && again.data == frame.data && again.time_us == frame.time_us);
+  }
+  require(bus.unknown_ids().size() <= 64 && bus.good() <= bus.frames());
+  const ScreenSize size_of_screen{1 + size % 200, 1 + size % 60};
+  const auto picture = screen(bus, {}, size_of_screen);
+  require(picture.size() <= size_of_screen.rows);
+  for (const ScreenLine& line : picture) require(line.columns() <= size_of_screen.columns);
+  require(!json_of(bus, {}).empty() && !csv_row(bus).empty() && !status_line(bus, {}).empty());
+  return 0;
+}

@@ -1,0 +1,265 @@
+#include "monitor/bus_state.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+#include <set>
+
+#include "monitor/history.hpp"
+#include "monitor/pack_view.hpp"
+#include "monitor/results.hpp"
+#include "tests/monitor/traffic.hpp"
+
+namespace bms::monitor {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::int64_t second_us = 1'000'000;
+
+const MessageState& state(const BusState& bus, const char* message) { return bus.states().at(BusState::find(message)); }
+
+void take(BusState& bus, const std::vector<BusFrame>& frames) {
+  for (const BusFrame& frame : frames) bus.take(frame);
+}
+
+BusFrame pack_state(float soc, std::uint8_t counter, std::int64_t time_us) {
+  can::PackState m;
+  m.soc = soc;
+  return on_bus(m.frame(counter), time_us);
+}
+
+TEST(BusState, HoldsTheLastValueOfEachSignalAsItWasSent) {
+  Traffic traffic;
+  BusState bus;
+  for (int k = 0; k < 20; ++k) take(bus, traffic.sample());
+  EXPECT_NEAR(bus.reading("PackState", "Soc").value, static_cast<double>(Traffic::soc_percent(19)), 0.001);
+  EXPECT_EQ(bus.reading("Status", "SampleCounter").value, 20);
+  EXPECT_EQ(bus.reading("Identity", "CellHash").value, 0xCAFE1234);
+  EXPECT_EQ(bus.reading("CurrentLimits", "ChargeTenSeconds").value, 24);
+  EXPECT_FALSE(bus.reading("SensorErrors", "CurrentOffset").known()) << "never sent";
+  EXPECT_FALSE(bus.reading("NoSuchMessage", "Soc").known());
+  EXPECT_FALSE(bus.reading("PackState", "NoSuchSignal").known());
+}
+
+TEST(BusState, AValueThatIsSentAsNotKnownIsNotKnown) {
+  BusState bus;
+  bus.take(pack_state(54, 0, 0));
+  EXPECT_TRUE(bus.reading("PackState", "Soc").known());
+  bus.take(pack_state(can::unknown, 1, 10));
+  EXPECT_FALSE(bus.reading("PackState", "Soc").known());
+  EXPECT_FALSE(bus.reading("PackState", "Soc").stale) << "it was said just now that it is not known";
+}
+
+TEST(BusState, EachMessageOfTheDbcFileIsThereWithWordsUnitsAndComments) {
+  std::set<int> ids;
+  for (const MessageInfo& m : messages()) {
+    ids.insert(m.id);
+    EXPECT_FALSE(m.signals.empty()) << m.name;
+    for (const SignalInfo& s : m.signals) EXPECT_STRNE(s.comment, "") << m.name << "." << s.name;
+  }
+  EXPECT_EQ(ids.size(), messages().size());
+  const MessageInfo& pack = messages().at(BusState::find("PackState"));
+  EXPECT_EQ(text_of(pack.signals[0], 2), "carried by counting");
+  EXPECT_STREQ(pack.signals[1].name, "Soc");
+  EXPECT_STREQ(pack.signals[1].unit, "%");
+  EXPECT_EQ(text_of(pack.signals[1], 54.3), "54.300 %");
+}
+
+TEST(BusState, CountsWhatTheCounterSaysIsMissing) {
+  BusState bus;
+  for (const int counter : {0, 1, 2, 5, 14, 0, 1}) bus.take(pack_state(50, static_cast<std::uint8_t>(counter), counter));
+  EXPECT_EQ(state(bus, "PackState").frames, 7U);
+  EXPECT_EQ(state(bus, "PackState").lost, 2U + 8U);
+  EXPECT_EQ(state(bus, "PackState").repeated, 0U);
+}
+
+TEST(BusState, ARepeatedFrameIsNotNews) {
+  BusState bus;
+  bus.take(pack_state(50, 3, 0));
+  for (int k = 1; k <= 10; ++k) bus.take(pack_state(60, 3, k * second_us));
+  EXPECT_EQ(state(bus, "PackState").repeated, 10U);
+  EXPECT_EQ(bus.reading("PackState", "Soc").value, 50);
+  EXPECT_TRUE(bus.reading("PackState", "Soc").stale) << "who repeats himself hangs";
+}
+
+TEST(BusState, AFrameThatIsDamagedOrOfAnotherLengthChangesNothing) {
+  BusState bus;
+  bus.take(pack_state(50, 0, 0));
+  for (std::size_t byte = 0; byte < 8; ++byte) {
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      BusFrame damaged = pack_state(60, 1, second_us);
+      damaged.data[byte] = static_cast<std::uint8_t>(damaged.data[byte] ^ (1U << bit));
+      bus.take(damaged);
+    }
+  }
+  EXPECT_EQ(state(bus, "PackState").crc_errors, 64U);
+  for (const std::uint8_t length : std::initializer_list<std::uint8_t>{0, 1, 7}) {
+    BusFrame cut = pack_state(60, 1, second_us);
+    cut.length = length;
+    bus.take(cut);
+  }
+  EXPECT_EQ(state(bus, "PackState").wrong_length, 3U);
+  BusFrame of_another = pack_state(60, 1, second_us);
+  of_another.id = can::PackElectrical::id;
+  bus.take(of_another);
+  EXPECT_EQ(state(bus, "PackElectrical").crc_errors, 1U) << "the data id is in the CRC";
+  hal::CanFrame fifteen = classic(pack_state(60, 0, 0));
+  can::protect(fifteen, can::PackState::data_id, 15);
+  bus.take(on_bus(fifteen, second_us));
+  EXPECT_EQ(state(bus, "PackState").crc_errors, 65U) << "no sender counts to 15";
+  EXPECT_EQ(state(bus, "PackState").frames, 1U);
+  EXPECT_EQ(bus.reading("PackState", "Soc").value, 50);
+}
+
+TEST(BusState, IsStaleAfterThreeCyclesOrThreeSeconds) {
+  Traffic traffic(0);
+  BusState bus;
+  take(bus, traffic.sample());
+  for (const char* name : {"PackState", "CurrentLimits"}) {  // no cycle time; a second
+    const std::size_t k = BusState::find(name);
+    BusState later = bus;
+    later.time_is(3 * second_us);
+    EXPECT_FALSE(later.stale(k)) << name;
+    later.time_is(3 * second_us + 1);
+    EXPECT_TRUE(later.stale(k)) << name;
+  }
+  EXPECT_TRUE(bus.stale(BusState::find("SensorErrors"))) << "never heard";
+}
+
+TEST(BusState, RateIsThatOfTheMessage) {
+  Traffic traffic(0, 50'000);
+  BusState bus;
+  for (int k = 0; k < 200; ++k) take(bus, traffic.sample());
+  EXPECT_NEAR(state(bus, "PackState").rate_hz(), 20, 0.01);
+  EXPECT_NEAR(state(bus, "Health").rate_hz(), 1, 0.01);
+}
+
+TEST(BusState, AClockThatIsSetBackMakesNothingStaleForEver) {
+  Traffic first(1'000'000 * second_us), second(100 * second_us);
+  BusState bus;
+  for (int k = 0; k < 60; ++k) take(bus, first.sample());
+  for (int k = 0; k < 60; ++k) take(bus, second.sample());
+  EXPECT_FALSE(bus.stale(BusState::find("PackState")));
+  EXPECT_NEAR(bus.duration_s(), 118, 0.01);
+  for (int k = 0; k < 5; ++k) bus.take(on_bus({0x7AA, 0, {}}, (160 + k) * second_us));
+  EXPECT_TRUE(bus.stale(BusState::find("PackState"))) << "but what has ended is";
+}
+
+TEST(BusState, UnknownIdsHaveAFixedTableAndTheRestIsCounted) {
+  BusState bus;
+  for (std::uint32_t id = 0; id < 100'000; ++id) {
+    BusFrame frame;
+    frame.kind = FrameKind::extended;
+    frame.long_id = true;
+    frame.id = id;
+    bus.take(frame);
+    bus.take(on_bus({0x7AA, 0, {}}, 0));
+  }
+  EXPECT_EQ(bus.unknown_ids().size(), 64U);
+  EXPECT_EQ(bus.unknown_frames(), 200'000U);
+  EXPECT_EQ(bus.unknown_ids()[1].id, 0x7AAU);
+  EXPECT_EQ(bus.unknown_ids()[1].frames, 100'000U);
+  EXPECT_EQ(bus.unknown_without_place(), 100'000U - 63U);
+}
+
+TEST(BusState, FramesOfOtherKindsAreCountedAndNotDecoded) {
+  BusState bus;
+  for (const FrameKind kind : {FrameKind::remote, FrameKind::error, FrameKind::fd, FrameKind::extended}) {
+    BusFrame frame = pack_state(50, 0, 0);
+    frame.kind = kind;
+    bus.take(frame);
+  }
+  EXPECT_EQ(bus.frames(), 4U);
+  EXPECT_EQ(bus.good(), 0U);
+  EXPECT_EQ(bus.remote(), 1U);
+  EXPECT_EQ(bus.errors(), 1U);
+  EXPECT_EQ(bus.fd(), 1U);
+  EXPECT_EQ(bus.unknown_frames(), 1U);
+}
+
+TEST(BusState, IsCompleteWhenASampleAndASecondOfItWereHeard) {
+  Traffic traffic(0);
+  BusState bus;
+  take(bus, traffic.sample());
+  EXPECT_FALSE(bus.complete()) << "SensorErrors may come";
+  take(bus, traffic.sample());
+  EXPECT_FALSE(bus.complete());
+  take(bus, traffic.sample());
+  EXPECT_TRUE(bus.complete());
+  BusState noise;
+  for (int k = 0; k < 100; ++k) noise.take(on_bus({0x7AA, 0, {}}, k * second_us));
+  EXPECT_FALSE(noise.complete());
+}
+
+TEST(BusState, AnyFramesDoNoHarm) {
+  std::mt19937_64 random(4);
+  BusState bus;
+  for (int run = 0; run < 200'000; ++run) {
+    BusFrame frame;
+    frame.time_us = static_cast<std::int64_t>(random() % 100'000'000'000'000'000);
+    frame.kind = static_cast<FrameKind>(random() % 5);
+    frame.id = static_cast<std::uint32_t>(frame.kind == FrameKind::standard ? 0x180 + random() % 16 : random() % 0x1FFFFFFF);
+    frame.length = static_cast<std::uint8_t>(random() % 9);
+    for (std::uint8_t& byte : frame.data) byte = static_cast<std::uint8_t>(random());
+    if (frame.kind == FrameKind::standard && random() % 2 == 0) {  // right in all but its values
+      for (const MessageInfo& m : messages()) {
+        if (m.id != frame.id) continue;
+        hal::CanFrame whole = classic(frame);
+        whole.length = 8;
+        can::protect(whole, m.data_id, static_cast<std::uint8_t>(random() % 15));
+        frame = on_bus(whole, frame.time_us);
+      }
+    }
+    bus.take(frame);
+    if (run % 1'000 == 0) {
+      EXPECT_FALSE(json_of(bus, {}).empty());
+      EXPECT_FALSE(csv_row(bus).empty());
+      EXPECT_FALSE(screen(bus, {}, {200, 60}).empty());
+    }
+  }
+  EXPECT_GT(bus.good(), 10'000U);
+}
+
+TEST(PackView, SaysWhichBitsOfTheEstimatesFlagsAreSet) {
+  Traffic traffic;
+  traffic.flags = 1U << 2 | 1U << 9 | 1U << 30;
+  BusState bus;
+  take(bus, traffic.sample());
+  const PackView view = pack_view(bus);
+  ASSERT_EQ(view.flags.size(), 3U);
+  EXPECT_EQ(view.flags[0].text, "voltage stuck");
+  EXPECT_EQ(view.flags[1].text, "more than one state of charge fits");
+  EXPECT_EQ(view.flags[2].text, "unknown flags 0x40000000");
+}
+
+TEST(Results, CsvHasAValueForEachNameAndLeavesOutWhatIsStale) {
+  Traffic traffic(0);
+  BusState bus;
+  take(bus, traffic.sample());
+  const auto commas = [](const std::string& text) { return std::count(text.begin(), text.end(), ','); };
+  EXPECT_EQ(commas(csv_head()), commas(csv_row(bus)));
+  EXPECT_THAT(csv_head(), ::testing::StartsWith("time_s,current_a,voltage_v,temperature_c,"));
+  EXPECT_THAT(csv_head(), HasSubstr(",PackState.Soc [%],"));
+  EXPECT_THAT(csv_row(bus), HasSubstr(",80,"));
+  bus.time_is(100 * second_us);
+  EXPECT_EQ(csv_row(bus), "0.000000" + std::string(static_cast<std::size_t>(commas(csv_head())), ',') + "\n");
+}
+
+TEST(History, KeepsAnHourAtAtMostTwoPointsASecondAndNeverMore) {
+  Traffic traffic(0, 100'000);
+  BusState bus;
+  History history;
+  for (int k = 0; k < 60'000; ++k) {
+    take(bus, traffic.sample());
+    if (history.wants(bus.now_us())) history.add(point_of(bus), bus.now_us());
+  }
+  EXPECT_EQ(history.count(), 12'000U);
+  EXPECT_EQ(history.first(), 12'000U - History::capacity);
+  EXPECT_NEAR(history.at(history.first()).time_s, 2'400, 0.01);
+  EXPECT_NEAR(history.at(history.count() - 1).time_s, 5'999.5, 0.01);
+}
+
+}  // namespace
+}  // namespace bms::monitor

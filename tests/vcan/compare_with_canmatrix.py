@@ -1,0 +1,72 @@
+"""Frames that candump saw, decoded by canmatrix from the DBC file, against what bms monitor made of the same bus.
+
+    compare_with_canmatrix.py DBC candump.log rows.csv monitor.json
+
+At each Status frame all values heard so far must be those of the monitor's row; at the end those of its JSON. Prints what was compared.
+"""
+import contextlib
+import csv
+import json
+import math
+import os
+import sys
+
+with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
+    import canmatrix.formats
+
+    matrix = canmatrix.formats.loadp_flat(sys.argv[1])
+frames = {f.arbitration_id.id: f for f in matrix.frames}
+rows = list(csv.DictReader(open(sys.argv[3])))
+report = json.load(open(sys.argv[4]))
+
+
+def values_of(frame, data):
+    decoded = frame.decode(data)
+    values = {}
+    for signal in frame.signals:
+        if signal.name in ("Crc", "Counter"):
+            continue
+        invalid = (signal.attributes.get("Invalid") or "").strip('"')
+        raw = int(decoded[signal.name].raw_value)
+        values[signal.name] = None if invalid != "" and raw == int(invalid) else float(decoded[signal.name].phys_value)
+    return values
+
+
+def same(text, value):
+    return text in ("", None) if value is None else text not in ("", None) and math.isclose(float(text), value, rel_tol=1e-12, abs_tol=1e-12)
+
+
+heard, count, at, compared, problems = {}, {}, 0, 0, []
+for line in open(sys.argv[2]):
+    identity, data = line.split()[2].split("#")
+    frame = frames.get(int(identity, 16))
+    if frame is None:
+        continue
+    heard[frame.name] = values_of(frame, bytes.fromhex(data))
+    count[frame.name] = count.get(frame.name, 0) + 1
+    if frame.name != "Status":
+        continue
+    if at >= len(rows):
+        problems.append("more Status frames than rows")
+        break
+    for name, values in heard.items():
+        for signal in frames[next(i for i, f in frames.items() if f.name == name)].signals:
+            if signal.name in values:
+                column = f"{name}.{signal.name}" + (f" [{signal.unit}]" if signal.unit else "")
+                compared += 1
+                if not same(rows[at][column], values[signal.name]):
+                    problems.append(f"row {at}, {column}: {rows[at][column]!r} in the CSV, {values[signal.name]} by canmatrix")
+    at += 1
+if at != len(rows):
+    problems.append(f"{at} Status frames, {len(rows)} rows")
+for name, values in heard.items():
+    message = report["messages"][name]
+    if message["frames"] != count[name]:
+        problems.append(f"{name}: {message['frames']} frames in the JSON, {count[name]} in candump's log")
+    for signal, value in values.items():
+        compared += 1
+        if not same(message["signals"][signal]["value"], value):
+            problems.append(f"{name}.{signal}: {message['signals'][signal]['value']} in the JSON, {value} by canmatrix")
+print(f"{at} samples, {sum(count.values())} frames of {len(count)} messages, {compared} values, {len(problems)} problems")
+print("\n".join(problems[:20]))
+sys.exit(1 if problems or at == 0 else 0)

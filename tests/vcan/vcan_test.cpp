@@ -1,0 +1,108 @@
+// The firmware on a real CAN bus (SocketCAN, in User-Mode Linux where this machine has none), with noise beside it: what bms monitor says of it is
+// what bms replay says of the same samples, and what candump and canmatrix make of the same frames.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Exit code, standard output and standard error of a command of the shell.
+ToolRun run_shell(const std::string& command) {
+  const TemporaryFolder folder;
+  const std::string out = (folder.path() / "out").string(), err = (folder.path() / "err").string();
+  const int status = std::system((command + " >" + out + " 2>" + err).c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, content(out), content(err)};
+}
+
+/// Rows 3000 to 3000 + count of the shift, as a recording of its own.
+void write_part(const std::filesystem::path& path, int count) {
+  std::ifstream in(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  std::ofstream out(path);
+  int row = -1;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("#")) continue;
+    if (row < 0 || (row >= 3000 && row < 3000 + count)) out << line << "\n";
+    ++row;
+  }
+}
+
+std::vector<double> column(const std::filesystem::path& csv, const std::string& name) {
+  std::ifstream in(csv);
+  std::string line, field;
+  std::getline(in, line);
+  std::istringstream head(line);
+  std::size_t wanted = 0;
+  while (std::getline(head, field, ',') && field != name) ++wanted;
+  std::vector<double> values;
+  while (std::getline(in, line)) {
+    std::istringstream row(line);
+    for (std::size_t k = 0; k <= wanted && std::getline(row, field, ','); ++k) {
+    }
+    values.push_back(field.empty() ? NAN : std::stod(field));
+  }
+  return values;
+}
+
+TEST(Vcan, MonitorAndCandumpShowOnANoisyBusWhatReplaySaysOfTheSameSamples) {
+  constexpr int samples = 200;
+  const TemporaryFolder folder;
+  const auto part = folder.path() / "part.csv", trace = folder.path() / "trace.csv";
+  write_part(part, samples);
+  ASSERT_EQ(run_tool(fmt::format("replay {} --initial-soc 0.8 --initial-soc-sigma 0.05 --trace {} --quiet", part.string(), trace.string())).exit_code, 0);
+  const auto image = firmware_image("netduinoplus2", read_cell("table9"), Image::application);
+
+  const ToolRun run = run_shell(fmt::format("{}/tests/vcan/telemetry.sh {} {} {} {} 0.8 0.05 {}", BMS_SOURCE_DIR, BMS_TOOL, BMS_FEED_SAMPLES, image.string(), part.string(), folder.path().string()));
+  if (run.exit_code == 125) GTEST_SKIP() << run.err;
+  ASSERT_EQ(run.exit_code, 0) << run.out << run.err << content(folder.path() / "emulator.log");
+  EXPECT_THAT(run.out, HasSubstr(fmt::format("{} samples", samples)));
+
+  const auto told = nlohmann::json::parse(content(folder.path() / "monitor.json"));
+  EXPECT_EQ(told["dropped"], 0);
+  EXPECT_GT(told["other_ids"]["frames"], 2'000) << "there was to be noise";
+  EXPECT_GT(told["other_kinds"]["remote"], 0);
+  EXPECT_GT(told["other_kinds"]["fd"], 0);
+  for (const auto& [name, message] : told["messages"].items()) {
+    EXPECT_EQ(message["lost"], 0) << name;
+    EXPECT_EQ(message["repeated"], 0) << name;
+    EXPECT_EQ(message["crc_errors"], 0) << name;
+  }
+  EXPECT_EQ(told["messages"]["Status"]["frames"], samples);
+
+  // what the firmware says of each sample; half a step of 0.002 %
+  const auto soc = column(trace, "soc"), sigma = column(trace, "soc_sigma"), shown = column(folder.path() / "rows.csv", "PackState.Soc [%]"), shown_sigma = column(folder.path() / "rows.csv", "PackState.SocSigma [%]");
+  ASSERT_EQ(soc.size(), samples);
+  ASSERT_EQ(shown.size(), samples);
+  for (int k = 0; k < samples; ++k) {
+    ASSERT_NEAR(shown[k], 100 * soc[k], 0.00101) << k;
+    ASSERT_NEAR(shown_sigma[k], 100 * sigma[k], 0.00101) << k;
+  }
+  EXPECT_NEAR(told["pack"]["soc"].get<double>(), soc.back(), 1.01e-5);
+  EXPECT_GT(std::abs(soc.back() - soc.front()), 1e-3) << "the state of charge was to move";
+
+  const ToolRun other = run_shell(fmt::format("/usr/bin/python3 {}/tests/vcan/compare_with_canmatrix.py {}/can/greybox_bms.dbc {f}/candump.log {f}/rows.csv {f}/monitor.json", BMS_SOURCE_DIR, BMS_SOURCE_DIR, fmt::arg("f", folder.path().string())));
+  EXPECT_EQ(other.exit_code, 0) << other.out << other.err;
+  std::printf("%s", other.out.c_str());
+
+  // what was recorded on that bus tells the same when it is read again
+  const auto again = run_tool("monitor file:" + (folder.path() / "record.log").string() + " --json -");
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  auto live = told, replayed = nlohmann::json::parse(again.out);
+  for (auto* json : {&live, &replayed}) {
+    json->erase("source");
+    json->erase("silent_s");
+  }
+  EXPECT_EQ(live, replayed);
+}
+
+}  // namespace
+}  // namespace bms
