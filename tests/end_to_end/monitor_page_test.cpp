@@ -1,11 +1,15 @@
 // bms monitor --serve: the server as a stranger finds it, and the page in a real browser.
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <regex>
 #include <thread>
 
@@ -14,6 +18,7 @@
 namespace bms {
 namespace {
 
+using nlohmann::json;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -110,31 +115,120 @@ TEST_F(ServedPage, APortThatIsTakenIsRefused) {
   EXPECT_THAT(run.err, HasSubstr("is not to be had"));
 }
 
-TEST_F(ServedPage, ShowsLiveValuesAndPlotsInABrowserAndAsksNobodyElse) {
-  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const auto dom_file = folder_.path() / "dom", net = folder_.path() / "net.json";
-  // every other name leads nowhere; the log has each request that was tried
-  const std::string command = "chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync "
-                              "--window-size=1400,1100 --timeout=4000 --log-net-log=" + net.string() + " --user-data-dir=" + (folder_.path() / "profile").string() + " --dump-dom " + url_ + " > " + dom_file.string() + " 2>/dev/null";
-  ASSERT_EQ(std::system(command.c_str()), 0);
-  const std::string dom = content(dom_file);
-  EXPECT_THAT(dom, std::regex_search(dom, std::regex("<span id=\"soc\">[0-9]+\\.[0-9]")) ? HasSubstr("<span id=\"soc\">") : HasSubstr("a state of charge"));
-  EXPECT_THAT(dom, HasSubstr("carried by counting"));
-  EXPECT_THAT(dom, HasSubstr("<td>PackElectrical</td>"));
-  EXPECT_THAT(dom, Not(HasSubstr("NaN")) ) << "no value is lost";
-  std::size_t canvases = 0;
-  for (std::size_t at = dom.find("<canvas"); at != std::string::npos; at = dom.find("<canvas", at + 1)) ++canvases;
-  EXPECT_GE(canvases, 8U);
-  const std::string log = content(net);
-  EXPECT_THAT(log, HasSubstr("/events"));
-  const std::regex asked("\"url\":\"((https?|wss?)://[^\"]*)\"");
-  std::size_t own = 0;
-  for (std::sregex_iterator at(log.begin(), log.end(), asked), end; at != end; ++at) {
-    const std::string url = (*at)[1];
-    EXPECT_THAT(url, StartsWith("http://" + own_host() + "/"));
-    ++own;
+/// A browser that is asked by its debugging protocol through pipes (--remote-debugging-pipe: JSON objects, each ended by a zero).
+class Browser {
+ public:
+  explicit Browser(const std::filesystem::path& profile) {
+    int in[2], out[2];
+    EXPECT_EQ(pipe2(in, O_CLOEXEC), 0);
+    EXPECT_EQ(pipe2(out, O_CLOEXEC), 0);
+    const std::string folder = "--user-data-dir=" + profile.string();
+    pid_ = fork();
+    if (pid_ == 0) {
+      const int quiet = open("/dev/null", O_RDWR), from = fcntl(in[0], F_DUPFD, 10), to = fcntl(out[1], F_DUPFD, 10);
+      for (int k = 0; k < 3; ++k) dup2(quiet, k);
+      dup2(from, 3);
+      dup2(to, 4);
+      execlp("chromium", "chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+             "--remote-debugging-pipe", "--window-size=1400,1100", folder.c_str(), "about:blank", nullptr);
+      _exit(127);
+    }
+    close(in[0]);
+    close(out[1]);
+    to_ = in[1];
+    from_ = out[0];
+    const json page = ask("Target.createTarget", {{"url", "about:blank"}});
+    session_ = ask("Target.attachToTarget", {{"targetId", page["targetId"]}, {"flatten", true}})["sessionId"];
+    for (const char* domain : {"Network.enable", "Runtime.enable", "Page.enable"}) ask(domain, json::object());
   }
-  EXPECT_GE(own, 2U);
+  ~Browser() {
+    close(to_);
+    close(from_);
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  Browser(const Browser&) = delete;
+  Browser& operator=(const Browser&) = delete;
+
+  json ask(const std::string& method, const json& parameters) {
+    json request = {{"id", ++asked_}, {"method", method}, {"params", parameters}};
+    if (!session_.empty()) request["sessionId"] = session_;
+    const std::string text = request.dump();
+    EXPECT_EQ(::write(to_, text.c_str(), text.size() + 1), static_cast<ssize_t>(text.size() + 1));
+    while (true) {
+      const json answer = next();
+      if (answer.is_null()) {
+        ADD_FAILURE() << "no answer to " << method;
+        return json::object();
+      }
+      if (answer.value("id", 0) == asked_) return answer.value("result", json::object());
+    }
+  }
+  /// A script's value in the page.
+  json value_of(const std::string& script) {
+    const json result = ask("Runtime.evaluate", {{"expression", script}, {"returnByValue", true}});
+    return result.value("result", json::object()).value("value", json());
+  }
+  const std::vector<std::string>& requests() const { return requests_; }
+  const std::vector<std::string>& errors() const { return errors_; }
+
+ private:
+  json next() {
+    while (true) {
+      const std::size_t end = held_.find('\0');
+      if (end != std::string::npos) {
+        json message = json::parse(held_.substr(0, end), nullptr, false);
+        held_.erase(0, end + 1);
+        const std::string method = message.value("method", "");
+        if (method == "Network.requestWillBeSent") requests_.push_back(message["params"]["request"]["url"]);
+        if (method == "Runtime.exceptionThrown") errors_.push_back(message.dump());
+        return message;
+      }
+      pollfd p{from_, POLLIN, 0};
+      char bytes[65536];
+      const ssize_t n = poll(&p, 1, 20'000) > 0 ? ::read(from_, bytes, sizeof bytes) : 0;
+      if (n <= 0) return {};
+      held_.append(bytes, static_cast<std::size_t>(n));
+    }
+  }
+
+  pid_t pid_ = -1;
+  int to_ = -1, from_ = -1, asked_ = 0;
+  std::string session_, held_;
+  std::vector<std::string> requests_, errors_;
+};
+
+TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndAsksNobodyElse) {
+  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
+  Browser browser(folder_.path() / "profile");
+  browser.ask("Page.navigate", {{"url", url_}});
+  const auto soon = [&](const std::string& script) {
+    for (int tries = 0; tries < 200; ++tries) {
+      if (browser.value_of(script) == true) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return false;
+  };
+  ASSERT_TRUE(soon("window.points && points.length > 500 && charts.soc.numRows() === points.length")) << browser.value_of("document.body.innerText");
+  // the last sample, as tests/monitor/traffic.hpp makes it: 50 + 30 cos(29,999 / 2,700) %
+  EXPECT_EQ(browser.value_of("document.getElementById('soc').textContent"), "53.4\u202f%");
+  EXPECT_EQ(browser.value_of("document.getElementById('quality').textContent"), "carried by counting");
+  EXPECT_NEAR(browser.value_of("points[0][1]").get<double>(), 80, 0.01);
+  EXPECT_NEAR(browser.value_of("charts.soc.getValue(charts.soc.numRows() - 1, 1)[1]").get<double>(), 52.906, 0.003) << "a point each half second: the last is of 299.5 s";
+  EXPECT_GT(browser.value_of("charts.current.yAxisRange()[1] - charts.current.yAxisRange()[0]").get<double>(), 20);
+  EXPECT_EQ(browser.value_of("document.querySelectorAll('#messages tr').length"), 9) << "a head and eight messages";
+  EXPECT_EQ(browser.value_of("document.getElementById('figure-cells').hidden"), true) << "this bus tells no cells";
+  EXPECT_EQ(browser.value_of("document.body.innerText.includes('NaN') || document.body.innerText.includes('undefined')"), false);
+  for (const char* elsewhere : {"fetch('http://127.0.0.1:1/')", "fetch('https://example.org/')"}) {
+    EXPECT_EQ(browser.ask("Runtime.evaluate", {{"expression", std::string(elsewhere) + ".then(() => 'let through', e => 'refused')"}, {"awaitPromise", true}})["result"]["value"], "refused");
+  }
+  EXPECT_TRUE(browser.errors().empty()) << browser.errors().front();
+  EXPECT_THAT(browser.requests(), ::testing::UnorderedElementsAre(url_, url_ + "events"));
+
+  // the monitor ends: the page says so and keeps what it has
+  tool_.reset();
+  EXPECT_TRUE(soon("document.getElementById('state').textContent === 'The monitor has ended'"));
+  EXPECT_EQ(browser.value_of("document.getElementById('soc').textContent"), "53.4\u202f%");
 }
 
 }  // namespace
