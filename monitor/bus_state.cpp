@@ -33,7 +33,8 @@ int digits_of(double step) {
 /// What the frame's raw value is in decimals: 54.302, not the product of two floats. A float of at most 24 bits holds that raw value exactly, and
 /// its one rounding is less than half of a step.
 double exact(const SignalInfo& signal, double value) {
-  if (signal.integer || !std::isfinite(value)) return value;
+  if (signal.integer) return signal.layout.has_invalid && value == signal.layout.invalid ? std::numeric_limits<double>::quiet_NaN() : value;
+  if (!std::isfinite(value)) return value;
   const double raw = std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
   const double scale = std::pow(10, signal.digits);
   return std::round((raw * signal.factor + signal.offset) * scale) / scale;

@@ -59,10 +59,12 @@ std::vector<Reading> cells_of(const BusState& bus) {
 }  // namespace
 
 std::string text_of(const SignalInfo& signal, double value) {
-  if (!std::isfinite(value)) return "-";
+  const bool known = std::isfinite(value);
+  const long raw = known ? std::lround((value - signal.offset) / signal.factor) : signal.layout.invalid;
   for (const can::ValueName& name : signal.names) {
-    if (std::lround((value - signal.offset) / signal.factor) == name.raw) return name.text;
+    if (raw == name.raw && (known || signal.layout.has_invalid)) return name.text;
   }
+  if (!known) return "-";
   if (signal.integer && signal.layout.bits > 16 && !signal.layout.is_signed && *signal.unit == '\0') return fmt::format("{:#x}", static_cast<std::int64_t>(value));
   return fmt::format("{:.{}f}{}{}", value, signal.digits, *signal.unit != '\0' ? " " : "", signal.unit);
 }

@@ -68,7 +68,7 @@ Json message_json(const BusState& bus, std::size_t k) {
   for (std::size_t s = 0; s < info.signals.size(); ++s) {
     const SignalInfo& signal = info.signals[s];
     const double value = state.values[s];
-    Json& entry = signals[signal.name] = {{"value", signal.integer ? Json(static_cast<std::int64_t>(value)) : number(value)}};
+    Json& entry = signals[signal.name] = {{"value", signal.integer && std::isfinite(value) ? Json(static_cast<std::int64_t>(value)) : number(value)}};
     if (*signal.unit != '\0') entry["unit"] = signal.unit;
     if (!signal.names.empty()) entry["words"] = text_of(signal, value);
   }

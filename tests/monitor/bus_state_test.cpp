@@ -50,6 +50,11 @@ TEST(BusState, AValueThatIsSentAsNotKnownIsNotKnown) {
   bus.take(pack_state(can::unknown, 1, 10));
   EXPECT_FALSE(bus.reading("PackState", "Soc").known());
   EXPECT_FALSE(bus.reading("PackState", "Soc").stale) << "it was said just now that it is not known";
+  can::PackState m;
+  m.soc_quality = 15;
+  bus.take(on_bus(m.frame(2), 20));
+  EXPECT_FALSE(bus.reading("PackState", "SocQuality").known()) << "an integer's Invalid as well";
+  EXPECT_EQ(pack_view(bus).soc_quality.text, "not known");
 }
 
 TEST(BusState, EachMessageOfTheDbcFileIsThereWithWordsUnitsAndComments) {
