@@ -2,7 +2,8 @@
 
     compare_with_canmatrix.py DBC candump.log rows.csv monitor.json
 
-At each Status frame all values heard so far must be those of the monitor's row; at the end those of its JSON. Prints what was compared.
+At each Status frame all values heard so far must be those of the monitor's row, and nothing where the last frame is older than three cycle times, or
+3 s without one; at the end those of its JSON. Prints what was compared.
 """
 import contextlib
 import csv
@@ -36,13 +37,15 @@ def same(text, value):
     return text in ("", None) if value is None else text not in ("", None) and math.isclose(float(text), value, rel_tol=1e-12, abs_tol=1e-12)
 
 
-heard, count, at, compared, problems = {}, {}, 0, 0, []
+heard, heard_us, count, at, compared, problems = {}, {}, {}, 0, 0, []
 for line in open(sys.argv[2]):
     identity, data = line.split()[2].split("#")
     frame = frames.get(int(identity, 16))
     if frame is None:
         continue
     heard[frame.name] = values_of(frame, bytes.fromhex(data))
+    now_us = int(line[1:line.index(")")].replace(".", ""))
+    heard_us[frame.name] = now_us
     count[frame.name] = count.get(frame.name, 0) + 1
     if frame.name != "Status":
         continue
@@ -50,11 +53,13 @@ for line in open(sys.argv[2]):
         problems.append("more Status frames than rows")
         break
     for name, values in heard.items():
-        for signal in frames[next(i for i, f in frames.items() if f.name == name)].signals:
+        sender = next(f for f in frames.values() if f.name == name)
+        stale = now_us - heard_us[name] > (3_000 * sender.cycle_time or 3_000_000)
+        for signal in sender.signals:
             if signal.name in values:
                 column = f"{name}.{signal.name}" + (f" [{signal.unit}]" if signal.unit else "")
                 compared += 1
-                if not same(rows[at][column], values[signal.name]):
+                if not same(rows[at][column], None if stale else values[signal.name]):
                     problems.append(f"row {at}, {column}: {rows[at][column]!r} in the CSV, {values[signal.name]} by canmatrix")
     at += 1
 if at != len(rows):

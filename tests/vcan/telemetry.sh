@@ -37,7 +37,7 @@ on_the_bus() {
   soon test -e /sys/class/net/slcan0
   ip link set slcan0 txqueuelen 1000 up
   cangw -A -s slcan0 -d vcan0 -e
-  candump -L vcan0,180:7E0 >"$folder/candump.log" & dump=$!
+  candump -r 8000000 -L vcan0,180:7E0 >"$folder/candump.log" & dump=$!
   "$bms" monitor vcan0 --record "$folder/record.log" --csv "$folder/rows.csv" --json "$folder/monitor.json" --quiet & monitor=$!
   pids+=($dump $monitor)
   soon test -e "$folder/record.log"  # made when the monitor listens
