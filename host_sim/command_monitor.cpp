@@ -102,7 +102,6 @@ class Monitor {
       const std::size_t n = source_->ended() ? 0 : source_->read(room_, wait_ms);
       if (n == 0 && source_->ended()) poll(nullptr, 0, wait_ms);  // only the page goes on
       for (std::size_t k = 0; k < n && !satisfied(); ++k) take(room_[k]);
-      if (source_->live() && bus_.frames() > 0) bus_.time_is(clock_us());
       show(false);
     }
     finish();
@@ -159,18 +158,28 @@ class Monitor {
       record_.write(true);
       csv_.write(true);
     }
-    if (page_ && page_every_.due(now_s)) page_->publish(json_of(bus_, facts_));
+    if (page_ && page_every_.due(now_s)) page_->publish(json_of(as_of_now(), facts_, silent_s()));
     if (terminal_) {
-      if (screen_.due(now_s) || stop_.resized()) terminal_->show(ansi_frame(screen(bus_, facts_, Terminal::size())));
+      if (screen_.due(now_s) || stop_.resized()) terminal_->show(ansi_frame(screen(as_of_now(), facts_, Terminal::size())));
     } else if (shown_ && source_->live() && line_.due(now_s)) {
       print_line();
     }
   }
 
+  /// For who looks: ages go on while the bus is silent. What is written goes by the frames' time alone, so that a record gives the same.
+  BusState as_of_now() const {
+    BusState now = bus_;
+    if (source_->live() && bus_.frames() > 0) now.time_is(clock_us());
+    return now;
+  }
+  double silent_s() const {
+    const BusState now = as_of_now();
+    return 1e-6 * static_cast<double>(now.now_us() - now.last_us());
+  }
   double mean_rate() const { return bus_.duration_s() > 0 ? static_cast<double>(bus_.frames()) / bus_.duration_s() : 0; }
 
   void print_line() const {
-    fmt::print("{}\n", status_line(bus_, facts_));
+    fmt::print("{}\n", status_line(as_of_now(), facts_));
     std::fflush(stdout);
   }
 
@@ -180,11 +189,11 @@ class Monitor {
     record_.write(true);
     csv_.write(true);
     if (terminal_) {
-      const auto picture = screen(bus_, facts_, Terminal::size());
+      const auto picture = screen(as_of_now(), facts_, Terminal::size());
       terminal_.reset();
       fmt::print("{}", plain_text(picture));  // stays on the terminal
     }
-    if (!options_.output.json.empty()) put(options_.output.json, json_of(bus_, facts_));
+    if (!options_.output.json.empty()) put(options_.output.json, json_of(bus_, facts_, silent_s()));
   }
 
   const MonitorOptions& options_;

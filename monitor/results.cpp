@@ -77,7 +77,7 @@ Json message_json(const BusState& bus, std::size_t k) {
 
 }  // namespace
 
-std::string json_of(const BusState& bus, const ScreenFacts& facts) {
+std::string json_of(const BusState& bus, const ScreenFacts& facts, double silent_s) {
   Json json;
   json["command"] = "monitor";
   json["source"] = facts.source;
@@ -96,7 +96,7 @@ std::string json_of(const BusState& bus, const ScreenFacts& facts) {
   json["other_kinds"] = {{"remote", bus.remote()}, {"fd", bus.fd()}, {"error_reports", bus.errors()}, {"error_classes", bus.error_classes()}};
   json["malformed"] = facts.malformed;
   json["dropped"] = facts.dropped;
-  json["silent_s"] = seconds(1e-6 * static_cast<double>(bus.now_us() - bus.last_us()));
+  json["silent_s"] = seconds(silent_s);
   json["frames_per_second"] = number(std::round(facts.frames_per_second * 10) / 10);
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }

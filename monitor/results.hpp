@@ -9,8 +9,8 @@
 namespace bms::monitor {
 
 /// One JSON object: the battery, each message with its signals, what was wrong. From the frames alone, so that a record gives the same, but for
-/// `source`, `silent_s` (how long before the end the last frame came) and `frames_per_second`.
-std::string json_of(const BusState& bus, const ScreenFacts& facts);
+/// `source` and `silent_s` (how long ago the last frame came).
+std::string json_of(const BusState& bus, const ScreenFacts& facts, double silent_s = 0);
 
 /// time_s (since the first frame), current_a, voltage_v, temperature_c as in a recording, then every signal of the DBC file as "Message.Signal [unit]".
 std::string csv_head();
