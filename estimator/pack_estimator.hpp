@@ -3,9 +3,12 @@
 //   const Sample mean = mean_cell(sample, cell.plausible);     what the estimator of the mean cell is given: integers, the same everywhere
 //   cells.update(cell, sample, estimate);                      after its step
 //
-// A cell whose reading cannot be one does not count. Where no cell can be read, the pack's own voltage over their number stands in.
+// A cell whose reading cannot be one does not count, nor does one that is far from the middle one (a broken wire, a converter that is
+// stuck); one that is off counts as if it were 0.1 V off, so that no cell alone moves the mean by much. Where no cell can be read, the pack's own
+// voltage over their number stands in.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -17,12 +20,33 @@ namespace bms {
 
 constexpr bool readable(std::int32_t uv, const model::Plausible& plausible) { return uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv; }
 
+inline constexpr std::int32_t far_off_uv = 300'000;    ///< from the middle cell: no cell of the same pack
+inline constexpr std::int32_t counted_off_uv = 100'000;  ///< as much of it counts
+
+/// The middle one of those that can be read; of an even number, the lower. no_reading: there is none.
+template <std::size_t Cells>
+constexpr std::int32_t middle_cell_uv(const PackSample<Cells>& pack, const model::Plausible& plausible) {
+  std::array<std::int32_t, Cells> sorted{};
+  std::size_t count = 0;
+  for (const std::int32_t uv : pack.cell_uv) {
+    if (!readable(uv, plausible)) continue;
+    std::size_t k = count++;
+    for (; k > 0 && sorted[k - 1] > uv; --k) sorted[k] = sorted[k - 1];
+    sorted[k] = uv;
+  }
+  return count > 0 ? sorted[(count - 1) / 2] : no_reading;
+}
+
 template <std::size_t Cells>
 constexpr Sample mean_cell(const PackSample<Cells>& pack, const model::Plausible& plausible) {
   Sample mean{pack.time_us, pack.current_ua, no_reading, no_temperature};
   std::int32_t sum_uv = 0, cells = 0, sum_cdegc = 0, sensors = 0;  // plausible is below 6 V: 16 of them are far from the end
+  const std::int32_t middle_uv = middle_cell_uv(pack, plausible);
   for (const std::int32_t uv : pack.cell_uv) {
-    if (readable(uv, plausible)) sum_uv += uv, ++cells;
+    const std::int32_t off_uv = readable(uv, plausible) ? uv - middle_uv : far_off_uv;
+    if (off_uv >= far_off_uv || off_uv <= -far_off_uv) continue;
+    sum_uv += middle_uv + (off_uv > counted_off_uv ? counted_off_uv : off_uv < -counted_off_uv ? -counted_off_uv : off_uv);
+    ++cells;
   }
   for (const std::int16_t cdegc : pack.temperature_cdegc) {
     if (temperature_possible(cdegc)) sum_cdegc += cdegc, ++sensors;

@@ -78,7 +78,7 @@ class SocEstimator {
 
     auto noise = Model::noise(laws, settling, cell.noise);
     noise[Model::soc] = soc_noise_;
-    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell));
+    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, drive.current_a));
     if constexpr (Model::errors_are_states) noise[Model::soc] = Variance(noise[Model::soc] + doubt_of_gain(Soc(soc - since_anchor_.soc), cell.noise.gain));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
@@ -180,11 +180,11 @@ class SocEstimator {
     return sum < most ? sum : most;
   }
 
-  /// Variance to add when the charge of a step may be wrong by a current that nobody measured. Such an error goes on in the same
+  /// Variance to add when the charge of a step may be wrong by a current that nobody measured, and what was counted instead may have ceased. Such an error goes on in the same
   /// direction, so standard deviations add: (sigma + d)^2 - sigma^2.
   template <class Cell>
-  constexpr Variance unknown_charge(const Cell& cell) const {
-    const Soc d = over_step(cell.noise.unknown_soc_per_s);
+  constexpr Variance unknown_charge(const Cell& cell, const Current& counted_a) const {
+    const Soc d = over_step(Soc(cell.noise.unknown_soc_per_s + model::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
     const Soc sigma = model::root<Soc>(state_.covariance.template variance<Model::soc>());
     return Variance(d * d) + Variance((sigma + sigma) * d);
   }
@@ -253,7 +253,11 @@ class SocEstimator {
     }
     Variance error_v2 = at.error_v2;
     if constexpr (Model::errors_are_states) error_v2 = Variance(model::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + axis_v2(cell, at));
-    const Variance model_v2 = Variance(model::product<Variance>(error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
+    Variance model_v2 = Variance(model::product<Variance>(error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
+    if ((flags & (current_missing | current_implausible)) != 0) [[unlikely]] {  // what drops over the resistances is not known then
+      const Voltage unknown_v = settled_drop_v<S>(at, Current(model::magnitude(drive.current_a) + cell.noise.unknown_a));
+      model_v2 = Variance(model_v2 + model::product<Variance>(Variance(unknown_v * unknown_v), shared_by_));
+    }
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
     take(state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), noise_v2, innovation_v), cell.charge);
   }

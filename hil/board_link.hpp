@@ -14,8 +14,9 @@ namespace bms::hil {
 class BoardLink {
  public:
   virtual ~BoardLink() = default;
-  /// Sends, and returns all that the board says until it has nothing more to do. Throws std::runtime_error when it has stopped.
-  virtual std::vector<hal::CanFrame> exchange(std::span<const hal::CanFrame> frames) = 0;
+  /// Sends, and returns all that the board says until it has nothing more to do. time_s: what the board's clock shows then, if it follows.
+  /// Throws std::runtime_error when it has stopped.
+  virtual std::vector<hal::CanFrame> exchange(double time_s, std::span<const hal::CanFrame> frames) = 0;
 };
 
 /// Firmware in the emulator (an image whose bus is hal/emulated/can_pipe). `command`: the emulator's, its program's arguments left open.

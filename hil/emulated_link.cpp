@@ -17,7 +17,7 @@ namespace bms::hil {
 namespace {
 
 constexpr std::size_t record_size = 12, most_records = 128;
-constexpr unsigned char nothing = 0xFF;
+constexpr unsigned char nothing = 0xFF, tick = 0xFE;
 constexpr int silence_ms = 30'000;
 
 class File {
@@ -58,13 +58,13 @@ class EmulatedLink : public BoardLink {
         from_(open(from_path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)),
         emulator_(command(board, image), folder_.path() / "log") {}
 
-  std::vector<hal::CanFrame> exchange(std::span<const hal::CanFrame> frames) override {
+  std::vector<hal::CanFrame> exchange(double time_s, std::span<const hal::CanFrame> frames) override {
     auto answer = first_ ? read_block() : std::vector<hal::CanFrame>{};  // what it said before it was asked anything
     first_ = false;
     do {
-      const auto part = frames.first(std::min(frames.size(), most_records));
+      const auto part = frames.first(std::min(frames.size(), most_records - 1));
       frames = frames.subspan(part.size());
-      write_block(part);
+      write_block(static_cast<std::uint64_t>(1e6 * time_s), part);
       const auto said = read_block();
       answer.insert(answer.end(), said.begin(), said.end());
     } while (!frames.empty());
@@ -78,11 +78,13 @@ class EmulatedLink : public BoardLink {
     return words;
   }
 
-  void write_block(std::span<const hal::CanFrame> frames) {
-    std::vector<unsigned char> bytes(record_size * std::max<std::size_t>(frames.size(), 1));
-    if (frames.empty()) bytes[2] = nothing;
+  void write_block(std::uint64_t time_us, std::span<const hal::CanFrame> frames) {
+    std::vector<unsigned char> bytes(record_size * (1 + frames.size()));
+    bytes[2] = tick;
+    bytes[3] = static_cast<unsigned char>(frames.size());
+    hal::put_bytes(std::span(bytes), 4, time_us);
     for (std::size_t k = 0; k < frames.size(); ++k) {
-      const std::span<unsigned char> to(bytes.data() + record_size * k, record_size);
+      const std::span<unsigned char> to(bytes.data() + record_size * (1 + k), record_size);
       hal::put_bytes(to, 0, frames[k].id);
       to[2] = frames[k].length;
       to[3] = static_cast<unsigned char>(frames.size() - 1 - k);

@@ -37,7 +37,7 @@ class SerialLink : public BoardLink {
     close(fd_);
   }
 
-  std::vector<hal::CanFrame> exchange(std::span<const hal::CanFrame> frames) override {
+  std::vector<hal::CanFrame> exchange(double, std::span<const hal::CanFrame> frames) override {
     std::array<char, hal::slcan::longest_frame> text;
     std::string lines;
     bool asks = false;

@@ -16,6 +16,7 @@ namespace bms::hil {
 namespace {
 
 constexpr double precharge_gives_up_s = 60, trace_every_s = 10;
+constexpr double parting_s = 20, asking_again_s = 12;  // after the drive nobody asks for 12 s, the contactors open; then they are asked to close again, which tells whether one is welded
 
 /// Current, temperature and, replayed, voltage at a time of the drive.
 class Drive {
@@ -145,7 +146,7 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
 
   const auto say = [&](double time_s, const std::vector<hal::CanFrame>& frames) {
     heard.said_status = heard.said_pack = false;
-    for (const hal::CanFrame& f : link.exchange(frames)) {
+    for (const hal::CanFrame& f : link.exchange(time_s, frames)) {
       ++result.frames;
       heard.take(time_s, f);
       if (frame) frame(time_s, f);
@@ -155,7 +156,7 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     say(0, {hal::frame_of(StartingPoint{static_cast<std::int32_t>(std::lround(1e9 * *plan.told_soc)), 20'000'000})});
   }
 
-  for (std::uint64_t k = 0; drive_s <= end_s; ++k) {
+  for (std::uint64_t k = 0; drive_s <= end_s + (plan.replayed ? 0 : parting_s); ++k) {
     const double time_s = static_cast<double>(k) * plan.sample_period_s;
     const Closed closed{heard.contactors.main_plus != 0, heard.contactors.main_minus != 0, heard.contactors.precharge != 0};
     const bool driving = closed.main_plus && closed.main_minus;
@@ -163,13 +164,14 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     // a drive begins when the contactors are closed; what is replayed does not wait, and nothing waits for ever
     const bool moves = plan.replayed || result.driving_after_s || time_s > precharge_gives_up_s;
     if (moves && k > 0) drive_s += plan.sample_period_s;
+    const bool parting = drive_s > end_s;
     drive.go_to(drive_s);
 
     Closed real = closed;
     if (injector.active("precharge_open", time_s)) real.precharge = false;
     const bool obeys = !injector.active("overcurrent", time_s);
     const double most_a = plan.cell.parameters.limits.discharge_current_max_a;
-    pack.run(obeys ? demanded(heard, drive.current_a(), true) : demanded(heard, -1.6 * most_a, false), real, injector.active("welded", time_s), drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
+    pack.run(parting ? 0 : obeys ? demanded(heard, drive.current_a(), true) : demanded(heard, -1.6 * most_a, false), real, injector.active("welded", time_s), drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
     auto sample = pack.read(static_cast<std::uint64_t>(std::llround(1e6 * time_s)), drive.temperature_c());
     double truth = pack.soc();
     link_v = pack.link_v();
@@ -185,7 +187,7 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     injector.apply(time_s, sample);
 
     std::vector<hal::CanFrame> frames;
-    if (k % 10 == 0) frames.push_back(request(static_cast<std::uint32_t>(protection::Request::drive), asked = can::next(asked)));
+    if (k % 10 == 0) frames.push_back(request(static_cast<std::uint32_t>(parting && drive_s <= end_s + asking_again_s ? protection::Request::none : protection::Request::drive), asked = can::next(asked)));
     const auto measured = plan.cells == 1 ? frames_for<1>(sample, link_v, static_cast<std::uint16_t>(k)) : frames_for<most_cells>(sample, link_v, static_cast<std::uint16_t>(k));
     for (const hal::CanFrame& f : injector.apply(time_s, measured)) frames.push_back(f);
     say(time_s, frames);
@@ -209,7 +211,7 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
         highest = std::max(highest, 1e-6 * sample.cell_uv[c]);
       }
       result.trace.push_back({time_s, 0.01 * static_cast<double>(heard.pack.soc), 0.01 * static_cast<double>(heard.pack.soc_sigma), truth, 1e-6 * sample.current_ua, lowest, highest, link_v, {}});
-      if (progress) progress(end_s > 0 ? drive_s / end_s : 1);
+      if (progress) progress(end_s > 0 ? std::min(1.0, drive_s / end_s) : 1);
     }
     result.duration_s = time_s;
   }

@@ -83,6 +83,7 @@ class Contactors {
 
   constexpr const Outputs& update(const ContactorInput& in) {
     events_ = {};
+    events_.welded = weld_proven_;
     if (!intact()) enter(ContactorState::safe);
     count(in_state_us_, in.step_us, plan_->longest_us());
     if (in.request != served_) served_ = Request::none;
@@ -154,7 +155,7 @@ class Contactors {
   constexpr void in_self_test(const ContactorInput& in) {
     see_open(in);
     const bool known = in.link_uv != no_reading && in.pack_uv != no_reading && in.current_ua != no_reading;
-    if (known && link_at_entry_uv_ != no_reading && in.link_uv - link_at_entry_uv_ > in.pack_uv / 8) events_.welded = true;
+    if (known && link_at_entry_uv_ != no_reading && in.link_uv - link_at_entry_uv_ > in.pack_uv / 8) events_.welded = weld_proven_ = true;
     if (known && (link_at_entry_uv_ == no_reading || in.link_uv < link_at_entry_uv_)) link_at_entry_uv_ = in.link_uv;
     if (events_.welded) return enter(ContactorState::opening);
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
@@ -197,10 +198,10 @@ class Contactors {
   constexpr void in_opening(const ContactorInput& in) {
     const bool faulted = in.open || in.open_now;
     const bool fell = in.link_uv != no_reading && in.pack_uv != no_reading && in.link_uv < part_of(in.pack_uv, 896);
-    const bool rests = in.current_ua != no_reading && magnitude_of(in.current_ua) <= plan_->rest_ua;
+    const bool rests = in.current_ua != no_reading && magnitude_of(in.current_ua) <= plan_->rest_ua, flows = in.current_ua != no_reading && !rests;
     if (fell && rests && in_state_us_ >= plan_->test_us) return enter(faulted ? ContactorState::safe : ContactorState::off);
     see_open(in);
-    if (in_state_us_ < plan_->test_us || (rests && in_state_us_ < plan_->link_discharge_us)) events_.welded = false;  // it may still fall
+    if (in_state_us_ < plan_->test_us || (!flows && in_state_us_ < plan_->link_discharge_us)) events_.welded = weld_proven_;  // it may still fall; what is not known is no weld
     if (in_state_us_ < plan_->link_discharge_us) return;
     // nothing contradicts, nothing proves: without readings there is no way to close again either
     if (faulted) enter(ContactorState::safe);
@@ -216,7 +217,7 @@ class Contactors {
   constexpr void see_open(const ContactorInput& in) {
     const bool flows = in.current_ua != no_reading && magnitude_of(in.current_ua) > plan_->rest_ua;
     const bool stands = in.link_uv != no_reading && in.pack_uv != no_reading && in.pack_uv > 0 && in.link_uv >= part_of(in.pack_uv, 896);
-    events_.welded = flows || stands;
+    events_.welded = weld_proven_ || flows || stands;
   }
 
   static constexpr std::int32_t magnitude_of(std::int32_t v) { return v < 0 ? -v : v; }
@@ -228,6 +229,7 @@ class Contactors {
   Request served_ = Request::none;  ///< the request that was followed last: it has to be made anew to be followed again
   std::int32_t link_at_entry_uv_ = no_reading;  ///< the lowest the link has been in the self-test
   ContactorEvents events_;
+  bool weld_proven_ : 1 = false;  ///< by the self-test, whose proof is gone with the next sample; until the next start
   Outputs outputs_;
 };
 

@@ -4,15 +4,16 @@
 //   record    u16 id, u8 length, u8 of_block, u8 data[8]        little-endian, 12 bytes
 //   block     records; of_block: how many of this block are left after this one, 255 at most
 //
-// The firmware sends until it asks for a frame and has none: then what it sent goes out as a block, and it waits for one of the other side.
-// An empty block is one record of length `nothing`. The end of the file closes the channel. So a run is the same every time, and as fast as both
-// sides compute.
+// The firmware works until it asks for a frame a second time and has none: then what it sent goes out as a block, and it waits for one of the
+// other side. That begins with a record of length `tick`, whose data are the time: this board's clock. An empty block is one record of length
+// `nothing`. The end of the file closes the channel and ends the program. So a run is the same every time, and as fast as both sides compute.
 // Exit code 3: no such files.
 #include <array>
 #include <span>
 
 #include "hal/bytes.hpp"
 #include "hal/can.hpp"
+#include "hal/clock.hpp"
 #include "hal/emulated/semihosting.hpp"
 #include "hal/power.hpp"
 
@@ -21,13 +22,14 @@ namespace bms::hal {
 namespace {
 
 constexpr std::size_t record_size = 12, most_records = 128;
-constexpr std::uint8_t nothing = 0xFF;
+constexpr std::uint8_t nothing = 0xFF, tick = 0xFE;
 constexpr int bad_pipe = 3;
 
 std::array<unsigned char, record_size * most_records> incoming, outgoing;
 std::size_t in_count = 0, in_next = 0, out_count = 0;
 int in = -1, out = -1;
-bool open = false;
+bool open = false, had_none = false;
+std::uint64_t time_us = 0;
 
 bool read_fully(std::span<unsigned char> into) {
   for (std::size_t have = 0; have < into.size();) {
@@ -86,17 +88,29 @@ bool can_send(const CanFrame& frame) {
 bool can_receive(CanFrame& frame) {
   while (open) {
     if (in_next == in_count) {
+      had_none = !had_none;
+      if (had_none) return false;  // what to do without a frame comes first
       flush();
-      if (!refill()) return false;
+      if (!refill()) finish(0);
     }
     const auto from = record(incoming, in_next++);
-    if (from[2] == nothing) continue;
+    if (from[2] == tick) time_us = get_bytes<std::uint64_t>(from, 4);
+    if (from[2] > 8) continue;
     frame.id = get_bytes<std::uint16_t>(from, 0);
-    frame.length = from[2] < 8 ? from[2] : std::uint8_t{8};
+    frame.length = from[2];
     for (std::size_t k = 0; k < 8; ++k) frame.data[k] = from[4 + k];
     return true;
   }
   return false;
 }
 
+CanHealth can_health() { return {.state = open ? CanState::active : CanState::starting}; }
+
+void clock_start() {}
+std::uint64_t now_us() { return time_us; }
+std::uint32_t core_clock_hz() { return 0; }
+void wait_for_interrupt() {}
+
 }  // namespace bms::hal
+
+extern "C" void systick_interrupt() {}  // no timer runs

@@ -25,6 +25,21 @@ TEST(MeanCell, IsThatOfTheReadingsThatCanBeOnes) {
   EXPECT_EQ(mean.temperature_cdegc, 2'500);
 }
 
+TEST(MeanCell, NoCellAloneMovesItByMuch) {
+  PackSample<16> p;
+  for (std::size_t k = 0; k < 16; ++k) p.cell_uv[k] = 3'280'000 + static_cast<std::int32_t>(k) * 1'000;
+  const std::int32_t whole_uv = mean_cell(p, table9.plausible).voltage_uv;
+  EXPECT_EQ(whole_uv, 3'287'500);
+  for (std::int32_t uv = 1'000'000; uv < 4'500'000; uv += 10'000) {
+    p.cell_uv[3] = uv;
+    EXPECT_NEAR(mean_cell(p, table9.plausible).voltage_uv, whole_uv, 7'000) << uv;
+  }
+  // a broken wire between two
+  p.cell_uv[3] = 2'600'000;
+  p.cell_uv[4] = 3'960'000;
+  EXPECT_NEAR(mean_cell(p, table9.plausible).voltage_uv, whole_uv, 1'500);
+}
+
 TEST(MeanCell, WithoutAnyTheTotalStandsInAndWithoutThatNothing) {
   PackSample<4> p;
   p.pack_uv = 13'200'000;

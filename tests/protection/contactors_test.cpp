@@ -290,6 +290,28 @@ TEST(WeldedContactor, IsFoundByTheSelfTestBeforeTheOtherPoleCloses) {
   }
 }
 
+TEST(WeldedContactor, FoundByTheSelfTestIsSaidUntilTheNextStart) {
+  Bench b;
+  b.plus_welded = true;
+  b.in.request = Request::drive;
+  ASSERT_GE(b.until(opening, 3), 0);
+  for (int k = 0; k < 300; ++k) {
+    ASSERT_TRUE(b.contactors.events().welded) << k << ": a fault that needs two samples has to see more than one";
+    b.step();
+  }
+}
+
+TEST(WeldedContactor, IsNotWhatACurrentThatIsNotKnownMeans) {
+  Bench b;
+  b.drive_off();
+  b.in.request = Request::none;
+  for (int k = 0; k < 40; ++k) {  // four seconds; the link has fallen by then
+    b.step();
+    b.in.current_ua = no_reading;
+    ASSERT_FALSE(b.contactors.events().welded) << k;
+  }
+}
+
 TEST(WeldedContactor, IsFoundAtOpeningByALinkThatDoesNotFall) {
   Bench b;
   b.drive_off();
