@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "host_sim/bad_input.hpp"
+#include "host_sim/can_log.hpp"
 #include "host_sim/emulator.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/json_results.hpp"
@@ -66,19 +67,25 @@ int run(const ReplayOptions& options) {
   if (!options.board_cell.empty() && board == nullptr) throw BadInput("--board-cell", 1, "no board to flash it to, expected --target with a board");
   if (options.verify && board == nullptr) throw BadInput("--verify", 1, "nothing to compare the host with, expected --target with a board");
   result.cell = read_cell(options.cell);
-  result.recording = read_recording(options.recording);
+  std::optional<CanLog> log;
+  if (is_can_log(options.recording)) log = read_can_log(options.recording);
+  result.recording = log ? log->recording : read_recording(options.recording);
   compare_with_cell(result.recording, result.cell.parameters);
   if (const std::string ids = not_estimated(result.cell); !ids.empty()) {
     result.recording.warnings.push_back({"not_in_estimator", ids + ": in the cell file, but the estimator does without (it sees no readings to come and no bursts)"});
   }
   for (const Warning& warning : result.recording.warnings) warn(options.recording + ": " + warning.text);
 
-  const auto samples = bms::samples(result.recording);
+  if (log && log->cell_hash && *log->cell_hash != result.cell.hash) {
+    result.recording.warnings.push_back({"other_cell_file", fmt::format("the firmware that wrote the log has cell file {:08x}, this is {:08x}", *log->cell_hash, result.cell.hash)});
+    warn(options.recording + ": " + result.recording.warnings.back().text);
+  }
+  const auto samples = log ? log->samples : bms::samples(result.recording);
   if (options.initial_soc) {
     result.belief = Belief{*options.initial_soc, options.initial_soc_sigma};
     result.initial_soc = *options.initial_soc;
   }
-  const auto start = starting_point(result.belief, value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
+  const auto start = log && !options.initial_soc ? log->start : starting_point(result.belief, value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
 
   if (board != nullptr) {
     const CellFile board_cell = options.board_cell.empty() ? result.cell : read_cell(options.board_cell);
@@ -96,6 +103,11 @@ int run(const ReplayOptions& options) {
       result.verified_against = board->name;
     }
   }
+  std::size_t compared = 0;
+  if (log && !options.initial_soc && result.scalar != ScalarKind::twice && !result.difference) {
+    result.difference = difference_to_log(*log, result.track, compared);
+    if (!result.difference && compared > 0) result.verified_against = "log";
+  }
   evaluate(result);
 
   const std::string trace = trace_csv(result);
@@ -107,7 +119,7 @@ int run(const ReplayOptions& options) {
     return 1;
   }
   tell(options.output, summary(result));
-  if (result.verified_against) tell(options.output, fmt::format("Verified: {} estimates, every bit equal on {}.", result.track.words.size(), *result.verified_against));
+  if (result.verified_against) tell(options.output, fmt::format("Verified: {} estimates, every bit equal {}.", compared > 0 ? compared : result.track.words.size(), compared > 0 ? "to what the firmware computed" : "on " + *result.verified_against));
   if (!options.output.report.empty()) tell(options.output, "Report: " + options.output.report);
   return 0;
 }

@@ -44,7 +44,7 @@ void add_output(CLI::App& command, bms::Output& output) {
 void add_replay(CLI::App& app, bms::ReplayOptions& o) {
   CLI::App& c = *app.add_subcommand("replay", "Run the state-of-charge estimator over a recording, on this machine or on an emulated board");
   c.footer("Example: bms replay recordings/forklift_shift.csv --target netduinoplus2 --verify --report shift.html");
-  c.add_option("recording", o.recording, "CSV with time_s, current_a (> 0 charges), voltage_v, and maybe temperature_c, soc_ref")->required();
+  c.add_option("recording", o.recording, "CSV with time_s, current_a (> 0 charges), voltage_v, and maybe temperature_c, soc_ref; or a candump log of the firmware's frames, which is compared with what the firmware computed")->required();
   c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell: " + bms::cell_names())->capture_default_str();
   c.add_option("--initial-soc", o.initial_soc, "state of charge believed at the start, 0..1; without it the first voltage tells")->check(Within(0.0, 1.0));
   c.add_option("--initial-soc-sigma", o.initial_soc_sigma, "how far that is to be believed (standard deviation)")->check(Within(1e-4, 1.0))->capture_default_str();

@@ -135,7 +135,7 @@ std::string statement(const ReplayResult& r) {
     text += fmt::format(" By then the current seemed to read {:.0f} mA too {} (standard deviation {:.0f} mA).", 1e3 * std::abs(*r.soc.current_offset_a), *r.soc.current_offset_a < 0 ? "low" : "high",
                         1e3 * *r.soc.current_offset_sigma_a);
   }
-  if (r.verified_against) text += fmt::format(" The emulated {} computed the same bits.", *r.verified_against);
+  if (r.verified_against) text += fmt::format(" {} computed the same bits.", *r.verified_against == "log" ? std::string("The firmware that wrote the log") : "The emulated " + *r.verified_against);
   return text;
 }
 
