@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: bus_load [BITS_PER_SECOND [SAMPLES_PER_SECOND]], numbers above 0\n");
     return 2;
   }
-  constexpr double most = 0.3, sample_to_queue_s = 1e-3;
+  constexpr double most = 0.3;
   const auto messages = messages_on_the_bus(samples_per_second, sample_to_queue_s, Cells::measured_by_another_node);
   bool in_time = true;
   fmt::print("{:5} {:20} {:>9} {:>5} {:>7} {:>11}\n", "id", "message", "every ms", "bits", "load %", "response ms");

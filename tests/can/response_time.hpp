@@ -68,6 +68,10 @@ double response_s(const std::vector<Message>& messages, std::size_t which, doubl
   return worst;
 }
 
+/// From a complete sample to its last frame in the queue: what the firmware works until then. Of 16 cells 0.9 ms at an instruction a cycle (bxcan_board_test
+/// measures it), two cycles on the chip at most.
+inline constexpr double sample_to_queue_s = 2e-3;
+
 /// Where the samples come from: of a chip on the board, or in frames of the bus (hal/sample_frames.hpp).
 enum class Cells { measured_by_the_board, measured_by_another_node };
 inline constexpr std::size_t cells_of_a_pack = 16;
