@@ -68,12 +68,22 @@ double response_s(const std::vector<Message>& messages, std::size_t which, doubl
   return worst;
 }
 
+/// From a complete sample to its last frame in the queue: what the firmware works until then. Of 16 cells 0.9 ms at an instruction a cycle (bxcan_board_test
+/// measures it), two cycles on the chip at most.
+inline constexpr double sample_to_queue_s = 2e-3;
+
+/// Where the samples come from: of a chip on the board, or in frames of the bus (hal/sample_frames.hpp).
+enum class Cells { measured_by_the_board, measured_by_another_node };
+inline constexpr std::size_t cells_of_a_pack = 16;
+
 /// What is in the DBC file: by its cycle time, or, without one, with every sample (of those that are sent once this is too much); and
-/// the two frames that bring a sample. jitter_s: from a complete sample to the queue.
-inline std::vector<Message> messages_on_the_bus(double samples_per_second, double jitter_s) {
+/// the frames that bring a sample, if it comes by the bus. jitter_s: from a complete sample to the queue.
+inline std::vector<Message> messages_on_the_bus(double samples_per_second, double jitter_s, Cells cells) {
   std::vector<Message> all;
   std::apply([&](auto... m) { (all.push_back({m.name, m.id, m.frame(0).length, m.cycle_us > 0 ? 1e-6 * m.cycle_us : 1 / samples_per_second, jitter_s}), ...); }, can::Messages{});
-  for (const auto id : {hal::reading_frame_id, hal::time_frame_id}) all.push_back({"sample", id, 8, 1 / samples_per_second, 0});
+  if (cells == Cells::measured_by_another_node) {
+    for (const hal::CanFrame& f : hal::frames_of(PackSample<cells_of_a_pack>{}, 0, 0)) all.push_back({"(of a sample)", f.id, f.length, 1 / samples_per_second, 0});
+  }
   std::sort(all.begin(), all.end(), [](const Message& a, const Message& b) { return a.id < b.id; });
   return all;
 }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 namespace bms::can_bus {
 namespace {
 
@@ -24,7 +26,12 @@ TEST(ResponseTime, OfAFullBusIsNeverAndAFrameIs135BitsAtMost) {
 }
 
 TEST(ResponseTime, EveryMessageOfTheFileIsInTheTable) {
-  EXPECT_EQ(messages_on_the_bus(10, 0).size(), std::tuple_size_v<can::Messages> + 2);
+  const std::size_t in_the_file = std::tuple_size_v<can::Messages>;
+  EXPECT_EQ(messages_on_the_bus(10, 0, Cells::measured_by_the_board).size(), in_the_file);
+  const auto with_samples = messages_on_the_bus(10, 0, Cells::measured_by_another_node);
+  EXPECT_EQ(with_samples.size(), in_the_file + 13) << "check, current and voltage, link, eight of cells, temperatures, time";
+  std::set<std::uint32_t> ids;
+  for (const Message& m : with_samples) EXPECT_TRUE(ids.insert(m.id).second) << "two messages with the identifier of " << m.name;
 }
 
 }  // namespace

@@ -1,7 +1,10 @@
-// The forklift board's own image on a core in Unicorn, its CAN controller a register model, other nodes on the wire: what is on the wire is
-// what telemetry meant, and whatever the bus does, the firmware goes on estimating and feeding its watchdog.
+// The forklift board's own image on a core in Unicorn, its CAN controller and its flash interface register models, other nodes on the wire: what
+// is on the wire and in the flash is what the application meant, and whatever the bus does, the firmware goes on estimating and feeding its watchdog.
 #include <algorithm>
+#include <cmath>
+#include <deque>
 #include <map>
+#include <regex>
 #include <set>
 
 #include <fmt/format.h>
@@ -14,13 +17,20 @@
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/recording.hpp"
 #include "host_sim/replay.hpp"
+#include "host_sim/text_file.hpp"
 #include "tests/can/response_time.hpp"
 #include "tests/firmware/unicorn_board.hpp"
+#include "tests/storage/flash_model.hpp"
 
 namespace bms {
 namespace {
 
-std::vector<hal::CanFrame> meant;  // by the application on this machine
+// of the application on this machine
+std::vector<hal::CanFrame> meant;
+std::deque<hal::CanFrame> requests;
+hal::PowerPath switched;
+std::int32_t link_voltage_uv = 0;
+hal::ResetCause cause = hal::ResetCause::power_on;
 
 }  // namespace
 
@@ -30,10 +40,18 @@ bool can_send(const CanFrame& frame) {
   meant.push_back(frame);
   return true;
 }
-ResetCause reset_cause() { return ResetCause::power_on; }
+ResetCause reset_cause() { return cause; }
 std::optional<FaultRecord> last_fault() { return std::nullopt; }
 void record(std::span<const std::uint32_t>) {}
-bool next_request(CanFrame&) { return false; }
+bool next_request(CanFrame& frame) {
+  if (requests.empty()) return false;
+  frame = requests.front();
+  requests.pop_front();
+  return true;
+}
+void power_path_set(const PowerPath& wanted) { switched = wanted; }
+std::int32_t link_uv() { return link_voltage_uv; }
+std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
 void watchdog_feed() {}
 }  // namespace hal
 
@@ -42,43 +60,152 @@ namespace {
 using ::testing::IsEmpty;
 using hal::CanState;
 using Plain = SocEstimator<float>;
-using Ids = std::vector<unsigned>;
+using Pack = PackSample<16>;
 
 const CellFile& table9() {
   static const CellFile cell = read_cell("table9");
   return cell;
 }
 const auto cell_tables = model::prepare<float, model::max_intervals>(table9().parameters);
-Estimate<float> step(Plain& estimator, const Sample& sample) { return estimator.step(cell_tables, sample); }
-void look(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const Estimate<float>& e, bool limits_wanted) { condition.update(cell_tables, sample, e, estimator.state(), limits_wanted); }
+
+/// firmware/board_cell.hpp of this board, with the cell from its file.
+struct ForkliftCell {
+  using Estimator = Plain;
+  static constexpr std::size_t cells = Pack::cells;
+  static bms::Estimate<float> step(Plain& estimator, const Sample& sample) { return estimator.step(cell_tables, sample); }
+  static void look(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const bms::Estimate<float>& e, bool limits_wanted) {
+    condition.update(cell_tables, sample, e, estimator.state(), limits_wanted);
+  }
+  static void tell_apart(PackCells<float, cells>& of, const PackSample<cells>& pack, const bms::Estimate<float>& e) { of.update(cell_tables, pack, e); }
+  static const model::Plausible& plausible() { return cell_tables.plausible; }
+  static const protection::ProtectionPlan& plan() {
+    static const auto plan = protection::protection_plan(
+        {.limits = table9().parameters.limits, .capacity_ah = table9().parameters.capacity_ah, .cells = cells, .temperatures = 4, .sample_period_s = 0.1});
+    return plan;
+  }
+};
 
 const std::filesystem::path& image() {
   static const auto path = firmware_image("stm32f405_forklift", table9(), Image::application);
   return path;
 }
 
-std::vector<Sample> part_of_the_shift(std::size_t count) {
+/// Sixteen of the recording's cell.
+std::vector<Pack> part_of_the_shift(std::size_t count) {
   const auto all = samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
-  return {all.begin() + 3000, all.begin() + 3000 + static_cast<std::ptrdiff_t>(count)};
+  std::vector<Pack> part(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Sample& s = all[3000 + k];
+    part[k].time_us = s.time_us;
+    part[k].current_ua = s.current_ua;
+    part[k].cell_uv.fill(s.voltage_uv);
+    part[k].pack_uv = static_cast<std::int32_t>(Pack::cells) * s.voltage_uv;
+    part[k].temperature_cdegc.fill(s.temperature_cdegc);
+  }
+  return part;
 }
+
+/// What comes to the board at one time.
+struct Input {
+  Pack pack;
+  std::int32_t link_uv = 0;
+  std::optional<hal::CanFrame> command;  ///< before the sample
+};
+
+/// The same firmware on this machine, with a flash of its own.
+class HostBoard {
+ public:
+  explicit HostBoard(const std::vector<std::uint8_t>& flash, const std::optional<StartingPoint>& told = std::nullopt) {
+    for (std::uint32_t k = 0; k < FlashControllerModel::sectors; ++k) flash_.fill(k, {flash.begin() + k * FlashControllerModel::sector_bytes, flash.begin() + (k + 1) * FlashControllerModel::sector_bytes});
+    plug_in(&flash_);
+    meant.clear();
+    requests.clear();
+    switched = {};
+    persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
+    application_.emplace(told ? told : persistence_.starting_point(), messages::Identity{table9().hash, 0x000100}, static_cast<float>(table9().parameters.capacity_ah), persistence_);
+  }
+  ~HostBoard() { plug_in(nullptr); }
+  HostBoard(const HostBoard&) = delete;
+  HostBoard& operator=(const HostBoard&) = delete;
+
+  void take(const Input& in) {
+    link_voltage_uv = in.link_uv;
+    if (in.command) requests.push_back(*in.command);
+    application_->take(in.pack);
+  }
+  std::vector<std::uint8_t> flash() {
+    std::vector<std::uint8_t> all;
+    for (std::uint32_t k = 0; k < FlashControllerModel::sectors; ++k) {
+      const auto sector = flash_.bytes(k);
+      all.insert(all.end(), sector.begin(), sector.end());
+    }
+    return all;
+  }
+  const storage::Persistence& persistence() const { return persistence_; }
+
+ private:
+  FlashModel flash_{{FlashControllerModel::sectors, FlashControllerModel::sector_bytes}, 1};
+  storage::Persistence persistence_;
+  std::optional<Application<ForkliftCell>> application_;
+};
+
+/// A flash as it left the works: a chip's is erased, and the firmware's first start has marked it.
+const std::vector<std::uint8_t>& started_once() {
+  static const auto bytes = HostBoard(std::vector<std::uint8_t>(FlashControllerModel::sectors * FlashControllerModel::sector_bytes, 0xFF)).flash();
+  return bytes;
+}
+
+std::vector<hal::CanFrame> meant_of(const std::vector<Pack>& part) {
+  HostBoard host(started_once());
+  for (const Pack& p : part) host.take({p, 0, {}});
+  return meant;
+}
+
+double ms_on_the_wire(const std::vector<hal::CanFrame>& frames) {
+  unsigned bits = 0;
+  for (const hal::CanFrame& f : frames) bits += bits_on_the_wire(wire_frame(f));
+  return 1e3 * bits / 250e3;
+}
+
+constexpr std::size_t frames_of_a_sample = hal::pack_frames<Pack::cells>;
+constexpr double longest_sample_ms = 1e3 * frames_of_a_sample * can_bus::worst_bits(8) / 250e3;
+constexpr double patience_s = 0.5;  // after five sample periods without one the board gives itself one that says nothing
+constexpr unsigned given_in(double s) { return static_cast<unsigned>(s / patience_s) - 1; }  // one may be under way
 
 constexpr std::uint64_t bits_between_samples = 25'000;  // ten a second at 250 kbit/s
 constexpr double shortest_watchdog_ms = 1'360;          // 2 s by an oscillator at 47 kHz (datasheet, LSI)
 
 bool same(const hal::CanFrame& a, const hal::CanFrame& b) { return a.id == b.id && a.length == b.length && a.data == b.data; }
 
+void queue_for(UnicornBoard& board, const std::vector<Input>& inputs) {
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    const std::uint64_t due = board.can.now_bit + bits_between_samples * (k + 1);
+    if (inputs[k].command) board.can.others.push_back({wire_frame(*inputs[k].command), due - bits_between_samples / 2});
+    for (const hal::CanFrame& f : hal::frames_of(inputs[k].pack, inputs[k].link_uv, static_cast<std::uint16_t>(k))) board.can.others.push_back({wire_frame(f), due, true});
+  }
+}
+
 class BxcanBoard : public ::testing::Test {
  protected:
+  void SetUp() override { board.flash.bytes = started_once(); }
   void TearDown() override {
     if (IsSkipped()) return;
     EXPECT_THAT(board.can.violations, IsEmpty());
+    EXPECT_THAT(board.flash.violations, IsEmpty());
     EXPECT_LT(board.longest_unfed_ms, shortest_watchdog_ms);
   }
 
   /// From now on a sample every 100 ms of the wire.
-  void queue(const std::vector<Sample>& some) {
-    for (std::size_t k = 0; k < some.size(); ++k) {
-      for (const hal::CanFrame& f : hal::frames_of(some[k])) board.can.others.push_back({wire_frame(f), board.can.now_bit + bits_between_samples * (k + 1)});
+  void queue(const std::vector<Pack>& some) {
+    std::vector<Input> inputs;
+    for (const Pack& p : some) inputs.push_back({p, 0, {}});
+    queue_for(board, inputs);
+  }
+  /// By another way than the bus, as fast as the firmware takes them out of the controller.
+  void deliver(const Pack& pack) {
+    for (const hal::CanFrame& f : hal::frames_of(pack, 0, 0)) {
+      board.can.deliver(f);
+      ASSERT_TRUE(board.run_until([&] { return !board.can.receive_interrupt(); }, 1));
     }
   }
   std::vector<hal::CanFrame> of_board(unsigned id = 0) const {
@@ -96,7 +223,7 @@ class BxcanBoard : public ::testing::Test {
     EXPECT_GE(board.watchdog_feeds - fed, at_least);
   }
   void expect_nothing_lost_within_an_id() const {
-    for (const unsigned id : {0x180U, 0x181U, 0x182U, 0x183U, 0x186U, 0x189U}) {
+    for (const unsigned id : {0x180U, 0x181U, 0x182U, 0x183U, 0x186U, 0x189U, 0x190U, 0x196U, 0x1B8U}) {
       const auto frames = of_board(id);
       for (std::size_t k = 0; k < frames.size(); ++k) {
         ASSERT_TRUE(can::intact(frames[k], static_cast<std::uint16_t>(id)));
@@ -108,23 +235,49 @@ class BxcanBoard : public ::testing::Test {
   UnicornBoard board{image()};
 };
 
-TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeans) {
-  const auto part = part_of_the_shift(40);
+/// Seven seconds of a truck that asks for power; its link follows the contactors of the application on this machine.
+std::vector<Input> start_of_a_drive(HostBoard& host) {
+  std::vector<Input> inputs;
+  double link_v = 0;
+  bool driving = false;
+  for (const Pack& recorded : part_of_the_shift(70)) {
+    const std::size_t k = inputs.size();
+    Input in{recorded, static_cast<std::int32_t>(1e6 * link_v), {}};
+    in.pack.time_us = 1'000'000 + 100'000 * k;
+    if (!driving) in.pack.current_ua = 0;
+    if (k % 20 == 3) {
+      can::Command command;
+      command.code = can::Command::code_request;
+      command.argument = static_cast<std::uint32_t>(protection::Request::drive);
+      in.command = command.frame(static_cast<std::uint8_t>(k / 20));
+    }
+    host.take(in);
+    inputs.push_back(in);
+    const double pack_v = 1e-6 * in.pack.pack_uv;
+    driving = switched.main_plus && switched.main_minus;
+    if (driving) link_v = pack_v;
+    else if (switched.precharge && switched.main_minus) link_v += (pack_v - link_v) * (1 - std::exp(-0.1 / 0.5));
+  }
+  EXPECT_TRUE(driving);
+  return inputs;
+}
+
+TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToDriving) {
   const StartingPoint start = starting_point(Belief{0.8, 0.05}).value();
-  meant.clear();
-  Application<Plain, step, look> application(start, {table9().hash, 0x000100}, static_cast<float>(table9().parameters.capacity_ah));
-  for (const Sample& s : part) application.take(s);
+  HostBoard host(started_once(), start);
+  const auto inputs = start_of_a_drive(host);
   std::map<unsigned, std::vector<hal::CanFrame>> expected;
   for (const hal::CanFrame& f : meant) expected[f.id].push_back(f);
-  EXPECT_GE(expected.size(), 8U);
+  EXPECT_GE(expected.size(), 24U);
+  const std::size_t commands = expected[can::CommandAnswer::id].size();
+  EXPECT_EQ(commands, 4U);
 
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     UnicornBoard one(image(), seed);
-    one.can.others.push_back({wire_frame(hal::frame_of(start)), 1'000});
-    for (std::size_t k = 0; k < part.size(); ++k) {
-      for (const hal::CanFrame& f : hal::frames_of(part[k])) one.can.others.push_back({wire_frame(f), bits_between_samples * (k + 1)});
-    }
-    one.run_for_ms(100 * static_cast<double>(part.size()) + 150);
+    one.flash.bytes = started_once();
+    one.can.others.push_back({wire_frame(hal::frame_of(start)), 5'000});
+    queue_for(one, inputs);
+    one.run_for_ms(100 * static_cast<double>(inputs.size()) + 50);
     std::map<unsigned, std::vector<hal::CanFrame>> seen;
     for (const SeenFrame& s : one.can.seen) {
       if (s.from_board) seen[s.frame.id].push_back(s.frame);
@@ -134,16 +287,94 @@ TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeans) {
       ASSERT_EQ(seen[id].size(), frames.size()) << fmt::format("{:x}", id);
       for (std::size_t k = 0; k < frames.size(); ++k) ASSERT_TRUE(same(seen[id][k], frames[k])) << fmt::format("{:x}, frame {}, seed {}", id, k, seed);
     }
-    EXPECT_NEAR(can::PackElectrical::of(seen[0x181].back()).voltage, 1e-6 * part.back().voltage_uv, 0.0006);
-    EXPECT_EQ(can::Status::of(seen[0x182].back()).sample_counter, part.size());
-    EXPECT_GT(one.interrupts_taken, 4'000U);
+    EXPECT_NEAR(can::PackElectrical::of(seen[0x181].back()).voltage, 1e-6 * inputs.back().pack.pack_uv, 0.0006);
+    EXPECT_NEAR(can::CellVoltages4::of(seen[0x193].back()).cell16, 1e-6 * inputs[inputs.size() - 5].pack.cell_uv[15], 0.01);
+    EXPECT_EQ(can::Status::of(seen[0x182].back()).sample_counter, inputs.size());
+    EXPECT_EQ(can::ContactorState::of(seen[0x197].back()).state, can::ContactorState::state_drive);
+    EXPECT_EQ(can::Faults::of(seen[0x196].back()).first_cause, 0U);
+    EXPECT_EQ(can::Storage::of(seen[0x1B8].back()).state, can::Storage::state_works);
+    EXPECT_GT(one.interrupts_taken, meant.size());
     EXPECT_THAT(one.can.violations, IsEmpty());
     const hal::CanHealth health = one.can_health();
     EXPECT_EQ(health.state, CanState::active);
     EXPECT_EQ(health.sent, meant.size());
-    EXPECT_EQ(health.received, 1 + 2 * part.size());
+    EXPECT_EQ(health.received, 1 + commands + frames_of_a_sample * inputs.size());
     EXPECT_EQ(health.dropped + health.lost + health.overruns + health.bus_offs + health.failed_starts, 0U);
   }
+}
+
+TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndTheNextStartGoesOnFromIt) {
+  const auto part = part_of_the_shift(130);  // a second from one to the next
+  const StartingPoint start = starting_point(Belief{0.8, 0.05}).value();
+  const auto run = [](UnicornBoard& one, const std::vector<Pack>& some) {
+    std::vector<Input> inputs;
+    for (const Pack& p : some) inputs.push_back({p, 0, {}});
+    queue_for(one, inputs);
+    one.run_for_ms(100 * static_cast<double>(some.size()) + 50);
+  };
+  std::vector<std::uint8_t> kept;
+  {
+    HostBoard host(started_once(), start);
+    for (const Pack& p : part) host.take({p, 0, {}});
+    kept = host.flash();
+    EXPECT_GE(host.persistence().charge().operating_s, 60U);
+  }
+  board.can.others.push_back({wire_frame(hal::frame_of(start)), 5'000});
+  run(board, part);
+  EXPECT_GT(board.flash.words_programmed, 20U);
+  EXPECT_EQ(board.flash.sectors_erased, 0U) << "there was room";
+  EXPECT_NE(board.flash.bytes, started_once());
+  ASSERT_EQ(board.flash.bytes, kept);
+  // written with the samples 61 and 121; how far soc moved between them is not known of the time after
+  const auto states = of_board(0x180);
+  const auto minute = can::PackState::of(states[60]), before = can::PackState::of(states[120]);
+  const double moved = std::abs(before.soc - minute.soc);
+
+  // nobody knows how long the power was away, which counts as 90 days of 0.2 % each (estimator/restart.hpp); a reset of the core alone takes no time
+  const struct {
+    hal::ResetCause cause;
+    std::uint32_t csr;
+    double lost_percent;
+  } starts[] = {{hal::ResetCause::power_on, 0x0E000000, 18}, {hal::ResetCause::pin, 0x04000000, 0}};
+  for (const auto& s : starts) {
+    UnicornBoard again(image(), 2);
+    again.flash.bytes = kept;
+    again.reset_flags = s.csr;
+    cause = s.cause;
+    HostBoard host(kept);
+    host.take({part.back(), 0, {}});
+    cause = hal::ResetCause::power_on;
+    run(again, {part.back()});
+    std::map<unsigned, hal::CanFrame> told, expected;
+    for (const SeenFrame& f : again.can.seen) {
+      if (f.from_board) told.emplace(f.frame.id, f.frame);
+    }
+    for (const hal::CanFrame& f : meant) expected.emplace(f.id, f);
+    ASSERT_EQ(told.size(), expected.size());
+    for (const auto& [id, frame] : expected) EXPECT_TRUE(same(told[id], frame)) << fmt::format("{:x}", id);
+    EXPECT_EQ(can::StartingSoc::of(told[0x19D]).given, can::StartingSoc::given_yes);
+    EXPECT_NEAR(1e-7 * can::StartingSoc::of(told[0x19D]).soc_ppb, before.soc - s.lost_percent, 0.0021) << "steps of 0.002 %";
+    EXPECT_NEAR(1e-7 * can::StartingSigma::of(told[0x19E]).sigma_ppb, before.soc_sigma + moved + s.lost_percent, 0.0061);
+    EXPECT_EQ(can::Storage::of(told[0x1B8]).starts, 2U);
+    EXPECT_THAT(again.flash.violations, IsEmpty());
+  }
+}
+
+/// The three sectors are erased and marked in less than a second, during which the watchdog is fed.
+TEST(BxcanBoardAlone, OfANewChipTheFirstStartMarksTheFlashAndTheSecondFindsItSo) {
+  UnicornBoard board(image());
+  board.run_for_ms(1'000);
+  EXPECT_EQ(board.flash.sectors_erased, FlashControllerModel::sectors);
+  EXPECT_EQ(board.flash.bytes, started_once());
+  EXPECT_TRUE(board.can.on_the_bus());
+  EXPECT_LT(board.longest_unfed_ms, 300);
+  UnicornBoard again(image());
+  again.flash.bytes = board.flash.bytes;
+  again.run_for_ms(100);
+  EXPECT_TRUE(again.can.on_the_bus());
+  EXPECT_EQ(again.flash.sectors_erased, 0U);
+  EXPECT_EQ(again.flash.words_programmed, 0U);
+  EXPECT_THAT(board.flash.violations, IsEmpty());
 }
 
 TEST_F(BxcanBoard, ArbitrationThatIsLostCostsNeitherAFrameNorTheOrder) {
@@ -157,14 +388,16 @@ TEST_F(BxcanBoard, ArbitrationThatIsLostCostsNeitherAFrameNorTheOrder) {
   EXPECT_EQ(board.can_health().dropped, 0U);
 }
 
-/// Once a second a dozen frames are due at once, 0x183 first and 0x182 last. They leave by urgency, but for the one that was under way.
+/// Once a second two dozen frames are due at once, 0x196 first and 0x182 last. They leave by urgency, but for the one that was under way.
 TEST_F(BxcanBoard, AnUrgentFrameOvertakesThoseInTheMailboxes) {
-  queue(part_of_the_shift(5));
+  const auto part = part_of_the_shift(5);
+  const std::size_t expected = meant_of(part).size();
+  queue(part);
   ASSERT_TRUE(board.run_until([&] { return board.estimates == 5; }, 600));
   board.run_for_ms(20);
   const auto frames = of_board();
-  ASSERT_EQ(frames.size(), 2 + 5U * 12U);
-  const auto begins = [](const hal::CanFrame& f) { return f.id == 0x183; };
+  ASSERT_EQ(frames.size(), expected);
+  const auto begins = [](const hal::CanFrame& f) { return f.id == 0x196; };
   unsigned bursts = 0;
   for (auto first = frames.begin(); first != frames.end(); ++bursts) {
     EXPECT_TRUE(begins(*first));
@@ -179,33 +412,38 @@ TEST_F(BxcanBoard, AnUrgentFrameOvertakesThoseInTheMailboxes) {
 
 /// Samples faster than the bus can tell of them, by another way than the bus, so that frames are sent while others end.
 TEST_F(BxcanBoard, AtTheLimitOfTheBusNothingIsLostAndBeyondItTheLeastUrgent) {
-  const auto part = part_of_the_shift(1'500);
+  const auto part = part_of_the_shift(1'000);
+  const auto all = meant_of(part), first = meant_of({part[0]});
+  const double sample_ms = ms_on_the_wire(all) / static_cast<double>(part.size());
+  const std::uint16_t least_urgent = std::ranges::max(all, {}, &hal::CanFrame::id).id;
+  // every sample of this recording is a second after the last: all messages each time
+  EXPECT_NEAR(static_cast<double>(all.size()), static_cast<double>((first.size() - 2) * part.size()), 20) << "the start is told once, a change of faults at once";
   board.run_for_ms(20);
   std::size_t next = 0;
   const auto feed = [&](std::size_t count, double every_ms) {
     for (std::size_t k = 0; k < count; ++k, ++next) {
-      for (const hal::CanFrame& f : hal::frames_of(part[next])) board.can.deliver(f);
-      board.run_for_ms(every_ms);
+      const double until = board.now_ms() + every_ms;
+      deliver(part[next]);
+      board.run_for_ms(until - board.now_ms());
     }
   };
-  // every sample of this recording is a second after the last: a dozen messages each time, 5.7 ms of the wire
-  feed(500, 6.02);
+  feed(500, 1.05 * sample_ms);
   board.run_for_ms(20);
   expect_nothing_lost_within_an_id();
-  EXPECT_EQ(of_board(0x19C).size(), 500U);
+  EXPECT_EQ(of_board(least_urgent).size(), 500U);
   EXPECT_EQ(of_board().size(), board.can_health().sent);
   EXPECT_EQ(board.can_health().dropped, 0U);
   const std::size_t told = of_board(0x180).size();
 
-  feed(500, 3.51);
+  feed(500, 0.6 * sample_ms);
   board.run_for_ms(50);
   const hal::CanHealth health = board.can_health();
   EXPECT_GT(health.dropped, 500U);
-  EXPECT_EQ(health.sent + health.dropped, 2 + 12U * 1'000);
+  EXPECT_EQ(health.sent + health.dropped, all.size());
   EXPECT_EQ(health.sent, of_board().size());
   EXPECT_EQ(of_board(0x180).size(), told + 500) << "the most urgent is never the one that is dropped";
   EXPECT_EQ(of_board(0x181).size(), told + 500);
-  EXPECT_LT(of_board(0x19C).size(), told + 250);
+  EXPECT_LT(of_board(least_urgent).size(), told + 250);
 }
 
 TEST_F(BxcanBoard, OfOneIdentifierTheOlderFrameLeavesFirstWhateverMailboxItHas) {
@@ -213,8 +451,8 @@ TEST_F(BxcanBoard, OfOneIdentifierTheOlderFrameLeavesFirstWhateverMailboxItHas) 
   std::size_t told = 0;
   for (int time = 0; time < 20; ++time) {
     for (int k = 0; k < 80; ++k) board.can.others.push_back({{0x100, false, false, 8, {}}, 0});  // 39 ms of the wire
-    for (const Sample& s : part_of_the_shift(5)) {
-      for (const hal::CanFrame& f : hal::frames_of(s)) board.can.deliver(f);
+    for (const Pack& p : part_of_the_shift(5)) {
+      deliver(p);
       board.run_for_ms(5 + time % 3);
     }
     told += 5;
@@ -248,7 +486,7 @@ TEST_F(BxcanBoard, AFullFifoAndAFullRingAreCountedAndTheNextSampleIsTaken) {
   EXPECT_EQ(board.can_health().lost, 6U);
 
   queue(part_of_the_shift(1));
-  board.run_for_ms(110);
+  board.run_for_ms(130);
   EXPECT_EQ(board.estimates, 1U);
   EXPECT_EQ(of_board(0x182).size(), 1U);
 }
@@ -271,7 +509,8 @@ TEST_F(BxcanBoard, NothingButTheAcceptedIdentifiersComesIn) {
   board.run_for_ms(2);
   EXPECT_EQ(board.can_health().received, 0U);
   for (const std::uint32_t id : hal::accepted_ids) board.can.others.push_back({{id, false, false, 8, {}}, 0});
-  board.run_for_ms(5);
+  ASSERT_TRUE(board.run_until([&] { return board.can.others.empty(); }, 100));
+  board.run_for_ms(2);
   EXPECT_EQ(board.can_health().received, hal::accepted_ids.size());
 }
 
@@ -322,7 +561,7 @@ TEST_F(BxcanBoard, ComesBackFromBusOffAfterItsRestWhichDoublesWhileNothingGetsOu
     const double away_ms = board.ms_at_bit(board.can.back_at_bit - board.can.off_since_bit);
     const double recovery_ms = board.ms_at_bit(128 * 11);
     EXPECT_GE(away_ms, rest_ms + recovery_ms);
-    EXPECT_LE(away_ms, rest_ms + recovery_ms + 8) << "sleeps of a millisecond between the steps, others' frames between the recessive bits";
+    EXPECT_LE(away_ms, rest_ms + recovery_ms + 7 + longest_sample_ms) << "sleeps of a millisecond between the steps, others' frames between the recessive bits";
     EXPECT_EQ(board.can_health().sent, sent);
     EXPECT_EQ(board.can_health().bus_offs, time);
   }
@@ -334,12 +573,12 @@ TEST_F(BxcanBoard, ComesBackFromBusOffAfterItsRestWhichDoublesWhileNothingGetsOu
   board.can.corrupt_sent = 32;
   ASSERT_TRUE(board.run_until([&] { return board.can.bus_off(); }, 1'500));
   ASSERT_TRUE(board.run_until([&] { return !board.can.bus_off(); }, 2'000));
-  EXPECT_LE(board.ms_at_bit(board.can.back_at_bit - board.can.off_since_bit), 100 + board.ms_at_bit(128 * 11) + 8) << "frames got out: the rest is short again";
+  EXPECT_LE(board.ms_at_bit(board.can.back_at_bit - board.can.off_since_bit), 100 + board.ms_at_bit(128 * 11) + 7 + longest_sample_ms) << "frames got out: the rest is short again";
 }
 
 TEST_F(BxcanBoard, AWireThatIsHeldLowAtTheStartStopsNothingButTheBus) {
   board.can.stuck_dominant = true;
-  expect_estimates(6'000, 4);
+  expect_estimates(6'000, given_in(6));
   EXPECT_EQ(board.can_health().state, CanState::starting);
   EXPECT_GE(board.can_health().failed_starts, 3U);
   EXPECT_LE(board.can_health().failed_starts, 10U) << "the rests grow";
@@ -362,7 +601,7 @@ TEST_F(BxcanBoard, AWireThatIsHeldLowLaterStopsNothingButTheBusAndWhatIsToldThen
     if (in_a_frame) ASSERT_TRUE(board.run_until(sending, 50));
     else board.run_for_ms(30);
     board.can.stuck_dominant = true;
-    expect_estimates(4'000, 3);
+    expect_estimates(4'000, given_in(4));
     EXPECT_EQ(board.can.bus_off(), in_a_frame) << "only who sends counts up to bus-off";
     EXPECT_EQ(board.can_health().state, in_a_frame ? CanState::bus_off : CanState::passive);
     board.can.stuck_dominant = false;
@@ -374,15 +613,15 @@ TEST_F(BxcanBoard, AWireThatIsHeldLowLaterStopsNothingButTheBusAndWhatIsToldThen
 
 TEST_F(BxcanBoard, WithNobodyThereItGoesOnAndTellsWhatIsFreshWithinTheSecondAfterSomebodyCame) {
   board.can.others_acknowledge = false;
-  expect_estimates(8'000, 6);
+  expect_estimates(8'000, given_in(8));
   EXPECT_EQ(board.can.transmit_errors(), 128U) << "no acknowledge makes passive, never bus-off";
   EXPECT_EQ(board.can_health().state, CanState::passive);
   EXPECT_EQ(board.can_health().sent, 0U);
   EXPECT_GT(board.can_health().dropped, 8U);
   EXPECT_THAT(of_board(), IsEmpty());
   board.can.others_acknowledge = true;
-  // a second of silence, and the samples that the board gives itself come every 1.2 s
-  ASSERT_TRUE(board.run_until([&] { return of_board(0x182).size() == 1; }, 2'300));
+  // a second of silence, and the samples that the board gives itself
+  ASSERT_TRUE(board.run_until([&] { return of_board(0x182).size() == 1; }, 1'100 + 1e3 * patience_s));
   EXPECT_EQ(can::Status::of(of_board(0x182).front()).sample_counter, board.estimates) << "not what waited";
   EXPECT_NE(can::Status::of(of_board(0x182).front()).flags & current_missing, 0U);
   queue(part_of_the_shift(3));
@@ -392,8 +631,9 @@ TEST_F(BxcanBoard, WithNobodyThereItGoesOnAndTellsWhatIsFreshWithinTheSecondAfte
 
 TEST(BxcanBoardAlone, WithoutItsCrystalItStaysOffTheBusAndEstimates) {
   UnicornBoard board(image(), 1, false);
+  board.flash.bytes = started_once();
   board.run_for_ms(5'000);
-  EXPECT_GE(board.estimates, 3U);
+  EXPECT_GE(board.estimates, given_in(5));
   EXPECT_FALSE(board.can.on_the_bus());
   EXPECT_EQ(board.can_health().state, CanState::starting);
   EXPECT_THAT(board.can.violations, IsEmpty());
@@ -401,11 +641,12 @@ TEST(BxcanBoardAlone, WithoutItsCrystalItStaysOffTheBusAndEstimates) {
 
 TEST(BxcanBoardAlone, AtAnotherBitRateNobodyHearsIt) {
   UnicornBoard board(image());
+  board.flash.bytes = started_once();
   board.can.bits_per_second = 500'000;
   board.run_for_ms(3'000);
   EXPECT_THAT(board.can.seen, IsEmpty());
   EXPECT_GT(board.can.attempts_failed, 30U);
-  EXPECT_GE(board.estimates, 2U);
+  EXPECT_GE(board.estimates, given_in(3));
 }
 
 /// Against the bounds of the analysis, which knows nothing of CRC and stuff bits of a certain frame.
@@ -424,10 +665,27 @@ TEST(BxcanModel, AFrameHasBetween111And135Bits) {
 }
 
 TEST_F(BxcanBoard, PinsAreThoseOfItsPage) {
-  board.run_for_ms(5);
+  ASSERT_TRUE(board.run_until([&] { return board.can.on_the_bus(); }, 100));
   EXPECT_EQ(board.register_value(0x40020400) >> 16 & 15, 10U) << "PB8, PB9: alternate function";
   EXPECT_EQ(board.register_value(0x40020424) & 255, 0x99U) << "9: CAN1";
   EXPECT_EQ(board.register_value(0x4002040C) >> 16 & 3, 1U) << "PB8 pulled up";
+}
+
+/// What candump shows of a board to which nobody has said anything is listed in its README: id and bytes, in this order.
+TEST_F(BxcanBoard, TellsWhatItsPageListsWhenNobodyMeasures) {
+  ASSERT_TRUE(board.run_until([&] { return of_board(0x1B8).size() == 1; }, 700));
+  std::string told, listed;
+  for (const SeenFrame& s : board.can.seen) {
+    if (s.from_board) fmt::print("({:.6f})", 1e-3 * board.ms_at_bit(s.end_bit - board.can.seen.front().end_bit));
+    std::string line = fmt::format("can0  {:03X}   [{}] ", s.frame.id, s.frame.length);
+    for (const std::uint8_t byte : s.frame.data) line += fmt::format(" {:02X}", byte);
+    fmt::print("  {}\n", line);
+    if (s.frame.id < 0x199 || s.frame.id > 0x19E) told += line + "\n";
+  }
+  const std::string page = read_file(BMS_SOURCE_DIR "/boards/stm32f405_forklift/README.md");
+  static const std::regex frame("can0  [0-9A-F]{3}   \\[8\\]  ([0-9A-F]{2} ){7}[0-9A-F]{2}");
+  for (std::sregex_iterator f(page.begin(), page.end(), frame), end; f != end; ++f) listed += f->str() + "\n";
+  EXPECT_EQ(listed, told);
 }
 
 /// Against the analysis: with the bus full of frames less urgent, the latency of every message from the sample's last bit to its own.
@@ -435,7 +693,7 @@ TEST_F(BxcanBoard, EveryFrameComesWithinTheTimeThatTheAnalysisAllows) {
   queue(part_of_the_shift(50));
   for (std::uint64_t k = 0; k < 11'000; ++k) board.can.others.push_back({{0x7F0, false, false, 8, {}}, 5'000 + 120 * k});  // 1 stuff bit in 5: longer than that
   board.run_for_ms(5'200);
-  const auto messages = can_bus::messages_on_the_bus(10, 1e-3);
+  const auto messages = can_bus::messages_on_the_bus(10, can_bus::sample_to_queue_s, can_bus::Cells::measured_by_another_node);
   std::map<unsigned, double> worst_ms;
   std::uint64_t sample_bit = 0;
   double busy_bits = 0;
@@ -445,7 +703,7 @@ TEST_F(BxcanBoard, EveryFrameComesWithinTheTimeThatTheAnalysisAllows) {
     busy_bits += static_cast<double>(s.end_bit - s.begin_bit);
   }
   EXPECT_GT(busy_bits / static_cast<double>(board.can.now_bit), 0.95);
-  EXPECT_GE(worst_ms.size(), 8U);
+  EXPECT_GE(worst_ms.size(), 23U);
   for (std::size_t k = 0; k < messages.size(); ++k) {
     if (!worst_ms.contains(messages[k].id)) continue;
     const double allowed_ms = 1e3 * can_bus::response_on_the_bus_s(messages, k, 250e3);
@@ -454,8 +712,33 @@ TEST_F(BxcanBoard, EveryFrameComesWithinTheTimeThatTheAnalysisAllows) {
   }
 }
 
+/// What the analysis takes for granted. An instruction is a cycle here; the chip, with what its flash accelerator misses, is given two.
+TEST_F(BxcanBoard, ASampleIsInTheQueueWithinTheTimeThatTheAnalysisTakesForGranted) {
+  board.run_for_ms(20);
+  double longest_ms = 0, minute_ms = 0;
+  std::size_t n = 0;
+  for (const Pack& p : part_of_the_shift(125)) {
+    const unsigned fed = board.watchdog_feeds, written = board.flash.words_programmed;
+    deliver(p);
+    const double complete_ms = board.now_ms();
+    ASSERT_TRUE(board.run_until([&] { return board.watchdog_feeds > fed; }, 50));  // the last that is done with a sample
+    double& longest = board.flash.words_programmed > written ? minute_ms : longest_ms;
+    longest = std::max(longest, board.now_ms() - complete_ms);
+    board.run_for_ms(15);
+    EXPECT_EQ(of_board(0x182).size(), ++n);
+  }
+  EXPECT_GT(longest_ms, 0.02);
+  EXPECT_LE(2 * longest_ms, 1e3 * can_bus::sample_to_queue_s);
+  EXPECT_GT(minute_ms, longest_ms) << "a record was written, after the frames";
+  EXPECT_LE(minute_ms, 20) << "storage/README.md";
+  EXPECT_LE(board.stack_used(), 4U * 1024);
+  fmt::print("a sample {:.3f} ms, one that writes to flash {:.2f} ms, stack {} bytes over {} samples\n", longest_ms, minute_ms, board.stack_used(), n);
+}
+
 TEST_F(BxcanBoard, FitsIntoItsBudgetsOfFlashRamAndStack) {
   const ImageSize size = size_of(image());
+  ASSERT_TRUE(board.run_until([&] { return board.can.on_the_bus(); }, 100));
+  const double on_the_bus_ms = board.now_ms();
   EXPECT_LE(size.text + size.data, 64U * 1024);
   EXPECT_LE(size.data + size.bss, 16U * 1024);
   queue(part_of_the_shift(20));
@@ -464,7 +747,7 @@ TEST_F(BxcanBoard, FitsIntoItsBudgetsOfFlashRamAndStack) {
   EXPECT_LE(board.stack_used(), 4U * 1024);
   EXPECT_GT(board.stack_used(), 500U);
   EXPECT_THAT(forbidden_in(symbols_of(image())), IsEmpty());
-  fmt::print("flash {} bytes, RAM {} bytes, stack {} bytes\n", size.text + size.data, size.data + size.bss, board.stack_used());
+  fmt::print("flash {} bytes, RAM {} bytes, stack {} bytes, on the bus {:.1f} ms after the reset\n", size.text + size.data, size.data + size.bss, board.stack_used(), on_the_bus_ms);
 }
 
 }  // namespace

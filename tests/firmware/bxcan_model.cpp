@@ -1,6 +1,7 @@
 #include "tests/firmware/bxcan_model.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace bms {
 
@@ -245,7 +246,9 @@ void BxcanModel::recessive_bit() {
 void BxcanModel::start_frame() {
   const int box = on_the_bus() && suspended_bits_ == 0 ? scheduled() : -1;
   auto other = others.end();
+  bool one_in_front = false;
   for (auto o = others.begin(); o != others.end(); ++o) {
+    if (o->in_order && std::exchange(one_in_front, true)) continue;
     if (o->from_bit <= now_bit && (other == others.end() || arbitration_field(o->frame) < arbitration_field(other->frame))) other = o;
   }
   if (box < 0 && other == others.end()) return;
@@ -260,7 +263,7 @@ void BxcanModel::start_frame() {
   const bool board_wins = box >= 0 && (other == others.end() || arbitration_field(ours) < arbitration_field(other->frame));
   if (board_wins) {
     sending_ = box;
-    other_ = {ours, 0};
+    other_ = {ours};
     busy_bits_ = bits_on_the_wire(ours);
     if (!timing_fits(clock_hz_)) outcome_ = bit_dominant_error, busy_bits_ = 20 + error_frame_bits;
     else if (corrupt_sent > 0) --corrupt_sent, outcome_ = bit_dominant_error, busy_bits_ = 40 + error_frame_bits;

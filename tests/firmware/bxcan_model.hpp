@@ -55,6 +55,7 @@ class BxcanModel {
   struct Other {
     WireFrame frame;
     std::uint64_t from_bit = 0;  ///< not before
+    bool in_order = false;       ///< not before those in front of it that are so, too: a node that sends first in, first out
   };
   std::deque<Other> others;
   /// Into the receive FIFO without the wire: a sample that came another way.

@@ -27,7 +27,13 @@ void must(uc_err error, const char* what) {
 UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal) : symbols_(symbols_of(image)), random_(seed), crystal_(crystal) {
   must(uc_open(UC_ARCH_ARM, static_cast<uc_mode>(UC_MODE_THUMB | UC_MODE_MCLASS), &core_), "open");
   must(uc_ctl_set_cpu_model(core_, UC_CPU_ARM_CORTEX_M4), "model");
-  must(uc_mem_map(core_, 0x08000000, 0x100000, UC_PROT_READ | UC_PROT_EXEC), "flash");
+  constexpr std::uint32_t stored = FlashControllerModel::memory, stored_bytes = FlashControllerModel::sectors * FlashControllerModel::sector_bytes, code = stored + stored_bytes;
+  must(uc_mem_map(core_, 0x08000000, stored - 0x08000000, UC_PROT_READ | UC_PROT_EXEC), "vectors");
+  must(uc_mem_map(core_, code, 0x08100000 - code, UC_PROT_READ | UC_PROT_EXEC), "flash");
+  must(uc_mmio_map(core_, stored, stored_bytes,
+                   [](uc_engine*, std::uint64_t at, unsigned size, void* self) -> std::uint64_t { return static_cast<UnicornBoard*>(self)->flash.read_memory(static_cast<std::uint32_t>(at), size); }, this,
+                   [](uc_engine*, std::uint64_t at, unsigned size, std::uint64_t value, void* self) { static_cast<UnicornBoard*>(self)->flash.write_memory(static_cast<std::uint32_t>(at), size, static_cast<std::uint32_t>(value)); }, this),
+       "storage");
   must(uc_mem_map(core_, 0x20000000, 0x20000, UC_PROT_READ | UC_PROT_WRITE), "RAM");
   must(uc_mem_map(core_, ccm, ccm_size, UC_PROT_READ | UC_PROT_WRITE), "core-coupled RAM");
   const auto map = [&]<std::uint32_t Base>(std::integral_constant<std::uint32_t, Base>, std::size_t size) {
@@ -80,11 +86,12 @@ std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808)
 
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
   if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
+  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.read(a - FlashControllerModel::registers);
   std::uint32_t value = register_value(a);
   switch (a) {
     case 0x40023800: return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) | 3U;  // RCC_CR: what is on is ready
     case 0x40023808: return (value & ~12U) | (value & 3) << 2;                                                                       // RCC_CFGR: the switch is at once
-    case 0x40023874: return 0x0E000000;                                                                                               // RCC_CSR: power on
+    case 0x40023874: return reset_flags;
     case scs + 0x010: return systick_csr_;
     case scs + 0x014: return systick_rvr_;
     case scs + 0x018: return static_cast<std::uint32_t>(next_systick_ > ticks_ ? (next_systick_ - ticks_) / ticks_a_cycle() : 0);
@@ -99,6 +106,7 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
     else can.violations.push_back("bxCAN is written without its clock");
     return;
   }
+  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.write(a - FlashControllerModel::registers, value);
   switch (a) {
     case 0x40003000:  // IWDG_KR
       if (value == 0xCCCC) watchdog_ticks_ = 1;
@@ -217,7 +225,7 @@ void UnicornBoard::slice() {
   } else {
     const auto count = static_cast<std::size_t>(1 + random_() % 200);
     execute(reg(UC_ARM_REG_PC), count);
-    pass(count * ticks_a_cycle());
+    pass(count * ticks_a_cycle() + static_cast<std::uint64_t>(flash.take_stall_us() * (ticks_per_second / 1e6)));
   }
   deliver_interrupt();
   if (!ended_.empty()) throw std::runtime_error(ended_);

@@ -1,8 +1,8 @@
 // A board's firmware image on this machine: Unicorn runs the Cortex-M4F's instructions, and what it lacks is here: exception entry and
-// return with the FPU's frame (ARMv7-M, B1.5), the NVIC's enables, SysTick, sleep until an interrupt, and of the chip the clock tree, watchdog, reset
-// and bxCAN (bxcan_model.hpp). Interrupts come between instructions, after a seeded random number of them.
+// return with the FPU's frame (ARMv7-M, B1.5), the NVIC's enables, SysTick, sleep until an interrupt, and of the chip the clock tree, watchdog, reset,
+// bxCAN (bxcan_model.hpp) and the flash interface (flash_controller_model.hpp). Interrupts come between instructions, after a seeded random number of them.
 //
-// Time: an instruction is a core cycle; sleeping costs none, time goes on to the next event. All interrupts have one priority, as
+// Time: an instruction is a core cycle; sleeping costs none, time goes on to the next event; while flash is programmed or erased the core stands still. All interrupts have one priority, as
 // the firmware sets them: none interrupts another.
 #pragma once
 
@@ -17,6 +17,7 @@
 #include "hal/can.hpp"
 #include "tests/firmware/bxcan_model.hpp"
 #include "tests/firmware/elf_image.hpp"
+#include "tests/firmware/flash_controller_model.hpp"
 
 struct uc_struct;
 
@@ -41,7 +42,9 @@ class UnicornBoard {
   /// Bytes of stack that were ever written.
   std::uint32_t stack_used() const;
 
+  std::uint32_t reset_flags = 0x0E000000;  ///< RCC_CSR: power on
   BxcanModel can;
+  FlashControllerModel flash;
   bool receive_interrupt_held = false;  ///< the CAN receive interrupt waits, as behind a long one
   bool program_held = false;            ///< main() does not go on, interrupts are served
   unsigned estimates = 0;        ///< calls of estimator_step()

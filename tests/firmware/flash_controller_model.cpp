@@ -1,0 +1,101 @@
+#include "tests/firmware/flash_controller_model.hpp"
+
+#include <algorithm>
+
+namespace bms {
+
+namespace {
+
+constexpr std::uint32_t pg = 1U << 0, ser = 1U << 1, mer = 1U << 2, strt = 1U << 16, lock = 1U << 31;  // FLASH_CR, 3.9.6
+constexpr std::uint32_t pgperr = 1U << 6, pgserr = 1U << 7, wrperr = 1U << 4;                          // FLASH_SR, 3.9.5
+constexpr double word_us = 16, erase_us = 250'000;                                                     // datasheet DS8626, flash memory programming, x32, usual
+
+}  // namespace
+
+std::uint32_t FlashControllerModel::read(std::uint32_t at) const {
+  switch (at) {
+    case 0x00: return acr_;
+    case 0x0C: return sr_;
+    case 0x10: return cr_;
+    default: return 0;
+  }
+}
+
+void FlashControllerModel::write(std::uint32_t at, std::uint32_t value) {
+  switch (at) {
+    case 0x00: acr_ = value; return;
+    case 0x04: return unlock(value);
+    case 0x0C: sr_ &= ~value; return;
+    case 0x10: return control(value);
+    default: return;
+  }
+}
+
+/// 3.6.1: two keys, one after the other; anything else locks until a reset.
+void FlashControllerModel::unlock(std::uint32_t key) {
+  if (keys_ == Keys::none && (cr_ & lock) != 0 && key == 0x45670123) {
+    keys_ = Keys::first;
+  } else if (keys_ == Keys::first && key == 0xCDEF89AB) {
+    keys_ = Keys::none;
+    cr_ &= ~lock;
+  } else {
+    keys_ = Keys::refused_until_reset;
+    cr_ |= lock;
+    violations.push_back("a wrong key locks the flash");
+  }
+}
+
+void FlashControllerModel::control(std::uint32_t value) {
+  if ((cr_ & lock) != 0) {
+    violations.push_back("FLASH_CR is written while locked");
+    return;
+  }
+  cr_ = value & ~strt;
+  if ((value & strt) == 0) return;
+  if ((value & (ser | mer | pg)) != ser) violations.push_back("an erase that is none of one sector");
+  else erase(value >> 3 & 15);
+}
+
+void FlashControllerModel::erase(std::uint32_t number) {
+  if (number < 1 || number > sectors) {
+    violations.push_back("sector " + std::to_string(number) + " is erased, which holds code");
+    sr_ |= wrperr;
+    return;
+  }
+  const auto begin = bytes.begin() + (number - 1) * sector_bytes;
+  std::fill(begin, begin + sector_bytes, std::uint8_t{0xFF});
+  ++sectors_erased;
+  stall_us_ += erase_us;
+}
+
+std::uint32_t FlashControllerModel::read_memory(std::uint32_t at, unsigned size) const {
+  std::uint32_t value = 0;
+  for (unsigned k = 0; k < size; ++k) value |= static_cast<std::uint32_t>(bytes[at + k]) << (8 * k);
+  return value;
+}
+
+void FlashControllerModel::write_memory(std::uint32_t at, unsigned size, std::uint32_t value) {
+  if ((cr_ & lock) != 0 || (cr_ & pg) == 0) {
+    violations.push_back("flash is written without PG");
+    sr_ |= pgserr;
+    return;
+  }
+  if (size != 1U << (cr_ >> 8 & 3)) {
+    violations.push_back("flash is written by another width than PSIZE says");
+    sr_ |= pgperr;
+    return;
+  }
+  const std::uint32_t before = read_memory(at, size), erased = size == 4 ? 0xFFFFFFFF : (1U << (8 * size)) - 1;
+  if (before != erased && value != before && value != 0) violations.push_back("flash is programmed that is not erased");
+  for (unsigned k = 0; k < size; ++k) bytes[at + k] &= static_cast<std::uint8_t>(value >> (8 * k));
+  ++words_programmed;
+  stall_us_ += word_us;
+}
+
+double FlashControllerModel::take_stall_us() {
+  const double us = stall_us_;
+  stall_us_ = 0;
+  return us;
+}
+
+}  // namespace bms
