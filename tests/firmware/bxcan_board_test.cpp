@@ -304,7 +304,8 @@ TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToD
 }
 
 TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndTheNextStartGoesOnFromIt) {
-  const auto part = part_of_the_shift(130);  // a second from one to the next
+  auto part = part_of_the_shift(130);  // a second from one to the next
+  for (std::size_t k = 20; k < part.size(); ++k) part[k].temperature_cdegc[3] = no_temperature;  // the fourth sensor breaks: a fault that is kept
   const StartingPoint start = starting_point(Belief{0.8, 0.05}).value();
   const auto run = [](UnicornBoard& one, const std::vector<Pack>& some) {
     std::vector<Input> inputs;
@@ -318,6 +319,8 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
     for (const Pack& p : part) host.take({p, 0, {}});
     kept = host.flash();
     EXPECT_GE(host.persistence().charge().operating_s, 60U);
+    const auto code = static_cast<std::uint16_t>(first_fault_code + static_cast<std::uint16_t>(protection::Fault::temperature_lost));
+    EXPECT_EQ(std::ranges::count(host.persistence().events().fault, code, &storage::EventsRecord::Fault::code), 1);
   }
   board.can.others.push_back({wire_frame(hal::frame_of(start)), 5'000});
   run(board, part);
