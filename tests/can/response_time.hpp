@@ -77,7 +77,7 @@ enum class Cells { measured_by_the_board, measured_by_another_node };
 inline constexpr std::size_t cells_of_a_pack = 16;
 
 /// What is in the DBC file: by its cycle time, or, without one, with every sample (of those that are sent once this is too much); and
-/// the frames that bring a sample, if it comes by the bus. jitter_s: from a complete sample to the queue.
+/// the frames that bring a sample, if it comes by the bus; of their sender, which keeps their order, the latest bound holds for all. jitter_s: from a complete sample to the queue.
 inline std::vector<Message> messages_on_the_bus(double samples_per_second, double jitter_s, Cells cells) {
   std::vector<Message> all;
   std::apply([&](auto... m) { (all.push_back({m.name, m.id, m.frame(0).length, m.cycle_us > 0 ? 1e-6 * m.cycle_us : 1 / samples_per_second, jitter_s}), ...); }, can::Messages{});

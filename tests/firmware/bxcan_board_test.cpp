@@ -90,7 +90,7 @@ const std::filesystem::path& image() {
   return path;
 }
 
-/// Sixteen of the recording's cell.
+/// Sixteen of the recording's cell, a millivolt from each to the next, that are the recording's voltage in the mean.
 std::vector<Pack> part_of_the_shift(std::size_t count) {
   const auto all = samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
   std::vector<Pack> part(count);
@@ -98,7 +98,7 @@ std::vector<Pack> part_of_the_shift(std::size_t count) {
     const Sample& s = all[3000 + k];
     part[k].time_us = s.time_us;
     part[k].current_ua = s.current_ua;
-    part[k].cell_uv.fill(s.voltage_uv);
+    for (std::size_t cell = 0; cell < Pack::cells; ++cell) part[k].cell_uv[cell] = s.voltage_uv - 7'500 + 1'000 * static_cast<std::int32_t>(cell);
     part[k].pack_uv = static_cast<std::int32_t>(Pack::cells) * s.voltage_uv;
     part[k].temperature_cdegc.fill(s.temperature_cdegc);
   }
@@ -304,7 +304,8 @@ TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToD
 }
 
 TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndTheNextStartGoesOnFromIt) {
-  const auto part = part_of_the_shift(130);  // a second from one to the next
+  auto part = part_of_the_shift(130);  // a second from one to the next
+  for (std::size_t k = 20; k < part.size(); ++k) part[k].temperature_cdegc[3] = no_temperature;  // the fourth sensor breaks: a fault that is kept
   const StartingPoint start = starting_point(Belief{0.8, 0.05}).value();
   const auto run = [](UnicornBoard& one, const std::vector<Pack>& some) {
     std::vector<Input> inputs;
@@ -318,6 +319,8 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
     for (const Pack& p : part) host.take({p, 0, {}});
     kept = host.flash();
     EXPECT_GE(host.persistence().charge().operating_s, 60U);
+    const auto code = static_cast<std::uint16_t>(first_fault_code + static_cast<std::uint16_t>(protection::Fault::temperature_lost));
+    EXPECT_EQ(std::ranges::count(host.persistence().events().fault, code, &storage::EventsRecord::Fault::code), 1);
   }
   board.can.others.push_back({wire_frame(hal::frame_of(start)), 5'000});
   run(board, part);
@@ -671,8 +674,8 @@ TEST_F(BxcanBoard, PinsAreThoseOfItsPage) {
   EXPECT_EQ(board.register_value(0x4002040C) >> 16 & 3, 1U) << "PB8 pulled up";
 }
 
-/// What candump shows of a board to which nobody has said anything is listed in its README: id and bytes, in this order.
-TEST_F(BxcanBoard, TellsWhatItsPageListsWhenNobodyMeasures) {
+/// What candump shows of a board to which nobody has said anything is listed in its README: id and bytes, in this order; and a sample to send.
+TEST_F(BxcanBoard, TellsWhatItsPageListsWhenNobodyMeasuresAndItsSampleIsOne) {
   ASSERT_TRUE(board.run_until([&] { return of_board(0x1B8).size() == 1; }, 700));
   std::string told, listed;
   for (const SeenFrame& s : board.can.seen) {
@@ -686,6 +689,18 @@ TEST_F(BxcanBoard, TellsWhatItsPageListsWhenNobodyMeasures) {
   static const std::regex frame("can0  [0-9A-F]{3}   \\[8\\]  ([0-9A-F]{2} ){7}[0-9A-F]{2}");
   for (std::sregex_iterator f(page.begin(), page.end(), frame), end; f != end; ++f) listed += f->str() + "\n";
   EXPECT_EQ(listed, told);
+
+  Pack sample;
+  sample.current_ua = -5'000'000;
+  sample.cell_uv.fill(3'280'000);
+  sample.pack_uv = 16 * 3'280'000;
+  sample.temperature_cdegc.fill(2'500);
+  for (const hal::CanFrame& f : hal::frames_of(sample, 0, 0)) {
+    std::string sent = "#";
+    for (const std::uint8_t byte : f.data) sent += fmt::format("{:02X}", byte);
+    if (f.id == hal::check_frame_id || f.id == hal::link_frame_id) continue;  // optional
+    EXPECT_NE(page.find(sent), std::string::npos) << fmt::format("{:03X}{}", f.id, sent);
+  }
 }
 
 /// Against the analysis: with the bus full of frames less urgent, the latency of every message from the sample's last bit to its own.
