@@ -71,7 +71,7 @@ std::optional<StartingPoint> Persistence::starting_point() const {
   StoredEstimate stored = charge_kept_.pack;
   const std::int64_t sigma = std::int64_t{stored.soc_sigma_ppb} + charge_kept_.moved_ppb;
   stored.soc_sigma_ppb = static_cast<std::int32_t>(std::min<std::int64_t>(sigma, 1'000'000'000));
-  return resumed(stored, off_s_.value_or(unknown_off_s));
+  return resumed(stored, off_s_);
 }
 
 /// What was counted since the last call, in whole units; the rest stays.

@@ -66,6 +66,13 @@ TEST(Complaint, AfterARebootInTheMiddleOfACharge) {
   EXPECT_NEAR(after.error(), 0, 0.01);
 }
 
+TEST(Complaint, AfterANightWithoutAClockALotIsMissing) {
+  const StartingPoint morning = resumed({500'000'000, 5'000'000}, std::nullopt);
+  EXPECT_NEAR(1e-9 * morning.soc_ppb, 0.5, 0.02);
+  EXPECT_LT(1e-9 * morning.soc_sigma_ppb, 0.08);
+  EXPECT_GE(2e-9 * morning.soc_sigma_ppb, 0.5 - 1e-9 * resumed({500'000'000, 5'000'000}, 60U * 86'400).soc_ppb) << "two months would still be believed";
+}
+
 TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
   const StartingPoint spring = resumed({500'000'000, 5'000'000}, 120U * 86'400);
   Truck truck(0.3, spring);  // more was lost than thought
