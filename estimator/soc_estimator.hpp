@@ -78,7 +78,7 @@ class SocEstimator {
 
     auto noise = Model::noise(laws, settling, cell.noise);
     noise[Model::soc] = soc_noise_;
-    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, drive.current_a));
+    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, current.measured ? Current(0) : drive.current_a));
     if constexpr (Model::errors_are_states) noise[Model::soc] = Variance(noise[Model::soc] + doubt_of_gain(Soc(soc - since_anchor_.soc), cell.noise.gain));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
