@@ -53,7 +53,7 @@ Estimate<float> step(Plain& estimator, const Sample& sample) { return estimator.
 void look(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const Estimate<float>& e, bool limits_wanted) { condition.update(cell_tables, sample, e, estimator.state(), limits_wanted); }
 
 const std::filesystem::path& image() {
-  static const auto path = firmware_image("stm32f405_forklift", table9(), Image::application);
+  static const auto path = firmware_image("stm32f405_forklift", table9(), Image::remote);
   return path;
 }
 
