@@ -27,7 +27,9 @@ void must(uc_err error, const char* what) {
 UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal) : symbols_(symbols_of(image)), random_(seed), crystal_(crystal) {
   must(uc_open(UC_ARCH_ARM, static_cast<uc_mode>(UC_MODE_THUMB | UC_MODE_MCLASS), &core_), "open");
   must(uc_ctl_set_cpu_model(core_, UC_CPU_ARM_CORTEX_M4), "model");
-  must(uc_mem_map(core_, 0x08000000, 0x100000, UC_PROT_READ | UC_PROT_EXEC), "flash");
+  must(uc_mem_map(core_, 0x08000000, 0x100000, UC_PROT_ALL), "flash");
+  const std::vector<std::uint8_t> erased(0xC000, 0xFF);
+  must(uc_mem_write(core_, 0x08004000, erased.data(), erased.size()), "storage");
   must(uc_mem_map(core_, 0x20000000, 0x20000, UC_PROT_READ | UC_PROT_WRITE), "RAM");
   must(uc_mem_map(core_, ccm, ccm_size, UC_PROT_READ | UC_PROT_WRITE), "core-coupled RAM");
   const auto map = [&]<std::uint32_t Base>(std::integral_constant<std::uint32_t, Base>, std::size_t size) {
@@ -80,6 +82,7 @@ std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808)
 
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
   if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
+  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->read(a & 0x3FF, 1e3 * now_ms());
   std::uint32_t value = register_value(a);
   switch (a) {
     case 0x40023800: return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) | 3U;  // RCC_CR: what is on is ready
@@ -99,6 +102,7 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
     else can.violations.push_back("bxCAN is written without its clock");
     return;
   }
+  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->write(a & 0x3FF, value, 1e3 * now_ms());
   switch (a) {
     case 0x40003000:  // IWDG_KR
       if (value == 0xCCCC) watchdog_ticks_ = 1;

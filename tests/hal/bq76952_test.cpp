@@ -3,6 +3,8 @@
 #include "hal/bq76952/front_end.hpp"
 
 #include <cmath>
+#include <cstdio>
+#include <map>
 #include <numeric>
 #include <random>
 
@@ -70,6 +72,7 @@ class Bq76952 : public ::testing::Test {
   }
   void TearDown() override {
     EXPECT_THAT(model.violations, IsEmpty());
+    std::printf("at most %u transfers and %u us in a sample\n", most_seen_, static_cast<unsigned>(longest_us_));
     EXPECT_LE(most_seen_, most_transfers);
     EXPECT_LE(longest_us_, longest_sample_us);
   }
@@ -148,7 +151,11 @@ TEST_F(Bq76952, ReadsWhatTheModelsCellsHaveToTheMillivolt) {
   }
 }
 
-TEST_F(Bq76952, MeasuresWithin1500msOfPowerOn) { EXPECT_LE(samples_until_whole(), 15); }
+TEST_F(Bq76952, MeasuresWithin1500msOfPowerOn) {
+  const int samples = samples_until_whole();
+  std::printf("measures with sample %d, %zu settings\n", samples, settings.size());
+  EXPECT_LE(samples, 15);
+}
 
 TEST_F(Bq76952, AConstantCurrentIsReadToTheStepOfTheCurrentAndItsSignIsThatOfCharging) {
   for (const double a : {0.0, 5.234, -80.017, 299.99, -299.99}) {
@@ -180,7 +187,7 @@ TEST_F(Bq76952, WhatAStepOfTheCurrentCameLateIsMadeUpForOverAMinute) {
   EXPECT_LE(std::abs(lacked_as), 200 * 0.15);
 }
 
-TEST_F(Bq76952, TheChargeGivenIsTheChargeThatFlowedOverHalfAnHourOfDriving) {
+TEST_F(Bq76952, TheChargeGivenIsTheChargeThatFlowedOverTenMinutesOfDriving) {
   start();
   std::mt19937 random(2);
   std::normal_distribution<double> amperes(-20, 60);
@@ -189,7 +196,7 @@ TEST_F(Bq76952, TheChargeGivenIsTheChargeThatFlowedOverHalfAnHourOfDriving) {
   double given_as = 0;
   std::uint64_t then_us = sample.time_us;
   std::uint64_t next_us = model.time_us + 100'000;
-  for (int k = 0; k < 18'000; ++k, next_us += 100'000) {
+  for (int k = 0; k < 6'000; ++k, next_us += 100'000) {
     while (model.time_us < next_us) {  // the load changes when it likes, not with the samples
       model.advance(std::min<std::uint64_t>(next_us - model.time_us, 1'000ULL * static_cast<std::uint64_t>(lasts_ms(random))));
       model.current_a = std::clamp(amperes(random), -300.0, 300.0);
@@ -200,9 +207,9 @@ TEST_F(Bq76952, TheChargeGivenIsTheChargeThatFlowedOverHalfAnHourOfDriving) {
     given_as += sample.current_ua * 1e-6 * 1e-6 * static_cast<double>(sample.time_us - then_us);
     then_us = sample.time_us;
   }
-  // what is not settled yet: one time constant of the noise of CC3, 250 ms of the counter
-  EXPECT_NEAR(given_as, model.charge_as - before_as, 0.3 * 60);
-  EXPECT_LT(std::abs(model.charge_as - before_as), 60'000);
+  // what flows at the end is late by 0.15 s; two sigma of the load
+  EXPECT_NEAR(given_as, model.charge_as - before_as, 0.15 * 2 * 60);
+  EXPECT_GT(std::abs(model.charge_as - before_as), 8'000);
   EXPECT_EQ(front_end.charge_restarts(), 0U);
 }
 
@@ -229,6 +236,7 @@ TEST_F(Bq76952, AnySingleFaultAndAnyPairOfThemAtAnyTransferLeavesTheTruthOrNothi
   start();
   double v = 3.0;
   int lost = 0, kept = 0;
+  std::map<std::pair<int, int>, int> slowest;  // by kind and count
   for (const auto kind : {Fault::no_acknowledge, Fault::flipped_bit, Fault::timed_out, Fault::reset}) {
     for (int count = 1; count <= 3; ++count) {
       for (int at = 0; at < 11; ++at) {
@@ -243,6 +251,7 @@ TEST_F(Bq76952, AnySingleFaultAndAnyPairOfThemAtAnyTransferLeavesTheTruthOrNothi
         (whole() ? kept : lost) += 1;
         model.fault = {};
         const int back = samples_until_whole();
+        slowest[{kind, count}] = std::max(slowest[{kind, count}], back);
         EXPECT_LE(back, kind == Fault::reset ? 18 : count < 3 ? 3 : 6) << "kind " << kind << ", " << count << " from transfer " << at;
         expect_true_or_nothing();
         if (kind == Fault::reset) forgive_what_a_reset_between_two_transfers_makes();
@@ -250,6 +259,7 @@ TEST_F(Bq76952, AnySingleFaultAndAnyPairOfThemAtAnyTransferLeavesTheTruthOrNothi
       }
     }
   }
+  for (const auto& [what, samples] : slowest) std::printf("fault %d, %d in a row: whole again after %d samples\n", what.first, what.second, samples);
   EXPECT_GT(lost, 40);
   EXPECT_GT(kept, 10);
 }
@@ -374,6 +384,7 @@ TEST_F(Bq76952, AfterARestartOfThisCoreAloneAConfiguredChipIsTakenAsItIs) {
     first.time_us = model.time_us;
     again.read(first);
   }
+  std::printf("after a restart of this core with sample %d\n", samples);
   EXPECT_LE(samples, 5);
   EXPECT_EQ(std::count(model.commands.begin(), model.commands.end(), 0x0090), set_config);
 
@@ -452,8 +463,13 @@ TEST_F(Bq76952, ASampleIs10TransfersOfLessThan9msOnTheWire) {
   const unsigned transfers = model.transfers, us = model.clocked_us, bytes = model.bytes_sent;
   for (int k = 0; k < 10; ++k) next();
   std::printf("a sample: %u transfers, %u bytes, %u us at 400 kHz\n", (model.transfers - transfers) / 10, (model.bytes_sent - bytes) / 10, (model.clocked_us - us) / 10);
-  EXPECT_LE(model.transfers - transfers, 100U);
-  EXPECT_LE(model.clocked_us - us, 90'000U);
+  front_end.bleed(1);
+  const unsigned quiet = model.transfers, quiet_us = model.clocked_us;
+  next();
+  std::printf("with balancing told: %u transfers, %u us\n", model.transfers - quiet, model.clocked_us - quiet_us);
+  EXPECT_LE(model.transfers - quiet, 16U);
+  EXPECT_LE(quiet - transfers, 100U);
+  EXPECT_LE(quiet_us - us, 90'000U);
 }
 
 // hal/bq76952/samples.cpp has one front end for the whole program: one test walks it through
