@@ -69,7 +69,7 @@ constexpr auto settings(const Board& b) {
       Setting{0x9302, 1, 0xAA},                                            // DDSG Pin Config: low when discharging is to stop
       Setting{0x9303, 1, 0x06},                                            // DA Configuration: userA 10 mA, userV 10 mV
       Setting{0x9304, 2, b.cell_inputs},                                   // Vcell Mode
-      Setting{0x9307, 1, 64},                                              // CC3 Samples: of 1.5 ms, 96 ms
+      Setting{0x9307, 1, 67},                                              // CC3 Samples: of 1.5 ms, 100.5 ms: as long as a sample
       Setting{0x9308, 1, 0x05},                                            // FET Options: it has no FETs
       Setting{0x9309, 1, 0x00},                                            // Chg Pump Control: off
       Setting{0x9314, 1, 5},                                               // Cell Open-Wire Check Time [s]

@@ -1,8 +1,8 @@
 // The mean current since the previous sample, and in the long run the very charge that the chip has counted.
 //
 // The chip adds up charge every 250 ms (its filter CC1), samples come every 100: the counted charge alone stands still for two or three samples and
-// then jumps. CC3, the mean of the last 64 conversions of 1.5 ms, has the age of the voltages, but what falls between two samples, or into
-// both, is lost or counted twice. So the current is CC3, and what the charge given out so far lacks of the counted charge is made up for over a minute:
+// then jumps. CC3, the mean of 67 conversions of 1.5 ms, is at most 100 ms older than the voltages, but the chip's clock is not this one: now and then
+// a mean is lost or read twice. So the current is CC3, and what the charge given out so far lacks of the counted charge is made up for over a minute:
 //
 //   current = CC3 + lack / 64 s,    lack = counted - given, looked at when the counted charge has moved
 //

@@ -38,7 +38,8 @@ bool Wire::transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> i
     case I2cResult::bus_stuck: ++counters_.stuck; break;
     case I2cResult::timed_out: ++counters_.timed_out; break;
   }
-  i2c_recover();
+  const bool free = i2c_recover();
+  again_ = free && result == I2cResult::bus_stuck;
   return false;
 }
 

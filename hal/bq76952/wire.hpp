@@ -3,7 +3,7 @@
 //   checked   behind every byte its CRC-8: of the first over all since the start (addresses, command, byte), of each other over the byte alone
 //   plain     as the chip wakes: no CRC; the transfer buffer has a checksum, which is looked at in both
 //
-// What is not acknowledged or does not check is asked once more, what the bus refuses is not: it is recovered. A false means that `into` is of
+// What is not acknowledged, does not check, or found a bus stuck that could be freed, is asked once more; a clock that was stretched for too long is not. A false means that `into` is of
 // no use. Time: bounded by i2c_time_us() twice, and i2c_recover().
 #pragma once
 

@@ -137,7 +137,7 @@ void Bq76952Model::slot_ends() {
   cc2_ = to_user_current(mean_a);
   cc3_sum_a_ += mean_a;
   if (++cc3_count_ >= static_cast<int>(memory(0x9307, 1))) {
-    cc3_ = to_user_current(cc3_sum_a_ / cc3_count_);
+    cc3_ = to_user_current((1 - cc3_loses) * cc3_sum_a_ / cc3_count_);
     cc3_sum_a_ = 0;
     cc3_count_ = 0;
   }
@@ -236,7 +236,7 @@ std::uint8_t Bq76952Model::register_byte(std::uint8_t at) const {
     case 0x3B: return static_cast<std::uint8_t>(cc2_ >> 8);
     case 0x3E: return time_us < busy_until_us_ ? 0xFF : low_;
     case 0x3F: return time_us < busy_until_us_ ? 0xFF : high_;
-    case 0x60: return checksum_;
+    case 0x60: return static_cast<std::uint8_t>(checksum_ + (torn_buffer ? 1 : 0));
     case 0x61: return length_;
     case 0x62: return static_cast<std::uint8_t>(alarm_);
     case 0x63: return static_cast<std::uint8_t>(alarm_ >> 8);
@@ -289,8 +289,10 @@ I2cResult Bq76952Model::transfer(std::uint8_t address, std::span<const std::uint
   const std::size_t on_wire = 1 + out.size() + (in.empty() ? 0 : 1 + in.size());
   const bool hit = fault.kind != Fault::none && fault.count > 0 && fault.at-- <= 0;
   if (hit) --fault.count;
+  if (stuck_) return I2cResult::bus_stuck;  // until somebody makes clocks
   if (hung || (hit && fault.kind == Fault::timed_out)) {
     advance(hal::i2c_time_us(out.size() + in.size()));
+    stuck_ = true;
     return I2cResult::timed_out;
   }
   if (hit && fault.kind == Fault::reset) reset();
@@ -315,6 +317,7 @@ I2cResult Bq76952Model::transfer(std::uint8_t address, std::span<const std::uint
 
 bool Bq76952Model::recover() {
   advance(150);
+  stuck_ = hung;
   return !hung;
 }
 

@@ -22,13 +22,14 @@ class Bq76952Model {
   // the world
   std::array<double, 16> cell_v{};
   double stack_v = 0, ld_v = 0, current_a = 0, shunt_mohm = 0.1;
+  double cc3_loses = 0;  ///< part of the current that the mean CC3 does not show
   std::array<double, 4> temperature_c{25, 25, 25, 25};  ///< at TS1, TS3, HDQ, CFETOFF
   double charge_as = 0;                                 ///< that really flowed
   std::uint64_t time_us = 0;
   std::array<double, 16> bled_s{};                      ///< how long each cell was bled
 
   // what may go wrong
-  bool gone = false, hung = false, frozen = false, deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
+  bool gone = false, hung = false, frozen = false, torn_buffer = false, deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
   std::uint16_t device_number = 0x7695;
   struct Fault {
     enum Kind { none, no_acknowledge, flipped_bit, timed_out, reset } kind = none;
@@ -73,7 +74,7 @@ class Bq76952Model {
   std::uint64_t busy_until_us_ = 0, slot_left_us_ = 3'000, cc1_left_us_ = 250'000, balancing_until_us_ = 0, heard_us_ = 0, over_since_us_ = 0;
   std::uint16_t alarm_ = 0, alarm_enable_ = 0xF800, balancing_ = 0;
   std::uint8_t safety_a_ = 0, safety_c_ = 0;
-  bool checked_ = false, config_ = false, was_reset_ = true;
+  bool checked_ = false, config_ = false, was_reset_ = true, stuck_ = false;
   int slot_ = 0, loop_ = 0;
   double slot_as_ = 0, cc1_as_ = 0, cc3_sum_a_ = 0;
   int cc3_count_ = 0;

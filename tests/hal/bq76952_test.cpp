@@ -187,6 +187,16 @@ TEST_F(Bq76952, WhatAStepOfTheCurrentCameLateIsMadeUpForOverAMinute) {
   EXPECT_LE(std::abs(lacked_as), 200 * 0.15);
 }
 
+TEST_F(Bq76952, WhatTheMeanLosesIsMadeUpForByTheCountedCharge) {
+  model.current_a = -100;
+  model.cc3_loses = 0.01;
+  start();
+  for (int k = 0; k < 4'000; ++k) next();
+  double sum_a = 0;
+  for (int k = 0; k < 100; ++k) sum_a += next().current_ua * 1e-6;
+  EXPECT_NEAR(sum_a / 100, -100, 0.01 + 0.0008 * 100);  // 6 time constants: 0.25 % of 1 A is left
+}
+
 TEST_F(Bq76952, TheChargeGivenIsTheChargeThatFlowedOverTenMinutesOfDriving) {
   start();
   std::mt19937 random(2);
@@ -207,8 +217,9 @@ TEST_F(Bq76952, TheChargeGivenIsTheChargeThatFlowedOverTenMinutesOfDriving) {
     given_as += sample.current_ua * 1e-6 * 1e-6 * static_cast<double>(sample.time_us - then_us);
     then_us = sample.time_us;
   }
-  // what flows at the end is late by 0.15 s; two sigma of the load
-  EXPECT_NEAR(given_as, model.charge_as - before_as, 0.15 * 2 * 60);
+  // what flows at the end is late by 0.15 s, 9 As; a mean of 6 As is read twice every 20 s and made up for over 64 s, 8 As: two sigma of both
+  std::printf("charge given %.1f As, flowed %.1f As\n", given_as, model.charge_as - before_as);
+  EXPECT_NEAR(given_as, model.charge_as - before_as, 2 * std::hypot(9, 8));
   EXPECT_GT(std::abs(model.charge_as - before_as), 8'000);
   EXPECT_EQ(front_end.charge_restarts(), 0U);
 }
@@ -252,7 +263,7 @@ TEST_F(Bq76952, AnySingleFaultAndAnyPairOfThemAtAnyTransferLeavesTheTruthOrNothi
         model.fault = {};
         const int back = samples_until_whole();
         slowest[{kind, count}] = std::max(slowest[{kind, count}], back);
-        EXPECT_LE(back, kind == Fault::reset ? 18 : count < 3 ? 3 : 6) << "kind " << kind << ", " << count << " from transfer " << at;
+        EXPECT_LE(back, kind == Fault::reset ? 12 : 1) << "kind " << kind << ", " << count << " from transfer " << at;
         expect_true_or_nothing();
         if (kind == Fault::reset) forgive_what_a_reset_between_two_transfers_makes();
         if (v > 3.5) v = 2.9;
@@ -298,7 +309,8 @@ TEST_F(Bq76952, AClockStretchedForEverGivesNothingWithinABoundedTimeAndComesBack
     next();
     ASSERT_TRUE(empty());
   }
-  EXPECT_GT(front_end.wire().timed_out, 3U);
+  EXPECT_GE(front_end.wire().timed_out, 1U);
+  EXPECT_GE(front_end.wire().stuck, 3U);
   model.hung = false;
   EXPECT_LE(samples_until_whole(), 20);
 }
@@ -316,6 +328,18 @@ TEST_F(Bq76952, ValuesThatStandStillAreNotGivenAgain) {
   EXPECT_GE(front_end.counters().not_fresh, 30U);
   model.frozen = false;
   EXPECT_LE(samples_until_whole(), 3);
+}
+
+TEST_F(Bq76952, ABufferThatDoesNotFitItsChecksumIsNoCurrent) {
+  start();
+  model.torn_buffer = true;
+  for (int k = 0; k < 20; ++k) {
+    next();
+    ASSERT_EQ(sample.current_ua, no_reading);
+  }
+  EXPECT_GT(front_end.wire().bad_checksum, 3U);
+  model.torn_buffer = false;
+  EXPECT_LE(samples_until_whole(), 20);
 }
 
 TEST_F(Bq76952, AResetInTheMiddleIsSeenAndTheChipConfiguredAnewWithin1800ms) {
