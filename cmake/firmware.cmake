@@ -9,7 +9,9 @@
 #   bms_<board>_protection.elf  tests/firmware/protection_image.cpp; only when asked for
 #
 # The first three run in QEMU only (hal/README.md). A board that QEMU does not have (BMS_EMULATED OFF) has bms_<board>.elf for the
-# chip, and bms_<board>_hil.elf for an emulated board with the same one (BMS_LOOP_BOARD). board.cmake says which CAN back end it has: BMS_CAN slcan or bxcan, for the latter with a bit rate. What does not depend on the cell is compiled once for all.
+# chip, bms_<board>_remote.elf with samples that another node measures, and bms_<board>_hil.elf for an emulated board with the same chip (BMS_LOOP_BOARD).
+# board.cmake says which CAN back end it has, BMS_CAN slcan or bxcan, for the latter with a bit rate; and where its samples come from, BMS_SAMPLES
+# bq76952 (measured on the board), remote (from another node) or emulated. What does not depend on the cell is compiled once for all.
 include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
@@ -68,12 +70,15 @@ bms_objects(hal_core -Os ${chip}/startup.cpp ${chip}/power.cpp)
 bms_objects(hal_clock -Os ${chip}/clock.cpp)
 bms_objects(hal_chip -Os ${chip}/clock_tree.cpp ${chip}/finish.cpp ${chip}/flash.cpp ${hal}/absent/calendar.cpp)
 bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semihosting.cpp)
-# the board's back ends: BMS_CAN names how it talks, and so far where its samples come from
+# the board's back ends: BMS_CAN names how it talks, BMS_SAMPLES where its samples come from
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
-set(samples_slcan ${hal}/emulated/samples_can.cpp)
-set(samples_bxcan ${hal}/remote/samples.cpp)
-bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${samples_${BMS_CAN}} ${hal}/absent/record.cpp)
+set(samples_emulated ${hal}/emulated/samples_can.cpp)
+set(samples_remote ${hal}/remote/samples.cpp)
+set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
+bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${hal}/absent/record.cpp)
+bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
+bms_objects(hal_remote_samples -Os ${samples_remote})
 target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
 bms_objects(hal_emulated_flash -Os ${hal}/emulated/flash.cpp ${hal}/emulated/calendar.cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
@@ -99,16 +104,19 @@ function(bms_image name)
 endfunction()
 
 if(NOT BMS_EMULATED)
-  bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_chip hal_board storage application estimator_step)
-  target_link_options(bms_${BMS_BOARD} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)  # for a debugger, and tests/firmware
+  bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_chip hal_board hal_samples storage application estimator_step)
+  bms_image(bms_${BMS_BOARD}_remote hal_core hal_clock hal_chip hal_board hal_remote_samples storage application estimator_step)
+  foreach(image bms_${BMS_BOARD} bms_${BMS_BOARD}_remote)
+    target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)  # for a debugger, and tests/firmware
+  endforeach()
   set(linker_script ${CMAKE_SOURCE_DIR}/boards/${BMS_LOOP_BOARD}/memory.ld)  # the memory of an emulated board with the same chip
   bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil storage application estimator_step)
   return()
 endif()
-bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board storage application estimator_step)
+bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples storage application estimator_step)
 bms_image(bms_${BMS_BOARD}_replay hal_core hal_clock hal_emulated hal_stream storage application estimator_step)
 bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil storage application estimator_step)
-bms_image(bms_${BMS_BOARD}_bench hal_core hal_clock hal_chip hal_board storage application estimator_step)
+bms_image(bms_${BMS_BOARD}_bench hal_core hal_clock hal_chip hal_board hal_samples storage application estimator_step)
 
 bms_objects(fault_image -Os ${CMAKE_SOURCE_DIR}/tests/firmware/fault_image.cpp)
 bms_image(bms_${BMS_BOARD}_fault hal_core hal_clock hal_emulated fault_image)

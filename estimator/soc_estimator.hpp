@@ -78,7 +78,13 @@ class SocEstimator {
 
     auto noise = Model::noise(laws, settling, cell.noise);
     noise[Model::soc] = soc_noise_;
-    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, current.measured ? Current(0) : drive.current_a));
+    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] {
+      noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, current.measured ? Current(0) : drive.current_a));
+      if (!current.measured) {  // what drops over the resistances is not known then
+        const Voltage unknown_v = settled_drop_v<S>(at, Current(model::magnitude(drive.current_a) + cell.noise.unknown_a));
+        noise[0] = Variance(noise[0] + unknown_v * unknown_v);
+      }
+    }
     if constexpr (Model::errors_are_states) noise[Model::soc] = Variance(noise[Model::soc] + doubt_of_gain(Soc(soc - since_anchor_.soc), cell.noise.gain));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
@@ -253,11 +259,7 @@ class SocEstimator {
     }
     Variance error_v2 = at.error_v2;
     if constexpr (Model::errors_are_states) error_v2 = Variance(model::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + axis_v2(cell, at));
-    Variance model_v2 = Variance(model::product<Variance>(error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
-    if ((flags & (current_missing | current_implausible)) != 0) [[unlikely]] {  // what drops over the resistances is not known then
-      const Voltage unknown_v = settled_drop_v<S>(at, Current(model::magnitude(drive.current_a) + cell.noise.unknown_a));
-      model_v2 = Variance(model_v2 + model::product<Variance>(Variance(unknown_v * unknown_v), shared_by_));
-    }
+    const Variance model_v2 = Variance(model::product<Variance>(error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
     take(state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), noise_v2, innovation_v), cell.charge);
   }

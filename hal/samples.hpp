@@ -1,5 +1,5 @@
 // Where measurements come from, as the estimator takes them.
-// Back ends: emulated/samples_can (frames), emulated/samples_stream (a recording through the debugger's file access).
+// Back ends: bq76952/samples (a monitoring chip), remote/samples (another node), emulated/samples_can (frames), emulated/samples_stream (a recording through the debugger's file access).
 #pragma once
 
 #include <cstddef>

@@ -51,6 +51,7 @@ void run_step(const std::vector<std::string>& argv, const std::filesystem::path&
 
 const char* ending(Image image) {
   switch (image) {
+    case Image::remote: return "_remote";
     case Image::replay: return "_replay";
     case Image::hil: return "_hil";
     case Image::fault: return "_fault";

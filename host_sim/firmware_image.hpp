@@ -9,7 +9,7 @@
 namespace bms {
 
 /// What an image is for: its end after "bms_<board>" (cmake/firmware.cmake).
-enum class Image { application, replay, hil, fault, pack, protection };
+enum class Image { application, remote, replay, hil, fault, pack, protection };
 
 /// `image` of `board` with the tables of `cell`, built if it is not there yet. Needs the source tree, CMake and the board's cross
 /// compiler; throws BadInput when they are missing and std::runtime_error when the build fails.

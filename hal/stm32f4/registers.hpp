@@ -33,6 +33,23 @@ inline Register& gpiob_moder() { return at<0x40020400>(); }
 inline Register& gpiob_pupdr() { return at<0x4002040C>(); }
 inline Register& gpiob_afrl() { return at<0x40020420>(); }
 inline Register& gpiob_afrh() { return at<0x40020424>(); }
+inline Register& gpiob_otyper() { return at<0x40020404>(); }
+inline Register& gpiob_idr() { return at<0x40020410>(); }
+inline Register& gpiob_bsrr() { return at<0x40020418>(); }
+
+// GPIOC [8.4]
+inline Register& gpioc_moder() { return at<0x40020800>(); }
+inline Register& gpioc_otyper() { return at<0x40020804>(); }
+inline Register& gpioc_bsrr() { return at<0x40020818>(); }
+
+// I2C1 [27.6]
+inline Register& i2c1_cr1() { return at<0x40005400>(); }
+inline Register& i2c1_cr2() { return at<0x40005404>(); }
+inline Register& i2c1_dr() { return at<0x40005410>(); }
+inline Register& i2c1_sr1() { return at<0x40005414>(); }
+inline Register& i2c1_sr2() { return at<0x40005418>(); }
+inline Register& i2c1_ccr() { return at<0x4000541C>(); }
+inline Register& i2c1_trise() { return at<0x40005420>(); }
 
 // USART1 [30.6]
 inline Register& usart1_sr() { return at<0x40011000>(); }

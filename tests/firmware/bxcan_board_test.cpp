@@ -86,7 +86,7 @@ struct ForkliftCell {
 };
 
 const std::filesystem::path& image() {
-  static const auto path = firmware_image("stm32f405_forklift", table9(), Image::application);
+  static const auto path = firmware_image("stm32f405_forklift", table9(), Image::remote);
   return path;
 }
 

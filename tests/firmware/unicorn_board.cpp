@@ -87,6 +87,7 @@ std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808)
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
   if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
   if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.read(a - FlashControllerModel::registers);
+  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->read(a & 0x3FF, 1e3 * now_ms());
   std::uint32_t value = register_value(a);
   switch (a) {
     case 0x40023800: return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) | 3U;  // RCC_CR: what is on is ready
@@ -107,6 +108,7 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
     return;
   }
   if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.write(a - FlashControllerModel::registers, value);
+  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->write(a & 0x3FF, value, 1e3 * now_ms());
   switch (a) {
     case 0x40003000:  // IWDG_KR
       if (value == 0xCCCC) watchdog_ticks_ = 1;

@@ -43,6 +43,15 @@ class UnicornBoard {
   std::uint32_t stack_used() const;
 
   std::uint32_t reset_flags = 0x0E000000;  ///< RCC_CSR: power on
+
+  /// What else answers at the addresses of the chip's peripherals.
+  struct Peripheral {
+    virtual ~Peripheral() = default;
+    virtual std::uint32_t read(std::uint32_t offset, double now_us) = 0;
+    virtual void write(std::uint32_t offset, std::uint32_t value, double now_us) = 0;
+  };
+  std::map<std::uint32_t, Peripheral*> plugged;  ///< by the base of its kilobyte
+
   BxcanModel can;
   FlashControllerModel flash;
   bool receive_interrupt_held = false;  ///< the CAN receive interrupt waits, as behind a long one

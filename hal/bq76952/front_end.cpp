@@ -1,0 +1,256 @@
+#include "hal/bq76952/front_end.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "hal/bq76952/registers.hpp"
+#include "hal/bytes.hpp"
+#include "hal/clock.hpp"
+
+namespace bms::hal::bq76952 {
+
+namespace {
+
+constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
+constexpr std::size_t settings_a_sample = 8;
+constexpr std::uint8_t patience = 5;          // samples, for a mode to be entered or left
+constexpr std::uint8_t most_failures = 2;     // samples in a row
+constexpr std::uint8_t scan_is_old = 2;       // samples without everything measured once
+constexpr std::uint8_t charge_is_old = 15;    // samples: 1.5 s of a counter of seconds
+constexpr std::uint64_t tell_again_us = 5'000'000;
+
+/// Until the chip has taken what was written.
+void settle() {
+  const std::uint64_t since = now_us();
+  while (now_us() - since < 2'000) wait_for_interrupt();
+}
+
+std::int32_t cell_uv(std::int16_t mv) { return mv == std::numeric_limits<std::int16_t>::min() ? no_reading : mv * 1'000; }
+
+std::int16_t cdegc(std::int16_t tenth_k) {
+  const int value = tenth_k * 10 - 27'315;
+  const auto narrow = static_cast<std::int16_t>(std::clamp<int>(value, std::numeric_limits<std::int16_t>::min(), std::numeric_limits<std::int16_t>::max()));
+  return temperature_possible(narrow) ? narrow : no_temperature;  // an open or shorted sensor
+}
+
+}  // namespace
+
+void FrontEnd::read(PackSample<cell_inputs>& into) {
+  const std::uint64_t time_us = into.time_us;
+  into = {};
+  into.time_us = time_us;
+  link_uv_ = no_reading;
+  if (state_ == State::measure) {
+    if (measure(into)) failures_ = 0;
+    else if (state_ == State::measure && ++failures_ >= most_failures) lose();
+    if (into.current_ua == no_reading) mean_current_.lose();
+    return;
+  }
+  if (state_ == State::absent && now_us() < next_try_us_) return;
+  const bool good = state_ == State::absent ? find() : state_ == State::compare ? compare() : state_ == State::enter ? enter() : state_ == State::write ? write() : leave();
+  if (!good) rest();
+}
+
+/// Not there, or not as it should be: later again.
+void FrontEnd::rest() {
+  state_ = State::absent;
+  rest_us_ = rest_us_ == 0 ? first_rest_us : std::min(2 * rest_us_, longest_rest_us);
+  next_try_us_ = now_us() + rest_us_;
+}
+
+void FrontEnd::lose() {
+  ++counters_.lost;
+  state_ = State::absent;
+  rest_us_ = 0;
+  next_try_us_ = 0;
+  failures_ = 0;
+}
+
+bool FrontEnd::find() {
+  std::uint16_t status = 0;
+  if (!wire_.find(status)) return false;
+  std::array<std::uint8_t, 2> number{};
+  if (!wire_.select(get_device_number)) return false;
+  settle();
+  if (!wire_.fetch(get_device_number, number)) return false;
+  if (get_bytes<std::uint16_t>(number, 0) != device_number) {
+    ++counters_.wrong_device;
+    return false;
+  }
+  if ((status & security) == sealed) {
+    ++counters_.sealed;
+    return false;
+  }
+  std::uint16_t control = 0;
+  if (!wire_.read_word(control_status, control)) return false;
+  if ((control & in_deep_sleep) != 0) {
+    static_cast<void>(wire_.select(exit_deep_sleep));
+    return false;
+  }
+  ++counters_.found;
+  state_ = State::compare;
+  return wire_.select(sleep_disable);
+}
+
+/// Blocks of the data memory against the settings that lie in them. False: it could not be read.
+bool FrontEnd::memory_is_right(bool& right) {
+  right = true;
+  for (std::size_t k = 0; k < settings_.size();) {
+    const std::uint16_t begin = settings_[k].address;
+    std::array<std::uint8_t, buffer_bytes> block{};
+    if (!wire_.select(begin)) return false;
+    settle();
+    if (!wire_.fetch(begin, block)) return false;
+    for (; k < settings_.size() && settings_[k].address + settings_[k].bytes <= begin + buffer_bytes; ++k) {
+      if (get_bytes<std::uint32_t>(block, static_cast<std::size_t>(settings_[k].address - begin), settings_[k].bytes) != settings_[k].value) right = false;
+    }
+  }
+  return true;
+}
+
+bool FrontEnd::compare() {
+  std::uint16_t status = 0;
+  bool right = false;
+  if (!wire_.find(status) || !memory_is_right(right)) return false;
+  waited_ = 0;
+  swapped_ = false;
+  next_setting_ = 0;
+  if (right && (status & (was_reset | in_config_update)) == 0) {
+    state_ = State::leave;
+    return true;
+  }
+  state_ = State::enter;
+  return wire_.select(set_config_update);
+}
+
+bool FrontEnd::enter() {
+  std::uint16_t status = 0;
+  if (!wire_.find(status)) return false;
+  if ((status & in_config_update) == 0) return ++waited_ < patience;
+  state_ = State::write;
+  return write();
+}
+
+bool FrontEnd::write() {
+  for (std::size_t k = 0; k < settings_a_sample && next_setting_ < settings_.size(); ++k, ++next_setting_) {
+    const Setting& s = settings_[next_setting_];
+    std::array<std::uint8_t, 4> bytes{};
+    put_bytes(bytes, 0, s.value);
+    if (!wire_.send(s.address, std::span(bytes).first(s.bytes))) return false;
+    settle();
+  }
+  if (next_setting_ < settings_.size()) return true;
+  bool right = false;
+  if (!memory_is_right(right)) return false;
+  if (!right) {
+    ++counters_.wrong_setting;
+    return false;
+  }
+  ++counters_.configured;
+  waited_ = 0;
+  state_ = State::leave;
+  return wire_.select(exit_config_update);
+}
+
+bool FrontEnd::leave() {
+  std::uint16_t status = 0;
+  if (!wire_.find(status)) return false;
+  if ((status & in_config_update) != 0) return ++waited_ < patience;
+  if (wire_.check == Check::plain) {
+    if (swapped_) return false;
+    swapped_ = true;
+    return wire_.select(swap_comm_mode);
+  }
+  state_ = State::measure;
+  failures_ = 0;
+  rest_us_ = 0;
+  scans_ago_ = scan_is_old;
+  charge_stands_ = 0;
+  told_ = static_cast<std::uint16_t>(~bleed_);  // what it bleeds is not known: tell it
+  return true;
+}
+
+/// Neither reset nor back in its configuration since the last sample.
+bool FrontEnd::still_the_same() {
+  std::uint16_t status = 0;
+  if (!wire_.read_word(battery_status, status)) return false;
+  if ((status & (was_reset | in_config_update)) == 0) return true;
+  ++counters_.resets;
+  lose();
+  return false;
+}
+
+/// In the order of who needs it most; ends at the first thing that cannot be had.
+bool FrontEnd::measure(PackSample<cell_inputs>& into) {
+  if (!still_the_same()) return false;
+  if (!wire_.select(get_currents)) return false;
+  if (!read_scan(into)) return false;
+  if (!read_current(into)) return false;
+  std::array<std::uint8_t, 5> safety{};  // status A, alert B, status B, alert C, status C
+  if (!wire_.read(safety_status_a, safety)) return false;
+  if ((safety[0] | safety[2] | safety[4]) != 0) ++counters_.trips;
+  return keep_bleeding();
+}
+
+bool FrontEnd::read_scan(PackSample<cell_inputs>& into) {
+  // the alarm bits first: values that are read after them are as fresh as they say
+  std::array<std::uint8_t, hdq_temperature + 2 - alarm_status> alarm_and_temperatures;
+  if (!wire_.read(alarm_status, alarm_and_temperatures)) return false;
+  const auto alarm = get_bytes<std::uint16_t>(alarm_and_temperatures, 0);
+  std::array<std::uint8_t, 2> seen{};
+  put_bytes(seen, 0, static_cast<std::uint16_t>(alarm & (cells_scanned | all_scanned)));
+  if (!wire_.write(alarm_status, seen)) return false;
+  std::array<std::uint8_t, ld_voltage + 2 - first_cell> voltages;
+  if (!wire_.read(first_cell, voltages)) return false;
+
+  scans_ago_ = (alarm & all_scanned) != 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(std::min(scans_ago_ + 1, int{scan_is_old}));
+  fresh_ = (alarm & cells_scanned) != 0;
+  if (!fresh_) {
+    ++counters_.not_fresh;
+    return true;
+  }
+  for (std::size_t k = 0; k < cell_inputs; ++k) into.cell_uv[k] = cell_uv(get_bytes<std::int16_t>(voltages, 2 * k));
+  if (scans_ago_ >= scan_is_old) return true;
+  into.pack_uv = get_bytes<std::int16_t>(voltages, stack_voltage - first_cell) * voltage_step_uv;
+  link_uv_ = get_bytes<std::int16_t>(voltages, ld_voltage - first_cell) * voltage_step_uv;
+  constexpr std::array<std::uint8_t, most_temperatures> sensors{ts1_temperature, ts3_temperature, hdq_temperature, cfetoff_temperature};
+  for (std::size_t k = 0; k < sensors.size(); ++k) into.temperature_cdegc[k] = cdegc(get_bytes<std::int16_t>(alarm_and_temperatures, static_cast<std::size_t>(sensors[k] - alarm_status)));
+  return true;
+}
+
+bool FrontEnd::read_current(PackSample<cell_inputs>& into) {
+  std::array<std::uint8_t, cc3_current_at + 2> currents;
+  std::array<std::uint8_t, charge_time_at + 4> charge;
+  if (!wire_.fetch(get_currents, currents) || !wire_.select(get_charge) || !wire_.fetch(get_charge, charge)) return false;
+  const auto time_s = get_bytes<std::uint32_t>(charge, charge_time_at);
+  if (time_s != charge_time_s_) charge_stands_ = 0;
+  else if (fresh_ && charge_stands_ < charge_is_old) ++charge_stands_;
+  charge_time_s_ = time_s;
+  const auto steps = get_bytes<std::int16_t>(currents, cc3_current_at);
+  constexpr auto limits = std::numeric_limits<std::int16_t>{};
+  if (!fresh_ || charge_stands_ >= charge_is_old || steps == limits.min() || steps == limits.max()) return true;  // nothing converts; or more than it can say
+  const auto counted = static_cast<std::int64_t>(static_cast<std::uint64_t>(get_bytes<std::uint32_t>(charge, charge_at)) << 32 | get_bytes<std::uint32_t>(charge, charge_fraction_at));
+  into.current_ua = mean_current_.update(steps * current_step_ua, counted, into.time_us);
+  return true;
+}
+
+bool FrontEnd::keep_bleeding() {
+  if (bleed_ == told_ && (bleed_ == 0 || now_us() - told_us_ < tell_again_us)) return true;
+  std::array<std::uint8_t, 2> cells{};
+  put_bytes(cells, 0, bleed_);
+  if (!wire_.send(balance_cells, cells)) return false;
+  settle();
+  if (!wire_.select(balance_cells)) return false;
+  settle();
+  std::array<std::uint8_t, 2> bled{};
+  if (!wire_.fetch(balance_cells, bled)) return false;
+  if (bled != cells) {
+    ++counters_.bleed_wrong;
+    return true;  // told again with the next sample
+  }
+  told_ = bleed_;
+  told_us_ = now_us();
+  return true;
+}
+
+}  // namespace bms::hal::bq76952

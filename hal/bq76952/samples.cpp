@@ -1,0 +1,64 @@
+// Samples that the board measures by itself, one each period of its own clock; beside it the bus is heard for requests and for the starting point.
+// A front end that does not answer makes samples without readings: estimator and protection are told that nothing is measured.
+//
+// A sample that comes late because the core was held up (an erase of flash) does not make the next ones come early: the period begins anew.
+#include "hal/bq76952/front_end.hpp"
+#include "hal/can.hpp"
+#include "hal/clock.hpp"
+#include "hal/contactor_pins.hpp"
+#include "hal/i2c.hpp"
+#include "hal/power_path.hpp"
+#include "hal/request_queue.hpp"
+#include "hal/requests.hpp"
+#include "hal/sample_frames.hpp"
+#include "hal/samples.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+static_assert(pack_cells == bq76952::cell_inputs);
+constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
+
+constexpr auto settings = bq76952::settings(bq76952::Board{});
+bq76952::FrontEnd front_end{settings};
+PackSample<pack_cells> sample;
+std::optional<StartingPoint> start;
+RequestQueue requests;
+std::uint64_t due_us = 0;
+bool started = false;
+
+void hear() {
+  CanFrame frame;
+  while (can_receive(frame)) {
+    if (is_start(frame)) start = start_of(frame);
+    if (!of_sample(frame)) requests.keep(frame);
+  }
+}
+
+}  // namespace
+
+bool next_request(CanFrame& frame) { return requests.next(frame); }
+
+const PackSample<pack_cells>* next_sample() {
+  if (!started) {
+    i2c_start();
+    started = true;
+    due_us = now_us() + period_us;
+  }
+  for (hear(); now_us() < due_us; hear()) wait_for_interrupt();
+  sample.time_us = now_us();
+  due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
+  front_end.read(sample);
+  return &sample;
+}
+
+std::optional<StartingPoint> starting_point() { return start; }
+
+void power_path_set(const PowerPath& wanted) {
+  contactor_pins_set(wanted);
+  front_end.bleed(wanted.bleed);
+}
+std::int32_t link_uv() { return front_end.link_uv(); }
+
+}  // namespace bms::hal

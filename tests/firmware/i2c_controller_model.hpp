@@ -1,0 +1,66 @@
+// ST's I2C controller (the one of STM32F1 to F4) as its registers show it, written from RM0090, 27: flags with the time that bytes take at 400 kHz, a
+// clock that waits while nobody reads or writes, the acknowledge that the program has to withdraw in time. On its wire hangs tests/hal/bq76952_model.
+//
+// A write reaches the chip when it is ended; that the chip refuses a byte of it is not shown. What a driver must not do is in violations.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/firmware/unicorn_board.hpp"
+#include "tests/hal/bq76952_model.hpp"
+
+namespace bms {
+
+class I2cControllerModel : public UnicornBoard::Peripheral {
+ public:
+  static constexpr std::uint32_t base = 0x40005400;
+
+  explicit I2cControllerModel(Bq76952Model& chip) : chip_(chip) {}
+
+  std::uint32_t read(std::uint32_t offset, double now_us) override;
+  void write(std::uint32_t offset, std::uint32_t value, double now_us) override;
+
+  std::vector<std::string> violations;
+  unsigned transfers = 0;
+  std::uint32_t ccr = 0, trise = 0, frequency_mhz = 0;
+
+ private:
+  enum class Phase { idle, starting, started, addressing, addressed, sending, receiving };
+  static constexpr double byte_us = 22.5, start_us = 2.5;
+
+  void update(double now_us);
+  void address_done();
+  void byte_received();
+  void begin_reception(double now_us);
+  void stop();
+  bool pending(double now_us) const { return ready_us_ > 0 && now_us >= ready_us_ && !chip_.hung; }
+
+  Bq76952Model& chip_;
+  Phase phase_ = Phase::idle;
+  std::uint32_t cr1_ = 0, cr2_ = 0;
+  double ready_us_ = 0, freed_us_ = 0;
+  bool sb_ = false, address_ = false, received_ = false, shift_full_ = false, empty_ = false, refused_ = false, status_read_ = false, stop_wanted_ = false, reading_ = false, last_acked_ = false, dr_waits_ = false;
+  std::uint8_t address_byte_ = 0, dr_ = 0, shift_ = 0;
+  std::vector<std::uint8_t> out_;
+  std::array<std::uint8_t, 96> in_{};
+  std::size_t at_ = 0;
+};
+
+/// Port B as far as I2C sees it: both wires high, or the clock held low.
+class I2cPins : public UnicornBoard::Peripheral {
+ public:
+  static constexpr std::uint32_t base = 0x40020400;
+
+  explicit I2cPins(const Bq76952Model& chip) : chip_(chip) {}
+  std::uint32_t read(std::uint32_t offset, double) override { return offset == 0x10 ? (chip_.hung ? 0x80 : 0xC0) : registers_[offset / 4]; }
+  void write(std::uint32_t offset, std::uint32_t value, double) override { registers_[offset / 4] = value; }
+
+ private:
+  const Bq76952Model& chip_;
+  std::array<std::uint32_t, 256> registers_{};
+};
+
+}  // namespace bms
