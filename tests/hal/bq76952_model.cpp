@@ -52,7 +52,8 @@ void Bq76952Model::reset() {
   set_memory(0x9307, 1, 80);
   set_memory(0x9275, 1, 50);
   set_memory(0x9278, 1, 86);
-  checked_ = config_ = false;
+  checked_ = crc_from_otp;
+  config_ = false;
   was_reset_ = true;
   alarm_ = 0;
   alarm_enable_ = 0xF800;
@@ -154,7 +155,8 @@ void Bq76952Model::scan_ends() {
     for (std::size_t k = 0; k < 4; ++k) put(direct_, temperature_register[k], memory(temperature_pin[k], 1) == 0x07 ? static_cast<std::uint32_t>(std::lround(10 * (temperature_c[k] + 273.15))) : 0, 2);
   }
   alarm_ |= 1U << 1 & alarm_enable_;
-  if (++loop_ == 3) {
+  if (only_cells) loop_ = 3;  // the slots of stack, LD and thermistors stand still
+  if (!only_cells && ++loop_ >= 3) {
     loop_ = 0;
     alarm_ |= 1U << 7 & alarm_enable_;
   }

@@ -29,7 +29,7 @@ class Bq76952Model {
   std::array<double, 16> bled_s{};                      ///< how long each cell was bled
 
   // what may go wrong
-  bool gone = false, hung = false, frozen = false, torn_buffer = false, deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
+  bool gone = false, hung = false, frozen = false, torn_buffer = false, only_cells = false, crc_from_otp = false, deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
   std::uint16_t device_number = 0x7695;
   struct Fault {
     enum Kind { none, no_acknowledge, flipped_bit, timed_out, reset } kind = none;

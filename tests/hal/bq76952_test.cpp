@@ -342,6 +342,29 @@ TEST_F(Bq76952, ABufferThatDoesNotFitItsChecksumIsNoCurrent) {
   EXPECT_LE(samples_until_whole(), 20);
 }
 
+TEST_F(Bq76952, StackLinkAndTemperaturesThatStandStillAreGivenForOneSampleMoreAtMost) {
+  start();
+  model.only_cells = true;
+  next();
+  for (int k = 0; k < 20; ++k) {
+    next();
+    if (k == 0) continue;
+    ASSERT_NE(sample.cell_uv[0], no_reading);
+    ASSERT_TRUE(sample.pack_uv == no_reading && front_end.link_uv() == no_reading && sample.temperature_cdegc[0] == no_temperature) << k;
+  }
+}
+
+TEST_F(Bq76952, AResetOfAChipThatGoesOnTalkingWithCrcIsSeenByItsStatus) {
+  start();
+  model.crc_from_otp = true;
+  model.reset();
+  next();
+  EXPECT_TRUE(empty());
+  EXPECT_EQ(front_end.counters().resets, 1U);
+  EXPECT_LE(samples_until_whole(), 12);
+  EXPECT_EQ(front_end.counters().configured, 2U);
+}
+
 TEST_F(Bq76952, AResetInTheMiddleIsSeenAndTheChipConfiguredAnewWithin1800ms) {
   start();
   model.reset();
