@@ -14,6 +14,16 @@ pids=()
 trap 'for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done' EXIT
 soon() { for _ in {1..400}; do "$@" >/dev/null 2>&1 && return; sleep 0.05; done; echo "telemetry.sh: never came true: $*" >&2; exit 1; }
 
+settled() {  # a file that has not grown for half a second
+  local before=-1 now
+  for _ in {1..120}; do
+    now=$(stat -c %s "$1")
+    [ "$now" != "$before" ] || return 0
+    before=$now
+    sleep 0.5
+  done
+}
+
 firmware_answers() {  # an emulated UART loses what comes before the firmware has started it
   printf 'V\r' >&3
   local answer
@@ -45,9 +55,10 @@ on_the_bus() {
   cangen vcan0 -g 1 -i -m -I 6A6 >/dev/null 2>&1 & pids+=($!)
   "$feeder" slcan0 "$recording" "$soc" "$sigma"
   kill "${pids[@]: -2}"
-  sleep 0.3
-  kill -INT $monitor
+  settled "$folder/candump.log"  # on a busy machine it writes long after the bus has become silent
+  kill -INT $monitor $dump
   wait $monitor
+  wait $dump || true
   cangw -D -s slcan0 -d vcan0 -e
 }
 
