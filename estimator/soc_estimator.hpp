@@ -79,8 +79,9 @@ class SocEstimator {
     auto noise = Model::noise(laws, settling, cell.noise);
     noise[Model::soc] = soc_noise_;
     if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] {
-      noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, current.measured ? Current(0) : drive.current_a));
-      if (!current.measured) {  // what drops over the resistances is not known then
+      const bool measured = (estimate.flags & (current_missing | current_implausible)) == 0;
+      noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, measured ? Current(0) : drive.current_a));
+      if (!measured) {  // what drops over the resistances is not known then
         const Voltage unknown_v = settled_drop_v<S>(at, Current(model::magnitude(drive.current_a) + cell.noise.unknown_a));
         noise[0] = Variance(noise[0] + unknown_v * unknown_v);
       }
