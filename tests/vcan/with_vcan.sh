@@ -3,7 +3,7 @@
 # Else in User-Mode Linux, which needs neither root nor modules of this machine's kernel: its / is this machine's, so programs, libraries and files are
 # the same, written as this user; what PROGRAM prints comes when it has ended. Sockets, pipes and pseudo-terminals outside are not seen inside.
 #
-#   VCAN_SECONDS   longest time, 120; then the exit code is 124        VCAN_UML=1   User-Mode Linux although there is a vcan0
+#   VCAN_SECONDS   longest time, 240; then the exit code is 124        VCAN_UML=1   User-Mode Linux although there is a vcan0
 #   VCAN_TTY       a serial line or pseudo-terminal of this machine that PROGRAM is to have: it finds its name there in VCAN_LINE
 #
 # Needs: user-mode-linux busybox-static iproute2 gcc (Debian's names). Exit code 125: something of these is missing.
@@ -21,7 +21,7 @@ gcc -O2 -shared -fPIC -o "$job/shim.so" "$here/xstate_shim.c" || exit 125
 : >"$job/stdout"; : >"$job/stderr"
 # one processor of those that are allowed: frames are five times slower where the guest wanders. The console goes through a pipe: a file can't be polled.
 processors=($(taskset -cp $$ | sed 's/.*: //' | tr ',' '\n' | awk -F- '{for (k = $1; k <= ($2 == "" ? $1 : $2); k++) print k}'))
-LD_PRELOAD=$job/shim.so timeout -k 5 "${VCAN_SECONDS:-120}" taskset -c "${processors[RANDOM % ${#processors[@]}]}" setarch -R \
+LD_PRELOAD=$job/shim.so timeout -k 5 "${VCAN_SECONDS:-240}" taskset -c "${processors[RANDOM % ${#processors[@]}]}" setarch -R \
   linux.uml mem=256M root=/dev/root rootfstype=hostfs rootflags=/ rw selinux=0 apparmor=0 con=null con0=null,fd:1 ${VCAN_TTY:+ssl0=tty:$VCAN_TTY} init="$here/guest_init.sh" vcan_job="$job" \
   </dev/null 2>&1 | cat >"$job/console"
 cat "$job/stdout"; cat "$job/stderr" >&2
