@@ -59,7 +59,7 @@ class FrontEndBoard : public ::testing::Test {
 };
 
 TEST_F(FrontEndBoard, TheCellsOfTheModelAreOnTheBusToTheMillivolt) {
-  board.run_for_ms(3'600);
+  board.run_for_ms(3'600 + 750);  // a new chip's store is erased first, three sectors of 0.25 s
   expect_cells();
   EXPECT_EQ(i2c.ccr, 0x8023U) << "400 kHz from 42 MHz, RM0090, 27.6.8";
   EXPECT_EQ(i2c.frequency_mhz, 42U);
