@@ -12,6 +12,7 @@ namespace bms::monitor {
 namespace {
 
 constexpr std::int64_t stale_without_cycle_us = 3'000'000;
+constexpr std::int64_t farthest_us = std::int64_t{1} << 60;  // 36,500 years: differences and their sums do not overflow
 constexpr std::int64_t clock_set_us = 1'000'000;
 constexpr double smoothing = 1.0 / 8;
 
@@ -83,10 +84,11 @@ BusState::BusState() {
 
 std::size_t BusState::take(const BusFrame& frame) {
   const std::size_t none_of_ours = states_.size();
-  if (frames_++ == 0) first_us_ = last_us_ = now_us_ = frame.time_us;
-  if (frame.time_us < last_us_ - clock_set_us) clock_set_back(frame.time_us);
-  last_us_ = std::max(last_us_, frame.time_us);
-  time_is(frame.time_us);
+  const std::int64_t time_us = std::clamp(frame.time_us, -farthest_us, farthest_us);  // any log may come
+  if (frames_++ == 0) first_us_ = last_us_ = now_us_ = time_us;
+  if (time_us < last_us_ - clock_set_us) clock_set_back(time_us);
+  last_us_ = std::max(last_us_, time_us);
+  time_is(time_us);
   switch (frame.kind) {
     case FrameKind::remote: ++remote_; return none_of_ours;
     case FrameKind::fd: ++fd_; return none_of_ours;
@@ -97,7 +99,7 @@ std::size_t BusState::take(const BusFrame& frame) {
     case FrameKind::extended: break;
     case FrameKind::standard:
       if (const std::uint8_t message = message_of_[frame.id & 0x7FFU]; message != none) {
-        return take_ours(message, classic(frame), frame.time_us) ? message : none_of_ours;
+        return take_ours(message, classic(frame), time_us) ? message : none_of_ours;
       }
   }
   take_unknown(frame);
@@ -105,7 +107,7 @@ std::size_t BusState::take(const BusFrame& frame) {
 }
 
 void BusState::clock_set_back(std::int64_t to_us) {
-  first_us_ -= last_us_ - to_us;
+  first_us_ = std::max(first_us_ - (last_us_ - to_us), -2 * farthest_us);
   last_us_ = now_us_ = to_us;
   for (MessageState& state : states_) state.last_us = std::min(state.last_us, to_us);
 }
