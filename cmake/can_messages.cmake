@@ -1,4 +1,4 @@
-# can/greybox_bms.dbc -> ${CMAKE_BINARY_DIR}/generated/can_messages.hpp; link bms_can to include it.
+# can/greybox_bms.dbc -> ${CMAKE_BINARY_DIR}/generated/can_messages.hpp, can/j1939_profile.dbc -> j1939_messages.hpp beside it; link bms_can to include them.
 find_program(BMS_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH DOC "python3 with canmatrix")
 if(NOT BMS_PYTHON)
   find_program(BMS_PYTHON python3 REQUIRED)
@@ -13,7 +13,12 @@ add_custom_command(OUTPUT ${can_messages}
   COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/greybox_bms.dbc ${can_messages}
   DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/greybox_bms.dbc
   COMMENT "CAN messages" VERBATIM)
-add_custom_target(can_messages_made DEPENDS ${can_messages})
+set(j1939_messages ${CMAKE_BINARY_DIR}/generated/j1939_messages.hpp)
+add_custom_command(OUTPUT ${j1939_messages}
+  COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/j1939_profile.dbc ${j1939_messages} j1939
+  DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/j1939_profile.dbc
+  COMMENT "CAN messages of the J1939 profile" VERBATIM)
+add_custom_target(can_messages_made DEPENDS ${can_messages} ${j1939_messages})
 add_library(bms_can INTERFACE)
 target_include_directories(bms_can INTERFACE ${CMAKE_BINARY_DIR}/generated)
 add_dependencies(bms_can can_messages_made)

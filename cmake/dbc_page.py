@@ -1,6 +1,6 @@
 """DBC file and what the firmware does (tests/firmware/vehicle_start.cpp, JSON on standard input) -> the page can/messages.md, by the template beside it.
 
-    vehicle_start | dbc_page.py [--compare] IN.dbc PAGE.md       template: PAGE.in.md
+    vehicle_start | dbc_page.py [--compare] IN.dbc J1939.dbc PAGE.md       template: PAGE.in.md
 
 --compare: writes nothing; exit code 1 and one line when the page is another one. The CRC of the example is computed here a second time. Needs python3-canmatrix.
 """
@@ -51,6 +51,18 @@ def signal_row(signal):
     return f"| {signal.name} | {signal.start_bit} | {signal.size} | {'signed' if signal.is_signed else ''} | {plain(signal.factor)} | {plain(signal.offset)} | {plain(signal.min)} to {plain(signal.max)} | {signal.unit} | {invalid} | {meaning} |"
 
 
+SIGNALS = ["", "| signal | first bit | length | | factor | offset | range | unit | not known (raw) | meaning |", "|---|---|---|---|---|---|---|---|---|---|"]
+
+
+def profile(matrix):
+    lines = []
+    for f in sorted(matrix.frames, key=lambda f: -f.arbitration_id.id):
+        if f.size != 8 or not f.arbitration_id.extended or any(not s.is_little_endian for s in f.signals):
+            raise SystemExit(f"{f.name}: not as the page says of the profile: 29 bits, 8 bytes, little-endian")
+        lines += ["", f"### {f.name}", "", f"{f.arbitration_id.id:#010x}, {when(f)}. {cell(f.comment)}"] + SIGNALS + [signal_row(s) for s in sorted(f.signals, key=lambda s: s.start_bit)]
+    return "\n".join(lines)
+
+
 def messages(matrix):
     frames = sorted(matrix.frames, key=lambda f: f.arbitration_id.id)
     lines = ["| id | message | from | when | what for |", "|---|---|---|---|---|"]
@@ -58,8 +70,7 @@ def messages(matrix):
     for f in frames:
         if any(not s.is_little_endian for s in f.signals) or f.size != 8 or int(f.attributes["E2EDataId"]) != f.arbitration_id.id:
             raise SystemExit(f"{f.name}: not as the page says of all messages: little-endian, 8 bytes, its id the data id")
-        lines += ["", f"### {f.name}", "", f"{f.arbitration_id.id:#05x}, from {', '.join(f.transmitters)}, {when(f)}. {cell(f.comment)}", "",
-                  "| signal | first bit | length | | factor | offset | range | unit | not known (raw) | meaning |", "|---|---|---|---|---|---|---|---|---|---|"]
+        lines += ["", f"### {f.name}", "", f"{f.arbitration_id.id:#05x}, from {', '.join(f.transmitters)}, {when(f)}. {cell(f.comment)}"] + SIGNALS
         lines += [signal_row(s) for s in sorted(f.signals, key=lambda s: s.start_bit) if s.name not in ("Crc", "Counter")]
     return "\n".join(lines)
 
@@ -76,9 +87,9 @@ def facts(said):
 
 def main():
     compare = sys.argv[1] == "--compare"
-    dbc, page = sys.argv[2 if compare else 1 :]
+    dbc, profile_dbc, page = sys.argv[2 if compare else 1 :]
     with open(page.removesuffix(".md") + ".in.md") as template:
-        text = string.Template(template.read()).substitute(facts(json.load(sys.stdin)), messages=messages(load(dbc)), other_profiles="").rstrip("\n") + "\n"
+        text = string.Template(template.read()).substitute(facts(json.load(sys.stdin)), messages=messages(load(dbc)), profile=profile(load(profile_dbc))).rstrip("\n") + "\n"
     if compare:
         if not os.path.exists(page) or open(page).read() != text:
             raise SystemExit(f"{page} is not what the DBC file and the firmware say: ./bms messages writes it anew")

@@ -12,9 +12,22 @@
 # chip, bms_<board>_remote.elf with samples that another node measures, and bms_<board>_hil.elf for an emulated board with the same chip (BMS_LOOP_BOARD).
 # board.cmake says which CAN back end it has, BMS_CAN slcan or bxcan, for the latter with a bit rate; and where its samples come from, BMS_SAMPLES
 # bq76952 (measured on the board), remote (from another node) or emulated. What does not depend on the cell is compiled once for all.
+#
+# BMS_VEHICLE_PROFILE: messages that go out beside the battery's own: cia418, for a CANopen charger (nodes BMS_CANOPEN_NODE, BMS_CANOPEN_CHARGER), or
+# j1939 (can/j1939_profile.dbc). can/messages.md says what they are.
 include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
+endif()
+
+set(BMS_VEHICLE_PROFILE none CACHE STRING "messages beside the battery's own: none, cia418, j1939 (can/messages.md)")
+set(BMS_CANOPEN_NODE 1 CACHE STRING "the battery's node on a CANopen bus")
+set(BMS_CANOPEN_CHARGER 10 CACHE STRING "the charger's node")
+set(vehicle_profile_none "")
+set(vehicle_profile_cia418 BMS_VEHICLE_PROFILE_CIA418 BMS_CANOPEN_NODE=${BMS_CANOPEN_NODE} BMS_CANOPEN_CHARGER=${BMS_CANOPEN_CHARGER})
+set(vehicle_profile_j1939 BMS_VEHICLE_PROFILE_J1939)
+if(NOT DEFINED vehicle_profile_${BMS_VEHICLE_PROFILE})
+  message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418 or j1939")
 endif()
 
 # The header generator runs on the host: the one that is there, or one built for the purpose.
@@ -79,15 +92,16 @@ set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/bq76952/front_end.cpp ${ha
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${hal}/absent/record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
-target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
+target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION} ${vehicle_profile_${BMS_VEHICLE_PROFILE}})
 bms_objects(hal_emulated_flash -Os ${hal}/emulated/flash.cpp ${hal}/emulated/calendar.cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
 
 bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${hal}/remote/samples.cpp ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
 
 bms_objects(storage -Os ${CMAKE_SOURCE_DIR}/storage/log.cpp ${CMAKE_SOURCE_DIR}/storage/persistence.cpp)
-bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/board_cell.cpp ${cell_header} ${can_messages})  # the cell says which model
+bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/board_cell.cpp ${cell_header} ${can_messages} ${j1939_messages})  # the cell says which model
 target_include_directories(application PRIVATE ${CMAKE_BINARY_DIR}/generated)
+target_compile_definitions(application PRIVATE ${vehicle_profile_${BMS_VEHICLE_PROFILE}})
 bms_objects(estimator_step -O2 ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header} ${can_messages})
 target_include_directories(estimator_step PRIVATE ${CMAKE_BINARY_DIR}/generated)
 math(EXPR version "${PROJECT_VERSION_MAJOR} * 65536 + ${PROJECT_VERSION_MINOR} * 256 + ${PROJECT_VERSION_PATCH}" OUTPUT_FORMAT HEXADECIMAL)

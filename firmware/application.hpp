@@ -24,7 +24,14 @@
 
 namespace bms {
 
-template <class Board>
+/// Nothing beside the battery's own messages. Others: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
+struct NoVehicleProfile {
+  template <class... Known>
+  constexpr void tell(const Known&...) {}
+  constexpr void hear(const hal::CanFrame&) {}
+};
+
+template <class Board, class VehicleProfile = NoVehicleProfile>
 class Application {
  public:
   using Estimator = typename Board::Estimator;
@@ -36,6 +43,7 @@ class Application {
       : estimator_{start ? Estimator(*start) : Estimator()},
         protection_{Board::plan(), static_cast<std::uint32_t>(persistence.settings().get(kept_faults_key).value_or(0))},
         telemetry_{identity, capacity_ah, start},
+        capacity_ah_{capacity_ah},
         persistence_{persistence} {
     if constexpr (cells > 1) recall(cells_, persistence.cells());
   }
@@ -49,6 +57,7 @@ class Application {
     if constexpr (cells > 1) Board::tell_apart(cells_, pack, estimate);
     protect(pack, estimate, request);
     telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, requested_.log_samples);
+    vehicle_profile_.tell(pack, condition_, protection_.decision(), Board::plan(), capacity_ah_, (estimate.flags & not_started) == 0);
     hear(pack.time_us);
     estimate_ = estimate;
     if (persistence_.count(mean)) [[unlikely]] remember();
@@ -104,6 +113,7 @@ class Application {
     hal::CanFrame frame;
     for (int k = 0; k < most_requests && hal::next_request(frame); ++k) {
       if (const auto answer = commands_.take(frame, now_us, requested_)) telemetry_.answer(*answer);
+      else vehicle_profile_.hear(frame);
     }
   }
 
@@ -119,6 +129,8 @@ class Application {
   PackCells<typename Estimator::Scalar, cells> cells_;
   protection::Protection<cells> protection_;
   Telemetry<Estimator, cells> telemetry_;
+  [[no_unique_address]] VehicleProfile vehicle_profile_;
+  float capacity_ah_ = 0;
   Commands commands_;
   Requested requested_;
   Result estimate_{};

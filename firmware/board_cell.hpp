@@ -7,9 +7,15 @@
 #include "cell_constants.hpp"  // generated from the cell file
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
+#include "firmware/application.hpp"
 #include "firmware/messages.hpp"
 #include "hal/samples.hpp"
 #include "protection/protection.hpp"
+#if defined(BMS_VEHICLE_PROFILE_CIA418)
+#include "firmware/cia418_profile.hpp"
+#elif defined(BMS_VEHICLE_PROFILE_J1939)
+#include "firmware/j1939_profile.hpp"
+#endif
 
 namespace bms {
 
@@ -26,6 +32,14 @@ BoardEstimator::Result estimator_step(BoardEstimator& estimator, const Sample& s
 
 messages::Identity identity();
 float capacity_ah();
+
+#if defined(BMS_VEHICLE_PROFILE_CIA418)
+using BoardVehicleProfile = Cia418Profile;
+#elif defined(BMS_VEHICLE_PROFILE_J1939)
+using BoardVehicleProfile = J1939Profile;
+#else
+using BoardVehicleProfile = NoVehicleProfile;
+#endif
 
 struct BoardCell {
   using Estimator = BoardEstimator;

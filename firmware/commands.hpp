@@ -35,7 +35,7 @@ class Commands {
  public:
   /// now_us: the samples' clock. Nothing: the frame is no command that is heard.
   constexpr std::optional<can::CommandAnswer> take(const hal::CanFrame& frame, std::uint64_t now_us, Requested& requested) {
-    if (frame.id != can::Command::id || !can::intact(frame, can::Command::data_id)) return std::nullopt;
+    if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id)) return std::nullopt;
     const std::uint8_t counter = can::counter_of(frame);
     if (counter >= can::counters || counter == last_counter_) return std::nullopt;
     last_counter_ = counter;

@@ -20,7 +20,7 @@ int main() {
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
   const auto told = hal::starting_point();
-  static Application<BoardCell> application(told ? told : persistence.starting_point(), identity(), capacity_ah(), persistence);
+  static Application<BoardCell, BoardVehicleProfile> application(told ? told : persistence.starting_point(), identity(), capacity_ah(), persistence);
   for (; sample != nullptr; sample = hal::next_sample()) application.take(*sample);
   application.end();
   return 0;

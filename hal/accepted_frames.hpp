@@ -11,11 +11,29 @@ namespace bms::hal {
 
 inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.hpp holds it to be the DBC file's
 
-/// All of hal/sample_frames.hpp, and commands.
+// A board's build option says otherwise (cmake/firmware.cmake).
+#ifndef BMS_CANOPEN_NODE
+#define BMS_CANOPEN_NODE 1
+#endif
+#ifndef BMS_CANOPEN_CHARGER
+#define BMS_CANOPEN_CHARGER 10
+#endif
+inline constexpr std::uint16_t canopen_node = BMS_CANOPEN_NODE, canopen_charger = BMS_CANOPEN_CHARGER;
+
+/// Network management, and requests to the battery's SDO server, if the image is a CANopen node (firmware/cia418_profile.hpp).
+#if defined(BMS_VEHICLE_PROFILE_CIA418)
+inline constexpr std::array<std::uint16_t, 2> profile_ids{0x000, 0x600 + canopen_node};
+#else
+inline constexpr std::array<std::uint16_t, 0> profile_ids{};
+#endif
+
+/// All of hal/sample_frames.hpp, commands, and those of the profile.
 inline constexpr auto accepted_ids = [] {
-  std::array<std::uint16_t, last_sample_frame_id - reading_frame_id + 2> ids{};
-  for (std::size_t k = 0; k + 1 < ids.size(); ++k) ids[k] = static_cast<std::uint16_t>(reading_frame_id + k);
-  ids.back() = command_frame_id;
+  constexpr std::size_t of_samples = last_sample_frame_id - reading_frame_id + 1;
+  std::array<std::uint16_t, of_samples + 1 + profile_ids.size()> ids{};
+  for (std::size_t k = 0; k < of_samples; ++k) ids[k] = static_cast<std::uint16_t>(reading_frame_id + k);
+  ids[of_samples] = command_frame_id;
+  for (std::size_t k = 0; k < profile_ids.size(); ++k) ids[of_samples + 1 + k] = profile_ids[k];
   return ids;
 }();
 

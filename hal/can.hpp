@@ -1,4 +1,4 @@
-// A classic CAN bus: standard frames out and in. Sending may wait for the line, receiving never does.
+// A classic CAN bus: frames out, standard ones and those of 29 bits; standard ones in. Sending may wait for the line, receiving never does.
 // Back ends: stm32f4/bxcan (a real bus), slcan/ (text over a UART), absent/ (nobody listens).
 //
 // can_receive() and can_listening() look after the bus beside: starting, errors, bus-off. Call one of them every 10 ms or so.
@@ -10,9 +10,10 @@
 namespace bms::hal {
 
 struct CanFrame {
-  std::uint16_t id = 0;                    ///< 11 bits
+  std::uint32_t id = 0;                    ///< 11 bits, 29 of a long one
   std::uint8_t length = 0;                 ///< 0..8 bytes of data in use
   std::array<std::uint8_t, 8> data{};
+  bool long_id = false;
 };
 
 /// Never waits: the bus is up when can_health() says so.

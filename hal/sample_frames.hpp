@@ -27,7 +27,7 @@ inline constexpr std::uint16_t reading_frame_id = 0x310, time_frame_id = 0x311, 
                                check_frame_id = 0x31E, last_sample_frame_id = 0x31F;
 
 /// Whether the frame is one of these.
-constexpr bool of_sample(const CanFrame& frame) { return frame.id >= reading_frame_id && frame.id <= last_sample_frame_id; }
+constexpr bool of_sample(const CanFrame& frame) { return !frame.long_id && frame.id >= reading_frame_id && frame.id <= last_sample_frame_id; }
 
 /// CRC-32 (IEEE 802.3) of what a check covers, continued: begins with ~0, ends inverted.
 constexpr std::uint32_t check_more(std::uint32_t crc, const CanFrame& frame) {

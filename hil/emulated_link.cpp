@@ -16,7 +16,7 @@ namespace bms::hil {
 
 namespace {
 
-constexpr std::size_t record_size = 12, most_records = 128;
+constexpr std::size_t record_size = 16, length_at = 4, of_block_at = 5, long_id_at = 6, data_at = 8, most_records = 128;
 constexpr unsigned char nothing = 0xFF, tick = 0xFE;
 constexpr int silence_ms = 30'000;
 
@@ -80,15 +80,16 @@ class EmulatedLink : public BoardLink {
 
   void write_block(std::uint64_t time_us, std::span<const hal::CanFrame> frames) {
     std::vector<unsigned char> bytes(record_size * (1 + frames.size()));
-    bytes[2] = tick;
-    bytes[3] = static_cast<unsigned char>(frames.size());
-    hal::put_bytes(std::span(bytes), 4, time_us);
+    bytes[length_at] = tick;
+    bytes[of_block_at] = static_cast<unsigned char>(frames.size());
+    hal::put_bytes(std::span(bytes), data_at, time_us);
     for (std::size_t k = 0; k < frames.size(); ++k) {
       const std::span<unsigned char> to(bytes.data() + record_size * (1 + k), record_size);
       hal::put_bytes(to, 0, frames[k].id);
-      to[2] = frames[k].length;
-      to[3] = static_cast<unsigned char>(frames.size() - 1 - k);
-      for (std::size_t byte = 0; byte < 8; ++byte) to[4 + byte] = frames[k].data[byte];
+      to[length_at] = frames[k].length;
+      to[of_block_at] = static_cast<unsigned char>(frames.size() - 1 - k);
+      to[long_id_at] = frames[k].long_id ? 1 : 0;
+      for (std::size_t byte = 0; byte < 8; ++byte) to[data_at + byte] = frames[k].data[byte];
     }
     for (std::size_t done = 0; done < bytes.size();) {
       const ssize_t n = ::write(*to_, bytes.data() + done, bytes.size() - done);
@@ -101,12 +102,12 @@ class EmulatedLink : public BoardLink {
     std::vector<hal::CanFrame> frames;
     while (true) {
       const auto record = read_record();
-      if (record[2] != nothing) {
-        hal::CanFrame frame{hal::get_bytes<std::uint16_t>(record, 0), record[2], {}};
-        for (std::size_t byte = 0; byte < 8; ++byte) frame.data[byte] = record[4 + byte];
+      if (record[length_at] != nothing) {
+        hal::CanFrame frame{hal::get_bytes<std::uint32_t>(record, 0), record[length_at], {}, record[long_id_at] != 0};
+        for (std::size_t byte = 0; byte < 8; ++byte) frame.data[byte] = record[data_at + byte];
         frames.push_back(frame);
       }
-      if (record[3] == 0) return frames;
+      if (record[of_block_at] == 0) return frames;
     }
   }
 

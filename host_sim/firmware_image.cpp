@@ -71,10 +71,10 @@ std::size_t board_cells(const std::string& board) {
   return std::stoul(found[1]);
 }
 
-std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image) {
+std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image, const std::string& vehicle_profile) {
   const auto root = source_tree();
   board_file(board);
-  const auto folder = root / "build" / "firmware" / fmt::format("{}-{}-{:08x}", board, cell.name, cell.hash);
+  const auto folder = root / "build" / "firmware" / fmt::format("{}-{}-{:08x}{}", board, cell.name, cell.hash, vehicle_profile == "none" ? "" : "-" + vehicle_profile);
   for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
     if (!in_path(tool)) throw BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
   }
@@ -84,7 +84,7 @@ std::filesystem::path firmware_image(const std::string& board, const CellFile& c
   if (!std::filesystem::exists(cell_path) || read_file(cell_path) != cell.text) write_file(cell_path, cell.text);
   if (!std::filesystem::exists(folder / "build.ninja")) {
     if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", board, cell.name);
-    run_step({"cmake", "-S", root.string(), "-B", folder.string(), "-G", "Ninja", "-DBMS_BOARD=" + board, "-DBMS_CELL=" + cell_path.string(),
+    run_step({"cmake", "-S", root.string(), "-B", folder.string(), "-G", "Ninja", "-DBMS_BOARD=" + board, "-DBMS_CELL=" + cell_path.string(), "-DBMS_VEHICLE_PROFILE=" + vehicle_profile,
               "--toolchain", (root / "cmake" / "toolchain-arm-none-eabi.cmake").string(), "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL}, log);
   }
   const std::string name = fmt::format("bms_{}{}.elf", board, ending(image));

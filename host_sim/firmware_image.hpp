@@ -13,7 +13,8 @@ enum class Image { application, remote, replay, hil, fault, pack, protection };
 
 /// `image` of `board` with the tables of `cell`, built if it is not there yet. Needs the source tree, CMake and the board's cross
 /// compiler; throws BadInput when they are missing and std::runtime_error when the build fails.
-std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image);
+/// vehicle_profile: as BMS_VEHICLE_PROFILE of cmake/firmware.cmake.
+std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image, const std::string& vehicle_profile = "none");
 
 /// Cells in series that a board measures, as its board.cmake says. Throws BadInput when there is no such board.
 std::size_t board_cells(const std::string& board);

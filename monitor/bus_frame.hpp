@@ -9,8 +9,8 @@
 namespace bms::monitor {
 
 enum class FrameKind : std::uint8_t {
-  standard,  ///< data, 11-bit id: the only kind that the BMS sends
-  extended,  ///< data, 29-bit id
+  standard,  ///< data, 11-bit id: the battery's own messages
+  extended,  ///< data, 29-bit id: those of its J1939 profile
   remote,    ///< a request, either id
   error,     ///< what the controller of this machine reports; id holds the class (linux/can/error.h)
   fd,        ///< CAN FD, either id
@@ -26,9 +26,9 @@ struct BusFrame {
   std::array<std::uint8_t, 64> data{};
 };
 
-/// The part that decoders look at; frame.kind must be standard.
+/// The part that decoders look at; frame.kind must be standard or extended.
 constexpr hal::CanFrame classic(const BusFrame& frame) {
-  hal::CanFrame out{static_cast<std::uint16_t>(frame.id), frame.length, {}};
+  hal::CanFrame out{frame.id, frame.length, {}, frame.long_id};
   for (std::size_t k = 0; k < out.data.size(); ++k) out.data[k] = frame.data[k];
   return out;
 }
@@ -36,6 +36,8 @@ constexpr hal::CanFrame classic(const BusFrame& frame) {
 constexpr BusFrame on_bus(const hal::CanFrame& frame, std::int64_t time_us) {
   BusFrame out;
   out.time_us = time_us;
+  out.kind = frame.long_id ? FrameKind::extended : FrameKind::standard;
+  out.long_id = frame.long_id;
   out.length = frame.length;
   out.id = frame.id;
   for (std::size_t k = 0; k < frame.data.size(); ++k) out.data[k] = frame.data[k];

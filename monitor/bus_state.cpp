@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "j1939_messages.hpp"  // generated from can/j1939_profile.dbc
 
 namespace bms::monitor {
 
@@ -34,24 +35,32 @@ int digits_of(double step) {
 /// What the frame's raw value is in decimals: 54.302, not the product of two floats. A float of at most 24 bits holds that raw value exactly, and
 /// its one rounding is less than half of a step.
 double exact(const SignalInfo& signal, double value) {
-  if (signal.integer) return signal.layout.has_invalid && value == signal.layout.invalid ? std::numeric_limits<double>::quiet_NaN() : value;
-  if (!std::isfinite(value)) return value;
-  const double raw = std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
+  const bool counts = signal.integer || signal.raw;
+  if (counts && signal.layout.has_invalid && value == (signal.layout.is_signed ? signal.layout.invalid : static_cast<double>(static_cast<std::uint32_t>(signal.layout.invalid)))) return std::numeric_limits<double>::quiet_NaN();
+  if (signal.integer || !std::isfinite(value)) return value;
+  const double raw = signal.raw ? value : std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
   const double scale = std::pow(10, signal.digits);
   return std::round((raw * signal.factor + signal.offset) * scale) / scale;
 }
 
 template <class Message>
+constexpr std::uint16_t data_id_of() {
+  if constexpr (requires { Message::data_id; }) return Message::data_id;
+  else return 0;
+}
+
+template <class Message>
 MessageInfo info_of() {
-  MessageInfo info{Message::name, Message::id, Message::data_id, Message::cycle_us, {}, [](const hal::CanFrame& frame, std::span<double> values) {
+  MessageInfo info{Message::name, Message::id, sizeof(Message::id) > 2, data_id_of<Message>(), Message::cycle_us, {}, [](const hal::CanFrame& frame, std::span<double> values) {
                      Message message = Message::of(frame);
                      std::size_t k = 0;
                      message.each([&](const char*, const char*, const auto& value, const can::SignalLayout&) { values[k++] = static_cast<double>(value); });
                    }};
   Message message;
   message.each([&](const char* name, const char* unit, const auto& value, const can::SignalLayout& layout) {
-    const double factor = decimal(layout.factor);
-    info.signals.push_back({name, unit, "", std::is_integral_v<std::remove_cvref_t<decltype(value)>>, layout, {}, factor, decimal(layout.offset), digits_of(factor)});
+    const double factor = decimal(layout.factor), offset = decimal(layout.offset);
+    const bool counts = std::is_integral_v<std::remove_cvref_t<decltype(value)>>, as_they_are = factor == 1 && offset == 0;
+    info.signals.push_back({name, unit, "", counts && as_they_are, counts && !as_they_are, layout, {}, factor, offset, digits_of(factor)});
   });
   std::size_t k = 0;
   Message::each_in_words([&](const char*, const char* comment, std::span<const can::ValueName> names) {
@@ -61,23 +70,24 @@ MessageInfo info_of() {
   return info;
 }
 
-template <class... Message>
-std::vector<MessageInfo> infos_of(std::tuple<Message...>*) {
+template <class... Message, class... OfProfile>
+std::vector<MessageInfo> infos_of(std::tuple<Message...>*, std::tuple<OfProfile...>*) {
   static_assert(sizeof...(Message) < 255);
-  return {info_of<Message>()...};
+  return {info_of<Message>()..., info_of<OfProfile>()...};
 }
 
 }  // namespace
 
 const std::vector<MessageInfo>& messages() {
-  static const std::vector<MessageInfo> all = infos_of(static_cast<can::Messages*>(nullptr));
+  static const std::vector<MessageInfo> all = infos_of(static_cast<can::Messages*>(nullptr), static_cast<can::j1939::Messages*>(nullptr));
   return all;
 }
 
 BusState::BusState() {
-  message_of_.fill(none);
+  of_short_id_.fill(none);
   for (std::size_t k = 0; k < messages().size(); ++k) {
-    message_of_[messages()[k].id & 0x7FFU] = static_cast<std::uint8_t>(k);
+    if (messages()[k].long_id) of_long_ids_.push_back(k);
+    else of_short_id_[messages()[k].id & 0x7FFU] = static_cast<std::uint8_t>(k);
     states_.emplace_back().values.assign(messages()[k].signals.size(), std::numeric_limits<double>::quiet_NaN());
   }
 }
@@ -96,14 +106,22 @@ std::size_t BusState::take(const BusFrame& frame) {
       ++errors_;
       error_classes_ |= frame.id;
       return none_of_ours;
-    case FrameKind::extended: break;
-    case FrameKind::standard:
-      if (const std::uint8_t message = message_of_[frame.id & 0x7FFU]; message != none) {
-        return take_ours(message, classic(frame), time_us) ? message : none_of_ours;
-      }
+    case FrameKind::extended:
+    case FrameKind::standard: break;
   }
+  const std::size_t message = message_of(frame);
+  if (message != none_of_ours) return take_ours(message, classic(frame), time_us) ? message : none_of_ours;
   take_unknown(frame);
   return none_of_ours;
+}
+
+std::size_t BusState::message_of(const BusFrame& frame) const {
+  if (frame.kind == FrameKind::extended) {
+    const auto found = std::find_if(of_long_ids_.begin(), of_long_ids_.end(), [&](std::size_t k) { return messages()[k].id == frame.id; });
+    return found == of_long_ids_.end() ? states_.size() : *found;
+  }
+  const std::uint8_t message = of_short_id_[frame.id & 0x7FFU];
+  return message == none ? states_.size() : message;
 }
 
 void BusState::clock_set_back(std::int64_t to_us) {
@@ -112,30 +130,34 @@ void BusState::clock_set_back(std::int64_t to_us) {
   for (MessageState& state : states_) state.last_us = std::min(state.last_us, to_us);
 }
 
-bool BusState::take_ours(std::size_t message, const hal::CanFrame& frame, std::int64_t time_us) {
-  const MessageInfo& info = messages()[message];
-  MessageState& state = states_[message];
+/// Counts what is wrong with a frame of a message.
+bool BusState::whole(const MessageInfo& info, MessageState& state, const hal::CanFrame& frame) const {
   if (frame.length != 8) {
     ++state.wrong_length;
     return false;
   }
+  if (info.data_id == 0) return true;
   const std::uint8_t counter = can::counter_of(frame);
   if (!can::intact(frame, info.data_id) || counter >= can::counters) {
     ++state.crc_errors;
     return false;
   }
-  if (state.frames > 0) {
-    if (counter == state.counter) {
-      ++state.repeated;
-      return false;
-    }
-    state.lost += static_cast<unsigned>(counter - state.counter + can::counters - 1) % can::counters;
-    const auto since_us = static_cast<double>(time_us - state.last_us);
-    if (since_us > 0) state.period_us += state.period_us > 0 ? smoothing * (since_us - state.period_us) : since_us;
+  if (state.frames > 0 && counter == state.counter) {
+    ++state.repeated;
+    return false;
   }
+  if (state.frames > 0) state.lost += static_cast<unsigned>(counter - state.counter + can::counters - 1) % can::counters;
+  state.counter = counter;
+  return true;
+}
+
+bool BusState::take_ours(std::size_t message, const hal::CanFrame& frame, std::int64_t time_us) {
+  const MessageInfo& info = messages()[message];
+  MessageState& state = states_[message];
+  if (!whole(info, state, frame)) return false;
+  if (const auto since_us = static_cast<double>(time_us - state.last_us); state.frames > 0 && since_us > 0) state.period_us += state.period_us > 0 ? smoothing * (since_us - state.period_us) : since_us;
   ++good_;
   ++state.frames;
-  state.counter = counter;
   state.last_us = time_us;
   info.decode(frame, state.values);
   for (std::size_t s = 0; s < state.values.size(); ++s) state.values[s] = exact(info.signals[s], state.values[s]);
@@ -184,6 +206,7 @@ bool BusState::complete() const {
   bool all = true, every_sample = true;
   std::int64_t longest_us = 0;
   for (std::size_t k = 0; k < states_.size(); ++k) {
+    if (messages()[k].long_id) continue;  // not every image sends them
     const std::string_view name = messages()[k].name;
     if (states_[k].frames == 0) {
       all = false;

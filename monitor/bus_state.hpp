@@ -1,7 +1,7 @@
-// What a CAN bus has told so far: the last value of each signal of can/greybox_bms.dbc, and what was wrong with the frames.
+// What a CAN bus has told so far: the last value of each signal of can/greybox_bms.dbc and can/j1939_profile.dbc, and what was wrong with the frames.
 //
-// Messages are those of the generated can_messages.hpp: one that is added to the DBC file is here without further code. A frame of ours
-// counts only if its length, its CRC and its counter are right (AUTOSAR end-to-end profile 1, can/codec.hpp):
+// Messages are those of the generated can_messages.hpp and j1939_messages.hpp: one that is added to a DBC file is here without further code. A frame of
+// ours counts only if its length is right, and of a protected message its CRC and its counter (AUTOSAR end-to-end profile 1, can/codec.hpp):
 //
 //   wrong_length   not 8 bytes                            crc_errors   CRC does not fit, or a counter of 15, which is none
 //   lost           frames that the counter says are missing; a sender that starts anew looks like a gap of up to 14
@@ -28,7 +28,8 @@ struct SignalInfo {
   const char* name;
   const char* unit;
   const char* comment;
-  bool integer;                              ///< by the generated code; otherwise a float
+  bool integer;                              ///< its values are
+  bool raw;                                  ///< the generated code gives the raw value, for want of bits in a float
   can::SignalLayout layout;
   std::span<const can::ValueName> names;     ///< of values, if they have any
   double factor, offset;                     ///< as the DBC file writes them: 0.002, not the float next to it
@@ -37,13 +38,15 @@ struct SignalInfo {
 
 struct MessageInfo {
   const char* name;
-  std::uint16_t id, data_id;
+  std::uint32_t id;
+  bool long_id;                              ///< 29 bits: of the J1939 profile, which an image may send beside the battery's own messages
+  std::uint16_t data_id;                     ///< 0: without CRC and counter
   std::uint32_t cycle_us;                    ///< 0: not by time
   std::vector<SignalInfo> signals;
   void (*decode)(const hal::CanFrame&, std::span<double> values);
 };
 
-/// All of the DBC file, in its order.
+/// All of both DBC files, in their order.
 const std::vector<MessageInfo>& messages();
 
 struct MessageState {
@@ -102,16 +105,19 @@ class BusState {
   std::int64_t now_us() const { return now_us_; }
   double duration_s() const { return 1e-6 * static_cast<double>(last_us_ - first_us_); }
 
-  /// All that the BMS tells has been heard once: each message, or those of every sample and as long as the longest cycle takes, and a fifth.
+  /// All that the BMS tells has been heard once: each message of its own, or those of every sample and as long as the longest cycle takes, and a fifth.
   bool complete() const;
 
  private:
   void clock_set_back(std::int64_t to_us);
+  std::size_t message_of(const BusFrame& frame) const;
   bool take_ours(std::size_t message, const hal::CanFrame& frame, std::int64_t time_us);
+  bool whole(const MessageInfo& info, MessageState& state, const hal::CanFrame& frame) const;
   void take_unknown(const BusFrame& frame);
 
   static constexpr std::uint8_t none = 0xFF;
-  std::array<std::uint8_t, 2048> message_of_{};
+  std::array<std::uint8_t, 2048> of_short_id_{};
+  std::vector<std::size_t> of_long_ids_;
   std::vector<MessageState> states_;
   std::array<Unknown, 64> unknown_{};
   std::size_t unknown_count_ = 0;

@@ -17,13 +17,13 @@ class SlcanStream {
   bool take(char byte, BusFrame& frame) {
     if (byte == '\a' || !reader_.take(byte)) return false;
     const std::string_view line = reader_.line();
-    hal::CanFrame standard;
-    if (hal::slcan::decode(line, standard)) {
-      frame = on_bus(standard, 0);
+    hal::CanFrame data;
+    if (hal::slcan::decode(line, data)) {
+      frame = on_bus(data, 0);
       return true;
     }
     if (hal::slcan::is_other_frame(line)) {
-      frame = other(line);
+      frame = request(line);
       return true;
     }
     if (!line.empty() && std::string_view("zZVvNF").find(line[0]) == std::string_view::npos) ++malformed_;
@@ -33,17 +33,13 @@ class SlcanStream {
 
  private:
   /// line: is_other_frame.
-  static BusFrame other(std::string_view line) {
+  static BusFrame request(std::string_view line) {
     BusFrame frame;
-    frame.long_id = line[0] != 'r';
-    frame.kind = line[0] == 'T' ? FrameKind::extended : FrameKind::remote;
+    frame.long_id = line[0] == 'R';
+    frame.kind = FrameKind::remote;
     const std::size_t digits = frame.long_id ? 8 : 3;
     for (const char c : line.substr(1, digits)) frame.id = frame.id << 4 | hal::slcan::digit(c);
     frame.length = static_cast<std::uint8_t>(hal::slcan::digit(line[1 + digits]));
-    if (frame.kind == FrameKind::remote) return frame;
-    for (std::size_t k = 0; k < frame.length; ++k) {
-      frame.data[k] = static_cast<std::uint8_t>(hal::slcan::digit(line[2 + digits + 2 * k]) << 4 | hal::slcan::digit(line[3 + digits + 2 * k]));
-    }
     return frame;
   }
 

@@ -1,4 +1,4 @@
-// Frames that wait for a transmit mailbox, in the order in which the bus would take them: lower identifier first, and of one
+// Frames that wait for a transmit mailbox, in the order in which the bus would take them: by arbitration, and of one
 // identifier the older first. Full: the least urgent goes, be it the new one.
 //
 // Depth: frames; the numbers that give the order of age wrap safely. Cost: a pass over the frames that wait.
@@ -17,8 +17,15 @@ struct WaitingFrame {
   std::uint32_t number = 0;  ///< of can_send()
 };
 
+/// The arbitration field's bits as they come on the wire: lower wins, equal is the same identifier. A frame of 29 bits has SRR and IDE
+/// recessive behind its first eleven and so loses to the standard frame with these eleven (ISO 11898-1, 10.4.2).
+constexpr std::uint32_t arbitration(const CanFrame& frame) {
+  return frame.long_id ? frame.id >> 18 << 21 | 3U << 19 | (frame.id & 0x3'FFFFU) << 1 : frame.id << 21;
+}
+
 constexpr bool more_urgent(const WaitingFrame& a, const WaitingFrame& b) {
-  return a.frame.id != b.frame.id ? a.frame.id < b.frame.id : static_cast<std::int32_t>(a.number - b.number) < 0;
+  const std::uint32_t of_a = arbitration(a.frame), of_b = arbitration(b.frame);
+  return of_a != of_b ? of_a < of_b : static_cast<std::int32_t>(a.number - b.number) < 0;
 }
 
 template <std::size_t Depth>

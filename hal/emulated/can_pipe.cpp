@@ -1,7 +1,7 @@
 // The CAN bus of an emulated board in lock step with a program on the host: frames as records through two of the debugger's files, which
 // are named pipes. Command line "fw TO_BOARD FROM_BOARD".
 //
-//   record    u16 id, u8 length, u8 of_block, u8 data[8]        little-endian, 12 bytes
+//   record    u32 id, u8 length, u8 of_block, u8 long_id, u8 0, u8 data[8]        little-endian, 16 bytes
 //   block     records; of_block: how many of this block are left after this one, 255 at most
 //
 // The firmware works until it asks for a frame a second time and has none: then what it sent goes out as a block, and it waits for one of the
@@ -21,7 +21,7 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::size_t record_size = 12, most_records = 128;
+constexpr std::size_t record_size = 16, length_at = 4, of_block_at = 5, long_id_at = 6, data_at = 8, most_records = 128;
 constexpr std::uint8_t nothing = 0xFF, tick = 0xFE;
 constexpr int bad_pipe = 3;
 
@@ -45,13 +45,14 @@ std::span<unsigned char> record(std::array<unsigned char, record_size * most_rec
 void put(const CanFrame& frame, std::uint8_t length) {
   const auto to = record(outgoing, out_count++);
   put_bytes(to, 0, frame.id);
-  to[2] = length;
-  for (std::size_t k = 0; k < 8; ++k) to[4 + k] = frame.data[k];
+  to[length_at] = length;
+  to[long_id_at] = frame.long_id ? 1 : 0;
+  for (std::size_t k = 0; k < 8; ++k) to[data_at + k] = frame.data[k];
 }
 
 void flush() {
   if (out_count == 0) put({}, nothing);
-  for (std::size_t k = 0; k < out_count; ++k) record(outgoing, k)[3] = static_cast<unsigned char>(out_count - 1 - k);
+  for (std::size_t k = 0; k < out_count; ++k) record(outgoing, k)[of_block_at] = static_cast<unsigned char>(out_count - 1 - k);
   if (!semihosting::write(out, std::span(outgoing).first(record_size * out_count))) open = false;
   out_count = 0;
 }
@@ -61,7 +62,7 @@ bool refill() {
   in_next = in_count = 0;
   do {
     if (!read_fully(record(incoming, in_count))) return open = false;
-  } while (record(incoming, in_count++)[3] != 0 && in_count < most_records);
+  } while (record(incoming, in_count++)[of_block_at] != 0 && in_count < most_records);
   return true;
 }
 
@@ -94,11 +95,11 @@ bool can_receive(CanFrame& frame) {
       if (!refill()) finish(0);
     }
     const auto from = record(incoming, in_next++);
-    if (from[2] == tick) time_us = get_bytes<std::uint64_t>(from, 4);
-    if (from[2] > 8) continue;
-    frame.id = get_bytes<std::uint16_t>(from, 0);
-    frame.length = from[2];
-    for (std::size_t k = 0; k < 8; ++k) frame.data[k] = from[4 + k];
+    if (from[length_at] == tick) time_us = get_bytes<std::uint64_t>(from, data_at);
+    if (from[length_at] > 8 || from[long_id_at] != 0) continue;
+    frame.id = get_bytes<std::uint32_t>(from, 0);
+    frame.length = from[length_at];
+    for (std::size_t k = 0; k < 8; ++k) frame.data[k] = from[data_at + k];
     return true;
   }
   return false;

@@ -52,11 +52,8 @@ bool can_receive(CanFrame& frame) {
   while (uart_read(byte)) {
     if (!reader.take(byte)) continue;
     const bool is_frame = slcan::decode(reader.line(), frame);
-    if (is_frame && listening) {
-      answer("\r");
-      return true;
-    }
-    answer(is_frame ? "\a" : answer_to(reader.line()));
+    answer(!is_frame ? answer_to(reader.line()) : listening ? "\r" : "\a");
+    if (is_frame && listening && !frame.long_id) return true;
   }
   return false;
 }

@@ -1,7 +1,7 @@
 // SLCAN, the text that cheap CAN adapters speak (Lawicel CAN232 manual): portable, for the firmware and for the host.
 //
 //   tIIILDD..\r        standard frame: 3 hex digits of id, length, data; upper case when sent, either case when received
-//   TIIIIIIIILDD..\r   29-bit frame     rIIIL\r, RIIIIIIIIL\r   remote request: well known, of no use here
+//   TIIIIIIIILDD..\r   29-bit frame, 8 digits of id      rIIIL\r, RIIIIIIIIL\r   remote request: well known, of no use here
 //   O\r, C\r           open and close the channel
 //   Sn\r, V\r, v\r, N\r, F\r   bit rate, versions, serial number, status
 //
@@ -19,14 +19,14 @@
 
 namespace bms::hal::slcan {
 
-inline constexpr std::size_t longest_frame = 1 + 3 + 1 + 16 + 1;
+inline constexpr std::size_t longest_frame = 1 + 8 + 1 + 16 + 1;
 
 /// A frame as text; the part of `text` that is in use. frame.length above 8 counts as 8.
 constexpr std::string_view encode(const CanFrame& frame, std::array<char, longest_frame>& text) {
   constexpr std::string_view hex = "0123456789ABCDEF";
   std::size_t n = 0;
-  text[n++] = 't';
-  for (int shift = 8; shift >= 0; shift -= 4) text[n++] = hex[static_cast<std::size_t>(frame.id >> shift) & 15U];
+  text[n++] = frame.long_id ? 'T' : 't';
+  for (int shift = frame.long_id ? 28 : 8; shift >= 0; shift -= 4) text[n++] = hex[static_cast<std::size_t>(frame.id >> shift) & 15U];
   const std::size_t length = frame.length < 8 ? frame.length : 8;
   text[n++] = hex[length];
   for (std::size_t k = 0; k < length; ++k) {
@@ -45,14 +45,22 @@ constexpr unsigned digit(char c) {
   return 16;
 }
 
-/// A line without its end; false: not a standard data frame.
+/// A line without its end; false: not a data frame.
 constexpr bool decode(std::string_view line, CanFrame& frame) {
-  if (line.size() < 5 || line[0] != 't') return false;
-  const unsigned high = digit(line[1]), middle = digit(line[2]), low = digit(line[3]), length = digit(line[4]);
-  if (high > 7 || middle > 15 || low > 15 || length > 8 || line.size() != 5 + 2 * length) return false;
-  CanFrame decoded{static_cast<std::uint16_t>(high << 8 | middle << 4 | low), static_cast<std::uint8_t>(length), {}};
+  if (line.empty() || (line[0] != 't' && line[0] != 'T')) return false;
+  CanFrame decoded;
+  decoded.long_id = line[0] == 'T';
+  const std::size_t before_data = decoded.long_id ? 10 : 5;
+  if (line.size() < before_data || digit(line[1]) > (decoded.long_id ? 1U : 7U)) return false;
+  for (std::size_t k = 1; k + 1 < before_data; ++k) {  // no substr(): what it may throw brings half a C library along
+    if (digit(line[k]) > 15) return false;
+    decoded.id = decoded.id << 4 | digit(line[k]);
+  }
+  const unsigned length = digit(line[before_data - 1]);
+  if (length > 8 || line.size() != before_data + 2 * length) return false;
+  decoded.length = static_cast<std::uint8_t>(length);
   for (std::size_t k = 0; k < length; ++k) {
-    const unsigned upper = digit(line[5 + 2 * k]), lower = digit(line[6 + 2 * k]);
+    const unsigned upper = digit(line[before_data + 2 * k]), lower = digit(line[before_data + 1 + 2 * k]);
     if (upper > 15 || lower > 15) return false;
     decoded.data[k] = static_cast<std::uint8_t>(upper << 4 | lower);
   }
@@ -60,18 +68,15 @@ constexpr bool decode(std::string_view line, CanFrame& frame) {
   return true;
 }
 
-/// Whether a line is a frame that decode() does not return: 29-bit or a remote request.
+/// Whether a line is a remote request, which decode() does not return.
 constexpr bool is_other_frame(std::string_view line) {
-  if (line.empty()) return false;
-  const char what = line[0];
-  if (what != 'T' && what != 'r' && what != 'R') return false;
-  const std::size_t id_digits = what == 'r' ? 3 : 8;
-  if (line.size() < 2 + id_digits) return false;
-  for (const char c : line.substr(1)) {
-    if (digit(c) > 15) return false;
+  if (line.empty() || (line[0] != 'r' && line[0] != 'R')) return false;
+  const std::size_t id_digits = line[0] == 'r' ? 3 : 8;
+  if (line.size() != 2 + id_digits) return false;
+  for (std::size_t k = 1; k < line.size(); ++k) {
+    if (digit(line[k]) > 15) return false;
   }
-  const unsigned length = digit(line[1 + id_digits]);
-  return length <= 8 && line.size() == 2 + id_digits + (what == 'T' ? 2 * length : 0) && digit(line[1]) <= (id_digits == 3 ? 7U : 1U);
+  return digit(line[1 + id_digits]) <= 8 && digit(line[1]) <= (id_digits == 3 ? 7U : 1U);
 }
 
 /// Collects bytes to lines.

@@ -3,7 +3,7 @@
 // Out: three mailboxes that the controller sends by identifier (TXFP = 0), behind them a queue of 32 frames in the same order. A more
 // urgent frame that finds all three taken has the least urgent one aborted, which goes back into the queue. Two frames of one
 // identifier are never in mailboxes together: the controller would send them by the mailbox's number, not by age.
-// In: filters for accepted_ids, the controller's FIFO of three, by interrupt into a ring of 64.
+// In: filters for accepted_ids, standard frames all of them, the controller's FIFO of three, by interrupt into a ring of 64.
 //
 // Going on the bus (32.4) and coming back after bus-off (32.7.6) are steps that service() looks at, each with a time after which it is
 // given up and tried again later; nothing here waits in a loop for the bus.
@@ -41,7 +41,7 @@ constexpr std::uint32_t mcr_inrq = 1U << 0, mcr_rflm = 1U << 3, mcr_reset = 1U <
 constexpr std::uint32_t rf_pending = 3U, rf_overrun = 1U << 4, rf_release = 1U << 5;
 constexpr std::uint32_t ier_tme = 1U << 0, ier_fmp0 = 1U << 1, ier_fov0 = 1U << 3;
 constexpr std::uint32_t esr_warning = 1U << 0, esr_passive = 1U << 1, esr_bus_off = 1U << 2;
-constexpr std::uint32_t transmit_request = 1U;
+constexpr std::uint32_t transmit_request = 1U, extended = 4U;
 constexpr std::uint32_t finished(std::uint32_t box) { return 1U << (8 * box); }
 constexpr std::uint32_t succeeded(std::uint32_t box) { return 2U << (8 * box); }
 constexpr std::uint32_t abort_request(std::uint32_t box) { return 0x80U << (8 * box); }
@@ -87,9 +87,9 @@ void take_back_finished() {
   }
 }
 
-bool in_a_mailbox(std::uint16_t id) {
+bool in_a_mailbox(const CanFrame& frame) {
   for (const Mailbox& box : mailboxes) {
-    if (box.taken && box.waiting.frame.id == id) return true;
+    if (box.taken && bxcan::arbitration(box.waiting.frame) == bxcan::arbitration(frame)) return true;
   }
   return false;
 }
@@ -101,22 +101,22 @@ void load(std::uint32_t k, const bxcan::WaitingFrame& waiting) {
   box.length_and_time = frame.length < 8 ? frame.length : 8;
   box.data_low = get_bytes<std::uint32_t>(frame.data, 0);
   box.data_high = get_bytes<std::uint32_t>(frame.data, 4);
-  box.identifier = static_cast<std::uint32_t>(frame.id) << 21 | transmit_request;
+  box.identifier = (frame.long_id ? frame.id << 3 | extended : frame.id << 21) | transmit_request;
 }
 
 /// All are taken: the least urgent frame comes back, if it is less urgent than the one that waits; at once, or after its end if it is under way.
 void make_room_for(const bxcan::WaitingFrame& waiting) {
   std::uint32_t least = 0;
   for (std::uint32_t k = 1; k < mailboxes.size(); ++k) {
-    if (mailboxes[k].waiting.frame.id > mailboxes[least].waiting.frame.id) least = k;
+    if (bxcan::arbitration(mailboxes[k].waiting.frame) > bxcan::arbitration(mailboxes[least].waiting.frame)) least = k;
   }
-  if (mailboxes[least].waiting.frame.id <= waiting.frame.id) return;
+  if (bxcan::arbitration(mailboxes[least].waiting.frame) <= bxcan::arbitration(waiting.frame)) return;
   can1_tsr() = abort_request(least);
 }
 
 void refill() {
   take_back_finished();
-  const auto may_go = [](const bxcan::WaitingFrame& w) { return !in_a_mailbox(w.frame.id); };
+  const auto may_go = [](const bxcan::WaitingFrame& w) { return !in_a_mailbox(w.frame); };
   for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
     bxcan::WaitingFrame next;
     if (mailboxes[k].taken) continue;
@@ -314,7 +314,7 @@ extern "C" void can1_rx0_interrupt() {
   if ((status & rf_pending) == 0) return;
   const stm32f4::CanMailbox& box = stm32f4::can1_receive_fifo_0();
   const std::uint32_t length = box.length_and_time & 15U;
-  CanFrame frame{static_cast<std::uint16_t>(box.identifier >> 21), static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
+  CanFrame frame{box.identifier >> 21, static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
   put_bytes<std::uint32_t>(frame.data, 0, box.data_low);
   put_bytes<std::uint32_t>(frame.data, 4, box.data_high);
   stm32f4::can1_rf0r() = rf_release;

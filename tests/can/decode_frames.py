@@ -1,6 +1,6 @@
 """Frames of random_frames, decoded by canmatrix from the DBC file, must say what went in.
 
-    random_frames SEED COUNT | decode_frames.py DBC
+    random_frames SEED COUNT [j1939] | decode_frames.py DBC
 
 The CRC is computed here a second time, bit by bit, by the polynomial's division.
 """
@@ -32,13 +32,16 @@ for line in sys.stdin:
     frame, data = frames[said["id"]], bytes.fromhex(said["data"])
     seen.add(said["id"])
     decoded = frame.decode(data)
-    identity = int(frame.attributes["E2EDataId"])
+    identity = int(frame.attributes.get("E2EDataId") or 0)
     problems = []
-    if int(decoded["Crc"].raw_value) != remainder(bytes([identity & 255, identity >> 8]) + data[1:]):
-        problems.append("Crc")
-    if int(decoded["Counter"].raw_value) != said["counter"]:
-        problems.append("Counter")
-    if set(said["values"]) | {"Crc", "Counter"} != {s.name for s in frame.signals}:
+    if identity:
+        if int(decoded["Crc"].raw_value) != remainder(bytes([identity & 255, identity >> 8]) + data[1:]):
+            problems.append("Crc")
+        if int(decoded["Counter"].raw_value) != said["counter"]:
+            problems.append("Counter")
+    elif (used := sum(((1 << s.size) - 1) << s.start_bit for s in frame.signals)) | int.from_bytes(data, "little") != (1 << 64) - 1:
+        problems.append("a bit of no signal is 0")
+    if set(said["values"]) | ({"Crc", "Counter"} if identity else set()) != {s.name for s in frame.signals}:
         problems.append("signals")
     for name, value in said["values"].items():
         signal = next(s for s in frame.signals if s.name == name)

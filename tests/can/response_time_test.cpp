@@ -22,6 +22,7 @@ TEST(ResponseTime, OfAFullBusIsNeverAndAFrameIs135BitsAtMost) {
   EXPECT_FALSE(std::isinf(response_on_the_bus_s(messages, 0, 250e3)));
   EXPECT_EQ(worst_bits(8), 135U);
   EXPECT_EQ(worst_bits(0), 55U);
+  EXPECT_EQ(worst_bits(8, true), 160U) << "of 29 bits";
   EXPECT_NEAR(load(messages, 250e3), 1.08, 1e-9);
 }
 
@@ -32,6 +33,22 @@ TEST(ResponseTime, EveryMessageOfTheFileIsInTheTable) {
   EXPECT_EQ(with_samples.size(), in_the_file + 13) << "check, current and voltage, link, eight of cells, temperatures, time";
   std::set<std::uint32_t> ids;
   for (const Message& m : with_samples) EXPECT_TRUE(ids.insert(m.id).second) << "two messages with the identifier of " << m.name;
+}
+
+TEST(ResponseTime, WithEitherProfileTheBusStaysBelow30PercentAndEveryFrameComesBeforeTheNext) {
+  constexpr double bits_per_second = 250e3;
+  const auto without = messages_on_the_bus(10, sample_to_queue_s, Cells::measured_by_another_node);
+  const auto judge = [&](Profile profile, std::size_t more, double more_bits_each_second) {
+    const auto all = messages_on_the_bus(10, sample_to_queue_s, Cells::measured_by_another_node, profile);
+    EXPECT_EQ(all.size(), without.size() + more);
+    EXPECT_LT(load(all, bits_per_second), 0.3);
+    EXPECT_NEAR(load(all, bits_per_second) - load(without, bits_per_second), more_bits_each_second / bits_per_second, 1e-9);
+    for (std::size_t k = 0; k < all.size(); ++k) EXPECT_LE(response_on_the_bus_s(all, k, bits_per_second), all[k].period_s) << all[k].name;
+    return all;
+  };
+  judge(Profile::cia418, 4, 2 * 65 + 5 * (85 + 125 + 85));
+  const auto all = judge(Profile::j1939, 6, 7 * 160);
+  for (std::size_t k = 0; k < all.size(); ++k) EXPECT_EQ(all[k].long_id, k + 6 >= all.size()) << all[k].name << ": the battery's own messages go first";
 }
 
 }  // namespace

@@ -418,7 +418,7 @@ TEST_F(BxcanBoard, AtTheLimitOfTheBusNothingIsLostAndBeyondItTheLeastUrgent) {
   const auto part = part_of_the_shift(1'000);
   const auto all = meant_of(part), first = meant_of({part[0]});
   const double sample_ms = ms_on_the_wire(all) / static_cast<double>(part.size());
-  const std::uint16_t least_urgent = std::ranges::max(all, {}, &hal::CanFrame::id).id;
+  const std::uint32_t least_urgent = std::ranges::max(all, {}, &hal::CanFrame::id).id;
   // every sample of this recording is a second after the last: all messages each time
   EXPECT_NEAR(static_cast<double>(all.size()), static_cast<double>((first.size() - 2) * part.size()), 20) << "the start is told once, a change of faults at once";
   board.run_for_ms(20);
@@ -748,6 +748,75 @@ TEST_F(BxcanBoard, ASampleIsInTheQueueWithinTheTimeThatTheAnalysisTakesForGrante
   EXPECT_LE(minute_ms, 20) << "storage/README.md";
   EXPECT_LE(board.stack_used(), 4U * 1024);
   fmt::print("a sample {:.3f} ms, one that writes to flash {:.2f} ms, stack {} bytes over {} samples\n", longest_ms, minute_ms, board.stack_used(), n);
+}
+
+/// The image with BMS_VEHICLE_PROFILE=j1939.
+TEST_F(BxcanBoard, WithTheJ1939ProfileFramesOf29BitsGoOutBehindTheOwnOnesAndTheBudgetsHold) {
+  const auto with_profile = firmware_image("stm32f405_forklift", table9(), Image::remote, "j1939");
+  const ImageSize size = size_of(with_profile);
+  EXPECT_LE(size.text + size.data, 64U * 1024);
+  EXPECT_LE(size.data + size.bss, 16U * 1024);
+  UnicornBoard other{with_profile};
+  other.flash.bytes = started_once();
+  ASSERT_TRUE(other.run_until([&] { return other.can.on_the_bus(); }, 100));
+  const auto part = part_of_the_shift(3);
+  std::vector<Input> inputs;
+  for (const Pack& p : part) inputs.push_back({p, 0, {}});
+  queue_for(other, inputs);
+  other.run_for_ms(400);
+  std::map<std::uint32_t, std::vector<hal::CanFrame>> told;
+  for (const SeenFrame& s : other.can.seen) {
+    if (s.from_board && s.frame.long_id) told[s.frame.id].push_back(s.frame);
+  }
+  EXPECT_EQ(told.size(), 6U);
+  ASSERT_EQ(told[0x19FFFD80].size(), 3U) << "a second between the samples of this recording";
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& d = told[0x19FFFD80][k].data;
+    EXPECT_EQ(d[0], 1);
+    EXPECT_EQ(d[1], 120);
+    EXPECT_NEAR(0.05 * (d[2] | d[3] << 8), 1e-6 * part[k].pack_uv, 0.0251);
+    EXPECT_NEAR(0.001 * static_cast<double>(hal::get_bytes<std::uint32_t>(d, 4)) - 2e6, -1e-6 * part[k].current_ua, 0.0011);
+  }
+  bool behind = false;
+  for (const SeenFrame& s : other.can.seen) {
+    if (!s.from_board) continue;
+    if (s.frame.long_id || s.frame.id == can::Faults::id) {
+      behind = s.frame.long_id;
+    } else {
+      EXPECT_FALSE(behind) << fmt::format("{:x} after a frame of 29 bits", s.frame.id);
+    }
+  }
+  EXPECT_EQ(other.can_health().dropped, 0U);
+  EXPECT_THAT(other.can.violations, IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(with_profile)), IsEmpty());
+  fmt::print("with the J1939 profile: flash {} bytes, RAM {} bytes\n", size.text + size.data, size.data + size.bss);
+}
+
+/// The image with BMS_VEHICLE_PROFILE=cia418.
+TEST_F(BxcanBoard, WithTheCia418ProfileAChargerHearsItsPdosAndIsAnsweredAndTheBudgetsHold) {
+  const auto with_profile = firmware_image("stm32f405_forklift", table9(), Image::remote, "cia418");
+  const ImageSize size = size_of(with_profile);
+  EXPECT_LE(size.text + size.data, 64U * 1024);
+  EXPECT_LE(size.data + size.bss, 16U * 1024);
+  UnicornBoard other{with_profile};
+  other.flash.bytes = started_once();
+  ASSERT_TRUE(other.run_until([&] { return other.can.on_the_bus(); }, 100));
+  other.can.others.push_back({wire_frame({0x601, 8, {0x40, 0x00, 0x10, 0}}), other.can.now_bit});
+  queue_for(other, {{part_of_the_shift(1)[0], 0, {}}});
+  other.run_for_ms(200);
+  std::map<std::uint32_t, hal::CanFrame> told;
+  for (const SeenFrame& s : other.can.seen) {
+    if (s.from_board) told[s.frame.id] = s.frame;
+  }
+  ASSERT_TRUE(told.contains(0x701) && told.contains(0x20A) && told.contains(0x30A) && told.contains(0x40A));
+  EXPECT_EQ(told[0x20A].length, 3);
+  EXPECT_EQ(told[0x30A].length, 7);
+  EXPECT_NEAR(hal::get_bytes<std::uint32_t>(told[0x30A].data, 3) / 1'024.0, 1e-6 * part_of_the_shift(1)[0].pack_uv, 1.0 / 1'024);
+  ASSERT_TRUE(told.contains(0x581)) << "the filters let the request in";
+  EXPECT_EQ(told[0x581].data[4], 0xA2);
+  EXPECT_THAT(other.can.violations, IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(with_profile)), IsEmpty());
+  fmt::print("with the CiA 418 profile: flash {} bytes, RAM {} bytes\n", size.text + size.data, size.data + size.bss);
 }
 
 TEST_F(BxcanBoard, FitsIntoItsBudgetsOfFlashRamAndStack) {

@@ -10,7 +10,7 @@ namespace {
 constexpr unsigned stuff_error = 1, acknowledge_error = 3, bit_dominant_error = 5, crc_error = 6;  // CAN_ESR, LEC
 constexpr unsigned error_frame_bits = 6 + 8 + 3, suspend_bits = 8;                               // flag, delimiter, intermission; ISO 11898-1, 10.4.4 and 10.9
 
-hal::CanFrame standard(const WireFrame& f) { return {static_cast<std::uint16_t>(f.id), f.length, f.data}; }
+hal::CanFrame classic(const WireFrame& f) { return {f.id, f.length, f.data, f.extended}; }
 
 /// Lower wins: identifier, then RTR, then IDE as the bits come.
 std::uint64_t arbitration_field(const WireFrame& f) {
@@ -20,7 +20,7 @@ std::uint64_t arbitration_field(const WireFrame& f) {
 
 }  // namespace
 
-WireFrame wire_frame(const hal::CanFrame& frame) { return {frame.id, false, false, frame.length, frame.data}; }
+WireFrame wire_frame(const hal::CanFrame& frame) { return {frame.id, frame.long_id, false, frame.length, frame.data}; }
 
 unsigned bits_on_the_wire(const WireFrame& f) {
   std::vector<int> bits;
@@ -257,7 +257,7 @@ void BxcanModel::start_frame() {
   WireFrame ours{};
   if (box >= 0) {
     const Mailbox& m = mailboxes_[static_cast<std::size_t>(box)];
-    ours = {m.tir >> 21, (m.tir & 4) != 0, (m.tir & 2) != 0, static_cast<std::uint8_t>(m.tdtr & 15), {}};
+    ours = {(m.tir & 4) != 0 ? m.tir >> 3 : m.tir >> 21, (m.tir & 4) != 0, (m.tir & 2) != 0, static_cast<std::uint8_t>(m.tdtr & 15), {}};
     for (unsigned k = 0; k < 8; ++k) ours.data[k] = static_cast<std::uint8_t>((k < 4 ? m.tdlr : m.tdhr) >> (8 * (k % 4)));
   }
   const bool board_wins = box >= 0 && (other == others.end() || arbitration_field(ours) < arbitration_field(other->frame));
@@ -298,7 +298,7 @@ void BxcanModel::end_frame() {
     if (tec_ > 0) --tec_;
     lec_ = 0;
     if (tec_ >= 128) suspended_bits_ = suspend_bits;
-    seen.push_back({standard(other_.frame), true, begun_bit_, now_bit});
+    seen.push_back({classic(other_.frame), true, begun_bit_, now_bit});
     return;
   }
   if (!other_sends_) return;
@@ -308,7 +308,7 @@ void BxcanModel::end_frame() {
     others.push_front(other_);  // its sender tries again
     return;
   }
-  seen.push_back({standard(other_.frame), false, begun_bit_, now_bit});
+  seen.push_back({classic(other_.frame), false, begun_bit_, now_bit});
   if (!on_the_bus()) return;
   lec_ = 0;
   rec_ = rec_ > 127 ? 120 : rec_ > 0 ? rec_ - 1 : 0;

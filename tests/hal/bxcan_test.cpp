@@ -86,6 +86,33 @@ TEST(FilterBanks, HoldEachIdentifierOnceInBits15To5AndRepeatTheLast) {
   EXPECT_EQ(banks[1].fr2, 0x00200020U);
 }
 
+/// ISO 11898-1, 10.4.2, bit by bit: eleven bits, then RTR and IDE of a standard frame (both 0), SRR and IDE of a long one (both 1) and its other eighteen.
+TEST(TransmitQueue, GivesFramesOfBothKindsInTheOrderOfTheWire) {
+  const auto on_the_wire = [](const CanFrame& f) {
+    std::vector<int> bits;
+    for (int k = 10; k >= 0; --k) bits.push_back(static_cast<int>((f.long_id ? f.id >> 18 : f.id) >> k & 1));
+    bits.insert(bits.end(), 2, f.long_id ? 1 : 0);
+    for (int k = 17; k >= 0; --k) bits.push_back(f.long_id ? static_cast<int>(f.id >> k & 1) : 0);
+    return bits;
+  };
+  std::mt19937 random(3);
+  TransmitQueue<32> queue;
+  std::vector<CanFrame> expected;
+  for (std::uint32_t k = 0; k < 32; ++k) {
+    const std::uint32_t base = 0x67E + static_cast<std::uint32_t>(random() % 3);
+    CanFrame f{k % 2 == 0 ? base : base << 18 | static_cast<std::uint32_t>(random() % (1U << 18)), 0, {}, k % 2 != 0};
+    f.data[0] = static_cast<std::uint8_t>(k);
+    expected.push_back(f);
+    ASSERT_TRUE(queue.insert({f, k}));
+  }
+  std::stable_sort(expected.begin(), expected.end(), [&](const CanFrame& a, const CanFrame& b) { return on_the_wire(a) < on_the_wire(b); });
+  for (const CanFrame& f : expected) {
+    WaitingFrame out;
+    ASSERT_TRUE(queue.take(out, [](const WaitingFrame&) { return true; }));
+    EXPECT_EQ(out.frame.data[0], f.data[0]);
+  }
+}
+
 /// A reference that holds everything and sorts.
 TEST(TransmitQueue, GivesTheMostUrgentAndOfOneIdentifierTheOldestWhateverComes) {
   TransmitQueue<8> queue;

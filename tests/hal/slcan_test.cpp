@@ -21,26 +21,30 @@ TEST(Slcan, WritesWhatTheManualShows) {
   EXPECT_EQ(encoded({0x100, 0, {}}), "t1000\r");
   EXPECT_EQ(encoded({0x10, 2, {0x11, 0x22}}), "t01021122\r");
   EXPECT_EQ(encoded({0x7FF, 8, {0xDE, 0xAD, 0xBE, 0xEF, 0, 1, 2, 3}}), "t7FF8DEADBEEF00010203\r");
+  EXPECT_EQ(encoded({0x100, 0, {}, true}), "T000001000\r");
+  EXPECT_EQ(encoded({0x10, 2, {0x11, 0x22}, true}), "T0000001021122\r");
 }
 
 TEST(Slcan, EveryFrameComesBack) {
   std::mt19937_64 random(1);
   for (int run = 0; run < 10'000; ++run) {
-    CanFrame sent{static_cast<std::uint16_t>(random() % 2048), static_cast<std::uint8_t>(random() % 9), {}};
+    const bool long_id = run % 3 == 0;
+    CanFrame sent{static_cast<std::uint32_t>(random() % (long_id ? 1U << 29 : 1U << 11)), static_cast<std::uint8_t>(random() % 9), {}, long_id};
     for (std::size_t k = 0; k < sent.length; ++k) sent.data[k] = static_cast<std::uint8_t>(random());
     std::string text = encoded(sent);
     text.pop_back();
-    if (run % 2 == 0) std::transform(text.begin(), text.end(), text.begin(), [](char c) { return static_cast<char>(std::tolower(c)); });
+    if (run % 2 == 0) std::transform(text.begin() + 1, text.end(), text.begin() + 1, [](char c) { return static_cast<char>(std::tolower(c)); });
     CanFrame received;
     ASSERT_TRUE(slcan::decode(text, received)) << text;
     ASSERT_EQ(received.id, sent.id);
+    ASSERT_EQ(received.long_id, sent.long_id);
     ASSERT_EQ(received.length, sent.length);
     ASSERT_EQ(received.data, sent.data);
   }
 }
 
 TEST(Slcan, RefusesWhatIsNoFrameAndLeavesTheLastOneAlone) {
-  for (const char* line : {"", "t", "t100", "t1009", "t10021", "t1002112", "t100211223", "t8001", "t80000", "tG000", "t1001G1", "t1001 1", "T1000", "r1000", "x1000"}) {
+  for (const char* line : {"", "t", "t100", "t1009", "t10021", "t1002112", "t100211223", "t8001", "t80000", "tG000", "t1001G1", "t1001 1", "T1000", "T00000100", "T200000000", "T0000010G0", "T0000010011", "T0000010011122", "r1000", "x1000"}) {
     CanFrame frame{0x123, 1, {7}};
     EXPECT_FALSE(slcan::decode(line, frame)) << line;
     EXPECT_EQ(frame.id, 0x123);

@@ -6,9 +6,11 @@
 #include <random>
 #include <set>
 
+#include "j1939_messages.hpp"
 #include "monitor/history.hpp"
 #include "monitor/pack_view.hpp"
 #include "monitor/results.hpp"
+#include "monitor/screen.hpp"
 #include "tests/monitor/traffic.hpp"
 
 namespace bms::monitor {
@@ -57,8 +59,8 @@ TEST(BusState, AValueThatIsSentAsNotKnownIsNotKnown) {
   EXPECT_EQ(pack_view(bus).soc_quality.text, "not known");
 }
 
-TEST(BusState, EachMessageOfTheDbcFileIsThereWithWordsUnitsAndComments) {
-  std::set<int> ids;
+TEST(BusState, EachMessageOfTheDbcFilesIsThereWithWordsUnitsAndComments) {
+  std::set<std::uint32_t> ids;
   for (const MessageInfo& m : messages()) {
     ids.insert(m.id);
     EXPECT_FALSE(m.signals.empty()) << m.name;
@@ -184,6 +186,38 @@ TEST(BusState, FramesOfOtherKindsAreCountedAndNotDecoded) {
   EXPECT_EQ(bus.unknown_frames(), 1U);
 }
 
+TEST(BusState, AFrameOf29BitsOfTheProfileIsNamedAndReadWithoutCounterOrCrc) {
+  BusState bus;
+  BusFrame frame;  // DC_SOURCE_STATUS_1 by hand: 52.8 V, 12.345 A out
+  frame.kind = FrameKind::extended;
+  frame.long_id = true;
+  frame.id = 0x19FFFD80;
+  frame.length = 8;
+  frame.data = {1, 120, 0x20, 0x04, 0x39, 0xC4, 0x35, 0x77};
+  for (int k = 0; k < 3; ++k) {
+    frame.time_us = k * second_us;
+    EXPECT_EQ(bus.take(frame), BusState::find("DcSourceStatus1")) << "the same bytes again are news where nothing counts";
+  }
+  EXPECT_EQ(bus.good(), 3U);
+  EXPECT_EQ(bus.unknown_frames(), 0U);
+  EXPECT_NEAR(bus.reading("DcSourceStatus1", "Voltage").value, 52.8, 1e-9);
+  EXPECT_NEAR(bus.reading("DcSourceStatus1", "Current").value, 12.345, 1e-9) << "32 bits: not through a float";
+  EXPECT_EQ(state(bus, "DcSourceStatus1").repeated, 0U);
+  EXPECT_THAT(json_of(bus, {}), HasSubstr("\"DcSourceStatus1\""));
+  EXPECT_THAT(plain_text(screen(bus, {}, {120, 40})), HasSubstr("DcSourceStatus1"));
+  for (std::size_t k = 4; k < 8; ++k) frame.data[k] = 0xFF;
+  bus.take(frame);
+  EXPECT_FALSE(bus.reading("DcSourceStatus1", "Current").known());
+  frame.length = 7;
+  bus.take(frame);
+  EXPECT_EQ(state(bus, "DcSourceStatus1").wrong_length, 1U);
+  frame.kind = FrameKind::standard;
+  frame.long_id = false;
+  frame.id &= 0x7FF;
+  bus.take(frame);
+  EXPECT_EQ(bus.unknown_frames(), 1U) << "its lower eleven bits are another message";
+}
+
 TEST(BusState, IsCompleteWhenASampleAndASecondOfItWereHeard) {
   Traffic traffic(0);
   BusState bus;
@@ -205,12 +239,13 @@ TEST(BusState, AnyFramesDoNoHarm) {
     BusFrame frame;
     frame.time_us = static_cast<std::int64_t>(random() % 100'000'000'000'000'000);
     frame.kind = static_cast<FrameKind>(random() % 5);
-    frame.id = static_cast<std::uint32_t>(frame.kind == FrameKind::standard ? 0x180 + random() % 16 : random() % 0x1FFFFFFF);
+    frame.id = static_cast<std::uint32_t>(frame.kind == FrameKind::standard ? 0x180 + random() % 16 : run % 4 == 0 ? can::j1939::DcSourceStatus1::id : random() % 0x1FFFFFFF);
+    frame.long_id = frame.kind == FrameKind::extended;
     frame.length = static_cast<std::uint8_t>(random() % 9);
     for (std::uint8_t& byte : frame.data) byte = static_cast<std::uint8_t>(random());
     if (frame.kind == FrameKind::standard && random() % 2 == 0) {  // right in all but its values
       for (const MessageInfo& m : messages()) {
-        if (m.id != frame.id) continue;
+        if (m.id != frame.id || m.long_id) continue;
         hal::CanFrame whole = classic(frame);
         whole.length = 8;
         can::protect(whole, m.data_id, static_cast<std::uint8_t>(random() % 15));
