@@ -63,7 +63,8 @@ add_custom_command(OUTPUT ${cell_header}
 
 add_compile_options(${BMS_CPU_FLAGS} -g -ffunction-sections -fdata-sections -fno-common -fstack-usage
   $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions> $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> $<$<COMPILE_LANGUAGE:CXX>:-fno-threadsafe-statics> $<$<COMPILE_LANGUAGE:CXX>:-fno-use-cxa-atexit>
-  -Wsign-conversion -Wdouble-promotion -Wfloat-conversion)
+  -Wsign-conversion -Wdouble-promotion -Wfloat-conversion
+  -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=build)  # the same bytes wherever it is built; what comes last is looked at first
 add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs
   -Wl,--gc-sections,--no-warn-rwx-segments,--fatal-warnings)
 
@@ -113,7 +114,7 @@ function(bms_image name)
   list(TRANSFORM ARGN PREPEND "$<TARGET_OBJECTS:" OUTPUT_VARIABLE objects)
   list(TRANSFORM objects APPEND ">")
   add_executable(${name} ${objects})
-  target_link_options(${name} PRIVATE -T${linker_script} -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
+  target_link_options(${name} PRIVATE -T${linker_script} -Wl,--undefined=image_cell_hash -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
   set_target_properties(${name} PROPERTIES LINK_DEPENDS ${linker_script} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
 endfunction()
 

@@ -1,5 +1,11 @@
 #include "firmware/board_cell.hpp"
 
+/// For who holds an image and asks which cell file it was built with; on CAN it is in the message Identity.
+extern "C" {
+extern const std::uint32_t image_cell_hash;
+constexpr std::uint32_t image_cell_hash = bms::generated::cell_hash;
+}
+
 namespace bms {
 
 // flatten: with everything inline the cell is a constant, which saves one instruction in seven
@@ -9,6 +15,6 @@ namespace bms {
 
 float capacity_ah() { return static_cast<float>(generated::parameters.capacity_ah); }
 
-messages::Identity identity() { return {.cell_hash = generated::cell_hash, .version = BMS_VERSION}; }
+messages::Identity identity() { return {.cell_hash = image_cell_hash, .version = BMS_VERSION}; }
 
 }  // namespace bms

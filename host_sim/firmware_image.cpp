@@ -4,6 +4,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <regex>
 #include <stdexcept>
@@ -54,6 +55,7 @@ const char* ending(Image image) {
     case Image::remote: return "_remote";
     case Image::replay: return "_replay";
     case Image::hil: return "_hil";
+    case Image::bench: return "_bench";
     case Image::fault: return "_fault";
     case Image::pack: return "_pack";
     case Image::protection: return "_protection";
@@ -63,13 +65,26 @@ const char* ending(Image image) {
 
 }  // namespace
 
-std::size_t board_cells(const std::string& board) {
-  static const std::regex cells("set\\(BMS_CELLS ([0-9]+)\\)");
+std::vector<std::string> board_names() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(source_tree() / "boards")) {
+    if (std::filesystem::exists(entry.path() / "board.cmake")) names.push_back(entry.path().filename());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string board_setting(const std::string& board, const std::string& name) {
+  const std::regex line("(^|\n)set\\(" + name + " ([^ )]*)\\)");
   const std::string text = read_file(board_file(board));
   std::smatch found;
-  if (!std::regex_search(text, found, cells)) throw std::runtime_error("no BMS_CELLS in " + board_file(board).string());
-  return std::stoul(found[1]);
+  if (!std::regex_search(text, found, line)) throw std::runtime_error("no " + name + " in " + board_file(board).string());
+  return found[2];
 }
+
+Image chip_image(const std::string& board) { return board_setting(board, "BMS_EMULATED") == "ON" ? Image::bench : Image::application; }
+
+std::size_t board_cells(const std::string& board) { return std::stoul(board_setting(board, "BMS_CELLS")); }
 
 std::filesystem::path firmware_image(const std::string& board, const CellFile& cell, Image image, const std::string& vehicle_profile) {
   const auto root = source_tree();

@@ -1,5 +1,6 @@
 // Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on the board;
-// with "board": writes that and the keys of mechanisms, nothing of recordings and speeds; with "protection": only what protection costs.
+// with "board": writes that and the keys of mechanisms, nothing of recordings and speeds; with "protection": only what protection costs, with "budgets": only
+// flash, RAM and stack of the boards.
 //
 // Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
 #include <algorithm>
@@ -25,6 +26,7 @@
 #include "identification/identify.hpp"
 #include "tests/figures/duty.hpp"
 #include "tests/figures/soc_trials.hpp"
+#include "tests/firmware/board_budget.hpp"
 #include "tests/firmware/step_cost.hpp"
 
 namespace bms {
@@ -245,6 +247,7 @@ void write_board() {
   replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
   replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
   replace_figures(source / "model/cells/README.md", "mechanisms", mechanism_tables());
+  replace_figures(source / "boards/README.md", "budgets", board_table());
 }
 
 void run() {
@@ -270,6 +273,7 @@ int main(int argc, char** argv) {
   try {
     if (argc > 1 && std::string_view(argv[1]) == "step") fmt::print("{}\n{}", bms::step_cost(), bms::mechanism_cost());
     else if (argc > 1 && std::string_view(argv[1]) == "board") bms::write_board();
+    else if (argc > 1 && std::string_view(argv[1]) == "budgets") bms::replace_figures(bms::source / "boards/README.md", "budgets", bms::board_table());
     else if (argc > 1 && std::string_view(argv[1]) == "protection") bms::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
     else bms::run();
     return 0;

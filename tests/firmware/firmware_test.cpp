@@ -6,6 +6,7 @@
 #include "host_sim/cell_file.hpp"
 #include "host_sim/committed_figures.hpp"
 #include "host_sim/firmware_image.hpp"
+#include "host_sim/image_file.hpp"
 #include "host_sim/recording.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/text_file.hpp"
@@ -120,6 +121,11 @@ TEST(SlcanBoard, TellsWhichCellFileItHolds) {
   board.send_sample(0, 0, 3'300'000, 2500);
   const std::string identity = board.read_until("t1838");
   EXPECT_EQ(identity.substr(9, 8), fmt::format("{:02X}{:02X}{:02X}{:02X}", cell.hash & 255, cell.hash >> 8 & 255, cell.hash >> 16 & 255, cell.hash >> 24));
+  const ImageFile file(image(Image::application));
+  std::uint32_t in_the_image = 0;
+  std::memcpy(&in_the_image, file.at(file.symbol("image_cell_hash"), sizeof in_the_image).data(), sizeof in_the_image);
+  EXPECT_EQ(in_the_image, cell.hash);
+  EXPECT_EQ(fmt::format("{:08x}", in_the_image), sha256(cell.text).substr(0, 8));
   EXPECT_EQ(identity.substr(17), "0100");  // 0.1.0, minor before major
   EXPECT_EQ(identity[7], '0') << "patch";
 }

@@ -23,8 +23,8 @@ struct BoardTelemetry {
 
 class SlcanBoard {
  public:
-  /// arguments: the program's; the first is the file that is its flash for data.
-  explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {});
+  /// arguments: the program's; the first is the file that is its flash for data. more: options of the emulator.
+  explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {}, const std::vector<std::string>& more = {});
   ~SlcanBoard();
   SlcanBoard(const SlcanBoard&) = delete;
   SlcanBoard& operator=(const SlcanBoard&) = delete;

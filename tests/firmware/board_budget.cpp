@@ -1,0 +1,126 @@
+#include "tests/firmware/board_budget.hpp"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "hal/sample_frames.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/emulator.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "host_sim/image_file.hpp"
+#include "host_sim/recording.hpp"
+#include "host_sim/replay.hpp"
+#include "host_sim/text_file.hpp"
+#include "tests/firmware/elf_image.hpp"
+#include "tests/firmware/slcan_board.hpp"
+#include "tests/firmware/stack_depth.hpp"
+#include "tests/firmware/unicorn_board.hpp"
+
+namespace bms {
+
+namespace {
+
+std::vector<Sample> two_minutes() {
+  const auto all = samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  return {all.begin() + 3000, all.begin() + 3125};
+}
+
+std::uint32_t deepest_in_unicorn(const std::string& board_name) {
+  UnicornBoard board(firmware_image(board_name, read_cell("table9"), Image::remote));
+  if (!board.run_until([&] { return board.can.on_the_bus(); }, 3'000)) throw std::runtime_error(board_name + " does not come up");
+  std::uint16_t counter = 0;
+  for (const Sample& s : two_minutes()) {
+    PackSample<16> pack;
+    pack.time_us = s.time_us;
+    pack.current_ua = s.current_ua;
+    pack.cell_uv.fill(s.voltage_uv);
+    pack.pack_uv = 16 * s.voltage_uv;
+    pack.temperature_cdegc.fill(s.temperature_cdegc);
+    const unsigned fed = board.watchdog_feeds;
+    for (const hal::CanFrame& frame : hal::frames_of(pack, 0, counter++)) {
+      board.can.deliver(frame);
+      if (!board.run_until([&] { return !board.can.receive_interrupt(); }, 1)) throw std::runtime_error(board_name + " takes no frame");
+    }
+    if (!board.run_until([&] { return board.watchdog_feeds > fed; }, 100)) throw std::runtime_error(board_name + " does not end a sample");
+    board.run_for_ms(15);
+  }
+  return board.stack_used();
+}
+
+/// The emulator's memory from `begin` on, by its monitor at the socket.
+std::string memory_of(const std::filesystem::path& monitor, std::uint32_t begin, std::uint32_t size, const std::filesystem::path& file) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, monitor.c_str(), sizeof address.sun_path - 1);
+  const int line = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const std::string command = fmt::format("pmemsave {:#x} {:#x} \"{}\"\nquit\n", begin, size, file.string());
+  const bool said = connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 && send(line, command.data(), command.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(command.size());
+  for (char c = 0; said && recv(line, &c, 1, 0) > 0;) continue;  // until it has quit
+  close(line);
+  const std::string memory = said ? read_file(file) : "";
+  if (memory.size() != size) throw std::runtime_error("no memory from the emulator's monitor");
+  return memory;
+}
+
+/// The emulator's RAM is all zero when it starts: from the end of the static part up the first word that is not.
+std::uint32_t deepest_in_qemu(const std::string& board_name) {
+  const auto image = firmware_image(board_name, read_cell("table9"), Image::application);
+  const TemporaryFolder folder;
+  const auto monitor = folder.path() / "monitor";
+  SlcanBoard board(image, {}, {"-chardev", "socket,id=monitor,server=on,wait=off,path=" + monitor.string(), "-mon", "monitor"});
+  board.read();
+  board.write("S6\rO\r");
+  for (const Sample& s : two_minutes()) {
+    board.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
+    board.telemetry();
+  }
+  board.send_sample(two_minutes().back().time_us + 1'000'000, 0, 3'300'000, 2500);  // it has written the record when it answers
+  board.telemetry();
+  const ImageFile file(image);
+  const std::uint32_t top = file.symbol("image_stack_top"), bottom = file.symbol("image_ram_begin");
+  const std::string memory = memory_of(monitor, bottom, top - bottom, folder.path() / "ram");
+  const ImageSize size = size_of(image);
+  std::size_t free = (size.data + size.bss + 64) / 4 * 4;
+  while (free + 4 <= memory.size() && memory.compare(free, 4, std::string(4, '\0')) == 0) free += 4;
+  return static_cast<std::uint32_t>(memory.size() - free);
+}
+
+}  // namespace
+
+BoardBudget budget_of(const std::string& board) {
+  const auto bytes = [&](const char* name) { return std::stoull(board_setting(board, name)); };
+  return {bytes("BMS_BUDGET_FLASH"), bytes("BMS_BUDGET_RAM"), bytes("BMS_BUDGET_STACK")};
+}
+
+BoardFigures figures_of(const std::string& board) {
+  const auto image = firmware_image(board, read_cell("table9"), chip_image(board));
+  const ImageSize size = size_of(image);
+  return {size.text + size.data, size.data + size.bss, stack_depth(image).worst(), 0};
+}
+
+std::uint64_t measured_stack(const std::string& board) {
+  const auto& emulated = emulated_boards();
+  if (board_setting(board, "BMS_EMULATED") == "OFF") return board_setting(board, "BMS_CAN") == "bxcan" ? deepest_in_unicorn(board) : 0;
+  return emulated.front().name == board ? deepest_in_qemu(board) : 0;
+}
+
+std::string board_table() {
+  std::string table = "| board | flash [bytes] | of | static RAM [bytes] | of | stack, worst [bytes] | of | stack, measured [bytes] |\n|---|---|---|---|---|---|---|---|\n";
+  for (const std::string& board : board_names()) {
+    const BoardFigures f = figures_of(board);
+    const BoardBudget b = budget_of(board);
+    const std::uint64_t measured = measured_stack(board);
+    table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", board, f.flash, b.flash, f.ram, b.ram, f.stack_worst, b.stack, measured > 0 ? std::to_string(measured) : "-");
+  }
+  return table;
+}
+
+}  // namespace bms

@@ -1,0 +1,118 @@
+// Flash, RAM and stack of every board in boards/ against its budget, and the way the stack's depth is found.
+#include <regex>
+
+#include <gtest/gtest.h>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/committed_figures.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "host_sim/text_file.hpp"
+#include "tests/firmware/board_budget.hpp"
+#include "tests/firmware/stack_depth.hpp"
+
+namespace bms {
+namespace {
+
+class Budgets : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Budgets, HoldTheImageOfTheChip) {
+  const BoardFigures f = figures_of(GetParam());
+  const BoardBudget budget = budget_of(GetParam());
+  EXPECT_LE(f.flash, budget.flash);
+  EXPECT_LE(f.ram, budget.ram);
+  EXPECT_LE(f.stack_worst, budget.stack);
+  const CommittedFigures flash(BMS_SOURCE_DIR "/boards/README.md", "budgets");
+  ASSERT_TRUE(flash.has(GetParam())) << "boards/README.md: ./bms figures writes its row";
+  EXPECT_LE(static_cast<double>(f.flash), 1.05 * flash.at(GetParam())) << "./bms figures if it is worth it";
+}
+
+TEST_P(Budgets, MeasuredStackIsNoDeeperThanTheWorstAndNotFarFromIt) {
+  const std::uint64_t measured = measured_stack(GetParam());
+  if (measured == 0) GTEST_SKIP() << "no emulator runs the image of " << GetParam() << " without a program beside it";
+  const std::uint64_t worst = figures_of(GetParam()).stack_worst;
+  EXPECT_LE(measured, worst);
+  EXPECT_GT(3 * measured, worst) << "what was measured did not go where it is deep";
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Budgets, ::testing::ValuesIn(board_names()), [](const auto& board) { return board.param; });
+
+TEST(ForkliftBudgets, Are64KilobytesOfFlashAnd16OfRam) {
+  const BoardBudget b = budget_of("stm32f405_forklift");
+  EXPECT_EQ(b.flash, 64U * 1024);
+  EXPECT_EQ(b.ram, 16U * 1024);
+}
+
+// instructions as objdump prints them
+const std::string main_calls_two = R"(
+08000000 <main>:
+ 8000000:	b530      	push	{r4, r5, lr}
+ 8000002:	b086      	sub	sp, #24
+ 8000004:	f000 f800 	bl	8000100 <leaf()>
+ 8000008:	d001      	beq.n	800000e <main+0xe>
+ 800000a:	f000 f800 	bl	8000200 <deep(int)>
+ 800000e:	b006      	add	sp, #24
+ 8000010:	bd30      	pop	{r4, r5, pc}
+
+08000100 <leaf()>:
+ 8000100:	4770      	bx	lr
+
+08000200 <deep(int)>:
+ 8000200:	ed2d 8b04 	vpush	{d8-d9}
+ 8000204:	f84d ed08 	str.w	lr, [sp, #-8]!
+ 8000208:	f000 f800 	bl	8000100 <leaf()>
+ 800020c:	f85d eb08 	ldr.w	lr, [sp], #8
+ 8000210:	ecbd 8b04 	vpop	{d8-d9}
+ 8000214:	4770      	bx	lr
+)";
+
+TEST(StackDepth, IsTheDeepestWayThroughTheCalls) {
+  const Functions functions = functions_of(main_calls_two);
+  EXPECT_EQ(functions.at(0x8000000).stack, 36U);
+  EXPECT_EQ(functions.at(0x8000200).stack, 24U);
+  const Depth d = depth_from(functions, 0x8000000, {});
+  EXPECT_EQ(d.bytes, 60U);
+  EXPECT_EQ(d.way, (std::vector<std::string>{"main", "deep(int)", "leaf()"}));
+}
+
+TEST(StackDepth, CountsACallAfterThePrologueIsTakenBackAsDeepAsBefore) {
+  const Functions f = functions_of("08000000 <f>:\n 8000000:\tb510\tpush\t{r4, lr}\n 8000002:\td001\tbeq.n\t8000008 <f+0x8>\n 8000004:\tbd10\tpop\t{r4, pc}\n 8000008:\tb084\tsub\tsp, #16\n");
+  EXPECT_EQ(f.at(0x8000000).stack, 24U);
+}
+
+TEST(StackDepth, TakesALargeFrameOfTheCortexM0) {
+  const Functions f = functions_of("00000000 <f>:\n   0:\tb510\tpush\t{r4, lr}\n   2:\t4c01\tldr\tr4, [pc, #4]\t@ (8 <f+0x8>)\n   4:\t44a5\tadd\tsp, r4\n   6:\tbd10\tpop\t{r4, pc}\n   8:\tfffffdf8 \t.word\t0xfffffdf8\n");
+  EXPECT_EQ(f.at(0).stack, 8U + 0x208);
+}
+
+TEST(StackDepth, RefusesWhatItCannotTell) {
+  const Functions pointer = functions_of("00000000 <f>:\n   0:\t4798\tblx\tr3\n   2:\t4770\tbx\tlr\n");
+  EXPECT_THROW(depth_from(pointer, 0, {}), std::runtime_error);
+  EXPECT_EQ(depth_from(pointer, 0, {{"f", {}}}).bytes, 0U);
+  const Functions itself = functions_of("00000000 <f>:\n   0:\tb510\tpush\t{r4, lr}\n   2:\tf7ff\tbl\t0 <f>\n   6:\tbd10\tpop\t{r4, pc}\n");
+  EXPECT_THROW(depth_from(itself, 0, {}), std::runtime_error);
+  EXPECT_THROW(functions_of("00000000 <f>:\n   0:\t4798\tsub.w\tsp, sp, r3\n"), std::runtime_error);
+}
+
+/// The compiler's own figure (-fstack-usage) of every function that it knows, of the same image.
+TEST(StackDepth, OfAFunctionIsWhatTheCompilerSays) {
+  const auto image = firmware_image("stm32f405_forklift", read_cell("table9"), Image::application);
+  std::map<std::string, std::uint32_t> compiler;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(image.parent_path() / "CMakeFiles")) {
+    if (entry.path().extension() != ".su") continue;
+    static const std::regex line("[^\\n]*?:[0-9]+:[0-9]+:([^\\t]*)\\t([0-9]+)\\tstatic");
+    const std::string text = read_file(entry.path());
+    for (std::sregex_iterator it(text.begin(), text.end(), line), end; it != end; ++it) compiler[(*it)[1]] = static_cast<std::uint32_t>(std::stoul((*it)[2]));
+  }
+  std::size_t compared = 0;
+  for (const auto& [address, f] : functions_of(output_of({"arm-none-eabi-objdump", "--disassemble", "--demangle", image.string()}))) {
+    const auto known = std::find_if(compiler.begin(), compiler.end(), [&](const auto& c) { return c.first == f.name || c.first.ends_with(" " + f.name); });
+    if (known == compiler.end()) continue;
+    EXPECT_EQ(f.stack, known->second) << f.name;
+    ++compared;
+  }
+  EXPECT_GT(compared, 40U);
+}
+
+}  // namespace
+}  // namespace bms
