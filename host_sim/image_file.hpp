@@ -24,6 +24,7 @@ class ImageFile {
   const std::vector<LoadedPart>& parts() const { return parts_; }
   /// Bytes that the file has for this place. Throws where it has none.
   std::string at(std::uint32_t address, std::size_t size) const;
+  bool has_symbol(const std::string& name) const { return symbols_.contains(name); }
   /// Value of a symbol.
   std::uint32_t symbol(const std::string& name) const;
   /// Bytes of a section.

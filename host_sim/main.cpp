@@ -11,6 +11,7 @@
 #include "host_sim/cell_file.hpp"
 #include "host_sim/command_diagnose.hpp"
 #include "host_sim/command_experiment.hpp"
+#include "host_sim/command_flash.hpp"
 #include "host_sim/command_hil.hpp"
 #include "host_sim/command_identify.hpp"
 #include "host_sim/command_monitor.hpp"
@@ -153,6 +154,16 @@ void add_hil(CLI::App& app, bms::HilOptions& o) {
   add_output(c, o.output);
 }
 
+void add_flash(CLI::App& app, bms::FlashOptions& o) {
+  CLI::App& c = *app.add_subcommand("flash", "Build a board's firmware and write it onto the chip with OpenOCD, compare, reset; the stored records stay");
+  c.footer("Example: bms flash --board stm32f405_forklift --cell my_cell.toml");
+  c.add_option("--board", o.board, "folder in boards/")->capture_default_str();
+  c.add_option("--cell", o.cell, "cell file, or the name of a built-in cell; the board's own if not given")->type_name("CELL");
+  c.add_option("--probe", o.probe, "debug probe: stlink, cmsis-dap, jlink... (OpenOCD's interface/); the board's own if not given");
+  c.add_option("--serial", o.serial, "serial number of the probe, where there are several");
+  c.add_flag("--dry-run", o.dry_run, "build, and print OpenOCD's command instead of running it");
+}
+
 void add_proof(CLI::App& app, bms::ProofOptions& o) {
   CLI::App& c = *app.add_subcommand("proof", "Set what the diagnosis says of real recordings beside measurements that it did not see; takes minutes");
   c.footer("Experiments: " + bms::proof_list_text() + "\nExample: bms proof --data recordings_of_a123 --report proof.html");
@@ -211,6 +222,8 @@ int main(int argc, char** argv) {
   add_study(app, study);
   bms::DiagnoseOptions diagnose;
   add_diagnose(app, diagnose);
+  bms::FlashOptions flash;
+  add_flash(app, flash);
   bms::ProofOptions proof;
   add_proof(app, proof);
   bms::HilOptions hil;
@@ -223,6 +236,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("simulate")) return run(simulate, simulate.out);
     if (app.got_subcommand("identify")) return run(identify, identify.out);
     if (app.got_subcommand("diagnose")) return run(diagnose, diagnose.out);
+    if (app.got_subcommand("flash")) return bms::run(flash);
     if (app.got_subcommand("proof")) return run(proof, "");
     if (app.got_subcommand("hil")) return run(hil, hil.candump);
     if (app.got_subcommand("monitor")) {

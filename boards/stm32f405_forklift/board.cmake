@@ -15,3 +15,6 @@ set(BMS_SAMPLES bq76952)
 set(BMS_BUDGET_FLASH 65536)
 set(BMS_BUDGET_RAM 16384)
 set(BMS_BUDGET_STACK 4096)
+# ./bms flash: OpenOCD's interface/ and target/
+set(BMS_PROBE stlink)
+set(BMS_PROBE_TARGET stm32f4x)
