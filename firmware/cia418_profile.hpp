@@ -136,7 +136,7 @@ constexpr bool apart_from_the_own() {
   }
   return apart;
 }
-static_assert(apart_from_the_own(), "BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER: two nodes of 1 to 127, whose PDOs are no message of the battery (a charger of 16 to 31 is)");
+static_assert(apart_from_the_own(), "BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER: two nodes of 1 to 127, whose PDOs are no message of the battery (of a charger of 16 to 29 one is)");
 
 }  // namespace cia418
 

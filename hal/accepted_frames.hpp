@@ -29,9 +29,9 @@ inline constexpr std::array<std::uint16_t, 0> profile_ids{};
 
 /// All of hal/sample_frames.hpp, commands, and those of the profile.
 inline constexpr auto accepted_ids = [] {
-  constexpr std::size_t of_samples = last_sample_frame_id - reading_frame_id + 1;
+  constexpr std::size_t of_samples = last_sample_frame_id - first_sample_frame_id + 1;
   std::array<std::uint16_t, of_samples + 1 + profile_ids.size()> ids{};
-  for (std::size_t k = 0; k < of_samples; ++k) ids[k] = static_cast<std::uint16_t>(reading_frame_id + k);
+  for (std::size_t k = 0; k < of_samples; ++k) ids[k] = static_cast<std::uint16_t>(first_sample_frame_id + k);
   ids[of_samples] = command_frame_id;
   for (std::size_t k = 0; k < profile_ids.size(); ++k) ids[of_samples + 1 + k] = profile_ids[k];
   return ids;

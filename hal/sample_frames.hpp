@@ -1,12 +1,13 @@
-// Samples over CAN, for boards whose measuring chain is not there: the last frame completes the sample.
+// Samples over CAN, for boards whose measuring chain is not there: the last frame completes the sample. Identifiers ascend in the order of sending, so that
+// a node that sends by them keeps it.
 //
-//   0x31E  u32 CRC-32, u16 frames, u16 counter       optional, first: over id and data of all that follow up to the time; how many they are
-//   0x310  i32 current_ua, i32 voltage_uv            of a pack: over all cells
+//   0x310  i32 soc_ppb, i32 soc_sigma_ppb            the starting point, before the first sample
+//   0x311  u32 CRC-32, u16 frames, u16 counter       optional: over id and data of all that follow up to the time; how many they are
+//   0x312  i32 current_ua, i32 voltage_uv            of a pack: over all cells
 //   0x313  i32 link_uv, i32 0                        optional: on the load's side of the contactors
 //   0x314 to 0x31B  i32 uv, i32 uv                   of a pack: cells 1 and 2, 3 and 4, ...
 //   0x31C  4 x i16 temperature_cdegc                 of a pack
-//   0x311  u48 time_us, i16 temperature_cdegc        completes the sample; of a pack: no temperature
-//   0x312  i32 soc_ppb, i32 soc_sigma_ppb            the starting point, before the first sample
+//   0x31D  u48 time_us, i16 temperature_cdegc        completes the sample; of a pack: no temperature
 //
 // A frame that gets lost is a missing reading; with a check before it, a sample of which a bit or a frame is wrong is none.
 #pragma once
@@ -23,11 +24,11 @@
 
 namespace bms::hal {
 
-inline constexpr std::uint16_t reading_frame_id = 0x310, time_frame_id = 0x311, start_frame_id = 0x312, link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
-                               check_frame_id = 0x31E, last_sample_frame_id = 0x31F;
+inline constexpr std::uint16_t start_frame_id = 0x310, check_frame_id = 0x311, reading_frame_id = 0x312, link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
+                               time_frame_id = 0x31D, first_sample_frame_id = start_frame_id, last_sample_frame_id = time_frame_id;
 
 /// Whether the frame is one of these.
-constexpr bool of_sample(const CanFrame& frame) { return !frame.long_id && frame.id >= reading_frame_id && frame.id <= last_sample_frame_id; }
+constexpr bool of_sample(const CanFrame& frame) { return !frame.long_id && frame.id >= first_sample_frame_id && frame.id <= last_sample_frame_id; }
 
 /// CRC-32 (IEEE 802.3) of what a check covers, continued: begins with ~0, ends inverted.
 constexpr std::uint32_t check_more(std::uint32_t crc, const CanFrame& frame) {
@@ -148,7 +149,7 @@ class SampleFrames {
   bool checked_ = false, done_ = false;
 };
 
-constexpr bool is_start(const CanFrame& frame) { return frame.id == start_frame_id && frame.length == 8; }
+constexpr bool is_start(const CanFrame& frame) { return !frame.long_id && frame.id == start_frame_id && frame.length == 8; }
 
 constexpr StartingPoint start_of(const CanFrame& frame) {
   return {get_bytes<std::int32_t>(frame.data, 0), get_bytes<std::int32_t>(frame.data, 4)};

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "hal/sample_frames.hpp"
 #include "hal/slcan/codec.hpp"
 #include "hil/board_link.hpp"
 #include "host_sim/bad_input.hpp"
@@ -43,7 +44,7 @@ class SerialLink : public BoardLink {
     bool asks = false;
     for (const hal::CanFrame& f : frames) {
       lines += hal::slcan::encode(f, text);
-      asks = asks || f.id == time_frame_id;
+      asks = asks || f.id == hal::time_frame_id;
     }
     send(lines);
     return listen(asks ? can::Status::id : 0, asks ? patience_ms : 20);
@@ -51,7 +52,6 @@ class SerialLink : public BoardLink {
 
  private:
   static constexpr int patience_ms = 1'000;
-  static constexpr std::uint16_t time_frame_id = 0x311;
 
   void send(std::string_view bytes) {
     while (!bytes.empty()) {

@@ -86,7 +86,7 @@ TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
   board.write("S6\rO\r");
   EXPECT_EQ(board.read(), "");
   EXPECT_EQ(board.read(), "");
-  board.write("t31280008AF2F80F0FA02\r");  // 800,000,000 and 50,000,000 ppb, little-endian
+  board.write("t31080008AF2F80F0FA02\r");  // 800,000,000 and 50,000,000 ppb, little-endian
   double displayed = 0;
   for (std::size_t k = 0; k < part.size(); ++k) {
     board.send_sample(part[k].time_us, part[k].current_ua, part[k].voltage_uv, part[k].temperature_cdegc);
@@ -133,21 +133,21 @@ TEST(SlcanBoard, TellsWhichCellFileItHolds) {
 TEST(SlcanBoard, HostileBytesAreRefusedAndTheNextSampleIsTaken) {
   SlcanBoard board(image(Image::application));
   board.read();
-  board.write("t3108\rO\r");
+  board.write("t3128\rO\r");
   EXPECT_EQ(board.read(), "\a") << "closed";
   EXPECT_EQ(board.read(), "");
-  for (const std::string& line : {std::string("t31"), std::string("t3109"), std::string("t310800"), std::string("t310G00000000000000"), std::string("t8108") + std::string(16, '0'),
-                                  std::string(3000, 't'), std::string("\xff\x00\x80\n\t;", 6), std::string("t3108zzzzzzzzzzzzzzzz"), std::string("O0"), std::string("S9")}) {
+  for (const std::string& line : {std::string("t31"), std::string("t3129"), std::string("t312800"), std::string("t312G00000000000000"), std::string("t8108") + std::string(16, '0'),
+                                  std::string(3000, 't'), std::string("\xff\x00\x80\n\t;", 6), std::string("t3128zzzzzzzzzzzzzzzz"), std::string("O0"), std::string("S9")}) {
     board.write(line + "\r");
     EXPECT_EQ(board.read(), "\a") << line.substr(0, 20);
   }
-  board.write("T0000031080011223344556677\rt3114" + std::string(8, '0') + "\rt3008" + std::string(16, '0') + "\r");  // well formed, not ours
+  board.write("T0000031280011223344556677\rt31D4" + std::string(8, '0') + "\rt3008" + std::string(16, '0') + "\r");  // well formed, not ours
   for (int k = 0; k < 3; ++k) EXPECT_EQ(board.read(), "");
   // a time frame whose reading got lost: flagged as missing, not the last reading again
   board.send_sample(0, 0, 3'300'000, 2500);
   const BoardTelemetry first = board.telemetry();
   EXPECT_NE(first.soc, 0xFFFFU);
-  board.write("t3118" "40420F000000" "C409\r");
+  board.write("t31D8" "40420F000000" "C409\r");
   const BoardTelemetry lost = board.telemetry();
   EXPECT_NE(lost.flags & (current_missing | voltage_missing), 0U);
   EXPECT_EQ(lost.voltage, 0xFFFFU);

@@ -16,7 +16,7 @@ namespace bms {
 namespace {
 
 constexpr double percent = 500;  // raw soc: 0.002 %
-constexpr const char* start_at_80_percent_to_1 = "t31280008AF2F80969800\r";
+constexpr const char* start_at_80_percent_to_1 = "t31080008AF2F80969800\r";
 
 std::filesystem::path image() { return firmware_image("netduinoplus2", read_cell("table9"), Image::application); }
 
@@ -59,7 +59,7 @@ class Board {
 
 /// The frame that tells a start, of what telemetry said.
 std::string start(const BoardTelemetry& t) {
-  std::string frame = "t3128";
+  std::string frame = "t3108";
   for (const std::uint32_t ppb : {20'000U * t.soc, 20'000U * t.soc_sigma}) {
     for (int k = 0; k < 4; ++k) frame += fmt::format("{:02X}", ppb >> (8 * k) & 0xFF);
   }
@@ -131,7 +131,7 @@ TEST_F(Resume, AStartThatIsToldWinsOverWhatWasStored) {
     board.switch_off();
   }
   Board board(flash());
-  board.tell("t3128" "00E9A435" "40420F00" "\r");  // 900,000,000 and 1,000,000 ppb
+  board.tell("t3108" "00E9A435" "40420F00" "\r");  // 900,000,000 and 1,000,000 ppb
   EXPECT_NEAR(board.sample(part_[0]).soc, 90 * percent, 0.2 * percent);
 }
 

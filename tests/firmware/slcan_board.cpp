@@ -89,7 +89,7 @@ std::string SlcanBoard::read_until(const std::string& what) {
 }
 
 void SlcanBoard::send_sample(std::uint64_t time_us, std::int32_t current_ua, std::int32_t voltage_uv, std::int16_t temperature_cdegc) const {
-  write("t3108" + hex(static_cast<std::uint32_t>(current_ua), 4) + hex(static_cast<std::uint32_t>(voltage_uv), 4) + "\r" + "t3118" + hex(time_us, 6) +
+  write("t3128" + hex(static_cast<std::uint32_t>(current_ua), 4) + hex(static_cast<std::uint32_t>(voltage_uv), 4) + "\r" + "t31D8" + hex(time_us, 6) +
         hex(static_cast<std::uint16_t>(temperature_cdegc), 2) + "\r");
 }
 

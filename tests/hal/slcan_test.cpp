@@ -109,6 +109,7 @@ TEST(SampleFrames, CarryAPack) {
   const auto sent = some_pack();
   SampleFrames<16> received;
   const auto frames = frames_of(sent, 51'000'000, 7);
+  EXPECT_TRUE(std::ranges::is_sorted(frames, {}, &CanFrame::id)) << "a node that sends by identifier keeps the order";
   for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(received.take(frames[k]), k + 1 == frames.size()) << k;
   EXPECT_EQ(received.sample().time_us, sent.time_us);
   EXPECT_EQ(received.sample().current_ua, sent.current_ua);
