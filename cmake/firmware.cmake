@@ -87,9 +87,9 @@ bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semi
 # the board's back ends: BMS_CAN names how it talks, BMS_SAMPLES where its samples come from
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
-set(samples_emulated ${hal}/emulated/samples_can.cpp)
-set(samples_remote ${hal}/remote/samples.cpp)
-set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
+set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/heard.cpp)
+set(samples_remote ${hal}/remote/samples.cpp ${hal}/heard.cpp)
+set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/heard.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${hal}/absent/record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
@@ -97,7 +97,7 @@ target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION} ${vehicle_pro
 bms_objects(hal_emulated_flash -Os ${hal}/emulated/flash.cpp ${hal}/emulated/calendar.cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
 
-bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${hal}/remote/samples.cpp ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
+bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
 
 bms_objects(storage -Os ${CMAKE_SOURCE_DIR}/storage/log.cpp ${CMAKE_SOURCE_DIR}/storage/persistence.cpp)
 bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/board_cell.cpp ${cell_header} ${can_messages} ${j1939_messages})  # the cell says which model

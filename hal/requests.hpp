@@ -1,5 +1,5 @@
 // Frames for the firmware itself: what came over CAN and is no sample.
-// Back ends: bq76952/samples, emulated/samples_can and remote/samples (they arrive between the samples), absent/ (nobody asks).
+// Back ends: heard (they arrive between the samples), absent/ (nobody asks).
 #pragma once
 
 #include "hal/can.hpp"

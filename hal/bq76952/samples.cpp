@@ -6,11 +6,9 @@
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
+#include "hal/heard.hpp"
 #include "hal/i2c.hpp"
 #include "hal/power_path.hpp"
-#include "hal/request_queue.hpp"
-#include "hal/requests.hpp"
-#include "hal/sample_frames.hpp"
 #include "hal/samples.hpp"
 
 namespace bms::hal {
@@ -23,22 +21,15 @@ constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
 constexpr auto settings = bq76952::settings(bq76952::Board{});
 bq76952::FrontEnd front_end{settings};
 PackSample<pack_cells> sample;
-std::optional<StartingPoint> start;
-RequestQueue requests;
 std::uint64_t due_us = 0;
 bool started = false;
 
-void hear() {
+void hear_the_bus() {
   CanFrame frame;
-  while (can_receive(frame)) {
-    if (is_start(frame)) start = start_of(frame);
-    if (!of_sample(frame)) requests.keep(frame);
-  }
+  while (can_receive(frame)) hear(frame);
 }
 
 }  // namespace
-
-bool next_request(CanFrame& frame) { return requests.next(frame); }
 
 const PackSample<pack_cells>* next_sample() {
   if (!started) {
@@ -46,14 +37,12 @@ const PackSample<pack_cells>* next_sample() {
     started = true;
     due_us = now_us() + period_us;
   }
-  for (hear(); now_us() < due_us; hear()) wait_for_interrupt();
+  for (hear_the_bus(); now_us() < due_us; hear_the_bus()) wait_for_interrupt();
   sample.time_us = now_us();
   due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
   front_end.read(sample);
   return &sample;
 }
-
-std::optional<StartingPoint> starting_point() { return start; }
 
 void power_path_set(const PowerPath& wanted) {
   contactor_pins_set(wanted);

@@ -1,34 +1,26 @@
 // Samples from CAN frames (hal/sample_frames.hpp): the measuring chain of a board that has none. Closing the channel ends them.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
+#include "hal/heard.hpp"
 #include "hal/power_path.hpp"
-#include "hal/request_queue.hpp"
-#include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/samples.hpp"
 #include "hal/watchdog.hpp"
-
 
 namespace bms::hal {
 
 namespace {
 
 SampleFrames<pack_cells> frames;
-std::optional<StartingPoint> start;
 bool was_listening = false;
-RequestQueue requests;
 
 }  // namespace
-
-bool next_request(CanFrame& frame) { return requests.next(frame); }
 
 const PackSample<pack_cells>* next_sample() {
   while (true) {
     CanFrame frame;
     while (can_receive(frame)) {
-      if (is_start(frame)) start = start_of(frame);
-      if (frames.take(frame)) return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
-      if (!of_sample(frame)) requests.keep(frame);
+      if (hear(frame) && frames.take(frame)) return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
     }
     if (was_listening && !can_listening()) return nullptr;
     was_listening = can_listening();
@@ -36,8 +28,6 @@ const PackSample<pack_cells>* next_sample() {
     wait_for_interrupt();
   }
 }
-
-std::optional<StartingPoint> starting_point() { return start; }
 
 void power_path_set(const PowerPath&) {}  // who simulates the load hears it on the bus
 std::int32_t link_uv() { return frames.link_uv(); }

@@ -6,9 +6,8 @@
 // goes on from the sender's last one.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
+#include "hal/heard.hpp"
 #include "hal/power_path.hpp"
-#include "hal/request_queue.hpp"
-#include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/samples.hpp"
 
@@ -20,21 +19,15 @@ constexpr std::uint64_t five_periods_us = static_cast<std::uint64_t>(5 * 1e6 * s
 
 SampleFrames<pack_cells> frames;
 PackSample<pack_cells> nothing;
-std::optional<StartingPoint> start;
-RequestQueue requests;
 std::uint64_t given_us = 0, last_us = 0;
 
 }  // namespace
-
-bool next_request(CanFrame& frame) { return requests.next(frame); }
 
 const PackSample<pack_cells>* next_sample() {
   while (true) {
     CanFrame frame;
     while (can_receive(frame)) {
-      if (is_start(frame)) start = start_of(frame);
-      if (!of_sample(frame)) requests.keep(frame);
-      if (!frames.take(frame)) continue;  // a frame that gets lost later is a missing reading, not the old one again
+      if (!hear(frame) || !frames.take(frame)) continue;  // a frame that gets lost later is a missing reading, not the old one again
       given_us = now_us();
       last_us = frames.sample().time_us;
       return &frames.sample();
@@ -48,8 +41,6 @@ const PackSample<pack_cells>* next_sample() {
     wait_for_interrupt();
   }
 }
-
-std::optional<StartingPoint> starting_point() { return start; }
 
 void power_path_set(const PowerPath&) {}
 std::int32_t link_uv() { return frames.link_uv(); }

@@ -527,7 +527,7 @@ TEST(Bq76952Samples, ComeEach100msWithOrWithoutTheChipHearRequestsAndSwitchWhatI
   model.stack_v = 52.8;
   model.ld_v = 40;
   model.gone = true;
-  arriving = {hal::frame_of(StartingPoint{500'000'000, 10'000'000}), {0x1A0, 8, {1, 2, 3}}, {hal::reading_frame_id, 8, {}}};
+  arriving = {hal::frame_of(StartingPoint{500'000'000, 10'000'000}), {hal::start_frame_id, 8, {1}, true}, {0x1A0, 8, {1, 2, 3}}, {hal::reading_frame_id, 8, {}}};
   std::uint64_t last_us = 0;
   for (int k = 0; k < 50; ++k) {
     if (k == 10) model.gone = false;
@@ -544,6 +544,8 @@ TEST(Bq76952Samples, ComeEach100msWithOrWithoutTheChipHearRequestsAndSwitchWhatI
   ASSERT_TRUE(hal::starting_point().has_value());
   EXPECT_EQ(hal::starting_point()->soc_ppb, 500'000'000);
   hal::CanFrame request;
+  ASSERT_TRUE(hal::next_request(request));
+  EXPECT_TRUE(request.long_id) << "of 29 bits: another frame than the starting point";
   ASSERT_TRUE(hal::next_request(request));
   EXPECT_EQ(request.id, 0x1A0);
   EXPECT_FALSE(hal::next_request(request)) << "a sample from another node is no request";
