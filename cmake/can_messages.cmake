@@ -11,12 +11,12 @@ set(can_messages ${CMAKE_BINARY_DIR}/generated/can_messages.hpp)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated)
 add_custom_command(OUTPUT ${can_messages}
   COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/greybox_bms.dbc ${can_messages}
-  DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/greybox_bms.dbc
+  DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/cmake/dbc_file.py ${CMAKE_SOURCE_DIR}/can/greybox_bms.dbc
   COMMENT "CAN messages" VERBATIM)
 set(j1939_messages ${CMAKE_BINARY_DIR}/generated/j1939_messages.hpp)
 add_custom_command(OUTPUT ${j1939_messages}
   COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/j1939_profile.dbc ${j1939_messages} j1939
-  DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/j1939_profile.dbc
+  DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/cmake/dbc_file.py ${CMAKE_SOURCE_DIR}/can/j1939_profile.dbc
   COMMENT "CAN messages of the J1939 profile" VERBATIM)
 add_custom_target(can_messages_made DEPENDS ${can_messages} ${j1939_messages})
 add_library(bms_can INTERFACE)

@@ -6,17 +6,11 @@ A signal of more than 24 bits, or of factor 1 without a unit, is an integer, any
 NaN. Signals Crc and Counter are not values: the codec fills them in. A message without them and without a data id is not protected, its bits that are no
 signal are 1, as J1939 has it. Needs python3-canmatrix.
 """
-import contextlib
 import os
 import re
 import sys
 
-
-def load(path):
-    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
-        import canmatrix.formats  # says on import which formats it does without
-
-        return canmatrix.formats.loadp_flat(path)
+from dbc_file import load
 
 
 def snake(name):

@@ -2,21 +2,13 @@
 // comes back from the line that is written of it.
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 
 #include "monitor/bus_state.hpp"
 #include "monitor/candump_line.hpp"
 #include "monitor/results.hpp"
 #include "monitor/screen.hpp"
-
-namespace {
-
-void require(bool true_of_any_input) {
-  if (!true_of_any_input) std::abort();
-}
-
-}  // namespace
+#include "tests/fuzz/require.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bms::monitor;

@@ -1,19 +1,11 @@
 // Any bytes from a serial adapter: frames are what they may be, and a whole frame after whatever came is read.
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "monitor/bus_state.hpp"
 #include "monitor/slcan_stream.hpp"
-
-namespace {
-
-void require(bool true_of_any_input) {
-  if (!true_of_any_input) std::abort();
-}
-
-}  // namespace
+#include "tests/fuzz/require.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bms::monitor;
