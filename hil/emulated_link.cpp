@@ -6,7 +6,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "hal/bytes.hpp"
+#include "hal/pipe_format.hpp"
 #include "hil/board_link.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/emulator.hpp"
@@ -16,8 +16,8 @@ namespace bms::hil {
 
 namespace {
 
-constexpr std::size_t record_size = 16, length_at = 4, of_block_at = 5, long_id_at = 6, data_at = 8, most_records = 128;
-constexpr unsigned char nothing = 0xFF, tick = 0xFE;
+using namespace hal::pipe;
+
 constexpr int silence_ms = 30'000;
 
 class File {
@@ -47,7 +47,7 @@ const EmulatedBoard& emulator_of(const std::string& board) {
   return emulated_boards().front();  // of the same chip: the images of a board that no emulator knows
 }
 
-/// The formats of hal/emulated/can_pipe.cpp.
+/// The other side of hal/emulated/can_pipe.cpp.
 class EmulatedLink : public BoardLink {
  public:
   EmulatedLink(const std::string& board, const std::filesystem::path& image)
@@ -85,11 +85,8 @@ class EmulatedLink : public BoardLink {
     hal::put_bytes(std::span(bytes), data_at, time_us);
     for (std::size_t k = 0; k < frames.size(); ++k) {
       const std::span<unsigned char> to(bytes.data() + record_size * (1 + k), record_size);
-      hal::put_bytes(to, 0, frames[k].id);
-      to[length_at] = frames[k].length;
+      put(to, frames[k]);
       to[of_block_at] = static_cast<unsigned char>(frames.size() - 1 - k);
-      to[long_id_at] = frames[k].long_id ? 1 : 0;
-      for (std::size_t byte = 0; byte < 8; ++byte) to[data_at + byte] = frames[k].data[byte];
     }
     for (std::size_t done = 0; done < bytes.size();) {
       const ssize_t n = ::write(*to_, bytes.data() + done, bytes.size() - done);
@@ -102,11 +99,7 @@ class EmulatedLink : public BoardLink {
     std::vector<hal::CanFrame> frames;
     while (true) {
       const auto record = read_record();
-      if (record[length_at] != nothing) {
-        hal::CanFrame frame{hal::get_bytes<std::uint32_t>(record, 0), record[length_at], {}, record[long_id_at] != 0};
-        for (std::size_t byte = 0; byte < 8; ++byte) frame.data[byte] = record[data_at + byte];
-        frames.push_back(frame);
-      }
+      if (record[length_at] != nothing) frames.push_back(frame_of(record));
       if (record[of_block_at] == 0) return frames;
     }
   }

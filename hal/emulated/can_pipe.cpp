@@ -1,8 +1,5 @@
 // The CAN bus of an emulated board in lock step with a program on the host: frames as records through two of the debugger's files, which
-// are named pipes. Command line "fw TO_BOARD FROM_BOARD".
-//
-//   record    u32 id, u8 length, u8 of_block, u8 long_id, u8 0, u8 data[8]        little-endian, 16 bytes
-//   block     records; of_block: how many of this block are left after this one, 255 at most
+// are named pipes (pipe_format.hpp). Command line "fw TO_BOARD FROM_BOARD".
 //
 // The firmware works until it asks for a frame a second time and has none: then what it sent goes out as a block, and it waits for one of the
 // other side. That begins with a record of length `tick`, whose data are the time: this board's clock. An empty block is one record of length
@@ -11,18 +8,18 @@
 #include <array>
 #include <span>
 
-#include "hal/bytes.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/emulated/semihosting.hpp"
+#include "hal/pipe_format.hpp"
 #include "hal/power.hpp"
 
 namespace bms::hal {
 
 namespace {
 
-constexpr std::size_t record_size = 16, length_at = 4, of_block_at = 5, long_id_at = 6, data_at = 8, most_records = 128;
-constexpr std::uint8_t nothing = 0xFF, tick = 0xFE;
+using namespace pipe;
+
 constexpr int bad_pipe = 3;
 
 std::array<unsigned char, record_size * most_records> incoming, outgoing;
@@ -42,16 +39,8 @@ bool read_fully(std::span<unsigned char> into) {
 
 std::span<unsigned char> record(std::array<unsigned char, record_size * most_records>& of, std::size_t k) { return std::span(of).subspan(record_size * k, record_size); }
 
-void put(const CanFrame& frame, std::uint8_t length) {
-  const auto to = record(outgoing, out_count++);
-  put_bytes(to, 0, frame.id);
-  to[length_at] = length;
-  to[long_id_at] = frame.long_id ? 1 : 0;
-  for (std::size_t k = 0; k < 8; ++k) to[data_at + k] = frame.data[k];
-}
-
 void flush() {
-  if (out_count == 0) put({}, nothing);
+  if (out_count == 0) put(record(outgoing, out_count++), {.length = nothing});
   for (std::size_t k = 0; k < out_count; ++k) record(outgoing, k)[of_block_at] = static_cast<unsigned char>(out_count - 1 - k);
   if (!semihosting::write(out, std::span(outgoing).first(record_size * out_count))) open = false;
   out_count = 0;
@@ -82,7 +71,7 @@ bool can_listening() { return open; }
 
 bool can_send(const CanFrame& frame) {
   if (!open || out_count == most_records) return false;
-  put(frame, frame.length);
+  put(record(outgoing, out_count++), frame);
   return true;
 }
 
@@ -97,9 +86,7 @@ bool can_receive(CanFrame& frame) {
     const auto from = record(incoming, in_next++);
     if (from[length_at] == tick) time_us = get_bytes<std::uint64_t>(from, data_at);
     if (from[length_at] > 8 || from[long_id_at] != 0) continue;
-    frame.id = get_bytes<std::uint32_t>(from, 0);
-    frame.length = from[length_at];
-    for (std::size_t k = 0; k < 8; ++k) frame.data[k] = from[data_at + k];
+    frame = frame_of(from);
     return true;
   }
   return false;
