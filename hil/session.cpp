@@ -4,18 +4,17 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <tuple>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "hal/sample_frames.hpp"
+#include "monitor/bus_state.hpp"
 #include "protection/contactors.hpp"
 
 namespace bms::hil {
 
 namespace {
 
-constexpr double precharge_gives_up_s = 60, trace_every_s = 10;
+constexpr double precharge_gives_up_s = 60, trace_every_s = 10, rest_c_rate = 0.02;
 constexpr double parting_s = 20, asking_again_s = 12;  // after the drive nobody asks for 12 s, the contactors open; then they are asked to close again, which tells whether one is welded
 
 /// Current, temperature and, replayed, voltage at a time of the drive.
@@ -44,60 +43,47 @@ class Drive {
   std::size_t row_ = 0;
 };
 
-/// What the board has said last.
+/// What the board has said last. Frames that are not whole are none.
 class Heard {
  public:
   can::PackState pack;
   can::ContactorState contactors;
   can::AllowedCurrent allowed;
   bool said_pack = false, said_status = false;
-  std::uint64_t lost = 0, crc_errors = 0;
-  std::map<std::string, double> raised;  ///< by name, since when
   std::vector<FaultSeen> faults;
 
   void take(double time_s, const hal::CanFrame& frame) {
-    std::apply([&]<class... M>(const M&...) { (take_as<M>(time_s, frame) || ...); }, can::Messages{});
+    if (bus_.take(monitor::on_bus(frame, std::llround(1e6 * time_s))) == monitor::messages().size()) return;
+    switch (frame.id) {
+      case can::PackState::id: pack = can::PackState::of(frame), said_pack = true; break;
+      case can::ContactorState::id: contactors = can::ContactorState::of(frame); break;
+      case can::AllowedCurrent::id: allowed = can::AllowedCurrent::of(frame); break;
+      case can::Status::id: said_status = true; break;
+      case can::Faults::id: see_faults(time_s, can::Faults::of(frame)); break;
+      default: break;
+    }
   }
+  std::uint64_t lost() const { return sum(&monitor::MessageState::lost); }
+  std::uint64_t crc_errors() const { return sum(&monitor::MessageState::crc_errors); }
 
  private:
-  template <class M>
-  bool take_as(double time_s, const hal::CanFrame& frame) {
-    if (frame.id != M::id) return false;
-    if (!can::intact(frame, M::data_id)) {
-      ++crc_errors;
-      return true;
-    }
-    const std::uint8_t counter = can::counter_of(frame);
-    if (const auto last = counters_.find(M::id); last != counters_.end()) lost += (counter + can::counters - can::next(last->second)) % can::counters;
-    counters_[M::id] = counter;
-    const M message = M::of(frame);
-    if constexpr (std::same_as<M, can::PackState>) pack = message, said_pack = true;
-    if constexpr (std::same_as<M, can::ContactorState>) contactors = message;
-    if constexpr (std::same_as<M, can::AllowedCurrent>) allowed = message;
-    if constexpr (std::same_as<M, can::Status>) said_status = true;
-    if constexpr (std::same_as<M, can::Faults>) see_faults(time_s, message);
-    return true;
+  std::uint64_t sum(std::uint64_t monitor::MessageState::*count) const {
+    std::uint64_t all = 0;
+    for (const monitor::MessageState& state : bus_.states()) all += state.*count;
+    return all;
   }
 
   void see_faults(double time_s, can::Faults message) {
     message.each([&](const char* name, const char*, auto& value, const can::SignalLayout& s) {
       if (s.bits != 1) return;
-      const auto since = raised.find(name);
-      if (value != 0 && since == raised.end()) {
-        raised[name] = time_s;
-        faults.push_back({name, time_s, {}});
-      } else if (value == 0 && since != raised.end()) {
-        raised.erase(since);
-        for (auto f = faults.rbegin(); f != faults.rend(); ++f) {
-          if (f->name != name) continue;
-          f->cleared_at_s = time_s;
-          break;
-        }
-      }
+      const auto last = std::find_if(faults.rbegin(), faults.rend(), [&](const FaultSeen& f) { return f.name == name; });
+      const bool raised = last != faults.rend() && !last->cleared_at_s;
+      if (value != 0 && !raised) faults.push_back({name, time_s, {}});
+      if (value == 0 && raised) last->cleared_at_s = time_s;
     });
   }
 
-  std::map<unsigned, std::uint8_t> counters_;
+  monitor::BusState bus_;
 };
 
 hal::CanFrame request(std::uint32_t what, std::uint8_t counter) {
@@ -138,11 +124,12 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
   SimulatedPack pack(plan.cell, plan.cells, plan.initial_soc, plan.spread);
   Injector injector(plan.injections, plan.spread.seed + 1);
   const double end_s = plan.drive.time_s.back() - plan.drive.time_s.front();
+  const auto asks_every = static_cast<std::uint64_t>(std::max(1L, std::lround(1 / plan.sample_period_s)));  // once a second
   double drive_s = 0, squares = 0;
   std::uint64_t judged = 0, inside = 0;
   std::vector<float> sigmas;
   std::uint8_t asked = 0;
-  double link_v = 0;
+  double link_v = 0, replayed_link_v = 0;
 
   const auto say = [&](double time_s, const std::vector<hal::CanFrame>& frames) {
     heard.said_status = heard.said_pack = false;
@@ -161,33 +148,36 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     const Closed closed{heard.contactors.main_plus != 0, heard.contactors.main_minus != 0, heard.contactors.precharge != 0};
     const bool driving = closed.main_plus && closed.main_minus;
     if (driving && !result.driving_after_s) result.driving_after_s = time_s;
-    // a drive begins when the contactors are closed; what is replayed does not wait, and nothing waits for ever
-    const bool moves = plan.replayed || result.driving_after_s || time_s > precharge_gives_up_s;
+    // a drive, or what was recorded of one, begins when the contactors are closed; nothing waits for ever
+    const bool moves = result.driving_after_s || time_s > precharge_gives_up_s;
     if (moves && k > 0) drive_s += plan.sample_period_s;
     const bool parting = drive_s > end_s;
     drive.go_to(drive_s);
 
     Closed real = closed;
     if (injector.active("precharge_open", time_s)) real.precharge = false;
-    const bool obeys = !injector.active("overcurrent", time_s);
+    const bool welded = injector.active("welded", time_s), obeys = !injector.active("overcurrent", time_s);
     const double most_a = plan.cell.parameters.limits.discharge_current_max_a;
-    pack.run(parting ? 0 : obeys ? demanded(heard, drive.current_a(), true) : demanded(heard, -1.6 * most_a, false), real, injector.active("welded", time_s), drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
+    pack.run(parting ? 0 : obeys ? demanded(heard, drive.current_a(), true) : demanded(heard, -1.6 * most_a, false), real, welded, drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
     auto sample = pack.read(static_cast<std::uint64_t>(std::llround(1e6 * time_s)), drive.temperature_c());
     double truth = pack.soc();
     link_v = pack.link_v();
     if (plan.replayed) {
       const auto volts = static_cast<std::int32_t>(std::lround(1e6 * drive.voltage_v(drive_s)));
-      sample.current_ua = static_cast<std::int32_t>(std::lround(1e6 * drive.current_a()));
+      const double recorded_a = moves ? drive.current_a() : 0;
+      const bool carries = real.carries(welded);
+      sample.current_ua = carries ? static_cast<std::int32_t>(std::lround(1e6 * recorded_a)) : 0;
+      if (!carries && std::abs(recorded_a) > rest_c_rate * plan.cell.parameters.capacity_ah && !result.cut_off_at_s) result.cut_off_at_s = time_s;
       for (std::size_t c = 0; c < plan.cells; ++c) sample.cell_uv[c] = volts;
       sample.pack_uv = static_cast<std::int32_t>(plan.cells) * volts;
-      truth = drive.soc_ref(drive_s);
-      const double v = 1e-6 * sample.pack_uv;
-      link_v = driving ? v : closed.precharge ? v - (v - link_v) * std::exp(-plan.sample_period_s / SimulatedPack::precharge_time_constant_s) : link_v * std::exp(-plan.sample_period_s / SimulatedPack::link_falls_in_s);
+      truth = result.cut_off_at_s ? std::nan("") : drive.soc_ref(drive_s);
+      replayed_link_v = link_after(replayed_link_v, 1e-6 * sample.pack_uv, real, welded, plan.sample_period_s);
+      link_v = replayed_link_v;
     }
     injector.apply(time_s, sample);
 
     std::vector<hal::CanFrame> frames;
-    if (k % 10 == 0) frames.push_back(request(static_cast<std::uint32_t>(parting && drive_s <= end_s + asking_again_s ? protection::Request::none : protection::Request::drive), asked = can::next(asked)));
+    if (k % asks_every == 0) frames.push_back(request(static_cast<std::uint32_t>(parting && drive_s <= end_s + asking_again_s ? protection::Request::none : protection::Request::drive), asked = can::next(asked)));
     const auto measured = plan.cells == 1 ? frames_for<1>(sample, link_v, static_cast<std::uint16_t>(k)) : frames_for<most_cells>(sample, link_v, static_cast<std::uint16_t>(k));
     for (const hal::CanFrame& f : injector.apply(time_s, measured)) frames.push_back(f);
     say(time_s, frames);
@@ -223,8 +213,8 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     result.median_sigma = static_cast<double>(*middle);
   }
-  result.lost = heard.lost;
-  result.crc_errors = heard.crc_errors;
+  result.lost = heard.lost();
+  result.crc_errors = heard.crc_errors();
   result.faults = heard.faults;
   for (const Injection& i : injector.all()) {
     Reaction r{i, {}, true};

@@ -20,7 +20,7 @@ namespace bms::hil {
 struct SessionPlan {
   CellFile cell;                     ///< the pack's, in truth
   Recording drive;                   ///< its current is the load's; with voltages, and replayed: its voltages are the cells'
-  bool replayed = false;             ///< open loop: what was recorded, whatever the board says
+  bool replayed = false;             ///< the cells read what was recorded; its current flows only while the contactors are closed
   std::size_t cells = 16;            ///< 1 or 16: as the board has
   double initial_soc = 0.9;          ///< of the pack
   std::optional<double> told_soc;    ///< what the board is told; nothing: it finds out
@@ -55,6 +55,7 @@ struct SessionResult {
   std::uint64_t soc_told = 0;        ///< times that a soc was told as valid
   std::uint64_t soc_wrong = 0;       ///< of these, more than three sigma and 2 % off
   std::optional<double> driving_after_s;
+  std::optional<double> cut_off_at_s;  ///< replayed: since then current flowed in the recording while the contactors were open; what the board tells of soc is not judged from there on
   std::vector<FaultSeen> faults;
   std::vector<Reaction> reactions;
   std::vector<TracePoint> trace;     ///< every few seconds

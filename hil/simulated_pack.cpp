@@ -5,6 +5,13 @@
 
 namespace bms::hil {
 
+double link_after(double link_v, double pack_v, const Closed& closed, bool welded, double duration_s) {
+  constexpr double precharge_time_constant_s = 0.5, falls_in_s = 5;
+  if (closed.carries(welded)) return pack_v;
+  if (closed.precharge && closed.main_minus) return link_v + (pack_v - link_v) * (1 - std::exp(-duration_s / precharge_time_constant_s));
+  return link_v * std::exp(-duration_s / falls_in_s);
+}
+
 SimulatedPack::SimulatedPack(const CellFile& cell, std::size_t cells, double initial_soc, const PackSpread& spread)
     : tables_(model::prepare<double, model::max_intervals>(cell.parameters)), voltage_v_(cells), random_(spread.seed), spread_(spread), capacity_ah_(cell.parameters.capacity_ah) {
   std::normal_distribution<double> normal;
@@ -30,13 +37,10 @@ double SimulatedPack::pack_v() const {
 }
 
 void SimulatedPack::run(double demand_a, const Closed& closed, bool welded, double temperature_c, double duration_s) {
-  const bool plus = closed.main_plus || welded;
-  current_a_ = plus && closed.main_minus ? demand_a : 0;
+  current_a_ = closed.carries(welded) ? demand_a : 0;
   time_s_ += duration_s;
   for (std::size_t k = 0; k < courses_.size(); ++k) voltage_v_[k] = courses_[k].step(time_s_, duration_s, current_a_, temperature_c, [](auto&, const auto&) {});
-  if (plus && closed.main_minus) link_v_ = pack_v();
-  else if (closed.precharge && closed.main_minus) link_v_ += (pack_v() - link_v_) * (1 - std::exp(-duration_s / precharge_time_constant_s));
-  else link_v_ *= std::exp(-duration_s / link_falls_in_s);
+  link_v_ = link_after(link_v_, pack_v(), closed, welded, duration_s);
 }
 
 PackSample<most_cells> SimulatedPack::read(std::uint64_t time_us, double temperature_c) {

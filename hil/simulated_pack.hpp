@@ -28,12 +28,16 @@ struct PackSpread {
 /// What the contactors are told; as ContactorState on CAN.
 struct Closed {
   bool main_plus = false, main_minus = false, precharge = false;
+
+  /// Whether current can flow; welded: main+ does not open.
+  constexpr bool carries(bool welded) const { return (main_plus || welded) && main_minus; }
 };
+
+/// The link's voltage after a time with the contactors so.
+double link_after(double link_v, double pack_v, const Closed& closed, bool welded, double duration_s);
 
 class SimulatedPack {
  public:
-  static constexpr double precharge_time_constant_s = 0.5, link_falls_in_s = 5;
-
   SimulatedPack(const CellFile& cell, std::size_t cells, double initial_soc, const PackSpread& spread);
 
   /// demand_a: what load or charger would have; flows while both main contactors are closed. welded: main+ does not open.

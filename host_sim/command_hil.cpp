@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 #include "host_sim/bad_input.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/report_page.hpp"
+#include "monitor/candump_line.hpp"
 
 namespace bms {
 
@@ -28,6 +28,7 @@ std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, con
   for (const Warning& w : plan.drive.warnings) warnings.push_back(w.id + ": " + w.text);
   return Json{{"command", "hil"}, {"board", options.board}, {"cell", plan.cell.name}, {"cells", plan.cells}, {"duration_s", r.duration_s}, {"speedup", r.speedup}, {"samples", r.samples}, {"frames", r.frames},
               {"lost", r.lost}, {"crc_errors", r.crc_errors}, {"unanswered", r.unanswered}, {"driving_after_s", r.driving_after_s ? Json(*r.driving_after_s) : Json()},
+              {"cut_off_at_s", r.cut_off_at_s ? Json(*r.cut_off_at_s) : Json()},
               {"soc", {{"rmse", r.soc_rmse}, {"max_error", r.soc_max_error}, {"within_2_sigma", r.within_2_sigma}, {"median_sigma", r.median_sigma}, {"told", r.soc_told}, {"wrong_told_as_valid", r.soc_wrong}}},
               {"faults", faults}, {"reactions", reactions}, {"warnings", warnings}}
              .dump(1) + "\n";
@@ -62,6 +63,7 @@ std::string statement_of(const hil::SessionResult& r) {
   std::string text = fmt::format("{:.2f} h in the loop, {:.0f} times as fast as real: {} samples, {} frames", r.duration_s / 3'600, r.speedup, r.samples, r.frames);
   text += r.driving_after_s ? fmt::format(", contactors closed after {:.1f} s. ", *r.driving_after_s) : ", contactors never closed. ";
   text += fmt::format("State of charge told: {:.2f} % RMS, {:.2f} % at most, {:.1f} % of the time within two sigma.", 100 * r.soc_rmse, 100 * r.soc_max_error, 100 * r.within_2_sigma);
+  if (r.cut_off_at_s) text += fmt::format(" From {:.1f} s on the contactors were open while current flowed in the recording: what was told of the state of charge since then is not judged.", *r.cut_off_at_s);
   std::size_t missed = 0;
   for (const hil::Reaction& x : r.reactions) missed += x.in_time ? 0 : 1;
   if (!r.reactions.empty()) text += missed == 0 ? " Every fault that was put in was told in its time." : fmt::format(" {} of {} faults that were put in were not told in their time.", missed, r.reactions.size());
@@ -92,9 +94,7 @@ int run(const HilOptions& options) {
   std::string dump;
   const auto keep = [&](double time_s, const hal::CanFrame& f) {
     if (options.candump.empty()) return;
-    fmt::format_to(std::back_inserter(dump), "({:.6f}) can0 {:03X}#", time_s, f.id);
-    for (std::size_t k = 0; k < f.length; ++k) fmt::format_to(std::back_inserter(dump), "{:02X}", f.data[k]);
-    dump += '\n';
+    monitor::append_dump_line(dump, monitor::on_bus(f, std::llround(1e6 * time_s)), "can0");
   };
   const auto show = progress_on_terminal(1, [](double done, double left_s, const std::string&) { return fmt::format("in the loop: {:.0f} %, {:.0f} s left", 100 * done, std::isfinite(left_s) ? left_s : 0); });
   const auto result = hil::run_session(*link, plan, keep, [&](double done) { if (show) show(done, ""); });

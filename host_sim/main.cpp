@@ -144,7 +144,7 @@ void add_hil(CLI::App& app, bms::HilOptions& o) {
   c.add_option("--cell", o.cell, "the pack's cells: cell file, or the name of a built-in cell: " + bms::cell_names())->capture_default_str();
   c.add_option("--board-cell", o.board_cell, "the firmware's cell file, when it believes in another")->type_name("CELL");
   c.add_option("--profile", o.profile, "what the load takes: time_s, current_a, maybe temperature_c")->type_name("FILE");
-  c.add_option("--recording", o.recording, "a recording whose current and voltage the board is told, whatever it says")->type_name("FILE");
+  c.add_option("--recording", o.recording, "a recording whose voltages the cells read; its current flows while the contactors are closed")->type_name("FILE");
   c.add_option("--initial-soc", o.initial_soc, "state of charge of the pack")->check(Within(0.0, 1.0))->capture_default_str();
   c.add_option("--told-soc", o.told_soc, "what the board is told of it; nothing, if not given")->check(Within(0.0, 1.0));
   c.add_option("--sample-s", o.sample_period_s, "between samples")->check(Within(0.01, 10.0))->capture_default_str();

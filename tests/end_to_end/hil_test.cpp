@@ -86,6 +86,25 @@ TEST_F(Hil, AFaultThatIsNotToldEndsWith1) {
   EXPECT_THAT(r.err, HasSubstr("cell_open=2@299.9-299.95: expected VoltageMissing"));
 }
 
+TEST_F(Hil, ARecordingFlowsOnlyThroughClosedContactorsAndIsNoWeldedOne) {
+  std::string csv = read_file(shift);
+  std::size_t end = 0;
+  for (int line = 0; line < 400; ++line) end = csv.find('\n', end) + 1;
+  const std::string part = (folder_.path() / "part.csv").string();
+  write_file(part, csv.substr(0, end));
+  const auto replayed = [&](const std::string& more) { return of(run_tool("hil --board netduinoplus2 --sample-s 1 --told-soc 0.98 --json - --recording " + part + more)); };
+  const Json j = replayed("");
+  EXPECT_LT(j["driving_after_s"], 30);
+  EXPECT_TRUE(j["faults"].empty()) << j["faults"].dump();
+  EXPECT_TRUE(j["cut_off_at_s"].is_null());
+  EXPECT_GT(j["soc"]["told"], 390);
+  const Json cut = replayed(" --fault current_open@350-360");
+  ASSERT_TRUE(cut["cut_off_at_s"].is_number()) << "CurrentMissing opens";
+  EXPECT_NEAR(cut["cut_off_at_s"].get<double>(), 356, 6);
+  EXPECT_LE(cut["soc"]["told"], 362) << "what is told past open contactors is not judged";
+  for (const Json& fault : cut["faults"]) EXPECT_NE(fault["name"], "ContactorWelded");
+}
+
 TEST_F(Hil, WhatItCannotRunItSaysInALine) {
   EXPECT_EQ(run_tool("hil").exit_code, 2);
   EXPECT_EQ(run_tool("hil --profile " + shift + " --recording " + shift).exit_code, 2);
