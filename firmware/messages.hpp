@@ -24,7 +24,7 @@ constexpr float percent(const T& fraction) {
   return 100.0F * number(fraction);
 }
 
-/// In units of 1e-9, within +-2.
+/// In units of 1e-9, within +-2; 0 of what is no number.
 template <class T>
 constexpr std::int32_t ppb(const T& value) {
   if constexpr (model::is_q<T>) {
@@ -33,6 +33,7 @@ constexpr std::int32_t ppb(const T& value) {
     const std::int64_t raw = value.raw(), held = raw > most ? most : raw < -most ? -most : raw;
     return static_cast<std::int32_t>(held * 1'000'000'000 >> T::fraction_bits);
   } else {
+    if (value != value) return 0;
     const float held = value > 2 ? 2.0F : value < -2 ? -2.0F : static_cast<float>(value);
     return static_cast<std::int32_t>(held * 1e9F);
   }

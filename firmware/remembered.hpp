@@ -31,7 +31,7 @@ class RememberedOf {
     using messages::number;
     constexpr float ppm = 1e6F;
     const bool known = (e.flags & not_started) == 0 && number(e.soc_sigma) > 0;
-    if (known) values_.pack = StoredEstimate{scaled(number(e.soc), 1e9F), scaled(number(e.soc_sigma), 1e9F)};
+    if (known) values_.pack = StoredEstimate{messages::ppb(e.soc), messages::ppb(e.soc_sigma)};
     const auto capacity = condition.capacity(), resistance = condition.resistance();
     values_.health = {scaled(number(capacity.ratio), ppm), scaled(number(capacity.sigma), ppm), scaled(number(resistance.ratio), ppm), scaled(number(resistance.sigma), ppm)};
     if constexpr (Cells > 1) {
