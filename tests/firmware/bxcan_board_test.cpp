@@ -2,7 +2,6 @@
 // is on the wire and in the flash is what the application meant, and whatever the bus does, the firmware goes on estimating and feeding its watchdog.
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <map>
 #include <regex>
 #include <set>
@@ -13,74 +12,27 @@
 
 #include "firmware/application.hpp"
 #include "hal/accepted_frames.hpp"
-#include "host_sim/cell_file.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "host_sim/recording.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/text_file.hpp"
 #include "tests/can/response_time.hpp"
+#include "tests/firmware/host_hal.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 #include "tests/storage/flash_model.hpp"
 
 namespace bms {
 namespace {
 
-// of the application on this machine
-std::vector<hal::CanFrame> meant;
-std::deque<hal::CanFrame> requests;
-hal::PowerPath switched;
-std::int32_t link_voltage_uv = 0;
-hal::ResetCause cause = hal::ResetCause::power_on;
-
-}  // namespace
-
-namespace hal {
-bool can_listening() { return true; }
-bool can_send(const CanFrame& frame) {
-  meant.push_back(frame);
-  return true;
-}
-ResetCause reset_cause() { return cause; }
-std::optional<FaultRecord> last_fault() { return std::nullopt; }
-void record(std::span<const std::uint32_t>) {}
-bool next_request(CanFrame& frame) {
-  if (requests.empty()) return false;
-  frame = requests.front();
-  requests.pop_front();
-  return true;
-}
-void power_path_set(const PowerPath& wanted) { switched = wanted; }
-std::int32_t link_uv() { return link_voltage_uv; }
-std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
-void watchdog_feed() {}
-}  // namespace hal
-
-namespace {
-
+using namespace host_hal;
 using ::testing::IsEmpty;
 using hal::CanState;
-using Plain = SocEstimator<float>;
 using Pack = PackSample<16>;
 
-const CellFile& table9() {
-  static const CellFile cell = read_cell("table9");
-  return cell;
-}
-const auto cell_tables = model::prepare<float, model::max_intervals>(table9().parameters);
-
 /// firmware/board_cell.hpp of this board, with the cell from its file.
-struct ForkliftCell {
-  using Estimator = Plain;
-  static constexpr std::size_t cells = Pack::cells;
-  static bms::Estimate<float> step(Plain& estimator, const Sample& sample) { return estimator.step(cell_tables, sample); }
-  static void look(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const bms::Estimate<float>& e, bool limits_wanted) {
-    condition.update(cell_tables, sample, e, estimator.state(), limits_wanted);
-  }
-  static void tell_apart(PackCells<float, cells>& of, const PackSample<cells>& pack, const bms::Estimate<float>& e) { of.update(cell_tables, pack, e); }
-  static const model::Plausible& plausible() { return cell_tables.plausible; }
+struct ForkliftCell : Table9Board<Pack::cells> {
   static const protection::ProtectionPlan& plan() {
-    static const auto plan = protection::protection_plan(
-        {.limits = table9().parameters.limits, .capacity_ah = table9().parameters.capacity_ah, .cells = cells, .temperatures = 4, .sample_period_s = 0.1});
+    static const auto plan = protection::protection_plan(design(0.1));
     return plan;
   }
 };
@@ -118,7 +70,7 @@ class HostBoard {
   explicit HostBoard(const std::vector<std::uint8_t>& flash, const std::optional<StartingPoint>& told = std::nullopt) {
     for (std::uint32_t k = 0; k < FlashControllerModel::sectors; ++k) flash_.fill(k, {flash.begin() + k * FlashControllerModel::sector_bytes, flash.begin() + (k + 1) * FlashControllerModel::sector_bytes});
     plug_in(&flash_);
-    meant.clear();
+    sent.clear();
     requests.clear();
     switched = {};
     persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
@@ -129,7 +81,7 @@ class HostBoard {
   HostBoard& operator=(const HostBoard&) = delete;
 
   void take(const Input& in) {
-    link_voltage_uv = in.link_uv;
+    link_reads_uv = in.link_uv;
     if (in.command) requests.push_back(*in.command);
     application_->take(in.pack);
   }
@@ -158,7 +110,7 @@ const std::vector<std::uint8_t>& started_once() {
 std::vector<hal::CanFrame> meant_of(const std::vector<Pack>& part) {
   HostBoard host(started_once());
   for (const Pack& p : part) host.take({p, 0, {}});
-  return meant;
+  return sent;
 }
 
 double ms_on_the_wire(const std::vector<hal::CanFrame>& frames) {
@@ -267,7 +219,7 @@ TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToD
   HostBoard host(started_once(), start);
   const auto inputs = start_of_a_drive(host);
   std::map<unsigned, std::vector<hal::CanFrame>> expected;
-  for (const hal::CanFrame& f : meant) expected[f.id].push_back(f);
+  for (const hal::CanFrame& f : sent) expected[f.id].push_back(f);
   EXPECT_GE(expected.size(), 24U);
   const std::size_t commands = expected[can::CommandAnswer::id].size();
   EXPECT_EQ(commands, 4U);
@@ -293,11 +245,11 @@ TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToD
     EXPECT_EQ(can::ContactorState::of(seen[0x197].back()).state, can::ContactorState::state_drive);
     EXPECT_EQ(can::Faults::of(seen[0x196].back()).first_cause, 0U);
     EXPECT_EQ(can::Storage::of(seen[0x1B8].back()).state, can::Storage::state_works);
-    EXPECT_GT(one.interrupts_taken, meant.size());
+    EXPECT_GT(one.interrupts_taken, sent.size());
     EXPECT_THAT(one.can.violations, IsEmpty());
     const hal::CanHealth health = one.can_health();
     EXPECT_EQ(health.state, CanState::active);
-    EXPECT_EQ(health.sent, meant.size());
+    EXPECT_EQ(health.sent, sent.size());
     EXPECT_EQ(health.received, 1 + commands + frames_of_a_sample * inputs.size());
     EXPECT_EQ(health.dropped + health.lost + health.overruns + health.bus_offs + health.failed_starts, 0U);
   }
@@ -352,7 +304,7 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
     for (const SeenFrame& f : again.can.seen) {
       if (f.from_board) told.emplace(f.frame.id, f.frame);
     }
-    for (const hal::CanFrame& f : meant) expected.emplace(f.id, f);
+    for (const hal::CanFrame& f : sent) expected.emplace(f.id, f);
     ASSERT_EQ(told.size(), expected.size());
     for (const auto& [id, frame] : expected) EXPECT_TRUE(same(told[id], frame)) << fmt::format("{:x}", id);
     EXPECT_EQ(can::StartingSoc::of(told[0x19D]).given, can::StartingSoc::given_yes);

@@ -1,82 +1,35 @@
-// The firmware's application on this machine: the few functions of hal/ that it calls are here.
+// The firmware's application on this machine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <map>
 #include <vector>
 
 #include "firmware/application.hpp"
 #include "firmware/cia418_profile.hpp"
 #include "firmware/j1939_profile.hpp"
-#include "host_sim/cell_file.hpp"
+#include "tests/firmware/host_hal.hpp"
 
 namespace bms {
 namespace {
 
-bool listening = true;
-std::vector<hal::CanFrame> sent;
-std::vector<std::vector<std::uint32_t>> recorded;
-int fed = 0;
-std::optional<hal::FaultRecord> fault;
-std::deque<hal::CanFrame> requests;
-
-}  // namespace
-
-namespace hal {
-bool can_listening() { return listening; }
-bool can_send(const CanFrame& frame) {
-  sent.push_back(frame);
-  return true;
-}
-PowerPath switched;
-std::int32_t link = no_reading;
-void power_path_set(const PowerPath& wanted) { switched = wanted; }
-std::int32_t link_uv() { return link; }
-ResetCause cause = ResetCause::watchdog;
-ResetCause reset_cause() { return cause; }
-std::optional<FaultRecord> last_fault() { return fault; }
-void record(std::span<const std::uint32_t> words) { recorded.emplace_back(words.begin(), words.end()); }
-void watchdog_feed() { ++fed; }
-bool next_request(CanFrame& frame) {
-  if (requests.empty()) return false;
-  frame = requests.front();
-  requests.pop_front();
-  return true;
-}
-std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
-}  // namespace hal
-
-namespace {
-
-using Plain = SocEstimator<float>;
-
-Estimate<float> fixed_answer(SocEstimator<float>&, const Sample&) {
-  Estimate<float> e;
-  e.soc = 0.54321F;
-  e.soc_sigma = 0.01F;
-  e.v_rc_v = -0.0123456F;
-  e.voltage_predicted_v = 3.2999F;
-  e.flags = voltage_stuck;
-  return e;
-}
-
-const auto table9 = model::prepare<float, model::max_intervals>(read_cell("table9").parameters);
+using namespace host_hal;
 
 /// A board whose estimator always says the same.
 template <std::size_t Cells>
-struct Board {
-  using Estimator = Plain;
-  static constexpr std::size_t cells = Cells;
-  static bms::Estimate<float> step(Plain& estimator, const Sample& sample) { return fixed_answer(estimator, sample); }
-  static void look(Condition<Plain>& condition, const Plain& estimator, const Sample& sample, const bms::Estimate<float>& e, bool limits_wanted) {
-    condition.update(table9, sample, e, estimator.state(), limits_wanted);
+struct Board : Table9Board<Cells> {
+  static bms::Estimate<float> step(SocEstimator<float>&, const Sample&) {
+    bms::Estimate<float> e;
+    e.soc = 0.54321F;
+    e.soc_sigma = 0.01F;
+    e.v_rc_v = -0.0123456F;
+    e.voltage_predicted_v = 3.2999F;
+    e.flags = voltage_stuck;
+    return e;
   }
-  static void tell_apart(PackCells<float, Cells>& of, const PackSample<Cells>& pack, const bms::Estimate<float>& e) { of.update(table9, pack, e); }
-  static const model::Plausible& plausible() { return table9.plausible; }
   static const protection::ProtectionPlan& plan() {
-    static const auto plan = protection::protection_plan({.limits = read_cell("table9").parameters.limits, .capacity_ah = 6, .cells = Cells, .temperatures = Cells > 1 ? 4 : 1, .sample_period_s = 1});
+    static const auto plan = protection::protection_plan(Table9Board<Cells>::design(1));
     return plan;
   }
 };
@@ -84,13 +37,9 @@ struct Board {
 class TelemetryTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    listening = true;
-    sent.clear();
-    recorded.clear();
-    fed = 0;
-    fault.reset();
-    requests.clear();
-    hal::cause = hal::ResetCause::watchdog;
+    begin();
+    link_reads_uv = no_reading;
+    cause = hal::ResetCause::watchdog;
   }
   /// The last frame of a message that was sent.
   template <class Message>
@@ -287,11 +236,12 @@ TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
   Estimate<float> e;
   e.soc = -0.1F;
   e.soc_sigma = 9;
-  Condition<Plain> condition;
+  Condition<SocEstimator<float>> condition;
   EXPECT_EQ(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc, 0);
   EXPECT_NEAR(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc_sigma, 125, 1e-3);
   e.soc = std::nanf("");
   EXPECT_TRUE(std::isnan(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc));
+  EXPECT_EQ(messages::ppb(e.soc), 0);
   e.flags = not_started;
   const auto start = can::PackState::of(messages::pack_state(e, condition).frame(0));
   EXPECT_TRUE(std::isnan(start.soc));
@@ -390,8 +340,8 @@ class PackWith : public TelemetryTest {
 
   void SetUp() override {
     TelemetryTest::SetUp();
-    hal::link = 0;
-    hal::cause = hal::ResetCause::power_on;
+    link_reads_uv = 0;
+    cause = hal::ResetCause::power_on;
     for (std::size_t k = 0; k < 16; ++k) reading.cell_uv[k] = 3'280'000 + static_cast<std::int32_t>(k) * 100;
     reading.pack_uv = 16 * 3'280'750;
     reading.current_ua = 0;
@@ -404,14 +354,14 @@ class PackWith : public TelemetryTest {
       if (uv != no_reading) uv += (reading.time_us / 1'000'000) % 2 == 0 ? 1 : -1;
     }
     const double pack_v = 1e-6 * reading.pack_uv;
-    const auto& c = hal::switched;
+    const auto& c = switched;
     if (c.main_plus && c.main_minus) link_v = pack_v;
     else if (c.precharge && c.main_minus) link_v += (pack_v - link_v) * (1 - std::exp(-1 / 0.5));
     else link_v *= std::exp(-0.2);
-    hal::link = static_cast<std::int32_t>(1e6 * link_v);
+    link_reads_uv = static_cast<std::int32_t>(1e6 * link_v);
     pack.take(reading);
   }
-  bool driving() const { return hal::switched.main_plus && hal::switched.main_minus; }
+  bool driving() const { return switched.main_plus && switched.main_minus; }
 };
 class PackTest : public PackWith<NoVehicleProfile> {};
 
@@ -450,7 +400,7 @@ TEST_F(PackTest, ClosesWhenATruckAsksAndOpensWhenItNoLongerDoes) {
 }
 
 TEST_F(PackTest, AfterAResetByTheWatchdogNothingClosesBeforeItIsCleared) {
-  hal::cause = hal::ResetCause::watchdog;
+  cause = hal::ResetCause::watchdog;
   std::uint8_t counter = 0;
   for (int k = 0; k < 20; ++k) {
     ask(can::Command::code_request, 1, counter = can::next(counter));
@@ -521,7 +471,7 @@ TEST_F(ChargerTest, ReadsStatusVoltageAndTheCurrentItMayGiveInItsOwnReceivePdos)
   EXPECT_EQ(told(0x30A), (std::vector<Bytes>{{0xC8, 0x00, 0x00, 0xF7, 0xD1, 0x00, 0x00}})) << "52.492 V in 1/1024";
   EXPECT_EQ(told(0x40A), (std::vector<Bytes>{{0x00, 0x00, 54}}));
   charge_for_s(30);
-  ASSERT_TRUE(hal::switched.charge_enable);
+  ASSERT_TRUE(switched.charge_enable);
   sent.clear();
   charge_for_s(1);
   EXPECT_EQ(told(0x701), (std::vector<Bytes>{{5}})) << "operational without a master";

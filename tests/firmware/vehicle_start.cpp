@@ -3,62 +3,26 @@
 // cmake/dbc_page.py makes the page with it.
 #include <cmath>
 #include <cstdio>
-#include <deque>
-#include <functional>
 #include <string>
 
 #include <fmt/format.h>
 
-#include "firmware/application.hpp"
-#include "host_sim/cell_file.hpp"
+#include "tests/firmware/host_hal.hpp"
 
 namespace bms {
 namespace {
 
-std::deque<hal::CanFrame> requests;
-hal::PowerPath switched;
-double link_v = 0;
-
-}  // namespace
-
-namespace hal {
-std::function<void(const CanFrame&)> hears;
-bool can_listening() { return true; }
-bool can_send(const CanFrame& frame) {
-  hears(frame);
-  return true;
-}
-void power_path_set(const PowerPath& wanted) { switched = wanted; }
-std::int32_t link_uv() { return static_cast<std::int32_t>(1e6 * link_v); }
-ResetCause reset_cause() { return ResetCause::power_on; }
-std::optional<FaultRecord> last_fault() { return std::nullopt; }
-void record(std::span<const std::uint32_t>) {}
-void watchdog_feed() {}
-bool next_request(CanFrame& frame) {
-  if (requests.empty()) return false;
-  frame = requests.front();
-  requests.pop_front();
-  return true;
-}
-std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
-}  // namespace hal
-
-namespace {
+using namespace host_hal;
 
 constexpr double period_s = 0.1, precharge_s = 0.5;
-const auto table9 = model::prepare<float, model::max_intervals>(read_cell("table9").parameters);
 
-struct Board {
-  using Estimator = SocEstimator<float>;
-  static constexpr std::size_t cells = 16;
-  static Estimate<float> step(Estimator& estimator, const Sample& sample) { return estimator.step(table9, sample); }
-  static void look(Condition<Estimator>& condition, const Estimator& estimator, const Sample& sample, const Estimate<float>& e, bool limits_wanted) {
-    condition.update(table9, sample, e, estimator.state(), limits_wanted);
-  }
-  static void tell_apart(PackCells<float, 16>& of, const PackSample<16>& pack, const Estimate<float>& e) { of.update(table9, pack, e); }
-  static const model::Plausible& plausible() { return table9.plausible; }
+struct Board : Table9Board<16> {
   static const protection::ProtectionPlan& plan() {
-    static const auto plan = protection::protection_plan({.limits = read_cell("table9").parameters.limits, .capacity_ah = 6, .cells = cells, .temperatures = 4, .sample_period_s = period_s, .precharge_time_constant_s = precharge_s});
+    static const auto plan = [] {
+      auto design = Table9Board<16>::design(period_s);
+      design.precharge_time_constant_s = precharge_s;
+      return protection::protection_plan(design);
+    }();
     return plan;
   }
 };
@@ -66,15 +30,6 @@ struct Board {
 /// The truck's side: hears what is on the bus, asks once a second.
 class Truck {
  public:
-  Truck() {
-    hal::hears = [this](const hal::CanFrame& f) {
-      if (f.id == can::ContactorState::id) contactors = can::ContactorState::of(f);
-      if (f.id == can::AllowedCurrent::id) allowed = can::AllowedCurrent::of(f);
-      if (f.id == can::Faults::id) faults = can::Faults::of(f);
-      if (f.id == can::CommandAnswer::id) answer = can::CommandAnswer::of(f);
-      heard = true;
-    };
-  }
   void command(std::uint32_t code, std::uint32_t with) {
     can::Command c;
     c.code = code;
@@ -98,8 +53,10 @@ class Truck {
     sample.pack_uv = static_cast<std::int32_t>(1e6 * pack_v);
     for (std::size_t k = 0; k < 4; ++k) sample.temperature_cdegc[k] = static_cast<std::int16_t>(2'500 + static_cast<int>((static_cast<std::size_t>(samples_) + k) % 3));
     const double target_v = switched.main_plus || (switched.precharge && switched.main_minus) ? pack_v : 0;
-    link_v = switched.main_plus && switched.main_minus ? pack_v : target_v + (link_v - target_v) * std::exp(-period_s / precharge_s);
+    link_v_ = switched.main_plus && switched.main_minus ? pack_v : target_v + (link_v_ - target_v) * std::exp(-period_s / precharge_s);
+    link_reads_uv = static_cast<std::int32_t>(1e6 * link_v_);
     application_.take(sample);
+    hear();
   }
   double now_s() const { return period_s * samples_; }
   /// Samples pass until it is so; after a minute it is none of this firmware.
@@ -126,10 +83,22 @@ class Truck {
   double first_cell_v = 3.28;
 
  private:
+  void hear() {
+    for (const hal::CanFrame& f : sent) {
+      if (f.id == can::ContactorState::id) contactors = can::ContactorState::of(f);
+      if (f.id == can::AllowedCurrent::id) allowed = can::AllowedCurrent::of(f);
+      if (f.id == can::Faults::id) faults = can::Faults::of(f);
+      if (f.id == can::CommandAnswer::id) answer = can::CommandAnswer::of(f);
+      heard = true;
+    }
+    sent.clear();
+  }
+
   storage::Persistence persistence_;
   Application<Board> application_{StartingPoint{500'000'000, 10'000'000}, {}, 6, persistence_};
   std::uint8_t counter_ = 0;
   int samples_ = 0;
+  double link_v_ = 0;
 };
 
 void tell() {

@@ -1,0 +1,39 @@
+#include "tests/firmware/host_hal.hpp"
+
+namespace bms {
+
+void host_hal::begin() {
+  listening = true;
+  sent.clear();
+  requests.clear();
+  recorded.clear();
+  switched = {};
+  link_reads_uv = 0;
+  cause = hal::ResetCause::power_on;
+  fault.reset();
+  fed = 0;
+}
+
+namespace hal {
+
+bool can_listening() { return host_hal::listening; }
+bool can_send(const CanFrame& frame) {
+  host_hal::sent.push_back(frame);
+  return true;
+}
+bool next_request(CanFrame& frame) {
+  if (host_hal::requests.empty()) return false;
+  frame = host_hal::requests.front();
+  host_hal::requests.pop_front();
+  return true;
+}
+void record(std::span<const std::uint32_t> words) { host_hal::recorded.emplace_back(words.begin(), words.end()); }
+void power_path_set(const PowerPath& wanted) { host_hal::switched = wanted; }
+std::int32_t link_uv() { return host_hal::link_reads_uv; }
+ResetCause reset_cause() { return host_hal::cause; }
+std::optional<FaultRecord> last_fault() { return host_hal::fault; }
+std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
+void watchdog_feed() { ++host_hal::fed; }
+
+}  // namespace hal
+}  // namespace bms
