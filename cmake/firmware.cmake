@@ -65,7 +65,7 @@ add_compile_options(${BMS_CPU_FLAGS} -g -ffunction-sections -fdata-sections -fno
   $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions> $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> $<$<COMPILE_LANGUAGE:CXX>:-fno-threadsafe-statics> $<$<COMPILE_LANGUAGE:CXX>:-fno-use-cxa-atexit>
   -Wsign-conversion -Wdouble-promotion -Wfloat-conversion
   -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=build)  # the same bytes wherever it is built; what comes last is looked at first
-add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs
+add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs -L${CMAKE_SOURCE_DIR}/hal/cortex_m
   -Wl,--gc-sections,--no-warn-rwx-segments,--fatal-warnings)
 
 include(${CMAKE_SOURCE_DIR}/cmake/can_messages.cmake)
@@ -80,10 +80,19 @@ endfunction()
 
 set(hal ${CMAKE_SOURCE_DIR}/hal)
 set(chip ${hal}/${BMS_CHIP})
-bms_objects(hal_core -Os ${chip}/startup.cpp ${chip}/power.cpp)
+set(core ${hal}/cortex_m)
+list(TRANSFORM BMS_REPLACED_IN_EMULATION APPEND .cpp OUTPUT_VARIABLE replaced)
+list(TRANSFORM replaced PREPEND ${chip}/ OUTPUT_VARIABLE on_the_chip)
+list(TRANSFORM replaced PREPEND ${hal}/emulated/ OUTPUT_VARIABLE in_emulation)
+set(chip_flash ${hal}/${BMS_FLASH}/flash.cpp)  # BMS_FLASH: the chip's folder, or absent
+set(emulated_flash ${hal}/emulated/flash.cpp)
+if(BMS_FLASH STREQUAL absent)
+  set(emulated_flash ${chip_flash})
+endif()
+bms_objects(hal_core -Os ${core}/startup.cpp ${core}/fault_record.cpp ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
 bms_objects(hal_clock -Os ${chip}/clock.cpp)
-bms_objects(hal_chip -Os ${chip}/clock_tree.cpp ${chip}/finish.cpp ${chip}/flash.cpp ${hal}/absent/calendar.cpp)
-bms_objects(hal_emulated -Os ${hal}/emulated/clock_tree.cpp ${hal}/emulated/semihosting.cpp)
+bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${hal}/absent/calendar.cpp)
+bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})
 # the board's back ends: BMS_CAN names how it talks, BMS_SAMPLES where its samples come from
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
@@ -94,8 +103,9 @@ bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${hal}/absent/r
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
 target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION} ${vehicle_profile_${BMS_VEHICLE_PROFILE}})
-bms_objects(hal_emulated_flash -Os ${hal}/emulated/flash.cpp ${hal}/emulated/calendar.cpp)
+bms_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
+target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
 
 bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
 
@@ -109,29 +119,29 @@ math(EXPR version "${PROJECT_VERSION_MAJOR} * 65536 + ${PROJECT_VERSION_MINOR} *
 target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
 
 set(linker_script ${BMS_LINKER_SCRIPT})
-# bms_image(NAME OBJECTS...)
+# bms_image(NAME OBJECTS...); of functions that several of them hold, the linker takes the first: the step's, which are made for speed
 function(bms_image name)
   list(TRANSFORM ARGN PREPEND "$<TARGET_OBJECTS:" OUTPUT_VARIABLE objects)
   list(TRANSFORM objects APPEND ">")
   add_executable(${name} ${objects})
   target_link_options(${name} PRIVATE -T${linker_script} -Wl,--undefined=image_cell_hash -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
-  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${linker_script} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
+  set_target_properties(${name} PROPERTIES LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
 endfunction()
 
 if(NOT BMS_EMULATED)
-  bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_chip hal_board hal_samples storage application estimator_step)
-  bms_image(bms_${BMS_BOARD}_remote hal_core hal_clock hal_chip hal_board hal_remote_samples storage application estimator_step)
+  bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_chip hal_board hal_samples estimator_step storage application)
+  bms_image(bms_${BMS_BOARD}_remote hal_core hal_clock hal_chip hal_board hal_remote_samples estimator_step storage application)
   foreach(image bms_${BMS_BOARD} bms_${BMS_BOARD}_remote)
     target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)  # for a debugger, and tests/firmware
   endforeach()
   set(linker_script ${CMAKE_SOURCE_DIR}/boards/${BMS_LOOP_BOARD}/memory.ld)  # the memory of an emulated board with the same chip
-  bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil storage application estimator_step)
+  bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil estimator_step storage application)
   return()
 endif()
-bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples storage application estimator_step)
-bms_image(bms_${BMS_BOARD}_replay hal_core hal_clock hal_emulated hal_stream storage application estimator_step)
-bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil storage application estimator_step)
-bms_image(bms_${BMS_BOARD}_bench hal_core hal_clock hal_chip hal_board hal_samples storage application estimator_step)
+bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples estimator_step storage application)
+bms_image(bms_${BMS_BOARD}_replay hal_core hal_clock hal_emulated hal_stream estimator_step storage application)
+bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil estimator_step storage application)
+bms_image(bms_${BMS_BOARD}_bench hal_core hal_clock hal_chip hal_board hal_samples estimator_step storage application)
 
 bms_objects(fault_image -Os ${CMAKE_SOURCE_DIR}/tests/firmware/fault_image.cpp)
 bms_image(bms_${BMS_BOARD}_fault hal_core hal_clock hal_emulated fault_image)

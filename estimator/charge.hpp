@@ -31,7 +31,7 @@ class Charge {
 
   /// current_ua: not below -2^31 + 1; duration_us: at most 2e9.
   constexpr void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
-    uaus_ += static_cast<std::int64_t>(current_ua) * static_cast<std::int64_t>(duration_us);
+    uaus_ += model::wide_product(current_ua, static_cast<std::int32_t>(duration_us));
     hold(scale);
   }
 

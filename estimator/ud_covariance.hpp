@@ -21,7 +21,6 @@ template <class S, std::size_t N>
 class UdCovariance {
   using Variance = model::Variance<S>;
   using Coupling = model::Coupling<S>;
-  using Fraction = model::Fraction<S>;
   using State = model::Voltage<S>;  // also soc: the same range in every scalar
 
  public:
@@ -118,7 +117,7 @@ class UdCovariance {
       const Variance g = model::product<Variance>(d_[j], f);
       const Variance before = alpha;
       alpha = Variance(alpha + model::product<Variance>(g, f));
-      d_[j] = model::product<Variance>(d_[j], model::ratio<Fraction>(before, alpha));
+      d_[j] = model::product<Variance>(d_[j], model::ratio<Coupling>(before, alpha));
 #pragma GCC unroll 8
       for (std::size_t i = 0; i < j; ++i) {
         const Coupling old = u(i, j);

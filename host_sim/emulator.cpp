@@ -67,7 +67,7 @@ class Pipe {
 }  // namespace
 
 const std::vector<EmulatedBoard>& emulated_boards() {
-  static const std::vector<EmulatedBoard> boards = {{"netduinoplus2", "netduinoplus2", ScalarKind::single}};
+  static const std::vector<EmulatedBoard> boards = {{"netduinoplus2", "netduinoplus2", ScalarKind::single}, {"microbit", "microbit", ScalarKind::fixed}};
   return boards;
 }
 

@@ -42,8 +42,8 @@ struct ChargeScale {
   std::int64_t lowest_uaus = 0;      ///< where counting stops: -1/4 of the capacity
   std::int64_t highest_uaus = 0;     ///< and 5/4 of it
   int shift = 0;
-  Soc<S> soc_per_count{};            ///< fixed point: per 2^28 counts, 0.5 .. 1
-  Soc<S> counts_per_soc{};           ///< its inverse; fixed point: in 2^28 counts
+  Soc<S> soc_per_count{};            ///< fixed point: per 2^27 counts (what Soc holds as 1), 0.25 .. 0.5
+  Soc<S> counts_per_soc{};           ///< its inverse; fixed point: in 2^27 counts
 };
 
 /// A current reading that rests (estimator/current_at_rest.hpp).
@@ -242,7 +242,8 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.charge.lowest_uaus = -(cell.charge.capacity_uaus / 4);
   cell.charge.highest_uaus = cell.charge.capacity_uaus + cell.charge.capacity_uaus / 4;
   const double per_soc = static_cast<double>(cell.charge.capacity_uaus) / (268'435'456.0 * static_cast<double>(std::int64_t{1} << cell.charge.shift));
-  const double unit = is_q<Soc<S>> ? 1 : 268'435'456.0;
+  double unit = 268'435'456.0;
+  if constexpr (is_q<Soc<S>>) unit /= static_cast<double>(std::int32_t{1} << Soc<S>::fraction_bits);
   cell.charge.counts_per_soc = Soc<S>(per_soc * unit);
   cell.charge.soc_per_count = Soc<S>(1 / (per_soc * unit));
 
@@ -294,16 +295,16 @@ constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std
   const Interval<S>& i = cell.interval[k];
   const Soc<S> t = (soc - i.start) * i.per_width;
   return {.per_width = i.per_width,
-          .ocv_v = i.ocv_v + t * i.ocv_delta_v,
+          .ocv_v = i.ocv_v + Voltage<S>(t * i.ocv_delta_v),
           .ocv_delta_v = i.ocv_delta_v,
-          .r0_ohm = i.r0_ohm + t * i.r0_delta_ohm,
+          .r0_ohm = i.r0_ohm + Resistance<S>(t * i.r0_delta_ohm),
           .r0_delta_ohm = i.r0_delta_ohm,
-          .r1_ohm = i.r1_ohm + t * i.r1_delta_ohm,
+          .r1_ohm = i.r1_ohm + Resistance<S>(t * i.r1_delta_ohm),
           .r1_delta_ohm = i.r1_delta_ohm,
-          .c1_f = i.c1_f + t * i.c1_delta_f,
+          .c1_f = i.c1_f + Capacitance<S>(t * i.c1_delta_f),
           .c1_delta_f = i.c1_delta_f,
           .error_v2 = i.error_v2,
-          .gap = i.gap + t * i.gap_delta,
+          .gap = i.gap + Factor<S>(t * i.gap_delta),
           .gap_delta = i.gap_delta};
 }
 

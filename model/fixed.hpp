@@ -13,13 +13,20 @@
 
 #include <bit>
 #include <compare>
+#include <concepts>
 #include <cstdint>
 #include <type_traits>
+
+#include "model/scaled.hpp"
+#include "model/wide_product.hpp"
 
 namespace bms::model {
 
 template <int I, int F>
 class Q;
+
+template <class A, class B>
+class Product;
 
 template <class T>
 inline constexpr bool is_q = false;
@@ -48,8 +55,36 @@ constexpr std::int64_t saturated_shift(std::int64_t v, int shift, std::int64_t l
   return r > limit ? limit : r < -limit ? -limit : r;
 }
 
+/// v, which has fewer than From bits, times 2^Shift, rounded to nearest, as a number of To bits, held within +-(2^To - 1).
+template <int From, int Shift, int To, class Raw>
+constexpr auto converted(Raw v) {
+  using Out = std::conditional_t<(To <= 31), std::int32_t, std::int64_t>;
+  constexpr auto limit = static_cast<Out>((std::uint64_t{1} << To) - 1);
+  if constexpr (Shift >= 0) {
+    if constexpr (From + Shift <= To) {
+      return static_cast<Out>(static_cast<std::conditional_t<(To <= 31), std::uint32_t, std::uint64_t>>(v) << Shift);
+    } else {
+      constexpr auto room = static_cast<Raw>(Shift < 63 ? static_cast<std::uint64_t>(limit) >> Shift : 0);
+      return v > room ? limit : v < -room ? static_cast<Out>(-limit) : static_cast<Out>(static_cast<std::uint64_t>(v) << Shift);
+    }
+  } else if constexpr (-Shift > From) {
+    return Out{0};
+  } else {
+    const Raw r = static_cast<Raw>((v >> -Shift) + (v >> (-Shift - 1) & 1));
+    if constexpr (From + Shift < To) {
+      return static_cast<Out>(r);
+    } else if constexpr (To == 31 && sizeof(Raw) > sizeof(Out)) {
+      const auto low = static_cast<std::int32_t>(r);
+      if (low == r && low != -limit - 1) [[likely]] return low;
+      return r < 0 ? -limit : limit;
+    } else {
+      return static_cast<Out>(r > limit ? limit : r < -limit ? -limit : r);
+    }
+  }
+}
+
 /// a * b * 2^-drop, rounded towards minus infinity, for 64 x 32 bit; the caller's types promise that the result fits.
-constexpr std::int64_t wide_product(std::int64_t a, std::int32_t b, int drop) {
+constexpr std::int64_t wider_product(std::int64_t a, std::int32_t b, int drop) {
   const std::int64_t high = (a >> 32) * b;                                      // |.| < 2^62
   const std::int64_t low = static_cast<std::int64_t>(a & 0xFFFFFFFF) * b;      // |.| < 2^63
   if (drop <= 32) return static_cast<std::int64_t>(static_cast<std::uint64_t>(high) << (32 - drop)) + (low >> drop);
@@ -88,7 +123,14 @@ class Q {
   /// From another range: rounds to nearest, saturates.
   template <int I2, int F2>
   constexpr Q(Q<I2, F2> other)  // NOLINT(google-explicit-constructor): narrowing at a named type is the idea
-      : raw_{static_cast<Raw>(fixed_detail::saturated_shift(other.raw(), F - F2, raw_limit))} {}
+      : raw_{fixed_detail::converted<I2 + F2, F - F2, I + F>(other.raw())} {}
+
+  /// The same from a number with its own power of two.
+  constexpr Q(Scaled other) : raw_{other.in_steps(F, raw_limit)} {}  // NOLINT(google-explicit-constructor)
+
+  /// A product: the same, without its exact value in between where that would be longer.
+  template <class A, class B>
+  constexpr Q(const Product<A, B>& product) : raw_{stored(product)} {}  // NOLINT(google-explicit-constructor)
 
   static constexpr Q from_raw(Raw raw) {
     Q q;
@@ -107,6 +149,15 @@ class Q {
   constexpr Q& operator-=(Q o) { return *this = Q(*this - o); }
 
  private:
+  template <class A, class B>
+  static constexpr Raw stored(const Product<A, B>& product) {
+    constexpr int shift = A::fraction_bits + B::fraction_bits - F;
+    if constexpr (sizeof(typename A::Raw) + sizeof(typename B::Raw) == 2 * sizeof(std::int32_t) && I + F <= 31 && shift >= 0 && Product<A, B>::Exact::integer_bits + Product<A, B>::Exact::fraction_bits > 31)
+      return rounded_product<shift, I + F>(product.a.raw(), product.b.raw());
+    else
+      return Q(product.exact()).raw();
+  }
+
   Raw raw_ = 0;
 };
 
@@ -124,9 +175,9 @@ struct Sum {
 };
 
 /// Raw value brought to f fraction bits; f is never more than the type that holds it has room for.
-template <int I, int F>
-constexpr std::int64_t aligned(Q<I, F> q, int f) {
-  return shifted(q.raw(), f - F);
+template <class Raw, int To, int I, int F>
+constexpr Raw aligned(Q<I, F> q) {
+  return static_cast<Raw>(converted<I + F, To - F, I + To>(q.raw()));
 }
 
 }  // namespace fixed_detail
@@ -134,7 +185,8 @@ constexpr std::int64_t aligned(Q<I, F> q, int f) {
 template <int I1, int F1, int I2, int F2>
 constexpr auto operator+(Q<I1, F1> a, Q<I2, F2> b) {
   using R = typename fixed_detail::Sum<I1, F1, I2, F2>::type;
-  return R::from_raw(static_cast<typename R::Raw>(fixed_detail::aligned(a, R::fraction_bits) + fixed_detail::aligned(b, R::fraction_bits)));
+  using Raw = typename R::Raw;
+  return R::from_raw(fixed_detail::aligned<Raw, R::fraction_bits>(a) + fixed_detail::aligned<Raw, R::fraction_bits>(b));
 }
 
 template <int I1, int F1, int I2, int F2>
@@ -142,72 +194,106 @@ constexpr auto operator-(Q<I1, F1> a, Q<I2, F2> b) {
   return a + (-b);
 }
 
+namespace fixed_detail {
+
 template <int I1, int F1, int I2, int F2>
-constexpr auto operator*(Q<I1, F1> a, Q<I2, F2> b) {
+constexpr auto exact_product(Q<I1, F1> a, Q<I2, F2> b) {
   constexpr int i = I1 + I2;
   constexpr bool wide_a = I1 + F1 > 31, wide_b = I2 + F2 > 31;
   static_assert(!(wide_a && wide_b), "64 x 64 bit: store one operand in a narrower named type first");
   if constexpr (!wide_a && !wide_b) {
     using R = Q<i, F1 + F2>;
-    return R::from_raw(static_cast<typename R::Raw>(static_cast<std::int64_t>(a.raw()) * b.raw()));
+    if constexpr (i + F1 + F2 <= 31) return R::from_raw(a.raw() * b.raw());
+    return R::from_raw(static_cast<typename R::Raw>(wide_product(a.raw(), b.raw())));
   } else if constexpr (wide_b) {
-    return b * a;
+    return exact_product(b, a);
   } else {
     constexpr int f = fixed_detail::smaller(F1 + F2, 63 - i);
-    return Q<i, f>::from_raw(fixed_detail::wide_product(a.raw(), static_cast<std::int32_t>(b.raw()), F1 + F2 - f));
+    return Q<i, f>::from_raw(fixed_detail::wider_product(a.raw(), static_cast<std::int32_t>(b.raw()), F1 + F2 - f));
   }
+}
+
+template <class T>
+constexpr auto exact(const T& x) {
+  if constexpr (is_q<T>) return x;
+  else return x.exact();
+}
+
+}  // namespace fixed_detail
+
+/// Two factors, multiplied when it is known where the product goes: stored at once in a named type, else exactly.
+template <class A, class B>
+class Product {
+ public:
+  using Exact = decltype(fixed_detail::exact_product(A{}, B{}));
+
+  constexpr Product(const A& first, const B& second) : a(first), b(second) {}
+  constexpr Exact exact() const { return fixed_detail::exact_product(a, b); }
+  constexpr Product operator-() const { return {-a, b}; }
+
+  A a;
+  B b;
+};
+
+template <class T>
+inline constexpr bool is_product = false;
+template <class A, class B>
+inline constexpr bool is_product<Product<A, B>> = true;
+
+template <int I1, int F1, int I2, int F2>
+constexpr Product<Q<I1, F1>, Q<I2, F2>> operator*(Q<I1, F1> a, Q<I2, F2> b) {
+  return {a, b};
+}
+
+template <class A, class B>
+concept OneIsAProduct = (is_product<A> && (is_product<B> || is_q<B>)) || (is_q<A> && is_product<B>);
+
+template <class A, class B>
+  requires OneIsAProduct<A, B>
+constexpr auto operator+(const A& a, const B& b) {
+  return fixed_detail::exact(a) + fixed_detail::exact(b);
+}
+template <class A, class B>
+  requires OneIsAProduct<A, B>
+constexpr auto operator-(const A& a, const B& b) {
+  return fixed_detail::exact(a) - fixed_detail::exact(b);
+}
+template <class A, class B>
+  requires OneIsAProduct<A, B>
+constexpr auto operator*(const A& a, const B& b) {
+  return fixed_detail::exact(a) * fixed_detail::exact(b);
+}
+template <class A, class B>
+  requires OneIsAProduct<A, B>
+constexpr bool operator<(const A& a, const B& b) {
+  return fixed_detail::exact(a) < fixed_detail::exact(b);
 }
 
 template <int I1, int F1, int I2, int F2>
 constexpr std::strong_ordering operator<=>(Q<I1, F1> a, Q<I2, F2> b) {
-  constexpr int f = fixed_detail::smaller(fixed_detail::larger(F1, F2), 63 - fixed_detail::larger(I1, I2));
-  return fixed_detail::aligned(a, f) <=> fixed_detail::aligned(b, f);
+  constexpr int i = fixed_detail::larger(I1, I2), f = fixed_detail::smaller(fixed_detail::larger(F1, F2), 63 - i);
+  using Raw = std::conditional_t<(i + f <= 31), std::int32_t, std::int64_t>;
+  return fixed_detail::aligned<Raw, f>(a) <=> fixed_detail::aligned<Raw, f>(b);
 }
 template <int I1, int F1, int I2, int F2>
 constexpr bool operator==(Q<I1, F1> a, Q<I2, F2> b) {
   return (a <=> b) == 0;
 }
 
-/// numerator / denominator stored in R, relative error below 2^-30 plus half a step of R; saturates; x / 0 is R's end.
-template <class R, int I1, int F1, int I2, int F2>
-constexpr R ratio(Q<I1, F1> numerator, Q<I2, F2> denominator) {
-  const bool negative = (numerator.raw() < 0) != (denominator.raw() < 0);
-  std::uint64_t n = numerator.raw() < 0 ? -static_cast<std::uint64_t>(numerator.raw()) : static_cast<std::uint64_t>(numerator.raw());
-  std::uint64_t d = denominator.raw() < 0 ? -static_cast<std::uint64_t>(denominator.raw()) : static_cast<std::uint64_t>(denominator.raw());
-  if (n == 0) return R{};
-  if (d == 0) return negative ? -R::highest() : R::highest();
-  // n gets 63 significant bits, d 32: the 64 / 32 bit quotient then has 31 or 32
-  const int up_n = std::countl_zero(n) - 1;
-  n <<= up_n;
-  const int up_d = std::countl_zero(d) - 32;
-  d = up_d >= 0 ? d << up_d : (d >> -up_d);
-  const auto quotient = static_cast<std::int64_t>(n / d);  // value * 2^(up_n - up_d + F1 - F2)
-  const int shift = R::fraction_bits - (up_n - up_d + F1 - F2);
-  const std::int64_t raw = fixed_detail::saturated_shift(quotient, shift > 62 ? 62 : shift, R::raw_limit);
-  return R::from_raw(static_cast<typename R::Raw>(negative ? -raw : raw));
+/// Of either kind: fixed point, or with a power of two of its own.
+template <class T>
+concept InIntegers = is_q<T> || is_product<T> || std::same_as<T, Scaled>;
+
+/// numerator / denominator stored in R, relative error below 2^-27 plus half a step of R; saturates; x / 0 is R's end, 0 / 0 is 0.
+template <InIntegers R, InIntegers A, InIntegers B>
+constexpr R ratio(const A& numerator, const B& denominator) {
+  return R(Scaled(numerator) * Scaled(denominator).reciprocal());
 }
 
-/// Square root stored in R, rounded down to a step of R; 0 for negative arguments.
-template <class R, int I, int F>
-constexpr R root(Q<I, F> x) {
-  if (x.raw() <= 0) return R{};
-  // normalise to an even number of fraction bits with as many significant bits as fit
-  auto v = static_cast<std::uint64_t>(x.raw());
-  int up = std::countl_zero(v) - 1;
-  if ((F + up) % 2 != 0) --up;
-  v <<= up;
-  std::uint64_t result = 0;
-  for (std::uint64_t bit = std::uint64_t{1} << 62; bit != 0; bit >>= 2) {
-    if (v >= result + bit) {
-      v -= result + bit;
-      result = (result >> 1) + bit;
-    } else {
-      result >>= 1;
-    }
-  }
-  // result has (F + up) / 2 fraction bits
-  return R::from_raw(static_cast<typename R::Raw>(
-      fixed_detail::saturated_shift(static_cast<std::int64_t>(result), R::fraction_bits - (F + up) / 2, R::raw_limit)));
+/// Square root stored in R, the same; 0 for negative arguments.
+template <InIntegers R, InIntegers A>
+constexpr R root(const A& x) {
+  return R(Scaled(x).root());
 }
 
 }  // namespace bms::model

@@ -52,29 +52,29 @@ struct OneRc {
 
   /// v_rc at the start of the step; `at` and `settling` belong to the soc at its end.
   static constexpr Polarisation advance(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
-    return {Voltage<S>(x[0] + settling.settled * gap_v(x, at, drive))};
+    return {Voltage<S>(x[0] + Voltage<S>(settling.settled * gap_v(x, at, drive)))};
   }
 
   /// Terminal voltage (Eq. 9).
   static constexpr Voltage<S> voltage(const Polarisation& x, const TablePoint<S>& at, const Drive<S>& drive) {
-    return at.ocv_v + x[0] + at.r0_ohm * drive.current_a;
+    return at.ocv_v + x[0] + Voltage<S>(at.r0_ohm * drive.current_a);
   }
 
   /// d (state after) / d (state before), upper triangular. The derivative by soc runs through R1, C1 and dp/dx = exp(-x).
   static constexpr Transition transition(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
     const Fraction<S> remaining = Fraction<S>(1) - settling.settled;
     // over one interval: tau, p, and what v_rc goes to
-    const Duration<S> tau_delta_s = at.r1_delta_ohm * at.c1_f + at.r1_ohm * at.c1_delta_f;
+    const Duration<S> tau_delta_s = Duration<S>(at.r1_delta_ohm * at.c1_f) + Duration<S>(at.r1_ohm * at.c1_delta_f);
     const Ratio tau_change = tau_delta_s * settling.rate_per_s;
     const Ratio settled_delta = -(Ratio(remaining * Short(settling.exponent)) * tau_change);
     const Voltage<S> target_delta_v = at.r1_delta_ohm * drive.current_a;
-    const Voltage<S> delta_v = settled_delta * gap_v(x, at, drive) + settling.settled * target_delta_v;
+    const Voltage<S> delta_v = Voltage<S>(settled_delta * gap_v(x, at, drive)) + Voltage<S>(settling.settled * target_delta_v);
     return {{{Coupling<S>(remaining), Coupling<S>(delta_v * at.per_width)}, {Coupling<S>(0), Coupling<S>(1)}}};
   }
 
   /// d voltage / d state, at the state after the step.
   static constexpr Sensitivity sensitivity(const TablePoint<S>& at, const Drive<S>& drive) {
-    return {VoltagePerSoc<S>(1), VoltagePerSoc<S>(Voltage<S>(at.ocv_delta_v + at.r0_delta_ohm * drive.current_a) * at.per_width)};
+    return {VoltagePerSoc<S>(1), VoltagePerSoc<S>(Voltage<S>(at.ocv_delta_v + Voltage<S>(at.r0_delta_ohm * drive.current_a)) * at.per_width)};
   }
 
  private:
@@ -83,7 +83,7 @@ struct OneRc {
 
   /// How far v_rc is from where the current leads it.
   static constexpr Voltage<S> gap_v(const Polarisation& x, const TablePoint<S>& at, const Drive<S>& drive) {
-    return at.r1_ohm * drive.current_a - x[0];
+    return Voltage<S>(at.r1_ohm * drive.current_a) - x[0];
   }
 };
 

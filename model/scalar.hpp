@@ -43,24 +43,24 @@ struct Quantities {  // a floating-point or dual number: one type for all
 };
 
 template <>
-struct Quantities<FixedPoint> {
-  using Soc = Q<3, 28>;                 // +-8, step 3.7e-9
-  using PerSoc = Q<11, 20>;             // 1 / width of an interval: up to 2,048
-  using Voltage = Q<3, 28>;             // +-8 V, step 3.7 nV; also every other state but soc
-  using VoltagePerSoc = Q<7, 24>;       // +-128 V
-  using Current = Q<11, 20>;            // +-2,048 A, step 1 uA
-  using Resistance = Q<0, 31>;          // below 1 ohm, step 0.5 nohm
-  using Capacitance = Q<17, 14>;        // below 131 kF
-  using Duration = Q<17, 14>;           // time constants, below 131,072 s
+struct Quantities<FixedPoint> {  // in 30 bits where they are added: the sum of two then has 31
+  using Soc = Q<3, 27>;                 // +-8, step 7.5e-9
+  using PerSoc = Q<11, 19>;             // 1 / width of an interval: up to 2,048
+  using Voltage = Q<3, 27>;             // +-8 V, step 7.5 nV; also every other state but soc
+  using VoltagePerSoc = Q<7, 23>;       // +-128 V
+  using Current = Q<11, 19>;            // +-2,048 A, step 2 uA
+  using Resistance = Q<0, 30>;          // below 1 ohm, step 1 nohm
+  using Capacitance = Q<17, 13>;        // below 131 kF
+  using Duration = Q<17, 13>;           // time constants, below 131,072 s
   using TimeStep = Q<12, 19>;           // one step, below 4,096 s (a longer one counts as 4,096 s: everything has settled), step 1.9 us
   using Rate = Q<3, 28>;                // 1 / time constant: 0.125 s and longer
   using Exponent = Q<15, 47>;           // time step times rate
-  using Fraction = Q<1, 30>;            // +-2
-  using Variance = Q<3, 60>;            // below 8 V^2 or 8 soc^2, step 8.7e-19
-  using Coupling = Q<7, 24>;            // one state per unit of another: +-128
-  using Count = Q<24, 7>;               // samples that share one error: below 16,777,216
-  using Temperature = Q<9, 22>;         // +-512 degrees C or K, step 0.24 uK
-  using Factor = Q<7, 24>;              // what a resistance is multiplied by: below 128
+  using Fraction = Q<1, 29>;            // +-2
+  using Variance = Scaled;              // 30 bits, of any size
+  using Coupling = Scaled;              // one state per unit of another
+  using Count = Scaled;                 // samples that share one error
+  using Temperature = Q<9, 21>;         // +-512 degrees C or K, step 0.5 uK
+  using Factor = Q<7, 23>;              // what a resistance is multiplied by: below 128
 };
 
 template <class S> using Soc = typename Quantities<S>::Soc;                              ///< 0 empty .. 1 full
@@ -88,13 +88,13 @@ constexpr R product(const A& a, const B& b) {
 }
 
 template <class R, class S>
-  requires(!is_q<R>)
+  requires(!InIntegers<R>)
 constexpr R ratio(const S& numerator, const S& denominator) {
   return numerator / denominator;
 }
 
 template <class R, class S>
-  requires(!is_q<R>)
+  requires(!InIntegers<R>)
 R root(const S& x) {
   using std::sqrt;  // IEEE 754: correctly rounded, equal on every core; a Jet brings its own
   return sqrt(x);
@@ -104,11 +104,8 @@ R root(const S& x) {
 template <class R>
 constexpr R from_micro(std::int32_t micro) {
   if constexpr (is_q<R>) {
-    constexpr std::int64_t factor = 4'503'599'627;  // 2^52 / 10^6
-    // |micro| < 2^31: split so that 64 bits are enough
-    const std::int64_t high = (static_cast<std::int64_t>(micro) >> 16) * factor;      // < 2^48
-    const std::int64_t low = (static_cast<std::int64_t>(micro) & 0xFFFF) * factor;    // < 2^49
-    return Q<11, 36>::from_raw(high + (low >> 16));                                   // micro * 2^36 / 10^6
+    constexpr std::int32_t factor = 1'125'899'907;  // 2^50 / 10^6
+    return R::from_raw(rounded_product<50 - R::fraction_bits, R::integer_bits + R::fraction_bits>(micro, factor));
   } else if constexpr (std::same_as<R, float>) {
     return static_cast<float>(micro) * 1e-6F;
   } else {
@@ -157,7 +154,7 @@ constexpr std::int32_t to_micro(const T& x) {
 
 /// Number without its derivatives, as double: for reports and tests, never in the step.
 template <class T>
-  requires(is_q<T> || std::floating_point<T>)
+  requires(InIntegers<T> || std::floating_point<T>)
 constexpr double as_double(const T& x) {
   return static_cast<double>(x);
 }

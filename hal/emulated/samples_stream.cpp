@@ -15,7 +15,7 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::size_t block = 512;
+constexpr std::size_t block = BMS_STREAM_BLOCK;  // samples at a time: as the board has room
 constexpr int bad_stream = 3;
 
 template <class T>

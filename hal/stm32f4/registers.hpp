@@ -1,16 +1,12 @@
-// Registers of the STM32F405 that this firmware touches, by hand from ST's RM0090 (section in brackets) and ARM's ARMv7-M manual.
+// Registers of the STM32F405 that this firmware touches, by hand from ST's RM0090 (section in brackets); those of every
+// Cortex-M: hal/cortex_m/registers.hpp.
 #pragma once
 
-#include <cstdint>
+#include "hal/cortex_m/registers.hpp"
 
 namespace bms::hal::stm32f4 {
 
-using Register = volatile std::uint32_t;
-
-template <std::uint32_t Address>
-inline Register& at() {
-  return *reinterpret_cast<Register*>(Address);
-}
+using namespace cortex_m;
 
 // reset and clock control [7.3]
 inline Register& rcc_cr() { return at<0x40023800>(); }
@@ -87,21 +83,9 @@ inline Register& iwdg_kr() { return at<0x40003000>(); }
 inline Register& iwdg_pr() { return at<0x40003004>(); }
 inline Register& iwdg_rlr() { return at<0x40003008>(); }
 
-// ARMv7-M: SysTick [B3.3], NVIC [B3.4], system control [B3.2]
+// SysTick [ARMv7-M B3.3]
 inline Register& syst_csr() { return at<0xE000E010>(); }
 inline Register& syst_rvr() { return at<0xE000E014>(); }
 inline Register& syst_cvr() { return at<0xE000E018>(); }
-inline Register& nvic_iser0() { return at<0xE000E100>(); }
-inline Register& nvic_icer0() { return at<0xE000E180>(); }
-inline Register& nvic_iser1() { return at<0xE000E104>(); }
-inline Register& scb_icsr() { return at<0xE000ED04>(); }
-inline Register& scb_vtor() { return at<0xE000ED08>(); }
-inline Register& scb_aircr() { return at<0xE000ED0C>(); }
-inline Register& scb_shcsr() { return at<0xE000ED24>(); }
-inline Register& scb_cfsr() { return at<0xE000ED28>(); }
-inline Register& scb_hfsr() { return at<0xE000ED2C>(); }
-inline Register& scb_mmfar() { return at<0xE000ED34>(); }
-inline Register& scb_bfar() { return at<0xE000ED38>(); }
-inline Register& scb_cpacr() { return at<0xE000ED88>(); }
 
 }  // namespace bms::hal::stm32f4

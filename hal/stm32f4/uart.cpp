@@ -1,9 +1,7 @@
 // USART1 on PB6 (TX) and PB7 (RX), alternate function 7 (datasheet, table 9).
 #include "hal/uart.hpp"
 
-#include <array>
-#include <atomic>
-
+#include "hal/received_bytes.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
 
@@ -13,10 +11,7 @@ namespace {
 
 constexpr std::uint32_t received = 1U << 5, transmitter_free = 1U << 7;
 
-// one writer (the interrupt), one reader (the program): indices need no lock on a single core
-std::array<char, 512> buffer;
-std::atomic<std::uint32_t> written{0}, taken{0};
-std::atomic<std::uint32_t> lost{0};
+ReceivedBytes received_bytes;
 
 }  // namespace
 
@@ -28,7 +23,7 @@ void uart_start(std::uint32_t baud) {
   gpiob_afrl() = (gpiob_afrl() & ~(255U << 24)) | 0x77U << 24;
   usart1_brr() = (clocks().apb2_hz + baud / 2) / baud;
   usart1_cr1() = 1U << 13 | 1U << 5 | 1U << 3 | 1U << 2;  // on, receive interrupt, transmitter, receiver
-  nvic_iser1() = 1U << (usart1_interrupt - 32);
+  cortex_m::nvic_iser1() = 1U << (usart1_interrupt - 32);
 }
 
 void uart_write(std::span<const char> bytes) {
@@ -38,28 +33,13 @@ void uart_write(std::span<const char> bytes) {
   }
 }
 
-bool uart_read(char& byte) {
-  const std::uint32_t at = taken.load(std::memory_order_relaxed);
-  if (at == written.load(std::memory_order_acquire)) return false;
-  byte = buffer[at % buffer.size()];
-  taken.store(at + 1, std::memory_order_release);
-  return true;
-}
+bool uart_read(char& byte) { return received_bytes.take(byte); }
 
-std::uint32_t uart_lost() { return lost.load(std::memory_order_relaxed); }
+std::uint32_t uart_lost() { return received_bytes.lost(); }
 
 }  // namespace bms::hal
 
 extern "C" void usart1_interrupt() {
   using namespace bms::hal;
-  while ((stm32f4::usart1_sr() & received) != 0) {
-    const char byte = static_cast<char>(stm32f4::usart1_dr());
-    const std::uint32_t at = written.load(std::memory_order_relaxed);
-    if (at - taken.load(std::memory_order_acquire) == buffer.size()) {
-      lost.store(lost.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-      continue;
-    }
-    buffer[at % buffer.size()] = byte;
-    written.store(at + 1, std::memory_order_release);
-  }
+  while ((stm32f4::usart1_sr() & received) != 0) received_bytes.put(static_cast<char>(stm32f4::usart1_dr()));
 }

@@ -48,14 +48,14 @@ extern void qemu_plugin_outs(const char *);
 
 __attribute__((visibility("default"))) int qemu_plugin_version = 1;
 
-enum { flash = 0x08000000, flash_size = 1 << 20 };
+enum { flash_size = 1 << 20 };  /* it begins where `entry` is, to the MiB */
 
 /* A piece of code without a branch inside, as QEMU translated it. Never freed: QEMU may run it again. */
 struct block {
   uint64_t start, end, instructions;
 };
 
-static uint64_t entry, skip_from, skip_to;
+static uint64_t entry, flash, skip_from, skip_to;
 static const char *profile;
 static uint64_t ran[flash_size / 2];  /* per halfword of flash */
 
@@ -112,7 +112,7 @@ static void on_exit_of_qemu(qemu_plugin_id_t id, void *user) {
   FILE *file = profile != NULL ? fopen(profile, "w") : NULL;
   if (file == NULL) return;
   for (size_t i = 0; i < flash_size / 2; ++i) {
-    if (ran[i] != 0) fprintf(file, "%08zx %" PRIu64 "\n", flash + 2 * i, ran[i]);
+    if (ran[i] != 0) fprintf(file, "%08" PRIx64 " %" PRIu64 "\n", flash + 2 * i, ran[i]);
   }
   fclose(file);
 }
@@ -125,6 +125,7 @@ __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t 
     ++value;
     if (strncmp(argv[i], "entry=", 6) == 0) {
       entry = strtoull(value, NULL, 16);
+      flash = entry & ~(uint64_t)(flash_size - 1);
     } else if (strncmp(argv[i], "skip=", 5) == 0) {
       char *dash;
       skip_from = strtoull(value, &dash, 16);

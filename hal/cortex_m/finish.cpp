@@ -1,9 +1,9 @@
 // On a board there is nothing to return to.
+#include "hal/cortex_m/fault_record.hpp"
 #include "hal/power.hpp"
-#include "hal/stm32f4/power.hpp"
 
 namespace bms::hal {
 
-void finish(int) { stm32f4::system_reset(); }
+void finish(int) { cortex_m::system_reset(); }
 
 }  // namespace bms::hal

@@ -1,0 +1,9 @@
+// ARMv6-M: no FPU, no vector table elsewhere, one kind of fault and no register that tells why.
+#include "hal/cortex_m/core.hpp"
+
+namespace bms::hal::cortex_m {
+
+void start_core() {}
+void see_fault(FaultRecord&) {}
+
+}  // namespace bms::hal::cortex_m

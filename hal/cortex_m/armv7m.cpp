@@ -1,0 +1,34 @@
+// ARMv7-M with an FPU: Architecture Reference Manual, B3.2.
+#include "hal/cortex_m/core.hpp"
+#include "hal/cortex_m/registers.hpp"
+
+extern "C" std::uint32_t image_vectors[];
+
+namespace bms::hal::cortex_m {
+
+namespace {
+
+Register& scb_vtor() { return at<0xE000ED08>(); }
+Register& scb_shcsr() { return at<0xE000ED24>(); }
+Register& scb_cfsr() { return at<0xE000ED28>(); }
+Register& scb_hfsr() { return at<0xE000ED2C>(); }
+Register& scb_mmfar() { return at<0xE000ED34>(); }
+Register& scb_bfar() { return at<0xE000ED38>(); }
+Register& scb_cpacr() { return at<0xE000ED88>(); }
+
+}  // namespace
+
+void start_core() {
+  scb_cpacr() = scb_cpacr() | 15U << 20;  // FPU, before anything can use it
+  scb_vtor() = reinterpret_cast<std::uint32_t>(image_vectors);  // flash is at 0 too, unless the boot pins say otherwise
+  asm volatile("dsb\n isb" ::: "memory");
+  scb_shcsr() = scb_shcsr() | 7U << 16;  // memory, bus and usage faults under their own name
+}
+
+void see_fault(FaultRecord& record) {
+  record.cfsr = scb_cfsr();
+  record.hfsr = scb_hfsr();
+  record.address = (record.cfsr & 1U << 7) != 0 ? scb_mmfar() : scb_bfar();
+}
+
+}  // namespace bms::hal::cortex_m

@@ -1,0 +1,48 @@
+#include "hal/cortex_m/fault_record.hpp"
+
+#include "hal/cortex_m/registers.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+constexpr std::uint32_t magic = 0xFA017BAD;
+
+/// In RAM that start-up leaves alone.
+struct Kept {
+  std::uint32_t magic;
+  FaultRecord fault;
+  std::uint32_t check;
+};
+[[gnu::section(".noinit")]] Kept kept;
+
+std::optional<FaultRecord> fault;
+
+std::uint32_t check_of(const FaultRecord& f) { return magic ^ f.exception ^ f.pc ^ f.lr ^ f.psr ^ f.cfsr ^ f.hfsr ^ f.address; }
+
+}  // namespace
+
+std::optional<FaultRecord> last_fault() { return fault; }
+
+namespace cortex_m {
+
+void read_kept_fault() {
+  if (kept.magic == magic && kept.check == check_of(kept.fault)) fault = kept.fault;
+  kept.magic = 0;
+}
+
+void keep(const FaultRecord& record) {
+  kept.fault = record;
+  kept.check = check_of(record);
+  kept.magic = magic;
+}
+
+void system_reset() {
+  asm volatile("dsb" ::: "memory");
+  scb_aircr() = 0x05FA0000U | 1U << 2;
+  while (true) asm volatile("dsb");
+}
+
+}  // namespace cortex_m
+
+}  // namespace bms::hal

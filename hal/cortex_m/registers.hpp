@@ -1,0 +1,28 @@
+// Registers that every Cortex-M has: ARMv6-M Architecture Reference Manual (section in brackets), the same addresses in ARMv7-M.
+#pragma once
+
+#include <cstdint>
+
+namespace bms::hal {
+
+using Register = volatile std::uint32_t;
+
+template <std::uint32_t Address>
+inline Register& at() {
+  return *reinterpret_cast<Register*>(Address);
+}
+
+namespace cortex_m {
+
+// interrupt controller [B3.4]: interrupts 0 to 31, 32 to 63
+inline Register& nvic_iser0() { return at<0xE000E100>(); }
+inline Register& nvic_icer0() { return at<0xE000E180>(); }
+inline Register& nvic_iser1() { return at<0xE000E104>(); }
+
+// system control [B3.2]
+inline Register& scb_icsr() { return at<0xE000ED04>(); }
+inline Register& scb_aircr() { return at<0xE000ED0C>(); }
+
+}  // namespace cortex_m
+
+}  // namespace bms::hal

@@ -1,0 +1,39 @@
+// The vector table: every exception and interrupt that nobody serves is a fault. A chip makes its own from this (hal/<chip>/vectors.cpp).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+extern "C" {
+
+extern std::uint32_t image_stack_top[];  // from the linker script
+
+[[noreturn]] void reset_handler();
+void fault_handler();
+
+}  // extern "C"
+
+namespace bms::hal::cortex_m {
+
+using Handler = void (*)();
+inline constexpr std::size_t core_exceptions = 16, systick = 15;
+
+template <std::size_t Interrupts>
+struct VectorTable {
+  std::uint32_t* stack;
+  std::array<Handler, core_exceptions - 1 + Interrupts> handlers;
+
+  /// exception: 16 and above are the chip's interrupts 0 and above.
+  constexpr void serve(std::size_t exception, Handler handler) { handlers[exception - 1] = handler; }
+};
+
+template <std::size_t Interrupts>
+constexpr VectorTable<Interrupts> faults_but_for_the_reset() {
+  VectorTable<Interrupts> table{image_stack_top, {}};
+  for (Handler& handler : table.handlers) handler = fault_handler;
+  table.serve(1, reset_handler);
+  return table;
+}
+
+}  // namespace bms::hal::cortex_m

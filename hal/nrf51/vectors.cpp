@@ -1,0 +1,31 @@
+#include "hal/cortex_m/vectors.hpp"
+
+#include "hal/nrf51/registers.hpp"
+
+extern "C" {
+
+void timer_interrupt();
+
+// an image without a UART does not serve its interrupt
+[[gnu::weak]] void uart_interrupt() { fault_handler(); }
+
+}  // extern "C"
+
+namespace bms::hal {
+
+namespace {
+
+constexpr std::size_t interrupts = 32;  // ARMv6-M has no more
+
+constexpr auto table() {
+  auto all = cortex_m::faults_but_for_the_reset<interrupts>();
+  all.serve(cortex_m::core_exceptions + nrf51::timer_interrupt, ::timer_interrupt);
+  all.serve(cortex_m::core_exceptions + nrf51::uart_interrupt, ::uart_interrupt);
+  return all;
+}
+
+[[gnu::section(".vectors"), gnu::used]] constinit const auto vectors = table();
+
+}  // namespace
+
+}  // namespace bms::hal

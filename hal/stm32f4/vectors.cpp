@@ -1,0 +1,35 @@
+#include "hal/cortex_m/vectors.hpp"
+
+#include "hal/stm32f4/registers.hpp"
+
+extern "C" {
+
+void systick_interrupt();
+
+// an image without a UART or CAN does not serve its interrupt
+[[gnu::weak]] void usart1_interrupt() { fault_handler(); }
+[[gnu::weak]] void can1_tx_interrupt() { fault_handler(); }
+[[gnu::weak]] void can1_rx0_interrupt() { fault_handler(); }
+
+}  // extern "C"
+
+namespace bms::hal {
+
+namespace {
+
+constexpr std::size_t interrupts = 82;  // RM0090, table 61
+
+constexpr auto table() {
+  auto all = cortex_m::faults_but_for_the_reset<interrupts>();
+  all.serve(cortex_m::systick, systick_interrupt);
+  all.serve(cortex_m::core_exceptions + stm32f4::usart1_interrupt, ::usart1_interrupt);
+  all.serve(cortex_m::core_exceptions + stm32f4::can1_tx_interrupt, ::can1_tx_interrupt);
+  all.serve(cortex_m::core_exceptions + stm32f4::can1_rx0_interrupt, ::can1_rx0_interrupt);
+  return all;
+}
+
+[[gnu::section(".vectors"), gnu::used]] constinit const auto vectors = table();
+
+}  // namespace
+
+}  // namespace bms::hal

@@ -1,0 +1,122 @@
+// 32 x 32 -> 64 bit product. A core whose multiplier has 32 bits of result (ARMv6-M) makes it of four 16-bit products in 24 instructions;
+// its library, which multiplies 64 by 64 bits, needs 60. The same bits either way.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+// What is called from many places on a core without wide products and barrel shifter stays a function there: inline it would only be larger.
+#if defined(__ARM_ARCH_6M__)
+#define BMS_NARROW_CORE 1
+#define BMS_CALLED [[gnu::noinline, gnu::const]]
+#else
+#define BMS_NARROW_CORE 0
+#define BMS_CALLED
+#endif
+
+namespace bms::model {
+
+namespace product_detail {
+
+/// By halves: H. S. Warren, "Hacker's Delight", 2nd edition, section 8-2.
+BMS_CALLED constexpr std::int64_t by_halves(std::int32_t a, std::int32_t b) {
+  const std::int32_t a1 = a >> 16, b1 = b >> 16;
+  const auto a0 = static_cast<std::uint32_t>(a & 0xFFFF), b0 = static_cast<std::uint32_t>(b & 0xFFFF);
+  const std::uint32_t low = a0 * b0;
+  const std::int32_t middle = static_cast<std::int32_t>(static_cast<std::uint32_t>(a1) * b0 + (low >> 16));
+  const std::int32_t other = static_cast<std::int32_t>(static_cast<std::uint32_t>(b1) * a0 + static_cast<std::uint32_t>(middle & 0xFFFF));
+  const std::int32_t high = a1 * b1 + (middle >> 16) + (other >> 16);
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | (static_cast<std::uint32_t>(other) << 16 | (low & 0xFFFF)));
+}
+
+}  // namespace product_detail
+
+constexpr std::int64_t wide_product(std::int32_t a, std::int32_t b) {
+  if constexpr (BMS_NARROW_CORE != 0) {
+    if (!std::is_constant_evaluated()) return product_detail::by_halves(a, b);
+  }
+  return static_cast<std::int64_t>(a) * b;
+}
+
+/// The upper half of a product, and the lower one with its last 16 bits 0.
+struct UpperPart {
+  std::int32_t high;
+  std::uint32_t low;
+};
+constexpr UpperPart wide_product_but_for_16(std::int32_t a, std::int32_t b) {
+  const std::int32_t a1 = a >> 16, b1 = b >> 16;
+  const auto a0 = static_cast<std::uint32_t>(a & 0xFFFF), b0 = static_cast<std::uint32_t>(b & 0xFFFF);
+  const auto middle = static_cast<std::int32_t>(static_cast<std::uint32_t>(a1) * b0 + (a0 * b0 >> 16));
+  const auto other = static_cast<std::int32_t>(static_cast<std::uint32_t>(b1) * a0 + static_cast<std::uint32_t>(middle & 0xFFFF));
+  return {a1 * b1 + (middle >> 16) + (other >> 16), static_cast<std::uint32_t>(other) << 16};
+}
+
+/// a * b * 2^-shift, rounded to nearest (ties up), held within +-(2^bits - 1).
+template <int shift, int bits>
+constexpr std::int32_t rounded_product(std::int32_t a, std::int32_t b);
+
+namespace product_detail {
+
+template <int shift, int bits>
+constexpr std::int32_t rounded(std::int64_t product) {
+  constexpr std::int64_t limit = (std::int64_t{1} << bits) - 1;
+  const std::int64_t r = shift == 0 ? product : (product >> shift) + (product >> (shift - 1) & 1);
+  return static_cast<std::int32_t>(r > limit ? limit : r < -limit ? -limit : r);
+}
+
+#if BMS_NARROW_CORE
+template <int shift, int bits>
+[[gnu::noinline, gnu::const]] inline std::int32_t far_out(std::int32_t high, std::uint32_t low) {
+  return rounded<shift, bits>(static_cast<std::int64_t>(static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | low));
+}
+
+/// The same by halves, for 17 <= shift <= 31: the lowest 16 bits of the product are not needed, the carry of the last bit shifted out rounds.
+/// What is beyond half of the range is left to far_out().
+template <int shift, int bits>
+[[gnu::noinline, gnu::const]] inline std::int32_t rounded_by_halves(std::int32_t a, std::int32_t b) {
+  std::uint32_t a0, b0;
+  std::int32_t t;
+  asm(".syntax unified\n"
+      "uxth %[a0], %[a]\n"
+      "asrs %[a], %[a], #16\n"
+      "uxth %[b0], %[b]\n"
+      "asrs %[b], %[b], #16\n"
+      "movs %[t], %[b0]\n"
+      "muls %[t], %[a]\n"
+      "muls %[b0], %[a0]\n"
+      "muls %[a0], %[b]\n"
+      "muls %[a], %[b]\n"
+      "lsrs %[b0], %[b0], #16\n"
+      "adds %[t], %[b0]\n"
+      "uxth %[b0], %[t]\n"
+      "adds %[a0], %[b0]\n"
+      "asrs %[t], %[t], #16\n"
+      "adds %[a], %[t]\n"
+      "asrs %[t], %[a0], #16\n"
+      "adds %[a], %[t]\n"
+      "lsls %[a0], %[a0], #16\n"
+      "lsls %[b], %[a], %[up]\n"
+      "lsrs %[b0], %[a0], %[down]\n"
+      "adcs %[b], %[b0]\n"
+      : [a] "+l"(a), [b] "+l"(b), [a0] "=&l"(a0), [b0] "=&l"(b0), [t] "=&l"(t)
+      : [up] "i"(32 - shift), [down] "i"(shift)
+      : "cc");
+  constexpr int unused = bits + shift - 33;
+  if (static_cast<std::uint32_t>((unused > 0 ? a >> unused : a) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a, a0);
+  return b;
+}
+#endif
+
+}  // namespace product_detail
+
+template <int shift, int bits>
+constexpr std::int32_t rounded_product(std::int32_t a, std::int32_t b) {
+#if BMS_NARROW_CORE
+  if constexpr (shift >= 17 && shift <= 31 && bits + shift >= 33) {
+    if (!std::is_constant_evaluated()) return product_detail::rounded_by_halves<shift, bits>(a, b);
+  }
+#endif
+  return product_detail::rounded<shift, bits>(wide_product(a, b));
+}
+
+}  // namespace bms::model
