@@ -62,11 +62,11 @@ class SocEstimator {
     if (!started_) return start(cell, sample);
     if (sample.time_us <= time_us_) return unchanged(cell, time_not_later);
 
-    Result estimate;
+    std::uint32_t flags = 0;
     const std::uint64_t step_us = sample.time_us - time_us_;
     time_us_ = sample.time_us;
-    const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
-    if (step_us != paced_us_) change_pace(cell, step_us, estimate.flags);
+    const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, flags);
+    if (step_us != paced_us_) change_pace(cell, step_us, flags);
     if (sample.temperature_cdegc >> 8 != heeded_) [[unlikely]] heed_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
     const Drive drive{laws.true_current(Model::without_offset(model::from_micro<Current>(current.ua), state_.polarisation, cell.noise)), duration_s_, temperature(laws, sample)};
@@ -78,8 +78,8 @@ class SocEstimator {
 
     auto noise = Model::noise(laws, settling, cell.noise);
     noise[Model::soc] = soc_noise_;
-    if ((estimate.flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] {
-      const bool measured = (estimate.flags & (current_missing | current_implausible)) == 0;
+    if ((flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] {
+      const bool measured = (flags & (current_missing | current_implausible)) == 0;
       noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, measured ? Current(0) : drive.current_a));
       if (!measured) {  // what drops over the resistances is not known then
         const Voltage unknown_v = settled_drop_v<S>(at, Current(model::magnitude(drive.current_a) + cell.noise.unknown_a));
@@ -90,12 +90,15 @@ class SocEstimator {
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
 
-    estimate.voltage_predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
+    const Voltage predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
     if constexpr (Model::errors_are_states) weigh_rest(cell, current, step_us);
-    if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * drive.current_a), cell.plausible, estimate.flags)) {
-      const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - estimate.voltage_predicted_v;
-      correct(cell, at, drive, soc, innovation_v, estimate.flags);
+    if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * drive.current_a), cell.plausible, flags)) {
+      const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - predicted_v;
+      correct(cell, at, drive, soc, innovation_v, flags);
     }
+    Result estimate;
+    estimate.voltage_predicted_v = predicted_v;
+    estimate.flags = flags;
     complete(cell, estimate);
     if constexpr (Model::errors_are_states) bound_gain(estimate.soc, estimate.soc_sigma, cell.noise.gain);
     return estimate;

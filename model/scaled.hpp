@@ -3,7 +3,7 @@
 //
 //   value = mantissa * 2^exponent       2^29 <= |mantissa| < 2^30, or 0
 //
-// +, -: rounded to nearest. *: towards minus infinity, exact where a factor is a power of two. Reciprocal: relative error below 2^-28.
+// +, -: rounded to nearest. *: relative error below 2^-26, exact where a factor is a power of two. Reciprocal: below 2^-27.
 // Exponents are held within +-1,024 by every sum and conversion: beyond, a number is 0 or stays at the end. Products alone let them grow, by
 // as much as a factor's: two million of them one after the other would overflow.
 //
@@ -189,8 +189,7 @@ class Scaled {
   }
 
   static constexpr Packed product_of(std::int32_t am, std::int32_t ae, std::int32_t bm, std::int32_t be) {
-    // 2^26 <= |high| < 2^28; bits 16 to 31 of what is below are enough
-    const auto [high, below] = wide_product_but_for_16(am, bm);
+    const auto [high, below] = upper_product(am, bm);  // 2^26 <= |high| < 2^28
     auto m = static_cast<std::int32_t>(static_cast<std::uint32_t>(high) << 3 | below >> 29);
     std::int32_t e = ae + be + 29;
     if (m >= limit || m <= -limit) {
@@ -215,14 +214,13 @@ class Scaled {
     const auto off = static_cast<std::int32_t>(-((m >> 8) * static_cast<std::uint32_t>(x)));       // of 2^37
     x += (x * (off >> 14) + (1 << 22)) >> 23;                                                      // 15 bits
     const auto left = static_cast<std::int32_t>(-(m * static_cast<std::uint32_t>(x)));             // of 2^45
-    std::int32_t inverse_m = (x << 14) + ((x * (left >> 16)) >> 15);                               // 2^-29
-    std::int32_t inverse_e = -e - 59;
-    if (inverse_m < one_mantissa) inverse_m = one_mantissa;  // of all but 1, by the last bit
+    std::int32_t inverse_m = (x << 14) + ((x * (left >> 16)) >> 15) + 2;                           // 2^-29, in the middle of its error: not below 1
+    std::int32_t inverse_e = -59 - e;
     if (inverse_m >= limit) {
       inverse_m = one_mantissa;
       ++inverse_e;
     }
-    return held(signed_m < 0 ? -inverse_m : inverse_m, inverse_e);
+    return packed(signed_m < 0 ? -inverse_m : inverse_m, inverse_e);
   }
 
   /// 1 / sqrt((k + 64.5) / 256) in steps of 2^-15.
@@ -278,7 +276,6 @@ inline Scaled::Packed Scaled::rarely_normalised(std::int32_t m, std::int32_t e) 
 
 [[gnu::naked]] inline Scaled::Packed Scaled::product_here(std::int32_t, std::int32_t, std::int32_t, std::int32_t) {
   asm(".syntax unified\n"
-      "push {r4}\n"
       "adds r1, r3\n"
       "adds r1, #29\n"
       "mov ip, r1\n"
@@ -286,25 +283,22 @@ inline Scaled::Packed Scaled::rarely_normalised(std::int32_t m, std::int32_t e) 
       "asrs r0, r0, #16\n"
       "uxth r3, r2\n"
       "asrs r2, r2, #16\n"
-      "movs r4, r3\n"
-      "muls r4, r0\n"
-      "muls r3, r1\n"
+      "muls r3, r0\n"
       "muls r1, r2\n"
       "muls r0, r2\n"
-      "lsrs r3, r3, #16\n"
-      "adds r4, r3\n"
-      "uxth r3, r4\n"
-      "adds r1, r3\n"
-      "asrs r4, r4, #16\n"
-      "adds r0, r4\n"
-      "asrs r4, r1, #16\n"
-      "adds r0, r4\n"
+      "asrs r2, r1, #16\n"
+      "adds r0, r2\n"
+      "asrs r2, r3, #16\n"
+      "adds r0, r2\n"
+      "movs r2, #0\n"
       "lsls r1, r1, #16\n"
+      "lsls r3, r3, #16\n"
+      "adds r1, r3\n"
+      "adcs r0, r2\n"
       "lsrs r1, r1, #29\n"
       "lsls r0, r0, #3\n"
       "adds r0, r1\n"
       "mov r1, ip\n"
-      "pop {r4}\n"
       "adds r3, r0, r0\n"
       "bvs 1f\n"
       "negs r3, r3\n"

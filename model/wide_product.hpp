@@ -38,22 +38,16 @@ constexpr std::int64_t wide_product(std::int32_t a, std::int32_t b) {
   return static_cast<std::int64_t>(a) * b;
 }
 
-/// The upper half of a product, and the lower one with its last 16 bits 0.
+/// a * b without the product of their lower halves, of which nothing is left in a rounded result: below 2^32 of up to 2^62, and 0 where
+/// either number is a multiple of 2^16. Its last 16 bits are 0.
 struct UpperPart {
   std::int32_t high;
   std::uint32_t low;
 };
-constexpr UpperPart wide_product_but_for_16(std::int32_t a, std::int32_t b) {
-  const std::int32_t a1 = a >> 16, b1 = b >> 16;
-  const auto a0 = static_cast<std::uint32_t>(a & 0xFFFF), b0 = static_cast<std::uint32_t>(b & 0xFFFF);
-  const auto middle = static_cast<std::int32_t>(static_cast<std::uint32_t>(a1) * b0 + (a0 * b0 >> 16));
-  const auto other = static_cast<std::int32_t>(static_cast<std::uint32_t>(b1) * a0 + static_cast<std::uint32_t>(middle & 0xFFFF));
-  return {a1 * b1 + (middle >> 16) + (other >> 16), static_cast<std::uint32_t>(other) << 16};
+constexpr UpperPart upper_product(std::int32_t a, std::int32_t b) {
+  const std::int64_t all = static_cast<std::int64_t>(a) * b - static_cast<std::int64_t>(a & 0xFFFF) * (b & 0xFFFF);
+  return {static_cast<std::int32_t>(all >> 32), static_cast<std::uint32_t>(all)};
 }
-
-/// a * b * 2^-shift, rounded to nearest (ties up), held within +-(2^bits - 1).
-template <int shift, int bits>
-constexpr std::int32_t rounded_product(std::int32_t a, std::int32_t b);
 
 namespace product_detail {
 
@@ -70,53 +64,54 @@ template <int shift, int bits>
   return rounded<shift, bits>(static_cast<std::int64_t>(static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | low));
 }
 
-/// The same by halves, for 17 <= shift <= 31: the lowest 16 bits of the product are not needed, the carry of the last bit shifted out rounds.
-/// What is beyond half of the range is left to far_out().
+/// rounded_product() of three 16-bit products, for 17 <= shift <= 31; the carry of the last bit shifted out rounds. What is beyond half of
+/// the range is left to far_out().
 template <int shift, int bits>
 [[gnu::noinline, gnu::const]] inline std::int32_t rounded_by_halves(std::int32_t a, std::int32_t b) {
-  std::uint32_t a0, b0;
-  std::int32_t t;
+  std::uint32_t low;
+  std::int32_t other;
   asm(".syntax unified\n"
-      "uxth %[a0], %[a]\n"
+      "uxth %[low], %[a]\n"
       "asrs %[a], %[a], #16\n"
-      "uxth %[b0], %[b]\n"
+      "uxth %[other], %[b]\n"
       "asrs %[b], %[b], #16\n"
-      "movs %[t], %[b0]\n"
-      "muls %[t], %[a]\n"
-      "muls %[b0], %[a0]\n"
-      "muls %[a0], %[b]\n"
+      "muls %[other], %[a]\n"
+      "muls %[low], %[b]\n"
       "muls %[a], %[b]\n"
-      "lsrs %[b0], %[b0], #16\n"
-      "adds %[t], %[b0]\n"
-      "uxth %[b0], %[t]\n"
-      "adds %[a0], %[b0]\n"
-      "asrs %[t], %[t], #16\n"
-      "adds %[a], %[t]\n"
-      "asrs %[t], %[a0], #16\n"
-      "adds %[a], %[t]\n"
-      "lsls %[a0], %[a0], #16\n"
+      "asrs %[b], %[low], #16\n"
+      "adds %[a], %[b]\n"
+      "asrs %[b], %[other], #16\n"
+      "adds %[a], %[b]\n"
+      "movs %[b], #0\n"
+      "lsls %[low], %[low], #16\n"
+      "lsls %[other], %[other], #16\n"
+      "adds %[low], %[other]\n"
+      "adcs %[a], %[b]\n"
       "lsls %[b], %[a], %[up]\n"
-      "lsrs %[b0], %[a0], %[down]\n"
-      "adcs %[b], %[b0]\n"
-      : [a] "+l"(a), [b] "+l"(b), [a0] "=&l"(a0), [b0] "=&l"(b0), [t] "=&l"(t)
+      "lsrs %[other], %[low], %[down]\n"
+      "adcs %[b], %[other]\n"
+      : [a] "+l"(a), [b] "+l"(b), [low] "=&l"(low), [other] "=&l"(other)
       : [up] "i"(32 - shift), [down] "i"(shift)
       : "cc");
   constexpr int unused = bits + shift - 33;
-  if (static_cast<std::uint32_t>((unused > 0 ? a >> unused : a) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a, a0);
+  if (static_cast<std::uint32_t>((unused > 0 ? a >> unused : a) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a, low);
   return b;
 }
 #endif
 
 }  // namespace product_detail
 
+/// a * b * 2^-shift, rounded to nearest (ties up), held within +-(2^bits - 1); where shift is 17 to 31, of upper_product().
 template <int shift, int bits>
 constexpr std::int32_t rounded_product(std::int32_t a, std::int32_t b) {
-#if BMS_NARROW_CORE
   if constexpr (shift >= 17 && shift <= 31 && bits + shift >= 33) {
+#if BMS_NARROW_CORE
     if (!std::is_constant_evaluated()) return product_detail::rounded_by_halves<shift, bits>(a, b);
-  }
 #endif
-  return product_detail::rounded<shift, bits>(wide_product(a, b));
+    return product_detail::rounded<shift, bits>(static_cast<std::int64_t>(a) * b - static_cast<std::int64_t>(a & 0xFFFF) * (b & 0xFFFF));
+  } else {
+    return product_detail::rounded<shift, bits>(wide_product(a, b));
+  }
 }
 
 }  // namespace bms::model

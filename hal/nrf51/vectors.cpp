@@ -7,7 +7,7 @@ extern "C" {
 void timer_interrupt();
 
 // an image without a UART does not serve its interrupt
-[[gnu::weak]] void uart_interrupt() { fault_handler(); }
+[[gnu::weak, gnu::naked]] void uart_interrupt() { asm volatile("ldr r0, =fault_handler\n bx r0\n .ltorg"); }
 
 }  // extern "C"
 

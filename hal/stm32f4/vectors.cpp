@@ -7,9 +7,9 @@ extern "C" {
 void systick_interrupt();
 
 // an image without a UART or CAN does not serve its interrupt
-[[gnu::weak]] void usart1_interrupt() { fault_handler(); }
-[[gnu::weak]] void can1_tx_interrupt() { fault_handler(); }
-[[gnu::weak]] void can1_rx0_interrupt() { fault_handler(); }
+[[gnu::weak, gnu::naked]] void usart1_interrupt() { asm volatile("b fault_handler"); }
+[[gnu::weak, gnu::naked]] void can1_tx_interrupt() { asm volatile("b fault_handler"); }
+[[gnu::weak, gnu::naked]] void can1_rx0_interrupt() { asm volatile("b fault_handler"); }
 
 }  // extern "C"
 
