@@ -190,7 +190,7 @@ constexpr std::size_t interval_count(const CellParameters<Real>& p) {
   return cell_detail::merged_edges(p).size + 1;
 }
 
-/// A voltage that is known no better says nothing; held for fixed point.
+/// A voltage that is known no better says nothing.
 inline constexpr double largest_error_v2 = 0.04;
 
 inline constexpr std::size_t max_intervals = max_ocv_edges + max_rc_nodes + 3;
@@ -223,8 +223,9 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
     const double gap = d::gap_at(p.ocv, middle_gap_v, from);
     i.gap = Factor<S>(gap);
     i.gap_delta = Factor<S>(d::gap_at(p.ocv, middle_gap_v, to) - gap);
-    const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc, error_v2 = p.noise.model_v * p.noise.model_v + axis_v * axis_v;
-    i.error_v2 = Variance<S>(error_v2 < largest_error_v2 ? error_v2 : largest_error_v2);
+    const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc, model_v2 = p.noise.model_v * p.noise.model_v, error_v2 = model_v2 + axis_v * axis_v;
+    const double most_v2 = model_v2 > largest_error_v2 ? model_v2 : largest_error_v2;  // never less than what is the same everywhere
+    i.error_v2 = Variance<S>(error_v2 < most_v2 ? error_v2 : most_v2);
     ++cell.size;
   };
   // outside, a width of 1/8 stands for "from there on": t goes on beyond 0 and 1

@@ -38,8 +38,8 @@ constexpr std::int64_t wide_product(std::int32_t a, std::int32_t b) {
   return static_cast<std::int64_t>(a) * b;
 }
 
-/// a * b without the product of their lower halves, of which nothing is left in a rounded result: below 2^32 of up to 2^62, and 0 where
-/// either number is a multiple of 2^16. Its last 16 bits are 0.
+/// a * b without the product of their lower halves, which is below 2^32, and 0 where either number is a multiple of 2^16. Its last 16 bits
+/// are 0.
 struct UpperPart {
   std::int32_t high;
   std::uint32_t low;
@@ -64,33 +64,35 @@ template <int shift, int bits>
   return rounded<shift, bits>(static_cast<std::int64_t>(static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | low));
 }
 
-/// rounded_product() of three 16-bit products, for 17 <= shift <= 31; the carry of the last bit shifted out rounds. What is beyond half of
-/// the range is left to far_out().
+/// rounded_product() by halves, for 17 <= shift <= 31: the lowest 16 bits of the product are not needed, the carry of the last bit shifted
+/// out rounds. What is beyond half of the range is left to far_out().
 template <int shift, int bits>
 [[gnu::noinline, gnu::const]] inline std::int32_t rounded_by_halves(std::int32_t a, std::int32_t b) {
-  std::uint32_t low;
-  std::int32_t other;
+  std::uint32_t low, b0;
+  std::int32_t middle;
   asm(".syntax unified\n"
       "uxth %[low], %[a]\n"
       "asrs %[a], %[a], #16\n"
-      "uxth %[other], %[b]\n"
+      "uxth %[b0], %[b]\n"
       "asrs %[b], %[b], #16\n"
-      "muls %[other], %[a]\n"
+      "movs %[middle], %[b0]\n"
+      "muls %[middle], %[a]\n"
+      "muls %[b0], %[low]\n"
       "muls %[low], %[b]\n"
       "muls %[a], %[b]\n"
-      "asrs %[b], %[low], #16\n"
-      "adds %[a], %[b]\n"
-      "asrs %[b], %[other], #16\n"
-      "adds %[a], %[b]\n"
-      "movs %[b], #0\n"
+      "lsrs %[b0], %[b0], #16\n"
+      "adds %[middle], %[b0]\n"
+      "uxth %[b0], %[middle]\n"
+      "adds %[low], %[b0]\n"
+      "asrs %[middle], %[middle], #16\n"
+      "adds %[a], %[middle]\n"
+      "asrs %[middle], %[low], #16\n"
+      "adds %[a], %[middle]\n"
       "lsls %[low], %[low], #16\n"
-      "lsls %[other], %[other], #16\n"
-      "adds %[low], %[other]\n"
-      "adcs %[a], %[b]\n"
       "lsls %[b], %[a], %[up]\n"
-      "lsrs %[other], %[low], %[down]\n"
-      "adcs %[b], %[other]\n"
-      : [a] "+l"(a), [b] "+l"(b), [low] "=&l"(low), [other] "=&l"(other)
+      "lsrs %[b0], %[low], %[down]\n"
+      "adcs %[b], %[b0]\n"
+      : [a] "+l"(a), [b] "+l"(b), [low] "=&l"(low), [b0] "=&l"(b0), [middle] "=&l"(middle)
       : [up] "i"(32 - shift), [down] "i"(shift)
       : "cc");
   constexpr int unused = bits + shift - 33;
@@ -101,17 +103,15 @@ template <int shift, int bits>
 
 }  // namespace product_detail
 
-/// a * b * 2^-shift, rounded to nearest (ties up), held within +-(2^bits - 1); where shift is 17 to 31, of upper_product().
+/// a * b * 2^-shift, rounded to nearest (ties up), held within +-(2^bits - 1).
 template <int shift, int bits>
 constexpr std::int32_t rounded_product(std::int32_t a, std::int32_t b) {
-  if constexpr (shift >= 17 && shift <= 31 && bits + shift >= 33) {
 #if BMS_NARROW_CORE
+  if constexpr (shift >= 17 && shift <= 31 && bits + shift >= 33) {
     if (!std::is_constant_evaluated()) return product_detail::rounded_by_halves<shift, bits>(a, b);
-#endif
-    return product_detail::rounded<shift, bits>(static_cast<std::int64_t>(a) * b - static_cast<std::int64_t>(a & 0xFFFF) * (b & 0xFFFF));
-  } else {
-    return product_detail::rounded<shift, bits>(wide_product(a, b));
   }
+#endif
+  return product_detail::rounded<shift, bits>(wide_product(a, b));
 }
 
 }  // namespace bms::model
