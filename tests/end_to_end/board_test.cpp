@@ -158,6 +158,60 @@ TEST(Board, TheGeneratorRefusesForIntegersWhatNeedsAnFpu) {
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 0);
 }
 
+const std::string on_microbit = " --scalar fixed --target microbit --verify ";
+
+TEST(Microbit, ComputesTheShiftBitForBitLikeTheHost) {
+  for (const char* start : {"", "--initial-soc 0.6 --initial-soc-sigma 0.2"}) {
+    const ToolRun run = run_tool("replay " + shift + on_microbit + start);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr("Verified: 28801 estimates, every bit equal on microbit."));
+  }
+}
+
+TEST(Microbit, ComputesARealRecordingBitForBitLikeTheHost) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
+  for (const char* file : {"a123_26650/udds_P25_A002.csv", "a123_26650/dyn10_N15_A002.csv"}) {
+    const ToolRun run = run_tool("replay " + (data / file).string() + " --cell a123_26650_extended" + on_microbit);
+    EXPECT_EQ(run.exit_code, 0) << file << ": " << run.err;
+    EXPECT_THAT(run.out, HasSubstr("every bit equal")) << file;
+  }
+}
+
+/// Readings that are missing, impossible and stuck; a gap; a clock that stands still.
+TEST(Microbit, ComputesARecordingWithTroubleBitForBitLikeTheHost) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "trouble.csv";
+  std::ifstream in(shift);
+  std::ofstream out(path);
+  std::size_t row = 0;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with('#') || line.starts_with('t')) {
+      out << line << '\n';
+      continue;
+    }
+    ++row;
+    if (row > 6'000) break;
+    if (row > 2'000 && row < 2'400) continue;  // a gap
+    const auto first = line.find(','), second = line.find(',', first + 1), third = line.find(',', second + 1);
+    const std::string rest = third == std::string::npos ? "" : line.substr(third);
+    const std::string time = line.substr(0, first + 1), current = line.substr(first + 1, second - first), voltage = line.substr(second + 1, third - second - 1);
+    if (row > 500 && row < 560) out << time << current << "9.9" << rest << '\n';
+    else if (row > 900 && row < 1'000) out << time << current << "3.30001" << rest << '\n';
+    else if (row > 3'000 && row < 3'040) out << time << "2000," << voltage << rest << '\n';
+    else out << line << '\n';
+  }
+  out.close();
+  const ToolRun run = run_tool("replay " + path.string() + on_microbit + "--initial-soc 0.7 --initial-soc-sigma 0.02");
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("every bit equal on microbit"));
+}
+
+TEST(Microbit, RefusesToPretendAnotherArithmetic) {
+  const ToolRun run = run_tool("replay " + shift + " --target microbit");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, HasSubstr("expected --scalar fixed"));
+}
+
 /// table9 with R0 at 90 % one float step larger: 0.0135692 is 0x3c5e5128 as a float.
 TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
   const TemporaryFolder folder;

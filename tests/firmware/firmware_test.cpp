@@ -22,6 +22,8 @@ using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
 std::filesystem::path image(Image kind, const char* cell = "table9") { return firmware_image("netduinoplus2", read_cell(cell), kind); }
+std::filesystem::path microbit_image(Image kind) { return firmware_image("microbit", read_cell("table9"), kind); }
+const EmulatedBoard& microbit() { return emulated_boards().back(); }
 
 std::vector<Sample> shift() { return samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv")); }
 
@@ -73,6 +75,33 @@ TEST(FirmwareImage, AStepStaysInsideItsBudget) {
   EXPECT_LE(cost.mean, 300);  // design budget of a step
   EXPECT_LT(cost.least, cost.mean);
   EXPECT_GT(cost.least, 100U);
+}
+
+TEST(MicrobitImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
+  EXPECT_THAT(forbidden_in(symbols_of(microbit_image(Image::application))), IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(microbit_image(Image::replay))), IsEmpty());
+}
+
+/// Telemetry tells in float, a few times a sample; the estimator and what is known beside it know no float.
+TEST(MicrobitImage, EstimatesWithoutSoftwareFloat) {
+  const auto objects = microbit_image(Image::application).parent_path() / "CMakeFiles";
+  for (const char* object : {"estimator_step.dir/firmware/estimator_step.cpp.obj", "application.dir/firmware/board_cell.cpp.obj"}) {
+    const auto symbols = symbols_of(objects / object);
+    ASSERT_FALSE(symbols.empty());
+    for (const Symbol& s : symbols) {
+      if (s.kind == 'U') EXPECT_THAT(s.name, ::testing::Not(::testing::MatchesRegex("__aeabi_(f|d|cf|cd|i2f|ui2f|l2f|ul2f).*"))) << object;
+    }
+  }
+}
+
+TEST(MicrobitImage, CostsNoMoreThanTheTableSays) {
+  const CommittedFigures table(BMS_SOURCE_DIR "/estimator/README.md", "microbit");
+  const auto measured = core_figures(microbit(), read_cell("table9"), shift());
+  ASSERT_FALSE(measured.empty());
+  for (const auto& [name, value] : measured) {
+    ASSERT_TRUE(table.has(name)) << name;
+    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": run ./bms figures if it is worth it";
+  }
 }
 
 TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {

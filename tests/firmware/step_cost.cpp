@@ -18,10 +18,18 @@ namespace bms {
 
 namespace {
 
+/// The handler that comes in between: of whatever timer the chip's clock runs on.
+Symbol clock_interrupt(const std::vector<Symbol>& symbols) {
+  for (const Symbol& s : symbols) {
+    if (s.name == "timer_interrupt") return s;
+  }
+  return symbol_named(symbols, "systick_interrupt");
+}
+
 /// What the emulator needs to count the instructions of a function.
 std::vector<std::string> counting(const std::filesystem::path& image, const char* function, const std::string& log) {
   const auto symbols = symbols_of(image);
-  const Symbol counted = symbol_named(symbols, function), interrupt = symbol_named(symbols, "systick_interrupt");
+  const Symbol counted = symbol_named(symbols, function), interrupt = clock_interrupt(symbols);
   return {"-plugin", fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, counted.address & ~1ULL, interrupt.address & ~1ULL, (interrupt.address & ~1ULL) + interrupt.size),
           "-d", "plugin", "-D", log};
 }
@@ -71,6 +79,19 @@ Footprint footprint(const std::filesystem::path& application_image) {
   if (!std::regex_search(usage, found, std::regex("bms::estimator_step[^\t]*\t([0-9]+)\tstatic"))) throw std::runtime_error("no stack usage in " + usage);
   f.step_stack = std::stoull(found[1]);
   return f;
+}
+
+std::vector<std::pair<std::string, double>> core_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
+  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell));
+  const StepCost besides = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell), "bms::BoardCell::look(");
+  const ImageSize size = size_of(firmware_image(board.name, cell, Image::application));
+  const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
+  return {{"step, mean [instructions]", cost.mean},
+          {"step, longest [instructions]", number(cost.most)},
+          {"first step, which starts the filter [instructions]", number(cost.first)},
+          {"quality, display, health beside a step, mean [instructions]", besides.mean},
+          {"flash of the whole application [bytes]", number(size.text)},
+          {"RAM of the whole application, without stack [bytes]", number(size.data + size.bss)}};
 }
 
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {

@@ -35,7 +35,10 @@ struct Footprint {
 };
 Footprint footprint(const std::filesystem::path& application_image);
 
-/// The rows of the table in estimator/README.md: what it is, and the figure.
+/// The rows of the table in estimator/README.md that a board in integers has: what it is, and the figure.
+std::vector<std::pair<std::string, double>> core_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples);
+
+/// The rows of the float board's.
 std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples);
 
 /// The rows of the table of costs in protection/README.md.
