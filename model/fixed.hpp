@@ -230,6 +230,7 @@ class Product {
   constexpr Product(const A& first, const B& second) : a(first), b(second) {}
   constexpr Exact exact() const { return fixed_detail::exact_product(a, b); }
   constexpr Product operator-() const { return {-a, b}; }
+  constexpr explicit operator double() const { return static_cast<double>(exact()); }
 
   A a;
   B b;
