@@ -285,7 +285,7 @@ constexpr bool operator==(Q<I1, F1> a, Q<I2, F2> b) {
 template <class T>
 concept InIntegers = is_q<T> || is_product<T> || std::same_as<T, Scaled>;
 
-/// numerator / denominator stored in R, relative error below 2^-27 plus half a step of R; saturates; x / 0 is R's end, 0 / 0 is 0.
+/// numerator / denominator stored in R, relative error below 2^-25 (model/scaled.hpp) plus half a step of R; saturates; x / 0 is R's end, 0 / 0 is 0.
 template <InIntegers R, InIntegers A, InIntegers B>
 constexpr R ratio(const A& numerator, const B& denominator) {
   return R(Scaled(numerator) * Scaled(denominator).reciprocal());
