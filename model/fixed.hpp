@@ -285,13 +285,13 @@ constexpr bool operator==(Q<I1, F1> a, Q<I2, F2> b) {
 template <class T>
 concept InIntegers = is_q<T> || is_product<T> || std::same_as<T, Scaled>;
 
-/// numerator / denominator stored in R, relative error below 2^-25 (model/scaled.hpp) plus half a step of R; saturates; x / 0 is R's end, 0 / 0 is 0.
+/// numerator / denominator stored in R, relative error below 2^-26 + 2^-27 + 2^-29 (product and reciprocal, model/scaled.hpp) plus 2^-29 for each operand of more than 30 bits, and half a step of R; saturates; x / 0 is R's end, 0 / 0 is 0.
 template <InIntegers R, InIntegers A, InIntegers B>
 constexpr R ratio(const A& numerator, const B& denominator) {
   return R(Scaled(numerator) * Scaled(denominator).reciprocal());
 }
 
-/// Square root stored in R, the same; 0 for negative arguments.
+/// Square root stored in R, relative error below 2^-26, the same for operands and step; 0 for negative arguments.
 template <InIntegers R, InIntegers A>
 constexpr R root(const A& x) {
   return R(Scaled(x).root());

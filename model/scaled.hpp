@@ -3,7 +3,8 @@
 //
 //   value = mantissa * 2^exponent       2^29 <= |mantissa| < 2^30, or 0
 //
-// +, -: rounded to nearest. *: relative error below 2^-26, exact where a factor is a power of two. Reciprocal: below 2^-27.
+// +, -: rounded to nearest. *: relative error below 2^-26 + 2^-29, exact where a factor is a power of two: the product of the lower halves,
+// below 2^32 of at least 2^58, is left out, and the rest is cut to 30 bits. Reciprocal: below 2^-27. Root: below 2^-26.
 // Exponents are held within +-1,024 by every sum and conversion: beyond, a number is 0 or stays at the end. Products alone let them grow, by
 // as much as a factor's: two million of them one after the other would overflow.
 //
@@ -248,7 +249,7 @@ class Scaled {
     std::uint32_t s = ((v >> 16) * y + 0x4000) >> 15;                            // 2^-16
     if (s > 0xFFFF) s = 0xFFFF;
     const auto left = static_cast<std::int32_t>(v - s * s);
-    const std::int32_t root = static_cast<std::int32_t>(s << 14) + (((left >> 5) * static_cast<std::int32_t>(y)) >> 13);  // 2^-30
+    const std::int32_t root = static_cast<std::int32_t>(s << 14) + ((((left + 16) >> 5) * static_cast<std::int32_t>(y)) >> 13);  // 2^-30
     const std::int32_t root_e = (odd ? e + 31 : e + 30) / 2 - 30;
     return normalised(root, root_e);
   }

@@ -56,7 +56,8 @@ TEST(Fixed, ArithmeticAgreesWithRealNumbersToAStepOfTheResult) {
     EXPECT_NEAR(real(product<Wide>(w, Q<1, 30>(b))), std::clamp(real(w) * real(Q<1, 30>(b)), -2.0, 2.0), 1e-15);
     EXPECT_EQ(a < b, real(a) < real(b));
     const double quotient = real(a) / real(b);
-    EXPECT_NEAR(real(ratio<Rounded>(a, b)), std::clamp(quotient, -1'024.0, 1'024.0), 0x1p-21 + std::abs(quotient) * 0x1p-25) << real(a) << " / " << real(b);
+    // half a step; 30-bit mantissas: a product leaves out 2^32 of 2^58 and cuts 2^-29, a reciprocal is good to 2^-27
+    EXPECT_NEAR(real(ratio<Rounded>(a, b)), std::clamp(quotient, -1'024.0, 1'024.0), 0x1p-22 + std::abs(quotient) * (0x1p-26 + 0x1p-29 + 0x1p-27)) << real(a) << " / " << real(b);
   }
 }
 
@@ -73,7 +74,9 @@ TEST(Fixed, RootIsTrueToItsDigits) {
   for (int n = 0; n < 5'000; ++n) {
     const auto w = Wide::from_raw(static_cast<std::int64_t>(random() >> (1 + random() % 60)));
     const double root_of = std::sqrt(real(w)), got = real(root<Narrow>(w));
-    EXPECT_NEAR(got, root_of, 0x1p-27 + root_of * 0x1p-25) << real(w);
+    // half a step of the result; the operand's 63 bits cut to 30, half of 2^-29 in the root; of the correction 2^-28 is lost, times y / 2 <= 1, of
+    // a root of at least 1/2: 2^-27, and in its other roundings 2^-28
+    EXPECT_NEAR(got, root_of, 0x1p-29 + root_of * (0x1p-30 + 0x1p-27 + 0x1p-28)) << real(w);
   }
   EXPECT_EQ(root<Narrow>(Wide(-1)).raw(), 0);
 }
