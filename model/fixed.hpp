@@ -91,6 +91,9 @@ constexpr std::int64_t wider_product(std::int64_t a, std::int32_t b, int drop) {
   return (high + (low >> 32)) >> (drop - 32);
 }
 
+template <class A, class B>
+inline constexpr int most_bits = A::integer_bits + A::fraction_bits > B::integer_bits + B::fraction_bits ? A::integer_bits + A::fraction_bits : B::integer_bits + B::fraction_bits;
+
 }  // namespace fixed_detail
 
 template <int I, int F>
@@ -153,7 +156,7 @@ class Q {
   static constexpr Raw stored(const Product<A, B>& product) {
     constexpr int shift = A::fraction_bits + B::fraction_bits - F;
     if constexpr (sizeof(typename A::Raw) + sizeof(typename B::Raw) == 2 * sizeof(std::int32_t) && I + F <= 31 && shift >= 0 && Product<A, B>::Exact::integer_bits + Product<A, B>::Exact::fraction_bits > 31)
-      return rounded_product<shift, I + F>(product.a.raw(), product.b.raw());
+      return rounded_product<shift, I + F, fixed_detail::most_bits<A, B>>(product.a.raw(), product.b.raw());
     else
       return Q(product.exact()).raw();
   }

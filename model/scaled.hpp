@@ -275,6 +275,7 @@ class Scaled {
 
 inline Scaled::Packed Scaled::rarely_normalised(std::int32_t m, std::int32_t e) { return normalised(m, e); }
 
+// Both middle products have room in one word: 2 * 2^14 (2^16 - 1) < 2^31.
 [[gnu::naked]] inline Scaled::Packed Scaled::product_here(std::int32_t, std::int32_t, std::int32_t, std::int32_t) {
   asm(".syntax unified\n"
       "adds r1, r3\n"
@@ -287,16 +288,8 @@ inline Scaled::Packed Scaled::rarely_normalised(std::int32_t m, std::int32_t e) 
       "muls r3, r0\n"
       "muls r1, r2\n"
       "muls r0, r2\n"
-      "asrs r2, r1, #16\n"
-      "adds r0, r2\n"
-      "asrs r2, r3, #16\n"
-      "adds r0, r2\n"
-      "movs r2, #0\n"
-      "lsls r1, r1, #16\n"
-      "lsls r3, r3, #16\n"
       "adds r1, r3\n"
-      "adcs r0, r2\n"
-      "lsrs r1, r1, #29\n"
+      "asrs r1, r1, #13\n"
       "lsls r0, r0, #3\n"
       "adds r0, r1\n"
       "mov r1, ip\n"
