@@ -59,17 +59,52 @@ constexpr std::int32_t rounded(std::int64_t product) {
 }
 
 #if BMS_NARROW_CORE
-/// high * 2^32 + middle * 2^16
 template <int shift, int bits>
-[[gnu::noinline, gnu::const]] inline std::int32_t far_out(std::int32_t high, std::int32_t middle) {
-  return rounded<shift, bits>((static_cast<std::int64_t>(high) << 32) + (static_cast<std::int64_t>(middle) << 16));
+[[gnu::noinline, gnu::const]] inline std::int32_t far_out(std::int32_t high, std::uint32_t low) {
+  return rounded<shift, bits>(static_cast<std::int64_t>(static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | low));
 }
 
-/// rounded_product() by halves, of numbers below 2^30: both middle products and what the low one carries have room in 32 bits, since
-/// 2 * (2^14 - 1) (2^16 - 1) + 2^16 < 2^31. The lowest 16 bits of the product are not needed, the last bit shifted out rounds. What is
-/// beyond half of the range is left to far_out(); the middle, below 2^47, does not lead out of it where the range is 2^49 or more.
+/// rounded_product() by halves, for 17 <= shift <= 31: the lowest 16 bits of the product are not needed, the carry of the last bit shifted
+/// out rounds. What is beyond half of the range is left to far_out().
 template <int shift, int bits>
 [[gnu::noinline, gnu::const]] inline std::int32_t rounded_by_halves(std::int32_t a, std::int32_t b) {
+  std::uint32_t low, b0;
+  std::int32_t middle;
+  asm(".syntax unified\n"
+      "uxth %[low], %[a]\n"
+      "asrs %[a], %[a], #16\n"
+      "uxth %[b0], %[b]\n"
+      "asrs %[b], %[b], #16\n"
+      "movs %[middle], %[b0]\n"
+      "muls %[middle], %[a]\n"
+      "muls %[b0], %[low]\n"
+      "muls %[low], %[b]\n"
+      "muls %[a], %[b]\n"
+      "lsrs %[b0], %[b0], #16\n"
+      "adds %[middle], %[b0]\n"
+      "uxth %[b0], %[middle]\n"
+      "adds %[low], %[b0]\n"
+      "asrs %[middle], %[middle], #16\n"
+      "adds %[a], %[middle]\n"
+      "asrs %[middle], %[low], #16\n"
+      "adds %[a], %[middle]\n"
+      "lsls %[low], %[low], #16\n"
+      "lsls %[b], %[a], %[up]\n"
+      "lsrs %[b0], %[low], %[down]\n"
+      "adcs %[b], %[b0]\n"
+      : [a] "+l"(a), [b] "+l"(b), [low] "=&l"(low), [b0] "=&l"(b0), [middle] "=&l"(middle)
+      : [up] "i"(32 - shift), [down] "i"(shift)
+      : "cc");
+  constexpr int unused = bits + shift - 33;
+  if (static_cast<std::uint32_t>((unused > 0 ? a >> unused : a) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a, low);
+  return b;
+}
+
+/// The same of numbers below 2^30: both middle products and what the low one carries have room in 32 bits, since
+/// 2 * (2^14 - 1) (2^16 - 1) + 2^16 < 2^31. The middle, below 2^47, does
+/// not lead out of the range where that is 2^49 or more.
+template <int shift, int bits>
+[[gnu::noinline, gnu::const]] inline std::int32_t rounded_by_short_halves(std::int32_t a, std::int32_t b) {
   std::uint32_t low, b0;
   std::int32_t middle;
   asm(".syntax unified\n"
@@ -92,7 +127,7 @@ template <int shift, int bits>
       : [up] "i"(32 - shift), [down] "i"(shift - 16)
       : "cc");
   constexpr int unused = bits + shift - 33;
-  if (static_cast<std::uint32_t>((a >> unused) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a, middle);
+  if (static_cast<std::uint32_t>((a >> unused) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a + (middle >> 16), static_cast<std::uint32_t>(middle) << 16);
   return b;
 }
 #endif
@@ -103,8 +138,11 @@ template <int shift, int bits>
 template <int shift, int bits, int of = 32>
 constexpr std::int32_t rounded_product(std::int32_t a, std::int32_t b) {
 #if BMS_NARROW_CORE
-  if constexpr (of <= 30 && shift >= 17 && shift <= 31 && bits + shift >= 49) {
-    if (!std::is_constant_evaluated()) return product_detail::rounded_by_halves<shift, bits>(a, b);
+  if constexpr (shift >= 17 && shift <= 31 && bits + shift >= 33) {
+    if (!std::is_constant_evaluated()) {
+      if constexpr (of <= 30 && bits + shift >= 49) return product_detail::rounded_by_short_halves<shift, bits>(a, b);
+      else return product_detail::rounded_by_halves<shift, bits>(a, b);
+    }
   }
 #endif
   return product_detail::rounded<shift, bits>(wide_product(a, b));
