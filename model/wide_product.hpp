@@ -100,10 +100,10 @@ template <int shift, int bits>
   return b;
 }
 
-/// The same of numbers below 2^30: both middle products and what the low one carries have room in 32 bits, since
-/// 2 * (2^14 - 1) (2^16 - 1) + 2^16 < 2^31. The middle, below 2^47, does
-/// not lead out of the range where that is 2^49 or more.
-template <int shift, int bits>
+/// The same of numbers of at most 30 bits: both middle products and what the low one carries have room in 32 bits, since
+/// 2 * (2^14 - 1) (2^16 - 1) + 2^16 < 2^31. The middle, below 2^47, does not lead out of the range where that is 2^49 or more; where it is
+/// as long as the product, nothing does.
+template <int shift, int bits, int of>
 [[gnu::noinline, gnu::const]] inline std::int32_t rounded_by_short_halves(std::int32_t a, std::int32_t b) {
   std::uint32_t low, b0;
   std::int32_t middle;
@@ -126,8 +126,10 @@ template <int shift, int bits>
       : [a] "+l"(a), [b] "+l"(b), [low] "=&l"(low), [b0] "=&l"(b0), [middle] "=&l"(middle)
       : [up] "i"(32 - shift), [down] "i"(shift - 16)
       : "cc");
-  constexpr int unused = bits + shift - 33;
-  if (static_cast<std::uint32_t>((a >> unused) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a + (middle >> 16), static_cast<std::uint32_t>(middle) << 16);
+  if constexpr (2 * of > bits + shift) {
+    constexpr int unused = bits + shift - 33;
+    if (static_cast<std::uint32_t>((a >> unused) + 1) > 1) [[unlikely]] return far_out<shift, bits>(a + (middle >> 16), static_cast<std::uint32_t>(middle) << 16);
+  }
   return b;
 }
 #endif
@@ -140,7 +142,7 @@ constexpr std::int32_t rounded_product(std::int32_t a, std::int32_t b) {
 #if BMS_NARROW_CORE
   if constexpr (shift >= 17 && shift <= 31 && bits + shift >= 33) {
     if (!std::is_constant_evaluated()) {
-      if constexpr (of <= 30 && bits + shift >= 49) return product_detail::rounded_by_short_halves<shift, bits>(a, b);
+      if constexpr (of <= 30 && bits + shift >= 49) return product_detail::rounded_by_short_halves<shift, bits, of>(a, b);
       else return product_detail::rounded_by_halves<shift, bits>(a, b);
     }
   }
