@@ -101,4 +101,4 @@ void wait_for_interrupt() {}
 
 }  // namespace bms::hal
 
-extern "C" void systick_interrupt() {}  // no timer runs
+extern "C" void clock_interrupt() {}  // no timer runs

@@ -51,7 +51,7 @@ void wait_for_interrupt() { asm volatile("wfi"); }
 
 }  // namespace bms::hal
 
-extern "C" void timer_interrupt() {
+extern "C" void clock_interrupt() {
   using namespace bms::hal;
   nrf51::timer_compare0() = 0;
   nrf51::timer_cc0() = static_cast<std::uint32_t>(read_timer()) + wake_every_us;

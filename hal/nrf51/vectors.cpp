@@ -4,7 +4,7 @@
 
 extern "C" {
 
-void timer_interrupt();
+void clock_interrupt();
 
 // an image without a UART does not serve its interrupt
 [[gnu::weak, gnu::naked]] void uart_interrupt() { asm volatile("ldr r0, =fault_handler\n bx r0\n .ltorg"); }
@@ -19,7 +19,7 @@ constexpr std::size_t interrupts = 32;  // ARMv6-M has no more
 
 constexpr auto table() {
   auto all = cortex_m::faults_but_for_the_reset<interrupts>();
-  all.serve(cortex_m::core_exceptions + nrf51::timer_interrupt, ::timer_interrupt);
+  all.serve(cortex_m::core_exceptions + nrf51::timer_interrupt, clock_interrupt);
   all.serve(cortex_m::core_exceptions + nrf51::uart_interrupt, ::uart_interrupt);
   return all;
 }

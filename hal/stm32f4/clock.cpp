@@ -36,7 +36,7 @@ void wait_for_interrupt() { asm volatile("wfi"); }
 
 }  // namespace bms::hal
 
-extern "C" void systick_interrupt() {
+extern "C" void clock_interrupt() {
   using namespace bms::hal;
   const std::uint32_t low = milliseconds_low + 1;
   milliseconds_low = low;

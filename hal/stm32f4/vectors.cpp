@@ -4,7 +4,7 @@
 
 extern "C" {
 
-void systick_interrupt();
+void clock_interrupt();
 
 // an image without a UART or CAN does not serve its interrupt
 [[gnu::weak, gnu::naked]] void usart1_interrupt() { asm volatile("b fault_handler"); }
@@ -21,7 +21,7 @@ constexpr std::size_t interrupts = 82;  // RM0090, table 61
 
 constexpr auto table() {
   auto all = cortex_m::faults_but_for_the_reset<interrupts>();
-  all.serve(cortex_m::systick, systick_interrupt);
+  all.serve(cortex_m::systick, clock_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::usart1_interrupt, ::usart1_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_tx_interrupt, ::can1_tx_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_rx0_interrupt, ::can1_rx0_interrupt);

@@ -18,18 +18,10 @@ namespace bms {
 
 namespace {
 
-/// The handler that comes in between: of whatever timer the chip's clock runs on.
-Symbol clock_interrupt(const std::vector<Symbol>& symbols) {
-  for (const Symbol& s : symbols) {
-    if (s.name == "timer_interrupt") return s;
-  }
-  return symbol_named(symbols, "systick_interrupt");
-}
-
 /// What the emulator needs to count the instructions of a function.
 std::vector<std::string> counting(const std::filesystem::path& image, const char* function, const std::string& log) {
   const auto symbols = symbols_of(image);
-  const Symbol counted = symbol_named(symbols, function), interrupt = clock_interrupt(symbols);
+  const Symbol counted = symbol_named(symbols, function), interrupt = symbol_named(symbols, "clock_interrupt");
   return {"-plugin", fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, counted.address & ~1ULL, interrupt.address & ~1ULL, (interrupt.address & ~1ULL) + interrupt.size),
           "-d", "plugin", "-D", log};
 }
