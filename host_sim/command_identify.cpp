@@ -77,36 +77,18 @@ void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordi
   tell(options.output, text + (result.cell.empty() ? "No cell file." : "Cell file: " + options.out));
 }
 
-/// Recordings of like temperature.
+/// Records of like temperature.
 struct Group {
   double temperature_c = 25;
   std::vector<id::Record> records;
 };
 
-/// Ascending; one when temperatures are not recorded or lie within a few kelvins.
 std::vector<Group> grouped(const std::vector<Recording>& recordings, const std::vector<id::Record>& records) {
-  constexpr double alike_k = 5;
-  std::vector<std::pair<double, std::size_t>> means;
-  for (std::size_t k = 0; k < recordings.size(); ++k) {
-    const auto mean_c = mean_temperature_c(recordings[k]);
-    if (!mean_c) return {{25, records}};
-    means.emplace_back(*mean_c, k);
-  }
-  std::sort(means.begin(), means.end());
   std::vector<Group> groups;
-  std::vector<double> begins;
-  for (const auto& [temperature_c, k] : means) {
-    if (groups.empty() || temperature_c - begins.back() > alike_k) {
-      groups.emplace_back();
-      begins.push_back(temperature_c);
-      groups.back().temperature_c = 0;
-    }
-    Group& group = groups.back();
-    const auto n = static_cast<double>(group.records.size());
-    group.temperature_c = (group.temperature_c * n + temperature_c) / (n + 1);
-    group.records.push_back(records[k]);
+  for (const LikeTemperature& like : by_temperature(recordings)) {
+    Group& group = groups.emplace_back(Group{like.temperature_c, {}});
+    for (const std::size_t k : like.recordings) group.records.push_back(records[k]);
   }
-  for (Group& group : groups) group.temperature_c = std::round(10 * group.temperature_c) / 10;
   return groups;
 }
 

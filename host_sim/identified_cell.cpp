@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -25,23 +26,24 @@ struct SlowRuns {
   std::string files;
 };
 
+/// Those nearest to 25 degrees C first.
 std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
-  constexpr double alike_k = 5;
+  std::vector<Recording> recordings;
+  for (const std::string& path : paths) recordings.push_back(read_recording(path));
   std::vector<SlowRuns> all;
-  for (const std::string& path : paths) {
-    const Recording r = read_recording(path);
-    const double temperature_c = mean_temperature_c(r).value_or(25);
-    auto like = std::find_if(all.begin(), all.end(), [&](const SlowRuns& g) { return std::abs(g.temperature_c - temperature_c) <= alike_k; });
-    if (like == all.end()) like = all.insert(all.end(), SlowRuns{temperature_c, {}, {}});
-    like->runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
-    like->files += (like->files.empty() ? "" : ", ") + std::filesystem::path(path).filename().string();
+  for (const LikeTemperature& like : by_temperature(recordings)) {
+    SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
+    for (const std::size_t k : like.recordings) {
+      const Recording& r = recordings[k];
+      runs.runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
+      runs.files += (runs.files.empty() ? "" : ", ") + std::filesystem::path(paths[k]).filename().string();
+    }
   }
   std::stable_sort(all.begin(), all.end(), [](const SlowRuns& a, const SlowRuns& b) { return std::abs(a.temperature_c - 25) < std::abs(b.temperature_c - 25); });
   return all;
 }
 
-}  // namespace
-
+/// Of the temperatures that were recorded; nothing: none.
 std::optional<double> mean_temperature_c(const Recording& recording) {
   double sum = 0;
   std::size_t count = 0;
@@ -50,6 +52,37 @@ std::optional<double> mean_temperature_c(const Recording& recording) {
   }
   if (count == 0) return std::nullopt;
   return sum / static_cast<double>(count);
+}
+
+}  // namespace
+
+std::vector<LikeTemperature> by_temperature(const std::vector<Recording>& recordings) {
+  constexpr double alike_k = 5;
+  std::vector<std::pair<double, std::size_t>> means;
+  std::vector<std::size_t> all;
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    all.push_back(k);
+    if (const auto mean_c = mean_temperature_c(recordings[k])) means.emplace_back(*mean_c, k);
+  }
+  if (means.size() < recordings.size()) return {{25, all}};
+  std::sort(means.begin(), means.end());
+  std::vector<LikeTemperature> groups;
+  double begin_c = 0;
+  for (const auto& [temperature_c, k] : means) {
+    if (groups.empty() || temperature_c - begin_c > alike_k) {
+      groups.push_back({0, {}});
+      begin_c = temperature_c;
+    }
+    LikeTemperature& group = groups.back();
+    const auto n = static_cast<double>(group.recordings.size());
+    group.temperature_c = (group.temperature_c * n + temperature_c) / (n + 1);
+    group.recordings.push_back(k);
+  }
+  for (LikeTemperature& group : groups) {
+    group.temperature_c = std::round(10 * group.temperature_c) / 10;
+    std::sort(group.recordings.begin(), group.recordings.end());
+  }
+  return groups;
 }
 
 OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, bool both_branches, CellFile& cell) {

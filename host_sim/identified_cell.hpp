@@ -41,8 +41,13 @@ void extend(const OcvTaken& ocv, const std::vector<IdentificationData>& data, Ce
 /// on the side of the OCV's gap that it does not lean to.
 void take_noise(const std::vector<Recording>& recordings, const identification::Fit& judge, const std::vector<identification::Parameter>& parameters, model::CellParameters<>& p);
 
-/// Mean of the temperatures that were recorded; nothing: none.
-std::optional<double> mean_temperature_c(const Recording& recording);
+/// Recordings within a few kelvins of each other, by their place in a list.
+struct LikeTemperature {
+  double temperature_c = 25;  ///< mean, to a tenth
+  std::vector<std::size_t> recordings;
+};
+/// Ascending; one of 25 degrees C for all where one of them has no temperature.
+std::vector<LikeTemperature> by_temperature(const std::vector<Recording>& recordings);
 
 /// Seven digits of every number: more are noise.
 void round_digits(CellFile& cell);
