@@ -72,7 +72,7 @@ class SocBank {
   };
 
   /// One sample. soc: where the filter has it, mean and what was counted since; share: of a correlation time that passes in 2 points
-  /// samples, 1.9 at most; white_v2: of the reading; lasting_v2 as above, forgotten in `lasts` correlation times; seen(soc_k): Seen.
+  /// samples, 1.9 at most; white_v2: of the reading; lasting_v2 as above, forgotten in model::lasting_error_lasts correlation times; seen(soc_k): Seen.
   template <class F>
   constexpr News step(const Soc& soc, const Fraction& share, const Variance& white_v2, const Variance& lasting_v2, F&& seen) {
     const auto k = static_cast<std::size_t>(turn_ % points);
@@ -97,12 +97,11 @@ class SocBank {
   static constexpr Soc grid(int k) { return Soc(model::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }
 
  private:
-  static constexpr int lasts = 8;
   static constexpr int most = 4;  ///< that one comparison may add to a misfit
 
   static constexpr Misfit held(const Misfit& m) { return m > Misfit(200) ? Misfit(200) : m; }
 
-  static constexpr Fraction forgotten_in(const Fraction& share) { return share * Fraction(1.0 / lasts); }
+  static constexpr Fraction forgotten_in(const Fraction& share) { return share * Fraction(1.0 / model::lasting_error_lasts); }
 
   /// ln(v2 / 1 mV^2) / 2, 0 below that; straight lines between powers of four, within 0.06.
   static constexpr Misfit half_log(Variance v2) {

@@ -72,9 +72,19 @@ class UdCovariance {
         state[i][j] = sum;
       }
     }
-    const Variances d = d_;
+    Variances d = d_;
+    // The last row has one entry in either block, so what it leaves of the others is alike in both: one column in place of two.
+    {
+      const Coupling f_last = state[N - 1][N - 1];
+      const Variance sum = Variance(q[N - 1] + model::product<Variance>(model::product<Variance>(d[N - 1], f_last), f_last));
+      const Coupling share = model::ratio<Coupling>(d[N - 1], sum);
 #pragma GCC unroll 8
-    for (std::size_t last = 0; last < N; ++last) {
+      for (std::size_t i = 0; i + 1 < N; ++i) u(i, N - 1) = model::product<Coupling>(model::product<Coupling>(share, state[i][N - 1]), f_last);
+      d_[N - 1] = sum;
+      d[N - 1] = model::product<Variance>(q[N - 1], share);
+    }
+#pragma GCC unroll 8
+    for (std::size_t last = 1; last < N; ++last) {
       const std::size_t j = N - 1 - last;
       Variances weighted;  // row j times its weights
       Variance sum = q[j];
@@ -84,7 +94,7 @@ class UdCovariance {
         sum = Variance(sum + model::product<Variance>(weighted[k], state[j][k]));
       }
 #pragma GCC unroll 8
-      for (std::size_t k = j + 1; k < N; ++k) sum = Variance(sum + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[j][k]));
+      for (std::size_t k = j + 1; k + 1 < N; ++k) sum = Variance(sum + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[j][k]));
       d_[j] = sum;
 #pragma GCC unroll 8
       for (std::size_t i = 0; i < j; ++i) {
@@ -92,43 +102,45 @@ class UdCovariance {
 #pragma GCC unroll 8
         for (std::size_t k = j; k < N; ++k) cross = Variance(cross + model::product<Variance>(weighted[k], state[i][k]));
 #pragma GCC unroll 8
-        for (std::size_t k = j + 1; k < N; ++k) cross = Variance(cross + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[i][k]));
+        for (std::size_t k = j + 1; k + 1 < N; ++k) cross = Variance(cross + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[i][k]));
         const Coupling projected = model::ratio<Coupling>(cross, sum);
         u(i, j) = projected;
 #pragma GCC unroll 8
         for (std::size_t k = j; k < N; ++k) state[i][k] = Coupling(state[i][k] - projected * state[j][k]);
         noise[i][j] = -projected;  // row j's own noise has weight 1
 #pragma GCC unroll 8
-        for (std::size_t k = j + 1; k < N; ++k) noise[i][k] = Coupling(noise[i][k] - projected * noise[j][k]);
+        for (std::size_t k = j + 1; k + 1 < N; ++k) noise[i][k] = Coupling(noise[i][k] - projected * noise[j][k]);
       }
     }
   }
 
   /// Takes in a measurement with sensitivity h, noise variance r > 0 and innovation e (measured less predicted); returns the
-  /// correction of each state, P h' e / (h P h' + r). Multiplied first, divided last: fixed point keeps the digits of a small gain.
+  /// correction of each state, P h' e / (h P h' + r).
   constexpr std::array<State, N> observe(const Row& h, const Variance& r, const State& e) {
     std::array<Variance, N> b{};  // U D U' h', built column by column
     Variance alpha = r;           // variance of the innovation, of the states so far
+    Variance per_alpha{};         // 1 / alpha
 #pragma GCC unroll 8
     for (std::size_t j = 0; j < N; ++j) {
       Coupling f = h[j];
 #pragma GCC unroll 8
       for (std::size_t k = 0; k < j; ++k) f = Coupling(f + u(k, j) * h[k]);
-      const Variance g = model::product<Variance>(d_[j], f);
-      const Variance before = alpha;
+      const Variance g = model::product<Variance>(d_[j], f), before = alpha, per_before = per_alpha;
       alpha = Variance(alpha + model::product<Variance>(g, f));
-      d_[j] = model::product<Variance>(d_[j], model::ratio<Coupling>(before, alpha));
+      per_alpha = model::ratio<Variance>(Variance(1), alpha);
+      d_[j] = model::product<Variance>(model::product<Variance>(d_[j], per_alpha), before);
 #pragma GCC unroll 8
       for (std::size_t i = 0; i < j; ++i) {
         const Coupling old = u(i, j);
-        u(i, j) = Coupling(old - model::ratio<Coupling>(model::product<Variance>(b[i], f), before));
+        u(i, j) = Coupling(old - model::product<Coupling>(model::product<Coupling>(b[i], per_before), f));
         b[i] = Variance(b[i] + model::product<Variance>(g, old));
       }
       b[j] = g;
     }
+    const Coupling off = model::product<Coupling>(e, per_alpha);
     std::array<State, N> correction;
 #pragma GCC unroll 8
-    for (std::size_t i = 0; i < N; ++i) correction[i] = model::ratio<State>(model::product<Variance>(b[i], e), alpha);
+    for (std::size_t i = 0; i < N; ++i) correction[i] = model::product<State>(b[i], off);
     return correction;
   }
 

@@ -1,9 +1,10 @@
 // A cell prepared for stepping with one scalar: the tables of its file merged into one row of intervals over soc, each with what
 // a step needs, and the noise figures turned into the units of the filter.
 //
-//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) / width,  value = value at start + t * delta
+//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) * per_width,  value = value at start + t * delta
 //
-// The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on (a clamp
+// per_width is the power of two next to 1 / width, not below it: a shift in integers. t ends below 2, delta is what a value changes by
+// while t goes from 0 to 1. // The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on (a clamp
 // would have slope 0 just where an estimate that has overshot needs one to find back) and R0, R1, C1 stay constant.
 // An edge belongs to the interval above it, so does the slope there.
 //
@@ -25,7 +26,7 @@ namespace bms::model {
 template <class S>
 struct Interval {
   Soc<S> start{};
-  PerSoc<S> per_width{};  ///< 1 / width
+  PerSoc<S> per_width{};  ///< 1 / width, rounded up to a power of two
   Voltage<S> ocv_v{}, ocv_delta_v{};
   Resistance<S> r0_ohm{}, r0_delta_ohm{};
   Resistance<S> r1_ohm{}, r1_delta_ohm{};
@@ -204,13 +205,15 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   const auto edges = d::merged_edges(p);
   const double middle_gap_v = middle_half_gap_v(p.ocv);
   const auto add = [&](double from, double to) {
-    const double width = to - from;
+    double width = 1;  // that t = 1 stands for
+    while (width > to - from) width /= 2;
+    const double part = width / (to - from);
     const std::size_t piece = d::ocv_piece(p.ocv, from);
     Interval<S>& i = cell.interval[cell.size];
     const auto line = [&]<class Value>(const auto& column, Value& at_start, Value& delta) {
       const Real start = d::rc_value(p.rc, column, from);
       at_start = Value(start);
-      delta = Value(d::rc_value(p.rc, column, to) - start);
+      delta = Value((d::rc_value(p.rc, column, to) - start) * part);
     };
     i.start = Soc<S>(from);
     cell.edge[cell.size] = i.start;
@@ -222,7 +225,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
     line(p.rc.c1_f, i.c1_f, i.c1_delta_f);
     const double gap = d::gap_at(p.ocv, middle_gap_v, from);
     i.gap = Factor<S>(gap);
-    i.gap_delta = Factor<S>(d::gap_at(p.ocv, middle_gap_v, to) - gap);
+    i.gap_delta = Factor<S>((d::gap_at(p.ocv, middle_gap_v, to) - gap) * part);
     const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc, model_v2 = p.noise.model_v * p.noise.model_v, error_v2 = model_v2 + axis_v * axis_v;
     const double most_v2 = model_v2 > largest_error_v2 ? model_v2 : largest_error_v2;  // never less than what is the same everywhere
     i.error_v2 = Variance<S>(error_v2 < most_v2 ? error_v2 : most_v2);

@@ -57,6 +57,9 @@ struct Limits {
   double temperature_max_c = 0;
 };
 
+/// Half of the model's error comes and goes within Noise::model_correlation_s, half lasts so many times as long.
+inline constexpr int lasting_error_lasts = 8;
+
 /// Errors that the estimator reckons with, as standard deviations.
 struct Noise {
   double voltage_v = 0;                     ///< voltage reading, new in every sample

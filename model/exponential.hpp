@@ -46,33 +46,60 @@ concept Dual = requires(S s) {
   s.v;
 };
 
+namespace exponential_detail {
+
+/// p = settled(x), with its derivative exp(-x).
+template <Dual S>
+constexpr S with_slope(S x, const decltype(S::a)& p) {
+  x.v *= 1 - p;
+  x.a = p;
+  return x;
+}
+
+}  // namespace exponential_detail
+
+/// Beyond where the polynomial holds.
 template <class S>
-constexpr Fraction<S> settled(Exponent<S> x) {
+constexpr bool long_step(const Fraction<S>& x) {
+  return x > Fraction<S>(0.25);
+}
+
+/// x <= 1/4 only.
+template <class S>
+constexpr Fraction<S> settled_shortly(Fraction<S> x) {
   using F = Fraction<S>;
   namespace d = exponential_detail;
-  if constexpr (Dual<S>) {
-    const auto p = settled<decltype(x.a)>(x.a);
-    x.v *= 1 - p;  // d settled / dx = exp(-x)
-    x.a = p;
-    return x;
+  if constexpr (Dual<S>) return exponential_detail::with_slope(x, settled_shortly<decltype(x.a)>(x.a));
+  F q;
+  if constexpr (d::short_mantissa<S>) {
+    constexpr auto c = d::converted<F>(d::chebyshev);
+    const F x2(x * x);  // in pairs (Estrin): half as long a chain of dependent operations as Horner's
+    q = F((c[0] + F(x * c[1])) + F(x2 * F(c[2] + F(x * c[3]))));
+  } else {
+    q = F(d::taylor.back());
+    for (std::size_t k = d::taylor.size() - 1; k-- > 0;) q = F(d::taylor[k]) + x * q;
   }
-  const Exponent<S> quarter(0.25);
-  if (x > quarter) [[unlikely]] {
+  return F(x * q);
+}
+
+template <class S>
+constexpr Fraction<S> settled(const Exponent<S>& x) {
+  using F = Fraction<S>;
+  if constexpr (Dual<S>) return exponential_detail::with_slope(x, settled<decltype(x.a)>(x.a));
+  if (x > Exponent<S>(0.25)) [[unlikely]] {
     if (x > Exponent<S>(32)) return F(1);
     const F half = settled<S>(product<Exponent<S>>(x, F(0.5)));
     return F(half * F(F(2) - half));
   }
-  const F r(x);
-  F q;
-  if constexpr (d::short_mantissa<S>) {
-    constexpr auto c = d::converted<F>(d::chebyshev);
-    const F r2(r * r);  // in pairs (Estrin): half as long a chain of dependent operations as Horner's
-    q = F((c[0] + F(r * c[1])) + F(r2 * F(c[2] + F(r * c[3]))));
-  } else {
-    q = F(d::taylor.back());
-    for (std::size_t k = d::taylor.size() - 1; k-- > 0;) q = F(d::taylor[k]) + r * q;
-  }
-  return F(r * q);
+  return settled_shortly<S>(F(x));
+}
+
+/// After a step, at 1 / time constant: x = duration * rate is made as long as it needs to be.
+template <class S>
+constexpr Fraction<S> settled_in(const TimeStep<S>& duration_s, const Rate<S>& rate_per_s) {
+  const Fraction<S> x = duration_s * rate_per_s;
+  if (long_step<S>(x)) [[unlikely]] return settled<S>(Exponent<S>(duration_s * rate_per_s));
+  return settled_shortly<S>(x);
 }
 
 }  // namespace bms::model

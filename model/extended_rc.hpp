@@ -4,7 +4,7 @@
 //   Held       all states of mechanisms; those that are not corrected (a warmth) come last
 //   Errors     whether two lasting errors are states as well: by how much the model's voltage is too low [V], and by how much the
 //              current reads too high, as part of the capacity per hour [1/h]. Both are first-order Gauss-Markov processes:
-//              noise.model_v over `forgotten_in` times noise.model_correlation_s, noise.current_offset_a over its own correlation time
+//              noise.model_v over `lasting_error_lasts` times noise.model_correlation_s, noise.current_offset_a over its own correlation time
 //
 //   covariance   v_rc, voltage error, mechanisms' voltages, soc, current offset        what the offset moves comes before it
 //   values       v_rc, voltage error, current offset, mechanisms' states               soc is counted elsewhere
@@ -98,9 +98,8 @@ struct ExtendedRc {
     };
     struct Nothing {};
     using Forgotten = std::conditional_t<Errors, Forgetting, Nothing>;
-    static constexpr int forgotten_in = 8;
     static constexpr Forgotten forgotten(const FilterNoise<S>& noise, const TimeStep<S>& duration_s) {
-      if constexpr (Errors) return {part(duration_s * Fraction<S>(1.0 / forgotten_in), noise.model_correlation_s), part(duration_s, noise.current_offset_correlation_s)};
+      if constexpr (Errors) return {part(duration_s * Fraction<S>(1.0 / lasting_error_lasts), noise.model_correlation_s), part(duration_s, noise.current_offset_correlation_s)};
       else return {};
     }
 

@@ -28,6 +28,21 @@ class Q;
 template <class A, class B>
 class Product;
 
+/// 2^exponent, 0 <= exponent < 31: a factor that only shifts.
+struct PowerOfTwo {
+  std::int32_t exponent = 0;
+
+  constexpr PowerOfTwo() = default;
+  /// The nearest from below, for constants and host-side conversions.
+  constexpr explicit PowerOfTwo(double value) {
+    while (exponent < 30 && value >= 2) {
+      value /= 2;
+      ++exponent;
+    }
+  }
+  constexpr explicit operator double() const { return static_cast<double>(std::int32_t{1} << exponent); }
+};
+
 template <class T>
 inline constexpr bool is_q = false;
 template <int I, int F>
@@ -53,6 +68,14 @@ constexpr std::int64_t saturated_shift(std::int64_t v, int shift, std::int64_t l
   }
   const std::int64_t r = shifted(v, shift);
   return r > limit ? limit : r < -limit ? -limit : r;
+}
+
+/// v * 2^up, 0 <= up < 31, held within +-limit.
+constexpr std::int32_t shifted_up(std::int32_t v, std::int32_t up, std::int32_t limit) {
+  const std::int32_t room = limit >> up;
+  if (v > room) return limit;
+  if (v < -room) return -limit;
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(v) << up);
 }
 
 /// v, which has fewer than From bits, times 2^Shift, rounded to nearest, as a number of To bits, held within +-(2^To - 1).
@@ -134,6 +157,9 @@ class Q {
   /// A product: the same, without its exact value in between where that would be longer.
   template <class A, class B>
   constexpr Q(const Product<A, B>& product) : raw_{stored(product)} {}  // NOLINT(google-explicit-constructor)
+  template <class A>
+  constexpr Q(const Product<A, PowerOfTwo>& product)  // NOLINT(google-explicit-constructor)
+      : raw_{fixed_detail::shifted_up(Q(product.a).raw(), product.b.exponent, raw_limit)} {}
 
   static constexpr Q from_raw(Raw raw) {
     Q q;
@@ -239,6 +265,17 @@ class Product {
   B b;
 };
 
+/// By a power of two: stored in a named type it is a shift, as a number with its own exponent not even that.
+template <class A>
+class Product<A, PowerOfTwo> {
+ public:
+  constexpr Product(const A& first, const PowerOfTwo& second) : a(first), b(second) {}
+  constexpr Product operator-() const { return {-a, b}; }
+
+  A a;
+  PowerOfTwo b;
+};
+
 template <class T>
 inline constexpr bool is_product = false;
 template <class A, class B>
@@ -246,6 +283,11 @@ inline constexpr bool is_product<Product<A, B>> = true;
 
 template <int I1, int F1, int I2, int F2>
 constexpr Product<Q<I1, F1>, Q<I2, F2>> operator*(Q<I1, F1> a, Q<I2, F2> b) {
+  return {a, b};
+}
+
+template <int I, int F>
+constexpr Product<Q<I, F>, PowerOfTwo> operator*(Q<I, F> a, PowerOfTwo b) {
   return {a, b};
 }
 
@@ -286,7 +328,7 @@ constexpr bool operator==(Q<I1, F1> a, Q<I2, F2> b) {
 
 /// Of either kind: fixed point, or with a power of two of its own.
 template <class T>
-concept InIntegers = is_q<T> || is_product<T> || std::same_as<T, Scaled>;
+concept InIntegers = is_q<T> || is_product<T> || std::same_as<T, Scaled> || std::same_as<T, PowerOfTwo>;
 
 /// numerator / denominator stored in R, relative error below 2^-26 + 2^-27 + 2^-29 (product and reciprocal, model/scaled.hpp) plus 2^-29 for each operand of more than 30 bits, and half a step of R; saturates; x / 0 is R's end, 0 / 0 is 0.
 template <InIntegers R, InIntegers A, InIntegers B>

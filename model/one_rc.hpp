@@ -38,16 +38,18 @@ struct OneRc {
 
   /// How far the RC branch settles within a step, for the tables at one soc.
   struct Settling {
-    Rate<S> rate_per_s;       ///< 1 / (R1 C1)
-    Exponent<S> exponent;     ///< duration / (R1 C1)
-    Fraction<S> settled;      ///< p
+    Rate<S> rate_per_s;    ///< 1 / (R1 C1)
+    Fraction<S> settled;   ///< p
+    Fraction<S> by_rate;   ///< dp / d ln rate = x exp(-x) of x = duration / (R1 C1)
   };
 
   static constexpr Settling settling(const TablePoint<S>& at, const TimeStep<S>& duration_s) {
     const Duration<S> tau_s = at.r1_ohm * at.c1_f;
     const Rate<S> rate_per_s = ratio<Rate<S>>(Duration<S>(1), tau_s);
-    const Exponent<S> exponent = duration_s * rate_per_s;
-    return {rate_per_s, exponent, bms::model::settled<S>(exponent)};
+    const Fraction<S> settled = settled_in<S>(duration_s, rate_per_s), remaining = Fraction<S>(1) - settled;
+    const Fraction<S> x = duration_s * rate_per_s;
+    if (long_step<S>(x)) [[unlikely]] return {rate_per_s, settled, remaining * Current<S>(Exponent<S>(duration_s * rate_per_s))};
+    return {rate_per_s, settled, remaining * x};
   }
 
   /// v_rc at the start of the step; `at` and `settling` belong to the soc at its end.
@@ -66,9 +68,9 @@ struct OneRc {
     // over one interval: tau, p, and what v_rc goes to
     const Duration<S> tau_delta_s = Duration<S>(at.r1_delta_ohm * at.c1_f) + Duration<S>(at.r1_ohm * at.c1_delta_f);
     const Ratio tau_change = tau_delta_s * settling.rate_per_s;
-    const Ratio settled_delta = -(Ratio(remaining * Short(settling.exponent)) * tau_change);
+    const Ratio settled_delta = settling.by_rate * tau_change;
     const Voltage<S> target_delta_v = at.r1_delta_ohm * drive.current_a;
-    const Voltage<S> delta_v = Voltage<S>(settled_delta * gap_v(x, at, drive)) + Voltage<S>(settling.settled * target_delta_v);
+    const Voltage<S> delta_v = Voltage<S>(settling.settled * target_delta_v) - Voltage<S>(settled_delta * gap_v(x, at, drive));
     return {{{Coupling<S>(remaining), Coupling<S>(delta_v * at.per_width)}, {Coupling<S>(0), Coupling<S>(1)}}};
   }
 
@@ -78,8 +80,7 @@ struct OneRc {
   }
 
  private:
-  using Short = Current<S>;  // exponents below 2,048 in 32 bits
-  using Ratio = PerSoc<S>;   // relative changes over an interval
+  using Ratio = Current<S>;  // relative changes over an interval: below 2,048
 
   /// How far v_rc is from where the current leads it.
   static constexpr Voltage<S> gap_v(const Polarisation& x, const TablePoint<S>& at, const Drive<S>& drive) {

@@ -45,9 +45,9 @@ struct Quantities {  // a floating-point or dual number: one type for all
 template <>
 struct Quantities<FixedPoint> {  // in 30 bits where they are added: the sum of two then has 31
   using Soc = Q<3, 27>;                 // +-8, step 7.5e-9
-  using PerSoc = Q<11, 19>;             // 1 / width of an interval: up to 2,048
+  using PerSoc = PowerOfTwo;            // up to 2,048: an interval is not narrower
   using Voltage = Q<3, 27>;             // +-8 V, step 7.5 nV; also every other state but soc
-  using VoltagePerSoc = Q<7, 23>;       // +-128 V
+  using VoltagePerSoc = Scaled;
   using Current = Q<11, 19>;            // +-2,048 A, step 2 uA
   using Resistance = Q<0, 30>;          // below 1 ohm, step 1 nohm
   using Capacitance = Q<17, 13>;        // below 131 kF

@@ -15,6 +15,7 @@
 #include <array>
 #include <bit>
 #include <compare>
+#include <concepts>
 #include <cstdint>
 
 #include "model/wide_product.hpp"
@@ -25,6 +26,7 @@ template <int I, int F>
 class Q;
 template <class A, class B>
 class Product;
+struct PowerOfTwo;
 
 class Scaled {
  public:
@@ -52,6 +54,11 @@ class Scaled {
 
   template <class A, class B>
   constexpr Scaled(const Product<A, B>& p) : Scaled(Scaled(p.a) * Scaled(p.b)) {}  // NOLINT(google-explicit-constructor)
+
+  template <class A>
+  constexpr Scaled(const Product<A, PowerOfTwo>& p) : Scaled(of(p.a.raw(), p.b.exponent - A::fraction_bits)) {}  // NOLINT(google-explicit-constructor)
+  template <std::same_as<PowerOfTwo> P>
+  constexpr Scaled(const P& p) : Scaled(of(std::int32_t{1}, p.exponent)) {}  // NOLINT(google-explicit-constructor)
 
   /// raw * 2^exponent.
   static constexpr Scaled of(std::int32_t raw, std::int32_t exponent) {

@@ -31,7 +31,7 @@ struct FastPolarisation {
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
     constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {
-      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s)), Voltage<S>(Resistance<S>(r_ohm * at.activation) * drive.current_a)};
+      return {settled_in<S>(drive.duration_s, rate_per_s), Voltage<S>(Resistance<S>(r_ohm * at.activation) * drive.current_a)};
     }
   };
 };

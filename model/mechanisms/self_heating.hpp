@@ -37,7 +37,7 @@ struct SelfHeating {
     constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {
       const Voltage<S> drop_v = Resistance<S>(at.r0_ohm + at.r1_ohm) * drive.current_a;
       const Coupling<S> heat_w = drop_v * drive.current_a;
-      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s)), Voltage<S>(heat_w * per_w)};
+      return {settled_in<S>(drive.duration_s, rate_per_s), Voltage<S>(heat_w * per_w)};
     }
     constexpr void warm(TablePoint<S>& at, const Voltage<S>& hundred_k, const Drive<S>&) const {
       const Temperature<S> reference_c(25);

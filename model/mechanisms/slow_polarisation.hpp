@@ -48,7 +48,7 @@ struct SlowPolarisation {
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
     constexpr Relaxation<S> settle(std::size_t i, const TablePoint<S>& at, const Drive<S>& drive) const {
-      return {settled<S>(Exponent<S>(drive.duration_s * rate_per_s[i])), Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * drive.current_a)};
+      return {settled_in<S>(drive.duration_s, rate_per_s[i]), Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * drive.current_a)};
     }
     constexpr Coupling<S> ahead_per_v() const { return surface_per_v; }
   };
