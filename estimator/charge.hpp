@@ -3,8 +3,7 @@
 //   charge += current_ua * duration_us        exact, in 1e-12 A s
 //   soc     = charge / capacity               read in counts of 2^shift (model::ChargeScale), below 4e-9
 //
-// Held within -1/4 .. 5/4 of the capacity: nothing overflows however long a sensor lies. (5/4 of the largest capacity and as much
-// again, or one count of the largest current over the longest step, are below 2^63.)
+// Held within -1/4 .. 5/4 of the capacity: nothing overflows however long a sensor lies (asserted below).
 // A dual number (an unknown of a fit) keeps its derivatives instead: Charge<Jet> sums in Jets.
 #pragma once
 
@@ -14,6 +13,19 @@
 #include "model/cell.hpp"
 
 namespace bms {
+
+inline constexpr std::uint32_t longest_count_us = 2'000'000'000U;
+
+namespace charge_ranges {
+
+using namespace model;
+inline constexpr double largest_uaus = accepted::capacity_ah.high * 3'600e12;
+static_assert(most_soc * largest_uaus + most_soc * largest_uaus < 0x1p63, "full, and corrected as far as it can be");
+static_assert(most_soc * largest_uaus + 0x1p31 * longest_count_us < 0x1p63, "full, and the largest current for as long as can be counted at once");
+static_assert(most_soc * 0x1p29 < 0x1p31, "read in counts");
+static_assert(accepted::capacity_ah.low * 3'600e12 / 0x1p32 > 5'000, "the upper half tells the smallest cell's soc to a five-thousandth");
+
+}  // namespace charge_ranges
 
 template <class S>
 inline constexpr bool counts_in_integers = std::floating_point<S> || std::same_as<S, model::FixedPoint>;
@@ -29,7 +41,7 @@ class Charge {
     correct(soc, scale);
   }
 
-  /// current_ua: not below -2^31 + 1; duration_us: at most 2e9.
+  /// current_ua: not below -2^31 + 1; duration_us: at most longest_count_us.
   constexpr void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
     uaus_ += model::wide_product(current_ua, static_cast<std::int32_t>(duration_us));
     hold(scale);
@@ -52,7 +64,7 @@ class Charge {
 
  private:
   static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
-    const Soc most(1.25);  // with what is there already, below 2^63 even in the largest cell
+    const Soc most(model::most_soc);
     const Soc held = delta > most ? most : delta < -most ? -most : delta;
     if constexpr (model::is_q<Soc>) {
       return Soc(held * scale.counts_per_soc).raw();

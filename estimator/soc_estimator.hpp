@@ -31,6 +31,7 @@
 #include "estimator/ud_covariance.hpp"
 #include "estimator/voltage_doubt.hpp"
 #include "model/extended_rc.hpp"
+#include "model/fixed_ranges.hpp"
 
 namespace bms {
 
@@ -118,7 +119,6 @@ class SocEstimator {
   using Coupling = model::Coupling<S>;
 
   static constexpr std::uint32_t longest_step_us = 4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
-  static constexpr std::uint32_t longest_count_us = 2'000'000'000U;
   static constexpr std::int16_t reference_cdegc = 2'500;
   static constexpr int longest_gap_counts = 1'000;                   // 23 days; nothing is known after that
 

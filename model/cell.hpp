@@ -4,7 +4,9 @@
 //   soc in [start of interval k, start of interval k + 1):  t = (soc - start) * per_width,  value = value at start + t * delta
 //
 // per_width is the power of two next to 1 / width, not below it: a shift in integers. t ends below 2, delta is what a value changes by
-// while t goes from 0 to 1. // The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on (a clamp
+// while t goes from 0 to 1.
+//
+// The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on (a clamp
 // would have slope 0 just where an estimate that has overshot needs one to find back) and R0, R1, C1 stay constant.
 // An edge belongs to the interval above it, so does the slope there.
 //
@@ -40,8 +42,8 @@ struct Interval {
 template <class S>
 struct ChargeScale {
   std::int64_t capacity_uaus = 0;
-  std::int64_t lowest_uaus = 0;      ///< where counting stops: -1/4 of the capacity
-  std::int64_t highest_uaus = 0;     ///< and 5/4 of it
+  std::int64_t lowest_uaus = 0;      ///< where counting stops: least_soc
+  std::int64_t highest_uaus = 0;     ///< most_soc
   int shift = 0;
   Soc<S> soc_per_count{};            ///< fixed point: per 2^27 counts (what Soc holds as 1), 0.25 .. 0.5
   Soc<S> counts_per_soc{};           ///< its inverse; fixed point: in 2^27 counts
@@ -157,12 +159,15 @@ constexpr std::size_t ocv_piece(const OcvTable<Real>& ocv, double soc) {
 
 }  // namespace cell_detail
 
-/// Half the distance between charge and discharge in the middle of the curve [V], 20 to 90 % of soc; 0: not known.
+/// The middle of the curve: where a lithium iron phosphate cell's voltage hardly moves, in soc. Beyond, slow charge and discharge part by their knees.
+inline constexpr double middle_from = 0.2, middle_to = 0.9;
+
+/// Half the distance between charge and discharge in the middle of the curve [V]; 0: not known.
 template <class Real>
 constexpr double middle_half_gap_v(const OcvTable<Real>& ocv) {
   double area = 0, width = 0;
   for (std::size_t k = 0; k + 1 < ocv.half_gap_v.size; ++k) {
-    const double from = ocv.soc[k] > 0.2 ? ocv.soc[k] : 0.2, to = ocv.soc[k + 1] < 0.9 ? ocv.soc[k + 1] : 0.9;
+    const double from = ocv.soc[k] > middle_from ? ocv.soc[k] : middle_from, to = ocv.soc[k + 1] < middle_to ? ocv.soc[k + 1] : middle_to;
     if (!(to > from)) continue;
     const double slope = (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
     area += (to - from) * (ocv.half_gap_v[k] + slope * ((from + to) / 2 - ocv.soc[k]));
@@ -193,6 +198,14 @@ constexpr std::size_t interval_count(const CellParameters<Real>& p) {
 
 /// A voltage that is known no better says nothing.
 inline constexpr double largest_error_v2 = 0.04;
+
+/// A sensor of more is not there: of what is plausible, and of what may have flowed unseen.
+inline constexpr double largest_current_a = 2'000;
+
+inline constexpr double outer_width = 0.125;
+
+/// Where counting stops, in soc.
+inline constexpr double least_soc = -0.25, most_soc = 1.25;
 
 inline constexpr std::size_t max_intervals = max_ocv_edges + max_rc_nodes + 3;
 
@@ -231,10 +244,10 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
     i.error_v2 = Variance<S>(error_v2 < most_v2 ? error_v2 : most_v2);
     ++cell.size;
   };
-  // outside, a width of 1/8 stands for "from there on": t goes on beyond 0 and 1
-  add(-0.125, 0);
+  // outside, a width stands for "from there on": t goes on beyond 0 and 1
+  add(-outer_width, 0);
   for (std::size_t k = 0; k + 1 < edges.size; ++k) add(edges[k], edges[k + 1]);
-  add(1, 1.125);
+  add(1, 1 + outer_width);
   // out of reach: a simulation's soc may be anywhere, the estimator's is held within -1/4 .. 5/4
   const double nowhere = is_q<Soc<S>> ? 7.9 : 1e30;
   cell.edge[0] = Soc<S>(-nowhere);
@@ -243,6 +256,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   const double capacity_as = p.capacity_ah * 3'600;
   cell.charge.capacity_uaus = static_cast<std::int64_t>(capacity_as * 1e12 + 0.5);
   while ((cell.charge.capacity_uaus >> cell.charge.shift) >= (std::int64_t{1} << 29)) ++cell.charge.shift;
+  static_assert(least_soc == -0.25 && most_soc == 1.25);
   cell.charge.lowest_uaus = -(cell.charge.capacity_uaus / 4);
   cell.charge.highest_uaus = cell.charge.capacity_uaus + cell.charge.capacity_uaus / 4;
   const double per_soc = static_cast<double>(cell.charge.capacity_uaus) / (268'435'456.0 * static_cast<double>(std::int64_t{1} << cell.charge.shift));
@@ -264,12 +278,12 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.offset_per_h2 = Variance<S>(square(n.current_offset_a / p.capacity_ah));
   cell.noise.current_offset_correlation_s = Duration<S>(n.current_offset_correlation_s < 131'000 ? n.current_offset_correlation_s : 131'000);
   cell.noise.at_rest_per_h2 = Variance<S>(square(n.current_at_rest_a / p.capacity_ah));
-  const auto micro = [](double a) { return static_cast<std::int32_t>(a < 2'000 ? a * 1e6 : 2e9); };
+  const auto micro = [](double a) { return static_cast<std::int32_t>(1e6 * (a < largest_current_a ? a : largest_current_a)); };
   cell.noise.at_rest = {micro(3 * (n.current_offset_a + n.current_at_rest_a)), micro(n.current_offset_a)};
   cell.noise.gain = Fraction<S>(n.current_gain);
   cell.noise.one_c_a = Current<S>(p.capacity_ah);
   cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
-  cell.noise.unknown_a = Current<S>(n.current_unknown_a);
+  cell.noise.unknown_a = Current<S>(n.current_unknown_a < largest_current_a ? n.current_unknown_a : largest_current_a);
 
   cell.limits = {Voltage<S>(p.limits.voltage_min_v), Voltage<S>(p.limits.voltage_max_v), Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a), Fraction<S>(1 / capacity_as)};
 
@@ -278,7 +292,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.plausible.voltage_max_uv = static_cast<std::int32_t>((p.limits.voltage_max_v + 0.5) * 1e6);
   const double larger = p.limits.charge_current_max_a > p.limits.discharge_current_max_a ? p.limits.charge_current_max_a
                                                                                          : p.limits.discharge_current_max_a;
-  cell.plausible.current_max_ua = static_cast<std::int32_t>(larger < 200 ? larger * 1e7 : 2e9);
+  cell.plausible.current_max_ua = micro(10 * larger);
   return cell;
 }
 

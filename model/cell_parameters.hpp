@@ -23,6 +23,27 @@ struct Column {
   constexpr void push_back(const Real& v) { value[size++] = v; }
 };
 
+/// What a cell file may hold: wide enough for any lithium cell from a coin to 1,000 Ah (Table 3 of the paper bounds the fit of one of 6 Ah).
+/// model/fixed_ranges.hpp proves with these that fixed point has room for all of it.
+namespace accepted {
+
+struct Range {
+  double low, high;
+};
+inline constexpr Range capacity_ah{0.01, 1'000};
+inline constexpr Range voltage_v{0.5, 5};               ///< limits of use, and the open-circuit voltage from soc 0 to 1
+inline constexpr Range current_a{1e-3, 2'000};          ///< limits of use
+inline constexpr Range slope_v{1e-6, 60};               ///< of the open-circuit voltage, per unit of soc
+inline constexpr Range resistance_ohm{1e-5, 0.5};       ///< R0 and R1
+inline constexpr Range capacitance_f{100, 100'000};     ///< C1
+inline constexpr Range time_constant_s{0.2, 50'000};    ///< R1 C1
+inline constexpr double least_width = 0.0005;           ///< of soc, between any two edges or nodes
+inline constexpr Range lasts_s{0, 86'400};              ///< noise.model_correlation_s
+inline constexpr Range unknown_c{1e-3, 10};             ///< noise.current_unknown_a over the 1C current
+inline constexpr double most_gain = 0.2, most_resistance_error = 1;
+
+}  // namespace accepted
+
 inline constexpr std::size_t max_ocv_edges = 64;
 inline constexpr std::size_t max_rc_nodes = 64;
 
@@ -101,19 +122,19 @@ struct CellFault {
   const char* what = nullptr;      ///< what is expected
 };
 
-/// Wide enough for any lithium cell from a coin to 1,000 Ah (Table 3 of the paper bounds the fit of one of 6 Ah), narrow enough
-/// that no scalar leaves its range.
+/// By `accepted`.
 constexpr CellFault first_fault(const CellParameters<double>& p) {
   // written so that NaN is outside
   const auto outside = [](double v, double low, double high) { return !(v >= low && v <= high); };
+  const auto beyond = [&](double v, accepted::Range range) { return outside(v, range.low, range.high); };
 
-  if (outside(p.capacity_ah, 0.01, 1'000)) return {"capacity_ah", 0, "0.01 to 1000 Ah"};
+  if (beyond(p.capacity_ah, accepted::capacity_ah)) return {"capacity_ah", 0, "0.01 to 1000 Ah"};
 
   const Limits& l = p.limits;
-  if (outside(l.voltage_min_v, 0.5, 5)) return {"limits.voltage_min_v", 0, "0.5 to 5 V"};
-  if (outside(l.voltage_max_v, l.voltage_min_v + 0.1, 5)) return {"limits.voltage_max_v", 0, "voltage_min_v + 0.1 to 5 V"};
-  if (outside(l.charge_current_max_a, 1e-3, 2'000)) return {"limits.charge_current_max_a", 0, "0.001 to 2000 A"};
-  if (outside(l.discharge_current_max_a, 1e-3, 2'000)) return {"limits.discharge_current_max_a", 0, "0.001 to 2000 A"};
+  if (beyond(l.voltage_min_v, accepted::voltage_v)) return {"limits.voltage_min_v", 0, "0.5 to 5 V"};
+  if (outside(l.voltage_max_v, l.voltage_min_v + 0.1, accepted::voltage_v.high)) return {"limits.voltage_max_v", 0, "voltage_min_v + 0.1 to 5 V"};
+  if (beyond(l.charge_current_max_a, accepted::current_a)) return {"limits.charge_current_max_a", 0, "0.001 to 2000 A"};
+  if (beyond(l.discharge_current_max_a, accepted::current_a)) return {"limits.discharge_current_max_a", 0, "0.001 to 2000 A"};
   if (outside(l.temperature_min_c, -60, 100)) return {"limits.temperature_min_c", 0, "-60 to 100 degrees C"};
   if (outside(l.temperature_max_c, l.temperature_min_c, 150)) return {"limits.temperature_max_c", 0, "temperature_min_c to 150 degrees C"};
 
@@ -125,9 +146,9 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (o.soc[o.soc.size - 1] != 1) return {"ocv.soc", o.soc.size - 1, "1 as the last edge"};
   for (std::size_t k = 0; k + 1 < o.soc.size; ++k) {
     if (outside(o.soc[k + 1] - o.soc[k], 0.001, 1)) return {"ocv.soc", k + 1, "edges that ascend by 0.001 or more"};
-    if (outside(o.b1_v[k], 1e-6, 60)) return {"ocv.b1_v", k, "a curve that rises: 0.000001 to 60 V per unit of soc"};
+    if (beyond(o.b1_v[k], accepted::slope_v)) return {"ocv.b1_v", k, "a curve that rises: 0.000001 to 60 V per unit of soc"};
     for (const double soc : {o.soc[k], o.soc[k + 1]}) {
-      if (outside(o.b0_v[k] + o.b1_v[k] * soc, 0.5, 5)) return {"ocv.b0_v", k, "an open-circuit voltage of 0.5 to 5 V"};
+      if (beyond(o.b0_v[k] + o.b1_v[k] * soc, accepted::voltage_v)) return {"ocv.b0_v", k, "an open-circuit voltage of 0.5 to 5 V"};
     }
     if (k > 0 && outside(o.b0_v[k] + o.b1_v[k] * o.soc[k] - o.b0_v[k - 1] - o.b1_v[k - 1] * o.soc[k], -0.005, 0.005)) {
       return {"ocv.b0_v", k, "pieces that meet within 5 mV at their common edge"};
@@ -160,33 +181,33 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
     if (outside(r.soc[k], 0, 1)) return {"rc.soc", k, "0 to 1"};
     for (std::size_t e = 0; e < o.soc.size; ++e) {
       const double apart = r.soc[k] < o.soc[e] ? o.soc[e] - r.soc[k] : r.soc[k] - o.soc[e];
-      if (apart > 1e-9 && apart < 0.0005) return {"rc.soc", k, "nodes on an edge of ocv.soc or 0.0005 or more away from it"};
+      if (apart > 1e-9 && apart < accepted::least_width) return {"rc.soc", k, "nodes on an edge of ocv.soc or 0.0005 or more away from it"};
     }
     if (k > 0 && outside(r.soc[k] - r.soc[k - 1], 0.001, 1)) return {"rc.soc", k, "nodes that ascend by 0.001 or more"};
-    if (outside(r.r0_ohm[k], 1e-5, 0.5)) return {"rc.r0_ohm", k, "0.00001 to 0.5 ohm"};
-    if (outside(r.r1_ohm[k], 1e-5, 0.5)) return {"rc.r1_ohm", k, "0.00001 to 0.5 ohm"};
-    if (outside(r.c1_f[k], 100, 100'000)) return {"rc.c1_f", k, "100 to 100000 F"};
-    if (outside(r.r1_ohm[k] * r.c1_f[k], 0.2, 50'000)) return {"rc.c1_f", k, "a time constant r1 * c1 of 0.2 to 50000 s"};
+    if (beyond(r.r0_ohm[k], accepted::resistance_ohm)) return {"rc.r0_ohm", k, "0.00001 to 0.5 ohm"};
+    if (beyond(r.r1_ohm[k], accepted::resistance_ohm)) return {"rc.r1_ohm", k, "0.00001 to 0.5 ohm"};
+    if (beyond(r.c1_f[k], accepted::capacitance_f)) return {"rc.c1_f", k, "100 to 100000 F"};
+    if (beyond(r.r1_ohm[k] * r.c1_f[k], accepted::time_constant_s)) return {"rc.c1_f", k, "a time constant r1 * c1 of 0.2 to 50000 s"};
   }
 
   const Noise& n = p.noise;
   if (outside(n.voltage_v, 1e-5, 0.5)) return {"noise.voltage_v", 0, "0.00001 to 0.5 V"};
   if (outside(n.model_v, 1e-5, 0.5)) return {"noise.model_v", 0, "0.00001 to 0.5 V"};
-  if (outside(n.model_correlation_s, 0, 86'400)) return {"noise.model_correlation_s", 0, "0 to 86400 s"};
+  if (beyond(n.model_correlation_s, accepted::lasts_s)) return {"noise.model_correlation_s", 0, "0 to 86400 s"};
   if (outside(n.v_rc_v, 1e-5, 0.5)) return {"noise.v_rc_v", 0, "0.00001 to 0.5 V"};
   if (outside(n.rest_v, 1e-4, 0.5)) return {"noise.rest_v", 0, "0.0001 to 0.5 V"};
   const double c_rate_1_a = p.capacity_ah;
   if (outside(n.current_a, 1e-7 * c_rate_1_a, c_rate_1_a)) return {"noise.current_a", 0, "1e-7 to 1 times the 1C current"};
   if (outside(n.current_offset_a, 1e-6 * c_rate_1_a, c_rate_1_a)) return {"noise.current_offset_a", 0, "1e-6 to 1 times the 1C current"};
   if (outside(n.current_offset_correlation_s, 1, 1e6)) return {"noise.current_offset_correlation_s", 0, "1 to 1000000 s"};
-  if (outside(n.current_unknown_a, 1e-3 * c_rate_1_a, 10 * c_rate_1_a)) return {"noise.current_unknown_a", 0, "0.001 to 10 times the 1C current"};
+  if (outside(n.current_unknown_a, accepted::unknown_c.low * c_rate_1_a, accepted::unknown_c.high * c_rate_1_a)) return {"noise.current_unknown_a", 0, "0.001 to 10 times the 1C current"};
 
   if (outside(n.current_at_rest_a, 0, 0.1 * c_rate_1_a)) return {"noise.current_at_rest_a", 0, "0 to 0.1 times the 1C current"};
-  if (outside(n.current_gain, 0, 0.2)) return {"noise.current_gain", 0, "0 to 0.2"};
+  if (outside(n.current_gain, 0, accepted::most_gain)) return {"noise.current_gain", 0, "0 to 0.2"};
 
   const Tolerance& t = p.tolerance;
   if (outside(t.ocv_v, 0, 0.1)) return {"tolerance.ocv_v", 0, "0 to 0.1 V"};
-  if (outside(t.resistance_fraction, 0, 1)) return {"tolerance.resistance_fraction", 0, "0 to 1"};
+  if (outside(t.resistance_fraction, 0, accepted::most_resistance_error)) return {"tolerance.resistance_fraction", 0, "0 to 1"};
   if (outside(t.initial_soc, 0, 1)) return {"tolerance.initial_soc", 0, "0 to 1"};
   if (outside(t.drift_v, 0, 0.1)) return {"tolerance.drift_v", 0, "0 to 0.1 V"};
   return {};

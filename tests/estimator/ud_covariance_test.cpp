@@ -25,7 +25,7 @@ struct DenseCovariance {
 };
 
 template <class S, std::size_t N>
-void expect_agreement(double tolerance, int steps) {
+void expect_agreement(double tolerance, int steps, bool last_decays = false) {
   constexpr int n = static_cast<int>(N);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -49,7 +49,7 @@ void expect_agreement(double tolerance, int steps) {
     for (std::size_t i = 0; i < N; ++i) {
       for (std::size_t j = i; j < N; ++j) {
         // exactly representable in every scalar, so that only the algorithm is compared
-        const double entry = i == j ? (j + 1 == N ? 1.0 : std::round(1024 * (0.5 + 0.5 * uniform(random))) / 1024) : std::round(1024 * (uniform(random) - 0.5)) / 8192;
+        const double entry = i == j ? (j + 1 == N && !last_decays ? 1.0 : std::round(1024 * (0.5 + 0.5 * uniform(random))) / 1024) : std::round(1024 * (uniform(random) - 0.5)) / 8192;
         f[i][j] = model::Coupling<S>(entry);
         f_dense(static_cast<int>(i), static_cast<int>(j)) = entry;
       }
@@ -87,6 +87,7 @@ void expect_agreement(double tolerance, int steps) {
 TEST(UdCovariance, AgreesWithADenseJosephFilterForTwoStates) { expect_agreement<double, 2>(1e-11, 2'000); }
 TEST(UdCovariance, AgreesWithADenseJosephFilterForThreeStates) { expect_agreement<double, 3>(1e-11, 2'000); }
 TEST(UdCovariance, AgreesWithADenseJosephFilterForFiveStates) { expect_agreement<double, 5>(1e-10, 2'000); }
+TEST(UdCovariance, AgreesWithADenseJosephFilterWhereTheLastStateDecays) { expect_agreement<double, 4>(1e-10, 2'000, true); }
 TEST(UdCovariance, AgreesInFloatToItsDigits) { expect_agreement<float, 2>(1e-4, 2'000); }
 TEST(UdCovariance, AgreesInFixedPointToItsDigits) { expect_agreement<model::FixedPoint, 3>(1e-4, 2'000); }
 

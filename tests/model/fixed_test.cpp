@@ -61,6 +61,19 @@ TEST(Fixed, ArithmeticAgreesWithRealNumbersToAStepOfTheResult) {
   }
 }
 
+TEST(Fixed, APowerOfTwoMultipliesExactlyUntilTheRangeEnds) {
+  std::mt19937_64 random(3);
+  for (int n = 0; n < 10'000; ++n) {
+    const auto a = Narrow::from_raw(static_cast<std::int32_t>(random() >> 33) - (1 << 30));
+    const PowerOfTwo p(static_cast<double>(1 << random() % 12));
+    const double expected = real(a) * real(p), end = real(Narrow::highest());
+    EXPECT_EQ(real(Narrow(a * p)), std::clamp(expected, -end, end)) << real(a) << " " << real(p);
+    EXPECT_NEAR(real(Scaled(a * p)), expected, std::abs(expected) * 0x1p-29);
+  }
+  EXPECT_EQ(real(PowerOfTwo(2'047)), 1'024);
+  EXPECT_EQ(real(PowerOfTwo(1)), 1);
+}
+
 TEST(Fixed, RatioOfTinyVariancesKeepsItsDigits) {
   const Wide small(3e-13), large(4e-12);
   EXPECT_NEAR(real(ratio<Q<1, 30>>(small, large)), real(small) / real(large), 0x1p-29);
