@@ -168,15 +168,6 @@ TEST(Microbit, ComputesTheShiftBitForBitLikeTheHost) {
   }
 }
 
-TEST(Microbit, ComputesARealRecordingBitForBitLikeTheHost) {
-  if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
-  for (const char* file : {"a123_26650/udds_P25_A002.csv", "a123_26650/dyn10_N15_A002.csv"}) {
-    const ToolRun run = run_tool("replay " + (data / file).string() + " --cell a123_26650_extended" + on_microbit);
-    EXPECT_EQ(run.exit_code, 0) << file << ": " << run.err;
-    EXPECT_THAT(run.out, HasSubstr("every bit equal")) << file;
-  }
-}
-
 /// Readings that are missing, impossible and stuck; a gap; a clock that stands still.
 TEST(Microbit, ComputesARecordingWithTroubleBitForBitLikeTheHost) {
   const TemporaryFolder folder;

@@ -1,6 +1,6 @@
 // Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on the board;
 // with "board": writes that and the keys of mechanisms, nothing of recordings and speeds; with "protection": only what protection costs, with "budgets": only
-// flash, RAM and stack of the boards; with "fixed": how far integers are from double.
+// flash, RAM and stack of the boards; with "fixed": how far integers are from double, and that the microbit computes them.
 //
 // Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
 #include <algorithm>
@@ -25,6 +25,7 @@
 #include "host_sim/text_file.hpp"
 #include "identification/identify.hpp"
 #include "tests/figures/duty.hpp"
+#include "tests/figures/fixed_point.hpp"
 #include "tests/figures/soc_trials.hpp"
 #include "tests/firmware/board_budget.hpp"
 #include "tests/firmware/step_cost.hpp"
@@ -113,33 +114,15 @@ std::string microbit_cost() {
   return table;
 }
 
-std::string fixed_row(const std::string& cell, const std::string& recording) {
-  const CellFile file = read_cell(cell);
-  const auto all = samples(read_recording(recording));
-  const Track fixed = run_on_host(file, all, std::nullopt, ScalarKind::fixed), once = run_on_host(file, all, std::nullopt, ScalarKind::single), twice = run_on_host(file, all, std::nullopt, ScalarKind::twice);
-  double of_fixed = 0, of_float = 0;
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    of_fixed = std::max(of_fixed, std::abs(fixed.rows[k].soc - twice.rows[k].soc));
-    of_float = std::max(of_float, std::abs(once.rows[k].soc - twice.rows[k].soc));
+/// How far integers, and float, are from double over whole recordings, and whether the microbit computes the same words as the host.
+std::string fixed_point() {
+  std::string table = "| recording | cell | estimates | fixed point less double | float less double | words on the microbit |\n|---|---|---|---|---|---|\n";
+  for (const FixedPointRun& run : fixed_point_runs(shift, data)) {
+    const Deviation d = deviation(run);
+    const auto difference = difference_on_microbit(run);
+    table += fmt::format("| {} | {} | {} | {:.4f} % | {:.4f} % | {} |\n", std::filesystem::path(run.recording).stem().string(), run.cell, d.estimates, 100 * d.of_fixed, 100 * d.of_float,
+                         difference ? fmt::format("differ from sample {}", difference->sample) : "all equal");
   }
-  return fmt::format("| {} | {} | {:.4f} % | {:.4f} % |\n", std::filesystem::path(recording).stem().string(), cell, 100 * of_fixed, 100 * of_float);
-}
-
-/// How far integers, and float, are from double: the largest difference of soc over a whole recording.
-std::string fixed_deviation() {
-  std::string table = "| recording | cell | fixed point | float |\n|---|---|---|---|\n" + fixed_row("table9", shift);
-  const auto all_in = [&](const char* folder, const std::vector<std::string>& cells) {
-    std::vector<std::filesystem::path> files;
-    for (const auto& entry : std::filesystem::directory_iterator(data / folder)) {
-      if (entry.path().extension() == ".csv") files.push_back(entry.path());
-    }
-    std::sort(files.begin(), files.end());
-    for (const std::string& cell : cells) {
-      for (const auto& file : files) table += fixed_row(cell, file.string());
-    }
-  };
-  all_in("a123_26650", {"a123_26650", "a123_26650_extended"});
-  all_in("a123_esctoolbox", {"a123_esctoolbox_extended"});
   return table;
 }
 
@@ -297,7 +280,7 @@ void run() {
   if (std::filesystem::exists(data)) {
     replace_figures(estimator, "real", real_accuracy());
     replace_figures(estimator, "trials", soc_trials(data));
-    replace_figures(estimator, "fixed", fixed_deviation());
+    replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
   } else {
     fmt::print(stderr, "{} is not there: the figures of real recordings stay\n", data.string());
   }
@@ -315,7 +298,7 @@ int main(int argc, char** argv) {
     else if (argc > 1 && std::string_view(argv[1]) == "board") bms::write_board();
     else if (argc > 1 && std::string_view(argv[1]) == "budgets") bms::replace_figures(bms::source / "boards/README.md", "budgets", bms::board_table());
     else if (argc > 1 && std::string_view(argv[1]) == "protection") bms::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
-    else if (argc > 1 && std::string_view(argv[1]) == "fixed") bms::replace_figures(bms::source / "estimator/README.md", "fixed", bms::fixed_deviation());
+    else if (argc > 1 && std::string_view(argv[1]) == "fixed") bms::replace_figures(bms::source / "boards/microbit/README.md", "fixed", bms::fixed_point());
     else bms::run();
     return 0;
   } catch (const std::exception& e) {

@@ -77,6 +77,13 @@ TEST(FirmwareImage, AStepStaysInsideItsBudget) {
   EXPECT_GT(cost.least, 100U);
 }
 
+TEST(MicrobitImage, AStepStaysInsideItsBudget) {
+  const StepCost cost = count_instructions(microbit(), microbit_image(Image::replay), shift());
+  EXPECT_EQ(cost.calls, 28801U);
+  EXPECT_LE(cost.mean, 3'000);  // design budget of a step
+  EXPECT_GT(cost.least, 1'000U);
+}
+
 TEST(MicrobitImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
   EXPECT_THAT(forbidden_in(symbols_of(microbit_image(Image::application))), IsEmpty());
   EXPECT_THAT(forbidden_in(symbols_of(microbit_image(Image::replay))), IsEmpty());

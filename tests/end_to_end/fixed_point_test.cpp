@@ -1,0 +1,36 @@
+// The estimator in integers: as good as in double, and the same bits on a Cortex-M0.
+#include <gtest/gtest.h>
+
+#include "tests/figures/fixed_point.hpp"
+
+namespace bms {
+namespace {
+
+const std::filesystem::path data = BMS_DATA_DIR;
+std::vector<FixedPointRun> runs() { return fixed_point_runs(BMS_SOURCE_DIR "/recordings/forklift_shift.csv", data); }
+constexpr std::size_t shift_and_recordings = 1 + 27 + 11 + 13;
+
+TEST(FixedPoint, IsWithinATenthOfAPercentOfDoubleOverTheShiftAndEveryRealRecording) {
+  std::size_t done = 0;
+  for (const FixedPointRun& run : runs()) {
+    const Deviation d = deviation(run);
+    EXPECT_GT(d.estimates, 1'000U) << run.recording;
+    EXPECT_GT(d.of_fixed, 0) << run.recording << ": not another arithmetic";
+    EXPECT_LE(d.of_fixed, 1e-3) << run.recording << " with " << run.cell;
+    ++done;
+  }
+  EXPECT_EQ(done, std::filesystem::exists(data) ? shift_and_recordings : 1U);
+}
+
+TEST(FixedPoint, OfTheMicrobitIsTheHostsBitForBitOverTheShiftAndEveryRealRecording) {
+  std::size_t done = 0;
+  for (const FixedPointRun& run : runs()) {
+    const auto difference = difference_on_microbit(run);
+    EXPECT_FALSE(difference) << run.recording << " with " << run.cell << ": " << difference->field << " of sample " << difference->sample << ", host " << difference->host << ", board " << difference->board;
+    ++done;
+  }
+  EXPECT_EQ(done, std::filesystem::exists(data) ? shift_and_recordings : 1U);
+}
+
+}  // namespace
+}  // namespace bms

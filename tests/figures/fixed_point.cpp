@@ -1,0 +1,49 @@
+#include "tests/figures/fixed_point.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/cell_file.hpp"
+#include "host_sim/emulator.hpp"
+#include "host_sim/recording.hpp"
+
+namespace bms {
+
+std::vector<FixedPointRun> fixed_point_runs(const std::filesystem::path& shift, const std::filesystem::path& data) {
+  std::vector<FixedPointRun> runs = {{shift.string(), "table9"}};
+  const auto all_in = [&](const char* folder, const char* cell, bool slow_ones) {
+    if (!std::filesystem::exists(data / folder)) return;
+    const std::size_t before = runs.size();
+    for (const auto& entry : std::filesystem::directory_iterator(data / folder)) {
+      const bool slow = entry.path().filename().string().starts_with("ocv_");
+      if (entry.path().extension() == ".csv" && (slow_ones || !slow)) runs.push_back({entry.path().string(), cell});
+    }
+    std::sort(runs.begin() + static_cast<std::ptrdiff_t>(before), runs.end(), [](const auto& a, const auto& b) { return a.recording < b.recording; });
+  };
+  all_in("a123_26650", "a123_26650", true);
+  all_in("a123_esctoolbox", "a123_esctoolbox_extended", true);
+  all_in("a123_26650", "a123_26650_extended", false);
+  return runs;
+}
+
+Deviation deviation(const FixedPointRun& run) {
+  const CellFile cell = read_cell(run.cell);
+  const auto all = samples(read_recording(run.recording));
+  const auto rows = [&](ScalarKind scalar) { return run_on_host(cell, all, std::nullopt, scalar).rows; };
+  const auto fixed = rows(ScalarKind::fixed), once = rows(ScalarKind::single), twice = rows(ScalarKind::twice);
+  Deviation d{all.size()};
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    d.of_fixed = std::max(d.of_fixed, std::abs(fixed[k].soc - twice[k].soc));
+    d.of_float = std::max(d.of_float, std::abs(once[k].soc - twice[k].soc));
+  }
+  return d;
+}
+
+std::optional<Difference> difference_on_microbit(const FixedPointRun& run) {
+  const CellFile cell = read_cell(run.cell);
+  const auto all = samples(read_recording(run.recording));
+  const Track host = run_on_host(cell, all, std::nullopt, ScalarKind::fixed), board = run_on_board(emulated_boards().back(), cell, all, std::nullopt);
+  return first_difference(host, board, ScalarKind::fixed);
+}
+
+}  // namespace bms
