@@ -2,7 +2,7 @@
 // long as every entry of D is, which each of the two operations below only ever makes from sums and quotients of positive numbers.
 // The same digits carry twice the range of P itself, so that float and fixed point are enough.
 //
-// propagate: P <- F P F' + diag(q), F upper triangular      modified weighted Gram-Schmidt (Thornton 1976)
+// propagate: P <- F P F' + diag(q), F upper triangular      modified weighted Gram-Schmidt (Thornton 1976); of the last state's two columns its projection leaves one, of weight d q / (d f^2 + q)
 // observe:   one scalar measurement z = h x + noise(r)       Bierman 1977
 //
 // Both as in G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation" (1977), chapters V and VI.
