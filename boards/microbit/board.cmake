@@ -17,3 +17,6 @@ set(BMS_SAMPLE_PERIOD_S 1.0)
 set(BMS_BUDGET_FLASH 65536)
 set(BMS_BUDGET_RAM 8192)
 set(BMS_BUDGET_STACK 4096)
+# ./bms flash: OpenOCD's interface/ and target/
+set(BMS_PROBE cmsis-dap)
+set(BMS_PROBE_TARGET nrf51)
