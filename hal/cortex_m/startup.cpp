@@ -53,8 +53,7 @@ int main();
       "mrs r0, psp\n"
       "1: ldr r1, =image_stack_top\n"
       "msr msp, r1\n"
-      "ldr r1, =record_fault\n"
-      "bx r1\n"
+      "bl record_fault\n"  // reaches further than b, and does not come back
       ".ltorg\n");
 }
 

@@ -118,10 +118,11 @@ Function function_of(const std::string& name, const std::vector<Instruction>& bo
     deepest = std::max(deepest, depth);
     if (const auto to = target(i)) {
       const bool own = *to >= body.front().address && *to <= body.back().address;
-      if (own && i.name != "bl") depth_at[*to] = std::max(depth_at[*to], depth);
-      if (i.name != "bl" && *to == body.front().address && depth > 0) throw std::runtime_error("a loop that takes more stack each time in " + name);
-      if (!own || i.name == "bl") f.calls.push_back(*to);
-      falls_through = i.name != "b";
+      const bool call = i.name == "bl" && (!own || *to == body.front().address);  // ARMv6-M jumps by bl where b does not reach
+      if (own && !call) depth_at[*to] = std::max(depth_at[*to], depth);
+      if (!call && *to == body.front().address && depth > 0) throw std::runtime_error("a loop that takes more stack each time in " + name);
+      if (!own || call) f.calls.push_back(*to);
+      falls_through = i.name != "b" && (i.name != "bl" || call);
     } else if (returns(i) || one_of(i.name, {"tbb", "tbh", "udf"}) || (i.name == "mov" && i.operands.starts_with("pc,"))) {
       falls_through = false;  // mov pc: a table, as tbb is where there is none
     } else if (i.name == "bx" && popped.find(i.operands) != std::string::npos) {
