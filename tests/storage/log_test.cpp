@@ -12,7 +12,9 @@
 #include "tests/storage/flash_model.hpp"
 #include "tests/storage/record_bytes.hpp"
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(BMS_POWER_CUT_SEQUENCES)
+constexpr int sequences = BMS_POWER_CUT_SEQUENCES;  // tests/mutants
+#elif defined(__SANITIZE_ADDRESS__)
 constexpr int sequences = 40;  // with sanitizers: a thousand would take many minutes
 #else
 constexpr int sequences = 1'000;

@@ -1,0 +1,28 @@
+// The whole fault matrix against the forklift board's image; with --write its table goes to protection/README.md. Exit: 1 when anything is missed, false
+// or late. ./bms faults
+#include <cstdio>
+#include <cstring>
+#include <exception>
+
+#include <fmt/format.h>
+
+#include "host_sim/committed_figures.hpp"
+#include "tests/firmware/board_fault_matrix.hpp"
+
+int main(int count, char** words) {
+  using namespace bms;
+  try {
+    const bool some = count > 1 && std::strcmp(words[1], "--some") == 0;
+    const auto result = protection::run_fault_matrix(!some, 1, 2);
+    for (const std::string& line : result.wrong) fmt::print("{}\n", line);
+    const std::string table = protection::markdown(result);
+    fmt::print("{}{} cases, {} samples: {} missed, {} false, {} complaints\n", table, result.cases, result.samples, result.missed, result.falsely, result.wrong.size());
+    if (count > 1 && std::strcmp(words[1], "--write") == 0) {
+      replace_figures(BMS_SOURCE_DIR "/protection/README.md", "fault matrix", table + fmt::format("\n{} cases, {} samples: {} missed, {} false.\n", result.cases, result.samples, result.missed, result.falsely));
+    }
+    return result.wrong.empty() ? 0 : 1;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "fault matrix: {}\n", e.what());
+    return 3;
+  }
+}
