@@ -37,7 +37,7 @@ constexpr Kind kinds[] = {
     {"overcurrent", Value::none, "DischargeOvercurrent", 30},
     {"welded", Value::none, "ContactorWelded", 1e9},       // when the contactors open next
     {"precharge_open", Value::none, "PrechargeFailed", 1e9},
-    {"silence", Value::none, "VoltageMissing", 0.5 + 0.5},  // five sample periods, then samples without readings
+    {"silence", Value::none, "SamplesMissing", 0.5 + 0.2},  // the table's, and a sample at either end
 };
 
 [[noreturn]] void refuse(const std::string& text, const std::string& what) { throw BadInput("--fault", 1, "'" + text + "': " + what); }

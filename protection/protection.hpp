@@ -85,9 +85,14 @@ class Protection {
   }
 
   constexpr const Decision& update(const PackSample<Cells>& sample, const PackEstimate<Cells>& estimate, const Orders& orders) {
+    decision_.came = 0;
     if (started_ && !later(sample.time_us, sample_us_)) {
       if (ignored_ < ignored_samples) ++ignored_;
       return ignored_ < ignored_samples ? decision_ : blind(step_to(sample.time_us), most_age_us);
+    }
+    if (!measured(sample)) {
+      clear_ = orders.clear;
+      return orders.board_fault ? blind(step_to(sample.time_us), 0, true) : without_sample(sample.time_us);
     }
     const std::uint32_t age_us = started_ ? clamped(sample.time_us - sample_us_) : 0, step_us = step_to(sample.time_us);
     started_ = true;
@@ -117,6 +122,7 @@ class Protection {
   }
 
   constexpr const Decision& without_sample(std::uint64_t now_us) {
+    decision_.came = 0;
     if (!started_) {
       started_ = true;
       sample_us_ = evaluated_us_ = now_us;
@@ -136,6 +142,12 @@ class Protection {
 
   static constexpr bool later(std::uint64_t a_us, std::uint64_t b_us) { return a_us - b_us - 1 < std::uint64_t{1} << 63; }
   static constexpr std::uint32_t clamped(std::uint64_t us) { return us < most_age_us ? static_cast<std::uint32_t>(us) : most_age_us; }
+
+  /// One of which nothing was read is none.
+  static constexpr bool measured(const PackSample<Cells>& s) {
+    return s.current_ua != no_reading || s.pack_uv != no_reading || std::any_of(s.cell_uv.begin(), s.cell_uv.end(), [](std::int32_t uv) { return uv != no_reading; }) ||
+           std::any_of(s.temperature_cdegc.begin(), s.temperature_cdegc.end(), [](std::int16_t cdegc) { return cdegc != no_temperature; });
+  }
 
   constexpr bool may_drive() const { return contactors_.state() == ContactorState::drive || contactors_.state() == ContactorState::charge; }
 
@@ -169,10 +181,10 @@ class Protection {
   }
 
   /// A step that knows nothing but that no sample came.
-  constexpr const Decision& blind(std::uint32_t step_us, std::int32_t age_us) {
+  constexpr const Decision& blind(std::uint32_t step_us, std::int32_t age_us, bool board_fault = false) {
     Quantities q = nothing_known();
     at(q, Quantity::sample_age_us) = age_us;
-    find_faults(q, step_us, {.clear = clear_});
+    find_faults(q, step_us, {.clear = clear_, .board_fault = board_fault});
     switch_contactors({Request::none, false, false, true, true, no_reading, no_reading, no_reading, step_us});
     decision_.allowed = derating_.update({.charge_forbidden = true, .discharge_forbidden = true}, step_us);
     decision_.bleed = 0;

@@ -1,8 +1,8 @@
 // Samples that another node on the bus measures and sends (hal/sample_frames.hpp), for a board whose own measuring chain is not there yet. The
 // load and its contactors are on the bus, too.
 //
-// When none has come for five sample periods, 1.2 s at most, one without readings is given: estimator and protection are told that nothing is measured,
-// go on and lose certainty as they should, and the watchdog (2 s, at least 1.36 s by its oscillator) is fed by work, not by waiting. Its time
+// When none has come for five sample periods, 1.2 s at most, one without readings is given, and one each period from then on: estimator and protection
+// are told that nothing is measured, go on and lose certainty as they should, and the watchdog (2 s, at least 1.36 s by its oscillator) is fed by work, not by waiting. Its time
 // goes on from the sender's last one.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
@@ -15,11 +15,13 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::uint64_t five_periods_us = static_cast<std::uint64_t>(5 * 1e6 * sample_period_s), patience_us = five_periods_us < 1'200'000 ? five_periods_us : 1'200'000;
+constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
+constexpr std::uint64_t longest_us = 1'200'000, patience_us = 5 * period_us < longest_us ? 5 * period_us : longest_us, again_us = period_us < longest_us ? period_us : longest_us;
 
 SampleFrames<pack_cells> frames;
 PackSample<pack_cells> nothing;
 std::uint64_t given_us = 0, last_us = 0;
+bool silent = false;  ///< the last one given was without readings
 
 }  // namespace
 
@@ -29,13 +31,15 @@ const PackSample<pack_cells>* next_sample() {
     while (can_receive(frame)) {
       if (!hear(frame) || !frames.take(frame)) continue;  // a frame that gets lost later is a missing reading, not the old one again
       given_us = now_us();
+      silent = false;
       last_us = frames.sample().time_us;
       return &frames.sample();
     }
     const std::uint64_t now = now_us(), waited = now - given_us;
-    if (waited >= patience_us) {
+    if (waited >= (silent ? again_us : patience_us)) {
       nothing.time_us = last_us += waited;
       given_us = now;
+      silent = true;
       return &nothing;
     }
     wait_for_interrupt();

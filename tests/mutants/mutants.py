@@ -3,7 +3,8 @@
 
     mutants.py BUILD_FOLDER [--count 200] [--seed 1] [--jobs 2] [--report FILE] [--again REPORT]
 
-  mutant     one place changed: a comparison, an operator, a constant, a condition held true or false, a statement left out; which, says the seed
+  mutant     one place changed: a comparison, an operator, a constant (one more or less; from a hundred on twice or half), a condition held true or false,
+             a statement left out; which, says the seed
   built      the file in a folder that is looked through first (-I), the tests that include it by the build folder's own commands, but -O1, each test
              source a program of its own. Nothing of the checkout is touched
   caught     a test fails, crashes, reads outside an array (checked), or takes ten times as long as it does without the change
@@ -14,6 +15,7 @@ The report names every mutant, what came of it and, of those that survive, the c
 Exit: 0 nine in ten are caught, 1 fewer, 2 bad usage.
 """
 import argparse
+import atexit
 import concurrent.futures
 import json
 import os
@@ -21,12 +23,17 @@ import pathlib
 import random
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 
-root = pathlib.Path(__file__).resolve().parents[2]
+checkout = pathlib.Path(__file__).resolve().parents[2]
+root = pathlib.Path(tempfile.mkdtemp(prefix="mutants_")) / "source"  # a copy: who edits meanwhile changes nothing
+atexit.register(shutil.rmtree, root.parent, ignore_errors=True)
+shutil.copytree(checkout, root, ignore=shutil.ignore_patterns("build*", ".git", "recordings", "corpus"), symlinks=True)
+(root / "recordings").symlink_to(checkout / "recordings")
 sources = sorted(p.relative_to(root).as_posix() for folder in ("protection", "storage") for p in (root / folder).iterdir() if p.suffix in (".hpp", ".cpp"))
 
 # Programs in the order in which they are tried: test source, target of the build it belongs to, what else is compiled. A test whose name begins
@@ -44,6 +51,11 @@ programs = [
     ("tests/storage/log_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
     ("tests/firmware/telemetry_test.cpp", "telemetry_test", ["hal/absent/flash.cpp", *store]),
 ]
+# the test that is tried first for files without one of their name
+first = {
+    "table_text": "table_test", "faults": "table_test", "pack_design": "table_test", "pack_quantities": "fault_matrix_test", "fault_monitor": "fault_matrix_test",
+    "guarded": "contactors_test", "crc32": "records_test",
+}
 checks = ["-O1", "-g0", "-w", "-D_GLIBCXX_ASSERTIONS", "-DBMS_POWER_CUT_SEQUENCES=60"]
 compiler = "clang++"  # half the time of g++
 compile_limit_s = 300
@@ -77,6 +89,8 @@ def numbers(literal, suffix):
         value = float(plain)
         return [repr(value * 2) + suffix, repr(value / 2) + suffix] if value else ["1.0" + suffix]
     value = int(plain)
+    if value >= 100:  # nothing is stated to better than that
+        return [f"{2 * value}{suffix}", f"{value // 2}{suffix}"]
     return [f"{value + 1}{suffix}"] + ([f"{value - 1}{suffix}"] if value > 0 else []) + ([f"0{suffix}"] if value > 1 else [])
 
 
@@ -161,7 +175,7 @@ def chosen(seed):
 
 def equivalents():
     """{(file, from, to): reason}: three lines each (file, from, to) and a fourth that begins with 'because'; empty lines between."""
-    path = pathlib.Path(__file__).parent / "equivalent.txt"
+    path = checkout / "tests/mutants/equivalent.txt"
     found = {}
     for block in re.split(r"\n\s*\n", path.read_text() if path.exists() else ""):
         lines = [line.strip() for line in block.strip().splitlines() if not line.startswith("#")]
@@ -183,7 +197,8 @@ class Build:
             commands = subprocess.run(["ninja", "-C", folder, "-t", "commands", target], check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()
             self.link[target] = commands[-1].removeprefix(": && ").split(" && ")[0]
             for command in commands:
-                words = shlex.split(command)
+                # the folder of the build is inside the checkout, and stays
+                words = shlex.split(command.replace(folder, "\0").replace(str(checkout), str(root)).replace("\0", folder))
                 if "-c" in words and "-o" in words:
                     file = pathlib.Path(words[words.index("-c") + 1])
                     if file.is_relative_to(root):
@@ -281,7 +296,7 @@ class Build:
             (overlay / file).parent.mkdir()
             (overlay / file).write_text(text[:mutant["begin"]] + mutant["new"] + text[mutant["end"]:])
             stem = pathlib.Path(file).stem
-            order = sorted(programs, key=lambda p: (not pathlib.Path(p[0]).name.startswith(stem), programs.index(p)))
+            order = sorted(programs, key=lambda p: (pathlib.Path(p[0]).stem != first.get(stem, f"{stem}_test"), programs.index(p)))
             changed = {}
             seen = False
             for test, target, beside in order:
@@ -322,8 +337,8 @@ def main():
         todo = chosen(arguments.seed)
 
     counted, refused = [], 0
-    with tempfile.TemporaryDirectory(prefix="mutants_") as scratch, concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        build = Build(str(pathlib.Path(arguments.build).resolve()), pathlib.Path(scratch))
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        build = Build(str(pathlib.Path(arguments.build).resolve()), root.parent)
         print("without any change: " + ", ".join(f"{pathlib.Path(t).stem} {s:.1f} s" for t, s in build.usual_s.items()), flush=True)
         running, number = {}, 0
         while True:

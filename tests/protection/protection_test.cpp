@@ -178,6 +178,54 @@ TEST(Protection, CountsSamplesOfAClockThatStandsOrGoesBackAsNone) {
   }
 }
 
+/// A front end that does not answer, a node that is silent: samples come, and nothing was read.
+TEST(Protection, CountsSamplesOfWhichNothingWasReadAsNone) {
+  Bench b;
+  b.drive_off();
+  const std::uint64_t last = b.time_us;
+  PackSample<16> nothing;
+  for (nothing.time_us = last + 100'000; nothing.time_us <= last + 600'000; nothing.time_us += 100'000) {
+    b.protection.update(nothing, b.estimate, b.orders);
+    EXPECT_EQ(b.protection.decision().outputs.any_closed(), nothing.time_us - last <= 500'000) << nothing.time_us - last;
+  }
+  EXPECT_EQ(b.protection.decision().faults, bit(Fault::samples_missing));
+  for (const auto one : {0, 1, 2, 3}) {  // what has a single reading is a sample
+    PackSample<16> s;
+    s.time_us = nothing.time_us += 100'000;
+    if (one == 0) s.current_ua = 0;
+    if (one == 1) s.pack_uv = 52'000'000;
+    if (one == 2) s.cell_uv[15] = 3'300'000;
+    if (one == 3) s.temperature_cdegc[3] = 2'000;
+    Protection<16> p(pack);
+    for (int k = 0; k < 10; ++k) {
+      p.update(s, b.estimate, b.orders);
+      s.time_us += 100'000;
+    }
+    EXPECT_EQ(p.decision().faults & bit(Fault::samples_missing), 0U) << one;
+    EXPECT_NE(p.decision().faults & bit(Fault::voltage_missing), 0U) << one;
+  }
+}
+
+TEST(Protection, AResetByTheWatchdogIsAFaultAlsoWhenNothingIsMeasured) {
+  Protection<16> p(pack);
+  PackSample<16> nothing;
+  Orders orders{.board_fault = true};
+  nothing.time_us = 100'000;
+  p.update(nothing, {}, orders);
+  EXPECT_EQ(p.decision().faults, bit(Fault::internal_fault));
+}
+
+TEST(Protection, SaysOnceThatAFaultCame) {
+  Bench b;
+  b.drive_off();
+  b.change = [](auto& s) { s.cell_uv[9] = 3'900'000; };
+  while ((b.protection.decision().faults & bit(Fault::cell_overvoltage_severe)) == 0) b.step();
+  ASSERT_NE(b.protection.decision().came, 0U);
+  b.time_us -= b.period;  // the next is no later
+  EXPECT_EQ(b.step().came, 0U);
+  EXPECT_EQ(b.protection.without_sample(b.time_us + 10'000).came, 0U);
+}
+
 TEST(Protection, WithoutASampleFromTheStartSaysSo) {
   Protection<16> p(pack);
   for (std::uint64_t now = 0; now < 600'000; now += 10'000) p.without_sample(now);

@@ -291,6 +291,26 @@ TEST_F(LogTest, ARecordOfANewerLayoutStaysThroughAllRoundsAndAnOlderOneIsReplace
   EXPECT_EQ(log.in_force().size(), 4U);
 }
 
+TEST_F(LogTest, AfterAMoveHoldsWhatWasThereAndNothingElse) {
+  ASSERT_EQ(keep(log, {2, 1}, {2}), Stored::kept);
+  for (int k = 0; k < 200; ++k) {
+    ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept);
+    ASSERT_EQ(log.in_force().size(), 2U) << k;
+    ASSERT_FALSE(content(log, 0, 255));
+  }
+}
+
+TEST_F(LogTest, APlaceThatDoesNotTakeItsBitsIsPassedOverAndTheSectorGoesOn) {
+  ASSERT_EQ(keep(log, {1, 1}, number(1)), Stored::kept);
+  const auto here = log.in_force().front();
+  flash.flip(here.sector, (here.line + 3U) * storage::line_bytes, 0x10);  // of the next payload
+  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::kept);
+  EXPECT_EQ(log.in_force().front().sector, here.sector);
+  EXPECT_EQ(log.broken(), 0U);
+  log.open();
+  EXPECT_EQ(content(log, 1, 1), Bytes(8, 0xFF)) << "kept is kept";
+}
+
 TEST_F(LogTest, NumbersWrap) {
   Bytes sector(flash.size().sector_bytes, 0xFF);
   const std::uint32_t line_0 = 0U - 64;  // the last round before 2^32
