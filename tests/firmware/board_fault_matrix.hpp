@@ -8,7 +8,7 @@
 //   missed     the oracle's fault is there and is not told, false: the other way; of every row that samples tell, with every sample of every case
 //
 // Heat is judged by the ideal integral, contactors by their own curves (README of protection/). What no frame can bring about (a reset by the
-// watchdog, flash that fails) is in unicorn_faults_test.cpp.
+// watchdog, flash that fails) is in bxcan_board_test.cpp.
 #pragma once
 
 #include <cstdint>
