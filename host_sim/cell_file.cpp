@@ -301,6 +301,10 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   file.text = text;
   file.hash = static_cast<std::uint32_t>(std::stoul(sha256(text).substr(0, 8), nullptr, 16));
 
+  // the parser asserts on some of these, where assertions are on
+  const auto binary = std::find_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\r' && c != '\t'; });
+  if (binary != text.end()) throw BadInput(path, static_cast<std::size_t>(1 + std::count(text.begin(), binary, '\n')), "a character that no text has, expected a cell file in TOML");
+
   toml::table root;
   try {
     root = toml::parse(text);

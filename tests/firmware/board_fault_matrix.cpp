@@ -30,11 +30,17 @@ constexpr double most_a = 6;
 std::string_view reaction_of(std::size_t k) { return expected_rows[k].reaction; }
 bool opens(std::size_t k) { return reaction_of(k) == "open" || reaction_of(k) == "open now" || reaction_of(k) == "forbid discharge"; }
 
+/// Built once.
+const std::filesystem::path& image() {
+  static const auto path = firmware_image("stm32f405_forklift", read_cell("table9"), Image::hil);
+  return path;
+}
+
 /// The board at the other end, and what it said last.
 class BoardTruck : public TruckPack {
  public:
   BoardTruck(std::uint64_t seed, MatrixResult& result)
-      : TruckPack(seed), result_(result), link_(hil::emulated_link("stm32f405_forklift", firmware_image("stm32f405_forklift", read_cell("table9"), Image::hil))) {
+      : TruckPack(seed), result_(result), link_(hil::emulated_link("stm32f405_forklift", image())) {
     hear(link_->exchange(0, std::vector{hal::frame_of(StartingPoint{600'000'000, 20'000'000})}));
   }
 
@@ -394,7 +400,7 @@ void merge(Told& into, const Told& from) {
 }  // namespace
 
 MatrixResult run_fault_matrix(bool every, std::uint64_t seed, unsigned threads) {
-  firmware_image("stm32f405_forklift", read_cell("table9"), Image::hil);  // built once
+  image();
   Matrix matrix(every, seed);
   const auto cases = matrix.cases();
   std::atomic<std::size_t> next = 0;

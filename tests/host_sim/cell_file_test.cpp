@@ -91,6 +91,10 @@ TEST(CellFile, RefusesWhatIsOutOfRangeAndNamesKeyLineAndExpectation) {
   EXPECT_THAT(refusal(replaced(good, "voltage_v = 0.001", "voltage_v = 0.0")), HasSubstr("'noise.voltage_v'"));
 }
 
+TEST(CellFile, RefusesAFileThatIsNoText) {
+  EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a character that no text has"));
+}
+
 TEST(CellFile, NamesTheLineOfTheEntryThatIsWrong) {
   const std::string good = table9_text();
   const std::string line = refusal(replaced(good, "420.558", "1.0"));
