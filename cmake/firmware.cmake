@@ -11,7 +11,7 @@
 # The first three run in QEMU only (hal/README.md). A board that QEMU does not have (BMS_EMULATED OFF) has bms_<board>.elf for the
 # chip, bms_<board>_remote.elf with samples that another node measures, and bms_<board>_hil.elf for an emulated board with the same chip (BMS_LOOP_BOARD).
 # board.cmake says which CAN back end it has, BMS_CAN slcan or bxcan, for the latter with a bit rate; and where its samples come from, BMS_SAMPLES
-# bq76952 (measured on the board), remote (from another node) or emulated. What does not depend on the cell is compiled once for all.
+# bq76952 (measured by a chip on the board), adc (by the controller itself), remote (from another node) or emulated. What does not depend on the cell is compiled once for all.
 #
 # BMS_VEHICLE_PROFILE: messages that go out beside the battery's own: cia418, for a CANopen charger (nodes BMS_CANOPEN_NODE, BMS_CANOPEN_CHARGER), or
 # j1939 (can/j1939_profile.dbc). can/messages.md says what they are.
@@ -89,25 +89,33 @@ set(emulated_flash ${hal}/emulated/flash.cpp)
 if(BMS_FLASH STREQUAL absent)
   set(emulated_flash ${chip_flash})
 endif()
-bms_objects(hal_core -Os ${core}/startup.cpp ${core}/fault_record.cpp ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
+# what a chip has no file for is absent
+set(chip_calendar ${hal}/absent/calendar.cpp)
+set(chip_state ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp)
+if(EXISTS ${chip}/board_state.cpp)
+  set(chip_calendar ${chip}/calendar.cpp)
+  set(chip_state ${chip}/board_state.cpp ${chip}/supply.cpp ${core}/image_check.cpp)
+endif()
+bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
 bms_objects(hal_clock -Os ${chip}/clock.cpp)
-bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${hal}/absent/calendar.cpp)
+bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar})
 bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})
 # the board's back ends: BMS_CAN names how it talks, BMS_SAMPLES where its samples come from
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
-set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/heard.cpp)
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/heard.cpp)
-set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/heard.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
-bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${hal}/absent/record.cpp)
+set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/heard.cpp ${hal}/absent/calibration.cpp)
+set(samples_remote ${hal}/remote/samples.cpp ${hal}/heard.cpp ${hal}/absent/calibration.cpp)
+set(samples_adc ${hal}/adc/samples.cpp ${hal}/heard.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp)
+set(samples_bq76952 ${hal}/absent/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/heard.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
+bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${hal}/absent/record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
 target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION} ${vehicle_profile_${BMS_VEHICLE_PROFILE}})
 bms_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
-bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
+bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp ${hal}/absent/calibration.cpp)
 target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
 
-bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp)
+bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp)
 
 bms_objects(storage -Os ${CMAKE_SOURCE_DIR}/storage/log.cpp ${CMAKE_SOURCE_DIR}/storage/persistence.cpp)
 bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/board_cell.cpp ${cell_header} ${can_messages} ${j1939_messages})  # the cell says which model
@@ -126,6 +134,7 @@ function(bms_image name)
   add_executable(${name} ${objects})
   target_link_options(${name} PRIVATE -T${linker_script} -Wl,--undefined=image_cell_hash -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
   set_target_properties(${name} PROPERTIES LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
+  add_custom_command(TARGET ${name} POST_BUILD COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/image_check.py $<TARGET_FILE:${name}> VERBATIM)
 endfunction()
 
 if(NOT BMS_EMULATED)

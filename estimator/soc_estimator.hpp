@@ -106,6 +106,8 @@ class SocEstimator {
   }
 
   constexpr const CellState<S, ModelOf>& state() const { return state_; }
+  /// Of the last sample that was taken.
+  constexpr std::uint64_t time_us() const { return time_us_; }
 
  private:
   using Drive = model::Drive<S>;
@@ -373,6 +375,7 @@ class SocEstimator {
   template <class Cell>
   [[gnu::noinline]] constexpr Result start(const Cell& cell, const Sample& sample) {
     Result estimate;
+    time_us_ = sample.time_us;
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
     const bool voltage = InputCheck<S>::voltage_present(sample.voltage_uv, cell.plausible, estimate.flags);
     if (!voltage && !has_start_) {
@@ -382,7 +385,6 @@ class SocEstimator {
       return estimate;
     }
     started_ = true;
-    time_us_ = sample.time_us;
 
     const auto& laws = laws_of(cell);
     const Drive drive{laws.true_current(model::from_micro<Current>(current.ua)), TimeStep(1), temperature(laws, sample)};

@@ -1,20 +1,25 @@
-// What the firmware does with each sample: estimate, record, look at the whole, protect, tell, listen, remember, feed the watchdog.
+// What the firmware does with each sample: estimate, record, look at the whole, protect, tell, listen, remember; and feed the watchdog if all of it
+// has made progress (firmware/progress.hpp).
 //
-//   Board   cells, and as functions what depends on the cell file: a step of the estimator, what is known beside it, the cells beside their mean,
+//   Board   cells, and as functions what depends on the cell file: a step of the estimator, how far it came, what is known beside it, the cells beside their mean,
 //           what a reading may be, the plan of protection (firmware/board_cell.hpp; a test brings its own)
 //
 // Sees the estimator, protection, storage and the hal, never a register; runs on a host that supplies the few functions of hal/ it calls.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/commands.hpp"
+#include "firmware/progress.hpp"
 #include "firmware/remembered.hpp"
 #include "firmware/telemetry.hpp"
+#include "hal/board_state.hpp"
 #include "hal/calendar.hpp"
+#include "hal/clock.hpp"
 #include "hal/power_path.hpp"
 #include "hal/record.hpp"
 #include "hal/requests.hpp"
@@ -44,11 +49,17 @@ class Application {
         protection_{Board::plan(), static_cast<std::uint32_t>(persistence.settings().get(kept_faults_key).value_or(0))},
         telemetry_{identity, capacity_ah, start},
         capacity_ah_{capacity_ah},
-        persistence_{persistence} {
+        persistence_{persistence},
+        cell_hash_{identity.cell_hash} {
+    board_.cell_file_changed = of_another_cell_file(persistence, cell_hash_);
+    if (board_.cell_file_changed) return;
+    persistence.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
     if constexpr (cells > 1) recall(cells_, persistence.cells());
   }
 
   void take(const PackSample<cells>& pack) {
+    const std::uint64_t began_us = hal::now_us();
+    board_.state = hal::board_state();
     const Sample mean = mean_cell(pack, Board::plausible());
     const Result estimate = Board::step(estimator_, mean);
     hal::record(words(estimate));
@@ -56,18 +67,26 @@ class Application {
     Board::look(condition_, estimator_, mean, estimate, hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::tell_apart(cells_, pack, estimate);
     protect(pack, estimate, request);
-    telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, requested_.log_samples);
+    telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, board_, requested_.log_samples);
     vehicle_profile_.tell(pack, condition_, protection_.decision(), Board::plan(), capacity_ah_, (estimate.flags & not_started) == 0);
     hear(pack.time_us);
     estimate_ = estimate;
     if (persistence_.count(mean)) [[unlikely]] remember();
-    hal::watchdog_feed();
+    const auto took_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(hal::now_us() - began_us, 0xFFFF'FFFF));
+    board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
+    if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.told()})) hal::watchdog_feed();
   }
 
   /// The last that is done: the battery is switched off.
   void end() {
     const Remembered now(estimate_, condition_, cells_);
     persistence_.power_failing(now.values(), hal::calendar_s());
+  }
+
+  /// Between two samples. The contactors are open already.
+  void supply_failing() {
+    const Remembered now(estimate_, condition_, cells_);
+    persistence_.supply_failing(now.values(), hal::calendar_s());
   }
 
  private:
@@ -92,8 +111,9 @@ class Application {
     protection::Orders orders;
     orders.request = request;
     orders.clear = std::exchange(requested_.clear, protection::Clear::none);
+    if (board_.cell_file_changed && orders.clear != protection::Clear::none) [[unlikely]] take_this_cell_file();
     orders.link_uv = hal::link_uv();
-    orders.board_fault = first_ && hal::reset_cause() == hal::ResetCause::watchdog;
+    orders.board_fault = board_.unfit() || board_.state.supply_low || (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     orders.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().works();
     first_ = false;
     const std::uint32_t kept_before = protection_.decision().kept;
@@ -101,6 +121,12 @@ class Application {
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge, decision.outputs.charge_enable, decision.bleed});
     if (decision.came != 0) [[unlikely]] note_faults(decision.came);
     if (decision.kept != kept_before) [[unlikely]] persistence_.set(kept_faults_key, static_cast<std::int32_t>(decision.kept));
+  }
+
+  /// Somebody has seen that it is another, and means it: what is stored from now on is of this one.
+  [[gnu::noinline]] void take_this_cell_file() {
+    persistence_.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
+    board_.cell_file_changed = false;
   }
 
   [[gnu::noinline]] void note_faults(std::uint32_t came) {
@@ -112,9 +138,19 @@ class Application {
   void hear(std::uint64_t now_us) {
     hal::CanFrame frame;
     for (int k = 0; k < most_requests && hal::next_request(frame); ++k) {
-      if (const auto answer = commands_.take(frame, now_us, requested_)) telemetry_.answer(*answer);
-      else vehicle_profile_.hear(frame);
+      if (auto answer = commands_.take(frame, now_us, requested_)) {
+        if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time)) answer->result = can::CommandAnswer::result_refused;
+        if (const auto correction = std::exchange(requested_.correction, std::nullopt)) correct(*correction);
+        telemetry_.answer(*answer);
+      } else {
+        vehicle_profile_.hear(frame);
+      }
     }
+  }
+
+  [[gnu::noinline]] void correct(const Requested::Correction& correction) {
+    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + correction.which), correction.value);
+    hal::calibrate(stored_calibration(persistence_));
   }
 
   /// An erase holds the core up for half a second: only while nothing is connected.
@@ -134,7 +170,10 @@ class Application {
   Commands commands_;
   Requested requested_;
   Result estimate_{};
+  Progress progress_;
   storage::Persistence& persistence_;
+  std::uint32_t cell_hash_;
+  OfBoard board_;
   bool first_ = true;
 };
 

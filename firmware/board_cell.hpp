@@ -46,6 +46,7 @@ struct BoardCell {
   static constexpr std::size_t cells = hal::pack_cells;
 
   static Estimator::Result step(Estimator& estimator, const Sample& sample) { return estimator_step(estimator, sample); }
+  static std::uint64_t estimated_us(const Estimator& estimator) { return estimator.time_us(); }
   static void look(Condition<Estimator>& condition, const Estimator& estimator, const Sample& sample, const Estimator::Result& estimate, bool limits_wanted);
   static void tell_apart(PackCells<BoardScalar, cells>& of, const PackSample<cells>& pack, const Estimator::Result& estimate);
   static const model::Plausible& plausible();

@@ -21,8 +21,12 @@ struct Requested {
   static constexpr std::uint64_t request_lasts_us = 5'000'000;
 
   bool log_samples = true;
-  std::uint32_t unix_time_s = 0;     ///< as last set; 0: never
-  std::uint64_t time_set_at_us = 0;  ///< by the samples' clock
+  std::uint32_t unix_time_s = 0;     ///< that the calendar is to be set to; 0: not
+  struct Correction {
+    std::uint16_t which = 0;  ///< of hal::Calibration, in its order
+    std::int32_t value = 0;
+  };
+  std::optional<Correction> correction;  ///< of the measuring chain, until it has been used
   protection::Clear clear = protection::Clear::none;  ///< until it has been used
   protection::Request power = protection::Request::none;
   std::uint64_t power_at_us = 0;
@@ -62,13 +66,23 @@ class Commands {
       case can::Command::code_set_time:
         if (command.argument == 0) return A::result_refused;
         requested.unix_time_s = command.argument;
-        requested.time_set_at_us = now_us;
         return A::result_done;
       case can::Command::code_request:
         if (command.argument > static_cast<std::uint32_t>(protection::Request::charge)) return A::result_refused;
         requested.power = static_cast<protection::Request>(command.argument);
         requested.power_at_us = now_us;
         return A::result_done;
+      case can::Command::code_voltage_gain:
+      case can::Command::code_voltage_offset:
+      case can::Command::code_current_gain:
+      case can::Command::code_current_offset: {
+        constexpr std::int32_t most[] = {50'000, 100'000, 50'000, 5'000'000};  // ppm, uV, ppm, uA: more is no calibration, but a wrong part
+        const auto which = static_cast<std::uint16_t>(command.code - can::Command::code_voltage_gain);
+        const auto value = static_cast<std::int32_t>(command.argument);
+        if (value < -most[which] || value > most[which]) return A::result_refused;
+        requested.correction = Requested::Correction{which, value};
+        return A::result_done;
+      }
       default: return A::result_no_such_command;
     }
   }

@@ -8,6 +8,8 @@
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
+#include "hal/board_state.hpp"
+#include "hal/power.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
@@ -209,6 +211,24 @@ inline can::Storage storage(const storage::Persistence& persistence) {
   m.newer_records = std::min<std::uint32_t>(persistence.newer_records(), 15U);
   m.erases = std::min<std::uint32_t>(log.rounds(), 65'535U);
   m.starts = std::min<std::uint32_t>(persistence.events().starts, 0xFF'FFFFU);
+  return m;
+}
+
+/// cell_file_changed: what is stored belongs to another; longest_sample_us: 0 as long as none is through.
+inline can::Board board(const hal::BoardState& state, bool cell_file_changed, std::uint32_t longest_sample_us) {
+  can::Board m;
+  m.ram_failed = state.ram_failed ? 1 : 0;
+  m.image_failed = state.image_failed ? 1 : 0;
+  m.stack_overrun = state.stack_overrun ? 1 : 0;
+  m.cell_file_changed = cell_file_changed ? 1 : 0;
+  m.supply_low = state.supply_low ? 1 : 0;
+  m.brown_out_reset_low = state.brown_out_reset_low ? 1 : 0;
+  m.clock_failed = state.clock_failed ? 1 : 0;
+  m.calendar = static_cast<std::uint32_t>(state.calendar);
+  const auto fault = hal::last_fault();
+  m.last_exception = fault ? std::min<std::uint32_t>(fault->exception, 255U) : 0U;
+  if (state.stack_free != 0xFFFF) m.stack_free = static_cast<float>(state.stack_free);
+  if (longest_sample_us != 0) m.longest_sample = 0.001F * static_cast<float>(longest_sample_us);
   return m;
 }
 

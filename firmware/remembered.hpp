@@ -3,16 +3,20 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
 #include "firmware/messages.hpp"
+#include "hal/calibration.hpp"
 #include "storage/persistence.hpp"
 
 namespace bms {
 
 // Keys of the settings, and codes of the faults, that this firmware stores.
 inline constexpr std::uint16_t kept_faults_key = 1;   ///< protection::Decision::kept
+inline constexpr std::uint16_t cell_file_key = 2;     ///< messages::Identity::cell_hash of the cell file that what is stored belongs to
+inline constexpr std::uint16_t first_calibration_key = 16;  ///< voltage's gain [ppm] and offset [uV], current's gain [ppm] and offset [uA]: hal::Calibration
 inline constexpr std::uint16_t first_fault_code = 1;  ///< of protection::Fault 0
 
 /// Not a number, or beyond what fits: the nearest that does, 0 for NaN.
@@ -54,6 +58,23 @@ class RememberedOf {
   storage::Values values_;
   std::array<storage::CellsRecord::Cell, Cells> cells_{};
 };
+
+inline hal::Calibration stored_calibration(const storage::Persistence& persistence) {
+  const auto value = [&](std::uint16_t k) { return persistence.settings().get(static_cast<std::uint16_t>(first_calibration_key + k)).value_or(0); };
+  return {value(0), value(1), value(2), value(3)};
+}
+
+/// State of charge, cells and health that are stored were estimated with another cell file: they mean nothing with this one.
+inline bool of_another_cell_file(const storage::Persistence& persistence, std::uint32_t cell_hash) {
+  const auto stored = persistence.settings().get(cell_file_key);
+  return stored && static_cast<std::uint32_t>(*stored) != cell_hash;
+}
+
+/// Where to begin, as far as it is remembered.
+inline std::optional<StartingPoint> remembered_start(const storage::Persistence& persistence, std::uint32_t cell_hash) {
+  if (of_another_cell_file(persistence, cell_hash)) return std::nullopt;
+  return persistence.starting_point();
+}
 
 /// A pack of another number of cells is another pack.
 template <class S, std::size_t Cells>

@@ -11,12 +11,23 @@
 #include "estimator/pack_estimator.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/messages.hpp"
+#include "hal/board_state.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
 namespace bms {
+
+/// What is told of the board beside the pack.
+struct OfBoard {
+  hal::BoardState state;
+  bool cell_file_changed = false;       ///< since what is stored was stored
+  std::uint32_t longest_sample_us = 0;  ///< 0: not known yet
+
+  constexpr bool unfit() const { return state.unfit() || cell_file_changed; }
+  constexpr bool alarming() const { return unfit() || state.supply_low; }
+};
 
 template <class Estimator, std::size_t Cells>
 class Telemetry {
@@ -28,10 +39,13 @@ class Telemetry {
 
   /// mean: what the estimator was given of the pack.
   void tell(const PackSample<Cells>& pack, const Sample& mean, const Result& estimate, const Condition<Estimator>& condition, const PackCells<typename Estimator::Scalar, Cells>& cells,
-            const protection::Decision& decision, const storage::Persistence& persistence, bool log_samples) {
+            const protection::Decision& decision, const storage::Persistence& persistence, const OfBoard& board, bool log_samples) {
     ++samples_;
     hash_.take(words(estimate));
-    if (!hal::can_listening()) return;
+    if (!hal::can_listening()) {
+      ++told_;
+      return;
+    }
     tell_fault();
     now_us_ = static_cast<std::uint32_t>(pack.time_us);
     tell_protection(decision);
@@ -42,6 +56,8 @@ class Telemetry {
     by_time<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
     if constexpr (Estimator::Model::errors_are_states) by_time<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
     by_time<can::Storage>([&] { return messages::storage(persistence); });
+    by_time_or<can::Board>(board.alarming() != alarming_told_, [&] { return messages::board(board.state, board.cell_file_changed, board.longest_sample_us); });
+    alarming_told_ = board.alarming();
     if (log_samples) log(mean);
     send(messages::pack_state(estimate, condition));
     send(messages::pack_electrical(pack));
@@ -51,7 +67,11 @@ class Telemetry {
     status.sample_counter = samples_;
     status.reset_cause = static_cast<std::uint32_t>(hal::reset_cause());
     send(status);
+    ++told_;
   }
+
+  /// Samples of which all was told that is to be told, or to nobody; wraps.
+  std::uint32_t told() const { return told_; }
 
   void answer(const can::CommandAnswer& answer) { send(answer); }
 
@@ -145,11 +165,11 @@ class Telemetry {
   std::optional<StartingPoint> start_;
   typename OfAll<can::Messages>::type sent_{};
   EstimateHash hash_;
-  std::uint32_t now_us_ = 0, faults_told_ = 0;
+  std::uint32_t now_us_ = 0, faults_told_ = 0, told_ = 0;
   protection::ContactorState state_told_ = protection::ContactorState::off;
   protection::Outputs outputs_told_;
   std::uint16_t samples_ = 0;
-  bool fault_told_ = false;
+  bool fault_told_ = false, alarming_told_ = false;
 };
 
 }  // namespace bms

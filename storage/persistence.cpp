@@ -122,6 +122,11 @@ void Persistence::power_failing(const Values& now, std::optional<std::uint32_t> 
   if (settings_changed_) put_settings();
 }
 
+void Persistence::supply_failing(const Values& now, std::optional<std::uint32_t> calendar_s) {
+  pass_time();
+  if (now.pack) put_charge(*now.pack, 0, calendar_s);
+}
+
 void Persistence::fault(std::uint16_t code) {
   events_.add({code, charge_.operating_s});
   events_changed_ = true;

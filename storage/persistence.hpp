@@ -62,6 +62,9 @@ class Persistence {
   /// The supply goes, or the battery is switched off. Charge first, 0.2 ms; 2 ms for everything, 12 at most.
   void power_failing(const Values& now, std::optional<std::uint32_t> calendar_s);
 
+  /// The supply sinks, and may stop sinking: charge alone, 0.2 ms, 1.2 at most where there is room for it in its sector, 20 where there is not.
+  void supply_failing(const Values& now, std::optional<std::uint32_t> calendar_s);
+
   bool wants_erase() const { return log_.wants_erase(); }
   void erase_one() { log_.erase_one(); }
 

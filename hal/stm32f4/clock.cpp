@@ -3,6 +3,7 @@
 
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
+#include "hal/supply.hpp"
 
 namespace bms::hal {
 
@@ -32,7 +33,10 @@ std::uint64_t now_us() {
 
 std::uint32_t core_clock_hz() { return stm32f4::clocks().core_hz; }
 
-void wait_for_interrupt() { asm volatile("wfi"); }
+void wait_for_interrupt() {
+  asm volatile("wfi");
+  supply_attend();
+}
 
 }  // namespace bms::hal
 

@@ -15,6 +15,7 @@ inline Register& rcc_cfgr() { return at<0x40023808>(); }
 inline Register& rcc_ahb1enr() { return at<0x40023830>(); }
 inline Register& rcc_apb1enr() { return at<0x40023840>(); }
 inline Register& rcc_apb2enr() { return at<0x40023844>(); }
+inline Register& rcc_bdcr() { return at<0x40023870>(); }
 inline Register& rcc_csr() { return at<0x40023874>(); }
 
 // flash interface [3.9.1], power [5.4.1]
@@ -22,9 +23,12 @@ inline Register& flash_acr() { return at<0x40023C00>(); }
 inline Register& flash_keyr() { return at<0x40023C04>(); }
 inline Register& flash_sr() { return at<0x40023C0C>(); }
 inline Register& flash_cr() { return at<0x40023C10>(); }
+inline Register& flash_optcr() { return at<0x40023C14>(); }
 inline Register& pwr_cr() { return at<0x40007000>(); }
+inline Register& pwr_csr() { return at<0x40007004>(); }
 
-// GPIOB [8.4]
+// GPIOA, GPIOB [8.4]
+inline Register& gpioa_moder() { return at<0x40020000>(); }
 inline Register& gpiob_moder() { return at<0x40020400>(); }
 inline Register& gpiob_pupdr() { return at<0x4002040C>(); }
 inline Register& gpiob_afrl() { return at<0x40020420>(); }
@@ -37,6 +41,17 @@ inline Register& gpiob_bsrr() { return at<0x40020418>(); }
 inline Register& gpioc_moder() { return at<0x40020800>(); }
 inline Register& gpioc_otyper() { return at<0x40020804>(); }
 inline Register& gpioc_bsrr() { return at<0x40020818>(); }
+
+// ADC1 [13.13]
+inline Register& adc1_sr() { return at<0x40012000>(); }
+inline Register& adc1_cr1() { return at<0x40012004>(); }
+inline Register& adc1_cr2() { return at<0x40012008>(); }
+inline Register& adc1_smpr1() { return at<0x4001200C>(); }
+inline Register& adc1_smpr2() { return at<0x40012010>(); }
+inline Register& adc1_sqr1() { return at<0x4001202C>(); }
+inline Register& adc1_sqr3() { return at<0x40012034>(); }
+inline Register& adc1_dr() { return at<0x4001204C>(); }
+inline Register& adc_ccr() { return at<0x40012304>(); }
 
 // I2C1 [27.6]
 inline Register& i2c1_cr1() { return at<0x40005400>(); }
@@ -77,6 +92,20 @@ struct CanFilterBank {
 };
 inline CanFilterBank& can1_filter_bank(std::uint32_t k) { return reinterpret_cast<CanFilterBank*>(0x40006640)[k]; }
 inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20;
+
+// external interrupts [12.3]
+inline Register& exti_imr() { return at<0x40013C00>(); }
+inline Register& exti_rtsr() { return at<0x40013C08>(); }
+inline Register& exti_pr() { return at<0x40013C14>(); }
+inline constexpr unsigned pvd_interrupt = 1;
+
+// real-time clock [26.6]
+inline Register& rtc_tr() { return at<0x40002800>(); }
+inline Register& rtc_dr() { return at<0x40002804>(); }
+inline Register& rtc_isr() { return at<0x4000280C>(); }
+inline Register& rtc_prer() { return at<0x40002810>(); }
+inline Register& rtc_wpr() { return at<0x40002824>(); }
+inline Register& rtc_bkp0r() { return at<0x40002850>(); }
 
 // independent watchdog [21.4]
 inline Register& iwdg_kr() { return at<0x40003000>(); }

@@ -85,11 +85,10 @@ std::uint32_t deepest_in_qemu(const std::string& board_name) {
   board.send_sample(two_minutes().back().time_us + 1'000'000, 0, 3'300'000, 2500);  // it has written the record when it answers
   board.telemetry();
   const ImageFile file(image);
-  const std::uint32_t top = file.symbol("image_stack_top"), bottom = file.symbol("image_ram_begin");
+  const std::uint32_t top = file.symbol("image_stack_top"), bottom = file.symbol("image_stack_limit") + 1'024;  // above the guard
   const std::string memory = memory_of(monitor, bottom, top - bottom, folder.path() / "ram");
-  const ImageSize size = size_of(image);
-  std::size_t free = (size.data + size.bss + 64) / 4 * 4;
-  while (free + 4 <= memory.size() && memory.compare(free, 4, std::string(4, '\0')) == 0) free += 4;
+  std::size_t free = 0;
+  while (free + 4 <= memory.size() && memory.compare(free, 4, "\xA5\xA5\xA5\xA5") == 0) free += 4;  // the firmware's own paint
   return static_cast<std::uint32_t>(memory.size() - free);
 }
 

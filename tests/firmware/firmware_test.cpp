@@ -200,7 +200,7 @@ TEST_P(Fault, LeavesARecordThatTheNextRunReads) {
   command.insert(command.end(), {"-serial", "none"});
   EXPECT_EQ(ChildProcess(command, folder.path() / "log").wait(), 0) << read_file(folder.path() / "log");
 }
-INSTANTIATE_TEST_SUITE_P(Kinds, Fault, ::testing::Values("address", "undefined", "stack"), [](const auto& kind) { return std::string(kind.param); });
+INSTANTIATE_TEST_SUITE_P(Kinds, Fault, ::testing::Values("address", "undefined", "stack", "overflow"), [](const auto& kind) { return std::string(kind.param); });
 
 }  // namespace
 }  // namespace bms

@@ -17,6 +17,7 @@ std::uint32_t FlashControllerModel::read(std::uint32_t at) const {
     case 0x00: return acr_;
     case 0x0C: return sr_;
     case 0x10: return cr_;
+    case 0x14: return option_bytes;
     default: return 0;
   }
 }
@@ -90,6 +91,12 @@ void FlashControllerModel::write_memory(std::uint32_t at, unsigned size, std::ui
   for (unsigned k = 0; k < size; ++k) bytes[at + k] &= static_cast<std::uint8_t>(value >> (8 * k));
   ++words_programmed;
   stall_us_ += word_us;
+}
+
+void FlashControllerModel::reset() {
+  acr_ = sr_ = 0;
+  cr_ = lock;
+  keys_ = Keys::none;
 }
 
 double FlashControllerModel::take_stall_us() {

@@ -20,10 +20,13 @@ class FlashControllerModel {
   /// offset from `memory`; size: bytes at once.
   std::uint32_t read_memory(std::uint32_t offset, unsigned size) const;
   void write_memory(std::uint32_t offset, unsigned size, std::uint32_t value);
+  /// Of the registers; what is stored stays.
+  void reset();
   /// For how long the core stands still since this was asked last.
   double take_stall_us();
 
   std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(sectors * sector_bytes, 0xFF);
+  std::uint32_t option_bytes = 0x0FFFAAED & ~(3U << 2);  ///< FLASH_OPTCR as delivered, but brown-out reset at level 3
   std::vector<std::string> violations;
   unsigned words_programmed = 0, sectors_erased = 0;
 

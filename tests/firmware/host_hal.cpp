@@ -12,6 +12,10 @@ void host_hal::begin() {
   cause = hal::ResetCause::power_on;
   fault.reset();
   fed = 0;
+  board_state = {};
+  calendar_was_set_to = 0;
+  calendar_takes = true;
+  calibrated = {};
 }
 
 namespace hal {
@@ -34,6 +38,13 @@ ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }
 std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
 void watchdog_feed() { ++host_hal::fed; }
+BoardState board_state() { return host_hal::board_state; }
+std::uint64_t now_us() { return 0; }
+bool calendar_set(std::uint32_t unix_s) {
+  host_hal::calendar_was_set_to = unix_s;
+  return host_hal::calendar_takes;
+}
+void calibrate(const Calibration& c) { host_hal::calibrated = c; }
 
 }  // namespace hal
 }  // namespace bms

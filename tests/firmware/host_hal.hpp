@@ -22,6 +22,10 @@ inline std::int32_t link_reads_uv = 0;
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;
+inline hal::BoardState board_state;
+inline std::uint32_t calendar_was_set_to = 0;
+inline bool calendar_takes = true;
+inline hal::Calibration calibrated;
 
 /// As at the start of a program.
 void begin();
@@ -42,6 +46,7 @@ struct Table9Board {
     return tables;
   }
   static Estimate<float> step(Estimator& estimator, const Sample& sample) { return estimator.step(tables(), sample); }
+  static std::uint64_t estimated_us(const Estimator& estimator) { return estimator.time_us(); }
   static void look(Condition<Estimator>& condition, const Estimator& estimator, const Sample& sample, const Estimate<float>& e, bool limits_wanted) {
     condition.update(tables(), sample, e, estimator.state(), limits_wanted);
   }

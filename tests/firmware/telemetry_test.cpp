@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "firmware/application.hpp"
@@ -16,10 +17,15 @@ namespace {
 
 using namespace host_hal;
 
+bool estimator_hangs_back = false;
+std::uint64_t taken_us = 0;
+
 /// A board whose estimator always says the same.
 template <std::size_t Cells>
 struct Board : Table9Board<Cells> {
-  static bms::Estimate<float> step(SocEstimator<float>&, const Sample&) {
+  static std::uint64_t estimated_us(const SocEstimator<float>&) { return taken_us; }
+  static bms::Estimate<float> step(SocEstimator<float>&, const Sample& sample) {
+    if (!estimator_hangs_back) taken_us = sample.time_us;
     bms::Estimate<float> e;
     e.soc = 0.54321F;
     e.soc_sigma = 0.01F;
@@ -38,6 +44,7 @@ class TelemetryTest : public ::testing::Test {
  protected:
   void SetUp() override {
     begin();
+    estimator_hangs_back = false;
     link_reads_uv = no_reading;
     cause = hal::ResetCause::watchdog;
   }
@@ -70,20 +77,20 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   sample.voltage_uv = 3'301'499;
   sample.temperature_cdegc = -1'234;
   application.take(pack_of(sample));
-  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
-  const auto state = can::PackState::of(sent[14]);
+  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x1B9, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
+  const auto state = can::PackState::of(sent[15]);
   EXPECT_NEAR(state.soc, 54.321, 0.0011);
   EXPECT_NEAR(state.soc_sigma, 1, 0.0011);
   EXPECT_NEAR(state.soc_display, 54.321, 0.0011);
   EXPECT_EQ(state.soc_quality, can::PackState::soc_quality_carried_by_counting);
-  const auto electrical = can::PackElectrical::of(sent[15]);
+  const auto electrical = can::PackElectrical::of(sent[16]);
   EXPECT_NEAR(electrical.voltage, 3.301, 1e-5);
   EXPECT_NEAR(electrical.current, -12.34, 1e-4);
   EXPECT_NEAR(electrical.temperature, -12.34, 1e-4);
-  const auto detail = can::ModelDetail::of(sent[16]);
+  const auto detail = can::ModelDetail::of(sent[17]);
   EXPECT_NEAR(detail.voltage_rc, -0.0123456, 1e-6);
   EXPECT_NEAR(detail.voltage_predicted, 3.2999, 1e-6);
-  const auto status = can::Status::of(sent[17]);
+  const auto status = can::Status::of(sent[18]);
   EXPECT_EQ(status.flags, voltage_stuck);
   EXPECT_EQ(status.sample_counter, 1U);
   EXPECT_EQ(status.reset_cause, 4U);
@@ -216,6 +223,57 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
   EXPECT_TRUE(last<can::SampleCurrent>()) << "the log is on as before";
 }
 
+TEST_F(TelemetryTest, TheTimeOfACommandIsTheCalendarsAndOneItDoesNotTakeIsRefused) {
+  ask(can::Command::code_set_time, 1'800'000'000, 1);
+  application.take(pack_of(sample));
+  EXPECT_EQ(calendar_was_set_to, 1'800'000'000U);
+  EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_done);
+  calendar_takes = false;
+  ask(can::Command::code_set_time, 1'800'000'001, 2);
+  sample.time_us += 100'000;
+  application.take(pack_of(sample));
+  EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_refused);
+}
+
+TEST_F(TelemetryTest, ACorrectionIsKeptAndUsedAtOnceAndOneThatIsNoneRefused) {
+  const auto set = [&](std::uint32_t code, std::int32_t value, std::uint8_t counter) {
+    ask(code, static_cast<std::uint32_t>(value), counter);
+    sample.time_us += 100'000;
+    application.take(pack_of(sample));
+    return last<can::CommandAnswer>()->result;
+  };
+  calibrated = {};
+  EXPECT_EQ(set(can::Command::code_voltage_gain, -1'234, 1), can::CommandAnswer::result_done);
+  EXPECT_EQ(set(can::Command::code_current_offset, 250'000, 2), can::CommandAnswer::result_done);
+  EXPECT_EQ(calibrated.voltage_gain_ppm, -1'234);
+  EXPECT_EQ(calibrated.current_offset_ua, 250'000);
+  EXPECT_EQ(set(can::Command::code_current_gain, 50'001, 3), can::CommandAnswer::result_refused);
+  EXPECT_EQ(set(can::Command::code_voltage_offset, -100'001, 4), can::CommandAnswer::result_refused);
+  EXPECT_EQ(stored_calibration(persistence).voltage_gain_ppm, -1'234);
+  EXPECT_EQ(stored_calibration(persistence).current_gain_ppm, 0);
+}
+
+TEST_F(TelemetryTest, WhatTheBoardFindsOutAboutItselfIsTold) {
+  host_hal::board_state = {.brown_out_reset_low = true, .clock_failed = true, .calendar = hal::CalendarState::runs_roughly, .stack_free = 1'234};
+  fault = hal::FaultRecord{.exception = 4};
+  application.take(pack_of(sample));
+  auto told = last<can::Board>();
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->ram_failed | told->image_failed | told->stack_overrun | told->cell_file_changed | told->supply_low, 0U);
+  EXPECT_EQ(told->brown_out_reset_low, 1U);
+  EXPECT_EQ(told->clock_failed, 1U);
+  EXPECT_EQ(told->calendar, can::Board::calendar_runs_roughly);
+  EXPECT_EQ(told->last_exception, 4U);
+  EXPECT_EQ(told->stack_free, 1'234);
+  sent.clear();
+  sample.time_us += 100'000;
+  host_hal::board_state.stack_overrun = true;
+  application.take(pack_of(sample));
+  told = last<can::Board>();
+  ASSERT_TRUE(told) << "at once, not within the second";
+  EXPECT_EQ(told->stack_overrun, 1U);
+}
+
 TEST_F(TelemetryTest, MuchAskingMakesASampleNoLonger) {
   for (std::uint8_t k = 0; k < 14; ++k) ask(can::Command::code_set_time, 1, k);
   application.take(pack_of(sample));
@@ -250,13 +308,27 @@ TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
 
 TEST_F(TelemetryTest, NobodyListeningIsToldNothingAndTheCountersSayHowMuchWasMissed) {
   listening = false;
-  for (int k = 0; k < 5; ++k) application.take(pack_of(sample));
+  for (int k = 0; k < 5; ++k, sample.time_us += 100'000) application.take(pack_of(sample));
   EXPECT_TRUE(sent.empty());
   EXPECT_EQ(fed, 5);
   listening = true;
   application.take(pack_of(sample));
   EXPECT_EQ(can::Status::of(sent.back()).sample_counter, 6U);
   EXPECT_EQ(can::counter_of(sent.back()), 0);
+}
+
+TEST_F(TelemetryTest, ASampleThatTheEstimatorHasNotTakenOrThatIsNoNewOneDoesNotFeedTheWatchdog) {
+  application.take(pack_of(sample));
+  application.take(pack_of(sample));
+  EXPECT_EQ(fed, 1) << "the same again";
+  sample.time_us += 100'000;
+  estimator_hangs_back = true;
+  application.take(pack_of(sample));
+  EXPECT_EQ(fed, 1);
+  sample.time_us += 100'000;
+  estimator_hangs_back = false;
+  application.take(pack_of(sample));
+  EXPECT_EQ(fed, 2);
 }
 
 TEST_F(TelemetryTest, IdentityComesEachSecondAndAFaultOnce) {
@@ -334,7 +406,7 @@ TEST_F(TelemetryTest, ACommandInAFrameOf29BitsIsNotHeard) {
 template <class VehicleProfile>
 class PackWith : public TelemetryTest {
  protected:
-  Application<Board<16>, VehicleProfile> pack{std::nullopt, {0, 0}, 6, persistence};
+  Application<Board<16>, VehicleProfile> pack{std::nullopt, {0xCE110001, 0}, 6, persistence};  // of the same cell file as the other
   PackSample<16> reading{};
   double link_v = 0;
 
@@ -408,6 +480,65 @@ TEST_F(PackTest, AfterAResetByTheWatchdogNothingClosesBeforeItIsCleared) {
   }
   EXPECT_FALSE(driving());
   EXPECT_EQ(last<can::Faults>().value().internal_fault, 1U);
+}
+
+/// Each of them, and what ended the last run: no request closes anything; what lasts, no command clears.
+TEST_F(PackTest, ABoardThatIsUnfitClosesNothing) {
+  const auto drive_s = [&](int seconds) {
+    std::uint8_t counter = 0;
+    for (int k = 0; k < seconds; ++k) {
+      ask(can::Command::code_request, 1, counter = can::next(counter));
+      second();
+    }
+  };
+  for (const auto what : {&hal::BoardState::ram_failed, &hal::BoardState::image_failed, &hal::BoardState::stack_overrun, &hal::BoardState::supply_low}) {
+    host_hal::board_state = {};
+    host_hal::board_state.*what = true;
+    drive_s(5);
+    ask(can::Command::code_clear_faults, 0, 14);
+    drive_s(15);
+    EXPECT_FALSE(driving());
+    EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
+  }
+  host_hal::board_state = {};
+  ask(can::Command::code_clear_faults, 0, 13);
+  for (int k = 0; k < 7; ++k) second();  // the request has to end before it counts again
+  drive_s(20);
+  EXPECT_TRUE(driving()) << "all is well again, and somebody has seen that it was not";
+}
+
+TEST_F(PackTest, AfterAFaultOfTheProcessorNothingClosesBeforeItIsCleared) {
+  fault = hal::FaultRecord{.exception = 3};
+  std::uint8_t counter = 0;
+  for (int k = 0; k < 20; ++k) {
+    ask(can::Command::code_request, 1, counter = can::next(counter));
+    second();
+  }
+  EXPECT_FALSE(driving());
+  EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
+}
+
+/// What was stored with another cell file means nothing with this one: it is not used, and nothing closes, until somebody says that it is meant.
+TEST_F(PackTest, AnotherCellFileIsToldAndTakenOnlyWhenFaultsAreCleared) {
+  const auto unit = [&](std::uint32_t hash) { return std::make_unique<Application<Board<16>>>(std::nullopt, messages::Identity{hash, 0}, 6.F, persistence); };
+  EXPECT_FALSE(of_another_cell_file(persistence, 0xCE110001));
+  EXPECT_TRUE(of_another_cell_file(persistence, 0xCE110002));
+  EXPECT_FALSE(remembered_start(persistence, 0xCE110002));
+  const auto changed = unit(0xCE110002);
+  reading.time_us += 1'000'000;
+  changed->take(reading);
+  EXPECT_EQ(last<can::Board>()->cell_file_changed, 1U);
+  EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
+  EXPECT_TRUE(of_another_cell_file(persistence, 0xCE110002)) << "not yet";
+  ask(can::Command::code_clear_faults, 0, 3);
+  for (int k = 0; k < 3; ++k) {
+    reading.time_us += 1'000'000;
+    changed->take(reading);
+  }
+  EXPECT_EQ(last<can::Board>()->cell_file_changed, 0U);
+  EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
+  EXPECT_FALSE(of_another_cell_file(persistence, 0xCE110002));
+  EXPECT_TRUE(of_another_cell_file(persistence, 0xCE110001));
 }
 
 TEST_F(PackTest, ASevereFaultOpensAndIsToldAtOnceWithItsCause) {

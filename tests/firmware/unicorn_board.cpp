@@ -15,7 +15,7 @@ namespace bms {
 
 namespace {
 
-constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, systick_exception = 15, can_tx = 16 + 19, can_rx0 = 16 + 20, untouched = 0xA5A5A5A5;
+constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, systick_exception = 15, pvd = 16 + 1, can_tx = 16 + 19, can_rx0 = 16 + 20, untouched = 0xA5A5A5A5;
 constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends a call from outside
 
 void must(uc_err error, const char* what) {
@@ -36,6 +36,9 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
        "storage");
   must(uc_mem_map(core_, 0x20000000, 0x20000, UC_PROT_READ | UC_PROT_WRITE), "RAM");
   must(uc_mem_map(core_, ccm, ccm_size, UC_PROT_READ | UC_PROT_WRITE), "core-coupled RAM");
+  must(uc_mem_map(core_, 0x1FFF7000, 0x1000, UC_PROT_READ), "system memory");
+  const std::uint16_t reference = 1'502;  // VREFINT_CAL: 1.21 V of 3.3 V (datasheet, internal reference voltage)
+  must(uc_mem_write(core_, 0x1FFF7A2A, &reference, 2), "system memory");
   const auto map = [&]<std::uint32_t Base>(std::integral_constant<std::uint32_t, Base>, std::size_t size) {
     must(uc_mmio_map(core_, Base, size,
                      [](uc_engine*, std::uint64_t at, unsigned, void* self) -> std::uint64_t { return static_cast<UnicornBoard*>(self)->peripheral_read(Base + static_cast<std::uint32_t>(at)); }, this,
@@ -51,10 +54,72 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
   uc_hook hook = 0;
   const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* self) { ++static_cast<UnicornBoard*>(self)->estimates; };
   must(uc_hook_add(core_, &hook, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, step, step), "hook");
+  start();
+}
+
+void UnicornBoard::start() {
   std::array<std::uint32_t, 2> vectors{};
   must(uc_mem_read(core_, 0x08000000, vectors.data(), sizeof vectors), "vectors");
   set_reg(UC_ARM_REG_SP, vectors[0]);
+  set_reg(UC_ARM_REG_LR, 0xFFFFFFFF);
   set_reg(UC_ARM_REG_PC, vectors[1] | 1);
+}
+
+/// RM0090, 7.1.1: everything but the backup domain, and the flags that say why.
+void UnicornBoard::start_again(std::uint32_t flags) {
+  resets.push_back(flags);
+  reset_flags = flags;
+  registers_.clear();
+  ended_.clear();
+  handling_ = sleeping_ = systick_pending_ = supply_pending_ = false;
+  exception_ = systick_csr_ = systick_rvr_ = enabled_ = 0;
+  fed_at_ = watchdog_ticks_ = 0;
+  can.write(0, 1U << 15);
+  flash.reset();
+  set_reg(UC_ARM_REG_CONTROL, 0);
+  set_reg(UC_ARM_REG_PRIMASK, 0);
+  set_reg(UC_ARM_REG_XPSR, 1U << 24);
+  start();
+}
+
+void UnicornBoard::patch(const std::string& function, Instructions with) {
+  const std::uint32_t at = address_of(function);
+  Instructions before{};
+  must(uc_mem_read(core_, at, before.data(), sizeof before), "patch");
+  patched_.emplace_back(at, before);
+  must(uc_mem_write(core_, at, with.data(), sizeof with), "patch");
+  uc_ctl_remove_cache(core_, at, at + sizeof with);
+}
+
+void UnicornBoard::unpatch() {
+  for (const auto& [at, before] : patched_) {
+    must(uc_mem_write(core_, at, before.data(), sizeof before), "patch");
+    uc_ctl_remove_cache(core_, at, at + sizeof before);
+  }
+  patched_.clear();
+}
+
+std::uint32_t UnicornBoard::address_of(const std::string& function) const { return static_cast<std::uint32_t>(symbol_named(symbols_, function).address) & ~1U; }
+
+void UnicornBoard::stick(std::uint32_t address, unsigned bit, bool at) {
+  stuck_ = {address, bit, at};
+  uc_hook hook = 0;
+  const auto before_reading = +[](uc_engine* core, uc_mem_type, std::uint64_t, int, std::int64_t, void* self) {
+    const Stuck& s = static_cast<UnicornBoard*>(self)->stuck_;
+    std::uint8_t byte = 0;
+    uc_mem_read(core, s.address, &byte, 1);
+    byte = static_cast<std::uint8_t>(s.at ? byte | 1U << s.bit : byte & ~(1U << s.bit));
+    uc_mem_write(core, s.address, &byte, 1);
+  };
+  must(uc_hook_add(core_, &hook, UC_HOOK_MEM_READ, reinterpret_cast<void*>(before_reading), this, address & ~3U, address | 3U), "hook");
+}
+
+void UnicornBoard::flip_bit(std::uint32_t address, unsigned bit) {
+  std::uint8_t byte = 0;
+  must(uc_mem_read(core_, address, &byte, 1), "memory");
+  byte = static_cast<std::uint8_t>(byte ^ 1U << bit);
+  must(uc_mem_write(core_, address, &byte, 1), "memory");
+  uc_ctl_remove_cache(core_, address & ~1U, (address & ~1U) + 2);
 }
 
 UnicornBoard::~UnicornBoard() { uc_close(core_); }
@@ -87,12 +152,16 @@ std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808)
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
   if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
   if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.read(a - FlashControllerModel::registers);
+  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400) return rtc->read(a - RtcModel::base, 1e3 * now_ms());
   if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->read(a & 0x3FF, 1e3 * now_ms());
   std::uint32_t value = register_value(a);
   switch (a) {
     case 0x40023800: return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) | 3U;  // RCC_CR: what is on is ready
     case 0x40023808: return (value & ~12U) | (value & 3) << 2;                                                                       // RCC_CFGR: the switch is at once
-    case 0x40023874: return reset_flags;
+    case 0x40007004: return supply_low_ && (register_value(0x40007000) & 1U << 4) != 0 ? 4U : 0U;  // PWR_CSR: PVDO, while the detector is on
+    case 0x40023870: return rtc != nullptr ? rtc->read_bdcr(1e3 * now_ms()) : 0;
+    case 0x40023874: return reset_flags | (value & 1) | (value & 1) << 1;  // RCC_CSR: the slow oscillator is ready at once
+    case scs + 0xD04: return exception_;
     case scs + 0x010: return systick_csr_;
     case scs + 0x014: return systick_rvr_;
     case scs + 0x018: return static_cast<std::uint32_t>(next_systick_ > ticks_ ? (next_systick_ - ticks_) / ticks_a_cycle() : 0);
@@ -108,6 +177,7 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
     return;
   }
   if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.write(a - FlashControllerModel::registers, value);
+  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400) return rtc->write(a - RtcModel::base, value, 1e3 * now_ms());
   if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->write(a & 0x3FF, value, 1e3 * now_ms());
   switch (a) {
     case 0x40003000:  // IWDG_KR
@@ -118,6 +188,17 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
       fed_at_ = ticks_;
       watchdog_ticks_ = register_value(0x40003008) * (ticks_per_second / 500);  // a count is 2 ms
       return;
+    case 0x40013C14:
+      if ((value & 1U << 16) != 0) supply_pending_ = false;
+      return;
+    case 0x40023870:
+      if (rtc != nullptr) rtc->write_bdcr(value, (register_value(0x40007000) & 1U << 8) != 0, 1e3 * now_ms());
+      return;
+    case 0x40023874:
+      if ((value & 1U << 24) != 0) reset_flags = 0;  // RMVF
+      registers_[a] = value & 1;
+      return;
+    case scs + 0xD28: registers_[a] &= ~value; return;
     case scs + 0x010:
       if ((value & 1) != 0 && (systick_csr_ & 1) == 0) next_systick_ = ticks_ + (systick_rvr_ + std::uint64_t{1}) * ticks_a_cycle();
       systick_csr_ = value;
@@ -127,6 +208,7 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
     case scs + 0x180: enabled_ &= ~value; return;
     case scs + 0xD0C:
       if ((value & 4) != 0) ended_ = "the firmware has reset the core";
+      if (!ended_.empty()) uc_emu_stop(core_);
       return;
     default: registers_[a] = value;
   }
@@ -146,6 +228,7 @@ void UnicornBoard::pass(std::uint64_t ticks) {
 
 int UnicornBoard::pending_exception() const {
   if (systick_pending_ && (systick_csr_ & 2) != 0) return systick_exception;
+  if ((enabled_ & 1U << 1) != 0 && supply_pending_) return pvd;
   if ((enabled_ & 1U << 19) != 0 && can.transmit_interrupt()) return can_tx;
   if (!receive_interrupt_held && (enabled_ & 1U << 20) != 0 && can.receive_interrupt()) return can_rx0;
   return 0;
@@ -176,7 +259,11 @@ void UnicornBoard::enter(std::uint32_t exception) {
     frame[24] = reg(UC_ARM_REG_FPSCR);
   }
   sp = (sp & ~4U) - static_cast<std::uint32_t>(4 * frame.size());
-  must(uc_mem_write(core_, sp, frame.data(), 4 * frame.size()), "the stack of an interrupt");
+  if (uc_mem_write(core_, sp, frame.data(), 4 * frame.size()) != UC_ERR_OK) {  // B1.5.6: a bus fault of its own
+    if (!may_start_again) throw std::runtime_error("no stack for an interrupt");
+    registers_[scs + 0xD28] |= 1U << 12;
+    exception = 5;
+  }
   set_reg(UC_ARM_REG_SP, sp);
   set_reg(UC_ARM_REG_LR, fpu ? 0xFFFFFFE9 : 0xFFFFFFF9);
   set_reg(UC_ARM_REG_CONTROL, control & ~4U);
@@ -185,6 +272,7 @@ void UnicornBoard::enter(std::uint32_t exception) {
   must(uc_mem_read(core_, 0x08000000 + 4 * exception, &handler, 4), "vector");
   set_reg(UC_ARM_REG_PC, handler | 1);
   handling_ = true;
+  exception_ = exception;
   ++interrupts_taken;
 }
 
@@ -206,6 +294,17 @@ void UnicornBoard::leave(std::uint32_t exc_return) {
   const std::uint32_t control = reg(UC_ARM_REG_CONTROL);
   set_reg(UC_ARM_REG_CONTROL, fpu ? control | 4U : control & ~4U);
   handling_ = false;
+  exception_ = 0;
+}
+
+/// What a chip would do where Unicorn stops: the fault's own exception, its cause in CFSR (ARMv7-M, B3.2.15).
+bool UnicornBoard::take_fault(int error) {
+  if (!may_start_again) return false;
+  const bool no_code = error == UC_ERR_FETCH_UNMAPPED || error == UC_ERR_FETCH_PROT;
+  const bool access = error == UC_ERR_READ_UNMAPPED || error == UC_ERR_WRITE_UNMAPPED || error == UC_ERR_WRITE_PROT || error == UC_ERR_READ_PROT;
+  registers_[scs + 0xD28] |= no_code ? 1U << 8 : access ? 1U << 9 : 1U << 16;  // IBUSERR, PRECISERR, UNDEFINSTR
+  enter(no_code || access ? 5 : 6);
+  return true;
 }
 
 void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
@@ -214,6 +313,7 @@ void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
   const std::uint32_t pc = reg(UC_ARM_REG_PC);
   if ((pc & 0xFFFFFFE0) == 0xFFFFFFE0) return leave(pc | 1);
   if (pc >= return_of_call) return;
+  if (error != UC_ERR_OK && take_fault(error)) return;
   if (error != UC_ERR_OK) throw std::runtime_error(fmt::format("the firmware stops at {:08x}: {}", pc, uc_strerror(error)));
   std::uint16_t last = 0;
   must(uc_mem_read(core_, pc - 2, &last, 2), "code");
@@ -230,8 +330,11 @@ void UnicornBoard::slice() {
     pass(count * ticks_a_cycle() + static_cast<std::uint64_t>(flash.take_stall_us() * (ticks_per_second / 1e6)));
   }
   deliver_interrupt();
-  if (!ended_.empty()) throw std::runtime_error(ended_);
-  if (watchdog_ticks_ > 1 && ticks_ - fed_at_ > watchdog_ticks_) throw std::runtime_error("the watchdog bites");
+  const bool bites = watchdog_ticks_ > 1 && ticks_ - fed_at_ > watchdog_ticks_;
+  if (bites) ended_ = "the watchdog bites";
+  if (ended_.empty()) return;
+  if (!may_start_again) throw std::runtime_error(ended_);
+  start_again(1U << 26 | (bites ? 1U << 29 : 1U << 28));  // each pulls the reset pin, too
 }
 
 void UnicornBoard::run_for_ms(double ms) {
@@ -248,23 +351,34 @@ bool UnicornBoard::run_until(const std::function<bool()>& becomes, double within
   return true;
 }
 
-/// Calls the firmware's own function between two of its instructions, as a debugger would.
-hal::CanHealth UnicornBoard::can_health() {
+std::vector<std::uint32_t> UnicornBoard::call(const std::string& function, std::size_t words) {
   while (handling_) slice();
-  static_assert(sizeof(hal::CanHealth) == 32);
-  const auto function = static_cast<std::uint32_t>(symbol_named(symbols_, "bms::hal::can_health()").address);
   uc_context* context = nullptr;
   must(uc_context_alloc(core_, &context), "context");
   must(uc_context_save(core_, context), "context");
   const std::uint32_t result = ccm + 64;  // the far end of the stack
   set_reg(UC_ARM_REG_R0, result);
   set_reg(UC_ARM_REG_LR, return_of_call | 1);
-  uc_emu_start(core_, function | 1, return_of_call, 0, 10'000);
-  hal::CanHealth health;
-  must(uc_mem_read(core_, result, &health, sizeof health), "result");
+  uc_emu_start(core_, address_of(function) | 1, return_of_call, 0, 1'000'000);
+  std::vector<std::uint32_t> returned(words);
+  must(uc_mem_read(core_, result, returned.data(), 4 * words), "result");
   must(uc_context_restore(core_, context), "context");
   uc_context_free(context);
+  return returned;
+}
+
+hal::CanHealth UnicornBoard::can_health() {
+  static_assert(sizeof(hal::CanHealth) == 32);
+  const auto words = call("bms::hal::can_health()", 8);
+  hal::CanHealth health;
+  std::memcpy(static_cast<void*>(&health), words.data(), sizeof health);
   return health;
+}
+
+void UnicornBoard::supply(bool low) {
+  supply_low_ = low;
+  const bool watched = (register_value(0x40007000) & 1U << 4) != 0 && (register_value(0x40013C00) & register_value(0x40013C08) & 1U << 16) != 0;
+  if (low && watched) supply_pending_ = true;
 }
 
 std::uint32_t UnicornBoard::stack_used() const {

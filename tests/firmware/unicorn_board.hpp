@@ -1,11 +1,12 @@
 // A board's firmware image on this machine: Unicorn runs the Cortex-M4F's instructions, and what it lacks is here: exception entry and
-// return with the FPU's frame (ARMv7-M, B1.5), the NVIC's enables, SysTick, sleep until an interrupt, and of the chip the clock tree, watchdog, reset,
+// return with the FPU's frame (ARMv7-M, B1.5), faults, the NVIC's enables, SysTick, sleep until an interrupt, and of the chip the clock tree, watchdog, reset,
 // bxCAN (bxcan_model.hpp) and the flash interface (flash_controller_model.hpp). Interrupts come between instructions, after a seeded random number of them.
 //
 // Time: an instruction is a core cycle; sleeping costs none, time goes on to the next event; while flash is programmed or erased the core stands still. All interrupts have one priority, as
 // the firmware sets them: none interrupts another.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -18,6 +19,7 @@
 #include "tests/firmware/bxcan_model.hpp"
 #include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/flash_controller_model.hpp"
+#include "tests/firmware/rtc_model.hpp"
 
 struct uc_struct;
 
@@ -30,7 +32,7 @@ class UnicornBoard {
   UnicornBoard(const UnicornBoard&) = delete;
   UnicornBoard& operator=(const UnicornBoard&) = delete;
 
-  /// Throws std::runtime_error when the firmware faults, resets or starves the watchdog.
+  /// Throws std::runtime_error when the firmware faults, resets or starves the watchdog; or, if it may start again, only when it does nothing that a chip could do.
   void run_for_ms(double ms);
   /// False when it did not become so in time.
   bool run_until(const std::function<bool()>& becomes, double within_ms);
@@ -43,6 +45,19 @@ class UnicornBoard {
   std::uint32_t stack_used() const;
 
   std::uint32_t reset_flags = 0x0E000000;  ///< RCC_CSR: power on
+  /// Faults are taken, and a reset starts the firmware again as on a chip: RAM is as it was, the peripherals are not.
+  bool may_start_again = false;
+  std::vector<std::uint32_t> resets;       ///< the flags of each
+
+  /// A function, whose name begins so, begins with these instructions from now on, in flash; unpatch(): as it was.
+  using Instructions = std::array<std::uint16_t, 2>;
+  void patch(const std::string& function, Instructions with);
+  void unpatch();
+  static constexpr Instructions hangs{0xBF30, 0xE7FD}, returns{0x4770, 0x4770}, undefined{0xDE00, 0xDE00};  ///< wfi, b to it; bx lr; udf #0
+  std::uint32_t address_of(const std::string& function) const;
+  void flip_bit(std::uint32_t address, unsigned bit);
+  /// A bit of the RAM that does not change.
+  void stick(std::uint32_t address, unsigned bit, bool at);
 
   /// What else answers at the addresses of the chip's peripherals.
   struct Peripheral {
@@ -51,6 +66,12 @@ class UnicornBoard {
     virtual void write(std::uint32_t offset, std::uint32_t value, double now_us) = 0;
   };
   std::map<std::uint32_t, Peripheral*> plugged;  ///< by the base of its kilobyte
+
+  RtcModel* rtc = nullptr;  ///< with it the backup domain's control register; outlives a board, as its battery does
+  /// PVDO of PWR_CSR, and the interrupt that the detector raises for it.
+  void supply(bool low);
+  /// Calls a function of the firmware between two of its instructions, as a debugger would; it returns so many words by address.
+  std::vector<std::uint32_t> call(const std::string& function, std::size_t words);
 
   BxcanModel can;
   FlashControllerModel flash;
@@ -70,6 +91,9 @@ class UnicornBoard {
   void pass(std::uint64_t ticks);
   void deliver_interrupt();
   void enter(std::uint32_t exception);
+  void start();
+  void start_again(std::uint32_t flags);
+  bool take_fault(int error);
   void leave(std::uint32_t exc_return);
   int pending_exception() const;
   std::uint32_t peripheral_read(std::uint32_t address);
@@ -82,12 +106,19 @@ class UnicornBoard {
 
   uc_struct* core_ = nullptr;
   std::vector<Symbol> symbols_;
+  std::vector<std::pair<std::uint32_t, Instructions>> patched_;
   std::mt19937 random_;
-  bool crystal_, handling_ = false, sleeping_ = false, systick_pending_ = false;
+  bool crystal_, handling_ = false, sleeping_ = false, systick_pending_ = false, supply_low_ = false, supply_pending_ = false;
   std::map<std::uint32_t, std::uint32_t> registers_;
   std::uint32_t systick_csr_ = 0, systick_rvr_ = 0, enabled_ = 0;
   std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0, fed_at_ = 0, watchdog_ticks_ = 0;
   std::string ended_;
+  std::uint32_t exception_ = 0;
+  struct Stuck {
+    std::uint32_t address = 0;
+    unsigned bit = 0;
+    bool at = false;
+  } stuck_;
 };
 
 }  // namespace bms

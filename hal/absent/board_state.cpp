@@ -1,0 +1,9 @@
+// Nothing is known against it.
+#include "hal/board_state.hpp"
+
+namespace bms::hal {
+
+void board_start() {}
+BoardState board_state() { return {}; }
+
+}  // namespace bms::hal

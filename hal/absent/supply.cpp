@@ -1,0 +1,8 @@
+// Nobody watches the supply.
+#include "hal/supply.hpp"
+
+namespace bms::hal {
+
+void supply_attend() {}
+
+}  // namespace bms::hal

@@ -1,0 +1,82 @@
+// Samples of one cell by the chip's own converter, one each period of the board's clock: each millisecond a conversion of every input, four of the current, summed up. A sample is
+// their mean: what a current did in between is in it, but for the millisecond in which the last sample was worked on.
+//
+// The load is switched by pins; nothing is measured behind them.
+#include "hal/adc.hpp"
+#include "hal/adc/cell_readings.hpp"
+#include "hal/calibration.hpp"
+#include "hal/can.hpp"
+#include "hal/clock.hpp"
+#include "hal/contactor_pins.hpp"
+#include "hal/heard.hpp"
+#include "hal/power_path.hpp"
+#include "hal/samples.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+static_assert(pack_cells == 1);
+constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
+constexpr adc::Circuit circuit;
+constexpr std::uint32_t currents_a_round = 4;
+
+Calibration correction;
+PackSample<1> pack;
+std::uint64_t due_us = 0;
+bool started = false;
+
+void hear_the_bus() {
+  CanFrame frame;
+  while (can_receive(frame)) hear(frame);
+}
+
+/// One of each; a round that is not whole counts for nothing.
+void convert(adc::Counts& sums) {
+  const auto voltage = adc_convert(AnalogInput::voltage), temperature = adc_convert(AnalogInput::temperature), reference = adc_convert(AnalogInput::reference);
+  std::uint32_t current = 0;
+  for (std::uint32_t k = 0; k < currents_a_round; ++k) {
+    const auto one = adc_convert(AnalogInput::current);
+    if (!one) return;
+    current += *one;
+  }
+  if (!voltage || !temperature || !reference) return;
+  ++sums.n;
+  sums.voltage += *voltage;
+  sums.temperature += *temperature;
+  sums.current += current;
+  ++sums.n_reference;
+  sums.reference += *reference;
+}
+
+}  // namespace
+
+void calibrate(const Calibration& calibration) { correction = calibration; }
+
+const PackSample<1>* next_sample() {
+  if (!started) {
+    adc_start();
+    started = true;
+    due_us = now_us() + period_us;
+  }
+  adc::Counts sums;
+  for (hear_the_bus(); now_us() < due_us; hear_the_bus()) {
+    wait_for_interrupt();
+    convert(sums);
+  }
+  Sample sample;
+  sample.time_us = now_us();
+  due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
+  sums.current = (sums.current + currents_a_round / 2) / currents_a_round;
+  adc::read(sums, adc_reference_at_3v3(), circuit, correction, sample);
+  pack.time_us = sample.time_us;
+  pack.current_ua = sample.current_ua;
+  pack.cell_uv[0] = pack.pack_uv = sample.voltage_uv;
+  pack.temperature_cdegc[0] = sample.temperature_cdegc;
+  return &pack;
+}
+
+void power_path_set(const PowerPath& wanted) { contactor_pins_set(wanted); }
+std::int32_t link_uv() { return no_reading; }
+
+}  // namespace bms::hal

@@ -1,0 +1,172 @@
+// The single-cell board's image in Unicorn, a register model of the chip's converter on its pins: what the cell has is on the CAN bus, a correction moves it, and a converter
+// that hangs takes its readings with it, not the firmware.
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "can_messages.hpp"
+#include "estimator/estimate.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "tests/firmware/unicorn_board.hpp"
+#include "tests/hal/thermistor.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::IsEmpty;
+
+/// ADC1 as its registers show it (RM0090, 13), its inputs by volts and ohms; noise of one count.
+class Converter : public UnicornBoard::Peripheral {
+ public:
+  static constexpr std::uint32_t base = 0x40012000;
+  double supply_v = 3.27, cell_v = 3.3, current_a = 0, celsius = 25;
+  bool hangs = false;
+  unsigned conversions = 0;
+  std::vector<std::string> violations;
+
+  std::uint32_t read(std::uint32_t at, double now_us) override {
+    switch (at) {
+      case 0x00: return begun_ && !hangs && now_us >= ready_us_ ? 2U : 0U;
+      case 0x4C:
+        if (!begun_ || now_us < ready_us_) violations.push_back("DR is read before the end of the conversion");
+        begun_ = false;
+        return value_;
+      default: return registers_[at];
+    }
+  }
+  void write(std::uint32_t at, std::uint32_t value, double now_us) override {
+    registers_[at] = value;
+    if (at == 0x08 && (value & 1U << 30) != 0) begin(now_us);
+  }
+
+ private:
+  void begin(double now_us) {
+    if ((registers_[0x08] & 1) == 0) violations.push_back("a conversion while the converter is off");
+    const std::uint32_t channel = registers_[0x34] & 31;
+    constexpr double cycles[] = {3, 15, 28, 56, 84, 112, 144, 480};
+    const double sampling = cycles[channel < 10 ? registers_[0x10] >> (3 * channel) & 7 : registers_[0x0C] >> (3 * (channel - 10)) & 7];
+    const double mhz = 84.0 / (2 * ((registers_[0x304] >> 16 & 3) + 1));
+    if (mhz > 36) violations.push_back("a clock above 36 MHz (datasheet, ADC characteristics)");
+    if (channel == 17 && ((registers_[0x304] & 1U << 23) == 0 || sampling / mhz < 10)) violations.push_back("the reference is off, or sampled for less than 10 us");
+    const double ohm = thermistor_ohm(celsius);
+    const double pin_v = channel == 1 ? supply_v / 2 + 20 * 0.002 * current_a : channel == 2 ? cell_v / 2 : channel == 3 ? supply_v * ohm / (ohm + 10'000) : channel == 17 ? 1.21 : 0;
+    value_ = static_cast<std::uint32_t>(std::clamp(std::lround(4'095 * pin_v / supply_v + noise_(random_)), 0L, 4'095L));
+    ready_us_ = now_us + (sampling + 12) / mhz;
+    begun_ = true;
+    ++conversions;
+  }
+
+  std::map<std::uint32_t, std::uint32_t> registers_;
+  std::mt19937 random_{1};
+  std::normal_distribution<double> noise_{0, 1};
+  double ready_us_ = 0;
+  std::uint32_t value_ = 0;
+  bool begun_ = false;
+};
+
+class CellBoard : public ::testing::Test {
+ protected:
+  CellBoard() {
+    board.plugged = {{Converter::base, &converter}};
+    board.run_for_ms(900);  // a new chip's store is erased first
+  }
+  void TearDown() override {
+    EXPECT_THAT(converter.violations, IsEmpty());
+    EXPECT_THAT(board.can.violations, IsEmpty());
+    EXPECT_THAT(board.flash.violations, IsEmpty());
+    EXPECT_LT(board.longest_unfed_ms, 1'360);
+  }
+  template <class Message>
+  Message last() const {
+    std::optional<Message> found;
+    for (const SeenFrame& s : board.can.seen) {
+      if (s.from_board && s.frame.id == Message::id) found = Message::of(s.frame);
+    }
+    if (!found) throw std::runtime_error("not told");
+    return *found;
+  }
+  std::uint32_t command(std::uint32_t code, std::int32_t argument) {
+    can::Command c;
+    c.code = code;
+    c.argument = static_cast<std::uint32_t>(argument);
+    board.can.others.push_back({wire_frame(c.frame(counter_++)), board.can.now_bit + 1});
+    board.run_for_ms(250);
+    return last<can::CommandAnswer>().result;
+  }
+
+  Converter converter;
+  UnicornBoard board{firmware_image("stm32f405_cell", read_cell("table9"), Image::application)};
+
+ private:
+  std::uint8_t counter_ = 0;
+};
+
+TEST_F(CellBoard, WhatTheCellHasIsOnTheBus) {
+  for (const double current_a : {-5.5, 0.0, 3.0}) {
+    converter.current_a = current_a;
+    converter.cell_v = 3.3 + 0.01 * current_a;
+    converter.celsius = 25 + 3 * current_a;
+    board.run_for_ms(320);
+    const auto told = last<can::PackElectrical>();
+    EXPECT_NEAR(told.voltage, converter.cell_v, 0.003) << "0.03 % of the reference, and the bus's millivolt";
+    EXPECT_NEAR(told.current, current_a, 0.03);
+    EXPECT_NEAR(told.temperature, converter.celsius, 0.5);
+  }
+  EXPECT_GT(converter.conversions, 7U * 900U);
+  EXPECT_GE(board.estimates, 9U);
+}
+
+/// A current that flows for a tenth of the time between two samples is a tenth in the next.
+TEST_F(CellBoard, ASampleIsTheMeanOfItsPeriod) {
+  const unsigned before = board.estimates;
+  ASSERT_TRUE(board.run_until([&] { return board.estimates > before; }, 200));
+  board.run_for_ms(20);
+  converter.current_a = -30;
+  board.run_for_ms(10);
+  converter.current_a = 0;
+  const unsigned next = board.estimates;
+  ASSERT_TRUE(board.run_until([&] { return board.estimates > next; }, 200));
+  board.run_for_ms(10);
+  EXPECT_NEAR(last<can::PackElectrical>().current, -3, 0.35) << "to the millisecond";
+}
+
+TEST_F(CellBoard, ACorrectionMovesTheReadingAndOutlivesThePower) {
+  converter.current_a = -4;
+  EXPECT_EQ(command(can::Command::code_voltage_gain, 10'000), can::CommandAnswer::result_done);
+  EXPECT_EQ(command(can::Command::code_current_offset, 1'000'000), can::CommandAnswer::result_done);
+  board.run_for_ms(250);
+  EXPECT_NEAR(last<can::PackElectrical>().voltage, 1.01 * 3.3, 0.003);
+  EXPECT_NEAR(last<can::PackElectrical>().current, -3, 0.03);
+  UnicornBoard again{firmware_image("stm32f405_cell", read_cell("table9"), Image::application), 2};
+  again.flash.bytes = board.flash.bytes;
+  again.plugged = {{Converter::base, &converter}};
+  again.run_for_ms(250);
+  std::optional<can::PackElectrical> told;
+  for (const SeenFrame& s : again.can.seen) {
+    if (s.from_board && s.frame.id == can::PackElectrical::id) told = can::PackElectrical::of(s.frame);
+  }
+  ASSERT_TRUE(told);
+  EXPECT_NEAR(told->voltage, 1.01 * 3.3, 0.003);
+  EXPECT_NEAR(told->current, -3, 0.03);
+}
+
+TEST_F(CellBoard, AConverterThatHangsTakesOnlyItsReadingsWithIt) {
+  converter.hangs = true;
+  const unsigned before = board.estimates;
+  board.run_for_ms(1'000);
+  EXPECT_GE(board.estimates - before, 9U);
+  EXPECT_TRUE(std::isnan(last<can::PackElectrical>().voltage));
+  EXPECT_NE(last<can::Status>().flags & voltage_missing, 0U);
+  EXPECT_EQ(last<can::Faults>().voltage_missing, 1U);
+  converter.hangs = false;
+  board.run_for_ms(300);
+  EXPECT_NEAR(last<can::PackElectrical>().voltage, 3.3, 0.003);
+}
+
+TEST_F(CellBoard, ItsPinsAreAnalog) { EXPECT_EQ(board.register_value(0x40020000) & 0xFC, 0xFCU) << "GPIOA_MODER: PA1 to PA3"; }
+
+}  // namespace
+}  // namespace bms

@@ -1,0 +1,50 @@
+// The STM32F405's real-time clock and its backup domain as the registers show them, from RM0090, 5.1.2, 7.3.20 and 26, alone: it shares nothing with hal/. Its calendar counts
+// by the rules of the Gregorian one. It lives longer than a board: power_away() is what happens to it in between.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace bms {
+
+class RtcModel {
+ public:
+  static constexpr std::uint32_t base = 0x40002800;
+
+  std::uint32_t read(std::uint32_t offset, double now_us);
+  void write(std::uint32_t offset, std::uint32_t value, double now_us);
+  std::uint32_t read_bdcr(double now_us) {
+    advance(now_us);
+    return bdcr;
+  }
+  /// allowed: DBP of PWR_CR.
+  void write_bdcr(std::uint32_t value, bool allowed, double now_us);
+
+  /// battery: at VBAT. The next board's time begins at 0.
+  void power_away(double seconds, bool battery);
+  /// A reset of the core: the shadow registers come anew.
+  void core_reset() { synchronised_ = false; }
+
+  bool crystal = true;
+  double crystal_after_us = 2e6;
+  std::uint32_t bdcr = 0;
+  struct Date {
+    int year = 0, month = 1, day = 1, hour = 0, minute = 0, second = 0;  ///< year of the century
+  };
+  Date date;
+  std::vector<std::string> violations;
+
+ private:
+  void advance(double now_us);
+  void second();
+  double hz() const;
+  void reset_domain();
+
+  double at_us_ = 0, fraction_s_ = 0, crystal_on_us_ = -1;
+  std::uint32_t prer_ = 0x007F00FF, mark_ = 0, dr_shadow_ = 0;
+  int keys_ = 0, prescaler_writes_ = 0;
+  bool initialising_ = false, synchronised_ = false, dr_locked_ = false;
+};
+
+}  // namespace bms

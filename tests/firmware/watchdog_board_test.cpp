@@ -1,0 +1,174 @@
+// The forklift board's image in Unicorn, parts of it made to hang or to do nothing: the watchdog bites, and the next run says so and keeps the contactors open.
+// What is no standstill of the firmware (nobody on the bus, a measuring chain that is gone) it survives.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "can_messages.hpp"
+#include "firmware/progress.hpp"
+#include "host_sim/cell_file.hpp"
+#include "host_sim/firmware_image.hpp"
+#include "host_sim/image_file.hpp"
+#include "tests/firmware/unicorn_board.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t by_watchdog = 1U << 29 | 1U << 26, by_software = 1U << 28 | 1U << 26;
+constexpr double watchdog_ms = 2'000;
+
+/// Of the frames that came after a time, the last of a message.
+template <class Message>
+std::optional<Message> last(const UnicornBoard& board, std::uint64_t after_bit = 0) {
+  std::optional<Message> found;
+  for (const SeenFrame& s : board.can.seen) {
+    if (s.from_board && s.frame.id == Message::id && s.begin_bit >= after_bit) found = Message::of(s.frame);
+  }
+  return found;
+}
+
+class Watchdog : public ::testing::Test {
+ protected:
+  Watchdog() { board.may_start_again = true; }
+  void run() { board.run_for_ms(1'800); }  // a new chip's store is erased first
+  UnicornBoard board{firmware_image("stm32f405_forklift", read_cell("table9"), Image::application)};
+};
+
+TEST(Progress, IsMadeOnlyByASampleThatWentAllItsWay) {
+  const auto second = [](const Progress::Made& made) {
+    Progress p;
+    EXPECT_TRUE(p.complete({1'000, 1'000, 1}));
+    return p.complete(made);
+  };
+  EXPECT_TRUE(second({2'000, 2'000, 2}));
+  EXPECT_FALSE(second({1'000, 1'000, 2})) << "the same sample again";
+  EXPECT_FALSE(second({500, 500, 2})) << "an older one";
+  EXPECT_FALSE(second({2'000, 1'000, 2})) << "the estimator has not taken it";
+  EXPECT_FALSE(second({2'000, 2'000, 1})) << "it was not told";
+}
+
+TEST(Progress, ComesBackWhenAllGoesOnAndItsCounterWraps) {
+  Progress p;
+  EXPECT_FALSE(p.complete({1'000, 1'000, 0xFFFF'FFFF}));
+  EXPECT_TRUE(p.complete({2'000, 2'000, 0}));
+  EXPECT_FALSE(p.complete({3'000, 2'000, 1}));
+  EXPECT_TRUE(p.complete({4'000, 4'000, 2}));
+}
+
+/// Each of the three alone, the others as they are: once it hangs, once it returns without having done anything.
+struct Stall {
+  const char* name;
+  const char* function;
+  UnicornBoard::Instructions instructions;
+};
+class OneStands : public Watchdog, public ::testing::WithParamInterface<Stall> {};
+
+TEST_P(OneStands, TheWatchdogBitesAndTheNextRunOpensAndTellsWhy) {
+  run();
+  ASSERT_THAT(board.resets, IsEmpty());
+  EXPECT_GT(board.watchdog_feeds, 5U);
+  board.patch(GetParam().function, GetParam().instructions);
+  const double stands_ms = board.now_ms();
+  ASSERT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 2 * watchdog_ms)) << "the watchdog was fed";
+  EXPECT_THAT(board.resets, ElementsAre(by_watchdog));
+  EXPECT_NEAR(board.now_ms() - stands_ms, watchdog_ms, 150) << "a sample's time, and a step of the watchdog's";
+}
+INSTANTIATE_TEST_SUITE_P(Parts, OneStands, ::testing::Values(
+    Stall{"SamplingHangs", "bms::hal::bq76952::FrontEnd::read(", UnicornBoard::hangs},
+    Stall{"EstimationHangs", "bms::estimator_step(", UnicornBoard::hangs},
+    Stall{"EstimationDoesNothing", "bms::estimator_step(", UnicornBoard::returns},
+    Stall{"TelemetryHangs", "bms::hal::can_send(", UnicornBoard::hangs},
+    Stall{"TimeStands", "clock_interrupt", UnicornBoard::returns}), [](const auto& p) { return std::string(p.param.name); });
+
+TEST_F(Watchdog, AfterItHasBittenTheNextRunSaysSoAndIsSafe) {
+  run();
+  board.patch("bms::estimator_step(", UnicornBoard::hangs);  // interrupts go on
+  ASSERT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 2 * watchdog_ms));
+  board.unpatch();
+  const std::uint64_t again = board.can.now_bit;
+  run();
+  EXPECT_THAT(board.resets, ElementsAre(by_watchdog));
+  ASSERT_TRUE(last<can::Status>(board, again));
+  EXPECT_EQ(last<can::Status>(board, again)->reset_cause, can::Status::reset_cause_watchdog);
+  EXPECT_EQ(last<can::Faults>(board, again)->internal_fault, 1U);
+  EXPECT_EQ(last<can::ContactorState>(board, again)->main_plus, 0U);
+}
+
+const std::filesystem::path& forklift() {
+  static const auto path = firmware_image("stm32f405_forklift", read_cell("table9"), Image::application);
+  return path;
+}
+std::uint32_t symbol(const char* name) { return ImageFile(forklift()).symbol(name); }
+
+TEST_F(Watchdog, AFaultOfTheProcessorResetsAtOnceAndTheNextRunTellsWhereItWas) {
+  run();
+  const double before_ms = board.now_ms();
+  board.patch("bms::estimator_step(", UnicornBoard::undefined);
+  ASSERT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 500));
+  EXPECT_LT(board.now_ms() - before_ms, 120) << "with the next sample";
+  EXPECT_THAT(board.resets, ElementsAre(by_software));
+  EXPECT_EQ(board.register_value(0x40020818), 0U) << "the outputs are inputs again";
+  board.unpatch();
+  const std::uint64_t again = board.can.now_bit;
+  run();
+  EXPECT_EQ(board.resets.size(), 1U);
+  EXPECT_EQ(last<can::Status>(board, again)->reset_cause, can::Status::reset_cause_software);
+  ASSERT_TRUE(last<can::LastFaultAddress>(board, again));
+  EXPECT_EQ(last<can::LastFaultAddress>(board, again)->program_counter, board.address_of("bms::estimator_step("));
+  EXPECT_EQ(last<can::LastFaultCause>(board, again)->configurable_fault_status, 1U << 16);
+  EXPECT_EQ(last<can::Board>(board, again)->last_exception, 6U);
+  EXPECT_EQ(last<can::Faults>(board, again)->internal_fault, 1U);
+}
+
+/// On a core without a memory protection unit (Unicorn's has none); firmware_test has the other in QEMU.
+TEST_F(Watchdog, AStackThatHasGrownIntoItsGuardIsToldAndOpens) {
+  run();
+  board.run_for_ms(2'500);
+  EXPECT_EQ(last<can::Board>(board)->stack_overrun, 0U);
+  EXPECT_NEAR(last<can::Board>(board)->stack_free, 7 * 1'024 - board.stack_used(), 64);
+  board.flip_bit(symbol("image_stack_limit") + 1'023, 0);
+  board.run_for_ms(150);
+  EXPECT_EQ(last<can::Board>(board)->stack_overrun, 1U);
+  EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
+}
+
+TEST_F(Watchdog, OneBitOfTheImageThatIsNotAsItWasBuiltIsTold) {
+  board.flip_bit(symbol("image_code_end") - 6, 3);
+  run();
+  EXPECT_EQ(last<can::Board>(board)->image_failed, 1U);
+  EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
+}
+
+TEST_F(Watchdog, AnImageAsItWasBuiltIsWhole) {
+  run();
+  const auto told = last<can::Board>(board);
+  EXPECT_EQ(told->image_failed | told->ram_failed | told->stack_overrun, 0U);
+  EXPECT_EQ(last<can::Faults>(board)->internal_fault, 0U);
+}
+
+/// In the data, and in the stack where it never comes; either way.
+TEST(Ram, ABitThatDoesNotChangeIsTold) {
+  for (const std::uint32_t address : {symbol("image_bss_end") - 1, symbol("image_stack_limit") + 2'001}) {
+    for (const bool at : {false, true}) {
+      UnicornBoard board(forklift());
+      board.stick(address, 6, at);
+      board.run_for_ms(1'800);
+      const auto told = last<can::Board>(board);
+      ASSERT_TRUE(told);
+      EXPECT_EQ(told->ram_failed, 1U) << std::hex << address << at;
+      EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
+    }
+  }
+}
+
+TEST_F(Watchdog, NobodyOnTheBusNorAtTheMeasuringChainIsNoStandstill) {
+  board.can.others_acknowledge = false;  // and nothing is plugged in at I2C1
+  board.run_for_ms(6'000);
+  EXPECT_THAT(board.resets, IsEmpty());
+  EXPECT_LT(board.longest_unfed_ms, 1'360) << "the fastest that the watchdog's oscillator may run";
+}
+
+}  // namespace
+}  // namespace bms

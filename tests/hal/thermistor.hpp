@@ -1,0 +1,25 @@
+// The thermistor 103AT by Steinhart and Hart's equation through three of its maker's values (-20, 25 and 70 degrees C): what it has at a temperature, without the firmware's table.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+namespace bms {
+
+inline double thermistor_ohm(double celsius) {
+  // 1/T = a + b ln R + c (ln R)^3 at three points
+  constexpr double t[] = {253.15, 298.15, 343.15}, r[] = {67'770, 10'000, 2'228};
+  const double l[] = {std::log(r[0]), std::log(r[1]), std::log(r[2])}, y[] = {1 / t[0], 1 / t[1], 1 / t[2]};
+  const double g2 = (y[1] - y[0]) / (l[1] - l[0]), g3 = (y[2] - y[0]) / (l[2] - l[0]);
+  const double c = (g3 - g2) / (l[2] - l[1]) / (l[0] + l[1] + l[2]);
+  const double b = g2 - c * (l[0] * l[0] + l[0] * l[1] + l[1] * l[1]);
+  const double a = y[0] - l[0] * (b + l[0] * l[0] * c);
+  double low = std::log(10.0), high = std::log(1e7);
+  for (int k = 0; k < 100; ++k) {
+    const double middle = (low + high) / 2, at = 1 / (a + b * middle + c * middle * middle * middle) - 273.15;
+    (at > celsius ? low : high) = middle;
+  }
+  return std::exp(low);
+}
+
+}  // namespace bms
