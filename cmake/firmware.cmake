@@ -8,6 +8,8 @@
 #   bms_<board>_pack.elf     tests/firmware/pack_image.cpp; only when asked for
 #   bms_<board>_protection.elf  tests/firmware/protection_image.cpp; only when asked for
 #
+# Beside each bms_<board>*.elf lies what is in it, bms_<board>*.cdx.json (sbom.py).
+#
 # The first three run in QEMU only (hal/README.md). A board that QEMU does not have (BMS_EMULATED OFF) has bms_<board>.elf for the
 # chip, bms_<board>_remote.elf with samples that another node measures, and bms_<board>_hil.elf for an emulated board with the same chip (BMS_LOOP_BOARD).
 # board.cmake says which CAN back end it has, BMS_CAN slcan or bxcan, for the latter with a bit rate; and where its samples come from, BMS_SAMPLES
@@ -51,6 +53,10 @@ file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated)
 set(cell_file "")
 if(EXISTS ${BMS_CELL})
   set(cell_file ${BMS_CELL})
+endif()
+set(cell_source ${CMAKE_SOURCE_DIR}/model/cells/${BMS_CELL}.toml)
+if(cell_file)
+  set(cell_source ${cell_file})
 endif()
 set(cell_header_scalar "")
 if(BMS_SCALAR_DEFINITION MATCHES BMS_FIXED_POINT)
@@ -133,6 +139,9 @@ function(bms_image name)
   list(TRANSFORM objects APPEND ">")
   add_executable(${name} ${objects})
   target_link_options(${name} PRIVATE -T${linker_script} -Wl,--undefined=image_cell_hash -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
+  add_custom_command(TARGET ${name} POST_BUILD
+    COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/sbom.py ${name} ${PROJECT_VERSION} ${CMAKE_CXX_COMPILER} ${cell_source} ${CMAKE_BINARY_DIR}/${name}.map ${CMAKE_BINARY_DIR}/${name}.elf
+    BYPRODUCTS ${CMAKE_BINARY_DIR}/${name}.cdx.json VERBATIM)
   set_target_properties(${name} PROPERTIES LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
   add_custom_command(TARGET ${name} POST_BUILD COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/image_check.py $<TARGET_FILE:${name}> VERBATIM)
 endfunction()

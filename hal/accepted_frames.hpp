@@ -28,7 +28,7 @@ inline constexpr std::array<std::uint16_t, 0> profile_ids{};
 #endif
 
 /// All of hal/sample_frames.hpp, commands, and those of the profile.
-inline constexpr auto accepted_ids = [] {
+inline constexpr auto accepted_ids = []() {
   constexpr std::size_t of_samples = last_sample_frame_id - first_sample_frame_id + 1;
   std::array<std::uint16_t, of_samples + 1 + profile_ids.size()> ids{};
   for (std::size_t k = 0; k < of_samples; ++k) ids[k] = static_cast<std::uint16_t>(first_sample_frame_id + k);

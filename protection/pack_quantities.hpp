@@ -83,7 +83,7 @@ class PackQuantities {
     }
     const auto known = static_cast<std::int32_t>(Cells) - missing;
     sum_uv_ = missing == 0 ? sum : no_reading;
-    const bool pack_known = sample.pack_uv != no_reading && sample.pack_uv >= 0;
+    const bool pack_known = sample.pack_uv >= 0;  // no_reading is less
     at(q, Quantity::voltages_missing) = missing + (pack_known ? 0 : 1);
     at(q, Quantity::pack_uv) = pack_known ? sample.pack_uv : no_reading;
     at(q, Quantity::sum_error_uv) = pack_known && missing == 0 ? magnitude(sum - sample.pack_uv) : no_reading;

@@ -19,7 +19,7 @@ class Crc32 {
   constexpr std::uint32_t value() const { return ~sum_; }
 
  private:
-  static constexpr std::array<std::uint32_t, 16> table = [] {
+  static constexpr std::array<std::uint32_t, 16> table = []() {
     std::array<std::uint32_t, 16> t{};
     for (std::uint32_t k = 0; k < t.size(); ++k) {
       std::uint32_t sum = k;

@@ -81,14 +81,15 @@ bool Log::look() {
   interrupted_ = false;
   settled_ = true;
   std::array<Survey, most_sectors> found{};
-  for (std::uint8_t s = 0; s < size_.sectors; ++s) {
+  const auto sectors = static_cast<std::uint8_t>(size_.sectors);
+  for (std::uint8_t s = 0; s < sectors; ++s) {
     found[s] = survey(s, [](const Record&) {});
     if (state_[s] != Sector::broken) state_[s] = marked(s) && blank(s, 1, static_cast<std::uint16_t>(lines_ - 1)) ? Sector::erased : Sector::dirty;
   }
   find_sector_in_charge(std::span(found).first(size_.sectors));
   if (charge_ == none) return true;
   const auto taking = [this](const Record& r) { take(r); };
-  for (std::uint8_t s = 0; s < size_.sectors; ++s) {
+  for (std::uint8_t s = 0; s < sectors; ++s) {
     if (s == charge_) continue;
     const bool ahead = found[s].begun && later(found[s].base, base_);
     interrupted_ = interrupted_ || ahead;
@@ -105,7 +106,8 @@ bool Log::look() {
 
 /// The furthest that holds more than copies; if there is none any more, the furthest with copies.
 void Log::find_sector_in_charge(std::span<const Survey> found) {
-  for (std::uint8_t s = 0; s < found.size(); ++s) {
+  const auto sectors = static_cast<std::uint8_t>(found.size());
+  for (std::uint8_t s = 0; s < sectors; ++s) {
     if (!found[s].any) continue;
     const bool better = charge_ == none || (found[s].original != found[charge_].original ? found[s].original : later(found[s].base, base_));
     if (!better) continue;

@@ -1,6 +1,12 @@
-// An image as a file: the same bytes from the same sources.
+// An image as a file: the same bytes from the same sources, and the bill of materials beside it against the linker's map.
+#include <map>
+#include <regex>
+#include <set>
+
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "host_sim/cell_file.hpp"
 #include "host_sim/child_process.hpp"
@@ -26,8 +32,59 @@ TEST(Image, HasTheSameBytesFromAnotherFolder) {
   output_of({"cmake", "--build", build, "--target", "bms_stm32f405_forklift.elf"});
   const std::string there = read_file(build / "bms_stm32f405_forklift.elf");
   EXPECT_EQ(sha256(read_file(here)), sha256(there));
+  EXPECT_EQ(read_file(fs::path(here).replace_extension(".cdx.json")), read_file(build / "bms_stm32f405_forklift.cdx.json"));
   EXPECT_EQ(there.find(folder.path().filename().string()), std::string::npos);
   EXPECT_EQ(there.find(BMS_SOURCE_DIR), std::string::npos);
+}
+
+/// Every line of the map's that names a member of an archive; by archive.
+std::map<std::string, std::set<std::string>> members_in(const std::string& map) {
+  std::map<std::string, std::set<std::string>> found;
+  static const std::regex member("/([^/ ()]*\\.a)\\(([^)]*)\\)");
+  for (std::sregex_iterator it(map.begin(), map.end(), member), end; it != end; ++it) found[(*it)[1]].insert((*it)[2]);
+  return found;
+}
+
+TEST(BillOfMaterials, NamesEveryArchiveAndMemberOfTheLinkersMapWithVersionAndLicence) {
+  const CellFile cell = read_cell("table9");
+  for (const std::string& board : board_names()) {
+    const fs::path image = firmware_image(board, cell, chip_image(board));
+    const auto bom = nlohmann::json::parse(read_file(fs::path(image).replace_extension(".cdx.json")));
+    EXPECT_EQ(bom.at("bomFormat"), "CycloneDX");
+    EXPECT_EQ(bom.at("specVersion"), "1.5");
+    const auto& self = bom.at("metadata").at("component");
+    EXPECT_EQ(self.at("type"), "firmware");
+    EXPECT_EQ(self.at("hashes")[0].at("content"), sha256(read_file(image)));
+    std::map<std::string, std::set<std::string>> named;
+    std::set<std::string> references;
+    bool has_cell = false;
+    for (const auto& c : bom.at("components")) {
+      EXPECT_TRUE(references.insert(c.at("bom-ref")).second) << c;
+      if (c.at("type") == "data") {
+        has_cell = true;
+        const std::string hash = c.at("hashes")[0].at("content");
+        EXPECT_EQ(hash, sha256(cell.text));
+        EXPECT_EQ(std::stoul(hash.substr(0, 8), nullptr, 16), cell.hash) << "what is on CAN";
+        continue;
+      }
+      EXPECT_EQ(c.at("type"), "library");
+      EXPECT_FALSE(c.at("licenses").empty());
+      EXPECT_TRUE(std::regex_match(c.at("version").get<std::string>(), std::regex("[0-9]+(\\.[0-9]+)+"))) << c;
+      if (!c.contains("properties")) continue;  // headers
+      for (const auto& p : c.at("properties")) named[c.at("bom-ref")].insert(p.at("value"));
+    }
+    EXPECT_TRUE(has_cell);
+    const std::string map = read_file(fs::path(image).replace_extension(".map"));
+    EXPECT_EQ(named, members_in(map)) << board;
+    EXPECT_FALSE(named.empty());
+    for (const auto& d : bom.at("dependencies")[0].at("dependsOn")) EXPECT_TRUE(references.contains(d)) << d;
+    for (const auto& p : self.at("properties")) {
+      const std::string source = p.at("value");
+      EXPECT_TRUE(fs::exists(fs::path(BMS_SOURCE_DIR) / source)) << source;
+      EXPECT_THAT(map, ::testing::HasSubstr(source + ".obj"));
+    }
+    EXPECT_GT(self.at("properties").size(), 10U);
+  }
 }
 
 }  // namespace
