@@ -140,10 +140,10 @@ function(bms_image name)
   add_executable(${name} ${objects})
   target_link_options(${name} PRIVATE -T${linker_script} -Wl,--undefined=image_cell_hash -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
   add_custom_command(TARGET ${name} POST_BUILD
+    COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/image_check.py $<TARGET_FILE:${name}>
     COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/sbom.py ${name} ${PROJECT_VERSION} ${CMAKE_CXX_COMPILER} ${cell_source} ${CMAKE_BINARY_DIR}/${name}.map ${CMAKE_BINARY_DIR}/${name}.elf
     BYPRODUCTS ${CMAKE_BINARY_DIR}/${name}.cdx.json VERBATIM)
   set_target_properties(${name} PROPERTIES LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
-  add_custom_command(TARGET ${name} POST_BUILD COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/image_check.py $<TARGET_FILE:${name}> VERBATIM)
 endfunction()
 
 if(NOT BMS_EMULATED)

@@ -121,8 +121,8 @@ double ms_on_the_wire(const std::vector<hal::CanFrame>& frames) {
 
 constexpr std::size_t frames_of_a_sample = hal::pack_frames<Pack::cells>;
 constexpr double longest_sample_ms = 1e3 * frames_of_a_sample * can_bus::worst_bits(8) / 250e3;
-constexpr double patience_s = 0.5;  // after five sample periods without one the board gives itself one that says nothing
-constexpr unsigned given_in(double s) { return static_cast<unsigned>(s / patience_s) - 1; }  // one may be under way
+constexpr double patience_s = 0.5, period_s = 0.1;  // after five sample periods without one the board gives itself one that says nothing, and one each period from then on
+constexpr unsigned given_in(double s) { return static_cast<unsigned>((s - patience_s) / period_s) - 1; }  // one may be under way
 
 constexpr std::uint64_t bits_between_samples = 25'000;  // ten a second at 250 kbit/s
 constexpr double shortest_watchdog_ms = 1'360;          // 2 s by an oscillator at 47 kHz (datasheet, LSI)
@@ -135,6 +135,12 @@ void queue_for(UnicornBoard& board, const std::vector<Input>& inputs) {
     if (inputs[k].command) board.can.others.push_back({wire_frame(*inputs[k].command), due - bits_between_samples / 2});
     for (const hal::CanFrame& f : hal::frames_of(inputs[k].pack, inputs[k].link_uv, static_cast<std::uint16_t>(k))) board.can.others.push_back({wire_frame(f), due, true});
   }
+}
+
+/// A start looks at its memories first; what is sent before it listens nobody takes.
+void run_until_it_listens(UnicornBoard& board) {
+  ASSERT_TRUE(board.run_until([&] { return board.can.on_the_bus(); }, 200));
+  board.run_for_ms(5);
 }
 
 class BxcanBoard : public ::testing::Test {
@@ -227,7 +233,8 @@ TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToD
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     UnicornBoard one(image(), seed);
     one.flash.bytes = started_once();
-    one.can.others.push_back({wire_frame(hal::frame_of(start)), 5'000});
+    run_until_it_listens(one);
+    one.can.others.push_back({wire_frame(hal::frame_of(start)), 0});
     queue_for(one, inputs);
     one.run_for_ms(100 * static_cast<double>(inputs.size()) + 50);
     std::map<unsigned, std::vector<hal::CanFrame>> seen;
@@ -275,7 +282,8 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
     const auto code = static_cast<std::uint16_t>(first_fault_code + static_cast<std::uint16_t>(protection::Fault::temperature_lost));
     EXPECT_EQ(std::ranges::count(host.persistence().events().fault, code, &storage::EventsRecord::Fault::code), 1);
   }
-  board.can.others.push_back({wire_frame(hal::frame_of(start)), 5'000});
+  run_until_it_listens(board);
+  board.can.others.push_back({wire_frame(hal::frame_of(start)), 0});
   run(board, part);
   EXPECT_GT(board.flash.words_programmed, 20U);
   EXPECT_EQ(board.flash.sectors_erased, 0U) << "there was room";
@@ -320,11 +328,12 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
 /// The three sectors are erased and marked in less than a second, during which the watchdog is fed.
 TEST(BxcanBoardAlone, OfANewChipTheFirstStartMarksTheFlashAndTheSecondFindsItSo) {
   UnicornBoard board(image());
-  board.run_for_ms(1'400);  // with the first sample, the cell file's mark
+  board.run_for_ms(1'000);
+  EXPECT_LT(board.longest_unfed_ms, 300);
+  board.run_for_ms(500);  // with the first sample, the cell file's mark
   EXPECT_EQ(board.flash.sectors_erased, FlashControllerModel::sectors);
   EXPECT_EQ(board.flash.bytes, started_once());
   EXPECT_TRUE(board.can.on_the_bus());
-  EXPECT_LT(board.longest_unfed_ms, 300);
   UnicornBoard again(image());
   again.flash.bytes = board.flash.bytes;
   again.run_for_ms(100);
@@ -375,7 +384,7 @@ TEST_F(BxcanBoard, AtTheLimitOfTheBusNothingIsLostAndBeyondItTheLeastUrgent) {
   const std::uint32_t least_urgent = std::ranges::max(all, {}, &hal::CanFrame::id).id;
   // every sample of this recording is a second after the last: all messages each time
   EXPECT_NEAR(static_cast<double>(all.size()), static_cast<double>((first.size() - 2) * part.size()), 20) << "the start is told once, a change of faults at once";
-  board.run_for_ms(20);
+  run_until_it_listens(board);
   std::size_t next = 0;
   const auto feed = [&](std::size_t count, double every_ms) {
     for (std::size_t k = 0; k < count; ++k, ++next) {
@@ -404,7 +413,7 @@ TEST_F(BxcanBoard, AtTheLimitOfTheBusNothingIsLostAndBeyondItTheLeastUrgent) {
 }
 
 TEST_F(BxcanBoard, OfOneIdentifierTheOlderFrameLeavesFirstWhateverMailboxItHas) {
-  board.run_for_ms(20);
+  run_until_it_listens(board);
   std::size_t told = 0;
   for (int time = 0; time < 20; ++time) {
     for (int k = 0; k < 80; ++k) board.can.others.push_back({{0x100, false, false, 8, {}}, 0});  // 39 ms of the wire
@@ -425,7 +434,7 @@ TEST_F(BxcanBoard, OfOneIdentifierTheOlderFrameLeavesFirstWhateverMailboxItHas) 
 }
 
 TEST_F(BxcanBoard, AFullFifoAndAFullRingAreCountedAndTheNextSampleIsTaken) {
-  board.run_for_ms(20);
+  run_until_it_listens(board);
   board.receive_interrupt_held = true;
   for (int k = 0; k < 5; ++k) board.can.others.push_back({wire_frame(hal::frame_of(StartingPoint{})), 0});
   board.run_for_ms(10);
@@ -449,7 +458,7 @@ TEST_F(BxcanBoard, AFullFifoAndAFullRingAreCountedAndTheNextSampleIsTaken) {
 }
 
 TEST_F(BxcanBoard, NothingButTheAcceptedIdentifiersComesIn) {
-  board.run_for_ms(20);
+  run_until_it_listens(board);
   for (std::uint32_t id = 0; id < 0x800; id += 7) {
     const bool accepted = std::find(hal::accepted_ids.begin(), hal::accepted_ids.end(), id) != hal::accepted_ids.end();
     if (!accepted) board.can.others.push_back({{id, false, false, 8, {}}, 0});
@@ -583,7 +592,7 @@ TEST_F(BxcanBoard, WithNobodyThereItGoesOnAndTellsWhatIsFreshWithinTheSecondAfte
   EXPECT_NE(can::Status::of(of_board(0x182).front()).flags & current_missing, 0U);
   queue(part_of_the_shift(3));
   board.run_for_ms(350);
-  EXPECT_EQ(of_board(0x182).size(), 4U);
+  EXPECT_EQ(std::ranges::count_if(of_board(0x182), [](const hal::CanFrame& f) { return (can::Status::of(f).flags & current_missing) == 0; }), 3);
 }
 
 TEST(BxcanBoardAlone, WithoutItsCrystalItStaysOffTheBusAndEstimates) {
@@ -683,7 +692,7 @@ TEST_F(BxcanBoard, EveryFrameComesWithinTheTimeThatTheAnalysisAllows) {
 
 /// What the analysis takes for granted. An instruction is a cycle here; the chip, with what its flash accelerator misses, is given two.
 TEST_F(BxcanBoard, ASampleIsInTheQueueWithinTheTimeThatTheAnalysisTakesForGranted) {
-  board.run_for_ms(20);
+  run_until_it_listens(board);
   double longest_ms = 0, minute_ms = 0;
   std::size_t n = 0;
   for (const Pack& p : part_of_the_shift(125)) {
