@@ -18,6 +18,7 @@
 # BMS_VEHICLE_PROFILE: messages that go out beside the battery's own: cia418, for a CANopen charger (nodes BMS_CANOPEN_NODE, BMS_CANOPEN_CHARGER), or
 # j1939 (can/j1939_profile.dbc). can/messages.md says what they are.
 include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
+include(${CMAKE_SOURCE_DIR}/hal/${BMS_CHIP}/chip.cmake)  # compiler flags, core, what QEMU has in its place, flash
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
 endif()

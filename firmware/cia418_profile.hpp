@@ -21,6 +21,7 @@
 
 #include "estimator/pack_sample.hpp"
 #include "firmware/canopen.hpp"
+#include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "hal/accepted_frames.hpp"
 #include "protection/protection.hpp"
@@ -53,10 +54,7 @@ class Cia418Profile {
     if (!hal::can_listening()) return;
     const auto now_us = static_cast<std::uint32_t>(pack.time_us);
     node_.beat(now_us);
-    if (node_.state() != canopen::NodeState::operational || (told_ && now_us - told_us_ < cycle_us)) return;
-    told_us_ = now_us;
-    told_ = true;
-    send_pdos();
+    if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
   }
 
   void hear(const hal::CanFrame& frame) { node_.hear(frame, *this); }
@@ -118,11 +116,11 @@ class Cia418Profile {
   }
 
   canopen::Node node_{static_cast<std::uint8_t>(hal::canopen_node)};
-  std::uint32_t voltage_ = 0xFFFF'FFFF, told_us_ = 0;
+  Cycle cycle_;
+  std::uint32_t voltage_ = 0xFFFF'FFFF;
   std::int16_t temperature_ = no_value;
   std::uint16_t current_requested_ = 0, capacity_ = 0, most_current_ = 0;
   std::uint8_t status_ = 0, charger_status_ = 0, soc_ = 0xFF, cells_ = 0;
-  bool told_ = false;
 };
 
 namespace cia418 {

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "estimator/pack_sample.hpp"
+#include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "hal/can.hpp"
 #include "j1939_messages.hpp"  // generated from can/j1939_profile.dbc
@@ -116,10 +117,7 @@ class J1939Profile {
 
  private:
   template <class Message>
-  struct Sent {
-    std::uint32_t at_us = 0;
-    bool once = false;
-  };
+  struct Sent : Cycle {};
   template <class>
   struct OfAll;
   template <class... Message>
@@ -127,13 +125,9 @@ class J1939Profile {
     using type = std::tuple<Sent<Message>...>;
   };
 
-  /// Unsigned: a time that went back is due as well.
   template <class Message, class Make>
   void by_time(Make&& message) {
-    auto& sent = std::get<Sent<Message>>(sent_);
-    if (sent.once && now_us_ - sent.at_us < Message::cycle_us) return;
-    sent = {now_us_, true};
-    hal::can_send(message().frame());
+    if (std::get<Sent<Message>>(sent_).due(now_us_, Message::cycle_us)) hal::can_send(message().frame());
   }
 
   typename OfAll<can::j1939::Messages>::type sent_{};

@@ -10,6 +10,7 @@
 
 #include "estimator/pack_estimator.hpp"
 #include "firmware/commands.hpp"
+#include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "hal/board_state.hpp"
 #include "hal/can.hpp"
@@ -78,10 +79,8 @@ class Telemetry {
  private:
   /// What is remembered of a message.
   template <class Message>
-  struct Sent {
-    std::uint32_t at_us = 0;
+  struct Sent : Cycle {
     std::uint8_t counter = 0;
-    bool once = false;
   };
   template <class>
   struct OfAll;
@@ -97,20 +96,16 @@ class Telemetry {
     sent.counter = can::next(sent.counter);
   }
 
-  /// message(): made when it is due. Unsigned: a time that went back is due as well.
+  /// message(): made when it is due.
   template <class Message, class Make>
   void by_time(Make&& message) {
-    auto& sent = std::get<Sent<Message>>(sent_);
-    if (sent.once && now_us_ - sent.at_us < Message::cycle_us) return;
-    sent.at_us = now_us_;
-    sent.once = true;
-    send(message());
+    if (std::get<Sent<Message>>(sent_).due(now_us_, Message::cycle_us)) send(message());
   }
 
   /// When the message is due, or at once when what it says has changed.
   template <class Message, class Make>
   void by_time_or(bool changed, Make&& message) {
-    if (changed) std::get<Sent<Message>>(sent_).once = false;
+    if (changed) std::get<Sent<Message>>(sent_).restart();
     by_time<Message>(message);
   }
 

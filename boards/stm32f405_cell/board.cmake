@@ -1,5 +1,4 @@
 # STM32F405RG, Cortex-M4F, on a board for one cell that it measures itself. No emulator has its CAN controller; tests/firmware runs the image on models of it and of its converter.
-set(BMS_CPU_FLAGS -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16)
 set(BMS_SCALAR_DEFINITION "")
 set(BMS_DEFAULT_CELL table9)
 set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/../stm32f405_forklift/memory.ld)  # the same chip, used alike
@@ -18,7 +17,3 @@ set(BMS_BUDGET_STACK 4096)
 # ./bms flash: OpenOCD's interface/ and target/
 set(BMS_PROBE stlink)
 set(BMS_PROBE_TARGET stm32f4x)
-set(BMS_CORE armv7m)
-set(BMS_REPLACED_IN_EMULATION clock_tree)
-set(BMS_STREAM_BLOCK 512)
-set(BMS_FLASH stm32f4)

@@ -143,6 +143,14 @@ void run_until_it_listens(UnicornBoard& board) {
   board.run_for_ms(5);
 }
 
+ImageSize within_the_budgets(const std::filesystem::path& of) {
+  const ImageSize size = size_of(of);
+  EXPECT_LE(size.text + size.data, 64U * 1024);
+  EXPECT_LE(size.data + size.bss, 16U * 1024);
+  EXPECT_THAT(forbidden_in(symbols_of(of)), IsEmpty());
+  return size;
+}
+
 class BxcanBoard : public ::testing::Test {
  protected:
   void SetUp() override { board.flash.bytes = started_once(); }
@@ -716,9 +724,7 @@ TEST_F(BxcanBoard, ASampleIsInTheQueueWithinTheTimeThatTheAnalysisTakesForGrante
 /// The image with BMS_VEHICLE_PROFILE=j1939.
 TEST_F(BxcanBoard, WithTheJ1939ProfileFramesOf29BitsGoOutBehindTheOwnOnesAndTheBudgetsHold) {
   const auto with_profile = firmware_image("stm32f405_forklift", table9(), Image::remote, "j1939");
-  const ImageSize size = size_of(with_profile);
-  EXPECT_LE(size.text + size.data, 64U * 1024);
-  EXPECT_LE(size.data + size.bss, 16U * 1024);
+  const ImageSize size = within_the_budgets(with_profile);
   UnicornBoard other{with_profile};
   other.flash.bytes = started_once();
   ASSERT_TRUE(other.run_until([&] { return other.can.on_the_bus(); }, 100));
@@ -751,16 +757,13 @@ TEST_F(BxcanBoard, WithTheJ1939ProfileFramesOf29BitsGoOutBehindTheOwnOnesAndTheB
   }
   EXPECT_EQ(other.can_health().dropped, 0U);
   EXPECT_THAT(other.can.violations, IsEmpty());
-  EXPECT_THAT(forbidden_in(symbols_of(with_profile)), IsEmpty());
   fmt::print("with the J1939 profile: flash {} bytes, RAM {} bytes\n", size.text + size.data, size.data + size.bss);
 }
 
 /// The image with BMS_VEHICLE_PROFILE=cia418.
 TEST_F(BxcanBoard, WithTheCia418ProfileAChargerHearsItsPdosAndIsAnsweredAndTheBudgetsHold) {
   const auto with_profile = firmware_image("stm32f405_forklift", table9(), Image::remote, "cia418");
-  const ImageSize size = size_of(with_profile);
-  EXPECT_LE(size.text + size.data, 64U * 1024);
-  EXPECT_LE(size.data + size.bss, 16U * 1024);
+  const ImageSize size = within_the_budgets(with_profile);
   UnicornBoard other{with_profile};
   other.flash.bytes = started_once();
   ASSERT_TRUE(other.run_until([&] { return other.can.on_the_bus(); }, 100));
@@ -778,22 +781,18 @@ TEST_F(BxcanBoard, WithTheCia418ProfileAChargerHearsItsPdosAndIsAnsweredAndTheBu
   ASSERT_TRUE(told.contains(0x581)) << "the filters let the request in";
   EXPECT_EQ(told[0x581].data[4], 0xA2);
   EXPECT_THAT(other.can.violations, IsEmpty());
-  EXPECT_THAT(forbidden_in(symbols_of(with_profile)), IsEmpty());
   fmt::print("with the CiA 418 profile: flash {} bytes, RAM {} bytes\n", size.text + size.data, size.data + size.bss);
 }
 
 TEST_F(BxcanBoard, FitsIntoItsBudgetsOfFlashRamAndStack) {
-  const ImageSize size = size_of(image());
+  const ImageSize size = within_the_budgets(image());
   ASSERT_TRUE(board.run_until([&] { return board.can.on_the_bus(); }, 100));
   const double on_the_bus_ms = board.now_ms();
-  EXPECT_LE(size.text + size.data, 64U * 1024);
-  EXPECT_LE(size.data + size.bss, 16U * 1024);
   queue(part_of_the_shift(20));
   board.run_for_ms(2'100);
   EXPECT_EQ(board.estimates, 20U);
   EXPECT_LE(board.stack_used(), 4U * 1024);
   EXPECT_GT(board.stack_used(), 500U);
-  EXPECT_THAT(forbidden_in(symbols_of(image())), IsEmpty());
   fmt::print("flash {} bytes, RAM {} bytes, stack {} bytes, on the bus {:.1f} ms after the reset\n", size.text + size.data, size.data + size.bss, board.stack_used(), on_the_bus_ms);
 }
 

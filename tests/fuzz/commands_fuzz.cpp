@@ -1,17 +1,9 @@
 // Any frames to the command handler, 12 bytes each: id, length, how its check is made, data. Nothing crashes; only a whole command of which the counter is
 // new is answered; what is set is one of the values there are; what is refused changes nothing.
 #include <cstdint>
-#include <cstdlib>
 
 #include "firmware/commands.hpp"
-
-namespace {
-
-void require(bool true_of_any_input) {
-  if (!true_of_any_input) std::abort();
-}
-
-}  // namespace
+#include "tests/fuzz/require.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bms;

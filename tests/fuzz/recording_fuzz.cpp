@@ -1,20 +1,12 @@
 // Any text as a recording: refused in a line, or read; then its columns are as long as its times, these go forward, and samples can be made of it.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 
 #include "host_sim/bad_input.hpp"
 #include "host_sim/cell_file.hpp"
 #include "host_sim/recording.hpp"
-
-namespace {
-
-void require(bool true_of_any_input) {
-  if (!true_of_any_input) std::abort();
-}
-
-}  // namespace
+#include "tests/fuzz/require.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bms;

@@ -1,0 +1,6 @@
+# nRF51822, Cortex-M0; its flash has no driver here. What every board with this chip has (cmake/firmware.cmake).
+set(BMS_CPU_FLAGS -mcpu=cortex-m0 -mthumb)
+set(BMS_CORE armv6m)
+set(BMS_REPLACED_IN_EMULATION "")
+set(BMS_STREAM_BLOCK 64)
+set(BMS_FLASH absent)
