@@ -9,6 +9,7 @@ for modules in /usr/lib/uml/modules/$release /lib/modules/$release; do [ -d "$mo
 for module in net/can/can net/can/can-raw net/can/can-gw drivers/net/can/dev/can-dev drivers/net/can/vcan drivers/net/can/slcan/slcan; do
   [ ! -f "$modules/kernel/$module.ko" ] || $b insmod "$modules/kernel/$module.ko"
 done
+: >"$job/up"
 PATH=/usr/sbin:/usr/bin:/sbin:/bin
 ip link set lo up
 ip link add dev vcan0 type vcan && ip link set vcan0 mtu 72 && ip link set vcan0 up

@@ -53,7 +53,7 @@ on_the_bus() {
   soon test -e "$folder/record.log"  # made when the monitor listens
   cangen vcan0 -g 0 -i -I 5A5 -L 8 -D r >/dev/null 2>&1 & pids+=($!)
   cangen vcan0 -g 1 -i -m -I 6A6 >/dev/null 2>&1 & pids+=($!)
-  "$feeder" slcan0 "$recording" "$soc" "$sigma"
+  "$feeder" slcan0 "$recording" "$soc" "$sigma" || { ip -s link; cat /proc/net/softnet_stat; exit 1; } >&2
   kill "${pids[@]: -2}"
   settled "$folder/candump.log"  # on a busy machine it writes long after the bus has become silent
   kill -INT $monitor $dump
