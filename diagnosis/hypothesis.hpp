@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -22,6 +23,8 @@
 #include "model/extended.hpp"
 
 namespace bms::diagnosis {
+
+constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 
 using model::MechanismSetting;
 

@@ -17,7 +17,6 @@ namespace {
 
 using model::catalogue;
 
-constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 constexpr std::size_t most_rivals = 5;
 constexpr double rows_at_most = 1'500;  ///< a coarse course is enough to choose by
 constexpr double lowest_soc = 0.02, highest_soc = 0.99;

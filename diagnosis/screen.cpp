@@ -21,7 +21,6 @@ namespace {
 using model::catalogue;
 using model::Role;
 
-constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 
 /// Shapes at which signatures are taken: every combination is one probe.
 std::vector<double> shape_grid(std::string_view id, double capacity_ah) {

@@ -14,7 +14,6 @@
 
 namespace bms::diagnosis {
 
-constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 
 /// How far the cell was from the temperature that its file is for.
 double away_k(const Evidence& evidence);

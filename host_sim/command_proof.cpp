@@ -14,7 +14,7 @@ namespace bms {
 
 namespace {
 
-std::string progress_line(double done, double left_s, const std::string& what) {
+std::string proof_progress(double done, double left_s, const std::string& what) {
   const std::string left = done > 0.02 ? fmt::format("about {:.0f} s left", left_s) : "";
   return fmt::format("{:3.0f} %, {:20} {:80.80}", 100 * done, left, what);
 }
@@ -46,7 +46,7 @@ int run(const ProofOptions& options) {
     const std::filesystem::path path = (std::filesystem::path(options.data) / folder).lexically_normal();
     if (!std::filesystem::is_directory(path, error)) throw BadInput(path.string(), 1, "no folder, expected one with the recordings a123_26650 and a123_esctoolbox (host_sim/README.md names their source)");
   }
-  const ProofResult result = prove(options.data, options.only, progress_on_terminal(0.2, progress_line));
+  const ProofResult result = prove(options.data, options.only, progress_on_terminal(0.2, proof_progress));
   if (!options.output.json.empty()) put(options.output.json, json_of(result));
   if (!options.output.report.empty()) put(options.output.report, proof_report(result));
   tell(options.output, summary(result));

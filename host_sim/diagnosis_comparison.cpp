@@ -18,16 +18,16 @@ using diagnosis::Finding;
 using model::catalogue;
 
 /// Digits that say something; a value that rounding would carry over its bound stays.
-double rounded(double value, int digits) { return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.{}g}", value, digits)); }
+double to_digits(double value, int digits) { return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.{}g}", value, digits)); }
 
 model::CellParameters<> with_short_numbers(model::CellParameters<> p) {
   for (auto* column : {&p.ocv.b0_v, &p.ocv.b1_v, &p.ocv.half_gap_v, &p.ocv.soc}) {
-    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = rounded((*column)[k], 8);
+    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = to_digits((*column)[k], 8);
   }
   for (auto* column : {&p.rc.r0_ohm, &p.rc.r1_ohm, &p.rc.c1_f}) {
-    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = rounded((*column)[k], 6);
+    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = to_digits((*column)[k], 6);
   }
-  p.capacity_ah = rounded(p.capacity_ah, 7);
+  p.capacity_ah = to_digits(p.capacity_ah, 7);
   return p;
 }
 
@@ -118,9 +118,9 @@ CellFile extended_cell(const DiagnoseResult& r) {
     }
     if (!f.equivalent_to.empty()) source += "; these recordings cannot tell it from " + ids_of(f.equivalent_to);
     for (std::size_t k = 0; k < info.parameters; ++k) {
-      const double short_value = rounded(setting.value[k], 6);
+      const double short_value = to_digits(setting.value[k], 6);
       if (short_value >= info.parameter[k].lower(capacity_ah) && short_value <= info.parameter[k].upper(capacity_ah)) setting.value[k] = short_value;
-      setting.deviation[k] = std::isfinite(setting.deviation[k]) ? rounded(setting.deviation[k], 3) : 0;
+      setting.deviation[k] = std::isfinite(setting.deviation[k]) ? to_digits(setting.deviation[k], 3) : 0;
     }
     put_mechanism(cell, setting);
     cell.sources[table_of(info)] = source;
@@ -129,7 +129,7 @@ CellFile extended_cell(const DiagnoseResult& r) {
   for (const Compared& c : r.recordings) records.push_back(c.record);
   if (const double factor = diagnosis::widening(cell.parameters, cell.mechanisms, std::move(records)); factor > 1) {
     cell.parameters.tolerance = diagnosis::widened(cell.parameters.tolerance, factor);
-    for (double* v : {&cell.parameters.tolerance.ocv_v, &cell.parameters.tolerance.drift_v}) *v = rounded(*v, 4);
+    for (double* v : {&cell.parameters.tolerance.ocv_v, &cell.parameters.tolerance.drift_v}) *v = to_digits(*v, 4);
     cell.sources["tolerance"] += fmt::format("; of the OCV and the drift widened {:g} times, to what {} left over", factor, files);
   }
   return cell;

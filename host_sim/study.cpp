@@ -56,8 +56,8 @@ constexpr double table9[10][3] = {{0.0140197, 0.027101, 420.558}, {0.013602, 0.0
                                   {0.0135692, 0.00822862, 1445.43}, {0.0153566, 0.0072376, 1927.32}};
 
 PageCell label(std::string text) { return {std::move(text), std::nullopt, std::nullopt}; }
-PageCell percent(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.2f} %", value), value, paper}; }
-PageCell number(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.5g}", value), value, paper}; }
+PageCell percent_cell(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.2f} %", value), value, paper}; }
+PageCell number_cell(double value, std::optional<double> paper = std::nullopt) { return {fmt::format("{:.5g}", value), value, paper}; }
 PageCell failed(const std::string& why, std::optional<double> paper = std::nullopt) { return {why, std::nullopt, paper}; }
 
 /// What one model and one optimiser came to.
@@ -145,7 +145,7 @@ void compare_models(Study& study, const Part& estimation, const Part& validation
       Outcome out = k < 3 ? study.linear(linear_kinds[k], estimation, methods[m], validation) : study.grey_box(estimation, methods[m], &validation);
       const auto paper = beside_paper ? std::optional(table4[m][k]) : std::nullopt;
       if (out.usable) {
-        row.push_back(percent(out.estimation.fit_percent, paper));
+        row.push_back(percent_cell(out.estimation.fit_percent, paper));
         if (!out.optimum.converged) row.back().text += " (not converged)";
       } else {
         row.push_back(failed("no result", paper));
@@ -169,8 +169,8 @@ void compare_models(Study& study, const Part& estimation, const Part& validation
       continue;
     }
     const id::ResidualAnalysis& r = o.validation.residuals;
-    both.rows.push_back({label(model_names[k]), percent(o.estimation.fit_percent, paper(table5[k][0])), percent(o.validation.fit_percent, paper(table5[k][1])),
-                         number(1e3 * o.estimation.rmse_v), number(1e3 * o.validation.rmse_v), percent(o.validation.one_step_fit_percent),
+    both.rows.push_back({label(model_names[k]), percent_cell(o.estimation.fit_percent, paper(table5[k][0])), percent_cell(o.validation.fit_percent, paper(table5[k][1])),
+                         number_cell(1e3 * o.estimation.rmse_v), number_cell(1e3 * o.validation.rmse_v), percent_cell(o.validation.one_step_fit_percent),
                          label(fmt::format("{:.2f} mV, band {:.2f} mV", 1e3 * r.mean_v, 1e3 * r.mean_band_v))});
     both.rows.back()[3].text += " mV";
     both.rows.back()[4].text += " mV";
@@ -178,7 +178,7 @@ void compare_models(Study& study, const Part& estimation, const Part& validation
     int column = 0;
     for (const char* name : {"r0_ohm", "r1_ohm", "c1_f"}) {
       const auto p = std::find_if(o.parameters.begin(), o.parameters.end(), [&](const id::Parameter& q) { return q.name == name; });
-      row.push_back(number(p->value, paper(table6[k][column++])));
+      row.push_back(number_cell(p->value, paper(table6[k][column++])));
       row.back().text += fmt::format(" +- {:.2g}", p->std);
     }
     std::string remarks;
@@ -235,7 +235,7 @@ void cross(Study& study, const std::vector<Part>& parts, bool beside_paper, Stud
     double sum_v = 0;
     for (std::size_t j = 0; j < parts.size(); ++j) {
       const id::Fit fit = i == j ? found.estimation : study.validated(found.cell, parts[j], found.fading);
-      row.push_back(percent(fit.fit_percent, beside_paper ? std::optional(table7[i][j]) : std::nullopt));
+      row.push_back(percent_cell(fit.fit_percent, beside_paper ? std::optional(table7[i][j]) : std::nullopt));
       if (i != j) sum_v += fit.rmse_v / static_cast<double>(parts.size() - 1);
     }
     others_v.push_back(sum_v);
@@ -245,12 +245,12 @@ void cross(Study& study, const std::vector<Part>& parts, bool beside_paper, Stud
     double relative[3] = {};
     for (std::size_t k = 0; k < 3; ++k) {
       const id::Parameter& p = found.parameters[k];
-      deviations.push_back(number(p.std, beside_paper ? std::optional(table8[i][k]) : std::nullopt));
+      deviations.push_back(number_cell(p.std, beside_paper ? std::optional(table8[i][k]) : std::nullopt));
       if (p.at_bound) deviations.back() = failed("at its bound", deviations.back().paper);
       relative[k] = p.std / std::abs(p.value);
     }
-    deviations.push_back(number(std::sqrt(found.estimation.output_variance_v2), beside_paper ? std::optional(table8[i][3]) : std::nullopt));
-    deviations.push_back(number(found.parameters[2].std_white));
+    deviations.push_back(number_cell(std::sqrt(found.estimation.output_variance_v2), beside_paper ? std::optional(table8[i][3]) : std::nullopt));
+    deviations.push_back(number_cell(found.parameters[2].std_white));
     c1_largest += relative[2] >= relative[0] && relative[2] >= relative[1] ? 1 : 0;
     spread.rows.push_back(std::move(deviations));
   }
@@ -275,7 +275,7 @@ PageTable filters(Study& study, const Part& part) {
     const id::Identification found = study.identified(filtered, id::Method::trust_region_reflective);
     std::vector<PageCell> row = {label(name)};
     for (std::size_t k = 0; k < 3; ++k) {
-      row.push_back(number(found.parameters[k].value));
+      row.push_back(number_cell(found.parameters[k].value));
       row.back().text += fmt::format(" +- {:.2g}", found.parameters[k].std);
     }
     row.push_back({fmt::format("{:.2f} mV", 1e3 * found.estimation.rmse_v), found.estimation.rmse_v, std::nullopt});
@@ -380,7 +380,7 @@ StudyResult study_plant(const model::CellParameters<>& cell, std::uint64_t seed,
     for (std::size_t k = 0; k < 3; ++k) {
       const id::Parameter& p = found.parameters[k];
       const double paper = table9[tenth - 1][k];
-      row.push_back(number(p.value, paper));
+      row.push_back(number_cell(p.value, paper));
       row.back().text += fmt::format(" +- {:.2g}", p.std);
       if (tenth >= 3 && tenth <= 8) (k == 0 ? worst_r0 : worst_rc) = std::max(k == 0 ? worst_r0 : worst_rc, std::abs(p.value / paper - 1));
     }

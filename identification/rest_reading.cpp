@@ -63,10 +63,10 @@ Decay decay_of(const Trace& trace, double tau_s) {
 /// Best tau: a grid, because a long flat tail makes second minima, then golden section between its neighbours.
 Decay best_decay(const Trace& trace) {
   const double least = std::max(trace.t_s.back() / static_cast<double>(trace.t_s.size()) / 3, 1e-3), most = 10 * trace.t_s.back();
-  constexpr int grid = 40;
-  const double ratio = std::pow(most / least, 1.0 / grid);
+  constexpr int taus = 40;
+  const double ratio = std::pow(most / least, 1.0 / taus);
   Decay best;
-  for (int k = 0; k <= grid; ++k) {
+  for (int k = 0; k <= taus; ++k) {
     const Decay d = decay_of(trace, least * std::pow(ratio, k));
     if (d.squares < best.squares) best = d;
   }

@@ -20,6 +20,7 @@ const PackSample<pack_cells>* next_sample() {
   while (true) {
     CanFrame frame;
     while (can_receive(frame)) {
+      was_listening = true;  // who closes the channel right after a sample, while it is being worked on, ends them, too
       if (hear(frame) && frames.take(frame)) return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
     }
     if (was_listening && !can_listening()) return nullptr;

@@ -16,7 +16,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int most_bisections = 10;  // a step still too long then says that J has lost rank
-constexpr double sufficient = 1e-4;  // part of the linear decrease that must be reached (Armijo)
 
 VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
   const Eigen::BDCSVD<MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
@@ -37,7 +36,7 @@ int move_along(Search& search, const VectorXd& step) {
   double length = 1;
   for (int bisections = 0; bisections <= most_bisections; ++bisections, length /= 2) {
     const VectorXd x = search.after(length * step);
-    if (search.cost_at(x) < search.cost() + sufficient * length * slope && search.move_to(x)) return bisections;
+    if (search.cost_at(x) < search.cost() + sufficient_decrease * length * slope && search.move_to(x)) return bisections;
   }
   return most_bisections + 1;
 }

@@ -14,6 +14,9 @@
 
 namespace bms::identification {
 
+/// Part of the linear decrease that a step must reach (Armijo).
+inline constexpr double sufficient_decrease = 1e-4;
+
 using Indices = std::vector<Eigen::Index>;
 
 class Search {

@@ -9,8 +9,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double sufficient = 1e-4;  // part of the linear decrease that must be reached (Armijo)
-
 struct Trial {
   VectorXd x;
   double cost = 0;
@@ -21,7 +19,7 @@ Trial try_length(Search& search, const VectorXd& direction, double length) {
   const VectorXd step = (length * direction).cwiseMax(search.below()).cwiseMin(search.above());
   Trial trial{search.after(step), 0, false};
   trial.cost = search.cost_at(trial.x);
-  trial.sufficient = trial.cost < search.cost() + sufficient * search.gradient().dot(step);
+  trial.sufficient = trial.cost < search.cost() + sufficient_decrease * search.gradient().dot(step);
   return trial;
 }
 

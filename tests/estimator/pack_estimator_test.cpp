@@ -9,7 +9,7 @@
 namespace bms {
 namespace {
 
-const auto table9 = model::prepare<float, model::max_intervals>(read_cell("table9").parameters);
+const auto nominal = model::prepare<float, model::max_intervals>(read_cell("table9").parameters);
 
 TEST(MeanCell, IsThatOfTheReadingsThatCanBeOnes) {
   PackSample<4> p;
@@ -18,7 +18,7 @@ TEST(MeanCell, IsThatOfTheReadingsThatCanBeOnes) {
   p.cell_uv = {3'300'000, 3'310'000, 0, no_reading};
   p.temperature_cdegc = {2'000, no_temperature, 3'000, -9'999};
   p.pack_uv = 13'000'000;
-  const Sample mean = mean_cell(p, table9.plausible);
+  const Sample mean = mean_cell(p, nominal.plausible);
   EXPECT_EQ(mean.time_us, 7U);
   EXPECT_EQ(mean.current_ua, -3);
   EXPECT_EQ(mean.voltage_uv, 3'305'000);
@@ -28,30 +28,30 @@ TEST(MeanCell, IsThatOfTheReadingsThatCanBeOnes) {
 TEST(MeanCell, NoCellAloneMovesItByMuch) {
   PackSample<16> p;
   for (std::size_t k = 0; k < 16; ++k) p.cell_uv[k] = 3'280'000 + static_cast<std::int32_t>(k) * 1'000;
-  const std::int32_t whole_uv = mean_cell(p, table9.plausible).voltage_uv;
+  const std::int32_t whole_uv = mean_cell(p, nominal.plausible).voltage_uv;
   EXPECT_EQ(whole_uv, 3'287'500);
   for (std::int32_t uv = 1'000'000; uv < 4'500'000; uv += 10'000) {
     p.cell_uv[3] = uv;
-    EXPECT_NEAR(mean_cell(p, table9.plausible).voltage_uv, whole_uv, 7'000) << uv;
+    EXPECT_NEAR(mean_cell(p, nominal.plausible).voltage_uv, whole_uv, 7'000) << uv;
   }
   // a broken wire between two
   p.cell_uv[3] = 2'600'000;
   p.cell_uv[4] = 3'960'000;
-  EXPECT_NEAR(mean_cell(p, table9.plausible).voltage_uv, whole_uv, 1'500);
+  EXPECT_NEAR(mean_cell(p, nominal.plausible).voltage_uv, whole_uv, 1'500);
 }
 
 TEST(MeanCell, WithoutAnyTheTotalStandsInAndWithoutThatNothing) {
   PackSample<4> p;
   p.pack_uv = 13'200'000;
-  EXPECT_EQ(mean_cell(p, table9.plausible).voltage_uv, 3'300'000);
-  EXPECT_EQ(mean_cell(p, table9.plausible).temperature_cdegc, no_temperature);
+  EXPECT_EQ(mean_cell(p, nominal.plausible).voltage_uv, 3'300'000);
+  EXPECT_EQ(mean_cell(p, nominal.plausible).temperature_cdegc, no_temperature);
   p.pack_uv = no_reading;
-  EXPECT_EQ(mean_cell(p, table9.plausible).voltage_uv, no_reading);
+  EXPECT_EQ(mean_cell(p, nominal.plausible).voltage_uv, no_reading);
 }
 
 TEST(MeanCell, OfAPackOfOneIsTheSampleItself) {
   for (const Sample& s : {Sample{1, 2, 3'300'000, 4}, Sample{1, no_reading, no_reading, no_temperature}, Sample{9, -5, 17, 15'001}, Sample{9, -5, 2'147'483'647, -6'000}}) {
-    const Sample mean = mean_cell(pack_of(s), table9.plausible);
+    const Sample mean = mean_cell(pack_of(s), nominal.plausible);
     EXPECT_EQ(mean.time_us, s.time_us);
     EXPECT_EQ(mean.current_ua, s.current_ua);
     EXPECT_EQ(mean.voltage_uv, s.voltage_uv);
@@ -76,8 +76,8 @@ TEST(PackCells, FindsTheCellThatIsEmptierThanTheOthers) {
       p.cell_uv[c] = static_cast<std::int32_t>(cells[c].voltage_v() * 1e6);
     }
     p.temperature_cdegc[0] = 2'000;
-    const auto mean = estimator.step(table9, mean_cell(p, table9.plausible));
-    pack.update(table9, p, mean);
+    const auto mean = estimator.step(nominal, mean_cell(p, nominal.plausible));
+    pack.update(nominal, p, mean);
   }
   for (std::size_t c = 0; c < 4; ++c) {
     EXPECT_NEAR(pack[c].soc(), soc[c] - 0.285, 0.005) << c;
@@ -95,7 +95,7 @@ TEST(PackCells, SurvivesGapsTimesThatGoBackAndCellsThatAreGone) {
     p.time_us = time_us;
     p.current_ua = -1'000'000;
     p.cell_uv = {3'280'000, no_reading, 9'000'000, 3'281'000};
-    pack.update(table9, p, estimator.step(table9, mean_cell(p, table9.plausible)));
+    pack.update(nominal, p, estimator.step(nominal, mean_cell(p, nominal.plausible)));
     for (std::size_t c = 0; c < 4; ++c) {
       EXPECT_TRUE(std::isfinite(pack[c].soc()) && std::isfinite(pack[c].soc_sigma())) << time_us;
     }

@@ -4,12 +4,14 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "hal/sample_frames.hpp"
 #include "host_sim/cell_file.hpp"
 #include "host_sim/child_process.hpp"
@@ -33,7 +35,7 @@ std::vector<Sample> two_minutes() {
   return {all.begin() + 3000, all.begin() + 3125};
 }
 
-std::uint32_t deepest_in_unicorn(const std::string& board_name) {
+BudgetRun run_in_unicorn(const std::string& board_name) {
   UnicornBoard board(firmware_image(board_name, read_cell("table9"), Image::remote));
   if (!board.run_until([&] { return board.can.on_the_bus(); }, 3'000)) throw std::runtime_error(board_name + " does not come up");
   std::uint16_t counter = 0;
@@ -52,7 +54,10 @@ std::uint32_t deepest_in_unicorn(const std::string& board_name) {
     if (!board.run_until([&] { return board.watchdog_feeds > fed; }, 100)) throw std::runtime_error(board_name + " does not end a sample");
     board.run_for_ms(15);
   }
-  return board.stack_used();
+  const auto& seen = board.can.seen;
+  const auto told = std::find_if(seen.rbegin(), seen.rend(), [](const SeenFrame& f) { return f.from_board && f.frame.id == can::Board::id; });
+  if (told == seen.rend()) throw std::runtime_error(board_name + " does not tell how long a sample takes");
+  return {board.stack_used(), can::Board::of(told->frame).longest_sample};
 }
 
 /// The emulator's memory from `begin` on, by its monitor at the socket.
@@ -71,11 +76,11 @@ std::string memory_of(const std::filesystem::path& monitor, std::uint32_t begin,
 }
 
 /// The emulator's RAM is all zero when it starts: from the end of the static part up the first word that is not.
-std::uint32_t deepest_in_qemu(const std::string& board_name) {
+BudgetRun run_in_qemu(const std::string& board_name) {
   const auto image = firmware_image(board_name, read_cell("table9"), Image::application);
   const TemporaryFolder folder;
   const auto monitor = folder.path() / "monitor";
-  SlcanBoard board(image, {}, {"-chardev", "socket,id=monitor,server=on,wait=off,path=" + monitor.string(), "-mon", "monitor"});
+  SlcanBoard board(image, {}, {"-chardev", "socket,id=monitor,server=on,wait=off,path=" + monitor.string(), "-mon", "monitor", "-icount", "shift=3"});
   board.read();
   board.write("S6\rO\r");
   for (const Sample& s : two_minutes()) {
@@ -83,41 +88,43 @@ std::uint32_t deepest_in_qemu(const std::string& board_name) {
     board.telemetry();
   }
   board.send_sample(two_minutes().back().time_us + 1'000'000, 0, 3'300'000, 2500);  // it has written the record when it answers
+  const std::string told = board.read_until("t1B98");  // Board: bytes 6 and 7, in 10 us
   board.telemetry();
   const ImageFile file(image);
   const std::uint32_t top = file.symbol("image_stack_top"), bottom = file.symbol("image_stack_limit") + 1'024;  // above the guard
   const std::string memory = memory_of(monitor, bottom, top - bottom, folder.path() / "ram");
   std::size_t free = 0;
   while (free + 4 <= memory.size() && memory.compare(free, 4, "\xA5\xA5\xA5\xA5") == 0) free += 4;  // the firmware's own paint
-  return static_cast<std::uint32_t>(memory.size() - free);
+  return {memory.size() - free, 0.01 * (std::stoi(told.substr(17, 2), nullptr, 16) + 256 * std::stoi(told.substr(19, 2), nullptr, 16))};
 }
 
 }  // namespace
 
 BoardBudget budget_of(const std::string& board) {
   const auto bytes = [&](const char* name) { return std::stoull(board_setting(board, name)); };
-  return {bytes("BMS_BUDGET_FLASH"), bytes("BMS_BUDGET_RAM"), bytes("BMS_BUDGET_STACK")};
+  return {bytes("BMS_BUDGET_FLASH"), bytes("BMS_BUDGET_RAM"), bytes("BMS_BUDGET_STACK"), std::stod(board_setting(board, "BMS_BUDGET_SAMPLE_MS"))};
 }
 
 BoardFigures figures_of(const std::string& board) {
   const auto image = firmware_image(board, read_cell("table9"), chip_image(board));
   const ImageSize size = size_of(image);
-  return {size.text + size.data, size.data + size.bss, stack_depth(image).worst(), 0};
+  return {size.text + size.data, size.data + size.bss, stack_depth(image).worst()};
 }
 
-std::uint64_t measured_stack(const std::string& board) {
-  const auto& emulated = emulated_boards();
-  if (board_setting(board, "BMS_EMULATED") == "OFF") return board_setting(board, "BMS_CAN") == "bxcan" ? deepest_in_unicorn(board) : 0;
-  return emulated.front().name == board ? deepest_in_qemu(board) : 0;
+std::optional<BudgetRun> run_of(const std::string& board) {
+  if (board_setting(board, "BMS_EMULATED") == "OFF") return board_setting(board, "BMS_CAN") == "bxcan" ? std::optional(run_in_unicorn(board)) : std::nullopt;
+  return emulated_boards().front().name == board ? std::optional(run_in_qemu(board)) : std::nullopt;
 }
 
 std::string board_table() {
-  std::string table = "| board | flash [bytes] | of | static RAM [bytes] | of | stack, worst [bytes] | of | stack, measured [bytes] |\n|---|---|---|---|---|---|---|---|\n";
+  std::string table =
+      "| board | flash [bytes] | of | static RAM [bytes] | of | stack, worst [bytes] | of | stack, measured [bytes] | a sample, longest [ms] | of |\n|---|---|---|---|---|---|---|---|---|---|\n";
   for (const std::string& board : board_names()) {
     const BoardFigures f = figures_of(board);
     const BoardBudget b = budget_of(board);
-    const std::uint64_t measured = measured_stack(board);
-    table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", board, f.flash, b.flash, f.ram, b.ram, f.stack_worst, b.stack, measured > 0 ? std::to_string(measured) : "-");
+    const auto run = run_of(board);
+    table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", board, f.flash, b.flash, f.ram, b.ram, f.stack_worst, b.stack, run ? std::to_string(run->stack) : "-",
+                         run ? fmt::format("{:.2f}", run->sample_ms) : "-", b.sample_ms);
   }
   return table;
 }

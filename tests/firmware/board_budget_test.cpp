@@ -27,12 +27,14 @@ TEST_P(Budgets, HoldTheImageOfTheChip) {
   EXPECT_LE(static_cast<double>(f.flash), 1.05 * flash.at(GetParam())) << "./bms figures if it is worth it";
 }
 
-TEST_P(Budgets, MeasuredStackIsNoDeeperThanTheWorstAndNotFarFromIt) {
-  const std::uint64_t measured = measured_stack(GetParam());
-  if (measured == 0) GTEST_SKIP() << "no emulator runs the image of " << GetParam() << " without a program beside it";
+TEST_P(Budgets, HoldTwoMinutesOfItsRun) {
+  const auto run = run_of(GetParam());
+  if (!run) GTEST_SKIP() << "no emulator runs the image of " << GetParam() << " without a program beside it";
   const std::uint64_t worst = figures_of(GetParam()).stack_worst;
-  EXPECT_LE(measured, worst);
-  EXPECT_GT(3 * measured, worst) << "what was measured did not go where it is deep";
+  EXPECT_LE(run->stack, worst);
+  EXPECT_GT(3 * run->stack, worst) << "what was measured did not go where it is deep";
+  EXPECT_GT(run->sample_ms, 0);
+  EXPECT_LE(run->sample_ms, budget_of(GetParam()).sample_ms);
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, Budgets, ::testing::ValuesIn(board_names()), [](const auto& board) { return board.param; });

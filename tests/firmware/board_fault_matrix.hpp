@@ -2,7 +2,7 @@
 // CAN judged by the oracle of tests/protection (oracle.hpp), which shares no code with the firmware.
 //
 //   cases      of each protection: just below its threshold, just above, three sigma of noise below, around and above it, and during each other fault;
-//              each begins with a new board that is driven off
+//              each begins with a new board that is driven off. And the eight-hour shift with three sigma of noise, in which nothing is to be told
 //   time       from the sample with which the condition holds to the frame Faults (0x196) that says so, and to the frame ContactorState (0x197) with both
 //              main contactors open. Frames come with the sample that caused them (lock step): the bus's own latency is can/README.md's
 //   missed     the oracle's fault is there and is not told, false: the other way; of every row that samples tell, with every sample of every case
@@ -36,6 +36,7 @@ struct MatrixRow {
 struct MatrixResult {
   std::vector<MatrixRow> rows;      ///< by fault
   std::uint64_t cases = 0, samples = 0, missed = 0, falsely = 0;
+  std::uint64_t shift_samples = 0;  ///< of the eight-hour shift, driven to its end without a fault
   std::vector<std::string> wrong;   ///< a line each
 };
 

@@ -393,6 +393,7 @@ TEST(NoFlash, KeepsNothingAndSaysSo) {
   EXPECT_EQ(log.sectors(), 0U);
   EXPECT_FALSE(log.works());
   EXPECT_FALSE(log.wants_erase());
+  EXPECT_TRUE(log.erase_one()) << "nothing is broken";
   EXPECT_EQ(log.store({1, 1}, {}), Stored::refused);
   EXPECT_FALSE(content(log, 1, 1));
 }

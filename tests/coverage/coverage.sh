@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Lines that the tests of firmware, estimator, protection, storage and the portable half of hal run: built with --coverage (preset host-coverage), run, counted.
+# Of templates only what is instantiated is code that can be counted; headers of those folders that no test includes are named.
+#
+#   coverage.sh BUILD_FOLDER      exit 1: below 95 % of the lines of firmware/ or estimator/
+set -euo pipefail
+folder=$1
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+tests="telemetry_test estimator_test protection_test storage_test hal_test bq76952_test"
+log=$folder.log
+mkdir -p "$folder"
+{ [ -f "$folder/build.ninja" ] || (cd "$root" && cmake --preset host-coverage -B "$folder"); } >"$log" 2>&1
+cmake --build "$folder" --target $tests >>"$log" 2>&1 || { tail -20 "$log" >&2; echo "coverage: the build failed, its log is $log" >&2; exit 3; }
+find "$folder" -name '*.gcda' -delete
+for test in $tests; do
+  "$folder/tests/$test" --gtest_brief=1 >>"$log" 2>&1 || { echo "coverage: $test fails: $log" >&2; exit 3; }
+done
+gcovr --root "$root" --object-directory "$folder" --exclude-throw-branches --merge-mode-functions=separate --json-summary "$folder/coverage.json" --txt "$folder/coverage.txt" \
+  --filter "$root/(firmware|estimator|protection|storage|hal)/" "$folder" >>"$log" 2>&1
+python3 - "$root" "$folder/coverage.json" <<'PYTHON'
+import json, pathlib, sys
+root, counted = pathlib.Path(sys.argv[1]), json.load(open(sys.argv[2]))["files"]
+seen = {f["filename"] for f in counted}
+bad = False
+print("| folder | lines | run | part |\n|---|---|---|---|")
+for folder in ("firmware", "estimator", "protection", "storage", "hal"):
+    of = [f for f in counted if f["filename"].startswith(folder + "/")]
+    lines, run = sum(f["line_total"] for f in of), sum(f["line_covered"] for f in of)
+    part = run / max(lines, 1)
+    bad = bad or (folder in ("firmware", "estimator") and part < 0.95)
+    print(f"| {folder} | {lines} | {run} | {100 * part:.1f} % |")
+for f in sorted(counted, key=lambda f: f["line_covered"] - f["line_total"])[:12]:
+    if f["line_covered"] < f["line_total"]:
+        print(f"{f['filename']}: {f['line_total'] - f['line_covered']} of {f['line_total']} lines are not run")
+for folder in ("firmware", "estimator", "protection", "storage"):
+    for path in sorted((root / folder).glob("*.?pp")):
+        if f"{folder}/{path.name}" not in seen:
+            print(f"{folder}/{path.name}: no line of it is compiled into these tests")
+sys.exit(1 if bad else 0)
+PYTHON
