@@ -145,7 +145,7 @@ void bring(std::size_t k, std::int32_t value, BoardTruck& truck, PackSample<16>&
   if (k == charge_heat || k == discharge_heat) {
     s.current_ua = value;
   } else if (k == implausible) {
-    for (auto& uv : s.cell_uv) uv -= value > 0 ? 300'000 : 0;
+    for (auto& uv : s.cell_uv) uv -= value > 0 && uv != no_reading ? 300'000 : 0;
   } else {
     inject(k, value, truck, s, e);
   }
