@@ -15,7 +15,7 @@ find "$folder" -name '*.gcda' -delete
 for test in $tests; do
   "$folder/tests/$test" --gtest_brief=1 >>"$log" 2>&1 || { echo "coverage: $test fails: $log" >&2; exit 3; }
 done
-gcovr --root "$root" --object-directory "$folder" --exclude-throw-branches --merge-mode-functions=separate --json-summary "$folder/coverage.json" --txt "$folder/coverage.txt" \
+gcovr --root "$root" --object-directory "$folder" --exclude-throw-branches --json-summary "$folder/coverage.json" --txt "$folder/coverage.txt" \
   --filter "$root/(firmware|estimator|protection|storage|hal)/" "$folder" >>"$log" 2>&1
 python3 - "$root" "$folder/coverage.json" <<'PYTHON'
 import json, pathlib, sys
