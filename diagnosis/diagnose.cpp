@@ -45,8 +45,8 @@ std::optional<std::string> says_nothing(const Evidence& evidence) {
 /// that tells how far charge and discharge lie apart tells that there is a hysteresis.
 std::set<std::size_t> expected_in(const Evidence& evidence) {
   std::set<std::size_t> expected;
-  if (away_k(evidence) > decision::far_k) expected.insert(index_of("temperature_resistance"));
-  if (evidence.cell().ocv.half_gap_v.size > 0) expected.insert(index_of("ocv_hysteresis"));
+  if (away_k(evidence) > decision::far_k) expected.insert(mechanism_index("temperature_resistance"));
+  if (evidence.cell().ocv.half_gap_v.size > 0) expected.insert(mechanism_index("ocv_hysteresis"));
   std::erase_if(expected, [&](std::size_t m) { return evidence.base().find(m) != nullptr; });
   return expected;
 }
@@ -55,7 +55,7 @@ std::set<std::size_t> expected_in(const Evidence& evidence) {
 /// all that may not. singles: what was tried alone.
 Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, std::size_t most, std::vector<Fit>& singles) {
   std::vector<std::size_t> steady = testable;
-  std::erase(steady, index_of("contact_intermittent"));
+  std::erase(steady, mechanism_index("contact_intermittent"));
   bool bursts = false;
   while (current.hypothesis.added().size() < most) {
     std::vector<Fit> more = search.one_more(current, bursts ? testable : steady);
@@ -148,8 +148,8 @@ const char* name_of(Verdict verdict) {
 std::vector<MechanismSetting> later_recording(const Hypothesis& extended) {
   std::vector<MechanismSetting> later;
   for (MechanismSetting s : extended.settings) {
-    if (s.index == index_of("initial_soc") || s.index == index_of("contact_intermittent")) continue;
-    if (s.index == index_of("contact_step")) s.value[1] = 0;
+    if (s.index == mechanism_index("initial_soc") || s.index == mechanism_index("contact_intermittent")) continue;
+    if (s.index == mechanism_index("contact_step")) s.value[1] = 0;
     later.push_back(s);
   }
   return later;
@@ -244,7 +244,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.adequacy = adequacy();
   const bool something = !current.hypothesis.added().empty();
   // what is flexible gains on anything: when it is named, what it leaves must be white
-  const bool bursts = current.hypothesis.find(index_of("contact_intermittent")) != nullptr;
+  const bool bursts = current.hypothesis.find(mechanism_index("contact_intermittent")) != nullptr;
   const bool unknown = (d.remaining > decision::much_left || d.far_out > decision::far_out) &&
                        (!something || d.adequacy < (bursts ? decision::explained_by_bursts : decision::explained) || d.fast_excess > decision::fast_excess);
 

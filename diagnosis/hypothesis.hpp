@@ -11,7 +11,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -24,8 +23,7 @@
 
 namespace bms::diagnosis {
 
-constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
-
+using model::mechanism_index;
 using model::MechanismSetting;
 
 /// A parameter that is sought.

@@ -31,7 +31,7 @@ struct Rival {
 Rival later(std::size_t mechanism, const Fitted& f) {
   Rival r{mechanism, {later_recording(f.hypothesis), f.hypothesis.own, {}}, {}};
   for (MechanismSetting& s : r.hypothesis.settings) {
-    if (s.index == index_of("ocv_hysteresis")) s.value[3] = 1;  // every design begins charged
+    if (s.index == mechanism_index("ocv_hysteresis")) s.value[3] = 1;  // every design begins charged
   }
   const std::vector<Sought> sought = f.hypothesis.sought();
   std::vector<Eigen::Index> kept;
@@ -52,7 +52,7 @@ Rival later(std::size_t mechanism, const Fitted& f) {
 double least_capacity_ah(double capacity_ah, const std::vector<Rival>& rivals) {
   double least = 1;
   for (const Rival& r : rivals) {
-    if (const MechanismSetting* s = r.hypothesis.find(index_of("capacity_change"))) least = std::min(least, 1 - s->value[0]);
+    if (const MechanismSetting* s = r.hypothesis.find(mechanism_index("capacity_change"))) least = std::min(least, 1 - s->value[0]);
   }
   return least < 0.995 ? std::floor(100 * capacity_ah * least) / 100 : capacity_ah;
 }
@@ -102,7 +102,7 @@ Record read_under(const Rival& truth, const Plan& plan, const model::CellParamet
     a = known_read_a;
   }
   std::vector<MechanismSetting> inside = settings;
-  std::erase_if(inside, [](const MechanismSetting& s) { return s.index == index_of("voltage_offset") || s.index == index_of("voltage_gain") || s.index == index_of("contact_step"); });
+  std::erase_if(inside, [](const MechanismSetting& s) { return s.index == mechanism_index("voltage_offset") || s.index == mechanism_index("voltage_gain") || s.index == mechanism_index("contact_step"); });
   std::vector<double> soc, current_ref_a, voltage_ref_v;
   const std::vector<double> volts = predict(cell, settings, r, &soc), terminal_v = predict(cell, inside, r);
   for (std::size_t k = 0; k < r.size(); ++k) {

@@ -21,7 +21,6 @@ namespace {
 using model::catalogue;
 using model::Role;
 
-
 /// Shapes at which signatures are taken: every combination is one probe.
 std::vector<double> shape_grid(std::string_view id, double capacity_ah) {
   if (id == "ocv_hysteresis") return {12, 30, 80, 220};
@@ -138,7 +137,7 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
   const double span_k = temperature ? x.temperature_max_c - x.temperature_min_c : 0;
   const double away_k = temperature ? std::max(std::abs(x.temperature_max_c - 25), std::abs(x.temperature_min_c - 25)) : 0;
   const auto needs_current = [&](double c) { return x.current_max_a < c * c_rate; };
-  const bool follows = given.find(index_of("temperature_resistance")) != nullptr || given.find(index_of("entropic_ocv")) != nullptr;
+  const bool follows = given.find(mechanism_index("temperature_resistance")) != nullptr || given.find(mechanism_index("entropic_ocv")) != nullptr;
 
   if (id == "temperature_resistance" || id == "entropic_ocv" || id == "temperature_sensor") {
     if (!temperature) return "no temperature was recorded";
@@ -149,7 +148,7 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
   // the same recording, whatever the current: beside each other they would grow without bounds
   const auto trusted = [&] { return std::any_of(evidence.records().begin(), evidence.records().end(), [](const Record& r) { return !r.checks.empty(); }); };
   for (const auto& [one, other] : {std::pair{"leakage", "current_offset"}, std::pair{"current_offset", "leakage"}}) {
-    if (id == one && given.find(index_of(other)) != nullptr && !trusted()) return fmt::format("without a trusted ammeter it cannot be told from {}, which is there", other);
+    if (id == one && given.find(mechanism_index(other)) != nullptr && !trusted()) return fmt::format("without a trusted ammeter it cannot be told from {}, which is there", other);
   }
   if (id == "self_heating" && needs_current(0.5)) return "the current is too small to heat the cell";
   if (id == "charge_transfer" && needs_current(0.5)) return "the current is too small to bend the overvoltage";
@@ -217,7 +216,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
   }
 
   // a contact that changes at a moment: one column per moment
-  const std::size_t step = index_of("contact_step");
+  const std::size_t step = mechanism_index("contact_step");
   const bool wants_step = std::find(over.begin(), over.end(), step) != over.end() && h.find(step) == nullptr && !not_testable(evidence, h, step);
   if (wants_step) {
     const Record& r = evidence.records().front();
@@ -306,7 +305,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
   }
 
   // bursts of a loose contact
-  const std::size_t loose = index_of("contact_intermittent");
+  const std::size_t loose = mechanism_index("contact_intermittent");
   if (std::find(over.begin(), over.end(), loose) != over.end() && h.find(loose) == nullptr && !not_testable(evidence, h, loose)) {
     Candidate c{loose, {loose, {}, {}}, {}, 0, 0};
     std::size_t bursts = 0;

@@ -15,7 +15,7 @@ using model::catalogue;
 using model::Role;
 
 constexpr int usual_iterations = 12;
-constexpr std::size_t temperature_resistance = index_of("temperature_resistance");
+constexpr std::size_t temperature_resistance = mechanism_index("temperature_resistance");
 
 /// What its unknowns cost a mechanism; what is known of most cells is none.
 double price(std::size_t mechanism, std::size_t bursts) {
@@ -29,7 +29,7 @@ double price(const Hypothesis& h) {
   double sum = 0;
   std::size_t bursts = 0;
   for (const auto& spans : h.bursts) bursts += spans.size();
-  for (const std::size_t m : h.added()) sum += price(m, m == index_of("contact_intermittent") ? bursts : 0);
+  for (const std::size_t m : h.added()) sum += price(m, m == mechanism_index("contact_intermittent") ? bursts : 0);
   return sum;
 }
 
@@ -154,7 +154,7 @@ bool Search::far_better(const Fit& around, const Candidate& c) {
 
 Fit Search::refined_onset(Fit best) {
   const Record& r = evidence_.records().front();
-  const auto setting = [](Fit& f) -> MechanismSetting& { return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(), [](const MechanismSetting& s) { return s.index == index_of("contact_step"); }); };
+  const auto setting = [](Fit& f) -> MechanismSetting& { return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(), [](const MechanismSetting& s) { return s.index == mechanism_index("contact_step"); }); };
   double reach_s = r.duration_s() / 40;
   Eigen::VectorXd residual;
   while (reach_s > 1.5 * r.duration_s() / static_cast<double>(r.size())) {
@@ -163,7 +163,7 @@ Fit Search::refined_onset(Fit best) {
       Hypothesis h = best.hypothesis;
       for (MechanismSetting& s : h.settings) {
         // a step at either end is no step
-        if (s.index == index_of("contact_step")) s.value[1] = std::clamp(middle_s + step * reach_s, r.time_s.front() + 0.04 * r.duration_s(), r.time_s.back() - 0.04 * r.duration_s());
+        if (s.index == mechanism_index("contact_step")) s.value[1] = std::clamp(middle_s + step * reach_s, r.time_s.front() + 0.04 * r.duration_s(), r.time_s.back() - 0.04 * r.duration_s());
       }
       residual = evidence_.residual(h, best.calibration);
       const double cost = residual.squaredNorm() + (best.cost - best.residual.squaredNorm());

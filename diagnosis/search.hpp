@@ -14,7 +14,6 @@
 
 namespace bms::diagnosis {
 
-
 /// How far the cell was from the temperature that its file is for.
 double away_k(const Evidence& evidence);
 /// RMS of measured less predicted by a hypothesis with the cell file's own base parameters: what an extended cell file will do.

@@ -13,6 +13,7 @@
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "hal/sample_frames.hpp"
+#include "hal/slcan/codec.hpp"
 #include "host_sim/cell_file.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/emulator.hpp"
@@ -88,14 +89,15 @@ BudgetRun run_in_qemu(const std::string& board_name) {
     board.telemetry();
   }
   board.send_sample(two_minutes().back().time_us + 1'000'000, 0, 3'300'000, 2500);  // it has written the record when it answers
-  const std::string told = board.read_until("t1B98");  // Board: bytes 6 and 7, in 10 us
+  hal::CanFrame told;
+  if (!hal::slcan::decode(board.read_until("t1B98"), told)) throw std::runtime_error(board_name + " does not tell how long a sample takes");
   board.telemetry();
   const ImageFile file(image);
   const std::uint32_t top = file.symbol("image_stack_top"), bottom = file.symbol("image_stack_limit") + 1'024;  // above the guard
   const std::string memory = memory_of(monitor, bottom, top - bottom, folder.path() / "ram");
   std::size_t free = 0;
   while (free + 4 <= memory.size() && memory.compare(free, 4, "\xA5\xA5\xA5\xA5") == 0) free += 4;  // the firmware's own paint
-  return {memory.size() - free, 0.01 * (std::stoi(told.substr(17, 2), nullptr, 16) + 256 * std::stoi(told.substr(19, 2), nullptr, 16))};
+  return {memory.size() - free, can::Board::of(told).longest_sample};
 }
 
 }  // namespace

@@ -219,18 +219,14 @@ class Matrix {
     const std::vector<Sample> seconds = samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
     BoardTruck truck(6, result, 980'000'000);
     truck.name = "the shift";
-    const auto as_in = [&](const Sample& at) {
-      return [&truck, at](auto& s, auto&, auto&) {
-        s.current_ua = at.current_ua + static_cast<std::int32_t>(30e3 * truck.chance());
-        for (std::size_t k = 0; k < 16; ++k) s.cell_uv[k] = at.voltage_uv + static_cast<std::int32_t>(1e3 * static_cast<double>(k % 5) + 3e3 * truck.chance());
-        for (std::size_t k = 0; k < 4; ++k) s.temperature_cdegc[k] = static_cast<std::int16_t>(at.temperature_cdegc + 10 * static_cast<int>(k) + static_cast<int>(15 * truck.chance()));
-      };
-    };
-    if (!truck.drive_off(as_in(seconds.front()))) return truck.complain("does not drive off");
+    const auto is = [&](const Sample& at) { truck.course = {static_cast<double>(at.current_ua), static_cast<double>(at.voltage_uv), static_cast<double>(at.temperature_cdegc)}; };
+    is(seconds.front());
+    if (!truck.drive_off()) return truck.complain("does not drive off");
     const std::uint64_t before = result.samples;
     for (const Sample& second : seconds) {
+      is(second);
       for (int tenth = 0; tenth < 10; ++tenth) {
-        truck.step(as_in(second));
+        truck.step();
         if (truck.faults != 0) return truck.complain(fmt::format("told faults {:08x}", truck.faults));
         if (truck.expected != 0) return truck.complain(fmt::format("there are faults {:08x}", truck.expected));
         if (!truck.is_closed()) return truck.complain("does not drive any more");

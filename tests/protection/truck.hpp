@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
+#include <optional>
 
 #include "plant/random.hpp"
 #include "protection/protection.hpp"
@@ -41,6 +42,10 @@ constexpr bool waits_for_others(std::size_t k) { return k == 21 || k == 24; }
 class TruckPack {
  public:
   using Change = std::function<void(PackSample<16>&, PackEstimate<16>&, Orders&)>;
+  /// What there is to be measured of a cell, without noise.
+  struct Course {
+    double current_ua, voltage_uv, temperature_cdegc;
+  };
 
   explicit TruckPack(std::uint64_t seed) : random_(seed) { orders.request = Request::drive; }
 
@@ -51,9 +56,10 @@ class TruckPack {
     const bool closed = out.main_plus && out.main_minus;
     sample.time_us = step_ * step_us;
     const double slow = std::abs(static_cast<double>(step_ % 400) - 200) / 200;  // 0 .. 1 .. 0 in 40 s: the load moves all cells, and the air
-    sample.current_ua = static_cast<std::int32_t>((closed ? -2e6 - 1e6 * slow : 0) + 30e3 * chance());
-    for (std::size_t k = 0; k < 16; ++k) sample.cell_uv[k] = static_cast<std::int32_t>(3.30e6 - 60e3 * slow + 1e3 * static_cast<double>(k % 5) + 3e3 * chance());
-    for (std::size_t k = 0; k < 4; ++k) sample.temperature_cdegc[k] = static_cast<std::int16_t>(2'000 + 1'200 * slow + 10 * static_cast<double>(k) + 15 * chance());
+    const Course cell = course.value_or(Course{closed ? -2e6 - 1e6 * slow : 0, 3.30e6 - 60e3 * slow, 2'000 + 1'200 * slow});
+    sample.current_ua = static_cast<std::int32_t>(cell.current_ua + 30e3 * chance());
+    for (std::size_t k = 0; k < 16; ++k) sample.cell_uv[k] = static_cast<std::int32_t>(cell.voltage_uv + 1e3 * static_cast<double>(k % 5) + 3e3 * chance());
+    for (std::size_t k = 0; k < 4; ++k) sample.temperature_cdegc[k] = static_cast<std::int16_t>(cell.temperature_cdegc + 10 * static_cast<double>(k) + 15 * chance());
     estimate.soc_ppb = 600'000'000;
     pack_offset_uv = 0;
     pack_follows = true;
@@ -79,6 +85,7 @@ class TruckPack {
   PackSample<16> sample;
   PackEstimate<16> estimate;
   Orders orders;
+  std::optional<Course> course;  ///< instead of its own, of 40 s
   std::int32_t pack_offset_uv = 0;
   bool pack_follows = true, noisy_pack = true;
 
