@@ -184,7 +184,10 @@ class Contactors {
     if (ignored) count(ignored_us_, in.step_us, grace_us);
     else ignored_us_ = 0;
     if (ignored_us_ == grace_us) return enter(ContactorState::opening);
-    if (in.request != mine || in.open) enter(ContactorState::unloading);
+    if (in.request == mine && !in.open) return;
+    const std::uint32_t ignored_us = ignored_us_;  // a second reason is no second time of grace
+    enter(ContactorState::unloading);
+    ignored_us_ = ignored_us;
   }
 
   constexpr void in_unloading(const ContactorInput& in) {

@@ -38,10 +38,13 @@ struct MatrixResult {
   std::uint64_t cases = 0, samples = 0, missed = 0, falsely = 0;
   std::uint64_t shift_samples = 0;  ///< of the eight-hour shift, driven to its end without a fault
   std::vector<std::string> wrong;   ///< a line each
+  bool traced = false;
+  std::string trace;                ///< a line for each sample, of cases that were chosen by name
 };
 
-/// every: all cases; else of each fault those below and above, and one of noise and one during another, drawn by seed.
-MatrixResult run_fault_matrix(bool every, std::uint64_t seed, unsigned threads);
+/// every: all cases; else of each fault those below and above, and one of noise and one during another, drawn by seed. only: of those, the ones
+/// whose name holds that text, traced sample by sample.
+MatrixResult run_fault_matrix(bool every, std::uint64_t seed, unsigned threads, const std::string& only = {});
 
 /// As in protection/README.md.
 std::string markdown(const MatrixResult& result);

@@ -1,5 +1,5 @@
-// The whole fault matrix against the forklift board's image; with --write its table goes to protection/README.md. Exit: 1 when anything is missed, false
-// or late. ./bms faults
+// The whole fault matrix against the forklift board's image; with --write its table goes to protection/README.md, with --only TEXT the cases whose names
+// hold it are told sample by sample. Exit: 1 when anything is missed, false or late. ./bms faults [TEXT]
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -13,7 +13,9 @@ int main(int count, char** words) {
   using namespace bms;
   try {
     const bool some = count > 1 && std::strcmp(words[1], "--some") == 0;
-    const auto result = protection::run_fault_matrix(!some, 1, 2);
+    const std::string only = count > 2 && std::strcmp(words[1], "--only") == 0 ? words[2] : "";
+    const auto result = protection::run_fault_matrix(!some, 1, 2, only);
+    fmt::print("{}", result.trace);
     for (const std::string& line : result.wrong) fmt::print("{}\n", line);
     const std::string table = protection::markdown(result);
     fmt::print("{}{} complaints\n", table, result.wrong.size());

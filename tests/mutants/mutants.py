@@ -49,7 +49,7 @@ programs = [
     ("tests/storage/records_test.cpp", "storage_test", []),
     ("tests/storage/persistence_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", *store]),
     ("tests/storage/log_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
-    ("tests/firmware/telemetry_test.cpp", "telemetry_test", ["hal/absent/flash.cpp", *store]),
+    ("tests/firmware/telemetry_test.cpp", "telemetry_test", ["tests/firmware/host_hal.cpp", "hal/absent/flash.cpp", *store]),
 ]
 # the test that is tried first for files without one of their name
 first = {

@@ -155,6 +155,18 @@ TEST(Contactors, OfAFaultThatOpensWaitFiveSecondsForTheLoadThenOpenUnderIt) {
   EXPECT_GE(b.until(safe, 6), 0);
 }
 
+TEST(Contactors, OfASecondReasonGiveNoSecondTimeOfGrace) {
+  Bench b;
+  b.drive_off();
+  b.load_a = -3;
+  b.in.discharge_forbidden = true;
+  EXPECT_EQ(b.run(3), drive);
+  b.in.open = true;
+  b.step();
+  EXPECT_EQ(b.contactors.state(), unloading);
+  EXPECT_NEAR(b.until(opening, 10), 2.0, 0.21) << "of five seconds three were over";
+}
+
 TEST(Contactors, OfASevereFaultOpenWithinTheSameStepWhateverFlows) {
   for (const Request r : {Request::drive, Request::charge}) {
     Bench b;
