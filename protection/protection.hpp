@@ -7,7 +7,8 @@
 //
 // Order of a step: quantities of the sample, faults by the table, allowed currents, contactors, balancing. What the contactors find out counts
 // with the next sample; they themselves act on it at once. A sample that is not later than the one before is not used; five of them
-// in a row count as none. Bounded time, no heap, integers only: the same on every core. Cost: README.md.
+// in a row count as none. Until the first one of the run nothing closes, and missing is only what has not come when the measuring chain should be up.
+// Bounded time, no heap, integers only: the same on every core. Cost: README.md.
 #pragma once
 
 #include <algorithm>
@@ -33,13 +34,14 @@ struct ProtectionPlan {
   ContactorPlan contactors;
   BalancingPlan balancing;
   std::uint8_t cells;
+  std::uint32_t start_us;  ///< within which the first sample has to come
 };
 
 constexpr ProtectionPlan protection_plan(const PackDesign& design) {
   const Rules rules = rules_of(protection_table(design));
   const std::uint32_t open_now = faults_with(rules, Reaction::open_now), open = faults_with(rules, Reaction::open);
   return {rules, faults_with(rules, Reaction::derate), faults_with(rules, Reaction::forbid_charge) | open | open_now, faults_with(rules, Reaction::forbid_discharge) | open | open_now, open, open_now,
-          pack_limits(design), derating_plan(design), contactor_plan(design), balancing_plan(design), design.cells};
+          pack_limits(design), derating_plan(design), contactor_plan(design), balancing_plan(design), design.cells, in_us(design.start_s)};
 }
 
 /// What is known of the cells beside a sample; no_reading where it is not.
@@ -94,8 +96,8 @@ class Protection {
       clear_ = orders.clear;
       return orders.board_fault ? blind(step_to(sample.time_us), 0, true) : without_sample(sample.time_us);
     }
-    const std::uint32_t age_us = started_ ? clamped(sample.time_us - sample_us_) : 0, step_us = step_to(sample.time_us);
-    started_ = true;
+    const std::uint32_t age_us = sampled_ ? clamped(sample.time_us - sample_us_) : 0, step_us = step_to(sample.time_us);
+    started_ = sampled_ = true;
     sample_us_ = sample.time_us;
     ignored_ = 0;
     Quantities q = nothing_known();
@@ -129,8 +131,8 @@ class Protection {
     }
     if (!later(now_us, sample_us_)) return decision_;
     const std::uint32_t age_us = clamped(now_us - sample_us_);
-    const Rule& rule = plan_->rules[static_cast<std::size_t>(Fault::samples_missing)];
-    return static_cast<std::int32_t>(age_us) <= rule.threshold ? decision_ : blind(step_to(now_us), static_cast<std::int32_t>(age_us));
+    const auto patience_us = static_cast<std::uint32_t>(plan_->rules[static_cast<std::size_t>(Fault::samples_missing)].threshold);
+    return age_us <= (sampled_ ? patience_us : std::max(patience_us, plan_->start_us)) ? decision_ : blind(step_to(now_us), static_cast<std::int32_t>(age_us));
   }
 
   constexpr const Decision& decision() const { return decision_; }
@@ -202,7 +204,7 @@ class Protection {
   std::uint64_t sample_us_ = 0, evaluated_us_ = 0;
   Clear clear_ = Clear::none;
   std::uint8_t ignored_ = 0;
-  bool started_ = false, closed_once_ = false;
+  bool started_ = false, sampled_ = false, closed_once_ = false;
 };
 
 }  // namespace bms::protection

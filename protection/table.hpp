@@ -120,7 +120,7 @@ constexpr Table protection_table(const PackDesign& d) {
       row(precharge_failed, off_curve, above, 0, 0, 0, 10, on_clear, open_now, "none: the time is in the curve; the resistor cools for ten seconds before another"),
       row(contactor_welded, welded, above, 0, 0.2, 0, 10, service, open_now, "two samples at 10 Hz"),
       row(contactor_not_closed, not_closed, above, 0, 0.3, 0, 10, on_clear, open_now, "a contactor closes and stops bouncing within 50 ms"),
-      row(samples_missing, sample_age_us, above, in_micro(5 * d.sample_period_s), 0, in_micro(2 * d.sample_period_s), 1, automatic, open_now, "none: five sample periods are the threshold"),
+      row(samples_missing, sample_age_us, above, in_micro(5 * d.sample_period_s), 0, in_micro(2 * d.sample_period_s), 1, automatic, open_now, "none: five sample periods are the threshold; until the first, the measuring chain has its time to start"),
       row(internal_fault, self_contradiction, above, 0, 0, 0, 0, on_clear, open_now, "none: what cannot be trusted does nothing"),
       row(storage_fault, store_failed, above, 0, 0, 0, 0, on_clear, warn, "none: the store has tried again by itself"),
   }};

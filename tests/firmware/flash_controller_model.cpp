@@ -88,7 +88,7 @@ void FlashControllerModel::write_memory(std::uint32_t at, unsigned size, std::ui
   }
   const std::uint32_t before = read_memory(at, size), erased = size == 4 ? 0xFFFFFFFF : (1U << (8 * size)) - 1;
   if (before != erased && value != before && value != 0) violations.push_back("flash is programmed that is not erased");
-  for (unsigned k = 0; k < size; ++k) bytes[at + k] &= static_cast<std::uint8_t>(value >> (8 * k));
+  for (unsigned k = 0; k < size && !worn_out; ++k) bytes[at + k] &= static_cast<std::uint8_t>(value >> (8 * k));
   ++words_programmed;
   stall_us_ += word_us;
 }

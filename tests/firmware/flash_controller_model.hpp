@@ -29,6 +29,7 @@ class FlashControllerModel {
   std::uint32_t option_bytes = 0x0FFFAAED & ~(3U << 2);  ///< FLASH_OPTCR as delivered, but brown-out reset at level 3
   std::vector<std::string> violations;
   unsigned words_programmed = 0, sectors_erased = 0;
+  bool worn_out = false;  ///< what is programmed does not stay, and no error flag says so
 
  private:
   enum class Keys { none, first, refused_until_reset };

@@ -1,9 +1,14 @@
 // The forklift board's own image in Unicorn, its I2C controller a register model, a model of the front end on its wire: what the cells have is on the CAN
-// bus, and a chip that goes, hangs or is reset takes the readings with it, not the firmware.
+// bus, and a chip that goes, hangs or is reset takes the readings with it, not the firmware. A truck around it follows the contactors' pins: they close in
+// their order and open in the time that protection's table gives.
+#include <cmath>
+#include <functional>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "host_sim/cell_file.hpp"
 #include "host_sim/firmware_image.hpp"
 #include "tests/firmware/i2c_controller_model.hpp"
@@ -92,6 +97,139 @@ TEST_F(FrontEndBoard, ContactorsAreOpenWhileNobodyAsks) {
   board.run_for_ms(2'500);
   EXPECT_EQ(board.register_value(0x40020818), 15U << 22) << "GPIOC_BSRR: PC6 to PC9 low";
   EXPECT_EQ(board.register_value(0x40020800) >> 12 & 0xFF, 0x55U) << "outputs";
+}
+
+/// The pins that close something, as the last write to GPIOC's set and reset register left them.
+struct Pins {
+  bool main_plus, main_minus, precharge, charge_enable;
+  bool any_closed() const { return main_plus || main_minus || precharge; }
+};
+
+struct Load {
+  double current_a = 0;
+  bool plus_fails = false, minus_welded = false;
+};
+
+/// A truck of 10 mF behind the pins, that asks for power each second and takes what its driver wants.
+class Truck : public FrontEndBoard {
+ protected:
+  Truck() {
+    chip.current_a = 0;
+    chip.ld_v = 0;
+  }
+  Pins driven() const {
+    const std::uint32_t high = board.register_value(0x40020818);
+    return {(high >> 6 & 1) != 0, (high >> 7 & 1) != 0, (high >> 8 & 1) != 0, (high >> 9 & 1) != 0};
+  }
+  /// 10 ms of the circuit.
+  void step() {
+    if (asks && steps_++ % 100 == 0) {
+      can::Command command;
+      command.code = can::Command::code_request;
+      command.argument = 1;  // drive
+      asked_ = can::next(asked_);
+      board.can.others.push_back({wire_frame(command.frame(asked_)), 0});
+    }
+    const Pins told = driven();
+    const bool plus = told.main_plus && !load.plus_fails, minus = told.main_minus || load.minus_welded;
+    if (plus && minus) {
+      chip.ld_v = chip.stack_v;
+      chip.current_a = load.current_a;
+    } else {
+      if (told.precharge && minus) chip.ld_v += (chip.stack_v - chip.ld_v) * (1 - std::exp(-0.01 / 0.5));
+      else chip.ld_v *= std::exp(-0.01 / (load.current_a == 0 ? 1.5 : 0.05));
+      chip.current_a = 0;
+    }
+    board.run_for_ms(10);
+  }
+  /// Milliseconds until it is so, or -1.
+  int until(const std::function<bool(const Pins&)>& is, int most_ms) {
+    for (int ms = 0; ms <= most_ms; ms += 10) {
+      if (is(driven())) return ms;
+      step();
+    }
+    return -1;
+  }
+  bool drive_off() {
+    asks = true;
+    if (until([](const Pins& p) { return p.main_plus && p.main_minus; }, 8'000) < 0) return false;
+    load.current_a = -3;
+    for (int k = 0; k < 60; ++k) step();
+    return driven().main_plus && driven().main_minus;
+  }
+  can::Faults faults() const {
+    const auto frame = last(can::Faults::id);
+    return frame ? can::Faults::of(*frame) : can::Faults{};
+  }
+
+  bool asks = false;
+  Load load;
+
+ private:
+  int steps_ = 0;
+  std::uint8_t asked_ = 0;
+};
+
+TEST_F(Truck, DrivesOffOverTheResistorAndTheSecondPoleClosesOnlyOnAFullLink) {
+  asks = true;
+  ASSERT_GE(until([](const Pins& p) { return p.precharge; }, 4'000), 0);
+  EXPECT_FALSE(driven().main_minus) << "the relay alone: is the other pole welded?";
+  ASSERT_GE(until([](const Pins& p) { return !p.precharge && p.main_minus; }, 1'000), 200);
+  ASSERT_GE(until([](const Pins& p) { return p.precharge && p.main_minus; }, 1'000), 200);
+  const int charged_ms = until([](const Pins& p) { return p.main_plus; }, 3'000);
+  EXPECT_NEAR(charged_ms, 500 * std::log(16.0), 250) << "15/16 of the pack";
+  EXPECT_GE(chip.ld_v, 15.0 / 16 * chip.stack_v);
+  EXPECT_FALSE(driven().precharge);
+  EXPECT_FALSE(driven().charge_enable) << "nobody charges";
+  for (int k = 0; k < 100; ++k) step();
+  EXPECT_TRUE(driven().main_plus && driven().main_minus);
+  EXPECT_EQ(faults().first_cause, 0U);
+}
+
+/// What happens to the pack while it drives; the pins are open within delay_ms of the table, a sample's period and the front end's own time to measure.
+struct Mishap {
+  const char* name;
+  std::function<void(Bq76952Model&, Load&)> happens;
+  int delay_ms;
+  std::function<bool(const can::Faults&)> told;
+};
+class Pulls : public Truck, public ::testing::WithParamInterface<Mishap> {};
+
+TEST_P(Pulls, ThePinsOpenInTime) {
+  ASSERT_TRUE(drive_off());
+  EXPECT_EQ(faults().first_cause, 0U);
+  const auto open = [](const Pins& p) { return !p.any_closed(); };
+  int ms = 0;
+  for (; ms <= GetParam().delay_ms + 2'000 && !open(driven()); ms += 10) {
+    if (driven().main_plus) GetParam().happens(chip, load);
+    step();
+  }
+  EXPECT_GE(ms, GetParam().delay_ms);
+  EXPECT_LE(ms, GetParam().delay_ms + 100 + 250) << "a period of samples, and a scan of the chip";
+  step();
+  EXPECT_TRUE(GetParam().told(faults()));
+}
+
+// what the contactors find, 0.3 s of it, counts with the next sample (protection/protection.hpp)
+INSTANTIATE_TEST_SUITE_P(On, Pulls, ::testing::Values(
+    Mishap{"SevereOvervoltage", [](auto& chip, auto&) { chip.cell_v[5] = 3.9; }, 200, [](const auto& f) { return f.cell_overvoltage_severe == 1; }},
+    Mishap{"SevereUndervoltage", [](auto& chip, auto&) { chip.cell_v[9] = 1.7; }, 200, [](const auto& f) { return f.cell_undervoltage_severe == 1; }},
+    Mishap{"ShortCircuit", [](auto&, auto& load) { load.current_a = -45; }, 0, [](const auto& f) { return f.short_circuit == 1; }},
+    Mishap{"AContactorThatFallsOff", [](auto&, auto& load) { load.plus_fails = true; }, 400, [](const auto& f) { return f.contactor_not_closed == 1; }}),
+    [](const auto& p) { return std::string(p.param.name); });
+
+TEST_F(Truck, WithAPoleWeldedGetsNoPower) {
+  load.minus_welded = true;
+  asks = true;
+  EXPECT_LT(until([](const Pins& p) { return p.main_plus; }, 4'000), 0);
+  EXPECT_EQ(faults().contactor_welded, 1U);
+  EXPECT_FALSE(driven().any_closed());
+}
+
+TEST_F(Truck, WhoseStoreIsWornOutIsToldSoAndDrives) {
+  board.flash.worn_out = true;
+  EXPECT_TRUE(drive_off());
+  EXPECT_EQ(faults().storage_fault, 1U);
 }
 
 }  // namespace

@@ -228,9 +228,31 @@ TEST(Protection, SaysOnceThatAFaultCame) {
 
 TEST(Protection, WithoutASampleFromTheStartSaysSo) {
   Protection<16> p(pack);
-  for (std::uint64_t now = 0; now < 600'000; now += 10'000) p.without_sample(now);
-  EXPECT_NE(p.decision().faults & bit(Fault::samples_missing), 0U);
+  for (std::uint64_t now = 0; now <= 3'000'000; now += 10'000) EXPECT_EQ(p.without_sample(now).faults, 0U) << "a front end is not asked sooner";
+  EXPECT_NE(p.without_sample(3'010'000).faults & bit(Fault::samples_missing), 0U);
   EXPECT_FALSE(p.decision().outputs.any_closed());
+}
+
+TEST(Protection, ThatHadASampleWaitsNoLongerThanTheTableSays) {
+  Bench b;
+  for (int k = 0; k < 7; ++k) b.protection.without_sample(b.time_us += b.period);
+  b.step();
+  EXPECT_EQ(b.protection.without_sample(b.time_us + 500'000).faults, 0U);
+  EXPECT_EQ(b.protection.without_sample(b.time_us + 510'000).faults, bit(Fault::samples_missing));
+}
+
+TEST(Protection, ATruckThatAskedBeforeTheFirstSampleGetsItsPower) {
+  Bench b;
+  b.orders.request = Request::drive;
+  const PackSample<16> nothing;
+  for (int k = 0; k < 15; ++k) {
+    PackSample<16> s = nothing;
+    s.time_us = b.time_us += b.period;
+    EXPECT_EQ(b.protection.update(s, {}, b.orders).state, ContactorState::off);
+  }
+  for (int k = 0; k < 40; ++k) b.step();
+  EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
+  EXPECT_EQ(b.protection.decision().faults, 0U);
 }
 
 /// The same run, begun shortly before the clock wraps, gives the same decisions as one begun at 0.
