@@ -253,7 +253,7 @@ TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToD
     for (const auto& [id, frames] : expected) {
       ASSERT_EQ(seen[id].size(), frames.size()) << fmt::format("{:x}", id);
       if (id == can::Board::id) continue;  // what the board finds out about itself, this machine does not know
-      for (std::size_t k = 0; k < frames.size(); ++k) ASSERT_TRUE(same(seen[id][k], frames[k])) << fmt::format("{:x}, frame {}, seed {}", id, k, seed);
+      for (std::size_t k = 0; k < frames.size(); ++k) ASSERT_TRUE(same(seen[id][k], frames[k])) << fmt::format("{:x}, frame {}, seed {}: {:02x}, not {:02x}", id, k, seed, fmt::join(seen[id][k].data, " "), fmt::join(frames[k].data, " "));
     }
     EXPECT_NEAR(can::PackElectrical::of(seen[0x181].back()).voltage, 1e-6 * inputs.back().pack.pack_uv, 0.0006);
     EXPECT_NEAR(can::CellVoltages4::of(seen[0x193].back()).cell16, 1e-6 * inputs[inputs.size() - 5].pack.cell_uv[15], 0.01);

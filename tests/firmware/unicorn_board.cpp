@@ -4,6 +4,7 @@
 #include <unicorn/unicorn.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <stdexcept>
 
@@ -307,10 +308,31 @@ bool UnicornBoard::take_fault(int error) {
   return true;
 }
 
+/// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation block begins inside of it) leaves the
+/// program counter in it: what is behind would run twice.
+std::uint32_t UnicornBoard::behind_it_block(std::uint32_t pc) const {
+  const auto half = [&](std::uint32_t at) {
+    std::uint16_t h = 0;
+    return uc_mem_read(core_, at, &h, 2) == UC_ERR_OK ? h : std::uint16_t{0};
+  };
+  for (std::uint32_t it = pc - 2; it + 14 >= pc; it -= 2) {
+    const unsigned mask = half(it) & 15U;
+    const bool second_half = half(it - 2) >= 0xE800 && half(it - 4) < 0xE800;  // of a wide instruction, e.g. a branch
+    if ((half(it) & 0xFF00) != 0xBF00 || mask == 0 || second_half) continue;
+    std::uint32_t end = it + 2;
+    for (int left = 4 - std::countr_zero(mask); left > 0; --left) end += half(end) >= 0xE800 ? 4 : 2;
+    if (end > pc) return end;
+  }
+  return pc;
+}
+
 void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
   const uc_err error = uc_emu_start(core_, from | 1, 0xFFFFFFFE, 0, count);
   instructions += count;
-  const std::uint32_t pc = reg(UC_ARM_REG_PC);
+  std::uint32_t pc = reg(UC_ARM_REG_PC);
+  if (error == UC_ERR_OK) {
+    if (const std::uint32_t behind = behind_it_block(pc); behind != pc) set_reg(UC_ARM_REG_PC, (pc = behind) | 1);
+  }
   if ((pc & 0xFFFFFFE0) == 0xFFFFFFE0) return leave(pc | 1);
   if (pc >= return_of_call) return;
   if (error != UC_ERR_OK && take_fault(error)) return;

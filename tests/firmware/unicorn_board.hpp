@@ -103,6 +103,7 @@ class UnicornBoard {
   std::uint32_t reg(int id) const;
   void set_reg(int id, std::uint32_t value);
   void execute(std::uint32_t from, std::size_t count);
+  std::uint32_t behind_it_block(std::uint32_t pc) const;
 
   uc_struct* core_ = nullptr;
   std::vector<Symbol> symbols_;
