@@ -17,9 +17,8 @@
 #include "host_sim/replay.hpp"
 #include "host_sim/text_file.hpp"
 #include "tests/can/response_time.hpp"
-#include "tests/firmware/host_hal.hpp"
+#include "tests/firmware/host_board.hpp"
 #include "tests/firmware/unicorn_board.hpp"
-#include "tests/storage/flash_model.hpp"
 
 namespace bms {
 namespace {
@@ -27,15 +26,6 @@ namespace {
 using namespace host_hal;
 using ::testing::IsEmpty;
 using hal::CanState;
-using Pack = PackSample<16>;
-
-/// firmware/board_cell.hpp of this board, with the cell from its file.
-struct ForkliftCell : Table9Board<Pack::cells> {
-  static const protection::ProtectionPlan& plan() {
-    static const auto plan = protection::protection_plan(design(0.1));
-    return plan;
-  }
-};
 
 const std::filesystem::path& image() {
   static const auto path = firmware_image("stm32f405_forklift", table9(), Image::remote);
@@ -56,50 +46,6 @@ std::vector<Pack> part_of_the_shift(std::size_t count) {
   }
   return part;
 }
-
-/// What comes to the board at one time.
-struct Input {
-  Pack pack;
-  std::int32_t link_uv = 0;
-  std::optional<hal::CanFrame> command;  ///< before the sample
-};
-
-/// The same firmware on this machine, with a flash of its own.
-class HostBoard {
- public:
-  explicit HostBoard(const std::vector<std::uint8_t>& flash, const std::optional<StartingPoint>& told = std::nullopt) {
-    for (std::uint32_t k = 0; k < FlashControllerModel::sectors; ++k) flash_.fill(k, {flash.begin() + k * FlashControllerModel::sector_bytes, flash.begin() + (k + 1) * FlashControllerModel::sector_bytes});
-    plug_in(&flash_);
-    sent.clear();
-    requests.clear();
-    switched = {};
-    persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
-    application_.emplace(told ? told : remembered_start(persistence_, table9().hash), messages::Identity{table9().hash, 0x000100}, static_cast<float>(table9().parameters.capacity_ah), persistence_);
-  }
-  ~HostBoard() { plug_in(nullptr); }
-  HostBoard(const HostBoard&) = delete;
-  HostBoard& operator=(const HostBoard&) = delete;
-
-  void take(const Input& in) {
-    link_reads_uv = in.link_uv;
-    if (in.command) requests.push_back(*in.command);
-    application_->take(in.pack);
-  }
-  std::vector<std::uint8_t> flash() {
-    std::vector<std::uint8_t> all;
-    for (std::uint32_t k = 0; k < FlashControllerModel::sectors; ++k) {
-      const auto sector = flash_.bytes(k);
-      all.insert(all.end(), sector.begin(), sector.end());
-    }
-    return all;
-  }
-  const storage::Persistence& persistence() const { return persistence_; }
-
- private:
-  FlashModel flash_{{FlashControllerModel::sectors, FlashControllerModel::sector_bytes}, 1};
-  storage::Persistence persistence_;
-  std::optional<Application<ForkliftCell>> application_;
-};
 
 /// A flash as it left the works: a chip's is erased, and the firmware's first start has marked it.
 const std::vector<std::uint8_t>& started_once() {

@@ -1,0 +1,69 @@
+// The forklift board's firmware on this machine, with a flash model of its own: what a board ought to say and to keep.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "tests/firmware/host_hal.hpp"
+#include "tests/storage/flash_model.hpp"
+
+namespace bms {
+
+using Pack = PackSample<16>;
+
+/// firmware/board_cell.hpp of this board, with the cell from its file.
+struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
+  static const protection::ProtectionPlan& plan() {
+    static const auto plan = protection::protection_plan(design(0.1));
+    return plan;
+  }
+};
+
+/// What comes to the board at one time.
+struct Input {
+  Pack pack;
+  std::int32_t link_uv = 0;
+  std::optional<hal::CanFrame> command;  ///< before the sample
+};
+
+/// The same firmware on this machine, with a flash of its own.
+class HostBoard {
+ public:
+  static constexpr std::uint32_t sectors = 3, sector_bytes = 0x4000;  // of the STM32F405, those behind the vectors
+
+  explicit HostBoard(const std::vector<std::uint8_t>& flash, const std::optional<StartingPoint>& told = std::nullopt) {
+    for (std::uint32_t k = 0; k < sectors; ++k) flash_.fill(k, {flash.begin() + k * sector_bytes, flash.begin() + (k + 1) * sector_bytes});
+    plug_in(&flash_);
+    host_hal::sent.clear();
+    host_hal::requests.clear();
+    host_hal::switched = {};
+    persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
+    application_.emplace(told ? told : remembered_start(persistence_, host_hal::table9().hash), messages::Identity{host_hal::table9().hash, 0x000100}, static_cast<float>(host_hal::table9().parameters.capacity_ah), persistence_);
+  }
+  ~HostBoard() { plug_in(nullptr); }
+  HostBoard(const HostBoard&) = delete;
+  HostBoard& operator=(const HostBoard&) = delete;
+
+  void take(const Input& in) {
+    host_hal::link_reads_uv = in.link_uv;
+    if (in.command) host_hal::requests.push_back(*in.command);
+    application_->take(in.pack);
+  }
+  void end() { application_->end(); }
+  std::vector<std::uint8_t> flash() {
+    std::vector<std::uint8_t> all;
+    for (std::uint32_t k = 0; k < sectors; ++k) {
+      const auto sector = flash_.bytes(k);
+      all.insert(all.end(), sector.begin(), sector.end());
+    }
+    return all;
+  }
+  const storage::Persistence& persistence() const { return persistence_; }
+
+ private:
+  FlashModel flash_{{sectors, sector_bytes}, 1};
+  storage::Persistence persistence_;
+  std::optional<Application<ForkliftCell>> application_;
+};
+
+}  // namespace bms

@@ -1,0 +1,160 @@
+// What the forklift board's firmware knows over a loss of power, on this machine: state of charge, its cells, faults for the workshop, corrections.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/firmware/host_board.hpp"
+
+namespace bms {
+namespace {
+
+using host_hal::sent;
+
+template <class Message>
+std::optional<Message> last() {
+  for (auto f = sent.rbegin(); f != sent.rend(); ++f) {
+    if (f->id == Message::id) return Message::of(*f);
+  }
+  return std::nullopt;
+}
+
+class Memory : public ::testing::Test {
+ protected:
+  void SetUp() override { host_hal::begin(); }
+  void TearDown() override { host_hal::begin(); }
+
+  /// A second, with 2 A out of sixteen cells of which the fifth is 30 mV above the others.
+  Input second() {
+    ++seconds_;
+    Input in;
+    in.pack.time_us = 1'000'000ULL * seconds_;
+    in.pack.current_ua = -2'000'000 + static_cast<std::int32_t>(10'000 * (seconds_ % 3));
+    in.pack.cell_uv.fill(3'240'000 + static_cast<std::int32_t>(500 * (seconds_ % 2)));
+    in.pack.cell_uv[4] += 30'000;
+    in.pack.pack_uv = 16 * in.pack.cell_uv[0] + 30'000;
+    in.pack.temperature_cdegc.fill(2'500);
+    return in;
+  }
+  void run(HostBoard& board, int count) {
+    for (int k = 0; k < count; ++k) board.take(second());
+  }
+  void ask(HostBoard& board, std::uint32_t code, std::uint32_t argument) {
+    can::Command command;
+    command.code = code;
+    command.argument = argument;
+    Input in = second();
+    in.command = command.frame(counter_ = can::next(counter_));
+    board.take(in);
+  }
+
+  const std::vector<std::uint8_t> new_chip = std::vector<std::uint8_t>(HostBoard::sectors * HostBoard::sector_bytes, 0xFF);
+  const StartingPoint start{600'000'000, 20'000'000};
+
+ private:
+  unsigned seconds_ = 0;
+  std::uint8_t counter_ = 0;
+};
+
+TEST_F(Memory, ARunBeginsWhereTheOneBeforeItEnded) {
+  std::vector<std::uint8_t> kept;
+  can::PackState before;
+  can::CellExtremes cells;
+  {
+    HostBoard board(new_chip, start);
+    run(board, 600);
+    before = last<can::PackState>().value();
+    cells = last<can::CellExtremes>().value();
+    ASSERT_GT(cells.soc_spread, 1.0F) << "30 mV are some percent";
+    board.end();
+    kept = board.flash();
+  }
+  host_hal::cause = hal::ResetCause::pin;  // which takes no time
+  HostBoard board(kept);
+  run(board, 1);
+  EXPECT_EQ(last<can::StartingSoc>()->given, can::StartingSoc::given_yes);
+  EXPECT_NEAR(last<can::PackState>()->soc, before.soc, 0.1F);
+  EXPECT_GE(last<can::PackState>()->soc_sigma, before.soc_sigma);
+  EXPECT_LT(last<can::PackState>()->soc_sigma, before.soc_sigma + 0.5F);
+  EXPECT_NEAR(last<can::CellExtremes>()->soc_spread, cells.soc_spread, 0.3F) << "each cell's difference is remembered, to 0.001 %";
+  EXPECT_NEAR(board.persistence().charge().operating_s, 600, 1);
+}
+
+TEST_F(Memory, OfAnotherCellFileNothingIsTakenUpUntilSomebodyHasSeenIt) {
+  std::vector<std::uint8_t> kept;
+  {
+    HostBoard board(new_chip, start);
+    run(board, 300);
+    board.end();
+    kept = board.flash();
+  }
+  {  // as if that had been an image with another cell
+    FlashModel flash({HostBoard::sectors, HostBoard::sector_bytes}, 2);
+    for (std::uint32_t k = 0; k < HostBoard::sectors; ++k) flash.fill(k, {kept.begin() + k * HostBoard::sector_bytes, kept.begin() + (k + 1) * HostBoard::sector_bytes});
+    plug_in(&flash);
+    storage::Persistence persistence;
+    persistence.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
+    ASSERT_TRUE(persistence.set(cell_file_key, 0x12345678));
+    kept.clear();
+    for (std::uint32_t k = 0; k < HostBoard::sectors; ++k) {
+      const auto sector = flash.bytes(k);
+      kept.insert(kept.end(), sector.begin(), sector.end());
+    }
+  }
+  HostBoard board(kept);
+  run(board, 2);
+  EXPECT_EQ(last<can::StartingSoc>()->given, can::StartingSoc::given_no);
+  EXPECT_EQ(last<can::Faults>()->internal_fault, 1U) << "until it is cleared";
+  EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()), 0x12345678U);
+  ask(board, can::Command::code_clear_faults, 1);
+  run(board, 2);
+  EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()), host_hal::table9().hash);
+  EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
+}
+
+TEST_F(Memory, AShortCircuitIsThereUntilTheWorkshopClearsIt) {
+  std::vector<std::uint8_t> kept;
+  {
+    HostBoard board(new_chip, start);
+    run(board, 5);
+    Input in = second();
+    in.pack.current_ua = -60'000'000;
+    board.take(in);
+    EXPECT_EQ(last<can::Faults>()->short_circuit, 1U);
+    kept = board.flash();  // the power goes at once
+  }
+  HostBoard board(kept, start);
+  run(board, 20);
+  EXPECT_EQ(last<can::Faults>()->short_circuit, 1U);
+  ask(board, can::Command::code_clear_faults, 0);
+  run(board, 2);
+  EXPECT_EQ(last<can::Faults>()->short_circuit, 1U) << "not a driver's to clear";
+  ask(board, can::Command::code_clear_faults, 1);
+  run(board, 2);
+  EXPECT_EQ(last<can::Faults>()->short_circuit, 0U);
+}
+
+TEST_F(Memory, ACorrectionIsTakenAtOnceAndKept) {
+  std::vector<std::uint8_t> kept;
+  {
+    HostBoard board(new_chip, start);
+    run(board, 2);
+    ask(board, can::Command::code_voltage_offset, static_cast<std::uint32_t>(-1'500));
+    EXPECT_EQ(host_hal::calibrated.voltage_offset_uv, -1'500);
+    kept = board.flash();
+  }
+  HostBoard board(kept, start);
+  EXPECT_EQ(stored_calibration(board.persistence()).voltage_offset_uv, -1'500);
+  EXPECT_EQ(stored_calibration(board.persistence()).current_gain_ppm, 0);
+}
+
+TEST_F(Memory, WhatDoesNotFitIsStoredAsTheNearestThatDoes) {
+  EXPECT_NEAR(scaled(0.9234567F, 1e6F), 923'457, 1);
+  EXPECT_EQ(scaled(-5e3F, 1e6F), -2'147'000'000);
+  EXPECT_EQ(scaled(5e3F, 1e6F), 2'147'000'000);
+  EXPECT_EQ(scaled(INFINITY, 1e6F), 2'147'000'000);
+  EXPECT_EQ(scaled(-INFINITY, 1e6F), -2'147'000'000);
+  EXPECT_EQ(scaled(NAN, 1e6F), 0);
+}
+
+}  // namespace
+}  // namespace bms
