@@ -5,9 +5,6 @@
 
 #include <cmath>
 
-#include "host_sim/json_results.hpp"
-#include "host_sim/report_page.hpp"
-
 namespace bms {
 namespace {
 
@@ -84,17 +81,6 @@ TEST(Replay, SocFiguresAreNullWithoutAReference) {
   r.open_loop_v.clear();
   evaluate(r);
   EXPECT_FALSE(r.soc.rmse.has_value());
-  EXPECT_THAT(json_of(r, ""), HasSubstr("\"rmse\": null"));
-}
-
-TEST(Replay, AnOffsetThatTheFilterIsSureOfIsSaid) {
-  ReplayResult r = replayed(std::nullopt);
-  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
-  r.soc.current_offset_a = -0.05;
-  r.soc.current_offset_sigma_a = 0.02;
-  EXPECT_THAT(statement(r), HasSubstr("the current seemed to read 50 mA too low (standard deviation 20 mA)"));
-  r.soc.current_offset_sigma_a = 0.04;
-  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
 }
 
 TEST(Replay, TraceHasARowForEverySampleAndTheContractsColumns) {
@@ -103,19 +89,6 @@ TEST(Replay, TraceHasARowForEverySampleAndTheContractsColumns) {
   EXPECT_TRUE(csv.starts_with("time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags\n"));
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), r.recording.rows() + 1);
   EXPECT_EQ(csv, trace_csv(replayed(std::nullopt)));
-}
-
-TEST(Report, HoldsItsScriptAndDataAndReachesForNothing) {
-  ReplayResult r = replayed(std::nullopt);
-  r.recording.path = "logs/</script><b>.csv";
-  const std::string page = replay_report(r);
-  EXPECT_THAT(page, HasSubstr("new Dygraph("));
-  EXPECT_THAT(page, HasSubstr("\"two_sigma\""));
-  EXPECT_EQ(page.find("@DATA@"), std::string::npos);
-  EXPECT_EQ(page.find("</script><b>"), std::string::npos) << "a file's name must not become markup";
-  EXPECT_EQ(page.find("<script src"), std::string::npos);
-  EXPECT_EQ(page.find("<link"), std::string::npos);
-  EXPECT_LT(page.size(), 3'000'000U);
 }
 
 }  // namespace
