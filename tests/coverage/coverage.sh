@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Lines that the tests of firmware, estimator, protection, storage and the portable half of hal run: built with --coverage (preset host-coverage), run here and counted.
-# Of templates only what is instantiated is code that can be counted; headers of those folders that no test includes are named.
+# The table goes to tests/README.md. Of templates only what is instantiated is code that can be counted; headers of those folders that no test includes are named.
 #
 #   coverage.sh BUILD_FOLDER TEST...      exit 1: below 95 % of the lines of firmware/ or estimator/
 set -euo pipefail
@@ -15,17 +15,21 @@ done
 gcovr --root "$root" --object-directory "$folder" --exclude-throw-branches --json-summary "$folder/coverage.json" --txt "$folder/coverage.txt" \
   --filter "$root/(firmware|estimator|protection|storage|hal)/" "$folder" >>"$log" 2>&1
 python3 - "$root" "$folder/coverage.json" <<'PYTHON'
-import json, pathlib, sys
+import json, pathlib, re, sys
 root, counted = pathlib.Path(sys.argv[1]), json.load(open(sys.argv[2]))["files"]
 seen = {f["filename"] for f in counted}
 bad = False
-print("| folder | lines | run | part |\n|---|---|---|---|")
+table = ["| folder | lines | run | part |", "|---|---|---|---|"]
 for folder in ("firmware", "estimator", "protection", "storage", "hal"):
     of = [f for f in counted if f["filename"].startswith(folder + "/")]
     lines, run = sum(f["line_total"] for f in of), sum(f["line_covered"] for f in of)
     part = run / max(lines, 1)
     bad = bad or (folder in ("firmware", "estimator") and part < 0.95)
-    print(f"| {folder} | {lines} | {run} | {100 * part:.1f} % |")
+    table.append(f"| {folder} | {lines} | {run} | {100 * part:.1f} % |")
+table = "\n".join(table) + "\n"
+print(table)
+readme = root / "tests/README.md"
+readme.write_text(re.sub(r"(<!-- figures: coverage -->\n).*?(<!-- end of figures -->)", lambda m: m[1] + table + m[2], readme.read_text(), flags=re.S))
 for f in sorted(counted, key=lambda f: f["line_covered"] - f["line_total"])[:12]:
     if f["line_covered"] < f["line_total"]:
         print(f"{f['filename']}: {f['line_total'] - f['line_covered']} of {f['line_total']} lines are not run")
