@@ -35,8 +35,7 @@ constexpr std::int32_t ppb(const T& value) {
     const std::int64_t raw = value.raw(), held = raw > most ? most : raw < -most ? -most : raw;
     return static_cast<std::int32_t>(held * 1'000'000'000 >> T::fraction_bits);
   } else {
-    if (value != value) return 0;
-    const float held = value > 2 ? 2.0F : value < -2 ? -2.0F : static_cast<float>(value);
+    const float held = value > 2 ? 2.0F : value < -2 ? -2.0F : value <= 2 ? static_cast<float>(value) : 0.0F;  // the last: not a number
     return static_cast<std::int32_t>(held * 1e9F);
   }
 }

@@ -114,7 +114,7 @@ class SampleFrames {
     } else if (frame.id == link_frame_id) {
       link_uv_ = get_bytes<std::int32_t>(frame.data, 0);
     } else if (frame.id >= first_cells_frame_id && frame.id < temperatures_frame_id) {
-      const std::size_t first = 2U * (frame.id - first_cells_frame_id);
+      const std::size_t first = std::size_t{2} * (frame.id - first_cells_frame_id);
       if (first < Cells) building_.cell_uv[first] = get_bytes<std::int32_t>(frame.data, 0);
       if (first + 1 < Cells) building_.cell_uv[first + 1] = get_bytes<std::int32_t>(frame.data, 4);
     } else if (frame.id == temperatures_frame_id) {

@@ -35,7 +35,7 @@ class File {
 };
 
 std::filesystem::path pipe_in(const std::filesystem::path& folder, const char* name) {
-  const auto path = folder / name;
+  auto path = folder / name;
   if (mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error("no pipe in " + folder.string());
   return path;
 }

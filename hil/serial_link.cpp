@@ -30,6 +30,8 @@ class SerialLink : public BoardLink {
     send("\rC\rS6\rO\r");
     listen(0, 200);
   }
+  SerialLink(const SerialLink&) = delete;
+  SerialLink& operator=(const SerialLink&) = delete;
   ~SerialLink() override {
     try {
       send("C\r");

@@ -28,7 +28,7 @@ double decimal(float value) {
 
 int digits_of(double step) {
   int digits = 0;
-  for (double scaled = step; digits < 9 && std::abs(scaled - std::round(scaled)) > 1e-9 * scaled; scaled *= 10) ++digits;
+  while (digits < 9 && std::abs(step - std::round(step)) > 1e-9 * step) step *= 10, ++digits;
   return digits;
 }
 

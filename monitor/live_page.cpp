@@ -117,7 +117,7 @@ struct LivePage::Server {
 LivePage::LivePage(std::string html, int port) : server_(std::make_unique<Server>()) {
   Server& s = *server_;
   s.html = std::move(html);
-  s.http.new_task_queue = [] { return new httplib::ThreadPool(most_streams + 2); };
+  s.http.new_task_queue = [] { return new httplib::ThreadPool(most_streams + 2); };  // NOLINT(cppcoreguidelines-owning-memory): the server takes it
   s.http.set_socket_options([](socket_t socket) {
     const int on = 1;
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);  // not SO_REUSEPORT: a port that is taken must be seen to be

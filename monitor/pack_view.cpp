@@ -1,8 +1,8 @@
 #include "monitor/pack_view.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 
 #include <fmt/format.h>
@@ -47,7 +47,8 @@ std::vector<Reading> cells_of(const BusState& bus) {
     each_signal(bus, message.name, [&](const SignalInfo& signal, double value, bool stale) {
       const std::string_view name = signal.name;
       if (!name.starts_with("Cell") || !std::isfinite(value)) return;
-      const int number = std::atoi(signal.name + 4);
+      int number = 0;
+      std::from_chars(name.data() + 4, name.data() + name.size(), number);
       if (number < 1 || number > 64) return;
       if (cells.size() < static_cast<std::size_t>(number)) cells.resize(static_cast<std::size_t>(number));
       cells[static_cast<std::size_t>(number) - 1] = {value, age_s, stale};

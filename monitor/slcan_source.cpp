@@ -17,8 +17,7 @@ namespace {
 
 class Slcan : public FrameSource {
  public:
-  explicit Slcan(const std::string& device) {
-    fd_ = open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  explicit Slcan(const std::string& device) : fd_(open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
     if (fd_ < 0) throw SourceRefused(device, 1, "cannot be opened, expected a serial port (" + std::generic_category().message(errno) + ")");
     if (tcgetattr(fd_, &before_) != 0) {
       close(fd_);

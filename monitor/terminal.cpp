@@ -58,14 +58,14 @@ void leave() {
 
 void on_crash(int number) {
   leave();
-  signal(number, SIG_DFL);
-  raise(number);
+  static_cast<void>(signal(number, SIG_DFL));
+  static_cast<void>(raise(number));
 }
 
 void on_suspend(int) {
   const int kept = errno;
   leave();
-  raise(SIGSTOP);  // until SIGCONT
+  static_cast<void>(raise(SIGSTOP));  // until SIGCONT
   enter();
   size_changed = 1;
   errno = kept;
@@ -92,8 +92,8 @@ Terminal::Terminal() {
 
 Terminal::~Terminal() {
   leave();
-  for (const int number : crashes) signal(number, SIG_DFL);
-  signal(SIGTSTP, SIG_DFL);
+  for (const int number : crashes) static_cast<void>(signal(number, SIG_DFL));
+  static_cast<void>(signal(SIGTSTP, SIG_DFL));
 }
 
 ScreenSize Terminal::size() {
@@ -104,7 +104,7 @@ ScreenSize Terminal::size() {
 
 bool Terminal::shows_utf8() {
   for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {
-    const char* value = std::getenv(name);
+    const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing here sets one
     if (value == nullptr || *value == '\0') continue;
     const std::string_view text = value;
     return text.find("UTF-8") != text.npos || text.find("utf8") != text.npos || text.find("UTF8") != text.npos || text.find("utf-8") != text.npos;
@@ -129,11 +129,11 @@ StopRequest::StopRequest() {
   size_changed = 0;
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) handle(number, on_stop);
   handle(SIGWINCH, on_resize);
-  signal(SIGPIPE, SIG_IGN);
+  static_cast<void>(signal(SIGPIPE, SIG_IGN));
 }
 
 StopRequest::~StopRequest() {
-  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGWINCH, SIGPIPE}) signal(number, SIG_DFL);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGWINCH, SIGPIPE}) static_cast<void>(signal(number, SIG_DFL));
 }
 
 bool StopRequest::asked() const { return stop_asked != 0; }

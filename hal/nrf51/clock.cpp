@@ -38,7 +38,7 @@ void clock_start() {
 }
 
 std::uint64_t now_us() {
-  std::uint32_t mask;
+  std::uint32_t mask = 0;
   asm volatile("mrs %0, primask\n cpsid i" : "=r"(mask)::"memory");
   const std::uint64_t us = read_timer();
   asm volatile("msr primask, %0" ::"r"(mask) : "memory");
