@@ -18,8 +18,8 @@ namespace bms {
 
 namespace {
 
-std::vector<std::string> command(const std::filesystem::path& image, const std::vector<std::string>& arguments, const std::vector<std::string>& more, const std::filesystem::path& socket) {
-  auto words = emulator_command(emulated_boards().front(), image, arguments);
+std::vector<std::string> command(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<std::string>& arguments, const std::vector<std::string>& more, const std::filesystem::path& socket) {
+  auto words = emulator_command(board, image, arguments);
   words.insert(words.end(), {"-serial", "unix:" + socket.string() + ",server=on,wait=on"});
   words.insert(words.end(), more.begin(), more.end());
   return words;
@@ -39,8 +39,8 @@ std::uint64_t little_endian(const std::string& frame, std::size_t at, std::size_
 
 }  // namespace
 
-SlcanBoard::SlcanBoard(const std::filesystem::path& image, const std::vector<std::string>& arguments, const std::vector<std::string>& more)
-    : emulator_(command(image, arguments, more, folder_.path() / "uart"), folder_.path() / "log") {
+SlcanBoard::SlcanBoard(const std::filesystem::path& image, const std::vector<std::string>& arguments, const std::vector<std::string>& more, const EmulatedBoard& board)
+    : emulator_(command(board, image, arguments, more, folder_.path() / "uart"), folder_.path() / "log") {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const std::string path = (folder_.path() / "uart").string();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "host_sim/child_process.hpp"
+#include "host_sim/emulator.hpp"
 
 namespace bms {
 
@@ -24,7 +25,7 @@ struct BoardTelemetry {
 class SlcanBoard {
  public:
   /// arguments: the program's; the first is the file that is its flash for data. more: options of the emulator.
-  explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {}, const std::vector<std::string>& more = {});
+  explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {}, const std::vector<std::string>& more = {}, const EmulatedBoard& board = emulated_boards().front());
   ~SlcanBoard();
   SlcanBoard(const SlcanBoard&) = delete;
   SlcanBoard& operator=(const SlcanBoard&) = delete;
