@@ -50,8 +50,8 @@ struct Outputs {
 };
 
 struct ContactorPlan {
-  std::uint32_t test_us = 0, half_time_constant_us = 0, link_discharge_us = 0;
-  std::int32_t rest_ua = 0;
+  std::uint32_t test_us, half_time_constant_us, link_discharge_us;
+  std::int32_t rest_ua;
 
   /// Time in a state is counted up to that.
   constexpr std::uint32_t longest_us() const { return std::max({3 * test_us, 12 * half_time_constant_us, link_discharge_us}); }
@@ -179,10 +179,7 @@ class Contactors {
 
   constexpr void closed(const ContactorInput& in, Request mine) {
     if (in.link_uv != no_reading && in.pack_uv != no_reading) events_.not_closed = in.link_uv < part_of(in.pack_uv, 960);
-    const bool flows_in = in.current_ua != no_reading && in.current_ua > plan_->rest_ua, flows_out = in.current_ua != no_reading && in.current_ua < -plan_->rest_ua;
-    const bool ignored = (in.charge_forbidden && flows_in) || (in.discharge_forbidden && flows_out);
-    if (ignored) count(ignored_us_, in.step_us, grace_us);
-    else ignored_us_ = 0;
+    count_grace(in, forbidden_flows(in));
     if (ignored_us_ == grace_us) return enter(ContactorState::opening);
     if (in.request == mine && !in.open) return;
     const std::uint32_t ignored_us = ignored_us_;  // a second reason is no second time of grace
@@ -192,10 +189,17 @@ class Contactors {
 
   constexpr void in_unloading(const ContactorInput& in) {
     const bool flows = in.current_ua == no_reading || magnitude_of(in.current_ua) > plan_->rest_ua;
-    const bool ordered = in.open || (in.charge_forbidden && flows && in.current_ua > 0) || (in.discharge_forbidden && flows && in.current_ua < 0);
-    if (ordered) count(ignored_us_, in.step_us, grace_us);
-    else ignored_us_ = 0;
+    count_grace(in, in.open || forbidden_flows(in));
     if (!flows || ignored_us_ == grace_us) enter(ContactorState::opening);
+  }
+
+  constexpr bool forbidden_flows(const ContactorInput& in) const {
+    return in.current_ua != no_reading && ((in.charge_forbidden && in.current_ua > plan_->rest_ua) || (in.discharge_forbidden && in.current_ua < -plan_->rest_ua));
+  }
+  /// How long current has flowed that is to cease. A reading that is missing now and then is no new beginning.
+  constexpr void count_grace(const ContactorInput& in, bool to_cease) {
+    if (to_cease) count(ignored_us_, in.step_us, grace_us);
+    else if (in.current_ua != no_reading) ignored_us_ = 0;
   }
 
   constexpr void in_opening(const ContactorInput& in) {

@@ -10,7 +10,7 @@ namespace bms::protection {
 
 struct PackDesign {
   model::Limits limits;                       ///< of a cell
-  double capacity_ah = 0;
+  double capacity_ah;
   std::uint8_t cells = 16;
   std::uint8_t temperatures = 1;              ///< sensors fitted, the first of PackSample's
   double sample_period_s = 0.1;

@@ -64,7 +64,7 @@ class Log {
   void open();
 
   struct Found {
-    std::uint8_t layout = 0;
+    std::uint8_t layout;
     std::span<const std::uint8_t> payload;  ///< in `into`
   };
   /// The newest record of a type whose layout is known_layout at most.
@@ -88,9 +88,9 @@ class Log {
   enum class Sector : std::uint8_t { dirty, erased, broken };
   struct Header {
     Kind kind;
-    bool copy = false;
-    std::uint8_t length = 0;
-    std::uint32_t number = 0, crc = 0;
+    bool copy;
+    std::uint8_t length;
+    std::uint32_t number, crc;
   };
   /// What lies in a sector.
   struct Survey {

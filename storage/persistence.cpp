@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 
 #include "hal/watchdog.hpp"
 
@@ -31,9 +32,8 @@ bool put(Log& log, const R& record) {
   return log.store(R::kind, encode(record, bytes)) == Stored::kept;
 }
 
-constexpr bool apart(std::int32_t a, std::int32_t b, std::int32_t by) {
-  const std::int64_t d = std::int64_t{a} - b;
-  return d >= by || -d >= by;
+bool apart(std::int32_t a, std::int32_t b, std::int32_t by) {
+  return std::abs(std::int64_t{a} - b) >= by;
 }
 
 constexpr std::uint16_t counted(std::uint16_t minutes) { return minutes < 0xFFFF ? static_cast<std::uint16_t>(minutes + 1) : minutes; }
@@ -96,13 +96,13 @@ void Persistence::keep(const Values& now, std::optional<std::uint32_t> calendar_
     ++faults_at_once_;
   }
   if (now.pack) {
-    const std::int64_t moved = std::int64_t{now.pack->soc_ppb} - soc_before_ppb_;
+    const auto moved_ppb = static_cast<std::uint32_t>(std::abs(std::int64_t{now.pack->soc_ppb} - soc_before_ppb_));
     soc_before_ppb_ = now.pack->soc_ppb;
     const bool first = !known_ || !kept_in_this_run_;
     const bool has_moved = apart(now.pack->soc_ppb, charge_kept_.pack.soc_ppb, moved_soc_ppb) ||
                            apart(now.pack->soc_sigma_ppb, charge_kept_.pack.soc_sigma_ppb, std::max(moved_soc_ppb / 10, charge_kept_.pack.soc_sigma_ppb / 10));
     const bool long_ago = charge_minutes_ >= charge_at_least_minutes && (charge_.charged_uah != charge_kept_.charged_uah || charge_.discharged_uah != charge_kept_.discharged_uah);
-    if (first || has_moved || long_ago) put_charge(*now.pack, static_cast<std::uint32_t>(std::min<std::int64_t>(moved < 0 ? -moved : moved, 1'000'000'000)), calendar_s);
+    if (first || has_moved || long_ago) put_charge(*now.pack, moved_ppb, calendar_s);
   }
   if (cells_minutes_ >= cells_every_minutes) put_cells(now.cells);
   if (health_minutes_ >= health_every_minutes) put_health(now.health);

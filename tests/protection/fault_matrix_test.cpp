@@ -52,7 +52,7 @@ class Rig {
 
   Quantities values = nothing_known();
   std::uint32_t kept = 0;
-  FaultMonitor monitor{pack.rules};
+  FaultMonitor monitor{pack.rules, 0};
   std::uint64_t time_us = 0;
   bool wrong = false;
 
@@ -241,7 +241,7 @@ TEST(ProtectionTable, KeepsOnlyFaultsOfServiceOverAPowerCycle) {
 // ---- first cause
 
 struct Cause {
-  FaultMonitor monitor{pack.rules};
+  FaultMonitor monitor{pack.rules, 0};
   Rig good;
   std::uint64_t time_us = 0;
   void step(Clear clear = Clear::none, int steps = 1) {
