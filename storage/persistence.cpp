@@ -106,10 +106,7 @@ void Persistence::keep(const Values& now, std::optional<std::uint32_t> calendar_
   }
   if (cells_minutes_ >= cells_every_minutes) put_cells(now.cells);
   if (health_minutes_ >= health_every_minutes) put_health(now.health);
-  if (events_changed_ && faults_at_once_ > 0) {
-    --faults_at_once_;
-    put_events();
-  }
+  if (events_changed_) put_events_in_turn();
   if (settings_changed_) put_settings();
 }
 
@@ -130,9 +127,7 @@ void Persistence::supply_failing(const Values& now, std::optional<std::uint32_t>
 void Persistence::fault(std::uint16_t code) {
   events_.add({code, charge_.operating_s});
   events_changed_ = true;
-  if (faults_at_once_ == 0) return;
-  --faults_at_once_;
-  put_events();
+  put_events_in_turn();
 }
 
 bool Persistence::set(std::uint16_t key, std::int32_t value) {
@@ -175,6 +170,12 @@ void Persistence::put_health(const HealthRecord& now) {
 }
 
 void Persistence::put_events() { events_changed_ = !put(log_, events_); }
+/// While some are left of those that may be written at once; what could not be written is none of them.
+void Persistence::put_events_in_turn() {
+  if (faults_at_once_ == 0) return;
+  put_events();
+  if (!events_changed_) --faults_at_once_;
+}
 void Persistence::put_settings() { settings_changed_ = !put(log_, settings_); }
 
 std::uint32_t Persistence::newer_records() const {

@@ -86,6 +86,7 @@ class Persistence {
   void put_cells(std::span<const CellsRecord::Cell> now);
   void put_health(const HealthRecord& now);
   void put_events();
+  void put_events_in_turn();
   void put_settings();
 
   Log log_;
