@@ -198,7 +198,7 @@ TEST_F(PersistenceTest, ChargeIsWrittenWhenItsSigmaHasMovedByATenthOfItself) {
     pack.soc_sigma_ppb = sigma_ppb;
     boot();
     drive(1);
-    EXPECT_EQ(written<ChargeRecord>(3, [&](int minute) { pack.soc_sigma_ppb = sigma_ppb + (minute < 3 ? by_ppb - by_ppb / std::abs(by_ppb) : by_ppb); }), (Minutes{3})) << sigma_ppb << ' ' << by_ppb;
+    EXPECT_EQ(written<ChargeRecord>(3, [&, from = sigma_ppb, by = by_ppb](int minute) { pack.soc_sigma_ppb = from + (minute < 3 ? by - by / std::abs(by) : by); }), (Minutes{3})) << sigma_ppb << ' ' << by_ppb;
   }
 }
 
