@@ -35,8 +35,6 @@ constexpr PackLimits pack_limits(const PackDesign& d) {
 /// A cell's voltage that can be one, or be asked to be protected from: a reversed one reads a little below 0.
 constexpr bool cell_possible(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
 
-constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
-
 template <std::size_t Cells>
 class PackQuantities {
  public:

@@ -118,7 +118,7 @@ void Log::find_sector_in_charge(std::span<const Survey> found) {
 
 template <class See>
 Log::Survey Log::survey(std::uint8_t sector, See&& see) const {
-  Survey s;
+  Survey s{};
   for (std::uint16_t at = 1; at < lines_;) {
     const auto header = identity_in(read_line(sector, at), at);
     if (!header) {

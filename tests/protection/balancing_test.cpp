@@ -157,6 +157,8 @@ TEST(Balancing, OfThirtyTwoCellsEveryOtherHasItsTurnOfEightSeconds) {
   soc.fill(30'000'000);
   soc[31] = 0;
   const auto step = [&] { return balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 1'000'000); };
+  EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 7'999'999), 0x5555'5555U);
+  EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 1), 0x2AAA'AAAAU);
   std::uint32_t before = step();
   while (step() == before) {}  // to the beginning of a turn
   before = ~before & 0x7FFF'FFFFU;
@@ -175,6 +177,7 @@ TEST(Balancing, TellsNoTimeLeftOfNothingToBleedNorByAVoltageThatIsNotKnown) {
   EXPECT_NEAR(b.balancing.left_s(3'330'000), 32e-3 * 6 * 3'600 / (3.33 / 33), 5) << "all at once: no turns to wait for";
   EXPECT_EQ(b.balancing.left_s(no_reading), 0U);
   EXPECT_EQ(b.balancing.left_s(0), 0U);
+  EXPECT_EQ(b.balancing.left_s(1), b.balancing.left_s(33)) << "less than a microampere is taken for one";
   b.step(60);
   for (int k = 0; k < 1'000; ++k) b.step(60);  // ends in the middle of a step: a little more than planned
   EXPECT_EQ(b.balancing.left_s(3'330'000), 0U);

@@ -567,7 +567,8 @@ TEST(Contactors, CountTheTimeOfGraceToItsEndAndAnewOnlyWhenTheCurrentCeased) {
     f.in.current_ua = current_ua;
     EXPECT_EQ(f.step(4.9, pack_uv), drive);
   }
-  EXPECT_EQ(f.step(0.1, pack_uv), opening);
+  EXPECT_EQ(f.step(0.099'999, pack_uv), drive);
+  EXPECT_EQ(f.step(0.000'001, pack_uv), opening);
   Fed other_way;
   other_way.to(drive);
   other_way.in.current_ua = 3'000'000;

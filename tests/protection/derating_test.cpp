@@ -75,8 +75,8 @@ TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
   };
   for (const Point& p : points) {
     const AllowedCurrent a = settled(p.in);
-    EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.012) << p.what;  // 1/1024 of 6 A, twice
-    EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.012) << p.what;
+    EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.004) << p.what;  // less than 1/1024 of 6 A
+    EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.004) << p.what;
     // all is all, and nothing is nothing
     if (p.charge_a == 0 || p.charge_a == 6) { EXPECT_EQ(a.charge_ua, 1e6 * p.charge_a) << p.what; }
     if (p.discharge_a == 0 || p.discharge_a == 6) { EXPECT_EQ(a.discharge_ua, 1e6 * p.discharge_a) << p.what; }

@@ -221,6 +221,39 @@ TEST_P(ServicedProtection, IsKeptOverAPowerCycleAndEndedByServiceBeforeAnythingC
   }
 }
 
+TEST_P(EveryProtection, CountsToTheMicrosecond) {
+  FaultMonitor monitor(pack.rules, 0);
+  Rig rig;
+  const Rule& rule = pack.rules[GetParam()];
+  const auto step = [&](std::int32_t value, std::uint32_t us, Clear clear = Clear::none) {
+    rig.set(row, value);
+    monitor.update(rig.values, us, 0, clear, false);
+    return has(monitor.active(), GetParam());
+  };
+  const Levels l = levels(row);
+  if (rule.delay_us > 0) {
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_FALSE(step(l.just_above, 1'000)) << "starts the delay";
+      EXPECT_FALSE(step(l.just_above, rule.delay_us - 1));
+      EXPECT_FALSE(step(l.just_below, rule.delay_us - 1)) << "as long not beyond: it is forgotten";
+      EXPECT_FALSE(step(l.just_below, 1'000));
+    }
+    EXPECT_FALSE(step(l.just_above, 1'000));
+    EXPECT_FALSE(step(l.just_above, rule.delay_us - 1));
+    EXPECT_TRUE(step(l.just_above, 1));
+  } else {
+    EXPECT_TRUE(step(l.just_above, 0));
+  }
+  if (rule.recover_us == 0 || rule.recovery == Recovery::service) return;
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_TRUE(step(row.release, 1'000)) << "starts the time for it to go";
+    EXPECT_TRUE(step(row.release, rule.recover_us - 1, Clear::user));
+    if (k == 0) { EXPECT_TRUE(step(row.release + (row.beyond == '>' ? 1 : -1), 1'000)) << "and anew"; }
+  }
+  EXPECT_EQ(step(row.release, 1), row.recovery == 'c');
+  EXPECT_FALSE(step(row.release, 0, Clear::user));
+}
+
 TEST_P(EveryProtection, NeitherComesNorGoesWhileItsQuantityIsNotKnown) {
   Rig rig;
   rig.set(row, no_reading);
@@ -375,9 +408,9 @@ TEST(Quantities, OfAnySampleAreThoseOfTheirDefinitions) {
         if (random.uniform() < same && uv != no_reading) continue;
         uv = random.uniform() < missing ? no_reading : random.uniform() < 0.1 ? whole(-500'000, 5'000'000) : level_uv + whole(-20'000, 20'000);
       }
-      if (random.uniform() < 0.3) {  // a broken wire, wherever
+      if (random.uniform() < 0.3) {  // a broken wire, wherever; or a reading that cannot be, beside one that can
         const auto k = static_cast<std::size_t>(whole(0, 14));
-        const int by = whole(-400'000, 400'000);
+        const int by = random.uniform() < 0.2 ? whole(-4'500'000, 4'500'000) : whole(-400'000, 400'000);
         s.cell_uv[k] = level_uv + by;
         s.cell_uv[k + 1] = level_uv - by + whole(-100'000, 100'000);
       }
@@ -398,7 +431,7 @@ TEST(Quantities, OfAnySampleAreThoseOfTheirDefinitions) {
       stuck_cells += expected[21].value_or(0) > 0 ? 1 : 0;
       stuck_sensors += expected[24].value_or(0) > 0 ? 1 : 0;
       std::int64_t sum = 0;
-      for (const std::int32_t uv : s.cell_uv) sum = uv == no_reading || sum == no_reading ? no_reading : sum + uv;
+      for (const std::int32_t uv : s.cell_uv) sum = uv < -500'000 || uv > 6'000'000 || sum == no_reading ? no_reading : sum + uv;
       ASSERT_EQ(quantities.sum_uv(), sum);
     }
   }
@@ -454,6 +487,17 @@ TEST(Quantities, OfLessThanFourCellsGoByThePacksOwnReading) {
   EXPECT_EQ(stuck_in_a_small_pack<4>(20'100, false), 1) << "four know it by themselves";
   EXPECT_EQ(stuck_in_a_small_pack<4>(20'100, false, true), no_reading) << "three of four do not";
   EXPECT_EQ(stuck_in_a_small_pack<4>(20'001, true, true), 1);
+}
+
+TEST(Quantities, OfACellThatMustNotBeChargedHeatByAnyCurrent) {
+  PackDesign d = forklift;
+  d.limits.charge_current_max_a = 0;
+  PackQuantities<16> quantities(pack_limits(d));
+  PackSample<16> s;
+  s.current_ua = 2'560;
+  Quantities q = nothing_known();
+  quantities.update(s, 1'000'000, q);
+  EXPECT_EQ(at(q, Quantity::charge_heat_us), 99'000'000) << "ten times the limit, the most that counts";
 }
 
 TEST(Quantities, OfASensorThatIsNotFittedAreNotMissed) {

@@ -475,6 +475,7 @@ TEST(Protection, AStoreThatFailsIsTheWarningThatItIsAndOthersBelieveTheirs) {
 TEST(Protection, SaysWhatWasKeptBeforeTheFirstSampleAndNothingElse) {
   const Protection<16> fresh(pack);
   EXPECT_EQ(fresh.decision().faults, 0U);
+  EXPECT_EQ(fresh.decision().first.time_us, 0U);
   const Protection<16> p(pack, bit(Fault::short_circuit) | bit(Fault::cell_overvoltage));
   const Decision& d = p.decision();
   EXPECT_EQ(d.faults, bit(Fault::short_circuit)) << "what only a workshop ends";

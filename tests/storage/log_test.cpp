@@ -311,6 +311,62 @@ TEST_F(LogTest, APlaceThatDoesNotTakeItsBitsIsPassedOverAndTheSectorGoesOn) {
   EXPECT_EQ(content(log, 1, 1), Bytes(8, 0xFF)) << "kept is kept";
 }
 
+/// Three tries in a sector, then it is one of the broken.
+TEST_F(LogTest, TwoBadPlacesInARowArePassedOverAndThreeEndTheSector) {
+  for (const std::uint32_t bad : {2U, 3U}) {
+    flash = FlashModel(small, 1);
+    log.open();
+    ASSERT_EQ(keep(log, {1, 1}, number(1)), Stored::kept);
+    while (log.wants_erase()) log.erase_one();
+    const auto here = log.in_force().front();
+    for (std::uint32_t k = 0; k < bad; ++k) flash.flip(here.sector, (here.line + 3U + 2 * k) * storage::line_bytes, 0x10);  // of the next payloads
+    ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::kept);
+    EXPECT_EQ(log.in_force().front().sector == here.sector, bad == 2);
+    EXPECT_EQ(log.broken(), bad == 2 ? 0U : 1U);
+    log.open();
+    EXPECT_EQ(content(log, 1, 1), Bytes(8, 0xFF));
+  }
+}
+
+/// Of three sectors, each holds a later one of type 2; those in the sector in charge decay.
+TEST_F(LogTest, WhatDecaysGivesWayToTheNewestThatIsLeftAndStaysSo) {
+  for (int turns = 2; turns < 8; ++turns) {
+    flash = FlashModel(small, 1);
+    log.open();
+    while (log.wants_erase()) log.erase_one();
+    int version = 0;
+    std::uint8_t sector = 0;
+    for (; version < turns; ++version) {
+      ASSERT_EQ(keep(log, {2, 1}, {2, static_cast<std::uint8_t>(version)}), Stored::kept);
+      if (version == turns - 1) break;
+      sector = log.in_force().front().sector;
+      for (int k = 0; k < 100 && log.in_force().back().sector == sector; ++k) ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept);
+    }
+    sector = log.in_force().back().sector;
+    const Bytes bytes = flash.bytes(sector);
+    for (std::uint32_t at = 16; at + 32 <= 1024; at += 16) {
+      if (bytes[at + 4] % 0x80 == 2 && bytes[at + 5] == 1 && bytes[at + 6] == 2) flash.flip(sector, at + 16, 1);  // a payload of type 2
+    }
+    log.open();
+    EXPECT_EQ(content(log, 2, 1), (Bytes{2, static_cast<std::uint8_t>(turns - 2)})) << turns;
+    EXPECT_EQ(log.in_force().size(), 2U);
+    fill_rounds(100);
+    EXPECT_EQ(content(log, 2, 1), (Bytes{2, static_cast<std::uint8_t>(turns - 2)})) << turns;
+    log.open();
+    EXPECT_EQ(content(log, 2, 1), (Bytes{2, static_cast<std::uint8_t>(turns - 2)})) << turns;
+  }
+}
+
+TEST_F(LogTest, ASectorThatWasErasedIsMarkedAsTheFormatSays) {
+  ASSERT_EQ(keep(log, {1, 1}, {}), Stored::kept);
+  Bytes mark{'R', 'E', 'S', 'D', 1, 0, 0, 0, 0, 0, 0, 0};
+  put(mark, crc32_by_bits(mark));
+  for (std::uint32_t s = 0; s < 3; ++s) {
+    const Bytes sector = flash.bytes(s);
+    EXPECT_EQ(Bytes(sector.begin(), sector.begin() + 16), mark);
+  }
+}
+
 TEST_F(LogTest, NumbersWrap) {
   Bytes sector(flash.size().sector_bytes, 0xFF);
   const std::uint32_t line_0 = 0U - 64;  // the last round before 2^32

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <tuple>
 #include <vector>
 
 #include "hal/watchdog.hpp"
@@ -329,6 +330,79 @@ TEST_F(PersistenceTest, WhenTheSupplySinksChargeIsWrittenAndNothingElse) {
   EXPECT_EQ(p.charge().discharged_uah, 250'000U);
   EXPECT_EQ(p.charge().calendar_s, 4'711U);
   EXPECT_EQ(p.cells().count, 0);
+}
+
+TEST_F(PersistenceTest, AtAShutdownWhatHasChangedIsWrittenWhetherItIsDueOrNot) {
+  boot();
+  cells.assign(16, {});
+  drive(61);
+  const auto everything = [&] { return std::tuple{p.cells(), p.health(), p.events().last(0), p.settings().get(8), p.starting_point()->soc_ppb}; };
+  for (const int k : {1, 2}) {
+    cells[7].soc = static_cast<std::int16_t>(200 * k);
+    health.resistance_ppm += 10'000;
+    pack.soc_ppb -= 1;
+    for (int faults = 0; faults < 20; ++faults) p.fault(static_cast<std::uint16_t>(0x100 * k + faults));
+    p.set(8, k);
+    p.power_failing(now(), std::nullopt);
+    const auto stored = std::tuple{p.cells(), p.health(), p.events().last(0), p.settings().get(8), pack.soc_ppb};
+    EXPECT_EQ(p.cells().cell[7].soc, 200 * k);
+    EXPECT_EQ(p.health(), health);
+    boot(ResetCause::software);
+    EXPECT_EQ(everything(), stored);
+    const auto before = steps();
+    p.power_failing({std::nullopt, cells, health}, std::nullopt);
+    EXPECT_LE(steps() - before, 80U) << "the events of this start, and the record before them once more";
+  }
+}
+
+/// Sigma after a reset: by what soc moved in the minute before, also in the first minute of a run.
+TEST_F(PersistenceTest, TheFirstMinuteOfARunCountsFromWhatWasStored) {
+  boot();
+  drive(1);
+  boot(ResetCause::watchdog);
+  drive(1, -3'000'000, -5'000'000);
+  boot(ResetCause::watchdog);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 595'000'000);
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, percent_ppb + 5'000'000);
+}
+
+TEST_F(PersistenceTest, AUnitIsCountedWhenItIsWhole) {
+  for (const std::int32_t sign : {1, -1}) {
+    boot();
+    const auto before = p.charge();
+    Sample s;
+    s.current_ua = sign * 59'999;
+    s.time_us = 60'001;  // one uA us less than a uAh
+    p.count(s);
+    p.supply_failing({}, std::nullopt);
+    EXPECT_EQ(p.charge().charged_uah + p.charge().discharged_uah, before.charged_uah + before.discharged_uah);
+    s.current_ua = sign;
+    s.time_us += 1;
+    p.count(s);
+    s.current_ua = 0;
+    s.time_us += 1'000'000 - 60'003;
+    p.count(s);
+    p.supply_failing({}, std::nullopt);
+    EXPECT_EQ(p.charge().charged_uah - before.charged_uah, sign > 0 ? 1U : 0U);
+    EXPECT_EQ(p.charge().discharged_uah - before.discharged_uah, sign < 0 ? 1U : 0U);
+    EXPECT_EQ(p.charge().operating_s, before.operating_s) << "a microsecond is missing";
+    s.time_us += 1;
+    p.count(s);
+    p.supply_failing({}, std::nullopt);
+    EXPECT_EQ(p.charge().operating_s, before.operating_s + 1);
+    p.power_failing(now(), std::nullopt);
+  }
+}
+
+TEST_F(PersistenceTest, AfterYearsOfStandingStillWhatMovesIsWritten) {
+  cells.assign(16, {});
+  boot();
+  for (int minute = 0; minute < 0x1'0000 + 62; ++minute) p.keep(now(), std::nullopt);  // the counters of minutes have stopped at their end
+  cells[2].soc = 1'000;
+  health.capacity_ppm = 900'000;
+  p.keep(now(), std::nullopt);
+  EXPECT_EQ(p.cells().cell[2].soc, 1'000);
+  EXPECT_EQ(p.health(), health);
 }
 
 TEST_F(PersistenceTest, TimeAndChargeAreCountedFromTheFirstSampleByAClockThatGoesOn) {
