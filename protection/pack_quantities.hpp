@@ -76,8 +76,8 @@ class PackQuantities {
         continue;
       }
       sum += uv;
-      if (high == no_reading || uv > high) high = uv;
-      if (low == no_reading || uv < low) low = uv;
+      high = std::max(high, uv);  // no_reading is less than any
+      low = low == no_reading ? uv : std::min(low, uv);
     }
     const auto known = static_cast<std::int32_t>(Cells) - missing;
     sum_uv_ = missing == 0 ? sum : no_reading;
@@ -140,8 +140,8 @@ class PackQuantities {
       if (!temperature_possible(all[k])) continue;
       ++known;
       sum += all[k];
-      if (high == no_reading || all[k] > high) high = all[k];
-      if (low == no_reading || all[k] < low) low = all[k];
+      high = std::max<std::int32_t>(high, all[k]);
+      low = low == no_reading ? all[k] : std::min<std::int32_t>(low, all[k]);
     }
     at(q, Quantity::temperatures_missing) = limits_.temperatures - known;
     at(q, Quantity::highest_cdegc) = high;

@@ -102,8 +102,8 @@ class Protection {
     ignored_ = 0;
     Quantities q = nothing_known();
     quantities_.update(sample, step_us, q);
-    at(q, Quantity::contradiction) = estimate.contradicts ? 1 : 0;
-    at(q, Quantity::store_failed) = orders.storage_fault ? 1 : 0;
+    at(q, Quantity::contradiction) = estimate.contradicts;
+    at(q, Quantity::store_failed) = orders.storage_fault;
     at(q, Quantity::sample_age_us) = static_cast<std::int32_t>(age_us);
     clear_ = orders.clear;
     find_faults(q, step_us, orders);
@@ -143,7 +143,7 @@ class Protection {
   static constexpr std::int32_t most_age_us = 2'000'000'000;
 
   static constexpr bool later(std::uint64_t a_us, std::uint64_t b_us) { return a_us - b_us - 1 < std::uint64_t{1} << 63; }
-  static constexpr std::uint32_t clamped(std::uint64_t us) { return us < most_age_us ? static_cast<std::uint32_t>(us) : most_age_us; }
+  static constexpr std::uint32_t clamped(std::uint64_t us) { return static_cast<std::uint32_t>(std::min<std::uint64_t>(us, most_age_us)); }
 
   /// One of which nothing was read is none.
   static constexpr bool measured(const PackSample<Cells>& s) {
@@ -164,10 +164,10 @@ class Protection {
     const bool intact = monitor_.intact() && contactors_.intact() && plan_->cells == Cells;  // a plan of another pack is no plan
     if (!monitor_.intact()) monitor_.distrust();
     const ContactorEvents& seen = contactors_.events();
-    at(q, Quantity::off_curve) = seen.precharge_failed ? 1 : 0;
-    at(q, Quantity::welded) = seen.welded ? 1 : 0;
-    at(q, Quantity::not_closed) = seen.not_closed ? 1 : 0;
-    at(q, Quantity::self_contradiction) = intact && !orders.board_fault ? 0 : 1;
+    at(q, Quantity::off_curve) = seen.precharge_failed;
+    at(q, Quantity::welded) = seen.welded;
+    at(q, Quantity::not_closed) = seen.not_closed;
+    at(q, Quantity::self_contradiction) = !intact || orders.board_fault;
     decision_.came = monitor_.update(q, step_us, evaluated_us_, orders.clear, !closed_once_);
     decision_.faults = monitor_.active();
     decision_.kept = monitor_.kept();

@@ -86,7 +86,7 @@ constexpr Bytes encode(const ChargeRecord& r, Payload into) {
 constexpr StoredEstimate possible(StoredEstimate e) {
   constexpr std::int32_t one = 1'000'000'000, beyond = one / 4, anything = 289'000'000;
   if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > anything) e.soc_sigma_ppb = anything;
-  e.soc_ppb = e.soc_ppb < 0 ? 0 : e.soc_ppb > one ? one : e.soc_ppb;
+  e.soc_ppb = std::clamp(e.soc_ppb, std::int32_t{0}, one);
   return e;
 }
 

@@ -183,6 +183,14 @@ TEST(Balancing, TellsNoTimeLeftOfNothingToBleedNorByAVoltageThatIsNotKnown) {
   EXPECT_EQ(b.balancing.left_s(3'330'000), 0U);
 }
 
+TEST(Balancing, TellsNoMoreTimeThanItHasDigitsFor) {
+  AtTheTop b;
+  b.plan.uams_per_ppb *= 100;
+  b.soc[5] = 900'000'000;
+  b.step();
+  EXPECT_EQ(b.balancing.left_s(1), 0xFFFF'FFFFU);
+}
+
 TEST(Balancing, CountsTheTimeThatACellWasBledAndNoOther) {
   AtTheTop whole(true), odd(true);
   whole.step();

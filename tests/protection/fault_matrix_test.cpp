@@ -489,6 +489,25 @@ TEST(Quantities, OfLessThanFourCellsGoByThePacksOwnReading) {
   EXPECT_EQ(stuck_in_a_small_pack<4>(20'001, true, true), 1);
 }
 
+TEST(Quantities, OfOneReadableCellAreItsOwnAndOfNoneAreNotKnown) {
+  PackQuantities<16> quantities(pack.limits);
+  PackSample<16> s;
+  Quantities q = nothing_known();
+  s.cell_uv[6] = 3'300'000;
+  quantities.update(s, step_us, q);
+  EXPECT_EQ(at(q, Quantity::highest_cell_uv), 3'300'000);
+  EXPECT_EQ(at(q, Quantity::lowest_cell_uv), 3'300'000);
+  EXPECT_EQ(at(q, Quantity::spread_uv), 0);
+  EXPECT_EQ(at(q, Quantity::opposite_shift_uv), 0);
+  EXPECT_EQ(at(q, Quantity::voltages_missing), 16) << "fifteen cells and the pack";
+  s.cell_uv[6] = no_reading;
+  s.pack_uv = 52'800'000;
+  quantities.update(s, step_us, q);
+  for (const Quantity of : {Quantity::highest_cell_uv, Quantity::lowest_cell_uv, Quantity::spread_uv, Quantity::opposite_shift_uv, Quantity::voltages_stuck, Quantity::sum_error_uv}) EXPECT_EQ(at(q, of), no_reading);
+  EXPECT_EQ(at(q, Quantity::voltages_missing), 16);
+  EXPECT_EQ(at(q, Quantity::pack_uv), 52'800'000);
+}
+
 TEST(Quantities, OfACellThatMustNotBeChargedHeatByAnyCurrent) {
   PackDesign d = forklift;
   d.limits.charge_current_max_a = 0;

@@ -16,7 +16,8 @@
 namespace bms {
 
 namespace hal {
-void watchdog_feed() {}
+int fed = 0;
+void watchdog_feed() { ++fed; }
 }  // namespace hal
 
 namespace {
@@ -90,6 +91,41 @@ TEST_F(PersistenceTest, NewFlashGivesNoStartAndIsErasedAtBoot) {
   EXPECT_FALSE(boot().starting_point());
   EXPECT_FALSE(p.wants_erase());
   EXPECT_EQ(p.events().starts, 1U);
+}
+
+TEST_F(PersistenceTest, TheWatchdogIsFedAfterEveryEraseOfABoot) {
+  hal::fed = 0;
+  boot();
+  EXPECT_EQ(flash.erases(), (std::vector<std::uint64_t>{1, 1, 1}));
+  EXPECT_EQ(hal::fed, 3);
+  boot();
+  EXPECT_EQ(hal::fed, 3) << "nothing is to be erased";
+}
+
+/// Whichever byte of the last record it is in, and whatever a reading makes of it.
+TEST_F(PersistenceTest, ACellThatReadsOtherwiseNowAndThenDoesNotHoldUpABoot) {
+  boot();
+  drive(5, -6'000'000, -2'000'000);
+  while (!p.wants_erase()) {
+    erases_allowed = false;
+    drive(1, -6'000'000, -2'000'000);
+    pack.soc_ppb = 60 * percent_ppb;
+  }
+  const auto records = p.log().in_force();
+  const auto last = *std::max_element(records.begin(), records.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  const FlashModel before = flash;
+  for (std::uint32_t at = last.line * 16U; at < last.line * 16U + 24; at += 5) {
+    for (std::uint32_t every = 1; every < 9; ++every) {
+      flash = before;
+      flash.make_unsteady(last.sector, at, 0x08, every);
+      flash.limit_reads(5'000'000);  // of 12,288 words
+      try {
+        boot(ResetCause::watchdog);
+      } catch (const TooManyReads&) {
+        ADD_FAILURE() << "no end, with a bit of byte " << at << " otherwise every " << every;
+      }
+    }
+  }
 }
 
 TEST_F(PersistenceTest, SocIsResumedAfterAResetWithSigmaForTheMinuteThatWasNotWritten) {
