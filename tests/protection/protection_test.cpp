@@ -178,6 +178,16 @@ TEST(Protection, CountsSamplesOfAClockThatStandsOrGoesBackAsNone) {
   }
 }
 
+TEST(Protection, ASampleThatComesTwiceNowAndThenIsNoClockThatStands) {
+  Bench b;
+  b.drive_off();
+  for (int k = 0; k < 40; ++k) {
+    for (int again = 0; again < 4; ++again) b.protection.update(b.sample, b.estimate, b.orders);
+    EXPECT_EQ(b.step().faults, 0U) << k;
+    EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
+  }
+}
+
 /// A front end that does not answer, a node that is silent: samples come, and nothing was read.
 TEST(Protection, CountsSamplesOfWhichNothingWasReadAsNone) {
   Bench b;
@@ -311,6 +321,31 @@ TEST(Protection, EndsInSafeWithAnInternalFaultAfterEveryOneAndEveryTwoFlippedBit
   EXPECT_EQ(tried, 96U * 97 / 2);
 }
 
+TEST(Protection, EndsInSafeWithAnInternalFaultAfterAnyFlippedBitOfTheSetOfFaults) {
+  Bench closed;
+  closed.drive_off();
+  using Words = std::array<std::uint32_t, sizeof(Protection<16>) / 4>;
+  Words words{};
+  std::memcpy(words.data(), static_cast<void*>(&closed.protection), sizeof words);
+  std::size_t at = 0;  // no fault, inverted, and against the pattern
+  while (at + 2 < words.size() && !(words[at] == 0 && words[at + 1] == ~0U && words[at + 2] == 0x5A3C'96A5)) ++at;
+  ASSERT_LT(at + 2, words.size());
+  for (std::size_t a = 0; a < 96; ++a) {
+    Bench copy = closed;
+    Words flipped = words;
+    flipped[at + a / 32] ^= 1U << (a % 32);
+    std::memcpy(static_cast<void*>(&copy.protection), flipped.data(), sizeof flipped);
+    const Decision& d = copy.step();
+    EXPECT_EQ(d.state, ContactorState::opening) << a;
+    EXPECT_FALSE(d.outputs.any_closed());
+    EXPECT_NE(d.faults & bit(Fault::internal_fault), 0U);
+    copy.load_ua = 0;
+    copy.run(60);
+    EXPECT_EQ(copy.protection.decision().state, ContactorState::safe);
+    EXPECT_NE(copy.protection.decision().faults & bit(Fault::internal_fault), 0U) << "until it is cleared";
+  }
+}
+
 /// Any bit of all that protection keeps, not only of what is guarded: contactors open, or nothing that a later step does not mend.
 TEST(Protection, NeverClosesAgainstASevereFaultWhateverBitFlips) {
   Bench b;
@@ -398,6 +433,10 @@ TEST(Protection, AllowsNoCurrentUnlessTheContactorsAreClosedForIt) {
   EXPECT_EQ(b.protection.decision().allowed.discharge_ua, 0);
   b.drive_off();
   EXPECT_GT(b.protection.decision().allowed.discharge_ua, 5'900'000);
+  Bench closing;
+  closing.orders.request = Request::drive;
+  while (closing.protection.decision().state != ContactorState::drive && closing.count < 100) closing.step();
+  for (int k = 1; k < 20; ++k) EXPECT_LE(closing.step().allowed.discharge_ua, 120'000 * k) << "all of it in five seconds from the closing on";
   b.orders.request = Request::none;
   EXPECT_EQ(b.step().allowed.discharge_ua, 0) << "in the same step";
 }
