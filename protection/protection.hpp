@@ -116,7 +116,7 @@ class Protection {
                                           estimate.soc_sigma_ppb, estimate.model_charge_ua, estimate.model_discharge_ua, (faults & plan_->derates) != 0, no_charge || !closed, no_discharge || !closed},
                                          step_us);
     const std::int32_t pack_uv = at(q, Quantity::pack_uv) != no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
-    switch_contactors({orders.request, false, false, no_charge, no_discharge, sample.current_ua, pack_uv, orders.link_uv, step_us});
+    switch_contactors({.request = orders.request, .charge_forbidden = no_charge, .discharge_forbidden = no_discharge, .current_ua = sample.current_ua, .pack_uv = pack_uv, .link_uv = orders.link_uv, .step_us = step_us});
     if (!may_drive()) decision_.allowed = {};
     decision_.bleed = balancing_.update({sample.cell_uv, estimate.cell_soc_ppb, estimate.cell_sigma_ppb, estimate.soc_ppb, sample.current_ua, at(q, Quantity::highest_cdegc), (faults & (plan_->open | plan_->open_now)) == 0}, step_us);
     decision_.bleed_left_s = balancing_.left_s(at(q, Quantity::lowest_cell_uv));
@@ -187,7 +187,7 @@ class Protection {
     Quantities q = nothing_known();
     at(q, Quantity::sample_age_us) = age_us;
     find_faults(q, step_us, {.clear = clear_, .board_fault = board_fault});
-    switch_contactors({Request::none, false, false, true, true, no_reading, no_reading, no_reading, step_us});
+    switch_contactors({.step_us = step_us});
     decision_.allowed = derating_.update({.charge_forbidden = true, .discharge_forbidden = true}, step_us);
     decision_.bleed = 0;
     balancing_.stop();

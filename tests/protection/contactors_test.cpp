@@ -577,6 +577,26 @@ TEST(Contactors, CountTheTimeOfGraceToItsEndAndAnewOnlyWhenTheCurrentCeased) {
   EXPECT_EQ(other_way.step(100, pack_uv), unloading) << "what is not forbidden may flow until it ceases";
 }
 
+/// Steps that no limit is a multiple of, and such that 2^32 us are one of.
+TEST(ContactorTimes, EndWhereTheyEndWhateverTheSteps) {
+  for (const bool in_unloading : {false, true}) {
+    Fed f;
+    f.to(drive);
+    f.in.current_ua = -3'000'000;
+    if (in_unloading) f.to(unloading, Request::none);
+    f.in.discharge_forbidden = true;
+    int steps = 0;
+    while (f.step(0.7, pack_uv) != opening && steps < 100) ++steps;
+    EXPECT_EQ(steps, 7) << "the eighth is beyond five seconds";
+  }
+  Fed charging;
+  charging.to(charge, Request::charge);
+  for (int k = 0; k < 130; ++k) {
+    ASSERT_EQ(charging.step(67.108'864, pack_uv), charge);
+    ASSERT_TRUE(charging.contactors.outputs().charge_enable) << k;
+  }
+}
+
 TEST(WeldedContactor, IsSaidWhenTheTimeForItToShowIsOver) {
   Fed current;
   current.to(drive);

@@ -149,6 +149,7 @@ TEST(Protection, WithoutSamplesOpensFromEveryState) {
       for (std::uint64_t after_us = 10'000; after_us <= 520'000; after_us += 10'000) b.protection.without_sample(b.time_us + after_us);
       ASSERT_FALSE(b.protection.decision().outputs.any_closed()) << steps;
       ASSERT_EQ(b.protection.decision().allowed.discharge_ua, 0);
+      ASSERT_EQ(b.protection.decision().allowed.charge_ua, 0);
     }
   }
   EXPECT_TRUE(tried.contains(ContactorState::self_test) && tried.contains(ContactorState::precharge) && tried.contains(ContactorState::drive) && tried.contains(ContactorState::charge) &&
@@ -343,6 +344,28 @@ TEST(Protection, EndsInSafeWithAnInternalFaultAfterAnyFlippedBitOfTheSetOfFaults
     copy.run(60);
     EXPECT_EQ(copy.protection.decision().state, ContactorState::safe);
     EXPECT_NE(copy.protection.decision().faults & bit(Fault::internal_fault), 0U) << "until it is cleared";
+  }
+}
+
+TEST(Protection, ForgetsNoFaultByAFlippedBitOfIt) {
+  Bench b;
+  b.drive_off();
+  b.orders.storage_fault = true;
+  b.step();
+  b.orders.storage_fault = false;  // it stays until it is cleared
+  b.step();
+  constexpr std::uint32_t there = bit(Fault::storage_fault);
+  std::array<std::uint32_t, sizeof(Protection<16>) / 4> words{};
+  std::memcpy(words.data(), static_cast<void*>(&b.protection), sizeof words);
+  std::size_t at = 0;
+  while (at + 2 < words.size() && !(words[at] == there && words[at + 1] == ~there && words[at + 2] == (there ^ 0x5A3C'96A5))) ++at;
+  ASSERT_LT(at + 2, words.size());
+  for (std::size_t copy = 0; copy < 3; ++copy) {
+    Bench flipped = b;
+    auto with_flip = words;
+    with_flip[at + copy] ^= there;
+    std::memcpy(static_cast<void*>(&flipped.protection), with_flip.data(), sizeof with_flip);
+    EXPECT_EQ(flipped.step().faults, there | bit(Fault::internal_fault)) << copy;
   }
 }
 

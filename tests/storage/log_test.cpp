@@ -352,6 +352,34 @@ TEST_F(LogTest, AMoveOverABadPlaceGoesOnInTheNextSectorWithAllThatThereIs) {
   }
 }
 
+TEST_F(LogTest, WhatDecaysWhileItRunsIsLeftOutOfAMoveAndCostsNothingElse) {
+  ASSERT_EQ(keep(log, {2, 1}, Bytes(20, 0x55)), Stored::kept);
+  ASSERT_EQ(keep(log, {3, 1}, {3}), Stored::kept);
+  const auto record = log.in_force().front();
+  flash.flip(record.sector, (record.line + 2U) * storage::line_bytes, 0x04);
+  fill_rounds(40);
+  EXPECT_NE(log.in_force().back().sector, record.sector);
+  EXPECT_EQ(log.in_force().size(), 2U);
+  log.open();
+  EXPECT_FALSE(content(log, 2, 1));
+  EXPECT_EQ(content(log, 3, 1), (Bytes{3}));
+  EXPECT_EQ(content(log, 1, 1), number(39));
+}
+
+TEST_F(LogTest, OfMoreKindsThanItHoldsSixteenAreInForceAndNothingIsHarmed) {
+  Bytes sector(16, 0xFF);
+  for (std::uint8_t type = 0; type < 40; ++type) {
+    const Bytes record = record_bytes(1U + type, type, 1, {});
+    sector.insert(sector.end(), record.begin(), record.end());
+  }
+  flash.fill(0, sector);
+  log.open();
+  EXPECT_EQ(log.in_force().size(), 16U);
+  EXPECT_EQ(keep(log, {50, 1}, {1}), Stored::refused);
+  EXPECT_EQ(keep(log, {3, 1}, {1}), Stored::kept) << "another of those";
+  EXPECT_EQ(log.in_force().size(), 16U);
+}
+
 /// Of three sectors, each holds a later one of type 2; those in the sector in charge decay.
 TEST_F(LogTest, WhatDecaysGivesWayToTheNewestThatIsLeftAndStaysSo) {
   for (int turns = 2; turns < 8; ++turns) {

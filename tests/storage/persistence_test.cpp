@@ -388,6 +388,9 @@ TEST_F(PersistenceTest, AtAShutdownWhatHasChangedIsWrittenWhetherItIsDueOrNot) {
     const auto before = steps();
     p.power_failing({std::nullopt, cells, health}, std::nullopt);
     EXPECT_LE(steps() - before, 80U) << "the events of this start, and the record before them once more";
+    const auto nothing_left = steps();
+    p.power_failing({std::nullopt, cells, health}, std::nullopt);
+    EXPECT_EQ(steps(), nothing_left);
   }
 }
 
