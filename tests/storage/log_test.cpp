@@ -366,6 +366,31 @@ TEST_F(LogTest, WhatDecaysWhileItRunsIsLeftOutOfAMoveAndCostsNothingElse) {
   EXPECT_EQ(content(log, 1, 1), number(39));
 }
 
+/// The sector in charge is worn, and what it holds decays while an erase is asked for: the other, which was to be erased, is the one that is left.
+TEST_F(LogTest, AnEraseEndsAlsoWhenTheSectorItWasMeantForComesInCharge) {
+  flash = FlashModel(two, 1);
+  log.open();
+  ASSERT_EQ(keep(log, {2, 1}, {2}), Stored::kept);
+  const auto first = log.in_force().front().sector;
+  int k = 0;
+  while (log.in_force().back().sector == first) ASSERT_EQ(keep(log, {1, 1}, number(++k)), Stored::kept);
+  const auto records = log.in_force();
+  const storage::Record copy = records.front(), last = records.back();
+  ASSERT_EQ(copy.kind.type, 2);
+  for (std::uint32_t place = 0; place < 3; ++place) flash.flip(last.sector, (last.line + 3U + 2 * place) * storage::line_bytes, 0x10);
+  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::wants_erase) << "the sector is broken, the other is to be erased";
+  flash.flip(copy.sector, (copy.line + 1U) * storage::line_bytes, 1);
+  EXPECT_EQ(content(log, 2, 1), (Bytes{2})) << "from where it was copied";
+  flash.flip(last.sector, (last.line + 1U) * storage::line_bytes, 1);
+  ASSERT_TRUE(log.wants_erase());
+  const auto erases = flash.erases();
+  EXPECT_TRUE(log.erase_one());
+  EXPECT_EQ(flash.erases(), erases);
+  EXPECT_EQ(content(log, 2, 1), (Bytes{2}));
+  EXPECT_EQ(content(log, 1, 1), number(k - 1));
+  EXPECT_EQ(log.broken(), 1U);
+}
+
 TEST_F(LogTest, OfMoreKindsThanItHoldsSixteenAreInForceAndNothingIsHarmed) {
   Bytes sector(16, 0xFF);
   for (std::uint8_t type = 0; type < 40; ++type) {
