@@ -357,6 +357,21 @@ TEST(FirstCause, OfAWarningThatDeratesGivesWayButNotToAnotherWarning) {
   EXPECT_EQ(c.first(), Fault::charge_overcurrent);
 }
 
+TEST(FirstCause, ThatGoesWithTheSampleThatBringsAnotherGivesWayToIt) {
+  Cause c;
+  at(c.good.values, Quantity::currents_missing) = 1;
+  c.step(Clear::none, 6);
+  ASSERT_EQ(c.first(), Fault::current_missing);
+  at(c.good.values, Quantity::currents_missing) = 0;
+  c.step(Clear::none, 50);
+  ASSERT_EQ(c.monitor.active(), bit(Fault::current_missing));
+  at(c.good.values, Quantity::charge_heat_us) = 40'000'000;
+  c.step();
+  ASSERT_EQ(c.monitor.active(), bit(Fault::charge_overcurrent));
+  EXPECT_EQ(c.first(), Fault::charge_overcurrent);
+  EXPECT_EQ(c.monitor.first().time_us, 57U * step_us);
+}
+
 TEST(FirstCause, IsForgottenByAClearThatLeavesNothing) {
   Cause c;
   at(c.good.values, Quantity::store_failed) = 1;
