@@ -16,6 +16,7 @@ namespace bms {
 struct StoredEstimate {
   std::int32_t soc_ppb = 0;
   std::int32_t soc_sigma_ppb = 0;
+  constexpr bool operator==(const StoredEstimate&) const = default;
 };
 
 inline constexpr std::int32_t lost_ppb_per_day = 2'000'000;

@@ -26,9 +26,9 @@
 namespace bms::protection {
 
 struct BalancingPlan {
-  std::int32_t bleed_ohm = 1, rest_ua = 0, lowest_uv = 0, warmest_cdegc = 0;
-  std::int64_t uams_per_ppb = 0;  ///< charge of 1e-9 of the capacity [uA ms]
-  bool neighbours_may_bleed = false;
+  std::int32_t bleed_ohm, rest_ua, lowest_uv, warmest_cdegc;
+  std::int64_t uams_per_ppb;  ///< charge of 1e-9 of the capacity [uA ms]
+  bool neighbours_may_bleed;
 };
 
 constexpr BalancingPlan balancing_plan(const PackDesign& d) {
@@ -42,8 +42,8 @@ struct BalancingInput {
   const std::array<std::int32_t, Cells>& cell_uv;
   const std::array<std::int32_t, Cells>& soc_ppb;    ///< of each cell less the mean's; no_reading: not known
   const std::array<std::int32_t, Cells>& sigma_ppb;
-  std::int32_t mean_soc_ppb = no_reading, current_ua = no_reading, highest_cdegc = no_reading;
-  bool allowed = false;  ///< no fault is in the way
+  std::int32_t mean_soc_ppb, current_ua, highest_cdegc;  ///< no_reading: not known
+  bool allowed;  ///< no fault is in the way
 };
 
 template <std::size_t Cells>

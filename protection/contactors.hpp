@@ -50,8 +50,8 @@ struct Outputs {
 };
 
 struct ContactorPlan {
-  std::uint32_t test_us = 0, half_time_constant_us = 0, link_discharge_us = 0;
-  std::int32_t rest_ua = 0;
+  std::uint32_t test_us, half_time_constant_us, link_discharge_us;
+  std::int32_t rest_ua;
 
   /// Time in a state is counted up to that.
   constexpr std::uint32_t longest_us() const { return std::max({3 * test_us, 12 * half_time_constant_us, link_discharge_us}); }
@@ -67,7 +67,7 @@ struct ContactorInput {
   bool open = false, open_now = false;  ///< a fault with that reaction is there
   bool charge_forbidden = false, discharge_forbidden = false;
   std::int32_t current_ua = no_reading, pack_uv = no_reading, link_uv = no_reading;
-  std::uint32_t step_us = 0;
+  std::uint32_t step_us;
 };
 
 /// What the contactors find out by themselves.
@@ -98,8 +98,8 @@ class Contactors {
 
  private:
   static constexpr std::uint32_t longest_halves = 12;
-  /// 1 - exp(-k / 2) less a fifth, k = 0 .. 12, in 1/1024.
-  static constexpr std::array<std::int32_t, longest_halves + 1> slowest = {0, 198, 442, 591, 681, 735, 768, 788, 800, 808, 812, 815, 817};
+  /// 1 - exp(-k / 2) less a fifth, k = 0 .. 11, in 1/1024.
+  static constexpr std::array<std::int32_t, longest_halves> slowest = {0, 198, 442, 591, 681, 735, 768, 788, 800, 808, 812, 815};
 
   constexpr void enter(ContactorState s) {
     state_.set(static_cast<std::uint32_t>(s));
@@ -136,7 +136,7 @@ class Contactors {
   }
 
   constexpr bool blocked(const ContactorInput& in) const {
-    return in.open || in.open_now || (in.request == Request::drive && in.discharge_forbidden) || (in.request == Request::charge && in.charge_forbidden);
+    return in.open || (in.request == Request::drive && in.discharge_forbidden) || (in.request == Request::charge && in.charge_forbidden);
   }
 
   static constexpr void count(std::uint32_t& us, std::uint32_t step_us, std::uint32_t most) { us = us >= most || step_us >= most - us ? most : us + step_us; }
@@ -179,10 +179,7 @@ class Contactors {
 
   constexpr void closed(const ContactorInput& in, Request mine) {
     if (in.link_uv != no_reading && in.pack_uv != no_reading) events_.not_closed = in.link_uv < part_of(in.pack_uv, 960);
-    const bool flows_in = in.current_ua != no_reading && in.current_ua > plan_->rest_ua, flows_out = in.current_ua != no_reading && in.current_ua < -plan_->rest_ua;
-    const bool ignored = (in.charge_forbidden && flows_in) || (in.discharge_forbidden && flows_out);
-    if (ignored) count(ignored_us_, in.step_us, grace_us);
-    else ignored_us_ = 0;
+    count_grace(in, forbidden_flows(in));
     if (ignored_us_ == grace_us) return enter(ContactorState::opening);
     if (in.request == mine && !in.open) return;
     const std::uint32_t ignored_us = ignored_us_;  // a second reason is no second time of grace
@@ -191,17 +188,24 @@ class Contactors {
   }
 
   constexpr void in_unloading(const ContactorInput& in) {
-    const bool flows = in.current_ua == no_reading || magnitude_of(in.current_ua) > plan_->rest_ua;
-    const bool ordered = in.open || (in.charge_forbidden && flows && in.current_ua > 0) || (in.discharge_forbidden && flows && in.current_ua < 0);
-    if (ordered) count(ignored_us_, in.step_us, grace_us);
-    else ignored_us_ = 0;
+    const bool flows = in.current_ua == no_reading || magnitude(in.current_ua) > plan_->rest_ua;
+    count_grace(in, in.open || forbidden_flows(in));
     if (!flows || ignored_us_ == grace_us) enter(ContactorState::opening);
+  }
+
+  constexpr bool forbidden_flows(const ContactorInput& in) const {
+    return in.current_ua != no_reading && ((in.charge_forbidden && in.current_ua > plan_->rest_ua) || (in.discharge_forbidden && in.current_ua < -plan_->rest_ua));
+  }
+  /// How long current has flowed that is to cease. A reading that is missing now and then is no new beginning.
+  constexpr void count_grace(const ContactorInput& in, bool to_cease) {
+    if (to_cease) count(ignored_us_, in.step_us, grace_us);
+    else if (in.current_ua != no_reading) ignored_us_ = 0;
   }
 
   constexpr void in_opening(const ContactorInput& in) {
     const bool faulted = in.open || in.open_now;
     const bool fell = in.link_uv != no_reading && in.pack_uv != no_reading && in.link_uv < part_of(in.pack_uv, 896);
-    const bool rests = in.current_ua != no_reading && magnitude_of(in.current_ua) <= plan_->rest_ua, flows = in.current_ua != no_reading && !rests;
+    const bool rests = in.current_ua != no_reading && magnitude(in.current_ua) <= plan_->rest_ua, flows = in.current_ua != no_reading && !rests;
     if (fell && rests && in_state_us_ >= plan_->test_us) return enter(faulted ? ContactorState::safe : ContactorState::off);
     see_open(in);
     if (in_state_us_ < plan_->test_us || (!flows && in_state_us_ < plan_->link_discharge_us)) events_.welded = weld_proven_;  // it may still fall; what is not known is no weld
@@ -218,12 +222,11 @@ class Contactors {
 
   /// While everything is open, or one pole is.
   constexpr void see_open(const ContactorInput& in) {
-    const bool flows = in.current_ua != no_reading && magnitude_of(in.current_ua) > plan_->rest_ua;
+    const bool flows = in.current_ua != no_reading && magnitude(in.current_ua) > plan_->rest_ua;
     const bool stands = in.link_uv != no_reading && in.pack_uv != no_reading && in.pack_uv > 0 && in.link_uv >= part_of(in.pack_uv, 896);
     events_.welded = weld_proven_ || flows || stands;
   }
 
-  static constexpr std::int32_t magnitude_of(std::int32_t v) { return v < 0 ? -v : v; }
   static constexpr std::int32_t part_of(std::int32_t uv, std::int32_t of_1024) { return static_cast<std::int32_t>(static_cast<std::int64_t>(uv) * of_1024 / 1024); }
 
   const ContactorPlan* plan_;

@@ -22,18 +22,16 @@ namespace bms::protection {
 
 /// A line between two points, level outside; in 1/1024.
 struct Ramp {
-  std::int32_t from = 0, to = 1;  ///< from < to
-  std::int32_t at_from = 0, at_to = 1024;
+  std::int32_t from, to;  ///< from < to
+  std::int32_t at_from, at_to;
 
   constexpr std::int32_t at(std::int32_t value) const {
-    if (value <= from) return at_from;
-    if (value >= to) return at_to;
-    return at_from + static_cast<std::int32_t>(static_cast<std::int64_t>(at_to - at_from) * (value - from) / (to - from));
+    return at_from + static_cast<std::int32_t>(static_cast<std::int64_t>(at_to - at_from) * (std::clamp(value, from, to) - from) / (to - from));
   }
 };
 
 struct DeratingPlan {
-  std::int32_t charge_most_ua = 0, discharge_most_ua = 0;
+  std::int32_t charge_most_ua, discharge_most_ua;
   Ramp charge_voltage, charge_cold, charge_warm, charge_soc;
   Ramp discharge_voltage, discharge_cold, discharge_warm, discharge_soc;
 };

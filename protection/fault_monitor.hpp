@@ -43,7 +43,7 @@ struct FirstCause {
 class FaultMonitor {
  public:
   /// kept: what the last run stored of kept().
-  constexpr explicit FaultMonitor(const Rules& rules, std::uint32_t kept = 0)
+  constexpr FaultMonitor(const Rules& rules, std::uint32_t kept)
       : rules_(&rules), of_service_(faults_with(rules, Recovery::service)), active_(kept & of_service_), serviceable_(kept & of_service_) {}
 
   /// step_us: since the last call. servable: nothing has been closed since the start. Returns the faults that came with this sample.

@@ -10,7 +10,7 @@ namespace bms::protection {
 
 class Guarded {
  public:
-  constexpr explicit Guarded(std::uint32_t value = 0) { set(value); }
+  constexpr explicit Guarded(std::uint32_t value) { set(value); }
   constexpr void set(std::uint32_t value) {
     value_ = value;
     inverted_ = ~value;

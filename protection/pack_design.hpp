@@ -2,6 +2,7 @@
 // SI units, as cell files hold them; everything derived from it is an integer and made in the compiler.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "model/cell_parameters.hpp"
@@ -10,7 +11,7 @@ namespace bms::protection {
 
 struct PackDesign {
   model::Limits limits;                       ///< of a cell
-  double capacity_ah = 0;
+  double capacity_ah;
   std::uint8_t cells = 16;
   std::uint8_t temperatures = 1;              ///< sensors fitted, the first of PackSample's
   double sample_period_s = 0.1;
@@ -25,6 +26,7 @@ struct PackDesign {
 
 constexpr std::int32_t in_micro(double value) { return static_cast<std::int32_t>(value * 1e6 + (value < 0 ? -0.5 : 0.5)); }
 constexpr std::int32_t in_centi(double value) { return static_cast<std::int32_t>(value * 1e2 + (value < 0 ? -0.5 : 0.5)); }
+constexpr std::int32_t magnitude(std::int32_t value) { return std::max(value, -value); }
 constexpr std::uint32_t in_us(double seconds) { return static_cast<std::uint32_t>(seconds * 1e6 + 0.5); }
 
 }  // namespace bms::protection

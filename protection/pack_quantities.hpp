@@ -23,8 +23,8 @@ namespace bms::protection {
 
 /// Limits of a pack as integers.
 struct PackLimits {
-  std::int32_t charge_ua_256th = 1, discharge_ua_256th = 1;  ///< from where the current heats, over 256
-  std::uint8_t temperatures = 0;
+  std::int32_t charge_ua_256th, discharge_ua_256th;  ///< from where the current heats, over 256
+  std::uint8_t temperatures;
 };
 
 constexpr PackLimits pack_limits(const PackDesign& d) {
@@ -34,8 +34,6 @@ constexpr PackLimits pack_limits(const PackDesign& d) {
 
 /// A cell's voltage that can be one, or be asked to be protected from: a reversed one reads a little below 0.
 constexpr bool cell_possible(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
-
-constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
 
 template <std::size_t Cells>
 class PackQuantities {
@@ -57,8 +55,8 @@ class PackQuantities {
 
  private:
   struct Repeats {
-    std::int32_t value = no_reading, others = 0;  ///< the reading, and where the others were when it last changed
-    std::uint8_t count = 0;
+    std::int32_t value = no_reading, others;  ///< the reading, and where the others were when it last changed
+    std::uint8_t count;
   };
 
   static constexpr bool stuck(Repeats& r, std::int32_t value, std::int32_t others, std::int32_t move) {
@@ -78,8 +76,8 @@ class PackQuantities {
         continue;
       }
       sum += uv;
-      if (high == no_reading || uv > high) high = uv;
-      if (low == no_reading || uv < low) low = uv;
+      high = std::max(high, uv);  // no_reading is less than any
+      low = low == no_reading ? uv : std::min(low, uv);
     }
     const auto known = static_cast<std::int32_t>(Cells) - missing;
     sum_uv_ = missing == 0 ? sum : no_reading;
@@ -122,16 +120,16 @@ class PackQuantities {
     at(q, Quantity::currents_missing) = known ? 0 : 1;
     at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : no_reading;
     if (known) {
-      heat(charge_heat_us_, current_ua > 0 ? current_ua / limits_.charge_ua_256th : 0, step_us);
-      heat(discharge_heat_us_, current_ua < 0 ? -current_ua / limits_.discharge_ua_256th : 0, step_us);
+      heat(charge_heat_us_, current_ua / limits_.charge_ua_256th, step_us);
+      heat(discharge_heat_us_, -current_ua / limits_.discharge_ua_256th, step_us);
     }
     at(q, Quantity::charge_heat_us) = known ? charge_heat_us_ : no_reading;
     at(q, Quantity::discharge_heat_us) = known ? discharge_heat_us_ : no_reading;
   }
 
-  /// times_256: current over its limit; beyond ten it counts as ten, which is a short circuit anyway.
+  /// times_256: current over its limit, less than 0 the other way; beyond ten it counts as ten, which is a short circuit anyway.
   static constexpr void heat(std::int32_t& heat_us, std::int32_t times_256, std::uint32_t step_us) {
-    const std::int32_t held = std::min(times_256, std::int32_t{10 * 256});
+    const std::int32_t held = std::clamp(times_256, std::int32_t{0}, std::int32_t{10 * 256});
     const std::int64_t more_us = (static_cast<std::int64_t>(held * held - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
     heat_us = static_cast<std::int32_t>(std::clamp<std::int64_t>(heat_us + more_us, 0, longest_heat_us));
   }
@@ -142,8 +140,8 @@ class PackQuantities {
       if (!temperature_possible(all[k])) continue;
       ++known;
       sum += all[k];
-      if (high == no_reading || all[k] > high) high = all[k];
-      if (low == no_reading || all[k] < low) low = all[k];
+      high = std::max<std::int32_t>(high, all[k]);
+      low = low == no_reading ? all[k] : std::min<std::int32_t>(low, all[k]);
     }
     at(q, Quantity::temperatures_missing) = limits_.temperatures - known;
     at(q, Quantity::highest_cdegc) = high;

@@ -102,8 +102,8 @@ class Protection {
     ignored_ = 0;
     Quantities q = nothing_known();
     quantities_.update(sample, step_us, q);
-    at(q, Quantity::contradiction) = estimate.contradicts ? 1 : 0;
-    at(q, Quantity::store_failed) = orders.storage_fault ? 1 : 0;
+    at(q, Quantity::contradiction) = estimate.contradicts;
+    at(q, Quantity::store_failed) = orders.storage_fault;
     at(q, Quantity::sample_age_us) = static_cast<std::int32_t>(age_us);
     clear_ = orders.clear;
     find_faults(q, step_us, orders);
@@ -116,7 +116,7 @@ class Protection {
                                           estimate.soc_sigma_ppb, estimate.model_charge_ua, estimate.model_discharge_ua, (faults & plan_->derates) != 0, no_charge || !closed, no_discharge || !closed},
                                          step_us);
     const std::int32_t pack_uv = at(q, Quantity::pack_uv) != no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
-    switch_contactors({orders.request, false, false, no_charge, no_discharge, sample.current_ua, pack_uv, orders.link_uv, step_us});
+    switch_contactors({.request = orders.request, .charge_forbidden = no_charge, .discharge_forbidden = no_discharge, .current_ua = sample.current_ua, .pack_uv = pack_uv, .link_uv = orders.link_uv, .step_us = step_us});
     if (!may_drive()) decision_.allowed = {};
     decision_.bleed = balancing_.update({sample.cell_uv, estimate.cell_soc_ppb, estimate.cell_sigma_ppb, estimate.soc_ppb, sample.current_ua, at(q, Quantity::highest_cdegc), (faults & (plan_->open | plan_->open_now)) == 0}, step_us);
     decision_.bleed_left_s = balancing_.left_s(at(q, Quantity::lowest_cell_uv));
@@ -143,7 +143,7 @@ class Protection {
   static constexpr std::int32_t most_age_us = 2'000'000'000;
 
   static constexpr bool later(std::uint64_t a_us, std::uint64_t b_us) { return a_us - b_us - 1 < std::uint64_t{1} << 63; }
-  static constexpr std::uint32_t clamped(std::uint64_t us) { return us < most_age_us ? static_cast<std::uint32_t>(us) : most_age_us; }
+  static constexpr std::uint32_t clamped(std::uint64_t us) { return static_cast<std::uint32_t>(std::min<std::uint64_t>(us, most_age_us)); }
 
   /// One of which nothing was read is none.
   static constexpr bool measured(const PackSample<Cells>& s) {
@@ -164,10 +164,10 @@ class Protection {
     const bool intact = monitor_.intact() && contactors_.intact() && plan_->cells == Cells;  // a plan of another pack is no plan
     if (!monitor_.intact()) monitor_.distrust();
     const ContactorEvents& seen = contactors_.events();
-    at(q, Quantity::off_curve) = seen.precharge_failed ? 1 : 0;
-    at(q, Quantity::welded) = seen.welded ? 1 : 0;
-    at(q, Quantity::not_closed) = seen.not_closed ? 1 : 0;
-    at(q, Quantity::self_contradiction) = intact && !orders.board_fault ? 0 : 1;
+    at(q, Quantity::off_curve) = seen.precharge_failed;
+    at(q, Quantity::welded) = seen.welded;
+    at(q, Quantity::not_closed) = seen.not_closed;
+    at(q, Quantity::self_contradiction) = !intact || orders.board_fault;
     decision_.came = monitor_.update(q, step_us, evaluated_us_, orders.clear, !closed_once_);
     decision_.faults = monitor_.active();
     decision_.kept = monitor_.kept();
@@ -187,7 +187,7 @@ class Protection {
     Quantities q = nothing_known();
     at(q, Quantity::sample_age_us) = age_us;
     find_faults(q, step_us, {.clear = clear_, .board_fault = board_fault});
-    switch_contactors({Request::none, false, false, true, true, no_reading, no_reading, no_reading, step_us});
+    switch_contactors({.step_us = step_us});
     decision_.allowed = derating_.update({.charge_forbidden = true, .discharge_forbidden = true}, step_us);
     decision_.bleed = 0;
     balancing_.stop();

@@ -11,6 +11,7 @@
 // is discharged too deep and later shorts it (Guo et al., Scientific Reports 6 (2016) 30248).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -80,13 +81,13 @@ constexpr Table protection_table(const PackDesign& d) {
   using enum Reaction;
   const model::Limits& l = d.limits;
   const double span_v = l.voltage_max_v - l.voltage_min_v, cells = d.cells;
-  const double most_a = l.charge_current_max_a > l.discharge_current_max_a ? l.charge_current_max_a : l.discharge_current_max_a;
+  const double most_a = std::max(l.charge_current_max_a, l.discharge_current_max_a);
   const auto high_v = [&](double of_span) { return in_micro(l.voltage_max_v + of_span * span_v); };
   const auto low_v = [&](double of_span) { return in_micro(l.voltage_min_v + of_span * span_v); };
   const auto pack_high_v = [&](double of_span) { return in_micro(cells * (l.voltage_max_v + of_span * span_v)); };
   const auto pack_low_v = [&](double of_span) { return in_micro(cells * (l.voltage_min_v + of_span * span_v)); };
   const auto span = [&](double of_span) { return in_micro(of_span * span_v); };
-  const double freezing_c = l.temperature_min_c > 0 ? l.temperature_min_c : 0;
+  const double freezing_c = std::max(l.temperature_min_c, 0.0);
   const auto row = [](Fault f, Quantity q, Sense s, std::int32_t threshold, double delay_s, std::int32_t release, double recover_s, Recovery recovery, Reaction reaction, const char* why) {
     return Row{{threshold, release, in_us(delay_s), in_us(recover_s), f, q, s, recovery, reaction}, why};
   };

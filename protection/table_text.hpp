@@ -31,10 +31,10 @@ constexpr const char* words(Recovery r) {
 
 /// Of a quantity: what it is, its unit in the table, and how many of the integers make one.
 struct QuantityWords {
-  const char* what;
-  const char* unit;
-  double scale;
-  int digits;
+  const char* what = "";
+  const char* unit = "";
+  double scale = 1;
+  int digits = 0;
 };
 constexpr QuantityWords words(Quantity q) {
   switch (q) {
@@ -48,19 +48,19 @@ constexpr QuantityWords words(Quantity q) {
     case Quantity::lowest_cdegc: return {"coldest sensor", "°C", 1e2, 0};
     case Quantity::opposite_shift_uv: return {"opposite shift of neighbours", "V", 1e6, 3};
     case Quantity::spread_uv: return {"highest less lowest cell", "V", 1e6, 3};
-    case Quantity::contradiction: return {"the model disbelieves the readings", "", 1, 0};
+    case Quantity::contradiction: return {"the model disbelieves the readings"};
     case Quantity::sum_error_uv: return {"sum of cells less pack", "V", 1e6, 3};
-    case Quantity::voltages_missing: return {"voltages missing", "", 1, 0};
-    case Quantity::voltages_stuck: return {"cells stuck", "", 1, 0};
-    case Quantity::currents_missing: return {"current missing", "", 1, 0};
-    case Quantity::temperatures_missing: return {"sensors missing", "", 1, 0};
-    case Quantity::temperatures_stuck: return {"sensors stuck", "", 1, 0};
-    case Quantity::off_curve: return {"pre-charge off its curve", "", 1, 0};
-    case Quantity::welded: return {"link stands, or current flows, while open", "", 1, 0};
-    case Quantity::not_closed: return {"link below the pack while closed", "", 1, 0};
+    case Quantity::voltages_missing: return {"voltages missing"};
+    case Quantity::voltages_stuck: return {"cells stuck"};
+    case Quantity::currents_missing: return {"current missing"};
+    case Quantity::temperatures_missing: return {"sensors missing"};
+    case Quantity::temperatures_stuck: return {"sensors stuck"};
+    case Quantity::off_curve: return {"pre-charge off its curve"};
+    case Quantity::welded: return {"link stands, or current flows, while open"};
+    case Quantity::not_closed: return {"link below the pack while closed"};
     case Quantity::sample_age_us: return {"time since a sample", "s", 1e6, 1};
-    case Quantity::self_contradiction: return {"state contradicts itself, watchdog", "", 1, 0};
-    case Quantity::store_failed: return {"the store says so", "", 1, 0};
+    case Quantity::self_contradiction: return {"state contradicts itself, watchdog"};
+    case Quantity::store_failed: return {"the store says so"};
   }
   return {};
 }

@@ -118,7 +118,7 @@ void Log::find_sector_in_charge(std::span<const Survey> found) {
 
 template <class See>
 Log::Survey Log::survey(std::uint8_t sector, See&& see) const {
-  Survey s;
+  Survey s{};
   for (std::uint16_t at = 1; at < lines_;) {
     const auto header = identity_in(read_line(sector, at), at);
     if (!header) {
@@ -216,7 +216,7 @@ std::optional<std::span<const std::uint8_t>> Log::read(const Record& record, std
 }
 
 Stored Log::store(Kind kind, std::span<const std::uint8_t> payload) {
-  if (lines_ == 0 || payload.size() > longest_payload || (kind.type & copy_bit) != 0) return Stored::refused;
+  if (payload.size() > longest_payload || (kind.type & copy_bit) != 0) return Stored::refused;
   if (!settle()) return Stored::refused;
   std::uint32_t together = lines_of(payload.size()), records = 1;
   for (const Record& r : in_force()) {
@@ -224,7 +224,7 @@ Stored Log::store(Kind kind, std::span<const std::uint8_t> payload) {
     together += lines_of(r.length);
     ++records;
   }
-  if (together > lines_ / 2U || records > most_kept) return Stored::refused;
+  if (together > lines_ / 2U || records > most_kept) return Stored::refused;  // without flash, of no lines
   if (append(kind, payload, longest_record) == Stored::kept) return Stored::kept;
   return move(kind, payload);
 }
@@ -353,13 +353,15 @@ bool Log::wants_erase() const {
 
 bool Log::erase_one() {
   if (!wants_erase() || !settle()) return true;
-  std::uint32_t steps = 1;
-  while (state_[after(steps)] != Sector::dirty || after(steps) == charge_) ++steps;
-  const std::uint8_t sector = after(steps);
-  rescue_from(sector);
-  const bool good = unmark(sector) && hal::flash_erase(sector) && blank(sector, 0, lines_) && mark(sector);
-  state_[sector] = good ? Sector::erased : Sector::broken;
-  return good;
+  for (std::uint32_t steps = 1; steps <= size_.sectors; ++steps) {
+    const std::uint8_t sector = after(steps);
+    if (sector == charge_ || state_[sector] != Sector::dirty) continue;
+    rescue_from(sector);
+    const bool good = unmark(sector) && hal::flash_erase(sector) && blank(sector, 0, lines_) && mark(sector);
+    state_[sector] = good ? Sector::erased : Sector::broken;
+    return good;
+  }
+  return true;  // what was to be erased has come in charge meanwhile
 }
 
 /// Only where a record in the sector in charge has decayed is an older one of its kind in force.

@@ -45,17 +45,17 @@ enum class Stored : std::uint8_t {
 
 /// type: 0 to 127; layout: of its payload, counted up.
 struct Kind {
-  std::uint8_t type = 0, layout = 0;
+  std::uint8_t type, layout;
   constexpr bool operator==(const Kind&) const = default;
 };
 
 /// Where a record is.
 struct Record {
   Kind kind;
-  std::uint8_t sector = 0;
-  std::uint8_t length = 0;   ///< of the payload [bytes]
-  std::uint16_t line = 0;    ///< of the header
-  std::uint32_t number = 0;
+  std::uint8_t sector;
+  std::uint8_t length;   ///< of the payload [bytes]
+  std::uint16_t line;    ///< of the header
+  std::uint32_t number;
 };
 
 class Log {
@@ -64,7 +64,7 @@ class Log {
   void open();
 
   struct Found {
-    std::uint8_t layout = 0;
+    std::uint8_t layout;
     std::span<const std::uint8_t> payload;  ///< in `into`
   };
   /// The newest record of a type whose layout is known_layout at most.
@@ -88,16 +88,16 @@ class Log {
   enum class Sector : std::uint8_t { dirty, erased, broken };
   struct Header {
     Kind kind;
-    bool copy = false;
-    std::uint8_t length = 0;
-    std::uint32_t number = 0, crc = 0;
+    bool copy;
+    std::uint8_t length;
+    std::uint32_t number, crc;
   };
   /// What lies in a sector.
   struct Survey {
-    bool begun = false;                  ///< a header of a record, complete or not
-    bool any = false, original = false;  ///< a complete record; one that is not a copy
-    std::uint32_t base = 0;              ///< number of its line 0 in the round it was written in
-    std::uint16_t last_end = 1;          ///< line behind the last complete record
+    bool begun;              ///< a header of a record, complete or not
+    bool any, original;      ///< a complete record; one that is not a copy
+    std::uint32_t base;      ///< number of its line 0 in the round it was written in
+    std::uint16_t last_end;  ///< line behind the last complete record
     Record last;
   };
   static constexpr std::uint8_t none = 0xFF;

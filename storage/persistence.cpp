@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 
 #include "hal/watchdog.hpp"
 
@@ -31,9 +32,8 @@ bool put(Log& log, const R& record) {
   return log.store(R::kind, encode(record, bytes)) == Stored::kept;
 }
 
-constexpr bool apart(std::int32_t a, std::int32_t b, std::int32_t by) {
-  const std::int64_t d = std::int64_t{a} - b;
-  return d >= by || -d >= by;
+bool apart(std::int32_t a, std::int32_t b, std::int32_t by) {
+  return std::abs(std::int64_t{a} - b) >= by;
 }
 
 constexpr std::uint16_t counted(std::uint16_t minutes) { return minutes < 0xFFFF ? static_cast<std::uint16_t>(minutes + 1) : minutes; }
@@ -96,20 +96,17 @@ void Persistence::keep(const Values& now, std::optional<std::uint32_t> calendar_
     ++faults_at_once_;
   }
   if (now.pack) {
-    const std::int64_t moved = std::int64_t{now.pack->soc_ppb} - soc_before_ppb_;
+    const auto moved_ppb = static_cast<std::uint32_t>(std::abs(std::int64_t{now.pack->soc_ppb} - soc_before_ppb_));
     soc_before_ppb_ = now.pack->soc_ppb;
     const bool first = !known_ || !kept_in_this_run_;
     const bool has_moved = apart(now.pack->soc_ppb, charge_kept_.pack.soc_ppb, moved_soc_ppb) ||
                            apart(now.pack->soc_sigma_ppb, charge_kept_.pack.soc_sigma_ppb, std::max(moved_soc_ppb / 10, charge_kept_.pack.soc_sigma_ppb / 10));
     const bool long_ago = charge_minutes_ >= charge_at_least_minutes && (charge_.charged_uah != charge_kept_.charged_uah || charge_.discharged_uah != charge_kept_.discharged_uah);
-    if (first || has_moved || long_ago) put_charge(*now.pack, static_cast<std::uint32_t>(std::min<std::int64_t>(moved < 0 ? -moved : moved, 1'000'000'000)), calendar_s);
+    if (first || has_moved || long_ago) put_charge(*now.pack, moved_ppb, calendar_s);
   }
   if (cells_minutes_ >= cells_every_minutes) put_cells(now.cells);
   if (health_minutes_ >= health_every_minutes) put_health(now.health);
-  if (events_changed_ && faults_at_once_ > 0) {
-    --faults_at_once_;
-    put_events();
-  }
+  if (events_changed_) put_events_in_turn();
   if (settings_changed_) put_settings();
 }
 
@@ -130,9 +127,7 @@ void Persistence::supply_failing(const Values& now, std::optional<std::uint32_t>
 void Persistence::fault(std::uint16_t code) {
   events_.add({code, charge_.operating_s});
   events_changed_ = true;
-  if (faults_at_once_ == 0) return;
-  --faults_at_once_;
-  put_events();
+  put_events_in_turn();
 }
 
 bool Persistence::set(std::uint16_t key, std::int32_t value) {
@@ -175,6 +170,12 @@ void Persistence::put_health(const HealthRecord& now) {
 }
 
 void Persistence::put_events() { events_changed_ = !put(log_, events_); }
+/// While some are left of those that may be written at once; what could not be written is none of them.
+void Persistence::put_events_in_turn() {
+  if (faults_at_once_ == 0) return;
+  put_events();
+  if (!events_changed_) --faults_at_once_;
+}
 void Persistence::put_settings() { settings_changed_ = !put(log_, settings_); }
 
 std::uint32_t Persistence::newer_records() const {

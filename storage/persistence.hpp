@@ -14,6 +14,7 @@
 // Time is the samples' own. Cost of a sample: counting its charge, some thirty instructions; less without flash.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -45,7 +46,7 @@ class Persistence {
   bool count(const Sample& sample) {
     if (log_.sectors() == 0) return false;
     const std::uint64_t us = counting_ && sample.time_us > time_us_ ? sample.time_us - time_us_ : 0;
-    const std::uint32_t step_us = us < minute_us ? static_cast<std::uint32_t>(us) : minute_us;
+    const auto step_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(us, minute_us));
     counting_ = true;
     time_us_ = sample.time_us;
     if (sample.current_ua > 0) charged_uaus_ += static_cast<std::uint64_t>(sample.current_ua) * step_us;
@@ -86,6 +87,7 @@ class Persistence {
   void put_cells(std::span<const CellsRecord::Cell> now);
   void put_health(const HealthRecord& now);
   void put_events();
+  void put_events_in_turn();
   void put_settings();
 
   Log log_;

@@ -51,6 +51,12 @@ class Decoder {
     value = at_ + size <= from_.size() ? hal::get_bytes<T>(from_, at_, size) : T{};
     at_ += size;
   }
+  template <class T>
+  constexpr T take() {
+    T value;
+    get(value);
+    return value;
+  }
 
  private:
   Bytes from_;
@@ -66,10 +72,7 @@ struct ChargeRecord {
   std::uint32_t operating_s = 0;
   std::uint32_t calendar_s = 0;      ///< hal/calendar.hpp; 0: no clock
 
-  constexpr bool operator==(const ChargeRecord& o) const {
-    return pack.soc_ppb == o.pack.soc_ppb && pack.soc_sigma_ppb == o.pack.soc_sigma_ppb && moved_ppb == o.moved_ppb && charged_uah == o.charged_uah &&
-           discharged_uah == o.discharged_uah && operating_s == o.operating_s && calendar_s == o.calendar_s;
-  }
+  constexpr bool operator==(const ChargeRecord&) const = default;
 };
 
 /// Thousandths of a full cycle: what was discharged over the capacity.
@@ -83,7 +86,7 @@ constexpr Bytes encode(const ChargeRecord& r, Payload into) {
 constexpr StoredEstimate possible(StoredEstimate e) {
   constexpr std::int32_t one = 1'000'000'000, beyond = one / 4, anything = 289'000'000;
   if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > anything) e.soc_sigma_ppb = anything;
-  e.soc_ppb = e.soc_ppb < 0 ? 0 : e.soc_ppb > one ? one : e.soc_ppb;
+  e.soc_ppb = std::clamp(e.soc_ppb, std::int32_t{0}, one);
   return e;
 }
 
@@ -134,8 +137,7 @@ constexpr Bytes encode(const CellsRecord& r, Payload into) {
 
 constexpr bool decode(Bytes from, std::uint8_t layout, CellsRecord& r) {
   Decoder d(from);
-  std::uint8_t count = 0;
-  d.get(count);
+  const auto count = d.take<std::uint8_t>();
   if (layout != 1 || count > CellsRecord::most || from.size() != 1 + std::size_t{4} * count) return false;
   r = {};
   r.count = count;
@@ -253,10 +255,8 @@ constexpr Bytes encode(const SettingsRecord& r, Payload into) {
 
 constexpr bool decode(Bytes from, std::uint8_t layout, SettingsRecord& r) {
   Decoder d(from);
-  std::uint16_t revision = 0;
-  std::uint8_t count = 0;
-  d.get(revision);
-  d.get(count);
+  const auto revision = d.take<std::uint16_t>();
+  const auto count = d.take<std::uint8_t>();
   if (layout != 1 || count > SettingsRecord::most || from.size() != 3 + std::size_t{6} * count) return false;
   r = {};
   r.revision = revision;

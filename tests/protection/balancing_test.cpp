@@ -121,6 +121,106 @@ TEST(Balancing, StopsWhileDrivingWhenWarmWhenEmptyWhenForbiddenAndWhenNothingIsK
   EXPECT_EQ(b.step(), 0U);
 }
 
+TEST(Balancing, GoesByItsLimitsToTheLastDigit) {
+  AtTheTop b(true);
+  b.mean_ppb = 949'999'999;
+  EXPECT_EQ(b.step(), 0U) << "below 95 %";
+  b.mean_ppb = 950'000'000;
+  b.current_ua = -120'001;
+  EXPECT_EQ(b.step(), 0U) << "a fiftieth of 1C is no rest any more";
+  b.current_ua = -120'000;
+  b.sigma[9] = 10'000'000;
+  EXPECT_EQ(b.step(), 1U << 3 | 1U << 5 | 1U << 6) << "all known to 1 % is known";
+  b.sigma[9] = 2'000'000;
+  b.warmest = 5'500;
+  b.uv[3] = 2'990'000;
+  EXPECT_EQ(b.step(), 1U << 3 | 1U << 5 | 1U << 6);
+  b.uv[3] = 2'989'999;
+  EXPECT_EQ(b.step(), 1U << 5 | 1U << 6);
+  b.uv[3] = 3'330'000;
+  b.soc.fill(0);
+  b.mean_ppb = 850'000'000;
+  b.step();
+  b.mean_ppb = 950'000'000;
+  EXPECT_NE(b.step(), 0U) << "the same charge: measured once";
+  b.mean_ppb = 849'999'999;
+  b.step();
+  b.mean_ppb = 950'000'000;
+  EXPECT_EQ(b.step(), 0U) << "measured anew, they are level";
+}
+
+TEST(Balancing, OfThirtyTwoCellsEveryOtherHasItsTurnOfEightSeconds) {
+  const BalancingPlan plan = balancing_plan(forklift);
+  Balancing<32> balancing(plan);
+  std::array<std::int32_t, 32> uv{}, soc{}, sigma{};
+  uv.fill(3'330'000);
+  soc.fill(30'000'000);
+  soc[31] = 0;
+  const auto step = [&] { return balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 1'000'000); };
+  EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 7'999'999), 0x5555'5555U);
+  EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 1), 0x2AAA'AAAAU);
+  std::uint32_t before = step();
+  while (step() == before) {}  // to the beginning of a turn
+  before = ~before & 0x7FFF'FFFFU;
+  for (int turn = 0; turn < 6; ++turn) {
+    ASSERT_TRUE(before == 0x5555'5555U || before == 0x2AAA'AAAAU) << std::hex << before;
+    for (int k = 1; k < 8; ++k) ASSERT_EQ(step(), before) << turn << ' ' << k;
+    before = ~before & 0x7FFF'FFFFU;
+    ASSERT_EQ(step(), before);
+  }
+}
+
+TEST(Balancing, TellsNoTimeLeftOfNothingToBleedNorByAVoltageThatIsNotKnown) {
+  AtTheTop b(true);
+  EXPECT_EQ(b.balancing.left_s(3'330'000), 0U) << "nothing was measured yet";
+  b.step();
+  EXPECT_NEAR(b.balancing.left_s(3'330'000), 32e-3 * 6 * 3'600 / (3.33 / 33), 5) << "all at once: no turns to wait for";
+  EXPECT_EQ(b.balancing.left_s(no_reading), 0U);
+  EXPECT_EQ(b.balancing.left_s(0), 0U);
+  EXPECT_EQ(b.balancing.left_s(1), b.balancing.left_s(33)) << "less than a microampere is taken for one";
+  b.step(60);
+  for (int k = 0; k < 1'000; ++k) b.step(60);  // ends in the middle of a step: a little more than planned
+  EXPECT_EQ(b.balancing.left_s(3'330'000), 0U);
+}
+
+TEST(Balancing, TellsNoMoreTimeThanItHasDigitsFor) {
+  AtTheTop b;
+  b.plan.uams_per_ppb *= 100;
+  b.soc[5] = 900'000'000;
+  b.step();
+  EXPECT_EQ(b.balancing.left_s(1), 0xFFFF'FFFFU);
+}
+
+TEST(Balancing, CountsTheTimeThatACellWasBledAndNoOther) {
+  AtTheTop whole(true), odd(true);
+  whole.step();
+  odd.step();
+  for (int k = 0; k < 2'000; ++k) whole.step(0.1);
+  for (int k = 0; k < 1'998; ++k) odd.step(0.1001);  // parts of milliseconds add up
+  EXPECT_NEAR(whole.balancing.left_s(3'330'000), odd.balancing.left_s(3'330'000), 1);
+  const std::uint32_t left_s = odd.balancing.left_s(3'330'000);
+  odd.balancing.stop();
+  odd.step(3'600);
+  EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "the bleeders were off meanwhile";
+  odd.uv.fill(no_reading);
+  odd.step(3'600);
+  EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "how much it was is not known";
+}
+
+TEST(Balancing, RoundsWhatItKnowsOfThePackToTheNearestAndTakesAResistorForAnOhmAtLeast) {
+  PackDesign d = forklift;
+  d.bleed_ohm = 32.6;
+  d.capacity_ah = 1.00015;
+  EXPECT_EQ(balancing_plan(d).bleed_ohm, 33);
+  EXPECT_EQ(balancing_plan(d).uams_per_ppb, 3'601) << "3600.54 As";
+  d.bleed_ohm = 32.4;
+  d.capacity_ah = 1.0001;
+  EXPECT_EQ(balancing_plan(d).bleed_ohm, 32);
+  EXPECT_EQ(balancing_plan(d).uams_per_ppb, 3'600) << "3600.36 As";
+  d.bleed_ohm = 0.2;
+  EXPECT_EQ(balancing_plan(d).bleed_ohm, 1) << "it is divided by";
+}
+
 TEST(Balancing, MeasuresNothingBelowTheTopNorWithACellThatIsNotKnown) {
   AtTheTop b;
   b.mean_ppb = 940'000'000;

@@ -385,6 +385,262 @@ TEST(ContactorTimes, HoldAcrossAnyLengthOfAState) {
   EXPECT_NEAR(b.until(opening, 10), 5.0, 0.21);
 }
 
+// ---- to the last digit: readings by hand
+
+/// Contactors that read what they are given.
+struct Fed {
+  explicit Fed(const ContactorPlan& plan = pack) : contactors(plan) {}
+  ContactorState step(double seconds, std::int32_t link_uv = 0) {
+    in.step_us = static_cast<std::uint32_t>(std::lround(1e6 * seconds));
+    in.link_uv = link_uv;
+    contactors.update(in);
+    return contactors.state();
+  }
+  /// With a link that does as it should.
+  Fed& to(ContactorState s, Request r = Request::drive) {
+    in.request = r;
+    for (int k = 0; k < 1'000 && contactors.state() != s; ++k) step(0.1, contactors.state() == precharge ? pack_uv : contactors.outputs().main_plus ? pack_uv : 0);
+    EXPECT_EQ(contactors.state(), s);
+    return *this;
+  }
+  bool welded() const { return contactors.events().welded; }
+
+  Contactors contactors;
+  ContactorInput in{.request = Request::none, .current_ua = 0, .pack_uv = pack_uv, .link_uv = 0, .step_us = 0};
+};
+constexpr std::int32_t eighth_uv = pack_uv / 8, sixteenth_uv = pack_uv / 16;
+
+TEST(WeldedContactor, IsWhatRaisesTheLinkByAnEighthAboveTheLowestOfTheSelfTest) {
+  for (const std::int32_t rise_uv : {eighth_uv, eighth_uv + 1}) {
+    Fed f;
+    f.in.request = Request::drive;
+    // the link still falls from the last drive
+    for (const std::int32_t link_uv : {40'000'000, 35'000'000, 30'000'000, 25'000'000}) EXPECT_EQ(f.step(0.1, link_uv), self_test);
+    // one reading missing, whichever: neither a weld nor forgotten
+    f.step(0.1, no_reading);
+    EXPECT_FALSE(f.welded());
+    f.in.pack_uv = no_reading;
+    f.step(0.05, 0);
+    f.in.pack_uv = pack_uv;
+    f.in.current_ua = no_reading;
+    f.step(0.05, 0);
+    f.in.current_ua = 0;
+    EXPECT_EQ(f.step(0.1, 26'000'000), self_test) << "a little noise";
+    EXPECT_EQ(f.step(0.1, 25'000'000 + rise_uv), rise_uv > eighth_uv ? opening : self_test);
+    EXPECT_EQ(f.welded(), rise_uv > eighth_uv);
+  }
+}
+
+TEST(WeldedContactor, WhileAllIsOpenIsAnySevenEighthsOnTheLinkAndAnyCurrentAboveRest) {
+  struct Case {
+    std::int32_t link_uv, current_ua, pack_uv;
+    bool welded;
+  };
+  for (const Case& c : {Case{7 * eighth_uv - 1, 0, pack_uv, false}, {7 * eighth_uv, 0, pack_uv, true}, {0, 120'000, pack_uv, false}, {0, -120'000, pack_uv, false}, {0, 120'001, pack_uv, true},
+                        {0, -120'001, pack_uv, true}, {no_reading, 0, pack_uv, false}, {pack_uv, 0, no_reading, false}, {0, 0, 0, false}, {1, 0, 1, true}}) {
+    Fed f;
+    f.in.current_ua = c.current_ua;
+    f.in.pack_uv = c.pack_uv;
+    f.step(0.1, c.link_uv);
+    EXPECT_EQ(f.welded(), c.welded) << c.link_uv << ' ' << c.current_ua << ' ' << c.pack_uv;
+    f.in.request = Request::drive;
+    EXPECT_EQ(f.step(0.1, c.link_uv), c.welded ? off : self_test) << "what is welded is not tested";
+  }
+}
+
+TEST(Contactors, TakeTheirTimesFromThePack) {
+  EXPECT_EQ(pack.test_us, 300'000U) << "three samples";
+  EXPECT_EQ(pack.half_time_constant_us, 250'000U);
+  EXPECT_EQ(pack.link_discharge_us, 5'000'000U);
+  EXPECT_EQ(pack.rest_ua, 120'000);
+  Fed f;
+  f.in.request = Request::drive;
+  EXPECT_EQ(f.step(0.1), self_test);
+  for (const Outputs& part : {Outputs{}, Outputs{.precharge = true}, Outputs{.main_minus = true}}) {
+    EXPECT_EQ(f.contactors.outputs(), part);
+    f.step(0.299'999);
+    EXPECT_EQ(f.contactors.outputs(), part);
+    f.step(0.000'001);
+  }
+  EXPECT_EQ(f.contactors.state(), precharge);
+  f.step(0.1, pack_uv);
+  f.in.request = Request::none;
+  f.step(0.1, pack_uv);
+  ASSERT_EQ(f.step(0.1, pack_uv), opening);
+  EXPECT_EQ(f.step(0.299'999, 0), opening) << "a link that has fallen at once has to stay down for a moment";
+  EXPECT_EQ(f.step(0.000'001, 0), off);
+  Fed charging;
+  charging.to(charge, Request::charge);
+  charging.step(0.299'999, pack_uv);
+  EXPECT_FALSE(charging.contactors.outputs().charge_enable) << "the contactors are to have closed";
+  charging.step(0.000'001, pack_uv);
+  EXPECT_TRUE(charging.contactors.outputs().charge_enable);
+}
+
+/// Whichever of its times is the longest.
+TEST(Contactors, ReachTheEndOfEveryStateWhateverThePlan) {
+  PackDesign seldom = forklift;  // the test takes longest: 3 x 3 s
+  seldom.sample_period_s = 1;
+  seldom.precharge_time_constant_s = 0.02;
+  const ContactorPlan slow_test = contactor_plan(seldom);
+  Fed tested(slow_test);
+  tested.in.request = Request::drive;
+  tested.step(1);
+  tested.step(8.999'999);
+  EXPECT_EQ(tested.contactors.state(), self_test);
+  EXPECT_EQ(tested.step(0.000'001), precharge);
+  PackDesign large = forklift;  // pre-charge does: six time constants of 4 s
+  large.precharge_time_constant_s = 4;
+  const ContactorPlan slow_charge = contactor_plan(large);
+  Fed held(slow_charge);
+  held.to(precharge);
+  for (int k = 0; k < 239; ++k) ASSERT_EQ(held.step(0.1, pack_uv - sixteenth_uv - 1), precharge) << k;
+  EXPECT_EQ(held.step(0.1, pack_uv - sixteenth_uv - 1), opening) << "never quite there";
+  EXPECT_TRUE(held.contactors.events().precharge_failed);
+}
+
+/// By the formula of an RC, less a fifth of the pack.
+TEST(Precharge, FailsBelowItsCurveByAFifthOfThePackAndGoesOnAbove) {
+  for (int k = 1; k < 12; ++k) {
+    const double least = 1 - std::exp(-k / 2.0) - 0.2;
+    for (const double off_by : {-0.001, 0.001}) {
+      for (const double after_s : {0.0, 0.249'999}) {  // until the next half time constant is over the same is asked
+        Fed f;
+        f.to(precharge);
+        EXPECT_EQ(f.step(0.25 * k + after_s, static_cast<std::int32_t>(pack_uv * (least + off_by))), off_by < 0 ? opening : precharge) << k << ' ' << off_by;
+        EXPECT_EQ(f.contactors.events().precharge_failed, off_by < 0);
+      }
+    }
+  }
+  Fed at_once;
+  at_once.to(precharge);
+  EXPECT_EQ(at_once.step(0.249'999, 0), precharge) << "nothing is asked of the first half time constant";
+  EXPECT_EQ(at_once.step(0, pack_uv - sixteenth_uv - 1), precharge);
+  EXPECT_EQ(at_once.step(0, pack_uv - sixteenth_uv), drive);
+}
+
+TEST(Precharge, WithoutAReadingOfThePackFailsWhenItsTimeIsOver) {
+  Fed f;
+  f.to(precharge);
+  f.in.pack_uv = no_reading;
+  EXPECT_EQ(f.step(2.999'999, 50'000'000), precharge);
+  EXPECT_EQ(f.step(0.000'001, 50'000'000), opening);
+  EXPECT_TRUE(f.contactors.events().precharge_failed);
+}
+
+TEST(Contactors, ToldToCeaseOpenAtRestToTheLastDigit) {
+  for (const std::int32_t rest_ua : {120'000, -120'000}) {
+    Fed f;
+    f.to(drive);
+    f.in.request = Request::none;
+    f.in.current_ua = rest_ua + (rest_ua > 0 ? 1 : -1);
+    f.step(0.1, pack_uv);
+    EXPECT_EQ(f.step(100, pack_uv), unloading);
+    f.in.current_ua = no_reading;
+    EXPECT_EQ(f.step(100, pack_uv), unloading) << "nobody knows";
+    f.in.current_ua = rest_ua;
+    EXPECT_EQ(f.step(0.1, pack_uv), opening);
+  }
+}
+
+TEST(Contactors, CountTheTimeOfGraceToItsEndAndAnewOnlyWhenTheCurrentCeased) {
+  for (const bool in_unloading : {false, true}) {
+    for (const std::int32_t current_ua : {120'001, -120'001}) {
+      const ContactorState here = in_unloading ? unloading : drive;
+      Fed f;
+      f.to(drive);
+      f.in.current_ua = current_ua;
+      if (in_unloading) f.to(unloading, Request::none);
+      (current_ua > 0 ? f.in.charge_forbidden : f.in.discharge_forbidden) = true;
+      EXPECT_EQ(f.step(4.9, pack_uv), here);
+      f.in.current_ua = no_reading;
+      EXPECT_EQ(f.step(1, pack_uv), here) << "what is not known counts for nothing";
+      f.in.current_ua = current_ua;
+      EXPECT_EQ(f.step(0.099'999, pack_uv), here);
+      EXPECT_EQ(f.step(0.000'001, pack_uv), opening) << "nor does it begin the time anew";
+    }
+  }
+  Fed f;
+  f.to(drive);
+  f.in.discharge_forbidden = true;
+  for (const std::int32_t current_ua : {-3'000'000, -120'000, -3'000'000}) {
+    f.in.current_ua = current_ua;
+    EXPECT_EQ(f.step(4.9, pack_uv), drive);
+  }
+  EXPECT_EQ(f.step(0.099'999, pack_uv), drive);
+  EXPECT_EQ(f.step(0.000'001, pack_uv), opening);
+  Fed other_way;
+  other_way.to(drive);
+  other_way.in.current_ua = 3'000'000;
+  other_way.to(unloading, Request::none);
+  other_way.in.discharge_forbidden = true;
+  EXPECT_EQ(other_way.step(100, pack_uv), unloading) << "what is not forbidden may flow until it ceases";
+}
+
+/// Steps that no limit is a multiple of, and such that 2^32 us are one of.
+TEST(ContactorTimes, EndWhereTheyEndWhateverTheSteps) {
+  for (const bool in_unloading : {false, true}) {
+    Fed f;
+    f.to(drive);
+    f.in.current_ua = -3'000'000;
+    if (in_unloading) f.to(unloading, Request::none);
+    f.in.discharge_forbidden = true;
+    int steps = 0;
+    while (f.step(0.7, pack_uv) != opening && steps < 100) ++steps;
+    EXPECT_EQ(steps, 7) << "the eighth is beyond five seconds";
+  }
+  Fed charging;
+  charging.to(charge, Request::charge);
+  for (int k = 0; k < 130; ++k) {
+    ASSERT_EQ(charging.step(67.108'864, pack_uv), charge);
+    ASSERT_TRUE(charging.contactors.outputs().charge_enable) << k;
+  }
+}
+
+TEST(WeldedContactor, IsSaidWhenTheTimeForItToShowIsOver) {
+  Fed current;
+  current.to(drive);
+  current.in.current_ua = -3'000'000;
+  current.in.open_now = true;
+  EXPECT_EQ(current.step(0.1, pack_uv), opening);
+  current.step(0.299'999, pack_uv);
+  EXPECT_FALSE(current.welded()) << "an arc, a mean over the last sample";
+  current.step(0.000'001, pack_uv);
+  EXPECT_TRUE(current.welded());
+  Fed standing;
+  standing.to(drive);
+  standing.in.open_now = true;
+  standing.step(0.1, pack_uv);
+  standing.step(4.999'999, pack_uv - eighth_uv);
+  EXPECT_FALSE(standing.welded());
+  EXPECT_EQ(standing.contactors.state(), opening);
+  standing.step(0.000'001, pack_uv - eighth_uv);
+  EXPECT_TRUE(standing.welded());
+  EXPECT_EQ(standing.contactors.state(), safe);
+  standing.step(4.999'999, pack_uv);
+  EXPECT_FALSE(standing.welded());
+  standing.step(0.000'001, pack_uv);
+  EXPECT_TRUE(standing.welded()) << "in safe as well";
+  Fed fallen;
+  fallen.to(drive);
+  fallen.in.open_now = true;
+  fallen.step(0.1, pack_uv);
+  EXPECT_EQ(fallen.step(0.3, pack_uv - eighth_uv - 1), safe);
+}
+
+TEST(Contactor, ThatHasNotClosedLeavesTheLinkASixteenthBelowThePack) {
+  Fed f;
+  f.to(charge, Request::charge);
+  f.step(1, pack_uv - sixteenth_uv);
+  EXPECT_FALSE(f.contactors.events().not_closed);
+  EXPECT_TRUE(f.contactors.outputs().charge_enable);
+  f.step(1, pack_uv - sixteenth_uv - 1);
+  EXPECT_TRUE(f.contactors.events().not_closed);
+  EXPECT_FALSE(f.contactors.outputs().charge_enable) << "nothing is to be charged through it";
+  f.step(1, no_reading);
+  EXPECT_FALSE(f.contactors.events().not_closed);
+}
+
 // ---- all states, all inputs
 
 /// What a step depends on, as bytes: equal bytes, equal future.
@@ -446,6 +702,25 @@ TEST(ContactorWalk, ThroughEveryReachableStateUnderEveryInputNeverClosesAgainstA
 }
 
 // ---- flipped bits
+
+TEST(Contactors, InAStateThatIsNoneEndInSafeThoughAllCopiesOfItAgree) {
+  for (const std::uint32_t none : {8U, 9U, 0x8000'0003U, 0xFFFF'FFFFU}) {
+    Fed f;
+    f.to(drive);
+    std::array<std::uint32_t, sizeof(Contactors) / 4> words{};
+    std::memcpy(words.data(), static_cast<void*>(&f.contactors), sizeof(Contactors));
+    std::size_t at = 0;
+    while (at + 2 < words.size() && !(words[at] == 3 && words[at + 1] == ~3U)) ++at;
+    ASSERT_LT(at + 2, words.size());
+    words[at] ^= 3 ^ none;
+    words[at + 1] ^= 3 ^ none;
+    words[at + 2] ^= 3 ^ none;
+    std::memcpy(static_cast<void*>(&f.contactors), words.data(), sizeof(Contactors));
+    EXPECT_FALSE(f.contactors.intact()) << none;
+    EXPECT_EQ(f.step(0.1, pack_uv), safe) << none;
+    EXPECT_EQ(f.contactors.outputs(), Outputs{});
+  }
+}
 
 TEST(GuardedWord, NoticesEveryOneAndEveryTwoFlippedBits) {
   static_assert(sizeof(Guarded) == 12);

@@ -58,8 +58,15 @@ TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
       {"0 %: a fifth is left", with([](auto& i) { i.soc_ppb = 0; }), 6, 1.2},
       {"10 % known to 5 %", with([](auto& i) { i.soc_ppb = 100'000'000; i.soc_sigma_ppb = 50'000'000; }), 6, 3.6},
       {"95 % known to 2.5 %", with([](auto& i) { i.soc_ppb = 950'000'000; i.soc_sigma_ppb = 25'000'000; }), 3.6, 6},
+      {"40 % known to 60 %", with([](auto& i) { i.soc_ppb = 400'000'000; i.soc_sigma_ppb = 600'000'000; }), 1.2, 1.2},
+      {"any soc, known to nothing", with([](auto& i) { i.soc_sigma_ppb = 2'000'000'000; }), 1.2, 1.2},
+      {"210 % known to nothing", with([](auto& i) { i.soc_ppb = 2'100'000'000; i.soc_sigma_ppb = 2'100'000'000; }), 1.2, 1.2},
+      {"-200 % known to nothing", with([](auto& i) { i.soc_ppb = -2'000'000'000; i.soc_sigma_ppb = 2'000'000'000; }), 1.2, 1.2},
+      {"95 % with a sigma that cannot be", with([](auto& i) { i.soc_ppb = 950'000'000; i.soc_sigma_ppb = -50'000'000; }), 6, 6},
       {"soc not known", with([](auto& i) { i.soc_ppb = no_reading; }), 6, 6},
       {"the model allows 2 A and 4 A", with([](auto& i) { i.model_charge_ua = 2'000'000; i.model_discharge_ua = 4'000'000; }), 2, 4},
+      {"the model says less than nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = -1'000'000; }), 0, 0},
+      {"the model allows 2 A and a fault halves", with([](auto& i) { i.model_charge_ua = 2'000'000; i.derate = true; }), 1, 3},
       {"the model allows nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = 0; }), 0, 0},
       {"a fault halves", with([](auto& i) { i.derate = true; }), 3, 3},
       {"charge forbidden", with([](auto& i) { i.charge_forbidden = true; }), 0, 6},
@@ -68,8 +75,11 @@ TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
   };
   for (const Point& p : points) {
     const AllowedCurrent a = settled(p.in);
-    EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.012) << p.what;  // 1/1024 of 6 A, twice
-    EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.012) << p.what;
+    EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.004) << p.what;  // less than 1/1024 of 6 A
+    EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.004) << p.what;
+    // all is all, and nothing is nothing
+    if (p.charge_a == 0 || p.charge_a == 6) { EXPECT_EQ(a.charge_ua, 1e6 * p.charge_a) << p.what; }
+    if (p.discharge_a == 0 || p.discharge_a == 6) { EXPECT_EQ(a.discharge_ua, 1e6 * p.discharge_a) << p.what; }
   }
 }
 
@@ -112,6 +122,43 @@ TEST(Derating, IsContinuousInWhatItGoesBy) {
   sweep(&DeratingInput::highest_cdegc, 3'500, 6'500, 5);
   sweep(&DeratingInput::lowest_cdegc, -2'500, 1'500, 5);
   sweep(&DeratingInput::soc_ppb, -100'000'000, 1'100'000'000, 1'000'000);
+}
+
+/// A second is 2^20 us there: 5 % slower.
+TEST(Derating, GoesDownInASecondAndUpInFive) {
+  for (const auto& [derate_again, expected_s] : {std::pair{false, 2.5 * 1.05}, std::pair{true, 0.5 * 1.05}}) {
+    Derating d(plan6a);
+    DeratingInput in = good;
+    in.derate = !derate_again;
+    for (int k = 0; k < 1'000; ++k) d.update(in, 10'000);
+    in.derate = derate_again;
+    double took_s = 0;
+    while (d.update(in, 10'000).discharge_ua != (derate_again ? 3'000'000 : 6'000'000) && took_s < 10) took_s += 0.01;
+    EXPECT_NEAR(took_s, expected_s, 0.02);
+  }
+  Derating d(plan6a);
+  EXPECT_EQ(d.update(good, 60'000'000).charge_ua, 1'200'000) << "a minute without a step is no more than a second";
+}
+
+/// Of a cell that charges and discharges at different rates, and of one that may not freeze at all.
+TEST(Derating, OfAnotherCellGoesByItsOwnLimits) {
+  PackDesign design = forklift;
+  design.limits = {.voltage_min_v = 2.5, .voltage_max_v = 4.2, .charge_current_max_a = 1.5, .discharge_current_max_a = 3, .temperature_min_c = 5, .temperature_max_c = 50};
+  const DeratingPlan plan = derating_plan(design);
+  const auto allowed = [&](DeratingInput in) {
+    Derating d(plan);
+    for (int k = 0; k < 100; ++k) d.update(in, 100'000);
+    return d.update(in, 100'000);
+  };
+  DeratingInput in{.highest_cell_uv = 3'700'000, .lowest_cell_uv = 3'700'000, .highest_cdegc = 2'500, .lowest_cdegc = 2'500};
+  EXPECT_EQ(allowed(in).charge_ua, 1'500'000);
+  EXPECT_EQ(allowed(in).discharge_ua, 3'000'000);
+  in.lowest_cdegc = 500;
+  EXPECT_EQ(allowed(in).charge_ua, 0) << "charged from its own lowest temperature on";
+  EXPECT_EQ(allowed(in).discharge_ua, 0);
+  in.lowest_cdegc = 1'000;
+  EXPECT_NEAR(allowed(in).charge_ua, 750'000, 2'000);
+  EXPECT_NEAR(allowed(in).discharge_ua, 1'000'000, 3'000);
 }
 
 TEST(Derating, ForbidsAtOnceAndAllowsSlowly) {

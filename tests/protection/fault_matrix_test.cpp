@@ -1,5 +1,6 @@
 // Every protection against the cases: just below its threshold, just above, noise around it, during every other fault; how fast, how it ends.
 // Once on the values of the quantities, for all rows; once on samples of a pack in a truck, for the rows that samples tell.
+#include <cstring>
 #include <functional>
 #include <set>
 
@@ -52,7 +53,7 @@ class Rig {
 
   Quantities values = nothing_known();
   std::uint32_t kept = 0;
-  FaultMonitor monitor{pack.rules};
+  FaultMonitor monitor{pack.rules, 0};
   std::uint64_t time_us = 0;
   bool wrong = false;
 
@@ -220,6 +221,39 @@ TEST_P(ServicedProtection, IsKeptOverAPowerCycleAndEndedByServiceBeforeAnythingC
   }
 }
 
+TEST_P(EveryProtection, CountsToTheMicrosecond) {
+  FaultMonitor monitor(pack.rules, 0);
+  Rig rig;
+  const Rule& rule = pack.rules[GetParam()];
+  const auto step = [&](std::int32_t value, std::uint32_t us, Clear clear = Clear::none) {
+    rig.set(row, value);
+    monitor.update(rig.values, us, 0, clear, false);
+    return has(monitor.active(), GetParam());
+  };
+  const Levels l = levels(row);
+  if (rule.delay_us > 0) {
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_FALSE(step(l.just_above, 1'000)) << "starts the delay";
+      EXPECT_FALSE(step(l.just_above, rule.delay_us - 1));
+      EXPECT_FALSE(step(l.just_below, rule.delay_us - 1)) << "as long not beyond: it is forgotten";
+      EXPECT_FALSE(step(l.just_below, 1'000));
+    }
+    EXPECT_FALSE(step(l.just_above, 1'000));
+    EXPECT_FALSE(step(l.just_above, rule.delay_us - 1));
+    EXPECT_TRUE(step(l.just_above, 1));
+  } else {
+    EXPECT_TRUE(step(l.just_above, 0));
+  }
+  if (rule.recover_us == 0 || rule.recovery == Recovery::service) return;
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_TRUE(step(row.release, 1'000)) << "starts the time for it to go";
+    EXPECT_TRUE(step(row.release, rule.recover_us - 1, Clear::user));
+    if (k == 0) { EXPECT_TRUE(step(row.release + (row.beyond == '>' ? 1 : -1), 1'000)) << "and anew"; }
+  }
+  EXPECT_EQ(step(row.release, 1), row.recovery == 'c');
+  EXPECT_FALSE(step(row.release, 0, Clear::user));
+}
+
 TEST_P(EveryProtection, NeitherComesNorGoesWhileItsQuantityIsNotKnown) {
   Rig rig;
   rig.set(row, no_reading);
@@ -241,7 +275,7 @@ TEST(ProtectionTable, KeepsOnlyFaultsOfServiceOverAPowerCycle) {
 // ---- first cause
 
 struct Cause {
-  FaultMonitor monitor{pack.rules};
+  FaultMonitor monitor{pack.rules, 0};
   Rig good;
   std::uint64_t time_us = 0;
   void step(Clear clear = Clear::none, int steps = 1) {
@@ -291,6 +325,229 @@ TEST(FirstCause, ThatWentByItselfGivesWayToTheNextThatComes) {
   at(c.good.values, Quantity::currents_missing) = 1;
   c.step(Clear::none, 10);
   EXPECT_EQ(c.first(), Fault::current_missing);
+}
+
+TEST(FirstCause, KeepsItsTimeWhileItIsThereAndOfEqualsTheFirstInTheTable) {
+  Cause c;
+  at(c.good.values, Quantity::currents_missing) = at(c.good.values, Quantity::voltages_missing) = 1;
+  c.step(Clear::none, 6);
+  EXPECT_EQ(c.first(), Fault::voltage_missing) << "both open; it stands before the other";
+  EXPECT_EQ(c.monitor.first().time_us, 6U * step_us);
+  at(c.good.values, Quantity::store_failed) = 1;
+  c.step(Clear::user);
+  EXPECT_EQ(c.first(), Fault::voltage_missing) << "a command does not end what is there";
+  EXPECT_EQ(c.monitor.first().time_us, 6U * step_us);
+  at(c.good.values, Quantity::voltages_missing) = 0;
+  c.step(Clear::none, 51);
+  c.step(Clear::user);
+  EXPECT_EQ(c.first(), Fault::current_missing) << "the first has gone, the graver of the others is told";
+  EXPECT_EQ(c.monitor.first().time_us, 59U * step_us) << "since it is the first";
+}
+
+TEST(FirstCause, OfAWarningThatDeratesGivesWayButNotToAnotherWarning) {
+  Cause c;
+  at(c.good.values, Quantity::store_failed) = 1;
+  c.step();
+  at(c.good.values, Quantity::temperatures_missing) = 1;
+  c.step(Clear::none, 30);
+  ASSERT_EQ(c.monitor.active(), bit(Fault::storage_fault) | bit(Fault::temperature_lost));
+  EXPECT_EQ(c.first(), Fault::storage_fault) << "the first of the mild";
+  at(c.good.values, Quantity::charge_heat_us) = 40'000'000;
+  c.step();
+  EXPECT_EQ(c.first(), Fault::charge_overcurrent);
+}
+
+TEST(FirstCause, ThatGoesWithTheSampleThatBringsAnotherGivesWayToIt) {
+  Cause c;
+  at(c.good.values, Quantity::currents_missing) = 1;
+  c.step(Clear::none, 6);
+  ASSERT_EQ(c.first(), Fault::current_missing);
+  at(c.good.values, Quantity::currents_missing) = 0;
+  c.step(Clear::none, 50);
+  ASSERT_EQ(c.monitor.active(), bit(Fault::current_missing));
+  at(c.good.values, Quantity::charge_heat_us) = 40'000'000;
+  c.step();
+  ASSERT_EQ(c.monitor.active(), bit(Fault::charge_overcurrent));
+  EXPECT_EQ(c.first(), Fault::charge_overcurrent);
+  EXPECT_EQ(c.monitor.first().time_us, 57U * step_us);
+}
+
+TEST(FirstCause, IsForgottenByAClearThatLeavesNothing) {
+  Cause c;
+  at(c.good.values, Quantity::store_failed) = 1;
+  c.step();
+  at(c.good.values, Quantity::store_failed) = 0;
+  c.step();
+  c.step(Clear::user);
+  EXPECT_EQ(c.monitor.active(), 0U);
+  EXPECT_EQ(c.monitor.first().fault, no_fault);
+}
+
+/// A word whose copies contradict each other: what any of them says is there.
+TEST(FaultsWithAFlippedBit, AreDistrustedAndNoneIsForgotten) {
+  for (std::size_t a = 0; a < 96; ++a) {
+    Cause c;
+    at(c.good.values, Quantity::current_magnitude_ua) = 40'000'000;
+    c.step();
+    ASSERT_TRUE(c.monitor.intact());
+    const std::uint32_t was = c.monitor.active();
+    std::array<std::uint32_t, sizeof(FaultMonitor) / 4> words{};
+    std::memcpy(words.data(), static_cast<void*>(&c.monitor), sizeof words);
+    std::size_t at = 0;
+    while (at + 1 < words.size() && !(words[at] == was && words[at + 1] == ~was)) ++at;
+    ASSERT_LT(at + 1, words.size());
+    words[at + a / 32] ^= 1U << (a % 32);
+    std::memcpy(static_cast<void*>(&c.monitor), words.data(), sizeof words);
+    EXPECT_FALSE(c.monitor.intact());
+    c.monitor.distrust();
+    EXPECT_TRUE(c.monitor.intact());
+    EXPECT_EQ(c.monitor.active(), was | bit(Fault::internal_fault) | 1U << (a % 32));
+  }
+}
+
+// ---- quantities of any sample
+
+/// Readings as no pack gives them: every cell and every sensor is once the highest, the lowest, missing, stuck, shifted against its neighbour.
+TEST(Quantities, OfAnySampleAreThoseOfTheirDefinitions) {
+  truth::Random random(23);
+  const auto whole = [&](int from, int to) { return from + static_cast<int>(random.uniform() * (to - from + 1)); };
+  int shifted = 0, stuck_cells = 0, stuck_sensors = 0;
+  for (int run = 0; run < 60; ++run) {
+    PackQuantities<16> quantities(pack.limits);
+    QuantityOracle oracle;
+    PackSample<16> s;
+    const double missing = run % 3 == 0 ? 0 : 0.05, same = run % 2 == 0 ? 0.2 : 0.9;
+    for (int step = 0; step < 100; ++step) {
+      const int level_uv = 3'300'000 + whole(-60, 60) * 1'000, level_cdegc = 2'000 + whole(-800, 800);
+      for (auto& uv : s.cell_uv) {
+        if (random.uniform() < same && uv != no_reading) continue;
+        uv = random.uniform() < missing ? no_reading : random.uniform() < 0.1 ? whole(-500'000, 5'000'000) : level_uv + whole(-20'000, 20'000);
+      }
+      if (random.uniform() < 0.3) {  // a broken wire, wherever; or a reading that cannot be, beside one that can
+        const auto k = static_cast<std::size_t>(whole(0, 14));
+        const int by = random.uniform() < 0.2 ? whole(-4'500'000, 4'500'000) : whole(-400'000, 400'000);
+        s.cell_uv[k] = level_uv + by;
+        s.cell_uv[k + 1] = level_uv - by + whole(-100'000, 100'000);
+      }
+      for (auto& t : s.temperature_cdegc) {
+        if (random.uniform() < same && t != no_temperature) continue;
+        t = random.uniform() < 2 * missing ? no_temperature : static_cast<std::int16_t>(level_cdegc + whole(-3'000, 3'000));
+      }
+      s.current_ua = random.uniform() < missing ? no_reading : whole(-40'000'000, 40'000'000);
+      s.pack_uv = random.uniform() < missing ? no_reading : 16 * level_uv + whole(-1'000'000, 1'000'000);
+      Quantities q = nothing_known();
+      quantities.update(s, step_us, q);
+      const auto expected = oracle.see(s, false);
+      for (std::size_t k = 0; k < 26; ++k) {
+        if (!told_by_samples(k) || k == 18) continue;  // heat: below; disbelief is the estimator's
+        ASSERT_EQ(at(q, pack.rules[k].quantity), expected[k].value_or(no_reading)) << expected_rows[k].name << ", run " << run << ", sample " << step;
+      }
+      shifted += expected[16].value_or(0) > 0 ? 1 : 0;
+      stuck_cells += expected[21].value_or(0) > 0 ? 1 : 0;
+      stuck_sensors += expected[24].value_or(0) > 0 ? 1 : 0;
+      std::int64_t sum = 0;
+      for (const std::int32_t uv : s.cell_uv) sum = uv < -500'000 || uv > 6'000'000 || sum == no_reading ? no_reading : sum + uv;
+      ASSERT_EQ(quantities.sum_uv(), sum);
+    }
+  }
+  EXPECT_GT(shifted, 500);
+  EXPECT_GT(stuck_cells, 500);
+  EXPECT_GT(stuck_sensors, 100);
+}
+
+TEST(Quantities, OfReadingsThatCannotBeAreMissing) {
+  struct Case {
+    std::int32_t cell_uv;
+    std::int16_t cdegc;
+    bool there;
+  };
+  for (const Case& c : {Case{-500'000, -6'000, true}, Case{6'000'000, 15'000, true}, Case{-500'001, -6'001, false}, Case{6'000'001, 15'001, false}}) {
+    PackQuantities<16> quantities(pack.limits);
+    PackSample<16> s;
+    s.cell_uv.fill(3'300'000);
+    s.temperature_cdegc.fill(2'500);
+    s.pack_uv = 0;  // shorted is a reading
+    s.cell_uv[15] = c.cell_uv;
+    s.temperature_cdegc[3] = c.cdegc;
+    Quantities q = nothing_known();
+    quantities.update(s, step_us, q);
+    EXPECT_EQ(at(q, Quantity::voltages_missing), c.there ? 0 : 1) << c.cell_uv;
+    EXPECT_EQ(at(q, Quantity::temperatures_missing), c.there ? 0 : 1) << c.cdegc;
+    EXPECT_EQ(at(q, Quantity::pack_uv), 0);
+  }
+}
+
+/// Where there are too few others to tell what they did, the pack's own reading tells it.
+template <std::size_t Cells>
+std::int32_t stuck_in_a_small_pack(std::int32_t others_move_uv, bool pack_known, bool one_missing = false) {
+  PackQuantities<Cells> quantities(pack.limits);
+  PackSample<Cells> s;
+  Quantities q = nothing_known();
+  for (int k = 0; k < 7; ++k) {
+    const std::int32_t moved_uv = k < 6 ? 0 : others_move_uv;
+    for (std::size_t c = 0; c < Cells; ++c) s.cell_uv[c] = 3'300'000 + static_cast<std::int32_t>(c) * 100 + (c == 0 ? 0 : moved_uv + k % 2);
+    if (one_missing) s.cell_uv[Cells - 1] = no_reading;
+    s.pack_uv = pack_known ? static_cast<std::int32_t>(Cells) * (3'300'000 + moved_uv) : no_reading;
+    quantities.update(s, step_us, q);
+  }
+  return at(q, Quantity::voltages_stuck);
+}
+
+TEST(Quantities, OfLessThanFourCellsGoByThePacksOwnReading) {
+  EXPECT_EQ(stuck_in_a_small_pack<1>(20'000, true), 0);
+  EXPECT_EQ(stuck_in_a_small_pack<1>(20'001, true), 1);
+  EXPECT_EQ(stuck_in_a_small_pack<2>(-20'001, true), 1);
+  EXPECT_EQ(stuck_in_a_small_pack<3>(-20'001, true), 1);
+  EXPECT_EQ(stuck_in_a_small_pack<3>(-20'001, false), no_reading);
+  EXPECT_EQ(stuck_in_a_small_pack<4>(20'100, false), 1) << "four know it by themselves";
+  EXPECT_EQ(stuck_in_a_small_pack<4>(20'100, false, true), no_reading) << "three of four do not";
+  EXPECT_EQ(stuck_in_a_small_pack<4>(20'001, true, true), 1);
+}
+
+TEST(Quantities, OfOneReadableCellAreItsOwnAndOfNoneAreNotKnown) {
+  PackQuantities<16> quantities(pack.limits);
+  PackSample<16> s;
+  Quantities q = nothing_known();
+  s.cell_uv[6] = 3'300'000;
+  quantities.update(s, step_us, q);
+  EXPECT_EQ(at(q, Quantity::highest_cell_uv), 3'300'000);
+  EXPECT_EQ(at(q, Quantity::lowest_cell_uv), 3'300'000);
+  EXPECT_EQ(at(q, Quantity::spread_uv), 0);
+  EXPECT_EQ(at(q, Quantity::opposite_shift_uv), 0);
+  EXPECT_EQ(at(q, Quantity::voltages_missing), 16) << "fifteen cells and the pack";
+  s.cell_uv[6] = no_reading;
+  s.pack_uv = 52'800'000;
+  quantities.update(s, step_us, q);
+  for (const Quantity of : {Quantity::highest_cell_uv, Quantity::lowest_cell_uv, Quantity::spread_uv, Quantity::opposite_shift_uv, Quantity::voltages_stuck, Quantity::sum_error_uv}) EXPECT_EQ(at(q, of), no_reading);
+  EXPECT_EQ(at(q, Quantity::voltages_missing), 16);
+  EXPECT_EQ(at(q, Quantity::pack_uv), 52'800'000);
+}
+
+TEST(Quantities, OfACellThatMustNotBeChargedHeatByAnyCurrent) {
+  PackDesign d = forklift;
+  d.limits.charge_current_max_a = 0;
+  PackQuantities<16> quantities(pack_limits(d));
+  PackSample<16> s;
+  s.current_ua = 2'560;
+  Quantities q = nothing_known();
+  quantities.update(s, 1'000'000, q);
+  EXPECT_EQ(at(q, Quantity::charge_heat_us), 99'000'000) << "ten times the limit, the most that counts";
+}
+
+TEST(Quantities, OfASensorThatIsNotFittedAreNotMissed) {
+  PackDesign d = forklift;
+  d.temperatures = 2;
+  PackQuantities<16> quantities(pack_limits(d));
+  PackSample<16> s;
+  s.temperature_cdegc = {2'500, no_temperature, 9'000, -5'000};
+  Quantities q = nothing_known();
+  quantities.update(s, step_us, q);
+  EXPECT_EQ(at(q, Quantity::temperatures_missing), 1);
+  EXPECT_EQ(at(q, Quantity::highest_cdegc), 2'500);
+  EXPECT_EQ(at(q, Quantity::lowest_cdegc), 2'500);
+  EXPECT_EQ(at(q, Quantity::temperatures_stuck), no_reading) << "one alone tells nothing";
+  d.temperatures = 9;
+  EXPECT_EQ(pack_limits(d).temperatures, 4) << "as many as a sample has";
 }
 
 // ---- samples of a pack in a truck
@@ -416,6 +673,55 @@ TEST_P(ProtectionAgainstHeat, TripsWhenTheIntegralOfTheSquareIsFull) {
     if ((faults & bit(fault)) != 0) fired_s = (t + step_ms) / 1e3;
   }
   EXPECT_NEAR(fired_s, expected_s, 0.1 + expected_s * 2 * i * i / (i * i - 1) / (256 * std::abs(i)) * 1.05);
+}
+
+/// (I / limit)^2 - 1 over the time, of 1.05 times the continuous limit; not below 0, beyond ten times as if it were ten.
+TEST(ProtectionAgainstHeatOf, ACurrentIsTheSquareOfItOverItsLimit) {
+  for (const double limit_a : {6.0, 300.0}) {
+    PackDesign d = forklift;
+    d.limits.charge_current_max_a = limit_a;
+    d.limits.discharge_current_max_a = 2 * limit_a;
+    for (const int sign : {1, -1}) {
+      const double from_a = 1.05 * (sign > 0 ? limit_a : 2 * limit_a);
+      const Quantity mine = sign > 0 ? Quantity::charge_heat_us : Quantity::discharge_heat_us, other = sign > 0 ? Quantity::discharge_heat_us : Quantity::charge_heat_us;
+      PackQuantities<16> quantities(pack_limits(d));
+      PackSample<16> s;
+      Quantities q = nothing_known();
+      const auto heat_s = [&](double times, std::uint32_t us) {
+        s.current_ua = sign * static_cast<std::int32_t>(1e6 * times * from_a);
+        quantities.update(s, us, q);
+        return at(q, mine) / 1e6;
+      };
+      EXPECT_NEAR(heat_s(2, 1'000'000), 3, 0.05);
+      EXPECT_NEAR(heat_s(0, 1'000'000), 2, 0.05) << "at rest it cools by its time";
+      EXPECT_NEAR(heat_s(0.5, 1'000'000), 1.25, 0.06);
+      EXPECT_EQ(at(q, other), 0);
+      EXPECT_NEAR(heat_s(-2, 1'000'000), 0.25, 0.06) << "the other way is rest, too";
+      EXPECT_EQ(heat_s(0, 10'000'000), 0) << "never below";
+      if (from_a > 200) continue;  // more than a reading can say
+      EXPECT_NEAR(heat_s(10, 100'000), 9.9, 0.1);
+      EXPECT_NEAR(heat_s(0, 9'900'000), 0, 0.1);
+      EXPECT_NEAR(heat_s(14, 100'000), 9.9, 0.1) << "a short circuit, anyway";
+      s.current_ua = no_reading;
+      quantities.update(s, 100'000, q);
+      EXPECT_EQ(at(q, mine), no_reading);
+      EXPECT_NEAR(heat_s(1, 100'000), 9.9, 0.1) << "neither heats nor cools while it is not known";
+      for (int k = 0; k < 100; ++k) heat_s(10, 60'000'000);
+      EXPECT_EQ(at(q, mine), 2'000'000'000) << "stops there";
+    }
+  }
+}
+
+TEST(ProtectionAgainstHeatOf, ARestIsCooledByItsTimeExactly) {
+  PackQuantities<16> quantities(pack.limits);
+  PackSample<16> s;
+  Quantities q = nothing_known();
+  s.current_ua = 12'000'000;
+  quantities.update(s, 1'000'000, q);
+  const std::int32_t before = at(q, Quantity::charge_heat_us);
+  s.current_ua = 0;
+  for (int k = 0; k < 10; ++k) quantities.update(s, 100'000, q);
+  EXPECT_EQ(at(q, Quantity::charge_heat_us), before - 1'000'000);
 }
 
 TEST(ProtectionAgainstHeatOf, TheContinuousCurrentAndShortBurstsNeverTrips) {

@@ -56,7 +56,7 @@ class QuantityOracle {
     if (history_.size() > 4'000) history_.pop_front();
     std::vector<std::int64_t> cells;
     for (const std::int32_t v : s.cell_uv) {
-      if (v != no_reading && v > -1'000'000) cells.push_back(v);
+      if (readable(v)) cells.push_back(v);
     }
     std::vector<std::int64_t> warm;
     for (const std::int16_t t : s.temperature_cdegc) {
@@ -87,19 +87,22 @@ class QuantityOracle {
   }
 
  private:
+  /// From half a volt reversed to six.
+  static bool readable(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
+
   static Value largest(const std::vector<std::int64_t>& v) { return v.empty() ? Value() : Value(*std::max_element(v.begin(), v.end())); }
   static Value smallest(const std::vector<std::int64_t>& v) { return v.empty() ? Value() : Value(*std::min_element(v.begin(), v.end())); }
 
   static Value shift(const Sample16& s) {
     std::int64_t sum = 0, n = 0;
     for (const std::int32_t v : s.cell_uv) {
-      if (v != no_reading) sum += v, ++n;
+      if (readable(v)) sum += v, ++n;
     }
     if (n == 0) return {};
     const std::int64_t mean = sum / n;
     std::int64_t most = 0;
     for (int k = 0; k < 15; ++k) {
-      if (s.cell_uv[static_cast<std::size_t>(k)] == no_reading || s.cell_uv[static_cast<std::size_t>(k) + 1] == no_reading) continue;
+      if (!readable(s.cell_uv[static_cast<std::size_t>(k)]) || !readable(s.cell_uv[static_cast<std::size_t>(k) + 1])) continue;
       const std::int64_t a = s.cell_uv[static_cast<std::size_t>(k)] - mean, b = s.cell_uv[static_cast<std::size_t>(k) + 1] - mean;
       const std::int64_t both = std::min(std::abs(a), std::abs(b));
       const bool opposite = (a < 0 && b >= 0) || (b < 0 && a >= 0);
@@ -112,7 +115,7 @@ class QuantityOracle {
   static std::int64_t middle(const Sample16& s) {
     std::vector<std::int64_t> v;
     for (const std::int32_t uv : s.cell_uv) {
-      if (uv != no_reading) v.push_back(uv);
+      if (readable(uv)) v.push_back(uv);
     }
     std::sort(v.begin(), v.end());
     std::int64_t sum = 0;
@@ -124,7 +127,7 @@ class QuantityOracle {
     std::int64_t count = 0;
     for (std::size_t k = 0; k < 16; ++k) {
       const auto reading = [&](std::size_t i) { return history_[i].cell_uv[k]; };
-      count += stuck(reading, no_reading, [&](std::size_t i) { return middle(history_[i]); }, 20'000) ? 1 : 0;
+      count += stuck(reading, readable, [&](std::size_t i) { return middle(history_[i]); }, 20'000) ? 1 : 0;
     }
     return count;
   }
@@ -139,18 +142,18 @@ class QuantityOracle {
         }
         return n > 0 ? sum / n : 0;
       };
-      count += stuck(reading, no_temperature, others, 500) ? 1 : 0;
+      count += stuck(reading, [](std::int16_t t) { return t != no_temperature; }, others, 500) ? 1 : 0;
     }
     return count;
   }
   /// The last readings that are there are all the same, six or more, and the others are elsewhere than at the first of them.
-  template <class Reading, class Others>
-  bool stuck(const Reading& reading, std::int64_t none, const Others& others, std::int64_t move) const {
+  template <class Reading, class There, class Others>
+  bool stuck(const Reading& reading, const There& there, const Others& others, std::int64_t move) const {
     const std::size_t last = history_.size() - 1;
-    if (reading(last) == none) return false;
+    if (!there(reading(last))) return false;
     std::size_t first = last, n = 0;
     for (std::size_t i = last + 1; i-- > 0;) {
-      if (reading(i) == none) continue;
+      if (!there(reading(i))) continue;
       if (reading(i) != reading(last)) break;
       first = i;
       ++n;

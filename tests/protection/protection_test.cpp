@@ -149,6 +149,7 @@ TEST(Protection, WithoutSamplesOpensFromEveryState) {
       for (std::uint64_t after_us = 10'000; after_us <= 520'000; after_us += 10'000) b.protection.without_sample(b.time_us + after_us);
       ASSERT_FALSE(b.protection.decision().outputs.any_closed()) << steps;
       ASSERT_EQ(b.protection.decision().allowed.discharge_ua, 0);
+      ASSERT_EQ(b.protection.decision().allowed.charge_ua, 0);
     }
   }
   EXPECT_TRUE(tried.contains(ContactorState::self_test) && tried.contains(ContactorState::precharge) && tried.contains(ContactorState::drive) && tried.contains(ContactorState::charge) &&
@@ -175,6 +176,16 @@ TEST(Protection, CountsSamplesOfAClockThatStandsOrGoesBackAsNone) {
       b.step();
       EXPECT_EQ(b.protection.decision().outputs.any_closed(), k < 5) << k;
     }
+  }
+}
+
+TEST(Protection, ASampleThatComesTwiceNowAndThenIsNoClockThatStands) {
+  Bench b;
+  b.drive_off();
+  for (int k = 0; k < 40; ++k) {
+    for (int again = 0; again < 4; ++again) b.protection.update(b.sample, b.estimate, b.orders);
+    EXPECT_EQ(b.step().faults, 0U) << k;
+    EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
   }
 }
 
@@ -229,7 +240,7 @@ TEST(Protection, SaysOnceThatAFaultCame) {
 TEST(Protection, WithoutASampleFromTheStartSaysSo) {
   Protection<16> p(pack);
   for (std::uint64_t now = 0; now <= 3'000'000; now += 10'000) EXPECT_EQ(p.without_sample(now).faults, 0U) << "a front end is not asked sooner";
-  EXPECT_NE(p.without_sample(3'010'000).faults & bit(Fault::samples_missing), 0U);
+  EXPECT_NE(p.without_sample(3'000'001).faults & bit(Fault::samples_missing), 0U);
   EXPECT_FALSE(p.decision().outputs.any_closed());
 }
 
@@ -238,7 +249,7 @@ TEST(Protection, ThatHadASampleWaitsNoLongerThanTheTableSays) {
   for (int k = 0; k < 7; ++k) b.protection.without_sample(b.time_us += b.period);
   b.step();
   EXPECT_EQ(b.protection.without_sample(b.time_us + 500'000).faults, 0U);
-  EXPECT_EQ(b.protection.without_sample(b.time_us + 510'000).faults, bit(Fault::samples_missing));
+  EXPECT_EQ(b.protection.without_sample(b.time_us + 500'001).faults, bit(Fault::samples_missing));
 }
 
 TEST(Protection, ATruckThatAskedBeforeTheFirstSampleGetsItsPower) {
@@ -309,6 +320,53 @@ TEST(Protection, EndsInSafeWithAnInternalFaultAfterEveryOneAndEveryTwoFlippedBit
     }
   }
   EXPECT_EQ(tried, 96U * 97 / 2);
+}
+
+TEST(Protection, EndsInSafeWithAnInternalFaultAfterAnyFlippedBitOfTheSetOfFaults) {
+  Bench closed;
+  closed.drive_off();
+  using Words = std::array<std::uint32_t, sizeof(Protection<16>) / 4>;
+  Words words{};
+  std::memcpy(words.data(), static_cast<void*>(&closed.protection), sizeof words);
+  std::size_t at = 0;  // no fault, inverted, and against the pattern
+  while (at + 2 < words.size() && !(words[at] == 0 && words[at + 1] == ~0U && words[at + 2] == 0x5A3C'96A5)) ++at;
+  ASSERT_LT(at + 2, words.size());
+  for (std::size_t a = 0; a < 96; ++a) {
+    Bench copy = closed;
+    Words flipped = words;
+    flipped[at + a / 32] ^= 1U << (a % 32);
+    std::memcpy(static_cast<void*>(&copy.protection), flipped.data(), sizeof flipped);
+    const Decision& d = copy.step();
+    EXPECT_EQ(d.state, ContactorState::opening) << a;
+    EXPECT_FALSE(d.outputs.any_closed());
+    EXPECT_NE(d.faults & bit(Fault::internal_fault), 0U);
+    copy.load_ua = 0;
+    copy.run(60);
+    EXPECT_EQ(copy.protection.decision().state, ContactorState::safe);
+    EXPECT_NE(copy.protection.decision().faults & bit(Fault::internal_fault), 0U) << "until it is cleared";
+  }
+}
+
+TEST(Protection, ForgetsNoFaultByAFlippedBitOfIt) {
+  Bench b;
+  b.drive_off();
+  b.orders.storage_fault = true;
+  b.step();
+  b.orders.storage_fault = false;  // it stays until it is cleared
+  b.step();
+  constexpr std::uint32_t there = bit(Fault::storage_fault);
+  std::array<std::uint32_t, sizeof(Protection<16>) / 4> words{};
+  std::memcpy(words.data(), static_cast<void*>(&b.protection), sizeof words);
+  std::size_t at = 0;
+  while (at + 2 < words.size() && !(words[at] == there && words[at + 1] == ~there && words[at + 2] == (there ^ 0x5A3C'96A5))) ++at;
+  ASSERT_LT(at + 2, words.size());
+  for (std::size_t copy = 0; copy < 3; ++copy) {
+    Bench flipped = b;
+    auto with_flip = words;
+    with_flip[at + copy] ^= there;
+    std::memcpy(static_cast<void*>(&flipped.protection), with_flip.data(), sizeof with_flip);
+    EXPECT_EQ(flipped.step().faults, there | bit(Fault::internal_fault)) << copy;
+  }
 }
 
 /// Any bit of all that protection keeps, not only of what is guarded: contactors open, or nothing that a later step does not mend.
@@ -398,6 +456,10 @@ TEST(Protection, AllowsNoCurrentUnlessTheContactorsAreClosedForIt) {
   EXPECT_EQ(b.protection.decision().allowed.discharge_ua, 0);
   b.drive_off();
   EXPECT_GT(b.protection.decision().allowed.discharge_ua, 5'900'000);
+  Bench closing;
+  closing.orders.request = Request::drive;
+  while (closing.protection.decision().state != ContactorState::drive && closing.count < 100) closing.step();
+  for (int k = 1; k < 20; ++k) EXPECT_LE(closing.step().allowed.discharge_ua, 120'000 * k) << "all of it in five seconds from the closing on";
   b.orders.request = Request::none;
   EXPECT_EQ(b.step().allowed.discharge_ua, 0) << "in the same step";
 }
@@ -419,6 +481,162 @@ TEST(Protection, BleedsWhileChargingAtTheTopAndNotWithAFaultThatOpens) {
   b.change = [](auto& s) { s.cell_uv[4] = no_reading; };
   b.run(20);
   EXPECT_EQ(b.protection.decision().bleed, 0U);
+}
+
+TEST(Protection, BleedsWithAWarningAndNotWithAFaultThatOpensAtOnce) {
+  for (const bool severe : {false, true}) {
+    Bench b;
+    b.estimate.soc_ppb = 960'000'000;
+    b.estimate.cell_soc_ppb.fill(0);
+    b.estimate.cell_soc_ppb[4] = 50'000'000;
+    b.estimate.cell_sigma_ppb.fill(1'000'000);
+    b.change = [severe](auto& s) { s.cell_uv[9] = severe ? 3'900'000 : 3'660'000; };
+    b.run(60);
+    std::uint32_t all = 0;
+    for (int k = 0; k < 200; ++k) all |= b.step().bleed;
+    EXPECT_NE(b.protection.decision().faults, 0U);
+    EXPECT_EQ(all, severe ? 0 : 1U << 4);
+  }
+}
+
+TEST(Protection, WithoutSamplesBleedsNothing) {
+  Bench b;
+  b.estimate.soc_ppb = 960'000'000;
+  b.estimate.cell_soc_ppb.fill(0);
+  b.estimate.cell_soc_ppb[4] = 50'000'000;
+  b.estimate.cell_sigma_ppb.fill(1'000'000);
+  while (b.step().bleed == 0 && b.count < 300) {}
+  ASSERT_NE(b.protection.decision().bleed, 0U);
+  EXPECT_EQ(b.protection.without_sample(b.time_us + 600'000).bleed, 0U);
+  const std::uint32_t left_s = b.protection.decision().bleed_left_s;
+  b.time_us += 50'000'000;
+  b.step();
+  EXPECT_NEAR(b.protection.decision().bleed_left_s, left_s, 2) << "nor counts it as bled";
+}
+
+TEST(Protection, AStoreThatFailsIsTheWarningThatItIsAndOthersBelieveTheirs) {
+  Bench b;
+  b.drive_off();
+  b.orders.storage_fault = true;
+  EXPECT_EQ(b.step().faults, bit(Fault::storage_fault));
+  EXPECT_EQ(b.protection.decision().first.fault, static_cast<std::uint8_t>(Fault::storage_fault));
+  b.run(50);
+  EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
+  EXPECT_GT(b.protection.decision().allowed.discharge_ua, 5'900'000) << "told, nothing else";
+  b.orders.storage_fault = false;
+  b.run(10);
+  EXPECT_EQ(b.protection.decision().faults, bit(Fault::storage_fault)) << "until somebody has seen it";
+  b.orders.clear = Clear::user;
+  EXPECT_EQ(b.step().faults, 0U);
+  b.estimate.contradicts = true;
+  b.run(625);
+  EXPECT_EQ(b.protection.decision().faults, bit(Fault::current_implausible));
+  EXPECT_NEAR(b.protection.decision().allowed.discharge_ua, 3'000'000, 20'000);
+}
+
+TEST(Protection, SaysWhatWasKeptBeforeTheFirstSampleAndNothingElse) {
+  const Protection<16> fresh(pack);
+  EXPECT_EQ(fresh.decision().faults, 0U);
+  EXPECT_EQ(fresh.decision().first.time_us, 0U);
+  const Protection<16> p(pack, bit(Fault::short_circuit) | bit(Fault::cell_overvoltage));
+  const Decision& d = p.decision();
+  EXPECT_EQ(d.faults, bit(Fault::short_circuit)) << "what only a workshop ends";
+  EXPECT_EQ(d.kept, bit(Fault::short_circuit));
+  EXPECT_EQ(d.came, 0U);
+  EXPECT_EQ(d.first.fault, no_fault);
+  EXPECT_EQ(d.state, ContactorState::off);
+  EXPECT_EQ(d.outputs, Outputs{});
+  EXPECT_EQ(d.allowed.charge_ua, 0);
+  EXPECT_EQ(d.allowed.discharge_ua, 0);
+  EXPECT_EQ(d.bleed, 0U);
+  EXPECT_EQ(d.bleed_left_s, 0U);
+}
+
+TEST(Protection, EndsAFaultOfTheWorkshopThatWasKeptAndNoneThatCameAfterItHadClosed) {
+  Bench b;
+  b.protection = Protection<16>(pack, bit(Fault::short_circuit));
+  b.orders.request = Request::drive;
+  b.run(110);
+  EXPECT_EQ(b.protection.decision().state, ContactorState::safe) << "kept is kept";
+  b.orders = {.clear = Clear::service};
+  EXPECT_EQ(b.step().faults, 0U);
+  EXPECT_EQ(b.protection.decision().kept, 0U);
+  b.orders = {};
+  b.step();
+  b.drive_off();
+  b.load_ua = -60'000'000;
+  b.step();
+  b.load_ua = 0;
+  b.run(150);
+  b.orders = {.clear = Clear::service};
+  EXPECT_EQ(b.step().faults, bit(Fault::short_circuit)) << "first a power cycle";
+}
+
+TEST(Protection, HoldsAKeyForOnePressOverAGapOfTheSamples) {
+  Bench b;
+  b.orders.clear = Clear::user;
+  b.orders.storage_fault = true;
+  b.run(3);
+  b.orders.storage_fault = false;
+  for (int k = 0; k < 10; ++k) b.protection.without_sample(b.time_us += b.period);
+  b.step();
+  EXPECT_NE(b.protection.decision().faults & bit(Fault::storage_fault), 0U) << "nobody has pressed it anew";
+}
+
+TEST(Protection, IsClearedAlsoWhileNothingIsMeasured) {
+  Protection<16> p(pack);
+  PackSample<16> nothing;
+  for (int k = 1; k <= 60; ++k) {
+    nothing.time_us = 100'000U * static_cast<unsigned>(k);
+    p.update(nothing, {}, {.clear = k == 50 ? Clear::user : Clear::none, .board_fault = k == 1});
+    if (k == 49) { ASSERT_EQ(p.decision().faults, bit(Fault::internal_fault) | bit(Fault::samples_missing)); }
+  }
+  EXPECT_EQ(p.decision().faults, bit(Fault::samples_missing));
+}
+
+TEST(Protection, GoesByTheSumOfTheCellsWhereThePackIsNotReadForOnce) {
+  Bench b;
+  b.orders.request = Request::drive;
+  while (b.protection.decision().state != ContactorState::precharge && b.count < 100) b.step();
+  b.sample.time_us += b.period;
+  b.sample.pack_uv = no_reading;
+  std::int32_t sum_uv = 0;
+  for (const std::int32_t uv : b.sample.cell_uv) sum_uv += uv;
+  b.orders.link_uv = sum_uv / 16 * 15 - 16;
+  EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.orders).state, ContactorState::precharge);
+  b.sample.time_us += b.period;
+  b.orders.link_uv = sum_uv / 16 * 15 + 16;
+  EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.orders).state, ContactorState::drive);
+}
+
+TEST(Protection, CountsAGapAsAMinuteAtMost) {
+  Bench b;
+  b.drive_off();
+  b.load_ua = -7'200'000;  // 0.31 s of heat a second: 18 s in a minute, and 30 s are too much
+  b.run(2);
+  ASSERT_EQ(b.protection.decision().faults, 0U);
+  b.time_us += 600'000'000;
+  b.step();
+  EXPECT_EQ(b.protection.decision().faults, bit(Fault::samples_missing));
+  Bench cold;  // recovers after a minute, which a step of a minute is
+  cold.change = [](auto& s) { s.temperature_cdegc.fill(-100); };
+  cold.run(60);
+  ASSERT_EQ(cold.protection.decision().faults, bit(Fault::charge_undertemperature));
+  cold.change = nullptr;
+  cold.step();
+  cold.time_us += 60'000'000 - cold.period;
+  EXPECT_EQ(cold.step().faults & bit(Fault::charge_undertemperature), 0U);
+}
+
+/// To the microsecond: the opening of contactors that nobody can watch takes five seconds.
+TEST(Protection, LetsNoTimePassByAClockThatStands) {
+  Bench b;
+  b.drive_off();
+  const std::uint64_t open_us = b.time_us + 500'001;
+  EXPECT_EQ(b.protection.without_sample(open_us).state, ContactorState::opening);
+  for (int k = 1; k < 50; ++k) b.protection.without_sample(open_us + 100'000U * static_cast<unsigned>(k));
+  for (int k = 0; k < 100; ++k) EXPECT_EQ(b.protection.without_sample(open_us + 4'999'999).state, ContactorState::opening);
+  EXPECT_EQ(b.protection.without_sample(open_us + 5'000'000).state, ContactorState::safe);
 }
 
 TEST(Protection, OfOneCellOpensForItToo) {

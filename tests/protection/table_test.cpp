@@ -56,6 +56,64 @@ TEST(ProtectionTable, IsConsistentForAnyCellAndNumberOfCells) {
   }
 }
 
+TEST(ProtectionTable, IsToldFromOneThatContradictsItself) {
+  for (std::size_t k = 0; k < fault_count; ++k) {
+    Rules rules = rules_of(table);
+    ASSERT_TRUE(consistent(rules));
+    rules[k].release = rules[k].threshold + (rules[k].sense == Sense::above ? 1 : -1);
+    EXPECT_FALSE(consistent(rules)) << name_of(rules[k].fault) << " would go before it comes";
+    rules[k].release = rules[k].threshold;
+    EXPECT_TRUE(consistent(rules)) << name_of(rules[k].fault);
+    rules[k].fault = static_cast<Fault>((k + 1) % fault_count);
+    EXPECT_FALSE(consistent(rules)) << name_of(table[k].rule.fault) << " would raise another's bit";
+  }
+}
+
+TEST(ProtectionTable, SaysWhichFaultsHaveAReactionOrARecovery) {
+  const Rules rules = rules_of(table);
+  std::uint32_t by_reaction = 0, by_recovery = 0;
+  for (const Reaction r : {Reaction::warn, Reaction::derate, Reaction::forbid_charge, Reaction::forbid_discharge, Reaction::open, Reaction::open_now}) {
+    for (std::size_t k = 0; k < fault_count; ++k) EXPECT_EQ((faults_with(rules, r) >> k & 1) != 0, std::string(expected_rows[k].reaction) == words(r)) << expected_rows[k].name;
+    by_reaction |= faults_with(rules, r);
+  }
+  for (const Recovery r : {Recovery::automatic, Recovery::on_clear, Recovery::service}) by_recovery |= faults_with(rules, r);
+  EXPECT_EQ(by_reaction, 0xFFFF'FFFFU);
+  EXPECT_EQ(by_recovery, 0xFFFF'FFFFU);
+}
+
+/// Half of the last digit is half, whichever the sign.
+TEST(IntegersOfAPack, AreTheNearest) {
+  for (const double sign : {1.0, -1.0}) {
+    const int s = static_cast<int>(sign);
+    EXPECT_EQ(in_micro(sign * 1.234'567'4), s * 1'234'567);
+    EXPECT_EQ(in_micro(sign * 1.234'567'6), s * 1'234'568);
+    EXPECT_EQ(in_centi(sign * 12.344), s * 1'234);
+    EXPECT_EQ(in_centi(sign * 12.346), s * 1'235);
+    EXPECT_EQ(in_micro(0), 0);
+  }
+  EXPECT_EQ(in_us(0.000'001'4), 1U);
+  EXPECT_EQ(in_us(0.000'001'6), 2U);
+}
+
+TEST(ProtectionTable, OfAnotherPackGoesByItsCellsTheirNumberAndItsSamples) {
+  PackDesign d = forklift;
+  d.limits = {.voltage_min_v = 2.5, .voltage_max_v = 4.2, .charge_current_max_a = 1.5, .discharge_current_max_a = 3, .temperature_min_c = 5, .temperature_max_c = 45};
+  d.cells = 4;
+  d.sample_period_s = 0.25;
+  const auto rule = [&](Fault f) { return protection_table(d)[static_cast<std::size_t>(f)].rule; };
+  EXPECT_EQ(rule(Fault::pack_overvoltage).threshold, 4 * 4'234'000) << "4.2 V and a fiftieth of 1.7 V";
+  EXPECT_EQ(rule(Fault::pack_undervoltage).threshold, 4 * 2'602'000);
+  EXPECT_EQ(rule(Fault::sum_mismatch).threshold, 4 * 51'000);
+  EXPECT_EQ(rule(Fault::short_circuit).threshold, 15'000'000) << "of the larger of both limits";
+  EXPECT_EQ(rule(Fault::short_circuit).release, 3'000'000);
+  EXPECT_EQ(rule(Fault::charge_undertemperature).threshold, 500) << "it must not be charged even where water does not freeze";
+  EXPECT_EQ(rule(Fault::charge_undertemperature).release, 700);
+  EXPECT_EQ(rule(Fault::samples_missing).threshold, 1'250'000);
+  EXPECT_EQ(rule(Fault::samples_missing).release, 500'000);
+  d.limits.charge_current_max_a = 4;
+  EXPECT_EQ(rule(Fault::short_circuit).threshold, 20'000'000);
+}
+
 TEST(ProtectionTable, IsTheOneInTheReadme) {
   const std::string readme = read_file(BMS_SOURCE_DIR "/protection/README.md");
   EXPECT_NE(readme.find(markdown(table)), std::string::npos) << "run ./bms figures, or build/host/tests/write_protection_figures";

@@ -33,6 +33,8 @@ std::vector<std::uint8_t> FlashModel::bytes(std::uint32_t sector) {
 
 void FlashModel::flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits) { word(sector, at).bits ^= static_cast<std::uint32_t>(bits) << (8 * (at % 4)); }
 
+void FlashModel::make_unsteady(std::uint32_t sector, std::uint32_t at, std::uint8_t bits, std::uint32_t every) { unsteady_ = {sector, at / 4 * 4, static_cast<std::uint32_t>(bits) << (8 * (at % 4)), every, 0}; }
+
 bool FlashModel::power_goes() {
   if (steps_++ != cut_at_) return false;
   cut_at_ = never;
@@ -85,8 +87,10 @@ bool FlashModel::program(std::uint32_t sector, std::uint32_t at, std::uint32_t v
 }
 
 std::uint32_t FlashModel::seen(std::uint32_t sector, std::uint32_t at) {
+  if (reads_left_-- == 0) throw TooManyReads{};
   const Word& w = word(sector, at);
   std::uint32_t bits = w.bits;
+  if (unsteady_.every > 0 && unsteady_.sector == sector && unsteady_.at == at / 4 * 4 && ++unsteady_.reads % unsteady_.every == 0) bits ^= unsteady_.bits;
   if (w.weak != 0) {
     // alike for a while, then otherwise: a whole record may read well once
     const std::uint32_t draw = random();

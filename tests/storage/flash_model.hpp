@@ -12,6 +12,8 @@ namespace bms {
 
 /// Thrown out of the step in whose middle the power goes.
 struct PowerCut {};
+/// Thrown out of a read beyond the limit.
+struct TooManyReads {};
 
 class FlashModel {
  public:
@@ -28,6 +30,11 @@ class FlashModel {
   void fill(std::uint32_t sector, const std::vector<std::uint8_t>& bytes);  ///< the rest as it was
   std::vector<std::uint8_t> bytes(std::uint32_t sector);
   void flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits);     ///< a cell that decays
+
+  /// A cell that reads otherwise every so many-th time that it is read.
+  void make_unsteady(std::uint32_t sector, std::uint32_t at, std::uint8_t bits, std::uint32_t every);
+  /// Who reads more words than that is thrown out: it would never end.
+  void limit_reads(std::uint64_t words) { reads_left_ = words; }
 
   const std::vector<std::uint64_t>& erases() const { return erases_; }
   std::uint64_t violations() const { return violations_; }                 ///< words programmed that were not erased
@@ -59,7 +66,10 @@ class FlashModel {
   std::vector<Word> words_;
   std::vector<Worn> worn_;
   std::vector<std::uint64_t> erases_;
-  std::uint64_t steps_ = 0, cut_at_ = never, violations_ = 0;
+  std::uint64_t steps_ = 0, cut_at_ = never, violations_ = 0, reads_left_ = never;
+  struct Unsteady {
+    std::uint32_t sector = 0, at = 0, bits = 0, every = 0, reads = 0;
+  } unsteady_;
 };
 
 /// What hal/flash.hpp works on in this program; may be nothing.

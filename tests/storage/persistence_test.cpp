@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <tuple>
 #include <vector>
 
 #include "hal/watchdog.hpp"
@@ -15,7 +16,8 @@
 namespace bms {
 
 namespace hal {
-void watchdog_feed() {}
+int fed = 0;
+void watchdog_feed() { ++fed; }
 }  // namespace hal
 
 namespace {
@@ -52,6 +54,26 @@ class PersistenceTest : public ::testing::Test {
     }
   }
   Values now() { return {known ? std::optional(pack) : std::nullopt, cells, health}; }
+  /// Number of the newest record of a kind; nothing: there is none.
+  template <class R>
+  std::optional<std::uint32_t> number() const {
+    for (const storage::Record& r : p.log().in_force()) {
+      if (r.kind == R::kind) return r.number;
+    }
+    return std::nullopt;
+  }
+  /// The minutes from now on, counted from 1, with which a record of that kind was written; before each, something is done.
+  template <class R, class Each>
+  std::vector<int> written(int minutes, const Each& each, std::int32_t current_ua = 0) {
+    std::vector<int> all;
+    for (int minute = 1; minute <= minutes; ++minute) {
+      const auto before = number<R>();
+      each(minute);
+      drive(1, current_ua);
+      if (number<R>() != before) all.push_back(minute);
+    }
+    return all;
+  }
   /// Steps of programming so far: nothing more is worn by what leaves it as it is.
   std::uint64_t steps() const { return flash.steps(); }
 
@@ -69,6 +91,41 @@ TEST_F(PersistenceTest, NewFlashGivesNoStartAndIsErasedAtBoot) {
   EXPECT_FALSE(boot().starting_point());
   EXPECT_FALSE(p.wants_erase());
   EXPECT_EQ(p.events().starts, 1U);
+}
+
+TEST_F(PersistenceTest, TheWatchdogIsFedAfterEveryEraseOfABoot) {
+  hal::fed = 0;
+  boot();
+  EXPECT_EQ(flash.erases(), (std::vector<std::uint64_t>{1, 1, 1}));
+  EXPECT_EQ(hal::fed, 3);
+  boot();
+  EXPECT_EQ(hal::fed, 3) << "nothing is to be erased";
+}
+
+/// Whichever byte of the last record it is in, and whatever a reading makes of it.
+TEST_F(PersistenceTest, ACellThatReadsOtherwiseNowAndThenDoesNotHoldUpABoot) {
+  boot();
+  drive(5, -6'000'000, -2'000'000);
+  while (!p.wants_erase()) {
+    erases_allowed = false;
+    drive(1, -6'000'000, -2'000'000);
+    pack.soc_ppb = 60 * percent_ppb;
+  }
+  const auto records = p.log().in_force();
+  const auto last = *std::max_element(records.begin(), records.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  const FlashModel before = flash;
+  for (std::uint32_t at = last.line * 16U; at < last.line * 16U + 24; at += 5) {
+    for (std::uint32_t every = 1; every < 9; ++every) {
+      flash = before;
+      flash.make_unsteady(last.sector, at, 0x08, every);
+      flash.limit_reads(5'000'000);  // of 12,288 words
+      try {
+        boot(ResetCause::watchdog);
+      } catch (const TooManyReads&) {
+        ADD_FAILURE() << "no end, with a bit of byte " << at << " otherwise every " << every;
+      }
+    }
+  }
 }
 
 TEST_F(PersistenceTest, SocIsResumedAfterAResetWithSigmaForTheMinuteThatWasNotWritten) {
@@ -156,6 +213,318 @@ TEST_F(PersistenceTest, AFaultIsWrittenAtOnceAndAProcessorsFaultWithTheNextMinut
   boot();
   EXPECT_EQ(p.events().last(0).code, 0xFF05);
   EXPECT_EQ(p.events().last(1).code, 7);
+}
+
+using storage::ChargeRecord;
+using storage::EventsRecord;
+using storage::HealthRecord;
+using storage::SettingsRecord;
+using Minutes = std::vector<int>;
+
+TEST_F(PersistenceTest, ChargeIsWrittenWhenItHasMovedByATenthOfAPercentSinceItWasWritten) {
+  for (const int sign : {1, -1}) {
+    boot();
+    EXPECT_EQ(written<ChargeRecord>(6, [&](int) { pack.soc_ppb += sign * 1'000'000; }), (Minutes{1, 2, 3, 4, 5, 6}));
+    EXPECT_EQ(written<ChargeRecord>(6, [&](int) { pack.soc_ppb += sign * 999'999; }), (Minutes{2, 4, 6}));
+    EXPECT_EQ(written<ChargeRecord>(6, [&](int) { pack.soc_ppb += sign * 400'000; }), (Minutes{3, 6})) << "a drift counts from what is stored";
+  }
+}
+
+TEST_F(PersistenceTest, ChargeIsWrittenWhenItsSigmaHasMovedByATenthOfItself) {
+  for (const auto& [sigma_ppb, by_ppb] : {std::pair{10'000'000, 1'000'000}, std::pair{10'000'000, -1'000'000}, std::pair{500'000, 100'000}, std::pair{500'000, -100'000}}) {
+    pack.soc_sigma_ppb = sigma_ppb;
+    boot();
+    drive(1);
+    EXPECT_EQ(written<ChargeRecord>(3, [&, from = sigma_ppb, by = by_ppb](int minute) { pack.soc_sigma_ppb = from + (minute < 3 ? by - by / std::abs(by) : by); }), (Minutes{3})) << sigma_ppb << ' ' << by_ppb;
+  }
+}
+
+TEST_F(PersistenceTest, ChargeIsWrittenAnHourLaterIfAnyHasFlowedAndElseNotAtAll) {
+  boot();
+  EXPECT_EQ(written<ChargeRecord>(150, [](int) {}), (Minutes{1}));
+  for (const std::int32_t current_ua : {6'000'000, -6'000'000}) {
+    boot();
+    EXPECT_EQ(written<ChargeRecord>(130, [](int) {}, current_ua), (Minutes{1, 61, 121})) << current_ua;
+  }
+}
+
+TEST_F(PersistenceTest, CellsAreWrittenEveryHalfHourWhenAnyOneHasMoved) {
+  cells.assign(16, {});
+  boot();
+  EXPECT_EQ(written<CellsRecord>(100, [&](int minute) { cells[5].soc = static_cast<std::int16_t>(100 * minute); }), (Minutes{30, 60, 90}));
+  EXPECT_EQ(written<CellsRecord>(100, [](int) {}), (Minutes{20})) << "the last of it, and then nothing";
+  for (std::size_t k = 0; k < 16; ++k) {
+    for (const int by : {100, -100}) {
+      cells[k].soc = static_cast<std::int16_t>(cells[k].soc + by - by / 100);
+      EXPECT_EQ(written<CellsRecord>(40, [](int) {}), Minutes{}) << k << ": less than 0.1 %";
+      cells[k].soc = static_cast<std::int16_t>(cells[k].soc + by / 100);
+      EXPECT_EQ(written<CellsRecord>(40, [](int) {}), (Minutes{1})) << k << ": due since the half hour was over";
+      ASSERT_TRUE(std::equal(cells.begin(), cells.end(), p.cells().cell.begin()));
+    }
+  }
+  cells.resize(15);
+  EXPECT_EQ(written<CellsRecord>(40, [](int) {}).size(), 1U) << "another number of cells";
+  cells.assign(17, {1'000, 0});
+  EXPECT_EQ(written<CellsRecord>(40, [](int) {}), Minutes{}) << "more than a record holds";
+}
+
+TEST_F(PersistenceTest, HealthIsWrittenEveryHourWhenAnyValueHasMoved) {
+  boot();
+  EXPECT_EQ(written<HealthRecord>(190, [&](int minute) { health.capacity_ppm = 1'000'000 - 1'000 * minute; }), (Minutes{60, 120, 180}));
+  EXPECT_EQ(written<HealthRecord>(300, [](int) {}), (Minutes{50})) << "the last of it, and then nothing";
+  for (const auto value : {&HealthRecord::capacity_ppm, &HealthRecord::capacity_sigma_ppm, &HealthRecord::resistance_ppm, &HealthRecord::resistance_sigma_ppm}) {
+    for (const std::int32_t by : {1'000, -1'000}) {
+      health.*value += by / 2;
+      EXPECT_EQ(written<HealthRecord>(65, [](int) {}), Minutes{}) << "less than 0.1 %";
+      health.*value += by - by / 2;
+      EXPECT_EQ(written<HealthRecord>(65, [](int) {}), (Minutes{1})) << "a drift counts from what is stored";
+      EXPECT_EQ(p.health(), health);
+    }
+  }
+}
+
+TEST_F(PersistenceTest, FaultsAreWrittenSixteenAtOnceAndThenOneEveryTenMinutes) {
+  boot();
+  const auto at_once = [&](int faults) {
+    int count = 0;
+    for (int k = 0; k < faults; ++k) {
+      const auto before = number<EventsRecord>();
+      p.fault(static_cast<std::uint16_t>(1 + k));
+      count += number<EventsRecord>() != before ? 1 : 0;
+    }
+    return count;
+  };
+  EXPECT_EQ(at_once(40), 16);
+  EXPECT_EQ(written<EventsRecord>(35, [&](int) { p.fault(7); }), (Minutes{10, 20, 30}));
+  EXPECT_EQ(written<EventsRecord>(40, [](int) {}), (Minutes{5})) << "what is left, once";
+  EXPECT_EQ(at_once(40), 3) << "of 35 minutes";
+  drive(170);  // one for the rest of these
+  EXPECT_EQ(at_once(40), 16);
+  boot(ResetCause::software);
+  EXPECT_EQ(p.events().faults, 40U + 35 + 40 + 16);
+}
+
+/// All of its sectors are full and none may be erased: what could not be written is, within a minute of an erase.
+TEST_F(PersistenceTest, WhatCouldNotBeWrittenIsTriedAgainEveryMinute) {
+  boot();
+  cells.assign(16, {});
+  drive(61);
+  erases_allowed = false;
+  int minutes = 0;
+  for (std::uint64_t before = ~0ULL; before != steps() && minutes < 5'000; ++minutes) {
+    before = steps();
+    drive(1, -6'000'000, minutes % 2 == 0 ? -2'000'000 : 2'000'000);
+  }
+  const auto before = steps();
+  cells[3].soc = 500;
+  health.capacity_ppm -= 50'000;
+  pack.soc_ppb += 5'000'000;
+  p.fault(77);
+  EXPECT_TRUE(p.set(9, 99));
+  drive(70);
+  EXPECT_EQ(steps(), before);
+  p.erase_one();
+  drive(1);
+  boot(ResetCause::software);
+  EXPECT_EQ(p.starting_point()->soc_ppb, pack.soc_ppb);
+  EXPECT_EQ(p.cells().cell[3].soc, 500);
+  EXPECT_EQ(p.health(), health);
+  EXPECT_EQ(p.events().last(0).code, 77);
+  EXPECT_EQ(p.settings().get(9), 99);
+}
+
+TEST_F(PersistenceTest, ASettingIsWrittenAtOnceAndOnlyWhenItIsAnother) {
+  boot();
+  EXPECT_TRUE(p.set(3, 5));
+  const auto before = steps();
+  EXPECT_TRUE(p.set(3, 5));
+  drive(0);
+  EXPECT_EQ(steps(), before);
+  EXPECT_TRUE(p.set(3, 6));
+  EXPECT_EQ(boot().settings().get(3), 6);
+  for (std::uint16_t key = 100; key < 123; ++key) EXPECT_TRUE(p.set(key, 1));
+  EXPECT_FALSE(p.set(200, 1)) << "there is no room";
+  EXPECT_TRUE(p.set(3, 7));
+}
+
+TEST_F(PersistenceTest, WhenTheSupplySinksChargeIsWrittenAndNothingElse) {
+  boot();
+  drive(2, -6'000'000, -4'000'000);
+  cells.assign(16, {500, 1});
+  pack.soc_ppb = 555'555'555;
+  for (int k = 0; k < 30; ++k) {
+    Sample s;
+    s.time_us = time_us += 1'000'000;
+    s.current_ua = -6'000'000;
+    p.count(s);
+  }
+  p.supply_failing(now(), 4'711);
+  boot(ResetCause::software);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 555'555'555);
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, percent_ppb) << "nothing has moved since";
+  EXPECT_EQ(p.charge().operating_s, 150U);
+  EXPECT_EQ(p.charge().discharged_uah, 250'000U);
+  EXPECT_EQ(p.charge().calendar_s, 4'711U);
+  EXPECT_EQ(p.cells().count, 0);
+}
+
+TEST_F(PersistenceTest, AtAShutdownWhatHasChangedIsWrittenWhetherItIsDueOrNot) {
+  boot();
+  cells.assign(16, {});
+  drive(61);
+  const auto everything = [&] { return std::tuple{p.cells(), p.health(), p.events().last(0), p.settings().get(8), p.starting_point()->soc_ppb}; };
+  for (const int k : {1, 2}) {
+    cells[7].soc = static_cast<std::int16_t>(200 * k);
+    health.resistance_ppm += 10'000;
+    pack.soc_ppb -= 1;
+    for (int faults = 0; faults < 20; ++faults) p.fault(static_cast<std::uint16_t>(0x100 * k + faults));
+    p.set(8, k);
+    p.power_failing(now(), std::nullopt);
+    const auto stored = std::tuple{p.cells(), p.health(), p.events().last(0), p.settings().get(8), pack.soc_ppb};
+    EXPECT_EQ(p.cells().cell[7].soc, 200 * k);
+    EXPECT_EQ(p.health(), health);
+    boot(ResetCause::software);
+    EXPECT_EQ(everything(), stored);
+    const auto before = steps();
+    p.power_failing({std::nullopt, cells, health}, std::nullopt);
+    EXPECT_LE(steps() - before, 80U) << "the events of this start, and the record before them once more";
+    const auto nothing_left = steps();
+    p.power_failing({std::nullopt, cells, health}, std::nullopt);
+    EXPECT_EQ(steps(), nothing_left);
+  }
+}
+
+/// Sigma after a reset: by what soc moved in the minute before, also in the first minute of a run.
+TEST_F(PersistenceTest, TheFirstMinuteOfARunCountsFromWhatWasStored) {
+  boot();
+  drive(1);
+  boot(ResetCause::watchdog);
+  drive(1, -3'000'000, -5'000'000);
+  boot(ResetCause::watchdog);
+  EXPECT_EQ(p.starting_point()->soc_ppb, 595'000'000);
+  EXPECT_EQ(p.starting_point()->soc_sigma_ppb, percent_ppb + 5'000'000);
+}
+
+TEST_F(PersistenceTest, AUnitIsCountedWhenItIsWhole) {
+  for (const std::int32_t sign : {1, -1}) {
+    boot();
+    const auto before = p.charge();
+    Sample s;
+    s.current_ua = sign * 59'999;
+    s.time_us = 60'001;  // one uA us less than a uAh
+    p.count(s);
+    p.supply_failing({}, std::nullopt);
+    EXPECT_EQ(p.charge().charged_uah + p.charge().discharged_uah, before.charged_uah + before.discharged_uah);
+    s.current_ua = sign;
+    s.time_us += 1;
+    p.count(s);
+    s.current_ua = 0;
+    s.time_us += 1'000'000 - 60'003;
+    p.count(s);
+    p.supply_failing({}, std::nullopt);
+    EXPECT_EQ(p.charge().charged_uah - before.charged_uah, sign > 0 ? 1U : 0U);
+    EXPECT_EQ(p.charge().discharged_uah - before.discharged_uah, sign < 0 ? 1U : 0U);
+    EXPECT_EQ(p.charge().operating_s, before.operating_s) << "a microsecond is missing";
+    s.time_us += 1;
+    p.count(s);
+    p.supply_failing({}, std::nullopt);
+    EXPECT_EQ(p.charge().operating_s, before.operating_s + 1);
+    p.power_failing(now(), std::nullopt);
+  }
+}
+
+TEST_F(PersistenceTest, AfterYearsOfStandingStillWhatMovesIsWritten) {
+  cells.assign(16, {});
+  boot();
+  for (int minute = 0; minute < 0x1'0000 + 62; ++minute) p.keep(now(), std::nullopt);  // the counters of minutes have stopped at their end
+  cells[2].soc = 1'000;
+  health.capacity_ppm = 900'000;
+  p.keep(now(), std::nullopt);
+  EXPECT_EQ(p.cells().cell[2].soc, 1'000);
+  EXPECT_EQ(p.health(), health);
+}
+
+TEST_F(PersistenceTest, TimeAndChargeAreCountedFromTheFirstSampleByAClockThatGoesOn) {
+  p = {};
+  p.start(ResetCause::power_on, std::nullopt, std::nullopt);
+  Sample s;
+  s.current_ua = 6'000'000;
+  s.time_us = 36'000'000'000;
+  EXPECT_FALSE(p.count(s)) << "ten hours since the core started are not of operation";
+  for (int k = 0; k < 1'000'000; ++k) ASSERT_FALSE(p.count(s)) << "stands";
+  s.time_us = 5;
+  EXPECT_FALSE(p.count(s)) << "went back";
+  s.time_us += 59'999'999;
+  EXPECT_FALSE(p.count(s));
+  s.time_us += 1;
+  EXPECT_TRUE(p.count(s));
+  p.keep(now(), std::nullopt);
+  EXPECT_EQ(p.charge().operating_s, 60U);
+  EXPECT_EQ(p.charge().charged_uah, 100'000U);
+  s.time_us += 3'600'000'000;
+  EXPECT_TRUE(p.count(s)) << "a gap is a minute at most";
+  p.keep(now(), std::nullopt);
+  EXPECT_EQ(p.charge().operating_s, 120U);
+  EXPECT_EQ(p.charge().charged_uah, 200'000U);
+  s.current_ua = no_reading;
+  s.time_us += 60'000'000;
+  EXPECT_TRUE(p.count(s));
+  p.keep(now(), std::nullopt);
+  EXPECT_EQ(p.charge().operating_s, 180U);
+  EXPECT_EQ(p.charge().charged_uah, 200'000U);
+  EXPECT_EQ(p.charge().discharged_uah, 0U);
+}
+
+/// A rest of each minute stays: 7 uA, samples every 0.7 s.
+TEST_F(PersistenceTest, NothingIsLostToRoundingInAThousandMinutes) {
+  for (const std::int32_t current_ua : {7, -7}) {
+    boot();
+    const auto charge_before = p.charge();
+    Sample s;
+    s.current_ua = current_ua;
+    for (int k = 0; k < 86'000; ++k) {
+      s.time_us += 700'000;
+      if (p.count(s)) p.keep(now(), std::nullopt);
+    }
+    const double hours = 86'000 * 0.7 / 3'600;
+    EXPECT_EQ(p.charge().operating_s - charge_before.operating_s, static_cast<std::uint32_t>(3'600 * hours));
+    EXPECT_EQ(p.charge().charged_uah - charge_before.charged_uah, current_ua > 0 ? static_cast<std::uint64_t>(7 * hours) : 0);
+    EXPECT_EQ(p.charge().discharged_uah - charge_before.discharged_uah, current_ua < 0 ? static_cast<std::uint64_t>(7 * hours) : 0);
+  }
+}
+
+TEST_F(PersistenceTest, ResetsAreCountedByTheirCauseUpToWhatTheirCountersHold) {
+  EventsRecord e;
+  e.resets[static_cast<std::size_t>(ResetCause::watchdog)] = 0xFFFE;
+  {
+    storage::Log log;
+    log.open();
+    while (log.wants_erase()) log.erase_one();
+    std::array<std::uint8_t, storage::longest_payload> bytes;
+    ASSERT_EQ(log.store(EventsRecord::kind, encode(e, bytes)), storage::Stored::kept);
+  }
+  for (int k = 0; k < 3; ++k) {
+    boot(ResetCause::watchdog);
+    drive(1);
+  }
+  boot(ResetCause::pin);
+  EXPECT_EQ(p.events().resets[static_cast<std::size_t>(ResetCause::watchdog)], 0xFFFF);
+  EXPECT_EQ(p.events().resets[static_cast<std::size_t>(ResetCause::pin)], 1);
+  EXPECT_EQ(p.events().starts, 4U);
+}
+
+TEST_F(PersistenceTest, TheTimeOffIsKnownOfAResetOfTheCoreAndByAClockThatRanBeforeAndAfter) {
+  boot();
+  drive(1);
+  p.power_failing(now(), std::nullopt);
+  boot(ResetCause::power_on, 1'000'000);
+  EXPECT_FALSE(p.off_s()) << "no clock ran when it was stored";
+  p.power_failing(now(), 1'000'000);
+  for (const ResetCause cause : {ResetCause::software, ResetCause::watchdog, ResetCause::pin}) EXPECT_EQ(boot(cause, 2'000'000).off_s(), 0U);
+  EXPECT_EQ(boot(ResetCause::brown_out, 1'000'000).off_s(), 0U);
+  EXPECT_EQ(boot(ResetCause::power_on, 1'000'001).off_s(), 1U);
+  for (std::uint32_t s = 0; s < 3; ++s) flash.fill(s, std::vector<std::uint8_t>(chip.sector_bytes, 0));
+  EXPECT_FALSE(boot(ResetCause::power_on, 1'000'001).off_s()) << "nothing is known";
 }
 
 TEST_F(PersistenceTest, AStormOfFaultsAndAChainOfStartsWriteLittle) {

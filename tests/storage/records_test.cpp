@@ -50,6 +50,50 @@ TEST(ChargeRecord, LiesLittleEndianFieldAfterField) {
   EXPECT_EQ(bytes_of(r), (Raw{0x44, 0x33, 0x22, 0x11, 0x0D, 0x0C, 0x0B, 0x0A, 5, 0, 0, 0, 1, 2, 3, 4, 5, 6, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 1, 0xFF, 0xFF, 0xFF, 0xFF}));
 }
 
+/// Who updates the firmware finds what the one before has stored.
+TEST(Records, LieUnderTheNumbersTheyAlwaysHadAndInTheirOrder) {
+  EXPECT_EQ(ChargeRecord::kind, (Kind{1, 2}));
+  EXPECT_EQ(CellsRecord::kind, (Kind{2, 1}));
+  EXPECT_EQ(HealthRecord::kind, (Kind{3, 1}));
+  EXPECT_EQ(EventsRecord::kind, (Kind{4, 1}));
+  EXPECT_EQ(SettingsRecord::kind, (Kind{5, 1}));
+  CellsRecord cells;
+  cells.count = 2;
+  cells.cell[0] = {-2, 0x0102};
+  cells.cell[1] = {3, 4};
+  EXPECT_EQ(bytes_of(cells), (Raw{2, 0xFE, 0xFF, 2, 1, 3, 0, 4, 0}));
+  EXPECT_EQ(bytes_of(HealthRecord{0x01020304, 5, -1, 0x7F000000}), (Raw{4, 3, 2, 1, 5, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0x7F}));
+  EventsRecord events;
+  events.starts = 9;
+  events.resets[6] = 0x0807;
+  events.add({0x0605, 0x04030201});
+  Raw expected(118, 0);
+  expected[0] = 9;
+  expected[16] = 7, expected[17] = 8;
+  expected[18] = 1;
+  expected[22] = 5, expected[23] = 6, expected[24] = 1, expected[25] = 2, expected[26] = 3, expected[27] = 4;
+  EXPECT_EQ(bytes_of(events), expected);
+  SettingsRecord settings;
+  EXPECT_TRUE(settings.set(0x0102, -2));
+  EXPECT_EQ(bytes_of(settings), (Raw{1, 0, 1, 2, 1, 0xFE, 0xFF, 0xFF, 0xFF}));
+}
+
+TEST(Records, OfANewBatteryHoldNothing) {
+  EXPECT_EQ(bytes_of(ChargeRecord{}), Raw(32, 0));
+  EXPECT_EQ(bytes_of(CellsRecord{}), Raw(1, 0));
+  EXPECT_EQ(bytes_of(HealthRecord{}), Raw(16, 0));
+  EXPECT_EQ(bytes_of(EventsRecord{}), Raw(118, 0));
+  EXPECT_EQ(bytes_of(SettingsRecord{}), Raw(3, 0));
+  EXPECT_EQ(SettingsRecord::Setting{}, (SettingsRecord::Setting{0, 0}));
+  EXPECT_EQ(CellsRecord::Cell{}, (CellsRecord::Cell{0, 0}));
+  EXPECT_EQ(cycles_milli({}, 6'000'000), 0U);
+  ChargeRecord r;
+  r.discharged_uah = 9'000'000;
+  EXPECT_EQ(cycles_milli(r, 6'000'000), 1'500U);
+  EXPECT_EQ(cycles_milli(r, 1), 9'000'000'000U);
+  EXPECT_EQ(cycles_milli(r, 0), 0U) << "of no capacity there are none";
+}
+
 template <class R>
 void comes_back(const R& record) {
   const Raw bytes = bytes_of(record);
@@ -95,6 +139,15 @@ TEST(ChargeRecord, ASocThatCannotBeIsNotBelieved) {
   EXPECT_EQ(possible({-2'000'000'000, 5}).soc_sigma_ppb, 289'000'000);
   EXPECT_EQ(possible({500'000'000, -5}).soc_sigma_ppb, 289'000'000);
   EXPECT_EQ(possible({500'000'000, 0}).soc_sigma_ppb, 289'000'000);
+  EXPECT_EQ(possible({500'000'000, 1}).soc_sigma_ppb, 1);
+  EXPECT_EQ(possible({500'000'000, 289'000'001}).soc_sigma_ppb, 289'000'000) << "anything is as wide as it gets";
+  for (const std::int32_t edge : {-250'000'000, 1'250'000'000}) {
+    const std::int32_t beyond = edge < 0 ? edge - 1 : edge + 1, end = edge < 0 ? 0 : 1'000'000'000;
+    EXPECT_EQ(possible({edge, 5}), (StoredEstimate{end, 5}));
+    EXPECT_EQ(possible({beyond, 5}), (StoredEstimate{end, 289'000'000}));
+  }
+  EXPECT_EQ(possible({0, 5}), (StoredEstimate{0, 5}));
+  EXPECT_EQ(possible({1'000'000'000, 5}), (StoredEstimate{1'000'000'000, 5}));
 }
 
 TEST(EventsRecord, HoldsTheLastSixteenFaultsNewestFirst) {
