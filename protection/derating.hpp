@@ -26,7 +26,9 @@ struct Ramp {
   std::int32_t at_from, at_to;
 
   constexpr std::int32_t at(std::int32_t value) const {
-    return at_from + static_cast<std::int32_t>(static_cast<std::int64_t>(at_to - at_from) * (std::clamp(value, from, to) - from) / (to - from));
+    if (value <= from) return at_from;  // before a division of 64 bits that most samples do not need
+    if (value >= to) return at_to;
+    return at_from + static_cast<std::int32_t>(static_cast<std::int64_t>(at_to - at_from) * (value - from) / (to - from));
   }
 };
 

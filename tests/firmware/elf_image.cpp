@@ -11,7 +11,7 @@ namespace bms {
 
 std::vector<Symbol> symbols_of(const std::filesystem::path& image, const std::string& tools) {
   std::vector<Symbol> symbols;
-  std::istringstream lines(output_of({tools + "nm", "--demangle", "--format=sysv", image.string()}));
+  std::istringstream lines(output_of({tools + "nm", "--demangle", "--special-syms", "--format=sysv", image.string()}));
   for (std::string line; std::getline(lines, line);) {
     std::vector<std::string> fields;  // name|value|class|type|size|line|section
     std::istringstream in(line);

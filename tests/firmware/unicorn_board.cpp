@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -51,6 +52,7 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
   const std::vector<std::uint32_t> paint(ccm_size / 4, untouched);
   must(uc_mem_write(core_, ccm, paint.data(), ccm_size), "paint");
   load(image);
+  find_it_blocks();
   const std::uint64_t step = symbol_named(symbols_, "bms::estimator_step(").address & ~std::uint64_t{1};
   uc_hook hook = 0;
   const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* self) { ++static_cast<UnicornBoard*>(self)->estimates; };
@@ -308,22 +310,33 @@ bool UnicornBoard::take_fault(int error) {
   return true;
 }
 
-/// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation block begins inside of it) leaves the
-/// program counter in it: what is behind would run twice.
-std::uint32_t UnicornBoard::behind_it_block(std::uint32_t pc) const {
+void UnicornBoard::find_it_blocks() {
+  std::map<std::uint32_t, bool> regions;  // from there on there is code, or data between it (AAELF32, mapping symbols)
+  for (const Symbol& s : symbols_) {
+    if (s.address < 0x08000000 || s.address >= 0x08100000) continue;
+    if (s.name.starts_with("$t") || s.name.starts_with("$d")) regions[static_cast<std::uint32_t>(s.address)] = s.name[1] == 't';
+  }
   const auto half = [&](std::uint32_t at) {
     std::uint16_t h = 0;
     return uc_mem_read(core_, at, &h, 2) == UC_ERR_OK ? h : std::uint16_t{0};
   };
-  for (std::uint32_t it = pc - 2; it + 14 >= pc; it -= 2) {
-    const unsigned mask = half(it) & 15U;
-    const bool second_half = half(it - 2) >= 0xE800 && half(it - 4) < 0xE800;  // of a wide instruction, e.g. a branch
-    if ((half(it) & 0xFF00) != 0xBF00 || mask == 0 || second_half) continue;
-    std::uint32_t end = it + 2;
-    for (int left = 4 - std::countr_zero(mask); left > 0; --left) end += half(end) >= 0xE800 ? 4 : 2;
-    if (end > pc) return end;
+  const auto bytes = [&](std::uint32_t at) { return half(at) >= 0xE800 ? 4U : 2U; };
+  for (auto r = regions.begin(); r != regions.end() && std::next(r) != regions.end(); ++r) {
+    for (std::uint32_t at = r->first; r->second && at < std::next(r)->first; at += bytes(at)) {
+      const unsigned mask = half(at) & 15U;
+      if ((half(at) & 0xFF00) != 0xBF00 || mask == 0) continue;
+      std::uint32_t end = at + 2;
+      for (int left = 4 - std::countr_zero(mask); left > 0; --left) end += bytes(end);
+      it_blocks_[at + 2] = end;
+    }
   }
-  return pc;
+}
+
+/// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation block begins inside of it) leaves the
+/// program counter in it: what is behind would run twice.
+std::uint32_t UnicornBoard::behind_it_block(std::uint32_t pc) const {
+  const auto next = it_blocks_.upper_bound(pc);
+  return next != it_blocks_.begin() && pc < std::prev(next)->second ? std::prev(next)->second : pc;
 }
 
 void UnicornBoard::execute(std::uint32_t from, std::size_t count) {

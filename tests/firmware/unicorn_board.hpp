@@ -103,10 +103,12 @@ class UnicornBoard {
   std::uint32_t reg(int id) const;
   void set_reg(int id, std::uint32_t value);
   void execute(std::uint32_t from, std::size_t count);
+  void find_it_blocks();
   std::uint32_t behind_it_block(std::uint32_t pc) const;
 
   uc_struct* core_ = nullptr;
   std::vector<Symbol> symbols_;
+  std::map<std::uint32_t, std::uint32_t> it_blocks_;  ///< from the first instruction behind the IT to the first behind the block
   std::vector<std::pair<std::uint32_t, Instructions>> patched_;
   std::mt19937 random_;
   bool crystal_, handling_ = false, sleeping_ = false, systick_pending_ = false, supply_low_ = false, supply_pending_ = false;
