@@ -330,6 +330,7 @@ void UnicornBoard::find_it_blocks() {
       it_blocks_[at + 2] = end;
     }
   }
+  if (it_blocks_.empty()) throw std::runtime_error("an image without mapping symbols");
 }
 
 /// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation block begins inside of it) leaves the
