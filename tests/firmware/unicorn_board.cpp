@@ -334,8 +334,9 @@ void UnicornBoard::find_it_blocks() {
 }
 
 /// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation block begins inside of it) leaves the
-/// program counter in it: what is behind would run twice.
+/// program counter in it, with the block's state (EPSR.IT) at its end: the last instruction would run twice. A stop in the middle has that state.
 std::uint32_t UnicornBoard::behind_it_block(std::uint32_t pc) const {
+  if ((reg(UC_ARM_REG_XPSR) & 0x0600FC00) != 0) return pc;
   const auto next = it_blocks_.upper_bound(pc);
   return next != it_blocks_.begin() && pc < std::prev(next)->second ? std::prev(next)->second : pc;
 }
