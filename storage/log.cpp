@@ -92,8 +92,9 @@ bool Log::look() {
   for (std::uint8_t s = 0; s < sectors; ++s) {
     if (s == charge_) continue;
     const bool ahead = found[s].begun && later(found[s].base, base_);
+    const bool twice = found[s].begun && found[s].base == base_;  // no run of a log writes that: its numbers would be taken for those in charge
     interrupted_ = interrupted_ || ahead;
-    if (!ahead) survey(s, taking);
+    if (!ahead && !twice) survey(s, taking);
   }
   const Survey again = survey(charge_, taking);
   last_ = again.last;

@@ -95,6 +95,17 @@ TEST(CellFile, RefusesAFileThatIsNoText) {
   EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a character that no text has"));
 }
 
+TEST(CellFile, TakesCharactersBeyondAsciiInCommentsAndTextsAndNowhereElse) {
+  const std::string good = table9_text(), entry = "chemistry = \"LiFePO4\"";
+  for (const char* text : {"chemistry = \"Zelle \xC3\xA4 \\\" \xC7\xA2 #\"", "chemistry = 'Zelle \xC3\xA4 \" #'", "chemistry = \"LiFePO4\"  # gr\xC3\xBC\xC3\x9F\x65 \"", "chemistry = \"\"\"\nZelle # \"'\"\"\""}) {
+    EXPECT_NO_THROW(parse_cell(replaced(good, entry, text), "cell.toml")) << text;
+  }
+  EXPECT_NO_THROW(parse_cell("\xEF\xBB\xBF" + good, "cell.toml")) << "a byte order mark";
+  for (const char* text : {"chemistry = \xC7\xA2\"table9\"", "chem\xC3\xAFstry = \"table9\"", "chemistry = \"LiFePO4\"\n\xC7\xA2", "chemistry = \"\"\"\xC7\xA2\"\"\"", "chemistry = 'LiFePO4' \xC7\xA2 '"}) {
+    EXPECT_THAT(refusal(replaced(good, entry, text)), HasSubstr("a character beyond ASCII, expected one only in a comment or between quotes")) << text;
+  }
+}
+
 TEST(CellFile, NamesTheLineOfTheEntryThatIsWrong) {
   const std::string good = table9_text();
   const std::string line = refusal(replaced(good, "420.558", "1.0"));

@@ -839,5 +839,31 @@ TEST(Crc32, IsTheCataloguesCheckValue) {
   EXPECT_EQ(crc32_by_bits({digits.begin(), digits.end()}), 0xCBF43926U);
 }
 
+/// No run of a log writes that; flash that decays or that somebody else has written may hold it.
+TEST(TwoSectorsOfOneRound, TakeNothingFromWhatIsKeptAfterwards) {
+  FlashModel flash(small, 1);
+  plug_in(&flash);
+  const auto sector = [&](std::uint32_t s, std::uint8_t type, std::size_t records) {
+    Bytes bytes(16, 0x42);
+    for (std::uint32_t line = 1; line <= records; ++line) {
+      const Bytes record = record_bytes(192 + line, static_cast<std::uint8_t>(type + line), 1, {});
+      bytes.insert(bytes.end(), record.begin(), record.end());
+    }
+    flash.fill(s, bytes);
+  };
+  sector(1, 10, 3);
+  sector(2, 20, 9);
+  Log log;
+  log.open();
+  for (std::uint8_t k = 0; k < 20; ++k) {
+    ASSERT_EQ(keep(log, {5, 1}, {k, 7}), Stored::kept);
+    ASSERT_EQ(content(log, 5, 1), (Bytes{k, 7}));
+    Log next;
+    next.open();
+    ASSERT_EQ(content(next, 5, 1), (Bytes{k, 7})) << "as the next boot sees it";
+  }
+  plug_in(nullptr);
+}
+
 }  // namespace
 }  // namespace bms
