@@ -6,6 +6,13 @@
 #include <sstream>
 
 #include <fmt/format.h>
+namespace bms {
+/// toml++ asserts on some files that it then refuses, and with NDEBUG lets the compiler rely on it: what it did not expect is a refusal here.
+struct ParserGaveUp {};
+[[noreturn]] inline void parser_gave_up() { throw ParserGaveUp{}; }
+}  // namespace bms
+#undef NDEBUG
+#define TOML_ASSERT(expr) (static_cast<bool>(expr) ? static_cast<void>(0) : ::bms::parser_gave_up())
 #include <toml++/toml.h>
 
 #include "host_sim/bad_input.hpp"
@@ -323,6 +330,20 @@ std::optional<std::size_t> not_for_the_parser(const std::string& text) {
   return std::nullopt;
 }
 
+/// The first line with which the parser gives up.
+std::size_t line_given_up(const std::string& text) {
+  std::size_t line = 1;
+  for (std::size_t end = text.find('\n'); end != text.npos; end = text.find('\n', end + 1), ++line) {
+    try {
+      static_cast<void>(toml::parse(std::string_view(text).substr(0, end + 1)));
+    } catch (const toml::parse_error&) {  // a value of several lines
+    } catch (const ParserGaveUp&) {
+      return line;
+    }
+  }
+  return line;
+}
+
 }  // namespace
 
 CellFile parse_cell(const std::string& text, const std::string& path) {
@@ -343,6 +364,8 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
     std::string what(error.description());
     std::replace(what.begin(), what.end(), '\n', ' ');
     throw BadInput(path, std::max<std::size_t>(error.source().begin.line, 1), what + ", expected a cell file in TOML");
+  } catch (const ParserGaveUp&) {
+    throw BadInput(path, line_given_up(text), "the parser gives up on it, expected a cell file in TOML");
   }
 
   Table top(root, path, "");

@@ -95,6 +95,11 @@ TEST(CellFile, RefusesAFileThatIsNoText) {
   EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a character that no text has"));
 }
 
+TEST(CellFile, RefusesWhatItsParserDidNotExpect) {
+  for (const char* text : {"[/limits]\n", "[[/]]\n", "[a.\"b\"./]\n", "/ = 1\n"}) EXPECT_THAT(refusal(text), HasSubstr("expected a cell file in TOML")) << text;
+  EXPECT_THAT(refusal("a = 1\nb = [1,\n2]\n[/limits]\n"), HasSubstr("cell.toml:4:"));
+}
+
 TEST(CellFile, TakesCharactersBeyondAsciiInCommentsAndTextsAndNowhereElse) {
   const std::string good = table9_text(), entry = "chemistry = \"LiFePO4\"";
   for (const char* text : {"chemistry = \"Zelle \xC3\xA4 \\\" \xC7\xA2 #\"", "chemistry = 'Zelle \xC3\xA4 \" #'", "chemistry = \"LiFePO4\"  # gr\xC3\xBC\xC3\x9F\x65 \"", "chemistry = \"\"\"\nZelle # \"'\"\"\""}) {
