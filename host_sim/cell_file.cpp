@@ -1,6 +1,7 @@
 #include "host_sim/cell_file.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -23,6 +24,27 @@ namespace bms {
 
 namespace {
 
+/// Bytes beyond ASCII, and ~, as ~ and two hexadecimal digits: what toml++ 3.3 does with some of them outside of texts and comments is anything.
+std::string in_ascii(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '~' || static_cast<unsigned char>(c) >= 0x80) out += fmt::format("~{:02X}", static_cast<unsigned char>(c));
+    else out += c;
+  }
+  return out;
+}
+/// As it was, of a text that in_ascii() has written.
+std::string from_ascii(const std::string& ascii) {
+  std::string out;
+  for (std::size_t k = 0; k < ascii.size(); ++k) {
+    unsigned byte = 0;
+    const bool coded = ascii[k] == '~' && k + 2 < ascii.size() && std::from_chars(&ascii[k + 1], &ascii[k + 1] + 2, byte, 16).ptr == &ascii[k + 1] + 2;
+    out += coded ? static_cast<char>(byte) : ascii[k];
+    if (coded) k += 2;
+  }
+  return out;
+}
+
 /// One table of the file, read key by key; at the end every key must have been read.
 class Table {
  public:
@@ -32,7 +54,7 @@ class Table {
     const toml::node& node = required(key, "a text");
     const auto value = node.value<std::string>();
     if (!node.is_string() || !value) refuse(node, key, "a text");
-    return *value;
+    return from_ascii(*value);
   }
 
   double number(const std::string& key) {
@@ -304,32 +326,6 @@ void refuse_without_fpu(const CellFile& file) {
 
 namespace {
 
-/// Where a text has what toml++ 3.3 has no answer for: a control character, on which it asserts, or one beyond ASCII outside of comments and strings of
-/// one line, of which it may ask whether it is a space and then does anything.
-std::optional<std::size_t> not_for_the_parser(const std::string& text) {
-  const std::size_t begin = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
-  char within = 0;  // '#', a quote, or nothing
-  bool of_lines = false;
-  for (std::size_t k = begin; k < text.size(); ++k) {
-    const char c = text[k];
-    const auto code = static_cast<unsigned char>(c);
-    if ((code < ' ' && c != '\n' && c != '\r' && c != '\t') || (code >= 0x80 && (within == 0 || of_lines))) return k;
-    const bool three = std::string_view(text).substr(k, 3) == std::string(3, c);
-    if (within == 0 && (c == '#' || c == '"' || c == '\'')) {
-      within = c;
-      of_lines = c != '#' && three;
-      if (of_lines) k += 2;
-    } else if (within == '"' && c == '\\' && k + 1 < text.size() && static_cast<unsigned char>(text[k + 1]) >= ' ' && static_cast<unsigned char>(text[k + 1]) < 0x80) {
-      ++k;
-    } else if (within != 0 && ((c == '\n' && !of_lines) || (c == within && within != '#' && (!of_lines || three)))) {
-      if (of_lines) k += 2;
-      within = 0;
-      of_lines = false;
-    }
-  }
-  return std::nullopt;
-}
-
 /// The first line with which the parser gives up.
 std::size_t line_given_up(const std::string& text) {
   std::size_t line = 1;
@@ -352,20 +348,19 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   file.text = text;
   file.hash = static_cast<std::uint32_t>(std::stoul(sha256(text).substr(0, 8), nullptr, 16));
 
-  if (const auto at = not_for_the_parser(text)) {
-    throw BadInput(path, static_cast<std::size_t>(1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*at), '\n')),
-                   static_cast<unsigned char>(text[*at]) < ' ' ? "a character that no text has, expected a cell file in TOML" : "a character beyond ASCII, expected one only in a comment or between quotes");
-  }
+  const auto binary = std::find_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\r' && c != '\t'; });
+  if (binary != text.end()) throw BadInput(path, static_cast<std::size_t>(1 + std::count(text.begin(), binary, '\n')), "a character that no text has, expected a cell file in TOML");
+  const std::string ascii = in_ascii(text.substr(text.starts_with("\xEF\xBB\xBF") ? 3 : 0));
 
   toml::table root;
   try {
-    root = toml::parse(text);
+    root = toml::parse(ascii);
   } catch (const toml::parse_error& error) {
-    std::string what(error.description());
+    std::string what = from_ascii(std::string(error.description()));
     std::replace(what.begin(), what.end(), '\n', ' ');
     throw BadInput(path, std::max<std::size_t>(error.source().begin.line, 1), what + ", expected a cell file in TOML");
   } catch (const ParserGaveUp&) {
-    throw BadInput(path, line_given_up(text), "the parser gives up on it, expected a cell file in TOML");
+    throw BadInput(path, line_given_up(ascii), "the parser gives up on it, expected a cell file in TOML");
   }
 
   Table top(root, path, "");
