@@ -105,7 +105,7 @@ class Contactors {
     state_.set(static_cast<std::uint32_t>(s));
     in_state_us_ = 0;
     link_at_entry_uv_ = no_reading;
-    ignored_us_ = 0;
+    if (s != ContactorState::unloading) ignored_us_ = 0;  // a second reason is no second time of grace
   }
 
   constexpr void step(const ContactorInput& in) {
@@ -181,10 +181,7 @@ class Contactors {
     if (in.link_uv != no_reading && in.pack_uv != no_reading) events_.not_closed = in.link_uv < part_of(in.pack_uv, 960);
     count_grace(in, forbidden_flows(in));
     if (ignored_us_ == grace_us) return enter(ContactorState::opening);
-    if (in.request == mine && !in.open) return;
-    const std::uint32_t ignored_us = ignored_us_;  // a second reason is no second time of grace
-    enter(ContactorState::unloading);
-    ignored_us_ = ignored_us;
+    if (in.request != mine || in.open) enter(ContactorState::unloading);
   }
 
   constexpr void in_unloading(const ContactorInput& in) {

@@ -26,13 +26,27 @@ struct Input {
   std::optional<hal::CanFrame> command;  ///< before the sample
 };
 
+/// All sectors, one behind the other.
+inline void fill(FlashModel& flash, const std::vector<std::uint8_t>& bytes) {
+  const std::uint32_t each = flash.size().sector_bytes;
+  for (std::uint32_t k = 0; k < flash.size().sectors; ++k) flash.fill(k, {bytes.begin() + k * each, bytes.begin() + (k + 1) * each});
+}
+inline std::vector<std::uint8_t> bytes_of(FlashModel& flash) {
+  std::vector<std::uint8_t> all;
+  for (std::uint32_t k = 0; k < flash.size().sectors; ++k) {
+    const auto sector = flash.bytes(k);
+    all.insert(all.end(), sector.begin(), sector.end());
+  }
+  return all;
+}
+
 /// The same firmware on this machine, with a flash of its own.
 class HostBoard {
  public:
   static constexpr std::uint32_t sectors = 3, sector_bytes = 0x4000;  // of the STM32F405, those behind the vectors
 
   explicit HostBoard(const std::vector<std::uint8_t>& flash, const std::optional<StartingPoint>& told = std::nullopt) {
-    for (std::uint32_t k = 0; k < sectors; ++k) flash_.fill(k, {flash.begin() + k * sector_bytes, flash.begin() + (k + 1) * sector_bytes});
+    fill(flash_, flash);
     plug_in(&flash_);
     host_hal::sent.clear();
     host_hal::requests.clear();
@@ -50,14 +64,7 @@ class HostBoard {
     application_->take(in.pack);
   }
   void end() { application_->end(); }
-  std::vector<std::uint8_t> flash() {
-    std::vector<std::uint8_t> all;
-    for (std::uint32_t k = 0; k < sectors; ++k) {
-      const auto sector = flash_.bytes(k);
-      all.insert(all.end(), sector.begin(), sector.end());
-    }
-    return all;
-  }
+  std::vector<std::uint8_t> flash() { return bytes_of(flash_); }
   const storage::Persistence& persistence() const { return persistence_; }
 
  private:

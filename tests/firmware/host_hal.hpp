@@ -30,6 +30,15 @@ inline hal::Calibration calibrated;
 /// As at the start of a program.
 void begin();
 
+/// The last frame of a message that was sent.
+template <class Message>
+std::optional<Message> last() {
+  for (auto f = sent.rbegin(); f != sent.rend(); ++f) {
+    if (f->id == Message::id) return Message::of(*f);
+  }
+  return std::nullopt;
+}
+
 inline const CellFile& table9() {
   static const CellFile cell = read_cell("table9");
   return cell;

@@ -8,15 +8,7 @@
 namespace bms {
 namespace {
 
-using host_hal::sent;
-
-template <class Message>
-std::optional<Message> last() {
-  for (auto f = sent.rbegin(); f != sent.rend(); ++f) {
-    if (f->id == Message::id) return Message::of(*f);
-  }
-  return std::nullopt;
-}
+using host_hal::last;
 
 class Memory : public ::testing::Test {
  protected:
@@ -89,16 +81,12 @@ TEST_F(Memory, OfAnotherCellFileNothingIsTakenUpUntilSomebodyHasSeenIt) {
   }
   {  // as if that had been an image with another cell
     FlashModel flash({HostBoard::sectors, HostBoard::sector_bytes}, 2);
-    for (std::uint32_t k = 0; k < HostBoard::sectors; ++k) flash.fill(k, {kept.begin() + k * HostBoard::sector_bytes, kept.begin() + (k + 1) * HostBoard::sector_bytes});
+    fill(flash, kept);
     plug_in(&flash);
     storage::Persistence persistence;
     persistence.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
     ASSERT_TRUE(persistence.set(cell_file_key, 0x12345678));
-    kept.clear();
-    for (std::uint32_t k = 0; k < HostBoard::sectors; ++k) {
-      const auto sector = flash.bytes(k);
-      kept.insert(kept.end(), sector.begin(), sector.end());
-    }
+    kept = bytes_of(flash);
   }
   HostBoard board(kept);
   run(board, 2);

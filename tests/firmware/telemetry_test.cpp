@@ -48,14 +48,6 @@ class TelemetryTest : public ::testing::Test {
     link_reads_uv = no_reading;
     cause = hal::ResetCause::watchdog;
   }
-  /// The last frame of a message that was sent.
-  template <class Message>
-  std::optional<Message> last() const {
-    for (auto f = sent.rbegin(); f != sent.rend(); ++f) {
-      if (f->id == Message::id) return Message::of(*f);
-    }
-    return std::nullopt;
-  }
   void ask(std::uint32_t code, std::uint32_t argument, std::uint8_t counter) {
     can::Command command;
     command.code = code;
