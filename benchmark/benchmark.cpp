@@ -1,4 +1,5 @@
-// The concealed benchmark: every case of a split through the diagnosis and through simpler rules, a line per case, then the tables.
+// The concealed benchmark: every case of a split through the diagnosis and through simpler rules, a line per case, then
+// the tables.
 //
 //   0 done; 2 bad usage; 3 a fault of ours
 #include <atomic>
@@ -10,18 +11,19 @@
 #include <thread>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "benchmark/baselines.hpp"
 #include "benchmark/tables.hpp"
-#include "host_sim/bad_input.hpp"
-#include "host_sim/committed_figures.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/bad_input.hpp"
+#include "files/committed_figures.hpp"
+#include "files/text_file.hpp"
 
 namespace {
 
+namespace truth = bms::benchmark::truth;
 using bms::benchmark::Column;
 using bms::benchmark::Outcome;
 
@@ -44,13 +46,18 @@ std::string joined(const std::vector<std::string>& ids, const char* by) {
 std::string line_of(std::size_t index, const Outcome& o) {
   std::string found;
   for (const auto& set : o.sets) found += (found.empty() ? "" : " + ") + joined(set, "~");
-  std::string line = fmt::format("{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n", index, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength,
-                     o.answer.profile, bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v, 1e3 * o.holdout_floor_v, o.wall_s, o.figures);
+  std::string line = fmt::format(
+      "{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n",
+      index, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength, o.answer.profile,
+      bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v,
+      1e3 * o.holdout_floor_v, o.wall_s, o.figures);
   if (o.next) {
     std::string after;
     for (const auto& set : o.next->sets) after += (after.empty() ? "" : " + ") + joined(set, "~");
-    line += fmt::format("{:3} {:10} {:40} next: {} ({:.1f} h, gain {:.0f}, planned in {:.1f} s) -> {}{}\n", index, "", joined(o.answer.ids, "+"), o.next->profile.empty() ? "none" : o.next->profile, o.next->duration_s / 3'600,
-                        o.next->expected_gain, o.next->plan_wall_s, after, o.next->separated ? "" : "  NOT SEPARATED");
+    line += fmt::format("{:3} {:10} {:40} next: {} ({:.1f} h, gain {:.0f}, planned in {:.1f} s) -> {}{}\n", index, "",
+                        joined(o.answer.ids, "+"), o.next->profile.empty() ? "none" : o.next->profile,
+                        o.next->duration_s / 3'600, o.next->expected_gain, o.next->plan_wall_s, after,
+                        o.next->separated ? "" : "  NOT SEPARATED");
   }
   return line;
 }
@@ -64,9 +71,20 @@ std::string json_of(const Options& options, const std::vector<Column>& columns) 
   for (const Column& c : columns) {
     Json& list = json["methods"][c.method] = Json::array();
     for (const Outcome& o : c.outcomes) {
-      list.push_back({{"kind", o.answer.kind}, {"ids", o.answer.ids}, {"strength", o.answer.strength}, {"profile", o.answer.profile}, {"verdict", bms::diagnosis::name_of(o.verdict)},
-                      {"found", o.found}, {"sets", o.sets}, {"probability", o.probability}, {"overlap", o.overlap}, {"holdout_before_v", o.holdout_before_v},
-                      {"holdout_after_v", o.holdout_after_v}, {"holdout_floor_v", o.holdout_floor_v}, {"wall_s", o.wall_s}, {"figures", o.figures}});
+      list.push_back({{"kind", o.answer.kind},
+                      {"ids", o.answer.ids},
+                      {"strength", o.answer.strength},
+                      {"profile", o.answer.profile},
+                      {"verdict", bms::diagnosis::name_of(o.verdict)},
+                      {"found", o.found},
+                      {"sets", o.sets},
+                      {"probability", o.probability},
+                      {"overlap", o.overlap},
+                      {"holdout_before_v", o.holdout_before_v},
+                      {"holdout_after_v", o.holdout_after_v},
+                      {"holdout_floor_v", o.holdout_floor_v},
+                      {"wall_s", o.wall_s},
+                      {"figures", o.figures}});
     }
   }
   return json.dump(1) + "\n";
@@ -75,10 +93,10 @@ std::string json_of(const Options& options, const std::vector<Column>& columns) 
 void run(const Options& options) {
   const truth::Split split = options.split == "final" ? truth::Split::final : truth::Split::development;
   const std::size_t cases = truth::case_count(split);
-  if (options.first >= cases) throw bms::BadInput("--first", 1, fmt::format("there are {} cases", cases));
+  if (options.first >= cases) throw bms::files::BadInput("--first", 1, fmt::format("there are {} cases", cases));
   const std::size_t count = std::min(options.count.value_or(cases), cases - options.first);
   // a run takes long: is there a place for its tables?
-  if (!options.readme.empty()) bms::CommittedFigures(options.readme, options.split);
+  if (!options.readme.empty()) bms::files::CommittedFigures(options.readme, options.split);
 
   std::vector<Column> columns;
   for (const auto& method : bms::benchmark::methods) {
@@ -104,8 +122,8 @@ void run(const Options& options) {
   for (Column& c : columns) std::erase_if(c.outcomes, [](const Outcome& o) { return o.answer.kind.empty(); });
   const std::string report = bms::benchmark::report(options.split, options.seed, columns);
   fmt::print("\n{}", report);
-  if (!options.json.empty()) bms::write_file(options.json, json_of(options, columns));
-  if (!options.readme.empty()) bms::replace_figures(options.readme, options.split, report);
+  if (!options.json.empty()) bms::files::write_file(options.json, json_of(options, columns));
+  if (!options.readme.empty()) bms::files::replace_figures(options.readme, options.split, report);
 }
 
 }  // namespace
@@ -115,14 +133,19 @@ int main(int argc, char** argv) {
   app.name("benchmark");
   app.footer("Example: benchmark development 1 --readme benchmark/README.md");
   Options o;
-  app.add_option("split", o.split, "development: cases to look at; final: cases to count once")->required()->check(CLI::IsMember({"development", "final"}));
+  app.add_option("split", o.split, "development: cases to look at; final: cases to count once")
+      ->required()
+      ->check(CLI::IsMember({"development", "final"}));
   app.add_option("seed", o.seed, "of the cases")->required()->type_name("SEED");
   app.add_option("--first", o.first, "first case")->capture_default_str();
   app.add_option("--count", o.count, "how many; without it all that are left")->check(CLI::PositiveNumber);
-  app.add_option("--kind", o.kind, "only cases of this kind")->check(CLI::IsMember(std::vector<std::string>(truth::case_kinds.begin(), truth::case_kinds.end())));
+  app.add_option("--kind", o.kind, "only cases of this kind")
+      ->check(CLI::IsMember(std::vector<std::string>(truth::case_kinds.begin(), truth::case_kinds.end())));
   app.add_flag("--no-baselines", o.no_baselines, "the diagnosis alone");
   app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
-  app.add_option("--readme", o.readme, "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")->type_name("FILE");
+  app.add_option("--readme", o.readme,
+                 "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")
+      ->type_name("FILE");
   try {
     app.parse(argc, argv);
     run(o);
@@ -131,7 +154,7 @@ int main(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     fmt::print(stderr, "benchmark: {} (see --help)\n", error.what());
     return 2;
-  } catch (const bms::BadInput& error) {
+  } catch (const bms::files::BadInput& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 2;
   } catch (const std::exception& error) {

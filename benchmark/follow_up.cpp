@@ -21,20 +21,23 @@ std::vector<std::vector<std::string>> sets_of(const diagnosis::Diagnosis& d) {
   return sets;
 }
 
-bool contains(const std::vector<std::string>& list, const std::string& id) { return std::find(list.begin(), list.end(), id) != list.end(); }
+bool contains(const std::vector<std::string>& list, const std::string& id) {
+  return std::find(list.begin(), list.end(), id) != list.end();
+}
 
 /// As the technician does it: the profile at the recording's own rate, references where it has them.
-diagnosis::Record carried_out(const truth::Case& c, const model::CellParameters<>& cell, const diagnosis::NextExperiment& next) {
+diagnosis::Record carried_out(const truth::Case& c, const model::CellParameters<>& cell,
+                              const diagnosis::NextExperiment& next) {
   const double step_s = std::min(next.step_s, c.recording.time_s[1] - c.recording.time_s[0]);
-  ExperimentOptions options;
+  experiments::ExperimentOptions options;
   options.capacity_ah = next.capacity_ah;
   options.step_s = step_s;
   truth::Errand errand;
   errand.step_s = step_s;
   errand.start_soc = next.start_soc;
   std::vector<double> current_ref_a, voltage_ref_v;
-  const std::vector<ProfileRow> rows = experiment(next.profile, options).value();
-  for (const ProfileRow& row : rows) {
+  const std::vector<experiments::ProfileRow> rows = experiments::experiment(next.profile, options).value();
+  for (const experiments::ProfileRow& row : rows) {
     errand.current_a.push_back(row.current_a);
     errand.ambient_c.push_back(row.temperature_c);
     errand.source_v.push_back(row.source_v);
@@ -42,15 +45,19 @@ diagnosis::Record carried_out(const truth::Case& c, const model::CellParameters<
     current_ref_a.push_back(row.current_ref_a());
   }
   const truth::Series s = c.drive(errand);
-  for (std::size_t k = 0; k < rows.size(); ++k) voltage_ref_v.push_back(rows[k].voltmeter ? s.terminal_v[k] : rows[k].source_v);
-  diagnosis::Record r{next.profile, s.time_s, s.current_a, s.voltage_v, s.temperature_c, next.start_soc, cell.tolerance.initial_soc, true, {}};
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    voltage_ref_v.push_back(rows[k].voltmeter ? s.terminal_v[k] : rows[k].source_v);
+  diagnosis::Record r{
+      next.profile, s.time_s, s.current_a, s.voltage_v, s.temperature_c, next.start_soc, cell.tolerance.initial_soc,
+      true,         {}};
   diagnosis::take_references(r, current_ref_a, voltage_ref_v, cell);
   return r;
 }
 
 }  // namespace
 
-std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell, const diagnosis::Record& recording, const diagnosis::Diagnosis& first) {
+std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell,
+                                  const diagnosis::Record& recording, const diagnosis::Diagnosis& first) {
   if (first.verdict != diagnosis::Verdict::ambiguous || !c.drive) return std::nullopt;
   FollowUp up;
   const auto begin = std::chrono::steady_clock::now();

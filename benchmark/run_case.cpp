@@ -50,21 +50,26 @@ diagnosis::Record record_of(const truth::Series& s, double initial_soc, double s
   return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true, {}};
 }
 
-void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& spans, const std::vector<double>& holdout_v) {
+void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& spans,
+             const std::vector<double>& holdout_v) {
   if (!holdout_v.empty()) {
     const model::CellParameters<> cell = cell_of(c.cell);
-    o.holdout_before_v = rmse(diagnosis::predict(cell, {}, record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc)), c.holdout.voltage_v);
+    o.holdout_before_v =
+        rmse(diagnosis::predict(cell, {}, record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc)),
+             c.holdout.voltage_v);
     o.holdout_after_v = rmse(holdout_v, c.holdout.voltage_v);
   }
   o.overlap = overlap(spans, c.answer.start_s, c.answer.end_s);
-  o.holdout_floor_v = std::sqrt(std::pow(c.answer.noise_floor_v, 2) + std::pow(c.cell.ocv_tolerance_v, 2) + std::pow(c.cell.drift_tolerance_v, 2));
+  o.holdout_floor_v = std::sqrt(std::pow(c.answer.noise_floor_v, 2) + std::pow(c.cell.ocv_tolerance_v, 2) +
+                                std::pow(c.cell.drift_tolerance_v, 2));
   o.answer = c.answer;
 }
 
 Outcome run_case(const truth::Case& c) {
   const model::CellParameters<> cell = cell_of(c.cell);
   const auto begin = std::chrono::steady_clock::now();
-  const diagnosis::Diagnosis d = diagnosis::diagnose(cell, {}, {record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc)});
+  const diagnosis::Diagnosis d =
+      diagnosis::diagnose(cell, {}, {record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc)});
   Outcome o;
   o.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   o.name = c.name;
@@ -76,16 +81,21 @@ Outcome run_case(const truth::Case& c) {
     for (const std::size_t e : f.equivalent_to) set.push_back(id(e));
   }
   o.probability = d.findings.empty() ? 0 : d.findings.front().probability;
-  o.figures = fmt::format("base {:.0f} best {:.0f} remaining {:.0f} ({}) adequacy {:.2f} fast {:.2f} far {:.4f}", d.base_cost, d.best_cost, d.remaining, d.remaining_goes_with, d.adequacy, d.fast_excess, d.far_out);
+  o.figures =
+      fmt::format("base {:.0f} best {:.0f} remaining {:.0f} ({}) adequacy {:.2f} fast {:.2f} far {:.4f}", d.base_cost,
+                  d.best_cost, d.remaining, d.remaining_goes_with, d.adequacy, d.fast_excess, d.far_out);
   for (const diagnosis::Finding& f : d.findings) {
     o.figures += fmt::format(" | {} {:.0f}", id(f.setting.index), f.gain);
-    for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p) o.figures += fmt::format(" {:.3g}", f.setting.value[p]);
+    for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p)
+      o.figures += fmt::format(" {:.3g}", f.setting.value[p]);
   }
-  if (d.findings.empty() && !d.candidates.empty()) o.figures += fmt::format(" | nearest {} {:.1f}", id(d.candidates.front().ids.front()), d.candidates.front().gain);
+  if (d.findings.empty() && !d.candidates.empty())
+    o.figures += fmt::format(" | nearest {} {:.1f}", id(d.candidates.front().ids.front()), d.candidates.front().gain);
 
   std::vector<double> holdout_v;
   if (!c.holdout.time_s.empty()) {
-    holdout_v = diagnosis::predict(d.cell, diagnosis::later_recording(d.extended), record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
+    holdout_v = diagnosis::predict(d.cell, diagnosis::later_recording(d.extended),
+                                   record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
   compare(o, c, d.spans, holdout_v);
   o.next = follow_up(c, cell, record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc), d);

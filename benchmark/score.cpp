@@ -8,7 +8,9 @@ namespace bms::benchmark {
 
 namespace {
 
-bool contains(const std::vector<std::string>& list, const std::string& id) { return std::find(list.begin(), list.end(), id) != list.end(); }
+bool contains(const std::vector<std::string>& list, const std::string& id) {
+  return std::find(list.begin(), list.end(), id) != list.end();
+}
 
 }  // namespace
 
@@ -16,7 +18,8 @@ Interval wilson(const Share& share) {
   if (share.of == 0) return {};
   constexpr double z2 = 1.96 * 1.96;
   const auto n = static_cast<double>(share.of);
-  const double p = share.value(), middle = (p + z2 / (2 * n)) / (1 + z2 / n), half = std::sqrt(z2 * (p * (1 - p) / n + z2 / (4 * n * n))) / (1 + z2 / n);
+  const double p = share.value(), middle = (p + z2 / (2 * n)) / (1 + z2 / n),
+               half = std::sqrt(z2 * (p * (1 - p) / n + z2 / (4 * n * n))) / (1 + z2 / n);
   return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
 }
 
@@ -42,7 +45,8 @@ Score score(const std::vector<Outcome>& outcomes) {
     if (o.answer.kind == "null") s.false_alarms.count(!quiet);
     if (o.answer.kind == "data_fault") s.data_fault.count(o.verdict == Verdict::data_fault);
     if (o.answer.kind == "outside" && o.answer.strength >= 2) s.outside_unknown.count(o.verdict == Verdict::unknown);
-    const bool named = !o.found.empty() && (o.verdict == Verdict::cause || o.verdict == Verdict::causes || o.verdict == Verdict::ambiguous);
+    const bool named = !o.found.empty() &&
+                       (o.verdict == Verdict::cause || o.verdict == Verdict::causes || o.verdict == Verdict::ambiguous);
     if (o.answer.kind == "single") {
       s.detected_all.count(!quiet);
       if (o.answer.strength >= 2) {
@@ -61,7 +65,9 @@ Score score(const std::vector<Outcome>& outcomes) {
         }
         if (!quiet) overlaps.push_back(o.overlap);
         if (o.holdout_before_v > 0 && ids.front() != "contact_intermittent") {
-          const double floor = o.holdout_floor_v, before = std::max(0.0, o.holdout_before_v * o.holdout_before_v - floor * floor), after = std::max(0.0, o.holdout_after_v * o.holdout_after_v - floor * floor);
+          const double floor = o.holdout_floor_v,
+                       before = std::max(0.0, o.holdout_before_v * o.holdout_before_v - floor * floor),
+                       after = std::max(0.0, o.holdout_after_v * o.holdout_after_v - floor * floor);
           s.holdout.count(o.holdout_after_v <= 1.3 * floor || after <= 0.1 * before);
         }
       }
@@ -77,7 +83,8 @@ Score score(const std::vector<Outcome>& outcomes) {
       }
       for (const std::string& id : ids) {
         bool hit = false;
-        for (std::size_t k = 0; k < o.found.size(); ++k) hit = hit || contains(o.sets[k], id) || class_of(o.found[k]) == class_of(id);
+        for (std::size_t k = 0; k < o.found.size(); ++k)
+          hit = hit || contains(o.sets[k], id) || class_of(o.found[k]) == class_of(id);
         right += hit ? 1 : 0;
       }
       s.pair_both.count(named && right == 2);

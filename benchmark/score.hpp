@@ -22,8 +22,9 @@ struct Interval {
 Interval wilson(const Share& share);
 
 struct Score {
-  Share false_alarms, detected, detected_all, first, first_class, in_set, pair_both, pair_one_none_wrong, outside_unknown, data_fault, holdout, separated;
-  std::size_t named = 0;              ///< cases that the calibration error is of
+  Share false_alarms, detected, detected_all, first, first_class, in_set, pair_both, pair_one_none_wrong,
+      outside_unknown, data_fault, holdout, separated;
+  std::size_t named = 0;  ///< cases that the calibration error is of
   double mean_set_size = 0, median_overlap = 0, calibration_error = 0, mean_wall_s = 0;
 };
 

@@ -32,19 +32,29 @@ constexpr std::array rows = {
     Row{"of these detected: right first", "", [](const Score& s) { return text(s.first); }},
     Row{"right class first", ">= 90 %", [](const Score& s) { return text(s.first_class); }},
     Row{"truth in the reported set", ">= 95 %", [](const Score& s) { return text(s.in_set); }},
-    Row{"mean size of a set", "<= 1.6", [](const Score& s) { return s.first.hits > 0 || s.mean_set_size > 0 ? fmt::format("{:.2f}", s.mean_set_size) : "-"; }},
+    Row{"mean size of a set", "<= 1.6",
+        [](const Score& s) {
+          return s.first.hits > 0 || s.mean_set_size > 0 ? fmt::format("{:.2f}", s.mean_set_size) : "-";
+        }},
     Row{"pairs: both", ">= 70 %", [](const Score& s) { return text(s.pair_both); }},
     Row{"pairs: at least one and none wrong", ">= 90 %", [](const Score& s) { return text(s.pair_one_none_wrong); }},
-    Row{"outside the catalogue, at twice the limit and above: UNKNOWN", ">= 70 %", [](const Score& s) { return text(s.outside_unknown); }},
+    Row{"outside the catalogue, at twice the limit and above: UNKNOWN", ">= 70 %",
+        [](const Score& s) { return text(s.outside_unknown); }},
     Row{"data faults", "", [](const Score& s) { return text(s.data_fault); }},
-    Row{"hold-out at 1.3 times the floor, or 90 % of the error above it removed", ">= 80 %", [](const Score& s) { return text(s.holdout); }},
-    Row{"ambiguous ones separated by the experiment asked for", ">= 80 %", [](const Score& s) { return s.separated.of > 0 ? text(s.separated) : "-"; }},
-    Row{"located in time: intersection over union, median", ">= 0.6", [](const Score& s) { return s.detected.hits > 0 ? fmt::format("{:.2f}", s.median_overlap) : "-"; }},
-    Row{"expected calibration error of the probabilities", "<= 0.07", [](const Score& s) { return s.named > 0 ? fmt::format("{:.2f}", s.calibration_error) : "-"; }},
+    Row{"hold-out at 1.3 times the floor, or 90 % of the error above it removed", ">= 80 %",
+        [](const Score& s) { return text(s.holdout); }},
+    Row{"ambiguous ones separated by the experiment asked for", ">= 80 %",
+        [](const Score& s) { return s.separated.of > 0 ? text(s.separated) : "-"; }},
+    Row{"located in time: intersection over union, median", ">= 0.6",
+        [](const Score& s) { return s.detected.hits > 0 ? fmt::format("{:.2f}", s.median_overlap) : "-"; }},
+    Row{"expected calibration error of the probabilities", "<= 0.07",
+        [](const Score& s) { return s.named > 0 ? fmt::format("{:.2f}", s.calibration_error) : "-"; }},
     Row{"seconds a case", "", [](const Score& s) { return fmt::format("{:.1f}", s.mean_wall_s); }},
 };
 
-bool quiet(const Outcome& o) { return o.verdict == diagnosis::Verdict::no_mismatch || o.verdict == diagnosis::Verdict::not_testable; }
+bool quiet(const Outcome& o) {
+  return o.verdict == diagnosis::Verdict::no_mismatch || o.verdict == diagnosis::Verdict::not_testable;
+}
 
 std::string heading(const std::vector<Column>& columns, const std::string& first) {
   std::string line = "| " + first + " |", rule = "|---|";
@@ -73,7 +83,9 @@ std::string confusion_table(const std::vector<Outcome>& outcomes) {
     const bool known = o.answer.kind == "single" && o.answer.strength >= 2;
     if (!known && o.answer.kind != "null" && o.answer.kind != "outside") continue;
     // of what is outside, the ids are no class of ours
-    const std::string truth = known ? class_of(o.answer.ids.front()) : o.answer.kind == "null" ? "(nothing)" : "(outside the catalogue)";
+    const std::string truth = known                     ? class_of(o.answer.ids.front())
+                              : o.answer.kind == "null" ? "(nothing)"
+                                                        : "(outside the catalogue)";
     const bool named = !o.found.empty() && o.verdict != diagnosis::Verdict::unknown;
     ++said[truth][quiet(o) ? "(nothing)" : named ? class_of(o.found.front()) : diagnosis::name_of(o.verdict)];
   }
@@ -84,8 +96,10 @@ std::string confusion_table(const std::vector<Outcome>& outcomes) {
     for (const auto& [name, count] : counts) {
       all += count;
       const bool same = name == truth || (truth == "(outside the catalogue)" && name == "UNKNOWN");
-      if (same) right = count;
-      else others.emplace_back(count, name);
+      if (same)
+        right = count;
+      else
+        others.emplace_back(count, name);
     }
     std::stable_sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
     std::string list;
@@ -102,13 +116,15 @@ std::string detection_table(const std::vector<Column>& columns) {
   };
   std::string table = heading(columns, "strength");
   // some effects are plain to see at any size worth naming
-  for (const Bin& bin : {Bin{"below 0.5", 0, 0.5}, Bin{"0.5 to 1", 0.5, 1}, Bin{"1 to 2", 1, 2}, Bin{"2 to 4", 2, 4}, Bin{"4 to 8", 4, 8}, Bin{"above 8", 8, 1e300}}) {
+  for (const Bin& bin : {Bin{"below 0.5", 0, 0.5}, Bin{"0.5 to 1", 0.5, 1}, Bin{"1 to 2", 1, 2}, Bin{"2 to 4", 2, 4},
+                         Bin{"4 to 8", 4, 8}, Bin{"above 8", 8, 1e300}}) {
     std::string line = fmt::format("| {} |", bin.text);
     std::size_t cases = 0;
     for (const Column& c : columns) {
       Share detected;
       for (const Outcome& o : c.outcomes) {
-        if (o.answer.kind == "single" && o.answer.strength >= bin.from && o.answer.strength < bin.to) detected.count(!quiet(o));
+        if (o.answer.kind == "single" && o.answer.strength >= bin.from && o.answer.strength < bin.to)
+          detected.count(!quiet(o));
       }
       cases = std::max(cases, detected.of);
       line += " " + text(detected) + " |";
@@ -120,9 +136,12 @@ std::string detection_table(const std::vector<Column>& columns) {
 
 std::string report(const std::string& split, std::uint64_t seed, const std::vector<Column>& columns) {
   const std::size_t cases = columns.front().outcomes.size();
-  return fmt::format("{} split, seed {}, {} cases. In brackets: Wilson's 95 % interval.\n\n{}\n", split, seed, cases, figures_table(columns)) +
+  return fmt::format("{} split, seed {}, {} cases. In brackets: Wilson's 95 % interval.\n\n{}\n", split, seed, cases,
+                     figures_table(columns)) +
          "Single effects that were detected, by strength in detection limits:\n\n" + detection_table(columns) +
-         fmt::format("\nWhat {} named first, by class; single effects at twice the detection limit and above:\n\n", columns.front().method) + confusion_table(columns.front().outcomes);
+         fmt::format("\nWhat {} named first, by class; single effects at twice the detection limit and above:\n\n",
+                     columns.front().method) +
+         confusion_table(columns.front().outcomes);
 }
 
 }  // namespace bms::benchmark

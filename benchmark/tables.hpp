@@ -1,5 +1,5 @@
-// The benchmark's tables, as Markdown: every figure of every method beside what is required, the classes that were mistaken for each
-// other, and detection over the strength of the effect.
+// The benchmark's tables, as Markdown: every figure of every method beside what is required, the classes that were
+// mistaken for each other, and detection over the strength of the effect.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@ struct Column {
 /// Shares as "hits of cases: share (Wilson's 95 % interval)"; "-" where no case counts.
 std::string figures_table(const std::vector<Column>& columns);
 
-/// Single effects at twice the detection limit and above, nulls and what is outside the catalogue: what was named first, by class.
+/// Single effects at twice the detection limit and above, nulls and what is outside the catalogue: what was named
+/// first, by class.
 std::string confusion_table(const std::vector<Outcome>& outcomes);
 
 /// Single effects that were not passed over, by strength in detection limits.

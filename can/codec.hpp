@@ -1,15 +1,15 @@
-// Values in the bits of a CAN frame, little-endian, and its end-to-end protection. What is where: greybox_bms.dbc, from which the messages
-// that use this are generated (cmake/dbc_header.py).
+// Values in the bits of a CAN frame, little-endian, and its end-to-end protection. What is where: greybox_bms.dbc, from
+// which the messages that use this are generated (cmake/dbc_header.py).
 //
-// In float: a signal of more than 24 bits is an integer. NaN is sent as the signal's invalid value; what does not fit saturates at
-// the signal's range.
+// In float: a signal of more than 24 bits is an integer. NaN is sent as the signal's invalid value; what does not fit
+// saturates at the signal's range.
 #pragma once
 
 #include <concepts>
 #include <cstdint>
 #include <limits>
 
-#include "hal/can.hpp"
+#include "can/frame.hpp"
 
 namespace bms::can {
 
@@ -31,19 +31,21 @@ struct ValueName {
 
 constexpr std::uint64_t mask(unsigned bits) { return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1; }
 
-constexpr std::uint64_t bits_of(const hal::CanFrame& frame) {
+constexpr std::uint64_t bits_of(const Frame& frame) {
   std::uint64_t all = 0;
   for (unsigned k = 0; k < 8; ++k) all |= static_cast<std::uint64_t>(frame.data[k]) << (8 * k);
   return all;
 }
-constexpr void put_raw(hal::CanFrame& frame, unsigned start, unsigned bits, std::uint64_t raw) {
+constexpr void put_raw(Frame& frame, unsigned start, unsigned bits, std::uint64_t raw) {
   const std::uint64_t all = (bits_of(frame) & ~(mask(bits) << start)) | ((raw & mask(bits)) << start);
   for (unsigned k = 0; k < 8; ++k) frame.data[k] = static_cast<std::uint8_t>(all >> (8 * k));
 }
-constexpr std::uint64_t get_raw(const hal::CanFrame& frame, unsigned start, unsigned bits) { return (bits_of(frame) >> start) & mask(bits); }
+constexpr std::uint64_t get_raw(const Frame& frame, unsigned start, unsigned bits) {
+  return (bits_of(frame) >> start) & mask(bits);
+}
 
 template <SignalLayout s>
-constexpr void put(hal::CanFrame& frame, float value) {
+constexpr void put(Frame& frame, float value) {
   std::int32_t raw = s.invalid;
   if (value == value || !s.has_invalid) {
     const float held = !(value > s.lowest) ? s.lowest : value > s.highest ? s.highest : value;
@@ -53,42 +55,42 @@ constexpr void put(hal::CanFrame& frame, float value) {
   put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(raw)));
 }
 template <SignalLayout s>
-constexpr void put(hal::CanFrame& frame, std::uint32_t value) {
+constexpr void put(Frame& frame, std::uint32_t value) {
   constexpr auto most = s.bits > 24 ? static_cast<std::uint32_t>(mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
   put_raw(frame, s.start, s.bits, value <= most ? value : s.has_invalid ? static_cast<std::uint32_t>(s.invalid) : most);
 }
 
 template <SignalLayout s>
-constexpr void put(hal::CanFrame& frame, std::int32_t value) {
+constexpr void put(Frame& frame, std::int32_t value) {
   constexpr auto most = static_cast<std::int32_t>(mask(s.bits - 1));
   const std::int32_t held = value > most ? most : value < -most - 1 ? -most - 1 : value;
   put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(held)));
 }
 
 template <SignalLayout s>
-constexpr std::int64_t value_of(const hal::CanFrame& frame) {
+constexpr std::int64_t value_of(const Frame& frame) {
   const std::uint64_t raw = get_raw(frame, s.start, s.bits);
   const auto value = static_cast<std::int64_t>(raw);
   return s.is_signed && (raw >> (s.bits - 1) & 1) != 0 ? value - static_cast<std::int64_t>(mask(s.bits)) - 1 : value;
 }
 template <SignalLayout s, std::same_as<float> T>
-constexpr float get(const hal::CanFrame& frame) {
+constexpr float get(const Frame& frame) {
   const std::int64_t value = value_of<s>(frame);
   if (s.has_invalid && value == s.invalid) return unknown;
   return static_cast<float>(static_cast<std::int32_t>(value)) * s.factor + s.offset;
 }
 template <SignalLayout s, std::same_as<std::uint32_t> T>
-constexpr std::uint32_t get(const hal::CanFrame& frame) {
+constexpr std::uint32_t get(const Frame& frame) {
   return static_cast<std::uint32_t>(get_raw(frame, s.start, s.bits));
 }
 template <SignalLayout s, std::same_as<std::int32_t> T>
-constexpr std::int32_t get(const hal::CanFrame& frame) {
+constexpr std::int32_t get(const Frame& frame) {
   return static_cast<std::int32_t>(value_of<s>(frame));
 }
 
-// AUTOSAR end-to-end protection, profile 1: CRC-8 SAE J1850 (polynomial 0x1D, start 0, nothing inverted) over the data id, low byte first,
-// and all bytes but its own, the first; a counter of 0 to 14 in the low half of the second. It finds what is corrupted, repeated, lost,
-// or sent as another message.
+// AUTOSAR end-to-end protection, profile 1: CRC-8 SAE J1850 (polynomial 0x1D, start 0, nothing inverted) over the data
+// id, low byte first, and all bytes but its own, the first; a counter of 0 to 14 in the low half of the second. It
+// finds what is corrupted, repeated, lost, or sent as another message.
 
 inline constexpr std::uint8_t counters = 15;
 
@@ -97,17 +99,21 @@ constexpr std::uint8_t crc8(std::uint8_t crc, std::uint8_t byte) {
   for (int k = 0; k < 8; ++k) crc = static_cast<std::uint8_t>((crc << 1) ^ ((crc & 0x80) != 0 ? 0x1D : 0));
   return crc;
 }
-constexpr std::uint8_t crc_of(const hal::CanFrame& frame, std::uint16_t data_id) {
+constexpr std::uint8_t crc_of(const Frame& frame, std::uint16_t data_id) {
   std::uint8_t crc = crc8(crc8(0, static_cast<std::uint8_t>(data_id & 0xFF)), static_cast<std::uint8_t>(data_id >> 8));
   for (unsigned k = 1; k < frame.length; ++k) crc = crc8(crc, frame.data[k]);
   return crc;
 }
-constexpr void protect(hal::CanFrame& frame, std::uint16_t data_id, std::uint8_t counter) {
+constexpr void protect(Frame& frame, std::uint16_t data_id, std::uint8_t counter) {
   put_raw(frame, 8, 4, counter);
   frame.data[0] = crc_of(frame, data_id);
 }
-constexpr bool intact(const hal::CanFrame& frame, std::uint16_t data_id) { return frame.length == 8 && frame.data[0] == crc_of(frame, data_id); }
-constexpr std::uint8_t counter_of(const hal::CanFrame& frame) { return frame.data[1] & 0x0F; }
-constexpr std::uint8_t next(std::uint8_t counter) { return counter + 1 < counters ? static_cast<std::uint8_t>(counter + 1) : std::uint8_t{0}; }
+constexpr bool intact(const Frame& frame, std::uint16_t data_id) {
+  return frame.length == 8 && frame.data[0] == crc_of(frame, data_id);
+}
+constexpr std::uint8_t counter_of(const Frame& frame) { return frame.data[1] & 0x0F; }
+constexpr std::uint8_t next(std::uint8_t counter) {
+  return counter + 1 < counters ? static_cast<std::uint8_t>(counter + 1) : std::uint8_t{0};
+}
 
 }  // namespace bms::can

@@ -2,9 +2,10 @@
 //
 //   cell_header CELL OUT.hpp [fixed]      CELL: a built-in name or a path; fixed: for a board that computes in integers
 //
-// Mechanisms that an estimator cannot run (model/mechanism.hpp, on_board) are left out, as the host's estimator leaves them out.
-// Numbers are written with the digits that give back the very same double; the compiler then prepares the tables for the
-// board's scalar by the same constexpr function that the host runs. Exit code 2 and one line when the cell is refused.
+// Mechanisms that an estimator cannot run (model/mechanism.hpp, on_board) are left out, as the host's estimator leaves
+// them out. Numbers are written with the digits that give back the very same double; the compiler then prepares the
+// tables for the board's scalar by the same constexpr function that the host runs. Exit code 2 and one line when the
+// cell is refused.
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -13,10 +14,10 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/bad_input.hpp"
-#include "host_sim/cell_fields.hpp"
-#include "host_sim/cell_file.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/bad_input.hpp"
+#include "files/cell_fields.hpp"
+#include "files/cell_file.hpp"
+#include "files/text_file.hpp"
 
 namespace {
 
@@ -29,10 +30,14 @@ std::string literal(double value) {
 /// Designated initialisers of model::CellParameters: its members are called as the keys of the file.
 class Initialiser {
  public:
-  void table(const std::string& key) { text_ += (std::exchange(inside_, true) ? "},\n" : "\n") + ("    ." + key + " = {"); }
+  void table(const std::string& key) {
+    text_ += (std::exchange(inside_, true) ? "},\n" : "\n") + ("    ." + key + " = {");
+  }
   void number(const std::string& key, double value) { text_ += "." + key + " = " + literal(value) + ", "; }
   void optional_number(const std::string& key, double value) { number(key, value); }
-  void optional_flag(const std::string& key, bool value) { text_ += "." + key + " = " + (value ? "true" : "false") + ", "; }
+  void optional_flag(const std::string& key, bool value) {
+    text_ += "." + key + " = " + (value ? "true" : "false") + ", ";
+  }
   template <class Column>
   void column(const std::string& key, const Column& column) {
     std::string values;
@@ -53,8 +58,8 @@ class Initialiser {
 };
 
 /// The mechanisms' part: which model the estimator runs, and the cell's constants.
-std::string extension(const bms::CellFile& file) {
-  const auto acting = bms::on_board(file.mechanisms);
+std::string extension(const bms::files::CellFile& file) {
+  const auto acting = bms::files::on_board(file.mechanisms);
   if (acting.empty()) {
     return fmt::format(R"(/// The model that the estimator steps.
 template <class S>
@@ -62,7 +67,8 @@ using Model = model::ExtendedRc<0, 0, {}>::Of<S>;
 
 template <class S>
 inline constexpr auto cell = model::prepare<S, model::interval_count(parameters)>(parameters);
-)", file.parameters.noise.errors_are_states);
+)",
+                       file.parameters.noise.errors_are_states);
   }
   std::string types, values;
   for (const bms::model::MechanismSetting& m : acting) {
@@ -71,7 +77,9 @@ inline constexpr auto cell = model::prepare<S, model::interval_count(parameters)
     for (std::size_t k = 0; k < info.parameters; ++k) list += (k == 0 ? "" : ", ") + literal(m.value[k]);
     const std::string type = fmt::format("model::MechanismAt<model::mechanism_index(\"{}\")>", info.id);
     types += ", " + type;
-    values += fmt::format("{}\n        typename {}::template Law<S>(std::array<double, {}>{{{}}}, parameters.capacity_ah)", values.empty() ? "" : ",", type, info.parameters, list);
+    values +=
+        fmt::format("{}\n        typename {}::template Law<S>(std::array<double, {}>{{{}}}, parameters.capacity_ah)",
+                    values.empty() ? "" : ",", type, info.parameters, list);
   }
   return fmt::format(R"(template <class S>
 using Laws = model::Laws<S{types}>;
@@ -83,12 +91,14 @@ using Model = typename model::ExtendedRc<Laws<float>::most_voltage_states, Laws<
 template <class S>
 inline constexpr model::ExtendedCell<S, model::interval_count(parameters), Laws<S>> cell{{
     model::prepare<S, model::interval_count(parameters)>(parameters), Laws<S>({values})}};
-)", fmt::arg("types", types), fmt::arg("errors", file.parameters.noise.errors_are_states), fmt::arg("values", values));
+)",
+                     fmt::arg("types", types), fmt::arg("errors", file.parameters.noise.errors_are_states),
+                     fmt::arg("values", values));
 }
 
-std::string header(const bms::CellFile& file) {
+std::string header(const bms::files::CellFile& file) {
   Initialiser values;
-  bms::visit_cell(values, file.parameters);
+  bms::files::visit_cell(values, file.parameters);
   return fmt::format(
       R"(// Made at build time from the cell file '{name}'; do not edit.
 #pragma once
@@ -110,8 +120,9 @@ static_assert(model::first_fault(parameters).what == nullptr, "a parameter of th
 {extension}
 }}  // namespace bms::generated
 )",
-      fmt::arg("model", bms::on_board(file.mechanisms).empty() ? "cell" : "extended"), fmt::arg("extension", extension(file)),
-      fmt::arg("name", file.name), fmt::arg("hash", file.hash), fmt::arg("values", values.text()));
+      fmt::arg("model", bms::files::on_board(file.mechanisms).empty() ? "cell" : "extended"),
+      fmt::arg("extension", extension(file)), fmt::arg("name", file.name), fmt::arg("hash", file.hash),
+      fmt::arg("values", values.text()));
 }
 
 }  // namespace
@@ -123,10 +134,10 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    const bms::CellFile cell = bms::read_cell(argv[1]);
-    if (fixed) bms::refuse_without_fpu(cell);
-    bms::write_file(argv[2], header(cell));
-  } catch (const bms::BadInput& error) {
+    const bms::files::CellFile cell = bms::files::read_cell(argv[1]);
+    if (fixed) bms::files::refuse_without_fpu(cell);
+    bms::files::write_file(argv[2], header(cell));
+  } catch (const bms::files::BadInput& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;
   } catch (const std::exception& error) {

@@ -62,10 +62,10 @@ def message(frame):
         for raw, text in sorted(s.values.items()):
             lines.append(f"  static constexpr std::uint32_t {snake(s.name)}_{re.sub(r'[^a-z0-9]+', '_', str(text).lower())} = {raw};")
     unused = "" if data_id else ", ".join(["0xFF"] * frame.size)
-    lines += ["", f"  constexpr hal::CanFrame frame({'std::uint8_t counter' if data_id else ''}) const {{", f"    hal::CanFrame out{{id, {frame.size}, {{{unused}}}, {str(long_id).lower()}}};"]
+    lines += ["", f"  constexpr can::Frame frame({'std::uint8_t counter' if data_id else ''}) const {{", f"    can::Frame out{{id, {frame.size}, {{{unused}}}, {str(long_id).lower()}}};"]
     lines += [f"    put<{snake(s.name)}_layout>(out, {snake(s.name)});" for s in values]
     lines += ["    protect(out, data_id, counter);"] if data_id else []
-    lines += ["    return out;", "  }", f"  static constexpr {frame.name} of(const hal::CanFrame& frame) {{", f"    {frame.name} out;"]
+    lines += ["    return out;", "  }", f"  static constexpr {frame.name} of(const can::Frame& frame) {{", f"    {frame.name} out;"]
     lines += [f"    out.{snake(s.name)} = get<{snake(s.name)}_layout, decltype(out.{snake(s.name)})>(frame);" for s in values]
     lines += ["    return out;", "  }", "  /// see(name, unit, value, layout) for each.", "  template <class See>", "  constexpr void each(See&& see) {"]
     lines += [f'    see("{s.name}", "{s.unit}", {snake(s.name)}, {snake(s.name)}_layout);' for s in values]

@@ -45,8 +45,8 @@ if(NOT cell_header_tool)
     CMAKE_ARGS -DBMS_GENERATORS_ONLY=ON -DBMS_TESTS=OFF
     BUILD_ALWAYS ON
     INSTALL_COMMAND ""
-    BUILD_BYPRODUCTS ${generators}/host_sim/cell_header)
-  set(cell_header_tool ${generators}/host_sim/cell_header)
+    BUILD_BYPRODUCTS ${generators}/files/cell_header)
+  set(cell_header_tool ${generators}/files/cell_header)
 endif()
 
 set(cell_header ${CMAKE_BINARY_DIR}/generated/cell_constants.hpp)

@@ -36,7 +36,7 @@ def configured(board, host_build):
     """Folder with the compile commands of a board's images, and the headers that are generated for them."""
     build = os.path.join(ROOT, "build", "lint", board)
     run(["cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DBMS_BOARD=" + board, "--toolchain", os.path.join(ROOT, "cmake", "toolchain-arm-none-eabi.cmake"),
-         "-DBMS_CELL_HEADER_TOOL=" + os.path.join(host_build, "host_sim", "cell_header")])
+         "-DBMS_CELL_HEADER_TOOL=" + os.path.join(host_build, "files", "cell_header")])
     generated = re.findall(r"^(generated/[^:]*): CUSTOM_COMMAND", run(["ninja", "-C", build, "-t", "targets", "all"]), re.M)
     run(["ninja", "-C", build] + generated)
     return build

@@ -23,8 +23,8 @@ constexpr std::array<std::size_t, 6> lengths = {2, 4, 8, 16, 32, 64};  // rows
 constexpr std::size_t tail = 40;                                       // rows in which a stretch's end rings out
 constexpr std::size_t fewest_rows = 3;                                 // one bad reading is no contact
 constexpr double most_loaded_share = 0.35;                             // bursts are the exception
-constexpr std::size_t beside = 64;                                     // rows around a step of the current in which the model itself may be off
-constexpr double chance = 0.01;                                        // of loose moments that fall beside steps as often as these
+constexpr std::size_t beside = 64;  // rows around a step of the current in which the model itself may be off
+constexpr double chance = 0.01;     // of loose moments that fall beside steps as often as these
 
 /// Stretches that do not touch, best first, each worth its price at this resistance.
 std::vector<Stretch> chosen(std::vector<Stretch> all, double ohm, std::size_t rows, double& total) {
@@ -34,8 +34,11 @@ std::vector<Stretch> chosen(std::vector<Stretch> all, double ohm, std::size_t ro
   std::vector<Stretch> best;
   total = 0;
   for (const Stretch& s : all) {
-    if (std::any_of(taken.begin() + static_cast<std::ptrdiff_t>(s.first), taken.begin() + static_cast<std::ptrdiff_t>(s.end + 1), [](char t) { return t != 0; })) continue;
-    std::fill(taken.begin() + static_cast<std::ptrdiff_t>(s.first), taken.begin() + static_cast<std::ptrdiff_t>(s.end + 1), 1);
+    if (std::any_of(taken.begin() + static_cast<std::ptrdiff_t>(s.first),
+                    taken.begin() + static_cast<std::ptrdiff_t>(s.end + 1), [](char t) { return t != 0; }))
+      continue;
+    std::fill(taken.begin() + static_cast<std::ptrdiff_t>(s.first),
+              taken.begin() + static_cast<std::ptrdiff_t>(s.end + 1), 1);
     total += s.gain(ohm) - decision::per_burst;
     best.push_back(s);
   }
@@ -47,14 +50,16 @@ double as_many(std::size_t of, std::size_t hits, double share) {
   double sum = 0;
   for (std::size_t k = hits; k <= of; ++k) {
     const double n = static_cast<double>(of), h = static_cast<double>(k);
-    sum += std::exp(std::lgamma(n + 1) - std::lgamma(h + 1) - std::lgamma(n - h + 1)) * std::pow(share, h) * std::pow(1 - share, n - h);
+    sum += std::exp(std::lgamma(n + 1) - std::lgamma(h + 1) - std::lgamma(n - h + 1)) * std::pow(share, h) *
+           std::pow(1 - share, n - h);
   }
   return sum;
 }
 
 }  // namespace
 
-std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v, const Whitener& whitener, double& found_ohm) {
+std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v,
+                                     const Whitener& whitener, double& found_ohm) {
   const std::size_t n = record.size();
   std::vector<double> residual(residual_v);
   for (double& v : residual) v = std::abs(v) < runaway_v ? v : 0;
@@ -121,11 +126,14 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
     for (Stretch& s : best) {
       for (bool moved = true; moved;) {
         moved = false;
-        for (const auto& [by_first, by_end] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {
-          const auto first = static_cast<std::ptrdiff_t>(s.first) + by_first, end = static_cast<std::ptrdiff_t>(s.end) + by_end;
+        for (const auto& [by_first, by_end] :
+             {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {
+          const auto first = static_cast<std::ptrdiff_t>(s.first) + by_first,
+                     end = static_cast<std::ptrdiff_t>(s.end) + by_end;
           if (first < 0 || end <= first || end >= static_cast<std::ptrdiff_t>(n)) continue;
           const Stretch there = stretch(static_cast<std::size_t>(first), static_cast<std::size_t>(end));
-          if (!(there.gain(ohm) > s.gain(ohm) + 1e-9)) continue;  // nor where there is no number: it would go to and fro for ever
+          if (!(there.gain(ohm) > s.gain(ohm) + 1e-9))
+            continue;  // nor where there is no number: it would go to and fro for ever
           s = there;
           moved = true;
         }
@@ -145,10 +153,12 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
     for (std::size_t j = k > beside ? k - beside : 0; j < std::min(n, k + beside); ++j) near_step[j] = 1;
   }
   double loaded_near = 0;
-  for (std::size_t k = 0; k < n; ++k) loaded_near += near_step[k] != 0 && std::abs(current_a(k)) > 0.02 * largest_a ? 1 : 0;
+  for (std::size_t k = 0; k < n; ++k)
+    loaded_near += near_step[k] != 0 && std::abs(current_a(k)) > 0.02 * largest_a ? 1 : 0;
   std::size_t bursts_near = 0;
   for (const Stretch& s : best) bursts_near += near_step[(s.first + s.end) / 2] != 0 ? 1 : 0;
-  if (as_many(best.size(), bursts_near, loaded_near / static_cast<double>(std::max<std::size_t>(loaded, 1))) < chance) return {};
+  if (as_many(best.size(), bursts_near, loaded_near / static_cast<double>(std::max<std::size_t>(loaded, 1))) < chance)
+    return {};
 
   // what then still asks for less than there is: as much as that chance does for more
   column.assign(n, 0);
@@ -164,8 +174,10 @@ std::vector<model::Span> find_bursts(const Record& record, const std::vector<dou
   std::sort(best.begin(), best.end(), [](const Stretch& a, const Stretch& b) { return a.first < b.first; });
   std::vector<model::Span> spans;
   for (const Stretch& s : best) {
-    if (!spans.empty() && record.time_s[s.first] <= spans.back().end_s) spans.back().end_s = std::max(spans.back().end_s, record.time_s[s.end - 1]);
-    else spans.push_back({record.time_s[s.first], record.time_s[s.end - 1]});
+    if (!spans.empty() && record.time_s[s.first] <= spans.back().end_s)
+      spans.back().end_s = std::max(spans.back().end_s, record.time_s[s.end - 1]);
+    else
+      spans.push_back({record.time_s[s.first], record.time_s[s.end - 1]});
   }
   return spans;
 }

@@ -22,7 +22,9 @@ std::vector<double> knots(double low, double high, double step) {
 
 /// Two ascending lists as one, of places at least `apart` from each other; those of `first` all stay. At most `most`.
 std::vector<double> merged(std::vector<double> first, const std::vector<double>& more, double apart, std::size_t most) {
-  const auto far = [&](double x) { return std::none_of(first.begin(), first.end(), [&](double y) { return std::abs(x - y) < apart; }); };
+  const auto far = [&](double x) {
+    return std::none_of(first.begin(), first.end(), [&](double y) { return std::abs(x - y) < apart; });
+  };
   for (const double x : more) {
     if (first.size() < most && x > 0 && x < 1 && far(x)) first.push_back(x);
   }
@@ -50,7 +52,9 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Re
   const double ocv_v = std::max(t.ocv_v, 2e-4), fraction = std::max(t.resistance_fraction, 2e-3);
   // a table of few nodes stands for the middle
   const double first_node = std::min(cell.rc.soc[0], 0.2), last_node = std::max(cell.rc.soc[cell.rc.soc.size - 1], 0.9);
-  const auto fraction_at = [&](double soc) { return fraction * (1 + std::max({0.0, first_node - soc, soc - last_node}) / beyond_nodes); };
+  const auto fraction_at = [&](double soc) {
+    return fraction * (1 + std::max({0.0, first_node - soc, soc - last_node}) / beyond_nodes);
+  };
   offset_a_ = std::min(cell.noise.current_offset_a, 1e-3 * cell.capacity_ah);
 
   const auto hats = [&](std::vector<double> at, const auto& deviation) {
@@ -61,18 +65,25 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Re
   ocv_ = hats(knots(low, high, 0.05), [&](double) { return ocv_v; });
   const auto& ocv = cell.ocv;
   for (std::size_t k = 1; k + 1 < ocv.soc.size; ++k) {
-    const double bend = std::abs(ocv.b1_v[k] - ocv.b1_v[k - 1]), between = std::min(ocv.soc[k + 1] - ocv.soc[k], ocv.soc[k] - ocv.soc[k - 1]);
+    const double bend = std::abs(ocv.b1_v[k] - ocv.b1_v[k - 1]),
+                 between = std::min(ocv.soc[k + 1] - ocv.soc[k], ocv.soc[k] - ocv.soc[k - 1]);
     // a curve that follows both lines but for a quarter of the pieces beside the corner passes it at bend * width / 4
     const double width = std::min(0.025, between / 2), deviation_v = bend * width / 6;
-    if (deviation_v > ocv_v / 2 && ocv.soc[k] > low - width && ocv.soc[k] < high + width) corners_.push_back({ocv.soc[k], width, deviation_v, size_++});
+    if (deviation_v > ocv_v / 2 && ocv.soc[k] > low - width && ocv.soc[k] < high + width)
+      corners_.push_back({ocv.soc[k], width, deviation_v, size_++});
   }
   // what an identification says of itself counts where it is more
   const auto said = [&](const auto& value, const auto& deviation, double soc) {
-    return deviation.size == 0 ? 0.0 : model::cell_detail::rc_value(cell.rc, deviation, soc) / model::cell_detail::rc_value(cell.rc, value, soc);
+    return deviation.size == 0 ? 0.0
+                               : model::cell_detail::rc_value(cell.rc, deviation, soc) /
+                                     model::cell_detail::rc_value(cell.rc, value, soc);
   };
-  r0_ = hats(knots(low, high, 0.1), [&](double soc) { return std::max(fraction_at(soc), said(cell.rc.r0_ohm, cell.rc.r0_std_ohm, soc)); });
-  r1_ = hats(knots(low, high, 0.2), [&](double soc) { return std::max(2 * fraction_at(soc), said(cell.rc.r1_ohm, cell.rc.r1_std_ohm, soc)); });
-  c1_ = hats(knots(low, high, 0.2), [&](double soc) { return std::max(4 * fraction_at(soc), said(cell.rc.c1_f, cell.rc.c1_std_f, soc)); });
+  r0_ = hats(knots(low, high, 0.1),
+             [&](double soc) { return std::max(fraction_at(soc), said(cell.rc.r0_ohm, cell.rc.r0_std_ohm, soc)); });
+  r1_ = hats(knots(low, high, 0.2),
+             [&](double soc) { return std::max(2 * fraction_at(soc), said(cell.rc.r1_ohm, cell.rc.r1_std_ohm, soc)); });
+  c1_ = hats(knots(low, high, 0.2),
+             [&](double soc) { return std::max(4 * fraction_at(soc), said(cell.rc.c1_f, cell.rc.c1_std_f, soc)); });
   capacity_ = size_++;
   gain_ = size_++;
   for (const Record& r : records) {
@@ -101,7 +112,9 @@ model::CellParameters<> Calibration::applied(const model::CellParameters<>& cell
     if (std::abs(u[c.unknown]) > 0.3) wanted.insert(wanted.end(), {c.soc - c.width, c.soc + c.width});
   }
   const model::OcvTable<double>& ocv = cell.ocv;
-  const std::vector<double> edges = merged({ocv.soc.value.begin(), ocv.soc.value.begin() + static_cast<std::ptrdiff_t>(ocv.soc.size)}, wanted, 0.004, model::max_ocv_edges);
+  const std::vector<double> edges =
+      merged({ocv.soc.value.begin(), ocv.soc.value.begin() + static_cast<std::ptrdiff_t>(ocv.soc.size)}, wanted, 0.004,
+             model::max_ocv_edges);
   moved.ocv = {};
   moved.ocv.lean = ocv.lean;
   for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -114,13 +127,16 @@ model::CellParameters<> Calibration::applied(const model::CellParameters<>& cell
     if (k + 1 == edges.size()) break;
     const double low_v = at(edges[k]).ocv_v, high_v = at(edges[k + 1]).ocv_v, width = edges[k + 1] - edges[k];
     // the curve goes on rising
-    const double turn_v = std::max((high_v - low_v) / width, -0.9 * ocv.b1_v[here]), middle_v = (low_v + high_v) / 2, middle = (edges[k] + edges[k + 1]) / 2;
+    const double turn_v = std::max((high_v - low_v) / width, -0.9 * ocv.b1_v[here]), middle_v = (low_v + high_v) / 2,
+                 middle = (edges[k] + edges[k + 1]) / 2;
     moved.ocv.b1_v.push_back(ocv.b1_v[here] + turn_v);
     moved.ocv.b0_v.push_back(ocv.b0_v[here] + middle_v - turn_v * middle);
   }
 
   const model::RcTable<double>& rc = cell.rc;
-  const std::vector<double> nodes = merged({rc.soc.value.begin(), rc.soc.value.begin() + static_cast<std::ptrdiff_t>(rc.soc.size)}, r0_.knots(), 0.02, model::max_rc_nodes);
+  const std::vector<double> nodes =
+      merged({rc.soc.value.begin(), rc.soc.value.begin() + static_cast<std::ptrdiff_t>(rc.soc.size)}, r0_.knots(), 0.02,
+             model::max_rc_nodes);
   moved.rc = {};
   const auto value = [&](const auto& column, double soc) { return model::cell_detail::rc_value(rc, column, soc); };
   for (const double soc : nodes) {

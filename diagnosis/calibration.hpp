@@ -1,11 +1,14 @@
-// The control hypothesis: every base parameter free within what the calibration is good for (the cell file's [tolerance]).
+// The control hypothesis: every base parameter free within what the calibration is good for (the cell file's
+// [tolerance]).
 //
-// A mechanism must beat this, not the frozen model: a table that is 1 mV or 2 % off is no missing physics. Each unknown is a
-// standard normal one; its size in the model is its deviation:
+// A mechanism must beat this, not the frozen model: a table that is 1 mV or 2 % off is no missing physics. Each unknown
+// is a standard normal one; its size in the model is its deviation:
 //
-//   OCV         at knots every 5 % of soc: tolerance.ocv_v; where the table bends sharply, another one beside the corner: a smooth
+//   OCV         at knots every 5 % of soc: tolerance.ocv_v; where the table bends sharply, another one beside the
+//   corner: a smooth
 //               curve cuts a corner of straight lines by its change of slope times some soc
-//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction, or the identification's own deviation if
+//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction, or the identification's
+//   own deviation if
 //               that is more; more beyond the table's nodes, where it only carries on: towards empty resistances grow
 //   capacity    0.5 %;  gain of the current 0.2 %
 //   per record  initial soc; a slow wander of the current's zero, 0.1 % of 1C at most, in hours
@@ -26,8 +29,10 @@ namespace bms::diagnosis {
 /// Without its derivatives.
 template <class S>
 double number(const S& x) {
-  if constexpr (model::Dual<S>) return x.a;
-  else return x;
+  if constexpr (model::Dual<S>)
+    return x.a;
+  else
+    return x;
 }
 
 /// Values between evenly spaced knots, straight lines; constant outside.
@@ -82,8 +87,8 @@ class Hats {
   std::size_t first_ = 0;
 };
 
-/// What the base parameters move in a row: the OCV; shares of R0, R1, C1; the current's zero; shares of the capacity and of the gain.
-/// Each unknown acts through one of these alone, but for the start.
+/// What the base parameters move in a row: the OCV; shares of R0, R1, C1; the current's zero; shares of the capacity
+/// and of the gain. Each unknown acts through one of these alone, but for the start.
 struct Lever {
   enum : std::size_t { ocv, r0, r1, c1, zero, capacity, gain, count };
 };
@@ -92,7 +97,9 @@ class Calibration {
  public:
   struct AsItIs {
     template <class S>
-    const S& operator()(std::size_t, const S& x) const { return x; }
+    const S& operator()(std::size_t, const S& x) const {
+      return x;
+    }
   };
 
   Calibration(const model::CellParameters<>& cell, std::span<const Record> records);
@@ -113,11 +120,13 @@ class Calibration {
     at.r1_ohm *= factor(pulled(Lever::r1, r1_.at(soc, u)));
     at.c1_f *= factor(pulled(Lever::c1, c1_.at(soc, u)));
   }
-  /// f(lever, unknown, how far an unknown of 1 moves it), of all that act on a row. The OCV's come first among the unknowns: they move
-  /// no state.
+  /// f(lever, unknown, how far an unknown of 1 moves it), of all that act on a row. The OCV's come first among the
+  /// unknowns: they move no state.
   template <class F>
   void each_lever(std::size_t record, double time_s, double soc, F&& f) const {
-    const auto through = [&](std::size_t lever) { return [&f, lever](std::size_t unknown, double size) { f(lever, unknown, size); }; };
+    const auto through = [&](std::size_t lever) {
+      return [&f, lever](std::size_t unknown, double size) { f(lever, unknown, size); };
+    };
     ocv_.each(soc, through(Lever::ocv));
     for (const Corner& c : corners_) {
       const double apart = std::abs(soc - c.soc) / c.width;
@@ -151,8 +160,9 @@ class Calibration {
   S gain_error(const std::vector<S>& u) const {
     return u[gain_] * gain_size;
   }
-  /// The cell with its tables and capacity as the unknowns have them: what belongs to one recording alone (its start, its wander of the
-  /// zero, the gain of its sensor) is left out. Edges and nodes are added at the knots as far as a cell file holds them.
+  /// The cell with its tables and capacity as the unknowns have them: what belongs to one recording alone (its start,
+  /// its wander of the zero, the gain of its sensor) is left out. Edges and nodes are added at the knots as far as a
+  /// cell file holds them.
   model::CellParameters<> applied(const model::CellParameters<>& cell, const std::vector<double>& u) const;
   /// How many unknowns come before those of single recordings.
   std::size_t shared() const { return initial_soc_.front(); }

@@ -41,8 +41,8 @@ std::optional<std::string> says_nothing(const Evidence& evidence) {
   return std::nullopt;
 }
 
-/// What is there for certain, before anything that would stand in for it: every cell's resistances follow the temperature, and a file
-/// that tells how far charge and discharge lie apart tells that there is a hysteresis.
+/// What is there for certain, before anything that would stand in for it: every cell's resistances follow the
+/// temperature, and a file that tells how far charge and discharge lie apart tells that there is a hysteresis.
 std::set<std::size_t> expected_in(const Evidence& evidence) {
   std::set<std::size_t> expected;
   if (away_k(evidence) > decision::far_k) expected.insert(mechanism_index("temperature_resistance"));
@@ -51,9 +51,10 @@ std::set<std::size_t> expected_in(const Evidence& evidence) {
   return expected;
 }
 
-/// One mechanism after the other, as long as chance would not do it; what may come and go as it likes, which gains on anything, after
-/// all that may not. singles: what was tried alone.
-Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, std::size_t most, std::vector<Fit>& singles) {
+/// One mechanism after the other, as long as chance would not do it; what may come and go as it likes, which gains on
+/// anything, after all that may not. singles: what was tried alone.
+Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, std::size_t most,
+         std::vector<Fit>& singles) {
   std::vector<std::size_t> steady = testable;
   std::erase(steady, mechanism_index("contact_intermittent"));
   bool bursts = false;
@@ -62,8 +63,10 @@ Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, 
     if (current.hypothesis.added().empty()) singles.insert(singles.end(), more.begin(), more.end());
     std::erase_if(more, [&](const Fit& f) { return !search.carries(current, f); });
     const bool gains = !more.empty() && search.gain(current, more.front()) >= decision::detected;
-    if (gains) current = more.front();
-    else if (bursts) break;
+    if (gains)
+      current = more.front();
+    else if (bursts)
+      break;
     bursts = !gains;
   }
   return current;
@@ -72,13 +75,14 @@ Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, 
 /// What has stood up against everything else.
 struct Standing {
   Fit best;
-  std::map<std::size_t, std::vector<Fit>> rivals;                  ///< with another in the place of a mechanism
-  std::map<std::size_t, double> gains;                             ///< of each over the rest
-  std::map<std::pair<std::size_t, std::size_t>, double> alike;     ///< signatures
+  std::map<std::size_t, std::vector<Fit>> rivals;               ///< with another in the place of a mechanism
+  std::map<std::size_t, double> gains;                          ///< of each over the rest
+  std::map<std::pair<std::size_t, std::size_t>, double> alike;  ///< signatures
 };
 
 /// What does not carry is taken away, and each one's rivals are tried in its place.
-Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit current, const std::vector<std::size_t>& testable, const std::set<std::size_t>& expected) {
+Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit current,
+                  const std::vector<std::size_t>& testable, const std::set<std::size_t>& expected) {
   const double error_v = plain_error_v(evidence, evidence.base());
   Standing found;
   auto& [best, rivals, gains, alike] = found;
@@ -92,9 +96,10 @@ Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit
       const bool alone = current.hypothesis.added().size() == 1;
       const Fit less = alone ? base : search.without_one(current, m);
       gains[m] = search.gain(less, current);
-      // beside others, one that is hardly seen is none, and so are those that are larger than the error and cancel each other: of these the
-      // one goes that is missed less
-      const bool seen = sizes_v.at(m) >= decision::noticeable * error_v || gains[m] >= decision::noticeable_gain * search.gain(base, current);
+      // beside others, one that is hardly seen is none, and so are those that are larger than the error and cancel each
+      // other: of these the one goes that is missed less
+      const bool seen = sizes_v.at(m) >= decision::noticeable * error_v ||
+                        gains[m] >= decision::noticeable_gain * search.gain(base, current);
       const bool counts = alone || (seen && sizes_v.at(m) <= decision::larger_than_error * error_v);
       if (!counts || gains[m] < decision::detected) {
         reduced.emplace_back(gains[m], less);
@@ -103,7 +108,8 @@ Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit
       std::map<std::size_t, double> likeness;
       for (Fit& rival : search.in_place_of(m, current, less, testable, gains[m], likeness)) {
         if (rival.hypothesis.find(m) != nullptr) {
-          if (search.score(rival) < search.score(current) - 1 && search.carries(less, rival)) current = rival, changed = true;  // the same from another start
+          if (search.score(rival) < search.score(current) - 1 && search.carries(less, rival))
+            current = rival, changed = true;  // the same from another start
           continue;
         }
         if (!search.carries(less, rival)) continue;
@@ -134,13 +140,20 @@ Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit
 
 const char* name_of(Verdict verdict) {
   switch (verdict) {
-    case Verdict::no_mismatch: return "NO_MISMATCH";
-    case Verdict::cause: return "CAUSE";
-    case Verdict::causes: return "CAUSES";
-    case Verdict::ambiguous: return "AMBIGUOUS";
-    case Verdict::unknown: return "UNKNOWN";
-    case Verdict::data_fault: return "DATA_FAULT";
-    case Verdict::not_testable: return "NOT_TESTABLE";
+    case Verdict::no_mismatch:
+      return "NO_MISMATCH";
+    case Verdict::cause:
+      return "CAUSE";
+    case Verdict::causes:
+      return "CAUSES";
+    case Verdict::ambiguous:
+      return "AMBIGUOUS";
+    case Verdict::unknown:
+      return "UNKNOWN";
+    case Verdict::data_fault:
+      return "DATA_FAULT";
+    case Verdict::not_testable:
+      return "NOT_TESTABLE";
   }
   return "";
 }
@@ -155,12 +168,14 @@ std::vector<MechanismSetting> later_recording(const Hypothesis& extended) {
   return later;
 }
 
-std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings, const Record& record, std::vector<double>* soc) {
+std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,
+                            const Record& record, std::vector<double>* soc) {
   const Evidence evidence(cell, settings, {record}, NoiseModel{});
   return evidence.voltage(evidence.base(), evidence.unchanged(), 0, soc);
 }
 
-Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own, std::vector<Record> records, const Options& options) {
+Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own,
+                   std::vector<Record> records, const Options& options) {
   Diagnosis d;
   d.cell = cell;
   for (Record& r : records) {
@@ -227,7 +242,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     return gained + remainder.gain > 0 ? gained / (gained + remainder.gain) : 1;
   };
   // what explains little, and that not quite, is none
-  if (!current.hypothesis.added().empty() && base_nominal.cost - best_nominal.cost < decision::faint && adequacy() < decision::explained) {
+  if (!current.hypothesis.added().empty() && base_nominal.cost - best_nominal.cost < decision::faint &&
+      adequacy() < decision::explained) {
     current = base;
     best_nominal = base_nominal;
     remainder = what_remains(evidence, best_nominal);
@@ -246,7 +262,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   // what is flexible gains on anything: when it is named, what it leaves must be white
   const bool bursts = current.hypothesis.find(mechanism_index("contact_intermittent")) != nullptr;
   const bool unknown = (d.remaining > decision::much_left || d.far_out > decision::far_out) &&
-                       (!something || d.adequacy < (bursts ? decision::explained_by_bursts : decision::explained) || d.fast_excess > decision::fast_excess);
+                       (!something || d.adequacy < (bursts ? decision::explained_by_bursts : decision::explained) ||
+                        d.fast_excess > decision::fast_excess);
 
   // findings
   d.extended = current.hypothesis;
@@ -256,7 +273,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.explained_share = parts.explained_share;
   d.unexplained_rmse_v = parts.remaining_rmse_v;
   d.unexplained_share = 1 - parts.explained_share;
-  d.noise_floor_v = std::sqrt(nominal.white_v * nominal.white_v + nominal.fast_v * nominal.fast_v + nominal.slow_v * nominal.slow_v);
+  d.noise_floor_v =
+      std::sqrt(nominal.white_v * nominal.white_v + nominal.fast_v * nominal.fast_v + nominal.slow_v * nominal.slow_v);
   std::vector<std::vector<std::size_t>> sets;
   for (const std::size_t m : current.hypothesis.added()) {
     Finding f;
@@ -265,7 +283,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     f.at_bound.assign(catalogue[m].parameters, 0);
     const std::vector<Sought> sought = current.hypothesis.sought();
     for (std::size_t j = 0; j < sought.size(); ++j) {
-      if (current.hypothesis.settings[sought[j].setting].index == m) f.at_bound[sought[j].parameter] = current.at_bound[j];
+      if (current.hypothesis.settings[sought[j].setting].index == m)
+        f.at_bound[sought[j].parameter] = current.at_bound[j];
     }
     double sum = 1;
     struct Near {
@@ -281,10 +300,14 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
         if (current.hypothesis.find(a) == nullptr) other = a;
       }
       sum += std::exp(-behind / (2 * decision::temper));
-      // what goes through the same few numbers of a recording differs by how well its equation fits, not by what was seen
-      if (behind < decision::same || (alike[{m, other}] > decision::inseparable && behind < decision::same_inseparable)) near.push_back({behind, other, &rival});
+      // what goes through the same few numbers of a recording differs by how well its equation fits, not by what was
+      // seen
+      if (behind < decision::same || (alike[{m, other}] > decision::inseparable && behind < decision::same_inseparable))
+        near.push_back({behind, other, &rival});
     }
-    std::sort(near.begin(), near.end(), [](const Near& a, const Near& b) { return std::pair(a.behind, a.mechanism) < std::pair(b.behind, b.mechanism); });
+    std::sort(near.begin(), near.end(), [](const Near& a, const Near& b) {
+      return std::pair(a.behind, a.mechanism) < std::pair(b.behind, b.mechanism);
+    });
     for (const Near& n : near) {
       if (std::find(f.equivalent_to.begin(), f.equivalent_to.end(), n.mechanism) != f.equivalent_to.end()) continue;
       f.equivalent_to.push_back(n.mechanism);
@@ -294,7 +317,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     f.rms_contribution_v = parts.rms_v.contains(m) ? parts.rms_v.at(m) : 0;
     d.findings.push_back(std::move(f));
   }
-  std::stable_sort(d.findings.begin(), d.findings.end(), [](const Finding& a, const Finding& b) { return a.gain > b.gain; });
+  std::stable_sort(d.findings.begin(), d.findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.gain > b.gain; });
 
   const auto rank = [&](const Fit& f) {
     for (const Ranked& r : d.candidates) {
@@ -307,16 +331,23 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   if (something) {
     rank(current);
     for (auto& [m, fits] : rivals) {
-      std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return search.score(a) < search.score(b); });
+      std::stable_sort(fits.begin(), fits.end(),
+                       [&](const Fit& a, const Fit& b) { return search.score(a) < search.score(b); });
       for (const Fit& f : fits) rank(f);
     }
   } else {
     for (const Fit& f : singles) rank(f);
   }
-  std::stable_sort(d.candidates.begin(), d.candidates.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
+  std::stable_sort(d.candidates.begin(), d.candidates.end(),
+                   [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
   double total = something ? 0 : 1;
-  for (const Ranked& r : d.candidates) total += std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper));
-  for (Ranked& r : d.candidates) r.probability = decision::surely * std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper)) / total;
+  for (const Ranked& r : d.candidates)
+    total += std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper));
+  for (Ranked& r : d.candidates)
+    r.probability =
+        decision::surely *
+        std::exp((r.gain - (something ? d.candidates.front().gain : decision::detected)) / (2 * decision::temper)) /
+        total;
 
   d.spans = unknown || !something ? remainder.spans : parts.spans;
   d.regimes = regimes(evidence, current, unknown || !something ? remainder.energy : parts.energy);
@@ -327,12 +358,18 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     d.views.push_back(std::move(view));
   }
 
-  if (unknown) d.verdict = Verdict::unknown;
-  else if (!something) d.verdict = Verdict::no_mismatch;
-  else if (d.findings.size() > 1) d.verdict = Verdict::causes;
-  else d.verdict = d.findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
+  if (unknown)
+    d.verdict = Verdict::unknown;
+  else if (!something)
+    d.verdict = Verdict::no_mismatch;
+  else if (d.findings.size() > 1)
+    d.verdict = Verdict::causes;
+  else
+    d.verdict = d.findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
   if (d.verdict == Verdict::no_mismatch) d.spans.clear(), d.regimes.clear(), d.unexplained_share = 0;
-  if (names(d.verdict)) d.cell = evidence.calibration().applied(cell, {current.calibration.data(), current.calibration.data() + current.calibration.size()});
+  if (names(d.verdict))
+    d.cell = evidence.calibration().applied(
+        cell, {current.calibration.data(), current.calibration.data() + current.calibration.size()});
   if (options.progress) options.progress(1, "done");
   return d;
 }

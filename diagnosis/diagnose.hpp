@@ -1,5 +1,6 @@
-// The whole chain: is the data to be trusted, does the cell file explain it, where not, which mechanism would, is that more than
-// chance, what remains, and what would settle what is open. README.md tells the reasons; every threshold is in decision.hpp.
+// The whole chain: is the data to be trusted, does the cell file explain it, where not, which mechanism would, is that
+// more than chance, what remains, and what would settle what is open. README.md tells the reasons; every threshold is
+// in decision.hpp.
 #pragma once
 
 #include <functional>
@@ -18,10 +19,10 @@ const char* name_of(Verdict verdict);
 
 /// A stretch of one axis in which most of the mismatch lies.
 struct Regime {
-  std::string axis;        ///< "soc", "current_c", "temperature_c", "since_edge_s", "direction"
+  std::string axis;  ///< "soc", "current_c", "temperature_c", "since_edge_s", "direction"
   double from = 0, to = 0;
-  double share = 0;        ///< of the mismatch's energy
-  double usual = 0;        ///< share of the time that is spent there
+  double share = 0;  ///< of the mismatch's energy
+  double usual = 0;  ///< share of the time that is spent there
 };
 
 /// A hypothesis with the values found, and how well they are known together: the covariance of what is sought.
@@ -31,14 +32,14 @@ struct Fitted {
 };
 
 struct Finding {
-  MechanismSetting setting;                ///< value and deviation
-  std::vector<char> at_bound;              ///< by parameter
+  MechanismSetting setting;    ///< value and deviation
+  std::vector<char> at_bound;  ///< by parameter
   double probability = 0;
   std::vector<std::size_t> equivalent_to;  ///< catalogue indices that these recordings cannot tell from it
   std::vector<Fitted> rivals;              ///< all that was found, with each of equivalent_to in its place
   double gain = 0;                         ///< cost without it less with it
   double rms_contribution_v = 0;
-  std::string because;                     ///< why this and not its neighbour
+  std::string because;  ///< why this and not its neighbour
 };
 
 /// A set of mechanisms that was fitted, and how well.
@@ -58,7 +59,7 @@ struct NotTestable {
   std::string reason;
 };
 
-struct RecordView {                        ///< for plots
+struct RecordView {  ///< for plots
   std::vector<double> base_v, extended_v, soc;
 };
 
@@ -76,13 +77,14 @@ struct Diagnosis {
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;
-  Hypothesis extended;                     ///< the cell's own mechanisms and those found
-  model::CellParameters<> cell;            ///< its parameters moved, within their tolerance, to where they fit beside what was found; as given when nothing was
-  Eigen::MatrixXd covariance;              ///< of what is sought in it
-  NoiseModel noise;                        ///< nominal
-  std::vector<RecordView> views;           ///< of each record
+  Hypothesis extended;            ///< the cell's own mechanisms and those found
+  model::CellParameters<> cell;   ///< its parameters moved, within their tolerance, to where they fit beside what was
+                                  ///< found; as given when nothing was
+  Eigen::MatrixXd covariance;     ///< of what is sought in it
+  NoiseModel noise;               ///< nominal
+  std::vector<RecordView> views;  ///< of each record
   // what the decision was made from
-  std::string remaining_goes_with;         ///< what remains, if much does: with the time, the soc, a period of its own
+  std::string remaining_goes_with;  ///< what remains, if much does: with the time, the soc, a period of its own
   double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, far_out = 0;
 };
 
@@ -92,16 +94,20 @@ struct Options {
 };
 
 /// own: mechanisms of the cell file. Records as read; what cannot be used is taken out here.
-Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own, std::vector<Record> records, const Options& options = {});
+Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own,
+                   std::vector<Record> records, const Options& options = {});
 
-/// What holds for a later recording of the same cell and instruments: a contact that has changed stays so, where bursts fell and
-/// where the first recording began does not.
+/// What holds for a later recording of the same cell and instruments: a contact that has changed stays so, where bursts
+/// fell and where the first recording began does not.
 std::vector<MechanismSetting> later_recording(const Hypothesis& extended);
 
 /// Whether the verdict names mechanisms.
-inline bool names(Verdict verdict) { return verdict == Verdict::cause || verdict == Verdict::causes || verdict == Verdict::ambiguous; }
+inline bool names(Verdict verdict) {
+  return verdict == Verdict::cause || verdict == Verdict::causes || verdict == Verdict::ambiguous;
+}
 
 /// Open loop from its initial soc: the voltage that would be read.
-std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings, const Record& record, std::vector<double>* soc = nullptr);
+std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,
+                            const Record& record, std::vector<double>* soc = nullptr);
 
 }  // namespace bms::diagnosis

@@ -1,5 +1,5 @@
-// Maximum a posteriori of a hypothesis: damped Gauss-Newton over the mechanisms' parameters, the base parameters eliminated at every
-// step (variable projection), bounds kept by an active set.
+// Maximum a posteriori of a hypothesis: damped Gauss-Newton over the mechanisms' parameters, the base parameters
+// eliminated at every step (variable projection), bounds kept by an active set.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -12,7 +12,7 @@
 namespace bms::diagnosis {
 
 struct Evidence::Linear {
-  Columns columns;                 ///< white
+  Columns columns;                     ///< white
   Eigen::LLT<Eigen::MatrixXd> normal;  ///< columns' columns + 1
 };
 
@@ -23,7 +23,8 @@ using model::catalogue;
 constexpr double rarity = 0.5;         // of a strength: what is beyond the common, over this share of it, in deviations
 constexpr double log_prior_width = 1;  // of a shape: a factor of e between its usual and an unusual value
 
-/// How far a parameter is from what is known of most cells, in deviations, and what a deviation is; 0: nothing is known.
+/// How far a parameter is from what is known of most cells, in deviations, and what a deviation is; 0: nothing is
+/// known.
 struct Known {
   double away = 0, deviation = 0;
 };
@@ -31,15 +32,18 @@ struct Known {
 /// The sought parameters of a hypothesis as a fit moves them: shapes by their logarithm, all others linearly.
 class Unknowns {
  public:
-  Unknowns(const model::CellParameters<>& cell, const Hypothesis& start) : capacity_ah_(cell.capacity_ah), sought_(start.sought()) {
+  Unknowns(const model::CellParameters<>& cell, const Hypothesis& start)
+      : capacity_ah_(cell.capacity_ah), sought_(start.sought()) {
     // what is neither faster nor slower than R1 C1 is R1 C1
-    const double rc_s = model::cell_detail::rc_value(cell.rc, cell.rc.r1_ohm, 0.5) * model::cell_detail::rc_value(cell.rc, cell.rc.c1_f, 0.5);
+    const double rc_s = model::cell_detail::rc_value(cell.rc, cell.rc.r1_ohm, 0.5) *
+                        model::cell_detail::rc_value(cell.rc, cell.rc.c1_f, 0.5);
     for (const Sought& s : sought_) {
       const model::MechanismInfo& info = catalogue[start.settings[s.setting].index];
       const model::Parameter& p = info.parameter[s.parameter];
       const bool time = p.name == "time_constant_s";
       const double low = p.lower(capacity_ah_), high = p.upper(capacity_ah_);
-      of_.push_back({&p, time && info.id == "slow_polarisation" ? std::clamp(2 * rc_s, low, 600.0) : low, time && info.id == "fast_polarisation" ? std::clamp(rc_s / 3, 1.0, high) : high});
+      of_.push_back({&p, time && info.id == "slow_polarisation" ? std::clamp(2 * rc_s, low, 600.0) : low,
+                     time && info.id == "fast_polarisation" ? std::clamp(rc_s / 3, 1.0, high) : high});
     }
   }
 
@@ -54,7 +58,9 @@ class Unknowns {
   double held(Eigen::Index j, double v) const { return std::clamp(v, at(j).low, at(j).high); }
   /// d v / d step.
   double natural(Eigen::Index j, double v) const { return is_shape(j) ? v : (at(j).high - at(j).low) / 100; }
-  double moved(Eigen::Index j, double v, double step) const { return held(j, is_shape(j) ? v * std::exp(step) : v + natural(j, v) * step); }
+  double moved(Eigen::Index j, double v, double step) const {
+    return held(j, is_shape(j) ? v * std::exp(step) : v + natural(j, v) * step);
+  }
   /// Steps to the bounds; a shape goes no farther than 1.5 at once.
   std::pair<double, double> room(Eigen::Index j, double v) const {
     const auto [low, high] = std::pair(at(j).low, at(j).high);
@@ -93,9 +99,10 @@ class Unknowns {
   std::vector<One> of_;
 };
 
-/// Step of damped normal equations. Those unknowns that would leave their room go to its end and no farther, and the others' steps are
-/// those beside that; one round after the other.
-Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorXd& rhs, double damping, const Eigen::VectorXd& to_low, const Eigen::VectorXd& to_high) {
+/// Step of damped normal equations. Those unknowns that would leave their room go to its end and no farther, and the
+/// others' steps are those beside that; one round after the other.
+Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorXd& rhs, double damping,
+                             const Eigen::VectorXd& to_low, const Eigen::VectorXd& to_high) {
   const Eigen::Index m = rhs.size();
   std::vector<char> held(static_cast<std::size_t>(m), 0);
   const auto is_held = [&](Eigen::Index j) { return held[static_cast<std::size_t>(j)] != 0; };
@@ -103,7 +110,8 @@ Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorX
   for (Eigen::Index round = 0; round <= m; ++round) {
     Eigen::MatrixXd s = normal;
     Eigen::VectorXd b = rhs;
-    for (Eigen::Index j = 0; j < m; ++j) s(j, j) += damping * normal(j, j) + 1e-9 + 1e-12 * normal.diagonal().maxCoeff();
+    for (Eigen::Index j = 0; j < m; ++j)
+      s(j, j) += damping * normal(j, j) + 1e-9 + 1e-12 * normal.diagonal().maxCoeff();
     for (Eigen::Index j = 0; j < m; ++j) {
       if (is_held(j)) b -= normal.col(j) * reach[j];
     }
@@ -146,8 +154,11 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
   const Unknowns unknowns(cell_, start);
   const Eigen::Index m = unknowns.size();
   Fit fit{start, calibration, {}, 0, noise_, {}, std::vector<char>(static_cast<std::size_t>(m), 0), false};
-  for (Eigen::Index j = 0; j < m; ++j) unknowns.of(fit.hypothesis, j) = unknowns.held(j, unknowns.of(fit.hypothesis, j));
-  const auto cost_of = [&](Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& r) { return r.squaredNorm() + u.squaredNorm() + unknowns.prior(h); };
+  for (Eigen::Index j = 0; j < m; ++j)
+    unknowns.of(fit.hypothesis, j) = unknowns.held(j, unknowns.of(fit.hypothesis, j));
+  const auto cost_of = [&](Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& r) {
+    return r.squaredNorm() + u.squaredNorm() + unknowns.prior(h);
+  };
   fit.residual = residual(fit.hypothesis, fit.calibration);
   fit.cost = cost_of(fit.hypothesis, fit.calibration, fit.residual);
   const double cost_at_start = fit.cost;
@@ -200,12 +211,14 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     if (iteration >= 3 && fit.cost - 2 * within_reach > hopeless) break;
 
     Eigen::VectorXd to_low(m), to_high(m);
-    for (Eigen::Index j = 0; j < m; ++j) std::tie(to_low[j], to_high[j]) = unknowns.room(j, unknowns.of(fit.hypothesis, j));
+    for (Eigen::Index j = 0; j < m; ++j)
+      std::tie(to_low[j], to_high[j]) = unknowns.room(j, unknowns.of(fit.hypothesis, j));
     bool better = false, astray = false;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {
       const Eigen::VectorXd step = m > 0 ? bounded_step(schur, rhs, damping, to_low, to_high) : Eigen::VectorXd();
       Hypothesis trial = fit.hypothesis;
-      for (Eigen::Index j = 0; j < m; ++j) unknowns.of(trial, j) = unknowns.moved(j, unknowns.of(fit.hypothesis, j), step[j]);
+      for (Eigen::Index j = 0; j < m; ++j)
+        unknowns.of(trial, j) = unknowns.moved(j, unknowns.of(fit.hypothesis, j), step[j]);
       // where the base parameters' derivatives are stale, a shorter way is taken with theirs too
       const double way = 1 / (1 + 0.02 * damping);
       Eigen::VectorXd toward = u_alone;
@@ -242,7 +255,8 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     break;
   }
 
-  for (Eigen::Index j = 0; j < m; ++j) fit.at_bound[static_cast<std::size_t>(j)] = unknowns.at_bound(j, unknowns.of(fit.hypothesis, j)) ? 1 : 0;
+  for (Eigen::Index j = 0; j < m; ++j)
+    fit.at_bound[static_cast<std::size_t>(j)] = unknowns.at_bound(j, unknowns.of(fit.hypothesis, j)) ? 1 : 0;
   fit.covariance = Eigen::MatrixXd::Zero(m, m);
   if (m > 0) {
     Eigen::MatrixXd s = schur;

@@ -18,7 +18,8 @@ model::Tolerance widened(model::Tolerance t, double factor) {
   return t;
 }
 
-double widening(const model::CellParameters<>& cell, const std::vector<model::MechanismSetting>& mechanisms, std::vector<Record> records) {
+double widening(const model::CellParameters<>& cell, const std::vector<model::MechanismSetting>& mechanisms,
+                std::vector<Record> records) {
   for (Record& r : records) examine(r, cell);
   std::vector<std::size_t> all(model::mechanism_count);
   std::iota(all.begin(), all.end(), std::size_t{0});

@@ -25,7 +25,8 @@ constexpr std::size_t intermittent = model::mechanism_index("contact_intermitten
 /// Derivatives that go through the simulation at once.
 constexpr std::size_t few_lanes = 4, lanes = 8;
 
-/// Reading beside a step of the current: voltage and current are never read at quite the same moment. Share of a sample's step.
+/// Reading beside a step of the current: voltage and current are never read at quite the same moment. Share of a
+/// sample's step.
 constexpr double edge_jitter = 0.05;
 
 /// A later recording that begins above it was charged last.
@@ -34,7 +35,8 @@ constexpr double charged_soc = 0.9;
 /// How much of resistance_fraction differs from one step of the current to the next.
 constexpr double edge_error = 0.4;
 
-/// Error along the soc of the OCV table, as a share of what the start may be off; and how far around the counted soc its slope is taken.
+/// Error along the soc of the OCV table, as a share of what the start may be off; and how far around the counted soc
+/// its slope is taken.
 constexpr double soc_error_share = 0.3, slope_reach = 0.01;
 
 /// The base parameters in a run, at the unknowns u.
@@ -127,36 +129,49 @@ Hypothesis with(const Hypothesis& h, const MechanismSetting& setting) {
   return more;
 }
 
-Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah) { return with(h, model::unsaid(mechanism, capacity_ah)); }
+Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah) {
+  return with(h, model::unsaid(mechanism, capacity_ah));
+}
 
 Hypothesis without(const Hypothesis& h, std::size_t mechanism) {
   Hypothesis less = h;
-  std::erase_if(less.settings, [&](const MechanismSetting& s) { return s.index == mechanism && &s - less.settings.data() >= static_cast<std::ptrdiff_t>(h.own); });
+  std::erase_if(less.settings, [&](const MechanismSetting& s) {
+    return s.index == mechanism && &s - less.settings.data() >= static_cast<std::ptrdiff_t>(h.own);
+  });
   return less;
 }
 
-Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSetting> own, std::vector<Record> records, const NoiseModel& noise)
-    : cell_(cell), tables_(model::prepare<double, model::max_intervals>(cell)), own_(std::move(own)), records_(std::move(records)), calibration_(cell, records_) {
+Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSetting> own, std::vector<Record> records,
+                   const NoiseModel& noise)
+    : cell_(cell),
+      tables_(model::prepare<double, model::max_intervals>(cell)),
+      own_(std::move(own)),
+      records_(std::move(records)),
+      calibration_(cell, records_) {
   for (const Record& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording of less than two rows");
     samples_ += r.size();
     checks_ += r.checks.size();
     std::vector<char>& usable = usable_.emplace_back(r.size(), 1);
     RowNoise& more = row_noise_.emplace_back(r.size());
-    const double soc_error = soc_error_share * r.initial_soc_sigma, r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
+    const double soc_error = soc_error_share * r.initial_soc_sigma,
+                 r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, 0.5);
     double known_a = 0, soc = r.initial_soc;
     std::uint8_t interval = 0;
     const auto ocv_v = [&](double at) { return model::look_up(tables_, at, interval).ocv_v; };
     for (std::size_t k = 0; k < r.size(); ++k) {
       if (!std::isfinite(r.voltage_v[k])) usable[k] = 0;
-      if (k == 0 && !(std::abs(r.current_a[k]) < 0.01 * cell_.capacity_ah)) usable[k] = 0;  // what flowed before is not known
+      if (k == 0 && !(std::abs(r.current_a[k]) < 0.01 * cell_.capacity_ah))
+        usable[k] = 0;  // what flowed before is not known
       const double step_a = std::isfinite(r.current_a[k]) && k > 0 ? r.current_a[k] - known_a : 0;
       if (std::isfinite(r.current_a[k])) known_a = r.current_a[k];
       more.white_v2[k] = std::pow(edge_jitter * r0_ohm * step_a, 2);
       if (k > 0) more.white_v2[k - 1] = std::max(more.white_v2[k - 1], more.white_v2[k]);
       more.edge_v2[k] = std::pow(edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
-      if (k > 0) soc = std::clamp(soc + known_a * (r.time_s[k] - r.time_s[k - 1]) / (3'600 * cell_.capacity_ah), 0.0, 1.0);
-      more.slow_v2[k] = std::pow(soc_error * (ocv_v(soc + slope_reach) - ocv_v(soc - slope_reach)) / (2 * slope_reach), 2);
+      if (k > 0)
+        soc = std::clamp(soc + known_a * (r.time_s[k] - r.time_s[k - 1]) / (3'600 * cell_.capacity_ah), 0.0, 1.0);
+      more.slow_v2[k] =
+          std::pow(soc_error * (ocv_v(soc + slope_reach) - ocv_v(soc - slope_reach)) / (2 * slope_reach), 2);
     }
   }
   set_noise(noise);
@@ -164,7 +179,8 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
 
 std::vector<Whitener> Evidence::whiteners_for(const NoiseModel& noise) const {
   std::vector<Whitener> made;
-  for (std::size_t r = 0; r < records_.size(); ++r) made.emplace_back(noise, records_[r].time_s, row_noise_[r], usable_[r]);
+  for (std::size_t r = 0; r < records_.size(); ++r)
+    made.emplace_back(noise, records_[r].time_s, row_noise_[r], usable_[r]);
   return made;
 }
 
@@ -216,7 +232,8 @@ std::size_t Evidence::used() const {
 Hypothesis Evidence::base() const { return {own_, own_.size(), {}}; }
 
 template <class S, class Base, class Row, class ForCheck>
-void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const Base& base, std::size_t record, Row&& row, ForCheck&& check) const {
+void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const Base& base,
+                   std::size_t record, Row&& row, ForCheck&& check) const {
   const Record& r = records_[record];
   model::ChosenLaws<S> laws;
   S delay_s(0), lag_s(0), start(r.initial_soc);
@@ -224,16 +241,27 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
   model::MechanismValues<S> capacity{base.capacity_loss()}, gain{base.gain_error()};
   for (std::size_t k = 0; k < h.settings.size(); ++k) {
     const std::size_t index = h.settings[k].index;
-    if (index == skew) delay_s = values[k][0];
-    else if (index == initial_soc && record > 0) continue;  // the later ones begin elsewhere
-    else if (index == initial_soc) start += values[k][0];
-    else if (index == capacity_change) capacity[0] += values[k][0];
-    else if (index == current_gain) gain[0] += values[k][0];
-    else if (index == contact_step && record > 0) model::choose<S>(laws, index, model::MechanismValues<S>{values[k][0], S(r.time_s.front())}, cell_.capacity_ah);  // it stays
-    else if (index == hysteresis && record > 0 && r.initial_soc > charged_soc) model::choose<S>(laws, index, model::MechanismValues<S>{values[k][0], values[k][1], values[k][2], S(1)}, cell_.capacity_ah);
-    else model::choose<S>(laws, index, values[k], cell_.capacity_ah);
+    if (index == skew)
+      delay_s = values[k][0];
+    else if (index == initial_soc && record > 0)
+      continue;  // the later ones begin elsewhere
+    else if (index == initial_soc)
+      start += values[k][0];
+    else if (index == capacity_change)
+      capacity[0] += values[k][0];
+    else if (index == current_gain)
+      gain[0] += values[k][0];
+    else if (index == contact_step && record > 0)
+      model::choose<S>(laws, index, model::MechanismValues<S>{values[k][0], S(r.time_s.front())},
+                       cell_.capacity_ah);  // it stays
+    else if (index == hysteresis && record > 0 && r.initial_soc > charged_soc)
+      model::choose<S>(laws, index, model::MechanismValues<S>{values[k][0], values[k][1], values[k][2], S(1)},
+                       cell_.capacity_ah);
+    else
+      model::choose<S>(laws, index, values[k], cell_.capacity_ah);
     if (index == sensor) lag_s = values[k][1];
-    if (index == intermittent && record < h.bursts.size()) (*laws.template slot<intermittent>()).bursts = h.bursts[record];
+    if (index == intermittent && record < h.bursts.size())
+      (*laws.template slot<intermittent>()).bursts = h.bursts[record];
   }
   model::choose<S>(laws, capacity_change, capacity, cell_.capacity_ah);
   model::choose<S>(laws, current_gain, gain, cell_.capacity_ah);
@@ -252,27 +280,36 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
     // of a current what would be true, of a voltage what would be read behind the contacts: both as the laws have it
     S at_terminals(c.reference);
     for (std::size_t k = 0; k < h.settings.size(); ++k) {
-      if (h.settings[k].index == contact_step && (record > 0 || c.time_s >= h.settings[k].value[1])) at_terminals += values[k][0] * c.current_a;
+      if (h.settings[k].index == contact_step && (record > 0 || c.time_s >= h.settings[k].value[1]))
+        at_terminals += values[k][0] * c.current_a;
     }
-    const S expected = current ? S(laws.true_current(S(c.read) - base.offset_a(record, c.time_s)) - c.reference) : S(laws.reading(at_terminals) - c.read);
+    const S expected = current ? S(laws.true_current(S(c.read) - base.offset_a(record, c.time_s)) - c.reference)
+                               : S(laws.reading(at_terminals) - c.read);
     check(j, S(expected * (1 / c.deviation)));
   }
 }
 
-std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc) const { return simulate(h, u, record, soc, nullptr); }
+std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record,
+                                      std::vector<double>* soc) const {
+  return simulate(h, u, record, soc, nullptr);
+}
 
-std::vector<double> Evidence::simulate(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record, std::vector<double>* soc, std::vector<double>* checks) const {
+std::vector<double> Evidence::simulate(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record,
+                                       std::vector<double>* soc, std::vector<double>* checks) const {
   std::vector<double> v(records_[record].size());
   if (soc != nullptr) soc->resize(v.size());
   std::vector<model::MechanismValues<double>> values;
   for (const MechanismSetting& s : h.settings) values.push_back(s.value);
   const std::vector<double> unknowns(u.data(), u.data() + u.size());
-  run<double>(values, h, AtUnknowns<double>{calibration_, unknowns}, record, [&](std::size_t k, double volt, const auto& course) {
-    v[k] = volt;
-    if (soc != nullptr) (*soc)[k] = course.soc();
-  }, [&](std::size_t, double expected) {
-    if (checks != nullptr) checks->push_back(expected);
-  });
+  run<double>(
+      values, h, AtUnknowns<double>{calibration_, unknowns}, record,
+      [&](std::size_t k, double volt, const auto& course) {
+        v[k] = volt;
+        if (soc != nullptr) (*soc)[k] = course.soc();
+      },
+      [&](std::size_t, double expected) {
+        if (checks != nullptr) checks->push_back(expected);
+      });
   return v;
 }
 
@@ -311,7 +348,8 @@ void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
   for (const Record& r : records_) {
     Eigen::VectorXd w = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(r.checks.size()));
     for (std::size_t j = 0; j < r.checks.size(); ++j) {
-      if (r.checks[j].channel == Check::Channel::voltage) w[static_cast<Eigen::Index>(j)] = cell_.tolerance.drift_v / r.checks[j].deviation;
+      if (r.checks[j].channel == Check::Channel::voltage)
+        w[static_cast<Eigen::Index>(j)] = cell_.tolerance.drift_v / r.checks[j].deviation;
     }
     if (const double shared = w.squaredNorm(); shared > 0) {
       auto rows = columns.middleRows(row, w.size());
@@ -323,18 +361,23 @@ void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
 }
 
 template <std::size_t Lanes>
-void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::size_t first, std::size_t here, Columns& columns) const {
+void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::size_t first,
+                      std::size_t here, Columns& columns) const {
   using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
   std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
   const std::vector<double> unknowns(u.data(), u.data() + u.size());
-  for (std::size_t lane = 0; lane < here; ++lane) values[by[first + lane].setting][by[first + lane].parameter].v[static_cast<Eigen::Index>(lane)] = 1;
+  for (std::size_t lane = 0; lane < here; ++lane)
+    values[by[first + lane].setting][by[first + lane].parameter].v[static_cast<Eigen::Index>(lane)] = 1;
   Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
   const auto put = [&](Eigen::Index at, const Jet& v) {
-    for (std::size_t lane = 0; lane < here; ++lane) columns(at, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
+    for (std::size_t lane = 0; lane < here; ++lane)
+      columns(at, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
   };
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    run<Jet>(values, h, AtUnknowns<Jet>{calibration_, unknowns}, r, [&](std::size_t, const Jet& v, const auto&) { put(row++, v); },
-             [&](std::size_t, const Jet& expected) { put(check_row++, expected); });
+    run<Jet>(
+        values, h, AtUnknowns<Jet>{calibration_, unknowns}, r,
+        [&](std::size_t, const Jet& v, const auto&) { put(row++, v); },
+        [&](std::size_t, const Jet& expected) { put(check_row++, expected); });
   }
 }
 
@@ -344,8 +387,10 @@ Columns Evidence::derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std
   for (std::size_t first = 0; first < by.size();) {
     const bool few = by.size() - first <= few_lanes;
     const std::size_t here = std::min(few ? few_lanes : lanes, by.size() - first);
-    if (few) derive<few_lanes>(h, u, by, first, here, columns);
-    else derive<lanes>(h, u, by, first, here, columns);
+    if (few)
+      derive<few_lanes>(h, u, by, first, here, columns);
+    else
+      derive<lanes>(h, u, by, first, here, columns);
     first += here;
   }
   whiten(columns);
@@ -366,41 +411,48 @@ void Evidence::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& col
   std::vector<Pull> pulls;
   const auto pull = [&](std::size_t record, double time_s, double soc) {
     pulls.clear();
-    calibration_.each_lever(record, time_s, soc, [&](std::size_t lever, std::size_t unknown, double size) { pulls.push_back({static_cast<Eigen::Index>(lever), static_cast<Eigen::Index>(unknown), size}); });
+    calibration_.each_lever(record, time_s, soc, [&](std::size_t lever, std::size_t unknown, double size) {
+      pulls.push_back({static_cast<Eigen::Index>(lever), static_cast<Eigen::Index>(unknown), size});
+    });
   };
   Columns states(static_cast<Eigen::Index>(Lanes - Lever::count), moving), next = states;  // d state / d unknown
   Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
   for (std::size_t r = 0; r < records_.size(); ++r) {
     const Record& record = records_[r];
     states.setZero();
-    states(0, static_cast<Eigen::Index>(calibration_.initial_soc_unknown(r)) - still) = calibration_.initial_soc_size(r);
-    run<Jet>(values, h, base, r, [&](std::size_t k, const Jet& v, auto& course) {
-      pull(r, record.time_s[k], course.soc().a);
-      Eigen::Index count = 0;
-      const auto through_states = [&](const Jet& of, auto to) {
-        to.setZero();
-        for (Eigen::Index s = 0; s + static_cast<Eigen::Index>(Lever::count) < of.v.size(); ++s) {
-          if (const double by = of.v[s + static_cast<Eigen::Index>(Lever::count)]; by != 0) to += by * states.row(s);  // most are 0
-        }
-      };
-      course.each_state([&](const Jet& state) {
-        auto to = next.row(count++);
-        through_states(state, to);
-        for (const Pull& p : pulls) {
-          if (p.unknown >= still) to[p.unknown - still] += state.v[p.lever] * p.size;
-        }
-      });
-      auto out = columns.row(row++);
-      out.head(still).setZero();
-      through_states(v, out.tail(moving));
-      for (const Pull& p : pulls) out[p.unknown] += v.v[p.lever] * p.size;
-      states.swap(next);
-    }, [&](std::size_t j, const Jet& expected) {
-      pull(r, record.checks[j].time_s, 0);
-      auto out = columns.row(check_row++);
-      out.setZero();
-      for (const Pull& p : pulls) out[p.unknown] += expected.v[p.lever] * p.size;
-    });
+    states(0, static_cast<Eigen::Index>(calibration_.initial_soc_unknown(r)) - still) =
+        calibration_.initial_soc_size(r);
+    run<Jet>(
+        values, h, base, r,
+        [&](std::size_t k, const Jet& v, auto& course) {
+          pull(r, record.time_s[k], course.soc().a);
+          Eigen::Index count = 0;
+          const auto through_states = [&](const Jet& of, auto to) {
+            to.setZero();
+            for (Eigen::Index s = 0; s + static_cast<Eigen::Index>(Lever::count) < of.v.size(); ++s) {
+              if (const double by = of.v[s + static_cast<Eigen::Index>(Lever::count)]; by != 0)
+                to += by * states.row(s);  // most are 0
+            }
+          };
+          course.each_state([&](const Jet& state) {
+            auto to = next.row(count++);
+            through_states(state, to);
+            for (const Pull& p : pulls) {
+              if (p.unknown >= still) to[p.unknown - still] += state.v[p.lever] * p.size;
+            }
+          });
+          auto out = columns.row(row++);
+          out.head(still).setZero();
+          through_states(v, out.tail(moving));
+          for (const Pull& p : pulls) out[p.unknown] += v.v[p.lever] * p.size;
+          states.swap(next);
+        },
+        [&](std::size_t j, const Jet& expected) {
+          pull(r, record.checks[j].time_s, 0);
+          auto out = columns.row(check_row++);
+          out.setZero();
+          for (const Pull& p : pulls) out[p.unknown] += expected.v[p.lever] * p.size;
+        });
   }
 }
 
@@ -408,9 +460,12 @@ Columns Evidence::calibration_derivatives(const Hypothesis& h, const Eigen::Vect
   Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(calibration_.size()));
   std::size_t states = 0;
   for (const MechanismSetting& s : h.settings) states += catalogue[s.index].states;
-  constexpr std::size_t one_law = Lever::count + model::OneRc<double>::states + 1, all_laws = Lever::count + model::Course<double>::most_states;
-  if (states <= 1) carry<one_law>(h, u, columns);
-  else carry<all_laws>(h, u, columns);
+  constexpr std::size_t one_law = Lever::count + model::OneRc<double>::states + 1,
+                        all_laws = Lever::count + model::Course<double>::most_states;
+  if (states <= 1)
+    carry<one_law>(h, u, columns);
+  else
+    carry<all_laws>(h, u, columns);
   whiten(columns);
   return columns;
 }

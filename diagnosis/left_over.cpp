@@ -13,7 +13,8 @@ Eigen::MatrixXd squared(const Columns& columns) {
 }  // namespace
 
 LeftOver::LeftOver(const Evidence& evidence, const Fit& fit) : residual_(fit.residual) {
-  const Columns base = evidence.calibration_derivatives(fit.hypothesis, fit.calibration), own = evidence.derivatives(fit.hypothesis, fit.calibration, fit.hypothesis.sought());
+  const Columns base = evidence.calibration_derivatives(fit.hypothesis, fit.calibration),
+                own = evidence.derivatives(fit.hypothesis, fit.calibration, fit.hypothesis.sought());
   known_.resize(base.rows(), base.cols() + own.cols());
   known_.leftCols(base.cols()) = base;
   if (own.cols() > 0) known_.rightCols(own.cols()) = own;
@@ -27,7 +28,8 @@ LeftOver::LeftOver(const Evidence& evidence, const Fit& fit) : residual_(fit.res
 
 LeftOver::Products LeftOver::of(const Columns& columns) const {
   const Eigen::MatrixXd cross = known_.transpose() * columns;
-  return {squared(columns) - cross.transpose() * normal_.solve(cross), columns.transpose() * residual_ - cross.transpose() * pulled_};
+  return {squared(columns) - cross.transpose() * normal_.solve(cross),
+          columns.transpose() * residual_ - cross.transpose() * pulled_};
 }
 
 }  // namespace bms::diagnosis

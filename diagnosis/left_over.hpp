@@ -1,4 +1,5 @@
-// What columns could still explain of a fit's residual when the base parameters and everything sought may move along: both projected out.
+// What columns could still explain of a fit's residual when the base parameters and everything sought may move along:
+// both projected out.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -22,9 +23,9 @@ class LeftOver {
 
  private:
   Eigen::VectorXd residual_;
-  Columns known_;                       ///< derivatives by the base parameters, then by what is sought
-  Eigen::LDLT<Eigen::MatrixXd> normal_; ///< known' known and what is known beforehand
-  Eigen::VectorXd pulled_;              ///< where known_ would go alone
+  Columns known_;                        ///< derivatives by the base parameters, then by what is sought
+  Eigen::LDLT<Eigen::MatrixXd> normal_;  ///< known' known and what is known beforehand
+  Eigen::VectorXd pulled_;               ///< where known_ would go alone
 };
 
 }  // namespace bms::diagnosis

@@ -29,7 +29,8 @@ Contributions contributions(const Evidence& evidence, const Fit& base, const Fit
   Contributions c;
   const std::vector<std::size_t> added = fit.hypothesis.added();
   std::size_t count = 0;
-  const double before = squared_error(evidence, base.hypothesis, base.calibration, count), after = squared_error(evidence, fit.hypothesis, fit.calibration, count);
+  const double before = squared_error(evidence, base.hypothesis, base.calibration, count),
+               after = squared_error(evidence, fit.hypothesis, fit.calibration, count);
   const double white = evidence.noise().white_v * evidence.noise().white_v * static_cast<double>(count);
   c.explained_share = before > white ? std::clamp((before - after) / (before - white), 0.0, 1.0) : 0;
   c.remaining_rmse_v = count > 0 ? std::sqrt(after / static_cast<double>(count)) : 0;
@@ -37,9 +38,11 @@ Contributions contributions(const Evidence& evidence, const Fit& base, const Fit
   Hypothesis none = fit.hypothesis;
   for (const std::size_t m : added) none = without(none, m);
   for (std::size_t r = 0; r < evidence.records().size(); ++r) {
-    const std::vector<double> with_all = evidence.voltage(fit.hypothesis, fit.calibration, r), with_none = evidence.voltage(none, fit.calibration, r);
+    const std::vector<double> with_all = evidence.voltage(fit.hypothesis, fit.calibration, r),
+                              with_none = evidence.voltage(none, fit.calibration, r);
     std::vector<double>& energy = c.energy.emplace_back(with_all.size());
-    for (std::size_t k = 0; k < with_all.size(); ++k) energy[k] = (with_all[k] - with_none[k]) * (with_all[k] - with_none[k]);
+    for (std::size_t k = 0; k < with_all.size(); ++k)
+      energy[k] = (with_all[k] - with_none[k]) * (with_all[k] - with_none[k]);
     for (const std::size_t m : added) {
       const std::vector<double> less = evidence.voltage(without(fit.hypothesis, m), fit.calibration, r);
       for (std::size_t k = 0; k < less.size(); ++k) c.rms_v[m] += (with_all[k] - less[k]) * (with_all[k] - less[k]);
@@ -59,8 +62,10 @@ std::vector<model::Span> strongest_spans(const Record& r, const std::vector<doub
   std::vector<model::Span> spans;
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (energy[k] < enough) continue;
-    if (!spans.empty() && r.time_s[k] - spans.back().end_s <= apart_s) spans.back().end_s = r.time_s[k];
-    else spans.push_back({r.time_s[k], r.time_s[k]});
+    if (!spans.empty() && r.time_s[k] - spans.back().end_s <= apart_s)
+      spans.back().end_s = r.time_s[k];
+    else
+      spans.push_back({r.time_s[k], r.time_s[k]});
   }
   return spans;
 }
@@ -116,14 +121,16 @@ std::vector<Regime> regimes(const Evidence& evidence, const Fit& fit, const std:
         if (share < 0.7) continue;
         if (usual > 0 && share / usual > sharpest) {
           sharpest = share / usual;
-          best = {axis.name, low + (high - low) * static_cast<double>(a) / bins, low + (high - low) * static_cast<double>(b + 1) / bins, share, usual};
+          best = {axis.name, low + (high - low) * static_cast<double>(a) / bins,
+                  low + (high - low) * static_cast<double>(b + 1) / bins, share, usual};
         }
         break;
       }
     }
     if (sharpest > 1.25) found.push_back(best);
   }
-  std::stable_sort(found.begin(), found.end(), [](const Regime& a, const Regime& b) { return a.share / a.usual > b.share / b.usual; });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Regime& a, const Regime& b) { return a.share / a.usual > b.share / b.usual; });
   return found;
 }
 

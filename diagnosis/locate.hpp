@@ -20,10 +20,12 @@ struct Contributions {
 
 Contributions contributions(const Evidence& evidence, const Fit& base, const Fit& fit);
 
-/// Where the energy exceeds a twenty-fifth of its largest (a fifth of the amplitude); stretches less than a tenth of the record apart are one.
+/// Where the energy exceeds a twenty-fifth of its largest (a fifth of the amplitude); stretches less than a tenth of
+/// the record apart are one.
 std::vector<model::Span> strongest_spans(const Record& record, const std::vector<double>& energy);
 
-/// Of each axis the narrowest range that holds 70 % of the energy, where that is much narrower than the record; the sharpest first.
+/// Of each axis the narrowest range that holds 70 % of the energy, where that is much narrower than the record; the
+/// sharpest first.
 std::vector<Regime> regimes(const Evidence& evidence, const Fit& fit, const std::vector<std::vector<double>>& energy);
 
 }  // namespace bms::diagnosis

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
+#include <Eigen/Cholesky>
 
 #include "diagnosis/decision.hpp"
 #include "diagnosis/reference.hpp"
@@ -36,12 +36,14 @@ Rival later(std::size_t mechanism, const Fitted& f) {
   const std::vector<Sought> sought = f.hypothesis.sought();
   std::vector<Eigen::Index> kept;
   for (std::size_t j = 0; j < sought.size(); ++j) {
-    if (r.hypothesis.find(f.hypothesis.settings[sought[j].setting].index) != nullptr) kept.push_back(static_cast<Eigen::Index>(j));
+    if (r.hypothesis.find(f.hypothesis.settings[sought[j].setting].index) != nullptr)
+      kept.push_back(static_cast<Eigen::Index>(j));
   }
   const auto n = static_cast<Eigen::Index>(kept.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) covariance(i, j) = f.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]);
+    for (Eigen::Index j = 0; j < n; ++j)
+      covariance(i, j) = f.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]);
   }
   for (Eigen::Index i = 0; i < n; ++i) covariance(i, i) = covariance(i, i) * (1 + 1e-6) + 1e-18;
   if (n > 0) r.information = covariance.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
@@ -52,7 +54,8 @@ Rival later(std::size_t mechanism, const Fitted& f) {
 double least_capacity_ah(double capacity_ah, const std::vector<Rival>& rivals) {
   double least = 1;
   for (const Rival& r : rivals) {
-    if (const MechanismSetting* s = r.hypothesis.find(mechanism_index("capacity_change"))) least = std::min(least, 1 - s->value[0]);
+    if (const MechanismSetting* s = r.hypothesis.find(mechanism_index("capacity_change")))
+      least = std::min(least, 1 - s->value[0]);
   }
   return least < 0.995 ? std::floor(100 * capacity_ah * least) / 100 : capacity_ah;
 }
@@ -70,28 +73,30 @@ double read_a(const model::ChosenLaws<double>& laws, double true_a, double capac
 /// A course as a recording of which nothing has been read yet.
 struct Plan {
   Record record;
-  std::vector<ProfileRow> rows;
+  std::vector<experiments::ProfileRow> rows;
 };
 
-Plan planned(const Experiment& experiment, const model::CellParameters<>& cell, double capacity_ah, double step_s, bool temperature) {
-  ExperimentOptions options;
+Plan planned(const experiments::Experiment& experiment, const model::CellParameters<>& cell, double capacity_ah,
+             double step_s, bool temperature) {
+  experiments::ExperimentOptions options;
   options.capacity_ah = capacity_ah;
   options.step_s = step_s;
-  Plan p{{}, bms::experiment(experiment.name, options).value()};
+  Plan p{{}, bms::experiments::experiment(experiment.name, options).value()};
   Record& r = p.record;
   r.initial_soc = experiment.start_soc;
   r.initial_soc_sigma = std::max(cell.tolerance.initial_soc, 1e-4);
-  for (const ProfileRow& row : p.rows) {
+  for (const experiments::ProfileRow& row : p.rows) {
     r.time_s.push_back(row.time_s);
     r.current_a.push_back(row.current_a);
     r.voltage_v.push_back(0);
-    if (temperature || std::isfinite(row.temperature_c)) r.temperature_c.push_back(std::isfinite(row.temperature_c) ? row.temperature_c : 25);
+    if (temperature || std::isfinite(row.temperature_c))
+      r.temperature_c.push_back(std::isfinite(row.temperature_c) ? row.temperature_c : 25);
   }
   return p;
 }
 
-/// What the instruments of a hypothesis would read on the course, and trusted ones beside them. within: whether the cell stays inside its
-/// limits.
+/// What the instruments of a hypothesis would read on the course, and trusted ones beside them. within: whether the
+/// cell stays inside its limits.
 Record read_under(const Rival& truth, const Plan& plan, const model::CellParameters<>& cell, bool& within) {
   Record r = plan.record;
   const std::vector<MechanismSetting>& settings = truth.hypothesis.settings;
@@ -102,16 +107,20 @@ Record read_under(const Rival& truth, const Plan& plan, const model::CellParamet
     a = known_read_a;
   }
   std::vector<MechanismSetting> inside = settings;
-  std::erase_if(inside, [](const MechanismSetting& s) { return s.index == mechanism_index("voltage_offset") || s.index == mechanism_index("voltage_gain") || s.index == mechanism_index("contact_step"); });
+  std::erase_if(inside, [](const MechanismSetting& s) {
+    return s.index == mechanism_index("voltage_offset") || s.index == mechanism_index("voltage_gain") ||
+           s.index == mechanism_index("contact_step");
+  });
   std::vector<double> soc, current_ref_a, voltage_ref_v;
   const std::vector<double> volts = predict(cell, settings, r, &soc), terminal_v = predict(cell, inside, r);
   for (std::size_t k = 0; k < r.size(); ++k) {
-    const ProfileRow& row = plan.rows[k];
+    const experiments::ProfileRow& row = plan.rows[k];
     const bool source = std::isfinite(row.source_v);
     r.voltage_v[k] = source ? laws.reading(row.source_v) : volts[k];
     current_ref_a.push_back(row.current_ref_a());
     voltage_ref_v.push_back(row.voltmeter ? terminal_v[k] : row.source_v);
-    within = within && soc[k] > lowest_soc && soc[k] < highest_soc && volts[k] > cell.limits.voltage_min_v && volts[k] < cell.limits.voltage_max_v;
+    within = within && soc[k] > lowest_soc && soc[k] < highest_soc && volts[k] > cell.limits.voltage_min_v &&
+             volts[k] < cell.limits.voltage_max_v;
   }
   take_references(r, current_ref_a, voltage_ref_v, cell);
   return r;
@@ -119,12 +128,17 @@ Record read_under(const Rival& truth, const Plan& plan, const model::CellParamet
 
 /// What a rival still misses of it, by -2 log posterior.
 double missed(const Rival& rival, const Record& seen, const model::CellParameters<>& cell, const NoiseModel& noise) {
-  const Evidence evidence(cell, std::vector<MechanismSetting>(rival.hypothesis.settings.begin(), rival.hypothesis.settings.begin() + static_cast<std::ptrdiff_t>(rival.hypothesis.own)), {seen}, noise);
+  const Evidence evidence(cell,
+                          std::vector<MechanismSetting>(
+                              rival.hypothesis.settings.begin(),
+                              rival.hypothesis.settings.begin() + static_cast<std::ptrdiff_t>(rival.hypothesis.own)),
+                          {seen}, noise);
   const Eigen::VectorXd none = evidence.unchanged();
   const std::vector<Sought> sought = rival.hypothesis.sought();
   const Eigen::VectorXd apart = evidence.residual(rival.hypothesis, none);
   if (apart.squaredNorm() < decision::same) return apart.squaredNorm();  // no more than that
-  const Columns base = evidence.calibration_derivatives(rival.hypothesis, none), own = evidence.derivatives(rival.hypothesis, none, sought);
+  const Columns base = evidence.calibration_derivatives(rival.hypothesis, none),
+                own = evidence.derivatives(rival.hypothesis, none, sought);
   Columns free(base.rows(), base.cols() + own.cols());
   free.leftCols(base.cols()) = base;
   if (own.cols() > 0) free.rightCols(own.cols()) = own;
@@ -139,10 +153,12 @@ double missed(const Rival& rival, const Record& seen, const model::CellParameter
 
 }  // namespace
 
-std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d, const Finding& f, bool temperature) {
+std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d, const Finding& f,
+                                              bool temperature) {
   if (f.rivals.empty()) return std::nullopt;
   std::vector<Rival> set = {later(f.setting.index, {d.extended, d.covariance})};
-  for (std::size_t k = 0; k < f.rivals.size() && set.size() < most_rivals; ++k) set.push_back(later(f.equivalent_to[k], f.rivals[k]));
+  for (std::size_t k = 0; k < f.rivals.size() && set.size() < most_rivals; ++k)
+    set.push_back(later(f.equivalent_to[k], f.rivals[k]));
   const double capacity_ah = least_capacity_ah(cell.capacity_ah, set);
 
   struct Judged {
@@ -150,19 +166,29 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
     double sum = 0;
     bool all = false;
   };
-  std::vector<std::pair<double, const Experiment*>> designs;
-  for (const Experiment& e : experiments()) {
-    if (std::isfinite(e.start_soc)) designs.emplace_back(planned(e, cell, capacity_ah, 10, temperature).record.duration_s(), &e);
+  std::vector<std::pair<double, const experiments::Experiment*>> designs;
+  for (const experiments::Experiment& e : experiments::experiments()) {
+    if (std::isfinite(e.start_soc))
+      designs.emplace_back(planned(e, cell, capacity_ah, 10, temperature).record.duration_s(), &e);
   }
   std::stable_sort(designs.begin(), designs.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::optional<Judged> best;
   for (const auto& [duration_s, design] : designs) {
-    const Experiment& e = *design;
+    const experiments::Experiment& e = *design;
     const double step_s = e.step_s < 1 ? e.step_s : std::max(1.0, std::ceil(duration_s / rows_at_most));
     const Plan plan = planned(e, cell, capacity_ah, step_s, temperature);
     NoiseModel noise = d.noise;
     noise.white_v /= std::sqrt(std::max(step_s, 1.0));  // a row stands for so many readings
-    Judged j{{std::string(e.name), capacity_ah, e.start_soc, e.step_s, plan.record.duration_s(), {f.setting.index}, {}, std::numeric_limits<double>::infinity()}, 0, true};
+    Judged j{{std::string(e.name),
+              capacity_ah,
+              e.start_soc,
+              e.step_s,
+              plan.record.duration_s(),
+              {f.setting.index},
+              {},
+              std::numeric_limits<double>::infinity()},
+             0,
+             true};
     bool within = true;
     std::vector<Record> seen;
     for (const Rival& truth : set) seen.push_back(read_under(truth, plan, cell, within));
@@ -176,8 +202,10 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
         j.all = j.all && gain >= decision::settled;
         if (a == 0) least = gain;
       }
-      if (least >= decision::same) j.next.separates.push_back(set[b].mechanism), j.next.gain = std::min(j.next.gain, least);
-      else j.next.leaves.push_back(set[b].mechanism);
+      if (least >= decision::same)
+        j.next.separates.push_back(set[b].mechanism), j.next.gain = std::min(j.next.gain, least);
+      else
+        j.next.leaves.push_back(set[b].mechanism);
     }
     if (j.next.separates.size() < 2) continue;
     const bool enough = j.all;
@@ -188,7 +216,8 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
   return best->next;
 }
 
-std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d, bool temperature) {
+std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d,
+                                              bool temperature) {
   for (const Finding& f : d.findings) {
     if (f.rivals.empty()) continue;
     if (auto next = next_experiment(cell, d, f, temperature)) return next;
@@ -196,14 +225,17 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
   return std::nullopt;
 }
 
-std::string command(const NextExperiment& n) { return fmt::format("bms experiment {} --capacity-ah {:g} --out {}.csv", n.profile, n.capacity_ah, n.profile); }
+std::string command(const NextExperiment& n) {
+  return fmt::format("bms experiment {} --capacity-ah {:g} --out {}.csv", n.profile, n.capacity_ah, n.profile);
+}
 
-std::string_view instruction(const NextExperiment& n) { return find_experiment(n.profile)->instruction; }
+std::string_view instruction(const NextExperiment& n) { return experiments::find_experiment(n.profile)->instruction; }
 
 std::string why(const NextExperiment& n) {
   std::vector<std::string> others;
   for (std::size_t k = 1; k < n.separates.size(); ++k) others.emplace_back(words_of(n.separates[k]).name);
-  return fmt::format("To tell {} from {}: {} ({}).", words_of(n.separates.front()).name, listed(others, "and"), find_experiment(n.profile)->description, clock_text(n.duration_s));
+  return fmt::format("To tell {} from {}: {} ({}).", words_of(n.separates.front()).name, listed(others, "and"),
+                     experiments::find_experiment(n.profile)->description, clock_text(n.duration_s));
 }
 
 }  // namespace bms::diagnosis

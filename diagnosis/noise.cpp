@@ -7,10 +7,13 @@ namespace bms::diagnosis {
 
 double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
   const auto of = [](double ratio) { return ratio > 1 ? std::pow(std::log(ratio) / 0.15, 2) : 0; };
-  return of(n.white_v / nominal.white_v) + of(n.fast_v / nominal.fast_v) + of(n.slow_v / nominal.slow_v) + of(n.edge / nominal.edge);
+  return of(n.white_v / nominal.white_v) + of(n.fast_v / nominal.fast_v) + of(n.slow_v / nominal.slow_v) +
+         of(n.edge / nominal.edge);
 }
 
-Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows, std::span<const char> usable) : gains_(time_s.size()) {
+Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows,
+                   std::span<const char> usable)
+    : gains_(time_s.size()) {
   double ff = n.fast_v * n.fast_v, ss = n.slow_v * n.slow_v, fs = 0;  // covariance of (fast, slow), stationary at first
   const double fast_v2 = ff, slow_v2 = ss;
   double last_s = -1, fast_left = 1, slow_left = 1;
@@ -86,7 +89,8 @@ double quantisation_step(std::span<const double> values) {
   const auto low = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 50);
   std::nth_element(steps.begin(), low, steps.end());
   // a converter's readings lie on a grid of its step; those of a reading that sticks until it leaps do not
-  const double step = *low, zero = *std::find_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  const double step = *low,
+               zero = *std::find_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   std::size_t moved = 0, on_grid = 0;
   for (std::size_t k = 1; k < values.size(); ++k) {
     if (!(std::abs(values[k] - values[k - 1]) > 1e-9)) continue;
@@ -110,7 +114,8 @@ double white_noise(std::span<const double> v, std::span<const double> i, double 
     std::nth_element(bends.begin(), nth, bends.end());
     return *nth;
   };
-  // of a normal distribution's absolute values 50 % lie below 0.674 and 80 % below 1.282 sigma; second differences have sqrt(6) sigma
+  // of a normal distribution's absolute values 50 % lie below 0.674 and 80 % below 1.282 sigma; second differences have
+  // sqrt(6) sigma
   const double spread_v = std::max(at(0.5) / 0.6745, at(0.8) / 1.2816) / std::sqrt(6.0);
   return std::max({spread_v, quantisation_step(v) / std::sqrt(12.0), 5e-5});
 }

@@ -1,4 +1,5 @@
-// A recording that is trusted, made ready for fits: the noise that is there before any hypothesis, the current without its sensor's noise.
+// A recording that is trusted, made ready for fits: the noise that is there before any hypothesis, the current without
+// its sensor's noise.
 #pragma once
 
 #include <vector>
@@ -14,6 +15,7 @@ namespace bms::diagnosis {
 NoiseModel nominal_noise(const std::vector<Record>& records, const model::CellParameters<>& cell);
 
 /// Of recordings whose data faults have been looked for and whose bad readings are taken out (trust.hpp).
-Evidence evidence_of(const model::CellParameters<>& cell, const std::vector<model::MechanismSetting>& own, std::vector<Record> records);
+Evidence evidence_of(const model::CellParameters<>& cell, const std::vector<model::MechanismSetting>& own,
+                     std::vector<Record> records);
 
 }  // namespace bms::diagnosis

@@ -15,14 +15,16 @@ namespace bms::diagnosis {
 namespace {
 
 /// Weight of x at the knots of an even grid over low..high.
-void hat(Eigen::Ref<Columns> row, Eigen::Index first, Eigen::Index knots, double low, double high, double x, double value) {
-  const double at = std::clamp((x - low) / std::max(high - low, 1e-12) * static_cast<double>(knots - 1), 0.0, static_cast<double>(knots - 1) - 1e-9);
+void hat(Eigen::Ref<Columns> row, Eigen::Index first, Eigen::Index knots, double low, double high, double x,
+         double value) {
+  const double at = std::clamp((x - low) / std::max(high - low, 1e-12) * static_cast<double>(knots - 1), 0.0,
+                               static_cast<double>(knots - 1) - 1e-9);
   const auto k = static_cast<Eigen::Index>(at);
   row(0, first + k) += value * (1 - (at - static_cast<double>(k)));
   row(0, first + k + 1) += value * (at - static_cast<double>(k));
 }
 
-constexpr double free_v = 0.02;  // prior deviation of a generic voltage
+constexpr double free_v = 0.02;          // prior deviation of a generic voltage
 constexpr double sought_frequency = 14;  // what the best of some hundred frequencies gains on noise
 
 /// A stretch of columns that is asked by itself.
@@ -46,11 +48,12 @@ double power_at(const std::vector<double>& time_s, const std::vector<double>& va
   return re * re + im * im;
 }
 
-/// Frequencies at which something from outside would show: not those of a profile that repeats itself, where a small error of the
-/// model repeats as well.
+/// Frequencies at which something from outside would show: not those of a profile that repeats itself, where a small
+/// error of the model repeats as well.
 std::vector<double> strange_frequencies(const Record& r) {
   constexpr std::size_t count = 160, around = 6;
-  const double lowest_hz = 4 / r.duration_s(), highest_hz = std::min(0.02, 0.1 / (r.duration_s() / static_cast<double>(r.size())));
+  const double lowest_hz = 4 / r.duration_s(),
+               highest_hz = std::min(0.02, 0.1 / (r.duration_s() / static_cast<double>(r.size())));
   std::vector<double> hz, power;
   if (!(highest_hz > 2 * lowest_hz)) return {};
   std::vector<double> rest(r.current_a);
@@ -58,11 +61,13 @@ std::vector<double> strange_frequencies(const Record& r) {
   for (double& a : rest) mean += std::isfinite(a) ? a / static_cast<double>(rest.size()) : 0;
   for (double& a : rest) a -= mean;
   // half a line's width apart at the low end, wider where that would be thousands
-  for (double f = lowest_hz; f < highest_hz && hz.size() < 4 * count; f += std::max(0.5 / r.duration_s(), f / count)) hz.push_back(f);
+  for (double f = lowest_hz; f < highest_hz && hz.size() < 4 * count; f += std::max(0.5 / r.duration_s(), f / count))
+    hz.push_back(f);
   for (const double f : hz) power.push_back(power_at(r.time_s, rest, f));
   std::vector<double> strange, near;
   for (std::size_t k = 0; k < hz.size(); ++k) {
-    near.assign(power.begin() + static_cast<std::ptrdiff_t>(k - std::min(k, around)), power.begin() + static_cast<std::ptrdiff_t>(std::min(hz.size(), k + around + 1)));
+    near.assign(power.begin() + static_cast<std::ptrdiff_t>(k - std::min(k, around)),
+                power.begin() + static_cast<std::ptrdiff_t>(std::min(hz.size(), k + around + 1)));
     std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2), near.end());
     if (power[k] <= 3 * near[near.size() / 2]) strange.push_back(hz[k]);
   }
@@ -74,7 +79,8 @@ std::vector<double> strange_frequencies(const Record& r) {
 Remainder what_remains(const Evidence& evidence, const Fit& fit) {
   const auto rows = static_cast<Eigen::Index>(evidence.samples());
   const double c_rate_a = evidence.cell().capacity_ah;
-  constexpr Eigen::Index time_knots = 30, soc_knots = 8, fine_knots = 24, volt_knots = 30, memory = 6, soc_current = 4, time_current = 6;
+  constexpr Eigen::Index time_knots = 30, soc_knots = 8, fine_knots = 24, volt_knots = 30, memory = 6, soc_current = 4,
+                         time_current = 6;
   constexpr Eigen::Index per_record = time_knots + time_current, leaps = leaps_v.size();
   const Eigen::Index shared = 2 * soc_knots + fine_knots + volt_knots + memory + soc_current + 1 + leaps;
   const Eigen::Index generic = shared + per_record * static_cast<Eigen::Index>(evidence.records().size());
@@ -161,7 +167,8 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
     const Eigen::LDLT<Eigen::MatrixXd> solver(regular);
     const Eigen::VectorXd x = solver.solve(toward.segment(f.first, f.count));
     // what the columns gain on noise alone: the trace of what they can follow
-    const double freedom = solver.solve(own_gram).trace(), gain = toward.segment(f.first, f.count).dot(x) - 1.6 * freedom;
+    const double freedom = solver.solve(own_gram).trace(),
+                 gain = toward.segment(f.first, f.count).dot(x) - 1.6 * freedom;
     if (gain <= found.gain) continue;
     found.gain = gain;
     found.family = f.goes_with;
@@ -202,7 +209,9 @@ Remainder what_remains(const Evidence& evidence, const Fit& fit) {
     std::nth_element(squares.begin(), middle, squares.end());
     // median of a chi-square of one degree of freedom; what lies within the tolerance is not far out
     const double variance = std::max(*middle / 0.4549, 1.0);
-    found.far_out = static_cast<double>(std::count_if(squares.begin(), squares.end(), [&](double s) { return s > 16 * variance; })) / static_cast<double>(squares.size());
+    found.far_out = static_cast<double>(
+                        std::count_if(squares.begin(), squares.end(), [&](double s) { return s > 16 * variance; })) /
+                    static_cast<double>(squares.size());
   }
   row = 0;
   for (const Record& r : evidence.records()) {

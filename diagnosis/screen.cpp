@@ -6,9 +6,9 @@
 #include <map>
 #include <numeric>
 
+#include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <fmt/format.h>
 
 #include "diagnosis/bursts.hpp"
 #include "diagnosis/decision.hpp"
@@ -58,7 +58,8 @@ Excitation excitation_of(const Evidence& evidence) {
       low_a = std::min(low_a, known_a);
       high_a = std::max(high_a, known_a);
       if (k > 0) {
-        const double dt_s = r.time_s[k] - r.time_s[k - 1], moved = known_a * dt_s / (3'600 * evidence.cell().capacity_ah);
+        const double dt_s = r.time_s[k] - r.time_s[k - 1],
+                     moved = known_a * dt_s / (3'600 * evidence.cell().capacity_ah);
         steps.push_back(dt_s);
         soc += moved;
         x.throughput_soc += std::abs(moved);
@@ -121,9 +122,11 @@ std::vector<MechanismSetting> probe_settings(const Evidence& evidence, std::size
     for (std::size_t k = 0; k < info.parameters; ++k) {
       const model::Parameter& parameter = info.parameter[k];
       if (parameter.role == Role::shape && shaped) setting.value[k] = shape;
-      if (parameter.role == Role::strength && parameter.low >= 0) setting.value[k] = 1e-6 * parameter.upper(capacity_ah);
+      if (parameter.role == Role::strength && parameter.low >= 0)
+        setting.value[k] = 1e-6 * parameter.upper(capacity_ah);
       if (info.id == "ocv_hysteresis" && k == 0) setting.value[k] = probing_share * parameter.upper(capacity_ah);
-      if (info.id == "current_clipping" && parameter.name == "limit_a") setting.value[k] = rail_a(evidence).value_or(setting.value[k]);
+      if (info.id == "current_clipping" && parameter.name == "limit_a")
+        setting.value[k] = rail_a(evidence).value_or(setting.value[k]);
     }
   }
   return settings;
@@ -135,20 +138,27 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
   const double c_rate = evidence.cell().capacity_ah;
   const bool temperature = x.temperature && x.temperature_max_c > x.temperature_min_c - 1e-9;
   const double span_k = temperature ? x.temperature_max_c - x.temperature_min_c : 0;
-  const double away_k = temperature ? std::max(std::abs(x.temperature_max_c - 25), std::abs(x.temperature_min_c - 25)) : 0;
+  const double away_k =
+      temperature ? std::max(std::abs(x.temperature_max_c - 25), std::abs(x.temperature_min_c - 25)) : 0;
   const auto needs_current = [&](double c) { return x.current_max_a < c * c_rate; };
-  const bool follows = given.find(mechanism_index("temperature_resistance")) != nullptr || given.find(mechanism_index("entropic_ocv")) != nullptr;
+  const bool follows = given.find(mechanism_index("temperature_resistance")) != nullptr ||
+                       given.find(mechanism_index("entropic_ocv")) != nullptr;
 
   if (id == "temperature_resistance" || id == "entropic_ocv" || id == "temperature_sensor") {
     if (!temperature) return "no temperature was recorded";
     if (id == "temperature_sensor" && !follows) return "the cell file has nothing that follows the temperature";
-    if (id == "temperature_resistance" && std::max(span_k, away_k) < 3) return fmt::format("temperature is within {:.1f} K of the cell file's 25 degrees C", away_k);
+    if (id == "temperature_resistance" && std::max(span_k, away_k) < 3)
+      return fmt::format("temperature is within {:.1f} K of the cell file's 25 degrees C", away_k);
     if (id == "entropic_ocv" && span_k < 4 && away_k < 8) return fmt::format("temperature spans {:.1f} K", span_k);
   }
   // the same recording, whatever the current: beside each other they would grow without bounds
-  const auto trusted = [&] { return std::any_of(evidence.records().begin(), evidence.records().end(), [](const Record& r) { return !r.checks.empty(); }); };
+  const auto trusted = [&] {
+    return std::any_of(evidence.records().begin(), evidence.records().end(),
+                       [](const Record& r) { return !r.checks.empty(); });
+  };
   for (const auto& [one, other] : {std::pair{"leakage", "current_offset"}, std::pair{"current_offset", "leakage"}}) {
-    if (id == one && given.find(mechanism_index(other)) != nullptr && !trusted()) return fmt::format("without a trusted ammeter it cannot be told from {}, which is there", other);
+    if (id == one && given.find(mechanism_index(other)) != nullptr && !trusted())
+      return fmt::format("without a trusted ammeter it cannot be told from {}, which is there", other);
   }
   if (id == "self_heating" && needs_current(0.5)) return "the current is too small to heat the cell";
   if (id == "charge_transfer" && needs_current(0.5)) return "the current is too small to bend the overvoltage";
@@ -156,15 +166,21 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
   if (id == "channel_skew" && (x.edges < 5 || x.step_s > 20)) return "too few steps of the current";
   if ((id == "direction_asymmetry" || id == "coulombic_loss") && x.charged_soc < 0.01) return "the cell is not charged";
   if (id == "current_clipping" && !rail_a(evidence)) return "the largest current is reached too seldom";
-  if (id == "initial_soc" && std::none_of(evidence.records().begin(), evidence.records().end(), [](const Record& r) { return r.initial_soc_told; })) {
+  if (id == "initial_soc" && std::none_of(evidence.records().begin(), evidence.records().end(),
+                                          [](const Record& r) { return r.initial_soc_told; })) {
     return "no initial state of charge was given";
   }
-  if ((id == "capacity_change" || id == "ocv_shape") && x.soc_span < 0.1) return fmt::format("the state of charge spans {:.0f} %", 100 * x.soc_span);
+  if ((id == "capacity_change" || id == "ocv_shape") && x.soc_span < 0.1)
+    return fmt::format("the state of charge spans {:.0f} %", 100 * x.soc_span);
   if (id == "ocv_hysteresis" && x.throughput_soc < 0.03) return "too little charge is moved";
-  if ((id == "resistance_growth" || id == "contact_step" || id == "contact_intermittent" || id == "current_gain" || id == "polarisation_growth" || id == "slow_polarisation") && needs_current(0.05)) {
+  if ((id == "resistance_growth" || id == "contact_step" || id == "contact_intermittent" || id == "current_gain" ||
+       id == "polarisation_growth" || id == "slow_polarisation") &&
+      needs_current(0.05)) {
     return "no current to speak of";
   }
-  if (x.duration_s < 600 && (id == "leakage" || id == "slow_polarisation" || id == "coulombic_loss" || id == "current_offset")) return "the recording is too short";
+  if (x.duration_s < 600 &&
+      (id == "leakage" || id == "slow_polarisation" || id == "coulombic_loss" || id == "current_offset"))
+    return "the recording is too short";
   return std::nullopt;
 }
 
@@ -176,7 +192,8 @@ double Screen::gain_of(const std::vector<Eigen::Index>& columns, Eigen::VectorXd
   Eigen::VectorXd b(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     b[i] = toward_[columns[static_cast<std::size_t>(i)]];
-    for (Eigen::Index j = 0; j < n; ++j) g(i, j) = gram_(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
+    for (Eigen::Index j = 0; j < n; ++j)
+      g(i, j) = gram_(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
   }
   for (Eigen::Index i = 0; i < n; ++i) g(i, i) *= 1 + 1e-6, g(i, i) += 1e-12;
   const Eigen::VectorXd x = g.ldlt().solve(b);
@@ -217,7 +234,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
 
   // a contact that changes at a moment: one column per moment
   const std::size_t step = mechanism_index("contact_step");
-  const bool wants_step = std::find(over.begin(), over.end(), step) != over.end() && h.find(step) == nullptr && !not_testable(evidence, h, step);
+  const bool wants_step = std::find(over.begin(), over.end(), step) != over.end() && h.find(step) == nullptr &&
+                          !not_testable(evidence, h, step);
   if (wants_step) {
     const Record& r = evidence.records().front();
     constexpr std::size_t moments = 40;
@@ -225,7 +243,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     for (std::size_t m = 0; m < moments; ++m) {
       const std::size_t onset = (m + 2) * r.size() / (moments + 4);
       for (std::size_t k = onset; k < r.size(); ++k) {
-        if (std::isfinite(r.current_a[k])) steps(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(m)) = r.current_a[k];
+        if (std::isfinite(r.current_a[k]))
+          steps(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(m)) = r.current_a[k];
       }
       // later recordings have it from their start
       Eigen::Index row = static_cast<Eigen::Index>(r.size());
@@ -264,7 +283,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     const model::Parameter& first = info.parameter[p.parameters[0]];
     const bool one_sided = first.low >= 0 && first.role == Role::strength;
     if (one_sided && found[0] + p.setting.value[p.parameters[0]] < 0) gain = 0;
-    gain = corrected(gain, p.parameters.size() + (shape_grid(info.id, capacity_ah).empty() && p.setting.index != step ? 0 : 1));
+    gain = corrected(
+        gain, p.parameters.size() + (shape_grid(info.id, capacity_ah).empty() && p.setting.index != step ? 0 : 1));
     if (!of.contains(p.setting.index)) {
       of[p.setting.index] = candidates_.size();
       candidates_.push_back({p.setting.index, p.setting, {}, -std::numeric_limits<double>::infinity(), 0});
@@ -298,7 +318,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
         for (std::size_t k = 0; k < p.parameters.size(); ++k) {
           const model::Parameter& parameter = info.parameter[p.parameters[k]];
           const double low = parameter.lower(capacity_ah), high = parameter.upper(capacity_ah);
-          c.start.value[p.parameters[k]] = std::clamp(found[static_cast<Eigen::Index>(k)], std::max(low, -0.6 * std::abs(low)), 0.6 * high);
+          c.start.value[p.parameters[k]] =
+              std::clamp(found[static_cast<Eigen::Index>(k)], std::max(low, -0.6 * std::abs(low)), 0.6 * high);
         }
       }
     }
@@ -306,7 +327,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
 
   // bursts of a loose contact
   const std::size_t loose = mechanism_index("contact_intermittent");
-  if (std::find(over.begin(), over.end(), loose) != over.end() && h.find(loose) == nullptr && !not_testable(evidence, h, loose)) {
+  if (std::find(over.begin(), over.end(), loose) != over.end() && h.find(loose) == nullptr &&
+      !not_testable(evidence, h, loose)) {
     Candidate c{loose, {loose, {}, {}}, {}, 0, 0};
     std::size_t bursts = 0;
     double sum_ohm = 0, in_s = 0;
@@ -320,7 +342,9 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
       c.bursts.push_back(find_bursts(record, e, evidence.whitener(r), found_ohm));
       // where a contact has changed for good, the rows beside that moment are no burst
       if (const MechanismSetting* changed = h.find(step)) {
-        std::erase_if(c.bursts.back(), [&](const model::Span& s) { return s.end_s > changed->value[1] - beside_step_s && s.start_s < changed->value[1] + beside_step_s; });
+        std::erase_if(c.bursts.back(), [&](const model::Span& s) {
+          return s.end_s > changed->value[1] - beside_step_s && s.start_s < changed->value[1] + beside_step_s;
+        });
       }
       bursts += c.bursts.back().size();
       sum_ohm = std::max(sum_ohm, found_ohm);
@@ -328,13 +352,15 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
       for (std::size_t k = 0; k < record.size(); ++k, ++row) {
         const auto& spans = c.bursts.back();
         while (next < spans.size() && record.time_s[k] > spans[next].end_s) ++next;
-        if (next < spans.size() && record.time_s[k] >= spans[next].start_s && std::isfinite(record.current_a[k])) column(row, 0) = record.current_a[k];
+        if (next < spans.size() && record.time_s[k] >= spans[next].start_s && std::isfinite(record.current_a[k]))
+          column(row, 0) = record.current_a[k];
       }
       for (const model::Span& s : c.bursts.back()) in_s += s.end_s - s.start_s;
     }
     // what the file's own resistance is not good to is no contact
     const model::CellParameters<>& cell = evidence.cell();
-    const double least_ohm = cell.tolerance.resistance_fraction * model::cell_detail::rc_value(cell.rc, cell.rc.r0_ohm, 0.5);
+    const double least_ohm =
+        cell.tolerance.resistance_fraction * model::cell_detail::rc_value(cell.rc, cell.rc.r0_ohm, 0.5);
     if (bursts > 0 && sum_ohm > least_ohm) {
       evidence.whiten(column);
       const LeftOver::Products one = left.of(column);
@@ -351,7 +377,8 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
 
   std::vector<std::size_t> order(candidates_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return candidates_[a].gain > candidates_[b].gain; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return candidates_[a].gain > candidates_[b].gain; });
   std::vector<Candidate> candidates;
   std::vector<Probe> best;
   for (const std::size_t k : order) {
@@ -376,12 +403,15 @@ double Screen::alike(std::size_t a, std::size_t b) const {
   double norm = 0;
   Eigen::VectorXd toward = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(cb.size()));
   for (std::size_t i = 0; i < ca.size(); ++i) {
-    for (std::size_t j = 0; j < ca.size(); ++j) norm += x[static_cast<Eigen::Index>(i)] * x[static_cast<Eigen::Index>(j)] * gram_(ca[i], ca[j]);
-    for (std::size_t j = 0; j < cb.size(); ++j) toward[static_cast<Eigen::Index>(j)] += x[static_cast<Eigen::Index>(i)] * gram_(ca[i], cb[j]);
+    for (std::size_t j = 0; j < ca.size(); ++j)
+      norm += x[static_cast<Eigen::Index>(i)] * x[static_cast<Eigen::Index>(j)] * gram_(ca[i], ca[j]);
+    for (std::size_t j = 0; j < cb.size(); ++j)
+      toward[static_cast<Eigen::Index>(j)] += x[static_cast<Eigen::Index>(i)] * gram_(ca[i], cb[j]);
   }
   Eigen::MatrixXd g(static_cast<Eigen::Index>(cb.size()), static_cast<Eigen::Index>(cb.size()));
   for (std::size_t i = 0; i < cb.size(); ++i) {
-    for (std::size_t j = 0; j < cb.size(); ++j) g(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = gram_(cb[i], cb[j]);
+    for (std::size_t j = 0; j < cb.size(); ++j)
+      g(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = gram_(cb[i], cb[j]);
     g(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) *= 1 + 1e-6;
   }
   return norm > 0 ? std::sqrt(std::clamp(toward.dot(g.ldlt().solve(toward)) / norm, 0.0, 1.0)) : 0;

@@ -20,7 +20,9 @@ constexpr std::size_t temperature_resistance = mechanism_index("temperature_resi
 /// What its unknowns cost a mechanism; what is known of most cells is none.
 double price(std::size_t mechanism, std::size_t bursts) {
   double unknowns = 0;
-  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) unknowns += catalogue[mechanism].parameter[p].role != Role::given && catalogue[mechanism].parameter[p].spread == 0 ? 1 : 0;
+  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p)
+    unknowns +=
+        catalogue[mechanism].parameter[p].role != Role::given && catalogue[mechanism].parameter[p].spread == 0 ? 1 : 0;
   if (catalogue[mechanism].id == "contact_step") unknowns += 4;  // its moment was sought too
   return decision::per_unknown * (unknowns - 1) + decision::per_burst * static_cast<double>(bursts);
 }
@@ -33,7 +35,8 @@ double price(const Hypothesis& h) {
   return sum;
 }
 
-/// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other resistances.
+/// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other
+/// resistances.
 double known_before(double away_k, const Hypothesis& h) {
   if (h.find(temperature_resistance) == nullptr || h.own > 0) return 0;
   return std::clamp((away_k - 5) * 1.5, 0.0, 15.0);
@@ -41,7 +44,8 @@ double known_before(double away_k, const Hypothesis& h) {
 
 /// RMS of a raw residual, of the voltages that were read.
 double reading_error_v(const Evidence& evidence, const Columns& raw) {
-  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(evidence.readings())).squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(evidence.readings())).squaredNorm() /
+                   static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
 }
 
 /// With the base parameters where a fit has them, but for those that belong to a single recording.
@@ -82,7 +86,8 @@ double Search::score(const Fit& f) {
 Fit Search::settled(Fit f) {
   for (int round = 0; round < 2; ++round) {
     double cost = 0;
-    const NoiseModel noise = evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+    const NoiseModel noise =
+        evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
     if (noise == f.noise) break;
     evidence_.set_noise(noise);
     f = evidence_.fit(f.hypothesis, f.calibration, 5);
@@ -109,22 +114,30 @@ Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {
   return best;
 }
 
-std::array<Eigen::VectorXd, 2> Search::far_bases(const Fit& around) const { return {around.calibration, evidence_.unchanged()}; }
+std::array<Eigen::VectorXd, 2> Search::far_bases(const Fit& around) const {
+  return {around.calibration, evidence_.unchanged()};
+}
 
 std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) {
   MechanismSetting& s = h.settings.back();
   const std::string_view id = catalogue[s.index].id;
   std::vector<std::vector<double>> tries;
-  if (id == "capacity_change") tries = {{-0.1}, {0.04}, {0.08}, {0.14}, {0.2}, {0.28}};
-  else if (id == "current_gain") tries = {{-0.12}, {-0.06}, {0.06}, {0.12}};
-  else if (id == "initial_soc") tries = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
-  else if (id == "ocv_shape") tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
+  if (id == "capacity_change")
+    tries = {{-0.1}, {0.04}, {0.08}, {0.14}, {0.2}, {0.28}};
+  else if (id == "current_gain")
+    tries = {{-0.12}, {-0.06}, {0.06}, {0.12}};
+  else if (id == "initial_soc")
+    tries = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
+  else if (id == "ocv_shape")
+    tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
   else if (id == "current_offset" || id == "leakage") {
     double hours = 0;
     for (const Record& r : evidence_.records()) hours += r.duration_s() / 3'600;
-    const double per_soc_a = evidence_.cell().capacity_ah / std::max(hours, 0.1), most_a = catalogue[s.index].parameter[0].upper(evidence_.cell().capacity_ah);
+    const double per_soc_a = evidence_.cell().capacity_ah / std::max(hours, 0.1),
+                 most_a = catalogue[s.index].parameter[0].upper(evidence_.cell().capacity_ah);
     for (const double soc : {-0.12, -0.06, -0.03, 0.03, 0.06, 0.12}) {
-      if (std::abs(soc) * per_soc_a < most_a && (soc > 0 || catalogue[s.index].parameter[0].low < 0)) tries.push_back({soc * per_soc_a});
+      if (std::abs(soc) * per_soc_a < most_a && (soc > 0 || catalogue[s.index].parameter[0].low < 0))
+        tries.push_back({soc * per_soc_a});
     }
   } else if (id == "slow_polarisation") {
     for (const double tau_s : {200.0, 600.0}) {
@@ -147,14 +160,19 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
 bool Search::far_better(const Fit& around, const Candidate& c) {
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto far = far_start(with(around.hypothesis, c.start), u);
-    if (far && evidence_.residual(*far, u).squaredNorm() < evidence_.residual(around.hypothesis, u).squaredNorm() - decision::worth_a_fit) return true;
+    if (far && evidence_.residual(*far, u).squaredNorm() <
+                   evidence_.residual(around.hypothesis, u).squaredNorm() - decision::worth_a_fit)
+      return true;
   }
   return false;
 }
 
 Fit Search::refined_onset(Fit best) {
   const Record& r = evidence_.records().front();
-  const auto setting = [](Fit& f) -> MechanismSetting& { return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(), [](const MechanismSetting& s) { return s.index == mechanism_index("contact_step"); }); };
+  const auto setting = [](Fit& f) -> MechanismSetting& {
+    return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(),
+                         [](const MechanismSetting& s) { return s.index == mechanism_index("contact_step"); });
+  };
   double reach_s = r.duration_s() / 40;
   Eigen::VectorXd residual;
   while (reach_s > 1.5 * r.duration_s() / static_cast<double>(r.size())) {
@@ -163,7 +181,9 @@ Fit Search::refined_onset(Fit best) {
       Hypothesis h = best.hypothesis;
       for (MechanismSetting& s : h.settings) {
         // a step at either end is no step
-        if (s.index == mechanism_index("contact_step")) s.value[1] = std::clamp(middle_s + step * reach_s, r.time_s.front() + 0.04 * r.duration_s(), r.time_s.back() - 0.04 * r.duration_s());
+        if (s.index == mechanism_index("contact_step"))
+          s.value[1] = std::clamp(middle_s + step * reach_s, r.time_s.front() + 0.04 * r.duration_s(),
+                                  r.time_s.back() - 0.04 * r.duration_s());
       }
       residual = evidence_.residual(h, best.calibration);
       const double cost = residual.squaredNorm() + (best.cost - best.residual.squaredNorm());
@@ -184,7 +204,8 @@ bool Search::alike(const NoiseModel& a, const NoiseModel& b) {
 }
 
 std::vector<Fit> Search::one_more(const Fit& around, const std::vector<std::size_t>& over) {
-  // by the nominal noise, which asks for everything to be explained, and by that of what is left, which asks for the large first
+  // by the nominal noise, which asks for everything to be explained, and by that of what is left, which asks for the
+  // large first
   std::vector<Fit> fits;
   std::set<std::size_t> tried;
   for (const NoiseModel& noise : {nominal_, around.noise}) {
@@ -204,7 +225,9 @@ std::vector<Fit> Search::one_more(const Fit& around, const std::vector<std::size
   return fits;
 }
 
-std::vector<Fit> Search::in_place_of(std::size_t m, const Fit& best, const Fit& less, const std::vector<std::size_t>& over, double gain_of_m, std::map<std::size_t, double>& likeness) {
+std::vector<Fit> Search::in_place_of(std::size_t m, const Fit& best, const Fit& less,
+                                     const std::vector<std::size_t>& over, double gain_of_m,
+                                     std::map<std::size_t, double>& likeness) {
   // they must stand up to the noise that the best leaves
   evidence_.set_noise(best.noise);
   const Fit from = evidence_.fit(less.hypothesis, less.calibration, 5);
@@ -215,7 +238,8 @@ std::vector<Fit> Search::in_place_of(std::size_t m, const Fit& best, const Fit& 
     if (all[a].mechanism == m) {
       for (std::size_t b = 0; b < all.size(); ++b) likeness[all[b].mechanism] = screen.alike(a, b);
     }
-    if (worth.size() < decision::most_rivals && all[a].gain >= std::max(decision::worth_a_fit, 0.1 * gain_of_m)) worth.push_back(all[a]);
+    if (worth.size() < decision::most_rivals && all[a].gain >= std::max(decision::worth_a_fit, 0.1 * gain_of_m))
+      worth.push_back(all[a]);
   }
   return fitted(from, worth, best.cost + decision::hopeless);
 }

@@ -45,7 +45,9 @@ std::vector<model::Span> stuck_voltage(const Record& r, double c_rate_a) {
       high = std::max(high, r.current_a[j]);
     }
     // at constant current on a flat curve a good reading stands still too
-    if ((k - from >= 8 && high - low > 0.25 * c_rate_a) || (k - from >= 60 && k - from > 12 * usual && high - low > 0.02 * c_rate_a)) spans.push_back({r.time_s[from], r.time_s[k - 1]});
+    if ((k - from >= 8 && high - low > 0.25 * c_rate_a) ||
+        (k - from >= 60 && k - from > 12 * usual && high - low > 0.02 * c_rate_a))
+      spans.push_back({r.time_s[from], r.time_s[k - 1]});
     from = k;
   }
   return spans;
@@ -56,7 +58,9 @@ std::vector<model::Span> stuck_voltage(const Record& r, double c_rate_a) {
 Trust examine(Record& r, const model::CellParameters<>& cell) {
   Trust trust;
   const double c_rate_a = cell.capacity_ah;
-  const auto fault = [&](const char* id, std::string text, std::vector<model::Span> spans = {}) { trust.faults.push_back({id, std::move(text), std::move(spans)}); };
+  const auto fault = [&](const char* id, std::string text, std::vector<model::Span> spans = {}) {
+    trust.faults.push_back({id, std::move(text), std::move(spans)});
+  };
 
   // units
   std::vector<double> sizes_a, volts, steps_s;
@@ -73,7 +77,10 @@ Trust examine(Record& r, const model::CellParameters<>& cell) {
   }
   const double limit_a = std::max(cell.limits.charge_current_max_a, cell.limits.discharge_current_max_a);
   if (largest_a > 60 * std::max(limit_a, c_rate_a)) {
-    fault("current_in_ma", fmt::format("The current reaches {:.0f} A, {:.0f} times the capacity: milliamperes where amperes are expected.", largest_a, largest_a / c_rate_a));
+    fault(
+        "current_in_ma",
+        fmt::format("The current reaches {:.0f} A, {:.0f} times the capacity: milliamperes where amperes are expected.",
+                    largest_a, largest_a / c_rate_a));
     return trust;
   }
 
@@ -84,31 +91,41 @@ Trust examine(Record& r, const model::CellParameters<>& cell) {
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (!std::isfinite(r.voltage_v[k]) || (r.voltage_v[k] >= low_v && r.voltage_v[k] <= high_v)) continue;
     const bool goes_on = k > 0 && !dropouts.empty() && dropouts.back().end_s == r.time_s[k - 1];
-    if (goes_on) dropouts.back().end_s = r.time_s[k];
-    else dropouts.push_back({r.time_s[k], r.time_s[k]});
+    if (goes_on)
+      dropouts.back().end_s = r.time_s[k];
+    else
+      dropouts.push_back({r.time_s[k], r.time_s[k]});
     r.voltage_v[k] = no_reading;
     ++dropped;
   }
-  if (dropped > std::max<std::size_t>(20, r.size() / 500)) fault("dropouts", fmt::format("The voltage drops out in {} of {} samples.", dropped, r.size()), dropouts);
-  else if (dropped > 0) trust.warnings.push_back(fmt::format("{} voltage readings outside {:g} to {:g} V are not used", dropped, low_v, high_v));
+  if (dropped > std::max<std::size_t>(20, r.size() / 500))
+    fault("dropouts", fmt::format("The voltage drops out in {} of {} samples.", dropped, r.size()), dropouts);
+  else if (dropped > 0)
+    trust.warnings.push_back(
+        fmt::format("{} voltage readings outside {:g} to {:g} V are not used", dropped, low_v, high_v));
 
   // single spikes: far from both neighbours, which agree, while the current does not move
   std::size_t spikes = 0;
   for (std::size_t k = 1; k + 1 < r.size(); ++k) {
     const double before = r.voltage_v[k - 1], after = r.voltage_v[k + 1], here = r.voltage_v[k];
-    const bool quiet = std::abs(r.current_a[k] - r.current_a[k - 1]) < 0.05 * c_rate_a && std::abs(r.current_a[k + 1] - r.current_a[k]) < 0.05 * c_rate_a;
+    const bool quiet = std::abs(r.current_a[k] - r.current_a[k - 1]) < 0.05 * c_rate_a &&
+                       std::abs(r.current_a[k + 1] - r.current_a[k]) < 0.05 * c_rate_a;
     if (quiet && std::abs(after - before) < 0.01 && std::abs(here - (before + after) / 2) > 0.25) {
       r.voltage_v[k] = no_reading;
       ++spikes;
     }
   }
-  if (spikes > std::max<std::size_t>(20, r.size() / 500)) fault("dropouts", fmt::format("The voltage has {} spikes that no current explains.", spikes));
-  else if (spikes > 0) trust.warnings.push_back(fmt::format("{} single spikes of the voltage are not used", spikes));
+  if (spikes > std::max<std::size_t>(20, r.size() / 500))
+    fault("dropouts", fmt::format("The voltage has {} spikes that no current explains.", spikes));
+  else if (spikes > 0)
+    trust.warnings.push_back(fmt::format("{} single spikes of the voltage are not used", spikes));
 
   // a channel that has stopped
   const auto stuck = stuck_voltage(r, c_rate_a);
   if (covered_s(stuck) > std::max(45.0, 0.004 * r.duration_s())) {
-    fault("stuck_voltage", fmt::format("The voltage does not move for {:.0f} s in all while the current does.", covered_s(stuck)), stuck);
+    fault("stuck_voltage",
+          fmt::format("The voltage does not move for {:.0f} s in all while the current does.", covered_s(stuck)),
+          stuck);
   } else if (!stuck.empty()) {
     std::size_t taken = 0;
     for (std::size_t k = 0; k < r.size(); ++k) {
@@ -125,13 +142,18 @@ Trust examine(Record& r, const model::CellParameters<>& cell) {
   for (std::size_t k = 1; k < r.size(); ++k) {
     const double dt_s = r.time_s[k] - r.time_s[k - 1];
     if (dt_s <= 10 * usual_step_s || dt_s < 5) continue;
-    const double load_a = std::max(std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0, std::isfinite(r.current_a[k - 1]) ? std::abs(r.current_a[k - 1]) : 0);
+    const double load_a = std::max(std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0,
+                                   std::isfinite(r.current_a[k - 1]) ? std::abs(r.current_a[k - 1]) : 0);
     if (load_a < 0.05 * c_rate_a) continue;
     gaps.push_back({r.time_s[k - 1], r.time_s[k]});
     lost_soc += load_a * dt_s / (3'600 * c_rate_a);
   }
   if (lost_soc > 0.02 || gaps.size() >= 3) {
-    fault("gaps", fmt::format("The recording stops {} times under load, {:.0f} s in all: up to {:.1f} % of the charge is not known.", gaps.size(), covered_s(gaps), 100 * lost_soc), gaps);
+    fault("gaps",
+          fmt::format(
+              "The recording stops {} times under load, {:.0f} s in all: up to {:.1f} % of the charge is not known.",
+              gaps.size(), covered_s(gaps), 100 * lost_soc),
+          gaps);
   } else if (!gaps.empty()) {
     trust.warnings.push_back(fmt::format("{} gaps under load", gaps.size()));
   }
@@ -149,7 +171,8 @@ Trust examine(Record& r, const model::CellParameters<>& cell) {
     against += di * dv < 0 ? 1 : 0;
   }
   if (edges >= 2 && together < -0.5 * std::sqrt(current2 * voltage2) && against > edges * 7 / 10) {
-    fault("current_inverted", "The voltage falls where the current rises: the current's sign is inverted, expected > 0 while charging.");
+    fault("current_inverted",
+          "The voltage falls where the current rises: the current's sign is inverted, expected > 0 while charging.");
   }
   return trust;
 }

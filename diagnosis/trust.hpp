@@ -1,5 +1,5 @@
-// Can the recording be believed at all? What no physics can explain is looked for first: a diagnosis on top of it would name a
-// mechanism for a broken clock.
+// Can the recording be believed at all? What no physics can explain is looked for first: a diagnosis on top of it would
+// name a mechanism for a broken clock.
 //
 // Faults that fill a recording end the diagnosis (DATA_FAULT); a few bad readings are taken out and told.
 #pragma once
@@ -14,7 +14,8 @@
 namespace bms::diagnosis {
 
 struct DataFault {
-  std::string id;                  ///< "current_inverted", "current_in_ma", "voltage_in_mv", "gaps", "stuck_voltage", "stuck_current", "dropouts", "too_short", "clock"
+  std::string id;  ///< "current_inverted", "current_in_ma", "voltage_in_mv", "gaps", "stuck_voltage", "stuck_current",
+                   ///< "dropouts", "too_short", "clock"
   std::string text;                ///< one sentence
   std::vector<model::Span> spans;  ///< where
 };

@@ -1,4 +1,5 @@
-// A diagnosis in words: what each mechanism is to a technician, one sentence for the verdict, and why this cause and not its neighbour.
+// A diagnosis in words: what each mechanism is to a technician, one sentence for the verdict, and why this cause and
+// not its neighbour.
 #pragma once
 
 #include <string>
@@ -20,26 +21,29 @@ struct Words {
 };
 const Words& words_of(std::size_t mechanism);
 
-/// A number with its deviation in a unit that suits its size: "12.4 +- 0.8 mV". deviation 0: the number alone. Its sign as it stands.
+/// A number with its deviation in a unit that suits its size: "12.4 +- 0.8 mV". deviation 0: the number alone. Its sign
+/// as it stands.
 std::string quantity(double value, double deviation, std::string_view unit);
 
 /// The same for a parameter of a mechanism; shares and fractions in percent.
 std::string parameter_text(const model::Parameter& parameter, double value, double deviation);
 
-/// What a finding says, with its number, as the beginning of a sentence: "the cell holds 8.1 +- 0.5 % less charge than its file says".
+/// What a finding says, with its number, as the beginning of a sentence: "the cell holds 8.1 +- 0.5 % less charge than
+/// its file says".
 std::string claim(const MechanismSetting& setting);
 
 /// What the recordings hold that tells neighbours apart.
 struct Occasions {
   double capacity_ah = 1;
-  double error_v = 0;             ///< RMS of measured less cell file's voltage
+  double error_v = 0;  ///< RMS of measured less cell file's voltage
   double longest_rest_s = 0;
   std::size_t reversals = 0;      ///< of the charge's direction, 1 % of the capacity or more each way
   std::size_t rates = 0;          ///< kinds of current, told apart by a third
   double temperature_span_k = 0;  ///< 0: not recorded, or constant
   double soc_span = 0;
 };
-Occasions occasions_of(const model::CellParameters<>& cell, const std::vector<Record>& records, const std::vector<RecordView>& views);
+Occasions occasions_of(const model::CellParameters<>& cell, const std::vector<Record>& records,
+                       const std::vector<RecordView>& views);
 
 /// "a, b and c"; last: "and", "or".
 std::string listed(const std::vector<std::string>& parts, const char* last);

@@ -1,11 +1,13 @@
-// The cells of a pack beside their mean. One current flows through all: a full filter follows the mean cell, and of each cell only what
-// makes it another is estimated, its soc and its resistance, by a filter of two states without dynamics. What a model gets wrong it gets
-// wrong of all cells alike and drops out of their difference, so a difference is known better than the mean.
+// The cells of a pack beside their mean. One current flows through all: a full filter follows the mean cell, and of
+// each cell only what makes it another is estimated, its soc and its resistance, by a filter of two states without
+// dynamics. What a model gets wrong it gets wrong of all cells alike and drops out of their difference, so a difference
+// is known better than the mean.
 //
-//   v_k - mean v = OCV(soc_k) - mean OCV(soc_j) + r_k (R0 + R1) I        r_k: resistance of cell k over the mean cell's, less 1
+//   v_k - mean v = OCV(soc_k) - mean OCV(soc_j) + r_k (R0 + R1) I        r_k: resistance of cell k over the mean
+//   cell's, less 1
 //
-// With a knee of the curve among the cells the mean of their OCVs is not the OCV of their mean; by how much is taken from the sample
-// before. Differences add up to nothing: what they do add up to is taken off them.
+// With a knee of the curve among the cells the mean of their OCVs is not the OCV of their mean; by how much is taken
+// from the sample before. Differences add up to nothing: what they do add up to is taken off them.
 //
 // G. Plett, "Efficient battery pack state estimation using bar-delta filtering", EVS24, Stavanger 2009.
 //
@@ -20,21 +22,24 @@
 #include "estimator/voltage_doubt.hpp"
 #include "model/cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 template <class S>
 class CellDifference {
-  using Soc = model::Soc<S>;
-  using Voltage = model::Voltage<S>;
-  using Variance = model::Variance<S>;
-  using Fraction = model::Fraction<S>;
-  using Coupling = model::Coupling<S>;
+  using Soc = arithmetic::Soc<S>;
+  using Voltage = arithmetic::Voltage<S>;
+  using Variance = arithmetic::Variance<S>;
+  using Fraction = arithmetic::Fraction<S>;
+  using Coupling = arithmetic::Coupling<S>;
 
  public:
-  static constexpr double first_soc = 0.05, first_resistance = 0.1;  ///< one sigma between cells of a pack that nobody has measured
-  static constexpr double of_charge = 0.02;                          ///< cells differ in capacity by that: of all soc that moves
+  static constexpr double first_soc = 0.05,
+                          first_resistance = 0.1;  ///< one sigma between cells of a pack that nobody has measured
+  static constexpr double of_charge = 0.02;        ///< cells differ in capacity by that: of all soc that moves
 
-  constexpr CellDifference() { covariance_.set_diagonal({Variance(first_resistance * first_resistance), Variance(first_soc * first_soc)}); }
+  constexpr CellDifference() {
+    covariance_.set_diagonal({Variance(first_resistance * first_resistance), Variance(first_soc * first_soc)});
+  }
 
   /// From what is known before.
   constexpr void begin(const Soc& soc, const Soc& sigma) {
@@ -45,21 +50,24 @@ class CellDifference {
   /// moved: how far soc of the mean has moved since the last call.
   constexpr void predict(const Soc& moved) {
     // the same way until the current turns: deviations add, (sigma + d)^2 - sigma^2, linear in d
-    const Soc d = Soc(model::magnitude(moved) * Fraction(of_charge)), sigma = model::root<Soc>(covariance_.template variance<1>());
+    const Soc d = Soc(arithmetic::magnitude(moved) * Fraction(of_charge)),
+              sigma = arithmetic::root<Soc>(covariance_.template variance<1>());
     covariance_.widen_last(Variance(Variance((sigma + sigma) * d) + Variance(d * d)));
   }
   /// Of what all differences share, which is the mean's.
   constexpr void centre(const Soc& shared) { soc_ = Soc(soc_ - shared); }
-  /// off_v: this cell's voltage less the mean, less what the OCV curve says of the difference; slope: at this cell; drop_v: over R0 and
-  /// R1; noise_v2: of off_v.
-  constexpr void correct(const Voltage& off_v, const model::VoltagePerSoc<S>& slope, const Voltage& drop_v, const Variance& noise_v2) {
-    const auto correction = covariance_.observe({model::VoltagePerSoc<S>(drop_v), slope}, noise_v2, Voltage(off_v - drop_v * resistance_));
+  /// off_v: this cell's voltage less the mean, less what the OCV curve says of the difference; slope: at this cell;
+  /// drop_v: over R0 and R1; noise_v2: of off_v.
+  constexpr void correct(const Voltage& off_v, const arithmetic::VoltagePerSoc<S>& slope, const Voltage& drop_v,
+                         const Variance& noise_v2) {
+    const auto correction = covariance_.observe({arithmetic::VoltagePerSoc<S>(drop_v), slope}, noise_v2,
+                                                Voltage(off_v - drop_v * resistance_));
     resistance_ = Soc(resistance_ + correction[0]);
     soc_ = Soc(soc_ + correction[1]);
   }
 
-  constexpr const Soc& soc() const { return soc_; }                ///< of this cell less the mean's
-  constexpr Soc soc_sigma() const { return model::root<Soc>(covariance_.template variance<1>()); }
+  constexpr const Soc& soc() const { return soc_; }  ///< of this cell less the mean's
+  constexpr Soc soc_sigma() const { return arithmetic::root<Soc>(covariance_.template variance<1>()); }
   constexpr const Soc& resistance() const { return resistance_; }  ///< over the mean's, less 1
 
  private:
@@ -69,9 +77,9 @@ class CellDifference {
 
 template <class S, std::size_t Cells>
 class CellDifferences {
-  using Soc = model::Soc<S>;
-  using Voltage = model::Voltage<S>;
-  using Variance = model::Variance<S>;
+  using Soc = arithmetic::Soc<S>;
+  using Voltage = arithmetic::Voltage<S>;
+  using Variance = arithmetic::Variance<S>;
 
  public:
   /// What one sample of the pack says.
@@ -80,19 +88,20 @@ class CellDifferences {
     std::array<bool, Cells> usable{};
   };
 
-  /// soc, sigma: of the mean cell; moved: how far it has moved since the last call; shared_by: samples that share one error of the model
-  /// (its correlation time over the step).
+  /// soc, sigma: of the mean cell; moved: how far it has moved since the last call; shared_by: samples that share one
+  /// error of the model (its correlation time over the step).
   template <class Cell>
-  constexpr void step(const Cell& cell, const Soc& soc, const Soc& sigma, const model::Current<S>& current_a, const Soc& moved, const model::Count<S>& shared_by, const Seen& seen) {
-    model::Current<S> sum_v(0), sum_above_v(0), sum_soc(0);
+  constexpr void step(const Cell& cell, const Soc& soc, const Soc& sigma, const arithmetic::Current<S>& current_a,
+                      const Soc& moved, const arithmetic::Count<S>& shared_by, const Seen& seen) {
+    arithmetic::Current<S> sum_v(0), sum_above_v(0), sum_soc(0);
     int count = 0;
     for (std::size_t k = 0; k < Cells; ++k) {
-      if (seen.usable[k]) sum_v = model::Current<S>(sum_v + seen.voltage_v[k]), ++count;
+      if (seen.usable[k]) sum_v = arithmetic::Current<S>(sum_v + seen.voltage_v[k]), ++count;
       difference_[k].centre(shared_);
       difference_[k].predict(moved);
     }
     if (count < 2) return;
-    const Voltage mean_v = model::ratio<Voltage>(sum_v, model::Current<S>(count));
+    const Voltage mean_v = arithmetic::ratio<Voltage>(sum_v, arithmetic::Current<S>(count));
     const auto at = look_up(cell, soc, interval_);
     const auto slope = ocv_slope<S>(at);
     const Voltage drop_v = settled_drop_v<S>(at, current_a);
@@ -102,17 +111,19 @@ class CellDifferences {
       const auto here = look_up(cell, Soc(soc + difference_[k].soc()), interval);
       const auto slope_here = ocv_slope<S>(here);
       const Voltage above_v = here.ocv_v - at.ocv_v;
-      sum_above_v = model::Current<S>(sum_above_v + above_v);
-      // of the model's error, a quarter is each cell's own, and stays with it: it lasts ten times as long; with a knee between cell and
-      // mean, the mean's own error counts
-      const Voltage knee_v = Voltage(model::VoltagePerSoc<S>(slope_here - slope) * sigma);
-      const Variance own_v2 = Variance(Variance(here.error_v2 * model::Fraction<S>(10.0 / 16)) + knee_v * knee_v);
-      const Variance noise_v2 = Variance(Variance(cell.noise.voltage_v2 + cell.noise.voltage_v2) + model::product<Variance>(own_v2, shared_by));
-      difference_[k].correct(Voltage((seen.voltage_v[k] - mean_v) - Voltage(above_v - mean_above_v_)), slope_here, drop_v, noise_v2);
+      sum_above_v = arithmetic::Current<S>(sum_above_v + above_v);
+      // of the model's error, a quarter is each cell's own, and stays with it: it lasts ten times as long; with a knee
+      // between cell and mean, the mean's own error counts
+      const Voltage knee_v = Voltage(arithmetic::VoltagePerSoc<S>(slope_here - slope) * sigma);
+      const Variance own_v2 = Variance(Variance(here.error_v2 * arithmetic::Fraction<S>(10.0 / 16)) + knee_v * knee_v);
+      const Variance noise_v2 = Variance(Variance(cell.noise.voltage_v2 + cell.noise.voltage_v2) +
+                                         arithmetic::product<Variance>(own_v2, shared_by));
+      difference_[k].correct(Voltage((seen.voltage_v[k] - mean_v) - Voltage(above_v - mean_above_v_)), slope_here,
+                             drop_v, noise_v2);
     }
-    for (const CellDifference<S>& d : difference_) sum_soc = model::Current<S>(sum_soc + d.soc());
-    mean_above_v_ = model::ratio<Voltage>(sum_above_v, model::Current<S>(count));
-    shared_ = Soc(sum_soc * model::Fraction<S>(1.0 / Cells));
+    for (const CellDifference<S>& d : difference_) sum_soc = arithmetic::Current<S>(sum_soc + d.soc());
+    mean_above_v_ = arithmetic::ratio<Voltage>(sum_above_v, arithmetic::Current<S>(count));
+    shared_ = Soc(sum_soc * arithmetic::Fraction<S>(1.0 / Cells));
   }
 
   constexpr void begin(std::size_t k, const Soc& soc, const Soc& sigma) { difference_[k].begin(soc, sigma); }
@@ -125,4 +136,4 @@ class CellDifferences {
   std::uint8_t interval_ = 0;
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

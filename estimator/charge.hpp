@@ -1,4 +1,5 @@
-// The charge in a cell, counted in integers: a float32 sum of 10 mA over 10 ms into a cell of 6 Ah would stay where it is.
+// The charge in a cell, counted in integers: a float32 sum of 10 mA over 10 ms into a cell of 6 Ah would stay where it
+// is.
 //
 //   charge += current_ua * duration_us        exact, in 1e-12 A s
 //   soc     = charge / capacity               read in counts of 2^shift (model::ChargeScale), below 4e-9
@@ -12,7 +13,7 @@
 
 #include "model/cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 inline constexpr std::uint32_t longest_count_us = 2'000'000'000U;
 
@@ -21,18 +22,20 @@ namespace charge_ranges {
 using namespace model;
 inline constexpr double largest_uaus = accepted::capacity_ah.high * 3'600e12;
 static_assert(most_soc * largest_uaus + most_soc * largest_uaus < 0x1p63, "full, and corrected as far as it can be");
-static_assert(most_soc * largest_uaus + 0x1p31 * longest_count_us < 0x1p63, "full, and the largest current for as long as can be counted at once");
+static_assert(most_soc * largest_uaus + 0x1p31 * longest_count_us < 0x1p63,
+              "full, and the largest current for as long as can be counted at once");
 static_assert(most_soc * 0x1p29 < 0x1p31, "read in counts");
-static_assert(accepted::capacity_ah.low * 3'600e12 / 0x1p32 > 5'000, "the upper half tells the smallest cell's soc to a five-thousandth");
+static_assert(accepted::capacity_ah.low * 3'600e12 / 0x1p32 > 5'000,
+              "the upper half tells the smallest cell's soc to a five-thousandth");
 
 }  // namespace charge_ranges
 
 template <class S>
-inline constexpr bool counts_in_integers = std::floating_point<S> || std::same_as<S, model::FixedPoint>;
+inline constexpr bool counts_in_integers = std::floating_point<S> || std::same_as<S, arithmetic::FixedPoint>;
 
 template <class S>
 class Charge {
-  using Soc = model::Soc<S>;
+  using Soc = arithmetic::Soc<S>;
   using Scale = model::ChargeScale<S>;
 
  public:
@@ -43,7 +46,7 @@ class Charge {
 
   /// current_ua: not below -2^31 + 1; duration_us: at most longest_count_us.
   constexpr void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
-    uaus_ += model::wide_product(current_ua, static_cast<std::int32_t>(duration_us));
+    uaus_ += arithmetic::wide_product(current_ua, static_cast<std::int32_t>(duration_us));
     hold(scale);
   }
 
@@ -55,7 +58,7 @@ class Charge {
 
   constexpr Soc soc(const Scale& scale) const {
     const auto counts = static_cast<std::int32_t>(uaus_ >> scale.shift);
-    if constexpr (model::is_q<Soc>) {
+    if constexpr (arithmetic::is_q<Soc>) {
       return Soc::from_raw(counts) * scale.soc_per_count;
     } else {
       return static_cast<Soc>(counts) * scale.soc_per_count;
@@ -66,23 +69,28 @@ class Charge {
   static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
     const Soc most(model::most_soc);
     const Soc held = delta > most ? most : delta < -most ? -most : delta;
-    if constexpr (model::is_q<Soc>) {
+    if constexpr (arithmetic::is_q<Soc>) {
       return Soc(held * scale.counts_per_soc).raw();
     } else {
       return static_cast<std::int32_t>(held * scale.counts_per_soc + half_signed(held));
     }
   }
 
-  /// 1/2 with the sign of x. A builtin, because it takes the sign without a branch, which noise would mispredict every other time.
+  /// 1/2 with the sign of x. A builtin, because it takes the sign without a branch, which noise would mispredict every
+  /// other time.
   static constexpr Soc half_signed(Soc x) {
-    if constexpr (std::same_as<Soc, float>) return __builtin_copysignf(0.5F, x);
-    else return __builtin_copysign(0.5, x);
+    if constexpr (std::same_as<Soc, float>)
+      return __builtin_copysignf(0.5F, x);
+    else
+      return __builtin_copysign(0.5, x);
   }
 
   constexpr void hold(const Scale& scale) {
     // the upper half tells, to less than a five-thousandth of the smallest cell
-    const auto upper = static_cast<std::uint32_t>(uaus_ >> 32), lowest = static_cast<std::uint32_t>(scale.lowest_uaus >> 32);
-    if (upper - lowest < static_cast<std::uint32_t>(scale.highest_uaus >> 32) - lowest) [[likely]] return;
+    const auto upper = static_cast<std::uint32_t>(uaus_ >> 32),
+               lowest = static_cast<std::uint32_t>(scale.lowest_uaus >> 32);
+    if (upper - lowest < static_cast<std::uint32_t>(scale.highest_uaus >> 32) - lowest) [[likely]]
+      return;
     uaus_ = uaus_ < 0 ? scale.lowest_uaus : scale.highest_uaus;
   }
 
@@ -90,14 +98,14 @@ class Charge {
 };
 
 template <class S>
-  requires(!counts_in_integers<S>)
-class Charge<S> {
+requires(!counts_in_integers<S>) class Charge<S> {
   using Scale = model::ChargeScale<S>;
 
  public:
   void set(const S& soc, const Scale&) { soc_ = soc; }
   void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
-    soc_ += S(static_cast<double>(current_ua) * static_cast<double>(duration_us) / static_cast<double>(scale.capacity_uaus));
+    soc_ += S(static_cast<double>(current_ua) * static_cast<double>(duration_us) /
+              static_cast<double>(scale.capacity_uaus));
   }
   void correct(const S& delta, const Scale&) { soc_ += delta; }
   S soc(const Scale&) const { return soc_; }
@@ -106,4 +114,4 @@ class Charge<S> {
   S soc_{};
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

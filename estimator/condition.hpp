@@ -1,7 +1,9 @@
-// What a display, a vehicle and a workshop want to know beside an estimate: how soc is known, a soc that never jumps, what current can be
-// given and taken, what is left of capacity and resistance. One place that asks each of them with every sample.
+// What a display, a vehicle and a workshop want to know beside an estimate: how soc is known, a soc that never jumps,
+// what current can be given and taken, what is left of capacity and resistance. One place that asks each of them with
+// every sample.
 //
-// Cost: two look-ups of the tables a sample; the current limits, 64 steps of the model, once a second while anybody asks.
+// Cost: two look-ups of the tables a sample; the current limits, 64 steps of the model, once a second while anybody
+// asks.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +11,11 @@
 #include "estimator/current_limits.hpp"
 #include "estimator/display_soc.hpp"
 #include "estimator/health.hpp"
-#include "estimator/sample.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "estimator/soc_quality.hpp"
+#include "measurement/sample.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 template <class Estimator>
 class Condition {
@@ -23,17 +25,25 @@ class Condition {
 
   /// After the estimator's step with the same sample. limits_wanted: whether anybody asks for them.
   template <class Cell, class State>
-  constexpr void update(const Cell& cell, const Sample& sample, const Estimate<S>& estimate, const State& state, bool limits_wanted) {
+  constexpr void update(const Cell& cell, const measurement::Sample& sample, const Estimate<S>& estimate,
+                        const State& state, bool limits_wanted) {
     using namespace model;
     const std::uint32_t step_us = started_ ? since(sample.time_us) : 0;
     started_ = true;
     time_us_ = sample.time_us;
     const auto& laws = laws_of(cell);
     const auto& x = state.polarisation;
-    constexpr std::uint32_t unmeasured = current_missing | current_implausible, unread = voltage_missing | voltage_implausible | voltage_stuck | voltage_disbelieved | not_started;
-    const bool measured = (estimate.flags & unmeasured) == 0 && sample.current_ua != no_reading;
-    const Current<S> current_a = measured ? Current<S>(laws.true_current(Model::without_offset(from_micro<Current<S>>(sample.current_ua), x, cell.noise))) : Current<S>(0);
-    const Drive<S> drive{current_a, seconds<S>(step_us), temperature_possible(sample.temperature_cdegc) ? laws.true_temperature(from_centi<Temperature<S>>(sample.temperature_cdegc)) : Temperature<S>(25)};
+    constexpr std::uint32_t unmeasured = current_missing | current_implausible,
+                            unread = voltage_missing | voltage_implausible | voltage_stuck | voltage_disbelieved |
+                                     not_started;
+    const bool measured = (estimate.flags & unmeasured) == 0 && sample.current_ua != measurement::no_reading;
+    const Current<S> current_a = measured ? Current<S>(laws.true_current(Model::without_offset(
+                                                from_micro<Current<S>>(sample.current_ua), x, cell.noise)))
+                                          : Current<S>(0);
+    const Drive<S> drive{current_a, seconds<S>(step_us),
+                         measurement::temperature_possible(sample.temperature_cdegc)
+                             ? laws.true_temperature(from_centi<Temperature<S>>(sample.temperature_cdegc))
+                             : Temperature<S>(25)};
     const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, estimate.soc, interval_);
     const Rate<S> per_s = current_a * cell.limits.soc_per_as;
     const Soc<S> counted = drive.duration_s * per_s;
@@ -44,10 +54,12 @@ class Condition {
     if (limits_wanted && (!limited_ || sample.time_us - limited_us_ >= limits_every_us)) {
       limited_ = true;
       limited_us_ = sample.time_us;
-      const Voltage<S> margin_v = root<Voltage<S>>(at.error_v2), most_v = (cell.limits.voltage_max_v - cell.limits.voltage_min_v) * Fraction<S>(0.125);
+      const Voltage<S> margin_v = root<Voltage<S>>(at.error_v2),
+                       most_v = (cell.limits.voltage_max_v - cell.limits.voltage_min_v) * Fraction<S>(0.125);
       const Voltage<S> held_v = margin_v < most_v ? margin_v : most_v;
       const auto limits = [&](int duration_s) __attribute__((noinline)) {
-        return current_limits<Model>(cell, x, estimate.soc, estimate.soc_sigma, drive.temperature_c, TimeStep<S>(duration_s), held_v);
+        return current_limits<Model>(cell, x, estimate.soc, estimate.soc_sigma, drive.temperature_c,
+                                     TimeStep<S>(duration_s), held_v);
       };
       limits_now_ = limits(1);
       limits_10s_ = limits(10);
@@ -55,9 +67,9 @@ class Condition {
   }
 
   constexpr const typename SocQuality<S>::Now& quality() const { return now_; }
-  constexpr const model::Soc<S>& display_soc() const { return shown_; }
-  constexpr bool limits_known() const { return limited_; }  ///< whether they have been reckoned
-  constexpr const CurrentLimits<S>& limits_now() const { return limits_now_; }     ///< for a second
+  constexpr const arithmetic::Soc<S>& display_soc() const { return shown_; }
+  constexpr bool limits_known() const { return limited_; }                      ///< whether they have been reckoned
+  constexpr const CurrentLimits<S>& limits_now() const { return limits_now_; }  ///< for a second
   constexpr const CurrentLimits<S>& limits_10s() const { return limits_10s_; }
   constexpr Health<S> capacity() const { return capacity_.health(); }
   constexpr Health<S> resistance() const { return resistance_.health(); }
@@ -72,7 +84,9 @@ class Condition {
   }
 
   template <class Cell>
-  constexpr void see_health(const Cell& cell, const model::TablePoint<S>& at, const model::Drive<S>& drive, const Sample& sample, const Estimate<S>& estimate, const model::Soc<S>& counted, bool good) {
+  constexpr void see_health(const Cell& cell, const model::TablePoint<S>& at, const model::Drive<S>& drive,
+                            const measurement::Sample& sample, const Estimate<S>& estimate,
+                            const arithmetic::Soc<S>& counted, bool good) {
     using namespace model;
     Soc<S> off(0);
     Variance<S> told2(1);
@@ -81,20 +95,22 @@ class Condition {
       resistance_.see(innovation_v, Voltage<S>(at.r0_ohm * drive.current_a), cell.noise.voltage_v2);
       if (now_.observable) {
         const VoltagePerSoc<S> slope = ocv_slope<S>(at);
-        const Variance<S> doubt_v2 = Variance<S>(at.error_v2 + drop_doubt_v2<S>(at, drive.current_a, cell.noise.resistance_error));
+        const Variance<S> doubt_v2 =
+            Variance<S>(at.error_v2 + drop_doubt_v2<S>(at, drive.current_a, cell.noise.resistance_error));
         off = ratio<Soc<S>>(innovation_v, slope);
         told2 = ratio<Variance<S>>(ratio<Variance<S>>(doubt_v2, slope), slope);
       }
     } else {
       resistance_.interrupt();
     }
-    capacity_.see(estimate.soc, off, told2, good && now_.observable, counted, product<Variance<S>>(cell.noise.walk_soc2_per_s, drive.duration_s));
+    capacity_.see(estimate.soc, off, told2, good && now_.observable, counted,
+                  product<Variance<S>>(cell.noise.walk_soc2_per_s, drive.duration_s));
   }
 
   SocQuality<S> quality_;
   typename SocQuality<S>::Now now_;
   DisplaySoc<S> display_;
-  model::Soc<S> shown_{};
+  arithmetic::Soc<S> shown_{};
   CurrentLimits<S> limits_now_, limits_10s_;
   CapacityHealth<S> capacity_;
   ResistanceHealth<S> resistance_;
@@ -103,4 +119,4 @@ class Condition {
   bool started_ = false, limited_ = false;
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

@@ -1,15 +1,15 @@
 // Whether a current sensor reads nothing but its own offset: while the circuit is open, that is its reading.
 //
-// A reading rests when for a minute it stays within `still` of where it began and is small enough to be an offset. What may still flow
-// then, the cell file says (noise.current_at_rest_a: a cell tester's leakage, a vehicle's electronics beside an open contactor); where it
-// says 0, nobody knows, and small currents are believed as they are.
+// A reading rests when for a minute it stays within `still` of where it began and is small enough to be an offset. What
+// may still flow then, the cell file says (noise.current_at_rest_a: a cell tester's leakage, a vehicle's electronics
+// beside an open contactor); where it says 0, nobody knows, and small currents are believed as they are.
 #pragma once
 
 #include <cstdint>
 
 #include "model/cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 class CurrentAtRest {
  public:
@@ -19,7 +19,8 @@ class CurrentAtRest {
   /// With every measured current; true: it rests.
   constexpr bool rests(std::int32_t current_ua, std::uint64_t step_us, const model::RestingCurrent& limits) {
     const bool small = current_ua <= limits.largest_ua && current_ua >= -limits.largest_ua;
-    const bool still = small && for_us_ != 0 && current_ua - began_ua_ <= limits.still_ua && began_ua_ - current_ua <= limits.still_ua;
+    const bool still =
+        small && for_us_ != 0 && current_ua - began_ua_ <= limits.still_ua && began_ua_ - current_ua <= limits.still_ua;
     if (!still) {
       began_ua_ = current_ua;
       for_us_ = small ? 1 : 0;
@@ -35,4 +36,4 @@ class CurrentAtRest {
   std::uint32_t for_us_ = 0;  ///< 0: it moves
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

@@ -6,9 +6,9 @@
 #include <concepts>
 #include <cstdint>
 
-#include "model/scalar.hpp"
+#include "arithmetic/scalar.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 /// Why an estimate is worth less than usual; several at once are or-ed. Bits 0-7: the sample; 8-15: the estimator.
 enum Flag : std::uint32_t {
@@ -17,38 +17,41 @@ enum Flag : std::uint32_t {
   voltage_stuck = 1U << 2,        ///< the same reading while the model moves
   current_missing = 1U << 3,
   current_implausible = 1U << 4,
-  time_gap = 1U << 5,             ///< more than ten times the usual step: charge in between is uncertain
-  time_not_later = 1U << 6,       ///< the sample was ignored
-  not_started = 1U << 8,          ///< no usable voltage yet and no starting point
-  soc_unsettled = 1U << 9,        ///< more than one state of charge fits the voltages so far; soc_sigma spans them
-  voltage_disbelieved = 1U << 10, ///< far from all that the model can explain: not used; when it lasts, soc is sought anew
+  time_gap = 1U << 5,        ///< more than ten times the usual step: charge in between is uncertain
+  time_not_later = 1U << 6,  ///< the sample was ignored
+  not_started = 1U << 8,     ///< no usable voltage yet and no starting point
+  soc_unsettled = 1U << 9,   ///< more than one state of charge fits the voltages so far; soc_sigma spans them
+  voltage_disbelieved =
+      1U << 10,  ///< far from all that the model can explain: not used; when it lasts, soc is sought anew
 };
 
 template <class S>
 struct Estimate {
-  model::Soc<S> soc{};                         ///< fraction, after the correction by this sample's voltage
-  model::Soc<S> soc_sigma{};                   ///< its standard deviation
-  model::Voltage<S> v_rc_v{};                  ///< after the correction
-  model::Voltage<S> voltage_predicted_v{};     ///< before it: what the model expected of this sample
-  std::uint32_t flags = 0;                     ///< Flag
+  arithmetic::Soc<S> soc{};                      ///< fraction, after the correction by this sample's voltage
+  arithmetic::Soc<S> soc_sigma{};                ///< its standard deviation
+  arithmetic::Voltage<S> v_rc_v{};               ///< after the correction
+  arithmetic::Voltage<S> voltage_predicted_v{};  ///< before it: what the model expected of this sample
+  std::uint32_t flags = 0;                       ///< Flag
 };
 
-/// The same with what the filter of an extended cell knows besides (model/extended_rc.hpp), after the correction: where errors are states,
-/// the voltage's [V], the current's offset [part of the capacity per hour] and its standard deviation; then the mechanisms' states.
+/// The same with what the filter of an extended cell knows besides (model/extended_rc.hpp), after the correction: where
+/// errors are states, the voltage's [V], the current's offset [part of the capacity per hour] and its standard
+/// deviation; then the mechanisms' states.
 template <class S, std::size_t N>
 struct ExtendedEstimate : Estimate<S> {
-  std::array<model::Voltage<S>, N> further{};
+  std::array<arithmetic::Voltage<S>, N> further{};
 };
 
 /// Number of 32-bit words of an estimate, and their names in that order: the unit of comparison between host and board.
 inline constexpr std::size_t estimate_words = 5;
-inline constexpr std::array<const char*, estimate_words> estimate_word_names = {"soc", "soc_sigma", "v_rc_v", "voltage_predicted_v", "flags"};
+inline constexpr std::array<const char*, estimate_words> estimate_word_names = {"soc", "soc_sigma", "v_rc_v",
+                                                                                "voltage_predicted_v", "flags"};
 using EstimateWords = std::array<std::uint32_t, estimate_words>;
 
 /// One number of an estimate as the bits that both sides must share.
 template <class T>
 constexpr std::uint32_t word(const T& value) {
-  if constexpr (model::is_q<T>) {
+  if constexpr (arithmetic::is_q<T>) {
     return static_cast<std::uint32_t>(value.raw());
   } else {
     static_assert(std::same_as<T, float>, "a board computes in float or in fixed point");
@@ -71,8 +74,8 @@ constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEsti
   return all;
 }
 
-/// A number for all estimates of a run: two runs that agree in it were equal in every bit. FNV-1a, 32 bits, over the words, low byte first
-/// (G. Fowler, L. Noll, K. Vo, draft-eastlake-fnv).
+/// A number for all estimates of a run: two runs that agree in it were equal in every bit. FNV-1a, 32 bits, over the
+/// words, low byte first (G. Fowler, L. Noll, K. Vo, draft-eastlake-fnv).
 class EstimateHash {
  public:
   template <std::size_t N>
@@ -87,4 +90,4 @@ class EstimateHash {
   std::uint32_t value_ = 2'166'136'261U;
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

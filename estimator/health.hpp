@@ -1,59 +1,67 @@
-// State of health from ordinary use: what capacity and resistances are now, against the cell file, each with a standard deviation.
+// State of health from ordinary use: what capacity and resistances are now, against the cell file, each with a standard
+// deviation.
 //
-//   capacity     between two visits to parts of the OCV curve that are steep, the counted charge over the difference of soc that the
+//   capacity     between two visits to parts of the OCV curve that are steep, the counted charge over the difference of
+//   soc that the
 //                voltage told there: moved / (soc_b - soc_a). What counting may have lost meanwhile widens it.
-//   resistances  at edges of the current, what the voltage moved more than the model said, over what the model said falls off over
+//   resistances  at edges of the current, what the voltage moved more than the model said, over what the model said
+//   falls off over
 //                R0 and what R1 has charged up to: (e_k - e_k-1) / (drop_k - drop_k-1)
 //
-// Each is a random constant that a scalar Kalman filter narrows; no more than a floor, because errors of the tables last.
+// Each is a random constant that a scalar Kalman filter narrows; no more than a floor, because errors of the tables
+// last.
 #pragma once
 
 #include <cstdint>
 
-#include "model/scalar.hpp"
+#include "arithmetic/scalar.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 /// Against the cell file: 1 is as new.
 template <class S>
 struct Health {
-  model::Factor<S> ratio{1};
-  model::Soc<S> sigma{};
+  arithmetic::Factor<S> ratio{1};
+  arithmetic::Soc<S> sigma{};
 };
 
 template <class S>
 class CapacityHealth {
-  using Soc = model::Soc<S>;
-  using Variance = model::Variance<S>;
-  using Fraction = model::Fraction<S>;
+  using Soc = arithmetic::Soc<S>;
+  using Variance = arithmetic::Variance<S>;
+  using Fraction = arithmetic::Fraction<S>;
 
  public:
-  static constexpr double unknown = 0.1;         ///< one sigma of a cell nobody has measured
+  static constexpr double unknown = 0.1;  ///< one sigma of a cell nobody has measured
   static constexpr double floor = 0.003;
   static constexpr double known_soc = 0.02;      ///< voltages that tell soc no better are left out
   static constexpr double least_moved = 0.3;     ///< of the capacity, between two visits
   static constexpr double longest_visit = 0.05;  ///< of the capacity
   static constexpr std::uint16_t least_readings = 10;
 
-  /// One reading. soc: as estimated; off: by how much its voltage alone says otherwise, along the slope there; variance: of that; usable:
-  /// whether it may be asked; counted: how far the charge moved soc since the last call, lost2: variance of that.
-  constexpr void see(const Soc& soc, const Soc& off, const Variance& variance, bool usable, const Soc& counted, const Variance& lost2) {
+  /// One reading. soc: as estimated; off: by how much its voltage alone says otherwise, along the slope there;
+  /// variance: of that; usable: whether it may be asked; counted: how far the charge moved soc since the last call,
+  /// lost2: variance of that.
+  constexpr void see(const Soc& soc, const Soc& off, const Variance& variance, bool usable, const Soc& counted,
+                     const Variance& lost2) {
     moved_ = Soc(moved_ + counted);
     if (reference_.readings > 0) reference_.variance = Variance(reference_.variance + lost2);
     // farther away the slope is another
-    const bool good = usable && variance < Variance(known_soc * known_soc) && model::magnitude(off) < Soc(known_soc);
+    const bool good =
+        usable && variance < Variance(known_soc * known_soc) && arithmetic::magnitude(off) < Soc(known_soc);
     const Soc told = Soc(soc + off);
-    if (here_.readings > 0 && (!good || model::magnitude(Soc(moved_ - begun_)) > Soc(longest_visit))) leave();
+    if (here_.readings > 0 && (!good || arithmetic::magnitude(Soc(moved_ - begun_)) > Soc(longest_visit))) leave();
     if (!good) return;
     if (here_.readings == 0) begun_ = moved_;
     if (here_.readings < 0x7FFF) ++here_.readings;
-    const Fraction share = model::ratio<Fraction>(model::Count<S>(1), model::Count<S>(here_.readings));
+    const Fraction share = arithmetic::ratio<Fraction>(arithmetic::Count<S>(1), arithmetic::Count<S>(here_.readings));
     here_.told = Soc(here_.told + Soc(told - here_.told) * share);
     here_.moved = Soc(here_.moved + Soc(moved_ - here_.moved) * share);
-    here_.variance = Variance(here_.variance + model::product<Variance>(Variance(variance - here_.variance), share));
+    here_.variance =
+        Variance(here_.variance + arithmetic::product<Variance>(Variance(variance - here_.variance), share));
   }
 
-  constexpr Health<S> health() const { return {ratio_, model::root<Soc>(variance_)}; }
+  constexpr Health<S> health() const { return {ratio_, arithmetic::root<Soc>(variance_)}; }
 
  private:
   struct Visit {
@@ -68,16 +76,17 @@ class CapacityHealth {
     if (visit.readings < least_readings) return;
     if (reference_.readings == 0) return refer_to(visit);
     const Soc moved = Soc(visit.moved - reference_.moved), apart = Soc(visit.told - reference_.told);
-    if (model::magnitude(moved) < Soc(least_moved) || model::magnitude(apart) < Soc(least_moved / 2)) {
+    if (arithmetic::magnitude(moved) < Soc(least_moved) || arithmetic::magnitude(apart) < Soc(least_moved / 2)) {
       if (visit.variance < reference_.variance) refer_to(visit);
       return;
     }
-    const auto seen = model::ratio<model::Factor<S>>(moved, apart);
-    const auto relative = model::ratio<Fraction>(Variance(visit.variance + reference_.variance), Variance(apart * apart));
-    const Variance seen2 = model::product<Variance>(Variance(seen * seen), relative);
-    const auto gain = model::ratio<Fraction>(variance_, Variance(variance_ + seen2));
-    ratio_ = model::Factor<S>(ratio_ + model::Factor<S>(seen - ratio_) * gain);
-    variance_ = Variance(variance_ - model::product<Variance>(variance_, gain));
+    const auto seen = arithmetic::ratio<arithmetic::Factor<S>>(moved, apart);
+    const auto relative =
+        arithmetic::ratio<Fraction>(Variance(visit.variance + reference_.variance), Variance(apart * apart));
+    const Variance seen2 = arithmetic::product<Variance>(Variance(seen * seen), relative);
+    const auto gain = arithmetic::ratio<Fraction>(variance_, Variance(variance_ + seen2));
+    ratio_ = arithmetic::Factor<S>(ratio_ + arithmetic::Factor<S>(seen - ratio_) * gain);
+    variance_ = Variance(variance_ - arithmetic::product<Variance>(variance_, gain));
     const auto least = Variance(floor * floor);
     if (variance_ < least) variance_ = least;
     refer_to(visit);
@@ -92,52 +101,54 @@ class CapacityHealth {
 
   Visit here_, reference_;
   Soc moved_{}, begun_{};
-  model::Factor<S> ratio_{1};
+  arithmetic::Factor<S> ratio_{1};
   Variance variance_ = Variance(unknown * unknown);
 };
 
 template <class S>
 class ResistanceHealth {
-  using Voltage = model::Voltage<S>;
-  using Variance = model::Variance<S>;
-  using Fraction = model::Fraction<S>;
-  using Soc = model::Soc<S>;
+  using Voltage = arithmetic::Voltage<S>;
+  using Variance = arithmetic::Variance<S>;
+  using Fraction = arithmetic::Fraction<S>;
+  using Soc = arithmetic::Soc<S>;
 
  public:
-  static constexpr double unknown = 0.3;       ///< one sigma
+  static constexpr double unknown = 0.3;  ///< one sigma
   static constexpr double floor = 0.01;
-  static constexpr double of_an_edge = 0.05;   ///< what the tables are wrong by at any one soc and temperature
+  static constexpr double of_an_edge = 0.05;  ///< what the tables are wrong by at any one soc and temperature
   static constexpr double least_edge_v = 0.003;
 
-  /// A reading one step after the last one. innovation_v: measured less predicted; drop_v: what falls off over R0 and what of R1's has
-  /// built up within the step, as the model has it; reading_v2: variance of a reading.
+  /// A reading one step after the last one. innovation_v: measured less predicted; drop_v: what falls off over R0 and
+  /// what of R1's has built up within the step, as the model has it; reading_v2: variance of a reading.
   constexpr void see(const Voltage& innovation_v, const Voltage& drop_v, const Variance& reading_v2) {
     const Voltage more_v = innovation_v - innovation_v_, edge_v = drop_v - drop_v_;
-    const bool edge = follows_ && model::magnitude(edge_v) > Voltage(least_edge_v);
+    const bool edge = follows_ && arithmetic::magnitude(edge_v) > Voltage(least_edge_v);
     innovation_v_ = innovation_v;
     drop_v_ = drop_v;
     follows_ = true;
     if (!edge) return;
-    const auto seen = model::ratio<model::Factor<S>>(more_v, edge_v);
+    const auto seen = arithmetic::ratio<arithmetic::Factor<S>>(more_v, edge_v);
     const auto tables = Variance(of_an_edge * of_an_edge);
     const Variance edge_v2 = edge_v * edge_v;
-    const Variance seen2 = Variance(tables + model::ratio<Variance>(Variance(reading_v2 + reading_v2), edge_v2));
-    const auto gain = model::ratio<Fraction>(variance_, Variance(variance_ + seen2));
-    more_ = model::Factor<S>(more_ + model::Factor<S>(seen - more_) * gain);
-    variance_ = Variance(variance_ - model::product<Variance>(variance_, gain));
+    const Variance seen2 = Variance(tables + arithmetic::ratio<Variance>(Variance(reading_v2 + reading_v2), edge_v2));
+    const auto gain = arithmetic::ratio<Fraction>(variance_, Variance(variance_ + seen2));
+    more_ = arithmetic::Factor<S>(more_ + arithmetic::Factor<S>(seen - more_) * gain);
+    variance_ = Variance(variance_ - arithmetic::product<Variance>(variance_, gain));
     const auto least = Variance(floor * floor);
     if (variance_ < least) variance_ = least;
   }
   /// The next reading does not follow the last one: a gap, or no voltage.
   constexpr void interrupt() { follows_ = false; }
 
-  constexpr Health<S> health() const { return {model::Factor<S>(model::Factor<S>(1) + more_), model::root<Soc>(variance_)}; }
+  constexpr Health<S> health() const {
+    return {arithmetic::Factor<S>(arithmetic::Factor<S>(1) + more_), arithmetic::root<Soc>(variance_)};
+  }
 
  private:
   Voltage innovation_v_{}, drop_v_{};
-  model::Factor<S> more_{0};
+  arithmetic::Factor<S> more_{0};
   Variance variance_ = Variance(unknown * unknown);
   bool follows_ = false;
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

@@ -1,21 +1,24 @@
-// Decides what of a sample may be believed. Costs the filter nothing but a flag: a reading that fails is left out, not mended.
+// Decides what of a sample may be believed. Costs the filter nothing but a flag: a reading that fails is left out, not
+// mended.
 //
-//   missing       no_reading
+//   missing       measurement::no_reading
 //   implausible   outside what the cell and its sensor can have (model::Plausible)
-//   stuck         the same voltage to the last digit for `stuck_after` samples while the drop over R0 moved by `stuck_move_v`;
+//   stuck         the same voltage to the last digit for `stuck_after` samples while the drop over R0 moved by
+//   `stuck_move_v`;
 //                 believed again when it changes
 //   gap           a step more than `gap_factor` times the usual one
 //
-// A current that is left out is replaced by the last one believed, and its uncertainty by the cell file's current_unknown_a.
+// A current that is left out is replaced by the last one believed, and its uncertainty by the cell file's
+// current_unknown_a.
 #pragma once
 
 #include <cstdint>
 
 #include "estimator/estimate.hpp"
-#include "estimator/sample.hpp"
+#include "measurement/sample.hpp"
 #include "model/cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 /// A current to count with, and whether it was measured.
 struct BelievedCurrent {
@@ -35,12 +38,13 @@ class InputCheck {
       current_ua_ = current_ua;
       return {current_ua, true};
     }
-    flags |= current_ua == no_reading ? current_missing : current_implausible;
+    flags |= current_ua == measurement::no_reading ? current_missing : current_implausible;
     return {current_ua_, false};
   }
 
   /// drop_v: R0 times the present current, which a live reading follows.
-  constexpr bool voltage_usable(std::int32_t voltage_uv, const model::Voltage<S>& drop_v, const model::Plausible& plausible, std::uint32_t& flags) {
+  constexpr bool voltage_usable(std::int32_t voltage_uv, const arithmetic::Voltage<S>& drop_v,
+                                const model::Plausible& plausible, std::uint32_t& flags) {
     if (!voltage_present(voltage_uv, plausible, flags)) return false;
     if (voltage_uv != voltage_uv_) {
       voltage_uv_ = voltage_uv;
@@ -52,16 +56,18 @@ class InputCheck {
       ++repeats_;
       return true;
     }
-    const model::Voltage<S> moved_v = drop_v - drop_then_v_;
-    const auto limit_v = model::Voltage<S>(stuck_move_v);
+    const arithmetic::Voltage<S> moved_v = drop_v - drop_then_v_;
+    const auto limit_v = arithmetic::Voltage<S>(stuck_move_v);
     if (moved_v > limit_v || moved_v < -limit_v) repeats_ = stuck;
     if (repeats_ == stuck) flags |= voltage_stuck;
     return repeats_ != stuck;
   }
 
-  static constexpr bool voltage_present(std::int32_t voltage_uv, const model::Plausible& plausible, std::uint32_t& flags) {
-    if (within(voltage_uv, plausible.voltage_min_uv, plausible.voltage_max_uv)) [[likely]] return true;
-    flags |= voltage_uv == no_reading ? voltage_missing : voltage_implausible;
+  static constexpr bool voltage_present(std::int32_t voltage_uv, const model::Plausible& plausible,
+                                        std::uint32_t& flags) {
+    if (within(voltage_uv, plausible.voltage_min_uv, plausible.voltage_max_uv)) [[likely]]
+      return true;
+    flags |= voltage_uv == measurement::no_reading ? voltage_missing : voltage_implausible;
     return false;
   }
 
@@ -73,9 +79,12 @@ class InputCheck {
     }
     const bool gap = step_us / gap_factor > usual_step_us_;
     // drifts towards what comes; steps that stay long become usual after a while
-    if (gap) usual_step_us_ += usual_step_us_ / 4 + 1;
-    else if (step_us > usual_step_us_) usual_step_us_ += (step_us - usual_step_us_) / 8;
-    else usual_step_us_ -= (usual_step_us_ - step_us) / 8;
+    if (gap)
+      usual_step_us_ += usual_step_us_ / 4 + 1;
+    else if (step_us > usual_step_us_)
+      usual_step_us_ += (step_us - usual_step_us_) / 8;
+    else
+      usual_step_us_ -= (usual_step_us_ - step_us) / 8;
     if (gap) flags |= time_gap;
     return gap;
   }
@@ -84,14 +93,15 @@ class InputCheck {
   static constexpr std::uint8_t stuck = 0xFF;
 
   static constexpr bool within(std::int32_t value, std::int32_t low, std::int32_t high) {
-    return static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(low) <= static_cast<std::uint32_t>(high) - static_cast<std::uint32_t>(low);
+    return static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(low) <=
+           static_cast<std::uint32_t>(high) - static_cast<std::uint32_t>(low);
   }
 
   std::uint32_t usual_step_us_ = 0;
   std::int32_t current_ua_ = 0;
-  std::int32_t voltage_uv_ = no_reading;
-  model::Voltage<S> drop_then_v_{};
+  std::int32_t voltage_uv_ = measurement::no_reading;
+  arithmetic::Voltage<S> drop_then_v_{};
   std::uint8_t repeats_ = 0;  // of the same voltage; or `stuck`
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

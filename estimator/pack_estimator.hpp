@@ -1,11 +1,12 @@
-// The cells of a pack: one full estimator follows their mean, and what makes each another is estimated beside it (cell_differences.hpp).
+// The cells of a pack: one full estimator follows their mean, and what makes each another is estimated beside it
+// (cell_differences.hpp).
 //
-//   const Sample mean = mean_cell(sample, cell.plausible);     what the estimator of the mean cell is given: integers, the same everywhere
-//   cells.update(cell, sample, estimate);                      after its step
+//   const measurement::Sample mean = mean_cell(sample, cell.plausible);     what the estimator of the mean cell is
+//   given: integers, the same everywhere cells.update(cell, sample, estimate);                      after its step
 //
-// A cell whose reading cannot be one does not count, nor does one that is far from the middle one (a broken wire, a converter that is
-// stuck); one that is off counts as if it were 0.1 V off, so that no cell alone moves the mean by much. Where no cell can be read, the pack's own
-// voltage over their number stands in.
+// A cell whose reading cannot be one does not count, nor does one that is far from the middle one (a broken wire, a
+// converter that is stuck); one that is off counts as if it were 0.1 V off, so that no cell alone moves the mean by
+// much. Where no cell can be read, the pack's own voltage over their number stands in.
 #pragma once
 
 #include <array>
@@ -14,18 +15,20 @@
 
 #include "estimator/cell_differences.hpp"
 #include "estimator/estimate.hpp"
-#include "estimator/pack_sample.hpp"
+#include "measurement/pack_sample.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
-constexpr bool readable(std::int32_t uv, const model::Plausible& plausible) { return uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv; }
+constexpr bool readable(std::int32_t uv, const model::Plausible& plausible) {
+  return uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv;
+}
 
-inline constexpr std::int32_t far_off_uv = 300'000;    ///< from the middle cell: no cell of the same pack
+inline constexpr std::int32_t far_off_uv = 300'000;      ///< from the middle cell: no cell of the same pack
 inline constexpr std::int32_t counted_off_uv = 100'000;  ///< as much of it counts
 
-/// The middle one of those that can be read; of an even number, the lower. no_reading: there is none.
+/// The middle one of those that can be read; of an even number, the lower. measurement::no_reading: there is none.
 template <std::size_t Cells>
-constexpr std::int32_t middle_cell_uv(const PackSample<Cells>& pack, const model::Plausible& plausible) {
+constexpr std::int32_t middle_cell_uv(const measurement::PackSample<Cells>& pack, const model::Plausible& plausible) {
   std::array<std::int32_t, Cells> sorted{};
   std::size_t count = 0;
   for (const std::int32_t uv : pack.cell_uv) {
@@ -34,33 +37,39 @@ constexpr std::int32_t middle_cell_uv(const PackSample<Cells>& pack, const model
     for (; k > 0 && sorted[k - 1] > uv; --k) sorted[k] = sorted[k - 1];
     sorted[k] = uv;
   }
-  return count > 0 ? sorted[(count - 1) / 2] : no_reading;
+  return count > 0 ? sorted[(count - 1) / 2] : measurement::no_reading;
 }
 
 template <std::size_t Cells>
-constexpr Sample mean_cell(const PackSample<Cells>& pack, const model::Plausible& plausible) {
-  Sample mean{pack.time_us, pack.current_ua, no_reading, no_temperature};
-  std::int32_t sum_uv = 0, cells = 0, sum_cdegc = 0, sensors = 0;  // plausible is below 6 V: 16 of them are far from the end
+constexpr measurement::Sample mean_cell(const measurement::PackSample<Cells>& pack, const model::Plausible& plausible) {
+  measurement::Sample mean{pack.time_us, pack.current_ua, measurement::no_reading, measurement::no_temperature};
+  std::int32_t sum_uv = 0, cells = 0, sum_cdegc = 0,
+               sensors = 0;  // plausible is below 6 V: 16 of them are far from the end
   const std::int32_t middle_uv = middle_cell_uv(pack, plausible);
   for (const std::int32_t uv : pack.cell_uv) {
     const std::int32_t off_uv = readable(uv, plausible) ? uv - middle_uv : far_off_uv;
     if (off_uv >= far_off_uv || off_uv <= -far_off_uv) continue;
-    sum_uv += middle_uv + (off_uv > counted_off_uv ? counted_off_uv : off_uv < -counted_off_uv ? -counted_off_uv : off_uv);
+    sum_uv += middle_uv + (off_uv > counted_off_uv    ? counted_off_uv
+                           : off_uv < -counted_off_uv ? -counted_off_uv
+                                                      : off_uv);
     ++cells;
   }
   for (const std::int16_t cdegc : pack.temperature_cdegc) {
-    if (temperature_possible(cdegc)) sum_cdegc += cdegc, ++sensors;
+    if (measurement::temperature_possible(cdegc)) sum_cdegc += cdegc, ++sensors;
   }
-  if (cells > 0) mean.voltage_uv = sum_uv / cells;
-  else if constexpr (Cells == 1) mean.voltage_uv = pack.cell_uv[0];  // the estimator says what is wrong with it
-  else if (pack.pack_uv != no_reading) mean.voltage_uv = pack.pack_uv / static_cast<std::int32_t>(Cells);
+  if (cells > 0)
+    mean.voltage_uv = sum_uv / cells;
+  else if constexpr (Cells == 1)
+    mean.voltage_uv = pack.cell_uv[0];  // the estimator says what is wrong with it
+  else if (pack.pack_uv != measurement::no_reading)
+    mean.voltage_uv = pack.pack_uv / static_cast<std::int32_t>(Cells);
   if (sensors > 0) mean.temperature_cdegc = static_cast<std::int16_t>(sum_cdegc / sensors);
   return mean;
 }
 
 /// A pack of one cell as it is measured without a monitor.
-constexpr PackSample<1> pack_of(const Sample& s) {
-  PackSample<1> pack;
+constexpr measurement::PackSample<1> pack_of(const measurement::Sample& s) {
+  measurement::PackSample<1> pack;
   pack.time_us = s.time_us;
   pack.current_ua = s.current_ua;
   pack.pack_uv = s.voltage_uv;
@@ -74,7 +83,7 @@ class PackCells {
  public:
   /// After the mean cell's step with the same sample.
   template <class Cell>
-  constexpr void update(const Cell& cell, const PackSample<Cells>& pack, const Estimate<S>& mean) {
+  constexpr void update(const Cell& cell, const measurement::PackSample<Cells>& pack, const Estimate<S>& mean) {
     using namespace model;
     if ((mean.flags & (not_started | time_not_later)) != 0) return;
     const std::uint64_t step_us = pack.time_us - time_us_;
@@ -91,13 +100,18 @@ class PackCells {
       if (seen.usable[k]) seen.voltage_v[k] = from_micro<Voltage<S>>(pack.cell_uv[k]);
     }
     constexpr std::uint32_t unmeasured = current_missing | current_implausible;
-    const Current<S> current_a = (mean.flags & unmeasured) == 0 ? from_micro<Current<S>>(pack.current_ua) : Current<S>(0);
-    const auto shared_by = ratio<Count<S>>(cell.noise.model_correlation_s, seconds<S>(static_cast<std::uint32_t>(step_us)));
-    differences_.step(cell, mean.soc, mean.soc_sigma, current_a, moved, shared_by > Count<S>(1) ? shared_by : Count<S>(1), seen);
+    const Current<S> current_a =
+        (mean.flags & unmeasured) == 0 ? from_micro<Current<S>>(pack.current_ua) : Current<S>(0);
+    const auto shared_by =
+        ratio<Count<S>>(cell.noise.model_correlation_s, seconds<S>(static_cast<std::uint32_t>(step_us)));
+    differences_.step(cell, mean.soc, mean.soc_sigma, current_a, moved,
+                      shared_by > Count<S>(1) ? shared_by : Count<S>(1), seen);
   }
 
   /// What is known of a cell from before: soc less the mean's, and how far to believe it.
-  constexpr void begin(std::size_t k, const model::Soc<S>& soc, const model::Soc<S>& sigma) { differences_.begin(k, soc, sigma); }
+  constexpr void begin(std::size_t k, const arithmetic::Soc<S>& soc, const arithmetic::Soc<S>& sigma) {
+    differences_.begin(k, soc, sigma);
+  }
 
   constexpr const CellDifference<S>& operator[](std::size_t k) const { return differences_[k]; }
 
@@ -105,9 +119,9 @@ class PackCells {
   static constexpr std::uint64_t longest_step_us = 4'000'000'000;
 
   CellDifferences<S, Cells> differences_;
-  model::Soc<S> soc_{};
+  arithmetic::Soc<S> soc_{};
   std::uint64_t time_us_ = 0;
   bool started_ = false;
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

@@ -3,18 +3,21 @@
 //   predict   charge counted in integers, other states by the model's exact step, covariance by its analytic transition
 //   correct   by the voltage, if it may be believed; otherwise the prediction stands and sigma grows
 //
-// One body for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states). The laws of the
-// mechanisms come with the cell; where it has none, nothing of them is left.
-// No heap, no exceptions, no libm but sqrt, no clock: the same samples give the same bits on every core (float and
-// fixed point; compile with -ffp-contract=off).
+// One body for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states). The laws of
+// the mechanisms come with the cell; where it has none, nothing of them is left. No heap, no exceptions, no libm but
+// sqrt, no clock: the same samples give the same bits on every core (float and fixed point; compile with
+// -ffp-contract=off).
 //
-// Voltage noise: a reading's own noise is new in every sample, the model's error is not. One that lasts for T seconds counts once
-// per T: at a step dt its variance is taken T / dt times. It is larger where the OCV is steep (the soc axis of its table is good to
-// tolerance.initial_soc) and under current (R0 and R1 are good to tolerance.resistance_fraction).
+// Voltage noise: a reading's own noise is new in every sample, the model's error is not. One that lasts for T seconds
+// counts once per T: at a step dt its variance is taken T / dt times. It is larger where the OCV is steep (the soc axis
+// of its table is good to tolerance.initial_soc) and under current (R0 and R1 are good to
+// tolerance.resistance_fraction).
 //
-// While soc is not known to 3 %, a bank of hypotheses keeps it (soc_bank.hpp): a line through the OCV curve would be sure of one.
+// While soc is not known to 3 %, a bank of hypotheses keeps it (soc_bank.hpp): a line through the OCV curve would be
+// sure of one.
 //
-// Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost in instructions: estimator/README.md.
+// Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost in instructions:
+// estimator/README.md.
 #pragma once
 
 #include <array>
@@ -25,15 +28,15 @@
 #include "estimator/current_at_rest.hpp"
 #include "estimator/estimate.hpp"
 #include "estimator/input_check.hpp"
-#include "estimator/sample.hpp"
 #include "estimator/soc_bank.hpp"
 #include "estimator/start.hpp"
 #include "estimator/ud_covariance.hpp"
 #include "estimator/voltage_doubt.hpp"
+#include "measurement/sample.hpp"
 #include "model/extended_rc.hpp"
 #include "model/fixed_ranges.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 /// What is remembered of one cell from sample to sample.
 template <class S, template <class> class Model>
@@ -55,11 +58,11 @@ class SocEstimator {
   constexpr SocEstimator() = default;
 
   /// Begins at a known state of charge instead of one read from the first voltage.
-  constexpr explicit SocEstimator(const StartingPoint& from) : from_{from}, has_start_{true} {}
+  constexpr explicit SocEstimator(const measurement::StartingPoint& from) : from_{from}, has_start_{true} {}
 
   /// The only call. cell: prepared for S, the same in every call.
   template <class Cell>
-  constexpr Result step(const Cell& cell, const Sample& sample) {
+  constexpr Result step(const Cell& cell, const measurement::Sample& sample) {
     if (!started_) return start(cell, sample);
     if (sample.time_us <= time_us_) return unchanged(cell, time_not_later);
 
@@ -68,9 +71,12 @@ class SocEstimator {
     time_us_ = sample.time_us;
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, flags);
     if (step_us != paced_us_) change_pace(cell, step_us, flags);
-    if (sample.temperature_cdegc >> 8 != heeded_) [[unlikely]] heed_temperature(cell, sample.temperature_cdegc);
+    if (sample.temperature_cdegc >> 8 != heeded_) [[unlikely]]
+      heed_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
-    const Drive drive{laws.true_current(Model::without_offset(model::from_micro<Current>(current.ua), state_.polarisation, cell.noise)), duration_s_, temperature(laws, sample)};
+    const Drive drive{laws.true_current(Model::without_offset(arithmetic::from_micro<Current>(current.ua),
+                                                              state_.polarisation, cell.noise)),
+                      duration_s_, temperature(laws, sample)};
     count_charge(cell, counted_ua(laws, drive, current.ua), step_us);
 
     const Soc soc = state_.charge.soc(cell.charge);
@@ -83,18 +89,20 @@ class SocEstimator {
       const bool measured = (flags & (current_missing | current_implausible)) == 0;
       noise[Model::soc] = Variance(soc_noise_ + unknown_charge(cell, measured ? Current(0) : drive.current_a));
       if (!measured) {  // what drops over the resistances is not known then
-        const Voltage unknown_v = settled_drop_v<S>(at, Current(model::magnitude(drive.current_a) + cell.noise.unknown_a));
+        const Voltage unknown_v =
+            settled_drop_v<S>(at, Current(arithmetic::magnitude(drive.current_a) + cell.noise.unknown_a));
         noise[0] = Variance(noise[0] + unknown_v * unknown_v);
       }
     }
-    if constexpr (Model::errors_are_states) noise[Model::soc] = Variance(noise[Model::soc] + doubt_of_gain(Soc(soc - since_anchor_.soc), cell.noise.gain));
+    if constexpr (Model::errors_are_states)
+      noise[Model::soc] = Variance(noise[Model::soc] + doubt_of_gain(Soc(soc - since_anchor_.soc), cell.noise.gain));
     state_.covariance.propagate(Model::transition(state_.polarisation, at, settling, drive), noise);
     state_.polarisation = Model::advance(state_.polarisation, at, settling, drive);
 
     const Voltage predicted_v = Model::voltage(laws, state_.polarisation, at, drive);
     if constexpr (Model::errors_are_states) weigh_rest(cell, current, step_us);
     if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * drive.current_a), cell.plausible, flags)) {
-      const Voltage innovation_v = model::from_micro<Voltage>(sample.voltage_uv) - predicted_v;
+      const Voltage innovation_v = arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v;
       correct(cell, at, drive, soc, innovation_v, flags);
     }
     Result estimate;
@@ -111,31 +119,32 @@ class SocEstimator {
 
  private:
   using Drive = model::Drive<S>;
-  using Soc = model::Soc<S>;
-  using Voltage = model::Voltage<S>;
-  using Current = model::Current<S>;
-  using Variance = model::Variance<S>;
-  using Fraction = model::Fraction<S>;
-  using TimeStep = model::TimeStep<S>;
-  using Count = model::Count<S>;
-  using Coupling = model::Coupling<S>;
+  using Soc = arithmetic::Soc<S>;
+  using Voltage = arithmetic::Voltage<S>;
+  using Current = arithmetic::Current<S>;
+  using Variance = arithmetic::Variance<S>;
+  using Fraction = arithmetic::Fraction<S>;
+  using TimeStep = arithmetic::TimeStep<S>;
+  using Count = arithmetic::Count<S>;
+  using Coupling = arithmetic::Coupling<S>;
 
-  static constexpr std::uint32_t longest_step_us = 4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
+  static constexpr std::uint32_t longest_step_us =
+      4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
   static constexpr std::int16_t reference_cdegc = 2'500;
-  static constexpr int longest_gap_counts = 1'000;                   // 23 days; nothing is known after that
+  static constexpr int longest_gap_counts = 1'000;  // 23 days; nothing is known after that
 
   /// Current that ends as charge. Without a law that makes another of it, the reading itself.
   template <class Laws>
   static constexpr std::int32_t counted_ua(const Laws& laws, const Drive& drive, std::int32_t read_ua) {
-    return Model::errors_are_states || laws.changes_charge() ? model::to_micro(laws.counted(drive)) : read_ua;
+    return Model::errors_are_states || laws.changes_charge() ? arithmetic::to_micro(laws.counted(drive)) : read_ua;
   }
 
   /// The last one that can be, 25 degrees C at first.
   template <class Laws>
-  constexpr model::Temperature<S> temperature(const Laws& laws, const Sample& sample) {
-    if constexpr (std::same_as<Laws, model::LawSet<S>>) return model::Temperature<S>(25);  // nobody asks
-    if (temperature_possible(sample.temperature_cdegc)) temperature_cdegc_ = sample.temperature_cdegc;
-    return laws.true_temperature(model::from_centi<model::Temperature<S>>(temperature_cdegc_));
+  constexpr arithmetic::Temperature<S> temperature(const Laws& laws, const measurement::Sample& sample) {
+    if constexpr (std::same_as<Laws, model::LawSet<S>>) return arithmetic::Temperature<S>(25);  // nobody asks
+    if (measurement::temperature_possible(sample.temperature_cdegc)) temperature_cdegc_ = sample.temperature_cdegc;
+    return laws.true_temperature(arithmetic::from_centi<arithmetic::Temperature<S>>(temperature_cdegc_));
   }
 
   template <class Cell>
@@ -156,48 +165,59 @@ class SocEstimator {
     paced_us_ = step_us;
     const std::uint32_t capped_us = step_us < longest_step_us ? static_cast<std::uint32_t>(step_us) : longest_step_us;
     check_.gap(capped_us, flags);
-    duration_s_ = model::seconds<S>(capped_us);
+    duration_s_ = arithmetic::seconds<S>(capped_us);
     const model::FilterNoise<S>& n = cell.noise;
-    const auto shared_by = model::ratio<model::Count<S>>(n.model_correlation_s, duration_s_);
-    shared_by_ = shared_by > model::Count<S>(1) ? shared_by : model::Count<S>(1);
+    const auto shared_by = arithmetic::ratio<arithmetic::Count<S>>(n.model_correlation_s, duration_s_);
+    shared_by_ = shared_by > arithmetic::Count<S>(1) ? shared_by : arithmetic::Count<S>(1);
     share_resistance_error();
     const auto most = Fraction(1.9);
-    bank_share_ = shared_by > model::Count<S>(SocBank<S>::points) ? model::ratio<Fraction>(model::Count<S>(2 * SocBank<S>::points), shared_by) : most;
+    bank_share_ = shared_by > arithmetic::Count<S>(SocBank<S>::points)
+                      ? arithmetic::ratio<Fraction>(arithmetic::Count<S>(2 * SocBank<S>::points), shared_by)
+                      : most;
     const Soc white = over_step(n.white_soc_per_s);
     soc_noise_ = Variance(white * white);
-    if constexpr (!Model::errors_are_states) soc_noise_ = soc_noise_ + model::product<Variance>(n.walk_soc2_per_s, duration_s_);
+    if constexpr (!Model::errors_are_states)
+      soc_noise_ = soc_noise_ + arithmetic::product<Variance>(n.walk_soc2_per_s, duration_s_);
     forgotten_ = Model::forgotten(n, duration_s_);
   }
 
-  /// Every 2.56 K anew: in the cold, resistances are larger than a file says that does not follow the temperature, by some 40 kJ/mol
-  /// (lithium iron phosphate, 30 to 60); by so much they are doubted.
+  /// Every 2.56 K anew: in the cold, resistances are larger than a file says that does not follow the temperature, by
+  /// some 40 kJ/mol (lithium iron phosphate, 30 to 60); by so much they are doubted.
   template <class Cell>
   [[gnu::noinline]] constexpr void heed_temperature(const Cell& cell, std::int16_t cdegc) {
     heeded_ = static_cast<std::int16_t>(cdegc >> 8);
     resistance_error_ = Coupling(cell.noise.resistance_error);
-    if (temperature_possible(cdegc) && cdegc < reference_cdegc && !laws_of(cell).resistances_follow_temperature()) {
+    if (measurement::temperature_possible(cdegc) && cdegc < reference_cdegc &&
+        !laws_of(cell).resistances_follow_temperature()) {
       constexpr double usual = model::mechanism_detail::energy_over_rt(40'000.0, 25.0);
-      const auto factor = model::mechanism_detail::arrhenius<S>(model::Factor<S>(usual), model::Temperature<S>(25), model::from_centi<model::Temperature<S>>(cdegc));
-      resistance_error_ = Coupling(resistance_error_ + Coupling(factor - model::Factor<S>(1)));
+      const auto factor =
+          model::mechanism_detail::arrhenius<S>(arithmetic::Factor<S>(usual), arithmetic::Temperature<S>(25),
+                                                arithmetic::from_centi<arithmetic::Temperature<S>>(cdegc));
+      resistance_error_ = Coupling(resistance_error_ + Coupling(factor - arithmetic::Factor<S>(1)));
     }
     share_resistance_error();
   }
-  constexpr void share_resistance_error() { resistance_noise_ = model::product<Coupling>(Coupling(resistance_error_ * resistance_error_), shared_by_); }
+  constexpr void share_resistance_error() {
+    resistance_noise_ = arithmetic::product<Coupling>(Coupling(resistance_error_ * resistance_error_), shared_by_);
+  }
 
   /// What adds up to by the end of the step, 1 at most.
   constexpr Soc over_step(const Soc& per_s) const {
     const Soc most(1), once = per_s * duration_s_;
     Soc sum = once;
-    for (std::uint64_t left_us = paced_us_; left_us > longest_step_us && sum < most; left_us -= longest_step_us) sum += once;
+    for (std::uint64_t left_us = paced_us_; left_us > longest_step_us && sum < most; left_us -= longest_step_us)
+      sum += once;
     return sum < most ? sum : most;
   }
 
-  /// Variance to add when the charge of a step may be wrong by a current that nobody measured, and what was counted instead may have ceased. Such an error goes on in the same
-  /// direction, so standard deviations add: (sigma + d)^2 - sigma^2.
+  /// Variance to add when the charge of a step may be wrong by a current that nobody measured, and what was counted
+  /// instead may have ceased. Such an error goes on in the same direction, so standard deviations add: (sigma + d)^2 -
+  /// sigma^2.
   template <class Cell>
   constexpr Variance unknown_charge(const Cell& cell, const Current& counted_a) const {
-    const Soc d = over_step(Soc(cell.noise.unknown_soc_per_s + model::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
-    const Soc sigma = model::root<Soc>(state_.covariance.template variance<Model::soc>());
+    const Soc d =
+        over_step(Soc(cell.noise.unknown_soc_per_s + arithmetic::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
+    const Soc sigma = arithmetic::root<Soc>(state_.covariance.template variance<Model::soc>());
     return Variance(d * d) + Variance((sigma + sigma) * d);
   }
 
@@ -217,68 +237,81 @@ class SocEstimator {
     if (!(cell.noise.at_rest_per_h2 > Variance(0))) return;
     if (!current.measured) return at_rest_.moves();
     if (!at_rest_.rests(current.ua, step_us, cell.noise.at_rest)) return;
-    const auto shared_by = model::ratio<Count>(model::Duration<S>(static_cast<int>(CurrentAtRest::lasts_s)), duration_s_);
-    const Voltage read = model::ratio<Voltage>(model::from_micro<Current>(current.ua), cell.noise.one_c_a);
+    const auto shared_by =
+        arithmetic::ratio<Count>(arithmetic::Duration<S>(static_cast<int>(CurrentAtRest::lasts_s)), duration_s_);
+    const Voltage read = arithmetic::ratio<Voltage>(arithmetic::from_micro<Current>(current.ua), cell.noise.one_c_a);
     typename Model::Sensitivity h{};
-    h[Model::last] = model::VoltagePerSoc<S>(1);
-    const Variance noise = model::product<Variance>(cell.noise.at_rest_per_h2, shared_by > Count(1) ? shared_by : Count(1));
+    h[Model::last] = arithmetic::VoltagePerSoc<S>(1);
+    const Variance noise =
+        arithmetic::product<Variance>(cell.noise.at_rest_per_h2, shared_by > Count(1) ? shared_by : Count(1));
     take(state_.covariance.observe(h, noise, Voltage(read - state_.polarisation[Model::current_offset])), cell.charge);
   }
 
-  /// What a wrong gain makes of the charge that was counted since soc was last known, c: its standard deviation is gain c, so a step's part of
-  /// the variance is gain^2 ((c + d)^2 - c^2). Charge that comes back takes it away again, which a covariance cannot: then it stays.
+  /// What a wrong gain makes of the charge that was counted since soc was last known, c: its standard deviation is gain
+  /// c, so a step's part of the variance is gain^2 ((c + d)^2 - c^2). Charge that comes back takes it away again, which
+  /// a covariance cannot: then it stays.
   constexpr Variance doubt_of_gain(const Soc& d, const Fraction& gain) {
     const Soc before = since_anchor_.counted;
     since_anchor_.counted = Soc(before + d);
     const Variance more = Variance((before + since_anchor_.counted) * d);
-    return more > Variance(0) ? model::product<Variance>(model::product<Variance>(more, gain), gain) : Variance(0);
+    return more > Variance(0) ? arithmetic::product<Variance>(arithmetic::product<Variance>(more, gain), gain)
+                              : Variance(0);
   }
   /// A gain's part of sigma is not more than sigma.
   constexpr void bound_gain(const Soc& soc, const Soc& sigma, const Fraction& gain) {
     since_anchor_.soc = soc;
-    if (!(model::magnitude(Soc(since_anchor_.counted * gain)) > sigma)) return;
-    const auto most = model::ratio<Soc>(sigma, Soc(gain));
+    if (!(arithmetic::magnitude(Soc(since_anchor_.counted * gain)) > sigma)) return;
+    const auto most = arithmetic::ratio<Soc>(sigma, Soc(gain));
     since_anchor_.counted = since_anchor_.counted > Soc(0) ? most : Soc(-most);
   }
 
-  static constexpr double impossible = 8;                     // standard deviations; a cell that was emptied fast shows five of them for minutes
-  static constexpr double new_share = 1.0 / 4;                // of the variance of an error that lasts: half of it comes and goes
-  static constexpr double least_error_v = 0.01;               // of any model, whatever its file says
-  static constexpr std::uint32_t impossible_us = 600'000'000; // of it before soc is sought anew: near empty a cell needs minutes to recover
-  static constexpr std::uint32_t calm_us = 60'000'000;        // without it, and it is forgotten
+  static constexpr double impossible =
+      8;  // standard deviations; a cell that was emptied fast shows five of them for minutes
+  static constexpr double new_share = 1.0 / 4;   // of the variance of an error that lasts: half of it comes and goes
+  static constexpr double least_error_v = 0.01;  // of any model, whatever its file says
+  static constexpr std::uint32_t impossible_us =
+      600'000'000;  // of it before soc is sought anew: near empty a cell needs minutes to recover
+  static constexpr std::uint32_t calm_us = 60'000'000;  // without it, and it is forgotten
 
   using At = model::TablePoint<S>;
 
   template <class Cell>
-  constexpr void correct(const Cell& cell, const At& at, const Drive& drive, const Soc& soc, const Voltage& innovation_v, std::uint32_t& flags) {
+  constexpr void correct(const Cell& cell, const At& at, const Drive& drive, const Soc& soc,
+                         const Voltage& innovation_v, std::uint32_t& flags) {
     const Voltage drop_v = settled_drop_v<S>(at, drive.current_a);
     const Variance drop_v2 = drop_v * drop_v;
     if (bank_.open()) [[unlikely]] {
       flags |= soc_unsettled;
       return ask_bank(cell, drive.current_a, drive.temperature_c, soc, innovation_v);
     }
-    if (model::magnitude(innovation_v) > Voltage(impossible * least_error_v)) [[unlikely]] {
+    if (arithmetic::magnitude(innovation_v) > Voltage(impossible * least_error_v)) [[unlikely]] {
       if (wonder(cell, drive.current_a, drive.temperature_c, soc, innovation_v)) {
         flags |= voltage_disbelieved;
         return;
       }
     }
     Variance error_v2 = at.error_v2;
-    if constexpr (Model::errors_are_states) error_v2 = Variance(model::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + axis_v2(cell, at));
-    const Variance model_v2 = Variance(model::product<Variance>(error_v2, shared_by_) + model::product<Variance>(drop_v2, resistance_noise_));
+    if constexpr (Model::errors_are_states)
+      error_v2 = Variance(arithmetic::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + axis_v2(cell, at));
+    const Variance model_v2 = Variance(arithmetic::product<Variance>(error_v2, shared_by_) +
+                                       arithmetic::product<Variance>(drop_v2, resistance_noise_));
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
     take(state_.covariance.observe(Model::sensitivity(laws_of(cell), at, drive), noise_v2, innovation_v), cell.charge);
   }
 
-  /// An innovation that the model's error and soc's own sigma do not explain, for ten minutes, is soc's: it is sought anew. True: it is.
+  /// An innovation that the model's error and soc's own sigma do not explain, for ten minutes, is soc's: it is sought
+  /// anew. True: it is.
   template <class Cell>
-  [[gnu::noinline]] constexpr bool wonder(const Cell& cell, Current current_a, model::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
+  [[gnu::noinline]] constexpr bool wonder(const Cell& cell, Current current_a, arithmetic::Temperature<S> temperature_c,
+                                          Soc soc, Voltage innovation_v) {
     const Drive drive{current_a, duration_s_, temperature_c};
     std::uint8_t interval = interval_;
     const At at = look_up(model::CellUnder{cell, drive, Model::held(state_.polarisation)}, soc, interval);
     const auto h = Model::sensitivity(laws_of(cell), at, drive);
-    const Variance of_soc_v2 = model::product<Variance>(model::product<Variance>(state_.covariance.template variance<Model::soc>(), h[Model::soc]), h[Model::soc]);
-    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) + Variance(lasting_v2(cell) + drop_doubt_v2<S>(at, current_a, resistance_error_)));
+    const Variance of_soc_v2 = arithmetic::product<Variance>(
+        arithmetic::product<Variance>(state_.covariance.template variance<Model::soc>(), h[Model::soc]), h[Model::soc]);
+    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) +
+                                       Variance(lasting_v2(cell) + drop_doubt_v2<S>(at, current_a, resistance_error_)));
     const Variance all_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
     if (!(Variance(innovation_v * innovation_v) > Variance(all_v2 * Count(impossible * impossible)))) return false;
     if (time_us_ - wondered_us_ > calm_us + paced_us_) wondering_us_ = 0;
@@ -286,18 +319,23 @@ class SocEstimator {
     wondering_us_ += paced_us_ < calm_us ? static_cast<std::uint32_t>(paced_us_) : calm_us;
     if (wondering_us_ < impossible_us) return true;  // one bad reading is not believed
     wondering_us_ = 0;
-    const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points)), variance = state_.covariance.template variance<Model::soc>();
+    const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points)),
+        variance = state_.covariance.template variance<Model::soc>();
     search(cell, {soc, variance < finest ? finest : variance});
     return true;
   }
 
-  /// Of what the tables' soc axis is good to, on the curve there. In the cold surfaces are further ahead of what is counted, as much as
-  /// resistances are larger: knees come elsewhere.
+  /// Of what the tables' soc axis is good to, on the curve there. In the cold surfaces are further ahead of what is
+  /// counted, as much as resistances are larger: knees come elsewhere.
   template <class Cell>
   static constexpr Variance axis_v2(const Cell& cell, const At& at) {
     const Variance axis_v2 = Variance(at.error_v2 - cell.noise.model_v2);
-    if constexpr (std::same_as<std::remove_cvref_t<decltype(laws_of(cell))>, model::LawSet<S>>) return axis_v2;
-    else return at.activation > model::Factor<S>(1) ? model::product<Variance>(model::product<Variance>(axis_v2, at.activation), at.activation) : axis_v2;
+    if constexpr (std::same_as<std::remove_cvref_t<decltype(laws_of(cell))>, model::LawSet<S>>)
+      return axis_v2;
+    else
+      return at.activation > arithmetic::Factor<S>(1)
+                 ? arithmetic::product<Variance>(arithmetic::product<Variance>(axis_v2, at.activation), at.activation)
+                 : axis_v2;
   }
 
   /// Opens the bank around a belief that may be mistaken.
@@ -308,7 +346,8 @@ class SocEstimator {
   template <class Cell, class Misfit>
   constexpr void open_bank(const Cell& cell, const Soc& mean, const Misfit& misfit) {
     std::uint8_t interval = 0;
-    bank_.open_at(mean, lasting_v2(cell), [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
+    bank_.open_at(mean, lasting_v2(cell),
+                  [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
   }
 
   /// Of an error that lasts while the bank is open: the model's, and of the states that are not corrected then.
@@ -323,21 +362,25 @@ class SocEstimator {
   /// While it is open, soc is the bank's; the other states go on as predicted.
   /// Arguments by value: one passed by address would be kept in memory in every step.
   template <class Cell>
-  [[gnu::noinline]] constexpr void ask_bank(const Cell& cell, Current current_a, model::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
+  [[gnu::noinline]] constexpr void ask_bank(const Cell& cell, Current current_a,
+                                            arithmetic::Temperature<S> temperature_c, Soc soc, Voltage innovation_v) {
     const Drive drive{current_a, duration_s_, temperature_c};
     const auto& laws = laws_of(cell);
     std::uint8_t interval = interval_;
     const model::CellUnder under{cell, drive, Model::held(state_.polarisation)};
     const At middle = look_up(under, soc, interval);
     const Voltage expected_v = Model::voltage(laws, state_.polarisation, middle, drive);
-    const Variance new_v2 = Variance(model::product<Variance>(cell.noise.model_v2, Fraction(new_share)) + drop_doubt_v2<S>(middle, current_a, resistance_error_));
+    const Variance new_v2 = Variance(arithmetic::product<Variance>(cell.noise.model_v2, Fraction(new_share)) +
+                                     drop_doubt_v2<S>(middle, current_a, resistance_error_));
     const auto seen = [&](const Soc& there) -> typename SocBank<S>::Seen {
       const At at = look_up(under, there, interval);
       return {.off_v = Voltage(innovation_v + (expected_v - Model::voltage(laws, state_.polarisation, at, drive))),
               .half_v = Voltage(ocv_slope<S>(at) * Fraction(0.5 / SocBank<S>::points)),
               .new_v2 = Variance(new_v2 + axis_v2(cell, at))};
     };
-    const auto news = bank_.step(soc, bank_share_, cell.noise.voltage_v2, Variance(lasting_v2(cell) + drop_doubt_v2<S>(middle, current_a, resistance_error_)), seen);
+    const auto news =
+        bank_.step(soc, bank_share_, cell.noise.voltage_v2,
+                   Variance(lasting_v2(cell) + drop_doubt_v2<S>(middle, current_a, resistance_error_)), seen);
     if (!news.any) return;
     state_.charge.correct(news.moved, cell.charge);
     state_.covariance.template know_anew<Model::soc>(news.variance);
@@ -347,14 +390,14 @@ class SocEstimator {
   template <class Cell>
   constexpr void complete(const Cell& cell, Result& estimate) const {
     estimate.soc = state_.charge.soc(cell.charge);
-    estimate.soc_sigma = model::root<Soc>(state_.covariance.template variance<Model::soc>());
+    estimate.soc_sigma = arithmetic::root<Soc>(state_.covariance.template variance<Model::soc>());
     estimate.v_rc_v = state_.polarisation[0];
     if constexpr (further_values > 0) {
       std::size_t told = 0;
       if constexpr (Model::errors_are_states) {
         estimate.further[told++] = state_.polarisation[Model::voltage_error];
         estimate.further[told++] = state_.polarisation[Model::current_offset];
-        estimate.further[told++] = model::root<Voltage>(state_.covariance.template variance<Model::last>());
+        estimate.further[told++] = arithmetic::root<Voltage>(state_.covariance.template variance<Model::last>());
       }
       for (std::size_t k = Model::first_held; k < Model::values; ++k) estimate.further[told++] = state_.polarisation[k];
     }
@@ -366,14 +409,15 @@ class SocEstimator {
     estimate.flags = flags;
     const Drive rest{Current(0), TimeStep(1)};
     std::uint8_t interval = interval_;
-    const auto at = look_up(model::CellUnder{cell, rest, Model::held(state_.polarisation)}, state_.charge.soc(cell.charge), interval);
+    const auto at = look_up(model::CellUnder{cell, rest, Model::held(state_.polarisation)},
+                            state_.charge.soc(cell.charge), interval);
     estimate.voltage_predicted_v = Model::voltage(laws_of(cell), state_.polarisation, at, rest);
     complete(cell, estimate);
     return estimate;
   }
 
   template <class Cell>
-  [[gnu::noinline]] constexpr Result start(const Cell& cell, const Sample& sample) {
+  [[gnu::noinline]] constexpr Result start(const Cell& cell, const measurement::Sample& sample) {
     Result estimate;
     time_us_ = sample.time_us;
     const BelievedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
@@ -387,11 +431,13 @@ class SocEstimator {
     started_ = true;
 
     const auto& laws = laws_of(cell);
-    const Drive drive{laws.true_current(model::from_micro<Current>(current.ua)), TimeStep(1), temperature(laws, sample)};
+    const Drive drive{laws.true_current(arithmetic::from_micro<Current>(current.ua)), TimeStep(1),
+                      temperature(laws, sample)};
     SocBelief<S> belief{soc_of_ppb(from_.soc_ppb), Variance{}};
     const Soc believed_sigma = soc_of_ppb(from_.soc_sigma_ppb);
     belief.variance = Variance(believed_sigma * believed_sigma);
-    // how much the current has built up is unknown: half of what it can, give or take the same; and what flowed before it
+    // how much the current has built up is unknown: half of what it can, give or take the same; and what flowed before
+    // it
     const model::CellUnder under{cell, drive, Model::held(state_.polarisation)};
     auto at = look_up(under, has_start_ ? belief.soc : Soc(0.5), interval_);
     const Voltage half_v = at.r1_ohm * Fraction(0.5) * drive.current_a;
@@ -410,9 +456,12 @@ class SocEstimator {
         const Voltage unknown_v = at.r0_ohm * cell.noise.unknown_a;
         reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
       }
-      const Voltage ocv_v = voltage ? Voltage(Model::true_voltage(laws, model::from_micro<Voltage>(sample.voltage_uv)) - load_v) : Voltage(0);
+      const Voltage ocv_v =
+          voltage ? Voltage(Model::true_voltage(laws, arithmetic::from_micro<Voltage>(sample.voltage_uv)) - load_v)
+                  : Voltage(0);
       const SocBelief<S> before = belief;
-      const StartMisfit<S, decltype(under)> misfit{under, voltage ? &ocv_v : nullptr, reading_v2, has_start_ ? &before : nullptr};
+      const StartMisfit<S, decltype(under)> misfit{under, voltage ? &ocv_v : nullptr, reading_v2,
+                                                   has_start_ ? &before : nullptr};
       if (voltage) belief = soc_from(misfit);
       if (belief.variance > Variance(SocBank<S>::wide_soc * SocBank<S>::wide_soc)) {
         state_.covariance.set_diagonal(variances);  // what the bank is told of the other states
@@ -431,7 +480,7 @@ class SocEstimator {
   }
 
   static constexpr Soc soc_of_ppb(std::int32_t ppb) {
-    return Soc(model::from_micro<model::Current<S>>(ppb) * Fraction(1e-3));
+    return Soc(arithmetic::from_micro<arithmetic::Current<S>>(ppb) * Fraction(1e-3));
   }
 
   CellState<S, ModelOf> state_;
@@ -452,12 +501,12 @@ class SocEstimator {
   Variance soc_noise_{};
   Count shared_by_{1};
   Coupling resistance_error_{}, resistance_noise_{};  ///< of R0 + R1; and as it counts in the noise of a step
-  std::int16_t heeded_ = 0x7FFF;  ///< no temperature's
+  std::int16_t heeded_ = 0x7FFF;                      ///< no temperature's
   Fraction bank_share_{};
   [[no_unique_address]] typename Model::Forgotten forgotten_{};
   SocBank<S> bank_;
-  StartingPoint from_;
+  measurement::StartingPoint from_;
   bool has_start_ = false, started_ = false;
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

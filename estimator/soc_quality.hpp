@@ -1,9 +1,11 @@
-// Whether the voltage tells soc here and now, or charge counting carries it; and for how long, and over how much charge, it has.
+// Whether the voltage tells soc here and now, or charge counting carries it; and for how long, and over how much
+// charge, it has.
 //
 //   observable   where 2 % of soc move the OCV by more than the model's error of the voltage
 //   anchored     observable, and soc known to 2 %: from here the counting starts
 //
-// For displays and for decisions (balance, recalibrate, allow a full charge); asked when it is told, not with every sample.
+// For displays and for decisions (balance, recalibrate, allow a full charge); asked when it is told, not with every
+// sample.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +14,11 @@
 #include "estimator/voltage_doubt.hpp"
 #include "model/extended_rc.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 template <class S>
 class SocQuality {
-  using Soc = model::Soc<S>;
+  using Soc = arithmetic::Soc<S>;
 
  public:
   static constexpr double known_soc = 0.02;
@@ -27,13 +29,15 @@ class SocQuality {
     Soc bridged_soc{};            ///< charge moved since, either way, in capacities; 7 at most
   };
 
-  /// at: what the tables say at the estimate's soc under drive. counted: how far the charge moved soc since the last call.
-  constexpr Now update(const Estimate<S>& estimate, const model::TablePoint<S>& at, const model::Drive<S>& drive, const Soc& counted, std::uint32_t step_ms,
-                       const model::Fraction<S>& resistance_error) {
+  /// at: what the tables say at the estimate's soc under drive. counted: how far the charge moved soc since the last
+  /// call.
+  constexpr Now update(const Estimate<S>& estimate, const model::TablePoint<S>& at, const model::Drive<S>& drive,
+                       const Soc& counted, std::uint32_t step_ms, const arithmetic::Fraction<S>& resistance_error) {
     using namespace model;
     const Voltage<S> moves_v = ocv_slope<S>(at) * Fraction<S>(known_soc);
     const Variance<S> doubt_v2 = drop_doubt_v2<S>(at, drive.current_a, resistance_error);
-    now_.observable = Variance<S>(moves_v * moves_v) > Variance<S>(at.error_v2 + doubt_v2) && (estimate.flags & not_now) == 0;
+    now_.observable =
+        Variance<S>(moves_v * moves_v) > Variance<S>(at.error_v2 + doubt_v2) && (estimate.flags & not_now) == 0;
     if (now_.observable && estimate.soc_sigma < Soc(known_soc)) {
       now_.bridged_s = 0;
       left_ms_ = 0;
@@ -49,10 +53,11 @@ class SocQuality {
   }
 
  private:
-  static constexpr std::uint32_t not_now = voltage_missing | voltage_implausible | voltage_stuck | not_started | soc_unsettled | voltage_disbelieved;
+  static constexpr std::uint32_t not_now =
+      voltage_missing | voltage_implausible | voltage_stuck | not_started | soc_unsettled | voltage_disbelieved;
 
   Now now_;
   std::uint32_t left_ms_ = 0;
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

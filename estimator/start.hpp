@@ -1,8 +1,9 @@
-// Where an estimate begins when nobody says where: the state of charge that a first voltage tells, with what it leaves open.
+// Where an estimate begins when nobody says where: the state of charge that a first voltage tells, with what it leaves
+// open.
 //
-// The voltage, less half of what the present current may have built up in the RC branch, is a reading of the OCV curve with
-// a standard deviation. Every soc from 0 to 1 is held possible and weighed by how well its OCV fits; mean and standard
-// deviation of that distribution are the start. On the plateau that is a wide band, as it should be.
+// The voltage, less half of what the present current may have built up in the RC branch, is a reading of the OCV curve
+// with a standard deviation. Every soc from 0 to 1 is held possible and weighed by how well its OCV fits; mean and
+// standard deviation of that distribution are the start. On the plateau that is a wide band, as it should be.
 //
 // Cost: one pass over 256 points, once.
 #pragma once
@@ -12,13 +13,13 @@
 #include "estimator/voltage_doubt.hpp"
 #include "model/one_rc.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 /// A state of charge and how sure it is.
 template <class S>
 struct SocBelief {
-  model::Soc<S> soc;
-  model::Variance<S> variance;
+  arithmetic::Soc<S> soc;
+  arithmetic::Variance<S> variance;
 };
 
 inline constexpr int start_points = 256;
@@ -27,12 +28,13 @@ inline constexpr int start_points = 256;
 template <class S, class Cell>
 struct StartMisfit {
   const Cell& cell;
-  const model::Voltage<S>* ocv_v;        ///< the reading; nullptr: none
-  model::Variance<S> variance_v2;        ///< of it
-  const SocBelief<S>* before;            ///< nullptr: none; else with a deviation of at least two points' spacing
+  const arithmetic::Voltage<S>* ocv_v;  ///< the reading; nullptr: none
+  arithmetic::Variance<S> variance_v2;  ///< of it
+  const SocBelief<S>* before;           ///< nullptr: none; else with a deviation of at least two points' spacing
 
   /// half_step: half the spacing of the points that it is asked for.
-  constexpr model::Exponent<S> operator()(const model::Soc<S>& soc, const model::Fraction<S>& half_step, std::uint8_t& interval) const {
+  constexpr arithmetic::Exponent<S> operator()(const arithmetic::Soc<S>& soc, const arithmetic::Fraction<S>& half_step,
+                                               std::uint8_t& interval) const {
     using namespace model;
     Exponent<S> misfit(0);
     if (ocv_v != nullptr) {
@@ -46,7 +48,8 @@ struct StartMisfit {
     if (before == nullptr) return misfit;
     const Soc<S> off = soc - before->soc;
     const auto of_belief = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
-    const Exponent<S> mistaken(8);  // one belief in 3,000 is wrong altogether: a voltage that speaks clearly against it wins
+    const Exponent<S> mistaken(
+        8);  // one belief in 3,000 is wrong altogether: a voltage that speaks clearly against it wins
     return Exponent<S>(misfit + (of_belief < mistaken ? of_belief : mistaken));
   }
 };
@@ -83,4 +86,4 @@ constexpr SocBelief<S> soc_from(const StartMisfit<S, Cell>& speaks_against) {
   return {mean, variance};
 }
 
-}  // namespace bms
+}  // namespace bms::estimator

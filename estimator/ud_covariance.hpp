@@ -1,9 +1,10 @@
-// Covariance of the state as P = U D U', U unit upper triangular, D diagonal: symmetric by construction, and positive as
-// long as every entry of D is, which each of the two operations below only ever makes from sums and quotients of positive numbers.
-// The same digits carry twice the range of P itself, so that float and fixed point are enough.
+// Covariance of the state as P = U D U', U unit upper triangular, D diagonal: symmetric by construction, and positive
+// as long as every entry of D is, which each of the two operations below only ever makes from sums and quotients of
+// positive numbers. The same digits carry twice the range of P itself, so that float and fixed point are enough.
 //
-// propagate: P <- F P F' + diag(q), F upper triangular      modified weighted Gram-Schmidt (Thornton 1976); of the last state's two columns its projection leaves one, of weight d q / (d f^2 + q)
-// observe:   one scalar measurement z = h x + noise(r)       Bierman 1977
+// propagate: P <- F P F' + diag(q), F upper triangular      modified weighted Gram-Schmidt (Thornton 1976); of the last
+// state's two columns its projection leaves one, of weight d q / (d f^2 + q) observe:   one scalar measurement z = h x
+// + noise(r)       Bierman 1977
 //
 // Both as in G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation" (1977), chapters V and VI.
 // The last state's variance is D's last entry, with no arithmetic: soc's place, where nothing moves it.
@@ -13,19 +14,19 @@
 #include <array>
 #include <cstddef>
 
-#include "model/scalar.hpp"
+#include "arithmetic/scalar.hpp"
 
-namespace bms {
+namespace bms::estimator {
 
 template <class S, std::size_t N>
 class UdCovariance {
-  using Variance = model::Variance<S>;
-  using Coupling = model::Coupling<S>;
-  using State = model::Voltage<S>;  // also soc: the same range in every scalar
+  using Variance = arithmetic::Variance<S>;
+  using Coupling = arithmetic::Coupling<S>;
+  using State = arithmetic::Voltage<S>;  // also soc: the same range in every scalar
 
  public:
   using Matrix = std::array<std::array<Coupling, N>, N>;
-  using Row = std::array<model::VoltagePerSoc<S>, N>;
+  using Row = std::array<arithmetic::VoltagePerSoc<S>, N>;
   using Variances = std::array<Variance, N>;
 
   constexpr void set_diagonal(const Variances& variances) {
@@ -54,7 +55,8 @@ class UdCovariance {
   constexpr Variance variance() const {
     Variance sum = d_[K];
     if constexpr (K + 1 < N) {
-      for (std::size_t j = K + 1; j < N; ++j) sum = Variance(sum + model::product<Variance>(model::product<Variance>(d_[j], u(K, j)), u(K, j)));
+      for (std::size_t j = K + 1; j < N; ++j)
+        sum = Variance(sum + arithmetic::product<Variance>(arithmetic::product<Variance>(d_[j], u(K, j)), u(K, j)));
     }
     return sum;
   }
@@ -73,15 +75,18 @@ class UdCovariance {
       }
     }
     Variances d = d_;
-    // The last row has one entry in either block, so what it leaves of the others is alike in both: one column in place of two.
+    // The last row has one entry in either block, so what it leaves of the others is alike in both: one column in place
+    // of two.
     {
       const Coupling f_last = state[N - 1][N - 1];
-      const Variance sum = Variance(q[N - 1] + model::product<Variance>(model::product<Variance>(d[N - 1], f_last), f_last));
-      const Coupling share = model::ratio<Coupling>(d[N - 1], sum);
+      const Variance sum =
+          Variance(q[N - 1] + arithmetic::product<Variance>(arithmetic::product<Variance>(d[N - 1], f_last), f_last));
+      const Coupling share = arithmetic::ratio<Coupling>(d[N - 1], sum);
 #pragma GCC unroll 8
-      for (std::size_t i = 0; i + 1 < N; ++i) u(i, N - 1) = model::product<Coupling>(model::product<Coupling>(share, state[i][N - 1]), f_last);
+      for (std::size_t i = 0; i + 1 < N; ++i)
+        u(i, N - 1) = arithmetic::product<Coupling>(arithmetic::product<Coupling>(share, state[i][N - 1]), f_last);
       d_[N - 1] = sum;
-      d[N - 1] = model::product<Variance>(q[N - 1], share);
+      d[N - 1] = arithmetic::product<Variance>(q[N - 1], share);
     }
 #pragma GCC unroll 8
     for (std::size_t last = 1; last < N; ++last) {
@@ -90,20 +95,25 @@ class UdCovariance {
       Variance sum = q[j];
 #pragma GCC unroll 8
       for (std::size_t k = j; k < N; ++k) {
-        weighted[k] = model::product<Variance>(d[k], state[j][k]);
-        sum = Variance(sum + model::product<Variance>(weighted[k], state[j][k]));
+        weighted[k] = arithmetic::product<Variance>(d[k], state[j][k]);
+        sum = Variance(sum + arithmetic::product<Variance>(weighted[k], state[j][k]));
       }
 #pragma GCC unroll 8
-      for (std::size_t k = j + 1; k + 1 < N; ++k) sum = Variance(sum + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[j][k]));
+      for (std::size_t k = j + 1; k + 1 < N; ++k)
+        sum = Variance(sum +
+                       arithmetic::product<Variance>(arithmetic::product<Variance>(q[k], noise[j][k]), noise[j][k]));
       d_[j] = sum;
 #pragma GCC unroll 8
       for (std::size_t i = 0; i < j; ++i) {
         Variance cross{};
 #pragma GCC unroll 8
-        for (std::size_t k = j; k < N; ++k) cross = Variance(cross + model::product<Variance>(weighted[k], state[i][k]));
+        for (std::size_t k = j; k < N; ++k)
+          cross = Variance(cross + arithmetic::product<Variance>(weighted[k], state[i][k]));
 #pragma GCC unroll 8
-        for (std::size_t k = j + 1; k + 1 < N; ++k) cross = Variance(cross + model::product<Variance>(model::product<Variance>(q[k], noise[j][k]), noise[i][k]));
-        const Coupling projected = model::ratio<Coupling>(cross, sum);
+        for (std::size_t k = j + 1; k + 1 < N; ++k)
+          cross = Variance(
+              cross + arithmetic::product<Variance>(arithmetic::product<Variance>(q[k], noise[j][k]), noise[i][k]));
+        const Coupling projected = arithmetic::ratio<Coupling>(cross, sum);
         u(i, j) = projected;
 #pragma GCC unroll 8
         for (std::size_t k = j; k < N; ++k) state[i][k] = Coupling(state[i][k] - projected * state[j][k]);
@@ -114,8 +124,8 @@ class UdCovariance {
     }
   }
 
-  /// Takes in a measurement with sensitivity h, noise variance r > 0 and innovation e (measured less predicted); returns the
-  /// correction of each state, P h' e / (h P h' + r).
+  /// Takes in a measurement with sensitivity h, noise variance r > 0 and innovation e (measured less predicted);
+  /// returns the correction of each state, P h' e / (h P h' + r).
   constexpr std::array<State, N> observe(const Row& h, const Variance& r, const State& e) {
     std::array<Variance, N> b{};  // U D U' h', built column by column
     Variance alpha = r;           // variance of the innovation, of the states so far
@@ -125,22 +135,22 @@ class UdCovariance {
       Coupling f = h[j];
 #pragma GCC unroll 8
       for (std::size_t k = 0; k < j; ++k) f = Coupling(f + u(k, j) * h[k]);
-      const Variance g = model::product<Variance>(d_[j], f), before = alpha, per_before = per_alpha;
-      alpha = Variance(alpha + model::product<Variance>(g, f));
-      per_alpha = model::ratio<Variance>(Variance(1), alpha);
-      d_[j] = model::product<Variance>(model::product<Variance>(d_[j], per_alpha), before);
+      const Variance g = arithmetic::product<Variance>(d_[j], f), before = alpha, per_before = per_alpha;
+      alpha = Variance(alpha + arithmetic::product<Variance>(g, f));
+      per_alpha = arithmetic::ratio<Variance>(Variance(1), alpha);
+      d_[j] = arithmetic::product<Variance>(arithmetic::product<Variance>(d_[j], per_alpha), before);
 #pragma GCC unroll 8
       for (std::size_t i = 0; i < j; ++i) {
         const Coupling old = u(i, j);
-        u(i, j) = Coupling(old - model::product<Coupling>(model::product<Coupling>(b[i], per_before), f));
-        b[i] = Variance(b[i] + model::product<Variance>(g, old));
+        u(i, j) = Coupling(old - arithmetic::product<Coupling>(arithmetic::product<Coupling>(b[i], per_before), f));
+        b[i] = Variance(b[i] + arithmetic::product<Variance>(g, old));
       }
       b[j] = g;
     }
-    const Coupling off = model::product<Coupling>(e, per_alpha);
+    const Coupling off = arithmetic::product<Coupling>(e, per_alpha);
     std::array<State, N> correction;
 #pragma GCC unroll 8
-    for (std::size_t i = 0; i < N; ++i) correction[i] = model::product<State>(b[i], off);
+    for (std::size_t i = 0; i < N; ++i) correction[i] = arithmetic::product<State>(b[i], off);
     return correction;
   }
 
@@ -150,8 +160,9 @@ class UdCovariance {
     for (std::size_t i = 0; i < N; ++i) {
       for (std::size_t j = 0; j < N; ++j) {
         for (std::size_t k = i > j ? i : j; k < N; ++k) {
-          const double left = i == k ? 1.0 : model::as_double(u(i, k)), right = j == k ? 1.0 : model::as_double(u(j, k));
-          p[i][j] += left * right * model::as_double(d_[k]);
+          const double left = i == k ? 1.0 : arithmetic::as_double(u(i, k)),
+                       right = j == k ? 1.0 : arithmetic::as_double(u(j, k));
+          p[i][j] += left * right * arithmetic::as_double(d_[k]);
         }
       }
     }
@@ -164,7 +175,7 @@ class UdCovariance {
   constexpr const Coupling& u(std::size_t i, std::size_t j) const { return u_[place(i, j)]; }
 
   std::array<Variance, N> d_{};
-  std::array<Coupling, N * (N - 1) / 2> u_{};  // above the diagonal, column by column
+  std::array<Coupling, N*(N - 1) / 2> u_{};  // above the diagonal, column by column
 };
 
-}  // namespace bms
+}  // namespace bms::estimator

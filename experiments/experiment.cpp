@@ -6,17 +6,19 @@
 
 #include "experiments/splitmix.hpp"
 
-namespace bms {
+namespace bms::experiments {
 
 /// What a design writes on: straight pieces of current over time, and a source of chance.
 class Course {
  public:
-  explicit Course(const ExperimentOptions& options) : high_c_rate(options.high_c_rate), low_c_rate(options.low_c_rate), random_(options.seed) {}
+  explicit Course(const ExperimentOptions& options)
+      : high_c_rate(options.high_c_rate), low_c_rate(options.low_c_rate), random_(options.seed) {}
 
   const double high_c_rate, low_c_rate;
 
   void ramp(int duration_s, double from_c_rate, double to_c_rate) {
-    pieces_.push_back({duration_s, std::clamp(from_c_rate, -1.0, 1.0), std::clamp(to_c_rate, -1.0, 1.0), temperature_c_, false, ammeter_, voltmeter_, no_value});
+    pieces_.push_back({duration_s, std::clamp(from_c_rate, -1.0, 1.0), std::clamp(to_c_rate, -1.0, 1.0), temperature_c_,
+                       false, ammeter_, voltmeter_, no_value});
     time_s_ += duration_s;
   }
   /// Contactor open, the sense wires on the cell or on a reference source.
@@ -30,7 +32,9 @@ class Course {
   /// Of the chamber, from here on.
   void set_temperature(double temperature_c) { temperature_c_ = temperature_c; }
   /// By so much state of charge, at a constant rate.
-  void move(double soc_change, double c_rate) { hold(static_cast<int>(std::lround(std::abs(soc_change) * 3'600 / c_rate)), soc_change > 0 ? c_rate : -c_rate); }
+  void move(double soc_change, double c_rate) {
+    hold(static_cast<int>(std::lround(std::abs(soc_change) * 3'600 / c_rate)), soc_change > 0 ? c_rate : -c_rate);
+  }
   void hold(int duration_s, double c_rate) { ramp(duration_s, c_rate, c_rate); }
 
   int time_s() const { return time_s_; }
@@ -40,7 +44,9 @@ class Course {
     const auto choices = static_cast<std::uint64_t>(high - low + 1);
     return low + static_cast<int>((random_.bits() >> 32) * choices >> 32);
   }
-  double between(double low, double high) { return low + (high - low) * (static_cast<double>(random_.bits() >> 11) * 0x1p-53); }
+  double between(double low, double high) {
+    return low + (high - low) * (static_cast<double>(random_.bits() >> 11) * 0x1p-53);
+  }
 
   std::vector<ProfileRow> sampled(double capacity_ah, double step_s) const {
     const int step_ms = std::max(1, static_cast<int>(std::lround(step_s * 1e3)));
@@ -60,7 +66,8 @@ class Course {
         filled_ms += part_ms;
         if (filled_ms < step_ms) break;
         const double current_a = std::round(charge / step_ms * capacity_ah * 1e3) / 1e3;
-        rows.push_back({static_cast<double>(rows.size()) * step_ms / 1e3, current_a + 0.0, piece.temperature_c, open, piece.ammeter, piece.voltmeter, piece.source_v});  // + 0.0: no "-0"
+        rows.push_back({static_cast<double>(rows.size()) * step_ms / 1e3, current_a + 0.0, piece.temperature_c, open,
+                        piece.ammeter, piece.voltmeter, piece.source_v});  // + 0.0: no "-0"
         charge = 0;
         filled_ms = 0;
         open = true;
@@ -88,8 +95,8 @@ class Course {
 
 namespace {
 
-// The truck of forklift_shift. The paper shows the current of a real one (Fig. 9: lifting and manoeuvres) but does not publish
-// it; amplitudes and durations here are chosen to look like it within 1C. `load` and `height` run from 0 to 1.
+// The truck of forklift_shift. The paper shows the current of a real one (Fig. 9: lifting and manoeuvres) but does not
+// publish it; amplitudes and durations here are chosen to look like it within 1C. `load` and `height` run from 0 to 1.
 
 constexpr double standby_c_rate = -0.012;  // controller, display, lights
 
@@ -172,7 +179,8 @@ void work_until(Course& truck, int time_s) {
   while (time_s - truck.time_s() > longest_job_s) {
     const int job = truck.between(0, 9);
     (job < 4 ? put_away : job < 8 ? fetch : load_lorry)(truck);
-    stand(truck, truck.between(0, 14) == 0 ? truck.between(90, 240) : truck.between(3, 22));  // now and then there is paperwork
+    stand(truck, truck.between(0, 14) == 0 ? truck.between(90, 240)
+                                           : truck.between(3, 22));  // now and then there is paperwork
   }
   travel(truck, 15, 0);
   truck.hold(time_s - truck.time_s(), 0);  // parked, key off
@@ -210,8 +218,8 @@ void forklift_shift(Course& truck) {
   truck.hold(480 * minute_s - truck.time_s(), 0);
 }
 
-// The designs of Tables 7 and 8, as current pulses around one state of charge: what is taken is given back, twenty minutes of it.
-// The paper shows them (Fig. 9-11) without numbers.
+// The designs of Tables 7 and 8, as current pulses around one state of charge: what is taken is given back, twenty
+// minutes of it. The paper shows them (Fig. 9-11) without numbers.
 
 constexpr int design_s = 1'200, lead_s = 60;
 
@@ -256,15 +264,16 @@ void ocv_test(Course& cell) {
   }
 }
 
-// Designs that tell causes apart which an ordinary recording leaves open. They begin at 95 %, come to from a full charge and charged
-// last: state of charge and history are known best there.
+// Designs that tell causes apart which an ordinary recording leaves open. They begin at 95 %, come to from a full
+// charge and charged last: state of charge and history are known best there.
 
 constexpr int minute_s = 60, hour_s = 3'600;
 constexpr double almost_full = 0.95;
 
 /// The sensors alone: nothing flows, and what the voltage sensor should read a source says.
 void meter_check(Course& cell) {
-  constexpr double low_v = 2.5, high_v = 3.6;  // inside every channel's range, as far apart as a lithium cell's voltages
+  constexpr double low_v = 2.5,
+                   high_v = 3.6;  // inside every channel's range, as far apart as a lithium cell's voltages
   cell.open(5 * minute_s);
   for (int turn = 0; turn < 5; ++turn) {
     cell.open(2 * minute_s, low_v);
@@ -343,7 +352,8 @@ void full_cycle(Course& cell) {
   cell.hold(40 * minute_s, 0);
 }
 
-/// Each level once from above and once from below, with rests that outlast diffusion; loops of three sizes at three rates.
+/// Each level once from above and once from below, with rests that outlast diffusion; loops of three sizes at three
+/// rates.
 void loops_and_rests(Course& cell) {
   cell.hold(10 * minute_s, 0);
   for (const double rate : {0.9, 0.45, 0.2}) {
@@ -412,35 +422,58 @@ const std::vector<Experiment>& experiments() {
       {"rest_30s", "pulses of 10 s and rests of 30 s, 20 minutes around one state of charge", short_pulses<30>},
       {"rest_18s", "the same with rests of 18 s", short_pulses<18>},
       {"rest_5s", "the same with rests of 5 s", short_pulses<5>},
-      {"high_1m_low_30s", "bursts of 1 min at HIGH and 30 s at LOW current, both ways, 20 minutes around one state of charge", long_bursts<60, 30>},
+      {"high_1m_low_30s",
+       "bursts of 1 min at HIGH and 30 s at LOW current, both ways, 20 minutes around one state of charge",
+       long_bursts<60, 30>},
       {"high_30s_low_30s", "the same with 30 s and 30 s", long_bursts<30, 30>},
       {"high_30s_low_1m", "the same with 30 s and 1 min", long_bursts<30, 60>},
       {"ocv_1h_rest", "from full to empty and back in tenths, with rests of 1 h", ocv_test<3'600>},
       {"ocv_10min_rest", "the same with rests of 10 min", ocv_test<600>},
-      {"forklift_shift", "eight hours of an electric forklift: driving, lifting, regeneration, breaks with opportunity charge", forklift_shift},
+      {"forklift_shift",
+       "eight hours of an electric forklift: driving, lifting, regeneration, breaks with opportunity charge",
+       forklift_shift},
       // those below tell causes apart, the quicker ones first
       {"fast_pulses", "pulses of 5 s at 1C, ten minutes, logged ten times a second", fast_pulses, almost_full,
        "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; log ten times a second.", 0.1},
-      {"zero_current", "contactor open for 20 minutes: what the current sensor reads is its own", zero_current, almost_full,
-       "Open the contactor where the profile has a current_ref_a, log on, and keep that column (0 A) in the recording."},
-      {"shunt_check", "charge and discharge at nearly 1C with a trusted ammeter in series, half an hour", shunt_check, almost_full,
-       "Charge the cell full, take out 10 % and put back 5 %; put a trusted ammeter or shunt in series and enter what it reads as current_ref_a in place of the profile's."},
-      {"terminal_check", "charge and discharge at nearly 1C with a trusted ammeter in series and a voltmeter on the cell's own terminals, half an hour", terminal_check, almost_full,
-       "Charge the cell full, take out 10 % and put back 5 %; put a trusted ammeter in series and a voltmeter on the cell's own terminals and enter what they read as current_ref_a and voltage_ref_v."},
-      {"meter_check", "contactor open for half an hour, the voltage sense wires in turn on two voltages of a reference source", meter_check, almost_full,
-       "Open the contactor; put the voltage sense wires on a reference source where the profile has a voltage_ref_v, and keep both reference columns in the recording, with what a trusted meter read there."},
-      {"rate_steps", "pulses of three rates and two lengths, both ways, at five states of charge", rate_steps, almost_full,
+      {"zero_current", "contactor open for 20 minutes: what the current sensor reads is its own", zero_current,
+       almost_full,
+       "Open the contactor where the profile has a current_ref_a, log on, and keep that column (0 A) in the "
+       "recording."},
+      {"shunt_check", "charge and discharge at nearly 1C with a trusted ammeter in series, half an hour", shunt_check,
+       almost_full,
+       "Charge the cell full, take out 10 % and put back 5 %; put a trusted ammeter or shunt in series and enter what "
+       "it reads as current_ref_a in place of the profile's."},
+      {"terminal_check",
+       "charge and discharge at nearly 1C with a trusted ammeter in series and a voltmeter on the cell's own "
+       "terminals, half an hour",
+       terminal_check, almost_full,
+       "Charge the cell full, take out 10 % and put back 5 %; put a trusted ammeter in series and a voltmeter on the "
+       "cell's own terminals and enter what they read as current_ref_a and voltage_ref_v."},
+      {"meter_check",
+       "contactor open for half an hour, the voltage sense wires in turn on two voltages of a reference source",
+       meter_check, almost_full,
+       "Open the contactor; put the voltage sense wires on a reference source where the profile has a voltage_ref_v, "
+       "and keep both reference columns in the recording, with what a trusted meter read there."},
+      {"rate_steps", "pulses of three rates and two lengths, both ways, at five states of charge", rate_steps,
+       almost_full,
        "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; log once a second or faster."},
-      {"climate_steps", "small pulses at 25, 10 and again 25 degrees C, then heat from within", climate_steps, almost_full,
-       "Put the cell into a climate chamber set as temperature_c says, and log the cell's own temperature; begin at 95 %, charged last and rested for an hour."},
+      {"climate_steps", "small pulses at 25, 10 and again 25 degrees C, then heat from within", climate_steps,
+       almost_full,
+       "Put the cell into a climate chamber set as temperature_c says, and log the cell's own temperature; begin at 95 "
+       "%, charged last and rested for an hour."},
       {"full_cycle", "slowly down into the lower knee and up into the upper one, with rests", full_cycle, almost_full,
        "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; no other load meanwhile."},
-      {"loops_and_rests", "loops of three sizes at three rates, each level from above and from below, with rests of 40 minutes", loops_and_rests, almost_full,
+      {"loops_and_rests",
+       "loops of three sizes at three rates, each level from above and from below, with rests of 40 minutes",
+       loops_and_rests, almost_full,
        "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; log through all rests."},
-      {"charge_turns", "half the capacity in and out five times between two visits of the lower knee", charge_turns, almost_full,
-       "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; open the contactor where the profile has a current_ref_a and keep that column in the recording."},
+      {"charge_turns", "half the capacity in and out five times between two visits of the lower knee", charge_turns,
+       almost_full,
+       "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; open the contactor where the "
+       "profile has a current_ref_a and keep that column in the recording."},
       {"long_rest_open", "contactor open for 8 hours between two visits of the lower knee", long_rest_open, almost_full,
-       "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; open the contactor where the profile has a current_ref_a, log on, and keep that column in the recording."},
+       "Charge the cell full, take out 10 % and put back 5 %, let it rest for an hour; open the contactor where the "
+       "profile has a current_ref_a, log on, and keep that column in the recording."},
   };
   return all;
 }
@@ -460,4 +493,4 @@ std::optional<std::vector<ProfileRow>> experiment(std::string_view name, const E
   return course.sampled(options.capacity_ah, options.step_s);
 }
 
-}  // namespace bms
+}  // namespace bms::experiments

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace bms {
+namespace bms::experiments {
 
 class SplitMix {
  public:
@@ -20,4 +20,4 @@ class SplitMix {
   std::uint64_t state_;
 };
 
-}  // namespace bms
+}  // namespace bms::experiments

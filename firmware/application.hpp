@@ -1,10 +1,12 @@
-// What the firmware does with each sample: estimate, record, look at the whole, protect, tell, listen, remember; and feed the watchdog if all of it
-// has made progress (firmware/progress.hpp).
+// What the firmware does with each sample: estimate, record, look at the whole, protect, tell, listen, remember; and
+// feed the watchdog if all of it has made progress (firmware/progress.hpp).
 //
-//   Board   cells, and as functions what depends on the cell file: a step of the estimator, how far it came, what is known beside it, the cells beside their mean,
+//   Board   cells, and as functions what depends on the cell file: a step of the estimator, how far it came, what is
+//   known beside it, the cells beside their mean,
 //           what a reading may be, the plan of protection (firmware/board_cell.hpp; a test brings its own)
 //
-// Sees the estimator, protection, storage and the hal, never a register; runs on a host that supplies the few functions of hal/ it calls.
+// Sees the estimator, protection, storage and the hal, never a register; runs on a host that supplies the few functions
+// of hal/ it calls.
 #pragma once
 
 #include <algorithm>
@@ -27,13 +29,13 @@
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 /// Nothing beside the battery's own messages. Others: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
 struct NoVehicleProfile {
   template <class... Known>
   constexpr void tell(const Known&...) {}
-  constexpr void hear(const hal::CanFrame&) {}
+  constexpr void hear(const can::Frame&) {}
 };
 
 template <class Board, class VehicleProfile = NoVehicleProfile>
@@ -44,7 +46,8 @@ class Application {
   static constexpr std::size_t cells = Board::cells;
 
   /// start: where to begin, told from outside or remembered. persistence: started.
-  Application(const std::optional<StartingPoint>& start, const messages::Identity& identity, float capacity_ah, storage::Persistence& persistence)
+  Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
+              float capacity_ah, storage::Persistence& persistence)
       : estimator_{start ? Estimator(*start) : Estimator()},
         protection_{Board::plan(), static_cast<std::uint32_t>(persistence.settings().get(kept_faults_key).value_or(0))},
         telemetry_{identity, capacity_ah, start},
@@ -57,21 +60,24 @@ class Application {
     if constexpr (cells > 1) recall(cells_, persistence.cells());
   }
 
-  void take(const PackSample<cells>& pack) {
+  void take(const measurement::PackSample<cells>& pack) {
     const std::uint64_t began_us = hal::now_us();
     board_.state = hal::board_state();
-    const Sample mean = mean_cell(pack, Board::plausible());
+    const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
     const Result estimate = Board::step(estimator_, mean);
-    hal::record(words(estimate));
+    hal::record(estimator::words(estimate));
     const auto request = requested_.power_now(pack.time_us);
     Board::look(condition_, estimator_, mean, estimate, hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::tell_apart(cells_, pack, estimate);
     protect(pack, estimate, request);
-    telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, board_, requested_.log_samples);
-    vehicle_profile_.tell(pack, condition_, protection_.decision(), Board::plan(), capacity_ah_, (estimate.flags & not_started) == 0);
+    telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, board_,
+                    requested_.log_samples);
+    vehicle_profile_.tell(pack, condition_, protection_.decision(), Board::plan(), capacity_ah_,
+                          (estimate.flags & estimator::not_started) == 0);
     hear(pack.time_us);
     estimate_ = estimate;
-    if (persistence_.count(mean)) [[unlikely]] remember();
+    if (persistence_.count(mean)) [[unlikely]]
+      remember();
     const auto took_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(hal::now_us() - began_us, 0xFFFF'FFFF));
     board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
     if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.told()})) hal::watchdog_feed();
@@ -93,15 +99,15 @@ class Application {
   using Remembered = RememberedOf<typename Estimator::Scalar, cells>;
   static constexpr int most_requests = 4;  // a sample must not take longer because somebody asks much
 
-  void protect(const PackSample<cells>& pack, const Result& estimate, protection::Request request) {
+  void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
     protection::PackEstimate<cells> known;
-    if ((estimate.flags & not_started) == 0) {
+    if ((estimate.flags & estimator::not_started) == 0) {
       known.soc_ppb = messages::ppb(estimate.soc);
       known.soc_sigma_ppb = messages::ppb(estimate.soc_sigma);
-      known.contradicts = (estimate.flags & voltage_disbelieved) != 0;
+      known.contradicts = (estimate.flags & estimator::voltage_disbelieved) != 0;
       if (condition_.limits_known()) {
-        known.model_charge_ua = model::to_micro(condition_.limits_10s().charge_a);
-        known.model_discharge_ua = model::to_micro(condition_.limits_10s().discharge_a);
+        known.model_charge_ua = arithmetic::to_micro(condition_.limits_10s().charge_a);
+        known.model_discharge_ua = arithmetic::to_micro(condition_.limits_10s().discharge_a);
       }
       for (std::size_t k = 0; k < cells; ++k) {
         known.cell_soc_ppb[k] = cells > 1 ? messages::ppb(cells_[k].soc()) : 0;
@@ -111,16 +117,21 @@ class Application {
     protection::Orders orders;
     orders.request = request;
     orders.clear = std::exchange(requested_.clear, protection::Clear::none);
-    if (board_.cell_file_changed && orders.clear != protection::Clear::none) [[unlikely]] take_this_cell_file();
+    if (board_.cell_file_changed && orders.clear != protection::Clear::none) [[unlikely]]
+      take_this_cell_file();
     orders.link_uv = hal::link_uv();
-    orders.board_fault = board_.unfit() || board_.state.supply_low || (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
+    orders.board_fault = board_.unfit() || board_.state.supply_low ||
+                         (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     orders.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().works();
     first_ = false;
     const std::uint32_t kept_before = protection_.decision().kept;
     const auto& decision = protection_.update(pack, known, orders);
-    hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge, decision.outputs.charge_enable, decision.bleed});
-    if (decision.came != 0) [[unlikely]] note_faults(decision.came);
-    if (decision.kept != kept_before) [[unlikely]] persistence_.set(kept_faults_key, static_cast<std::int32_t>(decision.kept));
+    hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
+                         decision.outputs.charge_enable, decision.bleed});
+    if (decision.came != 0) [[unlikely]]
+      note_faults(decision.came);
+    if (decision.kept != kept_before) [[unlikely]]
+      persistence_.set(kept_faults_key, static_cast<std::int32_t>(decision.kept));
   }
 
   /// Somebody has seen that it is another, and means it: what is stored from now on is of this one.
@@ -136,10 +147,11 @@ class Application {
   }
 
   void hear(std::uint64_t now_us) {
-    hal::CanFrame frame;
+    can::Frame frame;
     for (int k = 0; k < most_requests && hal::next_request(frame); ++k) {
       if (auto answer = commands_.take(frame, now_us, requested_)) {
-        if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time)) answer->result = can::CommandAnswer::result_refused;
+        if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time))
+          answer->result = can::CommandAnswer::result_refused;
         if (const auto correction = std::exchange(requested_.correction, std::nullopt)) correct(*correction);
         telemetry_.answer(*answer);
       } else {
@@ -161,8 +173,8 @@ class Application {
   }
 
   Estimator estimator_;
-  Condition<Estimator> condition_;
-  PackCells<typename Estimator::Scalar, cells> cells_;
+  estimator::Condition<Estimator> condition_;
+  estimator::PackCells<typename Estimator::Scalar, cells> cells_;
   protection::Protection<cells> protection_;
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;
@@ -177,4 +189,4 @@ class Application {
   bool first_ = true;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,20 +1,27 @@
 // Apart from the step: this is not in the hot path, and small rather than fast.
 #include "firmware/board_cell.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
-void BoardCell::look(Condition<Estimator>& condition, const Estimator& estimator, const Sample& sample, const Estimator::Result& estimate, bool limits_wanted) {
+void BoardCell::look(estimator::Condition<Estimator>& condition, const Estimator& estimator,
+                     const measurement::Sample& sample, const Estimator::Result& estimate, bool limits_wanted) {
   condition.update(generated::cell<BoardScalar>, sample, estimate, estimator.state(), limits_wanted);
 }
 
-void BoardCell::tell_apart(PackCells<BoardScalar, cells>& of, const PackSample<cells>& pack, const Estimator::Result& estimate) { of.update(generated::cell<BoardScalar>, pack, estimate); }
+void BoardCell::tell_apart(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
+                           const Estimator::Result& estimate) {
+  of.update(generated::cell<BoardScalar>, pack, estimate);
+}
 
 const model::Plausible& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
-  static constexpr auto plan = protection::protection_plan(
-      {.limits = generated::parameters.limits, .capacity_ah = generated::parameters.capacity_ah, .cells = cells, .temperatures = cells > 1 ? 4 : 1, .sample_period_s = hal::sample_period_s});
+  static constexpr auto plan = protection::protection_plan({.limits = generated::parameters.limits,
+                                                            .capacity_ah = generated::parameters.capacity_ah,
+                                                            .cells = cells,
+                                                            .temperatures = cells > 1 ? 4 : 1,
+                                                            .sample_period_s = hal::sample_period_s});
   return plan;
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,5 +1,5 @@
-// The application's parts with this board's cell: the one place where what is generated comes in, the model's type here, its tables in the
-// .cpp files.
+// The application's parts with this board's cell: the one place where what is generated comes in, the model's type
+// here, its tables in the .cpp files.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +17,18 @@
 #include "firmware/j1939_profile.hpp"
 #endif
 
-namespace bms {
+namespace bms::firmware {
 
 #if defined(BMS_FIXED_POINT)
-using BoardScalar = model::FixedPoint;  // a core without an FPU
+using BoardScalar = arithmetic::FixedPoint;  // a core without an FPU
 #else
 using BoardScalar = float;
 #endif
 
-using BoardEstimator = SocEstimator<BoardScalar, generated::Model>;
+using BoardEstimator = estimator::SocEstimator<BoardScalar, generated::Model>;
 
 /// One step. A function of its own so that its cost can be counted.
-BoardEstimator::Result estimator_step(BoardEstimator& estimator, const Sample& sample);
+BoardEstimator::Result estimator_step(BoardEstimator& estimator, const measurement::Sample& sample);
 
 messages::Identity identity();
 float capacity_ah();
@@ -45,12 +45,16 @@ struct BoardCell {
   using Estimator = BoardEstimator;
   static constexpr std::size_t cells = hal::pack_cells;
 
-  static Estimator::Result step(Estimator& estimator, const Sample& sample) { return estimator_step(estimator, sample); }
+  static Estimator::Result step(Estimator& estimator, const measurement::Sample& sample) {
+    return estimator_step(estimator, sample);
+  }
   static std::uint64_t estimated_us(const Estimator& estimator) { return estimator.time_us(); }
-  static void look(Condition<Estimator>& condition, const Estimator& estimator, const Sample& sample, const Estimator::Result& estimate, bool limits_wanted);
-  static void tell_apart(PackCells<BoardScalar, cells>& of, const PackSample<cells>& pack, const Estimator::Result& estimate);
+  static void look(estimator::Condition<Estimator>& condition, const Estimator& estimator,
+                   const measurement::Sample& sample, const Estimator::Result& estimate, bool limits_wanted);
+  static void tell_apart(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
+                         const Estimator::Result& estimate);
   static const model::Plausible& plausible();
   static const protection::ProtectionPlan& plan();
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,13 +1,15 @@
-// A CANopen slave as small as CiA 301 allows: network management, heartbeat, and an SDO server for values of up to four bytes.
+// A CANopen slave as small as CiA 301 allows: network management, heartbeat, and an SDO server for values of up to four
+// bytes.
 //
 //   000h          in     NMT: start, stop, pre-operational, reset, for this node or for all
 //   700h + node   out    boot-up once, then the state, each heartbeat_us
 //   600h + node   in     SDO: read or write an object at once (expedited)
 //   580h + node   out    its answer, or why not (abort code)
 //
-// The node starts by itself and is operational then: a truck need not have a master. Stopped it says nothing but its heartbeat. Segmented and block
-// transfers are refused. Objects are the owner's: read(index, sub) and write(index, sub, value, length) below.
-// Source: CiA 301 version 4.2.0, as its many public implementations have it: 7.2.4 (SDO), 7.2.8 (NMT).
+// The node starts by itself and is operational then: a truck need not have a master. Stopped it says nothing but its
+// heartbeat. Segmented and block transfers are refused. Objects are the owner's: read(index, sub) and write(index, sub,
+// value, length) below. Source: CiA 301 version 4.2.0, as its many public implementations have it: 7.2.4 (SDO), 7.2.8
+// (NMT).
 #pragma once
 
 #include <array>
@@ -23,7 +25,14 @@ inline constexpr std::uint32_t nmt_id = 0x000, sdo_answer_id = 0x580, sdo_reques
 enum class NodeState : std::uint8_t { boot_up = 0, stopped = 4, operational = 5, pre_operational = 127 };
 
 /// SDO abort codes; none: it went well.
-enum class Refusal : std::uint32_t { none = 0, unknown_command = 0x0504'0001, read_only = 0x0601'0002, no_such_object = 0x0602'0000, wrong_length = 0x0607'0010, no_such_sub_index = 0x0609'0011 };
+enum class Refusal : std::uint32_t {
+  none = 0,
+  unknown_command = 0x0504'0001,
+  read_only = 0x0601'0002,
+  no_such_object = 0x0602'0000,
+  wrong_length = 0x0607'0010,
+  no_such_sub_index = 0x0609'0011
+};
 
 /// What an object holds: length 1, 2 or 4 bytes.
 struct Entry {
@@ -54,7 +63,7 @@ class Node {
 
   /// Whether the frame was for this node.
   template <class Objects>
-  bool hear(const hal::CanFrame& frame, Objects&& objects) {
+  bool hear(const can::Frame& frame, Objects&& objects) {
     if (frame.long_id) return false;
     if (frame.id == nmt_id && frame.length == 2 && (frame.data[1] == 0 || frame.data[1] == id_)) {
       obey(frame.data[0]);
@@ -66,7 +75,8 @@ class Node {
   }
 
  private:
-  static constexpr std::uint8_t start = 1, stop = 2, enter_pre_operational = 128, reset_node = 129, reset_communication = 130;
+  static constexpr std::uint8_t start = 1, stop = 2, enter_pre_operational = 128, reset_node = 129,
+                                reset_communication = 130;
   static constexpr std::uint8_t download = 1, upload = 2, abort = 4;  // client command specifiers, the upper three bits
   static constexpr std::size_t value_at = 4;
 
@@ -80,11 +90,11 @@ class Node {
   void say(NodeState state) const { hal::can_send({heartbeat_id + id_, 1, {static_cast<std::uint8_t>(state)}}); }
 
   template <class Objects>
-  void serve(const hal::CanFrame& request, Objects& objects) const {
+  void serve(const can::Frame& request, Objects& objects) const {
     const auto index = hal::get_bytes<std::uint16_t>(request.data, 1);
     const std::uint8_t command = request.data[0] >> 5, sub = request.data[3];
     if (command == abort) return;
-    hal::CanFrame answer{sdo_answer_id + id_, 8, {0, request.data[1], request.data[2], sub}};
+    can::Frame answer{sdo_answer_id + id_, 8, {0, request.data[1], request.data[2], sub}};
     Refusal refusal = Refusal::unknown_command;
     if (command == upload) {
       const Entry entry = objects.read(index, sub);
@@ -92,7 +102,8 @@ class Node {
       answer.data[0] = static_cast<std::uint8_t>(0x43 | (4 - entry.length) << 2);
       hal::put_bytes(answer.data, value_at, entry.value);
     } else if (command == download && (request.data[0] & 3) == 3) {  // expedited, its length said
-      refusal = objects.write(index, sub, hal::get_bytes<std::uint32_t>(request.data, value_at), static_cast<std::uint8_t>(4 - (request.data[0] >> 2 & 3)));
+      refusal = objects.write(index, sub, hal::get_bytes<std::uint32_t>(request.data, value_at),
+                              static_cast<std::uint8_t>(4 - (request.data[0] >> 2 & 3)));
       answer.data[0] = 0x60;
     }
     if (refusal != Refusal::none) {

@@ -1,17 +1,19 @@
-// The battery as a CANopen battery module (CiA 418) for chargers of CiA 419. Build option BMS_VEHICLE_PROFILE=cia418; nodes BMS_CANOPEN_NODE (the
-// battery, 1) and BMS_CANOPEN_CHARGER (10).
+// The battery as a CANopen battery module (CiA 418) for chargers of CiA 419. Build option BMS_VEHICLE_PROFILE=cia418;
+// nodes BMS_CANOPEN_NODE (the battery, 1) and BMS_CANOPEN_CHARGER (10).
 //
-//   200h + charger   6010 temperature, 6000 battery status                          each 0.2 s while operational: the charger's first three
-//   300h + charger   6010 temperature, 6000 battery status, 6060 voltage            receive PDOs, with the mapping that they have by default
-//   400h + charger   6070 charging current requested, 6081 state of charge
+//   200h + charger   6010 temperature, 6000 battery status                          each 0.2 s while operational: the
+//   charger's first three 300h + charger   6010 temperature, 6000 battery status, 6060 voltage            receive PDOs,
+//   with the mapping that they have by default 400h + charger   6070 charging current requested, 6081 state of charge
 //
-//   6000  u8   bit 0: charge me                     6060  u32  V / 1024, all ones: not known      6020.1  u8   battery type, 0: not said
-//   6001  u8   charger status, written by it        6070  u16  A / 16                             6020.2  u16  capacity, Ah
-//   6010  i16  0.125 degC, 7FFFh: not known         6081  u8   %, FFh: not known                  6020.3  u16  highest charging current, A
+//   6000  u8   bit 0: charge me                     6060  u32  V / 1024, all ones: not known      6020.1  u8   battery
+//   type, 0: not said 6001  u8   charger status, written by it        6070  u16  A / 16 6020.2  u16  capacity, Ah 6010
+//   i16  0.125 degC, 7FFFh: not known         6081  u8   %, FFh: not known                  6020.3  u16  highest
+//   charging current, A
 //                                                                                                6020.4  u16  cells
 //
-// Where that comes from, and what of it no text confirms: can/messages.md. No end-to-end protection, as CANopen has none: what opens contactors goes by
-// the battery's own messages. Cost: bus load 0.7 % of 250 kbit/s; an SDO request is answered with the next sample.
+// Where that comes from, and what of it no text confirms: can/messages.md. No end-to-end protection, as CANopen has
+// none: what opens contactors goes by the battery's own messages. Cost: bus load 0.7 % of 250 kbit/s; an SDO request is
+// answered with the next sample.
 #pragma once
 
 #include <algorithm>
@@ -19,14 +21,14 @@
 #include <cstdint>
 #include <tuple>
 
-#include "estimator/pack_sample.hpp"
 #include "firmware/canopen.hpp"
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "hal/accepted_frames.hpp"
+#include "measurement/pack_sample.hpp"
 #include "protection/protection.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 class Cia418Profile {
  public:
@@ -36,17 +38,23 @@ class Cia418Profile {
     std::uint16_t id;
     std::uint8_t length;
   };
-  static constexpr std::array<Pdo, 3> pdos{{{"Cia418Status", 0x200 + BMS_CANOPEN_CHARGER, 3}, {"Cia418Voltage", 0x300 + BMS_CANOPEN_CHARGER, 7}, {"Cia418Request", 0x400 + BMS_CANOPEN_CHARGER, 3}}};
+  static constexpr std::array<Pdo, 3> pdos{{{"Cia418Status", 0x200 + BMS_CANOPEN_CHARGER, 3},
+                                            {"Cia418Voltage", 0x300 + BMS_CANOPEN_CHARGER, 7},
+                                            {"Cia418Request", 0x400 + BMS_CANOPEN_CHARGER, 3}}};
 
   /// soc_known: the estimator has started. capacity_ah: of the cell file.
   template <std::size_t Cells, class Condition>
-  void tell(const PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d, const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
+  void tell(const measurement::PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d,
+            const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
     const bool charge_me = d.outputs.charge_enable && d.allowed.charge_ua > 0;
     const std::int16_t cdegc = pack.temperature_cdegc[0];
-    temperature_ = temperature_possible(cdegc) ? static_cast<std::int16_t>(cdegc * 2 / 25) : no_value;
+    temperature_ = measurement::temperature_possible(cdegc) ? static_cast<std::int16_t>(cdegc * 2 / 25) : no_value;
     status_ = charge_me ? 1 : 0;
-    voltage_ = pack.pack_uv >= 0 ? static_cast<std::uint32_t>(static_cast<std::int64_t>(pack.pack_uv) * 1'024 / 1'000'000) : 0xFFFF'FFFF;
-    current_requested_ = charge_me ? static_cast<std::uint16_t>(std::min<std::int32_t>(d.allowed.charge_ua / 62'500, 0xFFFF)) : 0;
+    voltage_ = pack.pack_uv >= 0
+                   ? static_cast<std::uint32_t>(static_cast<std::int64_t>(pack.pack_uv) * 1'024 / 1'000'000)
+                   : 0xFFFF'FFFF;
+    current_requested_ =
+        charge_me ? static_cast<std::uint16_t>(std::min<std::int32_t>(d.allowed.charge_ua / 62'500, 0xFFFF)) : 0;
     soc_ = soc_known ? whole(messages::percent(condition.display_soc()), 100) : 0xFF;
     capacity_ = static_cast<std::uint16_t>(capacity_ah + 0.5F);
     most_current_ = static_cast<std::uint16_t>(plan.derating.charge_most_ua / 1'000'000);
@@ -57,13 +65,16 @@ class Cia418Profile {
     if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
   }
 
-  void hear(const hal::CanFrame& frame) { node_.hear(frame, *this); }
+  void hear(const can::Frame& frame) { node_.hear(frame, *this); }
 
   canopen::Entry read(std::uint16_t index, std::uint8_t sub) const {
-    if (index == 0x1018) return of_sub({4, 0, 0, 0, 0}, {1, 4, 4, 4, 4}, sub);  // identity: no vendor number is assigned
+    if (index == 0x1018)
+      return of_sub({4, 0, 0, 0, 0}, {1, 4, 4, 4, 4}, sub);  // identity: no vendor number is assigned
     if (index == 0x6020) return of_sub({4, 0, capacity_, most_current_, cells_}, {1, 1, 2, 2, 2}, sub);
     const canopen::Entry entry = single(index);
-    return entry.refusal == canopen::Refusal::none && sub != 0 ? canopen::Entry{.refusal = canopen::Refusal::no_such_sub_index} : entry;
+    return entry.refusal == canopen::Refusal::none && sub != 0
+               ? canopen::Entry{.refusal = canopen::Refusal::no_such_sub_index}
+               : entry;
   }
 
   canopen::Refusal write(std::uint16_t index, std::uint8_t sub, std::uint32_t value, std::uint8_t length) {
@@ -84,35 +95,47 @@ class Cia418Profile {
     return static_cast<std::uint8_t>(held + 0.5F);
   }
 
-  static canopen::Entry of_sub(const std::array<std::uint32_t, 5>& values, const std::array<std::uint8_t, 5>& lengths, std::uint8_t sub) {
+  static canopen::Entry of_sub(const std::array<std::uint32_t, 5>& values, const std::array<std::uint8_t, 5>& lengths,
+                               std::uint8_t sub) {
     if (sub >= values.size()) return {.refusal = canopen::Refusal::no_such_sub_index};
     return {values[sub], lengths[sub]};
   }
 
   canopen::Entry single(std::uint16_t index) const {
     switch (index) {
-      case 0x1000: return {device_type, 4};
-      case 0x1001: return {0, 1};  // what is wrong is in Faults
-      case 0x1017: return {canopen::Node::heartbeat_us / 1'000, 2};
-      case 0x6000: return {status_, 1};
-      case 0x6001: return {charger_status_, 1};
-      case 0x6010: return {static_cast<std::uint16_t>(temperature_), 2};
-      case 0x6060: return {voltage_, 4};
-      case 0x6070: return {current_requested_, 2};
-      case 0x6081: return {soc_, 1};
-      default: return {.refusal = canopen::Refusal::no_such_object};
+      case 0x1000:
+        return {device_type, 4};
+      case 0x1001:
+        return {0, 1};  // what is wrong is in Faults
+      case 0x1017:
+        return {canopen::Node::heartbeat_us / 1'000, 2};
+      case 0x6000:
+        return {status_, 1};
+      case 0x6001:
+        return {charger_status_, 1};
+      case 0x6010:
+        return {static_cast<std::uint16_t>(temperature_), 2};
+      case 0x6060:
+        return {voltage_, 4};
+      case 0x6070:
+        return {current_requested_, 2};
+      case 0x6081:
+        return {soc_, 1};
+      default:
+        return {.refusal = canopen::Refusal::no_such_object};
     }
   }
 
   void send_pdos() const {
-    hal::CanFrame status{pdos[0].id, pdos[0].length, {}}, voltage{pdos[1].id, pdos[1].length, {}}, wanted{pdos[2].id, pdos[2].length, {}};
+    can::Frame status{pdos[0].id, pdos[0].length, {}}, voltage{pdos[1].id, pdos[1].length, {}},
+        wanted{pdos[2].id, pdos[2].length, {}};
     hal::put_bytes(status.data, 0, temperature_);
     status.data[2] = status_;
     voltage.data = status.data;
     hal::put_bytes(voltage.data, 3, voltage_);
     hal::put_bytes(wanted.data, 0, current_requested_);
     wanted.data[2] = soc_;
-    for (const hal::CanFrame& pdo : {status, voltage, wanted}) hal::can_send(pdo);
+    for (const can::Frame& pdo : {status, voltage, wanted}) hal::can_send(pdo);
   }
 
   canopen::Node node_{static_cast<std::uint8_t>(hal::canopen_node)};
@@ -127,15 +150,18 @@ namespace cia418 {
 
 /// Whether a message of the battery, or a frame of a sample, has an identifier that a PDO has.
 constexpr bool apart_from_the_own() {
-  bool apart = hal::canopen_node >= 1 && hal::canopen_node <= 127 && hal::canopen_charger >= 1 && hal::canopen_charger <= 127 && hal::canopen_node != hal::canopen_charger;
+  bool apart = hal::canopen_node >= 1 && hal::canopen_node <= 127 && hal::canopen_charger >= 1 &&
+               hal::canopen_charger <= 127 && hal::canopen_node != hal::canopen_charger;
   for (const Cia418Profile::Pdo& pdo : Cia418Profile::pdos) {
     std::apply([&](auto... m) { ((apart = apart && m.id != pdo.id), ...); }, can::Messages{});
     for (const std::uint16_t id : hal::accepted_ids) apart = apart && id != pdo.id;
   }
   return apart;
 }
-static_assert(apart_from_the_own(), "BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER: two nodes of 1 to 127, whose PDOs are no message of the battery (of a charger of 16 to 29 one is)");
+static_assert(apart_from_the_own(),
+              "BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER: two nodes of 1 to 127, whose PDOs are no message of the "
+              "battery (of a charger of 16 to 29 one is)");
 
 }  // namespace cia418
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,4 +1,5 @@
-// What the vehicle or a workshop asks of the battery over CAN (Command in can/greybox_bms.dbc), and what it is answered.
+// What the vehicle or a workshop asks of the battery over CAN (Command in can/greybox_bms.dbc), and what it is
+// answered.
 //
 // A command is heard once: a wrong CRC, a frame of another message or the counter of the command before are not. An
 // argument that makes no sense is refused, a code that nobody knows answered as such; neither changes anything.
@@ -12,7 +13,7 @@
 #include "protection/contactors.hpp"
 #include "protection/fault_monitor.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 static_assert(can::Command::id == hal::command_frame_id, "a real bus would filter commands out");
 
@@ -21,25 +22,29 @@ struct Requested {
   static constexpr std::uint64_t request_lasts_us = 5'000'000;
 
   bool log_samples = true;
-  std::uint32_t unix_time_s = 0;     ///< that the calendar is to be set to; 0: not
+  std::uint32_t unix_time_s = 0;  ///< that the calendar is to be set to; 0: not
   struct Correction {
     std::uint16_t which = 0;  ///< of hal::Calibration, in its order
     std::int32_t value = 0;
   };
-  std::optional<Correction> correction;  ///< of the measuring chain, until it has been used
+  std::optional<Correction> correction;               ///< of the measuring chain, until it has been used
   protection::Clear clear = protection::Clear::none;  ///< until it has been used
   protection::Request power = protection::Request::none;
   std::uint64_t power_at_us = 0;
 
   /// What is still asked for: who does not repeat it has gone.
-  constexpr protection::Request power_now(std::uint64_t now_us) const { return now_us - power_at_us < request_lasts_us ? power : protection::Request::none; }
+  constexpr protection::Request power_now(std::uint64_t now_us) const {
+    return now_us - power_at_us < request_lasts_us ? power : protection::Request::none;
+  }
 };
 
 class Commands {
  public:
   /// now_us: the samples' clock. Nothing: the frame is no command that is heard.
-  constexpr std::optional<can::CommandAnswer> take(const hal::CanFrame& frame, std::uint64_t now_us, Requested& requested) {
-    if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id)) return std::nullopt;
+  constexpr std::optional<can::CommandAnswer> take(const can::Frame& frame, std::uint64_t now_us,
+                                                   Requested& requested) {
+    if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id))
+      return std::nullopt;
     const std::uint8_t counter = can::counter_of(frame);
     if (counter >= can::counters || counter == last_counter_) return std::nullopt;
     last_counter_ = counter;
@@ -76,18 +81,20 @@ class Commands {
       case can::Command::code_voltage_offset:
       case can::Command::code_current_gain:
       case can::Command::code_current_offset: {
-        constexpr std::int32_t most[] = {50'000, 100'000, 50'000, 5'000'000};  // ppm, uV, ppm, uA: more is no calibration, but a wrong part
+        constexpr std::int32_t most[] = {50'000, 100'000, 50'000,
+                                         5'000'000};  // ppm, uV, ppm, uA: more is no calibration, but a wrong part
         const auto which = static_cast<std::uint16_t>(command.code - can::Command::code_voltage_gain);
         const auto value = static_cast<std::int32_t>(command.argument);
         if (value < -most[which] || value > most[which]) return A::result_refused;
         requested.correction = Requested::Correction{which, value};
         return A::result_done;
       }
-      default: return A::result_no_such_command;
+      default:
+        return A::result_no_such_command;
     }
   }
 
   std::uint8_t last_counter_ = can::counters;  // no command's
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

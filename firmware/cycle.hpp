@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace bms {
+namespace bms::firmware {
 
 class Cycle {
  public:
@@ -22,4 +22,4 @@ class Cycle {
   bool once_ = false;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -6,10 +6,10 @@ extern const std::uint32_t image_cell_hash;
 constexpr std::uint32_t image_cell_hash = bms::generated::cell_hash;
 }
 
-namespace bms {
+namespace bms::firmware {
 
 // flatten: with everything inline the cell is a constant, which saves one instruction in seven
-[[gnu::flatten]] BoardEstimator::Result estimator_step(BoardEstimator& estimator, const Sample& sample) {
+[[gnu::flatten]] BoardEstimator::Result estimator_step(BoardEstimator& estimator, const measurement::Sample& sample) {
   return estimator.step(generated::cell<BoardScalar>, sample);
 }
 
@@ -17,4 +17,4 @@ float capacity_ah() { return static_cast<float>(generated::parameters.capacity_a
 
 messages::Identity identity() { return {.cell_hash = image_cell_hash, .version = BMS_VERSION}; }
 
-}  // namespace bms
+}  // namespace bms::firmware

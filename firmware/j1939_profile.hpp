@@ -1,23 +1,24 @@
-// The battery in messages that chargers and displays of other makers know, beside its own: DC_SOURCE_STATUS_1, 2, 3, 4, 6 and 11 of RV-C, a J1939
-// whose layouts are open (can/j1939_profile.dbc; where they come from: can/messages.md). Build option BMS_VEHICLE_PROFILE=j1939.
+// The battery in messages that chargers and displays of other makers know, beside its own: DC_SOURCE_STATUS_1, 2, 3, 4,
+// 6 and 11 of RV-C, a J1939 whose layouts are open (can/j1939_profile.dbc; where they come from: can/messages.md).
+// Build option BMS_VEHICLE_PROFILE=j1939.
 //
-// Each by its cycle time, in the samples' own time, while somebody listens. Nothing is received: no address is claimed, no request answered.
-// They have no end-to-end protection: what opens contactors goes by the battery's own messages. An allowed discharging current has no place in them
-// but DischargeOn.
-// Cost: six frames of 160 bits at worst, seven a second: 0.5 % of 250 kbit/s.
+// Each by its cycle time, in the samples' own time, while somebody listens. Nothing is received: no address is claimed,
+// no request answered. They have no end-to-end protection: what opens contactors goes by the battery's own messages. An
+// allowed discharging current has no place in them but DischargeOn. Cost: six frames of 160 bits at worst, seven a
+// second: 0.5 % of 250 kbit/s.
 #pragma once
 
 #include <cstdint>
 #include <tuple>
 
-#include "estimator/pack_sample.hpp"
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "hal/can.hpp"
 #include "j1939_messages.hpp"  // generated from can/j1939_profile.dbc
+#include "measurement/pack_sample.hpp"
 #include "protection/protection.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace j1939 {
 
@@ -29,7 +30,8 @@ constexpr std::uint32_t flag(bool b) { return b ? 1 : 0; }
 
 /// Discharging above 0, 1 mA, 2,000,000 A off.
 constexpr std::uint32_t milliamperes_off(std::int32_t current_ua) {
-  return current_ua == no_reading ? current_unknown : static_cast<std::uint32_t>(2'000'000'000 - current_ua / 1'000);
+  return current_ua == measurement::no_reading ? current_unknown
+                                               : static_cast<std::uint32_t>(2'000'000'000 - current_ua / 1'000);
 }
 
 template <class Message>
@@ -41,7 +43,7 @@ constexpr Message of_this_battery() {
 }
 
 template <std::size_t Cells>
-constexpr DcSourceStatus1 status_1(const PackSample<Cells>& pack) {
+constexpr DcSourceStatus1 status_1(const measurement::PackSample<Cells>& pack) {
   auto m = of_this_battery<DcSourceStatus1>();
   m.voltage = messages::volts(pack.pack_uv);
   m.current = milliamperes_off(pack.current_ua);
@@ -49,7 +51,8 @@ constexpr DcSourceStatus1 status_1(const PackSample<Cells>& pack) {
 }
 
 template <std::size_t Cells, class Condition>
-constexpr DcSourceStatus2 status_2(const PackSample<Cells>& pack, const Condition& condition, bool soc_known) {
+constexpr DcSourceStatus2 status_2(const measurement::PackSample<Cells>& pack, const Condition& condition,
+                                   bool soc_known) {
   auto m = of_this_battery<DcSourceStatus2>();
   m.source_temperature = messages::degrees(pack.temperature_cdegc[0]);
   if (soc_known) m.state_of_charge = messages::percent(condition.display_soc());
@@ -60,13 +63,16 @@ template <class Condition>
 constexpr DcSourceStatus3 status_3(const Condition& condition, float capacity_ah, bool soc_known) {
   auto m = of_this_battery<DcSourceStatus3>();
   m.state_of_health = messages::percent(condition.capacity().ratio);
-  if (soc_known) m.capacity_remaining = capacity_ah * messages::number(condition.capacity().ratio) * messages::number(condition.display_soc());
+  if (soc_known)
+    m.capacity_remaining =
+        capacity_ah * messages::number(condition.capacity().ratio) * messages::number(condition.display_soc());
   return m;
 }
 
 constexpr DcSourceStatus4 status_4(const protection::Decision& d, const protection::ProtectionPlan& plan) {
   auto m = of_this_battery<DcSourceStatus4>();
-  m.desired_charge_state = d.allowed.charge_ua > 0 ? DcSourceStatus4::desired_charge_state_constant_voltage_or_current : DcSourceStatus4::desired_charge_state_do_not_charge;
+  m.desired_charge_state = d.allowed.charge_ua > 0 ? DcSourceStatus4::desired_charge_state_constant_voltage_or_current
+                                                   : DcSourceStatus4::desired_charge_state_do_not_charge;
   m.desired_voltage = static_cast<float>(plan.cells) * messages::volts(plan.derating.charge_voltage.to);
   m.desired_current = messages::amperes(d.allowed.charge_ua);
   m.battery_type = DcSourceStatus4::battery_type_lithium_iron_phosphate;
@@ -75,8 +81,10 @@ constexpr DcSourceStatus4 status_4(const protection::Decision& d, const protecti
 
 constexpr DcSourceStatus6 status_6(const protection::Decision& d) {
   using protection::bit, protection::Fault;
-  constexpr std::uint32_t above = bit(Fault::cell_overvoltage) | bit(Fault::cell_overvoltage_severe) | bit(Fault::pack_overvoltage);
-  constexpr std::uint32_t below = bit(Fault::cell_undervoltage) | bit(Fault::cell_undervoltage_severe) | bit(Fault::pack_undervoltage) | bit(Fault::deep_discharge);
+  constexpr std::uint32_t above =
+      bit(Fault::cell_overvoltage) | bit(Fault::cell_overvoltage_severe) | bit(Fault::pack_overvoltage);
+  constexpr std::uint32_t below = bit(Fault::cell_undervoltage) | bit(Fault::cell_undervoltage_severe) |
+                                  bit(Fault::pack_undervoltage) | bit(Fault::deep_discharge);
   auto m = of_this_battery<DcSourceStatus6>();
   m.high_voltage_limit = flag((d.faults & (above | bit(Fault::cell_overvoltage_warning))) != 0);
   m.high_voltage_disconnect = flag((d.faults & above) != 0 && !d.outputs.main_plus);
@@ -86,12 +94,14 @@ constexpr DcSourceStatus6 status_6(const protection::Decision& d) {
 }
 
 template <std::size_t Cells, class Condition>
-constexpr DcSourceStatus11 status_11(const PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d, const protection::ProtectionPlan& plan, float capacity_ah) {
+constexpr DcSourceStatus11 status_11(const measurement::PackSample<Cells>& pack, const Condition& condition,
+                                     const protection::Decision& d, const protection::ProtectionPlan& plan,
+                                     float capacity_ah) {
   auto m = of_this_battery<DcSourceStatus11>();
   const bool closed = d.outputs.main_plus && d.outputs.main_minus;
   m.discharge_on = flag(closed && d.allowed.discharge_ua > 0);
   m.charge_on = flag(closed && d.allowed.charge_ua > 0);
-  m.charge_detected = flag(pack.current_ua != no_reading && pack.current_ua > plan.contactors.rest_ua);
+  m.charge_detected = flag(pack.current_ua != measurement::no_reading && pack.current_ua > plan.contactors.rest_ua);
   m.full_capacity = capacity_ah * messages::number(condition.capacity().ratio);
   return m;
 }
@@ -102,7 +112,8 @@ class J1939Profile {
  public:
   /// soc_known: the estimator has started. capacity_ah: of the cell file.
   template <std::size_t Cells, class Condition>
-  void tell(const PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d, const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
+  void tell(const measurement::PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d,
+            const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
     if (!hal::can_listening()) return;
     now_us_ = static_cast<std::uint32_t>(pack.time_us);
     by_time<j1939::DcSourceStatus1>([&] { return j1939::status_1(pack); });
@@ -113,7 +124,7 @@ class J1939Profile {
     by_time<j1939::DcSourceStatus11>([&] { return j1939::status_11(pack, condition, d, plan, capacity_ah); });
   }
 
-  constexpr void hear(const hal::CanFrame&) {}
+  constexpr void hear(const can::Frame&) {}
 
  private:
   template <class Message>
@@ -134,4 +145,4 @@ class J1939Profile {
   std::uint32_t now_us_ = 0;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

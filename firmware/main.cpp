@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint32_t watchdog_ms = 2'000;
 
-using TheApplication = bms::Application<bms::BoardCell, bms::BoardVehicleProfile>;
+using TheApplication = bms::firmware::Application<bms::firmware::BoardCell, bms::firmware::BoardVehicleProfile>;
 TheApplication* running = nullptr;
 
 }  // namespace
@@ -25,13 +25,15 @@ int main() {
   hal::watchdog_start(watchdog_ms);
   hal::board_start();
   storage::Persistence persistence;
-  persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());  // erases, up to half a second a sector: before anything waits for an answer
+  persistence.start(hal::reset_cause(), hal::last_fault(),
+                    hal::calendar_s());  // erases, up to half a second a sector: before anything waits for an answer
   hal::calibrate(stored_calibration(persistence));
   hal::can_start();
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
   const auto told = hal::starting_point();
-  static TheApplication application(told ? told : remembered_start(persistence, identity().cell_hash), identity(), capacity_ah(), persistence);
+  static TheApplication application(told ? told : remembered_start(persistence, identity().cell_hash), identity(),
+                                    capacity_ah(), persistence);
   running = &application;
   for (; sample != nullptr; sample = hal::next_sample()) application.take(*sample);
   application.end();

@@ -18,8 +18,10 @@ namespace bms::messages {
 /// A quantity of any scalar as a float: by its bits, without double arithmetic.
 template <class T>
 constexpr float number(const T& value) {
-  if constexpr (model::is_q<T>) return static_cast<float>(value.raw()) * (1.0F / static_cast<float>(std::int64_t{1} << T::fraction_bits));
-  else return static_cast<float>(value);
+  if constexpr (arithmetic::is_q<T>)
+    return static_cast<float>(value.raw()) * (1.0F / static_cast<float>(std::int64_t{1} << T::fraction_bits));
+  else
+    return static_cast<float>(value);
 }
 template <class T>
 constexpr float percent(const T& fraction) {
@@ -29,13 +31,16 @@ constexpr float percent(const T& fraction) {
 /// In units of 1e-9, within +-2; 0 of what is no number.
 template <class T>
 constexpr std::int32_t ppb(const T& value) {
-  if constexpr (model::is_q<T>) {
+  if constexpr (arithmetic::is_q<T>) {
     static_assert(T::fraction_bits <= 31);
     constexpr std::int64_t most = std::int64_t{2} << T::fraction_bits;
     const std::int64_t raw = value.raw(), held = raw > most ? most : raw < -most ? -most : raw;
     return static_cast<std::int32_t>(held * 1'000'000'000 >> T::fraction_bits);
   } else {
-    const float held = value > 2 ? 2.0F : value < -2 ? -2.0F : value <= 2 ? static_cast<float>(value) : 0.0F;  // the last: not a number
+    const float held = value > 2    ? 2.0F
+                       : value < -2 ? -2.0F
+                       : value <= 2 ? static_cast<float>(value)
+                                    : 0.0F;  // the last: not a number
     return static_cast<std::int32_t>(held * 1e9F);
   }
 }
@@ -55,19 +60,19 @@ constexpr can::Identity identity(const Identity& i) {
 }
 
 template <class S>
-constexpr std::uint32_t soc_quality(const Estimate<S>& e, bool observable) {
+constexpr std::uint32_t soc_quality(const estimator::Estimate<S>& e, bool observable) {
   using M = can::PackState;
-  if ((e.flags & not_started) != 0) return M::soc_quality_not_started;
-  if ((e.flags & voltage_disbelieved) != 0) return M::soc_quality_the_voltage_contradicts;
-  if ((e.flags & soc_unsettled) != 0) return M::soc_quality_more_than_one_state_of_charge_fits;
+  if ((e.flags & estimator::not_started) != 0) return M::soc_quality_not_started;
+  if ((e.flags & estimator::voltage_disbelieved) != 0) return M::soc_quality_the_voltage_contradicts;
+  if ((e.flags & estimator::soc_unsettled) != 0) return M::soc_quality_more_than_one_state_of_charge_fits;
   return observable ? M::soc_quality_told_by_the_voltage : M::soc_quality_carried_by_counting;
 }
 
 template <class Condition, class S>
-constexpr can::PackState pack_state(const Estimate<S>& e, const Condition& condition) {
+constexpr can::PackState pack_state(const estimator::Estimate<S>& e, const Condition& condition) {
   can::PackState m;
   m.soc_quality = soc_quality(e, condition.quality().observable);
-  if ((e.flags & not_started) != 0) return m;
+  if ((e.flags & estimator::not_started) != 0) return m;
   m.soc = percent(e.soc);
   m.soc_sigma = percent(e.soc_sigma);
   m.soc_display = percent(condition.display_soc());
@@ -76,11 +81,15 @@ constexpr can::PackState pack_state(const Estimate<S>& e, const Condition& condi
 
 /// Volts of a reading; what is none, or below 0, is not known.
 constexpr float volts(std::int32_t uv) { return uv >= 0 ? static_cast<float>(uv) * 1e-6F : can::unknown; }
-constexpr float degrees(std::int16_t cdegc) { return temperature_possible(cdegc) ? static_cast<float>(cdegc) * 0.01F : can::unknown; }
-constexpr float amperes(std::int32_t ua) { return ua != no_reading ? static_cast<float>(ua) * 1e-6F : can::unknown; }
+constexpr float degrees(std::int16_t cdegc) {
+  return measurement::temperature_possible(cdegc) ? static_cast<float>(cdegc) * 0.01F : can::unknown;
+}
+constexpr float amperes(std::int32_t ua) {
+  return ua != measurement::no_reading ? static_cast<float>(ua) * 1e-6F : can::unknown;
+}
 
 template <std::size_t Cells>
-constexpr can::PackElectrical pack_electrical(const PackSample<Cells>& pack) {
+constexpr can::PackElectrical pack_electrical(const measurement::PackSample<Cells>& pack) {
   can::PackElectrical m;
   m.voltage = volts(pack.pack_uv);
   m.current = amperes(pack.current_ua);
@@ -90,7 +99,7 @@ constexpr can::PackElectrical pack_electrical(const PackSample<Cells>& pack) {
 
 /// Cells From + 1 to From + 4.
 template <class Message, std::size_t From, std::size_t Cells>
-constexpr Message cell_voltages(const PackSample<Cells>& pack) {
+constexpr Message cell_voltages(const measurement::PackSample<Cells>& pack) {
   Message m;
   std::size_t k = From;
   m.each([&](const char*, const char*, float& value, const can::SignalLayout&) {
@@ -101,7 +110,8 @@ constexpr Message cell_voltages(const PackSample<Cells>& pack) {
 }
 
 template <std::size_t Cells, class S>
-constexpr can::CellExtremes cell_extremes(const PackSample<Cells>& pack, const PackCells<S, Cells>& cells) {
+constexpr can::CellExtremes cell_extremes(const measurement::PackSample<Cells>& pack,
+                                          const estimator::PackCells<S, Cells>& cells) {
   can::CellExtremes m;
   m.highest_cell = m.lowest_cell = 31;
   std::int32_t highest_uv = -1, lowest_uv = 2'147'483'647;
@@ -121,10 +131,12 @@ constexpr can::CellExtremes cell_extremes(const PackSample<Cells>& pack, const P
 }
 
 template <std::size_t Cells>
-constexpr can::Temperatures temperatures(const PackSample<Cells>& pack) {
+constexpr can::Temperatures temperatures(const measurement::PackSample<Cells>& pack) {
   can::Temperatures m;
   std::size_t k = 0;
-  m.each([&](const char*, const char*, float& value, const can::SignalLayout&) { value = degrees(pack.temperature_cdegc[k++]); });
+  m.each([&](const char*, const char*, float& value, const can::SignalLayout&) {
+    value = degrees(pack.temperature_cdegc[k++]);
+  });
   return m;
 }
 
@@ -145,7 +157,8 @@ constexpr can::ContactorState contactor_state(const protection::Decision& d) {
   m.main_minus = d.outputs.main_minus ? 1 : 0;
   m.precharge = d.outputs.precharge ? 1 : 0;
   m.charge_enable = d.outputs.charge_enable ? 1 : 0;
-  if (d.first.fault != protection::no_fault) m.first_cause_time = static_cast<float>(static_cast<std::uint32_t>(d.first.time_us / 100'000)) * 0.1F;
+  if (d.first.fault != protection::no_fault)
+    m.first_cause_time = static_cast<float>(static_cast<std::uint32_t>(d.first.time_us / 100'000)) * 0.1F;
   return m;
 }
 
@@ -164,7 +177,7 @@ constexpr can::Balancing balancing(const protection::Decision& d) {
 }
 
 template <class S>
-constexpr can::ModelDetail model_detail(const Estimate<S>& e) {
+constexpr can::ModelDetail model_detail(const estimator::Estimate<S>& e) {
   can::ModelDetail m;
   m.voltage_rc = number(e.v_rc_v);
   m.voltage_predicted = number(e.voltage_predicted_v);
@@ -245,31 +258,31 @@ constexpr can::SensorErrors sensor_errors(const Result& e, float capacity_ah) {
 
 // What the estimator saw, bit for bit.
 
-constexpr can::SampleCurrent sample_current(const Sample& sample, std::uint16_t counter) {
+constexpr can::SampleCurrent sample_current(const measurement::Sample& sample, std::uint16_t counter) {
   can::SampleCurrent m;
   m.current_ua = sample.current_ua;
   m.sample_counter = counter;
   return m;
 }
-constexpr can::SampleVoltage sample_voltage(const Sample& sample) {
+constexpr can::SampleVoltage sample_voltage(const measurement::Sample& sample) {
   can::SampleVoltage m;
   m.voltage_uv = sample.voltage_uv;
   m.temperature_cdegc = sample.temperature_cdegc;
   return m;
 }
-constexpr can::SampleTime sample_time(const Sample& sample) {
+constexpr can::SampleTime sample_time(const measurement::Sample& sample) {
   can::SampleTime m;
   m.time_low = static_cast<std::uint32_t>(sample.time_us);
   m.time_high = static_cast<std::uint32_t>(sample.time_us >> 32) & 0xFFFF;  // nine years
   return m;
 }
-constexpr can::StartingSoc starting_soc(const std::optional<StartingPoint>& start) {
+constexpr can::StartingSoc starting_soc(const std::optional<measurement::StartingPoint>& start) {
   can::StartingSoc m;
   m.soc_ppb = start ? start->soc_ppb : 0;
   m.given = start ? can::StartingSoc::given_yes : can::StartingSoc::given_no;
   return m;
 }
-constexpr can::StartingSigma starting_sigma(const std::optional<StartingPoint>& start) {
+constexpr can::StartingSigma starting_sigma(const std::optional<measurement::StartingPoint>& start) {
   can::StartingSigma m;
   m.sigma_ppb = start ? start->soc_sigma_ppb : 0;
   return m;

@@ -1,16 +1,18 @@
 // Whether a sample went all its way: only then is the watchdog fed.
 //
-//   sampled     its time is later than that of the sample before: a measuring chain that hands out the same sample again has stopped
-//   estimated   the estimator has taken the sample of this time: one that returns without has stopped
-//   told        telemetry has come to its last frame: whether the bus took it, and whether anybody listens, is the bus's affair
+//   sampled     its time is later than that of the sample before: a measuring chain that hands out the same sample
+//   again has stopped estimated   the estimator has taken the sample of this time: one that returns without has stopped
+//   told        telemetry has come to its last frame: whether the bus took it, and whether anybody listens, is the
+//   bus's affair
 //
-// Readings that are missing are progress: the protection opens for them, a reset would not bring them back. A part that hangs never comes back here.
-// Each part is asked for what it did, not whether it was called; a way around one of them leaves its question unanswered.
+// Readings that are missing are progress: the protection opens for them, a reset would not bring them back. A part that
+// hangs never comes back here. Each part is asked for what it did, not whether it was called; a way around one of them
+// leaves its question unanswered.
 #pragma once
 
 #include <cstdint>
 
-namespace bms {
+namespace bms::firmware {
 
 class Progress {
  public:
@@ -22,7 +24,8 @@ class Progress {
 
   /// Once a sample, last of all. True: feed.
   constexpr bool complete(const Made& made) {
-    const bool whole = (first_ || made.sample_us > sample_us_) && made.estimated_us == made.sample_us && made.told == told_ + 1;
+    const bool whole =
+        (first_ || made.sample_us > sample_us_) && made.estimated_us == made.sample_us && made.told == told_ + 1;
     first_ = false;
     sample_us_ = made.sample_us;
     told_ = made.told;
@@ -35,4 +38,4 @@ class Progress {
   bool first_ = true;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -11,12 +11,14 @@
 #include "hal/calibration.hpp"
 #include "storage/persistence.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 // Keys of the settings, and codes of the faults, that this firmware stores.
-inline constexpr std::uint16_t kept_faults_key = 1;   ///< protection::Decision::kept
-inline constexpr std::uint16_t cell_file_key = 2;     ///< messages::Identity::cell_hash of the cell file that what is stored belongs to
-inline constexpr std::uint16_t first_calibration_key = 16;  ///< voltage's gain [ppm] and offset [uV], current's gain [ppm] and offset [uA]: hal::Calibration
+inline constexpr std::uint16_t kept_faults_key = 1;  ///< protection::Decision::kept
+inline constexpr std::uint16_t cell_file_key =
+    2;  ///< messages::Identity::cell_hash of the cell file that what is stored belongs to
+inline constexpr std::uint16_t first_calibration_key =
+    16;  ///< voltage's gain [ppm] and offset [uV], current's gain [ppm] and offset [uA]: hal::Calibration
 inline constexpr std::uint16_t first_fault_code = 1;  ///< of protection::Fault 0
 
 /// Not a number, or beyond what fits: the nearest that does, 0 for NaN.
@@ -31,17 +33,22 @@ template <class S, std::size_t Cells>
 class RememberedOf {
  public:
   template <class Estimate, class Condition>
-  constexpr RememberedOf(const Estimate& e, const Condition& condition, const PackCells<S, Cells>& cells) {
+  constexpr RememberedOf(const Estimate& e, const Condition& condition, const estimator::PackCells<S, Cells>& cells) {
     using messages::number;
     constexpr float ppm = 1e6F;
-    const bool known = (e.flags & not_started) == 0 && number(e.soc_sigma) > 0;
-    if (known) values_.pack = StoredEstimate{messages::ppb(e.soc), messages::ppb(e.soc_sigma)};
+    const bool known = (e.flags & estimator::not_started) == 0 && number(e.soc_sigma) > 0;
+    if (known) values_.pack = estimator::StoredEstimate{messages::ppb(e.soc), messages::ppb(e.soc_sigma)};
     const auto capacity = condition.capacity(), resistance = condition.resistance();
-    values_.health = {scaled(number(capacity.ratio), ppm), scaled(number(capacity.sigma), ppm), scaled(number(resistance.ratio), ppm), scaled(number(resistance.sigma), ppm)};
+    values_.health = {scaled(number(capacity.ratio), ppm), scaled(number(capacity.sigma), ppm),
+                      scaled(number(resistance.ratio), ppm), scaled(number(resistance.sigma), ppm)};
     if constexpr (Cells > 1) {
       for (std::size_t k = 0; k < Cells; ++k) {
-        const std::int32_t soc = messages::ppb(cells[k].soc()) / per_unit, sigma = messages::ppb(cells[k].soc_sigma()) / per_unit;
-        cells_[k] = {static_cast<std::int16_t>(soc > most ? most : soc < -most ? -most : soc), static_cast<std::uint16_t>(sigma > 0 ? sigma < 65'535 ? sigma : 65'535 : 0)};
+        const std::int32_t soc = messages::ppb(cells[k].soc()) / per_unit,
+                           sigma = messages::ppb(cells[k].soc_sigma()) / per_unit;
+        cells_[k] = {static_cast<std::int16_t>(soc > most    ? most
+                                               : soc < -most ? -most
+                                                             : soc),
+                     static_cast<std::uint16_t>(sigma > 0 ? sigma < 65'535 ? sigma : 65'535 : 0)};
       }
     }
   }
@@ -60,29 +67,35 @@ class RememberedOf {
 };
 
 inline hal::Calibration stored_calibration(const storage::Persistence& persistence) {
-  const auto value = [&](std::uint16_t k) { return persistence.settings().get(static_cast<std::uint16_t>(first_calibration_key + k)).value_or(0); };
+  const auto value = [&](std::uint16_t k) {
+    return persistence.settings().get(static_cast<std::uint16_t>(first_calibration_key + k)).value_or(0);
+  };
   return {value(0), value(1), value(2), value(3)};
 }
 
-/// State of charge, cells and health that are stored were estimated with another cell file: they mean nothing with this one.
+/// State of charge, cells and health that are stored were estimated with another cell file: they mean nothing with this
+/// one.
 inline bool of_another_cell_file(const storage::Persistence& persistence, std::uint32_t cell_hash) {
   const auto stored = persistence.settings().get(cell_file_key);
   return stored && static_cast<std::uint32_t>(*stored) != cell_hash;
 }
 
 /// Where to begin, as far as it is remembered.
-inline std::optional<StartingPoint> remembered_start(const storage::Persistence& persistence, std::uint32_t cell_hash) {
+inline std::optional<measurement::StartingPoint> remembered_start(const storage::Persistence& persistence,
+                                                                  std::uint32_t cell_hash) {
   if (of_another_cell_file(persistence, cell_hash)) return std::nullopt;
   return persistence.starting_point();
 }
 
 /// A pack of another number of cells is another pack.
 template <class S, std::size_t Cells>
-constexpr void recall(PackCells<S, Cells>& cells, const storage::CellsRecord& stored) {
+constexpr void recall(estimator::PackCells<S, Cells>& cells, const storage::CellsRecord& stored) {
   if (stored.count != Cells) return;
   for (std::size_t k = 0; k < Cells; ++k) {
-    if (stored.cell[k].sigma > 0) cells.begin(k, model::from_micro<model::Voltage<S>>(stored.cell[k].soc * 10), model::from_micro<model::Voltage<S>>(stored.cell[k].sigma * 10));
+    if (stored.cell[k].sigma > 0)
+      cells.begin(k, arithmetic::from_micro<arithmetic::Voltage<S>>(stored.cell[k].soc * 10),
+                  arithmetic::from_micro<arithmetic::Voltage<S>>(stored.cell[k].sigma * 10));
   }
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,4 +1,5 @@
-// Which message goes out when. Time is the samples' own: a recording fed in faster than it was made gives the same frames.
+// Which message goes out when. Time is the samples' own: a recording fed in faster than it was made gives the same
+// frames.
 //
 // Nothing is sent while nobody listens. Every sample that is told ends with the status frame, so that who has
 // read it has the whole sample and may send the next (lock step).
@@ -18,7 +19,7 @@
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 /// What is told of the board beside the pack.
 struct OfBoard {
@@ -36,13 +37,17 @@ class Telemetry {
   using Result = typename Estimator::Result;
 
   /// capacity_ah: of the cell file; start: where the estimator began, if somebody said.
-  constexpr Telemetry(const messages::Identity& identity, float capacity_ah, const std::optional<StartingPoint>& start) : identity_(identity), capacity_ah_(capacity_ah), start_(start) {}
+  constexpr Telemetry(const messages::Identity& identity, float capacity_ah,
+                      const std::optional<measurement::StartingPoint>& start)
+      : identity_(identity), capacity_ah_(capacity_ah), start_(start) {}
 
   /// mean: what the estimator was given of the pack.
-  void tell(const PackSample<Cells>& pack, const Sample& mean, const Result& estimate, const Condition<Estimator>& condition, const PackCells<typename Estimator::Scalar, Cells>& cells,
-            const protection::Decision& decision, const storage::Persistence& persistence, const OfBoard& board, bool log_samples) {
+  void tell(const measurement::PackSample<Cells>& pack, const measurement::Sample& mean, const Result& estimate,
+            const estimator::Condition<Estimator>& condition,
+            const estimator::PackCells<typename Estimator::Scalar, Cells>& cells, const protection::Decision& decision,
+            const storage::Persistence& persistence, const OfBoard& board, bool log_samples) {
     ++samples_;
-    hash_.take(words(estimate));
+    hash_.take(estimator::words(estimate));
     if (!hal::can_listening()) {
       ++told_;
       return;
@@ -55,9 +60,12 @@ class Telemetry {
     by_time<can::CurrentLimits>([&] { return messages::current_limits(condition); });
     by_time<can::Health>([&] { return messages::health(condition); });
     by_time<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
-    if constexpr (Estimator::Model::errors_are_states) by_time<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
+    if constexpr (Estimator::Model::errors_are_states)
+      by_time<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
     by_time<can::Storage>([&] { return messages::storage(persistence); });
-    by_time_or<can::Board>(board.alarming() != alarming_told_, [&] { return messages::board(board.state, board.cell_file_changed, board.longest_sample_us); });
+    by_time_or<can::Board>(board.alarming() != alarming_told_, [&] {
+      return messages::board(board.state, board.cell_file_changed, board.longest_sample_us);
+    });
     alarming_told_ = board.alarming();
     if (log_samples) log(mean);
     send(messages::pack_state(estimate, condition));
@@ -111,18 +119,23 @@ class Telemetry {
 
   void tell_protection(const protection::Decision& d) {
     by_time_or<can::Faults>(d.faults != faults_told_, [&] { return messages::faults(d); });
-    by_time_or<can::ContactorState>(d.state != state_told_ || d.outputs != outputs_told_, [&] { return messages::contactor_state(d); });
+    by_time_or<can::ContactorState>(d.state != state_told_ || d.outputs != outputs_told_,
+                                    [&] { return messages::contactor_state(d); });
     by_time<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
     faults_told_ = d.faults;
     state_told_ = d.state;
     outputs_told_ = d.outputs;
   }
 
-  void tell_cells(const PackSample<Cells>& pack, const PackCells<typename Estimator::Scalar, Cells>& cells, const protection::Decision& d) {
+  void tell_cells(const measurement::PackSample<Cells>& pack,
+                  const estimator::PackCells<typename Estimator::Scalar, Cells>& cells, const protection::Decision& d) {
     by_time<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(pack); });
-    if constexpr (Cells > 4) by_time<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(pack); });
-    if constexpr (Cells > 8) by_time<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(pack); });
-    if constexpr (Cells > 12) by_time<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(pack); });
+    if constexpr (Cells > 4)
+      by_time<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(pack); });
+    if constexpr (Cells > 8)
+      by_time<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(pack); });
+    if constexpr (Cells > 12)
+      by_time<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(pack); });
     by_time<can::CellExtremes>([&] { return messages::cell_extremes(pack, cells); });
     by_time<can::Temperatures>([&] { return messages::temperatures(pack); });
     by_time<can::Balancing>([&] { return messages::balancing(d); });
@@ -141,7 +154,7 @@ class Telemetry {
     send(cause);
   }
 
-  void log(const Sample& sample) {
+  void log(const measurement::Sample& sample) {
     if (samples_ == 1) {
       send(messages::starting_soc(start_));
       send(messages::starting_sigma(start_));
@@ -157,9 +170,9 @@ class Telemetry {
 
   messages::Identity identity_;
   float capacity_ah_ = 0;
-  std::optional<StartingPoint> start_;
+  std::optional<measurement::StartingPoint> start_;
   typename OfAll<can::Messages>::type sent_{};
-  EstimateHash hash_;
+  estimator::EstimateHash hash_;
   std::uint32_t now_us_ = 0, faults_told_ = 0, told_ = 0;
   protection::ContactorState state_told_ = protection::ContactorState::off;
   protection::Outputs outputs_told_;
@@ -167,4 +180,4 @@ class Telemetry {
   bool fault_told_ = false, alarming_told_ = false;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

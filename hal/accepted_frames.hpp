@@ -20,7 +20,8 @@ inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.h
 #endif
 inline constexpr std::uint16_t canopen_node = BMS_CANOPEN_NODE, canopen_charger = BMS_CANOPEN_CHARGER;
 
-/// Network management, and requests to the battery's SDO server, if the image is a CANopen node (firmware/cia418_profile.hpp).
+/// Network management, and requests to the battery's SDO server, if the image is a CANopen node
+/// (firmware/cia418_profile.hpp).
 #if defined(BMS_VEHICLE_PROFILE_CIA418)
 inline constexpr std::array<std::uint16_t, 2> profile_ids{0x000, 0x600 + canopen_node};
 #else

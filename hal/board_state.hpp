@@ -7,22 +7,22 @@
 namespace bms::hal {
 
 enum class CalendarState : std::uint8_t {
-  absent = 0,        ///< no clock runs on
-  never_set = 1,     ///< it runs, nobody has said what time it is; or its supply was lost since
+  absent = 0,     ///< no clock runs on
+  never_set = 1,  ///< it runs, nobody has said what time it is; or its supply was lost since
   runs = 2,
   runs_roughly = 3,  ///< on an oscillator that is off by up to half (hal/calendar.hpp)
 };
 
 struct BoardState {
   // what makes the board unfit: contactors stay open until another start finds it fit
-  bool ram_failed = false;      ///< a cell did not hold what was written
-  bool image_failed = false;    ///< the flash does not hold what was linked
-  bool stack_overrun = false;   ///< the words below the stack are not as they were
+  bool ram_failed = false;     ///< a cell did not hold what was written
+  bool image_failed = false;   ///< the flash does not hold what was linked
+  bool stack_overrun = false;  ///< the words below the stack are not as they were
 
   // what it can work with
-  bool supply_low = false;          ///< the supply is below the detector's threshold, now
-  bool brown_out_reset_low = false; ///< the chip would go on below the voltage that its flash is written with
-  bool clock_failed = false;        ///< no crystal: the core runs slower, and CAN is off
+  bool supply_low = false;           ///< the supply is below the detector's threshold, now
+  bool brown_out_reset_low = false;  ///< the chip would go on below the voltage that its flash is written with
+  bool clock_failed = false;         ///< no crystal: the core runs slower, and CAN is off
   CalendarState calendar = CalendarState::absent;
   std::uint16_t stack_free = 0xFFFF;  ///< least so far [bytes]; 0xFFFF: not measured
 

@@ -12,13 +12,15 @@ namespace bms::hal {
 /// Writes the low `size` bytes of value.
 template <std::integral T>
 constexpr void put_bytes(std::span<std::uint8_t> to, std::size_t at, T value, std::size_t size = sizeof(T)) {
-  for (std::size_t k = 0; k < size; ++k) to[at + k] = static_cast<std::uint8_t>(static_cast<std::make_unsigned_t<T>>(value) >> (8 * k));
+  for (std::size_t k = 0; k < size; ++k)
+    to[at + k] = static_cast<std::uint8_t>(static_cast<std::make_unsigned_t<T>>(value) >> (8 * k));
 }
 
 template <std::integral T>
 constexpr T get_bytes(std::span<const std::uint8_t> from, std::size_t at, std::size_t size = sizeof(T)) {
   std::make_unsigned_t<T> value = 0;
-  for (std::size_t k = 0; k < size; ++k) value = static_cast<std::make_unsigned_t<T>>(value | static_cast<std::make_unsigned_t<T>>(from[at + k]) << (8 * k));
+  for (std::size_t k = 0; k < size; ++k)
+    value = static_cast<std::make_unsigned_t<T>>(value | static_cast<std::make_unsigned_t<T>>(from[at + k]) << (8 * k));
   return static_cast<T>(value);
 }
 

@@ -1,5 +1,6 @@
-// What a board's own measuring chain is corrected by: measured against a meter, kept with the settings (firmware/remembered.hpp).
-// Back ends: adc/samples; absent/calibration (a chip that comes calibrated, or another node measures).
+// What a board's own measuring chain is corrected by: measured against a meter, kept with the settings
+// (firmware/remembered.hpp). Back ends: adc/samples; absent/calibration (a chip that comes calibrated, or another node
+// measures).
 #pragma once
 
 #include <cstdint>

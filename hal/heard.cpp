@@ -9,20 +9,20 @@ namespace bms::hal {
 
 namespace {
 
-std::optional<StartingPoint> start;
+std::optional<measurement::StartingPoint> start;
 RequestQueue requests;
 
 }  // namespace
 
-bool hear(const CanFrame& frame) {
+bool hear(const can::Frame& frame) {
   if (is_start(frame)) start = start_of(frame);
   if (of_sample(frame)) return true;
   requests.keep(frame);
   return false;
 }
 
-bool next_request(CanFrame& frame) { return requests.next(frame); }
+bool next_request(can::Frame& frame) { return requests.next(frame); }
 
-std::optional<StartingPoint> starting_point() { return start; }
+std::optional<measurement::StartingPoint> starting_point() { return start; }
 
 }  // namespace bms::hal

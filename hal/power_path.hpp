@@ -1,5 +1,6 @@
 // What the battery switches, and what it measures beyond its cells.
-// Back ends: remote/ (the load is on the bus: told by frames), absent/ (nothing to switch), bq76952/samples (contactors by hal/contactor_pins.hpp, bleeding and link by the chip).
+// Back ends: remote/ (the load is on the bus: told by frames), absent/ (nothing to switch), bq76952/samples (contactors
+// by hal/contactor_pins.hpp, bleeding and link by the chip).
 #pragma once
 
 #include <cstdint>

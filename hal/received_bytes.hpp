@@ -1,4 +1,5 @@
-// Bytes on their way from a serial port's interrupt to the program. One writer, one reader: the indices need no lock on a single core.
+// Bytes on their way from a serial port's interrupt to the program. One writer, one reader: the indices need no lock on
+// a single core.
 #pragma once
 
 #include <array>

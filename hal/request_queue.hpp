@@ -1,4 +1,5 @@
-// Frames that came between the samples and wait for next_request() (hal/requests.hpp). Eight are kept; of more, the oldest.
+// Frames that came between the samples and wait for next_request() (hal/requests.hpp). Eight are kept; of more, the
+// oldest.
 #pragma once
 
 #include <array>
@@ -10,12 +11,12 @@ namespace bms::hal {
 
 class RequestQueue {
  public:
-  constexpr void keep(const CanFrame& frame) {
+  constexpr void keep(const can::Frame& frame) {
     if (size_ == frames_.size()) return;
     frames_[(first_ + size_) % frames_.size()] = frame;
     ++size_;
   }
-  constexpr bool next(CanFrame& frame) {
+  constexpr bool next(can::Frame& frame) {
     if (size_ == 0) return false;
     frame = frames_[first_];
     first_ = (first_ + 1) % frames_.size();
@@ -24,7 +25,7 @@ class RequestQueue {
   }
 
  private:
-  std::array<CanFrame, 8> frames_{};
+  std::array<can::Frame, 8> frames_{};
   std::size_t first_ = 0, size_ = 0;
 };
 

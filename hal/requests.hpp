@@ -7,6 +7,6 @@
 namespace bms::hal {
 
 /// The next one, if there is; in the order they came. A few are kept; of more, the oldest.
-bool next_request(CanFrame& frame);
+bool next_request(can::Frame& frame);
 
 }  // namespace bms::hal

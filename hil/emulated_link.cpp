@@ -6,11 +6,11 @@
 #include <array>
 #include <stdexcept>
 
+#include "files/text_file.hpp"
 #include "hal/pipe_format.hpp"
 #include "hil/board_link.hpp"
-#include "host_sim/child_process.hpp"
-#include "host_sim/emulator.hpp"
-#include "host_sim/text_file.hpp"
+#include "images/child_process.hpp"
+#include "images/emulator.hpp"
 
 namespace bms::hil {
 
@@ -40,11 +40,11 @@ std::filesystem::path pipe_in(const std::filesystem::path& folder, const char* n
   return path;
 }
 
-const EmulatedBoard& emulator_of(const std::string& board) {
-  for (const EmulatedBoard& b : emulated_boards()) {
+const images::EmulatedBoard& emulator_of(const std::string& board) {
+  for (const images::EmulatedBoard& b : images::emulated_boards()) {
     if (b.name == board) return b;
   }
-  return emulated_boards().front();  // of the same chip: the images of a board that no emulator knows
+  return images::emulated_boards().front();  // of the same chip: the images of a board that no emulator knows
 }
 
 /// The other side of hal/emulated/can_pipe.cpp.
@@ -58,8 +58,8 @@ class EmulatedLink : public BoardLink {
         from_(open(from_path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)),
         emulator_(command(board, image), folder_.path() / "log") {}
 
-  std::vector<hal::CanFrame> exchange(double time_s, std::span<const hal::CanFrame> frames) override {
-    auto answer = first_ ? read_block() : std::vector<hal::CanFrame>{};  // what it said before it was asked anything
+  std::vector<can::Frame> exchange(double time_s, std::span<const can::Frame> frames) override {
+    auto answer = first_ ? read_block() : std::vector<can::Frame>{};  // what it said before it was asked anything
     first_ = false;
     do {
       const auto part = frames.first(std::min(frames.size(), most_records - 1));
@@ -73,12 +73,12 @@ class EmulatedLink : public BoardLink {
 
  private:
   std::vector<std::string> command(const std::string& board, const std::filesystem::path& image) {
-    auto words = emulator_command(emulator_of(board), image, {to_path_.string(), from_path_.string()});
+    auto words = images::emulator_command(emulator_of(board), image, {to_path_.string(), from_path_.string()});
     words.insert(words.end(), {"-serial", "none"});
     return words;
   }
 
-  void write_block(std::uint64_t time_us, std::span<const hal::CanFrame> frames) {
+  void write_block(std::uint64_t time_us, std::span<const can::Frame> frames) {
     std::vector<unsigned char> bytes(record_size * (1 + frames.size()));
     bytes[length_at] = tick;
     bytes[of_block_at] = static_cast<unsigned char>(frames.size());
@@ -95,8 +95,8 @@ class EmulatedLink : public BoardLink {
     }
   }
 
-  std::vector<hal::CanFrame> read_block() {
-    std::vector<hal::CanFrame> frames;
+  std::vector<can::Frame> read_block() {
+    std::vector<can::Frame> frames;
     while (true) {
       const auto record = read_record();
       if (record[length_at] != nothing) frames.push_back(frame_of(record));
@@ -108,7 +108,8 @@ class EmulatedLink : public BoardLink {
     int silent_ms = 0;
     while (end_ - begin_ < record_size) {
       if (begin_ > 0) {
-        std::copy(bytes_.begin() + static_cast<std::ptrdiff_t>(begin_), bytes_.begin() + static_cast<std::ptrdiff_t>(end_), bytes_.begin());
+        std::copy(bytes_.begin() + static_cast<std::ptrdiff_t>(begin_),
+                  bytes_.begin() + static_cast<std::ptrdiff_t>(end_), bytes_.begin());
         end_ -= begin_;
         begin_ = 0;
       }
@@ -126,12 +127,14 @@ class EmulatedLink : public BoardLink {
     return {bytes_.data() + begin_ - record_size, record_size};
   }
 
-  std::runtime_error stopped() const { return std::runtime_error("the emulated board has stopped: " + read_file(folder_.path() / "log")); }
+  std::runtime_error stopped() const {
+    return std::runtime_error("the emulated board has stopped: " + files::read_file(folder_.path() / "log"));
+  }
 
-  TemporaryFolder folder_;
+  images::TemporaryFolder folder_;
   std::filesystem::path to_path_, from_path_;
   File to_, from_;
-  ChildProcess emulator_;
+  images::ChildProcess emulator_;
   std::array<unsigned char, 65'536> bytes_{};
   std::size_t begin_ = 0, end_ = 0;
   bool first_ = true;
@@ -139,6 +142,8 @@ class EmulatedLink : public BoardLink {
 
 }  // namespace
 
-std::unique_ptr<BoardLink> emulated_link(const std::string& board, const std::filesystem::path& image) { return std::make_unique<EmulatedLink>(board, image); }
+std::unique_ptr<BoardLink> emulated_link(const std::string& board, const std::filesystem::path& image) {
+  return std::make_unique<EmulatedLink>(board, image);
+}
 
 }  // namespace bms::hil

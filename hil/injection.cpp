@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/bad_input.hpp"
+#include "files/bad_input.hpp"
 
 namespace bms::hil {
 
@@ -17,7 +17,8 @@ struct Kind {
   const char* name;
   Value value;
   const char* expected;
-  double within_s;  ///< the table's delay (protection/README.md), and half a second for what is in the way: samples, this message's cycle
+  double within_s;  ///< the table's delay (protection/README.md), and half a second for what is in the way: samples,
+                    ///< this message's cycle
 };
 
 constexpr double on_the_way_s = 0.5;
@@ -35,17 +36,20 @@ constexpr Kind kinds[] = {
     {"temperature_open", Value::none, "TemperatureLost", 2},
     {"temperature_stuck", Value::none, "", 0},
     {"overcurrent", Value::none, "DischargeOvercurrent", 30},
-    {"welded", Value::none, "ContactorWelded", 1e9},       // when the contactors open next
+    {"welded", Value::none, "ContactorWelded", 1e9},  // when the contactors open next
     {"precharge_open", Value::none, "PrechargeFailed", 1e9},
     {"silence", Value::none, "SamplesMissing", 0.5 + 0.2},  // the table's, and a sample at either end
 };
 
-[[noreturn]] void refuse(const std::string& text, const std::string& what) { throw BadInput("--fault", 1, "'" + text + "': " + what); }
+[[noreturn]] void refuse(const std::string& text, const std::string& what) {
+  throw files::BadInput("--fault", 1, "'" + text + "': " + what);
+}
 
 double number(const std::string& text, std::string_view part, const char* what) {
   double value = 0;
   const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-  if (error != std::errc{} || end != part.data() + part.size() || !(value >= 0)) refuse(text, fmt::format("expected {} instead of '{}'", what, part));
+  if (error != std::errc{} || end != part.data() + part.size() || !(value >= 0))
+    refuse(text, fmt::format("expected {} instead of '{}'", what, part));
   return value;
 }
 
@@ -66,11 +70,16 @@ Injection injection(const std::string& text, std::size_t cells) {
   }
   if (kind == nullptr) refuse(text, "expected one of: " + names);
   Injection i{text, name, 0, 0, 1e300, kind->expected, kind->within_s + on_the_way_s};
-  if ((kind->value == Value::none) != (equals == std::string_view::npos)) refuse(text, kind->value == Value::none ? "takes no value" : "expected a value, as in " + name + (kind->value == Value::part ? "=0.01@60" : "=3@60"));
-  if (kind->value != Value::none) i.value = number(text, what.substr(equals + 1), kind->value == Value::part ? "a part, 0 to 1" : "a cell, from 1");
+  if ((kind->value == Value::none) != (equals == std::string_view::npos))
+    refuse(text, kind->value == Value::none
+                     ? "takes no value"
+                     : "expected a value, as in " + name + (kind->value == Value::part ? "=0.01@60" : "=3@60"));
+  if (kind->value != Value::none)
+    i.value = number(text, what.substr(equals + 1), kind->value == Value::part ? "a part, 0 to 1" : "a cell, from 1");
   if (kind->value == Value::part && i.value > 1) refuse(text, "expected a part, 0 to 1");
   const double most = static_cast<double>(name == "sense_wire" ? cells - 1 : cells);
-  if (kind->value == Value::cell && !(i.value >= 1 && i.value <= most && i.value == static_cast<int>(i.value))) refuse(text, fmt::format("expected a cell, 1 to {}", most));
+  if (kind->value == Value::cell && !(i.value >= 1 && i.value <= most && i.value == static_cast<int>(i.value)))
+    refuse(text, fmt::format("expected a cell, 1 to {}", most));
   const std::size_t dash = when.find('-');
   i.from_s = number(text, when.substr(0, dash), "seconds");
   if (dash != std::string_view::npos) i.to_s = number(text, when.substr(dash + 1), "seconds");
@@ -87,32 +96,33 @@ const Injection* Injector::find(const char* name, double time_s) const {
 
 bool Injector::active(const char* name, double time_s) const { return find(name, time_s) != nullptr; }
 
-void Injector::apply(double time_s, PackSample<most_cells>& s) {
+void Injector::apply(double time_s, measurement::PackSample<most_cells>& s) {
   const auto cell_of = [&](const Injection& i) { return static_cast<std::size_t>(i.value) - 1; };
   if (const auto* i = find("cell_stuck", time_s)) s.cell_uv[cell_of(*i)] = last_.cell_uv[cell_of(*i)];
-  if (const auto* i = find("cell_open", time_s)) s.cell_uv[cell_of(*i)] = no_reading;
+  if (const auto* i = find("cell_open", time_s)) s.cell_uv[cell_of(*i)] = measurement::no_reading;
   if (const auto* i = find("sense_wire", time_s)) {
-    const std::int32_t both = s.cell_uv[cell_of(*i)] + s.cell_uv[cell_of(*i) + 1];  // the monitor's own input currents divide it, not in halves
+    const std::int32_t both = s.cell_uv[cell_of(*i)] +
+                              s.cell_uv[cell_of(*i) + 1];  // the monitor's own input currents divide it, not in halves
     s.cell_uv[cell_of(*i)] = both / 5 * 2;
     s.cell_uv[cell_of(*i) + 1] = both - s.cell_uv[cell_of(*i)];
   }
   if (const auto* i = find("cell_high", time_s)) s.cell_uv[cell_of(*i)] = 4'050'000;
   if (const auto* i = find("cell_low", time_s)) s.cell_uv[cell_of(*i)] = 1'700'000;
   if (active("current_stuck", time_s)) s.current_ua = last_.current_ua;
-  if (active("current_open", time_s)) s.current_ua = no_reading;
-  if (active("temperature_open", time_s)) s.temperature_cdegc[0] = no_temperature;
+  if (active("current_open", time_s)) s.current_ua = measurement::no_reading;
+  if (active("temperature_open", time_s)) s.temperature_cdegc[0] = measurement::no_temperature;
   if (active("temperature_stuck", time_s)) s.temperature_cdegc[0] = last_.temperature_cdegc[0];
   last_ = s;
 }
 
-std::vector<hal::CanFrame> Injector::apply(double time_s, std::vector<hal::CanFrame> frames) {
-  std::vector<hal::CanFrame> through = std::exchange(late_, {});
+std::vector<can::Frame> Injector::apply(double time_s, std::vector<can::Frame> frames) {
+  std::vector<can::Frame> through = std::exchange(late_, {});
   if (active("silence", time_s)) return {};
   const auto happens = [&](const char* name) {
     const Injection* i = find(name, time_s);
     return i != nullptr && std::uniform_real_distribution<double>()(random_) < i->value;
   };
-  for (hal::CanFrame& frame : frames) {
+  for (can::Frame& frame : frames) {
     if (happens("drop")) continue;
     if (happens("corrupt")) frame.data[random_() % 8] ^= static_cast<std::uint8_t>(1U << random_() % 8);
     (happens("delay") ? late_ : through).push_back(frame);

@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
-#include "estimator/pack_sample.hpp"
 #include "hal/can.hpp"
 #include "hil/simulated_pack.hpp"
+#include "measurement/pack_sample.hpp"
 
 namespace bms::hil {
 
@@ -41,9 +41,9 @@ class Injector {
 
   bool active(const char* name, double time_s) const;
   /// Sensors.
-  void apply(double time_s, PackSample<most_cells>& sample);
+  void apply(double time_s, measurement::PackSample<most_cells>& sample);
   /// The wire. Frames that are late come with the next call's.
-  std::vector<hal::CanFrame> apply(double time_s, std::vector<hal::CanFrame> frames);
+  std::vector<can::Frame> apply(double time_s, std::vector<can::Frame> frames);
 
   const std::vector<Injection>& all() const { return all_; }
 
@@ -52,8 +52,8 @@ class Injector {
 
   std::vector<Injection> all_;
   std::mt19937_64 random_;
-  std::vector<hal::CanFrame> late_;
-  PackSample<most_cells> last_;
+  std::vector<can::Frame> late_;
+  measurement::PackSample<most_cells> last_;
 };
 
 }  // namespace bms::hil

@@ -8,10 +8,10 @@
 #include <string_view>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "files/bad_input.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/slcan/codec.hpp"
 #include "hil/board_link.hpp"
-#include "host_sim/bad_input.hpp"
 
 namespace bms::hil {
 
@@ -20,7 +20,8 @@ namespace {
 class SerialLink : public BoardLink {
  public:
   explicit SerialLink(const std::string& port) : fd_(open(port.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC)) {
-    if (fd_ < 0) throw BadInput(port, 1, "cannot be opened, expected a serial port of a board or a pseudo-terminal");
+    if (fd_ < 0)
+      throw files::BadInput(port, 1, "cannot be opened, expected a serial port of a board or a pseudo-terminal");
     termios line{};
     if (tcgetattr(fd_, &line) == 0) {
       cfmakeraw(&line);
@@ -40,11 +41,11 @@ class SerialLink : public BoardLink {
     close(fd_);
   }
 
-  std::vector<hal::CanFrame> exchange(double, std::span<const hal::CanFrame> frames) override {
+  std::vector<can::Frame> exchange(double, std::span<const can::Frame> frames) override {
     std::array<char, hal::slcan::longest_frame> text;
     std::string lines;
     bool asks = false;
-    for (const hal::CanFrame& f : frames) {
+    for (const can::Frame& f : frames) {
       lines += hal::slcan::encode(f, text);
       asks = asks || f.id == hal::time_frame_id;
     }
@@ -64,11 +65,12 @@ class SerialLink : public BoardLink {
   }
 
   /// Until a frame of that id, or for so long.
-  std::vector<hal::CanFrame> listen(std::uint16_t last_id, int most_ms) {
-    std::vector<hal::CanFrame> frames;
+  std::vector<can::Frame> listen(std::uint16_t last_id, int most_ms) {
+    std::vector<can::Frame> frames;
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(most_ms);
     while (true) {
-      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now()).count();
+      const auto left =
+          std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now()).count();
       pollfd p{fd_, POLLIN, 0};
       if (left <= 0 || poll(&p, 1, static_cast<int>(left)) <= 0) return frames;
       std::array<char, 4096> bytes;
@@ -76,7 +78,7 @@ class SerialLink : public BoardLink {
       if (n <= 0) throw std::runtime_error("the board has closed its serial port");
       bool ended = false;
       for (const char byte : std::string_view(bytes.data(), static_cast<std::size_t>(n))) {
-        hal::CanFrame frame;
+        can::Frame frame;
         if (!reader_.take(byte) || !hal::slcan::decode(reader_.line(), frame)) continue;
         frames.push_back(frame);
         ended = ended || (last_id != 0 && frame.id == last_id);

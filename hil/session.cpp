@@ -15,19 +15,25 @@ namespace bms::hil {
 namespace {
 
 constexpr double precharge_gives_up_s = 60, trace_every_s = 10, rest_c_rate = 0.02;
-constexpr double parting_s = 20, asking_again_s = 12;  // after the drive nobody asks for 12 s, the contactors open; then they are asked to close again, which tells whether one is welded
+constexpr double parting_s = 20,
+                 asking_again_s = 12;  // after the drive nobody asks for 12 s, the contactors open; then they are asked
+                                       // to close again, which tells whether one is welded
 
 /// Current, temperature and, replayed, voltage at a time of the drive.
 class Drive {
  public:
-  explicit Drive(const Recording& r) : r_(r) {}
+  explicit Drive(const files::Recording& r) : r_(r) {}
 
   /// Times must ascend.
   void go_to(double time_s) {
     while (row_ + 1 < r_.rows() && r_.time_s[row_] - r_.time_s.front() < time_s) ++row_;
   }
-  double current_a() const { return std::isfinite(r_.current_a[row_]) ? r_.current_a[row_] : 0; }  // mean over the interval that ends at the row
-  double temperature_c() const { return r_.temperature_c.empty() || !std::isfinite(r_.temperature_c[row_]) ? 25 : r_.temperature_c[row_]; }
+  double current_a() const {
+    return std::isfinite(r_.current_a[row_]) ? r_.current_a[row_] : 0;
+  }  // mean over the interval that ends at the row
+  double temperature_c() const {
+    return r_.temperature_c.empty() || !std::isfinite(r_.temperature_c[row_]) ? 25 : r_.temperature_c[row_];
+  }
   double voltage_v(double time_s) const { return between(r_.voltage_v, time_s); }
   double soc_ref(double time_s) const { return r_.soc_ref.empty() ? std::nan("") : between(r_.soc_ref, time_s); }
 
@@ -39,7 +45,7 @@ class Drive {
     return column[row_ - 1] + t * (column[row_] - column[row_ - 1]);
   }
 
-  const Recording& r_;
+  const files::Recording& r_;
   std::size_t row_ = 0;
 };
 
@@ -52,15 +58,26 @@ class Heard {
   bool said_pack = false, said_status = false;
   std::vector<FaultSeen> faults;
 
-  void take(double time_s, const hal::CanFrame& frame) {
+  void take(double time_s, const can::Frame& frame) {
     if (bus_.take(monitor::on_bus(frame, std::llround(1e6 * time_s))) == monitor::messages().size()) return;
     switch (frame.id) {
-      case can::PackState::id: pack = can::PackState::of(frame), said_pack = true; break;
-      case can::ContactorState::id: contactors = can::ContactorState::of(frame); break;
-      case can::AllowedCurrent::id: allowed = can::AllowedCurrent::of(frame); break;
-      case can::Status::id: said_status = true; break;
-      case can::Faults::id: see_faults(time_s, can::Faults::of(frame)); break;
-      default: break;
+      case can::PackState::id:
+        pack = can::PackState::of(frame), said_pack = true;
+        break;
+      case can::ContactorState::id:
+        contactors = can::ContactorState::of(frame);
+        break;
+      case can::AllowedCurrent::id:
+        allowed = can::AllowedCurrent::of(frame);
+        break;
+      case can::Status::id:
+        said_status = true;
+        break;
+      case can::Faults::id:
+        see_faults(time_s, can::Faults::of(frame));
+        break;
+      default:
+        break;
     }
   }
   std::uint64_t lost() const { return sum(&monitor::MessageState::lost); }
@@ -76,7 +93,8 @@ class Heard {
   void see_faults(double time_s, can::Faults message) {
     message.each([&](const char* name, const char*, auto& value, const can::SignalLayout& s) {
       if (s.bits != 1) return;
-      const auto last = std::find_if(faults.rbegin(), faults.rend(), [&](const FaultSeen& f) { return f.name == name; });
+      const auto last =
+          std::find_if(faults.rbegin(), faults.rend(), [&](const FaultSeen& f) { return f.name == name; });
       const bool raised = last != faults.rend() && !last->cleared_at_s;
       if (value != 0 && !raised) faults.push_back({name, time_s, {}});
       if (value == 0 && raised) last->cleared_at_s = time_s;
@@ -86,7 +104,7 @@ class Heard {
   monitor::BusState bus_;
 };
 
-hal::CanFrame request(std::uint32_t what, std::uint8_t counter) {
+can::Frame request(std::uint32_t what, std::uint8_t counter) {
   can::Command command;
   command.code = can::Command::code_request;
   command.argument = what;
@@ -94,8 +112,9 @@ hal::CanFrame request(std::uint32_t what, std::uint8_t counter) {
 }
 
 template <std::size_t Cells>
-std::vector<hal::CanFrame> frames_for(const PackSample<most_cells>& all, double link_v, std::uint16_t counter) {
-  PackSample<Cells> s;
+std::vector<can::Frame> frames_for(const measurement::PackSample<most_cells>& all, double link_v,
+                                   std::uint16_t counter) {
+  measurement::PackSample<Cells> s;
   s.time_us = all.time_us;
   s.current_ua = all.current_ua;
   s.pack_uv = Cells == 1 ? all.cell_uv[0] : all.pack_uv;
@@ -107,7 +126,8 @@ std::vector<hal::CanFrame> frames_for(const PackSample<most_cells>& all, double 
 
 /// What the load or the charger takes.
 double demanded(const Heard& heard, double wanted_a, bool obeys) {
-  const bool ready = heard.contactors.state == can::ContactorState::state_drive || heard.contactors.state == can::ContactorState::state_charge;
+  const bool ready = heard.contactors.state == can::ContactorState::state_drive ||
+                     heard.contactors.state == can::ContactorState::state_charge;
   if (!ready) return 0;
   if (!obeys) return wanted_a;
   const auto at_most = [](float limit_a) { return std::isfinite(limit_a) ? static_cast<double>(limit_a) : 0; };
@@ -116,7 +136,9 @@ double demanded(const Heard& heard, double wanted_a, bool obeys) {
 
 }  // namespace
 
-SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::function<void(double, const hal::CanFrame&)>& frame, const std::function<void(double)>& progress) {
+SessionResult run_session(BoardLink& link, const SessionPlan& plan,
+                          const std::function<void(double, const can::Frame&)>& frame,
+                          const std::function<void(double)>& progress) {
   const auto begin = std::chrono::steady_clock::now();
   SessionResult result;
   Heard heard;
@@ -124,28 +146,31 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
   SimulatedPack pack(plan.cell, plan.cells, plan.initial_soc, plan.spread);
   Injector injector(plan.injections, plan.spread.seed + 1);
   const double end_s = plan.drive.time_s.back() - plan.drive.time_s.front();
-  const auto asks_every = static_cast<std::uint64_t>(std::max(1L, std::lround(1 / plan.sample_period_s)));  // once a second
+  const auto asks_every =
+      static_cast<std::uint64_t>(std::max(1L, std::lround(1 / plan.sample_period_s)));  // once a second
   double drive_s = 0, squares = 0;
   std::uint64_t judged = 0, inside = 0;
   std::vector<float> sigmas;
   std::uint8_t asked = 0;
   double link_v = 0, replayed_link_v = 0;
 
-  const auto say = [&](double time_s, const std::vector<hal::CanFrame>& frames) {
+  const auto say = [&](double time_s, const std::vector<can::Frame>& frames) {
     heard.said_status = heard.said_pack = false;
-    for (const hal::CanFrame& f : link.exchange(time_s, frames)) {
+    for (const can::Frame& f : link.exchange(time_s, frames)) {
       ++result.frames;
       heard.take(time_s, f);
       if (frame) frame(time_s, f);
     }
   };
   if (plan.told_soc) {
-    say(0, {hal::frame_of(StartingPoint{static_cast<std::int32_t>(std::lround(1e9 * *plan.told_soc)), 20'000'000})});
+    say(0, {hal::frame_of(
+               measurement::StartingPoint{static_cast<std::int32_t>(std::lround(1e9 * *plan.told_soc)), 20'000'000})});
   }
 
   for (std::uint64_t k = 0; drive_s <= end_s + (plan.replayed ? 0 : parting_s); ++k) {
     const double time_s = static_cast<double>(k) * plan.sample_period_s;
-    const Closed closed{heard.contactors.main_plus != 0, heard.contactors.main_minus != 0, heard.contactors.precharge != 0};
+    const Closed closed{heard.contactors.main_plus != 0, heard.contactors.main_minus != 0,
+                        heard.contactors.precharge != 0};
     const bool driving = closed.main_plus && closed.main_minus;
     if (driving && !result.driving_after_s) result.driving_after_s = time_s;
     // a drive, or what was recorded of one, begins when the contactors are closed; nothing waits for ever
@@ -158,7 +183,10 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     if (injector.active("precharge_open", time_s)) real.precharge = false;
     const bool welded = injector.active("welded", time_s), obeys = !injector.active("overcurrent", time_s);
     const double most_a = plan.cell.parameters.limits.discharge_current_max_a;
-    pack.run(parting ? 0 : obeys ? demanded(heard, drive.current_a(), true) : demanded(heard, -1.6 * most_a, false), real, welded, drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
+    pack.run(parting ? 0
+             : obeys ? demanded(heard, drive.current_a(), true)
+                     : demanded(heard, -1.6 * most_a, false),
+             real, welded, drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
     auto sample = pack.read(static_cast<std::uint64_t>(std::llround(1e6 * time_s)), drive.temperature_c());
     double truth = pack.soc();
     link_v = pack.link_v();
@@ -167,7 +195,8 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
       const double recorded_a = moves ? drive.current_a() : 0;
       const bool carries = real.carries(welded);
       sample.current_ua = carries ? static_cast<std::int32_t>(std::lround(1e6 * recorded_a)) : 0;
-      if (!carries && std::abs(recorded_a) > rest_c_rate * plan.cell.parameters.capacity_ah && !result.cut_off_at_s) result.cut_off_at_s = time_s;
+      if (!carries && std::abs(recorded_a) > rest_c_rate * plan.cell.parameters.capacity_ah && !result.cut_off_at_s)
+        result.cut_off_at_s = time_s;
       for (std::size_t c = 0; c < plan.cells; ++c) sample.cell_uv[c] = volts;
       sample.pack_uv = static_cast<std::int32_t>(plan.cells) * volts;
       truth = result.cut_off_at_s ? std::nan("") : drive.soc_ref(drive_s);
@@ -176,16 +205,22 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
     }
     injector.apply(time_s, sample);
 
-    std::vector<hal::CanFrame> frames;
-    if (k % asks_every == 0) frames.push_back(request(static_cast<std::uint32_t>(parting && drive_s <= end_s + asking_again_s ? protection::Request::none : protection::Request::drive), asked = can::next(asked)));
-    const auto measured = plan.cells == 1 ? frames_for<1>(sample, link_v, static_cast<std::uint16_t>(k)) : frames_for<most_cells>(sample, link_v, static_cast<std::uint16_t>(k));
-    for (const hal::CanFrame& f : injector.apply(time_s, measured)) frames.push_back(f);
+    std::vector<can::Frame> frames;
+    if (k % asks_every == 0)
+      frames.push_back(
+          request(static_cast<std::uint32_t>(parting && drive_s <= end_s + asking_again_s ? protection::Request::none
+                                                                                          : protection::Request::drive),
+                  asked = can::next(asked)));
+    const auto measured = plan.cells == 1 ? frames_for<1>(sample, link_v, static_cast<std::uint16_t>(k))
+                                          : frames_for<most_cells>(sample, link_v, static_cast<std::uint16_t>(k));
+    for (const can::Frame& f : injector.apply(time_s, measured)) frames.push_back(f);
     say(time_s, frames);
 
     ++result.samples;
     if (!heard.said_status) ++result.unanswered;
     if (heard.said_pack && std::isfinite(heard.pack.soc) && std::isfinite(truth)) {
-      const double error = 0.01 * static_cast<double>(heard.pack.soc) - truth, sigma = 0.01 * static_cast<double>(heard.pack.soc_sigma);
+      const double error = 0.01 * static_cast<double>(heard.pack.soc) - truth,
+                   sigma = 0.01 * static_cast<double>(heard.pack.soc_sigma);
       ++result.soc_told;
       squares += error * error;
       ++judged;
@@ -200,7 +235,15 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan, const std::f
         lowest = std::min(lowest, 1e-6 * sample.cell_uv[c]);
         highest = std::max(highest, 1e-6 * sample.cell_uv[c]);
       }
-      result.trace.push_back({time_s, 0.01 * static_cast<double>(heard.pack.soc), 0.01 * static_cast<double>(heard.pack.soc_sigma), truth, 1e-6 * sample.current_ua, lowest, highest, link_v, {}});
+      result.trace.push_back({time_s,
+                              0.01 * static_cast<double>(heard.pack.soc),
+                              0.01 * static_cast<double>(heard.pack.soc_sigma),
+                              truth,
+                              1e-6 * sample.current_ua,
+                              lowest,
+                              highest,
+                              link_v,
+                              {}});
       if (progress) progress(end_s > 0 ? std::min(1.0, drive_s / end_s) : 1);
     }
     result.duration_s = time_s;

@@ -8,18 +8,26 @@ namespace bms::hil {
 double link_after(double link_v, double pack_v, const Closed& closed, bool welded, double duration_s) {
   constexpr double precharge_time_constant_s = 0.5, falls_in_s = 5;
   if (closed.carries(welded)) return pack_v;
-  if (closed.precharge && closed.main_minus) return link_v + (pack_v - link_v) * (1 - std::exp(-duration_s / precharge_time_constant_s));
+  if (closed.precharge && closed.main_minus)
+    return link_v + (pack_v - link_v) * (1 - std::exp(-duration_s / precharge_time_constant_s));
   return link_v * std::exp(-duration_s / falls_in_s);
 }
 
-SimulatedPack::SimulatedPack(const CellFile& cell, std::size_t cells, double initial_soc, const PackSpread& spread)
-    : tables_(model::prepare<double, model::max_intervals>(cell.parameters)), voltage_v_(cells), random_(spread.seed), spread_(spread), capacity_ah_(cell.parameters.capacity_ah) {
+SimulatedPack::SimulatedPack(const files::CellFile& cell, std::size_t cells, double initial_soc,
+                             const PackSpread& spread)
+    : tables_(model::prepare<double, model::max_intervals>(cell.parameters)),
+      voltage_v_(cells),
+      random_(spread.seed),
+      spread_(spread),
+      capacity_ah_(cell.parameters.capacity_ah) {
   std::normal_distribution<double> normal;
   courses_.reserve(cells);
   for (std::size_t k = 0; k < cells; ++k) {
-    const double soc = cells > 1 ? spread.soc * normal(random_) : 0, capacity = cells > 1 ? spread.capacity * normal(random_) : 0;
+    const double soc = cells > 1 ? spread.soc * normal(random_) : 0,
+                 capacity = cells > 1 ? spread.capacity * normal(random_) : 0;
     const double own_ah = capacity_ah_ * (1 + capacity);
-    courses_.emplace_back(tables_, own_ah, model::chosen<double>(cell.mechanisms, own_ah), std::clamp(initial_soc + soc, 0.0, 1.0));
+    courses_.emplace_back(tables_, own_ah, model::chosen<double>(cell.mechanisms, own_ah),
+                          std::clamp(initial_soc + soc, 0.0, 1.0));
     voltage_v_[k] = courses_[k].step(0, 0, 0, 25, [](auto&, const auto&) {});
   }
 }
@@ -39,19 +47,22 @@ double SimulatedPack::pack_v() const {
 void SimulatedPack::run(double demand_a, const Closed& closed, bool welded, double temperature_c, double duration_s) {
   current_a_ = closed.carries(welded) ? demand_a : 0;
   time_s_ += duration_s;
-  for (std::size_t k = 0; k < courses_.size(); ++k) voltage_v_[k] = courses_[k].step(time_s_, duration_s, current_a_, temperature_c, [](auto&, const auto&) {});
+  for (std::size_t k = 0; k < courses_.size(); ++k)
+    voltage_v_[k] = courses_[k].step(time_s_, duration_s, current_a_, temperature_c, [](auto&, const auto&) {});
   link_v_ = link_after(link_v_, pack_v(), closed, welded, duration_s);
 }
 
-PackSample<most_cells> SimulatedPack::read(std::uint64_t time_us, double temperature_c) {
+measurement::PackSample<most_cells> SimulatedPack::read(std::uint64_t time_us, double temperature_c) {
   std::normal_distribution<double> normal;
   const auto micro = [](double v) { return static_cast<std::int32_t>(std::lround(1e6 * v)); };
-  PackSample<most_cells> s;
+  measurement::PackSample<most_cells> s;
   s.time_us = time_us;
   s.current_ua = micro(current_a_ + spread_.current_noise_a * normal(random_));
-  for (std::size_t k = 0; k < courses_.size(); ++k) s.cell_uv[k] = micro(voltage_v_[k] + spread_.voltage_noise_v * normal(random_));
+  for (std::size_t k = 0; k < courses_.size(); ++k)
+    s.cell_uv[k] = micro(voltage_v_[k] + spread_.voltage_noise_v * normal(random_));
   s.pack_uv = courses_.size() == 1 ? s.cell_uv[0] : micro(pack_v() + 4 * spread_.voltage_noise_v * normal(random_));
-  for (auto& t : s.temperature_cdegc) t = static_cast<std::int16_t>(std::lround(100 * (temperature_c + spread_.temperature_noise_c * normal(random_))));
+  for (auto& t : s.temperature_cdegc)
+    t = static_cast<std::int16_t>(std::lround(100 * (temperature_c + spread_.temperature_noise_c * normal(random_))));
   return s;
 }
 

@@ -1,9 +1,9 @@
-// The pack that a board under test believes it measures: cells in series by a cell file, no two alike, a load behind contactors, and the
-// sensors. Truth and readings apart, so that what the board says can be judged.
+// The pack that a board under test believes it measures: cells in series by a cell file, no two alike, a load behind
+// contactors, and the sensors. Truth and readings apart, so that what the board says can be judged.
 //
 //   cells     model/extended.hpp in double precision, each with its own capacity and state of charge, drawn from a seed
-//   link      the load's capacitance: rises over the pre-charge resistor, follows the pack while both contactors are closed, falls else
-//   sensors   white noise; what is broken of them: hil/injection.hpp
+//   link      the load's capacitance: rises over the pre-charge resistor, follows the pack while both contactors are
+//   closed, falls else sensors   white noise; what is broken of them: hil/injection.hpp
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 #include <random>
 #include <vector>
 
-#include "estimator/pack_sample.hpp"
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
+#include "measurement/pack_sample.hpp"
 #include "model/extended.hpp"
 
 namespace bms::hil {
@@ -38,20 +38,21 @@ double link_after(double link_v, double pack_v, const Closed& closed, bool welde
 
 class SimulatedPack {
  public:
-  SimulatedPack(const CellFile& cell, std::size_t cells, double initial_soc, const PackSpread& spread);
+  SimulatedPack(const files::CellFile& cell, std::size_t cells, double initial_soc, const PackSpread& spread);
 
-  /// demand_a: what load or charger would have; flows while both main contactors are closed. welded: main+ does not open.
+  /// demand_a: what load or charger would have; flows while both main contactors are closed. welded: main+ does not
+  /// open.
   void run(double demand_a, const Closed& closed, bool welded, double temperature_c, double duration_s);
 
   double current_a() const { return current_a_; }
   double link_v() const { return link_v_; }
-  double soc() const;                                             ///< mean of the cells
+  double soc() const;  ///< mean of the cells
   double voltage_v(std::size_t cell) const { return voltage_v_[cell]; }
   double pack_v() const;
   std::size_t cells() const { return courses_.size(); }
 
   /// As the sensors read it; of what a board has no sensor for, nothing.
-  PackSample<most_cells> read(std::uint64_t time_us, double temperature_c);
+  measurement::PackSample<most_cells> read(std::uint64_t time_us, double temperature_c);
 
  private:
   model::Cell<double, model::max_intervals> tables_;

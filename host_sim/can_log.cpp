@@ -8,10 +8,10 @@
 #include <fmt/format.h>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
-#include "host_sim/bad_input.hpp"
+#include "files/bad_input.hpp"
 #include "monitor/frame_source.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
 namespace {
 
@@ -20,11 +20,11 @@ class Samples {
  public:
   explicit Samples(CanLog& log) : log_(log) {}
 
-  void take(const hal::CanFrame& frame) {
+  void take(const can::Frame& frame) {
     if (is<can::SampleCurrent>(frame)) {
       const auto m = can::SampleCurrent::of(frame);
       counter_ = static_cast<std::uint16_t>(m.sample_counter);
-      building_ = Sample{};
+      building_ = measurement::Sample{};
       building_.current_ua = m.current_ua;
       parts_ = 1;
     } else if (is<can::SampleVoltage>(frame) && parts_ == 1) {
@@ -43,7 +43,7 @@ class Samples {
     } else if (is<can::StartingSoc>(frame) && log_.samples.empty()) {
       const auto m = can::StartingSoc::of(frame);
       starts_ = true;
-      if (m.given != 0) log_.start = StartingPoint{m.soc_ppb, 0};
+      if (m.given != 0) log_.start = measurement::StartingPoint{m.soc_ppb, 0};
     } else if (is<can::StartingSigma>(frame) && log_.samples.empty() && log_.start) {
       log_.start->soc_sigma_ppb = can::StartingSigma::of(frame).sigma_ppb;
     } else if (is<can::Identity>(frame)) {
@@ -54,13 +54,15 @@ class Samples {
 
  private:
   template <class Message>
-  static bool is(const hal::CanFrame& frame) {
+  static bool is(const can::Frame& frame) {
     return frame.id == Message::id && can::intact(frame, Message::data_id);
   }
 
   void add() {
-    if (log_.samples.empty()) log_.from_the_start = starts_ && counter_ == 1;
-    else if (const std::uint16_t missing = static_cast<std::uint16_t>(counter_ - last_ - 1); missing != 0) lost_ += missing, broken_ = true;
+    if (log_.samples.empty())
+      log_.from_the_start = starts_ && counter_ == 1;
+    else if (const std::uint16_t missing = static_cast<std::uint16_t>(counter_ - last_ - 1); missing != 0)
+      lost_ += missing, broken_ = true;
     last_ = counter_;
     log_.samples.push_back(building_);
     log_.hashes.emplace_back();
@@ -68,14 +70,16 @@ class Samples {
   }
 
   CanLog& log_;
-  Sample building_;
+  measurement::Sample building_;
   int parts_ = 0;
   std::uint16_t counter_ = 0, last_ = 0;
   std::uint64_t lost_ = 0;
   bool starts_ = false, broken_ = false;
 };
 
-double number(std::int64_t value, std::int64_t none, double scale) { return value == none ? std::numeric_limits<double>::quiet_NaN() : scale * static_cast<double>(value); }
+double number(std::int64_t value, std::int64_t none, double scale) {
+  return value == none ? std::numeric_limits<double>::quiet_NaN() : scale * static_cast<double>(value);
+}
 
 }  // namespace
 
@@ -102,19 +106,26 @@ CanLog read_can_log(const std::string& path) {
     }
     malformed = source->malformed();
   } catch (const monitor::SourceRefused& refused) {
-    throw BadInput(path, refused.line == 0 ? 1 : refused.line, refused.what());
+    throw files::BadInput(path, refused.line == 0 ? 1 : refused.line, refused.what());
   }
-  if (log.samples.size() < 2) throw BadInput(path, 1, "no samples among its frames, expected SampleCurrent, SampleVoltage, SampleTime (0x199 to 0x19B): switch the log of samples on by a command");
-  Recording& r = log.recording;
+  if (log.samples.size() < 2)
+    throw files::BadInput(path, 1,
+                          "no samples among its frames, expected SampleCurrent, SampleVoltage, SampleTime (0x199 to "
+                          "0x19B): switch the log of samples on by a command");
+  files::Recording& r = log.recording;
   const std::uint64_t begin_us = log.samples.front().time_us;
-  for (const Sample& s : log.samples) {
+  for (const measurement::Sample& s : log.samples) {
     r.time_s.push_back(1e-6 * static_cast<double>(s.time_us - begin_us));
-    r.current_a.push_back(number(s.current_ua, no_reading, 1e-6));
-    r.voltage_v.push_back(number(s.voltage_uv, no_reading, 1e-6));
-    r.temperature_c.push_back(number(s.temperature_cdegc, no_temperature, 1e-2));
+    r.current_a.push_back(number(s.current_ua, measurement::no_reading, 1e-6));
+    r.voltage_v.push_back(number(s.voltage_uv, measurement::no_reading, 1e-6));
+    r.temperature_c.push_back(number(s.temperature_cdegc, measurement::no_temperature, 1e-2));
   }
-  if (!log.from_the_start) r.warnings.push_back({"log_from_later", "the log does not begin with the firmware's first sample: its estimates cannot be compared"});
-  if (samples.lost() > 0) r.warnings.push_back({"samples_lost", fmt::format("{} samples are not in the log, the first after sample {}", samples.lost(), log.unbroken)});
+  if (!log.from_the_start)
+    r.warnings.push_back({"log_from_later",
+                          "the log does not begin with the firmware's first sample: its estimates cannot be compared"});
+  if (samples.lost() > 0)
+    r.warnings.push_back({"samples_lost", fmt::format("{} samples are not in the log, the first after sample {}",
+                                                      samples.lost(), log.unbroken)});
   if (malformed > 0) r.warnings.push_back({"not_a_frame", fmt::format("{} lines are no frames", malformed)});
   return log;
 }
@@ -122,16 +133,19 @@ CanLog read_can_log(const std::string& path) {
 std::optional<std::string> difference_to_log(const CanLog& log, const Track& track, std::size_t& compared) {
   compared = 0;
   if (!log.from_the_start) return std::nullopt;
-  EstimateHash hash;
+  estimator::EstimateHash hash;
   const std::size_t states = track.state_names.size();
   for (std::size_t k = 0; k < log.unbroken; ++k) {
     hash.take(track.words[k]);
     for (std::size_t s = 0; s < states; ++s) hash.take(std::array{track.state_words[k * states + s]});
     if (!log.hashes[k]) continue;
-    if (*log.hashes[k] != hash.value()) return fmt::format("estimates differ from the firmware's at sample {} (time {:g} s) or since {}", k + 1, log.recording.time_s[k], compared == 0 ? std::string("the start") : fmt::format("sample {}", compared));
+    if (*log.hashes[k] != hash.value())
+      return fmt::format("estimates differ from the firmware's at sample {} (time {:g} s) or since {}", k + 1,
+                         log.recording.time_s[k],
+                         compared == 0 ? std::string("the start") : fmt::format("sample {}", compared));
     compared = k + 1;
   }
   return std::nullopt;
 }
 
-}  // namespace bms
+}  // namespace bms::host_sim

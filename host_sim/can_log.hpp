@@ -1,5 +1,5 @@
-// A truck's log: CAN frames as candump keeps them (also gzip), with the samples as the firmware's estimator saw them and a hash of all that it
-// computed. What a replay of the samples gives can be compared with that, bit for bit.
+// A truck's log: CAN frames as candump keeps them (also gzip), with the samples as the firmware's estimator saw them
+// and a hash of all that it computed. What a replay of the samples gives can be compared with that, bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -7,18 +7,18 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/recording.hpp"
+#include "files/recording.hpp"
 #include "host_sim/replay.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
 struct CanLog {
-  Recording recording;               ///< the same as numbers; its warnings tell of what is missing
-  std::vector<Sample> samples;
-  std::optional<StartingPoint> start;
-  bool from_the_start = false;       ///< begins with the firmware's first sample, and says where it began
+  files::Recording recording;  ///< the same as numbers; its warnings tell of what is missing
+  std::vector<measurement::Sample> samples;
+  std::optional<measurement::StartingPoint> start;
+  bool from_the_start = false;  ///< begins with the firmware's first sample, and says where it began
   std::vector<std::optional<std::uint32_t>> hashes;  ///< after each sample
-  std::size_t unbroken = 0;          ///< samples before the first that got lost
+  std::size_t unbroken = 0;                          ///< samples before the first that got lost
   std::optional<std::uint32_t> cell_hash;
 };
 
@@ -28,8 +28,8 @@ bool is_can_log(const std::string& path);
 /// Throws BadInput: no frames, no samples among them.
 CanLog read_can_log(const std::string& path);
 
-/// Compares a replay of log.samples with what the firmware computed. Nothing: all that can be compared is equal; else where it is not, in
-/// words. compared: samples whose hash was.
+/// Compares a replay of log.samples with what the firmware computed. Nothing: all that can be compared is equal; else
+/// where it is not, in words. compared: samples whose hash was.
 std::optional<std::string> difference_to_log(const CanLog& log, const Track& track, std::size_t& compared);
 
-}  // namespace bms
+}  // namespace bms::host_sim

@@ -1,4 +1,5 @@
-// Reproducible normal noise: the same seed gives the same values on every machine (std::normal_distribution does not promise that).
+// Reproducible normal noise: the same seed gives the same values on every machine (std::normal_distribution does not
+// promise that).
 #pragma once
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "experiments/splitmix.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
 class GaussianNoise {
  public:
@@ -23,7 +24,7 @@ class GaussianNoise {
   /// 0 <= u < 1.
   double uniform() { return static_cast<double>(random_.bits() >> 11) * 0x1p-53; }
 
-  SplitMix random_;
+  experiments::SplitMix random_;
 };
 
-}  // namespace bms
+}  // namespace bms::host_sim

@@ -8,23 +8,25 @@
 
 #include <fmt/format.h>
 
-#include "identification/figures.hpp"
 #include "host_sim/replay_run.hpp"
 #include "host_sim/simulation.hpp"
+#include "identification/figures.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
 namespace {
 
 constexpr double thirty_minutes_s = 1'800;
-/// As an ExtendedEstimate tells them.
-constexpr std::array<const char*, told_errors> error_names = {"voltage_error_v", "current_offset_a", "current_offset_sigma_a"};
+/// As an estimator::ExtendedEstimate tells them.
+constexpr std::array<const char*, told_errors> error_names = {"voltage_error_v", "current_offset_a",
+                                                              "current_offset_sigma_a"};
 constexpr std::size_t current_offset_at = 1, current_offset_sigma_at = 2;
 
 /// The value of an estimate's word as a board writes it.
 double number_of(std::uint32_t word, ScalarKind scalar) {
   if (scalar == ScalarKind::single) return std::bit_cast<float>(word);
-  return static_cast<double>(model::Soc<model::FixedPoint>::from_raw(static_cast<std::int32_t>(word)));  // all four are Q3.28
+  return static_cast<double>(
+      arithmetic::Soc<arithmetic::FixedPoint>::from_raw(static_cast<std::int32_t>(word)));  // all four are Q3.28
 }
 
 std::string formatted(double value, ScalarKind scalar) {
@@ -35,24 +37,34 @@ std::string formatted(double value, ScalarKind scalar) {
 
 const char* name_of(ScalarKind scalar) {
   switch (scalar) {
-    case ScalarKind::single: return "float";
-    case ScalarKind::fixed: return "fixed";
-    case ScalarKind::twice: return "double";
+    case ScalarKind::single:
+      return "float";
+    case ScalarKind::fixed:
+      return "fixed";
+    case ScalarKind::twice:
+      return "double";
   }
   return "";
 }
 
-std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief, double shift) {
+std::optional<measurement::StartingPoint> starting_point(const std::optional<Belief>& belief, double shift) {
   if (!belief) return std::nullopt;
-  return StartingPoint{static_cast<std::int32_t>(std::lround(std::clamp(belief->soc + shift, 0.0, 1.0) * 1e9)), static_cast<std::int32_t>(std::lround(belief->sigma * 1e9))};
+  return measurement::StartingPoint{
+      static_cast<std::int32_t>(std::lround(std::clamp(belief->soc + shift, 0.0, 1.0) * 1e9)),
+      static_cast<std::int32_t>(std::lround(belief->sigma * 1e9))};
 }
 
-Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar) {
+Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sample>& samples,
+                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar) {
   Track track = [&] {
     switch (scalar) {
-      case ScalarKind::fixed: refuse_without_fpu(cell); return run<model::FixedPoint>(cell, samples, start);
-      case ScalarKind::twice: return run<double>(cell, samples, start);
-      default: return run<float>(cell, samples, start);
+      case ScalarKind::fixed:
+        files::refuse_without_fpu(cell);
+        return run<arithmetic::FixedPoint>(cell, samples, start);
+      case ScalarKind::twice:
+        return run<double>(cell, samples, start);
+      default:
+        return run<float>(cell, samples, start);
     }
   }();
   name_states(track, cell);
@@ -60,21 +72,22 @@ Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, cons
   return track;
 }
 
-std::size_t state_count(const CellFile& cell) {
+std::size_t state_count(const files::CellFile& cell) {
   std::size_t count = cell.parameters.noise.errors_are_states ? error_names.size() : 0;
-  for (const model::MechanismSetting& m : on_board(cell.mechanisms)) count += model::catalogue[m.index].states;
+  for (const model::MechanismSetting& m : files::on_board(cell.mechanisms)) count += model::catalogue[m.index].states;
   return count;
 }
 
-void name_states(Track& track, const CellFile& cell) {
+void name_states(Track& track, const files::CellFile& cell) {
   if (cell.parameters.noise.errors_are_states) {
     track.state_names.assign(error_names.begin(), error_names.end());
     track.state_scales = {1, cell.parameters.capacity_ah, cell.parameters.capacity_ah};
   }
-  for (const model::MechanismSetting& m : on_board(cell.mechanisms)) {
+  for (const model::MechanismSetting& m : files::on_board(cell.mechanisms)) {
     const model::MechanismInfo& info = model::catalogue[m.index];
     for (std::size_t k = 0; k < info.states; ++k) {
-      track.state_names.push_back(fmt::format("{}{}_{}", info.id, info.states > 1 ? fmt::format("_{}", k + 1) : "", info.state_unit.name));
+      track.state_names.push_back(
+          fmt::format("{}{}_{}", info.id, info.states > 1 ? fmt::format("_{}", k + 1) : "", info.state_unit.name));
       track.state_scales.push_back(info.state_unit.scale);
     }
   }
@@ -90,12 +103,14 @@ void number_states(Track& track, ScalarKind scalar) {
   }
 }
 
-std::vector<EstimateRow> rows_of(const std::vector<EstimateWords>& words, ScalarKind scalar) {
-  static_assert(std::same_as<model::Soc<model::FixedPoint>, model::Voltage<model::FixedPoint>>, "one conversion serves all four numbers");
+std::vector<EstimateRow> rows_of(const std::vector<estimator::EstimateWords>& words, ScalarKind scalar) {
+  static_assert(std::same_as<arithmetic::Soc<arithmetic::FixedPoint>, arithmetic::Voltage<arithmetic::FixedPoint>>,
+                "one conversion serves all four numbers");
   std::vector<EstimateRow> rows;
   rows.reserve(words.size());
-  for (const EstimateWords& w : words) {
-    rows.push_back({number_of(w[0], scalar), number_of(w[1], scalar), number_of(w[2], scalar), number_of(w[3], scalar), w[4]});
+  for (const estimator::EstimateWords& w : words) {
+    rows.push_back(
+        {number_of(w[0], scalar), number_of(w[1], scalar), number_of(w[2], scalar), number_of(w[3], scalar), w[4]});
   }
   return rows;
 }
@@ -103,23 +118,27 @@ std::vector<EstimateRow> rows_of(const std::vector<EstimateWords>& words, Scalar
 std::optional<Difference> first_difference(const Track& host, const Track& board, ScalarKind scalar) {
   const std::size_t both = std::min(host.words.size(), board.words.size());
   for (std::size_t k = 0; k < both; ++k) {
-    for (std::size_t w = 0; w < estimate_words; ++w) {
+    for (std::size_t w = 0; w < estimator::estimate_words; ++w) {
       const std::uint32_t a = host.words[k][w], b = board.words[k][w];
       if (a == b) continue;
-      const bool flags = w + 1 == estimate_words;
-      return Difference{k, estimate_word_names[w], flags ? a : number_of(a, scalar), flags ? b : number_of(b, scalar)};
+      const bool flags = w + 1 == estimator::estimate_words;
+      return Difference{k, estimator::estimate_word_names[w], flags ? a : number_of(a, scalar),
+                        flags ? b : number_of(b, scalar)};
     }
     for (std::size_t s = 0; s < host.state_names.size() && host.state_names == board.state_names; ++s) {
-      const std::uint32_t a = host.state_words[k * host.state_names.size() + s], b = board.state_words[k * host.state_names.size() + s];
+      const std::uint32_t a = host.state_words[k * host.state_names.size() + s],
+                          b = board.state_words[k * host.state_names.size() + s];
       if (a != b) return Difference{k, host.state_names[s], number_of(a, scalar), number_of(b, scalar)};
     }
   }
-  if (host.words.size() != board.words.size()) return Difference{both, "number of estimates", static_cast<double>(host.words.size()), static_cast<double>(board.words.size())};
+  if (host.words.size() != board.words.size())
+    return Difference{both, "number of estimates", static_cast<double>(host.words.size()),
+                      static_cast<double>(board.words.size())};
   return std::nullopt;
 }
 
 void evaluate(ReplayResult& result) {
-  const Recording& r = result.recording;
+  const files::Recording& r = result.recording;
   const std::vector<EstimateRow>& rows = result.track.rows;
   const bool has_reference = !r.soc_ref.empty();
 
@@ -130,9 +149,10 @@ void evaluate(ReplayResult& result) {
   if (!result.belief) result.initial_soc = rows.front().soc;
   const bool start_known = has_reference && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1;
   // a shift of the start is about what was believed
-  const double shift = value_of(result.cell.mechanisms, model::InitialSoc::id, 0), started = result.belief ? result.initial_soc : result.initial_soc - shift;
-  const auto open = simulate(cell, result.cell.parameters.capacity_ah, result.cell.mechanisms, r.time_s, r.current_a, r.temperature_c,
-                             start_known ? r.soc_ref.front() - shift : started);
+  const double shift = value_of(result.cell.mechanisms, model::InitialSoc::id, 0),
+               started = result.belief ? result.initial_soc : result.initial_soc - shift;
+  const auto open = simulate(cell, result.cell.parameters.capacity_ah, result.cell.mechanisms, r.time_s, r.current_a,
+                             r.temperature_c, start_known ? r.soc_ref.front() - shift : started);
 
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const EstimateRow& e = rows[k];
@@ -143,9 +163,11 @@ void evaluate(ReplayResult& result) {
       if (std::abs(error) <= 2 * e.soc_sigma) ++inside;
     }
     // a reading that the filter did not believe says nothing about its prediction
-    constexpr std::uint32_t not_believed = voltage_missing | voltage_implausible | voltage_stuck | time_not_later | not_started;
+    constexpr std::uint32_t not_believed = estimator::voltage_missing | estimator::voltage_implausible |
+                                           estimator::voltage_stuck | estimator::time_not_later |
+                                           estimator::not_started;
     if (k > 0 && (e.flags & not_believed) == 0) prediction.add(r.voltage_v[k] - e.voltage_predicted_v);
-    if ((e.flags & (voltage_missing | voltage_implausible)) == 0) {
+    if ((e.flags & (estimator::voltage_missing | estimator::voltage_implausible)) == 0) {
       open_loop.add(r.voltage_v[k] - open[k].voltage_v);
       fit.add(r.voltage_v[k], open[k].voltage_v);
     }
@@ -187,12 +209,14 @@ std::string trace_csv(const ReplayResult& result) {
   const ScalarKind s = result.scalar;
   for (std::size_t k = 0; k < result.track.rows.size(); ++k) {
     const EstimateRow& e = result.track.rows[k];
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},", result.recording.time_s[k], formatted(e.soc, s), formatted(e.soc_sigma, s),
-                   formatted(e.v_rc_v, s), formatted(e.voltage_predicted_v, s), result.recording.voltage_v[k]);
-    for (std::size_t i = 0; i < names.size(); ++i) fmt::format_to(std::back_inserter(csv), "{},", formatted(result.track.states[k * names.size() + i], s));
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},", result.recording.time_s[k], formatted(e.soc, s),
+                   formatted(e.soc_sigma, s), formatted(e.v_rc_v, s), formatted(e.voltage_predicted_v, s),
+                   result.recording.voltage_v[k]);
+    for (std::size_t i = 0; i < names.size(); ++i)
+      fmt::format_to(std::back_inserter(csv), "{},", formatted(result.track.states[k * names.size() + i], s));
     fmt::format_to(std::back_inserter(csv), "{}\n", e.flags);
   }
   return csv;
 }
 
-}  // namespace bms
+}  // namespace bms::host_sim

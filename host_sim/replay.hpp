@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "estimator/estimate.hpp"
-#include "host_sim/cell_file.hpp"
-#include "host_sim/recording.hpp"
+#include "files/cell_file.hpp"
+#include "files/recording.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
 enum class ScalarKind { single, fixed, twice };  ///< float, fixed point, double
 
@@ -21,14 +21,15 @@ struct EstimateRow {
   std::uint32_t flags = 0;
 };
 
-/// The estimates of one run. What the filter of an extended cell knows besides stands row by row, state_names.size() to a row: errors that
-/// are states, states of mechanisms.
+/// The estimates of one run. What the filter of an extended cell knows besides stands row by row, state_names.size() to
+/// a row: errors that are states, states of mechanisms.
 struct Track {
   std::vector<EstimateRow> rows;
-  std::vector<EstimateWords> words;  ///< the bits behind them; empty for double
-  std::vector<std::string> state_names;      ///< "current_offset_a", "ocv_hysteresis_v", "slow_polarisation_1_v", "self_heating_k"
-  std::vector<double> state_scales;          ///< of what the words hold to the name's unit
-  std::vector<double> states;                ///< V, K, A
+  std::vector<estimator::EstimateWords> words;  ///< the bits behind them; empty for double
+  std::vector<std::string>
+      state_names;  ///< "current_offset_a", "ocv_hysteresis_v", "slow_polarisation_1_v", "self_heating_k"
+  std::vector<double> state_scales;  ///< of what the words hold to the name's unit
+  std::vector<double> states;        ///< V, K, A
   std::vector<std::uint32_t> state_words;
   double steps_per_second = 0;
 };
@@ -39,20 +40,21 @@ struct Belief {
   double sigma = 0.02;
 };
 /// shift: what a cell file knows of the truth of such beliefs.
-std::optional<StartingPoint> starting_point(const std::optional<Belief>& belief, double shift = 0);
+std::optional<measurement::StartingPoint> starting_point(const std::optional<Belief>& belief, double shift = 0);
 
 /// How many of them the estimator tells with this cell file; name_states: which.
-std::size_t state_count(const CellFile& cell);
-void name_states(Track& track, const CellFile& cell);
+std::size_t state_count(const files::CellFile& cell);
+void name_states(Track& track, const files::CellFile& cell);
 
 /// Runs the estimator on this machine. The measuring of its speed repeats the run; the estimates are those of the last.
-Track run_on_host(const CellFile& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, ScalarKind scalar);
+Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sample>& samples,
+                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar);
 
 /// Fills a track's numbers from its words.
 void number_states(Track& track, ScalarKind scalar);
 
 /// Numbers of the words that a board has sent.
-std::vector<EstimateRow> rows_of(const std::vector<EstimateWords>& words, ScalarKind scalar);
+std::vector<EstimateRow> rows_of(const std::vector<estimator::EstimateWords>& words, ScalarKind scalar);
 
 /// Where two runs part, or nothing.
 struct Difference {
@@ -68,25 +70,27 @@ struct SocFigures {
   std::optional<double> current_offset_a, current_offset_sigma_a;  ///< at the end, where errors are states
 };
 struct VoltageFigures {
-  std::optional<double> prediction_rmse_v, prediction_max_v, open_loop_rmse_v, open_loop_fit_percent;  ///< nothing: no voltage to judge by
+  std::optional<double> prediction_rmse_v, prediction_max_v, open_loop_rmse_v,
+      open_loop_fit_percent;  ///< nothing: no voltage to judge by
 };
 
 struct ReplayResult {
-  Recording recording;
-  CellFile cell;
+  files::Recording recording;
+  files::CellFile cell;
   std::string target;
   ScalarKind scalar = ScalarKind::single;
-  std::optional<Belief> belief;                  ///< of the user
-  double initial_soc = 0;                        ///< believed, or of the estimator after the first sample
+  std::optional<Belief> belief;  ///< of the user
+  double initial_soc = 0;        ///< believed, or of the estimator after the first sample
   Track track;
   std::vector<double> open_loop_v;
   SocFigures soc;
   VoltageFigures voltage;
-  std::optional<std::string> verified_against;   ///< board that gave the same bits
-  std::optional<std::string> difference;         ///< or where it did not, in words
+  std::optional<std::string> verified_against;  ///< board that gave the same bits
+  std::optional<std::string> difference;        ///< or where it did not, in words
 };
 
-/// Figures of `result.track` over `result.recording`; the open loop starts at soc_ref where there is one, else at initial_soc.
+/// Figures of `result.track` over `result.recording`; the open loop starts at soc_ref where there is one, else at
+/// initial_soc.
 void evaluate(ReplayResult& result);
 
 /// time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v, states of mechanisms, flags
@@ -94,4 +98,4 @@ std::string trace_csv(const ReplayResult& result);
 
 const char* name_of(ScalarKind scalar);
 
-}  // namespace bms
+}  // namespace bms::host_sim

@@ -1,5 +1,6 @@
-// A recording through the estimator with one scalar. The estimator of every combination of states that a cell file may ask for is compiled
-// for each scalar, which takes half a minute: each has a file of its own, replay_run_float.cpp and so on.
+// A recording through the estimator with one scalar. The estimator of every combination of states that a cell file may
+// ask for is compiled for each scalar, which takes half a minute: each has a file of its own, replay_run_float.cpp and
+// so on.
 #pragma once
 
 #include <algorithm>
@@ -13,9 +14,10 @@
 #include "host_sim/replay.hpp"
 #include "model/extended.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
-/// What an ExtendedEstimate tells first where errors are states: the voltage's error, the current's offset, the offset's standard deviation.
+/// What an estimator::ExtendedEstimate tells first where errors are states: the voltage's error, the current's offset,
+/// the offset's standard deviation.
 inline constexpr std::size_t told_errors = 3;
 
 namespace replay_detail {
@@ -23,30 +25,38 @@ namespace replay_detail {
 inline constexpr double timing_s = 0.03;  // long enough that a clock and a cold cache do not matter
 
 template <class S>
-EstimateRow row_of(const Estimate<S>& e) {
-  return {model::as_double(e.soc), model::as_double(e.soc_sigma), model::as_double(e.v_rc_v), model::as_double(e.voltage_predicted_v), e.flags};
+EstimateRow row_of(const estimator::Estimate<S>& e) {
+  return {arithmetic::as_double(e.soc), arithmetic::as_double(e.soc_sigma), arithmetic::as_double(e.v_rc_v),
+          arithmetic::as_double(e.voltage_predicted_v), e.flags};
 }
 
 template <class Estimator, class Cell>
-void step_through(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<typename Estimator::Result>& estimates) {
+void step_through(const Cell& cell, const std::vector<measurement::Sample>& samples,
+                  const std::optional<measurement::StartingPoint>& start,
+                  std::vector<typename Estimator::Result>& estimates) {
   Estimator estimator = start ? Estimator(*start) : Estimator();
   for (std::size_t k = 0; k < samples.size(); ++k) estimates[k] = estimator.step(cell, samples[k]);
 }
 
 template <class Estimator, class Cell>
-[[gnu::flatten]] void step_through_flat(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::vector<typename Estimator::Result>& estimates) {
+[[gnu::flatten]] void step_through_flat(const Cell& cell, const std::vector<measurement::Sample>& samples,
+                                        const std::optional<measurement::StartingPoint>& start,
+                                        std::vector<typename Estimator::Result>& estimates) {
   step_through<Estimator>(cell, samples, start, estimates);
 }
 
 template <class Estimator, class Cell>
-Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start, std::size_t further) {
+Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& samples,
+                    const std::optional<measurement::StartingPoint>& start, std::size_t further) {
   using S = typename Estimator::Scalar;
   std::vector<typename Estimator::Result> estimates(samples.size());
   double best_s = std::numeric_limits<double>::infinity(), total_s = 0;
   do {
     const auto begin = std::chrono::steady_clock::now();
-    if constexpr (Estimator::further_values == 0) step_through_flat<Estimator>(cell, samples, start, estimates);
-    else step_through<Estimator>(cell, samples, start, estimates);
+    if constexpr (Estimator::further_values == 0)
+      step_through_flat<Estimator>(cell, samples, start, estimates);
+    else
+      step_through<Estimator>(cell, samples, start, estimates);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     best_s = std::min(best_s, seconds);
     total_s += seconds;
@@ -57,11 +67,14 @@ Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const 
   track.rows.reserve(samples.size());
   for (const auto& e : estimates) {
     track.rows.push_back(row_of<S>(e));
-    if constexpr (!std::same_as<S, double>) track.words.push_back(words(static_cast<const Estimate<S>&>(e)));
+    if constexpr (!std::same_as<S, double>)
+      track.words.push_back(estimator::words(static_cast<const estimator::Estimate<S>&>(e)));
     if constexpr (Estimator::further_values > 0) {
       for (std::size_t k = 0; k < further; ++k) {
-        if constexpr (std::same_as<S, double>) track.states.push_back(e.further[k]);
-        else track.state_words.push_back(word(e.further[k]));
+        if constexpr (std::same_as<S, double>)
+          track.states.push_back(e.further[k]);
+        else
+          track.state_words.push_back(estimator::word(e.further[k]));
       }
     }
   }
@@ -70,28 +83,39 @@ Track run_estimator(const Cell& cell, const std::vector<Sample>& samples, const 
 
 /// A cell with mechanisms: as many states in the filter as they have voltages.
 template <class S, bool Errors, std::size_t Voltages = 0>
-Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
+Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell,
+                   const std::vector<measurement::Sample>& samples,
+                   const std::optional<measurement::StartingPoint>& start) {
   using Laws = model::ChosenLaws<S>;
   if constexpr (Voltages < Laws::most_voltage_states) {
     if (cell.laws.voltage_states() > Voltages) return run_extended<S, Errors, Voltages + 1>(cell, samples, start);
   }
-  return run_estimator<SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>>(cell, samples, start, (Errors ? told_errors : 0) + cell.laws.states());
+  return run_estimator<estimator::SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>>(
+      cell, samples, start, (Errors ? told_errors : 0) + cell.laws.states());
 }
 
 }  // namespace replay_detail
 
 template <class S>
-Track run(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start) {
+Track run(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+          const std::optional<measurement::StartingPoint>& start) {
   const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
-  const auto mechanisms = on_board(file.mechanisms);
+  const auto mechanisms = files::on_board(file.mechanisms);
   const bool errors = file.parameters.noise.errors_are_states;
-  if (mechanisms.empty() && !errors) return replay_detail::run_estimator<SocEstimator<S>>(cell, samples, start, 0);
-  const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> extended{cell, model::chosen<S>(mechanisms, file.parameters.capacity_ah)};
-  return errors ? replay_detail::run_extended<S, true>(extended, samples, start) : replay_detail::run_extended<S, false>(extended, samples, start);
+  if (mechanisms.empty() && !errors)
+    return replay_detail::run_estimator<estimator::SocEstimator<S>>(cell, samples, start, 0);
+  const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> extended{
+      cell, model::chosen<S>(mechanisms, file.parameters.capacity_ah)};
+  return errors ? replay_detail::run_extended<S, true>(extended, samples, start)
+                : replay_detail::run_extended<S, false>(extended, samples, start);
 }
 
-extern template Track run<float>(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start);
-extern template Track run<double>(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start);
-extern template Track run<model::FixedPoint>(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start);
+extern template Track run<float>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+                                 const std::optional<measurement::StartingPoint>& start);
+extern template Track run<double>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+                                  const std::optional<measurement::StartingPoint>& start);
+extern template Track run<arithmetic::FixedPoint>(const files::CellFile& file,
+                                                  const std::vector<measurement::Sample>& samples,
+                                                  const std::optional<measurement::StartingPoint>& start);
 
-}  // namespace bms
+}  // namespace bms::host_sim

@@ -1,7 +1,8 @@
 #include "host_sim/replay_run.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
-template Track run<double>(const CellFile& file, const std::vector<Sample>& samples, const std::optional<StartingPoint>& start);
+template Track run<double>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+                           const std::optional<measurement::StartingPoint>& start);
 
-}  // namespace bms
+}  // namespace bms::host_sim

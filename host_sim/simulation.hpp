@@ -9,7 +9,7 @@
 #include "model/one_rc.hpp"
 #include "model/readings.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 
 /// A cell for the host: any number of intervals that a file may have.
 template <class S>
@@ -21,10 +21,12 @@ struct SimulatedRow {
 };
 
 /// Integrates the model over rows of (time_s, mean current_a since the row before) from a cell at rest at initial_soc.
-/// A missing current (NaN) is taken as the last one known, as the estimator does, and soc stops at -1/4 and 5/4 as its does.
-/// Row 0 has no interval before it: its voltage is the rested one plus R0 I. Rows whose time is not later repeat the state.
-inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double capacity_ah, std::span<const double> time_s,
-                                          std::span<const double> current_a, double initial_soc) {
+/// A missing current (NaN) is taken as the last one known, as the estimator does, and soc stops at -1/4 and 5/4 as its
+/// does. Row 0 has no interval before it: its voltage is the rested one plus R0 I. Rows whose time is not later repeat
+/// the state.
+inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double capacity_ah,
+                                          std::span<const double> time_s, std::span<const double> current_a,
+                                          double initial_soc) {
   using Model = model::OneRc<double>;
   std::vector<SimulatedRow> rows(time_s.size());
   Model::Polarisation x{};
@@ -43,29 +45,35 @@ inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double c
 }
 
 /// The value of one parameter of a mechanism that may be there; 0 if it is not.
-inline double value_of(std::span<const model::MechanismSetting> mechanisms, std::string_view id, std::size_t parameter) {
+inline double value_of(std::span<const model::MechanismSetting> mechanisms, std::string_view id,
+                       std::size_t parameter) {
   for (const model::MechanismSetting& m : mechanisms) {
     if (model::catalogue[m.index].id == id) return m.value[parameter];
   }
   return 0;
 }
 
-/// The same with mechanisms and faults of the measuring chain, over currents and temperatures that were *measured*: the voltage that
-/// *would be measured*. initial_soc is what is believed; a shift among the mechanisms is added to it. temperature_c may be empty.
-inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double capacity_ah, std::span<const model::MechanismSetting> mechanisms,
-                                          std::span<const double> time_s, std::span<const double> current_a, std::span<const double> temperature_c,
-                                          double initial_soc) {
+/// The same with mechanisms and faults of the measuring chain, over currents and temperatures that were *measured*: the
+/// voltage that *would be measured*. initial_soc is what is believed; a shift among the mechanisms is added to it.
+/// temperature_c may be empty.
+inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double capacity_ah,
+                                          std::span<const model::MechanismSetting> mechanisms,
+                                          std::span<const double> time_s, std::span<const double> current_a,
+                                          std::span<const double> temperature_c, double initial_soc) {
   if (mechanisms.empty()) return simulate(cell, capacity_ah, time_s, current_a, initial_soc);
-  const model::CorrectedReadings<double> readings(time_s, current_a, temperature_c, value_of(mechanisms, model::ChannelSkew::id, 0),
+  const model::CorrectedReadings<double> readings(time_s, current_a, temperature_c,
+                                                  value_of(mechanisms, model::ChannelSkew::id, 0),
                                                   value_of(mechanisms, model::TemperatureSensor::id, 1));
-  model::Course<double> course(cell, capacity_ah, model::chosen<double>(mechanisms, capacity_ah), initial_soc + value_of(mechanisms, model::InitialSoc::id, 0));
+  model::Course<double> course(cell, capacity_ah, model::chosen<double>(mechanisms, capacity_ah),
+                               initial_soc + value_of(mechanisms, model::InitialSoc::id, 0));
   std::vector<SimulatedRow> rows(time_s.size());
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double duration_s = k == 0 ? 0 : time_s[k] - time_s[k - 1];
-    const double voltage_v = course.step(time_s[k], duration_s, readings.current(k), readings.temperature(k), [](auto&, const auto&) {});
+    const double voltage_v =
+        course.step(time_s[k], duration_s, readings.current(k), readings.temperature(k), [](auto&, const auto&) {});
     rows[k] = {voltage_v, course.soc()};
   }
   return rows;
 }
 
-}  // namespace bms
+}  // namespace bms::host_sim

@@ -33,7 +33,8 @@ std::array<Scalar, 4> backwards(const std::array<Scalar, 5>& x, double step_s, d
   if (input == Input::straight) return {b1, r0, r1, tau / r1};
   const Scalar& p = a2;
   const Scalar held_r1 = r1 * (1.0 + p) / (2.0 * p);
-  return {b1, r0 - b1 * step_s / (2 * capacity_c) - held_r1 * (1.0 - p) / (1.0 + p), held_r1, held_tau(p, step_s) / held_r1};
+  return {b1, r0 - b1 * step_s / (2 * capacity_c) - held_r1 * (1.0 - p) / (1.0 + p), held_r1,
+          held_tau(p, step_s) / held_r1};
 }
 
 /// Roots of z^2 + a1 z + a2; the smaller one from the product, for the subtraction loses it.
@@ -55,9 +56,12 @@ CircuitReading circuit_from_discrete(const DiscreteCoefficients& c, double step_
   out.pole_off_integrator = std::min(std::abs(1.0 - one), std::abs(1.0 - other));
 
   const auto judge = [&](const char* name, double value) {
-    if (!std::isfinite(value)) out.implausible.push_back(std::string(name) + " is not finite");
-    else if (value < 0) out.implausible.push_back(std::string(name) + " is negative");
-    else if (value == 0) out.implausible.push_back(std::string(name) + " is zero");
+    if (!std::isfinite(value))
+      out.implausible.push_back(std::string(name) + " is not finite");
+    else if (value < 0)
+      out.implausible.push_back(std::string(name) + " is negative");
+    else if (value == 0)
+      out.implausible.push_back(std::string(name) + " is zero");
   };
   for (std::size_t k = 0; k < values.size(); ++k) judge(circuit_names[k], values[k]);
   judge("tau_s", out.tau_s);
@@ -74,10 +78,12 @@ DiscreteCoefficients discrete_from_circuit(const Circuit& circuit, double step_s
     return {r0 + counted + relaxed, -r0 * (1 + p) - counted * p - relaxed, r0 * p, -(1 + p), p};
   }
   const double even = t * t * b1 + 4 * q * r0 * tau, odd = 2 * q * t * (r0 + r1) + 2 * b1 * tau * t;
-  return {(even + odd) / d, 2 * (t * t * b1 - 4 * q * r0 * tau) / d, (even - odd) / d, -8 * q * tau / d, (4 * q * tau - 2 * q * t) / d};
+  return {(even + odd) / d, 2 * (t * t * b1 - 4 * q * r0 * tau) / d, (even - odd) / d, -8 * q * tau / d,
+          (4 * q * tau - 2 * q * t) / d};
 }
 
-Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance, double step_s, double capacity_c, Input input) {
+Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance,
+                                   double step_s, double capacity_c, Input input) {
   require(step_s, capacity_c);
   constexpr double tiny = 1e-100;  // complex step: no difference is taken, so no rounding whatever its size
   Eigen::Matrix<double, 4, 5> slope;
@@ -85,12 +91,14 @@ Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& c, const Eigen::M
     std::array<std::complex<double>, 5> x{c.c0, c.c1, c.c2, c.a1, c.a2};
     x[j] += std::complex<double>(0, tiny);
     const auto values = backwards(x, step_s, capacity_c, input);
-    for (std::size_t k = 0; k < 4; ++k) slope(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = values[k].imag() / tiny;
+    for (std::size_t k = 0; k < 4; ++k)
+      slope(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = values[k].imag() / tiny;
   }
   return slope * covariance * slope.transpose();
 }
 
-Circuit circuit_std(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance, double step_s, double capacity_c, Input input) {
+Circuit circuit_std(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance, double step_s,
+                    double capacity_c, Input input) {
   const Eigen::Vector4d variance = circuit_covariance(c, covariance, step_s, capacity_c, input).diagonal();
   const auto root = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, variance[k])); };
   return {root(0), root(1), root(2), root(3)};

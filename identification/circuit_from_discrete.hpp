@@ -1,22 +1,28 @@
-// From the coefficients of the discrete transfer function (Eq. 11) to the circuit: slope of the OCV, R0, R1, C1; and back (Eq. 12-16).
+// From the coefficients of the discrete transfer function (Eq. 11) to the circuit: slope of the OCV, R0, R1, C1; and
+// back (Eq. 12-16).
 //
 //   tau = R1 C1 = T (1 + a2) / (2 (1 - a2))      D = 2 C_n T + 4 C_n tau
 //   R0 = (c0 - c1 + c2) D / (16 C_n tau)          b1 = (c0 + c1 + c2) D / (4 T^2)
 //   R1 = (c0 - c2) D / (4 C_n T) - R0 - b1 tau / C_n         C1 = tau / R1
 //
-// The paper's C_n is in coulombs here (Ah x 3600), b1 in volts per unit of soc. a1 does not enter: Eq. 15 makes it -(1 + a2), the pole at 1
-// that counts the charge; an identified a1 is off by a little, and `pole_off_integrator` says by how much.
+// The paper's C_n is in coulombs here (Ah x 3600), b1 in volts per unit of soc. a1 does not enter: Eq. 15 makes it -(1
+// + a2), the pole at 1 that counts the charge; an identified a1 is off by a little, and `pole_off_integrator` says by
+// how much.
 //
-// Accuracy: b1 is what is left of c0 + c1 + c2, about (T / tau) (T b1 / C_n) out of R0: at 1 s a rounding of 1e-16 is 1e-11 of b1.
+// Accuracy: b1 is what is left of c0 + c1 + c2, about (T / tau) (T b1 / C_n) out of R0: at 1 s a rounding of 1e-16 is
+// 1e-11 of b1.
 //
-// Eq. 12-16 are the bilinear transform: a current that runs straight from sample to sample. A recording's current is a mean over the
-// interval that ends with the sample, held: read by Eq. 12-16, R0 comes out too large by R1 T / (2 tau) + b1 T / (2 C_n), R1 too small by
-// R1 T / (2 tau) (1 % at T = 1 s and tau = 50 s), tau too large by (T / tau)^2 / 12 of itself. Input::held is exact for such data:
-//   p = a2 = exp(-T / tau), R1 = R1' (1 + p) / (2 p), R0 = R0' - b1 T / (2 C_n) - R1 (1 - p) / (1 + p), R0' and R1' those of Eq. 12-16.
+// Eq. 12-16 are the bilinear transform: a current that runs straight from sample to sample. A recording's current is a
+// mean over the interval that ends with the sample, held: read by Eq. 12-16, R0 comes out too large by R1 T / (2 tau) +
+// b1 T / (2 C_n), R1 too small by R1 T / (2 tau) (1 % at T = 1 s and tau = 50 s), tau too large by (T / tau)^2 / 12 of
+// itself. Input::held is exact for such data:
+//   p = a2 = exp(-T / tau), R1 = R1' (1 + p) / (2 p), R0 = R0' - b1 T / (2 C_n) - R1 (1 - p) / (1 + p), R0' and R1'
+//   those of Eq. 12-16.
 //
-// Delay (output error model, nk = 1): the paper puts b_1..b_3 of Eq. 21 into Eq. 12-16 as if there were none, and so do we: the delay is
-// taken for dead time beside the circuit. b1 and tau do not depend on it; R0 and R1 are right to about R1 T / tau if the voltage really
-// answers one sample late, and have no exact meaning if it does not (a model without direct path cannot show R0 in the sample it acts in).
+// Delay (output error model, nk = 1): the paper puts b_1..b_3 of Eq. 21 into Eq. 12-16 as if there were none, and so do
+// we: the delay is taken for dead time beside the circuit. b1 and tau do not depend on it; R0 and R1 are right to about
+// R1 T / tau if the voltage really answers one sample late, and have no exact meaning if it does not (a model without
+// direct path cannot show R0 in the sample it acts in).
 #pragma once
 
 #include <string>
@@ -27,7 +33,7 @@
 namespace bms::identification {
 
 struct Circuit {
-  double b1_v = 0;   ///< dOCV/dsoc [V] per unit of soc
+  double b1_v = 0;  ///< dOCV/dsoc [V] per unit of soc
   double r0_ohm = 0;
   double r1_ohm = 0;
   double c1_f = 0;
@@ -48,23 +54,31 @@ enum class Input {
 inline constexpr const char* circuit_names[] = {"b1_v", "r0_ohm", "r1_ohm", "c1_f"};
 
 struct CircuitReading {
-  Circuit circuit;                       ///< as the equations give it, never clipped
-  double tau_s = 0;                      ///< R1 C1
-  double pole_off_integrator = 0;        ///< distance from 1 of the pole next to it; exactly an integrator: 0
-  std::vector<std::string> implausible;  ///< "r1_ohm is negative", "c1_f is not finite", "the poles are complex"; empty: a circuit
+  Circuit circuit;                 ///< as the equations give it, never clipped
+  double tau_s = 0;                ///< R1 C1
+  double pole_off_integrator = 0;  ///< distance from 1 of the pole next to it; exactly an integrator: 0
+  std::vector<std::string>
+      implausible;  ///< "r1_ohm is negative", "c1_f is not finite", "the poles are complex"; empty: a circuit
 };
 
-/// Eq. 12-16 backwards. Total in the coefficients. Throws std::invalid_argument unless step_s and capacity_c [C] are positive and finite.
-CircuitReading circuit_from_discrete(const DiscreteCoefficients& coefficients, double step_s, double capacity_c, Input input = Input::straight);
+/// Eq. 12-16 backwards. Total in the coefficients. Throws std::invalid_argument unless step_s and capacity_c [C] are
+/// positive and finite.
+CircuitReading circuit_from_discrete(const DiscreteCoefficients& coefficients, double step_s, double capacity_c,
+                                     Input input = Input::straight);
 
 /// Eq. 12-16. Throws as above.
-DiscreteCoefficients discrete_from_circuit(const Circuit& circuit, double step_s, double capacity_c, Input input = Input::straight);
+DiscreteCoefficients discrete_from_circuit(const Circuit& circuit, double step_s, double capacity_c,
+                                           Input input = Input::straight);
 
-/// Covariance of b1, R0, R1, C1, in this order, from that of c0, c1, c2, a1, a2, linearised (delta method); derivatives by complex step, exact
-/// to rounding. Linear in a large deviation is not the truth: above a third of the value do not read more than "large" from it. Throws as above.
-Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& coefficients, const Eigen::Matrix<double, 5, 5>& covariance, double step_s, double capacity_c, Input input = Input::straight);
+/// Covariance of b1, R0, R1, C1, in this order, from that of c0, c1, c2, a1, a2, linearised (delta method); derivatives
+/// by complex step, exact to rounding. Linear in a large deviation is not the truth: above a third of the value do not
+/// read more than "large" from it. Throws as above.
+Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& coefficients,
+                                   const Eigen::Matrix<double, 5, 5>& covariance, double step_s, double capacity_c,
+                                   Input input = Input::straight);
 
 /// Square roots of its diagonal.
-Circuit circuit_std(const DiscreteCoefficients& coefficients, const Eigen::Matrix<double, 5, 5>& covariance, double step_s, double capacity_c, Input input = Input::straight);
+Circuit circuit_std(const DiscreteCoefficients& coefficients, const Eigen::Matrix<double, 5, 5>& covariance,
+                    double step_s, double capacity_c, Input input = Input::straight);
 
 }  // namespace bms::identification

@@ -6,7 +6,8 @@
 
 namespace bms::identification {
 
-/// Columns of equal length. current_a[k]: mean over the interval that ends at time_s[k], > 0 charges; voltage_v[k] at time_s[k].
+/// Columns of equal length. current_a[k]: mean over the interval that ends at time_s[k], > 0 charges; voltage_v[k] at
+/// time_s[k].
 struct Data {
   std::vector<double> time_s;
   std::vector<double> current_a;

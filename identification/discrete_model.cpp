@@ -80,7 +80,9 @@ std::vector<double> from_roots(const std::vector<std::complex<double>>& all) {
 }
 
 /// First sample that a free response can be exact in.
-std::size_t first_within_reach(const Structure& s) { return s.estimate_initial && s.nk + s.nb > s.nf + 1 ? s.nk + s.nb - 1 - s.nf : 0; }
+std::size_t first_within_reach(const Structure& s) {
+  return s.estimate_initial && s.nk + s.nb > s.nf + 1 ? s.nk + s.nb - 1 - s.nf : 0;
+}
 
 /// Rows of what was measured and is within reach.
 std::vector<Index> measured(const Data& data, const Structure& s) {
@@ -92,11 +94,15 @@ std::vector<Index> measured(const Data& data, const Structure& s) {
 }
 
 void require(const Data& data, const Structure& structure) {
-  if (structure.nf == 0 || structure.nb == 0) throw std::invalid_argument("a discrete model needs at least one coefficient in numerator and denominator");
-  if (data.current_a.size() != data.size() || data.voltage_v.size() != data.size()) throw std::invalid_argument("time, current and voltage differ in length");
+  if (structure.nf == 0 || structure.nb == 0)
+    throw std::invalid_argument("a discrete model needs at least one coefficient in numerator and denominator");
+  if (data.current_a.size() != data.size() || data.voltage_v.size() != data.size())
+    throw std::invalid_argument("time, current and voltage differ in length");
   even_step_s(data.time_s);
-  if (!std::all_of(data.current_a.begin(), data.current_a.end(), [](double i) { return std::isfinite(i); })) throw std::invalid_argument("a current is not a finite number");
-  if (measured(data, structure).size() <= structure.unknowns() + structure.nk) throw std::invalid_argument("fewer measured voltages than unknowns of the discrete model");
+  if (!std::all_of(data.current_a.begin(), data.current_a.end(), [](double i) { return std::isfinite(i); }))
+    throw std::invalid_argument("a current is not a finite number");
+  if (measured(data, structure).size() <= structure.unknowns() + structure.nk)
+    throw std::invalid_argument("fewer measured voltages than unknowns of the discrete model");
 }
 
 /// Least squares with columns brought to one size.
@@ -113,7 +119,8 @@ struct Candidate {
   double cost = INFINITY;
 };
 
-Candidate with_best_rest(const std::vector<double>& f, const Data& data, const Structure& s, const std::vector<Index>& rows) {
+Candidate with_best_rest(const std::vector<double>& f, const Data& data, const Structure& s,
+                         const std::vector<Index>& rows) {
   Candidate c;
   const Index n = at(data.size());
   const VectorXd charged = through_f(f, data.current_a);
@@ -127,7 +134,8 @@ Candidate with_best_rest(const std::vector<double>& f, const Data& data, const S
 
   VectorXd y(at(rows.size()));
   const double held_v = s.estimate_offset ? 0 : s.offset_v;
-  for (Index k = 0; k < y.size(); ++k) y[k] = data.voltage_v[static_cast<std::size_t>(rows[static_cast<std::size_t>(k)])] - held_v;
+  for (Index k = 0; k < y.size(); ++k)
+    y[k] = data.voltage_v[static_cast<std::size_t>(rows[static_cast<std::size_t>(k)])] - held_v;
   const VectorXd x = solve(a, y);
   if (!x.allFinite()) return c;
   c.cost = (a * x - y).squaredNorm() / 2;
@@ -138,17 +146,20 @@ Candidate with_best_rest(const std::vector<double>& f, const Data& data, const S
   return c;
 }
 
-/// At most about `count` of the rows, one of each stretch, at changing places: even ones might meet the same phase of every pulse.
+/// At most about `count` of the rows, one of each stretch, at changing places: even ones might meet the same phase of
+/// every pulse.
 std::vector<Index> some_of(const std::vector<Index>& rows, std::size_t count) {
   const std::size_t stretch = rows.size() / count + 1;
   if (stretch == 1) return rows;
   std::vector<Index> some;
-  for (std::size_t k = 0; k + stretch <= rows.size(); k += stretch) some.push_back(rows[k + k / stretch * 7'919 % stretch]);
+  for (std::size_t k = 0; k + stretch <= rows.size(); k += stretch)
+    some.push_back(rows[k + k / stretch * 7'919 % stretch]);
   return some;
 }
 
 /// F of the equation error F y = B u + F(1) offset + start, both signals filtered by 1/filter before.
-std::optional<std::vector<double>> equation_error(const Data& data, const Structure& s, const std::vector<double>& filter) {
+std::optional<std::vector<double>> equation_error(const Data& data, const Structure& s,
+                                                  const std::vector<double>& filter) {
   // A hole in the voltage takes the last value: good enough to start from.
   std::vector<double> y = data.voltage_v;
   const auto first = std::find_if(y.begin(), y.end(), [](double v) { return std::isfinite(v); });
@@ -174,22 +185,30 @@ std::optional<std::vector<double>> equation_error(const Data& data, const Struct
 
 }  // namespace
 
-Structure transfer_function(double b0_v) { return {.nb = 3, .nf = 2, .nk = 0, .offset_v = b0_v, .estimate_offset = false, .estimate_initial = true}; }
+Structure transfer_function(double b0_v) {
+  return {.nb = 3, .nf = 2, .nk = 0, .offset_v = b0_v, .estimate_offset = false, .estimate_initial = true};
+}
 
-Structure output_error(bool from_rest) { return {.nb = 3, .nf = 2, .nk = 1, .offset_v = 0, .estimate_offset = true, .estimate_initial = !from_rest}; }
+Structure output_error(bool from_rest) {
+  return {.nb = 3, .nf = 2, .nk = 1, .offset_v = 0, .estimate_offset = true, .estimate_initial = !from_rest};
+}
 
 VectorXd to_unknowns(const DiscreteModel& model, const Structure& s) {
-  if (model.b.size() != s.nb || model.f.size() != s.nf || model.nk != s.nk) throw std::invalid_argument("the model is not of the structure asked for");
-  if (!model.initial_v.empty() && model.initial_v.size() != s.nf) throw std::invalid_argument("a free response needs as many values as the denominator has coefficients");
+  if (model.b.size() != s.nb || model.f.size() != s.nf || model.nk != s.nk)
+    throw std::invalid_argument("the model is not of the structure asked for");
+  if (!model.initial_v.empty() && model.initial_v.size() != s.nf)
+    throw std::invalid_argument("a free response needs as many values as the denominator has coefficients");
   std::vector<double> x = model.b;
   x.insert(x.end(), model.f.begin(), model.f.end());
   if (s.estimate_offset) x.push_back(model.offset_v);
-  for (std::size_t k = s.nf - s.unknown_initial(); k < s.nf; ++k) x.push_back(model.initial_v.empty() ? 0 : model.initial_v[k]);
+  for (std::size_t k = s.nf - s.unknown_initial(); k < s.nf; ++k)
+    x.push_back(model.initial_v.empty() ? 0 : model.initial_v[k]);
   return Eigen::Map<const VectorXd>(x.data(), at(x.size()));
 }
 
 DiscreteModel to_model(const VectorXd& unknowns, const Structure& s) {
-  if (unknowns.size() != at(s.unknowns())) throw std::invalid_argument("the number of unknowns is not that of the structure");
+  if (unknowns.size() != at(s.unknowns()))
+    throw std::invalid_argument("the number of unknowns is not that of the structure");
   const double* x = unknowns.data();
   DiscreteModel model;
   model.nk = s.nk;
@@ -207,7 +226,8 @@ DiscreteModel to_model(const VectorXd& unknowns, const Structure& s) {
 VectorXd simulate(const DiscreteModel& model, const std::vector<double>& input, Eigen::MatrixXd* jacobian) {
   const auto& [b, f, nk, offset_v, initial_v] = model;
   if (f.empty()) throw std::invalid_argument("a discrete model needs at least one coefficient in the denominator");
-  if (!initial_v.empty() && initial_v.size() != f.size()) throw std::invalid_argument("a free response needs as many values as the denominator has coefficients");
+  if (!initial_v.empty() && initial_v.size() != f.size())
+    throw std::invalid_argument("a free response needs as many values as the denominator has coefficients");
   const Index n = at(input.size());
   const VectorXd charged = through_f(f, input);  // 1/F u
   VectorXd forced = VectorXd::Zero(n);
@@ -232,7 +252,8 @@ VectorXd simulate(const DiscreteModel& model, const std::vector<double>& input, 
       jacobian->col(nb + j) += through_f(f, drive);
     }
     jacobian->col(nb + nf).setOnes();
-    for (Index j = 0; j < nf; ++j) jacobian->col(nb + nf + 1 + j) = free_response(f, unit(f.size(), static_cast<std::size_t>(j)), n);
+    for (Index j = 0; j < nf; ++j)
+      jacobian->col(nb + nf + 1 + j) = free_response(f, unit(f.size(), static_cast<std::size_t>(j)), n);
   }
   return (forced + free).array() + offset_v;
 }
@@ -256,7 +277,8 @@ std::vector<double> mirrored_inside(const std::vector<double>& f) {
 
 LeastSquares simulation_error(const Data& data, const Structure& s, const VectorXd& start) {
   require(data, s);
-  if (start.size() != at(s.unknowns())) throw std::invalid_argument("the number of unknowns is not that of the structure");
+  if (start.size() != at(s.unknowns()))
+    throw std::invalid_argument("the number of unknowns is not that of the structure");
   LeastSquares problem;
   // b share a size, whatever one of them is; poles are of size 1
   VectorXd scale = start.cwiseAbs();
@@ -300,7 +322,9 @@ LeastSquares simulation_error(const Data& data, const Structure& s, const Vector
 DiscreteModel start_values(const Data& data, const Structure& s, int refinements) {
   require(data, s);
   const auto [least, most] = std::minmax_element(data.current_a.begin(), data.current_a.end());
-  if (!(*most - *least > 0)) throw std::invalid_argument("the current never changes: no model of its effect can be identified; a step or pulses would show it");
+  if (!(*most - *least > 0))
+    throw std::invalid_argument(
+        "the current never changes: no model of its effect can be identified; a step or pulses would show it");
   const std::vector<Index> rows = measured(data, s), few = some_of(rows, 2'000);
   Candidate best;
   const auto consider = [&](const std::vector<double>& f) {
@@ -337,7 +361,8 @@ DiscreteModel start_values(const Data& data, const Structure& s, int refinements
     }
   }
   if (std::isfinite(best.cost)) best = with_best_rest(best.model.f, data, s, rows);
-  if (!std::isfinite(best.cost)) throw std::invalid_argument("no start for the discrete model: its linear least squares did not stay finite");
+  if (!std::isfinite(best.cost))
+    throw std::invalid_argument("no start for the discrete model: its linear least squares did not stay finite");
   return best.model;
 }
 

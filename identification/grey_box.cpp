@@ -26,8 +26,10 @@ double value_of(const Local& v) { return v.a; }
 /// An independent variable of the step: its own lane is 1.
 template <class S>
 S local(double value, int own_lane) {
-  if constexpr (std::same_as<S, double>) return value;
-  else return Local(value, own_lane);
+  if constexpr (std::same_as<S, double>)
+    return value;
+  else
+    return Local(value, own_lane);
 }
 
 /// A table's value: its slope by soc, and a lane of its own where it is an unknown.
@@ -88,7 +90,9 @@ model::CellParameters<> leaning(const model::CellParameters<>& cell, double lean
   const double by = lean - cell.ocv.lean;
   moved.ocv.lean = lean;
   for (std::size_t k = 0; k + 1 < cell.ocv.soc.size; ++k) {
-    const auto corner = [&](std::size_t edge) { return cell.ocv.b0_v[k] + cell.ocv.b1_v[k] * cell.ocv.soc[edge] + by * cell.ocv.half_gap_v[edge]; };
+    const auto corner = [&](std::size_t edge) {
+      return cell.ocv.b0_v[k] + cell.ocv.b1_v[k] * cell.ocv.soc[edge] + by * cell.ocv.half_gap_v[edge];
+    };
     const double from = corner(k), to = corner(k + 1);
     moved.ocv.b1_v[k] = (to - from) / (cell.ocv.soc[k + 1] - cell.ocv.soc[k]);
     moved.ocv.b0_v[k] = from - moved.ocv.b1_v[k] * cell.ocv.soc[k];
@@ -104,7 +108,8 @@ GreyBox::GreyBox(const model::CellParameters<>& cell, std::vector<Record> record
     for (const double soc : options_.soc_nodes) unknowns_.push_back({name, soc, 0});
   }
   if (options_.estimate_lean) {
-    if (cell_.ocv.half_gap_v.size == 0) throw std::invalid_argument("no gap between charge and discharge for the OCV to lean in");
+    if (cell_.ocv.half_gap_v.size == 0)
+      throw std::invalid_argument("no gap between charge and discharge for the OCV to lean in");
     unknowns_.push_back({"ocv_lean", 0, 0});
   }
   for (std::size_t r = 0; r < records_.size(); ++r) {
@@ -130,11 +135,16 @@ Eigen::VectorXd GreyBox::start() const {
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(k)];
     double value = 0;
-    if (u.name == "r0_ohm") value = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, u.soc);
-    else if (u.name == "r1_ohm") value = model::cell_detail::rc_value(cell_.rc, cell_.rc.r1_ohm, u.soc);
-    else if (u.name == "c1_f") value = model::cell_detail::rc_value(cell_.rc, cell_.rc.c1_f, u.soc);
-    else if (u.name == "ocv_lean") value = cell_.ocv.lean;
-    else if (u.name == "initial_soc") value = u.soc;
+    if (u.name == "r0_ohm")
+      value = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, u.soc);
+    else if (u.name == "r1_ohm")
+      value = model::cell_detail::rc_value(cell_.rc, cell_.rc.r1_ohm, u.soc);
+    else if (u.name == "c1_f")
+      value = model::cell_detail::rc_value(cell_.rc, cell_.rc.c1_f, u.soc);
+    else if (u.name == "ocv_lean")
+      value = cell_.ocv.lean;
+    else if (u.name == "initial_soc")
+      value = u.soc;
     x[k] = std::clamp(value, limits.lower[k], limits.upper[k]);
   }
   return x;
@@ -155,13 +165,15 @@ model::CellParameters<> GreyBox::cell_with(const Eigen::VectorXd& x) const {
 }
 
 template <class S>
-bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::VectorXd> voltage_v, Eigen::Ref<Eigen::MatrixXd>* derivatives) const {
+bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::VectorXd> voltage_v,
+                  Eigen::Ref<Eigen::MatrixXd>* derivatives) const {
   using Model = model::OneRc<S>;
   constexpr bool with_derivatives = !std::same_as<S, double>;
   const Record& record = records_[r];
   const Data& data = record.data;
   const auto tables = std::make_unique<Tables>(model::prepare<double, model::max_intervals>(cell_with(x)));
-  const auto v_rc_unknown = unknown("initial_v_rc_v", r), soc_unknown = unknown("initial_soc", r), lean_unknown = unknown("ocv_lean", 0);
+  const auto v_rc_unknown = unknown("initial_v_rc_v", r), soc_unknown = unknown("initial_soc", r),
+             lean_unknown = unknown("ocv_lean", 0);
   const double per_as = 1 / (3'600 * cell_.capacity_ah);
 
   double soc = soc_unknown ? x[*soc_unknown] : record.initial_soc;
@@ -212,7 +224,8 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
   return true;
 }
 
-bool GreyBox::simulate(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::VectorXd> voltage_v, Eigen::Ref<Eigen::MatrixXd>* derivatives) const {
+bool GreyBox::simulate(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::VectorXd> voltage_v,
+                       Eigen::Ref<Eigen::MatrixXd>* derivatives) const {
   return derivatives == nullptr ? run<double>(x, r, voltage_v, nullptr) : run<Local>(x, r, voltage_v, derivatives);
 }
 
@@ -230,12 +243,18 @@ LeastSquares GreyBox::problem() const {
       p.upper[k] = upper;
       p.scale[k] = scale;
     };
-    if (name == "r0_ohm") set(b.r0_min_ohm, b.r0_max_ohm, 0.01);
-    else if (name == "r1_ohm") set(b.r1_min_ohm, b.r1_max_ohm, 0.01);
-    else if (name == "c1_f") set(b.c1_min_f, b.c1_max_f, 1'000);
-    else if (name == "ocv_lean") set(-1, 1, 0.1);
-    else if (name == "initial_soc") set(-0.05, 1.05, 0.1);
-    else set(-0.5, 0.5, 0.01);
+    if (name == "r0_ohm")
+      set(b.r0_min_ohm, b.r0_max_ohm, 0.01);
+    else if (name == "r1_ohm")
+      set(b.r1_min_ohm, b.r1_max_ohm, 0.01);
+    else if (name == "c1_f")
+      set(b.c1_min_f, b.c1_max_f, 1'000);
+    else if (name == "ocv_lean")
+      set(-1, 1, 0.1);
+    else if (name == "initial_soc")
+      set(-0.05, 1.05, 0.1);
+    else
+      set(-0.5, 0.5, 0.01);
   }
   p.evaluate = [this](const Eigen::VectorXd& x, Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian) {
     const auto rows = static_cast<Eigen::Index>(samples_ + beliefs_ + ties());

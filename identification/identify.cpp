@@ -33,47 +33,59 @@ void require_excitation(const std::vector<Record>& records) {
     capacity_ah = std::max(capacity_ah, r.data.capacity_ah);
     for (std::size_t k = 0; k < r.data.size(); ++k) {
       samples += measured(r.data, k) ? 1 : 0;
-      if (k > 0 && measured(r.data, k)) largest_step_a = std::max(largest_step_a, std::abs(r.data.current_a[k] - r.data.current_a[k - 1]));
+      if (k > 0 && measured(r.data, k))
+        largest_step_a = std::max(largest_step_a, std::abs(r.data.current_a[k] - r.data.current_a[k - 1]));
     }
   }
   if (samples < 10) throw std::invalid_argument("less than 10 samples in the window, expected data to identify from");
   if (largest_step_a < 0.02 * capacity_ah) {
-    throw std::invalid_argument("the current hardly changes: r0_ohm, r1_ohm and c1_f cannot be seen, expected current pulses as of the experiment high_1m_low_30s");
+    throw std::invalid_argument(
+        "the current hardly changes: r0_ohm, r1_ohm and c1_f cannot be seen, expected current pulses as of the "
+        "experiment high_1m_low_30s");
   }
 }
 
 const char* experiment_that_shows(const std::string& name) {
   if (name == "initial_soc") return "a rest of an hour before or after (ocv_1h_rest) would show it";
-  if (name == "ocv_lean") return "a recording that both charges and discharges over the same state of charge would show it";
+  if (name == "ocv_lean")
+    return "a recording that both charges and discharges over the same state of charge would show it";
   return "pulses of 1 min with rests of 30 s (experiment high_1m_low_30s) at that state of charge would show it";
 }
 
 void warn(Identification& result) {
   for (const Parameter& p : result.parameters) {
     const std::string where = fmt::format("{} at {:.0f} %", p.name, 100 * p.soc);
-    if (!p.seen) result.warnings.push_back(fmt::format("not_seen: {} cannot be seen in this data; {}", where, experiment_that_shows(p.name)));
-    else if (p.at_bound) result.warnings.push_back(fmt::format("at_bound: {} ended at its bound of {:g}; {}", where, p.value, experiment_that_shows(p.name)));
+    if (!p.seen)
+      result.warnings.push_back(
+          fmt::format("not_seen: {} cannot be seen in this data; {}", where, experiment_that_shows(p.name)));
+    else if (p.at_bound)
+      result.warnings.push_back(
+          fmt::format("at_bound: {} ended at its bound of {:g}; {}", where, p.value, experiment_that_shows(p.name)));
     else if (p.std > 0.5 * std::abs(p.value) && p.name != "ocv_lean") {
-      result.warnings.push_back(fmt::format("uncertain: {} is {:.3g} with a standard deviation of {:.2g}; {}", where, p.value, p.std, experiment_that_shows(p.name)));
+      result.warnings.push_back(fmt::format("uncertain: {} is {:.3g} with a standard deviation of {:.2g}; {}", where,
+                                            p.value, p.std, experiment_that_shows(p.name)));
     }
   }
   for (const InitialState& state : result.initial) {
     if (!state.observable) {
-      result.warnings.push_back(fmt::format("initial_soc_not_observable: the state of charge at the start may be off by {:.0f} % (standard deviation); {}",
-                                            100 * state.soc_std, experiment_that_shows("initial_soc")));
+      result.warnings.push_back(
+          fmt::format("initial_soc_not_observable: the state of charge at the start may be off by {:.0f} % (standard "
+                      "deviation); {}",
+                      100 * state.soc_std, experiment_that_shows("initial_soc")));
     }
   }
   if (!result.optimum.converged) result.warnings.push_back("not_converged: " + result.optimum.reason);
   if (result.starts > 1 && result.agreeing == 1) {
-    result.warnings.push_back(fmt::format("several_minima: {} starts ended at different places, the best was taken", result.starts));
+    result.warnings.push_back(
+        fmt::format("several_minima: {} starts ended at different places, the best was taken", result.starts));
   }
 }
 
 /// Time constants the search begins with, as multiples of the start's: C1 decides which of several minima is found.
 constexpr double time_constants[] = {1, 0.2, 5};
 
-Identification identified(const model::CellParameters<>& start, const std::vector<Record>& records, const GreyBoxOptions& options, Method method,
-                          const Stopping& stopping) {
+Identification identified(const model::CellParameters<>& start, const std::vector<Record>& records,
+                          const GreyBoxOptions& options, Method method, const Stopping& stopping) {
   const GreyBox grey_box(start, records, options);
   const LeastSquares problem = grey_box.problem();
   const auto nodes = static_cast<Eigen::Index>(options.soc_nodes.size());
@@ -91,12 +103,14 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
   }
   result.optimum.evaluations = evaluations;
   result.starts = static_cast<int>(costs.size());
-  result.agreeing = static_cast<int>(std::count_if(costs.begin(), costs.end(), [&](double c) { return c <= result.optimum.cost * (1 + 1e-4) + 1e-18; }));
+  result.agreeing = static_cast<int>(std::count_if(
+      costs.begin(), costs.end(), [&](double c) { return c <= result.optimum.cost * (1 + 1e-4) + 1e-18; }));
 
   const Eigen::VectorXd& x = result.optimum.x;
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
-  if (!problem.evaluate(x, residuals, &jacobian)) throw std::invalid_argument("the simulation leaves all bounds, expected a start nearer to the cell");
+  if (!problem.evaluate(x, residuals, &jacobian))
+    throw std::invalid_argument("the simulation leaves all bounds, expected a start nearer to the cell");
   // rows that were not measured are not data
   Eigen::Index rows = 0, sampled = 0;
   for (Eigen::Index k = 0; k < residuals.size(); ++k) {
@@ -125,7 +139,8 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
       state.soc_std = u.seen[k] != 0 && !at_bound ? std::min(uniform, u.std_with_offset(k)) : uniform;
       state.observable = state.soc_std <= observable_soc_std;
     } else {
-      result.parameters.push_back({unknown.name, unknown.soc, x[k], u.std(k), u.std_white(k), std::abs(u.offset[k]), at_bound, at_bound || u.seen[k] != 0});
+      result.parameters.push_back({unknown.name, unknown.soc, x[k], u.std(k), u.std_white(k), std::abs(u.offset[k]),
+                                   at_bound, at_bound || u.seen[k] != 0});
     }
   }
   for (std::size_t k = 0; k < options.soc_nodes.size(); ++k) {
@@ -166,7 +181,8 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
 
 }  // namespace
 
-Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v, const std::vector<double>& current_a, double fading) {
+Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
+           const std::vector<double>& current_a, double fading) {
   Fit fit;
   FitFigure open_loop, one_step;
   ErrorFigure error;
@@ -195,12 +211,12 @@ Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulat
   return fit;
 }
 
-Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<Record>& records, const GreyBoxOptions& options, Method method,
-                                 const Stopping& stopping) {
+Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<Record>& records,
+                                 const GreyBoxOptions& options, Method method, const Stopping& stopping) {
   require_excitation(records);
   if (options.soc_nodes.size() < 2) return identified(start, records, options, method, stopping);
-  // First as if nothing depended on soc: where the search for the nodes begins, and a measure of how far neighbours may differ
-  // before the residuals, which come in runs, say so.
+  // First as if nothing depended on soc: where the search for the nodes begins, and a measure of how far neighbours may
+  // differ before the residuals, which come in runs, say so.
   GreyBoxOptions constant = options;
   constant.soc_nodes = {0.5};
   const Identification first = identified(start, records, constant, method, stopping);
@@ -212,7 +228,8 @@ Identification identify_grey_box(const model::CellParameters<>& start, const std
   return result;
 }
 
-model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, const Data& data, const CircuitBounds& b) {
+model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, const Data& data,
+                                           const CircuitBounds& b) {
   model::CellParameters<> started = cell;
   RestReadings readings;
   try {

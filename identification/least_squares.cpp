@@ -20,8 +20,9 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double rounding = 100 * epsilon;   // of a sum of squares, relative
-constexpr double dependent_columns = 1e-11;  // pivot of a column of length 1, below which it is a combination of the others
+constexpr double rounding = 100 * epsilon;  // of a sum of squares, relative
+constexpr double dependent_columns =
+    1e-11;  // pivot of a column of length 1, below which it is a combination of the others
 
 void require(bool condition, const char* message) {
   if (!condition) throw std::invalid_argument(message);
@@ -55,7 +56,8 @@ std::string sentence(const std::string& text, double value) {
 
 }  // namespace
 
-Search::Search(const LeastSquares& problem, const VectorXd& start, const Stopping& stopping) : problem_(problem), stopping_(stopping) {
+Search::Search(const LeastSquares& problem, const VectorXd& start, const Stopping& stopping)
+    : problem_(problem), stopping_(stopping) {
   const Index n = start.size();
   require(n > 0, "least squares: no unknowns");
   require(start.allFinite(), "least squares: the start is not finite");
@@ -63,13 +65,15 @@ Search::Search(const LeastSquares& problem, const VectorXd& start, const Stoppin
   lower_ = given_or(problem.lower, n, -infinity);
   upper_ = given_or(problem.upper, n, infinity);
   scale_ = given_or(problem.scale, n, 1);
-  require(lower_.size() == n && upper_.size() == n && scale_.size() == n, "least squares: start, bounds and scale differ in length");
+  require(lower_.size() == n && upper_.size() == n && scale_.size() == n,
+          "least squares: start, bounds and scale differ in length");
   require((lower_.array() < upper_.array()).all(), "least squares: a lower bound is not below its upper bound");
   require(scale_.allFinite() && (scale_.array() > 0).all(), "least squares: a scale is not positive");
   column_norms_ = VectorXd::Zero(n);
   x_ = start.cwiseMax(lower_).cwiseMin(upper_);
   cost_ = infinity;
-  if (!evaluate(x_, true) || !take_over(x_)) end(false, "The residuals or their derivatives are not defined at the start.");
+  if (!evaluate(x_, true) || !take_over(x_))
+    end(false, "The residuals or their derivatives are not defined at the start.");
 }
 
 bool Search::evaluate(const VectorXd& x, bool derivatives) {
@@ -79,8 +83,10 @@ bool Search::evaluate(const VectorXd& x, bool derivatives) {
     residuals_.resize(m);  // whatever was left in it
     return false;
   }
-  require(residuals_.size() > 0 && (m == 0 || residuals_.size() == m), "least squares: the number of residuals changes, or is 0");
-  require(!derivatives || (jacobian_.rows() == residuals_.size() && jacobian_.cols() == x.size()), "least squares: J is not m by n");
+  require(residuals_.size() > 0 && (m == 0 || residuals_.size() == m),
+          "least squares: the number of residuals changes, or is 0");
+  require(!derivatives || (jacobian_.rows() == residuals_.size() && jacobian_.cols() == x.size()),
+          "least squares: J is not m by n");
   return std::isfinite(residuals_.squaredNorm());
 }
 
@@ -134,7 +140,8 @@ double Search::relative(const VectorXd& gradient) const {
 
 bool Search::is_short(const VectorXd& step, double tolerance) const {
   const auto is_short_times = [&](const VectorXd& weights) {
-    const VectorXd size = x_.cwiseQuotient(scale_).cwiseAbs() + VectorXd::Constant(x_.size(), tolerance);  // an optimum at 0 ends, too
+    const VectorXd size =
+        x_.cwiseQuotient(scale_).cwiseAbs() + VectorXd::Constant(x_.size(), tolerance);  // an optimum at 0 ends, too
     return weights.cwiseProduct(step).norm() <= tolerance * weights.cwiseProduct(size).norm();
   };
   // also as the residuals see it: without `scale` a large unknown would hide a small one
@@ -151,8 +158,8 @@ VectorXd Search::after(const VectorXd& step) const {
   return x;
 }
 
-/// What is left to gain, as the undamped, complete Gauss-Newton step sees it. Asked of every method alike: its own step may be
-/// short only because it is damped, bisected or bounded by a radius.
+/// What is left to gain, as the undamped, complete Gauss-Newton step sees it. Asked of every method alike: its own step
+/// may be short only because it is damped, bisected or bounded by a radius.
 Search::Outlook Search::outlook(const Indices& free) const {
   const VectorXd gradient = gradient_(free);
   MatrixXd a = factor_(Eigen::all, free);
@@ -174,8 +181,10 @@ Search::Outlook Search::outlook(const Indices& free) const {
 std::string Search::settled_because(const Indices& free) const {
   if (!(cost_ > 0)) return "The residuals are zero.";
   const Outlook here = outlook(free);
-  if (here.gradient <= stopping_.gradient) return sentence("The gradient has vanished: it is, relative, ", here.gradient);
-  if (here.short_step) return sentence("What is left of the step is shorter than its tolerance, relative ", stopping_.step);
+  if (here.gradient <= stopping_.gradient)
+    return sentence("The gradient has vanished: it is, relative, ", here.gradient);
+  if (here.short_step)
+    return sentence("What is left of the step is shorter than its tolerance, relative ", stopping_.step);
   if (iterations_ > 0 && here.decrease <= stopping_.cost && last_decrease_ <= stopping_.cost) {
     return sentence("The cost falls no more: the decrease expected is, relative, ", here.decrease);
   }
@@ -188,7 +197,9 @@ bool Search::settled() {
   if (!why.empty()) {
     end(true, why);
   } else if (iterations_ >= stopping_.iterations) {
-    end(false, sentence("Not converged in " + std::to_string(iterations_) + " iterations: a decrease is still expected of, relative, ", outlook(free()).decrease));
+    end(false, sentence("Not converged in " + std::to_string(iterations_) +
+                            " iterations: a decrease is still expected of, relative, ",
+                        outlook(free()).decrease));
   }
   return ended_;
 }
@@ -200,10 +211,14 @@ void Search::stuck() {
   if (decrease <= std::max(stopping_.cost, rounding)) {
     end(true, sentence("No smaller cost is found, nor expected: the decrease would be, relative, ", decrease));
   } else if (here.gradient <= std::sqrt(rounding)) {
-    // less cannot be seen in the cost, which is of second order in x; where J loses rank at the optimum, `decrease` is no guide
-    end(true, sentence("No smaller cost is found, and the gradient is as small as can be told from the cost, relative ", here.gradient));
+    // less cannot be seen in the cost, which is of second order in x; where J loses rank at the optimum, `decrease` is
+    // no guide
+    end(true, sentence("No smaller cost is found, and the gradient is as small as can be told from the cost, relative ",
+                       here.gradient));
   } else {
-    end(false, sentence("Not converged: no smaller cost is found, though the derivatives promise a decrease of, relative, ", decrease));
+    end(false,
+        sentence("Not converged: no smaller cost is found, though the derivatives promise a decrease of, relative, ",
+                 decrease));
   }
 }
 
@@ -276,22 +291,37 @@ VectorXd step_within_bounds(const Search& search, const Solve& solve) {
 Optimum minimise(const LeastSquares& problem, const VectorXd& start, Method method, const Stopping& stopping) {
   Search search(problem, start, stopping);
   switch (method) {
-    case Method::subspace_gauss_newton: search_gauss_newton(search); break;
-    case Method::adaptive_subspace_gauss_newton: search_adaptive_gauss_newton(search); break;
-    case Method::levenberg_marquardt: search_levenberg_marquardt(search); break;
-    case Method::steepest_descent: search_steepest_descent(search); break;
-    case Method::trust_region_reflective: search_trust_region_reflective(search); break;
+    case Method::subspace_gauss_newton:
+      search_gauss_newton(search);
+      break;
+    case Method::adaptive_subspace_gauss_newton:
+      search_adaptive_gauss_newton(search);
+      break;
+    case Method::levenberg_marquardt:
+      search_levenberg_marquardt(search);
+      break;
+    case Method::steepest_descent:
+      search_steepest_descent(search);
+      break;
+    case Method::trust_region_reflective:
+      search_trust_region_reflective(search);
+      break;
   }
   return search.result();
 }
 
 const char* name_of(Method method) {
   switch (method) {
-    case Method::subspace_gauss_newton: return "gn";
-    case Method::adaptive_subspace_gauss_newton: return "agn";
-    case Method::levenberg_marquardt: return "lm";
-    case Method::steepest_descent: return "sd";
-    case Method::trust_region_reflective: return "nls";
+    case Method::subspace_gauss_newton:
+      return "gn";
+    case Method::adaptive_subspace_gauss_newton:
+      return "agn";
+    case Method::levenberg_marquardt:
+      return "lm";
+    case Method::steepest_descent:
+      return "sd";
+    case Method::trust_region_reflective:
+      return "nls";
   }
   return "";
 }

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Dense>
 #include <fmt/format.h>
+#include <Eigen/Dense>
 
 #include "identification/circuit_from_discrete.hpp"
 #include "identification/prefilter.hpp"
@@ -36,8 +36,10 @@ double through(const StaticCurve& curve, double w_v) {
   return curve.y_v[k] + p.weight_above * (curve.y_v[k + 1] - curve.y_v[k]);
 }
 
-/// The problem of the linear block with the curve's inner values as further unknowns; its ends stay, or gain and offset would be there twice.
-LeastSquares with_curve(const Data& data, const Structure& structure, const StaticCurve& start, const Eigen::VectorXd& linear_start) {
+/// The problem of the linear block with the curve's inner values as further unknowns; its ends stay, or gain and offset
+/// would be there twice.
+LeastSquares with_curve(const Data& data, const Structure& structure, const StaticCurve& start,
+                        const Eigen::VectorXd& linear_start) {
   const LeastSquares linear = simulation_error(data, structure, linear_start);
   const Eigen::Index n = linear_start.size(), inner = pieces - 1;
   LeastSquares p;
@@ -74,12 +76,15 @@ Eigen::VectorXd simulated(const LinearModel& m, const Data& data) {
 
 }  // namespace
 
-LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc, Method method, const Stopping& stopping) {
+LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc,
+                                     Method method, const Stopping& stopping) {
   LinearIdentification out;
   LinearModel& m = out.model;
   Identification& found = out.identification;
   m.kind = kind;
-  m.structure = kind == LinearKind::transfer_function ? transfer_function(cell.ocv.b0_v[model::cell_detail::ocv_piece(cell.ocv, soc)]) : output_error();
+  m.structure = kind == LinearKind::transfer_function
+                    ? transfer_function(cell.ocv.b0_v[model::cell_detail::ocv_piece(cell.ocv, soc)])
+                    : output_error();
   if (kind == LinearKind::transfer_function) m.structure.estimate_initial = true;
   Eigen::VectorXd start = to_unknowns(start_values(data, m.structure), m.structure);
   LeastSquares problem = simulation_error(data, m.structure, start);
@@ -90,7 +95,8 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
     const Eigen::VectorXd w = simulate(to_model(start, m.structure), data.current_a);
     m.curve.w_from_v = w.minCoeff();
     m.curve.w_step_v = std::max(1e-6, (w.maxCoeff() - w.minCoeff()) / static_cast<double>(pieces));
-    for (Eigen::Index k = 0; k <= pieces; ++k) m.curve.y_v.push_back(m.curve.w_from_v + static_cast<double>(k) * m.curve.w_step_v);
+    for (Eigen::Index k = 0; k <= pieces; ++k)
+      m.curve.y_v.push_back(m.curve.w_from_v + static_cast<double>(k) * m.curve.w_step_v);
     problem = with_curve(data, m.structure, m.curve, start);
     start.conservativeResize(linear + pieces - 1);
     for (Eigen::Index k = 1; k < pieces; ++k) start[linear + k - 1] = m.curve.y_v[static_cast<std::size_t>(k)];
@@ -102,7 +108,8 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
 
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
-  if (!problem.evaluate(x, residuals, &jacobian)) throw std::invalid_argument("the simulation of the identified model is not finite");
+  if (!problem.evaluate(x, residuals, &jacobian))
+    throw std::invalid_argument("the simulation of the identified model is not finite");
   const Uncertainty u = uncertainty(residuals, jacobian, residuals.size(), found.optimum.at_bound, 0);
   found.correlation = u.correlation;
   found.correlation_length = u.correlation_length;
@@ -123,8 +130,10 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
   add("r0_ohm", &Circuit::r0_ohm);
   add("r1_ohm", &Circuit::r1_ohm);
   add("c1_f", &Circuit::c1_f);
-  for (const std::string& what : reading.implausible) found.warnings.push_back("no_circuit: " + what + ": the model follows the voltage, but is no circuit");
-  if (!stable(m.model.f)) found.warnings.push_back(fmt::format("unstable: a pole lies at {:.6f}", largest_pole(m.model.f)));
+  for (const std::string& what : reading.implausible)
+    found.warnings.push_back("no_circuit: " + what + ": the model follows the voltage, but is no circuit");
+  if (!stable(m.model.f))
+    found.warnings.push_back(fmt::format("unstable: a pole lies at {:.6f}", largest_pole(m.model.f)));
   if (!found.optimum.converged) found.warnings.push_back("not_converged: " + found.optimum.reason);
   return out;
 }
@@ -135,8 +144,8 @@ Fit validate(const LinearModel& model, const Data& data, double fading) {
   Eigen::MatrixXd jacobian;
   const Eigen::VectorXd w = simulate(m.model, data.current_a, &jacobian);
   const auto nf = static_cast<Eigen::Index>(m.model.f.size());
-  // The free response is linear in its start; behind the curve it is fitted where the curve is straight: measured voltages are taken back
-  // through it by its own slope, a few times.
+  // The free response is linear in its start; behind the curve it is fitted where the curve is straight: measured
+  // voltages are taken back through it by its own slope, a few times.
   Eigen::VectorXd initial = Eigen::VectorXd::Zero(nf);
   const auto free = jacobian.rightCols(nf);
   for (int pass = 0; pass < (m.curve.y_v.empty() ? 1 : 10); ++pass) {
@@ -147,7 +156,8 @@ Fit validate(const LinearModel& model, const Data& data, double fading) {
       const double measured_v = data.voltage_v[static_cast<std::size_t>(k)];
       if (!std::isfinite(measured_v) || !std::isfinite(now[k])) continue;
       constexpr double h = 1e-6;
-      const double slope = m.curve.y_v.empty() ? 1 : (through(m.curve, now[k] + h) - through(m.curve, now[k] - h)) / (2 * h);
+      const double slope =
+          m.curve.y_v.empty() ? 1 : (through(m.curve, now[k] + h) - through(m.curve, now[k] - h)) / (2 * h);
       const Eigen::VectorXd row = slope * free.row(k).transpose();
       normal += row * row.transpose();
       right += row * (measured_v - through(m.curve, now[k]));

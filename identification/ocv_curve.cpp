@@ -33,8 +33,10 @@ Run on_grid(const SlowRun& slow) {
   run.charges = charged_as > discharged_as;
   const double moved_as = std::max(charged_as, discharged_as);
   run.moved_ah = moved_as / 3'600;
-  if (std::min(charged_as, discharged_as) > 0.01 * moved_as) throw std::invalid_argument("an OCV recording that both charges and discharges");
-  if (largest_a > run.moved_ah / 8) throw std::invalid_argument("an OCV recording faster than C/8: its voltage is not an open-circuit voltage");
+  if (std::min(charged_as, discharged_as) > 0.01 * moved_as)
+    throw std::invalid_argument("an OCV recording that both charges and discharges");
+  if (largest_a > run.moved_ah / 8)
+    throw std::invalid_argument("an OCV recording faster than C/8: its voltage is not an open-circuit voltage");
 
   std::vector<double> soc = slow.soc;
   if (soc.empty()) {
@@ -55,11 +57,16 @@ Run on_grid(const SlowRun& slow) {
     if (!(at > -1 && at < grid + 1)) continue;
     const int below = static_cast<int>(std::floor(at));
     const double above_part = at - below;
-    if (below >= 0) sum[static_cast<std::size_t>(below)] += (1 - above_part) * d.voltage_v[k], weight[static_cast<std::size_t>(below)] += 1 - above_part;
-    if (below < grid) sum[static_cast<std::size_t>(below + 1)] += above_part * d.voltage_v[k], weight[static_cast<std::size_t>(below + 1)] += above_part;
+    if (below >= 0)
+      sum[static_cast<std::size_t>(below)] += (1 - above_part) * d.voltage_v[k],
+          weight[static_cast<std::size_t>(below)] += 1 - above_part;
+    if (below < grid)
+      sum[static_cast<std::size_t>(below + 1)] += above_part * d.voltage_v[k],
+          weight[static_cast<std::size_t>(below + 1)] += above_part;
   }
   const auto [lowest, highest] = std::minmax_element(soc.begin(), soc.end());
-  if (first >= last || *highest - *lowest < 0.8) throw std::invalid_argument("an OCV recording of less than 80 % of the state of charge");
+  if (first >= last || *highest - *lowest < 0.8)
+    throw std::invalid_argument("an OCV recording of less than 80 % of the state of charge");
   std::size_t covered_from = grid + 1, covered_to = 0;
   for (std::size_t g = 0; g <= grid; ++g) {
     if (weight[g] < 0.2) continue;
@@ -70,7 +77,8 @@ Run on_grid(const SlowRun& slow) {
   for (std::size_t g = covered_from, known = covered_from; g <= covered_to; ++g) {
     if (!std::isfinite(run.voltage_v[g])) continue;
     for (std::size_t j = known + 1; j < g; ++j) {
-      run.voltage_v[j] = run.voltage_v[known] + (run.voltage_v[g] - run.voltage_v[known]) * static_cast<double>(j - known) / static_cast<double>(g - known);
+      run.voltage_v[j] = run.voltage_v[known] + (run.voltage_v[g] - run.voltage_v[known]) *
+                                                    static_cast<double>(j - known) / static_cast<double>(g - known);
     }
     known = g;
   }
@@ -136,9 +144,12 @@ OcvCurve ocv_curve(const std::vector<SlowRun>& slow_runs) {
   for (std::size_t g = 0; both_from <= grid && g <= grid; ++g) half[g] = half[std::clamp(g, both_from, both_to)];
   std::vector<double> ocv(grid + 1, unknown);
   for (std::size_t g = 0; g <= grid; ++g) {
-    if (known(up[g]) && known(down[g])) ocv[g] = (up[g] + down[g]) / 2;
-    else if (known(up[g])) ocv[g] = up[g] - half[g];
-    else if (known(down[g])) ocv[g] = down[g] + half[g];
+    if (known(up[g]) && known(down[g]))
+      ocv[g] = (up[g] + down[g]) / 2;
+    else if (known(up[g]))
+      ocv[g] = up[g] - half[g];
+    else if (known(down[g]))
+      ocv[g] = down[g] + half[g];
   }
   // the last percent of either end bends into the cut-off under current: from there to what the cell rests at
   constexpr std::size_t bend = grid / 100;
@@ -163,24 +174,30 @@ OcvCurve ocv_curve(const std::vector<SlowRun>& slow_runs) {
 }
 
 std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
-  // Corners may lie at every grid point, at a few heights within the error. From each corner a fan of lines reaches as far
-  // as some line stays within the error all the way (Imai and Iri, 1986); fewest pieces first, least squared error second.
+  // Corners may lie at every grid point, at a few heights within the error. From each corner a fan of lines reaches as
+  // far as some line stays within the error all the way (Imai and Iri, 1986); fewest pieces first, least squared error
+  // second.
   constexpr std::array<double, 7> heights = {-0.9, -0.6, -0.3, 0, 0.3, 0.6, 0.9};  // of error_v
-  constexpr double flattest = 1e-4;                                                 // V per unit of soc
-  constexpr std::size_t narrowest = 2;                                              // grid steps: a cell file asks for one at least
-  constexpr double error_soc = 0.002;                                               // where the curve plunges, this far aside is near enough
+  constexpr double flattest = 1e-4;                                                // V per unit of soc
+  constexpr std::size_t narrowest = 2;  // grid steps: a cell file asks for one at least
+  constexpr double error_soc = 0.002;   // where the curve plunges, this far aside is near enough
   const std::size_t points = curve.soc.size(), levels = heights.size();
   std::vector<double> near_v(points, error_v);
-  for (std::size_t k = 1; k + 1 < points; ++k) near_v[k] = std::max(error_v, error_soc * (curve.ocv_v[k + 1] - curve.ocv_v[k - 1]) / (curve.soc[k + 1] - curve.soc[k - 1]));
+  for (std::size_t k = 1; k + 1 < points; ++k)
+    near_v[k] = std::max(error_v,
+                         error_soc * (curve.ocv_v[k + 1] - curve.ocv_v[k - 1]) / (curve.soc[k + 1] - curve.soc[k - 1]));
   struct Best {
     int pieces = std::numeric_limits<int>::max();
     double squares = 0;
     std::size_t from = 0;
   };
   std::vector<Best> best(points * levels);
-  const auto height = [&](std::size_t point, std::size_t level) { return curve.ocv_v[point] + heights[level] * near_v[point]; };
+  const auto height = [&](std::size_t point, std::size_t level) {
+    return curve.ocv_v[point] + heights[level] * near_v[point];
+  };
   // sums over the curve, so that a piece's squared error costs no loop
-  std::vector<double> sum_v(points + 1, 0), sum_vv(points + 1, 0), sum_vs(points + 1, 0), sum_s(points + 1, 0), sum_ss(points + 1, 0);
+  std::vector<double> sum_v(points + 1, 0), sum_vv(points + 1, 0), sum_vs(points + 1, 0), sum_s(points + 1, 0),
+      sum_ss(points + 1, 0);
   for (std::size_t k = 0; k < points; ++k) {
     const double s = curve.soc[k], v = curve.ocv_v[k];
     sum_v[k + 1] = sum_v[k] + v;
@@ -192,7 +209,8 @@ std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
   const auto squares_of = [&](std::size_t from, std::size_t to, double offset, double slope) {
     const auto span = [&](const std::vector<double>& sum) { return sum[to + 1] - sum[from + 1]; };
     const double n = static_cast<double>(to - from);
-    return std::max(0.0, span(sum_vv) - 2 * offset * span(sum_v) - 2 * slope * span(sum_vs) + n * offset * offset + 2 * offset * slope * span(sum_s) + slope * slope * span(sum_ss));
+    return std::max(0.0, span(sum_vv) - 2 * offset * span(sum_v) - 2 * slope * span(sum_vs) + n * offset * offset +
+                             2 * offset * slope * span(sum_s) + slope * slope * span(sum_ss));
   };
   for (std::size_t level = 0; level < levels; ++level) best[level] = {0, 0, 0};
   for (std::size_t from = 0; from + narrowest < points + 1 && from < points; from += narrowest) {
@@ -208,16 +226,18 @@ std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
         for (std::size_t end = 0; end < levels; ++end) {
           const double slope = (height(to, end) - height(from, level)) / width;
           if (slope < lowest || slope > highest) continue;
-          const double squares = here.squares + squares_of(from, to, height(from, level) - slope * curve.soc[from], slope);
+          const double squares =
+              here.squares + squares_of(from, to, height(from, level) - slope * curve.soc[from], slope);
           Best& there = best[to * levels + end];
-          if (here.pieces + 1 < there.pieces || (here.pieces + 1 == there.pieces && squares < there.squares)) there = {here.pieces + 1, squares, from * levels + level};
+          if (here.pieces + 1 < there.pieces || (here.pieces + 1 == there.pieces && squares < there.squares))
+            there = {here.pieces + 1, squares, from * levels + level};
         }
       }
     }
   }
-  const auto last = std::min_element(best.end() - static_cast<std::ptrdiff_t>(levels), best.end(), [](const Best& a, const Best& b) {
-    return a.pieces != b.pieces ? a.pieces < b.pieces : a.squares < b.squares;
-  });
+  const auto last = std::min_element(
+      best.end() - static_cast<std::ptrdiff_t>(levels), best.end(),
+      [](const Best& a, const Best& b) { return a.pieces != b.pieces ? a.pieces < b.pieces : a.squares < b.squares; });
   if (last->pieces == std::numeric_limits<int>::max()) return std::nullopt;
   OcvPieces pieces;
   for (auto at = static_cast<std::size_t>(last - best.begin());; at = best[at].from) {
@@ -232,7 +252,8 @@ std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
   for (std::size_t k = 0, piece = 0; k < points; ++k) {
     while (piece + 2 < pieces.soc.size() && curve.soc[k] > pieces.soc[piece + 1]) ++piece;
     const double t = (curve.soc[k] - pieces.soc[piece]) / (pieces.soc[piece + 1] - pieces.soc[piece]);
-    const double off_v = std::abs(pieces.ocv_v[piece] + t * (pieces.ocv_v[piece + 1] - pieces.ocv_v[piece]) - curve.ocv_v[k]);
+    const double off_v =
+        std::abs(pieces.ocv_v[piece] + t * (pieces.ocv_v[piece + 1] - pieces.ocv_v[piece]) - curve.ocv_v[k]);
     pieces.largest_error_v = std::max(pieces.largest_error_v, off_v * error_v / near_v[k]);
   }
   return pieces;
@@ -249,14 +270,18 @@ void add_gap_corners(OcvPieces& pieces, const OcvCurve& curve, double error_v, s
       while (piece + 2 < pieces.soc.size() && soc > pieces.soc[piece + 1]) ++piece;
       if (soc < lowest || soc > highest) continue;
       const double from = pieces.soc[piece], to = pieces.soc[piece + 1], t = (soc - from) / (to - from);
-      const double off_v = std::abs(pieces.half_gap_v[piece] + t * (pieces.half_gap_v[piece + 1] - pieces.half_gap_v[piece]) - curve.half_gap_v[k]);
+      const double off_v =
+          std::abs(pieces.half_gap_v[piece] + t * (pieces.half_gap_v[piece + 1] - pieces.half_gap_v[piece]) -
+                   curve.half_gap_v[k]);
       constexpr double narrowest = 0.0025;
-      if (off_v > largest_v && soc - from > narrowest && to - soc > narrowest) largest_v = off_v, worst = k, before = piece;
+      if (off_v > largest_v && soc - from > narrowest && to - soc > narrowest)
+        largest_v = off_v, worst = k, before = piece;
     }
     if (worst == 0) return;
     const double t = (curve.soc[worst] - pieces.soc[before]) / (pieces.soc[before + 1] - pieces.soc[before]);
     const auto here = static_cast<std::ptrdiff_t>(before + 1);
-    pieces.ocv_v.insert(pieces.ocv_v.begin() + here, pieces.ocv_v[before] + t * (pieces.ocv_v[before + 1] - pieces.ocv_v[before]));
+    pieces.ocv_v.insert(pieces.ocv_v.begin() + here,
+                        pieces.ocv_v[before] + t * (pieces.ocv_v[before + 1] - pieces.ocv_v[before]));
     pieces.half_gap_v.insert(pieces.half_gap_v.begin() + here, curve.half_gap_v[worst]);
     pieces.soc.insert(pieces.soc.begin() + here, curve.soc[worst]);
   }

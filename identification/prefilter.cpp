@@ -54,16 +54,20 @@ double even_step_s(const std::vector<double>& time_s) {
   if (time_s.size() < 2) throw std::invalid_argument("fewer than two samples: no sampling time");
   std::vector<double> steps_s;
   for (std::size_t k = 1; k < time_s.size(); ++k) steps_s.push_back(time_s[k] - time_s[k - 1]);
-  if (!std::all_of(steps_s.begin(), steps_s.end(), [](double s) { return s > 0 && std::isfinite(s); })) throw std::invalid_argument("time does not rise from sample to sample");
+  if (!std::all_of(steps_s.begin(), steps_s.end(), [](double s) { return s > 0 && std::isfinite(s); }))
+    throw std::invalid_argument("time does not rise from sample to sample");
   const double step_s = upper_median(steps_s);
   for (const double s : steps_s) {
-    if (std::abs(s - step_s) > largest_jitter * step_s) throw std::invalid_argument("the sampling is uneven: a step differs by more than 1 % from the median step; resample first");
+    if (std::abs(s - step_s) > largest_jitter * step_s)
+      throw std::invalid_argument(
+          "the sampling is uneven: a step differs by more than 1 % from the median step; resample first");
   }
   return step_s;
 }
 
 SecondOrderFilter butterworth_low_pass(double cutoff_hz, double sample_rate_hz) {
-  if (!(cutoff_hz > 0 && cutoff_hz < sample_rate_hz / 2)) throw std::invalid_argument("the cutoff of the low-pass must lie between 0 and half the sampling rate");
+  if (!(cutoff_hz > 0 && cutoff_hz < sample_rate_hz / 2))
+    throw std::invalid_argument("the cutoff of the low-pass must lie between 0 and half the sampling rate");
   // 1 / (s^2 + sqrt(2) s + 1) with s = (1 - z^-1) / (warped (1 + z^-1))
   const double warped = std::tan(std::numbers::pi * cutoff_hz / sample_rate_hz);
   const double squared = warped * warped, norm = 1 + std::numbers::sqrt2 * warped + squared;

@@ -28,7 +28,8 @@ double correlation_length(const Eigen::VectorXd& residuals) {
   if (!(power > 0)) return 1;
   const double white_band = 2 / std::sqrt(static_cast<double>(residuals.size()));
   double length = 1;
-  // at growing distances, each standing for those since the one before: a run of hours costs no more than one of seconds
+  // at growing distances, each standing for those since the one before: a run of hours costs no more than one of
+  // seconds
   Eigen::Index before = 0;
   for (Eigen::Index lag = 1; lag < residuals.size() / 2; lag = std::max(lag + 1, lag + lag / 8)) {
     const double correlation = product(residuals, residuals, lag) / power;
@@ -54,8 +55,10 @@ ResidualAnalysis analyse(const Eigen::VectorXd& residuals, const Eigen::VectorXd
     if (lag > 0) a.autocorrelation.push_back(power > 0 ? product(r, r, lag) / power : 0);
     a.input_correlation.push_back(input_power > 0 ? product(u, r, lag) / input_power : 0);
   }
-  a.autocorrelated = static_cast<double>(std::count_if(a.autocorrelation.begin(), a.autocorrelation.end(), outside)) / lags;
-  a.input_correlated = static_cast<double>(std::count_if(a.input_correlation.begin(), a.input_correlation.end(), outside)) / (lags + 1);
+  a.autocorrelated =
+      static_cast<double>(std::count_if(a.autocorrelation.begin(), a.autocorrelation.end(), outside)) / lags;
+  a.input_correlated =
+      static_cast<double>(std::count_if(a.input_correlation.begin(), a.input_correlation.end(), outside)) / (lags + 1);
   return a;
 }
 

@@ -62,7 +62,8 @@ Decay decay_of(const Trace& trace, double tau_s) {
 
 /// Best tau: a grid, because a long flat tail makes second minima, then golden section between its neighbours.
 Decay best_decay(const Trace& trace) {
-  const double least = std::max(trace.t_s.back() / static_cast<double>(trace.t_s.size()) / 3, 1e-3), most = 10 * trace.t_s.back();
+  const double least = std::max(trace.t_s.back() / static_cast<double>(trace.t_s.size()) / 3, 1e-3),
+               most = 10 * trace.t_s.back();
   constexpr int taus = 40;
   const double ratio = std::pow(most / least, 1.0 / taus);
   Decay best;
@@ -85,7 +86,8 @@ Decay best_decay(const Trace& trace) {
 /// The trace without samples further than five (robust) standard deviations from the fit: a loose contact, a lost bit.
 Trace without_outliers(const Trace& trace, const Decay& decay) {
   std::vector<double> left;
-  for (std::size_t k = 0; k < trace.v.size(); ++k) left.push_back(std::abs(decay.level_v + decay.amplitude_v * std::exp(-trace.t_s[k] / decay.tau_s) - trace.v[k]));
+  for (std::size_t k = 0; k < trace.v.size(); ++k)
+    left.push_back(std::abs(decay.level_v + decay.amplitude_v * std::exp(-trace.t_s[k] / decay.tau_s) - trace.v[k]));
   const double bound = std::max(5 * 1.4826 * median(left), 1e-9);
   Trace kept;
   for (std::size_t k = 0; k < trace.v.size(); ++k) {
@@ -126,9 +128,14 @@ PointReading points_of(const Data& data, const Rest& rest, double step_a) {
   PointReading p;
   // neighbours that belong to the same point: 1 % of the rest, on the side of the step where the point lies
   const double near_s = 0.01 * (data.time_s[rest.end - 1] - rest.step_s);
-  const auto within = [&](std::size_t k, std::size_t centre) { return std::abs(data.time_s[k] - data.time_s[centre]) <= near_s; };
+  const auto within = [&](std::size_t k, std::size_t centre) {
+    return std::abs(data.time_s[k] - data.time_s[centre]) <= near_s;
+  };
   std::size_t a = rest.loaded, b = rest.begin + 1, c = rest.end - 1;
-  while (a > 0 && within(a - 1, rest.loaded) && std::abs(data.current_a[a - 1] - data.current_a[rest.loaded]) < steady_part * std::abs(data.current_a[rest.loaded])) --a;
+  while (a > 0 && within(a - 1, rest.loaded) &&
+         std::abs(data.current_a[a - 1] - data.current_a[rest.loaded]) <
+             steady_part * std::abs(data.current_a[rest.loaded]))
+    --a;
   while (b < rest.end && within(b, rest.begin)) ++b;
   while (c > rest.begin && within(c - 1, rest.end - 1)) --c;
   p.a_v = median_voltage(data, a, rest.loaded + 1);
@@ -154,7 +161,8 @@ PointReading points_of(const Data& data, const Rest& rest, double step_a) {
   return p;
 }
 
-/// The current as the RC element feels it at the samples 0 .. loaded, then at the step; and the last one's derivative by tau.
+/// The current as the RC element feels it at the samples 0 .. loaded, then at the step; and the last one's derivative
+/// by tau.
 struct Felt {
   std::vector<double> current_a;
   double slope_by_tau = 0;
@@ -164,7 +172,8 @@ Felt felt_current(const Data& data, const Rest& rest, double tau_s) {
   Felt felt{{0}, 0};
   for (std::size_t k = 1; k <= rest.loaded + 1; ++k) {
     const bool at_step = k > rest.loaded;  // the load's part of the interval that holds the step
-    const double step_s = (at_step ? rest.step_s : data.time_s[k]) - data.time_s[k - 1], current_a = data.current_a[at_step ? k - 1 : k];
+    const double step_s = (at_step ? rest.step_s : data.time_s[k]) - data.time_s[k - 1],
+                 current_a = data.current_a[at_step ? k - 1 : k];
     const double p = std::exp(-step_s / tau_s), before_a = felt.current_a.back();
     felt.slope_by_tau = p * felt.slope_by_tau + (before_a - current_a) * p * step_s / (tau_s * tau_s);
     felt.current_a.push_back(p * before_a + (1 - p) * current_a);
@@ -178,7 +187,9 @@ AtZero load_at_step(const Data& data, const Rest& rest, const Felt& felt, double
   const double loaded_a = data.current_a[rest.loaded], longest_s = r1_ohm > 0 ? load_line_s : plain_line_s;
   for (std::size_t k = rest.loaded + 1; k-- > 0;) {
     // the first sample of a load may have lain under it for part of its interval only
-    if (std::abs(data.current_a[k] - loaded_a) > steady_part * std::abs(loaded_a) || rest.step_s - data.time_s[k] > longest_s) break;
+    if (std::abs(data.current_a[k] - loaded_a) > steady_part * std::abs(loaded_a) ||
+        rest.step_s - data.time_s[k] > longest_s)
+      break;
     if (!std::isfinite(data.voltage_v[k])) continue;
     load.t_s.push_back(data.time_s[k] - rest.step_s);
     load.v.push_back(data.voltage_v[k] - r1_ohm * felt.current_a[k]);
@@ -227,7 +238,8 @@ std::optional<RestReading> read(const Data& data, const Rest& rest, const RestRe
   slope *= size.cwiseInverse().asDiagonal();
   const Eigen::Matrix3d normal = slope.transpose() * slope;
   const Eigen::Matrix3d inverse = normal.completeOrthogonalDecomposition().pseudoInverse();
-  const Eigen::Matrix3d covariance = variance_v2 * (size.cwiseInverse().asDiagonal() * inverse * size.cwiseInverse().asDiagonal());
+  const Eigen::Matrix3d covariance =
+      variance_v2 * (size.cwiseInverse().asDiagonal() * inverse * size.cwiseInverse().asDiagonal());
 
   std::size_t first = 0;
   double first_left_v = 0;  // what the fit leaves in the first samples: a faster relaxation, if there is one
@@ -260,11 +272,13 @@ std::optional<RestReading> read(const Data& data, const Rest& rest, const RestRe
 }  // namespace
 
 RestReadings read_rests(const Data& data, const RestReadingOptions& options) {
-  if (data.current_a.size() != data.size() || data.voltage_v.size() != data.size()) throw std::invalid_argument("time, current and voltage differ in length");
+  if (data.current_a.size() != data.size() || data.voltage_v.size() != data.size())
+    throw std::invalid_argument("time, current and voltage differ in length");
   if (!(data.capacity_ah > 0)) throw std::invalid_argument("a load is judged by the capacity, which is not given");
   for (std::size_t k = 0; k < data.size(); ++k) {
     if (!std::isfinite(data.current_a[k])) throw std::invalid_argument("a current is not a finite number");
-    if (k > 0 && !(data.time_s[k] > data.time_s[k - 1])) throw std::invalid_argument("time does not rise from sample to sample");
+    if (k > 0 && !(data.time_s[k] > data.time_s[k - 1]))
+      throw std::invalid_argument("time does not rise from sample to sample");
   }
   const double load_a = options.load_c_rate * data.capacity_ah, quiet_a = options.rest_c_rate * data.capacity_ah;
   const auto loaded = [&](std::size_t k) { return std::abs(data.current_a[k]) >= load_a; };
@@ -280,7 +294,9 @@ RestReadings read_rests(const Data& data, const RestReadingOptions& options) {
     while (rest.end < data.size() && quiet(rest.end)) ++rest.end;
     if (data.time_s[rest.end - 1] - rest.step_s < options.duration_s) continue;
     // Two steady loaded samples, then the rest, or one between that holds the step: its mean tells where.
-    const auto same = [&](std::size_t one, std::size_t other) { return std::abs(data.current_a[one] - data.current_a[other]) < options.steady * std::abs(data.current_a[other]); };
+    const auto same = [&](std::size_t one, std::size_t other) {
+      return std::abs(data.current_a[one] - data.current_a[other]) < options.steady * std::abs(data.current_a[other]);
+    };
     const std::size_t last = rest.loaded;
     if (last >= 2 && loaded(last - 1) && same(last - 2, last - 1)) {
       const double part = data.current_a[last] / data.current_a[last - 1];
@@ -308,11 +324,16 @@ RestReadings read_rests(const Data& data, const RestReadingOptions& options) {
   out.rc_from = r1.size();
   if (!r0.empty()) out.r0_ohm = median(r0);
   if (!r1.empty()) out.r1_ohm = median(r1), out.tau_s = median(tau), out.c1_f = median(c1);
-  if (!any_load) out.reason = "the current never reaches the load that a step into a rest must start from";
-  else if (long_enough == 0) out.reason = "no steady load is followed by a rest that is long enough";
-  else if (out.rests.empty()) out.reason = "the rests hold too few measured voltages";
-  else if (r0.empty()) out.reason = "no rest gives a positive R0: is the sign of the current right?";
-  else if (r1.empty()) out.reason = "no rest is long enough to tell the time constant: R1 and C1 are not known";
+  if (!any_load)
+    out.reason = "the current never reaches the load that a step into a rest must start from";
+  else if (long_enough == 0)
+    out.reason = "no steady load is followed by a rest that is long enough";
+  else if (out.rests.empty())
+    out.reason = "the rests hold too few measured voltages";
+  else if (r0.empty())
+    out.reason = "no rest gives a positive R0: is the sign of the current right?";
+  else if (r1.empty())
+    out.reason = "no rest is long enough to tell the time constant: R1 and C1 are not known";
   return out;
 }
 

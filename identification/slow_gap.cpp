@@ -26,7 +26,10 @@ std::optional<SlowGap> slow_gap(const std::vector<GapAt>& gaps) {
   if (warmest->temperature_c - coldest->temperature_c < 20) return std::nullopt;
   std::optional<SlowGap> best;
   for (double energy = 10'000; energy <= 80'000; energy += 500) {
-    const auto factor = [&](double temperature_c) { return std::exp(model::mechanism_detail::energy_over_rt(energy, 25.0) * (25 - temperature_c) / (temperature_c + 273.15)); };
+    const auto factor = [&](double temperature_c) {
+      return std::exp(model::mechanism_detail::energy_over_rt(energy, 25.0) * (25 - temperature_c) /
+                      (temperature_c + 273.15));
+    };
     // two unknowns, neither negative
     double a = 0, aa = 0, g = 0, ag = 0, gg = 0;
     const auto n = static_cast<double>(gaps.size());
@@ -36,7 +39,8 @@ std::optional<SlowGap> slow_gap(const std::vector<GapAt>& gaps) {
     }
     double over_v = std::max(0.0, (n * ag - a * g) / (n * aa - a * a)), m_v = (g - over_v * a) / n;
     if (m_v < 0) m_v = 0, over_v = std::max(0.0, ag / aa);
-    const double squares = gg - 2 * m_v * g - 2 * over_v * ag + n * m_v * m_v + 2 * m_v * over_v * a + over_v * over_v * aa;
+    const double squares =
+        gg - 2 * m_v * g - 2 * over_v * ag + n * m_v * m_v + 2 * m_v * over_v * a + over_v * over_v * aa;
     const double residual_v = std::sqrt(std::max(0.0, squares) / n);
     if (!best || residual_v < best->residual_v) best = {m_v, over_v, energy, residual_v};
   }

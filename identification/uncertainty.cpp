@@ -12,8 +12,8 @@ namespace bms::identification {
 
 namespace {
 
-/// Sum over all pairs of samples at most `window` apart, weighted by 1 - distance / window, of score score'. As sums over a moving
-/// window, whose products have just these weights.
+/// Sum over all pairs of samples at most `window` apart, weighted by 1 - distance / window, of score score'. As sums
+/// over a moving window, whose products have just these weights.
 Eigen::MatrixXd long_run(const Eigen::MatrixXd& scores, Eigen::Index window) {
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(scores.cols(), scores.cols());
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(scores.cols());
@@ -32,7 +32,8 @@ double Uncertainty::std(Eigen::Index k) const { return std::sqrt(std::max(0.0, c
 double Uncertainty::std_with_offset(Eigen::Index k) const { return std::hypot(std(k), offset[k]); }
 double Uncertainty::std_white(Eigen::Index k) const { return std::sqrt(std::max(0.0, covariance_white(k, k))); }
 
-Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data, const Eigen::VectorXi& held, double offset_v) {
+Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data,
+                        const Eigen::VectorXi& held, double offset_v) {
   const Eigen::Index m = jacobian.rows(), n = jacobian.cols(), beliefs = m - data;
   Uncertainty u;
   u.covariance = u.covariance_white = Eigen::MatrixXd::Zero(n, n);
@@ -63,18 +64,22 @@ Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd&
   for (Eigen::Index k = 0; k < f; ++k) inverse[k] = inverse[k] > unseen ? 1 / inverse[k] : 0;
   for (Eigen::Index k = 0; k < f; ++k) {
     double hidden = 0;
-    for (Eigen::Index e = 0; e < f; ++e) hidden += inverse[e] > 0 ? 0 : eigen.eigenvectors()(k, e) * eigen.eigenvectors()(k, e);
+    for (Eigen::Index e = 0; e < f; ++e)
+      hidden += inverse[e] > 0 ? 0 : eigen.eigenvectors()(k, e) * eigen.eigenvectors()(k, e);
     u.seen[free[static_cast<std::size_t>(k)]] = hidden < 0.01 ? 1 : 0;
   }
   const Eigen::MatrixXd bread = eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
   const Eigen::VectorXd shift = bread * scores.topRows(data).colwise().sum().transpose() * offset_v;
-  const Eigen::MatrixXd of_beliefs = scores.bottomRows(beliefs).transpose() * scores.bottomRows(beliefs) * (u.output_variance_v2 * u.correlation_length);
+  const Eigen::MatrixXd of_beliefs = scores.bottomRows(beliefs).transpose() * scores.bottomRows(beliefs) *
+                                     (u.output_variance_v2 * u.correlation_length);
   scores.conservativeResize(data, Eigen::NoChange);
   scores.array().colwise() *= residuals.head(data).array();
-  const auto window = static_cast<Eigen::Index>(std::clamp(6 * u.correlation_length, 1.0, std::max(1.0, 0.25 * static_cast<double>(data))));
+  const auto window = static_cast<Eigen::Index>(
+      std::clamp(6 * u.correlation_length, 1.0, std::max(1.0, 0.25 * static_cast<double>(data))));
   // parameters take some freedom from the residuals, and the window some from the long run
   const auto n_data = static_cast<double>(data);
-  const double freedom = n_data / std::max(1.0, n_data - static_cast<double>(f)) * n_data / (n_data - static_cast<double>(window - 1));
+  const double freedom =
+      n_data / std::max(1.0, n_data - static_cast<double>(f)) * n_data / (n_data - static_cast<double>(window - 1));
   const Eigen::MatrixXd coloured = bread * (long_run(scores, window) * freedom + of_beliefs) * bread;
   for (Eigen::Index a = 0; a < f; ++a) {
     u.offset[free[static_cast<std::size_t>(a)]] = shift[a] / norm[a];

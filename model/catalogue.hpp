@@ -31,13 +31,12 @@
 
 namespace bms::model {
 
-using Catalogue = std::tuple<
-    ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,      // readings
-    InitialSoc, CapacityChange, CoulombicLoss, Leakage,                               // charge
-    SlowPolarisation, FastPolarisation, OcvHysteresis, SelfHeating,                   // states
-    ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance, ChargeTransfer, ContactStep, ContactIntermittent,
-    OcvShape, EntropicOcv,                                                            // tables
-    VoltageOffset, VoltageGain>;                                                      // the reading of the voltage
+using Catalogue = std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,  // readings
+                             InitialSoc, CapacityChange, CoulombicLoss, Leakage,                           // charge
+                             SlowPolarisation, FastPolarisation, OcvHysteresis, SelfHeating,               // states
+                             ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance,
+                             ChargeTransfer, ContactStep, ContactIntermittent, OcvShape, EntropicOcv,  // tables
+                             VoltageOffset, VoltageGain>;  // the reading of the voltage
 
 inline constexpr std::size_t mechanism_count = std::tuple_size_v<Catalogue>;
 
@@ -71,7 +70,8 @@ constexpr std::array<MechanismInfo, sizeof...(M)> infos(std::tuple<M...>*) {
 
 }  // namespace mechanism_detail
 
-inline constexpr std::array<MechanismInfo, mechanism_count> catalogue = mechanism_detail::infos(static_cast<Catalogue*>(nullptr));
+inline constexpr std::array<MechanismInfo, mechanism_count> catalogue =
+    mechanism_detail::infos(static_cast<Catalogue*>(nullptr));
 
 /// Place in the catalogue; mechanism_count when there is none of that id.
 constexpr std::size_t mechanism_index(std::string_view id) {

@@ -1,17 +1,18 @@
-// A cell prepared for stepping with one scalar: the tables of its file merged into one row of intervals over soc, each with what
-// a step needs, and the noise figures turned into the units of the filter.
+// A cell prepared for stepping with one scalar: the tables of its file merged into one row of intervals over soc, each
+// with what a step needs, and the noise figures turned into the units of the filter.
 //
-//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) * per_width,  value = value at start + t * delta
+//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) * per_width,  value = value at start + t
+//   * delta
 //
-// per_width is the power of two next to 1 / width, not below it: a shift in integers. t ends below 2, delta is what a value changes by
-// while t goes from 0 to 1.
+// per_width is the power of two next to 1 / width, not below it: a shift in integers. t ends below 2, delta is what a
+// value changes by while t goes from 0 to 1.
 //
-// The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on (a clamp
-// would have slope 0 just where an estimate that has overshot needs one to find back) and R0, R1, C1 stay constant.
-// An edge belongs to the interval above it, so does the slope there.
+// The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on
+// (a clamp would have slope 0 just where an estimate that has overshot needs one to find back) and R0, R1, C1 stay
+// constant. An edge belongs to the interval above it, so does the slope there.
 //
-// prepare() is constexpr: firmware runs it in the compiler, the host at run time, with the same digits in the same order.
-// Cost of look_up: in estimator/README.md with the step.
+// prepare() is constexpr: firmware runs it in the compiler, the host at run time, with the same digits in the same
+// order. Cost of look_up: in estimator/README.md with the step.
 #pragma once
 
 #include <array>
@@ -19,10 +20,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "arithmetic/scalar.hpp"
 #include "model/cell_parameters.hpp"
-#include "model/scalar.hpp"
 
 namespace bms::model {
+
+using namespace arithmetic;  // physics is written in its number types and functions
 
 /// All that the tables say about one interval of soc.
 template <class S>
@@ -33,20 +36,22 @@ struct Interval {
   Resistance<S> r0_ohm{}, r0_delta_ohm{};
   Resistance<S> r1_ohm{}, r1_delta_ohm{};
   Capacitance<S> c1_f{}, c1_delta_f{};
-  Factor<S> gap{1}, gap_delta{};  ///< of the distance between charge and discharge (ocv.half_gap_v): over what it is in the middle of the curve
-  Variance<S> error_v2{};  ///< of the voltage there, lasting: noise.model_v, and the slope times what the soc axis is good to (tolerance.initial_soc)
+  Factor<S> gap{1}, gap_delta{};  ///< of the distance between charge and discharge (ocv.half_gap_v): over what it is in
+                                  ///< the middle of the curve
+  Variance<S> error_v2{};  ///< of the voltage there, lasting: noise.model_v, and the slope times what the soc axis is
+                           ///< good to (tolerance.initial_soc)
 };
 
-/// Charge is counted in microampere-microseconds [1e-12 A s], in 64-bit integers, and read in counts of 2^shift of them: fine
-/// enough that nothing is lost (one count is below 4e-9 of the capacity), coarse enough for 32 bits.
+/// Charge is counted in microampere-microseconds [1e-12 A s], in 64-bit integers, and read in counts of 2^shift of
+/// them: fine enough that nothing is lost (one count is below 4e-9 of the capacity), coarse enough for 32 bits.
 template <class S>
 struct ChargeScale {
   std::int64_t capacity_uaus = 0;
-  std::int64_t lowest_uaus = 0;      ///< where counting stops: least_soc
-  std::int64_t highest_uaus = 0;     ///< most_soc
+  std::int64_t lowest_uaus = 0;   ///< where counting stops: least_soc
+  std::int64_t highest_uaus = 0;  ///< most_soc
   int shift = 0;
-  Soc<S> soc_per_count{};            ///< fixed point: per 2^27 counts (what Soc holds as 1), 0.25 .. 0.5
-  Soc<S> counts_per_soc{};           ///< its inverse; fixed point: in 2^27 counts
+  Soc<S> soc_per_count{};   ///< fixed point: per 2^27 counts (what Soc holds as 1), 0.25 .. 0.5
+  Soc<S> counts_per_soc{};  ///< its inverse; fixed point: in 2^27 counts
 };
 
 /// A current reading that rests (estimator/current_at_rest.hpp).
@@ -57,21 +62,22 @@ struct RestingCurrent {
 /// Noise as the filter uses it, in its own units.
 template <class S>
 struct FilterNoise {
-  Variance<S> voltage_v2{};             ///< white, per sample
-  Variance<S> model_v2{};               ///< of all that Interval::error_v2 holds, what is the same everywhere
-  Duration<S> model_correlation_s{};    ///< how long Interval::error_v2 and the resistances' error last
-  Fraction<S> resistance_error{};       ///< of R0 + R1
-  Variance<S> v_rc_v2{};                ///< in the steady state
+  Variance<S> voltage_v2{};           ///< white, per sample
+  Variance<S> model_v2{};             ///< of all that Interval::error_v2 holds, what is the same everywhere
+  Duration<S> model_correlation_s{};  ///< how long Interval::error_v2 and the resistances' error last
+  Fraction<S> resistance_error{};     ///< of R0 + R1
+  Variance<S> v_rc_v2{};              ///< in the steady state
   Variance<S> rest_v2{};
-  Soc<S> white_soc_per_s{};             ///< current_a over the capacity
-  Variance<S> walk_soc2_per_s{};        ///< slow current error: 2 offset^2 correlation / capacity^2
-  Variance<S> offset_per_h2{};          ///< the same as a state of the filter: current_offset_a over the capacity in Ah, squared
+  Soc<S> white_soc_per_s{};       ///< current_a over the capacity
+  Variance<S> walk_soc2_per_s{};  ///< slow current error: 2 offset^2 correlation / capacity^2
+  Variance<S>
+      offset_per_h2{};  ///< the same as a state of the filter: current_offset_a over the capacity in Ah, squared
   Duration<S> current_offset_correlation_s{};
-  Variance<S> at_rest_per_h2{};         ///< current_at_rest_a over the capacity in Ah, squared; 0: not known
+  Variance<S> at_rest_per_h2{};  ///< current_at_rest_a over the capacity in Ah, squared; 0: not known
   RestingCurrent at_rest;
-  Fraction<S> gain{};                   ///< current_gain
-  Current<S> one_c_a{};                 ///< the capacity in one hour
-  Soc<S> unknown_soc_per_s{};           ///< current_unknown_a over the capacity
+  Fraction<S> gain{};          ///< current_gain
+  Current<S> one_c_a{};        ///< the capacity in one hour
+  Soc<S> unknown_soc_per_s{};  ///< current_unknown_a over the capacity
   Current<S> unknown_a{};
 };
 
@@ -94,12 +100,12 @@ struct Cell {
   using Scalar = S;
 
   std::array<Interval<S>, Max> interval{};
-  std::array<Soc<S>, Max + 1> edge{};            ///< interval k is [edge k, edge k + 1); the outermost are out of reach
+  std::array<Soc<S>, Max + 1> edge{};  ///< interval k is [edge k, edge k + 1); the outermost are out of reach
   ChargeScale<S> charge;
   FilterNoise<S> noise;
   Plausible plausible;
   UseLimits<S> limits;
-  std::size_t size = 0;                          ///< intervals in use
+  std::size_t size = 0;  ///< intervals in use
 };
 
 /// What the tables say at one soc, and how much it changes over the interval: d / d soc = delta * per_width.
@@ -146,8 +152,10 @@ constexpr Real rc_value(const RcTable<Real>& rc, const Column<Real, Max>& column
 
 template <class Real>
 constexpr double plain(const Real& x) {
-  if constexpr (std::floating_point<Real>) return x;
-  else return x.a;  // a dual number
+  if constexpr (std::floating_point<Real>)
+    return x;
+  else
+    return x.a;  // a dual number
 }
 
 template <class Real>
@@ -159,7 +167,8 @@ constexpr std::size_t ocv_piece(const OcvTable<Real>& ocv, double soc) {
 
 }  // namespace cell_detail
 
-/// The middle of the curve: where a lithium iron phosphate cell's voltage hardly moves, in soc. Beyond, slow charge and discharge part by their knees.
+/// The middle of the curve: where a lithium iron phosphate cell's voltage hardly moves, in soc. Beyond, slow charge and
+/// discharge part by their knees.
 inline constexpr double middle_from = 0.2, middle_to = 0.9;
 
 /// Half the distance between charge and discharge in the middle of the curve [V]; 0: not known.
@@ -167,7 +176,8 @@ template <class Real>
 constexpr double middle_half_gap_v(const OcvTable<Real>& ocv) {
   double area = 0, width = 0;
   for (std::size_t k = 0; k + 1 < ocv.half_gap_v.size; ++k) {
-    const double from = ocv.soc[k] > middle_from ? ocv.soc[k] : middle_from, to = ocv.soc[k + 1] < middle_to ? ocv.soc[k + 1] : middle_to;
+    const double from = ocv.soc[k] > middle_from ? ocv.soc[k] : middle_from,
+                 to = ocv.soc[k + 1] < middle_to ? ocv.soc[k + 1] : middle_to;
     if (!(to > from)) continue;
     const double slope = (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
     area += (to - from) * (ocv.half_gap_v[k] + slope * ((from + to) / 2 - ocv.soc[k]));
@@ -178,7 +188,8 @@ constexpr double middle_half_gap_v(const OcvTable<Real>& ocv) {
 
 namespace cell_detail {
 
-/// The half gap over that of the middle; at the ends it is more of the current that it was measured with than of the cell.
+/// The half gap over that of the middle; at the ends it is more of the current that it was measured with than of the
+/// cell.
 template <class Real>
 constexpr double gap_at(const OcvTable<Real>& ocv, double middle_v, double soc) {
   if (!(middle_v > 0)) return 1;
@@ -239,8 +250,10 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
     const double gap = d::gap_at(p.ocv, middle_gap_v, from);
     i.gap = Factor<S>(gap);
     i.gap_delta = Factor<S>((d::gap_at(p.ocv, middle_gap_v, to) - gap) * part);
-    const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc, model_v2 = p.noise.model_v * p.noise.model_v, error_v2 = model_v2 + axis_v * axis_v;
-    const double most_v2 = model_v2 > largest_error_v2 ? model_v2 : largest_error_v2;  // never less than what is the same everywhere
+    const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc,
+                 model_v2 = p.noise.model_v * p.noise.model_v, error_v2 = model_v2 + axis_v * axis_v;
+    const double most_v2 =
+        model_v2 > largest_error_v2 ? model_v2 : largest_error_v2;  // never less than what is the same everywhere
     i.error_v2 = Variance<S>(error_v2 < most_v2 ? error_v2 : most_v2);
     ++cell.size;
   };
@@ -259,7 +272,8 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   static_assert(least_soc == -0.25 && most_soc == 1.25);
   cell.charge.lowest_uaus = -(cell.charge.capacity_uaus / 4);
   cell.charge.highest_uaus = cell.charge.capacity_uaus + cell.charge.capacity_uaus / 4;
-  const double per_soc = static_cast<double>(cell.charge.capacity_uaus) / (268'435'456.0 * static_cast<double>(std::int64_t{1} << cell.charge.shift));
+  const double per_soc = static_cast<double>(cell.charge.capacity_uaus) /
+                         (268'435'456.0 * static_cast<double>(std::int64_t{1} << cell.charge.shift));
   double unit = 268'435'456.0;
   if constexpr (is_q<Soc<S>>) unit /= static_cast<double>(std::int32_t{1} << Soc<S>::fraction_bits);
   cell.charge.counts_per_soc = Soc<S>(per_soc * unit);
@@ -274,29 +288,38 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.v_rc_v2 = Variance<S>(square(n.v_rc_v));
   cell.noise.rest_v2 = Variance<S>(square(n.rest_v));
   cell.noise.white_soc_per_s = Soc<S>(n.current_a / capacity_as);
-  cell.noise.walk_soc2_per_s = Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
+  cell.noise.walk_soc2_per_s =
+      Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
   cell.noise.offset_per_h2 = Variance<S>(square(n.current_offset_a / p.capacity_ah));
-  cell.noise.current_offset_correlation_s = Duration<S>(n.current_offset_correlation_s < 131'000 ? n.current_offset_correlation_s : 131'000);
+  cell.noise.current_offset_correlation_s =
+      Duration<S>(n.current_offset_correlation_s < 131'000 ? n.current_offset_correlation_s : 131'000);
   cell.noise.at_rest_per_h2 = Variance<S>(square(n.current_at_rest_a / p.capacity_ah));
-  const auto micro = [](double a) { return static_cast<std::int32_t>(1e6 * (a < largest_current_a ? a : largest_current_a)); };
+  const auto micro = [](double a) {
+    return static_cast<std::int32_t>(1e6 * (a < largest_current_a ? a : largest_current_a));
+  };
   cell.noise.at_rest = {micro(3 * (n.current_offset_a + n.current_at_rest_a)), micro(n.current_offset_a)};
   cell.noise.gain = Fraction<S>(n.current_gain);
   cell.noise.one_c_a = Current<S>(p.capacity_ah);
   cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
   cell.noise.unknown_a = Current<S>(n.current_unknown_a < largest_current_a ? n.current_unknown_a : largest_current_a);
 
-  cell.limits = {Voltage<S>(p.limits.voltage_min_v), Voltage<S>(p.limits.voltage_max_v), Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a), Fraction<S>(1 / capacity_as)};
+  cell.limits = {Voltage<S>(p.limits.voltage_min_v), Voltage<S>(p.limits.voltage_max_v),
+                 Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a),
+                 Fraction<S>(1 / capacity_as)};
 
-  // half a volt and ten times the current beyond the limits of use: a sensor still tells the truth there, a fault does not
+  // half a volt and ten times the current beyond the limits of use: a sensor still tells the truth there, a fault does
+  // not
   cell.plausible.voltage_min_uv = static_cast<std::int32_t>((p.limits.voltage_min_v - 0.5) * 1e6);
   cell.plausible.voltage_max_uv = static_cast<std::int32_t>((p.limits.voltage_max_v + 0.5) * 1e6);
-  const double larger = p.limits.charge_current_max_a > p.limits.discharge_current_max_a ? p.limits.charge_current_max_a
-                                                                                         : p.limits.discharge_current_max_a;
+  const double larger = p.limits.charge_current_max_a > p.limits.discharge_current_max_a
+                            ? p.limits.charge_current_max_a
+                            : p.limits.discharge_current_max_a;
   cell.plausible.current_max_ua = micro(10 * larger);
   return cell;
 }
 
-/// Interval that holds soc (fixed point: within +-7.9), found from a nearby one: a step moves soc by little. The result does not depend on `from`.
+/// Interval that holds soc (fixed point: within +-7.9), found from a nearby one: a step moves soc by little. The result
+/// does not depend on `from`.
 template <class S, std::size_t Max>
 constexpr std::size_t interval_of(const Cell<S, Max>& cell, const Soc<S>& soc, std::size_t from) {
   std::size_t k = from;

@@ -1,6 +1,6 @@
-// A cell as its file describes it: the tables of the paper and the figures around them, in SI units, before they are prepared
-// for a scalar (model/cell.hpp). The host fills it from TOML at run time; for firmware a generator writes the same
-// structure as a constexpr header, so that both start from the same digits.
+// A cell as its file describes it: the tables of the paper and the figures around them, in SI units, before they are
+// prepared for a scalar (model/cell.hpp). The host fills it from TOML at run time; for firmware a generator writes the
+// same structure as a constexpr header, so that both start from the same digits.
 //
 //   Real: double, or ceres::Jet where a parameter is an unknown of a fit
 //
@@ -23,23 +23,23 @@ struct Column {
   constexpr void push_back(const Real& v) { value[size++] = v; }
 };
 
-/// What a cell file may hold: wide enough for any lithium cell from a coin to 1,000 Ah (Table 3 of the paper bounds the fit of one of 6 Ah).
-/// model/fixed_ranges.hpp proves with these that fixed point has room for all of it.
+/// What a cell file may hold: wide enough for any lithium cell from a coin to 1,000 Ah (Table 3 of the paper bounds the
+/// fit of one of 6 Ah). model/fixed_ranges.hpp proves with these that fixed point has room for all of it.
 namespace accepted {
 
 struct Range {
   double low, high;
 };
 inline constexpr Range capacity_ah{0.01, 1'000};
-inline constexpr Range voltage_v{0.5, 5};               ///< limits of use, and the open-circuit voltage from soc 0 to 1
-inline constexpr Range current_a{1e-3, 2'000};          ///< limits of use
-inline constexpr Range slope_v{1e-6, 60};               ///< of the open-circuit voltage, per unit of soc
-inline constexpr Range resistance_ohm{1e-5, 0.5};       ///< R0 and R1
-inline constexpr Range capacitance_f{100, 100'000};     ///< C1
-inline constexpr Range time_constant_s{0.2, 50'000};    ///< R1 C1
-inline constexpr double least_width = 0.0005;           ///< of soc, between any two edges or nodes
-inline constexpr Range lasts_s{0, 86'400};              ///< noise.model_correlation_s
-inline constexpr Range unknown_c{1e-3, 10};             ///< noise.current_unknown_a over the 1C current
+inline constexpr Range voltage_v{0.5, 5};             ///< limits of use, and the open-circuit voltage from soc 0 to 1
+inline constexpr Range current_a{1e-3, 2'000};        ///< limits of use
+inline constexpr Range slope_v{1e-6, 60};             ///< of the open-circuit voltage, per unit of soc
+inline constexpr Range resistance_ohm{1e-5, 0.5};     ///< R0 and R1
+inline constexpr Range capacitance_f{100, 100'000};   ///< C1
+inline constexpr Range time_constant_s{0.2, 50'000};  ///< R1 C1
+inline constexpr double least_width = 0.0005;         ///< of soc, between any two edges or nodes
+inline constexpr Range lasts_s{0, 86'400};            ///< noise.model_correlation_s
+inline constexpr Range unknown_c{1e-3, 10};           ///< noise.current_unknown_a over the 1C current
 inline constexpr double most_gain = 0.2, most_resistance_error = 1;
 
 }  // namespace accepted
@@ -50,22 +50,23 @@ inline constexpr std::size_t max_rc_nodes = 64;
 /// Piecewise linear open-circuit voltage (Eq. 4): b0_v[k] + b1_v[k] * soc holds for soc[k] <= soc < soc[k + 1].
 template <class Real>
 struct OcvTable {
-  Column<double, max_ocv_edges> soc;   ///< edges, ascending, first 0, last 1
-  Column<Real, max_ocv_edges> b0_v;    ///< [V], one less than edges
-  Column<Real, max_ocv_edges> b1_v;    ///< [V per unit of soc], > 0
+  Column<double, max_ocv_edges> soc;  ///< edges, ascending, first 0, last 1
+  Column<Real, max_ocv_edges> b0_v;   ///< [V], one less than edges
+  Column<Real, max_ocv_edges> b1_v;   ///< [V per unit of soc], > 0
   // where slow charge and discharge part (hysteresis), if it is known; the 1RC model does without
   Column<double, max_ocv_edges> half_gap_v{};  ///< [V] at the edges, half of charge less discharge; or empty
-  double lean = 0;                     ///< -1..1: b0, b1 are the middle of both plus lean * half_gap
+  double lean = 0;                             ///< -1..1: b0, b1 are the middle of both plus lean * half_gap
 };
 
 /// Equivalent circuit at nodes of soc; linear in between, constant outside.
 template <class Real>
 struct RcTable {
-  Column<double, max_rc_nodes> soc;    ///< nodes, ascending, within 0 .. 1
+  Column<double, max_rc_nodes> soc;  ///< nodes, ascending, within 0 .. 1
   Column<Real, max_rc_nodes> r0_ohm;
   Column<Real, max_rc_nodes> r1_ohm;
   Column<Real, max_rc_nodes> c1_f;
-  Column<double, max_rc_nodes> r0_std_ohm{}, r1_std_ohm{}, c1_std_f{};  ///< standard deviations of an identification, or empty
+  Column<double, max_rc_nodes> r0_std_ohm{}, r1_std_ohm{},
+      c1_std_f{};  ///< standard deviations of an identification, or empty
 };
 
 /// Limits of use, from the manufacturer.
@@ -92,16 +93,20 @@ struct Noise {
   double current_offset_a = 0;              ///< slow error of the current reading
   double current_offset_correlation_s = 0;  ///< how long it lasts
   double current_unknown_a = 0;             ///< current to be expected while there is no reading
-  double current_at_rest_a = 0;             ///< what may still flow while the reading rests, where errors are states; 0: a resting reading is believed as it is
-  double current_gain = 0;                  ///< of the current reading and of the capacity that it is divided by, relative, lasting; where errors are states
-  bool errors_are_states = false;           ///< the filter estimates the current's offset and the model's lasting error; else it widens sigma by them
+  double current_at_rest_a = 0;  ///< what may still flow while the reading rests, where errors are states; 0: a resting
+                                 ///< reading is believed as it is
+  double current_gain = 0;  ///< of the current reading and of the capacity that it is divided by, relative, lasting;
+                            ///< where errors are states
+  bool errors_are_states =
+      false;  ///< the filter estimates the current's offset and the model's lasting error; else it widens sigma by them
 };
 
 /// What the calibration is good for: a difference inside it is not a mismatch.
 struct Tolerance {
   double ocv_v = 0;
   double resistance_fraction = 0;  ///< of R0 and R1; the estimator believes a voltage under current as much less
-  double initial_soc = 0;          ///< of the tables' soc axis; where the OCV is steep, the estimator believes a voltage as much less
+  double initial_soc =
+      0;  ///< of the tables' soc axis; where the OCV is steep, the estimator believes a voltage as much less
   double drift_v = 0;
 };
 
@@ -117,9 +122,9 @@ struct CellParameters {
 
 /// Why a set of parameters is refused; what == nullptr: it is not.
 struct CellFault {
-  const char* key = nullptr;       ///< as in the cell file, e.g. "ocv.b1_v"
-  std::size_t index = 0;           ///< of the table entry
-  const char* what = nullptr;      ///< what is expected
+  const char* key = nullptr;   ///< as in the cell file, e.g. "ocv.b1_v"
+  std::size_t index = 0;       ///< of the table entry
+  const char* what = nullptr;  ///< what is expected
 };
 
 /// By `accepted`.
@@ -132,11 +137,14 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
 
   const Limits& l = p.limits;
   if (beyond(l.voltage_min_v, accepted::voltage_v)) return {"limits.voltage_min_v", 0, "0.5 to 5 V"};
-  if (outside(l.voltage_max_v, l.voltage_min_v + 0.1, accepted::voltage_v.high)) return {"limits.voltage_max_v", 0, "voltage_min_v + 0.1 to 5 V"};
+  if (outside(l.voltage_max_v, l.voltage_min_v + 0.1, accepted::voltage_v.high))
+    return {"limits.voltage_max_v", 0, "voltage_min_v + 0.1 to 5 V"};
   if (beyond(l.charge_current_max_a, accepted::current_a)) return {"limits.charge_current_max_a", 0, "0.001 to 2000 A"};
-  if (beyond(l.discharge_current_max_a, accepted::current_a)) return {"limits.discharge_current_max_a", 0, "0.001 to 2000 A"};
+  if (beyond(l.discharge_current_max_a, accepted::current_a))
+    return {"limits.discharge_current_max_a", 0, "0.001 to 2000 A"};
   if (outside(l.temperature_min_c, -60, 100)) return {"limits.temperature_min_c", 0, "-60 to 100 degrees C"};
-  if (outside(l.temperature_max_c, l.temperature_min_c, 150)) return {"limits.temperature_max_c", 0, "temperature_min_c to 150 degrees C"};
+  if (outside(l.temperature_max_c, l.temperature_min_c, 150))
+    return {"limits.temperature_max_c", 0, "temperature_min_c to 150 degrees C"};
 
   const auto& o = p.ocv;
   if (o.soc.size < 2) return {"ocv.soc", 0, "two edges or more"};
@@ -146,16 +154,19 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (o.soc[o.soc.size - 1] != 1) return {"ocv.soc", o.soc.size - 1, "1 as the last edge"};
   for (std::size_t k = 0; k + 1 < o.soc.size; ++k) {
     if (outside(o.soc[k + 1] - o.soc[k], 0.001, 1)) return {"ocv.soc", k + 1, "edges that ascend by 0.001 or more"};
-    if (beyond(o.b1_v[k], accepted::slope_v)) return {"ocv.b1_v", k, "a curve that rises: 0.000001 to 60 V per unit of soc"};
+    if (beyond(o.b1_v[k], accepted::slope_v))
+      return {"ocv.b1_v", k, "a curve that rises: 0.000001 to 60 V per unit of soc"};
     for (const double soc : {o.soc[k], o.soc[k + 1]}) {
-      if (beyond(o.b0_v[k] + o.b1_v[k] * soc, accepted::voltage_v)) return {"ocv.b0_v", k, "an open-circuit voltage of 0.5 to 5 V"};
+      if (beyond(o.b0_v[k] + o.b1_v[k] * soc, accepted::voltage_v))
+        return {"ocv.b0_v", k, "an open-circuit voltage of 0.5 to 5 V"};
     }
     if (k > 0 && outside(o.b0_v[k] + o.b1_v[k] * o.soc[k] - o.b0_v[k - 1] - o.b1_v[k - 1] * o.soc[k], -0.005, 0.005)) {
       return {"ocv.b0_v", k, "pieces that meet within 5 mV at their common edge"};
     }
   }
 
-  if (o.half_gap_v.size != 0 && o.half_gap_v.size != o.soc.size) return {"ocv.half_gap_v", 0, "as many values as ocv.soc"};
+  if (o.half_gap_v.size != 0 && o.half_gap_v.size != o.soc.size)
+    return {"ocv.half_gap_v", 0, "as many values as ocv.soc"};
   for (std::size_t k = 0; k < o.half_gap_v.size; ++k) {
     if (outside(o.half_gap_v[k], -0.5, 1)) return {"ocv.half_gap_v", k, "-0.5 to 1 V"};
   }
@@ -181,13 +192,15 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
     if (outside(r.soc[k], 0, 1)) return {"rc.soc", k, "0 to 1"};
     for (std::size_t e = 0; e < o.soc.size; ++e) {
       const double apart = r.soc[k] < o.soc[e] ? o.soc[e] - r.soc[k] : r.soc[k] - o.soc[e];
-      if (apart > 1e-9 && apart < accepted::least_width) return {"rc.soc", k, "nodes on an edge of ocv.soc or 0.0005 or more away from it"};
+      if (apart > 1e-9 && apart < accepted::least_width)
+        return {"rc.soc", k, "nodes on an edge of ocv.soc or 0.0005 or more away from it"};
     }
     if (k > 0 && outside(r.soc[k] - r.soc[k - 1], 0.001, 1)) return {"rc.soc", k, "nodes that ascend by 0.001 or more"};
     if (beyond(r.r0_ohm[k], accepted::resistance_ohm)) return {"rc.r0_ohm", k, "0.00001 to 0.5 ohm"};
     if (beyond(r.r1_ohm[k], accepted::resistance_ohm)) return {"rc.r1_ohm", k, "0.00001 to 0.5 ohm"};
     if (beyond(r.c1_f[k], accepted::capacitance_f)) return {"rc.c1_f", k, "100 to 100000 F"};
-    if (beyond(r.r1_ohm[k] * r.c1_f[k], accepted::time_constant_s)) return {"rc.c1_f", k, "a time constant r1 * c1 of 0.2 to 50000 s"};
+    if (beyond(r.r1_ohm[k] * r.c1_f[k], accepted::time_constant_s))
+      return {"rc.c1_f", k, "a time constant r1 * c1 of 0.2 to 50000 s"};
   }
 
   const Noise& n = p.noise;
@@ -197,17 +210,23 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (outside(n.v_rc_v, 1e-5, 0.5)) return {"noise.v_rc_v", 0, "0.00001 to 0.5 V"};
   if (outside(n.rest_v, 1e-4, 0.5)) return {"noise.rest_v", 0, "0.0001 to 0.5 V"};
   const double c_rate_1_a = p.capacity_ah;
-  if (outside(n.current_a, 1e-7 * c_rate_1_a, c_rate_1_a)) return {"noise.current_a", 0, "1e-7 to 1 times the 1C current"};
-  if (outside(n.current_offset_a, 1e-6 * c_rate_1_a, c_rate_1_a)) return {"noise.current_offset_a", 0, "1e-6 to 1 times the 1C current"};
-  if (outside(n.current_offset_correlation_s, 1, 1e6)) return {"noise.current_offset_correlation_s", 0, "1 to 1000000 s"};
-  if (outside(n.current_unknown_a, accepted::unknown_c.low * c_rate_1_a, accepted::unknown_c.high * c_rate_1_a)) return {"noise.current_unknown_a", 0, "0.001 to 10 times the 1C current"};
+  if (outside(n.current_a, 1e-7 * c_rate_1_a, c_rate_1_a))
+    return {"noise.current_a", 0, "1e-7 to 1 times the 1C current"};
+  if (outside(n.current_offset_a, 1e-6 * c_rate_1_a, c_rate_1_a))
+    return {"noise.current_offset_a", 0, "1e-6 to 1 times the 1C current"};
+  if (outside(n.current_offset_correlation_s, 1, 1e6))
+    return {"noise.current_offset_correlation_s", 0, "1 to 1000000 s"};
+  if (outside(n.current_unknown_a, accepted::unknown_c.low * c_rate_1_a, accepted::unknown_c.high * c_rate_1_a))
+    return {"noise.current_unknown_a", 0, "0.001 to 10 times the 1C current"};
 
-  if (outside(n.current_at_rest_a, 0, 0.1 * c_rate_1_a)) return {"noise.current_at_rest_a", 0, "0 to 0.1 times the 1C current"};
+  if (outside(n.current_at_rest_a, 0, 0.1 * c_rate_1_a))
+    return {"noise.current_at_rest_a", 0, "0 to 0.1 times the 1C current"};
   if (outside(n.current_gain, 0, accepted::most_gain)) return {"noise.current_gain", 0, "0 to 0.2"};
 
   const Tolerance& t = p.tolerance;
   if (outside(t.ocv_v, 0, 0.1)) return {"tolerance.ocv_v", 0, "0 to 0.1 V"};
-  if (outside(t.resistance_fraction, 0, accepted::most_resistance_error)) return {"tolerance.resistance_fraction", 0, "0 to 1"};
+  if (outside(t.resistance_fraction, 0, accepted::most_resistance_error))
+    return {"tolerance.resistance_fraction", 0, "0 to 1"};
   if (outside(t.initial_soc, 0, 1)) return {"tolerance.initial_soc", 0, "0 to 1"};
   if (outside(t.drift_v, 0, 0.1)) return {"tolerance.drift_v", 0, "0 to 0.1 V"};
   return {};

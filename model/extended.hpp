@@ -3,8 +3,8 @@
 //   Laws<S, M...>        the mechanisms of a cell known at compile time, all acting (firmware)
 //   ChosenLaws<S>        any of the catalogue, chosen at run time (host)
 //
-// Both call the same laws in the same order, that of model/catalogue.hpp: the same digits. What no law of a set touches costs nothing in
-// Laws and an `if` per mechanism in ChosenLaws.
+// Both call the same laws in the same order, that of model/catalogue.hpp: the same digits. What no law of a set touches
+// costs nothing in Laws and an `if` per mechanism in ChosenLaws.
 #pragma once
 
 #include <array>
@@ -40,8 +40,7 @@ struct LawFor {
   using type = typename M::template Law<S>;
 };
 template <class S, class M>
-  requires(std::same_as<S, FixedPoint> && requires { M::needs_fpu; })
-struct LawFor<S, M> {
+requires(std::same_as<S, FixedPoint>&& requires { M::needs_fpu; }) struct LawFor<S, M> {
   using type = NoLaw;
 };
 
@@ -52,7 +51,8 @@ struct Chosen<S, std::tuple<M...>> {
   using type = LawSet<S, std::optional<typename LawFor<S, M>::type>...>;
 };
 
-/// Laws that add to the voltage come before those whose states do something else: the filter's states are then the first ones.
+/// Laws that add to the voltage come before those whose states do something else: the filter's states are then the
+/// first ones.
 template <class... M>
 constexpr bool voltage_states_first(std::tuple<M...>*) {
   bool others = false, good = true;
@@ -76,18 +76,21 @@ using MechanismValues = std::array<Real, max_mechanism_parameters>;
 
 /// One mechanism as a cell file states it.
 struct MechanismSetting {
-  std::size_t index = 0;          ///< in the catalogue
+  std::size_t index = 0;  ///< in the catalogue
   MechanismValues<> value{};
   MechanismValues<> deviation{};  ///< standard deviations; 0: not known, or given
 };
 
-/// Place of the first parameter whose value is out of its bounds or whose deviation is none; the number of parameters: all are good.
+/// Place of the first parameter whose value is out of its bounds or whose deviation is none; the number of parameters:
+/// all are good.
 constexpr std::size_t first_fault(const MechanismSetting& setting, double capacity_ah) {
   const MechanismInfo& info = catalogue[setting.index];
   std::size_t k = 0;
   for (; k < info.parameters; ++k) {
     const double v = setting.value[k], deviation = setting.deviation[k];
-    if (!(v >= info.parameter[k].lower(capacity_ah) && v <= info.parameter[k].upper(capacity_ah)) || !(deviation >= 0 && deviation < 1e300)) break;
+    if (!(v >= info.parameter[k].lower(capacity_ah) && v <= info.parameter[k].upper(capacity_ah)) ||
+        !(deviation >= 0 && deviation < 1e300))
+      break;
   }
   return k;
 }
@@ -95,14 +98,16 @@ constexpr std::size_t first_fault(const MechanismSetting& setting, double capaci
 /// All parameters as a cell file means them that says nothing of them: no effect.
 constexpr MechanismSetting unsaid(std::size_t index, double capacity_ah) {
   MechanismSetting setting{index, {}, {}};
-  for (std::size_t k = 0; k < catalogue[index].parameters; ++k) setting.value[k] = catalogue[index].parameter[k].unsaid(capacity_ah);
+  for (std::size_t k = 0; k < catalogue[index].parameters; ++k)
+    setting.value[k] = catalogue[index].parameter[k].unsaid(capacity_ah);
   return setting;
 }
 
 namespace extended_detail {
 
 template <class S, class Real, std::size_t K>
-constexpr void choose_at(ChosenLaws<S>& laws, std::size_t index, const MechanismValues<Real>& values, double capacity_ah) {
+constexpr void choose_at(ChosenLaws<S>& laws, std::size_t index, const MechanismValues<Real>& values,
+                         double capacity_ah) {
   if constexpr (K < mechanism_count) {
     if (index != K) return choose_at<S, Real, K + 1>(laws, index, values, capacity_ah);
     using M = std::tuple_element_t<K, Catalogue>;
@@ -137,11 +142,17 @@ TablePoint<S> look_up_dual(const Cell<double, max_intervals>& cell, const S& soc
     v.v = soc.v * (delta * p.per_width);
     return v;
   };
-  return {.per_width = S(p.per_width), .ocv_v = line(p.ocv_v, p.ocv_delta_v), .ocv_delta_v = S(p.ocv_delta_v),
-          .r0_ohm = line(p.r0_ohm, p.r0_delta_ohm), .r0_delta_ohm = S(p.r0_delta_ohm),
-          .r1_ohm = line(p.r1_ohm, p.r1_delta_ohm), .r1_delta_ohm = S(p.r1_delta_ohm),
-          .c1_f = line(p.c1_f, p.c1_delta_f), .c1_delta_f = S(p.c1_delta_f),
-          .gap = line(p.gap, p.gap_delta), .gap_delta = S(p.gap_delta)};
+  return {.per_width = S(p.per_width),
+          .ocv_v = line(p.ocv_v, p.ocv_delta_v),
+          .ocv_delta_v = S(p.ocv_delta_v),
+          .r0_ohm = line(p.r0_ohm, p.r0_delta_ohm),
+          .r0_delta_ohm = S(p.r0_delta_ohm),
+          .r1_ohm = line(p.r1_ohm, p.r1_delta_ohm),
+          .r1_delta_ohm = S(p.r1_delta_ohm),
+          .c1_f = line(p.c1_f, p.c1_delta_f),
+          .c1_delta_f = S(p.c1_delta_f),
+          .gap = line(p.gap, p.gap_delta),
+          .gap_delta = S(p.gap_delta)};
 }
 
 /// A cell on its way through a recording, open loop. S: double or a dual number.
@@ -153,8 +164,9 @@ class Course {
   Course(const Tables& cell, double capacity_ah, const ChosenLaws<S>& laws, const S& initial_soc)
       : cell_(cell), per_capacity_(1 / (3'600 * capacity_ah)), laws_(laws), soc_(initial_soc), x_(laws_.initial()) {}
 
-  /// One row: duration_s since the row before (0: the state stays), current that was read (of a channel that is not late), the
-  /// temperature (NaN: none). adjust(TablePoint&, soc): what else changes the tables. Returns the voltage that would be read.
+  /// One row: duration_s since the row before (0: the state stays), current that was read (of a channel that is not
+  /// late), the temperature (NaN: none). adjust(TablePoint&, soc): what else changes the tables. Returns the voltage
+  /// that would be read.
   template <class Adjust>
   S step(double time_s, double duration_s, const S& read_a, const S& read_c, Adjust&& adjust) {
     laws_.at(time_s);
@@ -189,17 +201,23 @@ class Course {
 
  private:
   static double value(const S& s) {
-    if constexpr (Dual<S>) return s.a;
-    else return s;
+    if constexpr (Dual<S>)
+      return s.a;
+    else
+      return s;
   }
   /// In value, or as a function of what is sought.
   static bool differs(const S& a, const S& b) {
-    if constexpr (Dual<S>) return a.a != b.a || a.v != b.v;
-    else return a != b;
+    if constexpr (Dual<S>)
+      return a.a != b.a || a.v != b.v;
+    else
+      return a != b;
   }
   TablePoint<S> tables_at(const S& soc) {
-    if constexpr (Dual<S>) return look_up_dual(cell_, soc, interval_);
-    else return look_up(cell_, soc, interval_);
+    if constexpr (Dual<S>)
+      return look_up_dual(cell_, soc, interval_);
+    else
+      return look_up(cell_, soc, interval_);
   }
   void hold() {
     if (value(soc_) < -0.25) soc_ = S(-0.25);

@@ -1,4 +1,5 @@
-// A set of mechanisms' laws, called one after the other. What no law of the set touches costs nothing; what is optional costs an `if`.
+// A set of mechanisms' laws, called one after the other. What no law of the set touches costs nothing; what is optional
+// costs an `if`.
 //
 //   LawSet<S, Law...>                   laws that all act
 //   LawSet<S, std::optional<Law>...>    laws of which some act
@@ -30,17 +31,22 @@ struct LawIn<std::optional<Law>> {
 
 template <class Law>
 constexpr bool adds_voltage() {
-  if constexpr (requires { Law::voltage_states; }) return Law::voltage_states;
-  else return false;
+  if constexpr (requires { Law::voltage_states; })
+    return Law::voltage_states;
+  else
+    return false;
 }
 template <class Law, class S>
 constexpr bool reads_elsewhere() {
-  return requires(Law law, Soc<S> soc) { law.read_at(soc); } || requires(Law law) { law.ahead_per_v(); };
+  return requires(Law law, Soc<S> soc) { law.read_at(soc); }
+  || requires(Law law) { law.ahead_per_v(); };
 }
 template <class Law>
 constexpr std::size_t states_of() {
-  if constexpr (requires { Law::states; }) return Law::states;
-  else return 0;
+  if constexpr (requires { Law::states; })
+    return Law::states;
+  else
+    return 0;
 }
 
 template <class Law>
@@ -53,16 +59,17 @@ constexpr std::size_t voltage_states_of() {
 template <class S, class... Slots>
 class LawSet {
  public:
-  static constexpr std::size_t most_states = (std::size_t{0} + ... + extended_detail::states_of<typename extended_detail::LawIn<Slots>::type>());
-  static constexpr std::size_t most_voltage_states = (std::size_t{0} + ... + extended_detail::voltage_states_of<typename extended_detail::LawIn<Slots>::type>());
-  static constexpr bool reads_elsewhere = (false || ... || extended_detail::reads_elsewhere<typename extended_detail::LawIn<Slots>::type, S>());
+  static constexpr std::size_t most_states =
+      (std::size_t{0} + ... + extended_detail::states_of<typename extended_detail::LawIn<Slots>::type>());
+  static constexpr std::size_t most_voltage_states =
+      (std::size_t{0} + ... + extended_detail::voltage_states_of<typename extended_detail::LawIn<Slots>::type>());
+  static constexpr bool reads_elsewhere =
+      (false || ... || extended_detail::reads_elsewhere<typename extended_detail::LawIn<Slots>::type, S>());
   using States = std::array<Voltage<S>, most_states>;
   using Relaxations = std::array<Relaxation<S>, most_states>;
 
   constexpr LawSet() = default;
-  constexpr explicit LawSet(const Slots&... slots)
-    requires(sizeof...(Slots) > 0)
-      : slots_(slots...) {}
+  constexpr explicit LawSet(const Slots&... slots) requires(sizeof...(Slots) > 0) : slots_(slots...) {}
 
   template <std::size_t K>
   constexpr auto& slot() {
@@ -134,18 +141,25 @@ class LawSet {
   /// Whether any law makes another current of the one that is read, on its way to the charge.
   constexpr bool changes_charge() const {
     bool any = false;
-    each([&](const auto& law) { any = any || requires(Current<S> a) { law.true_current(a); } || requires(Current<S> a, Drive<S> d) { law.counted(a, d); }; });
+    each([&](const auto& law) {
+      any = any || requires(Current<S> a) { law.true_current(a); }
+      || requires(Current<S> a, Drive<S> d) { law.counted(a, d); };
+    });
     return any;
   }
   /// Else the resistances are those of the cell file's temperature, whatever it is.
   constexpr bool resistances_follow_temperature() const {
     bool any = false;
-    each([&](const auto& law) { any = any || requires { law.resistances_follow_temperature; }; });
+    each([&](const auto& law) {
+      any = any || requires { law.resistances_follow_temperature; };
+    });
     return any;
   }
   constexpr bool changes_reading() const {
     bool any = false;
-    each([&](const auto& law) { any = any || requires(Voltage<S> v) { law.reading(v); }; });
+    each([&](const auto& law) {
+      any = any || requires(Voltage<S> v) { law.reading(v); };
+    });
     return any;
   }
 
@@ -219,10 +233,14 @@ class LawSet {
     }
   }
   template <class Law>
-  static constexpr Relaxation<S> settle(const Law& law, std::size_t i, const TablePoint<S>& at, const Drive<S>& drive, const Voltage<S>* x) {
-    if constexpr (requires { law.settle(i, at, drive, x); }) return law.settle(i, at, drive, x);
-    else if constexpr (extended_detail::states_of<Law>() > 0) return law.settle(i, at, drive);
-    else return {};
+  static constexpr Relaxation<S> settle(const Law& law, std::size_t i, const TablePoint<S>& at, const Drive<S>& drive,
+                                        const Voltage<S>* x) {
+    if constexpr (requires { law.settle(i, at, drive, x); })
+      return law.settle(i, at, drive, x);
+    else if constexpr (extended_detail::states_of<Law>() > 0)
+      return law.settle(i, at, drive);
+    else
+      return {};
   }
   template <class Law>
   static constexpr std::size_t states_of(const Law&) {

@@ -3,28 +3,29 @@
 //   d v_rc / dt = -v_rc / (R1 C1) + I / C1        d soc / dt = I / (3600 C_n)        V = OCV(soc) + v_rc + R0 I
 //
 // Current > 0 charges; v_rc > 0 while charging (v_rc = -x1 of Eq. 9; the sign of R0 u in Eq. 3 and 5 is an erratum).
-// One step is exact for a current that is constant over it (zero-order hold), with R1 and C1 taken at the soc after the step:
+// One step is exact for a current that is constant over it (zero-order hold), with R1 and C1 taken at the soc after the
+// step:
 //
 //   p = 1 - exp(-dt / (R1 C1))        v_rc' = v_rc + p (R1 I - v_rc)
 //
-// A model gives the filter: `states` (soc is always the last), how the states before soc advance, the voltage, and the derivatives
-// of both. A state may depend on itself and on later states only, so that the transition matrix is upper triangular; a second RC
-// or a hysteresis voltage comes before soc, a sensor offset would come after.
+// A model gives the filter: `states` (soc is always the last), how the states before soc advance, the voltage, and the
+// derivatives of both. A state may depend on itself and on later states only, so that the transition matrix is upper
+// triangular; a second RC or a hysteresis voltage comes before soc, a sensor offset would come after.
 #pragma once
 
 #include <array>
 #include <cstddef>
 
+#include "arithmetic/exponential.hpp"
 #include "model/cell.hpp"
-#include "model/exponential.hpp"
 
 namespace bms::model {
 
 /// What acts on the cell during one step.
 template <class S>
 struct Drive {
-  Current<S> current_a;      ///< mean over the step, > 0 charges
-  TimeStep<S> duration_s;    ///< > 0
+  Current<S> current_a;                               ///< mean over the step, > 0 charges
+  TimeStep<S> duration_s;                             ///< > 0
   Temperature<S> temperature_c = Temperature<S>(25);  ///< of the cell; read by mechanisms only
 };
 
@@ -38,9 +39,9 @@ struct OneRc {
 
   /// How far the RC branch settles within a step, for the tables at one soc.
   struct Settling {
-    Rate<S> rate_per_s;    ///< 1 / (R1 C1)
-    Fraction<S> settled;   ///< p
-    Fraction<S> by_rate;   ///< dp / d ln rate = x exp(-x) of x = duration / (R1 C1)
+    Rate<S> rate_per_s;   ///< 1 / (R1 C1)
+    Fraction<S> settled;  ///< p
+    Fraction<S> by_rate;  ///< dp / d ln rate = x exp(-x) of x = duration / (R1 C1)
   };
 
   static constexpr Settling settling(const TablePoint<S>& at, const TimeStep<S>& duration_s) {
@@ -48,12 +49,14 @@ struct OneRc {
     const Rate<S> rate_per_s = ratio<Rate<S>>(Duration<S>(1), tau_s);
     const Fraction<S> settled = settled_in<S>(duration_s, rate_per_s), remaining = Fraction<S>(1) - settled;
     const Fraction<S> x = duration_s * rate_per_s;
-    if (long_step<S>(x)) [[unlikely]] return {rate_per_s, settled, remaining * Current<S>(Exponent<S>(duration_s * rate_per_s))};
+    if (long_step<S>(x)) [[unlikely]]
+      return {rate_per_s, settled, remaining * Current<S>(Exponent<S>(duration_s * rate_per_s))};
     return {rate_per_s, settled, remaining * x};
   }
 
   /// v_rc at the start of the step; `at` and `settling` belong to the soc at its end.
-  static constexpr Polarisation advance(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
+  static constexpr Polarisation advance(const Polarisation& x, const TablePoint<S>& at, const Settling& settling,
+                                        const Drive<S>& drive) {
     return {Voltage<S>(x[0] + Voltage<S>(settling.settled * gap_v(x, at, drive)))};
   }
 
@@ -62,21 +65,26 @@ struct OneRc {
     return at.ocv_v + x[0] + Voltage<S>(at.r0_ohm * drive.current_a);
   }
 
-  /// d (state after) / d (state before), upper triangular. The derivative by soc runs through R1, C1 and dp/dx = exp(-x).
-  static constexpr Transition transition(const Polarisation& x, const TablePoint<S>& at, const Settling& settling, const Drive<S>& drive) {
+  /// d (state after) / d (state before), upper triangular. The derivative by soc runs through R1, C1 and dp/dx =
+  /// exp(-x).
+  static constexpr Transition transition(const Polarisation& x, const TablePoint<S>& at, const Settling& settling,
+                                         const Drive<S>& drive) {
     const Fraction<S> remaining = Fraction<S>(1) - settling.settled;
     // over one interval: tau, p, and what v_rc goes to
     const Duration<S> tau_delta_s = Duration<S>(at.r1_delta_ohm * at.c1_f) + Duration<S>(at.r1_ohm * at.c1_delta_f);
     const Ratio tau_change = tau_delta_s * settling.rate_per_s;
     const Ratio settled_delta = settling.by_rate * tau_change;
     const Voltage<S> target_delta_v = at.r1_delta_ohm * drive.current_a;
-    const Voltage<S> delta_v = Voltage<S>(settling.settled * target_delta_v) - Voltage<S>(settled_delta * gap_v(x, at, drive));
+    const Voltage<S> delta_v =
+        Voltage<S>(settling.settled * target_delta_v) - Voltage<S>(settled_delta * gap_v(x, at, drive));
     return {{{Coupling<S>(remaining), Coupling<S>(delta_v * at.per_width)}, {Coupling<S>(0), Coupling<S>(1)}}};
   }
 
   /// d voltage / d state, at the state after the step.
   static constexpr Sensitivity sensitivity(const TablePoint<S>& at, const Drive<S>& drive) {
-    return {VoltagePerSoc<S>(1), VoltagePerSoc<S>(Voltage<S>(at.ocv_delta_v + Voltage<S>(at.r0_delta_ohm * drive.current_a)) * at.per_width)};
+    return {
+        VoltagePerSoc<S>(1),
+        VoltagePerSoc<S>(Voltage<S>(at.ocv_delta_v + Voltage<S>(at.r0_delta_ohm * drive.current_a)) * at.per_width)};
   }
 
  private:

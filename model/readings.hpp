@@ -1,13 +1,16 @@
-// The readings of a recording with what needs the readings around them undone: a current that comes late, a temperature that lags.
+// The readings of a recording with what needs the readings around them undone: a current that comes late, a temperature
+// that lags.
 //
-//   current      whole steps of the delay: the mean of what was read over (t[k - 1] + delay, t[k] + delay], the charge read by then
+//   current      whole steps of the delay: the mean of what was read over (t[k - 1] + delay, t[k] + delay], the charge
+//   read by then
 //                interpolated linearly; before the first row and after the last the current is taken to go on.
-//                What is left, a part p of a step: a late reading is (1 - p) of its own interval's current and p of that before, an
-//                early one of that after; solved row by row. (Reading between the rows instead would smear an edge twice.)
+//                What is left, a part p of a step: a late reading is (1 - p) of its own interval's current and p of
+//                that before, an early one of that after; solved row by row. (Reading between the rows instead would
+//                smear an edge twice.)
 //   temperature  T + lag dT/dt, dT/dt the least-squares slope over half a minute to either side
 //
-// A missing current (NaN) is the last one known, 0 at first; a missing temperature the last one known, 25 degrees C at first.
-// Undone by laws instead, one reading at a time: offset, gain, clipping (model/extended.hpp).
+// A missing current (NaN) is the last one known, 0 at first; a missing temperature the last one known, 25 degrees C at
+// first. Undone by laws instead, one reading at a time: offset, gain, clipping (model/extended.hpp).
 //
 // S: double or a dual number, of the delay and the lag. Host only: it holds copies of the columns.
 #pragma once
@@ -18,23 +21,32 @@
 #include <span>
 #include <vector>
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 
 namespace bms::model {
+
+using namespace arithmetic;  // physics is written in its number types and functions
 
 template <class S>
 class CorrectedReadings {
  public:
   /// Columns of equal length, time ascending; temperature_c may be empty. time_s must outlive this.
-  CorrectedReadings(std::span<const double> time_s, std::span<const double> current_a, std::span<const double> temperature_c, S delay_s, S lag_s)
-      : time_s_(time_s), current_a_(known(current_a, 0)), delay_s_(delay_s), lag_s_(lag_s), late_(acts(delay_s)), lagging_(acts(lag_s)) {
-    temperature_c_ = temperature_c.empty() ? std::vector<double>(time_s.size(), usual_c) : known(temperature_c, usual_c);
+  CorrectedReadings(std::span<const double> time_s, std::span<const double> current_a,
+                    std::span<const double> temperature_c, S delay_s, S lag_s)
+      : time_s_(time_s),
+        current_a_(known(current_a, 0)),
+        delay_s_(delay_s),
+        lag_s_(lag_s),
+        late_(acts(delay_s)),
+        lagging_(acts(lag_s)) {
+    temperature_c_ =
+        temperature_c.empty() ? std::vector<double>(time_s.size(), usual_c) : known(temperature_c, usual_c);
     if (late_) undo_delay();
     if (lagging_) slopes();
   }
 
-  /// What flowed in the interval that ends at row k; of the first row, which has none, and of a row that is not later than the one
-  /// before: what is read at that moment.
+  /// What flowed in the interval that ends at row k; of the first row, which has none, and of a row that is not later
+  /// than the one before: what is read at that moment.
   S current(std::size_t k) const { return late_ ? true_a_[k] : S(current_a_[k]); }
 
   S temperature(std::size_t k) const {
@@ -48,26 +60,35 @@ class CorrectedReadings {
   static constexpr double most_part = 0.45;  ///< of a step; at half a step nothing tells the two rows apart
 
   static double value(const S& s) {
-    if constexpr (Dual<S>) return s.a;
-    else return s;
+    if constexpr (Dual<S>)
+      return s.a;
+    else
+      return s;
   }
   static S with_value(S s, double v) {
-    if constexpr (Dual<S>) s.a = v;
-    else s = v;
+    if constexpr (Dual<S>)
+      s.a = v;
+    else
+      s = v;
     return s;
   }
   /// Something to undo, or to differentiate by.
   static bool acts(const S& s) {
-    if constexpr (!Dual<S>) return s != 0;
-    else if constexpr (requires { s.v.isZero(0.0); }) return s.a != 0 || !s.v.isZero(0.0);
-    else return true;
+    if constexpr (!Dual<S>)
+      return s != 0;
+    else if constexpr (requires { s.v.isZero(0.0); })
+      return s.a != 0 || !s.v.isZero(0.0);
+    else
+      return true;
   }
   static std::vector<double> known(std::span<const double> column, double at_first) {
     std::vector<double> all(column.begin(), column.end());
     double last = at_first;
     for (double& v : all) {
-      if (v == v) last = v;
-      else v = last;
+      if (v == v)
+        last = v;
+      else
+        v = last;
     }
     return all;
   }
@@ -109,7 +130,8 @@ class CorrectedReadings {
     } else {
       // nothing but whole steps: not a digit differs; the derivative is the mean of both sides'
       for (std::size_t k = 1; k + 1 < rows; ++k) {
-        if (duration_s(k) > 0) true_a_[k] = with_value(S(part(k) * ((moved_a[k + 1] - moved_a[k - 1]) / 2)), moved_a[k]);
+        if (duration_s(k) > 0)
+          true_a_[k] = with_value(S(part(k) * ((moved_a[k + 1] - moved_a[k - 1]) / 2)), moved_a[k]);
       }
     }
   }
@@ -126,7 +148,8 @@ class CorrectedReadings {
   std::vector<double> moved_by(double delay_s) const {
     if (delay_s == 0) return current_a_;
     std::vector<double> charge_as(time_s_.size(), 0), moved_a = current_a_;
-    for (std::size_t k = 1; k < time_s_.size(); ++k) charge_as[k] = charge_as[k - 1] + current_a_[k] * (time_s_[k] - time_s_[k - 1]);
+    for (std::size_t k = 1; k < time_s_.size(); ++k)
+      charge_as[k] = charge_as[k - 1] + current_a_[k] * (time_s_[k] - time_s_[k - 1]);
     const auto charge_by = [&](std::size_t k) {
       const double moved_s = time_s_[k] + delay_s;
       const std::size_t j = row_at(moved_s, k);
@@ -134,7 +157,8 @@ class CorrectedReadings {
     };
     for (std::size_t k = 0; k < time_s_.size(); ++k) {
       const double duration_s = k == 0 ? 0 : time_s_[k] - time_s_[k - 1];
-      moved_a[k] = duration_s > 0 ? (charge_by(k) - charge_by(k - 1)) / duration_s : current_a_[row_at(time_s_[k] + delay_s, k)];
+      moved_a[k] =
+          duration_s > 0 ? (charge_by(k) - charge_by(k - 1)) / duration_s : current_a_[row_at(time_s_[k] + delay_s, k)];
     }
     return moved_a;
   }

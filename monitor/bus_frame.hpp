@@ -17,23 +17,24 @@ enum class FrameKind : std::uint8_t {
 };
 
 struct BusFrame {
-  std::int64_t time_us = 0;      ///< since 1970, or since whatever a log counts from
+  std::int64_t time_us = 0;  ///< since 1970, or since whatever a log counts from
   FrameKind kind = FrameKind::standard;
-  bool long_id = false;          ///< 29 bits
-  std::uint8_t length = 0;       ///< bytes of data in use, at most 8, FD at most 64; of a remote request the length asked for
-  std::uint8_t fd_flags = 0;     ///< as candump writes them
+  bool long_id = false;  ///< 29 bits
+  std::uint8_t length =
+      0;  ///< bytes of data in use, at most 8, FD at most 64; of a remote request the length asked for
+  std::uint8_t fd_flags = 0;  ///< as candump writes them
   std::uint32_t id = 0;
   std::array<std::uint8_t, 64> data{};
 };
 
 /// The part that decoders look at; frame.kind must be standard or extended.
-constexpr hal::CanFrame classic(const BusFrame& frame) {
-  hal::CanFrame out{frame.id, frame.length, {}, frame.long_id};
+constexpr can::Frame classic(const BusFrame& frame) {
+  can::Frame out{frame.id, frame.length, {}, frame.long_id};
   for (std::size_t k = 0; k < out.data.size(); ++k) out.data[k] = frame.data[k];
   return out;
 }
 
-constexpr BusFrame on_bus(const hal::CanFrame& frame, std::int64_t time_us) {
+constexpr BusFrame on_bus(const can::Frame& frame, std::int64_t time_us) {
   BusFrame out;
   out.time_us = time_us;
   out.kind = frame.long_id ? FrameKind::extended : FrameKind::standard;

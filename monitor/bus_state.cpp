@@ -5,7 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"    // generated from can/greybox_bms.dbc
 #include "j1939_messages.hpp"  // generated from can/j1939_profile.dbc
 
 namespace bms::monitor {
@@ -32,35 +32,53 @@ int digits_of(double step) {
   return digits;
 }
 
-/// What the frame's raw value is in decimals: 54.302, not the product of two floats. A float of at most 24 bits holds that raw value exactly, and
-/// its one rounding is less than half of a step.
+/// What the frame's raw value is in decimals: 54.302, not the product of two floats. A float of at most 24 bits holds
+/// that raw value exactly, and its one rounding is less than half of a step.
 double exact(const SignalInfo& signal, double value) {
   const bool counts = signal.integer || signal.raw;
-  if (counts && signal.layout.has_invalid && value == (signal.layout.is_signed ? signal.layout.invalid : static_cast<double>(static_cast<std::uint32_t>(signal.layout.invalid)))) return std::numeric_limits<double>::quiet_NaN();
+  if (counts && signal.layout.has_invalid &&
+      value == (signal.layout.is_signed ? signal.layout.invalid
+                                        : static_cast<double>(static_cast<std::uint32_t>(signal.layout.invalid))))
+    return std::numeric_limits<double>::quiet_NaN();
   if (signal.integer || !std::isfinite(value)) return value;
-  const double raw = signal.raw ? value : std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
+  const double raw =
+      signal.raw
+          ? value
+          : std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
   const double scale = std::pow(10, signal.digits);
   return std::round((raw * signal.factor + signal.offset) * scale) / scale;
 }
 
 template <class Message>
 constexpr std::uint16_t data_id_of() {
-  if constexpr (requires { Message::data_id; }) return Message::data_id;
-  else return 0;
+  if constexpr (requires { Message::data_id; })
+    return Message::data_id;
+  else
+    return 0;
 }
 
 template <class Message>
 MessageInfo info_of() {
-  MessageInfo info{Message::name, Message::id, sizeof(Message::id) > 2, data_id_of<Message>(), Message::cycle_us, {}, [](const hal::CanFrame& frame, std::span<double> values) {
+  MessageInfo info{Message::name,
+                   Message::id,
+                   sizeof(Message::id) > 2,
+                   data_id_of<Message>(),
+                   Message::cycle_us,
+                   {},
+                   [](const can::Frame& frame, std::span<double> values) {
                      Message message = Message::of(frame);
                      std::size_t k = 0;
-                     message.each([&](const char*, const char*, const auto& value, const can::SignalLayout&) { values[k++] = static_cast<double>(value); });
+                     message.each([&](const char*, const char*, const auto& value, const can::SignalLayout&) {
+                       values[k++] = static_cast<double>(value);
+                     });
                    }};
   Message message;
   message.each([&](const char* name, const char* unit, const auto& value, const can::SignalLayout& layout) {
     const double factor = decimal(layout.factor), offset = decimal(layout.offset);
-    const bool counts = std::is_integral_v<std::remove_cvref_t<decltype(value)>>, as_they_are = factor == 1 && offset == 0;
-    info.signals.push_back({name, unit, "", counts && as_they_are, counts && !as_they_are, layout, {}, factor, offset, digits_of(factor)});
+    const bool counts = std::is_integral_v<std::remove_cvref_t<decltype(value)>>,
+               as_they_are = factor == 1 && offset == 0;
+    info.signals.push_back(
+        {name, unit, "", counts && as_they_are, counts && !as_they_are, layout, {}, factor, offset, digits_of(factor)});
   });
   std::size_t k = 0;
   Message::each_in_words([&](const char*, const char* comment, std::span<const can::ValueName> names) {
@@ -79,15 +97,18 @@ std::vector<MessageInfo> infos_of(std::tuple<Message...>*, std::tuple<OfProfile.
 }  // namespace
 
 const std::vector<MessageInfo>& messages() {
-  static const std::vector<MessageInfo> all = infos_of(static_cast<can::Messages*>(nullptr), static_cast<can::j1939::Messages*>(nullptr));
+  static const std::vector<MessageInfo> all =
+      infos_of(static_cast<can::Messages*>(nullptr), static_cast<can::j1939::Messages*>(nullptr));
   return all;
 }
 
 BusState::BusState() {
   of_short_id_.fill(none);
   for (std::size_t k = 0; k < messages().size(); ++k) {
-    if (messages()[k].long_id) of_long_ids_.push_back(k);
-    else of_short_id_[messages()[k].id & 0x7FFU] = static_cast<std::uint8_t>(k);
+    if (messages()[k].long_id)
+      of_long_ids_.push_back(k);
+    else
+      of_short_id_[messages()[k].id & 0x7FFU] = static_cast<std::uint8_t>(k);
     states_.emplace_back().values.assign(messages()[k].signals.size(), std::numeric_limits<double>::quiet_NaN());
   }
 }
@@ -100,14 +121,19 @@ std::size_t BusState::take(const BusFrame& frame) {
   last_us_ = std::max(last_us_, time_us);
   time_is(time_us);
   switch (frame.kind) {
-    case FrameKind::remote: ++remote_; return none_of_ours;
-    case FrameKind::fd: ++fd_; return none_of_ours;
+    case FrameKind::remote:
+      ++remote_;
+      return none_of_ours;
+    case FrameKind::fd:
+      ++fd_;
+      return none_of_ours;
     case FrameKind::error:
       ++errors_;
       error_classes_ |= frame.id;
       return none_of_ours;
     case FrameKind::extended:
-    case FrameKind::standard: break;
+    case FrameKind::standard:
+      break;
   }
   const std::size_t message = message_of(frame);
   if (message != none_of_ours) return take_ours(message, classic(frame), time_us) ? message : none_of_ours;
@@ -117,7 +143,8 @@ std::size_t BusState::take(const BusFrame& frame) {
 
 std::size_t BusState::message_of(const BusFrame& frame) const {
   if (frame.kind == FrameKind::extended) {
-    const auto found = std::find_if(of_long_ids_.begin(), of_long_ids_.end(), [&](std::size_t k) { return messages()[k].id == frame.id; });
+    const auto found = std::find_if(of_long_ids_.begin(), of_long_ids_.end(),
+                                    [&](std::size_t k) { return messages()[k].id == frame.id; });
     return found == of_long_ids_.end() ? states_.size() : *found;
   }
   const std::uint8_t message = of_short_id_[frame.id & 0x7FFU];
@@ -131,7 +158,7 @@ void BusState::clock_set_back(std::int64_t to_us) {
 }
 
 /// Counts what is wrong with a frame of a message.
-bool BusState::whole(const MessageInfo& info, MessageState& state, const hal::CanFrame& frame) const {
+bool BusState::whole(const MessageInfo& info, MessageState& state, const can::Frame& frame) const {
   if (frame.length != 8) {
     ++state.wrong_length;
     return false;
@@ -146,16 +173,18 @@ bool BusState::whole(const MessageInfo& info, MessageState& state, const hal::Ca
     ++state.repeated;
     return false;
   }
-  if (state.frames > 0) state.lost += static_cast<unsigned>(counter - state.counter + can::counters - 1) % can::counters;
+  if (state.frames > 0)
+    state.lost += static_cast<unsigned>(counter - state.counter + can::counters - 1) % can::counters;
   state.counter = counter;
   return true;
 }
 
-bool BusState::take_ours(std::size_t message, const hal::CanFrame& frame, std::int64_t time_us) {
+bool BusState::take_ours(std::size_t message, const can::Frame& frame, std::int64_t time_us) {
   const MessageInfo& info = messages()[message];
   MessageState& state = states_[message];
   if (!whole(info, state, frame)) return false;
-  if (const auto since_us = static_cast<double>(time_us - state.last_us); state.frames > 0 && since_us > 0) state.period_us += state.period_us > 0 ? smoothing * (since_us - state.period_us) : since_us;
+  if (const auto since_us = static_cast<double>(time_us - state.last_us); state.frames > 0 && since_us > 0)
+    state.period_us += state.period_us > 0 ? smoothing * (since_us - state.period_us) : since_us;
   ++good_;
   ++state.frames;
   state.last_us = time_us;
@@ -167,7 +196,8 @@ bool BusState::take_ours(std::size_t message, const hal::CanFrame& frame, std::i
 void BusState::take_unknown(const BusFrame& frame) {
   ++unknown_frames_;
   const auto end = unknown_.begin() + static_cast<std::ptrdiff_t>(unknown_count_);
-  const auto place = std::find_if(unknown_.begin(), end, [&](const Unknown& u) { return u.id == frame.id && u.long_id == frame.long_id; });
+  const auto place = std::find_if(unknown_.begin(), end,
+                                  [&](const Unknown& u) { return u.id == frame.id && u.long_id == frame.long_id; });
   if (place != end) {
     ++place->frames;
   } else if (unknown_count_ < unknown_.size()) {
@@ -179,17 +209,20 @@ void BusState::take_unknown(const BusFrame& frame) {
 
 double BusState::age_s(std::size_t message) const {
   const MessageState& state = states_[message];
-  return state.frames == 0 ? std::numeric_limits<double>::infinity() : 1e-6 * static_cast<double>(now_us_ - state.last_us);
+  return state.frames == 0 ? std::numeric_limits<double>::infinity()
+                           : 1e-6 * static_cast<double>(now_us_ - state.last_us);
 }
 
 bool BusState::stale(std::size_t message) const {
   const std::int64_t cycle_us = messages()[message].cycle_us;
-  return states_[message].frames == 0 || now_us_ - states_[message].last_us > (cycle_us > 0 ? 3 * cycle_us : stale_without_cycle_us);
+  return states_[message].frames == 0 ||
+         now_us_ - states_[message].last_us > (cycle_us > 0 ? 3 * cycle_us : stale_without_cycle_us);
 }
 
 std::size_t BusState::find(std::string_view message) {
   const auto& all = messages();
-  return static_cast<std::size_t>(std::find_if(all.begin(), all.end(), [&](const MessageInfo& m) { return message == m.name; }) - all.begin());
+  return static_cast<std::size_t>(
+      std::find_if(all.begin(), all.end(), [&](const MessageInfo& m) { return message == m.name; }) - all.begin());
 }
 
 Reading BusState::reading(std::string_view message, std::string_view signal) const {

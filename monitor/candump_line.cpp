@@ -102,7 +102,9 @@ bool parse_dump_line(std::string_view line, BusFrame& frame) {
   const std::string_view content = word(line), direction = word(line);
   if (!line.empty() || !(direction.empty() || direction == "R" || direction == "T")) return false;
   const std::size_t mark = content.find('#');
-  if (mark == std::string_view::npos || !parse_id(content.substr(0, mark), parsed) || !parse_content(content.substr(mark + 1), parsed)) return false;
+  if (mark == std::string_view::npos || !parse_id(content.substr(0, mark), parsed) ||
+      !parse_content(content.substr(mark + 1), parsed))
+    return false;
   frame = parsed;
   return true;
 }
@@ -110,13 +112,18 @@ bool parse_dump_line(std::string_view line, BusFrame& frame) {
 void append_dump_line(std::string& text, const BusFrame& frame, std::string_view interface) {
   auto out = std::back_inserter(text);
   fmt::format_to(out, "({:010}.{:06}) {} ", frame.time_us / 1'000'000, frame.time_us % 1'000'000, interface);
-  if (frame.kind == FrameKind::error) fmt::format_to(out, "{:08X}#", frame.id | error_flag);
-  else if (frame.long_id) fmt::format_to(out, "{:08X}#", frame.id);
-  else fmt::format_to(out, "{:03X}#", frame.id);
+  if (frame.kind == FrameKind::error)
+    fmt::format_to(out, "{:08X}#", frame.id | error_flag);
+  else if (frame.long_id)
+    fmt::format_to(out, "{:08X}#", frame.id);
+  else
+    fmt::format_to(out, "{:03X}#", frame.id);
   if (frame.kind == FrameKind::fd) fmt::format_to(out, "#{:X}", frame.fd_flags & 15U);
   if (frame.kind == FrameKind::remote) {
-    if (frame.length == 0) text += "R\n";
-    else fmt::format_to(out, "R{:X}\n", frame.length);
+    if (frame.length == 0)
+      text += "R\n";
+    else
+      fmt::format_to(out, "R{:X}\n", frame.length);
     return;
   }
   for (std::size_t k = 0; k < frame.length; ++k) fmt::format_to(out, "{:02X}", frame.data[k]);

@@ -35,8 +35,10 @@ class DumpLines {
       ended_ = too_long_ = false;
     }
     if (byte != '\n') {
-      if (text_.size() < longest_dump_line) text_ += byte;
-      else too_long_ = true;
+      if (text_.size() < longest_dump_line)
+        text_ += byte;
+      else
+        too_long_ = true;
       return false;
     }
     if (!text_.empty() && text_.back() == '\r') text_.pop_back();

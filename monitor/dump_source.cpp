@@ -19,7 +19,8 @@ namespace {
 
 constexpr std::uint64_t lines_without_a_frame = 1'000'000;  // that is no log
 
-/// Bytes of a file or pipe, unpacked if they begin as gzip does. Never waits longer than asked, so that a pipe can be followed.
+/// Bytes of a file or pipe, unpacked if they begin as gzip does. Never waits longer than asked, so that a pipe can be
+/// followed.
 class Unpacked {
  public:
   explicit Unpacked(int fd) : fd_(fd) {}
@@ -56,7 +57,8 @@ class Unpacked {
     } else if (result != Z_BUF_ERROR) {
       state_ = complete_ ? State::ended : State::broken;  // what follows the end of one and is none is padding
     }
-    if (eof_ && inflate_.avail_in == 0 && inflate_.avail_out != 0 && state_ == State::open) state_ = complete_ ? State::ended : State::broken;
+    if (eof_ && inflate_.avail_in == 0 && inflate_.avail_out != 0 && state_ == State::open)
+      state_ = complete_ ? State::ended : State::broken;
     return room.size() - inflate_.avail_out;
   }
 
@@ -137,7 +139,9 @@ class Dump : public FrameSource {
     return taken;
   }
   [[noreturn]] void refuse() const {
-    throw SourceRefused(path_, 1, "no frame in " + std::to_string(count_) + " lines, expected a log of candump -L, as it is or compressed by gzip");
+    throw SourceRefused(path_, 1,
+                        "no frame in " + std::to_string(count_) +
+                            " lines, expected a log of candump -L, as it is or compressed by gzip");
   }
 
   std::string path_;
@@ -153,8 +157,10 @@ class Dump : public FrameSource {
 
 std::unique_ptr<FrameSource> open_dump(const std::string& path) {
   const int fd = path == "-" ? dup(0) : open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) throw SourceRefused(path, 1, "cannot be read, expected a log of candump -L (" + std::generic_category().message(errno) + ")");
-  struct stat status{};
+  if (fd < 0)
+    throw SourceRefused(
+        path, 1, "cannot be read, expected a log of candump -L (" + std::generic_category().message(errno) + ")");
+  struct stat status {};
   if (fstat(fd, &status) != 0 || S_ISDIR(status.st_mode)) {
     close(fd);
     throw SourceRefused(path, 1, "a folder, expected a log of candump -L");

@@ -1,7 +1,8 @@
 // Where frames come from, behind one small interface:
 //
-//   can0, vcan0, ...        SocketCAN: raw socket, kernel time stamps, error frames, the kernel's count of what it had to drop
-//   slcan:/dev/ttyACM0      a serial adapter or a pseudo-terminal, by hal/slcan/codec.hpp: set to 500 kbit/s (S6), opened (O), closed at the end (C);
+//   can0, vcan0, ...        SocketCAN: raw socket, kernel time stamps, error frames, the kernel's count of what it had
+//   to drop slcan:/dev/ttyACM0      a serial adapter or a pseudo-terminal, by hal/slcan/codec.hpp: set to 500 kbit/s
+//   (S6), opened (O), closed at the end (C);
 //                           921,600 baud where the line has a rate. Time is when the frame was read.
 //   file:DUMP.log           candump -L, maybe compressed by gzip; file:- is standard input. Time is the log's.
 //
@@ -20,7 +21,8 @@ namespace bms::monitor {
 
 /// A source that is not there, or not what it should be; what() says what was expected. Line 0: none.
 struct SourceRefused : std::runtime_error {
-  SourceRefused(const std::string& name, std::size_t at, const std::string& what) : std::runtime_error(what), source(name), line(at) {}
+  SourceRefused(const std::string& name, std::size_t at, const std::string& what)
+      : std::runtime_error(what), source(name), line(at) {}
   std::string source;
   std::size_t line;
 };
@@ -29,7 +31,8 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  /// Frames that are there, at most room.size(); waits up to wait_ms for the first. 0: none in that time, a signal came, or ended().
+  /// Frames that are there, at most room.size(); waits up to wait_ms for the first. 0: none in that time, a signal
+  /// came, or ended().
   virtual std::size_t read(std::span<BusFrame> room, int wait_ms) = 0;
   /// Nothing will come any more: end of file, adapter unplugged.
   virtual bool ended() const = 0;

@@ -1,4 +1,5 @@
-// What the live page plots: the last 7,200 points, half a second apart at least (an hour, two at one sample a second). Fixed memory.
+// What the live page plots: the last 7,200 points, half a second apart at least (an hour, two at one sample a second).
+// Fixed memory.
 #pragma once
 
 #include <array>
@@ -13,7 +14,8 @@ namespace bms::monitor {
 struct HistoryPoint {
   static constexpr std::size_t most_cells = 32;
   double time_s = 0;  ///< since the first frame
-  float soc_percent = nothing, soc_sigma_percent = nothing, current_a = nothing, voltage_v = nothing, temperature_c = nothing;
+  float soc_percent = nothing, soc_sigma_percent = nothing, current_a = nothing, voltage_v = nothing,
+        temperature_c = nothing;
   std::uint8_t cell_count = 0;
   std::array<float, most_cells> cells_v{};
 
@@ -29,10 +31,14 @@ class History {
 
   History() { points_.reserve(capacity); }
   /// Whether a point of that time is wanted: later than the last by the least gap, or earlier (a clock was set).
-  bool wants(std::int64_t time_us) const { return count_ == 0 || time_us - last_us_ >= least_gap_us || time_us < last_us_; }
+  bool wants(std::int64_t time_us) const {
+    return count_ == 0 || time_us - last_us_ >= least_gap_us || time_us < last_us_;
+  }
   void add(const HistoryPoint& point, std::int64_t time_us) {
-    if (points_.size() < capacity) points_.push_back(point);
-    else points_[count_ % capacity] = point;
+    if (points_.size() < capacity)
+      points_.push_back(point);
+    else
+      points_[count_ % capacity] = point;
     ++count_;
     last_us_ = time_us;
   }

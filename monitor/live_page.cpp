@@ -25,10 +25,13 @@ void append(std::string& text, const HistoryPoint& p) {
   auto out = std::back_inserter(text);
   fmt::format_to(out, "[{:.3f}", p.time_s);
   const auto field = [&](float value) {
-    if (std::isfinite(value)) fmt::format_to(out, ",{}", value);
-    else text += ",null";
+    if (std::isfinite(value))
+      fmt::format_to(out, ",{}", value);
+    else
+      text += ",null";
   };
-  for (const float value : {p.soc_percent, 2 * p.soc_sigma_percent, p.current_a, p.voltage_v, p.temperature_c}) field(value);
+  for (const float value : {p.soc_percent, 2 * p.soc_sigma_percent, p.current_a, p.voltage_v, p.temperature_c})
+    field(value);
   for (std::size_t k = 0; k < p.cell_count; ++k) field(p.cells_v[k]);
   text += ']';
 }
@@ -78,18 +81,25 @@ struct LivePage::Server {
     return true;
   }
 
-  bool ours(const std::string& host) const { return host == fmt::format("127.0.0.1:{}", port) || host == fmt::format("localhost:{}", port); }
+  bool ours(const std::string& host) const {
+    return host == fmt::format("127.0.0.1:{}", port) || host == fmt::format("localhost:{}", port);
+  }
 
   /// True: answered here.
   bool refused(const httplib::Request& request, httplib::Response& response) const {
-    response.set_header("Content-Security-Policy", "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response.set_header("Content-Security-Policy",
+                        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
+                        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
     response.set_header("Cross-Origin-Resource-Policy", "same-origin");
     response.set_header("X-Content-Type-Options", "nosniff");
     response.set_header("Referrer-Policy", "no-referrer");
     response.set_header("Cache-Control", "no-store");
-    if (!ours(request.get_header_value("Host"))) response.status = 403;
-    else if (request.method != "GET") response.status = 405;
-    else return false;
+    if (!ours(request.get_header_value("Host")))
+      response.status = 403;
+    else if (request.method != "GET")
+      response.status = 405;
+    else
+      return false;
     return true;
   }
 
@@ -117,19 +127,27 @@ struct LivePage::Server {
 LivePage::LivePage(std::string html, int port) : server_(std::make_unique<Server>()) {
   Server& s = *server_;
   s.html = std::move(html);
-  s.http.new_task_queue = [] { return new httplib::ThreadPool(most_streams + 2); };  // NOLINT(cppcoreguidelines-owning-memory): the server takes it
+  s.http.new_task_queue = [] {
+    return new httplib::ThreadPool(most_streams + 2);
+  };  // NOLINT(cppcoreguidelines-owning-memory): the server takes it
   s.http.set_socket_options([](socket_t socket) {
     const int on = 1;
-    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);  // not SO_REUSEPORT: a port that is taken must be seen to be
+    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on,
+               sizeof on);  // not SO_REUSEPORT: a port that is taken must be seen to be
   });
   s.http.set_payload_max_length(1'024);
   s.http.set_pre_routing_handler([&s](const httplib::Request& request, httplib::Response& response) {
-    return s.refused(request, response) ? httplib::Server::HandlerResponse::Handled : httplib::Server::HandlerResponse::Unhandled;
+    return s.refused(request, response) ? httplib::Server::HandlerResponse::Handled
+                                        : httplib::Server::HandlerResponse::Unhandled;
   });
-  s.http.Get("/", [&s](const httplib::Request&, httplib::Response& response) { response.set_content(s.html, "text/html; charset=utf-8"); });
+  s.http.Get("/", [&s](const httplib::Request&, httplib::Response& response) {
+    response.set_content(s.html, "text/html; charset=utf-8");
+  });
   s.http.Get("/events", [&s](const httplib::Request&, httplib::Response& response) { s.stream(response); });
   s.port = port > 0 ? (s.http.bind_to_port("127.0.0.1", port) ? port : -1) : s.http.bind_to_any_port("127.0.0.1");
-  if (s.port < 0) throw SourceRefused("--serve", 1, fmt::format("port {} of 127.0.0.1 is not to be had, expected one that is free", port));
+  if (s.port < 0)
+    throw SourceRefused("--serve", 1,
+                        fmt::format("port {} of 127.0.0.1 is not to be had, expected one that is free", port));
   s.thread = std::thread([&s] { s.http.listen_after_bind(); });
 }
 
@@ -139,7 +157,8 @@ LivePage::~LivePage() {
     server_->stopping = true;
   }
   server_->changed.notify_all();
-  while (!server_->http.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // stopping before it listens would be forgotten
+  while (!server_->http.is_running())
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // stopping before it listens would be forgotten
   server_->http.stop();
   server_->thread.join();
 }

@@ -13,10 +13,17 @@ namespace bms::monitor {
 
 namespace {
 
-constexpr std::pair<Flag, const char*> flag_words[] = {
-    {voltage_missing, "voltage missing"}, {voltage_implausible, "voltage implausible"}, {voltage_stuck, "voltage stuck"}, {current_missing, "current missing"},
-    {current_implausible, "current implausible"}, {time_gap, "gap in time"}, {time_not_later, "time not later"}, {not_started, "not started"},
-    {soc_unsettled, "more than one state of charge fits"}, {voltage_disbelieved, "voltage disbelieved"}};
+constexpr std::pair<estimator::Flag, const char*> flag_words[] = {
+    {estimator::voltage_missing, "voltage missing"},
+    {estimator::voltage_implausible, "voltage implausible"},
+    {estimator::voltage_stuck, "voltage stuck"},
+    {estimator::current_missing, "current missing"},
+    {estimator::current_implausible, "current implausible"},
+    {estimator::time_gap, "gap in time"},
+    {estimator::time_not_later, "time not later"},
+    {estimator::not_started, "not started"},
+    {estimator::soc_unsettled, "more than one state of charge fits"},
+    {estimator::voltage_disbelieved, "voltage disbelieved"}};
 
 std::vector<Words> flags_in_words(const Reading& flags) {
   std::vector<Words> set;
@@ -35,7 +42,8 @@ template <class See>
 bool each_signal(const BusState& bus, std::string_view message, See&& see) {
   const std::size_t k = BusState::find(message);
   if (k == messages().size() || bus.states()[k].frames == 0) return false;
-  for (std::size_t s = 0; s < messages()[k].signals.size(); ++s) see(messages()[k].signals[s], bus.states()[k].values[s], bus.stale(k));
+  for (std::size_t s = 0; s < messages()[k].signals.size(); ++s)
+    see(messages()[k].signals[s], bus.states()[k].values[s], bus.stale(k));
   return true;
 }
 
@@ -66,7 +74,8 @@ std::string text_of(const SignalInfo& signal, double value) {
     if (raw == name.raw && (known || signal.layout.has_invalid)) return name.text;
   }
   if (!known) return "-";
-  if (signal.integer && signal.layout.bits > 16 && !signal.layout.is_signed && *signal.unit == '\0') return fmt::format("{:#x}", static_cast<std::int64_t>(value));
+  if (signal.integer && signal.layout.bits > 16 && !signal.layout.is_signed && *signal.unit == '\0')
+    return fmt::format("{:#x}", static_cast<std::int64_t>(value));
   return fmt::format("{:.{}f}{}{}", value, signal.digits, *signal.unit != '\0' ? " " : "", signal.unit);
 }
 
@@ -105,12 +114,17 @@ PackView pack_view(const BusState& bus) {
   each_signal(bus, "ContactorState", [&](const SignalInfo& signal, double value, bool stale) {
     if (!std::isfinite(value) || (signal.layout.bits == 1 && value == 0)) return;
     const std::string text = text_of(signal, value);
-    v.contactor.push_back({std::string_view(signal.name) == "State" ? text : signal.layout.bits == 1 ? signal.name : fmt::format("{} {}", signal.name, text), signal.comment, stale});
+    v.contactor.push_back({std::string_view(signal.name) == "State" ? text
+                           : signal.layout.bits == 1                ? signal.name
+                                                                    : fmt::format("{} {}", signal.name, text),
+                           signal.comment, stale});
   });
   v.faults_heard = each_signal(bus, "Faults", [&](const SignalInfo& signal, double value, bool stale) {
     if (!std::isfinite(value) || value == 0) return;
-    if (signal.layout.bits == 1) v.faults.push_back({signal.name, signal.comment, stale});
-    else v.fault_details.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
+    if (signal.layout.bits == 1)
+      v.faults.push_back({signal.name, signal.comment, stale});
+    else
+      v.fault_details.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
   });
   v.flags = flags_in_words(bus.reading("Status", "Flags"));
   return v;

@@ -1,5 +1,5 @@
-// What a person wants to know of a battery, picked from the bus by the names of the DBC file: the same for the screen, the plain lines, the
-// JSON and the page. What the DBC file or the bus does not have is not known, and not shown.
+// What a person wants to know of a battery, picked from the bus by the names of the DBC file: the same for the screen,
+// the plain lines, the JSON and the page. What the DBC file or the bus does not have is not known, and not shown.
 #pragma once
 
 #include <string>

@@ -35,10 +35,16 @@ Json pack_json(const BusState& bus) {
                {"voltage_v", number(p.voltage_v.value)},
                {"current_a", number(p.current_a.value)},
                {"temperature_c", number(p.temperature_c.value)},
-               {"limits", {{"discharge_now_a", number(p.discharge_now_a.value)}, {"charge_now_a", number(p.charge_now_a.value)},
-                           {"discharge_10s_a", number(p.discharge_10s_a.value)}, {"charge_10s_a", number(p.charge_10s_a.value)}}},
-               {"health", {{"capacity", fraction(p.capacity_percent)}, {"capacity_sigma", fraction(p.capacity_sigma_percent)},
-                           {"resistance", fraction(p.resistance_percent)}, {"resistance_sigma", fraction(p.resistance_sigma_percent)}}}};
+               {"limits",
+                {{"discharge_now_a", number(p.discharge_now_a.value)},
+                 {"charge_now_a", number(p.charge_now_a.value)},
+                 {"discharge_10s_a", number(p.discharge_10s_a.value)},
+                 {"charge_10s_a", number(p.charge_10s_a.value)}}},
+               {"health",
+                {{"capacity", fraction(p.capacity_percent)},
+                 {"capacity_sigma", fraction(p.capacity_sigma_percent)},
+                 {"resistance", fraction(p.resistance_percent)},
+                 {"resistance_sigma", fraction(p.resistance_sigma_percent)}}}};
   json["cells_v"] = Json::array();
   for (const Reading& cell : p.cells_v) json["cells_v"].push_back(number(cell.value));
   json["contactor"] = list_of(p.contactor);
@@ -68,7 +74,8 @@ Json message_json(const BusState& bus, std::size_t k) {
   for (std::size_t s = 0; s < info.signals.size(); ++s) {
     const SignalInfo& signal = info.signals[s];
     const double value = state.values[s];
-    Json& entry = signals[signal.name] = {{"value", signal.integer && std::isfinite(value) ? Json(static_cast<std::int64_t>(value)) : number(value)}};
+    Json& entry = signals[signal.name] = {
+        {"value", signal.integer && std::isfinite(value) ? Json(static_cast<std::int64_t>(value)) : number(value)}};
     if (*signal.unit != '\0') entry["unit"] = signal.unit;
     if (!signal.names.empty()) entry["words"] = text_of(signal, value);
   }
@@ -93,7 +100,10 @@ std::string json_of(const BusState& bus, const ScreenFacts& facts, double silent
   Json ids = Json::object();
   for (const auto& u : bus.unknown_ids()) ids[fmt::format("{:0{}X}", u.id, u.long_id ? 8 : 3)] = u.frames;
   json["other_ids"] = {{"frames", bus.unknown_frames()}, {"ids", ids}, {"without_place", bus.unknown_without_place()}};
-  json["other_kinds"] = {{"remote", bus.remote()}, {"fd", bus.fd()}, {"error_reports", bus.errors()}, {"error_classes", bus.error_classes()}};
+  json["other_kinds"] = {{"remote", bus.remote()},
+                         {"fd", bus.fd()},
+                         {"error_reports", bus.errors()},
+                         {"error_classes", bus.error_classes()}};
   json["malformed"] = facts.malformed;
   json["dropped"] = facts.dropped;
   json["silent_s"] = seconds(silent_s);
@@ -104,7 +114,9 @@ std::string json_of(const BusState& bus, const ScreenFacts& facts, double silent
 std::string csv_head() {
   std::string head = "time_s,current_a,voltage_v,temperature_c";
   for (const MessageInfo& message : messages()) {
-    for (const SignalInfo& signal : message.signals) head += fmt::format(",{}.{}", message.name, signal.name) + (*signal.unit != '\0' ? fmt::format(" [{}]", signal.unit) : "");
+    for (const SignalInfo& signal : message.signals)
+      head += fmt::format(",{}.{}", message.name, signal.name) +
+              (*signal.unit != '\0' ? fmt::format(" [{}]", signal.unit) : "");
   }
   return head + "\n";
 }
@@ -115,8 +127,10 @@ std::string csv_row(const BusState& bus) {
   const auto field = [&](double value, bool integer, bool there) {
     row += ',';
     if (!there || !std::isfinite(value)) return;
-    if (integer) fmt::format_to(out, "{}", static_cast<std::int64_t>(value));
-    else fmt::format_to(out, "{}", value);
+    if (integer)
+      fmt::format_to(out, "{}", static_cast<std::int64_t>(value));
+    else
+      fmt::format_to(out, "{}", value);
   };
   for (const char* name : {"Current", "Voltage", "Temperature"}) {
     const Reading r = bus.reading("PackElectrical", name);
@@ -124,7 +138,8 @@ std::string csv_row(const BusState& bus) {
   }
   for (std::size_t k = 0; k < messages().size(); ++k) {
     const bool stale = bus.stale(k);
-    for (std::size_t s = 0; s < messages()[k].signals.size(); ++s) field(bus.states()[k].values[s], messages()[k].signals[s].integer, !stale);
+    for (std::size_t s = 0; s < messages()[k].signals.size(); ++s)
+      field(bus.states()[k].values[s], messages()[k].signals[s].integer, !stale);
   }
   return row + "\n";
 }

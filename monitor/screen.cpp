@@ -36,7 +36,9 @@ std::string clean(std::string_view text) {
 
 Ink ink_of(bool stale, Ink fresh = Ink::plain) { return stale ? Ink::faint : fresh; }
 
-std::string number(const Reading& r, int digits, const char* unit) { return r.known() ? fmt::format("{:.{}f}{}", r.value, digits, unit) : fmt::format("-{}", unit); }
+std::string number(const Reading& r, int digits, const char* unit) {
+  return r.known() ? fmt::format("{:.{}f}{}", r.value, digits, unit) : fmt::format("-{}", unit);
+}
 
 /// "3 s", "4 min", "-"
 std::string age(double age_s) {
@@ -54,22 +56,26 @@ std::string clock(double seconds) {
 /// Draws on bounded lines, in blocks or in ASCII.
 class Drawing {
  public:
-  Drawing(const BusState& bus, const ScreenFacts& facts, std::size_t columns) : bus_(bus), facts_(facts), columns_(columns), pack_(pack_view(bus)) {}
+  Drawing(const BusState& bus, const ScreenFacts& facts, std::size_t columns)
+      : bus_(bus), facts_(facts), columns_(columns), pack_(pack_view(bus)) {}
 
   ScreenLine head() const {
     ScreenLine line;
     line.add("bms monitor ", Ink::strong).add(clean(facts_.source).substr(0, columns_ / 2));
     line.add(fmt::format("  {}  {} frames", clock(bus_.duration_s()), bus_.frames()));
     if (columns_ >= 70) line.add(fmt::format("  {:.0f}/s", facts_.frames_per_second));
-    if (bus_.frames() == 0) line.add("  nothing heard yet", Ink::warning);
-    else if (const double silent_s = 1e-6 * static_cast<double>(bus_.now_us() - bus_.last_us()); silent_s > 3) line.add(fmt::format("  silent for {}", age(silent_s)), Ink::alarm);
+    if (bus_.frames() == 0)
+      line.add("  nothing heard yet", Ink::warning);
+    else if (const double silent_s = 1e-6 * static_cast<double>(bus_.now_us() - bus_.last_us()); silent_s > 3)
+      line.add(fmt::format("  silent for {}", age(silent_s)), Ink::alarm);
     return line;
   }
 
   /// What is wrong with the bus, in words; empty: nothing.
   ScreenLine troubles() const {
     std::uint64_t lost = 0, repeated = 0, crc = 0, length = 0;
-    for (const MessageState& m : bus_.states()) lost += m.lost, repeated += m.repeated, crc += m.crc_errors, length += m.wrong_length;
+    for (const MessageState& m : bus_.states())
+      lost += m.lost, repeated += m.repeated, crc += m.crc_errors, length += m.wrong_length;
     ScreenLine line;
     const auto say = [&](std::uint64_t count, const char* what, Ink ink) {
       if (count > 0) line.add(line.columns() == 0 ? "Bus      " : ", ").add(fmt::format("{} {}", count, what), ink);
@@ -91,9 +97,11 @@ class Drawing {
     line.add("Charge   ");
     const Reading &soc = pack_.soc_percent, &sigma = pack_.soc_sigma_percent;
     line.add(number(soc, 1, " %"), ink_of(soc.stale, Ink::strong));
-    if (sigma.known()) line.add(fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value), ink_of(sigma.stale));
+    if (sigma.known())
+      line.add(fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value), ink_of(sigma.stale));
     if (!pack_.soc_quality.text.empty()) line.add("  " + pack_.soc_quality.text, ink_of(soc.stale, quality_ink()));
-    if (columns_ >= 70 && pack_.soc_display_percent.known()) line.add(fmt::format("  (display {:.1f} %)", pack_.soc_display_percent.value), Ink::faint);
+    if (columns_ >= 70 && pack_.soc_display_percent.known())
+      line.add(fmt::format("  (display {:.1f} %)", pack_.soc_display_percent.value), Ink::faint);
     return line;
   }
 
@@ -104,14 +112,21 @@ class Drawing {
     const Reading &soc = pack_.soc_percent, &sigma = pack_.soc_sigma_percent;
     const double half = sigma.known() ? 2 * sigma.value : 0;
     line.add("[", Ink::faint);
-    const auto column = [&](double percent) { return std::clamp(percent, 0.0, 100.0) / 100 * static_cast<double>(width); };
+    const auto column = [&](double percent) {
+      return std::clamp(percent, 0.0, 100.0) / 100 * static_cast<double>(width);
+    };
     for (std::size_t k = 0; k < width; ++k) {
       const double left = static_cast<double>(k), right = left + 1;
-      if (!soc.known()) line.add(".", Ink::faint);
-      else if (column(soc.value) >= left && (column(soc.value) < right || k + 1 == width)) line.add(facts_.blocks ? "\u2503" : "|", ink_of(soc.stale, Ink::strong));
-      else if (column(soc.value - half) >= right) line.add(facts_.blocks ? "\u2588" : "#", ink_of(soc.stale, Ink::bar));
-      else if (column(soc.value + half) > left) line.add(facts_.blocks ? "\u2592" : "~", ink_of(soc.stale, Ink::band));
-      else line.add(" ");
+      if (!soc.known())
+        line.add(".", Ink::faint);
+      else if (column(soc.value) >= left && (column(soc.value) < right || k + 1 == width))
+        line.add(facts_.blocks ? "\u2503" : "|", ink_of(soc.stale, Ink::strong));
+      else if (column(soc.value - half) >= right)
+        line.add(facts_.blocks ? "\u2588" : "#", ink_of(soc.stale, Ink::bar));
+      else if (column(soc.value + half) > left)
+        line.add(facts_.blocks ? "\u2592" : "~", ink_of(soc.stale, Ink::band));
+      else
+        line.add(" ");
     }
     line.add("]", Ink::faint);
     return line;
@@ -120,9 +135,13 @@ class Drawing {
   ScreenLine electrical() const {
     ScreenLine line;
     const bool stale = pack_.voltage_v.stale;
-    const char* direction = !pack_.current_a.known() || pack_.current_a.value == 0 ? "" : pack_.current_a.value > 0 ? " charging" : " discharging";
+    const char* direction = !pack_.current_a.known() || pack_.current_a.value == 0 ? ""
+                            : pack_.current_a.value > 0                            ? " charging"
+                                                                                   : " discharging";
     line.add("Pack     ").add(number(pack_.voltage_v, 3, " V"), ink_of(stale, Ink::strong)).add("   ");
-    line.add(number(pack_.current_a, 2, " A"), ink_of(stale, Ink::strong)).add(columns_ >= 60 ? direction : "", ink_of(stale)).add("   ");
+    line.add(number(pack_.current_a, 2, " A"), ink_of(stale, Ink::strong))
+        .add(columns_ >= 60 ? direction : "", ink_of(stale))
+        .add("   ");
     line.add(number(pack_.temperature_c, 1, facts_.blocks ? " \u00b0C" : " degC"), ink_of(stale, Ink::strong));
     return line;
   }
@@ -130,26 +149,44 @@ class Drawing {
   ScreenLine limits() const {
     ScreenLine line;
     const bool stale = pack_.discharge_now_a.stale;
-    if (columns_ < 62) return line.add("Limits   ").add(fmt::format("-{}  +{}", number(pack_.discharge_now_a, 0, " A"), number(pack_.charge_now_a, 0, " A")), ink_of(stale));
-    line.add("Limits   ").add(fmt::format("discharge {} (10 s {})", number(pack_.discharge_now_a, 0, " A"), number(pack_.discharge_10s_a, 0, " A")), ink_of(stale));
-    line.add(fmt::format("   charge {} (10 s {})", number(pack_.charge_now_a, 0, " A"), number(pack_.charge_10s_a, 0, " A")), ink_of(stale));
+    if (columns_ < 62)
+      return line.add("Limits   ")
+          .add(fmt::format("-{}  +{}", number(pack_.discharge_now_a, 0, " A"), number(pack_.charge_now_a, 0, " A")),
+               ink_of(stale));
+    line.add("Limits   ")
+        .add(fmt::format("discharge {} (10 s {})", number(pack_.discharge_now_a, 0, " A"),
+                         number(pack_.discharge_10s_a, 0, " A")),
+             ink_of(stale));
+    line.add(
+        fmt::format("   charge {} (10 s {})", number(pack_.charge_now_a, 0, " A"), number(pack_.charge_10s_a, 0, " A")),
+        ink_of(stale));
     return line;
   }
 
   ScreenLine health() const {
     const auto with_band = [&](const Reading& value, const Reading& sigma) {
-      return number(value, 1, " %") + (value.known() && sigma.known() ? fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value) : "");
+      return number(value, 1, " %") + (value.known() && sigma.known()
+                                           ? fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value)
+                                           : "");
     };
     ScreenLine line;
-    if (columns_ < 62) return line.add("Health   ").add(fmt::format("{}  R {}", number(pack_.capacity_percent, 1, " %"), number(pack_.resistance_percent, 0, " %")), ink_of(pack_.capacity_percent.stale));
-    line.add("Health   ").add("capacity " + with_band(pack_.capacity_percent, pack_.capacity_sigma_percent), ink_of(pack_.capacity_percent.stale));
-    line.add("   resistance " + with_band(pack_.resistance_percent, pack_.resistance_sigma_percent), ink_of(pack_.resistance_percent.stale));
+    if (columns_ < 62)
+      return line.add("Health   ")
+          .add(fmt::format("{}  R {}", number(pack_.capacity_percent, 1, " %"),
+                           number(pack_.resistance_percent, 0, " %")),
+               ink_of(pack_.capacity_percent.stale));
+    line.add("Health   ")
+        .add("capacity " + with_band(pack_.capacity_percent, pack_.capacity_sigma_percent),
+             ink_of(pack_.capacity_percent.stale));
+    line.add("   resistance " + with_band(pack_.resistance_percent, pack_.resistance_sigma_percent),
+             ink_of(pack_.resistance_percent.stale));
     return line;
   }
 
   ScreenLine contactor() const {
     ScreenLine line;
-    for (const Words& w : pack_.contactor) line.add(line.columns() == 0 ? "Contactor " : ", ").add(clean(w.text), ink_of(w.stale, Ink::strong));
+    for (const Words& w : pack_.contactor)
+      line.add(line.columns() == 0 ? "Contactor " : ", ").add(clean(w.text), ink_of(w.stale, Ink::strong));
     return line;
   }
 
@@ -162,10 +199,14 @@ class Drawing {
     } else if (room < pack_.faults.size()) {
       ScreenLine& line = lines.emplace_back();
       line.add("Faults   ");
-      for (std::size_t k = 0; k < pack_.faults.size(); ++k) line.add(k == 0 ? "" : ", ").add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, Ink::alarm));
+      for (std::size_t k = 0; k < pack_.faults.size(); ++k)
+        line.add(k == 0 ? "" : ", ").add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, Ink::alarm));
     } else {
       for (std::size_t k = 0; k < pack_.faults.size(); ++k) {
-        lines.emplace_back().add(k == 0 ? "Faults   " : "         ").add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, Ink::alarm)).add("  " + clean(pack_.faults[k].comment), Ink::faint);
+        lines.emplace_back()
+            .add(k == 0 ? "Faults   " : "         ")
+            .add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, Ink::alarm))
+            .add("  " + clean(pack_.faults[k].comment), Ink::faint);
       }
     }
     return lines;
@@ -173,13 +214,15 @@ class Drawing {
 
   ScreenLine fault_details() const {
     ScreenLine line;
-    for (const Words& w : pack_.fault_details) line.add(line.columns() == 0 ? "         " : ", ").add(clean(w.text), ink_of(w.stale));
+    for (const Words& w : pack_.fault_details)
+      line.add(line.columns() == 0 ? "         " : ", ").add(clean(w.text), ink_of(w.stale));
     return line;
   }
 
   ScreenLine flags() const {
     ScreenLine line;
-    for (const Words& w : pack_.flags) line.add(line.columns() == 0 ? "Estimate " : ", ").add(w.text, ink_of(w.stale, Ink::warning));
+    for (const Words& w : pack_.flags)
+      line.add(line.columns() == 0 ? "Estimate " : ", ").add(w.text, ink_of(w.stale, Ink::warning));
     return line;
   }
 
@@ -190,7 +233,10 @@ class Drawing {
     if (c.count == 0 || room == 0) return lines;
     ScreenLine& summary = lines.emplace_back();
     const bool stale = pack_.cells_v[c.lowest].stale && pack_.cells_v[c.highest].stale;
-    summary.add("Cells    ").add(fmt::format("min {:.3f} V (cell {})  max {:.3f} V (cell {})  ", c.lowest_v, c.lowest + 1, c.highest_v, c.highest + 1), ink_of(stale));
+    summary.add("Cells    ")
+        .add(fmt::format("min {:.3f} V (cell {})  max {:.3f} V (cell {})  ", c.lowest_v, c.lowest + 1, c.highest_v,
+                         c.highest + 1),
+             ink_of(stale));
     summary.add(fmt::format("delta {:.0f} mV", 1e3 * (c.highest_v - c.lowest_v)), ink_of(stale, Ink::strong));
     // bars over a range that shows millivolts but does not make noise look large
     const double span_v = std::max(0.05, 1.25 * (c.highest_v - c.lowest_v)), from_v = c.highest_v - span_v;
@@ -200,7 +246,8 @@ class Drawing {
       if (across > fit || rows >= room) continue;
       for (std::size_t row = 0; row < rows; ++row) {
         ScreenLine& line = lines.emplace_back();
-        for (std::size_t k = row; k < pack_.cells_v.size(); k += rows) cell(line, k, std::min<std::size_t>(columns_ / across, 60), from_v, span_v);
+        for (std::size_t k = row; k < pack_.cells_v.size(); k += rows)
+          cell(line, k, std::min<std::size_t>(columns_ / across, 60), from_v, span_v);
       }
       break;
     }
@@ -209,9 +256,12 @@ class Drawing {
 
   std::vector<ScreenLine> message_table() const {
     std::vector<ScreenLine> lines;
-    lines.emplace_back().add(fmt::format("{:<16} {:>8} {:>7} {:>8} {:>5} {:>5} {:>5} {:>6}", "Message", "per s", "age", "frames", "lost", "CRC", "rep.", "length"), Ink::strong);
+    lines.emplace_back().add(fmt::format("{:<16} {:>8} {:>7} {:>8} {:>5} {:>5} {:>5} {:>6}", "Message", "per s", "age",
+                                         "frames", "lost", "CRC", "rep.", "length"),
+                             Ink::strong);
     for (std::size_t k = 0; k < messages().size(); ++k) {
-      if (bus_.states()[k].frames > 0 || bus_.states()[k].crc_errors + bus_.states()[k].wrong_length > 0) lines.push_back(message(k));
+      if (bus_.states()[k].frames > 0 || bus_.states()[k].crc_errors + bus_.states()[k].wrong_length > 0)
+        lines.push_back(message(k));
     }
     return lines;
   }
@@ -226,7 +276,9 @@ class Drawing {
       if (state.frames == 0 && state.crc_errors + state.wrong_length == 0) continue;
       all.push_back(lines[at++]);
       for (std::size_t s = 0; state.frames > 0 && s < state.values.size(); ++s) {
-        all.emplace_back().add(fmt::format("  {:<24} ", messages()[k].signals[s].name), Ink::faint).add(clean(text_of(messages()[k].signals[s], state.values[s])), ink_of(bus_.stale(k)));
+        all.emplace_back()
+            .add(fmt::format("  {:<24} ", messages()[k].signals[s].name), Ink::faint)
+            .add(clean(text_of(messages()[k].signals[s], state.values[s])), ink_of(bus_.stale(k)));
       }
     }
     return all;
@@ -255,8 +307,12 @@ class Drawing {
     const MessageState& m = bus_.states()[k];
     ScreenLine line;
     const bool stale = bus_.stale(k);
-    line.add(fmt::format("{:<16} {:>8.{}f} {:>7} {:>8}", messages()[k].name, m.rate_hz(), m.rate_hz() < 99.95 ? 1 : 0, age(bus_.age_s(k)), m.frames), ink_of(stale));
-    const auto count = [&](std::uint64_t n, int width) { line.add(fmt::format(" {:>{}}", n, width), n > 0 ? Ink::warning : ink_of(true)); };
+    line.add(fmt::format("{:<16} {:>8.{}f} {:>7} {:>8}", messages()[k].name, m.rate_hz(), m.rate_hz() < 99.95 ? 1 : 0,
+                         age(bus_.age_s(k)), m.frames),
+             ink_of(stale));
+    const auto count = [&](std::uint64_t n, int width) {
+      line.add(fmt::format(" {:>{}}", n, width), n > 0 ? Ink::warning : ink_of(true));
+    };
     count(m.lost, 5);
     count(m.crc_errors, 5);
     count(m.repeated, 5);
@@ -276,7 +332,8 @@ class Drawing {
   }
 
   std::string bar(double part, std::size_t columns) const {
-    static constexpr std::array<const char*, 8> eighths = {"", "\u258f", "\u258e", "\u258d", "\u258c", "\u258b", "\u258a", "\u2589"};
+    static constexpr std::array<const char*, 8> eighths = {"",       "\u258f", "\u258e", "\u258d",
+                                                           "\u258c", "\u258b", "\u258a", "\u2589"};
     const double length = std::clamp(part, 0.0, 1.0) * static_cast<double>(columns);
     std::string text;
     for (std::size_t k = 0; k < static_cast<std::size_t>(length); ++k) text += facts_.blocks ? "\u2588" : "#";
@@ -319,8 +376,10 @@ std::vector<ScreenLine> pack_part(const Drawing& d, std::size_t room) {
 
 ScreenLine& ScreenLine::add(std::string_view text, Ink ink) {
   if (text.empty()) return *this;
-  if (!pieces_.empty() && pieces_.back().ink == ink) pieces_.back().text += text;
-  else pieces_.push_back({std::string(text), ink});
+  if (!pieces_.empty() && pieces_.back().ink == ink)
+    pieces_.back().text += text;
+  else
+    pieces_.push_back({std::string(text), ink});
   return *this;
 }
 
@@ -401,7 +460,8 @@ std::string plain_text(const std::vector<ScreenLine>& lines) {
 }
 
 std::string ansi_frame(const std::vector<ScreenLine>& lines) {
-  static constexpr std::array<const char*, 8> inks = {"", "\x1b[90m", "\x1b[1m", "\x1b[32m", "\x1b[33m", "\x1b[1;31m", "\x1b[34m", "\x1b[36m"};
+  static constexpr std::array<const char*, 8> inks = {"",         "\x1b[90m",   "\x1b[1m",  "\x1b[32m",
+                                                      "\x1b[33m", "\x1b[1;31m", "\x1b[34m", "\x1b[36m"};
   std::string text = "\x1b[?2026h\x1b[H";
   for (std::size_t k = 0; k < lines.size(); ++k) {
     if (k > 0) text += "\r\n";
@@ -420,10 +480,13 @@ std::string status_line(const BusState& bus, const ScreenFacts& facts) {
   if (bus.good() == 0) {
     text += fmt::format("  nothing of the BMS in {} frames", bus.frames());
   } else {
-    text += fmt::format("  {} +- {}  {}  {}  {}", number(p.soc_percent, 2, " %"), p.soc_sigma_percent.known() ? fmt::format("{:.2f}", 2 * p.soc_sigma_percent.value) : "-",
-                        number(p.voltage_v, 3, " V"), number(p.current_a, 2, " A"), number(p.temperature_c, 1, " degC"));
+    text +=
+        fmt::format("  {} +- {}  {}  {}  {}", number(p.soc_percent, 2, " %"),
+                    p.soc_sigma_percent.known() ? fmt::format("{:.2f}", 2 * p.soc_sigma_percent.value) : "-",
+                    number(p.voltage_v, 3, " V"), number(p.current_a, 2, " A"), number(p.temperature_c, 1, " degC"));
     if (!p.soc_quality.text.empty()) text += "  " + p.soc_quality.text;
-    if (const auto c = p.cells(); c.count > 0) text += fmt::format("  cells {:.3f} to {:.3f} V", c.lowest_v, c.highest_v);
+    if (const auto c = p.cells(); c.count > 0)
+      text += fmt::format("  cells {:.3f} to {:.3f} V", c.lowest_v, c.highest_v);
     for (const Words& w : p.contactor) text += "  " + clean(w.text);
     for (const Words& w : p.faults) text += "  FAULT " + clean(w.text);
     if (p.soc_percent.stale) text += fmt::format("  stale for {}", age(p.soc_percent.age_s));

@@ -1,8 +1,9 @@
-// The monitor's picture as lines of text, for a terminal of any size: made anew each time, written by the terminal in one piece.
+// The monitor's picture as lines of text, for a terminal of any size: made anew each time, written by the terminal in
+// one piece.
 //
-// What matters most comes first, what does not fit is left out: state of charge with its two-sigma band, pack, limits, health, contactor,
-// faults, cells; then the messages with their rates, ages and errors; on a large terminal each signal. From 150 columns on the messages stand
-// beside the pack. Stale values are faint.
+// What matters most comes first, what does not fit is left out: state of charge with its two-sigma band, pack, limits,
+// health, contactor, faults, cells; then the messages with their rates, ages and errors; on a large terminal each
+// signal. From 150 columns on the messages stand beside the pack. Stale values are faint.
 #pragma once
 
 #include <cstddef>
@@ -56,8 +57,9 @@ std::vector<ScreenLine> screen(const BusState& bus, const ScreenFacts& facts, co
 /// Without inks.
 std::string plain_text(const std::vector<ScreenLine>& lines);
 
-/// For a terminal: from its upper left corner on, each line cleared behind its end, what is below cleared too, the whole as one synchronised
-/// update (mode 2026, which terminals that do not know it ignore). Nothing is cleared before it is drawn: no flicker.
+/// For a terminal: from its upper left corner on, each line cleared behind its end, what is below cleared too, the
+/// whole as one synchronised update (mode 2026, which terminals that do not know it ignore). Nothing is cleared before
+/// it is drawn: no flicker.
 std::string ansi_frame(const std::vector<ScreenLine>& lines);
 
 /// One line without inks: for standard output that is no terminal, and for logs.

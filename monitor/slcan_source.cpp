@@ -18,7 +18,9 @@ namespace {
 class Slcan : public FrameSource {
  public:
   explicit Slcan(const std::string& device) : fd_(open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
-    if (fd_ < 0) throw SourceRefused(device, 1, "cannot be opened, expected a serial port (" + std::generic_category().message(errno) + ")");
+    if (fd_ < 0)
+      throw SourceRefused(device, 1,
+                          "cannot be opened, expected a serial port (" + std::generic_category().message(errno) + ")");
     if (tcgetattr(fd_, &before_) != 0) {
       close(fd_);
       throw SourceRefused(device, 1, "no serial port, expected one, as /dev/ttyACM0");
@@ -59,9 +61,12 @@ class Slcan : public FrameSource {
   void say(std::string_view text) const {
     for (int tries = 0; tries < 100 && !text.empty(); ++tries) {
       const ssize_t n = write(fd_, text.data(), text.size());
-      if (n > 0) text.remove_prefix(static_cast<std::size_t>(n));
-      else if (n < 0 && errno != EAGAIN && errno != EINTR) return;
-      else usleep(10'000);
+      if (n > 0)
+        text.remove_prefix(static_cast<std::size_t>(n));
+      else if (n < 0 && errno != EAGAIN && errno != EINTR)
+        return;
+      else
+        usleep(10'000);
     }
   }
   std::size_t decode(std::span<BusFrame> room) {

@@ -1,6 +1,7 @@
 // The bytes of an SLCAN adapter, decoded to frames. Total: any bytes may come.
 //
-// Beside frames an adapter sends answers: an empty line, \a where it refuses, z or Z for a frame it sent, and what V, v, N, F ask for.
+// Beside frames an adapter sends answers: an empty line, \a where it refuses, z or Z for a frame it sent, and what V,
+// v, N, F ask for.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ class SlcanStream {
   bool take(char byte, BusFrame& frame) {
     if (byte == '\a' || !reader_.take(byte)) return false;
     const std::string_view line = reader_.line();
-    hal::CanFrame data;
+    can::Frame data;
     if (hal::slcan::decode(line, data)) {
       frame = on_bus(data, 0);
       return true;

@@ -25,7 +25,10 @@ class SocketCan : public FrameSource {
  public:
   explicit SocketCan(const std::string& interface) {
     const unsigned index = interface.size() < IFNAMSIZ ? if_nametoindex(interface.c_str()) : 0;
-    if (index == 0) throw SourceRefused(interface, 1, "no such network interface, expected a CAN interface that is up (ip link), slcan:DEVICE or file:DUMP.log");
+    if (index == 0)
+      throw SourceRefused(
+          interface, 1,
+          "no such network interface, expected a CAN interface that is up (ip link), slcan:DEVICE or file:DUMP.log");
     fd_ = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
     if (fd_ < 0) refuse(interface, "no CAN sockets on this machine, expected a kernel with can_raw");
     const int on = 1, bytes = receive_buffer_bytes;
@@ -34,11 +37,13 @@ class SocketCan : public FrameSource {
     setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
     setsockopt(fd_, SOL_SOCKET, SO_TIMESTAMP, &on, sizeof on);
     setsockopt(fd_, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
-    if (setsockopt(fd_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0) setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+    if (setsockopt(fd_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0)
+      setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
     sockaddr_can address{};
     address.can_family = AF_CAN;
     address.can_ifindex = static_cast<int>(index);
-    if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) refuse(interface, "no CAN interface, expected one that is (ip -details link)");
+    if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      refuse(interface, "no CAN interface, expected one that is (ip -details link)");
     for (std::size_t k = 0; k < batch; ++k) {
       parts_[k] = {&frames_[k], sizeof frames_[k]};
       messages_[k].msg_hdr.msg_iov = &parts_[k];
@@ -56,7 +61,8 @@ class SocketCan : public FrameSource {
       messages_[k].msg_hdr.msg_control = control_[k].data();
       messages_[k].msg_hdr.msg_controllen = control_[k].size();
     }
-    const int n = recvmmsg(fd_, messages_.data(), static_cast<unsigned>(std::min(batch, room.size())), MSG_DONTWAIT, nullptr);
+    const int n =
+        recvmmsg(fd_, messages_.data(), static_cast<unsigned>(std::min(batch, room.size())), MSG_DONTWAIT, nullptr);
     if (n < 0 && errno == ENODEV) ended_ = true;  // the interface is gone; one that is only down may come back
     std::size_t taken = 0;
     for (int k = 0; k < n; ++k) taken += take(static_cast<std::size_t>(k), room[taken]) ? 1U : 0U;
@@ -82,7 +88,11 @@ class SocketCan : public FrameSource {
     frame.time_us = time_and_drops(messages_[k].msg_hdr);
     frame.long_id = (raw.can_id & CAN_EFF_FLAG) != 0;
     frame.id = raw.can_id & (frame.long_id || (raw.can_id & CAN_ERR_FLAG) != 0 ? CAN_EFF_MASK : CAN_SFF_MASK);
-    frame.kind = (raw.can_id & CAN_ERR_FLAG) != 0 ? FrameKind::error : bytes == CANFD_MTU ? FrameKind::fd : (raw.can_id & CAN_RTR_FLAG) != 0 ? FrameKind::remote : frame.long_id ? FrameKind::extended : FrameKind::standard;
+    frame.kind = (raw.can_id & CAN_ERR_FLAG) != 0   ? FrameKind::error
+                 : bytes == CANFD_MTU               ? FrameKind::fd
+                 : (raw.can_id & CAN_RTR_FLAG) != 0 ? FrameKind::remote
+                 : frame.long_id                    ? FrameKind::extended
+                                                    : FrameKind::standard;
     if (frame.kind == FrameKind::error) frame.long_id = false;
     frame.fd_flags = frame.kind == FrameKind::fd ? raw.flags & 15U : 0;
     frame.length = std::min<std::uint8_t>(raw.len, frame.kind == FrameKind::fd ? 64 : 8);
@@ -120,6 +130,8 @@ class SocketCan : public FrameSource {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_socketcan(const std::string& interface) { return std::make_unique<SocketCan>(interface); }
+std::unique_ptr<FrameSource> open_socketcan(const std::string& interface) {
+  return std::make_unique<SocketCan>(interface);
+}
 
 }  // namespace bms::monitor

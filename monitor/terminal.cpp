@@ -75,7 +75,7 @@ void on_stop(int) { stop_asked = 1; }
 void on_resize(int) { size_changed = 1; }
 
 void handle(int number, void (*handler)(int)) {
-  struct sigaction action{};
+  struct sigaction action {};
   action.sa_handler = handler;  // without SA_RESTART: poll returns
   sigemptyset(&action.sa_mask);
   sigaction(number, &action, nullptr);
@@ -107,7 +107,8 @@ bool Terminal::shows_utf8() {
     const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing here sets one
     if (value == nullptr || *value == '\0') continue;
     const std::string_view text = value;
-    return text.find("UTF-8") != text.npos || text.find("utf8") != text.npos || text.find("UTF8") != text.npos || text.find("utf-8") != text.npos;
+    return text.find("UTF-8") != text.npos || text.find("utf8") != text.npos || text.find("UTF8") != text.npos ||
+           text.find("utf-8") != text.npos;
   }
   return false;
 }

@@ -1,8 +1,8 @@
-// The terminal that the live screen is on: alternate screen, no cursor, keys as they are pressed. Given back as it was by the destructor, and
-// when the program crashes or is stopped (Ctrl-Z). One at a time.
+// The terminal that the live screen is on: alternate screen, no cursor, keys as they are pressed. Given back as it was
+// by the destructor, and when the program crashes or is stopped (Ctrl-Z). One at a time.
 //
-// Plain escape codes (ECMA-48, and xterm's 1049, 25 and 2026) rather than ncurses: a frame is a string that tests compare, it is written in one
-// piece, and nothing depends on a terminal database.
+// Plain escape codes (ECMA-48, and xterm's 1049, 25 and 2026) rather than ncurses: a frame is a string that tests
+// compare, it is written in one piece, and nothing depends on a terminal database.
 #pragma once
 
 #include <string>

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace truth {
+namespace bms::plant {
 
 Channel::Channel(const ChannelParameters& parameters, std::uint64_t seed)
     : parameters_(parameters), random_(seed), drift_(parameters.drift_sigma * random_.normal()) {}
@@ -17,6 +17,8 @@ double Channel::read(double true_value, double elapsed_s) {
 
 // A seed of its own for each: a changed channel leaves the others as they were.
 Instruments::Instruments(const InstrumentParameters& parameters, std::uint64_t seed)
-    : current_a(parameters.current_a, 3 * seed), voltage_v(parameters.voltage_v, 3 * seed + 1), temperature_c(parameters.temperature_c, 3 * seed + 2) {}
+    : current_a(parameters.current_a, 3 * seed),
+      voltage_v(parameters.voltage_v, 3 * seed + 1),
+      temperature_c(parameters.temperature_c, 3 * seed + 2) {}
 
-}  // namespace truth
+}  // namespace bms::plant

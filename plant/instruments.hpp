@@ -10,7 +10,7 @@
 
 #include "plant/random.hpp"
 
-namespace truth {
+namespace bms::plant {
 
 /// drift_sigma, noise_sigma and step in the unit of what is measured.
 struct ChannelParameters {
@@ -37,9 +37,12 @@ class Channel {
 
 /// A forklift's measuring chain: shunt with amplifier, cell monitor IC, thermistor.
 struct InstrumentParameters {
-  ChannelParameters current_a = {.gain_error = 0.002, .drift_sigma = 0.015, .drift_correlation_s = 3'600, .noise_sigma = 0.010, .step = 0.005};
-  ChannelParameters voltage_v = {.gain_error = 0, .drift_sigma = 0.0005, .drift_correlation_s = 7'200, .noise_sigma = 0.001, .step = 0.001};
-  ChannelParameters temperature_c = {.gain_error = 0, .drift_sigma = 0, .drift_correlation_s = 3'600, .noise_sigma = 0.05, .step = 0.1};
+  ChannelParameters current_a = {
+      .gain_error = 0.002, .drift_sigma = 0.015, .drift_correlation_s = 3'600, .noise_sigma = 0.010, .step = 0.005};
+  ChannelParameters voltage_v = {
+      .gain_error = 0, .drift_sigma = 0.0005, .drift_correlation_s = 7'200, .noise_sigma = 0.001, .step = 0.001};
+  ChannelParameters temperature_c = {
+      .gain_error = 0, .drift_sigma = 0, .drift_correlation_s = 3'600, .noise_sigma = 0.05, .step = 0.1};
 };
 
 struct Instruments {
@@ -48,4 +51,4 @@ struct Instruments {
   Channel current_a, voltage_v, temperature_c;
 };
 
-}  // namespace truth
+}  // namespace bms::plant

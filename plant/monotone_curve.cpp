@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace truth {
+namespace bms::plant {
 
 MonotoneCurve::MonotoneCurve(std::vector<Point> points) : points_(std::move(points)), slopes_(points_.size()) {
   assert(points_.size() >= 2);
@@ -25,11 +25,12 @@ MonotoneCurve::MonotoneCurve(std::vector<Point> points) : points_(std::move(poin
 double MonotoneCurve::at(double x) const {
   if (x <= points_.front().x) return points_.front().y + slopes_.front() * (x - points_.front().x);
   if (x >= points_.back().x) return points_.back().y + slopes_.back() * (x - points_.back().x);
-  const auto right = std::upper_bound(points_.begin(), points_.end(), x, [](double value, const Point& p) { return value < p.x; });
+  const auto right =
+      std::upper_bound(points_.begin(), points_.end(), x, [](double value, const Point& p) { return value < p.x; });
   const auto k = static_cast<std::size_t>(right - points_.begin()) - 1;
   const Point &a = points_[k], &b = points_[k + 1];
   const double h = b.x - a.x, t = (x - a.x) / h, u = 1 - t;
   return u * u * ((1 + 2 * t) * a.y + t * h * slopes_[k]) + t * t * ((1 + 2 * u) * b.y - u * h * slopes_[k + 1]);
 }
 
-}  // namespace truth
+}  // namespace bms::plant

@@ -1,12 +1,13 @@
-// A smooth curve through points: cubic between neighbours, continuous slope, no overshoot. It rises where the points rise.
+// A smooth curve through points: cubic between neighbours, continuous slope, no overshoot. It rises where the points
+// rise.
 //
-// The slope at a point is the weighted harmonic mean of the two neighbouring chords, 0 where they differ in sign (Fritsch and
-// Butland, 1984); at an end, and straight on beyond it, the slope of the last chord.
+// The slope at a point is the weighted harmonic mean of the two neighbouring chords, 0 where they differ in sign
+// (Fritsch and Butland, 1984); at an end, and straight on beyond it, the slope of the last chord.
 #pragma once
 
 #include <vector>
 
-namespace truth {
+namespace bms::plant {
 
 struct Point {
   double x, y;
@@ -24,4 +25,4 @@ class MonotoneCurve {
   std::vector<double> slopes_;
 };
 
-}  // namespace truth
+}  // namespace bms::plant

@@ -1,11 +1,12 @@
-// Chance that is the same on every machine: integers (xoshiro256++, seeded by splitmix64) and exact sums, no libm, no <random>.
+// Chance that is the same on every machine: integers (xoshiro256++, seeded by splitmix64) and exact sums, no libm, no
+// <random>.
 #pragma once
 
 #include <array>
 #include <bit>
 #include <cstdint>
 
-namespace truth {
+namespace bms::plant {
 
 class Random {
  public:
@@ -33,7 +34,8 @@ class Random {
   /// 0 <= u < 1.
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
 
-  /// Mean 0, variance 1: the sum of twelve uniforms, which a normal density fits to 1 % up to 2.5 sigma; never beyond 6.
+  /// Mean 0, variance 1: the sum of twelve uniforms, which a normal density fits to 1 % up to 2.5 sigma; never
+  /// beyond 6.
   double normal() {
     double sum = -6;
     for (int k = 0; k < 12; ++k) sum += uniform();
@@ -44,4 +46,4 @@ class Random {
   std::array<std::uint64_t, 4> state_{};
 };
 
-}  // namespace truth
+}  // namespace bms::plant

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace truth {
+namespace bms::plant {
 
 MonotoneCurve table9_ocv_v() {
   // where neighbouring lines of Table 9 (b0 + b1 soc) meet: 0 %, 10 % ... 100 %
@@ -35,8 +35,10 @@ MonotoneCurve over_soc(const std::array<double, 10>& values) {
 
 Circuit table9_circuit() {
   return {
-      .r0_ohm = over_soc({0.0140197, 0.013602, 0.0133872, 0.0132749, 0.013237, 0.0131549, 0.0131347, 0.0132971, 0.0135692, 0.0153566}),
-      .r1_ohm = over_soc({0.027101, 0.012339, 0.00998571, 0.009014, 0.00825815, 0.00771709, 0.00740307, 0.00777491, 0.00822862, 0.0072376}),
+      .r0_ohm = over_soc(
+          {0.0140197, 0.013602, 0.0133872, 0.0132749, 0.013237, 0.0131549, 0.0131347, 0.0132971, 0.0135692, 0.0153566}),
+      .r1_ohm = over_soc({0.027101, 0.012339, 0.00998571, 0.009014, 0.00825815, 0.00771709, 0.00740307, 0.00777491,
+                          0.00822862, 0.0072376}),
       .c1_f = over_soc({420.558, 833.847, 1109.31, 1249.35, 1399.3, 1473.69, 1526.64, 1509.14, 1445.43, 1927.32}),
   };
 }
@@ -55,7 +57,8 @@ Cell::Moving Cell::rates(const Moving& at, double soc, double current_a, double 
   const Thermal& thermal = parameters_.thermal;
   return {
       .v_rc_v = (current_a - through_r1_a) / circuit.c1_f.at(soc),
-      .temperature_c = (heat_w - thermal.to_ambient_w_per_k * (at.temperature_c - ambient_c)) / thermal.heat_capacity_j_per_k,
+      .temperature_c =
+          (heat_w - thermal.to_ambient_w_per_k * (at.temperature_c - ambient_c)) / thermal.heat_capacity_j_per_k,
   };
 }
 
@@ -66,7 +69,9 @@ void Cell::run(double current_a, double ambient_c, double duration_s) {
     return Moving{from.v_rc_v + for_s * rate.v_rc_v, from.temperature_c + for_s * rate.temperature_c};
   };
   for (int k = 0; k < steps; ++k) {
-    const auto rates_after = [&](double s, const Moving& at) { return rates(at, soc_at(current_a * (k * h + s)), current_a, ambient_c); };
+    const auto rates_after = [&](double s, const Moving& at) {
+      return rates(at, soc_at(current_a * (k * h + s)), current_a, ambient_c);
+    };
     const Moving k1 = rates_after(0, moving_);
     const Moving k2 = rates_after(h / 2, moved(moving_, k1, h / 2));
     const Moving k3 = rates_after(h / 2, moved(moving_, k2, h / 2));
@@ -83,4 +88,4 @@ double Cell::voltage_v() const {
   return parameters_.ocv_v.at(soc()) + moving_.v_rc_v + parameters_.circuit.r0_ohm.at(soc()) * current_a_;
 }
 
-}  // namespace truth
+}  // namespace bms::plant

@@ -4,21 +4,22 @@
 //   circuit  d v_rc / dt = I / C1 - v_rc / (R1 C1),  V = OCV + v_rc + R0 I,  R0, R1, C1 smooth in soc
 //   thermal  one node: C dT/dt = heat - G (T - ambient)
 //
-// The differential equations are integrated by Runge-Kutta 4 in steps of at most step_s, with the parameters at the momentary
-// soc; charge is counted by compensated summation. Currents > 0 charge. Nothing here comes from model/ or estimator/, so that a
-// mistake there cannot hide by being made twice. No libm: with -ffp-contract=off the same bits everywhere.
+// The differential equations are integrated by Runge-Kutta 4 in steps of at most step_s, with the parameters at the
+// momentary soc; charge is counted by compensated summation. Currents > 0 charge. Nothing here comes from model/ or
+// estimator/, so that a mistake there cannot hide by being made twice. No libm: with -ffp-contract=off the same bits
+// everywhere.
 #pragma once
 
 #include "plant/monotone_curve.hpp"
 
-namespace truth {
+namespace bms::plant {
 
-/// Open-circuit voltage [V] over soc. Meets the ten lines of Table 9 within 1 mV, but at the two sharp corners: up to 11 mV within
-/// 2.5 % of soc around 10 %, up to 4.5 mV within 1 % around 90 %.
+/// Open-circuit voltage [V] over soc. Meets the ten lines of Table 9 within 1 mV, but at the two sharp corners: up to
+/// 11 mV within 2.5 % of soc around 10 %, up to 4.5 mV within 1 % around 90 %.
 MonotoneCurve table9_ocv_v();
 
-/// Over soc. Through the values of Table 9, flat below 10 %. Straight lines between them differ by up to 3 % above 20 % of soc,
-/// by up to 11 % (C1) below.
+/// Over soc. Through the values of Table 9, flat below 10 %. Straight lines between them differ by up to 3 % above 20 %
+/// of soc, by up to 11 % (C1) below.
 struct Circuit {
   MonotoneCurve r0_ohm;
   MonotoneCurve r1_ohm;
@@ -75,4 +76,4 @@ class Cell {
   double charge_as_ = 0, lost_as_ = 0;  ///< since the start; lost_as_ is what rounding took from charge_as_
 };
 
-}  // namespace truth
+}  // namespace bms::plant

@@ -1,18 +1,21 @@
-// Which cells to bleed so that all are full together: by state of charge, not by voltage, which says nothing on LFP's plateau and is
-// bent by resistance while current flows.
+// Which cells to bleed so that all are full together: by state of charge, not by voltage, which says nothing on LFP's
+// plateau and is bent by resistance while current flows.
 //
-//   measured   once a charge, when the mean cell has reached 95 %, current does not flow out and every cell is known to 1 %:
+//   measured   once a charge, when the mean cell has reached 95 %, current does not flow out and every cell is known to
+//   1 %:
 //              excess = (soc of the cell) - (lowest soc) - 2 (sigma of the one + sigma of the other)
 //              bled are cells whose excess is above the dead band of half a percent
-//   bled       that charge and no more, counted by V / R, over the next hours: while charging or at rest, never while driving
+//   bled       that charge and no more, counted by V / R, over the next hours: while charging or at rest, never while
+//   driving
 //
-// An amount that is fixed at the top is why a cell of less capacity is not chased: it is level there and low at the bottom, and at the bottom
-// nothing is measured. Of a difference the part that is not sure stays. The sigmas are added, not their squares: the
-// lowest of sixteen is the one whose error is the largest, and a root would bleed after noise. Cells of one monitoring chip that may not bleed beside
-// each other take turns of eight seconds. What is left to bleed is not stored: the next full charge finds it again.
+// An amount that is fixed at the top is why a cell of less capacity is not chased: it is level there and low at the
+// bottom, and at the bottom nothing is measured. Of a difference the part that is not sure stays. The sigmas are added,
+// not their squares: the lowest of sixteen is the one whose error is the largest, and a root would bleed after noise.
+// Cells of one monitoring chip that may not bleed beside each other take turns of eight seconds. What is left to bleed
+// is not stored: the next full charge finds it again.
 //
-// Voltages read while a cell bleeds are lower by the drop over its sense wires: measure with the bleeders off, or know the drop.
-// Memory: 8 bytes a cell. Integers only.
+// Voltages read while a cell bleeds are lower by the drop over its sense wires: measure with the bleeders off, or know
+// the drop. Memory: 8 bytes a cell. Integers only.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +23,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/sample.hpp"
+#include "measurement/sample.hpp"
 #include "protection/pack_design.hpp"
 
 namespace bms::protection {
@@ -33,24 +36,29 @@ struct BalancingPlan {
 
 constexpr BalancingPlan balancing_plan(const PackDesign& d) {
   const double span_v = d.limits.voltage_max_v - d.limits.voltage_min_v;
-  return {std::max(static_cast<std::int32_t>(d.bleed_ohm + 0.5), std::int32_t{1}), in_micro(d.rest_current_c_rate * d.capacity_ah), in_micro(d.limits.voltage_min_v + 0.6 * span_v), in_centi(d.bleed_temperature_max_c),
-          static_cast<std::int64_t>(d.capacity_ah * 3'600 + 0.5), d.neighbours_may_bleed};
+  return {std::max(static_cast<std::int32_t>(d.bleed_ohm + 0.5), std::int32_t{1}),
+          in_micro(d.rest_current_c_rate * d.capacity_ah),
+          in_micro(d.limits.voltage_min_v + 0.6 * span_v),
+          in_centi(d.bleed_temperature_max_c),
+          static_cast<std::int64_t>(d.capacity_ah * 3'600 + 0.5),
+          d.neighbours_may_bleed};
 }
 
 template <std::size_t Cells>
 struct BalancingInput {
   const std::array<std::int32_t, Cells>& cell_uv;
-  const std::array<std::int32_t, Cells>& soc_ppb;    ///< of each cell less the mean's; no_reading: not known
+  const std::array<std::int32_t, Cells>& soc_ppb;  ///< of each cell less the mean's; measurement::no_reading: not known
   const std::array<std::int32_t, Cells>& sigma_ppb;
-  std::int32_t mean_soc_ppb, current_ua, highest_cdegc;  ///< no_reading: not known
-  bool allowed;  ///< no fault is in the way
+  std::int32_t mean_soc_ppb, current_ua, highest_cdegc;  ///< measurement::no_reading: not known
+  bool allowed;                                          ///< no fault is in the way
 };
 
 template <std::size_t Cells>
 class Balancing {
  public:
   static_assert(Cells <= 32, "a bit each");
-  static constexpr std::int32_t top_ppb = 950'000'000, anew_below_ppb = 850'000'000, dead_band_ppb = 5'000'000, known_to_ppb = 10'000'000;
+  static constexpr std::int32_t top_ppb = 950'000'000, anew_below_ppb = 850'000'000, dead_band_ppb = 5'000'000,
+                                known_to_ppb = 10'000'000;
   static constexpr std::uint32_t turn_us = 8'000'000;
 
   constexpr explicit Balancing(const BalancingPlan& plan) : plan_(&plan) {}
@@ -60,11 +68,13 @@ class Balancing {
     count_bled(in.cell_uv, step_us);
     turn_us_ = (turn_us_ + step_us) % (2 * turn_us);
     mask_ = 0;
-    if (in.current_ua == no_reading || in.mean_soc_ppb == no_reading) return 0;
+    if (in.current_ua == measurement::no_reading || in.mean_soc_ppb == measurement::no_reading) return 0;
     const bool flows_out = in.current_ua < -plan_->rest_ua;
     if (in.mean_soc_ppb < anew_below_ppb) measured_ = false;
     if (!measured_ && in.mean_soc_ppb >= top_ppb && !flows_out) measure(in);
-    if (!in.allowed || flows_out || in.highest_cdegc == no_reading || in.highest_cdegc > plan_->warmest_cdegc) return 0;
+    if (!in.allowed || flows_out || in.highest_cdegc == measurement::no_reading ||
+        in.highest_cdegc > plan_->warmest_cdegc)
+      return 0;
     constexpr std::uint32_t even = 0x5555'5555;
     const std::uint32_t turn = plan_->neighbours_may_bleed ? 0xFFFF'FFFF : turn_us_ < turn_us ? even : ~even;
     for (std::size_t k = 0; k < Cells; ++k) {
@@ -80,7 +90,8 @@ class Balancing {
     const std::int64_t most_uams = *std::max_element(left_uams_.begin(), left_uams_.end());
     if (most_uams <= 0 || cell_uv <= 0) return 0;
     const std::int64_t ms = most_uams / std::max(cell_uv / plan_->bleed_ohm, std::int32_t{1});
-    return static_cast<std::uint32_t>(std::min<std::int64_t>(ms / (plan_->neighbours_may_bleed ? 1'000 : 500), 0xFFFF'FFFF));
+    return static_cast<std::uint32_t>(
+        std::min<std::int64_t>(ms / (plan_->neighbours_may_bleed ? 1'000 : 500), 0xFFFF'FFFF));
   }
 
  private:
@@ -89,18 +100,21 @@ class Balancing {
     const std::uint32_t ms = left_us_ / 1'000;
     left_us_ %= 1'000;
     for (std::size_t k = 0; k < Cells; ++k) {
-      if ((mask_ >> k & 1) != 0 && cell_uv[k] > 0) left_uams_[k] -= static_cast<std::int64_t>(cell_uv[k] / plan_->bleed_ohm) * ms;
+      if ((mask_ >> k & 1) != 0 && cell_uv[k] > 0)
+        left_uams_[k] -= static_cast<std::int64_t>(cell_uv[k] / plan_->bleed_ohm) * ms;
     }
   }
 
   constexpr void measure(const BalancingInput<Cells>& in) {
     std::size_t lowest = Cells;
     for (std::size_t k = 0; k < Cells; ++k) {
-      if (in.soc_ppb[k] == no_reading || in.sigma_ppb[k] > known_to_ppb) return;  // a cell that is not known may be the lowest
+      if (in.soc_ppb[k] == measurement::no_reading || in.sigma_ppb[k] > known_to_ppb)
+        return;  // a cell that is not known may be the lowest
       if (lowest == Cells || in.soc_ppb[k] < in.soc_ppb[lowest]) lowest = k;
     }
     for (std::size_t k = 0; k < Cells; ++k) {
-      const std::int64_t sure = std::int64_t{in.soc_ppb[k]} - in.soc_ppb[lowest] - 2 * (std::int64_t{in.sigma_ppb[k]} + in.sigma_ppb[lowest]);
+      const std::int64_t sure =
+          std::int64_t{in.soc_ppb[k]} - in.soc_ppb[lowest] - 2 * (std::int64_t{in.sigma_ppb[k]} + in.sigma_ppb[lowest]);
       left_uams_[k] = sure > dead_band_ppb ? sure * plan_->uams_per_ppb : 0;
     }
     measured_ = true;

@@ -1,25 +1,29 @@
 // The pack's three contactors, their order, and whether they did what they were told.
 //
 //                 main+  main-  pre    leaves for
-//   off             -      -     -     self_test      a truck or a charger asks, anew since it was last followed, and no fault forbids it
+//   off             -      -     -     self_test      a truck or a charger asks, anew since it was last followed, and
+//   no fault forbids it
 //                                      safe           a fault opens
-//   self_test       -      -     -     precharge      three parts, each of one test time: all open, pre-charge relay alone, main- alone. In none may
+//   self_test       -      -     -     precharge      three parts, each of one test time: all open, pre-charge relay
+//   alone, main- alone. In none may
 //                                                     the link rise: the other pole would be welded
-//   precharge       -      x     x     drive, charge  link at 15/16 of the pack; on the way it has to keep to the curve of an RC
-//   drive           x      x     -     unloading      nobody asks any more; a fault opens; current flows that is forbidden
-//   charge          x      x     -     the same; here the charger is enabled
-//   unloading       x      x     -     opening        no current flows, or a fault or forbidden current has had its time of grace
-//   opening         -      -     -     off, safe      weld check: link falls by an eighth and no current flows; safe with a fault
-//   safe            -      -     -     off            no fault opens any more and nobody asks
+//   precharge       -      x     x     drive, charge  link at 15/16 of the pack; on the way it has to keep to the curve
+//   of an RC drive           x      x     -     unloading      nobody asks any more; a fault opens; current flows that
+//   is forbidden charge          x      x     -     the same; here the charger is enabled unloading       x      x -
+//   opening        no current flows, or a fault or forbidden current has had its time of grace opening         -      -
+//   -     off, safe      weld check: link falls by an eighth and no current flows; safe with a fault safe            -
+//   -     -     off            no fault opens any more and nobody asks
 //
-// A severe fault opens at once from everywhere. Only what is severe, or has been told to cease and does not, is opened under load; a truck
-// that just takes its request back keeps the contactors until its current is gone. The state is kept three times; one that contradicts
-// itself or is none ends in safe, all open, with an internal fault.
+// A severe fault opens at once from everywhere. Only what is severe, or has been told to cease and does not, is opened
+// under load; a truck that just takes its request back keeps the contactors until its current is gone. The state is
+// kept three times; one that contradicts itself or is none ends in safe, all open, with an internal fault.
 //
-//   pre-charge  link(t) = pack (1 - exp(-t / RC)). Checked against the curve of the last half time constant that is over, less a fifth of the
-//               pack: slower is a load or a short on the link, and the resistor would burn. After six time constants it has failed.
-//   links       a link that stands at 7/8 of the pack while all is open, or rises by an eighth with one pole closed, or current while open: welded
-//   not closed  0.3 s after closing (table) the link is still a sixteenth below the pack
+//   pre-charge  link(t) = pack (1 - exp(-t / RC)). Checked against the curve of the last half time constant that is
+//   over, less a fifth of the
+//               pack: slower is a load or a short on the link, and the resistor would burn. After six time constants it
+//               has failed.
+//   links       a link that stands at 7/8 of the pack while all is open, or rises by an eighth with one pole closed, or
+//   current while open: welded not closed  0.3 s after closing (table) the link is still a sixteenth below the pack
 //
 // Times are lengths that stop at their limit: nothing wraps. Integers only.
 #pragma once
@@ -29,7 +33,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/sample.hpp"
+#include "measurement/sample.hpp"
 #include "protection/guarded.hpp"
 #include "protection/pack_design.hpp"
 
@@ -37,7 +41,8 @@ namespace bms::protection {
 
 enum class ContactorState : std::uint8_t { off, self_test, precharge, drive, charge, unloading, opening, safe };
 inline constexpr std::size_t contactor_state_count = 8;
-inline constexpr std::array<const char*, contactor_state_count> contactor_state_names = {"off", "self-test", "precharge", "drive", "charge", "unloading", "opening", "safe"};
+inline constexpr std::array<const char*, contactor_state_count> contactor_state_names = {
+    "off", "self-test", "precharge", "drive", "charge", "unloading", "opening", "safe"};
 
 enum class Request : std::uint8_t { none, drive, charge };
 
@@ -54,19 +59,23 @@ struct ContactorPlan {
   std::int32_t rest_ua;
 
   /// Time in a state is counted up to that.
-  constexpr std::uint32_t longest_us() const { return std::max({3 * test_us, 12 * half_time_constant_us, link_discharge_us}); }
+  constexpr std::uint32_t longest_us() const {
+    return std::max({3 * test_us, 12 * half_time_constant_us, link_discharge_us});
+  }
 };
 
 constexpr ContactorPlan contactor_plan(const PackDesign& d) {
   const std::uint32_t half_us = in_us(d.precharge_time_constant_s / 2);
-  return {std::max(half_us, in_us(3 * d.sample_period_s)), half_us, in_us(d.link_discharge_s), in_micro(d.rest_current_c_rate * d.capacity_ah)};
+  return {std::max(half_us, in_us(3 * d.sample_period_s)), half_us, in_us(d.link_discharge_s),
+          in_micro(d.rest_current_c_rate * d.capacity_ah)};
 }
 
 struct ContactorInput {
   Request request = Request::none;
   bool open = false, open_now = false;  ///< a fault with that reaction is there
   bool charge_forbidden = false, discharge_forbidden = false;
-  std::int32_t current_ua = no_reading, pack_uv = no_reading, link_uv = no_reading;
+  std::int32_t current_ua = measurement::no_reading, pack_uv = measurement::no_reading,
+               link_uv = measurement::no_reading;
   std::uint32_t step_us;
 };
 
@@ -99,47 +108,68 @@ class Contactors {
  private:
   static constexpr std::uint32_t longest_halves = 12;
   /// 1 - exp(-k / 2) less a fifth, k = 0 .. 11, in 1/1024.
-  static constexpr std::array<std::int32_t, longest_halves> slowest = {0, 198, 442, 591, 681, 735, 768, 788, 800, 808, 812, 815};
+  static constexpr std::array<std::int32_t, longest_halves> slowest = {0,   198, 442, 591, 681, 735,
+                                                                       768, 788, 800, 808, 812, 815};
 
   constexpr void enter(ContactorState s) {
     state_.set(static_cast<std::uint32_t>(s));
     in_state_us_ = 0;
-    link_at_entry_uv_ = no_reading;
+    link_at_entry_uv_ = measurement::no_reading;
     if (s != ContactorState::unloading) ignored_us_ = 0;  // a second reason is no second time of grace
   }
 
   constexpr void step(const ContactorInput& in) {
     const ContactorState s = state();
-    const bool may_close = s == ContactorState::self_test || s == ContactorState::precharge || s == ContactorState::drive || s == ContactorState::charge || s == ContactorState::unloading;
+    const bool may_close = s == ContactorState::self_test || s == ContactorState::precharge ||
+                           s == ContactorState::drive || s == ContactorState::charge || s == ContactorState::unloading;
     if (in.open_now && may_close) return enter(ContactorState::opening);
     switch (s) {
-      case ContactorState::off: return in_off(in);
-      case ContactorState::self_test: return in_self_test(in);
-      case ContactorState::precharge: return in_precharge(in);
-      case ContactorState::drive: return closed(in, Request::drive);
-      case ContactorState::charge: return closed(in, Request::charge);
-      case ContactorState::unloading: return in_unloading(in);
-      case ContactorState::opening: return in_opening(in);
-      case ContactorState::safe: return in_safe(in);
+      case ContactorState::off:
+        return in_off(in);
+      case ContactorState::self_test:
+        return in_self_test(in);
+      case ContactorState::precharge:
+        return in_precharge(in);
+      case ContactorState::drive:
+        return closed(in, Request::drive);
+      case ContactorState::charge:
+        return closed(in, Request::charge);
+      case ContactorState::unloading:
+        return in_unloading(in);
+      case ContactorState::opening:
+        return in_opening(in);
+      case ContactorState::safe:
+        return in_safe(in);
     }
   }
 
   constexpr Outputs outputs_in(const ContactorInput& in) const {
     switch (state()) {
-      case ContactorState::self_test: return {.main_plus = false, .main_minus = part() == 2, .precharge = part() == 1};
-      case ContactorState::precharge: return {.main_plus = false, .main_minus = true, .precharge = true};
+      case ContactorState::self_test:
+        return {.main_plus = false, .main_minus = part() == 2, .precharge = part() == 1};
+      case ContactorState::precharge:
+        return {.main_plus = false, .main_minus = true, .precharge = true};
       case ContactorState::drive:
-      case ContactorState::unloading: return {.main_plus = true, .main_minus = true};
-      case ContactorState::charge: return {.main_plus = true, .main_minus = true, .precharge = false, .charge_enable = in_state_us_ >= plan_->test_us && !in.charge_forbidden && !events_.not_closed};
-      default: return {};
+      case ContactorState::unloading:
+        return {.main_plus = true, .main_minus = true};
+      case ContactorState::charge:
+        return {.main_plus = true,
+                .main_minus = true,
+                .precharge = false,
+                .charge_enable = in_state_us_ >= plan_->test_us && !in.charge_forbidden && !events_.not_closed};
+      default:
+        return {};
     }
   }
 
   constexpr bool blocked(const ContactorInput& in) const {
-    return in.open || (in.request == Request::drive && in.discharge_forbidden) || (in.request == Request::charge && in.charge_forbidden);
+    return in.open || (in.request == Request::drive && in.discharge_forbidden) ||
+           (in.request == Request::charge && in.charge_forbidden);
   }
 
-  static constexpr void count(std::uint32_t& us, std::uint32_t step_us, std::uint32_t most) { us = us >= most || step_us >= most - us ? most : us + step_us; }
+  static constexpr void count(std::uint32_t& us, std::uint32_t step_us, std::uint32_t most) {
+    us = us >= most || step_us >= most - us ? most : us + step_us;
+  }
 
   constexpr void in_off(const ContactorInput& in) {
     see_open(in);
@@ -150,17 +180,23 @@ class Contactors {
   }
 
   /// Which of the three parts of the self-test.
-  constexpr std::uint32_t part() const { return in_state_us_ < plan_->test_us ? 0 : in_state_us_ - plan_->test_us < plan_->test_us ? 1 : 2; }
+  constexpr std::uint32_t part() const {
+    return in_state_us_ < plan_->test_us ? 0 : in_state_us_ - plan_->test_us < plan_->test_us ? 1 : 2;
+  }
 
   constexpr void in_self_test(const ContactorInput& in) {
     see_open(in);
-    const bool known = in.link_uv != no_reading && in.pack_uv != no_reading && in.current_ua != no_reading;
-    if (known && link_at_entry_uv_ != no_reading && in.link_uv - link_at_entry_uv_ > in.pack_uv / 8) events_.welded = weld_proven_ = true;
-    if (known && (link_at_entry_uv_ == no_reading || in.link_uv < link_at_entry_uv_)) link_at_entry_uv_ = in.link_uv;
+    const bool known = in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
+                       in.current_ua != measurement::no_reading;
+    if (known && link_at_entry_uv_ != measurement::no_reading && in.link_uv - link_at_entry_uv_ > in.pack_uv / 8)
+      events_.welded = weld_proven_ = true;
+    if (known && (link_at_entry_uv_ == measurement::no_reading || in.link_uv < link_at_entry_uv_))
+      link_at_entry_uv_ = in.link_uv;
     if (events_.welded) return enter(ContactorState::opening);
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
     if (!known && in_state_us_ >= 2 * plan_->test_us) return fail_precharge();
-    if (in_state_us_ >= 2 * plan_->test_us && in_state_us_ - 2 * plan_->test_us >= plan_->test_us) enter(ContactorState::precharge);
+    if (in_state_us_ >= 2 * plan_->test_us && in_state_us_ - 2 * plan_->test_us >= plan_->test_us)
+      enter(ContactorState::precharge);
   }
 
   constexpr void fail_precharge() {
@@ -172,44 +208,55 @@ class Contactors {
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
     const std::uint32_t halves = in_state_us_ / plan_->half_time_constant_us;
     if (halves >= longest_halves) return fail_precharge();
-    if (in.link_uv == no_reading || in.pack_uv == no_reading) return;
+    if (in.link_uv == measurement::no_reading || in.pack_uv == measurement::no_reading) return;
     if (in.link_uv < part_of(in.pack_uv, slowest[halves])) return fail_precharge();
-    if (in.link_uv >= part_of(in.pack_uv, 960)) enter(in.request == Request::drive ? ContactorState::drive : ContactorState::charge);
+    if (in.link_uv >= part_of(in.pack_uv, 960))
+      enter(in.request == Request::drive ? ContactorState::drive : ContactorState::charge);
   }
 
   constexpr void closed(const ContactorInput& in, Request mine) {
-    if (in.link_uv != no_reading && in.pack_uv != no_reading) events_.not_closed = in.link_uv < part_of(in.pack_uv, 960);
+    if (in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading)
+      events_.not_closed = in.link_uv < part_of(in.pack_uv, 960);
     count_grace(in, forbidden_flows(in));
     if (ignored_us_ == grace_us) return enter(ContactorState::opening);
     if (in.request != mine || in.open) enter(ContactorState::unloading);
   }
 
   constexpr void in_unloading(const ContactorInput& in) {
-    const bool flows = in.current_ua == no_reading || magnitude(in.current_ua) > plan_->rest_ua;
+    const bool flows = in.current_ua == measurement::no_reading || magnitude(in.current_ua) > plan_->rest_ua;
     count_grace(in, in.open || forbidden_flows(in));
     if (!flows || ignored_us_ == grace_us) enter(ContactorState::opening);
   }
 
   constexpr bool forbidden_flows(const ContactorInput& in) const {
-    return in.current_ua != no_reading && ((in.charge_forbidden && in.current_ua > plan_->rest_ua) || (in.discharge_forbidden && in.current_ua < -plan_->rest_ua));
+    return in.current_ua != measurement::no_reading && ((in.charge_forbidden && in.current_ua > plan_->rest_ua) ||
+                                                        (in.discharge_forbidden && in.current_ua < -plan_->rest_ua));
   }
   /// How long current has flowed that is to cease. A reading that is missing now and then is no new beginning.
   constexpr void count_grace(const ContactorInput& in, bool to_cease) {
-    if (to_cease) count(ignored_us_, in.step_us, grace_us);
-    else if (in.current_ua != no_reading) ignored_us_ = 0;
+    if (to_cease)
+      count(ignored_us_, in.step_us, grace_us);
+    else if (in.current_ua != measurement::no_reading)
+      ignored_us_ = 0;
   }
 
   constexpr void in_opening(const ContactorInput& in) {
     const bool faulted = in.open || in.open_now;
-    const bool fell = in.link_uv != no_reading && in.pack_uv != no_reading && in.link_uv < part_of(in.pack_uv, 896);
-    const bool rests = in.current_ua != no_reading && magnitude(in.current_ua) <= plan_->rest_ua, flows = in.current_ua != no_reading && !rests;
-    if (fell && rests && in_state_us_ >= plan_->test_us) return enter(faulted ? ContactorState::safe : ContactorState::off);
+    const bool fell = in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
+                      in.link_uv < part_of(in.pack_uv, 896);
+    const bool rests = in.current_ua != measurement::no_reading && magnitude(in.current_ua) <= plan_->rest_ua,
+               flows = in.current_ua != measurement::no_reading && !rests;
+    if (fell && rests && in_state_us_ >= plan_->test_us)
+      return enter(faulted ? ContactorState::safe : ContactorState::off);
     see_open(in);
-    if (in_state_us_ < plan_->test_us || (!flows && in_state_us_ < plan_->link_discharge_us)) events_.welded = weld_proven_;  // it may still fall; what is not known is no weld
+    if (in_state_us_ < plan_->test_us || (!flows && in_state_us_ < plan_->link_discharge_us))
+      events_.welded = weld_proven_;  // it may still fall; what is not known is no weld
     if (in_state_us_ < plan_->link_discharge_us) return;
     // nothing contradicts, nothing proves: without readings there is no way to close again either
-    if (faulted) enter(ContactorState::safe);
-    else if (!events_.welded) enter(ContactorState::off);
+    if (faulted)
+      enter(ContactorState::safe);
+    else if (!events_.welded)
+      enter(ContactorState::off);
   }
 
   constexpr void in_safe(const ContactorInput& in) {
@@ -219,18 +266,21 @@ class Contactors {
 
   /// While everything is open, or one pole is.
   constexpr void see_open(const ContactorInput& in) {
-    const bool flows = in.current_ua != no_reading && magnitude(in.current_ua) > plan_->rest_ua;
-    const bool stands = in.link_uv != no_reading && in.pack_uv != no_reading && in.pack_uv > 0 && in.link_uv >= part_of(in.pack_uv, 896);
+    const bool flows = in.current_ua != measurement::no_reading && magnitude(in.current_ua) > plan_->rest_ua;
+    const bool stands = in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
+                        in.pack_uv > 0 && in.link_uv >= part_of(in.pack_uv, 896);
     events_.welded = weld_proven_ || flows || stands;
   }
 
-  static constexpr std::int32_t part_of(std::int32_t uv, std::int32_t of_1024) { return static_cast<std::int32_t>(static_cast<std::int64_t>(uv) * of_1024 / 1024); }
+  static constexpr std::int32_t part_of(std::int32_t uv, std::int32_t of_1024) {
+    return static_cast<std::int32_t>(static_cast<std::int64_t>(uv) * of_1024 / 1024);
+  }
 
   const ContactorPlan* plan_;
   Guarded state_{static_cast<std::uint32_t>(ContactorState::off)};
   std::uint32_t in_state_us_ = 0, ignored_us_ = 0;
   Request served_ = Request::none;  ///< the request that was followed last: it has to be made anew to be followed again
-  std::int32_t link_at_entry_uv_ = no_reading;  ///< the lowest the link has been in the self-test
+  std::int32_t link_at_entry_uv_ = measurement::no_reading;  ///< the lowest the link has been in the self-test
   ContactorEvents events_;
   bool weld_proven_ : 1 = false;  ///< by the self-test, whose proof is gone with the next sample; until the next start
   Outputs outputs_;

@@ -1,21 +1,26 @@
 // Currents that are allowed: what the cell can take by its model, ramped down before a limit cuts off.
 //
-//   allowed = lowest of (continuous limit, model's limit, ramp over voltage, ramp over temperature, ramp over soc), halved by a fault that
-//             derates, 0 by one that forbids; it moves by no more than the continuous limit a second downwards, a fifth of that upwards
+//   allowed = lowest of (continuous limit, model's limit, ramp over voltage, ramp over temperature, ramp over soc),
+//   halved by a fault that
+//             derates, 0 by one that forbids; it moves by no more than the continuous limit a second downwards, a fifth
+//             of that upwards
 //
-//   charge       highest cell  1 up to 6 % of the span below the upper limit, 0 there       soc     1 up to 95 %, a fifth from 100 % on
+//   charge       highest cell  1 up to 6 % of the span below the upper limit, 0 there       soc     1 up to 95 %, a
+//   fifth from 100 % on
 //                temperature   0 at 0 degrees C, 1 from 10; 1 up to 20 K below the upper limit, 0 15 K below
-//   discharge    lowest cell   1 from 30 % of the span above the lower limit, 0 there       soc     1 down to 10 %, a fifth at 0
+//   discharge    lowest cell   1 from 30 % of the span above the lower limit, 0 there       soc     1 down to 10 %, a
+//   fifth at 0
 //                temperature   0 at the lower limit, 1 from 15 K above; 1 up to 10 K below the upper limit, 0 there
 //
-// soc never ends a current: it may be wrong, so the last fifth is left to the voltage. Charging goes by soc plus sigma, discharging by soc less
-// sigma. What forbids acts at once, everything else in the bounded way. No temperature known: no charging, half of the discharging.
+// soc never ends a current: it may be wrong, so the last fifth is left to the voltage. Charging goes by soc plus sigma,
+// discharging by soc less sigma. What forbids acts at once, everything else in the bounded way. No temperature known:
+// no charging, half of the discharging.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 
-#include "estimator/sample.hpp"
+#include "measurement/sample.hpp"
 #include "protection/pack_design.hpp"
 
 namespace bms::protection {
@@ -28,7 +33,8 @@ struct Ramp {
   constexpr std::int32_t at(std::int32_t value) const {
     if (value <= from) return at_from;  // before a division of 64 bits that most samples do not need
     if (value >= to) return at_to;
-    return at_from + static_cast<std::int32_t>(static_cast<std::int64_t>(at_to - at_from) * (value - from) / (to - from));
+    return at_from +
+           static_cast<std::int32_t>(static_cast<std::int64_t>(at_to - at_from) * (value - from) / (to - from));
   }
 };
 
@@ -54,12 +60,13 @@ constexpr DeratingPlan derating_plan(const PackDesign& d) {
           .discharge_soc = {0, 100'000'000, fifth, all}};
 }
 
-/// What the allowed currents go by; no_reading where something is not known.
+/// What the allowed currents go by; measurement::no_reading where something is not known.
 struct DeratingInput {
-  std::int32_t highest_cell_uv = no_reading, lowest_cell_uv = no_reading;
-  std::int32_t highest_cdegc = no_reading, lowest_cdegc = no_reading;
-  std::int32_t soc_ppb = no_reading, soc_sigma_ppb = 0;
-  std::int32_t model_charge_ua = no_reading, model_discharge_ua = no_reading;  ///< state of function, both >= 0
+  std::int32_t highest_cell_uv = measurement::no_reading, lowest_cell_uv = measurement::no_reading;
+  std::int32_t highest_cdegc = measurement::no_reading, lowest_cdegc = measurement::no_reading;
+  std::int32_t soc_ppb = measurement::no_reading, soc_sigma_ppb = 0;
+  std::int32_t model_charge_ua = measurement::no_reading,
+               model_discharge_ua = measurement::no_reading;  ///< state of function, both >= 0
   bool derate = false, charge_forbidden = false, discharge_forbidden = false;
 };
 
@@ -75,17 +82,20 @@ class Derating {
   constexpr explicit Derating(const DeratingPlan& plan) : plan_(&plan) {}
 
   constexpr AllowedCurrent update(const DeratingInput& in, std::uint32_t step_us) {
-    const bool warmth_known = in.highest_cdegc != no_reading;
+    const bool warmth_known = in.highest_cdegc != measurement::no_reading;
     std::int32_t charge = warmth_known ? 1024 : 0, discharge = warmth_known ? 1024 : 512;
-    const auto lower = [](std::int32_t& share, const Ramp& ramp, std::int32_t value) { share = value == no_reading ? share : std::min(share, ramp.at(value)); };
+    const auto lower = [](std::int32_t& share, const Ramp& ramp, std::int32_t value) {
+      share = value == measurement::no_reading ? share : std::min(share, ramp.at(value));
+    };
     lower(charge, plan_->charge_voltage, in.highest_cell_uv);
     lower(charge, plan_->charge_cold, in.lowest_cdegc);
     lower(charge, plan_->charge_warm, in.highest_cdegc);
     lower(discharge, plan_->discharge_voltage, in.lowest_cell_uv);
     lower(discharge, plan_->discharge_cold, in.lowest_cdegc);
     lower(discharge, plan_->discharge_warm, in.highest_cdegc);
-    if (in.soc_ppb != no_reading) {
-      const std::int32_t soc_ppb = std::clamp<std::int32_t>(in.soc_ppb, 0, 1'000'000'000), sigma_ppb = std::clamp<std::int32_t>(in.soc_sigma_ppb, 0, 1'000'000'000);
+    if (in.soc_ppb != measurement::no_reading) {
+      const std::int32_t soc_ppb = std::clamp<std::int32_t>(in.soc_ppb, 0, 1'000'000'000),
+                         sigma_ppb = std::clamp<std::int32_t>(in.soc_sigma_ppb, 0, 1'000'000'000);
       lower(charge, plan_->charge_soc, soc_ppb + sigma_ppb);
       lower(discharge, plan_->discharge_soc, soc_ppb - sigma_ppb);
     }
@@ -97,12 +107,16 @@ class Derating {
   }
 
  private:
-  static constexpr void move(std::int32_t& allowed_ua, std::int32_t most_ua, std::int32_t share, std::int32_t model_ua, bool derate, std::uint32_t step_us) {
-    const auto part = [](std::int32_t ua, std::uint32_t of_2_20) { return static_cast<std::int32_t>((static_cast<std::int64_t>(ua) * of_2_20) >> 20); };
+  static constexpr void move(std::int32_t& allowed_ua, std::int32_t most_ua, std::int32_t share, std::int32_t model_ua,
+                             bool derate, std::uint32_t step_us) {
+    const auto part = [](std::int32_t ua, std::uint32_t of_2_20) {
+      return static_cast<std::int32_t>((static_cast<std::int64_t>(ua) * of_2_20) >> 20);
+    };
     std::int32_t target_ua = part(most_ua, static_cast<std::uint32_t>(share) << 10);
-    if (model_ua != no_reading) target_ua = std::min(target_ua, std::max(model_ua, std::int32_t{0}));
+    if (model_ua != measurement::no_reading) target_ua = std::min(target_ua, std::max(model_ua, std::int32_t{0}));
     if (derate) target_ua /= 2;
-    const std::int32_t down_ua = part(most_ua, std::min<std::uint32_t>(step_us, 1U << 20));  // 2^20 us for a second: 5 % slower
+    const std::int32_t down_ua =
+        part(most_ua, std::min<std::uint32_t>(step_us, 1U << 20));  // 2^20 us for a second: 5 % slower
     allowed_ua = std::clamp(target_ua, allowed_ua - down_ua, allowed_ua + down_ua / rise_slower);
   }
 

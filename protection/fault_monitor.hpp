@@ -1,23 +1,26 @@
 // Applies the table to the quantities of a sample: which faults are there, which was the first.
 //
-//   comes      the first sample beyond the threshold starts the delay. From then on a step counts up when the sample at its end is beyond,
-//              down when it is not; at 0 the start is forgotten, at the delay the fault is there. So noise around the threshold counts by
-//              what it does on the whole, not by its luckiest sample (as counter-based debouncing of AUTOSAR's diagnostic event manager).
+//   comes      the first sample beyond the threshold starts the delay. From then on a step counts up when the sample at
+//   its end is beyond,
+//              down when it is not; at 0 the start is forgotten, at the delay the fault is there. So noise around the
+//              threshold counts by what it does on the whole, not by its luckiest sample (as counter-based debouncing
+//              of AUTOSAR's diagnostic event manager).
 //   goes       once every sample for so long has been at the release threshold or better; any other starts that anew.
-//   unknown    a quantity that is not known (no_reading) neither brings nor ends a fault; times stand still.
-//   first      the fault that came first since the last clear, the gravest if several came in one sample. A warning gives way to the first fault,
+//   unknown    a quantity that is not known (measurement::no_reading) neither brings nor ends a fault; times stand
+//   still. first      the fault that came first since the last clear, the gravest if several came in one sample. A
+//   warning gives way to the first fault,
 //              and what has gone by itself to the next that comes.
 //   kept       faults of Recovery::service are told to be stored, and given back at the next start.
 //
-// No time of day is kept, only lengths, which stop at their limit: nothing wraps. The set of faults is guarded against flipped bits.
-// Cost: README.md. Integers only.
+// No time of day is kept, only lengths, which stop at their limit: nothing wraps. The set of faults is guarded against
+// flipped bits. Cost: README.md. Integers only.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/sample.hpp"
+#include "measurement/sample.hpp"
 #include "protection/guarded.hpp"
 #include "protection/table.hpp"
 
@@ -27,7 +30,7 @@ using Quantities = std::array<std::int32_t, quantity_count>;
 
 constexpr Quantities nothing_known() {
   Quantities q{};
-  q.fill(no_reading);
+  q.fill(measurement::no_reading);
   return q;
 }
 constexpr std::int32_t& at(Quantities& q, Quantity which) { return q[static_cast<std::size_t>(which)]; }
@@ -44,10 +47,15 @@ class FaultMonitor {
  public:
   /// kept: what the last run stored of kept().
   constexpr FaultMonitor(const Rules& rules, std::uint32_t kept)
-      : rules_(&rules), of_service_(faults_with(rules, Recovery::service)), active_(kept & of_service_), serviceable_(kept & of_service_) {}
+      : rules_(&rules),
+        of_service_(faults_with(rules, Recovery::service)),
+        active_(kept & of_service_),
+        serviceable_(kept & of_service_) {}
 
-  /// step_us: since the last call. servable: nothing has been closed since the start. Returns the faults that came with this sample.
-  constexpr std::uint32_t update(const Quantities& quantities, std::uint32_t step_us, std::uint64_t time_us, Clear clear, bool servable) {
+  /// step_us: since the last call. servable: nothing has been closed since the start. Returns the faults that came with
+  /// this sample.
+  constexpr std::uint32_t update(const Quantities& quantities, std::uint32_t step_us, std::uint64_t time_us,
+                                 Clear clear, bool servable) {
     const Clear pressed = clear_before_ == Clear::none ? clear : Clear::none;  // a key that is held clears once
     clear_before_ = clear;
     if (!servable) serviceable_ = 0;
@@ -55,7 +63,7 @@ class FaultMonitor {
     std::uint32_t now = before;
     for (std::size_t k = 0; k < fault_count; ++k) {
       const std::int32_t value = at(quantities, (*rules_)[k].quantity);
-      if (value == no_reading) continue;
+      if (value == measurement::no_reading) continue;
       const std::uint32_t mask = 1U << k;
       if ((now & mask) == 0) {
         if (comes((*rules_)[k], timer_[k], value, step_us)) now |= mask;
@@ -81,7 +89,8 @@ class FaultMonitor {
   constexpr void distrust() { active_.set(active_.any() | bit(Fault::internal_fault)); }
 
  private:
-  /// Of a fault that is not there: how long its quantity has been beyond; of one that is there: how long it has been good.
+  /// Of a fault that is not there: how long its quantity has been beyond; of one that is there: how long it has been
+  /// good.
   struct Timer {
     std::uint32_t us = 0;
     bool runs = false;
@@ -100,7 +109,8 @@ class FaultMonitor {
     t = {};
     return true;
   }
-  static constexpr bool goes(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us, Clear pressed, bool serviceable) {
+  static constexpr bool goes(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us, Clear pressed,
+                             bool serviceable) {
     const bool good = r.sense == Sense::above ? value <= r.release : value >= r.release;
     if (!good) {
       t = {};
@@ -123,10 +133,12 @@ class FaultMonitor {
     if (came == 0) return;
     std::size_t gravest = fault_count;
     for (std::size_t k = 0; k < fault_count; ++k) {
-      if ((came >> k & 1) != 0 && (gravest == fault_count || (*rules_)[k].reaction > (*rules_)[gravest].reaction)) gravest = k;
+      if ((came >> k & 1) != 0 && (gravest == fault_count || (*rules_)[k].reaction > (*rules_)[gravest].reaction))
+        gravest = k;
     }
     const auto mild = [&](std::size_t k) { return (*rules_)[k].reaction <= Reaction::derate; };
-    if (first_.fault < fault_count && (still >> first_.fault & 1) != 0 && (!mild(first_.fault) || mild(gravest))) return;
+    if (first_.fault < fault_count && (still >> first_.fault & 1) != 0 && (!mild(first_.fault) || mild(gravest)))
+      return;
     first_ = {static_cast<std::uint8_t>(gravest), time_us};
   }
 

@@ -1,7 +1,7 @@
 // What can be wrong with a pack: one bit each, and the name that the bus, the README and a person read.
 //
-// The order is that of the bits in frame Faults of can/greybox_bms.dbc; it is never changed, only continued. Names become the names of the
-// DBC's signals (words joined, capitals) and stand in its table of first causes.
+// The order is that of the bits in frame Faults of can/greybox_bms.dbc; it is never changed, only continued. Names
+// become the names of the DBC's signals (words joined, capitals) and stand in its table of first causes.
 #pragma once
 
 #include <array>
@@ -48,12 +48,38 @@ enum class Fault : std::uint8_t {
 inline constexpr std::size_t fault_count = 32;
 inline constexpr std::uint8_t no_fault = 0xFF;
 
-inline constexpr std::array<const char*, fault_count> fault_names = {
-    "cell overvoltage warning", "cell overvoltage",  "cell overvoltage severe", "cell undervoltage warning", "cell undervoltage", "cell undervoltage severe", "pack overvoltage",
-    "pack undervoltage",        "charge overcurrent", "discharge overcurrent",  "short circuit",             "overtemperature warning", "overtemperature",     "charge overtemperature",
-    "undertemperature",         "charge undertemperature", "open wire",         "imbalance",                 "current implausible", "sum mismatch",            "voltage missing",
-    "voltage stuck",            "current missing",   "temperature lost",        "temperature stuck",         "deep discharge",    "precharge failed",          "contactor welded",
-    "contactor not closed",     "samples missing",   "internal fault",          "storage fault"};
+inline constexpr std::array<const char*, fault_count> fault_names = {"cell overvoltage warning",
+                                                                     "cell overvoltage",
+                                                                     "cell overvoltage severe",
+                                                                     "cell undervoltage warning",
+                                                                     "cell undervoltage",
+                                                                     "cell undervoltage severe",
+                                                                     "pack overvoltage",
+                                                                     "pack undervoltage",
+                                                                     "charge overcurrent",
+                                                                     "discharge overcurrent",
+                                                                     "short circuit",
+                                                                     "overtemperature warning",
+                                                                     "overtemperature",
+                                                                     "charge overtemperature",
+                                                                     "undertemperature",
+                                                                     "charge undertemperature",
+                                                                     "open wire",
+                                                                     "imbalance",
+                                                                     "current implausible",
+                                                                     "sum mismatch",
+                                                                     "voltage missing",
+                                                                     "voltage stuck",
+                                                                     "current missing",
+                                                                     "temperature lost",
+                                                                     "temperature stuck",
+                                                                     "deep discharge",
+                                                                     "precharge failed",
+                                                                     "contactor welded",
+                                                                     "contactor not closed",
+                                                                     "samples missing",
+                                                                     "internal fault",
+                                                                     "storage fault"};
 
 constexpr const char* name_of(Fault f) { return fault_names[static_cast<std::size_t>(f)]; }
 constexpr std::uint32_t bit(Fault f) { return 1U << static_cast<unsigned>(f); }

@@ -1,13 +1,19 @@
-// What the table compares, from what a pack measures. Nothing is mended: a reading that is missing or impossible counts as missing.
+// What the table compares, from what a pack measures. Nothing is mended: a reading that is missing or impossible counts
+// as missing.
 //
-//   heat        h += ((I / limit)^2 - 1) dt while above 0, limit: 1.05 times the continuous one; a replica of what warms a cell, IEC 60255-149's
+//   heat        h += ((I / limit)^2 - 1) dt while above 0, limit: 1.05 times the continuous one; a replica of what
+//   warms a cell, IEC 60255-149's
 //               idea without its exponential. Cools by itself at rest: 30 s of it are gone in 30 s.
-//   shift       a sense wire that is broken is pulled to somewhere between its neighbours: one cell reads low, the next as much too high.
+//   shift       a sense wire that is broken is pulled to somewhere between its neighbours: one cell reads low, the next
+//   as much too high.
 //               Counts when the two differ by less than half of it.
-//   stuck       a cell reads the same to the last digit, five samples or more, while the other cells moved by 20 mV; a temperature, while the
-//               others moved by 5 K. The others: mean without highest and lowest; of less than four cells, the pack's own reading.
+//   stuck       a cell reads the same to the last digit, five samples or more, while the other cells moved by 20 mV; a
+//   temperature, while the
+//               others moved by 5 K. The others: mean without highest and lowest; of less than four cells, the pack's
+//               own reading.
 //
-// What was not measured makes its quantities unknown (no_reading). Memory: 9 bytes a cell. Cost: README.md.
+// What was not measured makes its quantities unknown (measurement::no_reading). Memory: 9 bytes a cell. Cost:
+// README.md.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +21,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/pack_sample.hpp"
+#include "measurement/pack_sample.hpp"
 #include "protection/fault_monitor.hpp"
 #include "protection/pack_design.hpp"
 
@@ -29,7 +35,8 @@ struct PackLimits {
 
 constexpr PackLimits pack_limits(const PackDesign& d) {
   const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
-  return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a), std::min<std::uint8_t>(d.temperatures, most_temperatures)};
+  return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a),
+          std::min<std::uint8_t>(d.temperatures, measurement::most_temperatures)};
 }
 
 /// A cell's voltage that can be one, or be asked to be protected from: a reversed one reads a little below 0.
@@ -45,17 +52,20 @@ class PackQuantities {
   constexpr explicit PackQuantities(const PackLimits& limits) : limits_(limits) {}
 
   /// step_us: since the last one.
-  constexpr void update(const PackSample<Cells>& sample, std::uint32_t step_us, Quantities& q) {
+  constexpr void update(const measurement::PackSample<Cells>& sample, std::uint32_t step_us, Quantities& q) {
     see_cells(sample, q);
     see_current(sample.current_ua, step_us, q);
     see_temperatures(sample.temperature_cdegc, q);
   }
 
-  constexpr std::int32_t sum_uv() const { return sum_uv_; }  ///< of all cells of the last sample, or no_reading
+  constexpr std::int32_t sum_uv() const {
+    return sum_uv_;
+  }  ///< of all cells of the last sample, or measurement::no_reading
 
  private:
   struct Repeats {
-    std::int32_t value = no_reading, others;  ///< the reading, and where the others were when it last changed
+    std::int32_t value = measurement::no_reading,
+                 others;  ///< the reading, and where the others were when it last changed
     std::uint8_t count;
   };
 
@@ -68,31 +78,34 @@ class PackQuantities {
     return r.count == stuck_after && magnitude(others - r.others) > move;
   }
 
-  constexpr void see_cells(const PackSample<Cells>& sample, Quantities& q) {
-    std::int32_t high = no_reading, low = no_reading, missing = 0, sum = 0;
+  constexpr void see_cells(const measurement::PackSample<Cells>& sample, Quantities& q) {
+    std::int32_t high = measurement::no_reading, low = measurement::no_reading, missing = 0, sum = 0;
     for (const std::int32_t uv : sample.cell_uv) {
       if (!cell_possible(uv)) {
         ++missing;
         continue;
       }
       sum += uv;
-      high = std::max(high, uv);  // no_reading is less than any
-      low = low == no_reading ? uv : std::min(low, uv);
+      high = std::max(high, uv);  // measurement::no_reading is less than any
+      low = low == measurement::no_reading ? uv : std::min(low, uv);
     }
     const auto known = static_cast<std::int32_t>(Cells) - missing;
-    sum_uv_ = missing == 0 ? sum : no_reading;
-    const bool pack_known = sample.pack_uv >= 0;  // no_reading is less
+    sum_uv_ = missing == 0 ? sum : measurement::no_reading;
+    const bool pack_known = sample.pack_uv >= 0;  // measurement::no_reading is less
     at(q, Quantity::voltages_missing) = missing + (pack_known ? 0 : 1);
-    at(q, Quantity::pack_uv) = pack_known ? sample.pack_uv : no_reading;
-    at(q, Quantity::sum_error_uv) = pack_known && missing == 0 ? magnitude(sum - sample.pack_uv) : no_reading;
+    at(q, Quantity::pack_uv) = pack_known ? sample.pack_uv : measurement::no_reading;
+    at(q, Quantity::sum_error_uv) =
+        pack_known && missing == 0 ? magnitude(sum - sample.pack_uv) : measurement::no_reading;
     at(q, Quantity::highest_cell_uv) = high;
     at(q, Quantity::lowest_cell_uv) = low;
-    at(q, Quantity::spread_uv) = known > 0 ? high - low : no_reading;
-    at(q, Quantity::opposite_shift_uv) = known > 0 ? opposite_shift(sample.cell_uv, sum / known) : no_reading;
-    at(q, Quantity::voltages_stuck) = known == 0                ? no_reading
-                                      : known >= 4              ? cells_stuck(sample.cell_uv, (sum - high - low) / (known - 2))
-                                      : pack_known              ? cells_stuck(sample.cell_uv, sample.pack_uv / static_cast<std::int32_t>(Cells))
-                                                                : no_reading;
+    at(q, Quantity::spread_uv) = known > 0 ? high - low : measurement::no_reading;
+    at(q, Quantity::opposite_shift_uv) =
+        known > 0 ? opposite_shift(sample.cell_uv, sum / known) : measurement::no_reading;
+    at(q, Quantity::voltages_stuck) =
+        known == 0   ? measurement::no_reading
+        : known >= 4 ? cells_stuck(sample.cell_uv, (sum - high - low) / (known - 2))
+        : pack_known ? cells_stuck(sample.cell_uv, sample.pack_uv / static_cast<std::int32_t>(Cells))
+                     : measurement::no_reading;
   }
 
   static constexpr std::int32_t opposite_shift(const std::array<std::int32_t, Cells>& cell_uv, std::int32_t mean_uv) {
@@ -116,47 +129,51 @@ class PackQuantities {
   }
 
   constexpr void see_current(std::int32_t current_ua, std::uint32_t step_us, Quantities& q) {
-    const bool known = current_ua != no_reading;
+    const bool known = current_ua != measurement::no_reading;
     at(q, Quantity::currents_missing) = known ? 0 : 1;
-    at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : no_reading;
+    at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : measurement::no_reading;
     if (known) {
       heat(charge_heat_us_, current_ua / limits_.charge_ua_256th, step_us);
       heat(discharge_heat_us_, -current_ua / limits_.discharge_ua_256th, step_us);
     }
-    at(q, Quantity::charge_heat_us) = known ? charge_heat_us_ : no_reading;
-    at(q, Quantity::discharge_heat_us) = known ? discharge_heat_us_ : no_reading;
+    at(q, Quantity::charge_heat_us) = known ? charge_heat_us_ : measurement::no_reading;
+    at(q, Quantity::discharge_heat_us) = known ? discharge_heat_us_ : measurement::no_reading;
   }
 
-  /// times_256: current over its limit, less than 0 the other way; beyond ten it counts as ten, which is a short circuit anyway.
+  /// times_256: current over its limit, less than 0 the other way; beyond ten it counts as ten, which is a short
+  /// circuit anyway.
   static constexpr void heat(std::int32_t& heat_us, std::int32_t times_256, std::uint32_t step_us) {
     const std::int32_t held = std::clamp(times_256, std::int32_t{0}, std::int32_t{10 * 256});
-    const std::int64_t more_us = (static_cast<std::int64_t>(held * held - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
+    const std::int64_t more_us =
+        (static_cast<std::int64_t>(held * held - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
     heat_us = static_cast<std::int32_t>(std::clamp<std::int64_t>(heat_us + more_us, 0, longest_heat_us));
   }
 
-  constexpr void see_temperatures(const std::array<std::int16_t, most_temperatures>& all, Quantities& q) {
-    std::int32_t high = no_reading, low = no_reading, sum = 0, known = 0;
+  constexpr void see_temperatures(const std::array<std::int16_t, measurement::most_temperatures>& all, Quantities& q) {
+    std::int32_t high = measurement::no_reading, low = measurement::no_reading, sum = 0, known = 0;
     for (std::size_t k = 0; k < limits_.temperatures; ++k) {
-      if (!temperature_possible(all[k])) continue;
+      if (!measurement::temperature_possible(all[k])) continue;
       ++known;
       sum += all[k];
       high = std::max<std::int32_t>(high, all[k]);
-      low = low == no_reading ? all[k] : std::min<std::int32_t>(low, all[k]);
+      low = low == measurement::no_reading ? all[k] : std::min<std::int32_t>(low, all[k]);
     }
     at(q, Quantity::temperatures_missing) = limits_.temperatures - known;
     at(q, Quantity::highest_cdegc) = high;
     at(q, Quantity::lowest_cdegc) = low;
     std::int32_t count = 0;
     for (std::size_t k = 0; k < limits_.temperatures && known > 1; ++k) {
-      if (temperature_possible(all[k]) && stuck(temperature_[k], all[k], (sum - all[k]) / (known - 1), stuck_move_cdegc)) ++count;
+      if (measurement::temperature_possible(all[k]) &&
+          stuck(temperature_[k], all[k], (sum - all[k]) / (known - 1), stuck_move_cdegc))
+        ++count;
     }
-    at(q, Quantity::temperatures_stuck) = known > 1 ? count : no_reading;
+    at(q, Quantity::temperatures_stuck) = known > 1 ? count : measurement::no_reading;
   }
 
   PackLimits limits_;
   std::array<Repeats, Cells> cell_{};
-  std::array<Repeats, most_temperatures> temperature_{};
-  std::int32_t charge_heat_us_ = 0, discharge_heat_us_ = 0, sum_uv_ = no_reading;
+  std::array<Repeats, measurement::most_temperatures> temperature_{};
+  std::int32_t charge_heat_us_ = 0, discharge_heat_us_ = 0, sum_uv_ = measurement::no_reading;
 };
 
 }  // namespace bms::protection

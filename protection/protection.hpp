@@ -1,14 +1,16 @@
-// Protection of a pack of cells in series: what it measures and what the estimator knows of it go in, what may be done comes out.
+// Protection of a pack of cells in series: what it measures and what the estimator knows of it go in, what may be done
+// comes out.
 //
-//   constexpr auto pack = protection_plan(design);              in the compiler, of as many cells; has to outlive what uses it
-//   Protection<16> protection(pack, kept);                      kept: what the last run told to store
-//   decision = protection.update(sample, estimate, orders);     with every sample
-//   decision = protection.without_sample(now_us);               when none came: from the loop, as often as it likes, in the same clock
+//   constexpr auto pack = protection_plan(design);              in the compiler, of as many cells; has to outlive what
+//   uses it Protection<16> protection(pack, kept);                      kept: what the last run told to store decision
+//   = protection.update(sample, estimate, orders);     with every sample decision = protection.without_sample(now_us);
+//   when none came: from the loop, as often as it likes, in the same clock
 //
-// Order of a step: quantities of the sample, faults by the table, allowed currents, contactors, balancing. What the contactors find out counts
-// with the next sample; they themselves act on it at once. A sample that is not later than the one before is not used; five of them
-// in a row count as none. Until the first one of the run nothing closes, and missing is only what has not come when the measuring chain should be up.
-// Bounded time, no heap, integers only: the same on every core. Cost: README.md.
+// Order of a step: quantities of the sample, faults by the table, allowed currents, contactors, balancing. What the
+// contactors find out counts with the next sample; they themselves act on it at once. A sample that is not later than
+// the one before is not used; five of them in a row count as none. Until the first one of the run nothing closes, and
+// missing is only what has not come when the measuring chain should be up. Bounded time, no heap, integers only: the
+// same on every core. Cost: README.md.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +18,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/pack_sample.hpp"
+#include "measurement/pack_sample.hpp"
 #include "protection/balancing.hpp"
 #include "protection/contactors.hpp"
 #include "protection/derating.hpp"
@@ -28,7 +30,8 @@ namespace bms::protection {
 
 struct ProtectionPlan {
   Rules rules;
-  std::uint32_t derates, forbid_charge, forbid_discharge, open, open_now;  ///< faults with that reaction; who opens forbids as well
+  std::uint32_t derates, forbid_charge, forbid_discharge, open,
+      open_now;  ///< faults with that reaction; who opens forbids as well
   PackLimits limits;
   DeratingPlan derating;
   ContactorPlan contactors;
@@ -40,26 +43,38 @@ struct ProtectionPlan {
 constexpr ProtectionPlan protection_plan(const PackDesign& design) {
   const Rules rules = rules_of(protection_table(design));
   const std::uint32_t open_now = faults_with(rules, Reaction::open_now), open = faults_with(rules, Reaction::open);
-  return {rules, faults_with(rules, Reaction::derate), faults_with(rules, Reaction::forbid_charge) | open | open_now, faults_with(rules, Reaction::forbid_discharge) | open | open_now, open, open_now,
-          pack_limits(design), derating_plan(design), contactor_plan(design), balancing_plan(design), design.cells, in_us(design.start_s)};
+  return {rules,
+          faults_with(rules, Reaction::derate),
+          faults_with(rules, Reaction::forbid_charge) | open | open_now,
+          faults_with(rules, Reaction::forbid_discharge) | open | open_now,
+          open,
+          open_now,
+          pack_limits(design),
+          derating_plan(design),
+          contactor_plan(design),
+          balancing_plan(design),
+          design.cells,
+          in_us(design.start_s)};
 }
 
-/// What is known of the cells beside a sample; no_reading where it is not.
+/// What is known of the cells beside a sample; measurement::no_reading where it is not.
 template <std::size_t Cells>
 struct PackEstimate {
-  std::int32_t soc_ppb = no_reading, soc_sigma_ppb = 0;                             ///< of the mean cell, 1e-9
-  std::int32_t model_charge_ua = no_reading, model_discharge_ua = no_reading;       ///< CurrentLimits, both >= 0
-  bool contradicts = false;                                                         ///< Flag::voltage_disbelieved
-  std::array<std::int32_t, Cells> cell_soc_ppb = PackSample<Cells>{}.cell_uv;       ///< of each cell less the mean's
+  std::int32_t soc_ppb = measurement::no_reading, soc_sigma_ppb = 0;  ///< of the mean cell, 1e-9
+  std::int32_t model_charge_ua = measurement::no_reading,
+               model_discharge_ua = measurement::no_reading;  ///< CurrentLimits, both >= 0
+  bool contradicts = false;                                   ///< Flag::voltage_disbelieved
+  std::array<std::int32_t, Cells> cell_soc_ppb =
+      measurement::PackSample<Cells>{}.cell_uv;  ///< of each cell less the mean's
   std::array<std::int32_t, Cells> cell_sigma_ppb{};
 };
 
 /// What others want, and what the board says of itself.
 struct Orders {
   Request request = Request::none;
-  Clear clear = Clear::none;           ///< while it is pressed
-  std::int32_t link_uv = no_reading;   ///< on the load's side of the contactors
-  bool board_fault = false;            ///< a reset by the watchdog, with the first sample; a self-test of the board that failed
+  Clear clear = Clear::none;                       ///< while it is pressed
+  std::int32_t link_uv = measurement::no_reading;  ///< on the load's side of the contactors
+  bool board_fault = false;  ///< a reset by the watchdog, with the first sample; a self-test of the board that failed
   bool storage_fault = false;
 };
 
@@ -70,7 +85,7 @@ struct Decision {
   ContactorState state = ContactorState::off;
   Outputs outputs;
   AllowedCurrent allowed;
-  std::uint32_t bleed = 0;             ///< cells, a bit each
+  std::uint32_t bleed = 0;  ///< cells, a bit each
   std::uint32_t bleed_left_s = 0;
 };
 
@@ -81,12 +96,18 @@ class Protection {
   static constexpr std::uint8_t ignored_samples = 5;
 
   constexpr explicit Protection(const ProtectionPlan& plan, std::uint32_t kept = 0)
-      : plan_(&plan), quantities_(plan.limits), monitor_(plan.rules, kept), derating_(plan.derating), contactors_(plan.contactors), balancing_(plan.balancing) {
+      : plan_(&plan),
+        quantities_(plan.limits),
+        monitor_(plan.rules, kept),
+        derating_(plan.derating),
+        contactors_(plan.contactors),
+        balancing_(plan.balancing) {
     decision_.faults = monitor_.active();
     decision_.kept = monitor_.kept();
   }
 
-  constexpr const Decision& update(const PackSample<Cells>& sample, const PackEstimate<Cells>& estimate, const Orders& orders) {
+  constexpr const Decision& update(const measurement::PackSample<Cells>& sample, const PackEstimate<Cells>& estimate,
+                                   const Orders& orders) {
     decision_.came = 0;
     if (started_ && !later(sample.time_us, sample_us_)) {
       if (ignored_ < ignored_samples) ++ignored_;
@@ -109,16 +130,30 @@ class Protection {
     find_faults(q, step_us, orders);
     const std::uint32_t faults = monitor_.active();
 
-    const bool warmth_lost = (faults & bit(Fault::temperature_lost)) != 0 && at(q, Quantity::highest_cdegc) == no_reading;
-    const bool no_charge = (faults & plan_->forbid_charge) != 0 || warmth_lost, no_discharge = (faults & plan_->forbid_discharge) != 0;
+    const bool warmth_lost =
+        (faults & bit(Fault::temperature_lost)) != 0 && at(q, Quantity::highest_cdegc) == measurement::no_reading;
+    const bool no_charge = (faults & plan_->forbid_charge) != 0 || warmth_lost,
+               no_discharge = (faults & plan_->forbid_discharge) != 0;
     const bool closed = may_drive();
-    decision_.allowed = derating_.update({at(q, Quantity::highest_cell_uv), at(q, Quantity::lowest_cell_uv), at(q, Quantity::highest_cdegc), at(q, Quantity::lowest_cdegc), estimate.soc_ppb,
-                                          estimate.soc_sigma_ppb, estimate.model_charge_ua, estimate.model_discharge_ua, (faults & plan_->derates) != 0, no_charge || !closed, no_discharge || !closed},
-                                         step_us);
-    const std::int32_t pack_uv = at(q, Quantity::pack_uv) != no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
-    switch_contactors({.request = orders.request, .charge_forbidden = no_charge, .discharge_forbidden = no_discharge, .current_ua = sample.current_ua, .pack_uv = pack_uv, .link_uv = orders.link_uv, .step_us = step_us});
+    decision_.allowed = derating_.update(
+        {at(q, Quantity::highest_cell_uv), at(q, Quantity::lowest_cell_uv), at(q, Quantity::highest_cdegc),
+         at(q, Quantity::lowest_cdegc), estimate.soc_ppb, estimate.soc_sigma_ppb, estimate.model_charge_ua,
+         estimate.model_discharge_ua, (faults & plan_->derates) != 0, no_charge || !closed, no_discharge || !closed},
+        step_us);
+    const std::int32_t pack_uv =
+        at(q, Quantity::pack_uv) != measurement::no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
+    switch_contactors({.request = orders.request,
+                       .charge_forbidden = no_charge,
+                       .discharge_forbidden = no_discharge,
+                       .current_ua = sample.current_ua,
+                       .pack_uv = pack_uv,
+                       .link_uv = orders.link_uv,
+                       .step_us = step_us});
     if (!may_drive()) decision_.allowed = {};
-    decision_.bleed = balancing_.update({sample.cell_uv, estimate.cell_soc_ppb, estimate.cell_sigma_ppb, estimate.soc_ppb, sample.current_ua, at(q, Quantity::highest_cdegc), (faults & (plan_->open | plan_->open_now)) == 0}, step_us);
+    decision_.bleed = balancing_.update(
+        {sample.cell_uv, estimate.cell_soc_ppb, estimate.cell_sigma_ppb, estimate.soc_ppb, sample.current_ua,
+         at(q, Quantity::highest_cdegc), (faults & (plan_->open | plan_->open_now)) == 0},
+        step_us);
     decision_.bleed_left_s = balancing_.left_s(at(q, Quantity::lowest_cell_uv));
     return decision_;
   }
@@ -131,8 +166,11 @@ class Protection {
     }
     if (!later(now_us, sample_us_)) return decision_;
     const std::uint32_t age_us = clamped(now_us - sample_us_);
-    const auto patience_us = static_cast<std::uint32_t>(plan_->rules[static_cast<std::size_t>(Fault::samples_missing)].threshold);
-    return age_us <= (sampled_ ? patience_us : std::max(patience_us, plan_->start_us)) ? decision_ : blind(step_to(now_us), static_cast<std::int32_t>(age_us));
+    const auto patience_us =
+        static_cast<std::uint32_t>(plan_->rules[static_cast<std::size_t>(Fault::samples_missing)].threshold);
+    return age_us <= (sampled_ ? patience_us : std::max(patience_us, plan_->start_us))
+               ? decision_
+               : blind(step_to(now_us), static_cast<std::int32_t>(age_us));
   }
 
   constexpr const Decision& decision() const { return decision_; }
@@ -142,16 +180,25 @@ class Protection {
  private:
   static constexpr std::int32_t most_age_us = 2'000'000'000;
 
-  static constexpr bool later(std::uint64_t a_us, std::uint64_t b_us) { return a_us - b_us - 1 < std::uint64_t{1} << 63; }
-  static constexpr std::uint32_t clamped(std::uint64_t us) { return static_cast<std::uint32_t>(std::min<std::uint64_t>(us, most_age_us)); }
-
-  /// One of which nothing was read is none.
-  static constexpr bool measured(const PackSample<Cells>& s) {
-    return s.current_ua != no_reading || s.pack_uv != no_reading || std::any_of(s.cell_uv.begin(), s.cell_uv.end(), [](std::int32_t uv) { return uv != no_reading; }) ||
-           std::any_of(s.temperature_cdegc.begin(), s.temperature_cdegc.end(), [](std::int16_t cdegc) { return cdegc != no_temperature; });
+  static constexpr bool later(std::uint64_t a_us, std::uint64_t b_us) {
+    return a_us - b_us - 1 < std::uint64_t{1} << 63;
+  }
+  static constexpr std::uint32_t clamped(std::uint64_t us) {
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(us, most_age_us));
   }
 
-  constexpr bool may_drive() const { return contactors_.state() == ContactorState::drive || contactors_.state() == ContactorState::charge; }
+  /// One of which nothing was read is none.
+  static constexpr bool measured(const measurement::PackSample<Cells>& s) {
+    return s.current_ua != measurement::no_reading || s.pack_uv != measurement::no_reading ||
+           std::any_of(s.cell_uv.begin(), s.cell_uv.end(),
+                       [](std::int32_t uv) { return uv != measurement::no_reading; }) ||
+           std::any_of(s.temperature_cdegc.begin(), s.temperature_cdegc.end(),
+                       [](std::int16_t cdegc) { return cdegc != measurement::no_temperature; });
+  }
+
+  constexpr bool may_drive() const {
+    return contactors_.state() == ContactorState::drive || contactors_.state() == ContactorState::charge;
+  }
 
   constexpr std::uint32_t step_to(std::uint64_t time_us) {
     const bool forward = started_ && later(time_us, evaluated_us_);
@@ -161,7 +208,8 @@ class Protection {
   }
 
   constexpr void find_faults(Quantities& q, std::uint32_t step_us, const Orders& orders) {
-    const bool intact = monitor_.intact() && contactors_.intact() && plan_->cells == Cells;  // a plan of another pack is no plan
+    const bool intact =
+        monitor_.intact() && contactors_.intact() && plan_->cells == Cells;  // a plan of another pack is no plan
     if (!monitor_.intact()) monitor_.distrust();
     const ContactorEvents& seen = contactors_.events();
     at(q, Quantity::off_curve) = seen.precharge_failed;

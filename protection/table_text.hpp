@@ -11,20 +11,29 @@ namespace bms::protection {
 
 constexpr const char* words(Reaction r) {
   switch (r) {
-    case Reaction::warn: return "warn";
-    case Reaction::derate: return "derate";
-    case Reaction::forbid_charge: return "forbid charge";
-    case Reaction::forbid_discharge: return "forbid discharge";
-    case Reaction::open: return "open";
-    case Reaction::open_now: return "open now";
+    case Reaction::warn:
+      return "warn";
+    case Reaction::derate:
+      return "derate";
+    case Reaction::forbid_charge:
+      return "forbid charge";
+    case Reaction::forbid_discharge:
+      return "forbid discharge";
+    case Reaction::open:
+      return "open";
+    case Reaction::open_now:
+      return "open now";
   }
   return "";
 }
 constexpr const char* words(Recovery r) {
   switch (r) {
-    case Recovery::automatic: return "by itself";
-    case Recovery::on_clear: return "when cleared";
-    case Recovery::service: return "power cycle and service";
+    case Recovery::automatic:
+      return "by itself";
+    case Recovery::on_clear:
+      return "when cleared";
+    case Recovery::service:
+      return "power cycle and service";
   }
   return "";
 }
@@ -38,29 +47,52 @@ struct QuantityWords {
 };
 constexpr QuantityWords words(Quantity q) {
   switch (q) {
-    case Quantity::highest_cell_uv: return {"highest cell", "V", 1e6, 3};
-    case Quantity::lowest_cell_uv: return {"lowest cell", "V", 1e6, 3};
-    case Quantity::pack_uv: return {"pack", "V", 1e6, 2};
-    case Quantity::charge_heat_us: return {"excess of I² while charging, over 1.05 of the limit", "s", 1e6, 0};
-    case Quantity::discharge_heat_us: return {"the same while discharging", "s", 1e6, 0};
-    case Quantity::current_magnitude_ua: return {"current, either way", "A", 1e6, 1};
-    case Quantity::highest_cdegc: return {"warmest sensor", "°C", 1e2, 0};
-    case Quantity::lowest_cdegc: return {"coldest sensor", "°C", 1e2, 0};
-    case Quantity::opposite_shift_uv: return {"opposite shift of neighbours", "V", 1e6, 3};
-    case Quantity::spread_uv: return {"highest less lowest cell", "V", 1e6, 3};
-    case Quantity::contradiction: return {"the model disbelieves the readings"};
-    case Quantity::sum_error_uv: return {"sum of cells less pack", "V", 1e6, 3};
-    case Quantity::voltages_missing: return {"voltages missing"};
-    case Quantity::voltages_stuck: return {"cells stuck"};
-    case Quantity::currents_missing: return {"current missing"};
-    case Quantity::temperatures_missing: return {"sensors missing"};
-    case Quantity::temperatures_stuck: return {"sensors stuck"};
-    case Quantity::off_curve: return {"pre-charge off its curve"};
-    case Quantity::welded: return {"link stands, or current flows, while open"};
-    case Quantity::not_closed: return {"link below the pack while closed"};
-    case Quantity::sample_age_us: return {"time since a sample", "s", 1e6, 1};
-    case Quantity::self_contradiction: return {"state contradicts itself, watchdog"};
-    case Quantity::store_failed: return {"the store says so"};
+    case Quantity::highest_cell_uv:
+      return {"highest cell", "V", 1e6, 3};
+    case Quantity::lowest_cell_uv:
+      return {"lowest cell", "V", 1e6, 3};
+    case Quantity::pack_uv:
+      return {"pack", "V", 1e6, 2};
+    case Quantity::charge_heat_us:
+      return {"excess of I² while charging, over 1.05 of the limit", "s", 1e6, 0};
+    case Quantity::discharge_heat_us:
+      return {"the same while discharging", "s", 1e6, 0};
+    case Quantity::current_magnitude_ua:
+      return {"current, either way", "A", 1e6, 1};
+    case Quantity::highest_cdegc:
+      return {"warmest sensor", "°C", 1e2, 0};
+    case Quantity::lowest_cdegc:
+      return {"coldest sensor", "°C", 1e2, 0};
+    case Quantity::opposite_shift_uv:
+      return {"opposite shift of neighbours", "V", 1e6, 3};
+    case Quantity::spread_uv:
+      return {"highest less lowest cell", "V", 1e6, 3};
+    case Quantity::contradiction:
+      return {"the model disbelieves the readings"};
+    case Quantity::sum_error_uv:
+      return {"sum of cells less pack", "V", 1e6, 3};
+    case Quantity::voltages_missing:
+      return {"voltages missing"};
+    case Quantity::voltages_stuck:
+      return {"cells stuck"};
+    case Quantity::currents_missing:
+      return {"current missing"};
+    case Quantity::temperatures_missing:
+      return {"sensors missing"};
+    case Quantity::temperatures_stuck:
+      return {"sensors stuck"};
+    case Quantity::off_curve:
+      return {"pre-charge off its curve"};
+    case Quantity::welded:
+      return {"link stands, or current flows, while open"};
+    case Quantity::not_closed:
+      return {"link below the pack while closed"};
+    case Quantity::sample_age_us:
+      return {"time since a sample", "s", 1e6, 1};
+    case Quantity::self_contradiction:
+      return {"state contradicts itself, watchdog"};
+    case Quantity::store_failed:
+      return {"the store says so"};
   }
   return {};
 }
@@ -71,15 +103,22 @@ inline std::string markdown(const Table& table) {
     std::snprintf(text, sizeof text, "%.*f", digits, value);
     return std::string(text);
   };
-  std::string out = "| bit | fault | comes when | for | goes when | for | how | reaction | why so long |\n|---|---|---|---|---|---|---|---|---|\n";
+  std::string out =
+      "| bit | fault | comes when | for | goes when | for | how | reaction | why so long "
+      "|\n|---|---|---|---|---|---|---|---|---|\n";
   for (std::size_t k = 0; k < fault_count; ++k) {
     const Rule& r = table[k].rule;
     const QuantityWords q = words(r.quantity);
-    const auto limit = [&](const char* sign, std::int32_t value) { return std::string(sign) + " " + number(value / q.scale, q.digits) + (*q.unit != '\0' ? std::string(" ") + q.unit : ""); };
+    const auto limit = [&](const char* sign, std::int32_t value) {
+      return std::string(sign) + " " + number(value / q.scale, q.digits) +
+             (*q.unit != '\0' ? std::string(" ") + q.unit : "");
+    };
     const auto seconds = [&](std::uint32_t us) { return number(us / 1e6, us % 1'000'000 != 0 ? 1 : 0) + " s"; };
     const bool above = r.sense == Sense::above;
-    out += "| " + std::to_string(k) + " | " + name_of(r.fault) + " | " + q.what + " " + limit(above ? ">" : "<", r.threshold) + " | " + seconds(r.delay_us) + " | " +
-           limit(above ? "<=" : ">=", r.release) + " | " + seconds(r.recover_us) + " | " + words(r.recovery) + " | " + words(r.reaction) + " | " + table[k].why + " |\n";
+    out += "| " + std::to_string(k) + " | " + name_of(r.fault) + " | " + q.what + " " +
+           limit(above ? ">" : "<", r.threshold) + " | " + seconds(r.delay_us) + " | " +
+           limit(above ? "<=" : ">=", r.release) + " | " + seconds(r.recover_us) + " | " + words(r.recovery) + " | " +
+           words(r.reaction) + " | " + table[k].why + " |\n";
   }
   return out;
 }

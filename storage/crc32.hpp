@@ -1,4 +1,5 @@
-// CRC-32 of IEEE 802.3 (polynomial 0x04C11DB7, reflected, start and final xor all ones), four bits at a time: a table of 64 bytes.
+// CRC-32 of IEEE 802.3 (polynomial 0x04C11DB7, reflected, start and final xor all ones), four bits at a time: a table
+// of 64 bytes.
 #pragma once
 
 #include <array>

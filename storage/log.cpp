@@ -21,7 +21,9 @@ constexpr int tries_in_a_sector = 3, most_looks = 16;
 
 using Line = std::array<std::uint8_t, line_bytes>;
 
-constexpr std::uint16_t lines_of(std::size_t payload_bytes) { return static_cast<std::uint16_t>(1 + (payload_bytes + line_bytes - 1) / line_bytes); }
+constexpr std::uint16_t lines_of(std::size_t payload_bytes) {
+  return static_cast<std::uint16_t>(1 + (payload_bytes + line_bytes - 1) / line_bytes);
+}
 
 /// Of numbers that wrap.
 constexpr bool later(std::uint32_t a, std::uint32_t b) { return static_cast<std::int32_t>(a - b) > 0; }
@@ -40,14 +42,18 @@ Line mark_line() {
   return bytes;
 }
 
-bool replaces(const Record& later_one, const Record& r) { return later_one.kind.type == r.kind.type && later_one.kind.layout >= r.kind.layout && later(later_one.number, r.number); }
+bool replaces(const Record& later_one, const Record& r) {
+  return later_one.kind.type == r.kind.type && later_one.kind.layout >= r.kind.layout &&
+         later(later_one.number, r.number);
+}
 
 /// Programs whole words, the last one filled up with ones, and reads them back.
 bool program(std::uint8_t sector, std::uint32_t at, std::span<const std::uint8_t> bytes) {
   for (std::size_t k = 0; k < bytes.size(); k += 4) {
     const std::size_t n = std::min<std::size_t>(4, bytes.size() - k);
     std::uint32_t word = 0xFFFFFFFF;
-    for (std::size_t j = 0; j < n; ++j) word = (word & ~(0xFFU << (8 * j))) | static_cast<std::uint32_t>(bytes[k + j]) << (8 * j);
+    for (std::size_t j = 0; j < n; ++j)
+      word = (word & ~(0xFFU << (8 * j))) | static_cast<std::uint32_t>(bytes[k + j]) << (8 * j);
     if (!hal::flash_program(sector, at + static_cast<std::uint32_t>(k), word)) return false;
   }
   for (std::size_t k = 0; k < bytes.size();) {
@@ -67,11 +73,13 @@ void Log::open() {
   const hal::FlashSize size = hal::flash_start();
   const std::uint32_t lines = size.sector_bytes / line_bytes;
   // a power of two, so that the numbers of lines still fit when they wrap
-  const bool usable = size.sectors >= 2 && lines >= 4U * longest_record && lines <= 0x8000 && (lines & (lines - 1)) == 0;
+  const bool usable =
+      size.sectors >= 2 && lines >= 4U * longest_record && lines <= 0x8000 && (lines & (lines - 1)) == 0;
   if (!usable) return;
   size_ = {std::min<std::uint32_t>(size.sectors, most_sectors), size.sector_bytes};
   lines_ = static_cast<std::uint16_t>(lines);
-  for (int k = 0; k < most_looks && !look(); ++k) {}
+  for (int k = 0; k < most_looks && !look(); ++k) {
+  }
 }
 
 /// False: a torn record that reads now so and now otherwise has made a difference; look again.
@@ -84,7 +92,8 @@ bool Log::look() {
   const auto sectors = static_cast<std::uint8_t>(size_.sectors);
   for (std::uint8_t s = 0; s < sectors; ++s) {
     found[s] = survey(s, [](const Record&) {});
-    if (state_[s] != Sector::broken) state_[s] = marked(s) && blank(s, 1, static_cast<std::uint16_t>(lines_ - 1)) ? Sector::erased : Sector::dirty;
+    if (state_[s] != Sector::broken)
+      state_[s] = marked(s) && blank(s, 1, static_cast<std::uint16_t>(lines_ - 1)) ? Sector::erased : Sector::dirty;
   }
   find_sector_in_charge(std::span(found).first(size_.sectors));
   if (charge_ == none) return true;
@@ -92,7 +101,9 @@ bool Log::look() {
   for (std::uint8_t s = 0; s < sectors; ++s) {
     if (s == charge_) continue;
     const bool ahead = found[s].begun && later(found[s].base, base_);
-    const bool twice = found[s].begun && found[s].base == base_;  // no run of a log writes that: its numbers would be taken for those in charge
+    const bool twice =
+        found[s].begun &&
+        found[s].base == base_;  // no run of a log writes that: its numbers would be taken for those in charge
     interrupted_ = interrupted_ || ahead;
     if (!ahead && !twice) survey(s, taking);
   }
@@ -110,7 +121,8 @@ void Log::find_sector_in_charge(std::span<const Survey> found) {
   const auto sectors = static_cast<std::uint8_t>(found.size());
   for (std::uint8_t s = 0; s < sectors; ++s) {
     if (!found[s].any) continue;
-    const bool better = charge_ == none || (found[s].original != found[charge_].original ? found[s].original : later(found[s].base, base_));
+    const bool better = charge_ == none || (found[s].original != found[charge_].original ? found[s].original
+                                                                                         : later(found[s].base, base_));
     if (!better) continue;
     charge_ = s;
     base_ = found[s].base;
@@ -142,7 +154,8 @@ Log::Survey Log::survey(std::uint8_t sector, See&& see) const {
   return s;
 }
 
-std::optional<Log::Header> Log::identity_in(const std::array<std::uint8_t, line_bytes>& bytes, std::uint16_t line) const {
+std::optional<Log::Header> Log::identity_in(const std::array<std::uint8_t, line_bytes>& bytes,
+                                            std::uint16_t line) const {
   Header h;
   h.number = get_bytes<std::uint32_t>(bytes, 0);
   if ((h.number & (lines_ - 1U)) != line) return std::nullopt;
@@ -181,8 +194,10 @@ bool Log::unmark(std::uint8_t sector) const { return program(sector, 0, Line{});
 /// Into those in force, without those it replaces; the order of calls does not matter.
 void Log::take(const Record& record) {
   const auto begin = kept_.begin(), end = begin + static_cast<std::ptrdiff_t>(kept_count_);
-  if (std::any_of(begin, end, [&](const Record& r) { return r.number == record.number || replaces(r, record); })) return;
-  kept_count_ = static_cast<std::size_t>(std::remove_if(begin, end, [&](const Record& r) { return replaces(record, r); }) - begin);
+  if (std::any_of(begin, end, [&](const Record& r) { return r.number == record.number || replaces(r, record); }))
+    return;
+  kept_count_ = static_cast<std::size_t>(
+      std::remove_if(begin, end, [&](const Record& r) { return replaces(record, r); }) - begin);
   if (kept_count_ < kept_.size()) kept_[kept_count_++] = record;
 }
 
@@ -194,7 +209,8 @@ std::optional<Record> Log::newest(std::uint8_t type, std::uint8_t known_layout) 
   return found;
 }
 
-std::optional<Log::Found> Log::load(std::uint8_t type, std::uint8_t known_layout, std::span<std::uint8_t, longest_payload> into) {
+std::optional<Log::Found> Log::load(std::uint8_t type, std::uint8_t known_layout,
+                                    std::span<std::uint8_t, longest_payload> into) {
   for (int k = 0; k < most_looks; ++k) {
     const auto record = newest(type, known_layout);
     if (!record) return std::nullopt;
@@ -205,7 +221,8 @@ std::optional<Log::Found> Log::load(std::uint8_t type, std::uint8_t known_layout
 }
 
 /// Nothing: it cannot be read any more.
-std::optional<std::span<const std::uint8_t>> Log::read(const Record& record, std::span<std::uint8_t, longest_payload> into) const {
+std::optional<std::span<const std::uint8_t>> Log::read(const Record& record,
+                                                       std::span<std::uint8_t, longest_payload> into) const {
   const auto payload = into.first(record.length);
   hal::flash_read(record.sector, (record.line + 1U) * line_bytes, payload);
   // of what is in `into`, not of what another reading might give
@@ -245,7 +262,8 @@ bool Log::settle() {
   return settled_;
 }
 
-/// Behind the last complete record: what was begun is made certain, so that every later boot sees the same, and void. next_ is behind it.
+/// Behind the last complete record: what was begun is made certain, so that every later boot sees the same, and void.
+/// next_ is behind it.
 void Log::void_what_was_torn() {
   next_ = last_end_;
   for (std::uint16_t at = last_end_; at < lines_;) {
@@ -287,13 +305,15 @@ Stored Log::append(Kind kind, std::span<const std::uint8_t> payload, std::uint16
 }
 
 Stored Log::move(Kind kind, std::span<const std::uint8_t> payload) {
-  if ((charge_ == none || interrupted_) && wants_erase()) return Stored::wants_erase;  // what lies there may yet turn out to be a record
+  if ((charge_ == none || interrupted_) && wants_erase())
+    return Stored::wants_erase;  // what lies there may yet turn out to be a record
   const std::uint32_t others = charge_ == none ? size_.sectors : size_.sectors - 1;
   for (std::uint32_t steps = 1; steps <= others; ++steps) {
     const std::uint8_t sector = after(steps);
     if (state_[sector] != Sector::erased) continue;
     state_[sector] = Sector::dirty;
-    if (move_into(sector, (charge_ == none ? sector : base_ / lines_ + steps) * lines_, kind, payload)) return Stored::kept;
+    if (move_into(sector, (charge_ == none ? sector : base_ / lines_ + steps) * lines_, kind, payload))
+      return Stored::kept;
     state_[sector] = Sector::broken;
   }
   return wants_erase() ? Stored::wants_erase : Stored::refused;
@@ -330,19 +350,21 @@ bool Log::move_into(std::uint8_t sector, std::uint32_t base, Kind kind, std::spa
   return true;
 }
 
-/// The identity with its check first: whoever finds them knows how many lines are taken. The checksum of it all last: with it the record is.
+/// The identity with its check first: whoever finds them knows how many lines are taken. The checksum of it all last:
+/// with it the record is.
 bool Log::write(const Record& record, bool copy, std::span<const std::uint8_t> payload) const {
   Line header{};
   put_bytes(header, 0, record.number);
   header[4] = static_cast<std::uint8_t>(record.kind.type | (copy ? copy_bit : 0));
   header[5] = record.kind.layout;
   header[6] = record.length;
-  const auto identity = std::span(header).first(identity_bytes), commit = std::span(header).subspan(commit_at, 4), check = std::span(header).subspan(check_at, 4);
+  const auto identity = std::span(header).first(identity_bytes), commit = std::span(header).subspan(commit_at, 4),
+             check = std::span(header).subspan(check_at, 4);
   put_bytes(commit, 0, Crc32().add(identity).add(payload).value());
   put_bytes(check, 0, crc32(identity));
   const std::uint32_t at = record.line * line_bytes;
-  return program(record.sector, at, identity) && program(record.sector, at + check_at, check) && program(record.sector, at + line_bytes, payload) &&
-         program(record.sector, at + commit_at, commit);
+  return program(record.sector, at, identity) && program(record.sector, at + check_at, check) &&
+         program(record.sector, at + line_bytes, payload) && program(record.sector, at + commit_at, commit);
 }
 
 bool Log::wants_erase() const {
@@ -372,15 +394,20 @@ void Log::rescue_from(std::uint8_t sector) {
     std::array<std::uint8_t, longest_payload> payload;
     const Record record = kept_[k];
     const auto bytes = read(record, payload);
-    if (bytes && append(record.kind, *bytes, 0) == Stored::kept) k = static_cast<std::size_t>(-1);  // those in force are others now
+    if (bytes && append(record.kind, *bytes, 0) == Stored::kept)
+      k = static_cast<std::size_t>(-1);  // those in force are others now
   }
 }
 
 std::uint32_t Log::broken() const { return static_cast<std::uint32_t>(std::ranges::count(state_, Sector::broken)); }
 bool Log::works() const { return size_.sectors >= 2 + broken(); }
-std::uint32_t Log::rounds() const { return size_.sectors == 0 ? 0 : (charge_ == none ? 0 : base_ / lines_ / size_.sectors + 1); }
+std::uint32_t Log::rounds() const {
+  return size_.sectors == 0 ? 0 : (charge_ == none ? 0 : base_ / lines_ / size_.sectors + 1);
+}
 
 /// Round the sectors from the one in charge; sector 0 is the first of all.
-std::uint8_t Log::after(std::uint32_t steps) const { return static_cast<std::uint8_t>((charge_ == none ? steps - 1 : charge_ + steps) % size_.sectors); }
+std::uint8_t Log::after(std::uint32_t steps) const {
+  return static_cast<std::uint8_t>((charge_ == none ? steps - 1 : charge_ + steps) % size_.sectors);
+}
 
 }  // namespace bms::storage

@@ -1,23 +1,26 @@
-// Records that outlive the power: an append-only log in the sectors of hal/flash.hpp. After whatever happened, open() finds the newest
-// complete record of each type.
+// Records that outlive the power: an append-only log in the sectors of hal/flash.hpp. After whatever happened, open()
+// finds the newest complete record of each type.
 //
 //   sector   line 0: the mark "was erased to the end"; then records. A line has 16 bytes.
-//   record   header of one line: number, type and layout and length, CRC-32 of it all (written last), CRC-32 of the first two; payload
-//   number   of a record: of its line, counted through all rounds, modulo 2^32; what is written later has the higher one
+//   record   header of one line: number, type and layout and length, CRC-32 of it all (written last), CRC-32 of the
+//   first two; payload number   of a record: of its line, counted through all rounds, modulo 2^32; what is written
+//   later has the higher one
 //
-// One sector is in charge: it holds the newest of every record. When it is full, those that are still good are copied into the next
-// erased one and the new record is written behind them; with that record the next sector is in charge. So a sector that is not in charge
-// holds nothing that is needed and may be erased at any time, and an interrupted move is begun again. The sectors go round: all wear alike.
+// One sector is in charge: it holds the newest of every record. When it is full, those that are still good are copied
+// into the next erased one and the new record is written behind them; with that record the next sector is in charge. So
+// a sector that is not in charge holds nothing that is needed and may be erased at any time, and an interrupted move is
+// begun again. The sectors go round: all wear alike.
 //
-// A word that was being programmed when the power went may read well now and badly later. So before anything else is written after boot,
-// what lies behind the last complete record is made void, and that record is written once more.
+// A word that was being programmed when the power went may read well now and badly later. So before anything else is
+// written after boot, what lies behind the last complete record is made void, and that record is written once more.
 //
-// A type may have several layouts. A record replaces those of its type with the same or an older layout; one of a newer layout, which this
-// firmware cannot read, stays and is copied on.
+// A type may have several layouts. A record replaces those of its type with the same or an older layout; one of a newer
+// layout, which this firmware cannot read, stays and is copied on.
 //
-// Erasing is apart from storing, because it takes half a second: store() never erases, it says `wants_erase`; erase_one() is called when
-// the core may stand still. Time of store(): 16 us a word (100 at most), a record of 32 bytes 0.2 ms (1.2 at most); when it moves into the
-// next sector up to 4 KiB of records more, 16 ms (0.1 s at most). open(): reads all sectors twice, 20 ms for 48 KiB at 168 MHz.
+// Erasing is apart from storing, because it takes half a second: store() never erases, it says `wants_erase`;
+// erase_one() is called when the core may stand still. Time of store(): 16 us a word (100 at most), a record of 32
+// bytes 0.2 ms (1.2 at most); when it moves into the next sector up to 4 KiB of records more, 16 ms (0.1 s at most).
+// open(): reads all sectors twice, 20 ms for 48 KiB at 168 MHz.
 //
 // No heap. Never fails, only says less: without flash, or with one good sector left, store() returns `refused`.
 #pragma once
@@ -53,8 +56,8 @@ struct Kind {
 struct Record {
   Kind kind;
   std::uint8_t sector;
-  std::uint8_t length;   ///< of the payload [bytes]
-  std::uint16_t line;    ///< of the header
+  std::uint8_t length;  ///< of the payload [bytes]
+  std::uint16_t line;   ///< of the header
   std::uint32_t number;
 };
 
@@ -68,7 +71,8 @@ class Log {
     std::span<const std::uint8_t> payload;  ///< in `into`
   };
   /// The newest record of a type whose layout is known_layout at most.
-  std::optional<Found> load(std::uint8_t type, std::uint8_t known_layout, std::span<std::uint8_t, longest_payload> into);
+  std::optional<Found> load(std::uint8_t type, std::uint8_t known_layout,
+                            std::span<std::uint8_t, longest_payload> into);
   /// All that are in force, of whatever type and layout.
   std::span<const Record> in_force() const { return std::span(kept_).first(kept_count_); }
 
@@ -80,9 +84,9 @@ class Log {
   bool erase_one();
 
   std::uint32_t sectors() const { return size_.sectors; }
-  std::uint32_t broken() const;            ///< sectors that did not erase, or did not keep what was written, since open()
-  bool works() const;                      ///< there are two good sectors, which a log needs to go on
-  std::uint32_t rounds() const;            ///< how often each sector was erased so far: its number of lines says
+  std::uint32_t broken() const;  ///< sectors that did not erase, or did not keep what was written, since open()
+  bool works() const;            ///< there are two good sectors, which a log needs to go on
+  std::uint32_t rounds() const;  ///< how often each sector was erased so far: its number of lines says
 
  private:
   enum class Sector : std::uint8_t { dirty, erased, broken };
@@ -104,7 +108,8 @@ class Log {
 
   bool look();
   std::optional<Record> newest(std::uint8_t type, std::uint8_t known_layout) const;
-  std::optional<std::span<const std::uint8_t>> read(const Record& record, std::span<std::uint8_t, longest_payload> into) const;
+  std::optional<std::span<const std::uint8_t>> read(const Record& record,
+                                                    std::span<std::uint8_t, longest_payload> into) const;
   template <class See>
   Survey survey(std::uint8_t sector, See&& see) const;
   void find_sector_in_charge(std::span<const Survey> found);
@@ -126,14 +131,14 @@ class Log {
   std::uint8_t after(std::uint32_t steps) const;
 
   hal::FlashSize size_{};
-  std::uint16_t lines_ = 0;                       ///< of a sector
+  std::uint16_t lines_ = 0;  ///< of a sector
   std::array<Sector, most_sectors> state_{};
   std::uint8_t charge_ = none;
-  std::uint32_t base_ = 0;                        ///< number of line 0 of the sector in charge
-  std::uint16_t next_ = 0;                        ///< line to write to
-  bool interrupted_ = false;                      ///< a move was begun: nothing may be added to the sector in charge any more
-  bool settled_ = false;                          ///< nothing that was written before boot is in doubt
-  std::optional<Record> last_;                    ///< the last complete record, and the line behind it, when the log was opened
+  std::uint32_t base_ = 0;      ///< number of line 0 of the sector in charge
+  std::uint16_t next_ = 0;      ///< line to write to
+  bool interrupted_ = false;    ///< a move was begun: nothing may be added to the sector in charge any more
+  bool settled_ = false;        ///< nothing that was written before boot is in doubt
+  std::optional<Record> last_;  ///< the last complete record, and the line behind it, when the log was opened
   std::uint16_t last_end_ = 0;
   std::array<Record, most_kept> kept_{};
   std::size_t kept_count_ = 0;

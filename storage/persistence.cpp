@@ -11,13 +11,15 @@ namespace bms::storage {
 namespace {
 
 constexpr std::int32_t moved_soc_ppb = 1'000'000;
-constexpr std::int32_t moved_cell = 100, moved_health_ppm = 1'000;     // 0.1 % each
-constexpr std::uint16_t charge_at_least_minutes = 60, cells_every_minutes = 30, health_every_minutes = 60, fault_every_minutes = 10;
+constexpr std::int32_t moved_cell = 100, moved_health_ppm = 1'000;  // 0.1 % each
+constexpr std::uint16_t charge_at_least_minutes = 60, cells_every_minutes = 30, health_every_minutes = 60,
+                        fault_every_minutes = 10;
 constexpr std::uint8_t most_faults_at_once = 16;
 constexpr std::uint64_t uaus_per_uah = 3'600'000'000;
 constexpr std::uint16_t processor_fault_code = 0xFF00;  // and the exception's number
 
-constexpr std::array known_kinds{ChargeRecord::kind, CellsRecord::kind, HealthRecord::kind, EventsRecord::kind, SettingsRecord::kind};
+constexpr std::array known_kinds{ChargeRecord::kind, CellsRecord::kind, HealthRecord::kind, EventsRecord::kind,
+                                 SettingsRecord::kind};
 
 template <class R>
 bool get(Log& log, R& record) {
@@ -32,18 +34,21 @@ bool put(Log& log, const R& record) {
   return log.store(R::kind, encode(record, bytes)) == Stored::kept;
 }
 
-bool apart(std::int32_t a, std::int32_t b, std::int32_t by) {
-  return std::abs(std::int64_t{a} - b) >= by;
+bool apart(std::int32_t a, std::int32_t b, std::int32_t by) { return std::abs(std::int64_t{a} - b) >= by; }
+
+constexpr std::uint16_t counted(std::uint16_t minutes) {
+  return minutes < 0xFFFF ? static_cast<std::uint16_t>(minutes + 1) : minutes;
 }
 
-constexpr std::uint16_t counted(std::uint16_t minutes) { return minutes < 0xFFFF ? static_cast<std::uint16_t>(minutes + 1) : minutes; }
-
 /// The power stayed on over those.
-constexpr bool only_the_core(hal::ResetCause cause) { return cause == hal::ResetCause::software || cause == hal::ResetCause::watchdog || cause == hal::ResetCause::pin; }
+constexpr bool only_the_core(hal::ResetCause cause) {
+  return cause == hal::ResetCause::software || cause == hal::ResetCause::watchdog || cause == hal::ResetCause::pin;
+}
 
 }  // namespace
 
-void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault, std::optional<std::uint32_t> calendar_s) {
+void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,
+                        std::optional<std::uint32_t> calendar_s) {
   log_.open();
   known_ = get(log_, charge_kept_);
   charge_ = charge_kept_;
@@ -52,13 +57,17 @@ void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRec
   if (HealthRecord health; get(log_, health)) health_ = health;
   get(log_, events_);
   get(log_, settings_);
-  if (only_the_core(cause)) off_s_ = 0;
-  else if (known_ && calendar_s && charge_kept_.calendar_s != 0 && *calendar_s >= charge_kept_.calendar_s) off_s_ = *calendar_s - charge_kept_.calendar_s;
+  if (only_the_core(cause))
+    off_s_ = 0;
+  else if (known_ && calendar_s && charge_kept_.calendar_s != 0 && *calendar_s >= charge_kept_.calendar_s)
+    off_s_ = *calendar_s - charge_kept_.calendar_s;
 
   ++events_.starts;
   auto& resets = events_.resets[static_cast<std::size_t>(cause) % EventsRecord::causes];
   if (resets < 0xFFFF) ++resets;
-  if (processor_fault) events_.add({static_cast<std::uint16_t>(processor_fault_code | (processor_fault->exception & 0xFFU)), charge_.operating_s});
+  if (processor_fault)
+    events_.add(
+        {static_cast<std::uint16_t>(processor_fault_code | (processor_fault->exception & 0xFFU)), charge_.operating_s});
   events_changed_ = true;
   for (std::uint32_t k = 0; k < log_.sectors() && log_.wants_erase(); ++k) {
     log_.erase_one();
@@ -66,12 +75,12 @@ void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRec
   }
 }
 
-std::optional<StartingPoint> Persistence::starting_point() const {
+std::optional<measurement::StartingPoint> Persistence::starting_point() const {
   if (!known_) return std::nullopt;
-  StoredEstimate stored = charge_kept_.pack;
+  estimator::StoredEstimate stored = charge_kept_.pack;
   const std::int64_t sigma = std::int64_t{stored.soc_sigma_ppb} + charge_kept_.moved_ppb;
   stored.soc_sigma_ppb = static_cast<std::int32_t>(std::min<std::int64_t>(sigma, 1'000'000'000));
-  return resumed(stored, off_s_);
+  return estimator::resumed(stored, off_s_);
 }
 
 /// What was counted since the last call, in whole units; the rest stays.
@@ -100,8 +109,11 @@ void Persistence::keep(const Values& now, std::optional<std::uint32_t> calendar_
     soc_before_ppb_ = now.pack->soc_ppb;
     const bool first = !known_ || !kept_in_this_run_;
     const bool has_moved = apart(now.pack->soc_ppb, charge_kept_.pack.soc_ppb, moved_soc_ppb) ||
-                           apart(now.pack->soc_sigma_ppb, charge_kept_.pack.soc_sigma_ppb, std::max(moved_soc_ppb / 10, charge_kept_.pack.soc_sigma_ppb / 10));
-    const bool long_ago = charge_minutes_ >= charge_at_least_minutes && (charge_.charged_uah != charge_kept_.charged_uah || charge_.discharged_uah != charge_kept_.discharged_uah);
+                           apart(now.pack->soc_sigma_ppb, charge_kept_.pack.soc_sigma_ppb,
+                                 std::max(moved_soc_ppb / 10, charge_kept_.pack.soc_sigma_ppb / 10));
+    const bool long_ago =
+        charge_minutes_ >= charge_at_least_minutes &&
+        (charge_.charged_uah != charge_kept_.charged_uah || charge_.discharged_uah != charge_kept_.discharged_uah);
     if (first || has_moved || long_ago) put_charge(*now.pack, moved_ppb, calendar_s);
   }
   if (cells_minutes_ >= cells_every_minutes) put_cells(now.cells);
@@ -138,7 +150,8 @@ bool Persistence::set(std::uint16_t key, std::int32_t value) {
   return true;
 }
 
-void Persistence::put_charge(const StoredEstimate& now, std::uint32_t moved_ppb, std::optional<std::uint32_t> calendar_s) {
+void Persistence::put_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
+                             std::optional<std::uint32_t> calendar_s) {
   charge_.pack = now;
   charge_.moved_ppb = moved_ppb;
   charge_.calendar_s = calendar_s.value_or(0);
@@ -162,8 +175,10 @@ void Persistence::put_cells(std::span<const CellsRecord::Cell> now) {
 }
 
 void Persistence::put_health(const HealthRecord& now) {
-  const bool moved = !health_ || apart(now.capacity_ppm, health_->capacity_ppm, moved_health_ppm) || apart(now.resistance_ppm, health_->resistance_ppm, moved_health_ppm) ||
-                     apart(now.capacity_sigma_ppm, health_->capacity_sigma_ppm, moved_health_ppm) || apart(now.resistance_sigma_ppm, health_->resistance_sigma_ppm, moved_health_ppm);
+  const bool moved = !health_ || apart(now.capacity_ppm, health_->capacity_ppm, moved_health_ppm) ||
+                     apart(now.resistance_ppm, health_->resistance_ppm, moved_health_ppm) ||
+                     apart(now.capacity_sigma_ppm, health_->capacity_sigma_ppm, moved_health_ppm) ||
+                     apart(now.resistance_sigma_ppm, health_->resistance_sigma_ppm, moved_health_ppm);
   if (!moved || !put(log_, now)) return;
   health_ = now;
   health_minutes_ = 0;
@@ -179,7 +194,10 @@ void Persistence::put_events_in_turn() {
 void Persistence::put_settings() { settings_changed_ = !put(log_, settings_); }
 
 std::uint32_t Persistence::newer_records() const {
-  const auto newer = [](const Record& r) { return std::ranges::none_of(known_kinds, [&](const Kind& k) { return k.type == r.kind.type && k.layout >= r.kind.layout; }); };
+  const auto newer = [](const Record& r) {
+    return std::ranges::none_of(known_kinds,
+                                [&](const Kind& k) { return k.type == r.kind.type && k.layout >= r.kind.layout; });
+  };
   return static_cast<std::uint32_t>(std::ranges::count_if(log_.in_force(), newer));
 }
 

@@ -1,15 +1,16 @@
 // What the battery remembers, and when it writes it down. Wear is bounded whatever happens:
 //
-//   charge    once a minute at most, when soc has moved by 0.1 % or its sigma by a tenth; after an hour if anything has changed
-//   cells     every half hour at most, when one has moved by 0.1 %
-//   health    every hour at most, when one value has moved by 0.1 %
-//   events    a fault at once: sixteen in a row, then one every ten minutes; starts and resets with the first minute of a run, so that a
+//   charge    once a minute at most, when soc has moved by 0.1 % or its sigma by a tenth; after an hour if anything has
+//   changed cells     every half hour at most, when one has moved by 0.1 % health    every hour at most, when one value
+//   has moved by 0.1 % events    a fault at once: sixteen in a row, then one every ten minutes; starts and resets with
+//   the first minute of a run, so that a
 //             battery that starts again and again writes nothing
 //   settings  when set
 //   all that has changed, at once: power_failing()
 //
-// What could not be written is tried again a minute later. Erasing is the caller's to time: start() does it before anything runs, later
-// erase_one() when the core may stand still for half a second (hal/flash.hpp), e.g. with open contactors or without current.
+// What could not be written is tried again a minute later. Erasing is the caller's to time: start() does it before
+// anything runs, later erase_one() when the core may stand still for half a second (hal/flash.hpp), e.g. with open
+// contactors or without current.
 //
 // Time is the samples' own. Cost of a sample: counting its charge, some thirty instructions; less without flash.
 #pragma once
@@ -20,8 +21,8 @@
 #include <span>
 
 #include "estimator/restart.hpp"
-#include "estimator/sample.hpp"
 #include "hal/power.hpp"
+#include "measurement/sample.hpp"
 #include "storage/log.hpp"
 #include "storage/records.hpp"
 
@@ -29,7 +30,7 @@ namespace bms::storage {
 
 /// What the estimator knows at the moment.
 struct Values {
-  std::optional<StoredEstimate> pack;      ///< nothing: not started
+  std::optional<estimator::StoredEstimate> pack;  ///< nothing: not started
   std::span<const CellsRecord::Cell> cells;
   HealthRecord health;
 };
@@ -37,20 +38,23 @@ struct Values {
 class Persistence {
  public:
   /// At boot: reads what was stored, erases what is to be erased. calendar_s: hal/calendar.hpp.
-  void start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault, std::optional<std::uint32_t> calendar_s);
+  void start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,
+             std::optional<std::uint32_t> calendar_s);
 
   /// Where to begin, if that is known: as stored, as unsure as the time off and what was not written any more make it.
-  std::optional<StartingPoint> starting_point() const;
+  std::optional<measurement::StartingPoint> starting_point() const;
 
   /// Every sample. True once a minute: keep() is to be called.
-  bool count(const Sample& sample) {
+  bool count(const measurement::Sample& sample) {
     if (log_.sectors() == 0) return false;
     const std::uint64_t us = counting_ && sample.time_us > time_us_ ? sample.time_us - time_us_ : 0;
     const auto step_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(us, minute_us));
     counting_ = true;
     time_us_ = sample.time_us;
-    if (sample.current_ua > 0) charged_uaus_ += static_cast<std::uint64_t>(sample.current_ua) * step_us;
-    else if (sample.current_ua != no_reading) discharged_uaus_ += static_cast<std::uint64_t>(static_cast<std::uint32_t>(-sample.current_ua)) * step_us;
+    if (sample.current_ua > 0)
+      charged_uaus_ += static_cast<std::uint64_t>(sample.current_ua) * step_us;
+    else if (sample.current_ua != measurement::no_reading)
+      discharged_uaus_ += static_cast<std::uint64_t>(static_cast<std::uint32_t>(-sample.current_ua)) * step_us;
     since_us_ += step_us;
     return since_us_ >= minute_us;
   }
@@ -63,7 +67,8 @@ class Persistence {
   /// The supply goes, or the battery is switched off. Charge first, 0.2 ms; 2 ms for everything, 12 at most.
   void power_failing(const Values& now, std::optional<std::uint32_t> calendar_s);
 
-  /// The supply sinks, and may stop sinking: charge alone, 0.2 ms, 1.2 at most where there is room for it in its sector, 20 where there is not.
+  /// The supply sinks, and may stop sinking: charge alone, 0.2 ms, 1.2 at most where there is room for it in its
+  /// sector, 20 where there is not.
   void supply_failing(const Values& now, std::optional<std::uint32_t> calendar_s);
 
   bool wants_erase() const { return log_.wants_erase(); }
@@ -83,7 +88,8 @@ class Persistence {
   static constexpr std::uint32_t minute_us = 60'000'000;
 
   void pass_time();
-  void put_charge(const StoredEstimate& now, std::uint32_t moved_ppb, std::optional<std::uint32_t> calendar_s);
+  void put_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
+                  std::optional<std::uint32_t> calendar_s);
   void put_cells(std::span<const CellsRecord::Cell> now);
   void put_health(const HealthRecord& now);
   void put_events();
@@ -96,7 +102,7 @@ class Persistence {
   std::optional<HealthRecord> health_;
   EventsRecord events_;
   SettingsRecord settings_;
-  bool known_ = false;             ///< charge_kept_ is from a record
+  bool known_ = false;  ///< charge_kept_ is from a record
   bool events_changed_ = false, settings_changed_ = false, kept_in_this_run_ = false;
   std::optional<std::uint32_t> off_s_;
   std::int32_t soc_before_ppb_ = 0;

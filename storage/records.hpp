@@ -1,5 +1,6 @@
-// What is stored, and how it lies in a record: little-endian, field after field (hal/bytes.hpp). A record is decoded only if it has the
-// length that its layout says; a record of an older layout is read by what is left of that layout here.
+// What is stored, and how it lies in a record: little-endian, field after field (hal/bytes.hpp). A record is decoded
+// only if it has the length that its layout says; a record of an older layout is read by what is left of that layout
+// here.
 //
 //   type      layout  bytes  content
 //   charge    2       32     state of charge, charge moved, time in operation: the only one that is written often
@@ -66,26 +67,39 @@ class Decoder {
 struct ChargeRecord {
   static constexpr Kind kind{1, 2};
 
-  StoredEstimate pack;
-  std::uint32_t moved_ppb = 0;       ///< by which soc may have moved since: what it moved before this was written; 0 at a shutdown
+  estimator::StoredEstimate pack;
+  std::uint32_t moved_ppb =
+      0;  ///< by which soc may have moved since: what it moved before this was written; 0 at a shutdown
   std::uint64_t charged_uah = 0, discharged_uah = 0;
   std::uint32_t operating_s = 0;
-  std::uint32_t calendar_s = 0;      ///< hal/calendar.hpp; 0: no clock
+  std::uint32_t calendar_s = 0;  ///< hal/calendar.hpp; 0: no clock
 
   constexpr bool operator==(const ChargeRecord&) const = default;
 };
 
 /// Thousandths of a full cycle: what was discharged over the capacity.
-constexpr std::uint64_t cycles_milli(const ChargeRecord& r, std::uint32_t capacity_uah) { return capacity_uah == 0 ? 0 : r.discharged_uah * 1'000 / capacity_uah; }
-
-constexpr Bytes encode(const ChargeRecord& r, Payload into) {
-  return Encoder(into).put(r.pack.soc_ppb).put(r.pack.soc_sigma_ppb).put(r.moved_ppb).put(r.charged_uah, 6).put(r.discharged_uah, 6).put(r.operating_s).put(r.calendar_s).bytes();
+constexpr std::uint64_t cycles_milli(const ChargeRecord& r, std::uint32_t capacity_uah) {
+  return capacity_uah == 0 ? 0 : r.discharged_uah * 1'000 / capacity_uah;
 }
 
-/// The estimator's soc goes a little beyond 0 and 1; one that goes further, or a sigma that cannot be, is nothing to go by.
-constexpr StoredEstimate possible(StoredEstimate e) {
+constexpr Bytes encode(const ChargeRecord& r, Payload into) {
+  return Encoder(into)
+      .put(r.pack.soc_ppb)
+      .put(r.pack.soc_sigma_ppb)
+      .put(r.moved_ppb)
+      .put(r.charged_uah, 6)
+      .put(r.discharged_uah, 6)
+      .put(r.operating_s)
+      .put(r.calendar_s)
+      .bytes();
+}
+
+/// The estimator's soc goes a little beyond 0 and 1; one that goes further, or a sigma that cannot be, is nothing to go
+/// by.
+constexpr estimator::StoredEstimate possible(estimator::StoredEstimate e) {
   constexpr std::int32_t one = 1'000'000'000, beyond = one / 4, anything = 289'000'000;
-  if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > anything) e.soc_sigma_ppb = anything;
+  if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > anything)
+    e.soc_sigma_ppb = anything;
   e.soc_ppb = std::clamp(e.soc_ppb, std::int32_t{0}, one);
   return e;
 }
@@ -157,7 +171,12 @@ struct HealthRecord {
 };
 
 constexpr Bytes encode(const HealthRecord& r, Payload into) {
-  return Encoder(into).put(r.capacity_ppm).put(r.capacity_sigma_ppm).put(r.resistance_ppm).put(r.resistance_sigma_ppm).bytes();
+  return Encoder(into)
+      .put(r.capacity_ppm)
+      .put(r.capacity_sigma_ppm)
+      .put(r.resistance_ppm)
+      .put(r.resistance_sigma_ppm)
+      .bytes();
 }
 
 constexpr bool decode(Bytes from, std::uint8_t layout, HealthRecord& r) {
@@ -174,8 +193,8 @@ struct EventsRecord {
   static constexpr Kind kind{4, 1};
   static constexpr std::size_t causes = 7, most_faults = 16;
   struct Fault {
-    std::uint16_t code = 0;          ///< 0: none
-    std::uint32_t operating_s = 0;   ///< when
+    std::uint16_t code = 0;         ///< 0: none
+    std::uint32_t operating_s = 0;  ///< when
     constexpr bool operator==(const Fault&) const = default;
   };
 
@@ -186,7 +205,9 @@ struct EventsRecord {
 
   constexpr void add(const Fault& f) { fault[faults++ % most_faults] = f; }
   /// back: 0 for the newest, below 16.
-  constexpr Fault last(std::uint32_t back) const { return back < faults ? fault[(faults - 1 - back) % most_faults] : Fault{}; }
+  constexpr Fault last(std::uint32_t back) const {
+    return back < faults ? fault[(faults - 1 - back) % most_faults] : Fault{};
+  }
   constexpr bool operator==(const EventsRecord&) const = default;
 };
 
@@ -212,7 +233,8 @@ constexpr bool decode(Bytes from, std::uint8_t layout, EventsRecord& r) {
   return true;
 }
 
-/// Values that were set in the field, by key; what is not there has its default. Who gives a key a meaning never gives it another.
+/// Values that were set in the field, by key; what is not there has its default. Who gives a key a meaning never gives
+/// it another.
 struct SettingsRecord {
   static constexpr Kind kind{5, 1};
   static constexpr std::size_t most = 24;
@@ -222,7 +244,7 @@ struct SettingsRecord {
     constexpr bool operator==(const Setting&) const = default;
   };
 
-  std::uint16_t revision = 0;   ///< one more with every change
+  std::uint16_t revision = 0;  ///< one more with every change
   std::uint8_t count = 0;
   std::array<Setting, most> setting{};
 
@@ -237,8 +259,10 @@ struct SettingsRecord {
     std::size_t k = 0;
     while (k < count && setting[k].key != key) ++k;
     if (k == most) return false;
-    if (k == count) ++count;
-    else if (setting[k].value == value) return true;
+    if (k == count)
+      ++count;
+    else if (setting[k].value == value)
+      return true;
     setting[k] = {key, value};
     ++revision;
     return true;

@@ -5,14 +5,16 @@
 #include <functional>
 #include <vector>
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 namespace {
 
 constexpr int grid = 200;  // edges lie on whole half percents
 
-/// Splits where the straight line is worst until it is good or the edges are used up. error(left, right, at): of the line at `at`.
-std::vector<double> place_edges(int first, std::size_t least, std::size_t most, double good, const std::function<double(double, double, double)>& error) {
+/// Splits where the straight line is worst until it is good or the edges are used up. error(left, right, at): of the
+/// line at `at`.
+std::vector<double> place_edges(int first, std::size_t least, std::size_t most, double good,
+                                const std::function<double(double, double, double)>& error) {
   std::vector<int> edges = {first, grid};
   const auto soc = [](int place) { return place / double{grid}; };
   while (edges.size() < most) {
@@ -37,7 +39,8 @@ double on_line(double left, double right, double at, double left_value, double r
 }
 
 /// Values at the edges whose connecting lines fit best between 2 % and 98 %, each place with its weight.
-std::vector<double> fit_lines(const std::vector<double>& edges, const std::function<double(double)>& value, const std::function<double(double)>& weight) {
+std::vector<double> fit_lines(const std::vector<double>& edges, const std::function<double(double)>& value,
+                              const std::function<double(double)>& weight) {
   const std::size_t n = edges.size();
   std::vector<double> diagonal(n, 0.0), beside(n, 0.0), right_side(n, 0.0);
   std::size_t k = 0;
@@ -56,23 +59,27 @@ std::vector<double> fit_lines(const std::vector<double>& edges, const std::funct
     diagonal[e] -= share * beside[e - 1], right_side[e] -= share * right_side[e - 1];
   }
   std::vector<double> values(n);
-  for (std::size_t e = n; e-- > 0;) values[e] = (right_side[e] - (e + 1 < n ? beside[e] * values[e + 1] : 0)) / diagonal[e];
+  for (std::size_t e = n; e-- > 0;)
+    values[e] = (right_side[e] - (e + 1 < n ? beside[e] * values[e + 1] : 0)) / diagonal[e];
   return values;
 }
 
 }  // namespace
 
-CalibratedCell calibrate(const HealthyCell& cell, double share, Random& random) {
+CalibratedCell calibrate(const HealthyCell& cell, double share, plant::Random& random) {
   CalibratedCell made;
   made.capacity_ah = cell.capacity_ah * (1 + 0.0025 * share * between(random, -1, 1));
 
   const Curve& ocv = cell.ocv_v;
-  made.ocv_soc = place_edges(0, 10, 20, between(random, 0.0015, 0.003),  // halved by the fit
-                            
-                             [&](double l, double r, double at) { return on_line(l, r, at, ocv.at(l), ocv.at(r)) - ocv.at(at); });
+  made.ocv_soc =
+      place_edges(0, 10, 20, between(random, 0.0015, 0.003),  // halved by the fit
+
+                  [&](double l, double r, double at) { return on_line(l, r, at, ocv.at(l), ocv.at(r)) - ocv.at(at); });
   const SmoothChance ocv_error(random), r0_error(random), r1_error(random), c1_error(random);
-  std::vector<double> edge_v = fit_lines(made.ocv_soc, [&](double soc) { return ocv.at(soc); }, [](double) { return 1.0; });
-  for (std::size_t k = 0; k < edge_v.size(); ++k) edge_v[k] += share * made.ocv_tolerance_v * ocv_error.at(made.ocv_soc[k]);
+  std::vector<double> edge_v = fit_lines(
+      made.ocv_soc, [&](double soc) { return ocv.at(soc); }, [](double) { return 1.0; });
+  for (std::size_t k = 0; k < edge_v.size(); ++k)
+    edge_v[k] += share * made.ocv_tolerance_v * ocv_error.at(made.ocv_soc[k]);
   double left_v = edge_v[0];
   for (std::size_t k = 0; k + 1 < made.ocv_soc.size(); ++k) {
     const double left = made.ocv_soc[k], width = made.ocv_soc[k + 1] - left;
@@ -83,11 +90,15 @@ CalibratedCell calibrate(const HealthyCell& cell, double share, Random& random) 
   }
 
   made.rc_soc = place_edges(6, 6, 9 + below(random, 3), 0.012, [&](double l, double r, double at) {
-    const auto off = [&](const Curve& curve) { return std::abs(on_line(l, r, at, curve.at(l), curve.at(r)) / curve.at(at) - 1); };
+    const auto off = [&](const Curve& curve) {
+      return std::abs(on_line(l, r, at, curve.at(l), curve.at(r)) / curve.at(at) - 1);
+    };
     return std::max({off(cell.r0_ohm), off(cell.r1_ohm), 0.6 * off(cell.c1_f)});
   });
   const auto fit = [&](const Curve& curve) {  // in proportion
-    return fit_lines(made.rc_soc, [&](double soc) { return curve.at(soc); }, [&](double soc) { return 1 / (curve.at(soc) * curve.at(soc)); });
+    return fit_lines(
+        made.rc_soc, [&](double soc) { return curve.at(soc); },
+        [&](double soc) { return 1 / (curve.at(soc) * curve.at(soc)); });
   };
   made.r0_ohm = fit(cell.r0_ohm), made.r1_ohm = fit(cell.r1_ohm), made.c1_f = fit(cell.c1_f);
   for (std::size_t k = 0; k < made.rc_soc.size(); ++k) {
@@ -98,4 +109,4 @@ CalibratedCell calibrate(const HealthyCell& cell, double share, Random& random) 
   return made;
 }
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -5,7 +5,7 @@
 
 #include "benchmark/truth/cases.hpp"
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 /// Columns time_s, current_a, voltage_v, temperature_c (unless empty), soc_ref.
 std::string csv_of(const Series& series);
@@ -13,4 +13,4 @@ std::string csv_of(const Series& series);
 /// A cell file that `bms` takes.
 std::string cell_toml(const CalibratedCell& cell, const std::string& name);
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -10,7 +10,7 @@
 #include "benchmark/truth/healthy_cells.hpp"
 #include "benchmark/truth/yardstick.hpp"
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 namespace {
 
@@ -21,33 +21,34 @@ struct Slot {
   std::size_t number;  ///< among those of its kind
 };
 
-std::uint64_t mixed(std::uint64_t a, std::uint64_t b) { return Random(Random(a).bits() ^ b).bits(); }
+std::uint64_t mixed(std::uint64_t a, std::uint64_t b) { return plant::Random(plant::Random(a).bits() ^ b).bits(); }
 
 /// Which kind of case an index holds: the composition, shuffled, so that an index says nothing.
 Slot slot_of(Split split, std::uint64_t stream, std::size_t index) {
   using enum Kind;
-  constexpr std::array round = {null, single, single, pair, null,   single, outside, null, single, single,
-                                pair, null,   single, data_fault, null, single, pair,  null, single, outside};
+  constexpr std::array round = {null, single, single, pair,       null, single, outside, null, single, single,
+                                pair, null,   single, data_fault, null, single, pair,    null, single, outside};
   std::vector<std::size_t> order(case_count(split));
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-  Random random(stream);
+  plant::Random random(stream);
   for (std::size_t k = order.size() - 1; k > 0; --k) std::swap(order[k], order[below(random, k + 1)]);
   const std::size_t place = order[index % order.size()];
   const Kind kind = round[place % round.size()];
   const auto in_round = static_cast<std::size_t>(std::count(round.begin(), round.end(), kind));
-  const auto before = static_cast<std::size_t>(std::count(round.begin(), round.begin() + static_cast<std::ptrdiff_t>(place % round.size()), kind));
+  const auto before = static_cast<std::size_t>(
+      std::count(round.begin(), round.begin() + static_cast<std::ptrdiff_t>(place % round.size()), kind));
   return {kind, place / round.size() * in_round + before};
 }
 
 /// What all share: how well the cell was calibrated and how it is measured.
 struct Laboratory {
   double calibration_share = 0.6;
-  InstrumentParameters instruments;
+  plant::InstrumentParameters instruments;
   double step_s = 1;
   bool measures_temperature = true;
 };
 
-Laboratory draw_laboratory(double one_c_a, bool demanding, Random& random) {
+Laboratory draw_laboratory(double one_c_a, bool demanding, plant::Random& random) {
   Laboratory lab;
   lab.calibration_share = demanding ? between(random, 0.85, 1) : between(random, 0.3, 0.8);
   const double drift = demanding ? 1 : between(random, 0.15, 0.9);
@@ -61,7 +62,8 @@ Laboratory draw_laboratory(double one_c_a, bool demanding, Random& random) {
                                .drift_correlation_s = between(random, 1'800, 7'200),
                                .noise_sigma = between(random, 0.0003, 0.0015),
                                .step = between(random, 0.0005, 0.0015)};
-  lab.instruments.temperature_c = {.gain_error = 0, .drift_sigma = 0, .drift_correlation_s = 3'600, .noise_sigma = 0.05, .step = 0.1};
+  lab.instruments.temperature_c = {
+      .gain_error = 0, .drift_sigma = 0, .drift_correlation_s = 3'600, .noise_sigma = 0.05, .step = 0.1};
   const double which = random.uniform();
   lab.step_s = which < 0.14 ? 0.5 : which < 0.28 ? 2 : 1;
   lab.measures_temperature = !chance(random, 0.1);
@@ -69,7 +71,9 @@ Laboratory draw_laboratory(double one_c_a, bool demanding, Random& random) {
 }
 
 double white_v(const Laboratory& lab, const HealthyCell& cell) {
-  const auto variance = [](const ChannelParameters& c) { return c.noise_sigma * c.noise_sigma + c.step * c.step / 12; };
+  const auto variance = [](const plant::ChannelParameters& c) {
+    return c.noise_sigma * c.noise_sigma + c.step * c.step / 12;
+  };
   const double r0_ohm = cell.r0_ohm.at(0.5);
   return std::sqrt(variance(lab.instruments.voltage_v) + r0_ohm * r0_ohm * variance(lab.instruments.current_a));
 }
@@ -110,9 +114,10 @@ World with_effects(World world, const std::vector<Sized>& effects) {
   return world;
 }
 
-/// The world that somebody who does not know of `unknown` takes this to be: without it, but with what was measured. A fault of the
-/// current sensor is thus a cell through which the measured current flows.
-World believed(const World& healthy, const std::vector<Sized>& known, const std::vector<Sized>& unknown, const World& full, const Seen& seen) {
+/// The world that somebody who does not know of `unknown` takes this to be: without it, but with what was measured. A
+/// fault of the current sensor is thus a cell through which the measured current flows.
+World believed(const World& healthy, const std::vector<Sized>& known, const std::vector<Sized>& unknown,
+               const World& full, const Seen& seen) {
   World world = healthy;
   for (const Sized& sized : unknown) {
     if (sized.effect.acts_on == ActsOn::current) world.drive.current_a = seen.current_a;
@@ -122,7 +127,8 @@ World believed(const World& healthy, const std::vector<Sized>& known, const std:
   return with_effects(std::move(world), known);
 }
 
-std::vector<double> difference_v(const HealthyCell& cell, const World& healthy, const std::vector<Sized>& known, const std::vector<Sized>& unknown) {
+std::vector<double> difference_v(const HealthyCell& cell, const World& healthy, const std::vector<Sized>& known,
+                                 const std::vector<Sized>& unknown) {
   std::vector<Sized> all = known;
   all.insert(all.end(), unknown.begin(), unknown.end());
   const World full = with_effects(healthy, all);
@@ -135,7 +141,8 @@ std::vector<double> difference_v(const HealthyCell& cell, const World& healthy, 
 }
 
 /// Scales the effect until it is as visible as wanted or leaves its physical range.
-Sized scale(const HealthyCell& cell, const World& healthy, const std::vector<Sized>& known, Effect effect, const Yardstick& yardstick, double wanted) {
+Sized scale(const HealthyCell& cell, const World& healthy, const std::vector<Sized>& known, Effect effect,
+            const Yardstick& yardstick, double wanted) {
   Sized sized = {std::move(effect), 0, 0};
   const double least = sized.effect.least, most = sized.effect.most;
   const auto strength_at = [&](double amplitude) {
@@ -148,11 +155,14 @@ Sized scale(const HealthyCell& cell, const World& healthy, const std::vector<Siz
     const double off = std::log(wanted / std::max(strength_at(std::exp(place)), 1e-6));
     if (std::abs(off) < 0.04) break;
     (off > 0 ? low : high) = place;
-    if (k > 0 && std::abs(place - before_place) > 1e-9) slope = std::clamp((before - off) / (place - before_place), 0.4, 3.0);
+    if (k > 0 && std::abs(place - before_place) > 1e-9)
+      slope = std::clamp((before - off) / (place - before_place), 0.4, 3.0);
     before_place = place, before = off;
     double next = place + off / slope;
-    if (next >= std::log(most) - 1e-9 || next <= std::log(least) + 1e-9) next = std::clamp(next, std::log(least), std::log(most));
-    else if (next <= low || next >= high) next = (low + high) / 2;
+    if (next >= std::log(most) - 1e-9 || next <= std::log(least) + 1e-9)
+      next = std::clamp(next, std::log(least), std::log(most));
+    else if (next <= low || next >= high)
+      next = (low + high) / 2;
     if (std::abs(next - place) < 1e-9) break;
     place = next;
   }
@@ -180,7 +190,7 @@ struct Setting {
 };
 
 World make_world(const HealthyCell& cell, const Setting& setting, const Range& range, bool holdout) {
-  Random random(setting.seed);
+  plant::Random random(setting.seed);
   const double one_c_v = cell.capacity_ah * (cell.r0_ohm.at(0.5) + cell.r1_ohm.at(0.5));
   World world;
   world.holdout = holdout;
@@ -197,12 +207,13 @@ World make_world(const HealthyCell& cell, const Setting& setting, const Range& r
                                           .fastest_charge = std::min(2.0, 0.27 / one_c_v),
                                           .fastest_discharge = std::min(5.5, 0.75 / one_c_v)},
                                          random);
-  Random weather(mixed(setting.seed, 1));
-  world.drive.ambient_c = draw_ambient_c(setting.ambient, setting.ambient_start_c, setting.swing_k, world.drive.current_a.size(), weather);
+  plant::Random weather(mixed(setting.seed, 1));
+  world.drive.ambient_c =
+      draw_ambient_c(setting.ambient, setting.ambient_start_c, setting.swing_k, world.drive.current_a.size(), weather);
   return world;
 }
 
-Setting draw_setting(const Experiment& experiment, double usual_step_s, bool holdout, Random& random) {
+Setting draw_setting(const Experiment& experiment, double usual_step_s, bool holdout, plant::Random& random) {
   Setting s;
   s.profile = one_of(random, experiment.profiles);
   s.vigour = experiment.vigour;
@@ -210,7 +221,9 @@ Setting draw_setting(const Experiment& experiment, double usual_step_s, bool hol
   const bool has_an_end = s.profile == Profile::full_cycle || s.profile == Profile::storage;
   if (!holdout && has_an_end && experiment.step_s == 0) s.step_s = std::max(s.step_s, 1.0);
   const double least_s = std::max(9'000.0, 5'000 * s.step_s), most_s = std::min(28'800.0, 25'000 * s.step_s);
-  s.duration_s = holdout ? std::clamp(between(random, 3'600, 14'400), 3'600.0, 25'000 * s.step_s) : has_an_end ? most_s : between(random, least_s, most_s);
+  s.duration_s = holdout      ? std::clamp(between(random, 3'600, 14'400), 3'600.0, 25'000 * s.step_s)
+                 : has_an_end ? most_s
+                              : between(random, least_s, most_s);
   s.start_soc = draw_start_soc(s.profile, random);
   s.seed = random.bits();
   if (experiment.swing_k != 0) {
@@ -227,7 +240,7 @@ Setting draw_setting(const Experiment& experiment, double usual_step_s, bool hol
 
 Series measure(const World& world, const Seen& seen, const Laboratory& lab, std::uint64_t seed) {
   const double step_s = world.drive.step_s;
-  const Instruments instruments(lab.instruments, seed);
+  const plant::Instruments instruments(lab.instruments, seed);
   Series series;
   series.current_a = read_by(instruments.current_a, step_s, seen.current_a);
   series.voltage_v = read_by(instruments.voltage_v, step_s, seen.voltage_v);
@@ -239,12 +252,14 @@ Series measure(const World& world, const Seen& seen, const Laboratory& lab, std:
 }
 
 /// Run later: what chance does is new, what is wrong has stayed.
-Series driven(const HealthyCell& cell, const std::vector<Sized>& effects, Laboratory lab, std::uint64_t seed, const Errand& errand) {
-  Random random(seed);
+Series driven(const HealthyCell& cell, const std::vector<Sized>& effects, Laboratory lab, std::uint64_t seed,
+              const Errand& errand) {
+  plant::Random random(seed);
   World world;
   world.holdout = true;
   world.start_soc = errand.start_soc;
-  world.drive = {.step_s = errand.step_s, .current_a = errand.current_a, .ambient_c = errand.ambient_c, .told_temperature_c = {}};
+  world.drive = {
+      .step_s = errand.step_s, .current_a = errand.current_a, .ambient_c = errand.ambient_c, .told_temperature_c = {}};
   const double laboratory_c = between(random, 21, 29);
   for (double& c : world.drive.ambient_c) c = std::isfinite(c) ? c : laboratory_c;
   world = with_effects(std::move(world), effects);
@@ -253,7 +268,8 @@ Series driven(const HealthyCell& cell, const std::vector<Sized>& effects, Labora
   Series series = measure(world, seen, lab, random.bits());
   series.terminal_v = seen.trace.voltage_v;
   if (world.cell.contact_scale != 0) {
-    for (std::size_t k = 0; k < series.terminal_v.size(); ++k) series.terminal_v[k] -= world.cell.contact_scale * world.cell.contact_ohm[k] * errand.current_a[k];
+    for (std::size_t k = 0; k < series.terminal_v.size(); ++k)
+      series.terminal_v[k] -= world.cell.contact_scale * world.cell.contact_ohm[k] * errand.current_a[k];
   }
   return series;
 }
@@ -298,7 +314,7 @@ bool go_together(const std::string& a, const std::string& b) {
   });
 }
 
-std::vector<std::string> draw_pair(Random& random) {
+std::vector<std::string> draw_pair(plant::Random& random) {
   if (chance(random, 0.06)) return {"temperature_resistance", "temperature_sensor"};
   for (;;) {
     const std::string a = one_of(random, catalogue_ids()), b = one_of(random, catalogue_ids());
@@ -317,15 +333,18 @@ Experiment joined(const std::vector<Experiment>& experiments) {
     for (Profile p : all.profiles) {
       if (std::count(e.profiles.begin(), e.profiles.end(), p) > 0) shared.push_back(p);
     }
-    if (shared.empty()) all.profiles.insert(all.profiles.end(), e.profiles.begin(), e.profiles.end());
-    else all.profiles = shared;
+    if (shared.empty())
+      all.profiles.insert(all.profiles.end(), e.profiles.begin(), e.profiles.end());
+    else
+      all.profiles = shared;
   }
   return all;
 }
 
-constexpr std::array data_faults = {"inverted_current", "clock_gaps", "stuck_voltage", "milliampere", "voltage_dropouts"};
+constexpr std::array data_faults = {"inverted_current", "clock_gaps", "stuck_voltage", "milliampere",
+                                    "voltage_dropouts"};
 
-void spoil(const std::string& fault, Series& series, Series& holdout, Answer& answer, Random& random) {
+void spoil(const std::string& fault, Series& series, Series& holdout, Answer& answer, plant::Random& random) {
   const std::size_t count = series.time_s.size();
   answer.start_s = series.time_s.front(), answer.end_s = series.time_s.back();
   if (fault == "inverted_current" || fault == "milliampere") {
@@ -349,16 +368,22 @@ void spoil(const std::string& fault, Series& series, Series& holdout, Answer& an
   const auto samples = [&](double seconds) { return static_cast<std::size_t>(seconds / step_s); };
   std::vector<bool> missing(count, false), touched(count, false);
   const std::vector<double> before_v = series.voltage_v;
-  const std::size_t times = fault == "clock_gaps" ? 5 + below(random, 8) : fault == "stuck_voltage" ? 1 + below(random, 3) : 20 + below(random, 80);
+  const std::size_t times = fault == "clock_gaps"      ? 5 + below(random, 8)
+                            : fault == "stuck_voltage" ? 1 + below(random, 3)
+                                                       : 20 + below(random, 80);
   for (std::size_t n = 0; n < times; ++n) {
     const std::size_t from = somewhere();
-    const double seconds = fault == "clock_gaps" ? between(random, 40, 400) : fault == "stuck_voltage" ? between(random, 360, 2'400) : between(random, 1, 8) * step_s;
+    const double seconds = fault == "clock_gaps"      ? between(random, 40, 400)
+                           : fault == "stuck_voltage" ? between(random, 360, 2'400)
+                                                      : between(random, 1, 8) * step_s;
     const std::size_t to = std::min(count - 2, from + std::max<std::size_t>(samples(seconds), 1));
     const bool to_zero = chance(random, 0.6);
     for (std::size_t k = from; k < to; ++k) {
       touched[k] = true;
-      if (fault == "clock_gaps") missing[k] = true;
-      else series.voltage_v[k] = fault == "voltage_dropouts" && to_zero ? 0 : series.voltage_v[from];
+      if (fault == "clock_gaps")
+        missing[k] = true;
+      else
+        series.voltage_v[k] = fault == "voltage_dropouts" && to_zero ? 0 : series.voltage_v[from];
     }
   }
   const auto first = std::find(touched.begin(), touched.end(), true);
@@ -368,7 +393,8 @@ void spoil(const std::string& fault, Series& series, Series& holdout, Answer& an
   std::vector<double> d(count);
   for (std::size_t k = 0; k < count; ++k) d[k] = series.voltage_v[k] - before_v[k];
   answer.effect_rms_v = rms(d);
-  for (std::vector<double>* values : {&series.time_s, &series.current_a, &series.voltage_v, &series.temperature_c, &series.soc}) {
+  for (std::vector<double>* values :
+       {&series.time_s, &series.current_a, &series.voltage_v, &series.temperature_c, &series.soc}) {
     if (values->empty()) continue;
     std::size_t kept = 0;
     for (std::size_t k = 0; k < count; ++k) {
@@ -387,7 +413,7 @@ bool follows_temperature(const std::string& id) {
   return id == "temperature_resistance" || id == "temperature_sensor" || id == "self_heating" || id == "entropic_ocv";
 }
 
-Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& random) {
+Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, plant::Random& random) {
   const bool demanding = slot.kind == Kind::null && slot.number % 3 == 0;
   const HealthyCell cell = draw_healthy_cell(random);
   Laboratory lab = draw_laboratory(cell.capacity_ah, demanding, random);
@@ -397,7 +423,8 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
     experiments.push_back(experiment_for(id, random));
     if (follows_temperature(id)) lab.measures_temperature = true;
   }
-  Experiment experiment = ids.empty() ? Experiment{.profiles = {all_profiles.begin(), all_profiles.end()}} : joined(experiments);
+  Experiment experiment =
+      ids.empty() ? Experiment{.profiles = {all_profiles.begin(), all_profiles.end()}} : joined(experiments);
   if (chance(random, 1.0 / 3)) experiment.profiles = {all_profiles.begin(), all_profiles.end()};
   if (demanding) {
     if (chance(random, 0.6)) {
@@ -407,7 +434,8 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
     if (chance(random, 0.6)) experiment.swing_k = sign(random) * between(random, 8, 18);
   }
   const bool steady_temperature = std::count(ids.begin(), ids.end(), "self_heating") > 0;
-  if (experiment.swing_k == 0 && !steady_temperature && chance(random, 0.2)) experiment.swing_k = sign(random) * between(random, 3, 12);
+  if (experiment.swing_k == 0 && !steady_temperature && chance(random, 0.2))
+    experiment.swing_k = sign(random) * between(random, 3, 12);
 
   Setting setting = draw_setting(experiment, lab.step_s, false, random);
   Experiment later = experiment;
@@ -423,7 +451,8 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
   // draws that must not change when the range of soc is narrowed
   const std::uint64_t shape_seed = random.bits(), instrument_seed = random.bits();
   std::vector<double> wanted;
-  for (std::size_t n = 0; n < ids.size(); ++n) wanted.push_back(slot.kind == Kind::pair ? log_between(random, 2.6, 8) : log_between(random, 0.5, 8));
+  for (std::size_t n = 0; n < ids.size(); ++n)
+    wanted.push_back(slot.kind == Kind::pair ? log_between(random, 2.6, 8) : log_between(random, 0.5, 8));
 
   Attempt result;
   Case& made = result.made;
@@ -439,10 +468,11 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
     if (!ids.empty()) {
       const Yardstick yardstick(cell, healthy.drive, trace, white_v(lab, cell));
       for (std::size_t n = 0; n < ids.size(); ++n) {
-        Random shape(mixed(shape_seed, n));
+        plant::Random shape(mixed(shape_seed, n));
         const Effect effect = draw_effect(ids[n], cell, healthy, shape);
         // the thermometer is judged in a cell whose resistances follow the temperature
-        sized.push_back(scale(cell, healthy, ids[n] == "temperature_sensor" ? sized : std::vector<Sized>{}, effect, yardstick, wanted[n]));
+        sized.push_back(scale(cell, healthy, ids[n] == "temperature_sensor" ? sized : std::vector<Sized>{}, effect,
+                              yardstick, wanted[n]));
       }
       if (sized.size() == 2) {
         shares_v.clear();
@@ -470,7 +500,9 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
   answer.strength = answer.strengths.empty() ? 0 : *std::min_element(answer.strengths.begin(), answer.strengths.end());
   for (const Sized& s : sized) {
     const bool smallest = s.amplitude <= s.effect.least * 1.001;  // nobody would name less: then it may be plain to see
-    if (slot.kind == Kind::pair ? s.strength < 2 || s.strength > 12 : s.strength < 0.45 || (s.strength > 9 && !smallest)) result.good = false;
+    if (slot.kind == Kind::pair ? s.strength < 2 || s.strength > 12
+                                : s.strength < 0.45 || (s.strength > 9 && !smallest))
+      result.good = false;
   }
   if (!sized.empty()) {
     const std::vector<double> d = difference_v(cell, healthy, {}, sized);
@@ -492,7 +524,9 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
 
   made.recording = measure(full, seen, lab, instrument_seed);
   made.holdout = measure(later_world, later_seen, lab, mixed(instrument_seed, 1));
-  made.drive = [cell, sized, lab, seed = mixed(instrument_seed, 2)](const Errand& errand) { return driven(cell, sized, lab, seed, errand); };
+  made.drive = [cell, sized, lab, seed = mixed(instrument_seed, 2)](const Errand& errand) {
+    return driven(cell, sized, lab, seed, errand);
+  };
   made.cell = calibrate(cell, lab.calibration_share, random);
   const double told = std::clamp(0.0025 * random.normal(), -0.005, 0.005);
   made.believed_initial_soc = std::clamp(full.start_soc + full.believed_soc_excess + told, 0.0, 1.0);
@@ -510,9 +544,10 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, Random& r
 std::size_t case_count(Split split) { return split == Split::development ? 120 : 240; }
 
 Case make_case(Split split, std::uint64_t seed, std::size_t index) {
-  const std::uint64_t stream = mixed(split == Split::development ? 0x6465'7665'6C6F'7000U : 0x6669'6E61'6C00'0000U, seed);
+  const std::uint64_t stream =
+      mixed(split == Split::development ? 0x6465'7665'6C6F'7000U : 0x6669'6E61'6C00'0000U, seed);
   const Slot slot = slot_of(split, stream, index);
-  Random random(mixed(stream, index + 1));
+  plant::Random random(mixed(stream, index + 1));
   const std::size_t turn = static_cast<std::size_t>(stream % 1'009);
 
   Attempt best;
@@ -523,7 +558,8 @@ Case make_case(Split split, std::uint64_t seed, std::size_t index) {
     if (slot.kind == Kind::pair) ids = draw_pair(random);
     Attempt next = attempt(slot, ids, random);
     const bool good = next.good;
-    if (k == 0 || good || (slot.kind == Kind::pair && next.made.answer.strength > best.made.answer.strength)) best = std::move(next);
+    if (k == 0 || good || (slot.kind == Kind::pair && next.made.answer.strength > best.made.answer.strength))
+      best = std::move(next);
     if (good) break;
   }
   Case made = std::move(best.made);
@@ -534,8 +570,9 @@ Case make_case(Split split, std::uint64_t seed, std::size_t index) {
     spoil(made.answer.ids.front(), made.recording, made.holdout, made.answer, random);
   }
   const std::string digits = std::to_string(index);
-  made.name = (split == Split::development ? "development-" : "final-") + std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
+  made.name = (split == Split::development ? "development-" : "final-") +
+              std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
   return made;
 }
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

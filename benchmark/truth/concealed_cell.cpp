@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 Curve::Curve(const std::function<double(double)>& function) : value_(cells + 1) {
   for (std::size_t k = 0; k <= cells; ++k) value_[k] = function(first + step * static_cast<double>(k));
@@ -15,12 +15,14 @@ namespace {
 constexpr double zero_celsius_k = 273.15, reference_k = 298.15;
 constexpr double thermal_voltage_v = 8.314462618 * reference_k / 96'485.33212;
 
-/// Charge that has passed the surface of an electrode and where it is by now: finite volumes from the closed back to the surface.
+/// Charge that has passed the surface of an electrode and where it is by now: finite volumes from the closed back to
+/// the surface.
 class Slab {
  public:
   Slab(double time_s, double step_s) {
     const double r = step_s / time_s * volumes * volumes;
-    // implicit Euler: (1 + 2 r) c[k] - r (c[k-1] + c[k+1]) = c_before[k]; no flow at the back, the flux enters the last volume
+    // implicit Euler: (1 + 2 r) c[k] - r (c[k-1] + c[k+1]) = c_before[k]; no flow at the back, the flux enters the last
+    // volume
     double below_factor = 0;
     for (std::size_t k = 0; k < volumes; ++k) {
       const double diagonal = 1 + (k == 0 || k + 1 == volumes ? r : 2 * r);
@@ -87,7 +89,8 @@ class Electrode {
 
 class StopOperators {
  public:
-  StopOperators(const Hysteresis& parameters, double start_soc) : parameters_(parameters), stretched_(parameters.half_width) {
+  StopOperators(const Hysteresis& parameters, double start_soc)
+      : parameters_(parameters), stretched_(parameters.half_width) {
     const double turned = start_soc > 0.92 ? 0 : 1 - start_soc;  // since the full charge
     for (double& s : stretched_) s = std::max(-s, s - turned);
   }
@@ -101,7 +104,8 @@ class StopOperators {
 
   double voltage_v(double soc) const {
     double sum = parameters_.on_discharge_branch ? 1 : 0;
-    for (std::size_t k = 0; k < stretched_.size(); ++k) sum += parameters_.share[k] * stretched_[k] / parameters_.half_width[k];
+    for (std::size_t k = 0; k < stretched_.size(); ++k)
+      sum += parameters_.share[k] * stretched_[k] / parameters_.half_width[k];
     return sum * parameters_.half_gap_v * (1 + parameters_.tilt * (soc - 0.5));
   }
 
@@ -125,10 +129,12 @@ CellTrace run_parallel(const HealthyCell& cell, const CellEffects& effects, cons
   struct Half {
     double capacity_as, resistance_factor, soc, v1_v = 0;
   };
-  const double d = effects.parallel.inequality, exponent = effects.parallel.resistance_exponent, whole_as = 3'600 * cell.capacity_ah;
+  const double d = effects.parallel.inequality, exponent = effects.parallel.resistance_exponent,
+               whole_as = 3'600 * cell.capacity_ah;
   // resistances of the halves such that both together have the cell's
   const double a = std::pow(1 + d, exponent), b = std::pow(1 - d, exponent), both = a * b / (a + b);
-  std::array<Half, 2> halves = {{{whole_as * (1 + d) / 2, a / both, start_soc}, {whole_as * (1 - d) / 2, b / both, start_soc}}};
+  std::array<Half, 2> halves = {
+      {{whole_as * (1 + d) / 2, a / both, start_soc}, {whole_as * (1 - d) / 2, b / both, start_soc}}};
   const int substeps = std::max(1, static_cast<int>(std::ceil(drive.step_s / 0.25 - 1e-9)));
   const double h = drive.step_s / substeps;
   CellTrace trace;
@@ -148,7 +154,8 @@ CellTrace run_parallel(const HealthyCell& cell, const CellEffects& effects, cons
       const std::array<double, 3> shared = share();
       for (std::size_t n = 0; n < 2; ++n) {
         Half& half = halves[n];
-        const double r1 = cell.r1_ohm.at(half.soc) * half.resistance_factor, c1 = cell.c1_f.at(half.soc) / half.resistance_factor;
+        const double r1 = cell.r1_ohm.at(half.soc) * half.resistance_factor,
+                     c1 = cell.c1_f.at(half.soc) / half.resistance_factor;
         half.v1_v = r1 * shared[n] + (half.v1_v - r1 * shared[n]) * std::exp(-h / (r1 * c1));
         half.soc += shared[n] * h / half.capacity_as;
       }
@@ -183,7 +190,8 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
   Electrode in_r0(effects.charge_transfer.alpha), in_r1(effects.charge_transfer.alpha);
   constexpr std::array<double, 3> fast_share = {0.3, 0.4, 0.3};
   std::array<double, 3> fast_v{}, fast_kept{};
-  for (std::size_t n = 0; n < 3; ++n) fast_kept[n] = std::exp(-h / (effects.fast.time_s * std::pow(effects.fast.spread, static_cast<double>(n) - 1)));
+  for (std::size_t n = 0; n < 3; ++n)
+    fast_kept[n] = std::exp(-h / (effects.fast.time_s * std::pow(effects.fast.spread, static_cast<double>(n) - 1)));
   const double lag_kept = std::exp(-h / effects.diffusion.lag_s);
 
   double soc = start_soc, v1_v = 0, diffusion_v = 0, plated = 0, pressure = 0;
@@ -192,17 +200,20 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
   double voltage_v = cell.ocv_v.at(start_soc);
 
   CellTrace trace;
-  for (std::vector<double>* series : {&trace.voltage_v, &trace.soc, &trace.temperature_c, &trace.v1_v}) series->reserve(drive.current_a.size());
+  for (std::vector<double>* series : {&trace.voltage_v, &trace.soc, &trace.temperature_c, &trace.v1_v})
+    series->reserve(drive.current_a.size());
   for (std::size_t k = 0; k < drive.current_a.size(); ++k) {
     const double current_a = drive.current_a[k];
     double r0_factor = 1, r1_factor = 1, c1_factor = 1;
     if (warm) {
-      const double factor = temperature_factor(effects.temperature_law, drive.told_temperature_c.empty() ? core_c : drive.told_temperature_c[k]);
+      const double factor = temperature_factor(effects.temperature_law,
+                                               drive.told_temperature_c.empty() ? core_c : drive.told_temperature_c[k]);
       r1_factor *= factor;
       r0_factor *= std::pow(factor, effects.temperature_law.share_of_r0);
     }
     if (asymmetric) {
-      const double factor = 1 + effects.asymmetry.excess * (0.5 + 0.5 * std::tanh(current_a / effects.asymmetry.width_a));
+      const double factor =
+          1 + effects.asymmetry.excess * (0.5 + 0.5 * std::tanh(current_a / effects.asymmetry.width_a));
       r0_factor *= factor;
       r1_factor *= factor;
     }
@@ -210,22 +221,28 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
       r1_factor *= 1 + effects.growth.of_r1;
       c1_factor = std::pow(1 + effects.growth.of_r1, -effects.growth.c1_answers);
     }
-    const auto r0_at = [&](double z) { return cell.r0_ohm.at(z) * r0_factor * (1 + effects.growth.of_r0 * (1 + effects.growth.r0_lean * (z - 0.5))); };
+    const auto r0_at = [&](double z) {
+      return cell.r0_ohm.at(z) * r0_factor * (1 + effects.growth.of_r0 * (1 + effects.growth.r0_lean * (z - 0.5)));
+    };
 
     if (k > 0) {
       for (int s = 0; s < substeps; ++s) {
         double stored_a = current_a;
         if (effects.charge_loss.share != 0 && current_a > 0) {
-          stored_a *= 1 - effects.charge_loss.share * (0.6 + 0.8 * current_a / (current_a + effects.charge_loss.half_a));
+          stored_a *=
+              1 - effects.charge_loss.share * (0.6 + 0.8 * current_a / (current_a + effects.charge_loss.half_a));
         }
-        if (effects.leak.at_3v3_a != 0) stored_a -= effects.leak.at_3v3_a * std::exp((std::min(voltage_v, 3.6) - 3.3) / effects.leak.per_e_v);
+        if (effects.leak.at_3v3_a != 0)
+          stored_a -= effects.leak.at_3v3_a * std::exp((std::min(voltage_v, 3.6) - 3.3) / effects.leak.per_e_v);
         const double soc_change = stored_a * h / capacity_as, middle = soc + soc_change / 2;
         soc += soc_change;
 
         const double r1 = cell.r1_ohm.at(middle) * r1_factor, c1 = cell.c1_f.at(middle) * c1_factor;
         if (transfers && effects.charge_transfer.share_of_r1 > 0) {
           const double share = effects.charge_transfer.share_of_r1;
-          const auto rate = [&](double v) { return (current_a - in_r1.current_at(v, share * r1, (1 - share) * r1)) / c1; };
+          const auto rate = [&](double v) {
+            return (current_a - in_r1.current_at(v, share * r1, (1 - share) * r1)) / c1;
+          };
           v1_v += h * rate(v1_v + h / 2 * rate(v1_v));
         } else {
           v1_v = r1 * current_a + (v1_v - r1 * current_a) * std::exp(-h / (r1 * c1));
@@ -245,10 +262,13 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
 
       const double dt = drive.step_s;
       if (effects.plating.plateau_v != 0) {
-        if (current_a > effects.plating.least_a) plated += (1 - plated) * dt / effects.plating.fill_s;
-        else plated = std::max(0.0, plated - dt / effects.plating.hold_s);
+        if (current_a > effects.plating.least_a)
+          plated += (1 - plated) * dt / effects.plating.fill_s;
+        else
+          plated = std::max(0.0, plated - dt / effects.plating.hold_s);
       }
-      if (effects.pressure.lift_v != 0) pressure += (std::abs(current_a) / cell.capacity_ah - pressure) * dt / effects.pressure.forgets_s;
+      if (effects.pressure.lift_v != 0)
+        pressure += (std::abs(current_a) / cell.capacity_ah - pressure) * dt / effects.pressure.forgets_s;
 
       const double heat_w = current_a * current_a * r0_at(soc) + v1_v * v1_v / (cell.r1_ohm.at(soc) * r1_factor);
       if (two_nodes) {
@@ -256,9 +276,11 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
         const double outer_j_per_k = cell.thermal.heat_capacity_j_per_k - inner_j_per_k;
         const double outward_w = (core_c - can_c) / effects.core.to_can_k_per_w;
         core_c += dt / inner_j_per_k * (heat_w - outward_w);
-        can_c += dt / outer_j_per_k * (outward_w - effects.core.cooling * cell.thermal.to_ambient_w_per_k * (can_c - drive.ambient_c[k]));
+        can_c += dt / outer_j_per_k *
+                 (outward_w - effects.core.cooling * cell.thermal.to_ambient_w_per_k * (can_c - drive.ambient_c[k]));
       } else {
-        core_c += dt / cell.thermal.heat_capacity_j_per_k * (heat_w - cell.thermal.to_ambient_w_per_k * (core_c - drive.ambient_c[k]));
+        core_c += dt / cell.thermal.heat_capacity_j_per_k *
+                  (heat_w - cell.thermal.to_ambient_w_per_k * (core_c - drive.ambient_c[k]));
         can_c = core_c;
       }
     }
@@ -273,7 +295,8 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
     }
     if (hysteretic) voltage_v += stops.voltage_v(soc);
     voltage_v += diffusion_v + fast_v[0] + fast_v[1] + fast_v[2];
-    if (effects.entropy_scale != 0) voltage_v += effects.entropy_scale * effects.entropy_v_per_k.at(soc) * (core_c + zero_celsius_k - reference_k);
+    if (effects.entropy_scale != 0)
+      voltage_v += effects.entropy_scale * effects.entropy_v_per_k.at(soc) * (core_c + zero_celsius_k - reference_k);
     if (effects.contact_scale != 0) voltage_v += effects.contact_scale * effects.contact_ohm[k] * current_a;
     if (effects.plating.plateau_v != 0) voltage_v += effects.plating.plateau_v * std::tanh(plated / 0.12);
     if (effects.pressure.lift_v != 0) voltage_v += effects.pressure.lift_v * std::pow(pressure / 0.5, 1.7);
@@ -282,7 +305,8 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
       was_below = was_below || soc < memory.turned_at;
       if (was_below && soc > memory.turned_at + 0.12) remembers = false;
       const double off = (soc - memory.turned_at) / memory.width;
-      voltage_v += memory.bump_v * std::exp(-off * off) * (0.65 + 0.35 * std::tanh(current_a / (0.1 * cell.capacity_ah)));
+      voltage_v +=
+          memory.bump_v * std::exp(-off * off) * (0.65 + 0.35 * std::tanh(current_a / (0.1 * cell.capacity_ah)));
     }
     trace.voltage_v.push_back(voltage_v);
     trace.soc.push_back(soc);
@@ -292,4 +316,4 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
   return trace;
 }
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -2,12 +2,14 @@
 //
 //   V = U(z) + v1 + R0 I + what the effects add,   dv1/dt = (I - v1 / R1) / C1,   dz/dt = I / Q,   I > 0 charges
 //
-// R0, R1, C1 are smooth in z. Integrated in substeps of at most 0.25 s during which the current stands still: v1 by the exact
-// exponential with the parameters of the middle of the substep, or by the midpoint rule where it is not linear. The equations of
-// the effects are listed in README.md beside the usual ones. Nothing here comes from model/, estimator/, identification/ or diagnosis/.
+// R0, R1, C1 are smooth in z. Integrated in substeps of at most 0.25 s during which the current stands still: v1 by the
+// exact exponential with the parameters of the middle of the substep, or by the midpoint rule where it is not linear.
+// The equations of the effects are listed in README.md beside the usual ones. Nothing here comes from model/,
+// estimator/, identification/ or diagnosis/.
 //
-// At the start the cell is rested (no overvoltage anywhere, as warm as its surroundings) and has a history: charged full, then
-// discharged to the start soc; where it starts above 92 % it comes from charging and has not been discharged.
+// At the start the cell is rested (no overvoltage anywhere, as warm as its surroundings) and has a history: charged
+// full, then discharged to the start soc; where it starts above 92 % it comes from charging and has not been
+// discharged.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +19,7 @@
 
 #include "plant/truth_cell.hpp"
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 /// A function of soc, tabulated every 0.05 % from -30 % to 130 %, straight in between and beyond.
 class Curve {
@@ -42,15 +44,16 @@ class Curve {
 struct HealthyCell {
   double capacity_ah = 6;
   Curve ocv_v, r0_ohm, r1_ohm, c1_f;
-  Thermal thermal;
+  plant::Thermal thermal;
 };
 
-/// Prandtl-Ishlinskii: charge less its play operators. A play of half width w follows the charge once it has turned by 2 w.
+/// Prandtl-Ishlinskii: charge less its play operators. A play of half width w follows the charge once it has turned by
+/// 2 w.
 struct Hysteresis {
   std::vector<double> half_width;  ///< fraction of the capacity
   std::vector<double> share;       ///< of the gap, sum 1
   double half_gap_v = 0;
-  double tilt = 0;       ///< the gap at soc: half_gap_v (1 + tilt (soc - 0.5))
+  double tilt = 0;                   ///< the gap at soc: half_gap_v (1 + tilt (soc - 0.5))
   bool on_discharge_branch = false;  ///< U(z) is the lower branch instead of the middle
 };
 
@@ -80,7 +83,8 @@ struct Asymmetry {
   double width_a = 1;
 };
 
-/// R1 times f, R0 times f^share: f = exp(steepness (g(T) - g(25 degrees C))), g = 1/T (Arrhenius) or 1/(T - zero_k) (VTF).
+/// R1 times f, R0 times f^share: f = exp(steepness (g(T) - g(25 degrees C))), g = 1/T (Arrhenius) or 1/(T - zero_k)
+/// (VTF).
 struct TemperatureLaw {
   double steepness_k = 0;
   double zero_k = 0;
@@ -112,11 +116,12 @@ struct PlateauSlide {
 };
 
 struct ResistanceGrowth {
-  double of_r0 = 0, r0_lean = 0;  ///< R0 (1 + of_r0 (1 + r0_lean (z - 0.5)))
+  double of_r0 = 0, r0_lean = 0;     ///< R0 (1 + of_r0 (1 + r0_lean (z - 0.5)))
   double of_r1 = 0, c1_answers = 0;  ///< C1 (1 + of_r1)^-c1_answers
 };
 
-/// While charging a second electrode state fills; afterwards it empties in hold_s and holds the voltage up until it is empty.
+/// While charging a second electrode state fills; afterwards it empties in hold_s and holds the voltage up until it is
+/// empty.
 struct Plating {
   double plateau_v = 0;
   double hold_s = 2'400;
@@ -124,7 +129,8 @@ struct Plating {
   double least_a = 1;  ///< smaller charging currents do not fill it
 };
 
-/// A bump of the OCV where the cell turned round in an earlier partial cycle; gone once a charge from below has passed it by 12 % of soc.
+/// A bump of the OCV where the cell turned round in an earlier partial cycle; gone once a charge from below has passed
+/// it by 12 % of soc.
 struct Memory {
   double bump_v = 0;
   double turned_at = 0.5;
@@ -140,7 +146,8 @@ struct Pressure {
 /// Two cells in parallel that share the capacity and the conductance unequally.
 struct Parallel {
   double inequality = 0;  ///< first has (1 + inequality) / 2 of the capacity
-  double resistance_exponent = 1;  ///< R of the first (1 + inequality)^exponent, of the second (1 - inequality)^exponent
+  double resistance_exponent =
+      1;  ///< R of the first (1 + inequality)^exponent, of the second (1 - inequality)^exponent
 };
 
 struct CellEffects {
@@ -181,4 +188,4 @@ struct CellTrace {
 
 CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Drive& drive, double start_soc);
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -1,7 +1,7 @@
 // What can be wrong, one entry per id: everything about it drawn but for its size, which the wanted strength decides.
 //
-// Ids of the contract first; `temperature_sensor` comes only beside `temperature_resistance`: to a cell whose resistances do not
-// follow the temperature nothing can show it. Then what no catalogue lists.
+// Ids of the contract first; `temperature_sensor` comes only beside `temperature_resistance`: to a cell whose
+// resistances do not follow the temperature nothing can show it. Then what no catalogue lists.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 #include "benchmark/truth/measuring_chain.hpp"
 #include "benchmark/truth/profiles.hpp"
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 /// A cell with its instruments under a drive: what an effect changes.
 struct World {
@@ -38,15 +38,15 @@ struct Effect {
 struct Experiment {
   std::vector<Profile> profiles;
   double vigour = 1;
-  double swing_k = 0;      ///< of the surroundings
+  double swing_k = 0;         ///< of the surroundings
   bool away_from_25 = false;  ///< or else constantly warm or cold
-  double step_s = 0;       ///< 0: as usual
+  double step_s = 0;          ///< 0: as usual
 };
 
 const std::vector<std::string>& catalogue_ids();  ///< singles
 const std::vector<std::string>& outside_ids();
 
-Experiment experiment_for(const std::string& id, Random& random);
-Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& world, Random& random);
+Experiment experiment_for(const std::string& id, plant::Random& random);
+Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& world, plant::Random& random);
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

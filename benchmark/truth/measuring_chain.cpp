@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 namespace {
 
@@ -22,7 +22,9 @@ std::vector<double> faulty_current_a(const CurrentFaults& faults, double step_s,
   if (faults.late_s != 0) {
     const double steps = faults.late_s / step_s, whole = std::floor(steps), part = steps - whole;
     const auto last = static_cast<std::ptrdiff_t>(current_a.size()) - 1;
-    const auto at = [&](std::ptrdiff_t k) { return current_a[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))]; };
+    const auto at = [&](std::ptrdiff_t k) {
+      return current_a[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))];
+    };
     for (std::ptrdiff_t k = 0; k <= last; ++k) {
       const std::ptrdiff_t from = k - static_cast<std::ptrdiff_t>(whole);
       seen[static_cast<std::size_t>(k)] = (1 - part) * at(from) + part * at(from - 1);
@@ -32,7 +34,8 @@ std::vector<double> faulty_current_a(const CurrentFaults& faults, double step_s,
   for (std::size_t k = 0; k < seen.size(); ++k) {
     seen[k] *= 1 + faults.gain;
     if (faults.offset_scale != 0) seen[k] += faults.offset_scale * faults.offset_a[k];
-    if (faults.saturates_a > 0) seen[k] /= std::pow(1 + std::pow(std::abs(seen[k]) / faults.saturates_a, faults.knee), 1 / faults.knee);
+    if (faults.saturates_a > 0)
+      seen[k] /= std::pow(1 + std::pow(std::abs(seen[k]) / faults.saturates_a, faults.knee), 1 / faults.knee);
   }
   return seen;
 }
@@ -43,7 +46,8 @@ std::vector<double> faulty_voltage_v(const VoltageFaults& faults, double step_s,
     double& v = voltage_v[k];
     v *= 1 + faults.gain;
     if (faults.offset_scale != 0) v += faults.offset_scale * faults.offset_v[k];
-    if (faults.inl_v != 0) v += faults.inl_v * std::sin(2 * std::numbers::pi * v / faults.inl_period_v + faults.inl_phase);
+    if (faults.inl_v != 0)
+      v += faults.inl_v * std::sin(2 * std::numbers::pi * v / faults.inl_period_v + faults.inl_phase);
     if (faults.hum_v != 0) v += faults.hum_v * faults.hum[k];
   }
   return voltage_v;
@@ -58,7 +62,8 @@ void stick(const VoltageFaults& faults, std::vector<double>& voltage_v) {
   }
 }
 
-std::vector<double> faulty_temperature_c(const TemperatureFaults& faults, double step_s, const std::vector<double>& temperature_c) {
+std::vector<double> faulty_temperature_c(const TemperatureFaults& faults, double step_s,
+                                         const std::vector<double>& temperature_c) {
   std::vector<double> seen = temperature_c;
   filter(20, step_s, seen);
   filter(faults.lag_s, step_s, seen);
@@ -66,11 +71,11 @@ std::vector<double> faulty_temperature_c(const TemperatureFaults& faults, double
   return seen;
 }
 
-std::vector<double> read_by(Channel channel, double step_s, const std::vector<double>& values) {
+std::vector<double> read_by(plant::Channel channel, double step_s, const std::vector<double>& values) {
   std::vector<double> readings;
   readings.reserve(values.size());
   for (double value : values) readings.push_back(channel.read(value, step_s));
   return readings;
 }
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

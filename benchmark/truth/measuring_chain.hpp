@@ -1,7 +1,9 @@
-// From the cell to the file: faults of the instruments (free of chance but for their own drift), then what every instrument does.
+// From the cell to the file: faults of the instruments (free of chance but for their own drift), then what every
+// instrument does.
 //
-//   faults   current: passed on late or early, filtered, gain, offset, saturation;  voltage: filter, gain, offset, INL, interference
-//   healthy  gain error, Ornstein-Uhlenbeck drift, white noise, steps of the converter (plant/instruments.hpp); thermistor with a lag
+//   faults   current: passed on late or early, filtered, gain, offset, saturation;  voltage: filter, gain, offset, INL,
+//   interference healthy  gain error, Ornstein-Uhlenbeck drift, white noise, steps of the converter
+//   (plant/instruments.hpp); thermistor with a lag
 #pragma once
 
 #include <vector>
@@ -9,7 +11,7 @@
 #include "benchmark/truth/concealed_cell.hpp"
 #include "plant/instruments.hpp"
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 struct CurrentFaults {
   double late_s = 0;    ///< the measured mean is that of an interval so much earlier; < 0: the voltage is late
@@ -48,9 +50,10 @@ std::vector<double> faulty_voltage_v(const VoltageFaults& faults, double step_s,
 /// After noise and drift: a sticking converter.
 void stick(const VoltageFaults& faults, std::vector<double>& voltage_v);
 /// Thermistor of 20 s, then the faults.
-std::vector<double> faulty_temperature_c(const TemperatureFaults& faults, double step_s, const std::vector<double>& temperature_c);
+std::vector<double> faulty_temperature_c(const TemperatureFaults& faults, double step_s,
+                                         const std::vector<double>& temperature_c);
 
 /// One reading after the other through a channel of plant/.
-std::vector<double> read_by(Channel channel, double step_s, const std::vector<double>& values);
+std::vector<double> read_by(plant::Channel channel, double step_s, const std::vector<double>& values);
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

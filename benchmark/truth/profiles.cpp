@@ -4,34 +4,47 @@
 #include <cmath>
 #include <numbers>
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 std::string name_of(Profile profile) {
   switch (profile) {
-    case Profile::forklift_shift: return "forklift_shift";
-    case Profile::drive_discharge: return "drive_discharge";
-    case Profile::drive_two_way: return "drive_two_way";
-    case Profile::hppc: return "hppc";
-    case Profile::full_cycle: return "full_cycle";
-    case Profile::minor_loops: return "minor_loops";
-    case Profile::multi_rate: return "multi_rate";
-    case Profile::many_cycles: return "many_cycles";
-    case Profile::storage: return "storage";
+    case Profile::forklift_shift:
+      return "forklift_shift";
+    case Profile::drive_discharge:
+      return "drive_discharge";
+    case Profile::drive_two_way:
+      return "drive_two_way";
+    case Profile::hppc:
+      return "hppc";
+    case Profile::full_cycle:
+      return "full_cycle";
+    case Profile::minor_loops:
+      return "minor_loops";
+    case Profile::multi_rate:
+      return "multi_rate";
+    case Profile::many_cycles:
+      return "many_cycles";
+    case Profile::storage:
+      return "storage";
   }
   return "";
 }
 
-double draw_start_soc(Profile profile, Random& random) {
+double draw_start_soc(Profile profile, plant::Random& random) {
   switch (profile) {
     case Profile::forklift_shift:
     case Profile::drive_discharge:
     case Profile::hppc:
-    case Profile::full_cycle: return between(random, 0.92, 0.965);
-    case Profile::storage: return between(random, 0.88, 0.96);
+    case Profile::full_cycle:
+      return between(random, 0.92, 0.965);
+    case Profile::storage:
+      return between(random, 0.88, 0.96);
     case Profile::drive_two_way:
     case Profile::minor_loops:
-    case Profile::multi_rate: return between(random, 0.35, 0.95);
-    case Profile::many_cycles: return between(random, 0.6, 0.95);
+    case Profile::multi_rate:
+      return between(random, 0.35, 0.95);
+    case Profile::many_cycles:
+      return between(random, 0.6, 0.95);
   }
   return 0.5;
 }
@@ -72,7 +85,9 @@ class Plan {
   }
   void rest(double duration_s) { hold(0, duration_s); }
   /// At c_rate > 0, up or down.
-  bool go_to(double soc, double c_rate) { return hold(soc > soc_ ? c_rate : -c_rate, std::abs(soc - soc_) / c_rate * 3'600); }
+  bool go_to(double soc, double c_rate) {
+    return hold(soc > soc_ ? c_rate : -c_rate, std::abs(soc - soc_) / c_rate * 3'600);
+  }
 
   std::vector<double> current_a() && { return std::move(current_a_); }
 
@@ -83,7 +98,7 @@ class Plan {
   double soc_;
 };
 
-void forklift_shift(Plan& plan, double vigour, Random& random) {
+void forklift_shift(Plan& plan, double vigour, plant::Random& random) {
   plan.rest(between(random, 2, 8) * minute_s);
   const double pace = between(random, 0.7, 1.4);
   while (!plan.done()) {
@@ -94,29 +109,33 @@ void forklift_shift(Plan& plan, double vigour, Random& random) {
       continue;
     }
     const double drive = -between(random, 0.15, 0.7) * vigour * pace;
-    for (int n = 0, last = 3 + static_cast<int>(below(random, 8)); n < last; ++n) plan.hold(drive * between(random, 0.5, 1.5), between(random, 2, 6));
+    for (int n = 0, last = 3 + static_cast<int>(below(random, 8)); n < last; ++n)
+      plan.hold(drive * between(random, 0.5, 1.5), between(random, 2, 6));
     plan.hold(between(random, 0.1, 0.7), between(random, 2, 6));  // brakes
     if (chance(random, 0.7)) {
       plan.hold(-between(random, 1, 2.2) * vigour, between(random, 4, 12));  // lifts
       plan.hold(between(random, 0, 0.5), between(random, 3, 8));             // lowers
     }
-    plan.hold(-between(random, 0.005, 0.03), chance(random, 0.04) ? between(random, 8, 25) * minute_s : between(random, 5, 60) / pace);
+    plan.hold(-between(random, 0.005, 0.03),
+              chance(random, 0.04) ? between(random, 8, 25) * minute_s : between(random, 5, 60) / pace);
   }
 }
 
-void drive_discharge(Plan& plan, double vigour, double duration_s, Random& random) {
+void drive_discharge(Plan& plan, double vigour, double duration_s, plant::Random& random) {
   plan.rest(between(random, 5, 20) * minute_s);
   const double mean_rate = (plan.soc() - plan.lowest()) / (0.85 * duration_s / 3'600);
   while (!plan.done()) {
     if (plan.soc() < plan.lowest() + 0.01) return plan.rest(1e6);
-    if (chance(random, 0.15)) plan.rest(between(random, 5, 60));
-    else if (chance(random, 0.006)) plan.rest(between(random, 5, 20) * minute_s);
+    if (chance(random, 0.15))
+      plan.rest(between(random, 5, 60));
+    else if (chance(random, 0.006))
+      plan.rest(between(random, 5, 20) * minute_s);
     const double rate = -std::min(mean_rate * 1.25 * -std::log(1 - 0.98 * random.uniform()), 3.0) * vigour;
     plan.hold(rate, between(random, 2, 30) / vigour);
   }
 }
 
-void drive_two_way(Plan& plan, double vigour, Random& random) {
+void drive_two_way(Plan& plan, double vigour, plant::Random& random) {
   plan.rest(between(random, 5, 15) * minute_s);
   const double spread = between(random, 0.5, 1.1) * vigour;
   double aim = between(random, plan.lowest(), plan.highest());
@@ -131,7 +150,7 @@ void drive_two_way(Plan& plan, double vigour, Random& random) {
   }
 }
 
-void hppc(Plan& plan, double vigour, Random& random) {
+void hppc(Plan& plan, double vigour, plant::Random& random) {
   plan.rest(between(random, 5, 20) * minute_s);
   const double pulse = between(random, 0.8, 1.5) * vigour, width_s = one_of(random, std::array{10.0, 18.0, 30.0, 60.0});
   const double stride = one_of(random, std::array{0.05, 0.08, 0.1}), rate = one_of(random, std::array{0.33, 0.5, 1.0});
@@ -149,7 +168,7 @@ void hppc(Plan& plan, double vigour, Random& random) {
   }
 }
 
-void full_cycle(Plan& plan, Random& random) {
+void full_cycle(Plan& plan, plant::Random& random) {
   plan.rest(10 * minute_s);
   const double rate = one_of(random, std::array{1 / 3.0, 0.4, 0.5}), rest_s = between(random, 40, 70) * minute_s;
   plan.go_to(-1, rate);
@@ -160,7 +179,7 @@ void full_cycle(Plan& plan, Random& random) {
   plan.rest(20 * minute_s);
 }
 
-void minor_loops(Plan& plan, Random& random) {
+void minor_loops(Plan& plan, plant::Random& random) {
   constexpr std::array rates = {0.2, 0.33, 0.5, 1.0, 1.5};
   plan.rest(between(random, 10, 20) * minute_s);
   double direction = plan.soc() > 0.6 ? -1 : 1;
@@ -169,29 +188,34 @@ void minor_loops(Plan& plan, Random& random) {
     const double rate = std::max(one_of(random, rates), far > 0.15 ? 0.5 : 0.2);
     plan.go_to(plan.soc() + direction * far, rate);  // or to the end of the range
     if (chance(random, 0.5)) plan.rest(between(random, 8, 35) * minute_s);
-    direction = plan.soc() < plan.lowest() + 0.03 ? 1 : plan.soc() > plan.highest() - 0.03 ? -1 : chance(random, 0.75) ? -direction : direction;
+    direction = plan.soc() < plan.lowest() + 0.03    ? 1
+                : plan.soc() > plan.highest() - 0.03 ? -1
+                : chance(random, 0.75)               ? -direction
+                                                     : direction;
   }
 }
 
-void multi_rate(Plan& plan, double vigour, Random& random) {
+void multi_rate(Plan& plan, double vigour, plant::Random& random) {
   const std::array rates = {0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 2.0 * vigour, 3.0 * vigour};
   plan.rest(between(random, 5, 15) * minute_s);
   double direction = plan.soc() > 0.5 ? -1 : 1;
   while (!plan.done()) {
     for (int n = 0; n < 4 && !plan.done(); ++n) {
-      const double rate = std::min(one_of(random, rates), plan.fastest_discharge()), width_s = std::min(between(random, 8, 90), 150 / rate);
+      const double rate = std::min(one_of(random, rates), plan.fastest_discharge()),
+                   width_s = std::min(between(random, 8, 90), 150 / rate);
       plan.hold(-rate, width_s);
       plan.rest(between(random, 10, 90));
       const double back = std::min(rate, plan.fastest_charge());
       plan.hold(back, width_s * rate / back);
       plan.rest(between(random, 20, 150));
     }
-    if (!plan.go_to(plan.soc() + direction * between(random, 0.04, 0.15), between(random, 0.3, 1.2))) direction = -direction;
+    if (!plan.go_to(plan.soc() + direction * between(random, 0.04, 0.15), between(random, 0.3, 1.2)))
+      direction = -direction;
     plan.rest(between(random, 2, 12) * minute_s);
   }
 }
 
-void many_cycles(Plan& plan, Random& random) {
+void many_cycles(Plan& plan, plant::Random& random) {
   plan.rest(10 * minute_s);
   const double charge = between(random, 0.8, 1.8), discharge = between(random, 0.8, 1.8);
   while (!plan.done()) {
@@ -203,7 +227,7 @@ void many_cycles(Plan& plan, Random& random) {
   }
 }
 
-void storage(Plan& plan, double duration_s, Random& random) {
+void storage(Plan& plan, double duration_s, plant::Random& random) {
   const double rate = between(random, 0.4, 0.8);
   plan.rest(between(random, 0.12, 0.25) * duration_s);
   plan.go_to(-1, rate);
@@ -216,35 +240,56 @@ void storage(Plan& plan, double duration_s, Random& random) {
 
 }  // namespace
 
-std::vector<double> draw_current_a(const ProfileRequest& request, Random& random) {
+std::vector<double> draw_current_a(const ProfileRequest& request, plant::Random& random) {
   Plan plan(request);
   switch (request.profile) {
-    case Profile::forklift_shift: forklift_shift(plan, request.vigour, random); break;
-    case Profile::drive_discharge: drive_discharge(plan, request.vigour, request.duration_s, random); break;
-    case Profile::drive_two_way: drive_two_way(plan, request.vigour, random); break;
-    case Profile::hppc: hppc(plan, request.vigour, random); break;
-    case Profile::full_cycle: full_cycle(plan, random); break;
-    case Profile::minor_loops: minor_loops(plan, random); break;
-    case Profile::multi_rate: multi_rate(plan, request.vigour, random); break;
-    case Profile::many_cycles: many_cycles(plan, random); break;
-    case Profile::storage: storage(plan, request.duration_s, random); break;
+    case Profile::forklift_shift:
+      forklift_shift(plan, request.vigour, random);
+      break;
+    case Profile::drive_discharge:
+      drive_discharge(plan, request.vigour, request.duration_s, random);
+      break;
+    case Profile::drive_two_way:
+      drive_two_way(plan, request.vigour, random);
+      break;
+    case Profile::hppc:
+      hppc(plan, request.vigour, random);
+      break;
+    case Profile::full_cycle:
+      full_cycle(plan, random);
+      break;
+    case Profile::minor_loops:
+      minor_loops(plan, random);
+      break;
+    case Profile::multi_rate:
+      multi_rate(plan, request.vigour, random);
+      break;
+    case Profile::many_cycles:
+      many_cycles(plan, random);
+      break;
+    case Profile::storage:
+      storage(plan, request.duration_s, random);
+      break;
   }
   return std::move(plan).current_a();
 }
 
-std::vector<double> draw_ambient_c(Ambient ambient, double start_c, double swing_k, std::size_t count, Random& random) {
+std::vector<double> draw_ambient_c(Ambient ambient, double start_c, double swing_k, std::size_t count,
+                                   plant::Random& random) {
   std::vector<double> temperature_c(count, start_c);
   if (ambient == Ambient::constant) return temperature_c;
-  const double leaves = between(random, 0.1, 0.3), returns = leaves + between(random, 0.25, 0.45), ramp = between(random, 0.01, 0.08);
+  const double leaves = between(random, 0.1, 0.3), returns = leaves + between(random, 0.25, 0.45),
+               ramp = between(random, 0.01, 0.08);
   const double turns = between(random, 1, 2.2);
   const SmoothChance small(random);
   for (std::size_t k = 0; k < count; ++k) {
     const double x = static_cast<double>(k) / static_cast<double>(count);
-    const double way = ambient == Ambient::wave ? 0.5 - 0.5 * std::cos(2 * std::numbers::pi * turns * x)
-                                                : std::clamp((x - leaves) / ramp, 0.0, 1.0) - std::clamp((x - returns) / ramp, 0.0, 1.0);
+    const double way = ambient == Ambient::wave
+                           ? 0.5 - 0.5 * std::cos(2 * std::numbers::pi * turns * x)
+                           : std::clamp((x - leaves) / ramp, 0.0, 1.0) - std::clamp((x - returns) / ramp, 0.0, 1.0);
     temperature_c[k] += swing_k * way + 0.3 * (small.at(x) - small.at(0));
   }
   return temperature_c;
 }
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 namespace {
 
@@ -74,7 +74,10 @@ Yardstick::Yardstick(const HealthyCell& cell, const Drive& drive, const CellTrac
     if (any) columns.push_back(std::move(column));
   };
   for (int n = 0; n <= 20; ++n) add(0.0015, [&](std::size_t k) { return hat(healthy.soc[k], 0.05 * n, 0.05); });
-  for (int n = 0; n <= 5; ++n) add(0.02, [&](std::size_t k) { return hat(healthy.soc[k], 0.2 * n, 0.2) * cell.r0_ohm.at(healthy.soc[k]) * drive.current_a[k]; });
+  for (int n = 0; n <= 5; ++n)
+    add(0.02, [&](std::size_t k) {
+      return hat(healthy.soc[k], 0.2 * n, 0.2) * cell.r0_ohm.at(healthy.soc[k]) * drive.current_a[k];
+    });
   add(0.05, [&](std::size_t k) { return healthy.v1_v[k]; });
   // what acts through soc moves the overvoltages too, so the cell itself says what it does
   const auto add_change = [&](const CellEffects& effects, const Drive& other_drive, double start_soc) {
@@ -92,7 +95,8 @@ Yardstick::Yardstick(const HealthyCell& cell, const Drive& drive, const CellTrac
 
   Eigen::MatrixXd& nuisance = columns_->nuisance;
   nuisance.resize(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t n = 0; n < columns.size(); ++n) nuisance.col(static_cast<Eigen::Index>(n)) = columns_->whitener.white(columns[n]);
+  for (std::size_t n = 0; n < columns.size(); ++n)
+    nuisance.col(static_cast<Eigen::Index>(n)) = columns_->whitener.white(columns[n]);
   Eigen::MatrixXd gram = nuisance.transpose() * nuisance;
   gram.diagonal().array() += 1;
   columns_->gram.emplace(gram);
@@ -110,4 +114,4 @@ double Yardstick::likeness(const std::vector<double>& a_v, const std::vector<dou
   return a > 0 && b > 0 ? std::copysign(ab * ab, ab) / (a * b) : 0;
 }
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -1,12 +1,14 @@
 // How visible a difference of voltages is on a recording: the unit in which the strength of an effect is told.
 //
 //   noise     white + Ornstein-Uhlenbeck (1.5 mV, 60 s) + Ornstein-Uhlenbeck (1 mV, 1 h)
-//   nuisance  OCV hats every 5 % of soc, 1.5 mV; R0 hats every 20 %, 2 %; R1 5 %; start soc 0.5 %; current offset 0.03 % of 1C;
+//   nuisance  OCV hats every 5 % of soc, 1.5 mV; R0 hats every 20 %, 2 %; R1 5 %; start soc 0.5 %; current offset 0.03
+//   % of 1C;
 //             capacity (and current gain) 0.2 %. The last three by running the cell so, overvoltages included
 //   lambda    d' P d, P the inverse of the covariance of both;  strength = sqrt(lambda) / 4.76
 //
-// At strength 1 a test that raises one false alarm in 2,000 (1 % over some 23 hypotheses) finds the effect nine times out of ten.
-// A Kalman filter of the two drifts makes the noise white in one pass; the nuisance columns go through the same filter.
+// At strength 1 a test that raises one false alarm in 2,000 (1 % over some 23 hypotheses) finds the effect nine times
+// out of ten. A Kalman filter of the two drifts makes the noise white in one pass; the nuisance columns go through the
+// same filter.
 #pragma once
 
 #include <memory>
@@ -14,7 +16,7 @@
 
 #include "benchmark/truth/concealed_cell.hpp"
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 class Yardstick {
  public:
@@ -32,4 +34,4 @@ class Yardstick {
   std::unique_ptr<Columns> columns_;
 };
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -5,8 +5,8 @@ namespace bms::hal {
 
 void can_start() {}
 bool can_listening() { return false; }
-bool can_send(const CanFrame&) { return false; }
-bool can_receive(CanFrame&) { return false; }
+bool can_send(const can::Frame&) { return false; }
+bool can_receive(can::Frame&) { return false; }
 CanHealth can_health() { return {}; }
 
 }  // namespace bms::hal

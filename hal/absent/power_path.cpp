@@ -1,11 +1,11 @@
 // Nothing to switch.
 #include "hal/power_path.hpp"
 
-#include "estimator/sample.hpp"
+#include "measurement/sample.hpp"
 
 namespace bms::hal {
 
 void power_path_set(const PowerPath&) {}
-std::int32_t link_uv() { return no_reading; }
+std::int32_t link_uv() { return measurement::no_reading; }
 
 }  // namespace bms::hal

@@ -3,6 +3,6 @@
 
 namespace bms::hal {
 
-bool next_request(CanFrame&) { return false; }
+bool next_request(can::Frame&) { return false; }
 
 }  // namespace bms::hal

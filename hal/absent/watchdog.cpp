@@ -1,5 +1,5 @@
-// No watchdog: a replay runs faster than any clock, and a write to a register that QEMU does not have costs as much as half an
-// estimate.
+// No watchdog: a replay runs faster than any clock, and a write to a register that QEMU does not have costs as much as
+// half an estimate.
 #include "hal/watchdog.hpp"
 
 namespace bms::hal {

@@ -1,13 +1,15 @@
-// What a converter's counts mean on a single-cell board: volts, amperes, degrees of one cell, in the integers of a sample.
+// What a converter's counts mean on a single-cell board: volts, amperes, degrees of one cell, in the integers of a
+// sample.
 //
-//   supply      = 3.3 V * reference_at_3v3 / reference       the internal reference, measured by the same converter (RM0090, 13.10)
-//   pin         = supply * counts / 4095
-//   voltage     = pin * divider                              times (1 + gain), plus offset
-//   current     = (pin - supply / 2) / (amplifier * shunt)   times (1 + gain), plus offset; > 0 charges
-//   temperature = of a 10 kohm thermistor 103AT, pulled up to the supply by 10 kohm: straight lines between the maker's values each 10 K, off by 0.45 K at most from -25 to 85 degrees C
+//   supply      = 3.3 V * reference_at_3v3 / reference       the internal reference, measured by the same converter
+//   (RM0090, 13.10) pin         = supply * counts / 4095 voltage     = pin * divider                              times
+//   (1 + gain), plus offset current     = (pin - supply / 2) / (amplifier * shunt)   times (1 + gain), plus offset; > 0
+//   charges temperature = of a 10 kohm thermistor 103AT, pulled up to the supply by 10 kohm: straight lines between the
+//   maker's values each 10 K, off by 0.45 K at most from -25 to 85 degrees C
 //
-// Counts are sums over many conversions: their noise averages the converter's steps out (0.8 mV at the pin, AN2834 of ST). A converter that says nothing, a
-// supply beyond 2.4 to 3.6 V: no reading; a thermistor that is off or shorted: no temperature. An amplifier at its rail gives its range, which is above the short-circuit threshold.
+// Counts are sums over many conversions: their noise averages the converter's steps out (0.8 mV at the pin, AN2834 of
+// ST). A converter that says nothing, a supply beyond 2.4 to 3.6 V: no reading; a thermistor that is off or shorted: no
+// temperature. An amplifier at its rail gives its range, which is above the short-circuit threshold.
 //
 // All in integers of 64 bits; cost: 5 divisions, some 600 instructions a sample (Cortex-M4F).
 #pragma once
@@ -16,8 +18,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/sample.hpp"
 #include "hal/calibration.hpp"
+#include "measurement/sample.hpp"
 
 namespace bms::hal::adc {
 
@@ -42,12 +44,25 @@ struct Point {
   std::int32_t cdegc, ohm;
 };
 /// Semitec, AT thermistors, 103AT.
-inline constexpr std::array<Point, 13> thermistor{{{-3'000, 111'300}, {-2'000, 67'770}, {-1'000, 42'470}, {0, 27'280}, {1'000, 17'960}, {2'000, 12'090}, {3'000, 8'313}, {4'000, 5'827},
-                                                   {5'000, 4'160}, {6'000, 3'020}, {7'000, 2'228}, {8'000, 1'668}, {9'000, 1'266}}};
+inline constexpr std::array<Point, 13> thermistor{{{-3'000, 111'300},
+                                                   {-2'000, 67'770},
+                                                   {-1'000, 42'470},
+                                                   {0, 27'280},
+                                                   {1'000, 17'960},
+                                                   {2'000, 12'090},
+                                                   {3'000, 8'313},
+                                                   {4'000, 5'827},
+                                                   {5'000, 4'160},
+                                                   {6'000, 3'020},
+                                                   {7'000, 2'228},
+                                                   {8'000, 1'668},
+                                                   {9'000, 1'266}}};
 inline constexpr std::int32_t pull_up_ohm = 10'000;
 
 /// Of the supply, in millionths: falls with temperature.
-constexpr std::int32_t share_ppm(std::int32_t ohm) { return static_cast<std::int32_t>(1'000'000LL * ohm / (ohm + pull_up_ohm)); }
+constexpr std::int32_t share_ppm(std::int32_t ohm) {
+  return static_cast<std::int32_t>(1'000'000LL * ohm / (ohm + pull_up_ohm));
+}
 
 constexpr std::int64_t divided(std::int64_t a, std::int64_t by) { return (a >= 0 ? a + by / 2 : a - by / 2) / by; }
 
@@ -56,29 +71,33 @@ constexpr std::int64_t divided(std::int64_t a, std::int64_t by) { return (a >= 0
 /// Beyond the ends of the table the last line goes on, a little; what no thermistor gives is no temperature.
 constexpr std::int16_t temperature_of(std::int32_t share_ppm) {
   using namespace detail;
-  if (share_ppm > 960'000 || share_ppm < 80'000) return no_temperature;  // below -40, above 100 degrees C
+  if (share_ppm > 960'000 || share_ppm < 80'000) return measurement::no_temperature;  // below -40, above 100 degrees C
   std::size_t k = 1;
   while (k + 1 < thermistor.size() && share_ppm < detail::share_ppm(thermistor[k].ohm)) ++k;
   const Point warm = thermistor[k], cold = thermistor[k - 1];
   const std::int32_t from = detail::share_ppm(cold.ohm), to = detail::share_ppm(warm.ohm);
-  return static_cast<std::int16_t>(cold.cdegc + divided(std::int64_t{share_ppm - from} * (warm.cdegc - cold.cdegc), to - from));
+  return static_cast<std::int16_t>(cold.cdegc +
+                                   divided(std::int64_t{share_ppm - from} * (warm.cdegc - cold.cdegc), to - from));
 }
 
 /// reference_at_3v3: counts that the maker has measured of this chip. The time is left alone.
-constexpr void read(const Counts& c, std::uint32_t reference_at_3v3, const Circuit& circuit, const Calibration& calibration, Sample& into) {
+constexpr void read(const Counts& c, std::uint32_t reference_at_3v3, const Circuit& circuit,
+                    const Calibration& calibration, measurement::Sample& into) {
   using detail::divided;
-  into.voltage_uv = into.current_ua = no_reading;
-  into.temperature_cdegc = no_temperature;
+  into.voltage_uv = into.current_ua = measurement::no_reading;
+  into.temperature_cdegc = measurement::no_temperature;
   if (c.n == 0 || c.n_reference == 0 || c.reference == 0) return;
   const std::int64_t supply_uv = 3'300'000LL * reference_at_3v3 * c.n_reference / c.reference;
   if (supply_uv < 2'400'000 || supply_uv > 3'600'000) return;
   const std::int64_t most = full_scale * c.n;
   const auto pin_nv = [&](std::uint32_t sum) { return divided(1'000 * supply_uv * sum, most); };
   const std::int64_t cell_uv = divided(pin_nv(c.voltage) * circuit.divider_ppm, 1'000'000'000);
-  into.voltage_uv = static_cast<std::int32_t>(cell_uv + divided(cell_uv * calibration.voltage_gain_ppm, 1'000'000) + calibration.voltage_offset_uv);
+  into.voltage_uv = static_cast<std::int32_t>(cell_uv + divided(cell_uv * calibration.voltage_gain_ppm, 1'000'000) +
+                                              calibration.voltage_offset_uv);
   const std::int64_t shunt_nv = pin_nv(c.current) - 500 * supply_uv;
   const std::int64_t current_ua = divided(1'000 * shunt_nv, std::int64_t{circuit.amplifier} * circuit.shunt_uohm);
-  into.current_ua = static_cast<std::int32_t>(current_ua + divided(current_ua * calibration.current_gain_ppm, 1'000'000) + calibration.current_offset_ua);
+  into.current_ua = static_cast<std::int32_t>(
+      current_ua + divided(current_ua * calibration.current_gain_ppm, 1'000'000) + calibration.current_offset_ua);
   into.temperature_cdegc = temperature_of(static_cast<std::int32_t>(1'000'000LL * c.temperature / most));
 }
 

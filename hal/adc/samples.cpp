@@ -1,7 +1,9 @@
-// Samples of one cell by the chip's own converter, one each period of the board's clock: each millisecond a conversion of every input, four of the current, summed up. A sample is
-// their mean: what a current did in between is in it, but for the millisecond in which the last sample was worked on.
+// Samples of one cell by the chip's own converter, one each period of the board's clock: each millisecond a conversion
+// of every input, four of the current, summed up. A sample is their mean: what a current did in between is in it, but
+// for the millisecond in which the last sample was worked on.
 //
 // The load is switched by pins; nothing is measured behind them.
+#include "hal/samples.hpp"
 #include "hal/adc.hpp"
 #include "hal/adc/cell_readings.hpp"
 #include "hal/calibration.hpp"
@@ -10,7 +12,6 @@
 #include "hal/contactor_pins.hpp"
 #include "hal/heard.hpp"
 #include "hal/power_path.hpp"
-#include "hal/samples.hpp"
 
 namespace bms::hal {
 
@@ -22,18 +23,19 @@ constexpr adc::Circuit circuit;
 constexpr std::uint32_t currents_a_round = 4;
 
 Calibration correction;
-PackSample<1> pack;
+measurement::PackSample<1> pack;
 std::uint64_t due_us = 0;
 bool started = false;
 
 void hear_the_bus() {
-  CanFrame frame;
+  can::Frame frame;
   while (can_receive(frame)) hear(frame);
 }
 
 /// One of each; a round that is not whole counts for nothing.
 void convert(adc::Counts& sums) {
-  const auto voltage = adc_convert(AnalogInput::voltage), temperature = adc_convert(AnalogInput::temperature), reference = adc_convert(AnalogInput::reference);
+  const auto voltage = adc_convert(AnalogInput::voltage), temperature = adc_convert(AnalogInput::temperature),
+             reference = adc_convert(AnalogInput::reference);
   std::uint32_t current = 0;
   for (std::uint32_t k = 0; k < currents_a_round; ++k) {
     const auto one = adc_convert(AnalogInput::current);
@@ -53,7 +55,7 @@ void convert(adc::Counts& sums) {
 
 void calibrate(const Calibration& calibration) { correction = calibration; }
 
-const PackSample<1>* next_sample() {
+const measurement::PackSample<1>* next_sample() {
   if (!started) {
     adc_start();
     started = true;
@@ -64,7 +66,7 @@ const PackSample<1>* next_sample() {
     wait_for_interrupt();
     convert(sums);
   }
-  Sample sample;
+  measurement::Sample sample;
   sample.time_us = now_us();
   due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
   sums.current = (sums.current + currents_a_round / 2) / currents_a_round;
@@ -77,6 +79,6 @@ const PackSample<1>* next_sample() {
 }
 
 void power_path_set(const PowerPath& wanted) { contactor_pins_set(wanted); }
-std::int32_t link_uv() { return no_reading; }
+std::int32_t link_uv() { return measurement::no_reading; }
 
 }  // namespace bms::hal

@@ -1,4 +1,5 @@
-// The check of the chip's bytes on I2C: polynomial x^8 + x^2 + x + 1, from 0 (TRM 9.4). No table: 8 steps a byte, 40 us a sample at 168 MHz.
+// The check of the chip's bytes on I2C: polynomial x^8 + x^2 + x + 1, from 0 (TRM 9.4). No table: 8 steps a byte, 40 us
+// a sample at 168 MHz.
 #pragma once
 
 #include <cstdint>

@@ -13,10 +13,10 @@ namespace {
 
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
 constexpr std::size_t settings_a_sample = 8;
-constexpr std::uint8_t patience = 5;          // samples, for a mode to be entered or left
-constexpr std::uint8_t most_failures = 2;     // samples in a row
-constexpr std::uint8_t scan_is_old = 2;       // samples without everything measured once
-constexpr std::uint8_t charge_is_old = 15;    // samples: 1.5 s of a counter of seconds
+constexpr std::uint8_t patience = 5;        // samples, for a mode to be entered or left
+constexpr std::uint8_t most_failures = 2;   // samples in a row
+constexpr std::uint8_t scan_is_old = 2;     // samples without everything measured once
+constexpr std::uint8_t charge_is_old = 15;  // samples: 1.5 s of a counter of seconds
 constexpr std::uint64_t tell_again_us = 5'000'000;
 
 /// Until the chip has taken what was written.
@@ -25,29 +25,38 @@ void settle() {
   while (now_us() - since < 2'000) wait_for_interrupt();
 }
 
-std::int32_t cell_uv(std::int16_t mv) { return mv == std::numeric_limits<std::int16_t>::min() ? no_reading : mv * 1'000; }
+std::int32_t cell_uv(std::int16_t mv) {
+  return mv == std::numeric_limits<std::int16_t>::min() ? measurement::no_reading : mv * 1'000;
+}
 
 std::int16_t cdegc(std::int16_t tenth_k) {
   const int value = tenth_k * 10 - 27'315;
-  const auto narrow = static_cast<std::int16_t>(std::clamp<int>(value, std::numeric_limits<std::int16_t>::min(), std::numeric_limits<std::int16_t>::max()));
-  return temperature_possible(narrow) ? narrow : no_temperature;  // an open or shorted sensor
+  const auto narrow = static_cast<std::int16_t>(
+      std::clamp<int>(value, std::numeric_limits<std::int16_t>::min(), std::numeric_limits<std::int16_t>::max()));
+  return measurement::temperature_possible(narrow) ? narrow : measurement::no_temperature;  // an open or shorted sensor
 }
 
 }  // namespace
 
-void FrontEnd::read(PackSample<cell_inputs>& into) {
+void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   const std::uint64_t time_us = into.time_us;
   into = {};
   into.time_us = time_us;
-  link_uv_ = no_reading;
+  link_uv_ = measurement::no_reading;
   if (state_ == State::measure) {
-    if (measure(into)) failures_ = 0;
-    else if (state_ == State::measure && ++failures_ >= most_failures) lose();
-    if (into.current_ua == no_reading) mean_current_.lose();
+    if (measure(into))
+      failures_ = 0;
+    else if (state_ == State::measure && ++failures_ >= most_failures)
+      lose();
+    if (into.current_ua == measurement::no_reading) mean_current_.lose();
     return;
   }
   if (state_ == State::absent && now_us() < next_try_us_) return;
-  const bool good = state_ == State::absent ? find() : state_ == State::compare ? compare() : state_ == State::enter ? enter() : state_ == State::write ? write() : leave();
+  const bool good = state_ == State::absent    ? find()
+                    : state_ == State::compare ? compare()
+                    : state_ == State::enter   ? enter()
+                    : state_ == State::write   ? write()
+                                               : leave();
   if (!good) rest();
 }
 
@@ -102,7 +111,9 @@ bool FrontEnd::memory_is_right(bool& right) {
     settle();
     if (!wire_.fetch(begin, block)) return false;
     for (; k < settings_.size() && settings_[k].address + settings_[k].bytes <= begin + buffer_bytes; ++k) {
-      if (get_bytes<std::uint32_t>(block, static_cast<std::size_t>(settings_[k].address - begin), settings_[k].bytes) != settings_[k].value) right = false;
+      if (get_bytes<std::uint32_t>(block, static_cast<std::size_t>(settings_[k].address - begin), settings_[k].bytes) !=
+          settings_[k].value)
+        right = false;
     }
   }
   return true;
@@ -181,7 +192,7 @@ bool FrontEnd::still_the_same() {
 }
 
 /// In the order of who needs it most; ends at the first thing that cannot be had.
-bool FrontEnd::measure(PackSample<cell_inputs>& into) {
+bool FrontEnd::measure(measurement::PackSample<cell_inputs>& into) {
   if (!still_the_same()) return false;
   if (!wire_.select(get_currents)) return false;
   if (!read_scan(into)) return false;
@@ -192,7 +203,7 @@ bool FrontEnd::measure(PackSample<cell_inputs>& into) {
   return keep_bleeding();
 }
 
-bool FrontEnd::read_scan(PackSample<cell_inputs>& into) {
+bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   // the alarm bits first: values that are read after them are as fresh as they say
   std::array<std::uint8_t, hdq_temperature + 2 - alarm_status> alarm_and_temperatures;
   if (!wire_.read(alarm_status, alarm_and_temperatures)) return false;
@@ -203,7 +214,8 @@ bool FrontEnd::read_scan(PackSample<cell_inputs>& into) {
   std::array<std::uint8_t, ld_voltage + 2 - first_cell> voltages;
   if (!wire_.read(first_cell, voltages)) return false;
 
-  scans_ago_ = (alarm & all_scanned) != 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(std::min(scans_ago_ + 1, int{scan_is_old}));
+  scans_ago_ = (alarm & all_scanned) != 0 ? std::uint8_t{0}
+                                          : static_cast<std::uint8_t>(std::min(scans_ago_ + 1, int{scan_is_old}));
   fresh_ = (alarm & cells_scanned) != 0;
   if (!fresh_) {
     ++counters_.not_fresh;
@@ -213,23 +225,32 @@ bool FrontEnd::read_scan(PackSample<cell_inputs>& into) {
   if (scans_ago_ >= scan_is_old) return true;
   into.pack_uv = get_bytes<std::int16_t>(voltages, stack_voltage - first_cell) * voltage_step_uv;
   link_uv_ = get_bytes<std::int16_t>(voltages, ld_voltage - first_cell) * voltage_step_uv;
-  constexpr std::array<std::uint8_t, most_temperatures> sensors{ts1_temperature, ts3_temperature, hdq_temperature, cfetoff_temperature};
-  for (std::size_t k = 0; k < sensors.size(); ++k) into.temperature_cdegc[k] = cdegc(get_bytes<std::int16_t>(alarm_and_temperatures, static_cast<std::size_t>(sensors[k] - alarm_status)));
+  constexpr std::array<std::uint8_t, measurement::most_temperatures> sensors{ts1_temperature, ts3_temperature,
+                                                                             hdq_temperature, cfetoff_temperature};
+  for (std::size_t k = 0; k < sensors.size(); ++k)
+    into.temperature_cdegc[k] =
+        cdegc(get_bytes<std::int16_t>(alarm_and_temperatures, static_cast<std::size_t>(sensors[k] - alarm_status)));
   return true;
 }
 
-bool FrontEnd::read_current(PackSample<cell_inputs>& into) {
+bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
   std::array<std::uint8_t, cc3_current_at + 2> currents;
   std::array<std::uint8_t, charge_time_at + 4> charge;
-  if (!wire_.fetch(get_currents, currents) || !wire_.select(get_charge) || !wire_.fetch(get_charge, charge)) return false;
+  if (!wire_.fetch(get_currents, currents) || !wire_.select(get_charge) || !wire_.fetch(get_charge, charge))
+    return false;
   const auto time_s = get_bytes<std::uint32_t>(charge, charge_time_at);
-  if (time_s != charge_time_s_) charge_stands_ = 0;
-  else if (fresh_ && charge_stands_ < charge_is_old) ++charge_stands_;
+  if (time_s != charge_time_s_)
+    charge_stands_ = 0;
+  else if (fresh_ && charge_stands_ < charge_is_old)
+    ++charge_stands_;
   charge_time_s_ = time_s;
   const auto steps = get_bytes<std::int16_t>(currents, cc3_current_at);
   constexpr auto limits = std::numeric_limits<std::int16_t>{};
-  if (!fresh_ || charge_stands_ >= charge_is_old || steps == limits.min() || steps == limits.max()) return true;  // nothing converts; or more than it can say
-  const auto counted = static_cast<std::int64_t>(static_cast<std::uint64_t>(get_bytes<std::uint32_t>(charge, charge_at)) << 32 | get_bytes<std::uint32_t>(charge, charge_fraction_at));
+  if (!fresh_ || charge_stands_ >= charge_is_old || steps == limits.min() || steps == limits.max())
+    return true;  // nothing converts; or more than it can say
+  const auto counted =
+      static_cast<std::int64_t>(static_cast<std::uint64_t>(get_bytes<std::uint32_t>(charge, charge_at)) << 32 |
+                                get_bytes<std::uint32_t>(charge, charge_fraction_at));
   into.current_ua = mean_current_.update(steps * current_step_ua, counted, into.time_us);
   return true;
 }

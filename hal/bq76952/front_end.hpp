@@ -1,16 +1,17 @@
 // The chip as a measuring chain: found, configured, read once a sample; lost and found again.
 //
-//   absent      asked at rests of 100 ms, doubled to 1.6 s; found: in either way of talking, the device number right, not sealed
-//   compare     what the data memory holds is what it should, and the chip was not reset: measure at once (this core alone was restarted)
-//   enter       CONFIG_UPDATE mode: no measuring, no protections; 8 settings a sample,
+//   absent      asked at rests of 100 ms, doubled to 1.6 s; found: in either way of talking, the device number right,
+//   not sealed compare     what the data memory holds is what it should, and the chip was not reset: measure at once
+//   (this core alone was restarted) enter       CONFIG_UPDATE mode: no measuring, no protections; 8 settings a sample,
 //   write       then all read back; a setting that is not what was written: absent
 //   leave       and whether it talks with CRC now
 //   measure
 //
-// One state a sample. What is not fresh is not given: cells only when the chip has measured all of them since the last sample, stack, link and
-// temperatures when it has measured everything in the last two (94.5 ms), the current as cells, and when the seconds of the charge counter go on. What a transfer
-// that failed, and failed again, would have brought is no_reading, and so is all behind it. A chip that was reset, or two samples
-// in a row with a failure: absent, and asked again with the next sample.
+// One state a sample. What is not fresh is not given: cells only when the chip has measured all of them since the last
+// sample, stack, link and temperatures when it has measured everything in the last two (94.5 ms), the current as cells,
+// and when the seconds of the charge counter go on. What a transfer that failed, and failed again, would have brought
+// is measurement::no_reading, and so is all behind it. A chip that was reset, or two samples in a row with a failure:
+// absent, and asked again with the next sample.
 //
 // Time: 10 transfers, 8.9 ms; 14 while bleeding is told and looked at; README.md. Memory: 200 bytes.
 #pragma once
@@ -19,10 +20,10 @@
 #include <cstdint>
 #include <span>
 
-#include "estimator/pack_sample.hpp"
 #include "hal/bq76952/configuration.hpp"
 #include "hal/bq76952/mean_current.hpp"
 #include "hal/bq76952/wire.hpp"
+#include "measurement/pack_sample.hpp"
 
 namespace bms::hal::bq76952 {
 
@@ -34,20 +35,20 @@ class FrontEnd {
 
   struct Counters {  // since boot; they wrap
     std::uint32_t found = 0, configured = 0;
-    std::uint32_t lost = 0;         ///< from measuring
-    std::uint32_t resets = 0;       ///< of the chip, seen while measuring
+    std::uint32_t lost = 0;    ///< from measuring
+    std::uint32_t resets = 0;  ///< of the chip, seen while measuring
     std::uint32_t wrong_device = 0, sealed = 0;
     std::uint32_t wrong_setting = 0;  ///< read back other than written
-    std::uint32_t not_fresh = 0;    ///< samples that were answered with old values
-    std::uint32_t bleed_wrong = 0;  ///< times that the chip bled other cells than it was told
-    std::uint32_t trips = 0;        ///< samples with one of the chip's own protections tripped
+    std::uint32_t not_fresh = 0;      ///< samples that were answered with old values
+    std::uint32_t bleed_wrong = 0;    ///< times that the chip bled other cells than it was told
+    std::uint32_t trips = 0;          ///< samples with one of the chip's own protections tripped
   };
 
   /// settings: by address, kept by the caller; configuration.hpp makes them in the compiler.
   explicit constexpr FrontEnd(std::span<const Setting> settings) : settings_(settings) {}
 
   /// Once a sample: into cells, pack, current and temperatures goes what could be read, of now.
-  void read(PackSample<cell_inputs>& into);
+  void read(measurement::PackSample<cell_inputs>& into);
 
   /// Cells to bleed from the next read() on, a bit each; told again every 5 s, for the chip lets go after 20.
   void bleed(std::uint32_t cells) { bleed_ = static_cast<std::uint16_t>(cells); }
@@ -65,11 +66,11 @@ class FrontEnd {
   bool enter();
   bool write();
   bool leave();
-  bool measure(PackSample<cell_inputs>& into);
+  bool measure(measurement::PackSample<cell_inputs>& into);
   bool memory_is_right(bool& right);
   bool still_the_same();
-  bool read_current(PackSample<cell_inputs>& into);
-  bool read_scan(PackSample<cell_inputs>& into);
+  bool read_current(measurement::PackSample<cell_inputs>& into);
+  bool read_scan(measurement::PackSample<cell_inputs>& into);
   bool keep_bleeding();
   void rest();
   void lose();
@@ -84,7 +85,7 @@ class FrontEnd {
   std::size_t next_setting_ = 0;
   std::uint8_t waited_ = 0, failures_ = 0;
   bool swapped_ = false, fresh_ = false;
-  std::int32_t link_uv_ = no_reading;
+  std::int32_t link_uv_ = measurement::no_reading;
   std::uint8_t scans_ago_ = 0;  ///< samples since everything was measured
   std::uint32_t charge_time_s_ = 0;
   std::uint8_t charge_stands_ = 0;  ///< samples since the charge counter's time moved

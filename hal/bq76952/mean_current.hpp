@@ -1,20 +1,21 @@
 // The mean current since the previous sample, and in the long run the very charge that the chip has counted.
 //
-// The chip adds up charge every 250 ms (its filter CC1), samples come every 100: the counted charge alone stands still for two or three samples and
-// then jumps. CC3, the mean of 67 conversions of 1.5 ms, is at most 100 ms older than the voltages, but the chip's clock is not this one: now and then
-// a mean is lost or read twice. So the current is CC3, and what the charge given out so far lacks of the counted charge is made up for over a minute:
+// The chip adds up charge every 250 ms (its filter CC1), samples come every 100: the counted charge alone stands still
+// for two or three samples and then jumps. CC3, the mean of 67 conversions of 1.5 ms, is at most 100 ms older than the
+// voltages, but the chip's clock is not this one: now and then a mean is lost or read twice. So the current is CC3, and
+// what the charge given out so far lacks of the counted charge is made up for over a minute:
 //
 //   current = CC3 + lack / 64 s,    lack = counted - given, looked at when the counted charge has moved
 //
-// When in the last 100 ms it moved is not known: the middle is taken. With a constant current I that is off by 50 ms at most, which shifts the
-// current by 0.08 % of I for a while. What a step of the current by D comes late is made up for, too: by up to 0.15 s x D / 64 s = 0.23 % of D, a minute
-// long. A lack of more than half a second of full scale, or a gap between two readings, begins anew and is counted: what flowed then is not known.
-// Integers only, 48 bytes.
+// When in the last 100 ms it moved is not known: the middle is taken. With a constant current I that is off by 50 ms at
+// most, which shifts the current by 0.08 % of I for a while. What a step of the current by D comes late is made up for,
+// too: by up to 0.15 s x D / 64 s = 0.23 % of D, a minute long. A lack of more than half a second of full scale, or a
+// gap between two readings, begins anew and is counted: what flowed then is not known. Integers only, 48 bytes.
 #pragma once
 
 #include <cstdint>
 
-#include "estimator/sample.hpp"
+#include "measurement/sample.hpp"
 
 namespace bms::hal::bq76952 {
 
@@ -32,8 +33,10 @@ class MeanCurrent {
       lack_uaus_ += (counted_uas - counted_uas_) * 1'000'000;
       counted_uas_ = counted_uas;
       const std::int64_t lack_then = lack_uaus_ - given / 2;
-      if (known_) making_up_ua_ = lack_then / time_constant_us;
-      else lack_uaus_ = given / 2;  // where the two begin to be compared
+      if (known_)
+        making_up_ua_ = lack_then / time_constant_us;
+      else
+        lack_uaus_ = given / 2;  // where the two begin to be compared
       known_ = true;
       if (lack_then > most_lack_uaus || lack_then < -most_lack_uaus) {
         ++restarts_;
@@ -59,7 +62,9 @@ class MeanCurrent {
 
   static constexpr std::int64_t charge_uas(std::int64_t counted) {
     constexpr std::int64_t step_uas = 36'000'000;
-    return (counted >> 32) * step_uas + static_cast<std::int64_t>((static_cast<std::uint64_t>(counted) & 0xFFFF'FFFFU) * static_cast<std::uint64_t>(step_uas) >> 32);
+    return (counted >> 32) * step_uas +
+           static_cast<std::int64_t>(
+               (static_cast<std::uint64_t>(counted) & 0xFFFF'FFFFU) * static_cast<std::uint64_t>(step_uas) >> 32);
   }
 
   constexpr std::int32_t begin(std::int32_t cc3_ua, std::int64_t counted_uas, std::uint64_t time_us) {

@@ -10,8 +10,10 @@ inline constexpr std::uint8_t i2c_address = 0x08;       // 0x10 with the bit for
 inline constexpr std::uint16_t device_number = 0x7695;  // [12.2]
 
 // direct commands [12.1], two bytes each
-inline constexpr std::uint8_t control_status = 0x00, safety_status_a = 0x03, battery_status = 0x12, first_cell = 0x14, stack_voltage = 0x34, ld_voltage = 0x38, subcommand_low = 0x3E, transfer_buffer = 0x40,
-                              buffer_checksum = 0x60, alarm_status = 0x62, cfetoff_temperature = 0x6A, ts1_temperature = 0x70, ts3_temperature = 0x74, hdq_temperature = 0x76;
+inline constexpr std::uint8_t control_status = 0x00, safety_status_a = 0x03, battery_status = 0x12, first_cell = 0x14,
+                              stack_voltage = 0x34, ld_voltage = 0x38, subcommand_low = 0x3E, transfer_buffer = 0x40,
+                              buffer_checksum = 0x60, alarm_status = 0x62, cfetoff_temperature = 0x6A,
+                              ts1_temperature = 0x70, ts3_temperature = 0x74, hdq_temperature = 0x76;
 
 inline constexpr std::uint16_t in_deep_sleep = 1U << 2;  // of control_status
 
@@ -22,12 +24,14 @@ inline constexpr std::uint16_t in_config_update = 1U << 0, was_reset = 1U << 3, 
 inline constexpr std::uint16_t cells_scanned = 1U << 1, all_scanned = 1U << 7;
 
 // subcommands [12.2, 12.3]
-inline constexpr std::uint16_t get_device_number = 0x0001, get_currents = 0x0075, get_charge = 0x0076, exit_deep_sleep = 0x000E, balance_cells = 0x0083, set_config_update = 0x0090, exit_config_update = 0x0092, sleep_disable = 0x009A,
-                               swap_comm_mode = 0x29BC;
+inline constexpr std::uint16_t get_device_number = 0x0001, get_currents = 0x0075, get_charge = 0x0076,
+                               exit_deep_sleep = 0x000E, balance_cells = 0x0083, set_config_update = 0x0090,
+                               exit_config_update = 0x0092, sleep_disable = 0x009A, swap_comm_mode = 0x29BC;
 
 // what the transfer buffer holds
 inline constexpr std::size_t buffer_bytes = 32, buffer_overhead = 4;  // the length counts address, checksum and itself
 inline constexpr std::size_t cc3_current_at = 20;                     // of get_currents: userA [4.6]
-inline constexpr std::size_t charge_at = 0, charge_fraction_at = 4, charge_time_at = 8;  // of get_charge: i32 userAh, u32 of 2^32, u32 seconds [4.6]
+inline constexpr std::size_t charge_at = 0, charge_fraction_at = 4,
+                             charge_time_at = 8;  // of get_charge: i32 userAh, u32 of 2^32, u32 seconds [4.6]
 
 }  // namespace bms::hal::bq76952

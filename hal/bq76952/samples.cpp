@@ -1,7 +1,10 @@
-// Samples that the board measures by itself, one each period of its own clock; beside it the bus is heard for requests and for the starting point.
-// A front end that does not answer makes samples without readings: estimator and protection are told that nothing is measured.
+// Samples that the board measures by itself, one each period of its own clock; beside it the bus is heard for requests
+// and for the starting point. A front end that does not answer makes samples without readings: estimator and protection
+// are told that nothing is measured.
 //
-// A sample that comes late because the core was held up (an erase of flash) does not make the next ones come early: the period begins anew.
+// A sample that comes late because the core was held up (an erase of flash) does not make the next ones come early: the
+// period begins anew.
+#include "hal/samples.hpp"
 #include "hal/bq76952/front_end.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
@@ -9,7 +12,6 @@
 #include "hal/heard.hpp"
 #include "hal/i2c.hpp"
 #include "hal/power_path.hpp"
-#include "hal/samples.hpp"
 
 namespace bms::hal {
 
@@ -20,18 +22,18 @@ constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
 
 constexpr auto settings = bq76952::settings(bq76952::Board{});
 bq76952::FrontEnd front_end{settings};
-PackSample<pack_cells> sample;
+measurement::PackSample<pack_cells> sample;
 std::uint64_t due_us = 0;
 bool started = false;
 
 void hear_the_bus() {
-  CanFrame frame;
+  can::Frame frame;
   while (can_receive(frame)) hear(frame);
 }
 
 }  // namespace
 
-const PackSample<pack_cells>* next_sample() {
+const measurement::PackSample<pack_cells>* next_sample() {
   if (!started) {
     i2c_start();
     started = true;

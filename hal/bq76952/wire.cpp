@@ -33,10 +33,16 @@ bool Wire::transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> i
   const I2cResult result = i2c_transfer(i2c_address, out, in);
   again_ = result == I2cResult::no_acknowledge;
   switch (result) {
-    case I2cResult::done: return true;
-    case I2cResult::no_acknowledge: return bad(counters_.not_acknowledged);
-    case I2cResult::bus_stuck: ++counters_.stuck; break;
-    case I2cResult::timed_out: ++counters_.timed_out; break;
+    case I2cResult::done:
+      return true;
+    case I2cResult::no_acknowledge:
+      return bad(counters_.not_acknowledged);
+    case I2cResult::bus_stuck:
+      ++counters_.stuck;
+      break;
+    case I2cResult::timed_out:
+      ++counters_.timed_out;
+      break;
   }
   const bool free = i2c_recover();
   again_ = free && result == I2cResult::bus_stuck;
@@ -104,7 +110,8 @@ bool Wire::fetch(std::uint16_t address, std::span<std::uint8_t> into) {
       continue;
     }
     const std::size_t length = all[2 + buffer_bytes + 1];
-    if (length < buffer_overhead + into.size() || length > buffer_overhead + buffer_bytes) return bad(counters_.bad_checksum);
+    if (length < buffer_overhead + into.size() || length > buffer_overhead + buffer_bytes)
+      return bad(counters_.bad_checksum);
     const auto data = std::span<const std::uint8_t>(all).subspan(2, length - buffer_overhead);
     if (checksum(address, data) != all[2 + buffer_bytes]) return bad(counters_.bad_checksum);
     std::copy_n(data.begin(), into.size(), into.begin());
@@ -118,7 +125,8 @@ bool Wire::send(std::uint16_t address, std::span<const std::uint8_t> data) {
   put_bytes(bytes, 0, address);
   if (data.size() + 2 > bytes.size()) return false;
   std::copy(data.begin(), data.end(), bytes.begin() + 2);
-  const std::array<std::uint8_t, 2> end{checksum(address, data), static_cast<std::uint8_t>(data.size() + buffer_overhead)};
+  const std::array<std::uint8_t, 2> end{checksum(address, data),
+                                        static_cast<std::uint8_t>(data.size() + buffer_overhead)};
   return write(subcommand_low, std::span(bytes).first(data.size() + 2)) && write(buffer_checksum, end);
 }
 

@@ -1,10 +1,12 @@
 // Bytes to and from the chip, each checked: direct commands, subcommands, data memory (SLUUBY2B, 3.1, 9.4, 13.1).
 //
-//   checked   behind every byte its CRC-8: of the first over all since the start (addresses, command, byte), of each other over the byte alone
-//   plain     as the chip wakes: no CRC; the transfer buffer has a checksum, which is looked at in both
+//   checked   behind every byte its CRC-8: of the first over all since the start (addresses, command, byte), of each
+//   other over the byte alone plain     as the chip wakes: no CRC; the transfer buffer has a checksum, which is looked
+//   at in both
 //
-// What is not acknowledged, does not check, or found a bus stuck that could be freed, is asked once more; a clock that was stretched for too long is not. A false means that `into` is of
-// no use. Time: bounded by i2c_time_us() twice, and i2c_recover().
+// What is not acknowledged, does not check, or found a bus stuck that could be freed, is asked once more; a clock that
+// was stretched for too long is not. A false means that `into` is of no use. Time: bounded by i2c_time_us() twice, and
+// i2c_recover().
 #pragma once
 
 #include <array>
@@ -21,9 +23,9 @@ enum class Check : std::uint8_t { plain, checked };
 struct WireCounters {  // since boot; they wrap
   std::uint32_t transfers = 0, repeated = 0;
   std::uint32_t not_acknowledged = 0, stuck = 0, timed_out = 0;
-  std::uint32_t bad_crc = 0;        ///< of a byte
-  std::uint32_t bad_checksum = 0;   ///< of a transfer buffer, or a length that cannot be
-  std::uint32_t not_ready = 0;      ///< times that an answer was not there yet
+  std::uint32_t bad_crc = 0;       ///< of a byte
+  std::uint32_t bad_checksum = 0;  ///< of a transfer buffer, or a length that cannot be
+  std::uint32_t not_ready = 0;     ///< times that an answer was not there yet
 };
 
 class Wire {

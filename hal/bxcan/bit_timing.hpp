@@ -3,11 +3,12 @@
 //   bit = 1 + ts1 + ts2 quanta, a quantum = brp / clock      sample point after 1 + ts1 quanta
 //   brp 1..1024, ts1 1..16, ts2 1..8, sjw 1..4 and never above ts2, 8 to 25 quanta a bit (ISO 11898-1)
 //
-// bit_timing() takes the exact rate only, then the sample point nearest to 87.5 % (CiA 301, table of bit rates), then most quanta, and
-// the largest jump width. What cannot be reached does not compile.
+// bit_timing() takes the exact rate only, then the sample point nearest to 87.5 % (CiA 301, table of bit rates), then
+// most quanta, and the largest jump width. What cannot be reached does not compile.
 //
-// 42 MHz, as the STM32F405 has it at 168 MHz: 125 and 250 kbit/s at 87.5 % exactly. 500 kbit/s have 84 cycles a bit, which leave 12,
-// 14 or 21 quanta and 85.7 % at best: outside `near_recommendation`, inside what CiA 301 allows, and whoever wants it says so.
+// 42 MHz, as the STM32F405 has it at 168 MHz: 125 and 250 kbit/s at 87.5 % exactly. 500 kbit/s have 84 cycles a bit,
+// which leave 12, 14 or 21 quanta and 85.7 % at best: outside `near_recommendation`, inside what CiA 301 allows, and
+// whoever wants it says so.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@
 namespace bms::hal::bxcan {
 
 struct BitTiming {
-  std::uint32_t brp = 0;  ///< prescaler
+  std::uint32_t brp = 0;                    ///< prescaler
   std::uint32_t ts1 = 0, ts2 = 0, sjw = 0;  ///< quanta
 
   constexpr std::uint32_t quanta() const { return 1 + ts1 + ts2; }
@@ -29,7 +30,8 @@ struct SamplePointRange {
   std::uint32_t from_ppm, to_ppm;
 };
 inline constexpr std::uint32_t recommended_ppm = 875'000;
-inline constexpr SamplePointRange near_recommendation{recommended_ppm - recommended_ppm / 100, recommended_ppm + recommended_ppm / 100};
+inline constexpr SamplePointRange near_recommendation{recommended_ppm - recommended_ppm / 100,
+                                                      recommended_ppm + recommended_ppm / 100};
 inline constexpr SamplePointRange cia301_allows{850'000, 900'000};
 
 // Not defined: a call of one ends the compilation, and its name says why.
@@ -37,7 +39,8 @@ void there_is_no_such_bit_rate();
 void this_clock_cannot_be_divided_down_to_this_bit_rate();
 void no_sample_point_is_in_the_range_that_is_accepted();
 
-consteval BitTiming bit_timing(std::uint32_t clock_hz, std::uint32_t bits_per_second, SamplePointRange accepted = near_recommendation) {
+consteval BitTiming bit_timing(std::uint32_t clock_hz, std::uint32_t bits_per_second,
+                               SamplePointRange accepted = near_recommendation) {
   if (bits_per_second == 0 || bits_per_second > 1'000'000 || clock_hz == 0) there_is_no_such_bit_rate();
   BitTiming best;
   std::uint32_t least_error = 1'000'000;
@@ -48,12 +51,14 @@ consteval BitTiming bit_timing(std::uint32_t clock_hz, std::uint32_t bits_per_se
       const std::uint32_t ts1 = quanta - 1 - ts2;
       if (ts1 < 1 || ts1 > 16) continue;
       const BitTiming t{static_cast<std::uint32_t>(clock_hz / per_step), ts1, ts2, ts2 < 4 ? ts2 : 4};
-      const std::uint32_t at = t.sample_point_ppm(), error = at > recommended_ppm ? at - recommended_ppm : recommended_ppm - at;
+      const std::uint32_t at = t.sample_point_ppm(),
+                          error = at > recommended_ppm ? at - recommended_ppm : recommended_ppm - at;
       if (error < least_error) best = t, least_error = error;
     }
   }
   if (least_error == 1'000'000) this_clock_cannot_be_divided_down_to_this_bit_rate();
-  if (best.sample_point_ppm() < accepted.from_ppm || best.sample_point_ppm() > accepted.to_ppm) no_sample_point_is_in_the_range_that_is_accepted();
+  if (best.sample_point_ppm() < accepted.from_ppm || best.sample_point_ppm() > accepted.to_ppm)
+    no_sample_point_is_in_the_range_that_is_accepted();
   return best;
 }
 

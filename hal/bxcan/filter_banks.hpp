@@ -1,5 +1,6 @@
-// Acceptance filters of ST's bxCAN for a list of identifiers: 16-bit list mode, four in a bank (RM0090, 32.7.4, figure 342).
-// Standard data frames with just these identifiers come in; 29-bit frames, remote requests and all else are not even seen.
+// Acceptance filters of ST's bxCAN for a list of identifiers: 16-bit list mode, four in a bank (RM0090, 32.7.4, figure
+// 342). Standard data frames with just these identifiers come in; 29-bit frames, remote requests and all else are not
+// even seen.
 #pragma once
 
 #include <array>
@@ -17,7 +18,8 @@ constexpr std::uint32_t filter_of(std::uint16_t id) { return static_cast<std::ui
 
 void this_is_no_identifier_of_11_bits();  // not defined: ends the compilation
 
-/// CAN1 has the first 14 of the 28 banks unless told otherwise (CAN_FMR, CAN2SB). Places left over repeat the last identifier.
+/// CAN1 has the first 14 of the 28 banks unless told otherwise (CAN_FMR, CAN2SB). Places left over repeat the last
+/// identifier.
 template <std::size_t Ids>
 consteval std::array<FilterBank, (Ids + 3) / 4> filter_banks(const std::array<std::uint16_t, Ids>& ids) {
   static_assert(Ids > 0 && Ids <= 4 * 14);
@@ -26,7 +28,8 @@ consteval std::array<FilterBank, (Ids + 3) / 4> filter_banks(const std::array<st
   for (const std::uint16_t id : ids) {
     if (id > 0x7FF) this_is_no_identifier_of_11_bits();
   }
-  for (std::size_t k = 0; k < banks.size(); ++k) banks[k] = {at(4 * k) | at(4 * k + 1) << 16, at(4 * k + 2) | at(4 * k + 3) << 16};
+  for (std::size_t k = 0; k < banks.size(); ++k)
+    banks[k] = {at(4 * k) | at(4 * k + 1) << 16, at(4 * k + 2) | at(4 * k + 3) << 16};
   return banks;
 }
 

@@ -13,13 +13,14 @@
 namespace bms::hal::bxcan {
 
 struct WaitingFrame {
-  CanFrame frame;
+  can::Frame frame;
   std::uint32_t number = 0;  ///< of can_send()
 };
 
-/// The arbitration field's bits as they come on the wire: lower wins, equal is the same identifier. A frame of 29 bits has SRR and IDE
-/// recessive behind its first eleven and so loses to the standard frame with these eleven (ISO 11898-1, 10.4.2).
-constexpr std::uint32_t arbitration(const CanFrame& frame) {
+/// The arbitration field's bits as they come on the wire: lower wins, equal is the same identifier. A frame of 29 bits
+/// has SRR and IDE recessive behind its first eleven and so loses to the standard frame with these eleven (ISO
+/// 11898-1, 10.4.2).
+constexpr std::uint32_t arbitration(const can::Frame& frame) {
   return frame.long_id ? frame.id >> 18 << 21 | 3U << 19 | (frame.id & 0x3'FFFFU) << 1 : frame.id << 21;
 }
 
@@ -51,7 +52,8 @@ class TransmitQueue {
     const WaitingFrame* found = most_urgent(may);
     if (found == nullptr) return false;
     out = *found;
-    for (auto at = static_cast<std::size_t>(found - frames_.data()); at + 1 < size_; ++at) frames_[at] = frames_[at + 1];
+    for (auto at = static_cast<std::size_t>(found - frames_.data()); at + 1 < size_; ++at)
+      frames_[at] = frames_[at + 1];
     --size_;
     return true;
   }

@@ -18,7 +18,9 @@ struct Kept {
 
 std::optional<FaultRecord> fault;
 
-std::uint32_t check_of(const FaultRecord& f) { return magic ^ f.exception ^ f.pc ^ f.lr ^ f.psr ^ f.cfsr ^ f.hfsr ^ f.address; }
+std::uint32_t check_of(const FaultRecord& f) {
+  return magic ^ f.exception ^ f.pc ^ f.lr ^ f.psr ^ f.cfsr ^ f.hfsr ^ f.address;
+}
 
 }  // namespace
 

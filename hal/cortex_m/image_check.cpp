@@ -5,7 +5,8 @@
 
 extern "C" {
 // from the linker script
-extern const std::uint8_t image_vectors[], image_vectors_end[], image_code_begin[], image_code_end[], image_data_load[], image_data_begin[], image_data_end[];
+extern const std::uint8_t image_vectors[], image_vectors_end[], image_code_begin[], image_code_end[], image_data_load[],
+    image_data_begin[], image_data_end[];
 }
 
 namespace bms::hal::cortex_m {

@@ -1,4 +1,5 @@
-// Registers that every Cortex-M has: ARMv6-M Architecture Reference Manual (section in brackets), the same addresses in ARMv7-M.
+// Registers that every Cortex-M has: ARMv6-M Architecture Reference Manual (section in brackets), the same addresses in
+// ARMv7-M.
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,9 @@ constexpr std::size_t words_a_call = 128;
 const volatile std::uint32_t* lowest_used = nullptr;  // so far
 const volatile std::uint32_t* looking_at = nullptr;
 
-volatile std::uint32_t& mpu(std::uint32_t offset) { return *reinterpret_cast<volatile std::uint32_t*>(0xE000ED90 + offset); }
+volatile std::uint32_t& mpu(std::uint32_t offset) {
+  return *reinterpret_cast<volatile std::uint32_t*>(0xE000ED90 + offset);
+}
 volatile std::uint32_t& mpu_type() { return mpu(0x00); }
 volatile std::uint32_t& mpu_ctrl() { return mpu(0x04); }
 volatile std::uint32_t& mpu_rnr() { return mpu(0x08); }

@@ -1,5 +1,5 @@
-// From reset to main(): the core, .data and .bss, constructors; and the handler of faults, which records what the core saw and
-// resets it (one that stops would leave contactors as they are until the watchdog bites).
+// From reset to main(): the core, .data and .bss, constructors; and the handler of faults, which records what the core
+// saw and resets it (one that stops would leave contactors as they are until the watchdog bites).
 #include <cstdint>
 
 #include "hal/cortex_m/core.hpp"
@@ -34,7 +34,8 @@ int main();
   std::uint32_t* stack = nullptr;
   asm volatile("mov %0, sp" : "=r"(stack));
   stack -= 16;  // what is below is free
-  const bool good = cortex_m::ram_holds(image_data_begin, image_bss_end) && cortex_m::ram_holds(image_stack_limit, stack);
+  const bool good =
+      cortex_m::ram_holds(image_data_begin, image_bss_end) && cortex_m::ram_holds(image_stack_limit, stack);
   cortex_m::paint_stack(stack);
   for (std::uint32_t *from = image_data_load, *to = image_data_begin; to < image_data_end;) *to++ = *from++;
   for (std::uint32_t* to = image_bss_begin; to < image_bss_end;) *to++ = 0;
@@ -52,7 +53,9 @@ int main();
   FaultRecord record;
   record.exception = cortex_m::scb_icsr() & 511U;
   cortex_m::see_fault(record);
-  const auto at = reinterpret_cast<std::uintptr_t>(frame), ram = reinterpret_cast<std::uintptr_t>(image_stack_limit + cortex_m::guard_bytes / 4), top = reinterpret_cast<std::uintptr_t>(image_stack_top);
+  const auto at = reinterpret_cast<std::uintptr_t>(frame),
+             ram = reinterpret_cast<std::uintptr_t>(image_stack_limit + cortex_m::guard_bytes / 4),
+             top = reinterpret_cast<std::uintptr_t>(image_stack_top);
   if (at >= ram && at <= top - 8 * sizeof *frame) {  // else the stack itself was the fault
     record.lr = frame[5];
     record.pc = frame[6];

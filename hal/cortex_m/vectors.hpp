@@ -1,4 +1,5 @@
-// The vector table: every exception and interrupt that nobody serves is a fault. A chip makes its own from this (hal/<chip>/vectors.cpp).
+// The vector table: every exception and interrupt that nobody serves is a fault. A chip makes its own from this
+// (hal/<chip>/vectors.cpp).
 #pragma once
 
 #include <array>

@@ -1,10 +1,10 @@
-// The CAN bus of an emulated board in lock step with a program on the host: frames as records through two of the debugger's files, which
-// are named pipes (pipe_format.hpp). Command line "fw TO_BOARD FROM_BOARD".
+// The CAN bus of an emulated board in lock step with a program on the host: frames as records through two of the
+// debugger's files, which are named pipes (pipe_format.hpp). Command line "fw TO_BOARD FROM_BOARD".
 //
-// The firmware works until it asks for a frame a second time and has none: then what it sent goes out as a block, and it waits for one of the
-// other side. That begins with a record of length `tick`, whose data are the time: this board's clock. An empty block is one record of length
-// `nothing`. The end of the file closes the channel and ends the program. So a run is the same every time, and as fast as both sides compute.
-// Exit code 3: no such files.
+// The firmware works until it asks for a frame a second time and has none: then what it sent goes out as a block, and
+// it waits for one of the other side. That begins with a record of length `tick`, whose data are the time: this board's
+// clock. An empty block is one record of length `nothing`. The end of the file closes the channel and ends the program.
+// So a run is the same every time, and as fast as both sides compute. Exit code 3: no such files.
 #include <array>
 #include <span>
 
@@ -37,11 +37,14 @@ bool read_fully(std::span<unsigned char> into) {
   return true;
 }
 
-std::span<unsigned char> record(std::array<unsigned char, record_size * most_records>& of, std::size_t k) { return std::span(of).subspan(record_size * k, record_size); }
+std::span<unsigned char> record(std::array<unsigned char, record_size * most_records>& of, std::size_t k) {
+  return std::span(of).subspan(record_size * k, record_size);
+}
 
 void flush() {
   if (out_count == 0) put(record(outgoing, out_count++), {.length = nothing});
-  for (std::size_t k = 0; k < out_count; ++k) record(outgoing, k)[of_block_at] = static_cast<unsigned char>(out_count - 1 - k);
+  for (std::size_t k = 0; k < out_count; ++k)
+    record(outgoing, k)[of_block_at] = static_cast<unsigned char>(out_count - 1 - k);
   if (!semihosting::write(out, std::span(outgoing).first(record_size * out_count))) open = false;
   out_count = 0;
 }
@@ -69,13 +72,13 @@ void can_start() {
 
 bool can_listening() { return open; }
 
-bool can_send(const CanFrame& frame) {
+bool can_send(const can::Frame& frame) {
   if (!open || out_count == most_records) return false;
   put(record(outgoing, out_count++), frame);
   return true;
 }
 
-bool can_receive(CanFrame& frame) {
+bool can_receive(can::Frame& frame) {
   while (open) {
     if (in_next == in_count) {
       had_none = !had_none;

@@ -1,5 +1,6 @@
-// Three sectors of 16 KiB as the chip has them, kept in a file of the host: command line "fw FILE". Without one they last as long as the
-// emulator runs, resets included. A file that is new or of another size begins as bytes 0, as worn flash may.
+// Three sectors of 16 KiB as the chip has them, kept in a file of the host: command line "fw FILE". Without one they
+// last as long as the emulator runs, resets included. A file that is new or of another size begins as bytes 0, as worn
+// flash may.
 //
 // QEMU gives this board 192 KiB of RAM in one block where the chip has 128 KiB: the sectors lie above the chip's.
 #include <algorithm>
@@ -18,9 +19,13 @@ constexpr FlashSize size{3, 16 * 1024};
 constexpr std::uintptr_t above_the_chips_ram = 0x20020000;
 int file = -1;
 
-std::span<unsigned char> memory() { return {reinterpret_cast<unsigned char*>(above_the_chips_ram), std::size_t{size.sectors} * size.sector_bytes}; }
+std::span<unsigned char> memory() {
+  return {reinterpret_cast<unsigned char*>(above_the_chips_ram), std::size_t{size.sectors} * size.sector_bytes};
+}
 
-bool keep(std::size_t at, std::size_t bytes) { return file < 0 || (semihosting::seek(file, at) && semihosting::write(file, memory().subspan(at, bytes))); }
+bool keep(std::size_t at, std::size_t bytes) {
+  return file < 0 || (semihosting::seek(file, at) && semihosting::write(file, memory().subspan(at, bytes)));
+}
 
 void read_file() {
   std::size_t have = 0;

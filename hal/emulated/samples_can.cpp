@@ -1,4 +1,5 @@
-// Samples from CAN frames (hal/sample_frames.hpp): the measuring chain of a board that has none. Closing the channel ends them.
+// Samples from CAN frames (hal/sample_frames.hpp): the measuring chain of a board that has none. Closing the channel
+// ends them.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/heard.hpp"
@@ -16,12 +17,13 @@ bool was_listening = false;
 
 }  // namespace
 
-const PackSample<pack_cells>* next_sample() {
+const measurement::PackSample<pack_cells>* next_sample() {
   while (true) {
-    CanFrame frame;
+    can::Frame frame;
     while (can_receive(frame)) {
       was_listening = true;  // who closes the channel right after a sample, while it is being worked on, ends them, too
-      if (hear(frame) && frames.take(frame)) return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
+      if (hear(frame) && frames.take(frame))
+        return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
     }
     if (was_listening && !can_listening()) return nullptr;
     was_listening = can_listening();

@@ -1,6 +1,6 @@
-// A recording through the debugger's files, in blocks, as fast as the core computes: command line "fw SAMPLES ESTIMATES".
-// Formats in hal/stream_format.hpp; either file may be a named pipe, OUT is opened first. A part of a sample at the end is left out.
-// Exit code 3: no such files, not a stream, or estimates that could not be written.
+// A recording through the debugger's files, in blocks, as fast as the core computes: command line "fw SAMPLES
+// ESTIMATES". Formats in hal/stream_format.hpp; either file may be a named pipe, OUT is opened first. A part of a
+// sample at the end is left out. Exit code 3: no such files, not a stream, or estimates that could not be written.
 #include <algorithm>
 #include <array>
 
@@ -24,9 +24,9 @@ std::span<unsigned char> bytes_of(std::span<T> items) {
 }
 
 // bytes, not Samples: those are not zero at first, so that the whole block would be kept in flash
-alignas(Sample) std::array<unsigned char, block * sizeof(Sample)> samples;
+alignas(measurement::Sample) std::array<unsigned char, block * sizeof(measurement::Sample)> samples;
 std::size_t sample_count = 0, next = 0;
-std::array<std::uint32_t, block * estimate_words> estimates;
+std::array<std::uint32_t, block * estimator::estimate_words> estimates;
 std::size_t estimate_size = 0;
 StreamHeader header;
 int in = -1, out = -1;
@@ -60,16 +60,17 @@ void write_estimates() {
 
 }  // namespace
 
-const PackSample<pack_cells>* next_sample() {
+const measurement::PackSample<pack_cells>* next_sample() {
   if (next == sample_count) {
     if (in < 0) open_streams();
     if (estimate_size > 0) write_estimates();
-    sample_count = read_fully(samples) / sizeof(Sample);
+    sample_count = read_fully(samples) / sizeof(measurement::Sample);
     next = 0;
     if (sample_count == 0) return nullptr;
   }
-  const Sample& sample = *reinterpret_cast<const Sample*>(&samples[sizeof(Sample) * next++]);  // read() has put one there
-  static PackSample<pack_cells> pack;
+  const measurement::Sample& sample = *reinterpret_cast<const measurement::Sample*>(
+      &samples[sizeof(measurement::Sample) * next++]);  // read() has put one there
+  static measurement::PackSample<pack_cells> pack;
   pack.time_us = sample.time_us;
   pack.current_ua = sample.current_ua;
   pack.cell_uv.fill(sample.voltage_uv);  // a recording knows one cell
@@ -77,9 +78,9 @@ const PackSample<pack_cells>* next_sample() {
   return &pack;
 }
 
-std::optional<StartingPoint> starting_point() {
+std::optional<measurement::StartingPoint> starting_point() {
   if (header.has_start == 0) return std::nullopt;
-  return StartingPoint{header.soc_ppb, header.soc_sigma_ppb};
+  return measurement::StartingPoint{header.soc_ppb, header.soc_sigma_ppb};
 }
 
 void record(std::span<const std::uint32_t> words) {

@@ -9,7 +9,15 @@ namespace bms::hal::semihosting {
 
 namespace {
 
-enum Operation : std::uint32_t { sys_open = 0x01, sys_write = 0x05, sys_read = 0x06, sys_seek = 0x0A, sys_time = 0x11, sys_get_cmdline = 0x15, sys_exit_extended = 0x20 };
+enum Operation : std::uint32_t {
+  sys_open = 0x01,
+  sys_write = 0x05,
+  sys_read = 0x06,
+  sys_seek = 0x0A,
+  sys_time = 0x11,
+  sys_get_cmdline = 0x15,
+  sys_exit_extended = 0x20
+};
 
 std::uint32_t call(Operation operation, const void* parameters) {
   register std::uint32_t r0 asm("r0") = operation;
@@ -62,7 +70,8 @@ void exit(int code) {
   constexpr std::uint32_t application_exit = 0x20026;
   const std::array<std::uint32_t, 2> parameters{application_exit, static_cast<std::uint32_t>(code)};
   call(sys_exit_extended, parameters.data());
-  while (true) {}
+  while (true) {
+  }
 }
 
 }  // namespace bms::hal::semihosting

@@ -1,4 +1,5 @@
-// Calls to the debugger (ARM semihosting, version 2.0): files and exit of the host under QEMU. Without a debugger they fault.
+// Calls to the debugger (ARM semihosting, version 2.0): files and exit of the host under QEMU. Without a debugger they
+// fault.
 #pragma once
 
 #include <cstdint>

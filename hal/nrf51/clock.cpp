@@ -1,5 +1,5 @@
-// Microseconds from timer 0: this chip's core has no SysTick. An interrupt each millisecond, so that no turn of its 32 bits (71 minutes)
-// is missed.
+// Microseconds from timer 0: this chip's core has no SysTick. An interrupt each millisecond, so that no turn of its 32
+// bits (71 minutes) is missed.
 #include "hal/clock.hpp"
 
 #include "hal/nrf51/registers.hpp"
@@ -9,7 +9,8 @@ namespace bms::hal {
 namespace {
 
 constexpr std::uint32_t wake_every_us = 1'000;
-constexpr unsigned patience = 100'000;  // a crystal needs 1 ms; the internal oscillator runs meanwhile, and where it stays away
+constexpr unsigned patience =
+    100'000;  // a crystal needs 1 ms; the internal oscillator runs meanwhile, and where it stays away
 
 volatile std::uint32_t turns = 0, seen_us = 0;
 
@@ -27,7 +28,8 @@ volatile std::uint32_t turns = 0, seen_us = 0;
 void clock_start() {
   using namespace nrf51;
   clock_hfclkstart() = 1;
-  for (unsigned k = 0; k < patience && clock_hfclkstarted() == 0; ++k) {}
+  for (unsigned k = 0; k < patience && clock_hfclkstarted() == 0; ++k) {
+  }
   timer_bitmode() = 3;    // 32 bits
   timer_prescaler() = 4;  // 16 MHz / 2^4
   timer_cc0() = wake_every_us;

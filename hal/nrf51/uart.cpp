@@ -33,7 +33,8 @@ void uart_write(std::span<const char> bytes) {
   for (const char byte : bytes) {
     nrf51::uart_txdrdy() = 0;
     nrf51::uart_txd() = static_cast<unsigned char>(byte);
-    while (nrf51::uart_txdrdy() == 0) {}
+    while (nrf51::uart_txdrdy() == 0) {
+    }
   }
 }
 

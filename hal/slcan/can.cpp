@@ -1,4 +1,5 @@
-// CAN as SLCAN text over the board's UART. The channel is closed at boot; nothing is sent before the other side opens it.
+// CAN as SLCAN text over the board's UART. The channel is closed at boot; nothing is sent before the other side opens
+// it.
 #include "hal/can.hpp"
 
 #include "hal/slcan/codec.hpp"
@@ -18,16 +19,26 @@ void answer(std::string_view text) { uart_write({text.data(), text.size()}); }
 /// What an adapter answers to a line that is no frame for us; \a where it refuses.
 std::string_view answer_to(std::string_view line) {
   if (slcan::is_other_frame(line)) return listening ? "\r" : "\a";
-  if (line.size() == 2 && line[0] == 'S' && line[1] >= '0' && line[1] <= '8') return listening ? "\a" : "\r";  // not while open
+  if (line.size() == 2 && line[0] == 'S' && line[1] >= '0' && line[1] <= '8')
+    return listening ? "\a" : "\r";  // not while open
   if (line.size() != 1) return "\a";
   switch (line[0]) {
-    case 'O': listening = true; return "\r";
-    case 'C': listening = false; return "\r";
-    case 'V': return "V1010\r";  // hardware and software 1.0
-    case 'v': return "v1010\r";
-    case 'N': return "N0000\r";  // no serial number
-    case 'F': return listening ? "F00\r" : "\a";  // a UART has no bus errors
-    default: return "\a";
+    case 'O':
+      listening = true;
+      return "\r";
+    case 'C':
+      listening = false;
+      return "\r";
+    case 'V':
+      return "V1010\r";  // hardware and software 1.0
+    case 'v':
+      return "v1010\r";
+    case 'N':
+      return "N0000\r";  // no serial number
+    case 'F':
+      return listening ? "F00\r" : "\a";  // a UART has no bus errors
+    default:
+      return "\a";
   }
 }
 
@@ -40,14 +51,14 @@ void can_start() {
 
 bool can_listening() { return listening; }
 
-bool can_send(const CanFrame& frame) {
+bool can_send(const can::Frame& frame) {
   if (!listening) return false;
   std::array<char, slcan::longest_frame> text;
   answer(slcan::encode(frame, text));
   return true;
 }
 
-bool can_receive(CanFrame& frame) {
+bool can_receive(can::Frame& frame) {
   char byte = 0;
   while (uart_read(byte)) {
     if (!reader.take(byte)) continue;

@@ -1,9 +1,9 @@
 // SLCAN, the text that cheap CAN adapters speak (Lawicel CAN232 manual): portable, for the firmware and for the host.
 //
-//   tIIILDD..\r        standard frame: 3 hex digits of id, length, data; upper case when sent, either case when received
-//   TIIIIIIIILDD..\r   29-bit frame, 8 digits of id      rIIIL\r, RIIIIIIIIL\r   remote request: well known, of no use here
-//   O\r, C\r           open and close the channel
-//   Sn\r, V\r, v\r, N\r, F\r   bit rate, versions, serial number, status
+//   tIIILDD..\r        standard frame: 3 hex digits of id, length, data; upper case when sent, either case when
+//   received TIIIIIIIILDD..\r   29-bit frame, 8 digits of id      rIIIL\r, RIIIIIIIIL\r   remote request: well known,
+//   of no use here O\r, C\r           open and close the channel Sn\r, V\r, v\r, N\r, F\r   bit rate, versions, serial
+//   number, status
 //
 // Each line is answered by \r (after the text that was asked for, if any) or, refused, by \a.
 // A line that is too long, not hexadecimal or of the wrong length is refused as a whole and harms nothing.
@@ -22,11 +22,12 @@ namespace bms::hal::slcan {
 inline constexpr std::size_t longest_frame = 1 + 8 + 1 + 16 + 1;
 
 /// A frame as text; the part of `text` that is in use. frame.length above 8 counts as 8.
-constexpr std::string_view encode(const CanFrame& frame, std::array<char, longest_frame>& text) {
+constexpr std::string_view encode(const can::Frame& frame, std::array<char, longest_frame>& text) {
   constexpr std::string_view hex = "0123456789ABCDEF";
   std::size_t n = 0;
   text[n++] = frame.long_id ? 'T' : 't';
-  for (int shift = frame.long_id ? 28 : 8; shift >= 0; shift -= 4) text[n++] = hex[static_cast<std::size_t>(frame.id >> shift) & 15U];
+  for (int shift = frame.long_id ? 28 : 8; shift >= 0; shift -= 4)
+    text[n++] = hex[static_cast<std::size_t>(frame.id >> shift) & 15U];
   const std::size_t length = frame.length < 8 ? frame.length : 8;
   text[n++] = hex[length];
   for (std::size_t k = 0; k < length; ++k) {
@@ -46,9 +47,9 @@ constexpr unsigned digit(char c) {
 }
 
 /// A line without its end; false: not a data frame.
-constexpr bool decode(std::string_view line, CanFrame& frame) {
+constexpr bool decode(std::string_view line, can::Frame& frame) {
   if (line.empty() || (line[0] != 't' && line[0] != 'T')) return false;
-  CanFrame decoded;
+  can::Frame decoded;
   decoded.long_id = line[0] == 'T';
   const std::size_t before_data = decoded.long_id ? 10 : 5;
   if (line.size() < before_data || digit(line[1]) > (decoded.long_id ? 1U : 7U)) return false;
@@ -82,7 +83,8 @@ constexpr bool is_other_frame(std::string_view line) {
 /// Collects bytes to lines.
 class LineReader {
  public:
-  /// True when `byte` ended a line, which line() then holds until the next call. A line that was too long comes out empty.
+  /// True when `byte` ended a line, which line() then holds until the next call. A line that was too long comes out
+  /// empty.
   constexpr bool take(char byte) {
     if (ended_) {
       length_ = 0;
@@ -90,8 +92,10 @@ class LineReader {
     }
     if (byte == '\n') return false;
     if (byte != '\r') {
-      if (length_ < text_.size()) text_[length_++] = byte;
-      else too_long_ = true;
+      if (length_ < text_.size())
+        text_[length_++] = byte;
+      else
+        too_long_ = true;
       return false;
     }
     if (too_long_) length_ = 0;

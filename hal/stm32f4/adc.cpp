@@ -1,5 +1,6 @@
-// ADC1, one conversion at a time (RM0090, 13): PA1 current, PA2 voltage, PA3 temperature, channel 17 the internal reference. 84 cycles of sampling at 21 MHz are 4 us, which a source of
-// 50 kohm settles in (datasheet DS8626, ADC characteristics, R_AIN); the reference asks for 10 us (13.3, t_S_vrefint), 480 cycles are 23.
+// ADC1, one conversion at a time (RM0090, 13): PA1 current, PA2 voltage, PA3 temperature, channel 17 the internal
+// reference. 84 cycles of sampling at 21 MHz are 4 us, which a source of 50 kohm settles in (datasheet DS8626, ADC
+// characteristics, R_AIN); the reference asks for 10 us (13.3, t_S_vrefint), 480 cycles are 23.
 #include "hal/adc.hpp"
 
 #include "hal/stm32f4/registers.hpp"
@@ -11,14 +12,19 @@ namespace {
 using namespace stm32f4;
 
 constexpr std::uint32_t converted = 1U << 1, on = 1U << 0, begin = 1U << 30;
-constexpr unsigned patience = 1'000;  // polls of some 6 cycles: 36 us at 168 MHz, more at 16; the longest conversion takes 23.4
+constexpr unsigned patience =
+    1'000;  // polls of some 6 cycles: 36 us at 168 MHz, more at 16; the longest conversion takes 23.4
 
 constexpr std::uint32_t channel(AnalogInput input) {
   switch (input) {
-    case AnalogInput::current: return 1;
-    case AnalogInput::voltage: return 2;
-    case AnalogInput::temperature: return 3;
-    case AnalogInput::reference: break;
+    case AnalogInput::current:
+      return 1;
+    case AnalogInput::voltage:
+      return 2;
+    case AnalogInput::temperature:
+      return 3;
+    case AnalogInput::reference:
+      break;
   }
   return 17;
 }
@@ -26,14 +32,14 @@ constexpr std::uint32_t channel(AnalogInput input) {
 }  // namespace
 
 void adc_start() {
-  rcc_ahb1enr() = rcc_ahb1enr() | 1U << 0;    // GPIOA
-  rcc_apb2enr() = rcc_apb2enr() | 1U << 8;    // ADC1
-  gpioa_moder() = gpioa_moder() | 0xFCU;      // PA1 to PA3 analog
-  adc_ccr() = 1U << 16 | 1U << 23;            // APB2 / 4 = 21 MHz; reference on
-  adc1_smpr1() = 7U << 21;                    // channel 17: 480 cycles
-  adc1_smpr2() = 4U << 3 | 4U << 6 | 4U << 9; // channels 1 to 3: 84 cycles
-  adc1_cr1() = 0;                             // 12 bits
-  adc1_cr2() = on;                            // ready within 3 us; the reference within 10: long before the first round
+  rcc_ahb1enr() = rcc_ahb1enr() | 1U << 0;     // GPIOA
+  rcc_apb2enr() = rcc_apb2enr() | 1U << 8;     // ADC1
+  gpioa_moder() = gpioa_moder() | 0xFCU;       // PA1 to PA3 analog
+  adc_ccr() = 1U << 16 | 1U << 23;             // APB2 / 4 = 21 MHz; reference on
+  adc1_smpr1() = 7U << 21;                     // channel 17: 480 cycles
+  adc1_smpr2() = 4U << 3 | 4U << 6 | 4U << 9;  // channels 1 to 3: 84 cycles
+  adc1_cr1() = 0;                              // 12 bits
+  adc1_cr2() = on;  // ready within 3 us; the reference within 10: long before the first round
 }
 
 std::optional<std::uint16_t> adc_convert(AnalogInput input) {

@@ -1,18 +1,22 @@
 // CAN1 on PB8 (RX) and PB9 (TX), alternate function 9 (datasheet, table 9). Registers: RM0090, 32.9.
 //
-// Out: three mailboxes that the controller sends by identifier (TXFP = 0), behind them a queue of 32 frames in the same order. A more
-// urgent frame that finds all three taken has the least urgent one aborted, which goes back into the queue. Two frames of one
-// identifier are never in mailboxes together: the controller would send them by the mailbox's number, not by age.
-// In: filters for accepted_ids, standard frames all of them, the controller's FIFO of three, by interrupt into a ring of 64.
+// Out: three mailboxes that the controller sends by identifier (TXFP = 0), behind them a queue of 32 frames in the same
+// order. A more urgent frame that finds all three taken has the least urgent one aborted, which goes back into the
+// queue. Two frames of one identifier are never in mailboxes together: the controller would send them by the mailbox's
+// number, not by age. In: filters for accepted_ids, standard frames all of them, the controller's FIFO of three, by
+// interrupt into a ring of 64.
 //
-// Going on the bus (32.4) and coming back after bus-off (32.7.6) are steps that service() looks at, each with a time after which it is
-// given up and tried again later; nothing here waits in a loop for the bus.
-//   bus-off         what waits is dropped; after a rest of 100 ms, doubled each time up to 1.6 s and 100 ms again once a frame got out,
+// Going on the bus (32.4) and coming back after bus-off (32.7.6) are steps that service() looks at, each with a time
+// after which it is given up and tried again later; nothing here waits in a loop for the bus.
+//   bus-off         what waits is dropped; after a rest of 100 ms, doubled each time up to 1.6 s and 100 ms again once
+//   a frame got out,
 //                   the controller is told to recover, which takes 128 times 11 recessive bits
-//   nobody hears    frames wait and none got out for 100 ms (no acknowledge, a stuck wire, a bus that is full): what waits is dropped,
+//   nobody hears    frames wait and none got out for 100 ms (no acknowledge, a stuck wire, a bus that is full): what
+//   waits is dropped,
 //                   can_listening() is false for a second or until a frame comes in, then fresh frames try again
 //   no idle bus     100 ms after asking: counted, again after the rest
-//   no crystal      never on the bus: the internal oscillator is off by up to 8 % (datasheet, HSI), a bit may be by 0.5 %
+//   no crystal      never on the bus: the internal oscillator is off by up to 8 % (datasheet, HSI), a bit may be by 0.5
+//   %
 #include <array>
 #include <atomic>
 
@@ -57,7 +61,9 @@ bxcan::TransmitQueue<32> queue;
 std::uint32_t numbers = 0;
 std::atomic<std::uint32_t> sent{0}, dropped{0};
 
-void count(std::atomic<std::uint32_t>& counter, std::uint32_t more = 1) { counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed); }
+void count(std::atomic<std::uint32_t>& counter, std::uint32_t more = 1) {
+  counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
+}
 
 /// While one lives, the transmit interrupt waits.
 class TransmitInterruptHeld {
@@ -81,13 +87,15 @@ void take_back_finished() {
     can1_tsr() = finished(k);
     Mailbox& box = mailboxes[k];
     if (!box.taken) continue;
-    if ((status & succeeded(k)) != 0) count(sent);
-    else if (box.unwanted || !queue.insert(box.waiting)) count(dropped);
+    if ((status & succeeded(k)) != 0)
+      count(sent);
+    else if (box.unwanted || !queue.insert(box.waiting))
+      count(dropped);
     box.taken = box.unwanted = false;
   }
 }
 
-bool in_a_mailbox(const CanFrame& frame) {
+bool in_a_mailbox(const can::Frame& frame) {
   for (const Mailbox& box : mailboxes) {
     if (box.taken && bxcan::arbitration(box.waiting.frame) == bxcan::arbitration(frame)) return true;
   }
@@ -97,14 +105,15 @@ bool in_a_mailbox(const CanFrame& frame) {
 void load(std::uint32_t k, const bxcan::WaitingFrame& waiting) {
   mailboxes[k] = {waiting, true, false};
   CanMailbox& box = can1_transmit_mailbox(k);
-  const CanFrame& frame = waiting.frame;
+  const can::Frame& frame = waiting.frame;
   box.length_and_time = frame.length < 8 ? frame.length : 8;
   box.data_low = get_bytes<std::uint32_t>(frame.data, 0);
   box.data_high = get_bytes<std::uint32_t>(frame.data, 4);
   box.identifier = (frame.long_id ? frame.id << 3 | extended : frame.id << 21) | transmit_request;
 }
 
-/// All are taken: the least urgent frame comes back, if it is less urgent than the one that waits; at once, or after its end if it is under way.
+/// All are taken: the least urgent frame comes back, if it is less urgent than the one that waits; at once, or after
+/// its end if it is under way.
 void make_room_for(const bxcan::WaitingFrame& waiting) {
   std::uint32_t least = 0;
   for (std::uint32_t k = 1; k < mailboxes.size(); ++k) {
@@ -144,7 +153,7 @@ bool anything_waits() {
 
 // ---- in: one writer (the interrupt), one reader ----
 
-std::array<CanFrame, 64> ring;
+std::array<can::Frame, 64> ring;
 std::atomic<std::uint32_t> received{0}, taken{0}, lost{0}, overruns{0};
 
 // ---- the bus ----
@@ -218,7 +227,8 @@ void service() {
   const std::uint64_t elapsed = now_us() - phase_since_us;
   const bool initialising = (can1_msr() & msr_inak) != 0, bus_off = (can1_esr() & esr_bus_off) != 0;
   switch (phase) {
-    case Phase::off: return;
+    case Phase::off:
+      return;
     case Phase::resting:
       if (elapsed < rest_us) return;
       rest_us = rest_us < longest_rest_us ? 2 * rest_us : longest_rest_us;
@@ -267,7 +277,7 @@ bool can_listening() {
   return on_the_bus() && !silent;
 }
 
-bool can_send(const CanFrame& frame) {
+bool can_send(const can::Frame& frame) {
   const TransmitInterruptHeld held;
   if (!on_the_bus() || silent) {
     count(dropped);
@@ -279,7 +289,7 @@ bool can_send(const CanFrame& frame) {
   return kept;
 }
 
-bool can_receive(CanFrame& frame) {
+bool can_receive(can::Frame& frame) {
   service();
   const std::uint32_t at = taken.load(std::memory_order_relaxed);
   if (at == received.load(std::memory_order_acquire)) return false;
@@ -296,8 +306,16 @@ CanHealth can_health() {
     if ((esr & esr_passive) != 0) return CanState::passive;
     return (esr & esr_warning) != 0 ? CanState::warning : CanState::active;
   };
-  return {.state = state(), .transmit_errors = static_cast<std::uint8_t>(esr >> 16), .receive_errors = static_cast<std::uint8_t>(esr >> 24),
-          .sent = sent, .received = received, .dropped = dropped, .lost = lost, .overruns = overruns, .bus_offs = bus_offs, .failed_starts = failed_starts};
+  return {.state = state(),
+          .transmit_errors = static_cast<std::uint8_t>(esr >> 16),
+          .receive_errors = static_cast<std::uint8_t>(esr >> 24),
+          .sent = sent,
+          .received = received,
+          .dropped = dropped,
+          .lost = lost,
+          .overruns = overruns,
+          .bus_offs = bus_offs,
+          .failed_starts = failed_starts};
 }
 
 }  // namespace bms::hal
@@ -314,11 +332,12 @@ extern "C" void can1_rx0_interrupt() {
   if ((status & rf_pending) == 0) return;
   const stm32f4::CanMailbox& box = stm32f4::can1_receive_fifo_0();
   const std::uint32_t length = box.length_and_time & 15U;
-  CanFrame frame{box.identifier >> 21, static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
+  can::Frame frame{box.identifier >> 21, static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
   put_bytes<std::uint32_t>(frame.data, 0, box.data_low);
   put_bytes<std::uint32_t>(frame.data, 4, box.data_high);
   stm32f4::can1_rf0r() = rf_release;
-  for (int patience = 0; patience < 16 && (stm32f4::can1_rf0r() & rf_release) != 0; ++patience) {}
+  for (int patience = 0; patience < 16 && (stm32f4::can1_rf0r() & rf_release) != 0; ++patience) {
+  }
   const std::uint32_t at = received.load(std::memory_order_relaxed);
   if (at - taken.load(std::memory_order_acquire) == ring.size()) {
     count(lost);

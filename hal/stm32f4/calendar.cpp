@@ -1,5 +1,6 @@
-// The real-time clock in the backup domain (RM0090, 26 and 5.1.2), which VBAT supplies while the board is off: on the 32,768 Hz crystal, which VBAT supplies, too; on the
-// internal oscillator of 32 kHz (17 to 47) if there is none, which VBAT does not, so that its time is worth nothing after a loss of power.
+// The real-time clock in the backup domain (RM0090, 26 and 5.1.2), which VBAT supplies while the board is off: on the
+// 32,768 Hz crystal, which VBAT supplies, too; on the internal oscillator of 32 kHz (17 to 47) if there is none, which
+// VBAT does not, so that its time is worth nothing after a loss of power.
 //
 // A mark in a backup register says by which of them the time was set; it and the time go with the backup supply.
 #include "hal/calendar.hpp"
@@ -15,12 +16,14 @@ namespace {
 
 using namespace stm32f4;
 
-constexpr std::uint32_t lse_on = 1U << 0, lse_ready = 1U << 1, clock_selected = 3U << 8, from_lse = 1U << 8, from_lsi = 2U << 8, rtc_enabled = 1U << 15;  // RCC_BDCR
-constexpr std::uint32_t lsi_on = 1U << 0, lsi_ready = 1U << 1;                                                                                       // RCC_CSR
-constexpr std::uint32_t synchronised = 1U << 5, may_be_set = 1U << 6, setting = 1U << 7, year_set = 1U << 4;                                          // RTC_ISR
-constexpr std::uint32_t set_by_lse = 0x7105'E5E1, set_by_lsi = 0x7105'E512;                                                                          // in backup register 0
-constexpr std::uint64_t crystal_comes_up_us = 5'000'000;  // 2 s usual (datasheet, LSE oscillator characteristics); more in the cold
-constexpr unsigned patience = 200'000;                    // some 10 ms; what is waited for needs three cycles of 32 kHz at most
+constexpr std::uint32_t lse_on = 1U << 0, lse_ready = 1U << 1, clock_selected = 3U << 8, from_lse = 1U << 8,
+                        from_lsi = 2U << 8, rtc_enabled = 1U << 15;  // RCC_BDCR
+constexpr std::uint32_t lsi_on = 1U << 0, lsi_ready = 1U << 1;       // RCC_CSR
+constexpr std::uint32_t synchronised = 1U << 5, may_be_set = 1U << 6, setting = 1U << 7, year_set = 1U << 4;  // RTC_ISR
+constexpr std::uint32_t set_by_lse = 0x7105'E5E1, set_by_lsi = 0x7105'E512;  // in backup register 0
+constexpr std::uint64_t crystal_comes_up_us =
+    5'000'000;                          // 2 s usual (datasheet, LSE oscillator characteristics); more in the cold
+constexpr unsigned patience = 200'000;  // some 10 ms; what is waited for needs three cycles of 32 kHz at most
 
 bool comes(Register& reg, std::uint32_t bit) {
   for (unsigned k = 0; k < patience; ++k) {
@@ -34,7 +37,9 @@ bool lost_its_clock = false;  // ran from the internal oscillator, and the power
 CalendarState state() {
   if (lost_its_clock || (rcc_bdcr() & rtc_enabled) == 0 || (rtc_isr() & year_set) == 0) return CalendarState::never_set;
   const std::uint32_t mark = rtc_bkp0r();
-  return mark == set_by_lse ? CalendarState::runs : mark == set_by_lsi ? CalendarState::runs_roughly : CalendarState::never_set;
+  return mark == set_by_lse   ? CalendarState::runs
+         : mark == set_by_lsi ? CalendarState::runs_roughly
+                              : CalendarState::never_set;
 }
 
 }  // namespace
@@ -53,7 +58,8 @@ CalendarState calendar_state() { return state(); }
 
 std::optional<std::uint32_t> calendar_s() {
   if (state() == CalendarState::never_set) return std::nullopt;
-  if (!comes(rtc_isr(), synchronised)) return std::nullopt;  // after a reset the copies that are read come two cycles later
+  if (!comes(rtc_isr(), synchronised))
+    return std::nullopt;              // after a reset the copies that are read come two cycles later
   const std::uint32_t tr = rtc_tr();  // holds DR until that is read
   return unix_s({tr, rtc_dr()});
 }
@@ -79,7 +85,7 @@ bool calendar_set(std::uint32_t unix_s) {
   if (may) {
     const RtcTime time = rtc_time(unix_s);
     const std::uint32_t synchronous = by_lse ? 32'768 / 128 - 1 : 32'000 / 128 - 1;
-    rtc_prer() = synchronous;            // the two parts one after the other (26.3.5)
+    rtc_prer() = synchronous;  // the two parts one after the other (26.3.5)
     rtc_prer() = synchronous | 127U << 16;
     rtc_tr() = time.tr;
     rtc_dr() = time.dr;

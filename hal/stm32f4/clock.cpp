@@ -27,7 +27,8 @@ std::uint64_t now_us() {
   while (true) {
     const std::uint32_t high = milliseconds_high, low = milliseconds_low;
     const std::uint32_t ticks = stm32f4::syst_rvr() - stm32f4::syst_cvr();
-    if (low == milliseconds_low && high == milliseconds_high) return (static_cast<std::uint64_t>(high) << 32 | low) * 1'000 + ticks / ticks_per_us;
+    if (low == milliseconds_low && high == milliseconds_high)
+      return (static_cast<std::uint64_t>(high) << 32 | low) * 1'000 + ticks / ticks_per_us;
   }
 }
 

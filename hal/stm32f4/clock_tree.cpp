@@ -37,7 +37,7 @@ Clocks start_clocks() {
 
   flash_acr() = 5U | 1U << 8 | 1U << 9 | 1U << 10;  // 5 wait states, prefetch, both caches
   if (!comes_up(flash_acr(), 7U, 5U)) return reached;
-  rcc_cfgr() = 5U << 10 | 4U << 13 | 2U;            // APB1 / 4, APB2 / 2, PLL as system clock
+  rcc_cfgr() = 5U << 10 | 4U << 13 | 2U;  // APB1 / 4, APB2 / 2, PLL as system clock
   if (!comes_up(rcc_cfgr(), 3U << 2, 2U << 2)) {
     rcc_cfgr() = 0;  // the internal oscillator, undivided: what `reached` says
     return reached;

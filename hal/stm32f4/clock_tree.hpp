@@ -13,7 +13,8 @@ struct Clocks {
 /// On the crystal; what is derived from APB1 is good for CAN (0.5 %) then only.
 inline constexpr std::uint32_t crystal_core_hz = 168'000'000, crystal_apb1_hz = 42'000'000;
 
-/// 168 MHz from the 25 MHz crystal through the PLL; 16 MHz from the internal oscillator when crystal or PLL do not come up.
+/// 168 MHz from the 25 MHz crystal through the PLL; 16 MHz from the internal oscillator when crystal or PLL do not come
+/// up.
 Clocks start_clocks();
 
 /// What start_clocks() has reached; the internal oscillator before.

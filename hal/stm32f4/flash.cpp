@@ -1,5 +1,6 @@
-// The flash interface, programmed word by word from a supply of 2.7 to 3.6 V (RM0090, 3.6: parallelism x32). Only the sectors that the
-// linker script sets aside (image_storage_begin) are touched: sectors 1 to 3, the small ones behind the vectors.
+// The flash interface, programmed word by word from a supply of 2.7 to 3.6 V (RM0090, 3.6: parallelism x32). Only the
+// sectors that the linker script sets aside (image_storage_begin) are touched: sectors 1 to 3, the small ones behind
+// the vectors.
 #include "hal/flash.hpp"
 
 #include "hal/stm32f4/registers.hpp"
@@ -13,11 +14,14 @@ namespace bms::hal {
 namespace {
 
 constexpr std::uint32_t sector_bytes = 16 * 1024, flash_origin = 0x08000000;
-constexpr std::uint32_t busy = 1U << 16, errors = 1U << 1 | 1U << 4 | 1U << 5 | 1U << 6 | 1U << 7;                  // OPERR, WRPERR, PGAERR, PGPERR, PGSERR
-constexpr std::uint32_t program = 1U << 0, sector_erase = 1U << 1, by_words = 2U << 8, start = 1U << 16, locked = 1U << 31;
+constexpr std::uint32_t busy = 1U << 16, errors = 1U << 1 | 1U << 4 | 1U << 5 | 1U << 6 |
+                                                  1U << 7;  // OPERR, WRPERR, PGAERR, PGPERR, PGSERR
+constexpr std::uint32_t program = 1U << 0, sector_erase = 1U << 1, by_words = 2U << 8, start = 1U << 16,
+                        locked = 1U << 31;
 constexpr std::uint32_t data_cache = 1U << 10, data_cache_reset = 1U << 12;
 
-// A poll takes 5 to 10 cycles: 0.6 s at least at 168 MHz, where an erase needs 0.5 at most; 0.3 ms for a word, which needs 0.1.
+// A poll takes 5 to 10 cycles: 0.6 s at least at 168 MHz, where an erase needs 0.5 at most; 0.3 ms for a word, which
+// needs 0.1.
 constexpr std::uint32_t erase_patience = 20'000'000, program_patience = 10'000;
 
 bool ready(std::uint32_t patience) {
@@ -27,7 +31,9 @@ bool ready(std::uint32_t patience) {
   return true;
 }
 
-std::uint32_t address(std::uint32_t sector, std::uint32_t at) { return reinterpret_cast<std::uint32_t>(image_storage_begin) + sector * sector_bytes + at; }
+std::uint32_t address(std::uint32_t sector, std::uint32_t at) {
+  return reinterpret_cast<std::uint32_t>(image_storage_begin) + sector * sector_bytes + at;
+}
 
 /// Unlocked for one operation; a stray write outside of it is refused by the chip.
 template <class Operation>
@@ -48,7 +54,9 @@ bool unlocked(std::uint32_t control, std::uint32_t patience, Operation operation
 
 }  // namespace
 
-FlashSize flash_start() { return {static_cast<std::uint32_t>(image_storage_end - image_storage_begin) / sector_bytes, sector_bytes}; }
+FlashSize flash_start() {
+  return {static_cast<std::uint32_t>(image_storage_end - image_storage_begin) / sector_bytes, sector_bytes};
+}
 
 bool flash_erase(std::uint32_t sector) {
   const std::uint32_t number = (address(sector, 0) - flash_origin) / sector_bytes, control = sector_erase | number << 3;
@@ -62,7 +70,8 @@ bool flash_erase(std::uint32_t sector) {
 }
 
 bool flash_program(std::uint32_t sector, std::uint32_t at, std::uint32_t word) {
-  return unlocked(program, program_patience, [&] { *reinterpret_cast<volatile std::uint32_t*>(address(sector, at)) = word; });
+  return unlocked(program, program_patience,
+                  [&] { *reinterpret_cast<volatile std::uint32_t*>(address(sector, at)) = word; });
 }
 
 void flash_read(std::uint32_t sector, std::uint32_t at, std::span<std::uint8_t> into) {

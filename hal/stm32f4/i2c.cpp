@@ -1,11 +1,13 @@
-// I2C1 on PB6 (SCL) and PB7 (SDA), alternate function 4 (datasheet, table 9), asked register by register; no interrupt, no DMA. Registers and
-// the order of events: RM0090, 27.3.3 and 27.6. USART1 of hal/stm32f4/uart.cpp has the same pins: an image has one of both.
+// I2C1 on PB6 (SCL) and PB7 (SDA), alternate function 4 (datasheet, table 9), asked register by register; no interrupt,
+// no DMA. Registers and the order of events: RM0090, 27.3.3 and 27.6. USART1 of hal/stm32f4/uart.cpp has the same pins:
+// an image has one of both.
 //
-// Reading ends as 27.3.3 wants it: one byte (acknowledge off before the address is cleared), two (POS), more (the last three by BTF), so that an
-// interrupt between two registers may take as long as it likes. An interrupt makes a transfer longer, not wrong: the clock waits.
+// Reading ends as 27.3.3 wants it: one byte (acknowledge off before the address is cleared), two (POS), more (the last
+// three by BTF), so that an interrupt between two registers may take as long as it likes. An interrupt makes a transfer
+// longer, not wrong: the clock waits.
 //
-// The controller's BUSY may stay set with both wires high (erratum "I2C analog filter may provide wrong value, locking BUSY flag", STM32F405 errata
-// ES0182): i2c_recover() moves both wires as outputs and resets the controller.
+// The controller's BUSY may stay set with both wires high (erratum "I2C analog filter may provide wrong value, locking
+// BUSY flag", STM32F405 errata ES0182): i2c_recover() moves both wires as outputs and resets the controller.
 #include "hal/i2c.hpp"
 
 #include "hal/clock.hpp"
@@ -19,8 +21,10 @@ namespace {
 using namespace stm32f4;
 
 constexpr std::uint32_t scl = 1U << 6, sda = 1U << 7;
-constexpr std::uint32_t cr1_on = 1U << 0, cr1_start = 1U << 8, cr1_stop = 1U << 9, cr1_ack = 1U << 10, cr1_pos = 1U << 11, cr1_reset = 1U << 15;
-constexpr std::uint32_t sr1_started = 1U << 0, sr1_address = 1U << 1, sr1_finished = 1U << 2, sr1_received = 1U << 6, sr1_empty = 1U << 7;
+constexpr std::uint32_t cr1_on = 1U << 0, cr1_start = 1U << 8, cr1_stop = 1U << 9, cr1_ack = 1U << 10,
+                        cr1_pos = 1U << 11, cr1_reset = 1U << 15;
+constexpr std::uint32_t sr1_started = 1U << 0, sr1_address = 1U << 1, sr1_finished = 1U << 2, sr1_received = 1U << 6,
+                        sr1_empty = 1U << 7;
 constexpr std::uint32_t sr1_bus_error = 1U << 8, sr1_arbitration = 1U << 9, sr1_no_acknowledge = 1U << 10;
 constexpr std::uint32_t sr2_busy = 1U << 1;
 constexpr std::uint32_t half_bit_us = 5;  // of a clock made by hand: 100 kHz
@@ -29,8 +33,11 @@ struct Speed {
   std::uint32_t ccr, trise;
 };
 
-/// Fast mode, low for two thirds: ccr = clock / (3 x 400 kHz), never faster; trise = 300 ns of clocks + 1 (27.6.8, 27.6.9).
-constexpr Speed speed(std::uint32_t apb1_hz) { return {1U << 15 | (apb1_hz + 1'199'999) / 1'200'000, apb1_hz / 1'000 * 300 / 1'000'000 + 1}; }
+/// Fast mode, low for two thirds: ccr = clock / (3 x 400 kHz), never faster; trise = 300 ns of clocks + 1
+/// (27.6.8, 27.6.9).
+constexpr Speed speed(std::uint32_t apb1_hz) {
+  return {1U << 15 | (apb1_hz + 1'199'999) / 1'200'000, apb1_hz / 1'000 * 300 / 1'000'000 + 1};
+}
 static_assert(speed(42'000'000).ccr == (1U << 15 | 35) && speed(42'000'000).trise == 13);
 static_assert(speed(16'000'000).ccr == (1U << 15 | 14) && speed(16'000'000).trise == 5);
 
@@ -60,7 +67,8 @@ bool both_high() { return (gpiob_idr() & (scl | sda)) == (scl | sda); }
 
 void pause() {
   const std::uint64_t until = now_us() + half_bit_us + 1;
-  while (now_us() < until) {}
+  while (now_us() < until) {
+  }
 }
 
 /// One transfer, with the time that is left for it.
@@ -101,7 +109,8 @@ class Transfer {
         if (const auto r = wait(sr1_received); r != I2cResult::done) return r;
         in[at] = static_cast<std::uint8_t>(i2c1_dr());
       }
-      if (const auto r = wait(sr1_finished); r != I2cResult::done) return r;  // the third last is in DR, the second last behind it
+      if (const auto r = wait(sr1_finished); r != I2cResult::done)
+        return r;  // the third last is in DR, the second last behind it
       clear(cr1_ack);
       in[at++] = static_cast<std::uint8_t>(i2c1_dr());
       if (const auto r = wait(sr1_finished); r != I2cResult::done) return r;
@@ -180,7 +189,8 @@ bool i2c_recover() {
     gpiob_bsrr() = scl;
     pause();
   }
-  for (const std::uint32_t level : {scl << 16, sda << 16, scl, sda}) {  // a stop: the data wire rises while the clock is high
+  for (const std::uint32_t level :
+       {scl << 16, sda << 16, scl, sda}) {  // a stop: the data wire rises while the clock is high
     gpiob_bsrr() = level;
     pause();
   }

@@ -1,4 +1,5 @@
-// The calendar's registers TR and DR (RM0090, 26.6.1 and 26.6.2: decimal digits, four bits each; years 2000 to 2099), and seconds since 1970.
+// The calendar's registers TR and DR (RM0090, 26.6.1 and 26.6.2: decimal digits, four bits each; years 2000 to 2099),
+// and seconds since 1970.
 #pragma once
 
 #include <chrono>
@@ -25,16 +26,20 @@ constexpr RtcTime rtc_time(std::uint32_t unix_s) {
   const std::uint32_t second = unix_s % 86'400;
   const auto year = static_cast<std::uint32_t>(static_cast<int>(date.year()) - 2'000);
   return {to_digits(second / 3'600) << 16 | to_digits(second / 60 % 60) << 8 | to_digits(second % 60),
-          to_digits(year) << 16 | weekday{day}.iso_encoding() << 13 | to_digits(static_cast<unsigned>(date.month())) << 8 | to_digits(static_cast<unsigned>(date.day()))};
+          to_digits(year) << 16 | weekday{day}.iso_encoding() << 13 |
+              to_digits(static_cast<unsigned>(date.month())) << 8 | to_digits(static_cast<unsigned>(date.day()))};
 }
 
 /// Nothing for digits that are no date.
 constexpr std::optional<std::uint32_t> unix_s(const RtcTime& t) {
   using namespace std::chrono;
-  const std::uint32_t hour = of_digits(t.tr >> 16 & 0x3F), minute = of_digits(t.tr >> 8 & 0x7F), second = of_digits(t.tr & 0x7F);
-  const year_month_day date{year(2'000 + static_cast<int>(of_digits(t.dr >> 16 & 0xFF))), month(of_digits(t.dr >> 8 & 0x1F)), day(of_digits(t.dr & 0x3F))};
+  const std::uint32_t hour = of_digits(t.tr >> 16 & 0x3F), minute = of_digits(t.tr >> 8 & 0x7F),
+                      second = of_digits(t.tr & 0x7F);
+  const year_month_day date{year(2'000 + static_cast<int>(of_digits(t.dr >> 16 & 0xFF))),
+                            month(of_digits(t.dr >> 8 & 0x1F)), day(of_digits(t.dr & 0x3F))};
   if (!date.ok() || hour > 23 || minute > 59 || second > 59) return std::nullopt;
-  return static_cast<std::uint32_t>(sys_days{date}.time_since_epoch().count()) * 86'400 + hour * 3'600 + minute * 60 + second;
+  return static_cast<std::uint32_t>(sys_days{date}.time_since_epoch().count()) * 86'400 + hour * 3'600 + minute * 60 +
+         second;
 }
 
 }  // namespace bms::hal::stm32f4

@@ -7,7 +7,8 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::uint32_t detector_on = 1U << 4, highest_level = 7U << 5, output = 1U << 2, line = 1U << 16, brown_out_level = 3U << 2;
+constexpr std::uint32_t detector_on = 1U << 4, highest_level = 7U << 5, output = 1U << 2, line = 1U << 16,
+                        brown_out_level = 3U << 2;
 
 volatile bool fell = false;
 

@@ -28,7 +28,8 @@ void uart_start(std::uint32_t baud) {
 
 void uart_write(std::span<const char> bytes) {
   for (const char byte : bytes) {
-    while ((stm32f4::usart1_sr() & transmitter_free) == 0) {}
+    while ((stm32f4::usart1_sr() & transmitter_free) == 0) {
+    }
     stm32f4::usart1_dr() = static_cast<unsigned char>(byte);
   }
 }

@@ -1,5 +1,5 @@
-// Gauss-Newton in a subspace: `gn` after Ljung's System Identification Toolbox, `agn` after Wills & Ninness, "On Gradient-Based
-// Search for Multivariable System Estimates", IEEE Trans. Automatic Control 53 (2008).
+// Gauss-Newton in a subspace: `gn` after Ljung's System Identification Toolbox, `agn` after Wills & Ninness, "On
+// Gradient-Based Search for Multivariable System Estimates", IEEE Trans. Automatic Control 53 (2008).
 #include <algorithm>
 #include <limits>
 
@@ -22,12 +22,14 @@ VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
   const VectorXd& values = svd.singularValues();
   const VectorXd along = svd.matrixU().transpose() * b;
   VectorXd p = VectorXd::Zero(a.cols());
-  for (Index k = 0; k < values.size() && values[k] > tolerance * values[0]; ++k) p -= svd.matrixV().col(k) * (along[k] / values[k]);
+  for (Index k = 0; k < values.size() && values[k] > tolerance * values[0]; ++k)
+    p -= svd.matrixV().col(k) * (along[k] / values[k]);
   return p;
 }
 
 VectorXd subspace_step(const Search& search, double tolerance) {
-  return step_within_bounds(search, [&](const MatrixXd& a, const VectorXd& b, const Indices&) { return subspace_step(a, b, tolerance); });
+  return step_within_bounds(
+      search, [&](const MatrixXd& a, const VectorXd& b, const Indices&) { return subspace_step(a, b, tolerance); });
 }
 
 /// Bisections that were needed, more than most_bisections if in vain.
@@ -36,15 +38,18 @@ int move_along(Search& search, const VectorXd& step) {
   double length = 1;
   for (int bisections = 0; bisections <= most_bisections; ++bisections, length /= 2) {
     const VectorXd x = search.after(length * step);
-    if (search.cost_at(x) < search.cost() + sufficient_decrease * length * slope && search.move_to(x)) return bisections;
+    if (search.cost_at(x) < search.cost() + sufficient_decrease * length * slope && search.move_to(x))
+      return bisections;
   }
   return most_bisections + 1;
 }
 
-/// The last resort where J has lost rank and its step leads too far: down the gradient, columns of J brought to one length.
+/// The last resort where J has lost rank and its step leads too far: down the gradient, columns of J brought to one
+/// length.
 bool move_down_gradient(Search& search) {
   VectorXd step = VectorXd::Zero(search.size());
-  for (const Index i : search.free()) step[i] = -search.gradient()[i] / (search.column_norms()[i] * search.column_norms()[i]);
+  for (const Index i : search.free())
+    step[i] = -search.gradient()[i] / (search.column_norms()[i] * search.column_norms()[i]);
   const double curvature = (search.factor() * step).squaredNorm();
   if (curvature > 0) step *= -search.gradient().dot(step) / curvature;
   return move_along(search, step.cwiseMax(search.below()).cwiseMin(search.above())) <= most_bisections;
@@ -54,9 +59,11 @@ bool move_down_gradient(Search& search) {
 
 void search_gauss_newton(Search& search) {
   // what the toolbox leaves out, GnPinvConst = 1e4
-  const double tolerance = 1e4 * static_cast<double>(std::max(search.rows(), search.size())) * std::numeric_limits<double>::epsilon();
+  const double tolerance =
+      1e4 * static_cast<double>(std::max(search.rows(), search.size())) * std::numeric_limits<double>::epsilon();
   while (!search.settled()) {
-    if (move_along(search, subspace_step(search, tolerance)) > most_bisections && !move_down_gradient(search)) search.stuck();
+    if (move_along(search, subspace_step(search, tolerance)) > most_bisections && !move_down_gradient(search))
+      search.stuck();
   }
 }
 
@@ -67,7 +74,8 @@ void search_adaptive_gauss_newton(Search& search) {
   bool in_vain = false;  // the last search, in a larger subspace
   while (!search.settled()) {
     const VectorXd step = subspace_step(search, gamma);
-    const bool exhausted = -search.expected_change(step) <= search.stopping().cost * search.cost();  // nothing left in this subspace
+    const bool exhausted =
+        -search.expected_change(step) <= search.stopping().cost * search.cost();  // nothing left in this subspace
     if ((exhausted && (in_vain || gamma <= smallest)) || (in_vain && gamma >= largest)) {
       if (!move_down_gradient(search)) search.stuck();
       in_vain = false;

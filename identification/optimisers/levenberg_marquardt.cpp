@@ -1,5 +1,5 @@
-// Levenberg-Marquardt: scaling after More, "The Levenberg-Marquardt algorithm", LNM 630 (1978); damping after Nielsen, "Damping
-// parameter in Marquardt's method", IMM-REP-1999-05.
+// Levenberg-Marquardt: scaling after More, "The Levenberg-Marquardt algorithm", LNM 630 (1978); damping after Nielsen,
+// "Damping parameter in Marquardt's method", IMM-REP-1999-05.
 #include <algorithm>
 #include <cmath>
 

@@ -1,8 +1,8 @@
 // What the five methods of least_squares.hpp share: where a search stands, and when it ends.
 //
-// Steps are in scaled unknowns z = x / scale. The m rows of J are looked at once per point and reduced to the n rows of R,
-// J diag(scale) = Q R, and to Q'r; all methods work on these. R rather than J'J: its condition is the root of the other's.
-// Cost per point: 2 m (n + 1)^2 operations, 256 rows at a time. No copy of J, no Q.
+// Steps are in scaled unknowns z = x / scale. The m rows of J are looked at once per point and reduced to the n rows of
+// R, J diag(scale) = Q R, and to Q'r; all methods work on these. R rather than J'J: its condition is the root of the
+// other's. Cost per point: 2 m (n + 1)^2 operations, 256 rows at a time. No copy of J, no Q.
 #pragma once
 
 #include <functional>
@@ -27,11 +27,11 @@ class Search {
   // At the present x. Cost never rises.
   const Eigen::VectorXd& x() const { return x_; }
   double cost() const { return cost_; }
-  const Eigen::MatrixXd& factor() const { return factor_; }      ///< R
-  const Eigen::VectorXd& rotated() const { return rotated_; }    ///< Q'r, its first n
-  const Eigen::VectorXd& gradient() const { return gradient_; }  ///< R'Q'r
-  const Eigen::VectorXd& below() const { return below_; }        ///< smallest step that stays inside, <= 0
-  const Eigen::VectorXd& above() const { return above_; }        ///< largest step that stays inside, >= 0
+  const Eigen::MatrixXd& factor() const { return factor_; }              ///< R
+  const Eigen::VectorXd& rotated() const { return rotated_; }            ///< Q'r, its first n
+  const Eigen::VectorXd& gradient() const { return gradient_; }          ///< R'Q'r
+  const Eigen::VectorXd& below() const { return below_; }                ///< smallest step that stays inside, <= 0
+  const Eigen::VectorXd& above() const { return above_; }                ///< largest step that stays inside, >= 0
   const Eigen::VectorXd& column_norms() const { return column_norms_; }  ///< of R, the largest so far, > 0 (More 1978)
   const Eigen::VectorXd& scale() const { return scale_; }
   Eigen::Index size() const { return x_.size(); }
@@ -54,7 +54,8 @@ class Search {
   bool move_to(const Eigen::VectorXd& x);
 
   bool ended() const { return ended_; }
-  /// Ends the search if the criteria are met at x, or the iterations are used up. Every method asks so before each step.
+  /// Ends the search if the criteria are met at x, or the iterations are used up. Every method asks so before each
+  /// step.
   bool settled();
   /// Would the criteria be met if only these unknowns could move?
   bool is_settled(const Indices& free) const { return !settled_because(free).empty(); }
@@ -88,7 +89,8 @@ class Search {
 /// Minimises |A p + b|^2, and what the method adds to it, over the free unknowns.
 using Solve = std::function<Eigen::VectorXd(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Indices& free)>;
 
-/// The step that `solve` gives, within the bounds: what would leave goes onto its bound and the others are solved again. Zero, or downhill.
+/// The step that `solve` gives, within the bounds: what would leave goes onto its bound and the others are solved
+/// again. Zero, or downhill.
 Eigen::VectorXd step_within_bounds(const Search& search, const Solve& solve);
 
 /// In the subspace of the singular values above tolerance * largest; bisected until the cost falls.

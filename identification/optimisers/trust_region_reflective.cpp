@@ -1,9 +1,9 @@
-// Trust region with affine scaling and reflections: Coleman & Li, "An interior trust region approach for nonlinear minimization
-// subject to bounds", SIAM J. Optim. 6 (1996); Branch, Coleman & Li, SIAM J. Sci. Comput. 21 (1999).
+// Trust region with affine scaling and reflections: Coleman & Li, "An interior trust region approach for nonlinear
+// minimization subject to bounds", SIAM J. Optim. 6 (1996); Branch, Coleman & Li, SIAM J. Sci. Comput. 21 (1999).
 //
-//   v_i    distance to the bound that the gradient points at, at most 1 (a bound further off than x is large is none yet)
-//   D      sqrt(v_i) / column norm i; steps p = D q
-//   model  1/2 |R D q + Q'r|^2 + 1/2 q'Cq,  C_i = |g_i| / column norm i^2 where v_i is a distance, else 0
+//   v_i    distance to the bound that the gradient points at, at most 1 (a bound further off than x is large is none
+//   yet) D      sqrt(v_i) / column norm i; steps p = D q model  1/2 |R D q + Q'r|^2 + 1/2 q'Cq,  C_i = |g_i| / column
+//   norm i^2 where v_i is a distance, else 0
 //
 // Iterates stay off the bounds; where one is the limit, the last step is onto it.
 #include <algorithm>
@@ -54,7 +54,9 @@ class ScaledModel {
   double remaining() const { return remaining_; }  ///< v_i g_i, relative; 0 at an optimum, bounds or none
 
   double curvature_term(const VectorXd& q) const { return 0.5 * curvature_.dot(q.cwiseAbs2()); }
-  double change(const VectorXd& q) const { return search_.expected_change(scaling_.cwiseProduct(q)) + curvature_term(q); }
+  double change(const VectorXd& q) const {
+    return search_.expected_change(scaling_.cwiseProduct(q)) + curvature_term(q);
+  }
 
   /// The minimum of the model within the radius.
   VectorXd minimum(double radius) const {
@@ -121,7 +123,8 @@ double to_bound(const Search& search, const VectorXd& from, const VectorXd& dire
 
 /// Multiple of `direction` that leads from `from`, inside the radius, to it.
 double to_radius(const VectorXd& from, const VectorXd& direction, double radius) {
-  const double a = direction.squaredNorm(), b = from.dot(direction), c = std::min(from.squaredNorm() - radius * radius, 0.0);
+  const double a = direction.squaredNorm(), b = from.dot(direction),
+               c = std::min(from.squaredNorm() - radius * radius, 0.0);
   if (!(a > 0)) return 0;
   const double root = std::sqrt(b * b - a * c);
   return b > 0 ? -c / (b + root) : (root - b) / a;
@@ -130,7 +133,8 @@ double to_radius(const VectorXd& from, const VectorXd& direction, double radius)
 /// q of the best of: the trust region's step, cut at the first bound; the same reflected there; the scaled gradient's.
 VectorXd best_step(const Search& search, const ScaledModel& model, double radius) {
   const VectorXd zero = VectorXd::Zero(search.size()), &d = model.scaling();
-  const double keep_off = std::max(0.995, 1 - model.remaining());  // of the way to a bound; all of it in the end, or the convergence were linear
+  const double keep_off = std::max(
+      0.995, 1 - model.remaining());  // of the way to a bound; all of it in the end, or the convergence were linear
   const VectorXd full = model.minimum(radius);
   const VectorXd step = d.cwiseProduct(full);
   const double hit = to_bound(search, zero, step);
@@ -152,7 +156,8 @@ VectorXd best_step(const Search& search, const ScaledModel& model, double radius
   if (most > 0) consider(model.best_along(corner, reflected, std::min((1 - keep_off) * hit, most), most));
 
   const VectorXd downhill = -model.gradient();
-  const double gradient_hit = std::min(to_radius(zero, downhill, radius), keep_off * to_bound(search, zero, d.cwiseProduct(downhill)));
+  const double gradient_hit =
+      std::min(to_radius(zero, downhill, radius), keep_off * to_bound(search, zero, d.cwiseProduct(downhill)));
   if (gradient_hit > 0) consider(model.best_along(zero, downhill, 0, gradient_hit));
   return best;
 }
@@ -166,7 +171,8 @@ struct Landing {
 Landing landing(const Search& search) {
   Landing landing{VectorXd::Zero(search.size()), {}};
   for (Index i = 0; i < search.size(); ++i) {
-    const double g = search.gradient()[i], room = g < 0 ? search.above()[i] : search.below()[i], norm = search.column_norms()[i];
+    const double g = search.gradient()[i], room = g < 0 ? search.above()[i] : search.below()[i],
+                 norm = search.column_norms()[i];
     if (g == 0 || std::abs(room) * norm * norm > std::abs(g)) {
       landing.elsewhere.push_back(i);
     } else {

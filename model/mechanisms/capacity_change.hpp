@@ -12,7 +12,8 @@ struct CapacityChange {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"loss_fraction", "1", Role::strength, 0, -0.3, 0.6, Per::cell, "f: part of the capacity that is gone", 0.25},
+      Parameter{"loss_fraction", "1", Role::strength, 0, -0.3, 0.6, Per::cell, "f: part of the capacity that is gone",
+                0.25},
   };
 
   template <class S>

@@ -1,6 +1,6 @@
-// Current and voltage are not read at the same time: the current of row k is that of an interval which ended `delay` earlier than
-// the voltage was read (< 0: later). Undone by reading the charge that has flowed at shifted times; it needs the readings to come,
-// so it exists on the host alone.
+// Current and voltage are not read at the same time: the current of row k is that of an interval which ended `delay`
+// earlier than the voltage was read (< 0: later). Undone by reading the charge that has flowed at shifted times; it
+// needs the readings to come, so it exists on the host alone.
 #pragma once
 
 #include "model/mechanism.hpp"

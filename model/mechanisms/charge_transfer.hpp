@@ -1,5 +1,5 @@
-// Non-linear charge transfer: the overvoltage of a reaction grows with the logarithm of a large current (Butler-Volmer with equal
-// transfer coefficients).
+// Non-linear charge transfer: the overvoltage of a reaction grows with the logarithm of a large current (Butler-Volmer
+// with equal transfer coefficients).
 //
 //   eta = (2 R T / F) asinh(I / (2 I_0)):  a share of R0 and of R1 becomes  R asinh(x) / x,  x = I / (2 I_0)
 //
@@ -27,7 +27,8 @@ struct ChargeTransfer {
     Current<S> twice_i0_a;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 3>& p, double) : r0_share(Factor<S>(p[0])), r1_share(Factor<S>(p[1])), twice_i0_a(Current<S>(p[2] * Real(2))) {}
+    constexpr Law(const std::array<Real, 3>& p, double)
+        : r0_share(Factor<S>(p[0])), r1_share(Factor<S>(p[1])), twice_i0_a(Current<S>(p[2] * Real(2))) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
       const S less = S(1) - flattening(drive.current_a / twice_i0_a);
@@ -36,7 +37,8 @@ struct ChargeTransfer {
     }
 
    private:
-    /// asinh(x) / x. Halved, asinh(x) = 2 asinh(x / sqrt(2 (1 + sqrt(1 + x^2)))), until its series is short; relative error below 1e-7.
+    /// asinh(x) / x. Halved, asinh(x) = 2 asinh(x / sqrt(2 (1 + sqrt(1 + x^2)))), until its series is short; relative
+    /// error below 1e-7.
     static constexpr S flattening(S x) {
       S y = x, times(1);
       while (y > S(0.25) || y < S(-0.25)) {

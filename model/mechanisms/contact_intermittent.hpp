@@ -1,4 +1,5 @@
-// A loose contact: R0 plus a constant in bursts. Which bursts is read off a recording and says nothing about another one.
+// A loose contact: R0 plus a constant in bursts. Which bursts is read off a recording and says nothing about another
+// one.
 #pragma once
 
 #include <span>

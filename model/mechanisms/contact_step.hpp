@@ -1,8 +1,8 @@
-// A contact has become worse at a moment and stays so: R0 plus a constant from then on. On a board, where recordings do not begin
-// again, it is there all the time.
+// A contact has become worse at a moment and stays so: R0 plus a constant from then on. On a board, where recordings do
+// not begin again, it is there all the time.
 #pragma once
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -13,7 +13,8 @@ struct ContactStep {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"resistance_ohm", "ohm", Role::strength, 0, -0.05, 0.5, Per::siemens, "added to R0"},
-      Parameter{"onset_s", "s", Role::given, 0, -1e12, 1e12, Per::cell, "time in the recording; later recordings have it from their start"},
+      Parameter{"onset_s", "s", Role::given, 0, -1e12, 1e12, Per::cell,
+                "time in the recording; later recordings have it from their start"},
   };
 
   template <class S>
@@ -24,8 +25,10 @@ struct ContactStep {
 
     template <class Real>
     constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(Resistance<S>(p[0])) {
-      if constexpr (Dual<Real>) onset_s = p[1].a;
-      else onset_s = p[1];
+      if constexpr (Dual<Real>)
+        onset_s = p[1].a;
+      else
+        onset_s = p[1];
     }
 
     constexpr void at(double time_s) { there = time_s >= onset_s; }

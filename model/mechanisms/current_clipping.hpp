@@ -1,5 +1,5 @@
-// The current sensor ends at +-L: what it reads there is less than what flows, on average by e. Beyond L the reading is bent
-// before it stops: from (1 - knee) L on.
+// The current sensor ends at +-L: what it reads there is less than what flows, on average by e. Beyond L the reading is
+// bent before it stops: from (1 - knee) L on.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -12,7 +12,8 @@ struct CurrentClipping {
   static constexpr bool on_board = false;
   static constexpr bool needs_fpu = true;
   static constexpr std::array parameters = {
-      Parameter{"excess_a", "A", Role::strength, 0, 0, 8, Per::ah, "e: current beyond L, mean over the time at the end; bounds in multiples of 1C"},
+      Parameter{"excess_a", "A", Role::strength, 0, 0, 8, Per::ah,
+                "e: current beyond L, mean over the time at the end; bounds in multiples of 1C"},
       Parameter{"limit_a", "A", Role::given, 1, 0, 100, Per::ah, "L, the largest reading"},
       Parameter{"knee", "1", Role::shape, 0.1, 0.01, 0.7, Per::cell, "part of L over which the sensor bends"},
   };
@@ -22,7 +23,8 @@ struct CurrentClipping {
     Current<S> excess_a, limit_a, from_a;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 3>& p, double) : excess_a(Current<S>(p[0])), limit_a(Current<S>(p[1])), from_a(Current<S>(p[1] * (Real(1) - p[2]))) {}
+    constexpr Law(const std::array<Real, 3>& p, double)
+        : excess_a(Current<S>(p[0])), limit_a(Current<S>(p[1])), from_a(Current<S>(p[1] * (Real(1) - p[2]))) {}
 
     constexpr Current<S> true_current(const Current<S>& read_a) const {
       const bool negative = read_a < Current<S>(0);

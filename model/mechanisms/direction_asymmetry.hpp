@@ -10,7 +10,8 @@ struct DirectionAsymmetry {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"charge_fraction", "1", Role::strength, 0, -0.6, 1.5, Per::cell, "a: resistance of charging over discharging, less 1"},
+      Parameter{"charge_fraction", "1", Role::strength, 0, -0.6, 1.5, Per::cell,
+                "a: resistance of charging over discharging, less 1"},
   };
 
   template <class S>

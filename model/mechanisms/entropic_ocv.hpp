@@ -3,7 +3,7 @@
 //   V += dU/dT(soc) (T - T_ref),  dU/dT linear in soc between 10, 40, 70 and 95 %, constant outside
 #pragma once
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -13,7 +13,8 @@ struct EntropicOcv {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"at_10_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "dU/dT at 10 % of soc; -0.6 to 0.4 mV/K is usual for LFP and graphite", 0.0005},
+      Parameter{"at_10_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell,
+                "dU/dT at 10 % of soc; -0.6 to 0.4 mV/K is usual for LFP and graphite", 0.0005},
       Parameter{"at_40_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 40 %", 0.0005},
       Parameter{"at_70_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 70 %", 0.0005},
       Parameter{"at_95_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 95 %", 0.0005},

@@ -5,7 +5,7 @@
 // R is that at the temperature of the cell file, where the file has a temperature_resistance.
 #pragma once
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -27,11 +27,13 @@ struct FastPolarisation {
     Rate<S> rate_per_s;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 2>& p, double) : r_ohm(Resistance<S>(p[0])), rate_per_s(Rate<S>(Real(1) / p[1])) {}
+    constexpr Law(const std::array<Real, 2>& p, double)
+        : r_ohm(Resistance<S>(p[0])), rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
     constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {
-      return {settled_in<S>(drive.duration_s, rate_per_s), Voltage<S>(Resistance<S>(r_ohm * at.activation) * drive.current_a)};
+      return {settled_in<S>(drive.duration_s, rate_per_s),
+              Voltage<S>(Resistance<S>(r_ohm * at.activation) * drive.current_a)};
     }
   };
 };

@@ -10,7 +10,8 @@ struct Leakage {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"current_a", "A", Role::strength, 0, -0.002, 0.05, Per::ah, "lost all the time; bounds in multiples of 1C"},
+      Parameter{"current_a", "A", Role::strength, 0, -0.002, 0.05, Per::ah,
+                "lost all the time; bounds in multiples of 1C"},
   };
 
   template <class S>

@@ -2,19 +2,22 @@
 //
 //   V += M (h - h_0)      -1 <= h <= 1
 //
-// h_0 is where the cell file's OCV lies between the branches: -1 the discharge branch, 0 the middle, 1 the charge branch. h is not
-// changed by rest, however long. How it moves, and M, by `measured`:
+// h_0 is where the cell file's OCV lies between the branches: -1 the discharge branch, 0 the middle, 1 the charge
+// branch. h is not changed by rest, however long. How it moves, and M, by `measured`:
 //
-//   0   dh/dt = gamma |I| / (3600 C_n) (sgn I - h), M the same everywhere (Plett, J. Power Sources 134 (2004) 252, Part 2, with its decay
+//   0   dh/dt = gamma |I| / (3600 C_n) (sgn I - h), M the same everywhere (Plett, J. Power Sources 134 (2004) 252, Part
+//   2, with its decay
 //       in charge moved). What diagnosis seeks
-//   1   dh/dt = gamma I / (3600 C_n), stopped at -1 and 1, and M follows the cell file's half_gap_v over soc: at h = -1 and 1 the OCV is the
-//       curve that was measured in discharge and charge. Where a drive recovers some of what it takes, a cell stays near its discharge
-//       branch, knees and all; the first law, whose mean h is charge less discharge over their sum, puts it half way
+//   1   dh/dt = gamma I / (3600 C_n), stopped at -1 and 1, and M follows the cell file's half_gap_v over soc: at h = -1
+//   and 1 the OCV is the
+//       curve that was measured in discharge and charge. Where a drive recovers some of what it takes, a cell stays
+//       near its discharge branch, knees and all; the first law, whose mean h is charge less discharge over their sum,
+//       puts it half way
 //
 // The state carried is M h, M that of the middle of the curve.
 #pragma once
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -24,11 +27,17 @@ struct OcvHysteresis {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"half_gap_v", "V", Role::strength, 0, 0, 0.07, Per::cell, "half of charge less discharge branch, M; 3 to 40 mV is usual for LFP", 0.04},
-      Parameter{"decay", "1", Role::shape, 40, 8, 400, Per::cell, "gamma: 1 / decay of the capacity moved leads from one branch to 63 % of the way to the other; measured: to half of it"},
-      Parameter{"ocv_at", "1", Role::place, 0, -1, 1, Per::cell, "h_0: where the OCV of the cell file lies, -1 discharge .. 1 charge branch"},
+      Parameter{"half_gap_v", "V", Role::strength, 0, 0, 0.07, Per::cell,
+                "half of charge less discharge branch, M; 3 to 40 mV is usual for LFP", 0.04},
+      Parameter{"decay", "1", Role::shape, 40, 8, 400, Per::cell,
+                "gamma: 1 / decay of the capacity moved leads from one branch to 63 % of the way to the other; "
+                "measured: to half of it"},
+      Parameter{"ocv_at", "1", Role::place, 0, -1, 1, Per::cell,
+                "h_0: where the OCV of the cell file lies, -1 discharge .. 1 charge branch"},
       Parameter{"initial", "1", Role::place, 0, -1, 1, Per::cell, "h at the start of a recording"},
-      Parameter{"measured", "1", Role::given, 0, 0, 1, Per::cell, "1: between the curves of charge and discharge in the cell file; 0: exponentially, and the same gap everywhere"},
+      Parameter{"measured", "1", Role::given, 0, 0, 1, Per::cell,
+                "1: between the curves of charge and discharge in the cell file; 0: exponentially, and the same gap "
+                "everywhere"},
   };
 
   template <class S>
@@ -41,10 +50,15 @@ struct OcvHysteresis {
 
     template <class Real>
     constexpr Law(const std::array<Real, 5>& p, double capacity_ah)
-        : half_gap_v(Voltage<S>(p[0])), ocv_at_v(Voltage<S>(p[0] * p[2])), initial_v(Voltage<S>(p[0] * p[3])), per_mas(Coupling<S>(p[1] / Real(3.6 * capacity_ah))), measured(p[4] > Real(0.5)) {}
+        : half_gap_v(Voltage<S>(p[0])),
+          ocv_at_v(Voltage<S>(p[0] * p[2])),
+          initial_v(Voltage<S>(p[0] * p[3])),
+          per_mas(Coupling<S>(p[1] / Real(3.6 * capacity_ah))),
+          measured(p[4] > Real(0.5)) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return initial_v; }
-    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive, const Voltage<S>* x) const {
+    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive,
+                                   const Voltage<S>* x) const {
       const bool charging = drive.current_a > Current<S>(0);
       const Current<S> size_a = charging ? drive.current_a : Current<S>(-drive.current_a);
       const Current<S> milli = size_a * Fraction<S>(0.001);
@@ -58,7 +72,9 @@ struct OcvHysteresis {
       return {!far && left_v > step_v ? ratio<Fraction<S>>(step_v, left_v) : Fraction<S>(1), target, exponentially};
     }
     constexpr Voltage<S> error_at_first() const { return half_gap_v; }  // h may be anything
-    constexpr Voltage<S> lasting_error() const { return Voltage<S>(half_gap_v * Fraction<S>(0.25)); }  // one state is not the whole of it: minor loops
+    constexpr Voltage<S> lasting_error() const {
+      return Voltage<S>(half_gap_v * Fraction<S>(0.25));
+    }  // one state is not the whole of it: minor loops
     constexpr void warm(TablePoint<S>& at, const Voltage<S>& state_v, const Drive<S>&) const {
       if (!measured) {
         at.ocv_v = at.ocv_v - ocv_at_v;

@@ -1,5 +1,5 @@
-// The open-circuit voltage's steps lie at another soc than in the cell file: one electrode has slipped against the other (loss of
-// lithium) or lost material. The curve is read elsewhere:
+// The open-circuit voltage's steps lie at another soc than in the cell file: one electrode has slipped against the
+// other (loss of lithium) or lost material. The curve is read elsewhere:
 //
 //   V = OCV(soc + d(soc)),  d linear between 0 at empty, d_1 at 20 %, d_2 at 80 % and 0 at full
 //
@@ -30,7 +30,8 @@ struct OcvShape {
       const auto one = Soc<S>(1), none = Soc<S>(0), five = Soc<S>(5);
       if (!(soc > none) || !(soc < one)) return soc;
       if (soc < Soc<S>(0.2)) return soc + Soc<S>(soc * five) * low;
-      if (soc < Soc<S>(0.8)) return soc + (low + Soc<S>(Soc<S>(soc - Soc<S>(0.2)) * Soc<S>(1 / 0.6)) * Soc<S>(high - low));
+      if (soc < Soc<S>(0.8))
+        return soc + (low + Soc<S>(Soc<S>(soc - Soc<S>(0.2)) * Soc<S>(1 / 0.6)) * Soc<S>(high - low));
       return soc + Soc<S>(Soc<S>(one - soc) * five) * high;
     }
     /// d read_at / d soc

@@ -19,7 +19,8 @@ struct PolarisationGrowth {
     Factor<S> r1_times, c1_times;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 2>& p, double) : r1_times(Factor<S>(Real(1) + p[0])), c1_times(Factor<S>(Real(1) + p[1])) {}
+    constexpr Law(const std::array<Real, 2>& p, double)
+        : r1_times(Factor<S>(Real(1) + p[0])), c1_times(Factor<S>(Real(1) + p[1])) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const {
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, r1_times);

@@ -2,10 +2,11 @@
 //
 //   dw/dt = (R_th I^2 (R0 + R1) - w) / tau        R = R exp(E / R_gas (1 / (T + w) - 1 / T))
 //
-// The state carried is w in units of 100 K. What follows the temperature that is measured belongs to temperature_resistance.
+// The state carried is w in units of 100 K. What follows the temperature that is measured belongs to
+// temperature_resistance.
 #pragma once
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -15,9 +16,11 @@ struct SelfHeating {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"thermal_resistance_k_per_w", "K/W", Role::strength, 0, 0, 300, Per::siemens, "R_th from inside to where the temperature is measured", 20},
+      Parameter{"thermal_resistance_k_per_w", "K/W", Role::strength, 0, 0, 300, Per::siemens,
+                "R_th from inside to where the temperature is measured", 20},
       Parameter{"time_constant_s", "s", Role::shape, 900, 60, 6000, Per::cell, "tau"},
-      Parameter{"activation_j_per_mol", "J/mol", Role::given, 25000, 5000, 80000, Per::cell, "E of R0 and R1; only its product with R_th shows"},
+      Parameter{"activation_j_per_mol", "J/mol", Role::given, 25000, 5000, 80000, Per::cell,
+                "E of R0 and R1; only its product with R_th shows"},
   };
 
   template <class S>
@@ -25,13 +28,15 @@ struct SelfHeating {
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = false;
     static constexpr StateUnit state_unit{"k", 100};
-    Factor<S> energy;             ///< over R T, T at 25 degrees C
-    Coupling<S> per_w;            ///< 100 K per W
+    Factor<S> energy;   ///< over R T, T at 25 degrees C
+    Coupling<S> per_w;  ///< 100 K per W
     Rate<S> rate_per_s;
 
     template <class Real>
     constexpr Law(const std::array<Real, 3>& p, double)
-        : energy(Factor<S>(mechanism_detail::energy_over_rt(p[2], Real(25)))), per_w(Coupling<S>(p[0] / Real(100))), rate_per_s(Rate<S>(Real(1) / p[1])) {}
+        : energy(Factor<S>(mechanism_detail::energy_over_rt(p[2], Real(25)))),
+          per_w(Coupling<S>(p[0] / Real(100))),
+          rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
     constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {

@@ -3,16 +3,16 @@
 //   du_k/dt = (R_k I - u_k) / tau_k,  R_1 = (1 - w) R, tau_1 = tau,  R_2 = w R, tau_2 = tau / 9
 //   V = OCV(soc + t_lag (i_1 + i_2) / C_n) + ... + u_1 + u_2,  i_k = u_k / R the current as the modes have it
 //
-// The voltage sees the surface of the particles, which is ahead of the mean that is counted: besides what it costs everywhere, the steps
-// of the OCV come early under load. Of diffusion into a sphere of radius r, t_lag = r^2 / (15 D).
+// The voltage sees the surface of the particles, which is ahead of the mean that is counted: besides what it costs
+// everywhere, the steps of the OCV come early under load. Of diffusion into a sphere of radius r, t_lag = r^2 / (15 D).
 //
 // R is that at the temperature of the cell file, where the file has a temperature_resistance.
 //
-// w = 0 is a second RC branch; diffusion into a plate or a sphere has modes at 1, 1/9, 1/25 ... of the longest time constant
-// (Warburg element of finite length).
+// w = 0 is a second RC branch; diffusion into a plate or a sphere has modes at 1, 1/9, 1/25 ... of the longest time
+// constant (Warburg element of finite length).
 #pragma once
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -22,10 +22,13 @@ struct SlowPolarisation {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 0.12, Per::siemens, "R of both modes, after a pulse that is long against tau"},
+      Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 0.12, Per::siemens,
+                "R of both modes, after a pulse that is long against tau"},
       Parameter{"time_constant_s", "s", Role::shape, 600, 60, 20000, Per::cell, "tau of the slowest mode"},
-      Parameter{"faster_share", "1", Role::place, 0.1, 0, 0.6, Per::cell, "w: share of the mode that is nine times faster"},
-      Parameter{"surface_lag_s", "s", Role::strength, 0, 0, 900, Per::cell, "t_lag: in a lasting current the surface is ahead by what flows in it", 0, 0, 200},
+      Parameter{"faster_share", "1", Role::place, 0.1, 0, 0.6, Per::cell,
+                "w: share of the mode that is nine times faster"},
+      Parameter{"surface_lag_s", "s", Role::strength, 0, 0, 900, Per::cell,
+                "t_lag: in a lasting current the surface is ahead by what flows in it", 0, 0, 200},
   };
 
   template <class S>
@@ -48,7 +51,8 @@ struct SlowPolarisation {
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
     constexpr Relaxation<S> settle(std::size_t i, const TablePoint<S>& at, const Drive<S>& drive) const {
-      return {settled_in<S>(drive.duration_s, rate_per_s[i]), Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * drive.current_a)};
+      return {settled_in<S>(drive.duration_s, rate_per_s[i]),
+              Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * drive.current_a)};
     }
     constexpr Coupling<S> ahead_per_v() const { return surface_per_v; }
   };

@@ -1,13 +1,14 @@
 // Resistances that follow the temperature by Arrhenius, but for what contacts and foils have in R0:
 //
-//   R0(T) = R0 (1 - s + s a_0)    R1(T) = R1 a_1    a_k = exp(E_k / R_gas (1 / T - 1 / T_ref)),  T_ref: where the cell file was made
+//   R0(T) = R0 (1 - s + s a_0)    R1(T) = R1 a_1    a_k = exp(E_k / R_gas (1 / T - 1 / T_ref)),  T_ref: where the cell
+//   file was made
 //
 // C1 stays, so the time constant follows R1. Fast and slow polarisation follow a_1, their time constants stay.
 //
 // At one temperature E_0 and s look alike: what is known of E_0 decides, and the deviations say so.
 #pragma once
 
-#include "model/exponential.hpp"
+#include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -17,9 +18,12 @@ struct TemperatureResistance {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 60000, Per::cell, "E_0: of what reactions have in R0, 40 to 60 kJ/mol; 5 to 30 kJ/mol where s is 1", 0, 50000, 10000},
-      Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell, "E_1; 30 to 70 kJ/mol is usual", 70000},
-      Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell, "temperature of the cell file's resistances"},
+      Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 60000, Per::cell,
+                "E_0: of what reactions have in R0, 40 to 60 kJ/mol; 5 to 30 kJ/mol where s is 1", 0, 50000, 10000},
+      Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell,
+                "E_1; 30 to 70 kJ/mol is usual", 70000},
+      Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell,
+                "temperature of the cell file's resistances"},
       Parameter{"r0_share", "1", Role::place, 1, 0.02, 1, Per::cell, "s: share of R0 that follows the temperature"},
   };
 
@@ -32,12 +36,16 @@ struct TemperatureResistance {
 
     template <class Real>
     constexpr Law(const std::array<Real, 4>& p, double)
-        : r0_energy(Factor<S>(mechanism_detail::energy_over_rt(p[0], p[2]))), r1_energy(Factor<S>(mechanism_detail::energy_over_rt(p[1], p[2]))), reference_c(Temperature<S>(p[2])), share(Fraction<S>(p[3])) {}
+        : r0_energy(Factor<S>(mechanism_detail::energy_over_rt(p[0], p[2]))),
+          r1_energy(Factor<S>(mechanism_detail::energy_over_rt(p[1], p[2]))),
+          reference_c(Temperature<S>(p[2])),
+          share(Fraction<S>(p[3])) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
       const Factor<S> more = mechanism_detail::arrhenius<S>(r0_energy, reference_c, drive.temperature_c);
       const Factor<S> slower = mechanism_detail::arrhenius<S>(r1_energy, reference_c, drive.temperature_c);
-      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, Factor<S>(Factor<S>(1) + share * Factor<S>(more - Factor<S>(1))));
+      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm,
+                                 Factor<S>(Factor<S>(1) + share * Factor<S>(more - Factor<S>(1))));
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, slower);
       at.activation = Factor<S>(at.activation * slower);
     }

@@ -9,8 +9,8 @@
 
 #include "benchmark/score.hpp"
 #include "benchmark/tables.hpp"
-#include "host_sim/committed_figures.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/committed_figures.hpp"
+#include "files/text_file.hpp"
 
 namespace bms::benchmark {
 namespace {
@@ -27,7 +27,9 @@ const std::vector<truth::Case>& nulls() {
     for (std::size_t k = 0; chosen.size() < 6 && k < truth::case_count(split); ++k) {
       truth::Case c = truth::make_case(split, 1, k);
       if (c.answer.kind != "null") continue;
-      for (auto* column : {&c.recording.time_s, &c.recording.current_a, &c.recording.voltage_v, &c.recording.temperature_c, &c.recording.soc}) column->resize(std::min<std::size_t>(column->size(), 8'000));
+      for (auto* column : {&c.recording.time_s, &c.recording.current_a, &c.recording.voltage_v,
+                           &c.recording.temperature_c, &c.recording.soc})
+        column->resize(std::min<std::size_t>(column->size(), 8'000));
       chosen.push_back(std::move(c));
     }
     return chosen;
@@ -79,7 +81,8 @@ TEST(Baselines, TheNearestSignatureOfAPlainLargeResistanceIsAResistance) {
   EXPECT_EQ(o.found, std::vector<std::string>{"resistance_growth"});
   EXPECT_LT(o.holdout_after_v, 0.6 * o.holdout_before_v);
   for (const truth::Case& c : nulls()) {
-    EXPECT_EQ(nearest_signature(c).verdict == Verdict::no_mismatch, frozen_model(c).verdict == Verdict::no_mismatch) << "one detects as the other";
+    EXPECT_EQ(nearest_signature(c).verdict == Verdict::no_mismatch, frozen_model(c).verdict == Verdict::no_mismatch)
+        << "one detects as the other";
   }
 }
 
@@ -93,7 +96,8 @@ TEST(Tables, AWilsonIntervalIsNarrowerForMoreCasesAndInsideZeroToOne) {
   EXPECT_EQ(wilson({0, 0}).high, 1);
 }
 
-Outcome said(const std::string& kind, const std::vector<std::string>& ids, double strength, Verdict verdict, const std::vector<std::string>& found) {
+Outcome said(const std::string& kind, const std::vector<std::string>& ids, double strength, Verdict verdict,
+             const std::vector<std::string>& found) {
   Outcome o;
   o.answer.kind = kind;
   o.answer.ids = ids;
@@ -106,8 +110,10 @@ Outcome said(const std::string& kind, const std::vector<std::string>& ids, doubl
 }
 
 TEST(Tables, EveryMethodHasItsColumnAndEveryMistakeItsPlace) {
-  const std::vector<Outcome> ours = {said("null", {}, 0, Verdict::no_mismatch, {}), said("single", {"leakage"}, 3, Verdict::cause, {"current_offset"}),
-                                     said("single", {"resistance_growth"}, 5, Verdict::cause, {"contact_step"}), said("outside", {"memory_bump"}, 3, Verdict::unknown, {})};
+  const std::vector<Outcome> ours = {said("null", {}, 0, Verdict::no_mismatch, {}),
+                                     said("single", {"leakage"}, 3, Verdict::cause, {"current_offset"}),
+                                     said("single", {"resistance_growth"}, 5, Verdict::cause, {"contact_step"}),
+                                     said("outside", {"memory_bump"}, 3, Verdict::unknown, {})};
   std::vector<Outcome> theirs = ours;
   theirs[0].verdict = Verdict::unknown;
   const std::string text = report("development", 7, {{"ours", ours}, {"theirs", theirs}});
@@ -122,14 +128,15 @@ TEST(Tables, EveryMethodHasItsColumnAndEveryMistakeItsPlace) {
 
 TEST(Tables, AReadmeKeepsWhatStandsAroundThem) {
   const std::filesystem::path readme = std::filesystem::temp_directory_path() / "bms_benchmark_readme_test.md";
-  const std::string before = "# x\n<!-- figures: development -->\n", after = "<!-- end of figures -->\n<!-- figures: final -->\nNot run yet.\n<!-- end of figures -->\n";
-  write_file(readme, before + "old\n" + after);
+  const std::string before = "# x\n<!-- figures: development -->\n",
+                    after = "<!-- end of figures -->\n<!-- figures: final -->\nNot run yet.\n<!-- end of figures -->\n";
+  files::write_file(readme, before + "old\n" + after);
   const std::string text = report("development", 1, {{"ours", {said("null", {}, 0, Verdict::no_mismatch, {})}}});
   for (int times = 0; times < 2; ++times) {
-    replace_figures(readme, "development", text);
-    EXPECT_EQ(read_file(readme), before + text + after);
+    files::replace_figures(readme, "development", text);
+    EXPECT_EQ(files::read_file(readme), before + text + after);
   }
-  EXPECT_THROW(replace_figures(readme, "validation", text), std::runtime_error);
+  EXPECT_THROW(files::replace_figures(readme, "validation", text), std::runtime_error);
   std::filesystem::remove(readme);
 }
 

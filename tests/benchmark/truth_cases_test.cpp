@@ -17,7 +17,7 @@
 #include "benchmark/truth/healthy_cells.hpp"
 #include "benchmark/truth/yardstick.hpp"
 
-namespace truth {
+namespace bms::benchmark::truth {
 
 namespace {
 
@@ -33,13 +33,15 @@ double ocv_of(const CalibratedCell& cell, double soc) {
 double at_node(const CalibratedCell& cell, const std::vector<double>& values, double soc) {
   if (soc <= cell.rc_soc.front()) return values.front();
   for (std::size_t k = 1; k < values.size(); ++k) {
-    if (soc < cell.rc_soc[k]) return std::lerp(values[k - 1], values[k], (soc - cell.rc_soc[k - 1]) / (cell.rc_soc[k] - cell.rc_soc[k - 1]));
+    if (soc < cell.rc_soc[k])
+      return std::lerp(values[k - 1], values[k], (soc - cell.rc_soc[k - 1]) / (cell.rc_soc[k] - cell.rc_soc[k - 1]));
   }
   return values.back();
 }
 
 /// The 1RC model of a cell file, written once more.
-std::vector<double> simulate(const CalibratedCell& cell, const std::vector<double>& current_a, double step_s, double soc) {
+std::vector<double> simulate(const CalibratedCell& cell, const std::vector<double>& current_a, double step_s,
+                             double soc) {
   std::vector<double> voltage_v;
   double v1_v = 0;
   for (std::size_t k = 0; k < current_a.size(); ++k) {
@@ -62,12 +64,13 @@ Drive drive_of(std::vector<double> current_a) {
 
 Drive stretches(std::initializer_list<std::pair<double, int>> current_a_and_seconds) {
   std::vector<double> current_a = {0};
-  for (const auto& [a, seconds] : current_a_and_seconds) current_a.insert(current_a.end(), static_cast<std::size_t>(seconds), a);
+  for (const auto& [a, seconds] : current_a_and_seconds)
+    current_a.insert(current_a.end(), static_cast<std::size_t>(seconds), a);
   return drive_of(std::move(current_a));
 }
 
 HealthyCell cell_of(std::uint64_t seed) {
-  Random random(seed);
+  plant::Random random(seed);
   return draw_healthy_cell(random);
 }
 
@@ -104,7 +107,9 @@ TEST(TruthCases, HoldEveryEffectAndAreFitToBeGivenToADiagnosis) {
     if (c.answer.kind == "single") singles.insert(c.answer.ids.at(0));
     if (c.answer.kind == "outside") outside.insert(c.answer.ids.at(0));
     if (c.answer.kind == "data_fault") faults.insert(c.answer.ids.at(0));
-    if (c.answer.kind == "pair") { EXPECT_GE(c.answer.strength, 2); }
+    if (c.answer.kind == "pair") {
+      EXPECT_GE(c.answer.strength, 2);
+    }
 
     for (const Series* series : {&c.recording, &c.holdout}) {
       const std::size_t rows = series->time_s.size();
@@ -121,12 +126,15 @@ TEST(TruthCases, HoldEveryEffectAndAreFitToBeGivenToADiagnosis) {
 
       // a charging current raises the voltage
       double together = 0;
-      for (std::size_t k = 1; k < rows; ++k) together += (series->current_a[k] - series->current_a[k - 1]) * (series->voltage_v[k] - series->voltage_v[k - 1]);
+      for (std::size_t k = 1; k < rows; ++k)
+        together +=
+            (series->current_a[k] - series->current_a[k - 1]) * (series->voltage_v[k] - series->voltage_v[k - 1]);
       EXPECT_EQ(together > 0, !(c.answer.kind == "data_fault" && c.answer.ids.at(0) == "inverted_current"));
     }
     EXPECT_NEAR(c.holdout_initial_soc, c.holdout.soc.front(), 0.0026);
     const bool misled = std::count(c.answer.ids.begin(), c.answer.ids.end(), "initial_soc") > 0;
-    EXPECT_EQ(std::abs(c.believed_initial_soc - c.recording.soc.front()) > 0.0051, misled) << c.believed_initial_soc - c.recording.soc.front();
+    EXPECT_EQ(std::abs(c.believed_initial_soc - c.recording.soc.front()) > 0.0051, misled)
+        << c.believed_initial_soc - c.recording.soc.front();
 
     const CalibratedCell& cell = c.cell;
     ASSERT_EQ(cell.ocv_b0_v.size() + 1, cell.ocv_soc.size());
@@ -135,10 +143,14 @@ TEST(TruthCases, HoldEveryEffectAndAreFitToBeGivenToADiagnosis) {
     EXPECT_EQ(cell.ocv_soc.back(), 1);
     for (std::size_t k = 0; k < cell.ocv_b1_v.size(); ++k) {
       EXPECT_GT(cell.ocv_b1_v[k], 1e-5);
-      if (k > 0) { EXPECT_NEAR(cell.ocv_b0_v[k - 1] + cell.ocv_b1_v[k - 1] * cell.ocv_soc[k], cell.ocv_b0_v[k] + cell.ocv_b1_v[k] * cell.ocv_soc[k], 1e-6); }
+      if (k > 0) {
+        EXPECT_NEAR(cell.ocv_b0_v[k - 1] + cell.ocv_b1_v[k - 1] * cell.ocv_soc[k],
+                    cell.ocv_b0_v[k] + cell.ocv_b1_v[k] * cell.ocv_soc[k], 1e-6);
+      }
     }
   }
-  EXPECT_EQ(kinds, (std::map<std::string, int>{{"null", 36}, {"single", 48}, {"pair", 18}, {"outside", 12}, {"data_fault", 6}}));
+  EXPECT_EQ(kinds, (std::map<std::string, int>{
+                       {"null", 36}, {"single", 48}, {"pair", 18}, {"outside", 12}, {"data_fault", 6}}));
   EXPECT_EQ(singles, std::set<std::string>(catalogue_ids().begin(), catalogue_ids().end()));
   EXPECT_EQ(outside, std::set<std::string>(outside_ids().begin(), outside_ids().end()));
   EXPECT_EQ(faults.size(), 5u);
@@ -149,14 +161,16 @@ TEST(TruthCell, IsWhatACalibrated1RcModelSaysWhenItIsHealthy) {
   double worst_rms_v = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     const HealthyCell cell = cell_of(seed);
-    Random random(seed);
+    plant::Random random(seed);
     const CalibratedCell file = calibrate(cell, 0, random);
     EXPECT_EQ(file.capacity_ah, cell.capacity_ah);
-    const Drive drive = drive_of(draw_current_a({.profile = Profile::hppc, .capacity_ah = cell.capacity_ah, .start_soc = 0.95, .lowest_soc = 0.1}, random));
+    const Drive drive = drive_of(draw_current_a(
+        {.profile = Profile::hppc, .capacity_ah = cell.capacity_ah, .start_soc = 0.95, .lowest_soc = 0.1}, random));
     const CellTrace trace = run_cell(cell, {}, drive, 0.95);
     const std::vector<double> model_v = simulate(file, drive.current_a, drive.step_s, 0.95);
     double sum = 0;
-    for (std::size_t k = 0; k < model_v.size(); ++k) sum += (model_v[k] - trace.voltage_v[k]) * (model_v[k] - trace.voltage_v[k]);
+    for (std::size_t k = 0; k < model_v.size(); ++k)
+      sum += (model_v[k] - trace.voltage_v[k]) * (model_v[k] - trace.voltage_v[k]);
     worst_rms_v = std::max(worst_rms_v, std::sqrt(sum / static_cast<double>(model_v.size())));
   }
   EXPECT_LT(worst_rms_v, 0.0013);
@@ -179,7 +193,8 @@ TEST(TruthCell, KeepsItsHysteresisThroughARestAndForgetsItsPolarisation) {
   EXPECT_NEAR(gap_v(hysteretic), 0.02, 1e-6);
   EXPECT_NEAR(gap_v(slow), 0, 1e-5);
   const CellTrace polarised = run_cell(cell, slow, drive, 0.9), healthy = run_cell(cell, {}, drive, 0.9);
-  EXPECT_NEAR(polarised.voltage_v[2'880] - healthy.voltage_v[2'880], -0.01, 2e-4) << "settled after 1.4 times the diffusion time";
+  EXPECT_NEAR(polarised.voltage_v[2'880] - healthy.voltage_v[2'880], -0.01, 2e-4)
+      << "settled after 1.4 times the diffusion time";
 }
 
 TEST(TruthCell, HasTheCalibratedResistanceAtSmallCurrentsOnlyWhenItsChargeTransferIsNotLinear) {
@@ -207,19 +222,22 @@ TEST(TruthCell, SettlesWhereButlerAndVolmerSay) {
     const CellTrace trace = run_cell(cell, effects, drive, 0.7);
     const double soc = trace.soc.back();
     const auto current_of = [&](double overvoltage_v, double ohm) {
-      return thermal_v / ohm * (std::exp((1 - alpha) * overvoltage_v / thermal_v) - std::exp(-alpha * overvoltage_v / thermal_v));
+      return thermal_v / ohm *
+             (std::exp((1 - alpha) * overvoltage_v / thermal_v) - std::exp(-alpha * overvoltage_v / thermal_v));
     };
     const double r1_ohm = cell.r1_ohm.at(soc), in_r1_v = trace.v1_v.back() - 0.4 * r1_ohm * current_a;
     EXPECT_NEAR(current_of(in_r1_v, 0.6 * r1_ohm) / current_a, 1, 0.015);  // C1 lags behind R1, which moves with soc
-    const double in_r0_v = trace.voltage_v.back() - cell.ocv_v.at(soc) - trace.v1_v.back() - 0.7 * cell.r0_ohm.at(soc) * current_a;
+    const double in_r0_v =
+        trace.voltage_v.back() - cell.ocv_v.at(soc) - trace.v1_v.back() - 0.7 * cell.r0_ohm.at(soc) * current_a;
     EXPECT_NEAR(current_of(in_r0_v, 0.3 * cell.r0_ohm.at(soc)) / current_a, 1, 1e-4);
   }
 }
 
 TEST(Yardstick, MeasuresInProportionAndForgivesWhatACalibrationMayMiss) {
   const HealthyCell cell = cell_of(3);
-  Random random(3);
-  const Drive drive = drive_of(draw_current_a({.profile = Profile::hppc, .capacity_ah = cell.capacity_ah, .start_soc = 0.95}, random));
+  plant::Random random(3);
+  const Drive drive =
+      drive_of(draw_current_a({.profile = Profile::hppc, .capacity_ah = cell.capacity_ah, .start_soc = 0.95}, random));
   const CellTrace trace = run_cell(cell, {}, drive, 0.95);
   const Yardstick yardstick(cell, drive, trace, 0.001);
 
@@ -239,8 +257,14 @@ TEST(Yardstick, MeasuresInProportionAndForgivesWhatACalibrationMayMiss) {
 }
 
 TEST(CaseFiles, NameTheirColumnsAndLeaveOutATemperatureThatIsNotThere) {
-  Series series = {.time_s = {0, 1}, .current_a = {0, -1.5}, .voltage_v = {3.3, 3.28}, .temperature_c = {25, 25.1}, .soc = {0.9, 0.8999}};
-  EXPECT_EQ(csv_of(series), "time_s,current_a,voltage_v,temperature_c,soc_ref\n0.00,0.0000,3.30000,25.00,0.900000\n1.00,-1.5000,3.28000,25.10,0.899900\n");
+  Series series = {.time_s = {0, 1},
+                   .current_a = {0, -1.5},
+                   .voltage_v = {3.3, 3.28},
+                   .temperature_c = {25, 25.1},
+                   .soc = {0.9, 0.8999}};
+  EXPECT_EQ(csv_of(series),
+            "time_s,current_a,voltage_v,temperature_c,soc_ref\n0.00,0.0000,3.30000,25.00,0.900000\n1.00,-1.5000,3."
+            "28000,25.10,0.899900\n");
   series.temperature_c.clear();
   EXPECT_THAT(csv_of(series), StartsWith("time_s,current_a,voltage_v,soc_ref\n0.00,0.0000,3.30000,0.900000\n"));
 }
@@ -256,13 +280,16 @@ TEST(TruthSources, IncludeNothingButThemselvesThePlantEigenAndTheStandardLibrary
       if (!line.starts_with("#include ")) continue;
       ++includes;
       const std::string what = line.substr(9);
-      EXPECT_THAT(what, AnyOf(StartsWith("\"benchmark/truth/"), StartsWith("\"plant/"), StartsWith("<"))) << entry.path();
+      EXPECT_THAT(what, AnyOf(StartsWith("\"benchmark/truth/"), StartsWith("\"plant/"), StartsWith("<")))
+          << entry.path();
       // of what has angle brackets, only Eigen has a slash
-      if (what.starts_with("<")) { EXPECT_TRUE(what.find('/') == std::string::npos || what.starts_with("<Eigen/")) << entry.path() << ": " << what; }
+      if (what.starts_with("<")) {
+        EXPECT_TRUE(what.find('/') == std::string::npos || what.starts_with("<Eigen/")) << entry.path() << ": " << what;
+      }
     }
   }
   EXPECT_GE(files, 15);
   EXPECT_GE(includes, 60);
 }
 
-}  // namespace truth
+}  // namespace bms::benchmark::truth

@@ -30,9 +30,11 @@ TEST(ResponseTime, EveryMessageOfTheFileIsInTheTable) {
   const std::size_t in_the_file = std::tuple_size_v<can::Messages>;
   EXPECT_EQ(messages_on_the_bus(10, 0, Cells::measured_by_the_board).size(), in_the_file);
   const auto with_samples = messages_on_the_bus(10, 0, Cells::measured_by_another_node);
-  EXPECT_EQ(with_samples.size(), in_the_file + 13) << "check, current and voltage, link, eight of cells, temperatures, time";
+  EXPECT_EQ(with_samples.size(), in_the_file + 13)
+      << "check, current and voltage, link, eight of cells, temperatures, time";
   std::set<std::uint32_t> ids;
-  for (const Message& m : with_samples) EXPECT_TRUE(ids.insert(m.id).second) << "two messages with the identifier of " << m.name;
+  for (const Message& m : with_samples)
+    EXPECT_TRUE(ids.insert(m.id).second) << "two messages with the identifier of " << m.name;
 }
 
 TEST(ResponseTime, WithEitherProfileTheBusStaysBelow30PercentAndEveryFrameComesBeforeTheNext) {
@@ -42,13 +44,16 @@ TEST(ResponseTime, WithEitherProfileTheBusStaysBelow30PercentAndEveryFrameComesB
     const auto all = messages_on_the_bus(10, sample_to_queue_s, Cells::measured_by_another_node, profile);
     EXPECT_EQ(all.size(), without.size() + more);
     EXPECT_LT(load(all, bits_per_second), 0.3);
-    EXPECT_NEAR(load(all, bits_per_second) - load(without, bits_per_second), more_bits_each_second / bits_per_second, 1e-9);
-    for (std::size_t k = 0; k < all.size(); ++k) EXPECT_LE(response_on_the_bus_s(all, k, bits_per_second), all[k].period_s) << all[k].name;
+    EXPECT_NEAR(load(all, bits_per_second) - load(without, bits_per_second), more_bits_each_second / bits_per_second,
+                1e-9);
+    for (std::size_t k = 0; k < all.size(); ++k)
+      EXPECT_LE(response_on_the_bus_s(all, k, bits_per_second), all[k].period_s) << all[k].name;
     return all;
   };
   judge(Profile::cia418, 4, 2 * 65 + 5 * (85 + 125 + 85));
   const auto all = judge(Profile::j1939, 6, 7 * 160);
-  for (std::size_t k = 0; k < all.size(); ++k) EXPECT_EQ(all[k].long_id, k + 6 >= all.size()) << all[k].name << ": the battery's own messages go first";
+  for (std::size_t k = 0; k < all.size(); ++k)
+    EXPECT_EQ(all[k].long_id, k + 6 >= all.size()) << all[k].name << ": the battery's own messages go first";
 }
 
 }  // namespace

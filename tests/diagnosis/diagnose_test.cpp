@@ -27,25 +27,35 @@ TEST(Diagnose, AHealthyCellHasNoMismatchAndLimits) {
   EXPECT_EQ(d.verdict, Verdict::no_mismatch);
   EXPECT_THAT(ids_of(d), ElementsAre());
   EXPECT_THAT(d.limits, Contains(Field(&DetectionLimit::mechanism, model::mechanism_index("ocv_hysteresis"))));
-  EXPECT_THAT(d.not_testable, Contains(Field(&NotTestable::mechanism, model::mechanism_index("temperature_resistance")))) << "no temperature was recorded";
+  EXPECT_THAT(d.not_testable,
+              Contains(Field(&NotTestable::mechanism, model::mechanism_index("temperature_resistance"))))
+      << "no temperature was recorded";
 }
 
 TEST(Diagnose, NamesALargerResistanceAndWhereItsEffectIs) {
-  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 12), 0.7, 12, [](std::size_t, double current_a, double) { return 0.003 * current_a; })});
+  const Diagnosis d = diagnose(test::table9(), {},
+                               {test::recorded(test::drive(2, 12), 0.7, 12, [](std::size_t, double current_a, double) {
+                                 return 0.003 * current_a;
+                               })});
   EXPECT_THAT(ids_of(d), ElementsAre("resistance_growth"));
   EXPECT_NE(d.verdict, Verdict::unknown);
   EXPECT_NEAR(d.findings.front().setting.value[0], 0.003 / 0.0133, 0.04);
 }
 
 TEST(Diagnose, NamesAContactThatHasChangedAndWhen) {
-  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 13), 0.7, 13, [](std::size_t k, double current_a, double) { return k >= 4'000 ? 0.002 * current_a : 0; })});
+  const Diagnosis d = diagnose(
+      test::table9(), {}, {test::recorded(test::drive(2, 13), 0.7, 13, [](std::size_t k, double current_a, double) {
+        return k >= 4'000 ? 0.002 * current_a : 0;
+      })});
   ASSERT_THAT(ids_of(d), ElementsAre("contact_step"));
   EXPECT_NEAR(d.findings.front().setting.value[0], 0.002, 0.0003);
   EXPECT_NEAR(d.findings.front().setting.value[1], 4'000, 60);
 }
 
 TEST(Diagnose, VoltageOffsetAndGainAreTheSameToAnLfpCell) {
-  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 14), 0.7, 14, [](std::size_t, double, double) { return 0.015; })});
+  const Diagnosis d =
+      diagnose(test::table9(), {},
+               {test::recorded(test::drive(2, 14), 0.7, 14, [](std::size_t, double, double) { return 0.015; })});
   EXPECT_EQ(d.verdict, Verdict::ambiguous);
   ASSERT_EQ(d.findings.size(), 1U);
   std::vector<std::string> set = ids_of(d);
@@ -55,26 +65,34 @@ TEST(Diagnose, VoltageOffsetAndGainAreTheSameToAnLfpCell) {
 
 TEST(Diagnose, WhatNoMechanismExplainsIsUnknown) {
   // a converter's nonlinearity: a wave over the voltage
-  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 15), 0.7, 15, [](std::size_t, double current_a, double soc) {
-                                 return 0.012 * std::sin(2 * 3.14159265 * (3.25 + 0.3 * (soc - 0.5) + 0.02 * current_a) / 0.05);
-                               })});
+  const Diagnosis d = diagnose(
+      test::table9(), {}, {test::recorded(test::drive(2, 15), 0.7, 15, [](std::size_t, double current_a, double soc) {
+        return 0.012 * std::sin(2 * 3.14159265 * (3.25 + 0.3 * (soc - 0.5) + 0.02 * current_a) / 0.05);
+      })});
   EXPECT_EQ(d.verdict, Verdict::unknown);
 }
 
 TEST(Diagnose, APeriodThatTheLoadDoesNotHaveIsUnknownAndTold) {
-  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 18), 0.7, 18, [](std::size_t k, double, double) { return 0.003 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 173); })});
+  const Diagnosis d =
+      diagnose(test::table9(), {}, {test::recorded(test::drive(2, 18), 0.7, 18, [](std::size_t k, double, double) {
+                 return 0.003 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 173);
+               })});
   EXPECT_EQ(d.verdict, Verdict::unknown);
   EXPECT_EQ(d.remaining_goes_with, "a period of its own");
 }
 
 TEST(Diagnose, BurstsOfALooseContactAreFoundWhereTheyAre) {
   const auto loose = [](std::size_t k) { return k % 400 >= 170 && k % 400 < 182; };
-  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 19), 0.7, 19, [&](std::size_t k, double current_a, double) { return loose(k) ? 0.002 * current_a : 0; })});
+  const Diagnosis d = diagnose(
+      test::table9(), {}, {test::recorded(test::drive(2, 19), 0.7, 19, [&](std::size_t k, double current_a, double) {
+        return loose(k) ? 0.002 * current_a : 0;
+      })});
   ASSERT_THAT(ids_of(d), ElementsAre("contact_intermittent"));
   EXPECT_NEAR(d.findings.front().setting.value[0], 0.002, 0.0005);
   std::size_t inside = 0, outside = 0;
   for (const model::Span& s : d.extended.bursts.front()) {
-    for (auto k = static_cast<std::size_t>(s.start_s); k <= static_cast<std::size_t>(s.end_s); ++k) ++(loose(k) ? inside : outside);
+    for (auto k = static_cast<std::size_t>(s.start_s); k <= static_cast<std::size_t>(s.end_s); ++k)
+      ++(loose(k) ? inside : outside);
   }
   EXPECT_GT(inside, 60U);
   EXPECT_LT(outside, inside / 3);
@@ -108,7 +126,8 @@ TEST(Diagnose, WithoutInformationNothingIsSaid) {
   EXPECT_EQ(diagnose(test::table9(), {}, {brief}).verdict, Verdict::not_testable);
 }
 
-/// At a current sensor's offset that moves the charge by several per cent, the knees are too far away for a line to point there.
+/// At a current sensor's offset that moves the charge by several per cent, the knees are too far away for a line to
+/// point there.
 TEST(Diagnose, FindsAnOffsetThatMovesTheKneesFar) {
   Record r = test::recorded(test::drive(4, 31), 0.9, 31);
   for (double& a : r.current_a) a += 0.2;  // 13 % of soc
@@ -144,7 +163,9 @@ TEST(Diagnose, WhatIsSeenAtMomentsStandsBesideWhatIsLargeThroughout) {
 
 TEST(Diagnose, AFileIsGoodToWhatItLeavesOfItsOwnRecordings) {
   const auto left_over = [](double v) {
-    return test::recorded(test::drive(2, 33), 0.7, 33, [v](std::size_t k, double, double) { return v * std::sin(2 * 3.14159265 * static_cast<double>(k) / 1'234); });
+    return test::recorded(test::drive(2, 33), 0.7, 33, [v](std::size_t k, double, double) {
+      return v * std::sin(2 * 3.14159265 * static_cast<double>(k) / 1'234);
+    });
   };
   EXPECT_EQ(widening(test::table9(), {}, {left_over(0)}), 1);
   const double factor = widening(test::table9(), {}, {left_over(0.012)});

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "diagnosis/record.hpp"
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 
@@ -15,7 +15,7 @@ namespace bms::test {
 
 /// Two-way drive for so many hours: charging and discharging spells of up to 2C, with rests; 1 s samples.
 inline std::vector<double> drive(double hours, std::uint64_t seed, double capacity_ah = 6) {
-  truth::Random random(seed);
+  plant::Random random(seed);
   std::vector<double> current_a;
   const auto samples = static_cast<std::size_t>(hours * 3'600);
   double soc_moved = 0;
@@ -34,9 +34,10 @@ inline std::vector<double> drive(double hours, std::uint64_t seed, double capaci
 }
 
 /// What instruments read of the plant's cell: Table 9 made smooth, a millivolt and ten milliamperes of noise.
-inline diagnosis::Record recorded(const std::vector<double>& current_a, double initial_soc, std::uint64_t seed, const std::function<double(std::size_t, double, double)>& add_v = {}) {
-  truth::Random random(seed);
-  truth::Cell cell({}, {.soc = initial_soc, .v_rc_v = 0, .temperature_c = 25});
+inline diagnosis::Record recorded(const std::vector<double>& current_a, double initial_soc, std::uint64_t seed,
+                                  const std::function<double(std::size_t, double, double)>& add_v = {}) {
+  plant::Random random(seed);
+  plant::Cell cell({}, {.soc = initial_soc, .v_rc_v = 0, .temperature_c = 25});
   diagnosis::Record r;
   r.name = "plant";
   r.initial_soc = initial_soc;
@@ -44,11 +45,12 @@ inline diagnosis::Record recorded(const std::vector<double>& current_a, double i
     cell.run(current_a[k], 25, 1);
     r.time_s.push_back(static_cast<double>(k));
     r.current_a.push_back(current_a[k] + 0.01 * random.normal());
-    r.voltage_v.push_back(cell.voltage_v() + (add_v ? add_v(k, current_a[k], cell.soc()) : 0) + 0.001 * random.normal());
+    r.voltage_v.push_back(cell.voltage_v() + (add_v ? add_v(k, current_a[k], cell.soc()) : 0) +
+                          0.001 * random.normal());
   }
   return r;
 }
 
-inline model::CellParameters<> table9() { return read_cell("table9").parameters; }
+inline model::CellParameters<> table9() { return files::read_cell("table9").parameters; }
 
 }  // namespace bms::test

@@ -21,7 +21,8 @@ model::CellParameters<> without_steps(model::CellParameters<> cell) {
 Evidence plant_evidence(std::uint64_t seed = 1) {
   Record r = test::recorded(test::drive(1, seed), 0.7, seed);
   r.temperature_c.assign(r.size(), 15.0);
-  for (std::size_t k = 0; k < r.size(); ++k) r.temperature_c[k] += 10.0 * static_cast<double>(k) / static_cast<double>(r.size());
+  for (std::size_t k = 0; k < r.size(); ++k)
+    r.temperature_c[k] += 10.0 * static_cast<double>(k) / static_cast<double>(r.size());
   return {without_steps(test::table9()), {}, {r}, NoiseModel{}};
 }
 
@@ -63,7 +64,8 @@ TEST(Hypothesis, DerivativesAreThoseOfTheSimulation) {
   }
 }
 
-/// By every base parameter, each a dual number that goes through the whole recording: slow and plain. One record, one mechanism.
+/// By every base parameter, each a dual number that goes through the whole recording: slow and plain. One record, one
+/// mechanism.
 Columns plain_calibration_derivatives(const Evidence& evidence, const Hypothesis& h, const Eigen::VectorXd& at) {
   constexpr Eigen::Index lanes = 16;
   using S = ceres::Jet<double, lanes>;
@@ -80,13 +82,20 @@ Columns plain_calibration_derivatives(const Evidence& evidence, const Hypothesis
     for (const double x : at) u.emplace_back(x);
     for (Eigen::Index lane = 0; lane < here; ++lane) u[static_cast<std::size_t>(first + lane)].v[lane] = 1;
     model::ChosenLaws<S> laws = model::chosen<S>(h.settings, cell.capacity_ah);
-    model::choose<S>(laws, model::mechanism_index("capacity_change"), model::MechanismValues<S>{calibration.capacity_loss(u) + setting("capacity_change", 0)}, cell.capacity_ah);
-    model::choose<S>(laws, model::mechanism_index("current_gain"), model::MechanismValues<S>{calibration.gain_error(u) + setting("current_gain", 0)}, cell.capacity_ah);
-    const model::CorrectedReadings<S> readings(r.time_s, r.current_a, r.temperature_c, S(setting("channel_skew", 0)), S(setting("temperature_sensor", 1)));
-    model::Course<S> course(tables, cell.capacity_ah, laws, calibration.initial_soc_shift(0, u) + (r.initial_soc + setting("initial_soc", 0)));
+    model::choose<S>(laws, model::mechanism_index("capacity_change"),
+                     model::MechanismValues<S>{calibration.capacity_loss(u) + setting("capacity_change", 0)},
+                     cell.capacity_ah);
+    model::choose<S>(laws, model::mechanism_index("current_gain"),
+                     model::MechanismValues<S>{calibration.gain_error(u) + setting("current_gain", 0)},
+                     cell.capacity_ah);
+    const model::CorrectedReadings<S> readings(r.time_s, r.current_a, r.temperature_c, S(setting("channel_skew", 0)),
+                                               S(setting("temperature_sensor", 1)));
+    model::Course<S> course(tables, cell.capacity_ah, laws,
+                            calibration.initial_soc_shift(0, u) + (r.initial_soc + setting("initial_soc", 0)));
     for (std::size_t k = 0; k < r.size(); ++k) {
       const S read_a = readings.current(k) - calibration.offset_a(0, r.time_s[k], u);
-      const S v = course.step(r.time_s[k], k > 0 ? r.time_s[k] - r.time_s[k - 1] : 0, read_a, readings.temperature(k), [&](auto& table, const S& soc) { calibration.adjust(table, soc, u); });
+      const S v = course.step(r.time_s[k], k > 0 ? r.time_s[k] - r.time_s[k - 1] : 0, read_a, readings.temperature(k),
+                              [&](auto& table, const S& soc) { calibration.adjust(table, soc, u); });
       columns.row(static_cast<Eigen::Index>(k)).segment(first, here) = v.v.head(here).transpose();
     }
   }
@@ -97,12 +106,15 @@ Columns plain_calibration_derivatives(const Evidence& evidence, const Hypothesis
 /// Carried from row to row or one by one through everything: the same but for rounding, whatever acts beside them.
 TEST(Hypothesis, BaseParametersCarriedTogetherAreThoseOneByOne) {
   const Evidence evidence = plant_evidence();
-  const Eigen::VectorXd u = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(evidence.calibration().size()), -0.5, 0.7);
+  const Eigen::VectorXd u =
+      Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(evidence.calibration().size()), -0.5, 0.7);
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
     const Hypothesis h = acting(evidence, m);
-    const Columns plain = plain_calibration_derivatives(evidence, h, u), carried = evidence.calibration_derivatives(h, u);
+    const Columns plain = plain_calibration_derivatives(evidence, h, u),
+                  carried = evidence.calibration_derivatives(h, u);
     for (Eigen::Index k = 0; k < u.size(); ++k) {
-      EXPECT_LT((carried.col(k) - plain.col(k)).norm(), 1e-9 * plain.col(k).norm() + 1e-12) << model::catalogue[m].id << " " << k;
+      EXPECT_LT((carried.col(k) - plain.col(k)).norm(), 1e-9 * plain.col(k).norm() + 1e-12)
+          << model::catalogue[m].id << " " << k;
     }
   }
 }
@@ -112,7 +124,9 @@ TEST(Hypothesis, DerivativesByTheBaseParametersToo) {
   const Evidence one = plant_evidence(2);
   std::vector<Record> records(2, one.records().front());
   records[1].initial_soc = 0.65;
-  for (Record& r : records) r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002}, {Check::Channel::voltage, 1'800, 2, 3.3, 3.301, 0.001}};
+  for (Record& r : records)
+    r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002},
+                {Check::Channel::voltage, 1'800, 2, 3.3, 3.301, 0.001}};
   const Evidence evidence(one.cell(), {}, records, NoiseModel{});
   const Hypothesis h = evidence.base();
   Eigen::VectorXd u = evidence.unchanged();
@@ -129,15 +143,18 @@ TEST(Hypothesis, DerivativesByTheBaseParametersToo) {
 TEST(Hypothesis, AFitIsNeverWorseThanWhereItBegan) {
   const Evidence evidence = plant_evidence(3);
   const Fit base = evidence.fit(evidence.base());
-  for (const char* id : {"ocv_hysteresis", "slow_polarisation", "fast_polarisation", "capacity_change", "resistance_growth", "ocv_shape"}) {
-    const Fit fit = evidence.fit(with(base.hypothesis, model::mechanism_index(id), evidence.cell().capacity_ah), base.calibration);
+  for (const char* id : {"ocv_hysteresis", "slow_polarisation", "fast_polarisation", "capacity_change",
+                         "resistance_growth", "ocv_shape"}) {
+    const Fit fit =
+        evidence.fit(with(base.hypothesis, model::mechanism_index(id), evidence.cell().capacity_ah), base.calibration);
     EXPECT_LE(fit.cost, base.cost + 1) << id;
   }
 }
 
 TEST(Hypothesis, FindsAStrengthThatWasPutIn) {
   const double more_ohm = 0.004;
-  const Record r = test::recorded(test::drive(2, 4), 0.7, 4, [&](std::size_t, double current_a, double) { return more_ohm * current_a; });
+  const Record r = test::recorded(test::drive(2, 4), 0.7, 4,
+                                  [&](std::size_t, double current_a, double) { return more_ohm * current_a; });
   const Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
   const Fit fit = evidence.fit(with(evidence.base(), model::mechanism_index("resistance_growth"), 6));
   const MechanismSetting& found = fit.hypothesis.settings.back();

@@ -41,7 +41,8 @@ Diagnosis undecided(const std::vector<MechanismSetting>& set, double deviation) 
 }
 
 TEST(NextExperiment, LeakageAndAnOffsetArePartedByAnOpenContactor) {
-  const auto next = next_experiment(test::table9(), undecided({setting("leakage", {0.05}), setting("current_offset", {-0.05})}, 0.003), false);
+  const auto next = next_experiment(
+      test::table9(), undecided({setting("leakage", {0.05}), setting("current_offset", {-0.05})}, 0.003), false);
   ASSERT_TRUE(next);
   EXPECT_EQ(next->profile, "zero_current") << "the shortest in which nothing flows";
   EXPECT_THAT(next->separates, testing::ElementsAre(index_of("leakage"), index_of("current_offset")));
@@ -69,7 +70,8 @@ TEST(NextExperiment, EveryUsualSetHasADesignThatPartsIt) {
 }
 
 TEST(NextExperiment, IsLaidOutForTheChargeThatTheCellMayHoldAtLeast) {
-  const auto next = next_experiment(test::table9(), undecided({setting("capacity_change", {0.25}), setting("ocv_shape", {0.05, 0.05})}, 1e-3), false);
+  const auto next = next_experiment(
+      test::table9(), undecided({setting("capacity_change", {0.25}), setting("ocv_shape", {0.05, 0.05})}, 1e-3), false);
   ASSERT_TRUE(next);
   EXPECT_LE(next->capacity_ah, 4.5);
   EXPECT_THAT(command(*next), testing::HasSubstr("--capacity-ah 4.5"));
@@ -102,7 +104,8 @@ TEST(Reference, TheReadingOfAnOpenContactorDecidesBetweenLeakageAndAnOffset) {
   };
   Record without = r;
   without.checks.clear();
-  EXPECT_LT(std::abs(cost(without, "leakage") - cost(without, "current_offset")), 7) << "the voltage alone does not tell";
+  EXPECT_LT(std::abs(cost(without, "leakage") - cost(without, "current_offset")), 7)
+      << "the voltage alone does not tell";
   EXPECT_GT(cost(r, "leakage") - cost(r, "current_offset"), 30);
 }
 
@@ -150,8 +153,10 @@ TEST(Evidence, ALaterRecordingKeepsTheContactAndForgetsTheWrongStart) {
   const Eigen::VectorXd none = evidence.unchanged();
   const std::vector<double> plain = evidence.voltage(evidence.base(), none, 1);
   EXPECT_EQ(evidence.voltage(with(evidence.base(), setting("initial_soc", {0.1})), none, 1), plain);
-  const std::vector<double> contact = evidence.voltage(with(evidence.base(), setting("contact_step", {0.005, 1'000})), none, 1);
-  EXPECT_NEAR(contact[500] - plain[500], 0.005 * r.current_a[500], 1e-9) << "before the moment at which the first one got it";
+  const std::vector<double> contact =
+      evidence.voltage(with(evidence.base(), setting("contact_step", {0.005, 1'000})), none, 1);
+  EXPECT_NEAR(contact[500] - plain[500], 0.005 * r.current_a[500], 1e-9)
+      << "before the moment at which the first one got it";
 }
 
 }  // namespace

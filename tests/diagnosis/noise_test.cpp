@@ -19,7 +19,7 @@ struct Drawn {
 
 /// Noise exactly as the model has it.
 Drawn drawn(const NoiseModel& n, std::size_t samples, std::uint64_t seed) {
-  truth::Random random(seed);
+  plant::Random random(seed);
   Drawn d{{}, RowNoise(samples), std::vector<char>(samples, 1), Columns(static_cast<Eigen::Index>(samples), 1)};
   double fast = n.fast_v * random.normal(), slow = n.slow_v * random.normal(), t = 0;
   for (std::size_t k = 0; k < samples; ++k) {
@@ -44,7 +44,8 @@ TEST(Whitener, MakesItsOwnNoiseWhite) {
   EXPECT_EQ(w[100], 0);
   EXPECT_EQ(whitener.used(), 39'999U);
   EXPECT_NEAR(w.squaredNorm() / 39'999, 1, 0.03);
-  for (const Eigen::Index lag : {1, 10, 100, 1'000}) EXPECT_NEAR(w.head(w.size() - lag).dot(w.tail(w.size() - lag)) / w.squaredNorm(), 0, 0.02) << lag;
+  for (const Eigen::Index lag : {1, 10, 100, 1'000})
+    EXPECT_NEAR(w.head(w.size() - lag).dot(w.tail(w.size() - lag)) / w.squaredNorm(), 0, 0.02) << lag;
 }
 
 TEST(Whitener, ASlowDriftIsWorthFewSamplesAndAStepMany) {
@@ -76,7 +77,7 @@ TEST(Whitener, WhereTheOcvPlungesALargeErrorIsLittle) {
 }
 
 TEST(WhiteNoise, IsReadWhereTheCurrentIsQuiet) {
-  truth::Random random(3);
+  plant::Random random(3);
   std::vector<double> voltage_v, current_a;
   for (int k = 0; k < 5'000; ++k) {
     current_a.push_back(k % 50 < 25 ? 5 : -5);
@@ -85,11 +86,12 @@ TEST(WhiteNoise, IsReadWhereTheCurrentIsQuiet) {
   EXPECT_NEAR(white_noise(voltage_v, current_a, 0.1, 0.01), 0.0008, 0.0001);
   EXPECT_EQ(white_noise(std::vector<double>(50, 3.3), std::vector<double>(50, 0.0), 0.1, 0.01), 0.01) << "too few";
   for (double& v : voltage_v) v = std::round(v / 0.01) * 0.01;
-  EXPECT_GE(white_noise(voltage_v, current_a, 0.1, 0.01), 0.01 / std::sqrt(12.0)) << "a quantised channel is no better than its step";
+  EXPECT_GE(white_noise(voltage_v, current_a, 0.1, 0.01), 0.01 / std::sqrt(12.0))
+      << "a quantised channel is no better than its step";
 }
 
 TEST(QuietCurrent, KeepsStepsAndLosesNoise) {
-  truth::Random random(4);
+  plant::Random random(4);
   std::vector<double> read_a, true_a;
   for (int k = 0; k < 4'000; ++k) {
     true_a.push_back(k % 400 < 200 ? 3 : 0);

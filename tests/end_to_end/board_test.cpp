@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/end_to_end/run_tool.hpp"
-#include "tests/host_sim/refusal.hpp"
+#include "tests/files/refusal.hpp"
 
 namespace bms {
 namespace {
@@ -21,17 +21,21 @@ TEST(Board, ComputesTheShiftBitForBitLikeTheHost) {
 }
 
 TEST(Board, TraceIsTheHostsTrace) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const std::string host = (folder.path() / "h.csv").string(), board = (folder.path() / "b.csv").string();
   ASSERT_EQ(run_tool("replay " + shift + " --initial-soc 0.9 --initial-soc-sigma 0.1 --trace " + host).exit_code, 0);
-  ASSERT_EQ(run_tool("replay " + shift + " --initial-soc 0.9 --initial-soc-sigma 0.1 --target netduinoplus2 --trace " + board).exit_code, 0);
+  ASSERT_EQ(
+      run_tool("replay " + shift + " --initial-soc 0.9 --initial-soc-sigma 0.1 --target netduinoplus2 --trace " + board)
+          .exit_code,
+      0);
   EXPECT_EQ(content(host), content(board));
   EXPECT_GT(content(host).size(), 1'000'000U);
 }
 
 TEST(Board, ComputesARealRecordingBitForBitLikeTheHost) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
-  for (const char* file : {"a123_26650/udds_P25_A002.csv", "a123_26650/pulse_P25_A002.csv", "a123_26650/dyn10_N15_A002.csv", "a123_26650/ocv_P05_chg.csv"}) {
+  for (const char* file : {"a123_26650/udds_P25_A002.csv", "a123_26650/pulse_P25_A002.csv",
+                           "a123_26650/dyn10_N15_A002.csv", "a123_26650/ocv_P05_chg.csv"}) {
     const ToolRun run = run_tool("replay " + (data / file).string() + " --cell a123_26650" + on_board);
     EXPECT_EQ(run.exit_code, 0) << file << ": " << run.err;
     EXPECT_THAT(run.out, HasSubstr("every bit equal")) << file;
@@ -39,7 +43,7 @@ TEST(Board, ComputesARealRecordingBitForBitLikeTheHost) {
 }
 
 TEST(Board, AnIdentifiedCellGoesThroughTheGeneratorAndComputesTheSameBits) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const std::string cell = (folder.path() / "identified.toml").string();
   ASSERT_EQ(run_tool("identify --recording " + shift + " --out " + cell).exit_code, 0);
   const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
@@ -48,9 +52,11 @@ TEST(Board, AnIdentifiedCellGoesThroughTheGeneratorAndComputesTheSameBits) {
 }
 
 /// table9 with these tables behind it.
-std::filesystem::path extended_cell(const TemporaryFolder& folder, const std::string& name, const std::string& tables) {
+std::filesystem::path extended_cell(const images::TemporaryFolder& folder, const std::string& name,
+                                    const std::string& tables) {
   const auto path = folder.path() / (name + ".toml");
-  std::ofstream(path) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\"table9\"", "\"" + name + "\"") << tables;
+  std::ofstream(path) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\"table9\"", "\"" + name + "\"")
+                      << tables;
   return path;
 }
 
@@ -69,8 +75,9 @@ offset_a = 0.02
 )";
 
 TEST(Board, ComputesAnExtendedCellBitForBitLikeTheHostAndShowsItsStates) {
-  const TemporaryFolder folder;
-  const std::string cell = extended_cell(folder, "extended", four_mechanisms).string(), trace = (folder.path() / "t.csv").string();
+  const images::TemporaryFolder folder;
+  const std::string cell = extended_cell(folder, "extended", four_mechanisms).string(),
+                    trace = (folder.path() / "t.csv").string();
   const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("Verified: 28801 estimates, every bit equal on netduinoplus2."));
@@ -78,30 +85,33 @@ TEST(Board, ComputesAnExtendedCellBitForBitLikeTheHostAndShowsItsStates) {
   const std::string host = content(trace);
   ASSERT_EQ(run_tool("replay " + shift + " --target netduinoplus2 --cell " + cell + " --trace " + trace).exit_code, 0);
   EXPECT_EQ(content(trace), host);
-  EXPECT_THAT(host, HasSubstr(",voltage_measured_v,slow_polarisation_1_v,slow_polarisation_2_v,ocv_hysteresis_v,flags\n"));
+  EXPECT_THAT(host,
+              HasSubstr(",voltage_measured_v,slow_polarisation_1_v,slow_polarisation_2_v,ocv_hysteresis_v,flags\n"));
   // integers, on the host alone
   EXPECT_EQ(run_tool("replay " + shift + " --scalar fixed --cell " + cell).exit_code, 0);
 }
 
 TEST(Board, EstimatesErrorsThatLastBitForBitLikeTheHost) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   for (const char* cell : {"a123_26650_extended", "a123_esctoolbox_extended"}) {
     const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_THAT(run.out, HasSubstr("every bit equal"));
   }
   const std::string alone = extended_cell(folder, "alone", "").string(), trace = (folder.path() / "t.csv").string();
-  std::ofstream(alone) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\n[tolerance]", "errors_are_states = true\n[tolerance]");
+  std::ofstream(alone) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\n[tolerance]",
+                                   "errors_are_states = true\n[tolerance]");
   const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + alone);
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("every bit equal"));
   ASSERT_EQ(run_tool("replay " + shift + " --cell " + alone + " --trace " + trace).exit_code, 0);
-  EXPECT_THAT(content(trace), HasSubstr(",voltage_measured_v,voltage_error_v,current_offset_a,current_offset_sigma_a,flags\n"));
+  EXPECT_THAT(content(trace),
+              HasSubstr(",voltage_measured_v,voltage_error_v,current_offset_a,current_offset_sigma_a,flags\n"));
 }
 
 /// Every mechanism that a board runs, at once; with another order than the catalogue's.
 TEST(Board, ComputesEveryMechanismBitForBitLikeTheHost) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const std::string cell = extended_cell(folder, "everything", four_mechanisms + R"(
 [instrument.voltage_gain]
 gain_error = 0.002
@@ -141,19 +151,21 @@ at_10_v_per_k = 1e-4
 at_40_v_per_k = -2e-4
 at_70_v_per_k = 1e-4
 at_95_v_per_k = 1e-4
-)").string();
+)")
+                               .string();
   const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("Verified: 28801 estimates, every bit equal on netduinoplus2."));
 }
 
 TEST(Board, TheGeneratorRefusesForIntegersWhatNeedsAnFpu) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const auto cell = extended_cell(folder, "transfer", "\n[mechanism.charge_transfer]\nr0_share = 0.3\n");
   const std::string log = (folder.path() / "log").string(), out = (folder.path() / "out.hpp").string();
   const std::string command = "\"" BMS_CELL_HEADER_TOOL "\" " + cell.string() + " " + out;
   EXPECT_EQ(WEXITSTATUS(std::system((command + " fixed 2> " + log).c_str())), 2);
-  EXPECT_THAT(content(log), ::testing::MatchesRegex("[^\n]*'mechanism.charge_transfer' does not compute in fixed point[^\n]*\n"));
+  EXPECT_THAT(content(log),
+              ::testing::MatchesRegex("[^\n]*'mechanism.charge_transfer' does not compute in fixed point[^\n]*\n"));
   EXPECT_FALSE(std::filesystem::exists(out));
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 0);
 }
@@ -170,7 +182,7 @@ TEST(Microbit, ComputesTheShiftBitForBitLikeTheHost) {
 
 /// Readings that are missing, impossible and stuck; a gap; a clock that stands still.
 TEST(Microbit, ComputesARecordingWithTroubleBitForBitLikeTheHost) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const auto path = folder.path() / "trouble.csv";
   std::ifstream in(shift);
   std::ofstream out(path);
@@ -185,11 +197,16 @@ TEST(Microbit, ComputesARecordingWithTroubleBitForBitLikeTheHost) {
     if (row > 2'000 && row < 2'400) continue;  // a gap
     const auto first = line.find(','), second = line.find(',', first + 1), third = line.find(',', second + 1);
     const std::string rest = third == std::string::npos ? "" : line.substr(third);
-    const std::string time = line.substr(0, first + 1), current = line.substr(first + 1, second - first), voltage = line.substr(second + 1, third - second - 1);
-    if (row > 500 && row < 560) out << time << current << "9.9" << rest << '\n';
-    else if (row > 900 && row < 1'000) out << time << current << "3.30001" << rest << '\n';
-    else if (row > 3'000 && row < 3'040) out << time << "2000," << voltage << rest << '\n';
-    else out << line << '\n';
+    const std::string time = line.substr(0, first + 1), current = line.substr(first + 1, second - first),
+                      voltage = line.substr(second + 1, third - second - 1);
+    if (row > 500 && row < 560)
+      out << time << current << "9.9" << rest << '\n';
+    else if (row > 900 && row < 1'000)
+      out << time << current << "3.30001" << rest << '\n';
+    else if (row > 3'000 && row < 3'040)
+      out << time << "2000," << voltage << rest << '\n';
+    else
+      out << line << '\n';
   }
   out.close();
   const ToolRun run = run_tool("replay " + path.string() + on_microbit + "--initial-soc 0.7 --initial-soc-sigma 0.02");
@@ -205,22 +222,29 @@ TEST(Microbit, RefusesToPretendAnotherArithmetic) {
 
 /// table9 with R0 at 90 % one float step larger: 0.0135692 is 0x3c5e5128 as a float.
 TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const auto other = folder.path() / "ulp.toml";
   ASSERT_EQ(std::nextafter(0.0135692F, 1.0F), 0.013569201F);
   ASSERT_NE(0.0135692F, 0.013569201F);
-  std::ofstream(other) << replaced(replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0135692, ", "0.013569201, "), "\"table9\"", "\"ulp\"");
+  std::ofstream(other) << replaced(
+      replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0135692, ", "0.013569201, "), "\"table9\"",
+      "\"ulp\"");
   const ToolRun run = run_tool("replay " + shift + on_board + " --board-cell " + other.string());
   EXPECT_EQ(run.exit_code, 1);
-  EXPECT_THAT(run.err, ::testing::MatchesRegex(".*host and netduinoplus2 differ first at sample [0-9]+ \\(time [0-9]+ s\\) in [a-z_]+: host [^\n]+\n"));
+  EXPECT_THAT(
+      run.err,
+      ::testing::MatchesRegex(
+          ".*host and netduinoplus2 differ first at sample [0-9]+ \\(time [0-9]+ s\\) in [a-z_]+: host [^\n]+\n"));
 }
 
 TEST(Board, ACellThatIsOutOfRangeIsRefusedByTheFirmwareBuild) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const auto bad = folder.path() / "bad.toml";
   std::ofstream(bad) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0140197", "0.9");
   const std::string log = (folder.path() / "log").string();
-  const int status = std::system(("\"" BMS_CELL_HEADER_TOOL "\" " + bad.string() + " " + (folder.path() / "out.hpp").string() + " 2> " + log).c_str());
+  const int status = std::system(
+      ("\"" BMS_CELL_HEADER_TOOL "\" " + bad.string() + " " + (folder.path() / "out.hpp").string() + " 2> " + log)
+          .c_str());
   EXPECT_EQ(WEXITSTATUS(status), 2);
   EXPECT_THAT(content(log), HasSubstr("'rc.r0_ohm' is out of range"));
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "out.hpp"));

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/text_file.hpp"
+#include "files/text_file.hpp"
 #include "tests/end_to_end/run_tool.hpp"
 
 namespace bms {
@@ -18,7 +18,7 @@ const std::filesystem::path data = BMS_DATA_DIR;
 
 class CanLogTool : public ::testing::Test {
  protected:
-  TemporaryFolder folder_;
+  images::TemporaryFolder folder_;
   std::string path(const char* name) const { return (folder_.path() / name).string(); }
 
   /// What the emulated board said of the beginning of the shift, with a bad wire.
@@ -26,8 +26,9 @@ class CanLogTool : public ::testing::Test {
     const std::string shift = content(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
     std::size_t end = 0;
     for (int line = 0; line < 400; ++line) end = shift.find('\n', end) + 1;
-    write_file(path("part.csv"), shift.substr(0, end));
-    const auto r = run_tool("hil --board netduinoplus2 --recording " + path("part.csv") + " --sample-s 1 --candump " + path("truck.log") + " " + more);
+    files::write_file(path("part.csv"), shift.substr(0, end));
+    const auto r = run_tool("hil --board netduinoplus2 --recording " + path("part.csv") + " --sample-s 1 --candump " +
+                            path("truck.log") + " " + more);
     EXPECT_LT(r.exit_code, 2) << r.err;
     return path("truck.log");
   }
@@ -42,7 +43,7 @@ class CanLogTool : public ::testing::Test {
       if (line.find(with) != std::string::npos && ++seen > from && seen <= from + count) continue;
       kept += line;
     }
-    write_file(path("cut.log"), kept);
+    files::write_file(path("cut.log"), kept);
     return path("cut.log");
   }
 };
@@ -61,7 +62,9 @@ TEST_F(CanLogTool, ReplaysToTheVeryBitsThatTheFirmwareComputed) {
 
 TEST_F(CanLogTool, OfAnExtendedCellEveryStateIsCompared) {
   if (!std::filesystem::exists(data / "a123_26650")) GTEST_SKIP() << "the real recordings are not there: " << data;
-  const auto hil = run_tool("hil --board netduinoplus2 --cell a123_26650_extended --recording " + (data / "a123_26650" / "udds_P25_A002.csv").string() + " --sample-s 1 --told-soc 1 --candump " + path("truck.log"));
+  const auto hil = run_tool("hil --board netduinoplus2 --cell a123_26650_extended --recording " +
+                            (data / "a123_26650" / "udds_P25_A002.csv").string() +
+                            " --sample-s 1 --told-soc 1 --candump " + path("truck.log"));
   EXPECT_LT(hil.exit_code, 2) << hil.err;
   const auto r = run_tool("replay " + path("truck.log") + " --cell a123_26650_extended --json -");
   EXPECT_EQ(r.exit_code, 0) << r.err;
@@ -81,7 +84,7 @@ TEST_F(CanLogTool, AHashThatIsOffByABitIsFound) {
   for (int k = 0; k < 100; ++k) at = text.find(" 19B#", at + 1);  // the hundredth sample's time: a microsecond later
   char& digit = text[at + 5 + 4];
   digit = digit == '0' ? '1' : '0';
-  write_file(path("turned.log"), text);
+  files::write_file(path("turned.log"), text);
   const auto r = run_tool("replay " + path("turned.log") + " --json -");
   EXPECT_EQ(r.exit_code, 0) << "its CRC is wrong: the sample is lost, what came before is compared";
   EXPECT_THAT(r.out, HasSubstr("samples_lost"));
@@ -102,9 +105,9 @@ TEST_F(CanLogTool, WhatIsMissingIsSaid) {
 }
 
 TEST_F(CanLogTool, HostileBytesEndInALine) {
-  write_file(path("bad.log"), "(1.0) can0 199#00112233445566");
+  files::write_file(path("bad.log"), "(1.0) can0 199#00112233445566");
   EXPECT_EQ(run_tool("replay " + path("bad.log")).exit_code, 2);
-  write_file(path("bad.gz"), std::string("\x1f\x8b\x08garbage that is no gzip", 25));
+  files::write_file(path("bad.gz"), std::string("\x1f\x8b\x08garbage that is no gzip", 25));
   EXPECT_EQ(run_tool("replay " + path("bad.gz")).exit_code, 2);
 }
 

@@ -1,4 +1,5 @@
-// bms diagnose from the outside: contract, verdicts on recordings whose answer is known, data that says nothing, bad input.
+// bms diagnose from the outside: contract, verdicts on recordings whose answer is known, data that says nothing, bad
+// input.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -41,23 +42,29 @@ class DiagnoseTool : public ::testing::Test {
     return path("morning.csv");
   }
   /// Its current through the cell with a mechanism. `seed`: of the noise.
-  std::string simulated(const std::string& name, const std::string& with, int seed = 1, const std::string& initial_soc = "0.98") const {
-    const ToolRun run = run_tool("simulate --cell table9 --recording " + morning() + " --initial-soc " + initial_soc + " --with " + with + " --noise-v 0.001 --seed " + std::to_string(seed) + " --out " + path(name));
+  std::string simulated(const std::string& name, const std::string& with, int seed = 1,
+                        const std::string& initial_soc = "0.98") const {
+    const ToolRun run =
+        run_tool("simulate --cell table9 --recording " + morning() + " --initial-soc " + initial_soc + " --with " +
+                 with + " --noise-v 0.001 --seed " + std::to_string(seed) + " --out " + path(name));
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return path(name);
   }
   /// A recording of n rows, one each step_s seconds: current and voltage by row.
-  std::string made(const std::string& name, int rows, double step_s, const std::function<double(int)>& current_a, const std::function<double(int)>& voltage_v) const {
+  std::string made(const std::string& name, int rows, double step_s, const std::function<double(int)>& current_a,
+                   const std::function<double(int)>& voltage_v) const {
     std::ofstream out(path(name));
     out << "time_s,current_a,voltage_v\n";
     for (int k = 0; k < rows; ++k) out << step_s * k << "," << current_a(k) << "," << voltage_v(k) << "\n";
     return path(name);
   }
-  TemporaryFolder folder_;
+  images::TemporaryFolder folder_;
 };
 
 /// Without what the contract lets differ.
-std::string steady(const std::string& text) { return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), ""); }
+std::string steady(const std::string& text) {
+  return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), "");
+}
 
 constexpr const char* hysteresis = "ocv_hysteresis:half_gap_v=0.015,decay=40";
 
@@ -66,7 +73,8 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndProvesItOnALaterRecording) {
   std::string text = content(later);
   text.replace(text.find(",soc"), 4, ",soc_ref");
   std::ofstream(later) << text;
-  const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", hysteresis) + " --holdout " + later + " --out " + path("x.toml"));
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", hysteresis) +
+                        " --holdout " + later + " --out " + path("x.toml"));
   EXPECT_EQ(r["verdict"], "CAUSE");
   ASSERT_EQ(r["mechanisms"].size(), 1U);
   const json& m = r["mechanisms"][0];
@@ -84,14 +92,19 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndProvesItOnALaterRecording) {
   const std::string cell = content(path("x.toml"));
   EXPECT_THAT(cell, HasSubstr("name = \"table9_extended\""));
   EXPECT_THAT(cell, HasSubstr("[mechanism.ocv_hysteresis]\nsource = \"bms diagnose of now.csv"));
-  EXPECT_EQ(run_tool("simulate --cell " + path("x.toml") + " --recording " + shift + " --out " + path("s.csv")).exit_code, 0);
+  EXPECT_EQ(
+      run_tool("simulate --cell " + path("x.toml") + " --recording " + shift + " --out " + path("s.csv")).exit_code, 0);
   EXPECT_EQ(run_tool("replay " + shift + " --cell " + path("x.toml")).exit_code, 0);
-  EXPECT_EQ(result("--cell " + path("x.toml") + " --initial-soc 0.98 --recording " + path("now.csv"))["verdict"], "NO_MISMATCH") << "what the cell file has is no mismatch";
+  EXPECT_EQ(result("--cell " + path("x.toml") + " --initial-soc 0.98 --recording " + path("now.csv"))["verdict"],
+            "NO_MISMATCH")
+      << "what the cell file has is no mismatch";
 }
 
 TEST_F(DiagnoseTool, AContactThatGotWorseIsThereFromTheStartOfALaterRecording) {
-  const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", "contact_step:resistance_ohm=0.002,onset_s=5000") + " --holdout " +
-                        simulated("later.csv", "contact_step:resistance_ohm=0.002,onset_s=0", 2) + " --out " + path("x.toml"));
+  const json r =
+      result("--cell table9 --initial-soc 0.98 --recording " +
+             simulated("now.csv", "contact_step:resistance_ohm=0.002,onset_s=5000") + " --holdout " +
+             simulated("later.csv", "contact_step:resistance_ohm=0.002,onset_s=0", 2) + " --out " + path("x.toml"));
   ASSERT_EQ(r["verdict"], "CAUSE");
   EXPECT_EQ(r["mechanisms"][0]["id"], "contact_step");
   EXPECT_NEAR(r["mechanisms"][0]["parameters"][1]["value"], 5'000, 60);
@@ -114,7 +127,8 @@ TEST_F(DiagnoseTool, TheShiftItselfIsNoMismatchAndLeavesTheCellAsItWas) {
 
 TEST_F(DiagnoseTool, GivesWhatTheContractNamesWhateverTheVerdict) {
   const auto complete = [](const json& r) {
-    for (const char* key : {"command", "verdict", "statement", "location", "mechanisms", "candidates", "baseline", "extended", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
+    for (const char* key : {"command", "verdict", "statement", "location", "mechanisms", "candidates", "baseline",
+                            "extended", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
                             "next_experiment", "wall_s", "warnings"}) {
       EXPECT_TRUE(r.contains(key)) << key;
     }
@@ -126,20 +140,31 @@ TEST_F(DiagnoseTool, GivesWhatTheContractNamesWhateverTheVerdict) {
       for (const char* key : {"recording", "holdout"}) EXPECT_TRUE(r[model].contains(key)) << model << key;
     }
     for (const json& m : r["mechanisms"]) {
-      for (const char* key : {"id", "probability", "equivalent_to", "parameters", "rms_contribution_v"}) EXPECT_TRUE(m.contains(key)) << key;
-      for (const json& p : m["parameters"]) EXPECT_TRUE(p["value"].is_number() && p["std"].is_number() && p["name"].is_string() && p["unit"].is_string()) << p;
+      for (const char* key : {"id", "probability", "equivalent_to", "parameters", "rms_contribution_v"})
+        EXPECT_TRUE(m.contains(key)) << key;
+      for (const json& p : m["parameters"])
+        EXPECT_TRUE(p["value"].is_number() && p["std"].is_number() && p["name"].is_string() && p["unit"].is_string())
+            << p;
     }
     for (const json& c : r["candidates"]) {
-      for (const char* key : {"probability", "log_likelihood_gain", "explained_share"}) EXPECT_TRUE(c[key].is_number()) << key;
-      for (const json& id : c["ids"]) EXPECT_LT(model::mechanism_index(id.get<std::string>()), model::mechanism_count) << id;
+      for (const char* key : {"probability", "log_likelihood_gain", "explained_share"})
+        EXPECT_TRUE(c[key].is_number()) << key;
+      for (const json& id : c["ids"])
+        EXPECT_LT(model::mechanism_index(id.get<std::string>()), model::mechanism_count) << id;
     }
-    for (const json& l : r["detection_limits"]) EXPECT_TRUE(l["value"].is_number() && l["id"].is_string() && l["parameter"].is_string() && l["unit"].is_string()) << l;
+    for (const json& l : r["detection_limits"])
+      EXPECT_TRUE(l["value"].is_number() && l["id"].is_string() && l["parameter"].is_string() && l["unit"].is_string())
+          << l;
     for (const json& n : r["not_testable"]) EXPECT_FALSE(n["reason"].get<std::string>().empty()) << n;
   };
   complete(result("--cell table9 --initial-soc 0.98 --recording " + shift));
   complete(result("--cell table9 --initial-soc 0.98 --recording " + simulated("gap.csv", hysteresis)));
-  complete(result("--cell table9 --recording " + made("rest.csv", 2'000, 1, [](int) { return 0.0; }, [](int) { return 3.3; })));
-  complete(result("--cell table9 --recording " + made("mv.csv", 2'000, 1, [](int k) { return -(k / 60 % 3); }, [](int k) { return 3'300 - 10.0 * (k / 60 % 3); })));
+  complete(result("--cell table9 --recording " +
+                  made(
+                      "rest.csv", 2'000, 1, [](int) { return 0.0; }, [](int) { return 3.3; })));
+  complete(result("--cell table9 --recording " + made(
+                                                     "mv.csv", 2'000, 1, [](int k) { return -(k / 60 % 3); },
+                                                     [](int k) { return 3'300 - 10.0 * (k / 60 % 3); })));
 }
 
 TEST_F(DiagnoseTool, DataThatSaysNothingIsNotTestableAndNeverAGuess) {
@@ -148,13 +173,24 @@ TEST_F(DiagnoseTool, DataThatSaysNothingIsNotTestableAndNeverAGuess) {
     const char* what;
     std::string file;
   } cases[] = {
-      {"constant voltage and current", made("constant.csv", 3'000, 1, [](int) { return -2.0; }, [](int) { return 3.2; })},
-      {"constant current", made("flat.csv", 3'000, 1, [](int) { return -2.0; }, [](int k) { return 3.28 - 1e-6 * k + 0.001 * (k % 2); })},
-      {"all rest", made("rest.csv", 5'000, 1, [](int) { return 0.0; }, level)},
-      {"ten rows", made("ten.csv", 10, 1, [](int k) { return -(k % 3); }, level)},
-      {"a minute", made("minute.csv", 60, 1, [](int k) { return -(k % 3); }, [](int k) { return 3.29 - 0.01 * (k % 3); })},
-      {"no voltage that can be read", made("blind.csv", 2'000, 1, [](int k) { return -(k % 3); }, [](int) { return std::nan(""); })},
-      {"no current that can be read", made("still.csv", 2'000, 1, [](int) { return std::nan(""); }, level)},
+      {"constant voltage and current",
+       made(
+           "constant.csv", 3'000, 1, [](int) { return -2.0; }, [](int) { return 3.2; })},
+      {"constant current",
+       made(
+           "flat.csv", 3'000, 1, [](int) { return -2.0; }, [](int k) { return 3.28 - 1e-6 * k + 0.001 * (k % 2); })},
+      {"all rest", made(
+                       "rest.csv", 5'000, 1, [](int) { return 0.0; }, level)},
+      {"ten rows", made(
+                       "ten.csv", 10, 1, [](int k) { return -(k % 3); }, level)},
+      {"a minute",
+       made(
+           "minute.csv", 60, 1, [](int k) { return -(k % 3); }, [](int k) { return 3.29 - 0.01 * (k % 3); })},
+      {"no voltage that can be read",
+       made(
+           "blind.csv", 2'000, 1, [](int k) { return -(k % 3); }, [](int) { return std::nan(""); })},
+      {"no current that can be read", made(
+                                          "still.csv", 2'000, 1, [](int) { return std::nan(""); }, level)},
   };
   for (const auto& c : cases) {
     const json r = result("--cell table9 --recording " + c.file);
@@ -182,7 +218,9 @@ TEST_F(DiagnoseTool, WithoutTemperatureWhatNeedsItIsListed) {
 
 TEST_F(DiagnoseTool, ABrokenRecordingIsADataFaultWithItsPlace) {
   std::string text = "time_s,current_a,voltage_v\n";
-  for (int k = 0; k < 4'000; ++k) text += std::to_string(k) + "," + std::to_string(k / 50 % 2 == 0 ? 3 : -3) + "," + std::to_string(k / 50 % 2 == 0 ? 3.25 : 3.33) + "\n";
+  for (int k = 0; k < 4'000; ++k)
+    text += std::to_string(k) + "," + std::to_string(k / 50 % 2 == 0 ? 3 : -3) + "," +
+            std::to_string(k / 50 % 2 == 0 ? 3.25 : 3.33) + "\n";
   std::ofstream(path("inverted.csv")) << text;
   const json r = result("--cell table9 --recording " + path("inverted.csv"));
   EXPECT_EQ(r["verdict"], "DATA_FAULT");
@@ -226,7 +264,8 @@ TEST_F(DiagnoseTool, AsksForTheExperimentThatDecidesAndDecidesByIt) {
     later << line << "," << (source.empty() ? 3.3895 : std::stod(source)) + 0.012 + 0.001 * ((7 * k) % 5 - 2) << "\n";
   }
   later.close();
-  const json both = result("--cell table9 --initial-soc 0.98 --initial-soc 0.95 --recording " + now + " --recording " + path("later.csv"));
+  const json both = result("--cell table9 --initial-soc 0.98 --initial-soc 0.95 --recording " + now + " --recording " +
+                           path("later.csv"));
   EXPECT_EQ(both["verdict"], "CAUSE");
   EXPECT_EQ(both["mechanisms"][0]["id"], "voltage_offset");
   EXPECT_NEAR(both["mechanisms"][0]["parameters"][0]["value"], 0.012, 0.001);
@@ -243,8 +282,10 @@ TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
       "--cell table9 --recording " + shift + " --holdout /no/such/file.csv",
       "--cell table9 --recording " + shift + " --initial-soc 98",
       "--cell table9 --recording " + shift + " --initial-soc nan",
-      "--cell table9 --recording " + shift + " --recording " + shift + " --initial-soc 0.9 --initial-soc 0.8 --initial-soc 0.7",
-      "--cell table9 --recording " + made("nine.csv", 9, 1, [](int) { return 0.0; }, [](int) { return 3.3; }),
+      "--cell table9 --recording " + shift + " --recording " + shift +
+          " --initial-soc 0.9 --initial-soc 0.8 --initial-soc 0.7",
+      "--cell table9 --recording " + made(
+                                         "nine.csv", 9, 1, [](int) { return 0.0; }, [](int) { return 3.3; }),
       "--cell table9 --recording " + shift + " --json - --report -",
   };
   for (const std::string& arguments : wrong) {
@@ -259,7 +300,9 @@ TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
 }
 
 TEST_F(DiagnoseTool, TheSameInputGivesTheSameBytes) {
-  const std::string arguments = "diagnose --cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", hysteresis) + " --json - --out " + path("x.toml") + " --report " + path("x.html");
+  const std::string arguments = "diagnose --cell table9 --initial-soc 0.98 --recording " +
+                                simulated("now.csv", hysteresis) + " --json - --out " + path("x.toml") + " --report " +
+                                path("x.html");
   const ToolRun a = run_tool(arguments);
   const std::string cell = content(path("x.toml")), page = content(path("x.html"));
   const ToolRun b = run_tool(arguments);

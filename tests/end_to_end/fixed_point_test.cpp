@@ -28,7 +28,8 @@ TEST(FixedPoint, OfTheMicrobitIsTheHostsBitForBitOverTheShiftAndRealRecordings) 
   for (const FixedPointRun& run : runs()) {
     if (run.cell.ends_with("_extended") && of_extended++ % 4 != 0) continue;
     const auto difference = difference_on_microbit(run);
-    EXPECT_FALSE(difference) << run.recording << " with " << run.cell << ": " << difference->field << " of sample " << difference->sample << ", host " << difference->host << ", board " << difference->board;
+    EXPECT_FALSE(difference) << run.recording << " with " << run.cell << ": " << difference->field << " of sample "
+                             << difference->sample << ", host " << difference->host << ", board " << difference->board;
     ++done;
   }
   EXPECT_EQ(done, std::filesystem::exists(data) ? 1U + 27 + 6 : 1U);

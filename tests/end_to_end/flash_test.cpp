@@ -1,14 +1,15 @@
-// bms flash: what OpenOCD is told, and what it makes of it, without a probe: its dummy adapter, a processor that does nothing and a flash in its memory.
+// bms flash: what OpenOCD is told, and what it makes of it, without a probe: its dummy adapter, a processor that does
+// nothing and a flash in its memory.
 #include <regex>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "host_sim/child_process.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/flash_plan.hpp"
-#include "host_sim/image_file.hpp"
+#include "images/child_process.hpp"
+#include "images/firmware_image.hpp"
+#include "images/flash_plan.hpp"
+#include "images/image_file.hpp"
 #include "tests/end_to_end/run_tool.hpp"
 
 namespace bms {
@@ -49,7 +50,8 @@ std::vector<Written> written(const std::vector<std::string>& all) {
   std::vector<Written> found;
   for (const std::string& c : that_begin(all, "flash write")) {
     std::smatch m;
-    if (std::regex_match(c, m, write)) found.push_back({m[1], static_cast<std::uint32_t>(std::stoul(m[2], nullptr, 16))});
+    if (std::regex_match(c, m, write))
+      found.push_back({m[1], static_cast<std::uint32_t>(std::stoul(m[2], nullptr, 16))});
   }
   return found;
 }
@@ -67,7 +69,10 @@ TEST(Flash, TellsOpenOcdToWriteCompareAndReset) {
     EXPECT_THAT(all, ::testing::Contains(fmt::format("verify_image {{{}}} {:#010x} bin", w.path, w.address)));
   }
   EXPECT_EQ(that_begin(all, "flash").size(), parts.size()) << "nothing else is written or erased";
-  const auto at = [&](const std::string& c) { return std::find_if(all.begin(), all.end(), [&](const std::string& one) { return one.starts_with(c); }) - all.begin(); };
+  const auto at = [&](const std::string& c) {
+    return std::find_if(all.begin(), all.end(), [&](const std::string& one) { return one.starts_with(c); }) -
+           all.begin();
+  };
   EXPECT_LT(at("init"), at("reset halt"));
   EXPECT_LT(at("reset halt"), at("dump_image"));
   EXPECT_LT(at("dump_image"), at("flash write_image"));
@@ -81,49 +86,58 @@ TEST(Flash, PartsAreTheImageAndLeaveTheStoredRecordsSectorsAlone) {
   const auto parts = written(all);
   ASSERT_FALSE(parts.empty());
   const std::string elf = parts[0].path.substr(0, parts[0].path.find(".elf") + 4);
-  const ImageFile image(elf);
-  for (const LoadedPart& part : image.parts()) {
-    const auto holds = std::find_if(parts.begin(), parts.end(), [&](const Written& w) { return w.address <= part.address && part.address + part.bytes.size() <= w.address + content(w.path).size(); });
+  const images::ImageFile image(elf);
+  for (const images::LoadedPart& part : image.parts()) {
+    const auto holds = std::find_if(parts.begin(), parts.end(), [&](const Written& w) {
+      return w.address <= part.address && part.address + part.bytes.size() <= w.address + content(w.path).size();
+    });
     ASSERT_NE(holds, parts.end()) << std::hex << part.address;
     EXPECT_EQ(content(holds->path).substr(part.address - holds->address, part.bytes.size()), part.bytes);
   }
   for (std::size_t k = 0; k < parts.size(); ++k) {
     const std::uint64_t begin = parts[k].address, end = begin + content(parts[k].path).size();
-    // RM0090, table 5: sectors 0 to 3 have 16 KiB, 4 has 64, the others 128; boards/stm32f405_forklift/memory.ld gives 1 to 3 to the records
+    // RM0090, table 5: sectors 0 to 3 have 16 KiB, 4 has 64, the others 128; boards/stm32f405_forklift/memory.ld gives
+    // 1 to 3 to the records
     EXPECT_TRUE(end <= 0x08004000U || begin >= 0x08010000U) << std::hex << begin << " to " << end;
   }
   EXPECT_THAT(that_begin(all, "dump_image")[0], HasSubstr("0x08004000 0xc000"));
-  const auto storage = storage_of(image);
+  const auto storage = images::storage_of(image);
   ASSERT_TRUE(storage);
   EXPECT_EQ(storage->begin, 0x08004000U);
   EXPECT_EQ(storage->end, 0x08010000U);
 }
 
 TEST(Flash, RefusesAnImageWithBytesInTheStoredRecordsSectors) {
-  const AddressRange storage{0x08004000, 0x08010000};
-  EXPECT_EQ(parts_to_write({{0x08000000, std::string(0x4000, 'x')}, {0x08010000, "x"}}, storage).size(), 2U);
-  EXPECT_THROW(parts_to_write({{0x08000000, std::string(0x4001, 'x')}}, storage), std::runtime_error);
-  EXPECT_THROW(parts_to_write({{0x0800FFFF, "x"}}, storage), std::runtime_error);
-  EXPECT_THROW(parts_to_write({{0x08000000, std::string(0x20000, 'x')}}, storage), std::runtime_error);
-  EXPECT_THROW(parts_to_write({}, storage), std::runtime_error);
+  const images::AddressRange storage{0x08004000, 0x08010000};
+  EXPECT_EQ(images::parts_to_write({{0x08000000, std::string(0x4000, 'x')}, {0x08010000, "x"}}, storage).size(), 2U);
+  EXPECT_THROW(images::parts_to_write({{0x08000000, std::string(0x4001, 'x')}}, storage), std::runtime_error);
+  EXPECT_THROW(images::parts_to_write({{0x0800FFFF, "x"}}, storage), std::runtime_error);
+  EXPECT_THROW(images::parts_to_write({{0x08000000, std::string(0x20000, 'x')}}, storage), std::runtime_error);
+  EXPECT_THROW(images::parts_to_write({}, storage), std::runtime_error);
 }
 
 TEST(Flash, WritesPartsThatMayShareASectorAtOnce) {
-  const auto joined = parts_to_write({{0x08010000, "abc"}, {0x08010004, "d"}, {0x08010005, "e"}}, AddressRange{0x08004000, 0x08010000});
+  const auto joined = images::parts_to_write({{0x08010000, "abc"}, {0x08010004, "d"}, {0x08010005, "e"}},
+                                             images::AddressRange{0x08004000, 0x08010000});
   ASSERT_EQ(joined.size(), 1U);
-  EXPECT_EQ(joined[0].bytes, "abc\xFF" "de");
-  EXPECT_THROW(parts_to_write({{0, "abc"}, {2, "d"}}, std::nullopt), std::runtime_error);
+  EXPECT_EQ(joined[0].bytes,
+            "abc\xFF"
+            "de");
+  EXPECT_THROW(images::parts_to_write({{0, "abc"}, {2, "d"}}, std::nullopt), std::runtime_error);
 }
 
 /// The very commands, without those that read the chip's memory, which the processor that does nothing has not.
 TEST(Flash, OpenOcdTakesTheCommandsAndWritesNothingBetweenTheParts) {
-  const TemporaryFolder folder;
-  std::string command = "openocd -c 'adapter driver dummy' -c 'transport select jtag' -c 'jtag newtap chip cpu -irlen 4' -c 'target create chip.cpu testee -chain-position chip.cpu' "
-                        "-c 'flash bank chip.flash faux 0x08000000 0x100000 0 0 chip.cpu'";
+  const images::TemporaryFolder folder;
+  std::string command =
+      "openocd -c 'adapter driver dummy' -c 'transport select jtag' -c 'jtag newtap chip cpu -irlen 4' -c 'target "
+      "create chip.cpu testee -chain-position chip.cpu' "
+      "-c 'flash bank chip.flash faux 0x08000000 0x100000 0 0 chip.cpu'";
   std::uint64_t bytes = 0;
   const auto all = commands(dry_run().out);
   for (const std::string& c : all) {
-    if (!c.starts_with("dump_image") && !c.starts_with("verify_image") && !c.starts_with("reset")) command += " -c '" + c + "'";
+    if (!c.starts_with("dump_image") && !c.starts_with("verify_image") && !c.starts_with("reset"))
+      command += " -c '" + c + "'";
   }
   const auto log = folder.path() / "log";
   const int status = std::system((command + " >" + log.string() + " 2>&1").c_str());
@@ -138,15 +152,17 @@ TEST(Flash, OpenOcdTakesTheCommandsAndWritesNothingBetweenTheParts) {
 
 /// Every board's probe and chip are known to OpenOCD, and the commands before init are words that it knows.
 TEST(Flash, OpenOcdKnowsEveryBoardsProbeAndChip) {
-  for (const std::string& board : board_names()) {
-    const TemporaryFolder folder;
-    const Probe probe{board_setting(board, "BMS_PROBE"), board_setting(board, "BMS_PROBE_TARGET"), "no-such-probe"};
-    auto command = openocd_command(probe, {}, std::nullopt, "");
+  for (const std::string& board : images::board_names()) {
+    const images::TemporaryFolder folder;
+    const images::Probe probe{images::board_setting(board, "BMS_PROBE"),
+                              images::board_setting(board, "BMS_PROBE_TARGET"), "no-such-probe"};
+    auto command = images::openocd_command(probe, {}, std::nullopt, "");
     const auto init = std::find(command.begin(), command.end(), "init");
     ASSERT_NE(init, command.end());
     *init = "shutdown";
     command.erase(init + 1, command.end());
-    EXPECT_EQ(ChildProcess(command, folder.path() / "log").wait(), 0) << board << ": " << content(folder.path() / "log");
+    EXPECT_EQ(images::ChildProcess(command, folder.path() / "log").wait(), 0)
+        << board << ": " << content(folder.path() / "log");
   }
 }
 
@@ -161,21 +177,29 @@ TEST(Flash, SaysWhatIsMissing) {
   const ToolRun no_board = run_tool("flash --board no-such-board --dry-run");
   EXPECT_EQ(no_board.exit_code, 2);
   EXPECT_THAT(no_board.err, HasSubstr("no such board"));
-  const TemporaryFolder empty;
-  const int status = std::system(("PATH=" + empty.path().string() + " \"" BMS_TOOL "\" flash 2>" + (empty.path() / "err").string()).c_str());
+  const images::TemporaryFolder empty;
+  const int status = std::system(
+      ("PATH=" + empty.path().string() + " \"" BMS_TOOL "\" flash 2>" + (empty.path() / "err").string()).c_str());
   EXPECT_EQ(WEXITSTATUS(status), 2);
   EXPECT_THAT(content(empty.path() / "err"), HasSubstr("openocd:1: not installed"));
 }
 
 TEST(Flash, SaysWhatWentWrong) {
-  const Probe probe{"stlink", "stm32f4x", ""};
-  EXPECT_TRUE(failure_in("Error: open failed\n", probe).nothing_to_talk_to);
-  const FlashFailure no_chip = failure_in("Info : Target voltage: 3.2\nError: init mode failed (unable to connect to the target)\n", probe);
+  const images::Probe probe{"stlink", "stm32f4x", ""};
+  EXPECT_TRUE(images::failure_in("Error: open failed\n", probe).nothing_to_talk_to);
+  const images::FlashFailure no_chip = images::failure_in(
+      "Info : Target voltage: 3.2\nError: init mode failed (unable to connect to the target)\n", probe);
   EXPECT_FALSE(no_chip.nothing_to_talk_to);
   EXPECT_THAT(no_chip.what, HasSubstr("no chip answers"));
-  EXPECT_THAT(failure_in("Error: checksum mismatch - attempting binary compare\ndiff 0 address 0x08000000. Was 0xff instead of 0x00\n", probe).what, HasSubstr("does not hold"));
-  EXPECT_THAT(failure_in("image verified\nError: checksum mismatch\n", probe).what, HasSubstr("stored records"));
-  EXPECT_EQ(failure_in("Info : x\nError: something else\n", probe).what, "something else");
+  EXPECT_THAT(
+      images::failure_in(
+          "Error: checksum mismatch - attempting binary compare\ndiff 0 address 0x08000000. Was 0xff instead of 0x00\n",
+          probe)
+          .what,
+      HasSubstr("does not hold"));
+  EXPECT_THAT(images::failure_in("image verified\nError: checksum mismatch\n", probe).what,
+              HasSubstr("stored records"));
+  EXPECT_EQ(images::failure_in("Info : x\nError: something else\n", probe).what, "something else");
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/text_file.hpp"
+#include "files/text_file.hpp"
 #include "tests/end_to_end/run_tool.hpp"
 
 namespace bms {
@@ -21,7 +21,7 @@ std::string short_drive(const std::filesystem::path& folder) {
   std::string csv = "time_s,current_a\n";
   for (int k = 0; k <= 300; ++k) csv += fmt::format("{},{}\n", k, k % 60 < 30 ? -5.0 : k % 60 < 40 ? 1.5 : -0.5);
   const auto path = folder / "drive.csv";
-  write_file(path, csv);
+  files::write_file(path, csv);
   return path.string();
 }
 
@@ -30,8 +30,11 @@ Json of(const ToolRun& r) { return Json::parse(r.out); }
 class Hil : public ::testing::TestWithParam<const char*> {
  protected:
   /// The forklift board in the loop with that; its result as JSON on standard output.
-  ToolRun loop(const std::string& arguments) const { return run_tool("hil --board stm32f405_forklift --json - --profile " + short_drive(folder_.path()) + " " + arguments); }
-  TemporaryFolder folder_;
+  ToolRun loop(const std::string& arguments) const {
+    return run_tool("hil --board stm32f405_forklift --json - --profile " + short_drive(folder_.path()) + " " +
+                    arguments);
+  }
+  images::TemporaryFolder folder_;
 };
 
 TEST_F(Hil, ADriveWithoutFaultsRaisesNoneAndTellsTheTruth) {
@@ -53,7 +56,7 @@ TEST_F(Hil, TheSameRunIsTheSameAgain) {
   const auto run = [&] {
     Json j = of(loop("--fault drop=0.01@0 --seed 5 --candump " + (folder_.path() / "dump").string()));
     j.erase("speedup");
-    return j.dump() + read_file(folder_.path() / "dump");
+    return j.dump() + files::read_file(folder_.path() / "dump");
   };
   EXPECT_EQ(run(), run());
 }
@@ -68,8 +71,13 @@ TEST_P(HilFault, AFaultThatIsPutInIsToldInItsTime) {
   EXPECT_TRUE(j["reactions"][0]["after_s"].is_number()) << j["faults"].dump();
   EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
 }
-INSTANTIATE_TEST_SUITE_P(Faults, HilFault, ::testing::Values("cell_stuck=3@60", "cell_open=7@60", "sense_wire=5@60", "cell_high=1@60", "cell_low=16@60", "current_open@60", "temperature_open@60", "overcurrent@60", "welded@60", "precharge_open@0", "silence@60-65"),
-                         [](const auto& i) { return std::string(i.param).substr(0, std::string(i.param).find_first_of("=@")); });
+INSTANTIATE_TEST_SUITE_P(Faults, HilFault,
+                         ::testing::Values("cell_stuck=3@60", "cell_open=7@60", "sense_wire=5@60", "cell_high=1@60",
+                                           "cell_low=16@60", "current_open@60", "temperature_open@60", "overcurrent@60",
+                                           "welded@60", "precharge_open@0", "silence@60-65"),
+                         [](const auto& i) {
+                           return std::string(i.param).substr(0, std::string(i.param).find_first_of("=@"));
+                         });
 
 TEST_F(Hil, ABadWireMakesNoWrongStateOfChargeValid) {
   for (const char* fault : {"drop=0.02@30", "corrupt=0.02@30", "delay=0.02@30"}) {
@@ -87,12 +95,14 @@ TEST_F(Hil, AFaultThatIsNotToldEndsWith1) {
 }
 
 TEST_F(Hil, ARecordingFlowsOnlyThroughClosedContactorsAndIsNoWeldedOne) {
-  std::string csv = read_file(shift);
+  std::string csv = files::read_file(shift);
   std::size_t end = 0;
   for (int line = 0; line < 400; ++line) end = csv.find('\n', end) + 1;
   const std::string part = (folder_.path() / "part.csv").string();
-  write_file(part, csv.substr(0, end));
-  const auto replayed = [&](const std::string& more) { return of(run_tool("hil --board netduinoplus2 --sample-s 1 --told-soc 0.98 --json - --recording " + part + more)); };
+  files::write_file(part, csv.substr(0, end));
+  const auto replayed = [&](const std::string& more) {
+    return of(run_tool("hil --board netduinoplus2 --sample-s 1 --told-soc 0.98 --json - --recording " + part + more));
+  };
   const Json j = replayed("");
   EXPECT_LT(j["driving_after_s"], 30);
   EXPECT_TRUE(j["faults"].empty()) << j["faults"].dump();

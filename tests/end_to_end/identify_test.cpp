@@ -25,17 +25,21 @@ class IdentifyTool : public ::testing::Test {
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return run.exit_code == 0 ? json::parse(content(path("r.json"))) : json();
   }
-  TemporaryFolder folder_;
+  images::TemporaryFolder folder_;
 };
 
 TEST_F(IdentifyTool, GivesWhatTheContractNames) {
   const json r = result("--recording " + shift + " --validate " + shift + " --validate-window 0.6:0.3");
-  for (const char* key : {"command", "model", "optimizer", "samples", "parameters", "estimation", "validation", "initial_state", "iterations", "evaluations", "converged", "reason", "wall_s", "warnings"}) {
+  for (const char* key : {"command", "model", "optimizer", "samples", "parameters", "estimation", "validation",
+                          "initial_state", "iterations", "evaluations", "converged", "reason", "wall_s", "warnings"}) {
     EXPECT_TRUE(r.contains(key)) << key;
   }
-  for (const char* key : {"name", "soc", "value", "std", "at_bound"}) EXPECT_TRUE(r["parameters"][0].contains(key)) << key;
-  for (const char* key : {"fit_percent", "rmse_v", "one_step_fit_percent", "output_variance_v2"}) EXPECT_TRUE(r["estimation"].contains(key)) << key;
-  for (const char* key : {"soc", "soc_std", "v_rc_v", "observable"}) EXPECT_TRUE(r["initial_state"].contains(key)) << key;
+  for (const char* key : {"name", "soc", "value", "std", "at_bound"})
+    EXPECT_TRUE(r["parameters"][0].contains(key)) << key;
+  for (const char* key : {"fit_percent", "rmse_v", "one_step_fit_percent", "output_variance_v2"})
+    EXPECT_TRUE(r["estimation"].contains(key)) << key;
+  for (const char* key : {"soc", "soc_std", "v_rc_v", "observable"})
+    EXPECT_TRUE(r["initial_state"].contains(key)) << key;
   EXPECT_EQ(r["command"], "identify");
   EXPECT_EQ(r["samples"], 28801);
   EXPECT_LT(r["estimation"]["rmse_v"], 0.0014);
@@ -52,11 +56,15 @@ TEST_F(IdentifyTool, TheSameInputGivesTheSameCellFile) {
 
 TEST_F(IdentifyTool, EveryModelAndEveryOptimiserRuns) {
   ASSERT_EQ(run_tool("experiment ocv_10min_rest --out " + path("p.csv")).exit_code, 0);
-  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 1 --noise-v 0.001 --out " + path("s.csv")).exit_code, 0);
+  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 1 --noise-v 0.001 --out " +
+                     path("s.csv"))
+                .exit_code,
+            0);
   for (const char* model : {"tf", "oe", "hw", "nlgr"}) {
     for (const char* optimizer : {"gn", "agn", "lm", "sd", "nls"}) {
-      const ToolRun run = run_tool("identify --recording " + path("s.csv") + " --initial-soc 1 --window 0.8:0.5 --nodes 0.65 --model " + model + " --optimizer " + optimizer + " --out " + path("c.toml") +
-                                   " --json " + path("r.json"));
+      const ToolRun run =
+          run_tool("identify --recording " + path("s.csv") + " --initial-soc 1 --window 0.8:0.5 --nodes 0.65 --model " +
+                   model + " --optimizer " + optimizer + " --out " + path("c.toml") + " --json " + path("r.json"));
       ASSERT_LE(run.exit_code, 1) << model << " " << optimizer << ": " << run.err;  // 1: no circuit
       const json r = json::parse(content(path("r.json")));
       EXPECT_EQ(r["model"], model);
@@ -95,21 +103,27 @@ TEST_F(IdentifyTool, AnInvertedCurrentIsWarnedOf) {
   std::ofstream out(path("inverted.csv"));
   for (std::string line; std::getline(lines, line);) {
     const std::size_t first = line.find(','), second = line.find(',', first + 1);
-    if (line.starts_with("#") || line.starts_with("time_s")) out << line << "\n";
-    else out << line.substr(0, first + 1) << -std::stod(line.substr(first + 1, second - first - 1)) << line.substr(second) << "\n";
+    if (line.starts_with("#") || line.starts_with("time_s"))
+      out << line << "\n";
+    else
+      out << line.substr(0, first + 1) << -std::stod(line.substr(first + 1, second - first - 1)) << line.substr(second)
+          << "\n";
   }
   out.close();
-  const ToolRun run = run_tool("identify --recording " + path("inverted.csv") + " --window 0.6:0.5 --out " + path("c.toml"));
+  const ToolRun run =
+      run_tool("identify --recording " + path("inverted.csv") + " --window 0.6:0.5 --out " + path("c.toml"));
   EXPECT_THAT(run.err, HasSubstr("the current's sign looks inverted"));
   EXPECT_THAT(run.err, HasSubstr("ended at its bound"));
 }
 
 TEST_F(IdentifyTool, ARealCellIsPredictedOnRecordingsItWasNotIdentifiedFrom) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
-  const std::string common = "--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") + " --start a123_26650 --window 0.95:0.10 --recording ";
+  const std::string common = "--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") +
+                             " --start a123_26650 --window 0.95:0.10 --recording ";
   const json from_udds = result(common + real("udds_P25_A002.csv") + " --validate " + real("dyn20_P25_A002.csv"));
   EXPECT_LE(from_udds["validation"]["rmse_v"], 0.008);
-  const json from_others = result(common + real("cccv2C_P25_A002.csv") + " " + real("dyn20_P25_A002.csv") + " --validate " + real("udds_P25_A002.csv"));
+  const json from_others = result(common + real("cccv2C_P25_A002.csv") + " " + real("dyn20_P25_A002.csv") +
+                                  " --validate " + real("udds_P25_A002.csv"));
   EXPECT_LE(from_others["validation"]["rmse_v"], 0.018);
   EXPECT_NEAR(from_udds["coulombic_efficiency"], 0.998, 0.003);
 }
@@ -138,18 +152,24 @@ TEST_F(IdentifyTool, TheBuiltInExtendedCellsAreWhatTheirCommandsMake) {
     return values_of(content(path("made.toml")));
   };
   const std::filesystem::path cells = BMS_SOURCE_DIR "/model/cells";
-  EXPECT_EQ(made("--ocv" + all(one, {"ocv_N05_chg", "ocv_N05_dis", "ocv_N15_chg", "ocv_N15_dis", "ocv_P05_chg", "ocv_P05_dis", "ocv_P15_chg", "ocv_P15_dis", "ocv_P25_chg", "ocv_P25_dis", "ocv_P35_chg",
-                                     "ocv_P35_dis", "ocv_P45_chg", "ocv_P45_dis"}) + " --recording" + all(one, {"pulse_P25_A002"})),
+  EXPECT_EQ(made("--ocv" +
+                 all(one, {"ocv_N05_chg", "ocv_N05_dis", "ocv_N15_chg", "ocv_N15_dis", "ocv_P05_chg", "ocv_P05_dis",
+                           "ocv_P15_chg", "ocv_P15_dis", "ocv_P25_chg", "ocv_P25_dis", "ocv_P35_chg", "ocv_P35_dis",
+                           "ocv_P45_chg", "ocv_P45_dis"}) +
+                 " --recording" + all(one, {"pulse_P25_A002"})),
             values_of(content(cells / "a123_26650_extended.toml")));
-  EXPECT_EQ(made("--ocv" + all(other, {"ocv_N05_chg", "ocv_N05_dis", "ocv_P05_chg", "ocv_P05_dis", "ocv_P25_chg", "ocv_P25_dis", "ocv_P45_chg", "ocv_P45_dis"}) + " --recording" +
-                 all(other, {"dyn30_N05", "dyn45_P05", "dyn50_P25"}) + " --window 0.8:0.5"),
+  EXPECT_EQ(made("--ocv" +
+                 all(other, {"ocv_N05_chg", "ocv_N05_dis", "ocv_P05_chg", "ocv_P05_dis", "ocv_P25_chg", "ocv_P25_dis",
+                             "ocv_P45_chg", "ocv_P45_dis"}) +
+                 " --recording" + all(other, {"dyn30_N05", "dyn45_P05", "dyn50_P25"}) + " --window 0.8:0.5"),
             values_of(content(cells / "a123_esctoolbox_extended.toml")));
 }
 
 TEST_F(IdentifyTool, SeveralTemperaturesGiveATableEach) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
-  const json r = result("--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") + " --start a123_26650 --window 0.9:0.2 --nodes 0.5 --recording " + real("dyn10_P05_A002.csv") + " " +
-                        real("dyn20_P25_A002.csv") + " " + real("dyn10_P45_A002.csv"));
+  const json r = result("--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") +
+                        " --start a123_26650 --window 0.9:0.2 --nodes 0.5 --recording " + real("dyn10_P05_A002.csv") +
+                        " " + real("dyn20_P25_A002.csv") + " " + real("dyn10_P45_A002.csv"));
   const std::string cell = content(path("cell.toml"));
   EXPECT_THAT(cell, HasSubstr("[[at_temperature]]\ntemperature_c = 5.0"));
   EXPECT_THAT(cell, HasSubstr("[[at_temperature]]\ntemperature_c = 45.0"));
@@ -176,7 +196,8 @@ TEST_F(IdentifyTool, StudyWritesTablesAndAPageAndFindsTheOrderOfThePaper) {
   for (const json& claim : r["claims"]) hold += claim["holds"].get<bool>() ? 1 : 0;
   EXPECT_GE(hold, 6);
   for (const json& claim : r["claims"]) {
-    if (claim["claim"] == "The grey box is the best model on validation data" || claim["claim"] == "The identified parameters are the plant's") {
+    if (claim["claim"] == "The grey box is the best model on validation data" ||
+        claim["claim"] == "The identified parameters are the plant's") {
       EXPECT_TRUE(claim["holds"]) << claim["evidence"];
     }
   }
@@ -186,7 +207,10 @@ TEST_F(IdentifyTool, StudyTakesAFolderOfRecordings) {
   for (const char* name : {"rest_5s", "high_1m_low_30s"}) {
     ASSERT_EQ(run_tool(std::string("experiment ") + name + " --out " + path("p.csv")).exit_code, 0);
     std::filesystem::create_directories(path("in"));
-    ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.4 --noise-v 0.001 --out " + path("in") + "/" + name + ".csv").exit_code, 0);
+    ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") +
+                       " --initial-soc 0.4 --noise-v 0.001 --out " + path("in") + "/" + name + ".csv")
+                  .exit_code,
+              0);
   }
   const ToolRun run = run_tool("study --recordings " + path("in") + " --out " + path("out"));
   EXPECT_EQ(run.exit_code, 0) << run.err;

@@ -30,7 +30,8 @@ class ServedPage : public ::testing::Test {
   ServedPage() {
     const std::string log = (folder_.path() / "bus.log").string();
     EXPECT_EQ(std::system((BMS_WRITE_TRAFFIC " dump 0 300 2>/dev/null > " + log).c_str()), 0);
-    tool_ = std::make_unique<ChildProcess>(std::vector<std::string>{BMS_TOOL, "monitor", "file:" + log, "--quiet", "--serve"}, folder_.path() / "out");
+    tool_ = std::make_unique<images::ChildProcess>(
+        std::vector<std::string>{BMS_TOOL, "monitor", "file:" + log, "--quiet", "--serve"}, folder_.path() / "out");
     std::smatch match;
     for (int tries = 0; tries < 500; ++tries) {
       const std::string out = content(folder_.path() / "out");
@@ -71,31 +72,37 @@ class ServedPage : public ::testing::Test {
     return text;
   }
 
-  TemporaryFolder folder_;
-  std::unique_ptr<ChildProcess> tool_;
+  images::TemporaryFolder folder_;
+  std::unique_ptr<images::ChildProcess> tool_;
   std::string url_;
   int port_ = 0;
 };
 
 TEST_F(ServedPage, IsOnlyForThisMachineByItsOwnNameAndOnlyToRead) {
   const auto get = [&](const std::string& method, const std::string& path, const std::string& host) {
-    return answer(method + " " + path + " HTTP/1.1\r\n" + (host.empty() ? "" : "Host: " + host + "\r\n") + "Connection: close\r\n\r\n");
+    return answer(method + " " + path + " HTTP/1.1\r\n" + (host.empty() ? "" : "Host: " + host + "\r\n") +
+                  "Connection: close\r\n\r\n");
   };
   const std::string own = own_host();
-  EXPECT_THAT(get("GET", "/", own), AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("default-src 'none'"), HasSubstr("frame-ancestors 'none'"), Not(HasSubstr("Access-Control-Allow-Origin"))));
+  EXPECT_THAT(get("GET", "/", own),
+              AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("default-src 'none'"), HasSubstr("frame-ancestors 'none'"),
+                    Not(HasSubstr("Access-Control-Allow-Origin"))));
   EXPECT_THAT(get("GET", "/", "localhost:" + std::to_string(port_)), StartsWith("HTTP/1.1 200"));
-  for (const std::string& host : {std::string("evil.example"), "evil.example:" + std::to_string(port_), std::string("127.0.0.1"), "127.0.0.1:" + std::to_string(port_ + 1), std::string()}) {
+  for (const std::string& host : {std::string("evil.example"), "evil.example:" + std::to_string(port_),
+                                  std::string("127.0.0.1"), "127.0.0.1:" + std::to_string(port_ + 1), std::string()}) {
     EXPECT_THAT(get("GET", "/", host), StartsWith("HTTP/1.1 403")) << host;
     EXPECT_THAT(get("GET", "/events", host), StartsWith("HTTP/1.1 403")) << host;
   }
-  for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS", "HEAD", "PATCH"}) EXPECT_THAT(get(method, "/", own), StartsWith("HTTP/1.1 405")) << method;
+  for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS", "HEAD", "PATCH"})
+    EXPECT_THAT(get(method, "/", own), StartsWith("HTTP/1.1 405")) << method;
   EXPECT_THAT(get("GET", "/../etc/passwd", own), StartsWith("HTTP/1.1 404"));
 }
 
 TEST_F(ServedPage, AStreamBeginsWithTheWholeHistoryAndTheSeventhIsToldToWait) {
   const std::string request = "GET /events HTTP/1.1\r\nHost: " + own_host() + "\r\n\r\n";
   const std::string first = answer(request, 60'000);
-  EXPECT_THAT(first, AllOf(HasSubstr("text/event-stream"), HasSubstr("data: {\"picture\":{ \"command\": \"monitor\""), HasSubstr("\"points\":[[0.000,")));
+  EXPECT_THAT(first, AllOf(HasSubstr("text/event-stream"), HasSubstr("data: {\"picture\":{ \"command\": \"monitor\""),
+                           HasSubstr("\"points\":[[0.000,")));
   std::vector<int> lines;
   for (int k = 0; k < 6; ++k) {
     lines.push_back(connect());
@@ -110,12 +117,14 @@ TEST_F(ServedPage, AStreamBeginsWithTheWholeHistoryAndTheSeventhIsToldToWait) {
 }
 
 TEST_F(ServedPage, APortThatIsTakenIsRefused) {
-  const ToolRun run = run_tool("monitor file:" + (folder_.path() / "bus.log").string() + " --quiet --duration 1 --serve " + std::to_string(port_));
+  const ToolRun run = run_tool("monitor file:" + (folder_.path() / "bus.log").string() +
+                               " --quiet --duration 1 --serve " + std::to_string(port_));
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, HasSubstr("is not to be had"));
 }
 
-/// A browser that is asked by its debugging protocol through pipes (--remote-debugging-pipe: JSON objects, each ended by a zero).
+/// A browser that is asked by its debugging protocol through pipes (--remote-debugging-pipe: JSON objects, each ended
+/// by a zero).
 class Browser {
  public:
   explicit Browser(const std::filesystem::path& profile) {
@@ -129,7 +138,8 @@ class Browser {
       for (int k = 0; k < 3; ++k) dup2(quiet, k);
       dup2(from, 3);
       dup2(to, 4);
-      execlp("chromium", "chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+      execlp("chromium", "chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+             "--disable-background-networking", "--disable-component-update", "--disable-sync",
              "--remote-debugging-pipe", "--window-size=1400,1100", folder.c_str(), "about:blank", nullptr);
       _exit(127);
     }
@@ -199,7 +209,7 @@ class Browser {
 };
 
 TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndAsksNobodyElse) {
-  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
+  if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
   Browser browser(folder_.path() / "profile");
   browser.ask("Page.navigate", {{"url", url_}});
   const auto soon = [&](const std::string& script) {
@@ -209,18 +219,25 @@ TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndAsksNobodyElse) {
     }
     return false;
   };
-  ASSERT_TRUE(soon("window.points && points.length > 500 && charts.soc.numRows() === points.length")) << browser.value_of("document.body.innerText");
+  ASSERT_TRUE(soon("window.points && points.length > 500 && charts.soc.numRows() === points.length"))
+      << browser.value_of("document.body.innerText");
   // the last sample, as tests/monitor/traffic.hpp makes it: 50 + 30 cos(29,999 / 2,700) %
   EXPECT_EQ(browser.value_of("document.getElementById('soc').textContent"), "53.4\u202f%");
   EXPECT_EQ(browser.value_of("document.getElementById('quality').textContent"), "carried by counting");
   EXPECT_NEAR(browser.value_of("points[0][1]").get<double>(), 80, 0.01);
-  EXPECT_NEAR(browser.value_of("charts.soc.getValue(charts.soc.numRows() - 1, 1)[1]").get<double>(), 52.906, 0.003) << "a point each half second: the last is of 299.5 s";
+  EXPECT_NEAR(browser.value_of("charts.soc.getValue(charts.soc.numRows() - 1, 1)[1]").get<double>(), 52.906, 0.003)
+      << "a point each half second: the last is of 299.5 s";
   EXPECT_GT(browser.value_of("charts.current.yAxisRange()[1] - charts.current.yAxisRange()[0]").get<double>(), 20);
   EXPECT_EQ(browser.value_of("document.querySelectorAll('#messages tr').length"), 9) << "a head and eight messages";
   EXPECT_EQ(browser.value_of("document.getElementById('figure-cells').hidden"), true) << "this bus tells no cells";
-  EXPECT_EQ(browser.value_of("document.body.innerText.includes('NaN') || document.body.innerText.includes('undefined')"), false);
+  EXPECT_EQ(
+      browser.value_of("document.body.innerText.includes('NaN') || document.body.innerText.includes('undefined')"),
+      false);
   for (const char* elsewhere : {"fetch('http://127.0.0.1:1/')", "fetch('https://example.org/')"}) {
-    EXPECT_EQ(browser.ask("Runtime.evaluate", {{"expression", std::string(elsewhere) + ".then(() => 'let through', e => 'refused')"}, {"awaitPromise", true}})["result"]["value"], "refused");
+    EXPECT_EQ(browser.ask("Runtime.evaluate",
+                          {{"expression", std::string(elsewhere) + ".then(() => 'let through', e => 'refused')"},
+                           {"awaitPromise", true}})["result"]["value"],
+              "refused");
   }
   EXPECT_TRUE(browser.errors().empty()) << browser.errors().front();
   EXPECT_THAT(browser.requests(), ::testing::UnorderedElementsAre(url_, url_ + "events"));

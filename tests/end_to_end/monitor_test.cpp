@@ -1,4 +1,5 @@
-// bms monitor from the outside: logs, a serial adapter (a pseudo-terminal), the terminal it draws on, hostile input, files it writes.
+// bms monitor from the outside: logs, a serial adapter (a pseudo-terminal), the terminal it draws on, hostile input,
+// files it writes.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,12 +26,12 @@
 namespace bms {
 namespace {
 
+using nlohmann::json;
 using ::testing::AllOf;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-using nlohmann::json;
 
 std::string dump_of(int samples) {
   monitor::Traffic traffic(1'000'000'000);
@@ -54,7 +55,7 @@ class Monitor : public ::testing::Test {
     return json::parse(run.out, nullptr, false);
   }
 
-  TemporaryFolder folder_;
+  images::TemporaryFolder folder_;
 };
 
 TEST_F(Monitor, TellsALogAsOneJsonObject) {
@@ -66,7 +67,8 @@ TEST_F(Monitor, TellsALogAsOneJsonObject) {
   EXPECT_EQ(p["pack"]["soc"], 0.79992);
   EXPECT_EQ(p["pack"]["soc_quality"], "carried by counting");
   EXPECT_EQ(p["pack"]["faults"], nullptr) << "no such message on this bus";
-  EXPECT_EQ(p["messages"]["PackState"]["signals"]["Soc"]["value"], 79.992) << "a number of the DBC file's step, not of a float";
+  EXPECT_EQ(p["messages"]["PackState"]["signals"]["Soc"]["value"], 79.992)
+      << "a number of the DBC file's step, not of a float";
   EXPECT_EQ(p["messages"]["PackState"]["signals"]["Soc"]["unit"], "%");
   EXPECT_EQ(p["messages"]["Status"]["signals"]["ResetCause"]["words"], "power on");
   EXPECT_FALSE(p["messages"].contains("SensorErrors")) << "never heard";
@@ -113,11 +115,18 @@ TEST_F(Monitor, CsvIsARowForEachStatusMessageThatReplayReads) {
 
 TEST_F(Monitor, ARecordGivesTheSamePictureByteForByte) {
   std::string text = dump_of(100);
-  text += "(1200.000000) can0 12345678#0102\n(1200.000001) can0 123#R4\n(1200.000002) can0 123##3112233445566778899001122\n(1200.000003) can0 20000040#0000000000000000\n(1200.000004) can0 182#00\n";
+  text +=
+      "(1200.000000) can0 12345678#0102\n(1200.000001) can0 123#R4\n(1200.000002) can0 "
+      "123##3112233445566778899001122\n(1200.000003) can0 20000040#0000000000000000\n(1200.000004) can0 182#00\n";
   const std::string file = log(text);
-  ASSERT_EQ(run_tool("monitor --quiet --record " + path("record.log") + " --json " + path("first.json") + " " + file).exit_code, 0);
-  std::string first = content(path("first.json")), second = run_tool("monitor file:" + path("record.log") + " --json -").out;
-  const auto without_source = [](std::string text_of) { return text_of.erase(text_of.find("\"source\""), text_of.find("\"frames\"") - text_of.find("\"source\"")); };
+  ASSERT_EQ(run_tool("monitor --quiet --record " + path("record.log") + " --json " + path("first.json") + " " + file)
+                .exit_code,
+            0);
+  std::string first = content(path("first.json")),
+              second = run_tool("monitor file:" + path("record.log") + " --json -").out;
+  const auto without_source = [](std::string text_of) {
+    return text_of.erase(text_of.find("\"source\""), text_of.find("\"frames\"") - text_of.find("\"source\""));
+  };
   EXPECT_EQ(without_source(first), without_source(second));
   EXPECT_GT(first.size(), 1'000U);
   const json p = json::parse(first);
@@ -128,7 +137,9 @@ TEST_F(Monitor, ARecordGivesTheSamePictureByteForByte) {
 }
 
 TEST_F(Monitor, RefusesInOneLineWhatItCannotUse) {
-  for (const char* arguments : {"nonesuch0", "file:/nonesuch", "file:" BMS_SOURCE_DIR "/README.md", "file:/", "slcan:/dev/null", "file:x --record -", "file:x --serve 70000", "file:x --duration 0", "file:x --csv ''"}) {
+  for (const char* arguments :
+       {"nonesuch0", "file:/nonesuch", "file:" BMS_SOURCE_DIR "/README.md", "file:/", "slcan:/dev/null",
+        "file:x --record -", "file:x --serve 70000", "file:x --duration 0", "file:x --csv ''"}) {
     const ToolRun run = run_tool(std::string("monitor ") + arguments);
     EXPECT_EQ(run.exit_code, 2) << arguments;
     EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
@@ -154,9 +165,15 @@ TEST_F(Monitor, AHostileLogIsCountedAndWhatIsGoodInItIsRead) {
         for (char& c : noise) c = c == '\n' ? '?' : c;
         noise += '?';
         break;
-      case 1: noise = line.substr(0, line.size() / 2); break;
-      case 2: noise = std::string(random() % 100'000 + 600, '#'); break;
-      default: noise = "(1.000000) can0 800#00"; break;
+      case 1:
+        noise = line.substr(0, line.size() / 2);
+        break;
+      case 2:
+        noise = std::string(random() % 100'000 + 600, '#');
+        break;
+      default:
+        noise = "(1.000000) can0 800#00";
+        break;
     }
     ++bad;
     text += line + "\n" + noise + "\n";
@@ -187,12 +204,15 @@ class PseudoTerminal {
   void write(const std::string& text) const {
     for (std::size_t at = 0; at < text.size();) {
       const ssize_t n = ::write(master_, text.data() + at, text.size() - at);
-      if (n > 0) at += static_cast<std::size_t>(n);
-      else std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (n > 0)
+        at += static_cast<std::size_t>(n);
+      else
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
   /// What is on the line until `what` is among it, five seconds at most.
-  std::string read_until(const std::string& what, std::function<void()> meanwhile = [] {}) const {
+  std::string read_until(
+      const std::string& what, std::function<void()> meanwhile = [] {}) const {
     std::string text;
     for (int tries = 0; tries < 500 && text.find(what) == std::string::npos; ++tries) {
       meanwhile();
@@ -338,10 +358,11 @@ TEST_F(LiveScreen, GreysWhatIsStale) {
 TEST_F(LiveScreen, AnAdapterThatIsUnpluggedEndsItWithALine) {
   // the adapter's side is this test's: closed, the tool reads an error
   auto gone = std::make_unique<PseudoTerminal>();
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string();
-  const ChildProcess* child = nullptr;
-  auto tool = std::make_unique<ChildProcess>(std::vector<std::string>{BMS_TOOL, "monitor", std::string("slcan:") + gone->name()}, out);
+  const images::ChildProcess* child = nullptr;
+  auto tool = std::make_unique<images::ChildProcess>(
+      std::vector<std::string>{BMS_TOOL, "monitor", std::string("slcan:") + gone->name()}, out);
   child = tool.get();
   EXPECT_NE(child, nullptr);
   gone->read_until("O\r");
@@ -361,7 +382,7 @@ long memory_kb(pid_t pid) {
 
 TEST(MonitorLoad, TenThousandFramesASecondAreTakenWithoutLossInConstantMemory) {
   // a shorter run of tests/vcan/load.sh: every frame of 4 s at 10,000 a second, by a pipe
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const std::string json_file = (folder.path() / "p.json").string(), count_file = (folder.path() / "count").string();
   int line[2];
   ASSERT_EQ(pipe(line), 0);

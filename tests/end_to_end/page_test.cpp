@@ -12,14 +12,17 @@ using ::testing::HasSubstr;
 /// The page's document after its scripts ran, as the browser serialises it. Script errors are appended to it.
 std::string document_of(const std::filesystem::path& page, const std::filesystem::path& folder) {
   std::string html = content(page);
-  const std::string listener = "<script>window.addEventListener('error', e => { const p = document.createElement('p'); p.textContent = 'SCRIPT ERROR ' + e.message; "
-                               "document.documentElement.appendChild(p); });</script>";
+  const std::string listener =
+      "<script>window.addEventListener('error', e => { const p = document.createElement('p'); p.textContent = 'SCRIPT "
+      "ERROR ' + e.message; "
+      "document.documentElement.appendChild(p); });</script>";
   html.insert(html.find("<style>"), listener);
   const auto watched = folder / "watched.html", out = folder / "dom";
   std::ofstream(watched) << html;
-  const std::string command = "chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-                              "--disable-component-update --disable-sync --window-size=1400,1100 --virtual-time-budget=5000 --user-data-dir=" +
-                              (folder / "profile").string() + " --dump-dom file://" + watched.string() + " > " + out.string() + " 2>/dev/null";
+  const std::string command =
+      "chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+      "--disable-component-update --disable-sync --window-size=1400,1100 --virtual-time-budget=5000 --user-data-dir=" +
+      (folder / "profile").string() + " --dump-dom file://" + watched.string() + " > " + out.string() + " 2>/dev/null";
   EXPECT_EQ(std::system(command.c_str()), 0);
   return content(out);
 }
@@ -31,8 +34,8 @@ std::size_t count(const std::string& text, const std::string& what) {
 }
 
 TEST(ReportPage, DrawsFiveChartsAndTheFiguresWithoutAnError) {
-  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const TemporaryFolder folder;
+  if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const images::TemporaryFolder folder;
   const auto page = folder.path() / "report.html";
   ASSERT_EQ(run_tool("replay " BMS_SOURCE_DIR "/recordings/forklift_shift.csv --report " + page.string()).exit_code, 0);
   const std::string dom = document_of(page, folder.path());
@@ -43,8 +46,8 @@ TEST(ReportPage, DrawsFiveChartsAndTheFiguresWithoutAnError) {
 }
 
 TEST(ReportPage, WithoutAReferenceThereIsNoErrorChart) {
-  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const TemporaryFolder folder;
+  if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const images::TemporaryFolder folder;
   const auto page = folder.path() / "report.html", recording = folder.path() / "r.csv";
   std::ofstream csv(recording);
   csv << "time_s,current_a,voltage_v\n";
@@ -58,8 +61,8 @@ TEST(ReportPage, WithoutAReferenceThereIsNoErrorChart) {
 }
 
 TEST(StudyPage, DrawsTablesAndChartsWithoutAnError) {
-  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const TemporaryFolder folder;
+  if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const images::TemporaryFolder folder;
   ASSERT_EQ(run_tool("study --out " + (folder.path() / "study").string()).exit_code, 0);
   const std::string dom = document_of(folder.path() / "study/study.html", folder.path());
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
@@ -69,21 +72,28 @@ TEST(StudyPage, DrawsTablesAndChartsWithoutAnError) {
 }
 
 /// The shift's current through a cell with a hysteresis, diagnosed; with a later recording to prove it on.
-std::string diagnosis_dom(const std::string& with, const std::string& holdout, const TemporaryFolder& folder) {
+std::string diagnosis_dom(const std::string& with, const std::string& holdout, const images::TemporaryFolder& folder) {
   const std::string recording = (folder.path() / "r.csv").string(), page = (folder.path() / "report.html").string();
-  EXPECT_EQ(run_tool("simulate --cell table9 --recording " BMS_SOURCE_DIR "/recordings/forklift_shift.csv --initial-soc 0.98 --noise-v 0.001 " + with + " --out " + recording).exit_code, 0);
-  EXPECT_EQ(run_tool("diagnose --cell table9 --initial-soc 0.98 --recording " + recording + (holdout.empty() ? "" : " --holdout " + recording) + " --report " + page).exit_code, 0);
+  EXPECT_EQ(run_tool("simulate --cell table9 --recording " BMS_SOURCE_DIR
+                     "/recordings/forklift_shift.csv --initial-soc 0.98 --noise-v 0.001 " +
+                     with + " --out " + recording)
+                .exit_code,
+            0);
+  EXPECT_EQ(run_tool("diagnose --cell table9 --initial-soc 0.98 --recording " + recording +
+                     (holdout.empty() ? "" : " --holdout " + recording) + " --report " + page)
+                .exit_code,
+            0);
   EXPECT_EQ(count(content(page), " src=") + count(content(page), "<link"), 0U) << "nothing is fetched";
   return document_of(page, folder.path());
 }
 
 TEST(DiagnosisPage, ShowsWhatWhereHowMuchBeforeAndAfterWhyAndWhatRemains) {
-  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const TemporaryFolder folder;
+  if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const images::TemporaryFolder folder;
   const std::string dom = diagnosis_dom("--with ocv_hysteresis:half_gap_v=0.015,decay=40", "itself", folder);
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
-  EXPECT_GE(count(dom, "<canvas"), 8U);      // voltage and error of both recordings, two a chart
-  EXPECT_GE(count(dom, "<svg"), 8U);         // strip and its scale, how much, before and after, why, remains, regimes, limits
+  EXPECT_GE(count(dom, "<canvas"), 8U);  // voltage and error of both recordings, two a chart
+  EXPECT_GE(count(dom, "<svg"), 8U);  // strip and its scale, how much, before and after, why, remains, regimes, limits
   EXPECT_THAT(dom, HasSubstr("charged or discharged last"));
   EXPECT_THAT(dom, HasSubstr("of the mismatch explained"));
   EXPECT_THAT(dom, HasSubstr("not used: r.csv"));
@@ -92,8 +102,8 @@ TEST(DiagnosisPage, ShowsWhatWhereHowMuchBeforeAndAfterWhyAndWhatRemains) {
 }
 
 TEST(DiagnosisPage, WithoutAMismatchItShowsWhatWouldHaveShown) {
-  if (!in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const TemporaryFolder folder;
+  if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
+  const images::TemporaryFolder folder;
   const std::string dom = diagnosis_dom("", "", folder);
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
   EXPECT_THAT(dom, HasSubstr("NO MISMATCH"));

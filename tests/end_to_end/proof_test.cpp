@@ -1,5 +1,5 @@
-// bms proof from the outside: what it refuses, and what it writes of recordings that are small and simulated. Whether its claims hold on
-// real recordings is for a person to look at: ./bms proof.
+// bms proof from the outside: what it refuses, and what it writes of recordings that are small and simulated. Whether
+// its claims hold on real recordings is for a person to look at: ./bms proof.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,9 +24,12 @@ class ProofTool : public ::testing::Test {
   std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
 
   /// A current through the built-in cell, with soc_ref and a temperature: what a folder of recordings has.
-  void simulated(const std::string& name, const std::string& profile, const std::string& initial_soc, double temperature_c, const std::string& with = "") const {
+  void simulated(const std::string& name, const std::string& profile, const std::string& initial_soc,
+                 double temperature_c, const std::string& with = "") const {
     std::ofstream(path("profile.csv")) << profile;
-    const ToolRun run = run_tool("simulate --quiet --cell a123_26650 --profile " + path("profile.csv") + " --initial-soc " + initial_soc + " --noise-v 0.0005 " + with + " --out " + path("simulated.csv"));
+    const ToolRun run =
+        run_tool("simulate --quiet --cell a123_26650 --profile " + path("profile.csv") + " --initial-soc " +
+                 initial_soc + " --noise-v 0.0005 " + with + " --out " + path("simulated.csv"));
     ASSERT_EQ(run.exit_code, 0) << run.err;
     std::istringstream rows(content(path("simulated.csv")));
     std::ofstream out(path("data/" + name + ".csv"));
@@ -37,13 +40,20 @@ class ProofTool : public ::testing::Test {
   }
   static std::string slow(double current_a) {
     std::string profile = "time_s,current_a\n";
-    for (int k = 0; k <= 400; ++k) profile += std::to_string(300 * k) + "," + std::to_string(k < 5 || k > 372 ? 0 : current_a) + "\n";
+    for (int k = 0; k <= 400; ++k)
+      profile += std::to_string(300 * k) + "," + std::to_string(k < 5 || k > 372 ? 0 : current_a) + "\n";
     return profile;
   }
   /// Pulses, and a rest at the end.
   static std::string drive(double scale) {
     std::string profile = "time_s,current_a\n";
-    for (int k = 0; k < 500; ++k) profile += std::to_string(k) + "," + std::to_string(k < 30 || k > 420 ? 0 : scale * (k % 60 < 30 ? -2.5 : k % 60 < 45 ? 1.5 : 0.005)) + "\n";
+    for (int k = 0; k < 500; ++k)
+      profile += std::to_string(k) + "," +
+                 std::to_string(k < 30 || k > 420 ? 0
+                                                  : scale * (k % 60 < 30   ? -2.5
+                                                             : k % 60 < 45 ? 1.5
+                                                                           : 0.005)) +
+                 "\n";
     return profile;
   }
   void small_folder() const {
@@ -53,12 +63,15 @@ class ProofTool : public ::testing::Test {
       simulated(folder + "ocv_P25_dis", slow(-0.0838), "1", 25);
       simulated(folder + "ocv_P25_chg", slow(0.0838), "0", 25);
     }
-    for (const std::string name : {"a123_esctoolbox/dyn50_P25", "a123_esctoolbox/dyn45_P05", "a123_26650/dyn20_P25_A002", "a123_26650/udds_P25_A002", "a123_26650/pulse_P25_A002", "a123_26650/dyn10_N15_A002",
-                                   "a123_26650/dyn10_N05_A002", "a123_26650/dyn10_P05_A002", "a123_26650/dyn10_P15_A002", "a123_26650/dyn10_P45_A002", "a123_26650/cccv1C_P25_A002", "a123_26650/fsae_P25_A004"}) {
+    for (const std::string name :
+         {"a123_esctoolbox/dyn50_P25", "a123_esctoolbox/dyn45_P05", "a123_26650/dyn20_P25_A002",
+          "a123_26650/udds_P25_A002", "a123_26650/pulse_P25_A002", "a123_26650/dyn10_N15_A002",
+          "a123_26650/dyn10_N05_A002", "a123_26650/dyn10_P05_A002", "a123_26650/dyn10_P15_A002",
+          "a123_26650/dyn10_P45_A002", "a123_26650/cccv1C_P25_A002", "a123_26650/fsae_P25_A004"}) {
       simulated(name, drive(name.find("udds") != std::string::npos ? 6 : 1), "0.7", 25);
     }
   }
-  TemporaryFolder folder_;
+  images::TemporaryFolder folder_;
 };
 
 TEST_F(ProofTool, WithoutTheRecordingsThereIsOneClearLine) {
@@ -78,19 +91,24 @@ TEST_F(ProofTool, WithoutTheRecordingsThereIsOneClearLine) {
 
 TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
   small_folder();
-  const ToolRun run = run_tool("proof --data " + path("data") + " --json " + path("r.json") + " --report " + path("r.html"));
+  const ToolRun run =
+      run_tool("proof --data " + path("data") + " --json " + path("r.json") + " --report " + path("r.html"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json r = json::parse(content(path("r.json")));
   EXPECT_EQ(r["command"], "proof");
   std::size_t claims = 0, holding = 0;
   std::set<std::string> ids;
   const std::string page = content(path("r.html"));
-  for (const char* name : {"hysteresis", "hysteresis_b", "temperature", "relaxation", "balance", "balance_b", "faults", "no_mismatch", "holdouts"}) {
-    const auto at = std::find_if(r["experiments"].begin(), r["experiments"].end(), [&](const json& e) { return e["id"] == name; });
+  for (const char* name : {"hysteresis", "hysteresis_b", "temperature", "relaxation", "balance", "balance_b", "faults",
+                           "no_mismatch", "holdouts"}) {
+    const auto at =
+        std::find_if(r["experiments"].begin(), r["experiments"].end(), [&](const json& e) { return e["id"] == name; });
     ASSERT_NE(at, r["experiments"].end()) << name;
     EXPECT_FALSE((*at)["claims"].empty()) << name;
     for (const json& c : (*at)["claims"]) {
-      for (const char* key : {"id", "claim", "said", "measured", "tolerance", "number", "errors", "within_uncertainty", "holds", "verdict"}) EXPECT_TRUE(c.contains(key)) << c << key;
+      for (const char* key : {"id", "claim", "said", "measured", "tolerance", "number", "errors", "within_uncertainty",
+                              "holds", "verdict"})
+        EXPECT_TRUE(c.contains(key)) << c << key;
       EXPECT_TRUE(ids.insert(c["id"]).second) << c["id"] << " twice";
       EXPECT_THAT(page, HasSubstr(c["claim"].get<std::string>()));
       EXPECT_THAT(run.out, HasSubstr(c["claim"].get<std::string>()));
@@ -109,7 +127,9 @@ TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
   EXPECT_FALSE(r["diagnoses"].empty());
   // whichever experiment came first to a diagnosis that both need
   ASSERT_EQ(run_tool("proof --quiet --data " + path("data") + " --json " + path("again.json")).exit_code, 0);
-  const auto steady = [](const std::string& text) { return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), ""); };
+  const auto steady = [](const std::string& text) {
+    return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), "");
+  };
   EXPECT_EQ(steady(content(path("again.json"))), steady(content(path("r.json"))));
 }
 

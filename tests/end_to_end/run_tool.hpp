@@ -9,7 +9,7 @@
 #include <iterator>
 #include <string>
 
-#include "host_sim/child_process.hpp"
+#include "images/child_process.hpp"
 
 namespace bms {
 
@@ -25,7 +25,7 @@ inline std::string content(const std::filesystem::path& path) {
 
 /// arguments: as typed in a shell.
 inline ToolRun run_tool(const std::string& arguments) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const std::string out = (folder.path() / "stdout").string(), err = (folder.path() / "stderr").string();
   const int status = std::system(("\"" BMS_TOOL "\" " + arguments + " >" + out + " 2>" + err).c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, content(out), content(err)};

@@ -1,11 +1,11 @@
-// The estimator on real recordings of which no drive went into its cell files, or only a window: what it must not fall behind, and the
-// same bits on the emulated board.
+// The estimator on real recordings of which no drive went into its cell files, or only a window: what it must not fall
+// behind, and the same bits on the emulated board.
 #include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "host_sim/emulator.hpp"
+#include "images/emulator.hpp"
 #include "tests/figures/soc_trials.hpp"
 
 namespace bms {
@@ -13,7 +13,9 @@ namespace {
 
 const std::filesystem::path data = BMS_DATA_DIR;
 
-bool there() { return std::filesystem::exists(data / "a123_26650") && std::filesystem::exists(data / "a123_esctoolbox"); }
+bool there() {
+  return std::filesystem::exists(data / "a123_26650") && std::filesystem::exists(data / "a123_esctoolbox");
+}
 
 TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
   if (!there()) GTEST_SKIP() << "the real recordings are not there: " << data;
@@ -21,11 +23,11 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
   std::size_t trials = 0;
   std::vector<double> sigmas;
   each_soc_trial(data, [&](const SocTrial& t) {
-    ReplayResult r;
+    host_sim::ReplayResult r;
     r.cell = t.cell;
     r.recording = t.recording;
-    r.track = run_on_host(t.cell, samples(t.recording), starting_point(t.belief), r.scalar);
-    evaluate(r);
+    r.track = host_sim::run_on_host(t.cell, files::samples(t.recording), host_sim::starting_point(t.belief), r.scalar);
+    host_sim::evaluate(r);
     SCOPED_TRACE(t.name + ", " + t.trouble);
     ++trials;
     const auto rows = static_cast<double>(r.track.rows.size());
@@ -41,16 +43,21 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
     } else if (t.trouble.starts_with("voltage")) {
       EXPECT_LT(*r.soc.rmse, 0.02);
     } else {
-      const double most = !balanced ? (t.name.starts_with("dyn") ? 0.02 : 0.01) : t.name == "dyn50_P25" ? 0.010 : t.name == "dyn45_P05" ? 0.015 : 0.020;
+      const double most = !balanced               ? (t.name.starts_with("dyn") ? 0.02 : 0.01)
+                          : t.name == "dyn50_P25" ? 0.010
+                          : t.name == "dyn45_P05" ? 0.015
+                                                  : 0.020;
       const bool wrong = t.trouble.starts_with("started 30");
-      EXPECT_LT(wrong && balanced ? *r.soc.rmse_after_30min : *r.soc.rmse, wrong ? most + (most > 0.01 ? 0.005 : 0.002) : most);
+      EXPECT_LT(wrong && balanced ? *r.soc.rmse_after_30min : *r.soc.rmse,
+                wrong ? most + (most > 0.01 ? 0.005 : 0.002) : most);
       if (!t.name.starts_with("dyn")) {
         EXPECT_LT(*r.soc.max_error_after_30min, 0.017);
       }
     }
-    for (const EstimateRow& e : r.track.rows) sigmas.push_back(e.soc_sigma);
+    for (const host_sim::EstimateRow& e : r.track.rows) sigmas.push_back(e.soc_sigma);
     if (t.trouble == "started right" && t.name.ends_with("_A002") && t.name.starts_with("dyn")) {
-      EXPECT_NEAR(*r.soc.current_offset_a, 0.008, 2 * *r.soc.current_offset_sigma_a) << "7 to 9 mA are read while nothing flows";
+      EXPECT_NEAR(*r.soc.current_offset_a, 0.008, 2 * *r.soc.current_offset_sigma_a)
+          << "7 to 9 mA are read while nothing flows";
     }
   });
   EXPECT_EQ(trials, 90U);
@@ -62,11 +69,12 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
 
 TEST(SocTrials, AreBitEqualOnTheBoard) {
   if (!there()) GTEST_SKIP() << "the real recordings are not there: " << data;
-  const EmulatedBoard& board = emulated_boards().front();
+  const images::EmulatedBoard& board = images::emulated_boards().front();
   each_soc_trial(data, [&](const SocTrial& t) {
-    const auto all = samples(t.recording);
-    const auto start = starting_point(t.belief);
-    const auto difference = first_difference(run_on_host(t.cell, all, start, board.scalar), run_on_board(board, t.cell, all, start), board.scalar);
+    const auto all = files::samples(t.recording);
+    const auto start = host_sim::starting_point(t.belief);
+    const auto difference = host_sim::first_difference(host_sim::run_on_host(t.cell, all, start, board.scalar),
+                                                       images::run_on_board(board, t.cell, all, start), board.scalar);
     EXPECT_FALSE(difference) << t.name << ", " << t.trouble << ": " << (difference ? difference->field : "");
   });
 }

@@ -22,11 +22,12 @@ class Tool : public ::testing::Test {
     return path(name);
   }
   std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder_.path()), std::filesystem::directory_iterator{}));
+    return static_cast<std::size_t>(
+        std::distance(std::filesystem::directory_iterator(folder_.path()), std::filesystem::directory_iterator{}));
   }
 
  private:
-  TemporaryFolder folder_;
+  images::TemporaryFolder folder_;
 };
 
 /// Without what the contract lets differ.
@@ -70,7 +71,8 @@ TEST_F(Tool, BadUsageIsOneLineAndExitCode2) {
 
 TEST_F(Tool, ABadRecordingIsRefusedInOneLineAndLeavesNothingBehind) {
   const std::string bad = write("bad.csv", "time_s,current_a,voltage_v\n0,0,3.3\n1,x,3.3\n");
-  const ToolRun run = run_tool("replay " + bad + " --json " + path("r.json") + " --trace " + path("t.csv") + " --report " + path("p.html"));
+  const ToolRun run = run_tool("replay " + bad + " --json " + path("r.json") + " --trace " + path("t.csv") +
+                               " --report " + path("p.html"));
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_EQ(run.err, bad + ":3: 'x' in column 'current_a' is not a number, expected a number\n");
   EXPECT_EQ(files(), 1U) << "only the recording itself";
@@ -119,7 +121,9 @@ TEST_F(Tool, WarningsAreOnStandardErrorAndInTheJson) {
 
 TEST_F(Tool, AProfileSimulatedAndReplayedComesBack) {
   ASSERT_EQ(run_tool("experiment forklift_shift --out " + path("p.csv")).exit_code, 0);
-  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.95 --out " + path("s.csv")).exit_code, 0);
+  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.95 --out " + path("s.csv"))
+                .exit_code,
+            0);
   EXPECT_TRUE(content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc\n"));
   const ToolRun run = run_tool("replay " + path("s.csv") + " --initial-soc 0.95 --json -");
   ASSERT_EQ(run.exit_code, 0) << run.err;
@@ -129,27 +133,36 @@ TEST_F(Tool, AProfileSimulatedAndReplayedComesBack) {
   EXPECT_LT(std::stod(found[1]), 2e-6);
 }
 
-/// Written as a cell file, or on the command line: the same voltage. Replayed with the same cell, there is nothing to correct.
+/// Written as a cell file, or on the command line: the same voltage. Replayed with the same cell, there is nothing to
+/// correct.
 TEST_F(Tool, AMechanismFromACellFileOrFromTheCommandLineIsSimulatedAndReplayed) {
-  const std::string cell = write("e.toml", content(BMS_SOURCE_DIR "/model/cells/table9.toml") +
-      "\n[mechanism.slow_polarisation]\nresistance_ohm = 0.004\ntime_constant_s = 900\n[mechanism.temperature_resistance]\nr0_activation_j_per_mol = 20000\n"
-      "[instrument.current_offset]\noffset_a = 0.02\n[instrument.voltage_gain]\ngain_error = 0.002\n");
+  const std::string cell = write(
+      "e.toml", content(BMS_SOURCE_DIR "/model/cells/table9.toml") +
+                    "\n[mechanism.slow_polarisation]\nresistance_ohm = 0.004\ntime_constant_s = "
+                    "900\n[mechanism.temperature_resistance]\nr0_activation_j_per_mol = 20000\n"
+                    "[instrument.current_offset]\noffset_a = 0.02\n[instrument.voltage_gain]\ngain_error = 0.002\n");
   const std::string input = " --recording " + shift + " --initial-soc 0.98 --quiet --out ";
   ASSERT_EQ(run_tool("simulate --cell " + cell + input + path("a.csv")).exit_code, 0);
-  const ToolRun run = run_tool("simulate --cell table9 --with slow_polarisation:resistance_ohm=0.004,time_constant_s=900 --with current_offset:offset_a=0.02"
-                               " --with temperature_resistance:r0_activation_j_per_mol=2e4 --with voltage_gain:gain_error=0.002" + input + path("b.csv"));
+  const ToolRun run = run_tool(
+      "simulate --cell table9 --with slow_polarisation:resistance_ohm=0.004,time_constant_s=900 --with "
+      "current_offset:offset_a=0.02"
+      " --with temperature_resistance:r0_activation_j_per_mol=2e4 --with voltage_gain:gain_error=0.002" +
+      input + path("b.csv"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(content(path("a.csv")), content(path("b.csv")));
   run_tool("simulate --cell table9" + input + path("plain.csv"));
   EXPECT_NE(content(path("a.csv")), content(path("plain.csv")));
-  const ToolRun replay = run_tool("replay " + path("a.csv") + " --cell " + cell + " --initial-soc 0.98 --scalar double --json - --trace " + path("t.csv"));
+  const ToolRun replay = run_tool("replay " + path("a.csv") + " --cell " + cell +
+                                  " --initial-soc 0.98 --scalar double --json - --trace " + path("t.csv"));
   ASSERT_EQ(replay.exit_code, 0) << replay.err;
   std::smatch found;
   ASSERT_TRUE(std::regex_search(replay.out, found, std::regex("\"prediction_rmse_v\": ([-0-9.e]+)")));
   EXPECT_LT(std::stod(found[1]), 1e-5);
   ASSERT_TRUE(std::regex_search(replay.out, found, std::regex("\"open_loop_rmse_v\": ([-0-9.e]+)")));
   EXPECT_LT(std::stod(found[1]), 1e-8);
-  EXPECT_TRUE(content(path("t.csv")).starts_with("time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,slow_polarisation_1_v,slow_polarisation_2_v,flags\n"));
+  EXPECT_TRUE(content(path("t.csv"))
+                  .starts_with("time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,slow_polarisation_1_"
+                               "v,slow_polarisation_2_v,flags\n"));
 }
 
 TEST_F(Tool, AShiftOfTheStartIsAddedToWhatIsBelieved) {
@@ -163,12 +176,14 @@ TEST_F(Tool, AMechanismThatCannotBeIsRefusedInOneLineThatSaysWhatCan) {
   const std::pair<const char*, const char*> wrong[] = {
       {"hysteresis:half_gap_v=0.01", "no such mechanism 'hysteresis', expected one of: channel_skew, .*voltage_gain"},
       {"ocv_hysteresis", "'ocv_hysteresis' without parameters, expected ID:param=value,\\.\\.\\."},
-      {"ocv_hysteresis:gap=0.01", "no such parameter 'gap' of ocv_hysteresis, expected one of: half_gap_v, decay, ocv_at, initial, measured"},
+      {"ocv_hysteresis:gap=0.01",
+       "no such parameter 'gap' of ocv_hysteresis, expected one of: half_gap_v, decay, ocv_at, initial, measured"},
       {"ocv_hysteresis:half_gap_v=", "no value of 'half_gap_v', expected half_gap_v=NUMBER"},
       {"ocv_hysteresis:half_gap_v=0.01,decay=x", "no value of 'decay', expected decay=NUMBER"},
       {"ocv_hysteresis:half_gap_v=1", "'half_gap_v' is out of range, expected 0 to 0.07 V"}};
   for (const auto& [with, what] : wrong) {
-    const ToolRun run = run_tool("simulate --cell table9 --recording " + shift + " --out " + path("x.csv") + " --with " + with);
+    const ToolRun run =
+        run_tool("simulate --cell table9 --recording " + shift + " --out " + path("x.csv") + " --with " + with);
     EXPECT_EQ(run.exit_code, 2) << with;
     EXPECT_THAT(run.err, MatchesRegex(std::string("--with:1: ") + what + "\n")) << with;
   }
@@ -176,10 +191,13 @@ TEST_F(Tool, AMechanismThatCannotBeIsRefusedInOneLineThatSaysWhatCan) {
 }
 
 TEST_F(Tool, AReplaySaysWhichMechanismsTheEstimatorDoesWithout) {
-  const std::string cell = write("e.toml", content(BMS_SOURCE_DIR "/model/cells/table9.toml") + "\n[instrument.channel_skew]\ndelay_s = 1\n[mechanism.charge_transfer]\nr0_share = 0.2\n");
+  const std::string cell =
+      write("e.toml", content(BMS_SOURCE_DIR "/model/cells/table9.toml") +
+                          "\n[instrument.channel_skew]\ndelay_s = 1\n[mechanism.charge_transfer]\nr0_share = 0.2\n");
   ToolRun run = run_tool("replay " + shift + " --cell " + cell + " --quiet");
   EXPECT_EQ(run.exit_code, 0);
-  EXPECT_THAT(run.err, MatchesRegex("warning: [^\n]*channel_skew: in the cell file, but the estimator does without[^\n]*\n"));
+  EXPECT_THAT(run.err,
+              MatchesRegex("warning: [^\n]*channel_skew: in the cell file, but the estimator does without[^\n]*\n"));
   run = run_tool("replay " + shift + " --cell " + cell + " --quiet --scalar fixed");
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, HasSubstr("'mechanism.charge_transfer' does not compute in fixed point"));
@@ -187,7 +205,8 @@ TEST_F(Tool, AReplaySaysWhichMechanismsTheEstimatorDoesWithout) {
 
 TEST_F(Tool, SimulatedNoiseHasTheSizeAskedForAndFollowsTheSeed) {
   ASSERT_EQ(run_tool("experiment forklift_shift --out " + path("p.csv")).exit_code, 0);
-  const std::string simulate = "simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.95 --noise-v 0.002 --out ";
+  const std::string simulate =
+      "simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.95 --noise-v 0.002 --out ";
   run_tool(simulate + path("a.csv"));
   run_tool(simulate + path("b.csv"));
   run_tool(simulate + path("c.csv") + " --seed 2");

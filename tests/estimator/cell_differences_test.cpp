@@ -6,22 +6,24 @@
 #include <gtest/gtest.h>
 
 #include "estimator/soc_estimator.hpp"
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 constexpr std::size_t cells = 16;
 
-/// Sixteen cells of the plant in series, each with its own soc, capacity and resistance, and the estimators beside them.
+/// Sixteen cells of the plant in series, each with its own soc, capacity and resistance, and the estimators beside
+/// them.
 template <class S>
 struct Pack {
   explicit Pack(double weak_by = 0) {
     for (std::size_t k = 0; k < cells; ++k) {
       const double off = k == 5 ? -weak_by : 0.01 * random.normal();
-      truth.emplace_back(truth::CellParameters{.capacity_ah = 6 * (1 + 0.005 * random.normal())}, truth::CellState{.soc = 0.88 + off, .v_rc_v = 0, .temperature_c = 25});
+      truth.emplace_back(plant::CellParameters{.capacity_ah = 6 * (1 + 0.005 * random.normal())},
+                         plant::CellState{.soc = 0.88 + off, .v_rc_v = 0, .temperature_c = 25});
       more_ohm.push_back(0.0013 * random.normal());
     }
   }
@@ -33,29 +35,34 @@ struct Pack {
       truth[k].run(current_a, 25, 1);
       const double v = truth[k].voltage_v() + more_ohm[k] * current_a + 0.001 * random.normal();
       sum += v;
-      seen.voltage_v[k] = model::Voltage<S>(v);
+      seen.voltage_v[k] = arithmetic::Voltage<S>(v);
       seen.usable[k] = k != silent;
     }
     time_us += 1'000'000;
     const double read_a = current_a + 0.01 * random.normal();
-    const auto e = mean.step(tables, {time_us, static_cast<std::int32_t>(1e6 * read_a), static_cast<std::int32_t>(1e6 * sum / cells), 2'500});
-    differences.step(tables, e.soc, e.soc_sigma, model::Current<S>(read_a), model::Soc<S>(read_a / 21'600), model::Count<S>(60), seen);
+    const auto e = mean.step(tables, {time_us, static_cast<std::int32_t>(1e6 * read_a),
+                                      static_cast<std::int32_t>(1e6 * sum / cells), 2'500});
+    differences.step(tables, e.soc, e.soc_sigma, arithmetic::Current<S>(read_a), arithmetic::Soc<S>(read_a / 21'600),
+                     arithmetic::Count<S>(60), seen);
   }
   double mean_soc() const {
     double sum = 0;
     for (const auto& c : truth) sum += c.soc();
     return sum / cells;
   }
-  double error(std::size_t k) const { return model::as_double(differences[k].soc()) - (truth[k].soc() - mean_soc()); }
+  double error(std::size_t k) const {
+    return arithmetic::as_double(differences[k].soc()) - (truth[k].soc() - mean_soc());
+  }
   void hours(double h) {
     for (int k = 0; k < static_cast<int>(h * 3'600); ++k) second(k % 100 < 50 ? -6 : k % 100 < 60 ? 4 : 0);
   }
 
-  truth::Random random{3};
-  std::vector<truth::Cell> truth;
+  plant::Random random{3};
+  std::vector<plant::Cell> truth;
   std::vector<double> more_ohm;
-  model::Cell<S, model::max_intervals> tables = model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
-  SocEstimator<S> mean{StartingPoint{880'000'000, 10'000'000}};
+  model::Cell<S, model::max_intervals> tables =
+      model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
+  SocEstimator<S> mean{measurement::StartingPoint{880'000'000, 10'000'000}};
   CellDifferences<S, cells> differences;
   std::uint64_t time_us = 0;
 };
@@ -64,7 +71,7 @@ TEST(CellDifferences, TakeTwentyBytesACell) { EXPECT_LE(sizeof(CellDifference<fl
 
 template <class Scalar>
 class CellDifferencesOfEveryScalar : public ::testing::Test {};
-using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(CellDifferencesOfEveryScalar, Scalars);
 
 TYPED_TEST(CellDifferencesOfEveryScalar, AreFoundWhereTheCurveIsSteepAndHonestWhereItIsNot) {
@@ -72,12 +79,13 @@ TYPED_TEST(CellDifferencesOfEveryScalar, AreFoundWhereTheCurveIsSteepAndHonestWh
   for (int part = 0; part < 8; ++part) {
     pack.hours(0.18);
     for (std::size_t k = 0; k < cells; ++k) {
-      ASSERT_LE(std::abs(pack.error(k)), 3 * model::as_double(pack.differences[k].soc_sigma())) << "cell " << k << " at " << pack.mean_soc();
+      ASSERT_LE(std::abs(pack.error(k)), 3 * arithmetic::as_double(pack.differences[k].soc_sigma()))
+          << "cell " << k << " at " << pack.mean_soc();
     }
   }
   for (std::size_t k = 0; k < cells; ++k) {
     EXPECT_LE(std::abs(pack.error(k)), 0.01) << k << " at " << pack.mean_soc();
-    EXPECT_NEAR(model::as_double(pack.differences[k].resistance()), pack.more_ohm[k] / 0.0215, 0.03) << k;
+    EXPECT_NEAR(arithmetic::as_double(pack.differences[k].resistance()), pack.more_ohm[k] / 0.0215, 0.03) << k;
   }
 }
 
@@ -89,7 +97,7 @@ TYPED_TEST(CellDifferencesOfEveryScalar, OneCellWeakerIsSeen) {
     if (pack.differences[k].soc() < pack.differences[weakest].soc()) weakest = k;
   }
   EXPECT_EQ(weakest, 5U);
-  EXPECT_NEAR(model::as_double(pack.differences[5].soc()), pack.truth[5].soc() - pack.mean_soc(), 0.015);
+  EXPECT_NEAR(arithmetic::as_double(pack.differences[5].soc()), pack.truth[5].soc() - pack.mean_soc(), 0.015);
 }
 
 TEST(CellDifferences, ACellThatIsNotHeardBecomesUncertain) {
@@ -102,4 +110,4 @@ TEST(CellDifferences, ACellThatIsNotHeardBecomesUncertain) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

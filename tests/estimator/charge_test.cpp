@@ -3,47 +3,47 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 template <class S>
 auto cell() {
-  return model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
+  return model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
 }
 
 template <class Scalar>
 class ChargeOfEveryScalar : public ::testing::Test {};
-using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(ChargeOfEveryScalar, Scalars);
 
 TYPED_TEST(ChargeOfEveryScalar, LosesNothingOfTenMilliamperesOver100HoursAt100Hz) {
   const auto scale = cell<TypeParam>().charge;
   Charge<TypeParam> charge;
-  charge.set(model::Soc<TypeParam>(0.9), scale);
+  charge.set(arithmetic::Soc<TypeParam>(0.9), scale);
   for (int k = 0; k < 100 * 3'600 * 100; ++k) charge.count(-10'000, 10'000, scale);
-  EXPECT_NEAR(model::as_double(charge.soc(scale)), 0.9 - 1.0 / 6, 1e-7);  // 1 Ah of 6
+  EXPECT_NEAR(arithmetic::as_double(charge.soc(scale)), 0.9 - 1.0 / 6, 1e-7);  // 1 Ah of 6
 }
 
 TYPED_TEST(ChargeOfEveryScalar, IsHeldWithinAQuarterBeyondEmptyAndFull) {
   const auto scale = cell<TypeParam>().charge;
   Charge<TypeParam> charge;
-  charge.set(model::Soc<TypeParam>(0.5), scale);
+  charge.set(arithmetic::Soc<TypeParam>(0.5), scale);
   for (int k = 0; k < 1'000; ++k) charge.count(2'147'483'647, 2'000'000'000, scale);
-  EXPECT_NEAR(model::as_double(charge.soc(scale)), 1.25, 1e-6);
+  EXPECT_NEAR(arithmetic::as_double(charge.soc(scale)), 1.25, 1e-6);
   for (int k = 0; k < 1'000; ++k) charge.count(-2'147'483'647, 2'000'000'000, scale);
-  EXPECT_NEAR(model::as_double(charge.soc(scale)), -0.25, 1e-6);
+  EXPECT_NEAR(arithmetic::as_double(charge.soc(scale)), -0.25, 1e-6);
 }
 
 TYPED_TEST(ChargeOfEveryScalar, IsCorrectedToACountAndSurvivesAnAbsurdCorrection) {
   const auto scale = cell<TypeParam>().charge;
   Charge<TypeParam> charge;
-  charge.set(model::Soc<TypeParam>(0.4), scale);
-  charge.correct(model::Soc<TypeParam>(0.125), scale);
-  EXPECT_NEAR(model::as_double(charge.soc(scale)), 0.525, 1e-7);
-  charge.correct(model::Soc<TypeParam>(-7.0), scale);
-  EXPECT_NEAR(model::as_double(charge.soc(scale)), -0.25, 1e-6);
+  charge.set(arithmetic::Soc<TypeParam>(0.4), scale);
+  charge.correct(arithmetic::Soc<TypeParam>(0.125), scale);
+  EXPECT_NEAR(arithmetic::as_double(charge.soc(scale)), 0.525, 1e-7);
+  charge.correct(arithmetic::Soc<TypeParam>(-7.0), scale);
+  EXPECT_NEAR(arithmetic::as_double(charge.soc(scale)), -0.25, 1e-6);
 }
 
 TEST(Charge, OfAJetCarriesTheDerivative) {
@@ -57,4 +57,4 @@ TEST(Charge, OfAJetCarriesTheDerivative) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -9,48 +9,54 @@
 
 #include "estimator/restart.hpp"
 #include "estimator/soc_estimator.hpp"
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
-auto table9() { return model::prepare<float, model::max_intervals>(read_cell("table9").parameters); }
+auto table9() { return model::prepare<float, model::max_intervals>(files::read_cell("table9").parameters); }
 
 std::int32_t micro(double x) { return static_cast<std::int32_t>(std::lround(1e6 * x)); }
 
-StartingPoint told(double soc, double sigma) { return {static_cast<std::int32_t>(1e9 * soc), static_cast<std::int32_t>(1e9 * sigma)}; }
+measurement::StartingPoint told(double soc, double sigma) {
+  return {static_cast<std::int32_t>(1e9 * soc), static_cast<std::int32_t>(1e9 * sigma)};
+}
 
 /// A cell at work, and the estimator beside it.
 struct Truck {
-  explicit Truck(double soc, std::optional<StartingPoint> start = {}) : cell({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}), estimator(start ? SocEstimator<float>(*start) : SocEstimator<float>()) {}
+  explicit Truck(double soc, std::optional<measurement::StartingPoint> start = {})
+      : cell({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}),
+        estimator(start ? SocEstimator<float>(*start) : SocEstimator<float>()) {}
 
   /// One second; spoil: what becomes of the sample on its way.
-  void second(double current_a, const std::function<void(Sample&)>& spoil = {}) {
+  void second(double current_a, const std::function<void(measurement::Sample&)>& spoil = {}) {
     cell.run(current_a, 25, 1);
     time_us += 1'000'000;
-    Sample s{time_us, micro(current_a + 0.01 * random.normal()), micro(cell.voltage_v() + 0.001 * random.normal()), 2'500};
+    measurement::Sample s{time_us, micro(current_a + 0.01 * random.normal()),
+                          micro(cell.voltage_v() + 0.001 * random.normal()), 2'500};
     if (spoil) spoil(s);
     estimate = estimator.step(tables, s);
   }
   /// An hour of lifting and driving, with 0.3C of mean load.
-  void hour(const std::function<void(Sample&)>& spoil = {}) {
+  void hour(const std::function<void(measurement::Sample&)>& spoil = {}) {
     for (int k = 0; k < 3'600; ++k) second(k % 120 < 40 ? -6 * (0.5 + random.uniform()) : k % 120 < 60 ? 3 : 0, spoil);
   }
   double error() const { return estimate.soc - cell.soc(); }
 
-  truth::Cell cell;
+  plant::Cell cell;
   model::Cell<float, model::max_intervals> tables = table9();
   SocEstimator<float> estimator;
   Estimate<float> estimate;
-  truth::Random random{7};
+  plant::Random random{7};
   std::uint64_t time_us = 0;
 };
 
 TEST(Complaint, SmallCurrentsOverDaysAreForgotten) {
   Truck truck(0.6, told(0.6, 0.01));
-  for (int k = 0; k < 4 * 86'400; ++k) truck.second(-0.012);  // a display that is left on: 19 % of the charge in four days
+  for (int k = 0; k < 4 * 86'400; ++k)
+    truck.second(-0.012);  // a display that is left on: 19 % of the charge in four days
   EXPECT_NEAR(truck.cell.soc(), 0.408, 0.001);
   EXPECT_NEAR(truck.error(), 0, 0.02);
 }
@@ -58,7 +64,8 @@ TEST(Complaint, SmallCurrentsOverDaysAreForgotten) {
 TEST(Complaint, AfterARebootInTheMiddleOfACharge) {
   Truck before(0.3, told(0.3, 0.01));
   for (int k = 0; k < 3'600; ++k) before.second(1.8);
-  const StoredEstimate stored{static_cast<std::int32_t>(1e9F * before.estimate.soc), static_cast<std::int32_t>(1e9F * before.estimate.soc_sigma)};
+  const StoredEstimate stored{static_cast<std::int32_t>(1e9F * before.estimate.soc),
+                              static_cast<std::int32_t>(1e9F * before.estimate.soc_sigma)};
   Truck after(before.cell.soc(), resumed(stored, 30));
   after.second(1.8);  // under current from the first sample on
   EXPECT_NEAR(after.error(), 0, 0.01) << "not read from a voltage that the charger lifts";
@@ -67,14 +74,15 @@ TEST(Complaint, AfterARebootInTheMiddleOfACharge) {
 }
 
 TEST(Complaint, AfterANightWithoutAClockALotIsMissing) {
-  const StartingPoint morning = resumed({500'000'000, 5'000'000}, std::nullopt);
+  const measurement::StartingPoint morning = resumed({500'000'000, 5'000'000}, std::nullopt);
   EXPECT_NEAR(1e-9 * morning.soc_ppb, 0.5, 0.02);
   EXPECT_LT(1e-9 * morning.soc_sigma_ppb, 0.08);
-  EXPECT_GE(2e-9 * morning.soc_sigma_ppb, 0.5 - 1e-9 * resumed({500'000'000, 5'000'000}, 60U * 86'400).soc_ppb) << "two months would still be believed";
+  EXPECT_GE(2e-9 * morning.soc_sigma_ppb, 0.5 - 1e-9 * resumed({500'000'000, 5'000'000}, 60U * 86'400).soc_ppb)
+      << "two months would still be believed";
 }
 
 TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
-  const StartingPoint spring = resumed({500'000'000, 5'000'000}, 120U * 86'400);
+  const measurement::StartingPoint spring = resumed({500'000'000, 5'000'000}, 120U * 86'400);
   Truck truck(0.3, spring);  // more was lost than thought
   truck.second(0);
   EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma);
@@ -86,7 +94,7 @@ TEST(Complaint, TheSocIsNoLongerUpdatedAndNobodySaysSo) {
   truck.hour();
   truck.time_us += 3'600'000'000;  // the task hung for an hour
   truck.cell.run(-3, 25, 3'600);
-  truck.second(-3, [](Sample& s) { s.voltage_uv = no_reading; });
+  truck.second(-3, [](measurement::Sample& s) { s.voltage_uv = measurement::no_reading; });
   EXPECT_NE(truck.estimate.flags & time_gap, 0U);
   EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma);
 }
@@ -94,7 +102,7 @@ TEST(Complaint, TheSocIsNoLongerUpdatedAndNobodySaysSo) {
 TEST(Complaint, ASensorsOffsetOfHalfAPercentOf1C) {
   for (const double offset_a : {-0.03, 0.03}) {
     Truck truck(0.95, told(0.95, 0.01));
-    for (int h = 0; h < 3; ++h) truck.hour([&](Sample& s) { s.current_ua += micro(offset_a); });
+    for (int h = 0; h < 3; ++h) truck.hour([&](measurement::Sample& s) { s.current_ua += micro(offset_a); });
     EXPECT_NEAR(truck.error(), 0, 0.02) << offset_a;
     EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << offset_a;
   }
@@ -103,7 +111,8 @@ TEST(Complaint, ASensorsOffsetOfHalfAPercentOf1C) {
 TEST(Complaint, ASensorsGainOfOnePercent) {
   for (const double gain : {0.99, 1.01}) {
     Truck truck(0.95, told(0.95, 0.01));
-    for (int h = 0; h < 3; ++h) truck.hour([&](Sample& s) { s.current_ua = static_cast<std::int32_t>(gain * s.current_ua); });
+    for (int h = 0; h < 3; ++h)
+      truck.hour([&](measurement::Sample& s) { s.current_ua = static_cast<std::int32_t>(gain * s.current_ua); });
     EXPECT_NEAR(truck.error(), 0, 0.02) << gain;
   }
 }
@@ -121,7 +130,7 @@ TEST(Complaint, AWrongStartIsBelievedForEver) {
 
 TEST(Complaint, TheTemperatureSensorIsLost) {
   Truck truck(0.8, told(0.8, 0.01));
-  truck.hour([](Sample& s) { s.temperature_cdegc = no_temperature; });
+  truck.hour([](measurement::Sample& s) { s.temperature_cdegc = measurement::no_temperature; });
   EXPECT_NEAR(truck.error(), 0, 0.01);
 }
 
@@ -130,7 +139,7 @@ TEST(Complaint, TheSignOfTheCurrentIsLost) {
   double worst = 0;
   std::uint32_t flags = 0;
   for (int h = 0; h < 3; ++h) {
-    truck.hour([](Sample& s) { s.current_ua = -s.current_ua; });
+    truck.hour([](measurement::Sample& s) { s.current_ua = -s.current_ua; });
     worst = std::max(worst, std::abs(truck.error()));
     flags |= truck.estimate.flags;
   }
@@ -138,4 +147,4 @@ TEST(Complaint, TheSignOfTheCurrentIsLost) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -4,16 +4,16 @@
 
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 template <class Scalar>
 class ConditionOfEveryScalar : public ::testing::Test {};
-using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(ConditionOfEveryScalar, Scalars);
 
 /// The plant's cell, an estimator and what is told beside it.
@@ -21,20 +21,26 @@ template <class S>
 struct Truck {
   using Estimator = SocEstimator<S>;
 
-  explicit Truck(double soc, const StartingPoint& start) : plant({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}), estimator(start) {}
+  explicit Truck(double soc, const measurement::StartingPoint& start)
+      : plant({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}), estimator(start) {}
 
   Estimate<S> second(double current_a, bool limits_wanted = true, bool with_voltage = true) {
     plant.run(current_a, 25, 1);
     time_us += 1'000'000;
-    const Sample s{time_us, static_cast<std::int32_t>(1e6 * (current_a + 0.01 * random.normal())), with_voltage ? static_cast<std::int32_t>(1e6 * (plant.voltage_v() + 0.001 * random.normal())) : no_reading, 2'500};
+    const measurement::Sample s{time_us, static_cast<std::int32_t>(1e6 * (current_a + 0.01 * random.normal())),
+                                with_voltage
+                                    ? static_cast<std::int32_t>(1e6 * (plant.voltage_v() + 0.001 * random.normal()))
+                                    : measurement::no_reading,
+                                2'500};
     const auto e = estimator.step(cell, s);
     condition.update(cell, s, e, estimator.state(), limits_wanted);
     return e;
   }
 
-  truth::Cell plant;
-  truth::Random random{3};
-  model::Cell<S, model::max_intervals> cell = model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
+  plant::Cell plant;
+  plant::Random random{3};
+  model::Cell<S, model::max_intervals> cell =
+      model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
   Estimator estimator;
   Condition<Estimator> condition;
   std::uint64_t time_us = 0;
@@ -48,7 +54,7 @@ TYPED_TEST(ConditionOfEveryScalar, TellsOfAShiftWhatItsPartsTell) {
   bool observable = false, bridged = false;
   for (int k = 0; k < 6'000; ++k) {
     truck.second(load(k));
-    const double now = model::as_double(truck.condition.display_soc());
+    const double now = arithmetic::as_double(truck.condition.display_soc());
     if (k > 0) largest_jump = std::max(largest_jump, std::abs(now - shown));
     shown = now;
     observable = observable || truck.condition.quality().observable;
@@ -58,28 +64,28 @@ TYPED_TEST(ConditionOfEveryScalar, TellsOfAShiftWhatItsPartsTell) {
   EXPECT_NEAR(shown, truck.plant.soc(), 0.02);
   EXPECT_TRUE(observable) << "at 90 %";
   EXPECT_TRUE(bridged) << "on the plateau";
-  EXPECT_NEAR(model::as_double(truck.condition.resistance().ratio), 1, 0.06);
-  EXPECT_LT(model::as_double(truck.condition.resistance().sigma), 0.05);
-  EXPECT_EQ(model::as_double(truck.condition.limits_now().discharge_a), 6) << "what the file allows";
+  EXPECT_NEAR(arithmetic::as_double(truck.condition.resistance().ratio), 1, 0.06);
+  EXPECT_LT(arithmetic::as_double(truck.condition.resistance().sigma), 0.05);
+  EXPECT_EQ(arithmetic::as_double(truck.condition.limits_now().discharge_a), 6) << "what the file allows";
 }
 
 TYPED_TEST(ConditionOfEveryScalar, LimitsAreReckonedWhenSomebodyAsks) {
   Truck<TypeParam> truck(0.5, {500'000'000, 10'000'000});
   for (int k = 0; k < 10; ++k) truck.second(0, false);
-  EXPECT_EQ(model::as_double(truck.condition.limits_now().discharge_a), 0);
+  EXPECT_EQ(arithmetic::as_double(truck.condition.limits_now().discharge_a), 0);
   truck.second(0, true);
-  EXPECT_EQ(model::as_double(truck.condition.limits_now().discharge_a), 6);
+  EXPECT_EQ(arithmetic::as_double(truck.condition.limits_now().discharge_a), 6);
 }
 
 TYPED_TEST(ConditionOfEveryScalar, WithoutAVoltageNothingIsLearnedAndTheDisplayGoesOn) {
   Truck<TypeParam> truck(0.9, {900'000'000, 10'000'000});
   truck.second(0);
-  const double before = model::as_double(truck.condition.display_soc());
+  const double before = arithmetic::as_double(truck.condition.display_soc());
   for (int k = 0; k < 600; ++k) truck.second(-6, true, false);
-  EXPECT_NEAR(model::as_double(truck.condition.display_soc()), before - 600.0 / 3'600, 0.002);
+  EXPECT_NEAR(arithmetic::as_double(truck.condition.display_soc()), before - 600.0 / 3'600, 0.002);
   EXPECT_FALSE(truck.condition.quality().observable);
-  EXPECT_NEAR(model::as_double(truck.condition.resistance().sigma), 0.3, 1e-3);
+  EXPECT_NEAR(arithmetic::as_double(truck.condition.resistance().sigma), 0.3, 1e-3);
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 constexpr model::RestingCurrent resting{80'000, 25'000};
@@ -47,4 +47,4 @@ TEST(CurrentAtRest, NoLengthOfARestOrAStepWrapsIt) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

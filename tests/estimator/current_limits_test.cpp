@@ -5,24 +5,27 @@
 
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "plant/truth_cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 /// table9 as a cell that may be driven as hard as its voltage allows.
 model::CellParameters<> hard() {
-  model::CellParameters<> p = read_cell("table9").parameters;
+  model::CellParameters<> p = files::read_cell("table9").parameters;
   p.limits.charge_current_max_a = p.limits.discharge_current_max_a = 400;
   return p;
 }
 
 template <class S>
-std::pair<double, double> limits(const model::CellParameters<>& p, double soc, double seconds, double margin_v = 0, double v_rc_v = 0, double off = 0) {
+std::pair<double, double> limits(const model::CellParameters<>& p, double soc, double seconds, double margin_v = 0,
+                                 double v_rc_v = 0, double off = 0) {
   const auto cell = model::prepare<S, model::max_intervals>(p);
-  const auto l = current_limits<model::ExtendedRc<0, 0>::Of<S>>(cell, {model::Voltage<S>(v_rc_v)}, model::Soc<S>(soc), model::Soc<S>(off), model::Temperature<S>(25), model::TimeStep<S>(seconds), model::Voltage<S>(margin_v));
-  return {model::as_double(l.discharge_a), model::as_double(l.charge_a)};
+  const auto l = current_limits<model::ExtendedRc<0, 0>::Of<S>>(
+      cell, {arithmetic::Voltage<S>(v_rc_v)}, arithmetic::Soc<S>(soc), arithmetic::Soc<S>(off),
+      arithmetic::Temperature<S>(25), arithmetic::TimeStep<S>(seconds), arithmetic::Voltage<S>(margin_v));
+  return {arithmetic::as_double(l.discharge_a), arithmetic::as_double(l.charge_a)};
 }
 
 TEST(CurrentLimits, ACellThatIsDrivenByThemReachesItsVoltageLimitsAndDoesNotPassThem) {
@@ -30,7 +33,7 @@ TEST(CurrentLimits, ACellThatIsDrivenByThemReachesItsVoltageLimitsAndDoesNotPass
   for (const double soc : {0.3, 0.5, 0.7, 0.85}) {
     for (const double seconds : {1.0, 10.0}) {
       const auto [discharge_a, charge_a] = limits<double>(p, soc, seconds);
-      truth::Cell down({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}), up = down;
+      plant::Cell down({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}), up = down;
       down.run(-discharge_a, 25, seconds);
       up.run(charge_a, 25, seconds);
       EXPECT_NEAR(down.voltage_v(), p.limits.voltage_min_v, 0.03) << soc << ' ' << seconds;  // 2 % of 1.3 V of drop
@@ -40,13 +43,14 @@ TEST(CurrentLimits, ACellThatIsDrivenByThemReachesItsVoltageLimitsAndDoesNotPass
 }
 
 TEST(CurrentLimits, AreNoMoreThanTheFileAllows) {
-  const auto [discharge_a, charge_a] = limits<double>(read_cell("table9").parameters, 0.5, 10);
+  const auto [discharge_a, charge_a] = limits<double>(files::read_cell("table9").parameters, 0.5, 10);
   EXPECT_EQ(discharge_a, 6);
   EXPECT_EQ(charge_a, 6);
 }
 
 TEST(CurrentLimits, AreLessForLongerAndWithAMargin) {
-  const auto now = limits<double>(hard(), 0.5, 0.1), later = limits<double>(hard(), 0.5, 10), careful = limits<double>(hard(), 0.5, 10, 0.03);
+  const auto now = limits<double>(hard(), 0.5, 0.1), later = limits<double>(hard(), 0.5, 10),
+             careful = limits<double>(hard(), 0.5, 10, 0.03);
   EXPECT_GT(now.first, 1.2 * later.first);
   EXPECT_GT(now.second, 1.2 * later.second);
   EXPECT_LT(careful.first, later.first - 1);
@@ -70,7 +74,8 @@ TEST(CurrentLimits, WhatHasBuiltUpCounts) {
 
 TEST(CurrentLimits, EveryScalarSaysTheSame) {
   for (const double soc : {0.05, 0.4, 0.95}) {
-    const auto twice = limits<double>(hard(), soc, 10), once = limits<float>(hard(), soc, 10), fixed = limits<model::FixedPoint>(hard(), soc, 10);
+    const auto twice = limits<double>(hard(), soc, 10), once = limits<float>(hard(), soc, 10),
+               fixed = limits<arithmetic::FixedPoint>(hard(), soc, 10);
     EXPECT_NEAR(once.first, twice.first, 0.02);
     EXPECT_NEAR(fixed.first, twice.first, 0.02);
     EXPECT_NEAR(once.second, twice.second, 0.02);
@@ -79,4 +84,4 @@ TEST(CurrentLimits, EveryScalarSaysTheSame) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 using Display = DisplaySoc<double>;
@@ -49,4 +49,4 @@ TEST(DisplaySoc, StaysBetweenEmptyAndFull) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 void expect_no_drift(const DutyFigures& f) {
@@ -21,4 +21,4 @@ TEST(Duty, AThousandHoursDriftNowhere) { expect_no_drift(duty_as_in_the_file());
 TEST(Duty, AThousandHoursWithErrorsAsStates) { expect_no_drift(duty_with_errors()); }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

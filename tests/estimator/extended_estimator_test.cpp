@@ -6,11 +6,11 @@
 #include <random>
 
 #include "estimator/soc_estimator.hpp"
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "model/extended.hpp"
 #include "tests/model/usual_mechanisms.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 using namespace model;
@@ -25,7 +25,7 @@ constexpr std::size_t held = HostLaws<double>::most_states;
 
 template <class S>
 Cells<S> table9_with(const std::vector<MechanismSetting>& mechanisms) {
-  return {prepare<S, max_intervals>(read_cell("table9").parameters), chosen<S>(mechanisms, capacity_ah)};
+  return {prepare<S, max_intervals>(files::read_cell("table9").parameters), chosen<S>(mechanisms, capacity_ah)};
 }
 
 /// All that a board runs.
@@ -53,7 +53,8 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
     Model::Polarisation x;
     for (double& v : x) v = 0.05 * (uniform(random) - 0.5);
     x.back() = 0.05 * uniform(random);  // warmth, 5 K at most
-    const Drive<double> drive{30 * (uniform(random) - 0.5), std::pow(10, 3 * uniform(random) - 2), 40 * uniform(random)};
+    const Drive<double> drive{30 * (uniform(random) - 0.5), std::pow(10, 3 * uniform(random) - 2),
+                              40 * uniform(random)};
     std::uint8_t interval = 0;
     const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, soc, interval);
     const auto settling = Model::settling(cell.laws, x, at, drive);
@@ -70,28 +71,38 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
     const Jet v = JetModel::voltage(jets.laws, y, at_j, drive_j);
     EXPECT_NEAR(v.a, Model::voltage(cell.laws, x, at, drive), 1e-12);
     for (std::size_t j = 0; j < states; ++j) {
-      for (std::size_t i = 0; i + 1 < states; ++i) ASSERT_NEAR(f[i][j], moved[i].v[static_cast<int>(j)], 1e-12 * (1 + std::abs(f[i][j]))) << i << j << " soc " << soc;
+      for (std::size_t i = 0; i + 1 < states; ++i)
+        ASSERT_NEAR(f[i][j], moved[i].v[static_cast<int>(j)], 1e-12 * (1 + std::abs(f[i][j])))
+            << i << j << " soc " << soc;
       ASSERT_EQ(f[states - 1][j], j + 1 == states ? 1 : 0);
-      ASSERT_NEAR(h[j], v.v[static_cast<int>(j)], 1e-10 * (1 + std::abs(h[j]))) << j << " soc " << soc << " current " << drive.current_a;
+      ASSERT_NEAR(h[j], v.v[static_cast<int>(j)], 1e-10 * (1 + std::abs(h[j])))
+          << j << " soc " << soc << " current " << drive.current_a;
     }
   }
 }
 
 struct Work {
-  std::vector<Sample> samples;
+  std::vector<measurement::Sample> samples;
   std::vector<double> soc;
 };
 /// A shift of pulses as a cell with these mechanisms answers it, read with noise of 1 mV.
 Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, double soc) {
-  const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
   Course<double> course(cell, capacity_ah, chosen<double>(mechanisms, capacity_ah), soc);
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.001);
   Work w;
   for (std::size_t k = 0; k < count; ++k) {
-    const double current_a = k < 60 ? 0 : (k / 40) % 3 == 0 ? -5 : (k / 40) % 3 == 1 ? 1.5 : -0.2, temperature_c = 15 + 1e-3 * static_cast<double>(k);
-    const double v = course.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, temperature_c, [](auto&, const auto&) {}) + noise(random);
-    w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround(current_a * 1e6)), static_cast<std::int32_t>(std::lround(v * 1e6)),
+    const double current_a = k < 60              ? 0
+                             : (k / 40) % 3 == 0 ? -5
+                             : (k / 40) % 3 == 1 ? 1.5
+                                                 : -0.2,
+                 temperature_c = 15 + 1e-3 * static_cast<double>(k);
+    const double v =
+        course.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, temperature_c, [](auto&, const auto&) {}) +
+        noise(random);
+    w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround(current_a * 1e6)),
+                         static_cast<std::int32_t>(std::lround(v * 1e6)),
                          static_cast<std::int16_t>(std::lround(temperature_c * 100))});
     w.soc.push_back(course.soc());
   }
@@ -99,22 +110,24 @@ Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, do
 }
 
 template <class S, std::size_t Voltages, class AnyCell>
-auto run(const AnyCell& cell, const std::vector<Sample>& samples, const StartingPoint& start) {
+auto run(const AnyCell& cell, const std::vector<measurement::Sample>& samples,
+         const measurement::StartingPoint& start) {
   using Estimator = SocEstimator<S, ExtendedRc<Voltages, held>::template Of>;
   Estimator estimator(start);
   std::vector<typename Estimator::Result> estimates;
-  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  for (const measurement::Sample& s : samples) estimates.push_back(estimator.step(cell, s));
   return estimates;
 }
 
-const std::vector<std::string_view> some = {"ocv_hysteresis", "slow_polarisation", "temperature_resistance", "current_offset"};
+const std::vector<std::string_view> some = {"ocv_hysteresis", "slow_polarisation", "temperature_resistance",
+                                            "current_offset"};
 
 TEST(ExtendedEstimator, FollowsACellThatThePlainModelLoses) {
   const Work w = work(usual(some), 10'000, 0.9);
-  const StartingPoint start{900'000'000, 50'000'000};
+  const measurement::StartingPoint start{900'000'000, 50'000'000};
   const auto with = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
   SocEstimator<double> estimator(start);
-  const auto plain_cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  const auto plain_cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
   double with_rms = 0, plain_rms = 0;
   std::size_t inside = 0;
   for (std::size_t k = 0; k < w.samples.size(); ++k) {
@@ -143,18 +156,19 @@ TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
 /// With errors as states.
 template <class S, std::size_t Voltages>
 Cells<S> table9_with_errors(const std::vector<MechanismSetting>& mechanisms) {
-  CellFile file = read_cell("table9");
+  files::CellFile file = files::read_cell("table9");
   file.parameters.noise.current_offset_a = 0.06;  // a hundredth of 1C
   file.parameters.noise.current_offset_correlation_s = 36'000;
   return {prepare<S, max_intervals>(file.parameters), chosen<S>(mechanisms, capacity_ah)};
 }
 template <class S, std::size_t Voltages>
-auto run_with_errors(const std::vector<MechanismSetting>& mechanisms, const std::vector<Sample>& samples, const StartingPoint& start) {
+auto run_with_errors(const std::vector<MechanismSetting>& mechanisms, const std::vector<measurement::Sample>& samples,
+                     const measurement::StartingPoint& start) {
   using Estimator = SocEstimator<S, ExtendedRc<Voltages, held, true>::template Of>;
   const auto cell = table9_with_errors<S, Voltages>(mechanisms);
   Estimator estimator(start);
   std::vector<typename Estimator::Result> estimates;
-  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  for (const measurement::Sample& s : samples) estimates.push_back(estimator.step(cell, s));
   return estimates;
 }
 
@@ -163,7 +177,8 @@ TEST(ExtendedModel, ErrorsAsStatesChangeNothingElse) {
   using Plain = ExtendedRc<voltages, held>::Of<double>;
   using Model = ExtendedRc<voltages, held, true>::Of<double>;
   ASSERT_EQ(Model::states, Plain::states + 2);
-  const auto cell = table9_with_errors<double, voltages>(usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance"}));
+  const auto cell =
+      table9_with_errors<double, voltages>(usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance"}));
   Plain::Polarisation x;
   for (std::size_t k = 0; k < x.size(); ++k) x[k] = 0.001 * static_cast<double>(k + 1);
   Model::Polarisation y{x[0], 0.004, 0.002};
@@ -195,13 +210,13 @@ TEST(ExtendedModel, ErrorsAsStatesChangeNothingElse) {
 TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
   for (const double offset_a : {-0.08, 0.08}) {
     Work w = work({}, 13'000, 0.95);  // to 20 % of charge
-    for (Sample& s : w.samples) s.current_ua += static_cast<std::int32_t>(1e6 * offset_a);
-    const StartingPoint start{950'000'000, 10'000'000};
+    for (measurement::Sample& s : w.samples) s.current_ua += static_cast<std::int32_t>(1e6 * offset_a);
+    const measurement::StartingPoint start{950'000'000, 10'000'000};
     const auto e = run_with_errors<float, 0>({}, w.samples, start);
     SocEstimator<float> plain(start);
-    const auto plain_cell = prepare<float, max_intervals>(read_cell("table9").parameters);
+    const auto plain_cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
     Estimate<float> without;
-    for (const Sample& s : w.samples) without = plain.step(plain_cell, s);
+    for (const measurement::Sample& s : w.samples) without = plain.step(plain_cell, s);
     const double found_a = 6 * e.back().further[1], sigma_a = 6 * e.back().further[2];
     EXPECT_LT(sigma_a, 0.03);
     EXPECT_NEAR(found_a, offset_a, 2 * sigma_a);
@@ -213,21 +228,23 @@ TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
 /// An hour at rest, then the work of the others.
 Work work_after_a_rest(double sensor_a, double truly_a) {
   Work w;
-  const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
   Course<double> course(cell, capacity_ah, {}, 0.6);
   for (std::uint64_t k = 0; k < 7'200; ++k) {
     const double current_a = k < 3'600 ? truly_a : -1;
     const double v = course.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, 25, [](auto&, const auto&) {});
-    w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround((current_a + sensor_a) * 1e6)), static_cast<std::int32_t>(std::lround(v * 1e6)), 2'500});
+    w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround((current_a + sensor_a) * 1e6)),
+                         static_cast<std::int32_t>(std::lround(v * 1e6)), 2'500});
     w.soc.push_back(course.soc());
   }
   return w;
 }
 
 template <class S>
-auto run_with_rest(double at_rest_a, const std::vector<Sample>& samples, const StartingPoint& start, double gain = 0) {
+auto run_with_rest(double at_rest_a, const std::vector<measurement::Sample>& samples,
+                   const measurement::StartingPoint& start, double gain = 0) {
   using Estimator = SocEstimator<S, ExtendedRc<0, held, true>::template Of>;
-  auto parameters = read_cell("table9").parameters;
+  auto parameters = files::read_cell("table9").parameters;
   parameters.noise.current_offset_a = 0.06;
   parameters.noise.current_offset_correlation_s = 36'000;
   parameters.noise.current_at_rest_a = at_rest_a;
@@ -236,14 +253,14 @@ auto run_with_rest(double at_rest_a, const std::vector<Sample>& samples, const S
   const Cells<S> cell{prepare<S, max_intervals>(parameters), {}};
   Estimator estimator(start);
   std::vector<typename Estimator::Result> estimates;
-  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  for (const measurement::Sample& s : samples) estimates.push_back(estimator.step(cell, s));
   return estimates;
 }
 
 TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
   for (const double sensor_a : {-0.07, 0.07}) {
     const Work w = work_after_a_rest(sensor_a, 0);
-    const StartingPoint start{600'000'000, 5'000'000};
+    const measurement::StartingPoint start{600'000'000, 5'000'000};
     const auto e = run_with_rest<float>(0.012, w.samples, start);
     EXPECT_NEAR(6 * e[59].further[1], 0, 0.005) << "a minute first";
     EXPECT_NEAR(6 * e[3'599].further[1], sensor_a, 0.012);
@@ -265,22 +282,27 @@ TEST(ExtendedEstimator, BelievesASmallCurrentWhereNobodySaysWhatFlowsAtRest) {
 
 TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
   // on the plateau no voltage helps; 6 A for 36 minutes are 60 % of 6 Ah
-  const StartingPoint start{900'000'000, 1'000'000};
-  std::vector<Sample> out, out_and_back;
+  const measurement::StartingPoint start{900'000'000, 1'000'000};
+  std::vector<measurement::Sample> out, out_and_back;
   for (std::uint64_t k = 0; k < 2'160; ++k) {
-    out.push_back({k * 1'000'000, k == 0 ? 0 : -6'000'000, no_reading, 2'500});
-    out_and_back.push_back({k * 1'000'000, k == 0 ? 0 : k < 1'080 ? -6'000'000 : 6'000'000, no_reading, 2'500});
+    out.push_back({k * 1'000'000, k == 0 ? 0 : -6'000'000, measurement::no_reading, 2'500});
+    out_and_back.push_back({k * 1'000'000,
+                            k == 0      ? 0
+                            : k < 1'080 ? -6'000'000
+                                        : 6'000'000,
+                            measurement::no_reading, 2'500});
   }
   const auto without = run_with_rest<float>(0, out, start), with = run_with_rest<float>(0, out, start, 0.02);
   const auto sigma = [](const auto& e) { return static_cast<double>(e.back().soc_sigma); };
   EXPECT_NEAR(std::sqrt(sigma(with) * sigma(with) - sigma(without) * sigma(without)), 0.02 * 0.6, 0.0005);
   const auto returned = run_with_rest<float>(0, out_and_back, start, 0.02);
-  EXPECT_NEAR(std::sqrt(sigma(returned) * sigma(returned) - sigma(without) * sigma(without)), 0.02 * 0.3, 0.0005) << "what it was in the middle stays";
+  EXPECT_NEAR(std::sqrt(sigma(returned) * sigma(returned) - sigma(without) * sigma(without)), 0.02 * 0.3, 0.0005)
+      << "what it was in the middle stays";
 }
 
 TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
   const Work w = work(usual(some), 1'500, 0.77);
-  const StartingPoint start{770'000'000, 5'000'000};
+  const measurement::StartingPoint start{770'000'000, 5'000'000};
   const auto twice = run_with_errors<double, 3>(usual(some), w.samples, start);
   const auto single = run_with_errors<float, 3>(usual(some), w.samples, start);
   const auto fixed = run_with_errors<FixedPoint, 3>(usual(some), w.samples, start);
@@ -288,13 +310,14 @@ TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
     ASSERT_NEAR(single[k].soc, twice[k].soc, 1e-4) << k;
     ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 2e-4) << k;
     ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 2e-4) << k;
-    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(as_double(fixed[k].further[i]), twice[k].further[i], 1e-4) << k << " " << i;
+    for (std::size_t i = 0; i < 3; ++i)
+      ASSERT_NEAR(as_double(fixed[k].further[i]), twice[k].further[i], 1e-4) << k << " " << i;
   }
 }
 
 TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
   const Work w = work(usual(some), 1'500, 0.77);
-  const StartingPoint start{770'000'000, 5'000'000};
+  const measurement::StartingPoint start{770'000'000, 5'000'000};
   const auto twice = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
   const auto single = run<float, 3>(table9_with<float>(usual(some)), w.samples, start);
   const auto fixed = run<FixedPoint, 3>(table9_with<FixedPoint>(usual(some)), w.samples, start);
@@ -310,9 +333,10 @@ TEST(ExtendedEstimator, ACellWhoseMechanismsAreNeutralGivesThePlainCellsBits) {
   const Work w = work({}, 2'000, 0.77);
   auto neutral = unsaid(mechanism_index("resistance_growth"), capacity_ah);
   const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, {770'000'000, 20'000'000});
-  SocEstimator<float> plain(StartingPoint{770'000'000, 20'000'000});
-  const auto cell = prepare<float, max_intervals>(read_cell("table9").parameters);
-  for (std::size_t k = 0; k < w.samples.size(); ++k) ASSERT_EQ(words(static_cast<const Estimate<float>&>(e[k])), words(plain.step(cell, w.samples[k]))) << k;
+  SocEstimator<float> plain(measurement::StartingPoint{770'000'000, 20'000'000});
+  const auto cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
+  for (std::size_t k = 0; k < w.samples.size(); ++k)
+    ASSERT_EQ(words(static_cast<const Estimate<float>&>(e[k])), words(plain.step(cell, w.samples[k]))) << k;
 }
 
 TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
@@ -324,12 +348,20 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
     std::uint64_t time_us = 0;
     for (int k = 0; k < 2'000; ++k) {
       time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
-      const auto anything = [&](std::int32_t normal) { return random() % 3 == 0 ? static_cast<std::int32_t>(random()) : random() % 7 == 0 ? no_reading : normal; };
-      const auto e = estimator.step(cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
-      ASSERT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) && std::isfinite(e.voltage_predicted_v)) << round << " " << k;
+      const auto anything = [&](std::int32_t normal) {
+        return random() % 3 == 0   ? static_cast<std::int32_t>(random())
+               : random() % 7 == 0 ? measurement::no_reading
+                                   : normal;
+      };
+      const auto e = estimator.step(
+          cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
+      ASSERT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) &&
+                  std::isfinite(e.voltage_predicted_v))
+          << round << " " << k;
       for (const float x : e.further) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
       ASSERT_GT(e.soc_sigma, 0);
-      const auto more = of_errors.step(cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
+      const auto more = of_errors.step(
+          cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
       ASSERT_TRUE(std::isfinite(more.soc) && std::isfinite(more.soc_sigma)) << round << " " << k;
       for (const float x : more.further) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
     }
@@ -339,13 +371,14 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
 TEST(ExtendedEstimator, CountsThroughASensorThatIsOff) {
   auto off = usual({"current_offset", "current_gain", "capacity_change"});
   const auto cell = table9_with<float>(off);
-  SocEstimator<float, ExtendedRc<0, held>::Of> estimator(StartingPoint{500'000'000, 5'000'000});
-  estimator.step(cell, {0, 0, no_reading, 2'500});
+  SocEstimator<float, ExtendedRc<0, held>::Of> estimator(measurement::StartingPoint{500'000'000, 5'000'000});
+  estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Estimate<float> e;
-  for (std::uint64_t k = 1; k <= 3'600; ++k) e = estimator.step(cell, {k * 1'000'000, -1'200'000, no_reading, 2'500});
+  for (std::uint64_t k = 1; k <= 3'600; ++k)
+    e = estimator.step(cell, {k * 1'000'000, -1'200'000, measurement::no_reading, 2'500});
   const double true_a = (-1.2 - off[0].value[0]) / (1 + off[1].value[0]);
   EXPECT_NEAR(e.soc, 0.5 + true_a / (6 * (1 - 0.1)), 1e-6);
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -5,29 +5,30 @@
 #include <gtest/gtest.h>
 
 #include "estimator/soc_estimator.hpp"
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 template <class Scalar>
 class HealthOfEveryScalar : public ::testing::Test {};
-using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(HealthOfEveryScalar, Scalars);
 
-/// A day of a truck whose cell has other than the file's capacity and resistances: down from full to nearly empty, up again.
+/// A day of a truck whose cell has other than the file's capacity and resistances: down from full to nearly empty, up
+/// again.
 template <class S>
 struct Day {
   CapacityHealth<S> capacity;
   ResistanceHealth<S> resistance;
 
   Day(double capacity_ah, double more_ohm, int turns) {
-    const auto cell = model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
-    truth::Cell truth({.capacity_ah = capacity_ah}, {.soc = 0.97, .v_rc_v = 0, .temperature_c = 25});
-    truth::Random random(11);
-    SocEstimator<S> estimator(StartingPoint{970'000'000, 10'000'000});
+    const auto cell = model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
+    plant::Cell truth({.capacity_ah = capacity_ah}, {.soc = 0.97, .v_rc_v = 0, .temperature_c = 25});
+    plant::Random random(11);
+    SocEstimator<S> estimator(measurement::StartingPoint{970'000'000, 10'000'000});
     std::uint64_t time_us = 0;
     for (int turn = 0; turn < turns; ++turn) {
       for (int k = 0; k < 20'000; ++k) {
@@ -36,8 +37,10 @@ struct Day {
         const double current_a = down ? (k % 60 < 40 ? -6 : -1.5) : 3;
         truth.run(current_a, 25, 1);
         time_us += 1'000'000;
-        const Sample s{time_us, static_cast<std::int32_t>(1e6 * (current_a + 0.01 * random.normal())),
-                       static_cast<std::int32_t>(1e6 * (truth.voltage_v() + more_ohm * current_a + 0.001 * random.normal())), 2'500};
+        const measurement::Sample s{
+            time_us, static_cast<std::int32_t>(1e6 * (current_a + 0.01 * random.normal())),
+            static_cast<std::int32_t>(1e6 * (truth.voltage_v() + more_ohm * current_a + 0.001 * random.normal())),
+            2'500};
         const auto e = estimator.step(cell, s);
         watch(cell, s, e, k == 0);
       }
@@ -45,7 +48,7 @@ struct Day {
   }
 
   template <class Cell>
-  void watch(const Cell& cell, const Sample& s, const Estimate<S>& e, bool first) {
+  void watch(const Cell& cell, const measurement::Sample& s, const Estimate<S>& e, bool first) {
     using namespace model;
     const auto at = look_up(cell, e.soc);
     const Current<S> current_a = from_micro<Current<S>>(s.current_ua);
@@ -53,7 +56,8 @@ struct Day {
     const VoltagePerSoc<S> slope = VoltagePerSoc<S>(at.ocv_delta_v * at.per_width);
     const Voltage<S> drop_v = Voltage<S>(at.r0_ohm * current_a), doubt_v = drop_v * Fraction<S>(0.3);
     const Soc<S> off = ratio<Soc<S>>(innovation_v, slope);
-    const Variance<S> told2 = ratio<Variance<S>>(ratio<Variance<S>>(Variance<S>(at.error_v2 + doubt_v * doubt_v), slope), slope);
+    const Variance<S> told2 =
+        ratio<Variance<S>>(ratio<Variance<S>>(Variance<S>(at.error_v2 + doubt_v * doubt_v), slope), slope);
     const Soc<S> counted = Soc<S>(current_a * Fraction<S>(1.0 / 21'600));
     if (first) resistance.interrupt();
     capacity.see(e.soc, off, told2, true, counted, Variance<S>(1e-10));
@@ -65,8 +69,8 @@ TYPED_TEST(HealthOfEveryScalar, FindsTheCapacityThatIsLeft) {
   for (const double left : {0.8, 1.0, 1.05}) {
     const Day<TypeParam> day(6 * left, 0, 4);
     const auto found = day.capacity.health();
-    EXPECT_NEAR(model::as_double(found.ratio), left, 2 * model::as_double(found.sigma)) << left;
-    EXPECT_LT(model::as_double(found.sigma), 0.02) << left;
+    EXPECT_NEAR(arithmetic::as_double(found.ratio), left, 2 * arithmetic::as_double(found.sigma)) << left;
+    EXPECT_LT(arithmetic::as_double(found.sigma), 0.02) << left;
   }
 }
 
@@ -74,24 +78,26 @@ TYPED_TEST(HealthOfEveryScalar, FindsTheResistanceThatHasGrown) {
   for (const double more : {0.0, 0.3, 0.6}) {
     const Day<TypeParam> day(6, more * 0.0133, 1);
     const auto found = day.resistance.health();
-    EXPECT_NEAR(model::as_double(found.ratio), 1 + more, 0.05) << more;
-    EXPECT_LT(model::as_double(found.sigma), 0.03) << more;
+    EXPECT_NEAR(arithmetic::as_double(found.ratio), 1 + more, 0.05) << more;
+    EXPECT_LT(arithmetic::as_double(found.sigma), 0.03) << more;
   }
 }
 
 TYPED_TEST(HealthOfEveryScalar, WhoHasSeenNothingKnowsNothing) {
   const auto capacity = CapacityHealth<TypeParam>().health();
-  EXPECT_NEAR(model::as_double(capacity.sigma), 0.1, 1e-6);
+  EXPECT_NEAR(arithmetic::as_double(capacity.sigma), 0.1, 1e-6);
   const auto resistance = ResistanceHealth<TypeParam>().health();
-  EXPECT_NEAR(model::as_double(resistance.sigma), 0.3, 1e-6);
+  EXPECT_NEAR(arithmetic::as_double(resistance.sigma), 0.3, 1e-6);
 }
 
 TYPED_TEST(HealthOfEveryScalar, HalfAPlateauIsNoCapacity) {
   CapacityHealth<TypeParam> capacity;
   using namespace model;
-  for (int k = 0; k < 1'000; ++k) capacity.see(Soc<TypeParam>(0.6 - 1e-4 * k), Soc<TypeParam>(0), Variance<TypeParam>(0.01), true, Soc<TypeParam>(-1e-4), Variance<TypeParam>(0.0));
+  for (int k = 0; k < 1'000; ++k)
+    capacity.see(Soc<TypeParam>(0.6 - 1e-4 * k), Soc<TypeParam>(0), Variance<TypeParam>(0.01), true,
+                 Soc<TypeParam>(-1e-4), Variance<TypeParam>(0.0));
   EXPECT_NEAR(as_double(capacity.health().sigma), 0.1, 1e-6);
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -1,5 +1,6 @@
-// The estimator in integers against whatever a cell file may hold and a sensor may say: random cell files that first_fault() accepts, random
-// samples with extremes among them. Compiled with checks of every signed operation, whatever the rest of the build does (tests/CMakeLists.txt).
+// The estimator in integers against whatever a cell file may hold and a sensor may say: random cell files that
+// first_fault() accepts, random samples with extremes among them. Compiled with checks of every signed operation,
+// whatever the rest of the build does (tests/CMakeLists.txt).
 //
 // BMS_HOSTILE_INPUTS in the environment: how many samples instead of the usual 100,000.
 #include <gtest/gtest.h>
@@ -10,19 +11,24 @@
 #include "estimator/soc_estimator.hpp"
 #include "model/extended.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
-using S = model::FixedPoint;
+using S = arithmetic::FixedPoint;
 using Random = std::mt19937_64;
 
-double between(Random& random, double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
+double between(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
 /// Evenly over the decades; now and then an end.
 double over_decades(Random& random, double low, double high) {
   switch (random() % 8) {
-    case 0: return low;
-    case 1: return high;
-    default: return low * std::pow(high / low, between(random, 0, 1));
+    case 0:
+      return low;
+    case 1:
+      return high;
+    default:
+      return low * std::pow(high / low, between(random, 0, 1));
   }
 }
 
@@ -65,28 +71,41 @@ model::CellParameters<double> random_cell(Random& random) {
   n.current_offset_a = over_decades(random, 1e-6, 1) * p.capacity_ah;
   n.current_offset_correlation_s = over_decades(random, 1, 1e6);
   n.current_unknown_a = over_decades(random, 1e-3, 10) * p.capacity_ah;
-  p.tolerance = {.ocv_v = between(random, 0, 0.1), .resistance_fraction = between(random, 0, 1), .initial_soc = between(random, 0, 1), .drift_v = between(random, 0, 0.1)};
+  p.tolerance = {.ocv_v = between(random, 0, 0.1),
+                 .resistance_fraction = between(random, 0, 1),
+                 .initial_soc = between(random, 0, 1),
+                 .drift_v = between(random, 0, 0.1)};
   return p;
 }
 
 /// As random() wants it: within the cell's use, at the ends of what integers hold, or not there.
 std::int32_t hostile(Random& random, double low, double high) {
   switch (random() % 12) {
-    case 0: return no_reading;
-    case 1: return std::numeric_limits<std::int32_t>::max();
-    case 2: return std::numeric_limits<std::int32_t>::min() + 1;
-    case 3: return static_cast<std::int32_t>(random());
-    default: return static_cast<std::int32_t>(std::clamp(1e6 * between(random, low, high), -2'147'483'000.0, 2'147'483'000.0));
+    case 0:
+      return measurement::no_reading;
+    case 1:
+      return std::numeric_limits<std::int32_t>::max();
+    case 2:
+      return std::numeric_limits<std::int32_t>::min() + 1;
+    case 3:
+      return static_cast<std::int32_t>(random());
+    default:
+      return static_cast<std::int32_t>(std::clamp(1e6 * between(random, low, high), -2'147'483'000.0, 2'147'483'000.0));
   }
 }
 
 std::uint64_t step_us(Random& random) {
   switch (random() % 16) {
-    case 0: return 0;
-    case 1: return 1;
-    case 2: return random() >> 32;
-    case 3: return random() >> 20;
-    default: return 1'000ULL << random() % 14;
+    case 0:
+      return 0;
+    case 1:
+      return 1;
+    case 2:
+      return random() >> 32;
+    case 3:
+      return random() >> 20;
+    default:
+      return 1'000ULL << random() % 14;
   }
 }
 
@@ -96,22 +115,28 @@ struct Judged {
 
 template <class Estimator, class Cell>
 void live(Random& random, const model::CellParameters<double>& p, const Cell& cell, Judged& judged) {
-  Estimator estimator = random() % 2 == 0 ? Estimator() : Estimator(StartingPoint{static_cast<std::int32_t>(random() % 1'000'000'001), static_cast<std::int32_t>(random() % 1'000'000'001)});
+  Estimator estimator =
+      random() % 2 == 0 ? Estimator()
+                        : Estimator(measurement::StartingPoint{static_cast<std::int32_t>(random() % 1'000'000'001),
+                                                               static_cast<std::int32_t>(random() % 1'000'000'001)});
   const bool calm = random() % 2 == 0;  // steady steps, so that a filter gets somewhere before the next blow
   const std::uint64_t usual_us = 1'000ULL << random() % 14;
   std::uint64_t time_us = random() >> 30;
   constexpr double ends = 1.26;
   for (int k = 0; k < 500; ++k) {
     time_us += calm && random() % 32 != 0 ? usual_us : step_us(random);
-    const Sample sample{time_us, hostile(random, -p.limits.discharge_current_max_a, p.limits.charge_current_max_a), hostile(random, p.limits.voltage_min_v - 0.5, p.limits.voltage_max_v + 0.5),
-                        static_cast<std::int16_t>(random())};
+    const measurement::Sample sample{time_us,
+                                     hostile(random, -p.limits.discharge_current_max_a, p.limits.charge_current_max_a),
+                                     hostile(random, p.limits.voltage_min_v - 0.5, p.limits.voltage_max_v + 0.5),
+                                     static_cast<std::int16_t>(random())};
     const auto e = estimator.step(cell, sample);
-    const double soc = model::as_double(e.soc), sigma = model::as_double(e.soc_sigma);
+    const double soc = arithmetic::as_double(e.soc), sigma = arithmetic::as_double(e.soc_sigma);
     ASSERT_GE(soc, -ends + 1) << judged.cells << " " << k;
     ASSERT_LE(soc, ends) << judged.cells << " " << k;
     ASSERT_GE(sigma, 0) << judged.cells << " " << k;
     if ((e.flags & not_started) == 0) {
-      for (const auto& variance : estimator.state().covariance.variances()) ASSERT_GT(variance.mantissa(), 0) << judged.cells << " " << k;
+      for (const auto& variance : estimator.state().covariance.variances())
+        ASSERT_GT(variance.mantissa(), 0) << judged.cells << " " << k;
     }
     ++judged.samples;
   }
@@ -130,7 +155,8 @@ TEST(FixedPointEstimator, StaysInRangeForAnyCellFileAndAnySample) {
       live<SocEstimator<S>>(random, p, model::prepare<S, model::max_intervals>(p), judged);
     } else {
       p.noise.errors_are_states = true;
-      live<SocEstimator<S, model::ExtendedRc<0, 0, true>::Of>>(random, p, model::prepare<S, model::max_intervals>(p), judged);
+      live<SocEstimator<S, model::ExtendedRc<0, 0, true>::Of>>(random, p, model::prepare<S, model::max_intervals>(p),
+                                                               judged);
     }
   }
   EXPECT_GE(judged.samples, inputs);
@@ -139,4 +165,4 @@ TEST(FixedPointEstimator, StaysInRangeForAnyCellFileAndAnySample) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

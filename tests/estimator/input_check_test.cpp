@@ -2,17 +2,18 @@
 
 #include <gtest/gtest.h>
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
-constexpr model::Plausible plausible{.voltage_min_uv = 1'500'000, .voltage_max_uv = 4'100'000, .current_max_ua = 60'000'000};
+constexpr model::Plausible plausible{
+    .voltage_min_uv = 1'500'000, .voltage_max_uv = 4'100'000, .current_max_ua = 60'000'000};
 
 TEST(InputCheck, ReplacesACurrentThatCannotBeByTheLastOneBelieved) {
   InputCheck<float> check;
   std::uint32_t flags = 0;
   EXPECT_EQ(check.current(-3'000'000, plausible, flags).ua, -3'000'000);
   EXPECT_EQ(flags, 0U);
-  const BelievedCurrent missing = check.current(no_reading, plausible, flags);
+  const BelievedCurrent missing = check.current(measurement::no_reading, plausible, flags);
   EXPECT_EQ(missing.ua, -3'000'000);
   EXPECT_FALSE(missing.measured);
   EXPECT_EQ(flags, current_missing);
@@ -24,7 +25,7 @@ TEST(InputCheck, ReplacesACurrentThatCannotBeByTheLastOneBelieved) {
 TEST(InputCheck, TellsAMissingVoltageFromOneThatCannotBe) {
   InputCheck<float> check;
   std::uint32_t flags = 0;
-  EXPECT_FALSE(check.voltage_usable(no_reading, 3.3F, plausible, flags));
+  EXPECT_FALSE(check.voltage_usable(measurement::no_reading, 3.3F, plausible, flags));
   EXPECT_EQ(flags, voltage_missing);
   flags = 0;
   EXPECT_FALSE(check.voltage_usable(0, 3.3F, plausible, flags));
@@ -40,7 +41,8 @@ TEST(InputCheck, CallsAVoltageStuckWhenTheModelMovesAndItDoesNotAndTrustsItAgain
   EXPECT_EQ(flags, 0U);
   EXPECT_FALSE(check.voltage_usable(3'300'000, 3.35F, plausible, flags));
   EXPECT_EQ(flags, voltage_stuck);
-  EXPECT_FALSE(check.voltage_usable(3'300'000, 3.3F, plausible, flags)) << "a model that comes back to it proves nothing";
+  EXPECT_FALSE(check.voltage_usable(3'300'000, 3.3F, plausible, flags))
+      << "a model that comes back to it proves nothing";
   flags = 0;
   EXPECT_TRUE(check.voltage_usable(3'301'000, 3.35F, plausible, flags));
   EXPECT_EQ(flags, 0U);
@@ -62,4 +64,4 @@ TEST(InputCheck, AGapIsAStepTenTimesTheUsual) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -4,12 +4,12 @@
 
 #include <gtest/gtest.h>
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 template <class Scalar>
 class SocBankOfEveryScalar : public ::testing::Test {};
-using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(SocBankOfEveryScalar, Scalars);
 
 /// A curve that is flat but for a knee: 3.2 V, from 0.6 to 0.7 up to 3.3 V.
@@ -23,21 +23,25 @@ struct Asked {
   /// One sample of a cell that truly has that soc; all have moved by moved.
   void sample(double truth, double moved, double share, double sigma_v) {
     soc += moved;
-    const auto seen = [&](const model::Soc<S>& there) -> typename SocBank<S>::Seen {
-      const double at = model::as_double(there), half_v = std::abs(curve_v(at + 0.5 / 64) - curve_v(at - 0.5 / 64)) / 2;
-      return {model::Voltage<S>(curve_v(truth) + off_v - curve_v(at)), model::Voltage<S>(half_v), model::Variance<S>(sigma_v * sigma_v / 16)};
+    const auto seen = [&](const arithmetic::Soc<S>& there) -> typename SocBank<S>::Seen {
+      const double at = arithmetic::as_double(there),
+                   half_v = std::abs(curve_v(at + 0.5 / 64) - curve_v(at - 0.5 / 64)) / 2;
+      return {arithmetic::Voltage<S>(curve_v(truth) + off_v - curve_v(at)), arithmetic::Voltage<S>(half_v),
+              arithmetic::Variance<S>(sigma_v * sigma_v / 16)};
     };
-    const auto news = bank.step(model::Soc<S>(soc), model::Fraction<S>(share), model::Variance<S>(1e-6), model::Variance<S>(sigma_v * sigma_v), seen);
+    const auto news = bank.step(arithmetic::Soc<S>(soc), arithmetic::Fraction<S>(share), arithmetic::Variance<S>(1e-6),
+                                arithmetic::Variance<S>(sigma_v * sigma_v), seen);
     if (!news.any) return;
-    soc += model::as_double(news.moved);
-    variance = model::as_double(news.variance);
+    soc += arithmetic::as_double(news.moved);
+    variance = arithmetic::as_double(news.variance);
   }
 };
 
 template <class S>
 Asked<S> asked(double sigma_v) {
   Asked<S> a;
-  a.bank.open_at(model::Soc<S>(0.5), model::Variance<S>(sigma_v * sigma_v), [](const model::Soc<S>&) { return model::Exponent<S>(0); });
+  a.bank.open_at(arithmetic::Soc<S>(0.5), arithmetic::Variance<S>(sigma_v * sigma_v),
+                 [](const arithmetic::Soc<S>&) { return arithmetic::Exponent<S>(0); });
   return a;
 }
 
@@ -74,20 +78,23 @@ TYPED_TEST(SocBankOfEveryScalar, OneBadReadingDoesNotRuleTheTruthOut) {
   EXPECT_NEAR(std::sqrt(a.variance), 0.09, 0.02);
 }
 
-/// 1.5 deviations too much for 20 correlation times, on the lower plateau and over the knee: no certainty of the upper one.
-/// As curve_v, and below 0.1 steep, where soc is no surer than elsewhere: nothing there is far off.
+/// 1.5 deviations too much for 20 correlation times, on the lower plateau and over the knee: no certainty of the upper
+/// one. As curve_v, and below 0.1 steep, where soc is no surer than elsewhere: nothing there is far off.
 TYPED_TEST(SocBankOfEveryScalar, WhereAnythingCouldBeReadIsNotMoreLikelyForIt) {
   using S = TypeParam;
   auto a = asked<S>(0.01);
   const double truth = 0.4, off_v = 0.015;  // a lasting error of one and a half sigma
   double soc = 0.5;
   for (int k = 0; k < 128 * 200; ++k) {
-    const auto news = a.bank.step(model::Soc<S>(soc), model::Fraction<S>(0.2), model::Variance<S>(1e-6), model::Variance<S>(1e-4), [&](const model::Soc<S>& there) -> typename SocBank<S>::Seen {
-      const double at = model::as_double(there), steep_v = at < 0.25 ? 0.2 : 0;
-      return {model::Voltage<S>(curve_v(truth) + off_v - curve_v(at) + 0.1 * steep_v), model::Voltage<S>(0.001), model::Variance<S>(1e-5 + steep_v * steep_v)};
-    });
+    const auto news =
+        a.bank.step(arithmetic::Soc<S>(soc), arithmetic::Fraction<S>(0.2), arithmetic::Variance<S>(1e-6),
+                    arithmetic::Variance<S>(1e-4), [&](const arithmetic::Soc<S>& there) -> typename SocBank<S>::Seen {
+                      const double at = arithmetic::as_double(there), steep_v = at < 0.25 ? 0.2 : 0;
+                      return {arithmetic::Voltage<S>(curve_v(truth) + off_v - curve_v(at) + 0.1 * steep_v),
+                              arithmetic::Voltage<S>(0.001), arithmetic::Variance<S>(1e-5 + steep_v * steep_v)};
+                    });
     if (!news.any) continue;
-    soc += model::as_double(news.moved);
+    soc += arithmetic::as_double(news.moved);
   }
   EXPECT_GT(soc, 0.3) << "the steep end must not draw the mean to it";
 }
@@ -105,4 +112,4 @@ TYPED_TEST(SocBankOfEveryScalar, AnErrorThatLastsSpeaksOnce) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -6,59 +6,68 @@
 #include <cmath>
 #include <random>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 template <class S>
 auto table9() {
-  return model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
+  return model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
 }
 
-/// Samples of an hour of work at 1 Hz. The voltage is rough on purpose (R0 only): these tests are about the filter's manners.
-std::vector<Sample> work(std::size_t count) {
-  std::vector<Sample> samples(count);
+/// Samples of an hour of work at 1 Hz. The voltage is rough on purpose (R0 only): these tests are about the filter's
+/// manners.
+std::vector<measurement::Sample> work(std::size_t count) {
+  std::vector<measurement::Sample> samples(count);
   std::mt19937 random(5);
   double soc = 0.8;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::int32_t current_ua = k < 60 ? 0 : (k / 40) % 3 == 0 ? -5'000'000 : (k / 40) % 3 == 1 ? 1'000'000 : -200'000;
+    const std::int32_t current_ua = k < 60              ? 0
+                                    : (k / 40) % 3 == 0 ? -5'000'000
+                                    : (k / 40) % 3 == 1 ? 1'000'000
+                                                        : -200'000;
     soc += current_ua * 1e-6 / 3'600 / 6;
     const double voltage_v = 3.25 + 0.09 * soc + 0.015 * current_ua * 1e-6;
-    samples[k] = {k * 1'000'000, current_ua, static_cast<std::int32_t>(voltage_v * 1e6) + static_cast<std::int32_t>(random() % 2'000) - 1'000, 2'500};
+    samples[k] = {k * 1'000'000, current_ua,
+                  static_cast<std::int32_t>(voltage_v * 1e6) + static_cast<std::int32_t>(random() % 2'000) - 1'000,
+                  2'500};
   }
   return samples;
 }
 
 template <class S>
-std::vector<Estimate<S>> run(const std::vector<Sample>& samples, SocEstimator<S> estimator = SocEstimator<S>()) {
+std::vector<Estimate<S>> run(const std::vector<measurement::Sample>& samples,
+                             SocEstimator<S> estimator = SocEstimator<S>()) {
   const auto cell = table9<S>();
   std::vector<Estimate<S>> estimates;
-  for (const Sample& s : samples) estimates.push_back(estimator.step(cell, s));
+  for (const measurement::Sample& s : samples) estimates.push_back(estimator.step(cell, s));
   return estimates;
 }
 
 void expect_finite(const Estimate<float>& e, const std::string& where) {
-  EXPECT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) && std::isfinite(e.voltage_predicted_v)) << where;
+  EXPECT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) &&
+              std::isfinite(e.voltage_predicted_v))
+      << where;
   EXPECT_GT(e.soc_sigma, 0) << where;
 }
 
-TEST(SocEstimator, StateOfOneCellFitsIn24Bytes) {
-  EXPECT_EQ(sizeof(CellState<float, model::OneRc>), 24U);
-}
+TEST(SocEstimator, StateOfOneCellFitsIn24Bytes) { EXPECT_EQ(sizeof(CellState<float, model::OneRc>), 24U); }
 
 TEST(SocEstimator, EveryScalarTellsTheSameStory) {
   const auto samples = work(1'000);
-  const StartingPoint start{770'000'000, 5'000'000};  // between two edges: on one, the last bit decides which slope holds
+  const measurement::StartingPoint start{
+      770'000'000, 5'000'000};  // between two edges: on one, the last bit decides which slope holds
   const auto single = run<float>(samples, SocEstimator<float>(start));
   const auto twice = run<double>(samples, SocEstimator<double>(start));
-  const auto fixed = run<model::FixedPoint>(samples, SocEstimator<model::FixedPoint>(start));
+  const auto fixed = run<arithmetic::FixedPoint>(samples, SocEstimator<arithmetic::FixedPoint>(start));
   using Jet = ceres::Jet<double, 3>;
   const auto jets = run<Jet>(samples, SocEstimator<Jet>(start));
   for (std::size_t k = 0; k < samples.size(); ++k) {
     ASSERT_NEAR(single[k].soc, twice[k].soc, 2e-5) << k;
-    ASSERT_NEAR(model::as_double(fixed[k].soc), twice[k].soc, 1e-4) << k;  // a tenth of what is asked of fixed point in the end
-    ASSERT_NEAR(model::as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
+    ASSERT_NEAR(arithmetic::as_double(fixed[k].soc), twice[k].soc, 1e-4)
+        << k;  // a tenth of what is asked of fixed point in the end
+    ASSERT_NEAR(arithmetic::as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
     ASSERT_NEAR(jets[k].soc.a, twice[k].soc, 1e-5) << k;  // Charge<Jet> does not cut its corrections to counts of 4e-9
     ASSERT_NEAR(jets[k].voltage_predicted_v.a, twice[k].voltage_predicted_v, 1e-5) << k;
   }
@@ -66,11 +75,11 @@ TEST(SocEstimator, EveryScalarTellsTheSameStory) {
 
 TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   const auto cell = table9<float>();
-  SocEstimator<float> without_voltage(StartingPoint{650'000'000, 50'000'000});
-  auto e = without_voltage.step(cell, {0, 0, no_reading, 2'500});
+  SocEstimator<float> without_voltage(measurement::StartingPoint{650'000'000, 50'000'000});
+  auto e = without_voltage.step(cell, {0, 0, measurement::no_reading, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.05, 1e-6);
-  SocEstimator<float> sure(StartingPoint{650'000'000, 5'000'000});
+  SocEstimator<float> sure(measurement::StartingPoint{650'000'000, 5'000'000});
   e = sure.step(cell, {0, 0, 3'300'000, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
@@ -79,7 +88,7 @@ TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
 TEST(SocEstimator, AWideBeliefAndTheFirstVoltageAreWeighedTogether) {
   const auto cell = table9<float>();
   const auto started = [&](std::int32_t soc_ppb, std::int32_t sigma_ppb, std::int32_t voltage_uv) {
-    return SocEstimator<float>(StartingPoint{soc_ppb, sigma_ppb}).step(cell, {0, 0, voltage_uv, 2'500});
+    return SocEstimator<float>(measurement::StartingPoint{soc_ppb, sigma_ppb}).step(cell, {0, 0, voltage_uv, 2'500});
   };
   // 3.23 V is 16 %: where the curve is steep the voltage decides
   auto e = started(400'000'000, 200'000'000, 3'230'000);
@@ -99,19 +108,21 @@ TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
   const auto cell = table9<double>();
   for (const double truth : {0.55, 0.65, 0.75, 0.85}) {
     const auto at = model::look_up(cell, truth);
-    SocEstimator<double> estimator(StartingPoint{930'000'000, 150'000'000});
-    Estimate<double> e = estimator.step(cell, {0, 0, no_reading, 2'500});
-    for (std::uint64_t s = 1; s <= 600; ++s) e = estimator.step(cell, {s * 1'000'000, 0, static_cast<std::int32_t>(1e6 * at.ocv_v), 2'500});
+    SocEstimator<double> estimator(measurement::StartingPoint{930'000'000, 150'000'000});
+    Estimate<double> e = estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
+    for (std::uint64_t s = 1; s <= 600; ++s)
+      e = estimator.step(cell, {s * 1'000'000, 0, static_cast<std::int32_t>(1e6 * at.ocv_v), 2'500});
     EXPECT_LE(std::abs(e.soc - truth), 3 * e.soc_sigma) << truth;
   }
 }
 
-/// 20 %, told for certain, where it is 98 %: the voltage is 150 mV too high for ever. After ten minutes that is asked about.
+/// 20 %, told for certain, where it is 98 %: the voltage is 150 mV too high for ever. After ten minutes that is asked
+/// about.
 TEST(SocEstimator, ACertaintyThatCannotBeIsGivenUp) {
   const auto cell = table9<double>();
   const auto at = model::look_up(cell, 0.98);
-  SocEstimator<double> estimator(StartingPoint{200'000'000, 2'000'000});
-  estimator.step(cell, {0, 0, no_reading, 2'500});
+  SocEstimator<double> estimator(measurement::StartingPoint{200'000'000, 2'000'000});
+  estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Estimate<double> e;
   std::uint32_t flags = 0;
   for (std::uint64_t s = 1; s <= 1'800; ++s) {
@@ -125,7 +136,7 @@ TEST(SocEstimator, ACertaintyThatCannotBeIsGivenUp) {
 
 TEST(SocEstimator, OneReadingThatCannotBeIsFlaggedAndMovesNothing) {
   auto samples = work(1'000);
-  const SocEstimator<float> estimator(StartingPoint{800'000'000, 5'000'000});
+  const SocEstimator<float> estimator(measurement::StartingPoint{800'000'000, 5'000'000});
   const auto without = run<float>(samples, estimator);
   samples[500].voltage_uv += 300'000;
   const auto with = run<float>(samples, estimator);
@@ -138,10 +149,11 @@ TEST(SocEstimator, SigmaGoesOnGrowingOverAGapOfHours) {
   const auto cell = table9<float>();
   double before = 0;
   for (const std::uint64_t hours : {1U, 3U, 10U, 1'000U}) {
-    SocEstimator<float> estimator(StartingPoint{500'000'000, 5'000'000});
+    SocEstimator<float> estimator(measurement::StartingPoint{500'000'000, 5'000'000});
     estimator.step(cell, {0, 0, 3'285'000, 2'500});
     estimator.step(cell, {1'000'000, 0, 3'285'000, 2'500});
-    const auto e = estimator.step(cell, {hours * 3'600'000'000, no_reading, no_reading, 2'500});
+    const auto e =
+        estimator.step(cell, {hours * 3'600'000'000, measurement::no_reading, measurement::no_reading, 2'500});
     EXPECT_GT(e.soc_sigma, before) << hours;
     before = e.soc_sigma;
     if (hours == 1'000) break;
@@ -152,7 +164,8 @@ TEST(SocEstimator, SigmaGoesOnGrowingOverAGapOfHours) {
 TEST(SocEstimator, AStartWithoutACurrentIsLessSureOfTheVoltage) {
   const auto cell = table9<float>();
   SocEstimator<float> with, without;
-  const auto known = with.step(cell, {0, -3'000'000, 3'200'000, 2'500}), unknown = without.step(cell, {0, no_reading, 3'200'000, 2'500});
+  const auto known = with.step(cell, {0, -3'000'000, 3'200'000, 2'500}),
+             unknown = without.step(cell, {0, measurement::no_reading, 3'200'000, 2'500});
   EXPECT_GT(unknown.soc_sigma, 0.02);
   EXPECT_NEAR(unknown.soc, known.soc, 2.5 * (unknown.soc_sigma + known.soc_sigma));
 }
@@ -160,17 +173,17 @@ TEST(SocEstimator, AStartWithoutACurrentIsLessSureOfTheVoltage) {
 TEST(SocEstimator, WaitsForAVoltageWhenNothingIsKnown) {
   const auto cell = table9<float>();
   SocEstimator<float> estimator;
-  auto e = estimator.step(cell, {0, 0, no_reading, no_temperature});
+  auto e = estimator.step(cell, {0, 0, measurement::no_reading, measurement::no_temperature});
   EXPECT_EQ(e.flags, not_started | voltage_missing);
   EXPECT_NEAR(e.soc_sigma, 1 / std::sqrt(12.0), 1e-3);
-  e = estimator.step(cell, {1'000'000, 0, 3'400'000, no_temperature});
+  e = estimator.step(cell, {1'000'000, 0, 3'400'000, measurement::no_temperature});
   EXPECT_EQ(e.flags, 0U);
   EXPECT_GT(e.soc, 0.9);
 }
 
 TEST(SocEstimator, PredictsThroughAMissingVoltageWhileSigmaGrows) {
   auto samples = work(1'200);
-  for (std::size_t k = 600; k < 1'200; ++k) samples[k].voltage_uv = no_reading;
+  for (std::size_t k = 600; k < 1'200; ++k) samples[k].voltage_uv = measurement::no_reading;
   const auto e = run<float>(samples);
   for (std::size_t k = 600; k < 1'200; ++k) {
     ASSERT_EQ(e[k].flags, voltage_missing);
@@ -184,8 +197,8 @@ TEST(SocEstimator, PredictsThroughAMissingVoltageWhileSigmaGrows) {
 TEST(SocEstimator, GoesOnWithTheLastCurrentWhileItIsMissingAndSigmaGrowsFast) {
   auto samples = work(1'200);
   for (std::size_t k = 600; k < 1'200; ++k) {
-    samples[k].current_ua = no_reading;
-    samples[k].voltage_uv = no_reading;
+    samples[k].current_ua = measurement::no_reading;
+    samples[k].voltage_uv = measurement::no_reading;
   }
   const auto e = run<float>(samples);
   // ten minutes of an unknown 1.2 A (cell file), and of a current that may have ceased, of 6 Ah
@@ -199,7 +212,7 @@ TEST(SocEstimator, AGapIsFlaggedOnceAndMakesSigmaGrow) {
   auto samples = work(1'200);
   for (std::size_t k = 600; k < 1'200; ++k) samples[k].time_us += 600'000'000;
   samples[600].current_ua = 0;
-  const auto e = run<float>(samples, SocEstimator<float>(StartingPoint{800'000'000, 5'000'000}));
+  const auto e = run<float>(samples, SocEstimator<float>(measurement::StartingPoint{800'000'000, 5'000'000}));
   EXPECT_EQ(e[600].flags, time_gap);
   EXPECT_EQ(e[601].flags, 0U);
   EXPECT_EQ(e[599].flags, 0U);
@@ -211,7 +224,7 @@ TEST(SocEstimator, IgnoresASampleThatIsNotLater) {
   SocEstimator<float> estimator;
   const auto samples = work(100);
   Estimate<float> last;
-  for (const Sample& s : samples) last = estimator.step(cell, s);
+  for (const measurement::Sample& s : samples) last = estimator.step(cell, s);
   auto again = samples.back();
   again.voltage_uv = 2'500'000;
   const auto e = estimator.step(cell, again);
@@ -224,7 +237,7 @@ TEST(SocEstimator, IgnoresASampleThatIsNotLater) {
 TEST(SocEstimator, AStuckVoltageDoesNotDragTheEstimateAlong) {
   auto samples = work(3'600);
   for (std::size_t k = 600; k < samples.size(); ++k) samples[k].voltage_uv = samples[599].voltage_uv;
-  const auto stuck = run<float>(samples, SocEstimator<float>(StartingPoint{800'000'000, 20'000'000}));
+  const auto stuck = run<float>(samples, SocEstimator<float>(measurement::StartingPoint{800'000'000, 20'000'000}));
   std::size_t flagged = 0;
   for (const auto& e : stuck) flagged += (e.flags & voltage_stuck) != 0 ? 1 : 0;
   EXPECT_GT(flagged, 1'000U);
@@ -241,8 +254,13 @@ TEST(SocEstimator, NothingThatComesInMakesTheStateNotANumber) {
     std::uint64_t time_us = 0;
     for (int k = 0; k < 2'000; ++k) {
       time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
-      const auto anything = [&](std::int32_t usual) { return random() % 3 == 0 ? static_cast<std::int32_t>(random()) : random() % 7 == 0 ? no_reading : usual; };
-      const Sample sample{time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())};
+      const auto anything = [&](std::int32_t usual) {
+        return random() % 3 == 0   ? static_cast<std::int32_t>(random())
+               : random() % 7 == 0 ? measurement::no_reading
+                                   : usual;
+      };
+      const measurement::Sample sample{time_us, anything(-3'000'000), anything(3'280'000),
+                                       static_cast<std::int16_t>(random())};
       const auto e = estimator.step(cell, sample);
       expect_finite(e, "run " + std::to_string(run) + " step " + std::to_string(k));
       ASSERT_GE(e.soc, -0.26F);
@@ -259,13 +277,13 @@ TEST(SocEstimator, TheSameSamplesGiveTheSameBits) {
 }
 
 TEST(SocEstimator, AFirmwareTableOfExactSizeGivesTheSameBitsAsTheHostsLargeOne) {
-  static const auto parameters = read_cell("table9").parameters;
+  static const auto parameters = files::read_cell("table9").parameters;
   ASSERT_EQ(model::interval_count(parameters), 12U);
   const auto exact = model::prepare<float, 12>(parameters);
   const auto large = table9<float>();
   SocEstimator<float> a, b;
-  for (const Sample& s : work(2'000)) ASSERT_EQ(words(a.step(exact, s)), words(b.step(large, s)));
+  for (const measurement::Sample& s : work(2'000)) ASSERT_EQ(words(a.step(exact, s)), words(b.step(large, s)));
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

@@ -2,16 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 struct Watched {
-  model::Cell<double, model::max_intervals> cell = model::prepare<double, model::max_intervals>(read_cell("table9").parameters);
+  model::Cell<double, model::max_intervals> cell =
+      model::prepare<double, model::max_intervals>(files::read_cell("table9").parameters);
   SocQuality<double> quality;
 
-  SocQuality<double>::Now at(double soc, double sigma, double current_a = 0, double counted = 0, std::uint32_t flags = 0) {
+  SocQuality<double>::Now at(double soc, double sigma, double current_a = 0, double counted = 0,
+                             std::uint32_t flags = 0) {
     Estimate<double> e;
     e.soc = soc;
     e.soc_sigma = sigma;
@@ -54,4 +56,4 @@ TEST(SocQuality, UnderAHighCurrentLessIsObservable) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

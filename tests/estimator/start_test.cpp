@@ -4,27 +4,27 @@
 
 #include <cmath>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 template <class Scalar>
 class StartOfEveryScalar : public ::testing::Test {};
-using Scalars = ::testing::Types<float, double, model::FixedPoint>;
+using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(StartOfEveryScalar, Scalars);
 
 template <class Cell, class V>
 auto read(const Cell& cell, const V& ocv_v, double sigma_v) {
   using S = typename Cell::Scalar;
-  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, model::Variance<S>(sigma_v * sigma_v), nullptr});
+  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, arithmetic::Variance<S>(sigma_v * sigma_v), nullptr});
 }
 
 template <class S>
 std::pair<double, double> start(double voltage_v, double sigma_v) {
-  const auto cell = model::prepare<S, model::max_intervals>(read_cell("table9").parameters);
-  const auto belief = read(cell, model::Voltage<S>(voltage_v), sigma_v);
-  return {model::as_double(belief.soc), std::sqrt(model::as_double(belief.variance))};
+  const auto cell = model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
+  const auto belief = read(cell, arithmetic::Voltage<S>(voltage_v), sigma_v);
+  return {arithmetic::as_double(belief.soc), std::sqrt(arithmetic::as_double(belief.variance))};
 }
 
 TYPED_TEST(StartOfEveryScalar, IsNarrowWhereTheCurveIsSteep) {
@@ -43,11 +43,12 @@ TYPED_TEST(StartOfEveryScalar, IsAsWideAsThePlateau) {
 }
 
 TYPED_TEST(StartOfEveryScalar, HoldsTheTruthWithinTwoSigmaOnTheWholeCurve) {
-  const auto cell = model::prepare<double, model::max_intervals>(read_cell("table9").parameters);
+  const auto cell = model::prepare<double, model::max_intervals>(files::read_cell("table9").parameters);
   for (double soc = 0.01; soc < 1; soc += 0.01) {
     for (const double error_v : {-0.005, 0.0, 0.005}) {  // one standard deviation of a rested voltage
       const auto [found, sigma] = start<TypeParam>(model::look_up(cell, soc).ocv_v + error_v, 0.005);
-      EXPECT_LT(std::abs(found - soc), 2.1 * sigma) << "at soc " << soc << ", " << error_v << " V off: " << found << " +- " << sigma;
+      EXPECT_LT(std::abs(found - soc), 2.1 * sigma)
+          << "at soc " << soc << ", " << error_v << " V off: " << found << " +- " << sigma;
     }
   }
 }
@@ -58,4 +59,4 @@ TYPED_TEST(StartOfEveryScalar, AVoltageOutsideTheCurveIsItsEnd) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

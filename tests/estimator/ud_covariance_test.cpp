@@ -5,7 +5,7 @@
 #include <Eigen/Dense>
 #include <random>
 
-namespace bms {
+namespace bms::estimator {
 namespace {
 
 /// The textbook filter, dense and in Joseph form, in double: another algorithm for the same mathematics.
@@ -35,7 +35,7 @@ void expect_agreement(double tolerance, int steps, bool last_decays = false) {
   dense.p.setZero();
   for (std::size_t i = 0; i < N; ++i) {
     const double variance = 1e-3 * (1 + static_cast<double>(i));
-    start[i] = model::Variance<S>(variance);
+    start[i] = arithmetic::Variance<S>(variance);
     dense.p(static_cast<int>(i), static_cast<int>(i)) = variance;
   }
   ud.set_diagonal(start);
@@ -49,14 +49,17 @@ void expect_agreement(double tolerance, int steps, bool last_decays = false) {
     for (std::size_t i = 0; i < N; ++i) {
       for (std::size_t j = i; j < N; ++j) {
         // exactly representable in every scalar, so that only the algorithm is compared
-        const double entry = i == j ? (j + 1 == N && !last_decays ? 1.0 : std::round(1024 * (0.5 + 0.5 * uniform(random))) / 1024) : std::round(1024 * (uniform(random) - 0.5)) / 8192;
-        f[i][j] = model::Coupling<S>(entry);
+        const double entry =
+            i == j ? (j + 1 == N && !last_decays ? 1.0 : std::round(1024 * (0.5 + 0.5 * uniform(random))) / 1024)
+                   : std::round(1024 * (uniform(random) - 0.5)) / 8192;
+        f[i][j] = arithmetic::Coupling<S>(entry);
         f_dense(static_cast<int>(i), static_cast<int>(j)) = entry;
       }
-      const double noise = std::ldexp(std::round(16 * (1 + uniform(random))), -28), sensitivity = i == 0 ? 1.0 : std::round(64 * uniform(random)) / 64;
-      q[i] = model::Variance<S>(noise);
+      const double noise = std::ldexp(std::round(16 * (1 + uniform(random))), -28),
+                   sensitivity = i == 0 ? 1.0 : std::round(64 * uniform(random)) / 64;
+      q[i] = arithmetic::Variance<S>(noise);
       q_dense(static_cast<int>(i)) = noise;
-      h[i] = model::VoltagePerSoc<S>(sensitivity);
+      h[i] = arithmetic::VoltagePerSoc<S>(sensitivity);
       h_dense(static_cast<int>(i)) = sensitivity;
     }
     const double r = std::ldexp(1, -20);
@@ -64,10 +67,11 @@ void expect_agreement(double tolerance, int steps, bool last_decays = false) {
     dense.propagate(f_dense, q_dense);
     if (step % 3 != 0) {
       const double innovation = 0.0625;
-      const auto correction = ud.observe(h, model::Variance<S>(r), model::Voltage<S>(innovation));
+      const auto correction = ud.observe(h, arithmetic::Variance<S>(r), arithmetic::Voltage<S>(innovation));
       const auto gain = dense.observe(h_dense, r);
       for (std::size_t i = 0; i < N; ++i) {
-        ASSERT_NEAR(model::as_double(correction[i]), gain(static_cast<int>(i)) * innovation, tolerance * 10) << "state " << i << " in step " << step;
+        ASSERT_NEAR(arithmetic::as_double(correction[i]), gain(static_cast<int>(i)) * innovation, tolerance * 10)
+            << "state " << i << " in step " << step;
       }
     }
     const auto p = ud.dense();
@@ -87,12 +91,15 @@ void expect_agreement(double tolerance, int steps, bool last_decays = false) {
 TEST(UdCovariance, AgreesWithADenseJosephFilterForTwoStates) { expect_agreement<double, 2>(1e-11, 2'000); }
 TEST(UdCovariance, AgreesWithADenseJosephFilterForThreeStates) { expect_agreement<double, 3>(1e-11, 2'000); }
 TEST(UdCovariance, AgreesWithADenseJosephFilterForFiveStates) { expect_agreement<double, 5>(1e-10, 2'000); }
-TEST(UdCovariance, AgreesWithADenseJosephFilterWhereTheLastStateDecays) { expect_agreement<double, 4>(1e-10, 2'000, true); }
+TEST(UdCovariance, AgreesWithADenseJosephFilterWhereTheLastStateDecays) {
+  expect_agreement<double, 4>(1e-10, 2'000, true);
+}
 TEST(UdCovariance, AgreesInFloatToItsDigits) { expect_agreement<float, 2>(1e-4, 2'000); }
-TEST(UdCovariance, AgreesInFixedPointToItsDigits) { expect_agreement<model::FixedPoint, 3>(1e-4, 2'000); }
+TEST(UdCovariance, AgreesInFixedPointToItsDigits) { expect_agreement<arithmetic::FixedPoint, 3>(1e-4, 2'000); }
 
 TEST(UdCovariance, StaysPositiveWhereTheOrdinaryFormOfAFloatFilterDoesNot) {
-  // a nearly noiseless measurement of one combination of two states, again and again: the classic way to lose a covariance
+  // a nearly noiseless measurement of one combination of two states, again and again: the classic way to lose a
+  // covariance
   UdCovariance<float, 2> ud;
   ud.set_diagonal({1.0F, 1.0F});
   Eigen::Matrix2f p = Eigen::Matrix2f::Identity();
@@ -112,4 +119,4 @@ TEST(UdCovariance, StaysPositiveWhereTheOrdinaryFormOfAFloatFilterDoesNot) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::estimator

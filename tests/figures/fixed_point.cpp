@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/emulator.hpp"
-#include "host_sim/recording.hpp"
+#include "files/cell_file.hpp"
+#include "files/recording.hpp"
+#include "images/emulator.hpp"
 
 namespace bms {
 
@@ -18,7 +18,8 @@ std::vector<FixedPointRun> fixed_point_runs(const std::filesystem::path& shift, 
       const bool slow = entry.path().filename().string().starts_with("ocv_");
       if (entry.path().extension() == ".csv" && (slow_ones || !slow)) runs.push_back({entry.path().string(), cell});
     }
-    std::sort(runs.begin() + static_cast<std::ptrdiff_t>(before), runs.end(), [](const auto& a, const auto& b) { return a.recording < b.recording; });
+    std::sort(runs.begin() + static_cast<std::ptrdiff_t>(before), runs.end(),
+              [](const auto& a, const auto& b) { return a.recording < b.recording; });
   };
   all_in("a123_26650", "a123_26650", true);
   all_in("a123_esctoolbox", "a123_esctoolbox_extended", true);
@@ -27,10 +28,13 @@ std::vector<FixedPointRun> fixed_point_runs(const std::filesystem::path& shift, 
 }
 
 Deviation deviation(const FixedPointRun& run) {
-  const CellFile cell = read_cell(run.cell);
-  const auto all = samples(read_recording(run.recording));
-  const auto rows = [&](ScalarKind scalar) { return run_on_host(cell, all, std::nullopt, scalar).rows; };
-  const auto fixed = rows(ScalarKind::fixed), once = rows(ScalarKind::single), twice = rows(ScalarKind::twice);
+  const files::CellFile cell = files::read_cell(run.cell);
+  const auto all = files::samples(files::read_recording(run.recording));
+  const auto rows = [&](host_sim::ScalarKind scalar) {
+    return host_sim::run_on_host(cell, all, std::nullopt, scalar).rows;
+  };
+  const auto fixed = rows(host_sim::ScalarKind::fixed), once = rows(host_sim::ScalarKind::single),
+             twice = rows(host_sim::ScalarKind::twice);
   Deviation d{all.size()};
   for (std::size_t k = 0; k < all.size(); ++k) {
     d.of_fixed = std::max(d.of_fixed, std::abs(fixed[k].soc - twice[k].soc));
@@ -39,11 +43,12 @@ Deviation deviation(const FixedPointRun& run) {
   return d;
 }
 
-std::optional<Difference> difference_on_microbit(const FixedPointRun& run) {
-  const CellFile cell = read_cell(run.cell);
-  const auto all = samples(read_recording(run.recording));
-  const Track host = run_on_host(cell, all, std::nullopt, ScalarKind::fixed), board = run_on_board(emulated_boards().back(), cell, all, std::nullopt);
-  return first_difference(host, board, ScalarKind::fixed);
+std::optional<host_sim::Difference> difference_on_microbit(const FixedPointRun& run) {
+  const files::CellFile cell = files::read_cell(run.cell);
+  const auto all = files::samples(files::read_recording(run.recording));
+  const host_sim::Track host = host_sim::run_on_host(cell, all, std::nullopt, host_sim::ScalarKind::fixed),
+                        board = images::run_on_board(images::emulated_boards().back(), cell, all, std::nullopt);
+  return host_sim::first_difference(host, board, host_sim::ScalarKind::fixed);
 }
 
 }  // namespace bms

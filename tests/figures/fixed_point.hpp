@@ -1,9 +1,10 @@
-// The estimator in integers over the shift and every real recording: how far it is from the estimator in double, and whether the
-// Cortex-M0 computes the host's words.
+// The estimator in integers over the shift and every real recording: how far it is from the estimator in double, and
+// whether the Cortex-M0 computes the host's words.
 //
-// Each recording with the cell file that is made for it; the drives and pulses of the first cell with the extended file, too. Not the slow runs: a
-// C/30 current that stays for hours is within what that file says may be the sensor's offset, and is taken for it (estimator/current_at_rest.hpp).
-// What soc is sought anew from then on is chance in every scalar.
+// Each recording with the cell file that is made for it; the drives and pulses of the first cell with the extended
+// file, too. Not the slow runs: a C/30 current that stays for hours is within what that file says may be the sensor's
+// offset, and is taken for it (estimator/current_at_rest.hpp). What soc is sought anew from then on is chance in every
+// scalar.
 #pragma once
 
 #include <filesystem>
@@ -29,6 +30,6 @@ struct Deviation {
 Deviation deviation(const FixedPointRun& run);
 
 /// Where the microbit's first word that is not the host's is, or nothing.
-std::optional<Difference> difference_on_microbit(const FixedPointRun& run);
+std::optional<host_sim::Difference> difference_on_microbit(const FixedPointRun& run);
 
 }  // namespace bms

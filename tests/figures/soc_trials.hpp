@@ -1,12 +1,13 @@
-// The estimator on real recordings in trouble: started wrong, cut in the middle of the plateau, with sensors that are off.
+// The estimator on real recordings in trouble: started wrong, cut in the middle of the plateau, with sensors that are
+// off.
 #pragma once
 
 #include <filesystem>
 #include <functional>
 #include <string>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/recording.hpp"
+#include "files/cell_file.hpp"
+#include "files/recording.hpp"
 #include "host_sim/replay.hpp"
 
 namespace bms {
@@ -14,9 +15,9 @@ namespace bms {
 /// One of them: what came of the recording, and what the estimator is told.
 struct SocTrial {
   std::string name, trouble;
-  const CellFile& cell;
-  Recording recording;
-  Belief belief;
+  const files::CellFile& cell;
+  files::Recording recording;
+  host_sim::Belief belief;
 };
 
 /// Recordings of data/a123_26650 and data/a123_esctoolbox, with the extended cell file of that name.

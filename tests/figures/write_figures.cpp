@@ -1,6 +1,7 @@
-// Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on the board;
-// with "board": writes that and the keys of mechanisms, nothing of recordings and speeds; with "protection": only what protection costs, with "budgets": only
-// flash, RAM and stack of the boards; with "fixed": how far integers are from double, and that the microbit computes them.
+// Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on
+// the board; with "board": writes that and the keys of mechanisms, nothing of recordings and speeds; with "protection":
+// only what protection costs, with "budgets": only flash, RAM and stack of the boards; with "fixed": how far integers
+// are from double, and that the microbit computes them.
 //
 // Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
 #include <algorithm>
@@ -13,17 +14,17 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/child_process.hpp"
-#include "host_sim/committed_figures.hpp"
-#include "host_sim/emulator.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/recording.hpp"
+#include "files/cell_file.hpp"
+#include "files/committed_figures.hpp"
+#include "files/recording.hpp"
+#include "files/text_file.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/simulation.hpp"
-#include "host_sim/study.hpp"
-#include "host_sim/text_file.hpp"
 #include "identification/identify.hpp"
+#include "images/child_process.hpp"
+#include "images/emulator.hpp"
+#include "images/firmware_image.hpp"
+#include "study/study.hpp"
 #include "tests/figures/duty.hpp"
 #include "tests/figures/fixed_point.hpp"
 #include "tests/figures/soc_trials.hpp"
@@ -38,36 +39,40 @@ const std::string shift = (source / "recordings/forklift_shift.csv").string();
 
 struct Case {
   std::string title, recording, cell;
-  std::optional<Belief> belief;
+  std::optional<host_sim::Belief> belief;
 };
 
-std::string percent(const std::optional<double>& fraction) { return fraction ? fmt::format("{:.2f} %", 100 * *fraction) : "-"; }
+std::string percent(const std::optional<double>& fraction) {
+  return fraction ? fmt::format("{:.2f} %", 100 * *fraction) : "-";
+}
 
-ReplayResult replayed(const Case& c) {
-  ReplayResult r;
-  r.cell = read_cell(c.cell);
-  r.recording = read_recording(c.recording);
+host_sim::ReplayResult replayed(const Case& c) {
+  host_sim::ReplayResult r;
+  r.cell = files::read_cell(c.cell);
+  r.recording = files::read_recording(c.recording);
   r.target = "host";
-  r.track = run_on_host(r.cell, samples(r.recording), starting_point(c.belief), r.scalar);
-  evaluate(r);
+  r.track = host_sim::run_on_host(r.cell, files::samples(r.recording), host_sim::starting_point(c.belief), r.scalar);
+  host_sim::evaluate(r);
   return r;
 }
 
 std::string accuracy_row(const Case& c) {
-  const ReplayResult r = replayed(c);
-  return fmt::format("| {} | {} | {} | {} | {} | {:.2f} mV |\n", c.title, percent(r.soc.rmse), percent(r.soc.max_error), percent(r.soc.rmse_after_30min),
-                     percent(r.soc.within_2_sigma), 1e3 * r.voltage.prediction_rmse_v.value_or(0));
+  const host_sim::ReplayResult r = replayed(c);
+  return fmt::format("| {} | {} | {} | {} | {} | {:.2f} mV |\n", c.title, percent(r.soc.rmse), percent(r.soc.max_error),
+                     percent(r.soc.rmse_after_30min), percent(r.soc.within_2_sigma),
+                     1e3 * r.voltage.prediction_rmse_v.value_or(0));
 }
 
 const std::string accuracy_heading =
-    "| recording and start | SOC RMSE | largest error | RMSE after 30 min | inside two sigma | one-step voltage RMSE |\n|---|---|---|---|---|---|\n";
+    "| recording and start | SOC RMSE | largest error | RMSE after 30 min | inside two sigma | one-step voltage RMSE "
+    "|\n|---|---|---|---|---|---|\n";
 
 std::string shift_accuracy() {
   std::string table = accuracy_heading;
   table += accuracy_row({"started by itself (98 %)", shift, "table9", std::nullopt});
-  table += accuracy_row({"told 98 %, which is right", shift, "table9", Belief{0.98, 0.02}});
-  table += accuracy_row({"told 78 %, believed to 2 %", shift, "table9", Belief{0.78, 0.02}});
-  table += accuracy_row({"told 78 %, believed to 20 %", shift, "table9", Belief{0.78, 0.2}});
+  table += accuracy_row({"told 98 %, which is right", shift, "table9", host_sim::Belief{0.98, 0.02}});
+  table += accuracy_row({"told 78 %, believed to 2 %", shift, "table9", host_sim::Belief{0.78, 0.02}});
+  table += accuracy_row({"told 78 %, believed to 20 %", shift, "table9", host_sim::Belief{0.78, 0.2}});
   return table;
 }
 
@@ -79,19 +84,24 @@ std::string real_accuracy() {
   }
   std::sort(files.begin(), files.end());
   for (const auto& file : files) {
-    const Recording r = read_recording(file.string());
+    const files::Recording r = files::read_recording(file.string());
     if (r.soc_ref.empty()) continue;
     table += accuracy_row({file.stem().string(), file.string(), "a123_26650", std::nullopt});
-    if (file.stem() == "udds_P25_A002") table += accuracy_row({"the same, told 20 % less than it has, believed to 20 %", file.string(), "a123_26650", Belief{r.soc_ref.front() - 0.2, 0.2}});
+    if (file.stem() == "udds_P25_A002")
+      table += accuracy_row({"the same, told 20 % less than it has, believed to 20 %", file.string(), "a123_26650",
+                             host_sim::Belief{r.soc_ref.front() - 0.2, 0.2}});
   }
   return table;
 }
 
 std::string thousand_hours() {
-  std::string table = "| estimator and sensors | SOC RMSE, first to last hundred hours | largest error | inside two sigma | mean sigma | subnormal numbers | time of a step, last over first |\n|---|---|---|---|---|---|---|\n";
+  std::string table =
+      "| estimator and sensors | SOC RMSE, first to last hundred hours | largest error | inside two sigma | mean sigma "
+      "| subnormal numbers | time of a step, last over first |\n|---|---|---|---|---|---|---|\n";
   const auto row = [&](const char* what, const DutyFigures& f) {
-    table += fmt::format("| {} | {:.2f} % ({:.2f} to {:.2f} %) | {:.2f} % | {:.1f} % | {:.2f} % | {} | {:.2f} |\n", what, 100 * f.rmse, 100 * f.rmse_first, 100 * f.rmse_last, 100 * f.largest, 100 * f.inside, 100 * f.mean_sigma,
-                         f.subnormal, f.slower);
+    table += fmt::format("| {} | {:.2f} % ({:.2f} to {:.2f} %) | {:.2f} % | {:.1f} % | {:.2f} % | {} | {:.2f} |\n",
+                         what, 100 * f.rmse, 100 * f.rmse_first, 100 * f.rmse_last, 100 * f.largest, 100 * f.inside,
+                         100 * f.mean_sigma, f.subnormal, f.slower);
   };
   row("as in the cell file: 20 mA over an hour, 0.5 mV over ten", duty_as_in_the_file());
   row("errors as states, 30 mA and 2 mV over ten hours", duty_with_errors());
@@ -100,7 +110,8 @@ std::string thousand_hours() {
 
 std::string step_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
-  for (const auto& [what, value] : step_figures(emulated_boards().front(), read_cell("table9"), samples(read_recording(shift)))) {
+  for (const auto& [what, value] : step_figures(images::emulated_boards().front(), files::read_cell("table9"),
+                                                files::samples(files::read_recording(shift)))) {
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   }
   return table;
@@ -108,53 +119,74 @@ std::string step_cost() {
 
 std::string microbit_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
-  for (const auto& [what, value] : core_figures(emulated_boards().back(), read_cell("table9"), samples(read_recording(shift)))) {
+  for (const auto& [what, value] : core_figures(images::emulated_boards().back(), files::read_cell("table9"),
+                                                files::samples(files::read_recording(shift)))) {
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   }
   return table;
 }
 
-/// How far integers, and float, are from double over whole recordings, and whether the microbit computes the same words as the host.
+/// How far integers, and float, are from double over whole recordings, and whether the microbit computes the same words
+/// as the host.
 std::string fixed_point() {
-  std::string table = "| recording | cell | estimates | fixed point less double | float less double | words on the microbit |\n|---|---|---|---|---|---|\n";
+  std::string table =
+      "| recording | cell | estimates | fixed point less double | float less double | words on the microbit "
+      "|\n|---|---|---|---|---|---|\n";
   for (const FixedPointRun& run : fixed_point_runs(shift, data)) {
     const Deviation d = deviation(run);
     const auto difference = difference_on_microbit(run);
-    table += fmt::format("| {} | {} | {} | {:.4f} % | {:.4f} % | {} |\n", std::filesystem::path(run.recording).stem().string(), run.cell, d.estimates, 100 * d.of_fixed, 100 * d.of_float,
+    table += fmt::format("| {} | {} | {} | {:.4f} % | {:.4f} % | {} |\n",
+                         std::filesystem::path(run.recording).stem().string(), run.cell, d.estimates, 100 * d.of_fixed,
+                         100 * d.of_float,
                          difference ? fmt::format("differ from sample {}", difference->sample) : "all equal");
   }
   return table;
 }
 
 /// table9 with mechanisms at usual values, as a cell file would have them.
-CellFile table9_with(const std::vector<std::pair<const char*, std::vector<double>>>& mechanisms, bool errors) {
-  CellFile cell = read_cell("table9");
+files::CellFile table9_with(const std::vector<std::pair<const char*, std::vector<double>>>& mechanisms, bool errors) {
+  files::CellFile cell = files::read_cell("table9");
   cell.parameters.noise.errors_are_states = errors;
   for (const auto& [id, values] : mechanisms) {
     model::MechanismSetting m = model::unsaid(model::mechanism_index(id), cell.parameters.capacity_ah);
     std::copy(values.begin(), values.end(), m.value.begin());
-    put_mechanism(cell, m);
+    files::put_mechanism(cell, m);
   }
-  return parse_cell(cell_text(cell), "table9 with mechanisms");
+  return files::parse_cell(files::cell_text(cell), "table9 with mechanisms");
 }
 
 std::string mechanism_cost() {
-  const std::pair<const char*, std::vector<double>> hysteresis{"ocv_hysteresis", {0.006}}, slow{"slow_polarisation", {0.004}}, fast{"fast_polarisation", {0.002}},
-      warm{"temperature_resistance", {15'000, 30'000}}, heat{"self_heating", {1}}, shape{"ocv_shape", {0.02, -0.01}}, entropic{"entropic_ocv", {1e-4, 2e-4, -1e-4, 1e-4}},
-      transfer{"charge_transfer", {0.3, 0.5}}, offset{"current_offset", {0.02}}, gain{"voltage_gain", {0.001}};
-  const auto all = samples(read_recording(shift));
-  const EmulatedBoard& board = emulated_boards().front();
+  const std::pair<const char*, std::vector<double>> hysteresis{"ocv_hysteresis", {0.006}},
+      slow{"slow_polarisation", {0.004}}, fast{"fast_polarisation", {0.002}},
+      warm{"temperature_resistance", {15'000, 30'000}}, heat{"self_heating", {1}}, shape{"ocv_shape", {0.02, -0.01}},
+      entropic{"entropic_ocv", {1e-4, 2e-4, -1e-4, 1e-4}}, transfer{"charge_transfer", {0.3, 0.5}},
+      offset{"current_offset", {0.02}}, gain{"voltage_gain", {0.001}};
+  const auto all = files::samples(files::read_recording(shift));
+  const images::EmulatedBoard& board = images::emulated_boards().front();
   std::string table = "| table9 with | step, mean [instructions] | step, longest |\n|---|---|---|\n";
   using Set = std::vector<std::pair<const char*, std::vector<double>>>;
   const auto row = [&](const Set& set, bool errors) {
-    const CellFile cell = table9_with(set, errors);
-    const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), all, state_count(cell));
+    const files::CellFile cell = table9_with(set, errors);
+    const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
+                                             all, host_sim::state_count(cell));
     std::string names = errors ? "`noise.errors_are_states`" : "";
     for (const auto& [id, values] : set) names += fmt::format("{}`{}`", names.empty() ? "" : ", ", id);
     table += fmt::format("| {} | {:.0f} | {} |\n", names.empty() ? "nothing" : names, cost.mean, cost.most);
   };
-  for (const Set& set : std::vector<Set>{
-           {}, {offset}, {warm}, {transfer}, {entropic}, {shape}, {gain}, {heat}, {hysteresis}, {fast}, {slow}, {hysteresis, slow}, {hysteresis, slow, warm, offset}}) row(set, false);
+  for (const Set& set : std::vector<Set>{{},
+                                         {offset},
+                                         {warm},
+                                         {transfer},
+                                         {entropic},
+                                         {shape},
+                                         {gain},
+                                         {heat},
+                                         {hysteresis},
+                                         {fast},
+                                         {slow},
+                                         {hysteresis, slow},
+                                         {hysteresis, slow, warm, offset}})
+    row(set, false);
   for (const Set& set : std::vector<Set>{{}, {hysteresis, warm}}) row(set, true);
   return table;
 }
@@ -166,7 +198,9 @@ std::string mechanism_tables() {
     for (std::size_t k = 0; k < info.parameters; ++k) {
       const model::Parameter& p = info.parameter[k];
       const char* per = p.per == model::Per::ah ? " per Ah" : p.per == model::Per::siemens ? ", over Ah" : "";
-      table += fmt::format("| {} | `{}` | {} | {:g} .. {:g}{} | {} |\n", k > 0 ? "" : "`[" + table_of(info) + "]`" + (info.on_board ? "" : " *host*"), p.name, p.unit == "1" ? "" : p.unit, p.low, p.high, per, p.meaning);
+      table += fmt::format("| {} | `{}` | {} | {:g} .. {:g}{} | {} |\n",
+                           k > 0 ? "" : "`[" + files::table_of(info) + "]`" + (info.on_board ? "" : " *host*"), p.name,
+                           p.unit == "1" ? "" : p.unit, p.low, p.high, per, p.meaning);
     }
   }
   return table;
@@ -174,46 +208,67 @@ std::string mechanism_tables() {
 
 std::string speed() {
   std::string table = "| what | figure |\n|---|---|\n";
-  const CellFile cell = read_cell("table9");
-  const Recording recording = read_recording(shift);
-  const auto all = samples(recording);
-  for (const ScalarKind scalar : {ScalarKind::single, ScalarKind::twice, ScalarKind::fixed}) {
-    table += fmt::format("| replay on the host, {} | {:.1f} million steps/s |\n", name_of(scalar), run_on_host(cell, all, std::nullopt, scalar).steps_per_second / 1e6);
+  const files::CellFile cell = files::read_cell("table9");
+  const files::Recording recording = files::read_recording(shift);
+  const auto all = files::samples(recording);
+  for (const host_sim::ScalarKind scalar :
+       {host_sim::ScalarKind::single, host_sim::ScalarKind::twice, host_sim::ScalarKind::fixed}) {
+    table += fmt::format("| replay on the host, {} | {:.1f} million steps/s |\n", host_sim::name_of(scalar),
+                         host_sim::run_on_host(cell, all, std::nullopt, scalar).steps_per_second / 1e6);
   }
-  const EmulatedBoard& board = emulated_boards().front();
-  const auto image = firmware_image(board.name, cell, Image::replay);
+  const images::EmulatedBoard& board = images::emulated_boards().front();
+  const auto image = images::firmware_image(board.name, cell, images::Image::replay);
   double fastest = 0;
-  for (int k = 0; k < 3; ++k) fastest = std::max(fastest, run_on_board(board, image, all, std::nullopt).steps_per_second);
+  for (int k = 0; k < 3; ++k)
+    fastest = std::max(fastest, images::run_on_board(board, image, all, std::nullopt).steps_per_second);
   table += fmt::format("| replay on the emulated {} | {:.2f} million steps/s |\n", board.name, fastest / 1e6);
   table += fmt::format("| reading the shift's CSV | {:.0f} MB/s |\n", recording.read_mb_per_second);
   return table;
 }
 
 /// Identified and judged as a user does it: bms identify, its JSON.
-std::string identified_row(const std::vector<std::string>& from, const std::vector<std::string>& judges, const std::string& more) {
-  const TemporaryFolder folder;
+std::string identified_row(const std::vector<std::string>& from, const std::vector<std::string>& judges,
+                           const std::string& more) {
+  const images::TemporaryFolder folder;
   const auto real = [](const std::string& name) { return (data / "a123_26650" / (name + ".csv")).string(); };
-  std::vector<std::string> command = {BMS_TOOL, "identify", "--ocv", real("ocv_P25_dis"), real("ocv_P25_chg"), "--start", "a123_26650", "--window", "0.95:0.10", "--quiet",
-                                      "--out", (folder.path() / "c.toml").string(), "--json", (folder.path() / "r.json").string()};
+  std::vector<std::string> command = {BMS_TOOL,
+                                      "identify",
+                                      "--ocv",
+                                      real("ocv_P25_dis"),
+                                      real("ocv_P25_chg"),
+                                      "--start",
+                                      "a123_26650",
+                                      "--window",
+                                      "0.95:0.10",
+                                      "--quiet",
+                                      "--out",
+                                      (folder.path() / "c.toml").string(),
+                                      "--json",
+                                      (folder.path() / "r.json").string()};
   if (!more.empty()) command.insert(command.end(), {"--nodes", more});
   command.push_back("--recording");
   for (const std::string& name : from) command.push_back(real(name));
   command.push_back("--validate");
   for (const std::string& name : judges) command.push_back(real(name));
-  output_of(command);
-  const nlohmann::json r = nlohmann::json::parse(read_file(folder.path() / "r.json"));
+  images::output_of(command);
+  const nlohmann::json r = nlohmann::json::parse(files::read_file(folder.path() / "r.json"));
   std::string row, names;
   for (const std::string& name : from) names += (names.empty() ? "" : " + ") + name;
   for (const nlohmann::json& v : r["validations"]) {
-    row += fmt::format("| {} | {} | {:.2f} mV, {:.1f} % | {} | {:.2f} mV, {:.1f} % |\n", names, more.empty() ? "tenths" : more, 1e3 * r["estimation"]["rmse_v"].get<double>(),
-                       r["estimation"]["fit_percent"].get<double>(), std::filesystem::path(v["recording"].get<std::string>()).stem().string(), 1e3 * v["rmse_v"].get<double>(), v["fit_percent"].get<double>());
+    row += fmt::format("| {} | {} | {:.2f} mV, {:.1f} % | {} | {:.2f} mV, {:.1f} % |\n", names,
+                       more.empty() ? "tenths" : more, 1e3 * r["estimation"]["rmse_v"].get<double>(),
+                       r["estimation"]["fit_percent"].get<double>(),
+                       std::filesystem::path(v["recording"].get<std::string>()).stem().string(),
+                       1e3 * v["rmse_v"].get<double>(), v["fit_percent"].get<double>());
   }
   return row;
 }
 
 std::string real_identification() {
-  std::string table = "| identified from | nodes | RMSE, fit there | judged on | RMSE, fit there |\n|---|---|---|---|---|\n";
-  const std::string udds = "udds_P25_A002", dyn = "dyn20_P25_A002", pulse = "pulse_P25_A002", charge = "cccv2C_P25_A002";
+  std::string table =
+      "| identified from | nodes | RMSE, fit there | judged on | RMSE, fit there |\n|---|---|---|---|---|\n";
+  const std::string udds = "udds_P25_A002", dyn = "dyn20_P25_A002", pulse = "pulse_P25_A002",
+                    charge = "cccv2C_P25_A002";
   table += identified_row({udds}, {dyn, pulse}, "");
   table += identified_row({dyn}, {udds, pulse}, "");
   table += identified_row({dyn}, {udds}, "0.5");
@@ -225,11 +280,13 @@ std::string real_identification() {
 std::string identification_speed() {
   namespace id = identification;
   constexpr std::size_t samples_used = 20'000;
-  const CellFile cell = read_cell("table9");
-  const Recording recording = read_recording(shift);
+  const files::CellFile cell = files::read_cell("table9");
+  const files::Recording recording = files::read_recording(shift);
   id::Record r;
-  r.data = {{recording.time_s.begin(), recording.time_s.begin() + samples_used}, {recording.current_a.begin(), recording.current_a.begin() + samples_used},
-            {recording.voltage_v.begin(), recording.voltage_v.begin() + samples_used}, 6};
+  r.data = {{recording.time_s.begin(), recording.time_s.begin() + samples_used},
+            {recording.current_a.begin(), recording.current_a.begin() + samples_used},
+            {recording.voltage_v.begin(), recording.voltage_v.begin() + samples_used},
+            6};
   r.initial_soc = 0.98;
   r.estimate_initial_soc = true;
   r.initial_soc_sigma = 0.01;
@@ -243,50 +300,57 @@ std::string identification_speed() {
     return best_s;
   };
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
-  const double simulation_s = fastest_s([&] { simulate(tables, 6, r.data.time_s, r.data.current_a, 0.98); });
-  std::string table = fmt::format("| 20,000 samples | time | as many simulations |\n|---|---|---|\n| simulation, open loop | {:.2f} ms | 1 |\n", 1e3 * simulation_s);
-  for (const auto& [name, nodes] : {std::pair{"grey box, R0, R1, C1 and both initial states, from three starts", std::vector{0.6}}, std::pair{"grey box, the same at nine nodes", id::nodes_for(0.22, 0.98)}}) {
+  const double simulation_s = fastest_s([&] { host_sim::simulate(tables, 6, r.data.time_s, r.data.current_a, 0.98); });
+  std::string table = fmt::format(
+      "| 20,000 samples | time | as many simulations |\n|---|---|---|\n| simulation, open loop | {:.2f} ms | 1 |\n",
+      1e3 * simulation_s);
+  for (const auto& [name, nodes] :
+       {std::pair{"grey box, R0, R1, C1 and both initial states, from three starts", std::vector{0.6}},
+        std::pair{"grey box, the same at nine nodes", id::nodes_for(0.22, 0.98)}}) {
     id::GreyBoxOptions options;
     options.soc_nodes = nodes;
-    const double s = fastest_s([&] { id::identify_grey_box(cell.parameters, {r}, options, id::Method::trust_region_reflective); });
+    const double s =
+        fastest_s([&] { id::identify_grey_box(cell.parameters, {r}, options, id::Method::trust_region_reflective); });
     table += fmt::format("| {} | {:.0f} ms | {:.0f} |\n", name, 1e3 * s, s / simulation_s);
   }
-  const double study_s = study_plant(cell.parameters, 1, {}).seconds;
+  const double study_s = study::study_plant(cell.parameters, 1, {}).seconds;
   table += fmt::format("| `bms study`, all of it (42 identifications, other lengths) | {:.1f} s | |\n", study_s);
   return table;
 }
 
 std::string protection_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
-  for (const auto& [what, value] : protection_figures(emulated_boards().front(), read_cell("table9"))) table += fmt::format("| {} | {:.0f} |\n", what, value);
+  for (const auto& [what, value] : protection_figures(images::emulated_boards().front(), files::read_cell("table9")))
+    table += fmt::format("| {} | {:.0f} |\n", what, value);
   return table;
 }
 
 /// What is the same on every machine and depends on the code alone.
 void write_board() {
-  replace_figures(source / "protection/README.md", "netduinoplus2", protection_cost());
-  replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
-  replace_figures(source / "estimator/README.md", "microbit", microbit_cost());
-  replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
-  replace_figures(source / "model/cells/README.md", "mechanisms", mechanism_tables());
-  replace_figures(source / "boards/README.md", "budgets", board_table());
+  files::replace_figures(source / "protection/README.md", "netduinoplus2", protection_cost());
+  files::replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
+  files::replace_figures(source / "estimator/README.md", "microbit", microbit_cost());
+  files::replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
+  files::replace_figures(source / "model/cells/README.md", "mechanisms", mechanism_tables());
+  files::replace_figures(source / "boards/README.md", "budgets", board_table());
 }
 
 void run() {
   const auto estimator = source / "estimator/README.md";
   write_board();
-  replace_figures(estimator, "shift", shift_accuracy());
-  replace_figures(estimator, "duty", thousand_hours());
+  files::replace_figures(estimator, "shift", shift_accuracy());
+  files::replace_figures(estimator, "duty", thousand_hours());
   if (std::filesystem::exists(data)) {
-    replace_figures(estimator, "real", real_accuracy());
-    replace_figures(estimator, "trials", soc_trials(data));
-    replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
+    files::replace_figures(estimator, "real", real_accuracy());
+    files::replace_figures(estimator, "trials", soc_trials(data));
+    files::replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
   } else {
     fmt::print(stderr, "{} is not there: the figures of real recordings stay\n", data.string());
   }
-  replace_figures(source / "host_sim/README.md", "speed", speed());
-  if (std::filesystem::exists(data)) replace_figures(source / "identification/README.md", "real", real_identification());
-  replace_figures(source / "identification/README.md", "speed", identification_speed());
+  files::replace_figures(source / "host_sim/README.md", "speed", speed());
+  if (std::filesystem::exists(data))
+    files::replace_figures(source / "identification/README.md", "real", real_identification());
+  files::replace_figures(source / "identification/README.md", "speed", identification_speed());
 }
 
 }  // namespace
@@ -294,12 +358,18 @@ void run() {
 
 int main(int argc, char** argv) {
   try {
-    if (argc > 1 && std::string_view(argv[1]) == "step") fmt::print("{}\n{}", bms::step_cost(), bms::mechanism_cost());
-    else if (argc > 1 && std::string_view(argv[1]) == "board") bms::write_board();
-    else if (argc > 1 && std::string_view(argv[1]) == "budgets") bms::replace_figures(bms::source / "boards/README.md", "budgets", bms::board_table());
-    else if (argc > 1 && std::string_view(argv[1]) == "protection") bms::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
-    else if (argc > 1 && std::string_view(argv[1]) == "fixed") bms::replace_figures(bms::source / "boards/microbit/README.md", "fixed", bms::fixed_point());
-    else bms::run();
+    if (argc > 1 && std::string_view(argv[1]) == "step")
+      fmt::print("{}\n{}", bms::step_cost(), bms::mechanism_cost());
+    else if (argc > 1 && std::string_view(argv[1]) == "board")
+      bms::write_board();
+    else if (argc > 1 && std::string_view(argv[1]) == "budgets")
+      bms::files::replace_figures(bms::source / "boards/README.md", "budgets", bms::board_table());
+    else if (argc > 1 && std::string_view(argv[1]) == "protection")
+      bms::files::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
+    else if (argc > 1 && std::string_view(argv[1]) == "fixed")
+      bms::files::replace_figures(bms::source / "boards/microbit/README.md", "fixed", bms::fixed_point());
+    else
+      bms::run();
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "figures: {}\n", e.what());

@@ -12,89 +12,102 @@
 #include <fmt/format.h>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "files/cell_file.hpp"
+#include "files/recording.hpp"
+#include "files/text_file.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/slcan/codec.hpp"
-#include "host_sim/cell_file.hpp"
-#include "host_sim/child_process.hpp"
-#include "host_sim/emulator.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/image_file.hpp"
-#include "host_sim/recording.hpp"
 #include "host_sim/replay.hpp"
-#include "host_sim/text_file.hpp"
+#include "images/child_process.hpp"
+#include "images/emulator.hpp"
+#include "images/firmware_image.hpp"
+#include "images/image_file.hpp"
 #include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/slcan_board.hpp"
 #include "tests/firmware/stack_depth.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
-std::vector<Sample> two_minutes() {
-  const auto all = samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+std::vector<measurement::Sample> two_minutes() {
+  const auto all = files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
   return {all.begin() + 3000, all.begin() + 3125};
 }
 
 BudgetRun run_in_unicorn(const std::string& board_name) {
-  UnicornBoard board(firmware_image(board_name, read_cell("table9"), Image::remote));
-  if (!board.run_until([&] { return board.can.on_the_bus(); }, 3'000)) throw std::runtime_error(board_name + " does not come up");
+  UnicornBoard board(images::firmware_image(board_name, files::read_cell("table9"), images::Image::remote));
+  if (!board.run_until([&] { return board.can.on_the_bus(); }, 3'000))
+    throw std::runtime_error(board_name + " does not come up");
   std::uint16_t counter = 0;
-  for (const Sample& s : two_minutes()) {
-    PackSample<16> pack;
+  for (const measurement::Sample& s : two_minutes()) {
+    measurement::PackSample<16> pack;
     pack.time_us = s.time_us;
     pack.current_ua = s.current_ua;
     pack.cell_uv.fill(s.voltage_uv);
     pack.pack_uv = 16 * s.voltage_uv;
     pack.temperature_cdegc.fill(s.temperature_cdegc);
     const unsigned fed = board.watchdog_feeds;
-    for (const hal::CanFrame& frame : hal::frames_of(pack, 0, counter++)) {
+    for (const can::Frame& frame : hal::frames_of(pack, 0, counter++)) {
       board.can.deliver(frame);
-      if (!board.run_until([&] { return !board.can.receive_interrupt(); }, 1)) throw std::runtime_error(board_name + " takes no frame");
+      if (!board.run_until([&] { return !board.can.receive_interrupt(); }, 1))
+        throw std::runtime_error(board_name + " takes no frame");
     }
-    if (!board.run_until([&] { return board.watchdog_feeds > fed; }, 100)) throw std::runtime_error(board_name + " does not end a sample");
+    if (!board.run_until([&] { return board.watchdog_feeds > fed; }, 100))
+      throw std::runtime_error(board_name + " does not end a sample");
     board.run_for_ms(15);
   }
   const auto& seen = board.can.seen;
-  const auto told = std::find_if(seen.rbegin(), seen.rend(), [](const SeenFrame& f) { return f.from_board && f.frame.id == can::Board::id; });
+  const auto told = std::find_if(seen.rbegin(), seen.rend(),
+                                 [](const SeenFrame& f) { return f.from_board && f.frame.id == can::Board::id; });
   if (told == seen.rend()) throw std::runtime_error(board_name + " does not tell how long a sample takes");
   return {board.stack_used(), can::Board::of(told->frame).longest_sample};
 }
 
 /// The emulator's memory from `begin` on, by its monitor at the socket.
-std::string memory_of(const std::filesystem::path& monitor, std::uint32_t begin, std::uint32_t size, const std::filesystem::path& file) {
+std::string memory_of(const std::filesystem::path& monitor, std::uint32_t begin, std::uint32_t size,
+                      const std::filesystem::path& file) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::strncpy(address.sun_path, monitor.c_str(), sizeof address.sun_path - 1);
   const int line = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const std::string command = fmt::format("memsave {:#x} {:#x} \"{}\"\nquit\n", begin, size, file.string());
-  const bool said = connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 && send(line, command.data(), command.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(command.size());
+  const bool said = connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
+                    send(line, command.data(), command.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(command.size());
   for (char c = 0; said && recv(line, &c, 1, 0) > 0;) continue;  // until it has quit
   close(line);
-  const std::string memory = said ? read_file(file) : "";
+  const std::string memory = said ? files::read_file(file) : "";
   if (memory.size() != size) throw std::runtime_error("no memory from the emulator's monitor");
   return memory;
 }
 
-/// An instruction takes 8 ns, 1.3 cycles at 168 MHz, or 64 ns, one at 16 MHz. The stack: up to the firmware's own paint.
-BudgetRun run_in_qemu(const EmulatedBoard& emulated) {
+/// An instruction takes 8 ns, 1.3 cycles at 168 MHz, or 64 ns, one at 16 MHz. The stack: up to the firmware's own
+/// paint.
+BudgetRun run_in_qemu(const images::EmulatedBoard& emulated) {
   const std::string& board_name = emulated.name;
-  const auto image = firmware_image(board_name, read_cell("table9"), Image::application);
-  const TemporaryFolder folder;
+  const auto image = images::firmware_image(board_name, files::read_cell("table9"), images::Image::application);
+  const images::TemporaryFolder folder;
   const auto monitor = folder.path() / "monitor";
-  SlcanBoard board(image, {}, {"-chardev", "socket,id=monitor,server=on,wait=off,path=" + monitor.string(), "-mon", "monitor", "-icount", "shift=" + std::string(emulated.scalar == ScalarKind::fixed ? "6" : "3")}, emulated);
+  SlcanBoard board(image, {},
+                   {"-chardev", "socket,id=monitor,server=on,wait=off,path=" + monitor.string(), "-mon", "monitor",
+                    "-icount", "shift=" + std::string(emulated.scalar == host_sim::ScalarKind::fixed ? "6" : "3")},
+                   emulated);
   board.read();
   board.write("S6\rO\r");
-  for (const Sample& s : two_minutes()) {
+  for (const measurement::Sample& s : two_minutes()) {
     board.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
     board.telemetry();
   }
-  board.send_sample(two_minutes().back().time_us + 1'000'000, 0, 3'300'000, 2500);  // it has written the record when it answers
-  hal::CanFrame told;
-  if (!hal::slcan::decode(board.read_until("t1B98"), told)) throw std::runtime_error(board_name + " does not tell how long a sample takes");
+  board.send_sample(two_minutes().back().time_us + 1'000'000, 0, 3'300'000,
+                    2500);  // it has written the record when it answers
+  can::Frame told;
+  if (!hal::slcan::decode(board.read_until("t1B98"), told))
+    throw std::runtime_error(board_name + " does not tell how long a sample takes");
   board.telemetry();
-  const ImageFile file(image);
-  const std::uint32_t top = file.symbol("image_stack_top"), bottom = file.symbol("image_stack_limit") + 1'024;  // above the guard
+  const images::ImageFile file(image);
+  const std::uint32_t top = file.symbol("image_stack_top"),
+                      bottom = file.symbol("image_stack_limit") + 1'024;  // above the guard
   const std::string memory = memory_of(monitor, bottom, top - bottom, folder.path() / "ram");
   std::size_t free = 0;
   while (free + 4 <= memory.size() && memory.compare(free, 4, "\xA5\xA5\xA5\xA5") == 0) free += 4;
@@ -104,19 +117,21 @@ BudgetRun run_in_qemu(const EmulatedBoard& emulated) {
 }  // namespace
 
 BoardBudget budget_of(const std::string& board) {
-  const auto bytes = [&](const char* name) { return std::stoull(board_setting(board, name)); };
-  return {bytes("BMS_BUDGET_FLASH"), bytes("BMS_BUDGET_RAM"), bytes("BMS_BUDGET_STACK"), std::stod(board_setting(board, "BMS_BUDGET_SAMPLE_MS"))};
+  const auto bytes = [&](const char* name) { return std::stoull(images::board_setting(board, name)); };
+  return {bytes("BMS_BUDGET_FLASH"), bytes("BMS_BUDGET_RAM"), bytes("BMS_BUDGET_STACK"),
+          std::stod(images::board_setting(board, "BMS_BUDGET_SAMPLE_MS"))};
 }
 
 BoardFigures figures_of(const std::string& board) {
-  const auto image = firmware_image(board, read_cell("table9"), chip_image(board));
+  const auto image = images::firmware_image(board, files::read_cell("table9"), images::chip_image(board));
   const ImageSize size = size_of(image);
   return {size.text + size.data, size.data + size.bss, stack_depth(image).worst()};
 }
 
 std::optional<BudgetRun> run_of(const std::string& board) {
-  if (board_setting(board, "BMS_EMULATED") == "OFF") return board_setting(board, "BMS_CAN") == "bxcan" ? std::optional(run_in_unicorn(board)) : std::nullopt;
-  for (const EmulatedBoard& emulated : emulated_boards()) {
+  if (images::board_setting(board, "BMS_EMULATED") == "OFF")
+    return images::board_setting(board, "BMS_CAN") == "bxcan" ? std::optional(run_in_unicorn(board)) : std::nullopt;
+  for (const images::EmulatedBoard& emulated : images::emulated_boards()) {
     if (emulated.name == board) return run_in_qemu(emulated);
   }
   return std::nullopt;
@@ -124,15 +139,17 @@ std::optional<BudgetRun> run_of(const std::string& board) {
 
 std::string board_table() {
   std::string table =
-      "| board | flash [bytes] | of | static RAM [bytes] | of | stack, worst [bytes] | of | stack, measured [bytes] | a sample, longest [ms] | of |\n|---|---|---|---|---|---|---|---|---|---|\n";
-  for (const std::string& board : board_names()) {
+      "| board | flash [bytes] | of | static RAM [bytes] | of | stack, worst [bytes] | of | stack, measured [bytes] | "
+      "a sample, longest [ms] | of |\n|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const std::string& board : images::board_names()) {
     const BoardFigures f = figures_of(board);
     const BoardBudget b = budget_of(board);
     const auto run = run_of(board);
-    table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", board, f.flash, b.flash, f.ram, b.ram, f.stack_worst, b.stack, run ? std::to_string(run->stack) : "-",
+    table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", board, f.flash, b.flash, f.ram, b.ram,
+                         f.stack_worst, b.stack, run ? std::to_string(run->stack) : "-",
                          run ? fmt::format("{:.2f}", run->sample_ms) : "-", b.sample_ms);
   }
   return table;
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

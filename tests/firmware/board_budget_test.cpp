@@ -3,15 +3,15 @@
 
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/child_process.hpp"
-#include "host_sim/committed_figures.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/cell_file.hpp"
+#include "files/committed_figures.hpp"
+#include "files/text_file.hpp"
+#include "images/child_process.hpp"
+#include "images/firmware_image.hpp"
 #include "tests/firmware/board_budget.hpp"
 #include "tests/firmware/stack_depth.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 class Budgets : public ::testing::TestWithParam<std::string> {};
@@ -22,7 +22,7 @@ TEST_P(Budgets, HoldTheImageOfTheChip) {
   EXPECT_LE(f.flash, budget.flash);
   EXPECT_LE(f.ram, budget.ram);
   EXPECT_LE(f.stack_worst, budget.stack);
-  const CommittedFigures flash(BMS_SOURCE_DIR "/boards/README.md", "budgets");
+  const files::CommittedFigures flash(BMS_SOURCE_DIR "/boards/README.md", "budgets");
   ASSERT_TRUE(flash.has(GetParam())) << "boards/README.md: ./bms figures writes its row";
   EXPECT_LE(static_cast<double>(f.flash), 1.05 * flash.at(GetParam())) << "./bms figures if it is worth it";
 }
@@ -37,7 +37,8 @@ TEST_P(Budgets, HoldTwoMinutesOfItsRun) {
   EXPECT_LE(run->sample_ms, budget_of(GetParam()).sample_ms);
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, Budgets, ::testing::ValuesIn(board_names()), [](const auto& board) { return board.param; });
+INSTANTIATE_TEST_SUITE_P(Of, Budgets, ::testing::ValuesIn(images::board_names()),
+                         [](const auto& board) { return board.param; });
 
 TEST(ForkliftBudgets, Are64KilobytesOfFlashAnd16OfRam) {
   const BoardBudget b = budget_of("stm32f405_forklift");
@@ -78,12 +79,16 @@ TEST(StackDepth, IsTheDeepestWayThroughTheCalls) {
 }
 
 TEST(StackDepth, CountsACallAfterThePrologueIsTakenBackAsDeepAsBefore) {
-  const Functions f = functions_of("08000000 <f>:\n 8000000:\tb510\tpush\t{r4, lr}\n 8000002:\td001\tbeq.n\t8000008 <f+0x8>\n 8000004:\tbd10\tpop\t{r4, pc}\n 8000008:\tb084\tsub\tsp, #16\n");
+  const Functions f = functions_of(
+      "08000000 <f>:\n 8000000:\tb510\tpush\t{r4, lr}\n 8000002:\td001\tbeq.n\t8000008 <f+0x8>\n "
+      "8000004:\tbd10\tpop\t{r4, pc}\n 8000008:\tb084\tsub\tsp, #16\n");
   EXPECT_EQ(f.at(0x8000000).stack, 24U);
 }
 
 TEST(StackDepth, TakesALargeFrameOfTheCortexM0) {
-  const Functions f = functions_of("00000000 <f>:\n   0:\tb510\tpush\t{r4, lr}\n   2:\t4c01\tldr\tr4, [pc, #4]\t@ (8 <f+0x8>)\n   4:\t44a5\tadd\tsp, r4\n   6:\tbd10\tpop\t{r4, pc}\n   8:\tfffffdf8 \t.word\t0xfffffdf8\n");
+  const Functions f = functions_of(
+      "00000000 <f>:\n   0:\tb510\tpush\t{r4, lr}\n   2:\t4c01\tldr\tr4, [pc, #4]\t@ (8 <f+0x8>)\n   "
+      "4:\t44a5\tadd\tsp, r4\n   6:\tbd10\tpop\t{r4, pc}\n   8:\tfffffdf8 \t.word\t0xfffffdf8\n");
   EXPECT_EQ(f.at(0).stack, 8U + 0x208);
 }
 
@@ -91,24 +96,30 @@ TEST(StackDepth, RefusesWhatItCannotTell) {
   const Functions pointer = functions_of("00000000 <f>:\n   0:\t4798\tblx\tr3\n   2:\t4770\tbx\tlr\n");
   EXPECT_THROW(depth_from(pointer, 0, {}), std::runtime_error);
   EXPECT_EQ(depth_from(pointer, 0, {{"f", {}}}).bytes, 0U);
-  const Functions itself = functions_of("00000000 <f>:\n   0:\tb510\tpush\t{r4, lr}\n   2:\tf7ff\tbl\t0 <f>\n   6:\tbd10\tpop\t{r4, pc}\n");
+  const Functions itself =
+      functions_of("00000000 <f>:\n   0:\tb510\tpush\t{r4, lr}\n   2:\tf7ff\tbl\t0 <f>\n   6:\tbd10\tpop\t{r4, pc}\n");
   EXPECT_THROW(depth_from(itself, 0, {}), std::runtime_error);
   EXPECT_THROW(functions_of("00000000 <f>:\n   0:\t4798\tsub.w\tsp, sp, r3\n"), std::runtime_error);
 }
 
 /// The compiler's own figure (-fstack-usage) of every function that it knows, of the same image.
 TEST(StackDepth, OfAFunctionIsWhatTheCompilerSays) {
-  const auto image = firmware_image("stm32f405_forklift", read_cell("table9"), Image::application);
+  const auto image =
+      images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application);
   std::map<std::string, std::uint32_t> compiler;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(image.parent_path() / "CMakeFiles")) {
     if (entry.path().extension() != ".su") continue;
     static const std::regex line("[^\\n]*?:[0-9]+:[0-9]+:([^\\t]*)\\t([0-9]+)\\tstatic");
-    const std::string text = read_file(entry.path());
-    for (std::sregex_iterator it(text.begin(), text.end(), line), end; it != end; ++it) compiler[(*it)[1]] = static_cast<std::uint32_t>(std::stoul((*it)[2]));
+    const std::string text = files::read_file(entry.path());
+    for (std::sregex_iterator it(text.begin(), text.end(), line), end; it != end; ++it)
+      compiler[(*it)[1]] = static_cast<std::uint32_t>(std::stoul((*it)[2]));
   }
   std::size_t compared = 0;
-  for (const auto& [address, f] : functions_of(output_of({"arm-none-eabi-objdump", "--disassemble", "--demangle", image.string()}))) {
-    const auto known = std::find_if(compiler.begin(), compiler.end(), [&](const auto& c) { return c.first == f.name || c.first.ends_with(" " + f.name); });
+  for (const auto& [address, f] :
+       functions_of(images::output_of({"arm-none-eabi-objdump", "--disassemble", "--demangle", image.string()}))) {
+    const auto known = std::find_if(compiler.begin(), compiler.end(), [&](const auto& c) {
+      return c.first == f.name || c.first.ends_with(" " + f.name);
+    });
     if (known == compiler.end()) continue;
     EXPECT_EQ(f.stack, known->second) << f.name;
     ++compared;
@@ -117,4 +128,4 @@ TEST(StackDepth, OfAFunctionIsWhatTheCompilerSays) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

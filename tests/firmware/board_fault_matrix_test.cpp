@@ -1,5 +1,5 @@
-// A part of the fault matrix against the forklift board's image in the emulator: every protection below, above, in noise and during another fault. All of
-// it: ./bms faults
+// A part of the fault matrix against the forklift board's image in the emulator: every protection below, above, in
+// noise and during another fault. All of it: ./bms faults
 #include "tests/firmware/board_fault_matrix.hpp"
 
 #include <gtest/gtest.h>

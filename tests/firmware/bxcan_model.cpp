@@ -3,24 +3,26 @@
 #include <algorithm>
 #include <utility>
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
 constexpr unsigned stuff_error = 1, acknowledge_error = 3, bit_dominant_error = 5, crc_error = 6;  // CAN_ESR, LEC
-constexpr unsigned error_frame_bits = 6 + 8 + 3, suspend_bits = 8;                               // flag, delimiter, intermission; ISO 11898-1, 10.4.4 and 10.9
+constexpr unsigned error_frame_bits = 6 + 8 + 3,
+                   suspend_bits = 8;  // flag, delimiter, intermission; ISO 11898-1, 10.4.4 and 10.9
 
-hal::CanFrame classic(const WireFrame& f) { return {f.id, f.length, f.data, f.extended}; }
+can::Frame classic(const WireFrame& f) { return {f.id, f.length, f.data, f.extended}; }
 
 /// Lower wins: identifier, then RTR, then IDE as the bits come.
 std::uint64_t arbitration_field(const WireFrame& f) {
   if (!f.extended) return static_cast<std::uint64_t>(f.id) << 21 | (f.remote ? 1ULL << 20 : 0);
-  return static_cast<std::uint64_t>(f.id >> 18) << 21 | 3ULL << 19 | static_cast<std::uint64_t>(f.id & 0x3FFFF) << 1 | (f.remote ? 1 : 0);
+  return static_cast<std::uint64_t>(f.id >> 18) << 21 | 3ULL << 19 | static_cast<std::uint64_t>(f.id & 0x3FFFF) << 1 |
+         (f.remote ? 1 : 0);
 }
 
 }  // namespace
 
-WireFrame wire_frame(const hal::CanFrame& frame) { return {frame.id, frame.long_id, false, frame.length, frame.data}; }
+WireFrame wire_frame(const can::Frame& frame) { return {frame.id, frame.long_id, false, frame.length, frame.data}; }
 
 unsigned bits_on_the_wire(const WireFrame& f) {
   std::vector<int> bits;
@@ -45,7 +47,8 @@ unsigned bits_on_the_wire(const WireFrame& f) {
     last = b;
     if (run == 5) ++stuffed, last = 1 - b, run = 1;
   }
-  return static_cast<unsigned>(bits.size()) + stuffed + 1 + 2 + 7 + 3;  // CRC delimiter, acknowledge, end of frame, intermission
+  return static_cast<unsigned>(bits.size()) + stuffed + 1 + 2 + 7 +
+         3;  // CRC delimiter, acknowledge, end of frame, intermission
 }
 
 void BxcanModel::reset() {
@@ -70,7 +73,9 @@ std::uint32_t BxcanModel::mailbox_status() const {
   int lowest = -1;
   for (std::uint32_t k = 0; k < 3; ++k) {
     const Mailbox& m = mailboxes_[k];
-    status |= ((m.completed ? 1U : 0U) | (m.ok ? 2U : 0U) | (m.lost ? 4U : 0U) | (m.error ? 8U : 0U) | (m.abort ? 0x80U : 0U)) << (8 * k);
+    status |=
+        ((m.completed ? 1U : 0U) | (m.ok ? 2U : 0U) | (m.lost ? 4U : 0U) | (m.error ? 8U : 0U) | (m.abort ? 0x80U : 0U))
+        << (8 * k);
     if (!m.requested) {
       status |= 1U << (26 + k);
       if (lowest < 0) lowest = static_cast<int>(k);
@@ -81,21 +86,36 @@ std::uint32_t BxcanModel::mailbox_status() const {
 
 std::uint32_t BxcanModel::read(std::uint32_t at) const {
   switch (at) {
-    case 0x00: return mcr_;
-    case 0x04: return (mode_ == Mode::initialisation || mode_ == Mode::joining ? 1U : 0U) | (mode_ == Mode::sleep ? 2U : 0U) | (sending_ >= 0 ? 1U << 8 : 0U) | (stuck_dominant ? 0U : 3U << 10);
-    case 0x08: return mailbox_status();
-    case 0x0C: return static_cast<std::uint32_t>(fifo_.size()) | (full_ ? 8U : 0U) | (overrun_ ? 16U : 0U);
-    case 0x10: return 0;
-    case 0x14: return ier_;
+    case 0x00:
+      return mcr_;
+    case 0x04:
+      return (mode_ == Mode::initialisation || mode_ == Mode::joining ? 1U : 0U) | (mode_ == Mode::sleep ? 2U : 0U) |
+             (sending_ >= 0 ? 1U << 8 : 0U) | (stuck_dominant ? 0U : 3U << 10);
+    case 0x08:
+      return mailbox_status();
+    case 0x0C:
+      return static_cast<std::uint32_t>(fifo_.size()) | (full_ ? 8U : 0U) | (overrun_ ? 16U : 0U);
+    case 0x10:
+      return 0;
+    case 0x14:
+      return ier_;
     case 0x18:
-      return (tec_ >= 96 || rec_ >= 96 ? 1U : 0U) | (tec_ >= 128 || rec_ >= 128 ? 2U : 0U) | (bus_off_ ? 4U : 0U) | lec_ << 4 | std::min(tec_, 255U) << 16 | std::min(rec_, 255U) << 24;
-    case 0x1C: return btr_;
-    case 0x200: return fmr_;
-    case 0x204: return fm1r_;
-    case 0x20C: return fs1r_;
-    case 0x214: return ffa1r_;
-    case 0x21C: return fa1r_;
-    default: break;
+      return (tec_ >= 96 || rec_ >= 96 ? 1U : 0U) | (tec_ >= 128 || rec_ >= 128 ? 2U : 0U) | (bus_off_ ? 4U : 0U) |
+             lec_ << 4 | std::min(tec_, 255U) << 16 | std::min(rec_, 255U) << 24;
+    case 0x1C:
+      return btr_;
+    case 0x200:
+      return fmr_;
+    case 0x204:
+      return fm1r_;
+    case 0x20C:
+      return fs1r_;
+    case 0x214:
+      return ffa1r_;
+    case 0x21C:
+      return fa1r_;
+    default:
+      break;
   }
   if (at >= 0x180 && at < 0x1B0) {
     const Mailbox& m = mailboxes_[(at - 0x180) / 16];
@@ -115,26 +135,41 @@ std::uint32_t BxcanModel::read(std::uint32_t at) const {
 void BxcanModel::write(std::uint32_t at, std::uint32_t value) {
   const bool filters_open = (fmr_ & 1) != 0;
   switch (at) {
-    case 0x00: return write_mcr(value);
-    case 0x08: return write_tsr(value);
+    case 0x00:
+      return write_mcr(value);
+    case 0x08:
+      return write_tsr(value);
     case 0x0C:
       if ((value & 16) != 0) overrun_ = false;
       if ((value & 8) != 0) full_ = false;
       if ((value & 32) != 0 && !fifo_.empty()) fifo_.pop_front(), full_ = false;
       return;
-    case 0x14: ier_ = value; return;
-    case 0x18: lec_ = value >> 4 & 7; return;
-    case 0x1C:
-      if (mode_ != Mode::initialisation) violations.push_back("CAN_BTR is written outside initialisation");
-      else btr_ = value;
+    case 0x14:
+      ier_ = value;
       return;
-    case 0x200: fmr_ = value; return;
-    case 0x204: case 0x20C: case 0x214:
+    case 0x18:
+      lec_ = value >> 4 & 7;
+      return;
+    case 0x1C:
+      if (mode_ != Mode::initialisation)
+        violations.push_back("CAN_BTR is written outside initialisation");
+      else
+        btr_ = value;
+      return;
+    case 0x200:
+      fmr_ = value;
+      return;
+    case 0x204:
+    case 0x20C:
+    case 0x214:
       if (!filters_open) violations.push_back("filters are set up without FINIT");
       (at == 0x204 ? fm1r_ : at == 0x20C ? fs1r_ : ffa1r_) = value;
       return;
-    case 0x21C: fa1r_ = value; return;
-    default: break;
+    case 0x21C:
+      fa1r_ = value;
+      return;
+    default:
+      break;
   }
   if (at >= 0x180 && at < 0x1B0) return write_mailbox((at - 0x180) / 16, at / 4 % 4, value);
   if (at >= 0x240 && at < 0x240 + 4 * banks_.size()) {
@@ -149,7 +184,8 @@ void BxcanModel::write_mcr(std::uint32_t value) {
   mcr_ = value;
   const bool initialise = (value & 1) != 0, sleep = (value & 2) != 0;
   // from normal mode the hardware first waits for the end of what is on the wire (32.4.1): bit()
-  if (initialise && !sleep && (mode_ == Mode::sleep || mode_ == Mode::joining || bus_off_)) mode_ = Mode::initialisation;
+  if (initialise && !sleep && (mode_ == Mode::sleep || mode_ == Mode::joining || bus_off_))
+    mode_ = Mode::initialisation;
   if (!initialise && !sleep && mode_ == Mode::initialisation) {
     mode_ = Mode::joining;
     recessive_run_ = 0;
@@ -209,9 +245,12 @@ bool BxcanModel::receive_interrupt() const {
 /// 32.7.1: by identifier, then by mailbox; with TXFP by the order of requests.
 int BxcanModel::scheduled() const {
   int best = -1;
-  const auto key = [&](std::size_t k) -> std::uint64_t { return (mcr_ & 4) != 0 ? mailboxes_[k].order : mailboxes_[k].tir >> 3; };
+  const auto key = [&](std::size_t k) -> std::uint64_t {
+    return (mcr_ & 4) != 0 ? mailboxes_[k].order : mailboxes_[k].tir >> 3;
+  };
   for (std::size_t k = 0; k < 3; ++k) {
-    if (mailboxes_[k].requested && (best < 0 || key(k) < key(static_cast<std::size_t>(best)))) best = static_cast<int>(k);
+    if (mailboxes_[k].requested && (best < 0 || key(k) < key(static_cast<std::size_t>(best))))
+      best = static_cast<int>(k);
   }
   return best;
 }
@@ -249,7 +288,9 @@ void BxcanModel::start_frame() {
   bool one_in_front = false;
   for (auto o = others.begin(); o != others.end(); ++o) {
     if (o->in_order && std::exchange(one_in_front, true)) continue;
-    if (o->from_bit <= now_bit && (other == others.end() || arbitration_field(o->frame) < arbitration_field(other->frame))) other = o;
+    if (o->from_bit <= now_bit &&
+        (other == others.end() || arbitration_field(o->frame) < arbitration_field(other->frame)))
+      other = o;
   }
   if (box < 0 && other == others.end()) return;
   begun_bit_ = now_bit;
@@ -257,17 +298,26 @@ void BxcanModel::start_frame() {
   WireFrame ours{};
   if (box >= 0) {
     const Mailbox& m = mailboxes_[static_cast<std::size_t>(box)];
-    ours = {(m.tir & 4) != 0 ? m.tir >> 3 : m.tir >> 21, (m.tir & 4) != 0, (m.tir & 2) != 0, static_cast<std::uint8_t>(m.tdtr & 15), {}};
-    for (unsigned k = 0; k < 8; ++k) ours.data[k] = static_cast<std::uint8_t>((k < 4 ? m.tdlr : m.tdhr) >> (8 * (k % 4)));
+    ours = {(m.tir & 4) != 0 ? m.tir >> 3 : m.tir >> 21,
+            (m.tir & 4) != 0,
+            (m.tir & 2) != 0,
+            static_cast<std::uint8_t>(m.tdtr & 15),
+            {}};
+    for (unsigned k = 0; k < 8; ++k)
+      ours.data[k] = static_cast<std::uint8_t>((k < 4 ? m.tdlr : m.tdhr) >> (8 * (k % 4)));
   }
-  const bool board_wins = box >= 0 && (other == others.end() || arbitration_field(ours) < arbitration_field(other->frame));
+  const bool board_wins =
+      box >= 0 && (other == others.end() || arbitration_field(ours) < arbitration_field(other->frame));
   if (board_wins) {
     sending_ = box;
     other_ = {ours};
     busy_bits_ = bits_on_the_wire(ours);
-    if (!timing_fits(clock_hz_)) outcome_ = bit_dominant_error, busy_bits_ = 20 + error_frame_bits;
-    else if (corrupt_sent > 0) --corrupt_sent, outcome_ = bit_dominant_error, busy_bits_ = 40 + error_frame_bits;
-    else if (!others_acknowledge) outcome_ = acknowledge_error, busy_bits_ += error_frame_bits - 11;
+    if (!timing_fits(clock_hz_))
+      outcome_ = bit_dominant_error, busy_bits_ = 20 + error_frame_bits;
+    else if (corrupt_sent > 0)
+      --corrupt_sent, outcome_ = bit_dominant_error, busy_bits_ = 40 + error_frame_bits;
+    else if (!others_acknowledge)
+      outcome_ = acknowledge_error, busy_bits_ += error_frame_bits - 11;
     return;
   }
   if (box >= 0) {
@@ -279,8 +329,10 @@ void BxcanModel::start_frame() {
   other_ = *other;
   others.erase(other);
   busy_bits_ = bits_on_the_wire(other_.frame);
-  if (mode_ == Mode::normal && !timing_fits(clock_hz_)) outcome_ = stuff_error, busy_bits_ = 20 + error_frame_bits;
-  else if (corrupt_received > 0) --corrupt_received, outcome_ = crc_error, busy_bits_ += error_frame_bits - 11;
+  if (mode_ == Mode::normal && !timing_fits(clock_hz_))
+    outcome_ = stuff_error, busy_bits_ = 20 + error_frame_bits;
+  else if (corrupt_received > 0)
+    --corrupt_received, outcome_ = crc_error, busy_bits_ += error_frame_bits - 11;
 }
 
 void BxcanModel::end_frame() {
@@ -327,7 +379,8 @@ void BxcanModel::transmit_error(unsigned code, bool counts) {
   if ((mcr_ & 64) != 0) recovering_ = true, sequences_ = 0;  // ABOM
 }
 
-/// The wire is held low: whoever sends sees it at once, whoever listens misses the stuff bit; after that every eight bits count (ISO 11898-1, 12.1.4).
+/// The wire is held low: whoever sends sees it at once, whoever listens misses the stuff bit; after that every eight
+/// bits count (ISO 11898-1, 12.1.4).
 void BxcanModel::dominant_bit() {
   recessive_run_ = 0;
   ++dominant_run_;
@@ -352,8 +405,10 @@ void BxcanModel::dominant_bit() {
     return;
   }
   if (!on_the_bus() || dominant_run_ < 14 || dominant_run_ % 8 != 0) return;
-  if (stuck_sender_) transmit_error(bit_dominant_error, true);
-  else rec_ = std::min(rec_ + 8, 255U);
+  if (stuck_sender_)
+    transmit_error(bit_dominant_error, true);
+  else
+    rec_ = std::min(rec_ + 8, 255U);
 }
 
 void BxcanModel::receive(const WireFrame& f) {
@@ -393,4 +448,4 @@ bool BxcanModel::accepted(const WireFrame& f) const {
   return false;
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

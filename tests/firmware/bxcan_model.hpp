@@ -1,8 +1,10 @@
-// ST's bxCAN as its registers show it, on a wire with other nodes, written from RM0090, 32, and ISO 11898-1 alone: it shares nothing with hal/.
+// ST's bxCAN as its registers show it, on a wire with other nodes, written from RM0090, 32, and ISO 11898-1 alone: it
+// shares nothing with hal/.
 //
-// Time goes in bits of the bus. Frames are whole: their length is exact (CRC and stuff bits are computed), arbitration is decided at their
-// start, errors happen inside them. The test holds the other nodes: what they send, whether they acknowledge, what breaks.
-// What a driver must not do (write a mailbox that is taken, a bit timing while on the bus, a filter that is active) is in violations.
+// Time goes in bits of the bus. Frames are whole: their length is exact (CRC and stuff bits are computed), arbitration
+// is decided at their start, errors happen inside them. The test holds the other nodes: what they send, whether they
+// acknowledge, what breaks. What a driver must not do (write a mailbox that is taken, a bit timing while on the bus, a
+// filter that is active) is in violations.
 #pragma once
 
 #include <array>
@@ -13,7 +15,7 @@
 
 #include "hal/can.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 /// As on the wire, 29-bit frames and remote requests included.
 struct WireFrame {
@@ -22,13 +24,13 @@ struct WireFrame {
   std::uint8_t length = 0;
   std::array<std::uint8_t, 8> data{};
 };
-WireFrame wire_frame(const hal::CanFrame& frame);
+WireFrame wire_frame(const can::Frame& frame);
 
 /// Bits from the start of frame to the end of the intermission, with the stuff bits that its content needs.
 unsigned bits_on_the_wire(const WireFrame& frame);
 
 struct SeenFrame {
-  hal::CanFrame frame;
+  can::Frame frame;
   bool from_board = false;
   std::uint64_t begin_bit = 0, end_bit = 0;
 };
@@ -55,11 +57,11 @@ class BxcanModel {
   struct Other {
     WireFrame frame;
     std::uint64_t from_bit = 0;  ///< not before
-    bool in_order = false;       ///< not before those in front of it that are so, too: a node that sends first in, first out
+    bool in_order = false;  ///< not before those in front of it that are so, too: a node that sends first in, first out
   };
   std::deque<Other> others;
   /// Into the receive FIFO without the wire: a sample that came another way.
-  void deliver(const hal::CanFrame& frame) { receive(wire_frame(frame)); }
+  void deliver(const can::Frame& frame) { receive(wire_frame(frame)); }
 
   // what a test looks at
   std::uint64_t now_bit = 0;
@@ -101,23 +103,25 @@ class BxcanModel {
   bool timing_fits(std::uint32_t clock_hz) const;
 
   Mode mode_ = Mode::sleep;
-  std::uint32_t mcr_ = 0x00010002, ier_ = 0, btr_ = 0x01230000, fmr_ = 0x2A1C0E01, fm1r_ = 0, fs1r_ = 0, ffa1r_ = 0, fa1r_ = 0;
+  std::uint32_t mcr_ = 0x00010002, ier_ = 0, btr_ = 0x01230000, fmr_ = 0x2A1C0E01, fm1r_ = 0, fs1r_ = 0, ffa1r_ = 0,
+                fa1r_ = 0;
   std::array<std::uint32_t, 56> banks_{};
   std::array<Mailbox, 3> mailboxes_{};
   std::deque<Received> fifo_;
-  bool overrun_ = false, full_ = false, bus_off_ = false, recovering_ = false, was_stuck_ = false, stuck_sender_ = false;
+  bool overrun_ = false, full_ = false, bus_off_ = false, recovering_ = false, was_stuck_ = false,
+       stuck_sender_ = false;
   unsigned tec_ = 0, rec_ = 0, lec_ = 0;
   unsigned recessive_run_ = 0, dominant_run_ = 0, sequences_ = 0;
   std::uint64_t orders_ = 0;
 
   // the frame that is on the wire
   unsigned busy_bits_ = 0, suspended_bits_ = 0;
-  int sending_ = -1;        ///< mailbox
+  int sending_ = -1;  ///< mailbox
   bool other_sends_ = false;
   Other other_{};
   std::uint64_t begun_bit_ = 0;
-  unsigned outcome_ = 0;    ///< 0: arrives; else the last error code
+  unsigned outcome_ = 0;  ///< 0: arrives; else the last error code
   std::uint32_t clock_hz_ = 0;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

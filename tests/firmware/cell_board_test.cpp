@@ -1,5 +1,5 @@
-// The single-cell board's image in Unicorn, a register model of the chip's converter on its pins: what the cell has is on the CAN bus, a correction moves it, and a converter
-// that hangs takes its readings with it, not the firmware.
+// The single-cell board's image in Unicorn, a register model of the chip's converter on its pins: what the cell has is
+// on the CAN bus, a correction moves it, and a converter that hangs takes its readings with it, not the firmware.
 #include <cmath>
 #include <random>
 
@@ -8,12 +8,12 @@
 
 #include "can_messages.hpp"
 #include "estimator/estimate.hpp"
-#include "host_sim/cell_file.hpp"
-#include "host_sim/firmware_image.hpp"
+#include "files/cell_file.hpp"
+#include "images/firmware_image.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 #include "tests/hal/thermistor.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using ::testing::IsEmpty;
@@ -29,12 +29,14 @@ class Converter : public UnicornBoard::Peripheral {
 
   std::uint32_t read(std::uint32_t at, double now_us) override {
     switch (at) {
-      case 0x00: return begun_ && !hangs && now_us >= ready_us_ ? 2U : 0U;
+      case 0x00:
+        return begun_ && !hangs && now_us >= ready_us_ ? 2U : 0U;
       case 0x4C:
         if (!begun_ || now_us < ready_us_) violations.push_back("DR is read before the end of the conversion");
         begun_ = false;
         return value_;
-      default: return registers_[at];
+      default:
+        return registers_[at];
     }
   }
   void write(std::uint32_t at, std::uint32_t value, double now_us) override {
@@ -47,13 +49,20 @@ class Converter : public UnicornBoard::Peripheral {
     if ((registers_[0x08] & 1) == 0) violations.push_back("a conversion while the converter is off");
     const std::uint32_t channel = registers_[0x34] & 31;
     constexpr double cycles[] = {3, 15, 28, 56, 84, 112, 144, 480};
-    const double sampling = cycles[channel < 10 ? registers_[0x10] >> (3 * channel) & 7 : registers_[0x0C] >> (3 * (channel - 10)) & 7];
+    const double sampling =
+        cycles[channel < 10 ? registers_[0x10] >> (3 * channel) & 7 : registers_[0x0C] >> (3 * (channel - 10)) & 7];
     const double mhz = 84.0 / (2 * ((registers_[0x304] >> 16 & 3) + 1));
     if (mhz > 36) violations.push_back("a clock above 36 MHz (datasheet, ADC characteristics)");
-    if (channel == 17 && ((registers_[0x304] & 1U << 23) == 0 || sampling / mhz < 10)) violations.push_back("the reference is off, or sampled for less than 10 us");
+    if (channel == 17 && ((registers_[0x304] & 1U << 23) == 0 || sampling / mhz < 10))
+      violations.push_back("the reference is off, or sampled for less than 10 us");
     const double ohm = thermistor_ohm(celsius);
-    const double pin_v = channel == 1 ? supply_v / 2 + 20 * 0.002 * current_a : channel == 2 ? cell_v / 2 : channel == 3 ? supply_v * ohm / (ohm + 10'000) : channel == 17 ? 1.21 : 0;
-    value_ = static_cast<std::uint32_t>(std::clamp(std::lround(4'095 * pin_v / supply_v + noise_(random_)), 0L, 4'095L));
+    const double pin_v = channel == 1    ? supply_v / 2 + 20 * 0.002 * current_a
+                         : channel == 2  ? cell_v / 2
+                         : channel == 3  ? supply_v * ohm / (ohm + 10'000)
+                         : channel == 17 ? 1.21
+                                         : 0;
+    value_ =
+        static_cast<std::uint32_t>(std::clamp(std::lround(4'095 * pin_v / supply_v + noise_(random_)), 0L, 4'095L));
     ready_us_ = now_us + (sampling + 12) / mhz;
     begun_ = true;
     ++conversions;
@@ -98,7 +107,7 @@ class CellBoard : public ::testing::Test {
   }
 
   Converter converter;
-  UnicornBoard board{firmware_image("stm32f405_cell", read_cell("table9"), Image::application)};
+  UnicornBoard board{images::firmware_image("stm32f405_cell", files::read_cell("table9"), images::Image::application)};
 
  private:
   std::uint8_t counter_ = 0;
@@ -140,7 +149,8 @@ TEST_F(CellBoard, ACorrectionMovesTheReadingAndOutlivesThePower) {
   board.run_for_ms(250);
   EXPECT_NEAR(last<can::PackElectrical>().voltage, 1.01 * 3.3, 0.003);
   EXPECT_NEAR(last<can::PackElectrical>().current, -3, 0.03);
-  UnicornBoard again{firmware_image("stm32f405_cell", read_cell("table9"), Image::application), 2};
+  UnicornBoard again{images::firmware_image("stm32f405_cell", files::read_cell("table9"), images::Image::application),
+                     2};
   again.flash.bytes = board.flash.bytes;
   again.plugged = {{Converter::base, &converter}};
   again.run_for_ms(250);
@@ -159,14 +169,16 @@ TEST_F(CellBoard, AConverterThatHangsTakesOnlyItsReadingsWithIt) {
   board.run_for_ms(1'000);
   EXPECT_GE(board.estimates - before, 9U);
   EXPECT_TRUE(std::isnan(last<can::PackElectrical>().voltage));
-  EXPECT_NE(last<can::Status>().flags & voltage_missing, 0U);
+  EXPECT_NE(last<can::Status>().flags & estimator::voltage_missing, 0U);
   EXPECT_EQ(last<can::Faults>().samples_missing, 1U) << "nothing was read";
   converter.hangs = false;
   board.run_for_ms(300);
   EXPECT_NEAR(last<can::PackElectrical>().voltage, 3.3, 0.003);
 }
 
-TEST_F(CellBoard, ItsPinsAreAnalog) { EXPECT_EQ(board.register_value(0x40020000) & 0xFC, 0xFCU) << "GPIOA_MODER: PA1 to PA3"; }
+TEST_F(CellBoard, ItsPinsAreAnalog) {
+  EXPECT_EQ(board.register_value(0x40020000) & 0xFC, 0xFCU) << "GPIOA_MODER: PA1 to PA3";
+}
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

@@ -5,22 +5,26 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "host_sim/child_process.hpp"
+#include "images/child_process.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 std::vector<Symbol> symbols_of(const std::filesystem::path& image, const std::string& tools) {
   std::vector<Symbol> symbols;
-  std::istringstream lines(output_of({tools + "nm", "--demangle", "--special-syms", "--format=sysv", image.string()}));
+  std::istringstream lines(
+      images::output_of({tools + "nm", "--demangle", "--special-syms", "--format=sysv", image.string()}));
   for (std::string line; std::getline(lines, line);) {
     std::vector<std::string> fields;  // name|value|class|type|size|line|section
     std::istringstream in(line);
     for (std::string field; std::getline(in, field, '|');) fields.push_back(field);
     if (fields.size() < 5 || fields[0].starts_with("Name")) continue;
-    const auto number = [](const std::string& s) { return s.find_first_not_of(' ') == std::string::npos ? 0 : std::stoull(s, nullptr, 16); };
+    const auto number = [](const std::string& s) {
+      return s.find_first_not_of(' ') == std::string::npos ? 0 : std::stoull(s, nullptr, 16);
+    };
     const auto end = fields[0].find_last_not_of(' ');
     const auto kind = fields[2].find_first_not_of(' ');
-    symbols.push_back({number(fields[1]), number(fields[4]), kind == std::string::npos ? ' ' : fields[2][kind], fields[0].substr(0, end + 1)});
+    symbols.push_back({number(fields[1]), number(fields[4]), kind == std::string::npos ? ' ' : fields[2][kind],
+                       fields[0].substr(0, end + 1)});
   }
   return symbols;
 }
@@ -34,7 +38,7 @@ Symbol symbol_named(const std::vector<Symbol>& symbols, const std::string& begin
 }
 
 ImageSize size_of(const std::filesystem::path& image) {
-  std::istringstream out(output_of({"arm-none-eabi-size", image.string()}));
+  std::istringstream out(images::output_of({"arm-none-eabi-size", image.string()}));
   std::string headings;
   std::getline(out, headings);
   ImageSize size;
@@ -45,10 +49,10 @@ ImageSize size_of(const std::filesystem::path& image) {
 
 std::vector<std::string> forbidden_in(const std::vector<Symbol>& symbols) {
   static const std::regex forbidden(
-      "__aeabi_d.*|__aeabi_[fiul]+2d|__aeabi_cd.*|__.*df[23]"                            // double
+      "__aeabi_d.*|__aeabi_[fiul]+2d|__aeabi_cd.*|__.*df[23]"                                        // double
       "|_?malloc(_r)?|_?calloc(_r)?|_?realloc(_r)?|_?free(_r)?|_?sbrk(_r)?|operator (new|delete).*"  // heap
-      "|__cxa_(throw|allocate|rethrow|begin_catch).*|_Unwind_.*|__gxx_personality.*"     // exceptions
-      "|typeinfo .*|vtable .*|__dynamic_cast");                                           // run-time type information
+      "|__cxa_(throw|allocate|rethrow|begin_catch).*|_Unwind_.*|__gxx_personality.*"                 // exceptions
+      "|typeinfo .*|vtable .*|__dynamic_cast");  // run-time type information
   std::vector<std::string> found;
   for (const Symbol& s : symbols) {
     const std::string name = s.name.substr(0, s.name.find('@'));
@@ -57,4 +61,4 @@ std::vector<std::string> forbidden_in(const std::vector<Symbol>& symbols) {
   return found;
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace bms {
+namespace bms::firmware {
 
 struct Symbol {
   std::uint64_t address = 0, size = 0;
@@ -28,4 +28,4 @@ ImageSize size_of(const std::filesystem::path& image);
 /// Names in an image that firmware may not have: double arithmetic, heap, exceptions, run-time type information.
 std::vector<std::string> forbidden_in(const std::vector<Symbol>& symbols);
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,7 +1,8 @@
 // Provokes a fault and reads, after the reset that follows, what the hal has kept of it.
 //
 //   command line "fw KIND"   KIND: address (a load where nothing is), undefined (an instruction that is none),
-//                            stack (the stack pointer outside RAM), overflow (calls without end: the stack grows into its guard)
+//                            stack (the stack pointer outside RAM), overflow (calls without end: the stack grows into
+//                            its guard)
 //   exit code                0: the record of the last run names that fault; otherwise the check that failed, below
 //
 // The second run must follow by itself, with RAM as it was: the same binary decides by last_fault() which run it is.
@@ -47,7 +48,16 @@ extern "C" void lose_the_stack();
 
 namespace {
 
-enum Exit : int { as_expected = 0, no_fault_came = 10, wrong_pc = 11, wrong_status = 12, wrong_address = 13, wrong_exception = 14, unknown_kind = 15, got_past = 16 };
+enum Exit : int {
+  as_expected = 0,
+  no_fault_came = 10,
+  wrong_pc = 11,
+  wrong_status = 12,
+  wrong_address = 13,
+  wrong_exception = 14,
+  unknown_kind = 15,
+  got_past = 16
+};
 
 const auto* const nowhere = reinterpret_cast<const std::uint32_t*>(0x30000000);
 
@@ -65,7 +75,8 @@ std::uint32_t address(const void* p) { return reinterpret_cast<std::uint32_t>(p)
 }
 
 Exit judged(std::string_view kind, const bms::hal::FaultRecord& fault) {
-  constexpr std::uint32_t precise_bus_error = 1U << 9, address_valid = 1U << 15, undefined_instruction = 1U << 16, bus_fault = 5, usage_fault = 6;
+  constexpr std::uint32_t precise_bus_error = 1U << 9, address_valid = 1U << 15, undefined_instruction = 1U << 16,
+                          bus_fault = 5, usage_fault = 6;
   if (kind == "address") {
     if (fault.exception != bus_fault) return wrong_exception;
     if (fault.pc != address(faulting_load)) return wrong_pc;
@@ -78,11 +89,14 @@ Exit judged(std::string_view kind, const bms::hal::FaultRecord& fault) {
     return fault.cfsr == undefined_instruction ? as_expected : wrong_status;
   }
   if (kind == "overflow") {
-    constexpr std::uint32_t memory_fault = 4, data_access = 1U << 1, while_stacking = 1U << 4, memory_address_valid = 1U << 7;
+    constexpr std::uint32_t memory_fault = 4, data_access = 1U << 1, while_stacking = 1U << 4,
+                            memory_address_valid = 1U << 7;
     if (fault.exception != memory_fault) return wrong_exception;
     if ((fault.cfsr & (data_access | while_stacking)) == 0) return wrong_status;
     const std::uint32_t guard = address(image_stack_limit);
-    if ((fault.cfsr & memory_address_valid) != 0 && (fault.address < guard || fault.address >= guard + bms::hal::cortex_m::guard_bytes)) return wrong_address;
+    if ((fault.cfsr & memory_address_valid) != 0 &&
+        (fault.address < guard || fault.address >= guard + bms::hal::cortex_m::guard_bytes))
+      return wrong_address;
     return below_the_stack == 0x1234'5678 ? as_expected : got_past;
   }
   return fault.exception != 0 && fault.pc == 0 ? as_expected : wrong_pc;  // no frame could be stacked
@@ -100,9 +114,11 @@ int main() {
   below_the_stack = 0x1234'5678;
   if (kind == "overflow") return static_cast<int>(deeper(0)) | no_fault_came;
   if (kind == "address") return static_cast<int>(read_from(nowhere)) | no_fault_came;
-  if (kind == "undefined") execute_nothing();
-  else if (kind == "stack") lose_the_stack();
-  else return unknown_kind;
+  if (kind == "undefined")
+    execute_nothing();
+  else if (kind == "stack")
+    lose_the_stack();
+  else
+    return unknown_kind;
   return no_fault_came;
 }
-

@@ -1,12 +1,13 @@
-// The whole fault matrix against the forklift board's image; with --write its table goes to protection/README.md, with --only TEXT the cases whose names
-// hold it are told sample by sample. Exit: 1 when anything is missed, false or late. ./bms faults [TEXT]
+// The whole fault matrix against the forklift board's image; with --write its table goes to protection/README.md, with
+// --only TEXT the cases whose names hold it are told sample by sample. Exit: 1 when anything is missed, false or late.
+// ./bms faults [TEXT]
 #include <cstdio>
 #include <cstring>
 #include <exception>
 
 #include <fmt/format.h>
 
-#include "host_sim/committed_figures.hpp"
+#include "files/committed_figures.hpp"
 #include "tests/firmware/board_fault_matrix.hpp"
 
 int main(int count, char** words) {
@@ -20,7 +21,7 @@ int main(int count, char** words) {
     const std::string table = protection::markdown(result);
     fmt::print("{}{} complaints\n", table, result.wrong.size());
     if (count > 1 && std::strcmp(words[1], "--write") == 0) {
-      replace_figures(BMS_SOURCE_DIR "/protection/README.md", "fault matrix", table);
+      files::replace_figures(BMS_SOURCE_DIR "/protection/README.md", "fault matrix", table);
     }
     return result.wrong.empty() ? 0 : 1;
   } catch (const std::exception& e) {

@@ -1,35 +1,42 @@
-// The firmware images of the emulated board: what is in them, what a step costs, what they say on CAN, what a fault leaves behind.
+// The firmware images of the emulated board: what is in them, what a step costs, what they say on CAN, what a fault
+// leaves behind.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/committed_figures.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/image_file.hpp"
-#include "host_sim/recording.hpp"
+#include "files/cell_file.hpp"
+#include "files/committed_figures.hpp"
+#include "files/recording.hpp"
+#include "files/text_file.hpp"
 #include "host_sim/replay.hpp"
-#include "host_sim/text_file.hpp"
+#include "images/firmware_image.hpp"
+#include "images/image_file.hpp"
 #include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/slcan_board.hpp"
 #include "tests/firmware/step_cost.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-std::filesystem::path image(Image kind, const char* cell = "table9") { return firmware_image("netduinoplus2", read_cell(cell), kind); }
-std::filesystem::path microbit_image(Image kind) { return firmware_image("microbit", read_cell("table9"), kind); }
-const EmulatedBoard& microbit() { return emulated_boards().back(); }
+std::filesystem::path image(images::Image kind, const char* cell = "table9") {
+  return images::firmware_image("netduinoplus2", files::read_cell(cell), kind);
+}
+std::filesystem::path microbit_image(images::Image kind) {
+  return images::firmware_image("microbit", files::read_cell("table9"), kind);
+}
+const images::EmulatedBoard& microbit() { return images::emulated_boards().back(); }
 
-std::vector<Sample> shift() { return samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv")); }
+std::vector<measurement::Sample> shift() {
+  return files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+}
 
 TEST(FirmwareImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
-  EXPECT_THAT(forbidden_in(symbols_of(image(Image::application))), IsEmpty());
-  EXPECT_THAT(forbidden_in(symbols_of(image(Image::replay))), IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(image(images::Image::application))), IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(image(images::Image::replay))), IsEmpty());
 }
 
 TEST(FirmwareImage, WhatIsForbiddenIsFoundWhereItIs) {
@@ -38,14 +45,22 @@ TEST(FirmwareImage, WhatIsForbiddenIsFoundWhereItIs) {
   EXPECT_THAT(found, ::testing::Contains(StartsWith("__cxa_throw")));
   EXPECT_THAT(found, ::testing::Contains(StartsWith("typeinfo ")));
   EXPECT_THAT(found, ::testing::Contains(StartsWith("vtable ")));
-  EXPECT_EQ(forbidden_in({{0, 0, 'T', "__aeabi_dadd"}, {0, 0, 'T', "__aeabi_f2d"}, {0, 0, 'T', "__muldf3"}, {0, 0, 'T', "_malloc_r"}, {0, 0, 'T', "_sbrk"},
-                          {0, 0, 'T', "__aeabi_fadd"}, {0, 0, 'T', "memcpy"}, {0, 0, 'T', "__aeabi_uldivmod"}}).size(), 5U);
+  EXPECT_EQ(forbidden_in({{0, 0, 'T', "__aeabi_dadd"},
+                          {0, 0, 'T', "__aeabi_f2d"},
+                          {0, 0, 'T', "__muldf3"},
+                          {0, 0, 'T', "_malloc_r"},
+                          {0, 0, 'T', "_sbrk"},
+                          {0, 0, 'T', "__aeabi_fadd"},
+                          {0, 0, 'T', "memcpy"},
+                          {0, 0, 'T', "__aeabi_uldivmod"}})
+                .size(),
+            5U);
 }
 
 /// The table in estimator/README.md, which `./bms figures` writes, against what is measured here.
 TEST(FirmwareImage, CostsNoMoreThanTheTableSays) {
-  const CommittedFigures table(BMS_SOURCE_DIR "/estimator/README.md", "netduinoplus2");
-  const auto measured = step_figures(emulated_boards().front(), read_cell("table9"), shift());
+  const files::CommittedFigures table(BMS_SOURCE_DIR "/estimator/README.md", "netduinoplus2");
+  const auto measured = step_figures(images::emulated_boards().front(), files::read_cell("table9"), shift());
   ASSERT_FALSE(measured.empty());
   for (const auto& [name, value] : measured) {
     ASSERT_TRUE(table.has(name)) << name;
@@ -54,8 +69,9 @@ TEST(FirmwareImage, CostsNoMoreThanTheTableSays) {
 }
 
 TEST(ProtectionImage, CostsNoMoreThanTheTableSaysAndDecidesWhatTheHostDecides) {
-  const CommittedFigures table(BMS_SOURCE_DIR "/protection/README.md", "netduinoplus2");
-  const auto measured = protection_figures(emulated_boards().front(), read_cell("table9"));  // throws when the board decides otherwise
+  const files::CommittedFigures table(BMS_SOURCE_DIR "/protection/README.md", "netduinoplus2");
+  const auto measured = protection_figures(images::emulated_boards().front(),
+                                           files::read_cell("table9"));  // throws when the board decides otherwise
   ASSERT_FALSE(measured.empty());
   for (const auto& [name, value] : measured) {
     ASSERT_TRUE(table.has(name)) << name;
@@ -64,13 +80,14 @@ TEST(ProtectionImage, CostsNoMoreThanTheTableSaysAndDecidesWhatTheHostDecides) {
 }
 
 TEST(ProtectionImage, HasNoFloatingPoint) {
-  const auto symbols = symbols_of(image(Image::protection));
+  const auto symbols = symbols_of(image(images::Image::protection));
   EXPECT_THAT(forbidden_in(symbols), IsEmpty());
-  for (const Symbol& s : symbols) EXPECT_FALSE(s.name.starts_with("__aeabi_f") || s.name.starts_with("__aeabi_i2f")) << s.name;
+  for (const Symbol& s : symbols)
+    EXPECT_FALSE(s.name.starts_with("__aeabi_f") || s.name.starts_with("__aeabi_i2f")) << s.name;
 }
 
 TEST(FirmwareImage, AStepStaysInsideItsBudget) {
-  const StepCost cost = count_instructions(emulated_boards().front(), image(Image::replay), shift());
+  const StepCost cost = count_instructions(images::emulated_boards().front(), image(images::Image::replay), shift());
   EXPECT_EQ(cost.calls, 28801U);
   EXPECT_LE(cost.mean, 300);  // design budget of a step
   EXPECT_LT(cost.least, cost.mean);
@@ -78,21 +95,22 @@ TEST(FirmwareImage, AStepStaysInsideItsBudget) {
 }
 
 TEST(MicrobitImage, AStepStaysInsideItsBudget) {
-  const StepCost cost = count_instructions(microbit(), microbit_image(Image::replay), shift());
+  const StepCost cost = count_instructions(microbit(), microbit_image(images::Image::replay), shift());
   EXPECT_EQ(cost.calls, 28801U);
   EXPECT_LE(cost.mean, 3'000);  // design budget of a step
   EXPECT_GT(cost.least, 1'000U);
 }
 
 TEST(MicrobitImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
-  EXPECT_THAT(forbidden_in(symbols_of(microbit_image(Image::application))), IsEmpty());
-  EXPECT_THAT(forbidden_in(symbols_of(microbit_image(Image::replay))), IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(microbit_image(images::Image::application))), IsEmpty());
+  EXPECT_THAT(forbidden_in(symbols_of(microbit_image(images::Image::replay))), IsEmpty());
 }
 
 /// Telemetry tells in float, a few times a sample; the estimator and what is known beside it know no float.
 TEST(MicrobitImage, EstimatesWithoutSoftwareFloat) {
-  const auto objects = microbit_image(Image::application).parent_path() / "CMakeFiles";
-  for (const char* object : {"estimator_step.dir/firmware/estimator_step.cpp.obj", "application.dir/firmware/board_cell.cpp.obj"}) {
+  const auto objects = microbit_image(images::Image::application).parent_path() / "CMakeFiles";
+  for (const char* object :
+       {"estimator_step.dir/firmware/estimator_step.cpp.obj", "application.dir/firmware/board_cell.cpp.obj"}) {
     const auto symbols = symbols_of(objects / object);
     ASSERT_FALSE(symbols.empty());
     for (const Symbol& s : symbols) {
@@ -102,8 +120,8 @@ TEST(MicrobitImage, EstimatesWithoutSoftwareFloat) {
 }
 
 TEST(MicrobitImage, CostsNoMoreThanTheTableSays) {
-  const CommittedFigures table(BMS_SOURCE_DIR "/estimator/README.md", "microbit");
-  const auto measured = core_figures(microbit(), read_cell("table9"), shift());
+  const files::CommittedFigures table(BMS_SOURCE_DIR "/estimator/README.md", "microbit");
+  const auto measured = core_figures(microbit(), files::read_cell("table9"), shift());
   ASSERT_FALSE(measured.empty());
   for (const auto& [name, value] : measured) {
     ASSERT_TRUE(table.has(name)) << name;
@@ -113,11 +131,12 @@ TEST(MicrobitImage, CostsNoMoreThanTheTableSays) {
 
 TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
   const auto all = shift();
-  const std::vector<Sample> part(all.begin() + 3000, all.begin() + 4200);
-  const StartingPoint start = starting_point(Belief{0.8, 0.05}).value();
-  const Track host = run_on_host(read_cell("table9"), part, start, ScalarKind::single);
+  const std::vector<measurement::Sample> part(all.begin() + 3000, all.begin() + 4200);
+  const measurement::StartingPoint start = host_sim::starting_point(host_sim::Belief{0.8, 0.05}).value();
+  const host_sim::Track host =
+      host_sim::run_on_host(files::read_cell("table9"), part, start, host_sim::ScalarKind::single);
 
-  SlcanBoard board(image(Image::application));
+  SlcanBoard board(image(images::Image::application));
   EXPECT_EQ(board.read(), "");  // ready
   board.write("S6\rO\r");
   EXPECT_EQ(board.read(), "");
@@ -127,7 +146,7 @@ TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
   for (std::size_t k = 0; k < part.size(); ++k) {
     board.send_sample(part[k].time_us, part[k].current_ua, part[k].voltage_uv, part[k].temperature_cdegc);
     const BoardTelemetry t = board.telemetry();
-    const EstimateRow& expected = host.rows[k];
+    const host_sim::EstimateRow& expected = host.rows[k];
     ASSERT_NEAR(t.soc, 5e4 * expected.soc, 0.51) << k;
     ASSERT_NEAR(t.soc_sigma, 5e4 * expected.soc_sigma, 0.51) << k;
     if (k > 0) {
@@ -149,58 +168,66 @@ TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
 }
 
 TEST(SlcanBoard, TellsWhichCellFileItHolds) {
-  const CellFile cell = read_cell("table9");
-  SlcanBoard board(image(Image::application));
+  const files::CellFile cell = files::read_cell("table9");
+  SlcanBoard board(image(images::Image::application));
   board.read();
   board.write("O\r");
   board.read();
   board.send_sample(0, 0, 3'300'000, 2500);
   const std::string identity = board.read_until("t1838");
-  EXPECT_EQ(identity.substr(9, 8), fmt::format("{:02X}{:02X}{:02X}{:02X}", cell.hash & 255, cell.hash >> 8 & 255, cell.hash >> 16 & 255, cell.hash >> 24));
-  const ImageFile file(image(Image::application));
+  EXPECT_EQ(identity.substr(9, 8), fmt::format("{:02X}{:02X}{:02X}{:02X}", cell.hash & 255, cell.hash >> 8 & 255,
+                                               cell.hash >> 16 & 255, cell.hash >> 24));
+  const images::ImageFile file(image(images::Image::application));
   std::uint32_t in_the_image = 0;
   std::memcpy(&in_the_image, file.at(file.symbol("image_cell_hash"), sizeof in_the_image).data(), sizeof in_the_image);
   EXPECT_EQ(in_the_image, cell.hash);
-  EXPECT_EQ(fmt::format("{:08x}", in_the_image), sha256(cell.text).substr(0, 8));
+  EXPECT_EQ(fmt::format("{:08x}", in_the_image), files::sha256(cell.text).substr(0, 8));
   EXPECT_EQ(identity.substr(17), "0100");  // 0.1.0, minor before major
   EXPECT_EQ(identity[7], '0') << "patch";
 }
 
 TEST(SlcanBoard, HostileBytesAreRefusedAndTheNextSampleIsTaken) {
-  SlcanBoard board(image(Image::application));
+  SlcanBoard board(image(images::Image::application));
   board.read();
   board.write("t3128\rO\r");
   EXPECT_EQ(board.read(), "\a") << "closed";
   EXPECT_EQ(board.read(), "");
-  for (const std::string& line : {std::string("t31"), std::string("t3129"), std::string("t312800"), std::string("t312G00000000000000"), std::string("t8108") + std::string(16, '0'),
-                                  std::string(3000, 't'), std::string("\xff\x00\x80\n\t;", 6), std::string("t3128zzzzzzzzzzzzzzzz"), std::string("O0"), std::string("S9")}) {
+  for (const std::string& line :
+       {std::string("t31"), std::string("t3129"), std::string("t312800"), std::string("t312G00000000000000"),
+        std::string("t8108") + std::string(16, '0'), std::string(3000, 't'), std::string("\xff\x00\x80\n\t;", 6),
+        std::string("t3128zzzzzzzzzzzzzzzz"), std::string("O0"), std::string("S9")}) {
     board.write(line + "\r");
     EXPECT_EQ(board.read(), "\a") << line.substr(0, 20);
   }
-  board.write("T0000031280011223344556677\rt31D4" + std::string(8, '0') + "\rt3008" + std::string(16, '0') + "\r");  // well formed, not ours
+  board.write("T0000031280011223344556677\rt31D4" + std::string(8, '0') + "\rt3008" + std::string(16, '0') +
+              "\r");  // well formed, not ours
   for (int k = 0; k < 3; ++k) EXPECT_EQ(board.read(), "");
   // a time frame whose reading got lost: flagged as missing, not the last reading again
   board.send_sample(0, 0, 3'300'000, 2500);
   const BoardTelemetry first = board.telemetry();
   EXPECT_NE(first.soc, 0xFFFFU);
-  board.write("t31D8" "40420F000000" "C409\r");
+  board.write(
+      "t31D8"
+      "40420F000000"
+      "C409\r");
   const BoardTelemetry lost = board.telemetry();
-  EXPECT_NE(lost.flags & (current_missing | voltage_missing), 0U);
+  EXPECT_NE(lost.flags & (estimator::current_missing | estimator::voltage_missing), 0U);
   EXPECT_EQ(lost.voltage, 0xFFFFU);
   board.send_sample(2'000'000, 0, 3'300'000, 2500);
-  EXPECT_EQ(board.telemetry().flags & (current_missing | voltage_missing), 0U);
+  EXPECT_EQ(board.telemetry().flags & (estimator::current_missing | estimator::voltage_missing), 0U);
 }
 
 class Fault : public ::testing::TestWithParam<const char*> {};
 
 /// The image exits with the number of its check that failed (tests/firmware/fault_image.cpp).
 TEST_P(Fault, LeavesARecordThatTheNextRunReads) {
-  const TemporaryFolder folder;
-  auto command = emulator_command(emulated_boards().front(), image(Image::fault), {GetParam()});
+  const images::TemporaryFolder folder;
+  auto command = images::emulator_command(images::emulated_boards().front(), image(images::Image::fault), {GetParam()});
   command.insert(command.end(), {"-serial", "none"});
-  EXPECT_EQ(ChildProcess(command, folder.path() / "log").wait(), 0) << read_file(folder.path() / "log");
+  EXPECT_EQ(images::ChildProcess(command, folder.path() / "log").wait(), 0) << files::read_file(folder.path() / "log");
 }
-INSTANTIATE_TEST_SUITE_P(Kinds, Fault, ::testing::Values("address", "undefined", "stack", "overflow"), [](const auto& kind) { return std::string(kind.param); });
+INSTANTIATE_TEST_SUITE_P(Kinds, Fault, ::testing::Values("address", "undefined", "stack", "overflow"),
+                         [](const auto& kind) { return std::string(kind.param); });
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

@@ -2,33 +2,46 @@
 
 #include <algorithm>
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
-constexpr std::uint32_t pg = 1U << 0, ser = 1U << 1, mer = 1U << 2, strt = 1U << 16, lock = 1U << 31;  // FLASH_CR, 3.9.6
-constexpr std::uint32_t pgperr = 1U << 6, pgserr = 1U << 7, wrperr = 1U << 4;                          // FLASH_SR, 3.9.5
-constexpr double word_us = 16, erase_us = 250'000;                                                     // datasheet DS8626, flash memory programming, x32, usual
+constexpr std::uint32_t pg = 1U << 0, ser = 1U << 1, mer = 1U << 2, strt = 1U << 16,
+                        lock = 1U << 31;                                       // FLASH_CR, 3.9.6
+constexpr std::uint32_t pgperr = 1U << 6, pgserr = 1U << 7, wrperr = 1U << 4;  // FLASH_SR, 3.9.5
+constexpr double word_us = 16, erase_us = 250'000;  // datasheet DS8626, flash memory programming, x32, usual
 
 }  // namespace
 
 std::uint32_t FlashControllerModel::read(std::uint32_t at) const {
   switch (at) {
-    case 0x00: return acr_;
-    case 0x0C: return sr_;
-    case 0x10: return cr_;
-    case 0x14: return option_bytes;
-    default: return 0;
+    case 0x00:
+      return acr_;
+    case 0x0C:
+      return sr_;
+    case 0x10:
+      return cr_;
+    case 0x14:
+      return option_bytes;
+    default:
+      return 0;
   }
 }
 
 void FlashControllerModel::write(std::uint32_t at, std::uint32_t value) {
   switch (at) {
-    case 0x00: acr_ = value; return;
-    case 0x04: return unlock(value);
-    case 0x0C: sr_ &= ~value; return;
-    case 0x10: return control(value);
-    default: return;
+    case 0x00:
+      acr_ = value;
+      return;
+    case 0x04:
+      return unlock(value);
+    case 0x0C:
+      sr_ &= ~value;
+      return;
+    case 0x10:
+      return control(value);
+    default:
+      return;
   }
 }
 
@@ -53,8 +66,10 @@ void FlashControllerModel::control(std::uint32_t value) {
   }
   cr_ = value & ~strt;
   if ((value & strt) == 0) return;
-  if ((value & (ser | mer | pg)) != ser) violations.push_back("an erase that is none of one sector");
-  else erase(value >> 3 & 15);
+  if ((value & (ser | mer | pg)) != ser)
+    violations.push_back("an erase that is none of one sector");
+  else
+    erase(value >> 3 & 15);
 }
 
 void FlashControllerModel::erase(std::uint32_t number) {
@@ -105,4 +120,4 @@ double FlashControllerModel::take_stall_us() {
   return us;
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,14 +1,16 @@
-// The STM32F405's flash interface as its registers show it, with the three sectors behind the vectors, written from RM0090, 3, and the datasheet
-// alone: it shares nothing with hal/. Programming clears bits; erasing sets those of a sector; the core, which runs from flash, stands still meanwhile.
+// The STM32F405's flash interface as its registers show it, with the three sectors behind the vectors, written from
+// RM0090, 3, and the datasheet alone: it shares nothing with hal/. Programming clears bits; erasing sets those of a
+// sector; the core, which runs from flash, stands still meanwhile.
 //
-// What a driver must not do (a control register that is locked, a word that is not erased, another width than it set up) is in violations.
+// What a driver must not do (a control register that is locked, a word that is not erased, another width than it set
+// up) is in violations.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-namespace bms {
+namespace bms::firmware {
 
 class FlashControllerModel {
  public:
@@ -42,4 +44,4 @@ class FlashControllerModel {
   double stall_us_ = 0;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,6 +1,7 @@
-// The forklift board's own image in Unicorn, its I2C controller a register model, a model of the front end on its wire: what the cells have is on the CAN
-// bus, and a chip that goes, hangs or is reset takes the readings with it, not the firmware. A truck around it follows the contactors' pins: they close in
-// their order and open in the time that protection's table gives.
+// The forklift board's own image in Unicorn, its I2C controller a register model, a model of the front end on its wire:
+// what the cells have is on the CAN bus, and a chip that goes, hangs or is reset takes the readings with it, not the
+// firmware. A truck around it follows the contactors' pins: they close in their order and open in the time that
+// protection's table gives.
 #include <cmath>
 #include <functional>
 
@@ -9,17 +10,18 @@
 #include <gtest/gtest.h>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
-#include "host_sim/cell_file.hpp"
-#include "host_sim/firmware_image.hpp"
+#include "files/cell_file.hpp"
+#include "images/firmware_image.hpp"
 #include "tests/firmware/i2c_controller_model.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using ::testing::IsEmpty;
 
 const std::filesystem::path& image() {
-  static const auto path = firmware_image("stm32f405_forklift", read_cell("table9"), Image::application);
+  static const auto path =
+      images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application);
   return path;
 }
 
@@ -38,8 +40,8 @@ class FrontEndBoard : public ::testing::Test {
     EXPECT_THAT(board.can.violations, IsEmpty());
     EXPECT_LT(board.longest_unfed_ms, 1'360);
   }
-  std::optional<hal::CanFrame> last(unsigned id) const {
-    std::optional<hal::CanFrame> found;
+  std::optional<can::Frame> last(unsigned id) const {
+    std::optional<can::Frame> found;
     for (const SeenFrame& s : board.can.seen) {
       if (s.from_board && s.frame.id == id) found = s.frame;
     }
@@ -136,8 +138,10 @@ class Truck : public FrontEndBoard {
       chip.ld_v = chip.stack_v;
       chip.current_a = load.current_a;
     } else {
-      if (told.precharge && minus) chip.ld_v += (chip.stack_v - chip.ld_v) * (1 - std::exp(-0.01 / 0.5));
-      else chip.ld_v *= std::exp(-0.01 / (load.current_a == 0 ? 1.5 : 0.05));
+      if (told.precharge && minus)
+        chip.ld_v += (chip.stack_v - chip.ld_v) * (1 - std::exp(-0.01 / 0.5));
+      else
+        chip.ld_v *= std::exp(-0.01 / (load.current_a == 0 ? 1.5 : 0.05));
       chip.current_a = 0;
     }
     board.run_for_ms(10);
@@ -186,7 +190,8 @@ TEST_F(Truck, DrivesOffOverTheResistorAndTheSecondPoleClosesOnlyOnAFullLink) {
   EXPECT_EQ(faults().first_cause, 0U);
 }
 
-/// What happens to the pack while it drives; the pins are open within delay_ms of the table, a sample's period and the front end's own time to measure.
+/// What happens to the pack while it drives; the pins are open within delay_ms of the table, a sample's period and the
+/// front end's own time to measure.
 struct Mishap {
   const char* name;
   std::function<void(Bq76952Model&, Load&)> happens;
@@ -211,12 +216,17 @@ TEST_P(Pulls, ThePinsOpenInTime) {
 }
 
 // what the contactors find, 0.3 s of it, counts with the next sample (protection/protection.hpp)
-INSTANTIATE_TEST_SUITE_P(On, Pulls, ::testing::Values(
-    Mishap{"SevereOvervoltage", [](auto& chip, auto&) { chip.cell_v[5] = 3.9; }, 200, [](const auto& f) { return f.cell_overvoltage_severe == 1; }},
-    Mishap{"SevereUndervoltage", [](auto& chip, auto&) { chip.cell_v[9] = 1.7; }, 200, [](const auto& f) { return f.cell_undervoltage_severe == 1; }},
-    Mishap{"ShortCircuit", [](auto&, auto& load) { load.current_a = -45; }, 0, [](const auto& f) { return f.short_circuit == 1; }},
-    Mishap{"AContactorThatFallsOff", [](auto&, auto& load) { load.plus_fails = true; }, 400, [](const auto& f) { return f.contactor_not_closed == 1; }}),
-    [](const auto& p) { return std::string(p.param.name); });
+INSTANTIATE_TEST_SUITE_P(On, Pulls,
+                         ::testing::Values(Mishap{"SevereOvervoltage", [](auto& chip, auto&) { chip.cell_v[5] = 3.9; },
+                                                  200, [](const auto& f) { return f.cell_overvoltage_severe == 1; }},
+                                           Mishap{"SevereUndervoltage", [](auto& chip, auto&) { chip.cell_v[9] = 1.7; },
+                                                  200, [](const auto& f) { return f.cell_undervoltage_severe == 1; }},
+                                           Mishap{"ShortCircuit", [](auto&, auto& load) { load.current_a = -45; }, 0,
+                                                  [](const auto& f) { return f.short_circuit == 1; }},
+                                           Mishap{"AContactorThatFallsOff",
+                                                  [](auto&, auto& load) { load.plus_fails = true; }, 400,
+                                                  [](const auto& f) { return f.contactor_not_closed == 1; }}),
+                         [](const auto& p) { return std::string(p.param.name); });
 
 TEST_F(Truck, WithAPoleWeldedGetsNoPower) {
   load.minus_welded = true;
@@ -233,4 +243,4 @@ TEST_F(Truck, WhoseStoreIsWornOutIsToldSoAndDrives) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

@@ -7,9 +7,9 @@
 #include "tests/firmware/host_hal.hpp"
 #include "tests/storage/flash_model.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
-using Pack = PackSample<16>;
+using Pack = measurement::PackSample<16>;
 
 /// firmware/board_cell.hpp of this board, with the cell from its file.
 struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
@@ -23,13 +23,14 @@ struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
 struct Input {
   Pack pack;
   std::int32_t link_uv = 0;
-  std::optional<hal::CanFrame> command;  ///< before the sample
+  std::optional<can::Frame> command;  ///< before the sample
 };
 
 /// All sectors, one behind the other.
 inline void fill(FlashModel& flash, const std::vector<std::uint8_t>& bytes) {
   const std::uint32_t each = flash.size().sector_bytes;
-  for (std::uint32_t k = 0; k < flash.size().sectors; ++k) flash.fill(k, {bytes.begin() + k * each, bytes.begin() + (k + 1) * each});
+  for (std::uint32_t k = 0; k < flash.size().sectors; ++k)
+    flash.fill(k, {bytes.begin() + k * each, bytes.begin() + (k + 1) * each});
 }
 inline std::vector<std::uint8_t> bytes_of(FlashModel& flash) {
   std::vector<std::uint8_t> all;
@@ -45,14 +46,17 @@ class HostBoard {
  public:
   static constexpr std::uint32_t sectors = 3, sector_bytes = 0x4000;  // of the STM32F405, those behind the vectors
 
-  explicit HostBoard(const std::vector<std::uint8_t>& flash, const std::optional<StartingPoint>& told = std::nullopt) {
+  explicit HostBoard(const std::vector<std::uint8_t>& flash,
+                     const std::optional<measurement::StartingPoint>& told = std::nullopt) {
     fill(flash_, flash);
     plug_in(&flash_);
     host_hal::sent.clear();
     host_hal::requests.clear();
     host_hal::switched = {};
     persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
-    application_.emplace(told ? told : remembered_start(persistence_, host_hal::table9().hash), messages::Identity{host_hal::table9().hash, 0x000100}, static_cast<float>(host_hal::table9().parameters.capacity_ah), persistence_);
+    application_.emplace(told ? told : remembered_start(persistence_, host_hal::table9().hash),
+                         messages::Identity{host_hal::table9().hash, 0x000100},
+                         static_cast<float>(host_hal::table9().parameters.capacity_ah), persistence_);
   }
   ~HostBoard() { plug_in(nullptr); }
   HostBoard(const HostBoard&) = delete;
@@ -73,4 +77,4 @@ class HostBoard {
   std::optional<Application<ForkliftCell>> application_;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

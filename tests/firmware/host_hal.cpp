@@ -21,11 +21,11 @@ void host_hal::begin() {
 namespace hal {
 
 bool can_listening() { return host_hal::listening; }
-bool can_send(const CanFrame& frame) {
+bool can_send(const can::Frame& frame) {
   host_hal::sent.push_back(frame);
   return true;
 }
-bool next_request(CanFrame& frame) {
+bool next_request(can::Frame& frame) {
   if (host_hal::requests.empty()) return false;
   frame = host_hal::requests.front();
   host_hal::requests.pop_front();

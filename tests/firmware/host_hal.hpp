@@ -1,5 +1,6 @@
-// The functions of hal/ that the firmware's application calls, on this machine: what it sends, switches and records is kept here, what it reads is set here.
-// The flash is another file's (hal/absent/flash.cpp, tests/storage/flash_model.hpp). And the application's parts with cell table9.
+// The functions of hal/ that the firmware's application calls, on this machine: what it sends, switches and records is
+// kept here, what it reads is set here. The flash is another file's (hal/absent/flash.cpp,
+// tests/storage/flash_model.hpp). And the application's parts with cell table9.
 #pragma once
 
 #include <cstdint>
@@ -7,15 +8,15 @@
 #include <optional>
 #include <vector>
 
+#include "files/cell_file.hpp"
 #include "firmware/application.hpp"
 #include "hal/power.hpp"
-#include "host_sim/cell_file.hpp"
 
 namespace bms::host_hal {
 
 inline bool listening = true;
-inline std::vector<hal::CanFrame> sent;
-inline std::deque<hal::CanFrame> requests;
+inline std::vector<can::Frame> sent;
+inline std::deque<can::Frame> requests;
 inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
 inline std::int32_t link_reads_uv = 0;
@@ -39,30 +40,40 @@ std::optional<Message> last() {
   return std::nullopt;
 }
 
-inline const CellFile& table9() {
-  static const CellFile cell = read_cell("table9");
+inline const files::CellFile& table9() {
+  static const files::CellFile cell = files::read_cell("table9");
   return cell;
 }
 
 /// Of firmware/board_cell.hpp all but plan(), which a test's board adds.
 template <std::size_t Cells>
 struct Table9Board {
-  using Estimator = SocEstimator<float>;
+  using Estimator = estimator::SocEstimator<float>;
   static constexpr std::size_t cells = Cells;
 
   static const auto& tables() {
     static const auto tables = model::prepare<float, model::max_intervals>(table9().parameters);
     return tables;
   }
-  static Estimate<float> step(Estimator& estimator, const Sample& sample) { return estimator.step(tables(), sample); }
+  static estimator::Estimate<float> step(Estimator& estimator, const measurement::Sample& sample) {
+    return estimator.step(tables(), sample);
+  }
   static std::uint64_t estimated_us(const Estimator& estimator) { return estimator.time_us(); }
-  static void look(Condition<Estimator>& condition, const Estimator& estimator, const Sample& sample, const Estimate<float>& e, bool limits_wanted) {
+  static void look(estimator::Condition<Estimator>& condition, const Estimator& estimator,
+                   const measurement::Sample& sample, const estimator::Estimate<float>& e, bool limits_wanted) {
     condition.update(tables(), sample, e, estimator.state(), limits_wanted);
   }
-  static void tell_apart(PackCells<float, Cells>& of, const PackSample<Cells>& pack, const Estimate<float>& e) { of.update(tables(), pack, e); }
+  static void tell_apart(estimator::PackCells<float, Cells>& of, const measurement::PackSample<Cells>& pack,
+                         const estimator::Estimate<float>& e) {
+    of.update(tables(), pack, e);
+  }
   static const model::Plausible& plausible() { return tables().plausible; }
   static protection::PackDesign design(double sample_period_s) {
-    return {.limits = table9().parameters.limits, .capacity_ah = table9().parameters.capacity_ah, .cells = Cells, .temperatures = Cells > 1 ? 4 : 1, .sample_period_s = sample_period_s};
+    return {.limits = table9().parameters.limits,
+            .capacity_ah = table9().parameters.capacity_ah,
+            .cells = Cells,
+            .temperatures = Cells > 1 ? 4 : 1,
+            .sample_period_s = sample_period_s};
   }
 };
 

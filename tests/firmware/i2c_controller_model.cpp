@@ -1,6 +1,6 @@
 #include "tests/firmware/i2c_controller_model.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
@@ -15,8 +15,12 @@ void I2cControllerModel::update(double now_us) {
     const double then = ready_us_;
     ready_us_ = 0;
     switch (phase_) {
-      case Phase::starting: phase_ = Phase::started, sb_ = true; break;
-      case Phase::addressing: address_done(); break;
+      case Phase::starting:
+        phase_ = Phase::started, sb_ = true;
+        break;
+      case Phase::addressing:
+        address_done();
+        break;
       case Phase::sending:
         if (!dr_waits_) break;
         dr_waits_ = false;
@@ -24,8 +28,11 @@ void I2cControllerModel::update(double now_us) {
         empty_ = true;
         ready_us_ = then + byte_us;
         break;
-      case Phase::receiving: byte_received(); break;
-      default: break;
+      case Phase::receiving:
+        byte_received();
+        break;
+      default:
+        break;
     }
   }
 }
@@ -55,8 +62,10 @@ void I2cControllerModel::byte_received() {
   if (!received_) {
     dr_ = byte;
     received_ = true;
-    if (stop_wanted_) stop();
-    else if (last_acked_) begin_reception(static_cast<double>(chip_.time_us));
+    if (stop_wanted_)
+      stop();
+    else if (last_acked_)
+      begin_reception(static_cast<double>(chip_.time_us));
   } else {
     shift_ = byte;
     shift_full_ = true;
@@ -81,8 +90,10 @@ void I2cControllerModel::stop() {
 std::uint32_t I2cControllerModel::read(std::uint32_t offset, double now_us) {
   update(now_us);
   switch (offset) {
-    case 0x00: return cr1_;
-    case 0x04: return cr2_;
+    case 0x00:
+      return cr1_;
+    case 0x04:
+      return cr2_;
     case 0x10: {
       if (!received_) violations.push_back("DR is read with nothing in it");
       const std::uint8_t byte = dr_;
@@ -97,7 +108,8 @@ std::uint32_t I2cControllerModel::read(std::uint32_t offset, double now_us) {
     case 0x14: {
       status_read_ = true;
       const bool finished = phase_ == Phase::sending ? ready_us_ == 0 && !dr_waits_ && empty_ : shift_full_;
-      return (sb_ ? 1U : 0U) | (address_ ? 2U : 0U) | (finished ? 4U : 0U) | (received_ ? 1U << 6 : 0U) | (empty_ ? 1U << 7 : 0U) | (refused_ ? 1U << 10 : 0U);
+      return (sb_ ? 1U : 0U) | (address_ ? 2U : 0U) | (finished ? 4U : 0U) | (received_ ? 1U << 6 : 0U) |
+             (empty_ ? 1U << 7 : 0U) | (refused_ ? 1U << 10 : 0U);
     }
     case 0x18:
       if (address_ && status_read_) {
@@ -108,9 +120,12 @@ std::uint32_t I2cControllerModel::read(std::uint32_t offset, double now_us) {
         if (reading_) begin_reception(now_us);
       }
       return (phase_ != Phase::idle || chip_.hung ? 2U : 0U) | (phase_ != Phase::idle ? 1U : 0U);
-    case 0x1C: return ccr;
-    case 0x20: return trise;
-    default: return 0;
+    case 0x1C:
+      return ccr;
+    case 0x20:
+      return trise;
+    default:
+      return 0;
   }
 }
 
@@ -127,7 +142,8 @@ void I2cControllerModel::write(std::uint32_t offset, std::uint32_t value, double
         return;
       }
       if ((value & start) != 0 && (cr1_ & start) == 0) {
-        if (phase_ != Phase::idle && !(phase_ == Phase::sending && ready_us_ == 0)) violations.push_back("a start in the middle of something");
+        if (phase_ != Phase::idle && !(phase_ == Phase::sending && ready_us_ == 0))
+          violations.push_back("a start in the middle of something");
         phase_ = Phase::starting;
         empty_ = false;
         ready_us_ = now_us + start_us;
@@ -138,7 +154,9 @@ void I2cControllerModel::write(std::uint32_t offset, std::uint32_t value, double
         if (phase_ != Phase::receiving || ready_us_ == 0) stop();
       }
       return;
-    case 0x04: cr2_ = value, frequency_mhz = value & 63; return;
+    case 0x04:
+      cr2_ = value, frequency_mhz = value & 63;
+      return;
     case 0x10:
       if (sb_) {
         sb_ = false;
@@ -161,10 +179,15 @@ void I2cControllerModel::write(std::uint32_t offset, std::uint32_t value, double
     case 0x14:
       if ((value & 1U << 10) == 0) refused_ = false;
       return;
-    case 0x1C: ccr = value; return;
-    case 0x20: trise = value; return;
-    default: return;
+    case 0x1C:
+      ccr = value;
+      return;
+    case 0x20:
+      trise = value;
+      return;
+    default:
+      return;
   }
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,7 +1,9 @@
-// ST's I2C controller (the one of STM32F1 to F4) as its registers show it, written from RM0090, 27: flags with the time that bytes take at 400 kHz, a
-// clock that waits while nobody reads or writes, the acknowledge that the program has to withdraw in time. On its wire hangs tests/hal/bq76952_model.
+// ST's I2C controller (the one of STM32F1 to F4) as its registers show it, written from RM0090, 27: flags with the time
+// that bytes take at 400 kHz, a clock that waits while nobody reads or writes, the acknowledge that the program has to
+// withdraw in time. On its wire hangs tests/hal/bq76952_model.
 //
-// A write reaches the chip when it is ended; that the chip refuses a byte of it is not shown. What a driver must not do is in violations.
+// A write reaches the chip when it is ended; that the chip refuses a byte of it is not shown. What a driver must not do
+// is in violations.
 #pragma once
 
 #include <array>
@@ -12,7 +14,7 @@
 #include "tests/firmware/unicorn_board.hpp"
 #include "tests/hal/bq76952_model.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 class I2cControllerModel : public UnicornBoard::Peripheral {
  public:
@@ -42,7 +44,8 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
   Phase phase_ = Phase::idle;
   std::uint32_t cr1_ = 0, cr2_ = 0;
   double ready_us_ = 0, freed_us_ = 0;
-  bool sb_ = false, address_ = false, received_ = false, shift_full_ = false, empty_ = false, refused_ = false, status_read_ = false, stop_wanted_ = false, reading_ = false, last_acked_ = false, dr_waits_ = false;
+  bool sb_ = false, address_ = false, received_ = false, shift_full_ = false, empty_ = false, refused_ = false,
+       status_read_ = false, stop_wanted_ = false, reading_ = false, last_acked_ = false, dr_waits_ = false;
   std::uint8_t address_byte_ = 0, dr_ = 0, shift_ = 0;
   std::vector<std::uint8_t> out_;
   std::array<std::uint8_t, 96> in_{};
@@ -55,7 +58,9 @@ class I2cPins : public UnicornBoard::Peripheral {
   static constexpr std::uint32_t base = 0x40020400;
 
   explicit I2cPins(const Bq76952Model& chip) : chip_(chip) {}
-  std::uint32_t read(std::uint32_t offset, double) override { return offset == 0x10 ? (chip_.hung ? 0x80 : 0xC0) : registers_[offset / 4]; }
+  std::uint32_t read(std::uint32_t offset, double) override {
+    return offset == 0x10 ? (chip_.hung ? 0x80 : 0xC0) : registers_[offset / 4];
+  }
   void write(std::uint32_t offset, std::uint32_t value, double) override { registers_[offset / 4] = value; }
 
  private:
@@ -63,4 +68,4 @@ class I2cPins : public UnicornBoard::Peripheral {
   std::array<std::uint32_t, 256> registers_{};
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

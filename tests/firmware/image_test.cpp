@@ -1,4 +1,5 @@
-// An image as a file: the same bytes from the same sources, and the bill of materials beside it against the linker's map.
+// An image as a file: the same bytes from the same sources, and the bill of materials beside it against the linker's
+// map.
 #include <map>
 #include <regex>
 #include <set>
@@ -8,31 +9,36 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/child_process.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/cell_file.hpp"
+#include "files/text_file.hpp"
+#include "images/child_process.hpp"
+#include "images/firmware_image.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// From a copy of the sources in another place, without a compiler cache: one that answered would only show that it is the same as itself.
+/// From a copy of the sources in another place, without a compiler cache: one that answered would only show that it is
+/// the same as itself.
 TEST(Image, HasTheSameBytesFromAnotherFolder) {
-  const auto here = firmware_image("stm32f405_forklift", read_cell("table9"), Image::application);
-  const TemporaryFolder folder;
+  const auto here =
+      images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application);
+  const images::TemporaryFolder folder;
   const fs::path sources = folder.path() / "other sources", build = folder.path() / "other build";
   fs::create_directory(sources);
-  for (const char* name : {"CMakeLists.txt", "cmake", "boards", "can", "hal", "storage", "firmware", "estimator", "model", "protection"}) {
+  for (const char* name :
+       {"CMakeLists.txt", "cmake", "boards", "can", "hal", "storage", "firmware", "estimator", "model", "protection"}) {
     fs::copy(fs::path(BMS_SOURCE_DIR) / name, sources / name, fs::copy_options::recursive);
   }
-  output_of({"cmake", "-S", sources, "-B", build, "-G", "Ninja", "-DBMS_BOARD=stm32f405_forklift", "-DCCACHE=CCACHE-NOTFOUND", "--toolchain", sources / "cmake/toolchain-arm-none-eabi.cmake",
-             "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL});
-  output_of({"cmake", "--build", build, "--target", "bms_stm32f405_forklift.elf"});
-  const std::string there = read_file(build / "bms_stm32f405_forklift.elf");
-  EXPECT_EQ(sha256(read_file(here)), sha256(there));
-  EXPECT_EQ(read_file(fs::path(here).replace_extension(".cdx.json")), read_file(build / "bms_stm32f405_forklift.cdx.json"));
+  images::output_of({"cmake", "-S", sources, "-B", build, "-G", "Ninja", "-DBMS_BOARD=stm32f405_forklift",
+                     "-DCCACHE=CCACHE-NOTFOUND", "--toolchain", sources / "cmake/toolchain-arm-none-eabi.cmake",
+                     "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL});
+  images::output_of({"cmake", "--build", build, "--target", "bms_stm32f405_forklift.elf"});
+  const std::string there = files::read_file(build / "bms_stm32f405_forklift.elf");
+  EXPECT_EQ(files::sha256(files::read_file(here)), files::sha256(there));
+  EXPECT_EQ(files::read_file(fs::path(here).replace_extension(".cdx.json")),
+            files::read_file(build / "bms_stm32f405_forklift.cdx.json"));
   EXPECT_EQ(there.find(folder.path().filename().string()), std::string::npos);
   EXPECT_EQ(there.find(BMS_SOURCE_DIR), std::string::npos);
 }
@@ -46,15 +52,15 @@ std::map<std::string, std::set<std::string>> members_in(const std::string& map) 
 }
 
 TEST(BillOfMaterials, NamesEveryArchiveAndMemberOfTheLinkersMapWithVersionAndLicence) {
-  const CellFile cell = read_cell("table9");
-  for (const std::string& board : board_names()) {
-    const fs::path image = firmware_image(board, cell, chip_image(board));
-    const auto bom = nlohmann::json::parse(read_file(fs::path(image).replace_extension(".cdx.json")));
+  const files::CellFile cell = files::read_cell("table9");
+  for (const std::string& board : images::board_names()) {
+    const fs::path image = images::firmware_image(board, cell, images::chip_image(board));
+    const auto bom = nlohmann::json::parse(files::read_file(fs::path(image).replace_extension(".cdx.json")));
     EXPECT_EQ(bom.at("bomFormat"), "CycloneDX");
     EXPECT_EQ(bom.at("specVersion"), "1.5");
     const auto& self = bom.at("metadata").at("component");
     EXPECT_EQ(self.at("type"), "firmware");
-    EXPECT_EQ(self.at("hashes")[0].at("content"), sha256(read_file(image)));
+    EXPECT_EQ(self.at("hashes")[0].at("content"), files::sha256(files::read_file(image)));
     std::map<std::string, std::set<std::string>> named;
     std::set<std::string> references;
     bool has_cell = false;
@@ -63,7 +69,7 @@ TEST(BillOfMaterials, NamesEveryArchiveAndMemberOfTheLinkersMapWithVersionAndLic
       if (c.at("type") == "data") {
         has_cell = true;
         const std::string hash = c.at("hashes")[0].at("content");
-        EXPECT_EQ(hash, sha256(cell.text));
+        EXPECT_EQ(hash, files::sha256(cell.text));
         EXPECT_EQ(std::stoul(hash.substr(0, 8), nullptr, 16), cell.hash) << "what is on CAN";
         continue;
       }
@@ -74,7 +80,7 @@ TEST(BillOfMaterials, NamesEveryArchiveAndMemberOfTheLinkersMapWithVersionAndLic
       for (const auto& p : c.at("properties")) named[c.at("bom-ref")].insert(p.at("value"));
     }
     EXPECT_TRUE(has_cell);
-    const std::string map = read_file(fs::path(image).replace_extension(".map"));
+    const std::string map = files::read_file(fs::path(image).replace_extension(".map"));
     EXPECT_EQ(named, members_in(map)) << board;
     EXPECT_FALSE(named.empty());
     for (const auto& d : bom.at("dependencies")[0].at("dependsOn")) EXPECT_TRUE(references.contains(d)) << d;
@@ -88,4 +94,4 @@ TEST(BillOfMaterials, NamesEveryArchiveAndMemberOfTheLinkersMapWithVersionAndLic
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,11 +1,12 @@
-// What the forklift board's firmware knows over a loss of power, on this machine: state of charge, its cells, faults for the workshop, corrections.
+// What the forklift board's firmware knows over a loss of power, on this machine: state of charge, its cells, faults
+// for the workshop, corrections.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "tests/firmware/host_board.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using host_hal::last;
@@ -39,8 +40,9 @@ class Memory : public ::testing::Test {
     board.take(in);
   }
 
-  const std::vector<std::uint8_t> new_chip = std::vector<std::uint8_t>(HostBoard::sectors * HostBoard::sector_bytes, 0xFF);
-  const StartingPoint start{600'000'000, 20'000'000};
+  const std::vector<std::uint8_t> new_chip =
+      std::vector<std::uint8_t>(HostBoard::sectors * HostBoard::sector_bytes, 0xFF);
+  const measurement::StartingPoint start{600'000'000, 20'000'000};
 
  private:
   unsigned seconds_ = 0;
@@ -67,7 +69,8 @@ TEST_F(Memory, ARunBeginsWhereTheOneBeforeItEnded) {
   EXPECT_NEAR(last<can::PackState>()->soc, before.soc, 0.1F);
   EXPECT_GE(last<can::PackState>()->soc_sigma, before.soc_sigma);
   EXPECT_LT(last<can::PackState>()->soc_sigma, before.soc_sigma + 0.5F);
-  EXPECT_NEAR(last<can::CellExtremes>()->soc_spread, cells.soc_spread, 0.3F) << "each cell's difference is remembered, to 0.001 %";
+  EXPECT_NEAR(last<can::CellExtremes>()->soc_spread, cells.soc_spread, 0.3F)
+      << "each cell's difference is remembered, to 0.001 %";
   EXPECT_NEAR(board.persistence().charge().operating_s, 600, 1);
 }
 
@@ -95,7 +98,8 @@ TEST_F(Memory, OfAnotherCellFileNothingIsTakenUpUntilSomebodyHasSeenIt) {
   EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()), 0x12345678U);
   ask(board, can::Command::code_clear_faults, 1);
   run(board, 2);
-  EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()), host_hal::table9().hash);
+  EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()),
+            host_hal::table9().hash);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
 }
 
@@ -145,4 +149,4 @@ TEST_F(Memory, WhatDoesNotFitIsStoredAsTheNearestThatDoes) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,17 +1,18 @@
-// What sixteen cells beside their mean cost on the board: a thousand steps of their differences over a load that turns, for the
-// instruction counter. Exit code 0: a cell that was made weaker is found.
+// What sixteen cells beside their mean cost on the board: a thousand steps of their differences over a load that turns,
+// for the instruction counter. Exit code 0: a cell that was made weaker is found.
 #include "cell_constants.hpp"
 #include "estimator/cell_differences.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
-using Pack = CellDifferences<float, 16>;
+using Pack = estimator::CellDifferences<float, 16>;
 
-[[gnu::noinline, gnu::flatten]] void pack_step(Pack& pack, float soc, float current_a, float moved, const Pack::Seen& seen) {
+[[gnu::noinline, gnu::flatten]] void pack_step(Pack& pack, float soc, float current_a, float moved,
+                                               const Pack::Seen& seen) {
   pack.step(generated::cell<float>, soc, 0.01F, current_a, moved, 60.0F, seen);
 }
 
-}  // namespace bms
+}  // namespace bms::firmware
 
 int main() {
   using namespace bms;

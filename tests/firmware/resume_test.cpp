@@ -5,24 +5,26 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/recording.hpp"
+#include "files/cell_file.hpp"
+#include "files/recording.hpp"
+#include "files/text_file.hpp"
 #include "host_sim/replay.hpp"
-#include "host_sim/text_file.hpp"
+#include "images/firmware_image.hpp"
 #include "tests/firmware/slcan_board.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 constexpr double percent = 500;  // raw soc: 0.002 %
 constexpr const char* start_at_80_percent_to_1 = "t31080008AF2F80969800\r";
 
-std::filesystem::path image() { return firmware_image("netduinoplus2", read_cell("table9"), Image::application); }
+std::filesystem::path image() {
+  return images::firmware_image("netduinoplus2", files::read_cell("table9"), images::Image::application);
+}
 
 /// Seven minutes of the shift; a reading a second.
-std::vector<Sample> some_minutes() {
-  const auto all = samples(read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+std::vector<measurement::Sample> some_minutes() {
+  const auto all = files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
   return {all.begin() + 3'000, all.begin() + 3'420};
 }
 
@@ -34,17 +36,17 @@ class Board {
     board_.read();
   }
   void tell(const char* frame) { board_.write(frame); }
-  BoardTelemetry sample(const Sample& s) {
+  BoardTelemetry sample(const measurement::Sample& s) {
     board_.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
     return board_.telemetry();
   }
-  BoardTelemetry drive(const std::vector<Sample>& part) {
+  BoardTelemetry drive(const std::vector<measurement::Sample>& part) {
     BoardTelemetry last;
-    for (const Sample& s : part) last = sample(s);
+    for (const measurement::Sample& s : part) last = sample(s);
     return last;
   }
   /// With the first sample: state, broken sectors, newer records, erases, starts.
-  std::string storage(const Sample& s) {
+  std::string storage(const measurement::Sample& s) {
     board_.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
     return board_.read_until("t1B88").substr(5);
   }
@@ -70,16 +72,18 @@ class Resume : public ::testing::Test {
  protected:
   std::filesystem::path flash() const { return folder_.path() / "flash"; }
   /// A board that remembers nothing and is told where to begin.
-  BoardTelemetry told_of(const BoardTelemetry& t, const Sample& s) const {
+  BoardTelemetry told_of(const BoardTelemetry& t, const measurement::Sample& s) const {
     Board board(folder_.path() / "empty");
     board.tell(start(t).c_str());
     return board.sample(s);
   }
-  TemporaryFolder folder_;
-  std::vector<Sample> part_ = some_minutes();
+  images::TemporaryFolder folder_;
+  std::vector<measurement::Sample> part_ = some_minutes();
 };
 
-void say(const char* what, const BoardTelemetry& t) { std::printf("%s: soc %.2f %% +- %.2f %%\n", what, t.soc / percent, t.soc_sigma / percent); }
+void say(const char* what, const BoardTelemetry& t) {
+  std::printf("%s: soc %.2f %% +- %.2f %%\n", what, t.soc / percent, t.soc_sigma / percent);
+}
 
 TEST_F(Resume, AfterAShutdownSocGoesOnWhereItWas) {
   BoardTelemetry before;
@@ -120,7 +124,8 @@ TEST_F(Resume, AfterTheSupplyWasCutSocIsThatOfTheLastMinuteAndSigmaSaysSo) {
   say("when the supply was cut", before);
   say("resumed", after);
   EXPECT_NEAR(after.soc, before.soc, 2 * percent) << "what a minute moves at 1C";
-  EXPECT_LT(std::abs(static_cast<int>(after.soc) - static_cast<int>(before.soc)), 2 * static_cast<int>(after.soc_sigma));
+  EXPECT_LT(std::abs(static_cast<int>(after.soc) - static_cast<int>(before.soc)),
+            2 * static_cast<int>(after.soc_sigma));
 }
 
 TEST_F(Resume, AStartThatIsToldWinsOverWhatWasStored) {
@@ -131,7 +136,11 @@ TEST_F(Resume, AStartThatIsToldWinsOverWhatWasStored) {
     board.switch_off();
   }
   Board board(flash());
-  board.tell("t3108" "00E9A435" "40420F00" "\r");  // 900,000,000 and 1,000,000 ppb
+  board.tell(
+      "t3108"
+      "00E9A435"
+      "40420F00"
+      "\r");  // 900,000,000 and 1,000,000 ppb
   EXPECT_NEAR(board.sample(part_[0]).soc, 90 * percent, 0.2 * percent);
 }
 
@@ -150,7 +159,7 @@ TEST_F(Resume, AFlashFileOfAnyContentIsUsed) {
   std::string noise(3 * 16 * 1024, '\0');
   unsigned state = 1;
   for (char& c : noise) c = static_cast<char>((state = state * 1'664'525 + 1'013'904'223) >> 24);
-  write_file(flash(), noise);
+  files::write_file(flash(), noise);
   BoardTelemetry before;
   {
     Board board(flash());
@@ -164,4 +173,4 @@ TEST_F(Resume, AFlashFileOfAnyContentIsUsed) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,6 +1,6 @@
 #include "tests/firmware/rtc_model.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
@@ -18,7 +18,8 @@ void RtcModel::write_bdcr(std::uint32_t value, bool allowed, double now_us) {
   }
   if ((value & domain_reset) != 0) return reset_domain();
   const std::uint32_t selected = bdcr >> 8 & 3, wanted = value >> 8 & 3;
-  if (selected != 0 && wanted != selected) violations.push_back("the clock's source is chosen again without a reset of the backup domain");
+  if (selected != 0 && wanted != selected)
+    violations.push_back("the clock's source is chosen again without a reset of the backup domain");
   if ((value & lse_on) != 0 && (bdcr & lse_on) == 0) crystal_on_us_ = now_us;
   bdcr = (bdcr & lse_ready) | (value & ~lse_ready);
   advance(now_us);
@@ -35,12 +36,15 @@ void RtcModel::reset_domain() {
 
 double RtcModel::hz() const {
   if ((bdcr & enabled) == 0 || initialising_) return 0;
-  const double source = (bdcr >> 8 & 3) == 1 ? ((bdcr & lse_ready) != 0 ? 32'768 : 0) : (bdcr >> 8 & 3) == 2 ? 32'000 : 0;
+  const double source = (bdcr >> 8 & 3) == 1   ? ((bdcr & lse_ready) != 0 ? 32'768 : 0)
+                        : (bdcr >> 8 & 3) == 2 ? 32'000
+                                               : 0;
   return source / ((prer_ >> 16 & 0x7F) + 1) / ((prer_ & 0x7FFF) + 1);
 }
 
 void RtcModel::advance(double now_us) {
-  if (crystal && (bdcr & lse_on) != 0 && crystal_on_us_ >= 0 && now_us - crystal_on_us_ >= crystal_after_us) bdcr |= lse_ready;
+  if (crystal && (bdcr & lse_on) != 0 && crystal_on_us_ >= 0 && now_us - crystal_on_us_ >= crystal_after_us)
+    bdcr |= lse_ready;
   fraction_s_ += 1e-6 * (now_us - at_us_) * hz();
   at_us_ = now_us;
   for (; fraction_s_ >= 1; fraction_s_ -= 1) second();
@@ -88,10 +92,14 @@ std::uint32_t RtcModel::read(std::uint32_t at, double now_us) {
       if (!dr_locked_) return dr;
       dr_locked_ = false;
       return dr_shadow_;
-    case 0x0C: return (date.year != 0 ? 1U << 4 : 0U) | (synchronised_ ? 1U << 5 : 0U) | (initialising_ ? 3U << 6 : 0U) | 7U;
-    case 0x10: return prer_;
-    case 0x50: return mark_;
-    default: return 0;
+    case 0x0C:
+      return (date.year != 0 ? 1U << 4 : 0U) | (synchronised_ ? 1U << 5 : 0U) | (initialising_ ? 3U << 6 : 0U) | 7U;
+    case 0x10:
+      return prer_;
+    case 0x50:
+      return mark_;
+    default:
+      return 0;
   }
 }
 
@@ -137,4 +145,4 @@ void RtcModel::write(std::uint32_t at, std::uint32_t value, double now_us) {
   }
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,12 +1,13 @@
-// The STM32F405's real-time clock and its backup domain as the registers show them, from RM0090, 5.1.2, 7.3.20 and 26, alone: it shares nothing with hal/. Its calendar counts
-// by the rules of the Gregorian one. It lives longer than a board: power_away() is what happens to it in between.
+// The STM32F405's real-time clock and its backup domain as the registers show them, from RM0090, 5.1.2, 7.3.20 and 26,
+// alone: it shares nothing with hal/. Its calendar counts by the rules of the Gregorian one. It lives longer than a
+// board: power_away() is what happens to it in between.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-namespace bms {
+namespace bms::firmware {
 
 class RtcModel {
  public:
@@ -47,4 +48,4 @@ class RtcModel {
   bool initialising_ = false, synchronised_ = false, dr_locked_ = false;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -11,15 +11,17 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/emulator.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/text_file.hpp"
+#include "images/emulator.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
-std::vector<std::string> command(const EmulatedBoard& board, const std::filesystem::path& image, const std::vector<std::string>& arguments, const std::vector<std::string>& more, const std::filesystem::path& socket) {
-  auto words = emulator_command(board, image, arguments);
+std::vector<std::string> command(const images::EmulatedBoard& board, const std::filesystem::path& image,
+                                 const std::vector<std::string>& arguments, const std::vector<std::string>& more,
+                                 const std::filesystem::path& socket) {
+  auto words = images::emulator_command(board, image, arguments);
   words.insert(words.end(), {"-serial", "unix:" + socket.string() + ",server=on,wait=on"});
   words.insert(words.end(), more.begin(), more.end());
   return words;
@@ -33,13 +35,15 @@ std::string hex(std::uint64_t value, int bytes) {
 
 std::uint64_t little_endian(const std::string& frame, std::size_t at, std::size_t bytes) {
   std::uint64_t value = 0;
-  for (std::size_t k = 0; k < bytes; ++k) value |= static_cast<std::uint64_t>(std::stoul(frame.substr(5 + 2 * (at + k), 2), nullptr, 16)) << (8 * k);
+  for (std::size_t k = 0; k < bytes; ++k)
+    value |= static_cast<std::uint64_t>(std::stoul(frame.substr(5 + 2 * (at + k), 2), nullptr, 16)) << (8 * k);
   return value;
 }
 
 }  // namespace
 
-SlcanBoard::SlcanBoard(const std::filesystem::path& image, const std::vector<std::string>& arguments, const std::vector<std::string>& more, const EmulatedBoard& board)
+SlcanBoard::SlcanBoard(const std::filesystem::path& image, const std::vector<std::string>& arguments,
+                       const std::vector<std::string>& more, const images::EmulatedBoard& board)
     : emulator_(command(board, image, arguments, more, folder_.path() / "uart"), folder_.path() / "log") {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -51,7 +55,7 @@ SlcanBoard::SlcanBoard(const std::filesystem::path& image, const std::vector<std
     close(line_);
     usleep(10'000);
   }
-  throw std::runtime_error("no serial line: " + read_file(folder_.path() / "log"));
+  throw std::runtime_error("no serial line: " + files::read_file(folder_.path() / "log"));
 }
 
 SlcanBoard::~SlcanBoard() { close(line_); }
@@ -88,14 +92,16 @@ std::string SlcanBoard::read_until(const std::string& what) {
   }
 }
 
-void SlcanBoard::send_sample(std::uint64_t time_us, std::int32_t current_ua, std::int32_t voltage_uv, std::int16_t temperature_cdegc) const {
-  write("t3128" + hex(static_cast<std::uint32_t>(current_ua), 4) + hex(static_cast<std::uint32_t>(voltage_uv), 4) + "\r" + "t31D8" + hex(time_us, 6) +
-        hex(static_cast<std::uint16_t>(temperature_cdegc), 2) + "\r");
+void SlcanBoard::send_sample(std::uint64_t time_us, std::int32_t current_ua, std::int32_t voltage_uv,
+                             std::int16_t temperature_cdegc) const {
+  write("t3128" + hex(static_cast<std::uint32_t>(current_ua), 4) + hex(static_cast<std::uint32_t>(voltage_uv), 4) +
+        "\r" + "t31D8" + hex(time_us, 6) + hex(static_cast<std::uint16_t>(temperature_cdegc), 2) + "\r");
 }
 
 BoardTelemetry SlcanBoard::telemetry() {
   BoardTelemetry t;
-  const std::string state = read_until("t1808"), electrical = read_until("t1818"), detail = read_until("t1898"), status = read_until("t1828");
+  const std::string state = read_until("t1808"), electrical = read_until("t1818"), detail = read_until("t1898"),
+                    status = read_until("t1828");
   const auto signed_24 = [](std::uint64_t raw) { return static_cast<std::int32_t>(raw << 8) >> 8; };
   t.soc_quality = static_cast<unsigned>(little_endian(state, 1, 1) >> 4);
   t.soc = static_cast<unsigned>(little_endian(state, 2, 2));
@@ -113,4 +119,4 @@ BoardTelemetry SlcanBoard::telemetry() {
   return t;
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

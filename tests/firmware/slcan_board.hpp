@@ -1,5 +1,6 @@
-// The firmware's application image in the emulator, talked to as a CAN adapter on a serial line is. Numbers and ids are those of
-// the pages in hal/slcan/codec.hpp, hal/sample_frames.hpp and of can/greybox_bms.dbc, written here a second time on purpose.
+// The firmware's application image in the emulator, talked to as a CAN adapter on a serial line is. Numbers and ids are
+// those of the pages in hal/slcan/codec.hpp, hal/sample_frames.hpp and of can/greybox_bms.dbc, written here a second
+// time on purpose.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/child_process.hpp"
-#include "host_sim/emulator.hpp"
+#include "images/child_process.hpp"
+#include "images/emulator.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 /// What one sample was answered with.
 struct BoardTelemetry {
@@ -25,7 +26,9 @@ struct BoardTelemetry {
 class SlcanBoard {
  public:
   /// arguments: the program's; the first is the file that is its flash for data. more: options of the emulator.
-  explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {}, const std::vector<std::string>& more = {}, const EmulatedBoard& board = emulated_boards().front());
+  explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {},
+                      const std::vector<std::string>& more = {},
+                      const images::EmulatedBoard& board = images::emulated_boards().front());
   ~SlcanBoard();
   SlcanBoard(const SlcanBoard&) = delete;
   SlcanBoard& operator=(const SlcanBoard&) = delete;
@@ -36,7 +39,8 @@ class SlcanBoard {
   /// Lines until one begins with `what`; that one.
   std::string read_until(const std::string& what);
 
-  void send_sample(std::uint64_t time_us, std::int32_t current_ua, std::int32_t voltage_uv, std::int16_t temperature_cdegc) const;
+  void send_sample(std::uint64_t time_us, std::int32_t current_ua, std::int32_t voltage_uv,
+                   std::int16_t temperature_cdegc) const;
   /// The frames up to the status frame that ends a sample.
   BoardTelemetry telemetry();
 
@@ -44,10 +48,10 @@ class SlcanBoard {
   int wait() { return emulator_.wait(); }
 
  private:
-  TemporaryFolder folder_;
-  ChildProcess emulator_;
+  images::TemporaryFolder folder_;
+  images::ChildProcess emulator_;
   int line_ = -1;
   std::string received_;
 };
 
-}  // namespace bms
+}  // namespace bms::firmware

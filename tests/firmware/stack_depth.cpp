@@ -9,11 +9,11 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/child_process.hpp"
-#include "host_sim/image_file.hpp"
+#include "images/child_process.hpp"
+#include "images/image_file.hpp"
 #include "tests/firmware/elf_image.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
@@ -37,7 +37,9 @@ Instruction instruction_of(const std::string& line) {
   return i;
 }
 
-bool one_of(const std::string& name, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), name) != names.end(); }
+bool one_of(const std::string& name, std::initializer_list<const char*> names) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
 
 /// Bytes of the registers in "{r4, r5, lr}", "{d8-d9}", "{s16-s19}".
 std::int32_t bytes_of_list(const std::string& operands) {
@@ -48,7 +50,8 @@ std::int32_t bytes_of_list(const std::string& operands) {
   for (std::string item; std::getline(in, item, ',');) {
     item.erase(0, item.find_first_not_of(' '));
     const std::size_t dash = item.find('-');
-    const int count = dash == std::string::npos ? 1 : std::stoi(item.substr(dash + 2)) - std::stoi(item.substr(1, dash - 1)) + 1;
+    const int count =
+        dash == std::string::npos ? 1 : std::stoi(item.substr(dash + 2)) - std::stoi(item.substr(1, dash - 1)) + 1;
     bytes += count * (item[0] == 'd' ? 8 : 4);
   }
   return bytes;
@@ -56,8 +59,10 @@ std::int32_t bytes_of_list(const std::string& operands) {
 
 std::int32_t after_hash(const std::string& operands) { return std::stoi(operands.substr(operands.rfind('#') + 1)); }
 
-/// What an instruction adds to the stack, in bytes; less than 0 takes off. literals: of registers that hold a constant, which ARMv6-M makes large frames with.
-std::int32_t pushed(const Instruction& i, const std::map<std::string, std::int32_t>& literals, std::int32_t large_frame, const std::string& function) {
+/// What an instruction adds to the stack, in bytes; less than 0 takes off. literals: of registers that hold a constant,
+/// which ARMv6-M makes large frames with.
+std::int32_t pushed(const Instruction& i, const std::map<std::string, std::int32_t>& literals, std::int32_t large_frame,
+                    const std::string& function) {
   const std::string& o = i.operands;
   const bool of_stack = o.starts_with("sp,") || o.starts_with("sp!");
   if (i.name == "push" || i.name == "vpush") return bytes_of_list(o);
@@ -69,7 +74,8 @@ std::int32_t pushed(const Instruction& i, const std::map<std::string, std::int32
   if (!of_stack) return 0;
   const bool adds = i.name.starts_with("add"), subtracts = i.name.starts_with("sub");
   const bool of_constant = o.find('#') != std::string::npos;
-  if ((adds || subtracts) && of_constant) return adds ? -after_hash(o.substr(0, o.find('@'))) : after_hash(o.substr(0, o.find('@')));
+  if ((adds || subtracts) && of_constant)
+    return adds ? -after_hash(o.substr(0, o.find('@'))) : after_hash(o.substr(0, o.find('@')));
   const std::string by = o.substr(o.rfind(' ') + 1);
   if (adds && literals.contains(by) && literals.at(by) < 0) return -literals.at(by);
   if (adds && large_frame > 0) return -large_frame;
@@ -78,11 +84,14 @@ std::int32_t pushed(const Instruction& i, const std::map<std::string, std::int32
 }
 
 bool returns(const Instruction& i) {
-  return (i.name == "bx" && i.operands == "lr") || (one_of(i.name, {"pop", "ldmia"}) && i.operands.find("pc") != std::string::npos) || (i.name == "ldr" && i.operands.starts_with("pc, [sp]"));
+  return (i.name == "bx" && i.operands == "lr") ||
+         (one_of(i.name, {"pop", "ldmia"}) && i.operands.find("pc") != std::string::npos) ||
+         (i.name == "ldr" && i.operands.starts_with("pc, [sp]"));
 }
 
 std::optional<std::uint32_t> target(const Instruction& i) {
-  const bool branch = i.name[0] == 'b' && !one_of(i.name, {"bic", "bics", "bfi", "bfc", "bkpt", "bx", "blx"}) && !i.name.starts_with("bic");
+  const bool branch = i.name[0] == 'b' && !one_of(i.name, {"bic", "bics", "bfi", "bfc", "bkpt", "bx", "blx"}) &&
+                      !i.name.starts_with("bic");
   if (!branch && i.name != "cbz" && i.name != "cbnz") return std::nullopt;
   const std::size_t open = i.operands.find(" <");
   if (open == std::string::npos) return std::nullopt;
@@ -90,8 +99,10 @@ std::optional<std::uint32_t> target(const Instruction& i) {
   return static_cast<std::uint32_t>(std::stoul(i.operands.substr(begin, open - begin), nullptr, 16));
 }
 
-/// Of one function: its instructions in the order of their addresses. Where a way in is not seen (a table's, a backward one) the depth is the deepest before.
-Function function_of(const std::string& name, const std::vector<Instruction>& body, const std::map<std::uint32_t, std::int32_t>& words) {
+/// Of one function: its instructions in the order of their addresses. Where a way in is not seen (a table's, a backward
+/// one) the depth is the deepest before.
+Function function_of(const std::string& name, const std::vector<Instruction>& body,
+                     const std::map<std::uint32_t, std::int32_t>& words) {
   Function f{name, 0, {}, false};
   std::map<std::uint32_t, std::int32_t> depth_at;
   std::map<std::string, std::int32_t> literals;
@@ -99,8 +110,10 @@ Function function_of(const std::string& name, const std::vector<Instruction>& bo
   std::string popped;
   bool falls_through = true;
   for (const Instruction& i : body) {
-    if (const auto known = depth_at.find(i.address); known != depth_at.end()) depth = falls_through ? std::max(depth, known->second) : known->second;
-    else if (!falls_through) depth = deepest;
+    if (const auto known = depth_at.find(i.address); known != depth_at.end())
+      depth = falls_through ? std::max(depth, known->second) : known->second;
+    else if (!falls_through)
+      depth = deepest;
     falls_through = true;
     if (i.name == "msr" && i.operands.starts_with("MSP")) depth = deepest = 0;
     if (const std::size_t at = i.operands.find("@ ("); i.name == "ldr" && at != std::string::npos) {
@@ -109,7 +122,8 @@ Function function_of(const std::string& name, const std::vector<Instruction>& bo
     } else {
       literals.erase(i.operands.substr(0, i.operands.find(',')));
     }
-    const bool only_perhaps = i.name.starts_with("pop") && i.name != "pop";  // in an IT block: the way on has not taken it off
+    const bool only_perhaps =
+        i.name.starts_with("pop") && i.name != "pop";  // in an IT block: the way on has not taken it off
     const std::int32_t more = only_perhaps ? 0 : pushed(i, literals, large_frame, name);
     if (i.name == "add" && i.operands.starts_with("sp, r") && more > 0) large_frame = more;
     if (i.name == "pop") popped = i.operands;
@@ -118,12 +132,15 @@ Function function_of(const std::string& name, const std::vector<Instruction>& bo
     deepest = std::max(deepest, depth);
     if (const auto to = target(i)) {
       const bool own = *to >= body.front().address && *to <= body.back().address;
-      const bool call = i.name == "bl" && (!own || *to == body.front().address);  // ARMv6-M jumps by bl where b does not reach
+      const bool call =
+          i.name == "bl" && (!own || *to == body.front().address);  // ARMv6-M jumps by bl where b does not reach
       if (own && !call) depth_at[*to] = std::max(depth_at[*to], depth);
-      if (!call && *to == body.front().address && depth > 0) throw std::runtime_error("a loop that takes more stack each time in " + name);
+      if (!call && *to == body.front().address && depth > 0)
+        throw std::runtime_error("a loop that takes more stack each time in " + name);
       if (!own || call) f.calls.push_back(*to);
       falls_through = i.name != "b" && (i.name != "bl" || call);
-    } else if (returns(i) || one_of(i.name, {"tbb", "tbh", "udf"}) || (i.name == "mov" && i.operands.starts_with("pc,"))) {
+    } else if (returns(i) || one_of(i.name, {"tbb", "tbh", "udf"}) ||
+               (i.name == "mov" && i.operands.starts_with("pc,"))) {
       falls_through = false;  // mov pc: a table, as tbb is where there is none
     } else if (i.name == "bx" && popped.find(i.operands) != std::string::npos) {
       falls_through = false;  // a return, where pop cannot change the instruction set
@@ -142,7 +159,8 @@ class Deepest {
 
   Depth from(std::uint32_t address) {
     auto found = functions_.upper_bound(address);  // the libraries have functions with a second way in
-    if (found == functions_.begin()) throw std::runtime_error(fmt::format("a call to {:#x}, where no function is", address));
+    if (found == functions_.begin())
+      throw std::runtime_error(fmt::format("a call to {:#x}, where no function is", address));
     address = (--found)->first;
     if (const auto done = known_.find(address); done != known_.end()) return done->second;
     const Function& f = found->second;
@@ -163,13 +181,15 @@ class Deepest {
  private:
   /// Functions that call themselves a known number of times.
   static std::uint32_t repeated(const Function& f) {
-    const bool halves = f.name.find("bms::model::settled<") != std::string::npos;  // model/exponential.hpp: from 32 down to 1/4
+    const bool halves = f.name.find("bms::arithmetic::settled<") !=
+                        std::string::npos;  // arithmetic/exponential.hpp: from 32 down to 1/4
     return halves ? 1 + 7 : 1;
   }
   std::vector<std::uint32_t> callees(const Function& f) const {
     std::vector<std::uint32_t> all = f.calls;
     if (!f.by_pointer) return all;
-    const auto named = std::find_if(by_pointer_.begin(), by_pointer_.end(), [&](const auto& entry) { return f.name.starts_with(entry.first); });
+    const auto named = std::find_if(by_pointer_.begin(), by_pointer_.end(),
+                                    [&](const auto& entry) { return f.name.starts_with(entry.first); });
     if (named == by_pointer_.end()) throw std::runtime_error("a call by pointer in " + f.name);
     for (const std::string& begin : named->second) {
       for (const auto& [address, other] : functions_) {
@@ -185,7 +205,8 @@ class Deepest {
   std::set<std::uint32_t> active_;
 };
 
-/// Who calls by pointer in the images, and whom: constructors from reset, and the switch tables of libgcc, which return into their caller.
+/// Who calls by pointer in the images, and whom: constructors from reset, and the switch tables of libgcc, which return
+/// into their caller.
 const ByPointer& calls_by_pointer() {
   static const ByPointer known = {{"reset_handler", {"_GLOBAL__sub_I_"}}, {"__gnu_thumb1_case_", {}}};
   return known;
@@ -199,11 +220,14 @@ Functions functions_of(const std::string& disassembly) {
   std::istringstream lines(disassembly);
   for (std::string line; std::getline(lines, line);) {
     if (line.ends_with(">:")) {
-      bodies.emplace_back(line.substr(line.find('<') + 1, line.size() - line.find('<') - 3), std::vector<Instruction>{});
+      bodies.emplace_back(line.substr(line.find('<') + 1, line.size() - line.find('<') - 3),
+                          std::vector<Instruction>{});
     } else if (line.starts_with(" ") && line.find(":\t") != std::string::npos && !bodies.empty()) {
       const Instruction i = instruction_of(line);
-      if (i.name == ".word") words[i.address] = static_cast<std::int32_t>(std::stoul(i.operands, nullptr, 16));
-      else if (!i.name.starts_with(".")) bodies.back().second.push_back(i);
+      if (i.name == ".word")
+        words[i.address] = static_cast<std::int32_t>(std::stoul(i.operands, nullptr, 16));
+      else if (!i.name.starts_with("."))
+        bodies.back().second.push_back(i);
     }
   }
   Functions functions;
@@ -213,13 +237,15 @@ Functions functions_of(const std::string& disassembly) {
   return functions;
 }
 
-Depth depth_from(const Functions& functions, std::uint32_t root, const ByPointer& by_pointer) { return Deepest(functions, by_pointer).from(root); }
+Depth depth_from(const Functions& functions, std::uint32_t root, const ByPointer& by_pointer) {
+  return Deepest(functions, by_pointer).from(root);
+}
 
 StackDepth stack_depth(const std::filesystem::path& image) {
-  const std::string text = output_of({"arm-none-eabi-objdump", "--disassemble", "--demangle", image.string()});
+  const std::string text = images::output_of({"arm-none-eabi-objdump", "--disassemble", "--demangle", image.string()});
   const Functions functions = functions_of(text);
   Deepest deepest(functions, calls_by_pointer());
-  const std::string table = ImageFile(image).section(".vectors");
+  const std::string table = images::ImageFile(image).section(".vectors");
   std::vector<std::uint32_t> vectors(table.size() / 4);
   std::memcpy(vectors.data(), table.data(), 4 * vectors.size());
   StackDepth depth;
@@ -230,8 +256,9 @@ StackDepth stack_depth(const std::filesystem::path& image) {
     Depth d = deepest.from(handler & ~1U);
     if (d.bytes > depth.interrupt.bytes) depth.interrupt = std::move(d);
   }
-  depth.frame = 4 * (text.find("\tvmsr\t") != std::string::npos || text.find("\tvldr\t") != std::string::npos ? 26 + 1 : 8 + 1);
+  depth.frame =
+      4 * (text.find("\tvmsr\t") != std::string::npos || text.find("\tvldr\t") != std::string::npos ? 26 + 1 : 8 + 1);
   return depth;
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

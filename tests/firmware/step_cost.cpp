@@ -8,13 +8,13 @@
 
 #include "estimator/cell_differences.hpp"
 #include "estimator/condition.hpp"
-#include "host_sim/child_process.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/text_file.hpp"
+#include "images/child_process.hpp"
+#include "images/firmware_image.hpp"
 #include "protection/protection.hpp"
 #include "tests/firmware/elf_image.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
@@ -22,14 +22,21 @@ namespace {
 std::vector<std::string> counting(const std::filesystem::path& image, const char* function, const std::string& log) {
   const auto symbols = symbols_of(image);
   const Symbol counted = symbol_named(symbols, function), interrupt = symbol_named(symbols, "clock_interrupt");
-  return {"-plugin", fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, counted.address & ~1ULL, interrupt.address & ~1ULL, (interrupt.address & ~1ULL) + interrupt.size),
-          "-d", "plugin", "-D", log};
+  return {"-plugin",
+          fmt::format("{},entry={:x},skip={:x}-{:x}", BMS_INSTRUCTION_COUNT, counted.address & ~1ULL,
+                      interrupt.address & ~1ULL, (interrupt.address & ~1ULL) + interrupt.size),
+          "-d",
+          "plugin",
+          "-D",
+          log};
 }
 
 StepCost counted_in(const std::string& log) {
   unsigned long long calls = 0, first = 0, least = 0, most = 0, sum = 0;
-  const std::string text = read_file(log);
-  if (std::sscanf(text.c_str(), "calls %llu first %llu min %llu max %llu sum %llu", &calls, &first, &least, &most, &sum) != 5 || calls < 2) {
+  const std::string text = files::read_file(log);
+  if (std::sscanf(text.c_str(), "calls %llu first %llu min %llu max %llu sum %llu", &calls, &first, &least, &most,
+                  &sum) != 5 ||
+      calls < 2) {
     throw std::runtime_error("the instruction counter said: " + text);
   }
   return {calls, first, least, most, static_cast<double>(sum) / static_cast<double>(calls - 1)};
@@ -37,21 +44,25 @@ StepCost counted_in(const std::string& log) {
 
 }  // namespace
 
-StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& image, const char* function) {
-  const TemporaryFolder folder;
+StepCost count_instructions(const images::EmulatedBoard& board, const std::filesystem::path& image,
+                            const char* function) {
+  const images::TemporaryFolder folder;
   const std::string log = (folder.path() / "count").string();
-  auto command = emulator_command(board, image, {});
+  auto command = images::emulator_command(board, image, {});
   const auto more = counting(image, function, log);
   command.insert(command.end(), more.begin(), more.end());
   command.insert(command.end(), {"-serial", "none"});
-  if (const int code = ChildProcess(command, folder.path() / "log").wait(); code != 0) throw std::runtime_error(fmt::format("{} ended with {}: {}", image.string(), code, read_file(folder.path() / "log")));
+  if (const int code = images::ChildProcess(command, folder.path() / "log").wait(); code != 0)
+    throw std::runtime_error(
+        fmt::format("{} ended with {}: {}", image.string(), code, files::read_file(folder.path() / "log")));
   return counted_in(log);
 }
 
-StepCost count_instructions(const EmulatedBoard& board, const std::filesystem::path& replay_image, const std::vector<Sample>& samples, std::size_t states, const char* function) {
-  const TemporaryFolder folder;
+StepCost count_instructions(const images::EmulatedBoard& board, const std::filesystem::path& replay_image,
+                            const std::vector<measurement::Sample>& samples, std::size_t states, const char* function) {
+  const images::TemporaryFolder folder;
   const std::string log = (folder.path() / "count").string();
-  run_on_board(board, replay_image, samples, std::nullopt, counting(replay_image, function, log), states);
+  images::run_on_board(board, replay_image, samples, std::nullopt, counting(replay_image, function, log), states);
   return counted_in(log);
 }
 
@@ -59,24 +70,37 @@ Footprint footprint(const std::filesystem::path& application_image) {
   const auto symbols = symbols_of(application_image);
   const ImageSize size = size_of(application_image);
   Footprint f;
-  static const std::regex of_estimator(".*bms::(estimator_step\\(|SocEstimator<|BoardCell::look\\(|Condition<|current_limits<|soc_from<|SocBank<|StartMisfit<|model::|UdCovariance<|InputCheck).*");
+  static const std::regex of_estimator(
+      ".*bms::(firmware::estimator_step\\(|estimator::SocEstimator<|firmware::BoardCell::look\\(|estimator::Condition<|"
+      "estimator::current_"
+      "limits<|estimator::soc_from<|estimator::SocBank<|estimator::StartMisfit<|arithmetic::|model::|estimator::"
+      "UdCovariance<|"
+      "estimator::InputCheck).*");
   for (const Symbol& s : symbols) {
-    if (s.name.starts_with("bms::generated::cell<")) f.cell_tables += s.size;
-    else if (std::regex_match(s.name, of_estimator)) f.estimator_text += s.size;
+    if (s.name.starts_with("bms::generated::cell<"))
+      f.cell_tables += s.size;
+    else if (std::regex_match(s.name, of_estimator))
+      f.estimator_text += s.size;
   }
   f.image_text = size.text;
   f.image_ram = size.data + size.bss;
-  const std::string usage = read_file(application_image.parent_path() / "CMakeFiles/estimator_step.dir/firmware/estimator_step.cpp.su");
+  const std::string usage = files::read_file(application_image.parent_path() /
+                                             "CMakeFiles/estimator_step.dir/firmware/estimator_step.cpp.su");
   std::smatch found;
-  if (!std::regex_search(usage, found, std::regex("bms::estimator_step[^\t]*\t([0-9]+)\tstatic"))) throw std::runtime_error("no stack usage in " + usage);
+  if (!std::regex_search(usage, found, std::regex("bms::firmware::estimator_step[^\t]*\t([0-9]+)\tstatic")))
+    throw std::runtime_error("no stack usage in " + usage);
   f.step_stack = std::stoull(found[1]);
   return f;
 }
 
-std::vector<std::pair<std::string, double>> core_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
-  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell));
-  const StepCost besides = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell), "bms::BoardCell::look(");
-  const ImageSize size = size_of(firmware_image(board.name, cell, Image::application));
+std::vector<std::pair<std::string, double>> core_figures(const images::EmulatedBoard& board,
+                                                         const files::CellFile& cell,
+                                                         const std::vector<measurement::Sample>& samples) {
+  const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
+                                           samples, host_sim::state_count(cell));
+  const StepCost besides = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
+                                              samples, host_sim::state_count(cell), "bms::firmware::BoardCell::look(");
+  const ImageSize size = size_of(images::firmware_image(board.name, cell, images::Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},
           {"step, longest [instructions]", number(cost.most)},
@@ -86,11 +110,16 @@ std::vector<std::pair<std::string, double>> core_figures(const EmulatedBoard& bo
           {"RAM of the whole application, without stack [bytes]", number(size.data + size.bss)}};
 }
 
-std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& board, const CellFile& cell, const std::vector<Sample>& samples) {
-  const StepCost cost = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell));
-  const StepCost besides = count_instructions(board, firmware_image(board.name, cell, Image::replay), samples, state_count(cell), "bms::BoardCell::look(");
-  const StepCost pack = count_instructions(board, firmware_image(board.name, cell, Image::pack), "bms::pack_step(");
-  const Footprint f = footprint(firmware_image(board.name, cell, Image::application));
+std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedBoard& board,
+                                                         const files::CellFile& cell,
+                                                         const std::vector<measurement::Sample>& samples) {
+  const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
+                                           samples, host_sim::state_count(cell));
+  const StepCost besides = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
+                                              samples, host_sim::state_count(cell), "bms::firmware::BoardCell::look(");
+  const StepCost pack = count_instructions(board, images::firmware_image(board.name, cell, images::Image::pack),
+                                           "bms::firmware::pack_step(");
+  const Footprint f = footprint(images::firmware_image(board.name, cell, images::Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},
           {"step, longest [instructions]", number(cost.most)},
@@ -100,16 +129,18 @@ std::vector<std::pair<std::string, double>> step_figures(const EmulatedBoard& bo
           {"stack of a step [bytes]", number(f.step_stack)},
           {"code of estimator and model [bytes]", number(f.estimator_text)},
           {"the cell's tables [bytes]", number(f.cell_tables)},
-          {"state of one of sixteen cells beside their mean [bytes]", number(sizeof(CellDifference<float>))},
-          {"state of one cell [bytes]", number(sizeof(CellState<float, model::OneRc>))},
-          {"state of one estimator with its input checks [bytes]", number(sizeof(SocEstimator<float>))},
-          {"state of quality, display, limits and health [bytes]", number(sizeof(Condition<SocEstimator<float>>))},
+          {"state of one of sixteen cells beside their mean [bytes]", number(sizeof(estimator::CellDifference<float>))},
+          {"state of one cell [bytes]", number(sizeof(estimator::CellState<float, model::OneRc>))},
+          {"state of one estimator with its input checks [bytes]", number(sizeof(estimator::SocEstimator<float>))},
+          {"state of quality, display, limits and health [bytes]",
+           number(sizeof(estimator::Condition<estimator::SocEstimator<float>>))},
           {"flash of the whole application [bytes]", number(f.image_text)},
           {"RAM of the whole application, without stack [bytes]", number(f.image_ram)}};
 }
 
-std::vector<std::pair<std::string, double>> protection_figures(const EmulatedBoard& board, const CellFile& cell) {
-  const auto image = firmware_image(board.name, cell, Image::protection);
+std::vector<std::pair<std::string, double>> protection_figures(const images::EmulatedBoard& board,
+                                                               const files::CellFile& cell) {
+  const auto image = images::firmware_image(board.name, cell, images::Image::protection);
   const StepCost cost = count_instructions(board, image, "bms::protection::protection_step(");
   std::uint64_t code = 0, plan = 0;
   for (const Symbol& s : symbols_of(image)) {
@@ -126,4 +157,4 @@ std::vector<std::pair<std::string, double>> protection_figures(const EmulatedBoa
           {"state of one cell, at most [bytes]", number(sizeof(protection::Protection<1>))}};
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,15 +1,16 @@
-// The forklift board's image in Unicorn with the chip's real-time clock and its watch on the supply: a command sets the clock, a rest is as long as it was, a clock that lost
-// its battery says so; a supply that sinks opens the contactors at once and leaves a record.
+// The forklift board's image in Unicorn with the chip's real-time clock and its watch on the supply: a command sets the
+// clock, a rest is as long as it was, a clock that lost its battery says so; a supply that sinks opens the contactors
+// at once and leaves a record.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "can_messages.hpp"
+#include "files/cell_file.hpp"
 #include "hal/sample_frames.hpp"
-#include "host_sim/cell_file.hpp"
-#include "host_sim/firmware_image.hpp"
+#include "images/firmware_image.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using ::testing::ElementsAre;
@@ -19,7 +20,8 @@ constexpr std::uint32_t power_on = 0x0E000000, by_pin = 0x04000000;
 constexpr std::uint32_t new_years_eve_2031 = 1'956'527'998;  // 23:59:58 UTC
 
 const std::filesystem::path& image() {
-  static const auto path = firmware_image("stm32f405_forklift", read_cell("table9"), Image::remote);
+  static const auto path =
+      images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::remote);
   return path;
 }
 
@@ -35,7 +37,8 @@ std::optional<Message> last(const UnicornBoard& board) {
 /// One run of the board: its clock, and what was stored, live longer.
 class BoardRun {
  public:
-  explicit BoardRun(RtcModel& rtc, std::vector<std::uint8_t>& flash, std::uint32_t flags) : board(image()), rtc_(rtc), flash_(flash) {
+  explicit BoardRun(RtcModel& rtc, std::vector<std::uint8_t>& flash, std::uint32_t flags)
+      : board(image()), rtc_(rtc), flash_(flash) {
     board.rtc = &rtc;
     board.flash.bytes = flash;
     board.reset_flags = flags;
@@ -62,13 +65,14 @@ class BoardRun {
   /// Samples a second apart, ten a second.
   void drive(unsigned seconds) {
     for (unsigned k = 0; k < seconds; ++k) {
-      PackSample<16> s;
+      measurement::PackSample<16> s;
       s.time_us = 1'000'000ULL * (k + 1);
       s.current_ua = -2'000'000;
       s.cell_uv.fill(3'280'000);
       s.pack_uv = 16 * 3'280'000;
       s.temperature_cdegc.fill(2'500);
-      for (const hal::CanFrame& f : hal::frames_of(s, 0, static_cast<std::uint16_t>(k))) board.can.others.push_back({wire_frame(f), board.can.now_bit + 25'000 * (k + 1), true});
+      for (const can::Frame& f : hal::frames_of(s, 0, static_cast<std::uint16_t>(k)))
+        board.can.others.push_back({wire_frame(f), board.can.now_bit + 25'000 * (k + 1), true});
     }
     board.run_for_ms(100.0 * seconds + 60);
   }
@@ -84,7 +88,8 @@ class BoardRun {
 class Calendar : public ::testing::Test {
  protected:
   RtcModel rtc;
-  std::vector<std::uint8_t> flash = std::vector<std::uint8_t>(FlashControllerModel::sectors * FlashControllerModel::sector_bytes, 0xFF);
+  std::vector<std::uint8_t> flash =
+      std::vector<std::uint8_t>(FlashControllerModel::sectors * FlashControllerModel::sector_bytes, 0xFF);
 };
 
 TEST_F(Calendar, ThatWasNeverSetSaysSoAndOneThatIsSetGoesOnIntoTheNewYearWithoutPower) {
@@ -179,7 +184,8 @@ class Supply : public ::testing::Test {
  protected:
   Supply() : run(rtc, flash, power_on) {}
   RtcModel rtc;
-  std::vector<std::uint8_t> flash = std::vector<std::uint8_t>(FlashControllerModel::sectors * FlashControllerModel::sector_bytes, 0xFF);
+  std::vector<std::uint8_t> flash =
+      std::vector<std::uint8_t>(FlashControllerModel::sectors * FlashControllerModel::sector_bytes, 0xFF);
   BoardRun run;
   UnicornBoard& board = run.board;
 };
@@ -239,4 +245,4 @@ TEST_F(Supply, OptionBytesThatLetItRunTooLowAreTold) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

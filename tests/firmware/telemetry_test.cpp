@@ -12,7 +12,7 @@
 #include "firmware/j1939_profile.hpp"
 #include "tests/firmware/host_hal.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using namespace host_hal;
@@ -23,15 +23,15 @@ std::uint64_t taken_us = 0;
 /// A board whose estimator always says the same.
 template <std::size_t Cells>
 struct Board : Table9Board<Cells> {
-  static std::uint64_t estimated_us(const SocEstimator<float>&) { return taken_us; }
-  static bms::Estimate<float> step(SocEstimator<float>&, const Sample& sample) {
+  static std::uint64_t estimated_us(const estimator::SocEstimator<float>&) { return taken_us; }
+  static bms::estimator::Estimate<float> step(estimator::SocEstimator<float>&, const measurement::Sample& sample) {
     if (!estimator_hangs_back) taken_us = sample.time_us;
-    bms::Estimate<float> e;
+    bms::estimator::Estimate<float> e;
     e.soc = 0.54321F;
     e.soc_sigma = 0.01F;
     e.v_rc_v = -0.0123456F;
     e.voltage_predicted_v = 3.2999F;
-    e.flags = voltage_stuck;
+    e.flags = estimator::voltage_stuck;
     return e;
   }
   static const protection::ProtectionPlan& plan() {
@@ -45,7 +45,7 @@ class TelemetryTest : public ::testing::Test {
   void SetUp() override {
     begin();
     estimator_hangs_back = false;
-    link_reads_uv = no_reading;
+    link_reads_uv = measurement::no_reading;
     cause = hal::ResetCause::watchdog;
   }
   void ask(std::uint32_t code, std::uint32_t argument, std::uint8_t counter) {
@@ -56,20 +56,21 @@ class TelemetryTest : public ::testing::Test {
   }
   std::vector<unsigned> ids() const {
     std::vector<unsigned> all;
-    for (const hal::CanFrame& f : sent) all.push_back(f.id);
+    for (const can::Frame& f : sent) all.push_back(f.id);
     return all;
   }
   storage::Persistence persistence;
   Application<Board<1>> application{std::nullopt, {0xCE110001, 0x010203}, 6, persistence};
-  Sample sample{};
+  measurement::Sample sample{};
 };
 
 TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   sample.current_ua = -12'345'678;
   sample.voltage_uv = 3'301'499;
   sample.temperature_cdegc = -1'234;
-  application.take(pack_of(sample));
-  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x1B9, 0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
+  application.take(estimator::pack_of(sample));
+  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x1B9, 0x19D, 0x19E,
+                                          0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
   const auto state = can::PackState::of(sent[15]);
   EXPECT_NEAR(state.soc, 54.321, 0.0011);
   EXPECT_NEAR(state.soc_sigma, 1, 0.0011);
@@ -83,7 +84,7 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   EXPECT_NEAR(detail.voltage_rc, -0.0123456, 1e-6);
   EXPECT_NEAR(detail.voltage_predicted, 3.2999, 1e-6);
   const auto status = can::Status::of(sent[18]);
-  EXPECT_EQ(status.flags, voltage_stuck);
+  EXPECT_EQ(status.flags, estimator::voltage_stuck);
   EXPECT_EQ(status.sample_counter, 1U);
   EXPECT_EQ(status.reset_cause, 4U);
   const auto identity = can::Identity::of(sent[3]);
@@ -105,16 +106,16 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
 TEST_F(TelemetryTest, EveryFrameIsProtectedAndCounted) {
   for (int k = 0; k < 40; ++k) {
     sample.time_us = static_cast<std::uint64_t>(k) * 300'000;
-    application.take(pack_of(sample));
+    application.take(estimator::pack_of(sample));
   }
   std::map<unsigned, int> expected;
-  for (const hal::CanFrame& f : sent) {
+  for (const can::Frame& f : sent) {
     EXPECT_TRUE(can::intact(f, static_cast<std::uint16_t>(f.id))) << f.id;
     EXPECT_EQ(can::counter_of(f), expected[f.id] % 15) << f.id;
     ++expected[f.id];
     for (std::size_t byte = 0; byte < 8; ++byte) {
       for (int bit = 0; bit < 8; ++bit) {
-        hal::CanFrame broken = f;
+        can::Frame broken = f;
         broken.data[byte] = static_cast<std::uint8_t>(broken.data[byte] ^ (1 << bit));
         EXPECT_FALSE(can::intact(broken, static_cast<std::uint16_t>(f.id)));
       }
@@ -126,9 +127,12 @@ TEST_F(TelemetryTest, EveryFrameIsProtectedAndCounted) {
 }
 
 TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
-  EstimateHash expected;
-  for (const Sample& s : {Sample{0, -12'345'678, 3'301'499, -1'234}, Sample{1'000'000, no_reading, no_reading, no_temperature}, Sample{0x1234'5678'9ABC, 2'147'483'647, -2'147'483'647, 15'000}}) {
-    application.take(pack_of(s));
+  estimator::EstimateHash expected;
+  for (const measurement::Sample& s :
+       {measurement::Sample{0, -12'345'678, 3'301'499, -1'234},
+        measurement::Sample{1'000'000, measurement::no_reading, measurement::no_reading, measurement::no_temperature},
+        measurement::Sample{0x1234'5678'9ABC, 2'147'483'647, -2'147'483'647, 15'000}}) {
+    application.take(estimator::pack_of(s));
     const auto current = last<can::SampleCurrent>().value();
     const auto voltage = last<can::SampleVoltage>().value();
     const auto time = last<can::SampleTime>().value();
@@ -136,7 +140,7 @@ TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
     EXPECT_EQ(voltage.voltage_uv, s.voltage_uv);
     EXPECT_EQ(voltage.temperature_cdegc, s.temperature_cdegc);
     EXPECT_EQ(std::uint64_t{time.time_high} << 32 | time.time_low, s.time_us);
-    std::array<std::uint32_t, estimate_words> said{};
+    std::array<std::uint32_t, estimator::estimate_words> said{};
     std::copy(recorded.back().begin(), recorded.back().end(), said.begin());
     expected.take(said);
     EXPECT_EQ(last<can::EstimateHash>().value().hash, expected.value());
@@ -148,8 +152,8 @@ TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
 }
 
 TEST_F(TelemetryTest, TheLogSaysWhereTheEstimatorWasToldToBegin) {
-  Application<Board<1>> told{StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6, persistence};
-  told.take(pack_of(sample));
+  Application<Board<1>> told{measurement::StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6, persistence};
+  told.take(estimator::pack_of(sample));
   EXPECT_EQ(last<can::StartingSoc>().value().soc_ppb, 812'345'678);
   EXPECT_EQ(last<can::StartingSoc>().value().given, can::StartingSoc::given_yes);
   EXPECT_EQ(last<can::StartingSigma>().value().sigma_ppb, 20'000'001);
@@ -158,11 +162,11 @@ TEST_F(TelemetryTest, TheLogSaysWhereTheEstimatorWasToldToBegin) {
 TEST_F(TelemetryTest, TheHashTellsEveryBitAndEveryOrder) {
   using Words = std::array<std::uint32_t, 2>;
   const auto of = [](std::initializer_list<Words> all) {
-    EstimateHash h;
+    estimator::EstimateHash h;
     for (const Words& w : all) h.take(w);
     return h.value();
   };
-  EstimateHash text;  // "foobar" of the draft's test vectors begins with "foob"
+  estimator::EstimateHash text;  // "foobar" of the draft's test vectors begins with "foob"
   text.take(std::array<std::uint32_t, 1>{0x626F6F66});
   EXPECT_EQ(text.value(), 0x3F5076EFU);
   EXPECT_NE(of({{1, 2}, {3, 4}}), of({{3, 4}, {1, 2}}));
@@ -172,30 +176,31 @@ TEST_F(TelemetryTest, TheHashTellsEveryBitAndEveryOrder) {
 TEST_F(TelemetryTest, ACommandIsHeardOnceAndAnswered) {
   ask(can::Command::code_log_of_samples, 0, 3);
   ask(can::Command::code_log_of_samples, 1, 3);
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   auto all = ids();
-  EXPECT_EQ(std::count(all.begin(), all.end(), can::CommandAnswer::id), 1) << "the same counter again is the same command again";
+  EXPECT_EQ(std::count(all.begin(), all.end(), can::CommandAnswer::id), 1)
+      << "the same counter again is the same command again";
   EXPECT_EQ(last<can::CommandAnswer>().value().result, can::CommandAnswer::result_done);
   EXPECT_EQ(last<can::CommandAnswer>().value().command_counter, 3U);
   sent.clear();
   sample.time_us += 100'000;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_FALSE(last<can::SampleCurrent>()) << "the log is off";
   EXPECT_TRUE(last<can::Status>());
   ask(can::Command::code_log_of_samples, 1, 4);
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   sample.time_us += 100'000;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_TRUE(last<can::SampleCurrent>());
 }
 
 TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
   ask(can::Command::code_log_of_samples, 0, 1);
-  requests.back().data[4] ^= 1;  // CRC wrong
+  requests.back().data[4] ^= 1;                   // CRC wrong
   ask(can::Command::code_log_of_samples, 0, 15);  // no counter
   requests.push_back({0x123, 8, {}});
   requests.push_back({can::Command::id, 3, {}});
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_FALSE(last<can::CommandAnswer>());
   const struct {
     std::uint32_t code, argument, result;
@@ -208,7 +213,7 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
   std::uint8_t counter = 0;
   for (const auto& c : cases) {
     ask(c.code, c.argument, counter++);
-    application.take(pack_of(sample));
+    application.take(estimator::pack_of(sample));
     EXPECT_EQ(last<can::CommandAnswer>().value().result, c.result) << c.code;
     EXPECT_EQ(last<can::CommandAnswer>().value().code, c.code);
   }
@@ -217,13 +222,13 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
 
 TEST_F(TelemetryTest, TheTimeOfACommandIsTheCalendarsAndOneItDoesNotTakeIsRefused) {
   ask(can::Command::code_set_time, 1'800'000'000, 1);
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_EQ(calendar_was_set_to, 1'800'000'000U);
   EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_done);
   calendar_takes = false;
   ask(can::Command::code_set_time, 1'800'000'001, 2);
   sample.time_us += 100'000;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_refused);
 }
 
@@ -231,7 +236,7 @@ TEST_F(TelemetryTest, ACorrectionIsKeptAndUsedAtOnceAndOneThatIsNoneRefused) {
   const auto set = [&](std::uint32_t code, std::int32_t value, std::uint8_t counter) {
     ask(code, static_cast<std::uint32_t>(value), counter);
     sample.time_us += 100'000;
-    application.take(pack_of(sample));
+    application.take(estimator::pack_of(sample));
     return last<can::CommandAnswer>()->result;
   };
   calibrated = {};
@@ -246,12 +251,16 @@ TEST_F(TelemetryTest, ACorrectionIsKeptAndUsedAtOnceAndOneThatIsNoneRefused) {
 }
 
 TEST_F(TelemetryTest, WhatTheBoardFindsOutAboutItselfIsTold) {
-  host_hal::board_state = {.brown_out_reset_low = true, .clock_failed = true, .calendar = hal::CalendarState::runs_roughly, .stack_free = 1'234};
+  host_hal::board_state = {.brown_out_reset_low = true,
+                           .clock_failed = true,
+                           .calendar = hal::CalendarState::runs_roughly,
+                           .stack_free = 1'234};
   fault = hal::FaultRecord{.exception = 4};
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   auto told = last<can::Board>();
   ASSERT_TRUE(told);
-  EXPECT_EQ(told->ram_failed | told->image_failed | told->stack_overrun | told->cell_file_changed | told->supply_low, 0U);
+  EXPECT_EQ(told->ram_failed | told->image_failed | told->stack_overrun | told->cell_file_changed | told->supply_low,
+            0U);
   EXPECT_EQ(told->brown_out_reset_low, 1U);
   EXPECT_EQ(told->clock_failed, 1U);
   EXPECT_EQ(told->calendar, can::Board::calendar_runs_roughly);
@@ -260,7 +269,7 @@ TEST_F(TelemetryTest, WhatTheBoardFindsOutAboutItselfIsTold) {
   sent.clear();
   sample.time_us += 100'000;
   host_hal::board_state.stack_overrun = true;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   told = last<can::Board>();
   ASSERT_TRUE(told) << "at once, not within the second";
   EXPECT_EQ(told->stack_overrun, 1U);
@@ -268,31 +277,31 @@ TEST_F(TelemetryTest, WhatTheBoardFindsOutAboutItselfIsTold) {
 
 TEST_F(TelemetryTest, MuchAskingMakesASampleNoLonger) {
   for (std::uint8_t k = 0; k < 14; ++k) ask(can::Command::code_set_time, 1, k);
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_EQ(requests.size(), 10U);
 }
 
 TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
-  sample.current_ua = no_reading;
-  sample.voltage_uv = no_reading;
-  sample.temperature_cdegc = no_temperature;
-  const auto nothing = can::PackElectrical::of(messages::pack_electrical(pack_of(sample)).frame(0));
+  sample.current_ua = measurement::no_reading;
+  sample.voltage_uv = measurement::no_reading;
+  sample.temperature_cdegc = measurement::no_temperature;
+  const auto nothing = can::PackElectrical::of(messages::pack_electrical(estimator::pack_of(sample)).frame(0));
   EXPECT_TRUE(std::isnan(nothing.voltage) && std::isnan(nothing.current) && std::isnan(nothing.temperature));
   sample.current_ua = 2'000'000'000;
   sample.voltage_uv = 2'000'000'000;
-  const auto much = can::PackElectrical::of(messages::pack_electrical(pack_of(sample)).frame(0));
+  const auto much = can::PackElectrical::of(messages::pack_electrical(estimator::pack_of(sample)).frame(0));
   EXPECT_NEAR(much.current, 655.34, 1e-3);
   EXPECT_NEAR(much.voltage, 65.534, 1e-4);
-  Estimate<float> e;
+  estimator::Estimate<float> e;
   e.soc = -0.1F;
   e.soc_sigma = 9;
-  Condition<SocEstimator<float>> condition;
+  estimator::Condition<estimator::SocEstimator<float>> condition;
   EXPECT_EQ(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc, 0);
   EXPECT_NEAR(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc_sigma, 125, 1e-3);
   e.soc = std::nanf("");
   EXPECT_TRUE(std::isnan(can::PackState::of(messages::pack_state(e, condition).frame(0)).soc));
   EXPECT_EQ(messages::ppb(e.soc), 0);
-  e.flags = not_started;
+  e.flags = estimator::not_started;
   const auto start = can::PackState::of(messages::pack_state(e, condition).frame(0));
   EXPECT_TRUE(std::isnan(start.soc));
   EXPECT_EQ(start.soc_quality, can::PackState::soc_quality_not_started);
@@ -300,26 +309,26 @@ TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
 
 TEST_F(TelemetryTest, NobodyListeningIsToldNothingAndTheCountersSayHowMuchWasMissed) {
   listening = false;
-  for (int k = 0; k < 5; ++k, sample.time_us += 100'000) application.take(pack_of(sample));
+  for (int k = 0; k < 5; ++k, sample.time_us += 100'000) application.take(estimator::pack_of(sample));
   EXPECT_TRUE(sent.empty());
   EXPECT_EQ(fed, 5);
   listening = true;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_EQ(can::Status::of(sent.back()).sample_counter, 6U);
   EXPECT_EQ(can::counter_of(sent.back()), 0);
 }
 
 TEST_F(TelemetryTest, ASampleThatTheEstimatorHasNotTakenOrThatIsNoNewOneDoesNotFeedTheWatchdog) {
-  application.take(pack_of(sample));
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_EQ(fed, 1) << "the same again";
   sample.time_us += 100'000;
   estimator_hangs_back = true;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_EQ(fed, 1);
   sample.time_us += 100'000;
   estimator_hangs_back = false;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_EQ(fed, 2);
 }
 
@@ -329,7 +338,7 @@ TEST_F(TelemetryTest, IdentityComesEachSecondAndAFaultOnce) {
   fault->cfsr = 0x8200;
   for (int k = 0; k < 30; ++k) {
     sample.time_us = static_cast<std::uint64_t>(k) * 100'000;
-    application.take(pack_of(sample));
+    application.take(estimator::pack_of(sample));
   }
   const auto all = ids();
   EXPECT_EQ(std::count(all.begin(), all.end(), can::Identity::id), 3);
@@ -341,14 +350,14 @@ TEST_F(TelemetryTest, IdentityComesEachSecondAndAFaultOnce) {
 /// Bytes by hand, from the layouts that can/messages.md names.
 TEST_F(TelemetryTest, TheJ1939ProfileTellsTheBatteryInRvcsUnitsBesideItsOwnMessages) {
   Application<Board<16>, J1939Profile> with_profile{std::nullopt, {0, 0}, 6, persistence};
-  PackSample<16> pack{};
+  measurement::PackSample<16> pack{};
   for (auto& uv : pack.cell_uv) uv = 3'300'000;
   pack.pack_uv = 52'800'000;
   pack.current_ua = 5'000'000;
   pack.temperature_cdegc = {2'500, 2'500, 2'500, 2'500};
   const auto of_dgn = [](std::uint32_t dgn) {
     std::vector<std::array<std::uint8_t, 8>> all;
-    for (const hal::CanFrame& f : sent) {
+    for (const can::Frame& f : sent) {
       if (f.long_id && f.id == (6U << 26 | dgn << 8 | 0x80U)) all.push_back(f.data);
     }
     return all;
@@ -360,16 +369,20 @@ TEST_F(TelemetryTest, TheJ1939ProfileTellsTheBatteryInRvcsUnitsBesideItsOwnMessa
   ASSERT_EQ(of_dgn(0x1FFFD).size(), 3U) << "every second of two";
   EXPECT_EQ(of_dgn(0x1FEC9).size(), 5U) << "every half second";
   using Bytes = std::array<std::uint8_t, 8>;
-  EXPECT_EQ(of_dgn(0x1FFFD)[0], (Bytes{1, 120, 0x20, 0x04, 0x78, 0x80, 0x35, 0x77})) << "1056 times 50 mV; 2e9 mA less 5,000: it charges";
-  EXPECT_EQ(of_dgn(0x1FFFC)[0], (Bytes{1, 120, 0x40, 0x25, 109, 0xFF, 0xFF, 0xFF})) << "9536 is 25 degrees C; 54.32 % in halves";
+  EXPECT_EQ(of_dgn(0x1FFFD)[0], (Bytes{1, 120, 0x20, 0x04, 0x78, 0x80, 0x35, 0x77}))
+      << "1056 times 50 mV; 2e9 mA less 5,000: it charges";
+  EXPECT_EQ(of_dgn(0x1FFFC)[0], (Bytes{1, 120, 0x40, 0x25, 109, 0xFF, 0xFF, 0xFF}))
+      << "9536 is 25 degrees C; 54.32 % in halves";
   EXPECT_EQ(of_dgn(0x1FFFB)[0], (Bytes{1, 120, 200, 3, 0, 0xFF, 0xFF, 0xFF})) << "as new, 3.3 Ah are left";
-  EXPECT_EQ(of_dgn(0x1FEC9)[0], (Bytes{1, 120, 1, 0x90, 0x04, 0x00, 0x7D, 0xF3})) << "do not charge: all is open; 58.4 V, 0 A, LiFePO4";
+  EXPECT_EQ(of_dgn(0x1FEC9)[0], (Bytes{1, 120, 1, 0x90, 0x04, 0x00, 0x7D, 0xF3}))
+      << "do not charge: all is open; 58.4 V, 0 A, LiFePO4";
   EXPECT_EQ(of_dgn(0x1FEC7)[0], (Bytes{1, 120, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF}));
-  EXPECT_EQ(of_dgn(0x1FEA5)[0], (Bytes{1, 120, 0xD0, 6, 0, 0xFF, 0xFF, 0xFF})) << "current flows in past open contactors";
-  for (const hal::CanFrame& f : sent) EXPECT_EQ(f.long_id, f.id > 0x7FF);
+  EXPECT_EQ(of_dgn(0x1FEA5)[0], (Bytes{1, 120, 0xD0, 6, 0, 0xFF, 0xFF, 0xFF}))
+      << "current flows in past open contactors";
+  for (const can::Frame& f : sent) EXPECT_EQ(f.long_id, f.id > 0x7FF);
   sent.clear();
-  pack.pack_uv = pack.current_ua = no_reading;
-  pack.temperature_cdegc.fill(no_temperature);
+  pack.pack_uv = pack.current_ua = measurement::no_reading;
+  pack.temperature_cdegc.fill(measurement::no_temperature);
   for (auto& uv : pack.cell_uv) uv = 3'900'000;
   for (int k = 0; k < 20; ++k) {
     with_profile.take(pack);
@@ -390,7 +403,7 @@ TEST_F(TelemetryTest, TheJ1939ProfileTellsTheBatteryInRvcsUnitsBesideItsOwnMessa
 TEST_F(TelemetryTest, ACommandInAFrameOf29BitsIsNotHeard) {
   ask(can::Command::code_log_of_samples, 0, 3);
   requests.back().long_id = true;
-  application.take(pack_of(sample));
+  application.take(estimator::pack_of(sample));
   EXPECT_FALSE(last<can::CommandAnswer>());
 }
 
@@ -398,8 +411,9 @@ TEST_F(TelemetryTest, ACommandInAFrameOf29BitsIsNotHeard) {
 template <class VehicleProfile>
 class PackWith : public TelemetryTest {
  protected:
-  Application<Board<16>, VehicleProfile> pack{std::nullopt, {0xCE110001, 0}, 6, persistence};  // of the same cell file as the other
-  PackSample<16> reading{};
+  Application<Board<16>, VehicleProfile> pack{
+      std::nullopt, {0xCE110001, 0}, 6, persistence};  // of the same cell file as the other
+  measurement::PackSample<16> reading{};
   double link_v = 0;
 
   void SetUp() override {
@@ -415,13 +429,16 @@ class PackWith : public TelemetryTest {
   void second() {
     reading.time_us += 1'000'000;
     for (auto& uv : reading.cell_uv) {
-      if (uv != no_reading) uv += (reading.time_us / 1'000'000) % 2 == 0 ? 1 : -1;
+      if (uv != measurement::no_reading) uv += (reading.time_us / 1'000'000) % 2 == 0 ? 1 : -1;
     }
     const double pack_v = 1e-6 * reading.pack_uv;
     const auto& c = switched;
-    if (c.main_plus && c.main_minus) link_v = pack_v;
-    else if (c.precharge && c.main_minus) link_v += (pack_v - link_v) * (1 - std::exp(-1 / 0.5));
-    else link_v *= std::exp(-0.2);
+    if (c.main_plus && c.main_minus)
+      link_v = pack_v;
+    else if (c.precharge && c.main_minus)
+      link_v += (pack_v - link_v) * (1 - std::exp(-1 / 0.5));
+    else
+      link_v *= std::exp(-0.2);
     link_reads_uv = static_cast<std::int32_t>(1e6 * link_v);
     pack.take(reading);
   }
@@ -432,7 +449,7 @@ class PackTest : public PackWith<NoVehicleProfile> {};
 TEST_F(PackTest, TellsEachCellTheExtremesAndTheTemperatures) {
   reading.cell_uv[4] = 3'291'000;
   reading.cell_uv[9] = 3'201'000;
-  reading.cell_uv[15] = no_reading;
+  reading.cell_uv[15] = measurement::no_reading;
   second();
   EXPECT_NEAR(last<can::CellVoltages2>().value().cell5, 3.291, 1e-3);
   EXPECT_NEAR(last<can::CellVoltages3>().value().cell10, 3.201, 1e-3);
@@ -483,7 +500,8 @@ TEST_F(PackTest, ABoardThatIsUnfitClosesNothing) {
       second();
     }
   };
-  for (const auto what : {&hal::BoardState::ram_failed, &hal::BoardState::image_failed, &hal::BoardState::stack_overrun, &hal::BoardState::supply_low}) {
+  for (const auto what : {&hal::BoardState::ram_failed, &hal::BoardState::image_failed, &hal::BoardState::stack_overrun,
+                          &hal::BoardState::supply_low}) {
     host_hal::board_state = {};
     host_hal::board_state.*what = true;
     drive_s(5);
@@ -510,9 +528,12 @@ TEST_F(PackTest, AfterAFaultOfTheProcessorNothingClosesBeforeItIsCleared) {
   EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
 }
 
-/// What was stored with another cell file means nothing with this one: it is not used, and nothing closes, until somebody says that it is meant.
+/// What was stored with another cell file means nothing with this one: it is not used, and nothing closes, until
+/// somebody says that it is meant.
 TEST_F(PackTest, AnotherCellFileIsToldAndTakenOnlyWhenFaultsAreCleared) {
-  const auto unit = [&](std::uint32_t hash) { return std::make_unique<Application<Board<16>>>(std::nullopt, messages::Identity{hash, 0}, 6.F, persistence); };
+  const auto unit = [&](std::uint32_t hash) {
+    return std::make_unique<Application<Board<16>>>(std::nullopt, messages::Identity{hash, 0}, 6.F, persistence);
+  };
   EXPECT_FALSE(of_another_cell_file(persistence, 0xCE110001));
   EXPECT_TRUE(of_another_cell_file(persistence, 0xCE110002));
   EXPECT_FALSE(remembered_start(persistence, 0xCE110002));
@@ -546,7 +567,8 @@ TEST_F(PackTest, ASevereFaultOpensAndIsToldAtOnceWithItsCause) {
   drive();
   EXPECT_FALSE(driving());
   EXPECT_EQ(last<can::Faults>().value().cell_overvoltage_severe, 1U);
-  EXPECT_EQ(last<can::Faults>().value().first_cause, 1U + static_cast<unsigned>(protection::Fault::cell_overvoltage_severe));
+  EXPECT_EQ(last<can::Faults>().value().first_cause,
+            1U + static_cast<unsigned>(protection::Fault::cell_overvoltage_severe));
   reading.cell_uv[7] = 3'300'000;
   for (int k = 0; k < 20; ++k) drive();
   EXPECT_EQ(last<can::Faults>().value().cell_overvoltage_severe, 1U) << "it is latched";
@@ -562,7 +584,7 @@ class ChargerTest : public PackWith<Cia418Profile> {
   using Bytes = std::vector<std::uint8_t>;
   std::vector<Bytes> told(unsigned id) const {
     std::vector<Bytes> all;
-    for (const hal::CanFrame& f : sent) {
+    for (const can::Frame& f : sent) {
       if (f.id == id) all.emplace_back(f.data.begin(), f.data.begin() + f.length);
     }
     return all;
@@ -590,7 +612,8 @@ class ChargerTest : public PackWith<Cia418Profile> {
 TEST_F(ChargerTest, ReadsStatusVoltageAndTheCurrentItMayGiveInItsOwnReceivePdos) {
   second();
   EXPECT_EQ(told(0x701), (std::vector<Bytes>{{0}})) << "boot-up";
-  EXPECT_EQ(told(0x20A), (std::vector<Bytes>{{0xC8, 0x00, 0x00}})) << "25 degrees C in eighths; not to be charged, all is open";
+  EXPECT_EQ(told(0x20A), (std::vector<Bytes>{{0xC8, 0x00, 0x00}}))
+      << "25 degrees C in eighths; not to be charged, all is open";
   EXPECT_EQ(told(0x30A), (std::vector<Bytes>{{0xC8, 0x00, 0x00, 0xF7, 0xD1, 0x00, 0x00}})) << "52.492 V in 1/1024";
   EXPECT_EQ(told(0x40A), (std::vector<Bytes>{{0x00, 0x00, 54}}));
   charge_for_s(30);
@@ -602,7 +625,7 @@ TEST_F(ChargerTest, ReadsStatusVoltageAndTheCurrentItMayGiveInItsOwnReceivePdos)
   const auto allowed_a = static_cast<double>(last<can::AllowedCurrent>().value().charge);
   EXPECT_GT(allowed_a, 1);
   EXPECT_NEAR((told(0x40A).at(0)[0] | told(0x40A).at(0)[1] << 8) / 16.0, allowed_a, 1.0 / 16);
-  reading.temperature_cdegc.fill(no_temperature);
+  reading.temperature_cdegc.fill(measurement::no_temperature);
   charge_for_s(5);
   EXPECT_EQ(told(0x20A).back(), (Bytes{0xFF, 0x7F, 0x00}));
   EXPECT_EQ(told(0x40A).back(), (Bytes{0, 0, 54})) << "no current where no temperature is known";
@@ -643,7 +666,8 @@ TEST_F(ChargerTest, TheSdoServerAnswersWhatABatteryModuleIsAndRefusesTheRest) {
   EXPECT_EQ(asked({0x40, 0x20, 0x60, 4}), (Bytes{0x4B, 0x20, 0x60, 4, 16, 0, 0, 0})) << "cells";
   EXPECT_EQ(asked({0x40, 0x10, 0x60, 0}), (Bytes{0x4B, 0x10, 0x60, 0, 0xC8, 0, 0, 0}));
   EXPECT_EQ(asked({0x40, 0x01, 0x10, 0}), (Bytes{0x4F, 0x01, 0x10, 0, 0, 0, 0, 0})) << "error register";
-  EXPECT_EQ(asked({0x40, 0x17, 0x10, 0}), (Bytes{0x4B, 0x17, 0x10, 0, 0xF4, 0x01, 0, 0})) << "a heartbeat each half second";
+  EXPECT_EQ(asked({0x40, 0x17, 0x10, 0}), (Bytes{0x4B, 0x17, 0x10, 0, 0xF4, 0x01, 0, 0}))
+      << "a heartbeat each half second";
   EXPECT_EQ(asked({0x40, 0x60, 0x60, 0})[0], 0x43) << "voltage";
   EXPECT_EQ(asked({0x40, 0x70, 0x60, 0})[0], 0x4B) << "current requested";
   EXPECT_EQ(asked({0x40, 0x81, 0x60, 0}), (Bytes{0x4F, 0x81, 0x60, 0, 54, 0, 0, 0})) << "state of charge";
@@ -663,4 +687,4 @@ TEST_F(ChargerTest, TheSdoServerAnswersWhatABatteryModuleIsAndRefusesTheRest) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

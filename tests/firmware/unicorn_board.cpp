@@ -11,13 +11,14 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/text_file.hpp"
+#include "files/text_file.hpp"
 
-namespace bms {
+namespace bms::firmware {
 
 namespace {
 
-constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, systick_exception = 15, pvd = 16 + 1, can_tx = 16 + 19, can_rx0 = 16 + 20, untouched = 0xA5A5A5A5;
+constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, systick_exception = 15, pvd = 16 + 1,
+                        can_tx = 16 + 19, can_rx0 = 16 + 20, untouched = 0xA5A5A5A5;
 constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends a call from outside
 
 void must(uc_err error, const char* what) {
@@ -26,15 +27,26 @@ void must(uc_err error, const char* what) {
 
 }  // namespace
 
-UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal) : symbols_(symbols_of(image)), random_(seed), crystal_(crystal) {
+UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal)
+    : symbols_(symbols_of(image)), random_(seed), crystal_(crystal) {
   must(uc_open(UC_ARCH_ARM, static_cast<uc_mode>(UC_MODE_THUMB | UC_MODE_MCLASS), &core_), "open");
   must(uc_ctl_set_cpu_model(core_, UC_CPU_ARM_CORTEX_M4), "model");
-  constexpr std::uint32_t stored = FlashControllerModel::memory, stored_bytes = FlashControllerModel::sectors * FlashControllerModel::sector_bytes, code = stored + stored_bytes;
+  constexpr std::uint32_t stored = FlashControllerModel::memory,
+                          stored_bytes = FlashControllerModel::sectors * FlashControllerModel::sector_bytes,
+                          code = stored + stored_bytes;
   must(uc_mem_map(core_, 0x08000000, stored - 0x08000000, UC_PROT_READ | UC_PROT_EXEC), "vectors");
   must(uc_mem_map(core_, code, 0x08100000 - code, UC_PROT_READ | UC_PROT_EXEC), "flash");
-  must(uc_mmio_map(core_, stored, stored_bytes,
-                   [](uc_engine*, std::uint64_t at, unsigned size, void* self) -> std::uint64_t { return static_cast<UnicornBoard*>(self)->flash.read_memory(static_cast<std::uint32_t>(at), size); }, this,
-                   [](uc_engine*, std::uint64_t at, unsigned size, std::uint64_t value, void* self) { static_cast<UnicornBoard*>(self)->flash.write_memory(static_cast<std::uint32_t>(at), size, static_cast<std::uint32_t>(value)); }, this),
+  must(uc_mmio_map(
+           core_, stored, stored_bytes,
+           [](uc_engine*, std::uint64_t at, unsigned size, void* self) -> std::uint64_t {
+             return static_cast<UnicornBoard*>(self)->flash.read_memory(static_cast<std::uint32_t>(at), size);
+           },
+           this,
+           [](uc_engine*, std::uint64_t at, unsigned size, std::uint64_t value, void* self) {
+             static_cast<UnicornBoard*>(self)->flash.write_memory(static_cast<std::uint32_t>(at), size,
+                                                                  static_cast<std::uint32_t>(value));
+           },
+           this),
        "storage");
   must(uc_mem_map(core_, 0x20000000, 0x20000, UC_PROT_READ | UC_PROT_WRITE), "RAM");
   must(uc_mem_map(core_, ccm, ccm_size, UC_PROT_READ | UC_PROT_WRITE), "core-coupled RAM");
@@ -42,9 +54,17 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
   const std::uint16_t reference = 1'502;  // VREFINT_CAL: 1.21 V of 3.3 V (datasheet, internal reference voltage)
   must(uc_mem_write(core_, 0x1FFF7A2A, &reference, 2), "system memory");
   const auto map = [&]<std::uint32_t Base>(std::integral_constant<std::uint32_t, Base>, std::size_t size) {
-    must(uc_mmio_map(core_, Base, size,
-                     [](uc_engine*, std::uint64_t at, unsigned, void* self) -> std::uint64_t { return static_cast<UnicornBoard*>(self)->peripheral_read(Base + static_cast<std::uint32_t>(at)); }, this,
-                     [](uc_engine*, std::uint64_t at, unsigned, std::uint64_t value, void* self) { static_cast<UnicornBoard*>(self)->peripheral_write(Base + static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(value)); }, this),
+    must(uc_mmio_map(
+             core_, Base, size,
+             [](uc_engine*, std::uint64_t at, unsigned, void* self) -> std::uint64_t {
+               return static_cast<UnicornBoard*>(self)->peripheral_read(Base + static_cast<std::uint32_t>(at));
+             },
+             this,
+             [](uc_engine*, std::uint64_t at, unsigned, std::uint64_t value, void* self) {
+               static_cast<UnicornBoard*>(self)->peripheral_write(Base + static_cast<std::uint32_t>(at),
+                                                                  static_cast<std::uint32_t>(value));
+             },
+             this),
          "registers");
   };
   map(std::integral_constant<std::uint32_t, 0x40000000>{}, 0x30000);
@@ -53,9 +73,10 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
   must(uc_mem_write(core_, ccm, paint.data(), ccm_size), "paint");
   load(image);
   find_it_blocks();
-  const std::uint64_t step = symbol_named(symbols_, "bms::estimator_step(").address & ~std::uint64_t{1};
+  const std::uint64_t step = symbol_named(symbols_, "bms::firmware::estimator_step(").address & ~std::uint64_t{1};
   uc_hook hook = 0;
-  const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* self) { ++static_cast<UnicornBoard*>(self)->estimates; };
+  const auto count =
+      +[](uc_engine*, std::uint64_t, std::uint32_t, void* self) { ++static_cast<UnicornBoard*>(self)->estimates; };
   must(uc_hook_add(core_, &hook, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, step, step), "hook");
   start();
 }
@@ -102,7 +123,9 @@ void UnicornBoard::unpatch() {
   patched_.clear();
 }
 
-std::uint32_t UnicornBoard::address_of(const std::string& function) const { return static_cast<std::uint32_t>(symbol_named(symbols_, function).address) & ~1U; }
+std::uint32_t UnicornBoard::address_of(const std::string& function) const {
+  return static_cast<std::uint32_t>(symbol_named(symbols_, function).address) & ~1U;
+}
 
 void UnicornBoard::stick(std::uint32_t address, unsigned bit, bool at) {
   stuck_ = {address, bit, at};
@@ -114,7 +137,9 @@ void UnicornBoard::stick(std::uint32_t address, unsigned bit, bool at) {
     byte = static_cast<std::uint8_t>(s.at ? byte | 1U << s.bit : byte & ~(1U << s.bit));
     uc_mem_write(core, s.address, &byte, 1);
   };
-  must(uc_hook_add(core_, &hook, UC_HOOK_MEM_READ, reinterpret_cast<void*>(before_reading), this, address & ~3U, address | 3U), "hook");
+  must(uc_hook_add(core_, &hook, UC_HOOK_MEM_READ, reinterpret_cast<void*>(before_reading), this, address & ~3U,
+                   address | 3U),
+       "hook");
 }
 
 void UnicornBoard::flip_bit(std::uint32_t address, unsigned bit) {
@@ -128,13 +153,14 @@ void UnicornBoard::flip_bit(std::uint32_t address, unsigned bit) {
 UnicornBoard::~UnicornBoard() { uc_close(core_); }
 
 void UnicornBoard::load(const std::filesystem::path& image) {
-  const std::string bytes = read_file(image);
+  const std::string bytes = files::read_file(image);
   Elf32_Ehdr head{};
   std::memcpy(&head, bytes.data(), sizeof head);
   for (unsigned k = 0; k < head.e_phnum; ++k) {
     Elf32_Phdr part{};
     std::memcpy(&part, bytes.data() + head.e_phoff + k * sizeof part, sizeof part);
-    if (part.p_type == PT_LOAD && part.p_filesz > 0) must(uc_mem_write(core_, part.p_paddr, bytes.data() + part.p_offset, part.p_filesz), "load");
+    if (part.p_type == PT_LOAD && part.p_filesz > 0)
+      must(uc_mem_write(core_, part.p_paddr, bytes.data() + part.p_offset, part.p_filesz), "load");
   }
 }
 
@@ -153,41 +179,66 @@ std::uint32_t UnicornBoard::register_value(std::uint32_t address) const {
 std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808) & 3) == 2 ? 168'000'000 : 16'000'000; }
 
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
-  if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
-  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.read(a - FlashControllerModel::registers);
-  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400) return rtc->read(a - RtcModel::base, 1e3 * now_ms());
-  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->read(a & 0x3FF, 1e3 * now_ms());
+  if (a >= BxcanModel::base && a < BxcanModel::base + 0x400)
+    return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
+  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400)
+    return flash.read(a - FlashControllerModel::registers);
+  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400)
+    return rtc->read(a - RtcModel::base, 1e3 * now_ms());
+  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end())
+    return found->second->read(a & 0x3FF, 1e3 * now_ms());
   std::uint32_t value = register_value(a);
   switch (a) {
-    case 0x40023800: return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) | 3U;  // RCC_CR: what is on is ready
-    case 0x40023808: return (value & ~12U) | (value & 3) << 2;                                                                       // RCC_CFGR: the switch is at once
-    case 0x40007004: return supply_low_ && (register_value(0x40007000) & 1U << 4) != 0 ? 4U : 0U;  // PWR_CSR: PVDO, while the detector is on
-    case 0x40023870: return rtc != nullptr ? rtc->read_bdcr(1e3 * now_ms()) : 0;
-    case 0x40023874: return reset_flags | (value & 1) | (value & 1) << 1;  // RCC_CSR: the slow oscillator is ready at once
-    case scs + 0xD04: return exception_;
-    case scs + 0x010: return systick_csr_;
-    case scs + 0x014: return systick_rvr_;
-    case scs + 0x018: return static_cast<std::uint32_t>(next_systick_ > ticks_ ? (next_systick_ - ticks_) / ticks_a_cycle() : 0);
-    case scs + 0x100: case scs + 0x180: return enabled_;
-    default: return value;
+    case 0x40023800:
+      return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) |
+             3U;  // RCC_CR: what is on is ready
+    case 0x40023808:
+      return (value & ~12U) | (value & 3) << 2;  // RCC_CFGR: the switch is at once
+    case 0x40007004:
+      return supply_low_ && (register_value(0x40007000) & 1U << 4) != 0
+                 ? 4U
+                 : 0U;  // PWR_CSR: PVDO, while the detector is on
+    case 0x40023870:
+      return rtc != nullptr ? rtc->read_bdcr(1e3 * now_ms()) : 0;
+    case 0x40023874:
+      return reset_flags | (value & 1) | (value & 1) << 1;  // RCC_CSR: the slow oscillator is ready at once
+    case scs + 0xD04:
+      return exception_;
+    case scs + 0x010:
+      return systick_csr_;
+    case scs + 0x014:
+      return systick_rvr_;
+    case scs + 0x018:
+      return static_cast<std::uint32_t>(next_systick_ > ticks_ ? (next_systick_ - ticks_) / ticks_a_cycle() : 0);
+    case scs + 0x100:
+    case scs + 0x180:
+      return enabled_;
+    default:
+      return value;
   }
 }
 
 void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
   if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) {
-    if ((register_value(0x40023840) & 1U << 25) != 0) can.write(a - BxcanModel::base, value);
-    else can.violations.push_back("bxCAN is written without its clock");
+    if ((register_value(0x40023840) & 1U << 25) != 0)
+      can.write(a - BxcanModel::base, value);
+    else
+      can.violations.push_back("bxCAN is written without its clock");
     return;
   }
-  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400) return flash.write(a - FlashControllerModel::registers, value);
-  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400) return rtc->write(a - RtcModel::base, value, 1e3 * now_ms());
-  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end()) return found->second->write(a & 0x3FF, value, 1e3 * now_ms());
+  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400)
+    return flash.write(a - FlashControllerModel::registers, value);
+  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400)
+    return rtc->write(a - RtcModel::base, value, 1e3 * now_ms());
+  if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end())
+    return found->second->write(a & 0x3FF, value, 1e3 * now_ms());
   switch (a) {
     case 0x40003000:  // IWDG_KR
       if (value == 0xCCCC) watchdog_ticks_ = 1;
       if (value != 0xAAAA) return;
       ++watchdog_feeds;
-      if (fed_at_ != 0) longest_unfed_ms = std::max(longest_unfed_ms, static_cast<double>(ticks_ - fed_at_) / (ticks_per_second / 1e3));
+      if (fed_at_ != 0)
+        longest_unfed_ms = std::max(longest_unfed_ms, static_cast<double>(ticks_ - fed_at_) / (ticks_per_second / 1e3));
       fed_at_ = ticks_;
       watchdog_ticks_ = register_value(0x40003008) * (ticks_per_second / 500);  // a count is 2 ms
       return;
@@ -201,19 +252,29 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
       if ((value & 1U << 24) != 0) reset_flags = 0;  // RMVF
       registers_[a] = value & 1;
       return;
-    case scs + 0xD28: registers_[a] &= ~value; return;
+    case scs + 0xD28:
+      registers_[a] &= ~value;
+      return;
     case scs + 0x010:
-      if ((value & 1) != 0 && (systick_csr_ & 1) == 0) next_systick_ = ticks_ + (systick_rvr_ + std::uint64_t{1}) * ticks_a_cycle();
+      if ((value & 1) != 0 && (systick_csr_ & 1) == 0)
+        next_systick_ = ticks_ + (systick_rvr_ + std::uint64_t{1}) * ticks_a_cycle();
       systick_csr_ = value;
       return;
-    case scs + 0x014: systick_rvr_ = value; return;
-    case scs + 0x100: enabled_ |= value; return;
-    case scs + 0x180: enabled_ &= ~value; return;
+    case scs + 0x014:
+      systick_rvr_ = value;
+      return;
+    case scs + 0x100:
+      enabled_ |= value;
+      return;
+    case scs + 0x180:
+      enabled_ &= ~value;
+      return;
     case scs + 0xD0C:
       if ((value & 4) != 0) ended_ = "the firmware has reset the core";
       if (!ended_.empty()) uc_emu_stop(core_);
       return;
-    default: registers_[a] = value;
+    default:
+      registers_[a] = value;
   }
 }
 
@@ -251,7 +312,8 @@ void UnicornBoard::enter(std::uint32_t exception) {
   const std::uint32_t control = reg(UC_ARM_REG_CONTROL), psr = reg(UC_ARM_REG_XPSR);
   const bool fpu = (control & 4) != 0;
   std::vector<std::uint32_t> frame(fpu ? 26 : 8, 0);
-  const std::array<int, 6> core{UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR};
+  const std::array<int, 6> core{UC_ARM_REG_R0, UC_ARM_REG_R1,  UC_ARM_REG_R2,
+                                UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR};
   for (std::size_t k = 0; k < core.size(); ++k) frame[k] = reg(core[k]);
   frame[6] = reg(UC_ARM_REG_PC);
   std::uint32_t sp = reg(UC_ARM_REG_SP);
@@ -285,7 +347,8 @@ void UnicornBoard::leave(std::uint32_t exc_return) {
   std::vector<std::uint32_t> frame(fpu ? 26 : 8);
   const std::uint32_t sp = reg(UC_ARM_REG_SP);
   must(uc_mem_read(core_, sp, frame.data(), 4 * frame.size()), "the stack of an interrupt");
-  const std::array<int, 6> core{UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR};
+  const std::array<int, 6> core{UC_ARM_REG_R0, UC_ARM_REG_R1,  UC_ARM_REG_R2,
+                                UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR};
   for (std::size_t k = 0; k < core.size(); ++k) set_reg(core[k], frame[k]);
   if (fpu) {
     for (int k = 0; k < 16; ++k) set_reg(UC_ARM_REG_S0 + k, frame[8 + static_cast<std::size_t>(k)]);
@@ -304,7 +367,8 @@ void UnicornBoard::leave(std::uint32_t exc_return) {
 bool UnicornBoard::take_fault(int error) {
   if (!may_start_again) return false;
   const bool no_code = error == UC_ERR_FETCH_UNMAPPED || error == UC_ERR_FETCH_PROT;
-  const bool access = error == UC_ERR_READ_UNMAPPED || error == UC_ERR_WRITE_UNMAPPED || error == UC_ERR_WRITE_PROT || error == UC_ERR_READ_PROT;
+  const bool access = error == UC_ERR_READ_UNMAPPED || error == UC_ERR_WRITE_UNMAPPED || error == UC_ERR_WRITE_PROT ||
+                      error == UC_ERR_READ_PROT;
   registers_[scs + 0xD28] |= no_code ? 1U << 8 : access ? 1U << 9 : 1U << 16;  // IBUSERR, PRECISERR, UNDEFINSTR
   enter(no_code || access ? 5 : 6);
   return true;
@@ -314,7 +378,8 @@ void UnicornBoard::find_it_blocks() {
   std::map<std::uint32_t, bool> regions;  // from there on there is code, or data between it (AAELF32, mapping symbols)
   for (const Symbol& s : symbols_) {
     if (s.address < 0x08000000 || s.address >= 0x08100000) continue;
-    if (s.name.starts_with("$t") || s.name.starts_with("$d")) regions[static_cast<std::uint32_t>(s.address)] = s.name[1] == 't';
+    if (s.name.starts_with("$t") || s.name.starts_with("$d"))
+      regions[static_cast<std::uint32_t>(s.address)] = s.name[1] == 't';
   }
   const auto half = [&](std::uint32_t at) {
     std::uint16_t h = 0;
@@ -333,8 +398,9 @@ void UnicornBoard::find_it_blocks() {
   if (it_blocks_.empty()) throw std::runtime_error("an image without mapping symbols");
 }
 
-/// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation block begins inside of it) leaves the
-/// program counter in it, with the block's state (EPSR.IT) at its end: the last instruction would run twice. A stop in the middle has that state.
+/// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation
+/// block begins inside of it) leaves the program counter in it, with the block's state (EPSR.IT) at its end: the last
+/// instruction would run twice. A stop in the middle has that state.
 std::uint32_t UnicornBoard::behind_it_block(std::uint32_t pc) const {
   if ((reg(UC_ARM_REG_XPSR) & 0x0600FC00) != 0) return pc;
   const auto next = it_blocks_.upper_bound(pc);
@@ -351,7 +417,8 @@ void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
   if ((pc & 0xFFFFFFE0) == 0xFFFFFFE0) return leave(pc | 1);
   if (pc >= return_of_call) return;
   if (error != UC_ERR_OK && take_fault(error)) return;
-  if (error != UC_ERR_OK) throw std::runtime_error(fmt::format("the firmware stops at {:08x}: {}", pc, uc_strerror(error)));
+  if (error != UC_ERR_OK)
+    throw std::runtime_error(fmt::format("the firmware stops at {:08x}: {}", pc, uc_strerror(error)));
   std::uint16_t last = 0;
   must(uc_mem_read(core_, pc - 2, &last, 2), "code");
   sleeping_ = last == 0xBF30;  // wfi
@@ -414,7 +481,8 @@ hal::CanHealth UnicornBoard::can_health() {
 
 void UnicornBoard::supply(bool low) {
   supply_low_ = low;
-  const bool watched = (register_value(0x40007000) & 1U << 4) != 0 && (register_value(0x40013C00) & register_value(0x40013C08) & 1U << 16) != 0;
+  const bool watched = (register_value(0x40007000) & 1U << 4) != 0 &&
+                       (register_value(0x40013C00) & register_value(0x40013C08) & 1U << 16) != 0;
   if (low && watched) supply_pending_ = true;
 }
 
@@ -426,4 +494,4 @@ std::uint32_t UnicornBoard::stack_used() const {
   return static_cast<std::uint32_t>(ccm_size - 4 * free);
 }
 
-}  // namespace bms
+}  // namespace bms::firmware

@@ -1,6 +1,6 @@
-// What can/messages.md says of times and bytes, as the firmware's application does it: a truck that is switched on, drives, is switched off, meets a fault and
-// clears it. Sixteen cells table9 at rest, a sample each 0.1 s, pre-charge of 0.5 s (resistor times capacitance). One JSON object on standard output;
-// cmake/dbc_page.py makes the page with it.
+// What can/messages.md says of times and bytes, as the firmware's application does it: a truck that is switched on,
+// drives, is switched off, meets a fault and clears it. Sixteen cells table9 at rest, a sample each 0.1 s, pre-charge
+// of 0.5 s (resistor times capacitance). One JSON object on standard output; cmake/dbc_page.py makes the page with it.
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -9,7 +9,7 @@
 
 #include "tests/firmware/host_hal.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using namespace host_hal;
@@ -41,19 +41,25 @@ class Truck {
   void pass() {
     ++samples_;
     if (asks && samples_ % 10 == 0) command(can::Command::code_request, argument);
-    PackSample<16> sample;
+    measurement::PackSample<16> sample;
     sample.time_us = 100'000U * static_cast<std::uint64_t>(samples_);
     sample.current_ua = 0;
     double pack_v = 0;
     for (std::size_t k = 0; k < 16; ++k) {
       const double v = k == 0 ? first_cell_v : 3.28;
-      sample.cell_uv[k] = static_cast<std::int32_t>(1e6 * v) + static_cast<std::int32_t>((static_cast<std::size_t>(samples_) * 7 + 3 * k) % 11) * 50;  // a converter's steps
+      sample.cell_uv[k] =
+          static_cast<std::int32_t>(1e6 * v) +
+          static_cast<std::int32_t>((static_cast<std::size_t>(samples_) * 7 + 3 * k) % 11) * 50;  // a converter's steps
       pack_v += v;
     }
     sample.pack_uv = static_cast<std::int32_t>(1e6 * pack_v);
-    for (std::size_t k = 0; k < 4; ++k) sample.temperature_cdegc[k] = static_cast<std::int16_t>(2'500 + static_cast<int>((static_cast<std::size_t>(samples_) + k) % 3));
+    for (std::size_t k = 0; k < 4; ++k)
+      sample.temperature_cdegc[k] =
+          static_cast<std::int16_t>(2'500 + static_cast<int>((static_cast<std::size_t>(samples_) + k) % 3));
     const double target_v = switched.main_plus || (switched.precharge && switched.main_minus) ? pack_v : 0;
-    link_v_ = switched.main_plus && switched.main_minus ? pack_v : target_v + (link_v_ - target_v) * std::exp(-period_s / precharge_s);
+    link_v_ = switched.main_plus && switched.main_minus
+                  ? pack_v
+                  : target_v + (link_v_ - target_v) * std::exp(-period_s / precharge_s);
     link_reads_uv = static_cast<std::int32_t>(1e6 * link_v_);
     application_.take(sample);
     hear();
@@ -84,7 +90,7 @@ class Truck {
 
  private:
   void hear() {
-    for (const hal::CanFrame& f : sent) {
+    for (const can::Frame& f : sent) {
       if (f.id == can::ContactorState::id) contactors = can::ContactorState::of(f);
       if (f.id == can::AllowedCurrent::id) allowed = can::AllowedCurrent::of(f);
       if (f.id == can::Faults::id) faults = can::Faults::of(f);
@@ -95,7 +101,7 @@ class Truck {
   }
 
   storage::Persistence persistence_;
-  Application<Board> application_{StartingPoint{500'000'000, 10'000'000}, {}, 6, persistence_};
+  Application<Board> application_{measurement::StartingPoint{500'000'000, 10'000'000}, {}, 6, persistence_};
   std::uint8_t counter_ = 0;
   int samples_ = 0;
   double link_v_ = 0;
@@ -142,20 +148,24 @@ void tell() {
   can::Command command;
   command.code = can::Command::code_request;
   command.argument = 1;
-  const hal::CanFrame frame = command.frame(5);
-  std::string data, protected_bytes = fmt::format("{:02X} {:02X}", can::Command::data_id & 0xFF, can::Command::data_id >> 8);
+  const can::Frame frame = command.frame(5);
+  std::string data,
+      protected_bytes = fmt::format("{:02X} {:02X}", can::Command::data_id & 0xFF, can::Command::data_id >> 8);
   for (std::size_t k = 0; k < frame.length; ++k) data += fmt::format("{}{:02X}", k > 0 ? " " : "", frame.data[k]);
   for (std::size_t k = 1; k < frame.length; ++k) protected_bytes += fmt::format(" {:02X}", frame.data[k]);
-  fmt::print("{{\n  \"example_id\": {}, \"example_data_id\": {}, \"example_counter\": 5, \"example_bytes\": \"{}\", \"example_crc_over\": \"{}\", \"example_crc\": {}{},\n  \"request_lasts_s\": {:g}, \"grace_s\": {:g}\n}}\n",
-             frame.id, can::Command::data_id, data, protected_bytes, frame.data[0], json, 1e-6 * static_cast<double>(Requested::request_lasts_us), 1e-6 * protection::Contactors::grace_us);
+  fmt::print(
+      "{{\n  \"example_id\": {}, \"example_data_id\": {}, \"example_counter\": 5, \"example_bytes\": \"{}\", "
+      "\"example_crc_over\": \"{}\", \"example_crc\": {}{},\n  \"request_lasts_s\": {:g}, \"grace_s\": {:g}\n}}\n",
+      frame.id, can::Command::data_id, data, protected_bytes, frame.data[0], json,
+      1e-6 * static_cast<double>(Requested::request_lasts_us), 1e-6 * protection::Contactors::grace_us);
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware
 
 int main() {
   try {
-    bms::tell();
+    bms::firmware::tell();
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "vehicle_start: {}\n", e.what());

@@ -1,16 +1,17 @@
-// The forklift board's image in Unicorn, parts of it made to hang or to do nothing: the watchdog bites, and the next run says so and keeps the contactors open.
-// What is no standstill of the firmware (nobody on the bus, a measuring chain that is gone) it survives.
+// The forklift board's image in Unicorn, parts of it made to hang or to do nothing: the watchdog bites, and the next
+// run says so and keeps the contactors open. What is no standstill of the firmware (nobody on the bus, a measuring
+// chain that is gone) it survives.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "can_messages.hpp"
+#include "files/cell_file.hpp"
 #include "firmware/progress.hpp"
-#include "host_sim/cell_file.hpp"
-#include "host_sim/firmware_image.hpp"
-#include "host_sim/image_file.hpp"
+#include "images/firmware_image.hpp"
+#include "images/image_file.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 
-namespace bms {
+namespace bms::firmware {
 namespace {
 
 using ::testing::ElementsAre;
@@ -33,7 +34,8 @@ class Watchdog : public ::testing::Test {
  protected:
   Watchdog() { board.may_start_again = true; }
   void run() { board.run_for_ms(1'800); }  // a new chip's store is erased first
-  UnicornBoard board{firmware_image("stm32f405_forklift", read_cell("table9"), Image::application)};
+  UnicornBoard board{
+      images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application)};
 };
 
 TEST(Progress, IsMadeOnlyByASampleThatWentAllItsWay) {
@@ -75,16 +77,18 @@ TEST_P(OneStands, TheWatchdogBitesAndTheNextRunOpensAndTellsWhy) {
   EXPECT_THAT(board.resets, ElementsAre(by_watchdog));
   EXPECT_NEAR(board.now_ms() - stands_ms, watchdog_ms, 150) << "a sample's time, and a step of the watchdog's";
 }
-INSTANTIATE_TEST_SUITE_P(Parts, OneStands, ::testing::Values(
-    Stall{"SamplingHangs", "bms::hal::bq76952::FrontEnd::read(", UnicornBoard::hangs},
-    Stall{"EstimationHangs", "bms::estimator_step(", UnicornBoard::hangs},
-    Stall{"EstimationDoesNothing", "bms::estimator_step(", UnicornBoard::returns},
-    Stall{"TelemetryHangs", "bms::hal::can_send(", UnicornBoard::hangs},
-    Stall{"TimeStands", "clock_interrupt", UnicornBoard::returns}), [](const auto& p) { return std::string(p.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Parts, OneStands,
+    ::testing::Values(Stall{"SamplingHangs", "bms::hal::bq76952::FrontEnd::read(", UnicornBoard::hangs},
+                      Stall{"EstimationHangs", "bms::firmware::estimator_step(", UnicornBoard::hangs},
+                      Stall{"EstimationDoesNothing", "bms::firmware::estimator_step(", UnicornBoard::returns},
+                      Stall{"TelemetryHangs", "bms::hal::can_send(", UnicornBoard::hangs},
+                      Stall{"TimeStands", "clock_interrupt", UnicornBoard::returns}),
+    [](const auto& p) { return std::string(p.param.name); });
 
 TEST_F(Watchdog, AfterItHasBittenTheNextRunSaysSoAndIsSafe) {
   run();
-  board.patch("bms::estimator_step(", UnicornBoard::hangs);  // interrupts go on
+  board.patch("bms::firmware::estimator_step(", UnicornBoard::hangs);  // interrupts go on
   ASSERT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 2 * watchdog_ms));
   board.unpatch();
   const std::uint64_t again = board.can.now_bit;
@@ -97,15 +101,16 @@ TEST_F(Watchdog, AfterItHasBittenTheNextRunSaysSoAndIsSafe) {
 }
 
 const std::filesystem::path& forklift() {
-  static const auto path = firmware_image("stm32f405_forklift", read_cell("table9"), Image::application);
+  static const auto path =
+      images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application);
   return path;
 }
-std::uint32_t symbol(const char* name) { return ImageFile(forklift()).symbol(name); }
+std::uint32_t symbol(const char* name) { return images::ImageFile(forklift()).symbol(name); }
 
 TEST_F(Watchdog, AFaultOfTheProcessorResetsAtOnceAndTheNextRunTellsWhereItWas) {
   run();
   const double before_ms = board.now_ms();
-  board.patch("bms::estimator_step(", UnicornBoard::undefined);
+  board.patch("bms::firmware::estimator_step(", UnicornBoard::undefined);
   ASSERT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 500));
   EXPECT_LT(board.now_ms() - before_ms, 120) << "with the next sample";
   EXPECT_THAT(board.resets, ElementsAre(by_software));
@@ -116,7 +121,8 @@ TEST_F(Watchdog, AFaultOfTheProcessorResetsAtOnceAndTheNextRunTellsWhereItWas) {
   EXPECT_EQ(board.resets.size(), 1U);
   EXPECT_EQ(last<can::Status>(board, again)->reset_cause, can::Status::reset_cause_software);
   ASSERT_TRUE(last<can::LastFaultAddress>(board, again));
-  EXPECT_EQ(last<can::LastFaultAddress>(board, again)->program_counter, board.address_of("bms::estimator_step("));
+  EXPECT_EQ(last<can::LastFaultAddress>(board, again)->program_counter,
+            board.address_of("bms::firmware::estimator_step("));
   EXPECT_EQ(last<can::LastFaultCause>(board, again)->configurable_fault_status, 1U << 16);
   EXPECT_EQ(last<can::Board>(board, again)->last_exception, 6U);
   EXPECT_EQ(last<can::Faults>(board, again)->internal_fault, 1U);
@@ -171,4 +177,4 @@ TEST_F(Watchdog, NobodyOnTheBusNorAtTheMeasuringChainIsNoStandstill) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::firmware

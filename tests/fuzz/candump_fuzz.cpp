@@ -1,5 +1,5 @@
-// Any bytes as a candump log: by lines into the parser, what is a frame into the state of the bus, and that onto a screen. A frame that was read
-// comes back from the line that is written of it.
+// Any bytes as a candump log: by lines into the parser, what is a frame into the state of the bus, and that onto a
+// screen. A frame that was read comes back from the line that is written of it.
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -25,7 +25,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     BusFrame again;
     written.pop_back();
     require(parse_dump_line(written, again));
-    require(again.id == frame.id && again.kind == frame.kind && again.length == frame.length && again.data == frame.data && again.time_us == frame.time_us);
+    require(again.id == frame.id && again.kind == frame.kind && again.length == frame.length &&
+            again.data == frame.data && again.time_us == frame.time_us);
   }
   require(bus.unknown_ids().size() <= 64 && bus.good() <= bus.frames());
   const ScreenSize size_of_screen{1 + size % 200, 1 + size % 60};

@@ -1,5 +1,6 @@
-// Any frames to the command handler, 12 bytes each: id, length, how its check is made, data. Nothing crashes; only a whole command of which the counter is
-// new is answered; what is set is one of the values there are; what is refused changes nothing.
+// Any frames to the command handler, 12 bytes each: id, length, how its check is made, data. Nothing crashes; only a
+// whole command of which the counter is new is answered; what is set is one of the values there are; what is refused
+// changes nothing.
 #include <cstdint>
 
 #include "firmware/commands.hpp"
@@ -7,12 +8,12 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bms;
-  Commands commands;
-  Requested requested;
+  firmware::Commands commands;
+  firmware::Requested requested;
   std::uint64_t now_us = 0;
   int last_counter = -1;
   for (; size >= 12; data += 12, size -= 12) {
-    hal::CanFrame frame;
+    can::Frame frame;
     frame.id = static_cast<std::uint16_t>((data[0] & 0x80) != 0 ? can::Command::id : (data[0] << 8 | data[1]) & 0x7FF);
     frame.length = data[2] % 16;
     for (std::size_t k = 0; k < 8; ++k) frame.data[k] = data[4 + k];
@@ -25,22 +26,27 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame = c.frame(data[2] >> 4);
       frame.id = id;
     }
-    const Requested before = requested;
+    const firmware::Requested before = requested;
     const auto answer = commands.take(frame, now_us, requested);
     require(static_cast<unsigned>(requested.power) <= 2 && static_cast<unsigned>(requested.clear) <= 2);
-    const bool same = requested.log_samples == before.log_samples && requested.unix_time_s == before.unix_time_s && requested.clear == before.clear && requested.power == before.power &&
+    const bool same = requested.log_samples == before.log_samples && requested.unix_time_s == before.unix_time_s &&
+                      requested.clear == before.clear && requested.power == before.power &&
                       requested.power_at_us == before.power_at_us;
     if (!answer) {
       require(same);
       continue;
     }
-    require(frame.id == can::Command::id && can::intact(frame, can::Command::data_id) && can::counter_of(frame) != last_counter);
+    require(frame.id == can::Command::id && can::intact(frame, can::Command::data_id) &&
+            can::counter_of(frame) != last_counter);
     last_counter = can::counter_of(frame);
-    require(answer->code == can::Command::of(frame).code && answer->command_counter == static_cast<std::uint32_t>(last_counter));
+    require(answer->code == can::Command::of(frame).code &&
+            answer->command_counter == static_cast<std::uint32_t>(last_counter));
     require(same || answer->result == can::CommandAnswer::result_done);
     if (requested.power != protection::Request::none) {
-      require(requested.power_now(requested.power_at_us + Requested::request_lasts_us - 1) == requested.power);
-      require(requested.power_now(requested.power_at_us + Requested::request_lasts_us) == protection::Request::none);
+      require(requested.power_now(requested.power_at_us + firmware::Requested::request_lasts_us - 1) ==
+              requested.power);
+      require(requested.power_now(requested.power_at_us + firmware::Requested::request_lasts_us) ==
+              protection::Request::none);
     }
   }
   return 0;

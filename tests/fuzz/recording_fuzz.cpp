@@ -1,26 +1,31 @@
-// Any text as a recording: refused in a line, or read; then its columns are as long as its times, these go forward, and samples can be made of it.
+// Any text as a recording: refused in a line, or read; then its columns are as long as its times, these go forward, and
+// samples can be made of it.
 #include <cmath>
 #include <cstdint>
 #include <string>
 
-#include "host_sim/bad_input.hpp"
-#include "host_sim/cell_file.hpp"
-#include "host_sim/recording.hpp"
+#include "files/bad_input.hpp"
+#include "files/cell_file.hpp"
+#include "files/recording.hpp"
 #include "tests/fuzz/require.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bms;
   if (size == 0) return 0;
-  static const CellFile cell = read_cell("table9");
+  static const files::CellFile cell = files::read_cell("table9");
   try {
-    Recording r = parse_recording(std::string(reinterpret_cast<const char*>(data) + 1, size - 1), "fuzz.csv", (data[0] & 1) != 0 ? VoltageColumn::required : VoltageColumn::optional);
+    files::Recording r =
+        files::parse_recording(std::string(reinterpret_cast<const char*>(data) + 1, size - 1), "fuzz.csv",
+                               (data[0] & 1) != 0 ? files::VoltageColumn::required : files::VoltageColumn::optional);
     require(r.rows() >= 10 && r.current_a.size() == r.rows());
-    for (const auto* column : {&r.voltage_v, &r.temperature_c, &r.soc_ref, &r.current_ref_a, &r.voltage_ref_v}) require(column->empty() || column->size() == r.rows());
-    for (std::size_t k = 0; k < r.rows(); ++k) require(std::isfinite(r.time_s[k]) && (k == 0 || r.time_s[k] >= r.time_s[k - 1]));
-    compare_with_cell(r, cell.parameters);
-    if (!r.voltage_v.empty()) require(samples(r).size() <= r.rows());
-    for (const Warning& w : r.warnings) require(!w.id.empty() && w.text.find('\n') == std::string::npos);
-  } catch (const BadInput& e) {
+    for (const auto* column : {&r.voltage_v, &r.temperature_c, &r.soc_ref, &r.current_ref_a, &r.voltage_ref_v})
+      require(column->empty() || column->size() == r.rows());
+    for (std::size_t k = 0; k < r.rows(); ++k)
+      require(std::isfinite(r.time_s[k]) && (k == 0 || r.time_s[k] >= r.time_s[k - 1]));
+    files::compare_with_cell(r, cell.parameters);
+    if (!r.voltage_v.empty()) require(files::samples(r).size() <= r.rows());
+    for (const files::Warning& w : r.warnings) require(!w.id.empty() && w.text.find('\n') == std::string::npos);
+  } catch (const files::BadInput& e) {
     const std::string what = e.what();
     require(!what.empty() && what.find('\n') == std::string::npos);
   }

@@ -1,7 +1,8 @@
-// Any bytes in flash, then any use of it: nothing crashes or loops, no word is programmed twice in what the log has erased itself, and what
-// was kept is found.
+// Any bytes in flash, then any use of it: nothing crashes or loops, no word is programmed twice in what the log has
+// erased itself, and what was kept is found.
 //
-//   input   3 sectors, each a byte that says how it is filled, then its records as the tests write them or raw bytes; then what is done
+//   input   3 sectors, each a byte that says how it is filled, then its records as the tests write them or raw bytes;
+//   then what is done
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -83,7 +84,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     try {
       if ((what & 0x40) != 0) flash.cut_in(input.byte() % 32);
       switch (what % 6) {
-        case 0: log.erase_one(); break;
+        case 0:
+          log.erase_one();
+          break;
         case 1: {
           storage::Persistence p;
           p.start(static_cast<hal::ResetCause>(what >> 4 & 7), std::nullopt, input.word());
@@ -91,11 +94,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           must(!start || (start->soc_ppb >= 0 && start->soc_ppb <= 1'000'000'000 && start->soc_sigma_ppb > 0));
           p.fault(what);
           p.set(what, what);
-          p.power_failing({StoredEstimate{static_cast<std::int32_t>(input.word()), static_cast<std::int32_t>(input.word())}, {}, {}}, input.word());
+          p.power_failing({estimator::StoredEstimate{static_cast<std::int32_t>(input.word()),
+                                                     static_cast<std::int32_t>(input.word())},
+                           {},
+                           {}},
+                          input.word());
           log.open();
           break;
         }
-        case 2: log.open(); break;
+        case 2:
+          log.open();
+          break;
         default: {
           const storage::Kind kind{static_cast<std::uint8_t>(what & 15), input.byte()};
           const auto payload = input.bytes(input.byte());

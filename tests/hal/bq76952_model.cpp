@@ -24,7 +24,8 @@ std::uint8_t remainder(const std::vector<std::uint8_t>& message) {
     for (std::size_t j = 0; j < 9; ++j) bits[k + j] = bits[k + j] != divisor[8 - j];
   }
   std::uint8_t rest = 0;
-  for (std::size_t k = bits.size() - 8; k < bits.size(); ++k) rest = static_cast<std::uint8_t>(rest << 1 | (bits[k] ? 1 : 0));
+  for (std::size_t k = bits.size() - 8; k < bits.size(); ++k)
+    rest = static_cast<std::uint8_t>(rest << 1 | (bits[k] ? 1 : 0));
   return rest;
 }
 
@@ -80,21 +81,28 @@ std::uint32_t Bq76952Model::memory(std::uint16_t address, std::size_t bytes) con
 }
 
 void Bq76952Model::set_memory(std::uint16_t address, std::size_t bytes, std::uint32_t value) {
-  for (std::size_t k = 0; k < bytes; ++k) memory_[static_cast<std::uint16_t>(address + k)] = static_cast<std::uint8_t>(value >> 8 * k);
+  for (std::size_t k = 0; k < bytes; ++k)
+    memory_[static_cast<std::uint16_t>(address + k)] = static_cast<std::uint8_t>(value >> 8 * k);
 }
 
 bool Bq76952Model::enables_contactors() const {
-  const auto driven = [&](std::uint16_t pin) { return memory(pin, 1) == 0xAA; };  // low when faulty, high from REG1, which has to be on
-  return driven(0x9301) && driven(0x9302) && memory(0x9236, 1) == 0x0D && (memory(0x9237, 1) & 1) != 0 && !config_ && safety_a_ == 0 && safety_c_ == 0;
+  const auto driven = [&](std::uint16_t pin) {
+    return memory(pin, 1) == 0xAA;
+  };  // low when faulty, high from REG1, which has to be on
+  return driven(0x9301) && driven(0x9302) && memory(0x9236, 1) == 0x0D && (memory(0x9237, 1) & 1) != 0 && !config_ &&
+         safety_a_ == 0 && safety_c_ == 0;
 }
 
 // ---- measuring ----
 
-double Bq76952Model::gain_seen() const { return static_cast<double>(std::bit_cast<float>(memory(0x91A8, 4))) * shunt_mohm / 7.5684; }
+double Bq76952Model::gain_seen() const {
+  return static_cast<double>(std::bit_cast<float>(memory(0x91A8, 4))) * shunt_mohm / 7.5684;
+}
 
 std::int16_t Bq76952Model::to_user_current(double a) const {
   constexpr std::array<double, 4> unit_a{1e-4, 1e-3, 1e-2, 1e-1};
-  return static_cast<std::int16_t>(std::clamp(std::round(a * gain_seen() / unit_a[memory(0x9303, 1) & 3]), -32768.0, 32767.0));
+  return static_cast<std::int16_t>(
+      std::clamp(std::round(a * gain_seen() / unit_a[memory(0x9303, 1) & 3]), -32768.0, 32767.0));
 }
 
 void Bq76952Model::advance(std::uint64_t us) {
@@ -124,7 +132,8 @@ void Bq76952Model::step(std::uint64_t us) {
   }
   if (cc1_left_us_ == 0) {
     if (measures) {
-      const double capacity_gain = static_cast<double>(std::bit_cast<float>(memory(0x91AC, 4))) / 298261.6178 * shunt_mohm / 7.5684;
+      const double capacity_gain =
+          static_cast<double>(std::bit_cast<float>(memory(0x91AC, 4))) / 298261.6178 * shunt_mohm / 7.5684;
       counted_ += std::llround(cc1_as_ * capacity_gain / as_a_step * 4294967296.0);
       ++quarter_seconds_;
     }
@@ -142,7 +151,12 @@ void Bq76952Model::slot_ends() {
     cc3_sum_a_ = 0;
     cc3_count_ = 0;
   }
-  if (slot_ < 16) put(direct_, static_cast<std::size_t>(0x14 + 2 * slot_), (memory(0x9304, 2) >> slot_ & 1) != 0 ? static_cast<std::uint32_t>(std::lround(1e3 * cell_v[static_cast<std::size_t>(slot_)])) : 0, 2);
+  if (slot_ < 16)
+    put(direct_, static_cast<std::size_t>(0x14 + 2 * slot_),
+        (memory(0x9304, 2) >> slot_ & 1) != 0
+            ? static_cast<std::uint32_t>(std::lround(1e3 * cell_v[static_cast<std::size_t>(slot_)]))
+            : 0,
+        2);
   if (++slot_ == 21) scan_ends();
 }
 
@@ -152,7 +166,12 @@ void Bq76952Model::scan_ends() {
   if (loop_ == 0) put(direct_, 0x34, static_cast<std::uint32_t>(std::lround(stack_v / unit_v)), 2);
   if (loop_ == 1) put(direct_, 0x38, static_cast<std::uint32_t>(std::lround(ld_v / unit_v)), 2);
   if (loop_ == 2) {
-    for (std::size_t k = 0; k < 4; ++k) put(direct_, temperature_register[k], memory(temperature_pin[k], 1) == 0x07 ? static_cast<std::uint32_t>(std::lround(10 * (temperature_c[k] + 273.15))) : 0, 2);
+    for (std::size_t k = 0; k < 4; ++k)
+      put(direct_, temperature_register[k],
+          memory(temperature_pin[k], 1) == 0x07
+              ? static_cast<std::uint32_t>(std::lround(10 * (temperature_c[k] + 273.15)))
+              : 0,
+          2);
   }
   alarm_ |= 1U << 1 & alarm_enable_;
   if (only_cells) loop_ = 3;  // the slots of stack, LD and thermistors stand still
@@ -181,16 +200,26 @@ void Bq76952Model::command(std::uint16_t address) {
   std::array<std::uint8_t, 32> data{};
   std::size_t length = 32;
   switch (address) {
-    case 0x0001: put(data, 0, device_number, 2), length = 2; break;
-    case 0x000E: deep_sleep = false; break;
-    case 0x0075: put(data, 20, static_cast<std::uint16_t>(cc3_), 2); break;
+    case 0x0001:
+      put(data, 0, device_number, 2), length = 2;
+      break;
+    case 0x000E:
+      deep_sleep = false;
+      break;
+    case 0x0075:
+      put(data, 20, static_cast<std::uint16_t>(cc3_), 2);
+      break;
     case 0x0076:
       put(data, 0, static_cast<std::uint32_t>(counted_ >> 32), 4);
       put(data, 4, static_cast<std::uint32_t>(counted_), 4);
       put(data, 8, quarter_seconds_ / 4, 4);
       break;
-    case 0x0083: put(data, 0, balancing_, 2), length = 2; break;
-    case 0x0090: config_ = !sealed; break;
+    case 0x0083:
+      put(data, 0, balancing_, 2), length = 2;
+      break;
+    case 0x0090:
+      config_ = !sealed;
+      break;
     case 0x0092:
       if (config_) {
         config_ = was_reset_ = false;
@@ -200,11 +229,16 @@ void Bq76952Model::command(std::uint16_t address) {
         if (!needs_swap) checked_ = memory(0x9239, 1) == 0x11;
       }
       break;
-    case 0x009A: break;
-    case 0x29BC: checked_ = memory(0x9239, 1) == 0x11; break;
+    case 0x009A:
+      break;
+    case 0x29BC:
+      checked_ = memory(0x9239, 1) == 0x11;
+      break;
     default:
-      if (address < 0x9180 || address > 0x9380) violations.push_back("an unknown subcommand " + std::to_string(address));
-      for (std::size_t k = 0; k < 32; ++k) data[k] = static_cast<std::uint8_t>(memory(static_cast<std::uint16_t>(address + k), 1));
+      if (address < 0x9180 || address > 0x9380)
+        violations.push_back("an unknown subcommand " + std::to_string(address));
+      for (std::size_t k = 0; k < 32; ++k)
+        data[k] = static_cast<std::uint8_t>(memory(static_cast<std::uint16_t>(address + k), 1));
   }
   fill(data, length);
   busy_until_us_ = time_us + 600;
@@ -227,34 +261,57 @@ void Bq76952Model::commit(std::uint8_t length) {
 }
 
 std::uint8_t Bq76952Model::register_byte(std::uint8_t at) const {
-  const std::uint16_t status = static_cast<std::uint16_t>((config_ ? 1 : 0) | (was_reset_ ? 8 : 0) | (sealed ? 0x300 : 0x100));
+  const std::uint16_t status =
+      static_cast<std::uint16_t>((config_ ? 1 : 0) | (was_reset_ ? 8 : 0) | (sealed ? 0x300 : 0x100));
   switch (at) {
-    case 0x00: return deep_sleep ? 4 : 0;
-    case 0x03: return safety_a_;
-    case 0x07: return safety_c_;
-    case 0x12: return static_cast<std::uint8_t>(status);
-    case 0x13: return static_cast<std::uint8_t>(status >> 8);
-    case 0x3A: return static_cast<std::uint8_t>(cc2_);
-    case 0x3B: return static_cast<std::uint8_t>(cc2_ >> 8);
-    case 0x3E: return time_us < busy_until_us_ ? 0xFF : low_;
-    case 0x3F: return time_us < busy_until_us_ ? 0xFF : high_;
-    case 0x60: return static_cast<std::uint8_t>(checksum_ + (torn_buffer ? 1 : 0));
-    case 0x61: return length_;
-    case 0x62: return static_cast<std::uint8_t>(alarm_);
-    case 0x63: return static_cast<std::uint8_t>(alarm_ >> 8);
-    default: return at >= 0x40 && at < 0x60 ? buffer_[static_cast<std::size_t>(at - 0x40)] : direct_[at & 0x7F];
+    case 0x00:
+      return deep_sleep ? 4 : 0;
+    case 0x03:
+      return safety_a_;
+    case 0x07:
+      return safety_c_;
+    case 0x12:
+      return static_cast<std::uint8_t>(status);
+    case 0x13:
+      return static_cast<std::uint8_t>(status >> 8);
+    case 0x3A:
+      return static_cast<std::uint8_t>(cc2_);
+    case 0x3B:
+      return static_cast<std::uint8_t>(cc2_ >> 8);
+    case 0x3E:
+      return time_us < busy_until_us_ ? 0xFF : low_;
+    case 0x3F:
+      return time_us < busy_until_us_ ? 0xFF : high_;
+    case 0x60:
+      return static_cast<std::uint8_t>(checksum_ + (torn_buffer ? 1 : 0));
+    case 0x61:
+      return length_;
+    case 0x62:
+      return static_cast<std::uint8_t>(alarm_);
+    case 0x63:
+      return static_cast<std::uint8_t>(alarm_ >> 8);
+    default:
+      return at >= 0x40 && at < 0x60 ? buffer_[static_cast<std::size_t>(at - 0x40)] : direct_[at & 0x7F];
   }
 }
 
 bool Bq76952Model::write_register(std::uint8_t at, std::uint8_t value) {
-  if (at == 0x3E) low_ = value;
-  else if (at == 0x3F) high_ = value, command(static_cast<std::uint16_t>(high_ << 8 | low_));
-  else if (at >= 0x40 && at < 0x60) buffer_[static_cast<std::size_t>(at - 0x40)] = value;
-  else if (at == 0x60) checksum_ = value;
-  else if (at == 0x61) commit(value);
-  else if (at == 0x62) alarm_ &= static_cast<std::uint16_t>(~value);
-  else if (at == 0x63) alarm_ &= static_cast<std::uint16_t>(~(value << 8));
-  else violations.push_back("a write to " + std::to_string(at));
+  if (at == 0x3E)
+    low_ = value;
+  else if (at == 0x3F)
+    high_ = value, command(static_cast<std::uint16_t>(high_ << 8 | low_));
+  else if (at >= 0x40 && at < 0x60)
+    buffer_[static_cast<std::size_t>(at - 0x40)] = value;
+  else if (at == 0x60)
+    checksum_ = value;
+  else if (at == 0x61)
+    commit(value);
+  else if (at == 0x62)
+    alarm_ &= static_cast<std::uint16_t>(~value);
+  else if (at == 0x63)
+    alarm_ &= static_cast<std::uint16_t>(~(value << 8));
+  else
+    violations.push_back("a write to " + std::to_string(at));
   return true;
 }
 
@@ -276,7 +333,8 @@ I2cResult Bq76952Model::take(std::span<const std::uint8_t> out) {
 }
 
 void Bq76952Model::give(std::uint8_t command, bool written, std::span<std::uint8_t> in) {
-  std::vector<std::uint8_t> message = written ? std::vector<std::uint8_t>{0x10, command, 0x11} : std::vector<std::uint8_t>{0x11};
+  std::vector<std::uint8_t> message =
+      written ? std::vector<std::uint8_t>{0x10, command, 0x11} : std::vector<std::uint8_t>{0x11};
   const bool checks = checked_;
   for (std::size_t k = 0; k < in.size(); ++k, ++command) {
     in[k] = register_byte(command);
@@ -310,8 +368,10 @@ I2cResult Bq76952Model::transfer(std::uint8_t address, std::span<const std::uint
   I2cResult result = out.size() > 1 ? take(out) : I2cResult::done;
   if (!in.empty()) give(out[0], true, in);
   if (hit && fault.kind == Fault::flipped_bit) {
-    if (in.empty()) result = I2cResult::no_acknowledge;  // the chip has seen a wrong CRC
-    else in[(transfers * 7) % in.size()] ^= static_cast<std::uint8_t>(1U << transfers % 8);
+    if (in.empty())
+      result = I2cResult::no_acknowledge;  // the chip has seen a wrong CRC
+    else
+      in[(transfers * 7) % in.size()] ^= static_cast<std::uint8_t>(1U << transfers % 8);
   }
   advance(us);
   return result;

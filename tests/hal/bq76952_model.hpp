@@ -1,5 +1,6 @@
-// A BQ76952 on an I2C bus, written from its manual and independent of the driver: bytes with a CRC found by polynomial division, subcommands, data
-// memory, CONFIG_UPDATE mode, the scan of its cells in slots, three current filters, balancing with its 20 s, the host watchdog; and what may go wrong.
+// A BQ76952 on an I2C bus, written from its manual and independent of the driver: bytes with a CRC found by polynomial
+// division, subcommands, data memory, CONFIG_UPDATE mode, the scan of its cells in slots, three current filters,
+// balancing with its 20 s, the host watchdog; and what may go wrong.
 //
 // Time passes by advance() and by what is on the wire (22.5 us a byte and 2.5 us a start or stop, 400 kHz).
 #pragma once
@@ -22,14 +23,15 @@ class Bq76952Model {
   // the world
   std::array<double, 16> cell_v{};
   double stack_v = 0, ld_v = 0, current_a = 0, shunt_mohm = 0.1;
-  double cc3_loses = 0;  ///< part of the current that the mean CC3 does not show
+  double cc3_loses = 0;                                 ///< part of the current that the mean CC3 does not show
   std::array<double, 4> temperature_c{25, 25, 25, 25};  ///< at TS1, TS3, HDQ, CFETOFF
   double charge_as = 0;                                 ///< that really flowed
   std::uint64_t time_us = 0;
-  std::array<double, 16> bled_s{};                      ///< how long each cell was bled
+  std::array<double, 16> bled_s{};  ///< how long each cell was bled
 
   // what may go wrong
-  bool gone = false, hung = false, frozen = false, torn_buffer = false, only_cells = false, crc_from_otp = false, deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
+  bool gone = false, hung = false, frozen = false, torn_buffer = false, only_cells = false, crc_from_otp = false,
+       deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
   std::uint16_t device_number = 0x7695;
   struct Fault {
     enum Kind { none, no_acknowledge, flipped_bit, timed_out, reset } kind = none;
@@ -50,8 +52,8 @@ class Bq76952Model {
   bool enables_contactors() const;
 
   unsigned transfers = 0, bytes_sent = 0, clocked_us = 0;
-  std::vector<std::uint16_t> commands;    ///< subcommands, in their order
-  std::vector<std::string> violations;    ///< what a host must not do
+  std::vector<std::uint16_t> commands;  ///< subcommands, in their order
+  std::vector<std::string> violations;  ///< what a host must not do
 
  private:
   void step(std::uint64_t us);
@@ -71,7 +73,8 @@ class Bq76952Model {
   std::array<std::uint8_t, 128> direct_{};
   std::array<std::uint8_t, 32> buffer_{};
   std::uint8_t low_ = 0, high_ = 0, checksum_ = 0, length_ = 0;
-  std::uint64_t busy_until_us_ = 0, slot_left_us_ = 3'000, cc1_left_us_ = 250'000, balancing_until_us_ = 0, heard_us_ = 0, over_since_us_ = 0;
+  std::uint64_t busy_until_us_ = 0, slot_left_us_ = 3'000, cc1_left_us_ = 250'000, balancing_until_us_ = 0,
+                heard_us_ = 0, over_since_us_ = 0;
   std::uint16_t alarm_ = 0, alarm_enable_ = 0xF800, balancing_ = 0;
   std::uint8_t safety_a_ = 0, safety_c_ = 0;
   bool checked_ = false, config_ = false, was_reset_ = true, stuck_ = false;

@@ -1,5 +1,5 @@
-// The front end's driver on a model of its chip: what it reads is what the cells have, and whatever happens on the wire or in the chip, a reading is
-// that of now or none.
+// The front end's driver on a model of its chip: what it reads is what the cells have, and whatever happens on the wire
+// or in the chip, a reading is that of now or none.
 #include "hal/bq76952/front_end.hpp"
 
 #include <cmath>
@@ -25,18 +25,20 @@ namespace bms {
 namespace {
 
 Bq76952Model* chip = nullptr;
-std::vector<hal::CanFrame> arriving;
+std::vector<can::Frame> arriving;
 std::vector<hal::PowerPath> switched;
 
 }  // namespace
 
 namespace hal {
-I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, std::span<std::uint8_t> in) { return chip->transfer(address, out, in); }
+I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
+  return chip->transfer(address, out, in);
+}
 bool i2c_recover() { return chip->recover(); }
 void i2c_start() {}
 std::uint64_t now_us() { return chip->time_us; }
 void wait_for_interrupt() { chip->advance(1'000 - chip->time_us % 1'000); }
-bool can_receive(CanFrame& frame) {
+bool can_receive(can::Frame& frame) {
   if (arriving.empty()) return false;
   frame = arriving.front();
   arriving.erase(arriving.begin());
@@ -47,10 +49,10 @@ void contactor_pins_set(const PowerPath& wanted) { switched.push_back(wanted); }
 
 namespace {
 
+using hal::bq76952::FrontEnd;
 using ::testing::Contains;
 using ::testing::Each;
 using ::testing::IsEmpty;
-using hal::bq76952::FrontEnd;
 using State = FrontEnd::State;
 using Fault = Bq76952Model::Fault;
 
@@ -62,7 +64,8 @@ constexpr std::uint64_t longest_sample_us = 60'000;
 // TI's application note SLUAA11B, chapter 4: captures of a bus
 static_assert(hal::bq76952::crc8(hal::bq76952::crc8(hal::bq76952::crc8(0, 0x10), 0x3E), 0x22) == 0x63);
 static_assert(hal::bq76952::crc8(0, 0x0B) == 0x31 && hal::bq76952::crc8(0, 0x00) == 0x00);
-static_assert(hal::bq76952::crc8(hal::bq76952::crc8(hal::bq76952::crc8(hal::bq76952::crc8(0, 0x10), 0x14), 0x11), 0x68) == 0x33);
+static_assert(hal::bq76952::crc8(hal::bq76952::crc8(hal::bq76952::crc8(hal::bq76952::crc8(0, 0x10), 0x14), 0x11),
+                                 0x68) == 0x33);
 
 class Bq76952 : public ::testing::Test {
  protected:
@@ -81,7 +84,7 @@ class Bq76952 : public ::testing::Test {
     for (std::size_t k = 0; k < 16; ++k) model.cell_v[k] = v + apart_v * static_cast<double>(k);
     model.stack_v = std::accumulate(model.cell_v.begin(), model.cell_v.end(), 0.0);
   }
-  const PackSample<16>& next(std::uint64_t after_us = 100'000) {
+  const measurement::PackSample<16>& next(std::uint64_t after_us = 100'000) {
     const std::uint64_t due = due_us_ += after_us;
     if (model.time_us < due) model.advance(due - model.time_us);
     const unsigned before = model.transfers;
@@ -92,11 +95,18 @@ class Bq76952 : public ::testing::Test {
     return sample;
   }
   bool whole() const {
-    return std::none_of(sample.cell_uv.begin(), sample.cell_uv.end(), [](auto uv) { return uv == no_reading; }) && sample.pack_uv != no_reading && sample.current_ua != no_reading && front_end.link_uv() != no_reading;
+    return std::none_of(sample.cell_uv.begin(), sample.cell_uv.end(),
+                        [](auto uv) { return uv == measurement::no_reading; }) &&
+           sample.pack_uv != measurement::no_reading && sample.current_ua != measurement::no_reading &&
+           front_end.link_uv() != measurement::no_reading;
   }
   bool empty() const {
-    return std::all_of(sample.cell_uv.begin(), sample.cell_uv.end(), [](auto uv) { return uv == no_reading; }) && sample.pack_uv == no_reading && sample.current_ua == no_reading && front_end.link_uv() == no_reading &&
-           std::all_of(sample.temperature_cdegc.begin(), sample.temperature_cdegc.end(), [](auto t) { return t == no_temperature; });
+    return std::all_of(sample.cell_uv.begin(), sample.cell_uv.end(),
+                       [](auto uv) { return uv == measurement::no_reading; }) &&
+           sample.pack_uv == measurement::no_reading && sample.current_ua == measurement::no_reading &&
+           front_end.link_uv() == measurement::no_reading &&
+           std::all_of(sample.temperature_cdegc.begin(), sample.temperature_cdegc.end(),
+                       [](auto t) { return t == measurement::no_temperature; });
   }
   int samples_until_whole(int most = 60) {
     for (int k = 1; k <= most; ++k) {
@@ -109,25 +119,35 @@ class Bq76952 : public ::testing::Test {
 
   /// Each field is what is measured, or no reading.
   void expect_true_or_nothing() const {
-    const auto near = [](std::int64_t is, std::int64_t nothing, double should_be, double within) { return is == nothing || std::abs(static_cast<double>(is) - should_be) <= within; };
-    for (std::size_t k = 0; k < 16; ++k) EXPECT_TRUE(near(sample.cell_uv[k], no_reading, 1e6 * model.cell_v[k], 501)) << "cell " << k << ": " << sample.cell_uv[k] << ", " << model.cell_v[k];
-    EXPECT_TRUE(near(sample.pack_uv, no_reading, 1e6 * model.stack_v, 5'001)) << sample.pack_uv;
-    EXPECT_TRUE(near(front_end.link_uv(), no_reading, 1e6 * model.ld_v, 5'001)) << front_end.link_uv();
-    EXPECT_TRUE(near(sample.current_ua, no_reading, 1e6 * model.current_a, 0.1e6)) << sample.current_ua << ", " << model.current_a;
-    for (std::size_t k = 0; k < 4; ++k) EXPECT_TRUE(near(sample.temperature_cdegc[k], no_temperature, 100 * model.temperature_c[k], 5.1)) << sample.temperature_cdegc[k];
+    const auto near = [](std::int64_t is, std::int64_t nothing, double should_be, double within) {
+      return is == nothing || std::abs(static_cast<double>(is) - should_be) <= within;
+    };
+    for (std::size_t k = 0; k < 16; ++k)
+      EXPECT_TRUE(near(sample.cell_uv[k], measurement::no_reading, 1e6 * model.cell_v[k], 501))
+          << "cell " << k << ": " << sample.cell_uv[k] << ", " << model.cell_v[k];
+    EXPECT_TRUE(near(sample.pack_uv, measurement::no_reading, 1e6 * model.stack_v, 5'001)) << sample.pack_uv;
+    EXPECT_TRUE(near(front_end.link_uv(), measurement::no_reading, 1e6 * model.ld_v, 5'001)) << front_end.link_uv();
+    EXPECT_TRUE(near(sample.current_ua, measurement::no_reading, 1e6 * model.current_a, 0.1e6))
+        << sample.current_ua << ", " << model.current_a;
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_TRUE(near(sample.temperature_cdegc[k], measurement::no_temperature, 100 * model.temperature_c[k], 5.1))
+          << sample.temperature_cdegc[k];
   }
 
-  /// A chip that was reset takes the CRC of what is under way for data: two addresses that stand for nothing, and a write into what is read only.
+  /// A chip that was reset takes the CRC of what is under way for data: two addresses that stand for nothing, and a
+  /// write into what is read only.
   void forgive_what_a_reset_between_two_transfers_makes() {
     for (const std::string& v : model.violations) {
-      EXPECT_THAT((std::vector<std::string>{"an unknown subcommand 49525", "an unknown subcommand 51318", "a write to 100", "a write to 101"}), Contains(v));
+      EXPECT_THAT((std::vector<std::string>{"an unknown subcommand 49525", "an unknown subcommand 51318",
+                                            "a write to 100", "a write to 101"}),
+                  Contains(v));
     }
     model.violations.clear();
   }
 
   Bq76952Model model;
   FrontEnd front_end{settings};
-  PackSample<16> sample;
+  measurement::PackSample<16> sample;
 
  private:
   std::uint64_t due_us_ = 0, longest_us_ = 0;
@@ -147,7 +167,7 @@ TEST_F(Bq76952, ReadsWhatTheModelsCellsHaveToTheMillivolt) {
     next(400'000);
     ASSERT_TRUE(whole());
     expect_true_or_nothing();
-    EXPECT_THAT(sample.temperature_cdegc, Each(::testing::Ne(no_temperature)));
+    EXPECT_THAT(sample.temperature_cdegc, Each(::testing::Ne(measurement::no_temperature)));
   }
 }
 
@@ -180,7 +200,9 @@ TEST_F(Bq76952, WhatAStepOfTheCurrentCameLateIsMadeUpForOverAMinute) {
   double lacked_as = 0;
   for (int k = 0; k < 3'000; ++k) {
     const double off_a = next().current_ua * 1e-6 + 200;
-    if (k >= 3) { ASSERT_NEAR(off_a, 0, 0.005 + 200 * 0.15 / 64); }  // CC3 is 100 ms late, the counter 50
+    if (k >= 3) {
+      ASSERT_NEAR(off_a, 0, 0.005 + 200 * 0.15 / 64);
+    }  // CC3 is 100 ms late, the counter 50
     lacked_as += off_a * 0.1;
   }
   EXPECT_NEAR(sample.current_ua * 1e-6, -200, 0.005 + 0.0008 * 200);
@@ -208,16 +230,18 @@ TEST_F(Bq76952, TheChargeGivenIsTheChargeThatFlowedOverTenMinutesOfDriving) {
   std::uint64_t next_us = model.time_us + 100'000;
   for (int k = 0; k < 6'000; ++k, next_us += 100'000) {
     while (model.time_us < next_us) {  // the load changes when it likes, not with the samples
-      model.advance(std::min<std::uint64_t>(next_us - model.time_us, 1'000ULL * static_cast<std::uint64_t>(lasts_ms(random))));
+      model.advance(
+          std::min<std::uint64_t>(next_us - model.time_us, 1'000ULL * static_cast<std::uint64_t>(lasts_ms(random))));
       model.current_a = std::clamp(amperes(random), -300.0, 300.0);
     }
     sample.time_us = model.time_us;
     front_end.read(sample);
-    ASSERT_NE(sample.current_ua, no_reading);
+    ASSERT_NE(sample.current_ua, measurement::no_reading);
     given_as += sample.current_ua * 1e-6 * 1e-6 * static_cast<double>(sample.time_us - then_us);
     then_us = sample.time_us;
   }
-  // what flows at the end is late by 0.15 s, 9 As; a mean of 6 As is read twice every 20 s and made up for over 64 s, 8 As: two sigma of both
+  // what flows at the end is late by 0.15 s, 9 As; a mean of 6 As is read twice every 20 s and made up for over 64 s, 8
+  // As: two sigma of both
   std::printf("charge given %.1f As, flowed %.1f As\n", given_as, model.charge_as - before_as);
   EXPECT_NEAR(given_as, model.charge_as - before_as, 2 * std::hypot(9, 8));
   EXPECT_GT(std::abs(model.charge_as - before_as), 8'000);
@@ -229,8 +253,8 @@ TEST_F(Bq76952, ACurrentBeyondWhatTheChipCanSayIsNoReading) {
   model.current_a = 400;
   model.advance(300'000);
   next(400'000);
-  EXPECT_EQ(sample.current_ua, no_reading);
-  EXPECT_NE(sample.cell_uv[0], no_reading);
+  EXPECT_EQ(sample.current_ua, measurement::no_reading);
+  EXPECT_NE(sample.cell_uv[0], measurement::no_reading);
 }
 
 TEST_F(Bq76952, AnOpenOrShortedTemperatureSensorIsNoTemperature) {
@@ -238,9 +262,9 @@ TEST_F(Bq76952, AnOpenOrShortedTemperatureSensorIsNoTemperature) {
   model.temperature_c = {-273.15, 25, 3000, 25};
   model.advance(200'000);
   next(300'000);
-  EXPECT_EQ(sample.temperature_cdegc[0], no_temperature);
+  EXPECT_EQ(sample.temperature_cdegc[0], measurement::no_temperature);
   EXPECT_NEAR(sample.temperature_cdegc[1], 2500, 5);
-  EXPECT_EQ(sample.temperature_cdegc[2], no_temperature);
+  EXPECT_EQ(sample.temperature_cdegc[2], measurement::no_temperature);
 }
 
 TEST_F(Bq76952, AnySingleFaultAndAnyPairOfThemAtAnyTransferLeavesTheTruthOrNothing) {
@@ -270,7 +294,8 @@ TEST_F(Bq76952, AnySingleFaultAndAnyPairOfThemAtAnyTransferLeavesTheTruthOrNothi
       }
     }
   }
-  for (const auto& [what, samples] : slowest) std::printf("fault %d, %d in a row: whole again after %d samples\n", what.first, what.second, samples);
+  for (const auto& [what, samples] : slowest)
+    std::printf("fault %d, %d in a row: whole again after %d samples\n", what.first, what.second, samples);
   EXPECT_GT(lost, 40);
   EXPECT_GT(kept, 10);
 }
@@ -322,7 +347,7 @@ TEST_F(Bq76952, ValuesThatStandStillAreNotGivenAgain) {
   next();  // what was converted since the last sample may still be given
   for (int k = 0; k < 30; ++k) {
     next();
-    ASSERT_TRUE(empty() || sample.temperature_cdegc[0] == no_temperature);
+    ASSERT_TRUE(empty() || sample.temperature_cdegc[0] == measurement::no_temperature);
     ASSERT_TRUE(empty()) << k;
   }
   EXPECT_GE(front_end.counters().not_fresh, 30U);
@@ -335,7 +360,7 @@ TEST_F(Bq76952, ABufferThatDoesNotFitItsChecksumIsNoCurrent) {
   model.torn_buffer = true;
   for (int k = 0; k < 20; ++k) {
     next();
-    ASSERT_EQ(sample.current_ua, no_reading);
+    ASSERT_EQ(sample.current_ua, measurement::no_reading);
   }
   EXPECT_GT(front_end.wire().bad_checksum, 3U);
   model.torn_buffer = false;
@@ -349,8 +374,10 @@ TEST_F(Bq76952, StackLinkAndTemperaturesThatStandStillAreGivenForOneSampleMoreAt
   for (int k = 0; k < 20; ++k) {
     next();
     if (k == 0) continue;
-    ASSERT_NE(sample.cell_uv[0], no_reading);
-    ASSERT_TRUE(sample.pack_uv == no_reading && front_end.link_uv() == no_reading && sample.temperature_cdegc[0] == no_temperature) << k;
+    ASSERT_NE(sample.cell_uv[0], measurement::no_reading);
+    ASSERT_TRUE(sample.pack_uv == measurement::no_reading && front_end.link_uv() == measurement::no_reading &&
+                sample.temperature_cdegc[0] == measurement::no_temperature)
+        << k;
   }
 }
 
@@ -424,9 +451,9 @@ TEST_F(Bq76952, AfterARestartOfThisCoreAloneAConfiguredChipIsTakenAsItIs) {
   start();
   const auto set_config = std::count(model.commands.begin(), model.commands.end(), 0x0090);
   FrontEnd again{settings};
-  PackSample<16> first;
+  measurement::PackSample<16> first;
   int samples = 0;
-  for (; samples < 10 && first.current_ua == no_reading; ++samples) {
+  for (; samples < 10 && first.current_ua == measurement::no_reading; ++samples) {
     model.advance(100'000);
     first.time_us = model.time_us;
     again.read(first);
@@ -448,12 +475,12 @@ TEST_F(Bq76952, AfterARestartOfThisCoreAloneAConfiguredChipIsTakenAsItIs) {
 
 TEST_F(Bq76952, TheSettingsAreWhatTheBoardMeans) {
   start();
-  EXPECT_EQ(model.memory(0x91A8, 4), 0x42975E35U);           // 75.684 as IEEE 754
+  EXPECT_EQ(model.memory(0x91A8, 4), 0x42975E35U);  // 75.684 as IEEE 754
   EXPECT_NEAR(model.memory(0x9278, 1) * 0.0506, 3.8, 0.026);
   EXPECT_NEAR(model.memory(0x9275, 1) * 0.0506, 2.0, 0.026);
   EXPECT_NEAR((model.memory(0x9279, 2) + 2) * 3.3e-3, 1.0, 0.004);
   EXPECT_NEAR((model.memory(0x9287, 1) - 1) * 15.0, 450, 8);
-  EXPECT_EQ(model.memory(0x9234, 2) & 0x0100, 0U);           // never SLEEP
+  EXPECT_EQ(model.memory(0x9234, 2) & 0x0100, 0U);  // never SLEEP
   EXPECT_EQ(model.memory(0x9304, 2), 0xFFFFU);
 }
 
@@ -509,7 +536,8 @@ TEST_F(Bq76952, ASampleIs10TransfersOfLessThan9msOnTheWire) {
   for (int k = 0; k < 5; ++k) next();
   const unsigned transfers = model.transfers, us = model.clocked_us, bytes = model.bytes_sent;
   for (int k = 0; k < 10; ++k) next();
-  std::printf("a sample: %u transfers, %u bytes, %u us at 400 kHz\n", (model.transfers - transfers) / 10, (model.bytes_sent - bytes) / 10, (model.clocked_us - us) / 10);
+  std::printf("a sample: %u transfers, %u bytes, %u us at 400 kHz\n", (model.transfers - transfers) / 10,
+              (model.bytes_sent - bytes) / 10, (model.clocked_us - us) / 10);
   front_end.bleed(1);
   const unsigned quiet = model.transfers, quiet_us = model.clocked_us;
   next();
@@ -527,15 +555,22 @@ TEST(Bq76952Samples, ComeEach100msWithOrWithoutTheChipHearRequestsAndSwitchWhatI
   model.stack_v = 52.8;
   model.ld_v = 40;
   model.gone = true;
-  arriving = {hal::frame_of(StartingPoint{500'000'000, 10'000'000}), {hal::start_frame_id, 8, {1}, true}, {0x1A0, 8, {1, 2, 3}}, {hal::reading_frame_id, 8, {}}};
+  arriving = {hal::frame_of(measurement::StartingPoint{500'000'000, 10'000'000}),
+              {hal::start_frame_id, 8, {1}, true},
+              {0x1A0, 8, {1, 2, 3}},
+              {hal::reading_frame_id, 8, {}}};
   std::uint64_t last_us = 0;
   for (int k = 0; k < 50; ++k) {
     if (k == 10) model.gone = false;
     const auto* s = hal::next_sample();
     ASSERT_NE(s, nullptr);
-    if (k > 0) { ASSERT_NEAR(static_cast<double>(s->time_us - last_us), 100'000, 1'001); }
+    if (k > 0) {
+      ASSERT_NEAR(static_cast<double>(s->time_us - last_us), 100'000, 1'001);
+    }
     last_us = s->time_us;
-    if (k < 10) { ASSERT_EQ(s->cell_uv[3], no_reading); }
+    if (k < 10) {
+      ASSERT_EQ(s->cell_uv[3], measurement::no_reading);
+    }
     if (k == 49) {
       EXPECT_EQ(s->cell_uv[3], 3'300'000);
       EXPECT_EQ(hal::link_uv(), 40'000'000);
@@ -543,7 +578,7 @@ TEST(Bq76952Samples, ComeEach100msWithOrWithoutTheChipHearRequestsAndSwitchWhatI
   }
   ASSERT_TRUE(hal::starting_point().has_value());
   EXPECT_EQ(hal::starting_point()->soc_ppb, 500'000'000);
-  hal::CanFrame request;
+  can::Frame request;
   ASSERT_TRUE(hal::next_request(request));
   EXPECT_TRUE(request.long_id) << "of 29 bits: another frame than the starting point";
   ASSERT_TRUE(hal::next_request(request));

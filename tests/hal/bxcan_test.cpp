@@ -1,4 +1,5 @@
-// What of the bxCAN back end needs no register: bit timing against a search over all settings, filters, the queue behind the mailboxes.
+// What of the bxCAN back end needs no register: bit timing against a search over all settings, filters, the queue
+// behind the mailboxes.
 #include "hal/bxcan/bit_timing.hpp"
 #include "hal/bxcan/filter_banks.hpp"
 #include "hal/bxcan/transmit_queue.hpp"
@@ -26,7 +27,9 @@ static_assert(bit_timing(40'000'000, 500'000) == BitTiming{5, 13, 2, 2}, "what a
 
 /// Whether bit_timing() compiles for it.
 template <std::uint32_t Clock, std::uint32_t Rate>
-concept Reachable = requires { typename std::integral_constant<std::uint32_t, bit_timing(Clock, Rate).brp>; };
+concept Reachable = requires {
+  typename std::integral_constant<std::uint32_t, bit_timing(Clock, Rate).brp>;
+};
 static_assert(Reachable<42'000'000, 250'000> && Reachable<8'000'000, 500'000>);
 static_assert(!Reachable<42'000'000, 500'000>, "84 cycles a bit: 85.7 % at best");
 static_assert(!Reachable<42'000'000, 800'000>, "not a whole number of cycles");
@@ -46,8 +49,10 @@ Found search(double clock_hz, double rate) {
         const int quanta = 1 + ts1 + ts2;
         if (quanta < 8 || clock_hz != rate * brp * quanta) continue;
         const double distance = std::abs((1.0 + ts1) / quanta - 0.875);
-        if (distance < found.nearest - 1e-9) found = {distance, quanta};
-        else if (distance < found.nearest + 1e-9) found.most_quanta = std::max(found.most_quanta, quanta);
+        if (distance < found.nearest - 1e-9)
+          found = {distance, quanta};
+        else if (distance < found.nearest + 1e-9)
+          found.most_quanta = std::max(found.most_quanta, quanta);
       }
     }
   }
@@ -59,7 +64,8 @@ constexpr SamplePointRange anywhere{0, 1'000'000};
 void is_the_best(std::uint32_t clock_hz, std::uint32_t rate, const BitTiming& t) {
   const Found found = search(clock_hz, rate);
   EXPECT_EQ(std::uint64_t{rate} * t.brp * t.quanta(), clock_hz);
-  EXPECT_NEAR(std::abs((1.0 + t.ts1) / t.quanta() - 0.875), found.nearest, 1e-9) << clock_hz << " Hz, " << rate << " bit/s";
+  EXPECT_NEAR(std::abs((1.0 + t.ts1) / t.quanta() - 0.875), found.nearest, 1e-9)
+      << clock_hz << " Hz, " << rate << " bit/s";
   EXPECT_EQ(static_cast<int>(t.quanta()), found.most_quanta) << clock_hz << " Hz, " << rate << " bit/s";
   EXPECT_LE(t.sjw, std::min(t.ts2, 4U));
   EXPECT_GE(t.sjw, 1U);
@@ -86,9 +92,10 @@ TEST(FilterBanks, HoldEachIdentifierOnceInBits15To5AndRepeatTheLast) {
   EXPECT_EQ(banks[1].fr2, 0x00200020U);
 }
 
-/// ISO 11898-1, 10.4.2, bit by bit: eleven bits, then RTR and IDE of a standard frame (both 0), SRR and IDE of a long one (both 1) and its other eighteen.
+/// ISO 11898-1, 10.4.2, bit by bit: eleven bits, then RTR and IDE of a standard frame (both 0), SRR and IDE of a long
+/// one (both 1) and its other eighteen.
 TEST(TransmitQueue, GivesFramesOfBothKindsInTheOrderOfTheWire) {
-  const auto on_the_wire = [](const CanFrame& f) {
+  const auto on_the_wire = [](const can::Frame& f) {
     std::vector<int> bits;
     for (int k = 10; k >= 0; --k) bits.push_back(static_cast<int>((f.long_id ? f.id >> 18 : f.id) >> k & 1));
     bits.insert(bits.end(), 2, f.long_id ? 1 : 0);
@@ -97,16 +104,17 @@ TEST(TransmitQueue, GivesFramesOfBothKindsInTheOrderOfTheWire) {
   };
   std::mt19937 random(3);
   TransmitQueue<32> queue;
-  std::vector<CanFrame> expected;
+  std::vector<can::Frame> expected;
   for (std::uint32_t k = 0; k < 32; ++k) {
     const std::uint32_t base = 0x67E + static_cast<std::uint32_t>(random() % 3);
-    CanFrame f{k % 2 == 0 ? base : base << 18 | static_cast<std::uint32_t>(random() % (1U << 18)), 0, {}, k % 2 != 0};
+    can::Frame f{k % 2 == 0 ? base : base << 18 | static_cast<std::uint32_t>(random() % (1U << 18)), 0, {}, k % 2 != 0};
     f.data[0] = static_cast<std::uint8_t>(k);
     expected.push_back(f);
     ASSERT_TRUE(queue.insert({f, k}));
   }
-  std::stable_sort(expected.begin(), expected.end(), [&](const CanFrame& a, const CanFrame& b) { return on_the_wire(a) < on_the_wire(b); });
-  for (const CanFrame& f : expected) {
+  std::stable_sort(expected.begin(), expected.end(),
+                   [&](const can::Frame& a, const can::Frame& b) { return on_the_wire(a) < on_the_wire(b); });
+  for (const can::Frame& f : expected) {
     WaitingFrame out;
     ASSERT_TRUE(queue.take(out, [](const WaitingFrame&) { return true; }));
     EXPECT_EQ(out.frame.data[0], f.data[0]);
@@ -133,8 +141,10 @@ TEST(TransmitQueue, GivesTheMostUrgentAndOfOneIdentifierTheOldestWhateverComes) 
     } else {
       const auto forbidden = static_cast<std::uint16_t>(0x100 + random() % 6);
       WaitingFrame out;
-      const auto found = std::find_if(expected.begin(), expected.end(), [&](const auto& e) { return e.first != forbidden; });
-      ASSERT_EQ(queue.take(out, [&](const WaitingFrame& w) { return w.frame.id != forbidden; }), found != expected.end());
+      const auto found =
+          std::find_if(expected.begin(), expected.end(), [&](const auto& e) { return e.first != forbidden; });
+      ASSERT_EQ(queue.take(out, [&](const WaitingFrame& w) { return w.frame.id != forbidden; }),
+                found != expected.end());
       if (found == expected.end()) continue;
       ASSERT_EQ(out.frame.id, found->first);
       ASSERT_EQ(out.number - first, found->second);

@@ -20,13 +20,19 @@ struct Bench {
   std::uint32_t n = 100;
 
   Counts counts() const {
-    const auto sum = [&](double pin_v) { return static_cast<std::uint32_t>(std::lround(n * std::clamp(pin_v / supply_v, 0.0, 1.0) * 4'095)); };
+    const auto sum = [&](double pin_v) {
+      return static_cast<std::uint32_t>(std::lround(n * std::clamp(pin_v / supply_v, 0.0, 1.0) * 4'095));
+    };
     const double ohm = thermistor_ohm(celsius);
-    return {.n = n, .voltage = sum(cell_v / 2), .current = sum(supply_v / 2 + 20 * 0.002 * current_a), .temperature = sum(supply_v * ohm / (ohm + 10'000)),
-            .n_reference = n, .reference = sum(reference_v)};
+    return {.n = n,
+            .voltage = sum(cell_v / 2),
+            .current = sum(supply_v / 2 + 20 * 0.002 * current_a),
+            .temperature = sum(supply_v * ohm / (ohm + 10'000)),
+            .n_reference = n,
+            .reference = sum(reference_v)};
   }
-  Sample read(const Calibration& calibration = {}) const {
-    Sample s;
+  measurement::Sample read(const Calibration& calibration = {}) const {
+    measurement::Sample s;
     adc::read(counts(), reference_at_3v3, {}, calibration, s);
     return s;
   }
@@ -35,10 +41,13 @@ struct Bench {
 TEST(CellReadings, AreTheCellsAtEverySupply) {
   for (double supply_v = 3.0; supply_v <= 3.55; supply_v += 0.05) {
     for (double cell_v = 1.5; cell_v <= 4.3; cell_v += 0.1) {
-      EXPECT_NEAR(1e-6 * (Bench{.supply_v = supply_v, .cell_v = cell_v}.read().voltage_uv), cell_v, 0.0005 * cell_v) << "a count of the reference at the maker's is 0.067 %, half of it its error";
+      EXPECT_NEAR(1e-6 * (Bench{.supply_v = supply_v, .cell_v = cell_v}.read().voltage_uv), cell_v, 0.0005 * cell_v)
+          << "a count of the reference at the maker's is 0.067 %, half of it its error";
     }
     for (double current_a = -30; current_a <= 30; current_a += 5) {
-      EXPECT_NEAR(1e-6 * (Bench{.supply_v = supply_v, .current_a = current_a}.read().current_ua), current_a, 0.005 + 0.0005 * std::abs(current_a)) << supply_v;
+      EXPECT_NEAR(1e-6 * (Bench{.supply_v = supply_v, .current_a = current_a}.read().current_ua), current_a,
+                  0.005 + 0.0005 * std::abs(current_a))
+          << supply_v;
     }
   }
 }
@@ -58,18 +67,21 @@ TEST(CellReadings, TemperatureIsWithin045KelvinFromMinus25To85DegreesAndFallsNow
 
 TEST(CellReadings, AThermistorThatIsOffOrShortedIsNoTemperature) {
   Counts c = Bench{}.counts();
-  Sample s;
+  measurement::Sample s;
   for (const std::uint32_t rail : {0U, 4'095U * c.n}) {
     c.temperature = rail;
     read(c, reference_at_3v3, {}, {}, s);
-    EXPECT_EQ(s.temperature_cdegc, no_temperature);
-    EXPECT_NE(s.voltage_uv, no_reading);
+    EXPECT_EQ(s.temperature_cdegc, measurement::no_temperature);
+    EXPECT_NE(s.voltage_uv, measurement::no_reading);
   }
 }
 
 TEST(CellReadings, CorrectionsAreAGainAndAnOffset) {
   const Bench bench{.cell_v = 3.2, .current_a = -10};
-  const Sample plain = bench.read(), corrected = bench.read({.voltage_gain_ppm = 2'000, .voltage_offset_uv = -3'000, .current_gain_ppm = -10'000, .current_offset_ua = 50'000});
+  const measurement::Sample plain = bench.read(), corrected = bench.read({.voltage_gain_ppm = 2'000,
+                                                                          .voltage_offset_uv = -3'000,
+                                                                          .current_gain_ppm = -10'000,
+                                                                          .current_offset_ua = 50'000});
   EXPECT_NEAR(corrected.voltage_uv, 1.002 * plain.voltage_uv - 3'000, 1);
   EXPECT_NEAR(corrected.current_ua, 0.99 * plain.current_ua + 50'000, 1);
 }
@@ -81,9 +93,10 @@ TEST(CellReadings, AnAmplifierAtItsRailReadsMoreThanAShortCircuit) {
 
 TEST(CellReadings, AConverterOrASupplyThatCannotBeIsNoReading) {
   const auto nothing = [](Counts c) {
-    Sample s;
+    measurement::Sample s;
     read(c, reference_at_3v3, {}, {}, s);
-    return s.voltage_uv == no_reading && s.current_ua == no_reading && s.temperature_cdegc == no_temperature;
+    return s.voltage_uv == measurement::no_reading && s.current_ua == measurement::no_reading &&
+           s.temperature_cdegc == measurement::no_temperature;
   };
   EXPECT_TRUE(nothing({}));
   Counts c = Bench{}.counts();
@@ -95,7 +108,7 @@ TEST(CellReadings, AConverterOrASupplyThatCannotBeIsNoReading) {
 }
 
 TEST(CellReadings, OfAsManyConversionsAsAPeriodOfAMinuteHoldsNothingOverflows) {
-  const Sample s = Bench{.cell_v = 4.2, .current_a = 35, .n = 240'000}.read();
+  const measurement::Sample s = Bench{.cell_v = 4.2, .current_a = 35, .n = 240'000}.read();
   EXPECT_NEAR(1e-6 * s.voltage_uv, 4.2, 0.0021);
   EXPECT_NEAR(1e-6 * s.current_ua, 35, 0.02);
 }

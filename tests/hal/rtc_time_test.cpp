@@ -18,7 +18,8 @@ RtcTime expected(std::uint32_t s) {
   gmtime_r(&t, &of);
   const int weekday = of.tm_wday == 0 ? 7 : of.tm_wday;
   return {digits(of.tm_hour) << 16 | digits(of.tm_min) << 8 | digits(of.tm_sec),
-          digits(of.tm_year - 100) << 16 | static_cast<std::uint32_t>(weekday) << 13 | digits(of.tm_mon + 1) << 8 | digits(of.tm_mday)};
+          digits(of.tm_year - 100) << 16 | static_cast<std::uint32_t>(weekday) << 13 | digits(of.tm_mon + 1) << 8 |
+              digits(of.tm_mday)};
 }
 
 TEST(RtcTime, IsTheCLibrarysOfEveryDayOfTheCenturyAndBack) {

@@ -11,7 +11,7 @@
 namespace bms::hal {
 namespace {
 
-std::string encoded(const CanFrame& frame) {
+std::string encoded(const can::Frame& frame) {
   std::array<char, slcan::longest_frame> text;
   return std::string(slcan::encode(frame, text));
 }
@@ -29,12 +29,17 @@ TEST(Slcan, EveryFrameComesBack) {
   std::mt19937_64 random(1);
   for (int run = 0; run < 10'000; ++run) {
     const bool long_id = run % 3 == 0;
-    CanFrame sent{static_cast<std::uint32_t>(random() % (long_id ? 1U << 29 : 1U << 11)), static_cast<std::uint8_t>(random() % 9), {}, long_id};
+    can::Frame sent{static_cast<std::uint32_t>(random() % (long_id ? 1U << 29 : 1U << 11)),
+                    static_cast<std::uint8_t>(random() % 9),
+                    {},
+                    long_id};
     for (std::size_t k = 0; k < sent.length; ++k) sent.data[k] = static_cast<std::uint8_t>(random());
     std::string text = encoded(sent);
     text.pop_back();
-    if (run % 2 == 0) std::transform(text.begin() + 1, text.end(), text.begin() + 1, [](char c) { return static_cast<char>(std::tolower(c)); });
-    CanFrame received;
+    if (run % 2 == 0)
+      std::transform(text.begin() + 1, text.end(), text.begin() + 1,
+                     [](char c) { return static_cast<char>(std::tolower(c)); });
+    can::Frame received;
     ASSERT_TRUE(slcan::decode(text, received)) << text;
     ASSERT_EQ(received.id, sent.id);
     ASSERT_EQ(received.long_id, sent.long_id);
@@ -44,8 +49,11 @@ TEST(Slcan, EveryFrameComesBack) {
 }
 
 TEST(Slcan, RefusesWhatIsNoFrameAndLeavesTheLastOneAlone) {
-  for (const char* line : {"", "t", "t100", "t1009", "t10021", "t1002112", "t100211223", "t8001", "t80000", "tG000", "t1001G1", "t1001 1", "T1000", "T00000100", "T200000000", "T0000010G0", "T0000010011", "T0000010011122", "r1000", "x1000"}) {
-    CanFrame frame{0x123, 1, {7}};
+  for (const char* line :
+       {"",           "t",          "t100",        "t1009",          "t10021",  "t1002112", "t100211223",
+        "t8001",      "t80000",     "tG000",       "t1001G1",        "t1001 1", "T1000",    "T00000100",
+        "T200000000", "T0000010G0", "T0000010011", "T0000010011122", "r1000",   "x1000"}) {
+    can::Frame frame{0x123, 1, {7}};
     EXPECT_FALSE(slcan::decode(line, frame)) << line;
     EXPECT_EQ(frame.id, 0x123);
     EXPECT_EQ(frame.data[0], 7);
@@ -58,7 +66,7 @@ TEST(Slcan, AnyBytesNeverDoHarmAndTheNextLineIsRead) {
   for (int run = 0; run < 2'000; ++run) {
     for (std::size_t k = 0, n = random() % 100; k < n; ++k) {
       if (!reader.take(static_cast<char>(random()))) continue;
-      CanFrame frame;
+      can::Frame frame;
       if (slcan::decode(reader.line(), frame)) {
         ASSERT_LE(frame.length, 8);
       }
@@ -67,17 +75,17 @@ TEST(Slcan, AnyBytesNeverDoHarmAndTheNextLineIsRead) {
     reader.take('\r');
     for (const char c : std::string("t12327B2A")) ASSERT_FALSE(reader.take(c));
     ASSERT_TRUE(reader.take('\r'));
-    CanFrame frame;
+    can::Frame frame;
     ASSERT_TRUE(slcan::decode(reader.line(), frame));
     ASSERT_EQ(frame.data[1], 0x2A);
   }
 }
 
 TEST(SampleFrames, CarryASampleAndAStart) {
-  Sample sent;
+  measurement::Sample sent;
   sent.time_us = (std::uint64_t{1} << 48) - 5;
   sent.current_ua = -123'456'789;
-  sent.voltage_uv = no_reading;
+  sent.voltage_uv = measurement::no_reading;
   sent.temperature_cdegc = -4'000;
   SampleFrames<1> received;
   const auto frames = frames_of(sent);
@@ -85,23 +93,23 @@ TEST(SampleFrames, CarryASampleAndAStart) {
   EXPECT_TRUE(received.take(frames[1]));
   EXPECT_EQ(received.sample().time_us, sent.time_us);
   EXPECT_EQ(received.sample().current_ua, sent.current_ua);
-  EXPECT_EQ(received.sample().cell_uv[0], no_reading);
+  EXPECT_EQ(received.sample().cell_uv[0], measurement::no_reading);
   EXPECT_EQ(received.sample().temperature_cdegc[0], -4'000);
-  const CanFrame start = frame_of(StartingPoint{800'000'000, 20'000'000});
+  const can::Frame start = frame_of(measurement::StartingPoint{800'000'000, 20'000'000});
   EXPECT_TRUE(is_start(start));
   EXPECT_EQ(start_of(start).soc_ppb, 800'000'000);
   EXPECT_EQ(start_of(start).soc_sigma_ppb, 20'000'000);
   EXPECT_FALSE(is_start({start.id, 7, start.data}));
 }
 
-PackSample<16> some_pack() {
-  PackSample<16> p;
+measurement::PackSample<16> some_pack() {
+  measurement::PackSample<16> p;
   p.time_us = 123'456'789;
   p.current_ua = -98'765'432;
   p.pack_uv = 52'345'678;
   for (std::size_t k = 0; k < 16; ++k) p.cell_uv[k] = 3'200'000 + static_cast<std::int32_t>(k);
-  p.cell_uv[5] = no_reading;
-  p.temperature_cdegc = {2'500, -1'000, no_temperature, 4'000};
+  p.cell_uv[5] = measurement::no_reading;
+  p.temperature_cdegc = {2'500, -1'000, measurement::no_temperature, 4'000};
   return p;
 }
 
@@ -109,7 +117,7 @@ TEST(SampleFrames, CarryAPack) {
   const auto sent = some_pack();
   SampleFrames<16> received;
   const auto frames = frames_of(sent, 51'000'000, 7);
-  EXPECT_TRUE(std::ranges::is_sorted(frames, {}, &CanFrame::id)) << "a node that sends by identifier keeps the order";
+  EXPECT_TRUE(std::ranges::is_sorted(frames, {}, &can::Frame::id)) << "a node that sends by identifier keeps the order";
   for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(received.take(frames[k]), k + 1 == frames.size()) << k;
   EXPECT_EQ(received.sample().time_us, sent.time_us);
   EXPECT_EQ(received.sample().current_ua, sent.current_ua);
@@ -128,7 +136,7 @@ TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
       SampleFrames<16> received;
       bool complete = false;
       for (std::size_t k = 0; k < frames.size(); ++k) {
-        CanFrame frame = frames[k];
+        can::Frame frame = frames[k];
         if (k == broken) frame.data[bit / 8] = static_cast<std::uint8_t>(frame.data[bit / 8] ^ (1U << bit % 8));
         complete = received.take(frame) || complete;
       }
@@ -140,18 +148,18 @@ TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
     for (std::size_t k = 0; k < frames.size(); ++k) complete = (k != broken && received.take(frames[k])) || complete;
     EXPECT_FALSE(complete) << broken;
     // the next whole one is taken again
-    for (const CanFrame& frame : frames) complete = received.take(frame);
+    for (const can::Frame& frame : frames) complete = received.take(frame);
     EXPECT_TRUE(complete) << broken;
   }
 }
 
 TEST(SampleFrames, WhatGetsLostIsMissingAndNotTheLastReadingAgain) {
-  Sample s{1, -5, 3'300'000, 2'500};
+  measurement::Sample s{1, -5, 3'300'000, 2'500};
   SampleFrames<1> received;
-  for (const CanFrame& frame : frames_of(s)) received.take(frame);
+  for (const can::Frame& frame : frames_of(s)) received.take(frame);
   EXPECT_TRUE(received.take(frames_of(s)[1]));
-  EXPECT_EQ(received.sample().current_ua, no_reading);
-  EXPECT_EQ(received.sample().cell_uv[0], no_reading);
+  EXPECT_EQ(received.sample().current_ua, measurement::no_reading);
+  EXPECT_EQ(received.sample().cell_uv[0], measurement::no_reading);
 }
 
 }  // namespace

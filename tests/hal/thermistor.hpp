@@ -1,4 +1,5 @@
-// The thermistor 103AT by Steinhart and Hart's equation through three of its maker's values (-20, 25 and 70 degrees C): what it has at a temperature, without the firmware's table.
+// The thermistor 103AT by Steinhart and Hart's equation through three of its maker's values (-20, 25 and 70 degrees C):
+// what it has at a temperature, without the firmware's table.
 #pragma once
 
 #include <array>

@@ -3,13 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "host_sim/bad_input.hpp"
+#include "files/bad_input.hpp"
 
 namespace bms::hil {
 namespace {
 
-PackSample<most_cells> reading(std::int32_t first_uv) {
-  PackSample<most_cells> s;
+measurement::PackSample<most_cells> reading(std::int32_t first_uv) {
+  measurement::PackSample<most_cells> s;
   s.current_ua = -first_uv;
   for (std::size_t k = 0; k < most_cells; ++k) s.cell_uv[k] = first_uv + static_cast<std::int32_t>(k);
   s.temperature_cdegc[0] = static_cast<std::int16_t>(first_uv % 1000);
@@ -17,8 +17,10 @@ PackSample<most_cells> reading(std::int32_t first_uv) {
 }
 
 TEST(Injection, SaysWhatItCouldNotRead) {
-  for (const char* text : {"", "drop", "drop@3", "drop=2@3", "drop=x@3", "drop=nan@3", "cell_stuck@3", "cell_stuck=0@3", "cell_stuck=17@3", "cell_stuck=1.5@3", "sense_wire=16@3", "welded=1@3", "welded@", "welded@-1", "welded@5-5", "welded@5-4", "nothing@3"}) {
-    EXPECT_THROW(injection(text, 16), BadInput) << text;
+  for (const char* text : {"", "drop", "drop@3", "drop=2@3", "drop=x@3", "drop=nan@3", "cell_stuck@3", "cell_stuck=0@3",
+                           "cell_stuck=17@3", "cell_stuck=1.5@3", "sense_wire=16@3", "welded=1@3", "welded@",
+                           "welded@-1", "welded@5-5", "welded@5-4", "nothing@3"}) {
+    EXPECT_THROW(injection(text, 16), files::BadInput) << text;
   }
   const auto i = injection("cell_open=3@60.5-90", 16);
   EXPECT_EQ(i.name, "cell_open");
@@ -35,7 +37,7 @@ TEST(Injector, ActsInItsTimeAndOnItsCellOnly) {
     const auto whole = s;
     injector.apply(time_s, s);
     const bool inside = time_s >= 10 && time_s < 20;
-    EXPECT_EQ(s.cell_uv[2], inside ? no_reading : whole.cell_uv[2]) << time_s;
+    EXPECT_EQ(s.cell_uv[2], inside ? measurement::no_reading : whole.cell_uv[2]) << time_s;
     EXPECT_EQ(s.cell_uv[3], whole.cell_uv[3]) << time_s;
     EXPECT_EQ(s.current_ua, inside ? -(3'300'000 + 99) : whole.current_ua) << time_s << ": as it was before";
   }
@@ -52,7 +54,7 @@ TEST(Injector, ABrokenSenseWireMovesTwoNeighboursInOppositeWaysAndKeepsTheirSum)
 }
 
 TEST(Injector, TheWireLosesTurnsAndDelaysAsManyFramesAsItIsTold) {
-  const std::vector<hal::CanFrame> sent(10, hal::CanFrame{0x310, 8, {1, 2, 3, 4, 5, 6, 7, 8}});
+  const std::vector<can::Frame> sent(10, can::Frame{0x310, 8, {1, 2, 3, 4, 5, 6, 7, 8}});
   const auto run = [&](const char* text) {
     Injector injector({injection(text, 16)}, 7);
     std::size_t through = 0, changed = 0;
@@ -73,7 +75,7 @@ TEST(Injector, TheWireLosesTurnsAndDelaysAsManyFramesAsItIsTold) {
 }
 
 TEST(SimulatedPack, ALinkThatIsPrechargedFollowsItsCurveAndAWeldedContactorHoldsIt) {
-  SimulatedPack pack(read_cell("table9"), 16, 0.5, {});
+  SimulatedPack pack(files::read_cell("table9"), 16, 0.5, {});
   const double v = pack.pack_v();
   EXPECT_NEAR(v, 16 * 3.285, 0.3);
   for (int k = 0; k < 5; ++k) pack.run(-6, {.main_minus = true, .precharge = true}, false, 25, 0.1);
@@ -90,7 +92,8 @@ TEST(SimulatedPack, ALinkThatIsPrechargedFollowsItsCurveAndAWeldedContactorHolds
 }
 
 TEST(SimulatedPack, NoTwoCellsAreAlikeAndASeedMakesThemAgain) {
-  SimulatedPack a(read_cell("table9"), 16, 0.5, {.seed = 3}), b(read_cell("table9"), 16, 0.5, {.seed = 3}), c(read_cell("table9"), 16, 0.5, {.seed = 4});
+  SimulatedPack a(files::read_cell("table9"), 16, 0.5, {.seed = 3}),
+      b(files::read_cell("table9"), 16, 0.5, {.seed = 3}), c(files::read_cell("table9"), 16, 0.5, {.seed = 4});
   for (int k = 0; k < 100; ++k) {
     for (SimulatedPack* p : {&a, &b, &c}) p->run(-6, {.main_plus = true, .main_minus = true}, false, 25, 1);
   }

@@ -5,18 +5,18 @@
 
 #include <cmath>
 
-namespace bms {
+namespace bms::host_sim {
 namespace {
 
 using ::testing::HasSubstr;
 
 ReplayResult replayed(const std::optional<Belief>& belief, ScalarKind scalar = ScalarKind::single) {
   ReplayResult result;
-  result.cell = read_cell("table9");
+  result.cell = files::read_cell("table9");
   result.target = "host";
   result.scalar = scalar;
-  result.recording = read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
-  result.track = run_on_host(result.cell, samples(result.recording), starting_point(belief), scalar);
+  result.recording = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  result.track = run_on_host(result.cell, files::samples(result.recording), starting_point(belief), scalar);
   evaluate(result);
   return result;
 }
@@ -40,7 +40,8 @@ TEST(ReplayOfTheShift, Started20PercentWrongIsWithin1Point5PercentAfter30Minutes
 TEST(ReplayOfTheShift, FixedPointIsWithin1PercentOfDouble) {
   const auto fixed = replayed(Belief{0.98}, ScalarKind::fixed), twice = replayed(Belief{0.98}, ScalarKind::twice);
   double largest = 0;
-  for (std::size_t k = 0; k < fixed.track.rows.size(); ++k) largest = std::max(largest, std::abs(fixed.track.rows[k].soc - twice.track.rows[k].soc));
+  for (std::size_t k = 0; k < fixed.track.rows.size(); ++k)
+    largest = std::max(largest, std::abs(fixed.track.rows[k].soc - twice.track.rows[k].soc));
   EXPECT_LT(largest, 0.01);
   RecordProperty("largest_soc_difference", std::to_string(largest));
 }
@@ -92,4 +93,4 @@ TEST(Replay, TraceHasARowForEverySampleAndTheContractsColumns) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::host_sim

@@ -1,18 +1,18 @@
-#include "experiments/experiment.hpp"
 #include "host_sim/simulation.hpp"
+#include "experiments/experiment.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "identification/figures.hpp"
 
-namespace bms {
+namespace bms::host_sim {
 namespace {
 
 TEST(Simulation, CountsTheChargeAndRestsAtTheOpenCircuitVoltage) {
-  const auto p = read_cell("table9").parameters;
+  const auto p = files::read_cell("table9").parameters;
   const auto cell = model::prepare<double, model::max_intervals>(p);
   std::vector<double> time_s, current_a;
   for (int k = 0; k <= 7'200; ++k) {
@@ -40,32 +40,38 @@ TEST(Figures, FitIsA6AndIgnoresMissingReadings) {
 }
 
 TEST(Experiment, EveryProfileStaysWithin1CAndIsTheSameEachTime) {
-  for (const Experiment& e : experiments()) {
-    const auto a = *experiment(e.name, {.capacity_ah = 2.5}), b = *experiment(e.name, {.capacity_ah = 2.5});
+  for (const experiments::Experiment& e : experiments::experiments()) {
+    const auto a = *experiments::experiment(e.name, {.capacity_ah = 2.5}),
+               b = *experiments::experiment(e.name, {.capacity_ah = 2.5});
     ASSERT_EQ(a.size(), b.size());
     for (std::size_t k = 0; k < a.size(); ++k) {
       ASSERT_LE(std::abs(a[k].current_a), 2.5) << e.name << " at " << a[k].time_s;
       ASSERT_EQ(a[k].current_a, b[k].current_a);
     }
   }
-  EXPECT_FALSE(experiment("no_such_thing", {}).has_value());
+  EXPECT_FALSE(experiments::experiment("no_such_thing", {}).has_value());
 }
 
 TEST(Experiment, WhatTellsCausesApartStaysInTheCellAndSaysWhatToLog) {
   int designs = 0;
-  for (const Experiment& e : experiments()) {
+  for (const experiments::Experiment& e : experiments::experiments()) {
     if (std::isnan(e.start_soc)) continue;
     ++designs;
     EXPECT_FALSE(e.instruction.empty()) << e.name;
     double soc = e.start_soc, before_s = 0;
-    const std::vector<ProfileRow> rows = experiment(e.name, {.capacity_ah = 2.5, .step_s = e.step_s}).value();
-    for (const ProfileRow& row : rows) {
+    const std::vector<experiments::ProfileRow> rows =
+        experiments::experiment(e.name, {.capacity_ah = 2.5, .step_s = e.step_s}).value();
+    for (const experiments::ProfileRow& row : rows) {
       soc += row.current_a * (row.time_s - before_s) / 3'600 / 2.5;
       before_s = row.time_s;
       ASSERT_GT(soc, 0.05) << e.name << " at " << row.time_s;
       ASSERT_LT(soc, 0.98) << e.name << " at " << row.time_s;
-      if (row.contactor_open) { ASSERT_EQ(row.current_a, 0) << e.name; }
-      if (std::isfinite(row.source_v)) { ASSERT_TRUE(row.contactor_open) << "nobody takes the sense wires off a cell that is loaded: " << e.name; }
+      if (row.contactor_open) {
+        ASSERT_EQ(row.current_a, 0) << e.name;
+      }
+      if (std::isfinite(row.source_v)) {
+        ASSERT_TRUE(row.contactor_open) << "nobody takes the sense wires off a cell that is loaded: " << e.name;
+      }
     }
     EXPECT_LE(before_s, 12 * 3'600) << e.name;
   }
@@ -73,4 +79,4 @@ TEST(Experiment, WhatTellsCausesApartStaysInTheCellAndSaysWhatToLog) {
 }
 
 }  // namespace
-}  // namespace bms
+}  // namespace bms::host_sim

@@ -18,9 +18,13 @@ TEST(CircuitFromDiscrete, ForwardIsEq12To16AsPrinted) {
   const double b1 = 0.13, r0 = 0.0126, r1 = 0.0192, c1 = 8333.33, t = 10, cn = capacity_c;
   const DiscreteCoefficients c = discrete_from_circuit({b1, r0, r1, c1}, t, cn);
   const double below = 2 * cn * t + 4 * cn * r1 * c1;
-  EXPECT_NEAR(c.c0, (t * t * b1 + 2 * cn * r0 * t + 2 * cn * r1 * t + 4 * cn * r0 * r1 * c1 + 2 * b1 * r1 * c1 * t) / below, 1e-16);
+  EXPECT_NEAR(c.c0,
+              (t * t * b1 + 2 * cn * r0 * t + 2 * cn * r1 * t + 4 * cn * r0 * r1 * c1 + 2 * b1 * r1 * c1 * t) / below,
+              1e-16);
   EXPECT_NEAR(c.c1, (t * t * b1 - 4 * cn * r0 * r1 * c1) / (cn * t + 2 * cn * r1 * c1), 1e-16);
-  EXPECT_NEAR(c.c2, (t * t * b1 - 2 * cn * r0 * t - 2 * cn * r1 * t + 4 * cn * r0 * r1 * c1 - 2 * b1 * r1 * c1 * t) / below, 1e-16);
+  EXPECT_NEAR(c.c2,
+              (t * t * b1 - 2 * cn * r0 * t - 2 * cn * r1 * t + 4 * cn * r0 * r1 * c1 - 2 * b1 * r1 * c1 * t) / below,
+              1e-16);
   EXPECT_NEAR(c.a1, -8 * cn * r1 * c1 / below, 1e-15);
   EXPECT_NEAR(c.a2, (-2 * cn * t + 4 * cn * r1 * c1) / below, 1e-15);
   EXPECT_NEAR(c.a1, -(1 + c.a2), 1e-15);
@@ -32,7 +36,8 @@ TEST(CircuitFromDiscrete, ForwardIsTheBilinearTransformOfEq10) {
   const DiscreteCoefficients c = discrete_from_circuit({b1, r0, r1, c1}, t, cn);
   for (const double z : {2.0, -3.0, 1.1}) {
     const double s = 2 / t * (1 - 1 / z) / (1 + 1 / z);
-    const double eq10 = (r0 * s * s + (b1 / cn + 1 / c1 + r0 / (r1 * c1)) * s + b1 / (r1 * c1 * cn)) / (s * (s + 1 / (r1 * c1)));
+    const double eq10 =
+        (r0 * s * s + (b1 / cn + 1 / c1 + r0 / (r1 * c1)) * s + b1 / (r1 * c1 * cn)) / (s * (s + 1 / (r1 * c1)));
     EXPECT_NEAR((c.c0 + c.c1 / z + c.c2 / z / z) / (1 + c.a1 / z + c.a2 / z / z), eq10, 1e-12) << z;
   }
 }
@@ -46,17 +51,22 @@ TEST(CircuitFromDiscrete, ComesBackTo1e12OverTheBoundsOfTable3) {
     const Circuit in{between(0.01, 3), between(1e-3, 0.1), between(1e-3, 0.5), between(100, 50'000)};
     for (const Input input : {Input::straight, Input::held}) {
       const DiscreteCoefficients c = discrete_from_circuit(in, t, cn);
-      if (input == Input::held && t > 5 * in.r1_ohm * in.c1_f) continue;  // exp(-T/tau): nothing of the pole left in the sample after
+      if (input == Input::held && t > 5 * in.r1_ohm * in.c1_f)
+        continue;  // exp(-T/tau): nothing of the pole left in the sample after
       const DiscreteCoefficients shaped = discrete_from_circuit(in, t, cn, input);
       const CircuitReading back = circuit_from_discrete(shaped, t, cn, input);
       const Circuit& out = back.circuit;
       const double tau = in.r1_ohm * in.c1_f, d_by_4cn = t / 2 + tau;
-      // What the rounding of coefficients of size |c| and 1 - a2 costs, four ulp of them; 1e-12 of the value where that is more.
+      // What the rounding of coefficients of size |c| and 1 - a2 costs, four ulp of them; 1e-12 of the value where that
+      // is more.
       const double size = std::abs(c.c0) + std::abs(c.c1) + std::abs(c.c2), ulp = 4 * epsilon;
       const double pole = 1e-12 + ulp * (1 + tau / t);
-      const double b1_error = ulp * size * d_by_4cn * cn / (t * t), r1_error = ulp * size * d_by_4cn / t + 2 * b1_error * tau / cn;
+      const double b1_error = ulp * size * d_by_4cn * cn / (t * t),
+                   r1_error = ulp * size * d_by_4cn / t + 2 * b1_error * tau / cn;
       EXPECT_NEAR(out.b1_v, in.b1_v, pole * in.b1_v + b1_error);
-      EXPECT_NEAR(out.r0_ohm, in.r0_ohm, 10 * pole * (in.r0_ohm + in.r1_ohm) + ulp * size * (1 + t / tau) + (input == Input::held ? b1_error * t / cn + r1_error * t / tau : 0));
+      EXPECT_NEAR(out.r0_ohm, in.r0_ohm,
+                  10 * pole * (in.r0_ohm + in.r1_ohm) + ulp * size * (1 + t / tau) +
+                      (input == Input::held ? b1_error * t / cn + r1_error * t / tau : 0));
       EXPECT_NEAR(out.r1_ohm, in.r1_ohm, 10 * pole * (in.r0_ohm + in.r1_ohm) * (1 + t / tau) + 10 * r1_error);
       EXPECT_NEAR(out.c1_f * out.r1_ohm, tau, pole * tau * (1 + t / tau));
       EXPECT_TRUE(back.implausible.empty());
@@ -68,7 +78,8 @@ TEST(CircuitFromDiscrete, ComesBackTo1e12OverTheBoundsOfTable3) {
 TEST(CircuitFromDiscrete, ComesBackTo1e12AtThePapersCellAndTenSeconds) {
   const Circuit in{0.13, 0.0126, 0.0192, 8333.33};
   for (const Input input : {Input::straight, Input::held}) {
-    const Circuit out = circuit_from_discrete(discrete_from_circuit(in, 10, capacity_c, input), 10, capacity_c, input).circuit;
+    const Circuit out =
+        circuit_from_discrete(discrete_from_circuit(in, 10, capacity_c, input), 10, capacity_c, input).circuit;
     EXPECT_NEAR(out.b1_v, in.b1_v, 1e-12 * 0.13 * 10);  // of c's of 0.0126, b1 is 1e-5 of: 1e-16 / 1e-5
     EXPECT_NEAR(out.r0_ohm, in.r0_ohm, 1e-12 * in.r0_ohm);
     EXPECT_NEAR(out.r1_ohm, in.r1_ohm, 1e-12 * in.r1_ohm);
@@ -76,7 +87,8 @@ TEST(CircuitFromDiscrete, ComesBackTo1e12AtThePapersCellAndTenSeconds) {
   }
 }
 
-// By hand: T = 1, C_n = 1, b1 = 1, R0 = 1, R1 = 1, C1 = 1: tau = 1, D = 6, c = (1 + 2 + 2 + 4 + 2, 2 - 8, 1 - 2 - 2 + 4 - 2) / 6, a = (-8, 2) / 6.
+// By hand: T = 1, C_n = 1, b1 = 1, R0 = 1, R1 = 1, C1 = 1: tau = 1, D = 6, c = (1 + 2 + 2 + 4 + 2, 2 - 8, 1 - 2 - 2 + 4
+// - 2) / 6, a = (-8, 2) / 6.
 TEST(CircuitFromDiscrete, GivesOnesForTheCoefficientsOfOnes) {
   const CircuitReading r = circuit_from_discrete({11.0 / 6, -1, -1.0 / 6, -8.0 / 6, 2.0 / 6}, 1, 1);
   EXPECT_NEAR(r.circuit.b1_v, 1, 1e-14);
@@ -86,8 +98,9 @@ TEST(CircuitFromDiscrete, GivesOnesForTheCoefficientsOfOnes) {
   EXPECT_NEAR(r.tau_s, 1, 1e-14);
 }
 
-// What Eq. 17 says of R0 and R1 by Eq. 12-16, T and b1 aside (R0 and R1 - its b1 part need neither): 12.4 mohm, where the paper has 11.9; and
-// R1 + b1 tau / C_n = 8.2 mohm, where the paper has 1.3. Its R1 and C1 are not those of its coefficients.
+// What Eq. 17 says of R0 and R1 by Eq. 12-16, T and b1 aside (R0 and R1 - its b1 part need neither): 12.4 mohm, where
+// the paper has 11.9; and R1 + b1 tau / C_n = 8.2 mohm, where the paper has 1.3. Its R1 and C1 are not those of its
+// coefficients.
 TEST(CircuitFromDiscrete, ReadsFromEq17AnotherR1ThanThePaperPrints) {
   const CircuitReading r = circuit_from_discrete({0.01317, -0.02263, 0.00946, -1.82, 0.8203}, 1, capacity_c);
   EXPECT_NEAR(r.circuit.r0_ohm, 0.01243, 1e-5);
@@ -176,9 +189,11 @@ TEST(CircuitCovariance, IsWhatCentralDifferencesGive) {
     Eigen::Matrix<double, 5, 5> root;
     root << 3, 0, 0, 0, 0, -5, 1, 0, 0, 0, 2, -1, 0.2, 0, 0, 1, 2, 3, 4, 0, 5, -4, 3, -2, 1;
     const Eigen::Matrix<double, 5, 5> covariance = 1e-12 * root * root.transpose();
-    const Eigen::Matrix4d ours = circuit_covariance(c, covariance, t, capacity_c, input), theirs = slope * covariance * slope.transpose();
+    const Eigen::Matrix4d ours = circuit_covariance(c, covariance, t, capacity_c, input),
+                          theirs = slope * covariance * slope.transpose();
     for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j < 4; ++j) EXPECT_NEAR(ours(i, j), theirs(i, j), 1e-5 * std::sqrt(theirs(i, i) * theirs(j, j))) << i << j;
+      for (int j = 0; j < 4; ++j)
+        EXPECT_NEAR(ours(i, j), theirs(i, j), 1e-5 * std::sqrt(theirs(i, i) * theirs(j, j))) << i << j;
     }
     const Circuit deviation = circuit_std(c, covariance, t, capacity_c, input);
     EXPECT_EQ(deviation.b1_v, std::sqrt(ours(0, 0)));
@@ -194,12 +209,17 @@ TEST(CircuitCovariance, IsTheSpreadOfReadingsFromScatteredCoefficients) {
   const Circuit at = circuit_from_discrete(c, 10, capacity_c).circuit;
   constexpr int trials = 20'000;
   for (int k = 0; k < trials; ++k) {
-    const Circuit r = circuit_from_discrete({c.c0 + noise(random), c.c1 + noise(random), c.c2 + noise(random), c.a1, c.a2 + noise(random)}, 10, capacity_c).circuit;
-    squares += Eigen::Vector4d{r.b1_v - at.b1_v, r.r0_ohm - at.r0_ohm, r.r1_ohm - at.r1_ohm, r.c1_f - at.c1_f}.cwiseAbs2();
+    const Circuit r = circuit_from_discrete({c.c0 + noise(random), c.c1 + noise(random), c.c2 + noise(random), c.a1,
+                                             c.a2 + noise(random)},
+                                            10, capacity_c)
+                          .circuit;
+    squares +=
+        Eigen::Vector4d{r.b1_v - at.b1_v, r.r0_ohm - at.r0_ohm, r.r1_ohm - at.r1_ohm, r.c1_f - at.c1_f}.cwiseAbs2();
   }
   Eigen::Matrix<double, 5, 5> covariance = 1e-12 * Eigen::Matrix<double, 5, 5>::Identity();
   const Eigen::Vector4d expected = circuit_covariance(c, covariance, 10, capacity_c).diagonal();
-  for (int k = 0; k < 4; ++k) EXPECT_NEAR(std::sqrt(squares[k] / trials / expected[k]), 1, 0.03) << circuit_names[k];  // 1/sqrt(2 trials) = 0.5 %
+  for (int k = 0; k < 4; ++k)
+    EXPECT_NEAR(std::sqrt(squares[k] / trials / expected[k]), 1, 0.03) << circuit_names[k];  // 1/sqrt(2 trials) = 0.5 %
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ using Eigen::VectorXd;
 void expect_near(const VectorXd& ours, const std::vector<double>& theirs, double tolerance, const std::string& what) {
   ASSERT_EQ(static_cast<std::size_t>(ours.size()), theirs.size()) << what;
   ASSERT_FALSE(theirs.empty()) << what;
-  for (std::size_t k = 0; k < theirs.size(); ++k) ASSERT_NEAR(ours[static_cast<Eigen::Index>(k)], theirs[k], tolerance) << what << ", sample " << k;
+  for (std::size_t k = 0; k < theirs.size(); ++k)
+    ASSERT_NEAR(ours[static_cast<Eigen::Index>(k)], theirs[k], tolerance) << what << ", sample " << k;
 }
 
 /// Levenberg-Marquardt as short as it gets: these tests are about the problem, not the search.
@@ -38,7 +39,8 @@ VectorXd search(const LeastSquares& problem, VectorXd x, VectorXd* deviation = n
   for (int k = 0; k < 300 && damping < 1e12; ++k) {
     const VectorXd size = jacobian.colwise().norm();
     Eigen::MatrixXd stacked(jacobian.rows() + x.size(), x.size());
-    stacked << jacobian * size.cwiseInverse().asDiagonal(), Eigen::MatrixXd(VectorXd::Constant(x.size(), std::sqrt(damping)).asDiagonal());
+    stacked << jacobian * size.cwiseInverse().asDiagonal(),
+        Eigen::MatrixXd(VectorXd::Constant(x.size(), std::sqrt(damping)).asDiagonal());
     VectorXd right = VectorXd::Zero(stacked.rows());
     right.head(r.size()) = -r;
     const VectorXd tried = x + size.cwiseInverse().cwiseProduct(stacked.colPivHouseholderQr().solve(right));
@@ -53,7 +55,8 @@ VectorXd search(const LeastSquares& problem, VectorXd x, VectorXd* deviation = n
   }
   if (deviation != nullptr) {
     const VectorXd size = jacobian.colwise().norm();
-    const Eigen::MatrixXd scaled = jacobian * size.cwiseInverse().asDiagonal(), inverse = (scaled.transpose() * scaled).inverse();
+    const Eigen::MatrixXd scaled = jacobian * size.cwiseInverse().asDiagonal(),
+                          inverse = (scaled.transpose() * scaled).inverse();
     const double variance = r.squaredNorm() / static_cast<double>(r.size() - x.size());
     *deviation = (variance * inverse.diagonal()).cwiseSqrt().cwiseQuotient(size);
   }
@@ -106,8 +109,10 @@ TEST(DiscreteModel, SimulatesAsScipysLfilterDoes) {
   if (scipy.empty()) GTEST_SKIP() << "no python3 with scipy: install python3-scipy to compare the simulation with it";
   const auto& u = scipy["x"];
   expect_near(simulate({{0.01317, -0.02263, 0.00946}, {-1.82, 0.8203}, 0, 0, {}}, u), scipy["tf"], 1e-12, "Eq. 17");
-  expect_near(simulate({{0.009828, -0.01508, 0.005254}, {-1.835, 0.835}, 1, 0, {}}, u), scipy["oe"], 1e-12, "Eq. 21-22");
-  expect_near(simulate({{0, 0, 0}, {-1.82, 0.8203}, 0, 0, {0.1, -0.05}}, std::vector<double>(202, 0)).tail(200), scipy["free"], 1e-12, "free response");
+  expect_near(simulate({{0.009828, -0.01508, 0.005254}, {-1.835, 0.835}, 1, 0, {}}, u), scipy["oe"], 1e-12,
+              "Eq. 21-22");
+  expect_near(simulate({{0, 0, 0}, {-1.82, 0.8203}, 0, 0, {0.1, -0.05}}, std::vector<double>(202, 0)).tail(200),
+              scipy["free"], 1e-12, "free response");
 }
 
 // y[k] = 0.5 y[k-1] + 2 u[k-1] + 3 u[k-2] for u = 1 0 0 ...: 0 2 4 2 1; offset 10; free response from 8: 8 4 2 1 0.5
@@ -155,15 +160,21 @@ TEST(DiscreteModel, DerivativesAreCentralDifferences) {
       const auto moved = [&](double by) {
         DiscreteModel m = model;
         if (m.initial_v.empty()) m.initial_v.assign(nf, 0);
-        if (j < nb) m.b[j] += by;
-        else if (j < nb + nf) m.f[j - nb] += by;
-        else if (j == nb + nf) m.offset_v += by;
-        else m.initial_v[j - nb - nf - 1] += by;
+        if (j < nb)
+          m.b[j] += by;
+        else if (j < nb + nf)
+          m.f[j - nb] += by;
+        else if (j == nb + nf)
+          m.offset_v += by;
+        else
+          m.initial_v[j - nb - nf - 1] += by;
         return simulate(m, u);
       };
       const VectorXd difference = (moved(h) - moved(-h)) / (2 * h), ours = jacobian.col(static_cast<Eigen::Index>(j));
       // a central difference is good to h^2 of the third derivative and 1e-16 / h of the value
-      EXPECT_LT((difference - ours).cwiseAbs().maxCoeff(), 1e-7 * (1 + ours.cwiseAbs().maxCoeff() + plain.cwiseAbs().maxCoeff())) << "unknown " << j;
+      EXPECT_LT((difference - ours).cwiseAbs().maxCoeff(),
+                1e-7 * (1 + ours.cwiseAbs().maxCoeff() + plain.cwiseAbs().maxCoeff()))
+          << "unknown " << j;
     }
   }
 }
@@ -174,15 +185,16 @@ TEST(DiscreteModel, RefusesAFreeResponseOfTheWrongLengthAndAnEmptyDenominator) {
 }
 
 TEST(Poles, AreFoundAndMirrored) {
-  EXPECT_NEAR(largest_pole({-1.5, 0.5}), 1, 1e-12);           // 1, 0.5
-  EXPECT_NEAR(largest_pole({0, 0.81}), 0.9, 1e-12);           // +-0.9i
+  EXPECT_NEAR(largest_pole({-1.5, 0.5}), 1, 1e-12);  // 1, 0.5
+  EXPECT_NEAR(largest_pole({0, 0.81}), 0.9, 1e-12);  // +-0.9i
   EXPECT_NEAR(largest_pole({-2}), 2, 1e-12);
   EXPECT_TRUE(stable({-1.5, 0.5}));
-  EXPECT_TRUE(stable({-1.5005, 0.50025}));                    // 1.0005, 0.5
+  EXPECT_TRUE(stable({-1.5005, 0.50025}));  // 1.0005, 0.5
   EXPECT_FALSE(stable({-1.5005, 0.50025}, 1e-4));
   EXPECT_FALSE(stable({std::nan(""), 0.5}));
-  EXPECT_THAT(mirrored_inside({-2.5, 1}), testing::Pointwise(testing::DoubleNear(1e-12), {-1.0, 0.25}));         // 2, 0.5 -> 0.5, 0.5
-  EXPECT_THAT(mirrored_inside({0, 4, 0}), testing::Pointwise(testing::DoubleNear(1e-12), {0.0, 0.25, 0.0}));     // +-2i
+  EXPECT_THAT(mirrored_inside({-2.5, 1}),
+              testing::Pointwise(testing::DoubleNear(1e-12), {-1.0, 0.25}));  // 2, 0.5 -> 0.5, 0.5
+  EXPECT_THAT(mirrored_inside({0, 4, 0}), testing::Pointwise(testing::DoubleNear(1e-12), {0.0, 0.25, 0.0}));  // +-2i
   EXPECT_THAT(mirrored_inside({-1.2, 0.3}), testing::ElementsAre(-1.2, 0.3));
 }
 
@@ -212,9 +224,12 @@ TEST(Identification, WithoutNoiseComesBackTo1e6FromItsOwnStart) {
   const Structure tf_structure = transfer_function(2.9), oe_structure = output_error(true);
   const auto u = pulses(3'600);
   const Data tf_data = data_of(tf, u, 0), oe_data = data_of(oe, u, 0);
-  const VectorXd tf_start = to_unknowns(start_values(tf_data, tf_structure), tf_structure), oe_start = to_unknowns(start_values(oe_data, oe_structure), oe_structure);
-  expect_unknowns(search(simulation_error(tf_data, tf_structure, tf_start), tf_start), to_unknowns(tf, tf_structure), 1e-6, "TF");
-  expect_unknowns(search(simulation_error(oe_data, oe_structure, oe_start), oe_start), to_unknowns(oe, oe_structure), 1e-6, "OE");
+  const VectorXd tf_start = to_unknowns(start_values(tf_data, tf_structure), tf_structure),
+                 oe_start = to_unknowns(start_values(oe_data, oe_structure), oe_structure);
+  expect_unknowns(search(simulation_error(tf_data, tf_structure, tf_start), tf_start), to_unknowns(tf, tf_structure),
+                  1e-6, "TF");
+  expect_unknowns(search(simulation_error(oe_data, oe_structure, oe_start), oe_start), to_unknowns(oe, oe_structure),
+                  1e-6, "OE");
 }
 
 TEST(Identification, WithoutNoiseComesBackTo1e6FromAFarStart) {
@@ -230,12 +245,18 @@ TEST(Identification, WithoutNoiseComesBackTo1e6FromAFarStart) {
 TEST(Identification, OfARecordCutOutOfARunComesBackTo1e6) {
   DiscreteModel tf = tf_of_cell(), oe = tf;
   oe.nk = 1;
-  const struct { const char* name; DiscreteModel model; Structure structure; } kinds[] = {{"TF", tf, transfer_function(2.9)}, {"OE", oe, output_error()}};
+  const struct {
+    const char* name;
+    DiscreteModel model;
+    Structure structure;
+  } kinds[] = {{"TF", tf, transfer_function(2.9)}, {"OE", oe, output_error()}};
   for (const auto& [name, model, structure] : kinds) {
     Data data = data_of(model, pulses(4'000), 0);
     ASSERT_NE(data.current_a[399], 0);
-    for (auto* column : {&data.time_s, &data.current_a, &data.voltage_v}) column->erase(column->begin(), column->begin() + 400);
-    const VectorXd start = to_unknowns(start_values(data, structure), structure), x = search(simulation_error(data, structure, start), start);
+    for (auto* column : {&data.time_s, &data.current_a, &data.voltage_v})
+      column->erase(column->begin(), column->begin() + 400);
+    const VectorXd start = to_unknowns(start_values(data, structure), structure),
+                   x = search(simulation_error(data, structure, start), start);
     expect_unknowns(x.head(5), to_unknowns(model, structure).head(5), 1e-6, name);
   }
 }
@@ -244,7 +265,8 @@ TEST(Identification, OfARecordCutOutOfARunComesBackTo1e6) {
 TEST(Identification, LeadsBackToTheCircuit) {
   const Structure structure = transfer_function(2.9);
   const Data data = data_of(tf_of_cell(), pulses(3'600), 0);
-  const VectorXd start = to_unknowns(start_values(data, structure), structure), x = search(simulation_error(data, structure, start), start);
+  const VectorXd start = to_unknowns(start_values(data, structure), structure),
+                 x = search(simulation_error(data, structure, start), start);
   const CircuitReading r = circuit_from_discrete({x[0], x[1], x[2], x[3], x[4]}, 1, capacity_c);
   EXPECT_TRUE(r.implausible.empty());
   EXPECT_LT(r.pole_off_integrator, 1e-7);
@@ -254,12 +276,16 @@ TEST(Identification, LeadsBackToTheCircuit) {
   EXPECT_NEAR(r.circuit.c1_f / cell.c1_f, 1, 1e-3);
 }
 
-// 60 fits of each: no unknown further than three standard deviations more often than chance has it (0.27 % of 60 x 7: one or two; allow 6), and
-// the root mean square of the normalised errors is 1 (chi square of 60: +-9 %, three of them).
+// 60 fits of each: no unknown further than three standard deviations more often than chance has it (0.27 % of 60 x 7:
+// one or two; allow 6), and the root mean square of the normalised errors is 1 (chi square of 60: +-9 %, three of
+// them).
 TEST(Identification, UnderNoiseErrsAsItsStandardDeviationsSay) {
   const auto u = pulses(1'800);
-  const struct { const char* name; DiscreteModel model; Structure structure; } kinds[] = {
-      {"TF", tf_of_cell(), transfer_function(2.9)}, {"OE", oe_of_cell(), output_error(true)}};
+  const struct {
+    const char* name;
+    DiscreteModel model;
+    Structure structure;
+  } kinds[] = {{"TF", tf_of_cell(), transfer_function(2.9)}, {"OE", oe_of_cell(), output_error(true)}};
   for (const auto& [name, model, structure] : kinds) {
     const VectorXd truth = to_unknowns(model, structure);
     VectorXd squares = VectorXd::Zero(truth.size());
@@ -268,18 +294,25 @@ TEST(Identification, UnderNoiseErrsAsItsStandardDeviationsSay) {
       const Data data = data_of(model, u, 0.001, seed);
       const VectorXd start = to_unknowns(start_values(data, structure), structure);
       VectorXd deviation;
-      const VectorXd x = search(simulation_error(data, structure, start), start, &deviation), normal = (x - truth).cwiseQuotient(deviation);
+      const VectorXd x = search(simulation_error(data, structure, start), start, &deviation),
+                     normal = (x - truth).cwiseQuotient(deviation);
       squares += normal.cwiseAbs2();
       beyond += static_cast<int>((normal.array().abs() > 3).count());
     }
     EXPECT_LE(beyond, 6) << name;
-    for (Eigen::Index k = 0; k < truth.size(); ++k) EXPECT_NEAR(std::sqrt(squares[k] / 60), 1, 0.28) << name << ", unknown " << k;
+    for (Eigen::Index k = 0; k < truth.size(); ++k)
+      EXPECT_NEAR(std::sqrt(squares[k] / 60), 1, 0.28) << name << ", unknown " << k;
   }
 }
 
 TEST(StartValues, SimulateNearlyAsWellAsTheBestUnderNoise) {
-  const struct { const char* name; DiscreteModel model; Structure structure; } kinds[] = {
-      {"TF", tf_of_cell(), transfer_function(2.9)}, {"OE", oe_of_cell(), output_error(true)}, {"OE in motion", oe_of_cell(), output_error()}};
+  const struct {
+    const char* name;
+    DiscreteModel model;
+    Structure structure;
+  } kinds[] = {{"TF", tf_of_cell(), transfer_function(2.9)},
+               {"OE", oe_of_cell(), output_error(true)},
+               {"OE in motion", oe_of_cell(), output_error()}};
   for (const auto& [name, model, structure] : kinds) {
     for (unsigned seed = 1; seed <= 5; ++seed) {
       const Data data = data_of(model, pulses(3'600), 0.001, seed);
@@ -295,7 +328,8 @@ TEST(StartValues, AreExactWithoutNoiseWhateverTheOrders) {
   for (const std::size_t nf : {1U, 2U, 3U}) {
     const std::vector<double> f[] = {{-0.9}, {-1.7, 0.72}, {-2.1, 1.46, -0.336}};  // 0.9; 0.8; 0.9, 0.8 and so on
     const DiscreteModel model{{0.5, 0.2}, f[nf - 1], 1, 3, {}};
-    const Structure structure{.nb = 2, .nf = nf, .nk = 1, .offset_v = 0, .estimate_offset = true, .estimate_initial = false};
+    const Structure structure{
+        .nb = 2, .nf = nf, .nk = 1, .offset_v = 0, .estimate_offset = true, .estimate_initial = false};
     const DiscreteModel start = start_values(data_of(model, pulses(500), 0), structure);
     expect_unknowns(to_unknowns(start, structure), to_unknowns(model, structure), 1e-8, std::to_string(nf));
   }
@@ -304,7 +338,10 @@ TEST(StartValues, AreExactWithoutNoiseWhateverTheOrders) {
 TEST(SimulationError, HasExactDerivativesInEveryStructure) {
   DiscreteModel oe = oe_of_cell();
   oe.initial_v = {0, 0.01};
-  const struct { DiscreteModel model; Structure structure; } cases[] = {{tf_of_cell(), transfer_function(2.9)}, {oe, output_error()}, {oe_of_cell(), output_error(true)}};
+  const struct {
+    DiscreteModel model;
+    Structure structure;
+  } cases[] = {{tf_of_cell(), transfer_function(2.9)}, {oe, output_error()}, {oe_of_cell(), output_error(true)}};
   for (const auto& [model, structure] : cases) {
     Data data = data_of(model, pulses(200), 0.001);
     data.voltage_v[70] = std::nan("");

@@ -4,14 +4,14 @@
 
 #include <random>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "host_sim/simulation.hpp"
 #include "tests/identification/plant.hpp"
 
 namespace bms::identification {
 namespace {
 
-model::CellParameters<> table9() { return read_cell("table9").parameters; }
+model::CellParameters<> table9() { return files::read_cell("table9").parameters; }
 
 /// An irregular drive that crosses edges of the tables.
 Data irregular(std::size_t samples) {
@@ -40,13 +40,16 @@ TEST(GreyBox, SimulatesWhatTheModelSimulates) {
   const GreyBox grey_box(cell, {record}, options);
   Eigen::VectorXd voltage(300);
   ASSERT_TRUE(grey_box.simulate(grey_box.start(), 0, voltage, nullptr));
-  const auto expected = simulate(model::prepare<double, model::max_intervals>(cell), 6, record.data.time_s, record.data.current_a, 0.85);
-  for (Eigen::Index k = 0; k < 300; ++k) ASSERT_NEAR(voltage[k], expected[static_cast<std::size_t>(k)].voltage_v, 1e-12);
+  const auto expected = host_sim::simulate(model::prepare<double, model::max_intervals>(cell), 6, record.data.time_s,
+                                           record.data.current_a, 0.85);
+  for (Eigen::Index k = 0; k < 300; ++k)
+    ASSERT_NEAR(voltage[k], expected[static_cast<std::size_t>(k)].voltage_v, 1e-12);
 }
 
 TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
   model::CellParameters<> cell = table9();
-  for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.02 + 0.01 * static_cast<double>(k % 3));
+  for (std::size_t k = 0; k < cell.ocv.soc.size; ++k)
+    cell.ocv.half_gap_v.push_back(0.02 + 0.01 * static_cast<double>(k % 3));
   GreyBoxOptions options;
   options.soc_nodes = {0.15, 0.35, 0.62, 0.9};
   options.estimate_lean = true;
@@ -76,7 +79,8 @@ TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
     moved[k] -= 2 * h;
     ASSERT_TRUE(problem.evaluate(moved, below, nullptr));
     const Eigen::VectorXd numeric = (above - below) / (2 * h);
-    EXPECT_LT((numeric - jacobian.col(k)).norm(), 2e-6 * (numeric.norm() + 1e-9)) << grey_box.unknowns()[static_cast<std::size_t>(k)].name << " " << k;
+    EXPECT_LT((numeric - jacobian.col(k)).norm(), 2e-6 * (numeric.norm() + 1e-9))
+        << grey_box.unknowns()[static_cast<std::size_t>(k)].name << " " << k;
   }
 }
 

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "tests/identification/plant.hpp"
 
 namespace bms::identification {
@@ -14,7 +14,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-model::CellParameters<> table9() { return read_cell("table9").parameters; }
+model::CellParameters<> table9() { return files::read_cell("table9").parameters; }
 
 /// Begins far from the truth.
 model::CellParameters<> wrong_start() {
@@ -36,10 +36,10 @@ Record record_of(const PlantRun& run, double initial_soc) {
 }
 
 TEST(Identify, RecoversTheTruthAtMidSocAndKnowsHowWell) {
-  const auto profile = *experiment("high_1m_low_30s");
+  const auto profile = *experiments::experiment("high_1m_low_30s");
   const PlantRun run = run_plant(profile, 0.5);
   const double soc = (run.soc_min + run.soc_max) / 2;
-  const truth::Circuit circuit = truth::table9_circuit();
+  const plant::Circuit circuit = plant::table9_circuit();
   const double truths[3] = {circuit.r0_ohm.at(soc), circuit.r1_ohm.at(soc), circuit.c1_f.at(soc)};
   const double tolerance[3] = {0.01, 0.05, 0.05};
   constexpr int draws = 200;
@@ -68,7 +68,8 @@ TEST(Identify, RecoversTheTruthAtMidSocAndKnowsHowWell) {
 }
 
 TEST(Identify, FindsTheTablesFromAShiftAndPredictsAnother) {
-  const auto shift = *experiment("forklift_shift", {6, 11}), other = *experiment("forklift_shift", {6, 12});
+  const auto shift = *experiments::experiment("forklift_shift", {6, 11}),
+             other = *experiments::experiment("forklift_shift", {6, 12});
   std::mt19937_64 random(1);
   const PlantRun run = run_plant(shift, 0.98), unseen = run_plant(other, 0.98);
   Record r = record_of(run, 0.98);
@@ -76,10 +77,12 @@ TEST(Identify, FindsTheTablesFromAShiftAndPredictsAnother) {
   GreyBoxOptions options;
   options.soc_nodes = nodes_for(run.soc_min, run.soc_max);
   const Identification found = identify_grey_box(wrong_start(), {r}, options, Method::trust_region_reflective);
-  const truth::Circuit circuit = truth::table9_circuit();
+  const plant::Circuit circuit = plant::table9_circuit();
   for (const Parameter& p : found.parameters) {
     if (p.soc < 0.35 || p.soc > 0.75) continue;
-    const double is = p.name == "r0_ohm" ? circuit.r0_ohm.at(p.soc) : p.name == "r1_ohm" ? circuit.r1_ohm.at(p.soc) : circuit.c1_f.at(p.soc);
+    const double is = p.name == "r0_ohm"   ? circuit.r0_ohm.at(p.soc)
+                      : p.name == "r1_ohm" ? circuit.r1_ohm.at(p.soc)
+                                           : circuit.c1_f.at(p.soc);
     EXPECT_NEAR(p.value, is, (p.name == "r0_ohm" ? 0.015 : 0.08) * is) << p.name << " at " << p.soc;
   }
   Record judge = record_of(unseen, 0.98);
@@ -91,7 +94,7 @@ TEST(Identify, FindsTheTablesFromAShiftAndPredictsAnother) {
 
 TEST(Identify, InitialSocOnThePlateauIsNotClaimed) {
   // the paper's case: 40 %, pulses; it found 29.17 %
-  const PlantRun run = run_plant(*experiment("high_1m_low_30s"), 0.45);
+  const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.45);
   std::mt19937_64 random(3);
   Record r = record_of(run, 0.55);
   r.data = noisy(run.data, random);
@@ -105,7 +108,7 @@ TEST(Identify, InitialSocOnThePlateauIsNotClaimed) {
 }
 
 TEST(Identify, InitialSocOnASlopeIsFound) {
-  const PlantRun run = run_plant(*experiment("high_1m_low_30s"), 0.16);
+  const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.16);
   std::mt19937_64 random(3);
   Record r = record_of(run, 0.18);
   r.data = noisy(run.data, random);
@@ -138,8 +141,9 @@ TEST(Identify, RefusesARestAndNamesWhatWouldShowIt) {
 }
 
 TEST(Identify, OnePulseWithoutARestWarnsOfC1) {
-  std::vector<ProfileRow> profile;
-  for (int k = 0; k < 32; ++k) profile.push_back({static_cast<double>(k), k >= 30 ? -6.0 : 0.0});  // two seconds, then it ends
+  std::vector<experiments::ProfileRow> profile;
+  for (int k = 0; k < 32; ++k)
+    profile.push_back({static_cast<double>(k), k >= 30 ? -6.0 : 0.0});  // two seconds, then it ends
   const PlantRun run = run_plant(profile, 0.5);
   std::mt19937_64 random(3);
   Record r = record_of(run, 0.5);
@@ -152,7 +156,7 @@ TEST(Identify, OnePulseWithoutARestWarnsOfC1) {
 }
 
 TEST(Identify, AnInvertedCurrentEndsAtABoundAndIsNamed) {
-  const PlantRun run = run_plant(*experiment("high_1m_low_30s"), 0.5);
+  const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.5);
   Record r = record_of(run, 0.5);
   for (double& i : r.data.current_a) i = -i;
   GreyBoxOptions options;

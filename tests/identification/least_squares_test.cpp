@@ -1,4 +1,5 @@
-// The optimisers on published problems (more_garbow_hillstrom.hpp); on the fit of a step response, beside SciPy; and on bad input.
+// The optimisers on published problems (more_garbow_hillstrom.hpp); on the fit of a step response, beside SciPy; and on
+// bad input.
 #include "identification/least_squares.hpp"
 
 #include <algorithm>
@@ -28,10 +29,11 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr Method all_methods[] = {Method::subspace_gauss_newton, Method::adaptive_subspace_gauss_newton, Method::levenberg_marquardt,
-                                  Method::steepest_descent, Method::trust_region_reflective};
-constexpr Method fast_methods[] = {Method::subspace_gauss_newton, Method::adaptive_subspace_gauss_newton, Method::levenberg_marquardt,
-                                   Method::trust_region_reflective};
+constexpr Method all_methods[] = {Method::subspace_gauss_newton, Method::adaptive_subspace_gauss_newton,
+                                  Method::levenberg_marquardt, Method::steepest_descent,
+                                  Method::trust_region_reflective};
+constexpr Method fast_methods[] = {Method::subspace_gauss_newton, Method::adaptive_subspace_gauss_newton,
+                                   Method::levenberg_marquardt, Method::trust_region_reflective};
 
 Optimum solve(const Published& p, Method method, const Stopping& stopping = {}) {
   LeastSquares problem;
@@ -39,8 +41,9 @@ Optimum solve(const Published& p, Method method, const Stopping& stopping = {}) 
   return minimise(problem, vector_of(p.start), method, stopping);
 }
 
-
-bool reaches(const Optimum& found, double sum_of_squares, double zero = 1e-11) { return 2 * found.cost <= sum_of_squares * (1 + 2e-6) + zero; }
+bool reaches(const Optimum& found, double sum_of_squares, double zero = 1e-11) {
+  return 2 * found.cost <= sum_of_squares * (1 + 2e-6) + zero;
+}
 
 /// A method that does not arrive in 200 iterations.
 struct Exception {
@@ -49,18 +52,23 @@ struct Exception {
 };
 
 TEST(LeastSquares, FourMethodsReachThePublishedMinimaAndSaySo) {
-  // Brown-Dennis: the residuals are large, Gauss-Newton's curvature is wrong there and all four creep. Meyer and agn: a narrow
-  // valley in units that differ by 1e6, see below with `scale`.
-  const Exception not_in_200[] = {{Method::subspace_gauss_newton, "Brown-Dennis"}, {Method::levenberg_marquardt, "Brown-Dennis"},
-                                  {Method::trust_region_reflective, "Brown-Dennis"}, {Method::adaptive_subspace_gauss_newton, "Meyer"}};
+  // Brown-Dennis: the residuals are large, Gauss-Newton's curvature is wrong there and all four creep. Meyer and agn: a
+  // narrow valley in units that differ by 1e6, see below with `scale`.
+  const Exception not_in_200[] = {{Method::subspace_gauss_newton, "Brown-Dennis"},
+                                  {Method::levenberg_marquardt, "Brown-Dennis"},
+                                  {Method::trust_region_reflective, "Brown-Dennis"},
+                                  {Method::adaptive_subspace_gauss_newton, "Meyer"}};
   int compared = 0;
   for (const Published& p : published()) {
     for (const Method method : fast_methods) {
       SCOPED_TRACE(std::string(name_of(method)) + " on " + p.name);
       const Optimum found = solve(p, method);
-      const bool excepted = std::any_of(std::begin(not_in_200), std::end(not_in_200), [&](const Exception& e) { return e.method == method && p.name == std::string(e.problem); });
+      const bool excepted = std::any_of(std::begin(not_in_200), std::end(not_in_200), [&](const Exception& e) {
+        return e.method == method && p.name == std::string(e.problem);
+      });
       if (found.converged || !excepted) {
-        EXPECT_TRUE(reaches(found, p.sum_of_squares, p.zero) || (reaches(found, p.local_sum_of_squares) && 2 * found.cost >= p.local_sum_of_squares * (1 - 2e-6)))
+        EXPECT_TRUE(reaches(found, p.sum_of_squares, p.zero) ||
+                    (reaches(found, p.local_sum_of_squares) && 2 * found.cost >= p.local_sum_of_squares * (1 - 2e-6)))
             << 2 * found.cost << ": " << found.reason;
         // J loses rank at that local minimum: it is reached, but a subspace cannot tell that it is one
         if (p.local_sum_of_squares == infinity) {
@@ -120,7 +128,8 @@ struct Visits {
 
 Visits watched(const LeastSquares& problem) {
   Visits visits{problem};
-  visits.problem.evaluate = [inner = problem.evaluate, points = visits.points](const VectorXd& x, VectorXd& r, MatrixXd* jacobian) {
+  visits.problem.evaluate = [inner = problem.evaluate, points = visits.points](const VectorXd& x, VectorXd& r,
+                                                                               MatrixXd* jacobian) {
     points->push_back(x);
     return inner(x, r, jacobian);
   };
@@ -144,7 +153,15 @@ const std::vector<Bounded>& bounded() {
       {"Rosenbrock from a bound that must be left", rosenbrock, {-1.5, 1.5}, {-1.5, -2}, {2, 1.5}, {1, 1}, {0, 0}},
       {"Rosenbrock started outside", rosenbrock, {-7, 9}, {-2, -2}, {0.5, 3}, {0.5, 0.25}, {1, 0}},
       {"Beale in a corner", beale, {1, 1}, {0, 0.6}, {2, 2}, {2, 0.6}, {1, -1}},
-      {"powers, all on bounds", [](const Jets& x) { return Jets{x[0] + 3.0, x[1] - 4.0, 0.1 * x[0] * x[1]}; }, {0, 0}, {-1, -1}, {1, 1}, {-1, 1}, {-1, 1}},
+      {"powers, all on bounds",
+       [](const Jets& x) {
+         return Jets{x[0] + 3.0, x[1] - 4.0, 0.1 * x[0] * x[1]};
+       },
+       {0, 0},
+       {-1, -1},
+       {1, 1},
+       {-1, 1},
+       {-1, 1}},
   };
   return problems;
 }
@@ -162,7 +179,8 @@ TEST(LeastSquares, AnOptimumOnABoundIsFoundAndNamed) {
       const Optimum found = minimise(problem, vector_of(b.start), method, patient);
       EXPECT_TRUE(found.converged) << found.reason;
       EXPECT_LE((found.x - vector_of(b.optimum)).norm(), 2e-6) << found.x.transpose() << ": " << found.reason;
-      for (Index i = 0; i < found.x.size(); ++i) EXPECT_EQ(found.at_bound[i], b.at_bound[static_cast<std::size_t>(i)]) << i << ": " << found.x.transpose();
+      for (Index i = 0; i < found.x.size(); ++i)
+        EXPECT_EQ(found.at_bound[i], b.at_bound[static_cast<std::size_t>(i)]) << i << ": " << found.x.transpose();
     }
   }
 }
@@ -179,7 +197,8 @@ TEST(LeastSquares, NoPointOutsideTheBoundsIsEverAskedFor) {
       const Optimum found = minimise(visits.problem, vector_of(b.start), method);
       EXPECT_EQ(found.evaluations, static_cast<int>(visits.points->size()));
       for (const VectorXd& x : *visits.points) {
-        ASSERT_TRUE((x.array() >= problem.lower.array()).all() && (x.array() <= problem.upper.array()).all()) << name_of(method) << " on " << b.name << ": " << x.transpose();
+        ASSERT_TRUE((x.array() >= problem.lower.array()).all() && (x.array() <= problem.upper.array()).all())
+            << name_of(method) << " on " << b.name << ": " << x.transpose();
         ++asked;
       }
     }
@@ -256,7 +275,9 @@ TEST(LeastSquares, AStartWithoutResidualsIsNotAnOptimum) {
 
 TEST(LeastSquares, AnUnknownWithoutEffectAndTwoThatAreOneAreSurvived) {
   LeastSquares problem;
-  problem.evaluate = differentiated([](const Jets& x) { return Jets{x[0] + x[1] - 2.0, exp(x[0] + x[1]) - std::exp(2.0), 0.0 * x[2] + 0.1}; });
+  problem.evaluate = differentiated([](const Jets& x) {
+    return Jets{x[0] + x[1] - 2.0, exp(x[0] + x[1]) - std::exp(2.0), 0.0 * x[2] + 0.1};
+  });
   for (const Method method : all_methods) {
     const Optimum found = minimise(problem, vector_of({0.3, 0.2, 5}), method);
     EXPECT_TRUE(found.converged) << name_of(method) << ": " << found.reason;
@@ -268,7 +289,8 @@ TEST(LeastSquares, AnUnknownWithoutEffectAndTwoThatAreOneAreSurvived) {
 TEST(LeastSquares, FewerResidualsThanUnknownsAreSolved) {
   LeastSquares problem;
   problem.evaluate = differentiated([](const Jets& x) { return Jets{x[0] * x[1] - 2.0 + x[2]}; });
-  for (const Method method : all_methods) EXPECT_LE(minimise(problem, vector_of({1, 3, 1}), method).cost, 1e-15) << name_of(method);
+  for (const Method method : all_methods)
+    EXPECT_LE(minimise(problem, vector_of({1, 3, 1}), method).cost, 1e-15) << name_of(method);
 }
 
 TEST(LeastSquares, WrongDerivativesAreNotCalledAnOptimum) {
@@ -308,7 +330,9 @@ TEST(LeastSquares, ArgumentsThatCannotBeMeantAreRefused) {
   refused([](LeastSquares& p, VectorXd&) { p.lower = vector_of({std::nan(""), 2}); });
   refused([](LeastSquares& p, VectorXd&) { p.evaluate = nullptr; });
   refused([](LeastSquares& p, VectorXd&) {
-    p.evaluate = [](const VectorXd&, VectorXd& r, MatrixXd* j) { return r = VectorXd::Ones(3), *j = MatrixXd::Ones(2, 2), true; };
+    p.evaluate = [](const VectorXd&, VectorXd& r, MatrixXd* j) {
+      return r = VectorXd::Ones(3), *j = MatrixXd::Ones(2, 2), true;
+    };
   });
 }
 
@@ -446,7 +470,8 @@ class BesideScipy : public ::testing::Test {
       std::ofstream out(csv);
       out.precision(17);
       out << "time_s,current_a,voltage_v\n";
-      for (Index k = 0; k < data.time_s.size(); ++k) out << data.time_s[k] << ',' << data.current_a << ',' << data.voltage_v[k] << '\n';
+      for (Index k = 0; k < data.time_s.size(); ++k)
+        out << data.time_s[k] << ',' << data.current_a << ',' << data.voltage_v[k] << '\n';
     }
     std::ostringstream command;
     command.precision(17);
@@ -464,7 +489,8 @@ class BesideScipy : public ::testing::Test {
     return values;
   }
 
-  static void expect_equal(const Optimum& found, const std::map<std::string, double>& values, const std::string& method) {
+  static void expect_equal(const Optimum& found, const std::map<std::string, double>& values,
+                           const std::string& method) {
     ASSERT_EQ(values.size(), 8U);
     const char* const names[] = {".r0_ohm", ".r1_ohm", ".c1_f"};
     for (Index i = 0; i < 3; ++i) EXPECT_NEAR(found.x[i] / values.at(method + names[i]), 1, 1e-6) << method << names[i];
@@ -493,7 +519,8 @@ TEST_F(BesideScipy, WithABoundInTheWayTheOptimumIsTheSameToSixDigits) {
     LeastSquares problem = fit_of(data);
     (on_r0 ? problem.upper[0] : problem.lower[2]) = on_r0 ? 0.0130 : 3'500;  // free: 0.0136 ohm, 3,100 F
     const auto values = reference(data, problem);
-    for (const Method method : {Method::trust_region_reflective, Method::levenberg_marquardt}) {  // scipy's own lm knows no bounds
+    for (const Method method :
+         {Method::trust_region_reflective, Method::levenberg_marquardt}) {  // scipy's own lm knows no bounds
       const Optimum found = minimise(problem, vector_of(fit_start), method);
       expect_equal(found, values, "trf");
       EXPECT_EQ(found.at_bound[0], on_r0 ? 1 : 0);

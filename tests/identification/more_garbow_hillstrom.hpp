@@ -1,5 +1,5 @@
-// Problems of More, Garbow & Hillstrom, "Testing Unconstrained Optimization Software", ACM TOMS 7 (1981): residuals, the starts and
-// the sums of squares printed there.
+// Problems of More, Garbow & Hillstrom, "Testing Unconstrained Optimization Software", ACM TOMS 7 (1981): residuals,
+// the starts and the sums of squares printed there.
 #pragma once
 
 #include <cmath>
@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include <Eigen/Core>
 #include <ceres/jet.h>
+#include <Eigen/Core>
 
 namespace bms::identification {
 
@@ -23,9 +23,12 @@ using Jet = ceres::Jet<double, 5>;
 using Jets = std::vector<Jet>;
 using Residuals = Jets (*)(const Jets& x);
 
-inline VectorXd vector_of(const std::vector<double>& values) { return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())); }
+inline VectorXd vector_of(const std::vector<double>& values) {
+  return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
+}
 
-inline std::function<bool(const VectorXd&, VectorXd&, MatrixXd*)> differentiated(std::function<Jets(const Jets&)> residuals) {
+inline std::function<bool(const VectorXd&, VectorXd&, MatrixXd*)> differentiated(
+    std::function<Jets(const Jets&)> residuals) {
   return [residuals](const VectorXd& x, VectorXd& r, MatrixXd* jacobian) {
     Jets at;
     for (Index i = 0; i < x.size(); ++i) at.emplace_back(x[i], static_cast<int>(i));
@@ -53,8 +56,12 @@ inline Jets powell_singular(const Jets& x) {
 }
 
 inline Jets wood(const Jets& x) {
-  return {10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0], std::sqrt(90.0) * (x[3] - x[2] * x[2]), 1.0 - x[2],
-          std::sqrt(10.0) * (x[1] + x[3] - 2.0), (x[1] - x[3]) / std::sqrt(10.0)};
+  return {10.0 * (x[1] - x[0] * x[0]),
+          1.0 - x[0],
+          std::sqrt(90.0) * (x[3] - x[2] * x[2]),
+          1.0 - x[2],
+          std::sqrt(10.0) * (x[1] + x[3] - 2.0),
+          (x[1] - x[3]) / std::sqrt(10.0)};
 }
 
 inline Jets helical_valley(const Jets& x) {
@@ -92,12 +99,14 @@ inline Jets kowalik_osborne(const Jets& x) {
   constexpr double y[] = {0.1957, 0.1947, 0.1735, 0.1600, 0.0844, 0.0627, 0.0456, 0.0342, 0.0323, 0.0235, 0.0246};
   constexpr double u[] = {4, 2, 1, 0.5, 0.25, 0.167, 0.125, 0.1, 0.0833, 0.0714, 0.0625};
   Jets r;
-  for (int i = 0; i < 11; ++i) r.push_back(y[i] - x[0] * (u[i] * u[i] + u[i] * x[1]) / (u[i] * u[i] + u[i] * x[2] + x[3]));
+  for (int i = 0; i < 11; ++i)
+    r.push_back(y[i] - x[0] * (u[i] * u[i] + u[i] * x[1]) / (u[i] * u[i] + u[i] * x[2] + x[3]));
   return r;
 }
 
 inline Jets meyer(const Jets& x) {
-  constexpr double y[] = {34780, 28610, 23650, 19630, 16370, 13720, 11540, 9744, 8261, 7030, 6005, 5147, 4427, 3820, 3307, 2872};
+  constexpr double y[] = {34780, 28610, 23650, 19630, 16370, 13720, 11540, 9744,
+                          8261,  7030,  6005,  5147,  4427,  3820,  3307,  2872};
   Jets r;
   for (int i = 1; i <= 16; ++i) r.push_back(x[0] * exp(x[1] / (45.0 + 5.0 * i + x[2])) - y[i - 1]);
   return r;
@@ -105,7 +114,8 @@ inline Jets meyer(const Jets& x) {
 
 inline Jets jennrich_sampson(const Jets& x) {
   Jets r;
-  for (int i = 1; i <= 10; ++i) r.push_back(2.0 + 2.0 * i - (exp(static_cast<double>(i) * x[0]) + exp(static_cast<double>(i) * x[1])));
+  for (int i = 1; i <= 10; ++i)
+    r.push_back(2.0 + 2.0 * i - (exp(static_cast<double>(i) * x[0]) + exp(static_cast<double>(i) * x[1])));
   return r;
 }
 
@@ -120,8 +130,9 @@ inline Jets brown_dennis(const Jets& x) {
 }
 
 inline Jets osborne_1(const Jets& x) {
-  constexpr double y[] = {0.844, 0.908, 0.932, 0.936, 0.925, 0.908, 0.881, 0.850, 0.818, 0.784, 0.751, 0.718, 0.685, 0.658, 0.628, 0.603, 0.580,
-                          0.558, 0.538, 0.522, 0.506, 0.490, 0.478, 0.467, 0.457, 0.448, 0.438, 0.431, 0.424, 0.420, 0.414, 0.411, 0.406};
+  constexpr double y[] = {0.844, 0.908, 0.932, 0.936, 0.925, 0.908, 0.881, 0.850, 0.818, 0.784, 0.751,
+                          0.718, 0.685, 0.658, 0.628, 0.603, 0.580, 0.558, 0.538, 0.522, 0.506, 0.490,
+                          0.478, 0.467, 0.457, 0.448, 0.438, 0.431, 0.424, 0.420, 0.414, 0.411, 0.406};
   Jets r;
   for (int i = 0; i < 33; ++i) r.push_back(y[i] - (x[0] + x[1] * exp(-10.0 * i * x[3]) + x[2] * exp(-10.0 * i * x[4])));
   return r;
@@ -143,7 +154,8 @@ inline const std::vector<Published>& published() {
       {"Powell singular", powell_singular, {3, -1, 0, 1}, 0},
       {"Wood", wood, {-3, -1, -3, -1}, 0},
       {"helical valley", helical_valley, {-1, 0, 0}, 0},
-      {"Brown badly scaled", brown_badly_scaled, {1, 1}, 0, infinity, 1e-5},  // 1e-9 of its x0 = 1e6, Stopping::step, squared
+      {"Brown badly scaled", brown_badly_scaled, {1, 1}, 0, infinity, 1e-5},  // 1e-9 of its x0 = 1e6, Stopping::step,
+                                                                              // squared
       {"Beale", beale, {1, 1}, 0},
       {"Box 3D", box_3d, {0, 10, 20}, 0},
       {"Bard", bard, {1, 1, 1}, 8.21487e-3},

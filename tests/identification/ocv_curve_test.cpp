@@ -15,13 +15,18 @@ constexpr double gap_v = 0.025;
 /// A slow run of the truth cell with `gap_v` of hysteresis added, rests at both ends.
 SlowRun slow_run(bool charges, double noise_v = 0.0005) {
   constexpr double c_rate = 1.0 / 25;
-  std::vector<ProfileRow> profile;
+  std::vector<experiments::ProfileRow> profile;
   const int moving = 25 * 360;
-  for (int k = 0; k <= moving + 720; ++k) profile.push_back({10.0 * k, k > 360 && k <= 360 + moving ? (charges ? 6 : -6) * c_rate : 0.0});
+  for (int k = 0; k <= moving + 720; ++k)
+    profile.push_back({10.0 * k, k > 360 && k <= 360 + moving ? (charges ? 6 : -6) * c_rate : 0.0});
   PlantRun run = run_plant(profile, charges ? 0.0 : 1.0);
   std::mt19937_64 random(charges ? 1 : 2);
   std::normal_distribution<double> normal;
-  for (std::size_t k = 0; k < run.data.size(); ++k) run.data.voltage_v[k] += (profile[k].current_a > 0 ? gap_v : profile[k].current_a < 0 ? -gap_v : 0) + noise_v * normal(random);
+  for (std::size_t k = 0; k < run.data.size(); ++k)
+    run.data.voltage_v[k] += (profile[k].current_a > 0   ? gap_v
+                              : profile[k].current_a < 0 ? -gap_v
+                                                         : 0) +
+                             noise_v * normal(random);
   return {run.data, {}};
 }
 
@@ -29,10 +34,11 @@ TEST(OcvCurve, IsTheMiddleOfChargeAndDischargeAndKeepsTheGap) {
   const OcvCurve curve = ocv_curve({slow_run(false), slow_run(true)});
   EXPECT_NEAR(curve.capacity_ah, 6, 0.001);
   EXPECT_NEAR(*curve.coulombic_efficiency, 1, 1e-6);
-  const auto truth_v = truth::table9_ocv_v();
+  const auto truth_v = plant::table9_ocv_v();
   for (std::size_t k = 20; k + 20 < curve.soc.size(); k += 7) {
     ASSERT_NEAR(curve.ocv_v[k], truth_v.at(curve.soc[k]), 0.0015) << curve.soc[k];
-    ASSERT_NEAR(curve.half_gap_v[k], gap_v + 0.24 * 0.022, 0.005) << curve.soc[k];  // what C/25 drops over R0 + R1 is part of it
+    ASSERT_NEAR(curve.half_gap_v[k], gap_v + 0.24 * 0.022, 0.005)
+        << curve.soc[k];  // what C/25 drops over R0 + R1 is part of it
   }
 }
 
@@ -40,11 +46,11 @@ TEST(OcvCurve, OneRunAloneIsTakenAsItIs) {
   const OcvCurve curve = ocv_curve({slow_run(false)});
   EXPECT_FALSE(curve.coulombic_efficiency);
   EXPECT_EQ(curve.half_gap_v[500], 0);
-  EXPECT_NEAR(curve.ocv_v[500], truth::table9_ocv_v().at(0.5) - gap_v - 0.005, 0.002);
+  EXPECT_NEAR(curve.ocv_v[500], plant::table9_ocv_v().at(0.5) - gap_v - 0.005, 0.002);
 }
 
 TEST(OcvCurve, RefusesWhatIsNoSlowRun) {
-  const auto profile = *experiment("high_1m_low_30s");
+  const auto profile = *experiments::experiment("high_1m_low_30s");
   EXPECT_THROW(ocv_curve({{run_plant(profile, 0.5).data, {}}}), std::invalid_argument);
   EXPECT_THROW(ocv_curve({}), std::invalid_argument);
   SlowRun half = slow_run(false);
@@ -86,8 +92,11 @@ TEST(OcvPieces, HaveMoreCornersWhereTheGapBends) {
   for (std::size_t k = 0, piece = 0; k < curve.soc.size(); ++k) {
     while (piece + 2 < pieces.soc.size() && curve.soc[k] > pieces.soc[piece + 1]) ++piece;
     const double t = (curve.soc[k] - pieces.soc[piece]) / (pieces.soc[piece + 1] - pieces.soc[piece]);
-    ASSERT_NEAR(pieces.half_gap_v[piece] + t * (pieces.half_gap_v[piece + 1] - pieces.half_gap_v[piece]), curve.half_gap_v[k], 0.00101) << curve.soc[k];
-    ASSERT_NEAR(pieces.ocv_v[piece] + t * (pieces.ocv_v[piece + 1] - pieces.ocv_v[piece]), curve.ocv_v[k], 0.002) << curve.soc[k];
+    ASSERT_NEAR(pieces.half_gap_v[piece] + t * (pieces.half_gap_v[piece + 1] - pieces.half_gap_v[piece]),
+                curve.half_gap_v[k], 0.00101)
+        << curve.soc[k];
+    ASSERT_NEAR(pieces.ocv_v[piece] + t * (pieces.ocv_v[piece + 1] - pieces.ocv_v[piece]), curve.ocv_v[k], 0.002)
+        << curve.soc[k];
   }
   pieces = *fewest_pieces(curve, 0.002);
   add_gap_corners(pieces, curve, 0.001, 5);

@@ -12,18 +12,19 @@
 namespace bms::identification {
 
 struct PlantRun {
-  Data data;                       ///< exact
+  Data data;  ///< exact
   double soc_min = 1, soc_max = 0;
   std::vector<double> soc;
 };
 
-inline PlantRun run_plant(std::span<const ProfileRow> profile, double initial_soc, const truth::CellParameters& parameters = {}) {
+inline PlantRun run_plant(std::span<const experiments::ProfileRow> profile, double initial_soc,
+                          const plant::CellParameters& parameters = {}) {
   constexpr double ambient_c = 20;
-  truth::Cell cell(parameters, {initial_soc, 0, ambient_c});
+  plant::Cell cell(parameters, {initial_soc, 0, ambient_c});
   PlantRun run;
   run.data.capacity_ah = parameters.capacity_ah;
   double before_s = profile.front().time_s;
-  for (const ProfileRow& row : profile) {
+  for (const experiments::ProfileRow& row : profile) {
     if (row.time_s > before_s) cell.run(row.current_a, ambient_c, row.time_s - before_s);
     before_s = row.time_s;
     run.data.time_s.push_back(row.time_s);

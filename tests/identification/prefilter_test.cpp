@@ -21,7 +21,8 @@
 namespace bms::identification {
 namespace {
 
-void expect_near(const std::vector<double>& ours, const std::vector<double>& theirs, double tolerance, const std::string& what) {
+void expect_near(const std::vector<double>& ours, const std::vector<double>& theirs, double tolerance,
+                 const std::string& what) {
   ASSERT_EQ(ours.size(), theirs.size()) << what;
   ASSERT_FALSE(theirs.empty()) << what;
   for (std::size_t k = 0; k < ours.size(); ++k) ASSERT_NEAR(ours[k], theirs[k], tolerance) << what << ", value " << k;
@@ -35,13 +36,17 @@ std::vector<double> evenly(std::size_t n, double step_s) {
 
 double gain(const SecondOrderFilter& f, double cycles_per_sample) {
   const auto delay = std::polar(1.0, -2 * std::numbers::pi * cycles_per_sample);
-  return std::abs((f.b[0] + f.b[1] * delay + f.b[2] * delay * delay) / (f.a[0] + f.a[1] * delay + f.a[2] * delay * delay));
+  return std::abs((f.b[0] + f.b[1] * delay + f.b[2] * delay * delay) /
+                  (f.a[0] + f.a[1] * delay + f.a[2] * delay * delay));
 }
 
 TEST(Butterworth, AgreesWithScipyInCoefficientsAndInBothPhases) {
   auto scipy = scipy_reference();
   if (scipy.empty()) GTEST_SKIP() << "no python3 with scipy: install python3-scipy to compare the filters with it";
-  const struct { const char* name; double cutoff_hz, rate_hz; } cases[] = {{"low", 0.01, 1}, {"middle", 1, 10}, {"high", 0.49, 1}};
+  const struct {
+    const char* name;
+    double cutoff_hz, rate_hz;
+  } cases[] = {{"low", 0.01, 1}, {"middle", 1, 10}, {"high", 0.49, 1}};
   for (const auto& [prefix, cutoff_hz, rate_hz] : cases) {
     const std::string name = prefix;
     const SecondOrderFilter filter = butterworth_low_pass(cutoff_hz, rate_hz);
@@ -73,14 +78,16 @@ TEST(Butterworth, HasGainOneAtZeroHalfThePowerAtTheCutoffAndNothingAtHalfTheRate
 }
 
 TEST(Butterworth, RefusesACutoffOutsideZeroToHalfTheRate) {
-  for (const double cutoff : {0.0, -1.0, 0.5, 0.7, std::nan("")}) EXPECT_THROW(butterworth_low_pass(cutoff, 1), std::invalid_argument) << cutoff;
+  for (const double cutoff : {0.0, -1.0, 0.5, 0.7, std::nan("")})
+    EXPECT_THROW(butterworth_low_pass(cutoff, 1), std::invalid_argument) << cutoff;
   EXPECT_NO_THROW(butterworth_low_pass(0.4999, 1));
 }
 
 TEST(Filters, LeaveAConstantAsItIsFromTheFirstSampleOn) {
   const SecondOrderFilter f = butterworth_low_pass(0.03, 1);
   const std::vector<double> constant(50, -2.5);
-  for (const auto& filtered : {filter_causal(f, constant), filter_zero_phase(f, constant)}) expect_near(filtered, constant, 1e-11, "constant");
+  for (const auto& filtered : {filter_causal(f, constant), filter_zero_phase(f, constant)})
+    expect_near(filtered, constant, 1e-11, "constant");
 }
 
 TEST(Filters, ForwardAndBackwardDelaysNothingAndOneWayDoes) {
@@ -130,7 +137,8 @@ Data rest_load_rest(double offset_a, double noise_a) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 1);
   Data data{evenly(300, 1), {}, std::vector<double>(300, 3.3), 6};
-  for (std::size_t k = 0; k < 300; ++k) data.current_a.push_back((k >= 100 && k < 200 ? -6.0 : 0.0) + offset_a + noise_a * noise(random));
+  for (std::size_t k = 0; k < 300; ++k)
+    data.current_a.push_back((k >= 100 && k < 200 ? -6.0 : 0.0) + offset_a + noise_a * noise(random));
   return data;
 }
 
@@ -179,7 +187,8 @@ TEST(Prefilter, OneWayMakesVoltageAndCurrentLateAlike) {
   Data data = rest_load_rest(0, 0);
   for (std::size_t k = 0; k < 300; ++k) data.voltage_v[k] = 3.3 + 0.01 * data.current_a[k];
   const Prefiltered out = prefilter(data, {.cutoff_hz = 0.05, .phase = Phase::causal});
-  for (std::size_t k = 0; k < 300; ++k) ASSERT_NEAR(out.data.voltage_v[k], 3.3 + 0.01 * out.data.current_a[k], 1e-12) << k;
+  for (std::size_t k = 0; k < 300; ++k)
+    ASSERT_NEAR(out.data.voltage_v[k], 3.3 + 0.01 * out.data.current_a[k], 1e-12) << k;
   EXPECT_GT(out.data.current_a[100], -3) << "late";
   data.voltage_v[3] = std::nan("");
   EXPECT_THROW(prefilter(data, {.phase = Phase::causal}), std::invalid_argument);

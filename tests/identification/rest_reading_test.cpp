@@ -22,11 +22,13 @@ struct Stretch {
 };
 
 struct Sampling {
-  double step_s = 1, noise_v = 0.001, noise_a = 0, shift_s = 0;  ///< shift_s: of the current's steps against the samples
+  double step_s = 1, noise_v = 0.001, noise_a = 0,
+         shift_s = 0;  ///< shift_s: of the current's steps against the samples
   unsigned seed = 1;
 };
 
-/// Current: mean over the interval that ends with the sample; voltage at the sample, a step at that very instant not yet in it.
+/// Current: mean over the interval that ends with the sample; voltage at the sample, a step at that very instant not
+/// yet in it.
 Data recording(const Cell& cell, const std::vector<Stretch>& stretches, const Sampling& sampling = {}) {
   std::mt19937 random(sampling.seed);
   std::normal_distribution<double> noise(0, 1);
@@ -40,7 +42,8 @@ Data recording(const Cell& cell, const std::vector<Stretch>& stretches, const Sa
     double before_c = charge_c, rest_of_step_s = t == 0 ? 0 : sampling.step_s;
     while (rest_of_step_s > 1e-9) {
       if (left_s < 1e-9 && now + 1 < stretches.size()) left_s += stretches[++now].duration_s;
-      const double part_s = std::min(rest_of_step_s, left_s), i = stretches[now].current_a, p = std::exp(-part_s / cell.tau_s);
+      const double part_s = std::min(rest_of_step_s, left_s), i = stretches[now].current_a,
+                   p = std::exp(-part_s / cell.tau_s);
       v_rc = p * v_rc + (1 - p) * cell.r1_ohm * i;
       charge_c += part_s * i;
       left_s -= part_s;
@@ -49,7 +52,8 @@ Data recording(const Cell& cell, const std::vector<Stretch>& stretches, const Sa
     const double mean_a = t == 0 ? 0 : (charge_c - before_c) / sampling.step_s, i = stretches[now].current_a;
     data.time_s.push_back(t);
     data.current_a.push_back(mean_a + sampling.noise_a * noise(random));
-    data.voltage_v.push_back(cell.ocv_v + cell.slope_v * charge_c / cell.capacity_ah / 3'600 + v_rc + (t == 0 ? 0 : cell.r0_ohm * i) + sampling.noise_v * noise(random));
+    data.voltage_v.push_back(cell.ocv_v + cell.slope_v * charge_c / cell.capacity_ah / 3'600 + v_rc +
+                             (t == 0 ? 0 : cell.r0_ohm * i) + sampling.noise_v * noise(random));
   }
   return data;
 }
@@ -81,16 +85,20 @@ TEST(RestReading, FindsTheCellAt1HzAnd10HzUnder1mVOfNoiseWhicheverWayTheCurrentW
         ASSERT_EQ(r.rests.size(), 3U);
         EXPECT_EQ(r.r0_from, 3U);
         EXPECT_EQ(r.rc_from, 3U);
-        expect_cell(r, {}, {0.03, 0.1, 0.15}, std::to_string(step_s) + " s, " + std::to_string(current_a) + " A, seed " + std::to_string(seed));
+        expect_cell(r, {}, {0.03, 0.1, 0.15},
+                    std::to_string(step_s) + " s, " + std::to_string(current_a) + " A, seed " + std::to_string(seed));
       }
     }
   }
 }
 
 TEST(RestReading, WithoutNoiseIsRightToAPerThousandOfR0AndBetter) {
-  // The straight line under 5 s of load does not bend as the voltage does: (5/60)^2 / 12 of R1's 115 mV, where that has not settled.
-  for (const Cell& cell : {Cell{}, Cell{.r0_ohm = 0.03, .r1_ohm = 0.005, .tau_s = 12}, Cell{.r0_ohm = 0.002, .r1_ohm = 0.03, .tau_s = 150}}) {
-    expect_cell(read_rests(recording(cell, ocv_test(-6), {.noise_v = 0})), cell, {5e-3, 1e-3, 1e-3}, std::to_string(cell.tau_s));
+  // The straight line under 5 s of load does not bend as the voltage does: (5/60)^2 / 12 of R1's 115 mV, where that has
+  // not settled.
+  for (const Cell& cell : {Cell{}, Cell{.r0_ohm = 0.03, .r1_ohm = 0.005, .tau_s = 12},
+                           Cell{.r0_ohm = 0.002, .r1_ohm = 0.03, .tau_s = 150}}) {
+    expect_cell(read_rests(recording(cell, ocv_test(-6), {.noise_v = 0})), cell, {5e-3, 1e-3, 1e-3},
+                std::to_string(cell.tau_s));
   }
 }
 
@@ -159,7 +167,8 @@ TEST(RestReading, StandardDeviationsAreWhatRepetitionScatters) {
     c1_squares += std::pow((r.c1_f - cell.tau_s / cell.r1_ohm) / r.c1_std_f, 2);
   }
   // chi square: sqrt(1 / 400) = 0.05, three of them
-  for (const double squares : {r0_squares, r1_squares, tau_squares, c1_squares}) EXPECT_NEAR(std::sqrt(squares / trials), 1, 0.15);
+  for (const double squares : {r0_squares, r1_squares, tau_squares, c1_squares})
+    EXPECT_NEAR(std::sqrt(squares / trials), 1, 0.15);
   EXPECT_NEAR(r.residual_v, 0.001, 1e-4);
 }
 

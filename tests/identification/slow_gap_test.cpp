@@ -7,12 +7,15 @@
 namespace bms::identification {
 namespace {
 
-double factor(double energy_j_per_mol, double c) { return std::exp(energy_j_per_mol / 8.314462618 * (1 / (c + 273.15) - 1 / 298.15)); }
+double factor(double energy_j_per_mol, double c) {
+  return std::exp(energy_j_per_mol / 8.314462618 * (1 / (c + 273.15) - 1 / 298.15));
+}
 
 TEST(SlowGap, PartsHysteresisFromWhatGrowsInTheCold) {
   std::vector<GapAt> gaps;
   int odd = 1;
-  for (const double c : {-15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0}) gaps.push_back({c, 0.018 + 0.004 * factor(40'000, c) + (odd = -odd) * 0.0005});
+  for (const double c : {-15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0})
+    gaps.push_back({c, 0.018 + 0.004 * factor(40'000, c) + (odd = -odd) * 0.0005});
   const auto gap = slow_gap(gaps);
   ASSERT_TRUE(gap);
   EXPECT_NEAR(gap->hysteresis_v, 0.018, 0.001);

@@ -25,7 +25,8 @@ Eigen::VectorXd coloured(std::mt19937_64& random, Eigen::Index n, double fading)
 }
 
 struct Coverage {
-  double coloured = 0, white = 0;  ///< fraction of draws whose truth lies within two deviations, mean of both parameters
+  double coloured = 0,
+         white = 0;  ///< fraction of draws whose truth lies within two deviations, mean of both parameters
 };
 
 /// A straight-line regression whose answer is known, drawn often.
@@ -33,7 +34,8 @@ Coverage coverage(double fading) {
   constexpr Eigen::Index n = 3'000;
   constexpr int draws = 400;
   Eigen::MatrixXd jacobian(n, 2);
-  for (Eigen::Index k = 0; k < n; ++k) jacobian.row(k) << 1e-3 * std::sin(0.01 * static_cast<double>(k)), 1e3 * (k / 300 % 2 == 0 ? 1.0 : -0.5);
+  for (Eigen::Index k = 0; k < n; ++k)
+    jacobian.row(k) << 1e-3 * std::sin(0.01 * static_cast<double>(k)), 1e3 * (k / 300 % 2 == 0 ? 1.0 : -0.5);
   std::mt19937_64 random(5);
   Coverage c;
   for (int draw = 0; draw < draws; ++draw) {
@@ -63,7 +65,9 @@ TEST(Uncertainty, OfResidualsInRunsCountsRunsWhereTheWhiteFormulaIsFarOff) {
 
 TEST(Uncertainty, NamesWhatTheDataDoesNotShow) {
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(100, 4);
-  for (Eigen::Index k = 0; k < 100; ++k) jacobian.row(k) << std::sin(0.3 * static_cast<double>(k)), 0, static_cast<double>(k % 7), 2 * static_cast<double>(k % 7);
+  for (Eigen::Index k = 0; k < 100; ++k)
+    jacobian.row(k) << std::sin(0.3 * static_cast<double>(k)), 0, static_cast<double>(k % 7),
+        2 * static_cast<double>(k % 7);
   std::mt19937_64 random(1);
   const Eigen::VectorXd r = coloured(random, 100, 0);
   const Uncertainty u = uncertainty(r, jacobian, 100, Eigen::VectorXi::Zero(4), 0);
@@ -88,7 +92,8 @@ TEST(Uncertainty, AConstantErrorMovesWhatLooksConstant) {
 
 TEST(Residuals, TellWhiteFromColouredAndBias) {
   std::mt19937_64 random(2);
-  const Eigen::VectorXd current = coloured(random, 4'000, 0.9), white = coloured(random, 4'000, 0), slow = coloured(random, 4'000, 0.95);
+  const Eigen::VectorXd current = coloured(random, 4'000, 0.9), white = coloured(random, 4'000, 0),
+                        slow = coloured(random, 4'000, 0.95);
   const ResidualAnalysis of_white = analyse(white, current), of_slow = analyse(slow, current);
   EXPECT_LT(of_white.autocorrelated, 0.2);
   EXPECT_GT(of_slow.autocorrelated, 0.9);

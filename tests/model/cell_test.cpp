@@ -6,12 +6,12 @@
 #include <cmath>
 #include <numeric>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 
 namespace bms::model {
 namespace {
 
-CellParameters<> table9() { return read_cell("table9").parameters; }
+CellParameters<> table9() { return files::read_cell("table9").parameters; }
 
 template <class Scalar>
 class CellOfEveryScalar : public ::testing::Test {};
@@ -77,10 +77,11 @@ TEST(Cell, SlopesAreTheDerivatives) {
 }
 
 TEST(Cell, FindsTheSameIntervalFromAnywhere) {
-  const auto cell = prepare<float, max_intervals>(read_cell("a123_26650").parameters);
+  const auto cell = prepare<float, max_intervals>(files::read_cell("a123_26650").parameters);
   for (float soc = -0.3F; soc < 1.3F; soc += 0.0007F) {
     const std::size_t expected = interval_of(cell, soc, 0);
-    for (std::size_t from = 0; from < cell.size; ++from) ASSERT_EQ(interval_of(cell, soc, from), expected) << soc << " from " << from;
+    for (std::size_t from = 0; from < cell.size; ++from)
+      ASSERT_EQ(interval_of(cell, soc, from), expected) << soc << " from " << from;
   }
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 #include "model/extended_rc.hpp"
 #include "tests/model/usual_mechanisms.hpp"
 
@@ -17,8 +17,10 @@ constexpr double capacity_ah = 6;
 
 template <class S>
 double number(const S& x) {
-  if constexpr (Dual<S>) return x.a;
-  else return as_double(x);
+  if constexpr (Dual<S>)
+    return x.a;
+  else
+    return as_double(x);
 }
 
 /// An hour of work: current, temperature, soc after the row.
@@ -59,7 +61,7 @@ template <class S>
 void expect_no_effect(std::size_t index) {
   ChosenLaws<S> laws;
   choose<S>(laws, index, without_strength(index), capacity_ah);
-  const auto cell = prepare<S, max_intervals>(read_cell("table9").parameters);
+  const auto cell = prepare<S, max_intervals>(files::read_cell("table9").parameters);
   auto x = laws.initial();
   for (const Row& row : drive_of(200)) {
     const Current<S> a = Current<S>(row.current_a);
@@ -75,10 +77,14 @@ void expect_no_effect(std::size_t index) {
     const TablePoint<S> before = look_up(cell, soc);
     TablePoint<S> at = before;
     laws.tables(at, soc, drive, x);
-    for (const auto& [now, was] : {std::pair{number(at.ocv_v), number(before.ocv_v)}, {number(at.ocv_delta_v), number(before.ocv_delta_v)},
-                                   {number(at.r0_ohm), number(before.r0_ohm)}, {number(at.r0_delta_ohm), number(before.r0_delta_ohm)},
-                                   {number(at.r1_ohm), number(before.r1_ohm)}, {number(at.r1_delta_ohm), number(before.r1_delta_ohm)},
-                                   {number(at.c1_f), number(before.c1_f)}, {number(at.c1_delta_f), number(before.c1_delta_f)}}) {
+    for (const auto& [now, was] : {std::pair{number(at.ocv_v), number(before.ocv_v)},
+                                   {number(at.ocv_delta_v), number(before.ocv_delta_v)},
+                                   {number(at.r0_ohm), number(before.r0_ohm)},
+                                   {number(at.r0_delta_ohm), number(before.r0_delta_ohm)},
+                                   {number(at.r1_ohm), number(before.r1_ohm)},
+                                   {number(at.r1_delta_ohm), number(before.r1_delta_ohm)},
+                                   {number(at.c1_f), number(before.c1_f)},
+                                   {number(at.c1_delta_f), number(before.c1_delta_f)}}) {
       ASSERT_EQ(now, was);
     }
     ASSERT_EQ(number(laws.advance(x, at, drive, row.duration_s > 0)), 0);
@@ -103,7 +109,8 @@ template <class S>
 Walk<S> walk(const std::vector<MechanismSetting>& mechanisms, const std::vector<Row>& rows) {
   using Laws = ChosenLaws<S>;
   using Model = typename ExtendedRc<Laws::most_voltage_states, Laws::most_states>::template Of<S>;
-  const ExtendedCell<S, max_intervals, Laws> cell{prepare<S, max_intervals>(read_cell("table9").parameters), chosen<S>(mechanisms, capacity_ah)};
+  const ExtendedCell<S, max_intervals, Laws> cell{prepare<S, max_intervals>(files::read_cell("table9").parameters),
+                                                  chosen<S>(mechanisms, capacity_ah)};
   const Laws& laws = cell.laws;
   typename Model::Polarisation x{};
   const auto initial = laws.initial();
@@ -113,7 +120,8 @@ Walk<S> walk(const std::vector<MechanismSetting>& mechanisms, const std::vector<
   Walk<S> result;
   for (const Row& row : rows) {
     if (!(row.duration_s > 0)) continue;
-    const Drive<S> drive{laws.true_current(Current<S>(row.current_a)), TimeStep<S>(row.duration_s), laws.true_temperature(Temperature<S>(row.temperature_c))};
+    const Drive<S> drive{laws.true_current(Current<S>(row.current_a)), TimeStep<S>(row.duration_s),
+                         laws.true_temperature(Temperature<S>(row.temperature_c))};
     result.charge_as += number(laws.counted(drive)) * row.duration_s;
     soc += row.current_a * row.duration_s / 3'600 / capacity_ah;
     const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, Soc<S>(soc), interval);
@@ -131,29 +139,33 @@ TEST_P(EveryMechanism, ComputesTheSameVoltageInFloatAndFixedPointAsInDouble) {
   // 24 bits of 3.4 V are 0.2 uV; a state of an hour sums up as much as again at every step, most of which decays
   // fixed point: 4 nV, but currents, factors and rates in steps of 1e-6, 6e-8 and 4e-9
   constexpr double float_v = 3e-6, fixed_v = 1e-5;
-  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k) ASSERT_NEAR(single.voltage_v[k], exact.voltage_v[k], float_v) << k;
+  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k)
+    ASSERT_NEAR(single.voltage_v[k], exact.voltage_v[k], float_v) << k;
   EXPECT_NEAR(single.charge_as, exact.charge_as, 1e-6 * 6 * 3'600);
   if (info().needs_fpu) return;
   const auto fixed = walk<FixedPoint>(with, rows);
-  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k) ASSERT_NEAR(fixed.voltage_v[k], exact.voltage_v[k], fixed_v) << k;
+  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k)
+    ASSERT_NEAR(fixed.voltage_v[k], exact.voltage_v[k], fixed_v) << k;
   EXPECT_NEAR(fixed.charge_as, exact.charge_as, 1e-6 * 6 * 3'600);
   if (!info().on_board || info().id == TemperatureSensor::id) return;  // a temperature alone does nothing
   double most_v = 0;
-  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k) most_v = std::max(most_v, std::abs(exact.voltage_v[k] - plain.voltage_v[k]));
+  for (std::size_t k = 0; k < exact.voltage_v.size(); ++k)
+    most_v = std::max(most_v, std::abs(exact.voltage_v[k] - plain.voltage_v[k]));
   EXPECT_GT(most_v + std::abs(exact.charge_as - plain.charge_as), 1e-4) << "it acts";
 }
 
 /// Open loop; parameters as they come.
 template <class S>
 std::vector<S> course(std::size_t index, const MechanismValues<S>& values, const std::vector<Row>& rows) {
-  static const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
+  static const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
   ChosenLaws<S> laws;
   choose<S>(laws, index, values, capacity_ah);
   S start(0.815);
   if (index == mechanism_index("initial_soc")) start += values[0];
   Course<S> c(cell, capacity_ah, laws, start);
   std::vector<S> v;
-  for (const Row& row : rows) v.push_back(c.step(row.time_s, row.duration_s, S(row.current_a), S(row.temperature_c), [](auto&, const auto&) {}));
+  for (const Row& row : rows)
+    v.push_back(c.step(row.time_s, row.duration_s, S(row.current_a), S(row.temperature_c), [](auto&, const auto&) {}));
   return v;
 }
 
@@ -181,7 +193,8 @@ TEST_P(EveryMechanism, DerivativesOfTheVoltageByItsParametersAreDifferenceQuotie
       const double difference = (above[k] - below[k]) / (2 * step);
       if (std::abs(v[k].v[static_cast<int>(p)] - difference) > 2e-5 * scale + 1e-11 / step) ++off;
     }
-    EXPECT_LE(off, v.size() / 100) << info().parameter[p].name << ": only where the quotient reaches over a kink of the tables";
+    EXPECT_LE(off, v.size() / 100) << info().parameter[p].name
+                                   << ": only where the quotient reaches over a kink of the tables";
   }
 }
 
@@ -201,20 +214,23 @@ TEST(Catalogue, EveryMechanismHasBoundsThatHoldItsNeutralValueAndAtLeastOneStren
 }
 
 TEST(Laws, KnownAtCompileTimeGiveTheSameDigitsAsChosenAtRunTime) {
-  const auto chosen_laws = chosen<float>(usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance", "current_offset"}), capacity_ah);
+  const auto chosen_laws = chosen<float>(
+      usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance", "current_offset"}), capacity_ah);
   const auto law = []<class M>(M) {
     std::array<double, M::parameters.size()> p{};
     for (std::size_t k = 0; k < p.size(); ++k) p[k] = usual(M::id).value[k];
     return typename M::template Law<float>(p, capacity_ah);
   };
-  const Laws<float, CurrentOffset, SlowPolarisation, OcvHysteresis, TemperatureResistance> laws(law(CurrentOffset{}), law(SlowPolarisation{}), law(OcvHysteresis{}), law(TemperatureResistance{}));
+  const Laws<float, CurrentOffset, SlowPolarisation, OcvHysteresis, TemperatureResistance> laws(
+      law(CurrentOffset{}), law(SlowPolarisation{}), law(OcvHysteresis{}), law(TemperatureResistance{}));
   EXPECT_EQ(laws.most_states, 3U);
   EXPECT_EQ(laws.voltage_states(), chosen_laws.voltage_states());
-  const auto cell = prepare<float, max_intervals>(read_cell("table9").parameters);
+  const auto cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
   auto x = laws.initial();
   auto y = chosen_laws.initial();
   for (const Row& row : drive_of(1'000)) {
-    const Drive<float> drive{laws.true_current(static_cast<float>(row.current_a)), static_cast<float>(row.duration_s), static_cast<float>(row.temperature_c)};
+    const Drive<float> drive{laws.true_current(static_cast<float>(row.current_a)), static_cast<float>(row.duration_s),
+                             static_cast<float>(row.temperature_c)};
     ASSERT_EQ(drive.current_a, chosen_laws.true_current(static_cast<float>(row.current_a)));
     TablePoint<float> at = look_up(cell, 0.63F), there = at;
     laws.tables(at, 0.63F, drive, x);
@@ -241,7 +257,8 @@ TEST(OcvHysteresis, BetweenMeasuredBranchesMovesWithTheChargeAndStops) {
   const OcvHysteresis::Law<double> law(std::array<double, 5>{0.01, 40, 0, 0, 1}, capacity_ah);
   TablePoint<double> at{};
   double x = -0.01;
-  for (int k = 0; k < 45; ++k) x = relaxed<double>(x, law.settle(0, at, {6, 1}, &x));  // 1/80 of the capacity: half of the way to the middle
+  for (int k = 0; k < 45; ++k)
+    x = relaxed<double>(x, law.settle(0, at, {6, 1}, &x));  // 1/80 of the capacity: half of the way to the middle
   EXPECT_NEAR(x, -0.005, 1e-12);
   for (int k = 0; k < 45; ++k) x = relaxed<double>(x, law.settle(0, at, {-6, 1}, &x));
   EXPECT_NEAR(x, -0.01, 1e-12) << "what is given back is given back";
@@ -257,9 +274,10 @@ TEST(OcvHysteresis, BetweenMeasuredBranchesMovesWithTheChargeAndStops) {
 
 /// Charge branch and discharge branch are the curves that the file was made of.
 TEST(OcvHysteresis, FollowsTheShapeOfTheFilesGap) {
-  CellParameters<> p = read_cell("table9").parameters;
+  CellParameters<> p = files::read_cell("table9").parameters;
   p.ocv.half_gap_v = {};
-  for (std::size_t k = 0; k < p.ocv.soc.size; ++k) p.ocv.half_gap_v.push_back(0.01 + 0.01 * std::abs(p.ocv.soc[k] - 0.5));
+  for (std::size_t k = 0; k < p.ocv.soc.size; ++k)
+    p.ocv.half_gap_v.push_back(0.01 + 0.01 * std::abs(p.ocv.soc[k] - 0.5));
   const double middle_v = middle_half_gap_v(p.ocv);
   EXPECT_NEAR(middle_v, 0.012, 0.001);
   const auto cell = prepare<double, max_intervals>(p);
@@ -277,8 +295,10 @@ TEST(OcvHysteresis, FollowsTheShapeOfTheFilesGap) {
 
 TEST(Arrhenius, IsTheExponentialLaw) {
   const auto off = []<class S>(S, double energy, double reference_c, double c) {
-    const double exact = std::exp(energy / mechanism_detail::gas_constant_j_per_mol_k * (1 / (c + 273.15) - 1 / (reference_c + 273.15)));
-    const auto factor = mechanism_detail::arrhenius<S>(Factor<S>(mechanism_detail::energy_over_rt(energy, reference_c)), Temperature<S>(reference_c), Temperature<S>(c));
+    const double exact =
+        std::exp(energy / mechanism_detail::gas_constant_j_per_mol_k * (1 / (c + 273.15) - 1 / (reference_c + 273.15)));
+    const auto factor = mechanism_detail::arrhenius<S>(Factor<S>(mechanism_detail::energy_over_rt(energy, reference_c)),
+                                                       Temperature<S>(reference_c), Temperature<S>(c));
     return std::abs(number(factor) / exact - 1);
   };
   for (const double energy : {-20'000.0, 0.0, 15'000.0, 60'000.0}) {
@@ -316,7 +336,8 @@ TEST(OcvShape, KeepsTheEndsAndSlidesByWhatItSaysInBetween) {
   EXPECT_EQ(law.read_at(1.1), 1.1);
   EXPECT_NEAR(law.read_at(0.2), 0.25, 1e-12);
   EXPECT_NEAR(law.read_at(0.8), 0.77, 1e-12);
-  for (double soc = 0.01; soc < 1; soc += 0.017) EXPECT_NEAR(law.read_slope(soc), (law.read_at(soc + 1e-6) - law.read_at(soc - 1e-6)) / 2e-6, 1e-8) << soc;
+  for (double soc = 0.01; soc < 1; soc += 0.017)
+    EXPECT_NEAR(law.read_slope(soc), (law.read_at(soc + 1e-6) - law.read_at(soc - 1e-6)) / 2e-6, 1e-8) << soc;
 }
 
 TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
@@ -333,9 +354,11 @@ TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
 
 TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
   // the OCV is that of a cell ahead in soc by what the polarisation says; R0 and v_rc are not
-  const auto cell = prepare<double, max_intervals>(read_cell("table9").parameters);
-  const std::vector<MechanismSetting> slow = {{mechanism_index("slow_polarisation"), {0.003, 100, 0, 8 * 0.003 * 3'600 * capacity_ah}, {}}};
-  Course<double> with(cell, capacity_ah, chosen<double>(slow, capacity_ah), 0.3), without(cell, capacity_ah, ChosenLaws<double>{}, 0.3);
+  const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
+  const std::vector<MechanismSetting> slow = {
+      {mechanism_index("slow_polarisation"), {0.003, 100, 0, 8 * 0.003 * 3'600 * capacity_ah}, {}}};
+  Course<double> with(cell, capacity_ah, chosen<double>(slow, capacity_ah), 0.3),
+      without(cell, capacity_ah, ChosenLaws<double>{}, 0.3);
   const auto no_change = [](TablePoint<double>&, double) {};
   const double r_ohm = 0.003 + 1e-6 / capacity_ah, ahead_per_v = 8 * 0.003 / r_ohm;
   double u_v = 0;
@@ -344,7 +367,9 @@ TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
     const double before_v = u_v;
     if (k > 0) u_v += -std::expm1(-0.01) * (r_ohm * a - u_v);
     const double v = with.step(k, dt, a, 25, no_change), base_v = without.step(k, dt, a, 25, no_change);
-    ASSERT_NEAR(v - base_v, u_v + look_up(cell, with.soc() + ahead_per_v * before_v).ocv_v - look_up(cell, with.soc()).ocv_v, 1e-12) << k;
+    ASSERT_NEAR(v - base_v,
+                u_v + look_up(cell, with.soc() + ahead_per_v * before_v).ocv_v - look_up(cell, with.soc()).ocv_v, 1e-12)
+        << k;
   }
 }
 

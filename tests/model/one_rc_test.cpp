@@ -6,14 +6,14 @@
 #include <cmath>
 #include <random>
 
-#include "host_sim/cell_file.hpp"
+#include "files/cell_file.hpp"
 
 namespace bms::model {
 namespace {
 
 /// A cell with the same R0, R1, C1 everywhere, for which the step response is known in closed form.
 CellParameters<> constant_cell() {
-  CellParameters<> p = read_cell("table9").parameters;
+  CellParameters<> p = files::read_cell("table9").parameters;
   for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
     p.rc.r0_ohm[k] = 0.013;
     p.rc.r1_ohm[k] = 0.02;
@@ -52,7 +52,7 @@ TEST(OneRc, ChargingRaisesTheVoltageAtOnceByR0AndLaterByR1) {
 TEST(OneRc, AnalyticJacobiansAreTheDerivativesAt1000RandomStatesAndAllEdges) {
   using Jet = ceres::Jet<double, 2>;
   for (const char* name : {"table9", "a123_26650"}) {
-    const CellParameters<> p = read_cell(name).parameters;
+    const CellParameters<> p = files::read_cell(name).parameters;
     const auto cell = prepare<double, max_intervals>(p);
     const auto jets = prepare<Jet, max_intervals>(p);
     std::mt19937 random(7);
@@ -63,7 +63,8 @@ TEST(OneRc, AnalyticJacobiansAreTheDerivativesAt1000RandomStatesAndAllEdges) {
     for (std::size_t k = 0; k < p.rc.soc.size; ++k) socs.push_back(p.rc.soc[k]);
 
     for (const double soc : socs) {
-      const double v_rc = 0.2 * (uniform(random) - 0.5), current = p.capacity_ah * 6 * (uniform(random) - 0.5), duration = std::pow(10, 3 * uniform(random) - 2);
+      const double v_rc = 0.2 * (uniform(random) - 0.5), current = p.capacity_ah * 6 * (uniform(random) - 0.5),
+                   duration = std::pow(10, 3 * uniform(random) - 2);
       const auto at = look_up(cell, soc);
       const auto settling = OneRc<double>::settling(at, duration);
       const auto f = OneRc<double>::transition({v_rc}, at, settling, {current, duration});
@@ -86,7 +87,7 @@ TEST(OneRc, AnalyticJacobiansAreTheDerivativesAt1000RandomStatesAndAllEdges) {
 
 template <class S>
 void expect_close_to_double(double tolerance_v) {
-  const CellParameters<> p = read_cell("table9").parameters;
+  const CellParameters<> p = files::read_cell("table9").parameters;
   const auto cell = prepare<S, max_intervals>(p);
   const auto reference = prepare<double, max_intervals>(p);
   for (const double soc : {-0.05, 0.0, 0.03, 0.1, 0.47, 0.8, 0.99, 1.05}) {
@@ -96,8 +97,10 @@ void expect_close_to_double(double tolerance_v) {
         const auto at_d = look_up(reference, soc);
         const Drive<S> drive{Current<S>(current), TimeStep<S>(duration)};
         const auto x = OneRc<S>::advance({Voltage<S>(0.02)}, at, OneRc<S>::settling(at, drive.duration_s), drive);
-        const auto x_d = OneRc<double>::advance({0.02}, at_d, OneRc<double>::settling(at_d, duration), {current, duration});
-        EXPECT_NEAR(as_double(OneRc<S>::voltage(x, at, drive)), OneRc<double>::voltage(x_d, at_d, {current, duration}), tolerance_v)
+        const auto x_d =
+            OneRc<double>::advance({0.02}, at_d, OneRc<double>::settling(at_d, duration), {current, duration});
+        EXPECT_NEAR(as_double(OneRc<S>::voltage(x, at, drive)), OneRc<double>::voltage(x_d, at_d, {current, duration}),
+                    tolerance_v)
             << "soc " << soc << " current " << current << " duration " << duration;
       }
     }

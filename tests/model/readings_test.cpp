@@ -29,7 +29,9 @@ Columns uneven(std::size_t rows, double shortest_s = 0) {
   return c;
 }
 
-CorrectedReadings<double> corrected(const Columns& c, double delay_s, double lag_s) { return {c.time_s, c.current_a, c.temperature_c, delay_s, lag_s}; }
+CorrectedReadings<double> corrected(const Columns& c, double delay_s, double lag_s) {
+  return {c.time_s, c.current_a, c.temperature_c, delay_s, lag_s};
+}
 
 TEST(CorrectedReadings, WithNothingToUndoAreTheReadings) {
   const Columns c = uneven(200);
@@ -65,10 +67,12 @@ TEST(CorrectedReadings, APartOfAStepIsUndone) {
       Columns late = c;
       for (std::size_t k = 10; k < 190; ++k) {
         const std::size_t from = k - static_cast<std::size_t>(static_cast<int>(whole) + 3) + 3;
-        late.current_a[k] = (1 - std::abs(part)) * c.current_a[from] + std::abs(part) * c.current_a[part > 0 ? from - 1 : from + 1];
+        late.current_a[k] =
+            (1 - std::abs(part)) * c.current_a[from] + std::abs(part) * c.current_a[part > 0 ? from - 1 : from + 1];
       }
       const auto r = corrected(late, whole + part, 0);
-      for (std::size_t k = 60; k < 140; ++k) ASSERT_NEAR(r.current(k), c.current_a[k], 1e-6) << k << " " << whole << " " << part;
+      for (std::size_t k = 60; k < 140; ++k)
+        ASSERT_NEAR(r.current(k), c.current_a[k], 1e-6) << k << " " << whole << " " << part;
     }
   }
 }
@@ -96,14 +100,16 @@ TEST(CorrectedReadings, DerivativeByTheDelayIsADifferenceQuotient) {
     const auto more = corrected(c, delay_s + 1e-6, 120), less = corrected(c, delay_s - 1e-6, 120);
     for (std::size_t k = 1; k < 300; ++k) {
       ASSERT_NEAR(jets.current(k).v[0], (more.current(k) - less.current(k)) / 2e-6, 1e-5) << k << " " << delay_s;
-      ASSERT_NEAR(jets.temperature(k).v[1], corrected(c, delay_s, 121).temperature(k) - corrected(c, delay_s, 120).temperature(k), 1e-9);
+      ASSERT_NEAR(jets.temperature(k).v[1],
+                  corrected(c, delay_s, 121).temperature(k) - corrected(c, delay_s, 120).temperature(k), 1e-9);
     }
   }
 }
 
 TEST(CorrectedReadings, ALagOfARampIsUndone) {
   Columns c = uneven(300);
-  for (std::size_t k = 0; k < 300; ++k) c.temperature_c[k] = 20 + 0.01 * (c.time_s[k] - 80);  // what a sensor with a lag of 80 s reads
+  for (std::size_t k = 0; k < 300; ++k)
+    c.temperature_c[k] = 20 + 0.01 * (c.time_s[k] - 80);  // what a sensor with a lag of 80 s reads
   const auto r = corrected(c, 0, 80);
   for (std::size_t k = 0; k < 300; ++k) ASSERT_NEAR(r.temperature(k), 20 + 0.01 * c.time_s[k], 1e-7) << k;
 }

@@ -76,7 +76,8 @@ TEST(BusState, EachMessageOfTheDbcFilesIsThereWithWordsUnitsAndComments) {
 
 TEST(BusState, CountsWhatTheCounterSaysIsMissing) {
   BusState bus;
-  for (const int counter : {0, 1, 2, 5, 14, 0, 1}) bus.take(pack_state(50, static_cast<std::uint8_t>(counter), counter));
+  for (const int counter : {0, 1, 2, 5, 14, 0, 1})
+    bus.take(pack_state(50, static_cast<std::uint8_t>(counter), counter));
   EXPECT_EQ(state(bus, "PackState").frames, 7U);
   EXPECT_EQ(state(bus, "PackState").lost, 2U + 8U);
   EXPECT_EQ(state(bus, "PackState").repeated, 0U);
@@ -112,7 +113,7 @@ TEST(BusState, AFrameThatIsDamagedOrOfAnotherLengthChangesNothing) {
   of_another.id = can::PackElectrical::id;
   bus.take(of_another);
   EXPECT_EQ(state(bus, "PackElectrical").crc_errors, 1U) << "the data id is in the CRC";
-  hal::CanFrame fifteen = classic(pack_state(60, 0, 0));
+  can::Frame fifteen = classic(pack_state(60, 0, 0));
   can::protect(fifteen, can::PackState::data_id, 15);
   bus.take(on_bus(fifteen, second_us));
   EXPECT_EQ(state(bus, "PackState").crc_errors, 65U) << "no sender counts to 15";
@@ -196,7 +197,8 @@ TEST(BusState, AFrameOf29BitsOfTheProfileIsNamedAndReadWithoutCounterOrCrc) {
   frame.data = {1, 120, 0x20, 0x04, 0x39, 0xC4, 0x35, 0x77};
   for (int k = 0; k < 3; ++k) {
     frame.time_us = k * second_us;
-    EXPECT_EQ(bus.take(frame), BusState::find("DcSourceStatus1")) << "the same bytes again are news where nothing counts";
+    EXPECT_EQ(bus.take(frame), BusState::find("DcSourceStatus1"))
+        << "the same bytes again are news where nothing counts";
   }
   EXPECT_EQ(bus.good(), 3U);
   EXPECT_EQ(bus.unknown_frames(), 0U);
@@ -239,14 +241,16 @@ TEST(BusState, AnyFramesDoNoHarm) {
     BusFrame frame;
     frame.time_us = static_cast<std::int64_t>(random() % 100'000'000'000'000'000);
     frame.kind = static_cast<FrameKind>(random() % 5);
-    frame.id = static_cast<std::uint32_t>(frame.kind == FrameKind::standard ? 0x180 + random() % 16 : run % 4 == 0 ? can::j1939::DcSourceStatus1::id : random() % 0x1FFFFFFF);
+    frame.id = static_cast<std::uint32_t>(frame.kind == FrameKind::standard ? 0x180 + random() % 16
+                                          : run % 4 == 0                    ? can::j1939::DcSourceStatus1::id
+                                                                            : random() % 0x1FFFFFFF);
     frame.long_id = frame.kind == FrameKind::extended;
     frame.length = static_cast<std::uint8_t>(random() % 9);
     for (std::uint8_t& byte : frame.data) byte = static_cast<std::uint8_t>(random());
     if (frame.kind == FrameKind::standard && random() % 2 == 0) {  // right in all but its values
       for (const MessageInfo& m : messages()) {
         if (m.id != frame.id || m.long_id) continue;
-        hal::CanFrame whole = classic(frame);
+        can::Frame whole = classic(frame);
         whole.length = 8;
         can::protect(whole, m.data_id, static_cast<std::uint8_t>(random() % 15));
         frame = on_bus(whole, frame.time_us);

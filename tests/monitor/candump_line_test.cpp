@@ -48,10 +48,37 @@ TEST(CandumpLine, ReadsEachKindOfFrame) {
 }
 
 TEST(CandumpLine, RefusesWhatIsNoneAndLeavesTheFrameAlone) {
-  for (const char* line : {"", "(", "()", "can0 182#00", "(1.0) can0 182#00", "(1.000000)", "(1.000000) can0", "(1.000000) can0 ", "(1.000000) can0 182", "(1.000000) can0 182 00", "(1.000000) can0 #00",
-                           "(1.000000) can0 82#00", "(1.000000) can0 1822#00", "(1.000000) can0 800#00", "(1.000000) can0 18G#00", "(1.000000) can0 182#0", "(1.000000) can0 182#0g", "(1.000000) can0 182#00.",
-                           "(1.000000) can0 182#.00", "(1.000000) can0 182#000102030405060708", "(1.000000) can0 182##", "(1.000000) can0 182#R9", "(1.000000) can0 182#R88", "(1.000000) can0 182#00 X", "(1.000000) can0 182#00 R R",
-                           "(-1.000000) can0 182#00", "(1.-00001) can0 182#00", "(123456789012.000000) can0 182#00", "(1.000000) can0 40000000#00", "(1.000000) can0 3FFFFFFF#R", "(1.000000)can0 182#00"}) {
+  for (const char* line : {"",
+                           "(",
+                           "()",
+                           "can0 182#00",
+                           "(1.0) can0 182#00",
+                           "(1.000000)",
+                           "(1.000000) can0",
+                           "(1.000000) can0 ",
+                           "(1.000000) can0 182",
+                           "(1.000000) can0 182 00",
+                           "(1.000000) can0 #00",
+                           "(1.000000) can0 82#00",
+                           "(1.000000) can0 1822#00",
+                           "(1.000000) can0 800#00",
+                           "(1.000000) can0 18G#00",
+                           "(1.000000) can0 182#0",
+                           "(1.000000) can0 182#0g",
+                           "(1.000000) can0 182#00.",
+                           "(1.000000) can0 182#.00",
+                           "(1.000000) can0 182#000102030405060708",
+                           "(1.000000) can0 182##",
+                           "(1.000000) can0 182#R9",
+                           "(1.000000) can0 182#R88",
+                           "(1.000000) can0 182#00 X",
+                           "(1.000000) can0 182#00 R R",
+                           "(-1.000000) can0 182#00",
+                           "(1.-00001) can0 182#00",
+                           "(123456789012.000000) can0 182#00",
+                           "(1.000000) can0 40000000#00",
+                           "(1.000000) can0 3FFFFFFF#R",
+                           "(1.000000)can0 182#00"}) {
     BusFrame frame;
     frame.id = 0x77;
     EXPECT_FALSE(parse_dump_line(line, frame)) << line;
@@ -65,11 +92,14 @@ TEST(CandumpLine, EveryFrameComesBack) {
     BusFrame sent;
     sent.time_us = static_cast<std::int64_t>(random() % 9'999'999'999'000'000);
     sent.kind = static_cast<FrameKind>(random() % 5);
-    sent.long_id = sent.kind == FrameKind::extended || ((sent.kind == FrameKind::remote || sent.kind == FrameKind::fd) && random() % 2 == 0);
-    sent.id = static_cast<std::uint32_t>(random() & (sent.long_id || sent.kind == FrameKind::error ? 0x1FFF'FFFF : 0x7FF));
+    sent.long_id = sent.kind == FrameKind::extended ||
+                   ((sent.kind == FrameKind::remote || sent.kind == FrameKind::fd) && random() % 2 == 0);
+    sent.id =
+        static_cast<std::uint32_t>(random() & (sent.long_id || sent.kind == FrameKind::error ? 0x1FFF'FFFF : 0x7FF));
     sent.length = static_cast<std::uint8_t>(random() % (sent.kind == FrameKind::fd ? 65 : 9));
     sent.fd_flags = sent.kind == FrameKind::fd ? static_cast<std::uint8_t>(random() % 16) : 0;
-    for (std::size_t k = 0; k < sent.length && sent.kind != FrameKind::remote; ++k) sent.data[k] = static_cast<std::uint8_t>(random());
+    for (std::size_t k = 0; k < sent.length && sent.kind != FrameKind::remote; ++k)
+      sent.data[k] = static_cast<std::uint8_t>(random());
     std::string line;
     append_dump_line(line, sent, "can0");
     ASSERT_LE(line.size(), longest_dump_line);

@@ -1,5 +1,5 @@
-// The monitor's own sources with another DBC file (other.dbc): cells, faults, a contactor and a message that nobody has heard of are shown without
-// a line of code for them.
+// The monitor's own sources with another DBC file (other.dbc): cells, faults, a contactor and a message that nobody has
+// heard of are shown without a line of code for them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +35,9 @@ class OtherBus : public ::testing::Test {
     send(b);
     send(c);
   }
-  std::string text(std::size_t columns, std::size_t rows) const { return plain_text(screen(bus_, {"can0", 0, 0, 0, false}, {columns, rows})); }
+  std::string text(std::size_t columns, std::size_t rows) const {
+    return plain_text(screen(bus_, {"can0", 0, 0, 0, false}, {columns, rows}));
+  }
 
   BusState bus_;
   std::uint8_t counter_ = 0;
@@ -64,10 +66,12 @@ TEST_F(OtherBus, NamesTheFaultsThatAreSetAndTheContactorsState) {
   faults.overtemperature = 1;
   faults.first_cause = 2;
   send(faults);
-  EXPECT_THAT(text(80, 24), HasSubstr("Faults   ShortCircuit  More than a fuse can bear.\n         Overtemperature  Too hot.\n         FirstCause short circuit\n"));
+  EXPECT_THAT(text(80, 24), HasSubstr("Faults   ShortCircuit  More than a fuse can bear.\n         Overtemperature  "
+                                      "Too hot.\n         FirstCause short circuit\n"));
   EXPECT_THAT(text(80, 8), HasSubstr("Faults   ShortCircuit, Overtemperature\n")) << "one line where rows are few";
   EXPECT_THAT(status_line(bus_, {}), HasSubstr("FAULT ShortCircuit  FAULT Overtemperature"));
-  EXPECT_EQ(nlohmann::json::parse(json_of(bus_, {}))["pack"]["faults"], (nlohmann::json{"ShortCircuit", "Overtemperature"}));
+  EXPECT_EQ(nlohmann::json::parse(json_of(bus_, {}))["pack"]["faults"],
+            (nlohmann::json{"ShortCircuit", "Overtemperature"}));
   can::ContactorState contactor;
   contactor.state = 3;
   contactor.main_plus = 1;

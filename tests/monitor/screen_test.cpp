@@ -55,7 +55,8 @@ TEST(Screen, On80x24ShowsTheBatteryAndTheMessages) {
   EXPECT_EQ(r[3], "Pack     3.320 V   5.04 A charging   24.2 \u00b0C");
   EXPECT_EQ(r[4], "Limits   discharge 60 A (10 s 48 A)   charge 30 A (10 s 24 A)");
   EXPECT_EQ(r[5], "Health   capacity 97.5 % \u00b1 2.4   resistance 112.0 % \u00b1 8.0");
-  EXPECT_THAT(r, ::testing::Contains(StartsWith("PackState             1.0   0.0 s       61     0     0     0      0")));
+  EXPECT_THAT(r,
+              ::testing::Contains(StartsWith("PackState             1.0   0.0 s       61     0     0     0      0")));
 }
 
 TEST(Screen, On40x10ShowsWhatMattersMost) {
@@ -110,7 +111,8 @@ TEST(Screen, WhatIsStaleIsFaintAndWhatIsNotIsNot) {
   EXPECT_EQ(ink_of(screen(bus, facts(), {80, 24}), "discharge 60 A"), Ink::plain);
   for (int k = 0; k < 10; ++k) bus.take(on_bus({0x7AA, 0, {}}, (5 + k) * 1'000'000));
   const auto stale = screen(bus, facts(), {80, 24});
-  for (const char* text : {"80.0 %", " V", "discharge 60 A", "capacity", "PackState"}) EXPECT_EQ(ink_of(stale, text), Ink::faint) << text;
+  for (const char* text : {"80.0 %", " V", "discharge 60 A", "capacity", "PackState"})
+    EXPECT_EQ(ink_of(stale, text), Ink::faint) << text;
   EXPECT_THAT(plain_text(stale), Not(HasSubstr("silent"))) << "the bus lives";
   bus.time_is(60'000'000);
   EXPECT_THAT(plain_text(screen(bus, facts(), {80, 24})), HasSubstr("silent for 46 s"));
@@ -153,7 +155,8 @@ TEST(Screen, AFrameIsOneSynchronisedUpdateWithoutClearingFirst) {
 }
 
 TEST(StatusLine, SaysTheBatteryInOneLine) {
-  EXPECT_EQ(status_line(after(61), facts()), "0:01:00  79.99 % +- 1.72  3.320 V  5.04 A  24.2 degC  carried by counting");
+  EXPECT_EQ(status_line(after(61), facts()),
+            "0:01:00  79.99 % +- 1.72  3.320 V  5.04 A  24.2 degC  carried by counting");
   BusState bus = after(5);
   bus.time_is(24'000'000);
   EXPECT_THAT(status_line(bus, facts()), HasSubstr("stale for 20 s"));

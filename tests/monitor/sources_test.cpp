@@ -51,7 +51,8 @@ class Dump : public ::testing::Test {
     std::vector<BusFrame> frames(room);
     while (!source->ended()) {
       const std::size_t n = source->read(frames, 100);
-      for (std::size_t k = 0; k < n; ++k) r.check = r.check * 31 + frames[k].id + frames[k].data[0] + static_cast<std::uint64_t>(frames[k].time_us);
+      for (std::size_t k = 0; k < n; ++k)
+        r.check = r.check * 31 + frames[k].id + frames[k].data[0] + static_cast<std::uint64_t>(frames[k].time_us);
       r.frames += n;
     }
     r.malformed = source->malformed();
@@ -119,7 +120,8 @@ TEST_F(Dump, WithoutAFrameIsRefused) {
 }
 
 TEST(Source, ThatIsNotThereIsRefusedInWords) {
-  for (const char* name : {"", "nonesuch0", "can 0", "slcan:/nonesuch", "slcan:/dev/null", "file:/nonesuch", "file:/tmp", "usb:0", "../can0", "lo", "a_name_that_no_interface_can_have"}) {
+  for (const char* name : {"", "nonesuch0", "can 0", "slcan:/nonesuch", "slcan:/dev/null", "file:/nonesuch",
+                           "file:/tmp", "usb:0", "../can0", "lo", "a_name_that_no_interface_can_have"}) {
     EXPECT_THROW(open_source(name), SourceRefused) << name;
   }
 }
@@ -143,7 +145,9 @@ class Adapter {
     }
     return text;
   }
-  void say(const std::string& text) const { ASSERT_EQ(::write(fd_, text.data(), text.size()), static_cast<ssize_t>(text.size())); }
+  void say(const std::string& text) const {
+    ASSERT_EQ(::write(fd_, text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  }
   void unplug() {
     close(other_);
     close(fd_);

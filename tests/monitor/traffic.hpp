@@ -1,4 +1,5 @@
-// What a BMS says on CAN, made up: a truck that is driven and charged, sample after sample, in the order the firmware sends.
+// What a BMS says on CAN, made up: a truck that is driven and charged, sample after sample, in the order the firmware
+// sends.
 #pragma once
 
 #include <cmath>
@@ -12,7 +13,8 @@ namespace bms::monitor {
 
 class Traffic {
  public:
-  explicit Traffic(std::int64_t begin_us = 1'700'000'000'000'000, std::int64_t step_us = 1'000'000) : begin_us_(begin_us), step_us_(step_us) {}
+  explicit Traffic(std::int64_t begin_us = 1'700'000'000'000'000, std::int64_t step_us = 1'000'000)
+      : begin_us_(begin_us), step_us_(step_us) {}
 
   /// The frames of the next sample; those of each second come first, the status frame last.
   std::vector<BusFrame> sample() {

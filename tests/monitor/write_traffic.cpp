@@ -45,8 +45,10 @@ int main(int argc, char** argv) {
     if (traffic.now_us() - begin_us >= static_cast<std::int64_t>(1e6 * seconds)) break;
     for (const monitor::BusFrame& frame : sample) {
       std::array<char, hal::slcan::longest_frame> line;
-      if (slcan) text += hal::slcan::encode(classic(frame), line);
-      else monitor::append_dump_line(text, frame, "can0");
+      if (slcan)
+        text += hal::slcan::encode(classic(frame), line);
+      else
+        monitor::append_dump_line(text, frame, "can0");
       ++frames;
     }
     const std::int64_t early_us = traffic.now_us() - monitor::clock_us();

@@ -1,6 +1,6 @@
-// A pack to balance, simulated by itself: sixteen cells, each with its own capacity, charge, resistance and bleeding resistor, on the plant's
-// open-circuit curve, each read with an offset of its own; driven and charged once a day. What a rule that chooses the cells to bleed makes
-// of it.
+// A pack to balance, simulated by itself: sixteen cells, each with its own capacity, charge, resistance and bleeding
+// resistor, on the plant's open-circuit curve, each read with an offset of its own; driven and charged once a day. What
+// a rule that chooses the cells to bleed makes of it.
 #pragma once
 
 #include <algorithm>
@@ -23,11 +23,13 @@ struct BalancedPack {
   std::array<double, balanced_cells> soc{}, capacity_ah{}, ohm{}, offset_v{};
   std::array<double, balanced_cells> bled_ah{};
   double current_a = 0;
-  truth::MonotoneCurve ocv_v = truth::table9_ocv_v();
+  plant::MonotoneCurve ocv_v = plant::table9_ocv_v();
 
   double voltage_v(std::size_t k) const { return ocv_v.at(soc[k]) + ohm[k] * current_a; }
   double read_v(std::size_t k) const { return voltage_v(k) + offset_v[k]; }
-  double spread() const { return *std::max_element(soc.begin(), soc.end()) - *std::min_element(soc.begin(), soc.end()); }
+  double spread() const {
+    return *std::max_element(soc.begin(), soc.end()) - *std::min_element(soc.begin(), soc.end());
+  }
   double mean_soc() const {
     double sum = 0;
     for (const double s : soc) sum += s;
@@ -42,10 +44,10 @@ struct BalancedPack {
   }
 };
 
-/// Cells that leave a factory and a year of storage: charge +-3 %, resistance +-15 %, readings +-3 mV; capacity +-0.5 % but for one that may be
-/// weak.
+/// Cells that leave a factory and a year of storage: charge +-3 %, resistance +-15 %, readings +-3 mV; capacity +-0.5 %
+/// but for one that may be weak.
 inline BalancedPack pack_out_of_balance(std::uint64_t seed, double weak_by) {
-  truth::Random random(seed);
+  plant::Random random(seed);
   BalancedPack p;
   for (std::size_t k = 0; k < balanced_cells; ++k) {
     p.soc[k] = 0.55 + 0.06 * (random.uniform() - 0.5);
@@ -59,7 +61,8 @@ inline BalancedPack pack_out_of_balance(std::uint64_t seed, double weak_by) {
 /// The cells that a rule bleeds for the next seconds.
 using BleedRule = std::function<std::uint32_t(const BalancedPack&, double seconds)>;
 
-/// By charge: the firmware's own, with an estimator that knows the differences to a sigma and is off by as much, anew every day.
+/// By charge: the firmware's own, with an estimator that knows the differences to a sigma and is off by as much, anew
+/// every day.
 class ByCharge {
  public:
   explicit ByCharge(double sigma, const PackDesign& design = forklift) : plan_(balancing_plan(design)), sigma_(sigma) {}
@@ -76,7 +79,9 @@ class ByCharge {
       soc[k] = static_cast<std::int32_t>(1e9 * (p.soc[k] - p.mean_soc() + off_[k]));
       sigma[k] = static_cast<std::int32_t>(1e9 * sigma_);
     }
-    return balancing_.update({uv, soc, sigma, static_cast<std::int32_t>(1e9 * p.mean_soc()), static_cast<std::int32_t>(1e6 * p.current_a), 2'500, true}, static_cast<std::uint32_t>(1e6 * seconds));
+    return balancing_.update({uv, soc, sigma, static_cast<std::int32_t>(1e9 * p.mean_soc()),
+                              static_cast<std::int32_t>(1e6 * p.current_a), 2'500, true},
+                             static_cast<std::uint32_t>(1e6 * seconds));
   }
   const Balancing<balanced_cells>& balancing() const { return balancing_; }
 
@@ -85,10 +90,11 @@ class ByCharge {
   Balancing<balanced_cells> balancing_{plan_};
   double sigma_, since_s_ = 1e9;
   std::array<double, balanced_cells> off_{};
-  truth::Random random_{17};
+  plant::Random random_{17};
 };
 
-/// By voltage: every cell that reads 5 mV more than the lowest, while charging or at rest, from from_v on; turns as the firmware's.
+/// By voltage: every cell that reads 5 mV more than the lowest, while charging or at rest, from from_v on; turns as the
+/// firmware's.
 class ByVoltage {
  public:
   explicit ByVoltage(double from_v) : from_v_(from_v) {}
@@ -110,31 +116,44 @@ class ByVoltage {
 };
 
 struct BalancingFigures {
-  std::vector<double> spread;      ///< of soc when a charge ends, by day
-  std::vector<double> bled_ah;     ///< of all cells, by day
+  std::vector<double> spread;   ///< of soc when a charge ends, by day
+  std::vector<double> bled_ah;  ///< of all cells, by day
 };
 
 /// When a truck is charged: just before it is driven, or as soon as it comes home.
 enum class Habit { before_the_shift, after_the_shift };
 
-/// A day: driven down at 3 A till the first cell is at 10 % or 4.5 Ah are drawn, and charged at 3 A until the first cell is at 3.6 V under current;
-/// ten hours of rest before the charge and a quarter of an hour after it, or the other way round.
-inline BalancingFigures balance(BalancedPack p, const BleedRule& rule, int days, Habit habit = Habit::before_the_shift) {
+/// A day: driven down at 3 A till the first cell is at 10 % or 4.5 Ah are drawn, and charged at 3 A until the first
+/// cell is at 3.6 V under current; ten hours of rest before the charge and a quarter of an hour after it, or the other
+/// way round.
+inline BalancingFigures balance(BalancedPack p, const BleedRule& rule, int days,
+                                Habit habit = Habit::before_the_shift) {
   BalancingFigures f;
   constexpr double step_s = 8;
   for (int day = 0; day < days; ++day) {
     double drawn_ah = 0;
-    const double bled_before = [&] { double s = 0; for (const double b : p.bled_ah) s += b; return s; }();
+    const double bled_before = [&] {
+      double s = 0;
+      for (const double b : p.bled_ah) s += b;
+      return s;
+    }();
     const auto step = [&](double current_a) {
       p.current_a = current_a;
       p.run(step_s, rule(p, step_s));
     };
-    const auto rest = [&](double seconds) { for (double t = 0; t < seconds; t += step_s) step(0); };
+    const auto rest = [&](double seconds) {
+      for (double t = 0; t < seconds; t += step_s) step(0);
+    };
     const auto lowest = [&] { return *std::min_element(p.soc.begin(), p.soc.end()); };
     while (lowest() > 0.1 && drawn_ah < 4.5) step(-3), drawn_ah += 3 * step_s / 3'600;
     rest(habit == Habit::before_the_shift ? 36'000 : 900);
-    const auto highest_v = [&] { double v = 0; for (std::size_t k = 0; k < balanced_cells; ++k) v = std::max(v, p.voltage_v(k)); return v; };
-    do step(3); while (highest_v() < 3.6);
+    const auto highest_v = [&] {
+      double v = 0;
+      for (std::size_t k = 0; k < balanced_cells; ++k) v = std::max(v, p.voltage_v(k));
+      return v;
+    };
+    do step(3);
+    while (highest_v() < 3.6);
     f.spread.push_back(p.spread());
     rest(habit == Habit::before_the_shift ? 900 : 36'000);
     double bled = 0;

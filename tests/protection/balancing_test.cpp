@@ -9,7 +9,10 @@
 namespace bms::protection {
 namespace {
 
-double sum(const std::vector<double>& v, std::size_t from, std::size_t to) { return std::accumulate(v.begin() + static_cast<std::ptrdiff_t>(from), v.begin() + static_cast<std::ptrdiff_t>(to), 0.0); }
+double sum(const std::vector<double>& v, std::size_t from, std::size_t to) {
+  return std::accumulate(v.begin() + static_cast<std::ptrdiff_t>(from), v.begin() + static_cast<std::ptrdiff_t>(to),
+                         0.0);
+}
 
 TEST(BalancingByCharge, BringsFourPercentOfSpreadBelowTwoWithinTenDaysAndRests) {
   const BalancingFigures f = balance(pack_out_of_balance(1, 0), ByCharge(0.002), 40);
@@ -28,7 +31,8 @@ TEST(BalancingByCharge, DoesNotChaseACellOfLessCapacity) {
 TEST(BalancingByCharge, BeatsVoltageOnThePlateau) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const auto pack = pack_out_of_balance(seed, 0.1);
-    const BalancingFigures charge = balance(pack, ByCharge(0.002), 60), anywhere = balance(pack, ByVoltage(0), 60), top = balance(pack, ByVoltage(3.4), 60);
+    const BalancingFigures charge = balance(pack, ByCharge(0.002), 60), anywhere = balance(pack, ByVoltage(0), 60),
+                           top = balance(pack, ByVoltage(3.4), 60);
     EXPECT_LT(charge.spread.back(), 0.5 * anywhere.spread.back()) << seed;
     EXPECT_LT(sum(charge.bled_ah, 0, 60), 0.2 * sum(anywhere.bled_ah, 0, 60)) << seed;
     EXPECT_GT(sum(anywhere.bled_ah, 50, 60), 0.05) << "for ever";
@@ -43,7 +47,8 @@ TEST(BalancingByCharge, TakesNextToNothingFromAPackInBalanceHoweverWrongTheEstim
     p.soc.fill(0.5);
     p.capacity_ah.fill(6);
     const BalancingFigures f = balance(p, ByCharge(sigma), 30);
-    // at 1 % the lowest of sixteen is sometimes 4.5 sigma below the highest; cells lose 2 to 3 % a month by themselves, 2.4 Ah
+    // at 1 % the lowest of sixteen is sometimes 4.5 sigma below the highest; cells lose 2 to 3 % a month by
+    // themselves, 2.4 Ah
     EXPECT_LE(sum(f.bled_ah, 0, 30), sigma > 0.01 || sigma < 0.005 ? 0.0 : 0.8) << sigma << ": in a month, from 96 Ah";
   }
 }
@@ -58,7 +63,10 @@ struct AtTheTop {
     soc[5] = soc[6] = 40'000'000;
     sigma.fill(2'000'000);
   }
-  std::uint32_t step(double seconds = 1) { return balancing.update({uv, soc, sigma, mean_ppb, current_ua, warmest, allowed}, static_cast<std::uint32_t>(1e6 * seconds)); }
+  std::uint32_t step(double seconds = 1) {
+    return balancing.update({uv, soc, sigma, mean_ppb, current_ua, warmest, allowed},
+                            static_cast<std::uint32_t>(1e6 * seconds));
+  }
   std::uint32_t both_turns() {
     std::uint32_t all = 0;
     for (int k = 0; k < 16; ++k) all |= step();
@@ -106,18 +114,18 @@ TEST(Balancing, StopsWhileDrivingWhenWarmWhenEmptyWhenForbiddenAndWhenNothingIsK
   EXPECT_NE(b.step(), 0U) << "at rest";
   b.warmest = 5'501;
   EXPECT_EQ(b.step(), 0U);
-  b.warmest = no_reading;
+  b.warmest = measurement::no_reading;
   EXPECT_EQ(b.step(), 0U);
   b.warmest = 2'500;
   b.allowed = false;
   EXPECT_EQ(b.step(), 0U);
   b.allowed = true;
-  b.current_ua = no_reading;
+  b.current_ua = measurement::no_reading;
   EXPECT_EQ(b.step(), 0U);
   b.current_ua = 0;
   b.uv[3] = 2'980'000;  // below 2.99 V
   EXPECT_EQ(b.step(), 1U << 5 | 1U << 6);
-  b.mean_ppb = no_reading;
+  b.mean_ppb = measurement::no_reading;
   EXPECT_EQ(b.step(), 0U);
 }
 
@@ -160,7 +168,8 @@ TEST(Balancing, OfThirtyTwoCellsEveryOtherHasItsTurnOfEightSeconds) {
   EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 7'999'999), 0x5555'5555U);
   EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 1), 0x2AAA'AAAAU);
   std::uint32_t before = step();
-  while (step() == before) {}  // to the beginning of a turn
+  while (step() == before) {
+  }  // to the beginning of a turn
   before = ~before & 0x7FFF'FFFFU;
   for (int turn = 0; turn < 6; ++turn) {
     ASSERT_TRUE(before == 0x5555'5555U || before == 0x2AAA'AAAAU) << std::hex << before;
@@ -175,7 +184,7 @@ TEST(Balancing, TellsNoTimeLeftOfNothingToBleedNorByAVoltageThatIsNotKnown) {
   EXPECT_EQ(b.balancing.left_s(3'330'000), 0U) << "nothing was measured yet";
   b.step();
   EXPECT_NEAR(b.balancing.left_s(3'330'000), 32e-3 * 6 * 3'600 / (3.33 / 33), 5) << "all at once: no turns to wait for";
-  EXPECT_EQ(b.balancing.left_s(no_reading), 0U);
+  EXPECT_EQ(b.balancing.left_s(measurement::no_reading), 0U);
   EXPECT_EQ(b.balancing.left_s(0), 0U);
   EXPECT_EQ(b.balancing.left_s(1), b.balancing.left_s(33)) << "less than a microampere is taken for one";
   b.step(60);
@@ -202,7 +211,7 @@ TEST(Balancing, CountsTheTimeThatACellWasBledAndNoOther) {
   odd.balancing.stop();
   odd.step(3'600);
   EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "the bleeders were off meanwhile";
-  odd.uv.fill(no_reading);
+  odd.uv.fill(measurement::no_reading);
   odd.step(3'600);
   EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "how much it was is not known";
 }
@@ -226,7 +235,7 @@ TEST(Balancing, MeasuresNothingBelowTheTopNorWithACellThatIsNotKnown) {
   b.mean_ppb = 940'000'000;
   EXPECT_EQ(b.both_turns(), 0U);
   b.mean_ppb = 960'000'000;
-  b.soc[15] = no_reading;
+  b.soc[15] = measurement::no_reading;
   EXPECT_EQ(b.both_turns(), 0U);
   b.soc[15] = 0;
   b.sigma[15] = 10'000'001;

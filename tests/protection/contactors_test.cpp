@@ -21,10 +21,12 @@ void PrintTo(ContactorState s, std::ostream* out) { *out << contactor_state_name
 namespace {
 
 using enum ContactorState;
-constexpr ContactorPlan pack = contactor_plan(forklift);  // test part 0.3 s, half time constant 0.25 s, link 5 s, rest 0.12 A
+constexpr ContactorPlan pack =
+    contactor_plan(forklift);  // test part 0.3 s, half time constant 0.25 s, link 5 s, rest 0.12 A
 constexpr std::int32_t pack_uv = 52'800'000;
 
-/// Contactors between a pack and a link: resistor of 50 ohm, 10 mF, a bleeder. What is welded or does not close does so whatever it is told.
+/// Contactors between a pack and a link: resistor of 50 ohm, 10 mF, a bleeder. What is welded or does not close does so
+/// whatever it is told.
 struct Bench {
   Contactors contactors{pack};
   ContactorInput in{.request = Request::none, .current_ua = 0, .pack_uv = pack_uv, .link_uv = 0, .step_us = 100'000};
@@ -33,7 +35,8 @@ struct Bench {
 
   void step() {
     const Outputs out = contactors.update(in);
-    const bool plus = (out.main_plus && !plus_fails) || plus_welded, minus = out.main_minus || minus_welded, relay = out.precharge || precharge_welded;
+    const bool plus = (out.main_plus && !plus_fails) || plus_welded, minus = out.main_minus || minus_welded,
+               relay = out.precharge || precharge_welded;
     const double step_s = in.step_us / 1e6, pack_v = pack_uv / 1e6;
     double current_a = 0;
     if (plus && minus) {
@@ -264,8 +267,13 @@ TEST(Precharge, FailsAtOnceWhenTheLinkIsSlowerThanItsCurveAllows) {
     double time_constant_s, link_short;
     bool fails;
   };
-  for (const Case& c : {Case{"as designed", 0.5, 0, false}, {"a third faster", 0.33, 0, false}, {"a quarter slower", 0.62, 0, false}, {"twice as slow", 1, 0, true},
-                        {"link shorted", 0.5, 1, true}, {"a load that holds it at half", 0.5, 0.5, true}, {"a load that holds it at 7/8", 0.5, 0.125, true}}) {
+  for (const Case& c : {Case{"as designed", 0.5, 0, false},
+                        {"a third faster", 0.33, 0, false},
+                        {"a quarter slower", 0.62, 0, false},
+                        {"twice as slow", 1, 0, true},
+                        {"link shorted", 0.5, 1, true},
+                        {"a load that holds it at half", 0.5, 0.5, true},
+                        {"a load that holds it at 7/8", 0.5, 0.125, true}}) {
     Bench b;
     b.time_constant_s = c.time_constant_s;
     b.link_short = c.link_short;
@@ -274,8 +282,12 @@ TEST(Precharge, FailsAtOnceWhenTheLinkIsSlowerThanItsCurveAllows) {
     const double ended_s = b.until(c.fails ? opening : drive, 6);
     EXPECT_GE(ended_s, 0) << c.what;
     EXPECT_EQ(b.seen.precharge_failed, c.fails) << c.what;
-    if (c.fails) { EXPECT_LE(ended_s, 3.1) << c.what << ": six time constants"; }
-    if (c.link_short >= 1) { EXPECT_LE(ended_s, 0.5) << "a short is seen by half a time constant"; }
+    if (c.fails) {
+      EXPECT_LE(ended_s, 3.1) << c.what << ": six time constants";
+    }
+    if (c.link_short >= 1) {
+      EXPECT_LE(ended_s, 0.5) << "a short is seen by half a time constant";
+    }
   }
 }
 
@@ -283,7 +295,7 @@ TEST(Precharge, WithoutAReadingOfTheLinkNeverCloses) {
   Bench b;
   b.in.request = Request::drive;
   for (int k = 0; k < 100; ++k) {
-    b.in.link_uv = no_reading;
+    b.in.link_uv = measurement::no_reading;
     b.contactors.update(b.in);
     b.seen.precharge_failed = b.seen.precharge_failed || b.contactors.events().precharge_failed;
     ASSERT_FALSE(b.contactors.outputs().main_plus);
@@ -319,7 +331,7 @@ TEST(WeldedContactor, IsNotWhatACurrentThatIsNotKnownMeans) {
   b.in.request = Request::none;
   for (int k = 0; k < 40; ++k) {  // four seconds; the link has fallen by then
     b.step();
-    b.in.current_ua = no_reading;
+    b.in.current_ua = measurement::no_reading;
     ASSERT_FALSE(b.contactors.events().welded) << k;
   }
 }
@@ -399,7 +411,8 @@ struct Fed {
   /// With a link that does as it should.
   Fed& to(ContactorState s, Request r = Request::drive) {
     in.request = r;
-    for (int k = 0; k < 1'000 && contactors.state() != s; ++k) step(0.1, contactors.state() == precharge ? pack_uv : contactors.outputs().main_plus ? pack_uv : 0);
+    for (int k = 0; k < 1'000 && contactors.state() != s; ++k)
+      step(0.1, contactors.state() == precharge ? pack_uv : contactors.outputs().main_plus ? pack_uv : 0);
     EXPECT_EQ(contactors.state(), s);
     return *this;
   }
@@ -415,14 +428,15 @@ TEST(WeldedContactor, IsWhatRaisesTheLinkByAnEighthAboveTheLowestOfTheSelfTest) 
     Fed f;
     f.in.request = Request::drive;
     // the link still falls from the last drive
-    for (const std::int32_t link_uv : {40'000'000, 35'000'000, 30'000'000, 25'000'000}) EXPECT_EQ(f.step(0.1, link_uv), self_test);
+    for (const std::int32_t link_uv : {40'000'000, 35'000'000, 30'000'000, 25'000'000})
+      EXPECT_EQ(f.step(0.1, link_uv), self_test);
     // one reading missing, whichever: neither a weld nor forgotten
-    f.step(0.1, no_reading);
+    f.step(0.1, measurement::no_reading);
     EXPECT_FALSE(f.welded());
-    f.in.pack_uv = no_reading;
+    f.in.pack_uv = measurement::no_reading;
     f.step(0.05, 0);
     f.in.pack_uv = pack_uv;
-    f.in.current_ua = no_reading;
+    f.in.current_ua = measurement::no_reading;
     f.step(0.05, 0);
     f.in.current_ua = 0;
     EXPECT_EQ(f.step(0.1, 26'000'000), self_test) << "a little noise";
@@ -436,8 +450,16 @@ TEST(WeldedContactor, WhileAllIsOpenIsAnySevenEighthsOnTheLinkAndAnyCurrentAbove
     std::int32_t link_uv, current_ua, pack_uv;
     bool welded;
   };
-  for (const Case& c : {Case{7 * eighth_uv - 1, 0, pack_uv, false}, {7 * eighth_uv, 0, pack_uv, true}, {0, 120'000, pack_uv, false}, {0, -120'000, pack_uv, false}, {0, 120'001, pack_uv, true},
-                        {0, -120'001, pack_uv, true}, {no_reading, 0, pack_uv, false}, {pack_uv, 0, no_reading, false}, {0, 0, 0, false}, {1, 0, 1, true}}) {
+  for (const Case& c : {Case{7 * eighth_uv - 1, 0, pack_uv, false},
+                        {7 * eighth_uv, 0, pack_uv, true},
+                        {0, 120'000, pack_uv, false},
+                        {0, -120'000, pack_uv, false},
+                        {0, 120'001, pack_uv, true},
+                        {0, -120'001, pack_uv, true},
+                        {measurement::no_reading, 0, pack_uv, false},
+                        {pack_uv, 0, measurement::no_reading, false},
+                        {0, 0, 0, false},
+                        {1, 0, 1, true}}) {
     Fed f;
     f.in.current_ua = c.current_ua;
     f.in.pack_uv = c.pack_uv;
@@ -507,7 +529,9 @@ TEST(Precharge, FailsBelowItsCurveByAFifthOfThePackAndGoesOnAbove) {
       for (const double after_s : {0.0, 0.249'999}) {  // until the next half time constant is over the same is asked
         Fed f;
         f.to(precharge);
-        EXPECT_EQ(f.step(0.25 * k + after_s, static_cast<std::int32_t>(pack_uv * (least + off_by))), off_by < 0 ? opening : precharge) << k << ' ' << off_by;
+        EXPECT_EQ(f.step(0.25 * k + after_s, static_cast<std::int32_t>(pack_uv * (least + off_by))),
+                  off_by < 0 ? opening : precharge)
+            << k << ' ' << off_by;
         EXPECT_EQ(f.contactors.events().precharge_failed, off_by < 0);
       }
     }
@@ -522,7 +546,7 @@ TEST(Precharge, FailsBelowItsCurveByAFifthOfThePackAndGoesOnAbove) {
 TEST(Precharge, WithoutAReadingOfThePackFailsWhenItsTimeIsOver) {
   Fed f;
   f.to(precharge);
-  f.in.pack_uv = no_reading;
+  f.in.pack_uv = measurement::no_reading;
   EXPECT_EQ(f.step(2.999'999, 50'000'000), precharge);
   EXPECT_EQ(f.step(0.000'001, 50'000'000), opening);
   EXPECT_TRUE(f.contactors.events().precharge_failed);
@@ -536,7 +560,7 @@ TEST(Contactors, ToldToCeaseOpenAtRestToTheLastDigit) {
     f.in.current_ua = rest_ua + (rest_ua > 0 ? 1 : -1);
     f.step(0.1, pack_uv);
     EXPECT_EQ(f.step(100, pack_uv), unloading);
-    f.in.current_ua = no_reading;
+    f.in.current_ua = measurement::no_reading;
     EXPECT_EQ(f.step(100, pack_uv), unloading) << "nobody knows";
     f.in.current_ua = rest_ua;
     EXPECT_EQ(f.step(0.1, pack_uv), opening);
@@ -553,7 +577,7 @@ TEST(Contactors, CountTheTimeOfGraceToItsEndAndAnewOnlyWhenTheCurrentCeased) {
       if (in_unloading) f.to(unloading, Request::none);
       (current_ua > 0 ? f.in.charge_forbidden : f.in.discharge_forbidden) = true;
       EXPECT_EQ(f.step(4.9, pack_uv), here);
-      f.in.current_ua = no_reading;
+      f.in.current_ua = measurement::no_reading;
       EXPECT_EQ(f.step(1, pack_uv), here) << "what is not known counts for nothing";
       f.in.current_ua = current_ua;
       EXPECT_EQ(f.step(0.099'999, pack_uv), here);
@@ -637,7 +661,7 @@ TEST(Contactor, ThatHasNotClosedLeavesTheLinkASixteenthBelowThePack) {
   f.step(1, pack_uv - sixteenth_uv - 1);
   EXPECT_TRUE(f.contactors.events().not_closed);
   EXPECT_FALSE(f.contactors.outputs().charge_enable) << "nothing is to be charged through it";
-  f.step(1, no_reading);
+  f.step(1, measurement::no_reading);
   EXPECT_FALSE(f.contactors.events().not_closed);
 }
 
@@ -655,17 +679,21 @@ TEST(ContactorWalk, ThroughEveryReachableStateUnderEveryInputNeverClosesAgainstA
   std::vector<ContactorInput> inputs;
   for (const Request r : {Request::none, Request::drive, Request::charge}) {
     for (int faults = 0; faults < 16; ++faults) {
-      for (const std::int32_t current : {no_reading, -3'000'000, 0, 3'000'000}) {
-        for (const std::int32_t link : {no_reading, 0, 30'000'000, 46'000'000, 49'000'000, 52'800'000}) {
-          for (const std::int32_t stack : {no_reading, pack_uv}) {
-            if (stack == no_reading && link > 0) continue;
-            inputs.push_back({r, (faults & 1) != 0, (faults & 2) != 0, (faults & 4) != 0, (faults & 8) != 0, current, stack, link, 1'000'000});
+      for (const std::int32_t current : {measurement::no_reading, -3'000'000, 0, 3'000'000}) {
+        for (const std::int32_t link : {measurement::no_reading, 0, 30'000'000, 46'000'000, 49'000'000, 52'800'000}) {
+          for (const std::int32_t stack : {measurement::no_reading, pack_uv}) {
+            if (stack == measurement::no_reading && link > 0) continue;
+            inputs.push_back({r, (faults & 1) != 0, (faults & 2) != 0, (faults & 4) != 0, (faults & 8) != 0, current,
+                              stack, link, 1'000'000});
           }
         }
       }
     }
   }
-  constexpr ContactorPlan coarse{.test_us = 1'000'000, .half_time_constant_us = 500'000, .link_discharge_us = 3'000'000, .rest_ua = 120'000};  // of few different times
+  constexpr ContactorPlan coarse{.test_us = 1'000'000,
+                                 .half_time_constant_us = 500'000,
+                                 .link_discharge_us = 3'000'000,
+                                 .rest_ua = 120'000};  // of few different times
   std::set<std::array<std::uint8_t, sizeof(Contactors)>> known;
   std::vector<Contactors> open{Contactors(coarse)};
   std::set<ContactorState> visited;
@@ -685,17 +713,40 @@ TEST(ContactorWalk, ThroughEveryReachableStateUnderEveryInputNeverClosesAgainstA
       ASSERT_FALSE(out.main_plus && !out.main_minus);
       ASSERT_FALSE(out.charge_enable && (in.charge_forbidden || !out.main_plus || in.request == Request::none));
       ASSERT_EQ(out.any_closed() && out.main_plus, c.state() == drive || c.state() == charge || c.state() == unloading);
-      if (from.state() != c.state() && c.state() == self_test) { ASSERT_FALSE(in.open || in.open_now || in.request == Request::none); }
-      if (out.main_plus && from.state() == precharge) { ASSERT_TRUE(in.link_uv >= 49'000'000 && !in.open) << "closed onto an empty link"; }
+      if (from.state() != c.state() && c.state() == self_test) {
+        ASSERT_FALSE(in.open || in.open_now || in.request == Request::none);
+      }
+      if (out.main_plus && from.state() == precharge) {
+        ASSERT_TRUE(in.link_uv >= 49'000'000 && !in.open) << "closed onto an empty link";
+      }
       if (known.insert(bytes(c)).second) open.push_back(c);
     }
     ASSERT_LT(known.size(), 200'000U);
   }
   EXPECT_EQ(visited.size(), contactor_state_count);
-  const std::set<std::pair<ContactorState, ContactorState>> allowed = {
-      {off, off}, {off, self_test}, {off, safe}, {self_test, self_test}, {self_test, precharge}, {self_test, opening}, {precharge, precharge}, {precharge, drive}, {precharge, charge}, {precharge, opening},
-      {drive, drive}, {drive, unloading}, {drive, opening}, {charge, charge}, {charge, unloading}, {charge, opening}, {unloading, unloading}, {unloading, opening}, {opening, opening}, {opening, off},
-      {opening, safe}, {safe, safe}, {safe, off}};
+  const std::set<std::pair<ContactorState, ContactorState>> allowed = {{off, off},
+                                                                       {off, self_test},
+                                                                       {off, safe},
+                                                                       {self_test, self_test},
+                                                                       {self_test, precharge},
+                                                                       {self_test, opening},
+                                                                       {precharge, precharge},
+                                                                       {precharge, drive},
+                                                                       {precharge, charge},
+                                                                       {precharge, opening},
+                                                                       {drive, drive},
+                                                                       {drive, unloading},
+                                                                       {drive, opening},
+                                                                       {charge, charge},
+                                                                       {charge, unloading},
+                                                                       {charge, opening},
+                                                                       {unloading, unloading},
+                                                                       {unloading, opening},
+                                                                       {opening, opening},
+                                                                       {opening, off},
+                                                                       {opening, safe},
+                                                                       {safe, safe},
+                                                                       {safe, off}};
   EXPECT_EQ(edges, allowed) << "a transition that nobody named, or one that never happens";
   EXPECT_GT(steps, 100'000U);
   ::testing::Test::RecordProperty("reached", static_cast<int>(known.size()));

@@ -11,7 +11,11 @@ namespace bms::protection {
 namespace {
 
 constexpr DeratingPlan plan6a = derating_plan(forklift);
-constexpr DeratingInput good{.highest_cell_uv = 3'300'000, .lowest_cell_uv = 3'290'000, .highest_cdegc = 2'500, .lowest_cdegc = 2'400, .soc_ppb = 500'000'000};
+constexpr DeratingInput good{.highest_cell_uv = 3'300'000,
+                             .lowest_cell_uv = 3'290'000,
+                             .highest_cdegc = 2'500,
+                             .lowest_cdegc = 2'400,
+                             .soc_ppb = 500'000'000};
 
 AllowedCurrent settled(const DeratingInput& in) {
   Derating d(plan6a);
@@ -56,45 +60,95 @@ TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
       {"120 %", with([](auto& i) { i.soc_ppb = 1'200'000'000; }), 1.2, 6},
       {"10 %", with([](auto& i) { i.soc_ppb = 100'000'000; }), 6, 6},
       {"0 %: a fifth is left", with([](auto& i) { i.soc_ppb = 0; }), 6, 1.2},
-      {"10 % known to 5 %", with([](auto& i) { i.soc_ppb = 100'000'000; i.soc_sigma_ppb = 50'000'000; }), 6, 3.6},
-      {"95 % known to 2.5 %", with([](auto& i) { i.soc_ppb = 950'000'000; i.soc_sigma_ppb = 25'000'000; }), 3.6, 6},
-      {"40 % known to 60 %", with([](auto& i) { i.soc_ppb = 400'000'000; i.soc_sigma_ppb = 600'000'000; }), 1.2, 1.2},
+      {"10 % known to 5 %", with([](auto& i) {
+         i.soc_ppb = 100'000'000;
+         i.soc_sigma_ppb = 50'000'000;
+       }),
+       6, 3.6},
+      {"95 % known to 2.5 %", with([](auto& i) {
+         i.soc_ppb = 950'000'000;
+         i.soc_sigma_ppb = 25'000'000;
+       }),
+       3.6, 6},
+      {"40 % known to 60 %", with([](auto& i) {
+         i.soc_ppb = 400'000'000;
+         i.soc_sigma_ppb = 600'000'000;
+       }),
+       1.2, 1.2},
       {"any soc, known to nothing", with([](auto& i) { i.soc_sigma_ppb = 2'000'000'000; }), 1.2, 1.2},
-      {"210 % known to nothing", with([](auto& i) { i.soc_ppb = 2'100'000'000; i.soc_sigma_ppb = 2'100'000'000; }), 1.2, 1.2},
-      {"-200 % known to nothing", with([](auto& i) { i.soc_ppb = -2'000'000'000; i.soc_sigma_ppb = 2'000'000'000; }), 1.2, 1.2},
-      {"95 % with a sigma that cannot be", with([](auto& i) { i.soc_ppb = 950'000'000; i.soc_sigma_ppb = -50'000'000; }), 6, 6},
-      {"soc not known", with([](auto& i) { i.soc_ppb = no_reading; }), 6, 6},
-      {"the model allows 2 A and 4 A", with([](auto& i) { i.model_charge_ua = 2'000'000; i.model_discharge_ua = 4'000'000; }), 2, 4},
-      {"the model says less than nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = -1'000'000; }), 0, 0},
-      {"the model allows 2 A and a fault halves", with([](auto& i) { i.model_charge_ua = 2'000'000; i.derate = true; }), 1, 3},
+      {"210 % known to nothing", with([](auto& i) {
+         i.soc_ppb = 2'100'000'000;
+         i.soc_sigma_ppb = 2'100'000'000;
+       }),
+       1.2, 1.2},
+      {"-200 % known to nothing", with([](auto& i) {
+         i.soc_ppb = -2'000'000'000;
+         i.soc_sigma_ppb = 2'000'000'000;
+       }),
+       1.2, 1.2},
+      {"95 % with a sigma that cannot be", with([](auto& i) {
+         i.soc_ppb = 950'000'000;
+         i.soc_sigma_ppb = -50'000'000;
+       }),
+       6, 6},
+      {"soc not known", with([](auto& i) { i.soc_ppb = measurement::no_reading; }), 6, 6},
+      {"the model allows 2 A and 4 A", with([](auto& i) {
+         i.model_charge_ua = 2'000'000;
+         i.model_discharge_ua = 4'000'000;
+       }),
+       2, 4},
+      {"the model says less than nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = -1'000'000; }),
+       0, 0},
+      {"the model allows 2 A and a fault halves", with([](auto& i) {
+         i.model_charge_ua = 2'000'000;
+         i.derate = true;
+       }),
+       1, 3},
       {"the model allows nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = 0; }), 0, 0},
       {"a fault halves", with([](auto& i) { i.derate = true; }), 3, 3},
       {"charge forbidden", with([](auto& i) { i.charge_forbidden = true; }), 0, 6},
       {"discharge forbidden", with([](auto& i) { i.discharge_forbidden = true; }), 6, 0},
-      {"no temperature", with([](auto& i) { i.highest_cdegc = i.lowest_cdegc = no_reading; }), 0, 3},
+      {"no temperature", with([](auto& i) { i.highest_cdegc = i.lowest_cdegc = measurement::no_reading; }), 0, 3},
   };
   for (const Point& p : points) {
     const AllowedCurrent a = settled(p.in);
     EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.004) << p.what;  // less than 1/1024 of 6 A
     EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.004) << p.what;
     // all is all, and nothing is nothing
-    if (p.charge_a == 0 || p.charge_a == 6) { EXPECT_EQ(a.charge_ua, 1e6 * p.charge_a) << p.what; }
-    if (p.discharge_a == 0 || p.discharge_a == 6) { EXPECT_EQ(a.discharge_ua, 1e6 * p.discharge_a) << p.what; }
+    if (p.charge_a == 0 || p.charge_a == 6) {
+      EXPECT_EQ(a.charge_ua, 1e6 * p.charge_a) << p.what;
+    }
+    if (p.discharge_a == 0 || p.discharge_a == 6) {
+      EXPECT_EQ(a.discharge_ua, 1e6 * p.discharge_a) << p.what;
+    }
   }
 }
 
 TEST(Derating, MovesByNoMoreThanItsSlewWhateverComes) {
-  truth::Random random(5);
+  plant::Random random(5);
   Derating d(plan6a);
   AllowedCurrent before;
-  const auto any = [&](std::int32_t low, std::int32_t high) { return random.uniform() < 0.05 ? no_reading : low + static_cast<std::int32_t>(random.uniform() * (high - low)); };
+  const auto any = [&](std::int32_t low, std::int32_t high) {
+    return random.uniform() < 0.05 ? measurement::no_reading
+                                   : low + static_cast<std::int32_t>(random.uniform() * (high - low));
+  };
   for (int k = 0; k < 20'000; ++k) {
-    DeratingInput in{any(1'000'000, 4'000'000), any(1'000'000, 4'000'000), any(-3'000, 7'000), any(-3'000, 7'000), any(-200'000'000, 1'200'000'000), any(0, 900'000'000),
-                     any(0, 10'000'000), any(0, 10'000'000), random.uniform() < 0.3, false, false};
+    DeratingInput in{any(1'000'000, 4'000'000),
+                     any(1'000'000, 4'000'000),
+                     any(-3'000, 7'000),
+                     any(-3'000, 7'000),
+                     any(-200'000'000, 1'200'000'000),
+                     any(0, 900'000'000),
+                     any(0, 10'000'000),
+                     any(0, 10'000'000),
+                     random.uniform() < 0.3,
+                     false,
+                     false};
     const std::uint32_t step_us = static_cast<std::uint32_t>(random.uniform() * 200'000);
     const AllowedCurrent now = d.update(in, step_us);
     const double down_a = 6 * step_us * 1e-6 + 2e-6, up_a = down_a / 5 + 2e-6;
-    for (const auto& [a, b] : {std::pair{before.charge_ua, now.charge_ua}, std::pair{before.discharge_ua, now.discharge_ua}}) {
+    for (const auto& [a, b] :
+         {std::pair{before.charge_ua, now.charge_ua}, std::pair{before.discharge_ua, now.discharge_ua}}) {
       ASSERT_LE((b - a) / 1e6, up_a);
       ASSERT_LE((a - b) / 1e6, down_a);
       ASSERT_GE(b, 0);
@@ -143,14 +197,20 @@ TEST(Derating, GoesDownInASecondAndUpInFive) {
 /// Of a cell that charges and discharges at different rates, and of one that may not freeze at all.
 TEST(Derating, OfAnotherCellGoesByItsOwnLimits) {
   PackDesign design = forklift;
-  design.limits = {.voltage_min_v = 2.5, .voltage_max_v = 4.2, .charge_current_max_a = 1.5, .discharge_current_max_a = 3, .temperature_min_c = 5, .temperature_max_c = 50};
+  design.limits = {.voltage_min_v = 2.5,
+                   .voltage_max_v = 4.2,
+                   .charge_current_max_a = 1.5,
+                   .discharge_current_max_a = 3,
+                   .temperature_min_c = 5,
+                   .temperature_max_c = 50};
   const DeratingPlan plan = derating_plan(design);
   const auto allowed = [&](DeratingInput in) {
     Derating d(plan);
     for (int k = 0; k < 100; ++k) d.update(in, 100'000);
     return d.update(in, 100'000);
   };
-  DeratingInput in{.highest_cell_uv = 3'700'000, .lowest_cell_uv = 3'700'000, .highest_cdegc = 2'500, .lowest_cdegc = 2'500};
+  DeratingInput in{
+      .highest_cell_uv = 3'700'000, .lowest_cell_uv = 3'700'000, .highest_cdegc = 2'500, .lowest_cdegc = 2'500};
   EXPECT_EQ(allowed(in).charge_ua, 1'500'000);
   EXPECT_EQ(allowed(in).discharge_ua, 3'000'000);
   in.lowest_cdegc = 500;

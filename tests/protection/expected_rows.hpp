@@ -1,5 +1,5 @@
-// What the table has to say for sixteen cells of the paper's kind (2.0 to 3.65 V, 6 A, -20 to 60 degrees C, sampled ten times a second),
-// reckoned by hand from its words: a table entry that is wrong differs from this.
+// What the table has to say for sixteen cells of the paper's kind (2.0 to 3.65 V, 6 A, -20 to 60 degrees C, sampled ten
+// times a second), reckoned by hand from its words: a table entry that is wrong differs from this.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,12 @@
 
 namespace bms::protection {
 
-inline constexpr model::Limits table9_limits{.voltage_min_v = 2.0, .voltage_max_v = 3.65, .charge_current_max_a = 6, .discharge_current_max_a = 6, .temperature_min_c = -20, .temperature_max_c = 60};
+inline constexpr model::Limits table9_limits{.voltage_min_v = 2.0,
+                                             .voltage_max_v = 3.65,
+                                             .charge_current_max_a = 6,
+                                             .discharge_current_max_a = 6,
+                                             .temperature_min_c = -20,
+                                             .temperature_max_c = 60};
 inline constexpr PackDesign forklift{.limits = table9_limits, .capacity_ah = 6, .cells = 16, .temperatures = 4};
 
 struct ExpectedRow {
@@ -20,7 +25,7 @@ struct ExpectedRow {
   int delay_ms;
   std::int32_t release;
   int recover_ms;
-  char recovery;         ///< 'a'utomatic, 'c'lear, 's'ervice
+  char recovery;  ///< 'a'utomatic, 'c'lear, 's'ervice
   const char* reaction;
 };
 

@@ -1,5 +1,6 @@
-// Every protection against the cases: just below its threshold, just above, noise around it, during every other fault; how fast, how it ends.
-// Once on the values of the quantities, for all rows; once on samples of a pack in a truck, for the rows that samples tell.
+// Every protection against the cases: just below its threshold, just above, noise around it, during every other fault;
+// how fast, how it ends. Once on the values of the quantities, for all rows; once on samples of a pack in a truck, for
+// the rows that samples tell.
 #include <cstring>
 #include <functional>
 #include <set>
@@ -38,10 +39,13 @@ class Rig {
     monitor.update(values, step_us, time_us, clear, may_serve);
     for (std::size_t k = 0; k < fault_count; ++k) {
       const std::int32_t value = at(values, of(expected_rows[k]));
-      const bool ends = pressed && (expected_rows[k].recovery == 'c' || (expected_rows[k].recovery == 's' && clear == Clear::service && has(kept, k) && may_serve));
-      const bool there = oracle_[k].see(value == no_reading ? Value() : Value(value), step_ms, ends);
+      const bool ends =
+          pressed && (expected_rows[k].recovery == 'c' ||
+                      (expected_rows[k].recovery == 's' && clear == Clear::service && has(kept, k) && may_serve));
+      const bool there = oracle_[k].see(value == measurement::no_reading ? Value() : Value(value), step_ms, ends);
       if (there != has(monitor.active(), k)) {
-        ADD_FAILURE() << expected_rows[k].name << (there ? " missed" : " false") << " at " << time_us << " us with " << value;
+        ADD_FAILURE() << expected_rows[k].name << (there ? " missed" : " false") << " at " << time_us << " us with "
+                      << value;
         wrong = true;
       }
     }
@@ -88,10 +92,15 @@ const auto signal_name = [](const auto& row) { return std::string(expected_rows[
 INSTANTIATE_TEST_SUITE_P(Rows, EveryProtection, ::testing::Range<std::size_t>(0, fault_count), signal_name);
 
 class ClearedProtection : public EveryProtection {};
-INSTANTIATE_TEST_SUITE_P(Rows, ClearedProtection, ::testing::ValuesIn(rows([](std::size_t k) { return expected_rows[k].recovery == 'c' && expected_rows[k].recover_ms > 0; })), signal_name);
+INSTANTIATE_TEST_SUITE_P(Rows, ClearedProtection, ::testing::ValuesIn(rows([](std::size_t k) {
+                           return expected_rows[k].recovery == 'c' && expected_rows[k].recover_ms > 0;
+                         })),
+                         signal_name);
 
 class ServicedProtection : public EveryProtection {};
-INSTANTIATE_TEST_SUITE_P(Rows, ServicedProtection, ::testing::ValuesIn(rows([](std::size_t k) { return expected_rows[k].recovery == 's'; })), signal_name);
+INSTANTIATE_TEST_SUITE_P(Rows, ServicedProtection,
+                         ::testing::ValuesIn(rows([](std::size_t k) { return expected_rows[k].recovery == 's'; })),
+                         signal_name);
 
 TEST_P(EveryProtection, StaysSilentAtItsThreshold) {
   Rig rig;
@@ -115,7 +124,7 @@ TEST_P(EveryProtection, ComesAfterItsDelayOneUnitBeyondAndNoSooner) {
 TEST_P(EveryProtection, IsNeitherMissedNorFalseInNoise) {
   const Levels l = levels(row);
   if (l.noise == 0) {  // a quantity of 0 and 1: a contact that is loose
-    truth::Random random(GetParam());
+    plant::Random random(GetParam());
     Rig rig;
     for (int k = 0; k < 3'000 && !rig.wrong; ++k) {
       rig.set(row, random.uniform() < 0.3 ? 1 : 0);
@@ -125,7 +134,7 @@ TEST_P(EveryProtection, IsNeitherMissedNorFalseInNoise) {
   }
   const int sign = row.beyond == '>' ? 1 : -1;
   for (const int offset : {-1, 0, 1}) {  // three sigma below, on, three sigma above
-    truth::Random random(GetParam() * 3 + static_cast<std::size_t>(offset + 1));
+    plant::Random random(GetParam() * 3 + static_cast<std::size_t>(offset + 1));
     Rig rig;
     int fired_ms = -1;
     for (int t = 0; t < 3 * row.delay_ms + 20'000 && !rig.wrong; t += step_ms) {
@@ -134,7 +143,9 @@ TEST_P(EveryProtection, IsNeitherMissedNorFalseInNoise) {
       rig.step();
       if (fired_ms < 0 && there(rig)) fired_ms = t;
     }
-    if (offset < 0) { EXPECT_EQ(fired_ms, -1); }
+    if (offset < 0) {
+      EXPECT_EQ(fired_ms, -1);
+    }
     if (offset > 0) {
       EXPECT_GE(fired_ms, row.delay_ms);
       EXPECT_LE(fired_ms, row.delay_ms + step_ms);
@@ -248,7 +259,9 @@ TEST_P(EveryProtection, CountsToTheMicrosecond) {
   for (int k = 0; k < 2; ++k) {
     EXPECT_TRUE(step(row.release, 1'000)) << "starts the time for it to go";
     EXPECT_TRUE(step(row.release, rule.recover_us - 1, Clear::user));
-    if (k == 0) { EXPECT_TRUE(step(row.release + (row.beyond == '>' ? 1 : -1), 1'000)) << "and anew"; }
+    if (k == 0) {
+      EXPECT_TRUE(step(row.release + (row.beyond == '>' ? 1 : -1), 1'000)) << "and anew";
+    }
   }
   EXPECT_EQ(step(row.release, 1), row.recovery == 'c');
   EXPECT_FALSE(step(row.release, 0, Clear::user));
@@ -256,20 +269,21 @@ TEST_P(EveryProtection, CountsToTheMicrosecond) {
 
 TEST_P(EveryProtection, NeitherComesNorGoesWhileItsQuantityIsNotKnown) {
   Rig rig;
-  rig.set(row, no_reading);
+  rig.set(row, measurement::no_reading);
   rig.run(row.delay_ms + 5'000);
   EXPECT_FALSE(there(rig));
   rig.set(row, levels(row).just_above);
   rig.run(row.delay_ms + 2 * step_ms);
   ASSERT_TRUE(there(rig));
-  rig.set(row, no_reading);
+  rig.set(row, measurement::no_reading);
   rig.run(row.recover_ms + 5'000);
   EXPECT_TRUE(there(rig));
 }
 
 TEST(ProtectionTable, KeepsOnlyFaultsOfServiceOverAPowerCycle) {
   const FaultMonitor m(pack.rules, 0xFFFF'FFFF);
-  for (std::size_t k = 0; k < fault_count; ++k) EXPECT_EQ(has(m.active(), k), expected_rows[k].recovery == 's') << expected_rows[k].name;
+  for (std::size_t k = 0; k < fault_count; ++k)
+    EXPECT_EQ(has(m.active(), k), expected_rows[k].recovery == 's') << expected_rows[k].name;
 }
 
 // ---- first cause
@@ -407,21 +421,24 @@ TEST(FaultsWithAFlippedBit, AreDistrustedAndNoneIsForgotten) {
 
 // ---- quantities of any sample
 
-/// Readings as no pack gives them: every cell and every sensor is once the highest, the lowest, missing, stuck, shifted against its neighbour.
+/// Readings as no pack gives them: every cell and every sensor is once the highest, the lowest, missing, stuck, shifted
+/// against its neighbour.
 TEST(Quantities, OfAnySampleAreThoseOfTheirDefinitions) {
-  truth::Random random(23);
+  plant::Random random(23);
   const auto whole = [&](int from, int to) { return from + static_cast<int>(random.uniform() * (to - from + 1)); };
   int shifted = 0, stuck_cells = 0, stuck_sensors = 0;
   for (int run = 0; run < 60; ++run) {
     PackQuantities<16> quantities(pack.limits);
     QuantityOracle oracle;
-    PackSample<16> s;
+    measurement::PackSample<16> s;
     const double missing = run % 3 == 0 ? 0 : 0.05, same = run % 2 == 0 ? 0.2 : 0.9;
     for (int step = 0; step < 100; ++step) {
       const int level_uv = 3'300'000 + whole(-60, 60) * 1'000, level_cdegc = 2'000 + whole(-800, 800);
       for (auto& uv : s.cell_uv) {
-        if (random.uniform() < same && uv != no_reading) continue;
-        uv = random.uniform() < missing ? no_reading : random.uniform() < 0.1 ? whole(-500'000, 5'000'000) : level_uv + whole(-20'000, 20'000);
+        if (random.uniform() < same && uv != measurement::no_reading) continue;
+        uv = random.uniform() < missing ? measurement::no_reading
+             : random.uniform() < 0.1   ? whole(-500'000, 5'000'000)
+                                        : level_uv + whole(-20'000, 20'000);
       }
       if (random.uniform() < 0.3) {  // a broken wire, wherever; or a reading that cannot be, beside one that can
         const auto k = static_cast<std::size_t>(whole(0, 14));
@@ -430,23 +447,26 @@ TEST(Quantities, OfAnySampleAreThoseOfTheirDefinitions) {
         s.cell_uv[k + 1] = level_uv - by + whole(-100'000, 100'000);
       }
       for (auto& t : s.temperature_cdegc) {
-        if (random.uniform() < same && t != no_temperature) continue;
-        t = random.uniform() < 2 * missing ? no_temperature : static_cast<std::int16_t>(level_cdegc + whole(-3'000, 3'000));
+        if (random.uniform() < same && t != measurement::no_temperature) continue;
+        t = random.uniform() < 2 * missing ? measurement::no_temperature
+                                           : static_cast<std::int16_t>(level_cdegc + whole(-3'000, 3'000));
       }
-      s.current_ua = random.uniform() < missing ? no_reading : whole(-40'000'000, 40'000'000);
-      s.pack_uv = random.uniform() < missing ? no_reading : 16 * level_uv + whole(-1'000'000, 1'000'000);
+      s.current_ua = random.uniform() < missing ? measurement::no_reading : whole(-40'000'000, 40'000'000);
+      s.pack_uv = random.uniform() < missing ? measurement::no_reading : 16 * level_uv + whole(-1'000'000, 1'000'000);
       Quantities q = nothing_known();
       quantities.update(s, step_us, q);
       const auto expected = oracle.see(s, false);
       for (std::size_t k = 0; k < 26; ++k) {
         if (!told_by_samples(k) || k == 18) continue;  // heat: below; disbelief is the estimator's
-        ASSERT_EQ(at(q, pack.rules[k].quantity), expected[k].value_or(no_reading)) << expected_rows[k].name << ", run " << run << ", sample " << step;
+        ASSERT_EQ(at(q, pack.rules[k].quantity), expected[k].value_or(measurement::no_reading))
+            << expected_rows[k].name << ", run " << run << ", sample " << step;
       }
       shifted += expected[16].value_or(0) > 0 ? 1 : 0;
       stuck_cells += expected[21].value_or(0) > 0 ? 1 : 0;
       stuck_sensors += expected[24].value_or(0) > 0 ? 1 : 0;
       std::int64_t sum = 0;
-      for (const std::int32_t uv : s.cell_uv) sum = uv < -500'000 || uv > 6'000'000 || sum == no_reading ? no_reading : sum + uv;
+      for (const std::int32_t uv : s.cell_uv)
+        sum = uv < -500'000 || uv > 6'000'000 || sum == measurement::no_reading ? measurement::no_reading : sum + uv;
       ASSERT_EQ(quantities.sum_uv(), sum);
     }
   }
@@ -461,9 +481,10 @@ TEST(Quantities, OfReadingsThatCannotBeAreMissing) {
     std::int16_t cdegc;
     bool there;
   };
-  for (const Case& c : {Case{-500'000, -6'000, true}, Case{6'000'000, 15'000, true}, Case{-500'001, -6'001, false}, Case{6'000'001, 15'001, false}}) {
+  for (const Case& c : {Case{-500'000, -6'000, true}, Case{6'000'000, 15'000, true}, Case{-500'001, -6'001, false},
+                        Case{6'000'001, 15'001, false}}) {
     PackQuantities<16> quantities(pack.limits);
-    PackSample<16> s;
+    measurement::PackSample<16> s;
     s.cell_uv.fill(3'300'000);
     s.temperature_cdegc.fill(2'500);
     s.pack_uv = 0;  // shorted is a reading
@@ -481,13 +502,14 @@ TEST(Quantities, OfReadingsThatCannotBeAreMissing) {
 template <std::size_t Cells>
 std::int32_t stuck_in_a_small_pack(std::int32_t others_move_uv, bool pack_known, bool one_missing = false) {
   PackQuantities<Cells> quantities(pack.limits);
-  PackSample<Cells> s;
+  measurement::PackSample<Cells> s;
   Quantities q = nothing_known();
   for (int k = 0; k < 7; ++k) {
     const std::int32_t moved_uv = k < 6 ? 0 : others_move_uv;
-    for (std::size_t c = 0; c < Cells; ++c) s.cell_uv[c] = 3'300'000 + static_cast<std::int32_t>(c) * 100 + (c == 0 ? 0 : moved_uv + k % 2);
-    if (one_missing) s.cell_uv[Cells - 1] = no_reading;
-    s.pack_uv = pack_known ? static_cast<std::int32_t>(Cells) * (3'300'000 + moved_uv) : no_reading;
+    for (std::size_t c = 0; c < Cells; ++c)
+      s.cell_uv[c] = 3'300'000 + static_cast<std::int32_t>(c) * 100 + (c == 0 ? 0 : moved_uv + k % 2);
+    if (one_missing) s.cell_uv[Cells - 1] = measurement::no_reading;
+    s.pack_uv = pack_known ? static_cast<std::int32_t>(Cells) * (3'300'000 + moved_uv) : measurement::no_reading;
     quantities.update(s, step_us, q);
   }
   return at(q, Quantity::voltages_stuck);
@@ -498,15 +520,15 @@ TEST(Quantities, OfLessThanFourCellsGoByThePacksOwnReading) {
   EXPECT_EQ(stuck_in_a_small_pack<1>(20'001, true), 1);
   EXPECT_EQ(stuck_in_a_small_pack<2>(-20'001, true), 1);
   EXPECT_EQ(stuck_in_a_small_pack<3>(-20'001, true), 1);
-  EXPECT_EQ(stuck_in_a_small_pack<3>(-20'001, false), no_reading);
+  EXPECT_EQ(stuck_in_a_small_pack<3>(-20'001, false), measurement::no_reading);
   EXPECT_EQ(stuck_in_a_small_pack<4>(20'100, false), 1) << "four know it by themselves";
-  EXPECT_EQ(stuck_in_a_small_pack<4>(20'100, false, true), no_reading) << "three of four do not";
+  EXPECT_EQ(stuck_in_a_small_pack<4>(20'100, false, true), measurement::no_reading) << "three of four do not";
   EXPECT_EQ(stuck_in_a_small_pack<4>(20'001, true, true), 1);
 }
 
 TEST(Quantities, OfOneReadableCellAreItsOwnAndOfNoneAreNotKnown) {
   PackQuantities<16> quantities(pack.limits);
-  PackSample<16> s;
+  measurement::PackSample<16> s;
   Quantities q = nothing_known();
   s.cell_uv[6] = 3'300'000;
   quantities.update(s, step_us, q);
@@ -515,10 +537,12 @@ TEST(Quantities, OfOneReadableCellAreItsOwnAndOfNoneAreNotKnown) {
   EXPECT_EQ(at(q, Quantity::spread_uv), 0);
   EXPECT_EQ(at(q, Quantity::opposite_shift_uv), 0);
   EXPECT_EQ(at(q, Quantity::voltages_missing), 16) << "fifteen cells and the pack";
-  s.cell_uv[6] = no_reading;
+  s.cell_uv[6] = measurement::no_reading;
   s.pack_uv = 52'800'000;
   quantities.update(s, step_us, q);
-  for (const Quantity of : {Quantity::highest_cell_uv, Quantity::lowest_cell_uv, Quantity::spread_uv, Quantity::opposite_shift_uv, Quantity::voltages_stuck, Quantity::sum_error_uv}) EXPECT_EQ(at(q, of), no_reading);
+  for (const Quantity of : {Quantity::highest_cell_uv, Quantity::lowest_cell_uv, Quantity::spread_uv,
+                            Quantity::opposite_shift_uv, Quantity::voltages_stuck, Quantity::sum_error_uv})
+    EXPECT_EQ(at(q, of), measurement::no_reading);
   EXPECT_EQ(at(q, Quantity::voltages_missing), 16);
   EXPECT_EQ(at(q, Quantity::pack_uv), 52'800'000);
 }
@@ -527,7 +551,7 @@ TEST(Quantities, OfACellThatMustNotBeChargedHeatByAnyCurrent) {
   PackDesign d = forklift;
   d.limits.charge_current_max_a = 0;
   PackQuantities<16> quantities(pack_limits(d));
-  PackSample<16> s;
+  measurement::PackSample<16> s;
   s.current_ua = 2'560;
   Quantities q = nothing_known();
   quantities.update(s, 1'000'000, q);
@@ -538,14 +562,14 @@ TEST(Quantities, OfASensorThatIsNotFittedAreNotMissed) {
   PackDesign d = forklift;
   d.temperatures = 2;
   PackQuantities<16> quantities(pack_limits(d));
-  PackSample<16> s;
-  s.temperature_cdegc = {2'500, no_temperature, 9'000, -5'000};
+  measurement::PackSample<16> s;
+  s.temperature_cdegc = {2'500, measurement::no_temperature, 9'000, -5'000};
   Quantities q = nothing_known();
   quantities.update(s, step_us, q);
   EXPECT_EQ(at(q, Quantity::temperatures_missing), 1);
   EXPECT_EQ(at(q, Quantity::highest_cdegc), 2'500);
   EXPECT_EQ(at(q, Quantity::lowest_cdegc), 2'500);
-  EXPECT_EQ(at(q, Quantity::temperatures_stuck), no_reading) << "one alone tells nothing";
+  EXPECT_EQ(at(q, Quantity::temperatures_stuck), measurement::no_reading) << "one alone tells nothing";
   d.temperatures = 9;
   EXPECT_EQ(pack_limits(d).temperatures, 4) << "as many as a sample has";
 }
@@ -561,10 +585,12 @@ class Truck : public TruckPack {
 
   std::uint32_t step(const Change& change = {}) {
     measure(protection.decision().outputs, change);
-    const std::uint32_t faults = protection.update(sample, estimate, orders).faults, expected = oracle_.see(sample, estimate.contradicts);
+    const std::uint32_t faults = protection.update(sample, estimate, orders).faults,
+                        expected = oracle_.see(sample, estimate.contradicts);
     for (std::size_t k = 0; k < 26; ++k) {
       if (!told_by_samples(k) || has(expected, k) == has(faults, k)) continue;  // heat: ProtectionAgainstHeat
-      ADD_FAILURE() << expected_rows[k].name << (has(expected, k) ? " missed" : " false") << " at " << steps() * 100 << " ms, value " << oracle_.values[k].value_or(no_reading);
+      ADD_FAILURE() << expected_rows[k].name << (has(expected, k) ? " missed" : " false") << " at " << steps() * 100
+                    << " ms, value " << oracle_.values[k].value_or(measurement::no_reading);
       wrong = true;
     }
     return faults;
@@ -584,7 +610,10 @@ class EverySampledProtection : public ::testing::TestWithParam<std::size_t> {
 INSTANTIATE_TEST_SUITE_P(Rows, EverySampledProtection, ::testing::ValuesIn(rows(told_by_samples)), signal_name);
 
 class EveryMeasuredProtection : public EverySampledProtection {};
-INSTANTIATE_TEST_SUITE_P(Rows, EveryMeasuredProtection, ::testing::ValuesIn(rows([](std::size_t k) { return told_by_samples(k) && levels(expected_rows[k]).noise > 0; })), signal_name);
+INSTANTIATE_TEST_SUITE_P(Rows, EveryMeasuredProtection, ::testing::ValuesIn(rows([](std::size_t k) {
+                           return told_by_samples(k) && levels(expected_rows[k]).noise > 0;
+                         })),
+                         signal_name);
 
 TEST_P(EverySampledProtection, ComesOfSamplesBeyondItAndOfNoOthers) {
   const std::size_t k = GetParam();
@@ -596,7 +625,8 @@ TEST_P(EverySampledProtection, ComesOfSamplesBeyondItAndOfNoOthers) {
     // what stands still is found when the others have moved, within half of their 40 s
     const int patience_ms = row.delay_ms + (waits_for_others(k) ? 60'000 : 3'000);
     for (int t = 0; t < patience_ms && !truck.wrong; t += step_ms) {
-      const std::uint32_t faults = truck.step([&](auto& s, auto& e, auto&) { inject(k, beyond ? l.just_above : l.just_below, truck, s, e); });
+      const std::uint32_t faults =
+          truck.step([&](auto& s, auto& e, auto&) { inject(k, beyond ? l.just_above : l.just_below, truck, s, e); });
       if (since_ms < 0) since_ms = t;
       if (fired_ms < 0 && has(faults, k)) fired_ms = t;
     }
@@ -620,12 +650,15 @@ TEST_P(EveryMeasuredProtection, IsNeitherMissedNorFalseInNoiseAroundItsThreshold
     Truck truck(100 + k * 3 + static_cast<std::size_t>(offset + 1));
     int fired_ms = -1;
     for (int t = 0; t < row.delay_ms + 20'000 && !truck.wrong; t += step_ms) {
-      const auto value = row.threshold + sign * offset * (noise + 2) + static_cast<std::int32_t>(noise * truck.chance());
+      const auto value =
+          row.threshold + sign * offset * (noise + 2) + static_cast<std::int32_t>(noise * truck.chance());
       const std::uint32_t faults = truck.step([&](auto& s, auto& e, auto&) { inject(k, value, truck, s, e); });
       if (fired_ms < 0 && has(faults, k)) fired_ms = t;
     }
     ASSERT_FALSE(truck.wrong);
-    if (offset < 0) { EXPECT_EQ(fired_ms, -1); }
+    if (offset < 0) {
+      EXPECT_EQ(fired_ms, -1);
+    }
     if (offset > 0) {
       EXPECT_GE(fired_ms, row.delay_ms);
       EXPECT_LE(fired_ms, row.delay_ms + step_ms);
@@ -658,24 +691,29 @@ TEST(ProtectionOfATruck, IsSilentForTenMinutesWithNothingWrong) {
 // ---- heat
 
 class ProtectionAgainstHeat : public ::testing::TestWithParam<double> {};
-INSTANTIATE_TEST_SUITE_P(Loads, ProtectionAgainstHeat, ::testing::Values(-4.0, -2.0, -1.5, -1.2, 1.2, 1.5, 2.0, 4.0), [](const auto& load) {
-  return std::string(load.param < 0 ? "Discharge" : "Charge") + std::to_string(static_cast<int>(std::abs(load.param) * 10)) + "Tenths";
-});
+INSTANTIATE_TEST_SUITE_P(Loads, ProtectionAgainstHeat, ::testing::Values(-4.0, -2.0, -1.5, -1.2, 1.2, 1.5, 2.0, 4.0),
+                         [](const auto& load) {
+                           return std::string(load.param < 0 ? "Discharge" : "Charge") +
+                                  std::to_string(static_cast<int>(std::abs(load.param) * 10)) + "Tenths";
+                         });
 
-/// Trip time of an ideal integral: 30 s over (i^2 - 1), i = I / (1.05 x 6 A). The integer one is 0.8 % off at most (a 256th in i).
+/// Trip time of an ideal integral: 30 s over (i^2 - 1), i = I / (1.05 x 6 A). The integer one is 0.8 % off at most (a
+/// 256th in i).
 TEST_P(ProtectionAgainstHeat, TripsWhenTheIntegralOfTheSquareIsFull) {
   const double i = GetParam() * 6 / 6.3, expected_s = 30 / (i * i - 1);
   Truck truck(3);
   double fired_s = -1;
   const Fault fault = GetParam() < 0 ? Fault::discharge_overcurrent : Fault::charge_overcurrent;
   for (int t = 0; t < 1'000 * expected_s * 1.1 + 2'000 && fired_s < 0; t += step_ms) {
-    const std::uint32_t faults = truck.step([&](auto& s, auto&, auto&) { s.current_ua = static_cast<std::int32_t>(6e6 * GetParam()); });
+    const std::uint32_t faults =
+        truck.step([&](auto& s, auto&, auto&) { s.current_ua = static_cast<std::int32_t>(6e6 * GetParam()); });
     if ((faults & bit(fault)) != 0) fired_s = (t + step_ms) / 1e3;
   }
   EXPECT_NEAR(fired_s, expected_s, 0.1 + expected_s * 2 * i * i / (i * i - 1) / (256 * std::abs(i)) * 1.05);
 }
 
-/// (I / limit)^2 - 1 over the time, of 1.05 times the continuous limit; not below 0, beyond ten times as if it were ten.
+/// (I / limit)^2 - 1 over the time, of 1.05 times the continuous limit; not below 0, beyond ten times as if it were
+/// ten.
 TEST(ProtectionAgainstHeatOf, ACurrentIsTheSquareOfItOverItsLimit) {
   for (const double limit_a : {6.0, 300.0}) {
     PackDesign d = forklift;
@@ -683,9 +721,10 @@ TEST(ProtectionAgainstHeatOf, ACurrentIsTheSquareOfItOverItsLimit) {
     d.limits.discharge_current_max_a = 2 * limit_a;
     for (const int sign : {1, -1}) {
       const double from_a = 1.05 * (sign > 0 ? limit_a : 2 * limit_a);
-      const Quantity mine = sign > 0 ? Quantity::charge_heat_us : Quantity::discharge_heat_us, other = sign > 0 ? Quantity::discharge_heat_us : Quantity::charge_heat_us;
+      const Quantity mine = sign > 0 ? Quantity::charge_heat_us : Quantity::discharge_heat_us,
+                     other = sign > 0 ? Quantity::discharge_heat_us : Quantity::charge_heat_us;
       PackQuantities<16> quantities(pack_limits(d));
-      PackSample<16> s;
+      measurement::PackSample<16> s;
       Quantities q = nothing_known();
       const auto heat_s = [&](double times, std::uint32_t us) {
         s.current_ua = sign * static_cast<std::int32_t>(1e6 * times * from_a);
@@ -702,9 +741,9 @@ TEST(ProtectionAgainstHeatOf, ACurrentIsTheSquareOfItOverItsLimit) {
       EXPECT_NEAR(heat_s(10, 100'000), 9.9, 0.1);
       EXPECT_NEAR(heat_s(0, 9'900'000), 0, 0.1);
       EXPECT_NEAR(heat_s(14, 100'000), 9.9, 0.1) << "a short circuit, anyway";
-      s.current_ua = no_reading;
+      s.current_ua = measurement::no_reading;
       quantities.update(s, 100'000, q);
-      EXPECT_EQ(at(q, mine), no_reading);
+      EXPECT_EQ(at(q, mine), measurement::no_reading);
       EXPECT_NEAR(heat_s(1, 100'000), 9.9, 0.1) << "neither heats nor cools while it is not known";
       for (int k = 0; k < 100; ++k) heat_s(10, 60'000'000);
       EXPECT_EQ(at(q, mine), 2'000'000'000) << "stops there";
@@ -714,7 +753,7 @@ TEST(ProtectionAgainstHeatOf, ACurrentIsTheSquareOfItOverItsLimit) {
 
 TEST(ProtectionAgainstHeatOf, ARestIsCooledByItsTimeExactly) {
   PackQuantities<16> quantities(pack.limits);
-  PackSample<16> s;
+  measurement::PackSample<16> s;
   Quantities q = nothing_known();
   s.current_ua = 12'000'000;
   quantities.update(s, 1'000'000, q);
@@ -728,7 +767,9 @@ TEST(ProtectionAgainstHeatOf, TheContinuousCurrentAndShortBurstsNeverTrips) {
   Truck truck(4);
   for (int t = 0; t < 600'000; t += step_ms) {
     const bool burst = t / 1'000 % 40 < 8;  // twice the limit for 8 of 40 s
-    const std::uint32_t faults = truck.step([&](auto& s, auto&, auto&) { s.current_ua = t < 300'000 ? -6'300'000 + 30'000 : burst ? -12'000'000 : -1'000'000; });
+    const std::uint32_t faults = truck.step([&](auto& s, auto&, auto&) {
+      s.current_ua = t < 300'000 ? -6'300'000 + 30'000 : burst ? -12'000'000 : -1'000'000;
+    });
     ASSERT_EQ(faults, 0U) << t;
   }
 }

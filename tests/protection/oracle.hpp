@@ -1,5 +1,5 @@
-// What faults there have to be, found another way: quantities straight from their definitions, delays from the whole history, numbers from
-// expected_rows.hpp. In integers of milliseconds and micro-units, so that equal means equal.
+// What faults there have to be, found another way: quantities straight from their definitions, delays from the whole
+// history, numbers from expected_rows.hpp. In integers of milliseconds and micro-units, so that equal means equal.
 #pragma once
 
 #include <algorithm>
@@ -10,15 +10,15 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/pack_sample.hpp"
+#include "measurement/pack_sample.hpp"
 #include "tests/protection/expected_rows.hpp"
 
 namespace bms::protection {
 
 using Value = std::optional<std::int64_t>;
 
-/// One row over the samples of its quantity. Score: milliseconds beyond less milliseconds not beyond since it last was at 0, counted from the
-/// first sample beyond; the fault is there when it reaches the delay.
+/// One row over the samples of its quantity. Score: milliseconds beyond less milliseconds not beyond since it last was
+/// at 0, counted from the first sample beyond; the fault is there when it reaches the delay.
 class RowOracle {
  public:
   explicit RowOracle(const ExpectedRow& row) : row_(&row) {}
@@ -28,8 +28,10 @@ class RowOracle {
     if (!value) return there_;
     if (!there_) {
       const bool beyond = row_->beyond == '>' ? *value > row_->threshold : *value < row_->threshold;
-      if (score_ < 0) score_ = beyond ? 0 : -1;
-      else score_ += beyond ? step_ms : -step_ms;
+      if (score_ < 0)
+        score_ = beyond ? 0 : -1;
+      else
+        score_ += beyond ? step_ms : -step_ms;
       if (score_ <= 0 && !beyond) score_ = -1;
       if (score_ >= row_->delay_ms) there_ = true, good_ms_ = -1;
       return there_;
@@ -46,10 +48,11 @@ class RowOracle {
   bool there_ = false;
 };
 
-/// The quantity of every row, from samples of sixteen cells and four temperatures. Rows of heat and of contactors are not told (nullopt).
+/// The quantity of every row, from samples of sixteen cells and four temperatures. Rows of heat and of contactors are
+/// not told (nullopt).
 class QuantityOracle {
  public:
-  using Sample16 = PackSample<16>;
+  using Sample16 = measurement::PackSample<16>;
 
   std::array<Value, fault_count> see(const Sample16& s, bool contradicts) {
     history_.push_back(s);
@@ -60,13 +63,14 @@ class QuantityOracle {
     }
     std::vector<std::int64_t> warm;
     for (const std::int16_t t : s.temperature_cdegc) {
-      if (t != no_temperature) warm.push_back(t);
+      if (t != measurement::no_temperature) warm.push_back(t);
     }
-    const bool pack = s.pack_uv != no_reading;
+    const bool pack = s.pack_uv != measurement::no_reading;
     const Value high = largest(cells), low = smallest(cells), hot = largest(warm), cold = smallest(warm);
     std::int64_t sum = 0;
     for (const std::int64_t v : cells) sum += v;
-    const Value packed = pack ? Value(s.pack_uv) : std::nullopt, amps = s.current_ua != no_reading ? Value(std::abs(s.current_ua)) : std::nullopt;
+    const Value packed = pack ? Value(s.pack_uv) : std::nullopt,
+                amps = s.current_ua != measurement::no_reading ? Value(std::abs(s.current_ua)) : std::nullopt;
     std::array<Value, fault_count> q;
     q[0] = q[1] = q[2] = high;
     q[3] = q[4] = q[5] = q[25] = low;
@@ -90,8 +94,12 @@ class QuantityOracle {
   /// From half a volt reversed to six.
   static bool readable(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
 
-  static Value largest(const std::vector<std::int64_t>& v) { return v.empty() ? Value() : Value(*std::max_element(v.begin(), v.end())); }
-  static Value smallest(const std::vector<std::int64_t>& v) { return v.empty() ? Value() : Value(*std::min_element(v.begin(), v.end())); }
+  static Value largest(const std::vector<std::int64_t>& v) {
+    return v.empty() ? Value() : Value(*std::max_element(v.begin(), v.end()));
+  }
+  static Value smallest(const std::vector<std::int64_t>& v) {
+    return v.empty() ? Value() : Value(*std::min_element(v.begin(), v.end()));
+  }
 
   static Value shift(const Sample16& s) {
     std::int64_t sum = 0, n = 0;
@@ -102,8 +110,10 @@ class QuantityOracle {
     const std::int64_t mean = sum / n;
     std::int64_t most = 0;
     for (int k = 0; k < 15; ++k) {
-      if (!readable(s.cell_uv[static_cast<std::size_t>(k)]) || !readable(s.cell_uv[static_cast<std::size_t>(k) + 1])) continue;
-      const std::int64_t a = s.cell_uv[static_cast<std::size_t>(k)] - mean, b = s.cell_uv[static_cast<std::size_t>(k) + 1] - mean;
+      if (!readable(s.cell_uv[static_cast<std::size_t>(k)]) || !readable(s.cell_uv[static_cast<std::size_t>(k) + 1]))
+        continue;
+      const std::int64_t a = s.cell_uv[static_cast<std::size_t>(k)] - mean,
+                         b = s.cell_uv[static_cast<std::size_t>(k) + 1] - mean;
       const std::int64_t both = std::min(std::abs(a), std::abs(b));
       const bool opposite = (a < 0 && b >= 0) || (b < 0 && a >= 0);
       if (opposite && std::abs(a + b) <= both / 2) most = std::max(most, both);
@@ -127,7 +137,10 @@ class QuantityOracle {
     std::int64_t count = 0;
     for (std::size_t k = 0; k < 16; ++k) {
       const auto reading = [&](std::size_t i) { return history_[i].cell_uv[k]; };
-      count += stuck(reading, readable, [&](std::size_t i) { return middle(history_[i]); }, 20'000) ? 1 : 0;
+      count += stuck(
+                   reading, readable, [&](std::size_t i) { return middle(history_[i]); }, 20'000)
+                   ? 1
+                   : 0;
     }
     return count;
   }
@@ -138,15 +151,20 @@ class QuantityOracle {
       const auto others = [&](std::size_t i) {
         std::int64_t sum = 0, n = 0;
         for (std::size_t o = 0; o < 4; ++o) {
-          if (o != k && history_[i].temperature_cdegc[o] != no_temperature) sum += history_[i].temperature_cdegc[o], ++n;
+          if (o != k && history_[i].temperature_cdegc[o] != measurement::no_temperature)
+            sum += history_[i].temperature_cdegc[o], ++n;
         }
         return n > 0 ? sum / n : 0;
       };
-      count += stuck(reading, [](std::int16_t t) { return t != no_temperature; }, others, 500) ? 1 : 0;
+      count += stuck(
+                   reading, [](std::int16_t t) { return t != measurement::no_temperature; }, others, 500)
+                   ? 1
+                   : 0;
     }
     return count;
   }
-  /// The last readings that are there are all the same, six or more, and the others are elsewhere than at the first of them.
+  /// The last readings that are there are all the same, six or more, and the others are elsewhere than at the first of
+  /// them.
   template <class Reading, class There, class Others>
   bool stuck(const Reading& reading, const There& there, const Others& others, std::int64_t move) const {
     const std::size_t last = history_.size() - 1;

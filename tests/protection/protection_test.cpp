@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host_sim/recording.hpp"
+#include "files/recording.hpp"
 #include "plant/random.hpp"
 #include "tests/protection/expected_rows.hpp"
 #include "tests/protection/scenario.hpp"
@@ -22,7 +22,8 @@ constexpr ProtectionPlan pack = protection_plan(forklift);
 
 /// A pack on the bench in a state that can be asked for; readings always move a little.
 struct Bench {
-  explicit Bench(std::uint64_t start_us = 0, const ProtectionPlan& plan = pack, std::uint32_t period_us = 100'000) : protection(plan), time_us(start_us), period(period_us) {
+  explicit Bench(std::uint64_t start_us = 0, const ProtectionPlan& plan = pack, std::uint32_t period_us = 100'000)
+      : protection(plan), time_us(start_us), period(period_us) {
     estimate.soc_ppb = 600'000'000;
   }
   const Decision& step() {
@@ -30,16 +31,21 @@ struct Bench {
     ++count;
     const Outputs out = protection.decision().outputs;
     closed = out.main_plus && out.main_minus;
-    for (std::size_t k = 0; k < 16; ++k) sample.cell_uv[k] = base_uv + static_cast<std::int32_t>(500 * ((count + k) % 3));
-    for (std::size_t k = 0; k < 4; ++k) sample.temperature_cdegc[k] = static_cast<std::int16_t>(2'500 + (count + k) % 5);
+    for (std::size_t k = 0; k < 16; ++k)
+      sample.cell_uv[k] = base_uv + static_cast<std::int32_t>(500 * ((count + k) % 3));
+    for (std::size_t k = 0; k < 4; ++k)
+      sample.temperature_cdegc[k] = static_cast<std::int16_t>(2'500 + (count + k) % 5);
     sample.current_ua = closed ? load_ua : 0;
     if (change) change(sample);
     std::int64_t sum = 0;
     for (const std::int32_t uv : sample.cell_uv) sum += uv;
     sample.pack_uv = static_cast<std::int32_t>(sum);
-    if (closed) link_uv = static_cast<double>(sample.pack_uv);
-    else if (out.precharge && out.main_minus) link_uv += (static_cast<double>(sample.pack_uv) - link_uv) * 0.18;
-    else link_uv *= 0.97;
+    if (closed)
+      link_uv = static_cast<double>(sample.pack_uv);
+    else if (out.precharge && out.main_minus)
+      link_uv += (static_cast<double>(sample.pack_uv) - link_uv) * 0.18;
+    else
+      link_uv *= 0.97;
     orders.link_uv = static_cast<std::int32_t>(link_uv);
     return protection.update(sample, estimate, orders);
   }
@@ -56,7 +62,7 @@ struct Bench {
   }
 
   Protection<16> protection;
-  PackSample<16> sample;
+  measurement::PackSample<16> sample;
   PackEstimate<16> estimate;
   Orders orders;
   std::uint64_t time_us;
@@ -64,7 +70,7 @@ struct Bench {
   std::int32_t base_uv = 3'300'000, load_ua = 0;
   double link_uv = 0;
   bool closed = false;
-  std::function<void(PackSample<16>&)> change;
+  std::function<void(measurement::PackSample<16>&)> change;
 };
 
 TEST(Protection, OpensTheContactorsWithin300msOfASevereOvervoltage) {
@@ -103,8 +109,11 @@ TEST(Protection, TellsTheTruckToStopBeforeItOpensAndOpensWhenTheTruckDoesNot) {
     }
     EXPECT_GT(told_s, 0.5) << "ramped, not cut";
     EXPECT_LE(told_s, 2.2);
-    if (obeys) { EXPECT_EQ(opened_s, -1); }
-    else { EXPECT_NEAR(opened_s, 2.1 + 5.0, 0.2) << "two seconds of delay, five of grace"; }
+    if (obeys) {
+      EXPECT_EQ(opened_s, -1);
+    } else {
+      EXPECT_NEAR(opened_s, 2.1 + 5.0, 0.2) << "two seconds of delay, five of grace";
+    }
   }
 }
 
@@ -146,13 +155,15 @@ TEST(Protection, WithoutSamplesOpensFromEveryState) {
         b.run(2);
       }
       tried.insert(b.protection.decision().state);
-      for (std::uint64_t after_us = 10'000; after_us <= 520'000; after_us += 10'000) b.protection.without_sample(b.time_us + after_us);
+      for (std::uint64_t after_us = 10'000; after_us <= 520'000; after_us += 10'000)
+        b.protection.without_sample(b.time_us + after_us);
       ASSERT_FALSE(b.protection.decision().outputs.any_closed()) << steps;
       ASSERT_EQ(b.protection.decision().allowed.discharge_ua, 0);
       ASSERT_EQ(b.protection.decision().allowed.charge_ua, 0);
     }
   }
-  EXPECT_TRUE(tried.contains(ContactorState::self_test) && tried.contains(ContactorState::precharge) && tried.contains(ContactorState::drive) && tried.contains(ContactorState::charge) &&
+  EXPECT_TRUE(tried.contains(ContactorState::self_test) && tried.contains(ContactorState::precharge) &&
+              tried.contains(ContactorState::drive) && tried.contains(ContactorState::charge) &&
               tried.contains(ContactorState::unloading));
 }
 
@@ -194,14 +205,15 @@ TEST(Protection, CountsSamplesOfWhichNothingWasReadAsNone) {
   Bench b;
   b.drive_off();
   const std::uint64_t last = b.time_us;
-  PackSample<16> nothing;
+  measurement::PackSample<16> nothing;
   for (nothing.time_us = last + 100'000; nothing.time_us <= last + 600'000; nothing.time_us += 100'000) {
     b.protection.update(nothing, b.estimate, b.orders);
-    EXPECT_EQ(b.protection.decision().outputs.any_closed(), nothing.time_us - last <= 500'000) << nothing.time_us - last;
+    EXPECT_EQ(b.protection.decision().outputs.any_closed(), nothing.time_us - last <= 500'000)
+        << nothing.time_us - last;
   }
   EXPECT_EQ(b.protection.decision().faults, bit(Fault::samples_missing));
   for (const auto one : {0, 1, 2, 3}) {  // what has a single reading is a sample
-    PackSample<16> s;
+    measurement::PackSample<16> s;
     s.time_us = nothing.time_us += 100'000;
     if (one == 0) s.current_ua = 0;
     if (one == 1) s.pack_uv = 52'000'000;
@@ -219,7 +231,7 @@ TEST(Protection, CountsSamplesOfWhichNothingWasReadAsNone) {
 
 TEST(Protection, AResetByTheWatchdogIsAFaultAlsoWhenNothingIsMeasured) {
   Protection<16> p(pack);
-  PackSample<16> nothing;
+  measurement::PackSample<16> nothing;
   Orders orders{.board_fault = true};
   nothing.time_us = 100'000;
   p.update(nothing, {}, orders);
@@ -239,7 +251,8 @@ TEST(Protection, SaysOnceThatAFaultCame) {
 
 TEST(Protection, WithoutASampleFromTheStartSaysSo) {
   Protection<16> p(pack);
-  for (std::uint64_t now = 0; now <= 3'000'000; now += 10'000) EXPECT_EQ(p.without_sample(now).faults, 0U) << "a front end is not asked sooner";
+  for (std::uint64_t now = 0; now <= 3'000'000; now += 10'000)
+    EXPECT_EQ(p.without_sample(now).faults, 0U) << "a front end is not asked sooner";
   EXPECT_NE(p.without_sample(3'000'001).faults & bit(Fault::samples_missing), 0U);
   EXPECT_FALSE(p.decision().outputs.any_closed());
 }
@@ -255,9 +268,9 @@ TEST(Protection, ThatHadASampleWaitsNoLongerThanTheTableSays) {
 TEST(Protection, ATruckThatAskedBeforeTheFirstSampleGetsItsPower) {
   Bench b;
   b.orders.request = Request::drive;
-  const PackSample<16> nothing;
+  const measurement::PackSample<16> nothing;
   for (int k = 0; k < 15; ++k) {
-    PackSample<16> s = nothing;
+    measurement::PackSample<16> s = nothing;
     s.time_us = b.time_us += b.period;
     EXPECT_EQ(b.protection.update(s, {}, b.orders).state, ContactorState::off);
   }
@@ -274,7 +287,9 @@ TEST(Protection, DecidesTheSameAcrossAWrapOfTheClock) {
     b.orders.request = Request::drive;
     for (int k = 0; k < 900; ++k) {
       if (k == 60) b.load_ua = -3'000'000;
-      b.change = k > 100 && k < 180 ? std::function<void(PackSample<16>&)>([](auto& s) { s.cell_uv[2] = 3'720'000; }) : nullptr;
+      b.change = k > 100 && k < 180
+                     ? std::function<void(measurement::PackSample<16>&)>([](auto& s) { s.cell_uv[2] = 3'720'000; })
+                     : nullptr;
       if (k >= 300 && k < 309) {
         b.time_us += b.period;
         b.protection.without_sample(b.time_us);
@@ -282,15 +297,18 @@ TEST(Protection, DecidesTheSameAcrossAWrapOfTheClock) {
         b.step();
       }
       const Decision& d = b.protection.decision();
-      all.emplace_back(d.faults, static_cast<int>(d.state), d.outputs.any_closed(), d.allowed.charge_ua, d.first.fault == no_fault ? 0 : d.first.time_us - start_us);
+      all.emplace_back(d.faults, static_cast<int>(d.state), d.outputs.any_closed(), d.allowed.charge_ua,
+                       d.first.fault == no_fault ? 0 : d.first.time_us - start_us);
     }
     return all;
   };
   const auto from_zero = run(0);
   EXPECT_NE(std::get<0>(from_zero[175]), 0U);
   EXPECT_NE(std::get<0>(from_zero[310]) & bit(Fault::samples_missing), 0U);
-  for (const std::uint64_t wrap : {std::uint64_t{1} << 32, std::uint64_t{0}, std::uint64_t{1} << 63, std::uint64_t{1} << 31}) {
-    for (const std::uint64_t before_us : {14'000'000U, 30'500'000U}) EXPECT_EQ(run(wrap - before_us), from_zero) << wrap << ' ' << before_us;
+  for (const std::uint64_t wrap :
+       {std::uint64_t{1} << 32, std::uint64_t{0}, std::uint64_t{1} << 63, std::uint64_t{1} << 31}) {
+    for (const std::uint64_t before_us : {14'000'000U, 30'500'000U})
+      EXPECT_EQ(run(wrap - before_us), from_zero) << wrap << ' ' << before_us;
   }
 }
 
@@ -358,7 +376,9 @@ TEST(Protection, ForgetsNoFaultByAFlippedBitOfIt) {
   std::array<std::uint32_t, sizeof(Protection<16>) / 4> words{};
   std::memcpy(words.data(), static_cast<void*>(&b.protection), sizeof words);
   std::size_t at = 0;
-  while (at + 2 < words.size() && !(words[at] == there && words[at + 1] == ~there && words[at + 2] == (there ^ 0x5A3C'96A5))) ++at;
+  while (at + 2 < words.size() &&
+         !(words[at] == there && words[at + 1] == ~there && words[at + 2] == (there ^ 0x5A3C'96A5)))
+    ++at;
   ASSERT_LT(at + 2, words.size());
   for (std::size_t copy = 0; copy < 3; ++copy) {
     Bench flipped = b;
@@ -369,16 +389,20 @@ TEST(Protection, ForgetsNoFaultByAFlippedBitOfIt) {
   }
 }
 
-/// Any bit of all that protection keeps, not only of what is guarded: contactors open, or nothing that a later step does not mend.
+/// Any bit of all that protection keeps, not only of what is guarded: contactors open, or nothing that a later step
+/// does not mend.
 TEST(Protection, NeverClosesAgainstASevereFaultWhateverBitFlips) {
   Bench b;
   b.drive_off();
   b.change = [](auto& s) { s.cell_uv[0] = 4'000'000; };
-  truth::Random random(11);
+  plant::Random random(11);
   for (int trial = 0; trial < 4'000; ++trial) {
     Bench copy = b;
     auto* byte = reinterpret_cast<unsigned char*>(&copy.protection.contactors());
-    const std::size_t place = sizeof(void*) + static_cast<std::size_t>(random.uniform() * (sizeof(Contactors) - sizeof(void*)));  // all but the pointer to the plan
+    const std::size_t place =
+        sizeof(void*) +
+        static_cast<std::size_t>(random.uniform() *
+                                 (sizeof(Contactors) - sizeof(void*)));  // all but the pointer to the plan
     byte[place] = static_cast<unsigned char>(byte[place] ^ (1U << (random.bits() % 8)));
     for (int k = 0; k < 4; ++k) copy.step();
     ASSERT_FALSE(copy.protection.decision().outputs.any_closed()) << place;
@@ -429,7 +453,8 @@ TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
     apart.sample.time_us = apart.time_us += apart.period;
     apart.protection.update(apart.sample, apart.estimate, apart.orders);
   }
-  EXPECT_TRUE((apart.protection.decision().faults & bit(Fault::contactor_not_closed)) == 0) << "a reading now and then is no contactor";
+  EXPECT_TRUE((apart.protection.decision().faults & bit(Fault::contactor_not_closed)) == 0)
+      << "a reading now and then is no contactor";
   from = apart.time_us;
   while (apart.protection.decision().outputs.any_closed() && apart.time_us - from < 2'000'000) {
     apart.sample.time_us = apart.time_us += apart.period;
@@ -444,10 +469,11 @@ TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
 TEST(Protection, WithoutAnyTemperatureForbidsChargingAndHalvesDriving) {
   Bench b;
   b.drive_off();
-  b.change = [](auto& s) { s.temperature_cdegc.fill(no_temperature); };
+  b.change = [](auto& s) { s.temperature_cdegc.fill(measurement::no_temperature); };
   b.run(60);
   EXPECT_EQ(b.protection.decision().allowed.charge_ua, 0);
-  EXPECT_NEAR(b.protection.decision().allowed.discharge_ua, 1'500'000, 20'000) << "half for not knowing, half for the fault";
+  EXPECT_NEAR(b.protection.decision().allowed.discharge_ua, 1'500'000, 20'000)
+      << "half for not knowing, half for the fault";
 }
 
 TEST(Protection, AllowsNoCurrentUnlessTheContactorsAreClosedForIt) {
@@ -459,7 +485,8 @@ TEST(Protection, AllowsNoCurrentUnlessTheContactorsAreClosedForIt) {
   Bench closing;
   closing.orders.request = Request::drive;
   while (closing.protection.decision().state != ContactorState::drive && closing.count < 100) closing.step();
-  for (int k = 1; k < 20; ++k) EXPECT_LE(closing.step().allowed.discharge_ua, 120'000 * k) << "all of it in five seconds from the closing on";
+  for (int k = 1; k < 20; ++k)
+    EXPECT_LE(closing.step().allowed.discharge_ua, 120'000 * k) << "all of it in five seconds from the closing on";
   b.orders.request = Request::none;
   EXPECT_EQ(b.step().allowed.discharge_ua, 0) << "in the same step";
 }
@@ -478,7 +505,7 @@ TEST(Protection, BleedsWhileChargingAtTheTopAndNotWithAFaultThatOpens) {
   for (int k = 0; k < 200; ++k) all |= b.step().bleed;
   EXPECT_EQ(all, 1U << 4);
   EXPECT_GT(b.protection.decision().bleed_left_s, 3'600U);
-  b.change = [](auto& s) { s.cell_uv[4] = no_reading; };
+  b.change = [](auto& s) { s.cell_uv[4] = measurement::no_reading; };
   b.run(20);
   EXPECT_EQ(b.protection.decision().bleed, 0U);
 }
@@ -505,7 +532,8 @@ TEST(Protection, WithoutSamplesBleedsNothing) {
   b.estimate.cell_soc_ppb.fill(0);
   b.estimate.cell_soc_ppb[4] = 50'000'000;
   b.estimate.cell_sigma_ppb.fill(1'000'000);
-  while (b.step().bleed == 0 && b.count < 300) {}
+  while (b.step().bleed == 0 && b.count < 300) {
+  }
   ASSERT_NE(b.protection.decision().bleed, 0U);
   EXPECT_EQ(b.protection.without_sample(b.time_us + 600'000).bleed, 0U);
   const std::uint32_t left_s = b.protection.decision().bleed_left_s;
@@ -585,11 +613,13 @@ TEST(Protection, HoldsAKeyForOnePressOverAGapOfTheSamples) {
 
 TEST(Protection, IsClearedAlsoWhileNothingIsMeasured) {
   Protection<16> p(pack);
-  PackSample<16> nothing;
+  measurement::PackSample<16> nothing;
   for (int k = 1; k <= 60; ++k) {
     nothing.time_us = 100'000U * static_cast<unsigned>(k);
     p.update(nothing, {}, {.clear = k == 50 ? Clear::user : Clear::none, .board_fault = k == 1});
-    if (k == 49) { ASSERT_EQ(p.decision().faults, bit(Fault::internal_fault) | bit(Fault::samples_missing)); }
+    if (k == 49) {
+      ASSERT_EQ(p.decision().faults, bit(Fault::internal_fault) | bit(Fault::samples_missing));
+    }
   }
   EXPECT_EQ(p.decision().faults, bit(Fault::samples_missing));
 }
@@ -599,7 +629,7 @@ TEST(Protection, GoesByTheSumOfTheCellsWhereThePackIsNotReadForOnce) {
   b.orders.request = Request::drive;
   while (b.protection.decision().state != ContactorState::precharge && b.count < 100) b.step();
   b.sample.time_us += b.period;
-  b.sample.pack_uv = no_reading;
+  b.sample.pack_uv = measurement::no_reading;
   std::int32_t sum_uv = 0;
   for (const std::int32_t uv : b.sample.cell_uv) sum_uv += uv;
   b.orders.link_uv = sum_uv / 16 * 15 - 16;
@@ -635,7 +665,8 @@ TEST(Protection, LetsNoTimePassByAClockThatStands) {
   const std::uint64_t open_us = b.time_us + 500'001;
   EXPECT_EQ(b.protection.without_sample(open_us).state, ContactorState::opening);
   for (int k = 1; k < 50; ++k) b.protection.without_sample(open_us + 100'000U * static_cast<unsigned>(k));
-  for (int k = 0; k < 100; ++k) EXPECT_EQ(b.protection.without_sample(open_us + 4'999'999).state, ContactorState::opening);
+  for (int k = 0; k < 100; ++k)
+    EXPECT_EQ(b.protection.without_sample(open_us + 4'999'999).state, ContactorState::opening);
   EXPECT_EQ(b.protection.without_sample(open_us + 5'000'000).state, ContactorState::safe);
 }
 
@@ -645,7 +676,7 @@ TEST(Protection, OfOneCellOpensForItToo) {
   one.temperatures = 1;
   const ProtectionPlan plan = protection_plan(one);
   Protection<1> p(plan);
-  PackSample<1> s;
+  measurement::PackSample<1> s;
   PackEstimate<1> e;
   Orders orders{.request = Request::drive};
   double link_uv = 0;
@@ -655,44 +686,51 @@ TEST(Protection, OfOneCellOpensForItToo) {
     s.cell_uv[0] = s.pack_uv = k < 80 ? 3'300'000 + k : 1'700'000;
     s.temperature_cdegc[0] = 2'500;
     const Outputs out = p.decision().outputs;
-    link_uv = out.main_plus ? s.pack_uv : out.precharge && out.main_minus ? link_uv + (s.pack_uv - link_uv) * 0.18 : link_uv * 0.9;
+    link_uv = out.main_plus                     ? s.pack_uv
+              : out.precharge && out.main_minus ? link_uv + (s.pack_uv - link_uv) * 0.18
+                                                : link_uv * 0.9;
     orders.link_uv = static_cast<std::int32_t>(link_uv);
     p.update(s, e, orders);
-    if (k == 79) { ASSERT_EQ(p.decision().state, ContactorState::drive); }
+    if (k == 79) {
+      ASSERT_EQ(p.decision().state, ContactorState::drive);
+    }
   }
   EXPECT_FALSE(p.decision().outputs.any_closed());
   EXPECT_NE(p.decision().faults & bit(Fault::cell_undervoltage_severe), 0U);
 }
 
-/// Sixteen cells made of the shipped shift's one: each with an offset of charge (by the slope where it is), a resistance of its own and noise.
-/// The shift is sampled once a second; protection of such a pack knows that.
+/// Sixteen cells made of the shipped shift's one: each with an offset of charge (by the slope where it is), a
+/// resistance of its own and noise. The shift is sampled once a second; protection of such a pack knows that.
 TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
-  const Recording shift = read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  const files::Recording shift = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
   PackDesign design = forklift;
   design.sample_period_s = 1;
   design.precharge_time_constant_s = 2;
   const ProtectionPlan plan = protection_plan(design);
   Protection<16> p(plan);
-  truth::Random random(1);
+  plant::Random random(1);
   const auto noise = [&](double sigma) { return 3 * sigma * std::clamp(random.normal() / 3, -1.0, 1.0); };
   Orders orders{.request = Request::drive};
   double link_v = 0;
   std::size_t driven = 0;
   for (std::size_t row = 0; row < shift.rows(); ++row) {
-    PackSample<16> s;
+    measurement::PackSample<16> s;
     const Outputs out = p.decision().outputs;
     const bool closed = out.main_plus && out.main_minus;
     s.time_us = static_cast<std::uint64_t>(1e6 * shift.time_s[row]);
     s.current_ua = static_cast<std::int32_t>(1e6 * ((closed ? shift.current_a[row] : 0) + noise(0.01)));
     double sum_v = 0;
     for (std::size_t k = 0; k < 16; ++k) {
-      const double off_v = 0.004 * (static_cast<double>(k % 7) - 3), more_ohm = 0.001 * (static_cast<double>(k % 5) - 2);
+      const double off_v = 0.004 * (static_cast<double>(k % 7) - 3),
+                   more_ohm = 0.001 * (static_cast<double>(k % 5) - 2);
       const double v = shift.voltage_v[row] + off_v + more_ohm * shift.current_a[row];
       sum_v += v;
       s.cell_uv[k] = static_cast<std::int32_t>(1e6 * (std::round((v + noise(0.001)) * 1e3) / 1e3));
     }
     s.pack_uv = static_cast<std::int32_t>(1e6 * (sum_v + noise(0.02)));
-    for (std::size_t k = 0; k < 4; ++k) s.temperature_cdegc[k] = static_cast<std::int16_t>(100 * shift.temperature_c[row] + 30 * static_cast<double>(k) + noise(5));
+    for (std::size_t k = 0; k < 4; ++k)
+      s.temperature_cdegc[k] =
+          static_cast<std::int16_t>(100 * shift.temperature_c[row] + 30 * static_cast<double>(k) + noise(5));
     link_v = closed ? sum_v : out.precharge && out.main_minus ? link_v + (sum_v - link_v) * 0.39 : link_v * 0.9;
     orders.link_uv = static_cast<std::int32_t>(1e6 * link_v);
     const Decision& d = p.update(s, PackEstimate<16>{}, orders);

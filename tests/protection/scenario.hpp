@@ -1,4 +1,5 @@
-// A thousand samples of a pack with everything happening to it, and what protection decides, as one number: the same on host and board.
+// A thousand samples of a pack with everything happening to it, and what protection decides, as one number: the same on
+// host and board.
 #pragma once
 
 #include <algorithm>
@@ -22,8 +23,11 @@ class Scenario {
       measure(k);
       const Decision& d = step(protection, sample, estimate, orders);
       outputs_ = d.outputs;
-      for (const std::uint32_t word : {d.faults, static_cast<std::uint32_t>(d.state), static_cast<std::uint32_t>(d.allowed.charge_ua), static_cast<std::uint32_t>(d.allowed.discharge_ua), d.bleed, d.bleed_left_s,
-                                       static_cast<std::uint32_t>(d.first.fault), static_cast<std::uint32_t>(d.first.time_us), static_cast<std::uint32_t>(d.outputs.any_closed())}) {
+      for (const std::uint32_t word :
+           {d.faults, static_cast<std::uint32_t>(d.state), static_cast<std::uint32_t>(d.allowed.charge_ua),
+            static_cast<std::uint32_t>(d.allowed.discharge_ua), d.bleed, d.bleed_left_s,
+            static_cast<std::uint32_t>(d.first.fault), static_cast<std::uint32_t>(d.first.time_us),
+            static_cast<std::uint32_t>(d.outputs.any_closed())}) {
         add(word);
       }
     }
@@ -31,7 +35,7 @@ class Scenario {
   }
 
   Protection<16> protection{scenario_plan};
-  PackSample<16> sample;
+  measurement::PackSample<16> sample;
   PackEstimate<16> estimate;
   Orders orders;
 
@@ -50,20 +54,23 @@ class Scenario {
     for (std::size_t c = 0; c < 16; ++c) {
       sample.cell_uv[c] = 3'280'000 + ramp + static_cast<std::int32_t>(c) * 300 + chance(3'000);
       if (k > 300 && k < 340 && c == 3) sample.cell_uv[c] = 3'720'000 + chance(3'000);
-      if (k > 550 && k < 560 && c == 8) sample.cell_uv[c] = no_reading;
+      if (k > 550 && k < 560 && c == 8) sample.cell_uv[c] = measurement::no_reading;
       if (k > 900 && c == 12) sample.cell_uv[c] = 1'700'000;
-      sum += sample.cell_uv[c] == no_reading ? 3'300'000 : sample.cell_uv[c];
+      sum += sample.cell_uv[c] == measurement::no_reading ? 3'300'000 : sample.cell_uv[c];
       estimate.cell_soc_ppb[c] = static_cast<std::int32_t>(c) * 2'000'000;
       estimate.cell_sigma_ppb[c] = 1'000'000;
     }
     sample.pack_uv = sum + chance(60'000);
-    for (std::size_t t = 0; t < 4; ++t) sample.temperature_cdegc[t] = static_cast<std::int16_t>((k > 400 && k < 500 ? -300 : 2'500) + chance(20));
+    for (std::size_t t = 0; t < 4; ++t)
+      sample.temperature_cdegc[t] = static_cast<std::int16_t>((k > 400 && k < 500 ? -300 : 2'500) + chance(20));
     estimate.soc_ppb = 700'000'000 + std::min(k, 600) * 500'000;
     estimate.soc_sigma_ppb = 10'000'000;
     estimate.model_charge_ua = 5'000'000;
     estimate.model_discharge_ua = 5'500'000;
     orders.request = k % 800 < 20 ? Request::none : Request::drive;
-    link_uv_ = closed ? sum : outputs_.precharge && outputs_.main_minus ? link_uv_ + (sum - link_uv_) / 5 : link_uv_ - link_uv_ / 16;
+    link_uv_ = closed                                      ? sum
+               : outputs_.precharge && outputs_.main_minus ? link_uv_ + (sum - link_uv_) / 5
+                                                           : link_uv_ - link_uv_ / 16;
     orders.link_uv = link_uv_;
   }
 
@@ -76,7 +83,9 @@ inline constexpr std::uint32_t expected_scenario_hash = 3935384279U;
 
 inline std::uint32_t scenario_hash(int samples) {
   Scenario s;
-  return s.run(samples, [](auto& p, const auto& sample, const auto& estimate, const auto& orders) -> const Decision& { return p.update(sample, estimate, orders); });
+  return s.run(samples, [](auto& p, const auto& sample, const auto& estimate, const auto& orders) -> const Decision& {
+    return p.update(sample, estimate, orders);
+  });
 }
 
 }  // namespace bms::protection

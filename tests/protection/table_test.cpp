@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/text_file.hpp"
+#include "files/cell_file.hpp"
+#include "files/text_file.hpp"
 #include "protection/contactors.hpp"
 #include "protection/table_text.hpp"
 #include "tests/protection/expected_rows.hpp"
@@ -29,14 +29,18 @@ TEST(ProtectionTable, SaysWhatWasReckonedByHandForThePapersCell) {
     EXPECT_EQ(r.delay_us, 1'000U * static_cast<unsigned>(e.delay_ms)) << e.name;
     EXPECT_EQ(r.release, e.release) << e.name;
     EXPECT_EQ(r.recover_us, 1'000U * static_cast<unsigned>(e.recover_ms)) << e.name;
-    EXPECT_EQ(r.recovery == Recovery::automatic ? 'a' : r.recovery == Recovery::on_clear ? 'c' : 's', e.recovery) << e.name;
+    EXPECT_EQ(r.recovery == Recovery::automatic  ? 'a'
+              : r.recovery == Recovery::on_clear ? 'c'
+                                                 : 's',
+              e.recovery)
+        << e.name;
     EXPECT_STREQ(words(r.reaction), e.reaction) << e.name;
     EXPECT_GT(std::string(table[k].why).size(), 5U) << e.name << " has no reason for its delay";
   }
 }
 
 TEST(ProtectionTable, LimitsAreThoseOfTheShippedCellFile) {
-  const model::Limits l = read_cell("table9").parameters.limits;
+  const model::Limits l = files::read_cell("table9").parameters.limits;
   EXPECT_EQ(l.voltage_min_v, table9_limits.voltage_min_v);
   EXPECT_EQ(l.voltage_max_v, table9_limits.voltage_max_v);
   EXPECT_EQ(l.charge_current_max_a, table9_limits.charge_current_max_a);
@@ -47,7 +51,8 @@ TEST(ProtectionTable, LimitsAreThoseOfTheShippedCellFile) {
 
 TEST(ProtectionTable, IsConsistentForAnyCellAndNumberOfCells) {
   for (const int cells : {1, 4, 16, 24}) {
-    for (const model::Limits& l : {model::Limits{2.5, 4.2, 1.5, 3, -20, 60}, model::Limits{1.5, 2.8, 300, 300, -30, 55}, model::Limits{2.0, 3.6, 2.5, 50, 5, 45}}) {
+    for (const model::Limits& l : {model::Limits{2.5, 4.2, 1.5, 3, -20, 60}, model::Limits{1.5, 2.8, 300, 300, -30, 55},
+                                   model::Limits{2.0, 3.6, 2.5, 50, 5, 45}}) {
       PackDesign d = forklift;
       d.limits = l;
       d.cells = static_cast<std::uint8_t>(cells);
@@ -72,11 +77,15 @@ TEST(ProtectionTable, IsToldFromOneThatContradictsItself) {
 TEST(ProtectionTable, SaysWhichFaultsHaveAReactionOrARecovery) {
   const Rules rules = rules_of(table);
   std::uint32_t by_reaction = 0, by_recovery = 0;
-  for (const Reaction r : {Reaction::warn, Reaction::derate, Reaction::forbid_charge, Reaction::forbid_discharge, Reaction::open, Reaction::open_now}) {
-    for (std::size_t k = 0; k < fault_count; ++k) EXPECT_EQ((faults_with(rules, r) >> k & 1) != 0, std::string(expected_rows[k].reaction) == words(r)) << expected_rows[k].name;
+  for (const Reaction r : {Reaction::warn, Reaction::derate, Reaction::forbid_charge, Reaction::forbid_discharge,
+                           Reaction::open, Reaction::open_now}) {
+    for (std::size_t k = 0; k < fault_count; ++k)
+      EXPECT_EQ((faults_with(rules, r) >> k & 1) != 0, std::string(expected_rows[k].reaction) == words(r))
+          << expected_rows[k].name;
     by_reaction |= faults_with(rules, r);
   }
-  for (const Recovery r : {Recovery::automatic, Recovery::on_clear, Recovery::service}) by_recovery |= faults_with(rules, r);
+  for (const Recovery r : {Recovery::automatic, Recovery::on_clear, Recovery::service})
+    by_recovery |= faults_with(rules, r);
   EXPECT_EQ(by_reaction, 0xFFFF'FFFFU);
   EXPECT_EQ(by_recovery, 0xFFFF'FFFFU);
 }
@@ -97,7 +106,12 @@ TEST(IntegersOfAPack, AreTheNearest) {
 
 TEST(ProtectionTable, OfAnotherPackGoesByItsCellsTheirNumberAndItsSamples) {
   PackDesign d = forklift;
-  d.limits = {.voltage_min_v = 2.5, .voltage_max_v = 4.2, .charge_current_max_a = 1.5, .discharge_current_max_a = 3, .temperature_min_c = 5, .temperature_max_c = 45};
+  d.limits = {.voltage_min_v = 2.5,
+              .voltage_max_v = 4.2,
+              .charge_current_max_a = 1.5,
+              .discharge_current_max_a = 3,
+              .temperature_min_c = 5,
+              .temperature_max_c = 45};
   d.cells = 4;
   d.sample_period_s = 0.25;
   const auto rule = [&](Fault f) { return protection_table(d)[static_cast<std::size_t>(f)].rule; };
@@ -106,7 +120,8 @@ TEST(ProtectionTable, OfAnotherPackGoesByItsCellsTheirNumberAndItsSamples) {
   EXPECT_EQ(rule(Fault::sum_mismatch).threshold, 4 * 51'000);
   EXPECT_EQ(rule(Fault::short_circuit).threshold, 15'000'000) << "of the larger of both limits";
   EXPECT_EQ(rule(Fault::short_circuit).release, 3'000'000);
-  EXPECT_EQ(rule(Fault::charge_undertemperature).threshold, 500) << "it must not be charged even where water does not freeze";
+  EXPECT_EQ(rule(Fault::charge_undertemperature).threshold, 500)
+      << "it must not be charged even where water does not freeze";
   EXPECT_EQ(rule(Fault::charge_undertemperature).release, 700);
   EXPECT_EQ(rule(Fault::samples_missing).threshold, 1'250'000);
   EXPECT_EQ(rule(Fault::samples_missing).release, 500'000);
@@ -115,8 +130,9 @@ TEST(ProtectionTable, OfAnotherPackGoesByItsCellsTheirNumberAndItsSamples) {
 }
 
 TEST(ProtectionTable, IsTheOneInTheReadme) {
-  const std::string readme = read_file(BMS_SOURCE_DIR "/protection/README.md");
-  EXPECT_NE(readme.find(markdown(table)), std::string::npos) << "run ./bms figures, or build/host/tests/write_protection_figures";
+  const std::string readme = files::read_file(BMS_SOURCE_DIR "/protection/README.md");
+  EXPECT_NE(readme.find(markdown(table)), std::string::npos)
+      << "run ./bms figures, or build/host/tests/write_protection_figures";
 }
 
 /// The texts of VAL_ <id> <signal> in the DBC file.
@@ -126,23 +142,26 @@ std::map<int, std::string> values_in_dbc(const std::string& dbc, const std::stri
   if (begin == std::string::npos) return values;
   const std::string line = dbc.substr(begin + of.size() + 6, end - begin - of.size() - 6);
   static const std::regex pair("([0-9]+) \"([^\"]*)\"");
-  for (std::sregex_iterator it(line.begin(), line.end(), pair), none; it != none; ++it) values[std::stoi((*it)[1])] = (*it)[2];
+  for (std::sregex_iterator it(line.begin(), line.end(), pair), none; it != none; ++it)
+    values[std::stoi((*it)[1])] = (*it)[2];
   return values;
 }
 
 TEST(ProtectionTable, HasTheNamesOfTheBus) {
-  const std::string dbc = read_file(BMS_SOURCE_DIR "/can/greybox_bms.dbc");
+  const std::string dbc = files::read_file(BMS_SOURCE_DIR "/can/greybox_bms.dbc");
   const auto causes = values_in_dbc(dbc, "406 FirstCause");
   ASSERT_EQ(causes.size(), fault_count + 2);
   EXPECT_EQ(causes.at(0), "none");
   for (std::size_t k = 0; k < fault_count; ++k) {
     EXPECT_EQ(causes.at(static_cast<int>(k) + 1), fault_names[k]);
-    const std::string signal = std::string(" SG_ ") + expected_rows[k].signal + " : " + std::to_string(16 + k) + "|1@1+";
+    const std::string signal =
+        std::string(" SG_ ") + expected_rows[k].signal + " : " + std::to_string(16 + k) + "|1@1+";
     EXPECT_NE(dbc.find(signal), std::string::npos) << signal;
   }
   const auto states = values_in_dbc(dbc, "407 State");
   ASSERT_EQ(states.size(), contactor_state_count + 1);
-  for (std::size_t k = 0; k < contactor_state_count; ++k) EXPECT_EQ(states.at(static_cast<int>(k)), contactor_state_names[k]);
+  for (std::size_t k = 0; k < contactor_state_count; ++k)
+    EXPECT_EQ(states.at(static_cast<int>(k)), contactor_state_names[k]);
 }
 
 }  // namespace

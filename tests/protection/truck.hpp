@@ -1,5 +1,6 @@
-// Sixteen cells in a truck that drives, and every protection brought to a value there: the scenarios of the fault matrix, for protection on this
-// machine (fault_matrix_test.cpp) and for a board's image in the emulator (tests/firmware/board_fault_matrix.hpp).
+// Sixteen cells in a truck that drives, and every protection brought to a value there: the scenarios of the fault
+// matrix, for protection on this machine (fault_matrix_test.cpp) and for a board's image in the emulator
+// (tests/firmware/board_fault_matrix.hpp).
 #pragma once
 
 #include <algorithm>
@@ -31,17 +32,19 @@ inline Levels levels(const ExpectedRow& e) {
   return {e.release - sign * (width > 0 ? 1 : 0), e.threshold, e.threshold + sign, noise};
 }
 /// Three sigma of what is measured of row k, not of what its hysteresis could bear.
-constexpr std::int32_t measured_noise(std::size_t k) { return k >= 11 && k <= 15 ? 15 : k == 10 ? 30'000 : k == 6 || k == 7 || k == 19 ? 60'000 : 3'000; }
+constexpr std::int32_t measured_noise(std::size_t k) {
+  return k >= 11 && k <= 15 ? 15 : k == 10 ? 30'000 : k == 6 || k == 7 || k == 19 ? 60'000 : 3'000;
+}
 
 constexpr bool told_by_samples(std::size_t k) { return k < 26 && k != 8 && k != 9; }
 /// What stands still is found when the others have moved.
 constexpr bool waits_for_others(std::size_t k) { return k == 21 || k == 24; }
 
-/// What the pack measures while the contactors are as somebody wants them. Readings are off by noise of up to three sigma: 1 mV, 10 mA, 0.05 K,
-/// 20 mV over the pack.
+/// What the pack measures while the contactors are as somebody wants them. Readings are off by noise of up to three
+/// sigma: 1 mV, 10 mA, 0.05 K, 20 mV over the pack.
 class TruckPack {
  public:
-  using Change = std::function<void(PackSample<16>&, PackEstimate<16>&, Orders&)>;
+  using Change = std::function<void(measurement::PackSample<16>&, PackEstimate<16>&, Orders&)>;
   /// What there is to be measured of a cell, without noise.
   struct Course {
     double current_ua, voltage_uv, temperature_cdegc;
@@ -51,38 +54,48 @@ class TruckPack {
 
   void measure(const Outputs& out, const Change& change = {}) {
     ++step_;
-    sample = PackSample<16>{};
+    sample = measurement::PackSample<16>{};
     estimate = PackEstimate<16>{};
     const bool closed = out.main_plus && out.main_minus;
     sample.time_us = step_ * step_us;
-    const double slow = std::abs(static_cast<double>(step_ % 400) - 200) / 200;  // 0 .. 1 .. 0 in 40 s: the load moves all cells, and the air
-    const Course cell = course.value_or(Course{closed ? -2e6 - 1e6 * slow : 0, 3.30e6 - 60e3 * slow, 2'000 + 1'200 * slow});
+    const double slow = std::abs(static_cast<double>(step_ % 400) - 200) /
+                        200;  // 0 .. 1 .. 0 in 40 s: the load moves all cells, and the air
+    const Course cell =
+        course.value_or(Course{closed ? -2e6 - 1e6 * slow : 0, 3.30e6 - 60e3 * slow, 2'000 + 1'200 * slow});
     sample.current_ua = static_cast<std::int32_t>(cell.current_ua + 30e3 * chance());
-    for (std::size_t k = 0; k < 16; ++k) sample.cell_uv[k] = static_cast<std::int32_t>(cell.voltage_uv + 1e3 * static_cast<double>(k % 5) + 3e3 * chance());
-    for (std::size_t k = 0; k < 4; ++k) sample.temperature_cdegc[k] = static_cast<std::int16_t>(cell.temperature_cdegc + 10 * static_cast<double>(k) + 15 * chance());
+    for (std::size_t k = 0; k < 16; ++k)
+      sample.cell_uv[k] =
+          static_cast<std::int32_t>(cell.voltage_uv + 1e3 * static_cast<double>(k % 5) + 3e3 * chance());
+    for (std::size_t k = 0; k < 4; ++k)
+      sample.temperature_cdegc[k] =
+          static_cast<std::int16_t>(cell.temperature_cdegc + 10 * static_cast<double>(k) + 15 * chance());
     estimate.soc_ppb = 600'000'000;
     pack_offset_uv = 0;
     pack_follows = true;
     if (change) change(sample, estimate, orders);
     if (pack_follows) {
       std::int64_t sum = 0;
-      for (const std::int32_t uv : sample.cell_uv) sum += uv == no_reading ? 3'300'000 : uv;
+      for (const std::int32_t uv : sample.cell_uv) sum += uv == measurement::no_reading ? 3'300'000 : uv;
       sample.pack_uv = static_cast<std::int32_t>(sum) + pack_offset_uv;
       if (noisy_pack) sample.pack_uv += static_cast<std::int32_t>(60e3 * chance());
     }
-    if (!closed && sample.current_ua != no_reading) sample.current_ua = static_cast<std::int32_t>(30e3 * chance());
+    if (!closed && sample.current_ua != measurement::no_reading)
+      sample.current_ua = static_cast<std::int32_t>(30e3 * chance());
     const double stack_v = 52.8e6;
-    if (closed) link_uv_ = stack_v;
-    else if (out.precharge && out.main_minus) link_uv_ += (stack_v - link_uv_) * 0.18;
-    else link_uv_ *= 0.97;
+    if (closed)
+      link_uv_ = stack_v;
+    else if (out.precharge && out.main_minus)
+      link_uv_ += (stack_v - link_uv_) * 0.18;
+    else
+      link_uv_ *= 0.97;
     orders.link_uv = static_cast<std::int32_t>(link_uv_);
-    if (closed && sample.pack_uv != no_reading) orders.link_uv = sample.pack_uv;
+    if (closed && sample.pack_uv != measurement::no_reading) orders.link_uv = sample.pack_uv;
   }
 
   std::uint64_t steps() const { return step_; }
   double chance() { return std::clamp(random_.normal() / 3, -1.0, 1.0); }
 
-  PackSample<16> sample;
+  measurement::PackSample<16> sample;
   PackEstimate<16> estimate;
   Orders orders;
   std::optional<Course> course;  ///< instead of its own, of 40 s
@@ -90,7 +103,7 @@ class TruckPack {
   bool pack_follows = true, noisy_pack = true;
 
  private:
-  truth::Random random_;
+  plant::Random random_;
   std::uint64_t step_ = 0;
   double link_uv_ = 0;
 };
@@ -99,7 +112,7 @@ class TruckPack {
 class TruckOracle {
  public:
   /// A bit each; the others are 0.
-  std::uint32_t see(const PackSample<16>& sample, bool contradicts) {
+  std::uint32_t see(const measurement::PackSample<16>& sample, bool contradicts) {
     values = quantities_.see(sample, contradicts);
     std::uint32_t there = 0;
     for (std::size_t k = 0; k < 26; ++k) {
@@ -120,19 +133,40 @@ class TruckOracle {
   std::vector<RowOracle> rows_{std::begin(expected_rows), std::end(expected_rows)};
 };
 
-/// Brings the quantity of row k to a value, as the physics would; for rows that count, 1 for there and 0 for not. k: told by samples.
-inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, PackSample<16>& s, PackEstimate<16>& e) {
+/// Brings the quantity of row k to a value, as the physics would; for rows that count, 1 for there and 0 for not. k:
+/// told by samples.
+inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurement::PackSample<16>& s,
+                   PackEstimate<16>& e) {
   switch (k) {
-    case 0: case 1: case 2: s.cell_uv[5] = value; break;
-    case 3: case 4: case 5: case 25: s.cell_uv[11] = value; break;
-    case 6: case 7:
+    case 0:
+    case 1:
+    case 2:
+      s.cell_uv[5] = value;
+      break;
+    case 3:
+    case 4:
+    case 5:
+    case 25:
+      s.cell_uv[11] = value;
+      break;
+    case 6:
+    case 7:
       s.cell_uv.fill(value / 16);
       s.pack_uv = value;
       truck.pack_follows = false;
       break;
-    case 10: s.current_ua = -value; break;
-    case 11: case 12: case 13: s.temperature_cdegc[1] = static_cast<std::int16_t>(value); break;
-    case 14: case 15: s.temperature_cdegc[3] = static_cast<std::int16_t>(value); break;
+    case 10:
+      s.current_ua = -value;
+      break;
+    case 11:
+    case 12:
+    case 13:
+      s.temperature_cdegc[1] = static_cast<std::int16_t>(value);
+      break;
+    case 14:
+    case 15:
+      s.temperature_cdegc[3] = static_cast<std::int16_t>(value);
+      break;
     case 16:
       for (auto& uv : s.cell_uv) uv = 3'300'000 + (s.time_us / step_us % 2 == 0 ? 1'000 : -1'000);
       s.cell_uv[7] = s.cell_uv[0] - value;
@@ -145,17 +179,30 @@ inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, PackSamp
         if (c != 2 && c != 9) s.cell_uv[c] = s.cell_uv[0] + static_cast<std::int32_t>(c);
       }
       break;
-    case 18: e.contradicts = value > 0; break;
+    case 18:
+      e.contradicts = value > 0;
+      break;
     case 19:
       truck.pack_offset_uv = -value;
       truck.noisy_pack = false;
       break;
-    case 20: if (value > 0) s.cell_uv[4] = no_reading; break;
-    case 21: if (value > 0) s.cell_uv[13] = 3'287'654; break;
-    case 22: if (value > 0) s.current_ua = no_reading; break;
-    case 23: if (value > 0) s.temperature_cdegc[2] = no_temperature; break;
-    case 24: if (value > 0) s.temperature_cdegc[0] = 2'345; break;
-    default: std::abort();
+    case 20:
+      if (value > 0) s.cell_uv[4] = measurement::no_reading;
+      break;
+    case 21:
+      if (value > 0) s.cell_uv[13] = 3'287'654;
+      break;
+    case 22:
+      if (value > 0) s.current_ua = measurement::no_reading;
+      break;
+    case 23:
+      if (value > 0) s.temperature_cdegc[2] = measurement::no_temperature;
+      break;
+    case 24:
+      if (value > 0) s.temperature_cdegc[0] = 2'345;
+      break;
+    default:
+      std::abort();
   }
 }
 

@@ -1,4 +1,5 @@
-// Writes the tables of protection/README.md: the protections, and what balancing does. What it costs on the board: tests/figures.
+// Writes the tables of protection/README.md: the protections, and what balancing does. What it costs on the board:
+// tests/figures.
 #include <cstdio>
 #include <exception>
 #include <numeric>
@@ -6,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "host_sim/committed_figures.hpp"
+#include "files/committed_figures.hpp"
 #include "protection/table_text.hpp"
 #include "tests/protection/balancing_pack.hpp"
 
@@ -14,13 +15,16 @@ namespace bms::protection {
 namespace {
 
 std::string balancing_table() {
-  std::string table = "| charged | bled are | spread of soc at full charge, day 1 | day 6 | day 60 | bled in 60 days | of it in the last 10 |\n|---|---|---|---|---|---|---|\n";
+  std::string table =
+      "| charged | bled are | spread of soc at full charge, day 1 | day 6 | day 60 | bled in 60 days | of it in the "
+      "last 10 |\n|---|---|---|---|---|---|---|\n";
   for (const Habit habit : {Habit::before_the_shift, Habit::after_the_shift}) {
     const auto row = [&](const char* what, const BleedRule& rule) {
       const BalancingFigures f = balance(pack_out_of_balance(1, 0.1), rule, 60, habit);
       const auto bled_ah = [&](int from) { return std::accumulate(f.bled_ah.begin() + from, f.bled_ah.end(), 0.0); };
-      table += fmt::format("| {} | {} | {:.1f} % | {:.1f} % | {:.1f} % | {:.2f} Ah | {:.2f} Ah |\n", habit == Habit::before_the_shift ? "just before the shift" : "right after it", what, 100 * f.spread.front(), 100 * f.spread[5],
-                           100 * f.spread.back(), bled_ah(0), bled_ah(50));
+      table += fmt::format("| {} | {} | {:.1f} % | {:.1f} % | {:.1f} % | {:.2f} Ah | {:.2f} Ah |\n",
+                           habit == Habit::before_the_shift ? "just before the shift" : "right after it", what,
+                           100 * f.spread.front(), 100 * f.spread[5], 100 * f.spread.back(), bled_ah(0), bled_ah(50));
     };
     row("none", [](const BalancedPack&, double) { return 0U; });
     row("by charge, known to 0.2 %", ByCharge(0.002));
@@ -38,8 +42,8 @@ int main() {
   using namespace bms;
   try {
     const std::string readme = BMS_SOURCE_DIR "/protection/README.md";
-    replace_figures(readme, "table", protection::markdown(protection::protection_table(protection::forklift)));
-    replace_figures(readme, "balancing", protection::balancing_table());
+    files::replace_figures(readme, "table", protection::markdown(protection::protection_table(protection::forklift)));
+    files::replace_figures(readme, "balancing", protection::balancing_table());
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "protection figures: {}\n", e.what());

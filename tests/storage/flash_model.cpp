@@ -2,15 +2,28 @@
 
 namespace bms {
 
-FlashModel::FlashModel(hal::FlashSize size, std::uint64_t seed) : size_(size), random_(seed), words_(size.sectors * size.sector_bytes / 4), worn_(size.sectors), erases_(size.sectors) {}
+FlashModel::FlashModel(hal::FlashSize size, std::uint64_t seed)
+    : size_(size),
+      random_(seed),
+      words_(size.sectors * size.sector_bytes / 4),
+      worn_(size.sectors),
+      erases_(size.sectors) {}
 
 void FlashModel::wear_out(std::uint32_t sector, Wear how) {
   Worn& w = worn_[sector];
   switch (how) {
-    case Wear::erase_fails: w.erase_fails = true; break;
-    case Wear::erase_leaves_zeros: w.leaves_zeros = true; break;
-    case Wear::bits_stuck_at_one: w.stuck_at_one = 0x00010000; break;
-    case Wear::bits_stuck_at_zero: w.stuck_at_zero = 0x00000040; break;
+    case Wear::erase_fails:
+      w.erase_fails = true;
+      break;
+    case Wear::erase_leaves_zeros:
+      w.leaves_zeros = true;
+      break;
+    case Wear::bits_stuck_at_one:
+      w.stuck_at_one = 0x00010000;
+      break;
+    case Wear::bits_stuck_at_zero:
+      w.stuck_at_zero = 0x00000040;
+      break;
   }
 }
 
@@ -31,9 +44,13 @@ std::vector<std::uint8_t> FlashModel::bytes(std::uint32_t sector) {
   return all;
 }
 
-void FlashModel::flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits) { word(sector, at).bits ^= static_cast<std::uint32_t>(bits) << (8 * (at % 4)); }
+void FlashModel::flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits) {
+  word(sector, at).bits ^= static_cast<std::uint32_t>(bits) << (8 * (at % 4));
+}
 
-void FlashModel::make_unsteady(std::uint32_t sector, std::uint32_t at, std::uint8_t bits, std::uint32_t every) { unsteady_ = {sector, at / 4 * 4, static_cast<std::uint32_t>(bits) << (8 * (at % 4)), every, 0}; }
+void FlashModel::make_unsteady(std::uint32_t sector, std::uint32_t at, std::uint8_t bits, std::uint32_t every) {
+  unsteady_ = {sector, at / 4 * 4, static_cast<std::uint32_t>(bits) << (8 * (at % 4)), every, 0};
+}
 
 bool FlashModel::power_goes() {
   if (steps_++ != cut_at_) return false;
@@ -90,13 +107,18 @@ std::uint32_t FlashModel::seen(std::uint32_t sector, std::uint32_t at) {
   if (reads_left_-- == 0) throw TooManyReads{};
   const Word& w = word(sector, at);
   std::uint32_t bits = w.bits;
-  if (unsteady_.every > 0 && unsteady_.sector == sector && unsteady_.at == at / 4 * 4 && ++unsteady_.reads % unsteady_.every == 0) bits ^= unsteady_.bits;
+  if (unsteady_.every > 0 && unsteady_.sector == sector && unsteady_.at == at / 4 * 4 &&
+      ++unsteady_.reads % unsteady_.every == 0)
+    bits ^= unsteady_.bits;
   if (w.weak != 0) {
     // alike for a while, then otherwise: a whole record may read well once
     const std::uint32_t draw = random();
-    if (draw % 4 == 0) bits &= ~w.weak;
-    else if (draw % 4 == 1) bits |= w.weak;
-    else bits ^= w.weak & random();
+    if (draw % 4 == 0)
+      bits &= ~w.weak;
+    else if (draw % 4 == 1)
+      bits |= w.weak;
+    else
+      bits ^= w.weak & random();
   }
   const Worn& worn = worn_[sector];
   return (bits | worn.stuck_at_one) & ~worn.stuck_at_zero;
@@ -125,8 +147,12 @@ namespace hal {
 
 FlashSize flash_start() { return plugged_in != nullptr ? plugged_in->size() : FlashSize{}; }
 bool flash_erase(std::uint32_t sector) { return plugged_in->erase(sector); }
-bool flash_program(std::uint32_t sector, std::uint32_t at, std::uint32_t word) { return plugged_in->program(sector, at, word); }
-void flash_read(std::uint32_t sector, std::uint32_t at, std::span<std::uint8_t> into) { plugged_in->read(sector, at, into); }
+bool flash_program(std::uint32_t sector, std::uint32_t at, std::uint32_t word) {
+  return plugged_in->program(sector, at, word);
+}
+void flash_read(std::uint32_t sector, std::uint32_t at, std::span<std::uint8_t> into) {
+  plugged_in->read(sector, at, into);
+}
 
 }  // namespace hal
 

@@ -1,5 +1,6 @@
-// Flash as hal/flash.hpp describes it, cell by cell, with what goes wrong: the power that goes in the middle of a step, cells that read
-// differently each time, sectors that wear out. Knows nothing of storage/. Strict: whoever programs a word that is not erased is told so.
+// Flash as hal/flash.hpp describes it, cell by cell, with what goes wrong: the power that goes in the middle of a step,
+// cells that read differently each time, sectors that wear out. Knows nothing of storage/. Strict: whoever programs a
+// word that is not erased is told so.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,8 @@ class FlashModel {
  public:
   FlashModel(hal::FlashSize size, std::uint64_t seed);
 
-  /// The power goes in the middle of the step so many steps from now (0: the next one). A step is a word programmed or a sector erased.
+  /// The power goes in the middle of the step so many steps from now (0: the next one). A step is a word programmed or
+  /// a sector erased.
   void cut_in(std::uint64_t steps) { cut_at_ = steps_ + steps; }
   void no_cut() { cut_at_ = never; }
   void reseed(std::uint64_t seed) { random_.seed(seed); }
@@ -29,7 +31,7 @@ class FlashModel {
   void wear_out(std::uint32_t sector, Wear how);
   void fill(std::uint32_t sector, const std::vector<std::uint8_t>& bytes);  ///< the rest as it was
   std::vector<std::uint8_t> bytes(std::uint32_t sector);
-  void flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits);     ///< a cell that decays
+  void flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits);  ///< a cell that decays
 
   /// A cell that reads otherwise every so many-th time that it is read.
   void make_unsteady(std::uint32_t sector, std::uint32_t at, std::uint8_t bits, std::uint32_t every);
@@ -37,7 +39,7 @@ class FlashModel {
   void limit_reads(std::uint64_t words) { reads_left_ = words; }
 
   const std::vector<std::uint64_t>& erases() const { return erases_; }
-  std::uint64_t violations() const { return violations_; }                 ///< words programmed that were not erased
+  std::uint64_t violations() const { return violations_; }  ///< words programmed that were not erased
 
   hal::FlashSize size() const { return size_; }
   bool erase(std::uint32_t sector);
@@ -47,9 +49,9 @@ class FlashModel {
  private:
   static constexpr std::uint64_t never = ~0ULL;
   struct Word {
-    std::uint32_t bits = 0xFFFFFFFF;  ///< as they are for sure
-    std::uint32_t weak = 0;           ///< these read as 0 or 1
-    std::uint32_t asked = 0xFFFFFFFF; ///< what it was programmed with since the last erase
+    std::uint32_t bits = 0xFFFFFFFF;   ///< as they are for sure
+    std::uint32_t weak = 0;            ///< these read as 0 or 1
+    std::uint32_t asked = 0xFFFFFFFF;  ///< what it was programmed with since the last erase
     bool erased = true;
   };
   struct Worn {

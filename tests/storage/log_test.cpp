@@ -1,4 +1,5 @@
-// The log on a flash that loses its power at every step, wears out and decays. What must be kept is remembered here, beside the log.
+// The log on a flash that loses its power at every step, wears out and decays. What must be kept is remembered here,
+// beside the log.
 #include "storage/log.hpp"
 
 #include <gtest/gtest.h>
@@ -111,8 +112,10 @@ class PowerCuts {
       bool cut = false;
       Stored done = Stored::kept;
       try {
-        if (step.erase) log_.erase_one();
-        else done = log_.store(step.kind, step.bytes);
+        if (step.erase)
+          log_.erase_one();
+        else
+          done = log_.store(step.kind, step.bytes);
       } catch (const PowerCut&) {
         cut = true;
         ++cuts_;
@@ -143,7 +146,8 @@ class PowerCuts {
       if (kept == kept_.end()) {
         EXPECT_FALSE(found) << "of type " << type << " nothing was stored";
       } else {
-        EXPECT_TRUE(found == kept->second) << "of type " << type << (found ? " another was found" : " nothing was found");
+        EXPECT_TRUE(found == kept->second)
+            << "of type " << type << (found ? " another was found" : " nothing was found");
       }
     }
   }
@@ -155,8 +159,10 @@ class PowerCuts {
     for (auto cuts = random_() % 3; cuts > 0; --cuts) {
       flash_.cut_in(random_() % 24);
       try {
-        if (random_() % 2 == 0 && log_.wants_erase()) log_.erase_one();
-        else if (!other.erase && log_.store(other.kind, other.bytes) == Stored::kept) kept_[{other.kind.type, other.kind.layout}] = other.bytes;
+        if (random_() % 2 == 0 && log_.wants_erase())
+          log_.erase_one();
+        else if (!other.erase && log_.store(other.kind, other.bytes) == Stored::kept)
+          kept_[{other.kind.type, other.kind.layout}] = other.bytes;
       } catch (const PowerCut&) {
         ++cuts_;
         flash_.no_cut();
@@ -189,13 +195,15 @@ class PowerCuts {
     for (int type = 1; type <= 4; ++type) {
       const int layout = type == 4 ? 9 : 1;
       const auto found = content(log_, static_cast<std::uint8_t>(type), static_cast<std::uint8_t>(layout));
-      const bool in_progress = (!one.erase && one.kind.type == type && found == one.bytes) || (!other.erase && other.kind.type == type && found == other.bytes);
+      const bool in_progress = (!one.erase && one.kind.type == type && found == one.bytes) ||
+                               (!other.erase && other.kind.type == type && found == other.bytes);
       const auto kept = kept_.find({type, layout});
       if (in_progress) continue;
       if (kept == kept_.end()) {
         EXPECT_FALSE(found) << "of type " << type << " nothing was stored";
       } else {
-        EXPECT_TRUE(found == kept->second) << "of type " << type << (found ? " another was found" : " nothing was found");
+        EXPECT_TRUE(found == kept->second)
+            << "of type " << type << (found ? " another was found" : " nothing was found");
       }
     }
   }
@@ -270,7 +278,9 @@ TEST_F(LogTest, StoringNeverErases) {
 TEST_F(LogTest, SectorsWearAlike) {
   fill_rounds(10'000);
   const auto& e = flash.erases();
-  std::printf("10000 records of 4 bytes, sectors of 64 lines: erased %llu, %llu, %llu times\n", static_cast<unsigned long long>(e[0]), static_cast<unsigned long long>(e[1]), static_cast<unsigned long long>(e[2]));
+  std::printf("10000 records of 4 bytes, sectors of 64 lines: erased %llu, %llu, %llu times\n",
+              static_cast<unsigned long long>(e[0]), static_cast<unsigned long long>(e[1]),
+              static_cast<unsigned long long>(e[2]));
   EXPECT_GT(e[0], 100U);
   EXPECT_LE(*std::max_element(e.begin(), e.end()) - *std::min_element(e.begin(), e.end()), 1U);
   EXPECT_NEAR(log.rounds(), static_cast<double>(e[0]), 1.01);
@@ -284,7 +294,9 @@ TEST_F(LogTest, ARecordOfANewerLayoutStaysThroughAllRoundsAndAnOlderOneIsReplace
   fill_rounds(1'000);
   log.open();
   EXPECT_EQ(content(log, 1, 8), number(999));
-  EXPECT_TRUE(std::ranges::any_of(log.in_force(), [](const storage::Record& r) { return r.kind == Kind{1, 9} && r.length == 2; })) << "for a firmware that knows it";
+  EXPECT_TRUE(std::ranges::any_of(log.in_force(), [](const storage::Record& r) {
+    return r.kind == Kind{1, 9} && r.length == 2;
+  })) << "for a firmware that knows it";
   EXPECT_EQ(content(log, 77, 255), (Bytes{7}));
   EXPECT_EQ(content(log, 2, 2), (Bytes{2}));
   EXPECT_FALSE(content(log, 2, 1)) << "migrated";
@@ -319,7 +331,8 @@ TEST_F(LogTest, TwoBadPlacesInARowArePassedOverAndThreeEndTheSector) {
     ASSERT_EQ(keep(log, {1, 1}, number(1)), Stored::kept);
     while (log.wants_erase()) log.erase_one();
     const auto here = log.in_force().front();
-    for (std::uint32_t k = 0; k < bad; ++k) flash.flip(here.sector, (here.line + 3U + 2 * k) * storage::line_bytes, 0x10);  // of the next payloads
+    for (std::uint32_t k = 0; k < bad; ++k)
+      flash.flip(here.sector, (here.line + 3U + 2 * k) * storage::line_bytes, 0x10);  // of the next payloads
     ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::kept);
     EXPECT_EQ(log.in_force().front().sector == here.sector, bad == 2);
     EXPECT_EQ(log.broken(), bad == 2 ? 0U : 1U);
@@ -366,7 +379,8 @@ TEST_F(LogTest, WhatDecaysWhileItRunsIsLeftOutOfAMoveAndCostsNothingElse) {
   EXPECT_EQ(content(log, 1, 1), number(39));
 }
 
-/// The sector in charge is worn, and what it holds decays while an erase is asked for: the other, which was to be erased, is the one that is left.
+/// The sector in charge is worn, and what it holds decays while an erase is asked for: the other, which was to be
+/// erased, is the one that is left.
 TEST_F(LogTest, AnEraseEndsAlsoWhenTheSectorItWasMeantForComesInCharge) {
   flash = FlashModel(two, 1);
   log.open();
@@ -377,8 +391,10 @@ TEST_F(LogTest, AnEraseEndsAlsoWhenTheSectorItWasMeantForComesInCharge) {
   const auto records = log.in_force();
   const storage::Record copy = records.front(), last = records.back();
   ASSERT_EQ(copy.kind.type, 2);
-  for (std::uint32_t place = 0; place < 3; ++place) flash.flip(last.sector, (last.line + 3U + 2 * place) * storage::line_bytes, 0x10);
-  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::wants_erase) << "the sector is broken, the other is to be erased";
+  for (std::uint32_t place = 0; place < 3; ++place)
+    flash.flip(last.sector, (last.line + 3U + 2 * place) * storage::line_bytes, 0x10);
+  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::wants_erase)
+      << "the sector is broken, the other is to be erased";
   flash.flip(copy.sector, (copy.line + 1U) * storage::line_bytes, 1);
   EXPECT_EQ(content(log, 2, 1), (Bytes{2})) << "from where it was copied";
   flash.flip(last.sector, (last.line + 1U) * storage::line_bytes, 1);
@@ -391,7 +407,8 @@ TEST_F(LogTest, AnEraseEndsAlsoWhenTheSectorItWasMeantForComesInCharge) {
   EXPECT_EQ(log.broken(), 1U);
 }
 
-/// A move that failed at its last word, which reads well again at the next boot: what was kept in between must not be older than that.
+/// A move that failed at its last word, which reads well again at the next boot: what was kept in between must not be
+/// older than that.
 TEST_F(LogTest, AfterAMoveThatFailedNothingIsKeptThatTheNextBootWouldNotFind) {
   int failed = 0;
   for (int bit = 0; bit < 8; ++bit) {
@@ -403,14 +420,17 @@ TEST_F(LogTest, AfterAMoveThatFailedNothingIsKeptThatTheNextBootWouldNotFind) {
       ASSERT_EQ(log.store({1, 1}, number(k)), Stored::kept);
       line = log.in_force().front().line;
     }
-    flash.flip(1, 3 * storage::line_bytes + 8, static_cast<std::uint8_t>(1 << bit));  // the checksum of what comes behind one copy
-    if (log.store({2, 1}, Bytes(100, 2)) == Stored::kept) continue;                   // that bit is 0 in it
+    flash.flip(1, 3 * storage::line_bytes + 8,
+               static_cast<std::uint8_t>(1 << bit));                 // the checksum of what comes behind one copy
+    if (log.store({2, 1}, Bytes(100, 2)) == Stored::kept) continue;  // that bit is 0 in it
     ++failed;
     const bool kept = log.store({1, 1}, number(1'000)) == Stored::kept;
     flash.flip(1, 3 * storage::line_bytes + 8, static_cast<std::uint8_t>(1 << bit));
     log.open();
     EXPECT_TRUE(content(log, 1, 1));
-    if (kept) { EXPECT_EQ(content(log, 1, 1), number(1'000)) << bit; }
+    if (kept) {
+      EXPECT_EQ(content(log, 1, 1), number(1'000)) << bit;
+    }
   }
   EXPECT_GT(failed, 0);
 }
@@ -441,12 +461,14 @@ TEST_F(LogTest, WhatDecaysGivesWayToTheNewestThatIsLeftAndStaysSo) {
       ASSERT_EQ(keep(log, {2, 1}, {2, static_cast<std::uint8_t>(version)}), Stored::kept);
       if (version == turns - 1) break;
       sector = log.in_force().front().sector;
-      for (int k = 0; k < 100 && log.in_force().back().sector == sector; ++k) ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept);
+      for (int k = 0; k < 100 && log.in_force().back().sector == sector; ++k)
+        ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept);
     }
     sector = log.in_force().back().sector;
     const Bytes bytes = flash.bytes(sector);
     for (std::uint32_t at = 16; at + 32 <= 1024; at += 16) {
-      if (bytes[at + 4] % 0x80 == 2 && bytes[at + 5] == 1 && bytes[at + 6] == 2) flash.flip(sector, at + 16, 1);  // a payload of type 2
+      if (bytes[at + 4] % 0x80 == 2 && bytes[at + 5] == 1 && bytes[at + 6] == 2)
+        flash.flip(sector, at + 16, 1);  // a payload of type 2
     }
     log.open();
     EXPECT_EQ(content(log, 2, 1), (Bytes{2, static_cast<std::uint8_t>(turns - 2)})) << turns;
@@ -488,14 +510,16 @@ TEST_F(LogTest, NumbersWrap) {
 /// All that a log knows of what is there.
 std::vector<std::array<std::uint32_t, 6>> view(const Log& log) {
   std::vector<std::array<std::uint32_t, 6>> all;
-  for (const storage::Record& r : log.in_force()) all.push_back({r.number, r.kind.type, r.kind.layout, r.sector, r.line, r.length});
+  for (const storage::Record& r : log.in_force())
+    all.push_back({r.number, r.kind.type, r.kind.layout, r.sector, r.line, r.length});
   std::ranges::sort(all);
   all.push_back({log.sectors(), log.broken(), log.rounds()});
   return all;
 }
 
 TEST_F(LogTest, ABootFindsWhatWasKnownBeforeItWhereverTheNumbersWrap) {
-  for (const std::uint32_t round : {0U - 1, 0U - 2, 0U - 3, 0U - 30, 0x8000'0000U / 64 - 1, 0x8000'0000U / 64 - 4, 0x8000'0000U / 64 + 5, 0xC000'0000U / 64}) {
+  for (const std::uint32_t round : {0U - 1, 0U - 2, 0U - 3, 0U - 30, 0x8000'0000U / 64 - 1, 0x8000'0000U / 64 - 4,
+                                    0x8000'0000U / 64 + 5, 0xC000'0000U / 64}) {
     flash = FlashModel(small, 1);
     Bytes sector(flash.size().sector_bytes, 0xFF);
     Bytes record = record_bytes(64 * round + 1, 1, 1, number(5));
@@ -561,7 +585,8 @@ TEST_F(LogTest, AMoveThatIsCutShortLeavesTheSectorInChargeThatWas) {
     log.open();
     if (content(log, 1, 1) == number(k - 1)) continue;  // its last word was as good as written
     ASSERT_EQ(content(log, 1, 1), number(k - 2));
-    for (const storage::Record& r : log.in_force()) EXPECT_EQ(r.sector, here) << "copies are none until the new record is behind them";
+    for (const storage::Record& r : log.in_force())
+      EXPECT_EQ(r.sector, here) << "copies are none until the new record is behind them";
     ASSERT_EQ(keep(log, {1, 1}, number(8)), Stored::kept);
     log.open();
     EXPECT_EQ(content(log, 1, 1), number(8));
@@ -584,7 +609,8 @@ TEST_F(LogTest, WhatCouldNotBeReadAtABootNeverComesBackOverWhatWasStoredSince) {
     ASSERT_FALSE(content(log, 1, 1));
     ASSERT_EQ(keep(log, {1, 1}, number(6)), Stored::kept);
     const Bytes now = flash.bytes(s);
-    if (std::equal(record.begin(), record.begin() + 4, now.begin() + 16)) flash.flip(s, 16 + 17, 0x20);  // it is still there, and good again
+    if (std::equal(record.begin(), record.begin() + 4, now.begin() + 16))
+      flash.flip(s, 16 + 17, 0x20);  // it is still there, and good again
     log.open();
     EXPECT_EQ(content(log, 1, 1), number(6)) << s;
   }
@@ -605,7 +631,9 @@ TEST_F(LogTest, ACellThatReadsOtherwiseNowAndThenHoldsNothingUp) {
         static_cast<void>(content(log, 1, 1));
         const Stored done = keep(log, {2, 1}, {1});
         log.erase_one();
-        if (done == Stored::kept) { EXPECT_EQ(content(log, 2, 1), (Bytes{1})); }
+        if (done == Stored::kept) {
+          EXPECT_EQ(content(log, 2, 1), (Bytes{1}));
+        }
       } catch (const TooManyReads&) {
         ADD_FAILURE() << "no end, with a bit of byte " << at << " otherwise every " << every;
       }
@@ -621,7 +649,8 @@ TEST_F(LogTest, PayloadsOfEveryLengthComeBackAlsoAfterAMove) {
     log.open();
     ASSERT_EQ(content(log, 3, 4), bytes) << n;
     const auto here = log.in_force().front().sector;
-    for (int k = 0; k < 100 && log.in_force().front().sector == here; ++k) ASSERT_EQ(keep(log, {1, 1}, {}), Stored::kept);
+    for (int k = 0; k < 100 && log.in_force().front().sector == here; ++k)
+      ASSERT_EQ(keep(log, {1, 1}, {}), Stored::kept);
     log.open();
     ASSERT_EQ(content(log, 3, 4), bytes) << n;
   }
@@ -674,8 +703,9 @@ TEST(FlashSizes, ThatTheLogGoesByAreOfTwoSectorsAndAPowerOfTwoOfLines) {
     hal::FlashSize size;
     std::uint32_t used;
   };
-  for (const Case& c : {Case{{1, 1024}, 0}, Case{{2, 1024}, 2}, Case{{8, 1024}, 8}, Case{{9, 1024}, 8}, Case{{3, 512}, 0}, Case{{3, 1024 + 16}, 0}, Case{{3, 1024 + 512}, 0}, Case{{2, 512 * 1024}, 2}, Case{{2, 1024 * 1024}, 0},
-                        Case{{0, 1024}, 0}, Case{{3, 0}, 0}}) {
+  for (const Case& c : {Case{{1, 1024}, 0}, Case{{2, 1024}, 2}, Case{{8, 1024}, 8}, Case{{9, 1024}, 8},
+                        Case{{3, 512}, 0}, Case{{3, 1024 + 16}, 0}, Case{{3, 1024 + 512}, 0}, Case{{2, 512 * 1024}, 2},
+                        Case{{2, 1024 * 1024}, 0}, Case{{0, 1024}, 0}, Case{{3, 0}, 0}}) {
     FlashModel flash(c.size, 1);
     plug_in(&flash);
     Log log;
@@ -685,7 +715,8 @@ TEST(FlashSizes, ThatTheLogGoesByAreOfTwoSectorsAndAPowerOfTwoOfLines) {
     EXPECT_EQ(log.rounds(), 0U);
     EXPECT_EQ(keep(log, {1, 1}, {4, 5}), c.used > 0 ? Stored::kept : Stored::refused);
     EXPECT_EQ(log.in_force().size(), c.used > 0 ? 1U : 0U);
-    for (int k = 0; c.used > 0 && k < 600; ++k) ASSERT_EQ(keep(log, {1, 1}, {static_cast<std::uint8_t>(k)}), Stored::kept);
+    for (int k = 0; c.used > 0 && k < 600; ++k)
+      ASSERT_EQ(keep(log, {1, 1}, {static_cast<std::uint8_t>(k)}), Stored::kept);
     for (std::uint32_t s = c.used; s < c.size.sectors; ++s) EXPECT_EQ(flash.erases()[s], 0U) << "not the log's";
   }
 }
@@ -708,7 +739,9 @@ TEST_P(Worn, OneSectorOfThreeIsSurvivedAndReportedAndTwoEndIt) {
   plug_in(&flash);
   Log log;
   log.open();
-  const auto stored = [&](int k) { return keep(log, {1, 1}, Bytes{static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(k >> 8), 0x55, 0xAA}); };
+  const auto stored = [&](int k) {
+    return keep(log, {1, 1}, Bytes{static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(k >> 8), 0x55, 0xAA});
+  };
   int last = 0;
   for (; last < 100; ++last) ASSERT_EQ(stored(last), Stored::kept);
   EXPECT_TRUE(log.works());
@@ -745,7 +778,9 @@ TEST_P(Worn, OneSectorOfThreeIsSurvivedAndReportedAndTwoEndIt) {
   EXPECT_EQ(log.broken(), 3U);
   EXPECT_FALSE(content(log, 1, 1));
 }
-INSTANTIATE_TEST_SUITE_P(Kinds, Worn, ::testing::Values(FlashModel::Wear::erase_fails, FlashModel::Wear::erase_leaves_zeros, FlashModel::Wear::bits_stuck_at_one, FlashModel::Wear::bits_stuck_at_zero));
+INSTANTIATE_TEST_SUITE_P(Kinds, Worn,
+                         ::testing::Values(FlashModel::Wear::erase_fails, FlashModel::Wear::erase_leaves_zeros,
+                                           FlashModel::Wear::bits_stuck_at_one, FlashModel::Wear::bits_stuck_at_zero));
 
 TEST(NoFlash, KeepsNothingAndSaysSo) {
   plug_in(nullptr);
@@ -790,17 +825,28 @@ TEST(CorruptFlash, OfAnyKindIsReadWithoutHarmAndUsedAgain) {
     FlashModel flash(small, 1);
     for (std::uint32_t s = 0; s < 3; ++s) {
       switch (random() % 4) {
-        case 0: flash.fill(s, noise()); break;
-        case 1: flash.fill(s, Bytes(1024, 0)); break;
-        case 2: flash.fill(s, Bytes(1024, 0xFF)); break;
+        case 0:
+          flash.fill(s, noise());
+          break;
+        case 1:
+          flash.fill(s, Bytes(1024, 0));
+          break;
+        case 2:
+          flash.fill(s, Bytes(1024, 0xFF));
+          break;
         default: {
           // well-formed records in any order, of any length, number and round, some beyond the sector's end
           Bytes sector(16, 0xFF);
-          std::uint32_t base = random() % 3 == 0 ? 0U - 64 * static_cast<std::uint32_t>(random() % 3) : 64 * static_cast<std::uint32_t>(random() % 5 == 0 ? random() : random() % 8);
+          std::uint32_t base = random() % 3 == 0
+                                   ? 0U - 64 * static_cast<std::uint32_t>(random() % 3)
+                                   : 64 * static_cast<std::uint32_t>(random() % 5 == 0 ? random() : random() % 8);
           while (sector.size() < 1024) {
             const auto line = static_cast<std::uint32_t>(sector.size() / 16);
-            if (random() % 12 == 0) base += 64 * static_cast<std::uint32_t>(random() % 7) - 64 * 3;  // two rounds in one sector
-            const Bytes record = record_bytes(base + line + (random() % 9 == 0 ? 1 : 0), static_cast<std::uint8_t>(random() % 6 == 0 ? random() : random() % 4), static_cast<std::uint8_t>(random() % 4),
+            if (random() % 12 == 0)
+              base += 64 * static_cast<std::uint32_t>(random() % 7) - 64 * 3;  // two rounds in one sector
+            const Bytes record = record_bytes(base + line + (random() % 9 == 0 ? 1 : 0),
+                                              static_cast<std::uint8_t>(random() % 6 == 0 ? random() : random() % 4),
+                                              static_cast<std::uint8_t>(random() % 4),
                                               random_bytes(random, random() % 5 == 0 ? 255 : 20));
             sector.insert(sector.end(), record.begin(), record.end());
           }
@@ -809,7 +855,9 @@ TEST(CorruptFlash, OfAnyKindIsReadWithoutHarmAndUsedAgain) {
         }
       }
     }
-    for (auto flips = random() % 20; flips > 0; --flips) flash.flip(static_cast<std::uint32_t>(random() % 3), static_cast<std::uint32_t>(random() % 1024), static_cast<std::uint8_t>(1U << random() % 8));
+    for (auto flips = random() % 20; flips > 0; --flips)
+      flash.flip(static_cast<std::uint32_t>(random() % 3), static_cast<std::uint32_t>(random() % 1024),
+                 static_cast<std::uint8_t>(1U << random() % 8));
     survives(flash);
     if (::testing::Test::HasFailure()) break;
   }

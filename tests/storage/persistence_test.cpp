@@ -34,17 +34,18 @@ class PersistenceTest : public ::testing::Test {
  protected:
   PersistenceTest() { plug_in(&flash); }
 
-  Persistence& boot(ResetCause cause = ResetCause::power_on, std::optional<std::uint32_t> calendar = std::nullopt, bool processor_fault = false) {
+  Persistence& boot(ResetCause cause = ResetCause::power_on, std::optional<std::uint32_t> calendar = std::nullopt,
+                    bool processor_fault = false) {
     time_us = 0;
     p = {};
     p.start(cause, processor_fault ? std::optional(hal::FaultRecord{.exception = 5}) : std::nullopt, calendar);
-    p.count(Sample{});  // from here on time counts
+    p.count(measurement::Sample{});  // from here on time counts
     return p;
   }
   /// Minutes of a sample a second.
   void drive(int minutes, std::int32_t current_ua = 0, std::int32_t soc_per_minute_ppb = 0) {
     for (int k = 0; k < 60 * minutes; ++k) {
-      Sample s;
+      measurement::Sample s;
       s.time_us = time_us += 1'000'000;
       s.current_ua = current_ua;
       if (!p.count(s)) continue;
@@ -62,7 +63,8 @@ class PersistenceTest : public ::testing::Test {
     }
     return std::nullopt;
   }
-  /// The minutes from now on, counted from 1, with which a record of that kind was written; before each, something is done.
+  /// The minutes from now on, counted from 1, with which a record of that kind was written; before each, something is
+  /// done.
   template <class R, class Each>
   std::vector<int> written(int minutes, const Each& each, std::int32_t current_ua = 0) {
     std::vector<int> all;
@@ -80,7 +82,7 @@ class PersistenceTest : public ::testing::Test {
   FlashModel flash{chip, 1};
   Persistence p;
   std::uint64_t time_us = 0;
-  StoredEstimate pack{60 * percent_ppb, percent_ppb};
+  estimator::StoredEstimate pack{60 * percent_ppb, percent_ppb};
   std::vector<CellsRecord::Cell> cells;
   storage::HealthRecord health{1'000'000, 100'000, 1'000'000, 300'000};
   std::optional<std::uint32_t> calendar_s;
@@ -112,7 +114,8 @@ TEST_F(PersistenceTest, ACellThatReadsOtherwiseNowAndThenDoesNotHoldUpABoot) {
     pack.soc_ppb = 60 * percent_ppb;
   }
   const auto records = p.log().in_force();
-  const auto last = *std::max_element(records.begin(), records.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  const auto last = *std::max_element(records.begin(), records.end(),
+                                      [](const auto& a, const auto& b) { return a.number < b.number; });
   const FlashModel before = flash;
   for (std::uint32_t at = last.line * 16U; at < last.line * 16U + 24; at += 5) {
     for (std::uint32_t every = 1; every < 9; ++every) {
@@ -226,16 +229,23 @@ TEST_F(PersistenceTest, ChargeIsWrittenWhenItHasMovedByATenthOfAPercentSinceItWa
     boot();
     EXPECT_EQ(written<ChargeRecord>(6, [&](int) { pack.soc_ppb += sign * 1'000'000; }), (Minutes{1, 2, 3, 4, 5, 6}));
     EXPECT_EQ(written<ChargeRecord>(6, [&](int) { pack.soc_ppb += sign * 999'999; }), (Minutes{2, 4, 6}));
-    EXPECT_EQ(written<ChargeRecord>(6, [&](int) { pack.soc_ppb += sign * 400'000; }), (Minutes{3, 6})) << "a drift counts from what is stored";
+    EXPECT_EQ(written<ChargeRecord>(6, [&](int) { pack.soc_ppb += sign * 400'000; }), (Minutes{3, 6}))
+        << "a drift counts from what is stored";
   }
 }
 
 TEST_F(PersistenceTest, ChargeIsWrittenWhenItsSigmaHasMovedByATenthOfItself) {
-  for (const auto& [sigma_ppb, by_ppb] : {std::pair{10'000'000, 1'000'000}, std::pair{10'000'000, -1'000'000}, std::pair{500'000, 100'000}, std::pair{500'000, -100'000}}) {
+  for (const auto& [sigma_ppb, by_ppb] : {std::pair{10'000'000, 1'000'000}, std::pair{10'000'000, -1'000'000},
+                                          std::pair{500'000, 100'000}, std::pair{500'000, -100'000}}) {
     pack.soc_sigma_ppb = sigma_ppb;
     boot();
     drive(1);
-    EXPECT_EQ(written<ChargeRecord>(3, [&, from = sigma_ppb, by = by_ppb](int minute) { pack.soc_sigma_ppb = from + (minute < 3 ? by - by / std::abs(by) : by); }), (Minutes{3})) << sigma_ppb << ' ' << by_ppb;
+    EXPECT_EQ(written<ChargeRecord>(3,
+                                    [&, from = sigma_ppb, by = by_ppb](int minute) {
+                                      pack.soc_sigma_ppb = from + (minute < 3 ? by - by / std::abs(by) : by);
+                                    }),
+              (Minutes{3}))
+        << sigma_ppb << ' ' << by_ppb;
   }
 }
 
@@ -244,14 +254,18 @@ TEST_F(PersistenceTest, ChargeIsWrittenAnHourLaterIfAnyHasFlowedAndElseNotAtAll)
   EXPECT_EQ(written<ChargeRecord>(150, [](int) {}), (Minutes{1}));
   for (const std::int32_t current_ua : {6'000'000, -6'000'000}) {
     boot();
-    EXPECT_EQ(written<ChargeRecord>(130, [](int) {}, current_ua), (Minutes{1, 61, 121})) << current_ua;
+    EXPECT_EQ(written<ChargeRecord>(
+                  130, [](int) {}, current_ua),
+              (Minutes{1, 61, 121}))
+        << current_ua;
   }
 }
 
 TEST_F(PersistenceTest, CellsAreWrittenEveryHalfHourWhenAnyOneHasMoved) {
   cells.assign(16, {});
   boot();
-  EXPECT_EQ(written<CellsRecord>(100, [&](int minute) { cells[5].soc = static_cast<std::int16_t>(100 * minute); }), (Minutes{30, 60, 90}));
+  EXPECT_EQ(written<CellsRecord>(100, [&](int minute) { cells[5].soc = static_cast<std::int16_t>(100 * minute); }),
+            (Minutes{30, 60, 90}));
   EXPECT_EQ(written<CellsRecord>(100, [](int) {}), (Minutes{20})) << "the last of it, and then nothing";
   for (std::size_t k = 0; k < 16; ++k) {
     for (const int by : {100, -100}) {
@@ -270,9 +284,11 @@ TEST_F(PersistenceTest, CellsAreWrittenEveryHalfHourWhenAnyOneHasMoved) {
 
 TEST_F(PersistenceTest, HealthIsWrittenEveryHourWhenAnyValueHasMoved) {
   boot();
-  EXPECT_EQ(written<HealthRecord>(190, [&](int minute) { health.capacity_ppm = 1'000'000 - 1'000 * minute; }), (Minutes{60, 120, 180}));
+  EXPECT_EQ(written<HealthRecord>(190, [&](int minute) { health.capacity_ppm = 1'000'000 - 1'000 * minute; }),
+            (Minutes{60, 120, 180}));
   EXPECT_EQ(written<HealthRecord>(300, [](int) {}), (Minutes{50})) << "the last of it, and then nothing";
-  for (const auto value : {&HealthRecord::capacity_ppm, &HealthRecord::capacity_sigma_ppm, &HealthRecord::resistance_ppm, &HealthRecord::resistance_sigma_ppm}) {
+  for (const auto value : {&HealthRecord::capacity_ppm, &HealthRecord::capacity_sigma_ppm,
+                           &HealthRecord::resistance_ppm, &HealthRecord::resistance_sigma_ppm}) {
     for (const std::int32_t by : {1'000, -1'000}) {
       health.*value += by / 2;
       EXPECT_EQ(written<HealthRecord>(65, [](int) {}), Minutes{}) << "less than 0.1 %";
@@ -353,7 +369,7 @@ TEST_F(PersistenceTest, WhenTheSupplySinksChargeIsWrittenAndNothingElse) {
   cells.assign(16, {500, 1});
   pack.soc_ppb = 555'555'555;
   for (int k = 0; k < 30; ++k) {
-    Sample s;
+    measurement::Sample s;
     s.time_us = time_us += 1'000'000;
     s.current_ua = -6'000'000;
     p.count(s);
@@ -372,7 +388,9 @@ TEST_F(PersistenceTest, AtAShutdownWhatHasChangedIsWrittenWhetherItIsDueOrNot) {
   boot();
   cells.assign(16, {});
   drive(61);
-  const auto everything = [&] { return std::tuple{p.cells(), p.health(), p.events().last(0), p.settings().get(8), p.starting_point()->soc_ppb}; };
+  const auto everything = [&] {
+    return std::tuple{p.cells(), p.health(), p.events().last(0), p.settings().get(8), p.starting_point()->soc_ppb};
+  };
   for (const int k : {1, 2}) {
     cells[7].soc = static_cast<std::int16_t>(200 * k);
     health.resistance_ppm += 10'000;
@@ -409,7 +427,7 @@ TEST_F(PersistenceTest, AUnitIsCountedWhenItIsWhole) {
   for (const std::int32_t sign : {1, -1}) {
     boot();
     const auto before = p.charge();
-    Sample s;
+    measurement::Sample s;
     s.current_ua = sign * 59'999;
     s.time_us = 60'001;  // one uA us less than a uAh
     p.count(s);
@@ -436,7 +454,8 @@ TEST_F(PersistenceTest, AUnitIsCountedWhenItIsWhole) {
 TEST_F(PersistenceTest, AfterYearsOfStandingStillWhatMovesIsWritten) {
   cells.assign(16, {});
   boot();
-  for (int minute = 0; minute < 0x1'0000 + 62; ++minute) p.keep(now(), std::nullopt);  // the counters of minutes have stopped at their end
+  for (int minute = 0; minute < 0x1'0000 + 62; ++minute)
+    p.keep(now(), std::nullopt);  // the counters of minutes have stopped at their end
   cells[2].soc = 1'000;
   health.capacity_ppm = 900'000;
   p.keep(now(), std::nullopt);
@@ -447,7 +466,7 @@ TEST_F(PersistenceTest, AfterYearsOfStandingStillWhatMovesIsWritten) {
 TEST_F(PersistenceTest, TimeAndChargeAreCountedFromTheFirstSampleByAClockThatGoesOn) {
   p = {};
   p.start(ResetCause::power_on, std::nullopt, std::nullopt);
-  Sample s;
+  measurement::Sample s;
   s.current_ua = 6'000'000;
   s.time_us = 36'000'000'000;
   EXPECT_FALSE(p.count(s)) << "ten hours since the core started are not of operation";
@@ -466,7 +485,7 @@ TEST_F(PersistenceTest, TimeAndChargeAreCountedFromTheFirstSampleByAClockThatGoe
   p.keep(now(), std::nullopt);
   EXPECT_EQ(p.charge().operating_s, 120U);
   EXPECT_EQ(p.charge().charged_uah, 200'000U);
-  s.current_ua = no_reading;
+  s.current_ua = measurement::no_reading;
   s.time_us += 60'000'000;
   EXPECT_TRUE(p.count(s));
   p.keep(now(), std::nullopt);
@@ -480,7 +499,7 @@ TEST_F(PersistenceTest, NothingIsLostToRoundingInAThousandMinutes) {
   for (const std::int32_t current_ua : {7, -7}) {
     boot();
     const auto charge_before = p.charge();
-    Sample s;
+    measurement::Sample s;
     s.current_ua = current_ua;
     for (int k = 0; k < 86'000; ++k) {
       s.time_us += 700'000;
@@ -488,8 +507,10 @@ TEST_F(PersistenceTest, NothingIsLostToRoundingInAThousandMinutes) {
     }
     const double hours = 86'000 * 0.7 / 3'600;
     EXPECT_EQ(p.charge().operating_s - charge_before.operating_s, static_cast<std::uint32_t>(3'600 * hours));
-    EXPECT_EQ(p.charge().charged_uah - charge_before.charged_uah, current_ua > 0 ? static_cast<std::uint64_t>(7 * hours) : 0);
-    EXPECT_EQ(p.charge().discharged_uah - charge_before.discharged_uah, current_ua < 0 ? static_cast<std::uint64_t>(7 * hours) : 0);
+    EXPECT_EQ(p.charge().charged_uah - charge_before.charged_uah,
+              current_ua > 0 ? static_cast<std::uint64_t>(7 * hours) : 0);
+    EXPECT_EQ(p.charge().discharged_uah - charge_before.discharged_uah,
+              current_ua < 0 ? static_cast<std::uint64_t>(7 * hours) : 0);
   }
 }
 
@@ -520,7 +541,8 @@ TEST_F(PersistenceTest, TheTimeOffIsKnownOfAResetOfTheCoreAndByAClockThatRanBefo
   boot(ResetCause::power_on, 1'000'000);
   EXPECT_FALSE(p.off_s()) << "no clock ran when it was stored";
   p.power_failing(now(), 1'000'000);
-  for (const ResetCause cause : {ResetCause::software, ResetCause::watchdog, ResetCause::pin}) EXPECT_EQ(boot(cause, 2'000'000).off_s(), 0U);
+  for (const ResetCause cause : {ResetCause::software, ResetCause::watchdog, ResetCause::pin})
+    EXPECT_EQ(boot(cause, 2'000'000).off_s(), 0U);
   EXPECT_EQ(boot(ResetCause::brown_out, 1'000'000).off_s(), 0U);
   EXPECT_EQ(boot(ResetCause::power_on, 1'000'001).off_s(), 1U);
   for (std::uint32_t s = 0; s < 3; ++s) flash.fill(s, std::vector<std::uint8_t>(chip.sector_bytes, 0));
@@ -547,7 +569,7 @@ TEST_F(PersistenceTest, AStormOfFaultsAndAChainOfStartsWriteLittle) {
     boot(ResetCause::brown_out);
     time_us = 0;
     for (int s = 0; s < 59; ++s) {
-      Sample sample;
+      measurement::Sample sample;
       sample.time_us = time_us += 1'000'000;
       EXPECT_FALSE(p.count(sample));
     }
@@ -578,7 +600,8 @@ TEST_F(PersistenceTest, WithoutLeaveToEraseTheReserveLastsForElevenHoursOfMoving
   EXPECT_EQ(flash.erases(), erases);
   EXPECT_TRUE(p.wants_erase());
   EXPECT_TRUE(p.log().works());
-  EXPECT_EQ(boot(ResetCause::watchdog).starting_point()->soc_ppb / 1'000'000, minutes % 2 == 0 ? 598 : 600) << "of the last minute that was written";
+  EXPECT_EQ(boot(ResetCause::watchdog).starting_point()->soc_ppb / 1'000'000, minutes % 2 == 0 ? 598 : 600)
+      << "of the last minute that was written";
 }
 
 /// Layout 1 as the first firmware that stored anything wrote it, in flash that nobody else has touched.
@@ -649,9 +672,11 @@ TEST_F(PersistenceTest, WithBrokenSectorsItRunsAndSaysSo) {
   EXPECT_FALSE(p.starting_point());
 }
 
-/// A month of a truck that never rests: soc, cells and health move all the time. Written is what the policy lets through.
+/// A month of a truck that never rests: soc, cells and health move all the time. Written is what the policy lets
+/// through.
 TEST_F(PersistenceTest, FlashLastsSeventeenYearsOfMovingWithoutRest) {
-  constexpr double endurance = 10'000, minutes_a_year = 365.25 * 24 * 60;  // STM32F405 datasheet DS8626, flash endurance
+  constexpr double endurance = 10'000,
+                   minutes_a_year = 365.25 * 24 * 60;  // STM32F405 datasheet DS8626, flash endurance
   boot();
   cells.assign(16, {});
   constexpr int days = 60;
@@ -668,7 +693,8 @@ TEST_F(PersistenceTest, FlashLastsSeventeenYearsOfMovingWithoutRest) {
     least = std::min(least, n);
   }
   const double years = endurance / (most / days) / 365.25;
-  std::printf("%d days, a record of charge a minute: erased %.0f to %.0f times a sector, %.1f years\n", days, least, most, years);
+  std::printf("%d days, a record of charge a minute: erased %.0f to %.0f times a sector, %.1f years\n", days, least,
+              most, years);
   EXPECT_LE(most - least, 1);
   EXPECT_GT(years, 15);
   EXPECT_LT(years, endurance * 3 * 341 / minutes_a_year) << "more than three lines a minute are written";

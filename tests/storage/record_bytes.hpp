@@ -23,7 +23,8 @@ inline void put(std::vector<std::uint8_t>& to, std::uint32_t value) {
 }
 
 /// Header and payload, filled up to whole lines. number: its low bits are its line in the sector.
-inline std::vector<std::uint8_t> record_bytes(std::uint32_t number, std::uint8_t type, std::uint8_t layout, const std::vector<std::uint8_t>& payload) {
+inline std::vector<std::uint8_t> record_bytes(std::uint32_t number, std::uint8_t type, std::uint8_t layout,
+                                              const std::vector<std::uint8_t>& payload) {
   std::vector<std::uint8_t> bytes;
   put(bytes, number);
   bytes.insert(bytes.end(), {type, layout, static_cast<std::uint8_t>(payload.size()), 0});

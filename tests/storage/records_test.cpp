@@ -28,14 +28,16 @@ EventsRecord full_events() {
 
 SettingsRecord full_settings() {
   SettingsRecord s;
-  for (std::size_t k = 0; k < SettingsRecord::most; ++k) EXPECT_TRUE(s.set(static_cast<std::uint16_t>(7 * k), -100'000 * static_cast<std::int32_t>(k)));
+  for (std::size_t k = 0; k < SettingsRecord::most; ++k)
+    EXPECT_TRUE(s.set(static_cast<std::uint16_t>(7 * k), -100'000 * static_cast<std::int32_t>(k)));
   return s;
 }
 
 CellsRecord full_cells() {
   CellsRecord c;
   c.count = 16;
-  for (std::size_t k = 0; k < 16; ++k) c.cell[k] = {static_cast<std::int16_t>(-3000 + 400 * static_cast<int>(k)), static_cast<std::uint16_t>(40'000 + k)};
+  for (std::size_t k = 0; k < 16; ++k)
+    c.cell[k] = {static_cast<std::int16_t>(-3000 + 400 * static_cast<int>(k)), static_cast<std::uint16_t>(40'000 + k)};
   return c;
 }
 
@@ -47,7 +49,8 @@ TEST(ChargeRecord, LiesLittleEndianFieldAfterField) {
   r.discharged_uah = 0xFFFFFFFFFFFF;
   r.operating_s = 0x01000000;
   r.calendar_s = 0xFFFFFFFF;
-  EXPECT_EQ(bytes_of(r), (Raw{0x44, 0x33, 0x22, 0x11, 0x0D, 0x0C, 0x0B, 0x0A, 5, 0, 0, 0, 1, 2, 3, 4, 5, 6, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 1, 0xFF, 0xFF, 0xFF, 0xFF}));
+  EXPECT_EQ(bytes_of(r), (Raw{0x44, 0x33, 0x22, 0x11, 0x0D, 0x0C, 0x0B, 0x0A, 5, 0, 0, 0, 1,    2,    3,    4,
+                              5,    6,    0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 1, 0xFF, 0xFF, 0xFF, 0xFF}));
 }
 
 /// Who updates the firmware finds what the one before has stored.
@@ -62,7 +65,8 @@ TEST(Records, LieUnderTheNumbersTheyAlwaysHadAndInTheirOrder) {
   cells.cell[0] = {-2, 0x0102};
   cells.cell[1] = {3, 4};
   EXPECT_EQ(bytes_of(cells), (Raw{2, 0xFE, 0xFF, 2, 1, 3, 0, 4, 0}));
-  EXPECT_EQ(bytes_of(HealthRecord{0x01020304, 5, -1, 0x7F000000}), (Raw{4, 3, 2, 1, 5, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0x7F}));
+  EXPECT_EQ(bytes_of(HealthRecord{0x01020304, 5, -1, 0x7F000000}),
+            (Raw{4, 3, 2, 1, 5, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0x7F}));
   EventsRecord events;
   events.starts = 9;
   events.resets[6] = 0x0807;
@@ -101,7 +105,8 @@ void comes_back(const R& record) {
   R back;
   ASSERT_TRUE(decode(bytes, R::kind.layout, back));
   EXPECT_TRUE(back == record);
-  for (std::size_t n = 0; n < bytes.size(); ++n) EXPECT_FALSE(decode(Bytes(bytes).first(n), R::kind.layout, back)) << "cut to " << n;
+  for (std::size_t n = 0; n < bytes.size(); ++n)
+    EXPECT_FALSE(decode(Bytes(bytes).first(n), R::kind.layout, back)) << "cut to " << n;
   Raw longer = bytes;
   longer.push_back(0);
   EXPECT_FALSE(decode(longer, R::kind.layout, back));
@@ -143,11 +148,11 @@ TEST(ChargeRecord, ASocThatCannotBeIsNotBelieved) {
   EXPECT_EQ(possible({500'000'000, 289'000'001}).soc_sigma_ppb, 289'000'000) << "anything is as wide as it gets";
   for (const std::int32_t edge : {-250'000'000, 1'250'000'000}) {
     const std::int32_t beyond = edge < 0 ? edge - 1 : edge + 1, end = edge < 0 ? 0 : 1'000'000'000;
-    EXPECT_EQ(possible({edge, 5}), (StoredEstimate{end, 5}));
-    EXPECT_EQ(possible({beyond, 5}), (StoredEstimate{end, 289'000'000}));
+    EXPECT_EQ(possible({edge, 5}), (estimator::StoredEstimate{end, 5}));
+    EXPECT_EQ(possible({beyond, 5}), (estimator::StoredEstimate{end, 289'000'000}));
   }
-  EXPECT_EQ(possible({0, 5}), (StoredEstimate{0, 5}));
-  EXPECT_EQ(possible({1'000'000'000, 5}), (StoredEstimate{1'000'000'000, 5}));
+  EXPECT_EQ(possible({0, 5}), (estimator::StoredEstimate{0, 5}));
+  EXPECT_EQ(possible({1'000'000'000, 5}), (estimator::StoredEstimate{1'000'000'000, 5}));
 }
 
 TEST(EventsRecord, HoldsTheLastSixteenFaultsNewestFirst) {

@@ -3,12 +3,13 @@
 #include <array>
 #include <charconv>
 
-namespace truth {
+namespace bms::plant {
 
-std::vector<RecordedRow> record(const std::vector<bms::ProfileRow>& profile, Cell& cell, Instruments& instruments, const Ambient& ambient) {
+std::vector<RecordedRow> record(const std::vector<bms::experiments::ProfileRow>& profile, Cell& cell,
+                                Instruments& instruments, const Ambient& ambient) {
   std::vector<RecordedRow> rows;
   double before_s = profile.front().time_s;
-  for (const bms::ProfileRow& row : profile) {
+  for (const bms::experiments::ProfileRow& row : profile) {
     const double elapsed_s = row.time_s - before_s;
     const double done = row.time_s / profile.back().time_s;
     if (elapsed_s > 0) cell.run(row.current_a, ambient.start_c + done * (ambient.end_c - ambient.start_c), elapsed_s);
@@ -28,7 +29,8 @@ namespace {
 
 void append(std::string& text, double value, int decimals, char end) {
   std::array<char, 32> digits{};
-  const auto written = std::to_chars(digits.data(), digits.data() + digits.size(), value + 0.0, std::chars_format::fixed, decimals);  // + 0.0: no "-0"
+  const auto written = std::to_chars(digits.data(), digits.data() + digits.size(), value + 0.0,
+                                     std::chars_format::fixed, decimals);  // + 0.0: no "-0"
   text.append(digits.data(), written.ptr).push_back(end);
 }
 
@@ -38,7 +40,8 @@ std::string forklift_shift_csv() {
   constexpr std::uint64_t profile_seed = 1, instrument_seed = 1;
   Cell cell({.capacity_ah = 6.03}, {.soc = 0.98, .v_rc_v = 0, .temperature_c = 18});
   Instruments instruments({}, instrument_seed);
-  const auto profile = bms::experiment("forklift_shift", {.capacity_ah = 6, .seed = profile_seed, .step_s = 1});
+  const auto profile =
+      bms::experiments::experiment("forklift_shift", {.capacity_ah = 6, .seed = profile_seed, .step_s = 1});
 
   std::string text =
       "# Eight hours of an electric forklift on one LiFePO4 cell of 6 Ah. Simulated, not measured.\n"
@@ -56,4 +59,4 @@ std::string forklift_shift_csv() {
   return text;
 }
 
-}  // namespace truth
+}  // namespace bms::plant

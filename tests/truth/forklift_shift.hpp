@@ -1,4 +1,5 @@
-// recordings/forklift_shift.csv: the experiment of that name as the true current of a truth cell, seen through its instruments.
+// recordings/forklift_shift.csv: the experiment of that name as the true current of a truth cell, seen through its
+// instruments.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "plant/instruments.hpp"
 #include "plant/truth_cell.hpp"
 
-namespace truth {
+namespace bms::plant {
 
 struct RecordedRow {
   double time_s;
@@ -26,9 +27,10 @@ struct Ambient {
 };
 
 /// Drives the cell through the profile, whose current is the true one.
-std::vector<RecordedRow> record(const std::vector<bms::ProfileRow>& profile, Cell& cell, Instruments& instruments, const Ambient& ambient);
+std::vector<RecordedRow> record(const std::vector<bms::experiments::ProfileRow>& profile, Cell& cell,
+                                Instruments& instruments, const Ambient& ambient);
 
 /// The text of the file, comment lines included.
 std::string forklift_shift_csv();
 
-}  // namespace truth
+}  // namespace bms::plant

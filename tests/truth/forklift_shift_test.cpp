@@ -7,12 +7,12 @@
 #include <fstream>
 #include <sstream>
 
-namespace truth {
+namespace bms::plant {
 namespace {
 
-double charge_ah(const std::vector<bms::ProfileRow>& rows) {
+double charge_ah(const std::vector<bms::experiments::ProfileRow>& rows) {
   double sum_as = 0, before_s = 0;
-  for (const bms::ProfileRow& row : rows) {
+  for (const bms::experiments::ProfileRow& row : rows) {
     sum_as += row.current_a * (row.time_s - before_s);
     before_s = row.time_s;
   }
@@ -21,7 +21,7 @@ double charge_ah(const std::vector<bms::ProfileRow>& rows) {
 
 TEST(ForkliftShift, StaysWithin1CAndBetween10And100PercentWhateverTheSeed) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    const auto rows = bms::experiment("forklift_shift", {.seed = seed}).value();
+    const auto rows = bms::experiments::experiment("forklift_shift", {.seed = seed}).value();
     ASSERT_EQ(rows.size(), 28'801U);
     double soc = 0.98, lowest = soc, highest = soc;
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -41,18 +41,22 @@ TEST(ForkliftShift, StaysWithin1CAndBetween10And100PercentWhateverTheSeed) {
 }
 
 TEST(ForkliftShift, HoldsTheSameChargeAtEveryStepAndScalesWithTheCell) {
-  const double at_1s_ah = charge_ah(bms::experiment("forklift_shift").value());
+  const double at_1s_ah = charge_ah(bms::experiments::experiment("forklift_shift").value());
   // Rounding to 1 mA, at random: 0.3 mA / sqrt(28,800) of 8 h.
-  EXPECT_NEAR(charge_ah(bms::experiment("forklift_shift", {.step_s = 0.3}).value()), at_1s_ah, 1e-4);
-  EXPECT_NEAR(charge_ah(bms::experiment("forklift_shift", {.step_s = 10}).value()), at_1s_ah, 1e-4);
-  EXPECT_NEAR(charge_ah(bms::experiment("forklift_shift", {.capacity_ah = 2.5}).value()), at_1s_ah * 2.5 / 6, 1e-4);
+  EXPECT_NEAR(charge_ah(bms::experiments::experiment("forklift_shift", {.step_s = 0.3}).value()), at_1s_ah, 1e-4);
+  EXPECT_NEAR(charge_ah(bms::experiments::experiment("forklift_shift", {.step_s = 10}).value()), at_1s_ah, 1e-4);
+  EXPECT_NEAR(charge_ah(bms::experiments::experiment("forklift_shift", {.capacity_ah = 2.5}).value()),
+              at_1s_ah * 2.5 / 6, 1e-4);
 }
 
 TEST(ForkliftShift, DiffersBySeedAndNoOtherNameIsKnown) {
-  const auto one = bms::experiment("forklift_shift", {.seed = 1}).value(), other = bms::experiment("forklift_shift", {.seed = 2}).value();
-  const auto equal = [](const bms::ProfileRow& a, const bms::ProfileRow& b) { return a.current_a == b.current_a; };
+  const auto one = bms::experiments::experiment("forklift_shift", {.seed = 1}).value(),
+             other = bms::experiments::experiment("forklift_shift", {.seed = 2}).value();
+  const auto equal = [](const bms::experiments::ProfileRow& a, const bms::experiments::ProfileRow& b) {
+    return a.current_a == b.current_a;
+  };
   EXPECT_FALSE(std::equal(one.begin(), one.end(), other.begin(), other.end(), equal));
-  EXPECT_FALSE(bms::experiment("forklift").has_value());
+  EXPECT_FALSE(bms::experiments::experiment("forklift").has_value());
 }
 
 // No libm, no fused multiply-add, printed by to_chars: equal means equal.
@@ -72,4 +76,4 @@ TEST(ForkliftShift, CommittedRecordingIsWhatTheProgramMakes) {
 }
 
 }  // namespace
-}  // namespace truth
+}  // namespace bms::plant

@@ -7,7 +7,7 @@
 int main(int count, char** arguments) {
   const char* path = count > 1 ? arguments[1] : BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
   std::ofstream file(path, std::ios::binary);
-  file << truth::forklift_shift_csv();
+  file << bms::plant::forklift_shift_csv();
   file.close();
   if (file) return 0;
   std::fprintf(stderr, "%s: cannot be written\n", path);

@@ -9,7 +9,7 @@
 #include "plant/instruments.hpp"
 #include "plant/random.hpp"
 
-namespace truth {
+namespace bms::plant {
 namespace {
 
 constexpr double ambient_c = 20;
@@ -23,7 +23,8 @@ struct Pulse {
 std::vector<Pulse> pulses(int count) {
   Random random(7);
   std::vector<Pulse> all;
-  for (int k = 0; k < count; ++k) all.push_back({k % 3 == 0 ? 0 : 12 * random.uniform() - 6.5, 1 + std::floor(60 * random.uniform())});
+  for (int k = 0; k < count; ++k)
+    all.push_back({k % 3 == 0 ? 0 : 12 * random.uniform() - 6.5, 1 + std::floor(60 * random.uniform())});
   return all;
 }
 
@@ -54,7 +55,8 @@ TEST(TruthOcv, RisesEverywhereWithoutAJumpInItsSlope) {
 }
 
 TEST(TruthCircuit, GoesThroughTheValuesOfTable9AndStaysBetweenNeighbours) {
-  constexpr std::array r1_ohm = {0.027101, 0.012339, 0.00998571, 0.009014, 0.00825815, 0.00771709, 0.00740307, 0.00777491, 0.00822862, 0.0072376};
+  constexpr std::array r1_ohm = {0.027101,   0.012339,   0.00998571, 0.009014,   0.00825815,
+                                 0.00771709, 0.00740307, 0.00777491, 0.00822862, 0.0072376};
   const Circuit circuit = table9_circuit();
   EXPECT_DOUBLE_EQ(circuit.r0_ohm.at(0.1), 0.0140197);
   EXPECT_DOUBLE_EQ(circuit.c1_f.at(1.0), 1927.32);
@@ -129,7 +131,8 @@ TEST(TruthCell, ChangesByLessThanAMicrovoltWhenItsStepIsHalved) {
 TEST(TruthCell, WarmsUntilItsHeatLeavesAndThenCoolsExponentially) {
   constexpr double r0_ohm = 0.013, r1_ohm = 0.008, current_a = 5;
   const Thermal thermal{.heat_capacity_j_per_k = 100, .to_ambient_w_per_k = 0.2};
-  Cell cell({.capacity_ah = 1e3, .circuit = {flat(r0_ohm), flat(r1_ohm), flat(100)}, .thermal = thermal}, {.temperature_c = ambient_c});
+  Cell cell({.capacity_ah = 1e3, .circuit = {flat(r0_ohm), flat(r1_ohm), flat(100)}, .thermal = thermal},
+            {.temperature_c = ambient_c});
   cell.run(current_a, ambient_c, 20'000);
   const double rise_k = current_a * current_a * (r0_ohm + r1_ohm) / thermal.to_ambient_w_per_k;
   EXPECT_NEAR(cell.temperature_c(), ambient_c + rise_k, 1e-9);
@@ -200,4 +203,4 @@ TEST(Instruments, RepeatThemselvesBySeedAndDoNotShareTheirNoise) {
 }
 
 }  // namespace
-}  // namespace truth
+}  // namespace bms::plant

@@ -1,5 +1,5 @@
-// A recording into a firmware that listens on a CAN interface, in lock step: the frames of a sample, then wait for the status frame that ends
-// what it is answered with.
+// A recording into a firmware that listens on a CAN interface, in lock step: the frames of a sample, then wait for the
+// status frame that ends what it is answered with.
 //
 //   feed_samples INTERFACE RECORDING.csv SOC SIGMA
 #include <linux/can.h>
@@ -13,8 +13,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "files/recording.hpp"
 #include "hal/sample_frames.hpp"
-#include "host_sim/recording.hpp"
 #include "host_sim/replay.hpp"
 
 namespace {
@@ -23,7 +23,7 @@ using namespace bms;
 
 constexpr canid_t status_id = 0x182;
 
-void send(int bus, const hal::CanFrame& frame) {
+void send(int bus, const can::Frame& frame) {
   can_frame raw{};
   raw.can_id = frame.id;
   raw.can_dlc = frame.length;
@@ -54,10 +54,10 @@ int main(int argc, char** argv) {
     std::perror(argv[1]);
     return 1;
   }
-  send(bus, hal::frame_of(starting_point(Belief{std::atof(argv[3]), std::atof(argv[4])}).value()));
+  send(bus, hal::frame_of(host_sim::starting_point(host_sim::Belief{std::atof(argv[3]), std::atof(argv[4])}).value()));
   std::size_t fed = 0;
-  for (const Sample& sample : samples(read_recording(argv[2]))) {
-    for (const hal::CanFrame& frame : hal::frames_of(sample)) send(bus, frame);
+  for (const measurement::Sample& sample : files::samples(files::read_recording(argv[2]))) {
+    for (const can::Frame& frame : hal::frames_of(sample)) send(bus, frame);
     if (!answered(bus)) {
       std::fprintf(stderr, "no answer to sample %zu\n", fed);
       return 1;

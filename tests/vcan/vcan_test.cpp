@@ -1,5 +1,6 @@
-// The firmware on a real CAN bus (SocketCAN, in User-Mode Linux where this machine has none), with noise beside it: what bms monitor says of it is
-// what bms replay says of the same samples, and what candump and canmatrix make of the same frames.
+// The firmware on a real CAN bus (SocketCAN, in User-Mode Linux where this machine has none), with noise beside it:
+// what bms monitor says of it is what bms replay says of the same samples, and what candump and canmatrix make of the
+// same frames.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "host_sim/cell_file.hpp"
-#include "host_sim/firmware_image.hpp"
+#include "files/cell_file.hpp"
+#include "images/firmware_image.hpp"
 #include "tests/end_to_end/run_tool.hpp"
 
 namespace bms {
@@ -18,7 +19,7 @@ using ::testing::HasSubstr;
 
 /// Exit code, standard output and standard error of a command of the shell.
 ToolRun run_shell(const std::string& command) {
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string(), err = (folder.path() / "err").string();
   const int status = std::system((command + " >" + out + " 2>" + err).c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, content(out), content(err)};
@@ -55,13 +56,18 @@ std::vector<double> column(const std::filesystem::path& csv, const std::string& 
 
 TEST(Vcan, MonitorAndCandumpShowOnANoisyBusWhatReplaySaysOfTheSameSamples) {
   constexpr int samples = 200;
-  const TemporaryFolder folder;
+  const images::TemporaryFolder folder;
   const auto part = folder.path() / "part.csv", trace = folder.path() / "trace.csv";
   write_part(part, samples);
-  ASSERT_EQ(run_tool(fmt::format("replay {} --initial-soc 0.8 --initial-soc-sigma 0.05 --trace {} --quiet", part.string(), trace.string())).exit_code, 0);
-  const auto image = firmware_image("netduinoplus2", read_cell("table9"), Image::application);
+  ASSERT_EQ(run_tool(fmt::format("replay {} --initial-soc 0.8 --initial-soc-sigma 0.05 --trace {} --quiet",
+                                 part.string(), trace.string()))
+                .exit_code,
+            0);
+  const auto image = images::firmware_image("netduinoplus2", files::read_cell("table9"), images::Image::application);
 
-  const ToolRun run = run_shell(fmt::format("{}/tests/vcan/telemetry.sh {} {} {} {} 0.8 0.05 {}", BMS_SOURCE_DIR, BMS_TOOL, BMS_FEED_SAMPLES, image.string(), part.string(), folder.path().string()));
+  const ToolRun run =
+      run_shell(fmt::format("{}/tests/vcan/telemetry.sh {} {} {} {} 0.8 0.05 {}", BMS_SOURCE_DIR, BMS_TOOL,
+                            BMS_FEED_SAMPLES, image.string(), part.string(), folder.path().string()));
   if (run.exit_code == 125) GTEST_SKIP() << run.err;
   ASSERT_EQ(run.exit_code, 0) << run.out << run.err << content(folder.path() / "emulator.log");
   EXPECT_THAT(run.out, HasSubstr(fmt::format("{} samples", samples)));
@@ -79,7 +85,9 @@ TEST(Vcan, MonitorAndCandumpShowOnANoisyBusWhatReplaySaysOfTheSameSamples) {
   EXPECT_EQ(told["messages"]["Status"]["frames"], samples);
 
   // what the firmware says of each sample; half a step of 0.002 %
-  const auto soc = column(trace, "soc"), sigma = column(trace, "soc_sigma"), shown = column(folder.path() / "rows.csv", "PackState.Soc [%]"), shown_sigma = column(folder.path() / "rows.csv", "PackState.SocSigma [%]");
+  const auto soc = column(trace, "soc"), sigma = column(trace, "soc_sigma"),
+             shown = column(folder.path() / "rows.csv", "PackState.Soc [%]"),
+             shown_sigma = column(folder.path() / "rows.csv", "PackState.SocSigma [%]");
   ASSERT_EQ(soc.size(), samples);
   ASSERT_EQ(shown.size(), samples);
   for (int k = 0; k < samples; ++k) {
@@ -89,7 +97,10 @@ TEST(Vcan, MonitorAndCandumpShowOnANoisyBusWhatReplaySaysOfTheSameSamples) {
   EXPECT_NEAR(told["pack"]["soc"].get<double>(), soc.back(), 1.01e-5);
   EXPECT_GT(std::abs(soc.back() - soc.front()), 1e-3) << "the state of charge was to move";
 
-  const ToolRun other = run_shell(fmt::format("/usr/bin/python3 {}/tests/vcan/compare_with_canmatrix.py {}/can/greybox_bms.dbc {f}/candump.log {f}/rows.csv {f}/monitor.json", BMS_SOURCE_DIR, BMS_SOURCE_DIR, fmt::arg("f", folder.path().string())));
+  const ToolRun other =
+      run_shell(fmt::format("/usr/bin/python3 {}/tests/vcan/compare_with_canmatrix.py {}/can/greybox_bms.dbc "
+                            "{f}/candump.log {f}/rows.csv {f}/monitor.json",
+                            BMS_SOURCE_DIR, BMS_SOURCE_DIR, fmt::arg("f", folder.path().string())));
   EXPECT_EQ(other.exit_code, 0) << other.out << other.err;
   std::printf("%s", other.out.c_str());
 

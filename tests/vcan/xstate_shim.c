@@ -1,6 +1,6 @@
-/* Lets Debian 12's User-Mode Linux (6.1) run on processors whose extended state is larger than the 2,696 bytes that it saves (AMX has 11,008): the
- * host's kernel refuses to set a part of it with EFAULT. Preloaded, this ptrace() reads the whole state, lays the caller's part over it and writes
- * the whole. Elsewhere it changes nothing. */
+/* Lets Debian 12's User-Mode Linux (6.1) run on processors whose extended state is larger than the 2,696 bytes that it
+ * saves (AMX has 11,008): the host's kernel refuses to set a part of it with EFAULT. Preloaded, this ptrace() reads the
+ * whole state, lays the caller's part over it and writes the whole. Elsewhere it changes nothing. */
 #define _GNU_SOURCE
 #include <elf.h>
 #include <errno.h>
@@ -12,10 +12,10 @@
 #include <unistd.h>
 
 /* As the C library does it: what is peeked comes back as the result. */
-static long kernel_ptrace(long request, long pid, void *address, void *data) {
+static long kernel_ptrace(long request, long pid, void* address, void* data) {
   long peeked = 0;
   const int peeks = request == PTRACE_PEEKTEXT || request == PTRACE_PEEKDATA || request == PTRACE_PEEKUSER;
-  const long result = syscall(SYS_ptrace, request, pid, address, peeks ? (void *)&peeked : data);
+  const long result = syscall(SYS_ptrace, request, pid, address, peeks ? (void*)&peeked : data);
   if (!peeks || result < 0) return result;
   errno = 0;
   return peeked;
@@ -25,12 +25,12 @@ long ptrace(enum __ptrace_request request, ...) {
   va_list arguments;
   va_start(arguments, request);
   const long pid = va_arg(arguments, int);
-  void *address = va_arg(arguments, void *);
-  void *data = va_arg(arguments, void *);
+  void* address = va_arg(arguments, void*);
+  void* data = va_arg(arguments, void*);
   va_end(arguments);
   if ((long)request == PTRACE_SETREGSET && (unsigned long)address == NT_X86_XSTATE) {
     static unsigned char state[1 << 16] __attribute__((aligned(64)));
-    const struct iovec *part = data;
+    const struct iovec* part = data;
     struct iovec whole = {state, sizeof state};
     if (kernel_ptrace(PTRACE_GETREGSET, pid, address, &whole) == 0 && whole.iov_len > part->iov_len) {
       memcpy(state, part->iov_base, part->iov_len);

@@ -1,0 +1,65 @@
+// Every key of a cell file, once: reader and writer both go through this list, in this order.
+#pragma once
+
+#include "model/cell_parameters.hpp"
+
+namespace bms::files {
+
+/// Keys of an RC table: of [rc] and of each [[at_temperature]].
+template <class Visitor, class Table>
+void visit_rc(Visitor& visitor, Table& rc) {
+  visitor.column("soc", rc.soc);
+  visitor.column("r0_ohm", rc.r0_ohm);
+  visitor.column("r1_ohm", rc.r1_ohm);
+  visitor.column("c1_f", rc.c1_f);
+  visitor.optional_column("r0_std_ohm", rc.r0_std_ohm);
+  visitor.optional_column("r1_std_ohm", rc.r1_std_ohm);
+  visitor.optional_column("c1_std_f", rc.c1_std_f);
+}
+
+/// visitor.number(key, double&), .column(key, Column&), .optional_number, _column, _flag, and .table(key) before a
+/// table's own keys.
+template <class Visitor, class Parameters>
+void visit_cell(Visitor& visitor, Parameters& p) {
+  visitor.number("capacity_ah", p.capacity_ah);
+
+  visitor.table("limits");
+  visitor.number("voltage_min_v", p.limits.voltage_min_v);
+  visitor.number("voltage_max_v", p.limits.voltage_max_v);
+  visitor.number("charge_current_max_a", p.limits.charge_current_max_a);
+  visitor.number("discharge_current_max_a", p.limits.discharge_current_max_a);
+  visitor.number("temperature_min_c", p.limits.temperature_min_c);
+  visitor.number("temperature_max_c", p.limits.temperature_max_c);
+
+  visitor.table("ocv");
+  visitor.column("soc", p.ocv.soc);
+  visitor.column("b0_v", p.ocv.b0_v);
+  visitor.column("b1_v", p.ocv.b1_v);
+  visitor.optional_column("half_gap_v", p.ocv.half_gap_v);
+  visitor.optional_number("lean", p.ocv.lean);
+
+  visitor.table("rc");
+  visit_rc(visitor, p.rc);
+
+  visitor.table("noise");
+  visitor.number("voltage_v", p.noise.voltage_v);
+  visitor.number("model_v", p.noise.model_v);
+  visitor.number("model_correlation_s", p.noise.model_correlation_s);
+  visitor.number("v_rc_v", p.noise.v_rc_v);
+  visitor.number("rest_v", p.noise.rest_v);
+  visitor.number("current_a", p.noise.current_a);
+  visitor.number("current_offset_a", p.noise.current_offset_a);
+  visitor.number("current_offset_correlation_s", p.noise.current_offset_correlation_s);
+  visitor.number("current_unknown_a", p.noise.current_unknown_a);
+  visitor.optional_number("current_at_rest_a", p.noise.current_at_rest_a);
+  visitor.optional_number("current_gain", p.noise.current_gain);
+  visitor.optional_flag("errors_are_states", p.noise.errors_are_states);
+
+  visitor.table("tolerance");
+  visitor.number("ocv_v", p.tolerance.ocv_v);
+  visitor.number("resistance_fraction", p.tolerance.resistance_fraction);
+  visitor.number("initial_soc", p.tolerance.initial_soc);
+  visitor.number("drift_v", p.tolerance.drift_v);
+}
+
+}  // namespace bms::files

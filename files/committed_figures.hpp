@@ -1,0 +1,28 @@
+// Measured figures as they stand in a README: a Markdown table between two comments.
+//
+//   <!-- figures: NAME -->
+//   | what | figure | ...
+//   <!-- end of figures -->
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+namespace bms::files {
+
+class CommittedFigures {
+ public:
+  /// Rows whose second column begins with a number. Throws std::runtime_error when the file has no such table.
+  CommittedFigures(const std::filesystem::path& readme, const std::string& name);
+  bool has(const std::string& what) const { return figures_.contains(what); }
+  double at(const std::string& what) const { return figures_.at(what); }
+
+ private:
+  std::map<std::string, double> figures_;
+};
+
+/// Writes `table` in place of what stands between the comments. Throws std::runtime_error when the file has none.
+void replace_figures(const std::filesystem::path& readme, const std::string& name, const std::string& table);
+
+}  // namespace bms::files

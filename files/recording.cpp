@@ -1,0 +1,354 @@
+#include "files/recording.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "files/text_file.hpp"
+
+namespace bms::files {
+
+namespace {
+
+constexpr std::size_t minimum_rows = 10;
+constexpr std::size_t longest_quote = 40;
+
+/// A piece of the file in a message: short, printable.
+std::string in_quotes(std::string_view text) {
+  std::string out;
+  for (const char c : text.substr(0, longest_quote)) out += c >= ' ' && c <= '~' ? c : '?';
+  return "'" + out + (text.size() > longest_quote ? "..." : "") + "'";
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  return text;
+}
+
+/// Plain decimals of up to 15 digits, as recordings have them: mantissa and power of ten are exact doubles, so the
+/// quotient is correctly rounded. Everything else goes to from_chars.
+std::optional<double> number(std::string_view text) {
+  static constexpr std::array<double, 16> ten = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  const bool negative = at != end && *at == '-';
+  if (negative) ++at;
+  std::uint64_t mantissa = 0;
+  std::size_t digits = 0, decimals = 0;
+  for (; at != end && static_cast<unsigned char>(*at - '0') <= 9; ++at, ++digits)
+    mantissa = mantissa * 10 + static_cast<std::uint64_t>(*at - '0');
+  if (at != end && *at == '.') {
+    for (++at; at != end && static_cast<unsigned char>(*at - '0') <= 9; ++at, ++decimals)
+      mantissa = mantissa * 10 + static_cast<std::uint64_t>(*at - '0');
+  }
+  if (at == end && digits + decimals > 0 && digits + decimals <= 15) {
+    const double value = static_cast<double>(mantissa) / ten[decimals];
+    return negative ? -value : value;
+  }
+  text = trimmed(text);
+  if (text.size() > 1 && text.front() == '+' && text[1] != '-') text.remove_prefix(1);
+  double value = 0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool too_small = error == std::errc::result_out_of_range && text.find("e-") != std::string_view::npos;
+  if (too_small && stop == text.data() + text.size()) return 0.0;
+  if (text.empty() || error != std::errc() || stop != text.data() + text.size() || std::isinf(value))
+    return std::nullopt;
+  return value;
+}
+
+/// The columns of a recording in the order of the file.
+struct Column {
+  std::vector<double>* into = nullptr;  // nullptr: ignored
+  std::string name;
+  bool sparse = false;  // mostly empty, NaN where it is
+};
+
+class Parser {
+ public:
+  Parser(std::string_view text, const std::string& path) : rest_(text) {
+    recording_.path = path;
+    constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+    if (rest_.starts_with(byte_order_mark)) rest_.remove_prefix(byte_order_mark.size());
+  }
+
+  Recording parse(VoltageColumn voltage) {
+    if (rest_.empty()) refuse("the file is empty", "a header line and rows");
+    if (rest_.find('\0') != std::string_view::npos) refuse("not a text file", "a recording in CSV");
+    header(voltage);
+    reserve();
+    while (next_line()) row();
+    if (recording_.rows() < minimum_rows)
+      refuse(fmt::format("{} rows", recording_.rows()), fmt::format("{} or more", minimum_rows));
+    missing();
+    return std::move(recording_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& what, const std::string& expected) const {
+    throw BadInput(recording_.path, std::max<std::size_t>(line_number_, 1), what + ", expected " + expected);
+  }
+
+  /// The next line that is neither empty nor a comment.
+  bool next_line() {
+    while (!rest_.empty()) {
+      ++line_number_;
+      const std::size_t end = rest_.find('\n');
+      line_ = rest_.substr(0, end);
+      rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+      if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
+      const std::string_view content = trimmed(line_);
+      if (!content.empty() && content.front() != '#') return true;
+    }
+    return false;
+  }
+
+  void header(VoltageColumn voltage) {
+    if (!next_line()) refuse("only comments", "a header line and rows");
+    separator_ = line_.find(';') != std::string_view::npos ? ';' : ',';
+    std::string ignored;
+    std::string_view names = line_;
+    for (bool more = true; more;) {
+      const std::size_t end = names.find(separator_);
+      more = end != std::string_view::npos;
+      columns_.push_back(column(std::string(trimmed(names.substr(0, end)))));
+      if (columns_.back().into == nullptr) ignored += (ignored.empty() ? "" : ", ") + in_quotes(columns_.back().name);
+      if (more) names.remove_prefix(end + 1);
+    }
+    require("time_s", recording_.time_s);
+    require("current_a", recording_.current_a);
+    if (voltage == VoltageColumn::required) require("voltage_v", recording_.voltage_v);
+    if (!ignored.empty()) recording_.warnings.push_back({"ignored_column", "columns not used: " + ignored});
+  }
+
+  Column column(const std::string& name) {
+    std::vector<double>* into = nullptr;
+    if (name == "time_s") into = &recording_.time_s;
+    if (name == "current_a") into = &recording_.current_a;
+    if (name == "voltage_v") into = &recording_.voltage_v;
+    if (name == "temperature_c") into = &recording_.temperature_c;
+    if (name == "soc_ref") into = &recording_.soc_ref;
+    if (name == "current_ref_a") into = &recording_.current_ref_a;
+    if (name == "voltage_ref_v") into = &recording_.voltage_ref_v;
+    for (const Column& other : columns_) {
+      if (into != nullptr && other.into == into) refuse("column " + in_quotes(name) + " twice", "each column once");
+    }
+    return {into, name, into == &recording_.current_ref_a || into == &recording_.voltage_ref_v};
+  }
+
+  void require(const char* name, const std::vector<double>& column) const {
+    for (const Column& c : columns_) {
+      if (c.into == &column) return;
+    }
+    refuse(fmt::format("no column '{}' in {}", name, in_quotes(line_)), "a header with time_s, current_a, voltage_v");
+  }
+
+  void reserve() {
+    const std::size_t rows =
+        rest_.size() / std::max<std::size_t>(rest_.find('\n') == std::string_view::npos ? 1 : rest_.find('\n') + 1, 8) +
+        1;
+    for (const Column& c : columns_) {
+      if (c.into != nullptr) c.into->reserve(rows);
+    }
+  }
+
+  void row() {
+    std::string_view fields = line_;
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const char* const found = static_cast<const char*>(std::memchr(fields.data(), separator_, fields.size()));
+      const bool last = k + 1 == columns_.size();
+      if (found == nullptr && !last)
+        refuse(fmt::format("{} fields", k + 1), fmt::format("{} as in the header", columns_.size()));
+      if (found != nullptr && last &&
+          !trimmed({found + 1, fields.data() + fields.size()}).empty()) {  // a separator at the end is harmless
+        refuse("more fields than the header has", fmt::format("{}", columns_.size()));
+      }
+      const std::size_t length = found == nullptr ? fields.size() : static_cast<std::size_t>(found - fields.data());
+      if (columns_[k].into != nullptr) columns_[k].into->push_back(value(fields.substr(0, length), columns_[k]));
+      if (!last) fields.remove_prefix(length + 1);
+    }
+    const std::vector<double>& t = recording_.time_s;
+    if (std::isnan(t.back())) refuse("time_s is not a number", "a time in seconds");
+    if (t.size() > 1 && t.back() < t[t.size() - 2])
+      refuse(fmt::format("time goes back from {:g} s to {:g} s", t[t.size() - 2], t.back()),
+             "times that do not decrease");
+    if (std::abs(t.back() - t.front()) > longest_s)
+      refuse(fmt::format("time_s = {:g}", t.back()), "a recording of less than ten years");
+  }
+
+  double value(std::string_view field, const Column& column) {
+    if (column.sparse && trimmed(field).empty()) return std::numeric_limits<double>::quiet_NaN();
+    const auto v = number(field);
+    if (!v)
+      refuse(fmt::format("{} in column '{}' is not a number", in_quotes(field), column.name),
+             column.sparse ? "a number or nothing" : "a number");
+    if (std::isnan(*v) && !column.sparse && missing_++ == 0) first_missing_line_ = line_number_;
+    return *v;
+  }
+
+  void missing() {
+    if (missing_ > 0) {
+      recording_.warnings.push_back(
+          {"missing_reading", fmt::format("{} readings are 'nan', the first in line {}: they are treated as missing",
+                                          missing_, first_missing_line_)});
+    }
+  }
+
+  static constexpr double longest_s = 3.2e8;
+
+  std::string_view rest_, line_;
+  std::size_t line_number_ = 0;
+  char separator_ = ',';
+  std::vector<Column> columns_;
+  std::size_t missing_ = 0, first_missing_line_ = 0;
+  Recording recording_;
+};
+
+/// Of those that are numbers; 0 when there is none.
+double median(std::vector<double> values) {
+  std::erase_if(values, [](double v) { return std::isnan(v); });
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void check_time(Recording& r) {
+  std::vector<double> steps;
+  steps.reserve(r.rows());
+  std::size_t duplicates = 0, first_duplicate = 0;
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    const double step = r.time_s[k] - r.time_s[k - 1];
+    if (step > 0)
+      steps.push_back(step);
+    else if (duplicates++ == 0)
+      first_duplicate = k;
+  }
+  if (duplicates > 0) {
+    r.warnings.push_back({"duplicate_time",
+                          fmt::format("{} rows have the time of the row before, the first at {:g} s: they are left out",
+                                      duplicates, r.time_s[first_duplicate])});
+  }
+  const double usual = median(steps);
+  std::size_t gaps = 0, first_gap = 0;
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    if (usual > 0 && r.time_s[k] - r.time_s[k - 1] > 10 * usual && gaps++ == 0) first_gap = k;
+  }
+  if (gaps > 0) {
+    r.warnings.push_back({"gap", fmt::format("{} gaps longer than {:g} s, the first after {:g} s", gaps, 10 * usual,
+                                             r.time_s[first_gap - 1])});
+  }
+}
+
+/// Where current rises, a cell's voltage rises. A recording that says the opposite has the other sign convention.
+void check_sign(Recording& r) {
+  double together = 0, current2 = 0, voltage2 = 0;
+  for (std::size_t k = 1; k < r.voltage_v.size(); ++k) {
+    const double di = r.current_a[k] - r.current_a[k - 1], dv = r.voltage_v[k] - r.voltage_v[k - 1];
+    if (std::isnan(di) || std::isnan(dv)) continue;
+    together += di * dv;
+    current2 += di * di;
+    voltage2 += dv * dv;
+  }
+  if (together < -0.3 * std::sqrt(current2 * voltage2) && together < 0) {
+    r.warnings.push_back(
+        {"current_inverted",
+         "voltage falls where current rises: the current's sign looks inverted (current_a > 0 must charge)"});
+  }
+}
+
+std::size_t count_outside(const std::vector<double>& values, double low, double high) {
+  return static_cast<std::size_t>(
+      std::count_if(values.begin(), values.end(), [&](double v) { return v < low || v > high; }));
+}
+
+std::int32_t micro(double value) {
+  if (std::isnan(value)) return measurement::no_reading;
+  constexpr double limit = std::numeric_limits<std::int32_t>::max();
+  return static_cast<std::int32_t>(std::llround(std::clamp(value * 1e6, -limit, limit)));
+}
+
+std::int16_t centidegrees(double value) {
+  if (std::isnan(value)) return measurement::no_temperature;
+  return static_cast<std::int16_t>(std::lround(std::clamp(value * 100, -32'767.0, 32'767.0)));
+}
+
+}  // namespace
+
+Recording parse_recording(const std::string& text, const std::string& path, VoltageColumn voltage) {
+  Recording recording = Parser(text, path).parse(voltage);
+  check_time(recording);
+  check_sign(recording);
+  if (count_outside(recording.soc_ref, -0.5, 1.5) > 0) {
+    recording.warnings.push_back(
+        {"soc_ref_in_percent", "soc_ref leaves 0..1: it looks like percent, expected a fraction"});
+  }
+  return recording;
+}
+
+Recording read_recording(const std::string& path, VoltageColumn voltage) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string text = read_file(path);
+  Recording recording = parse_recording(text, path, voltage);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  recording.read_mb_per_second = static_cast<double>(text.size()) / 1e6 / seconds;
+  return recording;
+}
+
+void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
+  const model::Limits& l = cell.limits;
+  const double usual_v = median(r.voltage_v);
+  if (usual_v > 100 * l.voltage_max_v) {
+    r.warnings.push_back(
+        {"voltage_in_mv",
+         fmt::format("voltages around {:g} look like millivolts, expected volts; they are not used", usual_v)});
+  } else if (const std::size_t n = count_outside(r.voltage_v, l.voltage_min_v - 0.05, l.voltage_max_v + 0.05); n > 0) {
+    r.warnings.push_back({"outside_cell_range", fmt::format("{} voltages are outside the cell's {} to {} V", n,
+                                                            l.voltage_min_v, l.voltage_max_v)});
+  }
+  std::vector<double> magnitudes;
+  for (const double i : r.current_a) {
+    if (std::abs(i) > 0) magnitudes.push_back(std::abs(i));
+  }
+  const double larger_a = std::max(l.charge_current_max_a, l.discharge_current_max_a);
+  // no cell takes sixty times its capacity an hour
+  if (const double usual_a = median(magnitudes); usual_a > 20 * larger_a || usual_a > 60 * cell.capacity_ah) {
+    r.warnings.push_back({"current_in_ma", fmt::format("currents around {:g} look like milliamperes, expected amperes",
+                                                       median(magnitudes))});
+  } else if (const std::size_t n =
+                 count_outside(r.current_a, -1.05 * l.discharge_current_max_a, 1.05 * l.charge_current_max_a);
+             n > 0) {
+    r.warnings.push_back({"outside_cell_range", fmt::format("{} currents are outside the cell's continuous {} to {} A",
+                                                            n, -l.discharge_current_max_a, l.charge_current_max_a)});
+  }
+  if (const std::size_t n = count_outside(r.temperature_c, l.temperature_min_c, l.temperature_max_c); n > 0) {
+    r.warnings.push_back({"outside_cell_range", fmt::format("{} temperatures are outside the cell's {} to {} degrees C",
+                                                            n, l.temperature_min_c, l.temperature_max_c)});
+  }
+}
+
+std::vector<measurement::Sample> samples(const Recording& r) {
+  std::vector<measurement::Sample> out(r.rows());
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    out[k].time_us = static_cast<std::uint64_t>(std::llround((r.time_s[k] - r.time_s.front()) * 1e6));
+    out[k].current_ua = micro(r.current_a[k]);
+    const bool of_the_cell = r.voltage_ref_v.empty() || r.current_ref_a.empty() ||
+                             !(r.current_ref_a[k] == 0 && std::isfinite(r.voltage_ref_v[k]));
+    if (!r.voltage_v.empty() && of_the_cell) out[k].voltage_uv = micro(r.voltage_v[k]);
+    if (!r.temperature_c.empty()) out[k].temperature_cdegc = centidegrees(r.temperature_c[k]);
+  }
+  return out;
+}
+
+}  // namespace bms::files

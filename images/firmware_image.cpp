@@ -1,0 +1,130 @@
+#include "images/firmware_image.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <regex>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "files/text_file.hpp"
+#include "images/child_process.hpp"
+
+namespace bms::images {
+
+namespace {
+
+/// The source tree: where the tool was built from, or BMS_ROOT.
+std::filesystem::path source_tree() {
+  const char* root = std::getenv("BMS_ROOT");
+  return root != nullptr ? root : BMS_SOURCE_DIR;
+}
+
+std::filesystem::path board_file(const std::string& board) {
+  const auto file = source_tree() / "boards" / board / "board.cmake";
+  if (!std::filesystem::exists(file))
+    throw files::BadInput(
+        board, 1, "no such board in " + (source_tree() / "boards").string() + ", expected the folder name of a board");
+  return file;
+}
+
+/// Held while a folder is built in: two runs at once would build over each other.
+class Lock {
+ public:
+  explicit Lock(const std::filesystem::path& path) : fd_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+    if (fd_ < 0 || flock(fd_, LOCK_EX) != 0) throw std::runtime_error("cannot lock " + path.string());
+  }
+  ~Lock() { close(fd_); }
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+
+ private:
+  int fd_;
+};
+
+void run_step(const std::vector<std::string>& argv, const std::filesystem::path& log) {
+  if (ChildProcess(argv, log).wait() == 0) return;
+  throw std::runtime_error("the firmware does not build, see " + log.string());
+}
+
+const char* ending(Image image) {
+  switch (image) {
+    case Image::remote:
+      return "_remote";
+    case Image::replay:
+      return "_replay";
+    case Image::hil:
+      return "_hil";
+    case Image::bench:
+      return "_bench";
+    case Image::fault:
+      return "_fault";
+    case Image::pack:
+      return "_pack";
+    case Image::protection:
+      return "_protection";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> board_names() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(source_tree() / "boards")) {
+    if (std::filesystem::exists(entry.path() / "board.cmake")) names.push_back(entry.path().filename());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string board_setting(const std::string& board, const std::string& name) {
+  const std::regex line("(^|\n)set\\(" + name + " ([^ )]*)\\)");
+  const std::string text = files::read_file(board_file(board));
+  std::smatch found;
+  if (!std::regex_search(text, found, line))
+    throw std::runtime_error("no " + name + " in " + board_file(board).string());
+  return found[2];
+}
+
+Image chip_image(const std::string& board) {
+  return board_setting(board, "BMS_EMULATED") == "ON" ? Image::bench : Image::application;
+}
+
+std::size_t board_cells(const std::string& board) { return std::stoul(board_setting(board, "BMS_CELLS")); }
+
+std::filesystem::path firmware_image(const std::string& board, const files::CellFile& cell, Image image,
+                                     const std::string& vehicle_profile) {
+  const auto root = source_tree();
+  board_file(board);
+  const auto folder = root / "build" / "firmware" /
+                      fmt::format("{}-{}-{:08x}{}", board, cell.name, cell.hash,
+                                  vehicle_profile == "none" ? "" : "-" + vehicle_profile);
+  for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
+    if (!in_path(tool)) throw files::BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
+  }
+  std::filesystem::create_directories(folder);
+  const Lock lock(folder / "lock");
+  const auto cell_path = folder / "cell.toml", log = folder / "build.log";
+  if (!std::filesystem::exists(cell_path) || files::read_file(cell_path) != cell.text)
+    files::write_file(cell_path, cell.text);
+  if (!std::filesystem::exists(folder / "build.ninja")) {
+    if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", board, cell.name);
+    run_step(
+        {"cmake", "-S", root.string(), "-B", folder.string(), "-G", "Ninja", "-DBMS_BOARD=" + board,
+         "-DBMS_CELL=" + cell_path.string(), "-DBMS_VEHICLE_PROFILE=" + vehicle_profile, "--toolchain",
+         (root / "cmake" / "toolchain-arm-none-eabi.cmake").string(), "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL},
+        log);
+  }
+  const std::string name = fmt::format("bms_{}{}.elf", board, ending(image));
+  run_step({"cmake", "--build", folder.string(), "--target", name}, log);
+  return folder / name;
+}
+
+}  // namespace bms::images

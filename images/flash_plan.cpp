@@ -1,0 +1,99 @@
+#include "images/flash_plan.hpp"
+
+#include <sstream>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace bms::images {
+
+std::optional<AddressRange> storage_of(const ImageFile& image) {
+  if (!image.has_symbol("image_storage_begin")) return std::nullopt;
+  const AddressRange storage{image.symbol("image_storage_begin"), image.symbol("image_storage_end")};
+  if (storage.begin >= storage.end) return std::nullopt;
+  return storage;
+}
+
+std::vector<LoadedPart> parts_to_write(const std::vector<LoadedPart>& parts,
+                                       const std::optional<AddressRange>& storage) {
+  std::vector<LoadedPart> joined;
+  for (const LoadedPart& part : parts) {
+    if (storage && part.address < storage->end && part.address + part.bytes.size() > storage->begin) {
+      throw std::runtime_error(fmt::format(
+          "the image has {} bytes for {:#010x}, where the stored records are ({:#010x} to {:#010x}): not written",
+          part.bytes.size(), part.address, storage->begin, storage->end));
+    }
+    const bool records_between =
+        storage && !joined.empty() && joined.back().address < storage->begin && part.address >= storage->end;
+    if (joined.empty() || records_between) {
+      joined.push_back(part);
+      continue;
+    }
+    LoadedPart& before = joined.back();
+    if (part.address < before.address + before.bytes.size())
+      throw std::runtime_error(fmt::format("the image has two contents for {:#010x}", part.address));
+    before.bytes.resize(part.address - before.address, '\xFF');
+    before.bytes += part.bytes;
+  }
+  if (joined.empty()) throw std::runtime_error("the image has nothing for the flash");
+  return joined;
+}
+
+std::vector<std::string> openocd_command(const Probe& probe, const std::vector<PartFile>& parts,
+                                         const std::optional<AddressRange>& storage,
+                                         const std::filesystem::path& kept) {
+  std::vector<std::string> words = {"openocd"};
+  const auto say = [&](const std::string& command) { words.insert(words.end(), {"-c", command}); };
+  words.insert(words.end(), {"-f", "interface/" + probe.interface + ".cfg"});
+  if (!probe.serial.empty()) say("adapter serial " + probe.serial);
+  words.insert(words.end(), {"-f", "target/" + probe.target + ".cfg"});
+  for (const char* port : {"gdb_port", "tcl_port", "telnet_port"}) say(std::string(port) + " disabled");
+  say("init");
+  say("reset halt");
+  if (storage)
+    say(fmt::format("dump_image {{{}}} {:#010x} {:#x}", kept.string(), storage->begin, storage->end - storage->begin));
+  for (const PartFile& part : parts)
+    say(fmt::format("flash write_image erase {{{}}} {:#010x} bin", part.path.string(), part.address));
+  for (const PartFile& part : parts)
+    say(fmt::format("verify_image {{{}}} {:#010x} bin", part.path.string(), part.address));
+  say("echo {image verified}");
+  if (storage) say(fmt::format("verify_image {{{}}} {:#010x} bin", kept.string(), storage->begin));
+  say("reset run");
+  say("shutdown");
+  return words;
+}
+
+FlashFailure failure_in(const std::string& log, const Probe& probe) {
+  const auto said = [&](const char* words) { return log.find(words) != std::string::npos; };
+  if (said("Can't find"))
+    return {fmt::format("OpenOCD has no interface/{}.cfg or target/{}.cfg", probe.interface, probe.target), true};
+  if (said("LIBUSB_ERROR_ACCESS"))
+    return {
+        "the probe may not be opened: its USB device belongs to somebody else (openocd's udev rules, group plugdev)",
+        true};
+  for (const char* words : {"open failed", "unable to find a matching", "No device matches", "No J-Link device found",
+                            "no device found", "unable to open"}) {
+    if (said(words))
+      return {fmt::format("no {} probe{} found: is it plugged in? another kind: --probe", probe.interface,
+                          probe.serial.empty() ? "" : " with the serial number " + probe.serial),
+              true};
+  }
+  if (said("image verified"))
+    return {"the image is in the flash, but the stored records are not what they were; they are kept beside the image",
+            false};
+  for (const char* words : {"checksum mismatch", "verify failed", "Verify Failed", "diff 0 address"}) {
+    if (said(words)) return {"the flash does not hold what was written to it", false};
+  }
+  for (const char* words : {"init mode failed", "unable to connect to the target", "Cannot read IDR",
+                            "Target not examined", "Error connecting DP", "SWD DPIDR", "all ones", "all zeroes"}) {
+    if (said(words)) return {"the probe is there, but no chip answers: power, SWDIO, SWCLK, NRST, GND?", false};
+  }
+  std::string last = "OpenOCD failed";
+  std::istringstream lines(log);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("Error: ")) last = line.substr(7);
+  }
+  return {last, false};
+}
+
+}  // namespace bms::images

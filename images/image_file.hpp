@@ -1,0 +1,40 @@
+// What an image puts where: the parts of an ELF file of a 32-bit little-endian controller that a flash loader reads
+// (System V ABI, chapters 4 and 5). Throws std::runtime_error when the file is none, or ends too early.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace bms::images {
+
+/// Bytes for one place of the flash; where they are while the program runs is not told.
+struct LoadedPart {
+  std::uint32_t address = 0;
+  std::string bytes;
+};
+
+class ImageFile {
+ public:
+  explicit ImageFile(const std::filesystem::path& path);
+
+  /// By address, without those that have no bytes in the file.
+  const std::vector<LoadedPart>& parts() const { return parts_; }
+  /// Bytes that the file has for this place. Throws where it has none.
+  std::string at(std::uint32_t address, std::size_t size) const;
+  bool has_symbol(const std::string& name) const { return symbols_.contains(name); }
+  /// Value of a symbol.
+  std::uint32_t symbol(const std::string& name) const;
+  /// Bytes of a section.
+  const std::string& section(const std::string& name) const;
+
+ private:
+  std::string path_;
+  std::vector<LoadedPart> parts_;
+  std::map<std::string, std::string> sections_;
+  std::map<std::string, std::uint32_t> symbols_;
+};
+
+}  // namespace bms::images

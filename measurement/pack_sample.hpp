@@ -1,0 +1,36 @@
+// What a battery of several cells in series measures at one time: the one door for inputs of a pack, as Sample is of a
+// cell.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "measurement/sample.hpp"
+
+namespace bms::measurement {
+
+inline constexpr std::size_t most_temperatures = 4;
+
+/// Integers in micro-units; what was not measured is no_reading or no_temperature. Any field may lie.
+template <std::size_t Cells>
+struct PackSample {
+  static constexpr std::size_t cells = Cells;
+
+  std::uint64_t time_us = 0;             ///< since boot, or since the recording's zero
+  std::int32_t current_ua = no_reading;  ///< mean since the previous sample, > 0 charges; one current through all cells
+  std::int32_t pack_uv = no_reading;     ///< over all cells, measured by itself
+  std::array<std::int32_t, Cells> cell_uv = filled<Cells>(no_reading);
+  std::array<std::int16_t, most_temperatures> temperature_cdegc =
+      filled<most_temperatures>(no_temperature);  ///< hundredths of a degree Celsius
+
+ private:
+  template <std::size_t N, class T>
+  static constexpr std::array<T, N> filled(T value) {
+    std::array<T, N> all{};
+    all.fill(value);
+    return all;
+  }
+};
+
+}  // namespace bms::measurement

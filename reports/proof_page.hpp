@@ -1,0 +1,12 @@
+// The page of bms proof: every claim with its picture, then what each experiment shows.
+#pragma once
+
+#include <string>
+
+#include "proof/proof.hpp"
+
+namespace bms::reports {
+
+std::string proof_report(const proof::ProofResult& result);
+
+}  // namespace bms::reports

@@ -1,0 +1,261 @@
+#include "files/cell_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "files/text_file.hpp"
+#include "tests/files/refusal.hpp"
+
+namespace bms::files {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string table9_text() { return read_file(BMS_SOURCE_DIR "/model/cells/table9.toml"); }
+
+/// The one line that a bad file is refused with.
+std::string refusal(const std::string& text) {
+  return refusal_by("cell.toml", [&] { parse_cell(text, "cell.toml"); });
+}
+
+TEST(CellFile, HoldsThePapersTable9AndLimits) {
+  const CellFile cell = read_cell("table9");
+  EXPECT_EQ(cell.name, "table9");
+  const auto& p = cell.parameters;
+  EXPECT_EQ(p.capacity_ah, 6);
+  EXPECT_EQ(p.limits.voltage_min_v, 2.0);
+  EXPECT_EQ(p.limits.voltage_max_v, 3.65);
+  ASSERT_EQ(p.ocv.b0_v.size, 10U);
+  EXPECT_EQ(p.ocv.b0_v[9], 2.126);
+  EXPECT_EQ(p.ocv.b1_v[0], 3.35);
+  ASSERT_EQ(p.rc.soc.size, 10U);
+  EXPECT_EQ(p.rc.r0_ohm[4], 0.013237);
+  EXPECT_EQ(p.rc.r1_ohm[9], 0.0072376);
+  EXPECT_EQ(p.rc.c1_f[0], 420.558);
+  EXPECT_EQ(p.tolerance.ocv_v, 0.0015);
+}
+
+TEST(CellFile, EveryBuiltInCellIsAccepted) {
+  ASSERT_EQ(built_in_cells().size(), 4U);
+  for (const BuiltInCell& cell : built_in_cells()) EXPECT_EQ(read_cell(cell.name).name, cell.name);
+}
+
+TEST(CellFile, SaysWhetherErrorsAreStates) {
+  const std::string without = table9_text(),
+                    with = replaced(without, "\n[tolerance]", "errors_are_states = true\n\n[tolerance]");
+  EXPECT_FALSE(parse_cell(without, "x").parameters.noise.errors_are_states);
+  const CellFile cell = parse_cell(with, "x");
+  EXPECT_TRUE(cell.parameters.noise.errors_are_states);
+  EXPECT_TRUE(parse_cell(cell_text(cell), "x").parameters.noise.errors_are_states);
+  EXPECT_THAT(refusal(replaced(with, "errors_are_states = true", "errors_are_states = 1")),
+              HasSubstr("'noise.errors_are_states' is not acceptable, expected true or false"));
+}
+
+TEST(CellFile, TellsWhichFileItIsByAHash) {
+  const std::string text = table9_text();
+  EXPECT_EQ(parse_cell(text, "a").hash, parse_cell(text, "b").hash);
+  EXPECT_NE(parse_cell(text, "a").hash, parse_cell(text + "\n", "a").hash);
+}
+
+TEST(CellFile, WhatIsWrittenIsReadBackDigitForDigit) {
+  for (const BuiltInCell& built_in : built_in_cells()) {
+    CellFile cell = read_cell(built_in.name);
+    cell.source = "with \"quotes\", a \\ and\na line";
+    cell.parameters.ocv.half_gap_v.size = 0;
+    for (std::size_t k = 0; k < cell.parameters.ocv.soc.size; ++k)
+      cell.parameters.ocv.half_gap_v.push_back(0.01 / (1.0 + static_cast<double>(k)));
+    cell.parameters.ocv.lean = -0.7;
+    cell.at_temperature = {{-5, cell.parameters.rc}, {25, cell.parameters.rc}};
+    cell.at_temperature[0].rc.r0_ohm[0] = 0.0371;
+    const std::string text = cell_text(cell);
+    const CellFile again = parse_cell(text, "again");
+    EXPECT_EQ(cell_text(again), replaced(text, "a \\\\ and a line", "a \\\\ and a line"));
+    EXPECT_EQ(again.parameters.rc.c1_f[2], cell.parameters.rc.c1_f[2]);
+    EXPECT_EQ(again.parameters.ocv.half_gap_v[3], cell.parameters.ocv.half_gap_v[3]);
+    EXPECT_EQ(again.parameters.noise.current_unknown_a, cell.parameters.noise.current_unknown_a);
+    EXPECT_EQ(again.sources.at("rc"), cell.sources.at("rc"));
+    ASSERT_EQ(again.at_temperature.size(), 2U);
+    EXPECT_EQ(again.at_temperature[0].rc.r0_ohm[0], 0.0371);
+    EXPECT_THAT(refusal(replaced(text, "temperature_c = 25.0", "temperature_c = -25.0")),
+                HasSubstr("temperatures that ascend"));
+    EXPECT_THAT(refusal(replaced(text, "0.0371", "7.0")),
+                HasSubstr("'at_temperature.r0_ohm' at -5 degrees C is out of range"));
+  }
+}
+
+TEST(CellFile, RefusesWhatIsOutOfRangeAndNamesKeyLineAndExpectation) {
+  const std::string good = table9_text();
+  EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = -6.0")),
+              HasSubstr("'capacity_ah' is out of range, expected 0.01 to 1000 Ah"));
+  EXPECT_THAT(refusal(replaced(good, "0.0140197", "0.9")), HasSubstr("'rc.r0_ohm'"));
+  EXPECT_THAT(refusal(replaced(good, "420.558", "nan")), HasSubstr("'rc.c1_f'"));
+  EXPECT_THAT(refusal(replaced(good, "3.35,  0.39", "-3.35,  0.39")), HasSubstr("a curve that rises"));
+  EXPECT_THAT(refusal(replaced(good, "3.167", "3.267")), HasSubstr("pieces that meet within 5 mV"));
+  EXPECT_THAT(refusal(replaced(good, "[0.0,   0.1,   0.2", "[0.0,   0.2,   0.1")), HasSubstr("edges that ascend"));
+  EXPECT_THAT(refusal(replaced(good, "voltage_v = 0.001", "voltage_v = 0.0")), HasSubstr("'noise.voltage_v'"));
+}
+
+TEST(CellFile, RefusesAFileThatIsNoText) {
+  EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)),
+              HasSubstr("cell.toml:2: a character that no text has"));
+}
+
+TEST(CellFile, RefusesWhatItsParserDidNotExpect) {
+  for (const char* text : {"[/limits]\n", "[[/]]\n", "[a.\"b\"./]\n", "/ = 1\n"})
+    EXPECT_THAT(refusal(text), HasSubstr("expected a cell file in TOML")) << text;
+  EXPECT_THAT(refusal("a = 1\nb = [1,\n2]\n[/limits]\n"), HasSubstr("cell.toml:4:"));
+}
+
+TEST(CellFile, TakesCharactersBeyondAsciiInCommentsAndTextsAndNowhereElse) {
+  const std::string good = table9_text(), entry = "chemistry = \"LiFePO4\"";
+  for (const char* text :
+       {"chemistry = \"Zelle \xC3\xA4 \\\" \xC7\xA2 #\"", "chemistry = 'Zelle \xC3\xA4 \" #'",
+        "chemistry = \"LiFePO4\"  # gr\xC3\xBC\xC3\x9F\x65 \"", "chemistry = \"\"\"\nZelle # \"'\"\"\""}) {
+    EXPECT_NO_THROW(parse_cell(replaced(good, entry, text), "cell.toml")) << text;
+  }
+  const std::string umlaut = "Zelle \xC3\xA4 ~ ~C3 \xC7\xA2";
+  const CellFile cell = parse_cell(replaced(good, entry, "chemistry = \"" + umlaut + "\""), "cell.toml");
+  EXPECT_EQ(cell.chemistry, umlaut);
+  EXPECT_EQ(parse_cell(cell_text(cell), "cell.toml").chemistry, umlaut);
+  EXPECT_NO_THROW(parse_cell("\xEF\xBB\xBF" + good, "cell.toml")) << "a byte order mark";
+  for (const char* text : {"chemistry = \xC7\xA2\"table9\"", "chem\xC3\xAFstry = \"table9\"",
+                           "chemistry = \"LiFePO4\"\n\xC7\xA2", "chemistry = 'LiFePO4' \xC7\xA2 '"}) {
+    EXPECT_THAT(refusal(replaced(good, entry, text)), HasSubstr("cell.toml:")) << text;
+  }
+}
+
+TEST(CellFile, NamesTheLineOfTheEntryThatIsWrong) {
+  const std::string good = table9_text();
+  const std::string line = refusal(replaced(good, "420.558", "1.0"));
+  const std::string before = good.substr(0, good.find("420.558"));
+  const auto number = 1 + std::count(before.begin(), before.end(), '\n');
+  EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
+}
+
+TEST(CellFile, RefusesWhatIsMissingMisspeltOrOfTheWrongKind) {
+  const std::string good = table9_text();
+  EXPECT_THAT(refusal(""), HasSubstr("'name' is missing"));
+  EXPECT_THAT(refusal("\x01\x02 not toml at all"), HasSubstr("expected a cell file in TOML"));
+  const std::size_t last_key = good.rfind("drift_v");
+  for (std::size_t end = 0; end < last_key; end += 97) refusal(good.substr(0, end));  // cut off anywhere
+  EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = \"six\"")), HasSubstr("expected a number"));
+  EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_mah = 6000")),
+              HasSubstr("'capacity_ah' is missing"));
+  EXPECT_THAT(refusal(replaced(good, "model_v = 0.003", "model_v = 0.003\nmodell_v = 0.003")),
+              HasSubstr("unknown key 'noise.modell_v'"));
+  EXPECT_THAT(refusal(replaced(good, "0.7,  0.8,   0.9,   1.0]", "0.7,  0.8,   0.9]")), HasSubstr("ocv"));
+  EXPECT_THAT(refusal(replaced(good, "name = \"table9\"", "name = \"../x\\\"\"")), HasSubstr("'name'"));
+  EXPECT_THAT(refusal(replaced(good, "1927.32]", "[1927.32]]")), HasSubstr("expected a number"));
+  std::string many = "0.5";
+  for (int k = 0; k < 100; ++k) many += ", 0.5";
+  EXPECT_THAT(refusal(replaced(good, "1927.32]", many + "]")), HasSubstr("at most 64 numbers"));
+}
+
+constexpr const char* mechanisms = R"(
+[instrument.current_offset]
+offset_a = 0.03
+offset_a_std = 0.002
+
+[mechanism.initial_soc]
+shift = -0.04
+
+[mechanism.ocv_hysteresis]
+source = "seen in \"the\" lab"
+half_gap_v = 0.0123456789012345
+half_gap_v_std = 0.001
+decay = 55
+)";
+
+const model::MechanismSetting& setting_of(const CellFile& file, std::string_view id) {
+  for (const model::MechanismSetting& m : file.mechanisms) {
+    if (model::catalogue[m.index].id == id) return m;
+  }
+  throw std::runtime_error("not there");
+}
+
+TEST(CellFile, HoldsMechanismsInTheOrderOfTheCatalogueAndTakesWhatIsNotSaidAsNeutral) {
+  const CellFile cell = parse_cell(table9_text() + mechanisms, "cell.toml");
+  ASSERT_EQ(cell.mechanisms.size(), 3U);
+  for (std::size_t k = 1; k < 3; ++k) EXPECT_GT(cell.mechanisms[k].index, cell.mechanisms[k - 1].index);
+  const auto& hysteresis = setting_of(cell, "ocv_hysteresis");
+  EXPECT_EQ(hysteresis.value[0], 0.0123456789012345);
+  EXPECT_EQ(hysteresis.deviation[0], 0.001);
+  EXPECT_EQ(hysteresis.value[1], 55);
+  EXPECT_EQ(hysteresis.value[2], 0);
+  EXPECT_EQ(setting_of(cell, "current_offset").deviation[0], 0.002);
+  EXPECT_EQ(setting_of(cell, "initial_soc").value[0], -0.04);
+  EXPECT_TRUE(read_cell("table9").mechanisms.empty());
+}
+
+TEST(CellFile, EveryMechanismIsWrittenAndReadBackDigitForDigit) {
+  CellFile cell = read_cell("table9");
+  for (std::size_t index = model::mechanism_count; index-- > 0;) {
+    model::MechanismSetting m = model::unsaid(index, cell.parameters.capacity_ah);
+    for (std::size_t k = 0; k < model::catalogue[index].parameters; ++k) {
+      const model::Parameter& p = model::catalogue[index].parameter[k];
+      m.value[k] =
+          p.lower(6) + (p.upper(6) - p.lower(6)) * (k == 0 ? 1.0 : 0.123456789);  // a value on a bound is inside
+      m.deviation[k] = k == 1 ? 0 : 0.1 / 3;
+    }
+    put_mechanism(cell, m);
+  }
+  cell.sources["mechanism.leakage"] = "a drawer";
+  const CellFile again = parse_cell(cell_text(cell), "again");
+  ASSERT_EQ(again.mechanisms.size(), model::mechanism_count);
+  for (std::size_t index = 0; index < model::mechanism_count; ++index) {
+    EXPECT_EQ(again.mechanisms[index].index, index);
+    EXPECT_EQ(again.mechanisms[index].value, cell.mechanisms[index].value) << model::catalogue[index].id;
+    EXPECT_EQ(again.mechanisms[index].deviation, cell.mechanisms[index].deviation) << model::catalogue[index].id;
+  }
+  EXPECT_EQ(again.sources.at("mechanism.leakage"), "a drawer");
+  EXPECT_EQ(cell_text(again), cell_text(cell));
+}
+
+TEST(CellFile, WhatIsSilentAboutAParameterIsAcceptedForACellOfAnySize) {
+  for (const double capacity_ah : {0.01, 2.5, 1'000.0}) {
+    for (std::size_t index = 0; index < model::mechanism_count; ++index) {
+      EXPECT_EQ(model::first_fault(model::unsaid(index, capacity_ah), capacity_ah), model::catalogue[index].parameters)
+          << model::catalogue[index].id;
+    }
+  }
+}
+
+TEST(CellFile, RefusesAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable) {
+  const std::string good = table9_text() + mechanisms;
+  EXPECT_THAT(refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")),
+              HasSubstr("unknown key 'mechanism.hysteresis', expected one of: "));
+  EXPECT_THAT(refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")), HasSubstr("ocv_hysteresis"));
+  EXPECT_THAT(refusal(replaced(good, "instrument.current_offset", "mechanism.current_offset")),
+              HasSubstr("unknown key 'mechanism.current_offset'"));
+  EXPECT_THAT(refusal(replaced(good, "mechanism.initial_soc", "instrument.initial_soc")),
+              HasSubstr("unknown key 'instrument.initial_soc'"));
+  EXPECT_THAT(refusal(replaced(good, "decay = 55", "dekay = 55")),
+              HasSubstr("unknown key 'mechanism.ocv_hysteresis.dekay', expected one of: decay, decay_std, half_gap_v"));
+  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = \"fast\"")), HasSubstr("expected a number"));
+  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = nan")),
+              HasSubstr("'mechanism.ocv_hysteresis.decay' is out of range, expected 8 to 400"));
+  EXPECT_THAT(refusal(replaced(good, "offset_a = 0.03", "offset_a = 3")),
+              HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -0.6 to 0.6 A"));
+  EXPECT_THAT(refusal(replaced(good, "half_gap_v_std = 0.001", "half_gap_v_std = -1")),
+              HasSubstr("'mechanism.ocv_hysteresis.half_gap_v_std' is out of range, expected 0 or more"));
+  EXPECT_THAT(refusal("mechanism = 1\n" + table9_text()), HasSubstr("'mechanism' is not acceptable, expected a table"));
+  const std::string line = refusal(replaced(good, "decay = 55", "decay = 1"));
+  const auto number = std::count(good.begin(), good.end(), '\n');
+  EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
+}
+
+TEST(CellFile, AMissingFileIsRefusedWithTheNamesOfTheBuiltInCells) {
+  try {
+    read_cell("table10");
+    FAIL();
+  } catch (const BadInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr("table9, a123_26650, a123_26650_extended, a123_esctoolbox_extended"));
+  }
+  EXPECT_THROW(read_cell("/nowhere/cell.toml"), BadInput);
+  EXPECT_THROW(read_cell("/tmp"), BadInput);
+}
+
+}  // namespace
+}  // namespace bms::files

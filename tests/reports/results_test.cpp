@@ -1,0 +1,58 @@
+// What a replay shows: JSON and the page.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "reports/json_results.hpp"
+#include "reports/report_page.hpp"
+
+namespace bms::reports {
+namespace {
+
+using ::testing::HasSubstr;
+
+host_sim::ReplayResult replayed() {
+  host_sim::ReplayResult result;
+  result.cell = files::read_cell("table9");
+  result.target = "host";
+  result.recording = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  result.track =
+      host_sim::run_on_host(result.cell, files::samples(result.recording), std::nullopt, host_sim::ScalarKind::single);
+  host_sim::evaluate(result);
+  return result;
+}
+
+TEST(Results, SayNullWhereThereIsNoReference) {
+  host_sim::ReplayResult r = replayed();
+  EXPECT_THAT(json_of(r, ""), Not(HasSubstr("\"rmse\": null")));
+  r.recording.soc_ref.clear();
+  r.soc = {};
+  r.open_loop_v.clear();
+  host_sim::evaluate(r);
+  EXPECT_THAT(json_of(r, ""), HasSubstr("\"rmse\": null"));
+}
+
+TEST(Results, AnOffsetThatTheFilterIsSureOfIsSaid) {
+  host_sim::ReplayResult r = replayed();
+  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
+  r.soc.current_offset_a = -0.05;
+  r.soc.current_offset_sigma_a = 0.02;
+  EXPECT_THAT(statement(r), HasSubstr("the current seemed to read 50 mA too low (standard deviation 20 mA)"));
+  r.soc.current_offset_sigma_a = 0.04;
+  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
+}
+
+TEST(Report, HoldsItsScriptAndDataAndReachesForNothing) {
+  host_sim::ReplayResult r = replayed();
+  r.recording.path = "logs/</script><b>.csv";
+  const std::string page = replay_report(r);
+  EXPECT_THAT(page, HasSubstr("new Dygraph("));
+  EXPECT_THAT(page, HasSubstr("\"two_sigma\""));
+  EXPECT_EQ(page.find("@DATA@"), std::string::npos);
+  EXPECT_EQ(page.find("</script><b>"), std::string::npos) << "a file's name must not become markup";
+  EXPECT_EQ(page.find("<script src"), std::string::npos);
+  EXPECT_EQ(page.find("<link"), std::string::npos);
+  EXPECT_LT(page.size(), 3'000'000U);
+}
+
+}  // namespace
+}  // namespace bms::reports

@@ -1,0 +1,245 @@
+#include "tool/command_monitor.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "monitor/bus_state.hpp"
+#include "monitor/candump_line.hpp"
+#include "monitor/frame_source.hpp"
+#include "monitor/live_page.hpp"
+#include "monitor/results.hpp"
+#include "monitor/screen.hpp"
+#include "monitor/terminal.hpp"
+#include "reports/embedded_files.hpp"
+#include "reports/report_page.hpp"
+
+namespace bms::tool {
+
+namespace {
+
+using namespace monitor;
+using Clock = std::chrono::steady_clock;
+
+constexpr double screen_s = 0.2, page_s = 0.5, line_s = 1;
+constexpr std::size_t buffer_bytes = 64 << 10;
+
+/// A file that grows while the monitor runs, line by line, so that what came before a power cut is there.
+class GrowingFile {
+ public:
+  explicit GrowingFile(const std::string& name) : name_(name) {
+    if (name.empty()) return;
+    file_ = name == "-" ? stdout : std::fopen(name.c_str(), "we");
+    if (file_ == nullptr) refuse();
+  }
+  ~GrowingFile() {
+    if (file_ != nullptr && file_ != stdout) std::fclose(file_);
+  }
+  GrowingFile(const GrowingFile&) = delete;
+  GrowingFile& operator=(const GrowingFile&) = delete;
+
+  bool wanted() const { return file_ != nullptr; }
+  std::string& text() { return text_; }
+  /// Writes what has gathered; all: to the disk's door, else when it is much.
+  void write(bool all) {
+    if (file_ == nullptr || (!all && text_.size() < buffer_bytes)) return;
+    if (std::fwrite(text_.data(), 1, text_.size(), file_) != text_.size() || std::fflush(file_) != 0) refuse();
+    text_.clear();
+  }
+
+ private:
+  [[noreturn]] void refuse() const {
+    throw files::BadInput(name_, 1,
+                          fmt::format("cannot be written ({}), expected a place to write to", std::strerror(errno)));
+  }
+  std::string name_, text_;
+  std::FILE* file_ = nullptr;
+};
+
+/// True once every period of this machine's clock, or of seconds that it is told.
+class Every {
+ public:
+  explicit Every(double period_s) : period_s_(period_s) {}
+  bool due(double now_s) {
+    if (begun_ && now_s >= last_s_ && now_s - last_s_ < period_s_) return false;
+    last_s_ = now_s;
+    begun_ = true;
+    return true;
+  }
+
+ private:
+  double period_s_, last_s_ = 0;
+  bool begun_ = false;
+};
+
+std::string live_page_html() {
+  const std::string body =
+      "<style>\n" + std::string(reports::embedded::live_css) + "</style>\n" + std::string(reports::embedded::live_html);
+  return reports::page(body, reports::embedded::live_js, "bms monitor", "null");
+}
+
+class Monitor {
+ public:
+  explicit Monitor(const MonitorOptions& options)
+      : options_(options),
+        source_(open_source(options.source)),
+        record_(options.record),
+        csv_(options.csv),
+        status_(BusState::find("Status")) {
+    facts_.source = options.source;
+    facts_.blocks = Terminal::shows_utf8();
+    csv_.text() += csv_.wanted() ? csv_head() : "";
+    shown_ = !options.output.quiet && !options.output.standard_output_is_taken();
+    if (options.serve_port) page_ = std::make_unique<LivePage>(live_page_html(), *options.serve_port);
+    if (page_) fmt::print(options.output.standard_output_is_taken() ? stderr : stdout, "Page: {}\n", page_->url());
+    std::fflush(stdout);
+    if (shown_ && isatty(STDOUT_FILENO)) terminal_ = std::make_unique<Terminal>();
+  }
+
+  int run() {
+    while (!done()) {
+      const std::size_t n = source_->ended() ? 0 : source_->read(room_, wait_ms);
+      if (n == 0 && source_->ended()) poll(nullptr, 0, wait_ms);  // only the page goes on
+      for (std::size_t k = 0; k < n && !satisfied(); ++k) take(room_[k]);
+      show(false);
+    }
+    finish();
+    if (options_.once && !bus_.complete()) {
+      fmt::print(stderr, "{}: no complete picture in {:.1f} s and {} frames, {} of them of the BMS\n", options_.source,
+                 bus_.duration_s(), bus_.frames(), bus_.good());
+      return 1;
+    }
+    if (source_->live() && source_->ended()) {
+      fmt::print(stderr, "{}: has gone away\n", options_.source);
+      return 1;
+    }
+    return 0;
+  }
+
+ private:
+  static constexpr int wait_ms = 100;
+
+  double elapsed_s() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+
+  bool satisfied() const {
+    return (options_.once && bus_.complete()) ||
+           (options_.duration_s && !source_->live() && !page_ && bus_.duration_s() >= *options_.duration_s);
+  }
+  bool done() const {
+    if (stop_.asked() || (terminal_ && terminal_->quit_pressed())) return true;
+    if (options_.duration_s && source_->live() && elapsed_s() >= *options_.duration_s) return true;
+    if (page_ && !source_->live()) return page_done();
+    return satisfied() || source_->ended();
+  }
+  /// A log that has been read is still looked at; then the time is that of the page.
+  bool page_done() const {
+    return options_.once ? satisfied() || source_->ended() : options_.duration_s && elapsed_s() >= *options_.duration_s;
+  }
+
+  void take(const BusFrame& frame) {
+    const std::size_t message = bus_.take(frame);
+    if (record_.wanted()) append_dump_line(record_.text(), frame, "can0");
+    if (message == status_) {
+      if (csv_.wanted()) csv_.text() += csv_row(bus_);
+      if (page_) page_->add(bus_);
+    }
+    record_.write(false);
+    csv_.write(false);
+    if (!terminal_ && shown_ && !source_->live() && line_.due(bus_.duration_s())) print_line();
+  }
+
+  void show(bool at_end) {
+    facts_.malformed = source_->malformed();
+    facts_.dropped = source_->dropped();
+    const double now_s = elapsed_s();
+    if (rate_.due(now_s) || at_end) {
+      const double since_s = now_s - rated_s_;
+      if (!source_->live())
+        facts_.frames_per_second = mean_rate();
+      else if (since_s > 0.1)
+        facts_.frames_per_second = static_cast<double>(bus_.frames() - rated_) / since_s;
+      rated_ = bus_.frames();
+      rated_s_ = now_s;
+      record_.write(true);
+      csv_.write(true);
+    }
+    if (page_ && page_every_.due(now_s)) page_->publish(json_of(as_of_now(), facts_, silent_s()));
+    if (terminal_) {
+      if (screen_.due(now_s) || stop_.resized())
+        terminal_->show(ansi_frame(screen(as_of_now(), facts_, Terminal::size())));
+    } else if (shown_ && source_->live() && line_.due(now_s)) {
+      print_line();
+    }
+  }
+
+  /// For who looks: ages go on while the bus is silent. What is written goes by the frames' time alone, so that a
+  /// record gives the same.
+  BusState as_of_now() const {
+    BusState now = bus_;
+    if (source_->live() && bus_.frames() > 0) now.time_is(clock_us());
+    return now;
+  }
+  double silent_s() const {
+    const BusState now = as_of_now();
+    return 1e-6 * static_cast<double>(now.now_us() - now.last_us());
+  }
+  double mean_rate() const {
+    return bus_.duration_s() > 0 ? static_cast<double>(bus_.frames()) / bus_.duration_s() : 0;
+  }
+
+  void print_line() const {
+    fmt::print("{}\n", status_line(as_of_now(), facts_));
+    std::fflush(stdout);
+  }
+
+  void finish() {
+    show(true);
+    facts_.frames_per_second = mean_rate();
+    record_.write(true);
+    csv_.write(true);
+    if (terminal_) {
+      const auto picture = screen(as_of_now(), facts_, Terminal::size());
+      terminal_.reset();
+      fmt::print("{}", plain_text(picture));  // stays on the terminal
+    }
+    if (!options_.output.json.empty()) put(options_.output.json, json_of(bus_, facts_, silent_s()));
+  }
+
+  const MonitorOptions& options_;
+  StopRequest stop_;
+  std::unique_ptr<FrameSource> source_;
+  GrowingFile record_, csv_;
+  BusState bus_;
+  ScreenFacts facts_;
+  std::size_t status_;
+  bool shown_ = false;
+  std::unique_ptr<LivePage> page_;
+  std::unique_ptr<Terminal> terminal_;
+  std::array<BusFrame, 256> room_{};
+  Clock::time_point begin_ = Clock::now();
+  Every screen_{screen_s}, page_every_{page_s}, line_{line_s}, rate_{1};
+  std::uint64_t rated_ = 0;
+  double rated_s_ = 0;
+};
+
+}  // namespace
+
+int run(const MonitorOptions& options) {
+  if (options.record == "-") throw files::BadInput("--record", 1, "standard output is not for it, expected a file");
+  try {
+    return std::make_unique<Monitor>(options)->run();
+  } catch (const SourceRefused& refused) {
+    throw files::BadInput(refused.source, refused.line, refused.what());
+  }
+}
+
+}  // namespace bms::tool

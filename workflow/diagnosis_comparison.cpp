@@ -1,0 +1,153 @@
+#include "workflow/diagnosis_comparison.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "diagnosis/good_to.hpp"
+#include "diagnosis/reference.hpp"
+#include "host_sim/replay.hpp"
+#include "identification/figures.hpp"
+
+namespace bms::workflow {
+
+namespace {
+
+using diagnosis::Finding;
+using model::catalogue;
+
+/// Digits that say something; a value that rounding would carry over its bound stays.
+double to_digits(double value, int digits) {
+  return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.{}g}", value, digits));
+}
+
+model::CellParameters<> with_short_numbers(model::CellParameters<> p) {
+  for (auto* column : {&p.ocv.b0_v, &p.ocv.b1_v, &p.ocv.half_gap_v, &p.ocv.soc}) {
+    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = to_digits((*column)[k], 8);
+  }
+  for (auto* column : {&p.rc.r0_ohm, &p.rc.r1_ohm, &p.rc.c1_f}) {
+    for (std::size_t k = 0; k < column->size; ++k) (*column)[k] = to_digits((*column)[k], 6);
+  }
+  p.capacity_ah = to_digits(p.capacity_ah, 7);
+  return p;
+}
+
+std::string ids_of(const std::vector<std::size_t>& mechanisms) {
+  std::string ids;
+  for (const std::size_t m : mechanisms) ids += (ids.empty() ? "" : ", ") + std::string(catalogue[m].id);
+  return ids;
+}
+
+}  // namespace
+
+diagnosis::Record record_of(const files::Recording& r, std::string name, const model::CellParameters<>& cell,
+                            double initial_soc, double sigma, bool told) {
+  const bool any_temperature =
+      std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
+  diagnosis::Record record{
+      std::move(name), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{},
+      initial_soc,     sigma,    told,        {}};
+  diagnosis::take_references(record, r.current_ref_a, r.voltage_ref_v, cell);
+  return record;
+}
+
+void compare(DiagnoseResult& r) {
+  const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
+  const auto simulated = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h,
+                             std::vector<Compared>& list, std::vector<double> Compared::*into) {
+    for (Compared& c : list) {
+      diagnosis::Hypothesis here = h;
+      here.bursts.clear();
+      if (&list == &r.recordings && h.bursts.size() == list.size())
+        here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
+      const diagnosis::Evidence evidence(cell, own, {c.record}, {});
+      c.*into = evidence.voltage(here, evidence.unchanged(), 0);
+    }
+  };
+  const diagnosis::Hypothesis base{own, own.size(), {}};
+  diagnosis::Hypothesis extended = r.named() ? r.diagnosis.extended : base;
+  simulated(r.cell.parameters, base, r.recordings, &Compared::base_v);
+  simulated(r.cell.parameters, base, r.holdouts, &Compared::base_v);
+  simulated(r.diagnosis.cell, extended, r.recordings, &Compared::extended_v);
+  if (r.named()) extended.settings = diagnosis::later_recording(r.diagnosis.extended);
+  simulated(r.diagnosis.cell, extended, r.holdouts, &Compared::extended_v);
+}
+
+std::optional<OpenLoopFigures> figures(const std::vector<Compared>& list, std::vector<double> Compared::*simulated) {
+  ErrorFigure error;
+  FitFigure fit;
+  for (const Compared& c : list) {
+    for (std::size_t k = 0; k < c.record.size(); ++k) {
+      error.add(c.record.voltage_v[k] - (c.*simulated)[k]);
+      fit.add(c.record.voltage_v[k], (c.*simulated)[k]);
+    }
+  }
+  if (error.count() == 0) return std::nullopt;
+  return OpenLoopFigures{error.rms(), fit.percent()};
+}
+
+std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
+  ErrorFigure base, extended;
+  const auto add = [](const files::CellFile& cell, const Compared& c, ErrorFigure& figure) {
+    const auto start =
+        host_sim::starting_point(host_sim::Belief{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)});
+    const host_sim::Track track =
+        host_sim::run_on_host(cell, files::samples(c.recording), start, host_sim::ScalarKind::single);
+    for (std::size_t k = 0; k < track.rows.size(); ++k) figure.add(track.rows[k].soc - c.recording.soc_ref[k]);
+  };
+  for (const Compared& c : r.holdouts) {
+    if (c.recording.soc_ref.empty()) continue;
+    add(r.cell, c, base);
+    add(r.extended_cell, c, extended);
+  }
+  if (base.count() == 0) return std::nullopt;
+  return SocErrors{base.rms(), extended.rms()};
+}
+
+files::CellFile extended_cell(const DiagnoseResult& r) {
+  files::CellFile cell = r.cell;
+  std::string files;
+  for (const Compared& c : r.recordings) files += (files.empty() ? "" : ", ") + c.record.name;
+  if (!r.named()) {
+    cell.source += fmt::format("; bms diagnose of {}: {}, nothing was added", files, name_of(r.diagnosis.verdict));
+    return cell;
+  }
+  if (!cell.name.ends_with("_extended")) cell.name += "_extended";
+  cell.source += fmt::format("; what bms diagnose found in {} added: {:.2f} mV RMS open loop, before {:.2f}", files,
+                             1e3 * r.extended->rmse_v, 1e3 * r.baseline->rmse_v);
+  cell.parameters = with_short_numbers(r.diagnosis.cell);
+  for (const char* table : {"ocv", "rc"})
+    cell.sources[table] += fmt::format("; moved within its tolerance to fit {} beside what was found", files);
+  const double capacity_ah = r.cell.parameters.capacity_ah;
+  for (const Finding& f : r.diagnosis.findings) {
+    const model::MechanismInfo& info = catalogue[f.setting.index];
+    model::MechanismSetting setting = f.setting;
+    std::string source = fmt::format("bms diagnose of {}: {:.2f} mV RMS of the voltage, gain {:.0f}", files,
+                                     1e3 * f.rms_contribution_v, f.gain);
+    if (info.id == model::ContactStep::id) {
+      source += fmt::format("; since {:.0f} s of {}", setting.value[1], r.recordings.front().record.name);
+      setting.value[1] = 0;
+    }
+    if (!f.equivalent_to.empty()) source += "; these recordings cannot tell it from " + ids_of(f.equivalent_to);
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      const double short_value = to_digits(setting.value[k], 6);
+      if (short_value >= info.parameter[k].lower(capacity_ah) && short_value <= info.parameter[k].upper(capacity_ah))
+        setting.value[k] = short_value;
+      setting.deviation[k] = std::isfinite(setting.deviation[k]) ? to_digits(setting.deviation[k], 3) : 0;
+    }
+    files::put_mechanism(cell, setting);
+    cell.sources[files::table_of(info)] = source;
+  }
+  std::vector<diagnosis::Record> records;
+  for (const Compared& c : r.recordings) records.push_back(c.record);
+  if (const double factor = diagnosis::widening(cell.parameters, cell.mechanisms, std::move(records)); factor > 1) {
+    cell.parameters.tolerance = diagnosis::widened(cell.parameters.tolerance, factor);
+    for (double* v : {&cell.parameters.tolerance.ocv_v, &cell.parameters.tolerance.drift_v}) *v = to_digits(*v, 4);
+    cell.sources["tolerance"] +=
+        fmt::format("; of the OCV and the drift widened {:g} times, to what {} left over", factor, files);
+  }
+  return cell;
+}
+
+}  // namespace bms::workflow

@@ -1,0 +1,116 @@
+#include "workflow/identification_data.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+
+namespace bms::workflow {
+
+namespace {
+
+std::optional<double> number(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+/// Where the OCV is nearest to a voltage: where a search for the state of charge begins.
+double soc_at(const model::OcvTable<double>& ocv, double voltage_v) {
+  double best = 0.5, nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k + 1 < ocv.soc.size; ++k) {
+    const double soc = std::clamp((voltage_v - ocv.b0_v[k]) / ocv.b1_v[k], ocv.soc[k], ocv.soc[k + 1]);
+    const double distance = std::abs(ocv.b0_v[k] + ocv.b1_v[k] * soc - voltage_v);
+    if (distance < nearest) nearest = distance, best = soc;
+  }
+  return best;
+}
+
+}  // namespace
+
+IdentificationData identification_data(const files::Recording& recording, const DataOptions& options) {
+  const std::size_t rows = recording.rows();
+  const bool estimate = options.initial.estimate || (!options.initial.value && recording.soc_ref.empty());
+  // the state of charge of each row: the reference if there is one, else counted
+  double start = options.initial.value.value_or(
+      recording.soc_ref.empty() ? soc_at(options.cell.ocv, recording.voltage_v[0]) : recording.soc_ref[0]);
+  std::vector<double> soc = recording.soc_ref;
+  if (soc.empty() || options.initial.value) {
+    soc.assign(1, start);
+    for (std::size_t k = 1; k < rows; ++k) {
+      const double current_a = std::isfinite(recording.current_a[k]) ? recording.current_a[k] : 0;
+      soc.push_back(soc.back() +
+                    current_a * (recording.time_s[k] - recording.time_s[k - 1]) / (3'600 * options.cell.capacity_ah));
+    }
+  }
+  IdentificationData d;
+  identification::Data& data = d.record.data;
+  data.capacity_ah = options.cell.capacity_ah;
+  std::size_t first = rows, last = 0, used = 0;
+  for (std::size_t k = 0; k < rows; ++k) {
+    if (!(soc[k] <= options.window.high && soc[k] >= options.window.low)) continue;
+    first = std::min(first, k);
+    last = k;
+    ++used;
+    d.soc_min = std::min(d.soc_min, soc[k]);
+    d.soc_max = std::max(d.soc_max, soc[k]);
+  }
+  if (used < 10) {
+    throw files::BadInput(recording.path, 1,
+                          fmt::format("{} samples in the window of {:g} to {:g}, expected data there", used,
+                                      options.window.high, options.window.low));
+  }
+  const std::size_t from = estimate ? first : 0;
+  for (std::size_t k = from; k <= last; ++k) {
+    const bool counts = soc[k] <= options.window.high && soc[k] >= options.window.low;
+    data.time_s.push_back(recording.time_s[k]);
+    data.current_a.push_back(recording.current_a[k]);
+    if (!recording.temperature_c.empty()) d.temperature_c.push_back(recording.temperature_c[k]);
+    data.voltage_v.push_back(counts ? recording.voltage_v[k] : std::numeric_limits<double>::quiet_NaN());
+  }
+  d.record.initial_soc = std::clamp(soc[from], 0.0, 1.0);
+  d.record.estimate_initial_soc = estimate;
+  const double rested_a = 0.01 * options.cell.capacity_ah;
+  d.record.estimate_initial_v_rc = from > 0 || !(std::abs(recording.current_a[from]) < rested_a);
+  return d;
+}
+
+InitialSoc initial_soc_of(const std::string& text) {
+  if (text.empty()) return {};
+  if (text == "estimate") return {std::nullopt, true};
+  const auto value = number(text);
+  if (!value || *value < 0 || *value > 1)
+    throw files::BadInput("--initial-soc", 1,
+                          "'" + text + "' is not acceptable, expected a number from 0 to 1 or 'estimate'");
+  return {value, false};
+}
+
+SocWindow window_of(const std::string& option, const std::string& text) {
+  if (text.empty()) return {};
+  const std::size_t colon = text.find(':');
+  const auto high = number(std::string_view(text).substr(0, colon)),
+             low = colon == std::string::npos ? std::nullopt : number(std::string_view(text).substr(colon + 1));
+  if (!high || !low || !(*high > *low))
+    throw files::BadInput(option, 1, "'" + text + "' is not acceptable, expected HI:LO as in 0.8:0.5");
+  return {*high, *low};
+}
+
+identification::CircuitBounds circuit_bounds(double capacity_ah) {
+  constexpr double of_table_3_ah = 6;
+  const double times = of_table_3_ah / capacity_ah;
+  identification::CircuitBounds b;
+  b.r0_min_ohm = std::max(1e-5, b.r0_min_ohm * times);
+  b.r0_max_ohm = std::min(0.5, b.r0_max_ohm * times);
+  b.r1_min_ohm = std::max(1e-5, b.r1_min_ohm * times);
+  b.r1_max_ohm = std::min(0.5, b.r1_max_ohm * times);
+  b.c1_min_f = std::max(100.0, b.c1_min_f / times);
+  b.c1_max_f = std::clamp(b.c1_max_f / times, 1'000.0, 100'000.0);
+  return b;
+}
+
+}  // namespace bms::workflow

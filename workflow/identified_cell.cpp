@@ -1,0 +1,362 @@
+#include "workflow/identified_cell.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "files/cell_fields.hpp"
+#include "host_sim/simulation.hpp"
+#include "identification/ocv_curve.hpp"
+
+namespace bms::workflow {
+
+namespace id = identification;
+
+namespace {
+
+/// Slow runs of like temperature.
+struct SlowRuns {
+  double temperature_c = 25;
+  std::vector<id::SlowRun> runs;
+  std::string files;
+};
+
+/// Those nearest to 25 degrees C first.
+std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
+  std::vector<files::Recording> recordings;
+  for (const std::string& path : paths) recordings.push_back(files::read_recording(path));
+  std::vector<SlowRuns> all;
+  for (const LikeTemperature& like : by_temperature(recordings)) {
+    SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
+    for (const std::size_t k : like.recordings) {
+      const files::Recording& r = recordings[k];
+      runs.runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
+      runs.files += (runs.files.empty() ? "" : ", ") + std::filesystem::path(paths[k]).filename().string();
+    }
+  }
+  std::stable_sort(all.begin(), all.end(), [](const SlowRuns& a, const SlowRuns& b) {
+    return std::abs(a.temperature_c - 25) < std::abs(b.temperature_c - 25);
+  });
+  return all;
+}
+
+/// Of the temperatures that were recorded; nothing: none.
+std::optional<double> mean_temperature_c(const files::Recording& recording) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const double t : recording.temperature_c) {
+    if (std::isfinite(t)) sum += t, ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / static_cast<double>(count);
+}
+
+}  // namespace
+
+std::vector<LikeTemperature> by_temperature(const std::vector<files::Recording>& recordings) {
+  constexpr double alike_k = 5;
+  std::vector<std::pair<double, std::size_t>> means;
+  std::vector<std::size_t> all;
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    all.push_back(k);
+    if (const auto mean_c = mean_temperature_c(recordings[k])) means.emplace_back(*mean_c, k);
+  }
+  if (means.size() < recordings.size()) return {{25, all}};
+  std::sort(means.begin(), means.end());
+  std::vector<LikeTemperature> groups;
+  double begin_c = 0;
+  for (const auto& [temperature_c, k] : means) {
+    if (groups.empty() || temperature_c - begin_c > alike_k) {
+      groups.push_back({0, {}});
+      begin_c = temperature_c;
+    }
+    LikeTemperature& group = groups.back();
+    const auto n = static_cast<double>(group.recordings.size());
+    group.temperature_c = (group.temperature_c * n + temperature_c) / (n + 1);
+    group.recordings.push_back(k);
+  }
+  for (LikeTemperature& group : groups) {
+    group.temperature_c = std::round(10 * group.temperature_c) / 10;
+    std::sort(group.recordings.begin(), group.recordings.end());
+  }
+  return groups;
+}
+
+OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, bool both_branches,
+                  files::CellFile& cell) {
+  OcvTaken taken;
+  const auto groups = slow_runs(paths);
+  const std::string& files = groups.front().files;
+  std::vector<id::OcvCurve> curves;
+  try {
+    for (const SlowRuns& group : groups) {
+      curves.push_back(id::ocv_curve(group.runs));
+      if (const auto gap_v = id::middle_half_gap_v(curves.back())) taken.gaps.push_back({group.temperature_c, *gap_v});
+    }
+  } catch (const std::invalid_argument& error) {
+    throw files::BadInput(paths.front(), 1, error.what());
+  }
+  const id::OcvCurve& curve = curves.front();
+  double error_v = error_asked_v;
+  auto pieces = id::fewest_pieces(curve, error_v);
+  while (!pieces || pieces->soc.size() > model::max_ocv_edges) {
+    error_v *= 1.5;
+    if (error_v > 0.05)
+      throw files::BadInput(paths.front(), 1,
+                            "the open-circuit voltage does not rise with the state of charge, expected slow runs of a "
+                            "whole charge or discharge");
+    pieces = id::fewest_pieces(curve, error_v);
+  }
+  if (error_v > error_asked_v) {
+    taken.warnings.push_back(
+        {"ocv_error", fmt::format("the straight pieces of the OCV are up to {:.1f} mV off, {:.1f} were asked for",
+                                  1e3 * pieces->largest_error_v, 1e3 * error_asked_v)});
+  }
+  // a node of R0, R1, C1 may fall between two corners
+  constexpr std::size_t most_corners = model::max_ocv_edges;
+  if (both_branches && curve.coulombic_efficiency) id::add_gap_corners(*pieces, curve, error_v, most_corners);
+  auto& ocv = cell.parameters.ocv;
+  ocv = {};
+  for (std::size_t k = 0; k < pieces->soc.size(); ++k) {
+    ocv.soc.push_back(pieces->soc[k]);
+    if (curve.coulombic_efficiency) ocv.half_gap_v.push_back(pieces->half_gap_v[k]);
+    if (k == 0) continue;
+    const double b1_v = (pieces->ocv_v[k] - pieces->ocv_v[k - 1]) / (pieces->soc[k] - pieces->soc[k - 1]);
+    ocv.b0_v.push_back(pieces->ocv_v[k] - b1_v * pieces->soc[k]);
+    ocv.b1_v.push_back(b1_v);
+  }
+  cell.parameters.tolerance.ocv_v = std::max(0.0005, pieces->largest_error_v);
+  cell.parameters.capacity_ah = curve.capacity_ah;
+  taken.coulombic_efficiency = curve.coulombic_efficiency;
+  cell.sources["ocv"] = fmt::format("{} of {}; {} straight pieces, within {:.1f} mV",
+                                    curve.coulombic_efficiency ? "middle of slow charge and discharge" : "slow run",
+                                    files, pieces->soc.size() - 1, 1e3 * pieces->largest_error_v);
+  return taken;
+}
+
+void take_noise(const std::vector<files::Recording>& recordings, const id::Fit& judge,
+                const std::vector<id::Parameter>& parameters, model::CellParameters<>& p) {
+  std::vector<double> voltage_steps, current_steps;
+  double step_s = 1;
+  for (const files::Recording& r : recordings) {
+    const double quiet_a = 0.02 * p.capacity_ah;
+    for (std::size_t k = 2; k < r.rows(); ++k) {
+      if (std::abs(r.current_a[k]) > quiet_a || std::abs(r.current_a[k - 1]) > quiet_a ||
+          std::abs(r.current_a[k - 2]) > quiet_a)
+        continue;
+      // second differences: what relaxes slowly is not noise
+      const double v = r.voltage_v[k] - 2 * r.voltage_v[k - 1] + r.voltage_v[k - 2],
+                   i = r.current_a[k] - 2 * r.current_a[k - 1] + r.current_a[k - 2];
+      if (std::isfinite(v) && std::isfinite(i)) voltage_steps.push_back(v * v), current_steps.push_back(i * i);
+    }
+    step_s = std::max(0.01, r.duration_s() / static_cast<double>(r.rows() - 1));
+  }
+  const auto sigma = [](const std::vector<double>& squares) {
+    double sum = 0;
+    for (const double s : squares) sum += s;
+    return std::sqrt(sum / static_cast<double>(squares.size()) / 6);  // 1 + 4 + 1
+  };
+  constexpr std::size_t enough = 30;
+  if (voltage_steps.size() >= enough) {
+    p.noise.voltage_v = std::clamp(sigma(voltage_steps), 0.0002, 0.05);
+    p.noise.current_a = std::clamp(sigma(current_steps), 1e-4 * p.capacity_ah, 0.1 * p.capacity_ah);
+  }
+  double model_v = judge.rmse_v;
+  // with its mean, which is an error that lasts
+  p.noise.model_correlation_s =
+      std::clamp(id::correlation_length(id::without_missing(judge.error_v)) * step_s, 1.0, 20'000.0);
+  if (p.ocv.half_gap_v.size > 0) {
+    double gap_v = 0;
+    for (std::size_t k = 0; k < p.ocv.half_gap_v.size; ++k) {
+      if (p.ocv.soc[k] > 0.1 && p.ocv.soc[k] < 0.95) gap_v = std::max(gap_v, p.ocv.half_gap_v[k]);
+    }
+    // The voltage is somewhere between the slow curves, and the model leans: how far it is off on the other side no
+    // recording needs to have shown. As evenly distributed; and it lasts until the current has turned for a good part
+    // of an hour.
+    model_v = std::max(model_v, (1 + std::abs(p.ocv.lean)) * gap_v / std::sqrt(3.0));
+    p.noise.model_correlation_s = std::max(p.noise.model_correlation_s, 3'000.0);
+    p.noise.rest_v = std::clamp((1 + std::abs(p.ocv.lean)) * gap_v, p.noise.rest_v, 0.2);
+  }
+  p.noise.model_v = std::clamp(model_v, 0.0005, 0.2);
+  double largest = 0.005;
+  for (const id::Parameter& q : parameters) {
+    if (q.name == "r0_ohm" && q.value > 0) largest = std::max(largest, std::min(0.5, 2 * q.std / q.value));
+  }
+  p.tolerance.resistance_fraction = largest;
+}
+
+namespace {
+
+/// The mechanism as the catalogue leaves it when nothing is said.
+model::MechanismSetting silent(std::string_view id, double capacity_ah) {
+  return model::unsaid(model::mechanism_index(id), capacity_ah);
+}
+
+/// ln R over 1 / T: the least squares' activation energy of a column of the tables by temperature, held within 0 ..
+/// most.
+template <class Value>
+double activation_j_per_mol(const std::vector<files::TemperatureTable>& tables, double most, Value value) {
+  double x = 0, y = 0, xx = 0, xy = 0;
+  const auto n = static_cast<double>(tables.size());
+  for (const files::TemperatureTable& t : tables) {
+    const double inverse = 1 / (t.temperature_c + 273.15), log = std::log(value(t.rc));
+    x += inverse, y += log, xx += inverse * inverse, xy += inverse * log;
+  }
+  return std::clamp(model::mechanism_detail::gas_constant_j_per_mol_k * (n * xy - x * y) / (n * xx - x * x), 0.0, most);
+}
+
+double mean_of(const model::Column<double, model::max_rc_nodes>& column) {
+  double sum = 0;
+  for (std::size_t k = 0; k < column.size; ++k) sum += column[k];
+  return sum / static_cast<double>(column.size);
+}
+
+/// What follows from resistances at several temperatures, or from the gap of slow runs at several; else nothing.
+std::optional<model::MechanismSetting> temperature_dependence(const std::vector<files::TemperatureTable>& tables,
+                                                              const std::optional<id::SlowGap>& gap, double capacity_ah,
+                                                              std::string& source) {
+  model::MechanismSetting setting = silent("temperature_resistance", capacity_ah);
+  constexpr double usual_j_per_mol = 50'000,
+                   share = 0.3;  // of what reactions have in R0 of an iron phosphate cell, and how much of R0 that is
+  setting.value = {usual_j_per_mol, 0, 25, share, 0};
+  if (tables.size() > 1) {
+    setting.value[1] = activation_j_per_mol(tables, 90'000, [](const auto& rc) { return mean_of(rc.r1_ohm); });
+    // the share by least squares, its energy the usual one
+    const auto at_25 = std::min_element(tables.begin(), tables.end(), [](const auto& a, const auto& b) {
+      return std::abs(a.temperature_c - 25) < std::abs(b.temperature_c - 25);
+    });
+    const auto more = [&](double temperature_c) {
+      return std::exp(model::mechanism_detail::energy_over_rt(usual_j_per_mol, 25.0) * (25 - temperature_c) /
+                      (temperature_c + 273.15)) -
+             1;
+    };
+    double xx = 0, xy = 0;
+    for (const files::TemperatureTable& t : tables) {
+      const double x = more(t.temperature_c) - more(at_25->temperature_c),
+                   y = mean_of(t.rc.r0_ohm) / mean_of(at_25->rc.r0_ohm) - 1;
+      xx += x * x, xy += x * y;
+    }
+    setting.value[2] = at_25->temperature_c;
+    setting.value[3] = std::clamp(xy / xx, 0.02, 1.0);
+    source = fmt::format("resistances identified at {} temperatures; the activation energy of R0 is a usual one",
+                         tables.size());
+    return setting;
+  }
+  if (gap && gap->overvoltage_v > 0) {
+    setting.value[1] = gap->activation_j_per_mol;
+    source = "overvoltage in the gap of slow runs at several temperatures; R0 as usual";
+    return setting;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void take_hysteresis(const OcvTaken& ocv, files::CellFile& cell) {
+  const model::CellParameters<>& p = cell.parameters;
+  const double between_v = model::middle_half_gap_v(p.ocv);
+  if (!(between_v > 0)) return;
+  const auto gap = id::slow_gap(ocv.gaps);
+  // C/30 to C/35: what it drops over the circuit, or what grows in the cold
+  const double over_v = gap ? gap->overvoltage_v : p.capacity_ah / 30 * (mean_of(p.rc.r0_ohm) + mean_of(p.rc.r1_ohm));
+  model::MechanismSetting setting = silent("ocv_hysteresis", p.capacity_ah);
+  setting.value[0] = std::clamp(between_v - over_v, 0.1 * between_v, 0.07);
+  setting.value[4] = 1;
+  files::put_mechanism(cell, setting);
+  cell.sources["mechanism.ocv_hysteresis"] =
+      gap ? fmt::format(
+                "gap of slow runs at {} temperatures, less an overvoltage of {:.1f} mV that follows {:.0f} kJ/mol",
+                ocv.gaps.size(), 1e3 * over_v, 1e-3 * gap->activation_j_per_mol)
+          : fmt::format("gap of slow charge and discharge, less {:.1f} mV over R0 and R1", 1e3 * over_v);
+}
+
+id::Record without_mechanisms(const files::CellFile& cell, const IdentificationData& of) {
+  id::Record record = of.record;
+  const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
+  const auto simulated = [&](std::span<const model::MechanismSetting> mechanisms) {
+    return host_sim::simulate(tables, cell.parameters.capacity_ah, mechanisms, record.data.time_s,
+                              record.data.current_a, of.temperature_c, record.initial_soc);
+  };
+  const auto with = simulated(cell.mechanisms), without = simulated({});
+  for (std::size_t k = 0; k < record.data.size(); ++k)
+    record.data.voltage_v[k] -= with[k].voltage_v - without[k].voltage_v;
+  return record;
+}
+
+void extend(const OcvTaken& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell) {
+  model::CellParameters<>& p = cell.parameters;
+  const double capacity_ah = p.capacity_ah;
+  std::string source;
+  if (const auto setting = temperature_dependence(cell.at_temperature, id::slow_gap(ocv.gaps), capacity_ah, source)) {
+    files::put_mechanism(cell, *setting);
+    cell.sources["mechanism.temperature_resistance"] = source;
+  }
+  const double half_gap_v = host_sim::value_of(cell.mechanisms, "ocv_hysteresis", 0);
+  // what the recordings leave for longer than ten minutes, and a minor loop that they may not have shown
+  constexpr double lasting_s = 600, least_v = 0.003;
+  const auto tables = model::prepare<double, model::max_intervals>(p);
+  double squares_v2 = 0;
+  std::size_t count = 0;
+  for (const IdentificationData& of : data) {
+    const id::Data& d = of.record.data;
+    const auto rows = host_sim::simulate(tables, capacity_ah, cell.mechanisms, d.time_s, d.current_a, of.temperature_c,
+                                         of.record.initial_soc);
+    double sum_v = 0;
+    std::size_t in_sum = 0;
+    const auto take = [&] {
+      if (in_sum > 0) squares_v2 += sum_v * sum_v / static_cast<double>(in_sum);
+      count += in_sum;
+      sum_v = 0, in_sum = 0;
+    };
+    for (std::size_t k = 0; k < d.size(); ++k) {
+      if (k > 0 && std::floor(d.time_s[k] / lasting_s) != std::floor(d.time_s[k - 1] / lasting_s)) take();
+      if (std::isfinite(d.voltage_v[k])) sum_v += d.voltage_v[k] - rows[k].voltage_v, ++in_sum;
+    }
+    take();
+  }
+  const double left_v = count > 0 ? std::sqrt(squares_v2 / static_cast<double>(count)) : 0;
+  p.noise.model_v = std::clamp(std::hypot(left_v, half_gap_v / 4), least_v, 0.2);
+  p.noise.model_correlation_s = 3'000;  // until the current has turned for a good part of an hour
+  p.noise.rest_v = std::max(p.noise.model_v, 0.01);
+  // a sensor good to a hundredth of the 1C current, whose offset stays for a day's work
+  p.noise.current_offset_a = 0.01 * capacity_ah;
+  p.noise.current_offset_correlation_s = 36'000;
+  p.noise.current_at_rest_a = 0.002 * capacity_ah;
+  p.noise.current_gain = 0.007;
+  p.noise.errors_are_states = true;
+}
+
+namespace {
+
+struct Rounding {
+  static void table(const char*) {}
+  static void number(const char*, double& value) { value = std::stod(fmt::format("{:.7g}", value)); }
+  static void optional_number(const char* key, double& value) { number(key, value); }
+  static void optional_flag(const char*, bool&) {}
+  template <class Column>
+  static void column(const char* key, Column& values) {
+    for (std::size_t k = 0; k < values.size; ++k) number(key, values[k]);
+  }
+  template <class Column>
+  static void optional_column(const char* key, Column& values) {
+    column(key, values);
+  }
+};
+
+}  // namespace
+
+void round_digits(files::CellFile& cell) {
+  Rounding rounding;
+  files::visit_cell(rounding, cell.parameters);
+  for (files::TemperatureTable& at : cell.at_temperature) files::visit_rc(rounding, at.rc);
+  for (model::MechanismSetting& m : cell.mechanisms) {
+    for (double& v : m.value) Rounding::number("", v);
+  }
+}
+
+}  // namespace bms::workflow
