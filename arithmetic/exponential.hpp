@@ -50,7 +50,7 @@ namespace exponential_detail {
 
 /// p = settled(x), with its derivative exp(-x).
 template <Dual S>
-constexpr S with_slope(S x, const decltype(S::a)& p) {
+constexpr S with_derivative(S x, const decltype(S::a)& p) {
   x.v *= 1 - p;
   x.a = p;
   return x;
@@ -66,10 +66,10 @@ constexpr bool long_step(const Fraction<S>& x) {
 
 /// x <= 1/4 only.
 template <class S>
-constexpr Fraction<S> settled_shortly(Fraction<S> x) {
+constexpr Fraction<S> step_response_short(Fraction<S> x) {
   using F = Fraction<S>;
   namespace d = exponential_detail;
-  if constexpr (Dual<S>) return exponential_detail::with_slope(x, settled_shortly<decltype(x.a)>(x.a));
+  if constexpr (Dual<S>) return exponential_detail::with_derivative(x, step_response_short<decltype(x.a)>(x.a));
   F q;
   if constexpr (d::short_mantissa<S>) {
     constexpr auto c = d::converted<F>(d::chebyshev);
@@ -83,24 +83,24 @@ constexpr Fraction<S> settled_shortly(Fraction<S> x) {
 }
 
 template <class S>
-constexpr Fraction<S> settled(const Exponent<S>& x) {
+constexpr Fraction<S> step_response(const Exponent<S>& x) {
   using F = Fraction<S>;
-  if constexpr (Dual<S>) return exponential_detail::with_slope(x, settled<decltype(x.a)>(x.a));
+  if constexpr (Dual<S>) return exponential_detail::with_derivative(x, step_response<decltype(x.a)>(x.a));
   if (x > Exponent<S>(0.25)) [[unlikely]] {
     if (x > Exponent<S>(32)) return F(1);
-    const F half = settled<S>(product<Exponent<S>>(x, F(0.5)));
+    const F half = step_response<S>(product<Exponent<S>>(x, F(0.5)));
     return F(half * F(F(2) - half));
   }
-  return settled_shortly<S>(F(x));
+  return step_response_short<S>(F(x));
 }
 
 /// After a step, at 1 / time constant: x = duration * rate is made as long as it needs to be.
 template <class S>
-constexpr Fraction<S> settled_in(const TimeStep<S>& duration_s, const Rate<S>& rate_per_s) {
+constexpr Fraction<S> step_response_after(const TimeStep<S>& duration_s, const Rate<S>& rate_per_s) {
   const Fraction<S> x = duration_s * rate_per_s;
   if (long_step<S>(x)) [[unlikely]]
-    return settled<S>(Exponent<S>(duration_s * rate_per_s));
-  return settled_shortly<S>(x);
+    return step_response<S>(Exponent<S>(duration_s * rate_per_s));
+  return step_response_short<S>(x);
 }
 
 }  // namespace bms::arithmetic

@@ -167,8 +167,8 @@ constexpr std::int32_t to_micro(const T& x) {
     const std::int64_t micro = (static_cast<std::int64_t>(x.raw()) * 1'000'000 + half) >> T::fraction_bits;
     return static_cast<std::int32_t>(micro > most ? most : micro < -most ? -most : micro);
   } else if constexpr (std::floating_point<T>) {
-    const T most(2'147), held = x > most ? most : x < -most ? -most : x;
-    return static_cast<std::int32_t>(held * T(1'000'000) + (held < T(0) ? T(-0.5) : T(0.5)));
+    const T most(2'147), clamped = x > most ? most : x < -most ? -most : x;
+    return static_cast<std::int32_t>(clamped * T(1'000'000) + (clamped < T(0) ? T(-0.5) : T(0.5)));
   } else {
     return to_micro(x.a);  // a dual number
   }

@@ -165,10 +165,10 @@ class Scaled {
   static constexpr Packed normalised(std::int32_t m, std::int32_t e) {
     if (m == 0) return packed(0, of_zero);
     const int up = std::countl_zero(size_of(m)) - 2;
-    if (up >= 0) return held(static_cast<std::int32_t>(static_cast<std::uint32_t>(m) << up), e - up);
+    if (up >= 0) return saturated(static_cast<std::int32_t>(static_cast<std::uint32_t>(m) << up), e - up);
     // 31 bits; a carry into the 31st is exact: all below is 0
     const std::int32_t half = (m >> 1) + (m & 1);
-    return half == limit ? held(half >> 1, e + 2) : held(half, e + 1);
+    return half == limit ? saturated(half >> 1, e + 2) : saturated(half, e + 1);
   }
 
   // The three that a step calls most, in assembler where the compiler finds no way through eight registers; elsewhere
@@ -198,7 +198,7 @@ class Scaled {
     return product_of(am, ae, bm, be);
   }
 
-  static constexpr Packed held(std::int32_t m, std::int32_t e) {
+  static constexpr Packed saturated(std::int32_t m, std::int32_t e) {
     if (static_cast<std::uint32_t>(e - lowest) <= static_cast<std::uint32_t>(highest - lowest)) [[likely]]
       return packed(m, e);
     return e < lowest ? packed(0, of_zero) : packed(m, highest);
@@ -213,11 +213,11 @@ class Scaled {
       ae = be;
       apart = -apart;
     }
-    if (apart > 30) return held(am, ae);
+    if (apart > 30) return saturated(am, ae);
     bm = ((bm >> apart) + (apart > 0 ? bm >> (apart - 1) & 1 : 0));
     const std::int32_t m = am + bm;
     if (size_of(m) >> 29 == 1) [[likely]]
-      return held(m, ae);
+      return saturated(m, ae);
     return normalised(m, ae);
   }
 

@@ -9,21 +9,21 @@
 #include <fmt/format.h>
 
 #include "diagnosis/bursts.hpp"
+#include "diagnosis/denoise_current.hpp"
 #include "diagnosis/hypothesis.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/noise.hpp"
-#include "diagnosis/quiet_current.hpp"
+#include "diagnosis/recording_check.hpp"
 #include "diagnosis/screen.hpp"
-#include "diagnosis/trust.hpp"
 
 namespace bms::benchmark {
 
 namespace {
 
 using diagnosis::Columns;
-using diagnosis::Evidence;
-using diagnosis::Fit;
 using diagnosis::Hypothesis;
+using diagnosis::HypothesisFit;
+using diagnosis::LikelihoodModel;
 using diagnosis::NoiseModel;
 using diagnosis::Verdict;
 using model::catalogue;
@@ -38,12 +38,12 @@ NoiseModel white(double deviation_v) { return {.white_v = deviation_v, .fast_v =
 struct Question {
   explicit Question(const truth::Case& c)
       : cell(cell_of(c.cell)), recording(record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc)) {
-    diagnosis::examine(recording, cell);
+    diagnosis::check_recording(recording, cell);
     noise.white_v =
         diagnosis::white_noise(recording.voltage_v, recording.current_a, 0.01 * cell.capacity_ah, cell.noise.voltage_v);
     noise.fast_v = std::max(cell.tolerance.ocv_v, 5e-4);
     noise.slow_v = 1.3 * std::max(cell.tolerance.drift_v, 5e-4);
-    recording.current_a = diagnosis::quiet_current(
+    recording.current_a = diagnosis::denoise_current(
         recording.current_a, std::min(diagnosis::current_noise(recording.current_a), 1.5 * cell.noise.current_a));
     if (!c.holdout.time_s.empty()) holdout = record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc);
   }
@@ -58,11 +58,11 @@ struct Question {
 
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
   model::CellParameters<> cell;
-  diagnosis::Record recording, holdout;
+  diagnosis::PreparedRecording recording, holdout;
   NoiseModel noise;
 };
 
-double rms(const Evidence& evidence, const Columns& error_v) {
+double rms(const LikelihoodModel& evidence, const Columns& error_v) {
   return std::sqrt(error_v.squaredNorm() / static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
 }
 
@@ -88,7 +88,7 @@ Outcome answered(const truth::Case& c, const Question& q, Outcome said, const st
 
 Outcome frozen_model(const truth::Case& c) {
   const Question q(c);
-  const Evidence evidence(q.cell, {}, {q.recording}, white(1));
+  const LikelihoodModel evidence(q.cell, {}, {q.recording}, white(1));
   const Columns error_v = evidence.raw_residual(evidence.base(), evidence.unchanged());
   const double floors = rms(evidence, error_v) / q.floor_v();
   Outcome o;
@@ -104,19 +104,19 @@ Outcome refit(const truth::Case& c, double freedom) {
   const Question q(c);
   // The hold-out is in the evidence without its voltage: the unknowns are then those of both, the fit knows the
   // recording alone, and what belongs to the hold-out itself (initial soc, wander) stays at 0.
-  std::vector<diagnosis::Record> records{q.recording};
+  std::vector<diagnosis::PreparedRecording> records{q.recording};
   if (!q.holdout.time_s.empty()) {
     records.push_back(q.holdout);
     std::fill(records.back().voltage_v.begin(), records.back().voltage_v.end(),
               std::numeric_limits<double>::quiet_NaN());
   }
   // the tolerance's weight is relative: a tenth of the noise against it is the noise against ten times it
-  const Evidence evidence(q.cell, {}, records,
-                          {.white_v = q.noise.white_v / freedom,
-                           .fast_v = q.noise.fast_v / freedom,
-                           .slow_v = q.noise.slow_v / freedom,
-                           .edge = 1 / freedom});
-  const Fit fit = evidence.fit(evidence.base());
+  const LikelihoodModel evidence(q.cell, {}, records,
+                                 {.white_v = q.noise.white_v / freedom,
+                                  .fast_v = q.noise.fast_v / freedom,
+                                  .slow_v = q.noise.slow_v / freedom,
+                                  .edge = 1 / freedom});
+  const HypothesisFit fit = evidence.fit(evidence.base());
   const Columns error_v = evidence.raw_residual(fit.hypothesis, fit.calibration);
   const double floors = rms(evidence, error_v) / q.floor_v();
   Outcome o;
@@ -139,9 +139,9 @@ Outcome aicc_forward(const truth::Case& c) {
   constexpr double same = 2;  // AICc, the usual reading of Akaike weights
 
   const Question q(c);
-  const Evidence evidence(q.cell, {}, {q.recording}, white(q.floor_v()));
+  const LikelihoodModel evidence(q.cell, {}, {q.recording}, white(q.floor_v()));
   const auto n = static_cast<double>(evidence.used());
-  const auto aicc = [&](const Fit& f) {
+  const auto aicc = [&](const HypothesisFit& f) {
     const Hypothesis& h = f.hypothesis;
     auto k = static_cast<double>(evidence.calibration().size() + h.sought().size() + 1);
     if (h.find(contact_step) != nullptr) k += 1;  // its moment
@@ -153,22 +153,22 @@ Outcome aicc_forward(const truth::Case& c) {
   std::iota(all.begin(), all.end(), std::size_t{0});
 
   Outcome o;
-  const Fit base = evidence.fit(evidence.base(), iterations);
-  Fit current = base;
+  const HypothesisFit base = evidence.fit(evidence.base(), iterations);
+  HypothesisFit current = base;
   double lowest = aicc(base);
   while (o.found.size() < most_mechanisms) {
     const diagnosis::Screen screen(evidence, current, all);
     struct Tried {
       double aicc;
       std::size_t mechanism;
-      Fit fit;
+      HypothesisFit fit;
     };
     std::vector<Tried> tried;
     for (const diagnosis::Candidate& candidate : screen.candidates()) {
       if (tried.size() == most_fits) break;
       Hypothesis h = with(current.hypothesis, candidate.start);
       if (!candidate.bursts.empty()) h.bursts = candidate.bursts;
-      Fit fit = evidence.fit(h, current.calibration, iterations);
+      HypothesisFit fit = evidence.fit(h, current.calibration, iterations);
       const double value = aicc(fit);
       tried.push_back({value, candidate.mechanism, std::move(fit)});
     }
@@ -199,7 +199,7 @@ Outcome aicc_forward(const truth::Case& c) {
 
 Outcome nearest_signature(const truth::Case& c) {
   const Question q(c);
-  const Evidence evidence(q.cell, {}, {q.recording}, white(1));
+  const LikelihoodModel evidence(q.cell, {}, {q.recording}, white(1));
   const Hypothesis base = evidence.base();
   const Eigen::VectorXd u = evidence.unchanged();
   const Columns error_v = evidence.raw_residual(base, u);
@@ -233,7 +233,7 @@ Outcome nearest_signature(const truth::Case& c) {
       for (std::size_t p = 0; p < catalogue[m].parameters; ++p) {
         const model::Parameter& parameter = catalogue[m].parameter[p];
         if (parameter.role != model::Role::strength) continue;
-        const std::vector<diagnosis::Sought> by{{h.settings.size() - 1, p}};
+        const std::vector<diagnosis::ParameterRef> by{{h.settings.size() - 1, p}};
         const Columns signature = evidence.derivatives(h, u, by);
         const double along = signature.col(0).dot(error_v.col(0)), length = signature.norm();
         if (!(length > 0) || (along < 0 && parameter.low >= 0)) continue;

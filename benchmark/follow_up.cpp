@@ -26,39 +26,39 @@ bool contains(const std::vector<std::string>& list, const std::string& id) {
 }
 
 /// As the technician does it: the profile at the recording's own rate, references where it has them.
-diagnosis::Record carried_out(const truth::Case& c, const model::CellParameters<>& cell,
-                              const diagnosis::NextExperiment& next) {
+diagnosis::PreparedRecording carried_out(const truth::Case& c, const model::CellParameters<>& cell,
+                                         const diagnosis::NextExperiment& next) {
   const double step_s = std::min(next.step_s, c.recording.time_s[1] - c.recording.time_s[0]);
   experiments::ExperimentOptions options;
   options.capacity_ah = next.capacity_ah;
   options.step_s = step_s;
-  truth::Errand errand;
-  errand.step_s = step_s;
-  errand.start_soc = next.start_soc;
+  truth::TestPlan test_plan;
+  test_plan.step_s = step_s;
+  test_plan.start_soc = next.start_soc;
   std::vector<double> current_ref_a, voltage_ref_v;
   const std::vector<experiments::ProfileRow> rows = experiments::experiment(next.profile, options).value();
   for (const experiments::ProfileRow& row : rows) {
-    errand.current_a.push_back(row.current_a);
-    errand.ambient_c.push_back(row.temperature_c);
-    errand.source_v.push_back(row.source_v);
-    errand.measures_temperature = errand.measures_temperature || std::isfinite(row.temperature_c);
+    test_plan.current_a.push_back(row.current_a);
+    test_plan.ambient_c.push_back(row.temperature_c);
+    test_plan.source_v.push_back(row.source_v);
+    test_plan.measures_temperature = test_plan.measures_temperature || std::isfinite(row.temperature_c);
     current_ref_a.push_back(row.current_ref_a());
   }
-  const truth::Series s = c.drive(errand);
+  const truth::Series s = c.run_test(test_plan);
   for (std::size_t k = 0; k < rows.size(); ++k)
     voltage_ref_v.push_back(rows[k].voltmeter ? s.terminal_v[k] : rows[k].source_v);
-  diagnosis::Record r{
+  diagnosis::PreparedRecording r{
       next.profile, s.time_s, s.current_a, s.voltage_v, s.temperature_c, next.start_soc, cell.tolerance.initial_soc,
       true,         {}};
-  diagnosis::take_references(r, current_ref_a, voltage_ref_v, cell);
+  diagnosis::average_references(r, current_ref_a, voltage_ref_v, cell);
   return r;
 }
 
 }  // namespace
 
 std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell,
-                                  const diagnosis::Record& recording, const diagnosis::Diagnosis& first) {
-  if (first.verdict != diagnosis::Verdict::ambiguous || !c.drive) return std::nullopt;
+                                  const diagnosis::PreparedRecording& recording, const diagnosis::Diagnosis& first) {
+  if (first.verdict != diagnosis::Verdict::ambiguous || !c.run_test) return std::nullopt;
   FollowUp up;
   const auto begin = std::chrono::steady_clock::now();
   const auto next = diagnosis::next_experiment(cell, first, !recording.temperature_c.empty());

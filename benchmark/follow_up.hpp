@@ -20,6 +20,6 @@ struct FollowUp {
 
 /// Nothing unless the diagnosis is ambiguous. The answer is looked at when all is done.
 std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell,
-                                  const diagnosis::Record& recording, const diagnosis::Diagnosis& first);
+                                  const diagnosis::PreparedRecording& recording, const diagnosis::Diagnosis& first);
 
 }  // namespace bms::benchmark

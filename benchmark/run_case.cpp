@@ -46,7 +46,7 @@ model::CellParameters<> cell_of(const truth::CalibratedCell& c) {
   return p;
 }
 
-diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma) {
+diagnosis::PreparedRecording record_of(const truth::Series& s, double initial_soc, double sigma) {
   return {"", s.time_s, s.current_a, s.voltage_v, s.temperature_c, initial_soc, sigma, true, {}};
 }
 

@@ -30,7 +30,7 @@ struct Outcome {
 /// The cell file that a case comes with, as the tool would read it.
 model::CellParameters<> cell_of(const truth::CalibratedCell& cell);
 
-diagnosis::Record record_of(const truth::Series& s, double initial_soc, double sigma);
+diagnosis::PreparedRecording record_of(const truth::Series& s, double initial_soc, double sigma);
 
 /// Copies the answer and measures by it what was said; only when all has been said. spans: where; holdout_v: predicted
 /// for the hold-out, row by row; empty: there is none.

@@ -48,8 +48,8 @@ template <SignalLayout s>
 constexpr void put(Frame& frame, float value) {
   std::int32_t raw = s.invalid;
   if (value == value || !s.has_invalid) {
-    const float held = !(value > s.lowest) ? s.lowest : value > s.highest ? s.highest : value;
-    const float counts = (held - s.offset) / s.factor;
+    const float clamped = !(value > s.lowest) ? s.lowest : value > s.highest ? s.highest : value;
+    const float counts = (clamped - s.offset) / s.factor;
     raw = static_cast<std::int32_t>(counts + (counts < 0 ? -0.5F : 0.5F));
   }
   put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(raw)));
@@ -63,8 +63,8 @@ constexpr void put(Frame& frame, std::uint32_t value) {
 template <SignalLayout s>
 constexpr void put(Frame& frame, std::int32_t value) {
   constexpr auto most = static_cast<std::int32_t>(mask(s.bits - 1));
-  const std::int32_t held = value > most ? most : value < -most - 1 ? -most - 1 : value;
-  put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(held)));
+  const std::int32_t clamped = value > most ? most : value < -most - 1 ? -most - 1 : value;
+  put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(clamped)));
 }
 
 template <SignalLayout s>

@@ -18,7 +18,7 @@ add_custom_command(OUTPUT ${j1939_messages}
   COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/can/j1939_profile.dbc ${j1939_messages} j1939
   DEPENDS ${CMAKE_SOURCE_DIR}/cmake/dbc_header.py ${CMAKE_SOURCE_DIR}/cmake/dbc_file.py ${CMAKE_SOURCE_DIR}/can/j1939_profile.dbc
   COMMENT "CAN messages of the J1939 profile" VERBATIM)
-add_custom_target(can_messages_made DEPENDS ${can_messages} ${j1939_messages})
+add_custom_target(generate_can_messages DEPENDS ${can_messages} ${j1939_messages})
 add_library(bms_can INTERFACE)
 target_include_directories(bms_can INTERFACE ${CMAKE_BINARY_DIR}/generated)
-add_dependencies(bms_can can_messages_made)
+add_dependencies(bms_can generate_can_messages)

@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
   }
   try {
     const bms::files::CellFile cell = bms::files::read_cell(argv[1]);
-    if (fixed) bms::files::refuse_without_fpu(cell);
+    if (fixed) bms::files::reject_if_fpu_needed(cell);
     bms::files::write_file(argv[2], header(cell));
   } catch (const bms::files::BadInput& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -110,11 +110,11 @@ bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})
 # the board's back ends: BMS_CAN names how it talks, BMS_SAMPLES where its samples come from
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
-set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/heard.cpp ${hal}/absent/calibration.cpp)
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/heard.cpp ${hal}/absent/calibration.cpp)
-set(samples_adc ${hal}/adc/samples.cpp ${hal}/heard.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp)
-set(samples_bq76952 ${hal}/absent/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/heard.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
-bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${hal}/absent/record.cpp)
+set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${hal}/absent/calibration.cpp)
+set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/absent/calibration.cpp)
+set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp)
+set(samples_bq76952 ${hal}/absent/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
+bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${hal}/absent/estimate_record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
 target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION} ${vehicle_profile_${BMS_VEHICLE_PROFILE}})
@@ -122,7 +122,7 @@ bms_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cp
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp ${hal}/absent/calibration.cpp)
 target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
 
-bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${hal}/absent/record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp)
+bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${hal}/absent/estimate_record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp)
 
 bms_objects(storage -Os ${CMAKE_SOURCE_DIR}/storage/log.cpp ${CMAKE_SOURCE_DIR}/storage/persistence.cpp)
 bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/board_cell.cpp ${cell_header} ${can_messages} ${j1939_messages})  # the cell says which model

@@ -58,7 +58,7 @@ double as_many(std::size_t of, std::size_t hits, double share) {
 
 }  // namespace
 
-std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v,
+std::vector<model::Span> find_bursts(const PreparedRecording& record, const std::vector<double>& residual_v,
                                      const Whitener& whitener, double& found_ohm) {
   const std::size_t n = record.size();
   std::vector<double> residual(residual_v);

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "diagnosis/noise.hpp"
-#include "diagnosis/record.hpp"
+#include "diagnosis/prepared_recording.hpp"
 #include "model/mechanisms/contact_intermittent.hpp"
 
 namespace bms::diagnosis {
 
 /// residual_v: measured less predicted, V, a value per row. found_ohm: added in a burst. None: nothing that chance
 /// would not do.
-std::vector<model::Span> find_bursts(const Record& record, const std::vector<double>& residual_v,
+std::vector<model::Span> find_bursts(const PreparedRecording& record, const std::vector<double>& residual_v,
                                      const Whitener& whitener, double& found_ohm);
 
 }  // namespace bms::diagnosis

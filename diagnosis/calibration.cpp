@@ -34,9 +34,9 @@ std::vector<double> merged(std::vector<double> first, const std::vector<double>&
 
 }  // namespace
 
-Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Record> records) {
+Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records) {
   double low = 2, high = -1;
-  for (const Record& r : records) {
+  for (const PreparedRecording& r : records) {
     double soc = r.initial_soc, known_a = 0;
     for (std::size_t k = 0; k < r.size(); ++k) {
       if (std::isfinite(r.current_a[k])) known_a = r.current_a[k];
@@ -86,7 +86,7 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Re
              [&](double soc) { return std::max(4 * fraction_at(soc), said(cell.rc.c1_f, cell.rc.c1_std_f, soc)); });
   capacity_ = size_++;
   gain_ = size_++;
-  for (const Record& r : records) {
+  for (const PreparedRecording& r : records) {
     initial_soc_.push_back(size_++);
     initial_soc_sigma_.push_back(std::max(r.initial_soc_sigma, 1e-4));
     const double every_s = std::max(cell.noise.current_offset_correlation_s, r.duration_s() / 12);

@@ -20,7 +20,7 @@
 #include <span>
 #include <vector>
 
-#include "diagnosis/record.hpp"
+#include "diagnosis/prepared_recording.hpp"
 #include "model/cell_parameters.hpp"
 #include "model/extended.hpp"
 
@@ -102,7 +102,7 @@ class Calibration {
     }
   };
 
-  Calibration(const model::CellParameters<>& cell, std::span<const Record> records);
+  Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records);
 
   std::size_t size() const { return size_; }
 

@@ -11,7 +11,7 @@
 #include "diagnosis/decision.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/prepare.hpp"
-#include "diagnosis/remainder.hpp"
+#include "diagnosis/residual_test.hpp"
 #include "diagnosis/search.hpp"
 
 namespace bms::diagnosis {
@@ -21,11 +21,11 @@ namespace {
 using model::catalogue;
 
 /// Why nothing at all can be said.
-std::optional<std::string> says_nothing(const Evidence& evidence) {
+std::optional<std::string> says_nothing(const LikelihoodModel& evidence) {
   const double capacity_ah = evidence.cell().capacity_ah;
   std::size_t moving = 0;
   double duration_s = 0, low_a = 1e9, high_a = -1e9;
-  for (const Record& r : evidence.records()) {
+  for (const PreparedRecording& r : evidence.records()) {
     duration_s += r.duration_s();
     for (const double a : r.current_a) {
       if (!std::isfinite(a)) continue;
@@ -43,7 +43,7 @@ std::optional<std::string> says_nothing(const Evidence& evidence) {
 
 /// What is there for certain, before anything that would stand in for it: every cell's resistances follow the
 /// temperature, and a file that tells how far charge and discharge lie apart tells that there is a hysteresis.
-std::set<std::size_t> expected_in(const Evidence& evidence) {
+std::set<std::size_t> expected_in(const LikelihoodModel& evidence) {
   std::set<std::size_t> expected;
   if (away_k(evidence) > decision::far_k) expected.insert(mechanism_index("temperature_resistance"));
   if (evidence.cell().ocv.half_gap_v.size > 0) expected.insert(mechanism_index("ocv_hysteresis"));
@@ -53,15 +53,15 @@ std::set<std::size_t> expected_in(const Evidence& evidence) {
 
 /// One mechanism after the other, as long as chance would not do it; what may come and go as it likes, which gains on
 /// anything, after all that may not. singles: what was tried alone.
-Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, std::size_t most,
-         std::vector<Fit>& singles) {
+HypothesisFit grow(Search& search, HypothesisFit current, const std::vector<std::size_t>& testable, std::size_t most,
+                   std::vector<HypothesisFit>& singles) {
   std::vector<std::size_t> steady = testable;
   std::erase(steady, mechanism_index("contact_intermittent"));
   bool bursts = false;
   while (current.hypothesis.added().size() < most) {
-    std::vector<Fit> more = search.one_more(current, bursts ? testable : steady);
+    std::vector<HypothesisFit> more = search.one_more(current, bursts ? testable : steady);
     if (current.hypothesis.added().empty()) singles.insert(singles.end(), more.begin(), more.end());
-    std::erase_if(more, [&](const Fit& f) { return !search.carries(current, f); });
+    std::erase_if(more, [&](const HypothesisFit& f) { return !search.carries(current, f); });
     const bool gains = !more.empty() && search.gain(current, more.front()) >= decision::detected;
     if (gains)
       current = more.front();
@@ -74,14 +74,14 @@ Fit grow(Search& search, Fit current, const std::vector<std::size_t>& testable, 
 
 /// What has stood up against everything else.
 struct Standing {
-  Fit best;
-  std::map<std::size_t, std::vector<Fit>> rivals;               ///< with another in the place of a mechanism
+  HypothesisFit best;
+  std::map<std::size_t, std::vector<HypothesisFit>> rivals;     ///< with another in the place of a mechanism
   std::map<std::size_t, double> gains;                          ///< of each over the rest
   std::map<std::pair<std::size_t, std::size_t>, double> alike;  ///< signatures
 };
 
 /// What does not carry is taken away, and each one's rivals are tried in its place.
-Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit current,
+Standing stand_up(Search& search, const LikelihoodModel& evidence, const HypothesisFit& base, HypothesisFit current,
                   const std::vector<std::size_t>& testable, const std::set<std::size_t>& expected) {
   const double error_v = plain_error_v(evidence, evidence.base());
   Standing found;
@@ -90,11 +90,11 @@ Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit
     bool changed = false;
     rivals.clear();
     gains.clear();
-    std::vector<std::pair<double, Fit>> reduced;
+    std::vector<std::pair<double, HypothesisFit>> reduced;
     const std::map<std::size_t, double> sizes_v = contributions(evidence, base, current).rms_v;
     for (const std::size_t m : current.hypothesis.added()) {
       const bool alone = current.hypothesis.added().size() == 1;
-      const Fit less = alone ? base : search.without_one(current, m);
+      const HypothesisFit less = alone ? base : search.without_one(current, m);
       gains[m] = search.gain(less, current);
       // beside others, one that is hardly seen is none, and so are those that are larger than the error and cancel each
       // other: of these the one goes that is missed less
@@ -106,7 +106,7 @@ Standing stand_up(Search& search, const Evidence& evidence, const Fit& base, Fit
         continue;
       }
       std::map<std::size_t, double> likeness;
-      for (Fit& rival : search.in_place_of(m, current, less, testable, gains[m], likeness)) {
+      for (HypothesisFit& rival : search.in_place_of(m, current, less, testable, gains[m], likeness)) {
         if (rival.hypothesis.find(m) != nullptr) {
           if (search.score(rival) < search.score(current) - 1 && search.carries(less, rival))
             current = rival, changed = true;  // the same from another start
@@ -169,17 +169,17 @@ std::vector<MechanismSetting> later_recording(const Hypothesis& extended) {
 }
 
 std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,
-                            const Record& record, std::vector<double>* soc) {
-  const Evidence evidence(cell, settings, {record}, NoiseModel{});
+                            const PreparedRecording& record, std::vector<double>* soc) {
+  const LikelihoodModel evidence(cell, settings, {record}, NoiseModel{});
   return evidence.voltage(evidence.base(), evidence.unchanged(), 0, soc);
 }
 
 Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own,
-                   std::vector<Record> records, const Options& options) {
+                   std::vector<PreparedRecording> records, const Options& options) {
   Diagnosis d;
   d.cell = cell;
-  for (Record& r : records) {
-    Trust trust = examine(r, cell);
+  for (PreparedRecording& r : records) {
+    RecordingCheck trust = check_recording(r, cell);
     for (DataFault& f : trust.faults) d.faults.push_back(std::move(f));
     for (const std::string& w : trust.warnings) d.warnings.push_back(r.name.empty() ? w : r.name + ": " + w);
   }
@@ -190,7 +190,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     return d;
   }
 
-  Evidence evidence = evidence_of(cell, own, std::move(records));
+  LikelihoodModel evidence = likelihood_model_of(cell, own, std::move(records));
   const NoiseModel nominal = evidence.noise();  // before any hypothesis
 
   std::vector<std::size_t> testable;
@@ -208,14 +208,14 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   }
 
   Search search(evidence, options.progress);
-  Fit base = search.settled(evidence.fit(evidence.base()));
+  HypothesisFit base = search.settled(evidence.fit(evidence.base()));
   search.tell("calibration");
 
   const std::set<std::size_t> expected = expected_in(evidence);
-  std::vector<Fit> singles;
-  Fit grown = base;
+  std::vector<HypothesisFit> singles;
+  HypothesisFit grown = base;
   for (const std::size_t m : expected) {
-    const std::vector<Fit> with_it = search.one_more(grown, {m});
+    const std::vector<HypothesisFit> with_it = search.one_more(grown, {m});
     if (!with_it.empty() && search.gain(grown, with_it.front()) > decision::detected) grown = with_it.front();
   }
   grown = grow(search, std::move(grown), testable, options.most_mechanisms, singles);
@@ -234,9 +234,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 
   // is it enough?
   evidence.set_noise(nominal);
-  const Fit base_nominal = evidence.fit(base.hypothesis, base.calibration, 6);
-  Fit best_nominal = evidence.fit(current.hypothesis, current.calibration, 6);
-  Remainder remainder = what_remains(evidence, best_nominal);
+  const HypothesisFit base_nominal = evidence.fit(base.hypothesis, base.calibration, 6);
+  HypothesisFit best_nominal = evidence.fit(current.hypothesis, current.calibration, 6);
+  Remainder remainder = test_residual(evidence, best_nominal);
   const auto adequacy = [&] {
     const double gained = std::max(base_nominal.cost - best_nominal.cost, 0.0);
     return gained + remainder.gain > 0 ? gained / (gained + remainder.gain) : 1;
@@ -246,7 +246,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
       adequacy() < decision::explained) {
     current = base;
     best_nominal = base_nominal;
-    remainder = what_remains(evidence, best_nominal);
+    remainder = test_residual(evidence, best_nominal);
     gains.clear();
     rivals.clear();
   }
@@ -281,7 +281,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     f.setting = *current.hypothesis.find(m);
     f.gain = gains[m];
     f.at_bound.assign(catalogue[m].parameters, 0);
-    const std::vector<Sought> sought = current.hypothesis.sought();
+    const std::vector<ParameterRef> sought = current.hypothesis.sought();
     for (std::size_t j = 0; j < sought.size(); ++j) {
       if (current.hypothesis.settings[sought[j].setting].index == m)
         f.at_bound[sought[j].parameter] = current.at_bound[j];
@@ -290,10 +290,10 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     struct Near {
       double behind;
       std::size_t mechanism;
-      const Fit* fit;
+      const HypothesisFit* fit;
     };
     std::vector<Near> near;
-    for (const Fit& rival : rivals[m]) {
+    for (const HypothesisFit& rival : rivals[m]) {
       const double behind = search.score(rival) - search.score(current);
       std::size_t other = m;
       for (const std::size_t a : rival.hypothesis.added()) {
@@ -320,7 +320,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   std::stable_sort(d.findings.begin(), d.findings.end(),
                    [](const Finding& a, const Finding& b) { return a.gain > b.gain; });
 
-  const auto rank = [&](const Fit& f) {
+  const auto rank = [&](const HypothesisFit& f) {
     for (const Ranked& r : d.candidates) {
       if (r.ids == f.hypothesis.added()) return;  // the same from another start
     }
@@ -331,12 +331,13 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   if (something) {
     rank(current);
     for (auto& [m, fits] : rivals) {
-      std::stable_sort(fits.begin(), fits.end(),
-                       [&](const Fit& a, const Fit& b) { return search.score(a) < search.score(b); });
-      for (const Fit& f : fits) rank(f);
+      std::stable_sort(fits.begin(), fits.end(), [&](const HypothesisFit& a, const HypothesisFit& b) {
+        return search.score(a) < search.score(b);
+      });
+      for (const HypothesisFit& f : fits) rank(f);
     }
   } else {
-    for (const Fit& f : singles) rank(f);
+    for (const HypothesisFit& f : singles) rank(f);
   }
   std::stable_sort(d.candidates.begin(), d.candidates.end(),
                    [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
@@ -352,7 +353,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.spans = unknown || !something ? remainder.spans : parts.spans;
   d.regimes = regimes(evidence, current, unknown || !something ? remainder.energy : parts.energy);
   for (std::size_t r = 0; r < evidence.records().size(); ++r) {
-    RecordView view;
+    RecordingView view;
     view.base_v = evidence.voltage(evidence.base(), evidence.unchanged(), r);
     view.extended_v = evidence.voltage(current.hypothesis, current.calibration, r, &view.soc);
     d.views.push_back(std::move(view));

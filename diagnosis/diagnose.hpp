@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "diagnosis/hypothesis.hpp"
+#include "diagnosis/recording_check.hpp"
 #include "diagnosis/screen.hpp"
-#include "diagnosis/trust.hpp"
 
 namespace bms::diagnosis {
 
@@ -59,7 +59,7 @@ struct NotTestable {
   std::string reason;
 };
 
-struct RecordView {  ///< for plots
+struct RecordingView {  ///< for plots
   std::vector<double> base_v, extended_v, soc;
 };
 
@@ -77,12 +77,12 @@ struct Diagnosis {
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;
-  Hypothesis extended;            ///< the cell's own mechanisms and those found
-  model::CellParameters<> cell;   ///< its parameters moved, within their tolerance, to where they fit beside what was
-                                  ///< found; as given when nothing was
-  Eigen::MatrixXd covariance;     ///< of what is sought in it
-  NoiseModel noise;               ///< nominal
-  std::vector<RecordView> views;  ///< of each record
+  Hypothesis extended;           ///< the cell's own mechanisms and those found
+  model::CellParameters<> cell;  ///< its parameters moved, within their tolerance, to where they fit beside what was
+                                 ///< found; as given when nothing was
+  Eigen::MatrixXd covariance;    ///< of what is sought in it
+  NoiseModel noise;              ///< nominal
+  std::vector<RecordingView> views;  ///< of each record
   // what the decision was made from
   std::string remaining_goes_with;  ///< what remains, if much does: with the time, the soc, a period of its own
   double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, far_out = 0;
@@ -95,7 +95,7 @@ struct Options {
 
 /// own: mechanisms of the cell file. Records as read; what cannot be used is taken out here.
 Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own,
-                   std::vector<Record> records, const Options& options = {});
+                   std::vector<PreparedRecording> records, const Options& options = {});
 
 /// What holds for a later recording of the same cell and instruments: a contact that has changed stays so, where bursts
 /// fell and where the first recording began does not.
@@ -108,6 +108,6 @@ inline bool names(Verdict verdict) {
 
 /// Open loop from its initial soc: the voltage that would be read.
 std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,
-                            const Record& record, std::vector<double>* soc = nullptr);
+                            const PreparedRecording& record, std::vector<double>* soc = nullptr);
 
 }  // namespace bms::diagnosis

@@ -11,7 +11,7 @@
 
 namespace bms::diagnosis {
 
-struct Evidence::Linear {
+struct LikelihoodModel::Linear {
   Columns columns;                     ///< white
   Eigen::LLT<Eigen::MatrixXd> normal;  ///< columns' columns + 1
 };
@@ -37,7 +37,7 @@ class Unknowns {
     // what is neither faster nor slower than R1 C1 is R1 C1
     const double rc_s = model::cell_detail::rc_value(cell.rc, cell.rc.r1_ohm, 0.5) *
                         model::cell_detail::rc_value(cell.rc, cell.rc.c1_f, 0.5);
-    for (const Sought& s : sought_) {
+    for (const ParameterRef& s : sought_) {
       const model::MechanismInfo& info = catalogue[start.settings[s.setting].index];
       const model::Parameter& p = info.parameter[s.parameter];
       const bool time = p.name == "time_constant_s";
@@ -48,9 +48,9 @@ class Unknowns {
   }
 
   Eigen::Index size() const { return static_cast<Eigen::Index>(of_.size()); }
-  const std::vector<Sought>& sought() const { return sought_; }
+  const std::vector<ParameterRef>& sought() const { return sought_; }
   double& of(Hypothesis& h, Eigen::Index j) const {
-    const Sought& s = sought_[static_cast<std::size_t>(j)];
+    const ParameterRef& s = sought_[static_cast<std::size_t>(j)];
     return h.settings[s.setting].value[s.parameter];
   }
 
@@ -75,7 +75,7 @@ class Unknowns {
   /// Of a shape by its logarithm.
   Known known(Eigen::Index j, double v) const {
     const model::Parameter& p = *at(j).parameter;
-    if (is_shape(j)) return {std::log(v / p.unsaid(capacity_ah_)) / log_prior_width, log_prior_width};
+    if (is_shape(j)) return {std::log(v / p.default_value(capacity_ah_)) / log_prior_width, log_prior_width};
     if (p.spread > 0) return {(v - p.typical) / p.spread, p.spread};
     const double common = p.common(capacity_ah_);
     if (common <= 0 || std::abs(v) <= common) return {};
@@ -95,7 +95,7 @@ class Unknowns {
   const One& at(Eigen::Index j) const { return of_[static_cast<std::size_t>(j)]; }
 
   double capacity_ah_;
-  std::vector<Sought> sought_;
+  std::vector<ParameterRef> sought_;
   std::vector<One> of_;
 };
 
@@ -137,7 +137,8 @@ Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorX
 
 }  // namespace
 
-std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, const Eigen::VectorXd& u) const {
+std::shared_ptr<const LikelihoodModel::Linear> LikelihoodModel::linear(const Hypothesis& h,
+                                                                       const Eigen::VectorXd& u) const {
   auto made = std::make_shared<Linear>();
   made->columns = calibration_derivatives(h, u);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(made->columns.cols(), made->columns.cols());
@@ -146,14 +147,17 @@ std::shared_ptr<const Evidence::Linear> Evidence::linear(const Hypothesis& h, co
   return made;
 }
 
-void Evidence::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linear(h, u); }
+void LikelihoodModel::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linear(h, u); }
 
-Fit Evidence::fit(const Hypothesis& start, int iterations) const { return fit(start, unchanged(), iterations); }
+HypothesisFit LikelihoodModel::fit(const Hypothesis& start, int iterations) const {
+  return fit(start, unchanged(), iterations);
+}
 
-Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations, double hopeless) const {
+HypothesisFit LikelihoodModel::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations,
+                                   double hopeless) const {
   const Unknowns unknowns(cell_, start);
   const Eigen::Index m = unknowns.size();
-  Fit fit{start, calibration, {}, 0, noise_, {}, std::vector<char>(static_cast<std::size_t>(m), 0), false};
+  HypothesisFit fit{start, calibration, {}, 0, noise_, {}, std::vector<char>(static_cast<std::size_t>(m), 0), false};
   for (Eigen::Index j = 0; j < m; ++j)
     unknowns.of(fit.hypothesis, j) = unknowns.held(j, unknowns.of(fit.hypothesis, j));
   const auto cost_of = [&](Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& r) {
@@ -264,7 +268,7 @@ Fit Evidence::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, i
     const Eigen::MatrixXd inverse = s.ldlt().solve(Eigen::MatrixXd::Identity(m, m));
     fit.covariance = natural.asDiagonal() * inverse * natural.asDiagonal();
     for (Eigen::Index j = 0; j < m; ++j) {
-      const Sought& s_j = unknowns.sought()[static_cast<std::size_t>(j)];
+      const ParameterRef& s_j = unknowns.sought()[static_cast<std::size_t>(j)];
       fit.hypothesis.settings[s_j.setting].deviation[s_j.parameter] = std::sqrt(std::max(fit.covariance(j, j), 0.0));
     }
   }

@@ -6,7 +6,7 @@
 
 #include <ceres/jet.h>
 
-#include "model/readings.hpp"
+#include "model/corrected_readings.hpp"
 
 namespace bms::diagnosis {
 
@@ -50,7 +50,7 @@ struct AtUnknowns {
   S gain_error() const { return S(calibration.gain_error(u)); }
   S offset_a(std::size_t record, double time_s) const { return S(calibration.offset_a(record, time_s, u)); }
   void adjust(model::TablePoint<S>& at, const S& soc) const { calibration.adjust(at, soc, u); }
-  void before_row(model::Course<S>&) const {}
+  void before_row(model::OpenLoopSimulation<S>&) const {}
 };
 
 /// The same for derivatives along one row: a lane for each lever, then one for each state as it was before the row.
@@ -64,7 +64,7 @@ struct OnLevers : AtUnknowns<S> {
   void adjust(model::TablePoint<S>& at, const S& soc) const {
     this->calibration.adjust(at, soc, this->u, [](std::size_t lever, const S& x) { return pulled(x, lever); });
   }
-  void before_row(model::Course<S>& course) const {
+  void before_row(model::OpenLoopSimulation<S>& course) const {
     Eigen::Index lane = Lever::count;
     course.each_state([&](S& state) {
       state.v.setZero();
@@ -106,8 +106,8 @@ const MechanismSetting* Hypothesis::find(std::size_t index) const {
   return nullptr;
 }
 
-std::vector<Sought> Hypothesis::sought() const {
-  std::vector<Sought> all;
+std::vector<ParameterRef> Hypothesis::sought() const {
+  std::vector<ParameterRef> all;
   for (std::size_t k = own; k < settings.size(); ++k) {
     const model::MechanismInfo& info = catalogue[settings[k].index];
     for (std::size_t p = 0; p < info.parameters; ++p) {
@@ -130,7 +130,7 @@ Hypothesis with(const Hypothesis& h, const MechanismSetting& setting) {
 }
 
 Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah) {
-  return with(h, model::unsaid(mechanism, capacity_ah));
+  return with(h, model::default_setting(mechanism, capacity_ah));
 }
 
 Hypothesis without(const Hypothesis& h, std::size_t mechanism) {
@@ -141,14 +141,14 @@ Hypothesis without(const Hypothesis& h, std::size_t mechanism) {
   return less;
 }
 
-Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSetting> own, std::vector<Record> records,
-                   const NoiseModel& noise)
+LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
+                                 std::vector<PreparedRecording> records, const NoiseModel& noise)
     : cell_(cell),
       tables_(model::prepare<double, model::max_intervals>(cell)),
       own_(std::move(own)),
       records_(std::move(records)),
       calibration_(cell, records_) {
-  for (const Record& r : records_) {
+  for (const PreparedRecording& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording of less than two rows");
     samples_ += r.size();
     checks_ += r.checks.size();
@@ -177,21 +177,21 @@ Evidence::Evidence(const model::CellParameters<>& cell, std::vector<MechanismSet
   set_noise(noise);
 }
 
-std::vector<Whitener> Evidence::whiteners_for(const NoiseModel& noise) const {
+std::vector<Whitener> LikelihoodModel::whiteners_for(const NoiseModel& noise) const {
   std::vector<Whitener> made;
   for (std::size_t r = 0; r < records_.size(); ++r)
     made.emplace_back(noise, records_[r].time_s, row_noise_[r], usable_[r]);
   return made;
 }
 
-void Evidence::set_noise(const NoiseModel& noise) {
+void LikelihoodModel::set_noise(const NoiseModel& noise) {
   if (!whiteners_.empty() && noise == noise_) return;
   noise_ = noise;
   whiteners_ = whiteners_for(noise);
   nearby_.reset();
 }
 
-NoiseModel Evidence::likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const {
+NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const {
   const auto cost_of = [&](const NoiseModel& n) {
     const std::vector<Whitener> by = whiteners_for(n);
     Columns e = raw;
@@ -223,18 +223,18 @@ NoiseModel Evidence::likeliest_noise(const Columns& raw, const NoiseModel& nomin
   return best;
 }
 
-std::size_t Evidence::used() const {
+std::size_t LikelihoodModel::used() const {
   std::size_t n = 0;
   for (const Whitener& w : whiteners_) n += w.used();
   return n;
 }
 
-Hypothesis Evidence::base() const { return {own_, own_.size(), {}}; }
+Hypothesis LikelihoodModel::base() const { return {own_, own_.size(), {}}; }
 
 template <class S, class Base, class Row, class ForCheck>
-void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const Base& base,
-                   std::size_t record, Row&& row, ForCheck&& check) const {
-  const Record& r = records_[record];
+void LikelihoodModel::run(const std::vector<model::MechanismValues<S>>& values, const Hypothesis& h, const Base& base,
+                          std::size_t record, Row&& row, ForCheck&& check) const {
+  const PreparedRecording& r = records_[record];
   model::ChosenLaws<S> laws;
   S delay_s(0), lag_s(0), start(r.initial_soc);
   start += base.initial_soc_shift(record);
@@ -266,7 +266,7 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
   model::choose<S>(laws, capacity_change, capacity, cell_.capacity_ah);
   model::choose<S>(laws, current_gain, gain, cell_.capacity_ah);
   const model::CorrectedReadings<S> readings(r.time_s, r.current_a, r.temperature_c, delay_s, lag_s);
-  model::Course<S> course(tables_, cell_.capacity_ah, laws, start);
+  model::OpenLoopSimulation<S> course(tables_, cell_.capacity_ah, laws, start);
   const auto adjust = [&](model::TablePoint<S>& at, const S& soc) { base.adjust(at, soc); };
   for (std::size_t k = 0; k < r.size(); ++k) {
     const double duration_s = k == 0 ? 0 : r.time_s[k] - r.time_s[k - 1];
@@ -289,13 +289,13 @@ void Evidence::run(const std::vector<model::MechanismValues<S>>& values, const H
   }
 }
 
-std::vector<double> Evidence::voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record,
-                                      std::vector<double>* soc) const {
+std::vector<double> LikelihoodModel::voltage(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record,
+                                             std::vector<double>* soc) const {
   return simulate(h, u, record, soc, nullptr);
 }
 
-std::vector<double> Evidence::simulate(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record,
-                                       std::vector<double>* soc, std::vector<double>* checks) const {
+std::vector<double> LikelihoodModel::simulate(const Hypothesis& h, const Eigen::VectorXd& u, std::size_t record,
+                                              std::vector<double>* soc, std::vector<double>* checks) const {
   std::vector<double> v(records_[record].size());
   if (soc != nullptr) soc->resize(v.size());
   std::vector<model::MechanismValues<double>> values;
@@ -313,7 +313,7 @@ std::vector<double> Evidence::simulate(const Hypothesis& h, const Eigen::VectorX
   return v;
 }
 
-Columns Evidence::raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
+Columns LikelihoodModel::raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
   Columns e(static_cast<Eigen::Index>(samples()), 1);
   Eigen::Index row = 0;
   std::vector<double> checks;
@@ -328,15 +328,15 @@ Columns Evidence::raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) co
   return e;
 }
 
-Eigen::VectorXd Evidence::residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
+Eigen::VectorXd LikelihoodModel::residual(const Hypothesis& h, const Eigen::VectorXd& u) const {
   Columns e = raw_residual(h, u);
   whiten(e);
   return e.col(0);
 }
 
-void Evidence::whiten(Columns& columns) const { whiten(columns, whiteners_); }
+void LikelihoodModel::whiten(Columns& columns) const { whiten(columns, whiteners_); }
 
-void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
+void LikelihoodModel::whiten(Columns& columns, const std::vector<Whitener>& by) const {
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < records_.size(); ++r) {
     const auto rows = static_cast<Eigen::Index>(records_[r].size());
@@ -345,7 +345,7 @@ void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
   }
   if (checks_ == 0) return;
   // checks of one voltage channel share its drift: covariance 1 + w w', taken off by (1 + w w')^-1/2
-  for (const Record& r : records_) {
+  for (const PreparedRecording& r : records_) {
     Eigen::VectorXd w = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(r.checks.size()));
     for (std::size_t j = 0; j < r.checks.size(); ++j) {
       if (r.checks[j].channel == Check::Channel::voltage)
@@ -361,8 +361,8 @@ void Evidence::whiten(Columns& columns, const std::vector<Whitener>& by) const {
 }
 
 template <std::size_t Lanes>
-void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::size_t first,
-                      std::size_t here, Columns& columns) const {
+void LikelihoodModel::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const ParameterRef> by,
+                             std::size_t first, std::size_t here, Columns& columns) const {
   using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
   std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
   const std::vector<double> unknowns(u.data(), u.data() + u.size());
@@ -381,7 +381,8 @@ void Evidence::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<c
   }
 }
 
-Columns Evidence::derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const {
+Columns LikelihoodModel::derivatives(const Hypothesis& h, const Eigen::VectorXd& u,
+                                     std::span<const ParameterRef> by) const {
   Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(by.size()));
   if (by.empty()) return columns;
   for (std::size_t first = 0; first < by.size();) {
@@ -398,7 +399,7 @@ Columns Evidence::derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std
 }
 
 template <std::size_t Lanes>
-void Evidence::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const {
+void LikelihoodModel::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const {
   using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
   struct Pull {
     Eigen::Index lever, unknown;
@@ -418,7 +419,7 @@ void Evidence::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& col
   Columns states(static_cast<Eigen::Index>(Lanes - Lever::count), moving), next = states;  // d state / d unknown
   Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    const Record& record = records_[r];
+    const PreparedRecording& record = records_[r];
     states.setZero();
     states(0, static_cast<Eigen::Index>(calibration_.initial_soc_unknown(r)) - still) =
         calibration_.initial_soc_size(r);
@@ -456,12 +457,12 @@ void Evidence::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& col
   }
 }
 
-Columns Evidence::calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const {
+Columns LikelihoodModel::calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const {
   Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(calibration_.size()));
   std::size_t states = 0;
   for (const MechanismSetting& s : h.settings) states += catalogue[s.index].states;
   constexpr std::size_t one_law = Lever::count + model::OneRc<double>::states + 1,
-                        all_laws = Lever::count + model::Course<double>::most_states;
+                        all_laws = Lever::count + model::OpenLoopSimulation<double>::most_states;
   if (states <= 1)
     carry<one_law>(h, u, columns);
   else

@@ -19,7 +19,7 @@
 
 #include "diagnosis/calibration.hpp"
 #include "diagnosis/noise.hpp"
-#include "diagnosis/record.hpp"
+#include "diagnosis/prepared_recording.hpp"
 #include "model/cell_parameters.hpp"
 #include "model/extended.hpp"
 
@@ -29,10 +29,10 @@ using model::mechanism_index;
 using model::MechanismSetting;
 
 /// A parameter that is sought.
-struct Sought {
+struct ParameterRef {
   std::size_t setting = 0;    ///< in the hypothesis
   std::size_t parameter = 0;  ///< of its mechanism
-  bool operator==(const Sought&) const = default;
+  bool operator==(const ParameterRef&) const = default;
 };
 
 struct Hypothesis {
@@ -42,7 +42,7 @@ struct Hypothesis {
 
   std::vector<std::size_t> added() const;  ///< catalogue indices, ascending
   const MechanismSetting* find(std::size_t index) const;
-  std::vector<Sought> sought() const;
+  std::vector<ParameterRef> sought() const;
   std::string name() const;  ///< ids joined by '+', "calibration" when it adds none
 };
 
@@ -52,7 +52,7 @@ Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah);
 Hypothesis with(const Hypothesis& h, const MechanismSetting& setting);
 Hypothesis without(const Hypothesis& h, std::size_t mechanism);
 
-struct Fit {
+struct HypothesisFit {
   Hypothesis hypothesis;        ///< with the values found
   Eigen::VectorXd calibration;  ///< the base parameters' unknowns, in standard deviations
   Eigen::VectorXd residual;     ///< whitened, all records after another
@@ -67,14 +67,14 @@ struct Fit {
 inline constexpr double runaway_v = 1e3;
 
 /// Everything that stays the same from hypothesis to hypothesis.
-class Evidence {
+class LikelihoodModel {
  public:
   /// own: mechanisms of the cell file. Records that are empty or have no voltage: std::invalid_argument.
-  Evidence(const model::CellParameters<>& cell, std::vector<MechanismSetting> own, std::vector<Record> records,
-           const NoiseModel& noise);
+  LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
+                  std::vector<PreparedRecording> records, const NoiseModel& noise);
 
   const model::CellParameters<>& cell() const { return cell_; }
-  const std::vector<Record>& records() const { return records_; }
+  const std::vector<PreparedRecording>& records() const { return records_; }
   const Calibration& calibration() const { return calibration_; }
   const NoiseModel& noise() const { return noise_; }
   /// Rows of a residual: one a reading of every record after another, then one a check of an instrument
@@ -98,7 +98,7 @@ class Evidence {
   /// Measured less predicted, whitened, all records.
   Eigen::VectorXd residual(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// Derivatives of the predicted voltage, whitened: by what is sought, in the parameters' units.
-  Columns derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by) const;
+  Columns derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const ParameterRef> by) const;
   /// By the base parameters' unknowns.
   Columns calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// Measured less predicted, V; 0 where there is no voltage. Checks in their own deviations, as in all columns: they
@@ -114,11 +114,11 @@ class Evidence {
   /// Where the fits that follow find the base parameters' derivatives, until the noise changes; saves each of them its
   /// own.
   void linearise(const Hypothesis& h, const Eigen::VectorXd& u) const;
-  Fit fit(const Hypothesis& start, int iterations = 12) const;
+  HypothesisFit fit(const Hypothesis& start, int iterations = 12) const;
   /// From where another fit ended, e.g. with other noise. Ends early when even a step that keeps all it promises stays
   /// above hopeless.
-  Fit fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations = 12,
-          double hopeless = std::numeric_limits<double>::infinity()) const;
+  HypothesisFit fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations = 12,
+                    double hopeless = std::numeric_limits<double>::infinity()) const;
 
  private:
   struct Linear;  // base parameters' derivatives and their factorised normal matrix
@@ -130,7 +130,7 @@ class Evidence {
                                std::vector<double>* soc, std::vector<double>* checks) const;
   /// Columns first .. first + here, in one run.
   template <std::size_t Lanes>
-  void derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const Sought> by, std::size_t first,
+  void derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const ParameterRef> by, std::size_t first,
               std::size_t here, Columns& columns) const;
   /// By all base parameters, in one run: what each row makes of the states before it and of the levers, carried on from
   /// row to row.
@@ -141,7 +141,7 @@ class Evidence {
   model::CellParameters<> cell_;
   model::Cell<double, model::max_intervals> tables_;
   std::vector<MechanismSetting> own_;
-  std::vector<Record> records_;
+  std::vector<PreparedRecording> records_;
   Calibration calibration_;
   NoiseModel noise_;
   std::vector<Whitener> whiteners_;

@@ -8,7 +8,8 @@ namespace bms::diagnosis {
 
 namespace {
 
-double squared_error(const Evidence& evidence, const Hypothesis& h, const Eigen::VectorXd& u, std::size_t& count) {
+double squared_error(const LikelihoodModel& evidence, const Hypothesis& h, const Eigen::VectorXd& u,
+                     std::size_t& count) {
   double sum = 0;
   count = 0;
   for (std::size_t r = 0; r < evidence.records().size(); ++r) {
@@ -25,7 +26,7 @@ double squared_error(const Evidence& evidence, const Hypothesis& h, const Eigen:
 
 }  // namespace
 
-Contributions contributions(const Evidence& evidence, const Fit& base, const Fit& fit) {
+Contributions contributions(const LikelihoodModel& evidence, const HypothesisFit& base, const HypothesisFit& fit) {
   Contributions c;
   const std::vector<std::size_t> added = fit.hypothesis.added();
   std::size_t count = 0;
@@ -53,7 +54,7 @@ Contributions contributions(const Evidence& evidence, const Fit& base, const Fit
   return c;
 }
 
-std::vector<model::Span> strongest_spans(const Record& r, const std::vector<double>& energy) {
+std::vector<model::Span> strongest_spans(const PreparedRecording& r, const std::vector<double>& energy) {
   std::vector<double> sorted = energy;
   std::sort(sorted.begin(), sorted.end());
   if (sorted.empty() || !(sorted.back() > 0)) return {};
@@ -70,7 +71,8 @@ std::vector<model::Span> strongest_spans(const Record& r, const std::vector<doub
   return spans;
 }
 
-std::vector<Regime> regimes(const Evidence& evidence, const Fit& fit, const std::vector<std::vector<double>>& energy) {
+std::vector<Regime> regimes(const LikelihoodModel& evidence, const HypothesisFit& fit,
+                            const std::vector<std::vector<double>>& energy) {
   struct Axis {
     std::string name;
     std::vector<double> value;
@@ -78,7 +80,7 @@ std::vector<Regime> regimes(const Evidence& evidence, const Fit& fit, const std:
   std::vector<Axis> axes = {{"soc", {}}, {"current_c", {}}, {"temperature_c", {}}, {"since_edge_s", {}}};
   std::vector<double> weight;
   for (std::size_t n = 0; n < energy.size(); ++n) {
-    const Record& r = evidence.records()[n];
+    const PreparedRecording& r = evidence.records()[n];
     std::vector<double> soc;
     evidence.voltage(fit.hypothesis, fit.calibration, n, &soc);
     double known_a = 0, edge_s = r.time_s.front();

@@ -18,14 +18,15 @@ struct Contributions {
   double remaining_rmse_v = 0;              ///< measured less extended, base parameters fitted
 };
 
-Contributions contributions(const Evidence& evidence, const Fit& base, const Fit& fit);
+Contributions contributions(const LikelihoodModel& evidence, const HypothesisFit& base, const HypothesisFit& fit);
 
 /// Where the energy exceeds a twenty-fifth of its largest (a fifth of the amplitude); stretches less than a tenth of
 /// the record apart are one.
-std::vector<model::Span> strongest_spans(const Record& record, const std::vector<double>& energy);
+std::vector<model::Span> strongest_spans(const PreparedRecording& record, const std::vector<double>& energy);
 
 /// Of each axis the narrowest range that holds 70 % of the energy, where that is much narrower than the record; the
 /// sharpest first.
-std::vector<Regime> regimes(const Evidence& evidence, const Fit& fit, const std::vector<std::vector<double>>& energy);
+std::vector<Regime> regimes(const LikelihoodModel& evidence, const HypothesisFit& fit,
+                            const std::vector<std::vector<double>>& energy);
 
 }  // namespace bms::diagnosis

@@ -9,7 +9,7 @@
 
 #include "diagnosis/decision.hpp"
 #include "diagnosis/reference.hpp"
-#include "diagnosis/words.hpp"
+#include "diagnosis/texts.hpp"
 
 namespace bms::diagnosis {
 
@@ -33,7 +33,7 @@ Rival later(std::size_t mechanism, const Fitted& f) {
   for (MechanismSetting& s : r.hypothesis.settings) {
     if (s.index == mechanism_index("ocv_hysteresis")) s.value[3] = 1;  // every design begins charged
   }
-  const std::vector<Sought> sought = f.hypothesis.sought();
+  const std::vector<ParameterRef> sought = f.hypothesis.sought();
   std::vector<Eigen::Index> kept;
   for (std::size_t j = 0; j < sought.size(); ++j) {
     if (r.hypothesis.find(f.hypothesis.settings[sought[j].setting].index) != nullptr)
@@ -72,7 +72,7 @@ double read_a(const model::ChosenLaws<double>& laws, double true_a, double capac
 
 /// A course as a recording of which nothing has been read yet.
 struct Plan {
-  Record record;
+  PreparedRecording record;
   std::vector<experiments::ProfileRow> rows;
 };
 
@@ -82,7 +82,7 @@ Plan planned(const experiments::Experiment& experiment, const model::CellParamet
   options.capacity_ah = capacity_ah;
   options.step_s = step_s;
   Plan p{{}, bms::experiments::experiment(experiment.name, options).value()};
-  Record& r = p.record;
+  PreparedRecording& r = p.record;
   r.initial_soc = experiment.start_soc;
   r.initial_soc_sigma = std::max(cell.tolerance.initial_soc, 1e-4);
   for (const experiments::ProfileRow& row : p.rows) {
@@ -97,8 +97,8 @@ Plan planned(const experiments::Experiment& experiment, const model::CellParamet
 
 /// What the instruments of a hypothesis would read on the course, and trusted ones beside them. within: whether the
 /// cell stays inside its limits.
-Record read_under(const Rival& truth, const Plan& plan, const model::CellParameters<>& cell, bool& within) {
-  Record r = plan.record;
+PreparedRecording read_under(const Rival& truth, const Plan& plan, const model::CellParameters<>& cell, bool& within) {
+  PreparedRecording r = plan.record;
   const std::vector<MechanismSetting>& settings = truth.hypothesis.settings;
   const model::ChosenLaws<double> laws = model::chosen<double>(settings, cell.capacity_ah);
   double known_a = 0, known_read_a = read_a(laws, 0, cell.capacity_ah);
@@ -122,19 +122,20 @@ Record read_under(const Rival& truth, const Plan& plan, const model::CellParamet
     within = within && soc[k] > lowest_soc && soc[k] < highest_soc && volts[k] > cell.limits.voltage_min_v &&
              volts[k] < cell.limits.voltage_max_v;
   }
-  take_references(r, current_ref_a, voltage_ref_v, cell);
+  average_references(r, current_ref_a, voltage_ref_v, cell);
   return r;
 }
 
 /// What a rival still misses of it, by -2 log posterior.
-double missed(const Rival& rival, const Record& seen, const model::CellParameters<>& cell, const NoiseModel& noise) {
-  const Evidence evidence(cell,
-                          std::vector<MechanismSetting>(
-                              rival.hypothesis.settings.begin(),
-                              rival.hypothesis.settings.begin() + static_cast<std::ptrdiff_t>(rival.hypothesis.own)),
-                          {seen}, noise);
+double missed(const Rival& rival, const PreparedRecording& seen, const model::CellParameters<>& cell,
+              const NoiseModel& noise) {
+  const LikelihoodModel evidence(cell,
+                                 std::vector<MechanismSetting>(rival.hypothesis.settings.begin(),
+                                                               rival.hypothesis.settings.begin() +
+                                                                   static_cast<std::ptrdiff_t>(rival.hypothesis.own)),
+                                 {seen}, noise);
   const Eigen::VectorXd none = evidence.unchanged();
-  const std::vector<Sought> sought = rival.hypothesis.sought();
+  const std::vector<ParameterRef> sought = rival.hypothesis.sought();
   const Eigen::VectorXd apart = evidence.residual(rival.hypothesis, none);
   if (apart.squaredNorm() < decision::same) return apart.squaredNorm();  // no more than that
   const Columns base = evidence.calibration_derivatives(rival.hypothesis, none),
@@ -190,7 +191,7 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
              0,
              true};
     bool within = true;
-    std::vector<Record> seen;
+    std::vector<PreparedRecording> seen;
     for (const Rival& truth : set) seen.push_back(read_under(truth, plan, cell, within));
     if (!within) continue;
     // every pair both ways: whoever is right must be found
@@ -233,9 +234,9 @@ std::string_view instruction(const NextExperiment& n) { return experiments::find
 
 std::string why(const NextExperiment& n) {
   std::vector<std::string> others;
-  for (std::size_t k = 1; k < n.separates.size(); ++k) others.emplace_back(words_of(n.separates[k]).name);
-  return fmt::format("To tell {} from {}: {} ({}).", words_of(n.separates.front()).name, listed(others, "and"),
-                     experiments::find_experiment(n.profile)->description, clock_text(n.duration_s));
+  for (std::size_t k = 1; k < n.separates.size(); ++k) others.emplace_back(text_of_mechanism(n.separates[k]).name);
+  return fmt::format("To tell {} from {}: {} ({}).", text_of_mechanism(n.separates.front()).name, joined(others, "and"),
+                     experiments::find_experiment(n.profile)->description, duration_text(n.duration_s));
 }
 
 }  // namespace bms::diagnosis

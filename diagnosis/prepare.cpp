@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "diagnosis/quiet_current.hpp"
+#include "diagnosis/denoise_current.hpp"
 
 namespace bms::diagnosis {
 
@@ -13,10 +13,10 @@ constexpr double least_white = 0.2;
 
 }  // namespace
 
-NoiseModel nominal_noise(const std::vector<Record>& records, const model::CellParameters<>& cell) {
+NoiseModel nominal_noise(const std::vector<PreparedRecording>& records, const model::CellParameters<>& cell) {
   NoiseModel noise;
   noise.white_v = least_white * cell.tolerance.ocv_v;
-  for (const Record& r : records)
+  for (const PreparedRecording& r : records)
     noise.white_v =
         std::max(noise.white_v, white_noise(r.voltage_v, r.current_a, 0.01 * cell.capacity_ah, cell.noise.voltage_v));
   noise.fast_v = std::max(cell.tolerance.ocv_v, 5e-4);
@@ -24,11 +24,12 @@ NoiseModel nominal_noise(const std::vector<Record>& records, const model::CellPa
   return noise;
 }
 
-Evidence evidence_of(const model::CellParameters<>& cell, const std::vector<model::MechanismSetting>& own,
-                     std::vector<Record> records) {
+LikelihoodModel likelihood_model_of(const model::CellParameters<>& cell,
+                                    const std::vector<model::MechanismSetting>& own,
+                                    std::vector<PreparedRecording> records) {
   const NoiseModel noise = nominal_noise(records, cell);
-  for (Record& r : records)
-    r.current_a = quiet_current(r.current_a, std::min(current_noise(r.current_a), 1.5 * cell.noise.current_a));
+  for (PreparedRecording& r : records)
+    r.current_a = denoise_current(r.current_a, std::min(current_noise(r.current_a), 1.5 * cell.noise.current_a));
   return {cell, own, std::move(records), noise};
 }
 

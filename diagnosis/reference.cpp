@@ -38,8 +38,8 @@ std::vector<Stretch> stretches(const std::vector<double>& time_s, std::span<cons
   return all;
 }
 
-void add(Record& r, Check::Channel channel, const std::vector<double>& read, std::span<const double> reference,
-         double still, const model::CellParameters<>& cell) {
+void add(PreparedRecording& r, Check::Channel channel, const std::vector<double>& read,
+         std::span<const double> reference, double still, const model::CellParameters<>& cell) {
   for (const Stretch& s : stretches(r.time_s, reference, still)) {
     const double from_s = r.time_s[s.first] + settling * (r.time_s[s.last] - r.time_s[s.first]);
     Check c;
@@ -67,8 +67,8 @@ double check_deviation(Check::Channel channel, double apart, double readings, co
   return std::sqrt(noise * noise / readings + own * own + unsteady * unsteady * apart * apart);
 }
 
-void take_references(Record& r, std::span<const double> current_ref_a, std::span<const double> voltage_ref_v,
-                     const model::CellParameters<>& cell) {
+void average_references(PreparedRecording& r, std::span<const double> current_ref_a,
+                        std::span<const double> voltage_ref_v, const model::CellParameters<>& cell) {
   add(r, Check::Channel::current, r.current_a, current_ref_a, 0.02 * cell.capacity_ah, cell);
   add(r, Check::Channel::voltage, r.voltage_v, voltage_ref_v, 0.02, cell);
   if (current_ref_a.empty() || voltage_ref_v.empty()) return;

@@ -12,7 +12,7 @@
 
 #include "diagnosis/bursts.hpp"
 #include "diagnosis/decision.hpp"
-#include "diagnosis/left_over.hpp"
+#include "diagnosis/residual_projection.hpp"
 
 namespace bms::diagnosis {
 
@@ -45,11 +45,11 @@ struct Excitation {
   bool temperature = false;
 };
 
-Excitation excitation_of(const Evidence& evidence) {
+Excitation excitation_of(const LikelihoodModel& evidence) {
   Excitation x;
   double low_a = 1e9, high_a = -1e9;
   std::vector<double> steps;
-  for (const Record& r : evidence.records()) {
+  for (const PreparedRecording& r : evidence.records()) {
     double soc = r.initial_soc, known_a = 0;
     x.temperature = x.temperature || !r.temperature_c.empty();
     for (std::size_t k = 0; k < r.size(); ++k) {
@@ -87,16 +87,16 @@ Excitation excitation_of(const Evidence& evidence) {
 }
 
 /// The largest current, where it is reached often enough to show whether the sensor ends there.
-std::optional<double> rail_a(const Evidence& evidence) {
+std::optional<double> rail_a(const LikelihoodModel& evidence) {
   double largest = 0;
-  for (const Record& r : evidence.records()) {
+  for (const PreparedRecording& r : evidence.records()) {
     for (const double a : r.current_a) {
       if (std::isfinite(a)) largest = std::max(largest, std::abs(a));
     }
   }
   if (largest < 0.2 * evidence.cell().capacity_ah) return std::nullopt;
   std::size_t near = 0, runs = 0;
-  for (const Record& r : evidence.records()) {
+  for (const PreparedRecording& r : evidence.records()) {
     bool inside = false;
     for (const double a : r.current_a) {
       const bool now = std::isfinite(a) && std::abs(a) > 0.9 * largest;
@@ -110,7 +110,7 @@ std::optional<double> rail_a(const Evidence& evidence) {
 
 }  // namespace
 
-std::vector<MechanismSetting> probe_settings(const Evidence& evidence, std::size_t mechanism) {
+std::vector<MechanismSetting> probe_settings(const LikelihoodModel& evidence, std::size_t mechanism) {
   const double capacity_ah = evidence.cell().capacity_ah;
   const model::MechanismInfo& info = catalogue[mechanism];
   std::vector<double> shapes = shape_grid(info.id, capacity_ah);
@@ -118,7 +118,7 @@ std::vector<MechanismSetting> probe_settings(const Evidence& evidence, std::size
   if (!shaped) shapes = {0};
   std::vector<MechanismSetting> settings;
   for (const double shape : shapes) {
-    MechanismSetting& setting = settings.emplace_back(model::unsaid(mechanism, capacity_ah));
+    MechanismSetting& setting = settings.emplace_back(model::default_setting(mechanism, capacity_ah));
     for (std::size_t k = 0; k < info.parameters; ++k) {
       const model::Parameter& parameter = info.parameter[k];
       if (parameter.role == Role::shape && shaped) setting.value[k] = shape;
@@ -132,7 +132,8 @@ std::vector<MechanismSetting> probe_settings(const Evidence& evidence, std::size
   return settings;
 }
 
-std::optional<std::string> not_testable(const Evidence& evidence, const Hypothesis& given, std::size_t mechanism) {
+std::optional<std::string> not_testable(const LikelihoodModel& evidence, const Hypothesis& given,
+                                        std::size_t mechanism) {
   const Excitation x = excitation_of(evidence);
   const std::string_view id = catalogue[mechanism].id;
   const double c_rate = evidence.cell().capacity_ah;
@@ -154,7 +155,7 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
   // the same recording, whatever the current: beside each other they would grow without bounds
   const auto trusted = [&] {
     return std::any_of(evidence.records().begin(), evidence.records().end(),
-                       [](const Record& r) { return !r.checks.empty(); });
+                       [](const PreparedRecording& r) { return !r.checks.empty(); });
   };
   for (const auto& [one, other] : {std::pair{"leakage", "current_offset"}, std::pair{"current_offset", "leakage"}}) {
     if (id == one && given.find(mechanism_index(other)) != nullptr && !trusted())
@@ -167,7 +168,7 @@ std::optional<std::string> not_testable(const Evidence& evidence, const Hypothes
   if ((id == "direction_asymmetry" || id == "coulombic_loss") && x.charged_soc < 0.01) return "the cell is not charged";
   if (id == "current_clipping" && !rail_a(evidence)) return "the largest current is reached too seldom";
   if (id == "initial_soc" && std::none_of(evidence.records().begin(), evidence.records().end(),
-                                          [](const Record& r) { return r.initial_soc_told; })) {
+                                          [](const PreparedRecording& r) { return r.initial_soc_given; })) {
     return "no initial state of charge was given";
   }
   if ((id == "capacity_change" || id == "ocv_shape") && x.soc_span < 0.1)
@@ -201,7 +202,7 @@ double Screen::gain_of(const std::vector<Eigen::Index>& columns, Eigen::VectorXd
   return std::max(0.0, b.dot(x));
 }
 
-Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<std::size_t>& over) {
+Screen::Screen(const LikelihoodModel& evidence, const HypothesisFit& around, const std::vector<std::size_t>& over) {
   const double capacity_ah = evidence.cell().capacity_ah;
   const Hypothesis& h = around.hypothesis;
   std::vector<Probe> probes;
@@ -215,7 +216,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     for (const MechanismSetting& setting : probe_settings(evidence, mechanism)) {
       const Hypothesis probe = with(h, setting);
       Probe p;
-      std::vector<Sought> by;
+      std::vector<ParameterRef> by;
       for (std::size_t k = 0; k < info.parameters; ++k) {
         const model::Parameter& parameter = info.parameter[k];
         const bool place = parameter.role == Role::place && info.id == "ocv_hysteresis";
@@ -237,7 +238,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
   const bool wants_step = std::find(over.begin(), over.end(), step) != over.end() && h.find(step) == nullptr &&
                           !not_testable(evidence, h, step);
   if (wants_step) {
-    const Record& r = evidence.records().front();
+    const PreparedRecording& r = evidence.records().front();
     constexpr std::size_t moments = 40;
     Columns steps = Columns::Zero(static_cast<Eigen::Index>(evidence.samples()), moments);
     for (std::size_t m = 0; m < moments; ++m) {
@@ -335,7 +336,7 @@ Screen::Screen(const Evidence& evidence, const Fit& around, const std::vector<st
     Columns column = Columns::Zero(static_cast<Eigen::Index>(evidence.samples()), 1);
     Eigen::Index row = 0;
     for (std::size_t r = 0; r < evidence.records().size(); ++r) {
-      const Record& record = evidence.records()[r];
+      const PreparedRecording& record = evidence.records()[r];
       std::vector<double> e = evidence.voltage(h, around.calibration, r);
       for (std::size_t k = 0; k < e.size(); ++k) e[k] = record.voltage_v[k] - e[k];
       double found_ohm = 0;

@@ -24,15 +24,16 @@ struct Candidate {
 
 /// Settings at which the signature of a testable mechanism is taken: every shape of its grid, strengths just off a
 /// bound at 0.
-std::vector<MechanismSetting> probe_settings(const Evidence& evidence, std::size_t mechanism);
+std::vector<MechanismSetting> probe_settings(const LikelihoodModel& evidence, std::size_t mechanism);
 
 /// Why a mechanism cannot be judged by these recordings beside those given, or nothing.
-std::optional<std::string> not_testable(const Evidence& evidence, const Hypothesis& given, std::size_t mechanism);
+std::optional<std::string> not_testable(const LikelihoodModel& evidence, const Hypothesis& given,
+                                        std::size_t mechanism);
 
 class Screen {
  public:
   /// around: what is there already. over: mechanisms to judge (those in `around` are left out).
-  Screen(const Evidence& evidence, const Fit& around, const std::vector<std::size_t>& over);
+  Screen(const LikelihoodModel& evidence, const HypothesisFit& around, const std::vector<std::size_t>& over);
 
   /// Best first.
   const std::vector<Candidate>& candidates() const { return candidates_; }

@@ -43,13 +43,13 @@ double known_before(double away_k, const Hypothesis& h) {
 }
 
 /// RMS of a raw residual, of the voltages that were read.
-double reading_error_v(const Evidence& evidence, const Columns& raw) {
+double reading_error_v(const LikelihoodModel& evidence, const Columns& raw) {
   return std::sqrt(raw.topRows(static_cast<Eigen::Index>(evidence.readings())).squaredNorm() /
                    static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
 }
 
 /// With the base parameters where a fit has them, but for those that belong to a single recording.
-double lasting_error_v(const Evidence& evidence, const Fit& f) {
+double lasting_error_v(const LikelihoodModel& evidence, const HypothesisFit& f) {
   Eigen::VectorXd u = f.calibration;
   u.tail(u.size() - static_cast<Eigen::Index>(evidence.calibration().shared())).setZero();
   return reading_error_v(evidence, evidence.raw_residual(f.hypothesis, u));
@@ -57,9 +57,9 @@ double lasting_error_v(const Evidence& evidence, const Fit& f) {
 
 }  // namespace
 
-double away_k(const Evidence& evidence) {
+double away_k(const LikelihoodModel& evidence) {
   double away = 0;
-  for (const Record& r : evidence.records()) {
+  for (const PreparedRecording& r : evidence.records()) {
     for (const double c : r.temperature_c) {
       if (std::isfinite(c)) away = std::max(away, std::abs(c - 25));
     }
@@ -67,23 +67,23 @@ double away_k(const Evidence& evidence) {
   return away;
 }
 
-double plain_error_v(const Evidence& evidence, const Hypothesis& h) {
+double plain_error_v(const LikelihoodModel& evidence, const Hypothesis& h) {
   return reading_error_v(evidence, evidence.raw_residual(h, evidence.unchanged()));
 }
 
-double Search::total(const Fit& f) const {
+double Search::total(const HypothesisFit& f) const {
   double cost = 0;
   evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
   return cost + f.cost - f.residual.squaredNorm();
 }
 
-double Search::score(const Fit& f) {
+double Search::score(const HypothesisFit& f) {
   const auto known = totals_.find(f.cost);
   const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
   return sum + price(f.hypothesis) - known_before(away_k_, f.hypothesis);
 }
 
-Fit Search::settled(Fit f) {
+HypothesisFit Search::settled(HypothesisFit f) {
   for (int round = 0; round < 2; ++round) {
     double cost = 0;
     const NoiseModel noise =
@@ -95,18 +95,18 @@ Fit Search::settled(Fit f) {
   return f;
 }
 
-double Search::gain(const Fit& less, const Fit& more) {
+double Search::gain(const HypothesisFit& less, const HypothesisFit& more) {
   return score(less) + known_before(away_k_, less.hypothesis) - score(more) - known_before(away_k_, more.hypothesis);
 }
 
-Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {
+HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, double hopeless) {
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
-  Fit best = evidence_.fit(h, around.calibration, usual_iterations, hopeless);
+  HypothesisFit best = evidence_.fit(h, around.calibration, usual_iterations, hopeless);
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto farther = far_start(h, u);
     if (!farther) continue;
-    Fit other = evidence_.fit(*farther, u, usual_iterations, hopeless);
+    HypothesisFit other = evidence_.fit(*farther, u, usual_iterations, hopeless);
     if (other.cost < best.cost) best = std::move(other);
   }
   if (catalogue[c.mechanism].id == "contact_step") best = refined_onset(best);
@@ -114,7 +114,7 @@ Fit Search::fit_with(const Fit& around, const Candidate& c, double hopeless) {
   return best;
 }
 
-std::array<Eigen::VectorXd, 2> Search::far_bases(const Fit& around) const {
+std::array<Eigen::VectorXd, 2> Search::far_bases(const HypothesisFit& around) const {
   return {around.calibration, evidence_.unchanged()};
 }
 
@@ -132,7 +132,7 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
     tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
   else if (id == "current_offset" || id == "leakage") {
     double hours = 0;
-    for (const Record& r : evidence_.records()) hours += r.duration_s() / 3'600;
+    for (const PreparedRecording& r : evidence_.records()) hours += r.duration_s() / 3'600;
     const double per_soc_a = evidence_.cell().capacity_ah / std::max(hours, 0.1),
                  most_a = catalogue[s.index].parameter[0].upper(evidence_.cell().capacity_ah);
     for (const double soc : {-0.12, -0.06, -0.03, 0.03, 0.06, 0.12}) {
@@ -157,7 +157,7 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
   return best;
 }
 
-bool Search::far_better(const Fit& around, const Candidate& c) {
+bool Search::far_better(const HypothesisFit& around, const Candidate& c) {
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto far = far_start(with(around.hypothesis, c.start), u);
     if (far && evidence_.residual(*far, u).squaredNorm() <
@@ -167,9 +167,9 @@ bool Search::far_better(const Fit& around, const Candidate& c) {
   return false;
 }
 
-Fit Search::refined_onset(Fit best) {
-  const Record& r = evidence_.records().front();
-  const auto setting = [](Fit& f) -> MechanismSetting& {
+HypothesisFit Search::refined_onset(HypothesisFit best) {
+  const PreparedRecording& r = evidence_.records().front();
+  const auto setting = [](HypothesisFit& f) -> MechanismSetting& {
     return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(),
                          [](const MechanismSetting& s) { return s.index == mechanism_index("contact_step"); });
   };
@@ -203,34 +203,35 @@ bool Search::alike(const NoiseModel& a, const NoiseModel& b) {
   return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
 }
 
-std::vector<Fit> Search::one_more(const Fit& around, const std::vector<std::size_t>& over) {
+std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const std::vector<std::size_t>& over) {
   // by the nominal noise, which asks for everything to be explained, and by that of what is left, which asks for the
   // large first
-  std::vector<Fit> fits;
+  std::vector<HypothesisFit> fits;
   std::set<std::size_t> tried;
   for (const NoiseModel& noise : {nominal_, around.noise}) {
     if (!fits.empty() && alike(noise, nominal_)) break;
     evidence_.set_noise(noise);
-    const Fit from = noise == around.noise ? around : evidence_.fit(around.hypothesis, around.calibration, 5);
+    const HypothesisFit from = noise == around.noise ? around : evidence_.fit(around.hypothesis, around.calibration, 5);
     const Screen screen(evidence_, from, over);
     std::vector<Candidate> worth;
     for (const Candidate& c : screen.candidates()) {
       if (c.gain < decision::worth_a_fit ? !far_better(from, c) : worth.size() >= decision::most_fits) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
-    const std::vector<Fit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
+    const std::vector<HypothesisFit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
     fits.insert(fits.end(), here.begin(), here.end());
   }
-  std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return score(a) < score(b); });
+  std::stable_sort(fits.begin(), fits.end(),
+                   [&](const HypothesisFit& a, const HypothesisFit& b) { return score(a) < score(b); });
   return fits;
 }
 
-std::vector<Fit> Search::in_place_of(std::size_t m, const Fit& best, const Fit& less,
-                                     const std::vector<std::size_t>& over, double gain_of_m,
-                                     std::map<std::size_t, double>& likeness) {
+std::vector<HypothesisFit> Search::in_place_of(std::size_t m, const HypothesisFit& best, const HypothesisFit& less,
+                                               const std::vector<std::size_t>& over, double gain_of_m,
+                                               std::map<std::size_t, double>& likeness) {
   // they must stand up to the noise that the best leaves
   evidence_.set_noise(best.noise);
-  const Fit from = evidence_.fit(less.hypothesis, less.calibration, 5);
+  const HypothesisFit from = evidence_.fit(less.hypothesis, less.calibration, 5);
   const Screen screen(evidence_, from, over);
   const auto& all = screen.candidates();
   std::vector<Candidate> worth;
@@ -244,26 +245,28 @@ std::vector<Fit> Search::in_place_of(std::size_t m, const Fit& best, const Fit& 
   return fitted(from, worth, best.cost + decision::hopeless);
 }
 
-std::vector<Fit> Search::fitted(const Fit& around, const std::vector<Candidate>& candidates, double hopeless) {
-  std::vector<Fit> fits;
+std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
+                                          double hopeless) {
+  std::vector<HypothesisFit> fits;
   if (!around.hypothesis.added().empty()) evidence_.linearise(around.hypothesis, around.calibration);
   for (const Candidate& c : candidates) {
     fits.push_back(fit_with(around, c, hopeless));
   }
-  std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const HypothesisFit& a, const HypothesisFit& b) { return a.cost < b.cost; });
   for (std::size_t k = 0; k < fits.size() && k < 3; ++k) {
     if (fits[k].cost < hopeless) fits[k] = settled(fits[k]);
   }
   return fits;
 }
 
-bool Search::carries(const Fit& before, const Fit& f) const {
+bool Search::carries(const HypothesisFit& before, const HypothesisFit& f) const {
   if (f.hypothesis.added().size() < 2) return true;
   const double was_v = std::min(lasting_error_v(evidence_, before), plain_error_v(evidence_, evidence_.base()));
   return lasting_error_v(evidence_, f) <= decision::may_grow * was_v + 3e-4;
 }
 
-Fit Search::without_one(const Fit& f, std::size_t m) {
+HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t m) {
   evidence_.set_noise(f.noise);
   return settled(evidence_.fit(without(f.hypothesis, m), f.calibration, 8));
 }

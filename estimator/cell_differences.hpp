@@ -19,7 +19,7 @@
 #include <cstdint>
 
 #include "estimator/ud_covariance.hpp"
-#include "estimator/voltage_doubt.hpp"
+#include "estimator/voltage_uncertainty.hpp"
 #include "model/cell.hpp"
 
 namespace bms::estimator {
@@ -33,29 +33,31 @@ class CellDifference {
   using Coupling = arithmetic::Coupling<S>;
 
  public:
-  static constexpr double first_soc = 0.05,
-                          first_resistance = 0.1;  ///< one sigma between cells of a pack that nobody has measured
-  static constexpr double of_charge = 0.02;        ///< cells differ in capacity by that: of all soc that moves
+  static constexpr double initial_soc_sigma = 0.05,
+                          initial_resistance_sigma =
+                              0.1;                 ///< one sigma between cells of a pack that nobody has measured
+  static constexpr double capacity_spread = 0.02;  ///< cells differ in capacity by that: of all soc that moves
 
   constexpr CellDifference() {
-    covariance_.set_diagonal({Variance(first_resistance * first_resistance), Variance(first_soc * first_soc)});
+    covariance_.set_diagonal({Variance(initial_resistance_sigma * initial_resistance_sigma),
+                              Variance(initial_soc_sigma * initial_soc_sigma)});
   }
 
   /// From what is known before.
   constexpr void begin(const Soc& soc, const Soc& sigma) {
     soc_ = soc;
-    covariance_.set_diagonal({Variance(first_resistance * first_resistance), Variance(sigma * sigma)});
+    covariance_.set_diagonal({Variance(initial_resistance_sigma * initial_resistance_sigma), Variance(sigma * sigma)});
   }
 
   /// moved: how far soc of the mean has moved since the last call.
   constexpr void predict(const Soc& moved) {
     // the same way until the current turns: deviations add, (sigma + d)^2 - sigma^2, linear in d
-    const Soc d = Soc(arithmetic::magnitude(moved) * Fraction(of_charge)),
+    const Soc d = Soc(arithmetic::magnitude(moved) * Fraction(capacity_spread)),
               sigma = arithmetic::root<Soc>(covariance_.template variance<1>());
-    covariance_.widen_last(Variance(Variance((sigma + sigma) * d) + Variance(d * d)));
+    covariance_.add_noise_to_last(Variance(Variance((sigma + sigma) * d) + Variance(d * d)));
   }
   /// Of what all differences share, which is the mean's.
-  constexpr void centre(const Soc& shared) { soc_ = Soc(soc_ - shared); }
+  constexpr void remove_mean(const Soc& common) { soc_ = Soc(soc_ - common); }
   /// off_v: this cell's voltage less the mean, less what the OCV curve says of the difference; slope: at this cell;
   /// drop_v: over R0 and R1; noise_v2: of off_v.
   constexpr void correct(const Voltage& off_v, const arithmetic::VoltagePerSoc<S>& slope, const Voltage& drop_v,
@@ -83,30 +85,31 @@ class CellDifferences {
 
  public:
   /// What one sample of the pack says.
-  struct Seen {
+  struct Observation {
     std::array<Voltage, Cells> voltage_v{};
     std::array<bool, Cells> usable{};
   };
 
-  /// soc, sigma: of the mean cell; moved: how far it has moved since the last call; shared_by: samples that share one
-  /// error of the model (its correlation time over the step).
+  /// soc, sigma: of the mean cell; moved: how far it has moved since the last call; correlated_samples: samples that
+  /// share one error of the model (its correlation time over the step).
   template <class Cell>
   constexpr void step(const Cell& cell, const Soc& soc, const Soc& sigma, const arithmetic::Current<S>& current_a,
-                      const Soc& moved, const arithmetic::Count<S>& shared_by, const Seen& seen) {
+                      const Soc& moved, const arithmetic::Count<S>& correlated_samples,
+                      const Observation& observation) {
     arithmetic::Current<S> sum_v(0), sum_above_v(0), sum_soc(0);
     int count = 0;
     for (std::size_t k = 0; k < Cells; ++k) {
-      if (seen.usable[k]) sum_v = arithmetic::Current<S>(sum_v + seen.voltage_v[k]), ++count;
-      difference_[k].centre(shared_);
+      if (observation.usable[k]) sum_v = arithmetic::Current<S>(sum_v + observation.voltage_v[k]), ++count;
+      difference_[k].remove_mean(common_);
       difference_[k].predict(moved);
     }
     if (count < 2) return;
     const Voltage mean_v = arithmetic::ratio<Voltage>(sum_v, arithmetic::Current<S>(count));
     const auto at = look_up(cell, soc, interval_);
     const auto slope = ocv_slope<S>(at);
-    const Voltage drop_v = settled_drop_v<S>(at, current_a);
+    const Voltage drop_v = steady_state_drop_v<S>(at, current_a);
     for (std::size_t k = 0; k < Cells; ++k) {
-      if (!seen.usable[k]) continue;
+      if (!observation.usable[k]) continue;
       std::uint8_t interval = interval_;
       const auto here = look_up(cell, Soc(soc + difference_[k].soc()), interval);
       const auto slope_here = ocv_slope<S>(here);
@@ -117,13 +120,13 @@ class CellDifferences {
       const Voltage knee_v = Voltage(arithmetic::VoltagePerSoc<S>(slope_here - slope) * sigma);
       const Variance own_v2 = Variance(Variance(here.error_v2 * arithmetic::Fraction<S>(10.0 / 16)) + knee_v * knee_v);
       const Variance noise_v2 = Variance(Variance(cell.noise.voltage_v2 + cell.noise.voltage_v2) +
-                                         arithmetic::product<Variance>(own_v2, shared_by));
-      difference_[k].correct(Voltage((seen.voltage_v[k] - mean_v) - Voltage(above_v - mean_above_v_)), slope_here,
-                             drop_v, noise_v2);
+                                         arithmetic::product<Variance>(own_v2, correlated_samples));
+      difference_[k].correct(Voltage((observation.voltage_v[k] - mean_v) - Voltage(above_v - mean_above_v_)),
+                             slope_here, drop_v, noise_v2);
     }
     for (const CellDifference<S>& d : difference_) sum_soc = arithmetic::Current<S>(sum_soc + d.soc());
     mean_above_v_ = arithmetic::ratio<Voltage>(sum_above_v, arithmetic::Current<S>(count));
-    shared_ = Soc(sum_soc * arithmetic::Fraction<S>(1.0 / Cells));
+    common_ = Soc(sum_soc * arithmetic::Fraction<S>(1.0 / Cells));
   }
 
   constexpr void begin(std::size_t k, const Soc& soc, const Soc& sigma) { difference_[k].begin(soc, sigma); }
@@ -132,7 +135,7 @@ class CellDifferences {
  private:
   std::array<CellDifference<S>, Cells> difference_;
   Voltage mean_above_v_{};  ///< mean of the cells' OCVs less the OCV of their mean, in the sample before
-  Soc shared_{};
+  Soc common_{};
   std::uint8_t interval_ = 0;
 };
 

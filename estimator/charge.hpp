@@ -21,10 +21,10 @@ namespace charge_ranges {
 
 using namespace model;
 inline constexpr double largest_uaus = accepted::capacity_ah.high * 3'600e12;
-static_assert(most_soc * largest_uaus + most_soc * largest_uaus < 0x1p63, "full, and corrected as far as it can be");
-static_assert(most_soc * largest_uaus + 0x1p31 * longest_count_us < 0x1p63,
+static_assert(max_soc * largest_uaus + max_soc * largest_uaus < 0x1p63, "full, and corrected as far as it can be");
+static_assert(max_soc * largest_uaus + 0x1p31 * longest_count_us < 0x1p63,
               "full, and the largest current for as long as can be counted at once");
-static_assert(most_soc * 0x1p29 < 0x1p31, "read in counts");
+static_assert(max_soc * 0x1p29 < 0x1p31, "read in counts");
 static_assert(accepted::capacity_ah.low * 3'600e12 / 0x1p32 > 5'000,
               "the upper half tells the smallest cell's soc to a five-thousandth");
 
@@ -47,13 +47,13 @@ class Charge {
   /// current_ua: not below -2^31 + 1; duration_us: at most longest_count_us.
   constexpr void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
     uaus_ += arithmetic::wide_product(current_ua, static_cast<std::int32_t>(duration_us));
-    hold(scale);
+    limit_soc(scale);
   }
 
   /// Moves soc by delta, to the nearest count.
   constexpr void correct(const Soc& delta, const Scale& scale) {
     uaus_ += static_cast<std::int64_t>(to_counts(delta, scale)) << scale.shift;
-    hold(scale);
+    limit_soc(scale);
   }
 
   constexpr Soc soc(const Scale& scale) const {
@@ -67,12 +67,12 @@ class Charge {
 
  private:
   static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
-    const Soc most(model::most_soc);
-    const Soc held = delta > most ? most : delta < -most ? -most : delta;
+    const Soc most(model::max_soc);
+    const Soc clamped = delta > most ? most : delta < -most ? -most : delta;
     if constexpr (arithmetic::is_q<Soc>) {
-      return Soc(held * scale.counts_per_soc).raw();
+      return Soc(clamped * scale.counts_per_soc).raw();
     } else {
-      return static_cast<std::int32_t>(held * scale.counts_per_soc + half_signed(held));
+      return static_cast<std::int32_t>(clamped * scale.counts_per_soc + half_signed(clamped));
     }
   }
 
@@ -85,7 +85,7 @@ class Charge {
       return __builtin_copysign(0.5, x);
   }
 
-  constexpr void hold(const Scale& scale) {
+  constexpr void limit_soc(const Scale& scale) {
     // the upper half tells, to less than a five-thousandth of the smallest cell
     const auto upper = static_cast<std::uint32_t>(uaus_ >> 32),
                lowest = static_cast<std::uint32_t>(scale.lowest_uaus >> 32);

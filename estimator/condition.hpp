@@ -32,33 +32,33 @@ class Condition {
     started_ = true;
     time_us_ = sample.time_us;
     const auto& laws = laws_of(cell);
-    const auto& x = state.polarisation;
+    const auto& x = state.model_state;
     constexpr std::uint32_t unmeasured = current_missing | current_implausible,
-                            unread = voltage_missing | voltage_implausible | voltage_stuck | voltage_disbelieved |
-                                     not_started;
+                            unread =
+                                voltage_missing | voltage_implausible | voltage_stuck | voltage_rejected | not_started;
     const bool measured = (estimate.flags & unmeasured) == 0 && sample.current_ua != measurement::no_reading;
     const Current<S> current_a = measured ? Current<S>(laws.true_current(Model::without_offset(
                                                 from_micro<Current<S>>(sample.current_ua), x, cell.noise)))
                                           : Current<S>(0);
-    const Drive<S> drive{current_a, seconds<S>(step_us),
-                         measurement::temperature_possible(sample.temperature_cdegc)
-                             ? laws.true_temperature(from_centi<Temperature<S>>(sample.temperature_cdegc))
-                             : Temperature<S>(25)};
-    const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, estimate.soc, interval_);
+    const StepInput<S> input{current_a, seconds<S>(step_us),
+                             measurement::temperature_possible(sample.temperature_cdegc)
+                                 ? laws.true_temperature(from_centi<Temperature<S>>(sample.temperature_cdegc))
+                                 : Temperature<S>(25)};
+    const auto at = look_up(OperatingPoint{cell, input, Model::mechanism_states(x)}, estimate.soc, interval_);
     const Rate<S> per_s = current_a * cell.limits.soc_per_as;
-    const Soc<S> counted = drive.duration_s * per_s;
+    const Soc<S> counted = input.duration_s * per_s;
 
-    now_ = quality_.update(estimate, at, drive, counted, step_us / 1'000, cell.noise.resistance_error);
-    if ((estimate.flags & not_started) == 0) shown_ = display_.show(estimate.soc, counted, drive.duration_s);
-    see_health(cell, at, drive, sample, estimate, counted, measured && (estimate.flags & unread) == 0);
-    if (limits_wanted && (!limited_ || sample.time_us - limited_us_ >= limits_every_us)) {
-      limited_ = true;
+    soc_quality_ = quality_.update(estimate, at, input, counted, step_us / 1'000, cell.noise.resistance_error);
+    if ((estimate.flags & not_started) == 0) display_soc_ = display_.update(estimate.soc, counted, input.duration_s);
+    update_health(cell, at, input, sample, estimate, counted, measured && (estimate.flags & unread) == 0);
+    if (limits_wanted && (!limits_known_ || sample.time_us - limited_us_ >= limits_every_us)) {
+      limits_known_ = true;
       limited_us_ = sample.time_us;
       const Voltage<S> margin_v = root<Voltage<S>>(at.error_v2),
                        most_v = (cell.limits.voltage_max_v - cell.limits.voltage_min_v) * Fraction<S>(0.125);
       const Voltage<S> held_v = margin_v < most_v ? margin_v : most_v;
       const auto limits = [&](int duration_s) __attribute__((noinline)) {
-        return current_limits<Model>(cell, x, estimate.soc, estimate.soc_sigma, drive.temperature_c,
+        return current_limits<Model>(cell, x, estimate.soc, estimate.soc_sigma, input.temperature_c,
                                      TimeStep<S>(duration_s), held_v);
       };
       limits_now_ = limits(1);
@@ -66,9 +66,9 @@ class Condition {
     }
   }
 
-  constexpr const typename SocQuality<S>::Now& quality() const { return now_; }
-  constexpr const arithmetic::Soc<S>& display_soc() const { return shown_; }
-  constexpr bool limits_known() const { return limited_; }                      ///< whether they have been reckoned
+  constexpr const typename SocQuality<S>::Result& quality() const { return soc_quality_; }
+  constexpr const arithmetic::Soc<S>& display_soc() const { return display_soc_; }
+  constexpr bool limits_known() const { return limits_known_; }                 ///< whether they have been reckoned
   constexpr const CurrentLimits<S>& limits_now() const { return limits_now_; }  ///< for a second
   constexpr const CurrentLimits<S>& limits_10s() const { return limits_10s_; }
   constexpr Health<S> capacity() const { return capacity_.health(); }
@@ -84,39 +84,39 @@ class Condition {
   }
 
   template <class Cell>
-  constexpr void see_health(const Cell& cell, const model::TablePoint<S>& at, const model::Drive<S>& drive,
-                            const measurement::Sample& sample, const Estimate<S>& estimate,
-                            const arithmetic::Soc<S>& counted, bool good) {
+  constexpr void update_health(const Cell& cell, const model::TablePoint<S>& at, const model::StepInput<S>& input,
+                               const measurement::Sample& sample, const Estimate<S>& estimate,
+                               const arithmetic::Soc<S>& counted, bool good) {
     using namespace model;
     Soc<S> off(0);
-    Variance<S> told2(1);
+    Variance<S> voltage_soc_variance(1);
     if (good) {
       const Voltage<S> innovation_v = from_micro<Voltage<S>>(sample.voltage_uv) - estimate.voltage_predicted_v;
-      resistance_.see(innovation_v, Voltage<S>(at.r0_ohm * drive.current_a), cell.noise.voltage_v2);
-      if (now_.observable) {
+      resistance_.update(innovation_v, Voltage<S>(at.r0_ohm * input.current_a), cell.noise.voltage_v2);
+      if (soc_quality_.observable) {
         const VoltagePerSoc<S> slope = ocv_slope<S>(at);
-        const Variance<S> doubt_v2 =
-            Variance<S>(at.error_v2 + drop_doubt_v2<S>(at, drive.current_a, cell.noise.resistance_error));
+        const Variance<S> variance_v2 =
+            Variance<S>(at.error_v2 + drop_variance_v2<S>(at, input.current_a, cell.noise.resistance_error));
         off = ratio<Soc<S>>(innovation_v, slope);
-        told2 = ratio<Variance<S>>(ratio<Variance<S>>(doubt_v2, slope), slope);
+        voltage_soc_variance = ratio<Variance<S>>(ratio<Variance<S>>(variance_v2, slope), slope);
       }
     } else {
       resistance_.interrupt();
     }
-    capacity_.see(estimate.soc, off, told2, good && now_.observable, counted,
-                  product<Variance<S>>(cell.noise.walk_soc2_per_s, drive.duration_s));
+    capacity_.update(estimate.soc, off, voltage_soc_variance, good && soc_quality_.observable, counted,
+                     product<Variance<S>>(cell.noise.walk_soc2_per_s, input.duration_s));
   }
 
   SocQuality<S> quality_;
-  typename SocQuality<S>::Now now_;
+  typename SocQuality<S>::Result soc_quality_;
   DisplaySoc<S> display_;
-  arithmetic::Soc<S> shown_{};
+  arithmetic::Soc<S> display_soc_{};
   CurrentLimits<S> limits_now_, limits_10s_;
   CapacityHealth<S> capacity_;
   ResistanceHealth<S> resistance_;
   std::uint64_t time_us_ = 0, limited_us_ = 0;
   std::uint8_t interval_ = 0;
-  bool started_ = false, limited_ = false;
+  bool started_ = false, limits_known_ = false;
 };
 
 }  // namespace bms::estimator

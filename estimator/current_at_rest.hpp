@@ -13,27 +13,28 @@ namespace bms::estimator {
 
 class CurrentAtRest {
  public:
-  static constexpr std::uint32_t begins_us = 60'000'000;
-  static constexpr std::uint32_t lasts_s = 600;  ///< what flows in a rest is the same for so long: it is told once
+  static constexpr std::uint32_t min_rest_us = 60'000'000;
+  static constexpr std::uint32_t correlation_s =
+      600;  ///< what flows in a rest is the same for so long: it is told once
 
   /// With every measured current; true: it rests.
-  constexpr bool rests(std::int32_t current_ua, std::uint64_t step_us, const model::RestingCurrent& limits) {
+  constexpr bool is_at_rest(std::int32_t current_ua, std::uint64_t step_us, const model::RestingCurrent& limits) {
     const bool small = current_ua <= limits.largest_ua && current_ua >= -limits.largest_ua;
-    const bool still =
-        small && for_us_ != 0 && current_ua - began_ua_ <= limits.still_ua && began_ua_ - current_ua <= limits.still_ua;
+    const bool still = small && rest_us_ != 0 && current_ua - start_ua_ <= limits.still_ua &&
+                       start_ua_ - current_ua <= limits.still_ua;
     if (!still) {
-      began_ua_ = current_ua;
-      for_us_ = small ? 1 : 0;
+      start_ua_ = current_ua;
+      rest_us_ = small ? 1 : 0;
       return false;
     }
-    if (for_us_ < begins_us) for_us_ += step_us < begins_us ? static_cast<std::uint32_t>(step_us) : begins_us;
-    return for_us_ >= begins_us;
+    if (rest_us_ < min_rest_us) rest_us_ += step_us < min_rest_us ? static_cast<std::uint32_t>(step_us) : min_rest_us;
+    return rest_us_ >= min_rest_us;
   }
-  constexpr void moves() { for_us_ = 0; }
+  constexpr void reset() { rest_us_ = 0; }
 
  private:
-  std::int32_t began_ua_ = 0;
-  std::uint32_t for_us_ = 0;  ///< 0: it moves
+  std::int32_t start_ua_ = 0;
+  std::uint32_t rest_us_ = 0;  ///< 0: it moves
 };
 
 }  // namespace bms::estimator

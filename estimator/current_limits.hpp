@@ -23,7 +23,7 @@ struct CurrentLimits {
 /// lower, what is charged from the higher. duration_s: how long the current lasts, above 0. margin_v: by how much less
 /// than the limits the voltage may reach, e.g. one standard deviation of the model's error.
 template <class Model, class Cell, class S = typename Cell::Scalar>
-constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model::Polarisation& x,
+constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model::State& x,
                                           const arithmetic::Soc<S>& soc, const arithmetic::Soc<S>& off,
                                           const arithmetic::Temperature<S>& temperature_c,
                                           const arithmetic::TimeStep<S>& duration_s,
@@ -33,13 +33,13 @@ constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model
   const auto& laws = laws_of(cell);
   std::uint8_t interval = 0;
   const auto voltage_after = [&](const Current<S>& current_a) {
-    const Drive<S> drive{current_a, duration_s, temperature_c};
+    const StepInput<S> input{current_a, duration_s, temperature_c};
     const Rate<S> per_s = current_a * cell.limits.soc_per_as;
     const Soc<S> start = current_a < Current<S>(0) ? Soc<S>(soc - off) : Soc<S>(soc + off);
     const Soc<S> end = start + duration_s * per_s;
-    const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, end, interval);
+    const auto at = look_up(OperatingPoint{cell, input, Model::mechanism_states(x)}, end, interval);
     return Voltage<S>(
-        Model::voltage(laws, Model::advance(x, at, Model::settling(laws, x, at, drive), drive), at, drive));
+        Model::voltage(laws, Model::advance(x, at, Model::discretise(laws, x, at, input), input), at, input));
   };
   /// The largest current of that sign, up to most, that is good; 0 where none is.
   const auto largest = [&](const Current<S>& most_a, const auto& good) {

@@ -15,28 +15,29 @@ class DisplaySoc {
   using Soc = arithmetic::Soc<S>;
 
  public:
-  static constexpr double calm_per_s = 0.005 / 60, hasty_per_s = 10 * calm_per_s;  ///< soc
-  static constexpr double nearly_empty = 0.1;
+  static constexpr double slow_rate_per_s = 0.005 / 60, fast_rate_per_s = 10 * slow_rate_per_s;  ///< soc
+  static constexpr double low_soc = 0.1;
 
   /// soc: the estimate; counted: how far the charge has moved it since the last call; step_s: time since then.
-  constexpr Soc show(const Soc& soc, const Soc& counted, const arithmetic::TimeStep<S>& step_s) {
-    const Soc held = soc > Soc(1) ? Soc(1) : soc < Soc(0) ? Soc(0) : soc;
+  constexpr Soc update(const Soc& soc, const Soc& counted, const arithmetic::TimeStep<S>& step_s) {
+    const Soc clamped = soc > Soc(1) ? Soc(1) : soc < Soc(0) ? Soc(0) : soc;
     if (!started_) {
       started_ = true;
-      return shown_ = held;
+      return display_soc_ = clamped;
     }
-    shown_ = Soc(shown_ + counted);
-    const arithmetic::Rate<S> pace =
-        held < Soc(nearly_empty) && held < shown_ ? arithmetic::Rate<S>(hasty_per_s) : arithmetic::Rate<S>(calm_per_s);
-    const Soc most = Soc(pace * step_s), off = Soc(held - shown_);
-    shown_ = off > most ? Soc(shown_ + most) : off < -most ? Soc(shown_ - most) : held;
-    if (shown_ > Soc(1)) shown_ = Soc(1);
-    if (shown_ < Soc(0)) shown_ = Soc(0);
-    return shown_;
+    display_soc_ = Soc(display_soc_ + counted);
+    const arithmetic::Rate<S> pace = clamped < Soc(low_soc) && clamped < display_soc_
+                                         ? arithmetic::Rate<S>(fast_rate_per_s)
+                                         : arithmetic::Rate<S>(slow_rate_per_s);
+    const Soc most = Soc(pace * step_s), off = Soc(clamped - display_soc_);
+    display_soc_ = off > most ? Soc(display_soc_ + most) : off < -most ? Soc(display_soc_ - most) : clamped;
+    if (display_soc_ > Soc(1)) display_soc_ = Soc(1);
+    if (display_soc_ < Soc(0)) display_soc_ = Soc(0);
+    return display_soc_;
   }
 
  private:
-  Soc shown_{};
+  Soc display_soc_{};
   bool started_ = false;
 };
 

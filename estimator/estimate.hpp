@@ -17,11 +17,11 @@ enum Flag : std::uint32_t {
   voltage_stuck = 1U << 2,        ///< the same reading while the model moves
   current_missing = 1U << 3,
   current_implausible = 1U << 4,
-  time_gap = 1U << 5,        ///< more than ten times the usual step: charge in between is uncertain
-  time_not_later = 1U << 6,  ///< the sample was ignored
-  not_started = 1U << 8,     ///< no usable voltage yet and no starting point
-  soc_unsettled = 1U << 9,   ///< more than one state of charge fits the voltages so far; soc_sigma spans them
-  voltage_disbelieved =
+  time_gap = 1U << 5,             ///< more than ten times the usual step: charge in between is uncertain
+  time_not_increasing = 1U << 6,  ///< the sample was ignored
+  not_started = 1U << 8,          ///< no usable voltage yet and no starting point
+  soc_ambiguous = 1U << 9,        ///< more than one state of charge fits the voltages so far; soc_sigma spans them
+  voltage_rejected =
       1U << 10,  ///< far from all that the model can explain: not used; when it lasts, soc is sought anew
 };
 
@@ -39,7 +39,7 @@ struct Estimate {
 /// deviation; then the mechanisms' states.
 template <class S, std::size_t N>
 struct ExtendedEstimate : Estimate<S> {
-  std::array<arithmetic::Voltage<S>, N> further{};
+  std::array<arithmetic::Voltage<S>, N> extra{};
 };
 
 /// Number of 32-bit words of an estimate, and their names in that order: the unit of comparison between host and board.
@@ -70,7 +70,7 @@ constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEsti
   std::array<std::uint32_t, estimate_words + N> all{};
   const EstimateWords first = words(static_cast<const Estimate<S>&>(e));
   for (std::size_t k = 0; k < estimate_words; ++k) all[k] = first[k];
-  for (std::size_t k = 0; k < N; ++k) all[estimate_words + k] = word(e.further[k]);
+  for (std::size_t k = 0; k < N; ++k) all[estimate_words + k] = word(e.extra[k]);
   return all;
 }
 
@@ -79,7 +79,7 @@ constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEsti
 class EstimateHash {
  public:
   template <std::size_t N>
-  constexpr void take(const std::array<std::uint32_t, N>& words) {
+  constexpr void add(const std::array<std::uint32_t, N>& words) {
     for (const std::uint32_t w : words) {
       for (unsigned shift = 0; shift < 32; shift += 8) value_ = (value_ ^ (w >> shift & 0xFF)) * 16'777'619U;
     }

@@ -32,30 +32,30 @@ class CapacityHealth {
   using Fraction = arithmetic::Fraction<S>;
 
  public:
-  static constexpr double unknown = 0.1;  ///< one sigma of a cell nobody has measured
-  static constexpr double floor = 0.003;
+  static constexpr double initial_sigma = 0.1;  ///< one sigma of a cell nobody has measured
+  static constexpr double min_sigma = 0.003;
   static constexpr double known_soc = 0.02;      ///< voltages that tell soc no better are left out
-  static constexpr double least_moved = 0.3;     ///< of the capacity, between two visits
-  static constexpr double longest_visit = 0.05;  ///< of the capacity
-  static constexpr std::uint16_t least_readings = 10;
+  static constexpr double min_moved_soc = 0.3;   ///< of the capacity, between two visits
+  static constexpr double max_visit_soc = 0.05;  ///< of the capacity
+  static constexpr std::uint16_t min_readings = 10;
 
   /// One reading. soc: as estimated; off: by how much its voltage alone says otherwise, along the slope there;
   /// variance: of that; usable: whether it may be asked; counted: how far the charge moved soc since the last call,
   /// lost2: variance of that.
-  constexpr void see(const Soc& soc, const Soc& off, const Variance& variance, bool usable, const Soc& counted,
-                     const Variance& lost2) {
+  constexpr void update(const Soc& soc, const Soc& off, const Variance& variance, bool usable, const Soc& counted,
+                        const Variance& lost2) {
     moved_ = Soc(moved_ + counted);
     if (reference_.readings > 0) reference_.variance = Variance(reference_.variance + lost2);
     // farther away the slope is another
     const bool good =
         usable && variance < Variance(known_soc * known_soc) && arithmetic::magnitude(off) < Soc(known_soc);
-    const Soc told = Soc(soc + off);
-    if (here_.readings > 0 && (!good || arithmetic::magnitude(Soc(moved_ - begun_)) > Soc(longest_visit))) leave();
+    const Soc voltage_soc = Soc(soc + off);
+    if (here_.readings > 0 && (!good || arithmetic::magnitude(Soc(moved_ - begun_)) > Soc(max_visit_soc))) end_visit();
     if (!good) return;
     if (here_.readings == 0) begun_ = moved_;
     if (here_.readings < 0x7FFF) ++here_.readings;
     const Fraction share = arithmetic::ratio<Fraction>(arithmetic::Count<S>(1), arithmetic::Count<S>(here_.readings));
-    here_.told = Soc(here_.told + Soc(told - here_.told) * share);
+    here_.voltage_soc = Soc(here_.voltage_soc + Soc(voltage_soc - here_.voltage_soc) * share);
     here_.moved = Soc(here_.moved + Soc(moved_ - here_.moved) * share);
     here_.variance =
         Variance(here_.variance + arithmetic::product<Variance>(Variance(variance - here_.variance), share));
@@ -65,33 +65,34 @@ class CapacityHealth {
 
  private:
   struct Visit {
-    Soc told{}, moved{};
+    Soc voltage_soc{}, moved{};
     Variance variance{};
     std::uint16_t readings = 0;
   };
 
-  constexpr void leave() {
+  constexpr void end_visit() {
     const Visit visit = here_;
     here_ = {};
-    if (visit.readings < least_readings) return;
-    if (reference_.readings == 0) return refer_to(visit);
-    const Soc moved = Soc(visit.moved - reference_.moved), apart = Soc(visit.told - reference_.told);
-    if (arithmetic::magnitude(moved) < Soc(least_moved) || arithmetic::magnitude(apart) < Soc(least_moved / 2)) {
-      if (visit.variance < reference_.variance) refer_to(visit);
+    if (visit.readings < min_readings) return;
+    if (reference_.readings == 0) return set_reference(visit);
+    const Soc moved = Soc(visit.moved - reference_.moved), apart = Soc(visit.voltage_soc - reference_.voltage_soc);
+    if (arithmetic::magnitude(moved) < Soc(min_moved_soc) || arithmetic::magnitude(apart) < Soc(min_moved_soc / 2)) {
+      if (visit.variance < reference_.variance) set_reference(visit);
       return;
     }
-    const auto seen = arithmetic::ratio<arithmetic::Factor<S>>(moved, apart);
+    const auto measured_ratio = arithmetic::ratio<arithmetic::Factor<S>>(moved, apart);
     const auto relative =
         arithmetic::ratio<Fraction>(Variance(visit.variance + reference_.variance), Variance(apart * apart));
-    const Variance seen2 = arithmetic::product<Variance>(Variance(seen * seen), relative);
-    const auto gain = arithmetic::ratio<Fraction>(variance_, Variance(variance_ + seen2));
-    ratio_ = arithmetic::Factor<S>(ratio_ + arithmetic::Factor<S>(seen - ratio_) * gain);
+    const Variance measured_variance =
+        arithmetic::product<Variance>(Variance(measured_ratio * measured_ratio), relative);
+    const auto gain = arithmetic::ratio<Fraction>(variance_, Variance(variance_ + measured_variance));
+    ratio_ = arithmetic::Factor<S>(ratio_ + arithmetic::Factor<S>(measured_ratio - ratio_) * gain);
     variance_ = Variance(variance_ - arithmetic::product<Variance>(variance_, gain));
-    const auto least = Variance(floor * floor);
+    const auto least = Variance(min_sigma * min_sigma);
     if (variance_ < least) variance_ = least;
-    refer_to(visit);
+    set_reference(visit);
   }
-  constexpr void refer_to(const Visit& visit) {
+  constexpr void set_reference(const Visit& visit) {
     reference_ = visit;
     // only differences count: they stay small
     moved_ = Soc(moved_ - visit.moved);
@@ -102,7 +103,7 @@ class CapacityHealth {
   Visit here_, reference_;
   Soc moved_{}, begun_{};
   arithmetic::Factor<S> ratio_{1};
-  Variance variance_ = Variance(unknown * unknown);
+  Variance variance_ = Variance(initial_sigma * initial_sigma);
 };
 
 template <class S>
@@ -113,28 +114,29 @@ class ResistanceHealth {
   using Soc = arithmetic::Soc<S>;
 
  public:
-  static constexpr double unknown = 0.3;  ///< one sigma
-  static constexpr double floor = 0.01;
-  static constexpr double of_an_edge = 0.05;  ///< what the tables are wrong by at any one soc and temperature
-  static constexpr double least_edge_v = 0.003;
+  static constexpr double initial_sigma = 0.3;  ///< one sigma
+  static constexpr double min_sigma = 0.01;
+  static constexpr double table_sigma = 0.05;  ///< what the tables are wrong by at any one soc and temperature
+  static constexpr double min_edge_v = 0.003;
 
   /// A reading one step after the last one. innovation_v: measured less predicted; drop_v: what falls off over R0 and
   /// what of R1's has built up within the step, as the model has it; reading_v2: variance of a reading.
-  constexpr void see(const Voltage& innovation_v, const Voltage& drop_v, const Variance& reading_v2) {
+  constexpr void update(const Voltage& innovation_v, const Voltage& drop_v, const Variance& reading_v2) {
     const Voltage more_v = innovation_v - innovation_v_, edge_v = drop_v - drop_v_;
-    const bool edge = follows_ && arithmetic::magnitude(edge_v) > Voltage(least_edge_v);
+    const bool edge = follows_ && arithmetic::magnitude(edge_v) > Voltage(min_edge_v);
     innovation_v_ = innovation_v;
     drop_v_ = drop_v;
     follows_ = true;
     if (!edge) return;
-    const auto seen = arithmetic::ratio<arithmetic::Factor<S>>(more_v, edge_v);
-    const auto tables = Variance(of_an_edge * of_an_edge);
+    const auto measured_ratio = arithmetic::ratio<arithmetic::Factor<S>>(more_v, edge_v);
+    const auto tables = Variance(table_sigma * table_sigma);
     const Variance edge_v2 = edge_v * edge_v;
-    const Variance seen2 = Variance(tables + arithmetic::ratio<Variance>(Variance(reading_v2 + reading_v2), edge_v2));
-    const auto gain = arithmetic::ratio<Fraction>(variance_, Variance(variance_ + seen2));
-    more_ = arithmetic::Factor<S>(more_ + arithmetic::Factor<S>(seen - more_) * gain);
+    const Variance measured_variance =
+        Variance(tables + arithmetic::ratio<Variance>(Variance(reading_v2 + reading_v2), edge_v2));
+    const auto gain = arithmetic::ratio<Fraction>(variance_, Variance(variance_ + measured_variance));
+    more_ = arithmetic::Factor<S>(more_ + arithmetic::Factor<S>(measured_ratio - more_) * gain);
     variance_ = Variance(variance_ - arithmetic::product<Variance>(variance_, gain));
-    const auto least = Variance(floor * floor);
+    const auto least = Variance(min_sigma * min_sigma);
     if (variance_ < least) variance_ = least;
   }
   /// The next reading does not follow the last one: a gap, or no voltage.
@@ -147,7 +149,7 @@ class ResistanceHealth {
  private:
   Voltage innovation_v_{}, drop_v_{};
   arithmetic::Factor<S> more_{0};
-  Variance variance_ = Variance(unknown * unknown);
+  Variance variance_ = Variance(initial_sigma * initial_sigma);
   bool follows_ = false;
 };
 

@@ -21,7 +21,7 @@
 namespace bms::estimator {
 
 /// A current to count with, and whether it was measured.
-struct BelievedCurrent {
+struct AcceptedCurrent {
   std::int32_t ua;
   bool measured;
 };
@@ -33,7 +33,8 @@ class InputCheck {
   static constexpr std::uint32_t gap_factor = 10;
   static constexpr double stuck_move_v = 0.02;  // far above any ADC's step, below any load's effect
 
-  constexpr BelievedCurrent current(std::int32_t current_ua, const model::Plausible& plausible, std::uint32_t& flags) {
+  constexpr AcceptedCurrent current(std::int32_t current_ua, const model::PlausibleRange& plausible,
+                                    std::uint32_t& flags) {
     if (within(current_ua, -plausible.current_max_ua, plausible.current_max_ua)) [[likely]] {
       current_ua_ = current_ua;
       return {current_ua, true};
@@ -44,26 +45,26 @@ class InputCheck {
 
   /// drop_v: R0 times the present current, which a live reading follows.
   constexpr bool voltage_usable(std::int32_t voltage_uv, const arithmetic::Voltage<S>& drop_v,
-                                const model::Plausible& plausible, std::uint32_t& flags) {
+                                const model::PlausibleRange& plausible, std::uint32_t& flags) {
     if (!voltage_present(voltage_uv, plausible, flags)) return false;
     if (voltage_uv != voltage_uv_) {
       voltage_uv_ = voltage_uv;
       repeats_ = 0;
-      drop_then_v_ = drop_v;
+      drop_at_change_v_ = drop_v;
       return true;
     }
     if (repeats_ < stuck_after) {
       ++repeats_;
       return true;
     }
-    const arithmetic::Voltage<S> moved_v = drop_v - drop_then_v_;
+    const arithmetic::Voltage<S> moved_v = drop_v - drop_at_change_v_;
     const auto limit_v = arithmetic::Voltage<S>(stuck_move_v);
     if (moved_v > limit_v || moved_v < -limit_v) repeats_ = stuck;
     if (repeats_ == stuck) flags |= voltage_stuck;
     return repeats_ != stuck;
   }
 
-  static constexpr bool voltage_present(std::int32_t voltage_uv, const model::Plausible& plausible,
+  static constexpr bool voltage_present(std::int32_t voltage_uv, const model::PlausibleRange& plausible,
                                         std::uint32_t& flags) {
     if (within(voltage_uv, plausible.voltage_min_uv, plausible.voltage_max_uv)) [[likely]]
       return true;
@@ -100,7 +101,7 @@ class InputCheck {
   std::uint32_t usual_step_us_ = 0;
   std::int32_t current_ua_ = 0;
   std::int32_t voltage_uv_ = measurement::no_reading;
-  arithmetic::Voltage<S> drop_then_v_{};
+  arithmetic::Voltage<S> drop_at_change_v_{};
   std::uint8_t repeats_ = 0;  // of the same voltage; or `stuck`
 };
 

@@ -19,20 +19,21 @@
 
 namespace bms::estimator {
 
-constexpr bool readable(std::int32_t uv, const model::Plausible& plausible) {
+constexpr bool is_plausible(std::int32_t uv, const model::PlausibleRange& plausible) {
   return uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv;
 }
 
-inline constexpr std::int32_t far_off_uv = 300'000;      ///< from the middle cell: no cell of the same pack
-inline constexpr std::int32_t counted_off_uv = 100'000;  ///< as much of it counts
+inline constexpr std::int32_t outlier_uv = 300'000;        ///< from the middle cell: no cell of the same pack
+inline constexpr std::int32_t max_deviation_uv = 100'000;  ///< as much of it counts
 
 /// The middle one of those that can be read; of an even number, the lower. measurement::no_reading: there is none.
 template <std::size_t Cells>
-constexpr std::int32_t middle_cell_uv(const measurement::PackSample<Cells>& pack, const model::Plausible& plausible) {
+constexpr std::int32_t median_cell_uv(const measurement::PackSample<Cells>& pack,
+                                      const model::PlausibleRange& plausible) {
   std::array<std::int32_t, Cells> sorted{};
   std::size_t count = 0;
   for (const std::int32_t uv : pack.cell_uv) {
-    if (!readable(uv, plausible)) continue;
+    if (!is_plausible(uv, plausible)) continue;
     std::size_t k = count++;
     for (; k > 0 && sorted[k - 1] > uv; --k) sorted[k] = sorted[k - 1];
     sorted[k] = uv;
@@ -41,17 +42,18 @@ constexpr std::int32_t middle_cell_uv(const measurement::PackSample<Cells>& pack
 }
 
 template <std::size_t Cells>
-constexpr measurement::Sample mean_cell(const measurement::PackSample<Cells>& pack, const model::Plausible& plausible) {
+constexpr measurement::Sample mean_cell(const measurement::PackSample<Cells>& pack,
+                                        const model::PlausibleRange& plausible) {
   measurement::Sample mean{pack.time_us, pack.current_ua, measurement::no_reading, measurement::no_temperature};
   std::int32_t sum_uv = 0, cells = 0, sum_cdegc = 0,
                sensors = 0;  // plausible is below 6 V: 16 of them are far from the end
-  const std::int32_t middle_uv = middle_cell_uv(pack, plausible);
+  const std::int32_t median_uv = median_cell_uv(pack, plausible);
   for (const std::int32_t uv : pack.cell_uv) {
-    const std::int32_t off_uv = readable(uv, plausible) ? uv - middle_uv : far_off_uv;
-    if (off_uv >= far_off_uv || off_uv <= -far_off_uv) continue;
-    sum_uv += middle_uv + (off_uv > counted_off_uv    ? counted_off_uv
-                           : off_uv < -counted_off_uv ? -counted_off_uv
-                                                      : off_uv);
+    const std::int32_t off_uv = is_plausible(uv, plausible) ? uv - median_uv : outlier_uv;
+    if (off_uv >= outlier_uv || off_uv <= -outlier_uv) continue;
+    sum_uv += median_uv + (off_uv > max_deviation_uv    ? max_deviation_uv
+                           : off_uv < -max_deviation_uv ? -max_deviation_uv
+                                                        : off_uv);
     ++cells;
   }
   for (const std::int16_t cdegc : pack.temperature_cdegc) {
@@ -68,7 +70,7 @@ constexpr measurement::Sample mean_cell(const measurement::PackSample<Cells>& pa
 }
 
 /// A pack of one cell as it is measured without a monitor.
-constexpr measurement::PackSample<1> pack_of(const measurement::Sample& s) {
+constexpr measurement::PackSample<1> single_cell_pack(const measurement::Sample& s) {
   measurement::PackSample<1> pack;
   pack.time_us = s.time_us;
   pack.current_ua = s.current_ua;
@@ -85,7 +87,7 @@ class PackCells {
   template <class Cell>
   constexpr void update(const Cell& cell, const measurement::PackSample<Cells>& pack, const Estimate<S>& mean) {
     using namespace model;
-    if ((mean.flags & (not_started | time_not_later)) != 0) return;
+    if ((mean.flags & (not_started | time_not_increasing)) != 0) return;
     const std::uint64_t step_us = pack.time_us - time_us_;
     time_us_ = pack.time_us;
     const Soc<S> moved = started_ ? Soc<S>(mean.soc - soc_) : Soc<S>(0);
@@ -94,18 +96,18 @@ class PackCells {
       started_ = true;
       return;
     }
-    typename CellDifferences<S, Cells>::Seen seen;
+    typename CellDifferences<S, Cells>::Observation observation;
     for (std::size_t k = 0; k < Cells; ++k) {
-      seen.usable[k] = readable(pack.cell_uv[k], cell.plausible);
-      if (seen.usable[k]) seen.voltage_v[k] = from_micro<Voltage<S>>(pack.cell_uv[k]);
+      observation.usable[k] = is_plausible(pack.cell_uv[k], cell.plausible);
+      if (observation.usable[k]) observation.voltage_v[k] = from_micro<Voltage<S>>(pack.cell_uv[k]);
     }
     constexpr std::uint32_t unmeasured = current_missing | current_implausible;
     const Current<S> current_a =
         (mean.flags & unmeasured) == 0 ? from_micro<Current<S>>(pack.current_ua) : Current<S>(0);
-    const auto shared_by =
+    const auto correlated_samples =
         ratio<Count<S>>(cell.noise.model_correlation_s, seconds<S>(static_cast<std::uint32_t>(step_us)));
     differences_.step(cell, mean.soc, mean.soc_sigma, current_a, moved,
-                      shared_by > Count<S>(1) ? shared_by : Count<S>(1), seen);
+                      correlated_samples > Count<S>(1) ? correlated_samples : Count<S>(1), observation);
   }
 
   /// What is known of a cell from before: soc less the mean's, and how far to believe it.

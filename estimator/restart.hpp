@@ -21,17 +21,19 @@ struct StoredEstimate {
   constexpr bool operator==(const StoredEstimate&) const = default;
 };
 
-inline constexpr std::int32_t lost_ppb_per_day = 2'000'000;
+inline constexpr std::int32_t self_discharge_ppb_per_day = 2'000'000;
 // Where no clock ran on, it may have been a night or a winter, a night mostly: what a week loses, give or take a
 // month's.
-inline constexpr std::uint32_t usual_off_s = 7U * 86'400, doubted_off_s = 30U * 86'400;
+inline constexpr std::uint32_t assumed_off_s = 7U * 86'400, assumed_off_sigma_s = 30U * 86'400;
 
 /// off_s: how long the power was away; nothing: nobody knows.
-constexpr measurement::StartingPoint resumed(const StoredEstimate& stored, std::optional<std::uint32_t> off_s) {
-  const std::int64_t lost = std::int64_t{lost_ppb_per_day} * off_s.value_or(usual_off_s) / 86'400,
-                     doubted = std::int64_t{lost_ppb_per_day} * off_s.value_or(doubted_off_s) / 86'400;
+constexpr measurement::StartingPoint starting_point_after_off_time(const StoredEstimate& stored,
+                                                                   std::optional<std::uint32_t> off_s) {
+  const std::int64_t lost = std::int64_t{self_discharge_ppb_per_day} * off_s.value_or(assumed_off_s) / 86'400,
+                     sigma_growth =
+                         std::int64_t{self_discharge_ppb_per_day} * off_s.value_or(assumed_off_sigma_s) / 86'400;
   // standard deviations add: what is lost goes on in one direction
-  const std::int64_t sigma = stored.soc_sigma_ppb + doubted, soc = stored.soc_ppb - lost;
+  const std::int64_t sigma = stored.soc_sigma_ppb + sigma_growth, soc = stored.soc_ppb - lost;
   constexpr std::int64_t widest = 289'000'000;  // anything from 0 to 1
   return {static_cast<std::int32_t>(soc > 0 ? soc : 0), static_cast<std::int32_t>(sigma < widest ? sigma : widest)};
 }

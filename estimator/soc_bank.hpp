@@ -37,68 +37,68 @@ class SocBank {
 
  public:
   static constexpr int points = 64;
-  static constexpr double narrow_soc = 0.025;  ///< one sigma, below which a line through the curve does as well
-  static constexpr double wide_soc = 0.03;     ///< and above which it does not
+  static constexpr double close_below_sigma = 0.025;  ///< one sigma, below which a line through the curve does as well
+  static constexpr double open_above_sigma = 0.03;    ///< and above which it does not
 
   constexpr bool open() const { return open_; }
   constexpr void close() { open_ = false; }
 
-  /// Begins. misfit(soc): what speaks against it so far, >= 0. mean: where the filter now has soc. lasting_v2: of the
-  /// model's error.
+  /// Begins. misfit(soc): what speaks against it so far, >= 0. mean: where the filter now has soc. persistent_variance:
+  /// of the model's error.
   template <class F>
-  constexpr void open_at(const Soc& mean, const Variance& lasting_v2, F&& misfit) {
+  constexpr void open_at(const Soc& mean, const Variance& persistent_variance, F&& misfit) {
     open_ = true;
     turn_ = 0;
     mean_ = mean;
     bias_v_ = {};
-    bias_v2_ = lasting_v2;
-    gained_ = Sum(0);
+    bias_v2_ = persistent_variance;
+    gain_sum_ = Sum(0);
     least_ = Misfit(2'000);
     for (int k = 0; k < points; ++k) {
-      misfit_[static_cast<std::size_t>(k)] = held(Misfit(misfit(grid(k))));
+      misfit_[static_cast<std::size_t>(k)] = clamped(Misfit(misfit(grid(k))));
       if (misfit_[static_cast<std::size_t>(k)] < least_) least_ = misfit_[static_cast<std::size_t>(k)];
     }
   }
 
   /// What a voltage says to one hypothesis.
-  struct Seen {
+  struct Observation {
     Voltage off_v;    ///< measured less expected
     Voltage half_v;   ///< half a step of the grid on the curve
     Variance new_v2;  ///< variance of what is new in every correlation time
   };
-  struct News {
-    bool any = false;
+  struct BankUpdate {
+    bool ready = false;
     Soc moved{};  ///< the mean, by
     Variance variance{};
   };
 
   /// One sample. soc: where the filter has it, mean and what was counted since; share: of a correlation time that
-  /// passes in 2 points samples, 1.9 at most; white_v2: of the reading; lasting_v2 as above, forgotten in
-  /// model::lasting_error_lasts correlation times; seen(soc_k): Seen.
+  /// passes in 2 points samples, 1.9 at most; white_v2: of the reading; persistent_variance as above, forgotten in
+  /// model::persistent_error_correlations correlation times; seen(soc_k): Seen.
   template <class F>
-  constexpr News step(const Soc& soc, const Fraction& share, const Variance& white_v2, const Variance& lasting_v2,
-                      F&& seen) {
+  constexpr BankUpdate step(const Soc& soc, const Fraction& share, const Variance& white_v2,
+                            const Variance& persistent_variance, F&& observation) {
     const auto k = static_cast<std::size_t>(turn_ % points);
     if (turn_ < points)
-      compare(k, share, white_v2, seen(Soc(grid(static_cast<int>(k)) + (soc - mean_))));
+      update_misfit(k, share, white_v2, observation(Soc(grid(static_cast<int>(k)) + (soc - mean_))));
     else
-      weigh(k);
+      accumulate_moments(k);
     if (++turn_ < 2 * points) return {};
     turn_ = 0;
     // what the biases have been told, and have forgotten
-    const Fraction forgotten = forgotten_in(share), told = Fraction(gained_ * Fraction(1.0 / points));
-    bias_v2_ = Variance(bias_v2_ - arithmetic::product<Variance>(bias_v2_, told));
+    const Fraction decayed = decay_in(share), mean_gain = Fraction(gain_sum_ * Fraction(1.0 / points));
+    bias_v2_ = Variance(bias_v2_ - arithmetic::product<Variance>(bias_v2_, mean_gain));
     bias_v2_ = Variance(bias_v2_ + arithmetic::product<Variance>(
-                                       arithmetic::product<Variance>(Variance(lasting_v2 - bias_v2_), forgotten),
-                                       Fraction(Fraction(2) - forgotten)));
-    gained_ = Sum(0);
+                                       arithmetic::product<Variance>(Variance(persistent_variance - bias_v2_), decayed),
+                                       Fraction(Fraction(2) - decayed)));
+    gain_sum_ = Sum(0);
     const Soc mean = arithmetic::ratio<Soc>(first_, weights_);
     const Fraction step(1.0 / points);
     const Variance finest = Variance(Variance(step * step) * Fraction(1.0 / 12));
-    News news{true, Soc(mean - mean_), Variance(arithmetic::ratio<Soc>(second_, weights_) - mean * mean)};
-    news.variance = news.variance < Variance(0) ? finest : Variance(news.variance + finest);
+    BankUpdate bank_update{true, Soc(mean - mean_), Variance(arithmetic::ratio<Soc>(second_, weights_) - mean * mean)};
+    bank_update.variance = bank_update.variance < Variance(0) ? finest : Variance(bank_update.variance + finest);
     mean_ = mean;
-    return news;
+    return bank_update;
   }
 
   static constexpr Soc grid(int k) { return Soc(arithmetic::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }
@@ -106,10 +106,10 @@ class SocBank {
  private:
   static constexpr int most = 4;  ///< that one comparison may add to a misfit
 
-  static constexpr Misfit held(const Misfit& m) { return m > Misfit(200) ? Misfit(200) : m; }
+  static constexpr Misfit clamped(const Misfit& m) { return m > Misfit(200) ? Misfit(200) : m; }
 
-  static constexpr Fraction forgotten_in(const Fraction& share) {
-    return share * Fraction(1.0 / model::lasting_error_lasts);
+  static constexpr Fraction decay_in(const Fraction& share) {
+    return share * Fraction(1.0 / model::persistent_error_correlations);
   }
 
   /// ln(v2 / 1 mV^2) / 2, 0 below that; straight lines between powers of four, within 0.06.
@@ -125,34 +125,36 @@ class SocBank {
                      : sum;
   }
 
-  constexpr void compare(std::size_t k, const Fraction& share, const Variance& white_v2, const Seen& seen) {
+  constexpr void update_misfit(std::size_t k, const Fraction& share, const Variance& white_v2,
+                               const Observation& observation) {
     if (k == 0) next_least_ = Misfit(2'000);
-    bias_v_[k] = Voltage(bias_v_[k] - bias_v_[k] * forgotten_in(share));
-    const Voltage off_v = seen.off_v - bias_v_[k];
-    const Voltage beyond_v = off_v > seen.half_v    ? Voltage(off_v - seen.half_v)
-                             : off_v < -seen.half_v ? Voltage(off_v + seen.half_v)
-                                                    : Voltage(0);
-    const Variance noise_v2 =
-        Variance(white_v2 + (share < Fraction(1) ? arithmetic::ratio<Variance>(seen.new_v2, share) : seen.new_v2));
+    bias_v_[k] = Voltage(bias_v_[k] - bias_v_[k] * decay_in(share));
+    const Voltage off_v = observation.off_v - bias_v_[k];
+    const Voltage beyond_v = off_v > observation.half_v    ? Voltage(off_v - observation.half_v)
+                             : off_v < -observation.half_v ? Voltage(off_v + observation.half_v)
+                                                           : Voltage(0);
+    const Variance noise_v2 = Variance(
+        white_v2 + (share < Fraction(1) ? arithmetic::ratio<Variance>(observation.new_v2, share) : observation.new_v2));
     const Variance all_v2 = Variance(bias_v2_ + noise_v2);
     const auto squares = arithmetic::ratio<Exponent>(Variance(beyond_v * beyond_v), Variance(all_v2 + all_v2));
     const auto gain = arithmetic::ratio<Fraction>(bias_v2_, all_v2);
     const bool far = squares > Exponent(most);  // as much may be one bad reading
     if (!far) bias_v_[k] = Voltage(bias_v_[k] + gain * beyond_v);
-    gained_ = Sum(gained_ + gain);
+    gain_sum_ = Sum(gain_sum_ + gain);
     const Misfit width =
-        Misfit(half_log(Variance(white_v2 + seen.new_v2)) * (share < Fraction(1) ? share : Fraction(1)));
-    misfit_[k] = held(Misfit(Misfit(Misfit(misfit_[k] - least_) + width) + (far ? Misfit(most) : Misfit(squares))));
+        Misfit(half_log(Variance(white_v2 + observation.new_v2)) * (share < Fraction(1) ? share : Fraction(1)));
+    misfit_[k] = clamped(Misfit(Misfit(Misfit(misfit_[k] - least_) + width) + (far ? Misfit(most) : Misfit(squares))));
     if (misfit_[k] < next_least_) next_least_ = misfit_[k];
   }
 
-  constexpr void weigh(std::size_t k) {
+  constexpr void accumulate_moments(std::size_t k) {
     if (k == 0) {
       weights_ = first_ = second_ = Variance{};
       least_ = next_least_;
     }
     const Fraction spacing(1.0 / points);
-    const Fraction weight = (Fraction(1) - arithmetic::settled<S>(Exponent(Misfit(misfit_[k] - least_)))) * spacing;
+    const Fraction weight =
+        (Fraction(1) - arithmetic::step_response<S>(Exponent(Misfit(misfit_[k] - least_)))) * spacing;
     const Fraction moment = weight * grid(static_cast<int>(k));
     weights_ = Variance(weights_ + weight);
     first_ = Variance(first_ + moment);
@@ -162,7 +164,7 @@ class SocBank {
   std::array<Misfit, points> misfit_{};
   std::array<Voltage, points> bias_v_{};
   Variance bias_v2_{};
-  Sum gained_{};
+  Sum gain_sum_{};
   Misfit least_{}, next_least_{};
   Variance weights_{}, first_{}, second_{};
   Soc mean_{};

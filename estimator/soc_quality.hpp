@@ -11,7 +11,7 @@
 #include <cstdint>
 
 #include "estimator/estimate.hpp"
-#include "estimator/voltage_doubt.hpp"
+#include "estimator/voltage_uncertainty.hpp"
 #include "model/extended_rc.hpp"
 
 namespace bms::estimator {
@@ -23,41 +23,41 @@ class SocQuality {
  public:
   static constexpr double known_soc = 0.02;
 
-  struct Now {
+  struct Result {
     bool observable = false;
-    std::uint32_t bridged_s = 0;  ///< since the last anchor; since the start where there was none
-    Soc bridged_soc{};            ///< charge moved since, either way, in capacities; 7 at most
+    std::uint32_t since_anchor_s = 0;  ///< since the last anchor; since the start where there was none
+    Soc since_anchor_soc{};            ///< charge moved since, either way, in capacities; 7 at most
   };
 
   /// at: what the tables say at the estimate's soc under drive. counted: how far the charge moved soc since the last
   /// call.
-  constexpr Now update(const Estimate<S>& estimate, const model::TablePoint<S>& at, const model::Drive<S>& drive,
-                       const Soc& counted, std::uint32_t step_ms, const arithmetic::Fraction<S>& resistance_error) {
+  constexpr Result update(const Estimate<S>& estimate, const model::TablePoint<S>& at, const model::StepInput<S>& input,
+                          const Soc& counted, std::uint32_t step_ms, const arithmetic::Fraction<S>& resistance_error) {
     using namespace model;
     const Voltage<S> moves_v = ocv_slope<S>(at) * Fraction<S>(known_soc);
-    const Variance<S> doubt_v2 = drop_doubt_v2<S>(at, drive.current_a, resistance_error);
-    now_.observable =
-        Variance<S>(moves_v * moves_v) > Variance<S>(at.error_v2 + doubt_v2) && (estimate.flags & not_now) == 0;
-    if (now_.observable && estimate.soc_sigma < Soc(known_soc)) {
-      now_.bridged_s = 0;
-      left_ms_ = 0;
-      now_.bridged_soc = Soc(0);
-      return now_;
+    const Variance<S> resistance_v2 = drop_variance_v2<S>(at, input.current_a, resistance_error);
+    result_.observable = Variance<S>(moves_v * moves_v) > Variance<S>(at.error_v2 + resistance_v2) &&
+                         (estimate.flags & unobservable_flags) == 0;
+    if (result_.observable && estimate.soc_sigma < Soc(known_soc)) {
+      result_.since_anchor_s = 0;
+      remainder_ms_ = 0;
+      result_.since_anchor_soc = Soc(0);
+      return result_;
     }
-    left_ms_ += step_ms;
-    now_.bridged_s += left_ms_ / 1'000;
-    left_ms_ %= 1'000;
-    const Soc sum = Soc(now_.bridged_soc + magnitude(counted));
-    now_.bridged_soc = sum > Soc(7) ? Soc(7) : sum;
-    return now_;
+    remainder_ms_ += step_ms;
+    result_.since_anchor_s += remainder_ms_ / 1'000;
+    remainder_ms_ %= 1'000;
+    const Soc sum = Soc(result_.since_anchor_soc + magnitude(counted));
+    result_.since_anchor_soc = sum > Soc(7) ? Soc(7) : sum;
+    return result_;
   }
 
  private:
-  static constexpr std::uint32_t not_now =
-      voltage_missing | voltage_implausible | voltage_stuck | not_started | soc_unsettled | voltage_disbelieved;
+  static constexpr std::uint32_t unobservable_flags =
+      voltage_missing | voltage_implausible | voltage_stuck | not_started | soc_ambiguous | voltage_rejected;
 
-  Now now_;
-  std::uint32_t left_ms_ = 0;
+  Result result_;
+  std::uint32_t remainder_ms_ = 0;
 };
 
 }  // namespace bms::estimator

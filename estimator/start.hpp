@@ -10,14 +10,14 @@
 
 #include <cstddef>
 
-#include "estimator/voltage_doubt.hpp"
+#include "estimator/voltage_uncertainty.hpp"
 #include "model/one_rc.hpp"
 
 namespace bms::estimator {
 
 /// A state of charge and how sure it is.
 template <class S>
-struct SocBelief {
+struct SocDistribution {
   arithmetic::Soc<S> soc;
   arithmetic::Variance<S> variance;
 };
@@ -30,7 +30,7 @@ struct StartMisfit {
   const Cell& cell;
   const arithmetic::Voltage<S>* ocv_v;  ///< the reading; nullptr: none
   arithmetic::Variance<S> variance_v2;  ///< of it
-  const SocBelief<S>* before;           ///< nullptr: none; else with a deviation of at least two points' spacing
+  const SocDistribution<S>* before;     ///< nullptr: none; else with a deviation of at least two points' spacing
 
   /// half_step: half the spacing of the points that it is asked for.
   constexpr arithmetic::Exponent<S> operator()(const arithmetic::Soc<S>& soc, const arithmetic::Fraction<S>& half_step,
@@ -56,7 +56,7 @@ struct StartMisfit {
 
 /// Mean and variance of soc.
 template <class S, class Cell>
-constexpr SocBelief<S> soc_from(const StartMisfit<S, Cell>& speaks_against) {
+constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell>& speaks_against) {
   using namespace model;
   constexpr int points = start_points;
   const Fraction<S> spacing(1.0 / points), half_step(0.5 / points);
@@ -71,14 +71,14 @@ constexpr SocBelief<S> soc_from(const StartMisfit<S, Cell>& speaks_against) {
   }
   Variance<S> weights{}, first{}, second{};  // the widest type: sums of 256 weights of at most 1/256
   for (int k = 0; k < points; ++k) {
-    const Fraction<S> weight = (Fraction<S>(1) - settled<S>(Exponent<S>(misfit(k) - least))) * spacing;
+    const Fraction<S> weight = (Fraction<S>(1) - step_response<S>(Exponent<S>(misfit(k) - least))) * spacing;
     weights = Variance<S>(weights + weight);
     first = Variance<S>(first + weight * point(k));
   }
   const Soc<S> mean = ratio<Soc<S>>(first, weights);
   for (int k = 0; k < points; ++k) {
     const Soc<S> off = point(k) - mean;
-    const Fraction<S> weight = (Fraction<S>(1) - settled<S>(Exponent<S>(misfit(k) - least))) * spacing;
+    const Fraction<S> weight = (Fraction<S>(1) - step_response<S>(Exponent<S>(misfit(k) - least))) * spacing;
     second = Variance<S>(second + weight * Fraction<S>(off * off));
   }
   // the points' own spacing is the least that can be known

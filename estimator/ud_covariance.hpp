@@ -39,7 +39,7 @@ class UdCovariance {
 
   /// State K is known anew, from elsewhere: that well, and from none of the others.
   template <std::size_t K>
-  constexpr void know_anew(const Variance& variance) {
+  constexpr void reset(const Variance& variance) {
     d_[K] = variance;
     for (std::size_t i = 0; i < K; ++i) u(i, K) = Coupling{};
     if constexpr (K + 1 < N) {
@@ -48,7 +48,7 @@ class UdCovariance {
   }
 
   /// Process noise of the last state alone, which moves no other.
-  constexpr void widen_last(const Variance& by) { d_[N - 1] = Variance(d_[N - 1] + by); }
+  constexpr void add_noise_to_last(const Variance& by) { d_[N - 1] = Variance(d_[N - 1] + by); }
 
   /// Of state K, all of it.
   template <std::size_t K>

@@ -9,9 +9,9 @@
 namespace bms::experiments {
 
 /// What a design writes on: straight pieces of current over time, and a source of chance.
-class Course {
+class ProfileBuilder {
  public:
-  explicit Course(const ExperimentOptions& options)
+  explicit ProfileBuilder(const ExperimentOptions& options)
       : high_c_rate(options.high_c_rate), low_c_rate(options.low_c_rate), random_(options.seed) {}
 
   const double high_c_rate, low_c_rate;
@@ -100,14 +100,14 @@ namespace {
 
 constexpr double standby_c_rate = -0.012;  // controller, display, lights
 
-void stand(Course& truck, int duration_s) { truck.hold(duration_s, standby_c_rate); }
+void stand(ProfileBuilder& truck, int duration_s) { truck.hold(duration_s, standby_c_rate); }
 
 /// No second under a foot or a load is like the last.
-void unsteady(Course& truck, int duration_s, double c_rate) {
+void unsteady(ProfileBuilder& truck, int duration_s, double c_rate) {
   for (int k = 0; k < duration_s; ++k) truck.hold(1, c_rate * truck.between(0.88, 1.12));
 }
 
-void travel(Course& truck, int cruise_s, double load) {
+void travel(ProfileBuilder& truck, int cruise_s, double load) {
   const double start = -(0.64 + 0.24 * load) * truck.between(0.9, 1.1), cruise = -(0.36 + 0.18 * load);
   truck.ramp(1, standby_c_rate, start);
   unsteady(truck, truck.between(2, 4), start);
@@ -119,7 +119,7 @@ void travel(Course& truck, int cruise_s, double load) {
 }
 
 /// Back and forth in front of a rack: bursts of one to three seconds.
-void manoeuvre(Course& truck) {
+void manoeuvre(ProfileBuilder& truck) {
   for (int moves = truck.between(2, 5); moves > 0; --moves) {
     const int burst_s = truck.between(1, 3);  // one draw a statement: the order of arguments is the compiler's
     truck.hold(burst_s, truck.between(-0.5, -0.25));
@@ -128,7 +128,7 @@ void manoeuvre(Course& truck) {
   }
 }
 
-void lift(Course& truck, double height, double load) {
+void lift(ProfileBuilder& truck, double height, double load) {
   const double pump = -(0.58 + 0.37 * load);
   truck.ramp(1, standby_c_rate, pump);
   unsteady(truck, 2 + static_cast<int>(9 * height), pump);
@@ -136,12 +136,12 @@ void lift(Course& truck, double height, double load) {
 }
 
 /// What hangs on the fork drives the pump backwards.
-void lower(Course& truck, double height, double load) {
+void lower(ProfileBuilder& truck, double height, double load) {
   unsteady(truck, 2 + static_cast<int>(7 * height), 0.08 + 0.24 * load);
   stand(truck, truck.between(1, 3));
 }
 
-void put_away(Course& truck) {
+void put_away(ProfileBuilder& truck) {
   const double load = truck.between(0.4, 1.0), height = truck.between(0.3, 1.0);
   lift(truck, 0, load);
   travel(truck, truck.between(10, 28), load);
@@ -152,7 +152,7 @@ void put_away(Course& truck) {
   travel(truck, truck.between(10, 28), 0);
 }
 
-void fetch(Course& truck) {
+void fetch(ProfileBuilder& truck) {
   const double load = truck.between(0.4, 1.0), height = truck.between(0.3, 1.0);
   travel(truck, truck.between(10, 28), 0);
   manoeuvre(truck);
@@ -163,7 +163,7 @@ void fetch(Course& truck) {
   lower(truck, 0, load);
 }
 
-void load_lorry(Course& truck) {
+void load_lorry(ProfileBuilder& truck) {
   for (int pallets = truck.between(2, 3); pallets > 0; --pallets) {
     const double load = truck.between(0.5, 1.0);
     lift(truck, 0.1, load);
@@ -174,7 +174,7 @@ void load_lorry(Course& truck) {
   }
 }
 
-void work_until(Course& truck, int time_s) {
+void work_until(ProfileBuilder& truck, int time_s) {
   constexpr int longest_job_s = 500;
   while (time_s - truck.time_s() > longest_job_s) {
     const int job = truck.between(0, 9);
@@ -187,25 +187,25 @@ void work_until(Course& truck, int time_s) {
 }
 
 /// Tapers at its end, where a charger would hold the voltage: a profile knows only the clock.
-void charge(Course& truck, int duration_s, double c_rate) {
+void charge(ProfileBuilder& truck, int duration_s, double c_rate) {
   truck.ramp(10, 0, c_rate);
   truck.hold(duration_s - 310, c_rate);
   truck.ramp(300, c_rate, 0.25 * c_rate);
 }
 
-void coffee_break(Course& truck) {
+void coffee_break(ProfileBuilder& truck) {
   truck.hold(60, 0);
   charge(truck, 12 * 60, 0.5);
   truck.hold(180, 0);
 }
 
-void lunch_break(Course& truck) {
+void lunch_break(ProfileBuilder& truck) {
   truck.hold(300, 0);
   charge(truck, 30 * 60, 0.98);
   truck.hold(900, 0);
 }
 
-void forklift_shift(Course& truck) {
+void forklift_shift(ProfileBuilder& truck) {
   constexpr int minute_s = 60;
   truck.hold(5 * minute_s, 0);
   work_until(truck, 125 * minute_s);
@@ -225,7 +225,7 @@ constexpr int design_s = 1'200, lead_s = 60;
 
 /// Short pulses out and in, of two heights, with rests between.
 template <int rest_s>
-void short_pulses(Course& cell) {
+void short_pulses(ProfileBuilder& cell) {
   constexpr int pulse_s = 10;
   cell.hold(lead_s, 0);
   for (int k = 0; cell.time_s() < design_s - lead_s; ++k) {
@@ -240,7 +240,7 @@ void short_pulses(Course& cell) {
 
 /// Long bursts that never rest: HIGH, LOW, and the same back.
 template <int high_s, int low_s>
-void long_bursts(Course& cell) {
+void long_bursts(ProfileBuilder& cell) {
   cell.hold(lead_s, 0);
   while (cell.time_s() < design_s - lead_s) {
     for (const double direction : {-1.0, 1.0}) {
@@ -253,7 +253,7 @@ void long_bursts(Course& cell) {
 
 /// From full to empty and back in ten steps each way, with a rest after each.
 template <int rest_s>
-void ocv_test(Course& cell) {
+void ocv_test(ProfileBuilder& cell) {
   cell.hold(rest_s, 0);
   const int tenth_s = static_cast<int>(360 / cell.high_c_rate);
   for (const double direction : {-1.0, 1.0}) {
@@ -271,7 +271,7 @@ constexpr int minute_s = 60, hour_s = 3'600;
 constexpr double almost_full = 0.95;
 
 /// The sensors alone: nothing flows, and what the voltage sensor should read a source says.
-void meter_check(Course& cell) {
+void meter_check(ProfileBuilder& cell) {
   constexpr double low_v = 2.5,
                    high_v = 3.6;  // inside every channel's range, as far apart as a lithium cell's voltages
   cell.open(5 * minute_s);
@@ -282,7 +282,7 @@ void meter_check(Course& cell) {
   cell.open(5 * minute_s);
 }
 
-void there_and_back(Course& cell) {
+void there_and_back(ProfileBuilder& cell) {
   cell.hold(2 * minute_s, 0);
   for (int turn = 0; turn < 3; ++turn) {
     for (const double direction : {-1.0, 1.0}) {
@@ -293,20 +293,20 @@ void there_and_back(Course& cell) {
 }
 
 /// The current sensor against a better one.
-void shunt_check(Course& cell) {
+void shunt_check(ProfileBuilder& cell) {
   cell.insert_ammeter();
   there_and_back(cell);
 }
 
 /// The voltage channel too, against a meter on the cell itself: what lies between them is a contact.
-void terminal_check(Course& cell) {
+void terminal_check(ProfileBuilder& cell) {
   cell.insert_ammeter();
   cell.apply_voltmeter();
   there_and_back(cell);
 }
 
 /// So short and so finely logged that a resistance at once and one after half a second are two.
-void fast_pulses(Course& cell) {
+void fast_pulses(ProfileBuilder& cell) {
   cell.hold(minute_s, 0);
   for (int k = 0; k < 25; ++k) {
     for (const double direction : {-1.0, 1.0}) {
@@ -316,13 +316,13 @@ void fast_pulses(Course& cell) {
   }
 }
 
-void zero_current(Course& cell) {
+void zero_current(ProfileBuilder& cell) {
   cell.hold(2 * minute_s, 0);
   cell.open(20 * minute_s);
 }
 
 /// What is lost or only seems to be, between two visits of the lower knee, where the voltage tells the charge.
-void long_rest_open(Course& cell) {
+void long_rest_open(ProfileBuilder& cell) {
   cell.open(15 * minute_s);
   cell.move(-0.87, 0.5);
   cell.hold(20 * minute_s, 0);
@@ -333,7 +333,7 @@ void long_rest_open(Course& cell) {
 }
 
 /// The same with much charge turned over in place of time.
-void charge_turns(Course& cell) {
+void charge_turns(ProfileBuilder& cell) {
   cell.open(15 * minute_s);
   cell.move(-0.87, 0.5);
   cell.hold(20 * minute_s, 0);
@@ -344,7 +344,7 @@ void charge_turns(Course& cell) {
   cell.hold(20 * minute_s, 0);
 }
 
-void full_cycle(Course& cell) {
+void full_cycle(ProfileBuilder& cell) {
   cell.hold(10 * minute_s, 0);
   cell.move(-0.9, 0.4);
   cell.hold(40 * minute_s, 0);
@@ -354,7 +354,7 @@ void full_cycle(Course& cell) {
 
 /// Each level once from above and once from below, with rests that outlast diffusion; loops of three sizes at three
 /// rates.
-void loops_and_rests(Course& cell) {
+void loops_and_rests(ProfileBuilder& cell) {
   cell.hold(10 * minute_s, 0);
   for (const double rate : {0.9, 0.45, 0.2}) {
     cell.move(-0.25, 0.9);
@@ -371,7 +371,7 @@ void loops_and_rests(Course& cell) {
   cell.hold(40 * minute_s, 0);
 }
 
-void rate_steps(Course& cell) {
+void rate_steps(ProfileBuilder& cell) {
   cell.hold(5 * minute_s, 0);
   for (int level = 0; level < 5; ++level) {
     if (level > 0) {
@@ -391,7 +391,7 @@ void rate_steps(Course& cell) {
 }
 
 /// Pulses that do not heat at two temperatures and at the first again; then heat without another temperature outside.
-void climate_steps(Course& cell) {
+void climate_steps(ProfileBuilder& cell) {
   const auto pulses = [&](int duration_s, double rate) {
     for (const int until_s = cell.time_s() + duration_s; cell.time_s() < until_s;) {
       for (const double direction : {-1.0, 1.0}) {
@@ -488,9 +488,9 @@ const Experiment* find_experiment(std::string_view name) {
 std::optional<std::vector<ProfileRow>> experiment(std::string_view name, const ExperimentOptions& options) {
   const Experiment* e = find_experiment(name);
   if (e == nullptr) return std::nullopt;
-  Course course(options);
-  e->lay_out(course);
-  return course.sampled(options.capacity_ah, options.step_s);
+  ProfileBuilder builder(options);
+  e->build(builder);
+  return builder.sampled(options.capacity_ah, options.step_s);
 }
 
 }  // namespace bms::experiments

@@ -43,12 +43,12 @@ struct ExperimentOptions {
   double low_c_rate = 0.25;  ///< of what LOW means in high_*_low_*. 0..1
 };
 
-class Course;
+class ProfileBuilder;
 
 struct Experiment {
   std::string_view name;
   std::string_view description;
-  void (*lay_out)(Course&);
+  void (*build)(ProfileBuilder&);
   double start_soc = std::nan("");    ///< where it wants to begin; NaN: wherever the cell is
   std::string_view instruction = {};  ///< to the technician: what to prepare and what to log; empty: run it
   double step_s = 1;                  ///< longest interval at which logging it makes sense

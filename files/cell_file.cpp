@@ -163,7 +163,7 @@ void read_mechanisms(Table& top, CellFile& file) {
       if (!name.starts_with(kind) || !group.has(id)) continue;
       Table table = group.table(id);
       if (table.has("source")) file.sources[name] = table.text("source");
-      model::MechanismSetting setting = model::unsaid(index, capacity_ah);
+      model::MechanismSetting setting = model::default_setting(index, capacity_ah);
       for (std::size_t k = 0; k < info.parameters; ++k) {
         const std::string key(info.parameter[k].name), deviation = key + "_std";
         if (table.has(key)) setting.value[k] = table.number(key);
@@ -338,7 +338,7 @@ std::vector<model::MechanismSetting> on_board(const std::vector<model::Mechanism
   return acting;
 }
 
-void refuse_without_fpu(const CellFile& file) {
+void reject_if_fpu_needed(const CellFile& file) {
   for (const model::MechanismSetting& m : on_board(file.mechanisms)) {
     const model::MechanismInfo& info = model::catalogue[m.index];
     if (info.needs_fpu)

@@ -55,7 +55,7 @@ std::string cell_text(const CellFile& file);
 std::vector<model::MechanismSetting> on_board(const std::vector<model::MechanismSetting>& mechanisms);
 
 /// Throws BadInput when one of those needs an FPU.
-void refuse_without_fpu(const CellFile& file);
+void reject_if_fpu_needed(const CellFile& file);
 
 struct BuiltInCell {
   std::string name;

@@ -17,13 +17,13 @@
 #include "estimator/soc_estimator.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/progress.hpp"
-#include "firmware/remembered.hpp"
+#include "firmware/stored_state.hpp"
 #include "firmware/telemetry.hpp"
 #include "hal/board_state.hpp"
 #include "hal/calendar.hpp"
 #include "hal/clock.hpp"
+#include "hal/estimate_record.hpp"
 #include "hal/power_path.hpp"
-#include "hal/record.hpp"
 #include "hal/requests.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
@@ -32,13 +32,13 @@
 namespace bms::firmware {
 
 /// Nothing beside the battery's own messages. Others: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
-struct NoVehicleProfile {
+struct WithoutVehicleProfile {
   template <class... Known>
-  constexpr void tell(const Known&...) {}
-  constexpr void hear(const can::Frame&) {}
+  constexpr void publish(const Known&...) {}
+  constexpr void receive(const can::Frame&) {}
 };
 
-template <class Board, class VehicleProfile = NoVehicleProfile>
+template <class Board, class VehicleProfile = WithoutVehicleProfile>
 class Application {
  public:
   using Estimator = typename Board::Estimator;
@@ -49,62 +49,65 @@ class Application {
   Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
               float capacity_ah, storage::Persistence& persistence)
       : estimator_{start ? Estimator(*start) : Estimator()},
-        protection_{Board::plan(), static_cast<std::uint32_t>(persistence.settings().get(kept_faults_key).value_or(0))},
+        protection_{Board::plan(),
+                    static_cast<std::uint32_t>(persistence.settings().get(latched_faults_key).value_or(0))},
         telemetry_{identity, capacity_ah, start},
         capacity_ah_{capacity_ah},
         persistence_{persistence},
         cell_hash_{identity.cell_hash} {
-    board_.cell_file_changed = of_another_cell_file(persistence, cell_hash_);
+    board_.cell_file_changed = stored_for_another_cell_file(persistence, cell_hash_);
     if (board_.cell_file_changed) return;
     persistence.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
-    if constexpr (cells > 1) recall(cells_, persistence.cells());
+    if constexpr (cells > 1) restore_cells(cells_, persistence.cells());
   }
 
-  void take(const measurement::PackSample<cells>& pack) {
+  void process_sample(const measurement::PackSample<cells>& pack) {
     const std::uint64_t began_us = hal::now_us();
     board_.state = hal::board_state();
     const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
     const Result estimate = Board::step(estimator_, mean);
-    hal::record(estimator::words(estimate));
-    const auto request = requested_.power_now(pack.time_us);
-    Board::look(condition_, estimator_, mean, estimate, hal::can_listening() || request != protection::Request::none);
-    if constexpr (cells > 1) Board::tell_apart(cells_, pack, estimate);
+    hal::record_estimate(estimator::words(estimate));
+    const auto request = requested_.active_request(pack.time_us);
+    Board::update_condition(condition_, estimator_, mean, estimate,
+                            hal::can_listening() || request != protection::Request::none);
+    if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
     protect(pack, estimate, request);
-    telemetry_.tell(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, board_,
-                    requested_.log_samples);
-    vehicle_profile_.tell(pack, condition_, protection_.decision(), Board::plan(), capacity_ah_,
-                          (estimate.flags & estimator::not_started) == 0);
-    hear(pack.time_us);
+    telemetry_.publish(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, board_,
+                       requested_.log_samples);
+    vehicle_profile_.publish(pack, condition_, protection_.decision(), Board::plan(), capacity_ah_,
+                             (estimate.flags & estimator::not_started) == 0);
+    handle_requests(pack.time_us);
     estimate_ = estimate;
     if (persistence_.count(mean)) [[unlikely]]
-      remember();
+      store_state();
     const auto took_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(hal::now_us() - began_us, 0xFFFF'FFFF));
     board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
-    if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.told()})) hal::watchdog_feed();
+    if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.published()}))
+      hal::watchdog_feed();
   }
 
   /// The last that is done: the battery is switched off.
-  void end() {
-    const Remembered now(estimate_, condition_, cells_);
+  void shut_down() {
+    const Snapshot now(estimate_, condition_, cells_);
     persistence_.power_failing(now.values(), hal::calendar_s());
   }
 
   /// Between two samples. The contactors are open already.
   void supply_failing() {
-    const Remembered now(estimate_, condition_, cells_);
+    const Snapshot now(estimate_, condition_, cells_);
     persistence_.supply_failing(now.values(), hal::calendar_s());
   }
 
  private:
-  using Remembered = RememberedOf<typename Estimator::Scalar, cells>;
-  static constexpr int most_requests = 4;  // a sample must not take longer because somebody asks much
+  using Snapshot = SnapshotOf<typename Estimator::Scalar, cells>;
+  static constexpr int max_requests = 4;  // a sample must not take longer because somebody asks much
 
   void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
     protection::PackEstimate<cells> known;
     if ((estimate.flags & estimator::not_started) == 0) {
       known.soc_ppb = messages::ppb(estimate.soc);
       known.soc_sigma_ppb = messages::ppb(estimate.soc_sigma);
-      known.contradicts = (estimate.flags & estimator::voltage_disbelieved) != 0;
+      known.voltage_rejected = (estimate.flags & estimator::voltage_rejected) != 0;
       if (condition_.limits_known()) {
         known.model_charge_ua = arithmetic::to_micro(condition_.limits_10s().charge_a);
         known.model_discharge_ua = arithmetic::to_micro(condition_.limits_10s().discharge_a);
@@ -114,62 +117,64 @@ class Application {
         known.cell_sigma_ppb[k] = cells > 1 ? messages::ppb(cells_[k].soc_sigma()) : 0;
       }
     }
-    protection::Orders orders;
-    orders.request = request;
-    orders.clear = std::exchange(requested_.clear, protection::Clear::none);
-    if (board_.cell_file_changed && orders.clear != protection::Clear::none) [[unlikely]]
-      take_this_cell_file();
-    orders.link_uv = hal::link_uv();
-    orders.board_fault = board_.unfit() || board_.state.supply_low ||
+    protection::ExternalInputs inputs;
+    inputs.request = request;
+    inputs.clear = std::exchange(requested_.clear, protection::Clear::none);
+    if (board_.cell_file_changed && inputs.clear != protection::Clear::none) [[unlikely]]
+      accept_cell_file();
+    inputs.dc_link_uv = hal::dc_link_uv();
+    inputs.board_fault = board_.unfit() || board_.state.supply_low ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
-    orders.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().works();
+    inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
     first_ = false;
-    const std::uint32_t kept_before = protection_.decision().kept;
-    const auto& decision = protection_.update(pack, known, orders);
+    const std::uint32_t latched_before = protection_.decision().latched;
+    const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
-    if (decision.came != 0) [[unlikely]]
-      note_faults(decision.came);
-    if (decision.kept != kept_before) [[unlikely]]
-      persistence_.set(kept_faults_key, static_cast<std::int32_t>(decision.kept));
+    if (decision.raised != 0) [[unlikely]]
+      store_faults(decision.raised);
+    if (decision.latched != latched_before) [[unlikely]]
+      persistence_.set(latched_faults_key, static_cast<std::int32_t>(decision.latched));
   }
 
   /// Somebody has seen that it is another, and means it: what is stored from now on is of this one.
-  [[gnu::noinline]] void take_this_cell_file() {
+  [[gnu::noinline]] void accept_cell_file() {
     persistence_.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
     board_.cell_file_changed = false;
   }
 
-  [[gnu::noinline]] void note_faults(std::uint32_t came) {
+  [[gnu::noinline]] void store_faults(std::uint32_t raised) {
     for (std::uint16_t k = 0; k < protection::fault_count; ++k) {
-      if ((came >> k & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
+      if ((raised >> k & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
     }
   }
 
-  void hear(std::uint64_t now_us) {
+  void handle_requests(std::uint64_t now_us) {
     can::Frame frame;
-    for (int k = 0; k < most_requests && hal::next_request(frame); ++k) {
-      if (auto answer = commands_.take(frame, now_us, requested_)) {
+    for (int k = 0; k < max_requests && hal::next_request(frame); ++k) {
+      if (auto answer = commands_.handle(frame, now_us, requested_)) {
         if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time))
           answer->result = can::CommandAnswer::result_refused;
-        if (const auto correction = std::exchange(requested_.correction, std::nullopt)) correct(*correction);
+        if (const auto calibration_change = std::exchange(requested_.calibration_change, std::nullopt))
+          apply_calibration(*calibration_change);
         telemetry_.answer(*answer);
       } else {
-        vehicle_profile_.hear(frame);
+        vehicle_profile_.receive(frame);
       }
     }
   }
 
-  [[gnu::noinline]] void correct(const Requested::Correction& correction) {
-    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + correction.which), correction.value);
+  [[gnu::noinline]] void apply_calibration(const Requested::CalibrationChange& calibration_change) {
+    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + calibration_change.which),
+                     calibration_change.value);
     hal::calibrate(stored_calibration(persistence_));
   }
 
   /// An erase holds the core up for half a second: only while nothing is connected.
-  [[gnu::noinline]] void remember() {
-    const Remembered now(estimate_, condition_, cells_);
-    persistence_.keep(now.values(), hal::calendar_s());
-    if (!protection_.decision().outputs.any_closed()) persistence_.erase_one();
+  [[gnu::noinline]] void store_state() {
+    const Snapshot now(estimate_, condition_, cells_);
+    persistence_.store(now.values(), hal::calendar_s());
+    if (!protection_.decision().outputs.any_closed()) persistence_.erase_next_sector();
   }
 
   Estimator estimator_;
@@ -185,7 +190,7 @@ class Application {
   Progress progress_;
   storage::Persistence& persistence_;
   std::uint32_t cell_hash_;
-  OfBoard board_;
+  BoardStatus board_;
   bool first_ = true;
 };
 

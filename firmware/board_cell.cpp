@@ -3,17 +3,18 @@
 
 namespace bms::firmware {
 
-void BoardCell::look(estimator::Condition<Estimator>& condition, const Estimator& estimator,
-                     const measurement::Sample& sample, const Estimator::Result& estimate, bool limits_wanted) {
+void BoardCell::update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
+                                 const measurement::Sample& sample, const Estimator::Result& estimate,
+                                 bool limits_wanted) {
   condition.update(generated::cell<BoardScalar>, sample, estimate, estimator.state(), limits_wanted);
 }
 
-void BoardCell::tell_apart(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
-                           const Estimator::Result& estimate) {
+void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
+                             const Estimator::Result& estimate) {
   of.update(generated::cell<BoardScalar>, pack, estimate);
 }
 
-const model::Plausible& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
+const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
   static constexpr auto plan = protection::protection_plan({.limits = generated::parameters.limits,

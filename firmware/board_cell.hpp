@@ -38,7 +38,7 @@ using BoardVehicleProfile = Cia418Profile;
 #elif defined(BMS_VEHICLE_PROFILE_J1939)
 using BoardVehicleProfile = J1939Profile;
 #else
-using BoardVehicleProfile = NoVehicleProfile;
+using BoardVehicleProfile = WithoutVehicleProfile;
 #endif
 
 struct BoardCell {
@@ -49,11 +49,12 @@ struct BoardCell {
     return estimator_step(estimator, sample);
   }
   static std::uint64_t estimated_us(const Estimator& estimator) { return estimator.time_us(); }
-  static void look(estimator::Condition<Estimator>& condition, const Estimator& estimator,
-                   const measurement::Sample& sample, const Estimator::Result& estimate, bool limits_wanted);
-  static void tell_apart(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
-                         const Estimator::Result& estimate);
-  static const model::Plausible& plausible();
+  static void update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
+                               const measurement::Sample& sample, const Estimator::Result& estimate,
+                               bool limits_wanted);
+  static void update_cells(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
+                           const Estimator::Result& estimate);
+  static const model::PlausibleRange& plausible();
   static const protection::ProtectionPlan& plan();
 };
 

@@ -25,7 +25,7 @@ inline constexpr std::uint32_t nmt_id = 0x000, sdo_answer_id = 0x580, sdo_reques
 enum class NodeState : std::uint8_t { boot_up = 0, stopped = 4, operational = 5, pre_operational = 127 };
 
 /// SDO abort codes; none: it went well.
-enum class Refusal : std::uint32_t {
+enum class AbortCode : std::uint32_t {
   none = 0,
   unknown_command = 0x0504'0001,
   read_only = 0x0601'0002,
@@ -38,7 +38,7 @@ enum class Refusal : std::uint32_t {
 struct Entry {
   std::uint32_t value = 0;
   std::uint8_t length = 0;
-  Refusal refusal = Refusal::none;
+  AbortCode abort_code = AbortCode::none;
 };
 
 class Node {
@@ -50,27 +50,27 @@ class Node {
   constexpr NodeState state() const { return state_; }
 
   /// At each sample; times of the samples' clock.
-  void beat(std::uint32_t now_us) {
+  void update_heartbeat(std::uint32_t now_us) {
     if (state_ == NodeState::boot_up) {
-      say(NodeState::boot_up);
+      send_heartbeat(NodeState::boot_up);
       state_ = NodeState::operational;
-      beaten_us_ = now_us;
-    } else if (now_us - beaten_us_ >= heartbeat_us) {
-      say(state_);
-      beaten_us_ = now_us;
+      heartbeat_sent_us_ = now_us;
+    } else if (now_us - heartbeat_sent_us_ >= heartbeat_us) {
+      send_heartbeat(state_);
+      heartbeat_sent_us_ = now_us;
     }
   }
 
   /// Whether the frame was for this node.
   template <class Objects>
-  bool hear(const can::Frame& frame, Objects&& objects) {
+  bool receive(const can::Frame& frame, Objects&& objects) {
     if (frame.long_id) return false;
     if (frame.id == nmt_id && frame.length == 2 && (frame.data[1] == 0 || frame.data[1] == id_)) {
-      obey(frame.data[0]);
+      apply_nmt_command(frame.data[0]);
       return true;
     }
     if (frame.id != sdo_request_id + id_ || frame.length != 8) return false;
-    if (state_ == NodeState::operational || state_ == NodeState::pre_operational) serve(frame, objects);
+    if (state_ == NodeState::operational || state_ == NodeState::pre_operational) serve_sdo(frame, objects);
     return true;
   }
 
@@ -80,40 +80,42 @@ class Node {
   static constexpr std::uint8_t download = 1, upload = 2, abort = 4;  // client command specifiers, the upper three bits
   static constexpr std::size_t value_at = 4;
 
-  constexpr void obey(std::uint8_t command) {
+  constexpr void apply_nmt_command(std::uint8_t command) {
     if (command == start) state_ = NodeState::operational;
     if (command == stop) state_ = NodeState::stopped;
     if (command == enter_pre_operational) state_ = NodeState::pre_operational;
     if (command == reset_node || command == reset_communication) state_ = NodeState::boot_up;
   }
 
-  void say(NodeState state) const { hal::can_send({heartbeat_id + id_, 1, {static_cast<std::uint8_t>(state)}}); }
+  void send_heartbeat(NodeState state) const {
+    hal::can_send({heartbeat_id + id_, 1, {static_cast<std::uint8_t>(state)}});
+  }
 
   template <class Objects>
-  void serve(const can::Frame& request, Objects& objects) const {
+  void serve_sdo(const can::Frame& request, Objects& objects) const {
     const auto index = hal::get_bytes<std::uint16_t>(request.data, 1);
     const std::uint8_t command = request.data[0] >> 5, sub = request.data[3];
     if (command == abort) return;
     can::Frame answer{sdo_answer_id + id_, 8, {0, request.data[1], request.data[2], sub}};
-    Refusal refusal = Refusal::unknown_command;
+    AbortCode abort_code = AbortCode::unknown_command;
     if (command == upload) {
       const Entry entry = objects.read(index, sub);
-      refusal = entry.refusal;
+      abort_code = entry.abort_code;
       answer.data[0] = static_cast<std::uint8_t>(0x43 | (4 - entry.length) << 2);
       hal::put_bytes(answer.data, value_at, entry.value);
     } else if (command == download && (request.data[0] & 3) == 3) {  // expedited, its length said
-      refusal = objects.write(index, sub, hal::get_bytes<std::uint32_t>(request.data, value_at),
-                              static_cast<std::uint8_t>(4 - (request.data[0] >> 2 & 3)));
+      abort_code = objects.write(index, sub, hal::get_bytes<std::uint32_t>(request.data, value_at),
+                                 static_cast<std::uint8_t>(4 - (request.data[0] >> 2 & 3)));
       answer.data[0] = 0x60;
     }
-    if (refusal != Refusal::none) {
+    if (abort_code != AbortCode::none) {
       answer.data[0] = 0x80;
-      hal::put_bytes(answer.data, value_at, static_cast<std::uint32_t>(refusal));
+      hal::put_bytes(answer.data, value_at, static_cast<std::uint32_t>(abort_code));
     }
     hal::can_send(answer);
   }
 
-  std::uint32_t beaten_us_ = 0;
+  std::uint32_t heartbeat_sent_us_ = 0;
   std::uint8_t id_;
   NodeState state_ = NodeState::boot_up;
 };

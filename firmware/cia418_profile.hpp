@@ -44,8 +44,8 @@ class Cia418Profile {
 
   /// soc_known: the estimator has started. capacity_ah: of the cell file.
   template <std::size_t Cells, class Condition>
-  void tell(const measurement::PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d,
-            const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
+  void publish(const measurement::PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d,
+               const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
     const bool charge_me = d.outputs.charge_enable && d.allowed.charge_ua > 0;
     const std::int16_t cdegc = pack.temperature_cdegc[0];
     temperature_ = measurement::temperature_possible(cdegc) ? static_cast<std::int16_t>(cdegc * 2 / 25) : no_value;
@@ -55,53 +55,53 @@ class Cia418Profile {
                    : 0xFFFF'FFFF;
     current_requested_ =
         charge_me ? static_cast<std::uint16_t>(std::min<std::int32_t>(d.allowed.charge_ua / 62'500, 0xFFFF)) : 0;
-    soc_ = soc_known ? whole(messages::percent(condition.display_soc()), 100) : 0xFF;
+    soc_ = soc_known ? rounded(messages::percent(condition.display_soc()), 100) : 0xFF;
     capacity_ = static_cast<std::uint16_t>(capacity_ah + 0.5F);
-    most_current_ = static_cast<std::uint16_t>(plan.derating.charge_most_ua / 1'000'000);
+    max_current_ = static_cast<std::uint16_t>(plan.derating.charge_max_ua / 1'000'000);
     cells_ = plan.cells;
     if (!hal::can_listening()) return;
     const auto now_us = static_cast<std::uint32_t>(pack.time_us);
-    node_.beat(now_us);
+    node_.update_heartbeat(now_us);
     if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
   }
 
-  void hear(const can::Frame& frame) { node_.hear(frame, *this); }
+  void receive(const can::Frame& frame) { node_.receive(frame, *this); }
 
   canopen::Entry read(std::uint16_t index, std::uint8_t sub) const {
     if (index == 0x1018)
-      return of_sub({4, 0, 0, 0, 0}, {1, 4, 4, 4, 4}, sub);  // identity: no vendor number is assigned
-    if (index == 0x6020) return of_sub({4, 0, capacity_, most_current_, cells_}, {1, 1, 2, 2, 2}, sub);
-    const canopen::Entry entry = single(index);
-    return entry.refusal == canopen::Refusal::none && sub != 0
-               ? canopen::Entry{.refusal = canopen::Refusal::no_such_sub_index}
+      return sub_entry({4, 0, 0, 0, 0}, {1, 4, 4, 4, 4}, sub);  // identity: no vendor number is assigned
+    if (index == 0x6020) return sub_entry({4, 0, capacity_, max_current_, cells_}, {1, 1, 2, 2, 2}, sub);
+    const canopen::Entry entry = plain_entry(index);
+    return entry.abort_code == canopen::AbortCode::none && sub != 0
+               ? canopen::Entry{.abort_code = canopen::AbortCode::no_such_sub_index}
                : entry;
   }
 
-  canopen::Refusal write(std::uint16_t index, std::uint8_t sub, std::uint32_t value, std::uint8_t length) {
+  canopen::AbortCode write(std::uint16_t index, std::uint8_t sub, std::uint32_t value, std::uint8_t length) {
     const canopen::Entry entry = read(index, sub);
-    if (entry.refusal != canopen::Refusal::none) return entry.refusal;
-    if (index != 0x6001) return canopen::Refusal::read_only;
-    if (length != entry.length) return canopen::Refusal::wrong_length;
+    if (entry.abort_code != canopen::AbortCode::none) return entry.abort_code;
+    if (index != 0x6001) return canopen::AbortCode::read_only;
+    if (length != entry.length) return canopen::AbortCode::wrong_length;
     charger_status_ = static_cast<std::uint8_t>(value);
-    return canopen::Refusal::none;
+    return canopen::AbortCode::none;
   }
 
  private:
   static constexpr std::int16_t no_value = 0x7FFF;
   static constexpr std::uint32_t device_type = 418;
 
-  static constexpr std::uint8_t whole(float value, std::uint8_t most) {
-    const float held = !(value > 0) ? 0 : value > static_cast<float>(most) ? static_cast<float>(most) : value;
-    return static_cast<std::uint8_t>(held + 0.5F);
+  static constexpr std::uint8_t rounded(float value, std::uint8_t most) {
+    const float clamped = !(value > 0) ? 0 : value > static_cast<float>(most) ? static_cast<float>(most) : value;
+    return static_cast<std::uint8_t>(clamped + 0.5F);
   }
 
-  static canopen::Entry of_sub(const std::array<std::uint32_t, 5>& values, const std::array<std::uint8_t, 5>& lengths,
-                               std::uint8_t sub) {
-    if (sub >= values.size()) return {.refusal = canopen::Refusal::no_such_sub_index};
+  static canopen::Entry sub_entry(const std::array<std::uint32_t, 5>& values,
+                                  const std::array<std::uint8_t, 5>& lengths, std::uint8_t sub) {
+    if (sub >= values.size()) return {.abort_code = canopen::AbortCode::no_such_sub_index};
     return {values[sub], lengths[sub]};
   }
 
-  canopen::Entry single(std::uint16_t index) const {
+  canopen::Entry plain_entry(std::uint16_t index) const {
     switch (index) {
       case 0x1000:
         return {device_type, 4};
@@ -122,7 +122,7 @@ class Cia418Profile {
       case 0x6081:
         return {soc_, 1};
       default:
-        return {.refusal = canopen::Refusal::no_such_object};
+        return {.abort_code = canopen::AbortCode::no_such_object};
     }
   }
 
@@ -142,14 +142,14 @@ class Cia418Profile {
   Cycle cycle_;
   std::uint32_t voltage_ = 0xFFFF'FFFF;
   std::int16_t temperature_ = no_value;
-  std::uint16_t current_requested_ = 0, capacity_ = 0, most_current_ = 0;
+  std::uint16_t current_requested_ = 0, capacity_ = 0, max_current_ = 0;
   std::uint8_t status_ = 0, charger_status_ = 0, soc_ = 0xFF, cells_ = 0;
 };
 
 namespace cia418 {
 
 /// Whether a message of the battery, or a frame of a sample, has an identifier that a PDO has.
-constexpr bool apart_from_the_own() {
+constexpr bool pdo_ids_are_unique() {
   bool apart = hal::canopen_node >= 1 && hal::canopen_node <= 127 && hal::canopen_charger >= 1 &&
                hal::canopen_charger <= 127 && hal::canopen_node != hal::canopen_charger;
   for (const Cia418Profile::Pdo& pdo : Cia418Profile::pdos) {
@@ -158,7 +158,7 @@ constexpr bool apart_from_the_own() {
   }
   return apart;
 }
-static_assert(apart_from_the_own(),
+static_assert(pdo_ids_are_unique(),
               "BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER: two nodes of 1 to 127, whose PDOs are no message of the "
               "battery (of a charger of 16 to 29 one is)");
 

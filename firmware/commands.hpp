@@ -19,30 +19,30 @@ static_assert(can::Command::id == hal::command_frame_id, "a real bus would filte
 
 /// What commands set.
 struct Requested {
-  static constexpr std::uint64_t request_lasts_us = 5'000'000;
+  static constexpr std::uint64_t request_timeout_us = 5'000'000;
 
   bool log_samples = true;
   std::uint32_t unix_time_s = 0;  ///< that the calendar is to be set to; 0: not
-  struct Correction {
+  struct CalibrationChange {
     std::uint16_t which = 0;  ///< of hal::Calibration, in its order
     std::int32_t value = 0;
   };
-  std::optional<Correction> correction;               ///< of the measuring chain, until it has been used
-  protection::Clear clear = protection::Clear::none;  ///< until it has been used
+  std::optional<CalibrationChange> calibration_change;  ///< of the measuring chain, until it has been used
+  protection::Clear clear = protection::Clear::none;    ///< until it has been used
   protection::Request power = protection::Request::none;
   std::uint64_t power_at_us = 0;
 
   /// What is still asked for: who does not repeat it has gone.
-  constexpr protection::Request power_now(std::uint64_t now_us) const {
-    return now_us - power_at_us < request_lasts_us ? power : protection::Request::none;
+  constexpr protection::Request active_request(std::uint64_t now_us) const {
+    return now_us - power_at_us < request_timeout_us ? power : protection::Request::none;
   }
 };
 
 class Commands {
  public:
   /// now_us: the samples' clock. Nothing: the frame is no command that is heard.
-  constexpr std::optional<can::CommandAnswer> take(const can::Frame& frame, std::uint64_t now_us,
-                                                   Requested& requested) {
+  constexpr std::optional<can::CommandAnswer> handle(const can::Frame& frame, std::uint64_t now_us,
+                                                     Requested& requested) {
     if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id))
       return std::nullopt;
     const std::uint8_t counter = can::counter_of(frame);
@@ -52,12 +52,12 @@ class Commands {
     can::CommandAnswer answer;
     answer.code = command.code;
     answer.command_counter = counter;
-    answer.result = carry_out(command, now_us, requested);
+    answer.result = execute(command, now_us, requested);
     return answer;
   }
 
  private:
-  static constexpr std::uint32_t carry_out(const can::Command& command, std::uint64_t now_us, Requested& requested) {
+  static constexpr std::uint32_t execute(const can::Command& command, std::uint64_t now_us, Requested& requested) {
     using A = can::CommandAnswer;
     switch (command.code) {
       case can::Command::code_clear_faults:
@@ -86,7 +86,7 @@ class Commands {
         const auto which = static_cast<std::uint16_t>(command.code - can::Command::code_voltage_gain);
         const auto value = static_cast<std::int32_t>(command.argument);
         if (value < -most[which] || value > most[which]) return A::result_refused;
-        requested.correction = Requested::Correction{which, value};
+        requested.calibration_change = Requested::CalibrationChange{which, value};
         return A::result_done;
       }
       default:

@@ -31,11 +31,12 @@ int main() {
   hal::can_start();
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
-  const auto told = hal::starting_point();
-  static TheApplication application(told ? told : remembered_start(persistence, identity().cell_hash), identity(),
-                                    capacity_ah(), persistence);
+  const auto given_start = hal::starting_point();
+  static TheApplication application(
+      given_start ? given_start : stored_starting_point(persistence, identity().cell_hash), identity(), capacity_ah(),
+      persistence);
   running = &application;
-  for (; sample != nullptr; sample = hal::next_sample()) application.take(*sample);
-  application.end();
+  for (; sample != nullptr; sample = hal::next_sample()) application.process_sample(*sample);
+  application.shut_down();
   return 0;
 }

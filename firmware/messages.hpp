@@ -34,14 +34,14 @@ constexpr std::int32_t ppb(const T& value) {
   if constexpr (arithmetic::is_q<T>) {
     static_assert(T::fraction_bits <= 31);
     constexpr std::int64_t most = std::int64_t{2} << T::fraction_bits;
-    const std::int64_t raw = value.raw(), held = raw > most ? most : raw < -most ? -most : raw;
-    return static_cast<std::int32_t>(held * 1'000'000'000 >> T::fraction_bits);
+    const std::int64_t raw = value.raw(), clamped = raw > most ? most : raw < -most ? -most : raw;
+    return static_cast<std::int32_t>(clamped * 1'000'000'000 >> T::fraction_bits);
   } else {
-    const float held = value > 2    ? 2.0F
-                       : value < -2 ? -2.0F
-                       : value <= 2 ? static_cast<float>(value)
-                                    : 0.0F;  // the last: not a number
-    return static_cast<std::int32_t>(held * 1e9F);
+    const float clamped = value > 2    ? 2.0F
+                          : value < -2 ? -2.0F
+                          : value <= 2 ? static_cast<float>(value)
+                                       : 0.0F;  // the last: not a number
+    return static_cast<std::int32_t>(clamped * 1e9F);
   }
 }
 
@@ -63,8 +63,8 @@ template <class S>
 constexpr std::uint32_t soc_quality(const estimator::Estimate<S>& e, bool observable) {
   using M = can::PackState;
   if ((e.flags & estimator::not_started) != 0) return M::soc_quality_not_started;
-  if ((e.flags & estimator::voltage_disbelieved) != 0) return M::soc_quality_the_voltage_contradicts;
-  if ((e.flags & estimator::soc_unsettled) != 0) return M::soc_quality_more_than_one_state_of_charge_fits;
+  if ((e.flags & estimator::voltage_rejected) != 0) return M::soc_quality_the_voltage_contradicts;
+  if ((e.flags & estimator::soc_ambiguous) != 0) return M::soc_quality_more_than_one_state_of_charge_fits;
   return observable ? M::soc_quality_told_by_the_voltage : M::soc_quality_carried_by_counting;
 }
 
@@ -209,8 +209,8 @@ constexpr can::SocAnchor soc_anchor(const Condition& condition) {
   can::SocAnchor m;
   const auto& now = condition.quality();
   m.observable = now.observable ? 1 : 0;
-  m.seconds_since_anchor = static_cast<float>(now.bridged_s);
-  m.charge_since_anchor = percent(now.bridged_soc);
+  m.seconds_since_anchor = static_cast<float>(now.since_anchor_s);
+  m.charge_since_anchor = percent(now.since_anchor_soc);
   return m;
 }
 
@@ -218,10 +218,10 @@ inline can::Storage storage(const storage::Persistence& persistence) {
   using M = can::Storage;
   const auto& log = persistence.log();
   M m;
-  m.state = log.sectors() == 0 ? M::state_no_flash : log.works() ? M::state_works : M::state_nothing_more_is_kept;
+  m.state = log.sectors() == 0 ? M::state_no_flash : log.operational() ? M::state_works : M::state_nothing_more_is_kept;
   m.broken_sectors = std::min<std::uint32_t>(log.broken(), 15U);
   m.newer_records = std::min<std::uint32_t>(persistence.newer_records(), 15U);
-  m.erases = std::min<std::uint32_t>(log.rounds(), 65'535U);
+  m.erases = std::min<std::uint32_t>(log.erase_cycles(), 65'535U);
   m.starts = std::min<std::uint32_t>(persistence.events().starts, 0xFF'FFFFU);
   return m;
 }
@@ -248,10 +248,10 @@ inline can::Board board(const hal::BoardState& state, bool cell_file_changed, st
 template <class Result>
 constexpr can::SensorErrors sensor_errors(const Result& e, float capacity_ah) {
   can::SensorErrors m;
-  if constexpr (requires { e.further; }) {
-    m.voltage_error = number(e.further[0]);
-    m.current_offset = number(e.further[1]) * capacity_ah;
-    m.current_offset_sigma = number(e.further[2]) * capacity_ah;
+  if constexpr (requires { e.extra; }) {
+    m.voltage_error = number(e.extra[0]);
+    m.current_offset = number(e.extra[1]) * capacity_ah;
+    m.current_offset_sigma = number(e.extra[2]) * capacity_ah;
   }
   return m;
 }

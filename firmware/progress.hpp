@@ -16,25 +16,25 @@ namespace bms::firmware {
 
 class Progress {
  public:
-  struct Made {
+  struct SampleProgress {
     std::uint64_t sample_us = 0;     ///< time of the sample that was taken
     std::uint64_t estimated_us = 0;  ///< time of the last sample that the estimator has taken
-    std::uint32_t told = 0;          ///< samples that telemetry has come to the end of; wraps
+    std::uint32_t published = 0;     ///< samples that telemetry has come to the end of; wraps
   };
 
   /// Once a sample, last of all. True: feed.
-  constexpr bool complete(const Made& made) {
-    const bool whole =
-        (first_ || made.sample_us > sample_us_) && made.estimated_us == made.sample_us && made.told == told_ + 1;
+  constexpr bool complete(const SampleProgress& done) {
+    const bool whole = (first_ || done.sample_us > sample_us_) && done.estimated_us == done.sample_us &&
+                       done.published == published_ + 1;
     first_ = false;
-    sample_us_ = made.sample_us;
-    told_ = made.told;
+    sample_us_ = done.sample_us;
+    published_ = done.published;
     return whole;
   }
 
  private:
   std::uint64_t sample_us_ = 0;
-  std::uint32_t told_ = 0;
+  std::uint32_t published_ = 0;
   bool first_ = true;
 };
 

@@ -22,7 +22,7 @@
 namespace bms::firmware {
 
 /// What is told of the board beside the pack.
-struct OfBoard {
+struct BoardStatus {
   hal::BoardState state;
   bool cell_file_changed = false;       ///< since what is stored was stored
   std::uint32_t longest_sample_us = 0;  ///< 0: not known yet
@@ -42,31 +42,32 @@ class Telemetry {
       : identity_(identity), capacity_ah_(capacity_ah), start_(start) {}
 
   /// mean: what the estimator was given of the pack.
-  void tell(const measurement::PackSample<Cells>& pack, const measurement::Sample& mean, const Result& estimate,
-            const estimator::Condition<Estimator>& condition,
-            const estimator::PackCells<typename Estimator::Scalar, Cells>& cells, const protection::Decision& decision,
-            const storage::Persistence& persistence, const OfBoard& board, bool log_samples) {
+  void publish(const measurement::PackSample<Cells>& pack, const measurement::Sample& mean, const Result& estimate,
+               const estimator::Condition<Estimator>& condition,
+               const estimator::PackCells<typename Estimator::Scalar, Cells>& cells,
+               const protection::Decision& decision, const storage::Persistence& persistence, const BoardStatus& board,
+               bool log_samples) {
     ++samples_;
-    hash_.take(estimator::words(estimate));
+    hash_.add(estimator::words(estimate));
     if (!hal::can_listening()) {
-      ++told_;
+      ++published_;
       return;
     }
-    tell_fault();
+    publish_fault();
     now_us_ = static_cast<std::uint32_t>(pack.time_us);
-    tell_protection(decision);
-    if constexpr (Cells > 1) tell_cells(pack, cells, decision);
-    by_time<can::Identity>([&] { return messages::identity(identity_); });
-    by_time<can::CurrentLimits>([&] { return messages::current_limits(condition); });
-    by_time<can::Health>([&] { return messages::health(condition); });
-    by_time<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
+    publish_protection(decision);
+    if constexpr (Cells > 1) publish_cells(pack, cells, decision);
+    send_if_due<can::Identity>([&] { return messages::identity(identity_); });
+    send_if_due<can::CurrentLimits>([&] { return messages::current_limits(condition); });
+    send_if_due<can::Health>([&] { return messages::health(condition); });
+    send_if_due<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
     if constexpr (Estimator::Model::errors_are_states)
-      by_time<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
-    by_time<can::Storage>([&] { return messages::storage(persistence); });
-    by_time_or<can::Board>(board.alarming() != alarming_told_, [&] {
+      send_if_due<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
+    send_if_due<can::Storage>([&] { return messages::storage(persistence); });
+    send_if_due_or_changed<can::Board>(board.alarming() != published_alarming_, [&] {
       return messages::board(board.state, board.cell_file_changed, board.longest_sample_us);
     });
-    alarming_told_ = board.alarming();
+    published_alarming_ = board.alarming();
     if (log_samples) log(mean);
     send(messages::pack_state(estimate, condition));
     send(messages::pack_electrical(pack));
@@ -76,74 +77,75 @@ class Telemetry {
     status.sample_counter = samples_;
     status.reset_cause = static_cast<std::uint32_t>(hal::reset_cause());
     send(status);
-    ++told_;
+    ++published_;
   }
 
   /// Samples of which all was told that is to be told, or to nobody; wraps.
-  std::uint32_t told() const { return told_; }
+  std::uint32_t published() const { return published_; }
 
   void answer(const can::CommandAnswer& answer) { send(answer); }
 
  private:
   /// What is remembered of a message.
   template <class Message>
-  struct Sent : Cycle {
+  struct SendState : Cycle {
     std::uint8_t counter = 0;
   };
   template <class>
-  struct OfAll;
+  struct SendStatesOf;
   template <class... Message>
-  struct OfAll<std::tuple<Message...>> {
-    using type = std::tuple<Sent<Message>...>;
+  struct SendStatesOf<std::tuple<Message...>> {
+    using type = std::tuple<SendState<Message>...>;
   };
 
   template <class Message>
   void send(const Message& message) {
-    auto& sent = std::get<Sent<Message>>(sent_);
+    auto& sent = std::get<SendState<Message>>(sent_);
     hal::can_send(message.frame(sent.counter));
     sent.counter = can::next(sent.counter);
   }
 
   /// message(): made when it is due.
   template <class Message, class Make>
-  void by_time(Make&& message) {
-    if (std::get<Sent<Message>>(sent_).due(now_us_, Message::cycle_us)) send(message());
+  void send_if_due(Make&& message) {
+    if (std::get<SendState<Message>>(sent_).due(now_us_, Message::cycle_us)) send(message());
   }
 
   /// When the message is due, or at once when what it says has changed.
   template <class Message, class Make>
-  void by_time_or(bool changed, Make&& message) {
-    if (changed) std::get<Sent<Message>>(sent_).restart();
-    by_time<Message>(message);
+  void send_if_due_or_changed(bool changed, Make&& message) {
+    if (changed) std::get<SendState<Message>>(sent_).restart();
+    send_if_due<Message>(message);
   }
 
-  void tell_protection(const protection::Decision& d) {
-    by_time_or<can::Faults>(d.faults != faults_told_, [&] { return messages::faults(d); });
-    by_time_or<can::ContactorState>(d.state != state_told_ || d.outputs != outputs_told_,
-                                    [&] { return messages::contactor_state(d); });
-    by_time<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
-    faults_told_ = d.faults;
-    state_told_ = d.state;
-    outputs_told_ = d.outputs;
+  void publish_protection(const protection::Decision& d) {
+    send_if_due_or_changed<can::Faults>(d.faults != published_faults_, [&] { return messages::faults(d); });
+    send_if_due_or_changed<can::ContactorState>(d.state != published_state_ || d.outputs != published_outputs_,
+                                                [&] { return messages::contactor_state(d); });
+    send_if_due<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
+    published_faults_ = d.faults;
+    published_state_ = d.state;
+    published_outputs_ = d.outputs;
   }
 
-  void tell_cells(const measurement::PackSample<Cells>& pack,
-                  const estimator::PackCells<typename Estimator::Scalar, Cells>& cells, const protection::Decision& d) {
-    by_time<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(pack); });
+  void publish_cells(const measurement::PackSample<Cells>& pack,
+                     const estimator::PackCells<typename Estimator::Scalar, Cells>& cells,
+                     const protection::Decision& d) {
+    send_if_due<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(pack); });
     if constexpr (Cells > 4)
-      by_time<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(pack); });
+      send_if_due<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(pack); });
     if constexpr (Cells > 8)
-      by_time<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(pack); });
+      send_if_due<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(pack); });
     if constexpr (Cells > 12)
-      by_time<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(pack); });
-    by_time<can::CellExtremes>([&] { return messages::cell_extremes(pack, cells); });
-    by_time<can::Temperatures>([&] { return messages::temperatures(pack); });
-    by_time<can::Balancing>([&] { return messages::balancing(d); });
+      send_if_due<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(pack); });
+    send_if_due<can::CellExtremes>([&] { return messages::cell_extremes(pack, cells); });
+    send_if_due<can::Temperatures>([&] { return messages::temperatures(pack); });
+    send_if_due<can::Balancing>([&] { return messages::balancing(d); });
   }
 
-  void tell_fault() {
-    if (fault_told_) return;
-    fault_told_ = true;
+  void publish_fault() {
+    if (fault_published_) return;
+    fault_published_ = true;
     const auto fault = hal::last_fault();
     if (!fault) return;
     can::LastFaultAddress address;
@@ -171,13 +173,13 @@ class Telemetry {
   messages::Identity identity_;
   float capacity_ah_ = 0;
   std::optional<measurement::StartingPoint> start_;
-  typename OfAll<can::Messages>::type sent_{};
+  typename SendStatesOf<can::Messages>::type sent_{};
   estimator::EstimateHash hash_;
-  std::uint32_t now_us_ = 0, faults_told_ = 0, told_ = 0;
-  protection::ContactorState state_told_ = protection::ContactorState::off;
-  protection::Outputs outputs_told_;
+  std::uint32_t now_us_ = 0, published_faults_ = 0, published_ = 0;
+  protection::ContactorState published_state_ = protection::ContactorState::off;
+  protection::Outputs published_outputs_;
   std::uint16_t samples_ = 0;
-  bool fault_told_ = false, alarming_told_ = false;
+  bool fault_published_ = false, published_alarming_ = false;
 };
 
 }  // namespace bms::firmware

@@ -16,6 +16,6 @@ struct PowerPath {
 void power_path_set(const PowerPath& wanted);
 
 /// On the load's side of the contactors [uV]; no_reading: not measured.
-std::int32_t link_uv();
+std::int32_t dc_link_uv();
 
 }  // namespace bms::hal

@@ -11,22 +11,22 @@ namespace bms::hal {
 class ReceivedBytes {
  public:
   /// From the interrupt. What does not fit is lost and counted.
-  void put(char byte) {
-    const std::uint32_t at = written_.load(std::memory_order_relaxed);
-    if (at - taken_.load(std::memory_order_acquire) == buffer_.size()) {
+  void push(char byte) {
+    const std::uint32_t at = head_.load(std::memory_order_relaxed);
+    if (at - tail_.load(std::memory_order_acquire) == buffer_.size()) {
       lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
       return;
     }
     buffer_[at % buffer_.size()] = byte;
-    written_.store(at + 1, std::memory_order_release);
+    head_.store(at + 1, std::memory_order_release);
   }
 
   /// From the program; false: there is none.
-  bool take(char& byte) {
-    const std::uint32_t at = taken_.load(std::memory_order_relaxed);
-    if (at == written_.load(std::memory_order_acquire)) return false;
+  bool pop(char& byte) {
+    const std::uint32_t at = tail_.load(std::memory_order_relaxed);
+    if (at == head_.load(std::memory_order_acquire)) return false;
     byte = buffer_[at % buffer_.size()];
-    taken_.store(at + 1, std::memory_order_release);
+    tail_.store(at + 1, std::memory_order_release);
     return true;
   }
 
@@ -34,7 +34,7 @@ class ReceivedBytes {
 
  private:
   std::array<char, 512> buffer_{};
-  std::atomic<std::uint32_t> written_{0}, taken_{0}, lost_{0};
+  std::atomic<std::uint32_t> head_{0}, tail_{0}, lost_{0};
 };
 
 }  // namespace bms::hal

@@ -11,12 +11,12 @@ namespace bms::hal {
 
 class RequestQueue {
  public:
-  constexpr void keep(const can::Frame& frame) {
+  constexpr void push(const can::Frame& frame) {
     if (size_ == frames_.size()) return;
     frames_[(first_ + size_) % frames_.size()] = frame;
     ++size_;
   }
-  constexpr bool next(can::Frame& frame) {
+  constexpr bool pop(can::Frame& frame) {
     if (size_ == 0) return false;
     frame = frames_[first_];
     first_ = (first_ + 1) % frames_.size();

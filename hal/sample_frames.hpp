@@ -3,9 +3,9 @@
 //
 //   0x310  i32 soc_ppb, i32 soc_sigma_ppb            the starting point, before the first sample
 //   0x311  u32 CRC-32, u16 frames, u16 counter       optional: over id and data of all that follow up to the time; how
-//   many they are 0x312  i32 current_ua, i32 voltage_uv            of a pack: over all cells 0x313  i32 link_uv, i32 0
-//   optional: on the load's side of the contactors 0x314 to 0x31B  i32 uv, i32 uv                   of a pack: cells 1
-//   and 2, 3 and 4, ... 0x31C  4 x i16 temperature_cdegc                 of a pack 0x31D  u48 time_us, i16
+//   many they are 0x312  i32 current_ua, i32 voltage_uv            of a pack: over all cells 0x313  i32 dc_link_uv, i32
+//   0 optional: on the load's side of the contactors 0x314 to 0x31B  i32 uv, i32 uv                   of a pack: cells
+//   1 and 2, 3 and 4, ... 0x31C  4 x i16 temperature_cdegc                 of a pack 0x31D  u48 time_us, i16
 //   temperature_cdegc        completes the sample; of a pack: no temperature
 //
 // A frame that gets lost is a missing reading; with a check before it, a sample of which a bit or a frame is wrong is
@@ -25,24 +25,24 @@
 namespace bms::hal {
 
 inline constexpr std::uint16_t start_frame_id = 0x310, check_frame_id = 0x311, reading_frame_id = 0x312,
-                               link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
+                               dc_link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
                                time_frame_id = 0x31D, first_sample_frame_id = start_frame_id,
                                last_sample_frame_id = time_frame_id;
 
 /// Whether the frame is one of these.
-constexpr bool of_sample(const can::Frame& frame) {
+constexpr bool is_sample_frame(const can::Frame& frame) {
   return !frame.long_id && frame.id >= first_sample_frame_id && frame.id <= last_sample_frame_id;
 }
 
 /// CRC-32 (IEEE 802.3) of what a check covers, continued: begins with ~0, ends inverted.
-constexpr std::uint32_t check_more(std::uint32_t crc, const can::Frame& frame) {
-  const auto take = [&](std::uint8_t byte) {
+constexpr std::uint32_t update_crc(std::uint32_t crc, const can::Frame& frame) {
+  const auto add_byte = [&](std::uint8_t byte) {
     crc ^= byte;
     for (int k = 0; k < 8; ++k) crc = crc >> 1 ^ ((crc & 1) != 0 ? 0xEDB8'8320U : 0U);
   };
-  take(static_cast<std::uint8_t>(frame.id & 0xFF));
-  take(static_cast<std::uint8_t>(frame.id >> 8));
-  for (const std::uint8_t byte : frame.data) take(byte);
+  add_byte(static_cast<std::uint8_t>(frame.id & 0xFF));
+  add_byte(static_cast<std::uint8_t>(frame.id >> 8));
+  for (const std::uint8_t byte : frame.data) add_byte(byte);
   return crc;
 }
 
@@ -61,7 +61,7 @@ inline constexpr std::size_t pack_frames = 5 + (Cells + 1) / 2;
 
 template <std::size_t Cells>
 constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement::PackSample<Cells>& s,
-                                                               std::int32_t link_uv, std::uint16_t counter) {
+                                                               std::int32_t dc_link_uv, std::uint16_t counter) {
   static_assert(Cells <= 16);
   std::array<can::Frame, pack_frames<Cells>> frames{};
   std::size_t n = 1;
@@ -72,18 +72,18 @@ constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement
     put_bytes(frame.data, 4, second);
   };
   pair(reading_frame_id, s.current_ua, s.pack_uv);
-  pair(link_frame_id, link_uv, 0);
+  pair(dc_link_frame_id, dc_link_uv, 0);
   for (std::size_t k = 0; k < Cells; k += 2)
     pair(static_cast<std::uint16_t>(first_cells_frame_id + k / 2), s.cell_uv[k],
          k + 1 < Cells ? s.cell_uv[k + 1] : measurement::no_reading);
   frames[n] = {temperatures_frame_id, 8, {}};
-  for (std::size_t k = 0; k < measurement::most_temperatures; ++k)
+  for (std::size_t k = 0; k < measurement::max_temperatures; ++k)
     put_bytes(frames[n].data, 2 * k, s.temperature_cdegc[k]);
   frames[++n] = {time_frame_id, 8, {}};
   put_bytes(frames[n].data, 0, s.time_us, 6);
   put_bytes(frames[n].data, 6, measurement::no_temperature);
   std::uint32_t crc = ~0U;
-  for (std::size_t k = 1; k < frames.size(); ++k) crc = check_more(crc, frames[k]);
+  for (std::size_t k = 1; k < frames.size(); ++k) crc = update_crc(crc, frames[k]);
   frames[0] = {check_frame_id, 8, {}};
   put_bytes(frames[0].data, 0, ~crc);
   put_bytes(frames[0].data, 4, static_cast<std::uint16_t>(frames.size() - 1));
@@ -104,8 +104,8 @@ class SampleFrames {
  public:
   /// True when `frame` completed a sample, which sample() then holds until the next frame. Frames of another length or
   /// number change nothing.
-  constexpr bool take(const can::Frame& frame) {
-    if (frame.length != 8 || !of_sample(frame) || frame.id == start_frame_id) return false;
+  constexpr bool receive(const can::Frame& frame) {
+    if (frame.length != 8 || !is_sample_frame(frame) || frame.id == start_frame_id) return false;
     if (done_) begin();
     if (frame.id == check_frame_id) {
       begin();
@@ -114,20 +114,20 @@ class SampleFrames {
       expected_frames_ = get_bytes<std::uint16_t>(frame.data, 4);
       return false;
     }
-    crc_ = check_more(crc_, frame);
+    crc_ = update_crc(crc_, frame);
     ++frames_;
     if (frame.id == reading_frame_id) {
       building_.current_ua = get_bytes<std::int32_t>(frame.data, 0);
       building_.pack_uv = get_bytes<std::int32_t>(frame.data, 4);
       if constexpr (Cells == 1) building_.cell_uv[0] = building_.pack_uv;
-    } else if (frame.id == link_frame_id) {
-      link_uv_ = get_bytes<std::int32_t>(frame.data, 0);
+    } else if (frame.id == dc_link_frame_id) {
+      dc_link_uv_ = get_bytes<std::int32_t>(frame.data, 0);
     } else if (frame.id >= first_cells_frame_id && frame.id < temperatures_frame_id) {
       const std::size_t first = std::size_t{2} * (frame.id - first_cells_frame_id);
       if (first < Cells) building_.cell_uv[first] = get_bytes<std::int32_t>(frame.data, 0);
       if (first + 1 < Cells) building_.cell_uv[first + 1] = get_bytes<std::int32_t>(frame.data, 4);
     } else if (frame.id == temperatures_frame_id) {
-      for (std::size_t k = 0; k < measurement::most_temperatures; ++k)
+      for (std::size_t k = 0; k < measurement::max_temperatures; ++k)
         building_.temperature_cdegc[k] = get_bytes<std::int16_t>(frame.data, 2 * k);
     }
     if (frame.id != time_frame_id) return false;
@@ -136,35 +136,35 @@ class SampleFrames {
       building_.temperature_cdegc[0] = cdegc;
     done_ = true;
     if (!checked_ || (~crc_ == expected_crc_ && frames_ == expected_frames_)) return true;
-    ++refused_;
+    ++rejected_;
     return false;
   }
 
   constexpr const measurement::PackSample<Cells>& sample() const { return building_; }
-  constexpr std::int32_t link_uv() const { return link_uv_; }   ///< measurement::no_reading: nobody says
-  constexpr std::uint32_t refused() const { return refused_; }  ///< samples that were not what was checked
+  constexpr std::int32_t dc_link_uv() const { return dc_link_uv_; }  ///< measurement::no_reading: nobody says
+  constexpr std::uint32_t rejected() const { return rejected_; }     ///< samples that were not what was checked
 
  private:
   constexpr void begin() {
     building_ = {};
-    link_uv_ = measurement::no_reading;
+    dc_link_uv_ = measurement::no_reading;
     crc_ = ~0U;
     frames_ = 0;
     checked_ = done_ = false;
   }
 
   measurement::PackSample<Cells> building_{};
-  std::int32_t link_uv_ = measurement::no_reading;
-  std::uint32_t crc_ = ~0U, expected_crc_ = 0, refused_ = 0;
+  std::int32_t dc_link_uv_ = measurement::no_reading;
+  std::uint32_t crc_ = ~0U, expected_crc_ = 0, rejected_ = 0;
   std::uint16_t frames_ = 0, expected_frames_ = 0;
   bool checked_ = false, done_ = false;
 };
 
-constexpr bool is_start(const can::Frame& frame) {
+constexpr bool is_starting_point(const can::Frame& frame) {
   return !frame.long_id && frame.id == start_frame_id && frame.length == 8;
 }
 
-constexpr measurement::StartingPoint start_of(const can::Frame& frame) {
+constexpr measurement::StartingPoint starting_point_of(const can::Frame& frame) {
   return {get_bytes<std::int32_t>(frame.data, 0), get_bytes<std::int32_t>(frame.data, 4)};
 }
 

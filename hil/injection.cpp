@@ -96,7 +96,7 @@ const Injection* Injector::find(const char* name, double time_s) const {
 
 bool Injector::active(const char* name, double time_s) const { return find(name, time_s) != nullptr; }
 
-void Injector::apply(double time_s, measurement::PackSample<most_cells>& s) {
+void Injector::apply(double time_s, measurement::PackSample<max_cells>& s) {
   const auto cell_of = [&](const Injection& i) { return static_cast<std::size_t>(i.value) - 1; };
   if (const auto* i = find("cell_stuck", time_s)) s.cell_uv[cell_of(*i)] = last_.cell_uv[cell_of(*i)];
   if (const auto* i = find("cell_open", time_s)) s.cell_uv[cell_of(*i)] = measurement::no_reading;

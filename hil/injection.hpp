@@ -41,7 +41,7 @@ class Injector {
 
   bool active(const char* name, double time_s) const;
   /// Sensors.
-  void apply(double time_s, measurement::PackSample<most_cells>& sample);
+  void apply(double time_s, measurement::PackSample<max_cells>& sample);
   /// The wire. Frames that are late come with the next call's.
   std::vector<can::Frame> apply(double time_s, std::vector<can::Frame> frames);
 
@@ -53,7 +53,7 @@ class Injector {
   std::vector<Injection> all_;
   std::mt19937_64 random_;
   std::vector<can::Frame> late_;
-  measurement::PackSample<most_cells> last_;
+  measurement::PackSample<max_cells> last_;
 };
 
 }  // namespace bms::hil

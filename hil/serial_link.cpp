@@ -79,7 +79,7 @@ class SerialLink : public BoardLink {
       bool ended = false;
       for (const char byte : std::string_view(bytes.data(), static_cast<std::size_t>(n))) {
         can::Frame frame;
-        if (!reader_.take(byte) || !hal::slcan::decode(reader_.line(), frame)) continue;
+        if (!reader_.push(byte) || !hal::slcan::decode(reader_.line(), frame)) continue;
         frames.push_back(frame);
         ended = ended || (last_id != 0 && frame.id == last_id);
       }

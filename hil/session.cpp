@@ -15,14 +15,14 @@ namespace bms::hil {
 namespace {
 
 constexpr double precharge_gives_up_s = 60, trace_every_s = 10, rest_c_rate = 0.02;
-constexpr double parting_s = 20,
-                 asking_again_s = 12;  // after the drive nobody asks for 12 s, the contactors open; then they are asked
-                                       // to close again, which tells whether one is welded
+constexpr double shutdown_s = 20,
+                 reclose_request_s = 12;  // after the drive nobody asks for 12 s, the contactors open; then they are
+                                          // asked to close again, which tells whether one is welded
 
 /// Current, temperature and, replayed, voltage at a time of the drive.
-class Drive {
+class LoadProfile {
  public:
-  explicit Drive(const files::Recording& r) : r_(r) {}
+  explicit LoadProfile(const files::Recording& r) : r_(r) {}
 
   /// Times must ascend.
   void go_to(double time_s) {
@@ -50,19 +50,19 @@ class Drive {
 };
 
 /// What the board has said last. Frames that are not whole are none.
-class Heard {
+class ReceivedState {
  public:
   can::PackState pack;
   can::ContactorState contactors;
   can::AllowedCurrent allowed;
-  bool said_pack = false, said_status = false;
-  std::vector<FaultSeen> faults;
+  bool pack_received = false, status_received = false;
+  std::vector<FaultEvent> faults;
 
-  void take(double time_s, const can::Frame& frame) {
-    if (bus_.take(monitor::on_bus(frame, std::llround(1e6 * time_s))) == monitor::messages().size()) return;
+  void receive(double time_s, const can::Frame& frame) {
+    if (bus_.receive(monitor::to_bus_frame(frame, std::llround(1e6 * time_s))) == monitor::messages().size()) return;
     switch (frame.id) {
       case can::PackState::id:
-        pack = can::PackState::of(frame), said_pack = true;
+        pack = can::PackState::of(frame), pack_received = true;
         break;
       case can::ContactorState::id:
         contactors = can::ContactorState::of(frame);
@@ -71,10 +71,10 @@ class Heard {
         allowed = can::AllowedCurrent::of(frame);
         break;
       case can::Status::id:
-        said_status = true;
+        status_received = true;
         break;
       case can::Faults::id:
-        see_faults(time_s, can::Faults::of(frame));
+        update_faults(time_s, can::Faults::of(frame));
         break;
       default:
         break;
@@ -90,11 +90,11 @@ class Heard {
     return all;
   }
 
-  void see_faults(double time_s, can::Faults message) {
+  void update_faults(double time_s, can::Faults message) {
     message.each([&](const char* name, const char*, auto& value, const can::SignalLayout& s) {
       if (s.bits != 1) return;
       const auto last =
-          std::find_if(faults.rbegin(), faults.rend(), [&](const FaultSeen& f) { return f.name == name; });
+          std::find_if(faults.rbegin(), faults.rend(), [&](const FaultEvent& f) { return f.name == name; });
       const bool raised = last != faults.rend() && !last->cleared_at_s;
       if (value != 0 && !raised) faults.push_back({name, time_s, {}});
       if (value == 0 && raised) last->cleared_at_s = time_s;
@@ -112,7 +112,7 @@ can::Frame request(std::uint32_t what, std::uint8_t counter) {
 }
 
 template <std::size_t Cells>
-std::vector<can::Frame> frames_for(const measurement::PackSample<most_cells>& all, double link_v,
+std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, double dc_link_v,
                                    std::uint16_t counter) {
   measurement::PackSample<Cells> s;
   s.time_us = all.time_us;
@@ -120,18 +120,18 @@ std::vector<can::Frame> frames_for(const measurement::PackSample<most_cells>& al
   s.pack_uv = Cells == 1 ? all.cell_uv[0] : all.pack_uv;
   std::copy_n(all.cell_uv.begin(), Cells, s.cell_uv.begin());
   s.temperature_cdegc = all.temperature_cdegc;
-  const auto frames = hal::frames_of(s, static_cast<std::int32_t>(std::lround(1e6 * link_v)), counter);
+  const auto frames = hal::frames_of(s, static_cast<std::int32_t>(std::lround(1e6 * dc_link_v)), counter);
   return {frames.begin(), frames.end()};
 }
 
 /// What the load or the charger takes.
-double demanded(const Heard& heard, double wanted_a, bool obeys) {
-  const bool ready = heard.contactors.state == can::ContactorState::state_drive ||
-                     heard.contactors.state == can::ContactorState::state_charge;
+double load_current_a(const ReceivedState& received, double wanted_a, bool obeys) {
+  const bool ready = received.contactors.state == can::ContactorState::state_drive ||
+                     received.contactors.state == can::ContactorState::state_charge;
   if (!ready) return 0;
   if (!obeys) return wanted_a;
   const auto at_most = [](float limit_a) { return std::isfinite(limit_a) ? static_cast<double>(limit_a) : 0; };
-  return std::clamp(wanted_a, -at_most(heard.allowed.discharge), at_most(heard.allowed.charge));
+  return std::clamp(wanted_a, -at_most(received.allowed.discharge), at_most(received.allowed.charge));
 }
 
 }  // namespace
@@ -141,87 +141,88 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan,
                           const std::function<void(double)>& progress) {
   const auto begin = std::chrono::steady_clock::now();
   SessionResult result;
-  Heard heard;
-  Drive drive(plan.drive);
+  ReceivedState received;
+  LoadProfile profile(plan.profile);
   SimulatedPack pack(plan.cell, plan.cells, plan.initial_soc, plan.spread);
   Injector injector(plan.injections, plan.spread.seed + 1);
-  const double end_s = plan.drive.time_s.back() - plan.drive.time_s.front();
-  const auto asks_every =
+  const double end_s = plan.profile.time_s.back() - plan.profile.time_s.front();
+  const auto request_period =
       static_cast<std::uint64_t>(std::max(1L, std::lround(1 / plan.sample_period_s)));  // once a second
-  double drive_s = 0, squares = 0;
+  double profile_s = 0, squares = 0;
   std::uint64_t judged = 0, inside = 0;
   std::vector<float> sigmas;
-  std::uint8_t asked = 0;
-  double link_v = 0, replayed_link_v = 0;
+  std::uint8_t request_counter = 0;
+  double dc_link_v = 0, replayed_dc_link_v = 0;
 
-  const auto say = [&](double time_s, const std::vector<can::Frame>& frames) {
-    heard.said_status = heard.said_pack = false;
+  const auto exchange_frames = [&](double time_s, const std::vector<can::Frame>& frames) {
+    received.status_received = received.pack_received = false;
     for (const can::Frame& f : link.exchange(time_s, frames)) {
       ++result.frames;
-      heard.take(time_s, f);
+      received.receive(time_s, f);
       if (frame) frame(time_s, f);
     }
   };
-  if (plan.told_soc) {
-    say(0, {hal::frame_of(
-               measurement::StartingPoint{static_cast<std::int32_t>(std::lround(1e9 * *plan.told_soc)), 20'000'000})});
+  if (plan.announced_soc) {
+    exchange_frames(0, {hal::frame_of(measurement::StartingPoint{
+                           static_cast<std::int32_t>(std::lround(1e9 * *plan.announced_soc)), 20'000'000})});
   }
 
-  for (std::uint64_t k = 0; drive_s <= end_s + (plan.replayed ? 0 : parting_s); ++k) {
+  for (std::uint64_t k = 0; profile_s <= end_s + (plan.replayed ? 0 : shutdown_s); ++k) {
     const double time_s = static_cast<double>(k) * plan.sample_period_s;
-    const Closed closed{heard.contactors.main_plus != 0, heard.contactors.main_minus != 0,
-                        heard.contactors.precharge != 0};
+    const ContactorCommand closed{received.contactors.main_plus != 0, received.contactors.main_minus != 0,
+                                  received.contactors.precharge != 0};
     const bool driving = closed.main_plus && closed.main_minus;
     if (driving && !result.driving_after_s) result.driving_after_s = time_s;
     // a drive, or what was recorded of one, begins when the contactors are closed; nothing waits for ever
     const bool moves = result.driving_after_s || time_s > precharge_gives_up_s;
-    if (moves && k > 0) drive_s += plan.sample_period_s;
-    const bool parting = drive_s > end_s;
-    drive.go_to(drive_s);
+    if (moves && k > 0) profile_s += plan.sample_period_s;
+    const bool shutting_down = profile_s > end_s;
+    profile.go_to(profile_s);
 
-    Closed real = closed;
+    ContactorCommand real = closed;
     if (injector.active("precharge_open", time_s)) real.precharge = false;
     const bool welded = injector.active("welded", time_s), obeys = !injector.active("overcurrent", time_s);
     const double most_a = plan.cell.parameters.limits.discharge_current_max_a;
-    pack.run(parting ? 0
-             : obeys ? demanded(heard, drive.current_a(), true)
-                     : demanded(heard, -1.6 * most_a, false),
-             real, welded, drive.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
-    auto sample = pack.read(static_cast<std::uint64_t>(std::llround(1e6 * time_s)), drive.temperature_c());
+    pack.run(shutting_down ? 0
+             : obeys       ? load_current_a(received, profile.current_a(), true)
+                           : load_current_a(received, -1.6 * most_a, false),
+             real, welded, profile.temperature_c(), k == 0 ? 0 : plan.sample_period_s);
+    auto sample = pack.read(static_cast<std::uint64_t>(std::llround(1e6 * time_s)), profile.temperature_c());
     double truth = pack.soc();
-    link_v = pack.link_v();
+    dc_link_v = pack.dc_link_v();
     if (plan.replayed) {
-      const auto volts = static_cast<std::int32_t>(std::lround(1e6 * drive.voltage_v(drive_s)));
-      const double recorded_a = moves ? drive.current_a() : 0;
-      const bool carries = real.carries(welded);
-      sample.current_ua = carries ? static_cast<std::int32_t>(std::lround(1e6 * recorded_a)) : 0;
-      if (!carries && std::abs(recorded_a) > rest_c_rate * plan.cell.parameters.capacity_ah && !result.cut_off_at_s)
+      const auto volts = static_cast<std::int32_t>(std::lround(1e6 * profile.voltage_v(profile_s)));
+      const double recorded_a = moves ? profile.current_a() : 0;
+      const bool conducts = real.conducts(welded);
+      sample.current_ua = conducts ? static_cast<std::int32_t>(std::lround(1e6 * recorded_a)) : 0;
+      if (!conducts && std::abs(recorded_a) > rest_c_rate * plan.cell.parameters.capacity_ah && !result.cut_off_at_s)
         result.cut_off_at_s = time_s;
       for (std::size_t c = 0; c < plan.cells; ++c) sample.cell_uv[c] = volts;
       sample.pack_uv = static_cast<std::int32_t>(plan.cells) * volts;
-      truth = result.cut_off_at_s ? std::nan("") : drive.soc_ref(drive_s);
-      replayed_link_v = link_after(replayed_link_v, 1e-6 * sample.pack_uv, real, welded, plan.sample_period_s);
-      link_v = replayed_link_v;
+      truth = result.cut_off_at_s ? std::nan("") : profile.soc_ref(profile_s);
+      replayed_dc_link_v =
+          dc_link_voltage_after(replayed_dc_link_v, 1e-6 * sample.pack_uv, real, welded, plan.sample_period_s);
+      dc_link_v = replayed_dc_link_v;
     }
     injector.apply(time_s, sample);
 
     std::vector<can::Frame> frames;
-    if (k % asks_every == 0)
-      frames.push_back(
-          request(static_cast<std::uint32_t>(parting && drive_s <= end_s + asking_again_s ? protection::Request::none
-                                                                                          : protection::Request::drive),
-                  asked = can::next(asked)));
-    const auto measured = plan.cells == 1 ? frames_for<1>(sample, link_v, static_cast<std::uint16_t>(k))
-                                          : frames_for<most_cells>(sample, link_v, static_cast<std::uint16_t>(k));
+    if (k % request_period == 0)
+      frames.push_back(request(static_cast<std::uint32_t>(shutting_down && profile_s <= end_s + reclose_request_s
+                                                              ? protection::Request::none
+                                                              : protection::Request::drive),
+                               request_counter = can::next(request_counter)));
+    const auto measured = plan.cells == 1 ? frames_for<1>(sample, dc_link_v, static_cast<std::uint16_t>(k))
+                                          : frames_for<max_cells>(sample, dc_link_v, static_cast<std::uint16_t>(k));
     for (const can::Frame& f : injector.apply(time_s, measured)) frames.push_back(f);
-    say(time_s, frames);
+    exchange_frames(time_s, frames);
 
     ++result.samples;
-    if (!heard.said_status) ++result.unanswered;
-    if (heard.said_pack && std::isfinite(heard.pack.soc) && std::isfinite(truth)) {
-      const double error = 0.01 * static_cast<double>(heard.pack.soc) - truth,
-                   sigma = 0.01 * static_cast<double>(heard.pack.soc_sigma);
-      ++result.soc_told;
+    if (!received.status_received) ++result.unanswered;
+    if (received.pack_received && std::isfinite(received.pack.soc) && std::isfinite(truth)) {
+      const double error = 0.01 * static_cast<double>(received.pack.soc) - truth,
+                   sigma = 0.01 * static_cast<double>(received.pack.soc_sigma);
+      ++result.soc_published;
       squares += error * error;
       ++judged;
       if (std::abs(error) <= 2 * sigma) ++inside;
@@ -236,15 +237,15 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan,
         highest = std::max(highest, 1e-6 * sample.cell_uv[c]);
       }
       result.trace.push_back({time_s,
-                              0.01 * static_cast<double>(heard.pack.soc),
-                              0.01 * static_cast<double>(heard.pack.soc_sigma),
+                              0.01 * static_cast<double>(received.pack.soc),
+                              0.01 * static_cast<double>(received.pack.soc_sigma),
                               truth,
                               1e-6 * sample.current_ua,
                               lowest,
                               highest,
-                              link_v,
+                              dc_link_v,
                               {}});
-      if (progress) progress(end_s > 0 ? std::min(1.0, drive_s / end_s) : 1);
+      if (progress) progress(end_s > 0 ? std::min(1.0, profile_s / end_s) : 1);
     }
     result.duration_s = time_s;
   }
@@ -256,18 +257,18 @@ SessionResult run_session(BoardLink& link, const SessionPlan& plan,
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     result.median_sigma = static_cast<double>(*middle);
   }
-  result.lost = heard.lost();
-  result.crc_errors = heard.crc_errors();
-  result.faults = heard.faults;
+  result.lost = received.lost();
+  result.crc_errors = received.crc_errors();
+  result.faults = received.faults;
   for (const Injection& i : injector.all()) {
-    Reaction r{i, {}, true};
+    InjectionResult r{i, {}, true};
     if (!i.expected.empty() && i.from_s <= result.duration_s) {
-      for (const FaultSeen& f : result.faults) {
+      for (const FaultEvent& f : result.faults) {
         if (f.name == i.expected && f.raised_at_s >= i.from_s && !r.after_s) r.after_s = f.raised_at_s - i.from_s;
       }
       r.in_time = r.after_s && *r.after_s <= i.within_s;
     }
-    result.reactions.push_back(r);
+    result.injection_results.push_back(r);
   }
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   result.speedup = wall_s > 0 ? result.duration_s / wall_s : 0;

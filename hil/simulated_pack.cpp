@@ -5,12 +5,13 @@
 
 namespace bms::hil {
 
-double link_after(double link_v, double pack_v, const Closed& closed, bool welded, double duration_s) {
+double dc_link_voltage_after(double dc_link_v, double pack_v, const ContactorCommand& closed, bool welded,
+                             double duration_s) {
   constexpr double precharge_time_constant_s = 0.5, falls_in_s = 5;
-  if (closed.carries(welded)) return pack_v;
+  if (closed.conducts(welded)) return pack_v;
   if (closed.precharge && closed.main_minus)
-    return link_v + (pack_v - link_v) * (1 - std::exp(-duration_s / precharge_time_constant_s));
-  return link_v * std::exp(-duration_s / falls_in_s);
+    return dc_link_v + (pack_v - dc_link_v) * (1 - std::exp(-duration_s / precharge_time_constant_s));
+  return dc_link_v * std::exp(-duration_s / falls_in_s);
 }
 
 SimulatedPack::SimulatedPack(const files::CellFile& cell, std::size_t cells, double initial_soc,
@@ -21,21 +22,21 @@ SimulatedPack::SimulatedPack(const files::CellFile& cell, std::size_t cells, dou
       spread_(spread),
       capacity_ah_(cell.parameters.capacity_ah) {
   std::normal_distribution<double> normal;
-  courses_.reserve(cells);
+  simulations_.reserve(cells);
   for (std::size_t k = 0; k < cells; ++k) {
     const double soc = cells > 1 ? spread.soc * normal(random_) : 0,
                  capacity = cells > 1 ? spread.capacity * normal(random_) : 0;
     const double own_ah = capacity_ah_ * (1 + capacity);
-    courses_.emplace_back(tables_, own_ah, model::chosen<double>(cell.mechanisms, own_ah),
-                          std::clamp(initial_soc + soc, 0.0, 1.0));
-    voltage_v_[k] = courses_[k].step(0, 0, 0, 25, [](auto&, const auto&) {});
+    simulations_.emplace_back(tables_, own_ah, model::chosen<double>(cell.mechanisms, own_ah),
+                              std::clamp(initial_soc + soc, 0.0, 1.0));
+    voltage_v_[k] = simulations_[k].step(0, 0, 0, 25, [](auto&, const auto&) {});
   }
 }
 
 double SimulatedPack::soc() const {
   double sum = 0;
-  for (const auto& c : courses_) sum += c.soc();
-  return sum / static_cast<double>(courses_.size());
+  for (const auto& c : simulations_) sum += c.soc();
+  return sum / static_cast<double>(simulations_.size());
 }
 
 double SimulatedPack::pack_v() const {
@@ -44,23 +45,24 @@ double SimulatedPack::pack_v() const {
   return sum;
 }
 
-void SimulatedPack::run(double demand_a, const Closed& closed, bool welded, double temperature_c, double duration_s) {
-  current_a_ = closed.carries(welded) ? demand_a : 0;
+void SimulatedPack::run(double demand_a, const ContactorCommand& closed, bool welded, double temperature_c,
+                        double duration_s) {
+  current_a_ = closed.conducts(welded) ? demand_a : 0;
   time_s_ += duration_s;
-  for (std::size_t k = 0; k < courses_.size(); ++k)
-    voltage_v_[k] = courses_[k].step(time_s_, duration_s, current_a_, temperature_c, [](auto&, const auto&) {});
-  link_v_ = link_after(link_v_, pack_v(), closed, welded, duration_s);
+  for (std::size_t k = 0; k < simulations_.size(); ++k)
+    voltage_v_[k] = simulations_[k].step(time_s_, duration_s, current_a_, temperature_c, [](auto&, const auto&) {});
+  dc_link_v_ = dc_link_voltage_after(dc_link_v_, pack_v(), closed, welded, duration_s);
 }
 
-measurement::PackSample<most_cells> SimulatedPack::read(std::uint64_t time_us, double temperature_c) {
+measurement::PackSample<max_cells> SimulatedPack::read(std::uint64_t time_us, double temperature_c) {
   std::normal_distribution<double> normal;
   const auto micro = [](double v) { return static_cast<std::int32_t>(std::lround(1e6 * v)); };
-  measurement::PackSample<most_cells> s;
+  measurement::PackSample<max_cells> s;
   s.time_us = time_us;
   s.current_ua = micro(current_a_ + spread_.current_noise_a * normal(random_));
-  for (std::size_t k = 0; k < courses_.size(); ++k)
+  for (std::size_t k = 0; k < simulations_.size(); ++k)
     s.cell_uv[k] = micro(voltage_v_[k] + spread_.voltage_noise_v * normal(random_));
-  s.pack_uv = courses_.size() == 1 ? s.cell_uv[0] : micro(pack_v() + 4 * spread_.voltage_noise_v * normal(random_));
+  s.pack_uv = simulations_.size() == 1 ? s.cell_uv[0] : micro(pack_v() + 4 * spread_.voltage_noise_v * normal(random_));
   for (auto& t : s.temperature_cdegc)
     t = static_cast<std::int16_t>(std::lround(100 * (temperature_c + spread_.temperature_noise_c * normal(random_))));
   return s;

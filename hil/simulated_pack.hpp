@@ -17,7 +17,7 @@
 
 namespace bms::hil {
 
-inline constexpr std::size_t most_cells = 16;
+inline constexpr std::size_t max_cells = 16;
 
 struct PackSpread {
   std::uint32_t seed = 1;
@@ -26,15 +26,16 @@ struct PackSpread {
 };
 
 /// What the contactors are told; as ContactorState on CAN.
-struct Closed {
+struct ContactorCommand {
   bool main_plus = false, main_minus = false, precharge = false;
 
   /// Whether current can flow; welded: main+ does not open.
-  constexpr bool carries(bool welded) const { return (main_plus || welded) && main_minus; }
+  constexpr bool conducts(bool welded) const { return (main_plus || welded) && main_minus; }
 };
 
 /// The link's voltage after a time with the contactors so.
-double link_after(double link_v, double pack_v, const Closed& closed, bool welded, double duration_s);
+double dc_link_voltage_after(double dc_link_v, double pack_v, const ContactorCommand& closed, bool welded,
+                             double duration_s);
 
 class SimulatedPack {
  public:
@@ -42,25 +43,25 @@ class SimulatedPack {
 
   /// demand_a: what load or charger would have; flows while both main contactors are closed. welded: main+ does not
   /// open.
-  void run(double demand_a, const Closed& closed, bool welded, double temperature_c, double duration_s);
+  void run(double demand_a, const ContactorCommand& closed, bool welded, double temperature_c, double duration_s);
 
   double current_a() const { return current_a_; }
-  double link_v() const { return link_v_; }
+  double dc_link_v() const { return dc_link_v_; }
   double soc() const;  ///< mean of the cells
   double voltage_v(std::size_t cell) const { return voltage_v_[cell]; }
   double pack_v() const;
-  std::size_t cells() const { return courses_.size(); }
+  std::size_t cells() const { return simulations_.size(); }
 
   /// As the sensors read it; of what a board has no sensor for, nothing.
-  measurement::PackSample<most_cells> read(std::uint64_t time_us, double temperature_c);
+  measurement::PackSample<max_cells> read(std::uint64_t time_us, double temperature_c);
 
  private:
   model::Cell<double, model::max_intervals> tables_;
-  std::vector<model::Course<double>> courses_;
+  std::vector<model::OpenLoopSimulation<double>> simulations_;
   std::vector<double> voltage_v_;
   std::mt19937_64 random_;
   PackSpread spread_;
-  double capacity_ah_, time_s_ = 0, current_a_ = 0, link_v_ = 0;
+  double capacity_ah_, time_s_ = 0, current_a_ = 0, dc_link_v_ = 0;
 };
 
 }  // namespace bms::hil

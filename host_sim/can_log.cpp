@@ -101,11 +101,11 @@ CanLog read_can_log(const std::string& path) {
     while (!source->ended()) {
       const std::size_t n = source->read(room, 0);
       for (std::size_t k = 0; k < n; ++k) {
-        if (room[k].kind == monitor::FrameKind::standard) samples.take(monitor::classic(room[k]));
+        if (room[k].kind == monitor::FrameKind::standard) samples.take(monitor::to_can_frame(room[k]));
       }
     }
     malformed = source->malformed();
-  } catch (const monitor::SourceRefused& refused) {
+  } catch (const monitor::SourceError& refused) {
     throw files::BadInput(path, refused.line == 0 ? 1 : refused.line, refused.what());
   }
   if (log.samples.size() < 2)
@@ -136,8 +136,8 @@ std::optional<std::string> difference_to_log(const CanLog& log, const Track& tra
   estimator::EstimateHash hash;
   const std::size_t states = track.state_names.size();
   for (std::size_t k = 0; k < log.unbroken; ++k) {
-    hash.take(track.words[k]);
-    for (std::size_t s = 0; s < states; ++s) hash.take(std::array{track.state_words[k * states + s]});
+    hash.add(track.words[k]);
+    for (std::size_t s = 0; s < states; ++s) hash.add(std::array{track.state_words[k * states + s]});
     if (!log.hashes[k]) continue;
     if (*log.hashes[k] != hash.value())
       return fmt::format("estimates differ from the firmware's at sample {} (time {:g} s) or since {}", k + 1,

@@ -10,7 +10,7 @@
 
 #include "host_sim/replay_run.hpp"
 #include "host_sim/simulation.hpp"
-#include "identification/figures.hpp"
+#include "identification/goodness_of_fit.hpp"
 
 namespace bms::host_sim {
 
@@ -24,34 +24,34 @@ constexpr std::size_t current_offset_at = 1, current_offset_sigma_at = 2;
 
 /// The value of an estimate's word as a board writes it.
 double number_of(std::uint32_t word, ScalarKind scalar) {
-  if (scalar == ScalarKind::single) return std::bit_cast<float>(word);
+  if (scalar == ScalarKind::float32) return std::bit_cast<float>(word);
   return static_cast<double>(
       arithmetic::Soc<arithmetic::FixedPoint>::from_raw(static_cast<std::int32_t>(word)));  // all four are Q3.28
 }
 
 std::string formatted(double value, ScalarKind scalar) {
-  return scalar == ScalarKind::single ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{}", value);
+  return scalar == ScalarKind::float32 ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{}", value);
 }
 
 }  // namespace
 
 const char* name_of(ScalarKind scalar) {
   switch (scalar) {
-    case ScalarKind::single:
+    case ScalarKind::float32:
       return "float";
     case ScalarKind::fixed:
       return "fixed";
-    case ScalarKind::twice:
+    case ScalarKind::float64:
       return "double";
   }
   return "";
 }
 
-std::optional<measurement::StartingPoint> starting_point(const std::optional<Belief>& belief, double shift) {
-  if (!belief) return std::nullopt;
+std::optional<measurement::StartingPoint> starting_point(const std::optional<SocPrior>& prior, double shift) {
+  if (!prior) return std::nullopt;
   return measurement::StartingPoint{
-      static_cast<std::int32_t>(std::lround(std::clamp(belief->soc + shift, 0.0, 1.0) * 1e9)),
-      static_cast<std::int32_t>(std::lround(belief->sigma * 1e9))};
+      static_cast<std::int32_t>(std::lround(std::clamp(prior->soc + shift, 0.0, 1.0) * 1e9)),
+      static_cast<std::int32_t>(std::lround(prior->sigma * 1e9))};
 }
 
 Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sample>& samples,
@@ -59,9 +59,9 @@ Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sa
   Track track = [&] {
     switch (scalar) {
       case ScalarKind::fixed:
-        files::refuse_without_fpu(cell);
+        files::reject_if_fpu_needed(cell);
         return run<arithmetic::FixedPoint>(cell, samples, start);
-      case ScalarKind::twice:
+      case ScalarKind::float64:
         return run<double>(cell, samples, start);
       default:
         return run<float>(cell, samples, start);
@@ -94,7 +94,7 @@ void name_states(Track& track, const files::CellFile& cell) {
 }
 
 void number_states(Track& track, ScalarKind scalar) {
-  if (scalar != ScalarKind::twice) {
+  if (scalar != ScalarKind::float64) {
     track.states.clear();
     for (const std::uint32_t w : track.state_words) track.states.push_back(number_of(w, scalar));
   }
@@ -146,11 +146,11 @@ void evaluate(ReplayResult& result) {
   FitFigure fit;
   std::size_t inside = 0;
   const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
-  if (!result.belief) result.initial_soc = rows.front().soc;
+  if (!result.prior) result.initial_soc = rows.front().soc;
   const bool start_known = has_reference && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1;
   // a shift of the start is about what was believed
   const double shift = value_of(result.cell.mechanisms, model::InitialSoc::id, 0),
-               started = result.belief ? result.initial_soc : result.initial_soc - shift;
+               started = result.prior ? result.initial_soc : result.initial_soc - shift;
   const auto open = simulate(cell, result.cell.parameters.capacity_ah, result.cell.mechanisms, r.time_s, r.current_a,
                              r.temperature_c, start_known ? r.soc_ref.front() - shift : started);
 
@@ -164,7 +164,7 @@ void evaluate(ReplayResult& result) {
     }
     // a reading that the filter did not believe says nothing about its prediction
     constexpr std::uint32_t not_believed = estimator::voltage_missing | estimator::voltage_implausible |
-                                           estimator::voltage_stuck | estimator::time_not_later |
+                                           estimator::voltage_stuck | estimator::time_not_increasing |
                                            estimator::not_started;
     if (k > 0 && (e.flags & not_believed) == 0) prediction.add(r.voltage_v[k] - e.voltage_predicted_v);
     if ((e.flags & (estimator::voltage_missing | estimator::voltage_implausible)) == 0) {

@@ -13,7 +13,7 @@
 
 namespace bms::host_sim {
 
-enum class ScalarKind { single, fixed, twice };  ///< float, fixed point, double
+enum class ScalarKind { float32, fixed, float64 };  ///< float, fixed point, double
 
 /// One estimate as numbers, whatever the scalar was.
 struct EstimateRow {
@@ -35,12 +35,12 @@ struct Track {
 };
 
 /// What the user believes of the state of charge before the first sample.
-struct Belief {
+struct SocPrior {
   double soc = 0;
   double sigma = 0.02;
 };
 /// shift: what a cell file knows of the truth of such beliefs.
-std::optional<measurement::StartingPoint> starting_point(const std::optional<Belief>& belief, double shift = 0);
+std::optional<measurement::StartingPoint> starting_point(const std::optional<SocPrior>& prior, double shift = 0);
 
 /// How many of them the estimator tells with this cell file; name_states: which.
 std::size_t state_count(const files::CellFile& cell);
@@ -78,9 +78,9 @@ struct ReplayResult {
   files::Recording recording;
   files::CellFile cell;
   std::string target;
-  ScalarKind scalar = ScalarKind::single;
-  std::optional<Belief> belief;  ///< of the user
-  double initial_soc = 0;        ///< believed, or of the estimator after the first sample
+  ScalarKind scalar = ScalarKind::float32;
+  std::optional<SocPrior> prior;  ///< of the user
+  double initial_soc = 0;         ///< believed, or of the estimator after the first sample
   Track track;
   std::vector<double> open_loop_v;
   SocFigures soc;

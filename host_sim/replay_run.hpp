@@ -47,13 +47,13 @@ template <class Estimator, class Cell>
 
 template <class Estimator, class Cell>
 Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& samples,
-                    const std::optional<measurement::StartingPoint>& start, std::size_t further) {
+                    const std::optional<measurement::StartingPoint>& start, std::size_t extra) {
   using S = typename Estimator::Scalar;
   std::vector<typename Estimator::Result> estimates(samples.size());
   double best_s = std::numeric_limits<double>::infinity(), total_s = 0;
   do {
     const auto begin = std::chrono::steady_clock::now();
-    if constexpr (Estimator::further_values == 0)
+    if constexpr (Estimator::extra_values == 0)
       step_through_flat<Estimator>(cell, samples, start, estimates);
     else
       step_through<Estimator>(cell, samples, start, estimates);
@@ -69,12 +69,12 @@ Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& sa
     track.rows.push_back(row_of<S>(e));
     if constexpr (!std::same_as<S, double>)
       track.words.push_back(estimator::words(static_cast<const estimator::Estimate<S>&>(e)));
-    if constexpr (Estimator::further_values > 0) {
-      for (std::size_t k = 0; k < further; ++k) {
+    if constexpr (Estimator::extra_values > 0) {
+      for (std::size_t k = 0; k < extra; ++k) {
         if constexpr (std::same_as<S, double>)
-          track.states.push_back(e.further[k]);
+          track.states.push_back(e.extra[k]);
         else
-          track.state_words.push_back(estimator::word(e.further[k]));
+          track.state_words.push_back(estimator::word(e.extra[k]));
       }
     }
   }

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "model/corrected_readings.hpp"
 #include "model/extended.hpp"
 #include "model/one_rc.hpp"
-#include "model/readings.hpp"
 
 namespace bms::host_sim {
 
@@ -29,17 +29,17 @@ inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double c
                                           double initial_soc) {
   using Model = model::OneRc<double>;
   std::vector<SimulatedRow> rows(time_s.size());
-  Model::Polarisation x{};
+  Model::State x{};
   double soc = initial_soc, known_a = 0;
   std::uint8_t interval = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double duration_s = k == 0 ? 0 : time_s[k] - time_s[k - 1];
     if (current_a[k] == current_a[k]) known_a = current_a[k];
-    const model::Drive<double> drive{known_a, duration_s};
-    soc = std::clamp(soc + drive.current_a * duration_s / (3'600 * capacity_ah), -0.25, 1.25);
+    const model::StepInput<double> input{known_a, duration_s};
+    soc = std::clamp(soc + input.current_a * duration_s / (3'600 * capacity_ah), -0.25, 1.25);
     const auto at = model::look_up(cell, soc, interval);
-    if (duration_s > 0) x = Model::advance(x, at, Model::settling(at, duration_s), drive);
-    rows[k] = {Model::voltage(x, at, drive), soc};
+    if (duration_s > 0) x = Model::advance(x, at, Model::discretise(at, duration_s), input);
+    rows[k] = {Model::voltage(x, at, input), soc};
   }
   return rows;
 }
@@ -64,14 +64,14 @@ inline std::vector<SimulatedRow> simulate(const HostCell<double>& cell, double c
   const model::CorrectedReadings<double> readings(time_s, current_a, temperature_c,
                                                   value_of(mechanisms, model::ChannelSkew::id, 0),
                                                   value_of(mechanisms, model::TemperatureSensor::id, 1));
-  model::Course<double> course(cell, capacity_ah, model::chosen<double>(mechanisms, capacity_ah),
-                               initial_soc + value_of(mechanisms, model::InitialSoc::id, 0));
+  model::OpenLoopSimulation<double> simulation(cell, capacity_ah, model::chosen<double>(mechanisms, capacity_ah),
+                                               initial_soc + value_of(mechanisms, model::InitialSoc::id, 0));
   std::vector<SimulatedRow> rows(time_s.size());
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double duration_s = k == 0 ? 0 : time_s[k] - time_s[k - 1];
     const double voltage_v =
-        course.step(time_s[k], duration_s, readings.current(k), readings.temperature(k), [](auto&, const auto&) {});
-    rows[k] = {voltage_v, course.soc()};
+        simulation.step(time_s[k], duration_s, readings.current(k), readings.temperature(k), [](auto&, const auto&) {});
+    rows[k] = {voltage_v, simulation.soc()};
   }
   return rows;
 }

@@ -23,14 +23,14 @@ Scalar held_tau(const Scalar& pole, double step_s) {
 
 /// b1, R0, R1, C1 of c0, c1, c2, a1, a2; Scalar: double, or complex for the derivatives.
 template <class Scalar>
-std::array<Scalar, 4> backwards(const std::array<Scalar, 5>& x, double step_s, double capacity_c, Input input) {
+std::array<Scalar, 4> backwards(const std::array<Scalar, 5>& x, double step_s, double capacity_c, Intersample input) {
   const auto& [c0, c1, c2, a1, a2] = x;
   const Scalar tau = step_s * (1.0 + a2) / (2.0 * (1.0 - a2));
   const Scalar d = 2 * capacity_c * step_s + 4 * capacity_c * tau;
   const Scalar b1 = (c0 + c1 + c2) * d / (4 * step_s * step_s);
   const Scalar r0 = (c0 - c1 + c2) * d / (16 * capacity_c * tau);
   const Scalar r1 = (c0 - c2) * d / (4 * capacity_c * step_s) - r0 - b1 * tau / capacity_c;
-  if (input == Input::straight) return {b1, r0, r1, tau / r1};
+  if (input == Intersample::first_order_hold) return {b1, r0, r1, tau / r1};
   const Scalar& p = a2;
   const Scalar held_r1 = r1 * (1.0 + p) / (2.0 * p);
   return {b1, r0 - b1 * step_s / (2 * capacity_c) - held_r1 * (1.0 - p) / (1.0 + p), held_r1,
@@ -46,14 +46,15 @@ std::array<std::complex<double>, 2> poles(double a1, double a2) {
 
 }  // namespace
 
-CircuitReading circuit_from_discrete(const DiscreteCoefficients& c, double step_s, double capacity_c, Input input) {
+CircuitResult circuit_from_discrete(const DiscreteCoefficients& c, double step_s, double capacity_c,
+                                    Intersample input) {
   require(step_s, capacity_c);
   const auto values = backwards<double>({c.c0, c.c1, c.c2, c.a1, c.a2}, step_s, capacity_c, input);
   const auto [one, other] = poles(c.a1, c.a2);
-  CircuitReading out;
+  CircuitResult out;
   out.circuit = {values[0], values[1], values[2], values[3]};
-  out.tau_s = input == Input::held ? held_tau(c.a2, step_s) : step_s * (1 + c.a2) / (2 * (1 - c.a2));
-  out.pole_off_integrator = std::min(std::abs(1.0 - one), std::abs(1.0 - other));
+  out.tau_s = input == Intersample::zero_order_hold ? held_tau(c.a2, step_s) : step_s * (1 + c.a2) / (2 * (1 - c.a2));
+  out.integrator_pole_error = std::min(std::abs(1.0 - one), std::abs(1.0 - other));
 
   const auto judge = [&](const char* name, double value) {
     if (!std::isfinite(value))
@@ -69,11 +70,12 @@ CircuitReading circuit_from_discrete(const DiscreteCoefficients& c, double step_
   return out;
 }
 
-DiscreteCoefficients discrete_from_circuit(const Circuit& circuit, double step_s, double capacity_c, Input input) {
+DiscreteCoefficients discrete_from_circuit(const CircuitParameters& circuit, double step_s, double capacity_c,
+                                           Intersample input) {
   require(step_s, capacity_c);
   const auto& [b1, r0, r1, c1] = circuit;
   const double t = step_s, q = capacity_c, tau = r1 * c1, d = 2 * q * t + 4 * q * tau;
-  if (input == Input::held) {  // R0 + b1 T / C_n / (1 - z^-1) + R1 (1 - p) / (1 - p z^-1)
+  if (input == Intersample::zero_order_hold) {  // R0 + b1 T / C_n / (1 - z^-1) + R1 (1 - p) / (1 - p z^-1)
     const double p = std::exp(-t / tau), counted = b1 * t / q, relaxed = -r1 * std::expm1(-t / tau);
     return {r0 + counted + relaxed, -r0 * (1 + p) - counted * p - relaxed, r0 * p, -(1 + p), p};
   }
@@ -83,7 +85,7 @@ DiscreteCoefficients discrete_from_circuit(const Circuit& circuit, double step_s
 }
 
 Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance,
-                                   double step_s, double capacity_c, Input input) {
+                                   double step_s, double capacity_c, Intersample input) {
   require(step_s, capacity_c);
   constexpr double tiny = 1e-100;  // complex step: no difference is taken, so no rounding whatever its size
   Eigen::Matrix<double, 4, 5> slope;
@@ -97,8 +99,8 @@ Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& c, const Eigen::M
   return slope * covariance * slope.transpose();
 }
 
-Circuit circuit_std(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance, double step_s,
-                    double capacity_c, Input input) {
+CircuitParameters circuit_std(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance,
+                              double step_s, double capacity_c, Intersample input) {
   const Eigen::Vector4d variance = circuit_covariance(c, covariance, step_s, capacity_c, input).diagonal();
   const auto root = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, variance[k])); };
   return {root(0), root(1), root(2), root(3)};

@@ -6,7 +6,7 @@
 //   R1 = (c0 - c2) D / (4 C_n T) - R0 - b1 tau / C_n         C1 = tau / R1
 //
 // The paper's C_n is in coulombs here (Ah x 3600), b1 in volts per unit of soc. a1 does not enter: Eq. 15 makes it -(1
-// + a2), the pole at 1 that counts the charge; an identified a1 is off by a little, and `pole_off_integrator` says by
+// + a2), the pole at 1 that counts the charge; an identified a1 is off by a little, and `integrator_pole_error` says by
 // how much.
 //
 // Accuracy: b1 is what is left of c0 + c1 + c2, about (T / tau) (T b1 / C_n) out of R0: at 1 s a rounding of 1e-16 is
@@ -32,7 +32,7 @@
 
 namespace bms::identification {
 
-struct Circuit {
+struct CircuitParameters {
   double b1_v = 0;  ///< dOCV/dsoc [V] per unit of soc
   double r0_ohm = 0;
   double r1_ohm = 0;
@@ -45,40 +45,40 @@ struct DiscreteCoefficients {
 };
 
 /// How the current runs between samples.
-enum class Input {
-  straight,  ///< Eq. 12-16
-  held,      ///< mean over the interval that ends with the sample, as in a recording
+enum class Intersample {
+  first_order_hold,  ///< Eq. 12-16
+  zero_order_hold,   ///< mean over the interval that ends with the sample, as in a recording
 };
 
 /// Names in the order of Circuit: b1_v, r0_ohm, r1_ohm, c1_f.
 inline constexpr const char* circuit_names[] = {"b1_v", "r0_ohm", "r1_ohm", "c1_f"};
 
-struct CircuitReading {
-  Circuit circuit;                 ///< as the equations give it, never clipped
-  double tau_s = 0;                ///< R1 C1
-  double pole_off_integrator = 0;  ///< distance from 1 of the pole next to it; exactly an integrator: 0
+struct CircuitResult {
+  CircuitParameters circuit;         ///< as the equations give it, never clipped
+  double tau_s = 0;                  ///< R1 C1
+  double integrator_pole_error = 0;  ///< distance from 1 of the pole next to it; exactly an integrator: 0
   std::vector<std::string>
       implausible;  ///< "r1_ohm is negative", "c1_f is not finite", "the poles are complex"; empty: a circuit
 };
 
 /// Eq. 12-16 backwards. Total in the coefficients. Throws std::invalid_argument unless step_s and capacity_c [C] are
 /// positive and finite.
-CircuitReading circuit_from_discrete(const DiscreteCoefficients& coefficients, double step_s, double capacity_c,
-                                     Input input = Input::straight);
+CircuitResult circuit_from_discrete(const DiscreteCoefficients& coefficients, double step_s, double capacity_c,
+                                    Intersample input = Intersample::first_order_hold);
 
 /// Eq. 12-16. Throws as above.
-DiscreteCoefficients discrete_from_circuit(const Circuit& circuit, double step_s, double capacity_c,
-                                           Input input = Input::straight);
+DiscreteCoefficients discrete_from_circuit(const CircuitParameters& circuit, double step_s, double capacity_c,
+                                           Intersample input = Intersample::first_order_hold);
 
 /// Covariance of b1, R0, R1, C1, in this order, from that of c0, c1, c2, a1, a2, linearised (delta method); derivatives
 /// by complex step, exact to rounding. Linear in a large deviation is not the truth: above a third of the value do not
 /// read more than "large" from it. Throws as above.
 Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& coefficients,
                                    const Eigen::Matrix<double, 5, 5>& covariance, double step_s, double capacity_c,
-                                   Input input = Input::straight);
+                                   Intersample input = Intersample::first_order_hold);
 
 /// Square roots of its diagonal.
-Circuit circuit_std(const DiscreteCoefficients& coefficients, const Eigen::Matrix<double, 5, 5>& covariance,
-                    double step_s, double capacity_c, Input input = Input::straight);
+CircuitParameters circuit_std(const DiscreteCoefficients& coefficients, const Eigen::Matrix<double, 5, 5>& covariance,
+                              double step_s, double capacity_c, Intersample input = Intersample::first_order_hold);
 
 }  // namespace bms::identification

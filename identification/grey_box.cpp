@@ -85,10 +85,10 @@ double half_gap_v(const model::OcvTable<double>& ocv, double soc) {
 
 }  // namespace
 
-model::CellParameters<> leaning(const model::CellParameters<>& cell, double lean) {
+model::CellParameters<> with_ocv_branch(const model::CellParameters<>& cell, double ocv_branch) {
   model::CellParameters<> moved = cell;
-  const double by = lean - cell.ocv.lean;
-  moved.ocv.lean = lean;
+  const double by = ocv_branch - cell.ocv.lean;
+  moved.ocv.lean = ocv_branch;
   for (std::size_t k = 0; k + 1 < cell.ocv.soc.size; ++k) {
     const auto corner = [&](std::size_t edge) {
       return cell.ocv.b0_v[k] + cell.ocv.b1_v[k] * cell.ocv.soc[edge] + by * cell.ocv.half_gap_v[edge];
@@ -100,14 +100,14 @@ model::CellParameters<> leaning(const model::CellParameters<>& cell, double lean
   return moved;
 }
 
-GreyBox::GreyBox(const model::CellParameters<>& cell, std::vector<Record> records, GreyBoxOptions options)
+GreyBox::GreyBox(const model::CellParameters<>& cell, std::vector<DataSet> records, GreyBoxOptions options)
     : cell_(cell), records_(std::move(records)), options_(std::move(options)) {
   if (options_.soc_nodes.empty()) throw std::invalid_argument("no soc nodes to identify R0, R1, C1 at");
   if (records_.empty()) throw std::invalid_argument("no recording to identify from");
   for (const char* name : {"r0_ohm", "r1_ohm", "c1_f"}) {
     for (const double soc : options_.soc_nodes) unknowns_.push_back({name, soc, 0});
   }
-  if (options_.estimate_lean) {
+  if (options_.estimate_ocv_branch) {
     if (cell_.ocv.half_gap_v.size == 0)
       throw std::invalid_argument("no gap between charge and discharge for the OCV to lean in");
     unknowns_.push_back({"ocv_lean", 0, 0});
@@ -151,8 +151,8 @@ Eigen::VectorXd GreyBox::start() const {
 }
 
 model::CellParameters<> GreyBox::cell_with(const Eigen::VectorXd& x) const {
-  const auto lean = unknown("ocv_lean", 0);
-  model::CellParameters<> cell = lean ? leaning(cell_, x[*lean]) : cell_;
+  const auto ocv_branch = unknown("ocv_lean", 0);
+  model::CellParameters<> cell = ocv_branch ? with_ocv_branch(cell_, x[*ocv_branch]) : cell_;
   cell.rc = {};
   for (std::size_t k = 0; k < nodes(); ++k) {
     const auto at = [&](std::size_t column) { return x[static_cast<Eigen::Index>(column * nodes() + k)]; };
@@ -169,7 +169,7 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
                   Eigen::Ref<Eigen::MatrixXd>* derivatives) const {
   using Model = model::OneRc<S>;
   constexpr bool with_derivatives = !std::same_as<S, double>;
-  const Record& record = records_[r];
+  const DataSet& record = records_[r];
   const Data& data = record.data;
   const auto tables = std::make_unique<Tables>(model::prepare<double, model::max_intervals>(cell_with(x)));
   const auto v_rc_unknown = unknown("initial_v_rc_v", r), soc_unknown = unknown("initial_soc", r),
@@ -195,12 +195,13 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
     soc += current_a * duration_s * per_as;
     if (!(std::abs(soc) < 7)) return false;
     const auto at = localised<S>(model::look_up(*tables, soc, interval));
-    const model::Drive<S> drive{S(current_a), S(duration_s)};
+    const model::StepInput<S> input{S(current_a), S(duration_s)};
     [[maybe_unused]] Between beside;
     if constexpr (with_derivatives) beside = between(options_.soc_nodes, soc);
 
     if (duration_s > 0) {
-      const S state = Model::advance({local<S>(v_rc_v, by_v_rc)}, at, Model::settling(at, drive.duration_s), drive)[0];
+      const S state =
+          Model::advance({local<S>(v_rc_v, by_v_rc)}, at, Model::discretise(at, input.duration_s), input)[0];
       v_rc_v = value_of(state);
       if constexpr (with_derivatives) {
         v_rc_by *= state.v[by_v_rc];
@@ -209,7 +210,7 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
         if (soc_unknown) v_rc_by[*soc_unknown] += state.v[by_soc];
       }
     }
-    const S voltage = Model::voltage({local<S>(v_rc_v, by_v_rc)}, at, drive);
+    const S voltage = Model::voltage({local<S>(v_rc_v, by_v_rc)}, at, input);
     if (!std::isfinite(value_of(voltage))) return false;
     const auto row = static_cast<Eigen::Index>(k);
     voltage_v[row] = value_of(voltage);
@@ -262,7 +263,7 @@ LeastSquares GreyBox::problem() const {
     if (jacobian != nullptr) jacobian->setZero(rows, x.size());
     Eigen::Index from = 0, belief = static_cast<Eigen::Index>(samples_);
     for (std::size_t r = 0; r < records_.size(); ++r) {
-      const Record& record = records_[r];
+      const DataSet& record = records_[r];
       const auto count = static_cast<Eigen::Index>(record.data.size());
       if (jacobian != nullptr) {
         Eigen::Ref<Eigen::MatrixXd> part = jacobian->middleRows(from, count);

@@ -20,7 +20,7 @@
 namespace bms::identification {
 
 /// One recording and what is known of its start.
-struct Record {
+struct DataSet {
   Data data;
   double initial_soc = 0.5;  ///< true, believed, or where the search begins
   double initial_soc_sigma =
@@ -39,8 +39,8 @@ struct CircuitBounds {
 struct GreyBoxOptions {
   std::vector<double> soc_nodes;  ///< ascending, one or more; one: constant parameters
   CircuitBounds bounds;
-  bool estimate_lean = false;      ///< needs the cell's ocv.half_gap_v
-  double voltage_sigma_v = 0.001;  ///< weight of a voltage residual against a belief
+  bool estimate_ocv_branch = false;  ///< needs the cell's ocv.half_gap_v
+  double voltage_sigma_v = 0.001;    ///< weight of a voltage residual against a belief
   double tie_v =
       0;  ///< residual where neighbouring nodes differ as much as those of Table 9 do; 0: each stands for itself
 };
@@ -56,7 +56,7 @@ class GreyBox {
  public:
   /// cell: OCV, capacity, and R0, R1, C1 to start from (at the nodes by interpolation).
   /// Throws std::invalid_argument: no nodes, no records, a record of less than two samples, a lean without a gap.
-  GreyBox(const model::CellParameters<>& cell, std::vector<Record> records, GreyBoxOptions options);
+  GreyBox(const model::CellParameters<>& cell, std::vector<DataSet> records, GreyBoxOptions options);
 
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   /// The cell's own values, moved inside the bounds.
@@ -81,7 +81,7 @@ class GreyBox {
   std::optional<Eigen::Index> unknown(const std::string& name, std::size_t record) const;
 
   model::CellParameters<> cell_;
-  std::vector<Record> records_;
+  std::vector<DataSet> records_;
   GreyBoxOptions options_;
   std::vector<Unknown> unknowns_;
   std::size_t samples_ = 0, beliefs_ = 0;
@@ -89,7 +89,7 @@ class GreyBox {
 };
 
 /// The cell with its OCV at another place between slow discharge (-1) and charge (1).
-model::CellParameters<> leaning(const model::CellParameters<>& cell, double lean);
+model::CellParameters<> with_ocv_branch(const model::CellParameters<>& cell, double ocv_branch);
 
 /// Nodes for data that covers soc_min..soc_max: one in the middle if it is narrow, else at tenths as in Table 9.
 std::vector<double> nodes_for(double soc_min, double soc_max);

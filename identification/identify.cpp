@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "identification/figures.hpp"
+#include "identification/goodness_of_fit.hpp"
 #include "identification/rest_reading.hpp"
 
 namespace bms::identification {
@@ -26,10 +26,10 @@ Eigen::VectorXd where(const Eigen::VectorXd& values, const Eigen::VectorXd& by) 
 bool measured(const Data& data, std::size_t k) { return std::isfinite(data.voltage_v[k]); }
 
 /// Refuses what no search could find anything in.
-void require_excitation(const std::vector<Record>& records) {
+void require_excitation(const std::vector<DataSet>& records) {
   double largest_step_a = 0, capacity_ah = 0;
   std::size_t samples = 0;
-  for (const Record& r : records) {
+  for (const DataSet& r : records) {
     capacity_ah = std::max(capacity_ah, r.data.capacity_ah);
     for (std::size_t k = 0; k < r.data.size(); ++k) {
       samples += measured(r.data, k) ? 1 : 0;
@@ -55,7 +55,7 @@ const char* experiment_that_shows(const std::string& name) {
 void warn(Identification& result) {
   for (const Parameter& p : result.parameters) {
     const std::string where = fmt::format("{} at {:.0f} %", p.name, 100 * p.soc);
-    if (!p.seen)
+    if (!p.identifiable)
       result.warnings.push_back(
           fmt::format("not_seen: {} cannot be seen in this data; {}", where, experiment_that_shows(p.name)));
     else if (p.at_bound)
@@ -84,7 +84,7 @@ void warn(Identification& result) {
 /// Time constants the search begins with, as multiples of the start's: C1 decides which of several minima is found.
 constexpr double time_constants[] = {1, 0.2, 5};
 
-Identification identified(const model::CellParameters<>& start, const std::vector<Record>& records,
+Identification identified(const model::CellParameters<>& start, const std::vector<DataSet>& records,
                           const GreyBoxOptions& options, Method method, const Stopping& stopping) {
   const GreyBox grey_box(start, records, options);
   const LeastSquares problem = grey_box.problem();
@@ -136,11 +136,11 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
       InitialState& state = result.initial[unknown.record];
       constexpr double uniform = 0.29;  // standard deviation of a state of charge of which nothing is known
       state.soc = x[k];
-      state.soc_std = u.seen[k] != 0 && !at_bound ? std::min(uniform, u.std_with_offset(k)) : uniform;
+      state.soc_std = u.identifiable[k] != 0 && !at_bound ? std::min(uniform, u.std_with_offset(k)) : uniform;
       state.observable = state.soc_std <= observable_soc_std;
     } else {
       result.parameters.push_back({unknown.name, unknown.soc, x[k], u.std(k), u.std_white(k), std::abs(u.offset[k]),
-                                   at_bound, at_bound || u.seen[k] != 0});
+                                   at_bound, at_bound || u.identifiable[k] != 0});
     }
   }
   for (std::size_t k = 0; k < options.soc_nodes.size(); ++k) {
@@ -181,9 +181,9 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
 
 }  // namespace
 
-Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
-           const std::vector<double>& current_a, double fading) {
-  Fit fit;
+FitStatistics fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
+                     const std::vector<double>& current_a, double fading) {
+  FitStatistics fit;
   FitFigure open_loop, one_step;
   ErrorFigure error;
   fit.error_v.resize(simulated_v.size());
@@ -211,7 +211,7 @@ Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulat
   return fit;
 }
 
-Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<Record>& records,
+Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<DataSet>& records,
                                  const GreyBoxOptions& options, Method method, const Stopping& stopping) {
   require_excitation(records);
   if (options.soc_nodes.size() < 2) return identified(start, records, options, method, stopping);
@@ -245,12 +245,12 @@ model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, 
   return started;
 }
 
-Fit validate(const model::CellParameters<>& cell, const Record& record, double fading) {
-  Record held = record;
-  held.estimate_initial_soc = false;
+FitStatistics validate(const model::CellParameters<>& cell, const DataSet& record, double fading) {
+  DataSet fixed_start = record;
+  fixed_start.estimate_initial_soc = false;
   GreyBoxOptions options;
   for (std::size_t k = 0; k < cell.rc.soc.size; ++k) options.soc_nodes.push_back(cell.rc.soc[k]);
-  const GreyBox grey_box(cell, {held}, options);
+  const GreyBox grey_box(cell, {fixed_start}, options);
   LeastSquares problem = grey_box.problem();
   Eigen::VectorXd x(static_cast<Eigen::Index>(grey_box.unknowns().size()));
   const auto nodes = static_cast<Eigen::Index>(cell.rc.soc.size);
@@ -260,7 +260,7 @@ Fit validate(const model::CellParameters<>& cell, const Record& record, double f
     x[nodes + k] = cell.rc.r1_ohm[node];
     x[2 * nodes + k] = cell.rc.c1_f[node];
   }
-  if (held.estimate_initial_v_rc) {
+  if (fixed_start.estimate_initial_v_rc) {
     // the voltage is linear in v_rc at the start: one step of Gauss and Newton is exact
     x[3 * nodes] = 0;
     Eigen::VectorXd residuals;

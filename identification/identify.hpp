@@ -20,21 +20,21 @@ struct Parameter {
   double std_white = 0;         ///< as if every residual were new
   double by_ocv_tolerance = 0;  ///< how far it would move if the OCV were off by its tolerance
   bool at_bound = false;
-  bool seen = true;                                    ///< false: the data does not depend on it
+  bool identifiable = true;                            ///< false: the data does not depend on it
   std::optional<double> temperature_c = std::nullopt;  ///< where recordings of several were identified
 };
 
 /// How well a model follows the voltage of recordings.
-struct Fit {
+struct FitStatistics {
   double fit_percent = 0;  ///< Eq. A6, open loop
   double rmse_v = 0;       ///< the same in volts: comparable between recordings, as the fit is not
   double largest_v = 0;
   double one_step_fit_percent = 0;  ///< of the one-step prediction (residuals.hpp)
-  struct Ahead {
+  struct PredictionError {
     int steps = 0;
     double rmse_v = 0;
   };
-  std::vector<Ahead> ahead;  ///< k-step predictions, 1, 10 and 60 samples ahead
+  std::vector<PredictionError> ahead;  ///< k-step predictions, 1, 10 and 60 samples ahead
   double output_variance_v2 = 0;
   std::size_t samples = 0;
   ResidualAnalysis residuals;  ///< of the first recording
@@ -49,7 +49,7 @@ struct InitialState {
 struct Identification {
   std::vector<Parameter> parameters;
   Eigen::MatrixXd correlation;  ///< of the parameters and then the initial states, as the fit had them
-  Fit estimation;
+  FitStatistics estimation;
   double correlation_length = 1;      ///< samples over which residuals are alike
   double fading = 0;                  ///< how residuals fade from sample to sample: for predictions on other data
   std::vector<InitialState> initial;  ///< per record
@@ -66,7 +66,7 @@ inline constexpr double observable_soc_std = 0.05;
 /// (what the constant model leaves over, in its runs, is the measure). Without that a node the data hardly visits takes
 /// any value. Throws std::invalid_argument, one sentence that names what cannot be seen and what would show it, when
 /// the current never moves or a record is empty.
-Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<Record>& records,
+Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<DataSet>& records,
                                  const GreyBoxOptions& options, Method method, const Stopping& stopping = {});
 
 /// The cell with R0, R1, C1 as Appendix A reads them from the rests of a record (rest_reading.hpp), moved inside the
@@ -76,10 +76,10 @@ model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, 
 
 /// Open loop over a record that was not identified from. Only v_rc at its start is fitted, and only if the record says
 /// so.
-Fit validate(const model::CellParameters<>& cell, const Record& record, double fading);
+FitStatistics validate(const model::CellParameters<>& cell, const DataSet& record, double fading);
 
 /// The figures of a simulation; NaN: not measured.
-Fit fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
-           const std::vector<double>& current_a, double fading);
+FitStatistics fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
+                     const std::vector<double>& current_a, double fading);
 
 }  // namespace bms::identification

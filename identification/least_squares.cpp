@@ -8,7 +8,7 @@
 
 #include <Eigen/QR>
 
-#include "identification/optimisers/methods.hpp"
+#include "identification/optimisers/optimisation.hpp"
 
 namespace bms::identification {
 
@@ -56,7 +56,7 @@ std::string sentence(const std::string& text, double value) {
 
 }  // namespace
 
-Search::Search(const LeastSquares& problem, const VectorXd& start, const Stopping& stopping)
+Optimisation::Optimisation(const LeastSquares& problem, const VectorXd& start, const Stopping& stopping)
     : problem_(problem), stopping_(stopping) {
   const Index n = start.size();
   require(n > 0, "least squares: no unknowns");
@@ -72,11 +72,11 @@ Search::Search(const LeastSquares& problem, const VectorXd& start, const Stoppin
   column_norms_ = VectorXd::Zero(n);
   x_ = start.cwiseMax(lower_).cwiseMin(upper_);
   cost_ = infinity;
-  if (!evaluate(x_, true) || !take_over(x_))
+  if (!evaluate(x_, true) || !update_derivatives(x_))
     end(false, "The residuals or their derivatives are not defined at the start.");
 }
 
-bool Search::evaluate(const VectorXd& x, bool derivatives) {
+bool Optimisation::evaluate(const VectorXd& x, bool derivatives) {
   ++evaluations_;
   const Index m = residuals_.size();
   if (!problem_.evaluate(x, residuals_, derivatives ? &jacobian_ : nullptr)) {
@@ -90,17 +90,19 @@ bool Search::evaluate(const VectorXd& x, bool derivatives) {
   return std::isfinite(residuals_.squaredNorm());
 }
 
-double Search::cost_at(const VectorXd& x) { return evaluate(x, false) ? 0.5 * residuals_.squaredNorm() : infinity; }
+double Optimisation::cost_at(const VectorXd& x) {
+  return evaluate(x, false) ? 0.5 * residuals_.squaredNorm() : infinity;
+}
 
-bool Search::move_to(const VectorXd& x) {
+bool Optimisation::move_to(const VectorXd& x) {
   const double before = cost_;
-  if (!evaluate(x, true) || !(0.5 * residuals_.squaredNorm() <= before) || !take_over(x)) return false;
+  if (!evaluate(x, true) || !(0.5 * residuals_.squaredNorm() <= before) || !update_derivatives(x)) return false;
   last_decrease_ = before > 0 ? (before - cost_) / before : 0;
   ++iterations_;
   return true;
 }
 
-bool Search::take_over(const VectorXd& x) {
+bool Optimisation::update_derivatives(const VectorXd& x) {
   const Index n = x.size();
   const MatrixXd r = triangle(jacobian_, residuals_, scale_);
   if (!r.allFinite()) return false;
@@ -119,26 +121,26 @@ bool Search::take_over(const VectorXd& x) {
   return true;
 }
 
-Indices Search::free() const {
+Indices Optimisation::free() const {
   Indices free;
   for (Index i = 0; i < size(); ++i) {
-    const bool held = (x_[i] <= lower_[i] && gradient_[i] >= 0) || (x_[i] >= upper_[i] && gradient_[i] <= 0);
-    if (!held) free.push_back(i);
+    const bool at_bound = (x_[i] <= lower_[i] && gradient_[i] >= 0) || (x_[i] >= upper_[i] && gradient_[i] <= 0);
+    if (!at_bound) free.push_back(i);
   }
   return free;
 }
 
-double Search::expected_change(const VectorXd& step) const {
+double Optimisation::expected_change(const VectorXd& step) const {
   const VectorXd change = factor_ * step;
   return change.dot(rotated_) + 0.5 * change.squaredNorm();
 }
 
-double Search::relative(const VectorXd& gradient) const {
+double Optimisation::relative(const VectorXd& gradient) const {
   const double unit = std::sqrt(2 * cost_) * factor_.colwise().norm().maxCoeff();
   return unit > 0 && gradient.size() > 0 ? gradient.lpNorm<Eigen::Infinity>() / unit : 0;
 }
 
-bool Search::is_short(const VectorXd& step, double tolerance) const {
+bool Optimisation::is_short(const VectorXd& step, double tolerance) const {
   const auto is_short_times = [&](const VectorXd& weights) {
     const VectorXd size =
         x_.cwiseQuotient(scale_).cwiseAbs() + VectorXd::Constant(x_.size(), tolerance);  // an optimum at 0 ends, too
@@ -148,7 +150,7 @@ bool Search::is_short(const VectorXd& step, double tolerance) const {
   return is_short_times(VectorXd::Ones(x_.size())) && is_short_times(column_norms_);
 }
 
-VectorXd Search::after(const VectorXd& step) const {
+VectorXd Optimisation::after(const VectorXd& step) const {
   VectorXd x = x_ + scale_.cwiseProduct(step);
   for (Index i = 0; i < size(); ++i) {
     const double close = 8 * epsilon * std::max(std::abs(x_[i]), std::abs(x[i]));
@@ -160,7 +162,7 @@ VectorXd Search::after(const VectorXd& step) const {
 
 /// What is left to gain, as the undamped, complete Gauss-Newton step sees it. Asked of every method alike: its own step
 /// may be short only because it is damped, bisected or bounded by a radius.
-Search::Outlook Search::outlook(const Indices& free) const {
+Optimisation::Outlook Optimisation::outlook(const Indices& free) const {
   const VectorXd gradient = gradient_(free);
   MatrixXd a = factor_(Eigen::all, free);
   VectorXd norms = a.colwise().norm();
@@ -178,7 +180,7 @@ Search::Outlook Search::outlook(const Indices& free) const {
   return {relative(gradient), cost_ > 0 ? decrease / cost_ : 0, is_short(step, stopping_.step)};
 }
 
-std::string Search::settled_because(const Indices& free) const {
+std::string Optimisation::convergence_reason(const Indices& free) const {
   if (!(cost_ > 0)) return "The residuals are zero.";
   const Outlook here = outlook(free);
   if (here.gradient <= stopping_.gradient)
@@ -191,9 +193,9 @@ std::string Search::settled_because(const Indices& free) const {
   return "";
 }
 
-bool Search::settled() {
+bool Optimisation::finished() {
   if (ended_) return true;
-  const std::string why = settled_because(free());
+  const std::string why = convergence_reason(free());
   if (!why.empty()) {
     end(true, why);
   } else if (iterations_ >= stopping_.iterations) {
@@ -204,7 +206,7 @@ bool Search::settled() {
   return ended_;
 }
 
-void Search::stuck() {
+void Optimisation::no_decrease() {
   if (ended_) return;
   const Outlook here = outlook(free());
   const double decrease = here.decrease;
@@ -222,13 +224,13 @@ void Search::stuck() {
   }
 }
 
-void Search::end(bool converged, const std::string& reason) {
+void Optimisation::end(bool converged, const std::string& reason) {
   ended_ = true;
   converged_ = converged;
   reason_ = reason;
 }
 
-Optimum Search::result() const {
+Optimum Optimisation::result() const {
   Optimum found;
   found.x = x_;
   found.cost = cost_;
@@ -242,19 +244,19 @@ Optimum Search::result() const {
   return found;
 }
 
-VectorXd step_within_bounds(const Search& search, const Solve& solve) {
-  const MatrixXd& a = search.factor();
-  const auto beyond = [&](Index i, double p) { return p < search.below()[i] || p > search.above()[i]; };
+VectorXd step_within_bounds(const Optimisation& run, const Solve& solve) {
+  const MatrixXd& a = run.factor();
+  const auto beyond = [&](Index i, double p) { return p < run.below()[i] || p > run.above()[i]; };
 
-  VectorXd step = VectorXd::Zero(search.size()), b = search.rotated();
-  Indices free = search.free();
+  VectorXd step = VectorXd::Zero(run.size()), b = run.rotated();
+  Indices free = run.free();
   for (bool inside = false; !inside && !free.empty();) {
     const VectorXd p = solve(a(Eigen::all, free), b, free);
     Indices staying;
     for (std::size_t k = 0; k < free.size(); ++k) {
       const Index i = free[k];
       const double wanted = p[static_cast<Index>(k)];
-      step[i] = std::clamp(wanted, search.below()[i], search.above()[i]);
+      step[i] = std::clamp(wanted, run.below()[i], run.above()[i]);
       if (beyond(i, wanted)) {
         b += a.col(i) * step[i];
       } else {
@@ -264,19 +266,19 @@ VectorXd step_within_bounds(const Search& search, const Solve& solve) {
     inside = staying.size() == free.size();
     free = staying;
   }
-  if (search.expected_change(step) < 0) return step;
+  if (run.expected_change(step) < 0) return step;
 
   // Several bounds at once have bent it uphill: straight on instead, to the first bound.
-  free = search.free();
+  free = run.free();
   for (bool starts_inside = false; !starts_inside && !free.empty();) {
-    const VectorXd p = solve(a(Eigen::all, free), search.rotated(), free);
+    const VectorXd p = solve(a(Eigen::all, free), run.rotated(), free);
     step.setZero();
     Indices staying;
     double length = 1;
     for (std::size_t k = 0; k < free.size(); ++k) {
       const Index i = free[k];
       step[i] = p[static_cast<Index>(k)];
-      const double room = step[i] < 0 ? search.below()[i] : search.above()[i];
+      const double room = step[i] < 0 ? run.below()[i] : run.above()[i];
       if (room == 0 && step[i] != 0) continue;
       if (beyond(i, step[i])) length = std::min(length, room / step[i]);
       staying.push_back(i);
@@ -285,29 +287,29 @@ VectorXd step_within_bounds(const Search& search, const Solve& solve) {
     free = staying;
     if (starts_inside) return length * step;
   }
-  return VectorXd::Zero(search.size());
+  return VectorXd::Zero(run.size());
 }
 
 Optimum minimise(const LeastSquares& problem, const VectorXd& start, Method method, const Stopping& stopping) {
-  Search search(problem, start, stopping);
+  Optimisation run(problem, start, stopping);
   switch (method) {
     case Method::subspace_gauss_newton:
-      search_gauss_newton(search);
+      search_gauss_newton(run);
       break;
     case Method::adaptive_subspace_gauss_newton:
-      search_adaptive_gauss_newton(search);
+      search_adaptive_gauss_newton(run);
       break;
     case Method::levenberg_marquardt:
-      search_levenberg_marquardt(search);
+      search_levenberg_marquardt(run);
       break;
     case Method::steepest_descent:
-      search_steepest_descent(search);
+      search_steepest_descent(run);
       break;
     case Method::trust_region_reflective:
-      search_trust_region_reflective(search);
+      search_trust_region_reflective(run);
       break;
   }
-  return search.result();
+  return run.result();
 }
 
 const char* name_of(Method method) {

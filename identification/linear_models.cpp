@@ -119,17 +119,19 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
 
   const double step_s = even_step_s(data.time_s), capacity_c = 3'600 * data.capacity_ah;
   const DiscreteCoefficients c{m.model.b[0], m.model.b[1], m.model.b[2], m.model.f[0], m.model.f[1]};
-  const Input input = kind == LinearKind::transfer_function ? Input::held : Input::straight;
-  const CircuitReading reading = circuit_from_discrete(c, step_s, capacity_c, input);
-  const Circuit std = circuit_std(c, u.covariance.topLeftCorner<5, 5>(), step_s, capacity_c, input);
-  const Circuit std_white = circuit_std(c, u.covariance_white.topLeftCorner<5, 5>(), step_s, capacity_c, input);
-  const auto add = [&](const char* name, double Circuit::*value) {
+  const Intersample input =
+      kind == LinearKind::transfer_function ? Intersample::zero_order_hold : Intersample::first_order_hold;
+  const CircuitResult reading = circuit_from_discrete(c, step_s, capacity_c, input);
+  const CircuitParameters std = circuit_std(c, u.covariance.topLeftCorner<5, 5>(), step_s, capacity_c, input);
+  const CircuitParameters std_white =
+      circuit_std(c, u.covariance_white.topLeftCorner<5, 5>(), step_s, capacity_c, input);
+  const auto add = [&](const char* name, double CircuitParameters::*value) {
     found.parameters.push_back({name, soc, reading.circuit.*value, std.*value, std_white.*value, 0, false, true});
   };
-  add("b1_v", &Circuit::b1_v);
-  add("r0_ohm", &Circuit::r0_ohm);
-  add("r1_ohm", &Circuit::r1_ohm);
-  add("c1_f", &Circuit::c1_f);
+  add("b1_v", &CircuitParameters::b1_v);
+  add("r0_ohm", &CircuitParameters::r0_ohm);
+  add("r1_ohm", &CircuitParameters::r1_ohm);
+  add("c1_f", &CircuitParameters::c1_f);
   for (const std::string& what : reading.implausible)
     found.warnings.push_back("no_circuit: " + what + ": the model follows the voltage, but is no circuit");
   if (!stable(m.model.f))
@@ -138,7 +140,7 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
   return out;
 }
 
-Fit validate(const LinearModel& model, const Data& data, double fading) {
+FitStatistics validate(const LinearModel& model, const Data& data, double fading) {
   LinearModel m = model;
   m.model.initial_v.assign(m.model.f.size(), 0);
   Eigen::MatrixXd jacobian;

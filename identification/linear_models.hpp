@@ -44,6 +44,6 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
                                      Method method, const Stopping& stopping = {});
 
 /// Simulation over other data; only its free response is fitted.
-Fit validate(const LinearModel& model, const Data& data, double fading);
+FitStatistics validate(const LinearModel& model, const Data& data, double fading);
 
 }  // namespace bms::identification

@@ -226,7 +226,7 @@ std::optional<RestReading> read(const Data& data, const Rest& rest, const RestRe
   const double variance_v2 = decay.squares / static_cast<double>(n - 3);
   out.residual_v = std::sqrt(decay.squares / static_cast<double>(n));
   out.tau_s = decay.tau_s;
-  out.settled = -std::expm1(-out.rest_s / out.tau_s);
+  out.relaxed_fraction = -std::expm1(-out.rest_s / out.tau_s);
 
   // Covariance of A, B, tau, and of the first samples' level among them.
   Eigen::MatrixXd slope(static_cast<Eigen::Index>(n), 3);

@@ -54,9 +54,9 @@ struct RestReading {
   double r0_ohm = 0, r1_ohm = 0, tau_s = 0, c1_f = 0;
   double r0_std_ohm = 0, r1_std_ohm = 0, tau_std_s = 0, c1_std_f = 0;  ///< as if what the fit leaves were white
   double residual_v = 0;                                               ///< root mean square of what the fit leaves
-  double settled = 0;      ///< part of the relaxation seen, 1 - exp(-rest / tau)
-  bool r0_usable = false;  ///< finite and positive
-  bool rc_usable = false;  ///< and so are R1 and C1, and tau is known to largest_std
+  double relaxed_fraction = 0;  ///< part of the relaxation seen, 1 - exp(-rest / tau)
+  bool r0_usable = false;       ///< finite and positive
+  bool rc_usable = false;       ///< and so are R1 and C1, and tau is known to largest_std
   PointReading points;
 };
 

@@ -33,19 +33,19 @@ double Uncertainty::std_with_offset(Eigen::Index k) const { return std::hypot(st
 double Uncertainty::std_white(Eigen::Index k) const { return std::sqrt(std::max(0.0, covariance_white(k, k))); }
 
 Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data,
-                        const Eigen::VectorXi& held, double offset_v) {
+                        const Eigen::VectorXi& fixed, double offset_v) {
   const Eigen::Index m = jacobian.rows(), n = jacobian.cols(), beliefs = m - data;
   Uncertainty u;
   u.covariance = u.covariance_white = Eigen::MatrixXd::Zero(n, n);
   u.correlation = Eigen::MatrixXd::Identity(n, n);
-  u.seen = Eigen::VectorXi::Zero(n);
+  u.identifiable = Eigen::VectorXi::Zero(n);
   u.offset = Eigen::VectorXd::Zero(n);
 
   // free parameters in units of what moves the voltage by the same amount, so that one threshold serves ohm and farad
   std::vector<Eigen::Index> free;
   const double largest = jacobian.size() > 0 ? jacobian.colwise().norm().maxCoeff() : 0;
   for (Eigen::Index k = 0; k < n; ++k) {
-    if (held[k] == 0 && jacobian.col(k).norm() > 1e-14 * largest) free.push_back(k);
+    if (fixed[k] == 0 && jacobian.col(k).norm() > 1e-14 * largest) free.push_back(k);
   }
   const auto f = static_cast<Eigen::Index>(free.size());
   u.output_variance_v2 = residuals.head(data).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, data - f));
@@ -66,7 +66,7 @@ Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd&
     double hidden = 0;
     for (Eigen::Index e = 0; e < f; ++e)
       hidden += inverse[e] > 0 ? 0 : eigen.eigenvectors()(k, e) * eigen.eigenvectors()(k, e);
-    u.seen[free[static_cast<std::size_t>(k)]] = hidden < 0.01 ? 1 : 0;
+    u.identifiable[free[static_cast<std::size_t>(k)]] = hidden < 0.01 ? 1 : 0;
   }
   const Eigen::MatrixXd bread = eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
   const Eigen::VectorXd shift = bread * scores.topRows(data).colwise().sum().transpose() * offset_v;

@@ -21,7 +21,7 @@ struct Uncertainty {
   double output_variance_v2 = 0;  ///< of the residuals, over samples less parameters
   double correlation_length = 1;  ///< samples over which residuals are alike
   Eigen::VectorXd offset;         ///< how far each parameter would move with the constant error
-  Eigen::VectorXi seen;           ///< 0: nothing in the data depends on this parameter, or only together with others
+  Eigen::VectorXi identifiable;   ///< 0: nothing in the data depends on this parameter, or only together with others
 
   double std(Eigen::Index k) const;
   double std_white(Eigen::Index k) const;
@@ -31,6 +31,6 @@ struct Uncertainty {
 /// residuals: m. jacobian: m by n. The first `data` rows are samples in order, the rest beliefs, which count as one run
 /// of residuals each. held: n, not 0 for parameters at a bound. offset_v: a constant error to reckon with, >= 0.
 Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data,
-                        const Eigen::VectorXi& held, double offset_v);
+                        const Eigen::VectorXi& fixed, double offset_v);
 
 }  // namespace bms::identification

@@ -69,7 +69,7 @@ class Pipe {
 }  // namespace
 
 const std::vector<EmulatedBoard>& emulated_boards() {
-  static const std::vector<EmulatedBoard> boards = {{"netduinoplus2", "netduinoplus2", host_sim::ScalarKind::single},
+  static const std::vector<EmulatedBoard> boards = {{"netduinoplus2", "netduinoplus2", host_sim::ScalarKind::float32},
                                                     {"microbit", "microbit", host_sim::ScalarKind::fixed}};
   return boards;
 }

@@ -43,23 +43,24 @@ std::vector<std::string> openocd_command(const Probe& probe, const std::vector<P
                                          const std::optional<AddressRange>& storage,
                                          const std::filesystem::path& kept) {
   std::vector<std::string> words = {"openocd"};
-  const auto say = [&](const std::string& command) { words.insert(words.end(), {"-c", command}); };
+  const auto add_command = [&](const std::string& command) { words.insert(words.end(), {"-c", command}); };
   words.insert(words.end(), {"-f", "interface/" + probe.interface + ".cfg"});
-  if (!probe.serial.empty()) say("adapter serial " + probe.serial);
+  if (!probe.serial.empty()) add_command("adapter serial " + probe.serial);
   words.insert(words.end(), {"-f", "target/" + probe.target + ".cfg"});
-  for (const char* port : {"gdb_port", "tcl_port", "telnet_port"}) say(std::string(port) + " disabled");
-  say("init");
-  say("reset halt");
+  for (const char* port : {"gdb_port", "tcl_port", "telnet_port"}) add_command(std::string(port) + " disabled");
+  add_command("init");
+  add_command("reset halt");
   if (storage)
-    say(fmt::format("dump_image {{{}}} {:#010x} {:#x}", kept.string(), storage->begin, storage->end - storage->begin));
+    add_command(
+        fmt::format("dump_image {{{}}} {:#010x} {:#x}", kept.string(), storage->begin, storage->end - storage->begin));
   for (const PartFile& part : parts)
-    say(fmt::format("flash write_image erase {{{}}} {:#010x} bin", part.path.string(), part.address));
+    add_command(fmt::format("flash write_image erase {{{}}} {:#010x} bin", part.path.string(), part.address));
   for (const PartFile& part : parts)
-    say(fmt::format("verify_image {{{}}} {:#010x} bin", part.path.string(), part.address));
-  say("echo {image verified}");
-  if (storage) say(fmt::format("verify_image {{{}}} {:#010x} bin", kept.string(), storage->begin));
-  say("reset run");
-  say("shutdown");
+    add_command(fmt::format("verify_image {{{}}} {:#010x} bin", part.path.string(), part.address));
+  add_command("echo {image verified}");
+  if (storage) add_command(fmt::format("verify_image {{{}}} {:#010x} bin", kept.string(), storage->begin));
+  add_command("reset run");
+  add_command("shutdown");
   return words;
 }
 

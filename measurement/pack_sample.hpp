@@ -10,7 +10,7 @@
 
 namespace bms::measurement {
 
-inline constexpr std::size_t most_temperatures = 4;
+inline constexpr std::size_t max_temperatures = 4;
 
 /// Integers in micro-units; what was not measured is no_reading or no_temperature. Any field may lie.
 template <std::size_t Cells>
@@ -21,8 +21,8 @@ struct PackSample {
   std::int32_t current_ua = no_reading;  ///< mean since the previous sample, > 0 charges; one current through all cells
   std::int32_t pack_uv = no_reading;     ///< over all cells, measured by itself
   std::array<std::int32_t, Cells> cell_uv = filled<Cells>(no_reading);
-  std::array<std::int16_t, most_temperatures> temperature_cdegc =
-      filled<most_temperatures>(no_temperature);  ///< hundredths of a degree Celsius
+  std::array<std::int16_t, max_temperatures> temperature_cdegc =
+      filled<max_temperatures>(no_temperature);  ///< hundredths of a degree Celsius
 
  private:
   template <std::size_t N, class T>

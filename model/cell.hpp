@@ -47,8 +47,8 @@ struct Interval {
 template <class S>
 struct ChargeScale {
   std::int64_t capacity_uaus = 0;
-  std::int64_t lowest_uaus = 0;   ///< where counting stops: least_soc
-  std::int64_t highest_uaus = 0;  ///< most_soc
+  std::int64_t lowest_uaus = 0;   ///< where counting stops: min_soc
+  std::int64_t highest_uaus = 0;  ///< max_soc
   int shift = 0;
   Soc<S> soc_per_count{};   ///< fixed point: per 2^27 counts (what Soc holds as 1), 0.25 .. 0.5
   Soc<S> counts_per_soc{};  ///< its inverse; fixed point: in 2^27 counts
@@ -82,14 +82,14 @@ struct FilterNoise {
 };
 
 /// A reading outside is not a measurement.
-struct Plausible {
+struct PlausibleRange {
   std::int32_t voltage_min_uv = 0, voltage_max_uv = 0;
   std::int32_t current_max_ua = 0;  ///< either way
 };
 
 /// Limits of use, and what a current makes of soc.
 template <class S>
-struct UseLimits {
+struct OperatingLimits {
   Voltage<S> voltage_min_v{}, voltage_max_v{};
   Current<S> charge_max_a{}, discharge_max_a{};  ///< > 0
   Fraction<S> soc_per_as{};                      ///< 1 / (3600 capacity)
@@ -103,8 +103,8 @@ struct Cell {
   std::array<Soc<S>, Max + 1> edge{};  ///< interval k is [edge k, edge k + 1); the outermost are out of reach
   ChargeScale<S> charge;
   FilterNoise<S> noise;
-  Plausible plausible;
-  UseLimits<S> limits;
+  PlausibleRange plausible;
+  OperatingLimits<S> limits;
   std::size_t size = 0;  ///< intervals in use
 };
 
@@ -119,7 +119,7 @@ struct TablePoint {
   Variance<S> error_v2{};
   Factor<S> gap{1}, gap_delta{};
   Factor<S> activation{1};  ///< by how much resistances that the tables do not hold differ with the temperature
-  VoltagePerSoc<S> read_slope_v{0};  ///< of the OCV, by the soc at which laws read it elsewhere
+  VoltagePerSoc<S> shifted_ocv_slope_v{0};  ///< of the OCV, by the soc at which laws read it elsewhere
 };
 
 namespace cell_detail {
@@ -169,15 +169,15 @@ constexpr std::size_t ocv_piece(const OcvTable<Real>& ocv, double soc) {
 
 /// The middle of the curve: where a lithium iron phosphate cell's voltage hardly moves, in soc. Beyond, slow charge and
 /// discharge part by their knees.
-inline constexpr double middle_from = 0.2, middle_to = 0.9;
+inline constexpr double plateau_from_soc = 0.2, plateau_to_soc = 0.9;
 
 /// Half the distance between charge and discharge in the middle of the curve [V]; 0: not known.
 template <class Real>
-constexpr double middle_half_gap_v(const OcvTable<Real>& ocv) {
+constexpr double plateau_half_gap_v(const OcvTable<Real>& ocv) {
   double area = 0, width = 0;
   for (std::size_t k = 0; k + 1 < ocv.half_gap_v.size; ++k) {
-    const double from = ocv.soc[k] > middle_from ? ocv.soc[k] : middle_from,
-                 to = ocv.soc[k + 1] < middle_to ? ocv.soc[k + 1] : middle_to;
+    const double from = ocv.soc[k] > plateau_from_soc ? ocv.soc[k] : plateau_from_soc,
+                 to = ocv.soc[k + 1] < plateau_to_soc ? ocv.soc[k + 1] : plateau_to_soc;
     if (!(to > from)) continue;
     const double slope = (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
     area += (to - from) * (ocv.half_gap_v[k] + slope * ((from + to) / 2 - ocv.soc[k]));
@@ -208,15 +208,15 @@ constexpr std::size_t interval_count(const CellParameters<Real>& p) {
 }
 
 /// A voltage that is known no better says nothing.
-inline constexpr double largest_error_v2 = 0.04;
+inline constexpr double max_error_v2 = 0.04;
 
 /// A sensor of more is not there: of what is plausible, and of what may have flowed unseen.
-inline constexpr double largest_current_a = 2'000;
+inline constexpr double max_current_a = 2'000;
 
 inline constexpr double outer_width = 0.125;
 
 /// Where counting stops, in soc.
-inline constexpr double least_soc = -0.25, most_soc = 1.25;
+inline constexpr double min_soc = -0.25, max_soc = 1.25;
 
 inline constexpr std::size_t max_intervals = max_ocv_edges + max_rc_nodes + 3;
 
@@ -227,7 +227,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   Cell<S, Max> cell;
 
   const auto edges = d::merged_edges(p);
-  const double middle_gap_v = middle_half_gap_v(p.ocv);
+  const double middle_gap_v = plateau_half_gap_v(p.ocv);
   const auto add = [&](double from, double to) {
     double width = 1;  // that t = 1 stands for
     while (width > to - from) width /= 2;
@@ -253,7 +253,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
     const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc,
                  model_v2 = p.noise.model_v * p.noise.model_v, error_v2 = model_v2 + axis_v * axis_v;
     const double most_v2 =
-        model_v2 > largest_error_v2 ? model_v2 : largest_error_v2;  // never less than what is the same everywhere
+        model_v2 > max_error_v2 ? model_v2 : max_error_v2;  // never less than what is the same everywhere
     i.error_v2 = Variance<S>(error_v2 < most_v2 ? error_v2 : most_v2);
     ++cell.size;
   };
@@ -269,7 +269,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   const double capacity_as = p.capacity_ah * 3'600;
   cell.charge.capacity_uaus = static_cast<std::int64_t>(capacity_as * 1e12 + 0.5);
   while ((cell.charge.capacity_uaus >> cell.charge.shift) >= (std::int64_t{1} << 29)) ++cell.charge.shift;
-  static_assert(least_soc == -0.25 && most_soc == 1.25);
+  static_assert(min_soc == -0.25 && max_soc == 1.25);
   cell.charge.lowest_uaus = -(cell.charge.capacity_uaus / 4);
   cell.charge.highest_uaus = cell.charge.capacity_uaus + cell.charge.capacity_uaus / 4;
   const double per_soc = static_cast<double>(cell.charge.capacity_uaus) /
@@ -294,14 +294,12 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.noise.current_offset_correlation_s =
       Duration<S>(n.current_offset_correlation_s < 131'000 ? n.current_offset_correlation_s : 131'000);
   cell.noise.at_rest_per_h2 = Variance<S>(square(n.current_at_rest_a / p.capacity_ah));
-  const auto micro = [](double a) {
-    return static_cast<std::int32_t>(1e6 * (a < largest_current_a ? a : largest_current_a));
-  };
+  const auto micro = [](double a) { return static_cast<std::int32_t>(1e6 * (a < max_current_a ? a : max_current_a)); };
   cell.noise.at_rest = {micro(3 * (n.current_offset_a + n.current_at_rest_a)), micro(n.current_offset_a)};
   cell.noise.gain = Fraction<S>(n.current_gain);
   cell.noise.one_c_a = Current<S>(p.capacity_ah);
   cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
-  cell.noise.unknown_a = Current<S>(n.current_unknown_a < largest_current_a ? n.current_unknown_a : largest_current_a);
+  cell.noise.unknown_a = Current<S>(n.current_unknown_a < max_current_a ? n.current_unknown_a : max_current_a);
 
   cell.limits = {Voltage<S>(p.limits.voltage_min_v), Voltage<S>(p.limits.voltage_max_v),
                  Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a),

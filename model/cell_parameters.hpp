@@ -80,7 +80,7 @@ struct Limits {
 };
 
 /// Half of the model's error comes and goes within Noise::model_correlation_s, half lasts so many times as long.
-inline constexpr int lasting_error_lasts = 8;
+inline constexpr int persistent_error_correlations = 8;
 
 /// Errors that the estimator reckons with, as standard deviations.
 struct Noise {

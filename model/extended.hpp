@@ -96,10 +96,10 @@ constexpr std::size_t first_fault(const MechanismSetting& setting, double capaci
 }
 
 /// All parameters as a cell file means them that says nothing of them: no effect.
-constexpr MechanismSetting unsaid(std::size_t index, double capacity_ah) {
+constexpr MechanismSetting default_setting(std::size_t index, double capacity_ah) {
   MechanismSetting setting{index, {}, {}};
   for (std::size_t k = 0; k < catalogue[index].parameters; ++k)
-    setting.value[k] = catalogue[index].parameter[k].unsaid(capacity_ah);
+    setting.value[k] = catalogue[index].parameter[k].default_value(capacity_ah);
   return setting;
 }
 
@@ -157,11 +157,11 @@ TablePoint<S> look_up_dual(const Cell<double, max_intervals>& cell, const S& soc
 
 /// A cell on its way through a recording, open loop. S: double or a dual number.
 template <class S>
-class Course {
+class OpenLoopSimulation {
  public:
   using Tables = Cell<double, max_intervals>;
 
-  Course(const Tables& cell, double capacity_ah, const ChosenLaws<S>& laws, const S& initial_soc)
+  OpenLoopSimulation(const Tables& cell, double capacity_ah, const ChosenLaws<S>& laws, const S& initial_soc)
       : cell_(cell), per_capacity_(1 / (3'600 * capacity_ah)), laws_(laws), soc_(initial_soc), x_(laws_.initial()) {}
 
   /// One row: duration_s since the row before (0: the state stays), current that was read (of a channel that is not
@@ -170,21 +170,21 @@ class Course {
   template <class Adjust>
   S step(double time_s, double duration_s, const S& read_a, const S& read_c, Adjust&& adjust) {
     laws_.at(time_s);
-    const Drive<S> drive{laws_.true_current(read_a), S(duration_s), laws_.true_temperature(read_c)};
+    const StepInput<S> input{laws_.true_current(read_a), S(duration_s), laws_.true_temperature(read_c)};
     const bool moving = duration_s > 0;
-    soc_ += laws_.counted(drive) * (duration_s * per_capacity_);
-    hold();
+    soc_ += laws_.counted(input) * (duration_s * per_capacity_);
+    limit_soc();
     TablePoint<S> at = tables_at(soc_);
-    const S elsewhere = laws_.read_at(soc_, x_);
+    const S elsewhere = laws_.ocv_soc(soc_, x_);
     if (differs(elsewhere, soc_)) {
       const TablePoint<S> there = tables_at(elsewhere);
       at.ocv_v = there.ocv_v;
     }
     adjust(at, soc_);
-    laws_.tables(at, soc_, drive, x_);
-    if (moving) v_rc_ = OneRc<S>::advance(v_rc_, at, OneRc<S>::settling(at, drive.duration_s), drive);
-    const S more_v = laws_.advance(x_, at, drive, moving);
-    return laws_.reading(OneRc<S>::voltage(v_rc_, at, drive) + more_v);
+    laws_.tables(at, soc_, input, x_);
+    if (moving) v_rc_ = OneRc<S>::advance(v_rc_, at, OneRc<S>::discretise(at, input.duration_s), input);
+    const S more_v = laws_.advance(x_, at, input, moving);
+    return laws_.reading(OneRc<S>::voltage(v_rc_, at, input) + more_v);
   }
 
   const S& soc() const { return soc_; }
@@ -219,7 +219,7 @@ class Course {
     else
       return look_up(cell_, soc, interval_);
   }
-  void hold() {
+  void limit_soc() {
     if (value(soc_) < -0.25) soc_ = S(-0.25);
     if (value(soc_) > 1.25) soc_ = S(1.25);
   }
@@ -228,7 +228,7 @@ class Course {
   double per_capacity_;
   ChosenLaws<S> laws_;
   S soc_;
-  typename OneRc<S>::Polarisation v_rc_{};
+  typename OneRc<S>::State v_rc_{};
   typename ChosenLaws<S>::States x_;
   std::uint8_t interval_ = 0;
 };

@@ -16,7 +16,8 @@
 //           +-1,024; no number goes through a hundred products between two sums, and 100 x 1,024 is far below 2^31. D
 //           stays positive: sums, products and quotients of positive numbers keep 30 digits of whatever size
 //
-// tests/estimator/hostile_test.cpp tries to break it: random cell files and samples, every signed operation checked.
+// tests/estimator/adversarial_inputs_test.cpp tries to break it: random cell files and samples, every signed operation
+// checked.
 #pragma once
 
 #include "model/cell.hpp"
@@ -55,8 +56,8 @@ static_assert(accepted::resistance_ohm.high * 2.0 / (1 << Capacitance<S>::fracti
 static_assert(static_cast<double>(PerSoc<S>(2 / accepted::least_width)) >= 1 / accepted::least_width &&
                   PerSoc<S>(2 / accepted::least_width).exponent <= 11,
               "the narrowest interval");
-static_assert(holds<Current<S>>(accepted::current_a) && holds<Current<S>>(largest_current_a) &&
-              largest_current_a * 1e6 < 0x1p31);
+static_assert(holds<Current<S>>(accepted::current_a) && holds<Current<S>>(max_current_a) &&
+              max_current_a * 1e6 < 0x1p31);
 static_assert(holds<Current<S>>(accepted::capacity_ah.high), "the 1C current");
 static_assert(holds<Duration<S>>(accepted::lasts_s));
 static_assert(holds<Fraction<S>>(accepted::most_gain) && holds<Fraction<S>>(accepted::most_resistance_error));
@@ -64,7 +65,7 @@ static_assert(holds<Fraction<S>>(1 / (3'600 * accepted::capacity_ah.low)), "what
 static_assert(holds<Soc<S>>(accepted::unknown_c.high / 3'600));
 
 // Where soc can be, in an interval's own steps: below 2 in its own, beyond 0 and 1 as far as counting goes.
-static_assert(holds<Soc<S>>(2.0) && holds<Soc<S>>((most_soc - 1) / outer_width) &&
-              holds<Soc<S>>((least_soc + outer_width) / outer_width));
+static_assert(holds<Soc<S>>(2.0) && holds<Soc<S>>((max_soc - 1) / outer_width) &&
+              holds<Soc<S>>((min_soc + outer_width) / outer_width));
 
 }  // namespace bms::model::fixed_ranges

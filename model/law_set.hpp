@@ -37,9 +37,9 @@ constexpr bool adds_voltage() {
     return false;
 }
 template <class Law, class S>
-constexpr bool reads_elsewhere() {
-  return requires(Law law, Soc<S> soc) { law.read_at(soc); }
-  || requires(Law law) { law.ahead_per_v(); };
+constexpr bool shifts_ocv_soc() {
+  return requires(Law law, Soc<S> soc) { law.ocv_soc(soc); }
+  || requires(Law law) { law.soc_shift_per_v(); };
 }
 template <class Law>
 constexpr std::size_t states_of() {
@@ -63,8 +63,8 @@ class LawSet {
       (std::size_t{0} + ... + extended_detail::states_of<typename extended_detail::LawIn<Slots>::type>());
   static constexpr std::size_t most_voltage_states =
       (std::size_t{0} + ... + extended_detail::voltage_states_of<typename extended_detail::LawIn<Slots>::type>());
-  static constexpr bool reads_elsewhere =
-      (false || ... || extended_detail::reads_elsewhere<typename extended_detail::LawIn<Slots>::type, S>());
+  static constexpr bool shifts_ocv_soc =
+      (false || ... || extended_detail::shifts_ocv_soc<typename extended_detail::LawIn<Slots>::type, S>());
   using States = std::array<Voltage<S>, most_states>;
   using Relaxations = std::array<Relaxation<S>, most_states>;
 
@@ -93,42 +93,43 @@ class LawSet {
     });
     return c;
   }
-  constexpr Current<S> counted(const Drive<S>& drive) const {
-    Current<S> a = drive.current_a;
+  constexpr Current<S> counted(const StepInput<S>& input) const {
+    Current<S> a = input.current_a;
     each([&](const auto& law) {
-      if constexpr (requires { law.counted(a, drive); }) a = law.counted(a, drive);
+      if constexpr (requires { law.counted(a, input); }) a = law.counted(a, input);
     });
     return a;
   }
   /// Where the OCV is read: x, the laws' states.
   template <class X>
-  constexpr Soc<S> read_at(Soc<S> soc, const X& x) const {
-    each_with_states([&](const auto& law, std::size_t first) { soc = read_at(law, soc, x, first); });
+  constexpr Soc<S> ocv_soc(Soc<S> soc, const X& x) const {
+    each_with_states([&](const auto& law, std::size_t first) { soc = ocv_soc(law, soc, x, first); });
     return soc;
   }
   template <class X>
-  constexpr Coupling<S> read_slope(Soc<S> soc, const X& x) const {
+  constexpr Coupling<S> ocv_soc_slope(Soc<S> soc, const X& x) const {
     Coupling<S> slope(1);
     each_with_states([&](const auto& law, std::size_t first) {
-      if constexpr (requires { law.read_slope(soc); }) slope = Coupling<S>(slope * law.read_slope(soc));
-      soc = read_at(law, soc, x, first);
+      if constexpr (requires { law.ocv_soc_slope(soc); }) slope = Coupling<S>(slope * law.ocv_soc_slope(soc));
+      soc = ocv_soc(law, soc, x, first);
     });
     return slope;
   }
   /// By how much soc is read ahead per volt of each voltage state.
   template <class Couplings>
-  constexpr void ahead_per_v(Couplings& out) const {
+  constexpr void soc_shift_per_v(Couplings& out) const {
     each_with_states([&](const auto& law, std::size_t first) {
-      if constexpr (requires { law.ahead_per_v(); }) {
-        for (std::size_t i = 0; i < states_of(law) && first + i < out.size(); ++i) out[first + i] = law.ahead_per_v();
+      if constexpr (requires { law.soc_shift_per_v(); }) {
+        for (std::size_t i = 0; i < states_of(law) && first + i < out.size(); ++i)
+          out[first + i] = law.soc_shift_per_v();
       }
     });
   }
   template <class X>
-  constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const Drive<S>& drive, const X& x) const {
+  constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const StepInput<S>& input, const X& x) const {
     each_with_states([&](const auto& law, std::size_t first) {
-      if constexpr (requires { law.warm(at, x[first], drive); }) law.warm(at, x[first], drive);
-      if constexpr (requires { law.tables(at, soc, drive); }) law.tables(at, soc, drive);
+      if constexpr (requires { law.apply_state(at, x[first], input); }) law.apply_state(at, x[first], input);
+      if constexpr (requires { law.tables(at, soc, input); }) law.tables(at, soc, input);
     });
   }
   constexpr Voltage<S> reading(Voltage<S> v) const {
@@ -143,7 +144,7 @@ class LawSet {
     bool any = false;
     each([&](const auto& law) {
       any = any || requires(Current<S> a) { law.true_current(a); }
-      || requires(Current<S> a, Drive<S> d) { law.counted(a, d); };
+      || requires(Current<S> a, StepInput<S> d) { law.counted(a, d); };
     });
     return any;
   }
@@ -185,10 +186,10 @@ class LawSet {
   }
   /// How each state moves in a step. x: the laws' states before it.
   template <class X>
-  constexpr Relaxations settling(const X& x, const TablePoint<S>& at, const Drive<S>& drive) const {
+  constexpr Relaxations discretise(const X& x, const TablePoint<S>& at, const StepInput<S>& input) const {
     Relaxations r{};
     each_with_states([&](const auto& law, std::size_t first) {
-      for (std::size_t i = 0; i < states_of(law); ++i) r[first + i] = settle(law, i, at, drive, &x[first]);
+      for (std::size_t i = 0; i < states_of(law); ++i) r[first + i] = relaxation(law, i, at, input, &x[first]);
     });
     return r;
   }
@@ -208,11 +209,11 @@ class LawSet {
     });
   }
   /// Voltage states advanced, and what they add to the terminal's voltage.
-  constexpr Voltage<S> advance(States& x, const TablePoint<S>& at, const Drive<S>& drive, bool moving) const {
+  constexpr Voltage<S> advance(States& x, const TablePoint<S>& at, const StepInput<S>& input, bool moving) const {
     Voltage<S> sum(0);
     each_with_states([&](const auto& law, std::size_t first) {
       for (std::size_t i = 0; i < states_of(law); ++i) {
-        if (moving) x[first + i] = relaxed<S>(x[first + i], settle(law, i, at, drive, &x[first]));
+        if (moving) x[first + i] = relaxed<S>(x[first + i], relaxation(law, i, at, input, &x[first]));
         if (adds_voltage(law)) sum = Voltage<S>(sum + x[first + i]);
       }
     });
@@ -221,24 +222,24 @@ class LawSet {
 
  private:
   template <class Law, class X>
-  static constexpr Soc<S> read_at(const Law& law, const Soc<S>& soc, const X& x, std::size_t first) {
-    if constexpr (requires { law.read_at(soc); }) {
-      return law.read_at(soc);
-    } else if constexpr (requires { law.ahead_per_v(); }) {
+  static constexpr Soc<S> ocv_soc(const Law& law, const Soc<S>& soc, const X& x, std::size_t first) {
+    if constexpr (requires { law.ocv_soc(soc); }) {
+      return law.ocv_soc(soc);
+    } else if constexpr (requires { law.soc_shift_per_v(); }) {
       Voltage<S> sum = x[first];
       for (std::size_t i = 1; i < states_of(law); ++i) sum = Voltage<S>(sum + x[first + i]);
-      return Soc<S>(soc + law.ahead_per_v() * sum);
+      return Soc<S>(soc + law.soc_shift_per_v() * sum);
     } else {
       return soc;
     }
   }
   template <class Law>
-  static constexpr Relaxation<S> settle(const Law& law, std::size_t i, const TablePoint<S>& at, const Drive<S>& drive,
-                                        const Voltage<S>* x) {
-    if constexpr (requires { law.settle(i, at, drive, x); })
-      return law.settle(i, at, drive, x);
+  static constexpr Relaxation<S> relaxation(const Law& law, std::size_t i, const TablePoint<S>& at,
+                                            const StepInput<S>& input, const Voltage<S>* x) {
+    if constexpr (requires { law.relaxation(i, at, input, x); })
+      return law.relaxation(i, at, input, x);
     else if constexpr (extended_detail::states_of<Law>() > 0)
-      return law.settle(i, at, drive);
+      return law.relaxation(i, at, input);
     else
       return {};
   }

@@ -7,19 +7,19 @@
 //   Current<S> true_current(Current<S> read)                       undoes a fault of the current sensor
 //   Temperature<S> true_temperature(Temperature<S> read)           the same for the temperature
 //   Current<S> counted(Current<S> counted, const Drive<S>&)        current that ends as charge
-//   Soc<S> read_at(Soc<S>)                                         where the OCV table is read
-//   Coupling<S> ahead_per_v()                                      the same by the law's voltage states: soc ahead per
-//   volt of their sum Coupling<S> read_slope(Soc<S>)                                 its derivative; with read_at only
-//   void tables(TablePoint<S>&, Soc<S>, const Drive<S>&)           changes OCV, R0, R1, C1 at this soc under this drive
-//   Voltage<S> initial(std::size_t i)                              state i before the first step
+//   Soc<S> ocv_soc(Soc<S>)                                         where the OCV table is read
+//   Coupling<S> soc_shift_per_v()                                      the same by the law's voltage states: soc ahead
+//   per volt of their sum Coupling<S> ocv_soc_slope(Soc<S>)                                 its derivative; with
+//   ocv_soc only void tables(TablePoint<S>&, Soc<S>, const Drive<S>&)           changes OCV, R0, R1, C1 at this soc
+//   under this drive Voltage<S> initial(std::size_t i)                              state i before the first step
 //   Relaxation<S> settle(std::size_t i, const TablePoint<S>&, const Drive<S>&)     how state i moves in a step; with a
 //   fourth argument,
 //                                                                  const Voltage<S>* x, where that depends on the law's
 //                                                                  own states
 //   void warm(TablePoint<S>&, Voltage<S> state, const Drive<S>&)   changes the tables by the law's own state
 //   Voltage<S> reading(Voltage<S>)                                 what the voltage sensor makes of the voltage: a
-//   straight line Voltage<S> error_at_first(), lasting_error()                   standard deviations of its voltage
-//   states, for the filter; without
+//   straight line Voltage<S> initial_sigma_v(), steady_state_sigma_v()                   standard deviations of its
+//   voltage states, for the filter; without
 //                                                                  them: half of what the current can have built up,
 //                                                                  and noise.v_rc_v
 //   void at(double time_s)                                         host only: where in the recording the step ends
@@ -76,7 +76,7 @@ struct Parameter {
   constexpr double upper(double capacity_ah) const { return high * scale(capacity_ah); }
   constexpr double common(double capacity_ah) const { return usual * scale(capacity_ah); }
   /// neutral, scaled as the bounds are and held within them: what a cell file that is silent about it means.
-  constexpr double unsaid(double capacity_ah) const {
+  constexpr double default_value(double capacity_ah) const {
     const double silent = neutral * scale(capacity_ah);
     return silent < lower(capacity_ah) ? lower(capacity_ah) : silent > upper(capacity_ah) ? upper(capacity_ah) : silent;
   }
@@ -91,9 +91,9 @@ enum class Domain { physics, instrument, start };
 /// How one state of a law moves in a step.
 template <class S>
 struct Relaxation {
-  Fraction<S> settled;            ///< p
-  Voltage<S> target;              ///< where it goes
-  Fraction<S> renewed = settled;  ///< how much of an error in the state is gone after it
+  Fraction<S> alpha;                ///< p
+  Voltage<S> target;                ///< where it goes
+  Fraction<S> error_decay = alpha;  ///< how much of an error in the state is gone after it
 };
 
 /// What a law's states are where they are no voltages: the unit for people, and how much of it one unit of the state
@@ -105,7 +105,7 @@ struct StateUnit {
 
 template <class S>
 constexpr Voltage<S> relaxed(const Voltage<S>& x, const Relaxation<S>& r) {
-  return Voltage<S>(x + r.settled * Voltage<S>(r.target - x));
+  return Voltage<S>(x + r.alpha * Voltage<S>(r.target - x));
 }
 
 namespace mechanism_detail {
@@ -114,8 +114,8 @@ namespace mechanism_detail {
 template <class S>
 constexpr Factor<S> exponential(const Exponent<S>& x) {
   const Exponent<S> none(0), most(4.5);
-  if (x < none) return Factor<S>(Fraction<S>(1) - settled<S>(-x < most ? Exponent<S>(-x) : most));
-  const Fraction<S> remaining = Fraction<S>(Fraction<S>(1) - settled<S>(x < most ? x : most));
+  if (x < none) return Factor<S>(Fraction<S>(1) - step_response<S>(-x < most ? Exponent<S>(-x) : most));
+  const Fraction<S> remaining = Fraction<S>(Fraction<S>(1) - step_response<S>(x < most ? x : most));
   return ratio<Factor<S>>(Fraction<S>(1), remaining);
 }
 

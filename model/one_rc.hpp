@@ -23,7 +23,7 @@ namespace bms::model {
 
 /// What acts on the cell during one step.
 template <class S>
-struct Drive {
+struct StepInput {
   Current<S> current_a;                               ///< mean over the step, > 0 charges
   TimeStep<S> duration_s;                             ///< > 0
   Temperature<S> temperature_c = Temperature<S>(25);  ///< of the cell; read by mechanisms only
@@ -33,66 +33,66 @@ template <class S>
 struct OneRc {
   static constexpr std::size_t states = 2;  ///< v_rc [V], soc
 
-  using Polarisation = std::array<Voltage<S>, states - 1>;  ///< the states before soc
-  using Transition = std::array<std::array<Coupling<S>, states>, states>;
-  using Sensitivity = std::array<VoltagePerSoc<S>, states>;
+  using State = std::array<Voltage<S>, states - 1>;  ///< the states before soc
+  using StateTransition = std::array<std::array<Coupling<S>, states>, states>;
+  using MeasurementJacobian = std::array<VoltagePerSoc<S>, states>;
 
   /// How far the RC branch settles within a step, for the tables at one soc.
-  struct Settling {
-    Rate<S> rate_per_s;   ///< 1 / (R1 C1)
-    Fraction<S> settled;  ///< p
-    Fraction<S> by_rate;  ///< dp / d ln rate = x exp(-x) of x = duration / (R1 C1)
+  struct Discretisation {
+    Rate<S> rate_per_s;             ///< 1 / (R1 C1)
+    Fraction<S> alpha;              ///< p
+    Fraction<S> alpha_by_log_rate;  ///< dp / d ln rate = x exp(-x) of x = duration / (R1 C1)
   };
 
-  static constexpr Settling settling(const TablePoint<S>& at, const TimeStep<S>& duration_s) {
+  static constexpr Discretisation discretise(const TablePoint<S>& at, const TimeStep<S>& duration_s) {
     const Duration<S> tau_s = at.r1_ohm * at.c1_f;
     const Rate<S> rate_per_s = ratio<Rate<S>>(Duration<S>(1), tau_s);
-    const Fraction<S> settled = settled_in<S>(duration_s, rate_per_s), remaining = Fraction<S>(1) - settled;
+    const Fraction<S> alpha = step_response_after<S>(duration_s, rate_per_s), remaining = Fraction<S>(1) - alpha;
     const Fraction<S> x = duration_s * rate_per_s;
     if (long_step<S>(x)) [[unlikely]]
-      return {rate_per_s, settled, remaining * Current<S>(Exponent<S>(duration_s * rate_per_s))};
-    return {rate_per_s, settled, remaining * x};
+      return {rate_per_s, alpha, remaining * Current<S>(Exponent<S>(duration_s * rate_per_s))};
+    return {rate_per_s, alpha, remaining * x};
   }
 
   /// v_rc at the start of the step; `at` and `settling` belong to the soc at its end.
-  static constexpr Polarisation advance(const Polarisation& x, const TablePoint<S>& at, const Settling& settling,
-                                        const Drive<S>& drive) {
-    return {Voltage<S>(x[0] + Voltage<S>(settling.settled * gap_v(x, at, drive)))};
+  static constexpr State advance(const State& x, const TablePoint<S>& at, const Discretisation& discretisation,
+                                 const StepInput<S>& input) {
+    return {Voltage<S>(x[0] + Voltage<S>(discretisation.alpha * gap_v(x, at, input)))};
   }
 
   /// Terminal voltage (Eq. 9).
-  static constexpr Voltage<S> voltage(const Polarisation& x, const TablePoint<S>& at, const Drive<S>& drive) {
-    return at.ocv_v + x[0] + Voltage<S>(at.r0_ohm * drive.current_a);
+  static constexpr Voltage<S> voltage(const State& x, const TablePoint<S>& at, const StepInput<S>& input) {
+    return at.ocv_v + x[0] + Voltage<S>(at.r0_ohm * input.current_a);
   }
 
   /// d (state after) / d (state before), upper triangular. The derivative by soc runs through R1, C1 and dp/dx =
   /// exp(-x).
-  static constexpr Transition transition(const Polarisation& x, const TablePoint<S>& at, const Settling& settling,
-                                         const Drive<S>& drive) {
-    const Fraction<S> remaining = Fraction<S>(1) - settling.settled;
+  static constexpr StateTransition state_transition(const State& x, const TablePoint<S>& at,
+                                                    const Discretisation& discretisation, const StepInput<S>& input) {
+    const Fraction<S> remaining = Fraction<S>(1) - discretisation.alpha;
     // over one interval: tau, p, and what v_rc goes to
     const Duration<S> tau_delta_s = Duration<S>(at.r1_delta_ohm * at.c1_f) + Duration<S>(at.r1_ohm * at.c1_delta_f);
-    const Ratio tau_change = tau_delta_s * settling.rate_per_s;
-    const Ratio settled_delta = settling.by_rate * tau_change;
-    const Voltage<S> target_delta_v = at.r1_delta_ohm * drive.current_a;
+    const Ratio tau_change = tau_delta_s * discretisation.rate_per_s;
+    const Ratio alpha_delta = discretisation.alpha_by_log_rate * tau_change;
+    const Voltage<S> target_delta_v = at.r1_delta_ohm * input.current_a;
     const Voltage<S> delta_v =
-        Voltage<S>(settling.settled * target_delta_v) - Voltage<S>(settled_delta * gap_v(x, at, drive));
+        Voltage<S>(discretisation.alpha * target_delta_v) - Voltage<S>(alpha_delta * gap_v(x, at, input));
     return {{{Coupling<S>(remaining), Coupling<S>(delta_v * at.per_width)}, {Coupling<S>(0), Coupling<S>(1)}}};
   }
 
   /// d voltage / d state, at the state after the step.
-  static constexpr Sensitivity sensitivity(const TablePoint<S>& at, const Drive<S>& drive) {
+  static constexpr MeasurementJacobian measurement_jacobian(const TablePoint<S>& at, const StepInput<S>& input) {
     return {
         VoltagePerSoc<S>(1),
-        VoltagePerSoc<S>(Voltage<S>(at.ocv_delta_v + Voltage<S>(at.r0_delta_ohm * drive.current_a)) * at.per_width)};
+        VoltagePerSoc<S>(Voltage<S>(at.ocv_delta_v + Voltage<S>(at.r0_delta_ohm * input.current_a)) * at.per_width)};
   }
 
  private:
   using Ratio = Current<S>;  // relative changes over an interval: below 2,048
 
   /// How far v_rc is from where the current leads it.
-  static constexpr Voltage<S> gap_v(const Polarisation& x, const TablePoint<S>& at, const Drive<S>& drive) {
-    return Voltage<S>(at.r1_ohm * drive.current_a) - x[0];
+  static constexpr Voltage<S> gap_v(const State& x, const TablePoint<S>& at, const StepInput<S>& input) {
+    return Voltage<S>(at.r1_ohm * input.current_a) - x[0];
   }
 };
 

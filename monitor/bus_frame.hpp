@@ -28,13 +28,13 @@ struct BusFrame {
 };
 
 /// The part that decoders look at; frame.kind must be standard or extended.
-constexpr can::Frame classic(const BusFrame& frame) {
+constexpr can::Frame to_can_frame(const BusFrame& frame) {
   can::Frame out{frame.id, frame.length, {}, frame.long_id};
   for (std::size_t k = 0; k < out.data.size(); ++k) out.data[k] = frame.data[k];
   return out;
 }
 
-constexpr BusFrame on_bus(const can::Frame& frame, std::int64_t time_us) {
+constexpr BusFrame to_bus_frame(const can::Frame& frame, std::int64_t time_us) {
   BusFrame out;
   out.time_us = time_us;
   out.kind = frame.long_id ? FrameKind::extended : FrameKind::standard;

@@ -103,23 +103,23 @@ const std::vector<MessageInfo>& messages() {
 }
 
 BusState::BusState() {
-  of_short_id_.fill(none);
+  index_of_standard_id_.fill(none);
   for (std::size_t k = 0; k < messages().size(); ++k) {
     if (messages()[k].long_id)
-      of_long_ids_.push_back(k);
+      index_of_extended_id_.push_back(k);
     else
-      of_short_id_[messages()[k].id & 0x7FFU] = static_cast<std::uint8_t>(k);
+      index_of_standard_id_[messages()[k].id & 0x7FFU] = static_cast<std::uint8_t>(k);
     states_.emplace_back().values.assign(messages()[k].signals.size(), std::numeric_limits<double>::quiet_NaN());
   }
 }
 
-std::size_t BusState::take(const BusFrame& frame) {
+std::size_t BusState::receive(const BusFrame& frame) {
   const std::size_t none_of_ours = states_.size();
   const std::int64_t time_us = std::clamp(frame.time_us, -farthest_us, farthest_us);  // any log may come
   if (frames_++ == 0) first_us_ = last_us_ = now_us_ = time_us;
   if (time_us < last_us_ - clock_set_us) clock_set_back(time_us);
   last_us_ = std::max(last_us_, time_us);
-  time_is(time_us);
+  advance_time(time_us);
   switch (frame.kind) {
     case FrameKind::remote:
       ++remote_;
@@ -136,18 +136,18 @@ std::size_t BusState::take(const BusFrame& frame) {
       break;
   }
   const std::size_t message = message_of(frame);
-  if (message != none_of_ours) return take_ours(message, classic(frame), time_us) ? message : none_of_ours;
-  take_unknown(frame);
+  if (message != none_of_ours) return receive_known(message, to_can_frame(frame), time_us) ? message : none_of_ours;
+  count_unknown(frame);
   return none_of_ours;
 }
 
 std::size_t BusState::message_of(const BusFrame& frame) const {
   if (frame.kind == FrameKind::extended) {
-    const auto found = std::find_if(of_long_ids_.begin(), of_long_ids_.end(),
+    const auto found = std::find_if(index_of_extended_id_.begin(), index_of_extended_id_.end(),
                                     [&](std::size_t k) { return messages()[k].id == frame.id; });
-    return found == of_long_ids_.end() ? states_.size() : *found;
+    return found == index_of_extended_id_.end() ? states_.size() : *found;
   }
-  const std::uint8_t message = of_short_id_[frame.id & 0x7FFU];
+  const std::uint8_t message = index_of_standard_id_[frame.id & 0x7FFU];
   return message == none ? states_.size() : message;
 }
 
@@ -158,7 +158,7 @@ void BusState::clock_set_back(std::int64_t to_us) {
 }
 
 /// Counts what is wrong with a frame of a message.
-bool BusState::whole(const MessageInfo& info, MessageState& state, const can::Frame& frame) const {
+bool BusState::is_intact(const MessageInfo& info, MessageState& state, const can::Frame& frame) const {
   if (frame.length != 8) {
     ++state.wrong_length;
     return false;
@@ -179,10 +179,10 @@ bool BusState::whole(const MessageInfo& info, MessageState& state, const can::Fr
   return true;
 }
 
-bool BusState::take_ours(std::size_t message, const can::Frame& frame, std::int64_t time_us) {
+bool BusState::receive_known(std::size_t message, const can::Frame& frame, std::int64_t time_us) {
   const MessageInfo& info = messages()[message];
   MessageState& state = states_[message];
-  if (!whole(info, state, frame)) return false;
+  if (!is_intact(info, state, frame)) return false;
   if (const auto since_us = static_cast<double>(time_us - state.last_us); state.frames > 0 && since_us > 0)
     state.period_us += state.period_us > 0 ? smoothing * (since_us - state.period_us) : since_us;
   ++good_;
@@ -193,7 +193,7 @@ bool BusState::take_ours(std::size_t message, const can::Frame& frame, std::int6
   return true;
 }
 
-void BusState::take_unknown(const BusFrame& frame) {
+void BusState::count_unknown(const BusFrame& frame) {
   ++unknown_frames_;
   const auto end = unknown_.begin() + static_cast<std::ptrdiff_t>(unknown_count_);
   const auto place = std::find_if(unknown_.begin(), end,

@@ -76,9 +76,9 @@ class BusState {
   BusState();
 
   /// The message that it was a good frame of; messages().size(): none.
-  std::size_t take(const BusFrame& frame);
+  std::size_t receive(const BusFrame& frame);
   /// For sources whose time goes on without frames. Never goes back.
-  void time_is(std::int64_t now_us) { now_us_ = now_us > now_us_ ? now_us : now_us_; }
+  void advance_time(std::int64_t now_us) { now_us_ = now_us > now_us_ ? now_us : now_us_; }
 
   const std::vector<MessageState>& states() const { return states_; }  ///< as messages()
   double age_s(std::size_t message) const;
@@ -95,7 +95,7 @@ class BusState {
   };
   std::span<const Unknown> unknown_ids() const { return {unknown_.data(), unknown_count_}; }
   std::uint64_t unknown_frames() const { return unknown_frames_; }
-  std::uint64_t unknown_without_place() const { return unknown_without_place_; }
+  std::uint64_t unknown_overflow() const { return unknown_without_place_; }
 
   std::uint64_t frames() const { return frames_; }  ///< of any kind
   std::uint64_t good() const { return good_; }      ///< ours, and right
@@ -115,13 +115,13 @@ class BusState {
  private:
   void clock_set_back(std::int64_t to_us);
   std::size_t message_of(const BusFrame& frame) const;
-  bool take_ours(std::size_t message, const can::Frame& frame, std::int64_t time_us);
-  bool whole(const MessageInfo& info, MessageState& state, const can::Frame& frame) const;
-  void take_unknown(const BusFrame& frame);
+  bool receive_known(std::size_t message, const can::Frame& frame, std::int64_t time_us);
+  bool is_intact(const MessageInfo& info, MessageState& state, const can::Frame& frame) const;
+  void count_unknown(const BusFrame& frame);
 
   static constexpr std::uint8_t none = 0xFF;
-  std::array<std::uint8_t, 2048> of_short_id_{};
-  std::vector<std::size_t> of_long_ids_;
+  std::array<std::uint8_t, 2048> index_of_standard_id_{};
+  std::vector<std::size_t> index_of_extended_id_;
   std::vector<MessageState> states_;
   std::array<Unknown, 64> unknown_{};
   std::size_t unknown_count_ = 0;

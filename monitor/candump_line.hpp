@@ -29,7 +29,7 @@ void append_dump_line(std::string& text, const BusFrame& frame, std::string_view
 class DumpLines {
  public:
   /// True when `byte` ended a line, which line() holds until the next call.
-  bool take(char byte) {
+  bool push(char byte) {
     if (ended_) {
       text_.clear();
       ended_ = too_long_ = false;

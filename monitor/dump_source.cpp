@@ -73,17 +73,17 @@ class Unpacked {
       return false;
     }
     eof_ = n == 0;
-    std::size_t held = static_cast<std::size_t>(n);
+    std::size_t available = static_cast<std::size_t>(n);
     if (!begun_) {
-      head_ = held += head_;
-      if (held < 2 && !eof_) return false;
+      head_ = available += head_;
+      if (available < 2 && !eof_) return false;
       begun_ = true;
       head_ = 0;
-      packed_ = held >= 2 && bytes_[0] == 0x1F && bytes_[1] == 0x8B;
+      packed_ = available >= 2 && bytes_[0] == 0x1F && bytes_[1] == 0x8B;
       if (packed_ && inflateInit2(&inflate_, 15 + 16) != Z_OK) throw std::bad_alloc();
     }
     inflate_.next_in = bytes_.data();
-    inflate_.avail_in = static_cast<uInt>(held);
+    inflate_.avail_in = static_cast<uInt>(available);
     return true;
   }
 
@@ -115,7 +115,7 @@ class Dump : public FrameSource {
   std::size_t decode(std::span<BusFrame> room) {
     std::size_t taken = 0;
     while (used_ < held_ && taken < room.size()) {
-      if (lines_.take(text_[used_++])) taken += line(room[taken]);
+      if (lines_.push(text_[used_++])) taken += line(room[taken]);
     }
     return taken;
   }
@@ -133,15 +133,15 @@ class Dump : public FrameSource {
   /// The last line may have no end.
   std::size_t finish(BusFrame& frame) {
     ended_ = true;
-    const std::size_t taken = lines_.pending() && lines_.take('\n') ? line(frame) : 0;
+    const std::size_t taken = lines_.pending() && lines_.push('\n') ? line(frame) : 0;
     if (file_.state() == Unpacked::State::broken) ++malformed_;  // cut off or damaged
     if (!any_) refuse();
     return taken;
   }
   [[noreturn]] void refuse() const {
-    throw SourceRefused(path_, 1,
-                        "no frame in " + std::to_string(count_) +
-                            " lines, expected a log of candump -L, as it is or compressed by gzip");
+    throw SourceError(path_, 1,
+                      "no frame in " + std::to_string(count_) +
+                          " lines, expected a log of candump -L, as it is or compressed by gzip");
   }
 
   std::string path_;
@@ -158,12 +158,12 @@ class Dump : public FrameSource {
 std::unique_ptr<FrameSource> open_dump(const std::string& path) {
   const int fd = path == "-" ? dup(0) : open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0)
-    throw SourceRefused(
-        path, 1, "cannot be read, expected a log of candump -L (" + std::generic_category().message(errno) + ")");
+    throw SourceError(path, 1,
+                      "cannot be read, expected a log of candump -L (" + std::generic_category().message(errno) + ")");
   struct stat status {};
   if (fstat(fd, &status) != 0 || S_ISDIR(status.st_mode)) {
     close(fd);
-    throw SourceRefused(path, 1, "a folder, expected a log of candump -L");
+    throw SourceError(path, 1, "a folder, expected a log of candump -L");
   }
   return std::make_unique<Dump>(path, fd);
 }

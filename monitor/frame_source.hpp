@@ -20,8 +20,8 @@
 namespace bms::monitor {
 
 /// A source that is not there, or not what it should be; what() says what was expected. Line 0: none.
-struct SourceRefused : std::runtime_error {
-  SourceRefused(const std::string& name, std::size_t at, const std::string& what)
+struct SourceError : std::runtime_error {
+  SourceError(const std::string& name, std::size_t at, const std::string& what)
       : std::runtime_error(what), source(name), line(at) {}
   std::string source;
   std::size_t line;
@@ -46,7 +46,7 @@ class FrameSource {
   std::uint64_t malformed_ = 0, dropped_ = 0;
 };
 
-/// Throws SourceRefused.
+/// Throws SourceError.
 std::unique_ptr<FrameSource> open_source(const std::string& name);
 
 /// Of this machine, as SocketCAN stamps frames.

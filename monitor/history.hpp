@@ -12,14 +12,14 @@
 namespace bms::monitor {
 
 struct HistoryPoint {
-  static constexpr std::size_t most_cells = 32;
+  static constexpr std::size_t max_cells = 32;
   double time_s = 0;  ///< since the first frame
-  float soc_percent = nothing, soc_sigma_percent = nothing, current_a = nothing, voltage_v = nothing,
-        temperature_c = nothing;
+  float soc_percent = not_available, soc_sigma_percent = not_available, current_a = not_available,
+        voltage_v = not_available, temperature_c = not_available;
   std::uint8_t cell_count = 0;
-  std::array<float, most_cells> cells_v{};
+  std::array<float, max_cells> cells_v{};
 
-  static constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+  static constexpr float not_available = std::numeric_limits<float>::quiet_NaN();
 };
 
 HistoryPoint point_of(const BusState& bus);
@@ -27,12 +27,12 @@ HistoryPoint point_of(const BusState& bus);
 class History {
  public:
   static constexpr std::size_t capacity = 7'200;
-  static constexpr std::int64_t least_gap_us = 500'000;
+  static constexpr std::int64_t min_interval_us = 500'000;
 
   History() { points_.reserve(capacity); }
   /// Whether a point of that time is wanted: later than the last by the least gap, or earlier (a clock was set).
-  bool wants(std::int64_t time_us) const {
-    return count_ == 0 || time_us - last_us_ >= least_gap_us || time_us < last_us_;
+  bool is_due(std::int64_t time_us) const {
+    return count_ == 0 || time_us - last_us_ >= min_interval_us || time_us < last_us_;
   }
   void add(const HistoryPoint& point, std::int64_t time_us) {
     if (points_.size() < capacity)

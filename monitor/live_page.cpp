@@ -146,8 +146,8 @@ LivePage::LivePage(std::string html, int port) : server_(std::make_unique<Server
   s.http.Get("/events", [&s](const httplib::Request&, httplib::Response& response) { s.stream(response); });
   s.port = port > 0 ? (s.http.bind_to_port("127.0.0.1", port) ? port : -1) : s.http.bind_to_any_port("127.0.0.1");
   if (s.port < 0)
-    throw SourceRefused("--serve", 1,
-                        fmt::format("port {} of 127.0.0.1 is not to be had, expected one that is free", port));
+    throw SourceError("--serve", 1,
+                      fmt::format("port {} of 127.0.0.1 is not to be had, expected one that is free", port));
   s.thread = std::thread([&s] { s.http.listen_after_bind(); });
 }
 
@@ -166,7 +166,7 @@ LivePage::~LivePage() {
 std::string LivePage::url() const { return fmt::format("http://127.0.0.1:{}/", server_->port); }
 
 void LivePage::add(const BusState& bus) {
-  if (!server_->history.wants(bus.now_us())) return;  // only this thread writes
+  if (!server_->history.is_due(bus.now_us())) return;  // only this thread writes
   const HistoryPoint point = point_of(bus);
   const std::lock_guard lock(server_->guard);
   server_->history.add(point, bus.now_us());

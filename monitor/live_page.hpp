@@ -20,7 +20,7 @@ namespace bms::monitor {
 
 class LivePage {
  public:
-  /// port 0: any that is free. Throws SourceRefused when it is taken.
+  /// port 0: any that is free. Throws SourceError when it is taken.
   LivePage(std::string html, int port);
   ~LivePage();
   LivePage(const LivePage&) = delete;

@@ -20,13 +20,13 @@ constexpr std::pair<estimator::Flag, const char*> flag_words[] = {
     {estimator::current_missing, "current missing"},
     {estimator::current_implausible, "current implausible"},
     {estimator::time_gap, "gap in time"},
-    {estimator::time_not_later, "time not later"},
+    {estimator::time_not_increasing, "time not later"},
     {estimator::not_started, "not started"},
-    {estimator::soc_unsettled, "more than one state of charge fits"},
-    {estimator::voltage_disbelieved, "voltage disbelieved"}};
+    {estimator::soc_ambiguous, "more than one state of charge fits"},
+    {estimator::voltage_rejected, "voltage disbelieved"}};
 
-std::vector<Words> flags_in_words(const Reading& flags) {
-  std::vector<Words> set;
+std::vector<TextItem> flags_in_words(const Reading& flags) {
+  std::vector<TextItem> set;
   if (!flags.known()) return set;
   auto bits = static_cast<std::uint32_t>(flags.value);
   for (const auto& [bit, text] : flag_words) {
@@ -119,7 +119,7 @@ PackView pack_view(const BusState& bus) {
                                                                     : fmt::format("{} {}", signal.name, text),
                            signal.comment, stale});
   });
-  v.faults_heard = each_signal(bus, "Faults", [&](const SignalInfo& signal, double value, bool stale) {
+  v.faults_received = each_signal(bus, "Faults", [&](const SignalInfo& signal, double value, bool stale) {
     if (!std::isfinite(value) || value == 0) return;
     if (signal.layout.bits == 1)
       v.faults.push_back({signal.name, signal.comment, stale});

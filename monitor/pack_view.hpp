@@ -10,7 +10,7 @@
 namespace bms::monitor {
 
 /// Something said in words, and whether it is still so.
-struct Words {
+struct TextItem {
   std::string text;
   std::string comment;
   bool stale = false;
@@ -18,16 +18,16 @@ struct Words {
 
 struct PackView {
   Reading soc_percent, soc_sigma_percent, soc_display_percent;
-  Words soc_quality;
+  TextItem soc_quality;
   Reading voltage_v, current_a, temperature_c;
   Reading discharge_now_a, charge_now_a, discharge_10s_a, charge_10s_a;
   Reading capacity_percent, capacity_sigma_percent, resistance_percent, resistance_sigma_percent;
-  std::vector<Reading> cells_v;      ///< CellVoltages*.Cell1, Cell2, ... up to the highest that was ever heard
-  std::vector<Words> contactor;      ///< ContactorState: its State, the bits that are set, what else it says
-  bool faults_heard = false;         ///< a message Faults is there
-  std::vector<Words> faults;         ///< its bits that are set
-  std::vector<Words> fault_details;  ///< what is no bit and not zero, in words
-  std::vector<Words> flags;          ///< why the estimate is worth less: the bits of Status.Flags
+  std::vector<Reading> cells_v;         ///< CellVoltages*.Cell1, Cell2, ... up to the highest that was ever heard
+  std::vector<TextItem> contactor;      ///< ContactorState: its State, the bits that are set, what else it says
+  bool faults_received = false;         ///< a message Faults is there
+  std::vector<TextItem> faults;         ///< its bits that are set
+  std::vector<TextItem> fault_details;  ///< what is no bit and not zero, in words
+  std::vector<TextItem> flags;          ///< why the estimate is worth less: the bits of Status.Flags
 
   /// Lowest, highest and mean of the cells that are known; count 0: none.
   struct Cells {

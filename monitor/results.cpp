@@ -19,9 +19,9 @@ Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nul
 Json fraction(const Reading& percent) { return number(std::round(percent.value * 1e7) / 1e9); }
 Json seconds(double s) { return number(std::round(s * 1e6) / 1e6); }
 
-Json list_of(const std::vector<Words>& words) {
+Json list_of(const std::vector<TextItem>& words) {
   Json list = Json::array();
-  for (const Words& w : words) list.push_back(w.text);
+  for (const TextItem& w : words) list.push_back(w.text);
   return list;
 }
 
@@ -48,7 +48,7 @@ Json pack_json(const BusState& bus) {
   json["cells_v"] = Json::array();
   for (const Reading& cell : p.cells_v) json["cells_v"].push_back(number(cell.value));
   json["contactor"] = list_of(p.contactor);
-  json["faults"] = p.faults_heard ? list_of(p.faults) : Json(nullptr);
+  json["faults"] = p.faults_received ? list_of(p.faults) : Json(nullptr);
   json["fault_details"] = list_of(p.fault_details);
   json["flags"] = list_of(p.flags);
   return json;
@@ -99,7 +99,7 @@ std::string json_of(const BusState& bus, const ScreenFacts& facts, double silent
   }
   Json ids = Json::object();
   for (const auto& u : bus.unknown_ids()) ids[fmt::format("{:0{}X}", u.id, u.long_id ? 8 : 3)] = u.frames;
-  json["other_ids"] = {{"frames", bus.unknown_frames()}, {"ids", ids}, {"without_place", bus.unknown_without_place()}};
+  json["other_ids"] = {{"frames", bus.unknown_frames()}, {"ids", ids}, {"without_place", bus.unknown_overflow()}};
   json["other_kinds"] = {{"remote", bus.remote()},
                          {"fd", bus.fd()},
                          {"error_reports", bus.errors()},

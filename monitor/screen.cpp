@@ -34,7 +34,7 @@ std::string clean(std::string_view text) {
   return out;
 }
 
-Ink ink_of(bool stale, Ink fresh = Ink::plain) { return stale ? Ink::faint : fresh; }
+TextStyle ink_of(bool stale, TextStyle fresh = TextStyle::plain) { return stale ? TextStyle::faint : fresh; }
 
 std::string number(const Reading& r, int digits, const char* unit) {
   return r.known() ? fmt::format("{:.{}f}{}", r.value, digits, unit) : fmt::format("-{}", unit);
@@ -61,13 +61,13 @@ class Drawing {
 
   ScreenLine head() const {
     ScreenLine line;
-    line.add("bms monitor ", Ink::strong).add(clean(facts_.source).substr(0, columns_ / 2));
+    line.add("bms monitor ", TextStyle::strong).add(clean(facts_.source).substr(0, columns_ / 2));
     line.add(fmt::format("  {}  {} frames", clock(bus_.duration_s()), bus_.frames()));
     if (columns_ >= 70) line.add(fmt::format("  {:.0f}/s", facts_.frames_per_second));
     if (bus_.frames() == 0)
-      line.add("  nothing heard yet", Ink::warning);
+      line.add("  nothing heard yet", TextStyle::warning);
     else if (const double silent_s = 1e-6 * static_cast<double>(bus_.now_us() - bus_.last_us()); silent_s > 3)
-      line.add(fmt::format("  silent for {}", age(silent_s)), Ink::alarm);
+      line.add(fmt::format("  silent for {}", age(silent_s)), TextStyle::alarm);
     return line;
   }
 
@@ -77,18 +77,18 @@ class Drawing {
     for (const MessageState& m : bus_.states())
       lost += m.lost, repeated += m.repeated, crc += m.crc_errors, length += m.wrong_length;
     ScreenLine line;
-    const auto say = [&](std::uint64_t count, const char* what, Ink ink) {
+    const auto say = [&](std::uint64_t count, const char* what, TextStyle ink) {
       if (count > 0) line.add(line.columns() == 0 ? "Bus      " : ", ").add(fmt::format("{} {}", count, what), ink);
     };
-    say(facts_.dropped, "dropped by the kernel", Ink::alarm);
-    say(lost, "lost", Ink::warning);
-    say(crc, "CRC errors", Ink::warning);
-    say(length, "of wrong length", Ink::warning);
-    say(repeated, "repeated", Ink::warning);
-    say(facts_.malformed, "malformed lines", Ink::warning);
-    say(bus_.errors(), "error reports", Ink::alarm);
-    say(bus_.unknown_frames(), "of other ids", Ink::faint);
-    say(bus_.remote() + bus_.fd(), "remote or FD", Ink::faint);
+    say(facts_.dropped, "dropped by the kernel", TextStyle::alarm);
+    say(lost, "lost", TextStyle::warning);
+    say(crc, "CRC errors", TextStyle::warning);
+    say(length, "of wrong length", TextStyle::warning);
+    say(repeated, "repeated", TextStyle::warning);
+    say(facts_.malformed, "malformed lines", TextStyle::warning);
+    say(bus_.errors(), "error reports", TextStyle::alarm);
+    say(bus_.unknown_frames(), "of other ids", TextStyle::faint);
+    say(bus_.remote() + bus_.fd(), "remote or FD", TextStyle::faint);
     return line;
   }
 
@@ -96,12 +96,12 @@ class Drawing {
     ScreenLine line;
     line.add("Charge   ");
     const Reading &soc = pack_.soc_percent, &sigma = pack_.soc_sigma_percent;
-    line.add(number(soc, 1, " %"), ink_of(soc.stale, Ink::strong));
+    line.add(number(soc, 1, " %"), ink_of(soc.stale, TextStyle::strong));
     if (sigma.known())
       line.add(fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value), ink_of(sigma.stale));
     if (!pack_.soc_quality.text.empty()) line.add("  " + pack_.soc_quality.text, ink_of(soc.stale, quality_ink()));
     if (columns_ >= 70 && pack_.soc_display_percent.known())
-      line.add(fmt::format("  (display {:.1f} %)", pack_.soc_display_percent.value), Ink::faint);
+      line.add(fmt::format("  (display {:.1f} %)", pack_.soc_display_percent.value), TextStyle::faint);
     return line;
   }
 
@@ -111,24 +111,24 @@ class Drawing {
     const std::size_t width = columns_ < 12 ? 0 : columns_ - 2;
     const Reading &soc = pack_.soc_percent, &sigma = pack_.soc_sigma_percent;
     const double half = sigma.known() ? 2 * sigma.value : 0;
-    line.add("[", Ink::faint);
+    line.add("[", TextStyle::faint);
     const auto column = [&](double percent) {
       return std::clamp(percent, 0.0, 100.0) / 100 * static_cast<double>(width);
     };
     for (std::size_t k = 0; k < width; ++k) {
       const double left = static_cast<double>(k), right = left + 1;
       if (!soc.known())
-        line.add(".", Ink::faint);
+        line.add(".", TextStyle::faint);
       else if (column(soc.value) >= left && (column(soc.value) < right || k + 1 == width))
-        line.add(facts_.blocks ? "\u2503" : "|", ink_of(soc.stale, Ink::strong));
+        line.add(facts_.blocks ? "\u2503" : "|", ink_of(soc.stale, TextStyle::strong));
       else if (column(soc.value - half) >= right)
-        line.add(facts_.blocks ? "\u2588" : "#", ink_of(soc.stale, Ink::bar));
+        line.add(facts_.blocks ? "\u2588" : "#", ink_of(soc.stale, TextStyle::bar));
       else if (column(soc.value + half) > left)
-        line.add(facts_.blocks ? "\u2592" : "~", ink_of(soc.stale, Ink::band));
+        line.add(facts_.blocks ? "\u2592" : "~", ink_of(soc.stale, TextStyle::band));
       else
         line.add(" ");
     }
-    line.add("]", Ink::faint);
+    line.add("]", TextStyle::faint);
     return line;
   }
 
@@ -138,11 +138,11 @@ class Drawing {
     const char* direction = !pack_.current_a.known() || pack_.current_a.value == 0 ? ""
                             : pack_.current_a.value > 0                            ? " charging"
                                                                                    : " discharging";
-    line.add("Pack     ").add(number(pack_.voltage_v, 3, " V"), ink_of(stale, Ink::strong)).add("   ");
-    line.add(number(pack_.current_a, 2, " A"), ink_of(stale, Ink::strong))
+    line.add("Pack     ").add(number(pack_.voltage_v, 3, " V"), ink_of(stale, TextStyle::strong)).add("   ");
+    line.add(number(pack_.current_a, 2, " A"), ink_of(stale, TextStyle::strong))
         .add(columns_ >= 60 ? direction : "", ink_of(stale))
         .add("   ");
-    line.add(number(pack_.temperature_c, 1, facts_.blocks ? " \u00b0C" : " degC"), ink_of(stale, Ink::strong));
+    line.add(number(pack_.temperature_c, 1, facts_.blocks ? " \u00b0C" : " degC"), ink_of(stale, TextStyle::strong));
     return line;
   }
 
@@ -185,28 +185,28 @@ class Drawing {
 
   ScreenLine contactor() const {
     ScreenLine line;
-    for (const Words& w : pack_.contactor)
-      line.add(line.columns() == 0 ? "Contactor " : ", ").add(clean(w.text), ink_of(w.stale, Ink::strong));
+    for (const TextItem& w : pack_.contactor)
+      line.add(line.columns() == 0 ? "Contactor " : ", ").add(clean(w.text), ink_of(w.stale, TextStyle::strong));
     return line;
   }
 
   /// One line, or with room one a fault and its comment.
   std::vector<ScreenLine> faults(std::size_t room) const {
     std::vector<ScreenLine> lines;
-    if (!pack_.faults_heard) return lines;
+    if (!pack_.faults_received) return lines;
     if (pack_.faults.empty()) {
-      lines.emplace_back().add("Faults   ").add("none", Ink::good);
+      lines.emplace_back().add("Faults   ").add("none", TextStyle::good);
     } else if (room < pack_.faults.size()) {
       ScreenLine& line = lines.emplace_back();
       line.add("Faults   ");
       for (std::size_t k = 0; k < pack_.faults.size(); ++k)
-        line.add(k == 0 ? "" : ", ").add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, Ink::alarm));
+        line.add(k == 0 ? "" : ", ").add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, TextStyle::alarm));
     } else {
       for (std::size_t k = 0; k < pack_.faults.size(); ++k) {
         lines.emplace_back()
             .add(k == 0 ? "Faults   " : "         ")
-            .add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, Ink::alarm))
-            .add("  " + clean(pack_.faults[k].comment), Ink::faint);
+            .add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, TextStyle::alarm))
+            .add("  " + clean(pack_.faults[k].comment), TextStyle::faint);
       }
     }
     return lines;
@@ -214,15 +214,15 @@ class Drawing {
 
   ScreenLine fault_details() const {
     ScreenLine line;
-    for (const Words& w : pack_.fault_details)
+    for (const TextItem& w : pack_.fault_details)
       line.add(line.columns() == 0 ? "         " : ", ").add(clean(w.text), ink_of(w.stale));
     return line;
   }
 
   ScreenLine flags() const {
     ScreenLine line;
-    for (const Words& w : pack_.flags)
-      line.add(line.columns() == 0 ? "Estimate " : ", ").add(w.text, ink_of(w.stale, Ink::warning));
+    for (const TextItem& w : pack_.flags)
+      line.add(line.columns() == 0 ? "Estimate " : ", ").add(w.text, ink_of(w.stale, TextStyle::warning));
     return line;
   }
 
@@ -237,7 +237,7 @@ class Drawing {
         .add(fmt::format("min {:.3f} V (cell {})  max {:.3f} V (cell {})  ", c.lowest_v, c.lowest + 1, c.highest_v,
                          c.highest + 1),
              ink_of(stale));
-    summary.add(fmt::format("delta {:.0f} mV", 1e3 * (c.highest_v - c.lowest_v)), ink_of(stale, Ink::strong));
+    summary.add(fmt::format("delta {:.0f} mV", 1e3 * (c.highest_v - c.lowest_v)), ink_of(stale, TextStyle::strong));
     // bars over a range that shows millivolts but does not make noise look large
     const double span_v = std::max(0.05, 1.25 * (c.highest_v - c.lowest_v)), from_v = c.highest_v - span_v;
     const std::size_t least = 20, fit = std::max<std::size_t>(1, columns_ / least);
@@ -258,7 +258,7 @@ class Drawing {
     std::vector<ScreenLine> lines;
     lines.emplace_back().add(fmt::format("{:<16} {:>8} {:>7} {:>8} {:>5} {:>5} {:>5} {:>6}", "Message", "per s", "age",
                                          "frames", "lost", "CRC", "rep.", "length"),
-                             Ink::strong);
+                             TextStyle::strong);
     for (std::size_t k = 0; k < messages().size(); ++k) {
       if (bus_.states()[k].frames > 0 || bus_.states()[k].crc_errors + bus_.states()[k].wrong_length > 0)
         lines.push_back(message(k));
@@ -277,7 +277,7 @@ class Drawing {
       all.push_back(lines[at++]);
       for (std::size_t s = 0; state.frames > 0 && s < state.values.size(); ++s) {
         all.emplace_back()
-            .add(fmt::format("  {:<24} ", messages()[k].signals[s].name), Ink::faint)
+            .add(fmt::format("  {:<24} ", messages()[k].signals[s].name), TextStyle::faint)
             .add(clean(text_of(messages()[k].signals[s], state.values[s])), ink_of(bus_.stale(k)));
       }
     }
@@ -292,15 +292,15 @@ class Drawing {
     for (const auto& u : bus_.unknown_ids()) {
       const std::string text = fmt::format(" {:0{}X}:{}", u.id, u.long_id ? 8 : 3, u.frames);
       if (line.columns() + text.size() > columns_) return lines;
-      line.add(text, Ink::faint);
+      line.add(text, TextStyle::faint);
     }
     return lines;
   }
 
  private:
-  Ink quality_ink() const {
+  TextStyle quality_ink() const {
     const std::string& q = pack_.soc_quality.text;
-    return q.starts_with("told") ? Ink::good : q.starts_with("carried") ? Ink::plain : Ink::warning;
+    return q.starts_with("told") ? TextStyle::good : q.starts_with("carried") ? TextStyle::plain : TextStyle::warning;
   }
 
   ScreenLine message(std::size_t k) const {
@@ -311,7 +311,7 @@ class Drawing {
                          age(bus_.age_s(k)), m.frames),
              ink_of(stale));
     const auto count = [&](std::uint64_t n, int width) {
-      line.add(fmt::format(" {:>{}}", n, width), n > 0 ? Ink::warning : ink_of(true));
+      line.add(fmt::format(" {:>{}}", n, width), n > 0 ? TextStyle::warning : ink_of(true));
     };
     count(m.lost, 5);
     count(m.crc_errors, 5);
@@ -325,9 +325,11 @@ class Drawing {
     const Reading& r = pack_.cells_v[k];
     const std::size_t begin = line.columns(), room = width > 12 ? width - 12 : 0;
     const auto c = pack_.cells();
-    const Ink ink = ink_of(r.stale, k == c.lowest ? Ink::warning : k == c.highest ? Ink::good : Ink::plain);
+    const TextStyle ink = ink_of(r.stale, k == c.lowest    ? TextStyle::warning
+                                          : k == c.highest ? TextStyle::good
+                                                           : TextStyle::plain);
     line.add(fmt::format("{:>3} {:>6} ", k + 1, r.known() ? fmt::format("{:.3f}", r.value) : "-"), ink);
-    if (r.known()) line.add(bar((r.value - from_v) / span_v, room), ink_of(r.stale, Ink::bar));
+    if (r.known()) line.add(bar((r.value - from_v) / span_v, room), ink_of(r.stale, TextStyle::bar));
     line.to(begin + width);
   }
 
@@ -374,7 +376,7 @@ std::vector<ScreenLine> pack_part(const Drawing& d, std::size_t room) {
 
 }  // namespace
 
-ScreenLine& ScreenLine::add(std::string_view text, Ink ink) {
+ScreenLine& ScreenLine::add(std::string_view text, TextStyle ink) {
   if (text.empty()) return *this;
   if (!pieces_.empty() && pieces_.back().ink == ink)
     pieces_.back().text += text;
@@ -487,8 +489,8 @@ std::string status_line(const BusState& bus, const ScreenFacts& facts) {
     if (!p.soc_quality.text.empty()) text += "  " + p.soc_quality.text;
     if (const auto c = p.cells(); c.count > 0)
       text += fmt::format("  cells {:.3f} to {:.3f} V", c.lowest_v, c.highest_v);
-    for (const Words& w : p.contactor) text += "  " + clean(w.text);
-    for (const Words& w : p.faults) text += "  FAULT " + clean(w.text);
+    for (const TextItem& w : p.contactor) text += "  " + clean(w.text);
+    for (const TextItem& w : p.faults) text += "  FAULT " + clean(w.text);
     if (p.soc_percent.stale) text += fmt::format("  stale for {}", age(p.soc_percent.age_s));
   }
   std::uint64_t lost = 0, crc = 0;

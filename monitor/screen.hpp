@@ -16,12 +16,12 @@
 
 namespace bms::monitor {
 
-enum class Ink { plain, faint, strong, good, warning, alarm, bar, band };
+enum class TextStyle { plain, faint, strong, good, warning, alarm, bar, band };
 
 /// One line: pieces of text in an ink each. Only what is printable gets in; every character is one column wide.
 class ScreenLine {
  public:
-  ScreenLine& add(std::string_view text, Ink ink = Ink::plain);
+  ScreenLine& add(std::string_view text, TextStyle ink = TextStyle::plain);
   /// Blanks up to a column.
   ScreenLine& to(std::size_t column);
   ScreenLine& append(const ScreenLine& other);
@@ -31,7 +31,7 @@ class ScreenLine {
 
   struct Piece {
     std::string text;  ///< UTF-8
-    Ink ink;
+    TextStyle ink;
   };
   const std::vector<Piece>& pieces() const { return pieces_; }
 

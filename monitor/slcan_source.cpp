@@ -19,11 +19,11 @@ class Slcan : public FrameSource {
  public:
   explicit Slcan(const std::string& device) : fd_(open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
     if (fd_ < 0)
-      throw SourceRefused(device, 1,
-                          "cannot be opened, expected a serial port (" + std::generic_category().message(errno) + ")");
+      throw SourceError(device, 1,
+                        "cannot be opened, expected a serial port (" + std::generic_category().message(errno) + ")");
     if (tcgetattr(fd_, &before_) != 0) {
       close(fd_);
-      throw SourceRefused(device, 1, "no serial port, expected one, as /dev/ttyACM0");
+      throw SourceError(device, 1, "no serial port, expected one, as /dev/ttyACM0");
     }
     termios raw = before_;
     cfmakeraw(&raw);
@@ -31,10 +31,10 @@ class Slcan : public FrameSource {
     cfsetspeed(&raw, B921600);
     tcsetattr(fd_, TCSANOW, &raw);
     tcflush(fd_, TCIOFLUSH);
-    say("\rC\rS6\rO\r");  // the first ends whatever stands in the adapter's line
+    send("\rC\rS6\rO\r");  // the first ends whatever stands in the adapter's line
   }
   ~Slcan() override {
-    say("C\r");
+    send("C\r");
     tcsetattr(fd_, TCSANOW, &before_);
     close(fd_);
   }
@@ -58,7 +58,7 @@ class Slcan : public FrameSource {
   bool live() const override { return true; }
 
  private:
-  void say(std::string_view text) const {
+  void send(std::string_view text) const {
     for (int tries = 0; tries < 100 && !text.empty(); ++tries) {
       const ssize_t n = write(fd_, text.data(), text.size());
       if (n > 0)
@@ -72,7 +72,7 @@ class Slcan : public FrameSource {
   std::size_t decode(std::span<BusFrame> room) {
     std::size_t taken = 0;
     while (used_ < held_ && taken < room.size()) {
-      if (!stream_.take(bytes_[used_++], room[taken])) continue;
+      if (!stream_.push(bytes_[used_++], room[taken])) continue;
       room[taken++].time_us = at_us_;
     }
     malformed_ = stream_.malformed();

@@ -15,12 +15,12 @@ namespace bms::monitor {
 class SlcanStream {
  public:
   /// True when `byte` completed a frame; its time is left to the caller.
-  bool take(char byte, BusFrame& frame) {
-    if (byte == '\a' || !reader_.take(byte)) return false;
+  bool push(char byte, BusFrame& frame) {
+    if (byte == '\a' || !reader_.push(byte)) return false;
     const std::string_view line = reader_.line();
     can::Frame data;
     if (hal::slcan::decode(line, data)) {
-      frame = on_bus(data, 0);
+      frame = to_bus_frame(data, 0);
       return true;
     }
     if (hal::slcan::is_other_frame(line)) {

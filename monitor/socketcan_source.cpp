@@ -26,7 +26,7 @@ class SocketCan : public FrameSource {
   explicit SocketCan(const std::string& interface) {
     const unsigned index = interface.size() < IFNAMSIZ ? if_nametoindex(interface.c_str()) : 0;
     if (index == 0)
-      throw SourceRefused(
+      throw SourceError(
           interface, 1,
           "no such network interface, expected a CAN interface that is up (ip link), slcan:DEVICE or file:DUMP.log");
     fd_ = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
@@ -65,7 +65,7 @@ class SocketCan : public FrameSource {
         recvmmsg(fd_, messages_.data(), static_cast<unsigned>(std::min(batch, room.size())), MSG_DONTWAIT, nullptr);
     if (n < 0 && errno == ENODEV) ended_ = true;  // the interface is gone; one that is only down may come back
     std::size_t taken = 0;
-    for (int k = 0; k < n; ++k) taken += take(static_cast<std::size_t>(k), room[taken]) ? 1U : 0U;
+    for (int k = 0; k < n; ++k) taken += receive(static_cast<std::size_t>(k), room[taken]) ? 1U : 0U;
     return taken;
   }
   bool ended() const override { return ended_; }
@@ -77,10 +77,10 @@ class SocketCan : public FrameSource {
   [[noreturn]] void refuse(const std::string& interface, const char* what) const {
     const std::string why = std::generic_category().message(errno);
     if (fd_ >= 0) close(fd_);
-    throw SourceRefused(interface, 1, std::string(what) + " (" + why + ")");
+    throw SourceError(interface, 1, std::string(what) + " (" + why + ")");
   }
 
-  bool take(std::size_t k, BusFrame& frame) {
+  bool receive(std::size_t k, BusFrame& frame) {
     const canfd_frame& raw = frames_[k];
     const std::size_t bytes = messages_[k].msg_len;
     if (bytes != CAN_MTU && bytes != CANFD_MTU) return false;

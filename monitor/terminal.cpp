@@ -137,7 +137,7 @@ StopRequest::~StopRequest() {
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGWINCH, SIGPIPE}) static_cast<void>(signal(number, SIG_DFL));
 }
 
-bool StopRequest::asked() const { return stop_asked != 0; }
+bool StopRequest::requested() const { return stop_asked != 0; }
 
 bool StopRequest::resized() {
   const bool changed = size_changed != 0;

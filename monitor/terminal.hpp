@@ -35,7 +35,7 @@ class StopRequest {
   ~StopRequest();
   StopRequest(const StopRequest&) = delete;
   StopRequest& operator=(const StopRequest&) = delete;
-  bool asked() const;
+  bool requested() const;
   /// Whether the terminal's size changed since the last call.
   bool resized();
 };

@@ -33,7 +33,7 @@ MonotoneCurve over_soc(const std::array<double, 10>& values) {
 
 }  // namespace
 
-Circuit table9_circuit() {
+CircuitCurves table9_circuit() {
   return {
       .r0_ohm = over_soc(
           {0.0140197, 0.013602, 0.0133872, 0.0132749, 0.013237, 0.0131549, 0.0131347, 0.0132971, 0.0135692, 0.0153566}),
@@ -44,14 +44,14 @@ Circuit table9_circuit() {
 }
 
 Cell::Cell(CellParameters parameters, CellState start)
-    : parameters_(std::move(parameters)), start_soc_(start.soc), moving_{start.v_rc_v, start.temperature_c} {}
+    : parameters_(std::move(parameters)), start_soc_(start.soc), dynamic_{start.v_rc_v, start.temperature_c} {}
 
 double Cell::soc_at(double more_as) const {
   return start_soc_ + (charge_as_ + (more_as - lost_as_)) / (3'600 * parameters_.capacity_ah);
 }
 
-Cell::Moving Cell::rates(const Moving& at, double soc, double current_a, double ambient_c) const {
-  const Circuit& circuit = parameters_.circuit;
+Cell::DynamicState Cell::rates(const DynamicState& at, double soc, double current_a, double ambient_c) const {
+  const CircuitCurves& circuit = parameters_.circuit;
   const double through_r1_a = at.v_rc_v / circuit.r1_ohm.at(soc);
   const double heat_w = current_a * current_a * circuit.r0_ohm.at(soc) + at.v_rc_v * through_r1_a;
   const Thermal& thermal = parameters_.thermal;
@@ -65,18 +65,18 @@ Cell::Moving Cell::rates(const Moving& at, double soc, double current_a, double 
 void Cell::run(double current_a, double ambient_c, double duration_s) {
   const int steps = static_cast<int>(std::ceil(duration_s / parameters_.step_s - 1e-9));
   const double h = duration_s / steps;
-  const auto moved = [](const Moving& from, const Moving& rate, double for_s) {
-    return Moving{from.v_rc_v + for_s * rate.v_rc_v, from.temperature_c + for_s * rate.temperature_c};
+  const auto moved = [](const DynamicState& from, const DynamicState& rate, double for_s) {
+    return DynamicState{from.v_rc_v + for_s * rate.v_rc_v, from.temperature_c + for_s * rate.temperature_c};
   };
   for (int k = 0; k < steps; ++k) {
-    const auto rates_after = [&](double s, const Moving& at) {
+    const auto rates_after = [&](double s, const DynamicState& at) {
       return rates(at, soc_at(current_a * (k * h + s)), current_a, ambient_c);
     };
-    const Moving k1 = rates_after(0, moving_);
-    const Moving k2 = rates_after(h / 2, moved(moving_, k1, h / 2));
-    const Moving k3 = rates_after(h / 2, moved(moving_, k2, h / 2));
-    const Moving k4 = rates_after(h, moved(moving_, k3, h));
-    moving_ = moved(moved(moved(moved(moving_, k1, h / 6), k2, h / 3), k3, h / 3), k4, h / 6);
+    const DynamicState k1 = rates_after(0, dynamic_);
+    const DynamicState k2 = rates_after(h / 2, moved(dynamic_, k1, h / 2));
+    const DynamicState k3 = rates_after(h / 2, moved(dynamic_, k2, h / 2));
+    const DynamicState k4 = rates_after(h, moved(dynamic_, k3, h));
+    dynamic_ = moved(moved(moved(moved(dynamic_, k1, h / 6), k2, h / 3), k3, h / 3), k4, h / 6);
   }
   const double added_as = current_a * duration_s - lost_as_, sum_as = charge_as_ + added_as;
   lost_as_ = (sum_as - charge_as_) - added_as;
@@ -85,7 +85,7 @@ void Cell::run(double current_a, double ambient_c, double duration_s) {
 }
 
 double Cell::voltage_v() const {
-  return parameters_.ocv_v.at(soc()) + moving_.v_rc_v + parameters_.circuit.r0_ohm.at(soc()) * current_a_;
+  return parameters_.ocv_v.at(soc()) + dynamic_.v_rc_v + parameters_.circuit.r0_ohm.at(soc()) * current_a_;
 }
 
 }  // namespace bms::plant

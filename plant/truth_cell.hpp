@@ -20,12 +20,12 @@ MonotoneCurve table9_ocv_v();
 
 /// Over soc. Through the values of Table 9, flat below 10 %. Straight lines between them differ by up to 3 % above 20 %
 /// of soc, by up to 11 % (C1) below.
-struct Circuit {
+struct CircuitCurves {
   MonotoneCurve r0_ohm;
   MonotoneCurve r1_ohm;
   MonotoneCurve c1_f;
 };
-Circuit table9_circuit();
+CircuitCurves table9_circuit();
 
 /// Not from the paper: 140 g of cell at 1 J/(gK), in a row of neighbours with little air; time constant 24 min.
 struct Thermal {
@@ -36,7 +36,7 @@ struct Thermal {
 struct CellParameters {
   double capacity_ah = 6;
   MonotoneCurve ocv_v = table9_ocv_v();
-  Circuit circuit = table9_circuit();
+  CircuitCurves circuit = table9_circuit();
   Thermal thermal = {};
   double step_s = 0.05;
 };
@@ -55,23 +55,23 @@ class Cell {
   void run(double current_a, double ambient_c, double duration_s);
 
   double soc() const { return soc_at(0); }
-  double v_rc_v() const { return moving_.v_rc_v; }
-  double temperature_c() const { return moving_.temperature_c; }
+  double v_rc_v() const { return dynamic_.v_rc_v; }
+  double temperature_c() const { return dynamic_.temperature_c; }
   /// At the terminals, under the current of the last run; at rest before the first.
   double voltage_v() const;
 
  private:
   /// What the differential equations move, or their rates of change per second.
-  struct Moving {
+  struct DynamicState {
     double v_rc_v;
     double temperature_c;
   };
   double soc_at(double more_as) const;
-  Moving rates(const Moving& at, double soc, double current_a, double ambient_c) const;
+  DynamicState rates(const DynamicState& at, double soc, double current_a, double ambient_c) const;
 
   CellParameters parameters_;
   double start_soc_;
-  Moving moving_;
+  DynamicState dynamic_;
   double current_a_ = 0;
   double charge_as_ = 0, lost_as_ = 0;  ///< since the start; lost_as_ is what rounding took from charge_as_
 };

@@ -17,8 +17,8 @@ namespace bms::proof {
 
 /// A number that the tool gave, and the same number measured by other means.
 struct ProofNumber {
-  std::optional<double> said;  ///< nothing: the tool gave none
-  double said_sigma = 0;
+  std::optional<double> claimed;  ///< nothing: the tool gave none
+  double claimed_sigma = 0;
   double measured = 0, measured_sigma = 0;
   double allowed = 0;  ///< largest difference for the claim to hold
   std::string unit;
@@ -33,7 +33,7 @@ struct ProofErrors {
 struct ProofClaim {
   std::string id;         ///< "hysteresis.udds_P25_A002.half_gap"
   std::string claim;      ///< what is to be shown
-  std::string said;       ///< by the tool, with its uncertainty
+  std::string claimed;    ///< by the tool, with its uncertainty
   std::string measured;   ///< independently
   std::string tolerance;  ///< when it holds
   std::optional<ProofNumber> number;

@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
-#include "diagnosis/words.hpp"
+#include "diagnosis/texts.hpp"
 #include "experiments/splitmix.hpp"
-#include "identification/figures.hpp"
+#include "identification/goodness_of_fit.hpp"
 #include "model/cell.hpp"
 #include "proof/proof_lab.hpp"
 
@@ -75,7 +75,7 @@ std::optional<Value> value_of(const workflow::DiagnoseResult& r, std::string_vie
 /// What was found, moved by one standard deviation along each axis of what is known of a mechanism's parameters
 /// together.
 std::vector<diagnosis::Hypothesis> one_deviation_away(const diagnosis::Diagnosis& d, std::string_view id) {
-  const std::vector<diagnosis::Sought> sought = d.extended.sought();
+  const std::vector<diagnosis::ParameterRef> sought = d.extended.sought();
   std::vector<Eigen::Index> of;
   for (std::size_t j = 0; j < sought.size(); ++j) {
     if (catalogue[d.extended.settings[sought[j].setting].index].id == id) of.push_back(static_cast<Eigen::Index>(j));
@@ -85,7 +85,7 @@ std::vector<diagnosis::Hypothesis> one_deviation_away(const diagnosis::Diagnosis
   for (Eigen::Index axis = 0; axis < axes.eigenvalues().size(); ++axis) {
     diagnosis::Hypothesis& h = list.emplace_back(d.extended);
     for (std::size_t k = 0; k < of.size(); ++k) {
-      const diagnosis::Sought& s = sought[static_cast<std::size_t>(of[k])];
+      const diagnosis::ParameterRef& s = sought[static_cast<std::size_t>(of[k])];
       model::MechanismSetting& setting = h.settings[s.setting];
       const model::Parameter& p = catalogue[setting.index].parameter[s.parameter];
       const double capacity_ah = d.cell.capacity_ah;
@@ -111,9 +111,9 @@ void claim_named(ProofExperiment& e, const std::string& id, const std::string& c
 }
 
 /// said: nothing when the tool gave no such number; then `instead` tells what it gave.
-void claim_number(ProofExperiment& e, const std::string& id, const std::string& claim, const std::optional<Value>& said,
-                  const std::string& instead, const Value& measured, const std::string& by, double allowed,
-                  const std::string& unit) {
+void claim_number(ProofExperiment& e, const std::string& id, const std::string& claim,
+                  const std::optional<Value>& claimed, const std::string& instead, const Value& measured,
+                  const std::string& by, double allowed, const std::string& unit) {
   ProofNumber n{{}, 0, measured.value, measured.sigma, allowed, unit};
   const auto text = [&](double value, double sigma) { return diagnosis::quantity(value, sigma, unit); };
   ProofClaim c{e.id + "." + id,
@@ -125,13 +125,13 @@ void claim_number(ProofExperiment& e, const std::string& id, const std::string& 
                {},
                {},
                false};
-  if (said) {
-    c.number->said = said->value;
-    c.number->said_sigma = said->sigma;
-    c.said = text(said->value, said->sigma);
-    const double apart = std::abs(said->value - measured.value);
+  if (claimed) {
+    c.number->claimed = claimed->value;
+    c.number->claimed_sigma = claimed->sigma;
+    c.claimed = text(claimed->value, claimed->sigma);
+    const double apart = std::abs(claimed->value - measured.value);
     // what is read off the data, as a moment or a limit, has no deviation
-    if (said->sigma > 0) c.within_uncertainty = apart <= 2 * std::hypot(said->sigma, measured.sigma);
+    if (claimed->sigma > 0) c.within_uncertainty = apart <= 2 * std::hypot(claimed->sigma, measured.sigma);
     c.holds = apart <= allowed;
   }
   e.claims.push_back(std::move(c));
@@ -155,7 +155,8 @@ void claim_better(ProofExperiment& e, const std::string& id, const std::string& 
 
 // --- what is measured directly
 
-double rms(const workflow::Compared& c, const std::vector<double>& simulated, double soc_from = -1, double soc_to = 2) {
+double rms(const workflow::RecordingComparison& c, const std::vector<double>& simulated, double soc_from = -1,
+           double soc_to = 2) {
   ErrorFigure error;
   for (std::size_t k = 0; k < c.record.size(); ++k) {
     if (c.recording.soc_ref[k] >= soc_from && c.recording.soc_ref[k] <= soc_to)
@@ -243,7 +244,7 @@ Idle idle_of(const files::Recording& r) {
 
 // --- what is drawn
 
-ProofLines errors_over_time(const workflow::Compared& c, const std::string& title) {
+ProofLines errors_over_time(const workflow::RecordingComparison& c, const std::string& title) {
   ProofLines lines{title, {"cell file, mV", "extended, mV"}, {}, "h", {{}, {}}};
   for (const std::size_t k : [&] {
          std::vector<std::size_t> rows;
@@ -287,7 +288,7 @@ void one_hysteresis(ProofLab& lab, ProofExperiment& e, const Concealed& what) {
                0.005, "V");
   claim_number(e, id + ".ocv_at", fmt::format("{}: on which branch the cell file's OCV lies", what.diagnosed),
                value_of(r, "ocv_hysteresis", "ocv_at"), said_of(r), {-1, 0}, "made from discharge", 0.5, "1");
-  const workflow::Compared slow = lab.scored(r, at + "ocv_P25_chg");
+  const workflow::RecordingComparison slow = lab.scored(r, at + "ocv_P25_chg");
   const double before_v = rms(slow, slow.base_v, 0.2, 0.9), after_v = rms(slow, slow.extended_v, 0.2, 0.9);
   claim_better(e, id + ".slow_charge", fmt::format("{}: predicts the slow charge that nobody has seen", what.diagnosed),
                "ocv_P25_chg from 20 to 90 % of charge", before_v, after_v);
@@ -358,11 +359,11 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
     const bool named = found(r, "temperature_resistance") != nullptr;
     // an edge shows the ohmic resistance and what is faster than a sample; the same of the simulation, and how far its
     // parameters let it go
-    std::map<double, workflow::Compared> scored;
+    std::map<double, workflow::RecordingComparison> scored;
     const auto ratios_with = [&](const diagnosis::Hypothesis& extended, bool keep) {
       std::map<double, double> ohm;
       for (const AtTemperature& t : temperatures) {
-        workflow::Compared c = lab.scored(r, t.recording, &extended);
+        workflow::RecordingComparison c = lab.scored(r, t.recording, &extended);
         files::Recording simulated = c.recording;
         simulated.voltage_v = c.extended_v;
         ohm[t.temperature_c] = edge_resistance(simulated).value;
@@ -401,7 +402,7 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
                    named ? std::clamp(2 * predicted(t.temperature_c).sigma, 0.2 * ratio.value, 0.5 * ratio.value)
                          : 0.2 * ratio.value,
                    "1");
-      const workflow::Compared& other = scored.at(t.temperature_c);
+      const workflow::RecordingComparison& other = scored.at(t.temperature_c);
       const double before_v = rms(other, other.base_v), after_v = rms(other, other.extended_v);
       if (from.temperature_c == 5)
         claim_better(e, fmt::format("{}.rmse_at_{:g}C", id, t.temperature_c),
@@ -427,7 +428,7 @@ void relaxation(ProofLab& lab, ProofExperiment& e) {
   const workflow::DiagnoseResult& r = lab.diagnosed(cell, {"a123_26650/" + diagnosed});
   claim_named(e, diagnosed + ".named", diagnosed + ": one RC pair lacks what relaxes over minutes and hours", r,
               {"slow_polarisation"}, "the voltage still moves an hour into a rest");
-  const workflow::Compared c = lab.scored(r, "a123_26650/pulse_P25_A002");
+  const workflow::RecordingComparison c = lab.scored(r, "a123_26650/pulse_P25_A002");
   const auto found_rests = rests(c.recording, 5'400);
   for (std::size_t n = 0; n < found_rests.size(); ++n) {
     const Rows rest = found_rests[n];
@@ -495,16 +496,16 @@ void charge_balance(ProofLab& lab, ProofExperiment& e) {
                 fmt::format("{:.0f} mAh missing from full to full, by the cycler's counters", 1e3 * counters_ah));
     const Idle idle = idle_of(lab.recording("a123_26650/" + name));
     const double idle_ah = idle.reading_a.value * idle.on_s / 3'600;
-    const auto said = lost_charge(r);
+    const auto claimed = lost_charge(r);
     // what the idle current gives and what the counters give are two measurements of it
-    claim_number(e, name + ".size", name + ": charge that is read and does not arrive", said, said_of(r),
+    claim_number(e, name + ".size", name + ": charge that is read and does not arrive", claimed, said_of(r),
                  {(idle_ah + counters_ah) / 2, std::abs(idle_ah - counters_ah) / 2},
                  fmt::format("{:+.1f} mA read while idle over {:.1f} h: {:.0f} mAh; counters {:.0f} mAh",
                              1e3 * idle.reading_a.value, idle.on_s / 3'600, 1e3 * idle_ah, 1e3 * counters_ah),
                  0.02, "Ah");
     const double x = static_cast<double>(points.measured.size() + 1);
     points.measured.push_back({x, 1e3 * (idle_ah + counters_ah) / 2, 1e3 * std::abs(idle_ah - counters_ah) / 2});
-    if (said) points.predicted[0].points.push_back({x, 1e3 * said->value, 1e3 * said->sigma});
+    if (claimed) points.predicted[0].points.push_back({x, 1e3 * claimed->value, 1e3 * claimed->sigma});
     points.names.push_back(name);
   }
   e.points.push_back(std::move(points));
@@ -531,8 +532,9 @@ void charge_balance_of_another(ProofLab& lab, ProofExperiment& e) {
          {},
          {},
          looked && !any});
-    if (const auto said = lost_charge(r))
-      e.notes.push_back(fmt::format("{}: {:.0f} +- {:.0f} mAh as found", name, 1e3 * said->value, 1e3 * said->sigma));
+    if (const auto claimed = lost_charge(r))
+      e.notes.push_back(
+          fmt::format("{}: {:.0f} +- {:.0f} mAh as found", name, 1e3 * claimed->value, 1e3 * claimed->sigma));
   }
   e.notes.push_back(
       "dyn50_P25 as sampled ends 2.1 % (43 mAh) higher than the cycler's counters: its current was resampled. A loss "
@@ -629,13 +631,14 @@ void instrument_faults(ProofLab& lab, ProofExperiment& e) {
     const workflow::DiagnoseResult& d = lab.diagnosed(untouched.extended_cell, base + ", " + fault.what, {r});
     claim_named(e, std::string(fault.id) + ".named", fault.what, d, {fault.id}, "put into the recording");
     for (const Sizes& s : sizes) {
-      const auto said = value_of(d, fault.id, s.parameter);
-      claim_number(e, fmt::format("{}.{}", fault.id, s.parameter), fmt::format("{}: {}", fault.what, s.parameter), said,
-                   said_of(d), {s.put_in, 0}, "put into the recording", s.allowed, s.unit);
+      const auto claimed = value_of(d, fault.id, s.parameter);
+      claim_number(e, fmt::format("{}.{}", fault.id, s.parameter), fmt::format("{}: {}", fault.what, s.parameter),
+                   claimed, said_of(d), {s.put_in, 0}, "put into the recording", s.allowed, s.unit);
       if (&s != &sizes.back()) continue;
       const double x = static_cast<double>(&fault - std::begin(faults) + 1);
       points.measured.push_back({x, 1, 0});
-      if (said) points.predicted[0].points.push_back({x, said->value / s.put_in, said->sigma / std::abs(s.put_in)});
+      if (claimed)
+        points.predicted[0].points.push_back({x, claimed->value / s.put_in, claimed->sigma / std::abs(s.put_in)});
     }
     points.names.push_back(fault.id);
   }
@@ -684,7 +687,7 @@ void holdouts(ProofLab& lab, ProofExperiment& e) {
   for (const char* name : {"a123_26650/dyn20_P25_A002", "a123_26650/pulse_P25_A002", "a123_26650/cccv1C_P25_A002",
                            "a123_26650/dyn10_P15_A002", "a123_26650/dyn10_P45_A002", "a123_26650/dyn10_N05_A002",
                            "a123_26650/fsae_P25_A004"}) {
-    const workflow::Compared c = lab.scored(r, name);
+    const workflow::RecordingComparison c = lab.scored(r, name);
     // where the file's resistances were identified; nearer to full and empty they are no more than drawn on
     const double before_v = rms(c, c.base_v, 0.1, 0.95), after_v = rms(c, c.extended_v, 0.1, 0.95);
     claim_better(e, stem(name), fmt::format("open loop on {}", stem(name)),

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "diagnosis/words.hpp"
+#include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
 #include "images/child_process.hpp"
 #include "tool/command_identify.hpp"
@@ -19,7 +19,7 @@ namespace {
 
 using model::catalogue;
 
-workflow::Compared begun(const files::Recording& r, const files::CellFile& cell) {
+workflow::RecordingComparison begun(const files::Recording& r, const files::CellFile& cell) {
   if (r.soc_ref.empty() || !std::isfinite(r.soc_ref.front()))
     throw files::BadInput(r.path, 1, "no soc_ref at the start, expected the reference state of charge");
   return {r,
@@ -42,7 +42,7 @@ const files::CellFile& ProofLab::built_in(const std::string& name) {
 const files::CellFile& ProofLab::identified(const std::string& name, const std::vector<std::string>& ocv,
                                             const std::string& recording) {
   return cells_.get(name, [&] {
-    tell(0, "identifying " + name);
+    report_progress(0, "identifying " + name);
     const images::TemporaryFolder folder;
     tool::IdentifyOptions options;
     for (const std::string& slow : ocv) options.ocv.push_back(path(slow));
@@ -75,7 +75,7 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
     const auto begin = std::chrono::steady_clock::now();
     auto r = std::make_shared<workflow::DiagnoseResult>();
     r->cell = cell;
-    std::vector<diagnosis::Record> records;
+    std::vector<diagnosis::PreparedRecording> records;
     double rows = 0;
     for (const files::Recording& recording : list) {
       r->recordings.push_back(begun(recording, cell));
@@ -83,17 +83,17 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
       rows += static_cast<double>(recording.rows());
     }
     diagnosis::Options how;
-    double told = 0;
+    double reported = 0;
     how.progress = [&](double done, const std::string&) {
-      tell(rows * std::max(0.0, done - told), key);
-      told = std::max(told, done);
+      report_progress(rows * std::max(0.0, done - reported), key);
+      reported = std::max(reported, done);
     };
     r->diagnosis = diagnosis::diagnose(cell.parameters, cell.mechanisms, records, how);
-    tell(rows * (1 - told), key);
+    report_progress(rows * (1 - reported), key);
     diagnosis::describe(r->diagnosis, cell.parameters, records);
     workflow::compare(*r);
-    r->baseline = workflow::figures(r->recordings, &workflow::Compared::base_v);
-    r->extended = workflow::figures(r->recordings, &workflow::Compared::extended_v);
+    r->baseline = workflow::figures(r->recordings, &workflow::RecordingComparison::base_v);
+    r->extended = workflow::figures(r->recordings, &workflow::RecordingComparison::extended_v);
     r->extended_cell = workflow::extended_cell(*r);
     r->extended_cell.name = key + " (extended)";  // names diagnoses made with it
     r->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -101,8 +101,8 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
   });
 }
 
-workflow::Compared ProofLab::scored(const workflow::DiagnoseResult& of, const std::string& name,
-                                    const diagnosis::Hypothesis* instead) {
+workflow::RecordingComparison ProofLab::scored(const workflow::DiagnoseResult& of, const std::string& name,
+                                               const diagnosis::Hypothesis* instead) {
   workflow::DiagnoseResult one;
   one.cell = of.cell;
   one.diagnosis = of.diagnosis;
@@ -142,8 +142,8 @@ std::vector<ProofDiagnosis> ProofLab::diagnoses() const {
   return list;
 }
 
-void ProofLab::tell(double rows, const std::string& what) {
-  const std::lock_guard lock(telling_);
+void ProofLab::report_progress(double rows, const std::string& what) {
+  const std::lock_guard lock(progress_mutex_);
   done_ += rows;
   if (progress_) progress_(std::min(0.99, done_ / work_), what);
 }

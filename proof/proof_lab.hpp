@@ -19,7 +19,7 @@ namespace bms::proof {
 
 /// Values by name, made by who asks first; who asks meanwhile waits. A failure is thrown to everybody.
 template <class Value>
-class Once {
+class LazyMap {
  public:
   const Value& get(const std::string& name, const std::function<Value()>& make) {
     std::promise<Value> promise;
@@ -71,23 +71,23 @@ class ProofLab {
 
   /// What cell file and extended cell say of a recording that the diagnosis did not use.
   /// instead: of what was found.
-  workflow::Compared scored(const workflow::DiagnoseResult& diagnosis, const std::string& recording,
-                            const diagnosis::Hypothesis* instead = nullptr);
+  workflow::RecordingComparison scored(const workflow::DiagnoseResult& diagnosis, const std::string& recording,
+                                       const diagnosis::Hypothesis* instead = nullptr);
 
   /// All diagnoses, by name; once nobody works any more.
   std::vector<ProofDiagnosis> diagnoses() const;
 
  private:
-  void tell(double rows, const std::string& what);
+  void report_progress(double rows, const std::string& what);
 
   std::string folder_;
   double work_;
   workflow::Progress progress_;
-  std::mutex telling_;
+  std::mutex progress_mutex_;
   double done_ = 0;
-  Once<files::Recording> recordings_;
-  Once<files::CellFile> cells_;
-  Once<std::shared_ptr<workflow::DiagnoseResult>> diagnoses_;
+  LazyMap<files::Recording> recordings_;
+  LazyMap<files::CellFile> cells_;
+  LazyMap<std::shared_ptr<workflow::DiagnoseResult>> diagnoses_;
 };
 
 /// The list of bms proof: one line, one experiment.

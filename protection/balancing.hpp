@@ -29,7 +29,7 @@
 namespace bms::protection {
 
 struct BalancingPlan {
-  std::int32_t bleed_ohm, rest_ua, lowest_uv, warmest_cdegc;
+  std::int32_t bleed_ohm, rest_ua, lowest_uv, max_cdegc;
   std::int64_t uams_per_ppb;  ///< charge of 1e-9 of the capacity [uA ms]
   bool neighbours_may_bleed;
 };
@@ -57,8 +57,8 @@ template <std::size_t Cells>
 class Balancing {
  public:
   static_assert(Cells <= 32, "a bit each");
-  static constexpr std::int32_t top_ppb = 950'000'000, anew_below_ppb = 850'000'000, dead_band_ppb = 5'000'000,
-                                known_to_ppb = 10'000'000;
+  static constexpr std::int32_t top_ppb = 950'000'000, rearm_below_ppb = 850'000'000, dead_band_ppb = 5'000'000,
+                                max_sigma_ppb = 10'000'000;
   static constexpr std::uint32_t turn_us = 8'000'000;
 
   constexpr explicit Balancing(const BalancingPlan& plan) : plan_(&plan) {}
@@ -69,17 +69,17 @@ class Balancing {
     turn_us_ = (turn_us_ + step_us) % (2 * turn_us);
     mask_ = 0;
     if (in.current_ua == measurement::no_reading || in.mean_soc_ppb == measurement::no_reading) return 0;
-    const bool flows_out = in.current_ua < -plan_->rest_ua;
-    if (in.mean_soc_ppb < anew_below_ppb) measured_ = false;
-    if (!measured_ && in.mean_soc_ppb >= top_ppb && !flows_out) measure(in);
-    if (!in.allowed || flows_out || in.highest_cdegc == measurement::no_reading ||
-        in.highest_cdegc > plan_->warmest_cdegc)
+    const bool discharging = in.current_ua < -plan_->rest_ua;
+    if (in.mean_soc_ppb < rearm_below_ppb) measured_ = false;
+    if (!measured_ && in.mean_soc_ppb >= top_ppb && !discharging) measure(in);
+    if (!in.allowed || discharging || in.highest_cdegc == measurement::no_reading ||
+        in.highest_cdegc > plan_->max_cdegc)
       return 0;
     constexpr std::uint32_t even = 0x5555'5555;
     const std::uint32_t turn = plan_->neighbours_may_bleed ? 0xFFFF'FFFF : turn_us_ < turn_us ? even : ~even;
     for (std::size_t k = 0; k < Cells; ++k) {
       const std::uint32_t mask = std::uint32_t{1} << k;
-      if (left_uams_[k] > 0 && (turn & mask) != 0 && in.cell_uv[k] >= plan_->lowest_uv) mask_ |= mask;
+      if (remaining_uams_[k] > 0 && (turn & mask) != 0 && in.cell_uv[k] >= plan_->lowest_uv) mask_ |= mask;
     }
     return mask_;
   }
@@ -87,7 +87,7 @@ class Balancing {
   constexpr void stop() { mask_ = 0; }
   /// Until the last cell is done, if nothing interrupts it.
   constexpr std::uint32_t left_s(std::int32_t cell_uv) const {
-    const std::int64_t most_uams = *std::max_element(left_uams_.begin(), left_uams_.end());
+    const std::int64_t most_uams = *std::max_element(remaining_uams_.begin(), remaining_uams_.end());
     if (most_uams <= 0 || cell_uv <= 0) return 0;
     const std::int64_t ms = most_uams / std::max(cell_uv / plan_->bleed_ohm, std::int32_t{1});
     return static_cast<std::uint32_t>(
@@ -101,27 +101,27 @@ class Balancing {
     left_us_ %= 1'000;
     for (std::size_t k = 0; k < Cells; ++k) {
       if ((mask_ >> k & 1) != 0 && cell_uv[k] > 0)
-        left_uams_[k] -= static_cast<std::int64_t>(cell_uv[k] / plan_->bleed_ohm) * ms;
+        remaining_uams_[k] -= static_cast<std::int64_t>(cell_uv[k] / plan_->bleed_ohm) * ms;
     }
   }
 
   constexpr void measure(const BalancingInput<Cells>& in) {
     std::size_t lowest = Cells;
     for (std::size_t k = 0; k < Cells; ++k) {
-      if (in.soc_ppb[k] == measurement::no_reading || in.sigma_ppb[k] > known_to_ppb)
+      if (in.soc_ppb[k] == measurement::no_reading || in.sigma_ppb[k] > max_sigma_ppb)
         return;  // a cell that is not known may be the lowest
       if (lowest == Cells || in.soc_ppb[k] < in.soc_ppb[lowest]) lowest = k;
     }
     for (std::size_t k = 0; k < Cells; ++k) {
       const std::int64_t sure =
           std::int64_t{in.soc_ppb[k]} - in.soc_ppb[lowest] - 2 * (std::int64_t{in.sigma_ppb[k]} + in.sigma_ppb[lowest]);
-      left_uams_[k] = sure > dead_band_ppb ? sure * plan_->uams_per_ppb : 0;
+      remaining_uams_[k] = sure > dead_band_ppb ? sure * plan_->uams_per_ppb : 0;
     }
     measured_ = true;
   }
 
   const BalancingPlan* plan_;
-  std::array<std::int64_t, Cells> left_uams_{};  ///< to be bled
+  std::array<std::int64_t, Cells> remaining_uams_{};  ///< to be bled
   std::uint32_t mask_ = 0, turn_us_ = 0, left_us_ = 0;
   bool measured_ = false;
 };

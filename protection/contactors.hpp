@@ -55,18 +55,18 @@ struct Outputs {
 };
 
 struct ContactorPlan {
-  std::uint32_t test_us, half_time_constant_us, link_discharge_us;
+  std::uint32_t test_us, half_time_constant_us, dc_link_discharge_us;
   std::int32_t rest_ua;
 
   /// Time in a state is counted up to that.
   constexpr std::uint32_t longest_us() const {
-    return std::max({3 * test_us, 12 * half_time_constant_us, link_discharge_us});
+    return std::max({3 * test_us, 12 * half_time_constant_us, dc_link_discharge_us});
   }
 };
 
 constexpr ContactorPlan contactor_plan(const PackDesign& d) {
   const std::uint32_t half_us = in_us(d.precharge_time_constant_s / 2);
-  return {std::max(half_us, in_us(3 * d.sample_period_s)), half_us, in_us(d.link_discharge_s),
+  return {std::max(half_us, in_us(3 * d.sample_period_s)), half_us, in_us(d.dc_link_discharge_s),
           in_micro(d.rest_current_c_rate * d.capacity_ah)};
 }
 
@@ -75,7 +75,7 @@ struct ContactorInput {
   bool open = false, open_now = false;  ///< a fault with that reaction is there
   bool charge_forbidden = false, discharge_forbidden = false;
   std::int32_t current_ua = measurement::no_reading, pack_uv = measurement::no_reading,
-               link_uv = measurement::no_reading;
+               dc_link_uv = measurement::no_reading;
   std::uint32_t step_us;
 };
 
@@ -92,10 +92,10 @@ class Contactors {
 
   constexpr const Outputs& update(const ContactorInput& in) {
     events_ = {};
-    events_.welded = weld_proven_;
+    events_.welded = weld_detected_;
     if (!intact()) enter(ContactorState::safe);
     count(in_state_us_, in.step_us, plan_->longest_us());
-    if (in.request != served_) served_ = Request::none;
+    if (in.request != last_request_) last_request_ = Request::none;
     step(in);
     return outputs_ = outputs_in(in);
   }
@@ -106,16 +106,16 @@ class Contactors {
   constexpr const Outputs& outputs() const { return outputs_; }
 
  private:
-  static constexpr std::uint32_t longest_halves = 12;
+  static constexpr std::uint32_t max_half_time_constants = 12;
   /// 1 - exp(-k / 2) less a fifth, k = 0 .. 11, in 1/1024.
-  static constexpr std::array<std::int32_t, longest_halves> slowest = {0,   198, 442, 591, 681, 735,
-                                                                       768, 788, 800, 808, 812, 815};
+  static constexpr std::array<std::int32_t, max_half_time_constants> min_precharge_curve = {
+      0, 198, 442, 591, 681, 735, 768, 788, 800, 808, 812, 815};
 
   constexpr void enter(ContactorState s) {
     state_.set(static_cast<std::uint32_t>(s));
     in_state_us_ = 0;
-    link_at_entry_uv_ = measurement::no_reading;
-    if (s != ContactorState::unloading) ignored_us_ = 0;  // a second reason is no second time of grace
+    dc_link_at_entry_uv_ = measurement::no_reading;
+    if (s != ContactorState::unloading) overrun_us_ = 0;  // a second reason is no second time of grace
   }
 
   constexpr void step(const ContactorInput& in) {
@@ -172,10 +172,10 @@ class Contactors {
   }
 
   constexpr void in_off(const ContactorInput& in) {
-    see_open(in);
+    check_opened(in);
     if (in.open || in.open_now) return enter(ContactorState::safe);
-    if (in.request == Request::none || in.request == served_ || blocked(in) || events_.welded) return;
-    served_ = in.request;
+    if (in.request == Request::none || in.request == last_request_ || blocked(in) || events_.welded) return;
+    last_request_ = in.request;
     enter(ContactorState::self_test);
   }
 
@@ -185,13 +185,14 @@ class Contactors {
   }
 
   constexpr void in_self_test(const ContactorInput& in) {
-    see_open(in);
-    const bool known = in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
+    check_opened(in);
+    const bool known = in.dc_link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
                        in.current_ua != measurement::no_reading;
-    if (known && link_at_entry_uv_ != measurement::no_reading && in.link_uv - link_at_entry_uv_ > in.pack_uv / 8)
-      events_.welded = weld_proven_ = true;
-    if (known && (link_at_entry_uv_ == measurement::no_reading || in.link_uv < link_at_entry_uv_))
-      link_at_entry_uv_ = in.link_uv;
+    if (known && dc_link_at_entry_uv_ != measurement::no_reading &&
+        in.dc_link_uv - dc_link_at_entry_uv_ > in.pack_uv / 8)
+      events_.welded = weld_detected_ = true;
+    if (known && (dc_link_at_entry_uv_ == measurement::no_reading || in.dc_link_uv < dc_link_at_entry_uv_))
+      dc_link_at_entry_uv_ = in.dc_link_uv;
     if (events_.welded) return enter(ContactorState::opening);
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
     if (!known && in_state_us_ >= 2 * plan_->test_us) return fail_precharge();
@@ -207,51 +208,51 @@ class Contactors {
   constexpr void in_precharge(const ContactorInput& in) {
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
     const std::uint32_t halves = in_state_us_ / plan_->half_time_constant_us;
-    if (halves >= longest_halves) return fail_precharge();
-    if (in.link_uv == measurement::no_reading || in.pack_uv == measurement::no_reading) return;
-    if (in.link_uv < part_of(in.pack_uv, slowest[halves])) return fail_precharge();
-    if (in.link_uv >= part_of(in.pack_uv, 960))
+    if (halves >= max_half_time_constants) return fail_precharge();
+    if (in.dc_link_uv == measurement::no_reading || in.pack_uv == measurement::no_reading) return;
+    if (in.dc_link_uv < part_of(in.pack_uv, min_precharge_curve[halves])) return fail_precharge();
+    if (in.dc_link_uv >= part_of(in.pack_uv, 960))
       enter(in.request == Request::drive ? ContactorState::drive : ContactorState::charge);
   }
 
   constexpr void closed(const ContactorInput& in, Request mine) {
-    if (in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading)
-      events_.not_closed = in.link_uv < part_of(in.pack_uv, 960);
-    count_grace(in, forbidden_flows(in));
-    if (ignored_us_ == grace_us) return enter(ContactorState::opening);
+    if (in.dc_link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading)
+      events_.not_closed = in.dc_link_uv < part_of(in.pack_uv, 960);
+    count_grace(in, forbidden_current_flows(in));
+    if (overrun_us_ == grace_us) return enter(ContactorState::opening);
     if (in.request != mine || in.open) enter(ContactorState::unloading);
   }
 
   constexpr void in_unloading(const ContactorInput& in) {
     const bool flows = in.current_ua == measurement::no_reading || magnitude(in.current_ua) > plan_->rest_ua;
-    count_grace(in, in.open || forbidden_flows(in));
-    if (!flows || ignored_us_ == grace_us) enter(ContactorState::opening);
+    count_grace(in, in.open || forbidden_current_flows(in));
+    if (!flows || overrun_us_ == grace_us) enter(ContactorState::opening);
   }
 
-  constexpr bool forbidden_flows(const ContactorInput& in) const {
+  constexpr bool forbidden_current_flows(const ContactorInput& in) const {
     return in.current_ua != measurement::no_reading && ((in.charge_forbidden && in.current_ua > plan_->rest_ua) ||
                                                         (in.discharge_forbidden && in.current_ua < -plan_->rest_ua));
   }
   /// How long current has flowed that is to cease. A reading that is missing now and then is no new beginning.
   constexpr void count_grace(const ContactorInput& in, bool to_cease) {
     if (to_cease)
-      count(ignored_us_, in.step_us, grace_us);
+      count(overrun_us_, in.step_us, grace_us);
     else if (in.current_ua != measurement::no_reading)
-      ignored_us_ = 0;
+      overrun_us_ = 0;
   }
 
   constexpr void in_opening(const ContactorInput& in) {
     const bool faulted = in.open || in.open_now;
-    const bool fell = in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
-                      in.link_uv < part_of(in.pack_uv, 896);
+    const bool fell = in.dc_link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
+                      in.dc_link_uv < part_of(in.pack_uv, 896);
     const bool rests = in.current_ua != measurement::no_reading && magnitude(in.current_ua) <= plan_->rest_ua,
                flows = in.current_ua != measurement::no_reading && !rests;
     if (fell && rests && in_state_us_ >= plan_->test_us)
       return enter(faulted ? ContactorState::safe : ContactorState::off);
-    see_open(in);
-    if (in_state_us_ < plan_->test_us || (!flows && in_state_us_ < plan_->link_discharge_us))
-      events_.welded = weld_proven_;  // it may still fall; what is not known is no weld
-    if (in_state_us_ < plan_->link_discharge_us) return;
+    check_opened(in);
+    if (in_state_us_ < plan_->test_us || (!flows && in_state_us_ < plan_->dc_link_discharge_us))
+      events_.welded = weld_detected_;  // it may still fall; what is not known is no weld
+    if (in_state_us_ < plan_->dc_link_discharge_us) return;
     // nothing contradicts, nothing proves: without readings there is no way to close again either
     if (faulted)
       enter(ContactorState::safe);
@@ -260,16 +261,16 @@ class Contactors {
   }
 
   constexpr void in_safe(const ContactorInput& in) {
-    if (in_state_us_ >= plan_->link_discharge_us) see_open(in);
+    if (in_state_us_ >= plan_->dc_link_discharge_us) check_opened(in);
     if (!in.open && !in.open_now && in.request == Request::none) enter(ContactorState::off);
   }
 
   /// While everything is open, or one pole is.
-  constexpr void see_open(const ContactorInput& in) {
+  constexpr void check_opened(const ContactorInput& in) {
     const bool flows = in.current_ua != measurement::no_reading && magnitude(in.current_ua) > plan_->rest_ua;
-    const bool stands = in.link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
-                        in.pack_uv > 0 && in.link_uv >= part_of(in.pack_uv, 896);
-    events_.welded = weld_proven_ || flows || stands;
+    const bool stands = in.dc_link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
+                        in.pack_uv > 0 && in.dc_link_uv >= part_of(in.pack_uv, 896);
+    events_.welded = weld_detected_ || flows || stands;
   }
 
   static constexpr std::int32_t part_of(std::int32_t uv, std::int32_t of_1024) {
@@ -278,11 +279,13 @@ class Contactors {
 
   const ContactorPlan* plan_;
   Guarded state_{static_cast<std::uint32_t>(ContactorState::off)};
-  std::uint32_t in_state_us_ = 0, ignored_us_ = 0;
-  Request served_ = Request::none;  ///< the request that was followed last: it has to be made anew to be followed again
-  std::int32_t link_at_entry_uv_ = measurement::no_reading;  ///< the lowest the link has been in the self-test
+  std::uint32_t in_state_us_ = 0, overrun_us_ = 0;
+  Request last_request_ =
+      Request::none;  ///< the request that was followed last: it has to be made anew to be followed again
+  std::int32_t dc_link_at_entry_uv_ = measurement::no_reading;  ///< the lowest the link has been in the self-test
   ContactorEvents events_;
-  bool weld_proven_ : 1 = false;  ///< by the self-test, whose proof is gone with the next sample; until the next start
+  bool weld_detected_ : 1 =
+      false;  ///< by the self-test, whose proof is gone with the next sample; until the next start
   Outputs outputs_;
 };
 

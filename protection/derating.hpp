@@ -39,7 +39,7 @@ struct Ramp {
 };
 
 struct DeratingPlan {
-  std::int32_t charge_most_ua, discharge_most_ua;
+  std::int32_t charge_max_ua, discharge_max_ua;
   Ramp charge_voltage, charge_cold, charge_warm, charge_soc;
   Ramp discharge_voltage, discharge_cold, discharge_warm, discharge_soc;
 };
@@ -48,8 +48,8 @@ constexpr DeratingPlan derating_plan(const PackDesign& d) {
   const model::Limits& l = d.limits;
   const double span_v = l.voltage_max_v - l.voltage_min_v, freezing_c = std::max(l.temperature_min_c, 0.0);
   constexpr std::int32_t all = 1024, fifth = 205;
-  return {.charge_most_ua = in_micro(l.charge_current_max_a),
-          .discharge_most_ua = in_micro(l.discharge_current_max_a),
+  return {.charge_max_ua = in_micro(l.charge_current_max_a),
+          .discharge_max_ua = in_micro(l.discharge_current_max_a),
           .charge_voltage = {in_micro(l.voltage_max_v - 0.06 * span_v), in_micro(l.voltage_max_v), all, 0},
           .charge_cold = {in_centi(freezing_c), in_centi(freezing_c + 10), 0, all},
           .charge_warm = {in_centi(l.temperature_max_c - 20), in_centi(l.temperature_max_c - 15), all, 0},
@@ -77,13 +77,13 @@ struct AllowedCurrent {
 
 class Derating {
  public:
-  static constexpr std::int32_t rise_slower = 5;
+  static constexpr std::int32_t rise_divisor = 5;
 
   constexpr explicit Derating(const DeratingPlan& plan) : plan_(&plan) {}
 
   constexpr AllowedCurrent update(const DeratingInput& in, std::uint32_t step_us) {
-    const bool warmth_known = in.highest_cdegc != measurement::no_reading;
-    std::int32_t charge = warmth_known ? 1024 : 0, discharge = warmth_known ? 1024 : 512;
+    const bool temperature_known = in.highest_cdegc != measurement::no_reading;
+    std::int32_t charge = temperature_known ? 1024 : 0, discharge = temperature_known ? 1024 : 512;
     const auto lower = [](std::int32_t& share, const Ramp& ramp, std::int32_t value) {
       share = value == measurement::no_reading ? share : std::min(share, ramp.at(value));
     };
@@ -99,8 +99,8 @@ class Derating {
       lower(charge, plan_->charge_soc, soc_ppb + sigma_ppb);
       lower(discharge, plan_->discharge_soc, soc_ppb - sigma_ppb);
     }
-    move(allowed_.charge_ua, plan_->charge_most_ua, charge, in.model_charge_ua, in.derate, step_us);
-    move(allowed_.discharge_ua, plan_->discharge_most_ua, discharge, in.model_discharge_ua, in.derate, step_us);
+    move(allowed_.charge_ua, plan_->charge_max_ua, charge, in.model_charge_ua, in.derate, step_us);
+    move(allowed_.discharge_ua, plan_->discharge_max_ua, discharge, in.model_discharge_ua, in.derate, step_us);
     if (in.charge_forbidden) allowed_.charge_ua = 0;
     if (in.discharge_forbidden) allowed_.discharge_ua = 0;
     return allowed_;
@@ -117,7 +117,7 @@ class Derating {
     if (derate) target_ua /= 2;
     const std::int32_t down_ua =
         part(most_ua, std::min<std::uint32_t>(step_us, 1U << 20));  // 2^20 us for a second: 5 % slower
-    allowed_ua = std::clamp(target_ua, allowed_ua - down_ua, allowed_ua + down_ua / rise_slower);
+    allowed_ua = std::clamp(target_ua, allowed_ua - down_ua, allowed_ua + down_ua / rise_divisor);
   }
 
   const DeratingPlan* plan_;

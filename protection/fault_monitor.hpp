@@ -28,7 +28,7 @@ namespace bms::protection {
 
 using Quantities = std::array<std::int32_t, quantity_count>;
 
-constexpr Quantities nothing_known() {
+constexpr Quantities unknown_quantities() {
   Quantities q{};
   q.fill(measurement::no_reading);
   return q;
@@ -46,19 +46,19 @@ struct FirstCause {
 class FaultMonitor {
  public:
   /// kept: what the last run stored of kept().
-  constexpr FaultMonitor(const Rules& rules, std::uint32_t kept)
+  constexpr FaultMonitor(const Rules& rules, std::uint32_t latched)
       : rules_(&rules),
-        of_service_(faults_with(rules, Recovery::service)),
-        active_(kept & of_service_),
-        serviceable_(kept & of_service_) {}
+        service_faults_(faults_with(rules, Recovery::service)),
+        active_(latched & service_faults_),
+        clearable_(latched & service_faults_) {}
 
   /// step_us: since the last call. servable: nothing has been closed since the start. Returns the faults that came with
   /// this sample.
   constexpr std::uint32_t update(const Quantities& quantities, std::uint32_t step_us, std::uint64_t time_us,
-                                 Clear clear, bool servable) {
+                                 Clear clear, bool may_clear_latched) {
     const Clear pressed = clear_before_ == Clear::none ? clear : Clear::none;  // a key that is held clears once
     clear_before_ = clear;
-    if (!servable) serviceable_ = 0;
+    if (!may_clear_latched) clearable_ = 0;
     const std::uint32_t before = active_.value();
     std::uint32_t now = before;
     for (std::size_t k = 0; k < fault_count; ++k) {
@@ -66,27 +66,27 @@ class FaultMonitor {
       if (value == measurement::no_reading) continue;
       const std::uint32_t mask = 1U << k;
       if ((now & mask) == 0) {
-        if (comes((*rules_)[k], timer_[k], value, step_us)) now |= mask;
-      } else if (goes((*rules_)[k], timer_[k], value, step_us, pressed, (serviceable_ & mask) != 0)) {
+        if (is_raised((*rules_)[k], timer_[k], value, step_us)) now |= mask;
+      } else if (is_cleared((*rules_)[k], timer_[k], value, step_us, pressed, (clearable_ & mask) != 0)) {
         now &= ~mask;
       }
     }
     active_.set(now);
-    const std::uint32_t came = now & ~before;
+    const std::uint32_t raised = now & ~before;
     if (pressed != Clear::none && (first_.fault >= fault_count || (now >> first_.fault & 1) == 0)) {
       first_ = {};
-      note_first(before & now, 0, time_us);  // what the command could not end
+      update_first_cause(before & now, 0, time_us);  // what the command could not end
     }
-    note_first(came, before & now, time_us);
-    return came;
+    update_first_cause(raised, before & now, time_us);
+    return raised;
   }
 
   constexpr std::uint32_t active() const { return active_.value(); }
-  constexpr std::uint32_t kept() const { return active_.value() & of_service_; }
+  constexpr std::uint32_t latched() const { return active_.value() & service_faults_; }
   constexpr const FirstCause& first() const { return first_; }
   constexpr bool intact() const { return active_.intact(); }
   /// When it is not: whatever any copy says is there, and an internal fault besides.
-  constexpr void distrust() { active_.set(active_.any() | bit(Fault::internal_fault)); }
+  constexpr void fail_safe() { active_.set(active_.any() | bit(Fault::internal_fault)); }
 
  private:
   /// Of a fault that is not there: how long its quantity has been beyond; of one that is there: how long it has been
@@ -96,7 +96,7 @@ class FaultMonitor {
     bool runs = false;
   };
 
-  static constexpr bool comes(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us) {
+  static constexpr bool is_raised(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us) {
     const bool beyond = r.sense == Sense::above ? value > r.threshold : value < r.threshold;
     if (!beyond) {
       if (!t.runs) return false;
@@ -109,8 +109,8 @@ class FaultMonitor {
     t = {};
     return true;
   }
-  static constexpr bool goes(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us, Clear pressed,
-                             bool serviceable) {
+  static constexpr bool is_cleared(const Rule& r, Timer& t, std::int32_t value, std::uint32_t step_us, Clear pressed,
+                                   bool clearable) {
     const bool good = r.sense == Sense::above ? value <= r.release : value >= r.release;
     if (!good) {
       t = {};
@@ -119,7 +119,7 @@ class FaultMonitor {
     count(t, step_us, r.recover_us);
     if (t.us < r.recover_us) return false;
     if (r.recovery == Recovery::on_clear && pressed == Clear::none) return false;
-    if (r.recovery == Recovery::service && (pressed != Clear::service || !serviceable)) return false;
+    if (r.recovery == Recovery::service && (pressed != Clear::service || !clearable)) return false;
     t = {};
     return true;
   }
@@ -129,11 +129,11 @@ class FaultMonitor {
     t.runs = true;
   }
 
-  constexpr void note_first(std::uint32_t came, std::uint32_t still, std::uint64_t time_us) {
-    if (came == 0) return;
+  constexpr void update_first_cause(std::uint32_t raised, std::uint32_t still, std::uint64_t time_us) {
+    if (raised == 0) return;
     std::size_t gravest = fault_count;
     for (std::size_t k = 0; k < fault_count; ++k) {
-      if ((came >> k & 1) != 0 && (gravest == fault_count || (*rules_)[k].reaction > (*rules_)[gravest].reaction))
+      if ((raised >> k & 1) != 0 && (gravest == fault_count || (*rules_)[k].reaction > (*rules_)[gravest].reaction))
         gravest = k;
     }
     const auto mild = [&](std::size_t k) { return (*rules_)[k].reaction <= Reaction::derate; };
@@ -143,10 +143,10 @@ class FaultMonitor {
   }
 
   const Rules* rules_;
-  std::uint32_t of_service_;
+  std::uint32_t service_faults_;
   std::array<Timer, fault_count> timer_{};
   Guarded active_;
-  std::uint32_t serviceable_;  ///< faults that a service command may end: kept from before the start
+  std::uint32_t clearable_;  ///< faults that a service command may end: kept from before the start
   FirstCause first_;
   Clear clear_before_ = Clear::none;
 };

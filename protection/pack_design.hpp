@@ -20,7 +20,7 @@ struct PackDesign {
       3;  ///< for the measuring chain to give its first sample (a BQ76952: 1.2 s with a reset and its settings)
   double precharge_time_constant_s =
       0.5;                            ///< pre-charge resistor times the capacitance of the link, e.g. 50 ohm and 10 mF
-  double link_discharge_s = 5;        ///< within which the link falls by an eighth when nothing feeds it
+  double dc_link_discharge_s = 5;     ///< within which the link falls by an eighth when nothing feeds it
   double rest_current_c_rate = 0.02;  ///< below that no current flows: four offsets of a 0.5 % sensor
   double bleed_ohm = 33;              ///< of a balancing resistor
   bool neighbours_may_bleed =

@@ -36,7 +36,7 @@ struct PackLimits {
 constexpr PackLimits pack_limits(const PackDesign& d) {
   const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
   return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a),
-          std::min<std::uint8_t>(d.temperatures, measurement::most_temperatures)};
+          std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures)};
 }
 
 /// A cell's voltage that can be one, or be asked to be protected from: a reversed one reads a little below 0.
@@ -47,15 +47,15 @@ class PackQuantities {
  public:
   static constexpr std::int32_t stuck_move_uv = 20'000, stuck_move_cdegc = 500;
   static constexpr std::uint8_t stuck_after = 5;
-  static constexpr std::int32_t longest_heat_us = 2'000'000'000;
+  static constexpr std::int32_t max_overload_i2t_us = 2'000'000'000;
 
   constexpr explicit PackQuantities(const PackLimits& limits) : limits_(limits) {}
 
   /// step_us: since the last one.
   constexpr void update(const measurement::PackSample<Cells>& sample, std::uint32_t step_us, Quantities& q) {
-    see_cells(sample, q);
-    see_current(sample.current_ua, step_us, q);
-    see_temperatures(sample.temperature_cdegc, q);
+    update_cells(sample, q);
+    update_current(sample.current_ua, step_us, q);
+    update_temperatures(sample.temperature_cdegc, q);
   }
 
   constexpr std::int32_t sum_uv() const {
@@ -78,7 +78,7 @@ class PackQuantities {
     return r.count == stuck_after && magnitude(others - r.others) > move;
   }
 
-  constexpr void see_cells(const measurement::PackSample<Cells>& sample, Quantities& q) {
+  constexpr void update_cells(const measurement::PackSample<Cells>& sample, Quantities& q) {
     std::int32_t high = measurement::no_reading, low = measurement::no_reading, missing = 0, sum = 0;
     for (const std::int32_t uv : sample.cell_uv) {
       if (!cell_possible(uv)) {
@@ -128,28 +128,31 @@ class PackQuantities {
     return count;
   }
 
-  constexpr void see_current(std::int32_t current_ua, std::uint32_t step_us, Quantities& q) {
+  constexpr void update_current(std::int32_t current_ua, std::uint32_t step_us, Quantities& q) {
     const bool known = current_ua != measurement::no_reading;
     at(q, Quantity::currents_missing) = known ? 0 : 1;
     at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : measurement::no_reading;
     if (known) {
-      heat(charge_heat_us_, current_ua / limits_.charge_ua_256th, step_us);
-      heat(discharge_heat_us_, -current_ua / limits_.discharge_ua_256th, step_us);
+      integrate_overload(charge_overload_i2t_us_, current_ua / limits_.charge_ua_256th, step_us);
+      integrate_overload(discharge_overload_i2t_us_, -current_ua / limits_.discharge_ua_256th, step_us);
     }
-    at(q, Quantity::charge_heat_us) = known ? charge_heat_us_ : measurement::no_reading;
-    at(q, Quantity::discharge_heat_us) = known ? discharge_heat_us_ : measurement::no_reading;
+    at(q, Quantity::charge_overload_i2t_us) = known ? charge_overload_i2t_us_ : measurement::no_reading;
+    at(q, Quantity::discharge_overload_i2t_us) = known ? discharge_overload_i2t_us_ : measurement::no_reading;
   }
 
   /// times_256: current over its limit, less than 0 the other way; beyond ten it counts as ten, which is a short
   /// circuit anyway.
-  static constexpr void heat(std::int32_t& heat_us, std::int32_t times_256, std::uint32_t step_us) {
-    const std::int32_t held = std::clamp(times_256, std::int32_t{0}, std::int32_t{10 * 256});
+  static constexpr void integrate_overload(std::int32_t& overload_i2t_us, std::int32_t times_256,
+                                           std::uint32_t step_us) {
+    const std::int32_t clamped = std::clamp(times_256, std::int32_t{0}, std::int32_t{10 * 256});
     const std::int64_t more_us =
-        (static_cast<std::int64_t>(held * held - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
-    heat_us = static_cast<std::int32_t>(std::clamp<std::int64_t>(heat_us + more_us, 0, longest_heat_us));
+        (static_cast<std::int64_t>(clamped * clamped - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
+    overload_i2t_us =
+        static_cast<std::int32_t>(std::clamp<std::int64_t>(overload_i2t_us + more_us, 0, max_overload_i2t_us));
   }
 
-  constexpr void see_temperatures(const std::array<std::int16_t, measurement::most_temperatures>& all, Quantities& q) {
+  constexpr void update_temperatures(const std::array<std::int16_t, measurement::max_temperatures>& all,
+                                     Quantities& q) {
     std::int32_t high = measurement::no_reading, low = measurement::no_reading, sum = 0, known = 0;
     for (std::size_t k = 0; k < limits_.temperatures; ++k) {
       if (!measurement::temperature_possible(all[k])) continue;
@@ -172,8 +175,8 @@ class PackQuantities {
 
   PackLimits limits_;
   std::array<Repeats, Cells> cell_{};
-  std::array<Repeats, measurement::most_temperatures> temperature_{};
-  std::int32_t charge_heat_us_ = 0, discharge_heat_us_ = 0, sum_uv_ = measurement::no_reading;
+  std::array<Repeats, measurement::max_temperatures> temperature_{};
+  std::int32_t charge_overload_i2t_us_ = 0, discharge_overload_i2t_us_ = 0, sum_uv_ = measurement::no_reading;
 };
 
 }  // namespace bms::protection

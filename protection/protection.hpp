@@ -63,24 +63,24 @@ struct PackEstimate {
   std::int32_t soc_ppb = measurement::no_reading, soc_sigma_ppb = 0;  ///< of the mean cell, 1e-9
   std::int32_t model_charge_ua = measurement::no_reading,
                model_discharge_ua = measurement::no_reading;  ///< CurrentLimits, both >= 0
-  bool contradicts = false;                                   ///< Flag::voltage_disbelieved
+  bool voltage_rejected = false;                              ///< Flag::voltage_rejected
   std::array<std::int32_t, Cells> cell_soc_ppb =
       measurement::PackSample<Cells>{}.cell_uv;  ///< of each cell less the mean's
   std::array<std::int32_t, Cells> cell_sigma_ppb{};
 };
 
 /// What others want, and what the board says of itself.
-struct Orders {
+struct ExternalInputs {
   Request request = Request::none;
-  Clear clear = Clear::none;                       ///< while it is pressed
-  std::int32_t link_uv = measurement::no_reading;  ///< on the load's side of the contactors
+  Clear clear = Clear::none;                          ///< while it is pressed
+  std::int32_t dc_link_uv = measurement::no_reading;  ///< on the load's side of the contactors
   bool board_fault = false;  ///< a reset by the watchdog, with the first sample; a self-test of the board that failed
   bool storage_fault = false;
 };
 
 struct Decision {
-  std::uint32_t faults = 0, came = 0;  ///< a bit each (Fault): there now, and those that this step brought
-  std::uint32_t kept = 0;              ///< to be stored, and given to the next start
+  std::uint32_t faults = 0, raised = 0;  ///< a bit each (Fault): there now, and those that this step brought
+  std::uint32_t latched = 0;             ///< to be stored, and given to the next start
   FirstCause first;
   ContactorState state = ContactorState::off;
   Outputs outputs;
@@ -95,44 +95,46 @@ class Protection {
   static constexpr std::uint32_t longest_step_us = 60'000'000;
   static constexpr std::uint8_t ignored_samples = 5;
 
-  constexpr explicit Protection(const ProtectionPlan& plan, std::uint32_t kept = 0)
+  constexpr explicit Protection(const ProtectionPlan& plan, std::uint32_t latched = 0)
       : plan_(&plan),
         quantities_(plan.limits),
-        monitor_(plan.rules, kept),
+        monitor_(plan.rules, latched),
         derating_(plan.derating),
         contactors_(plan.contactors),
         balancing_(plan.balancing) {
     decision_.faults = monitor_.active();
-    decision_.kept = monitor_.kept();
+    decision_.latched = monitor_.latched();
   }
 
   constexpr const Decision& update(const measurement::PackSample<Cells>& sample, const PackEstimate<Cells>& estimate,
-                                   const Orders& orders) {
-    decision_.came = 0;
-    if (started_ && !later(sample.time_us, sample_us_)) {
+                                   const ExternalInputs& inputs) {
+    decision_.raised = 0;
+    if (started_ && !is_later(sample.time_us, sample_us_)) {
       if (ignored_ < ignored_samples) ++ignored_;
-      return ignored_ < ignored_samples ? decision_ : blind(step_to(sample.time_us), most_age_us);
+      return ignored_ < ignored_samples ? decision_ : update_without_readings(elapsed_us(sample.time_us), most_age_us);
     }
-    if (!measured(sample)) {
-      clear_ = orders.clear;
-      return orders.board_fault ? blind(step_to(sample.time_us), 0, true) : without_sample(sample.time_us);
+    if (!has_reading(sample)) {
+      clear_ = inputs.clear;
+      return inputs.board_fault ? update_without_readings(elapsed_us(sample.time_us), 0, true)
+                                : without_sample(sample.time_us);
     }
-    const std::uint32_t age_us = sampled_ ? clamped(sample.time_us - sample_us_) : 0, step_us = step_to(sample.time_us);
+    const std::uint32_t age_us = sampled_ ? clamped(sample.time_us - sample_us_) : 0,
+                        step_us = elapsed_us(sample.time_us);
     started_ = sampled_ = true;
     sample_us_ = sample.time_us;
     ignored_ = 0;
-    Quantities q = nothing_known();
+    Quantities q = unknown_quantities();
     quantities_.update(sample, step_us, q);
-    at(q, Quantity::contradiction) = estimate.contradicts;
-    at(q, Quantity::store_failed) = orders.storage_fault;
+    at(q, Quantity::estimator_contradiction) = estimate.voltage_rejected;
+    at(q, Quantity::storage_failed) = inputs.storage_fault;
     at(q, Quantity::sample_age_us) = static_cast<std::int32_t>(age_us);
-    clear_ = orders.clear;
-    find_faults(q, step_us, orders);
+    clear_ = inputs.clear;
+    update_faults(q, step_us, inputs);
     const std::uint32_t faults = monitor_.active();
 
-    const bool warmth_lost =
+    const bool temperature_unknown =
         (faults & bit(Fault::temperature_lost)) != 0 && at(q, Quantity::highest_cdegc) == measurement::no_reading;
-    const bool no_charge = (faults & plan_->forbid_charge) != 0 || warmth_lost,
+    const bool no_charge = (faults & plan_->forbid_charge) != 0 || temperature_unknown,
                no_discharge = (faults & plan_->forbid_discharge) != 0;
     const bool closed = may_drive();
     decision_.allowed = derating_.update(
@@ -142,12 +144,12 @@ class Protection {
         step_us);
     const std::int32_t pack_uv =
         at(q, Quantity::pack_uv) != measurement::no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
-    switch_contactors({.request = orders.request,
+    switch_contactors({.request = inputs.request,
                        .charge_forbidden = no_charge,
                        .discharge_forbidden = no_discharge,
                        .current_ua = sample.current_ua,
                        .pack_uv = pack_uv,
-                       .link_uv = orders.link_uv,
+                       .dc_link_uv = inputs.dc_link_uv,
                        .step_us = step_us});
     if (!may_drive()) decision_.allowed = {};
     decision_.bleed = balancing_.update(
@@ -159,18 +161,18 @@ class Protection {
   }
 
   constexpr const Decision& without_sample(std::uint64_t now_us) {
-    decision_.came = 0;
+    decision_.raised = 0;
     if (!started_) {
       started_ = true;
       sample_us_ = evaluated_us_ = now_us;
     }
-    if (!later(now_us, sample_us_)) return decision_;
+    if (!is_later(now_us, sample_us_)) return decision_;
     const std::uint32_t age_us = clamped(now_us - sample_us_);
-    const auto patience_us =
+    const auto max_silence_us =
         static_cast<std::uint32_t>(plan_->rules[static_cast<std::size_t>(Fault::samples_missing)].threshold);
-    return age_us <= (sampled_ ? patience_us : std::max(patience_us, plan_->start_us))
+    return age_us <= (sampled_ ? max_silence_us : std::max(max_silence_us, plan_->start_us))
                ? decision_
-               : blind(step_to(now_us), static_cast<std::int32_t>(age_us));
+               : update_without_readings(elapsed_us(now_us), static_cast<std::int32_t>(age_us));
   }
 
   constexpr const Decision& decision() const { return decision_; }
@@ -180,7 +182,7 @@ class Protection {
  private:
   static constexpr std::int32_t most_age_us = 2'000'000'000;
 
-  static constexpr bool later(std::uint64_t a_us, std::uint64_t b_us) {
+  static constexpr bool is_later(std::uint64_t a_us, std::uint64_t b_us) {
     return a_us - b_us - 1 < std::uint64_t{1} << 63;
   }
   static constexpr std::uint32_t clamped(std::uint64_t us) {
@@ -188,7 +190,7 @@ class Protection {
   }
 
   /// One of which nothing was read is none.
-  static constexpr bool measured(const measurement::PackSample<Cells>& s) {
+  static constexpr bool has_reading(const measurement::PackSample<Cells>& s) {
     return s.current_ua != measurement::no_reading || s.pack_uv != measurement::no_reading ||
            std::any_of(s.cell_uv.begin(), s.cell_uv.end(),
                        [](std::int32_t uv) { return uv != measurement::no_reading; }) ||
@@ -200,25 +202,25 @@ class Protection {
     return contactors_.state() == ContactorState::drive || contactors_.state() == ContactorState::charge;
   }
 
-  constexpr std::uint32_t step_to(std::uint64_t time_us) {
-    const bool forward = started_ && later(time_us, evaluated_us_);
+  constexpr std::uint32_t elapsed_us(std::uint64_t time_us) {
+    const bool forward = started_ && is_later(time_us, evaluated_us_);
     const std::uint32_t step_us = forward ? std::min(clamped(time_us - evaluated_us_), longest_step_us) : 0;
     if (forward || !started_) evaluated_us_ = time_us;
     return step_us;
   }
 
-  constexpr void find_faults(Quantities& q, std::uint32_t step_us, const Orders& orders) {
+  constexpr void update_faults(Quantities& q, std::uint32_t step_us, const ExternalInputs& inputs) {
     const bool intact =
         monitor_.intact() && contactors_.intact() && plan_->cells == Cells;  // a plan of another pack is no plan
-    if (!monitor_.intact()) monitor_.distrust();
+    if (!monitor_.intact()) monitor_.fail_safe();
     const ContactorEvents& seen = contactors_.events();
-    at(q, Quantity::off_curve) = seen.precharge_failed;
+    at(q, Quantity::precharge_off_curve) = seen.precharge_failed;
     at(q, Quantity::welded) = seen.welded;
     at(q, Quantity::not_closed) = seen.not_closed;
-    at(q, Quantity::self_contradiction) = !intact || orders.board_fault;
-    decision_.came = monitor_.update(q, step_us, evaluated_us_, orders.clear, !closed_once_);
+    at(q, Quantity::integrity_error) = !intact || inputs.board_fault;
+    decision_.raised = monitor_.update(q, step_us, evaluated_us_, inputs.clear, !closed_once_);
     decision_.faults = monitor_.active();
-    decision_.kept = monitor_.kept();
+    decision_.latched = monitor_.latched();
     decision_.first = monitor_.first();
   }
 
@@ -231,10 +233,11 @@ class Protection {
   }
 
   /// A step that knows nothing but that no sample came.
-  constexpr const Decision& blind(std::uint32_t step_us, std::int32_t age_us, bool board_fault = false) {
-    Quantities q = nothing_known();
+  constexpr const Decision& update_without_readings(std::uint32_t step_us, std::int32_t age_us,
+                                                    bool board_fault = false) {
+    Quantities q = unknown_quantities();
     at(q, Quantity::sample_age_us) = age_us;
-    find_faults(q, step_us, {.clear = clear_, .board_fault = board_fault});
+    update_faults(q, step_us, {.clear = clear_, .board_fault = board_fault});
     switch_contactors({.step_us = step_us});
     decision_.allowed = derating_.update({.charge_forbidden = true, .discharge_forbidden = true}, step_us);
     decision_.bleed = 0;

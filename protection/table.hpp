@@ -29,26 +29,26 @@ enum class Quantity : std::uint8_t {
   highest_cell_uv,
   lowest_cell_uv,
   pack_uv,
-  charge_heat_us,  ///< integral of (I / limit)^2 - 1 over time, not below 0, while charging
-  discharge_heat_us,
+  charge_overload_i2t_us,  ///< integral of (I / limit)^2 - 1 over time, not below 0, while charging
+  discharge_overload_i2t_us,
   current_magnitude_ua,
   highest_cdegc,
   lowest_cdegc,
-  opposite_shift_uv,  ///< of two neighbours from the mean: by how much both, in opposite ways
-  spread_uv,          ///< highest less lowest cell
-  contradiction,      ///< the estimator disbelieves what it reads: 0 or 1
-  sum_error_uv,       ///< sum of cells less pack, magnitude
-  voltages_missing,   ///< how many readings
+  opposite_shift_uv,        ///< of two neighbours from the mean: by how much both, in opposite ways
+  spread_uv,                ///< highest less lowest cell
+  estimator_contradiction,  ///< the estimator disbelieves what it reads: 0 or 1
+  sum_error_uv,             ///< sum of cells less pack, magnitude
+  voltages_missing,         ///< how many readings
   voltages_stuck,
   currents_missing,  ///< 0 or 1
   temperatures_missing,
   temperatures_stuck,
-  off_curve,  ///< 0 or 1, these three from the contactors
+  precharge_off_curve,  ///< 0 or 1, these three from the contactors
   welded,
   not_closed,
-  sample_age_us,       ///< since the last sample that could be used
-  self_contradiction,  ///< 0 or 1
-  store_failed,        ///< 0 or 1
+  sample_age_us,    ///< since the last sample that could be used
+  integrity_error,  ///< 0 or 1
+  storage_failed,   ///< 0 or 1
 };
 inline constexpr std::size_t quantity_count = 23;
 
@@ -112,10 +112,10 @@ constexpr Table protection_table(const PackDesign& d) {
           "as a cell's; by a second measurement"),
       row(pack_undervoltage, pack_uv, below, pack_low_v(0.06), 2, pack_low_v(0.55), 60, automatic, forbid_discharge,
           "as a cell's; by a second measurement"),
-      row(charge_overcurrent, charge_heat_us, above, 30'000'000, 0, 15'000'000, 30, automatic, forbid_charge,
+      row(charge_overcurrent, charge_overload_i2t_us, above, 30'000'000, 0, 15'000'000, 30, automatic, forbid_charge,
           "the integral is the delay: twice the limit for 10 s, half as much again for 24 s"),
-      row(discharge_overcurrent, discharge_heat_us, above, 30'000'000, 0, 15'000'000, 30, automatic, forbid_discharge,
-          "the same"),
+      row(discharge_overcurrent, discharge_overload_i2t_us, above, 30'000'000, 0, 15'000'000, 30, automatic,
+          forbid_discharge, "the same"),
       row(short_circuit, current_magnitude_ua, above, in_micro(5 * most_a), 0, in_micro(most_a), 10, service, open_now,
           "none: one sample; fuse and comparator are faster, this keeps it open"),
       row(overtemperature_warning, highest_cdegc, above, in_centi(l.temperature_max_c - 5), 5,
@@ -132,7 +132,7 @@ constexpr Table protection_table(const PackDesign& d) {
           "a relay's bounce and a burst of noise last 100 ms"),
       row(imbalance, spread_uv, above, span(0.2), 30, span(0.12), 60, automatic, warn,
           "at the knees cells part for as long as a load lasts"),
-      row(current_implausible, contradiction, above, 0, 60, 0, 60, automatic, derate,
+      row(current_implausible, estimator_contradiction, above, 0, 60, 0, 60, automatic, derate,
           "a model may be wrong for some of its correlation time of a minute"),
       row(sum_mismatch, sum_error_uv, above, static_cast<std::int32_t>(cells) * span(0.03), 1,
           static_cast<std::int32_t>(cells) * span(0.015), 10, on_clear, open,
@@ -146,7 +146,7 @@ constexpr Table protection_table(const PackDesign& d) {
       row(temperature_stuck, temperatures_stuck, above, 0, 10, 0, 60, automatic, derate, "temperatures wait"),
       row(deep_discharge, lowest_cell_uv, below, in_micro(0.75 * l.voltage_min_v), 10, in_micro(0.8 * l.voltage_min_v),
           0, service, open, "no load that the rows above allow lasts that long"),
-      row(precharge_failed, off_curve, above, 0, 0, 0, 10, on_clear, open_now,
+      row(precharge_failed, precharge_off_curve, above, 0, 0, 0, 10, on_clear, open_now,
           "none: the time is in the curve; the resistor cools for ten seconds before another"),
       row(contactor_welded, welded, above, 0, 0.2, 0, 10, service, open_now, "two samples at 10 Hz"),
       row(contactor_not_closed, not_closed, above, 0, 0.3, 0, 10, on_clear, open_now,
@@ -154,9 +154,10 @@ constexpr Table protection_table(const PackDesign& d) {
       row(samples_missing, sample_age_us, above, in_micro(5 * d.sample_period_s), 0, in_micro(2 * d.sample_period_s), 1,
           automatic, open_now,
           "none: five sample periods are the threshold; until the first, the measuring chain has its time to start"),
-      row(internal_fault, self_contradiction, above, 0, 0, 0, 0, on_clear, open_now,
+      row(internal_fault, integrity_error, above, 0, 0, 0, 0, on_clear, open_now,
           "none: what cannot be trusted does nothing"),
-      row(storage_fault, store_failed, above, 0, 0, 0, 0, on_clear, warn, "none: the store has tried again by itself"),
+      row(storage_fault, storage_failed, above, 0, 0, 0, 0, on_clear, warn,
+          "none: the store has tried again by itself"),
   }};
 }
 

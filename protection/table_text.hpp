@@ -9,7 +9,7 @@
 
 namespace bms::protection {
 
-constexpr const char* words(Reaction r) {
+constexpr const char* text_of(Reaction r) {
   switch (r) {
     case Reaction::warn:
       return "warn";
@@ -26,7 +26,7 @@ constexpr const char* words(Reaction r) {
   }
   return "";
 }
-constexpr const char* words(Recovery r) {
+constexpr const char* text_of(Recovery r) {
   switch (r) {
     case Recovery::automatic:
       return "by itself";
@@ -39,13 +39,13 @@ constexpr const char* words(Recovery r) {
 }
 
 /// Of a quantity: what it is, its unit in the table, and how many of the integers make one.
-struct QuantityWords {
+struct QuantityText {
   const char* what = "";
   const char* unit = "";
   double scale = 1;
   int digits = 0;
 };
-constexpr QuantityWords words(Quantity q) {
+constexpr QuantityText text_of(Quantity q) {
   switch (q) {
     case Quantity::highest_cell_uv:
       return {"highest cell", "V", 1e6, 3};
@@ -53,9 +53,9 @@ constexpr QuantityWords words(Quantity q) {
       return {"lowest cell", "V", 1e6, 3};
     case Quantity::pack_uv:
       return {"pack", "V", 1e6, 2};
-    case Quantity::charge_heat_us:
+    case Quantity::charge_overload_i2t_us:
       return {"excess of I² while charging, over 1.05 of the limit", "s", 1e6, 0};
-    case Quantity::discharge_heat_us:
+    case Quantity::discharge_overload_i2t_us:
       return {"the same while discharging", "s", 1e6, 0};
     case Quantity::current_magnitude_ua:
       return {"current, either way", "A", 1e6, 1};
@@ -67,7 +67,7 @@ constexpr QuantityWords words(Quantity q) {
       return {"opposite shift of neighbours", "V", 1e6, 3};
     case Quantity::spread_uv:
       return {"highest less lowest cell", "V", 1e6, 3};
-    case Quantity::contradiction:
+    case Quantity::estimator_contradiction:
       return {"the model disbelieves the readings"};
     case Quantity::sum_error_uv:
       return {"sum of cells less pack", "V", 1e6, 3};
@@ -81,7 +81,7 @@ constexpr QuantityWords words(Quantity q) {
       return {"sensors missing"};
     case Quantity::temperatures_stuck:
       return {"sensors stuck"};
-    case Quantity::off_curve:
+    case Quantity::precharge_off_curve:
       return {"pre-charge off its curve"};
     case Quantity::welded:
       return {"link stands, or current flows, while open"};
@@ -89,9 +89,9 @@ constexpr QuantityWords words(Quantity q) {
       return {"link below the pack while closed"};
     case Quantity::sample_age_us:
       return {"time since a sample", "s", 1e6, 1};
-    case Quantity::self_contradiction:
+    case Quantity::integrity_error:
       return {"state contradicts itself, watchdog"};
-    case Quantity::store_failed:
+    case Quantity::storage_failed:
       return {"the store says so"};
   }
   return {};
@@ -108,7 +108,7 @@ inline std::string markdown(const Table& table) {
       "|\n|---|---|---|---|---|---|---|---|---|\n";
   for (std::size_t k = 0; k < fault_count; ++k) {
     const Rule& r = table[k].rule;
-    const QuantityWords q = words(r.quantity);
+    const QuantityText q = text_of(r.quantity);
     const auto limit = [&](const char* sign, std::int32_t value) {
       return std::string(sign) + " " + number(value / q.scale, q.digits) +
              (*q.unit != '\0' ? std::string(" ") + q.unit : "");
@@ -117,8 +117,8 @@ inline std::string markdown(const Table& table) {
     const bool above = r.sense == Sense::above;
     out += "| " + std::to_string(k) + " | " + name_of(r.fault) + " | " + q.what + " " +
            limit(above ? ">" : "<", r.threshold) + " | " + seconds(r.delay_us) + " | " +
-           limit(above ? "<=" : ">=", r.release) + " | " + seconds(r.recover_us) + " | " + words(r.recovery) + " | " +
-           words(r.reaction) + " | " + table[k].why + " |\n";
+           limit(above ? "<=" : ">=", r.release) + " | " + seconds(r.recover_us) + " | " + text_of(r.recovery) + " | " +
+           text_of(r.reaction) + " | " + table[k].why + " |\n";
   }
   return out;
 }

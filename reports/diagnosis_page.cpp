@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "diagnosis/decision.hpp"
-#include "diagnosis/words.hpp"
-#include "identification/figures.hpp"
+#include "diagnosis/texts.hpp"
+#include "identification/goodness_of_fit.hpp"
 #include "reports/embedded_files.hpp"
 #include "reports/report_page.hpp"
 
@@ -17,7 +17,7 @@ namespace bms::reports {
 
 namespace {
 
-using diagnosis::words_of;
+using diagnosis::text_of_mechanism;
 using model::catalogue;
 using nlohmann::json;
 
@@ -40,7 +40,7 @@ json spans_of(const std::vector<model::Span>& spans) {
 std::vector<double> soc_of(const workflow::DiagnoseResult& r, std::size_t n) {
   if (n < r.diagnosis.views.size() && r.diagnosis.views[n].soc.size() == r.recordings[n].record.size())
     return r.diagnosis.views[n].soc;
-  const diagnosis::Record& record = r.recordings[n].record;
+  const diagnosis::PreparedRecording& record = r.recordings[n].record;
   std::vector<double> soc(record.size());
   double at = record.initial_soc, known_a = 0;
   for (std::size_t k = 0; k < soc.size(); ++k) {
@@ -53,8 +53,8 @@ std::vector<double> soc_of(const workflow::DiagnoseResult& r, std::size_t n) {
 
 /// One recording in bins of time: how far both models are off, and what was going on.
 json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins) {
-  const workflow::Compared& c = r.recordings[n];
-  const diagnosis::Record& record = c.record;
+  const workflow::RecordingComparison& c = r.recordings[n];
+  const diagnosis::PreparedRecording& record = c.record;
   const std::vector<double> soc = soc_of(r, n);
   const double from_s = record.time_s.front(),
                width_s = std::max(record.duration_s(), 1e-9) / static_cast<double>(bins);
@@ -89,7 +89,7 @@ json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins
 
 json strips(const workflow::DiagnoseResult& r) {
   double total_s = 0;
-  for (const workflow::Compared& c : r.recordings) total_s += std::max(c.record.duration_s(), 1.0);
+  for (const workflow::RecordingComparison& c : r.recordings) total_s += std::max(c.record.duration_s(), 1.0);
   json list = json::array();
   for (std::size_t n = 0; n < r.recordings.size(); ++n) {
     const double share = std::max(r.recordings[n].record.duration_s(), 1.0) / total_s;
@@ -111,7 +111,7 @@ json mechanisms(const workflow::DiagnoseResult& r) {
       const model::Parameter& p = info.parameter[k];
       parameters.push_back({{"name", p.name},
                             {"text", p.role == model::Role::given && p.unit == "s"
-                                         ? diagnosis::clock_text(f.setting.value[k])
+                                         ? diagnosis::duration_text(f.setting.value[k])
                                          : diagnosis::parameter_text(p, f.setting.value[k], f.setting.deviation[k])},
                             {"meaning", p.meaning},
                             {"value", rounded(f.setting.value[k], 9)},
@@ -123,8 +123,8 @@ json mechanisms(const workflow::DiagnoseResult& r) {
                             {"given", p.role == model::Role::given},
                             {"at_bound", k < f.at_bound.size() && f.at_bound[k] != 0}});
     }
-    for (const std::size_t m : f.equivalent_to) rivals.push_back(words_of(m).name);
-    const diagnosis::Words& words = words_of(f.setting.index);
+    for (const std::size_t m : f.equivalent_to) rivals.push_back(text_of_mechanism(m).name);
+    const diagnosis::MechanismText& words = text_of_mechanism(f.setting.index);
     list.push_back({{"id", info.id},
                     {"name", words.name},
                     {"meaning", words.meaning},
@@ -190,7 +190,8 @@ json figures(const workflow::DiagnoseResult& r) {
   return list;
 }
 
-json chart_of(const workflow::DiagnoseResult& r, const workflow::Compared& c, bool holdout, std::size_t most) {
+json chart_of(const workflow::DiagnoseResult& r, const workflow::RecordingComparison& c, bool holdout,
+              std::size_t most) {
   json chart = {{"name", c.record.name}, {"holdout", holdout}};
   const auto rows = shown_rows(c.recording, most);
   const auto add = [&](const char* name, int decimals, auto&& value) {
@@ -212,8 +213,8 @@ json chart_of(const workflow::DiagnoseResult& r, const workflow::Compared& c, bo
 json charts(const workflow::DiagnoseResult& r) {
   json list = json::array();
   const std::size_t most = std::max<std::size_t>(2'000, chart_rows / (r.recordings.size() + r.holdouts.size()));
-  for (const workflow::Compared& c : r.holdouts) list.push_back(chart_of(r, c, true, most));
-  for (const workflow::Compared& c : r.recordings) list.push_back(chart_of(r, c, false, most));
+  for (const workflow::RecordingComparison& c : r.holdouts) list.push_back(chart_of(r, c, true, most));
+  for (const workflow::RecordingComparison& c : r.recordings) list.push_back(chart_of(r, c, false, most));
   return list;
 }
 
@@ -233,7 +234,7 @@ json regimes(const workflow::DiagnoseResult& r) {
   for (const Axis& axis : axes) {
     std::vector<double> at, before, after;
     for (std::size_t n = 0; n < r.recordings.size(); ++n) {
-      const workflow::Compared& c = r.recordings[n];
+      const workflow::RecordingComparison& c = r.recordings[n];
       const std::vector<double> soc = soc_of(r, n);
       double known_a = 0, edge_s = c.record.time_s.front();
       for (std::size_t k = 0; k < c.record.size(); ++k) {
@@ -297,7 +298,7 @@ json limits(const workflow::DiagnoseResult& r) {
     const model::MechanismInfo& info = catalogue[l.mechanism];
     const model::Parameter& p = info.parameter[l.parameter];
     list.push_back({{"id", info.id},
-                    {"name", words_of(l.mechanism).name},
+                    {"name", text_of_mechanism(l.mechanism).name},
                     {"text", diagnosis::parameter_text(p, l.value, 0)},
                     {"ratio", rounded(l.value / p.upper(r.cell.parameters.capacity_ah), 7)}});
   }
@@ -308,7 +309,7 @@ json limits(const workflow::DiagnoseResult& r) {
 /// A warning with the file's name in place of its path.
 std::string without_folder(const std::string& text, const workflow::DiagnoseResult& r) {
   for (const auto* list : {&r.recordings, &r.holdouts}) {
-    for (const workflow::Compared& c : *list) {
+    for (const workflow::RecordingComparison& c : *list) {
       if (text.starts_with(c.recording.path)) return c.record.name + text.substr(c.recording.path.size());
     }
   }
@@ -321,7 +322,7 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
   const diagnosis::Diagnosis& d = r.diagnosis;
   std::string files;
   double hours = 0;
-  for (const workflow::Compared& c : r.recordings) {
+  for (const workflow::RecordingComparison& c : r.recordings) {
     files += (files.empty() ? "" : ", ") + c.record.name;
     hours += c.record.duration_s() / 3'600;
   }
@@ -353,7 +354,7 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
   report["not_testable"] = json::array();
   for (const diagnosis::NotTestable& n : d.not_testable)
     report["not_testable"].push_back(
-        {{"id", catalogue[n.mechanism].id}, {"name", words_of(n.mechanism).name}, {"reason", n.reason}});
+        {{"id", catalogue[n.mechanism].id}, {"name", text_of_mechanism(n.mechanism).name}, {"reason", n.reason}});
   report["next"] = r.next ? json{{"why", diagnosis::why(*r.next)},
                                  {"instruction", diagnosis::instruction(*r.next)},
                                  {"command", diagnosis::command(*r.next)}}

@@ -30,9 +30,9 @@ std::string identify_report(const IdentifyResult& r, const std::vector<id::Data>
                                cell(fmt::format("{:.5g}", p.value)), cell(fmt::format("{:.2g}", p.std)),
                                cell(fmt::format("{:.2g}", p.std_white)),
                                cell(fmt::format("{:.2g}", p.by_ocv_tolerance)),
-                               cell(!p.seen      ? "not seen"
-                                    : p.at_bound ? "at its bound"
-                                                 : "")});
+                               cell(!p.identifiable ? "not seen"
+                                    : p.at_bound    ? "at its bound"
+                                                    : "")});
   }
   files::PageTable fits{"fits",
                         "How the voltage is followed, open loop",
@@ -40,9 +40,10 @@ std::string identify_report(const IdentifyResult& r, const std::vector<id::Data>
                          "lags outside the white band"},
                         {},
                         ""};
-  const auto add_fit = [&](const std::string& name, const id::Fit& f) {
+  const auto add_fit = [&](const std::string& name, const id::FitStatistics& f) {
     std::string ahead;
-    for (const id::Fit::Ahead& a : f.ahead) ahead += fmt::format("{}{:.2f}", ahead.empty() ? "" : ", ", 1e3 * a.rmse_v);
+    for (const id::FitStatistics::PredictionError& a : f.ahead)
+      ahead += fmt::format("{}{:.2f}", ahead.empty() ? "" : ", ", 1e3 * a.rmse_v);
     ahead += " mV";
     fits.rows.push_back(
         {cell(name), cell(fmt::format("{:.2f} mV", 1e3 * f.rmse_v)), cell(fmt::format("{:.2f} mV", 1e3 * f.largest_v)),
@@ -54,7 +55,7 @@ std::string identify_report(const IdentifyResult& r, const std::vector<id::Data>
   add_fit("identified from", found.estimation);
   for (const auto& [path, fit] : r.validations) add_fit(path, fit);
   content.tables = {std::move(parameters), std::move(fits)};
-  const auto add_charts = [&](const std::string& name, const id::Data& data, const id::Fit& f) {
+  const auto add_charts = [&](const std::string& name, const id::Data& data, const id::FitStatistics& f) {
     files::PageChart voltage{name + ": voltage", {"measured, V", "simulated, V"}, data.time_s, {data.voltage_v, {}}},
         error{name + ": measured less simulated, mV", {"mV"}, data.time_s, {{}}};
     for (Eigen::Index k = 0; k < f.error_v.size(); ++k) {

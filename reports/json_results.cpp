@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/words.hpp"
+#include "diagnosis/texts.hpp"
 
 namespace bms::reports {
 
@@ -83,10 +83,11 @@ std::string json_of(const ExperimentResult& r) {
 
 namespace {
 
-Json fit_of(const identification::Fit& f) {
+Json fit_of(const identification::FitStatistics& f) {
   const identification::ResidualAnalysis& r = f.residuals;
   Json ahead = Json::array();
-  for (const identification::Fit::Ahead& a : f.ahead) ahead.push_back({{"steps", a.steps}, {"rmse_v", a.rmse_v}});
+  for (const identification::FitStatistics::PredictionError& a : f.ahead)
+    ahead.push_back({{"steps", a.steps}, {"rmse_v", a.rmse_v}});
   return {{"fit_percent", f.fit_percent},
           {"rmse_v", f.rmse_v},
           {"largest_v", f.largest_v},
@@ -126,7 +127,7 @@ std::string json_of(const IdentifyResult& r) {
                                   {"std_white", p.std_white},
                                   {"by_ocv_tolerance", p.by_ocv_tolerance},
                                   {"at_bound", p.at_bound},
-                                  {"seen", p.seen}});
+                                  {"seen", p.identifiable}});
     if (p.temperature_c) json["parameters"].back()["temperature_c"] = *p.temperature_c;
   }
   json["correlation"] = Json::array();
@@ -208,7 +209,7 @@ Json spans_of(const std::vector<model::Span>& spans) {
 
 Json mechanism_of(const diagnosis::Finding& f) {
   const model::MechanismInfo& info = model::catalogue[f.setting.index];
-  const diagnosis::Words& words = diagnosis::words_of(f.setting.index);
+  const diagnosis::MechanismText& words = diagnosis::text_of_mechanism(f.setting.index);
   Json parameters = Json::array();
   for (std::size_t k = 0; k < info.parameters; ++k) {
     parameters.push_back({{"name", info.parameter[k].name},
@@ -241,7 +242,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["command"] = "diagnose";
   json["cell"] = r.cell.name;
   json["recordings"] = Json::array();
-  for (const workflow::Compared& c : r.recordings) {
+  for (const workflow::RecordingComparison& c : r.recordings) {
     json["recordings"].push_back({{"path", c.recording.path},
                                   {"samples", c.record.size()},
                                   {"duration_s", c.record.duration_s()},
@@ -249,7 +250,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                                   {"initial_soc_sigma", c.record.initial_soc_sigma}});
   }
   json["holdouts"] = Json::array();
-  for (const workflow::Compared& c : r.holdouts)
+  for (const workflow::RecordingComparison& c : r.holdouts)
     json["holdouts"].push_back(
         {{"path", c.recording.path}, {"samples", c.record.size()}, {"initial_soc", c.record.initial_soc}});
   json["verdict"] = name_of(d.verdict);
@@ -330,10 +331,10 @@ std::string json_of(const proof::ProofResult& r) {
                 {"notes", e.notes}};
     for (const proof::ProofClaim& c : e.claims) {
       Json claim = {
-          {"id", c.id}, {"claim", c.claim}, {"said", c.said}, {"measured", c.measured}, {"tolerance", c.tolerance}};
+          {"id", c.id}, {"claim", c.claim}, {"said", c.claimed}, {"measured", c.measured}, {"tolerance", c.tolerance}};
       claim["number"] = nullptr;
       if (const auto& n = c.number) {
-        claim["number"] = {{"said", optional(n->said)},       {"said_std", number(n->said_sigma)},
+        claim["number"] = {{"said", optional(n->claimed)},    {"said_std", number(n->claimed_sigma)},
                            {"measured", number(n->measured)}, {"measured_std", number(n->measured_sigma)},
                            {"allowed", number(n->allowed)},   {"unit", n->unit}};
       }

@@ -35,8 +35,8 @@ std::string json_of(const ExperimentResult& result);
 struct IdentifyResult {
   std::string model, optimizer, cell, out;
   identification::Identification identification;
-  std::optional<identification::Fit> validation;                         ///< of the first recording that was asked for
-  std::vector<std::pair<std::string, identification::Fit>> validations;  ///< of all
+  std::optional<identification::FitStatistics> validation;  ///< of the first recording that was asked for
+  std::vector<std::pair<std::string, identification::FitStatistics>> validations;  ///< of all
   std::optional<double> coulombic_efficiency;
   double wall_s = 0;
   std::vector<files::Warning> warnings;

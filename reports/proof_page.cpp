@@ -20,13 +20,13 @@ json number(double value) {
 }
 
 json claim_of(const proof::ProofClaim& c) {
-  json one = {{"claim", c.claim},         {"said", c.said},   {"measured", c.measured},
-              {"tolerance", c.tolerance}, {"holds", c.holds}, {"verdict", c.verdict()}};
+  json one = {{"claim", c.claim},         {"said", c.claimed}, {"measured", c.measured},
+              {"tolerance", c.tolerance}, {"holds", c.holds},  {"verdict", c.verdict()}};
   one["within"] = c.within_uncertainty ? json(*c.within_uncertainty) : json(nullptr);
   if (c.number) {
     const proof::ProofNumber& n = *c.number;
-    one["number"] = {{"said", n.said ? number(*n.said) : json(nullptr)},
-                     {"said_sigma", number(n.said_sigma)},
+    one["number"] = {{"said", n.claimed ? number(*n.claimed) : json(nullptr)},
+                     {"said_sigma", number(n.claimed_sigma)},
                      {"measured", number(n.measured)},
                      {"measured_sigma", number(n.measured_sigma)},
                      {"allowed", number(n.allowed)}};

@@ -15,9 +15,9 @@ using hal::put_bytes;
 constexpr std::uint32_t erased_mark = 0x44534552, format = 1;  // "RESD"
 constexpr std::uint8_t copy_bit = 0x80;
 constexpr std::size_t identity_bytes = 8, commit_at = 8, check_at = 12;  // of a header
-constexpr std::uint16_t longest_record = 1 + longest_payload / line_bytes;
+constexpr std::uint16_t longest_record = 1 + max_payload_bytes / line_bytes;
 constexpr std::array<std::uint8_t, 4> zeros{};
-constexpr int tries_in_a_sector = 3, most_looks = 16;
+constexpr int tries_in_a_sector = 3, max_scans = 16;
 
 using Line = std::array<std::uint8_t, line_bytes>;
 
@@ -42,7 +42,7 @@ Line mark_line() {
   return bytes;
 }
 
-bool replaces(const Record& later_one, const Record& r) {
+bool replaces(const RecordLocation& later_one, const RecordLocation& r) {
   return later_one.kind.type == r.kind.type && later_one.kind.layout >= r.kind.layout &&
          later(later_one.number, r.number);
 }
@@ -76,55 +76,56 @@ void Log::open() {
   const bool usable =
       size.sectors >= 2 && lines >= 4U * longest_record && lines <= 0x8000 && (lines & (lines - 1)) == 0;
   if (!usable) return;
-  size_ = {std::min<std::uint32_t>(size.sectors, most_sectors), size.sector_bytes};
+  size_ = {std::min<std::uint32_t>(size.sectors, max_sectors), size.sector_bytes};
   lines_ = static_cast<std::uint16_t>(lines);
-  for (int k = 0; k < most_looks && !look(); ++k) {
+  for (int k = 0; k < max_scans && !scan(); ++k) {
   }
 }
 
 /// False: a torn record that reads now so and now otherwise has made a difference; look again.
-bool Log::look() {
-  charge_ = none;
-  kept_count_ = 0;
+bool Log::scan() {
+  active_sector_ = none;
+  record_count_ = 0;
   interrupted_ = false;
-  settled_ = true;
-  std::array<Survey, most_sectors> found{};
+  last_record_secured_ = true;
+  std::array<Survey, max_sectors> found{};
   const auto sectors = static_cast<std::uint8_t>(size_.sectors);
   for (std::uint8_t s = 0; s < sectors; ++s) {
-    found[s] = survey(s, [](const Record&) {});
+    found[s] = survey(s, [](const RecordLocation&) {});
     if (state_[s] != Sector::broken)
       state_[s] = marked(s) && blank(s, 1, static_cast<std::uint16_t>(lines_ - 1)) ? Sector::erased : Sector::dirty;
   }
-  find_sector_in_charge(std::span(found).first(size_.sectors));
-  if (charge_ == none) return true;
-  const auto taking = [this](const Record& r) { take(r); };
+  find_active_sector(std::span(found).first(size_.sectors));
+  if (active_sector_ == none) return true;
+  const auto adding = [this](const RecordLocation& r) { add_record(r); };
   for (std::uint8_t s = 0; s < sectors; ++s) {
-    if (s == charge_) continue;
+    if (s == active_sector_) continue;
     const bool ahead = found[s].begun && later(found[s].base, base_);
     const bool twice =
         found[s].begun &&
         found[s].base == base_;  // no run of a log writes that: its numbers would be taken for those in charge
     interrupted_ = interrupted_ || ahead;
-    if (!ahead && !twice) survey(s, taking);
+    if (!ahead && !twice) survey(s, adding);
   }
-  const Survey again = survey(charge_, taking);
+  const Survey again = survey(active_sector_, adding);
   last_ = again.last;
   last_end_ = again.last_end;
-  const bool alike = again.any && again.original == found[charge_].original;
+  const bool alike = again.any && again.original == found[active_sector_].original;
   if (!alike) last_.reset();
-  settled_ = alike && interrupted_;  // a move is begun only when nothing is in doubt
+  last_record_secured_ = alike && interrupted_;  // a move is begun only when nothing is in doubt
   return alike;
 }
 
 /// The furthest that holds more than copies; if there is none any more, the furthest with copies.
-void Log::find_sector_in_charge(std::span<const Survey> found) {
+void Log::find_active_sector(std::span<const Survey> found) {
   const auto sectors = static_cast<std::uint8_t>(found.size());
   for (std::uint8_t s = 0; s < sectors; ++s) {
     if (!found[s].any) continue;
-    const bool better = charge_ == none || (found[s].original != found[charge_].original ? found[s].original
-                                                                                         : later(found[s].base, base_));
+    const bool better =
+        active_sector_ == none ||
+        (found[s].original != found[active_sector_].original ? found[s].original : later(found[s].base, base_));
     if (!better) continue;
-    charge_ = s;
+    active_sector_ = s;
     base_ = found[s].base;
   }
 }
@@ -164,7 +165,7 @@ std::optional<Log::Header> Log::identity_in(const std::array<std::uint8_t, line_
   h.copy = (bytes[4] & copy_bit) != 0;
   h.length = bytes[6];
   h.crc = get_bytes<std::uint32_t>(bytes, commit_at);
-  if (h.length > longest_payload || line + lines_of(h.length) > lines_) return std::nullopt;
+  if (h.length > max_payload_bytes || line + lines_of(h.length) > lines_) return std::nullopt;
   return h;
 }
 
@@ -192,37 +193,38 @@ bool Log::mark(std::uint8_t sector) const { return program(sector, 0, mark_line(
 bool Log::unmark(std::uint8_t sector) const { return program(sector, 0, Line{}); }
 
 /// Into those in force, without those it replaces; the order of calls does not matter.
-void Log::take(const Record& record) {
-  const auto begin = kept_.begin(), end = begin + static_cast<std::ptrdiff_t>(kept_count_);
-  if (std::any_of(begin, end, [&](const Record& r) { return r.number == record.number || replaces(r, record); }))
+void Log::add_record(const RecordLocation& record) {
+  const auto begin = records_.begin(), end = begin + static_cast<std::ptrdiff_t>(record_count_);
+  if (std::any_of(begin, end,
+                  [&](const RecordLocation& r) { return r.number == record.number || replaces(r, record); }))
     return;
-  kept_count_ = static_cast<std::size_t>(
-      std::remove_if(begin, end, [&](const Record& r) { return replaces(record, r); }) - begin);
-  if (kept_count_ < kept_.size()) kept_[kept_count_++] = record;
+  record_count_ = static_cast<std::size_t>(
+      std::remove_if(begin, end, [&](const RecordLocation& r) { return replaces(record, r); }) - begin);
+  if (record_count_ < records_.size()) records_[record_count_++] = record;
 }
 
-std::optional<Record> Log::newest(std::uint8_t type, std::uint8_t known_layout) const {
-  std::optional<Record> found;
-  for (const Record& r : in_force()) {
+std::optional<RecordLocation> Log::newest(std::uint8_t type, std::uint8_t known_layout) const {
+  std::optional<RecordLocation> found;
+  for (const RecordLocation& r : current_records()) {
     if (r.kind.type == type && r.kind.layout <= known_layout && (!found || later(r.number, found->number))) found = r;
   }
   return found;
 }
 
-std::optional<Log::Found> Log::load(std::uint8_t type, std::uint8_t known_layout,
-                                    std::span<std::uint8_t, longest_payload> into) {
-  for (int k = 0; k < most_looks; ++k) {
+std::optional<Log::LoadedRecord> Log::load(std::uint8_t type, std::uint8_t known_layout,
+                                           std::span<std::uint8_t, max_payload_bytes> into) {
+  for (int k = 0; k < max_scans; ++k) {
     const auto record = newest(type, known_layout);
     if (!record) return std::nullopt;
-    if (const auto payload = read(*record, into)) return Found{record->kind.layout, *payload};
-    look();  // torn: an older one is in force
+    if (const auto payload = read(*record, into)) return LoadedRecord{record->kind.layout, *payload};
+    scan();  // torn: an older one is in force
   }
   return std::nullopt;
 }
 
 /// Nothing: it cannot be read any more.
-std::optional<std::span<const std::uint8_t>> Log::read(const Record& record,
-                                                       std::span<std::uint8_t, longest_payload> into) const {
+std::optional<std::span<const std::uint8_t>> Log::read(const RecordLocation& record,
+                                                       std::span<std::uint8_t, max_payload_bytes> into) const {
   const auto payload = into.first(record.length);
   hal::flash_read(record.sector, (record.line + 1U) * line_bytes, payload);
   // of what is in `into`, not of what another reading might give
@@ -233,53 +235,53 @@ std::optional<std::span<const std::uint8_t>> Log::read(const Record& record,
   return payload;
 }
 
-Stored Log::store(Kind kind, std::span<const std::uint8_t> payload) {
-  if (payload.size() > longest_payload || (kind.type & copy_bit) != 0) return Stored::refused;
-  if (!settle()) return Stored::refused;
+StoreResult Log::store(Kind kind, std::span<const std::uint8_t> payload) {
+  if (payload.size() > max_payload_bytes || (kind.type & copy_bit) != 0) return StoreResult::rejected;
+  if (!secure_last_record()) return StoreResult::rejected;
   std::uint32_t together = lines_of(payload.size()), records = 1;
-  for (const Record& r : in_force()) {
+  for (const RecordLocation& r : current_records()) {
     if (r.kind.type == kind.type && r.kind.layout <= kind.layout) continue;
     together += lines_of(r.length);
     ++records;
   }
-  if (together > lines_ / 2U || records > most_kept) return Stored::refused;  // without flash, of no lines
-  if (append(kind, payload, longest_record) == Stored::kept) return Stored::kept;
+  if (together > lines_ / 2U || records > max_records) return StoreResult::rejected;  // without flash, of no lines
+  if (append(kind, payload, longest_record) == StoreResult::stored) return StoreResult::stored;
   return move(kind, payload);
 }
 
-bool Log::settle() {
-  for (int k = 0; k < most_looks && !settled_; ++k) {
-    std::array<std::uint8_t, longest_payload> payload;
+bool Log::secure_last_record() {
+  for (int k = 0; k < max_scans && !last_record_secured_; ++k) {
+    std::array<std::uint8_t, max_payload_bytes> payload;
     const auto bytes = last_ ? read(*last_, payload) : std::nullopt;
     if (!bytes) {
-      while (k < most_looks && !look()) ++k;
+      while (k < max_scans && !scan()) ++k;
       continue;
     }
-    void_what_was_torn();
+    void_torn_records();
     append(last_->kind, *bytes, 0);  // there is room: every other record leaves some
-    settled_ = true;
+    last_record_secured_ = true;
   }
-  return settled_;
+  return last_record_secured_;
 }
 
 /// Behind the last complete record: what was begun is made certain, so that every later boot sees the same, and void.
 /// next_ is behind it.
-void Log::void_what_was_torn() {
+void Log::void_torn_records() {
   next_ = last_end_;
   for (std::uint16_t at = last_end_; at < lines_;) {
-    const Line bytes = read_line(charge_, at);
+    const Line bytes = read_line(active_sector_, at);
     const std::uint32_t place = at * line_bytes;
     const auto word = [&](std::size_t k) { return std::span(bytes).subspan(k, 4); };
     if (const auto header = identity_in(bytes, at)) {
-      program(charge_, place + check_at, word(check_at));
-      program(charge_, place + commit_at, zeros);
+      program(active_sector_, place + check_at, word(check_at));
+      program(active_sector_, place + commit_at, zeros);
       next_ = at = static_cast<std::uint16_t>(at + lines_of(header->length));
       continue;
     }
     const bool numbered = get_bytes<std::uint32_t>(bytes, 0) == base_ + at;
     if (numbered) {
-      program(charge_, place, word(0));
-      program(charge_, place + check_at, zeros);
+      program(active_sector_, place, word(0));
+      program(active_sector_, place + check_at, zeros);
     }
     // else: nothing, or a number that was not finished: it will be begun again
     const bool more = std::any_of(bytes.begin() + 4, bytes.end(), [](std::uint8_t byte) { return byte != 0xFF; });
@@ -288,71 +290,71 @@ void Log::void_what_was_torn() {
   }
 }
 
-Stored Log::append(Kind kind, std::span<const std::uint8_t> payload, std::uint16_t spare) {
-  if (charge_ == none || interrupted_) return Stored::wants_erase;
+StoreResult Log::append(Kind kind, std::span<const std::uint8_t> payload, std::uint16_t spare) {
+  if (active_sector_ == none || interrupted_) return StoreResult::needs_erase;
   const std::uint16_t lines = lines_of(payload.size());
   for (int tries = 0; tries < tries_in_a_sector; ++tries) {
-    if (next_ + lines + spare > lines_) return Stored::wants_erase;
-    const Record record{kind, charge_, static_cast<std::uint8_t>(payload.size()), next_, base_ + next_};
+    if (next_ + lines + spare > lines_) return StoreResult::needs_erase;
+    const RecordLocation record{kind, active_sector_, static_cast<std::uint8_t>(payload.size()), next_, base_ + next_};
     next_ = static_cast<std::uint16_t>(next_ + lines);
     if (!write(record, false, payload)) continue;
-    take(record);
-    return Stored::kept;
+    add_record(record);
+    return StoreResult::stored;
   }
-  state_[charge_] = Sector::broken;
+  state_[active_sector_] = Sector::broken;
   next_ = lines_;
-  return Stored::wants_erase;
+  return StoreResult::needs_erase;
 }
 
-Stored Log::move(Kind kind, std::span<const std::uint8_t> payload) {
-  if ((charge_ == none || interrupted_) && wants_erase())
-    return Stored::wants_erase;  // what lies there may yet turn out to be a record
-  const std::uint32_t others = charge_ == none ? size_.sectors : size_.sectors - 1;
+StoreResult Log::move(Kind kind, std::span<const std::uint8_t> payload) {
+  if ((active_sector_ == none || interrupted_) && needs_erase())
+    return StoreResult::needs_erase;  // what lies there may yet turn out to be a record
+  const std::uint32_t others = active_sector_ == none ? size_.sectors : size_.sectors - 1;
   for (std::uint32_t steps = 1; steps <= others; ++steps) {
     const std::uint8_t sector = after(steps);
     if (state_[sector] != Sector::erased) continue;
     state_[sector] = Sector::dirty;
-    if (move_into(sector, (charge_ == none ? sector : base_ / lines_ + steps) * lines_, kind, payload))
-      return Stored::kept;
+    if (move_into(sector, (active_sector_ == none ? sector : base_ / lines_ + steps) * lines_, kind, payload))
+      return StoreResult::stored;
     state_[sector] = Sector::broken;
   }
-  return wants_erase() ? Stored::wants_erase : Stored::refused;
+  return needs_erase() ? StoreResult::needs_erase : StoreResult::rejected;
 }
 
 bool Log::move_into(std::uint8_t sector, std::uint32_t base, Kind kind, std::span<const std::uint8_t> payload) {
   interrupted_ = true;
   std::uint16_t line = 1;
   const auto place = [&](Kind what, std::size_t length) {
-    const Record at{what, sector, static_cast<std::uint8_t>(length), line, base + line};
+    const RecordLocation at{what, sector, static_cast<std::uint8_t>(length), line, base + line};
     line = static_cast<std::uint16_t>(line + lines_of(length));
     return at;
   };
-  std::array<Record, most_kept> moved{};
+  std::array<RecordLocation, max_records> moved{};
   std::size_t count = 0;
-  for (const Record& old : in_force()) {
+  for (const RecordLocation& old : current_records()) {
     if (old.kind.type == kind.type && old.kind.layout <= kind.layout) continue;
-    std::array<std::uint8_t, longest_payload> bytes;
+    std::array<std::uint8_t, max_payload_bytes> bytes;
     const auto content = read(old, bytes);
     if (!content) continue;  // it has decayed since it was found
     moved[count] = place(old.kind, old.length);
     if (!write(moved[count], true, *content)) return false;
     ++count;
   }
-  const Record record = place(kind, payload.size());
+  const RecordLocation record = place(kind, payload.size());
   if (!write(record, false, payload)) return false;
-  charge_ = sector;
+  active_sector_ = sector;
   base_ = base;
   interrupted_ = false;
   next_ = line;
-  kept_ = moved;
-  kept_count_ = count;
-  take(record);
+  records_ = moved;
+  record_count_ = count;
+  add_record(record);
   return true;
 }
 
 /// The identity with its check first: whoever finds them knows how many lines are taken. The checksum of it all last:
 /// with it the record is.
-bool Log::write(const Record& record, bool copy, std::span<const std::uint8_t> payload) const {
+bool Log::write(const RecordLocation& record, bool copy, std::span<const std::uint8_t> payload) const {
   Line header{};
   put_bytes(header, 0, record.number);
   header[4] = static_cast<std::uint8_t>(record.kind.type | (copy ? copy_bit : 0));
@@ -367,19 +369,19 @@ bool Log::write(const Record& record, bool copy, std::span<const std::uint8_t> p
          program(record.sector, at + line_bytes, payload) && program(record.sector, at + commit_at, commit);
 }
 
-bool Log::wants_erase() const {
+bool Log::needs_erase() const {
   for (std::uint8_t s = 0; s < size_.sectors; ++s) {
-    if (s != charge_ && state_[s] == Sector::dirty) return true;
+    if (s != active_sector_ && state_[s] == Sector::dirty) return true;
   }
   return false;
 }
 
-bool Log::erase_one() {
-  if (!wants_erase() || !settle()) return true;
+bool Log::erase_next_sector() {
+  if (!needs_erase() || !secure_last_record()) return true;
   for (std::uint32_t steps = 1; steps <= size_.sectors; ++steps) {
     const std::uint8_t sector = after(steps);
-    if (sector == charge_ || state_[sector] != Sector::dirty) continue;
-    rescue_from(sector);
+    if (sector == active_sector_ || state_[sector] != Sector::dirty) continue;
+    copy_records_from(sector);
     const bool good = unmark(sector) && hal::flash_erase(sector) && blank(sector, 0, lines_) && mark(sector);
     state_[sector] = good ? Sector::erased : Sector::broken;
     return good;
@@ -388,26 +390,26 @@ bool Log::erase_one() {
 }
 
 /// Only where a record in the sector in charge has decayed is an older one of its kind in force.
-void Log::rescue_from(std::uint8_t sector) {
-  for (std::size_t k = 0; k < kept_count_; ++k) {
-    if (kept_[k].sector != sector) continue;
-    std::array<std::uint8_t, longest_payload> payload;
-    const Record record = kept_[k];
+void Log::copy_records_from(std::uint8_t sector) {
+  for (std::size_t k = 0; k < record_count_; ++k) {
+    if (records_[k].sector != sector) continue;
+    std::array<std::uint8_t, max_payload_bytes> payload;
+    const RecordLocation record = records_[k];
     const auto bytes = read(record, payload);
-    if (bytes && append(record.kind, *bytes, 0) == Stored::kept)
+    if (bytes && append(record.kind, *bytes, 0) == StoreResult::stored)
       k = static_cast<std::size_t>(-1);  // those in force are others now
   }
 }
 
 std::uint32_t Log::broken() const { return static_cast<std::uint32_t>(std::ranges::count(state_, Sector::broken)); }
-bool Log::works() const { return size_.sectors >= 2 + broken(); }
-std::uint32_t Log::rounds() const {
-  return size_.sectors == 0 ? 0 : (charge_ == none ? 0 : base_ / lines_ / size_.sectors + 1);
+bool Log::operational() const { return size_.sectors >= 2 + broken(); }
+std::uint32_t Log::erase_cycles() const {
+  return size_.sectors == 0 ? 0 : (active_sector_ == none ? 0 : base_ / lines_ / size_.sectors + 1);
 }
 
 /// Round the sectors from the one in charge; sector 0 is the first of all.
 std::uint8_t Log::after(std::uint32_t steps) const {
-  return static_cast<std::uint8_t>((charge_ == none ? steps - 1 : charge_ + steps) % size_.sectors);
+  return static_cast<std::uint8_t>((active_sector_ == none ? steps - 1 : active_sector_ + steps) % size_.sectors);
 }
 
 }  // namespace bms::storage

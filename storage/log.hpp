@@ -17,9 +17,9 @@
 // A type may have several layouts. A record replaces those of its type with the same or an older layout; one of a newer
 // layout, which this firmware cannot read, stays and is copied on.
 //
-// Erasing is apart from storing, because it takes half a second: store() never erases, it says `wants_erase`;
-// erase_one() is called when the core may stand still. Time of store(): 16 us a word (100 at most), a record of 32
-// bytes 0.2 ms (1.2 at most); when it moves into the next sector up to 4 KiB of records more, 16 ms (0.1 s at most).
+// Erasing is apart from storing, because it takes half a second: store() never erases, it says `needs_erase`;
+// erase_next_sector() is called when the core may stand still. Time of store(): 16 us a word (100 at most), a record of
+// 32 bytes 0.2 ms (1.2 at most); when it moves into the next sector up to 4 KiB of records more, 16 ms (0.1 s at most).
 // open(): reads all sectors twice, 20 ms for 48 KiB at 168 MHz.
 //
 // No heap. Never fails, only says less: without flash, or with one good sector left, store() returns `refused`.
@@ -36,14 +36,14 @@
 namespace bms::storage {
 
 inline constexpr std::uint32_t line_bytes = 16;
-inline constexpr std::size_t longest_payload = 240;
-inline constexpr std::size_t most_sectors = 8;
-inline constexpr std::size_t most_kept = 16;  ///< records that are in force at the same time
+inline constexpr std::size_t max_payload_bytes = 240;
+inline constexpr std::size_t max_sectors = 8;
+inline constexpr std::size_t max_records = 16;  ///< records that are in force at the same time
 
-enum class Stored : std::uint8_t {
-  kept,         ///< it is in flash and was read back
-  wants_erase,  ///< no erased sector: after erase_one() it will be
-  refused,      ///< no flash, no good sector, or more than the log can hold
+enum class StoreResult : std::uint8_t {
+  stored,       ///< it is in flash and was read back
+  needs_erase,  ///< no erased sector: after erase_next_sector() it will be
+  rejected,     ///< no flash, no good sector, or more than the log can hold
 };
 
 /// type: 0 to 127; layout: of its payload, counted up.
@@ -53,7 +53,7 @@ struct Kind {
 };
 
 /// Where a record is.
-struct Record {
+struct RecordLocation {
   Kind kind;
   std::uint8_t sector;
   std::uint8_t length;  ///< of the payload [bytes]
@@ -66,27 +66,27 @@ class Log {
   /// Once, at boot. Writes nothing.
   void open();
 
-  struct Found {
+  struct LoadedRecord {
     std::uint8_t layout;
     std::span<const std::uint8_t> payload;  ///< in `into`
   };
   /// The newest record of a type whose layout is known_layout at most.
-  std::optional<Found> load(std::uint8_t type, std::uint8_t known_layout,
-                            std::span<std::uint8_t, longest_payload> into);
+  std::optional<LoadedRecord> load(std::uint8_t type, std::uint8_t known_layout,
+                                   std::span<std::uint8_t, max_payload_bytes> into);
   /// All that are in force, of whatever type and layout.
-  std::span<const Record> in_force() const { return std::span(kept_).first(kept_count_); }
+  std::span<const RecordLocation> current_records() const { return std::span(records_).first(record_count_); }
 
-  Stored store(Kind kind, std::span<const std::uint8_t> payload);
+  StoreResult store(Kind kind, std::span<const std::uint8_t> payload);
 
   /// Whether there is a sector to erase ahead of time.
-  bool wants_erase() const;
+  bool needs_erase() const;
   /// Erases one sector if one is to be: the core stands still meanwhile. False: that sector is broken.
-  bool erase_one();
+  bool erase_next_sector();
 
   std::uint32_t sectors() const { return size_.sectors; }
-  std::uint32_t broken() const;  ///< sectors that did not erase, or did not keep what was written, since open()
-  bool works() const;            ///< there are two good sectors, which a log needs to go on
-  std::uint32_t rounds() const;  ///< how often each sector was erased so far: its number of lines says
+  std::uint32_t broken() const;        ///< sectors that did not erase, or did not keep what was written, since open()
+  bool operational() const;            ///< there are two good sectors, which a log needs to go on
+  std::uint32_t erase_cycles() const;  ///< how often each sector was erased so far: its number of lines says
 
  private:
   enum class Sector : std::uint8_t { dirty, erased, broken };
@@ -102,46 +102,46 @@ class Log {
     bool any, original;      ///< a complete record; one that is not a copy
     std::uint32_t base;      ///< number of its line 0 in the round it was written in
     std::uint16_t last_end;  ///< line behind the last complete record
-    Record last;
+    RecordLocation last;
   };
   static constexpr std::uint8_t none = 0xFF;
 
-  bool look();
-  std::optional<Record> newest(std::uint8_t type, std::uint8_t known_layout) const;
-  std::optional<std::span<const std::uint8_t>> read(const Record& record,
-                                                    std::span<std::uint8_t, longest_payload> into) const;
+  bool scan();
+  std::optional<RecordLocation> newest(std::uint8_t type, std::uint8_t known_layout) const;
+  std::optional<std::span<const std::uint8_t>> read(const RecordLocation& record,
+                                                    std::span<std::uint8_t, max_payload_bytes> into) const;
   template <class See>
   Survey survey(std::uint8_t sector, See&& see) const;
-  void find_sector_in_charge(std::span<const Survey> found);
+  void find_active_sector(std::span<const Survey> found);
   std::optional<Header> identity_in(const std::array<std::uint8_t, line_bytes>& bytes, std::uint16_t line) const;
   bool complete(const Header& header, std::uint8_t sector, std::uint16_t line) const;
   bool blank(std::uint8_t sector, std::uint16_t from, std::uint16_t lines) const;
   bool marked(std::uint8_t sector) const;
   bool mark(std::uint8_t sector) const;
   bool unmark(std::uint8_t sector) const;
-  void take(const Record& record);
+  void add_record(const RecordLocation& record);
 
-  bool settle();
-  void void_what_was_torn();
-  void rescue_from(std::uint8_t sector);
-  Stored append(Kind kind, std::span<const std::uint8_t> payload, std::uint16_t spare);
-  Stored move(Kind kind, std::span<const std::uint8_t> payload);
+  bool secure_last_record();
+  void void_torn_records();
+  void copy_records_from(std::uint8_t sector);
+  StoreResult append(Kind kind, std::span<const std::uint8_t> payload, std::uint16_t spare);
+  StoreResult move(Kind kind, std::span<const std::uint8_t> payload);
   bool move_into(std::uint8_t sector, std::uint32_t base, Kind kind, std::span<const std::uint8_t> payload);
-  bool write(const Record& record, bool copy, std::span<const std::uint8_t> payload) const;
+  bool write(const RecordLocation& record, bool copy, std::span<const std::uint8_t> payload) const;
   std::uint8_t after(std::uint32_t steps) const;
 
   hal::FlashSize size_{};
   std::uint16_t lines_ = 0;  ///< of a sector
-  std::array<Sector, most_sectors> state_{};
-  std::uint8_t charge_ = none;
-  std::uint32_t base_ = 0;      ///< number of line 0 of the sector in charge
-  std::uint16_t next_ = 0;      ///< line to write to
-  bool interrupted_ = false;    ///< a move was begun: nothing may be added to the sector in charge any more
-  bool settled_ = false;        ///< nothing that was written before boot is in doubt
-  std::optional<Record> last_;  ///< the last complete record, and the line behind it, when the log was opened
+  std::array<Sector, max_sectors> state_{};
+  std::uint8_t active_sector_ = none;
+  std::uint32_t base_ = 0;              ///< number of line 0 of the sector in charge
+  std::uint16_t next_ = 0;              ///< line to write to
+  bool interrupted_ = false;            ///< a move was begun: nothing may be added to the sector in charge any more
+  bool last_record_secured_ = false;    ///< nothing that was written before boot is in doubt
+  std::optional<RecordLocation> last_;  ///< the last complete record, and the line behind it, when the log was opened
   std::uint16_t last_end_ = 0;
-  std::array<Record, most_kept> kept_{};
-  std::size_t kept_count_ = 0;
+  std::array<RecordLocation, max_records> records_{};
+  std::size_t record_count_ = 0;
 };
 
 }  // namespace bms::storage

@@ -23,15 +23,15 @@ constexpr std::array known_kinds{ChargeRecord::kind, CellsRecord::kind, HealthRe
 
 template <class R>
 bool get(Log& log, R& record) {
-  std::array<std::uint8_t, longest_payload> bytes;
+  std::array<std::uint8_t, max_payload_bytes> bytes;
   const auto found = log.load(R::kind.type, R::kind.layout, bytes);
   return found && decode(found->payload, found->layout, record);
 }
 
 template <class R>
 bool put(Log& log, const R& record) {
-  std::array<std::uint8_t, longest_payload> bytes;
-  return log.store(R::kind, encode(record, bytes)) == Stored::kept;
+  std::array<std::uint8_t, max_payload_bytes> bytes;
+  return log.store(R::kind, encode(record, bytes)) == StoreResult::stored;
 }
 
 bool apart(std::int32_t a, std::int32_t b, std::int32_t by) { return std::abs(std::int64_t{a} - b) >= by; }
@@ -50,8 +50,8 @@ constexpr bool only_the_core(hal::ResetCause cause) {
 void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,
                         std::optional<std::uint32_t> calendar_s) {
   log_.open();
-  known_ = get(log_, charge_kept_);
-  charge_ = charge_kept_;
+  charge_known_ = get(log_, charge_stored_);
+  charge_ = charge_stored_;
   soc_before_ppb_ = charge_.pack.soc_ppb;
   get(log_, cells_);
   if (HealthRecord health; get(log_, health)) health_ = health;
@@ -59,8 +59,8 @@ void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRec
   get(log_, settings_);
   if (only_the_core(cause))
     off_s_ = 0;
-  else if (known_ && calendar_s && charge_kept_.calendar_s != 0 && *calendar_s >= charge_kept_.calendar_s)
-    off_s_ = *calendar_s - charge_kept_.calendar_s;
+  else if (charge_known_ && calendar_s && charge_stored_.calendar_s != 0 && *calendar_s >= charge_stored_.calendar_s)
+    off_s_ = *calendar_s - charge_stored_.calendar_s;
 
   ++events_.starts;
   auto& resets = events_.resets[static_cast<std::size_t>(cause) % EventsRecord::causes];
@@ -69,22 +69,22 @@ void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRec
     events_.add(
         {static_cast<std::uint16_t>(processor_fault_code | (processor_fault->exception & 0xFFU)), charge_.operating_s});
   events_changed_ = true;
-  for (std::uint32_t k = 0; k < log_.sectors() && log_.wants_erase(); ++k) {
-    log_.erase_one();
+  for (std::uint32_t k = 0; k < log_.sectors() && log_.needs_erase(); ++k) {
+    log_.erase_next_sector();
     hal::watchdog_feed();
   }
 }
 
 std::optional<measurement::StartingPoint> Persistence::starting_point() const {
-  if (!known_) return std::nullopt;
-  estimator::StoredEstimate stored = charge_kept_.pack;
-  const std::int64_t sigma = std::int64_t{stored.soc_sigma_ppb} + charge_kept_.moved_ppb;
+  if (!charge_known_) return std::nullopt;
+  estimator::StoredEstimate stored = charge_stored_.pack;
+  const std::int64_t sigma = std::int64_t{stored.soc_sigma_ppb} + charge_stored_.moved_ppb;
   stored.soc_sigma_ppb = static_cast<std::int32_t>(std::min<std::int64_t>(sigma, 1'000'000'000));
-  return estimator::resumed(stored, off_s_);
+  return estimator::starting_point_after_off_time(stored, off_s_);
 }
 
 /// What was counted since the last call, in whole units; the rest stays.
-void Persistence::pass_time() {
+void Persistence::advance_time() {
   charge_.charged_uah += charged_uaus_ / uaus_per_uah;
   charged_uaus_ %= uaus_per_uah;
   charge_.discharged_uah += discharged_uaus_ / uaus_per_uah;
@@ -95,8 +95,8 @@ void Persistence::pass_time() {
   us_ %= 1'000'000;
 }
 
-void Persistence::keep(const Values& now, std::optional<std::uint32_t> calendar_s) {
-  pass_time();
+void Persistence::store(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s) {
+  advance_time();
   charge_minutes_ = counted(charge_minutes_);
   cells_minutes_ = counted(cells_minutes_);
   health_minutes_ = counted(health_minutes_);
@@ -107,62 +107,62 @@ void Persistence::keep(const Values& now, std::optional<std::uint32_t> calendar_
   if (now.pack) {
     const auto moved_ppb = static_cast<std::uint32_t>(std::abs(std::int64_t{now.pack->soc_ppb} - soc_before_ppb_));
     soc_before_ppb_ = now.pack->soc_ppb;
-    const bool first = !known_ || !kept_in_this_run_;
-    const bool has_moved = apart(now.pack->soc_ppb, charge_kept_.pack.soc_ppb, moved_soc_ppb) ||
-                           apart(now.pack->soc_sigma_ppb, charge_kept_.pack.soc_sigma_ppb,
-                                 std::max(moved_soc_ppb / 10, charge_kept_.pack.soc_sigma_ppb / 10));
+    const bool first = !charge_known_ || !stored_in_this_run_;
+    const bool has_moved = apart(now.pack->soc_ppb, charge_stored_.pack.soc_ppb, moved_soc_ppb) ||
+                           apart(now.pack->soc_sigma_ppb, charge_stored_.pack.soc_sigma_ppb,
+                                 std::max(moved_soc_ppb / 10, charge_stored_.pack.soc_sigma_ppb / 10));
     const bool long_ago =
         charge_minutes_ >= charge_at_least_minutes &&
-        (charge_.charged_uah != charge_kept_.charged_uah || charge_.discharged_uah != charge_kept_.discharged_uah);
-    if (first || has_moved || long_ago) put_charge(*now.pack, moved_ppb, calendar_s);
+        (charge_.charged_uah != charge_stored_.charged_uah || charge_.discharged_uah != charge_stored_.discharged_uah);
+    if (first || has_moved || long_ago) store_charge(*now.pack, moved_ppb, calendar_s);
   }
-  if (cells_minutes_ >= cells_every_minutes) put_cells(now.cells);
-  if (health_minutes_ >= health_every_minutes) put_health(now.health);
-  if (events_changed_) put_events_in_turn();
-  if (settings_changed_) put_settings();
+  if (cells_minutes_ >= cells_every_minutes) store_cells(now.cells);
+  if (health_minutes_ >= health_every_minutes) store_health(now.health);
+  if (events_changed_) store_events_in_turn();
+  if (settings_changed_) store_settings();
 }
 
-void Persistence::power_failing(const Values& now, std::optional<std::uint32_t> calendar_s) {
-  pass_time();
-  if (now.pack) put_charge(*now.pack, 0, calendar_s);
-  if (events_changed_) put_events();
-  put_cells(now.cells);
-  put_health(now.health);
-  if (settings_changed_) put_settings();
+void Persistence::power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s) {
+  advance_time();
+  if (now.pack) store_charge(*now.pack, 0, calendar_s);
+  if (events_changed_) store_events();
+  store_cells(now.cells);
+  store_health(now.health);
+  if (settings_changed_) store_settings();
 }
 
-void Persistence::supply_failing(const Values& now, std::optional<std::uint32_t> calendar_s) {
-  pass_time();
-  if (now.pack) put_charge(*now.pack, 0, calendar_s);
+void Persistence::supply_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s) {
+  advance_time();
+  if (now.pack) store_charge(*now.pack, 0, calendar_s);
 }
 
 void Persistence::fault(std::uint16_t code) {
   events_.add({code, charge_.operating_s});
   events_changed_ = true;
-  put_events_in_turn();
+  store_events_in_turn();
 }
 
 bool Persistence::set(std::uint16_t key, std::int32_t value) {
   const std::uint16_t before = settings_.revision;
   if (!settings_.set(key, value)) return false;
   settings_changed_ = settings_changed_ || settings_.revision != before;
-  if (settings_changed_) put_settings();
+  if (settings_changed_) store_settings();
   return true;
 }
 
-void Persistence::put_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
-                             std::optional<std::uint32_t> calendar_s) {
+void Persistence::store_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
+                               std::optional<std::uint32_t> calendar_s) {
   charge_.pack = now;
   charge_.moved_ppb = moved_ppb;
   charge_.calendar_s = calendar_s.value_or(0);
   if (!put(log_, charge_)) return;
-  charge_kept_ = charge_;
-  known_ = kept_in_this_run_ = true;
+  charge_stored_ = charge_;
+  charge_known_ = stored_in_this_run_ = true;
   charge_minutes_ = 0;
 }
 
-void Persistence::put_cells(std::span<const CellsRecord::Cell> now) {
-  if (now.empty() || now.size() > CellsRecord::most) return;
+void Persistence::store_cells(std::span<const CellsRecord::Cell> now) {
+  if (now.empty() || now.size() > CellsRecord::max_cells) return;
   bool moved = cells_.count != now.size();
   for (std::size_t k = 0; !moved && k < now.size(); ++k) moved = apart(now[k].soc, cells_.cell[k].soc, moved_cell);
   if (!moved) return;
@@ -174,7 +174,7 @@ void Persistence::put_cells(std::span<const CellsRecord::Cell> now) {
   cells_minutes_ = 0;
 }
 
-void Persistence::put_health(const HealthRecord& now) {
+void Persistence::store_health(const HealthRecord& now) {
   const bool moved = !health_ || apart(now.capacity_ppm, health_->capacity_ppm, moved_health_ppm) ||
                      apart(now.resistance_ppm, health_->resistance_ppm, moved_health_ppm) ||
                      apart(now.capacity_sigma_ppm, health_->capacity_sigma_ppm, moved_health_ppm) ||
@@ -184,21 +184,21 @@ void Persistence::put_health(const HealthRecord& now) {
   health_minutes_ = 0;
 }
 
-void Persistence::put_events() { events_changed_ = !put(log_, events_); }
+void Persistence::store_events() { events_changed_ = !put(log_, events_); }
 /// While some are left of those that may be written at once; what could not be written is none of them.
-void Persistence::put_events_in_turn() {
+void Persistence::store_events_in_turn() {
   if (faults_at_once_ == 0) return;
-  put_events();
+  store_events();
   if (!events_changed_) --faults_at_once_;
 }
-void Persistence::put_settings() { settings_changed_ = !put(log_, settings_); }
+void Persistence::store_settings() { settings_changed_ = !put(log_, settings_); }
 
 std::uint32_t Persistence::newer_records() const {
-  const auto newer = [](const Record& r) {
+  const auto newer = [](const RecordLocation& r) {
     return std::ranges::none_of(known_kinds,
                                 [&](const Kind& k) { return k.type == r.kind.type && k.layout >= r.kind.layout; });
   };
-  return static_cast<std::uint32_t>(std::ranges::count_if(log_.in_force(), newer));
+  return static_cast<std::uint32_t>(std::ranges::count_if(log_.current_records(), newer));
 }
 
 }  // namespace bms::storage

@@ -9,8 +9,8 @@
 //   all that has changed, at once: power_failing()
 //
 // What could not be written is tried again a minute later. Erasing is the caller's to time: start() does it before
-// anything runs, later erase_one() when the core may stand still for half a second (hal/flash.hpp), e.g. with open
-// contactors or without current.
+// anything runs, later erase_next_sector() when the core may stand still for half a second (hal/flash.hpp), e.g. with
+// open contactors or without current.
 //
 // Time is the samples' own. Cost of a sample: counting its charge, some thirty instructions; less without flash.
 #pragma once
@@ -29,7 +29,7 @@
 namespace bms::storage {
 
 /// What the estimator knows at the moment.
-struct Values {
+struct EstimatorSnapshot {
   std::optional<estimator::StoredEstimate> pack;  ///< nothing: not started
   std::span<const CellsRecord::Cell> cells;
   HealthRecord health;
@@ -58,21 +58,21 @@ class Persistence {
     since_us_ += step_us;
     return since_us_ >= minute_us;
   }
-  void keep(const Values& now, std::optional<std::uint32_t> calendar_s);
+  void store(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   /// code: not 0; what it means is the caller's.
   void fault(std::uint16_t code);
   /// False: no room for another key.
   bool set(std::uint16_t key, std::int32_t value);
   /// The supply goes, or the battery is switched off. Charge first, 0.2 ms; 2 ms for everything, 12 at most.
-  void power_failing(const Values& now, std::optional<std::uint32_t> calendar_s);
+  void power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   /// The supply sinks, and may stop sinking: charge alone, 0.2 ms, 1.2 at most where there is room for it in its
   /// sector, 20 where there is not.
-  void supply_failing(const Values& now, std::optional<std::uint32_t> calendar_s);
+  void supply_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
-  bool wants_erase() const { return log_.wants_erase(); }
-  void erase_one() { log_.erase_one(); }
+  bool needs_erase() const { return log_.needs_erase(); }
+  void erase_next_sector() { log_.erase_next_sector(); }
 
   const ChargeRecord& charge() const { return charge_; }
   const CellsRecord& cells() const { return cells_; }
@@ -87,23 +87,23 @@ class Persistence {
  private:
   static constexpr std::uint32_t minute_us = 60'000'000;
 
-  void pass_time();
-  void put_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
-                  std::optional<std::uint32_t> calendar_s);
-  void put_cells(std::span<const CellsRecord::Cell> now);
-  void put_health(const HealthRecord& now);
-  void put_events();
-  void put_events_in_turn();
-  void put_settings();
+  void advance_time();
+  void store_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
+                    std::optional<std::uint32_t> calendar_s);
+  void store_cells(std::span<const CellsRecord::Cell> now);
+  void store_health(const HealthRecord& now);
+  void store_events();
+  void store_events_in_turn();
+  void store_settings();
 
   Log log_;
-  ChargeRecord charge_, charge_kept_;
+  ChargeRecord charge_, charge_stored_;
   CellsRecord cells_;
   std::optional<HealthRecord> health_;
   EventsRecord events_;
   SettingsRecord settings_;
-  bool known_ = false;  ///< charge_kept_ is from a record
-  bool events_changed_ = false, settings_changed_ = false, kept_in_this_run_ = false;
+  bool charge_known_ = false;  ///< charge_stored_ is from a record
+  bool events_changed_ = false, settings_changed_ = false, stored_in_this_run_ = false;
   std::optional<std::uint32_t> off_s_;
   std::int32_t soc_before_ppb_ = 0;
 

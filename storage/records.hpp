@@ -23,7 +23,7 @@
 
 namespace bms::storage {
 
-using Payload = std::span<std::uint8_t, longest_payload>;
+using Payload = std::span<std::uint8_t, max_payload_bytes>;
 using Bytes = std::span<const std::uint8_t>;
 
 /// Writes field after field.
@@ -53,7 +53,7 @@ class Decoder {
     at_ += size;
   }
   template <class T>
-  constexpr T take() {
+  constexpr T read() {
     T value;
     get(value);
     return value;
@@ -96,7 +96,7 @@ constexpr Bytes encode(const ChargeRecord& r, Payload into) {
 
 /// The estimator's soc goes a little beyond 0 and 1; one that goes further, or a sigma that cannot be, is nothing to go
 /// by.
-constexpr estimator::StoredEstimate possible(estimator::StoredEstimate e) {
+constexpr estimator::StoredEstimate plausible(estimator::StoredEstimate e) {
   constexpr std::int32_t one = 1'000'000'000, beyond = one / 4, anything = 289'000'000;
   if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > anything)
     e.soc_sigma_ppb = anything;
@@ -124,13 +124,13 @@ constexpr bool decode(Bytes from, std::uint8_t layout, ChargeRecord& r) {
   } else {
     return false;
   }
-  r.pack = possible(r.pack);
+  r.pack = plausible(r.pack);
   return true;
 }
 
 struct CellsRecord {
   static constexpr Kind kind{2, 1};
-  static constexpr std::size_t most = 16;
+  static constexpr std::size_t max_cells = 16;
   struct Cell {
     std::int16_t soc = 0;     ///< less the mean's, in 1e-5: +-0.32
     std::uint16_t sigma = 0;  ///< in 1e-5
@@ -138,7 +138,7 @@ struct CellsRecord {
   };
 
   std::uint8_t count = 0;
-  std::array<Cell, most> cell{};
+  std::array<Cell, max_cells> cell{};
   constexpr bool operator==(const CellsRecord&) const = default;
 };
 
@@ -151,8 +151,8 @@ constexpr Bytes encode(const CellsRecord& r, Payload into) {
 
 constexpr bool decode(Bytes from, std::uint8_t layout, CellsRecord& r) {
   Decoder d(from);
-  const auto count = d.take<std::uint8_t>();
-  if (layout != 1 || count > CellsRecord::most || from.size() != 1 + std::size_t{4} * count) return false;
+  const auto count = d.read<std::uint8_t>();
+  if (layout != 1 || count > CellsRecord::max_cells || from.size() != 1 + std::size_t{4} * count) return false;
   r = {};
   r.count = count;
   for (std::size_t k = 0; k < count; ++k) {
@@ -191,7 +191,7 @@ constexpr bool decode(Bytes from, std::uint8_t layout, HealthRecord& r) {
 
 struct EventsRecord {
   static constexpr Kind kind{4, 1};
-  static constexpr std::size_t causes = 7, most_faults = 16;
+  static constexpr std::size_t causes = 7, max_faults = 16;
   struct Fault {
     std::uint16_t code = 0;         ///< 0: none
     std::uint32_t operating_s = 0;  ///< when
@@ -201,12 +201,12 @@ struct EventsRecord {
   std::uint32_t starts = 0;
   std::array<std::uint16_t, causes> resets{};  ///< by hal::ResetCause; stays at 65,535
   std::uint32_t faults = 0;                    ///< ever; the newest is at (faults - 1) modulo 16
-  std::array<Fault, most_faults> fault{};
+  std::array<Fault, max_faults> fault{};
 
-  constexpr void add(const Fault& f) { fault[faults++ % most_faults] = f; }
+  constexpr void add(const Fault& f) { fault[faults++ % max_faults] = f; }
   /// back: 0 for the newest, below 16.
   constexpr Fault last(std::uint32_t back) const {
-    return back < faults ? fault[(faults - 1 - back) % most_faults] : Fault{};
+    return back < faults ? fault[(faults - 1 - back) % max_faults] : Fault{};
   }
   constexpr bool operator==(const EventsRecord&) const = default;
 };
@@ -237,7 +237,7 @@ constexpr bool decode(Bytes from, std::uint8_t layout, EventsRecord& r) {
 /// it another.
 struct SettingsRecord {
   static constexpr Kind kind{5, 1};
-  static constexpr std::size_t most = 24;
+  static constexpr std::size_t max_settings = 24;
   struct Setting {
     std::uint16_t key = 0;
     std::int32_t value = 0;
@@ -246,7 +246,7 @@ struct SettingsRecord {
 
   std::uint16_t revision = 0;  ///< one more with every change
   std::uint8_t count = 0;
-  std::array<Setting, most> setting{};
+  std::array<Setting, max_settings> setting{};
 
   constexpr std::optional<std::int32_t> get(std::uint16_t key) const {
     for (std::size_t k = 0; k < count; ++k) {
@@ -258,7 +258,7 @@ struct SettingsRecord {
   constexpr bool set(std::uint16_t key, std::int32_t value) {
     std::size_t k = 0;
     while (k < count && setting[k].key != key) ++k;
-    if (k == most) return false;
+    if (k == max_settings) return false;
     if (k == count)
       ++count;
     else if (setting[k].value == value)
@@ -279,9 +279,9 @@ constexpr Bytes encode(const SettingsRecord& r, Payload into) {
 
 constexpr bool decode(Bytes from, std::uint8_t layout, SettingsRecord& r) {
   Decoder d(from);
-  const auto revision = d.take<std::uint16_t>();
-  const auto count = d.take<std::uint8_t>();
-  if (layout != 1 || count > SettingsRecord::most || from.size() != 3 + std::size_t{6} * count) return false;
+  const auto revision = d.read<std::uint16_t>();
+  const auto count = d.read<std::uint8_t>();
+  if (layout != 1 || count > SettingsRecord::max_settings || from.size() != 3 + std::size_t{6} * count) return false;
   r = {};
   r.revision = revision;
   r.count = count;

@@ -81,7 +81,7 @@ files::PageCell failed(const std::string& why, std::optional<double> paper = std
 
 /// What one model and one optimiser came to.
 struct Outcome {
-  id::Fit estimation, validation;
+  id::FitStatistics estimation, validation;
   std::vector<id::Parameter> parameters;
   id::Optimum optimum;
   std::vector<std::string> warnings;
@@ -132,7 +132,7 @@ class Study {
     return out;
   }
 
-  id::Fit validated(const model::CellParameters<>& cell, const Part& part, double fading) const {
+  id::FitStatistics validated(const model::CellParameters<>& cell, const Part& part, double fading) const {
     return id::validate(cell, record(part), fading);
   }
 
@@ -140,8 +140,8 @@ class Study {
   std::size_t done() const { return done_; }
 
  private:
-  static id::Record record(const Part& part) {
-    id::Record r;
+  static id::DataSet record(const Part& part) {
+    id::DataSet r;
     r.data = part.data;
     r.initial_soc = part.soc_from;
     return r;
@@ -303,7 +303,7 @@ void cross(Study& study, const std::vector<Part>& parts, bool beside_paper, Stud
     std::vector<files::PageCell> row = {label(parts[i].name)};
     double sum_v = 0;
     for (std::size_t j = 0; j < parts.size(); ++j) {
-      const id::Fit fit = i == j ? found.estimation : study.validated(found.cell, parts[j], found.fading);
+      const id::FitStatistics fit = i == j ? found.estimation : study.validated(found.cell, parts[j], found.fading);
       row.push_back(percent_cell(fit.fit_percent, beside_paper ? std::optional(table7[i][j]) : std::nullopt));
       if (i != j) sum_v += fit.rmse_v / static_cast<double>(parts.size() - 1);
     }

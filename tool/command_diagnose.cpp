@@ -9,7 +9,7 @@
 
 #include "diagnosis/next_experiment.hpp"
 #include "diagnosis/reference.hpp"
-#include "diagnosis/words.hpp"
+#include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
@@ -24,7 +24,7 @@ namespace bms::tool {
 namespace {
 
 using diagnosis::Finding;
-using diagnosis::Record;
+using diagnosis::PreparedRecording;
 using diagnosis::Verdict;
 using model::catalogue;
 
@@ -33,7 +33,7 @@ std::string name_of_file(const std::string& path) { return std::filesystem::path
 /// Where a recording began, and how far that is known.
 struct Start {
   double soc = 0.5, sigma = 0.3;
-  bool told = false;
+  bool soc_given = false;
   std::string from;  ///< empty: of the user
 };
 
@@ -58,7 +58,7 @@ Start voltage_start(const files::Recording& r, const files::CellFile& cell) {
   one.voltage_v = {r.voltage_v[k]};
   if (!r.temperature_c.empty()) one.temperature_c = {r.temperature_c[k]};
   const host_sim::EstimateRow row =
-      host_sim::run_on_host(cell, files::samples(one), std::nullopt, host_sim::ScalarKind::twice).rows.front();
+      host_sim::run_on_host(cell, files::samples(one), std::nullopt, host_sim::ScalarKind::float64).rows.front();
   return {row.soc, row.soc_sigma, false,
           fmt::format("starts where the first voltage says, {:.0f} % give or take {:.0f} %", 100 * row.soc,
                       100 * row.soc_sigma)};
@@ -76,15 +76,18 @@ Start start_of_holdout(const files::Recording& r, const files::CellFile& cell, c
   return start_of(r, cell, given);
 }
 
-workflow::Compared opened(const std::string& path, const files::CellFile& cell, const std::optional<double>& given,
-                          Start (*rule)(const files::Recording&, const files::CellFile&, const std::optional<double>&),
-                          std::vector<files::Warning>& warnings) {
-  workflow::Compared c{files::read_recording(path), {}, {}, {}};
+workflow::RecordingComparison opened(const std::string& path, const files::CellFile& cell,
+                                     const std::optional<double>& given,
+                                     Start (*rule)(const files::Recording&, const files::CellFile&,
+                                                   const std::optional<double>&),
+                                     std::vector<files::Warning>& warnings) {
+  workflow::RecordingComparison c{files::read_recording(path), {}, {}, {}};
   files::compare_with_cell(c.recording, cell.parameters);
   for (const files::Warning& w : c.recording.warnings) warnings.push_back({w.id, path + ": " + w.text});
   const Start start = rule(c.recording, cell, given);
   if (!start.from.empty()) warnings.push_back({"initial_soc", path + ": " + start.from});
-  c.record = workflow::record_of(c.recording, name_of_file(path), cell.parameters, start.soc, start.sigma, start.told);
+  c.record =
+      workflow::record_of(c.recording, name_of_file(path), cell.parameters, start.soc, start.sigma, start.soc_given);
   return c;
 }
 
@@ -131,24 +134,24 @@ int run(const DiagnoseOptions& options) {
   workflow::DiagnoseResult result;
   result.out = options.out;
   result.cell = files::read_cell(options.cell);
-  std::vector<Record> records;
-  const std::vector<double>& told = options.initial_soc;
-  if (told.size() > 1 && told.size() != options.recordings.size()) {
+  std::vector<PreparedRecording> records;
+  const std::vector<double>& soc_given = options.initial_soc;
+  if (soc_given.size() > 1 && soc_given.size() != options.recordings.size()) {
     throw files::BadInput("--initial-soc", 1,
-                          fmt::format("{} values for {} recordings, expected one for all or one for each", told.size(),
-                                      options.recordings.size()));
+                          fmt::format("{} values for {} recordings, expected one for all or one for each",
+                                      soc_given.size(), options.recordings.size()));
   }
-  const auto told_of = [&](std::size_t n) {
-    return told.empty() ? std::nullopt : std::optional(told[std::min(n, told.size() - 1)]);
+  const auto given_soc = [&](std::size_t n) {
+    return soc_given.empty() ? std::nullopt : std::optional(soc_given[std::min(n, soc_given.size() - 1)]);
   };
   for (const std::string& path : options.recordings) {
     result.recordings.push_back(
-        opened(path, result.cell, told_of(result.recordings.size()), start_of, result.warnings));
+        opened(path, result.cell, given_soc(result.recordings.size()), start_of, result.warnings));
     records.push_back(result.recordings.back().record);
   }
   for (const std::string& path : options.holdouts)
-    result.holdouts.push_back(
-        opened(path, result.cell, told.size() == 1 ? told_of(0) : std::nullopt, start_of_holdout, result.warnings));
+    result.holdouts.push_back(opened(path, result.cell, soc_given.size() == 1 ? given_soc(0) : std::nullopt,
+                                     start_of_holdout, result.warnings));
 
   diagnosis::Options how;
   how.progress = progress_on_terminal(0.1, progress_line);
@@ -156,16 +159,16 @@ int run(const DiagnoseOptions& options) {
   diagnosis::describe(result.diagnosis, result.cell.parameters, records);
   for (const std::string& text : result.diagnosis.warnings) result.warnings.push_back({"readings", text});
   if (result.named()) {
-    const bool temperature =
-        std::any_of(records.begin(), records.end(), [](const Record& r) { return !r.temperature_c.empty(); });
+    const bool temperature = std::any_of(records.begin(), records.end(),
+                                         [](const PreparedRecording& r) { return !r.temperature_c.empty(); });
     result.next = diagnosis::next_experiment(result.cell.parameters, result.diagnosis, temperature);
   }
 
   workflow::compare(result);
-  result.baseline = workflow::figures(result.recordings, &workflow::Compared::base_v);
-  result.extended = workflow::figures(result.recordings, &workflow::Compared::extended_v);
-  result.baseline_holdout = workflow::figures(result.holdouts, &workflow::Compared::base_v);
-  result.extended_holdout = workflow::figures(result.holdouts, &workflow::Compared::extended_v);
+  result.baseline = workflow::figures(result.recordings, &workflow::RecordingComparison::base_v);
+  result.extended = workflow::figures(result.recordings, &workflow::RecordingComparison::extended_v);
+  result.baseline_holdout = workflow::figures(result.holdouts, &workflow::RecordingComparison::base_v);
+  result.extended_holdout = workflow::figures(result.holdouts, &workflow::RecordingComparison::extended_v);
   result.extended_cell = workflow::extended_cell(result);
   result.soc = workflow::soc_errors(result);
   if (result.named() && result.baseline_holdout && result.extended_holdout &&
@@ -182,11 +185,11 @@ int run(const DiagnoseOptions& options) {
   }
 
   for (const files::Warning& w : result.warnings) warn(w.text);
-  if (!options.out.empty()) put(options.out, files::cell_text(result.extended_cell));
+  if (!options.out.empty()) write_output(options.out, files::cell_text(result.extended_cell));
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (!options.output.json.empty()) put(options.output.json, reports::json_of(result));
-  if (!options.output.report.empty()) put(options.output.report, reports::diagnosis_report(result));
-  tell(options.output, summary(result));
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
+  if (!options.output.report.empty()) write_output(options.output.report, reports::diagnosis_report(result));
+  print_summary(options.output, summary(result));
   return 0;
 }
 

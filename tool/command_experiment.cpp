@@ -57,22 +57,23 @@ int run(const ExperimentCommandOptions& options) {
     result.largest_current_a = std::max(result.largest_current_a, std::abs(row.current_a));
     before_s = row.time_s;
   }
-  put(options.out, csv);
-  if (!options.output.json.empty()) put(options.output.json, reports::json_of(result));
+  write_output(options.out, csv);
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
   if (!options.output.report.empty()) {
     files::PageChart current{"Current, charging up", {"A"}, {}, {{}}};
     for (const experiments::ProfileRow& row : *rows) {
       current.time_s.push_back(row.time_s);
       current.columns[0].push_back(row.current_a);
     }
-    put(options.output.report, reports::page_of({"Experiment " + options.name, "", {}, {}, {current}}));
+    write_output(options.output.report, reports::page_of({"Experiment " + options.name, "", {}, {}, {current}}));
   }
   if (options.out != "-") {
     const std::string_view instruction = design->instruction;
-    tell(options.output,
-         fmt::format("{} rows in {}: {:.2f} h, {:.2f} Ah charged, {:.2f} Ah discharged, {:.2f} A at most.{}{}",
-                     result.samples, options.out, result.duration_s / 3'600, result.charged_ah, result.discharged_ah,
-                     result.largest_current_a, instruction.empty() ? "" : "\n", instruction));
+    print_summary(
+        options.output,
+        fmt::format("{} rows in {}: {:.2f} h, {:.2f} Ah charged, {:.2f} Ah discharged, {:.2f} A at most.{}{}",
+                    result.samples, options.out, result.duration_s / 3'600, result.charged_ah, result.discharged_ah,
+                    result.largest_current_a, instruction.empty() ? "" : "\n", instruction));
   }
   return 0;
 }

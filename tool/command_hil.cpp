@@ -19,19 +19,19 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, const hil::SessionResult& r) {
-  Json faults = Json::array(), reactions = Json::array(), warnings = Json::array();
-  for (const hil::FaultSeen& f : r.faults)
+  Json faults = Json::array(), injection_results = Json::array(), warnings = Json::array();
+  for (const hil::FaultEvent& f : r.faults)
     faults.push_back({{"name", f.name},
                       {"raised_at_s", f.raised_at_s},
                       {"cleared_at_s", f.cleared_at_s ? Json(*f.cleared_at_s) : Json()}});
-  for (const hil::Reaction& x : r.reactions) {
-    reactions.push_back({{"fault", x.injection.text},
-                         {"expected", x.injection.expected.empty() ? Json() : Json(x.injection.expected)},
-                         {"within_s", x.injection.expected.empty() ? Json() : Json(x.injection.within_s)},
-                         {"after_s", x.after_s ? Json(*x.after_s) : Json()},
-                         {"in_time", x.in_time}});
+  for (const hil::InjectionResult& x : r.injection_results) {
+    injection_results.push_back({{"fault", x.injection.text},
+                                 {"expected", x.injection.expected.empty() ? Json() : Json(x.injection.expected)},
+                                 {"within_s", x.injection.expected.empty() ? Json() : Json(x.injection.within_s)},
+                                 {"after_s", x.after_s ? Json(*x.after_s) : Json()},
+                                 {"in_time", x.in_time}});
   }
-  for (const files::Warning& w : plan.drive.warnings) warnings.push_back(w.id + ": " + w.text);
+  for (const files::Warning& w : plan.profile.warnings) warnings.push_back(w.id + ": " + w.text);
   return Json{{"command", "hil"},
               {"board", options.board},
               {"cell", plan.cell.name},
@@ -50,10 +50,10 @@ std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, con
                 {"max_error", r.soc_max_error},
                 {"within_2_sigma", r.within_2_sigma},
                 {"median_sigma", r.median_sigma},
-                {"told", r.soc_told},
+                {"told", r.soc_published},
                 {"wrong_told_as_valid", r.soc_wrong}}},
               {"faults", faults},
-              {"reactions", reactions},
+              {"reactions", injection_results},
               {"warnings", warnings}}
              .dump(1) +
          "\n";
@@ -62,20 +62,22 @@ std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, con
 std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, const hil::SessionResult& r,
                       const std::string& statement) {
   files::PageTable faults{"faults", "Faults that the board told", {"fault", "from, s", "to, s"}, {}, ""},
-      reactions{"reactions", "What was broken on purpose", {"what", "expected", "within, s", "after, s"}, {}, ""};
-  for (const hil::FaultSeen& f : r.faults)
+      injection_results{
+          "reactions", "What was broken on purpose", {"what", "expected", "within, s", "after, s"}, {}, ""};
+  for (const hil::FaultEvent& f : r.faults)
     faults.rows.push_back({{f.name, {}, {}},
                            {fmt::format("{:.1f}", f.raised_at_s), {}, {}},
                            {f.cleared_at_s ? fmt::format("{:.1f}", *f.cleared_at_s) : "stays", {}, {}}});
-  for (const hil::Reaction& x : r.reactions) {
-    reactions.rows.push_back({{x.injection.text, {}, {}},
-                              {x.injection.expected.empty() ? "no fault" : x.injection.expected, {}, {}},
-                              {x.injection.expected.empty() ? "" : fmt::format("{:.1f}", x.injection.within_s), {}, {}},
-                              {x.after_s                      ? fmt::format("{:.1f}", *x.after_s)
-                               : x.injection.expected.empty() ? ""
-                                                              : "not told",
-                               {},
-                               {}}});
+  for (const hil::InjectionResult& x : r.injection_results) {
+    injection_results.rows.push_back(
+        {{x.injection.text, {}, {}},
+         {x.injection.expected.empty() ? "no fault" : x.injection.expected, {}, {}},
+         {x.injection.expected.empty() ? "" : fmt::format("{:.1f}", x.injection.within_s), {}, {}},
+         {x.after_s                      ? fmt::format("{:.1f}", *x.after_s)
+          : x.injection.expected.empty() ? ""
+                                         : "not told",
+          {},
+          {}}});
   }
   files::PageChart soc{
       "State of charge", {"told, %", "told + two sigma", "told - two sigma", "true, %"}, {}, {{}, {}, {}, {}}},
@@ -91,9 +93,9 @@ std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, c
     volts.columns[1].push_back(p.highest_v);
   }
   files::PageContent page{"In the loop: " + options.board, statement, {}, {}, {soc, current, volts}};
-  for (const files::Warning& w : plan.drive.warnings) page.warnings.push_back(w.text);
+  for (const files::Warning& w : plan.profile.warnings) page.warnings.push_back(w.text);
   if (!faults.rows.empty()) page.tables.push_back(faults);
-  if (!reactions.rows.empty()) page.tables.push_back(reactions);
+  if (!injection_results.rows.empty()) page.tables.push_back(injection_results);
   return reports::page_of(page);
 }
 
@@ -110,11 +112,11 @@ std::string statement_of(const hil::SessionResult& r) {
         "of charge since then is not judged.",
         *r.cut_off_at_s);
   std::size_t missed = 0;
-  for (const hil::Reaction& x : r.reactions) missed += x.in_time ? 0 : 1;
-  if (!r.reactions.empty())
+  for (const hil::InjectionResult& x : r.injection_results) missed += x.in_time ? 0 : 1;
+  if (!r.injection_results.empty())
     text += missed == 0 ? " Every fault that was put in was told in its time."
                         : fmt::format(" {} of {} faults that were put in were not told in their time.", missed,
-                                      r.reactions.size());
+                                      r.injection_results.size());
   if (r.soc_wrong > 0) text += fmt::format(" {} times a wrong state of charge was told as valid.", r.soc_wrong);
   return text;
 }
@@ -128,13 +130,13 @@ int run(const HilOptions& options) {
   plan.cell = files::read_cell(options.cell);
   plan.replayed = options.profile.empty();
   const std::string& input = plan.replayed ? options.recording : options.profile;
-  plan.drive =
+  plan.profile =
       files::read_recording(input, plan.replayed ? files::VoltageColumn::required : files::VoltageColumn::optional);
-  files::compare_with_cell(plan.drive, plan.cell.parameters);
-  for (const files::Warning& w : plan.drive.warnings) warn(input + ": " + w.text);
+  files::compare_with_cell(plan.profile, plan.cell.parameters);
+  for (const files::Warning& w : plan.profile.warnings) warn(input + ": " + w.text);
   plan.cells = images::board_cells(options.board);
   plan.initial_soc = options.initial_soc;
-  plan.told_soc = options.told_soc;
+  plan.announced_soc = options.announced_soc;
   plan.sample_period_s = options.sample_period_s;
   plan.spread.seed = options.seed;
   for (const std::string& text : options.faults) plan.injections.push_back(hil::injection(text, plan.cells));
@@ -147,7 +149,7 @@ int run(const HilOptions& options) {
   std::string dump;
   const auto keep = [&](double time_s, const can::Frame& f) {
     if (options.candump.empty()) return;
-    monitor::append_dump_line(dump, monitor::on_bus(f, std::llround(1e6 * time_s)), "can0");
+    monitor::append_dump_line(dump, monitor::to_bus_frame(f, std::llround(1e6 * time_s)), "can0");
   };
   const auto show = progress_on_terminal(1, [](double done, double left_s, const std::string&) {
     return fmt::format("in the loop: {:.0f} %, {:.0f} s left", 100 * done, std::isfinite(left_s) ? left_s : 0);
@@ -156,17 +158,17 @@ int run(const HilOptions& options) {
     if (show) show(done, "");
   });
 
-  if (!options.candump.empty()) put(options.candump, dump);
+  if (!options.candump.empty()) write_output(options.candump, dump);
   const std::string statement = statement_of(result);
-  if (!options.output.json.empty()) put(options.output.json, json_of(options, plan, result));
-  if (!options.output.report.empty()) put(options.output.report, report_of(options, plan, result, statement));
-  tell(options.output, statement);
-  for (const hil::FaultSeen& f : result.faults)
-    tell(options.output, fmt::format("  {:>9.1f} s  {}{}", f.raised_at_s, f.name,
-                                     f.cleared_at_s ? fmt::format(", until {:.1f} s", *f.cleared_at_s) : ""));
-  if (!options.output.report.empty()) tell(options.output, "Report: " + options.output.report);
+  if (!options.output.json.empty()) write_output(options.output.json, json_of(options, plan, result));
+  if (!options.output.report.empty()) write_output(options.output.report, report_of(options, plan, result, statement));
+  print_summary(options.output, statement);
+  for (const hil::FaultEvent& f : result.faults)
+    print_summary(options.output, fmt::format("  {:>9.1f} s  {}{}", f.raised_at_s, f.name,
+                                              f.cleared_at_s ? fmt::format(", until {:.1f} s", *f.cleared_at_s) : ""));
+  if (!options.output.report.empty()) print_summary(options.output, "Report: " + options.output.report);
   bool good = result.soc_wrong == 0;
-  for (const hil::Reaction& x : result.reactions) {
+  for (const hil::InjectionResult& x : result.injection_results) {
     if (x.in_time) continue;
     good = false;
     fmt::print(stderr, "{}: expected {} within {:.1f} s, {}\n", x.injection.text, x.injection.expected,

@@ -15,7 +15,7 @@ struct HilOptions {
   std::string cell = "table9", board_cell;
   std::string profile, recording;  ///< one of them
   double initial_soc = 0.9;
-  std::optional<double> told_soc;
+  std::optional<double> announced_soc;
   double sample_period_s = 0.1;
   unsigned seed = 1;
   std::vector<std::string> faults;

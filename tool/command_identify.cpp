@@ -72,8 +72,8 @@ void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordi
   for (const files::Warning& w : result.warnings) warn(w.text);
   result.out = options.out;
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (!options.output.json.empty()) put(options.output.json, reports::json_of(result));
-  if (!options.output.report.empty()) put(options.output.report, reports::identify_report(result, recordings));
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
+  if (!options.output.report.empty()) write_output(options.output.report, reports::identify_report(result, recordings));
   const id::Identification& found = result.identification;
   std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n",
                                  found.estimation.samples, 1e3 * found.estimation.rmse_v, found.estimation.fit_percent,
@@ -85,18 +85,18 @@ void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordi
   }
   for (const auto& [path, fit] : result.validations)
     text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
-  tell(options.output, text + (result.cell.empty() ? "No cell file." : "Cell file: " + options.out));
+  print_summary(options.output, text + (result.cell.empty() ? "No cell file." : "Cell file: " + options.out));
 }
 
 /// Records of like temperature.
 struct Group {
   double temperature_c = 25;
-  std::vector<id::Record> records;
+  std::vector<id::DataSet> records;
 };
 
-std::vector<Group> grouped(const std::vector<files::Recording>& recordings, const std::vector<id::Record>& records) {
+std::vector<Group> grouped(const std::vector<files::Recording>& recordings, const std::vector<id::DataSet>& records) {
   std::vector<Group> groups;
-  for (const workflow::LikeTemperature& like : workflow::by_temperature(recordings)) {
+  for (const workflow::TemperatureGroup& like : workflow::group_by_temperature(recordings)) {
     Group& group = groups.emplace_back(Group{like.temperature_c, {}});
     for (const std::size_t k : like.recordings) group.records.push_back(records[k]);
   }
@@ -109,7 +109,7 @@ std::vector<files::TemperatureTable> at_temperatures(const std::vector<Group>& g
                                                      reports::IdentifyResult& result) {
   std::vector<files::TemperatureTable> tables;
   const model::CellParameters<> main_cell = result.identification.cell;
-  options.estimate_lean = false;
+  options.estimate_ocv_branch = false;
   for (id::Parameter& p : result.identification.parameters) p.temperature_c = groups[main_group].temperature_c;
   for (std::size_t k = 0; k < groups.size(); ++k) {
     if (k == main_group) {
@@ -130,7 +130,7 @@ std::vector<files::TemperatureTable> at_temperatures(const std::vector<Group>& g
 }
 
 /// tf, oe, hw: one record. Exit code 1 when what follows the voltage is no circuit: there is no cell file then.
-int run_linear(const IdentifyOptions& options, id::Method method, files::CellFile cell, const id::Record& record,
+int run_linear(const IdentifyOptions& options, id::Method method, files::CellFile cell, const id::DataSet& record,
                double soc, const workflow::DataOptions& given, reports::IdentifyResult& result) {
   const auto begin = std::chrono::steady_clock::now();
   const id::LinearKind kind = options.model == "tf"   ? id::LinearKind::transfer_function
@@ -169,7 +169,7 @@ int run_linear(const IdentifyOptions& options, id::Method method, files::CellFil
   const model::CellFault fault = model::first_fault(cell.parameters);
   if (fault.what == nullptr) {
     workflow::round_digits(cell);
-    put(options.out, files::cell_text(cell));
+    write_output(options.out, files::cell_text(cell));
     result.cell = cell.name;
   } else {
     result.warnings.push_back(
@@ -191,22 +191,22 @@ int run(const IdentifyOptions& options) {
   const id::Method method = method_of(options.optimizer);
   files::CellFile cell = files::read_cell(options.start);
   const double start_capacity_ah = cell.parameters.capacity_ah;
-  workflow::OcvTaken taken;
+  workflow::OcvResult taken;
   if (!options.ocv.empty()) {
-    taken = workflow::take_ocv(options.ocv, options.ocv_error_v, options.extend, cell);
+    taken = workflow::identify_ocv(options.ocv, options.ocv_error_v, options.extend, cell);
     result.coulombic_efficiency = taken.coulombic_efficiency;
     result.warnings = taken.warnings;
   }
   if (options.capacity_ah > 0) cell.parameters.capacity_ah = options.capacity_ah;
-  if (options.extend) workflow::take_hysteresis(taken, cell);
+  if (options.extend) workflow::identify_hysteresis(taken, cell);
   const bool has_hysteresis = options.extend && !cell.mechanisms.empty();
-  if (options.lean && cell.parameters.ocv.half_gap_v.size > 0)
-    cell.parameters = id::leaning(cell.parameters, *options.lean);
+  if (options.ocv_branch && cell.parameters.ocv.half_gap_v.size > 0)
+    cell.parameters = id::with_ocv_branch(cell.parameters, *options.ocv_branch);
 
   workflow::DataOptions data{workflow::initial_soc_of(options.initial_soc),
                              workflow::window_of("--window", options.window), cell.parameters};
   std::vector<files::Recording> recordings;
-  std::vector<id::Record> records;
+  std::vector<id::DataSet> records;
   std::vector<workflow::IdentificationData> measured;
   double soc_min = 1, soc_max = 0;
   for (const std::string& path : options.recordings) {
@@ -234,7 +234,7 @@ int run(const IdentifyOptions& options) {
   id::GreyBoxOptions grey_box;
   grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(soc_min, soc_max) : options.nodes;
   grey_box.bounds = workflow::circuit_bounds(cell.parameters.capacity_ah);
-  grey_box.estimate_lean = !options.lean && !has_hysteresis && cell.parameters.ocv.half_gap_v.size > 0;
+  grey_box.estimate_ocv_branch = !options.ocv_branch && !has_hysteresis && cell.parameters.ocv.half_gap_v.size > 0;
   grey_box.voltage_sigma_v = cell.parameters.noise.voltage_v;
   try {
     result.identification = id::identify_grey_box(
@@ -249,7 +249,7 @@ int run(const IdentifyOptions& options) {
   data.window = validation_window(options);
   std::vector<id::Data> shown = {groups[main_group].records.front().data};
   for (const std::string& path : options.validate) {
-    const id::Record record = workflow::identification_data(files::read_recording(path), data).record;
+    const id::DataSet record = workflow::identification_data(files::read_recording(path), data).record;
     result.validations.push_back(
         {path, id::validate(result.identification.cell, record, result.identification.fading)});
     shown.push_back(record.data);
@@ -257,8 +257,8 @@ int run(const IdentifyOptions& options) {
   if (!result.validations.empty()) result.validation = result.validations.front().second;
 
   cell.parameters = result.identification.cell;
-  workflow::take_noise(recordings, result.validation ? *result.validation : result.identification.estimation,
-                       result.identification.parameters, cell.parameters);
+  workflow::identify_noise(recordings, result.validation ? *result.validation : result.identification.estimation,
+                           result.identification.parameters, cell.parameters);
   const auto& nodes = cell.parameters.rc.soc;
   std::string files;
   for (const std::string& path : options.recordings)
@@ -288,7 +288,7 @@ int run(const IdentifyOptions& options) {
                                       fault.key, fault.what));
   }
   workflow::round_digits(cell);
-  put(options.out, files::cell_text(cell));
+  write_output(options.out, files::cell_text(cell));
 
   result.cell = cell.name;
   finish(options, shown, begin, result);

@@ -24,7 +24,7 @@ struct IdentifyOptions {
   bool remove_offset = false;   ///< of the current, as its rests show it
   double ocv_error_v = 0.002;   ///< largest error of the OCV's straight pieces
   std::optional<double>
-      lean;  ///< of the OCV between slow discharge (-1) and charge (1); not given: identified where it can be
+      ocv_branch;  ///< of the OCV between slow discharge (-1) and charge (1); not given: identified where it can be
   bool extend = false;     ///< what an estimator needs beyond the circuit
   double capacity_ah = 0;  ///< 0: of the OCV recordings, else of `start`
   std::string name;        ///< of the cell; empty: of the file that is written

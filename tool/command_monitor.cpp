@@ -98,9 +98,9 @@ class Monitor {
     facts_.source = options.source;
     facts_.blocks = Terminal::shows_utf8();
     csv_.text() += csv_.wanted() ? csv_head() : "";
-    shown_ = !options.output.quiet && !options.output.standard_output_is_taken();
+    shown_ = !options.output.quiet && !options.output.uses_standard_output();
     if (options.serve_port) page_ = std::make_unique<LivePage>(live_page_html(), *options.serve_port);
-    if (page_) fmt::print(options.output.standard_output_is_taken() ? stderr : stdout, "Page: {}\n", page_->url());
+    if (page_) fmt::print(options.output.uses_standard_output() ? stderr : stdout, "Page: {}\n", page_->url());
     std::fflush(stdout);
     if (shown_ && isatty(STDOUT_FILENO)) terminal_ = std::make_unique<Terminal>();
   }
@@ -109,7 +109,7 @@ class Monitor {
     while (!done()) {
       const std::size_t n = source_->ended() ? 0 : source_->read(room_, wait_ms);
       if (n == 0 && source_->ended()) poll(nullptr, 0, wait_ms);  // only the page goes on
-      for (std::size_t k = 0; k < n && !satisfied(); ++k) take(room_[k]);
+      for (std::size_t k = 0; k < n && !satisfied(); ++k) receive(room_[k]);
       show(false);
     }
     finish();
@@ -135,7 +135,7 @@ class Monitor {
            (options_.duration_s && !source_->live() && !page_ && bus_.duration_s() >= *options_.duration_s);
   }
   bool done() const {
-    if (stop_.asked() || (terminal_ && terminal_->quit_pressed())) return true;
+    if (stop_.requested() || (terminal_ && terminal_->quit_pressed())) return true;
     if (options_.duration_s && source_->live() && elapsed_s() >= *options_.duration_s) return true;
     if (page_ && !source_->live()) return page_done();
     return satisfied() || source_->ended();
@@ -145,8 +145,8 @@ class Monitor {
     return options_.once ? satisfied() || source_->ended() : options_.duration_s && elapsed_s() >= *options_.duration_s;
   }
 
-  void take(const BusFrame& frame) {
-    const std::size_t message = bus_.take(frame);
+  void receive(const BusFrame& frame) {
+    const std::size_t message = bus_.receive(frame);
     if (record_.wanted()) append_dump_line(record_.text(), frame, "can0");
     if (message == status_) {
       if (csv_.wanted()) csv_.text() += csv_row(bus_);
@@ -185,7 +185,7 @@ class Monitor {
   /// record gives the same.
   BusState as_of_now() const {
     BusState now = bus_;
-    if (source_->live() && bus_.frames() > 0) now.time_is(clock_us());
+    if (source_->live() && bus_.frames() > 0) now.advance_time(clock_us());
     return now;
   }
   double silent_s() const {
@@ -211,7 +211,7 @@ class Monitor {
       terminal_.reset();
       fmt::print("{}", plain_text(picture));  // stays on the terminal
     }
-    if (!options_.output.json.empty()) put(options_.output.json, json_of(bus_, facts_, silent_s()));
+    if (!options_.output.json.empty()) write_output(options_.output.json, json_of(bus_, facts_, silent_s()));
   }
 
   const MonitorOptions& options_;
@@ -237,7 +237,7 @@ int run(const MonitorOptions& options) {
   if (options.record == "-") throw files::BadInput("--record", 1, "standard output is not for it, expected a file");
   try {
     return std::make_unique<Monitor>(options)->run();
-  } catch (const SourceRefused& refused) {
+  } catch (const SourceError& refused) {
     throw files::BadInput(refused.source, refused.line, refused.what());
   }
 }

@@ -25,7 +25,7 @@ std::string summary(const proof::ProofResult& r) {
     text += fmt::format("{} ({} of {} hold)\n", e.title, e.holding(), e.claims.size());
     for (const proof::ProofClaim& c : e.claims)
       text += fmt::format("  {:5} {}\n        said: {}\n        measured: {}\n        holds when {}{}\n",
-                          c.holds ? "holds" : "FAILS", c.claim, c.said, c.measured, c.tolerance,
+                          c.holds ? "holds" : "FAILS", c.claim, c.claimed, c.measured, c.tolerance,
                           c.within_uncertainty ? *c.within_uncertainty ? "; within the stated uncertainty"
                                                                        : "; not within the stated uncertainty"
                                                : "");
@@ -57,9 +57,9 @@ int run(const ProofOptions& options) {
                             "(host_sim/README.md names their source)");
   }
   const proof::ProofResult result = proof::prove(options.data, options.only, progress_on_terminal(0.2, proof_progress));
-  if (!options.output.json.empty()) put(options.output.json, reports::json_of(result));
-  if (!options.output.report.empty()) put(options.output.report, reports::proof_report(result));
-  tell(options.output, summary(result));
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
+  if (!options.output.report.empty()) write_output(options.output.report, reports::proof_report(result));
+  print_summary(options.output, summary(result));
   return 0;
 }
 

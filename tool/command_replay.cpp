@@ -19,8 +19,8 @@ namespace {
 
 host_sim::ScalarKind scalar_of(const std::string& name) {
   if (name == "fixed") return host_sim::ScalarKind::fixed;
-  if (name == "double") return host_sim::ScalarKind::twice;
-  return host_sim::ScalarKind::single;
+  if (name == "double") return host_sim::ScalarKind::float64;
+  return host_sim::ScalarKind::float32;
 }
 
 const images::EmulatedBoard& board_named(const std::string& name) {
@@ -95,13 +95,13 @@ int run(const ReplayOptions& options) {
   }
   const auto samples = log ? log->samples : bms::files::samples(result.recording);
   if (options.initial_soc) {
-    result.belief = host_sim::Belief{*options.initial_soc, options.initial_soc_sigma};
+    result.prior = host_sim::SocPrior{*options.initial_soc, options.initial_soc_sigma};
     result.initial_soc = *options.initial_soc;
   }
   const auto start = log && !options.initial_soc
                          ? log->start
                          : host_sim::starting_point(
-                               result.belief, host_sim::value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
+                               result.prior, host_sim::value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
 
   if (board != nullptr) {
     const files::CellFile board_cell = options.board_cell.empty() ? result.cell : files::read_cell(options.board_cell);
@@ -121,26 +121,27 @@ int run(const ReplayOptions& options) {
     }
   }
   std::size_t compared = 0;
-  if (log && !options.initial_soc && result.scalar != host_sim::ScalarKind::twice && !result.difference) {
+  if (log && !options.initial_soc && result.scalar != host_sim::ScalarKind::float64 && !result.difference) {
     result.difference = host_sim::difference_to_log(*log, result.track, compared);
     if (!result.difference && compared > 0) result.verified_against = "log";
   }
   host_sim::evaluate(result);
 
   const std::string trace = host_sim::trace_csv(result);
-  if (!options.trace.empty()) put(options.trace, trace);
-  if (!options.output.report.empty()) put(options.output.report, reports::replay_report(result));
-  if (!options.output.json.empty()) put(options.output.json, reports::json_of(result, files::sha256(trace)));
+  if (!options.trace.empty()) write_output(options.trace, trace);
+  if (!options.output.report.empty()) write_output(options.output.report, reports::replay_report(result));
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result, files::sha256(trace)));
   if (result.difference) {
     fmt::print(stderr, "{}: {}\n", options.recording, *result.difference);
     return 1;
   }
-  tell(options.output, summary(result));
+  print_summary(options.output, summary(result));
   if (result.verified_against)
-    tell(options.output,
-         fmt::format("Verified: {} estimates, every bit equal {}.", compared > 0 ? compared : result.track.words.size(),
-                     compared > 0 ? "to what the firmware computed" : "on " + *result.verified_against));
-  if (!options.output.report.empty()) tell(options.output, "Report: " + options.output.report);
+    print_summary(
+        options.output,
+        fmt::format("Verified: {} estimates, every bit equal {}.", compared > 0 ? compared : result.track.words.size(),
+                    compared > 0 ? "to what the firmware computed" : "on " + *result.verified_against));
+  if (!options.output.report.empty()) print_summary(options.output, "Report: " + options.output.report);
   return 0;
 }
 

@@ -55,7 +55,7 @@ model::MechanismSetting mechanism_of(const std::string& text, double capacity_ah
   }
   if (colon == std::string::npos) refuse("'" + id + "' without parameters, expected ID:param=value,...");
   const model::MechanismInfo& info = model::catalogue[index];
-  model::MechanismSetting setting = model::unsaid(index, capacity_ah);
+  model::MechanismSetting setting = model::default_setting(index, capacity_ah);
   for (std::size_t at = colon; at < text.size();) {
     const std::size_t end = std::min(text.find(',', at + 1), text.size());
     const std::string part = text.substr(at + 1, end - at - 1);
@@ -104,7 +104,7 @@ int run(const SimulateOptions& options) {
   const auto rows = host_sim::simulate(cell, cell_file.parameters.capacity_ah, cell_file.mechanisms, recording.time_s,
                                        recording.current_a, recording.temperature_c, options.initial_soc);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  put(options.out, csv_of(recording, rows, options));
+  write_output(options.out, csv_of(recording, rows, options));
 
   reports::SimulateResult result{cell_file.name,
                                  input,
@@ -116,7 +116,7 @@ int run(const SimulateOptions& options) {
                                  rows.back().voltage_v,
                                  static_cast<double>(rows.size()) / seconds,
                                  recording.warnings};
-  if (!options.output.json.empty()) put(options.output.json, reports::json_of(result));
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
   if (!options.output.report.empty()) {
     files::PageChart voltage{"Voltage, open loop", {"simulated, V"}, recording.time_s, {{}}},
         current{"Current, charging up", {"A"}, recording.time_s, {recording.current_a}},
@@ -127,13 +127,15 @@ int run(const SimulateOptions& options) {
       voltage.columns[0].push_back(row.voltage_v);
       soc.columns[0].push_back(100 * row.soc);
     }
-    put(options.output.report,
+    write_output(
+        options.output.report,
         reports::page_of(
             {"Simulation of " + input, "Cell " + cell_file.name + ", open loop.", {}, {}, {voltage, current, soc}}));
   }
   if (options.out != "-") {
-    tell(options.output, fmt::format("{} rows in {}: from {:.1f} % to {:.1f} % in {:.2f} h.", rows.size(), options.out,
-                                     100 * options.initial_soc, 100 * rows.back().soc, recording.duration_s() / 3600));
+    print_summary(options.output,
+                  fmt::format("{} rows in {}: from {:.1f} % to {:.1f} % in {:.2f} h.", rows.size(), options.out,
+                              100 * options.initial_soc, 100 * rows.back().soc, recording.duration_s() / 3600));
   }
   return 0;
 }

@@ -98,19 +98,20 @@ int run(const StudyOptions& options) {
     result = study::study_recordings(cell.parameters, paths, progress_on_terminal());
   }
   const std::filesystem::path folder = options.out;
-  for (const files::PageTable& table : result.tables) put((folder / (table.id + ".csv")).string(), csv_of(table));
+  for (const files::PageTable& table : result.tables)
+    write_output((folder / (table.id + ".csv")).string(), csv_of(table));
   const std::string json = reports::json_of(result), page = page_of_study(result);
-  put((folder / "study.json").string(), json);
-  put((folder / "study.html").string(), page);
-  if (!options.output.json.empty()) put(options.output.json, json);
-  if (!options.output.report.empty()) put(options.output.report, page);
+  write_output((folder / "study.json").string(), json);
+  write_output((folder / "study.html").string(), page);
+  if (!options.output.json.empty()) write_output(options.output.json, json);
+  if (!options.output.report.empty()) write_output(options.output.report, page);
 
   for (const files::Warning& w : result.warnings) warn(w.text);
   std::string text =
       fmt::format("{} identifications in {:.1f} s, of {}.\n", result.fits, result.seconds, result.source);
   for (const study::StudyClaim& c : result.claims)
     text += fmt::format("  {} {}: {}\n", c.holds ? "yes" : "no ", c.claim, c.evidence);
-  tell(options.output, text + "Report: " + (folder / "study.html").string());
+  print_summary(options.output, text + "Report: " + (folder / "study.html").string());
   return 0;
 }
 

@@ -163,7 +163,7 @@ void add_identify(CLI::App& app, bms::tool::IdentifyOptions& o) {
   c.add_flag("--extend", o.extend,
              "what an estimator needs beyond the circuit, from the same recordings: hysteresis between slow charge and "
              "discharge, resistances that follow the temperature, lasting errors as states of the filter");
-  c.add_option("--lean", o.lean,
+  c.add_option("--lean", o.ocv_branch,
                "where the OCV lies between slow discharge (-1) and charge (1); identified if not given")
       ->check(Within(-1.0, 1.0));
   c.add_option("--ocv-error-v", o.ocv_error_v, "largest error of the OCV's straight pieces")
@@ -244,7 +244,7 @@ void add_hil(CLI::App& app, bms::tool::HilOptions& o) {
   c.add_option("--initial-soc", o.initial_soc, "state of charge of the pack")
       ->check(Within(0.0, 1.0))
       ->capture_default_str();
-  c.add_option("--told-soc", o.told_soc, "what the board is told of it; nothing, if not given")
+  c.add_option("--told-soc", o.announced_soc, "what the board is told of it; nothing, if not given")
       ->check(Within(0.0, 1.0));
   c.add_option("--sample-s", o.sample_period_s, "between samples")->check(Within(0.01, 10.0))->capture_default_str();
   c.add_option("--seed", o.seed, "of the cells' spread and the sensors' noise")->capture_default_str();

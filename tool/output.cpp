@@ -14,15 +14,15 @@
 
 namespace bms::tool {
 
-void put(const std::string& file, const std::string& text) {
+void write_output(const std::string& file, const std::string& text) {
   if (file != "-") return files::write_file(file, text);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
     throw files::BadInput("-", 1, "standard output cannot be written, expected a place to write to");
   }
 }
 
-void tell(const Output& output, const std::string& text) {
-  if (!output.quiet && !output.standard_output_is_taken()) std::printf("%s\n", text.c_str());
+void print_summary(const Output& output, const std::string& text) {
+  if (!output.quiet && !output.uses_standard_output()) std::printf("%s\n", text.c_str());
 }
 
 workflow::Progress progress_on_terminal(

@@ -14,14 +14,14 @@ struct Output {
   bool quiet = false;  ///< no summary on standard output
   std::string main;    ///< the command's own file (--out, --trace); "-" for standard output
 
-  bool standard_output_is_taken() const { return json == "-" || report == "-" || main == "-"; }
+  bool uses_standard_output() const { return json == "-" || report == "-" || main == "-"; }
 };
 
 /// Writes `text` to the file, or to standard output for "-". Throws BadInput when it cannot be written.
-void put(const std::string& file, const std::string& text);
+void write_output(const std::string& file, const std::string& text);
 
 /// A summary for a person; not when quiet, nor when standard output carries a result.
-void tell(const Output& output, const std::string& text);
+void print_summary(const Output& output, const std::string& text);
 
 /// Progress as one line of a terminal that is written over, every_s at most; nothing where standard error is no
 /// terminal. line: what to show, left_s being a guess (infinite at first).

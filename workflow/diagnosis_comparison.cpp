@@ -5,10 +5,10 @@
 
 #include <fmt/format.h>
 
-#include "diagnosis/good_to.hpp"
+#include "diagnosis/model_tolerance.hpp"
 #include "diagnosis/reference.hpp"
 #include "host_sim/replay.hpp"
-#include "identification/figures.hpp"
+#include "identification/goodness_of_fit.hpp"
 
 namespace bms::workflow {
 
@@ -41,43 +41,44 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
 
 }  // namespace
 
-diagnosis::Record record_of(const files::Recording& r, std::string name, const model::CellParameters<>& cell,
-                            double initial_soc, double sigma, bool told) {
+diagnosis::PreparedRecording record_of(const files::Recording& r, std::string name, const model::CellParameters<>& cell,
+                                       double initial_soc, double sigma, bool soc_given) {
   const bool any_temperature =
       std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
-  diagnosis::Record record{
+  diagnosis::PreparedRecording record{
       std::move(name), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{},
-      initial_soc,     sigma,    told,        {}};
-  diagnosis::take_references(record, r.current_ref_a, r.voltage_ref_v, cell);
+      initial_soc,     sigma,    soc_given,   {}};
+  diagnosis::average_references(record, r.current_ref_a, r.voltage_ref_v, cell);
   return record;
 }
 
 void compare(DiagnoseResult& r) {
   const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
   const auto simulated = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h,
-                             std::vector<Compared>& list, std::vector<double> Compared::*into) {
-    for (Compared& c : list) {
+                             std::vector<RecordingComparison>& list, std::vector<double> RecordingComparison::*into) {
+    for (RecordingComparison& c : list) {
       diagnosis::Hypothesis here = h;
       here.bursts.clear();
       if (&list == &r.recordings && h.bursts.size() == list.size())
         here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
-      const diagnosis::Evidence evidence(cell, own, {c.record}, {});
+      const diagnosis::LikelihoodModel evidence(cell, own, {c.record}, {});
       c.*into = evidence.voltage(here, evidence.unchanged(), 0);
     }
   };
   const diagnosis::Hypothesis base{own, own.size(), {}};
   diagnosis::Hypothesis extended = r.named() ? r.diagnosis.extended : base;
-  simulated(r.cell.parameters, base, r.recordings, &Compared::base_v);
-  simulated(r.cell.parameters, base, r.holdouts, &Compared::base_v);
-  simulated(r.diagnosis.cell, extended, r.recordings, &Compared::extended_v);
+  simulated(r.cell.parameters, base, r.recordings, &RecordingComparison::base_v);
+  simulated(r.cell.parameters, base, r.holdouts, &RecordingComparison::base_v);
+  simulated(r.diagnosis.cell, extended, r.recordings, &RecordingComparison::extended_v);
   if (r.named()) extended.settings = diagnosis::later_recording(r.diagnosis.extended);
-  simulated(r.diagnosis.cell, extended, r.holdouts, &Compared::extended_v);
+  simulated(r.diagnosis.cell, extended, r.holdouts, &RecordingComparison::extended_v);
 }
 
-std::optional<OpenLoopFigures> figures(const std::vector<Compared>& list, std::vector<double> Compared::*simulated) {
+std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& list,
+                                       std::vector<double> RecordingComparison::*simulated) {
   ErrorFigure error;
   FitFigure fit;
-  for (const Compared& c : list) {
+  for (const RecordingComparison& c : list) {
     for (std::size_t k = 0; k < c.record.size(); ++k) {
       error.add(c.record.voltage_v[k] - (c.*simulated)[k]);
       fit.add(c.record.voltage_v[k], (c.*simulated)[k]);
@@ -89,14 +90,14 @@ std::optional<OpenLoopFigures> figures(const std::vector<Compared>& list, std::v
 
 std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
   ErrorFigure base, extended;
-  const auto add = [](const files::CellFile& cell, const Compared& c, ErrorFigure& figure) {
+  const auto add = [](const files::CellFile& cell, const RecordingComparison& c, ErrorFigure& figure) {
     const auto start =
-        host_sim::starting_point(host_sim::Belief{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)});
+        host_sim::starting_point(host_sim::SocPrior{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)});
     const host_sim::Track track =
-        host_sim::run_on_host(cell, files::samples(c.recording), start, host_sim::ScalarKind::single);
+        host_sim::run_on_host(cell, files::samples(c.recording), start, host_sim::ScalarKind::float32);
     for (std::size_t k = 0; k < track.rows.size(); ++k) figure.add(track.rows[k].soc - c.recording.soc_ref[k]);
   };
-  for (const Compared& c : r.holdouts) {
+  for (const RecordingComparison& c : r.holdouts) {
     if (c.recording.soc_ref.empty()) continue;
     add(r.cell, c, base);
     add(r.extended_cell, c, extended);
@@ -108,7 +109,7 @@ std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
 files::CellFile extended_cell(const DiagnoseResult& r) {
   files::CellFile cell = r.cell;
   std::string files;
-  for (const Compared& c : r.recordings) files += (files.empty() ? "" : ", ") + c.record.name;
+  for (const RecordingComparison& c : r.recordings) files += (files.empty() ? "" : ", ") + c.record.name;
   if (!r.named()) {
     cell.source += fmt::format("; bms diagnose of {}: {}, nothing was added", files, name_of(r.diagnosis.verdict));
     return cell;
@@ -139,10 +140,11 @@ files::CellFile extended_cell(const DiagnoseResult& r) {
     files::put_mechanism(cell, setting);
     cell.sources[files::table_of(info)] = source;
   }
-  std::vector<diagnosis::Record> records;
-  for (const Compared& c : r.recordings) records.push_back(c.record);
-  if (const double factor = diagnosis::widening(cell.parameters, cell.mechanisms, std::move(records)); factor > 1) {
-    cell.parameters.tolerance = diagnosis::widened(cell.parameters.tolerance, factor);
+  std::vector<diagnosis::PreparedRecording> records;
+  for (const RecordingComparison& c : r.recordings) records.push_back(c.record);
+  if (const double factor = diagnosis::tolerance_factor(cell.parameters, cell.mechanisms, std::move(records));
+      factor > 1) {
+    cell.parameters.tolerance = diagnosis::with_wider_tolerance(cell.parameters.tolerance, factor);
     for (double* v : {&cell.parameters.tolerance.ocv_v, &cell.parameters.tolerance.drift_v}) *v = to_digits(*v, 4);
     cell.sources["tolerance"] +=
         fmt::format("; of the OCV and the drift widened {:g} times, to what {} left over", factor, files);

@@ -7,15 +7,16 @@ namespace bms::workflow {
 
 /// A recording as the diagnosis takes it, trusted readings summed up; initial soc, its standard deviation, and whether
 /// it was told.
-diagnosis::Record record_of(const files::Recording& r, std::string name, const model::CellParameters<>& cell,
-                            double initial_soc, double sigma, bool told);
+diagnosis::PreparedRecording record_of(const files::Recording& r, std::string name, const model::CellParameters<>& cell,
+                                       double initial_soc, double sigma, bool soc_given);
 
 /// What both models say, open loop from where each recording begins: fills base_v and extended_v of recordings and
 /// hold-outs.
 void compare(DiagnoseResult& r);
 
 /// Of several recordings together; nothing without a voltage.
-std::optional<OpenLoopFigures> figures(const std::vector<Compared>& list, std::vector<double> Compared::*simulated);
+std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& list,
+                                       std::vector<double> RecordingComparison::*simulated);
 
 /// The state of charge, as a board would estimate it, on the hold-outs that have a reference.
 std::optional<SocErrors> soc_errors(const DiagnoseResult& r);

@@ -23,16 +23,16 @@ struct SocErrors {
 };
 
 /// One recording and what both models say of it, nothing fitted to it but the mechanisms found.
-struct Compared {
+struct RecordingComparison {
   files::Recording recording;
-  diagnosis::Record record;
+  diagnosis::PreparedRecording record;
   std::vector<double> base_v, extended_v;  ///< empty: no voltage to compare with
 };
 
 struct DiagnoseResult {
   files::CellFile cell, extended_cell;
   diagnosis::Diagnosis diagnosis;
-  std::vector<Compared> recordings, holdouts;
+  std::vector<RecordingComparison> recordings, holdouts;
   std::optional<OpenLoopFigures> baseline, extended, baseline_holdout, extended_holdout;
   std::optional<SocErrors> soc;                   ///< of the hold-outs that have a reference
   std::optional<diagnosis::NextExperiment> next;  ///< what would settle which of several causes it is

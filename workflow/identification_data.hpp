@@ -27,7 +27,7 @@ struct DataOptions {
 };
 
 struct IdentificationData {
-  identification::Record record;
+  identification::DataSet record;
   std::vector<double> temperature_c;  ///< of the record's rows; empty: not recorded
   double soc_min = 1, soc_max = 0;    ///< of the samples used
 };

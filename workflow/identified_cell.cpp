@@ -31,7 +31,7 @@ std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
   std::vector<files::Recording> recordings;
   for (const std::string& path : paths) recordings.push_back(files::read_recording(path));
   std::vector<SlowRuns> all;
-  for (const LikeTemperature& like : by_temperature(recordings)) {
+  for (const TemperatureGroup& like : group_by_temperature(recordings)) {
     SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
     for (const std::size_t k : like.recordings) {
       const files::Recording& r = recordings[k];
@@ -58,7 +58,7 @@ std::optional<double> mean_temperature_c(const files::Recording& recording) {
 
 }  // namespace
 
-std::vector<LikeTemperature> by_temperature(const std::vector<files::Recording>& recordings) {
+std::vector<TemperatureGroup> group_by_temperature(const std::vector<files::Recording>& recordings) {
   constexpr double alike_k = 5;
   std::vector<std::pair<double, std::size_t>> means;
   std::vector<std::size_t> all;
@@ -68,41 +68,41 @@ std::vector<LikeTemperature> by_temperature(const std::vector<files::Recording>&
   }
   if (means.size() < recordings.size()) return {{25, all}};
   std::sort(means.begin(), means.end());
-  std::vector<LikeTemperature> groups;
+  std::vector<TemperatureGroup> groups;
   double begin_c = 0;
   for (const auto& [temperature_c, k] : means) {
     if (groups.empty() || temperature_c - begin_c > alike_k) {
       groups.push_back({0, {}});
       begin_c = temperature_c;
     }
-    LikeTemperature& group = groups.back();
+    TemperatureGroup& group = groups.back();
     const auto n = static_cast<double>(group.recordings.size());
     group.temperature_c = (group.temperature_c * n + temperature_c) / (n + 1);
     group.recordings.push_back(k);
   }
-  for (LikeTemperature& group : groups) {
+  for (TemperatureGroup& group : groups) {
     group.temperature_c = std::round(10 * group.temperature_c) / 10;
     std::sort(group.recordings.begin(), group.recordings.end());
   }
   return groups;
 }
 
-OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, bool both_branches,
-                  files::CellFile& cell) {
-  OcvTaken taken;
+OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
+                       files::CellFile& cell) {
+  OcvResult taken;
   const auto groups = slow_runs(paths);
   const std::string& files = groups.front().files;
   std::vector<id::OcvCurve> curves;
   try {
     for (const SlowRuns& group : groups) {
       curves.push_back(id::ocv_curve(group.runs));
-      if (const auto gap_v = id::middle_half_gap_v(curves.back())) taken.gaps.push_back({group.temperature_c, *gap_v});
+      if (const auto gap_v = id::plateau_half_gap_v(curves.back())) taken.gaps.push_back({group.temperature_c, *gap_v});
     }
   } catch (const std::invalid_argument& error) {
     throw files::BadInput(paths.front(), 1, error.what());
   }
   const id::OcvCurve& curve = curves.front();
-  double error_v = error_asked_v;
+  double error_v = max_error_v;
   auto pieces = id::fewest_pieces(curve, error_v);
   while (!pieces || pieces->soc.size() > model::max_ocv_edges) {
     error_v *= 1.5;
@@ -112,10 +112,10 @@ OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, b
                             "whole charge or discharge");
     pieces = id::fewest_pieces(curve, error_v);
   }
-  if (error_v > error_asked_v) {
+  if (error_v > max_error_v) {
     taken.warnings.push_back(
         {"ocv_error", fmt::format("the straight pieces of the OCV are up to {:.1f} mV off, {:.1f} were asked for",
-                                  1e3 * pieces->largest_error_v, 1e3 * error_asked_v)});
+                                  1e3 * pieces->largest_error_v, 1e3 * max_error_v)});
   }
   // a node of R0, R1, C1 may fall between two corners
   constexpr std::size_t most_corners = model::max_ocv_edges;
@@ -139,8 +139,8 @@ OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, b
   return taken;
 }
 
-void take_noise(const std::vector<files::Recording>& recordings, const id::Fit& judge,
-                const std::vector<id::Parameter>& parameters, model::CellParameters<>& p) {
+void identify_noise(const std::vector<files::Recording>& recordings, const id::FitStatistics& judge,
+                    const std::vector<id::Parameter>& parameters, model::CellParameters<>& p) {
   std::vector<double> voltage_steps, current_steps;
   double step_s = 1;
   for (const files::Recording& r : recordings) {
@@ -194,7 +194,7 @@ namespace {
 
 /// The mechanism as the catalogue leaves it when nothing is said.
 model::MechanismSetting silent(std::string_view id, double capacity_ah) {
-  return model::unsaid(model::mechanism_index(id), capacity_ah);
+  return model::default_setting(model::mechanism_index(id), capacity_ah);
 }
 
 /// ln R over 1 / T: the least squares' activation energy of a column of the tables by temperature, held within 0 ..
@@ -257,9 +257,9 @@ std::optional<model::MechanismSetting> temperature_dependence(const std::vector<
 
 }  // namespace
 
-void take_hysteresis(const OcvTaken& ocv, files::CellFile& cell) {
+void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell) {
   const model::CellParameters<>& p = cell.parameters;
-  const double between_v = model::middle_half_gap_v(p.ocv);
+  const double between_v = model::plateau_half_gap_v(p.ocv);
   if (!(between_v > 0)) return;
   const auto gap = id::slow_gap(ocv.gaps);
   // C/30 to C/35: what it drops over the circuit, or what grows in the cold
@@ -275,8 +275,8 @@ void take_hysteresis(const OcvTaken& ocv, files::CellFile& cell) {
           : fmt::format("gap of slow charge and discharge, less {:.1f} mV over R0 and R1", 1e3 * over_v);
 }
 
-id::Record without_mechanisms(const files::CellFile& cell, const IdentificationData& of) {
-  id::Record record = of.record;
+id::DataSet without_mechanisms(const files::CellFile& cell, const IdentificationData& of) {
+  id::DataSet record = of.record;
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
   const auto simulated = [&](std::span<const model::MechanismSetting> mechanisms) {
     return host_sim::simulate(tables, cell.parameters.capacity_ah, mechanisms, record.data.time_s,
@@ -288,7 +288,7 @@ id::Record without_mechanisms(const files::CellFile& cell, const IdentificationD
   return record;
 }
 
-void extend(const OcvTaken& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell) {
+void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell) {
   model::CellParameters<>& p = cell.parameters;
   const double capacity_ah = p.capacity_ah;
   std::string source;

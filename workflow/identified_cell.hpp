@@ -7,30 +7,30 @@
 
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
+#include "identification/hysteresis_gap.hpp"
 #include "identification/identify.hpp"
-#include "identification/slow_gap.hpp"
 #include "workflow/identification_data.hpp"
 
 namespace bms::workflow {
 
-struct OcvTaken {
-  std::optional<double> coulombic_efficiency;  ///< discharged over charged; only of a run of each kind
-  std::vector<identification::GapAt> gaps;     ///< of each temperature with a run of each kind
+struct OcvResult {
+  std::optional<double> coulombic_efficiency;          ///< discharged over charged; only of a run of each kind
+  std::vector<identification::GapAtTemperature> gaps;  ///< of each temperature with a run of each kind
   std::vector<files::Warning> warnings;
 };
 
 /// OCV, gap and capacity of slow charge and discharge recordings, with as few straight pieces as stay within
-/// error_asked_v; with more error, and a warning, where that cannot be. Of runs at several temperatures those nearest
+/// max_error_v; with more error, and a warning, where that cannot be. Of runs at several temperatures those nearest
 /// to 25 degrees C make the curve. both_branches: with corners where the gap bends, too. Throws BadInput when they are
 /// no slow runs.
-OcvTaken take_ocv(const std::vector<std::string>& paths, double error_asked_v, bool both_branches,
-                  files::CellFile& cell);
+OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
+                       files::CellFile& cell);
 
 /// The hysteresis between the measured curves of charge and discharge, as a mechanism; none where there was one run.
-void take_hysteresis(const OcvTaken& ocv, files::CellFile& cell);
+void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell);
 
 /// Takes what the cell's mechanisms do to the voltage off a record, so that a circuit can be identified from the rest.
-identification::Record without_mechanisms(const files::CellFile& cell, const IdentificationData& of);
+identification::DataSet without_mechanisms(const files::CellFile& cell, const IdentificationData& of);
 
 /// What an estimator needs besides: resistances that follow the temperature, errors that last as states of the filter,
 /// and noise as it then is. data: what was identified from, as measured.
@@ -39,20 +39,20 @@ inline constexpr const char* extended_noise =
     "good to a hundredth of the 1C current, over a day's work; "
     "at rest: an open circuit, to a fifth of that; gain: half a percent of the reading and half a percent of the "
     "capacity";
-void extend(const OcvTaken& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell);
+void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell);
 
 /// Noise and tolerance: of the measuring chain by the recordings' rests, of the model by what it leaves over on
 /// `judge`, and by what lies on the side of the OCV's gap that it does not lean to.
-void take_noise(const std::vector<files::Recording>& recordings, const identification::Fit& judge,
-                const std::vector<identification::Parameter>& parameters, model::CellParameters<>& p);
+void identify_noise(const std::vector<files::Recording>& recordings, const identification::FitStatistics& judge,
+                    const std::vector<identification::Parameter>& parameters, model::CellParameters<>& p);
 
 /// Recordings within a few kelvins of each other, by their place in a list.
-struct LikeTemperature {
+struct TemperatureGroup {
   double temperature_c = 25;  ///< mean, to a tenth
   std::vector<std::size_t> recordings;
 };
 /// Ascending; one of 25 degrees C for all where one of them has no temperature.
-std::vector<LikeTemperature> by_temperature(const std::vector<files::Recording>& recordings);
+std::vector<TemperatureGroup> group_by_temperature(const std::vector<files::Recording>& recordings);
 
 /// Seven digits of every number: more are noise.
 void round_digits(files::CellFile& cell);

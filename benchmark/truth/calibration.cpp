@@ -75,7 +75,7 @@ CalibratedCell calibrate(const HealthyCell& cell, double share, plant::Random& r
       place_edges(0, 10, 20, between(random, 0.0015, 0.003),  // halved by the fit
 
                   [&](double l, double r, double at) { return on_line(l, r, at, ocv.at(l), ocv.at(r)) - ocv.at(at); });
-  const SmoothChance ocv_error(random), r0_error(random), r1_error(random), c1_error(random);
+  const SmoothRandom ocv_error(random), r0_error(random), r1_error(random), c1_error(random);
   std::vector<double> edge_v = fit_lines(
       made.ocv_soc, [&](double soc) { return ocv.at(soc); }, [](double) { return 1.0; });
   for (std::size_t k = 0; k < edge_v.size(); ++k)

@@ -6,8 +6,8 @@
 #pragma once
 
 #include "benchmark/truth/cases.hpp"
-#include "benchmark/truth/chance.hpp"
 #include "benchmark/truth/concealed_cell.hpp"
+#include "benchmark/truth/random_functions.hpp"
 
 namespace bms::benchmark::truth {
 

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "benchmark/truth/calibration.hpp"
+#include "benchmark/truth/detection_scale.hpp"
 #include "benchmark/truth/effects.hpp"
 #include "benchmark/truth/healthy_cells.hpp"
-#include "benchmark/truth/yardstick.hpp"
 
 namespace bms::benchmark::truth {
 
@@ -79,20 +79,20 @@ double white_v(const Laboratory& lab, const HealthyCell& cell) {
 }
 
 /// What instruments without chance would read, and the truth behind it.
-struct Seen {
+struct MeasuredSeries {
   std::vector<double> current_a, voltage_v, temperature_c;
   CellTrace trace;
 };
 
 /// source_v: what the voltage channel is connected to where that is not the cell; empty: always the cell.
-Seen observe(const HealthyCell& cell, const World& world, const std::vector<double>& source_v = {}) {
-  const double step_s = world.drive.step_s;
-  Seen seen;
-  seen.trace = run_cell(cell, world.cell, world.drive, world.start_soc);
+MeasuredSeries observe(const HealthyCell& cell, const World& world, const std::vector<double>& source_v = {}) {
+  const double step_s = world.stimulus.step_s;
+  MeasuredSeries seen;
+  seen.trace = run_cell(cell, world.cell, world.stimulus, world.start_soc);
   for (std::size_t k = 0; k < source_v.size(); ++k) {
     if (std::isfinite(source_v[k])) seen.trace.voltage_v[k] = source_v[k];
   }
-  seen.current_a = faulty_current_a(world.faults.current, step_s, world.drive.current_a);
+  seen.current_a = faulty_current_a(world.faults.current, step_s, world.stimulus.current_a);
   seen.voltage_v = faulty_voltage_v(world.faults.voltage, step_s, seen.trace.voltage_v);
   seen.temperature_c = faulty_temperature_c(world.faults.temperature, step_s, seen.trace.temperature_c);
   return seen;
@@ -103,36 +103,36 @@ std::vector<double> stuck(const World& world, std::vector<double> voltage_v) {
   return voltage_v;
 }
 
-struct Sized {
+struct ScaledEffect {
   Effect effect;
   double amplitude = 0;
   double strength = 0;
 };
 
-World with_effects(World world, const std::vector<Sized>& effects) {
-  for (const Sized& sized : effects) sized.effect.apply(sized.amplitude, world);
+World with_effects(World world, const std::vector<ScaledEffect>& effects) {
+  for (const ScaledEffect& sized : effects) sized.effect.apply(sized.amplitude, world);
   return world;
 }
 
 /// The world that somebody who does not know of `unknown` takes this to be: without it, but with what was measured. A
 /// fault of the current sensor is thus a cell through which the measured current flows.
-World believed(const World& healthy, const std::vector<Sized>& known, const std::vector<Sized>& unknown,
-               const World& full, const Seen& seen) {
+World believed(const World& healthy, const std::vector<ScaledEffect>& known, const std::vector<ScaledEffect>& unknown,
+               const World& full, const MeasuredSeries& seen) {
   World world = healthy;
-  for (const Sized& sized : unknown) {
-    if (sized.effect.acts_on == ActsOn::current) world.drive.current_a = seen.current_a;
-    if (sized.effect.acts_on == ActsOn::temperature) world.drive.told_temperature_c = seen.temperature_c;
+  for (const ScaledEffect& sized : unknown) {
+    if (sized.effect.acts_on == ActsOn::current) world.stimulus.current_a = seen.current_a;
+    if (sized.effect.acts_on == ActsOn::temperature) world.stimulus.resistance_temperature_c = seen.temperature_c;
     if (sized.effect.acts_on == ActsOn::start) world.start_soc = full.start_soc + full.believed_soc_excess;
   }
   return with_effects(std::move(world), known);
 }
 
-std::vector<double> difference_v(const HealthyCell& cell, const World& healthy, const std::vector<Sized>& known,
-                                 const std::vector<Sized>& unknown) {
-  std::vector<Sized> all = known;
+std::vector<double> difference_v(const HealthyCell& cell, const World& healthy, const std::vector<ScaledEffect>& known,
+                                 const std::vector<ScaledEffect>& unknown) {
+  std::vector<ScaledEffect> all = known;
   all.insert(all.end(), unknown.begin(), unknown.end());
   const World full = with_effects(healthy, all);
-  const Seen with = observe(cell, full);
+  const MeasuredSeries with = observe(cell, full);
   const World other = believed(healthy, known, unknown, full, with);
   const std::vector<double> without_v = stuck(other, observe(cell, other).voltage_v);
   std::vector<double> d = stuck(full, with.voltage_v);
@@ -141,13 +141,13 @@ std::vector<double> difference_v(const HealthyCell& cell, const World& healthy, 
 }
 
 /// Scales the effect until it is as visible as wanted or leaves its physical range.
-Sized scale(const HealthyCell& cell, const World& healthy, const std::vector<Sized>& known, Effect effect,
-            const Yardstick& yardstick, double wanted) {
-  Sized sized = {std::move(effect), 0, 0};
+ScaledEffect scale(const HealthyCell& cell, const World& healthy, const std::vector<ScaledEffect>& known, Effect effect,
+                   const DetectionScale& detection_scale, double wanted) {
+  ScaledEffect sized = {std::move(effect), 0, 0};
   const double least = sized.effect.least, most = sized.effect.most;
   const auto strength_at = [&](double amplitude) {
     sized.amplitude = amplitude;
-    return sized.strength = yardstick.strength(difference_v(cell, healthy, known, {sized}));
+    return sized.strength = detection_scale.strength(difference_v(cell, healthy, known, {sized}));
   };
   double low = std::log(least), high = std::log(most), place = low + 0.4 * (high - low), slope = 1;
   double before_place = 0, before = 0;
@@ -182,7 +182,7 @@ Range excess(const std::vector<double>& soc) {
 
 struct Setting {
   Profile profile = Profile::hppc;
-  double step_s = 1, duration_s = 0, vigour = 1;
+  double step_s = 1, duration_s = 0, current_scale = 1;
   double start_soc = 0.9;
   Ambient ambient = Ambient::constant;
   double ambient_start_c = 25, swing_k = 0;
@@ -195,28 +195,28 @@ World make_world(const HealthyCell& cell, const Setting& setting, const Range& r
   World world;
   world.holdout = holdout;
   world.start_soc = std::clamp(setting.start_soc, range.lowest + 0.02, range.highest);
-  world.drive.step_s = setting.step_s;
-  world.drive.current_a = draw_current_a({.profile = setting.profile,
-                                          .step_s = setting.step_s,
-                                          .capacity_ah = cell.capacity_ah,
-                                          .start_soc = world.start_soc,
-                                          .lowest_soc = range.lowest,
-                                          .highest_soc = range.highest,
-                                          .duration_s = setting.duration_s,
-                                          .vigour = setting.vigour,
-                                          .fastest_charge = std::min(2.0, 0.27 / one_c_v),
-                                          .fastest_discharge = std::min(5.5, 0.75 / one_c_v)},
-                                         random);
+  world.stimulus.step_s = setting.step_s;
+  world.stimulus.current_a = draw_current_a({.profile = setting.profile,
+                                             .step_s = setting.step_s,
+                                             .capacity_ah = cell.capacity_ah,
+                                             .start_soc = world.start_soc,
+                                             .lowest_soc = range.lowest,
+                                             .highest_soc = range.highest,
+                                             .duration_s = setting.duration_s,
+                                             .current_scale = setting.current_scale,
+                                             .fastest_charge = std::min(2.0, 0.27 / one_c_v),
+                                             .fastest_discharge = std::min(5.5, 0.75 / one_c_v)},
+                                            random);
   plant::Random weather(mixed(setting.seed, 1));
-  world.drive.ambient_c =
-      draw_ambient_c(setting.ambient, setting.ambient_start_c, setting.swing_k, world.drive.current_a.size(), weather);
+  world.stimulus.ambient_c = draw_ambient_c(setting.ambient, setting.ambient_start_c, setting.swing_k,
+                                            world.stimulus.current_a.size(), weather);
   return world;
 }
 
 Setting draw_setting(const Experiment& experiment, double usual_step_s, bool holdout, plant::Random& random) {
   Setting s;
   s.profile = one_of(random, experiment.profiles);
-  s.vigour = experiment.vigour;
+  s.current_scale = experiment.current_scale;
   s.step_s = experiment.step_s > 0 ? std::min(experiment.step_s, usual_step_s) : usual_step_s;
   const bool has_an_end = s.profile == Profile::full_cycle || s.profile == Profile::storage;
   if (!holdout && has_an_end && experiment.step_s == 0) s.step_s = std::max(s.step_s, 1.0);
@@ -238,8 +238,8 @@ Setting draw_setting(const Experiment& experiment, double usual_step_s, bool hol
   return s;
 }
 
-Series measure(const World& world, const Seen& seen, const Laboratory& lab, std::uint64_t seed) {
-  const double step_s = world.drive.step_s;
+Series measure(const World& world, const MeasuredSeries& seen, const Laboratory& lab, std::uint64_t seed) {
+  const double step_s = world.stimulus.step_s;
   const plant::Instruments instruments(lab.instruments, seed);
   Series series;
   series.current_a = read_by(instruments.current_a, step_s, seen.current_a);
@@ -252,24 +252,26 @@ Series measure(const World& world, const Seen& seen, const Laboratory& lab, std:
 }
 
 /// Run later: what chance does is new, what is wrong has stayed.
-Series driven(const HealthyCell& cell, const std::vector<Sized>& effects, Laboratory lab, std::uint64_t seed,
-              const Errand& errand) {
+Series run_test_plan(const HealthyCell& cell, const std::vector<ScaledEffect>& effects, Laboratory lab,
+                     std::uint64_t seed, const TestPlan& test_plan) {
   plant::Random random(seed);
   World world;
   world.holdout = true;
-  world.start_soc = errand.start_soc;
-  world.drive = {
-      .step_s = errand.step_s, .current_a = errand.current_a, .ambient_c = errand.ambient_c, .told_temperature_c = {}};
+  world.start_soc = test_plan.start_soc;
+  world.stimulus = {.step_s = test_plan.step_s,
+                    .current_a = test_plan.current_a,
+                    .ambient_c = test_plan.ambient_c,
+                    .resistance_temperature_c = {}};
   const double laboratory_c = between(random, 21, 29);
-  for (double& c : world.drive.ambient_c) c = std::isfinite(c) ? c : laboratory_c;
+  for (double& c : world.stimulus.ambient_c) c = std::isfinite(c) ? c : laboratory_c;
   world = with_effects(std::move(world), effects);
-  lab.measures_temperature = lab.measures_temperature || errand.measures_temperature;
-  const Seen seen = observe(cell, world, errand.source_v);
+  lab.measures_temperature = lab.measures_temperature || test_plan.measures_temperature;
+  const MeasuredSeries seen = observe(cell, world, test_plan.source_v);
   Series series = measure(world, seen, lab, random.bits());
   series.terminal_v = seen.trace.voltage_v;
   if (world.cell.contact_scale != 0) {
     for (std::size_t k = 0; k < series.terminal_v.size(); ++k)
-      series.terminal_v[k] -= world.cell.contact_scale * world.cell.contact_ohm[k] * errand.current_a[k];
+      series.terminal_v[k] -= world.cell.contact_scale * world.cell.contact_ohm[k] * test_plan.current_a[k];
   }
   return series;
 }
@@ -325,7 +327,7 @@ std::vector<std::string> draw_pair(plant::Random& random) {
 Experiment joined(const std::vector<Experiment>& experiments) {
   Experiment all = experiments.front();
   for (const Experiment& e : experiments) {
-    all.vigour = std::max(all.vigour, e.vigour);
+    all.current_scale = std::max(all.current_scale, e.current_scale);
     if (all.swing_k == 0) all.swing_k = e.swing_k;
     all.away_from_25 = all.away_from_25 || e.away_from_25;
     if (e.step_s > 0) all.step_s = e.step_s;
@@ -428,7 +430,7 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, plant::Ra
   if (chance(random, 1.0 / 3)) experiment.profiles = {all_profiles.begin(), all_profiles.end()};
   if (demanding) {
     if (chance(random, 0.6)) {
-      experiment.vigour = between(random, 1.3, 1.8);
+      experiment.current_scale = between(random, 1.3, 1.8);
       experiment.profiles = {Profile::multi_rate, Profile::drive_two_way, Profile::forklift_shift};
     }
     if (chance(random, 0.6)) experiment.swing_k = sign(random) * between(random, 8, 18);
@@ -458,29 +460,29 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, plant::Ra
   Case& made = result.made;
   Answer& answer = made.answer;
   World healthy, full;
-  Seen seen;
-  std::vector<Sized> sized;
+  MeasuredSeries seen;
+  std::vector<ScaledEffect> sized;
   std::vector<std::vector<double>> shares_v;
   for (int narrowed = 0; narrowed < 5; ++narrowed) {
     healthy = make_world(cell, setting, range, false);
-    const CellTrace trace = run_cell(cell, {}, healthy.drive, healthy.start_soc);
+    const CellTrace trace = run_cell(cell, {}, healthy.stimulus, healthy.start_soc);
     sized.clear();
     if (!ids.empty()) {
-      const Yardstick yardstick(cell, healthy.drive, trace, white_v(lab, cell));
+      const DetectionScale detection_scale(cell, healthy.stimulus, trace, white_v(lab, cell));
       for (std::size_t n = 0; n < ids.size(); ++n) {
         plant::Random shape(mixed(shape_seed, n));
         const Effect effect = draw_effect(ids[n], cell, healthy, shape);
         // the thermometer is judged in a cell whose resistances follow the temperature
-        sized.push_back(scale(cell, healthy, ids[n] == "temperature_sensor" ? sized : std::vector<Sized>{}, effect,
-                              yardstick, wanted[n]));
+        sized.push_back(scale(cell, healthy, ids[n] == "temperature_sensor" ? sized : std::vector<ScaledEffect>{},
+                              effect, detection_scale, wanted[n]));
       }
       if (sized.size() == 2) {
         shares_v.clear();
         for (std::size_t n = 0; n < 2; ++n) {
           shares_v.push_back(difference_v(cell, healthy, {sized[1 - n]}, {sized[n]}));
-          sized[n].strength = yardstick.strength(shares_v[n]);
+          sized[n].strength = detection_scale.strength(shares_v[n]);
         }
-        result.good = std::abs(yardstick.likeness(shares_v[0], shares_v[1])) < 0.85;
+        result.good = std::abs(detection_scale.cosine_similarity(shares_v[0], shares_v[1])) < 0.85;
       }
     }
     full = with_effects(healthy, sized);
@@ -492,13 +494,13 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, plant::Ra
     if (range.highest - range.lowest < 0.3) break;
     if (narrowed == 4) result.good = false;
   }
-  for (const Sized& s : sized) {
+  for (const ScaledEffect& s : sized) {
     answer.ids.push_back(s.effect.id);
     answer.strengths.push_back(s.strength);
     answer.amplitudes.push_back(s.amplitude);
   }
   answer.strength = answer.strengths.empty() ? 0 : *std::min_element(answer.strengths.begin(), answer.strengths.end());
-  for (const Sized& s : sized) {
+  for (const ScaledEffect& s : sized) {
     const bool smallest = s.amplitude <= s.effect.least * 1.001;  // nobody would name less: then it may be plain to see
     if (slot.kind == Kind::pair ? s.strength < 2 || s.strength > 12
                                 : s.strength < 0.45 || (s.strength > 9 && !smallest))
@@ -507,11 +509,11 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, plant::Ra
   if (!sized.empty()) {
     const std::vector<double> d = difference_v(cell, healthy, {}, sized);
     answer.effect_rms_v = rms(d);
-    locate(d, healthy.drive.step_s, seen.trace.soc, answer);
+    locate(d, healthy.stimulus.step_s, seen.trace.soc, answer);
   }
 
   World later_world;
-  Seen later_seen;
+  MeasuredSeries later_seen;
   for (int narrowed = 0; narrowed < 6; ++narrowed) {
     later_world = with_effects(make_world(cell, later_setting, later_range, true), sized);
     later_seen = observe(cell, later_world);
@@ -524,8 +526,8 @@ Attempt attempt(const Slot& slot, const std::vector<std::string>& ids, plant::Ra
 
   made.recording = measure(full, seen, lab, instrument_seed);
   made.holdout = measure(later_world, later_seen, lab, mixed(instrument_seed, 1));
-  made.drive = [cell, sized, lab, seed = mixed(instrument_seed, 2)](const Errand& errand) {
-    return driven(cell, sized, lab, seed, errand);
+  made.run_test = [cell, sized, lab, seed = mixed(instrument_seed, 2)](const TestPlan& test_plan) {
+    return run_test_plan(cell, sized, lab, seed, test_plan);
   };
   made.cell = calibrate(cell, lab.calibration_share, random);
   const double told = std::clamp(0.0025 * random.normal(), -0.005, 0.005);
@@ -565,7 +567,7 @@ Case make_case(Split split, std::uint64_t seed, std::size_t index) {
   Case made = std::move(best.made);
   made.answer.kind = case_kinds[static_cast<std::size_t>(slot.kind)];
   if (slot.kind == Kind::data_fault) {
-    made.drive = nullptr;
+    made.run_test = nullptr;
     made.answer.ids = {data_faults[(slot.number + turn) % data_faults.size()]};
     spoil(made.answer.ids.front(), made.recording, made.holdout, made.answer, random);
   }

@@ -48,7 +48,7 @@ struct Answer {
 };
 
 /// What somebody drives a cell through on purpose. Columns of equal length.
-struct Errand {
+struct TestPlan {
   double step_s = 1, start_soc = 0.95;
   std::vector<double> current_a;      ///< true; [0] is 0
   std::vector<double> ambient_c;      ///< NaN: as warm as the laboratory happens to be
@@ -62,8 +62,8 @@ struct Case {
   double believed_initial_soc = 0, holdout_initial_soc = 0;  ///< the latter is true to 0.5 %
   Series recording, holdout;
   Answer answer;
-  std::function<Series(const Errand&)>
-      drive;  ///< the same cell and instruments with the same effects, later; empty for data faults
+  std::function<Series(const TestPlan&)>
+      run_test;  ///< the same cell and instruments with the same effects, later; empty for data faults
 };
 
 enum class Split { development, final };

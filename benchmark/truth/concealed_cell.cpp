@@ -125,7 +125,8 @@ double temperature_factor(const TemperatureLaw& law, double temperature_c) {
   return std::exp(law.steepness_k * (g(temperature_c + zero_celsius_k) - g(reference_k)));
 }
 
-CellTrace run_parallel(const HealthyCell& cell, const CellEffects& effects, const Drive& drive, double start_soc) {
+CellTrace run_parallel(const HealthyCell& cell, const CellEffects& effects, const Stimulus& stimulus,
+                       double start_soc) {
   struct Half {
     double capacity_as, resistance_factor, soc, v1_v = 0;
   };
@@ -135,12 +136,12 @@ CellTrace run_parallel(const HealthyCell& cell, const CellEffects& effects, cons
   const double a = std::pow(1 + d, exponent), b = std::pow(1 - d, exponent), both = a * b / (a + b);
   std::array<Half, 2> halves = {
       {{whole_as * (1 + d) / 2, a / both, start_soc}, {whole_as * (1 - d) / 2, b / both, start_soc}}};
-  const int substeps = std::max(1, static_cast<int>(std::ceil(drive.step_s / 0.25 - 1e-9)));
-  const double h = drive.step_s / substeps;
+  const int substeps = std::max(1, static_cast<int>(std::ceil(stimulus.step_s / 0.25 - 1e-9)));
+  const double h = stimulus.step_s / substeps;
   CellTrace trace;
-  double temperature_c = drive.ambient_c.front();
-  for (std::size_t k = 0; k < drive.current_a.size(); ++k) {
-    const double current_a = drive.current_a[k];
+  double temperature_c = stimulus.ambient_c.front();
+  for (std::size_t k = 0; k < stimulus.current_a.size(); ++k) {
+    const double current_a = stimulus.current_a[k];
     const auto share = [&] {
       std::array<double, 2> open_v{}, r0{};
       for (std::size_t n = 0; n < 2; ++n) {
@@ -162,8 +163,8 @@ CellTrace run_parallel(const HealthyCell& cell, const CellEffects& effects, cons
     }
     const double soc = (halves[0].soc * halves[0].capacity_as + halves[1].soc * halves[1].capacity_as) / whole_as;
     const double heat_w = current_a * current_a * (cell.r0_ohm.at(soc) + cell.r1_ohm.at(soc));
-    const double lost_w = cell.thermal.to_ambient_w_per_k * (temperature_c - drive.ambient_c[k]);
-    if (k > 0) temperature_c += drive.step_s / cell.thermal.heat_capacity_j_per_k * (heat_w - lost_w);
+    const double lost_w = cell.thermal.to_ambient_w_per_k * (temperature_c - stimulus.ambient_c[k]);
+    if (k > 0) temperature_c += stimulus.step_s / cell.thermal.heat_capacity_j_per_k * (heat_w - lost_w);
     trace.voltage_v.push_back(share()[2]);
     trace.soc.push_back(soc);
     trace.temperature_c.push_back(temperature_c);
@@ -174,11 +175,11 @@ CellTrace run_parallel(const HealthyCell& cell, const CellEffects& effects, cons
 
 }  // namespace
 
-CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Drive& drive, double start_soc) {
-  if (effects.parallel.inequality != 0) return run_parallel(cell, effects, drive, start_soc);
+CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Stimulus& stimulus, double start_soc) {
+  if (effects.parallel.inequality != 0) return run_parallel(cell, effects, stimulus, start_soc);
 
-  const int substeps = std::max(1, static_cast<int>(std::ceil(drive.step_s / 0.25 - 1e-9)));
-  const double h = drive.step_s / substeps;
+  const int substeps = std::max(1, static_cast<int>(std::ceil(stimulus.step_s / 0.25 - 1e-9)));
+  const double h = stimulus.step_s / substeps;
   const double capacity_as = 3'600 * cell.capacity_ah * effects.capacity_factor;
   const bool transfers = effects.charge_transfer.share_of_r0 > 0 || effects.charge_transfer.share_of_r1 > 0;
   const bool asymmetric = effects.asymmetry.excess != 0, lagging = effects.diffusion.resistance_ohm != 0;
@@ -196,18 +197,19 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
 
   double soc = start_soc, v1_v = 0, diffusion_v = 0, plated = 0, pressure = 0;
   bool remembers = effects.memory.bump_v != 0, was_below = false;
-  double core_c = drive.ambient_c.front(), can_c = core_c;
+  double core_c = stimulus.ambient_c.front(), can_c = core_c;
   double voltage_v = cell.ocv_v.at(start_soc);
 
   CellTrace trace;
   for (std::vector<double>* series : {&trace.voltage_v, &trace.soc, &trace.temperature_c, &trace.v1_v})
-    series->reserve(drive.current_a.size());
-  for (std::size_t k = 0; k < drive.current_a.size(); ++k) {
-    const double current_a = drive.current_a[k];
+    series->reserve(stimulus.current_a.size());
+  for (std::size_t k = 0; k < stimulus.current_a.size(); ++k) {
+    const double current_a = stimulus.current_a[k];
     double r0_factor = 1, r1_factor = 1, c1_factor = 1;
     if (warm) {
-      const double factor = temperature_factor(effects.temperature_law,
-                                               drive.told_temperature_c.empty() ? core_c : drive.told_temperature_c[k]);
+      const double factor =
+          temperature_factor(effects.temperature_law,
+                             stimulus.resistance_temperature_c.empty() ? core_c : stimulus.resistance_temperature_c[k]);
       r1_factor *= factor;
       r0_factor *= std::pow(factor, effects.temperature_law.share_of_r0);
     }
@@ -260,7 +262,7 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
         }
       }
 
-      const double dt = drive.step_s;
+      const double dt = stimulus.step_s;
       if (effects.plating.plateau_v != 0) {
         if (current_a > effects.plating.least_a)
           plated += (1 - plated) * dt / effects.plating.fill_s;
@@ -268,7 +270,7 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
           plated = std::max(0.0, plated - dt / effects.plating.hold_s);
       }
       if (effects.pressure.lift_v != 0)
-        pressure += (std::abs(current_a) / cell.capacity_ah - pressure) * dt / effects.pressure.forgets_s;
+        pressure += (std::abs(current_a) / cell.capacity_ah - pressure) * dt / effects.pressure.time_constant_s;
 
       const double heat_w = current_a * current_a * r0_at(soc) + v1_v * v1_v / (cell.r1_ohm.at(soc) * r1_factor);
       if (two_nodes) {
@@ -277,10 +279,10 @@ CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Dr
         const double outward_w = (core_c - can_c) / effects.core.to_can_k_per_w;
         core_c += dt / inner_j_per_k * (heat_w - outward_w);
         can_c += dt / outer_j_per_k *
-                 (outward_w - effects.core.cooling * cell.thermal.to_ambient_w_per_k * (can_c - drive.ambient_c[k]));
+                 (outward_w - effects.core.cooling * cell.thermal.to_ambient_w_per_k * (can_c - stimulus.ambient_c[k]));
       } else {
         core_c += dt / cell.thermal.heat_capacity_j_per_k *
-                  (heat_w - cell.thermal.to_ambient_w_per_k * (core_c - drive.ambient_c[k]));
+                  (heat_w - cell.thermal.to_ambient_w_per_k * (core_c - stimulus.ambient_c[k]));
         can_c = core_c;
       }
     }

@@ -140,7 +140,7 @@ struct Memory {
 /// Pressure follows the mean |I| of the last hour and lifts the OCV, more than proportionally.
 struct Pressure {
   double lift_v = 0;  ///< at a lasting C-rate of 0.5
-  double forgets_s = 3'600;
+  double time_constant_s = 3'600;
 };
 
 /// Two cells in parallel that share the capacity and the conductance unequally.
@@ -174,11 +174,11 @@ struct CellEffects {
 };
 
 /// current_a[k] flows from sample k - 1 to sample k. current_a[0] should be 0: there is nothing before.
-struct Drive {
+struct Stimulus {
   double step_s = 1;
   std::vector<double> current_a;
   std::vector<double> ambient_c;
-  std::vector<double> told_temperature_c;  ///< if not empty: the temperature that the resistances follow
+  std::vector<double> resistance_temperature_c;  ///< if not empty: the temperature that the resistances follow
 };
 
 struct CellTrace {
@@ -186,6 +186,6 @@ struct CellTrace {
   std::vector<double> v1_v;                           ///< over R1
 };
 
-CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Drive& drive, double start_soc);
+CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Stimulus& stimulus, double start_soc);
 
 }  // namespace bms::benchmark::truth

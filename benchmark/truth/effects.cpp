@@ -48,7 +48,8 @@ Experiment experiment_for(const std::string& id, plant::Random& random) {
   if (id == "ocv_hysteresis") return {.profiles = {minor_loops, full_cycle, hppc}};
   if (id == "slow_polarisation") return {.profiles = {hppc, minor_loops, full_cycle}};
   if (id == "fast_polarisation") return {.profiles = {hppc, multi_rate, drive_two_way}, .step_s = 0.5};
-  if (id == "charge_transfer") return {.profiles = {multi_rate, drive_two_way}, .vigour = between(random, 1.2, 1.8)};
+  if (id == "charge_transfer")
+    return {.profiles = {multi_rate, drive_two_way}, .current_scale = between(random, 1.2, 1.8)};
   if (id == "direction_asymmetry") return {.profiles = {drive_two_way, minor_loops, multi_rate, hppc}};
   if (id == "temperature_resistance" || id == "temperature_sensor") {
     const bool away = id == "temperature_resistance" && chance(random, 0.25);
@@ -56,7 +57,7 @@ Experiment experiment_for(const std::string& id, plant::Random& random) {
             .swing_k = away ? 0 : sign(random) * between(random, 10, 18),
             .away_from_25 = away};
   }
-  if (id == "self_heating") return {.profiles = {multi_rate, drive_two_way, many_cycles}, .vigour = 1.4};
+  if (id == "self_heating") return {.profiles = {multi_rate, drive_two_way, many_cycles}, .current_scale = 1.4};
   if (id == "entropic_ocv")
     return {.profiles = {minor_loops, full_cycle, hppc, storage},
             .swing_k = either(between(random, 15, 22), -between(random, 15, 22))};
@@ -69,14 +70,14 @@ Experiment experiment_for(const std::string& id, plant::Random& random) {
     return {.profiles = {drive_two_way, forklift_shift, drive_discharge, hppc}};
   if (id == "ocv_shape") return {.profiles = {full_cycle, hppc, storage}};
   if (id == "current_offset") return {.profiles = {full_cycle, storage, minor_loops, many_cycles}};
-  if (id == "current_clipping") return {.profiles = {drive_two_way, multi_rate, forklift_shift}, .vigour = 1.3};
+  if (id == "current_clipping") return {.profiles = {drive_two_way, multi_rate, forklift_shift}, .current_scale = 1.3};
   if (id == "voltage_offset" || id == "voltage_gain") return {.profiles = {hppc, minor_loops, full_cycle, storage}};
   if (id == "channel_skew") return {.profiles = {drive_two_way, multi_rate, forklift_shift, drive_discharge}};
   if (id == "initial_soc") return {.profiles = {full_cycle, hppc, drive_discharge, storage}};
   if (id == "plating_relaxation") return {.profiles = {full_cycle, minor_loops, storage, many_cycles}};
   if (id == "parallel_imbalance") return {.profiles = {full_cycle, minor_loops, hppc}};
   if (id == "memory_bump") return {.profiles = {hppc, full_cycle, storage}};
-  if (id == "pressure_memory") return {.profiles = {multi_rate, drive_two_way, many_cycles}, .vigour = 1.3};
+  if (id == "pressure_memory") return {.profiles = {multi_rate, drive_two_way, many_cycles}, .current_scale = 1.3};
   return {.profiles = {all_profiles.begin(), all_profiles.end()}};
 }
 
@@ -143,7 +144,7 @@ Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& 
             [d](double a, World& w) { (w.cell.diffusion = d).resistance_ohm = a; }};
   }
   if (id == "fast_polarisation") {
-    const double fastest_s = std::max(0.5, world.drive.step_s);
+    const double fastest_s = std::max(0.5, world.stimulus.step_s);
     const double slowest_s = std::max(0.3 * lag_s, 1.5 * fastest_s);
     const FastElement f = {
         .resistance_ohm = 0, .time_s = log_between(random, fastest_s, slowest_s), .spread = between(random, 2, 3)};
@@ -182,7 +183,7 @@ Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& 
   }
   if (id == "entropic_ocv") {
     const double crosses = between(random, 0.3, 0.7), swing = between(random, 0.15, 0.3);
-    const SmoothChance wave(random);
+    const SmoothRandom wave(random);
     const Curve curve([&](double z) { return way * (std::tanh((z - crosses) / swing) + 0.3 * wave.at(z)); });
     return {id, ActsOn::cell, 0.00002, 0.0006, [curve](double a, World& w) {
               w.cell.entropy_v_per_k = curve;
@@ -215,11 +216,11 @@ Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& 
     const double at = between(random, 0.2, 0.75), ramp_s = between(random, 1, 5);
     return {id, ActsOn::cell, 0.02 * r0_ohm, 1.5 * r0_ohm, [=](double a, World& w) {
               w.cell.contact_scale = a;
-              w.cell.contact_ohm.assign(w.drive.current_a.size(), 1.0);
+              w.cell.contact_ohm.assign(w.stimulus.current_a.size(), 1.0);
               if (w.holdout) return;  // it stays
               for (std::size_t k = 0; k < w.cell.contact_ohm.size(); ++k) {
                 const double since_s =
-                    (static_cast<double>(k) - at * static_cast<double>(w.cell.contact_ohm.size())) * w.drive.step_s;
+                    (static_cast<double>(k) - at * static_cast<double>(w.cell.contact_ohm.size())) * w.stimulus.step_s;
                 w.cell.contact_ohm[k] = std::clamp(since_s / ramp_s, 0.0, 1.0);
               }
             }};
@@ -228,7 +229,8 @@ Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& 
     const double between_s = log_between(random, 120, 1'200), dwell_s = log_between(random, 3, 30);
     return {id, ActsOn::cell, 0.02 * r0_ohm, 1.5 * r0_ohm, [=](double a, World& w) {
               w.cell.contact_scale = a;
-              w.cell.contact_ohm = bursts(later_seed(w), w.drive.current_a.size(), w.drive.step_s, between_s, dwell_s);
+              w.cell.contact_ohm =
+                  bursts(later_seed(w), w.stimulus.current_a.size(), w.stimulus.step_s, between_s, dwell_s);
             }};
   }
   if (id == "ocv_shape") {
@@ -241,14 +243,14 @@ Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& 
     return {id, ActsOn::current, 0.0005 * one_c_a, 0.02 * one_c_a, [=](double a, World& w) {
               w.faults.current.offset_scale = a;
               w.faults.current.offset_a =
-                  wander(later_seed(w), w.drive.current_a.size(), w.drive.step_s, correlation_s);
+                  ornstein_uhlenbeck(later_seed(w), w.stimulus.current_a.size(), w.stimulus.step_s, correlation_s);
               for (double& v : w.faults.current.offset_a) v = way * (1 + unsteady * v);
             }};
   }
   if (id == "current_gain")
     return {id, ActsOn::current, 0.005, 0.1, [=](double a, World& w) { w.faults.current.gain = way * a; }};
   if (id == "current_clipping") {
-    const double most_a = largest(world.drive.current_a), knee = between(random, 8, 16);
+    const double most_a = largest(world.stimulus.current_a), knee = between(random, 8, 16);
     return {id, ActsOn::current, 0.1, 0.6,
             [=](double a, World& w) { w.faults.current.saturates_a = (1 - a) * most_a, w.faults.current.knee = knee; }};
   }
@@ -256,7 +258,8 @@ Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& 
     const double unsteady = between(random, 0.02, 0.08);
     return {id, ActsOn::voltage, 0.001, 0.025, [=](double a, World& w) {
               w.faults.voltage.offset_scale = a;
-              w.faults.voltage.offset_v = wander(later_seed(w), w.drive.current_a.size(), w.drive.step_s, 5'400);
+              w.faults.voltage.offset_v =
+                  ornstein_uhlenbeck(later_seed(w), w.stimulus.current_a.size(), w.stimulus.step_s, 5'400);
               for (double& v : w.faults.voltage.offset_v) v = way * (1 + unsteady * v);
             }};
   }
@@ -308,18 +311,18 @@ Effect draw_effect(const std::string& id, const HealthyCell& cell, const World& 
                  second = between(random, 0, 0.4);
     return {id, ActsOn::voltage, 0.0005, 0.012, [=](double a, World& w) {
               w.faults.voltage.hum_v = a;
-              w.faults.voltage.hum.resize(w.drive.current_a.size());
+              w.faults.voltage.hum.resize(w.stimulus.current_a.size());
               for (std::size_t k = 0; k < w.faults.voltage.hum.size(); ++k) {
                 const double turn =
-                    2 * std::numbers::pi * frequency_hz * static_cast<double>(k) * w.drive.step_s + phase;
+                    2 * std::numbers::pi * frequency_hz * static_cast<double>(k) * w.stimulus.step_s + phase;
                 w.faults.voltage.hum[k] = std::sin(turn) + second * std::sin(2 * turn + 1);
               }
             }};
   }
   if (id == "pressure_memory") {
-    const double forgets_s = between(random, 2'400, 4'800);
+    const double time_constant_s = between(random, 2'400, 4'800);
     return {id, ActsOn::cell, 0.001, 0.03,
-            [=](double a, World& w) { w.cell.pressure = {.lift_v = way * a, .forgets_s = forgets_s}; }};
+            [=](double a, World& w) { w.cell.pressure = {.lift_v = way * a, .time_constant_s = time_constant_s}; }};
   }
   if (id == "sticky_converter")
     return {id, ActsOn::voltage, 0.003, 0.03, [](double a, World& w) { w.faults.voltage.sticks_v = a; }};

@@ -8,16 +8,16 @@
 #include <string>
 #include <vector>
 
-#include "benchmark/truth/chance.hpp"
 #include "benchmark/truth/concealed_cell.hpp"
 #include "benchmark/truth/measuring_chain.hpp"
 #include "benchmark/truth/profiles.hpp"
+#include "benchmark/truth/random_functions.hpp"
 
 namespace bms::benchmark::truth {
 
 /// A cell with its instruments under a drive: what an effect changes.
 struct World {
-  Drive drive;  ///< true currents
+  Stimulus stimulus;  ///< true currents
   double start_soc = 0.5;
   double believed_soc_excess = 0;  ///< what the user was told, less start_soc
   bool holdout = false;            ///< a later recording
@@ -37,7 +37,7 @@ struct Effect {
 /// What a wise experimenter would run to see it.
 struct Experiment {
   std::vector<Profile> profiles;
-  double vigour = 1;
+  double current_scale = 1;
   double swing_k = 0;         ///< of the surroundings
   bool away_from_25 = false;  ///< or else constantly warm or cold
   double step_s = 0;          ///< 0: as usual

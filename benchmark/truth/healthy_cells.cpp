@@ -51,7 +51,7 @@ Curve ocv_of_stages(plant::Random& random) {
 }
 
 Curve over_soc(plant::Random& random, const std::array<double, 10>& table, double scale, double unlike) {
-  const SmoothChance wave(random);
+  const SmoothRandom wave(random);
   const double lowest = std::exp(between(random, -0.05, 0.25));  // the table is flat below 10 %
   std::vector<plant::Point> points = {{0, scale * lowest * table[0]}};
   for (std::size_t k = 0; k < table.size(); ++k) {

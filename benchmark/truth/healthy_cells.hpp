@@ -1,8 +1,8 @@
 // Healthy cells by chance: LiFePO4 of 2 to 280 Ah, around Table 9 of the paper, no two alike.
 #pragma once
 
-#include "benchmark/truth/chance.hpp"
 #include "benchmark/truth/concealed_cell.hpp"
+#include "benchmark/truth/random_functions.hpp"
 
 namespace bms::benchmark::truth {
 

@@ -98,7 +98,7 @@ class Plan {
   double soc_;
 };
 
-void forklift_shift(Plan& plan, double vigour, plant::Random& random) {
+void forklift_shift(Plan& plan, double current_scale, plant::Random& random) {
   plan.rest(between(random, 2, 8) * minute_s);
   const double pace = between(random, 0.7, 1.4);
   while (!plan.done()) {
@@ -108,20 +108,20 @@ void forklift_shift(Plan& plan, double vigour, plant::Random& random) {
       plan.rest(between(random, 2, 10) * minute_s);
       continue;
     }
-    const double drive = -between(random, 0.15, 0.7) * vigour * pace;
+    const double drive = -between(random, 0.15, 0.7) * current_scale * pace;
     for (int n = 0, last = 3 + static_cast<int>(below(random, 8)); n < last; ++n)
       plan.hold(drive * between(random, 0.5, 1.5), between(random, 2, 6));
     plan.hold(between(random, 0.1, 0.7), between(random, 2, 6));  // brakes
     if (chance(random, 0.7)) {
-      plan.hold(-between(random, 1, 2.2) * vigour, between(random, 4, 12));  // lifts
-      plan.hold(between(random, 0, 0.5), between(random, 3, 8));             // lowers
+      plan.hold(-between(random, 1, 2.2) * current_scale, between(random, 4, 12));  // lifts
+      plan.hold(between(random, 0, 0.5), between(random, 3, 8));                    // lowers
     }
     plan.hold(-between(random, 0.005, 0.03),
               chance(random, 0.04) ? between(random, 8, 25) * minute_s : between(random, 5, 60) / pace);
   }
 }
 
-void drive_discharge(Plan& plan, double vigour, double duration_s, plant::Random& random) {
+void drive_discharge(Plan& plan, double current_scale, double duration_s, plant::Random& random) {
   plan.rest(between(random, 5, 20) * minute_s);
   const double mean_rate = (plan.soc() - plan.lowest()) / (0.85 * duration_s / 3'600);
   while (!plan.done()) {
@@ -130,14 +130,14 @@ void drive_discharge(Plan& plan, double vigour, double duration_s, plant::Random
       plan.rest(between(random, 5, 60));
     else if (chance(random, 0.006))
       plan.rest(between(random, 5, 20) * minute_s);
-    const double rate = -std::min(mean_rate * 1.25 * -std::log(1 - 0.98 * random.uniform()), 3.0) * vigour;
-    plan.hold(rate, between(random, 2, 30) / vigour);
+    const double rate = -std::min(mean_rate * 1.25 * -std::log(1 - 0.98 * random.uniform()), 3.0) * current_scale;
+    plan.hold(rate, between(random, 2, 30) / current_scale);
   }
 }
 
-void drive_two_way(Plan& plan, double vigour, plant::Random& random) {
+void drive_two_way(Plan& plan, double current_scale, plant::Random& random) {
   plan.rest(between(random, 5, 15) * minute_s);
-  const double spread = between(random, 0.5, 1.1) * vigour;
+  const double spread = between(random, 0.5, 1.1) * current_scale;
   double aim = between(random, plan.lowest(), plan.highest());
   while (!plan.done()) {
     if (std::abs(plan.soc() - aim) < 0.03) {
@@ -150,9 +150,10 @@ void drive_two_way(Plan& plan, double vigour, plant::Random& random) {
   }
 }
 
-void hppc(Plan& plan, double vigour, plant::Random& random) {
+void hppc(Plan& plan, double current_scale, plant::Random& random) {
   plan.rest(between(random, 5, 20) * minute_s);
-  const double pulse = between(random, 0.8, 1.5) * vigour, width_s = one_of(random, std::array{10.0, 18.0, 30.0, 60.0});
+  const double pulse = between(random, 0.8, 1.5) * current_scale,
+               width_s = one_of(random, std::array{10.0, 18.0, 30.0, 60.0});
   const double stride = one_of(random, std::array{0.05, 0.08, 0.1}), rate = one_of(random, std::array{0.33, 0.5, 1.0});
   const double rest_s = one_of(random, std::array{8.0, 12.0, 20.0, 30.0}) * minute_s;
   double direction = plan.soc() > 0.5 ? -1 : 1;
@@ -195,8 +196,8 @@ void minor_loops(Plan& plan, plant::Random& random) {
   }
 }
 
-void multi_rate(Plan& plan, double vigour, plant::Random& random) {
-  const std::array rates = {0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 2.0 * vigour, 3.0 * vigour};
+void multi_rate(Plan& plan, double current_scale, plant::Random& random) {
+  const std::array rates = {0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 2.0 * current_scale, 3.0 * current_scale};
   plan.rest(between(random, 5, 15) * minute_s);
   double direction = plan.soc() > 0.5 ? -1 : 1;
   while (!plan.done()) {
@@ -244,16 +245,16 @@ std::vector<double> draw_current_a(const ProfileRequest& request, plant::Random&
   Plan plan(request);
   switch (request.profile) {
     case Profile::forklift_shift:
-      forklift_shift(plan, request.vigour, random);
+      forklift_shift(plan, request.current_scale, random);
       break;
     case Profile::drive_discharge:
-      drive_discharge(plan, request.vigour, request.duration_s, random);
+      drive_discharge(plan, request.current_scale, request.duration_s, random);
       break;
     case Profile::drive_two_way:
-      drive_two_way(plan, request.vigour, random);
+      drive_two_way(plan, request.current_scale, random);
       break;
     case Profile::hppc:
-      hppc(plan, request.vigour, random);
+      hppc(plan, request.current_scale, random);
       break;
     case Profile::full_cycle:
       full_cycle(plan, random);
@@ -262,7 +263,7 @@ std::vector<double> draw_current_a(const ProfileRequest& request, plant::Random&
       minor_loops(plan, random);
       break;
     case Profile::multi_rate:
-      multi_rate(plan, request.vigour, random);
+      multi_rate(plan, request.current_scale, random);
       break;
     case Profile::many_cycles:
       many_cycles(plan, random);
@@ -281,7 +282,7 @@ std::vector<double> draw_ambient_c(Ambient ambient, double start_c, double swing
   const double leaves = between(random, 0.1, 0.3), returns = leaves + between(random, 0.25, 0.45),
                ramp = between(random, 0.01, 0.08);
   const double turns = between(random, 1, 2.2);
-  const SmoothChance small(random);
+  const SmoothRandom small(random);
   for (std::size_t k = 0; k < count; ++k) {
     const double x = static_cast<double>(k) / static_cast<double>(count);
     const double way = ambient == Ambient::wave

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "benchmark/truth/chance.hpp"
+#include "benchmark/truth/random_functions.hpp"
 
 namespace bms::benchmark::truth {
 
@@ -34,7 +34,7 @@ struct ProfileRequest {
   double capacity_ah = 6;  ///< for keeping within the range
   double start_soc = 0.9, lowest_soc = 0.04, highest_soc = 0.96;
   double duration_s = 14'400;
-  double vigour = 1;                                   ///< times the discharge rates of drives and pulses
+  double current_scale = 1;                            ///< times the discharge rates of drives and pulses
   double fastest_charge = 2, fastest_discharge = 5.5;  ///< C-rates
 };
 

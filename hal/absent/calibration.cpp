@@ -3,6 +3,6 @@
 
 namespace bms::hal {
 
-void calibrate(const Calibration&) {}
+void calibrate(const SensorCalibration&) {}
 
 }  // namespace bms::hal

@@ -6,6 +6,6 @@
 namespace bms::hal {
 
 void power_path_set(const PowerPath&) {}
-std::int32_t link_uv() { return measurement::no_reading; }
+std::int32_t dc_link_uv() { return measurement::no_reading; }
 
 }  // namespace bms::hal

@@ -24,14 +24,14 @@
 namespace bms::hal::adc {
 
 /// What stands between the cell and the pins.
-struct Circuit {
+struct AnalogFrontEnd {
   std::int32_t divider_ppm = 2'000'000;  ///< cell over pin: two equal resistors
   std::int32_t amplifier = 20;           ///< of the shunt's voltage, around half the supply (INA240A1)
   std::int32_t shunt_uohm = 2'000;       ///< +-41 A
 };
 
 /// Sums, and of how many conversions each.
-struct Counts {
+struct AdcCounts {
   std::uint32_t n = 0, voltage = 0, current = 0, temperature = 0;
   std::uint32_t n_reference = 0, reference = 0;
 };
@@ -64,7 +64,9 @@ constexpr std::int32_t share_ppm(std::int32_t ohm) {
   return static_cast<std::int32_t>(1'000'000LL * ohm / (ohm + pull_up_ohm));
 }
 
-constexpr std::int64_t divided(std::int64_t a, std::int64_t by) { return (a >= 0 ? a + by / 2 : a - by / 2) / by; }
+constexpr std::int64_t rounded_quotient(std::int64_t a, std::int64_t by) {
+  return (a >= 0 ? a + by / 2 : a - by / 2) / by;
+}
 
 }  // namespace detail
 
@@ -76,28 +78,30 @@ constexpr std::int16_t temperature_of(std::int32_t share_ppm) {
   while (k + 1 < thermistor.size() && share_ppm < detail::share_ppm(thermistor[k].ohm)) ++k;
   const Point warm = thermistor[k], cold = thermistor[k - 1];
   const std::int32_t from = detail::share_ppm(cold.ohm), to = detail::share_ppm(warm.ohm);
-  return static_cast<std::int16_t>(cold.cdegc +
-                                   divided(std::int64_t{share_ppm - from} * (warm.cdegc - cold.cdegc), to - from));
+  return static_cast<std::int16_t>(
+      cold.cdegc + rounded_quotient(std::int64_t{share_ppm - from} * (warm.cdegc - cold.cdegc), to - from));
 }
 
 /// reference_at_3v3: counts that the maker has measured of this chip. The time is left alone.
-constexpr void read(const Counts& c, std::uint32_t reference_at_3v3, const Circuit& circuit,
-                    const Calibration& calibration, measurement::Sample& into) {
-  using detail::divided;
+constexpr void read(const AdcCounts& c, std::uint32_t reference_at_3v3, const AnalogFrontEnd& front_end,
+                    const SensorCalibration& calibration, measurement::Sample& into) {
+  using detail::rounded_quotient;
   into.voltage_uv = into.current_ua = measurement::no_reading;
   into.temperature_cdegc = measurement::no_temperature;
   if (c.n == 0 || c.n_reference == 0 || c.reference == 0) return;
   const std::int64_t supply_uv = 3'300'000LL * reference_at_3v3 * c.n_reference / c.reference;
   if (supply_uv < 2'400'000 || supply_uv > 3'600'000) return;
   const std::int64_t most = full_scale * c.n;
-  const auto pin_nv = [&](std::uint32_t sum) { return divided(1'000 * supply_uv * sum, most); };
-  const std::int64_t cell_uv = divided(pin_nv(c.voltage) * circuit.divider_ppm, 1'000'000'000);
-  into.voltage_uv = static_cast<std::int32_t>(cell_uv + divided(cell_uv * calibration.voltage_gain_ppm, 1'000'000) +
-                                              calibration.voltage_offset_uv);
+  const auto pin_nv = [&](std::uint32_t sum) { return rounded_quotient(1'000 * supply_uv * sum, most); };
+  const std::int64_t cell_uv = rounded_quotient(pin_nv(c.voltage) * front_end.divider_ppm, 1'000'000'000);
+  into.voltage_uv = static_cast<std::int32_t>(
+      cell_uv + rounded_quotient(cell_uv * calibration.voltage_gain_ppm, 1'000'000) + calibration.voltage_offset_uv);
   const std::int64_t shunt_nv = pin_nv(c.current) - 500 * supply_uv;
-  const std::int64_t current_ua = divided(1'000 * shunt_nv, std::int64_t{circuit.amplifier} * circuit.shunt_uohm);
-  into.current_ua = static_cast<std::int32_t>(
-      current_ua + divided(current_ua * calibration.current_gain_ppm, 1'000'000) + calibration.current_offset_ua);
+  const std::int64_t current_ua =
+      rounded_quotient(1'000 * shunt_nv, std::int64_t{front_end.amplifier} * front_end.shunt_uohm);
+  into.current_ua =
+      static_cast<std::int32_t>(current_ua + rounded_quotient(current_ua * calibration.current_gain_ppm, 1'000'000) +
+                                calibration.current_offset_ua);
   into.temperature_cdegc = temperature_of(static_cast<std::int32_t>(1'000'000LL * c.temperature / most));
 }
 

@@ -10,7 +10,7 @@
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
-#include "hal/heard.hpp"
+#include "hal/frame_dispatch.hpp"
 #include "hal/power_path.hpp"
 
 namespace bms::hal {
@@ -19,21 +19,21 @@ namespace {
 
 static_assert(pack_cells == 1);
 constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
-constexpr adc::Circuit circuit;
+constexpr adc::AnalogFrontEnd front_end;
 constexpr std::uint32_t currents_a_round = 4;
 
-Calibration correction;
+SensorCalibration correction;
 measurement::PackSample<1> pack;
 std::uint64_t due_us = 0;
 bool started = false;
 
 void hear_the_bus() {
   can::Frame frame;
-  while (can_receive(frame)) hear(frame);
+  while (can_receive(frame)) dispatch_frame(frame);
 }
 
 /// One of each; a round that is not whole counts for nothing.
-void convert(adc::Counts& sums) {
+void convert(adc::AdcCounts& sums) {
   const auto voltage = adc_convert(AnalogInput::voltage), temperature = adc_convert(AnalogInput::temperature),
              reference = adc_convert(AnalogInput::reference);
   std::uint32_t current = 0;
@@ -53,7 +53,7 @@ void convert(adc::Counts& sums) {
 
 }  // namespace
 
-void calibrate(const Calibration& calibration) { correction = calibration; }
+void calibrate(const SensorCalibration& calibration) { correction = calibration; }
 
 const measurement::PackSample<1>* next_sample() {
   if (!started) {
@@ -61,7 +61,7 @@ const measurement::PackSample<1>* next_sample() {
     started = true;
     due_us = now_us() + period_us;
   }
-  adc::Counts sums;
+  adc::AdcCounts sums;
   for (hear_the_bus(); now_us() < due_us; hear_the_bus()) {
     wait_for_interrupt();
     convert(sums);
@@ -70,7 +70,7 @@ const measurement::PackSample<1>* next_sample() {
   sample.time_us = now_us();
   due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
   sums.current = (sums.current + currents_a_round / 2) / currents_a_round;
-  adc::read(sums, adc_reference_at_3v3(), circuit, correction, sample);
+  adc::read(sums, adc_reference_at_3v3(), front_end, correction, sample);
   pack.time_us = sample.time_us;
   pack.current_ua = sample.current_ua;
   pack.cell_uv[0] = pack.pack_uv = sample.voltage_uv;
@@ -79,6 +79,6 @@ const measurement::PackSample<1>* next_sample() {
 }
 
 void power_path_set(const PowerPath& wanted) { contactor_pins_set(wanted); }
-std::int32_t link_uv() { return measurement::no_reading; }
+std::int32_t dc_link_uv() { return measurement::no_reading; }
 
 }  // namespace bms::hal

@@ -42,12 +42,12 @@ void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   const std::uint64_t time_us = into.time_us;
   into = {};
   into.time_us = time_us;
-  link_uv_ = measurement::no_reading;
+  dc_link_uv_ = measurement::no_reading;
   if (state_ == State::measure) {
     if (measure(into))
       failures_ = 0;
     else if (state_ == State::measure && ++failures_ >= most_failures)
-      lose();
+      reset_measurement();
     if (into.current_ua == measurement::no_reading) mean_current_.lose();
     return;
   }
@@ -67,7 +67,7 @@ void FrontEnd::rest() {
   next_try_us_ = now_us() + rest_us_;
 }
 
-void FrontEnd::lose() {
+void FrontEnd::reset_measurement() {
   ++counters_.lost;
   state_ = State::absent;
   rest_us_ = 0;
@@ -177,7 +177,7 @@ bool FrontEnd::leave() {
   rest_us_ = 0;
   scans_ago_ = scan_is_old;
   charge_stands_ = 0;
-  told_ = static_cast<std::uint16_t>(~bleed_);  // what it bleeds is not known: tell it
+  sent_bleed_ = static_cast<std::uint16_t>(~bleed_);  // what it bleeds is not known: tell it
   return true;
 }
 
@@ -187,7 +187,7 @@ bool FrontEnd::still_the_same() {
   if (!wire_.read_word(battery_status, status)) return false;
   if ((status & (was_reset | in_config_update)) == 0) return true;
   ++counters_.resets;
-  lose();
+  reset_measurement();
   return false;
 }
 
@@ -200,7 +200,7 @@ bool FrontEnd::measure(measurement::PackSample<cell_inputs>& into) {
   std::array<std::uint8_t, 5> safety{};  // status A, alert B, status B, alert C, status C
   if (!wire_.read(safety_status_a, safety)) return false;
   if ((safety[0] | safety[2] | safety[4]) != 0) ++counters_.trips;
-  return keep_bleeding();
+  return refresh_balancing();
 }
 
 bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
@@ -224,9 +224,9 @@ bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   for (std::size_t k = 0; k < cell_inputs; ++k) into.cell_uv[k] = cell_uv(get_bytes<std::int16_t>(voltages, 2 * k));
   if (scans_ago_ >= scan_is_old) return true;
   into.pack_uv = get_bytes<std::int16_t>(voltages, stack_voltage - first_cell) * voltage_step_uv;
-  link_uv_ = get_bytes<std::int16_t>(voltages, ld_voltage - first_cell) * voltage_step_uv;
-  constexpr std::array<std::uint8_t, measurement::most_temperatures> sensors{ts1_temperature, ts3_temperature,
-                                                                             hdq_temperature, cfetoff_temperature};
+  dc_link_uv_ = get_bytes<std::int16_t>(voltages, ld_voltage - first_cell) * voltage_step_uv;
+  constexpr std::array<std::uint8_t, measurement::max_temperatures> sensors{ts1_temperature, ts3_temperature,
+                                                                            hdq_temperature, cfetoff_temperature};
   for (std::size_t k = 0; k < sensors.size(); ++k)
     into.temperature_cdegc[k] =
         cdegc(get_bytes<std::int16_t>(alarm_and_temperatures, static_cast<std::size_t>(sensors[k] - alarm_status)));
@@ -255,8 +255,8 @@ bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
   return true;
 }
 
-bool FrontEnd::keep_bleeding() {
-  if (bleed_ == told_ && (bleed_ == 0 || now_us() - told_us_ < tell_again_us)) return true;
+bool FrontEnd::refresh_balancing() {
+  if (bleed_ == sent_bleed_ && (bleed_ == 0 || now_us() - sent_bleed_us_ < tell_again_us)) return true;
   std::array<std::uint8_t, 2> cells{};
   put_bytes(cells, 0, bleed_);
   if (!wire_.send(balance_cells, cells)) return false;
@@ -269,8 +269,8 @@ bool FrontEnd::keep_bleeding() {
     ++counters_.bleed_wrong;
     return true;  // told again with the next sample
   }
-  told_ = bleed_;
-  told_us_ = now_us();
+  sent_bleed_ = bleed_;
+  sent_bleed_us_ = now_us();
   return true;
 }
 

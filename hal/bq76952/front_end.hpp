@@ -54,7 +54,7 @@ class FrontEnd {
   void bleed(std::uint32_t cells) { bleed_ = static_cast<std::uint16_t>(cells); }
 
   /// With the last read().
-  std::int32_t link_uv() const { return link_uv_; }
+  std::int32_t dc_link_uv() const { return dc_link_uv_; }
   State state() const { return state_; }
   const Counters& counters() const { return counters_; }
   const WireCounters& wire() const { return wire_.counters(); }
@@ -71,9 +71,9 @@ class FrontEnd {
   bool still_the_same();
   bool read_current(measurement::PackSample<cell_inputs>& into);
   bool read_scan(measurement::PackSample<cell_inputs>& into);
-  bool keep_bleeding();
+  bool refresh_balancing();
   void rest();
-  void lose();
+  void reset_measurement();
 
   std::span<const Setting> settings_;
   Wire wire_;
@@ -85,12 +85,12 @@ class FrontEnd {
   std::size_t next_setting_ = 0;
   std::uint8_t waited_ = 0, failures_ = 0;
   bool swapped_ = false, fresh_ = false;
-  std::int32_t link_uv_ = measurement::no_reading;
+  std::int32_t dc_link_uv_ = measurement::no_reading;
   std::uint8_t scans_ago_ = 0;  ///< samples since everything was measured
   std::uint32_t charge_time_s_ = 0;
   std::uint8_t charge_stands_ = 0;  ///< samples since the charge counter's time moved
-  std::uint16_t bleed_ = 0, told_ = 0;
-  std::uint64_t told_us_ = 0;
+  std::uint16_t bleed_ = 0, sent_bleed_ = 0;
+  std::uint64_t sent_bleed_us_ = 0;
 };
 
 }  // namespace bms::hal::bq76952

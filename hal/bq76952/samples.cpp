@@ -9,7 +9,7 @@
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
-#include "hal/heard.hpp"
+#include "hal/frame_dispatch.hpp"
 #include "hal/i2c.hpp"
 #include "hal/power_path.hpp"
 
@@ -28,7 +28,7 @@ bool started = false;
 
 void hear_the_bus() {
   can::Frame frame;
-  while (can_receive(frame)) hear(frame);
+  while (can_receive(frame)) dispatch_frame(frame);
 }
 
 }  // namespace
@@ -50,6 +50,6 @@ void power_path_set(const PowerPath& wanted) {
   contactor_pins_set(wanted);
   front_end.bleed(wanted.bleed);
 }
-std::int32_t link_uv() { return front_end.link_uv(); }
+std::int32_t dc_link_uv() { return front_end.dc_link_uv(); }
 
 }  // namespace bms::hal

@@ -35,13 +35,13 @@ inline constexpr SamplePointRange near_recommendation{recommended_ppm - recommen
 inline constexpr SamplePointRange cia301_allows{850'000, 900'000};
 
 // Not defined: a call of one ends the compilation, and its name says why.
-void there_is_no_such_bit_rate();
-void this_clock_cannot_be_divided_down_to_this_bit_rate();
-void no_sample_point_is_in_the_range_that_is_accepted();
+void bit_rate_not_supported();
+void clock_not_divisible_to_bit_rate();
+void no_sample_point_in_accepted_range();
 
 consteval BitTiming bit_timing(std::uint32_t clock_hz, std::uint32_t bits_per_second,
                                SamplePointRange accepted = near_recommendation) {
-  if (bits_per_second == 0 || bits_per_second > 1'000'000 || clock_hz == 0) there_is_no_such_bit_rate();
+  if (bits_per_second == 0 || bits_per_second > 1'000'000 || clock_hz == 0) bit_rate_not_supported();
   BitTiming best;
   std::uint32_t least_error = 1'000'000;
   for (std::uint32_t quanta = 25; quanta >= 8; --quanta) {
@@ -56,9 +56,9 @@ consteval BitTiming bit_timing(std::uint32_t clock_hz, std::uint32_t bits_per_se
       if (error < least_error) best = t, least_error = error;
     }
   }
-  if (least_error == 1'000'000) this_clock_cannot_be_divided_down_to_this_bit_rate();
+  if (least_error == 1'000'000) clock_not_divisible_to_bit_rate();
   if (best.sample_point_ppm() < accepted.from_ppm || best.sample_point_ppm() > accepted.to_ppm)
-    no_sample_point_is_in_the_range_that_is_accepted();
+    no_sample_point_in_accepted_range();
   return best;
 }
 

@@ -16,7 +16,7 @@ struct FilterBank {
 /// Identifier in bits 15:5; RTR, IDE and the 29-bit part are 0, so that they are asked for as 0.
 constexpr std::uint32_t filter_of(std::uint16_t id) { return static_cast<std::uint32_t>(id) << 5; }
 
-void this_is_no_identifier_of_11_bits();  // not defined: ends the compilation
+void identifier_exceeds_11_bits();  // not defined: ends the compilation
 
 /// CAN1 has the first 14 of the 28 banks unless told otherwise (CAN_FMR, CAN2SB). Places left over repeat the last
 /// identifier.
@@ -26,7 +26,7 @@ consteval std::array<FilterBank, (Ids + 3) / 4> filter_banks(const std::array<st
   std::array<FilterBank, (Ids + 3) / 4> banks{};
   const auto at = [&](std::size_t k) { return filter_of(ids[k < Ids ? k : Ids - 1]); };
   for (const std::uint16_t id : ids) {
-    if (id > 0x7FF) this_is_no_identifier_of_11_bits();
+    if (id > 0x7FF) identifier_exceeds_11_bits();
   }
   for (std::size_t k = 0; k < banks.size(); ++k)
     banks[k] = {at(4 * k) | at(4 * k + 1) << 16, at(4 * k + 2) | at(4 * k + 3) << 16};

@@ -48,7 +48,7 @@ class TransmitQueue {
 
   /// The most urgent one that `may`, taken out; false: none.
   template <class May>
-  constexpr bool take(WaitingFrame& out, May&& may) {
+  constexpr bool pop(WaitingFrame& out, May&& may) {
     const WaitingFrame* found = most_urgent(may);
     if (found == nullptr) return false;
     out = *found;

@@ -4,6 +4,6 @@
 namespace bms::hal::cortex_m {
 
 void start_core() {}
-void see_fault(FaultRecord&) {}
+void read_fault_status(FaultRecord&) {}
 
 }  // namespace bms::hal::cortex_m

@@ -25,7 +25,7 @@ void start_core() {
   scb_shcsr() = scb_shcsr() | 7U << 16;  // memory, bus and usage faults under their own name
 }
 
-void see_fault(FaultRecord& record) {
+void read_fault_status(FaultRecord& record) {
   record.cfsr = scb_cfsr();
   record.hfsr = scb_hfsr();
   record.address = (record.cfsr & 1U << 7) != 0 ? scb_mmfar() : scb_bfar();

@@ -9,6 +9,6 @@ namespace bms::hal::cortex_m {
 void start_core();
 
 /// Fills in what the core's status registers say of a fault; `exception` is known.
-void see_fault(FaultRecord& record);
+void read_fault_status(FaultRecord& record);
 
 }  // namespace bms::hal::cortex_m

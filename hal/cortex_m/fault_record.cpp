@@ -9,12 +9,12 @@ namespace {
 constexpr std::uint32_t magic = 0xFA017BAD;
 
 /// In RAM that start-up leaves alone.
-struct Kept {
+struct StoredFault {
   std::uint32_t magic;
   FaultRecord fault;
   std::uint32_t check;
 };
-[[gnu::section(".noinit")]] Kept kept;
+[[gnu::section(".noinit")]] StoredFault stored;
 
 std::optional<FaultRecord> fault;
 
@@ -28,15 +28,15 @@ std::optional<FaultRecord> last_fault() { return fault; }
 
 namespace cortex_m {
 
-void read_kept_fault() {
-  if (kept.magic == magic && kept.check == check_of(kept.fault)) fault = kept.fault;
-  kept.magic = 0;
+void read_stored_fault() {
+  if (stored.magic == magic && stored.check == check_of(stored.fault)) fault = stored.fault;
+  stored.magic = 0;
 }
 
-void keep(const FaultRecord& record) {
-  kept.fault = record;
-  kept.check = check_of(record);
-  kept.magic = magic;
+void store_fault(const FaultRecord& record) {
+  stored.fault = record;
+  stored.check = check_of(record);
+  stored.magic = magic;
 }
 
 void system_reset() {

@@ -6,9 +6,9 @@
 namespace bms::hal::cortex_m {
 
 /// At start-up: what the last run has kept; forgotten for the next.
-void read_kept_fault();
+void read_stored_fault();
 
-void keep(const FaultRecord& record);
+void store_fault(const FaultRecord& record);
 [[noreturn]] void system_reset();
 
 }  // namespace bms::hal::cortex_m

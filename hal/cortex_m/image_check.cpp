@@ -40,7 +40,7 @@ std::uint32_t more(std::uint32_t crc, const std::uint8_t* begin, const std::uint
 
 }  // namespace
 
-bool image_whole() {
+bool image_intact() {
   std::uint32_t crc = more(0xFFFF'FFFF, image_vectors, image_vectors_end);
   crc = more(crc, image_code_begin, image_code_end);
   crc = ~more(crc, image_data_load, image_data_load + (image_data_end - image_data_begin));

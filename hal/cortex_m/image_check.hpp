@@ -7,6 +7,6 @@ namespace bms::hal::cortex_m {
 
 /// Cost: 14 instructions a byte, some 55 KB: 5 ms at 168 MHz. An image into which nobody has written a check is not
 /// whole.
-bool image_whole();
+bool image_intact();
 
 }  // namespace bms::hal::cortex_m

@@ -16,7 +16,7 @@
 namespace bms::hal::cortex_m {
 
 /// False: some word of [begin, end) does not hold what is written. The range is all 0 afterwards, if it can be.
-[[gnu::always_inline]] inline bool ram_holds(volatile std::uint32_t* begin, volatile std::uint32_t* end) {
+[[gnu::always_inline]] inline bool ram_passes(volatile std::uint32_t* begin, volatile std::uint32_t* end) {
   bool good = true;
   for (int run = 0; run < 2; ++run) {
     const std::uint32_t zero = run == 0 ? 0x5555'5555 : 0, one = ~zero;  // 0 last: that is left

@@ -37,9 +37,9 @@ void unguard_stack() {
   asm volatile("dsb\n isb" ::: "memory");
 }
 
-bool stack_guard_whole() {
+bool stack_guard_intact() {
   if ((mpu_ctrl() & 1) != 0) return true;  // nobody has got past it
-  for (std::size_t k = 1; k <= guard_words_looked_at; ++k) {
+  for (std::size_t k = 1; k <= guard_words_checked; ++k) {
     if (*(bottom() - k) != paint) return false;
   }
   return true;

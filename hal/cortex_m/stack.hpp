@@ -16,8 +16,8 @@ extern std::uint32_t image_stack_limit[], image_stack_top[];  // from the linker
 namespace bms::hal::cortex_m {
 
 inline constexpr std::uint32_t guard_bytes = 1'024,
-                               paint = 0xA5A5'A5A5;       // larger than any frame: nothing steps over it
-inline constexpr std::size_t guard_words_looked_at = 16;  // next to the stack
+                               paint = 0xA5A5'A5A5;     // larger than any frame: nothing steps over it
+inline constexpr std::size_t guard_words_checked = 16;  // next to the stack
 
 /// Start-up, from a function without a frame to speak of: up to a little below it.
 [[gnu::always_inline]] inline void paint_stack(std::uint32_t* up_to) {
@@ -31,7 +31,7 @@ void guard_stack();
 void unguard_stack();
 
 /// Whether the guard is as it was painted; true while it cannot be looked at.
-bool stack_guard_whole();
+bool stack_guard_intact();
 
 /// Least that was free so far [bytes], without the guard. Looks at some words more with each call, and at all of them
 /// within fifteen calls.

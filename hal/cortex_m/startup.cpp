@@ -35,13 +35,13 @@ int main();
   asm volatile("mov %0, sp" : "=r"(stack));
   stack -= 16;  // what is below is free
   const bool good =
-      cortex_m::ram_holds(image_data_begin, image_bss_end) && cortex_m::ram_holds(image_stack_limit, stack);
+      cortex_m::ram_passes(image_data_begin, image_bss_end) && cortex_m::ram_passes(image_stack_limit, stack);
   cortex_m::paint_stack(stack);
   for (std::uint32_t *from = image_data_load, *to = image_data_begin; to < image_data_end;) *to++ = *from++;
   for (std::uint32_t* to = image_bss_begin; to < image_bss_end;) *to++ = 0;
   ram_good = good;
   cortex_m::guard_stack();
-  cortex_m::read_kept_fault();
+  cortex_m::read_stored_fault();
   for (auto construct = image_constructors_begin; construct < image_constructors_end; ++construct) (*construct)();
   finish(main());
 }
@@ -52,7 +52,7 @@ int main();
   cortex_m::unguard_stack();
   FaultRecord record;
   record.exception = cortex_m::scb_icsr() & 511U;
-  cortex_m::see_fault(record);
+  cortex_m::read_fault_status(record);
   const auto at = reinterpret_cast<std::uintptr_t>(frame),
              ram = reinterpret_cast<std::uintptr_t>(image_stack_limit + cortex_m::guard_bytes / 4),
              top = reinterpret_cast<std::uintptr_t>(image_stack_top);
@@ -61,7 +61,7 @@ int main();
     record.pc = frame[6];
     record.psr = frame[7];
   }
-  cortex_m::keep(record);
+  cortex_m::store_fault(record);
   cortex_m::system_reset();
 }
 

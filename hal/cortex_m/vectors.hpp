@@ -30,7 +30,7 @@ struct VectorTable {
 };
 
 template <std::size_t Interrupts>
-constexpr VectorTable<Interrupts> faults_but_for_the_reset() {
+constexpr VectorTable<Interrupts> fault_vectors() {
   VectorTable<Interrupts> table{image_stack_top, {}};
   for (Handler& handler : table.handlers) handler = fault_handler;
   table.serve(1, reset_handler);

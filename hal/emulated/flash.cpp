@@ -23,7 +23,7 @@ std::span<unsigned char> memory() {
   return {reinterpret_cast<unsigned char*>(above_the_chips_ram), std::size_t{size.sectors} * size.sector_bytes};
 }
 
-bool keep(std::size_t at, std::size_t bytes) {
+bool write_back(std::size_t at, std::size_t bytes) {
   return file < 0 || (semihosting::seek(file, at) && semihosting::write(file, memory().subspan(at, bytes)));
 }
 
@@ -36,7 +36,7 @@ void read_file() {
   }
   if (have == memory().size()) return;
   std::ranges::fill(memory(), static_cast<unsigned char>(0));
-  if (!keep(0, memory().size())) file = -1;
+  if (!write_back(0, memory().size())) file = -1;
 }
 
 }  // namespace
@@ -54,14 +54,14 @@ FlashSize flash_start() {
 bool flash_erase(std::uint32_t sector) {
   const std::size_t at = std::size_t{sector} * size.sector_bytes;
   std::ranges::fill(memory().subspan(at, size.sector_bytes), static_cast<unsigned char>(0xFF));
-  return keep(at, size.sector_bytes);
+  return write_back(at, size.sector_bytes);
 }
 
 bool flash_program(std::uint32_t sector, std::uint32_t at, std::uint32_t word) {
   const std::size_t place = std::size_t{sector} * size.sector_bytes + at;
   const auto bytes = memory().subspan(place, sizeof word);
   put_bytes(bytes, 0, get_bytes<std::uint32_t>(bytes, 0) & word);
-  return keep(place, sizeof word);
+  return write_back(place, sizeof word);
 }
 
 void flash_read(std::uint32_t sector, std::uint32_t at, std::span<std::uint8_t> into) {

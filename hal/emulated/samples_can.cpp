@@ -2,7 +2,7 @@
 // ends them.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
-#include "hal/heard.hpp"
+#include "hal/frame_dispatch.hpp"
 #include "hal/power_path.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/samples.hpp"
@@ -22,7 +22,7 @@ const measurement::PackSample<pack_cells>* next_sample() {
     can::Frame frame;
     while (can_receive(frame)) {
       was_listening = true;  // who closes the channel right after a sample, while it is being worked on, ends them, too
-      if (hear(frame) && frames.take(frame))
+      if (dispatch_frame(frame) && frames.receive(frame))
         return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
     }
     if (was_listening && !can_listening()) return nullptr;
@@ -33,6 +33,6 @@ const measurement::PackSample<pack_cells>* next_sample() {
 }
 
 void power_path_set(const PowerPath&) {}  // who simulates the load hears it on the bus
-std::int32_t link_uv() { return frames.link_uv(); }
+std::int32_t dc_link_uv() { return frames.dc_link_uv(); }
 
 }  // namespace bms::hal

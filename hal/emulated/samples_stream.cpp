@@ -6,8 +6,8 @@
 
 #include "estimator/pack_estimator.hpp"
 #include "hal/emulated/semihosting.hpp"
+#include "hal/estimate_record.hpp"
 #include "hal/power.hpp"
-#include "hal/record.hpp"
 #include "hal/samples.hpp"
 #include "hal/stream_format.hpp"
 
@@ -83,7 +83,7 @@ std::optional<measurement::StartingPoint> starting_point() {
   return measurement::StartingPoint{header.soc_ppb, header.soc_sigma_ppb};
 }
 
-void record(std::span<const std::uint32_t> words) {
+void record_estimate(std::span<const std::uint32_t> words) {
   if (estimate_size + words.size() > estimates.size()) write_estimates();
   std::copy(words.begin(), words.end(), &estimates[estimate_size]);
   estimate_size += words.size();

@@ -38,7 +38,7 @@ void uart_write(std::span<const char> bytes) {
   }
 }
 
-bool uart_read(char& byte) { return received_bytes.take(byte); }
+bool uart_read(char& byte) { return received_bytes.pop(byte); }
 
 std::uint32_t uart_lost() { return received_bytes.lost(); }
 
@@ -48,6 +48,6 @@ extern "C" void uart_interrupt() {
   using namespace bms::hal;
   while (nrf51::uart_rxdrdy() != 0) {
     nrf51::uart_rxdrdy() = 0;  // before the byte is taken: the next one sets it again
-    received_bytes.put(static_cast<char>(nrf51::uart_rxd()));
+    received_bytes.push(static_cast<char>(nrf51::uart_rxd()));
   }
 }

@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t interrupts = 32;  // ARMv6-M has no more
 
 constexpr auto table() {
-  auto all = cortex_m::faults_but_for_the_reset<interrupts>();
+  auto all = cortex_m::fault_vectors<interrupts>();
   all.serve(cortex_m::core_exceptions + nrf51::timer_interrupt, clock_interrupt);
   all.serve(cortex_m::core_exceptions + nrf51::uart_interrupt, ::uart_interrupt);
   return all;

@@ -8,7 +8,7 @@
 #include "hal/samples.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
-#include "hal/heard.hpp"
+#include "hal/frame_dispatch.hpp"
 #include "hal/power_path.hpp"
 #include "hal/sample_frames.hpp"
 
@@ -31,7 +31,7 @@ const measurement::PackSample<pack_cells>* next_sample() {
   while (true) {
     can::Frame frame;
     while (can_receive(frame)) {
-      if (!hear(frame) || !frames.take(frame))
+      if (!dispatch_frame(frame) || !frames.receive(frame))
         continue;  // a frame that gets lost later is a missing reading, not the old one again
       given = frames.sample();
       given.time_us += before_us;
@@ -57,6 +57,6 @@ const measurement::PackSample<pack_cells>* next_sample() {
 }
 
 void power_path_set(const PowerPath&) {}
-std::int32_t link_uv() { return frames.link_uv(); }
+std::int32_t dc_link_uv() { return frames.dc_link_uv(); }
 
 }  // namespace bms::hal

@@ -61,7 +61,7 @@ bool can_send(const can::Frame& frame) {
 bool can_receive(can::Frame& frame) {
   char byte = 0;
   while (uart_read(byte)) {
-    if (!reader.take(byte)) continue;
+    if (!reader.push(byte)) continue;
     const bool is_frame = slcan::decode(reader.line(), frame);
     answer(!is_frame ? answer_to(reader.line()) : listening ? "\r" : "\a");
     if (is_frame && listening && !frame.long_id) return true;

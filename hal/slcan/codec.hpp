@@ -85,7 +85,7 @@ class LineReader {
  public:
   /// True when `byte` ended a line, which line() then holds until the next call. A line that was too long comes out
   /// empty.
-  constexpr bool take(char byte) {
+  constexpr bool push(char byte) {
     if (ended_) {
       length_ = 0;
       ended_ = too_long_ = false;

@@ -16,7 +16,7 @@ bool image_failed = false, stack_overrun = false, brown_out_reset_low = false;
 }  // namespace
 
 void board_start() {
-  image_failed = !cortex_m::image_whole();
+  image_failed = !cortex_m::image_intact();
   brown_out_reset_low = stm32f4::brown_out_reset_low();
   stm32f4::supply_start();
   calendar_start();
@@ -26,7 +26,7 @@ BoardState board_state() {
   BoardState state;
   state.ram_failed = cortex_m::ram_failed();
   state.image_failed = image_failed;
-  state.stack_overrun = stack_overrun = stack_overrun || !cortex_m::stack_guard_whole();
+  state.stack_overrun = stack_overrun = stack_overrun || !cortex_m::stack_guard_intact();
   state.supply_low = stm32f4::supply_low();
   state.brown_out_reset_low = brown_out_reset_low;
   state.clock_failed = stm32f4::clocks().core_hz != stm32f4::crystal_core_hz;

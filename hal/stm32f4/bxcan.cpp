@@ -66,18 +66,18 @@ void count(std::atomic<std::uint32_t>& counter, std::uint32_t more = 1) {
 }
 
 /// While one lives, the transmit interrupt waits.
-class TransmitInterruptHeld {
+class TransmitInterruptLock {
  public:
-  TransmitInterruptHeld() {
+  TransmitInterruptLock() {
     nvic_icer0() = 1U << can1_tx_interrupt;
     asm volatile("dsb\n isb" ::: "memory");
   }
-  ~TransmitInterruptHeld() {
+  ~TransmitInterruptLock() {
     asm volatile("" ::: "memory");
     nvic_iser0() = 1U << can1_tx_interrupt;
   }
-  TransmitInterruptHeld(const TransmitInterruptHeld&) = delete;
-  TransmitInterruptHeld& operator=(const TransmitInterruptHeld&) = delete;
+  TransmitInterruptLock(const TransmitInterruptLock&) = delete;
+  TransmitInterruptLock& operator=(const TransmitInterruptLock&) = delete;
 };
 
 void take_back_finished() {
@@ -129,14 +129,14 @@ void refill() {
   for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
     bxcan::WaitingFrame next;
     if (mailboxes[k].taken) continue;
-    if (!queue.take(next, may_go)) return;
+    if (!queue.pop(next, may_go)) return;
     load(k, next);
   }
   if (const bxcan::WaitingFrame* next = queue.most_urgent(may_go)) make_room_for(*next);
 }
 
 void drop_what_waits() {
-  const TransmitInterruptHeld held;
+  const TransmitInterruptLock lock;
   count(dropped, static_cast<std::uint32_t>(queue.size()));
   queue.clear();
   for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
@@ -147,7 +147,7 @@ void drop_what_waits() {
 }
 
 bool anything_waits() {
-  const TransmitInterruptHeld held;
+  const TransmitInterruptLock lock;
   return queue.size() > 0 || mailboxes[0].taken || mailboxes[1].taken || mailboxes[2].taken;
 }
 
@@ -196,7 +196,7 @@ void ask_for_initialisation() {
 void give_up() {
   ++failed_starts;
   if (phase == Phase::entering) {
-    const TransmitInterruptHeld held;
+    const TransmitInterruptLock lock;
     can1_mcr() = mcr_reset;
     for (Mailbox& box : mailboxes) count(dropped, box.taken ? 1 : 0);
     mailboxes = {};
@@ -278,7 +278,7 @@ bool can_listening() {
 }
 
 bool can_send(const can::Frame& frame) {
-  const TransmitInterruptHeld held;
+  const TransmitInterruptLock lock;
   if (!on_the_bus() || silent) {
     count(dropped);
     return false;

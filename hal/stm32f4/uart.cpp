@@ -34,7 +34,7 @@ void uart_write(std::span<const char> bytes) {
   }
 }
 
-bool uart_read(char& byte) { return received_bytes.take(byte); }
+bool uart_read(char& byte) { return received_bytes.pop(byte); }
 
 std::uint32_t uart_lost() { return received_bytes.lost(); }
 
@@ -42,5 +42,5 @@ std::uint32_t uart_lost() { return received_bytes.lost(); }
 
 extern "C" void usart1_interrupt() {
   using namespace bms::hal;
-  while ((stm32f4::usart1_sr() & received) != 0) received_bytes.put(static_cast<char>(stm32f4::usart1_dr()));
+  while ((stm32f4::usart1_sr() & received) != 0) received_bytes.push(static_cast<char>(stm32f4::usart1_dr()));
 }

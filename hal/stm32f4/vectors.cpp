@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t interrupts = 82;  // RM0090, table 61
 
 constexpr auto table() {
-  auto all = cortex_m::faults_but_for_the_reset<interrupts>();
+  auto all = cortex_m::fault_vectors<interrupts>();
   all.serve(cortex_m::systick, clock_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::usart1_interrupt, ::usart1_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_tx_interrupt, ::can1_tx_interrupt);

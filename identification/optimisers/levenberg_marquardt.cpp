@@ -5,7 +5,7 @@
 
 #include <Eigen/QR>
 
-#include "identification/optimisers/methods.hpp"
+#include "identification/optimisers/optimisation.hpp"
 
 namespace bms::identification {
 
@@ -28,17 +28,17 @@ VectorXd damped_step(const MatrixXd& a, const VectorXd& b, const VectorXd& weigh
 
 }  // namespace
 
-void search_levenberg_marquardt(Search& search) {
+void search_levenberg_marquardt(Optimisation& run) {
   constexpr double largest_damping = 1e30;  // relative to J'J: no step is left
   double damping = 1e-3, raise = 2;
-  while (!search.settled()) {
-    const VectorXd step = step_within_bounds(search, [&](const MatrixXd& a, const VectorXd& b, const Indices& free) {
-      return damped_step(a, b, search.column_norms()(free), damping);
+  while (!run.finished()) {
+    const VectorXd step = step_within_bounds(run, [&](const MatrixXd& a, const VectorXd& b, const Indices& free) {
+      return damped_step(a, b, run.column_norms()(free), damping);
     });
-    const double before = search.cost(), expected = -search.expected_change(step);
-    const VectorXd x = search.after(step);
-    const double cost = search.cost_at(x);
-    if (cost < before && search.move_to(x)) {
+    const double before = run.cost(), expected = -run.expected_change(step);
+    const VectorXd x = run.after(step);
+    const double cost = run.cost_at(x);
+    if (cost < before && run.move_to(x)) {
       const double gain = (before - cost) / expected;
       damping *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
       damping = std::max(damping, 1e-30);
@@ -46,7 +46,7 @@ void search_levenberg_marquardt(Search& search) {
     } else {
       damping *= raise;
       raise *= 2;
-      if (!(damping < largest_damping) || x == search.x()) search.stuck();
+      if (!(damping < largest_damping) || x == run.x()) run.no_decrease();
     }
   }
 }

@@ -12,7 +12,7 @@
 
 #include <Eigen/SVD>
 
-#include "identification/optimisers/methods.hpp"
+#include "identification/optimisers/optimisation.hpp"
 
 namespace bms::identification {
 
@@ -26,27 +26,27 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 class ScaledModel {
  public:
-  explicit ScaledModel(const Search& search) : search_(search) {
-    const Index n = search.size();
+  explicit ScaledModel(const Optimisation& run) : run_(run) {
+    const Index n = run.size();
     scaling_.resize(n);
     curvature_ = VectorXd::Zero(n);
     VectorXd interior_gradient(n);
     for (Index i = 0; i < n; ++i) {
-      const double g = search.gradient()[i], distance = g < 0 ? search.above()[i] : -search.below()[i];
-      const double v = std::min(distance, 1.0), norm = search.column_norms()[i];
+      const double g = run.gradient()[i], distance = g < 0 ? run.above()[i] : -run.below()[i];
+      const double v = std::min(distance, 1.0), norm = run.column_norms()[i];
       scaling_[i] = std::sqrt(v) / norm;
       if (distance < 1) curvature_[i] = std::abs(g) / (norm * norm);
       interior_gradient[i] = v * g;
     }
-    remaining_ = search.relative(interior_gradient);
-    gradient_ = scaling_.cwiseProduct(search.gradient());
+    remaining_ = run.relative(interior_gradient);
+    gradient_ = scaling_.cwiseProduct(run.gradient());
     MatrixXd both = MatrixXd::Zero(2 * n, n);
-    both.topRows(n) = search.factor() * scaling_.asDiagonal();
+    both.topRows(n) = run.factor() * scaling_.asDiagonal();
     both.bottomRows(n).diagonal() = curvature_.cwiseSqrt();
     const Eigen::BDCSVD<MatrixXd> svd(both, Eigen::ComputeThinU | Eigen::ComputeThinV);
     values_ = svd.singularValues();
     vectors_ = svd.matrixV();
-    along_ = svd.matrixU().topRows(n).transpose() * search.rotated();
+    along_ = svd.matrixU().topRows(n).transpose() * run.rotated();
   }
 
   const VectorXd& scaling() const { return scaling_; }
@@ -54,9 +54,7 @@ class ScaledModel {
   double remaining() const { return remaining_; }  ///< v_i g_i, relative; 0 at an optimum, bounds or none
 
   double curvature_term(const VectorXd& q) const { return 0.5 * curvature_.dot(q.cwiseAbs2()); }
-  double change(const VectorXd& q) const {
-    return search_.expected_change(scaling_.cwiseProduct(q)) + curvature_term(q);
-  }
+  double change(const VectorXd& q) const { return run_.expected_change(scaling_.cwiseProduct(q)) + curvature_term(q); }
 
   /// The minimum of the model within the radius.
   VectorXd minimum(double radius) const {
@@ -105,18 +103,18 @@ class ScaledModel {
     return vectors_ * weights;
   }
 
-  const Search& search_;
+  const Optimisation& run_;
   VectorXd scaling_, curvature_, gradient_, values_, along_;
   MatrixXd vectors_;
   double remaining_ = 0;
 };
 
 /// Multiple of `direction` that leads from `from` to the first bound.
-double to_bound(const Search& search, const VectorXd& from, const VectorXd& direction) {
+double to_bound(const Optimisation& run, const VectorXd& from, const VectorXd& direction) {
   double length = infinity;
-  for (Index i = 0; i < search.size(); ++i) {
-    if (direction[i] > 0) length = std::min(length, (search.above()[i] - from[i]) / direction[i]);
-    if (direction[i] < 0) length = std::min(length, (search.below()[i] - from[i]) / direction[i]);
+  for (Index i = 0; i < run.size(); ++i) {
+    if (direction[i] > 0) length = std::min(length, (run.above()[i] - from[i]) / direction[i]);
+    if (direction[i] < 0) length = std::min(length, (run.below()[i] - from[i]) / direction[i]);
   }
   return std::max(length, 0.0);
 }
@@ -131,13 +129,13 @@ double to_radius(const VectorXd& from, const VectorXd& direction, double radius)
 }
 
 /// q of the best of: the trust region's step, cut at the first bound; the same reflected there; the scaled gradient's.
-VectorXd best_step(const Search& search, const ScaledModel& model, double radius) {
-  const VectorXd zero = VectorXd::Zero(search.size()), &d = model.scaling();
+VectorXd best_step(const Optimisation& run, const ScaledModel& model, double radius) {
+  const VectorXd zero = VectorXd::Zero(run.size()), &d = model.scaling();
   const double keep_off = std::max(
       0.995, 1 - model.remaining());  // of the way to a bound; all of it in the end, or the convergence were linear
   const VectorXd full = model.minimum(radius);
   const VectorXd step = d.cwiseProduct(full);
-  const double hit = to_bound(search, zero, step);
+  const double hit = to_bound(run, zero, step);
   if (hit > 1) return full;
 
   VectorXd best = full * (hit * keep_off);
@@ -146,18 +144,18 @@ VectorXd best_step(const Search& search, const ScaledModel& model, double radius
   };
 
   VectorXd reflected = full;
-  for (Index i = 0; i < search.size(); ++i) {
-    const double room = step[i] < 0 ? search.below()[i] : search.above()[i];
+  for (Index i = 0; i < run.size(); ++i) {
+    const double room = step[i] < 0 ? run.below()[i] : run.above()[i];
     if (step[i] != 0 && room / step[i] <= hit) reflected[i] = -reflected[i];
   }
   const VectorXd corner = full * hit;
-  const double next_hit = to_bound(search, step * hit, d.cwiseProduct(reflected));
+  const double next_hit = to_bound(run, step * hit, d.cwiseProduct(reflected));
   const double radius_hit = to_radius(corner, reflected, radius), most = std::min(next_hit * keep_off, radius_hit);
   if (most > 0) consider(model.best_along(corner, reflected, std::min((1 - keep_off) * hit, most), most));
 
   const VectorXd downhill = -model.gradient();
   const double gradient_hit =
-      std::min(to_radius(zero, downhill, radius), keep_off * to_bound(search, zero, d.cwiseProduct(downhill)));
+      std::min(to_radius(zero, downhill, radius), keep_off * to_bound(run, zero, d.cwiseProduct(downhill)));
   if (gradient_hit > 0) consider(model.best_along(zero, downhill, 0, gradient_hit));
   return best;
 }
@@ -168,11 +166,10 @@ struct Landing {
   Indices elsewhere;  ///< the unknowns that it does not concern
 };
 
-Landing landing(const Search& search) {
-  Landing landing{VectorXd::Zero(search.size()), {}};
-  for (Index i = 0; i < search.size(); ++i) {
-    const double g = search.gradient()[i], room = g < 0 ? search.above()[i] : search.below()[i],
-                 norm = search.column_norms()[i];
+Landing landing(const Optimisation& run) {
+  Landing landing{VectorXd::Zero(run.size()), {}};
+  for (Index i = 0; i < run.size(); ++i) {
+    const double g = run.gradient()[i], room = g < 0 ? run.above()[i] : run.below()[i], norm = run.column_norms()[i];
     if (g == 0 || std::abs(room) * norm * norm > std::abs(g)) {
       landing.elsewhere.push_back(i);
     } else {
@@ -182,19 +179,19 @@ Landing landing(const Search& search) {
   return landing;
 }
 
-void land(Search& search, const Landing& landing) {
-  if (!landing.step.isZero(0)) search.move_to(search.after(landing.step));
+void land(Optimisation& run, const Landing& landing) {
+  if (!landing.step.isZero(0)) run.move_to(run.after(landing.step));
 }
 
 /// One step that lowers the cost, after as many smaller radii as it takes. False: there is none.
-bool move(Search& search, double& radius) {
-  const ScaledModel model(search);
+bool move(Optimisation& run, double& radius) {
+  const ScaledModel model(run);
   for (;;) {
-    const VectorXd q = best_step(search, model, radius), step = model.scaling().cwiseProduct(q);
-    const VectorXd x = search.after(step);
-    const double expected = model.change(q), before = search.cost();
-    if (!(expected < 0) || x == search.x()) return false;
-    const double cost = search.cost_at(x), size = q.norm();
+    const VectorXd q = best_step(run, model, radius), step = model.scaling().cwiseProduct(q);
+    const VectorXd x = run.after(step);
+    const double expected = model.change(q), before = run.cost();
+    if (!(expected < 0) || x == run.x()) return false;
+    const double cost = run.cost_at(x), size = q.norm();
     const double gain = (cost - before + model.curvature_term(q)) / expected;  // -infinity where not defined
     if (!(gain >= 0.25)) {
       radius = 0.25 * size;
@@ -202,7 +199,7 @@ bool move(Search& search, double& radius) {
       radius *= 2;
     }
     if (cost < before) {
-      if (search.move_to(x)) return true;
+      if (run.move_to(x)) return true;
       radius = 0.25 * size;  // r is defined there, J is not
     }
   }
@@ -210,17 +207,17 @@ bool move(Search& search, double& radius) {
 
 }  // namespace
 
-void search_trust_region_reflective(Search& search) {
-  if (search.ended()) return;
-  double radius = search.x().cwiseQuotient(search.scale()).cwiseProduct(search.column_norms()).norm();
-  if (!(radius > 0)) radius = search.column_norms().norm();
+void search_trust_region_reflective(Optimisation& run) {
+  if (run.ended()) return;
+  double radius = run.x().cwiseQuotient(run.scale()).cwiseProduct(run.column_norms()).norm();
+  if (!(radius > 0)) radius = run.column_norms().norm();
   for (;;) {
-    const Landing approach = landing(search);
-    if (search.is_settled(approach.elsewhere)) land(search, approach);
-    if (search.settled()) return;
-    if (move(search, radius)) continue;
-    land(search, landing(search));
-    if (!search.settled()) search.stuck();
+    const Landing approach = landing(run);
+    if (run.would_converge(approach.elsewhere)) land(run, approach);
+    if (run.finished()) return;
+    if (move(run, radius)) continue;
+    land(run, landing(run));
+    if (!run.finished()) run.no_decrease();
     return;
   }
 }

@@ -23,7 +23,7 @@ struct CapacityChange {
     template <class Real>
     constexpr Law(const std::array<Real, 1>& p, double) : faster(Factor<S>(Real(1) / (Real(1) - p[0]))) {}
 
-    constexpr Current<S> counted(const Current<S>& counted_a, const Drive<S>&) const { return counted_a * faster; }
+    constexpr Current<S> counted(const Current<S>& counted_a, const StepInput<S>&) const { return counted_a * faster; }
   };
 };
 

@@ -30,8 +30,8 @@ struct ChargeTransfer {
     constexpr Law(const std::array<Real, 3>& p, double)
         : r0_share(Factor<S>(p[0])), r1_share(Factor<S>(p[1])), twice_i0_a(Current<S>(p[2] * Real(2))) {}
 
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
-      const S less = S(1) - flattening(drive.current_a / twice_i0_a);
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const StepInput<S>& input) const {
+      const S less = S(1) - flattening(input.current_a / twice_i0_a);
       mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, S(1) - r0_share * less);
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, S(1) - r1_share * less);
     }

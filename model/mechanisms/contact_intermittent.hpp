@@ -27,17 +27,17 @@ struct ContactIntermittent {
     Resistance<S> added_ohm;
     std::span<const Span> bursts;  ///< ascending, of the recording at hand; none: a contact that holds
     std::size_t next = 0;
-    bool there = false;
+    bool active = false;
 
     template <class Real>
     constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(Resistance<S>(p[0])) {}
 
     constexpr void at(double time_s) {
       while (next < bursts.size() && time_s > bursts[next].end_s) ++next;
-      there = next < bursts.size() && time_s >= bursts[next].start_s;
+      active = next < bursts.size() && time_s >= bursts[next].start_s;
     }
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const {
-      if (there) at.r0_ohm = Resistance<S>(at.r0_ohm + added_ohm);
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const StepInput<S>&) const {
+      if (active) at.r0_ohm = Resistance<S>(at.r0_ohm + added_ohm);
     }
   };
 };

@@ -21,7 +21,7 @@ struct ContactStep {
   struct Law {
     Resistance<S> added_ohm;
     double onset_s = 0;
-    bool there = true;
+    bool active = true;
 
     template <class Real>
     constexpr Law(const std::array<Real, 2>& p, double) : added_ohm(Resistance<S>(p[0])) {
@@ -31,9 +31,9 @@ struct ContactStep {
         onset_s = p[1];
     }
 
-    constexpr void at(double time_s) { there = time_s >= onset_s; }
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const {
-      if (there) at.r0_ohm = Resistance<S>(at.r0_ohm + added_ohm);
+    constexpr void at(double time_s) { active = time_s >= onset_s; }
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const StepInput<S>&) const {
+      if (active) at.r0_ohm = Resistance<S>(at.r0_ohm + added_ohm);
     }
   };
 };

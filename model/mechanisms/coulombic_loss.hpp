@@ -15,13 +15,13 @@ struct CoulombicLoss {
 
   template <class S>
   struct Law {
-    Fraction<S> stays;
+    Fraction<S> stored_fraction;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : stays(Fraction<S>(Real(1) - p[0])) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : stored_fraction(Fraction<S>(Real(1) - p[0])) {}
 
-    constexpr Current<S> counted(const Current<S>& counted_a, const Drive<S>&) const {
-      return counted_a > Current<S>(0) ? Current<S>(counted_a * stays) : counted_a;
+    constexpr Current<S> counted(const Current<S>& counted_a, const StepInput<S>&) const {
+      return counted_a > Current<S>(0) ? Current<S>(counted_a * stored_fraction) : counted_a;
     }
   };
 };

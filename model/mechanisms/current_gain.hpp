@@ -15,12 +15,12 @@ struct CurrentGain {
 
   template <class S>
   struct Law {
-    Factor<S> times;
+    Factor<S> factor;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : times(Factor<S>(Real(1) / (Real(1) + p[0]))) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : factor(Factor<S>(Real(1) / (Real(1) + p[0]))) {}
 
-    constexpr Current<S> true_current(const Current<S>& read_a) const { return read_a * times; }
+    constexpr Current<S> true_current(const Current<S>& read_a) const { return read_a * factor; }
   };
 };
 

@@ -21,8 +21,8 @@ struct DirectionAsymmetry {
     template <class Real>
     constexpr Law(const std::array<Real, 1>& p, double) : charging(Factor<S>(Real(1) + p[0])) {}
 
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
-      if (!(drive.current_a > Current<S>(0))) return;  // no current, no drop: its sign near zero does not matter
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const StepInput<S>& input) const {
+      if (!(input.current_a > Current<S>(0))) return;  // no current, no drop: its sign near zero does not matter
       mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, charging);
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, charging);
     }

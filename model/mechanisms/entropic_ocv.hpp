@@ -35,8 +35,8 @@ struct EntropicOcv {
           delta_v_per_k{Voltage<S>(p[1] - p[0]), Voltage<S>(p[2] - p[1]), Voltage<S>(p[3] - p[2])},
           reference_c(Temperature<S>(p[4])) {}
 
-    constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const Drive<S>& drive) const {
-      const Temperature<S> warmer_k = drive.temperature_c - reference_c;
+    constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const StepInput<S>& input) const {
+      const Temperature<S> warmer_k = input.temperature_c - reference_c;
       Voltage<S> here = v_per_k[3];
       if (soc < node[0]) {
         here = v_per_k[0];

@@ -31,9 +31,9 @@ struct FastPolarisation {
         : r_ohm(Resistance<S>(p[0])), rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
-    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {
-      return {settled_in<S>(drive.duration_s, rate_per_s),
-              Voltage<S>(Resistance<S>(r_ohm * at.activation) * drive.current_a)};
+    constexpr Relaxation<S> relaxation(std::size_t, const TablePoint<S>& at, const StepInput<S>& input) const {
+      return {step_response_after<S>(input.duration_s, rate_per_s),
+              Voltage<S>(Resistance<S>(r_ohm * at.activation) * input.current_a)};
     }
   };
 };

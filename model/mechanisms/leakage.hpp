@@ -21,7 +21,7 @@ struct Leakage {
     template <class Real>
     constexpr Law(const std::array<Real, 1>& p, double) : lost_a(Current<S>(p[0])) {}
 
-    constexpr Current<S> counted(const Current<S>& counted_a, const Drive<S>&) const { return counted_a - lost_a; }
+    constexpr Current<S> counted(const Current<S>& counted_a, const StepInput<S>&) const { return counted_a - lost_a; }
   };
 };
 

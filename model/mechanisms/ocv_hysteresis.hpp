@@ -57,25 +57,25 @@ struct OcvHysteresis {
           measured(p[4] > Real(0.5)) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return initial_v; }
-    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>&, const Drive<S>& drive,
-                                   const Voltage<S>* x) const {
-      const bool charging = drive.current_a > Current<S>(0);
-      const Current<S> size_a = charging ? drive.current_a : Current<S>(-drive.current_a);
+    constexpr Relaxation<S> relaxation(std::size_t, const TablePoint<S>&, const StepInput<S>& input,
+                                       const Voltage<S>* x) const {
+      const bool charging = input.current_a > Current<S>(0);
+      const Current<S> size_a = charging ? input.current_a : Current<S>(-input.current_a);
       const Current<S> milli = size_a * Fraction<S>(0.001);
-      const Exponent<S> moved = drive.duration_s * Rate<S>(milli * per_mas);
+      const Exponent<S> moved = input.duration_s * Rate<S>(milli * per_mas);
       const Voltage<S> target = charging ? half_gap_v : Voltage<S>(-half_gap_v);
-      const Fraction<S> exponentially = settled<S>(moved);
+      const Fraction<S> exponentially = step_response<S>(moved);
       if (!measured) return {exponentially, target};
       const Voltage<S> left_v = charging ? Voltage<S>(target - x[0]) : Voltage<S>(x[0] - target);
       const bool far = !(moved < Exponent<S>(2));
       const Voltage<S> step_v = half_gap_v * Fraction<S>(far ? Exponent<S>(0) : moved);
       return {!far && left_v > step_v ? ratio<Fraction<S>>(step_v, left_v) : Fraction<S>(1), target, exponentially};
     }
-    constexpr Voltage<S> error_at_first() const { return half_gap_v; }  // h may be anything
-    constexpr Voltage<S> lasting_error() const {
+    constexpr Voltage<S> initial_sigma_v() const { return half_gap_v; }  // h may be anything
+    constexpr Voltage<S> steady_state_sigma_v() const {
       return Voltage<S>(half_gap_v * Fraction<S>(0.25));
     }  // one state is not the whole of it: minor loops
-    constexpr void warm(TablePoint<S>& at, const Voltage<S>& state_v, const Drive<S>&) const {
+    constexpr void apply_state(TablePoint<S>& at, const Voltage<S>& state_v, const StepInput<S>&) const {
       if (!measured) {
         at.ocv_v = at.ocv_v - ocv_at_v;
         return;

@@ -26,7 +26,7 @@ struct OcvShape {
     template <class Real>
     constexpr Law(const std::array<Real, 2>& p, double) : low(Soc<S>(p[0])), high(Soc<S>(p[1])) {}
 
-    constexpr Soc<S> read_at(const Soc<S>& soc) const {
+    constexpr Soc<S> ocv_soc(const Soc<S>& soc) const {
       const auto one = Soc<S>(1), none = Soc<S>(0), five = Soc<S>(5);
       if (!(soc > none) || !(soc < one)) return soc;
       if (soc < Soc<S>(0.2)) return soc + Soc<S>(soc * five) * low;
@@ -34,8 +34,8 @@ struct OcvShape {
         return soc + (low + Soc<S>(Soc<S>(soc - Soc<S>(0.2)) * Soc<S>(1 / 0.6)) * Soc<S>(high - low));
       return soc + Soc<S>(Soc<S>(one - soc) * five) * high;
     }
-    /// d read_at / d soc
-    constexpr Coupling<S> read_slope(const Soc<S>& soc) const {
+    /// d ocv_soc / d soc
+    constexpr Coupling<S> ocv_soc_slope(const Soc<S>& soc) const {
       const auto one = Soc<S>(1), none = Soc<S>(0), five = Soc<S>(5);
       if (!(soc > none) || !(soc < one)) return Coupling<S>(1);
       if (soc < Soc<S>(0.2)) return Coupling<S>(one + low * five);

@@ -22,7 +22,7 @@ struct PolarisationGrowth {
     constexpr Law(const std::array<Real, 2>& p, double)
         : r1_times(Factor<S>(Real(1) + p[0])), c1_times(Factor<S>(Real(1) + p[1])) {}
 
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const {
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const StepInput<S>&) const {
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, r1_times);
       at.c1_f = Capacitance<S>(at.c1_f * c1_times);
       at.c1_delta_f = Capacitance<S>(at.c1_delta_f * c1_times);

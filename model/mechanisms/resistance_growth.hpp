@@ -15,13 +15,13 @@ struct ResistanceGrowth {
 
   template <class S>
   struct Law {
-    Factor<S> times;
+    Factor<S> factor;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : times(Factor<S>(Real(1) + p[0])) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : factor(Factor<S>(Real(1) + p[0])) {}
 
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>&) const {
-      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, times);
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const StepInput<S>&) const {
+      mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, factor);
     }
   };
 };

@@ -39,12 +39,12 @@ struct SelfHeating {
           rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
-    constexpr Relaxation<S> settle(std::size_t, const TablePoint<S>& at, const Drive<S>& drive) const {
-      const Voltage<S> drop_v = Resistance<S>(at.r0_ohm + at.r1_ohm) * drive.current_a;
-      const Coupling<S> heat_w = drop_v * drive.current_a;
-      return {settled_in<S>(drive.duration_s, rate_per_s), Voltage<S>(heat_w * per_w)};
+    constexpr Relaxation<S> relaxation(std::size_t, const TablePoint<S>& at, const StepInput<S>& input) const {
+      const Voltage<S> drop_v = Resistance<S>(at.r0_ohm + at.r1_ohm) * input.current_a;
+      const Coupling<S> heat_w = drop_v * input.current_a;
+      return {step_response_after<S>(input.duration_s, rate_per_s), Voltage<S>(heat_w * per_w)};
     }
-    constexpr void warm(TablePoint<S>& at, const Voltage<S>& hundred_k, const Drive<S>&) const {
+    constexpr void apply_state(TablePoint<S>& at, const Voltage<S>& hundred_k, const StepInput<S>&) const {
       const Temperature<S> reference_c(25);
       const Temperature<S> inside_c = reference_c + Temperature<S>(Coupling<S>(hundred_k) * Coupling<S>(100));
       const Factor<S> less = mechanism_detail::arrhenius<S>(energy, reference_c, inside_c);

@@ -50,11 +50,11 @@ struct SlowPolarisation {
     }
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
-    constexpr Relaxation<S> settle(std::size_t i, const TablePoint<S>& at, const Drive<S>& drive) const {
-      return {settled_in<S>(drive.duration_s, rate_per_s[i]),
-              Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * drive.current_a)};
+    constexpr Relaxation<S> relaxation(std::size_t i, const TablePoint<S>& at, const StepInput<S>& input) const {
+      return {step_response_after<S>(input.duration_s, rate_per_s[i]),
+              Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * input.current_a)};
     }
-    constexpr Coupling<S> ahead_per_v() const { return surface_per_v; }
+    constexpr Coupling<S> soc_shift_per_v() const { return surface_per_v; }
   };
 };
 

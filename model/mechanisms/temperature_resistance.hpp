@@ -41,9 +41,9 @@ struct TemperatureResistance {
           reference_c(Temperature<S>(p[2])),
           share(Fraction<S>(p[3])) {}
 
-    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const Drive<S>& drive) const {
-      const Factor<S> more = mechanism_detail::arrhenius<S>(r0_energy, reference_c, drive.temperature_c);
-      const Factor<S> slower = mechanism_detail::arrhenius<S>(r1_energy, reference_c, drive.temperature_c);
+    constexpr void tables(TablePoint<S>& at, const Soc<S>&, const StepInput<S>& input) const {
+      const Factor<S> more = mechanism_detail::arrhenius<S>(r0_energy, reference_c, input.temperature_c);
+      const Factor<S> slower = mechanism_detail::arrhenius<S>(r1_energy, reference_c, input.temperature_c);
       mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm,
                                  Factor<S>(Factor<S>(1) + share * Factor<S>(more - Factor<S>(1))));
       mechanism_detail::scale<S>(at.r1_ohm, at.r1_delta_ohm, slower);

@@ -15,12 +15,12 @@ struct VoltageGain {
 
   template <class S>
   struct Law {
-    Factor<S> times;
+    Factor<S> factor;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 1>& p, double) : times(Factor<S>(Real(1) + p[0])) {}
+    constexpr Law(const std::array<Real, 1>& p, double) : factor(Factor<S>(Real(1) + p[0])) {}
 
-    constexpr Voltage<S> reading(const Voltage<S>& v) const { return v * times; }
+    constexpr Voltage<S> reading(const Voltage<S>& v) const { return v * factor; }
   };
 };
 

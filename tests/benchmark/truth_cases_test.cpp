@@ -13,9 +13,9 @@
 
 #include "benchmark/truth/calibration.hpp"
 #include "benchmark/truth/case_files.hpp"
+#include "benchmark/truth/detection_scale.hpp"
 #include "benchmark/truth/effects.hpp"
 #include "benchmark/truth/healthy_cells.hpp"
-#include "benchmark/truth/yardstick.hpp"
 
 namespace bms::benchmark::truth {
 
@@ -55,18 +55,18 @@ std::vector<double> simulate(const CalibratedCell& cell, const std::vector<doubl
   return voltage_v;
 }
 
-Drive drive_of(std::vector<double> current_a) {
-  Drive drive;
-  drive.ambient_c.assign(current_a.size(), 25);
-  drive.current_a = std::move(current_a);
-  return drive;
+Stimulus stimulus_of(std::vector<double> current_a) {
+  Stimulus stimulus;
+  stimulus.ambient_c.assign(current_a.size(), 25);
+  stimulus.current_a = std::move(current_a);
+  return stimulus;
 }
 
-Drive stretches(std::initializer_list<std::pair<double, int>> current_a_and_seconds) {
+Stimulus stretches(std::initializer_list<std::pair<double, int>> current_a_and_seconds) {
   std::vector<double> current_a = {0};
   for (const auto& [a, seconds] : current_a_and_seconds)
     current_a.insert(current_a.end(), static_cast<std::size_t>(seconds), a);
-  return drive_of(std::move(current_a));
+  return stimulus_of(std::move(current_a));
 }
 
 HealthyCell cell_of(std::uint64_t seed) {
@@ -164,10 +164,10 @@ TEST(TruthCell, IsWhatACalibrated1RcModelSaysWhenItIsHealthy) {
     plant::Random random(seed);
     const CalibratedCell file = calibrate(cell, 0, random);
     EXPECT_EQ(file.capacity_ah, cell.capacity_ah);
-    const Drive drive = drive_of(draw_current_a(
+    const Stimulus stimulus = stimulus_of(draw_current_a(
         {.profile = Profile::hppc, .capacity_ah = cell.capacity_ah, .start_soc = 0.95, .lowest_soc = 0.1}, random));
-    const CellTrace trace = run_cell(cell, {}, drive, 0.95);
-    const std::vector<double> model_v = simulate(file, drive.current_a, drive.step_s, 0.95);
+    const CellTrace trace = run_cell(cell, {}, stimulus, 0.95);
+    const std::vector<double> model_v = simulate(file, stimulus.current_a, stimulus.step_s, 0.95);
     double sum = 0;
     for (std::size_t k = 0; k < model_v.size(); ++k)
       sum += (model_v[k] - trace.voltage_v[k]) * (model_v[k] - trace.voltage_v[k]);
@@ -180,10 +180,10 @@ TEST(TruthCell, IsWhatACalibrated1RcModelSaysWhenItIsHealthy) {
 TEST(TruthCell, KeepsItsHysteresisThroughARestAndForgetsItsPolarisation) {
   const HealthyCell cell = cell_of(4);
   const double i = cell.capacity_ah / 2;  // to 0.5 from above, and from below: 0.9 -> 0.5 -> 0.2 -> 0.5
-  const Drive drive = stretches({{-i, 2'880}, {0, 20'000}, {-i, 2'160}, {i, 2'160}, {0, 20'000}});
-  const std::size_t from_above = 2'880 + 20'000, from_below = drive.current_a.size() - 1;
+  const Stimulus stimulus = stretches({{-i, 2'880}, {0, 20'000}, {-i, 2'160}, {i, 2'160}, {0, 20'000}});
+  const std::size_t from_above = 2'880 + 20'000, from_below = stimulus.current_a.size() - 1;
   const auto gap_v = [&](const CellEffects& effects) {
-    const CellTrace trace = run_cell(cell, effects, drive, 0.9);
+    const CellTrace trace = run_cell(cell, effects, stimulus, 0.9);
     return trace.voltage_v[from_below] - trace.voltage_v[from_above];
   };
   CellEffects hysteretic, slow;
@@ -192,7 +192,7 @@ TEST(TruthCell, KeepsItsHysteresisThroughARestAndForgetsItsPolarisation) {
   EXPECT_NEAR(gap_v({}), 0, 1e-6);
   EXPECT_NEAR(gap_v(hysteretic), 0.02, 1e-6);
   EXPECT_NEAR(gap_v(slow), 0, 1e-5);
-  const CellTrace polarised = run_cell(cell, slow, drive, 0.9), healthy = run_cell(cell, {}, drive, 0.9);
+  const CellTrace polarised = run_cell(cell, slow, stimulus, 0.9), healthy = run_cell(cell, {}, stimulus, 0.9);
   EXPECT_NEAR(polarised.voltage_v[2'880] - healthy.voltage_v[2'880], -0.01, 2e-4)
       << "settled after 1.4 times the diffusion time";
 }
@@ -202,9 +202,9 @@ TEST(TruthCell, HasTheCalibratedResistanceAtSmallCurrentsOnlyWhenItsChargeTransf
   CellEffects effects;
   effects.charge_transfer = {.share_of_r0 = 0.4, .share_of_r1 = 1, .alpha = 0.4};
   const auto drop_of_healthy = [&](double rate) {
-    const Drive drive = stretches({{-rate * cell.capacity_ah, 60}});
+    const Stimulus stimulus = stretches({{-rate * cell.capacity_ah, 60}});
     const double rest_v = cell.ocv_v.at(0.6);
-    const CellTrace healthy = run_cell(cell, {}, drive, 0.6), real = run_cell(cell, effects, drive, 0.6);
+    const CellTrace healthy = run_cell(cell, {}, stimulus, 0.6), real = run_cell(cell, effects, stimulus, 0.6);
     const double ocv_change_v = cell.ocv_v.at(healthy.soc.back()) - rest_v;
     return (real.voltage_v.back() - rest_v - ocv_change_v) / (healthy.voltage_v.back() - rest_v - ocv_change_v);
   };
@@ -215,11 +215,11 @@ TEST(TruthCell, HasTheCalibratedResistanceAtSmallCurrentsOnlyWhenItsChargeTransf
 TEST(TruthCell, SettlesWhereButlerAndVolmerSay) {
   const HealthyCell cell = cell_of(7);
   const double current_a = -2 * cell.capacity_ah, thermal_v = 0.025693;  // RT/F at 25 degrees C
-  const Drive drive = stretches({{current_a, 200}});
+  const Stimulus stimulus = stretches({{current_a, 200}});
   for (double alpha : {0.35, 0.5, 0.65}) {
     CellEffects effects;
     effects.charge_transfer = {.share_of_r0 = 0.3, .share_of_r1 = 0.6, .alpha = alpha};
-    const CellTrace trace = run_cell(cell, effects, drive, 0.7);
+    const CellTrace trace = run_cell(cell, effects, stimulus, 0.7);
     const double soc = trace.soc.back();
     const auto current_of = [&](double overvoltage_v, double ohm) {
       return thermal_v / ohm *
@@ -233,27 +233,27 @@ TEST(TruthCell, SettlesWhereButlerAndVolmerSay) {
   }
 }
 
-TEST(Yardstick, MeasuresInProportionAndForgivesWhatACalibrationMayMiss) {
+TEST(DetectionScale, MeasuresInProportionAndForgivesWhatACalibrationMayMiss) {
   const HealthyCell cell = cell_of(3);
   plant::Random random(3);
-  const Drive drive =
-      drive_of(draw_current_a({.profile = Profile::hppc, .capacity_ah = cell.capacity_ah, .start_soc = 0.95}, random));
-  const CellTrace trace = run_cell(cell, {}, drive, 0.95);
-  const Yardstick yardstick(cell, drive, trace, 0.001);
+  const Stimulus stimulus = stimulus_of(
+      draw_current_a({.profile = Profile::hppc, .capacity_ah = cell.capacity_ah, .start_soc = 0.95}, random));
+  const CellTrace trace = run_cell(cell, {}, stimulus, 0.95);
+  const DetectionScale detection_scale(cell, stimulus, trace, 0.001);
 
   CellEffects grown;
   grown.growth.of_r0 = 0.02;
-  std::vector<double> d = run_cell(cell, grown, drive, 0.95).voltage_v;
+  std::vector<double> d = run_cell(cell, grown, stimulus, 0.95).voltage_v;
   for (std::size_t k = 0; k < d.size(); ++k) d[k] -= trace.voltage_v[k];
-  EXPECT_LT(yardstick.strength(d), 0.7) << "2 % of R0 is within the tolerance";
+  EXPECT_LT(detection_scale.strength(d), 0.7) << "2 % of R0 is within the tolerance";
   std::vector<double> tenfold = d;
   for (double& v : tenfold) v *= 10;
-  EXPECT_NEAR(yardstick.strength(tenfold), 10 * yardstick.strength(d), 1e-6);
-  EXPECT_NEAR(yardstick.likeness(d, tenfold), 1, 1e-9);
+  EXPECT_NEAR(detection_scale.strength(tenfold), 10 * detection_scale.strength(d), 1e-6);
+  EXPECT_NEAR(detection_scale.cosine_similarity(d, tenfold), 1, 1e-9);
 
-  std::vector<double> elsewhere = run_cell(cell, {}, drive, 0.945).voltage_v;
+  std::vector<double> elsewhere = run_cell(cell, {}, stimulus, 0.945).voltage_v;
   for (std::size_t k = 0; k < d.size(); ++k) elsewhere[k] -= trace.voltage_v[k];
-  EXPECT_LT(yardstick.strength(elsewhere), 0.25) << "0.5 % of start soc is one sigma";
+  EXPECT_LT(detection_scale.strength(elsewhere), 0.25) << "0.5 % of start soc is one sigma";
 }
 
 TEST(CaseFiles, NameTheirColumnsAndLeaveOutATemperatureThatIsNotThere) {

@@ -40,8 +40,9 @@ void line() {
                                    : s.lowest + span * uniform();
       const bool known = !s.has_invalid || chance() % 5 != 0;
       value = known ? static_cast<float>(x) : can::unknown;
-      const double held = std::min(std::max(x, static_cast<double>(s.lowest)), static_cast<double>(s.highest));
-      values += fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, known ? fmt::format("{}", held) : "null");
+      const double clamped = std::min(std::max(x, static_cast<double>(s.lowest)), static_cast<double>(s.highest));
+      values +=
+          fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, known ? fmt::format("{}", clamped) : "null");
     } else if constexpr (std::same_as<std::remove_reference_t<decltype(value)>, std::int32_t>) {
       const auto most = static_cast<std::int32_t>(can::mask(s.bits - 1));
       value = static_cast<std::int32_t>(chance());

@@ -5,9 +5,9 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/good_to.hpp"
+#include "diagnosis/model_tolerance.hpp"
 #include "diagnosis/screen.hpp"
-#include "tests/diagnosis/evidence.hpp"
+#include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
 namespace {
@@ -103,7 +103,7 @@ TEST(Diagnose, TheExtendedCellHasItsTablesWhereTheyFitBesideWhatWasFound) {
   const auto add_v = [](std::size_t, double current_a, double) { return 0.002 + 0.004 * current_a; };
   const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 20), 0.7, 20, add_v)});
   ASSERT_THAT(ids_of(d), ElementsAre("resistance_growth"));
-  const Record later = test::recorded(test::drive(1, 21), 0.6, 21, add_v);
+  const PreparedRecording later = test::recorded(test::drive(1, 21), 0.6, 21, add_v);
   const auto rms_v = [&](const model::CellParameters<>& cell) {
     const std::vector<double> v = predict(cell, later_recording(d.extended), later);
     double sum = 0;
@@ -115,21 +115,21 @@ TEST(Diagnose, TheExtendedCellHasItsTablesWhereTheyFitBesideWhatWasFound) {
 }
 
 TEST(Diagnose, WithoutInformationNothingIsSaid) {
-  Record rest = test::recorded(std::vector<double>(3'000, 0.0), 0.7, 16);
+  PreparedRecording rest = test::recorded(std::vector<double>(3'000, 0.0), 0.7, 16);
   EXPECT_EQ(diagnose(test::table9(), {}, {rest}).verdict, Verdict::not_testable);
-  Record constant = test::recorded(std::vector<double>(3'000, -3.0), 0.9, 17);
+  PreparedRecording constant = test::recorded(std::vector<double>(3'000, -3.0), 0.9, 17);
   constant.current_a[0] = -3;
   const Diagnosis d = diagnose(test::table9(), {}, {constant});
   EXPECT_EQ(d.verdict, Verdict::not_testable);
   EXPECT_EQ(d.not_testable.size(), model::mechanism_count);
-  Record brief = test::recorded(test::drive(0.05, 18), 0.7, 18);
+  PreparedRecording brief = test::recorded(test::drive(0.05, 18), 0.7, 18);
   EXPECT_EQ(diagnose(test::table9(), {}, {brief}).verdict, Verdict::not_testable);
 }
 
 /// At a current sensor's offset that moves the charge by several per cent, the knees are too far away for a line to
 /// point there.
 TEST(Diagnose, FindsAnOffsetThatMovesTheKneesFar) {
-  Record r = test::recorded(test::drive(4, 31), 0.9, 31);
+  PreparedRecording r = test::recorded(test::drive(4, 31), 0.9, 31);
   for (double& a : r.current_a) a += 0.2;  // 13 % of soc
   const Diagnosis d = diagnose(test::table9(), {}, {r});
   ASSERT_FALSE(d.findings.empty());
@@ -139,14 +139,14 @@ TEST(Diagnose, FindsAnOffsetThatMovesTheKneesFar) {
 }
 
 TEST(Diagnose, LeakageAndAnOffsetAreNotBesideEachOther) {
-  Record r = test::recorded(test::drive(2, 32), 0.7, 32);
-  Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
+  PreparedRecording r = test::recorded(test::drive(2, 32), 0.7, 32);
+  LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
   const std::size_t leakage = model::mechanism_index("leakage"), offset = model::mechanism_index("current_offset");
   const Hypothesis leaking = with(evidence.base(), leakage, 6);
   EXPECT_TRUE(not_testable(evidence, leaking, offset).has_value());
   EXPECT_FALSE(not_testable(evidence, evidence.base(), offset).has_value());
   r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002}};
-  const Evidence trusted(test::table9(), {}, {r}, NoiseModel{});
+  const LikelihoodModel trusted(test::table9(), {}, {r}, NoiseModel{});
   EXPECT_FALSE(not_testable(trusted, leaking, offset).has_value()) << "a trusted ammeter tells them apart";
 }
 
@@ -154,7 +154,7 @@ TEST(Diagnose, LeakageAndAnOffsetAreNotBesideEachOther) {
 TEST(Diagnose, WhatIsSeenAtMomentsStandsBesideWhatIsLargeThroughout) {
   std::vector<double> gentle = test::drive(2, 34);
   for (double& a : gentle) a *= 0.1;
-  Record r = test::recorded(gentle, 0.7, 34);
+  PreparedRecording r = test::recorded(gentle, 0.7, 34);
   for (std::size_t k = r.size() - 1; k > 0; --k) r.voltage_v[k] = r.voltage_v[k - 1] + 0.06;
   const Diagnosis d = diagnose(test::table9(), {}, {r});
   EXPECT_EQ(d.findings.size(), 2U);
@@ -167,11 +167,11 @@ TEST(Diagnose, AFileIsGoodToWhatItLeavesOfItsOwnRecordings) {
       return v * std::sin(2 * 3.14159265 * static_cast<double>(k) / 1'234);
     });
   };
-  EXPECT_EQ(widening(test::table9(), {}, {left_over(0)}), 1);
-  const double factor = widening(test::table9(), {}, {left_over(0.012)});
+  EXPECT_EQ(tolerance_factor(test::table9(), {}, {left_over(0)}), 1);
+  const double factor = tolerance_factor(test::table9(), {}, {left_over(0.012)});
   EXPECT_GT(factor, 1);
   model::CellParameters<> wide = test::table9();
-  wide.tolerance = widened(wide.tolerance, factor);
+  wide.tolerance = with_wider_tolerance(wide.tolerance, factor);
   EXPECT_EQ(diagnose(test::table9(), {}, {left_over(0.012)}).verdict, Verdict::unknown);
   EXPECT_EQ(diagnose(wide, {}, {left_over(0.012)}).verdict, Verdict::no_mismatch);
 }

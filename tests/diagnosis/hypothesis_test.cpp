@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/bursts.hpp"
-#include "model/readings.hpp"
-#include "tests/diagnosis/evidence.hpp"
+#include "model/corrected_readings.hpp"
+#include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
 namespace {
@@ -18,8 +18,8 @@ model::CellParameters<> without_steps(model::CellParameters<> cell) {
   return cell;
 }
 
-Evidence plant_evidence(std::uint64_t seed = 1) {
-  Record r = test::recorded(test::drive(1, seed), 0.7, seed);
+LikelihoodModel plant_evidence(std::uint64_t seed = 1) {
+  PreparedRecording r = test::recorded(test::drive(1, seed), 0.7, seed);
   r.temperature_c.assign(r.size(), 15.0);
   for (std::size_t k = 0; k < r.size(); ++k)
     r.temperature_c[k] += 10.0 * static_cast<double>(k) / static_cast<double>(r.size());
@@ -27,7 +27,7 @@ Evidence plant_evidence(std::uint64_t seed = 1) {
 }
 
 /// The mechanism well away from its neutral values.
-Hypothesis acting(const Evidence& evidence, std::size_t mechanism) {
+Hypothesis acting(const LikelihoodModel& evidence, std::size_t mechanism) {
   const double ah = evidence.cell().capacity_ah;
   const model::MechanismInfo& info = model::catalogue[mechanism];
   Hypothesis h = with(evidence.base(), mechanism, ah);
@@ -42,14 +42,14 @@ Hypothesis acting(const Evidence& evidence, std::size_t mechanism) {
 
 /// Every parameter of every mechanism: what the dual numbers say and what a small change does.
 TEST(Hypothesis, DerivativesAreThoseOfTheSimulation) {
-  const Evidence evidence = plant_evidence();
+  const LikelihoodModel evidence = plant_evidence();
   const double ah = evidence.cell().capacity_ah;
   const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(evidence.calibration().size()), 0.3);
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
     const model::MechanismInfo& info = model::catalogue[m];
     if (info.id == "contact_intermittent") continue;
     const Hypothesis h = acting(evidence, m);
-    const std::vector<Sought> sought = h.sought();
+    const std::vector<ParameterRef> sought = h.sought();
     const Columns exact = evidence.derivatives(h, u, sought);
     for (std::size_t j = 0; j < sought.size(); ++j) {
       const model::Parameter& parameter = info.parameter[sought[j].parameter];
@@ -66,11 +66,11 @@ TEST(Hypothesis, DerivativesAreThoseOfTheSimulation) {
 
 /// By every base parameter, each a dual number that goes through the whole recording: slow and plain. One record, one
 /// mechanism.
-Columns plain_calibration_derivatives(const Evidence& evidence, const Hypothesis& h, const Eigen::VectorXd& at) {
+Columns plain_calibration_derivatives(const LikelihoodModel& evidence, const Hypothesis& h, const Eigen::VectorXd& at) {
   constexpr Eigen::Index lanes = 16;
   using S = ceres::Jet<double, lanes>;
   const model::CellParameters<>& cell = evidence.cell();
-  const Record& r = evidence.records().front();
+  const PreparedRecording& r = evidence.records().front();
   const Calibration& calibration = evidence.calibration();
   const auto tables = model::prepare<double, model::max_intervals>(cell);
   const model::MechanismInfo& info = model::catalogue[h.settings.back().index];
@@ -90,8 +90,9 @@ Columns plain_calibration_derivatives(const Evidence& evidence, const Hypothesis
                      cell.capacity_ah);
     const model::CorrectedReadings<S> readings(r.time_s, r.current_a, r.temperature_c, S(setting("channel_skew", 0)),
                                                S(setting("temperature_sensor", 1)));
-    model::Course<S> course(tables, cell.capacity_ah, laws,
-                            calibration.initial_soc_shift(0, u) + (r.initial_soc + setting("initial_soc", 0)));
+    model::OpenLoopSimulation<S> course(
+        tables, cell.capacity_ah, laws,
+        calibration.initial_soc_shift(0, u) + (r.initial_soc + setting("initial_soc", 0)));
     for (std::size_t k = 0; k < r.size(); ++k) {
       const S read_a = readings.current(k) - calibration.offset_a(0, r.time_s[k], u);
       const S v = course.step(r.time_s[k], k > 0 ? r.time_s[k] - r.time_s[k - 1] : 0, read_a, readings.temperature(k),
@@ -105,7 +106,7 @@ Columns plain_calibration_derivatives(const Evidence& evidence, const Hypothesis
 
 /// Carried from row to row or one by one through everything: the same but for rounding, whatever acts beside them.
 TEST(Hypothesis, BaseParametersCarriedTogetherAreThoseOneByOne) {
-  const Evidence evidence = plant_evidence();
+  const LikelihoodModel evidence = plant_evidence();
   const Eigen::VectorXd u =
       Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(evidence.calibration().size()), -0.5, 0.7);
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
@@ -121,13 +122,13 @@ TEST(Hypothesis, BaseParametersCarriedTogetherAreThoseOneByOne) {
 
 TEST(Hypothesis, DerivativesByTheBaseParametersToo) {
   // two recordings, and checks of both channels
-  const Evidence one = plant_evidence(2);
-  std::vector<Record> records(2, one.records().front());
+  const LikelihoodModel one = plant_evidence(2);
+  std::vector<PreparedRecording> records(2, one.records().front());
   records[1].initial_soc = 0.65;
-  for (Record& r : records)
+  for (PreparedRecording& r : records)
     r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002},
                 {Check::Channel::voltage, 1'800, 2, 3.3, 3.301, 0.001}};
-  const Evidence evidence(one.cell(), {}, records, NoiseModel{});
+  const LikelihoodModel evidence(one.cell(), {}, records, NoiseModel{});
   const Hypothesis h = evidence.base();
   Eigen::VectorXd u = evidence.unchanged();
   const Columns exact = evidence.calibration_derivatives(h, u);
@@ -141,11 +142,11 @@ TEST(Hypothesis, DerivativesByTheBaseParametersToo) {
 }
 
 TEST(Hypothesis, AFitIsNeverWorseThanWhereItBegan) {
-  const Evidence evidence = plant_evidence(3);
-  const Fit base = evidence.fit(evidence.base());
+  const LikelihoodModel evidence = plant_evidence(3);
+  const HypothesisFit base = evidence.fit(evidence.base());
   for (const char* id : {"ocv_hysteresis", "slow_polarisation", "fast_polarisation", "capacity_change",
                          "resistance_growth", "ocv_shape"}) {
-    const Fit fit =
+    const HypothesisFit fit =
         evidence.fit(with(base.hypothesis, model::mechanism_index(id), evidence.cell().capacity_ah), base.calibration);
     EXPECT_LE(fit.cost, base.cost + 1) << id;
   }
@@ -153,10 +154,10 @@ TEST(Hypothesis, AFitIsNeverWorseThanWhereItBegan) {
 
 TEST(Hypothesis, FindsAStrengthThatWasPutIn) {
   const double more_ohm = 0.004;
-  const Record r = test::recorded(test::drive(2, 4), 0.7, 4,
-                                  [&](std::size_t, double current_a, double) { return more_ohm * current_a; });
-  const Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
-  const Fit fit = evidence.fit(with(evidence.base(), model::mechanism_index("resistance_growth"), 6));
+  const PreparedRecording r = test::recorded(
+      test::drive(2, 4), 0.7, 4, [&](std::size_t, double current_a, double) { return more_ohm * current_a; });
+  const LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
+  const HypothesisFit fit = evidence.fit(with(evidence.base(), model::mechanism_index("resistance_growth"), 6));
   const MechanismSetting& found = fit.hypothesis.settings.back();
   EXPECT_NEAR(found.value[0], more_ohm / 0.0133, 0.03);
   EXPECT_GT(found.deviation[0], 0.001);
@@ -166,7 +167,7 @@ TEST(Hypothesis, FindsAStrengthThatWasPutIn) {
 
 /// A fit may be asked about where its simulation has run away.
 TEST(Bursts, EndWhateverTheResidual) {
-  const Evidence evidence = plant_evidence(5);
+  const LikelihoodModel evidence = plant_evidence(5);
   std::vector<double> residual_v(evidence.readings(), 0.001);
   for (std::size_t k = 1'000; k < 1'020; ++k) residual_v[k] = k % 2 == 0 ? 1e298 : -1e298;
   double ohm = 0;

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/reference.hpp"
-#include "tests/diagnosis/evidence.hpp"
+#include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
 namespace {
@@ -12,14 +12,14 @@ namespace {
 constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 
 MechanismSetting setting(std::string_view id, std::initializer_list<double> values) {
-  MechanismSetting s = model::unsaid(index_of(id), 6);
+  MechanismSetting s = model::default_setting(index_of(id), 6);
   std::copy(values.begin(), values.end(), s.value.begin());
   return s;
 }
 
 /// A diagnosis that has found these, each as well known as a recording tells it, and cannot tell them apart.
 Diagnosis undecided(const std::vector<MechanismSetting>& set, double deviation) {
-  const Evidence evidence(test::table9(), {}, {test::recorded(test::drive(0.1, 1), 0.7, 1)}, NoiseModel{});
+  const LikelihoodModel evidence(test::table9(), {}, {test::recorded(test::drive(0.1, 1), 0.7, 1)}, NoiseModel{});
   Diagnosis d;
   d.verdict = Verdict::ambiguous;
   const auto fitted = [&](const MechanismSetting& s) {
@@ -83,26 +83,26 @@ TEST(NextExperiment, WhatStandsAloneNeedsNone) {
 }
 
 /// An hour's drive, then half an hour with the contactor open; read_a: what the sensor says there.
-Record with_open_contactor(double offset_a) {
+PreparedRecording with_open_contactor(double offset_a) {
   std::vector<double> current_a = test::drive(2, 31);
   for (std::size_t k = 3'600; k < 5'400; ++k) current_a[k] = 0;
-  Record r = test::recorded(current_a, 0.7, 31);
+  PreparedRecording r = test::recorded(current_a, 0.7, 31);
   std::vector<double> reference_a(r.size(), std::nan(""));
   for (std::size_t k = 0; k < r.size(); ++k) r.current_a[k] += offset_a;
   for (std::size_t k = 3'600; k < 5'400; ++k) reference_a[k] = 0;
-  take_references(r, reference_a, {}, test::table9());
+  average_references(r, reference_a, {}, test::table9());
   return r;
 }
 
 TEST(Reference, TheReadingOfAnOpenContactorDecidesBetweenLeakageAndAnOffset) {
   const double offset_a = 0.06;
-  const Record r = with_open_contactor(offset_a);
+  const PreparedRecording r = with_open_contactor(offset_a);
   ASSERT_GE(r.checks.size(), 5U);
-  const auto cost = [](const Record& record, const char* id) {
-    const Evidence evidence(test::table9(), {}, {record}, NoiseModel{});
+  const auto cost = [](const PreparedRecording& record, const char* id) {
+    const LikelihoodModel evidence(test::table9(), {}, {record}, NoiseModel{});
     return evidence.fit(with(evidence.base(), index_of(id), 6)).cost;
   };
-  Record without = r;
+  PreparedRecording without = r;
   without.checks.clear();
   EXPECT_LT(std::abs(cost(without, "leakage") - cost(without, "current_offset")), 7)
       << "the voltage alone does not tell";
@@ -110,16 +110,16 @@ TEST(Reference, TheReadingOfAnOpenContactorDecidesBetweenLeakageAndAnOffset) {
 }
 
 TEST(Reference, ChecksOfTheVoltageTellAnOffsetFromAGainAndAContact) {
-  Record r = test::recorded(test::drive(1, 32), 0.7, 32, [](std::size_t, double, double) { return 0.01; });
+  PreparedRecording r = test::recorded(test::drive(1, 32), 0.7, 32, [](std::size_t, double, double) { return 0.01; });
   std::vector<double> reference_a(r.size(), std::nan("")), reference_v(r.size(), std::nan(""));
   for (std::size_t k = 600; k < 1'800; ++k) {
     reference_a[k] = 0;
     reference_v[k] = k / 120 % 2 == 0 ? 2.5 : 3.6;
     r.voltage_v[k] = reference_v[k] + 0.01;
   }
-  take_references(r, reference_a, reference_v, test::table9());
+  average_references(r, reference_a, reference_v, test::table9());
   EXPECT_TRUE(std::isnan(r.voltage_v[700])) << "a source's voltage is not the cell's";
-  const Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
+  const LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
   EXPECT_EQ(evidence.used(), r.size() - 1'200 - (std::abs(r.current_a[0]) < 0.06 ? 0 : 1));
   const auto cost = [&](const char* id) { return evidence.fit(with(evidence.base(), index_of(id), 6)).cost; };
   EXPECT_GT(cost("voltage_gain") - cost("voltage_offset"), 30);
@@ -128,16 +128,16 @@ TEST(Reference, ChecksOfTheVoltageTellAnOffsetFromAGainAndAContact) {
 
 /// The derivatives of the checks, all mechanisms that they see.
 TEST(Reference, DerivativesOfChecksAreThoseOfTheSimulation) {
-  Record r = with_open_contactor(0.1);
+  PreparedRecording r = with_open_contactor(0.1);
   r.checks.push_back({Check::Channel::voltage, 4'000, 2, 3.31, 3.3, 0.001});
   r.checks.push_back({Check::Channel::voltage, 4'100, -2, 3.21, 3.2, 0.001});
-  const Evidence evidence(test::table9(), {}, {r}, NoiseModel{});
+  const LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
   const auto checks = static_cast<Eigen::Index>(r.checks.size());
   const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(evidence.calibration().size()), 0.2);
   for (const char* id : {"current_offset", "current_gain", "voltage_offset", "voltage_gain", "contact_step"}) {
     Hypothesis h = with(evidence.base(), index_of(id), 6);
     h.settings.back().value[0] = 0.01;
-    const Eigen::VectorXd exact = evidence.derivatives(h, u, std::vector<Sought>{{0, 0}}).col(0).tail(checks);
+    const Eigen::VectorXd exact = evidence.derivatives(h, u, std::vector<ParameterRef>{{0, 0}}).col(0).tail(checks);
     Hypothesis more = h, less = h;
     more.settings.back().value[0] += 1e-6;
     less.settings.back().value[0] -= 1e-6;
@@ -147,9 +147,9 @@ TEST(Reference, DerivativesOfChecksAreThoseOfTheSimulation) {
   }
 }
 
-TEST(Evidence, ALaterRecordingKeepsTheContactAndForgetsTheWrongStart) {
-  const Record r = test::recorded(test::drive(0.5, 33), 0.7, 33);
-  const Evidence evidence(test::table9(), {}, {r, r}, NoiseModel{});
+TEST(LikelihoodModel, ALaterRecordingKeepsTheContactAndForgetsTheWrongStart) {
+  const PreparedRecording r = test::recorded(test::drive(0.5, 33), 0.7, 33);
+  const LikelihoodModel evidence(test::table9(), {}, {r, r}, NoiseModel{});
   const Eigen::VectorXd none = evidence.unchanged();
   const std::vector<double> plain = evidence.voltage(evidence.base(), none, 1);
   EXPECT_EQ(evidence.voltage(with(evidence.base(), setting("initial_soc", {0.1})), none, 1), plain);

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/quiet_current.hpp"
+#include "diagnosis/denoise_current.hpp"
 #include "plant/random.hpp"
 
 namespace bms::diagnosis {
@@ -98,7 +98,7 @@ TEST(QuietCurrent, KeepsStepsAndLosesNoise) {
     read_a.push_back(true_a.back() + 0.02 * random.normal());
   }
   EXPECT_NEAR(current_noise(read_a), 0.02, 0.005);
-  const std::vector<double> quiet_a = quiet_current(read_a, 0.02);
+  const std::vector<double> quiet_a = denoise_current(read_a, 0.02);
   double before = 0, after = 0;
   for (std::size_t k = 0; k < read_a.size(); ++k) {
     before += std::pow(read_a[k] - true_a[k], 2);

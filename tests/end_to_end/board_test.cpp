@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/end_to_end/run_tool.hpp"
-#include "tests/files/refusal.hpp"
+#include "tests/files/rejected_input.hpp"
 
 namespace bms {
 namespace {
@@ -55,7 +55,8 @@ TEST(Board, AnIdentifiedCellGoesThroughTheGeneratorAndComputesTheSameBits) {
 std::filesystem::path extended_cell(const images::TemporaryFolder& folder, const std::string& name,
                                     const std::string& tables) {
   const auto path = folder.path() / (name + ".toml");
-  std::ofstream(path) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\"table9\"", "\"" + name + "\"")
+  std::ofstream(path) << files::replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\"table9\"",
+                                         "\"" + name + "\"")
                       << tables;
   return path;
 }
@@ -99,8 +100,8 @@ TEST(Board, EstimatesErrorsThatLastBitForBitLikeTheHost) {
     EXPECT_THAT(run.out, HasSubstr("every bit equal"));
   }
   const std::string alone = extended_cell(folder, "alone", "").string(), trace = (folder.path() / "t.csv").string();
-  std::ofstream(alone) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\n[tolerance]",
-                                   "errors_are_states = true\n[tolerance]");
+  std::ofstream(alone) << files::replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\n[tolerance]",
+                                          "errors_are_states = true\n[tolerance]");
   const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + alone);
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("every bit equal"));
@@ -226,8 +227,8 @@ TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
   const auto other = folder.path() / "ulp.toml";
   ASSERT_EQ(std::nextafter(0.0135692F, 1.0F), 0.013569201F);
   ASSERT_NE(0.0135692F, 0.013569201F);
-  std::ofstream(other) << replaced(
-      replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0135692, ", "0.013569201, "), "\"table9\"",
+  std::ofstream(other) << files::replaced(
+      files::replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0135692, ", "0.013569201, "), "\"table9\"",
       "\"ulp\"");
   const ToolRun run = run_tool("replay " + shift + on_board + " --board-cell " + other.string());
   EXPECT_EQ(run.exit_code, 1);
@@ -240,7 +241,7 @@ TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
 TEST(Board, ACellThatIsOutOfRangeIsRefusedByTheFirmwareBuild) {
   const images::TemporaryFolder folder;
   const auto bad = folder.path() / "bad.toml";
-  std::ofstream(bad) << replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0140197", "0.9");
+  std::ofstream(bad) << files::replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0140197", "0.9");
   const std::string log = (folder.path() / "log").string();
   const int status = std::system(
       ("\"" BMS_CELL_HEADER_TOOL "\" " + bad.string() + " " + (folder.path() / "out.hpp").string() + " 2> " + log)

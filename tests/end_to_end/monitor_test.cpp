@@ -270,7 +270,7 @@ class LiveScreen : public ::testing::Test {
     next_ = now + std::chrono::milliseconds(100);
     for (const monitor::BusFrame& frame : traffic_.sample()) {
       std::array<char, hal::slcan::longest_frame> text;
-      adapter_.write(std::string(hal::slcan::encode(classic(frame), text)));
+      adapter_.write(std::string(hal::slcan::encode(to_can_frame(frame), text)));
     }
   }
   std::string shown_until(const std::string& what) {

@@ -29,7 +29,7 @@ struct Pack {
   }
 
   void second(double current_a, std::size_t silent = cells) {
-    typename CellDifferences<S, cells>::Seen seen;
+    typename CellDifferences<S, cells>::Observation seen;
     double sum = 0;
     for (std::size_t k = 0; k < cells; ++k) {
       truth[k].run(current_a, 25, 1);

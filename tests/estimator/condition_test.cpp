@@ -58,7 +58,7 @@ TYPED_TEST(ConditionOfEveryScalar, TellsOfAShiftWhatItsPartsTell) {
     if (k > 0) largest_jump = std::max(largest_jump, std::abs(now - shown));
     shown = now;
     observable = observable || truck.condition.quality().observable;
-    bridged = bridged || truck.condition.quality().bridged_s > 600;
+    bridged = bridged || truck.condition.quality().since_anchor_s > 600;
   }
   EXPECT_LT(largest_jump, 0.0005) << "6 A for a second are 0.03 %, and half a percent a minute";
   EXPECT_NEAR(shown, truck.plant.soc(), 0.02);

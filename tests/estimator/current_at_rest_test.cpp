@@ -10,21 +10,21 @@ constexpr std::uint64_t second_us = 1'000'000;
 
 bool after(CurrentAtRest& r, int seconds, std::int32_t ua) {
   bool rests = false;
-  for (int k = 0; k < seconds; ++k) rests = r.rests(ua, second_us, resting);
+  for (int k = 0; k < seconds; ++k) rests = r.is_at_rest(ua, second_us, resting);
   return rests;
 }
 
 TEST(CurrentAtRest, ASmallReadingThatStaysForAMinuteRests) {
   CurrentAtRest r;
   EXPECT_FALSE(after(r, 60, 30'000));
-  EXPECT_TRUE(r.rests(35'000, second_us, resting));
+  EXPECT_TRUE(r.is_at_rest(35'000, second_us, resting));
   EXPECT_TRUE(after(r, 1, -30'000 + 36'000));
 }
 
 TEST(CurrentAtRest, OneThatMovesOrIsTooLargeForAnOffsetDoesNot) {
   CurrentAtRest r;
   EXPECT_TRUE(after(r, 100, 30'000));
-  EXPECT_FALSE(r.rests(56'000, second_us, resting)) << "further than an offset wanders";
+  EXPECT_FALSE(r.is_at_rest(56'000, second_us, resting)) << "further than an offset wanders";
   EXPECT_FALSE(after(r, 59, 56'000)) << "the minute begins anew";
   EXPECT_TRUE(after(r, 2, 56'000));
   EXPECT_FALSE(after(r, 1'000, 81'000));
@@ -34,16 +34,16 @@ TEST(CurrentAtRest, OneThatMovesOrIsTooLargeForAnOffsetDoesNot) {
 TEST(CurrentAtRest, AMissingReadingEndsIt) {
   CurrentAtRest r;
   EXPECT_TRUE(after(r, 100, 0));
-  r.moves();
+  r.reset();
   EXPECT_FALSE(after(r, 60, 0));
 }
 
 TEST(CurrentAtRest, NoLengthOfARestOrAStepWrapsIt) {
   CurrentAtRest r;
-  r.rests(0, second_us, resting);
-  for (int k = 0; k < 100; ++k) ASSERT_TRUE(r.rests(0, std::uint64_t{1} << 63, resting));
-  EXPECT_FALSE(r.rests(2'147'483'647, second_us, resting));
-  EXPECT_FALSE(r.rests(-2'147'483'647 - 1, second_us, resting));
+  r.is_at_rest(0, second_us, resting);
+  for (int k = 0; k < 100; ++k) ASSERT_TRUE(r.is_at_rest(0, std::uint64_t{1} << 63, resting));
+  EXPECT_FALSE(r.is_at_rest(2'147'483'647, second_us, resting));
+  EXPECT_FALSE(r.is_at_rest(-2'147'483'647 - 1, second_us, resting));
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ template <class S>
 using HostLaws = ChosenLaws<S>;
 template <class S>
 using Cells = ExtendedCell<S, max_intervals, HostLaws<S>>;
-constexpr std::size_t held = HostLaws<double>::most_states;
+constexpr std::size_t mechanism_state_count = HostLaws<double>::most_states;
 
 template <class S>
 Cells<S> table9_with(const std::vector<MechanismSetting>& mechanisms) {
@@ -41,8 +41,8 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
   constexpr std::size_t voltages = HostLaws<double>::most_voltage_states, states = voltages + 2;
   ASSERT_EQ(voltages, 4U);
   using Jet = ceres::Jet<double, static_cast<int>(states)>;
-  using Model = ExtendedRc<voltages, held>::Of<double>;
-  using JetModel = ExtendedRc<voltages, held>::Of<Jet>;
+  using Model = ExtendedRc<voltages, mechanism_state_count>::Of<double>;
+  using JetModel = ExtendedRc<voltages, mechanism_state_count>::Of<Jet>;
   const auto cell = table9_with<double>(everything());
   const auto jets = table9_with<Jet>(everything());
   ASSERT_EQ(cell.laws.voltage_states(), voltages);
@@ -50,33 +50,33 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
   std::uniform_real_distribution<double> uniform(0, 1);
   for (int run = 0; run < 1'000; ++run) {
     const double soc = -0.05 + 1.1 * uniform(random);
-    Model::Polarisation x;
+    Model::State x;
     for (double& v : x) v = 0.05 * (uniform(random) - 0.5);
     x.back() = 0.05 * uniform(random);  // warmth, 5 K at most
-    const Drive<double> drive{30 * (uniform(random) - 0.5), std::pow(10, 3 * uniform(random) - 2),
-                              40 * uniform(random)};
+    const StepInput<double> input{30 * (uniform(random) - 0.5), std::pow(10, 3 * uniform(random) - 2),
+                                  40 * uniform(random)};
     std::uint8_t interval = 0;
-    const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, soc, interval);
-    const auto settling = Model::settling(cell.laws, x, at, drive);
-    const auto f = Model::transition(x, at, settling, drive);
-    const auto h = Model::sensitivity(cell.laws, at, drive);
+    const auto at = look_up(OperatingPoint{cell, input, Model::mechanism_states(x)}, soc, interval);
+    const auto discretisation = Model::discretise(cell.laws, x, at, input);
+    const auto f = Model::state_transition(x, at, discretisation, input);
+    const auto h = Model::measurement_jacobian(cell.laws, at, input);
 
-    typename JetModel::Polarisation y;
+    typename JetModel::State y;
     for (std::size_t k = 0; k < y.size(); ++k) y[k] = k <= voltages ? Jet(x[k], static_cast<int>(k)) : Jet(x[k]);
-    const Drive<Jet> drive_j{Jet(drive.current_a), Jet(drive.duration_s), Jet(drive.temperature_c)};
+    const StepInput<Jet> input_j{Jet(input.current_a), Jet(input.duration_s), Jet(input.temperature_c)};
     const Jet soc_j(soc, static_cast<int>(states - 1));
-    const auto at_j = look_up(CellUnder{jets, drive_j, JetModel::held(y)}, soc_j, interval);
-    const auto settling_j = JetModel::settling(jets.laws, y, at_j, drive_j);
-    const auto moved = JetModel::advance(y, at_j, settling_j, drive_j);
-    const Jet v = JetModel::voltage(jets.laws, y, at_j, drive_j);
-    EXPECT_NEAR(v.a, Model::voltage(cell.laws, x, at, drive), 1e-12);
+    const auto at_j = look_up(OperatingPoint{jets, input_j, JetModel::mechanism_states(y)}, soc_j, interval);
+    const auto discretisation_j = JetModel::discretise(jets.laws, y, at_j, input_j);
+    const auto moved = JetModel::advance(y, at_j, discretisation_j, input_j);
+    const Jet v = JetModel::voltage(jets.laws, y, at_j, input_j);
+    EXPECT_NEAR(v.a, Model::voltage(cell.laws, x, at, input), 1e-12);
     for (std::size_t j = 0; j < states; ++j) {
       for (std::size_t i = 0; i + 1 < states; ++i)
         ASSERT_NEAR(f[i][j], moved[i].v[static_cast<int>(j)], 1e-12 * (1 + std::abs(f[i][j])))
             << i << j << " soc " << soc;
       ASSERT_EQ(f[states - 1][j], j + 1 == states ? 1 : 0);
       ASSERT_NEAR(h[j], v.v[static_cast<int>(j)], 1e-10 * (1 + std::abs(h[j])))
-          << j << " soc " << soc << " current " << drive.current_a;
+          << j << " soc " << soc << " current " << input.current_a;
     }
   }
 }
@@ -88,7 +88,7 @@ struct Work {
 /// A shift of pulses as a cell with these mechanisms answers it, read with noise of 1 mV.
 Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, double soc) {
   const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
-  Course<double> course(cell, capacity_ah, chosen<double>(mechanisms, capacity_ah), soc);
+  OpenLoopSimulation<double> simulation(cell, capacity_ah, chosen<double>(mechanisms, capacity_ah), soc);
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.001);
   Work w;
@@ -99,12 +99,12 @@ Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, do
                                                  : -0.2,
                  temperature_c = 15 + 1e-3 * static_cast<double>(k);
     const double v =
-        course.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, temperature_c, [](auto&, const auto&) {}) +
+        simulation.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, temperature_c, [](auto&, const auto&) {}) +
         noise(random);
     w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround(current_a * 1e6)),
                          static_cast<std::int32_t>(std::lround(v * 1e6)),
                          static_cast<std::int16_t>(std::lround(temperature_c * 100))});
-    w.soc.push_back(course.soc());
+    w.soc.push_back(simulation.soc());
   }
   return w;
 }
@@ -112,7 +112,7 @@ Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, do
 template <class S, std::size_t Voltages, class AnyCell>
 auto run(const AnyCell& cell, const std::vector<measurement::Sample>& samples,
          const measurement::StartingPoint& start) {
-  using Estimator = SocEstimator<S, ExtendedRc<Voltages, held>::template Of>;
+  using Estimator = SocEstimator<S, ExtendedRc<Voltages, mechanism_state_count>::template Of>;
   Estimator estimator(start);
   std::vector<typename Estimator::Result> estimates;
   for (const measurement::Sample& s : samples) estimates.push_back(estimator.step(cell, s));
@@ -148,8 +148,8 @@ TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
   told[0].value = {0.02, 40, 0, -1};
   const Work w = work(truth, 6'000, 0.93);  // where the curve is steep, soc is known and the rest is hysteresis
   const auto e = run<float, 1>(table9_with<float>(told), w.samples, {930'000'000, 5'000'000});
-  EXPECT_NEAR(e.front().further[0], -0.02, 1e-6);
-  EXPECT_NEAR(e[50].further[0], 0.02, 0.012);
+  EXPECT_NEAR(e.front().extra[0], -0.02, 1e-6);
+  EXPECT_NEAR(e[50].extra[0], 0.02, 0.012);
   EXPECT_NEAR(e.back().soc, w.soc.back(), 0.02);
 }
 
@@ -164,7 +164,7 @@ Cells<S> table9_with_errors(const std::vector<MechanismSetting>& mechanisms) {
 template <class S, std::size_t Voltages>
 auto run_with_errors(const std::vector<MechanismSetting>& mechanisms, const std::vector<measurement::Sample>& samples,
                      const measurement::StartingPoint& start) {
-  using Estimator = SocEstimator<S, ExtendedRc<Voltages, held, true>::template Of>;
+  using Estimator = SocEstimator<S, ExtendedRc<Voltages, mechanism_state_count, true>::template Of>;
   const auto cell = table9_with_errors<S, Voltages>(mechanisms);
   Estimator estimator(start);
   std::vector<typename Estimator::Result> estimates;
@@ -174,23 +174,23 @@ auto run_with_errors(const std::vector<MechanismSetting>& mechanisms, const std:
 
 TEST(ExtendedModel, ErrorsAsStatesChangeNothingElse) {
   constexpr std::size_t voltages = 3;
-  using Plain = ExtendedRc<voltages, held>::Of<double>;
-  using Model = ExtendedRc<voltages, held, true>::Of<double>;
+  using Plain = ExtendedRc<voltages, mechanism_state_count>::Of<double>;
+  using Model = ExtendedRc<voltages, mechanism_state_count, true>::Of<double>;
   ASSERT_EQ(Model::states, Plain::states + 2);
   const auto cell =
       table9_with_errors<double, voltages>(usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance"}));
-  Plain::Polarisation x;
+  Plain::State x;
   for (std::size_t k = 0; k < x.size(); ++k) x[k] = 0.001 * static_cast<double>(k + 1);
-  Model::Polarisation y{x[0], 0.004, 0.002};
-  for (std::size_t k = 0; k < held; ++k) y[Model::first_held + k] = x[1 + k];
-  const Drive<double> drive{-3, 2, 10};
+  Model::State y{x[0], 0.004, 0.002};
+  for (std::size_t k = 0; k < mechanism_state_count; ++k) y[Model::first_mechanism_state + k] = x[1 + k];
+  const StepInput<double> input{-3, 2, 10};
   std::uint8_t interval = 0;
-  const auto at = look_up(CellUnder{cell, drive, Model::held(y)}, 0.6, interval);
-  const auto forgotten = Model::forgotten(cell.noise, drive.duration_s);
-  const auto of_plain = Plain::settling(cell.laws, x, at, drive);
-  const auto of_model = Model::settling(cell.laws, y, at, drive, forgotten);
-  const auto f = Plain::transition(x, at, of_plain, drive);
-  const auto g = Model::transition(y, at, of_model, drive);
+  const auto at = look_up(OperatingPoint{cell, input, Model::mechanism_states(y)}, 0.6, interval);
+  const auto error_decay = Model::error_decay(cell.noise, input.duration_s);
+  const auto of_plain = Plain::discretise(cell.laws, x, at, input);
+  const auto of_model = Model::discretise(cell.laws, y, at, input, error_decay);
+  const auto f = Plain::state_transition(x, at, of_plain, input);
+  const auto g = Model::state_transition(y, at, of_model, input);
   const auto from_plain = [](std::size_t i) { return i == 0 ? 0 : i + 1; };
   for (std::size_t i = 0; i < Plain::states; ++i) {
     for (std::size_t j = 0; j < Plain::states; ++j) EXPECT_EQ(f[i][j], g[from_plain(i)][from_plain(j)]) << i << j;
@@ -198,10 +198,10 @@ TEST(ExtendedModel, ErrorsAsStatesChangeNothingElse) {
   EXPECT_DOUBLE_EQ(g[1][1], 1 - 2 / (8 * cell.noise.model_correlation_s));
   EXPECT_DOUBLE_EQ(g[Model::last][Model::last], 1 - 2 / 36'000.0);
   EXPECT_DOUBLE_EQ(g[Model::soc][Model::last], -2 / 3'600.0);
-  EXPECT_DOUBLE_EQ(Model::voltage(cell.laws, y, at, drive), Plain::voltage(cell.laws, x, at, drive) + 0.004);
+  EXPECT_DOUBLE_EQ(Model::voltage(cell.laws, y, at, input), Plain::voltage(cell.laws, x, at, input) + 0.004);
   EXPECT_DOUBLE_EQ(Model::without_offset(1.0, y, cell.noise), 1 - 0.002 * 6);
-  const auto h = Model::sensitivity(cell.laws, at, drive);
-  const auto p = Plain::sensitivity(cell.laws, at, drive);
+  const auto h = Model::measurement_jacobian(cell.laws, at, input);
+  const auto p = Plain::measurement_jacobian(cell.laws, at, input);
   EXPECT_EQ(h[1], h[0]);
   EXPECT_EQ(h[Model::soc], p[Plain::soc]);
   EXPECT_EQ(h[Model::last], 0);
@@ -217,7 +217,7 @@ TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
     const auto plain_cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
     Estimate<float> without;
     for (const measurement::Sample& s : w.samples) without = plain.step(plain_cell, s);
-    const double found_a = 6 * e.back().further[1], sigma_a = 6 * e.back().further[2];
+    const double found_a = 6 * e.back().extra[1], sigma_a = 6 * e.back().extra[2];
     EXPECT_LT(sigma_a, 0.03);
     EXPECT_NEAR(found_a, offset_a, 2 * sigma_a);
     EXPECT_LE(std::abs(e.back().soc - w.soc.back()), 2 * e.back().soc_sigma);
@@ -229,13 +229,13 @@ TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
 Work work_after_a_rest(double sensor_a, double truly_a) {
   Work w;
   const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
-  Course<double> course(cell, capacity_ah, {}, 0.6);
+  OpenLoopSimulation<double> simulation(cell, capacity_ah, {}, 0.6);
   for (std::uint64_t k = 0; k < 7'200; ++k) {
     const double current_a = k < 3'600 ? truly_a : -1;
-    const double v = course.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, 25, [](auto&, const auto&) {});
+    const double v = simulation.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, 25, [](auto&, const auto&) {});
     w.samples.push_back({k * 1'000'000, static_cast<std::int32_t>(std::lround((current_a + sensor_a) * 1e6)),
                          static_cast<std::int32_t>(std::lround(v * 1e6)), 2'500});
-    w.soc.push_back(course.soc());
+    w.soc.push_back(simulation.soc());
   }
   return w;
 }
@@ -243,7 +243,7 @@ Work work_after_a_rest(double sensor_a, double truly_a) {
 template <class S>
 auto run_with_rest(double at_rest_a, const std::vector<measurement::Sample>& samples,
                    const measurement::StartingPoint& start, double gain = 0) {
-  using Estimator = SocEstimator<S, ExtendedRc<0, held, true>::template Of>;
+  using Estimator = SocEstimator<S, ExtendedRc<0, mechanism_state_count, true>::template Of>;
   auto parameters = files::read_cell("table9").parameters;
   parameters.noise.current_offset_a = 0.06;
   parameters.noise.current_offset_correlation_s = 36'000;
@@ -262,21 +262,21 @@ TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
     const Work w = work_after_a_rest(sensor_a, 0);
     const measurement::StartingPoint start{600'000'000, 5'000'000};
     const auto e = run_with_rest<float>(0.012, w.samples, start);
-    EXPECT_NEAR(6 * e[59].further[1], 0, 0.005) << "a minute first";
-    EXPECT_NEAR(6 * e[3'599].further[1], sensor_a, 0.012);
-    EXPECT_LT(6 * e[3'599].further[2], 0.012);
+    EXPECT_NEAR(6 * e[59].extra[1], 0, 0.005) << "a minute first";
+    EXPECT_NEAR(6 * e[3'599].extra[1], sensor_a, 0.012);
+    EXPECT_LT(6 * e[3'599].extra[2], 0.012);
     EXPECT_NEAR(e.back().soc, w.soc.back(), 0.004);
     EXPECT_LE(std::abs(e.back().soc - w.soc.back()), 2 * e.back().soc_sigma);
     const auto fixed = run_with_rest<FixedPoint>(0.012, w.samples, start);
     EXPECT_NEAR(as_double(fixed.back().soc), static_cast<double>(e.back().soc), 2e-4);
-    EXPECT_NEAR(as_double(fixed[3'599].further[1]), static_cast<double>(e[3'599].further[1]), 1e-4);
+    EXPECT_NEAR(as_double(fixed[3'599].extra[1]), static_cast<double>(e[3'599].extra[1]), 1e-4);
   }
 }
 
 TEST(ExtendedEstimator, BelievesASmallCurrentWhereNobodySaysWhatFlowsAtRest) {
   const Work w = work_after_a_rest(0, -0.07);  // a display that is left on
   const auto e = run_with_rest<float>(0, w.samples, {600'000'000, 5'000'000});
-  EXPECT_NEAR(6 * e[3'599].further[1], 0, 0.01);
+  EXPECT_NEAR(6 * e[3'599].extra[1], 0, 0.01);
   EXPECT_NEAR(e[3'599].soc, w.soc[3'599], 0.002);
 }
 
@@ -311,7 +311,7 @@ TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
     ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 2e-4) << k;
     ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 2e-4) << k;
     for (std::size_t i = 0; i < 3; ++i)
-      ASSERT_NEAR(as_double(fixed[k].further[i]), twice[k].further[i], 1e-4) << k << " " << i;
+      ASSERT_NEAR(as_double(fixed[k].extra[i]), twice[k].extra[i], 1e-4) << k << " " << i;
   }
 }
 
@@ -325,13 +325,13 @@ TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
     ASSERT_NEAR(single[k].soc, twice[k].soc, 5e-5) << k;
     ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 1e-4) << k;
     ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
-    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(single[k].further[i], as_double(fixed[k].further[i]), 2e-5) << k;
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(single[k].extra[i], as_double(fixed[k].extra[i]), 2e-5) << k;
   }
 }
 
 TEST(ExtendedEstimator, ACellWhoseMechanismsAreNeutralGivesThePlainCellsBits) {
   const Work w = work({}, 2'000, 0.77);
-  auto neutral = unsaid(mechanism_index("resistance_growth"), capacity_ah);
+  auto neutral = default_setting(mechanism_index("resistance_growth"), capacity_ah);
   const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, {770'000'000, 20'000'000});
   SocEstimator<float> plain(measurement::StartingPoint{770'000'000, 20'000'000});
   const auto cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
@@ -343,8 +343,8 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
   const auto cell = table9_with<float>(everything());
   std::mt19937_64 random(11);
   for (int round = 0; round < 30; ++round) {
-    SocEstimator<float, ExtendedRc<4, held>::Of> estimator;
-    SocEstimator<float, ExtendedRc<4, held, true>::Of> of_errors;
+    SocEstimator<float, ExtendedRc<4, mechanism_state_count>::Of> estimator;
+    SocEstimator<float, ExtendedRc<4, mechanism_state_count, true>::Of> of_errors;
     std::uint64_t time_us = 0;
     for (int k = 0; k < 2'000; ++k) {
       time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
@@ -358,12 +358,12 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
       ASSERT_TRUE(std::isfinite(e.soc) && std::isfinite(e.soc_sigma) && std::isfinite(e.v_rc_v) &&
                   std::isfinite(e.voltage_predicted_v))
           << round << " " << k;
-      for (const float x : e.further) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
+      for (const float x : e.extra) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
       ASSERT_GT(e.soc_sigma, 0);
       const auto more = of_errors.step(
           cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});
       ASSERT_TRUE(std::isfinite(more.soc) && std::isfinite(more.soc_sigma)) << round << " " << k;
-      for (const float x : more.further) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
+      for (const float x : more.extra) ASSERT_TRUE(std::isfinite(x)) << round << " " << k;
     }
   }
 }
@@ -371,7 +371,8 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
 TEST(ExtendedEstimator, CountsThroughASensorThatIsOff) {
   auto off = usual({"current_offset", "current_gain", "capacity_change"});
   const auto cell = table9_with<float>(off);
-  SocEstimator<float, ExtendedRc<0, held>::Of> estimator(measurement::StartingPoint{500'000'000, 5'000'000});
+  SocEstimator<float, ExtendedRc<0, mechanism_state_count>::Of> estimator(
+      measurement::StartingPoint{500'000'000, 5'000'000});
   estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Estimate<float> e;
   for (std::uint64_t k = 1; k <= 3'600; ++k)

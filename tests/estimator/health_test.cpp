@@ -60,8 +60,8 @@ struct Day {
         ratio<Variance<S>>(ratio<Variance<S>>(Variance<S>(at.error_v2 + doubt_v * doubt_v), slope), slope);
     const Soc<S> counted = Soc<S>(current_a * Fraction<S>(1.0 / 21'600));
     if (first) resistance.interrupt();
-    capacity.see(e.soc, off, told2, true, counted, Variance<S>(1e-10));
-    resistance.see(innovation_v, drop_v, Variance<S>(1e-6));
+    capacity.update(e.soc, off, told2, true, counted, Variance<S>(1e-10));
+    resistance.update(innovation_v, drop_v, Variance<S>(1e-6));
   }
 };
 
@@ -94,8 +94,8 @@ TYPED_TEST(HealthOfEveryScalar, HalfAPlateauIsNoCapacity) {
   CapacityHealth<TypeParam> capacity;
   using namespace model;
   for (int k = 0; k < 1'000; ++k)
-    capacity.see(Soc<TypeParam>(0.6 - 1e-4 * k), Soc<TypeParam>(0), Variance<TypeParam>(0.01), true,
-                 Soc<TypeParam>(-1e-4), Variance<TypeParam>(0.0));
+    capacity.update(Soc<TypeParam>(0.6 - 1e-4 * k), Soc<TypeParam>(0), Variance<TypeParam>(0.01), true,
+                    Soc<TypeParam>(-1e-4), Variance<TypeParam>(0.0));
   EXPECT_NEAR(as_double(capacity.health().sigma), 0.1, 1e-6);
 }
 

@@ -5,7 +5,7 @@
 namespace bms::estimator {
 namespace {
 
-constexpr model::Plausible plausible{
+constexpr model::PlausibleRange plausible{
     .voltage_min_uv = 1'500'000, .voltage_max_uv = 4'100'000, .current_max_ua = 60'000'000};
 
 TEST(InputCheck, ReplacesACurrentThatCannotBeByTheLastOneBelieved) {
@@ -13,7 +13,7 @@ TEST(InputCheck, ReplacesACurrentThatCannotBeByTheLastOneBelieved) {
   std::uint32_t flags = 0;
   EXPECT_EQ(check.current(-3'000'000, plausible, flags).ua, -3'000'000);
   EXPECT_EQ(flags, 0U);
-  const BelievedCurrent missing = check.current(measurement::no_reading, plausible, flags);
+  const AcceptedCurrent missing = check.current(measurement::no_reading, plausible, flags);
   EXPECT_EQ(missing.ua, -3'000'000);
   EXPECT_FALSE(missing.measured);
   EXPECT_EQ(flags, current_missing);

@@ -54,7 +54,7 @@ TEST(MeanCell, OfAPackOfOneIsTheSampleItself) {
        {measurement::Sample{1, 2, 3'300'000, 4},
         measurement::Sample{1, measurement::no_reading, measurement::no_reading, measurement::no_temperature},
         measurement::Sample{9, -5, 17, 15'001}, measurement::Sample{9, -5, 2'147'483'647, -6'000}}) {
-    const measurement::Sample mean = mean_cell(pack_of(s), nominal.plausible);
+    const measurement::Sample mean = mean_cell(single_cell_pack(s), nominal.plausible);
     EXPECT_EQ(mean.time_us, s.time_us);
     EXPECT_EQ(mean.current_ua, s.current_ua);
     EXPECT_EQ(mean.voltage_uv, s.voltage_uv);

@@ -23,17 +23,17 @@ struct Asked {
   /// One sample of a cell that truly has that soc; all have moved by moved.
   void sample(double truth, double moved, double share, double sigma_v) {
     soc += moved;
-    const auto seen = [&](const arithmetic::Soc<S>& there) -> typename SocBank<S>::Seen {
+    const auto seen = [&](const arithmetic::Soc<S>& there) -> typename SocBank<S>::Observation {
       const double at = arithmetic::as_double(there),
                    half_v = std::abs(curve_v(at + 0.5 / 64) - curve_v(at - 0.5 / 64)) / 2;
       return {arithmetic::Voltage<S>(curve_v(truth) + off_v - curve_v(at)), arithmetic::Voltage<S>(half_v),
               arithmetic::Variance<S>(sigma_v * sigma_v / 16)};
     };
-    const auto news = bank.step(arithmetic::Soc<S>(soc), arithmetic::Fraction<S>(share), arithmetic::Variance<S>(1e-6),
-                                arithmetic::Variance<S>(sigma_v * sigma_v), seen);
-    if (!news.any) return;
-    soc += arithmetic::as_double(news.moved);
-    variance = arithmetic::as_double(news.variance);
+    const auto bank_update = bank.step(arithmetic::Soc<S>(soc), arithmetic::Fraction<S>(share),
+                                       arithmetic::Variance<S>(1e-6), arithmetic::Variance<S>(sigma_v * sigma_v), seen);
+    if (!bank_update.ready) return;
+    soc += arithmetic::as_double(bank_update.moved);
+    variance = arithmetic::as_double(bank_update.variance);
   }
 };
 
@@ -86,15 +86,15 @@ TYPED_TEST(SocBankOfEveryScalar, WhereAnythingCouldBeReadIsNotMoreLikelyForIt) {
   const double truth = 0.4, off_v = 0.015;  // a lasting error of one and a half sigma
   double soc = 0.5;
   for (int k = 0; k < 128 * 200; ++k) {
-    const auto news =
-        a.bank.step(arithmetic::Soc<S>(soc), arithmetic::Fraction<S>(0.2), arithmetic::Variance<S>(1e-6),
-                    arithmetic::Variance<S>(1e-4), [&](const arithmetic::Soc<S>& there) -> typename SocBank<S>::Seen {
-                      const double at = arithmetic::as_double(there), steep_v = at < 0.25 ? 0.2 : 0;
-                      return {arithmetic::Voltage<S>(curve_v(truth) + off_v - curve_v(at) + 0.1 * steep_v),
-                              arithmetic::Voltage<S>(0.001), arithmetic::Variance<S>(1e-5 + steep_v * steep_v)};
-                    });
-    if (!news.any) continue;
-    soc += arithmetic::as_double(news.moved);
+    const auto bank_update = a.bank.step(
+        arithmetic::Soc<S>(soc), arithmetic::Fraction<S>(0.2), arithmetic::Variance<S>(1e-6),
+        arithmetic::Variance<S>(1e-4), [&](const arithmetic::Soc<S>& there) -> typename SocBank<S>::Observation {
+          const double at = arithmetic::as_double(there), steep_v = at < 0.25 ? 0.2 : 0;
+          return {arithmetic::Voltage<S>(curve_v(truth) + off_v - curve_v(at) + 0.1 * steep_v),
+                  arithmetic::Voltage<S>(0.001), arithmetic::Variance<S>(1e-5 + steep_v * steep_v)};
+        });
+    if (!bank_update.ready) continue;
+    soc += arithmetic::as_double(bank_update.moved);
   }
   EXPECT_GT(soc, 0.3) << "the steep end must not draw the mean to it";
 }

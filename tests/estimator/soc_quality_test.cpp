@@ -12,8 +12,8 @@ struct Watched {
       model::prepare<double, model::max_intervals>(files::read_cell("table9").parameters);
   SocQuality<double> quality;
 
-  SocQuality<double>::Now at(double soc, double sigma, double current_a = 0, double counted = 0,
-                             std::uint32_t flags = 0) {
+  SocQuality<double>::Result at(double soc, double sigma, double current_a = 0, double counted = 0,
+                                std::uint32_t flags = 0) {
     Estimate<double> e;
     e.soc = soc;
     e.soc_sigma = sigma;
@@ -33,19 +33,19 @@ TEST(SocQuality, AKneeIsObservableAndAPlateauIsNot) {
 TEST(SocQuality, CountsTimeAndChargeSinceTheAnchor) {
   Watched w;
   w.at(0.95, 0.005);
-  SocQuality<double>::Now now;
+  SocQuality<double>::Result now;
   for (int k = 0; k < 60; ++k) now = w.at(0.85, 0.005, -6, -0.001);
   for (int k = 0; k < 60; ++k) now = w.at(0.85, 0.005, 6, 0.001);
-  EXPECT_EQ(now.bridged_s, 120U);
-  EXPECT_NEAR(now.bridged_soc, 0.12, 1e-9) << "either way";
-  EXPECT_EQ(w.at(0.95, 0.005).bridged_s, 0U);
+  EXPECT_EQ(now.since_anchor_s, 120U);
+  EXPECT_NEAR(now.since_anchor_soc, 0.12, 1e-9) << "either way";
+  EXPECT_EQ(w.at(0.95, 0.005).since_anchor_s, 0U);
 }
 
 TEST(SocQuality, WhereSocIsNotKnownThereIsNoAnchor) {
   Watched w;
   w.at(0.95, 0.005);
-  EXPECT_EQ(w.at(0.95, 0.05).bridged_s, 1U);
-  EXPECT_FALSE(w.at(0.95, 0.005, 0, 0, soc_unsettled).observable);
+  EXPECT_EQ(w.at(0.95, 0.05).since_anchor_s, 1U);
+  EXPECT_FALSE(w.at(0.95, 0.005, 0, 0, soc_ambiguous).observable);
   EXPECT_FALSE(w.at(0.95, 0.005, 0, 0, voltage_missing).observable);
 }
 

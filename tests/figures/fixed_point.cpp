@@ -33,8 +33,8 @@ Deviation deviation(const FixedPointRun& run) {
   const auto rows = [&](host_sim::ScalarKind scalar) {
     return host_sim::run_on_host(cell, all, std::nullopt, scalar).rows;
   };
-  const auto fixed = rows(host_sim::ScalarKind::fixed), once = rows(host_sim::ScalarKind::single),
-             twice = rows(host_sim::ScalarKind::twice);
+  const auto fixed = rows(host_sim::ScalarKind::fixed), once = rows(host_sim::ScalarKind::float32),
+             twice = rows(host_sim::ScalarKind::float64);
   Deviation d{all.size()};
   for (std::size_t k = 0; k < all.size(); ++k) {
     d.of_fixed = std::max(d.of_fixed, std::abs(fixed[k].soc - twice[k].soc));

@@ -15,7 +15,7 @@ namespace {
 /// What is done to a recording, and what the estimator is told.
 struct Trouble {
   std::string title;
-  host_sim::Belief belief;
+  host_sim::SocPrior prior;
   double offset_a = 0, gain = 1, offset_v = 0;
   std::optional<double> from_soc;
 };
@@ -52,7 +52,7 @@ std::string row(const SocTrial& t, Sums& all) {
   host_sim::ReplayResult r;
   r.cell = t.cell;
   r.recording = t.recording;
-  r.track = host_sim::run_on_host(t.cell, files::samples(r.recording), host_sim::starting_point(t.belief), r.scalar);
+  r.track = host_sim::run_on_host(t.cell, files::samples(r.recording), host_sim::starting_point(t.prior), r.scalar);
   host_sim::evaluate(r);
   std::vector<float> sigmas;
   for (const host_sim::EstimateRow& e : r.track.rows) sigmas.push_back(static_cast<float>(e.soc_sigma));
@@ -68,7 +68,7 @@ std::string row(const SocTrial& t, Sums& all) {
 }  // namespace
 
 void each_soc_trial(const std::filesystem::path& data, const std::function<void(const SocTrial&)>& f) {
-  const host_sim::Belief right{1, 0.02};
+  const host_sim::SocPrior right{1, 0.02};
   const std::vector<Trouble> with_sensors_off = {
       {"started right", right, 0, 1, 0, {}},       {"current + 30 mA", right, 0.03, 1, 0, {}},
       {"current - 30 mA", right, -0.03, 1, 0, {}}, {"current + 1 %", right, 0, 1.01, 0, {}},
@@ -83,7 +83,7 @@ void each_soc_trial(const std::filesystem::path& data, const std::function<void(
     const files::CellFile cell = files::read_cell(folder + "_extended");
     const files::Recording r = files::read_recording((data / folder / (std::string(name) + ".csv")).string());
     for (const auto* list : lists) {
-      for (const Trouble& t : *list) f({name, t.title, cell, troubled(r, t), t.belief});
+      for (const Trouble& t : *list) f({name, t.title, cell, troubled(r, t), t.prior});
     }
   };
   for (const char* name : {"udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"})

@@ -17,7 +17,7 @@ struct SocTrial {
   std::string name, trouble;
   const files::CellFile& cell;
   files::Recording recording;
-  host_sim::Belief belief;
+  host_sim::SocPrior prior;
 };
 
 /// Recordings of data/a123_26650 and data/a123_esctoolbox, with the extended cell file of that name.

@@ -39,7 +39,7 @@ const std::string shift = (source / "recordings/forklift_shift.csv").string();
 
 struct Case {
   std::string title, recording, cell;
-  std::optional<host_sim::Belief> belief;
+  std::optional<host_sim::SocPrior> prior;
 };
 
 std::string percent(const std::optional<double>& fraction) {
@@ -51,7 +51,7 @@ host_sim::ReplayResult replayed(const Case& c) {
   r.cell = files::read_cell(c.cell);
   r.recording = files::read_recording(c.recording);
   r.target = "host";
-  r.track = host_sim::run_on_host(r.cell, files::samples(r.recording), host_sim::starting_point(c.belief), r.scalar);
+  r.track = host_sim::run_on_host(r.cell, files::samples(r.recording), host_sim::starting_point(c.prior), r.scalar);
   host_sim::evaluate(r);
   return r;
 }
@@ -70,9 +70,9 @@ const std::string accuracy_heading =
 std::string shift_accuracy() {
   std::string table = accuracy_heading;
   table += accuracy_row({"started by itself (98 %)", shift, "table9", std::nullopt});
-  table += accuracy_row({"told 98 %, which is right", shift, "table9", host_sim::Belief{0.98, 0.02}});
-  table += accuracy_row({"told 78 %, believed to 2 %", shift, "table9", host_sim::Belief{0.78, 0.02}});
-  table += accuracy_row({"told 78 %, believed to 20 %", shift, "table9", host_sim::Belief{0.78, 0.2}});
+  table += accuracy_row({"told 98 %, which is right", shift, "table9", host_sim::SocPrior{0.98, 0.02}});
+  table += accuracy_row({"told 78 %, believed to 2 %", shift, "table9", host_sim::SocPrior{0.78, 0.02}});
+  table += accuracy_row({"told 78 %, believed to 20 %", shift, "table9", host_sim::SocPrior{0.78, 0.2}});
   return table;
 }
 
@@ -89,7 +89,7 @@ std::string real_accuracy() {
     table += accuracy_row({file.stem().string(), file.string(), "a123_26650", std::nullopt});
     if (file.stem() == "udds_P25_A002")
       table += accuracy_row({"the same, told 20 % less than it has, believed to 20 %", file.string(), "a123_26650",
-                             host_sim::Belief{r.soc_ref.front() - 0.2, 0.2}});
+                             host_sim::SocPrior{r.soc_ref.front() - 0.2, 0.2}});
   }
   return table;
 }
@@ -110,8 +110,8 @@ std::string thousand_hours() {
 
 std::string step_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
-  for (const auto& [what, value] : step_figures(images::emulated_boards().front(), files::read_cell("table9"),
-                                                files::samples(files::read_recording(shift)))) {
+  for (const auto& [what, value] : firmware::step_figures(images::emulated_boards().front(), files::read_cell("table9"),
+                                                          files::samples(files::read_recording(shift)))) {
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   }
   return table;
@@ -119,8 +119,8 @@ std::string step_cost() {
 
 std::string microbit_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
-  for (const auto& [what, value] : core_figures(images::emulated_boards().back(), files::read_cell("table9"),
-                                                files::samples(files::read_recording(shift)))) {
+  for (const auto& [what, value] : firmware::core_figures(images::emulated_boards().back(), files::read_cell("table9"),
+                                                          files::samples(files::read_recording(shift)))) {
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   }
   return table;
@@ -148,7 +148,7 @@ files::CellFile table9_with(const std::vector<std::pair<const char*, std::vector
   files::CellFile cell = files::read_cell("table9");
   cell.parameters.noise.errors_are_states = errors;
   for (const auto& [id, values] : mechanisms) {
-    model::MechanismSetting m = model::unsaid(model::mechanism_index(id), cell.parameters.capacity_ah);
+    model::MechanismSetting m = model::default_setting(model::mechanism_index(id), cell.parameters.capacity_ah);
     std::copy(values.begin(), values.end(), m.value.begin());
     files::put_mechanism(cell, m);
   }
@@ -167,8 +167,8 @@ std::string mechanism_cost() {
   using Set = std::vector<std::pair<const char*, std::vector<double>>>;
   const auto row = [&](const Set& set, bool errors) {
     const files::CellFile cell = table9_with(set, errors);
-    const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
-                                             all, host_sim::state_count(cell));
+    const firmware::StepCost cost = count_instructions(
+        board, images::firmware_image(board.name, cell, images::Image::replay), all, host_sim::state_count(cell));
     std::string names = errors ? "`noise.errors_are_states`" : "";
     for (const auto& [id, values] : set) names += fmt::format("{}`{}`", names.empty() ? "" : ", ", id);
     table += fmt::format("| {} | {:.0f} | {} |\n", names.empty() ? "nothing" : names, cost.mean, cost.most);
@@ -212,7 +212,7 @@ std::string speed() {
   const files::Recording recording = files::read_recording(shift);
   const auto all = files::samples(recording);
   for (const host_sim::ScalarKind scalar :
-       {host_sim::ScalarKind::single, host_sim::ScalarKind::twice, host_sim::ScalarKind::fixed}) {
+       {host_sim::ScalarKind::float32, host_sim::ScalarKind::float64, host_sim::ScalarKind::fixed}) {
     table += fmt::format("| replay on the host, {} | {:.1f} million steps/s |\n", host_sim::name_of(scalar),
                          host_sim::run_on_host(cell, all, std::nullopt, scalar).steps_per_second / 1e6);
   }
@@ -282,7 +282,7 @@ std::string identification_speed() {
   constexpr std::size_t samples_used = 20'000;
   const files::CellFile cell = files::read_cell("table9");
   const files::Recording recording = files::read_recording(shift);
-  id::Record r;
+  id::DataSet r;
   r.data = {{recording.time_s.begin(), recording.time_s.begin() + samples_used},
             {recording.current_a.begin(), recording.current_a.begin() + samples_used},
             {recording.voltage_v.begin(), recording.voltage_v.begin() + samples_used},
@@ -320,7 +320,8 @@ std::string identification_speed() {
 
 std::string protection_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
-  for (const auto& [what, value] : protection_figures(images::emulated_boards().front(), files::read_cell("table9")))
+  for (const auto& [what, value] :
+       firmware::protection_figures(images::emulated_boards().front(), files::read_cell("table9")))
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   return table;
 }
@@ -332,7 +333,7 @@ void write_board() {
   files::replace_figures(source / "estimator/README.md", "microbit", microbit_cost());
   files::replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
   files::replace_figures(source / "model/cells/README.md", "mechanisms", mechanism_tables());
-  files::replace_figures(source / "boards/README.md", "budgets", board_table());
+  files::replace_figures(source / "boards/README.md", "budgets", firmware::board_table());
 }
 
 void run() {
@@ -363,7 +364,7 @@ int main(int argc, char** argv) {
     else if (argc > 1 && std::string_view(argv[1]) == "board")
       bms::write_board();
     else if (argc > 1 && std::string_view(argv[1]) == "budgets")
-      bms::files::replace_figures(bms::source / "boards/README.md", "budgets", bms::board_table());
+      bms::files::replace_figures(bms::source / "boards/README.md", "budgets", bms::firmware::board_table());
     else if (argc > 1 && std::string_view(argv[1]) == "protection")
       bms::files::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
     else if (argc > 1 && std::string_view(argv[1]) == "fixed")

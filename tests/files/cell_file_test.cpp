@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "files/text_file.hpp"
-#include "tests/files/refusal.hpp"
+#include "tests/files/rejected_input.hpp"
 
 namespace bms::files {
 namespace {
@@ -192,7 +192,7 @@ TEST(CellFile, HoldsMechanismsInTheOrderOfTheCatalogueAndTakesWhatIsNotSaidAsNeu
 TEST(CellFile, EveryMechanismIsWrittenAndReadBackDigitForDigit) {
   CellFile cell = read_cell("table9");
   for (std::size_t index = model::mechanism_count; index-- > 0;) {
-    model::MechanismSetting m = model::unsaid(index, cell.parameters.capacity_ah);
+    model::MechanismSetting m = model::default_setting(index, cell.parameters.capacity_ah);
     for (std::size_t k = 0; k < model::catalogue[index].parameters; ++k) {
       const model::Parameter& p = model::catalogue[index].parameter[k];
       m.value[k] =
@@ -216,7 +216,8 @@ TEST(CellFile, EveryMechanismIsWrittenAndReadBackDigitForDigit) {
 TEST(CellFile, WhatIsSilentAboutAParameterIsAcceptedForACellOfAnySize) {
   for (const double capacity_ah : {0.01, 2.5, 1'000.0}) {
     for (std::size_t index = 0; index < model::mechanism_count; ++index) {
-      EXPECT_EQ(model::first_fault(model::unsaid(index, capacity_ah), capacity_ah), model::catalogue[index].parameters)
+      EXPECT_EQ(model::first_fault(model::default_setting(index, capacity_ah), capacity_ah),
+                model::catalogue[index].parameters)
           << model::catalogue[index].id;
     }
   }

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "files/cell_file.hpp"
-#include "tests/files/refusal.hpp"
+#include "tests/files/rejected_input.hpp"
 
 namespace bms::files {
 namespace {

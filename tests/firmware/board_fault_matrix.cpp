@@ -18,7 +18,7 @@
 #include "hil/board_link.hpp"
 #include "host_sim/replay.hpp"
 #include "images/firmware_image.hpp"
-#include "tests/protection/truck.hpp"
+#include "tests/protection/simulated_truck.hpp"
 
 namespace bms::protection {
 
@@ -46,7 +46,7 @@ class BoardTruck : public TruckPack {
  public:
   BoardTruck(std::uint64_t seed, MatrixResult& result, std::int32_t soc_ppb = 600'000'000)
       : TruckPack(seed), result_(result), link_(hil::emulated_link("stm32f405_forklift", image())) {
-    hear(link_->exchange(0, std::vector{hal::frame_of(measurement::StartingPoint{soc_ppb, 20'000'000})}));
+    receive(link_->exchange(0, std::vector{hal::frame_of(measurement::StartingPoint{soc_ppb, 20'000'000})}));
   }
 
   bool drive_off(const Change& change = {}) {
@@ -56,13 +56,13 @@ class BoardTruck : public TruckPack {
 
   void step(const Change& change = {}) {
     measure(told(), change);
-    if (link) orders.link_uv = link(*this);
+    if (link) inputs.dc_link_uv = link(*this);
     std::vector<can::Frame> frames;
     if (steps() % 10 == 1) frames.push_back(request());
-    const auto measured = hal::frames_of(sample, orders.link_uv, static_cast<std::uint16_t>(steps()));
+    const auto measured = hal::frames_of(sample, inputs.dc_link_uv, static_cast<std::uint16_t>(steps()));
     frames.insert(frames.end(), measured.begin(), measured.end());
     heard_faults_ = false;
-    hear(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
+    receive(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
     if (!heard_faults_) complain("did not say Faults with a sample");
     judge();
     if (result_.traced) trace();
@@ -73,7 +73,7 @@ class BoardTruck : public TruckPack {
     measure(told());
     std::vector<can::Frame> frames;
     if (steps() % 10 == 1) frames.push_back(request());
-    hear(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
+    receive(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
   }
 
   Outputs told() const {
@@ -93,7 +93,7 @@ class BoardTruck : public TruckPack {
   std::uint32_t faults = 0, expected = 0;
   std::uint32_t not_judged = 0;  ///< rows that the oracle does not know here
   std::uint32_t flags = 0;       ///< of the estimate
-  bool contradicts() const { return (flags & estimator::voltage_disbelieved) != 0; }
+  bool contradicts() const { return (flags & estimator::voltage_rejected) != 0; }
   can::ContactorState contactors;
   can::AllowedCurrent allowed;
   int wrong = 0;
@@ -102,11 +102,11 @@ class BoardTruck : public TruckPack {
   can::Frame request() {
     can::Command command;
     command.code = can::Command::code_request;
-    command.argument = static_cast<std::uint32_t>(orders.request);
+    command.argument = static_cast<std::uint32_t>(inputs.request);
     return command.frame(asked_ = can::next(asked_));
   }
 
-  void hear(const std::vector<can::Frame>& frames) {
+  void receive(const std::vector<can::Frame>& frames) {
     for (const can::Frame& f : frames) {
       if (f.id == can::Faults::id)
         faults = hal::get_bytes<std::uint32_t>(f.data, 2), heard_faults_ = true;  // bits 16 to 47
@@ -129,7 +129,7 @@ class BoardTruck : public TruckPack {
 
   void judge() {
     ++result_.samples;
-    expected = oracle_.see(sample, contradicts());
+    expected = oracle_.check(sample, contradicts());
     for (std::size_t k = 0; k < fault_count; ++k) {
       if (!told_by_samples(k) || has(not_judged, k) || has(expected, k) == has(faults, k)) continue;
       ++(has(expected, k) ? result_.missed : result_.falsely);
@@ -140,7 +140,7 @@ class BoardTruck : public TruckPack {
       if (!has(faults, k)) told_at_us_[k] = sample.time_us;
     }
     drove_ = drove_ || contactors.state == can::ContactorState::state_drive;
-    bool may_open = orders.request == Request::none;
+    bool may_open = inputs.request == Request::none;
     for (std::size_t k = 0; k < fault_count; ++k)
       may_open = may_open || (has(faults, k) && opens(k)) ||
                  (has(faults, k) && reaction_of(k) == "forbid charge" && sample.current_ua > 0);
@@ -286,8 +286,8 @@ class Matrix {
         files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
     BoardTruck truck(6, result, 980'000'000);
     const auto is = [&](const measurement::Sample& at) {
-      truck.course = {static_cast<double>(at.current_ua), static_cast<double>(at.voltage_uv),
-                      static_cast<double>(at.temperature_cdegc)};
+      truck.trajectory = {static_cast<double>(at.current_ua), static_cast<double>(at.voltage_uv),
+                          static_cast<double>(at.temperature_cdegc)};
     };
     is(seconds.front());
     if (!truck.drive_off()) return truck.complain("does not drive off");
@@ -428,10 +428,10 @@ class Matrix {
     const auto change = [&](auto& s, auto& e, auto&) {
       if (other) hold(*other, truck, s, e);
     };
-    truck.orders.request = Request::none;
+    truck.inputs.request = Request::none;
     for (int t = 0; t < (other ? delay_ms(*other) + 500 : 1'000); t += step_ms) truck.step(change);
     if (other && !has(truck.faults, *other)) return truck.complain("the other is not there");
-    truck.orders.request = Request::drive;
+    truck.inputs.request = Request::drive;
     int in_precharge = 0, holds_since = -1, now = 0, told = -1, opened = -1;
     const auto holds = [&](bool yes) {
       if (yes && holds_since < 0) holds_since = now;
@@ -505,7 +505,7 @@ class Matrix {
   plant::Random random_;
 };
 
-void merge(Told& into, const Told& from) {
+void merge(DetectionTime& into, const DetectionTime& from) {
   if (from.cases == 0) return;
   into.soonest_ms = into.cases == 0 ? from.soonest_ms : std::min(into.soonest_ms, from.soonest_ms);
   into.latest_ms = std::max(into.latest_ms, from.latest_ms);
@@ -557,7 +557,7 @@ MatrixResult run_fault_matrix(bool every, std::uint64_t seed, unsigned threads, 
 }
 
 std::string markdown(const MatrixResult& result) {
-  const auto told = [](const Told& t) {
+  const auto told = [](const DetectionTime& t) {
     if (t.cases == 0) return std::string("-");
     if (t.soonest_ms == t.latest_ms) return fmt::format("{:.1f} s", 1e-3 * t.latest_ms);
     return fmt::format("{:.1f} to {:.1f} s", 1e-3 * t.soonest_ms, 1e-3 * t.latest_ms);

@@ -23,7 +23,7 @@
 
 namespace bms::protection {
 
-struct Told {
+struct DetectionTime {
   int cases = 0, soonest_ms = 0, latest_ms = -1;
 
   void add(int ms) {
@@ -34,9 +34,9 @@ struct Told {
 };
 
 struct MatrixRow {
-  int silent = 0;                ///< cases below the threshold, in which it did not come
-  Told above, in_noise, during;  ///< after what time it was told
-  Told opened;                   ///< after what time both main contactors were told open, of a fault that opens
+  int silent = 0;                         ///< cases below the threshold, in which it did not come
+  DetectionTime above, in_noise, during;  ///< after what time it was told
+  DetectionTime opened;  ///< after what time both main contactors were told open, of a fault that opens
 };
 
 struct MatrixResult {

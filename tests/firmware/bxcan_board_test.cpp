@@ -59,7 +59,7 @@ const std::vector<std::uint8_t>& started_once() {
 
 std::vector<can::Frame> meant_of(const std::vector<Pack>& part) {
   HostBoard host(started_once());
-  for (const Pack& p : part) host.take({p, 0, {}});
+  for (const Pack& p : part) host.process_sample({p, 0, {}});
   return sent;
 }
 
@@ -86,7 +86,7 @@ void queue_for(UnicornBoard& board, const std::vector<Input>& inputs) {
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const std::uint64_t due = board.can.now_bit + bits_between_samples * (k + 1);
     if (inputs[k].command) board.can.others.push_back({wire_frame(*inputs[k].command), due - bits_between_samples / 2});
-    for (const can::Frame& f : hal::frames_of(inputs[k].pack, inputs[k].link_uv, static_cast<std::uint16_t>(k)))
+    for (const can::Frame& f : hal::frames_of(inputs[k].pack, inputs[k].dc_link_uv, static_cast<std::uint16_t>(k)))
       board.can.others.push_back({wire_frame(f), due, true});
   }
 }
@@ -158,11 +158,11 @@ class BxcanBoard : public ::testing::Test {
 /// Seven seconds of a truck that asks for power; its link follows the contactors of the application on this machine.
 std::vector<Input> start_of_a_drive(HostBoard& host) {
   std::vector<Input> inputs;
-  double link_v = 0;
+  double dc_link_v = 0;
   bool driving = false;
   for (const Pack& recorded : part_of_the_shift(70)) {
     const std::size_t k = inputs.size();
-    Input in{recorded, static_cast<std::int32_t>(1e6 * link_v), {}};
+    Input in{recorded, static_cast<std::int32_t>(1e6 * dc_link_v), {}};
     in.pack.time_us = 1'000'000 + 100'000 * k;
     if (!driving) in.pack.current_ua = 0;
     if (k % 20 == 3) {
@@ -171,21 +171,21 @@ std::vector<Input> start_of_a_drive(HostBoard& host) {
       command.argument = static_cast<std::uint32_t>(protection::Request::drive);
       in.command = command.frame(static_cast<std::uint8_t>(k / 20));
     }
-    host.take(in);
+    host.process_sample(in);
     inputs.push_back(in);
     const double pack_v = 1e-6 * in.pack.pack_uv;
     driving = switched.main_plus && switched.main_minus;
     if (driving)
-      link_v = pack_v;
+      dc_link_v = pack_v;
     else if (switched.precharge && switched.main_minus)
-      link_v += (pack_v - link_v) * (1 - std::exp(-0.1 / 0.5));
+      dc_link_v += (pack_v - dc_link_v) * (1 - std::exp(-0.1 / 0.5));
   }
   EXPECT_TRUE(driving);
   return inputs;
 }
 
 TEST_F(BxcanBoard, WhatIsOnTheWireIsBitForBitWhatTheApplicationMeansFromStartToDriving) {
-  const measurement::StartingPoint start = host_sim::starting_point(host_sim::Belief{0.8, 0.05}).value();
+  const measurement::StartingPoint start = host_sim::starting_point(host_sim::SocPrior{0.8, 0.05}).value();
   HostBoard host(started_once(), start);
   const auto inputs = start_of_a_drive(host);
   std::map<unsigned, std::vector<can::Frame>> expected;
@@ -235,7 +235,7 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
   auto part = part_of_the_shift(130);  // a second from one to the next
   for (std::size_t k = 20; k < part.size(); ++k)
     part[k].temperature_cdegc[3] = measurement::no_temperature;  // the fourth sensor breaks: a fault that is kept
-  const measurement::StartingPoint start = host_sim::starting_point(host_sim::Belief{0.8, 0.05}).value();
+  const measurement::StartingPoint start = host_sim::starting_point(host_sim::SocPrior{0.8, 0.05}).value();
   const auto run = [](UnicornBoard& one, const std::vector<Pack>& some) {
     std::vector<Input> inputs;
     for (const Pack& p : some) inputs.push_back({p, 0, {}});
@@ -245,7 +245,7 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
   std::vector<std::uint8_t> kept;
   {
     HostBoard host(started_once(), start);
-    for (const Pack& p : part) host.take({p, 0, {}});
+    for (const Pack& p : part) host.process_sample({p, 0, {}});
     kept = host.flash();
     EXPECT_GE(host.persistence().charge().operating_s, 60U);
     const auto code =
@@ -277,7 +277,7 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashHoldsBitForBitWhatTheApplicationKeepsAndT
     again.reset_flags = s.csr;
     cause = s.cause;
     HostBoard host(kept);
-    host.take({part.back(), 0, {}});
+    host.process_sample({part.back(), 0, {}});
     cause = hal::ResetCause::power_on;
     run(again, {part.back()});
     std::map<unsigned, can::Frame> told, expected;
@@ -629,7 +629,7 @@ TEST_F(BxcanBoard, PinsAreThoseOfItsPage) {
 /// order; and a sample to send.
 TEST_F(BxcanBoard, TellsWhatItsPageListsWhenNobodyMeasuresAndItsSampleIsOne) {
   ASSERT_TRUE(board.run_until([&] { return of_board(0x1B9).size() == 1; }, 700));
-  std::string told, listed;
+  std::string told, joined;
   for (const SeenFrame& s : board.can.seen) {
     if (s.from_board) fmt::print("({:.6f})", 1e-3 * board.ms_at_bit(s.end_bit - board.can.seen.front().end_bit));
     std::string line = fmt::format("can0  {:03X}   [{}] ", s.frame.id, s.frame.length);
@@ -639,8 +639,8 @@ TEST_F(BxcanBoard, TellsWhatItsPageListsWhenNobodyMeasuresAndItsSampleIsOne) {
   }
   const std::string page = files::read_file(BMS_SOURCE_DIR "/boards/stm32f405_forklift/README.md");
   static const std::regex frame("can0  [0-9A-F]{3}   \\[8\\]  ([0-9A-F]{2} ){7}[0-9A-F]{2}");
-  for (std::sregex_iterator f(page.begin(), page.end(), frame), end; f != end; ++f) listed += f->str() + "\n";
-  EXPECT_EQ(listed, told);
+  for (std::sregex_iterator f(page.begin(), page.end(), frame), end; f != end; ++f) joined += f->str() + "\n";
+  EXPECT_EQ(joined, told);
 
   Pack sample;
   sample.current_ua = -5'000'000;
@@ -650,7 +650,7 @@ TEST_F(BxcanBoard, TellsWhatItsPageListsWhenNobodyMeasuresAndItsSampleIsOne) {
   for (const can::Frame& f : hal::frames_of(sample, 0, 0)) {
     std::string sent = "#";
     for (const std::uint8_t byte : f.data) sent += fmt::format("{:02X}", byte);
-    if (f.id == hal::check_frame_id || f.id == hal::link_frame_id) continue;  // optional
+    if (f.id == hal::check_frame_id || f.id == hal::dc_link_frame_id) continue;  // optional
     EXPECT_TRUE(
         page.find(fmt::format("{:03X}{}", f.id, sent)) != std::string::npos ||
         (page.find(fmt::format(" {:03X}", f.id)) != std::string::npos && page.find("$id" + sent) != std::string::npos))

@@ -11,7 +11,7 @@ constexpr unsigned stuff_error = 1, acknowledge_error = 3, bit_dominant_error = 
 constexpr unsigned error_frame_bits = 6 + 8 + 3,
                    suspend_bits = 8;  // flag, delimiter, intermission; ISO 11898-1, 10.4.4 and 10.9
 
-can::Frame classic(const WireFrame& f) { return {f.id, f.length, f.data, f.extended}; }
+can::Frame to_can_frame(const WireFrame& f) { return {f.id, f.length, f.data, f.extended}; }
 
 /// Lower wins: identifier, then RTR, then IDE as the bits come.
 std::uint64_t arbitration_field(const WireFrame& f) {
@@ -350,7 +350,7 @@ void BxcanModel::end_frame() {
     if (tec_ > 0) --tec_;
     lec_ = 0;
     if (tec_ >= 128) suspended_bits_ = suspend_bits;
-    seen.push_back({classic(other_.frame), true, begun_bit_, now_bit});
+    seen.push_back({to_can_frame(other_.frame), true, begun_bit_, now_bit});
     return;
   }
   if (!other_sends_) return;
@@ -360,7 +360,7 @@ void BxcanModel::end_frame() {
     others.push_front(other_);  // its sender tries again
     return;
   }
-  seen.push_back({classic(other_.frame), false, begun_bit_, now_bit});
+  seen.push_back({to_can_frame(other_.frame), false, begun_bit_, now_bit});
   if (!on_the_bus()) return;
   lec_ = 0;
   rec_ = rec_ > 127 ? 120 : rec_ > 0 ? rec_ - 1 : 0;

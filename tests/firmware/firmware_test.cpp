@@ -132,9 +132,9 @@ TEST(MicrobitImage, CostsNoMoreThanTheTableSays) {
 TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
   const auto all = shift();
   const std::vector<measurement::Sample> part(all.begin() + 3000, all.begin() + 4200);
-  const measurement::StartingPoint start = host_sim::starting_point(host_sim::Belief{0.8, 0.05}).value();
+  const measurement::StartingPoint start = host_sim::starting_point(host_sim::SocPrior{0.8, 0.05}).value();
   const host_sim::Track host =
-      host_sim::run_on_host(files::read_cell("table9"), part, start, host_sim::ScalarKind::single);
+      host_sim::run_on_host(files::read_cell("table9"), part, start, host_sim::ScalarKind::float32);
 
   SlcanBoard board(image(images::Image::application));
   EXPECT_EQ(board.read(), "");  // ready

@@ -22,7 +22,7 @@ struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
 /// What comes to the board at one time.
 struct Input {
   Pack pack;
-  std::int32_t link_uv = 0;
+  std::int32_t dc_link_uv = 0;
   std::optional<can::Frame> command;  ///< before the sample
 };
 
@@ -54,7 +54,7 @@ class HostBoard {
     host_hal::requests.clear();
     host_hal::switched = {};
     persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
-    application_.emplace(told ? told : remembered_start(persistence_, host_hal::table9().hash),
+    application_.emplace(told ? told : stored_starting_point(persistence_, host_hal::table9().hash),
                          messages::Identity{host_hal::table9().hash, 0x000100},
                          static_cast<float>(host_hal::table9().parameters.capacity_ah), persistence_);
   }
@@ -62,12 +62,12 @@ class HostBoard {
   HostBoard(const HostBoard&) = delete;
   HostBoard& operator=(const HostBoard&) = delete;
 
-  void take(const Input& in) {
-    host_hal::link_reads_uv = in.link_uv;
+  void process_sample(const Input& in) {
+    host_hal::dc_link_reading_uv = in.dc_link_uv;
     if (in.command) host_hal::requests.push_back(*in.command);
-    application_->take(in.pack);
+    application_->process_sample(in.pack);
   }
-  void end() { application_->end(); }
+  void shut_down() { application_->shut_down(); }
   std::vector<std::uint8_t> flash() { return bytes_of(flash_); }
   const storage::Persistence& persistence() const { return persistence_; }
 

@@ -8,7 +8,7 @@ void host_hal::begin() {
   requests.clear();
   recorded.clear();
   switched = {};
-  link_reads_uv = 0;
+  dc_link_reading_uv = 0;
   cause = hal::ResetCause::power_on;
   fault.reset();
   fed = 0;
@@ -31,9 +31,11 @@ bool next_request(can::Frame& frame) {
   host_hal::requests.pop_front();
   return true;
 }
-void record(std::span<const std::uint32_t> words) { host_hal::recorded.emplace_back(words.begin(), words.end()); }
+void record_estimate(std::span<const std::uint32_t> words) {
+  host_hal::recorded.emplace_back(words.begin(), words.end());
+}
 void power_path_set(const PowerPath& wanted) { host_hal::switched = wanted; }
-std::int32_t link_uv() { return host_hal::link_reads_uv; }
+std::int32_t dc_link_uv() { return host_hal::dc_link_reading_uv; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }
 std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
@@ -44,7 +46,7 @@ bool calendar_set(std::uint32_t unix_s) {
   host_hal::calendar_was_set_to = unix_s;
   return host_hal::calendar_takes;
 }
-void calibrate(const Calibration& c) { host_hal::calibrated = c; }
+void calibrate(const SensorCalibration& c) { host_hal::calibrated = c; }
 
 }  // namespace hal
 }  // namespace bms

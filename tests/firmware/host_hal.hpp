@@ -19,14 +19,14 @@ inline std::vector<can::Frame> sent;
 inline std::deque<can::Frame> requests;
 inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
-inline std::int32_t link_reads_uv = 0;
+inline std::int32_t dc_link_reading_uv = 0;
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;
 inline hal::BoardState board_state;
 inline std::uint32_t calendar_was_set_to = 0;
 inline bool calendar_takes = true;
-inline hal::Calibration calibrated;
+inline hal::SensorCalibration calibrated;
 
 /// As at the start of a program.
 void begin();
@@ -59,15 +59,16 @@ struct Table9Board {
     return estimator.step(tables(), sample);
   }
   static std::uint64_t estimated_us(const Estimator& estimator) { return estimator.time_us(); }
-  static void look(estimator::Condition<Estimator>& condition, const Estimator& estimator,
-                   const measurement::Sample& sample, const estimator::Estimate<float>& e, bool limits_wanted) {
+  static void update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
+                               const measurement::Sample& sample, const estimator::Estimate<float>& e,
+                               bool limits_wanted) {
     condition.update(tables(), sample, e, estimator.state(), limits_wanted);
   }
-  static void tell_apart(estimator::PackCells<float, Cells>& of, const measurement::PackSample<Cells>& pack,
-                         const estimator::Estimate<float>& e) {
+  static void update_cells(estimator::PackCells<float, Cells>& of, const measurement::PackSample<Cells>& pack,
+                           const estimator::Estimate<float>& e) {
     of.update(tables(), pack, e);
   }
-  static const model::Plausible& plausible() { return tables().plausible; }
+  static const model::PlausibleRange& plausible() { return tables().plausible; }
   static protection::PackDesign design(double sample_period_s) {
     return {.limits = table9().parameters.limits,
             .capacity_ah = table9().parameters.capacity_ah,

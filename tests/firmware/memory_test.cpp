@@ -29,7 +29,7 @@ class Memory : public ::testing::Test {
     return in;
   }
   void run(HostBoard& board, int count) {
-    for (int k = 0; k < count; ++k) board.take(second());
+    for (int k = 0; k < count; ++k) board.process_sample(second());
   }
   void ask(HostBoard& board, std::uint32_t code, std::uint32_t argument) {
     can::Command command;
@@ -37,7 +37,7 @@ class Memory : public ::testing::Test {
     command.argument = argument;
     Input in = second();
     in.command = command.frame(counter_ = can::next(counter_));
-    board.take(in);
+    board.process_sample(in);
   }
 
   const std::vector<std::uint8_t> new_chip =
@@ -59,7 +59,7 @@ TEST_F(Memory, ARunBeginsWhereTheOneBeforeItEnded) {
     before = last<can::PackState>().value();
     cells = last<can::CellExtremes>().value();
     ASSERT_GT(cells.soc_spread, 1.0F) << "30 mV are some percent";
-    board.end();
+    board.shut_down();
     kept = board.flash();
   }
   host_hal::cause = hal::ResetCause::pin;  // which takes no time
@@ -79,7 +79,7 @@ TEST_F(Memory, OfAnotherCellFileNothingIsTakenUpUntilSomebodyHasSeenIt) {
   {
     HostBoard board(new_chip, start);
     run(board, 300);
-    board.end();
+    board.shut_down();
     kept = board.flash();
   }
   {  // as if that had been an image with another cell
@@ -110,7 +110,7 @@ TEST_F(Memory, AShortCircuitIsThereUntilTheWorkshopClearsIt) {
     run(board, 5);
     Input in = second();
     in.pack.current_ua = -60'000'000;
-    board.take(in);
+    board.process_sample(in);
     EXPECT_EQ(last<can::Faults>()->short_circuit, 1U);
     kept = board.flash();  // the power goes at once
   }
@@ -140,12 +140,12 @@ TEST_F(Memory, ACorrectionIsTakenAtOnceAndKept) {
 }
 
 TEST_F(Memory, WhatDoesNotFitIsStoredAsTheNearestThatDoes) {
-  EXPECT_NEAR(scaled(0.9234567F, 1e6F), 923'457, 1);
-  EXPECT_EQ(scaled(-5e3F, 1e6F), -2'147'000'000);
-  EXPECT_EQ(scaled(5e3F, 1e6F), 2'147'000'000);
-  EXPECT_EQ(scaled(INFINITY, 1e6F), 2'147'000'000);
-  EXPECT_EQ(scaled(-INFINITY, 1e6F), -2'147'000'000);
-  EXPECT_EQ(scaled(NAN, 1e6F), 0);
+  EXPECT_NEAR(scaled_to_integer(0.9234567F, 1e6F), 923'457, 1);
+  EXPECT_EQ(scaled_to_integer(-5e3F, 1e6F), -2'147'000'000);
+  EXPECT_EQ(scaled_to_integer(5e3F, 1e6F), 2'147'000'000);
+  EXPECT_EQ(scaled_to_integer(INFINITY, 1e6F), 2'147'000'000);
+  EXPECT_EQ(scaled_to_integer(-INFINITY, 1e6F), -2'147'000'000);
+  EXPECT_EQ(scaled_to_integer(NAN, 1e6F), 0);
 }
 
 }  // namespace

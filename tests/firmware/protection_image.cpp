@@ -7,8 +7,8 @@ namespace bms::protection {
 [[gnu::noinline, gnu::flatten]] const Decision& protection_step(Protection<16>& protection,
                                                                 const measurement::PackSample<16>& sample,
                                                                 const PackEstimate<16>& estimate,
-                                                                const Orders& orders) {
-  return protection.update(sample, estimate, orders);
+                                                                const ExternalInputs& inputs) {
+  return protection.update(sample, estimate, inputs);
 }
 
 }  // namespace bms::protection
@@ -17,8 +17,8 @@ int main() {
   using namespace bms::protection;
   static Scenario scenario;
   return scenario.run(1'000,
-                      [](auto& p, const auto& sample, const auto& estimate, const auto& orders) -> const Decision& {
-                        return protection_step(p, sample, estimate, orders);
+                      [](auto& p, const auto& sample, const auto& estimate, const auto& inputs) -> const Decision& {
+                        return protection_step(p, sample, estimate, inputs);
                       }) == expected_scenario_hash
              ? 0
              : 1;

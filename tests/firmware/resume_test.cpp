@@ -35,7 +35,7 @@ class Board {
     board_.write("O\r");
     board_.read();
   }
-  void tell(const char* frame) { board_.write(frame); }
+  void send(const char* frame) { board_.write(frame); }
   BoardTelemetry sample(const measurement::Sample& s) {
     board_.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
     return board_.telemetry();
@@ -74,7 +74,7 @@ class Resume : public ::testing::Test {
   /// A board that remembers nothing and is told where to begin.
   BoardTelemetry told_of(const BoardTelemetry& t, const measurement::Sample& s) const {
     Board board(folder_.path() / "empty");
-    board.tell(start(t).c_str());
+    board.send(start(t).c_str());
     return board.sample(s);
   }
   images::TemporaryFolder folder_;
@@ -89,7 +89,7 @@ TEST_F(Resume, AfterAShutdownSocGoesOnWhereItWas) {
   BoardTelemetry before;
   {
     Board board(flash());
-    board.tell(start_at_80_percent_to_1);
+    board.send(start_at_80_percent_to_1);
     before = board.drive(part_);
     board.switch_off();
   }
@@ -116,7 +116,7 @@ TEST_F(Resume, AfterTheSupplyWasCutSocIsThatOfTheLastMinuteAndSigmaSaysSo) {
   BoardTelemetry before;
   {
     Board board(flash());
-    board.tell(start_at_80_percent_to_1);
+    board.send(start_at_80_percent_to_1);
     before = board.drive(part_);
   }  // the emulator is killed
   Board board(flash());
@@ -131,12 +131,12 @@ TEST_F(Resume, AfterTheSupplyWasCutSocIsThatOfTheLastMinuteAndSigmaSaysSo) {
 TEST_F(Resume, AStartThatIsToldWinsOverWhatWasStored) {
   {
     Board board(flash());
-    board.tell(start_at_80_percent_to_1);
+    board.send(start_at_80_percent_to_1);
     board.drive({part_.begin(), part_.begin() + 200});
     board.switch_off();
   }
   Board board(flash());
-  board.tell(
+  board.send(
       "t3108"
       "00E9A435"
       "40420F00"
@@ -163,7 +163,7 @@ TEST_F(Resume, AFlashFileOfAnyContentIsUsed) {
   BoardTelemetry before;
   {
     Board board(flash());
-    board.tell(start_at_80_percent_to_1);
+    board.send(start_at_80_percent_to_1);
     before = board.drive({part_.begin(), part_.begin() + 200});
     board.switch_off();
   }

@@ -181,7 +181,7 @@ class Deepest {
  private:
   /// Functions that call themselves a known number of times.
   static std::uint32_t repeated(const Function& f) {
-    const bool halves = f.name.find("bms::arithmetic::settled<") !=
+    const bool halves = f.name.find("bms::arithmetic::step_response<") !=
                         std::string::npos;  // arithmetic/exponential.hpp: from 32 down to 1/4
     return halves ? 1 + 7 : 1;
   }

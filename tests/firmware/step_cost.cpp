@@ -71,7 +71,8 @@ Footprint footprint(const std::filesystem::path& application_image) {
   const ImageSize size = size_of(application_image);
   Footprint f;
   static const std::regex of_estimator(
-      ".*bms::(firmware::estimator_step\\(|estimator::SocEstimator<|firmware::BoardCell::look\\(|estimator::Condition<|"
+      ".*bms::(firmware::estimator_step\\(|estimator::SocEstimator<|firmware::BoardCell::update_condition\\(|estimator:"
+      ":Condition<|"
       "estimator::current_"
       "limits<|estimator::soc_from<|estimator::SocBank<|estimator::StartMisfit<|arithmetic::|model::|estimator::"
       "UdCovariance<|"
@@ -98,8 +99,9 @@ std::vector<std::pair<std::string, double>> core_figures(const images::EmulatedB
                                                          const std::vector<measurement::Sample>& samples) {
   const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
                                            samples, host_sim::state_count(cell));
-  const StepCost besides = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
-                                              samples, host_sim::state_count(cell), "bms::firmware::BoardCell::look(");
+  const StepCost besides =
+      count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay), samples,
+                         host_sim::state_count(cell), "bms::firmware::BoardCell::update_condition(");
   const ImageSize size = size_of(images::firmware_image(board.name, cell, images::Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},
@@ -115,8 +117,9 @@ std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedB
                                                          const std::vector<measurement::Sample>& samples) {
   const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
                                            samples, host_sim::state_count(cell));
-  const StepCost besides = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
-                                              samples, host_sim::state_count(cell), "bms::firmware::BoardCell::look(");
+  const StepCost besides =
+      count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay), samples,
+                         host_sim::state_count(cell), "bms::firmware::BoardCell::update_condition(");
   const StepCost pack = count_instructions(board, images::firmware_image(board.name, cell, images::Image::pack),
                                            "bms::firmware::pack_step(");
   const Footprint f = footprint(images::firmware_image(board.name, cell, images::Image::application));

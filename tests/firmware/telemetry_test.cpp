@@ -45,7 +45,7 @@ class TelemetryTest : public ::testing::Test {
   void SetUp() override {
     begin();
     estimator_hangs_back = false;
-    link_reads_uv = measurement::no_reading;
+    dc_link_reading_uv = measurement::no_reading;
     cause = hal::ResetCause::watchdog;
   }
   void ask(std::uint32_t code, std::uint32_t argument, std::uint8_t counter) {
@@ -68,7 +68,7 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
   sample.current_ua = -12'345'678;
   sample.voltage_uv = 3'301'499;
   sample.temperature_cdegc = -1'234;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x1B9, 0x19D, 0x19E,
                                           0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
   const auto state = can::PackState::of(sent[15]);
@@ -106,7 +106,7 @@ TEST_F(TelemetryTest, EverySampleIsToldRecordedAndFeedsTheWatchdog) {
 TEST_F(TelemetryTest, EveryFrameIsProtectedAndCounted) {
   for (int k = 0; k < 40; ++k) {
     sample.time_us = static_cast<std::uint64_t>(k) * 300'000;
-    application.take(estimator::pack_of(sample));
+    application.process_sample(estimator::single_cell_pack(sample));
   }
   std::map<unsigned, int> expected;
   for (const can::Frame& f : sent) {
@@ -132,7 +132,7 @@ TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
        {measurement::Sample{0, -12'345'678, 3'301'499, -1'234},
         measurement::Sample{1'000'000, measurement::no_reading, measurement::no_reading, measurement::no_temperature},
         measurement::Sample{0x1234'5678'9ABC, 2'147'483'647, -2'147'483'647, 15'000}}) {
-    application.take(estimator::pack_of(s));
+    application.process_sample(estimator::single_cell_pack(s));
     const auto current = last<can::SampleCurrent>().value();
     const auto voltage = last<can::SampleVoltage>().value();
     const auto time = last<can::SampleTime>().value();
@@ -142,7 +142,7 @@ TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
     EXPECT_EQ(std::uint64_t{time.time_high} << 32 | time.time_low, s.time_us);
     std::array<std::uint32_t, estimator::estimate_words> said{};
     std::copy(recorded.back().begin(), recorded.back().end(), said.begin());
-    expected.take(said);
+    expected.add(said);
     EXPECT_EQ(last<can::EstimateHash>().value().hash, expected.value());
     EXPECT_EQ(last<can::EstimateHash>().value().sample_counter, recorded.size());
   }
@@ -153,7 +153,7 @@ TEST_F(TelemetryTest, TheLogHoldsWhatTheEstimatorSawBitForBit) {
 
 TEST_F(TelemetryTest, TheLogSaysWhereTheEstimatorWasToldToBegin) {
   Application<Board<1>> told{measurement::StartingPoint{812'345'678, 20'000'001}, {0, 0}, 6, persistence};
-  told.take(estimator::pack_of(sample));
+  told.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(last<can::StartingSoc>().value().soc_ppb, 812'345'678);
   EXPECT_EQ(last<can::StartingSoc>().value().given, can::StartingSoc::given_yes);
   EXPECT_EQ(last<can::StartingSigma>().value().sigma_ppb, 20'000'001);
@@ -163,11 +163,11 @@ TEST_F(TelemetryTest, TheHashTellsEveryBitAndEveryOrder) {
   using Words = std::array<std::uint32_t, 2>;
   const auto of = [](std::initializer_list<Words> all) {
     estimator::EstimateHash h;
-    for (const Words& w : all) h.take(w);
+    for (const Words& w : all) h.add(w);
     return h.value();
   };
   estimator::EstimateHash text;  // "foobar" of the draft's test vectors begins with "foob"
-  text.take(std::array<std::uint32_t, 1>{0x626F6F66});
+  text.add(std::array<std::uint32_t, 1>{0x626F6F66});
   EXPECT_EQ(text.value(), 0x3F5076EFU);
   EXPECT_NE(of({{1, 2}, {3, 4}}), of({{3, 4}, {1, 2}}));
   for (int bit = 0; bit < 32; ++bit) EXPECT_NE(of({{1U << bit, 2}}), of({{0, 2}})) << bit;
@@ -176,7 +176,7 @@ TEST_F(TelemetryTest, TheHashTellsEveryBitAndEveryOrder) {
 TEST_F(TelemetryTest, ACommandIsHeardOnceAndAnswered) {
   ask(can::Command::code_log_of_samples, 0, 3);
   ask(can::Command::code_log_of_samples, 1, 3);
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   auto all = ids();
   EXPECT_EQ(std::count(all.begin(), all.end(), can::CommandAnswer::id), 1)
       << "the same counter again is the same command again";
@@ -184,13 +184,13 @@ TEST_F(TelemetryTest, ACommandIsHeardOnceAndAnswered) {
   EXPECT_EQ(last<can::CommandAnswer>().value().command_counter, 3U);
   sent.clear();
   sample.time_us += 100'000;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_FALSE(last<can::SampleCurrent>()) << "the log is off";
   EXPECT_TRUE(last<can::Status>());
   ask(can::Command::code_log_of_samples, 1, 4);
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   sample.time_us += 100'000;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_TRUE(last<can::SampleCurrent>());
 }
 
@@ -200,7 +200,7 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
   ask(can::Command::code_log_of_samples, 0, 15);  // no counter
   requests.push_back({0x123, 8, {}});
   requests.push_back({can::Command::id, 3, {}});
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_FALSE(last<can::CommandAnswer>());
   const struct {
     std::uint32_t code, argument, result;
@@ -213,7 +213,7 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
   std::uint8_t counter = 0;
   for (const auto& c : cases) {
     ask(c.code, c.argument, counter++);
-    application.take(estimator::pack_of(sample));
+    application.process_sample(estimator::single_cell_pack(sample));
     EXPECT_EQ(last<can::CommandAnswer>().value().result, c.result) << c.code;
     EXPECT_EQ(last<can::CommandAnswer>().value().code, c.code);
   }
@@ -222,13 +222,13 @@ TEST_F(TelemetryTest, WhatIsNoCommandIsNotHeardAndNonsenseRefused) {
 
 TEST_F(TelemetryTest, TheTimeOfACommandIsTheCalendarsAndOneItDoesNotTakeIsRefused) {
   ask(can::Command::code_set_time, 1'800'000'000, 1);
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(calendar_was_set_to, 1'800'000'000U);
   EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_done);
   calendar_takes = false;
   ask(can::Command::code_set_time, 1'800'000'001, 2);
   sample.time_us += 100'000;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_refused);
 }
 
@@ -236,7 +236,7 @@ TEST_F(TelemetryTest, ACorrectionIsKeptAndUsedAtOnceAndOneThatIsNoneRefused) {
   const auto set = [&](std::uint32_t code, std::int32_t value, std::uint8_t counter) {
     ask(code, static_cast<std::uint32_t>(value), counter);
     sample.time_us += 100'000;
-    application.take(estimator::pack_of(sample));
+    application.process_sample(estimator::single_cell_pack(sample));
     return last<can::CommandAnswer>()->result;
   };
   calibrated = {};
@@ -256,7 +256,7 @@ TEST_F(TelemetryTest, WhatTheBoardFindsOutAboutItselfIsTold) {
                            .calendar = hal::CalendarState::runs_roughly,
                            .stack_free = 1'234};
   fault = hal::FaultRecord{.exception = 4};
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   auto told = last<can::Board>();
   ASSERT_TRUE(told);
   EXPECT_EQ(told->ram_failed | told->image_failed | told->stack_overrun | told->cell_file_changed | told->supply_low,
@@ -269,7 +269,7 @@ TEST_F(TelemetryTest, WhatTheBoardFindsOutAboutItselfIsTold) {
   sent.clear();
   sample.time_us += 100'000;
   host_hal::board_state.stack_overrun = true;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   told = last<can::Board>();
   ASSERT_TRUE(told) << "at once, not within the second";
   EXPECT_EQ(told->stack_overrun, 1U);
@@ -277,7 +277,7 @@ TEST_F(TelemetryTest, WhatTheBoardFindsOutAboutItselfIsTold) {
 
 TEST_F(TelemetryTest, MuchAskingMakesASampleNoLonger) {
   for (std::uint8_t k = 0; k < 14; ++k) ask(can::Command::code_set_time, 1, k);
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(requests.size(), 10U);
 }
 
@@ -285,11 +285,11 @@ TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
   sample.current_ua = measurement::no_reading;
   sample.voltage_uv = measurement::no_reading;
   sample.temperature_cdegc = measurement::no_temperature;
-  const auto nothing = can::PackElectrical::of(messages::pack_electrical(estimator::pack_of(sample)).frame(0));
+  const auto nothing = can::PackElectrical::of(messages::pack_electrical(estimator::single_cell_pack(sample)).frame(0));
   EXPECT_TRUE(std::isnan(nothing.voltage) && std::isnan(nothing.current) && std::isnan(nothing.temperature));
   sample.current_ua = 2'000'000'000;
   sample.voltage_uv = 2'000'000'000;
-  const auto much = can::PackElectrical::of(messages::pack_electrical(estimator::pack_of(sample)).frame(0));
+  const auto much = can::PackElectrical::of(messages::pack_electrical(estimator::single_cell_pack(sample)).frame(0));
   EXPECT_NEAR(much.current, 655.34, 1e-3);
   EXPECT_NEAR(much.voltage, 65.534, 1e-4);
   estimator::Estimate<float> e;
@@ -309,26 +309,27 @@ TEST_F(TelemetryTest, WhatIsNotKnownIsSaidAndWhatDoesNotFitSaturates) {
 
 TEST_F(TelemetryTest, NobodyListeningIsToldNothingAndTheCountersSayHowMuchWasMissed) {
   listening = false;
-  for (int k = 0; k < 5; ++k, sample.time_us += 100'000) application.take(estimator::pack_of(sample));
+  for (int k = 0; k < 5; ++k, sample.time_us += 100'000)
+    application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_TRUE(sent.empty());
   EXPECT_EQ(fed, 5);
   listening = true;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(can::Status::of(sent.back()).sample_counter, 6U);
   EXPECT_EQ(can::counter_of(sent.back()), 0);
 }
 
 TEST_F(TelemetryTest, ASampleThatTheEstimatorHasNotTakenOrThatIsNoNewOneDoesNotFeedTheWatchdog) {
-  application.take(estimator::pack_of(sample));
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(fed, 1) << "the same again";
   sample.time_us += 100'000;
   estimator_hangs_back = true;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(fed, 1);
   sample.time_us += 100'000;
   estimator_hangs_back = false;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_EQ(fed, 2);
 }
 
@@ -338,7 +339,7 @@ TEST_F(TelemetryTest, IdentityComesEachSecondAndAFaultOnce) {
   fault->cfsr = 0x8200;
   for (int k = 0; k < 30; ++k) {
     sample.time_us = static_cast<std::uint64_t>(k) * 100'000;
-    application.take(estimator::pack_of(sample));
+    application.process_sample(estimator::single_cell_pack(sample));
   }
   const auto all = ids();
   EXPECT_EQ(std::count(all.begin(), all.end(), can::Identity::id), 3);
@@ -363,7 +364,7 @@ TEST_F(TelemetryTest, TheJ1939ProfileTellsTheBatteryInRvcsUnitsBesideItsOwnMessa
     return all;
   };
   for (int k = 0; k < 21; ++k) {
-    with_profile.take(pack);
+    with_profile.process_sample(pack);
     pack.time_us += 100'000;
   }
   ASSERT_EQ(of_dgn(0x1FFFD).size(), 3U) << "every second of two";
@@ -385,7 +386,7 @@ TEST_F(TelemetryTest, TheJ1939ProfileTellsTheBatteryInRvcsUnitsBesideItsOwnMessa
   pack.temperature_cdegc.fill(measurement::no_temperature);
   for (auto& uv : pack.cell_uv) uv = 3'900'000;
   for (int k = 0; k < 20; ++k) {
-    with_profile.take(pack);
+    with_profile.process_sample(pack);
     pack.time_us += 100'000;
   }
   EXPECT_EQ(of_dgn(0x1FFFD).back(), (Bytes{1, 120, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF})) << "not known";
@@ -394,7 +395,7 @@ TEST_F(TelemetryTest, TheJ1939ProfileTellsTheBatteryInRvcsUnitsBesideItsOwnMessa
   listening = false;
   sent.clear();
   for (int k = 0; k < 20; ++k) {
-    with_profile.take(pack);
+    with_profile.process_sample(pack);
     pack.time_us += 100'000;
   }
   EXPECT_TRUE(sent.empty());
@@ -403,7 +404,7 @@ TEST_F(TelemetryTest, TheJ1939ProfileTellsTheBatteryInRvcsUnitsBesideItsOwnMessa
 TEST_F(TelemetryTest, ACommandInAFrameOf29BitsIsNotHeard) {
   ask(can::Command::code_log_of_samples, 0, 3);
   requests.back().long_id = true;
-  application.take(estimator::pack_of(sample));
+  application.process_sample(estimator::single_cell_pack(sample));
   EXPECT_FALSE(last<can::CommandAnswer>());
 }
 
@@ -414,11 +415,11 @@ class PackWith : public TelemetryTest {
   Application<Board<16>, VehicleProfile> pack{
       std::nullopt, {0xCE110001, 0}, 6, persistence};  // of the same cell file as the other
   measurement::PackSample<16> reading{};
-  double link_v = 0;
+  double dc_link_v = 0;
 
   void SetUp() override {
     TelemetryTest::SetUp();
-    link_reads_uv = 0;
+    dc_link_reading_uv = 0;
     cause = hal::ResetCause::power_on;
     for (std::size_t k = 0; k < 16; ++k) reading.cell_uv[k] = 3'280'000 + static_cast<std::int32_t>(k) * 100;
     reading.pack_uv = 16 * 3'280'750;
@@ -434,17 +435,17 @@ class PackWith : public TelemetryTest {
     const double pack_v = 1e-6 * reading.pack_uv;
     const auto& c = switched;
     if (c.main_plus && c.main_minus)
-      link_v = pack_v;
+      dc_link_v = pack_v;
     else if (c.precharge && c.main_minus)
-      link_v += (pack_v - link_v) * (1 - std::exp(-1 / 0.5));
+      dc_link_v += (pack_v - dc_link_v) * (1 - std::exp(-1 / 0.5));
     else
-      link_v *= std::exp(-0.2);
-    link_reads_uv = static_cast<std::int32_t>(1e6 * link_v);
-    pack.take(reading);
+      dc_link_v *= std::exp(-0.2);
+    dc_link_reading_uv = static_cast<std::int32_t>(1e6 * dc_link_v);
+    pack.process_sample(reading);
   }
   bool driving() const { return switched.main_plus && switched.main_minus; }
 };
-class PackTest : public PackWith<NoVehicleProfile> {};
+class PackTest : public PackWith<WithoutVehicleProfile> {};
 
 TEST_F(PackTest, TellsEachCellTheExtremesAndTheTemperatures) {
   reading.cell_uv[4] = 3'291'000;
@@ -534,24 +535,24 @@ TEST_F(PackTest, AnotherCellFileIsToldAndTakenOnlyWhenFaultsAreCleared) {
   const auto unit = [&](std::uint32_t hash) {
     return std::make_unique<Application<Board<16>>>(std::nullopt, messages::Identity{hash, 0}, 6.F, persistence);
   };
-  EXPECT_FALSE(of_another_cell_file(persistence, 0xCE110001));
-  EXPECT_TRUE(of_another_cell_file(persistence, 0xCE110002));
-  EXPECT_FALSE(remembered_start(persistence, 0xCE110002));
+  EXPECT_FALSE(stored_for_another_cell_file(persistence, 0xCE110001));
+  EXPECT_TRUE(stored_for_another_cell_file(persistence, 0xCE110002));
+  EXPECT_FALSE(stored_starting_point(persistence, 0xCE110002));
   const auto changed = unit(0xCE110002);
   reading.time_us += 1'000'000;
-  changed->take(reading);
+  changed->process_sample(reading);
   EXPECT_EQ(last<can::Board>()->cell_file_changed, 1U);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
-  EXPECT_TRUE(of_another_cell_file(persistence, 0xCE110002)) << "not yet";
+  EXPECT_TRUE(stored_for_another_cell_file(persistence, 0xCE110002)) << "not yet";
   ask(can::Command::code_clear_faults, 0, 3);
   for (int k = 0; k < 3; ++k) {
     reading.time_us += 1'000'000;
-    changed->take(reading);
+    changed->process_sample(reading);
   }
   EXPECT_EQ(last<can::Board>()->cell_file_changed, 0U);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
-  EXPECT_FALSE(of_another_cell_file(persistence, 0xCE110002));
-  EXPECT_TRUE(of_another_cell_file(persistence, 0xCE110001));
+  EXPECT_FALSE(stored_for_another_cell_file(persistence, 0xCE110002));
+  EXPECT_TRUE(stored_for_another_cell_file(persistence, 0xCE110001));
 }
 
 TEST_F(PackTest, ASevereFaultOpensAndIsToldAtOnceWithItsCause) {

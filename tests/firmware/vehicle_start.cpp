@@ -57,12 +57,12 @@ class Truck {
       sample.temperature_cdegc[k] =
           static_cast<std::int16_t>(2'500 + static_cast<int>((static_cast<std::size_t>(samples_) + k) % 3));
     const double target_v = switched.main_plus || (switched.precharge && switched.main_minus) ? pack_v : 0;
-    link_v_ = switched.main_plus && switched.main_minus
-                  ? pack_v
-                  : target_v + (link_v_ - target_v) * std::exp(-period_s / precharge_s);
-    link_reads_uv = static_cast<std::int32_t>(1e6 * link_v_);
-    application_.take(sample);
-    hear();
+    dc_link_v_ = switched.main_plus && switched.main_minus
+                     ? pack_v
+                     : target_v + (dc_link_v_ - target_v) * std::exp(-period_s / precharge_s);
+    dc_link_reading_uv = static_cast<std::int32_t>(1e6 * dc_link_v_);
+    application_.process_sample(sample);
+    receive();
   }
   double now_s() const { return period_s * samples_; }
   /// Samples pass until it is so; after a minute it is none of this firmware.
@@ -84,18 +84,18 @@ class Truck {
   can::AllowedCurrent allowed;
   can::Faults faults;
   can::CommandAnswer answer;
-  bool heard = false, asks = false;
+  bool received = false, asks = false;
   std::uint32_t argument = 0;
   double first_cell_v = 3.28;
 
  private:
-  void hear() {
+  void receive() {
     for (const can::Frame& f : sent) {
       if (f.id == can::ContactorState::id) contactors = can::ContactorState::of(f);
       if (f.id == can::AllowedCurrent::id) allowed = can::AllowedCurrent::of(f);
       if (f.id == can::Faults::id) faults = can::Faults::of(f);
       if (f.id == can::CommandAnswer::id) answer = can::CommandAnswer::of(f);
-      heard = true;
+      received = true;
     }
     sent.clear();
   }
@@ -104,7 +104,7 @@ class Truck {
   Application<Board> application_{measurement::StartingPoint{500'000'000, 10'000'000}, {}, 6, persistence_};
   std::uint8_t counter_ = 0;
   int samples_ = 0;
-  double link_v_ = 0;
+  double dc_link_v_ = 0;
 };
 
 void tell() {
@@ -112,7 +112,7 @@ void tell() {
   Truck truck;
   std::string json;
   const auto say = [&](const char* name, double seconds) { json += fmt::format(",\n  \"{}\": {:.1f}", name, seconds); };
-  say("first_frames_s", truck.until([&] { return truck.heard; }));
+  say("first_frames_s", truck.until([&] { return truck.received; }));
   truck.drives();
   const double asked_s = truck.now_s();
   const auto since_asked_s = [&] { return truck.now_s() - asked_s; };
@@ -157,7 +157,7 @@ void tell() {
       "{{\n  \"example_id\": {}, \"example_data_id\": {}, \"example_counter\": 5, \"example_bytes\": \"{}\", "
       "\"example_crc_over\": \"{}\", \"example_crc\": {}{},\n  \"request_lasts_s\": {:g}, \"grace_s\": {:g}\n}}\n",
       frame.id, can::Command::data_id, data, protected_bytes, frame.data[0], json,
-      1e-6 * static_cast<double>(Requested::request_lasts_us), 1e-6 * protection::Contactors::grace_us);
+      1e-6 * static_cast<double>(Requested::request_timeout_us), 1e-6 * protection::Contactors::grace_us);
 }
 
 }  // namespace

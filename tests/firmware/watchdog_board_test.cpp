@@ -39,10 +39,10 @@ class Watchdog : public ::testing::Test {
 };
 
 TEST(Progress, IsMadeOnlyByASampleThatWentAllItsWay) {
-  const auto second = [](const Progress::Made& made) {
+  const auto second = [](const Progress::SampleProgress& done) {
     Progress p;
     EXPECT_TRUE(p.complete({1'000, 1'000, 1}));
-    return p.complete(made);
+    return p.complete(done);
   };
   EXPECT_TRUE(second({2'000, 2'000, 2}));
   EXPECT_FALSE(second({1'000, 1'000, 2})) << "the same sample again";

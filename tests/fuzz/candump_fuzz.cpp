@@ -15,11 +15,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   DumpLines lines;
   BusState bus;
   for (std::size_t k = 0; k < size; ++k) {
-    if (!lines.take(static_cast<char>(data[k]))) continue;
+    if (!lines.push(static_cast<char>(data[k]))) continue;
     BusFrame frame;
     if (!parse_dump_line(lines.line(), frame)) continue;
     require(frame.length <= (frame.kind == FrameKind::fd ? 64 : 8));
-    bus.take(frame);
+    bus.receive(frame);
     std::string written;
     append_dump_line(written, frame, "can0");
     BusFrame again;

@@ -27,7 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame.id = id;
     }
     const firmware::Requested before = requested;
-    const auto answer = commands.take(frame, now_us, requested);
+    const auto answer = commands.handle(frame, now_us, requested);
     require(static_cast<unsigned>(requested.power) <= 2 && static_cast<unsigned>(requested.clear) <= 2);
     const bool same = requested.log_samples == before.log_samples && requested.unix_time_s == before.unix_time_s &&
                       requested.clear == before.clear && requested.power == before.power &&
@@ -43,9 +43,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             answer->command_counter == static_cast<std::uint32_t>(last_counter));
     require(same || answer->result == can::CommandAnswer::result_done);
     if (requested.power != protection::Request::none) {
-      require(requested.power_now(requested.power_at_us + firmware::Requested::request_lasts_us - 1) ==
+      require(requested.active_request(requested.power_at_us + firmware::Requested::request_timeout_us - 1) ==
               requested.power);
-      require(requested.power_now(requested.power_at_us + firmware::Requested::request_lasts_us) ==
+      require(requested.active_request(requested.power_at_us + firmware::Requested::request_timeout_us) ==
               protection::Request::none);
     }
   }

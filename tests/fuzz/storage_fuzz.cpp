@@ -85,7 +85,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if ((what & 0x40) != 0) flash.cut_in(input.byte() % 32);
       switch (what % 6) {
         case 0:
-          log.erase_one();
+          log.erase_next_sector();
           break;
         case 1: {
           storage::Persistence p;
@@ -108,9 +108,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         default: {
           const storage::Kind kind{static_cast<std::uint8_t>(what & 15), input.byte()};
           const auto payload = input.bytes(input.byte());
-          if (log.store(kind, payload) != storage::Stored::kept) break;
+          if (log.store(kind, payload) != storage::StoreResult::stored) break;
           flash.no_cut();
-          std::array<std::uint8_t, storage::longest_payload> into;
+          std::array<std::uint8_t, storage::max_payload_bytes> into;
           const auto found = log.load(kind.type, kind.layout, into);
           must(found && std::equal(found->payload.begin(), found->payload.end(), payload.begin(), payload.end()));
         }

@@ -98,13 +98,13 @@ class Bq76952 : public ::testing::Test {
     return std::none_of(sample.cell_uv.begin(), sample.cell_uv.end(),
                         [](auto uv) { return uv == measurement::no_reading; }) &&
            sample.pack_uv != measurement::no_reading && sample.current_ua != measurement::no_reading &&
-           front_end.link_uv() != measurement::no_reading;
+           front_end.dc_link_uv() != measurement::no_reading;
   }
   bool empty() const {
     return std::all_of(sample.cell_uv.begin(), sample.cell_uv.end(),
                        [](auto uv) { return uv == measurement::no_reading; }) &&
            sample.pack_uv == measurement::no_reading && sample.current_ua == measurement::no_reading &&
-           front_end.link_uv() == measurement::no_reading &&
+           front_end.dc_link_uv() == measurement::no_reading &&
            std::all_of(sample.temperature_cdegc.begin(), sample.temperature_cdegc.end(),
                        [](auto t) { return t == measurement::no_temperature; });
   }
@@ -126,7 +126,8 @@ class Bq76952 : public ::testing::Test {
       EXPECT_TRUE(near(sample.cell_uv[k], measurement::no_reading, 1e6 * model.cell_v[k], 501))
           << "cell " << k << ": " << sample.cell_uv[k] << ", " << model.cell_v[k];
     EXPECT_TRUE(near(sample.pack_uv, measurement::no_reading, 1e6 * model.stack_v, 5'001)) << sample.pack_uv;
-    EXPECT_TRUE(near(front_end.link_uv(), measurement::no_reading, 1e6 * model.ld_v, 5'001)) << front_end.link_uv();
+    EXPECT_TRUE(near(front_end.dc_link_uv(), measurement::no_reading, 1e6 * model.ld_v, 5'001))
+        << front_end.dc_link_uv();
     EXPECT_TRUE(near(sample.current_ua, measurement::no_reading, 1e6 * model.current_a, 0.1e6))
         << sample.current_ua << ", " << model.current_a;
     for (std::size_t k = 0; k < 4; ++k)
@@ -375,7 +376,7 @@ TEST_F(Bq76952, StackLinkAndTemperaturesThatStandStillAreGivenForOneSampleMoreAt
     next();
     if (k == 0) continue;
     ASSERT_NE(sample.cell_uv[0], measurement::no_reading);
-    ASSERT_TRUE(sample.pack_uv == measurement::no_reading && front_end.link_uv() == measurement::no_reading &&
+    ASSERT_TRUE(sample.pack_uv == measurement::no_reading && front_end.dc_link_uv() == measurement::no_reading &&
                 sample.temperature_cdegc[0] == measurement::no_temperature)
         << k;
   }
@@ -573,7 +574,7 @@ TEST(Bq76952Samples, ComeEach100msWithOrWithoutTheChipHearRequestsAndSwitchWhatI
     }
     if (k == 49) {
       EXPECT_EQ(s->cell_uv[3], 3'300'000);
-      EXPECT_EQ(hal::link_uv(), 40'000'000);
+      EXPECT_EQ(hal::dc_link_uv(), 40'000'000);
     }
   }
   ASSERT_TRUE(hal::starting_point().has_value());

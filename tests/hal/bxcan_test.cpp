@@ -116,7 +116,7 @@ TEST(TransmitQueue, GivesFramesOfBothKindsInTheOrderOfTheWire) {
                    [&](const can::Frame& a, const can::Frame& b) { return on_the_wire(a) < on_the_wire(b); });
   for (const can::Frame& f : expected) {
     WaitingFrame out;
-    ASSERT_TRUE(queue.take(out, [](const WaitingFrame&) { return true; }));
+    ASSERT_TRUE(queue.pop(out, [](const WaitingFrame&) { return true; }));
     EXPECT_EQ(out.frame.data[0], f.data[0]);
   }
 }
@@ -143,7 +143,7 @@ TEST(TransmitQueue, GivesTheMostUrgentAndOfOneIdentifierTheOldestWhateverComes) 
       WaitingFrame out;
       const auto found =
           std::find_if(expected.begin(), expected.end(), [&](const auto& e) { return e.first != forbidden; });
-      ASSERT_EQ(queue.take(out, [&](const WaitingFrame& w) { return w.frame.id != forbidden; }),
+      ASSERT_EQ(queue.pop(out, [&](const WaitingFrame& w) { return w.frame.id != forbidden; }),
                 found != expected.end());
       if (found == expected.end()) continue;
       ASSERT_EQ(out.frame.id, found->first);

@@ -19,7 +19,7 @@ struct Bench {
   double supply_v = 3.3, cell_v = 3.3, current_a = 0, celsius = 25;
   std::uint32_t n = 100;
 
-  Counts counts() const {
+  AdcCounts counts() const {
     const auto sum = [&](double pin_v) {
       return static_cast<std::uint32_t>(std::lround(n * std::clamp(pin_v / supply_v, 0.0, 1.0) * 4'095));
     };
@@ -31,7 +31,7 @@ struct Bench {
             .n_reference = n,
             .reference = sum(reference_v)};
   }
-  measurement::Sample read(const Calibration& calibration = {}) const {
+  measurement::Sample read(const SensorCalibration& calibration = {}) const {
     measurement::Sample s;
     adc::read(counts(), reference_at_3v3, {}, calibration, s);
     return s;
@@ -66,7 +66,7 @@ TEST(CellReadings, TemperatureIsWithin045KelvinFromMinus25To85DegreesAndFallsNow
 }
 
 TEST(CellReadings, AThermistorThatIsOffOrShortedIsNoTemperature) {
-  Counts c = Bench{}.counts();
+  AdcCounts c = Bench{}.counts();
   measurement::Sample s;
   for (const std::uint32_t rail : {0U, 4'095U * c.n}) {
     c.temperature = rail;
@@ -92,14 +92,14 @@ TEST(CellReadings, AnAmplifierAtItsRailReadsMoreThanAShortCircuit) {
 }
 
 TEST(CellReadings, AConverterOrASupplyThatCannotBeIsNoReading) {
-  const auto nothing = [](Counts c) {
+  const auto nothing = [](AdcCounts c) {
     measurement::Sample s;
     read(c, reference_at_3v3, {}, {}, s);
     return s.voltage_uv == measurement::no_reading && s.current_ua == measurement::no_reading &&
            s.temperature_cdegc == measurement::no_temperature;
   };
   EXPECT_TRUE(nothing({}));
-  Counts c = Bench{}.counts();
+  AdcCounts c = Bench{}.counts();
   EXPECT_FALSE(nothing(c));
   c.reference = 0;
   EXPECT_TRUE(nothing(c));

@@ -65,16 +65,16 @@ TEST(Slcan, AnyBytesNeverDoHarmAndTheNextLineIsRead) {
   slcan::LineReader reader;
   for (int run = 0; run < 2'000; ++run) {
     for (std::size_t k = 0, n = random() % 100; k < n; ++k) {
-      if (!reader.take(static_cast<char>(random()))) continue;
+      if (!reader.push(static_cast<char>(random()))) continue;
       can::Frame frame;
       if (slcan::decode(reader.line(), frame)) {
         ASSERT_LE(frame.length, 8);
       }
       slcan::is_other_frame(reader.line());
     }
-    reader.take('\r');
-    for (const char c : std::string("t12327B2A")) ASSERT_FALSE(reader.take(c));
-    ASSERT_TRUE(reader.take('\r'));
+    reader.push('\r');
+    for (const char c : std::string("t12327B2A")) ASSERT_FALSE(reader.push(c));
+    ASSERT_TRUE(reader.push('\r'));
     can::Frame frame;
     ASSERT_TRUE(slcan::decode(reader.line(), frame));
     ASSERT_EQ(frame.data[1], 0x2A);
@@ -89,17 +89,17 @@ TEST(SampleFrames, CarryASampleAndAStart) {
   sent.temperature_cdegc = -4'000;
   SampleFrames<1> received;
   const auto frames = frames_of(sent);
-  EXPECT_FALSE(received.take(frames[0]));
-  EXPECT_TRUE(received.take(frames[1]));
+  EXPECT_FALSE(received.receive(frames[0]));
+  EXPECT_TRUE(received.receive(frames[1]));
   EXPECT_EQ(received.sample().time_us, sent.time_us);
   EXPECT_EQ(received.sample().current_ua, sent.current_ua);
   EXPECT_EQ(received.sample().cell_uv[0], measurement::no_reading);
   EXPECT_EQ(received.sample().temperature_cdegc[0], -4'000);
   const can::Frame start = frame_of(measurement::StartingPoint{800'000'000, 20'000'000});
-  EXPECT_TRUE(is_start(start));
-  EXPECT_EQ(start_of(start).soc_ppb, 800'000'000);
-  EXPECT_EQ(start_of(start).soc_sigma_ppb, 20'000'000);
-  EXPECT_FALSE(is_start({start.id, 7, start.data}));
+  EXPECT_TRUE(is_starting_point(start));
+  EXPECT_EQ(starting_point_of(start).soc_ppb, 800'000'000);
+  EXPECT_EQ(starting_point_of(start).soc_sigma_ppb, 20'000'000);
+  EXPECT_FALSE(is_starting_point({start.id, 7, start.data}));
 }
 
 measurement::PackSample<16> some_pack() {
@@ -118,14 +118,14 @@ TEST(SampleFrames, CarryAPack) {
   SampleFrames<16> received;
   const auto frames = frames_of(sent, 51'000'000, 7);
   EXPECT_TRUE(std::ranges::is_sorted(frames, {}, &can::Frame::id)) << "a node that sends by identifier keeps the order";
-  for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(received.take(frames[k]), k + 1 == frames.size()) << k;
+  for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(received.receive(frames[k]), k + 1 == frames.size()) << k;
   EXPECT_EQ(received.sample().time_us, sent.time_us);
   EXPECT_EQ(received.sample().current_ua, sent.current_ua);
   EXPECT_EQ(received.sample().pack_uv, sent.pack_uv);
   EXPECT_EQ(received.sample().cell_uv, sent.cell_uv);
   EXPECT_EQ(received.sample().temperature_cdegc, sent.temperature_cdegc);
-  EXPECT_EQ(received.link_uv(), 51'000'000);
-  EXPECT_EQ(received.refused(), 0U);
+  EXPECT_EQ(received.dc_link_uv(), 51'000'000);
+  EXPECT_EQ(received.rejected(), 0U);
 }
 
 TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
@@ -138,17 +138,17 @@ TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
       for (std::size_t k = 0; k < frames.size(); ++k) {
         can::Frame frame = frames[k];
         if (k == broken) frame.data[bit / 8] = static_cast<std::uint8_t>(frame.data[bit / 8] ^ (1U << bit % 8));
-        complete = received.take(frame) || complete;
+        complete = received.receive(frame) || complete;
       }
       EXPECT_FALSE(complete) << broken << " " << bit;
     }
     if (broken == 0) continue;  // without a check everything is taken
     SampleFrames<16> received;
     bool complete = false;
-    for (std::size_t k = 0; k < frames.size(); ++k) complete = (k != broken && received.take(frames[k])) || complete;
+    for (std::size_t k = 0; k < frames.size(); ++k) complete = (k != broken && received.receive(frames[k])) || complete;
     EXPECT_FALSE(complete) << broken;
     // the next whole one is taken again
-    for (const can::Frame& frame : frames) complete = received.take(frame);
+    for (const can::Frame& frame : frames) complete = received.receive(frame);
     EXPECT_TRUE(complete) << broken;
   }
 }
@@ -156,8 +156,8 @@ TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
 TEST(SampleFrames, WhatGetsLostIsMissingAndNotTheLastReadingAgain) {
   measurement::Sample s{1, -5, 3'300'000, 2'500};
   SampleFrames<1> received;
-  for (const can::Frame& frame : frames_of(s)) received.take(frame);
-  EXPECT_TRUE(received.take(frames_of(s)[1]));
+  for (const can::Frame& frame : frames_of(s)) received.receive(frame);
+  EXPECT_TRUE(received.receive(frames_of(s)[1]));
   EXPECT_EQ(received.sample().current_ua, measurement::no_reading);
   EXPECT_EQ(received.sample().cell_uv[0], measurement::no_reading);
 }

@@ -8,10 +8,10 @@
 namespace bms::hil {
 namespace {
 
-measurement::PackSample<most_cells> reading(std::int32_t first_uv) {
-  measurement::PackSample<most_cells> s;
+measurement::PackSample<max_cells> reading(std::int32_t first_uv) {
+  measurement::PackSample<max_cells> s;
   s.current_ua = -first_uv;
-  for (std::size_t k = 0; k < most_cells; ++k) s.cell_uv[k] = first_uv + static_cast<std::int32_t>(k);
+  for (std::size_t k = 0; k < max_cells; ++k) s.cell_uv[k] = first_uv + static_cast<std::int32_t>(k);
   s.temperature_cdegc[0] = static_cast<std::int16_t>(first_uv % 1000);
   return s;
 }
@@ -79,16 +79,16 @@ TEST(SimulatedPack, ALinkThatIsPrechargedFollowsItsCurveAndAWeldedContactorHolds
   const double v = pack.pack_v();
   EXPECT_NEAR(v, 16 * 3.285, 0.3);
   for (int k = 0; k < 5; ++k) pack.run(-6, {.main_minus = true, .precharge = true}, false, 25, 0.1);
-  EXPECT_NEAR(pack.link_v(), v * (1 - std::exp(-1.0)), 0.01 * v) << "after one time constant";
+  EXPECT_NEAR(pack.dc_link_v(), v * (1 - std::exp(-1.0)), 0.01 * v) << "after one time constant";
   EXPECT_EQ(pack.current_a(), 0) << "the load waits";
   pack.run(-6, {.main_plus = true, .main_minus = true}, false, 25, 0.1);
   EXPECT_EQ(pack.current_a(), -6);
-  EXPECT_NEAR(pack.link_v(), pack.pack_v(), 1e-9);
+  EXPECT_NEAR(pack.dc_link_v(), pack.pack_v(), 1e-9);
   pack.run(-6, {.main_minus = true}, true, 25, 0.1);
   EXPECT_EQ(pack.current_a(), -6) << "welded";
   pack.run(-6, {}, false, 25, 5);
   EXPECT_EQ(pack.current_a(), 0);
-  EXPECT_NEAR(pack.link_v(), pack.pack_v() * std::exp(-1.0), 0.5);
+  EXPECT_NEAR(pack.dc_link_v(), pack.pack_v() * std::exp(-1.0), 0.5);
 }
 
 TEST(SimulatedPack, NoTwoCellsAreAlikeAndASeedMakesThemAgain) {

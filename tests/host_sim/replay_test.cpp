@@ -10,20 +10,20 @@ namespace {
 
 using ::testing::HasSubstr;
 
-ReplayResult replayed(const std::optional<Belief>& belief, ScalarKind scalar = ScalarKind::single) {
+ReplayResult replayed(const std::optional<SocPrior>& prior, ScalarKind scalar = ScalarKind::float32) {
   ReplayResult result;
   result.cell = files::read_cell("table9");
   result.target = "host";
   result.scalar = scalar;
   result.recording = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
-  result.track = run_on_host(result.cell, files::samples(result.recording), starting_point(belief), scalar);
+  result.track = run_on_host(result.cell, files::samples(result.recording), starting_point(prior), scalar);
   evaluate(result);
   return result;
 }
 
 // The figures of the issue that this estimator is built for; measured values are in estimator/README.md.
 TEST(ReplayOfTheShift, StartedRightIsWithin1Percent) {
-  const auto r = replayed(Belief{0.98});
+  const auto r = replayed(SocPrior{0.98});
   EXPECT_LT(*r.soc.rmse, 0.01);
   EXPECT_GT(*r.soc.within_2_sigma, 0.9);
 }
@@ -32,13 +32,13 @@ TEST(ReplayOfTheShift, StartedByItselfIsWithin1Percent) { EXPECT_LT(*replayed(st
 
 TEST(ReplayOfTheShift, Started20PercentWrongIsWithin1Point5PercentAfter30MinutesHoweverSureTheUserWas) {
   for (const double sigma : {0.02, 0.2, 0.3}) {
-    const auto r = replayed(Belief{0.78, sigma});
+    const auto r = replayed(SocPrior{0.78, sigma});
     EXPECT_LT(*r.soc.rmse_after_30min, 0.015) << "sigma " << sigma;
   }
 }
 
 TEST(ReplayOfTheShift, FixedPointIsWithin1PercentOfDouble) {
-  const auto fixed = replayed(Belief{0.98}, ScalarKind::fixed), twice = replayed(Belief{0.98}, ScalarKind::twice);
+  const auto fixed = replayed(SocPrior{0.98}, ScalarKind::fixed), twice = replayed(SocPrior{0.98}, ScalarKind::float64);
   double largest = 0;
   for (std::size_t k = 0; k < fixed.track.rows.size(); ++k)
     largest = std::max(largest, std::abs(fixed.track.rows[k].soc - twice.track.rows[k].soc));
@@ -50,21 +50,21 @@ TEST(Replay, ADifferenceOfOneBitIsFoundAndNamed) {
   Track a;
   a.words.assign(100, {1, 2, 3, 4, 5});
   Track b = a;
-  EXPECT_FALSE(first_difference(a, b, ScalarKind::single).has_value());
+  EXPECT_FALSE(first_difference(a, b, ScalarKind::float32).has_value());
   b.words[41][1] ^= 1;
   b.words[70][0] ^= 1;
-  const auto d = first_difference(a, b, ScalarKind::single);
+  const auto d = first_difference(a, b, ScalarKind::float32);
   ASSERT_TRUE(d.has_value());
   EXPECT_EQ(d->sample, 41U);
   EXPECT_EQ(d->field, "soc_sigma");
   b.words = a.words;
   b.words.pop_back();
-  EXPECT_EQ(first_difference(a, b, ScalarKind::single)->field, "number of estimates");
+  EXPECT_EQ(first_difference(a, b, ScalarKind::float32)->field, "number of estimates");
 }
 
 TEST(Replay, WordsOfABoardBecomeTheNumbersThatTheHostHas) {
-  for (const ScalarKind scalar : {ScalarKind::single, ScalarKind::fixed}) {
-    const auto r = replayed(Belief{0.9}, scalar);
+  for (const ScalarKind scalar : {ScalarKind::float32, ScalarKind::fixed}) {
+    const auto r = replayed(SocPrior{0.9}, scalar);
     const auto rows = rows_of(r.track.words, scalar);
     for (std::size_t k = 0; k < rows.size(); k += 997) {
       EXPECT_EQ(rows[k].soc, r.track.rows[k].soc);

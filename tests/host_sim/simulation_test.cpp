@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "files/cell_file.hpp"
-#include "identification/figures.hpp"
+#include "identification/goodness_of_fit.hpp"
 
 namespace bms::host_sim {
 namespace {

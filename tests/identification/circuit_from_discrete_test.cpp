@@ -48,14 +48,14 @@ TEST(CircuitFromDiscrete, ComesBackTo1e12OverTheBoundsOfTable3) {
   const auto between = [&](double low, double high) { return low * std::pow(high / low, u(random)); };
   for (int trial = 0; trial < 2'000; ++trial) {
     const double t = between(0.1, 60), cn = between(2, 100) * 3'600;
-    const Circuit in{between(0.01, 3), between(1e-3, 0.1), between(1e-3, 0.5), between(100, 50'000)};
-    for (const Input input : {Input::straight, Input::held}) {
+    const CircuitParameters in{between(0.01, 3), between(1e-3, 0.1), between(1e-3, 0.5), between(100, 50'000)};
+    for (const Intersample input : {Intersample::first_order_hold, Intersample::zero_order_hold}) {
       const DiscreteCoefficients c = discrete_from_circuit(in, t, cn);
-      if (input == Input::held && t > 5 * in.r1_ohm * in.c1_f)
+      if (input == Intersample::zero_order_hold && t > 5 * in.r1_ohm * in.c1_f)
         continue;  // exp(-T/tau): nothing of the pole left in the sample after
       const DiscreteCoefficients shaped = discrete_from_circuit(in, t, cn, input);
-      const CircuitReading back = circuit_from_discrete(shaped, t, cn, input);
-      const Circuit& out = back.circuit;
+      const CircuitResult back = circuit_from_discrete(shaped, t, cn, input);
+      const CircuitParameters& out = back.circuit;
       const double tau = in.r1_ohm * in.c1_f, d_by_4cn = t / 2 + tau;
       // What the rounding of coefficients of size |c| and 1 - a2 costs, four ulp of them; 1e-12 of the value where that
       // is more.
@@ -66,19 +66,19 @@ TEST(CircuitFromDiscrete, ComesBackTo1e12OverTheBoundsOfTable3) {
       EXPECT_NEAR(out.b1_v, in.b1_v, pole * in.b1_v + b1_error);
       EXPECT_NEAR(out.r0_ohm, in.r0_ohm,
                   10 * pole * (in.r0_ohm + in.r1_ohm) + ulp * size * (1 + t / tau) +
-                      (input == Input::held ? b1_error * t / cn + r1_error * t / tau : 0));
+                      (input == Intersample::zero_order_hold ? b1_error * t / cn + r1_error * t / tau : 0));
       EXPECT_NEAR(out.r1_ohm, in.r1_ohm, 10 * pole * (in.r0_ohm + in.r1_ohm) * (1 + t / tau) + 10 * r1_error);
       EXPECT_NEAR(out.c1_f * out.r1_ohm, tau, pole * tau * (1 + t / tau));
       EXPECT_TRUE(back.implausible.empty());
-      EXPECT_LT(back.pole_off_integrator, ulp * (1 + tau / t));  // F(1) over 1 - p = T / tau
+      EXPECT_LT(back.integrator_pole_error, ulp * (1 + tau / t));  // F(1) over 1 - p = T / tau
     }
   }
 }
 
 TEST(CircuitFromDiscrete, ComesBackTo1e12AtThePapersCellAndTenSeconds) {
-  const Circuit in{0.13, 0.0126, 0.0192, 8333.33};
-  for (const Input input : {Input::straight, Input::held}) {
-    const Circuit out =
+  const CircuitParameters in{0.13, 0.0126, 0.0192, 8333.33};
+  for (const Intersample input : {Intersample::first_order_hold, Intersample::zero_order_hold}) {
+    const CircuitParameters out =
         circuit_from_discrete(discrete_from_circuit(in, 10, capacity_c, input), 10, capacity_c, input).circuit;
     EXPECT_NEAR(out.b1_v, in.b1_v, 1e-12 * 0.13 * 10);  // of c's of 0.0126, b1 is 1e-5 of: 1e-16 / 1e-5
     EXPECT_NEAR(out.r0_ohm, in.r0_ohm, 1e-12 * in.r0_ohm);
@@ -90,7 +90,7 @@ TEST(CircuitFromDiscrete, ComesBackTo1e12AtThePapersCellAndTenSeconds) {
 // By hand: T = 1, C_n = 1, b1 = 1, R0 = 1, R1 = 1, C1 = 1: tau = 1, D = 6, c = (1 + 2 + 2 + 4 + 2, 2 - 8, 1 - 2 - 2 + 4
 // - 2) / 6, a = (-8, 2) / 6.
 TEST(CircuitFromDiscrete, GivesOnesForTheCoefficientsOfOnes) {
-  const CircuitReading r = circuit_from_discrete({11.0 / 6, -1, -1.0 / 6, -8.0 / 6, 2.0 / 6}, 1, 1);
+  const CircuitResult r = circuit_from_discrete({11.0 / 6, -1, -1.0 / 6, -8.0 / 6, 2.0 / 6}, 1, 1);
   EXPECT_NEAR(r.circuit.b1_v, 1, 1e-14);
   EXPECT_NEAR(r.circuit.r0_ohm, 1, 1e-14);
   EXPECT_NEAR(r.circuit.r1_ohm, 1, 1e-14);
@@ -102,17 +102,17 @@ TEST(CircuitFromDiscrete, GivesOnesForTheCoefficientsOfOnes) {
 // the paper has 11.9; and R1 + b1 tau / C_n = 8.2 mohm, where the paper has 1.3. Its R1 and C1 are not those of its
 // coefficients.
 TEST(CircuitFromDiscrete, ReadsFromEq17AnotherR1ThanThePaperPrints) {
-  const CircuitReading r = circuit_from_discrete({0.01317, -0.02263, 0.00946, -1.82, 0.8203}, 1, capacity_c);
+  const CircuitResult r = circuit_from_discrete({0.01317, -0.02263, 0.00946, -1.82, 0.8203}, 1, capacity_c);
   EXPECT_NEAR(r.circuit.r0_ohm, 0.01243, 1e-5);
   EXPECT_NEAR(r.circuit.r1_ohm + r.circuit.b1_v * r.tau_s / capacity_c, 0.00822, 1e-5);
-  EXPECT_NEAR(r.pole_off_integrator, 0.0017, 1e-4);  // F(1) = 0.0003, the other pole 0.18 away
+  EXPECT_NEAR(r.integrator_pole_error, 0.0017, 1e-4);  // F(1) = 0.0003, the other pole 0.18 away
 }
 
 /// Recursion of the held circuit, sample by sample, from its equations (2), (9) with exact exponentials.
 TEST(CircuitFromDiscrete, HeldInputIsTheCircuitUnderACurrentHeldOverEachInterval) {
-  const Circuit in{0.4, 0.012, 0.02, 1'500};
+  const CircuitParameters in{0.4, 0.012, 0.02, 1'500};
   const double t = 5, pole = std::exp(-t / (in.r1_ohm * in.c1_f));
-  const DiscreteCoefficients c = discrete_from_circuit(in, t, capacity_c, Input::held);
+  const DiscreteCoefficients c = discrete_from_circuit(in, t, capacity_c, Intersample::zero_order_hold);
   const double current_a[] = {1, -2, 0, 0, 5, 5, 5, -1};
   double soc = 0, v_rc = 0, y1 = 0, y2 = 0, u1 = 0, u2 = 0;
   for (const double u : current_a) {
@@ -126,8 +126,9 @@ TEST(CircuitFromDiscrete, HeldInputIsTheCircuitUnderACurrentHeldOverEachInterval
 
 // The header's figures of what Eq. 12-16 make of a held current.
 TEST(CircuitFromDiscrete, ReadingHeldDataByEq12To16MovesR0AndR1ByHalfAStepOverTau) {
-  const Circuit in{0.4, 0.012, 0.02, 2'500};  // tau = 50 s
-  const CircuitReading r = circuit_from_discrete(discrete_from_circuit(in, 1, capacity_c, Input::held), 1, capacity_c);
+  const CircuitParameters in{0.4, 0.012, 0.02, 2'500};  // tau = 50 s
+  const CircuitResult r =
+      circuit_from_discrete(discrete_from_circuit(in, 1, capacity_c, Intersample::zero_order_hold), 1, capacity_c);
   EXPECT_NEAR(r.circuit.r0_ohm - in.r0_ohm, in.r1_ohm / 100 + 0.4 / 2 / capacity_c, 1e-8);
   EXPECT_NEAR(r.circuit.r1_ohm - in.r1_ohm, -in.r1_ohm / 100, 2e-8);
   EXPECT_NEAR(r.tau_s / 50 - 1, 1.0 / 2'500 / 12, 1e-8);
@@ -139,7 +140,7 @@ TEST(CircuitFromDiscrete, NamesWhatIsNegativeInfiniteOrComplexAndClipsNothing) {
   const DiscreteCoefficients good = discrete_from_circuit({0.13, 0.0126, 0.0192, 8333}, 1, capacity_c);
   DiscreteCoefficients c = good;
   c.c2 += 0.002;  // less R1 than nothing
-  const CircuitReading negative = circuit_from_discrete(c, 1, capacity_c);
+  const CircuitResult negative = circuit_from_discrete(c, 1, capacity_c);
   EXPECT_LT(negative.circuit.r1_ohm, 0);
   EXPECT_LT(negative.circuit.c1_f, 0);
   EXPECT_THAT(negative.implausible, Contains("r1_ohm is negative"));
@@ -147,18 +148,19 @@ TEST(CircuitFromDiscrete, NamesWhatIsNegativeInfiniteOrComplexAndClipsNothing) {
 
   c = good;
   c.a2 = 1;  // no relaxation at all
-  const CircuitReading infinite = circuit_from_discrete(c, 1, capacity_c);
+  const CircuitResult infinite = circuit_from_discrete(c, 1, capacity_c);
   EXPECT_THAT(infinite.implausible, Contains("tau_s is not finite"));
   EXPECT_THAT(infinite.implausible, Contains("b1_v is not finite"));
 
   c = good;
   c.a1 = -1.6, c.a2 = 0.8;
-  const CircuitReading swinging = circuit_from_discrete(c, 1, capacity_c);
+  const CircuitResult swinging = circuit_from_discrete(c, 1, capacity_c);
   EXPECT_THAT(swinging.implausible, Contains(testing::HasSubstr("complex")));
-  EXPECT_NEAR(swinging.pole_off_integrator, std::hypot(0.2, 0.4), 1e-12);
+  EXPECT_NEAR(swinging.integrator_pole_error, std::hypot(0.2, 0.4), 1e-12);
 
   c.a1 = -0.9, c.a2 = -0.1;  // a pole below 0: no held circuit
-  EXPECT_THAT(circuit_from_discrete(c, 1, capacity_c, Input::held).implausible, Contains("tau_s is not finite"));
+  EXPECT_THAT(circuit_from_discrete(c, 1, capacity_c, Intersample::zero_order_hold).implausible,
+              Contains("tau_s is not finite"));
   EXPECT_THAT(circuit_from_discrete(good, 1, capacity_c).implausible, testing::IsEmpty());
 }
 
@@ -172,7 +174,7 @@ TEST(CircuitFromDiscrete, RefusesATimeOrCapacityThatIsNotPositive) {
 }
 
 TEST(CircuitCovariance, IsWhatCentralDifferencesGive) {
-  for (const Input input : {Input::straight, Input::held}) {
+  for (const Intersample input : {Intersample::first_order_hold, Intersample::zero_order_hold}) {
     const double t = 10;
     const DiscreteCoefficients c = discrete_from_circuit({0.4, 0.0126, 0.0192, 2'000}, t, capacity_c, input);
     Eigen::Matrix<double, 4, 5> slope;
@@ -181,7 +183,7 @@ TEST(CircuitCovariance, IsWhatCentralDifferencesGive) {
       const auto moved = [&](double by) {
         DiscreteCoefficients x = c;
         (j == 0 ? x.c0 : j == 1 ? x.c1 : j == 2 ? x.c2 : j == 3 ? x.a1 : x.a2) += by;
-        const Circuit r = circuit_from_discrete(x, t, capacity_c, input).circuit;
+        const CircuitParameters r = circuit_from_discrete(x, t, capacity_c, input).circuit;
         return Eigen::Vector4d{r.b1_v, r.r0_ohm, r.r1_ohm, r.c1_f};
       };
       slope.col(j) = (moved(h) - moved(-h)) / (2 * h);
@@ -195,7 +197,7 @@ TEST(CircuitCovariance, IsWhatCentralDifferencesGive) {
       for (int j = 0; j < 4; ++j)
         EXPECT_NEAR(ours(i, j), theirs(i, j), 1e-5 * std::sqrt(theirs(i, i) * theirs(j, j))) << i << j;
     }
-    const Circuit deviation = circuit_std(c, covariance, t, capacity_c, input);
+    const CircuitParameters deviation = circuit_std(c, covariance, t, capacity_c, input);
     EXPECT_EQ(deviation.b1_v, std::sqrt(ours(0, 0)));
     EXPECT_EQ(deviation.c1_f, std::sqrt(ours(3, 3)));
   }
@@ -206,13 +208,13 @@ TEST(CircuitCovariance, IsTheSpreadOfReadingsFromScatteredCoefficients) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, 1e-6);
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
-  const Circuit at = circuit_from_discrete(c, 10, capacity_c).circuit;
+  const CircuitParameters at = circuit_from_discrete(c, 10, capacity_c).circuit;
   constexpr int trials = 20'000;
   for (int k = 0; k < trials; ++k) {
-    const Circuit r = circuit_from_discrete({c.c0 + noise(random), c.c1 + noise(random), c.c2 + noise(random), c.a1,
-                                             c.a2 + noise(random)},
-                                            10, capacity_c)
-                          .circuit;
+    const CircuitParameters r = circuit_from_discrete({c.c0 + noise(random), c.c1 + noise(random), c.c2 + noise(random),
+                                                       c.a1, c.a2 + noise(random)},
+                                                      10, capacity_c)
+                                    .circuit;
     squares +=
         Eigen::Vector4d{r.b1_v - at.b1_v, r.r0_ohm - at.r0_ohm, r.r1_ohm - at.r1_ohm, r.c1_f - at.c1_f}.cwiseAbs2();
   }

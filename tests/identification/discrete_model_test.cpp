@@ -89,7 +89,7 @@ Data data_of(const DiscreteModel& model, const std::vector<double>& input, doubl
   return data;
 }
 
-const Circuit cell{0.4, 0.0126, 0.0192, 2'000};  // tau = 38.4 s
+const CircuitParameters cell{0.4, 0.0126, 0.0192, 2'000};  // tau = 38.4 s
 constexpr double capacity_c = 6 * 3'600;
 
 /// The cell of 6 Ah as TF, sampled at 1 Hz: 80 % charged and relaxing by 10 mV at the start.
@@ -267,9 +267,9 @@ TEST(Identification, LeadsBackToTheCircuit) {
   const Data data = data_of(tf_of_cell(), pulses(3'600), 0);
   const VectorXd start = to_unknowns(start_values(data, structure), structure),
                  x = search(simulation_error(data, structure, start), start);
-  const CircuitReading r = circuit_from_discrete({x[0], x[1], x[2], x[3], x[4]}, 1, capacity_c);
+  const CircuitResult r = circuit_from_discrete({x[0], x[1], x[2], x[3], x[4]}, 1, capacity_c);
   EXPECT_TRUE(r.implausible.empty());
-  EXPECT_LT(r.pole_off_integrator, 1e-7);
+  EXPECT_LT(r.integrator_pole_error, 1e-7);
   EXPECT_NEAR(r.circuit.b1_v / cell.b1_v, 1, 1e-3);
   EXPECT_NEAR(r.circuit.r0_ohm / cell.r0_ohm, 1, 1e-3);
   EXPECT_NEAR(r.circuit.r1_ohm / cell.r1_ohm, 1, 1e-3);

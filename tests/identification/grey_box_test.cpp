@@ -33,7 +33,7 @@ TEST(GreyBox, SimulatesWhatTheModelSimulates) {
   const auto cell = table9();
   GreyBoxOptions options;
   for (std::size_t k = 0; k < cell.rc.soc.size; ++k) options.soc_nodes.push_back(cell.rc.soc[k]);
-  Record record;
+  DataSet record;
   record.data = irregular(300);
   record.initial_soc = 0.85;
   record.estimate_initial_v_rc = false;
@@ -52,9 +52,9 @@ TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
     cell.ocv.half_gap_v.push_back(0.02 + 0.01 * static_cast<double>(k % 3));
   GreyBoxOptions options;
   options.soc_nodes = {0.15, 0.35, 0.62, 0.9};
-  options.estimate_lean = true;
+  options.estimate_ocv_branch = true;
   options.tie_v = 0.01;
-  Record first, second;
+  DataSet first, second;
   first.data = irregular(200);
   first.initial_soc = 0.86;
   first.estimate_initial_soc = true;
@@ -87,23 +87,23 @@ TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
 TEST(GreyBox, LeaningMovesTheCurveByItsGap) {
   model::CellParameters<> cell = table9();
   for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.03);
-  const auto leant = leaning(cell, -0.5);
+  const auto leant = with_ocv_branch(cell, -0.5);
   for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) {
     EXPECT_NEAR(leant.ocv.b0_v[k], cell.ocv.b0_v[k] - 0.015, 1e-12);
     EXPECT_NEAR(leant.ocv.b1_v[k], cell.ocv.b1_v[k], 1e-12);
   }
-  const auto back = leaning(leant, 0);
+  const auto back = with_ocv_branch(leant, 0);
   for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) EXPECT_NEAR(back.ocv.b0_v[k], cell.ocv.b0_v[k], 1e-12);
 }
 
 TEST(GreyBox, RefusesWhatIsNoProblem) {
-  Record record;
+  DataSet record;
   record.data = irregular(20);
   EXPECT_THROW(GreyBox(table9(), {record}, {}), std::invalid_argument);
   GreyBoxOptions options;
   options.soc_nodes = {0.5};
   EXPECT_THROW(GreyBox(table9(), {}, options), std::invalid_argument);
-  options.estimate_lean = true;
+  options.estimate_ocv_branch = true;
   EXPECT_THROW(GreyBox(table9(), {record}, options), std::invalid_argument);
 }
 

@@ -27,8 +27,8 @@ model::CellParameters<> wrong_start() {
   return cell;
 }
 
-Record record_of(const PlantRun& run, double initial_soc) {
-  Record r;
+DataSet record_of(const PlantRun& run, double initial_soc) {
+  DataSet r;
   r.data = run.data;
   r.initial_soc = initial_soc;
   r.estimate_initial_v_rc = false;
@@ -39,7 +39,7 @@ TEST(Identify, RecoversTheTruthAtMidSocAndKnowsHowWell) {
   const auto profile = *experiments::experiment("high_1m_low_30s");
   const PlantRun run = run_plant(profile, 0.5);
   const double soc = (run.soc_min + run.soc_max) / 2;
-  const plant::Circuit circuit = plant::table9_circuit();
+  const plant::CircuitCurves circuit = plant::table9_circuit();
   const double truths[3] = {circuit.r0_ohm.at(soc), circuit.r1_ohm.at(soc), circuit.c1_f.at(soc)};
   const double tolerance[3] = {0.01, 0.05, 0.05};
   constexpr int draws = 200;
@@ -47,7 +47,7 @@ TEST(Identify, RecoversTheTruthAtMidSocAndKnowsHowWell) {
   int inside[3] = {};
   double mean[3] = {};
   for (int draw = 0; draw < draws; ++draw) {
-    Record r = record_of(run, 0.5);
+    DataSet r = record_of(run, 0.5);
     r.data = noisy(run.data, random);
     GreyBoxOptions options;
     options.soc_nodes = {soc};
@@ -72,12 +72,12 @@ TEST(Identify, FindsTheTablesFromAShiftAndPredictsAnother) {
              other = *experiments::experiment("forklift_shift", {6, 12});
   std::mt19937_64 random(1);
   const PlantRun run = run_plant(shift, 0.98), unseen = run_plant(other, 0.98);
-  Record r = record_of(run, 0.98);
+  DataSet r = record_of(run, 0.98);
   r.data = noisy(run.data, random);
   GreyBoxOptions options;
   options.soc_nodes = nodes_for(run.soc_min, run.soc_max);
   const Identification found = identify_grey_box(wrong_start(), {r}, options, Method::trust_region_reflective);
-  const plant::Circuit circuit = plant::table9_circuit();
+  const plant::CircuitCurves circuit = plant::table9_circuit();
   for (const Parameter& p : found.parameters) {
     if (p.soc < 0.35 || p.soc > 0.75) continue;
     const double is = p.name == "r0_ohm"   ? circuit.r0_ohm.at(p.soc)
@@ -85,9 +85,9 @@ TEST(Identify, FindsTheTablesFromAShiftAndPredictsAnother) {
                                            : circuit.c1_f.at(p.soc);
     EXPECT_NEAR(p.value, is, (p.name == "r0_ohm" ? 0.015 : 0.08) * is) << p.name << " at " << p.soc;
   }
-  Record judge = record_of(unseen, 0.98);
+  DataSet judge = record_of(unseen, 0.98);
   judge.data = noisy(unseen.data, random);
-  const Fit fit = validate(found.cell, judge, found.fading);
+  const FitStatistics fit = validate(found.cell, judge, found.fading);
   EXPECT_LT(fit.rmse_v, 0.0016);
   EXPECT_GT(fit.fit_percent, 95);
 }
@@ -96,7 +96,7 @@ TEST(Identify, InitialSocOnThePlateauIsNotClaimed) {
   // the paper's case: 40 %, pulses; it found 29.17 %
   const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.45);
   std::mt19937_64 random(3);
-  Record r = record_of(run, 0.55);
+  DataSet r = record_of(run, 0.55);
   r.data = noisy(run.data, random);
   r.estimate_initial_soc = true;
   GreyBoxOptions options;
@@ -110,7 +110,7 @@ TEST(Identify, InitialSocOnThePlateauIsNotClaimed) {
 TEST(Identify, InitialSocOnASlopeIsFound) {
   const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.16);
   std::mt19937_64 random(3);
-  Record r = record_of(run, 0.18);
+  DataSet r = record_of(run, 0.18);
   r.data = noisy(run.data, random);
   r.estimate_initial_soc = true;
   GreyBoxOptions options;
@@ -122,7 +122,7 @@ TEST(Identify, InitialSocOnASlopeIsFound) {
 }
 
 TEST(Identify, RefusesARestAndNamesWhatWouldShowIt) {
-  Record r;
+  DataSet r;
   for (int k = 0; k < 600; ++k) {
     r.data.time_s.push_back(k);
     r.data.current_a.push_back(0.001 * (k % 2));
@@ -146,7 +146,7 @@ TEST(Identify, OnePulseWithoutARestWarnsOfC1) {
     profile.push_back({static_cast<double>(k), k >= 30 ? -6.0 : 0.0});  // two seconds, then it ends
   const PlantRun run = run_plant(profile, 0.5);
   std::mt19937_64 random(3);
-  Record r = record_of(run, 0.5);
+  DataSet r = record_of(run, 0.5);
   r.data = noisy(run.data, random);
   GreyBoxOptions options;
   options.soc_nodes = {0.5};
@@ -157,7 +157,7 @@ TEST(Identify, OnePulseWithoutARestWarnsOfC1) {
 
 TEST(Identify, AnInvertedCurrentEndsAtABoundAndIsNamed) {
   const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.5);
-  Record r = record_of(run, 0.5);
+  DataSet r = record_of(run, 0.5);
   for (double& i : r.data.current_a) i = -i;
   GreyBoxOptions options;
   options.soc_nodes = {0.5};

@@ -112,7 +112,7 @@ TEST(RestReading, ReadsR1WholeFromShortLoadsAndShortRestsWherePointsDoNot) {
   expect_cell(r, cell, {0.03, 0.1, 0.15}, "pulses");
   for (const RestReading& rest : r.rests) {
     EXPECT_LT(rest.points.r1_ohm, 0.7 * cell.r1_ohm);
-    EXPECT_NEAR(rest.settled, 1 - std::exp(-1.0), 0.08);
+    EXPECT_NEAR(rest.relaxed_fraction, 1 - std::exp(-1.0), 0.08);
   }
 }
 

@@ -71,15 +71,15 @@ TEST(Uncertainty, NamesWhatTheDataDoesNotShow) {
   std::mt19937_64 random(1);
   const Eigen::VectorXd r = coloured(random, 100, 0);
   const Uncertainty u = uncertainty(r, jacobian, 100, Eigen::VectorXi::Zero(4), 0);
-  EXPECT_EQ(u.seen[0], 1);
-  EXPECT_EQ(u.seen[1], 0) << "no column";
-  EXPECT_EQ(u.seen[2], 0) << "only together with the next";
-  EXPECT_EQ(u.seen[3], 0);
-  Eigen::VectorXi held = Eigen::VectorXi::Zero(4);
-  held[3] = 1;
-  const Uncertainty with_one_held = uncertainty(r, jacobian, 100, held, 0);
-  EXPECT_EQ(with_one_held.seen[2], 1);
-  EXPECT_EQ(with_one_held.std(3), 0);
+  EXPECT_EQ(u.identifiable[0], 1);
+  EXPECT_EQ(u.identifiable[1], 0) << "no column";
+  EXPECT_EQ(u.identifiable[2], 0) << "only together with the next";
+  EXPECT_EQ(u.identifiable[3], 0);
+  Eigen::VectorXi fixed = Eigen::VectorXi::Zero(4);
+  fixed[3] = 1;
+  const Uncertainty with_one_fixed = uncertainty(r, jacobian, 100, fixed, 0);
+  EXPECT_EQ(with_one_fixed.identifiable[2], 1);
+  EXPECT_EQ(with_one_fixed.std(3), 0);
 }
 
 TEST(Uncertainty, AConstantErrorMovesWhatLooksConstant) {

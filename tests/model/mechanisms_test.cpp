@@ -27,7 +27,7 @@ double number(const S& x) {
 struct Row {
   double time_s, duration_s, current_a, temperature_c;
 };
-std::vector<Row> drive_of(std::size_t rows) {
+std::vector<Row> input_of(std::size_t rows) {
   std::mt19937 random(17);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::vector<Row> all;
@@ -63,20 +63,20 @@ void expect_no_effect(std::size_t index) {
   choose<S>(laws, index, without_strength(index), capacity_ah);
   const auto cell = prepare<S, max_intervals>(files::read_cell("table9").parameters);
   auto x = laws.initial();
-  for (const Row& row : drive_of(200)) {
+  for (const Row& row : input_of(200)) {
     const Current<S> a = Current<S>(row.current_a);
     const Temperature<S> c = Temperature<S>(row.temperature_c);
     const Soc<S> soc = Soc<S>(0.05 + 0.9 * row.time_s / 200);
     laws.at(row.time_s);
     ASSERT_EQ(number(laws.true_current(a)), number(a));
     ASSERT_EQ(number(laws.true_temperature(c)), number(c));
-    const Drive<S> drive{a, TimeStep<S>(row.duration_s), c};
-    ASSERT_EQ(number(laws.counted(drive)), number(a));
-    ASSERT_EQ(number(laws.read_at(soc, x)), number(soc));
-    ASSERT_EQ(number(laws.read_slope(soc, x)), 1);
+    const StepInput<S> input{a, TimeStep<S>(row.duration_s), c};
+    ASSERT_EQ(number(laws.counted(input)), number(a));
+    ASSERT_EQ(number(laws.ocv_soc(soc, x)), number(soc));
+    ASSERT_EQ(number(laws.ocv_soc_slope(soc, x)), 1);
     const TablePoint<S> before = look_up(cell, soc);
     TablePoint<S> at = before;
-    laws.tables(at, soc, drive, x);
+    laws.tables(at, soc, input, x);
     for (const auto& [now, was] : {std::pair{number(at.ocv_v), number(before.ocv_v)},
                                    {number(at.ocv_delta_v), number(before.ocv_delta_v)},
                                    {number(at.r0_ohm), number(before.r0_ohm)},
@@ -87,7 +87,7 @@ void expect_no_effect(std::size_t index) {
                                    {number(at.c1_delta_f), number(before.c1_delta_f)}}) {
       ASSERT_EQ(now, was);
     }
-    ASSERT_EQ(number(laws.advance(x, at, drive, row.duration_s > 0)), 0);
+    ASSERT_EQ(number(laws.advance(x, at, input, row.duration_s > 0)), 0);
     ASSERT_EQ(number(laws.reading(at.ocv_v)), number(at.ocv_v));
   }
 }
@@ -112,7 +112,7 @@ Walk<S> walk(const std::vector<MechanismSetting>& mechanisms, const std::vector<
   const ExtendedCell<S, max_intervals, Laws> cell{prepare<S, max_intervals>(files::read_cell("table9").parameters),
                                                   chosen<S>(mechanisms, capacity_ah)};
   const Laws& laws = cell.laws;
-  typename Model::Polarisation x{};
+  typename Model::State x{};
   const auto initial = laws.initial();
   for (std::size_t k = 0; k < initial.size(); ++k) x[1 + k] = initial[k];
   std::uint8_t interval = 0;
@@ -120,19 +120,19 @@ Walk<S> walk(const std::vector<MechanismSetting>& mechanisms, const std::vector<
   Walk<S> result;
   for (const Row& row : rows) {
     if (!(row.duration_s > 0)) continue;
-    const Drive<S> drive{laws.true_current(Current<S>(row.current_a)), TimeStep<S>(row.duration_s),
-                         laws.true_temperature(Temperature<S>(row.temperature_c))};
-    result.charge_as += number(laws.counted(drive)) * row.duration_s;
+    const StepInput<S> input{laws.true_current(Current<S>(row.current_a)), TimeStep<S>(row.duration_s),
+                             laws.true_temperature(Temperature<S>(row.temperature_c))};
+    result.charge_as += number(laws.counted(input)) * row.duration_s;
     soc += row.current_a * row.duration_s / 3'600 / capacity_ah;
-    const auto at = look_up(CellUnder{cell, drive, Model::held(x)}, Soc<S>(soc), interval);
-    x = Model::advance(x, at, Model::settling(laws, x, at, drive), drive);
-    result.voltage_v.push_back(number(Model::voltage(laws, x, at, drive)));
+    const auto at = look_up(OperatingPoint{cell, input, Model::mechanism_states(x)}, Soc<S>(soc), interval);
+    x = Model::advance(x, at, Model::discretise(laws, x, at, input), input);
+    result.voltage_v.push_back(number(Model::voltage(laws, x, at, input)));
   }
   return result;
 }
 
 TEST_P(EveryMechanism, ComputesTheSameVoltageInFloatAndFixedPointAsInDouble) {
-  const auto rows = drive_of(3'600);
+  const auto rows = input_of(3'600);
   const std::vector<MechanismSetting> with = {usual(info().id)};
   const auto exact = walk<double>(with, rows), plain = walk<double>({}, rows);
   const auto single = walk<float>(with, rows);
@@ -162,7 +162,7 @@ std::vector<S> course(std::size_t index, const MechanismValues<S>& values, const
   choose<S>(laws, index, values, capacity_ah);
   S start(0.815);
   if (index == mechanism_index("initial_soc")) start += values[0];
-  Course<S> c(cell, capacity_ah, laws, start);
+  OpenLoopSimulation<S> c(cell, capacity_ah, laws, start);
   std::vector<S> v;
   for (const Row& row : rows)
     v.push_back(c.step(row.time_s, row.duration_s, S(row.current_a), S(row.temperature_c), [](auto&, const auto&) {}));
@@ -171,7 +171,7 @@ std::vector<S> course(std::size_t index, const MechanismValues<S>& values, const
 
 TEST_P(EveryMechanism, DerivativesOfTheVoltageByItsParametersAreDifferenceQuotients) {
   using Jet = ceres::Jet<double, max_mechanism_parameters>;
-  const auto rows = drive_of(1'200);
+  const auto rows = input_of(1'200);
   const std::size_t index = GetParam();
   const MechanismValues<> base = usual(info().id).value;
   MechanismValues<Jet> jets;
@@ -228,15 +228,15 @@ TEST(Laws, KnownAtCompileTimeGiveTheSameDigitsAsChosenAtRunTime) {
   const auto cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
   auto x = laws.initial();
   auto y = chosen_laws.initial();
-  for (const Row& row : drive_of(1'000)) {
-    const Drive<float> drive{laws.true_current(static_cast<float>(row.current_a)), static_cast<float>(row.duration_s),
-                             static_cast<float>(row.temperature_c)};
-    ASSERT_EQ(drive.current_a, chosen_laws.true_current(static_cast<float>(row.current_a)));
+  for (const Row& row : input_of(1'000)) {
+    const StepInput<float> input{laws.true_current(static_cast<float>(row.current_a)),
+                                 static_cast<float>(row.duration_s), static_cast<float>(row.temperature_c)};
+    ASSERT_EQ(input.current_a, chosen_laws.true_current(static_cast<float>(row.current_a)));
     TablePoint<float> at = look_up(cell, 0.63F), there = at;
-    laws.tables(at, 0.63F, drive, x);
-    chosen_laws.tables(there, 0.63F, drive, y);
+    laws.tables(at, 0.63F, input, x);
+    chosen_laws.tables(there, 0.63F, input, y);
     ASSERT_EQ(at.r1_ohm, there.r1_ohm);
-    ASSERT_EQ(laws.advance(x, at, drive, true), chosen_laws.advance(y, there, drive, true));
+    ASSERT_EQ(laws.advance(x, at, input, true), chosen_laws.advance(y, there, input, true));
   }
 }
 
@@ -244,12 +244,12 @@ TEST(OcvHysteresis, SaturatesAtTheBranchesAndForgetsNothingAtRest) {
   const OcvHysteresis::Law<double> law(std::array<double, 5>{0.01, 40, 0, 0, 0}, capacity_ah);
   const TablePoint<double> at{};
   double x = 0;
-  for (int k = 0; k < 3'600; ++k) x = relaxed<double>(x, law.settle(0, at, {6, 1}, &x));
+  for (int k = 0; k < 3'600; ++k) x = relaxed<double>(x, law.relaxation(0, at, {6, 1}, &x));
   EXPECT_NEAR(x, 0.01, 1e-12);
-  for (int k = 0; k < 180; ++k) x = relaxed<double>(x, law.settle(0, at, {-3, 1}, &x));  // 1/40 of the capacity
+  for (int k = 0; k < 180; ++k) x = relaxed<double>(x, law.relaxation(0, at, {-3, 1}, &x));  // 1/40 of the capacity
   const double moved = x;
   EXPECT_NEAR(x, -0.01 + 0.02 * std::exp(-1), 1e-12);
-  for (int k = 0; k < 1'000; ++k) x = relaxed<double>(x, law.settle(0, at, {0, 3'600}, &x));
+  for (int k = 0; k < 1'000; ++k) x = relaxed<double>(x, law.relaxation(0, at, {0, 3'600}, &x));
   EXPECT_EQ(x, moved);
 }
 
@@ -258,17 +258,17 @@ TEST(OcvHysteresis, BetweenMeasuredBranchesMovesWithTheChargeAndStops) {
   TablePoint<double> at{};
   double x = -0.01;
   for (int k = 0; k < 45; ++k)
-    x = relaxed<double>(x, law.settle(0, at, {6, 1}, &x));  // 1/80 of the capacity: half of the way to the middle
+    x = relaxed<double>(x, law.relaxation(0, at, {6, 1}, &x));  // 1/80 of the capacity: half of the way to the middle
   EXPECT_NEAR(x, -0.005, 1e-12);
-  for (int k = 0; k < 45; ++k) x = relaxed<double>(x, law.settle(0, at, {-6, 1}, &x));
+  for (int k = 0; k < 45; ++k) x = relaxed<double>(x, law.relaxation(0, at, {-6, 1}, &x));
   EXPECT_NEAR(x, -0.01, 1e-12) << "what is given back is given back";
-  for (int k = 0; k < 100; ++k) x = relaxed<double>(x, law.settle(0, at, {-6, 1}, &x));
+  for (int k = 0; k < 100; ++k) x = relaxed<double>(x, law.relaxation(0, at, {-6, 1}, &x));
   EXPECT_NEAR(x, -0.01, 1e-12);
-  x = relaxed<double>(x, law.settle(0, at, {6, 3'600}, &x));
+  x = relaxed<double>(x, law.relaxation(0, at, {6, 3'600}, &x));
   EXPECT_EQ(x, 0.01);
   at.ocv_v = 3.3;
   at.gap = 1.5;
-  law.warm(at, x, {});
+  law.apply_state(at, x, {});
   EXPECT_NEAR(at.ocv_v + x, 3.3 + 1.5 * 0.01, 1e-12) << "the state is added besides";
 }
 
@@ -278,17 +278,17 @@ TEST(OcvHysteresis, FollowsTheShapeOfTheFilesGap) {
   p.ocv.half_gap_v = {};
   for (std::size_t k = 0; k < p.ocv.soc.size; ++k)
     p.ocv.half_gap_v.push_back(0.01 + 0.01 * std::abs(p.ocv.soc[k] - 0.5));
-  const double middle_v = middle_half_gap_v(p.ocv);
+  const double middle_v = plateau_half_gap_v(p.ocv);
   EXPECT_NEAR(middle_v, 0.012, 0.001);
   const auto cell = prepare<double, max_intervals>(p);
-  auto setting = unsaid(mechanism_index("ocv_hysteresis"), capacity_ah);
+  auto setting = default_setting(mechanism_index("ocv_hysteresis"), capacity_ah);
   setting.value = {middle_v, 40, 0, -1, 1};
   const auto laws = chosen<double>(std::vector{setting}, capacity_ah);
   const auto x = laws.initial();
   for (std::size_t k = 1; k + 1 < p.ocv.soc.size; ++k) {
     TablePoint<double> at = look_up(cell, p.ocv.soc[k]);
     const double middle = at.ocv_v;
-    laws.tables(at, p.ocv.soc[k], Drive<double>{-1, 1, 25}, x);
+    laws.tables(at, p.ocv.soc[k], StepInput<double>{-1, 1, 25}, x);
     EXPECT_NEAR(middle - (at.ocv_v + x[0]), p.ocv.half_gap_v[k], 1e-9) << p.ocv.soc[k];
   }
 }
@@ -330,14 +330,14 @@ TEST(ChargeTransfer, FlattensByTheInverseHyperbolicSine) {
 
 TEST(OcvShape, KeepsTheEndsAndSlidesByWhatItSaysInBetween) {
   const OcvShape::Law<double> law(std::array<double, 2>{0.05, -0.03}, capacity_ah);
-  EXPECT_EQ(law.read_at(0), 0);
-  EXPECT_EQ(law.read_at(1), 1);
-  EXPECT_EQ(law.read_at(-0.1), -0.1);
-  EXPECT_EQ(law.read_at(1.1), 1.1);
-  EXPECT_NEAR(law.read_at(0.2), 0.25, 1e-12);
-  EXPECT_NEAR(law.read_at(0.8), 0.77, 1e-12);
+  EXPECT_EQ(law.ocv_soc(0), 0);
+  EXPECT_EQ(law.ocv_soc(1), 1);
+  EXPECT_EQ(law.ocv_soc(-0.1), -0.1);
+  EXPECT_EQ(law.ocv_soc(1.1), 1.1);
+  EXPECT_NEAR(law.ocv_soc(0.2), 0.25, 1e-12);
+  EXPECT_NEAR(law.ocv_soc(0.8), 0.77, 1e-12);
   for (double soc = 0.01; soc < 1; soc += 0.017)
-    EXPECT_NEAR(law.read_slope(soc), (law.read_at(soc + 1e-6) - law.read_at(soc - 1e-6)) / 2e-6, 1e-8) << soc;
+    EXPECT_NEAR(law.ocv_soc_slope(soc), (law.ocv_soc(soc + 1e-6) - law.ocv_soc(soc - 1e-6)) / 2e-6, 1e-8) << soc;
 }
 
 TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
@@ -346,9 +346,9 @@ TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
   at.r0_ohm = 0.03;
   at.r1_ohm = 0.02;
   double w = 0;
-  for (int k = 0; k < 20'000; ++k) w = relaxed<double>(w, law.settle(0, at, {-6, 1}));
+  for (int k = 0; k < 20'000; ++k) w = relaxed<double>(w, law.relaxation(0, at, {-6, 1}));
   EXPECT_NEAR(100 * w, 10 * 36 * 0.05, 1e-6);
-  law.warm(at, w, {});
+  law.apply_state(at, w, {});
   EXPECT_NEAR(at.r0_ohm / 0.03, std::exp(25'000 / 8.314462618 * (1 / (298.15 + 18) - 1 / 298.15)), 1e-9);
 }
 
@@ -357,10 +357,10 @@ TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
   const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
   const std::vector<MechanismSetting> slow = {
       {mechanism_index("slow_polarisation"), {0.003, 100, 0, 8 * 0.003 * 3'600 * capacity_ah}, {}}};
-  Course<double> with(cell, capacity_ah, chosen<double>(slow, capacity_ah), 0.3),
+  OpenLoopSimulation<double> with(cell, capacity_ah, chosen<double>(slow, capacity_ah), 0.3),
       without(cell, capacity_ah, ChosenLaws<double>{}, 0.3);
   const auto no_change = [](TablePoint<double>&, double) {};
-  const double r_ohm = 0.003 + 1e-6 / capacity_ah, ahead_per_v = 8 * 0.003 / r_ohm;
+  const double r_ohm = 0.003 + 1e-6 / capacity_ah, soc_shift_per_v = 8 * 0.003 / r_ohm;
   double u_v = 0;
   for (int k = 0; k < 3'000; ++k) {
     const double a = k < 1'000 ? -3 : 0, dt = k == 0 ? 0 : 1;
@@ -368,7 +368,8 @@ TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
     if (k > 0) u_v += -std::expm1(-0.01) * (r_ohm * a - u_v);
     const double v = with.step(k, dt, a, 25, no_change), base_v = without.step(k, dt, a, 25, no_change);
     ASSERT_NEAR(v - base_v,
-                u_v + look_up(cell, with.soc() + ahead_per_v * before_v).ocv_v - look_up(cell, with.soc()).ocv_v, 1e-12)
+                u_v + look_up(cell, with.soc() + soc_shift_per_v * before_v).ocv_v - look_up(cell, with.soc()).ocv_v,
+                1e-12)
         << k;
   }
 }

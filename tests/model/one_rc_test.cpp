@@ -25,12 +25,12 @@ CellParameters<> constant_cell() {
 TEST(OneRc, FollowsTheExactStepResponseWhateverTheStepLength) {
   const auto cell = prepare<double, max_intervals>(constant_cell());
   for (const double step_s : {0.01, 0.7, 5.0, 20.0, 200.0}) {
-    OneRc<double>::Polarisation x{0.03};
-    const Drive<double> drive{-4, step_s};
+    OneRc<double>::State x{0.03};
+    const StepInput<double> input{-4, step_s};
     double time_s = 0;
     for (int k = 0; k < 50; ++k) {
       const auto at = look_up(cell, 0.5);
-      x = OneRc<double>::advance(x, at, OneRc<double>::settling(at, step_s), drive);
+      x = OneRc<double>::advance(x, at, OneRc<double>::discretise(at, step_s), input);
       time_s += step_s;
       const double end_v = 0.02 * -4, expected_v = end_v + (0.03 - end_v) * std::exp(-time_s / 20);
       ASSERT_NEAR(x[0], expected_v, 1e-12) << "step " << step_s << " s, k = " << k;
@@ -41,9 +41,9 @@ TEST(OneRc, FollowsTheExactStepResponseWhateverTheStepLength) {
 TEST(OneRc, ChargingRaisesTheVoltageAtOnceByR0AndLaterByR1) {
   const auto cell = prepare<double, max_intervals>(constant_cell());
   const auto at = look_up(cell, 0.5);
-  const Drive<double> charge{5, 1'000};
+  const StepInput<double> charge{5, 1'000};
   const double at_once_v = OneRc<double>::voltage({0}, at, charge) - at.ocv_v;
-  const auto x = OneRc<double>::advance({0}, at, OneRc<double>::settling(at, 1'000), charge);
+  const auto x = OneRc<double>::advance({0}, at, OneRc<double>::discretise(at, 1'000), charge);
   EXPECT_NEAR(at_once_v, 5 * 0.013, 1e-12);
   EXPECT_NEAR(OneRc<double>::voltage(x, at, charge) - at.ocv_v, 5 * (0.013 + 0.02), 1e-12);
 }
@@ -66,19 +66,19 @@ TEST(OneRc, AnalyticJacobiansAreTheDerivativesAt1000RandomStatesAndAllEdges) {
       const double v_rc = 0.2 * (uniform(random) - 0.5), current = p.capacity_ah * 6 * (uniform(random) - 0.5),
                    duration = std::pow(10, 3 * uniform(random) - 2);
       const auto at = look_up(cell, soc);
-      const auto settling = OneRc<double>::settling(at, duration);
-      const auto f = OneRc<double>::transition({v_rc}, at, settling, {current, duration});
-      const auto h = OneRc<double>::sensitivity(at, {current, duration});
+      const auto discretisation = OneRc<double>::discretise(at, duration);
+      const auto f = OneRc<double>::state_transition({v_rc}, at, discretisation, {current, duration});
+      const auto h = OneRc<double>::measurement_jacobian(at, {current, duration});
 
       const Jet v_rc_j(v_rc, 0), soc_j(soc, 1);
       const auto at_j = look_up(jets, soc_j);
-      const Drive<Jet> drive_j{Jet(current), Jet(duration)};
-      const auto x_j = OneRc<Jet>::advance({v_rc_j}, at_j, OneRc<Jet>::settling(at_j, drive_j.duration_s), drive_j);
+      const StepInput<Jet> input_j{Jet(current), Jet(duration)};
+      const auto x_j = OneRc<Jet>::advance({v_rc_j}, at_j, OneRc<Jet>::discretise(at_j, input_j.duration_s), input_j);
       ASSERT_NEAR(f[0][0], x_j[0].v[0], 1e-13) << "soc " << soc;
       ASSERT_NEAR(f[0][1], x_j[0].v[1], 1e-12 * (1 + std::abs(f[0][1]))) << "soc " << soc;
       ASSERT_EQ(f[1][0], 0);
       ASSERT_EQ(f[1][1], 1);
-      const Jet v_j = OneRc<Jet>::voltage({v_rc_j}, at_j, drive_j);
+      const Jet v_j = OneRc<Jet>::voltage({v_rc_j}, at_j, input_j);
       ASSERT_NEAR(h[0], v_j.v[0], 1e-13) << "soc " << soc;
       ASSERT_NEAR(h[1], v_j.v[1], 1e-12 * (1 + std::abs(h[1]))) << "soc " << soc;
     }
@@ -95,11 +95,11 @@ void expect_close_to_double(double tolerance_v) {
       for (const double duration : {0.01, 1.0, 60.0, 4'000.0}) {
         const auto at = look_up(cell, Soc<S>(soc));
         const auto at_d = look_up(reference, soc);
-        const Drive<S> drive{Current<S>(current), TimeStep<S>(duration)};
-        const auto x = OneRc<S>::advance({Voltage<S>(0.02)}, at, OneRc<S>::settling(at, drive.duration_s), drive);
+        const StepInput<S> input{Current<S>(current), TimeStep<S>(duration)};
+        const auto x = OneRc<S>::advance({Voltage<S>(0.02)}, at, OneRc<S>::discretise(at, input.duration_s), input);
         const auto x_d =
-            OneRc<double>::advance({0.02}, at_d, OneRc<double>::settling(at_d, duration), {current, duration});
-        EXPECT_NEAR(as_double(OneRc<S>::voltage(x, at, drive)), OneRc<double>::voltage(x_d, at_d, {current, duration}),
+            OneRc<double>::advance({0.02}, at_d, OneRc<double>::discretise(at_d, duration), {current, duration});
+        EXPECT_NEAR(as_double(OneRc<S>::voltage(x, at, input)), OneRc<double>::voltage(x_d, at_d, {current, duration}),
                     tolerance_v)
             << "soc " << soc << " current " << current << " duration " << duration;
       }

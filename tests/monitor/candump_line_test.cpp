@@ -117,13 +117,13 @@ TEST(CandumpLine, EveryFrameComesBack) {
 
 TEST(DumpLines, AHugeLineIsOneThatIsTooLongAndTheNextIsWhole) {
   DumpLines lines;
-  for (int k = 0; k < 1'000'000; ++k) ASSERT_FALSE(lines.take('('));
-  ASSERT_TRUE(lines.take('\n'));
+  for (int k = 0; k < 1'000'000; ++k) ASSERT_FALSE(lines.push('('));
+  ASSERT_TRUE(lines.push('\n'));
   EXPECT_TRUE(lines.too_long());
   EXPECT_EQ(lines.line(), "");
-  for (const char c : std::string("next\r")) ASSERT_FALSE(lines.take(c));
+  for (const char c : std::string("next\r")) ASSERT_FALSE(lines.push(c));
   EXPECT_TRUE(lines.pending());
-  ASSERT_TRUE(lines.take('\n'));
+  ASSERT_TRUE(lines.push('\n'));
   EXPECT_FALSE(lines.too_long());
   EXPECT_EQ(lines.line(), "next");
 }
@@ -138,7 +138,7 @@ Heard heard(std::string_view bytes) {
   SlcanStream stream;
   BusFrame frame;
   for (const char c : bytes) {
-    if (stream.take(c, frame)) h.frames.push_back(frame);
+    if (stream.push(c, frame)) h.frames.push_back(frame);
   }
   h.malformed = stream.malformed();
   return h;

@@ -21,7 +21,7 @@ class OtherBus : public ::testing::Test {
  protected:
   template <class Message>
   void send(const Message& message) {
-    bus_.take(on_bus(message.frame(counter_), time_us_));
+    bus_.receive(to_bus_frame(message.frame(counter_), time_us_));
     counter_ = can::next(counter_);
   }
   void send_cells() {
@@ -91,7 +91,7 @@ TEST_F(OtherBus, AMessageThatWasAddedIsThere) {
 
 TEST_F(OtherBus, ItsOwnCycleTimeMakesAMessageStale) {
   send_cells();
-  bus_.time_is(300'001);
+  bus_.advance_time(300'001);
   EXPECT_TRUE(bus_.stale(BusState::find("CellVoltages1"))) << "three times a tenth of a second";
   EXPECT_FALSE(bus_.stale(BusState::find("CellVoltages2"))) << "no cycle time";
 }

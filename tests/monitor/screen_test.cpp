@@ -20,7 +20,7 @@ BusState after(int samples, std::uint32_t flags = 0) {
   traffic.flags = flags;
   BusState bus;
   for (int k = 0; k < samples; ++k) {
-    for (const BusFrame& frame : traffic.sample()) bus.take(frame);
+    for (const BusFrame& frame : traffic.sample()) bus.receive(frame);
   }
   return bus;
 }
@@ -35,14 +35,14 @@ std::vector<std::string> rows(const BusState& bus, const ScreenSize& size, bool 
 }
 
 /// Ink of the piece that holds `text`.
-Ink ink_of(const std::vector<ScreenLine>& lines, const std::string& text) {
+TextStyle ink_of(const std::vector<ScreenLine>& lines, const std::string& text) {
   for (const ScreenLine& line : lines) {
     for (const auto& piece : line.pieces()) {
       if (piece.text.find(text) != std::string::npos) return piece.ink;
     }
   }
   ADD_FAILURE() << text << " is not on the screen";
-  return Ink::plain;
+  return TextStyle::plain;
 }
 
 TEST(Screen, On80x24ShowsTheBatteryAndTheMessages) {
@@ -107,14 +107,14 @@ TEST(Screen, InAsciiHasNothingElse) {
 
 TEST(Screen, WhatIsStaleIsFaintAndWhatIsNotIsNot) {
   BusState bus = after(5);
-  EXPECT_EQ(ink_of(screen(bus, facts(), {80, 24}), "80.0 %"), Ink::strong);
-  EXPECT_EQ(ink_of(screen(bus, facts(), {80, 24}), "discharge 60 A"), Ink::plain);
-  for (int k = 0; k < 10; ++k) bus.take(on_bus({0x7AA, 0, {}}, (5 + k) * 1'000'000));
+  EXPECT_EQ(ink_of(screen(bus, facts(), {80, 24}), "80.0 %"), TextStyle::strong);
+  EXPECT_EQ(ink_of(screen(bus, facts(), {80, 24}), "discharge 60 A"), TextStyle::plain);
+  for (int k = 0; k < 10; ++k) bus.receive(to_bus_frame({0x7AA, 0, {}}, (5 + k) * 1'000'000));
   const auto stale = screen(bus, facts(), {80, 24});
   for (const char* text : {"80.0 %", " V", "discharge 60 A", "capacity", "PackState"})
-    EXPECT_EQ(ink_of(stale, text), Ink::faint) << text;
+    EXPECT_EQ(ink_of(stale, text), TextStyle::faint) << text;
   EXPECT_THAT(plain_text(stale), Not(HasSubstr("silent"))) << "the bus lives";
-  bus.time_is(60'000'000);
+  bus.advance_time(60'000'000);
   EXPECT_THAT(plain_text(screen(bus, facts(), {80, 24})), HasSubstr("silent for 46 s"));
 }
 
@@ -123,15 +123,15 @@ TEST(Screen, SaysWhatIsWrongWithTheBus) {
   EXPECT_THAT(plain_text(screen(bus, facts(), {80, 24})), Not(HasSubstr("Bus  ")));
   BusFrame damaged = Traffic(5'000'000).sample().back();
   damaged.data[3] = static_cast<std::uint8_t>(damaged.data[3] ^ 1);
-  bus.take(damaged);
-  bus.take(on_bus({0x7AA, 0, {}}, 5'000'000));
+  bus.receive(damaged);
+  bus.receive(to_bus_frame({0x7AA, 0, {}}, 5'000'000));
   ScreenFacts more = facts();
   more.dropped = 17;
   more.malformed = 3;
   const auto lines = screen(bus, more, {80, 24});
   EXPECT_THAT(plain_text(lines), HasSubstr("Bus      17 dropped by the kernel, 1 CRC errors, 3 malformed lines"));
   EXPECT_THAT(plain_text(lines), HasSubstr("Other ids 7AA:1"));
-  EXPECT_EQ(ink_of(lines, "17 dropped"), Ink::alarm);
+  EXPECT_EQ(ink_of(lines, "17 dropped"), TextStyle::alarm);
 }
 
 TEST(Screen, BeforeAnythingIsHeardSaysSo) {
@@ -158,7 +158,7 @@ TEST(StatusLine, SaysTheBatteryInOneLine) {
   EXPECT_EQ(status_line(after(61), facts()),
             "0:01:00  79.99 % +- 1.72  3.320 V  5.04 A  24.2 degC  carried by counting");
   BusState bus = after(5);
-  bus.time_is(24'000'000);
+  bus.advance_time(24'000'000);
   EXPECT_THAT(status_line(bus, facts()), HasSubstr("stale for 20 s"));
 }
 

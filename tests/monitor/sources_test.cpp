@@ -61,7 +61,7 @@ class Dump : public ::testing::Test {
   std::string refusal() const {
     try {
       read();
-    } catch (const SourceRefused& refused) {
+    } catch (const SourceError& refused) {
       return refused.what();
     }
     return "";
@@ -122,7 +122,7 @@ TEST_F(Dump, WithoutAFrameIsRefused) {
 TEST(Source, ThatIsNotThereIsRefusedInWords) {
   for (const char* name : {"", "nonesuch0", "can 0", "slcan:/nonesuch", "slcan:/dev/null", "file:/nonesuch",
                            "file:/tmp", "usb:0", "../can0", "lo", "a_name_that_no_interface_can_have"}) {
-    EXPECT_THROW(open_source(name), SourceRefused) << name;
+    EXPECT_THROW(open_source(name), SourceError) << name;
   }
 }
 

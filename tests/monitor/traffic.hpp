@@ -76,7 +76,7 @@ class Traffic {
  private:
   template <class Message>
   void send(const Message& message, std::size_t place) {
-    frames_.push_back(on_bus(message.frame(counters_[place]), now_us_));
+    frames_.push_back(to_bus_frame(message.frame(counters_[place]), now_us_));
     counters_[place] = can::next(counters_[place]);
   }
 

@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
     for (const monitor::BusFrame& frame : sample) {
       std::array<char, hal::slcan::longest_frame> line;
       if (slcan)
-        text += hal::slcan::encode(classic(frame), line);
+        text += hal::slcan::encode(to_can_frame(frame), line);
       else
         monitor::append_dump_line(text, frame, "can0");
       ++frames;

@@ -29,8 +29,8 @@ constexpr std::int32_t pack_uv = 52'800'000;
 /// whatever it is told.
 struct Bench {
   Contactors contactors{pack};
-  ContactorInput in{.request = Request::none, .current_ua = 0, .pack_uv = pack_uv, .link_uv = 0, .step_us = 100'000};
-  double link_v = 0, load_a = 0, time_constant_s = 0.5, discharge_s = 3, link_short = 0;
+  ContactorInput in{.request = Request::none, .current_ua = 0, .pack_uv = pack_uv, .dc_link_uv = 0, .step_us = 100'000};
+  double dc_link_v = 0, load_a = 0, time_constant_s = 0.5, discharge_s = 3, link_short = 0;
   bool plus_welded = false, minus_welded = false, precharge_welded = false, plus_fails = false;
 
   void step() {
@@ -40,16 +40,16 @@ struct Bench {
     const double step_s = in.step_us / 1e6, pack_v = pack_uv / 1e6;
     double current_a = 0;
     if (plus && minus) {
-      link_v = pack_v;
+      dc_link_v = pack_v;
       current_a = load_a;
     } else if (relay && minus) {
       const double end_v = pack_v * (1 - link_short);
-      link_v += (end_v - link_v) * (1 - std::exp(-step_s / time_constant_s));
+      dc_link_v += (end_v - dc_link_v) * (1 - std::exp(-step_s / time_constant_s));
     } else {
-      link_v *= std::exp(-step_s / discharge_s);
-      if (load_a < 0) link_v *= 0.8;
+      dc_link_v *= std::exp(-step_s / discharge_s);
+      if (load_a < 0) dc_link_v *= 0.8;
     }
-    in.link_uv = static_cast<std::int32_t>(1e6 * link_v);
+    in.dc_link_uv = static_cast<std::int32_t>(1e6 * dc_link_v);
     in.current_ua = static_cast<std::int32_t>(1e6 * current_a);
     closed = plus && minus;
   }
@@ -295,7 +295,7 @@ TEST(Precharge, WithoutAReadingOfTheLinkNeverCloses) {
   Bench b;
   b.in.request = Request::drive;
   for (int k = 0; k < 100; ++k) {
-    b.in.link_uv = measurement::no_reading;
+    b.in.dc_link_uv = measurement::no_reading;
     b.contactors.update(b.in);
     b.seen.precharge_failed = b.seen.precharge_failed || b.contactors.events().precharge_failed;
     ASSERT_FALSE(b.contactors.outputs().main_plus);
@@ -402,9 +402,9 @@ TEST(ContactorTimes, HoldAcrossAnyLengthOfAState) {
 /// Contactors that read what they are given.
 struct Fed {
   explicit Fed(const ContactorPlan& plan = pack) : contactors(plan) {}
-  ContactorState step(double seconds, std::int32_t link_uv = 0) {
+  ContactorState step(double seconds, std::int32_t dc_link_uv = 0) {
     in.step_us = static_cast<std::uint32_t>(std::lround(1e6 * seconds));
-    in.link_uv = link_uv;
+    in.dc_link_uv = dc_link_uv;
     contactors.update(in);
     return contactors.state();
   }
@@ -419,7 +419,7 @@ struct Fed {
   bool welded() const { return contactors.events().welded; }
 
   Contactors contactors;
-  ContactorInput in{.request = Request::none, .current_ua = 0, .pack_uv = pack_uv, .link_uv = 0, .step_us = 0};
+  ContactorInput in{.request = Request::none, .current_ua = 0, .pack_uv = pack_uv, .dc_link_uv = 0, .step_us = 0};
 };
 constexpr std::int32_t eighth_uv = pack_uv / 8, sixteenth_uv = pack_uv / 16;
 
@@ -428,8 +428,8 @@ TEST(WeldedContactor, IsWhatRaisesTheLinkByAnEighthAboveTheLowestOfTheSelfTest) 
     Fed f;
     f.in.request = Request::drive;
     // the link still falls from the last drive
-    for (const std::int32_t link_uv : {40'000'000, 35'000'000, 30'000'000, 25'000'000})
-      EXPECT_EQ(f.step(0.1, link_uv), self_test);
+    for (const std::int32_t dc_link_uv : {40'000'000, 35'000'000, 30'000'000, 25'000'000})
+      EXPECT_EQ(f.step(0.1, dc_link_uv), self_test);
     // one reading missing, whichever: neither a weld nor forgotten
     f.step(0.1, measurement::no_reading);
     EXPECT_FALSE(f.welded());
@@ -447,7 +447,7 @@ TEST(WeldedContactor, IsWhatRaisesTheLinkByAnEighthAboveTheLowestOfTheSelfTest) 
 
 TEST(WeldedContactor, WhileAllIsOpenIsAnySevenEighthsOnTheLinkAndAnyCurrentAboveRest) {
   struct Case {
-    std::int32_t link_uv, current_ua, pack_uv;
+    std::int32_t dc_link_uv, current_ua, pack_uv;
     bool welded;
   };
   for (const Case& c : {Case{7 * eighth_uv - 1, 0, pack_uv, false},
@@ -463,17 +463,17 @@ TEST(WeldedContactor, WhileAllIsOpenIsAnySevenEighthsOnTheLinkAndAnyCurrentAbove
     Fed f;
     f.in.current_ua = c.current_ua;
     f.in.pack_uv = c.pack_uv;
-    f.step(0.1, c.link_uv);
-    EXPECT_EQ(f.welded(), c.welded) << c.link_uv << ' ' << c.current_ua << ' ' << c.pack_uv;
+    f.step(0.1, c.dc_link_uv);
+    EXPECT_EQ(f.welded(), c.welded) << c.dc_link_uv << ' ' << c.current_ua << ' ' << c.pack_uv;
     f.in.request = Request::drive;
-    EXPECT_EQ(f.step(0.1, c.link_uv), c.welded ? off : self_test) << "what is welded is not tested";
+    EXPECT_EQ(f.step(0.1, c.dc_link_uv), c.welded ? off : self_test) << "what is welded is not tested";
   }
 }
 
 TEST(Contactors, TakeTheirTimesFromThePack) {
   EXPECT_EQ(pack.test_us, 300'000U) << "three samples";
   EXPECT_EQ(pack.half_time_constant_us, 250'000U);
-  EXPECT_EQ(pack.link_discharge_us, 5'000'000U);
+  EXPECT_EQ(pack.dc_link_discharge_us, 5'000'000U);
   EXPECT_EQ(pack.rest_ua, 120'000);
   Fed f;
   f.in.request = Request::drive;
@@ -692,7 +692,7 @@ TEST(ContactorWalk, ThroughEveryReachableStateUnderEveryInputNeverClosesAgainstA
   }
   constexpr ContactorPlan coarse{.test_us = 1'000'000,
                                  .half_time_constant_us = 500'000,
-                                 .link_discharge_us = 3'000'000,
+                                 .dc_link_discharge_us = 3'000'000,
                                  .rest_ua = 120'000};  // of few different times
   std::set<std::array<std::uint8_t, sizeof(Contactors)>> known;
   std::vector<Contactors> open{Contactors(coarse)};
@@ -717,7 +717,7 @@ TEST(ContactorWalk, ThroughEveryReachableStateUnderEveryInputNeverClosesAgainstA
         ASSERT_FALSE(in.open || in.open_now || in.request == Request::none);
       }
       if (out.main_plus && from.state() == precharge) {
-        ASSERT_TRUE(in.link_uv >= 49'000'000 && !in.open) << "closed onto an empty link";
+        ASSERT_TRUE(in.dc_link_uv >= 49'000'000 && !in.open) << "closed onto an empty link";
       }
       if (known.insert(bytes(c)).second) open.push_back(c);
     }

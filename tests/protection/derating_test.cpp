@@ -17,7 +17,7 @@ constexpr DeratingInput good{.highest_cell_uv = 3'300'000,
                              .lowest_cdegc = 2'400,
                              .soc_ppb = 500'000'000};
 
-AllowedCurrent settled(const DeratingInput& in) {
+AllowedCurrent steady_state(const DeratingInput& in) {
   Derating d(plan6a);
   AllowedCurrent a;
   for (int k = 0; k < 100; ++k) a = d.update(in, 100'000);
@@ -111,7 +111,7 @@ TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
       {"no temperature", with([](auto& i) { i.highest_cdegc = i.lowest_cdegc = measurement::no_reading; }), 0, 3},
   };
   for (const Point& p : points) {
-    const AllowedCurrent a = settled(p.in);
+    const AllowedCurrent a = steady_state(p.in);
     EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.004) << p.what;  // less than 1/1024 of 6 A
     EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.004) << p.what;
     // all is all, and nothing is nothing
@@ -162,10 +162,10 @@ TEST(Derating, IsContinuousInWhatItGoesBy) {
   const auto sweep = [](std::int32_t DeratingInput::*field, std::int32_t from, std::int32_t to, std::int32_t step) {
     DeratingInput in = good;
     in.*field = from;
-    AllowedCurrent before = settled(in);
+    AllowedCurrent before = steady_state(in);
     for (std::int32_t v = from; v <= to; v += step) {
       in.*field = v;
-      const AllowedCurrent now = settled(in);
+      const AllowedCurrent now = steady_state(in);
       ASSERT_LE(std::abs(now.charge_ua - before.charge_ua), 100'000) << v;
       ASSERT_LE(std::abs(now.discharge_ua - before.discharge_ua), 100'000) << v;
       before = now;

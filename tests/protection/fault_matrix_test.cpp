@@ -10,7 +10,7 @@
 #include "plant/random.hpp"
 #include "protection/protection.hpp"
 #include "tests/protection/oracle.hpp"
-#include "tests/protection/truck.hpp"
+#include "tests/protection/simulated_truck.hpp"
 
 namespace bms::protection {
 namespace {
@@ -41,8 +41,8 @@ class Rig {
       const std::int32_t value = at(values, of(expected_rows[k]));
       const bool ends =
           pressed && (expected_rows[k].recovery == 'c' ||
-                      (expected_rows[k].recovery == 's' && clear == Clear::service && has(kept, k) && may_serve));
-      const bool there = oracle_[k].see(value == measurement::no_reading ? Value() : Value(value), step_ms, ends);
+                      (expected_rows[k].recovery == 's' && clear == Clear::service && has(latched, k) && may_serve));
+      const bool there = oracle_[k].check(value == measurement::no_reading ? Value() : Value(value), step_ms, ends);
       if (there != has(monitor.active(), k)) {
         ADD_FAILURE() << expected_rows[k].name << (there ? " missed" : " false") << " at " << time_us << " us with "
                       << value;
@@ -55,8 +55,8 @@ class Rig {
     for (int t = 0; t < ms && !wrong; t += step_ms) step(clear);
   }
 
-  Quantities values = nothing_known();
-  std::uint32_t kept = 0;
+  Quantities values = unknown_quantities();
+  std::uint32_t latched = 0;
   FaultMonitor monitor{pack.rules, 0};
   std::uint64_t time_us = 0;
   bool wrong = false;
@@ -216,9 +216,9 @@ TEST_P(ServicedProtection, IsKeptOverAPowerCycleAndEndedByServiceBeforeAnythingC
   Rig first;
   first.set(row, levels(row).just_above);
   first.run(row.delay_ms + 2 * step_ms);
-  ASSERT_EQ(first.monitor.kept(), 1U << GetParam());
+  ASSERT_EQ(first.monitor.latched(), 1U << GetParam());
   for (const bool closed_before : {false, true}) {
-    FaultMonitor next(pack.rules, first.monitor.kept());
+    FaultMonitor next(pack.rules, first.monitor.latched());
     Rig good;
     const auto step = [&](Clear clear, bool may_serve) { next.update(good.values, step_us, 0, clear, may_serve); };
     EXPECT_TRUE(has(next.active(), GetParam()));
@@ -319,11 +319,11 @@ TEST(FirstCause, IsTheFaultThatCameFirstWithItsTimeUntilItIsCleared) {
 
 TEST(FirstCause, IsTheGravestOfOneSampleAndAWarningGivesWayToAFault) {
   Cause c;
-  at(c.good.values, Quantity::store_failed) = 1;
+  at(c.good.values, Quantity::storage_failed) = 1;
   c.step();
   EXPECT_EQ(c.first(), Fault::storage_fault);
   at(c.good.values, Quantity::current_magnitude_ua) = 40'000'000;
-  at(c.good.values, Quantity::charge_heat_us) = 40'000'000;
+  at(c.good.values, Quantity::charge_overload_i2t_us) = 40'000'000;
   c.step();
   EXPECT_EQ(c.first(), Fault::short_circuit);
 }
@@ -347,7 +347,7 @@ TEST(FirstCause, KeepsItsTimeWhileItIsThereAndOfEqualsTheFirstInTheTable) {
   c.step(Clear::none, 6);
   EXPECT_EQ(c.first(), Fault::voltage_missing) << "both open; it stands before the other";
   EXPECT_EQ(c.monitor.first().time_us, 6U * step_us);
-  at(c.good.values, Quantity::store_failed) = 1;
+  at(c.good.values, Quantity::storage_failed) = 1;
   c.step(Clear::user);
   EXPECT_EQ(c.first(), Fault::voltage_missing) << "a command does not end what is there";
   EXPECT_EQ(c.monitor.first().time_us, 6U * step_us);
@@ -360,13 +360,13 @@ TEST(FirstCause, KeepsItsTimeWhileItIsThereAndOfEqualsTheFirstInTheTable) {
 
 TEST(FirstCause, OfAWarningThatDeratesGivesWayButNotToAnotherWarning) {
   Cause c;
-  at(c.good.values, Quantity::store_failed) = 1;
+  at(c.good.values, Quantity::storage_failed) = 1;
   c.step();
   at(c.good.values, Quantity::temperatures_missing) = 1;
   c.step(Clear::none, 30);
   ASSERT_EQ(c.monitor.active(), bit(Fault::storage_fault) | bit(Fault::temperature_lost));
   EXPECT_EQ(c.first(), Fault::storage_fault) << "the first of the mild";
-  at(c.good.values, Quantity::charge_heat_us) = 40'000'000;
+  at(c.good.values, Quantity::charge_overload_i2t_us) = 40'000'000;
   c.step();
   EXPECT_EQ(c.first(), Fault::charge_overcurrent);
 }
@@ -379,7 +379,7 @@ TEST(FirstCause, ThatGoesWithTheSampleThatBringsAnotherGivesWayToIt) {
   at(c.good.values, Quantity::currents_missing) = 0;
   c.step(Clear::none, 50);
   ASSERT_EQ(c.monitor.active(), bit(Fault::current_missing));
-  at(c.good.values, Quantity::charge_heat_us) = 40'000'000;
+  at(c.good.values, Quantity::charge_overload_i2t_us) = 40'000'000;
   c.step();
   ASSERT_EQ(c.monitor.active(), bit(Fault::charge_overcurrent));
   EXPECT_EQ(c.first(), Fault::charge_overcurrent);
@@ -388,9 +388,9 @@ TEST(FirstCause, ThatGoesWithTheSampleThatBringsAnotherGivesWayToIt) {
 
 TEST(FirstCause, IsForgottenByAClearThatLeavesNothing) {
   Cause c;
-  at(c.good.values, Quantity::store_failed) = 1;
+  at(c.good.values, Quantity::storage_failed) = 1;
   c.step();
-  at(c.good.values, Quantity::store_failed) = 0;
+  at(c.good.values, Quantity::storage_failed) = 0;
   c.step();
   c.step(Clear::user);
   EXPECT_EQ(c.monitor.active(), 0U);
@@ -413,7 +413,7 @@ TEST(FaultsWithAFlippedBit, AreDistrustedAndNoneIsForgotten) {
     words[at + a / 32] ^= 1U << (a % 32);
     std::memcpy(static_cast<void*>(&c.monitor), words.data(), sizeof words);
     EXPECT_FALSE(c.monitor.intact());
-    c.monitor.distrust();
+    c.monitor.fail_safe();
     EXPECT_TRUE(c.monitor.intact());
     EXPECT_EQ(c.monitor.active(), was | bit(Fault::internal_fault) | 1U << (a % 32));
   }
@@ -453,9 +453,9 @@ TEST(Quantities, OfAnySampleAreThoseOfTheirDefinitions) {
       }
       s.current_ua = random.uniform() < missing ? measurement::no_reading : whole(-40'000'000, 40'000'000);
       s.pack_uv = random.uniform() < missing ? measurement::no_reading : 16 * level_uv + whole(-1'000'000, 1'000'000);
-      Quantities q = nothing_known();
+      Quantities q = unknown_quantities();
       quantities.update(s, step_us, q);
-      const auto expected = oracle.see(s, false);
+      const auto expected = oracle.check(s, false);
       for (std::size_t k = 0; k < 26; ++k) {
         if (!told_by_samples(k) || k == 18) continue;  // heat: below; disbelief is the estimator's
         ASSERT_EQ(at(q, pack.rules[k].quantity), expected[k].value_or(measurement::no_reading))
@@ -490,7 +490,7 @@ TEST(Quantities, OfReadingsThatCannotBeAreMissing) {
     s.pack_uv = 0;  // shorted is a reading
     s.cell_uv[15] = c.cell_uv;
     s.temperature_cdegc[3] = c.cdegc;
-    Quantities q = nothing_known();
+    Quantities q = unknown_quantities();
     quantities.update(s, step_us, q);
     EXPECT_EQ(at(q, Quantity::voltages_missing), c.there ? 0 : 1) << c.cell_uv;
     EXPECT_EQ(at(q, Quantity::temperatures_missing), c.there ? 0 : 1) << c.cdegc;
@@ -503,7 +503,7 @@ template <std::size_t Cells>
 std::int32_t stuck_in_a_small_pack(std::int32_t others_move_uv, bool pack_known, bool one_missing = false) {
   PackQuantities<Cells> quantities(pack.limits);
   measurement::PackSample<Cells> s;
-  Quantities q = nothing_known();
+  Quantities q = unknown_quantities();
   for (int k = 0; k < 7; ++k) {
     const std::int32_t moved_uv = k < 6 ? 0 : others_move_uv;
     for (std::size_t c = 0; c < Cells; ++c)
@@ -529,7 +529,7 @@ TEST(Quantities, OfLessThanFourCellsGoByThePacksOwnReading) {
 TEST(Quantities, OfOneReadableCellAreItsOwnAndOfNoneAreNotKnown) {
   PackQuantities<16> quantities(pack.limits);
   measurement::PackSample<16> s;
-  Quantities q = nothing_known();
+  Quantities q = unknown_quantities();
   s.cell_uv[6] = 3'300'000;
   quantities.update(s, step_us, q);
   EXPECT_EQ(at(q, Quantity::highest_cell_uv), 3'300'000);
@@ -553,9 +553,9 @@ TEST(Quantities, OfACellThatMustNotBeChargedHeatByAnyCurrent) {
   PackQuantities<16> quantities(pack_limits(d));
   measurement::PackSample<16> s;
   s.current_ua = 2'560;
-  Quantities q = nothing_known();
+  Quantities q = unknown_quantities();
   quantities.update(s, 1'000'000, q);
-  EXPECT_EQ(at(q, Quantity::charge_heat_us), 99'000'000) << "ten times the limit, the most that counts";
+  EXPECT_EQ(at(q, Quantity::charge_overload_i2t_us), 99'000'000) << "ten times the limit, the most that counts";
 }
 
 TEST(Quantities, OfASensorThatIsNotFittedAreNotMissed) {
@@ -564,7 +564,7 @@ TEST(Quantities, OfASensorThatIsNotFittedAreNotMissed) {
   PackQuantities<16> quantities(pack_limits(d));
   measurement::PackSample<16> s;
   s.temperature_cdegc = {2'500, measurement::no_temperature, 9'000, -5'000};
-  Quantities q = nothing_known();
+  Quantities q = unknown_quantities();
   quantities.update(s, step_us, q);
   EXPECT_EQ(at(q, Quantity::temperatures_missing), 1);
   EXPECT_EQ(at(q, Quantity::highest_cdegc), 2'500);
@@ -585,8 +585,8 @@ class Truck : public TruckPack {
 
   std::uint32_t step(const Change& change = {}) {
     measure(protection.decision().outputs, change);
-    const std::uint32_t faults = protection.update(sample, estimate, orders).faults,
-                        expected = oracle_.see(sample, estimate.contradicts);
+    const std::uint32_t faults = protection.update(sample, estimate, inputs).faults,
+                        expected = oracle_.check(sample, estimate.voltage_rejected);
     for (std::size_t k = 0; k < 26; ++k) {
       if (!told_by_samples(k) || has(expected, k) == has(faults, k)) continue;  // heat: ProtectionAgainstHeat
       ADD_FAILURE() << expected_rows[k].name << (has(expected, k) ? " missed" : " false") << " at " << steps() * 100
@@ -721,11 +721,11 @@ TEST(ProtectionAgainstHeatOf, ACurrentIsTheSquareOfItOverItsLimit) {
     d.limits.discharge_current_max_a = 2 * limit_a;
     for (const int sign : {1, -1}) {
       const double from_a = 1.05 * (sign > 0 ? limit_a : 2 * limit_a);
-      const Quantity mine = sign > 0 ? Quantity::charge_heat_us : Quantity::discharge_heat_us,
-                     other = sign > 0 ? Quantity::discharge_heat_us : Quantity::charge_heat_us;
+      const Quantity mine = sign > 0 ? Quantity::charge_overload_i2t_us : Quantity::discharge_overload_i2t_us,
+                     other = sign > 0 ? Quantity::discharge_overload_i2t_us : Quantity::charge_overload_i2t_us;
       PackQuantities<16> quantities(pack_limits(d));
       measurement::PackSample<16> s;
-      Quantities q = nothing_known();
+      Quantities q = unknown_quantities();
       const auto heat_s = [&](double times, std::uint32_t us) {
         s.current_ua = sign * static_cast<std::int32_t>(1e6 * times * from_a);
         quantities.update(s, us, q);
@@ -754,13 +754,13 @@ TEST(ProtectionAgainstHeatOf, ACurrentIsTheSquareOfItOverItsLimit) {
 TEST(ProtectionAgainstHeatOf, ARestIsCooledByItsTimeExactly) {
   PackQuantities<16> quantities(pack.limits);
   measurement::PackSample<16> s;
-  Quantities q = nothing_known();
+  Quantities q = unknown_quantities();
   s.current_ua = 12'000'000;
   quantities.update(s, 1'000'000, q);
-  const std::int32_t before = at(q, Quantity::charge_heat_us);
+  const std::int32_t before = at(q, Quantity::charge_overload_i2t_us);
   s.current_ua = 0;
   for (int k = 0; k < 10; ++k) quantities.update(s, 100'000, q);
-  EXPECT_EQ(at(q, Quantity::charge_heat_us), before - 1'000'000);
+  EXPECT_EQ(at(q, Quantity::charge_overload_i2t_us), before - 1'000'000);
 }
 
 TEST(ProtectionAgainstHeatOf, TheContinuousCurrentAndShortBurstsNeverTrips) {

@@ -24,7 +24,7 @@ class RowOracle {
   explicit RowOracle(const ExpectedRow& row) : row_(&row) {}
 
   /// cleared: a clear command that could end it came with this sample.
-  bool see(Value value, int step_ms, bool cleared) {
+  bool check(Value value, int step_ms, bool cleared) {
     if (!value) return there_;
     if (!there_) {
       const bool beyond = row_->beyond == '>' ? *value > row_->threshold : *value < row_->threshold;
@@ -54,7 +54,7 @@ class QuantityOracle {
  public:
   using Sample16 = measurement::PackSample<16>;
 
-  std::array<Value, fault_count> see(const Sample16& s, bool contradicts) {
+  std::array<Value, fault_count> check(const Sample16& s, bool voltage_rejected) {
     history_.push_back(s);
     if (history_.size() > 4'000) history_.pop_front();
     std::vector<std::int64_t> cells;
@@ -80,7 +80,7 @@ class QuantityOracle {
     q[14] = q[15] = cold;
     q[16] = shift(s);
     q[17] = high ? Value(*high - *low) : std::nullopt;
-    q[18] = contradicts ? 1 : 0;
+    q[18] = voltage_rejected ? 1 : 0;
     q[19] = pack && cells.size() == 16 ? Value(std::abs(sum - s.pack_uv)) : std::nullopt;
     q[20] = static_cast<std::int64_t>(16 - cells.size()) + (pack ? 0 : 1);
     q[21] = stuck_cells();

@@ -41,19 +41,19 @@ struct Bench {
     for (const std::int32_t uv : sample.cell_uv) sum += uv;
     sample.pack_uv = static_cast<std::int32_t>(sum);
     if (closed)
-      link_uv = static_cast<double>(sample.pack_uv);
+      dc_link_uv = static_cast<double>(sample.pack_uv);
     else if (out.precharge && out.main_minus)
-      link_uv += (static_cast<double>(sample.pack_uv) - link_uv) * 0.18;
+      dc_link_uv += (static_cast<double>(sample.pack_uv) - dc_link_uv) * 0.18;
     else
-      link_uv *= 0.97;
-    orders.link_uv = static_cast<std::int32_t>(link_uv);
-    return protection.update(sample, estimate, orders);
+      dc_link_uv *= 0.97;
+    inputs.dc_link_uv = static_cast<std::int32_t>(dc_link_uv);
+    return protection.update(sample, estimate, inputs);
   }
   void run(int steps) {
     for (int k = 0; k < steps; ++k) step();
   }
   void drive_off() {
-    orders.request = Request::drive;
+    inputs.request = Request::drive;
     for (int k = 0; k < 100 && protection.decision().state != ContactorState::drive; ++k) step();
     load_ua = -3'000'000;
     run(60);
@@ -64,11 +64,11 @@ struct Bench {
   Protection<16> protection;
   measurement::PackSample<16> sample;
   PackEstimate<16> estimate;
-  Orders orders;
+  ExternalInputs inputs;
   std::uint64_t time_us;
   std::uint32_t period, count = 0;
   std::int32_t base_uv = 3'300'000, load_ua = 0;
-  double link_uv = 0;
+  double dc_link_uv = 0;
   bool closed = false;
   std::function<void(measurement::PackSample<16>&)> change;
 };
@@ -92,7 +92,7 @@ TEST(Protection, OpensOnTheFirstSampleOfAShortCircuitAndKeepsItForTheWorkshop) {
   b.drive_off();
   b.load_ua = -60'000'000;
   EXPECT_FALSE(b.step().outputs.any_closed());
-  EXPECT_EQ(b.protection.decision().kept, bit(Fault::short_circuit));
+  EXPECT_EQ(b.protection.decision().latched, bit(Fault::short_circuit));
 }
 
 TEST(Protection, TellsTheTruckToStopBeforeItOpensAndOpensWhenTheTruckDoesNot) {
@@ -134,9 +134,9 @@ TEST(Protection, WithoutSamplesOpensAfterFivePeriodsAndTakesAnewRequestToClose) 
   b.run(300);
   EXPECT_EQ(b.protection.decision().faults, 0U) << "samples are back";
   EXPECT_EQ(b.protection.decision().state, ContactorState::safe);
-  b.orders.request = Request::none;
+  b.inputs.request = Request::none;
   b.step();
-  b.orders.request = Request::drive;
+  b.inputs.request = Request::drive;
   b.run(60);
   EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
 }
@@ -146,12 +146,12 @@ TEST(Protection, WithoutSamplesOpensFromEveryState) {
   for (int steps = 1; steps < 60; ++steps) {
     for (const Request r : {Request::drive, Request::charge}) {
       Bench b;
-      b.orders.request = r;
+      b.inputs.request = r;
       b.run(steps);
       if (steps > 50) {  // and while it waits for a load to cease
         b.load_ua = -3'000'000;
         b.step();
-        b.orders.request = Request::none;
+        b.inputs.request = Request::none;
         b.run(2);
       }
       tried.insert(b.protection.decision().state);
@@ -172,7 +172,7 @@ TEST(Protection, WithThePlanOfAnotherPackClosesNothing) {
   other.cells = 15;
   const ProtectionPlan plan_of_15 = protection_plan(other);
   Bench b(0, plan_of_15);
-  b.orders.request = Request::drive;
+  b.inputs.request = Request::drive;
   b.run(100);
   EXPECT_NE(b.protection.decision().faults & bit(Fault::internal_fault), 0U);
   EXPECT_FALSE(b.protection.decision().outputs.any_closed());
@@ -194,7 +194,7 @@ TEST(Protection, ASampleThatComesTwiceNowAndThenIsNoClockThatStands) {
   Bench b;
   b.drive_off();
   for (int k = 0; k < 40; ++k) {
-    for (int again = 0; again < 4; ++again) b.protection.update(b.sample, b.estimate, b.orders);
+    for (int again = 0; again < 4; ++again) b.protection.update(b.sample, b.estimate, b.inputs);
     EXPECT_EQ(b.step().faults, 0U) << k;
     EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
   }
@@ -207,7 +207,7 @@ TEST(Protection, CountsSamplesOfWhichNothingWasReadAsNone) {
   const std::uint64_t last = b.time_us;
   measurement::PackSample<16> nothing;
   for (nothing.time_us = last + 100'000; nothing.time_us <= last + 600'000; nothing.time_us += 100'000) {
-    b.protection.update(nothing, b.estimate, b.orders);
+    b.protection.update(nothing, b.estimate, b.inputs);
     EXPECT_EQ(b.protection.decision().outputs.any_closed(), nothing.time_us - last <= 500'000)
         << nothing.time_us - last;
   }
@@ -221,7 +221,7 @@ TEST(Protection, CountsSamplesOfWhichNothingWasReadAsNone) {
     if (one == 3) s.temperature_cdegc[3] = 2'000;
     Protection<16> p(pack);
     for (int k = 0; k < 10; ++k) {
-      p.update(s, b.estimate, b.orders);
+      p.update(s, b.estimate, b.inputs);
       s.time_us += 100'000;
     }
     EXPECT_EQ(p.decision().faults & bit(Fault::samples_missing), 0U) << one;
@@ -232,9 +232,9 @@ TEST(Protection, CountsSamplesOfWhichNothingWasReadAsNone) {
 TEST(Protection, AResetByTheWatchdogIsAFaultAlsoWhenNothingIsMeasured) {
   Protection<16> p(pack);
   measurement::PackSample<16> nothing;
-  Orders orders{.board_fault = true};
+  ExternalInputs inputs{.board_fault = true};
   nothing.time_us = 100'000;
-  p.update(nothing, {}, orders);
+  p.update(nothing, {}, inputs);
   EXPECT_EQ(p.decision().faults, bit(Fault::internal_fault));
 }
 
@@ -243,10 +243,10 @@ TEST(Protection, SaysOnceThatAFaultCame) {
   b.drive_off();
   b.change = [](auto& s) { s.cell_uv[9] = 3'900'000; };
   while ((b.protection.decision().faults & bit(Fault::cell_overvoltage_severe)) == 0) b.step();
-  ASSERT_NE(b.protection.decision().came, 0U);
+  ASSERT_NE(b.protection.decision().raised, 0U);
   b.time_us -= b.period;  // the next is no later
-  EXPECT_EQ(b.step().came, 0U);
-  EXPECT_EQ(b.protection.without_sample(b.time_us + 10'000).came, 0U);
+  EXPECT_EQ(b.step().raised, 0U);
+  EXPECT_EQ(b.protection.without_sample(b.time_us + 10'000).raised, 0U);
 }
 
 TEST(Protection, WithoutASampleFromTheStartSaysSo) {
@@ -267,12 +267,12 @@ TEST(Protection, ThatHadASampleWaitsNoLongerThanTheTableSays) {
 
 TEST(Protection, ATruckThatAskedBeforeTheFirstSampleGetsItsPower) {
   Bench b;
-  b.orders.request = Request::drive;
+  b.inputs.request = Request::drive;
   const measurement::PackSample<16> nothing;
   for (int k = 0; k < 15; ++k) {
     measurement::PackSample<16> s = nothing;
     s.time_us = b.time_us += b.period;
-    EXPECT_EQ(b.protection.update(s, {}, b.orders).state, ContactorState::off);
+    EXPECT_EQ(b.protection.update(s, {}, b.inputs).state, ContactorState::off);
   }
   for (int k = 0; k < 40; ++k) b.step();
   EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
@@ -284,7 +284,7 @@ TEST(Protection, DecidesTheSameAcrossAWrapOfTheClock) {
   const auto run = [](std::uint64_t start_us) {
     Bench b(start_us);
     std::vector<std::tuple<std::uint32_t, int, bool, std::int32_t, std::uint64_t>> all;
-    b.orders.request = Request::drive;
+    b.inputs.request = Request::drive;
     for (int k = 0; k < 900; ++k) {
       if (k == 60) b.load_ua = -3'000'000;
       b.change = k > 100 && k < 180
@@ -368,9 +368,9 @@ TEST(Protection, EndsInSafeWithAnInternalFaultAfterAnyFlippedBitOfTheSetOfFaults
 TEST(Protection, ForgetsNoFaultByAFlippedBitOfIt) {
   Bench b;
   b.drive_off();
-  b.orders.storage_fault = true;
+  b.inputs.storage_fault = true;
   b.step();
-  b.orders.storage_fault = false;  // it stays until it is cleared
+  b.inputs.storage_fault = false;  // it stays until it is cleared
   b.step();
   constexpr std::uint32_t there = bit(Fault::storage_fault);
   std::array<std::uint32_t, sizeof(Protection<16>) / 4> words{};
@@ -411,24 +411,24 @@ TEST(Protection, NeverClosesAgainstASevereFaultWhateverBitFlips) {
 
 TEST(Protection, AResetByTheWatchdogIsAFaultUntilItIsCleared) {
   Bench b;
-  b.orders.board_fault = true;
+  b.inputs.board_fault = true;
   b.step();
-  b.orders.board_fault = false;
-  b.orders.request = Request::drive;
+  b.inputs.board_fault = false;
+  b.inputs.request = Request::drive;
   b.run(50);
   EXPECT_EQ(b.protection.decision().faults, bit(Fault::internal_fault));
   EXPECT_FALSE(b.protection.decision().outputs.any_closed());
-  b.orders.request = Request::none;
-  b.orders.clear = Clear::user;
+  b.inputs.request = Request::none;
+  b.inputs.clear = Clear::user;
   b.step();
   EXPECT_EQ(b.protection.decision().faults, 0U);
 }
 
 TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
   Bench failed;
-  failed.orders.request = Request::drive;
+  failed.inputs.request = Request::drive;
   for (int k = 0; k < 60; ++k) {
-    failed.link_uv = 0;
+    failed.dc_link_uv = 0;
     failed.step();
   }
   EXPECT_NE(failed.protection.decision().faults & bit(Fault::precharge_failed), 0U);
@@ -437,21 +437,21 @@ TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
   Bench welded;
   welded.drive_off();
   welded.load_ua = 0;
-  welded.orders.request = Request::none;
+  welded.inputs.request = Request::none;
   for (int k = 0; k < 80; ++k) {
     welded.step();
-    welded.link_uv = 52.8e6;
+    welded.dc_link_uv = 52.8e6;
   }
-  EXPECT_EQ(welded.protection.decision().kept, bit(Fault::contactor_welded));
+  EXPECT_EQ(welded.protection.decision().latched, bit(Fault::contactor_welded));
 
   Bench apart;
   apart.drive_off();
   std::uint64_t from = apart.time_us;
   for (int k = 0; k < 10 && apart.protection.decision().outputs.any_closed(); ++k) {
     apart.step();
-    apart.orders.link_uv = 40'000'000;
+    apart.inputs.dc_link_uv = 40'000'000;
     apart.sample.time_us = apart.time_us += apart.period;
-    apart.protection.update(apart.sample, apart.estimate, apart.orders);
+    apart.protection.update(apart.sample, apart.estimate, apart.inputs);
   }
   EXPECT_TRUE((apart.protection.decision().faults & bit(Fault::contactor_not_closed)) == 0)
       << "a reading now and then is no contactor";
@@ -460,7 +460,7 @@ TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
     apart.sample.time_us = apart.time_us += apart.period;
     apart.sample.cell_uv[3] += 1;
     apart.sample.pack_uv += 1;
-    apart.protection.update(apart.sample, apart.estimate, apart.orders);
+    apart.protection.update(apart.sample, apart.estimate, apart.inputs);
   }
   EXPECT_NE(apart.protection.decision().faults & bit(Fault::contactor_not_closed), 0U);
   EXPECT_LE(apart.time_us - from, 600'000U);
@@ -483,17 +483,17 @@ TEST(Protection, AllowsNoCurrentUnlessTheContactorsAreClosedForIt) {
   b.drive_off();
   EXPECT_GT(b.protection.decision().allowed.discharge_ua, 5'900'000);
   Bench closing;
-  closing.orders.request = Request::drive;
+  closing.inputs.request = Request::drive;
   while (closing.protection.decision().state != ContactorState::drive && closing.count < 100) closing.step();
   for (int k = 1; k < 20; ++k)
     EXPECT_LE(closing.step().allowed.discharge_ua, 120'000 * k) << "all of it in five seconds from the closing on";
-  b.orders.request = Request::none;
+  b.inputs.request = Request::none;
   EXPECT_EQ(b.step().allowed.discharge_ua, 0) << "in the same step";
 }
 
 TEST(Protection, BleedsWhileChargingAtTheTopAndNotWithAFaultThatOpens) {
   Bench b;
-  b.orders.request = Request::charge;
+  b.inputs.request = Request::charge;
   b.estimate.soc_ppb = 960'000'000;
   b.estimate.cell_soc_ppb.fill(0);
   b.estimate.cell_soc_ppb[4] = 50'000'000;
@@ -545,18 +545,18 @@ TEST(Protection, WithoutSamplesBleedsNothing) {
 TEST(Protection, AStoreThatFailsIsTheWarningThatItIsAndOthersBelieveTheirs) {
   Bench b;
   b.drive_off();
-  b.orders.storage_fault = true;
+  b.inputs.storage_fault = true;
   EXPECT_EQ(b.step().faults, bit(Fault::storage_fault));
   EXPECT_EQ(b.protection.decision().first.fault, static_cast<std::uint8_t>(Fault::storage_fault));
   b.run(50);
   EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
   EXPECT_GT(b.protection.decision().allowed.discharge_ua, 5'900'000) << "told, nothing else";
-  b.orders.storage_fault = false;
+  b.inputs.storage_fault = false;
   b.run(10);
   EXPECT_EQ(b.protection.decision().faults, bit(Fault::storage_fault)) << "until somebody has seen it";
-  b.orders.clear = Clear::user;
+  b.inputs.clear = Clear::user;
   EXPECT_EQ(b.step().faults, 0U);
-  b.estimate.contradicts = true;
+  b.estimate.voltage_rejected = true;
   b.run(625);
   EXPECT_EQ(b.protection.decision().faults, bit(Fault::current_implausible));
   EXPECT_NEAR(b.protection.decision().allowed.discharge_ua, 3'000'000, 20'000);
@@ -569,8 +569,8 @@ TEST(Protection, SaysWhatWasKeptBeforeTheFirstSampleAndNothingElse) {
   const Protection<16> p(pack, bit(Fault::short_circuit) | bit(Fault::cell_overvoltage));
   const Decision& d = p.decision();
   EXPECT_EQ(d.faults, bit(Fault::short_circuit)) << "what only a workshop ends";
-  EXPECT_EQ(d.kept, bit(Fault::short_circuit));
-  EXPECT_EQ(d.came, 0U);
+  EXPECT_EQ(d.latched, bit(Fault::short_circuit));
+  EXPECT_EQ(d.raised, 0U);
   EXPECT_EQ(d.first.fault, no_fault);
   EXPECT_EQ(d.state, ContactorState::off);
   EXPECT_EQ(d.outputs, Outputs{});
@@ -583,29 +583,29 @@ TEST(Protection, SaysWhatWasKeptBeforeTheFirstSampleAndNothingElse) {
 TEST(Protection, EndsAFaultOfTheWorkshopThatWasKeptAndNoneThatCameAfterItHadClosed) {
   Bench b;
   b.protection = Protection<16>(pack, bit(Fault::short_circuit));
-  b.orders.request = Request::drive;
+  b.inputs.request = Request::drive;
   b.run(110);
   EXPECT_EQ(b.protection.decision().state, ContactorState::safe) << "kept is kept";
-  b.orders = {.clear = Clear::service};
+  b.inputs = {.clear = Clear::service};
   EXPECT_EQ(b.step().faults, 0U);
-  EXPECT_EQ(b.protection.decision().kept, 0U);
-  b.orders = {};
+  EXPECT_EQ(b.protection.decision().latched, 0U);
+  b.inputs = {};
   b.step();
   b.drive_off();
   b.load_ua = -60'000'000;
   b.step();
   b.load_ua = 0;
   b.run(150);
-  b.orders = {.clear = Clear::service};
+  b.inputs = {.clear = Clear::service};
   EXPECT_EQ(b.step().faults, bit(Fault::short_circuit)) << "first a power cycle";
 }
 
 TEST(Protection, HoldsAKeyForOnePressOverAGapOfTheSamples) {
   Bench b;
-  b.orders.clear = Clear::user;
-  b.orders.storage_fault = true;
+  b.inputs.clear = Clear::user;
+  b.inputs.storage_fault = true;
   b.run(3);
-  b.orders.storage_fault = false;
+  b.inputs.storage_fault = false;
   for (int k = 0; k < 10; ++k) b.protection.without_sample(b.time_us += b.period);
   b.step();
   EXPECT_NE(b.protection.decision().faults & bit(Fault::storage_fault), 0U) << "nobody has pressed it anew";
@@ -626,17 +626,17 @@ TEST(Protection, IsClearedAlsoWhileNothingIsMeasured) {
 
 TEST(Protection, GoesByTheSumOfTheCellsWhereThePackIsNotReadForOnce) {
   Bench b;
-  b.orders.request = Request::drive;
+  b.inputs.request = Request::drive;
   while (b.protection.decision().state != ContactorState::precharge && b.count < 100) b.step();
   b.sample.time_us += b.period;
   b.sample.pack_uv = measurement::no_reading;
   std::int32_t sum_uv = 0;
   for (const std::int32_t uv : b.sample.cell_uv) sum_uv += uv;
-  b.orders.link_uv = sum_uv / 16 * 15 - 16;
-  EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.orders).state, ContactorState::precharge);
+  b.inputs.dc_link_uv = sum_uv / 16 * 15 - 16;
+  EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.inputs).state, ContactorState::precharge);
   b.sample.time_us += b.period;
-  b.orders.link_uv = sum_uv / 16 * 15 + 16;
-  EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.orders).state, ContactorState::drive);
+  b.inputs.dc_link_uv = sum_uv / 16 * 15 + 16;
+  EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.inputs).state, ContactorState::drive);
 }
 
 TEST(Protection, CountsAGapAsAMinuteAtMost) {
@@ -678,19 +678,19 @@ TEST(Protection, OfOneCellOpensForItToo) {
   Protection<1> p(plan);
   measurement::PackSample<1> s;
   PackEstimate<1> e;
-  Orders orders{.request = Request::drive};
-  double link_uv = 0;
+  ExternalInputs inputs{.request = Request::drive};
+  double dc_link_uv = 0;
   for (int k = 1; k < 120; ++k) {
     s.time_us = 100'000U * static_cast<unsigned>(k);
     s.current_ua = 0;
     s.cell_uv[0] = s.pack_uv = k < 80 ? 3'300'000 + k : 1'700'000;
     s.temperature_cdegc[0] = 2'500;
     const Outputs out = p.decision().outputs;
-    link_uv = out.main_plus                     ? s.pack_uv
-              : out.precharge && out.main_minus ? link_uv + (s.pack_uv - link_uv) * 0.18
-                                                : link_uv * 0.9;
-    orders.link_uv = static_cast<std::int32_t>(link_uv);
-    p.update(s, e, orders);
+    dc_link_uv = out.main_plus                     ? s.pack_uv
+                 : out.precharge && out.main_minus ? dc_link_uv + (s.pack_uv - dc_link_uv) * 0.18
+                                                   : dc_link_uv * 0.9;
+    inputs.dc_link_uv = static_cast<std::int32_t>(dc_link_uv);
+    p.update(s, e, inputs);
     if (k == 79) {
       ASSERT_EQ(p.decision().state, ContactorState::drive);
     }
@@ -710,8 +710,8 @@ TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
   Protection<16> p(plan);
   plant::Random random(1);
   const auto noise = [&](double sigma) { return 3 * sigma * std::clamp(random.normal() / 3, -1.0, 1.0); };
-  Orders orders{.request = Request::drive};
-  double link_v = 0;
+  ExternalInputs inputs{.request = Request::drive};
+  double dc_link_v = 0;
   std::size_t driven = 0;
   for (std::size_t row = 0; row < shift.rows(); ++row) {
     measurement::PackSample<16> s;
@@ -731,9 +731,11 @@ TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
     for (std::size_t k = 0; k < 4; ++k)
       s.temperature_cdegc[k] =
           static_cast<std::int16_t>(100 * shift.temperature_c[row] + 30 * static_cast<double>(k) + noise(5));
-    link_v = closed ? sum_v : out.precharge && out.main_minus ? link_v + (sum_v - link_v) * 0.39 : link_v * 0.9;
-    orders.link_uv = static_cast<std::int32_t>(1e6 * link_v);
-    const Decision& d = p.update(s, PackEstimate<16>{}, orders);
+    dc_link_v = closed                            ? sum_v
+                : out.precharge && out.main_minus ? dc_link_v + (sum_v - dc_link_v) * 0.39
+                                                  : dc_link_v * 0.9;
+    inputs.dc_link_uv = static_cast<std::int32_t>(1e6 * dc_link_v);
+    const Decision& d = p.update(s, PackEstimate<16>{}, inputs);
     ASSERT_EQ(d.faults, 0U) << "row " << row;
     driven += d.state == ContactorState::drive ? 1U : 0U;
   }

@@ -21,7 +21,7 @@ class Scenario {
     const auto add = [&](std::uint32_t word) { hash = (hash ^ word) * 16'777'619U; };
     for (int k = 1; k <= samples; ++k) {
       measure(k);
-      const Decision& d = step(protection, sample, estimate, orders);
+      const Decision& d = step(protection, sample, estimate, inputs);
       outputs_ = d.outputs;
       for (const std::uint32_t word :
            {d.faults, static_cast<std::uint32_t>(d.state), static_cast<std::uint32_t>(d.allowed.charge_ua),
@@ -37,7 +37,7 @@ class Scenario {
   Protection<16> protection{scenario_plan};
   measurement::PackSample<16> sample;
   PackEstimate<16> estimate;
-  Orders orders;
+  ExternalInputs inputs;
 
  private:
   constexpr std::int32_t chance(std::int32_t most) {
@@ -67,15 +67,15 @@ class Scenario {
     estimate.soc_sigma_ppb = 10'000'000;
     estimate.model_charge_ua = 5'000'000;
     estimate.model_discharge_ua = 5'500'000;
-    orders.request = k % 800 < 20 ? Request::none : Request::drive;
-    link_uv_ = closed                                      ? sum
-               : outputs_.precharge && outputs_.main_minus ? link_uv_ + (sum - link_uv_) / 5
-                                                           : link_uv_ - link_uv_ / 16;
-    orders.link_uv = link_uv_;
+    inputs.request = k % 800 < 20 ? Request::none : Request::drive;
+    dc_link_uv_ = closed                                      ? sum
+                  : outputs_.precharge && outputs_.main_minus ? dc_link_uv_ + (sum - dc_link_uv_) / 5
+                                                              : dc_link_uv_ - dc_link_uv_ / 16;
+    inputs.dc_link_uv = dc_link_uv_;
   }
 
   std::uint32_t state_ = 1;
-  std::int32_t link_uv_ = 0;
+  std::int32_t dc_link_uv_ = 0;
   Outputs outputs_;
 };
 
@@ -83,8 +83,8 @@ inline constexpr std::uint32_t expected_scenario_hash = 3935384279U;
 
 inline std::uint32_t scenario_hash(int samples) {
   Scenario s;
-  return s.run(samples, [](auto& p, const auto& sample, const auto& estimate, const auto& orders) -> const Decision& {
-    return p.update(sample, estimate, orders);
+  return s.run(samples, [](auto& p, const auto& sample, const auto& estimate, const auto& inputs) -> const Decision& {
+    return p.update(sample, estimate, inputs);
   });
 }
 

@@ -34,7 +34,7 @@ TEST(ProtectionTable, SaysWhatWasReckonedByHandForThePapersCell) {
                                                  : 's',
               e.recovery)
         << e.name;
-    EXPECT_STREQ(words(r.reaction), e.reaction) << e.name;
+    EXPECT_STREQ(text_of(r.reaction), e.reaction) << e.name;
     EXPECT_GT(std::string(table[k].why).size(), 5U) << e.name << " has no reason for its delay";
   }
 }

@@ -16,7 +16,7 @@ host_sim::ReplayResult replayed() {
   result.target = "host";
   result.recording = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
   result.track =
-      host_sim::run_on_host(result.cell, files::samples(result.recording), std::nullopt, host_sim::ScalarKind::single);
+      host_sim::run_on_host(result.cell, files::samples(result.recording), std::nullopt, host_sim::ScalarKind::float32);
   host_sim::evaluate(result);
   return result;
 }

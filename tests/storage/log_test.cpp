@@ -26,14 +26,14 @@ namespace {
 
 using storage::Kind;
 using storage::Log;
-using storage::Stored;
+using storage::StoreResult;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr hal::FlashSize small{3, 1024}, two{2, 1024};
 
 /// What the log says of a type, up to a layout.
 std::optional<Bytes> content(Log& log, std::uint8_t type, std::uint8_t layout) {
-  std::array<std::uint8_t, storage::longest_payload> into;
+  std::array<std::uint8_t, storage::max_payload_bytes> into;
   const auto found = log.load(type, layout, into);
   if (!found) return std::nullopt;
   return Bytes(found->payload.begin(), found->payload.end());
@@ -47,10 +47,10 @@ Bytes random_bytes(std::mt19937& random, std::size_t most) {
 }
 
 /// Erases when it must.
-Stored keep(Log& log, Kind kind, const Bytes& bytes) {
-  Stored done = log.store(kind, bytes);
-  for (int k = 0; k < 8 && done == Stored::wants_erase; ++k) {
-    log.erase_one();
+StoreResult store_record(Log& log, Kind kind, const Bytes& bytes) {
+  StoreResult done = log.store(kind, bytes);
+  for (int k = 0; k < 8 && done == StoreResult::needs_erase; ++k) {
+    log.erase_next_sector();
     done = log.store(kind, bytes);
   }
   return done;
@@ -85,17 +85,17 @@ class PowerCuts {
   using Kept = std::map<std::pair<int, int>, Bytes>;
 
   Step next_step() {
-    if (log_.wants_erase() && random_() % 3 == 0) return {true, {}, {}};
+    if (log_.needs_erase() && random_() % 3 == 0) return {true, {}, {}};
     const auto type = static_cast<std::uint8_t>(1 + random_() % 4);
     return {false, {type, static_cast<std::uint8_t>(type == 4 ? 9 : 1)}, random_bytes(random_, type == 2 ? 90 : 24)};
   }
 
   void whole(const Step& step) {
     if (step.erase) {
-      EXPECT_TRUE(log_.erase_one());
+      EXPECT_TRUE(log_.erase_next_sector());
       return;
     }
-    ASSERT_EQ(keep(log_, step.kind, step.bytes), Stored::kept);
+    ASSERT_EQ(store_record(log_, step.kind, step.bytes), StoreResult::stored);
     kept_[{step.kind.type, step.kind.layout}] = step.bytes;
   }
 
@@ -110,10 +110,10 @@ class PowerCuts {
       flash_.reseed(random_());
       flash_.cut_in(at);
       bool cut = false;
-      Stored done = Stored::kept;
+      StoreResult done = StoreResult::stored;
       try {
         if (step.erase)
-          log_.erase_one();
+          log_.erase_next_sector();
         else
           done = log_.store(step.kind, step.bytes);
       } catch (const PowerCut&) {
@@ -159,9 +159,9 @@ class PowerCuts {
     for (auto cuts = random_() % 3; cuts > 0; --cuts) {
       flash_.cut_in(random_() % 24);
       try {
-        if (random_() % 2 == 0 && log_.wants_erase())
-          log_.erase_one();
-        else if (!other.erase && log_.store(other.kind, other.bytes) == Stored::kept)
+        if (random_() % 2 == 0 && log_.needs_erase())
+          log_.erase_next_sector();
+        else if (!other.erase && log_.store(other.kind, other.bytes) == StoreResult::stored)
           kept_[{other.kind.type, other.kind.layout}] = other.bytes;
       } catch (const PowerCut&) {
         ++cuts_;
@@ -173,7 +173,7 @@ class PowerCuts {
     }
     look_for_either(step, other);
     const Bytes last = random_bytes(random_, 24);
-    ASSERT_EQ(keep(log_, {5, 1}, last), Stored::kept);
+    ASSERT_EQ(store_record(log_, {5, 1}, last), StoreResult::stored);
     Kept now;
     for (int boots = 0; boots < 3; ++boots) {
       log_.open();
@@ -238,7 +238,7 @@ class LogTest : public ::testing::Test {
     log.open();
   }
   void fill_rounds(int records) {
-    for (int k = 0; k < records; ++k) ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept) << k;
+    for (int k = 0; k < records; ++k) ASSERT_EQ(store_record(log, {1, 1}, number(k)), StoreResult::stored) << k;
   }
   static Bytes number(int k) {
     Bytes bytes;
@@ -251,28 +251,28 @@ class LogTest : public ::testing::Test {
 
 TEST_F(LogTest, NewFlashHoldsNothingAndKeepsWhatIsStoredOnceItWasErased) {
   EXPECT_FALSE(content(log, 1, 1));
-  EXPECT_TRUE(log.wants_erase());
-  EXPECT_EQ(log.store({1, 1}, {}), Stored::wants_erase) << "nobody knows whether it was erased to the end";
-  ASSERT_EQ(keep(log, {1, 1}, {7, 8, 9}), Stored::kept);
+  EXPECT_TRUE(log.needs_erase());
+  EXPECT_EQ(log.store({1, 1}, {}), StoreResult::needs_erase) << "nobody knows whether it was erased to the end";
+  ASSERT_EQ(store_record(log, {1, 1}, {7, 8, 9}), StoreResult::stored);
   log.open();
   EXPECT_EQ(content(log, 1, 1), (Bytes{7, 8, 9}));
 }
 
 TEST_F(LogTest, ARecordIsBytesAsTheHeaderSays) {
-  ASSERT_EQ(keep(log, {5, 3}, {1, 2, 3}), Stored::kept);
+  ASSERT_EQ(store_record(log, {5, 3}, {1, 2, 3}), StoreResult::stored);
   const Bytes expected = record_bytes(1, 5, 3, {1, 2, 3}), sector = flash.bytes(0);
   EXPECT_EQ(Bytes(sector.begin() + 16, sector.begin() + 48), expected);
 }
 
 TEST_F(LogTest, StoringNeverErases) {
-  while (log.wants_erase()) log.erase_one();
+  while (log.needs_erase()) log.erase_next_sector();
   const auto erases = flash.erases();
-  Stored done = Stored::kept;
-  for (int k = 0; k < 1'000 && done == Stored::kept; ++k) done = log.store({1, 1}, number(k));
-  EXPECT_EQ(done, Stored::wants_erase);
+  StoreResult done = StoreResult::stored;
+  for (int k = 0; k < 1'000 && done == StoreResult::stored; ++k) done = log.store({1, 1}, number(k));
+  EXPECT_EQ(done, StoreResult::needs_erase);
   EXPECT_EQ(flash.erases(), erases);
-  log.erase_one();
-  EXPECT_EQ(log.store({1, 1}, number(1)), Stored::kept);
+  log.erase_next_sector();
+  EXPECT_EQ(log.store({1, 1}, number(1)), StoreResult::stored);
 }
 
 TEST_F(LogTest, SectorsWearAlike) {
@@ -283,41 +283,41 @@ TEST_F(LogTest, SectorsWearAlike) {
               static_cast<unsigned long long>(e[2]));
   EXPECT_GT(e[0], 100U);
   EXPECT_LE(*std::max_element(e.begin(), e.end()) - *std::min_element(e.begin(), e.end()), 1U);
-  EXPECT_NEAR(log.rounds(), static_cast<double>(e[0]), 1.01);
+  EXPECT_NEAR(log.erase_cycles(), static_cast<double>(e[0]), 1.01);
 }
 
 TEST_F(LogTest, ARecordOfANewerLayoutStaysThroughAllRoundsAndAnOlderOneIsReplaced) {
-  ASSERT_EQ(keep(log, {1, 9}, {9, 9}), Stored::kept);
-  ASSERT_EQ(keep(log, {77, 1}, {7}), Stored::kept) << "a type of a later firmware";
-  ASSERT_EQ(keep(log, {2, 1}, {1}), Stored::kept);
-  ASSERT_EQ(keep(log, {2, 2}, {2}), Stored::kept);
+  ASSERT_EQ(store_record(log, {1, 9}, {9, 9}), StoreResult::stored);
+  ASSERT_EQ(store_record(log, {77, 1}, {7}), StoreResult::stored) << "a type of a later firmware";
+  ASSERT_EQ(store_record(log, {2, 1}, {1}), StoreResult::stored);
+  ASSERT_EQ(store_record(log, {2, 2}, {2}), StoreResult::stored);
   fill_rounds(1'000);
   log.open();
   EXPECT_EQ(content(log, 1, 8), number(999));
-  EXPECT_TRUE(std::ranges::any_of(log.in_force(), [](const storage::Record& r) {
+  EXPECT_TRUE(std::ranges::any_of(log.current_records(), [](const storage::RecordLocation& r) {
     return r.kind == Kind{1, 9} && r.length == 2;
   })) << "for a firmware that knows it";
   EXPECT_EQ(content(log, 77, 255), (Bytes{7}));
   EXPECT_EQ(content(log, 2, 2), (Bytes{2}));
   EXPECT_FALSE(content(log, 2, 1)) << "migrated";
-  EXPECT_EQ(log.in_force().size(), 4U);
+  EXPECT_EQ(log.current_records().size(), 4U);
 }
 
 TEST_F(LogTest, AfterAMoveHoldsWhatWasThereAndNothingElse) {
-  ASSERT_EQ(keep(log, {2, 1}, {2}), Stored::kept);
+  ASSERT_EQ(store_record(log, {2, 1}, {2}), StoreResult::stored);
   for (int k = 0; k < 200; ++k) {
-    ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept);
-    ASSERT_EQ(log.in_force().size(), 2U) << k;
+    ASSERT_EQ(store_record(log, {1, 1}, number(k)), StoreResult::stored);
+    ASSERT_EQ(log.current_records().size(), 2U) << k;
     ASSERT_FALSE(content(log, 0, 255));
   }
 }
 
 TEST_F(LogTest, APlaceThatDoesNotTakeItsBitsIsPassedOverAndTheSectorGoesOn) {
-  ASSERT_EQ(keep(log, {1, 1}, number(1)), Stored::kept);
-  const auto here = log.in_force().front();
+  ASSERT_EQ(store_record(log, {1, 1}, number(1)), StoreResult::stored);
+  const auto here = log.current_records().front();
   flash.flip(here.sector, (here.line + 3U) * storage::line_bytes, 0x10);  // of the next payload
-  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::kept);
-  EXPECT_EQ(log.in_force().front().sector, here.sector);
+  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), StoreResult::stored);
+  EXPECT_EQ(log.current_records().front().sector, here.sector);
   EXPECT_EQ(log.broken(), 0U);
   log.open();
   EXPECT_EQ(content(log, 1, 1), Bytes(8, 0xFF)) << "kept is kept";
@@ -328,13 +328,13 @@ TEST_F(LogTest, TwoBadPlacesInARowArePassedOverAndThreeEndTheSector) {
   for (const std::uint32_t bad : {2U, 3U}) {
     flash = FlashModel(small, 1);
     log.open();
-    ASSERT_EQ(keep(log, {1, 1}, number(1)), Stored::kept);
-    while (log.wants_erase()) log.erase_one();
-    const auto here = log.in_force().front();
+    ASSERT_EQ(store_record(log, {1, 1}, number(1)), StoreResult::stored);
+    while (log.needs_erase()) log.erase_next_sector();
+    const auto here = log.current_records().front();
     for (std::uint32_t k = 0; k < bad; ++k)
       flash.flip(here.sector, (here.line + 3U + 2 * k) * storage::line_bytes, 0x10);  // of the next payloads
-    ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::kept);
-    EXPECT_EQ(log.in_force().front().sector == here.sector, bad == 2);
+    ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), StoreResult::stored);
+    EXPECT_EQ(log.current_records().front().sector == here.sector, bad == 2);
     EXPECT_EQ(log.broken(), bad == 2 ? 0U : 1U);
     log.open();
     EXPECT_EQ(content(log, 1, 1), Bytes(8, 0xFF));
@@ -345,16 +345,16 @@ TEST_F(LogTest, AMoveOverABadPlaceGoesOnInTheNextSectorWithAllThatThereIs) {
   for (std::uint32_t bad_line = 1; bad_line < 9; ++bad_line) {
     flash = FlashModel(small, 1);
     log.open();
-    while (log.wants_erase()) log.erase_one();
-    ASSERT_EQ(keep(log, {2, 1}, Bytes(20, 0x77)), Stored::kept);
-    ASSERT_EQ(keep(log, {3, 1}, Bytes(4, 0x77)), Stored::kept);
+    while (log.needs_erase()) log.erase_next_sector();
+    ASSERT_EQ(store_record(log, {2, 1}, Bytes(20, 0x77)), StoreResult::stored);
+    ASSERT_EQ(store_record(log, {3, 1}, Bytes(4, 0x77)), StoreResult::stored);
     flash.flip(1, bad_line * storage::line_bytes + 2, 0x01);  // takes no one any more
     int k = 0;
-    do ASSERT_EQ(log.store({1, 1}, Bytes(4, static_cast<std::uint8_t>(0x81 + 2 * ++k))), Stored::kept);
-    while (log.in_force().back().sector == 0);
+    do ASSERT_EQ(log.store({1, 1}, Bytes(4, static_cast<std::uint8_t>(0x81 + 2 * ++k))), StoreResult::stored);
+    while (log.current_records().back().sector == 0);
     // the copies' payloads are in lines 2, 3 and 5, the new one's in 7; in a header that bit is 0 anyway
     const bool in_the_way = bad_line == 2 || bad_line == 3 || bad_line == 5 || bad_line == 7;
-    EXPECT_EQ(log.in_force().back().sector, in_the_way ? 2 : 1) << bad_line;
+    EXPECT_EQ(log.current_records().back().sector, in_the_way ? 2 : 1) << bad_line;
     EXPECT_EQ(log.broken(), in_the_way ? 1U : 0U) << bad_line;
     for (int boots = 0; boots < 2; ++boots) {
       EXPECT_EQ(content(log, 1, 1), Bytes(4, static_cast<std::uint8_t>(0x81 + 2 * k))) << bad_line;
@@ -366,13 +366,13 @@ TEST_F(LogTest, AMoveOverABadPlaceGoesOnInTheNextSectorWithAllThatThereIs) {
 }
 
 TEST_F(LogTest, WhatDecaysWhileItRunsIsLeftOutOfAMoveAndCostsNothingElse) {
-  ASSERT_EQ(keep(log, {2, 1}, Bytes(20, 0x55)), Stored::kept);
-  ASSERT_EQ(keep(log, {3, 1}, {3}), Stored::kept);
-  const auto record = log.in_force().front();
+  ASSERT_EQ(store_record(log, {2, 1}, Bytes(20, 0x55)), StoreResult::stored);
+  ASSERT_EQ(store_record(log, {3, 1}, {3}), StoreResult::stored);
+  const auto record = log.current_records().front();
   flash.flip(record.sector, (record.line + 2U) * storage::line_bytes, 0x04);
   fill_rounds(40);
-  EXPECT_NE(log.in_force().back().sector, record.sector);
-  EXPECT_EQ(log.in_force().size(), 2U);
+  EXPECT_NE(log.current_records().back().sector, record.sector);
+  EXPECT_EQ(log.current_records().size(), 2U);
   log.open();
   EXPECT_FALSE(content(log, 2, 1));
   EXPECT_EQ(content(log, 3, 1), (Bytes{3}));
@@ -384,23 +384,24 @@ TEST_F(LogTest, WhatDecaysWhileItRunsIsLeftOutOfAMoveAndCostsNothingElse) {
 TEST_F(LogTest, AnEraseEndsAlsoWhenTheSectorItWasMeantForComesInCharge) {
   flash = FlashModel(two, 1);
   log.open();
-  ASSERT_EQ(keep(log, {2, 1}, {2}), Stored::kept);
-  const auto first = log.in_force().front().sector;
+  ASSERT_EQ(store_record(log, {2, 1}, {2}), StoreResult::stored);
+  const auto first = log.current_records().front().sector;
   int k = 0;
-  while (log.in_force().back().sector == first) ASSERT_EQ(keep(log, {1, 1}, number(++k)), Stored::kept);
-  const auto records = log.in_force();
-  const storage::Record copy = records.front(), last = records.back();
+  while (log.current_records().back().sector == first)
+    ASSERT_EQ(store_record(log, {1, 1}, number(++k)), StoreResult::stored);
+  const auto records = log.current_records();
+  const storage::RecordLocation copy = records.front(), last = records.back();
   ASSERT_EQ(copy.kind.type, 2);
   for (std::uint32_t place = 0; place < 3; ++place)
     flash.flip(last.sector, (last.line + 3U + 2 * place) * storage::line_bytes, 0x10);
-  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), Stored::wants_erase)
+  ASSERT_EQ(log.store({1, 1}, Bytes(8, 0xFF)), StoreResult::needs_erase)
       << "the sector is broken, the other is to be erased";
   flash.flip(copy.sector, (copy.line + 1U) * storage::line_bytes, 1);
   EXPECT_EQ(content(log, 2, 1), (Bytes{2})) << "from where it was copied";
   flash.flip(last.sector, (last.line + 1U) * storage::line_bytes, 1);
-  ASSERT_TRUE(log.wants_erase());
+  ASSERT_TRUE(log.needs_erase());
   const auto erases = flash.erases();
-  EXPECT_TRUE(log.erase_one());
+  EXPECT_TRUE(log.erase_next_sector());
   EXPECT_EQ(flash.erases(), erases);
   EXPECT_EQ(content(log, 2, 1), (Bytes{2}));
   EXPECT_EQ(content(log, 1, 1), number(k - 1));
@@ -414,17 +415,17 @@ TEST_F(LogTest, AfterAMoveThatFailedNothingIsKeptThatTheNextBootWouldNotFind) {
   for (int bit = 0; bit < 8; ++bit) {
     flash = FlashModel(two, 1);
     log.open();
-    while (log.wants_erase()) log.erase_one();
+    while (log.needs_erase()) log.erase_next_sector();
     std::uint32_t line = 0;
     for (int k = 0; line < 40; ++k) {
-      ASSERT_EQ(log.store({1, 1}, number(k)), Stored::kept);
-      line = log.in_force().front().line;
+      ASSERT_EQ(log.store({1, 1}, number(k)), StoreResult::stored);
+      line = log.current_records().front().line;
     }
     flash.flip(1, 3 * storage::line_bytes + 8,
-               static_cast<std::uint8_t>(1 << bit));                 // the checksum of what comes behind one copy
-    if (log.store({2, 1}, Bytes(100, 2)) == Stored::kept) continue;  // that bit is 0 in it
+               static_cast<std::uint8_t>(1 << bit));  // the checksum of what comes behind one copy
+    if (log.store({2, 1}, Bytes(100, 2)) == StoreResult::stored) continue;  // that bit is 0 in it
     ++failed;
-    const bool kept = log.store({1, 1}, number(1'000)) == Stored::kept;
+    const bool kept = log.store({1, 1}, number(1'000)) == StoreResult::stored;
     flash.flip(1, 3 * storage::line_bytes + 8, static_cast<std::uint8_t>(1 << bit));
     log.open();
     EXPECT_TRUE(content(log, 1, 1));
@@ -443,10 +444,10 @@ TEST_F(LogTest, OfMoreKindsThanItHoldsSixteenAreInForceAndNothingIsHarmed) {
   }
   flash.fill(0, sector);
   log.open();
-  EXPECT_EQ(log.in_force().size(), 16U);
-  EXPECT_EQ(keep(log, {50, 1}, {1}), Stored::refused);
-  EXPECT_EQ(keep(log, {3, 1}, {1}), Stored::kept) << "another of those";
-  EXPECT_EQ(log.in_force().size(), 16U);
+  EXPECT_EQ(log.current_records().size(), 16U);
+  EXPECT_EQ(store_record(log, {50, 1}, {1}), StoreResult::rejected);
+  EXPECT_EQ(store_record(log, {3, 1}, {1}), StoreResult::stored) << "another of those";
+  EXPECT_EQ(log.current_records().size(), 16U);
 }
 
 /// Of three sectors, each holds a later one of type 2; those in the sector in charge decay.
@@ -454,17 +455,17 @@ TEST_F(LogTest, WhatDecaysGivesWayToTheNewestThatIsLeftAndStaysSo) {
   for (int turns = 2; turns < 8; ++turns) {
     flash = FlashModel(small, 1);
     log.open();
-    while (log.wants_erase()) log.erase_one();
+    while (log.needs_erase()) log.erase_next_sector();
     int version = 0;
     std::uint8_t sector = 0;
     for (; version < turns; ++version) {
-      ASSERT_EQ(keep(log, {2, 1}, {2, static_cast<std::uint8_t>(version)}), Stored::kept);
+      ASSERT_EQ(store_record(log, {2, 1}, {2, static_cast<std::uint8_t>(version)}), StoreResult::stored);
       if (version == turns - 1) break;
-      sector = log.in_force().front().sector;
-      for (int k = 0; k < 100 && log.in_force().back().sector == sector; ++k)
-        ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept);
+      sector = log.current_records().front().sector;
+      for (int k = 0; k < 100 && log.current_records().back().sector == sector; ++k)
+        ASSERT_EQ(store_record(log, {1, 1}, number(k)), StoreResult::stored);
     }
-    sector = log.in_force().back().sector;
+    sector = log.current_records().back().sector;
     const Bytes bytes = flash.bytes(sector);
     for (std::uint32_t at = 16; at + 32 <= 1024; at += 16) {
       if (bytes[at + 4] % 0x80 == 2 && bytes[at + 5] == 1 && bytes[at + 6] == 2)
@@ -472,7 +473,7 @@ TEST_F(LogTest, WhatDecaysGivesWayToTheNewestThatIsLeftAndStaysSo) {
     }
     log.open();
     EXPECT_EQ(content(log, 2, 1), (Bytes{2, static_cast<std::uint8_t>(turns - 2)})) << turns;
-    EXPECT_EQ(log.in_force().size(), 2U);
+    EXPECT_EQ(log.current_records().size(), 2U);
     fill_rounds(100);
     EXPECT_EQ(content(log, 2, 1), (Bytes{2, static_cast<std::uint8_t>(turns - 2)})) << turns;
     log.open();
@@ -481,7 +482,7 @@ TEST_F(LogTest, WhatDecaysGivesWayToTheNewestThatIsLeftAndStaysSo) {
 }
 
 TEST_F(LogTest, ASectorThatWasErasedIsMarkedAsTheFormatSays) {
-  ASSERT_EQ(keep(log, {1, 1}, {}), Stored::kept);
+  ASSERT_EQ(store_record(log, {1, 1}, {}), StoreResult::stored);
   Bytes mark{'R', 'E', 'S', 'D', 1, 0, 0, 0, 0, 0, 0, 0};
   put(mark, crc32_by_bits(mark));
   for (std::uint32_t s = 0; s < 3; ++s) {
@@ -499,7 +500,7 @@ TEST_F(LogTest, NumbersWrap) {
   log.open();
   ASSERT_EQ(content(log, 1, 1), number(5));
   for (int k = 0; k < 100; ++k) {
-    ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept) << k;
+    ASSERT_EQ(store_record(log, {1, 1}, number(k)), StoreResult::stored) << k;
     Log again;
     again.open();
     ASSERT_EQ(content(again, 1, 1), number(k));
@@ -510,10 +511,10 @@ TEST_F(LogTest, NumbersWrap) {
 /// All that a log knows of what is there.
 std::vector<std::array<std::uint32_t, 6>> view(const Log& log) {
   std::vector<std::array<std::uint32_t, 6>> all;
-  for (const storage::Record& r : log.in_force())
+  for (const storage::RecordLocation& r : log.current_records())
     all.push_back({r.number, r.kind.type, r.kind.layout, r.sector, r.line, r.length});
   std::ranges::sort(all);
-  all.push_back({log.sectors(), log.broken(), log.rounds()});
+  all.push_back({log.sectors(), log.broken(), log.erase_cycles()});
   return all;
 }
 
@@ -530,7 +531,7 @@ TEST_F(LogTest, ABootFindsWhatWasKnownBeforeItWhereverTheNumbersWrap) {
     log.open();
     ASSERT_EQ(content(log, 1, 1), number(5));
     for (int k = 0; k < 200; ++k) {
-      ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept) << k;
+      ASSERT_EQ(store_record(log, {1, 1}, number(k)), StoreResult::stored) << k;
       Log again;
       again.open();
       ASSERT_EQ(view(again), view(log)) << round << ' ' << k;
@@ -542,35 +543,35 @@ TEST_F(LogTest, ABootFindsWhatWasKnownBeforeItWhereverTheNumbersWrap) {
 
 TEST_F(LogTest, ABootCostsTheLastRecordOnceMoreAndNoSector) {
   fill_rounds(3);
-  auto before = log.in_force().front();
+  auto before = log.current_records().front();
   for (int k = 0; k < 6; ++k) {
     log.open();
     const auto steps = flash.steps();
     log.open();
     EXPECT_EQ(flash.steps(), steps) << "to look costs nothing";
-    ASSERT_EQ(log.store({1, 1}, number(k)), Stored::kept);
-    const auto now = log.in_force().front();
+    ASSERT_EQ(log.store({1, 1}, number(k)), StoreResult::stored);
+    const auto now = log.current_records().front();
     EXPECT_EQ(now.sector, before.sector);
     EXPECT_EQ(now.line, before.line + 4) << "two records of two lines";
     before = now;
-    ASSERT_EQ(log.store({1, 1}, number(k)), Stored::kept);
-    EXPECT_EQ(log.in_force().front().line, before.line + 2);
-    before = log.in_force().front();
+    ASSERT_EQ(log.store({1, 1}, number(k)), StoreResult::stored);
+    EXPECT_EQ(log.current_records().front().line, before.line + 2);
+    before = log.current_records().front();
   }
 }
 
 TEST_F(LogTest, AMoveThatIsCutShortLeavesTheSectorInChargeThatWas) {
-  ASSERT_EQ(keep(log, {2, 1}, {2}), Stored::kept);
-  ASSERT_EQ(keep(log, {3, 1}, Bytes(50, 3)), Stored::kept);
+  ASSERT_EQ(store_record(log, {2, 1}, {2}), StoreResult::stored);
+  ASSERT_EQ(store_record(log, {3, 1}, Bytes(50, 3)), StoreResult::stored);
   fill_rounds(1);
   FlashModel before = flash;
   Log log_before = log;
-  const auto here = log.in_force().front().sector;
+  const auto here = log.current_records().front().sector;
   int k = 1;
-  for (; log.in_force().back().sector == here; ++k) {
+  for (; log.current_records().back().sector == here; ++k) {
     before = flash;
     log_before = log;
-    ASSERT_EQ(log.store({1, 1}, number(k)), Stored::kept);
+    ASSERT_EQ(log.store({1, 1}, number(k)), StoreResult::stored);
   }
   int cuts = 0;
   for (std::uint64_t at = 0;; ++at, ++cuts) {
@@ -585,9 +586,9 @@ TEST_F(LogTest, AMoveThatIsCutShortLeavesTheSectorInChargeThatWas) {
     log.open();
     if (content(log, 1, 1) == number(k - 1)) continue;  // its last word was as good as written
     ASSERT_EQ(content(log, 1, 1), number(k - 2));
-    for (const storage::Record& r : log.in_force())
+    for (const storage::RecordLocation& r : log.current_records())
       EXPECT_EQ(r.sector, here) << "copies are none until the new record is behind them";
-    ASSERT_EQ(keep(log, {1, 1}, number(8)), Stored::kept);
+    ASSERT_EQ(store_record(log, {1, 1}, number(8)), StoreResult::stored);
     log.open();
     EXPECT_EQ(content(log, 1, 1), number(8));
     EXPECT_EQ(content(log, 2, 1), (Bytes{2}));
@@ -607,7 +608,7 @@ TEST_F(LogTest, WhatCouldNotBeReadAtABootNeverComesBackOverWhatWasStoredSince) {
     flash.flip(s, 16 + 17, 0x20);  // in the payload
     log.open();
     ASSERT_FALSE(content(log, 1, 1));
-    ASSERT_EQ(keep(log, {1, 1}, number(6)), Stored::kept);
+    ASSERT_EQ(store_record(log, {1, 1}, number(6)), StoreResult::stored);
     const Bytes now = flash.bytes(s);
     if (std::equal(record.begin(), record.begin() + 4, now.begin() + 16))
       flash.flip(s, 16 + 17, 0x20);  // it is still there, and good again
@@ -616,10 +617,10 @@ TEST_F(LogTest, WhatCouldNotBeReadAtABootNeverComesBackOverWhatWasStoredSince) {
   }
 }
 
-/// The time of open(), store(), load() and erase_one() is bounded, whatever a cell does.
+/// The time of open(), store(), load() and erase_next_sector() is bounded, whatever a cell does.
 TEST_F(LogTest, ACellThatReadsOtherwiseNowAndThenHoldsNothingUp) {
   fill_rounds(20);
-  const auto here = log.in_force().front();
+  const auto here = log.current_records().front();
   const FlashModel before = flash;
   for (std::uint32_t at = here.line * 16U; at < here.line * 16U + 20; ++at) {
     for (std::uint32_t every = 1; every < 9; ++every) {
@@ -629,9 +630,9 @@ TEST_F(LogTest, ACellThatReadsOtherwiseNowAndThenHoldsNothingUp) {
       try {
         log.open();
         static_cast<void>(content(log, 1, 1));
-        const Stored done = keep(log, {2, 1}, {1});
-        log.erase_one();
-        if (done == Stored::kept) {
+        const StoreResult done = store_record(log, {2, 1}, {1});
+        log.erase_next_sector();
+        if (done == StoreResult::stored) {
           EXPECT_EQ(content(log, 2, 1), (Bytes{1}));
         }
       } catch (const TooManyReads&) {
@@ -642,15 +643,15 @@ TEST_F(LogTest, ACellThatReadsOtherwiseNowAndThenHoldsNothingUp) {
 }
 
 TEST_F(LogTest, PayloadsOfEveryLengthComeBackAlsoAfterAMove) {
-  for (std::size_t n = 0; n <= storage::longest_payload; ++n) {
+  for (std::size_t n = 0; n <= storage::max_payload_bytes; ++n) {
     Bytes bytes(n);
     for (std::size_t k = 0; k < n; ++k) bytes[k] = static_cast<std::uint8_t>(n + 7 * k);
-    ASSERT_EQ(keep(log, {3, 4}, bytes), Stored::kept) << n;
+    ASSERT_EQ(store_record(log, {3, 4}, bytes), StoreResult::stored) << n;
     log.open();
     ASSERT_EQ(content(log, 3, 4), bytes) << n;
-    const auto here = log.in_force().front().sector;
-    for (int k = 0; k < 100 && log.in_force().front().sector == here; ++k)
-      ASSERT_EQ(keep(log, {1, 1}, {}), Stored::kept);
+    const auto here = log.current_records().front().sector;
+    for (int k = 0; k < 100 && log.current_records().front().sector == here; ++k)
+      ASSERT_EQ(store_record(log, {1, 1}, {}), StoreResult::stored);
     log.open();
     ASSERT_EQ(content(log, 3, 4), bytes) << n;
   }
@@ -658,44 +659,45 @@ TEST_F(LogTest, PayloadsOfEveryLengthComeBackAlsoAfterAMove) {
 }
 
 TEST_F(LogTest, LoadsTheNewestOfTheLayoutsItKnowsAndSaysWhich) {
-  std::array<std::uint8_t, storage::longest_payload> into;
-  ASSERT_EQ(keep(log, {1, 2}, {2}), Stored::kept);
-  ASSERT_EQ(keep(log, {1, 1}, {1}), Stored::kept);
-  ASSERT_EQ(log.in_force().size(), 2U);
+  std::array<std::uint8_t, storage::max_payload_bytes> into;
+  ASSERT_EQ(store_record(log, {1, 2}, {2}), StoreResult::stored);
+  ASSERT_EQ(store_record(log, {1, 1}, {1}), StoreResult::stored);
+  ASSERT_EQ(log.current_records().size(), 2U);
   EXPECT_EQ(log.load(1, 2, into)->layout, 1) << "written last, by an older firmware";
   EXPECT_EQ(log.load(1, 1, into)->layout, 1);
   EXPECT_FALSE(log.load(1, 0, into));
-  ASSERT_EQ(keep(log, {1, 2}, {3}), Stored::kept);
+  ASSERT_EQ(store_record(log, {1, 2}, {3}), StoreResult::stored);
   EXPECT_EQ(log.load(1, 2, into)->layout, 2);
-  EXPECT_EQ(log.in_force().size(), 1U) << "replaces both";
+  EXPECT_EQ(log.current_records().size(), 1U) << "replaces both";
 }
 
 TEST_F(LogTest, SixteenKindsAreKeptAndNoMore) {
-  for (std::uint8_t type = 0; type < 16; ++type) ASSERT_EQ(keep(log, {type, 1}, {}), Stored::kept);
-  EXPECT_EQ(keep(log, {16, 1}, {}), Stored::refused);
-  for (int k = 0; k < 100; ++k) ASSERT_EQ(keep(log, {3, 1}, {}), Stored::kept) << "another of those that are there";
+  for (std::uint8_t type = 0; type < 16; ++type) ASSERT_EQ(store_record(log, {type, 1}, {}), StoreResult::stored);
+  EXPECT_EQ(store_record(log, {16, 1}, {}), StoreResult::rejected);
+  for (int k = 0; k < 100; ++k)
+    ASSERT_EQ(store_record(log, {3, 1}, {}), StoreResult::stored) << "another of those that are there";
   log.open();
-  EXPECT_EQ(log.in_force().size(), 16U);
+  EXPECT_EQ(log.current_records().size(), 16U);
   for (std::uint8_t type = 0; type < 16; ++type) EXPECT_EQ(content(log, type, 1), Bytes{});
   EXPECT_FALSE(content(log, 16, 1));
 }
 
 TEST_F(LogTest, CountsItsRoundsAndTellsASectorThatDoesNotErase) {
-  EXPECT_EQ(log.rounds(), 0U);
+  EXPECT_EQ(log.erase_cycles(), 0U);
   fill_rounds(1);
-  EXPECT_EQ(log.rounds(), 1U);
+  EXPECT_EQ(log.erase_cycles(), 1U);
   for (int k = 0; k < 2'000; ++k) {
-    ASSERT_EQ(keep(log, {1, 1}, number(k)), Stored::kept);
-    ASSERT_EQ(log.rounds(), flash.erases()[log.in_force().front().sector]);
+    ASSERT_EQ(store_record(log, {1, 1}, number(k)), StoreResult::stored);
+    ASSERT_EQ(log.erase_cycles(), flash.erases()[log.current_records().front().sector]);
   }
-  while (!log.wants_erase()) ASSERT_EQ(log.store({1, 1}, number(1)), Stored::kept);
-  const auto here = log.in_force().front().sector;
+  while (!log.needs_erase()) ASSERT_EQ(log.store({1, 1}, number(1)), StoreResult::stored);
+  const auto here = log.current_records().front().sector;
   for (std::uint32_t s = 0; s < 3; ++s) {
     if (s != here) flash.wear_out(s, FlashModel::Wear::erase_fails);
   }
-  EXPECT_FALSE(log.erase_one());
+  EXPECT_FALSE(log.erase_next_sector());
   EXPECT_EQ(log.broken(), 1U);
-  EXPECT_TRUE(log.works());
+  EXPECT_TRUE(log.operational());
 }
 
 TEST(FlashSizes, ThatTheLogGoesByAreOfTwoSectorsAndAPowerOfTwoOfLines) {
@@ -711,22 +713,22 @@ TEST(FlashSizes, ThatTheLogGoesByAreOfTwoSectorsAndAPowerOfTwoOfLines) {
     Log log;
     log.open();
     EXPECT_EQ(log.sectors(), c.used) << c.size.sectors << " of " << c.size.sector_bytes;
-    EXPECT_EQ(log.works(), c.used > 0);
-    EXPECT_EQ(log.rounds(), 0U);
-    EXPECT_EQ(keep(log, {1, 1}, {4, 5}), c.used > 0 ? Stored::kept : Stored::refused);
-    EXPECT_EQ(log.in_force().size(), c.used > 0 ? 1U : 0U);
+    EXPECT_EQ(log.operational(), c.used > 0);
+    EXPECT_EQ(log.erase_cycles(), 0U);
+    EXPECT_EQ(store_record(log, {1, 1}, {4, 5}), c.used > 0 ? StoreResult::stored : StoreResult::rejected);
+    EXPECT_EQ(log.current_records().size(), c.used > 0 ? 1U : 0U);
     for (int k = 0; c.used > 0 && k < 600; ++k)
-      ASSERT_EQ(keep(log, {1, 1}, {static_cast<std::uint8_t>(k)}), Stored::kept);
+      ASSERT_EQ(store_record(log, {1, 1}, {static_cast<std::uint8_t>(k)}), StoreResult::stored);
     for (std::uint32_t s = c.used; s < c.size.sectors; ++s) EXPECT_EQ(flash.erases()[s], 0U) << "not the log's";
   }
 }
 
 TEST_F(LogTest, WhatTheLogCannotHoldIsRefusedAndNothingIsLost) {
-  ASSERT_EQ(keep(log, {1, 1}, {1}), Stored::kept);
-  EXPECT_EQ(log.store({2, 1}, Bytes(storage::longest_payload + 1)), Stored::refused);
-  EXPECT_EQ(log.store({128, 1}, Bytes(1)), Stored::refused);
+  ASSERT_EQ(store_record(log, {1, 1}, {1}), StoreResult::stored);
+  EXPECT_EQ(log.store({2, 1}, Bytes(storage::max_payload_bytes + 1)), StoreResult::rejected);
+  EXPECT_EQ(log.store({128, 1}, Bytes(1)), StoreResult::rejected);
   std::uint8_t type = 2;
-  while (keep(log, {type, 1}, Bytes(100, 0xAB)) == Stored::kept) ++type;
+  while (store_record(log, {type, 1}, Bytes(100, 0xAB)) == StoreResult::stored) ++type;
   EXPECT_EQ(type, 5) << "half a sector: two lines of 32, and three times eight";
   fill_rounds(200);
   for (std::uint8_t t = 2; t < type; ++t) EXPECT_EQ(content(log, t, 1), Bytes(100, 0xAB));
@@ -740,33 +742,34 @@ TEST_P(Worn, OneSectorOfThreeIsSurvivedAndReportedAndTwoEndIt) {
   Log log;
   log.open();
   const auto stored = [&](int k) {
-    return keep(log, {1, 1}, Bytes{static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(k >> 8), 0x55, 0xAA});
+    return store_record(log, {1, 1},
+                        Bytes{static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(k >> 8), 0x55, 0xAA});
   };
   int last = 0;
-  for (; last < 100; ++last) ASSERT_EQ(stored(last), Stored::kept);
-  EXPECT_TRUE(log.works());
+  for (; last < 100; ++last) ASSERT_EQ(stored(last), StoreResult::stored);
+  EXPECT_TRUE(log.operational());
   EXPECT_EQ(log.broken(), 0U);
   const auto told = [&] { return content(log, 1, 1)->at(0) | content(log, 1, 1)->at(1) << 8; };
 
-  const auto next = [&](std::uint32_t steps) { return (log.in_force().front().sector + steps) % 3; };
+  const auto next = [&](std::uint32_t steps) { return (log.current_records().front().sector + steps) % 3; };
   const std::uint32_t first = next(1);
   flash.wear_out(first, GetParam());
-  for (; last < 300; ++last) ASSERT_EQ(stored(last), Stored::kept) << last;
+  for (; last < 300; ++last) ASSERT_EQ(stored(last), StoreResult::stored) << last;
   EXPECT_EQ(log.broken(), 1U);
-  EXPECT_TRUE(log.works());
+  EXPECT_TRUE(log.operational());
   log.open();
   EXPECT_EQ(told(), last - 1);
 
   flash.wear_out(next(1) == first ? next(2) : next(1), GetParam());
-  Stored done = Stored::kept;
+  StoreResult done = StoreResult::stored;
   int kept = last - 1;
   for (; last < 600; ++last) {
     done = stored(last);
-    if (done == Stored::kept) kept = last;
+    if (done == StoreResult::stored) kept = last;
   }
-  EXPECT_EQ(done, Stored::refused);
+  EXPECT_EQ(done, StoreResult::rejected);
   EXPECT_EQ(log.broken(), 2U);
-  EXPECT_FALSE(log.works());
+  EXPECT_FALSE(log.operational());
   EXPECT_EQ(told(), kept) << "what was kept can still be read";
   log.open();
   EXPECT_EQ(told(), kept);
@@ -774,7 +777,7 @@ TEST_P(Worn, OneSectorOfThreeIsSurvivedAndReportedAndTwoEndIt) {
   for (std::uint32_t s = 0; s < 3; ++s) flash.wear_out(s, GetParam());
   for (std::uint32_t s = 0; s < 3; ++s) flash.fill(s, Bytes(1024, 0));
   log.open();
-  EXPECT_EQ(stored(1), Stored::refused);
+  EXPECT_EQ(stored(1), StoreResult::rejected);
   EXPECT_EQ(log.broken(), 3U);
   EXPECT_FALSE(content(log, 1, 1));
 }
@@ -787,13 +790,13 @@ TEST(NoFlash, KeepsNothingAndSaysSo) {
   Log log;
   log.open();
   EXPECT_EQ(log.sectors(), 0U);
-  EXPECT_TRUE(log.in_force().empty());
-  EXPECT_EQ(log.rounds(), 0U);
+  EXPECT_TRUE(log.current_records().empty());
+  EXPECT_EQ(log.erase_cycles(), 0U);
   EXPECT_EQ(log.broken(), 0U);
-  EXPECT_FALSE(log.works());
-  EXPECT_FALSE(log.wants_erase());
-  EXPECT_TRUE(log.erase_one()) << "nothing is broken";
-  EXPECT_EQ(log.store({1, 1}, {}), Stored::refused);
+  EXPECT_FALSE(log.operational());
+  EXPECT_FALSE(log.needs_erase());
+  EXPECT_TRUE(log.erase_next_sector()) << "nothing is broken";
+  EXPECT_EQ(log.store({1, 1}, {}), StoreResult::rejected);
   EXPECT_FALSE(content(log, 1, 1));
 }
 
@@ -804,10 +807,10 @@ void survives(FlashModel& flash) {
   log.open();
   for (int type = 0; type < 256; ++type) static_cast<void>(content(log, static_cast<std::uint8_t>(type), 255));
   const Bytes mine{1, 2, 3};
-  const Stored done = keep(log, {1, 255}, mine);
-  if (done != Stored::kept) {
+  const StoreResult done = store_record(log, {1, 255}, mine);
+  if (done != StoreResult::stored) {
     // hostile records may take all the room there is
-    EXPECT_FALSE(log.in_force().empty());
+    EXPECT_FALSE(log.current_records().empty());
     return;
   }
   log.open();
@@ -865,8 +868,8 @@ TEST(CorruptFlash, OfAnyKindIsReadWithoutHarmAndUsedAgain) {
 
 TEST_F(LogTest, AnyBitThatDecaysCostsAtMostTheRecordItIsIn) {
   fill_rounds(130);
-  ASSERT_EQ(keep(log, {2, 1}, {2, 2}), Stored::kept);
-  ASSERT_EQ(keep(log, {1, 1}, number(130)), Stored::kept);
+  ASSERT_EQ(store_record(log, {2, 1}, {2, 2}), StoreResult::stored);
+  ASSERT_EQ(store_record(log, {1, 1}, number(130)), StoreResult::stored);
   const FlashModel before = flash;
   for (std::uint32_t s = 0; s < 3; ++s) {
     for (std::uint32_t at = 0; at < 1024; ++at) {
@@ -904,7 +907,7 @@ TEST(TwoSectorsOfOneRound, TakeNothingFromWhatIsKeptAfterwards) {
   Log log;
   log.open();
   for (std::uint8_t k = 0; k < 20; ++k) {
-    ASSERT_EQ(keep(log, {5, 1}, {k, 7}), Stored::kept);
+    ASSERT_EQ(store_record(log, {5, 1}, {k, 7}), StoreResult::stored);
     ASSERT_EQ(content(log, 5, 1), (Bytes{k, 7}));
     Log next;
     next.open();

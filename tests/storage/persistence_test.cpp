@@ -24,8 +24,8 @@ namespace {
 
 using hal::ResetCause;
 using storage::CellsRecord;
+using storage::EstimatorSnapshot;
 using storage::Persistence;
-using storage::Values;
 
 constexpr hal::FlashSize chip{3, 16 * 1024};  // as boards/netduinoplus2/memory.ld has it
 constexpr std::int32_t percent_ppb = 10'000'000;
@@ -50,15 +50,15 @@ class PersistenceTest : public ::testing::Test {
       s.current_ua = current_ua;
       if (!p.count(s)) continue;
       pack.soc_ppb += soc_per_minute_ppb;
-      p.keep(now(), calendar_s);
-      if (erases_allowed) p.erase_one();
+      p.store(now(), calendar_s);
+      if (erases_allowed) p.erase_next_sector();
     }
   }
-  Values now() { return {known ? std::optional(pack) : std::nullopt, cells, health}; }
+  EstimatorSnapshot now() { return {known ? std::optional(pack) : std::nullopt, cells, health}; }
   /// Number of the newest record of a kind; nothing: there is none.
   template <class R>
   std::optional<std::uint32_t> number() const {
-    for (const storage::Record& r : p.log().in_force()) {
+    for (const storage::RecordLocation& r : p.log().current_records()) {
       if (r.kind == R::kind) return r.number;
     }
     return std::nullopt;
@@ -91,7 +91,7 @@ class PersistenceTest : public ::testing::Test {
 
 TEST_F(PersistenceTest, NewFlashGivesNoStartAndIsErasedAtBoot) {
   EXPECT_FALSE(boot().starting_point());
-  EXPECT_FALSE(p.wants_erase());
+  EXPECT_FALSE(p.needs_erase());
   EXPECT_EQ(p.events().starts, 1U);
 }
 
@@ -108,12 +108,12 @@ TEST_F(PersistenceTest, TheWatchdogIsFedAfterEveryEraseOfABoot) {
 TEST_F(PersistenceTest, ACellThatReadsOtherwiseNowAndThenDoesNotHoldUpABoot) {
   boot();
   drive(5, -6'000'000, -2'000'000);
-  while (!p.wants_erase()) {
+  while (!p.needs_erase()) {
     erases_allowed = false;
     drive(1, -6'000'000, -2'000'000);
     pack.soc_ppb = 60 * percent_ppb;
   }
-  const auto records = p.log().in_force();
+  const auto records = p.log().current_records();
   const auto last = *std::max_element(records.begin(), records.end(),
                                       [](const auto& a, const auto& b) { return a.number < b.number; });
   const FlashModel before = flash;
@@ -339,7 +339,7 @@ TEST_F(PersistenceTest, WhatCouldNotBeWrittenIsTriedAgainEveryMinute) {
   EXPECT_TRUE(p.set(9, 99));
   drive(70);
   EXPECT_EQ(steps(), before);
-  p.erase_one();
+  p.erase_next_sector();
   drive(1);
   boot(ResetCause::software);
   EXPECT_EQ(p.starting_point()->soc_ppb, pack.soc_ppb);
@@ -455,10 +455,10 @@ TEST_F(PersistenceTest, AfterYearsOfStandingStillWhatMovesIsWritten) {
   cells.assign(16, {});
   boot();
   for (int minute = 0; minute < 0x1'0000 + 62; ++minute)
-    p.keep(now(), std::nullopt);  // the counters of minutes have stopped at their end
+    p.store(now(), std::nullopt);  // the counters of minutes have stopped at their end
   cells[2].soc = 1'000;
   health.capacity_ppm = 900'000;
-  p.keep(now(), std::nullopt);
+  p.store(now(), std::nullopt);
   EXPECT_EQ(p.cells().cell[2].soc, 1'000);
   EXPECT_EQ(p.health(), health);
 }
@@ -477,18 +477,18 @@ TEST_F(PersistenceTest, TimeAndChargeAreCountedFromTheFirstSampleByAClockThatGoe
   EXPECT_FALSE(p.count(s));
   s.time_us += 1;
   EXPECT_TRUE(p.count(s));
-  p.keep(now(), std::nullopt);
+  p.store(now(), std::nullopt);
   EXPECT_EQ(p.charge().operating_s, 60U);
   EXPECT_EQ(p.charge().charged_uah, 100'000U);
   s.time_us += 3'600'000'000;
   EXPECT_TRUE(p.count(s)) << "a gap is a minute at most";
-  p.keep(now(), std::nullopt);
+  p.store(now(), std::nullopt);
   EXPECT_EQ(p.charge().operating_s, 120U);
   EXPECT_EQ(p.charge().charged_uah, 200'000U);
   s.current_ua = measurement::no_reading;
   s.time_us += 60'000'000;
   EXPECT_TRUE(p.count(s));
-  p.keep(now(), std::nullopt);
+  p.store(now(), std::nullopt);
   EXPECT_EQ(p.charge().operating_s, 180U);
   EXPECT_EQ(p.charge().charged_uah, 200'000U);
   EXPECT_EQ(p.charge().discharged_uah, 0U);
@@ -503,7 +503,7 @@ TEST_F(PersistenceTest, NothingIsLostToRoundingInAThousandMinutes) {
     s.current_ua = current_ua;
     for (int k = 0; k < 86'000; ++k) {
       s.time_us += 700'000;
-      if (p.count(s)) p.keep(now(), std::nullopt);
+      if (p.count(s)) p.store(now(), std::nullopt);
     }
     const double hours = 86'000 * 0.7 / 3'600;
     EXPECT_EQ(p.charge().operating_s - charge_before.operating_s, static_cast<std::uint32_t>(3'600 * hours));
@@ -520,9 +520,9 @@ TEST_F(PersistenceTest, ResetsAreCountedByTheirCauseUpToWhatTheirCountersHold) {
   {
     storage::Log log;
     log.open();
-    while (log.wants_erase()) log.erase_one();
-    std::array<std::uint8_t, storage::longest_payload> bytes;
-    ASSERT_EQ(log.store(EventsRecord::kind, encode(e, bytes)), storage::Stored::kept);
+    while (log.needs_erase()) log.erase_next_sector();
+    std::array<std::uint8_t, storage::max_payload_bytes> bytes;
+    ASSERT_EQ(log.store(EventsRecord::kind, encode(e, bytes)), storage::StoreResult::stored);
   }
   for (int k = 0; k < 3; ++k) {
     boot(ResetCause::watchdog);
@@ -598,8 +598,8 @@ TEST_F(PersistenceTest, WithoutLeaveToEraseTheReserveLastsForElevenHoursOfMoving
   EXPECT_GT(minutes, 11 * 60);
   EXPECT_LT(minutes, 5'000);
   EXPECT_EQ(flash.erases(), erases);
-  EXPECT_TRUE(p.wants_erase());
-  EXPECT_TRUE(p.log().works());
+  EXPECT_TRUE(p.needs_erase());
+  EXPECT_TRUE(p.log().operational());
   EXPECT_EQ(boot(ResetCause::watchdog).starting_point()->soc_ppb / 1'000'000, minutes % 2 == 0 ? 598 : 600)
       << "of the last minute that was written";
 }
@@ -620,7 +620,7 @@ TEST_F(PersistenceTest, AnOlderFirmwaresRecordIsMigrated) {
   drive(2, -6'000'000, -16'666'667);
   boot(ResetCause::software);
   EXPECT_EQ(p.starting_point()->soc_ppb, 566'666'666) << "as the estimator said, in the layout of today";
-  EXPECT_EQ(p.log().in_force().size(), 2U) << "charge in the layout of today, events; health is not due";
+  EXPECT_EQ(p.log().current_records().size(), 2U) << "charge in the layout of today, events; health is not due";
 }
 
 TEST_F(PersistenceTest, ANewerFirmwaresRecordIsKeptReportedAndNotRead) {
@@ -630,18 +630,18 @@ TEST_F(PersistenceTest, ANewerFirmwaresRecordIsKeptReportedAndNotRead) {
   {
     storage::Log log;
     log.open();
-    ASSERT_EQ(log.store({1, 3}, unknown), storage::Stored::kept);
-    ASSERT_EQ(log.store({9, 1}, unknown), storage::Stored::kept);
+    ASSERT_EQ(log.store({1, 3}, unknown), storage::StoreResult::stored);
+    ASSERT_EQ(log.store({9, 1}, unknown), storage::StoreResult::stored);
   }
   boot(ResetCause::software);
   EXPECT_EQ(p.newer_records(), 2U);
   EXPECT_FALSE(p.starting_point()) << "the newer firmware has replaced what this one wrote";
   for (int k = 0; k < 3'000; ++k) drive(1, -6'000'000, k % 2 == 0 ? -2'000'000 : 2'000'000);
-  EXPECT_GE(p.log().rounds(), 2U);
+  EXPECT_GE(p.log().erase_cycles(), 2U);
   boot(ResetCause::software);
   EXPECT_EQ(p.newer_records(), 2U);
   EXPECT_EQ(p.starting_point()->soc_ppb, 60 * percent_ppb) << "what this firmware has written since";
-  std::array<std::uint8_t, storage::longest_payload> bytes;
+  std::array<std::uint8_t, storage::max_payload_bytes> bytes;
   storage::Log log;
   log.open();
   const auto found = log.load(9, 1, bytes);
@@ -658,7 +658,7 @@ TEST_F(PersistenceTest, WithoutFlashItRunsAndSaysSo) {
   EXPECT_TRUE(p.set(1, 2));
   p.power_failing(now(), std::nullopt);
   EXPECT_EQ(p.log().sectors(), 0U);
-  EXPECT_FALSE(p.log().works());
+  EXPECT_FALSE(p.log().operational());
   EXPECT_EQ(p.settings().get(1), 2) << "in this run";
 }
 
@@ -667,7 +667,7 @@ TEST_F(PersistenceTest, WithBrokenSectorsItRunsAndSaysSo) {
   boot();
   drive(3, -6'000'000, -2'000'000);
   EXPECT_EQ(p.log().broken(), 3U);
-  EXPECT_FALSE(p.log().works());
+  EXPECT_FALSE(p.log().operational());
   boot();
   EXPECT_FALSE(p.starting_point());
 }

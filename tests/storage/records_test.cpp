@@ -13,7 +13,7 @@ using Raw = std::vector<std::uint8_t>;
 
 template <class R>
 Raw bytes_of(const R& record) {
-  std::array<std::uint8_t, longest_payload> into;
+  std::array<std::uint8_t, max_payload_bytes> into;
   const Bytes bytes = encode(record, into);
   return {bytes.begin(), bytes.end()};
 }
@@ -28,7 +28,7 @@ EventsRecord full_events() {
 
 SettingsRecord full_settings() {
   SettingsRecord s;
-  for (std::size_t k = 0; k < SettingsRecord::most; ++k)
+  for (std::size_t k = 0; k < SettingsRecord::max_settings; ++k)
     EXPECT_TRUE(s.set(static_cast<std::uint16_t>(7 * k), -100'000 * static_cast<std::int32_t>(k)));
   return s;
 }
@@ -101,7 +101,7 @@ TEST(Records, OfANewBatteryHoldNothing) {
 template <class R>
 void comes_back(const R& record) {
   const Raw bytes = bytes_of(record);
-  EXPECT_LE(bytes.size(), longest_payload);
+  EXPECT_LE(bytes.size(), max_payload_bytes);
   R back;
   ASSERT_TRUE(decode(bytes, R::kind.layout, back));
   EXPECT_TRUE(back == record);
@@ -139,20 +139,20 @@ TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithSigmaForAMinuteThatWasNotCounte
 }
 
 TEST(ChargeRecord, ASocThatCannotBeIsNotBelieved) {
-  EXPECT_EQ(possible({1'040'000'000, 5}).soc_ppb, 1'000'000'000);
-  EXPECT_EQ(possible({1'040'000'000, 5}).soc_sigma_ppb, 5);
-  EXPECT_EQ(possible({-2'000'000'000, 5}).soc_sigma_ppb, 289'000'000);
-  EXPECT_EQ(possible({500'000'000, -5}).soc_sigma_ppb, 289'000'000);
-  EXPECT_EQ(possible({500'000'000, 0}).soc_sigma_ppb, 289'000'000);
-  EXPECT_EQ(possible({500'000'000, 1}).soc_sigma_ppb, 1);
-  EXPECT_EQ(possible({500'000'000, 289'000'001}).soc_sigma_ppb, 289'000'000) << "anything is as wide as it gets";
+  EXPECT_EQ(plausible({1'040'000'000, 5}).soc_ppb, 1'000'000'000);
+  EXPECT_EQ(plausible({1'040'000'000, 5}).soc_sigma_ppb, 5);
+  EXPECT_EQ(plausible({-2'000'000'000, 5}).soc_sigma_ppb, 289'000'000);
+  EXPECT_EQ(plausible({500'000'000, -5}).soc_sigma_ppb, 289'000'000);
+  EXPECT_EQ(plausible({500'000'000, 0}).soc_sigma_ppb, 289'000'000);
+  EXPECT_EQ(plausible({500'000'000, 1}).soc_sigma_ppb, 1);
+  EXPECT_EQ(plausible({500'000'000, 289'000'001}).soc_sigma_ppb, 289'000'000) << "anything is as wide as it gets";
   for (const std::int32_t edge : {-250'000'000, 1'250'000'000}) {
     const std::int32_t beyond = edge < 0 ? edge - 1 : edge + 1, end = edge < 0 ? 0 : 1'000'000'000;
-    EXPECT_EQ(possible({edge, 5}), (estimator::StoredEstimate{end, 5}));
-    EXPECT_EQ(possible({beyond, 5}), (estimator::StoredEstimate{end, 289'000'000}));
+    EXPECT_EQ(plausible({edge, 5}), (estimator::StoredEstimate{end, 5}));
+    EXPECT_EQ(plausible({beyond, 5}), (estimator::StoredEstimate{end, 289'000'000}));
   }
-  EXPECT_EQ(possible({0, 5}), (estimator::StoredEstimate{0, 5}));
-  EXPECT_EQ(possible({1'000'000'000, 5}), (estimator::StoredEstimate{1'000'000'000, 5}));
+  EXPECT_EQ(plausible({0, 5}), (estimator::StoredEstimate{0, 5}));
+  EXPECT_EQ(plausible({1'000'000'000, 5}), (estimator::StoredEstimate{1'000'000'000, 5}));
 }
 
 TEST(EventsRecord, HoldsTheLastSixteenFaultsNewestFirst) {
@@ -192,8 +192,8 @@ TEST(Records, OfRandomBytesAreReadWithoutHarm) {
     EventsRecord events;
     SettingsRecord settings;
     EXPECT_TRUE(!decode(bytes, layout, charge) || charge.pack.soc_sigma_ppb <= 289'000'000);
-    EXPECT_TRUE(!decode(bytes, layout, cells) || cells.count <= CellsRecord::most);
-    EXPECT_TRUE(!decode(bytes, layout, settings) || settings.count <= SettingsRecord::most);
+    EXPECT_TRUE(!decode(bytes, layout, cells) || cells.count <= CellsRecord::max_cells);
+    EXPECT_TRUE(!decode(bytes, layout, settings) || settings.count <= SettingsRecord::max_settings);
     decode(bytes, layout, health);
     if (decode(bytes, layout, events)) events.add(events.last(3));
   }

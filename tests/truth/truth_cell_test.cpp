@@ -57,7 +57,7 @@ TEST(TruthOcv, RisesEverywhereWithoutAJumpInItsSlope) {
 TEST(TruthCircuit, GoesThroughTheValuesOfTable9AndStaysBetweenNeighbours) {
   constexpr std::array r1_ohm = {0.027101,   0.012339,   0.00998571, 0.009014,   0.00825815,
                                  0.00771709, 0.00740307, 0.00777491, 0.00822862, 0.0072376};
-  const Circuit circuit = table9_circuit();
+  const CircuitCurves circuit = table9_circuit();
   EXPECT_DOUBLE_EQ(circuit.r0_ohm.at(0.1), 0.0140197);
   EXPECT_DOUBLE_EQ(circuit.c1_f.at(1.0), 1927.32);
   EXPECT_EQ(circuit.r1_ohm.at(0.03), circuit.r1_ohm.at(0.1));

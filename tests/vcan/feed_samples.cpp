@@ -54,7 +54,8 @@ int main(int argc, char** argv) {
     std::perror(argv[1]);
     return 1;
   }
-  send(bus, hal::frame_of(host_sim::starting_point(host_sim::Belief{std::atof(argv[3]), std::atof(argv[4])}).value()));
+  send(bus,
+       hal::frame_of(host_sim::starting_point(host_sim::SocPrior{std::atof(argv[3]), std::atof(argv[4])}).value()));
   std::size_t fed = 0;
   for (const measurement::Sample& sample : files::samples(files::read_recording(argv[2]))) {
     for (const can::Frame& frame : hal::frames_of(sample)) send(bus, frame);

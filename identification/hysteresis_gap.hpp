@@ -1,0 +1,32 @@
+// Slow charge and discharge lie apart by hysteresis, which temperature hardly changes, and by what the slow current
+// drops over the cell, which grows in the cold. Runs at several temperatures tell them apart:
+//
+//   half gap (T) = M + U a(T)     a(T) = exp(E / R_gas (1 / T - 1 / T_ref)),  T_ref = 25 degrees C
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "identification/ocv_curve.hpp"
+
+namespace bms::identification {
+
+struct GapAtTemperature {
+  double temperature_c = 25;
+  double half_gap_v = 0;  ///< mean over the middle of the curve
+};
+
+struct SlowGap {
+  double hysteresis_v = 0;          ///< M >= 0
+  double overvoltage_v = 0;         ///< U >= 0, of the slow current at 25 degrees C
+  double activation_j_per_mol = 0;  ///< E, 10 to 80 kJ/mol
+  double residual_v = 0;            ///< RMS
+};
+
+/// Half the gap between 20 and 80 % of soc; nothing of a single run.
+std::optional<double> plateau_half_gap_v(const OcvCurve& curve);
+
+/// Least squares. Nothing with less than three temperatures, or of less than 20 K.
+std::optional<SlowGap> slow_gap(const std::vector<GapAtTemperature>& gaps);
+
+}  // namespace bms::identification

@@ -1,0 +1,192 @@
+// The readings of a recording with what needs the readings around them undone: a current that comes late, a temperature
+// that lags.
+//
+//   current      whole steps of the delay: the mean of what was read over (t[k - 1] + delay, t[k] + delay], the charge
+//   read by then
+//                interpolated linearly; before the first row and after the last the current is taken to go on.
+//                What is left, a part p of a step: a late reading is (1 - p) of its own interval's current and p of
+//                that before, an early one of that after; solved row by row. (Reading between the rows instead would
+//                smear an edge twice.)
+//   temperature  T + lag dT/dt, dT/dt the least-squares slope over half a minute to either side
+//
+// A missing current (NaN) is the last one known, 0 at first; a missing temperature the last one known, 25 degrees C at
+// first. Undone by laws instead, one reading at a time: offset, gain, clipping (model/extended.hpp).
+//
+// S: double or a dual number, of the delay and the lag. Host only: it holds copies of the columns.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "arithmetic/exponential.hpp"
+
+namespace bms::model {
+
+using namespace arithmetic;  // physics is written in its number types and functions
+
+template <class S>
+class CorrectedReadings {
+ public:
+  /// Columns of equal length, time ascending; temperature_c may be empty. time_s must outlive this.
+  CorrectedReadings(std::span<const double> time_s, std::span<const double> current_a,
+                    std::span<const double> temperature_c, S delay_s, S lag_s)
+      : time_s_(time_s),
+        current_a_(known(current_a, 0)),
+        delay_s_(delay_s),
+        lag_s_(lag_s),
+        late_(acts(delay_s)),
+        lagging_(acts(lag_s)) {
+    temperature_c_ = temperature_c.empty() ? std::vector<double>(time_s.size(), default_temperature_c)
+                                           : known(temperature_c, default_temperature_c);
+    if (late_) undo_delay();
+    if (lagging_) slopes();
+  }
+
+  /// What flowed in the interval that ends at row k; of the first row, which has none, and of a row that is not later
+  /// than the one before: what is read at that moment.
+  S current(std::size_t k) const { return late_ ? true_a_[k] : S(current_a_[k]); }
+
+  S temperature(std::size_t k) const {
+    if (!lagging_) return S(temperature_c_[k]);
+    return S(lag_s_ * c_per_s_[k] + temperature_c_[k]);
+  }
+
+ private:
+  static constexpr double default_temperature_c = 25;
+  static constexpr double half_window_s = 30;
+  static constexpr double most_part = 0.45;  ///< of a step; at half a step nothing tells the two rows apart
+
+  static double value(const S& s) {
+    if constexpr (Dual<S>)
+      return s.a;
+    else
+      return s;
+  }
+  static S with_value(S s, double v) {
+    if constexpr (Dual<S>)
+      s.a = v;
+    else
+      s = v;
+    return s;
+  }
+  /// Something to undo, or to differentiate by.
+  static bool acts(const S& s) {
+    if constexpr (!Dual<S>)
+      return s != 0;
+    else if constexpr (requires { s.v.isZero(0.0); })
+      return s.a != 0 || !s.v.isZero(0.0);
+    else
+      return true;
+  }
+  static std::vector<double> known(std::span<const double> column, double at_first) {
+    std::vector<double> all(column.begin(), column.end());
+    double last = at_first;
+    for (double& v : all) {
+      if (v == v)
+        last = v;
+      else
+        v = last;
+    }
+    return all;
+  }
+
+  /// Length of most steps.
+  double usual_step_s() const {
+    std::vector<double> steps;
+    for (std::size_t k = 1; k < time_s_.size(); ++k) steps.push_back(time_s_[k] - time_s_[k - 1]);
+    if (steps.empty()) return 1;
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    return *middle > 0 ? *middle : 1;
+  }
+
+  void undo_delay() {
+    const std::size_t rows = time_s_.size();
+    const double step_s = usual_step_s(), whole_s = std::round(value(delay_s_) / step_s) * step_s;
+    const std::vector<double> moved_a = moved_by(whole_s);
+    const S rest_s = delay_s_ - whole_s;
+    const auto duration_s = [&](std::size_t k) { return k == 0 ? 0 : time_s_[k] - time_s_[k - 1]; };
+    const auto part = [&](std::size_t k) {
+      const S p = S(rest_s / duration_s(k));
+      return value(p) > most_part ? S(most_part) : value(p) < -most_part ? S(-most_part) : p;
+    };
+    true_a_.clear();
+    for (const double a : moved_a) true_a_.push_back(S(a));
+    if (value(rest_s) > 0) {
+      for (std::size_t k = 1; k < rows; ++k) {
+        if (!(duration_s(k) > 0)) continue;
+        const S p = part(k);
+        true_a_[k] = S((moved_a[k] - p * true_a_[k - 1]) / (1.0 - p));
+      }
+    } else if (value(rest_s) < 0) {
+      for (std::size_t k = rows - 1; k-- > 1;) {
+        if (!(duration_s(k) > 0)) continue;
+        const S p = -part(k);
+        true_a_[k] = S((moved_a[k] - p * true_a_[k + 1]) / (1.0 - p));
+      }
+    } else {
+      // nothing but whole steps: not a digit differs; the derivative is the mean of both sides'
+      for (std::size_t k = 1; k + 1 < rows; ++k) {
+        if (duration_s(k) > 0)
+          true_a_[k] = with_value(S(part(k) * ((moved_a[k + 1] - moved_a[k - 1]) / 2)), moved_a[k]);
+      }
+    }
+  }
+
+  /// Row whose interval holds the time, looked for from row `near`; the last one for what comes after.
+  std::size_t row_at(double time_s, std::size_t near) const {
+    std::size_t j = near;
+    while (j + 1 < time_s_.size() && time_s_[j] < time_s) ++j;
+    while (j > 0 && time_s_[j - 1] >= time_s) --j;
+    return j;
+  }
+
+  /// Mean of what was read over each row's interval, moved by so much.
+  std::vector<double> moved_by(double delay_s) const {
+    if (delay_s == 0) return current_a_;
+    std::vector<double> charge_as(time_s_.size(), 0), moved_a = current_a_;
+    for (std::size_t k = 1; k < time_s_.size(); ++k)
+      charge_as[k] = charge_as[k - 1] + current_a_[k] * (time_s_[k] - time_s_[k - 1]);
+    const auto charge_by = [&](std::size_t k) {
+      const double moved_s = time_s_[k] + delay_s;
+      const std::size_t j = row_at(moved_s, k);
+      return charge_as[j] + current_a_[j] * (moved_s - time_s_[j]);
+    };
+    for (std::size_t k = 0; k < time_s_.size(); ++k) {
+      const double duration_s = k == 0 ? 0 : time_s_[k] - time_s_[k - 1];
+      moved_a[k] =
+          duration_s > 0 ? (charge_by(k) - charge_by(k - 1)) / duration_s : current_a_[row_at(time_s_[k] + delay_s, k)];
+    }
+    return moved_a;
+  }
+
+  /// Sums over a window that moves along: each row comes in once and leaves once. At least the neighbours are in it.
+  void slopes() {
+    const std::size_t rows = time_s_.size();
+    c_per_s_.assign(rows, 0);
+    if (rows < 2) return;
+    double n = 0, t = 0, tt = 0, c = 0, tc = 0;
+    const auto take = [&](std::size_t k, double sign) {
+      const double s = time_s_[k] - time_s_[0], warm = temperature_c_[k] - temperature_c_[0];
+      n += sign, t += sign * s, tt += sign * s * s, c += sign * warm, tc += sign * s * warm;
+    };
+    std::size_t from = 0, to = 0;  // rows in the sums: from .. to - 1
+    for (std::size_t k = 0; k < rows; ++k) {
+      while (to < rows && (time_s_[to] <= time_s_[k] + half_window_s || to <= k + 1)) take(to++, 1);
+      while (from + 1 < k && time_s_[from] < time_s_[k] - half_window_s) take(from++, -1);
+      const double spread = n * tt - t * t;
+      c_per_s_[k] = spread > 1e-9 * n * n ? (n * tc - t * c) / spread : 0;
+    }
+  }
+
+  std::span<const double> time_s_;
+  std::vector<double> current_a_, temperature_c_, c_per_s_;
+  std::vector<S> true_a_;
+  S delay_s_, lag_s_;
+  bool late_, lagging_;
+};
+
+}  // namespace bms::model

@@ -1,0 +1,151 @@
+// What users of battery monitors complain of, each as a case that must not come back. The cell is the plant's.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "estimator/restart.hpp"
+#include "estimator/soc_estimator.hpp"
+#include "files/cell_file.hpp"
+#include "plant/random.hpp"
+#include "plant/truth_cell.hpp"
+
+namespace bms::estimator {
+namespace {
+
+auto table9() { return model::prepare<float, model::max_intervals>(files::read_cell("table9").parameters); }
+
+std::int32_t micro(double x) { return static_cast<std::int32_t>(std::lround(1e6 * x)); }
+
+measurement::StartingPoint starting_point(double soc, double sigma) {
+  return {static_cast<std::int32_t>(1e9 * soc), static_cast<std::int32_t>(1e9 * sigma)};
+}
+
+/// A cell at work, and the estimator beside it.
+struct Truck {
+  explicit Truck(double soc, std::optional<measurement::StartingPoint> start = {})
+      : cell({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}),
+        estimator(start ? SocEstimator<float>(*start) : SocEstimator<float>()) {}
+
+  /// One second; spoil: what becomes of the sample on its way.
+  void second(double current_a, const std::function<void(measurement::Sample&)>& spoil = {}) {
+    cell.run(current_a, 25, 1);
+    time_us += 1'000'000;
+    measurement::Sample s{time_us, micro(current_a + 0.01 * random.normal()),
+                          micro(cell.voltage_v() + 0.001 * random.normal()), 2'500};
+    if (spoil) spoil(s);
+    estimate = estimator.step(tables, s);
+  }
+  /// An hour of lifting and driving, with 0.3C of mean load.
+  void hour(const std::function<void(measurement::Sample&)>& spoil = {}) {
+    for (int k = 0; k < 3'600; ++k) second(k % 120 < 40 ? -6 * (0.5 + random.uniform()) : k % 120 < 60 ? 3 : 0, spoil);
+  }
+  double error() const { return estimate.soc - cell.soc(); }
+
+  plant::Cell cell;
+  model::Cell<float, model::max_intervals> tables = table9();
+  SocEstimator<float> estimator;
+  Estimate<float> estimate;
+  plant::Random random{7};
+  std::uint64_t time_us = 0;
+};
+
+TEST(Complaint, SmallCurrentsOverDaysAreForgotten) {
+  Truck truck(0.6, starting_point(0.6, 0.01));
+  for (int k = 0; k < 4 * 86'400; ++k)
+    truck.second(-0.012);  // a display that is left on: 19 % of the charge in four days
+  EXPECT_NEAR(truck.cell.soc(), 0.408, 0.001);
+  EXPECT_NEAR(truck.error(), 0, 0.02);
+}
+
+TEST(Complaint, AfterARebootInTheMiddleOfACharge) {
+  Truck before(0.3, starting_point(0.3, 0.01));
+  for (int k = 0; k < 3'600; ++k) before.second(1.8);
+  const StoredEstimate stored{static_cast<std::int32_t>(1e9F * before.estimate.soc),
+                              static_cast<std::int32_t>(1e9F * before.estimate.soc_sigma)};
+  Truck after(before.cell.soc(), starting_point_after_off_time(stored, 30));
+  after.second(1.8);  // under current from the first sample on
+  EXPECT_NEAR(after.error(), 0, 0.01) << "not read from a voltage that the charger lifts";
+  for (int k = 0; k < 600; ++k) after.second(1.8);
+  EXPECT_NEAR(after.error(), 0, 0.01);
+}
+
+TEST(Complaint, AfterANightWithoutAClockALotIsMissing) {
+  const measurement::StartingPoint morning = starting_point_after_off_time({500'000'000, 5'000'000}, std::nullopt);
+  EXPECT_NEAR(1e-9 * morning.soc_ppb, 0.5, 0.02);
+  EXPECT_LT(1e-9 * morning.soc_sigma_ppb, 0.08);
+  EXPECT_GE(2e-9 * morning.soc_sigma_ppb,
+            0.5 - 1e-9 * starting_point_after_off_time({500'000'000, 5'000'000}, 60U * 86'400).soc_ppb)
+      << "two months would still be believed";
+}
+
+TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
+  const measurement::StartingPoint spring = starting_point_after_off_time({500'000'000, 5'000'000}, 120U * 86'400);
+  Truck truck(0.3, spring);  // more was lost than thought
+  truck.second(0);
+  EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma);
+  EXPECT_GT(truck.estimate.soc_sigma, 0.03);
+}
+
+TEST(Complaint, TheSocIsNoLongerUpdatedAndNobodySaysSo) {
+  Truck truck(0.7, starting_point(0.7, 0.005));
+  truck.hour();
+  truck.time_us += 3'600'000'000;  // the task hung for an hour
+  truck.cell.run(-3, 25, 3'600);
+  truck.second(-3, [](measurement::Sample& s) { s.voltage_uv = measurement::no_reading; });
+  EXPECT_NE(truck.estimate.flags & time_gap, 0U);
+  EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma);
+}
+
+TEST(Complaint, ASensorsOffsetOfHalfAPercentOf1C) {
+  for (const double offset_a : {-0.03, 0.03}) {
+    Truck truck(0.95, starting_point(0.95, 0.01));
+    for (int h = 0; h < 3; ++h) truck.hour([&](measurement::Sample& s) { s.current_ua += micro(offset_a); });
+    EXPECT_NEAR(truck.error(), 0, 0.02) << offset_a;
+    EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << offset_a;
+  }
+}
+
+TEST(Complaint, ASensorsGainOfOnePercent) {
+  for (const double gain : {0.99, 1.01}) {
+    Truck truck(0.95, starting_point(0.95, 0.01));
+    for (int h = 0; h < 3; ++h)
+      truck.hour([&](measurement::Sample& s) { s.current_ua = static_cast<std::int32_t>(gain * s.current_ua); });
+    EXPECT_NEAR(truck.error(), 0, 0.02) << gain;
+  }
+}
+
+TEST(Complaint, AWrongStartIsBelievedForEver) {
+  for (const double wrong : {0.25, -0.25}) {
+    Truck truck(0.65, starting_point(0.65 + wrong, 0.25));
+    for (int k = 0; k < 3'600 * 2; ++k) {
+      truck.second(k % 120 < 40 ? -6 * (0.5 + truck.random.uniform()) : k % 120 < 60 ? 3 : 0);
+      ASSERT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << "second " << k;
+    }
+    EXPECT_NEAR(truck.error(), 0, 0.02) << "two knees have been passed";
+  }
+}
+
+TEST(Complaint, TheTemperatureSensorIsLost) {
+  Truck truck(0.8, starting_point(0.8, 0.01));
+  truck.hour([](measurement::Sample& s) { s.temperature_cdegc = measurement::no_temperature; });
+  EXPECT_NEAR(truck.error(), 0, 0.01);
+}
+
+TEST(Complaint, TheSignOfTheCurrentIsLost) {
+  Truck truck(0.8, starting_point(0.8, 0.01));
+  double worst = 0;
+  std::uint32_t flags = 0;
+  for (int h = 0; h < 3; ++h) {
+    truck.hour([](measurement::Sample& s) { s.current_ua = -s.current_ua; });
+    worst = std::max(worst, std::abs(truck.error()));
+    flags |= truck.estimate.flags;
+  }
+  EXPECT_NE(flags & (voltage_rejected | soc_ambiguous), 0U) << "the voltage contradicts, and it is said";
+}
+
+}  // namespace
+}  // namespace bms::estimator
