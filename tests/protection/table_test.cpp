@@ -80,7 +80,7 @@ TEST(ProtectionTable, SaysWhichFaultsHaveAReactionOrARecovery) {
   for (const Reaction r : {Reaction::warn, Reaction::derate, Reaction::forbid_charge, Reaction::forbid_discharge,
                            Reaction::open, Reaction::open_now}) {
     for (std::size_t k = 0; k < fault_count; ++k)
-      EXPECT_EQ((faults_with(rules, r) >> k & 1) != 0, std::string(expected_rows[k].reaction) == words(r))
+      EXPECT_EQ((faults_with(rules, r) >> k & 1) != 0, std::string(expected_rows[k].reaction) == text_of(r))
           << expected_rows[k].name;
     by_reaction |= faults_with(rules, r);
   }
