@@ -1,11 +1,10 @@
-// Cell file -> constexpr header for firmware.
+// Generates the constexpr header of a cell for the firmware.
 //
 //   cell_header CELL OUT.hpp [fixed]      CELL: a built-in name or a path; fixed: for a board that computes in integers
 //
-// Mechanisms that an estimator cannot run (model/mechanism.hpp, on_board) are left out, as the host's estimator leaves
-// them out. Numbers are written with the digits that give back the very same double; the compiler then prepares the
-// tables for the board's scalar by the same constexpr function that the host runs. Exit code 2 and one line when the
-// cell is refused.
+// Mechanisms that an estimator cannot run (on_board in model/mechanism.hpp) are left out, as in the host's estimator.
+// Numbers have the digits that give back the same double. The compiler prepares the tables for the scalar of the board
+// with the constexpr function that the host runs, too. A rejected cell gives exit code 2 and one line.
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -27,7 +26,7 @@ std::string literal(double value) {
   return text;
 }
 
-/// Designated initialisers of model::CellParameters: its members are called as the keys of the file.
+/// Writes designated initialisers of model::CellParameters. Its members have the names of the keys in the file.
 class Initialiser {
  public:
   void table(const std::string& key) {
@@ -44,7 +43,7 @@ class Initialiser {
     for (std::size_t k = 0; k < column.size; ++k) values += (k == 0 ? "" : ", ") + literal(column[k]);
     text_ += "\n        ." + key + " = {{" + values + "}, " + std::to_string(column.size) + "}, ";
   }
-  /// What the firmware does without, deviations of an identification, stays empty.
+  /// Columns that the firmware does not use stay empty, for example the sigmas of an identification.
   template <class Column>
   void optional_column(const std::string& key, const Column& values) {
     if (key == "half_gap_v") column(key, values);
@@ -57,11 +56,11 @@ class Initialiser {
   bool inside_ = false;
 };
 
-/// The mechanisms' part: which model the estimator runs, and the cell's constants.
+/// The code that depends on the mechanisms: the estimator's model and the constants of the cell.
 std::string extension(const bms::files::CellFile& file) {
   const auto acting = bms::files::on_board(file.mechanisms);
   if (acting.empty()) {
-    return fmt::format(R"(/// The model that the estimator steps.
+    return fmt::format(R"(/// The estimator's model.
 template <class S>
 using Model = model::ExtendedRc<0, 0, {}>::Of<S>;
 
@@ -84,9 +83,10 @@ inline constexpr auto cell = model::prepare<S, model::interval_count(parameters)
   return fmt::format(R"(template <class S>
 using Laws = model::Laws<S{types}>;
 
-/// The model that the estimator steps.
+/// The estimator's model.
 template <class S>
-using Model = typename model::ExtendedRc<Laws<float>::most_voltage_states, Laws<float>::most_states, {errors}>::template Of<S>;
+using Model =
+    typename model::ExtendedRc<Laws<float>::most_voltage_states, Laws<float>::most_states, {errors}>::template Of<S>;
 
 template <class S>
 inline constexpr model::ExtendedCell<S, model::interval_count(parameters), Laws<S>> cell{{
@@ -100,7 +100,7 @@ std::string header(const bms::files::CellFile& file) {
   Initialiser values;
   bms::files::visit_cell(values, file.parameters);
   return fmt::format(
-      R"(// Made at build time from the cell file '{name}'; do not edit.
+      R"(// Generated from the cell file '{name}'. Do not edit.
 #pragma once
 
 #include <cstdint>
@@ -111,7 +111,7 @@ std::string header(const bms::files::CellFile& file) {
 namespace bms::generated {{
 
 inline constexpr char cell_name[] = "{name}";
-inline constexpr std::uint32_t cell_hash = 0x{hash:08x};  // first 32 bits of the file's SHA-256
+inline constexpr std::uint32_t cell_hash = 0x{hash:08x};  // first 32 bits of the SHA-256 of the file
 
 inline constexpr model::CellParameters<double> parameters{{{values}}};
 

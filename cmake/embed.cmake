@@ -1,10 +1,14 @@
-# Files as constants of a C++ source: cmake -DOUT=x.cpp -DHEADER=h.hpp -DNAMES=a|b -DFILES=fa|fb -P embed.cmake
-# With CELLS=ON: the list of built-in cells instead, named by their files.
+# Embeds files in a C++ source:
+#
+#   cmake -DOUT=x.cpp -DHEADER=h.hpp -DNAMES=a|b -DFILES=fa|fb -P embed.cmake
+#
+# Each file becomes a constant of its name. With CELLS=ON the source holds the list of built-in cells instead.
 string(REPLACE "|" ";" names "${NAMES}")
 string(REPLACE "|" ";" files "${FILES}")
 set(source "#include \"${HEADER}\"\n\n")
 if(CELLS)
-  string(APPEND source "namespace bms::files {\n\nconst std::vector<BuiltInCell>& built_in_cells() {\n  static const std::vector<BuiltInCell> cells = {\n")
+  string(APPEND source "namespace bms::files {\n\nconst std::vector<BuiltInCell>& built_in_cells() {\n"
+    "  static const std::vector<BuiltInCell> cells = {\n")
 else()
   string(APPEND source "namespace bms::reports::embedded {\n\n")
 endif()

@@ -1,46 +1,56 @@
-# Firmware images of one board (BMS_BOARD) with one cell (BMS_CELL):
+# Firmware images of one board (BMS_BOARD) with one cell (BMS_CELL).
 #
-#   bms_<board>.elf          the application; telemetry and samples as SLCAN text on the UART
-#   bms_<board>_replay.elf   the same application; samples and estimates stream through the emulator's files
-#   bms_<board>_hil.elf      the application in lock step with a program on the host: its bus is a pair of the emulator's files
-#   bms_<board>_bench.elf    as the first, for the chip itself: its clock tree, reset instead of the emulator's exit
-#   bms_<board>_fault.elf    tests/firmware/fault_image.cpp; only when asked for
-#   bms_<board>_pack.elf     tests/firmware/pack_image.cpp; only when asked for
-#   bms_<board>_protection.elf  tests/firmware/protection_image.cpp; only when asked for
+#   bms_<board>.elf             the application, for the chip; of an emulated board for QEMU
+#   bms_<board>_remote.elf      the application; another node measures and sends the samples over CAN
+#   bms_<board>_replay.elf      the application; samples and estimates stream through files of the emulator
+#   bms_<board>_hil.elf         the application in lock step with a host program; its bus is a pair of files
+#   bms_<board>_bench.elf       the application of an emulated board for the chip: with clock tree, ends in a reset
+#   bms_<board>_fault.elf       tests/firmware/fault_image.cpp, built on request
+#   bms_<board>_pack.elf        tests/firmware/pack_image.cpp, built on request
+#   bms_<board>_protection.elf  tests/firmware/protection_image.cpp, built on request
 #
-# Beside each bms_<board>*.elf lies what is in it, bms_<board>*.cdx.json (sbom.py).
+# A board that QEMU emulates (BMS_EMULATED ON) has all but the remote image. Another board has the first two, and the
+# hil image for an emulated board with the same chip (BMS_LOOP_BOARD). Next to each image lies its bill of materials,
+# bms_<board>*.cdx.json (sbom.py).
 #
-# The first three run in QEMU only (hal/README.md). A board that QEMU does not have (BMS_EMULATED OFF) has bms_<board>.elf for the
-# chip, bms_<board>_remote.elf with samples that another node measures, and bms_<board>_hil.elf for an emulated board with the same chip (BMS_LOOP_BOARD).
-# board.cmake says which CAN back end it has, BMS_CAN slcan or bxcan, for the latter with a bit rate; and where its samples come from, BMS_SAMPLES
-# bq76952 (measured by a chip on the board), adc (by the controller itself), remote (from another node) or emulated. What does not depend on the cell is compiled once for all.
+# board.cmake chooses the CAN back end and the source of the samples:
+#   BMS_CAN        slcan, or bxcan with a bit rate
+#   BMS_SAMPLES    bq76952 (a chip on the board), adc (the controller), remote (another node), emulated
 #
-# BMS_VEHICLE_PROFILE: messages that go out beside the battery's own: cia418, for a CANopen charger (nodes BMS_CANOPEN_NODE, BMS_CANOPEN_CHARGER), or
-# j1939 (can/j1939_profile.dbc). can/messages.md says what they are.
-include(${CMAKE_SOURCE_DIR}/boards/${BMS_BOARD}/board.cmake)
-include(${CMAKE_SOURCE_DIR}/hal/${BMS_CHIP}/chip.cmake)  # compiler flags, core, what QEMU has in its place, flash
+# BMS_VEHICLE_PROFILE adds messages for other makers' devices (can/messages.md): cia418 for a CANopen charger, with the
+# nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
+#
+# Whatever does not depend on the cell is compiled once for all images.
+set(root ${PROJECT_SOURCE_DIR})
+set(build ${PROJECT_BINARY_DIR})
+include(${root}/boards/${BMS_BOARD}/board.cmake)
+include(${root}/hal/${BMS_CHIP}/chip.cmake)  # compiler flags, core, flash, what QEMU replaces
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
 endif()
 
-set(BMS_VEHICLE_PROFILE none CACHE STRING "messages beside the battery's own: none, cia418, j1939 (can/messages.md)")
-set(BMS_CANOPEN_NODE 1 CACHE STRING "the battery's node on a CANopen bus")
-set(BMS_CANOPEN_CHARGER 10 CACHE STRING "the charger's node")
-set(vehicle_profile_none "")
-set(vehicle_profile_cia418 BMS_VEHICLE_PROFILE_CIA418 BMS_CANOPEN_NODE=${BMS_CANOPEN_NODE} BMS_CANOPEN_CHARGER=${BMS_CANOPEN_CHARGER})
-set(vehicle_profile_j1939 BMS_VEHICLE_PROFILE_J1939)
-if(NOT DEFINED vehicle_profile_${BMS_VEHICLE_PROFILE})
+set(BMS_VEHICLE_PROFILE none CACHE STRING "additional messages: none, cia418 or j1939 (can/messages.md)")
+set(BMS_CANOPEN_NODE 1 CACHE STRING "CANopen node of the battery")
+set(BMS_CANOPEN_CHARGER 10 CACHE STRING "CANopen node of the charger")
+if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939)$")
   message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418 or j1939")
 endif()
+set(fixed_point false)
+if(BMS_SCALAR_DEFINITION MATCHES BMS_FIXED_POINT)
+  set(fixed_point true)
+endif()
+bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
+  CELLS ${BMS_CELLS} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} FIXED_POINT ${fixed_point}
+  VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
 
-# The header generator runs on the host: the one that is there, or one built for the purpose.
+# The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
 set(BMS_CELL_HEADER_TOOL "" CACHE FILEPATH "cell_header of a host build; empty: build it")
 set(cell_header_tool ${BMS_CELL_HEADER_TOOL})
 if(NOT cell_header_tool)
   include(ExternalProject)
-  set(generators ${CMAKE_BINARY_DIR}/generators)
+  set(generators ${build}/generators)
   ExternalProject_Add(generators
-    SOURCE_DIR ${CMAKE_SOURCE_DIR}
+    SOURCE_DIR ${root}
     BINARY_DIR ${generators}
     CMAKE_ARGS -DBMS_GENERATORS_ONLY=ON -DBMS_TESTS=OFF
     BUILD_ALWAYS ON
@@ -49,18 +59,18 @@ if(NOT cell_header_tool)
   set(cell_header_tool ${generators}/files/cell_header)
 endif()
 
-set(cell_header ${CMAKE_BINARY_DIR}/generated/cell_constants.hpp)
-file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated)
+set(cell_header ${build}/generated/cell_constants.hpp)
+file(MAKE_DIRECTORY ${build}/generated)
 set(cell_file "")
 if(EXISTS ${BMS_CELL})
   set(cell_file ${BMS_CELL})
 endif()
-set(cell_source ${CMAKE_SOURCE_DIR}/model/cells/${BMS_CELL}.toml)
+set(cell_source ${root}/model/cells/${BMS_CELL}.toml)
 if(cell_file)
   set(cell_source ${cell_file})
 endif()
 set(cell_header_scalar "")
-if(BMS_SCALAR_DEFINITION MATCHES BMS_FIXED_POINT)
+if(fixed_point)
   set(cell_header_scalar fixed)
 endif()
 add_custom_command(OUTPUT ${cell_header}
@@ -68,106 +78,122 @@ add_custom_command(OUTPUT ${cell_header}
   DEPENDS ${cell_header_tool} ${cell_file}
   COMMENT "Cell ${BMS_CELL}" VERBATIM)
 
-add_compile_options(${BMS_CPU_FLAGS} -g -ffunction-sections -fdata-sections -fno-common -fstack-usage
-  $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions> $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> $<$<COMPILE_LANGUAGE:CXX>:-fno-threadsafe-statics> $<$<COMPILE_LANGUAGE:CXX>:-fno-use-cxa-atexit>
-  -Wsign-conversion -Wdouble-promotion -Wfloat-conversion
-  -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=build)  # the same bytes wherever it is built; what comes last is looked at first
-add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs -L${CMAKE_SOURCE_DIR}/hal/cortex_m
+# The image has the same bytes in every folder, so paths are mapped to relative ones. GCC tries the last map first.
+set(path_maps -ffile-prefix-map=${root}=. -ffile-prefix-map=${build}=build)
+set(no_runtime -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-use-cxa-atexit)
+list(TRANSFORM no_runtime PREPEND "$<$<COMPILE_LANGUAGE:CXX>:")
+list(TRANSFORM no_runtime APPEND ">")
+add_compile_options(${BMS_CPU_FLAGS} -g -ffunction-sections -fdata-sections -fno-common -fstack-usage ${no_runtime}
+  -Wsign-conversion -Wdouble-promotion -Wfloat-conversion ${path_maps})
+add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys.specs -L${root}/hal/cortex_m
   -Wl,--gc-sections,--no-warn-rwx-segments,--fatal-warnings)
 
-include(${CMAKE_SOURCE_DIR}/cmake/can_messages.cmake)
+include(${root}/cmake/can_messages.cmake)
 
 # bms_objects(NAME OPTIMISATION SOURCE...)
 function(bms_objects name optimisation)
   add_library(${name} OBJECT ${ARGN})
-  target_link_libraries(${name} PUBLIC bms_estimator)
-  target_compile_definitions(${name} PUBLIC ${BMS_SCALAR_DEFINITION} BMS_CELLS=${BMS_CELLS} BMS_SAMPLE_PERIOD_S=${BMS_SAMPLE_PERIOD_S})
+  target_link_libraries(${name} PUBLIC bms_estimator bms_board)
   target_compile_options(${name} PRIVATE ${optimisation})
 endfunction()
 
-set(hal ${CMAKE_SOURCE_DIR}/hal)
+set(hal ${root}/hal)
 set(chip ${hal}/${BMS_CHIP})
 set(core ${hal}/cortex_m)
+set(absent_hal ${hal}/absent)
 list(TRANSFORM BMS_REPLACED_IN_EMULATION APPEND .cpp OUTPUT_VARIABLE replaced)
 list(TRANSFORM replaced PREPEND ${chip}/ OUTPUT_VARIABLE on_the_chip)
 list(TRANSFORM replaced PREPEND ${hal}/emulated/ OUTPUT_VARIABLE in_emulation)
-set(chip_flash ${hal}/${BMS_FLASH}/flash.cpp)  # BMS_FLASH: the chip's folder, or absent
+set(chip_flash ${hal}/${BMS_FLASH}/flash.cpp)  # BMS_FLASH: folder of the chip, or absent
 set(emulated_flash ${hal}/emulated/flash.cpp)
-if(BMS_FLASH STREQUAL absent)
+if(BMS_FLASH STREQUAL "absent")
   set(emulated_flash ${chip_flash})
 endif()
-# what a chip has no file for is absent
-set(chip_calendar ${hal}/absent/calendar.cpp)
-set(chip_state ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp)
+# A chip without one of these files gets the absent back end.
+set(chip_calendar ${absent_hal}/calendar.cpp)
+set(chip_state ${absent_hal}/board_state.cpp ${absent_hal}/supply.cpp)
 if(EXISTS ${chip}/board_state.cpp)
   set(chip_calendar ${chip}/calendar.cpp)
   set(chip_state ${chip}/board_state.cpp ${chip}/supply.cpp ${core}/image_check.cpp)
 endif()
-bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
+bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/${BMS_CORE}.cpp
+  ${chip}/vectors.cpp ${chip}/power.cpp)
 bms_objects(hal_clock -Os ${chip}/clock.cpp)
 bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar})
 bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})
-# the board's back ends: BMS_CAN names how it talks, BMS_SAMPLES where its samples come from
+# Back ends by BMS_CAN and BMS_SAMPLES.
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
-set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${hal}/absent/calibration.cpp)
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/absent/calibration.cpp)
+set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp)
+set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp)
 set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp)
-set(samples_bq76952 ${hal}/absent/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
-bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${hal}/absent/estimate_record.cpp)
+set(samples_bq76952 ${absent_hal}/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp
+  ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
+bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
-target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION} ${vehicle_profile_${BMS_VEHICLE_PROFILE}})
+target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
 bms_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
-bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${hal}/absent/can.cpp ${hal}/absent/power_path.cpp ${hal}/absent/requests.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp ${hal}/absent/calibration.cpp)
+set(no_hardware watchdog flash calendar board_state supply)
+list(TRANSFORM no_hardware PREPEND ${absent_hal}/)
+list(TRANSFORM no_hardware APPEND .cpp)
+bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
+  ${absent_hal}/requests.cpp ${no_hardware} ${absent_hal}/calibration.cpp)
 target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
+bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp ${no_hardware})
 
-bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${hal}/absent/estimate_record.cpp ${hal}/absent/watchdog.cpp ${hal}/absent/flash.cpp ${hal}/absent/calendar.cpp ${hal}/absent/board_state.cpp ${hal}/absent/supply.cpp)
-
-bms_objects(storage -Os ${CMAKE_SOURCE_DIR}/storage/log.cpp ${CMAKE_SOURCE_DIR}/storage/persistence.cpp)
-bms_objects(application -Os ${CMAKE_SOURCE_DIR}/firmware/main.cpp ${CMAKE_SOURCE_DIR}/firmware/board_cell.cpp ${cell_header} ${can_messages} ${j1939_messages})  # the cell says which model
-target_include_directories(application PRIVATE ${CMAKE_BINARY_DIR}/generated)
-target_compile_definitions(application PRIVATE ${vehicle_profile_${BMS_VEHICLE_PROFILE}})
-bms_objects(estimator_step -O2 ${CMAKE_SOURCE_DIR}/firmware/estimator_step.cpp ${cell_header} ${can_messages})
-target_include_directories(estimator_step PRIVATE ${CMAKE_BINARY_DIR}/generated)
-math(EXPR version "${PROJECT_VERSION_MAJOR} * 65536 + ${PROJECT_VERSION_MINOR} * 256 + ${PROJECT_VERSION_PATCH}" OUTPUT_FORMAT HEXADECIMAL)
+# The cell file decides which model these compile.
+set(generated_headers ${cell_header} ${can_messages} ${j1939_messages})
+bms_objects(storage -Os ${root}/storage/log.cpp ${root}/storage/persistence.cpp)
+bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cell.cpp ${generated_headers})
+bms_objects(estimator_step -O2 ${root}/firmware/estimator_step.cpp ${generated_headers})
+math(EXPR version "(${PROJECT_VERSION_MAJOR} << 16) + (${PROJECT_VERSION_MINOR} << 8) + ${PROJECT_VERSION_PATCH}"
+  OUTPUT_FORMAT HEXADECIMAL)
 target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
 
+# bms_image(NAME OBJECTS...)
+# The linker uses the first copy of a function that several objects have: estimator_step, compiled for speed, comes
+# before the objects compiled for size.
 set(linker_script ${BMS_LINKER_SCRIPT})
-# bms_image(NAME OBJECTS...); of functions that several of them hold, the linker takes the first: the step's, which are made for speed
 function(bms_image name)
   list(TRANSFORM ARGN PREPEND "$<TARGET_OBJECTS:" OUTPUT_VARIABLE objects)
   list(TRANSFORM objects APPEND ">")
   add_executable(${name} ${objects})
-  target_link_options(${name} PRIVATE -T${linker_script} -Wl,--undefined=image_cell_hash -Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map)
+  target_link_options(${name} PRIVATE
+    -T${linker_script} -Wl,--undefined=image_cell_hash -Wl,-Map=${build}/${name}.map)
   add_custom_command(TARGET ${name} POST_BUILD
-    COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/image_check.py $<TARGET_FILE:${name}>
-    COMMAND ${BMS_PYTHON} ${CMAKE_SOURCE_DIR}/cmake/sbom.py ${name} ${PROJECT_VERSION} ${CMAKE_CXX_COMPILER} ${cell_source} ${CMAKE_BINARY_DIR}/${name}.map ${CMAKE_BINARY_DIR}/${name}.elf
-    BYPRODUCTS ${CMAKE_BINARY_DIR}/${name}.cdx.json VERBATIM)
-  set_target_properties(${name} PROPERTIES LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
+    COMMAND ${BMS_PYTHON} ${root}/cmake/image_check.py $<TARGET_FILE:${name}>
+    COMMAND ${BMS_PYTHON} ${root}/cmake/sbom.py ${name} ${PROJECT_VERSION} ${CMAKE_CXX_COMPILER} ${cell_source}
+      ${build}/${name}.map ${build}/${name}.elf
+    BYPRODUCTS ${build}/${name}.cdx.json VERBATIM)
+  set_target_properties(${name} PROPERTIES
+    LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${build})
 endfunction()
 
+set(on_chip hal_core hal_clock hal_chip hal_board)
+set(portable estimator_step storage application)
 if(NOT BMS_EMULATED)
-  bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_chip hal_board hal_samples estimator_step storage application)
-  bms_image(bms_${BMS_BOARD}_remote hal_core hal_clock hal_chip hal_board hal_remote_samples estimator_step storage application)
+  bms_image(bms_${BMS_BOARD} ${on_chip} hal_samples ${portable})
+  bms_image(bms_${BMS_BOARD}_remote ${on_chip} hal_remote_samples ${portable})
   foreach(image bms_${BMS_BOARD} bms_${BMS_BOARD}_remote)
-    target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)  # for a debugger, and tests/firmware
+    # can_health() is called by debuggers and by tests/firmware
+    target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)
   endforeach()
-  set(linker_script ${CMAKE_SOURCE_DIR}/boards/${BMS_LOOP_BOARD}/memory.ld)  # the memory of an emulated board with the same chip
-  bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil estimator_step storage application)
+  set(linker_script ${root}/boards/${BMS_LOOP_BOARD}/memory.ld)
+  bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil ${portable})
   return()
 endif()
-bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples estimator_step storage application)
-bms_image(bms_${BMS_BOARD}_replay hal_core hal_clock hal_emulated hal_stream estimator_step storage application)
-bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil estimator_step storage application)
-bms_image(bms_${BMS_BOARD}_bench hal_core hal_clock hal_chip hal_board hal_samples estimator_step storage application)
+bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples ${portable})
+bms_image(bms_${BMS_BOARD}_replay hal_core hal_clock hal_emulated hal_stream ${portable})
+bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil ${portable})
+bms_image(bms_${BMS_BOARD}_bench ${on_chip} hal_samples ${portable})
 
-bms_objects(fault_image -Os ${CMAKE_SOURCE_DIR}/tests/firmware/fault_image.cpp)
-bms_image(bms_${BMS_BOARD}_fault hal_core hal_clock hal_emulated fault_image)
-bms_objects(pack_image -O2 ${CMAKE_SOURCE_DIR}/tests/firmware/pack_image.cpp ${cell_header})
-target_include_directories(pack_image PRIVATE ${CMAKE_BINARY_DIR}/generated)
-bms_image(bms_${BMS_BOARD}_pack hal_core hal_clock hal_emulated pack_image)
-bms_objects(protection_image -O2 ${CMAKE_SOURCE_DIR}/tests/firmware/protection_image.cpp)
-bms_image(bms_${BMS_BOARD}_protection hal_core hal_clock hal_emulated protection_image)
-set_target_properties(protection_image bms_${BMS_BOARD}_protection PROPERTIES EXCLUDE_FROM_ALL ON)
-set_target_properties(fault_image bms_${BMS_BOARD}_fault pack_image bms_${BMS_BOARD}_pack PROPERTIES EXCLUDE_FROM_ALL ON)
+# bms_test_image(NAME OPTIMISATION SOURCE...): NAME_image.cpp of tests/firmware as the image bms_<board>_NAME
+function(bms_test_image name optimisation)
+  bms_objects(${name}_image ${optimisation} ${root}/tests/firmware/${name}_image.cpp ${ARGN})
+  bms_image(bms_${BMS_BOARD}_${name} hal_core hal_clock hal_emulated ${name}_image)
+  set_target_properties(${name}_image bms_${BMS_BOARD}_${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+endfunction()
+bms_test_image(fault -Os)
+bms_test_image(pack -O2 ${cell_header})
+bms_test_image(protection -O2)

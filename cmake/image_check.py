@@ -1,8 +1,9 @@
-"""Writes into a firmware image the check that hal/cortex_m/image_check.cpp looks for: the same input, the same bytes.
+"""Writes the check code of a firmware image into the image, where hal/cortex_m/image_check.cpp reads it. The same input
+gives the same bytes.
 
     image_check.py IMAGE.elf
 
-CRC-32 over what the flash holds, by the linker script's symbols: vectors, code and constants, initial values of data.
+CRC-32 over the flash content, by the symbols of the linker script: vectors, code and constants, initial data.
 """
 import struct
 import sys
@@ -10,15 +11,16 @@ import zlib
 
 
 class Elf:
-    """32 bits, little-endian: sections by header, symbols by name."""
+    """An ELF file of 32 bits, little-endian: sections by header, symbols by name."""
 
     def __init__(self, data):
         self.data = data
         begin, = struct.unpack_from("<I", data, 32)
         size, count, self.shstrndx = struct.unpack_from("<HHH", data, 46)
         self.sections = [struct.unpack_from("<10I", data, begin + k * size) for k in range(count)]
-        self.segments = [struct.unpack_from("<8I", data, struct.unpack_from("<I", data, 28)[0] + k * struct.unpack_from("<H", data, 42)[0])
-                         for k in range(struct.unpack_from("<H", data, 44)[0])]
+        segments, = struct.unpack_from("<I", data, 28)
+        each, segment_count = struct.unpack_from("<HH", data, 42)
+        self.segments = [struct.unpack_from("<8I", data, segments + k * each) for k in range(segment_count)]
 
     def text(self, strings, at):
         begin = self.sections[strings][4] + at
@@ -31,7 +33,7 @@ class Elf:
             yield self.text(table[6], name), value
 
     def offset_of(self, address):
-        """In the file, of what is loaded at this address (of the flash: p_paddr); None: nothing is."""
+        """Position in the file of the byte that is loaded at this flash address (p_paddr); None if there is none."""
         for kind, offset, _, physical, in_file, _, _, _ in self.segments:
             if kind == 1 and physical <= address < physical + in_file:
                 return offset + address - physical
@@ -46,10 +48,11 @@ def main(path):
         elf = Elf(bytearray(f.read()))
     at = dict(elf.symbols())
     if not any(elf.text(elf.shstrndx, s[0]) == ".image_check" and s[5] > 0 for s in elf.sections):
-        return  # nothing looks for one
+        return  # this image does not check itself
     crc = zlib.crc32(elf.loaded(at["image_vectors"], at["image_vectors_end"]))
     crc = zlib.crc32(elf.loaded(at["image_code_begin"], at["image_code_end"]), crc)
-    crc = zlib.crc32(elf.loaded(at["image_data_load"], at["image_data_load"] + at["image_data_end"] - at["image_data_begin"]), crc)
+    data_load, data_bytes = at["image_data_load"], at["image_data_end"] - at["image_data_begin"]
+    crc = zlib.crc32(elf.loaded(data_load, data_load + data_bytes), crc)
     struct.pack_into("<II", elf.data, elf.offset_of(at["image_check"]), crc, crc ^ 0xFFFFFFFF)
     with open(path, "wb") as f:
         f.write(elf.data)

@@ -1,4 +1,4 @@
-# GCC for bare-metal ARM.
+# Toolchain file: GCC for bare-metal ARM.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_C_COMPILER arm-none-eabi-gcc)

@@ -1,12 +1,12 @@
-// What the firmware does with each sample: estimate, record, look at the whole, protect, tell, listen, remember; and
-// feed the watchdog if all of it has made progress (firmware/progress.hpp).
+// The application: for each sample it updates the estimator, evaluates the protections, drives the contactors,
+// publishes CAN messages, handles commands and stores its state. It feeds the watchdog only if all of that has made
+// progress (firmware/progress.hpp).
 //
-//   Board   cells, and as functions what depends on the cell file: a step of the estimator, how far it came, what is
-//   known beside it, the cells beside their mean,
-//           what a reading may be, the plan of protection (firmware/board_cell.hpp; a test brings its own)
+//   Board   number of cells, and the functions that depend on the cell file: estimator step, time of the last step,
+//           condition, differences between the cells, plausible range of a reading, protection plan
+//           (firmware/board_cell.hpp; tests bring their own)
 //
-// Sees the estimator, protection, storage and the hal, never a register; runs on a host that supplies the few functions
-// of hal/ it calls.
+// The application accesses the hardware only through hal/. It runs on any host that implements the functions it calls.
 #pragma once
 
 #include <algorithm>
@@ -17,6 +17,7 @@
 #include "estimator/soc_estimator.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/progress.hpp"
+#include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
 #include "firmware/telemetry.hpp"
 #include "hal/board_state.hpp"
@@ -31,10 +32,10 @@
 
 namespace bms::firmware {
 
-/// Nothing beside the battery's own messages. Others: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
+/// Only the battery's own messages. Other profiles: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
 struct WithoutVehicleProfile {
-  template <class... Known>
-  constexpr void publish(const Known&...) {}
+  template <class Estimator, std::size_t Cells>
+  constexpr void publish(const Snapshot<Estimator, Cells>&) {}
   constexpr void receive(const can::Frame&) {}
 };
 
@@ -45,13 +46,13 @@ class Application {
   using Result = typename Estimator::Result;
   static constexpr std::size_t cells = Board::cells;
 
-  /// start: where to begin, told from outside or remembered. persistence: started.
+  /// start: state of charge from outside or from storage. persistence: already started.
   Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
               float capacity_ah, storage::Persistence& persistence)
       : estimator_{start ? Estimator(*start) : Estimator()},
         protection_{Board::plan(),
                     static_cast<std::uint32_t>(persistence.settings().get(latched_faults_key).value_or(0))},
-        telemetry_{identity, capacity_ah, start},
+        telemetry_{identity, start},
         capacity_ah_{capacity_ah},
         persistence_{persistence},
         cell_hash_{identity.cell_hash} {
@@ -72,10 +73,7 @@ class Application {
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
     protect(pack, estimate, request);
-    telemetry_.publish(pack, mean, estimate, condition_, cells_, protection_.decision(), persistence_, board_,
-                       requested_.log_samples);
-    vehicle_profile_.publish(pack, condition_, protection_.decision(), Board::plan(), capacity_ah_,
-                             (estimate.flags & estimator::not_started) == 0);
+    publish(pack, mean, estimate);
     handle_requests(pack.time_us);
     estimate_ = estimate;
     if (persistence_.count(mean)) [[unlikely]]
@@ -86,21 +84,37 @@ class Application {
       hal::watchdog_feed();
   }
 
-  /// The last that is done: the battery is switched off.
+  /// Stores the state when the battery is switched off. The last call.
   void shut_down() {
-    const Snapshot now(estimate_, condition_, cells_);
+    const StateToStore now(estimate_, condition_, cells_);
     persistence_.power_failing(now.values(), hal::calendar_s());
   }
 
-  /// Between two samples. The contactors are open already.
+  /// Stores the state when the supply falls, between two samples. The contactors are open already.
   void supply_failing() {
-    const Snapshot now(estimate_, condition_, cells_);
+    const StateToStore now(estimate_, condition_, cells_);
     persistence_.supply_failing(now.values(), hal::calendar_s());
   }
 
  private:
-  using Snapshot = SnapshotOf<typename Estimator::Scalar, cells>;
-  static constexpr int max_requests = 4;  // a sample must not take longer because somebody asks much
+  using StateToStore = StateToStoreOf<typename Estimator::Scalar, cells>;
+  static constexpr int max_requests = 4;  // per sample: bounds its processing time
+
+  void publish(const measurement::PackSample<cells>& pack, const measurement::Sample& mean, const Result& estimate) {
+    const Snapshot<Estimator, cells> now{.pack = pack,
+                                         .mean = mean,
+                                         .estimate = estimate,
+                                         .condition = condition_,
+                                         .cells = cells_,
+                                         .decision = protection_.decision(),
+                                         .plan = Board::plan(),
+                                         .persistence = persistence_,
+                                         .board = board_,
+                                         .capacity_ah = capacity_ah_,
+                                         .log_samples = requested_.log_samples};
+    telemetry_.publish(now);
+    vehicle_profile_.publish(now);
+  }
 
   void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
     protection::PackEstimate<cells> known;
@@ -137,7 +151,7 @@ class Application {
       persistence_.set(latched_faults_key, static_cast<std::int32_t>(decision.latched));
   }
 
-  /// Somebody has seen that it is another, and means it: what is stored from now on is of this one.
+  /// Clearing the faults confirms the new cell file: from now on the stored data belong to it.
   [[gnu::noinline]] void accept_cell_file() {
     persistence_.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
     board_.cell_file_changed = false;
@@ -170,9 +184,9 @@ class Application {
     hal::calibrate(stored_calibration(persistence_));
   }
 
-  /// An erase holds the core up for half a second: only while nothing is connected.
+  /// An erase stops the core for half a second, so it happens only while all contactors are open.
   [[gnu::noinline]] void store_state() {
-    const Snapshot now(estimate_, condition_, cells_);
+    const StateToStore now(estimate_, condition_, cells_);
     persistence_.store(now.values(), hal::calendar_s());
     if (!protection_.decision().outputs.any_closed()) persistence_.erase_next_sector();
   }

@@ -1,4 +1,4 @@
-// Apart from the step: this is not in the hot path, and small rather than fast.
+// Functions of the board other than the estimator step. They are compiled for size, not for speed.
 #include "firmware/board_cell.hpp"
 
 namespace bms::firmware {
@@ -9,9 +9,9 @@ void BoardCell::update_condition(estimator::Condition<Estimator>& condition, con
   condition.update(generated::cell<BoardScalar>, sample, estimate, estimator.state(), limits_wanted);
 }
 
-void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
-                             const Estimator::Result& estimate) {
-  of.update(generated::cell<BoardScalar>, pack, estimate);
+void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differences,
+                             const measurement::PackSample<cells>& pack, const Estimator::Result& estimate) {
+  differences.update(generated::cell<BoardScalar>, pack, estimate);
 }
 
 const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }

@@ -1,46 +1,48 @@
-// The application's parts with this board's cell: the one place where what is generated comes in, the model's type
-// here, its tables in the .cpp files.
+// Binds the application to this board: scalar type, number of cells, cell file and vehicle profile. Only this header
+// and its .cpp files include the generated headers of the board and of the cell.
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 
+#include "board_config.hpp"    // generated from boards/<board>/board.cmake and the build options
 #include "cell_constants.hpp"  // generated from the cell file
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/application.hpp"
+#include "firmware/cia418_profile.hpp"
+#include "firmware/j1939_profile.hpp"
 #include "firmware/messages.hpp"
 #include "hal/samples.hpp"
 #include "protection/protection.hpp"
-#if defined(BMS_VEHICLE_PROFILE_CIA418)
-#include "firmware/cia418_profile.hpp"
-#elif defined(BMS_VEHICLE_PROFILE_J1939)
-#include "firmware/j1939_profile.hpp"
-#endif
-
 namespace bms::firmware {
 
-#if defined(BMS_FIXED_POINT)
-using BoardScalar = arithmetic::FixedPoint;  // a core without an FPU
-#else
-using BoardScalar = float;
-#endif
-
+using BoardScalar = std::conditional_t<hal::fixed_point, arithmetic::FixedPoint, float>;
 using BoardEstimator = estimator::SocEstimator<BoardScalar, generated::Model>;
 
-/// One step. A function of its own so that its cost can be counted.
+/// Runs one estimator step. It is a separate function so that its cost can be counted.
 BoardEstimator::Result estimator_step(BoardEstimator& estimator, const measurement::Sample& sample);
 
+/// Cell file and firmware version of this image.
 messages::Identity identity();
+/// Capacity according to the cell file.
 float capacity_ah();
 
-#if defined(BMS_VEHICLE_PROFILE_CIA418)
-using BoardVehicleProfile = Cia418Profile;
-#elif defined(BMS_VEHICLE_PROFILE_J1939)
-using BoardVehicleProfile = J1939Profile;
-#else
-using BoardVehicleProfile = WithoutVehicleProfile;
-#endif
+template <hal::VehicleProfile>
+struct ProfileOf {
+  using Type = WithoutVehicleProfile;
+};
+template <>
+struct ProfileOf<hal::VehicleProfile::cia418> {
+  using Type = Cia418Profile;
+};
+template <>
+struct ProfileOf<hal::VehicleProfile::j1939> {
+  using Type = J1939Profile;
+};
+using BoardVehicleProfile = ProfileOf<hal::vehicle_profile>::Type;
 
+/// The application's Board (firmware/application.hpp).
 struct BoardCell {
   using Estimator = BoardEstimator;
   static constexpr std::size_t cells = hal::pack_cells;
@@ -52,8 +54,8 @@ struct BoardCell {
   static void update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
                                const measurement::Sample& sample, const Estimator::Result& estimate,
                                bool limits_wanted);
-  static void update_cells(estimator::PackCells<BoardScalar, cells>& of, const measurement::PackSample<cells>& pack,
-                           const Estimator::Result& estimate);
+  static void update_cells(estimator::PackCells<BoardScalar, cells>& differences,
+                           const measurement::PackSample<cells>& pack, const Estimator::Result& estimate);
   static const model::PlausibleRange& plausible();
   static const protection::ProtectionPlan& plan();
 };

@@ -1,15 +1,15 @@
-// A CANopen slave as small as CiA 301 allows: network management, heartbeat, and an SDO server for values of up to four
+// A minimal CANopen slave (CiA 301): network management (NMT), heartbeat and an SDO server for values of up to four
 // bytes.
 //
-//   000h          in     NMT: start, stop, pre-operational, reset, for this node or for all
-//   700h + node   out    boot-up once, then the state, each heartbeat_us
-//   600h + node   in     SDO: read or write an object at once (expedited)
-//   580h + node   out    its answer, or why not (abort code)
+//   000h          in     NMT: start, stop, pre-operational or reset, for this node or for all
+//   700h + node   out    boot-up once, then the state every heartbeat_us
+//   600h + node   in     SDO: read or write an object in one frame (expedited transfer)
+//   580h + node   out    the answer, or an abort code
 //
-// The node starts by itself and is operational then: a truck need not have a master. Stopped it says nothing but its
-// heartbeat. Segmented and block transfers are refused. Objects are the owner's: read(index, sub) and write(index, sub,
-// value, length) below. Source: CiA 301 version 4.2.0, as its many public implementations have it: 7.2.4 (SDO), 7.2.8
-// (NMT).
+// The node becomes operational without a master, because a truck may have none. In state "stopped" it sends only its
+// heartbeat. Segmented and block transfers are refused. The owner implements the objects: read(index, sub) and
+// write(index, sub, value, length). Source: CiA 301 version 4.2.0, sections 7.2.4 (SDO) and 7.2.8 (NMT), as public
+// implementations have it.
 #pragma once
 
 #include <array>
@@ -18,13 +18,13 @@
 #include "hal/bytes.hpp"
 #include "hal/can.hpp"
 
-namespace bms::canopen {
+namespace bms::firmware::canopen {
 
 inline constexpr std::uint32_t nmt_id = 0x000, sdo_answer_id = 0x580, sdo_request_id = 0x600, heartbeat_id = 0x700;
 
 enum class NodeState : std::uint8_t { boot_up = 0, stopped = 4, operational = 5, pre_operational = 127 };
 
-/// SDO abort codes; none: it went well.
+/// SDO abort codes; none means success.
 enum class AbortCode : std::uint32_t {
   none = 0,
   unknown_command = 0x0504'0001,
@@ -34,10 +34,10 @@ enum class AbortCode : std::uint32_t {
   no_such_sub_index = 0x0609'0011
 };
 
-/// What an object holds: length 1, 2 or 4 bytes.
+/// Value of an object.
 struct Entry {
   std::uint32_t value = 0;
-  std::uint8_t length = 0;
+  std::uint8_t length = 0;  ///< bytes: 1, 2 or 4
   AbortCode abort_code = AbortCode::none;
 };
 
@@ -49,7 +49,7 @@ class Node {
 
   constexpr NodeState state() const { return state_; }
 
-  /// At each sample; times of the samples' clock.
+  /// Sends boot-up or a heartbeat if it is due. Call at each sample; now_us is the time of the sample.
   void update_heartbeat(std::uint32_t now_us) {
     if (state_ == NodeState::boot_up) {
       send_heartbeat(NodeState::boot_up);
@@ -61,7 +61,7 @@ class Node {
     }
   }
 
-  /// Whether the frame was for this node.
+  /// Handles NMT and SDO requests. Returns true if the frame was for this node.
   template <class Objects>
   bool receive(const can::Frame& frame, Objects&& objects) {
     if (frame.long_id) return false;
@@ -77,7 +77,7 @@ class Node {
  private:
   static constexpr std::uint8_t start = 1, stop = 2, enter_pre_operational = 128, reset_node = 129,
                                 reset_communication = 130;
-  static constexpr std::uint8_t download = 1, upload = 2, abort = 4;  // client command specifiers, the upper three bits
+  static constexpr std::uint8_t download = 1, upload = 2, abort = 4;  // client command specifiers: the upper three bits
   static constexpr std::size_t value_at = 4;
 
   constexpr void apply_nmt_command(std::uint8_t command) {
@@ -103,7 +103,7 @@ class Node {
       abort_code = entry.abort_code;
       answer.data[0] = static_cast<std::uint8_t>(0x43 | (4 - entry.length) << 2);
       hal::put_bytes(answer.data, value_at, entry.value);
-    } else if (command == download && (request.data[0] & 3) == 3) {  // expedited, its length said
+    } else if (command == download && (request.data[0] & 3) == 3) {  // expedited, with its length
       abort_code = objects.write(index, sub, hal::get_bytes<std::uint32_t>(request.data, value_at),
                                  static_cast<std::uint8_t>(4 - (request.data[0] >> 2 & 3)));
       answer.data[0] = 0x60;
@@ -120,4 +120,4 @@ class Node {
   NodeState state_ = NodeState::boot_up;
 };
 
-}  // namespace bms::canopen
+}  // namespace bms::firmware::canopen

@@ -1,19 +1,26 @@
-// The battery as a CANopen battery module (CiA 418) for chargers of CiA 419. Build option BMS_VEHICLE_PROFILE=cia418;
-// nodes BMS_CANOPEN_NODE (the battery, 1) and BMS_CANOPEN_CHARGER (10).
+// The battery as a CANopen battery module (CiA 418) for chargers of CiA 419. Build option: BMS_VEHICLE_PROFILE=cia418
+// with the node numbers BMS_CANOPEN_NODE (battery, 1) and BMS_CANOPEN_CHARGER (charger, 10).
 //
-//   200h + charger   6010 temperature, 6000 battery status                          each 0.2 s while operational: the
-//   charger's first three 300h + charger   6010 temperature, 6000 battery status, 6060 voltage            receive PDOs,
-//   with the mapping that they have by default 400h + charger   6070 charging current requested, 6081 state of charge
+// While the node is operational it sends the charger's first three receive PDOs every 0.2 s, in their default mapping:
 //
-//   6000  u8   bit 0: charge me                     6060  u32  V / 1024, all ones: not known      6020.1  u8   battery
-//   type, 0: not said 6001  u8   charger status, written by it        6070  u16  A / 16 6020.2  u16  capacity, Ah 6010
-//   i16  0.125 degC, 7FFFh: not known         6081  u8   %, FFh: not known                  6020.3  u16  highest
-//   charging current, A
-//                                                                                                6020.4  u16  cells
+//   200h + charger   6010 temperature, 6000 battery status
+//   300h + charger   6010 temperature, 6000 battery status, 6060 voltage
+//   400h + charger   6070 requested charging current, 6081 state of charge
 //
-// Where that comes from, and what of it no text confirms: can/messages.md. No end-to-end protection, as CANopen has
-// none: what opens contactors goes by the battery's own messages. Cost: bus load 0.7 % of 250 kbit/s; an SDO request is
-// answered with the next sample.
+//   6000     u8    bit 0: ready to charge
+//   6001     u8    status of the charger, written by the charger
+//   6010     i16   0.125 degC; 7FFFh: not known
+//   6020.1   u8    battery type; 0: not specified
+//   6020.2   u16   capacity [Ah]
+//   6020.3   u16   highest charging current [A]
+//   6020.4   u16   number of cells
+//   6060     u32   V / 1024; all ones: not known
+//   6070     u16   A / 16
+//   6081     u8    %; FFh: not known
+//
+// can/messages.md names the sources, and the points that no text confirms. CANopen has no end-to-end protection: use
+// the battery's own messages for everything that opens contactors. Cost: 0.7 % of a bus of 250 kbit/s. An SDO request
+// is answered with the next sample.
 #pragma once
 
 #include <algorithm>
@@ -24,9 +31,8 @@
 #include "firmware/canopen.hpp"
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
+#include "firmware/snapshot.hpp"
 #include "hal/accepted_frames.hpp"
-#include "measurement/pack_sample.hpp"
-#include "protection/protection.hpp"
 
 namespace bms::firmware {
 
@@ -38,38 +44,26 @@ class Cia418Profile {
     std::uint16_t id;
     std::uint8_t length;
   };
-  static constexpr std::array<Pdo, 3> pdos{{{"Cia418Status", 0x200 + BMS_CANOPEN_CHARGER, 3},
-                                            {"Cia418Voltage", 0x300 + BMS_CANOPEN_CHARGER, 7},
-                                            {"Cia418Request", 0x400 + BMS_CANOPEN_CHARGER, 3}}};
+  static constexpr std::array<Pdo, 3> pdos{{{"Cia418Status", 0x200 + hal::canopen_charger, 3},
+                                            {"Cia418Voltage", 0x300 + hal::canopen_charger, 7},
+                                            {"Cia418Request", 0x400 + hal::canopen_charger, 3}}};
 
-  /// soc_known: the estimator has started. capacity_ah: of the cell file.
-  template <std::size_t Cells, class Condition>
-  void publish(const measurement::PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d,
-               const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
-    const bool charge_me = d.outputs.charge_enable && d.allowed.charge_ua > 0;
-    const std::int16_t cdegc = pack.temperature_cdegc[0];
-    temperature_ = measurement::temperature_possible(cdegc) ? static_cast<std::int16_t>(cdegc * 2 / 25) : no_value;
-    status_ = charge_me ? 1 : 0;
-    voltage_ = pack.pack_uv >= 0
-                   ? static_cast<std::uint32_t>(static_cast<std::int64_t>(pack.pack_uv) * 1'024 / 1'000'000)
-                   : 0xFFFF'FFFF;
-    current_requested_ =
-        charge_me ? static_cast<std::uint16_t>(std::min<std::int32_t>(d.allowed.charge_ua / 62'500, 0xFFFF)) : 0;
-    soc_ = soc_known ? rounded(messages::percent(condition.display_soc()), 100) : 0xFF;
-    capacity_ = static_cast<std::uint16_t>(capacity_ah + 0.5F);
-    max_current_ = static_cast<std::uint16_t>(plan.derating.charge_max_ua / 1'000'000);
-    cells_ = plan.cells;
+  /// Updates the objects, then sends what is due.
+  template <class Estimator, std::size_t Cells>
+  void publish(const Snapshot<Estimator, Cells>& now) {
+    update_objects(now);
     if (!hal::can_listening()) return;
-    const auto now_us = static_cast<std::uint32_t>(pack.time_us);
+    const auto now_us = static_cast<std::uint32_t>(now.pack.time_us);
     node_.update_heartbeat(now_us);
     if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
   }
 
   void receive(const can::Frame& frame) { node_.receive(frame, *this); }
 
+  /// Object dictionary, for the SDO server.
   canopen::Entry read(std::uint16_t index, std::uint8_t sub) const {
     if (index == 0x1018)
-      return sub_entry({4, 0, 0, 0, 0}, {1, 4, 4, 4, 4}, sub);  // identity: no vendor number is assigned
+      return sub_entry({4, 0, 0, 0, 0}, {1, 4, 4, 4, 4}, sub);  // identity: there is no vendor number
     if (index == 0x6020) return sub_entry({4, 0, capacity_, max_current_, cells_}, {1, 1, 2, 2, 2}, sub);
     const canopen::Entry entry = plain_entry(index);
     return entry.abort_code == canopen::AbortCode::none && sub != 0
@@ -90,8 +84,28 @@ class Cia418Profile {
   static constexpr std::int16_t no_value = 0x7FFF;
   static constexpr std::uint32_t device_type = 418;
 
+  template <class Estimator, std::size_t Cells>
+  void update_objects(const Snapshot<Estimator, Cells>& now) {
+    const std::int32_t allowed_ua = now.decision.allowed.charge_ua;
+    const bool charge_me = now.decision.outputs.charge_enable && allowed_ua > 0;
+    const std::int16_t cdegc = now.pack.temperature_cdegc[0];
+    temperature_ = measurement::temperature_possible(cdegc) ? static_cast<std::int16_t>(cdegc * 2 / 25) : no_value;
+    status_ = charge_me ? 1 : 0;
+    voltage_ = now.pack.pack_uv >= 0
+                   ? static_cast<std::uint32_t>(static_cast<std::int64_t>(now.pack.pack_uv) * 1'024 / 1'000'000)
+                   : 0xFFFF'FFFF;
+    current_requested_ =
+        charge_me ? static_cast<std::uint16_t>(std::min<std::int32_t>(allowed_ua / 62'500, 0xFFFF)) : 0;
+    soc_ = now.soc_known() ? rounded(messages::percent(now.condition.display_soc()), 100) : 0xFF;
+    capacity_ = static_cast<std::uint16_t>(now.capacity_ah + 0.5F);
+    max_current_ = static_cast<std::uint16_t>(now.plan.derating.charge_max_ua / 1'000'000);
+    cells_ = now.plan.cells;
+  }
+
+  /// Rounds to an integer from 0 to `most`; not-a-number becomes 0.
   static constexpr std::uint8_t rounded(float value, std::uint8_t most) {
-    const float clamped = !(value > 0) ? 0 : value > static_cast<float>(most) ? static_cast<float>(most) : value;
+    if (!(value > 0)) return 0;
+    const float clamped = value > static_cast<float>(most) ? static_cast<float>(most) : value;
     return static_cast<std::uint8_t>(clamped + 0.5F);
   }
 
@@ -106,7 +120,7 @@ class Cia418Profile {
       case 0x1000:
         return {device_type, 4};
       case 0x1001:
-        return {0, 1};  // what is wrong is in Faults
+        return {0, 1};  // error register: the faults are in the message Faults
       case 0x1017:
         return {canopen::Node::heartbeat_us / 1'000, 2};
       case 0x6000:
@@ -128,14 +142,14 @@ class Cia418Profile {
 
   void send_pdos() const {
     can::Frame status{pdos[0].id, pdos[0].length, {}}, voltage{pdos[1].id, pdos[1].length, {}},
-        wanted{pdos[2].id, pdos[2].length, {}};
+        request{pdos[2].id, pdos[2].length, {}};
     hal::put_bytes(status.data, 0, temperature_);
     status.data[2] = status_;
     voltage.data = status.data;
     hal::put_bytes(voltage.data, 3, voltage_);
-    hal::put_bytes(wanted.data, 0, current_requested_);
-    wanted.data[2] = soc_;
-    for (const can::Frame& pdo : {status, voltage, wanted}) hal::can_send(pdo);
+    hal::put_bytes(request.data, 0, current_requested_);
+    request.data[2] = soc_;
+    for (const can::Frame& pdo : {status, voltage, request}) hal::can_send(pdo);
   }
 
   canopen::Node node_{static_cast<std::uint8_t>(hal::canopen_node)};
@@ -148,19 +162,19 @@ class Cia418Profile {
 
 namespace cia418 {
 
-/// Whether a message of the battery, or a frame of a sample, has an identifier that a PDO has.
+/// Returns true if both node numbers are valid and no other frame has the identifier of a PDO.
 constexpr bool pdo_ids_are_unique() {
-  bool apart = hal::canopen_node >= 1 && hal::canopen_node <= 127 && hal::canopen_charger >= 1 &&
-               hal::canopen_charger <= 127 && hal::canopen_node != hal::canopen_charger;
+  bool unique = hal::canopen_node >= 1 && hal::canopen_node <= 127 && hal::canopen_charger >= 1 &&
+                hal::canopen_charger <= 127 && hal::canopen_node != hal::canopen_charger;
   for (const Cia418Profile::Pdo& pdo : Cia418Profile::pdos) {
-    std::apply([&](auto... m) { ((apart = apart && m.id != pdo.id), ...); }, can::Messages{});
-    for (const std::uint16_t id : hal::accepted_ids) apart = apart && id != pdo.id;
+    std::apply([&](auto... m) { ((unique = unique && m.id != pdo.id), ...); }, can::Messages{});
+    for (const std::uint16_t id : hal::accepted_ids) unique = unique && id != pdo.id;
   }
-  return apart;
+  return unique;
 }
-static_assert(pdo_ids_are_unique(),
-              "BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER: two nodes of 1 to 127, whose PDOs are no message of the "
-              "battery (of a charger of 16 to 29 one is)");
+static_assert(hal::vehicle_profile != hal::VehicleProfile::cia418 || pdo_ids_are_unique(),
+              "BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER must be two different nodes from 1 to 127, and no PDO may have "
+              "the identifier of a battery message (which excludes chargers 16 to 29)");
 
 }  // namespace cia418
 

@@ -1,8 +1,8 @@
-// What the vehicle or a workshop asks of the battery over CAN (Command in can/greybox_bms.dbc), and what it is
-// answered.
+// Handles the commands that a vehicle or a workshop sends over CAN (Command in can/greybox_bms.dbc) and makes the
+// answer to each.
 //
-// A command is heard once: a wrong CRC, a frame of another message or the counter of the command before are not. An
-// argument that makes no sense is refused, a code that nobody knows answered as such; neither changes anything.
+// A frame with a wrong CRC, another identifier or the counter of the previous command is ignored. An invalid argument
+// is answered "refused", an unknown code "no such command"; neither changes anything.
 #pragma once
 
 #include <cstdint>
@@ -15,24 +15,24 @@
 
 namespace bms::firmware {
 
-static_assert(can::Command::id == hal::command_frame_id, "a real bus would filter commands out");
+static_assert(can::Command::id == hal::command_frame_id, "the acceptance filter of a real bus would reject commands");
 
-/// What commands set.
+/// What the commands have requested so far.
 struct Requested {
   static constexpr std::uint64_t request_timeout_us = 5'000'000;
 
   bool log_samples = true;
-  std::uint32_t unix_time_s = 0;  ///< that the calendar is to be set to; 0: not
+  std::uint32_t unix_time_s = 0;  ///< new time of the calendar; 0: no change
   struct CalibrationChange {
-    std::uint16_t which = 0;  ///< of hal::Calibration, in its order
-    std::int32_t value = 0;
+    std::uint16_t which = 0;  ///< index into hal::SensorCalibration
+    std::int32_t value = 0;   ///< ppm for gains, uV or uA for offsets
   };
-  std::optional<CalibrationChange> calibration_change;  ///< of the measuring chain, until it has been used
-  protection::Clear clear = protection::Clear::none;    ///< until it has been used
+  std::optional<CalibrationChange> calibration_change;  ///< reset when applied
+  protection::Clear clear = protection::Clear::none;    ///< reset when applied
   protection::Request power = protection::Request::none;
-  std::uint64_t power_at_us = 0;
+  std::uint64_t power_at_us = 0;  ///< time of the last request for power
 
-  /// What is still asked for: who does not repeat it has gone.
+  /// Returns the request for power. It expires if the vehicle does not repeat it.
   constexpr protection::Request active_request(std::uint64_t now_us) const {
     return now_us - power_at_us < request_timeout_us ? power : protection::Request::none;
   }
@@ -40,7 +40,7 @@ struct Requested {
 
 class Commands {
  public:
-  /// now_us: the samples' clock. Nothing: the frame is no command that is heard.
+  /// Executes a command and returns the answer, or nothing if the frame is ignored. now_us: time of the sample.
   constexpr std::optional<can::CommandAnswer> handle(const can::Frame& frame, std::uint64_t now_us,
                                                      Requested& requested) {
     if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id))
@@ -81,8 +81,8 @@ class Commands {
       case can::Command::code_voltage_offset:
       case can::Command::code_current_gain:
       case can::Command::code_current_offset: {
-        constexpr std::int32_t most[] = {50'000, 100'000, 50'000,
-                                         5'000'000};  // ppm, uV, ppm, uA: more is no calibration, but a wrong part
+        // ppm, uV, ppm, uA; a larger correction means a wrong part, not a tolerance
+        constexpr std::int32_t most[] = {50'000, 100'000, 50'000, 5'000'000};
         const auto which = static_cast<std::uint16_t>(command.code - can::Command::code_voltage_gain);
         const auto value = static_cast<std::int32_t>(command.argument);
         if (value < -most[which] || value > most[which]) return A::result_refused;
@@ -94,7 +94,7 @@ class Commands {
     }
   }
 
-  std::uint8_t last_counter_ = can::counters;  // no command's
+  std::uint8_t last_counter_ = can::counters;  // no command has this one
 };
 
 }  // namespace bms::firmware

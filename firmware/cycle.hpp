@@ -1,4 +1,5 @@
-// When something that goes out by time is due: at first, then a cycle after it was last, in the samples' own time.
+// Decides when a cyclic message is due: at the first sample, then one cycle after it was last sent. Time is the time of
+// the samples.
 #pragma once
 
 #include <cstdint>
@@ -7,14 +8,15 @@ namespace bms::firmware {
 
 class Cycle {
  public:
-  /// True: now it is, and from now on counts. Unsigned: a time that went back is due as well.
+  /// Returns true if the message is due, and starts the next cycle. Also due if the time went back (unsigned
+  /// difference).
   constexpr bool due(std::uint32_t now_us, std::uint32_t cycle_us) {
     if (once_ && now_us - at_us_ < cycle_us) return false;
     at_us_ = now_us;
     once_ = true;
     return true;
   }
-  /// Due the next time, however short ago it was.
+  /// Makes the message due at the next call.
   constexpr void restart() { once_ = false; }
 
  private:

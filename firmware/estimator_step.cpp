@@ -1,6 +1,6 @@
 #include "firmware/board_cell.hpp"
 
-/// For who holds an image and asks which cell file it was built with; on CAN it is in the message Identity.
+/// Identifies the cell file of an image without running it. On CAN the message Identity has the same value.
 extern "C" {
 extern const std::uint32_t image_cell_hash;
 constexpr std::uint32_t image_cell_hash = bms::generated::cell_hash;

@@ -1,11 +1,11 @@
-// The battery in messages that chargers and displays of other makers know, beside its own: DC_SOURCE_STATUS_1, 2, 3, 4,
-// 6 and 11 of RV-C, a J1939 whose layouts are open (can/j1939_profile.dbc; where they come from: can/messages.md).
-// Build option BMS_VEHICLE_PROFILE=j1939.
+// Sends DC_SOURCE_STATUS_1, 2, 3, 4, 6 and 11 of RV-C in addition to the battery's own messages, for chargers and
+// displays of other makers. RV-C is a J1939 protocol with open layouts (can/j1939_profile.dbc; sources:
+// can/messages.md). Build option: BMS_VEHICLE_PROFILE=j1939.
 //
-// Each by its cycle time, in the samples' own time, while somebody listens. Nothing is received: no address is claimed,
-// no request answered. They have no end-to-end protection: what opens contactors goes by the battery's own messages. An
-// allowed discharging current has no place in them but DischargeOn. Cost: six frames of 160 bits at worst, seven a
-// second: 0.5 % of 250 kbit/s.
+// Each message has its own cycle, in the time of the samples, and is sent while a node listens. Nothing is received: no
+// address is claimed and no request is answered. There is no end-to-end protection: use the battery's own messages for
+// everything that opens contactors. The allowed discharge current has no signal here, only DischargeOn. Cost: six
+// frames of at most 160 bits, seven per second: 0.5 % of 250 kbit/s.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,9 @@
 
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
+#include "firmware/snapshot.hpp"
 #include "hal/can.hpp"
 #include "j1939_messages.hpp"  // generated from can/j1939_profile.dbc
-#include "measurement/pack_sample.hpp"
-#include "protection/protection.hpp"
 
 namespace bms::firmware {
 
@@ -28,7 +27,7 @@ inline constexpr std::uint32_t instance = 1, soc_known_priority = 120, current_u
 
 constexpr std::uint32_t flag(bool b) { return b ? 1 : 0; }
 
-/// Discharging above 0, 1 mA, 2,000,000 A off.
+/// Converts to units of 1 mA with an offset of 2,000,000 A. Here discharging is positive.
 constexpr std::uint32_t offset_milliamperes(std::int32_t current_ua) {
   return current_ua == measurement::no_reading ? current_unknown
                                                : static_cast<std::uint32_t>(2'000'000'000 - current_ua / 1'000);
@@ -42,30 +41,30 @@ constexpr Message message_of_instance() {
   return m;
 }
 
-template <std::size_t Cells>
-constexpr DcSourceStatus1 status_1(const measurement::PackSample<Cells>& pack) {
+template <class Estimator, std::size_t Cells>
+constexpr DcSourceStatus1 status_1(const Snapshot<Estimator, Cells>& now) {
   auto m = message_of_instance<DcSourceStatus1>();
-  m.voltage = messages::volts(pack.pack_uv);
-  m.current = offset_milliamperes(pack.current_ua);
+  m.voltage = messages::volts(now.pack.pack_uv);
+  m.current = offset_milliamperes(now.pack.current_ua);
   return m;
 }
 
-template <std::size_t Cells, class Condition>
-constexpr DcSourceStatus2 status_2(const measurement::PackSample<Cells>& pack, const Condition& condition,
-                                   bool soc_known) {
+template <class Estimator, std::size_t Cells>
+constexpr DcSourceStatus2 status_2(const Snapshot<Estimator, Cells>& now) {
   auto m = message_of_instance<DcSourceStatus2>();
-  m.source_temperature = messages::degrees(pack.temperature_cdegc[0]);
-  if (soc_known) m.state_of_charge = messages::percent(condition.display_soc());
+  m.source_temperature = messages::degrees(now.pack.temperature_cdegc[0]);
+  if (now.soc_known()) m.state_of_charge = messages::percent(now.condition.display_soc());
   return m;
 }
 
-template <class Condition>
-constexpr DcSourceStatus3 status_3(const Condition& condition, float capacity_ah, bool soc_known) {
+template <class Estimator, std::size_t Cells>
+constexpr DcSourceStatus3 status_3(const Snapshot<Estimator, Cells>& now) {
   auto m = message_of_instance<DcSourceStatus3>();
-  m.state_of_health = messages::percent(condition.capacity().ratio);
-  if (soc_known)
+  const auto capacity_ratio = now.condition.capacity().ratio;
+  m.state_of_health = messages::percent(capacity_ratio);
+  if (now.soc_known())
     m.capacity_remaining =
-        capacity_ah * messages::number(condition.capacity().ratio) * messages::number(condition.display_soc());
+        now.capacity_ah * messages::number(capacity_ratio) * messages::number(now.condition.display_soc());
   return m;
 }
 
@@ -93,16 +92,16 @@ constexpr DcSourceStatus6 status_6(const protection::Decision& d) {
   return m;
 }
 
-template <std::size_t Cells, class Condition>
-constexpr DcSourceStatus11 status_11(const measurement::PackSample<Cells>& pack, const Condition& condition,
-                                     const protection::Decision& d, const protection::ProtectionPlan& plan,
-                                     float capacity_ah) {
+template <class Estimator, std::size_t Cells>
+constexpr DcSourceStatus11 status_11(const Snapshot<Estimator, Cells>& now) {
   auto m = message_of_instance<DcSourceStatus11>();
+  const protection::Decision& d = now.decision;
+  const std::int32_t current_ua = now.pack.current_ua;
   const bool closed = d.outputs.main_plus && d.outputs.main_minus;
   m.discharge_on = flag(closed && d.allowed.discharge_ua > 0);
   m.charge_on = flag(closed && d.allowed.charge_ua > 0);
-  m.charge_detected = flag(pack.current_ua != measurement::no_reading && pack.current_ua > plan.contactors.rest_ua);
-  m.full_capacity = capacity_ah * messages::number(condition.capacity().ratio);
+  m.charge_detected = flag(current_ua != measurement::no_reading && current_ua > now.plan.contactors.rest_ua);
+  m.full_capacity = now.capacity_ah * messages::number(now.condition.capacity().ratio);
   return m;
 }
 
@@ -110,18 +109,17 @@ constexpr DcSourceStatus11 status_11(const measurement::PackSample<Cells>& pack,
 
 class J1939Profile {
  public:
-  /// soc_known: the estimator has started. capacity_ah: of the cell file.
-  template <std::size_t Cells, class Condition>
-  void publish(const measurement::PackSample<Cells>& pack, const Condition& condition, const protection::Decision& d,
-               const protection::ProtectionPlan& plan, float capacity_ah, bool soc_known) {
+  /// Sends the messages that are due.
+  template <class Estimator, std::size_t Cells>
+  void publish(const Snapshot<Estimator, Cells>& now) {
     if (!hal::can_listening()) return;
-    now_us_ = static_cast<std::uint32_t>(pack.time_us);
-    send_if_due<j1939::DcSourceStatus1>([&] { return j1939::status_1(pack); });
-    send_if_due<j1939::DcSourceStatus2>([&] { return j1939::status_2(pack, condition, soc_known); });
-    send_if_due<j1939::DcSourceStatus3>([&] { return j1939::status_3(condition, capacity_ah, soc_known); });
-    send_if_due<j1939::DcSourceStatus4>([&] { return j1939::status_4(d, plan); });
-    send_if_due<j1939::DcSourceStatus6>([&] { return j1939::status_6(d); });
-    send_if_due<j1939::DcSourceStatus11>([&] { return j1939::status_11(pack, condition, d, plan, capacity_ah); });
+    now_us_ = static_cast<std::uint32_t>(now.pack.time_us);
+    send_if_due<j1939::DcSourceStatus1>([&] { return j1939::status_1(now); });
+    send_if_due<j1939::DcSourceStatus2>([&] { return j1939::status_2(now); });
+    send_if_due<j1939::DcSourceStatus3>([&] { return j1939::status_3(now); });
+    send_if_due<j1939::DcSourceStatus4>([&] { return j1939::status_4(now.decision, now.plan); });
+    send_if_due<j1939::DcSourceStatus6>([&] { return j1939::status_6(now.decision); });
+    send_if_due<j1939::DcSourceStatus11>([&] { return j1939::status_11(now); });
   }
 
   constexpr void receive(const can::Frame&) {}

@@ -1,4 +1,4 @@
-// The firmware: start what the board has, then sample after sample.
+// Entry point of the firmware: starts the hardware, restores the stored state, then processes sample after sample.
 #include "firmware/application.hpp"
 #include "firmware/board_cell.hpp"
 #include "hal/board_state.hpp"
@@ -10,8 +10,8 @@ namespace {
 
 constexpr std::uint32_t watchdog_ms = 2'000;
 
-using TheApplication = bms::firmware::Application<bms::firmware::BoardCell, bms::firmware::BoardVehicleProfile>;
-TheApplication* running = nullptr;
+using BoardApplication = bms::firmware::Application<bms::firmware::BoardCell, bms::firmware::BoardVehicleProfile>;
+BoardApplication* running = nullptr;
 
 }  // namespace
 
@@ -21,18 +21,19 @@ void bms::hal::supply_failing() {
 
 int main() {
   using namespace bms;
+  using namespace bms::firmware;
   hal::clock_start();
   hal::watchdog_start(watchdog_ms);
   hal::board_start();
   storage::Persistence persistence;
-  persistence.start(hal::reset_cause(), hal::last_fault(),
-                    hal::calendar_s());  // erases, up to half a second a sector: before anything waits for an answer
+  // may erase, up to half a second per sector; so it comes before anything that must answer in time
+  persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
   hal::calibrate(stored_calibration(persistence));
   hal::can_start();
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
   const auto given_start = hal::starting_point();
-  static TheApplication application(
+  static BoardApplication application(
       given_start ? given_start : stored_starting_point(persistence, identity().cell_hash), identity(), capacity_ah(),
       persistence);
   running = &application;

@@ -1,4 +1,4 @@
-// What the firmware tells of an estimate, in the messages of can/greybox_bms.dbc.
+// Converts estimates, decisions and states into the messages of can/greybox_bms.dbc.
 #pragma once
 
 #include <algorithm>
@@ -13,9 +13,9 @@
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
-namespace bms::messages {
+namespace bms::firmware::messages {
 
-/// A quantity of any scalar as a float: by its bits, without double arithmetic.
+/// Converts a quantity of any scalar type to float, without double arithmetic.
 template <class T>
 constexpr float number(const T& value) {
   if constexpr (arithmetic::is_q<T>)
@@ -28,19 +28,22 @@ constexpr float percent(const T& fraction) {
   return 100.0F * number(fraction);
 }
 
-/// In units of 1e-9, within +-2; 0 of what is no number.
+/// Converts to units of 1e-9. Clamped to -2..2; not-a-number becomes 0.
 template <class T>
 constexpr std::int32_t ppb(const T& value) {
   if constexpr (arithmetic::is_q<T>) {
     static_assert(T::fraction_bits <= 31);
     constexpr std::int64_t most = std::int64_t{2} << T::fraction_bits;
-    const std::int64_t raw = value.raw(), clamped = raw > most ? most : raw < -most ? -most : raw;
+    const std::int64_t clamped = std::clamp<std::int64_t>(value.raw(), -most, most);
     return static_cast<std::int32_t>(clamped * 1'000'000'000 >> T::fraction_bits);
   } else {
-    const float clamped = value > 2    ? 2.0F
-                          : value < -2 ? -2.0F
-                          : value <= 2 ? static_cast<float>(value)
-                                       : 0.0F;  // the last: not a number
+    float clamped = 0;  // not a number
+    if (value > 2)
+      clamped = 2;
+    else if (value < -2)
+      clamped = -2;
+    else if (value <= 2)
+      clamped = static_cast<float>(value);
     return static_cast<std::int32_t>(clamped * 1e9F);
   }
 }
@@ -79,11 +82,13 @@ constexpr can::PackState pack_state(const estimator::Estimate<S>& e, const Condi
   return m;
 }
 
-/// Volts of a reading; what is none, or below 0, is not known.
+/// Converts a reading to volts. Missing and negative readings become "not known".
 constexpr float volts(std::int32_t uv) { return uv >= 0 ? static_cast<float>(uv) * 1e-6F : can::unknown; }
+/// Converts a reading to degrees Celsius. Impossible readings become "not known".
 constexpr float degrees(std::int16_t cdegc) {
   return measurement::temperature_possible(cdegc) ? static_cast<float>(cdegc) * 0.01F : can::unknown;
 }
+/// Converts a reading to amperes. A missing reading becomes "not known".
 constexpr float amperes(std::int32_t ua) {
   return ua != measurement::no_reading ? static_cast<float>(ua) * 1e-6F : can::unknown;
 }
@@ -97,7 +102,7 @@ constexpr can::PackElectrical pack_electrical(const measurement::PackSample<Cell
   return m;
 }
 
-/// Cells From + 1 to From + 4.
+/// Voltages of the cells From + 1 to From + 4. Cells that the pack does not have are "not known".
 template <class Message, std::size_t From, std::size_t Cells>
 constexpr Message cell_voltages(const measurement::PackSample<Cells>& pack) {
   Message m;
@@ -113,7 +118,8 @@ template <std::size_t Cells, class S>
 constexpr can::CellExtremes cell_extremes(const measurement::PackSample<Cells>& pack,
                                           const estimator::PackCells<S, Cells>& cells) {
   can::CellExtremes m;
-  m.highest_cell = m.lowest_cell = 31;
+  constexpr std::uint32_t no_cell = 31;  // the signals' value for "not known"
+  m.highest_cell = m.lowest_cell = no_cell;
   std::int32_t highest_uv = -1, lowest_uv = 2'147'483'647;
   float fullest = -1e9F, emptiest = 1e9F;
   for (std::size_t k = 0; k < Cells; ++k) {
@@ -121,11 +127,17 @@ constexpr can::CellExtremes cell_extremes(const measurement::PackSample<Cells>& 
     if (soc > fullest) fullest = soc;
     if (soc < emptiest) emptiest = soc;
     if (pack.cell_uv[k] < 0) continue;
-    if (pack.cell_uv[k] > highest_uv) highest_uv = pack.cell_uv[k], m.highest_cell = static_cast<std::uint32_t>(k + 1);
-    if (pack.cell_uv[k] < lowest_uv) lowest_uv = pack.cell_uv[k], m.lowest_cell = static_cast<std::uint32_t>(k + 1);
+    if (pack.cell_uv[k] > highest_uv) {
+      highest_uv = pack.cell_uv[k];
+      m.highest_cell = static_cast<std::uint32_t>(k + 1);
+    }
+    if (pack.cell_uv[k] < lowest_uv) {
+      lowest_uv = pack.cell_uv[k];
+      m.lowest_cell = static_cast<std::uint32_t>(k + 1);
+    }
   }
   m.highest_voltage = volts(highest_uv);
-  m.lowest_voltage = m.lowest_cell == 31 ? can::unknown : volts(lowest_uv);
+  m.lowest_voltage = m.lowest_cell == no_cell ? can::unknown : volts(lowest_uv);
   m.soc_spread = 100.0F * (fullest - emptiest);
   return m;
 }
@@ -218,7 +230,10 @@ inline can::Storage storage(const storage::Persistence& persistence) {
   using M = can::Storage;
   const auto& log = persistence.log();
   M m;
-  m.state = log.sectors() == 0 ? M::state_no_flash : log.operational() ? M::state_works : M::state_nothing_more_is_kept;
+  if (log.sectors() == 0)
+    m.state = M::state_no_flash;
+  else
+    m.state = log.operational() ? M::state_works : M::state_nothing_more_is_kept;
   m.broken_sectors = std::min<std::uint32_t>(log.broken(), 15U);
   m.newer_records = std::min<std::uint32_t>(persistence.newer_records(), 15U);
   m.erases = std::min<std::uint32_t>(log.erase_cycles(), 65'535U);
@@ -226,7 +241,7 @@ inline can::Storage storage(const storage::Persistence& persistence) {
   return m;
 }
 
-/// cell_file_changed: what is stored belongs to another; longest_sample_us: 0 as long as none is through.
+/// cell_file_changed: the stored data belong to another cell file. longest_sample_us: 0 means not known.
 inline can::Board board(const hal::BoardState& state, bool cell_file_changed, std::uint32_t longest_sample_us) {
   can::Board m;
   m.ram_failed = state.ram_failed ? 1 : 0;
@@ -244,7 +259,7 @@ inline can::Board board(const hal::BoardState& state, bool cell_file_changed, st
   return m;
 }
 
-/// capacity_ah: what a current of one is in the filter's units.
+/// capacity_ah: the filter's unit of current is the capacity per hour.
 template <class Result>
 constexpr can::SensorErrors sensor_errors(const Result& e, float capacity_ah) {
   can::SensorErrors m;
@@ -256,7 +271,7 @@ constexpr can::SensorErrors sensor_errors(const Result& e, float capacity_ah) {
   return m;
 }
 
-// What the estimator saw, bit for bit.
+// The estimator's input, bit for bit.
 
 constexpr can::SampleCurrent sample_current(const measurement::Sample& sample, std::uint16_t counter) {
   can::SampleCurrent m;
@@ -273,7 +288,7 @@ constexpr can::SampleVoltage sample_voltage(const measurement::Sample& sample) {
 constexpr can::SampleTime sample_time(const measurement::Sample& sample) {
   can::SampleTime m;
   m.time_low = static_cast<std::uint32_t>(sample.time_us);
-  m.time_high = static_cast<std::uint32_t>(sample.time_us >> 32) & 0xFFFF;  // nine years
+  m.time_high = static_cast<std::uint32_t>(sample.time_us >> 32) & 0xFFFF;  // 48 bits: nine years
   return m;
 }
 constexpr can::StartingSoc starting_soc(const std::optional<measurement::StartingPoint>& start) {
@@ -288,4 +303,4 @@ constexpr can::StartingSigma starting_sigma(const std::optional<measurement::Sta
   return m;
 }
 
-}  // namespace bms::messages
+}  // namespace bms::firmware::messages

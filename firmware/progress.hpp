@@ -1,13 +1,13 @@
-// Whether a sample went all its way: only then is the watchdog fed.
+// Decides whether a sample was processed completely. Only then is the watchdog fed.
 //
-//   sampled     its time is later than that of the sample before: a measuring chain that hands out the same sample
-//   again has stopped estimated   the estimator has taken the sample of this time: one that returns without has stopped
-//   told        telemetry has come to its last frame: whether the bus took it, and whether anybody listens, is the
-//   bus's affair
+//   sampled     the time of the sample is later than that of the previous one. A measuring chain that delivers the same
+//               sample again has stopped.
+//   estimated   the estimator has processed the sample of this time. An estimator that returns without doing so has
+//               stopped.
+//   published   telemetry has reached its last frame. It does not matter whether a node listens or the bus accepts it.
 //
-// Readings that are missing are progress: the protection opens for them, a reset would not bring them back. A part that
-// hangs never comes back here. Each part is asked for what it did, not whether it was called; a way around one of them
-// leaves its question unanswered.
+// Missing readings count as progress: the protection opens the contactors for them, and a reset would not help. A part
+// that hangs never returns to this class. Each part is asked for its result, so that a skipped call is noticed, too.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +17,12 @@ namespace bms::firmware {
 class Progress {
  public:
   struct SampleProgress {
-    std::uint64_t sample_us = 0;     ///< time of the sample that was taken
-    std::uint64_t estimated_us = 0;  ///< time of the last sample that the estimator has taken
-    std::uint32_t published = 0;     ///< samples that telemetry has come to the end of; wraps
+    std::uint64_t sample_us = 0;     ///< time of this sample
+    std::uint64_t estimated_us = 0;  ///< time of the last sample that the estimator has processed
+    std::uint32_t published = 0;     ///< samples that telemetry has published completely; wraps
   };
 
-  /// Once a sample, last of all. True: feed.
+  /// Call once at the end of each sample. Returns true if the watchdog may be fed.
   constexpr bool complete(const SampleProgress& done) {
     const bool whole = (first_ || done.sample_us > sample_us_) && done.estimated_us == done.sample_us &&
                        done.published == published_ + 1;

@@ -1,6 +1,8 @@
-// What of an estimate and of a condition is stored (storage/persistence.hpp), as integers; and what is taken up again.
+// Converts estimate and condition into the integers that are stored (storage/persistence.hpp), and stored integers back
+// into starting values.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -13,27 +15,28 @@
 
 namespace bms::firmware {
 
-// Keys of the settings, and codes of the faults, that this firmware stores.
-inline constexpr std::uint16_t latched_faults_key = 1;  ///< protection::Decision::kept
-inline constexpr std::uint16_t cell_file_key =
-    2;  ///< messages::Identity::cell_hash of the cell file that what is stored belongs to
-inline constexpr std::uint16_t first_calibration_key =
-    16;  ///< voltage's gain [ppm] and offset [uV], current's gain [ppm] and offset [uA]: hal::Calibration
-inline constexpr std::uint16_t first_fault_code = 1;  ///< of protection::Fault 0
+// Keys of the stored settings and codes of the stored faults.
+inline constexpr std::uint16_t latched_faults_key = 1;  ///< protection::Decision::latched
+inline constexpr std::uint16_t cell_file_key = 2;       ///< hash of the cell file that the stored data belong to
+/// Four keys for hal::SensorCalibration: gain [ppm] and offset [uV] of the voltage, gain [ppm] and offset [uA] of the
+/// current.
+inline constexpr std::uint16_t first_calibration_key = 16;
+inline constexpr std::uint16_t first_fault_code = 1;  ///< code of protection::Fault 0
 
-/// Not a number, or beyond what fits: the nearest that does, 0 for NaN.
-constexpr std::int32_t scaled_to_integer(float value, float by) {
-  const float scaled_to_integer = value * by;
+/// Returns value * factor as an integer, clamped to +-2,147,000,000. Not-a-number becomes 0.
+constexpr std::int32_t scaled_to_integer(float value, float factor) {
+  const float scaled = value * factor;
   constexpr float most = 2'147'000'000.0F;
-  if (!(scaled_to_integer > -most)) return scaled_to_integer <= -most ? -2'147'000'000 : 0;
-  return scaled_to_integer < most ? static_cast<std::int32_t>(scaled_to_integer) : 2'147'000'000;
+  if (!(scaled > -most)) return scaled <= -most ? -2'147'000'000 : 0;
+  return scaled < most ? static_cast<std::int32_t>(scaled) : 2'147'000'000;
 }
 
+/// The stored part of estimate, condition and cells.
 template <class S, std::size_t Cells>
-class SnapshotOf {
+class StateToStoreOf {
  public:
   template <class Estimate, class Condition>
-  constexpr SnapshotOf(const Estimate& e, const Condition& condition, const estimator::PackCells<S, Cells>& cells) {
+  constexpr StateToStoreOf(const Estimate& e, const Condition& condition, const estimator::PackCells<S, Cells>& cells) {
     using messages::number;
     constexpr float ppm = 1e6F;
     const bool known = (e.flags & estimator::not_started) == 0 && number(e.soc_sigma) > 0;
@@ -46,10 +49,8 @@ class SnapshotOf {
       for (std::size_t k = 0; k < Cells; ++k) {
         const std::int32_t soc = messages::ppb(cells[k].soc()) / per_unit,
                            sigma = messages::ppb(cells[k].soc_sigma()) / per_unit;
-        cells_[k] = {static_cast<std::int16_t>(soc > most    ? most
-                                               : soc < -most ? -most
-                                                             : soc),
-                     static_cast<std::uint16_t>(sigma > 0 ? sigma < 65'535 ? sigma : 65'535 : 0)};
+        cells_[k] = {static_cast<std::int16_t>(std::clamp<std::int32_t>(soc, -most, most)),
+                     static_cast<std::uint16_t>(std::clamp<std::int32_t>(sigma, 0, 65'535))};
       }
     }
   }
@@ -61,12 +62,13 @@ class SnapshotOf {
   }
 
  private:
-  static constexpr std::int32_t per_unit = 10'000, most = 32'000;  // ppb in a unit of CellsRecord
+  static constexpr std::int32_t per_unit = 10'000, most = 32'000;  // ppb per unit of CellsRecord; units
 
   storage::EstimatorSnapshot values_;
   std::array<storage::CellsRecord::Cell, Cells> cells_{};
 };
 
+/// Calibration of the measuring chain from the stored settings; 0 where nothing is stored.
 inline hal::SensorCalibration stored_calibration(const storage::Persistence& persistence) {
   const auto value = [&](std::uint16_t k) {
     return persistence.settings().get(static_cast<std::uint16_t>(first_calibration_key + k)).value_or(0);
@@ -74,21 +76,20 @@ inline hal::SensorCalibration stored_calibration(const storage::Persistence& per
   return {value(0), value(1), value(2), value(3)};
 }
 
-/// State of charge, cells and health that are stored were estimated with another cell file: they mean nothing with this
-/// one.
+/// Returns true if the stored estimates were made with another cell file. They are not valid with this one.
 inline bool stored_for_another_cell_file(const storage::Persistence& persistence, std::uint32_t cell_hash) {
   const auto stored = persistence.settings().get(cell_file_key);
   return stored && static_cast<std::uint32_t>(*stored) != cell_hash;
 }
 
-/// Where to begin, as far as it is remembered.
+/// Returns the stored state of charge, or nothing if none is valid.
 inline std::optional<measurement::StartingPoint> stored_starting_point(const storage::Persistence& persistence,
                                                                        std::uint32_t cell_hash) {
   if (stored_for_another_cell_file(persistence, cell_hash)) return std::nullopt;
   return persistence.starting_point();
 }
 
-/// A pack of another number of cells is another pack.
+/// Restores the differences of the cells. Ignored if the number of cells differs.
 template <class S, std::size_t Cells>
 constexpr void restore_cells(estimator::PackCells<S, Cells>& cells, const storage::CellsRecord& stored) {
   if (stored.count != Cells) return;

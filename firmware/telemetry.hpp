@@ -1,8 +1,8 @@
-// Which message goes out when. Time is the samples' own: a recording fed in faster than it was made gives the same
-// frames.
+// Decides which message is sent when. Time is the time of the samples: a recording that is played back faster than it
+// was made gives the same frames.
 //
-// Nothing is sent while nobody listens. Every sample that is told ends with the status frame, so that who has
-// read it has the whole sample and may send the next (lock step).
+// Nothing is sent while no node listens. The frames of a sample end with Status, so that the sender of samples knows
+// when the next one may follow (lock step).
 #pragma once
 
 #include <cstdint>
@@ -13,80 +13,62 @@
 #include "firmware/commands.hpp"
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
-#include "hal/board_state.hpp"
+#include "firmware/snapshot.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
-#include "storage/persistence.hpp"
 
 namespace bms::firmware {
-
-/// What is told of the board beside the pack.
-struct BoardStatus {
-  hal::BoardState state;
-  bool cell_file_changed = false;       ///< since what is stored was stored
-  std::uint32_t longest_sample_us = 0;  ///< 0: not known yet
-
-  constexpr bool unfit() const { return state.unfit() || cell_file_changed; }
-  constexpr bool alarming() const { return unfit() || state.supply_low; }
-};
 
 template <class Estimator, std::size_t Cells>
 class Telemetry {
  public:
-  using Result = typename Estimator::Result;
+  /// start: where the estimator began, if it was given.
+  constexpr Telemetry(const messages::Identity& identity, const std::optional<measurement::StartingPoint>& start)
+      : identity_(identity), start_(start) {}
 
-  /// capacity_ah: of the cell file; start: where the estimator began, if somebody said.
-  constexpr Telemetry(const messages::Identity& identity, float capacity_ah,
-                      const std::optional<measurement::StartingPoint>& start)
-      : identity_(identity), capacity_ah_(capacity_ah), start_(start) {}
-
-  /// mean: what the estimator was given of the pack.
-  void publish(const measurement::PackSample<Cells>& pack, const measurement::Sample& mean, const Result& estimate,
-               const estimator::Condition<Estimator>& condition,
-               const estimator::PackCells<typename Estimator::Scalar, Cells>& cells,
-               const protection::Decision& decision, const storage::Persistence& persistence, const BoardStatus& board,
-               bool log_samples) {
+  /// Sends the messages of one sample.
+  void publish(const Snapshot<Estimator, Cells>& now) {
     ++samples_;
-    hash_.add(estimator::words(estimate));
+    hash_.add(estimator::words(now.estimate));
     if (!hal::can_listening()) {
       ++published_;
       return;
     }
     publish_fault();
-    now_us_ = static_cast<std::uint32_t>(pack.time_us);
-    publish_protection(decision);
-    if constexpr (Cells > 1) publish_cells(pack, cells, decision);
+    now_us_ = static_cast<std::uint32_t>(now.pack.time_us);
+    publish_protection(now.decision);
+    if constexpr (Cells > 1) publish_cells(now);
     send_if_due<can::Identity>([&] { return messages::identity(identity_); });
-    send_if_due<can::CurrentLimits>([&] { return messages::current_limits(condition); });
-    send_if_due<can::Health>([&] { return messages::health(condition); });
-    send_if_due<can::SocAnchor>([&] { return messages::soc_anchor(condition); });
+    send_if_due<can::CurrentLimits>([&] { return messages::current_limits(now.condition); });
+    send_if_due<can::Health>([&] { return messages::health(now.condition); });
+    send_if_due<can::SocAnchor>([&] { return messages::soc_anchor(now.condition); });
     if constexpr (Estimator::Model::errors_are_states)
-      send_if_due<can::SensorErrors>([&] { return messages::sensor_errors(estimate, capacity_ah_); });
-    send_if_due<can::Storage>([&] { return messages::storage(persistence); });
-    send_if_due_or_changed<can::Board>(board.alarming() != published_alarming_, [&] {
-      return messages::board(board.state, board.cell_file_changed, board.longest_sample_us);
+      send_if_due<can::SensorErrors>([&] { return messages::sensor_errors(now.estimate, now.capacity_ah); });
+    send_if_due<can::Storage>([&] { return messages::storage(now.persistence); });
+    send_if_due_or_changed<can::Board>(now.board.alarming() != published_alarming_, [&] {
+      return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
     });
-    published_alarming_ = board.alarming();
-    if (log_samples) log(mean);
-    send(messages::pack_state(estimate, condition));
-    send(messages::pack_electrical(pack));
-    send(messages::model_detail(estimate));
+    published_alarming_ = now.board.alarming();
+    if (now.log_samples) log(now.mean);
+    send(messages::pack_state(now.estimate, now.condition));
+    send(messages::pack_electrical(now.pack));
+    send(messages::model_detail(now.estimate));
     can::Status status;
-    status.flags = estimate.flags;
+    status.flags = now.estimate.flags;
     status.sample_counter = samples_;
     status.reset_cause = static_cast<std::uint32_t>(hal::reset_cause());
     send(status);
     ++published_;
   }
 
-  /// Samples of which all was told that is to be told, or to nobody; wraps.
+  /// Samples that were published completely, also those without a listener. Wraps.
   std::uint32_t published() const { return published_; }
 
   void answer(const can::CommandAnswer& answer) { send(answer); }
 
  private:
-  /// What is remembered of a message.
+  /// Time of the last frame of a message, and its counter.
   template <class Message>
   struct SendState : Cycle {
     std::uint8_t counter = 0;
@@ -105,13 +87,13 @@ class Telemetry {
     sent.counter = can::next(sent.counter);
   }
 
-  /// message(): made when it is due.
+  /// Calls message() only when it is due.
   template <class Message, class Make>
   void send_if_due(Make&& message) {
     if (std::get<SendState<Message>>(sent_).due(now_us_, Message::cycle_us)) send(message());
   }
 
-  /// When the message is due, or at once when what it says has changed.
+  /// Sends when the message is due, or at once when its content has changed.
   template <class Message, class Make>
   void send_if_due_or_changed(bool changed, Make&& message) {
     if (changed) std::get<SendState<Message>>(sent_).restart();
@@ -128,19 +110,17 @@ class Telemetry {
     published_outputs_ = d.outputs;
   }
 
-  void publish_cells(const measurement::PackSample<Cells>& pack,
-                     const estimator::PackCells<typename Estimator::Scalar, Cells>& cells,
-                     const protection::Decision& d) {
-    send_if_due<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(pack); });
+  void publish_cells(const Snapshot<Estimator, Cells>& now) {
+    send_if_due<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(now.pack); });
     if constexpr (Cells > 4)
-      send_if_due<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(pack); });
+      send_if_due<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(now.pack); });
     if constexpr (Cells > 8)
-      send_if_due<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(pack); });
+      send_if_due<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(now.pack); });
     if constexpr (Cells > 12)
-      send_if_due<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(pack); });
-    send_if_due<can::CellExtremes>([&] { return messages::cell_extremes(pack, cells); });
-    send_if_due<can::Temperatures>([&] { return messages::temperatures(pack); });
-    send_if_due<can::Balancing>([&] { return messages::balancing(d); });
+      send_if_due<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(now.pack); });
+    send_if_due<can::CellExtremes>([&] { return messages::cell_extremes(now.pack, now.cells); });
+    send_if_due<can::Temperatures>([&] { return messages::temperatures(now.pack); });
+    send_if_due<can::Balancing>([&] { return messages::balancing(now.decision); });
   }
 
   void publish_fault() {
@@ -171,7 +151,6 @@ class Telemetry {
   }
 
   messages::Identity identity_;
-  float capacity_ah_ = 0;
   std::optional<measurement::StartingPoint> start_;
   typename SendStatesOf<can::Messages>::type sent_{};
   estimator::EstimateHash hash_;

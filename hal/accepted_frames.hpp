@@ -5,28 +5,21 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "board_config.hpp"  // generated from boards/<board>/board.cmake: vehicle_profile, canopen_node
 #include "hal/sample_frames.hpp"
 
 namespace bms::hal {
 
 inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.hpp holds it to be the DBC file's
 
-// A board's build option says otherwise (cmake/firmware.cmake).
-#ifndef BMS_CANOPEN_NODE
-#define BMS_CANOPEN_NODE 1
-#endif
-#ifndef BMS_CANOPEN_CHARGER
-#define BMS_CANOPEN_CHARGER 10
-#endif
-inline constexpr std::uint16_t canopen_node = BMS_CANOPEN_NODE, canopen_charger = BMS_CANOPEN_CHARGER;
-
-/// Network management, and requests to the battery's SDO server, if the image is a CANopen node
+/// Network management and requests to the battery's SDO server, if the image is a CANopen node
 /// (firmware/cia418_profile.hpp).
-#if defined(BMS_VEHICLE_PROFILE_CIA418)
-inline constexpr std::array<std::uint16_t, 2> profile_ids{0x000, 0x600 + canopen_node};
-#else
-inline constexpr std::array<std::uint16_t, 0> profile_ids{};
-#endif
+inline constexpr auto profile_ids = [] {
+  if constexpr (vehicle_profile == VehicleProfile::cia418)
+    return std::array<std::uint16_t, 2>{0x000, 0x600 + canopen_node};
+  else
+    return std::array<std::uint16_t, 0>{};
+}();
 
 /// All of hal/sample_frames.hpp, commands, and those of the profile.
 inline constexpr auto accepted_ids = []() {

@@ -3,23 +3,12 @@
 // emulated/samples_stream (a recording through the debugger's file access).
 #pragma once
 
-#include <cstddef>
 #include <optional>
 
+#include "board_config.hpp"  // generated from boards/<board>/board.cmake: pack_cells, sample_period_s
 #include "measurement/pack_sample.hpp"
 
-// boards/<board>/board.cmake says otherwise
-#ifndef BMS_CELLS
-#define BMS_CELLS 1
-#endif
-#ifndef BMS_SAMPLE_PERIOD_S
-#define BMS_SAMPLE_PERIOD_S 0.1
-#endif
-
 namespace bms::hal {
-
-inline constexpr std::size_t pack_cells = BMS_CELLS;
-inline constexpr double sample_period_s = BMS_SAMPLE_PERIOD_S;
 
 /// Waits for the next sample; it stays until the next call. nullptr: there will be none (a replay has ended); never on
 /// a truck.

@@ -8,11 +8,12 @@ set(BMS_CAN slcan)
 set(BMS_SAMPLES emulated)
 set(BMS_CELLS 1)
 set(BMS_SAMPLE_PERIOD_S 1.0)
-# bytes that the chip's image may take: flash, static RAM, stack at its deepest; the longest that a sample may keep it busy (tests/firmware/board_budget.hpp)
+# Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
+# sample [ms] (tests/firmware/board_budget.hpp).
 set(BMS_BUDGET_FLASH 65536)
 set(BMS_BUDGET_RAM 16384)
 set(BMS_BUDGET_STACK 4096)
 set(BMS_BUDGET_SAMPLE_MS 50)
-# ./bms flash: OpenOCD's interface/ and target/
+# Debug probe and target for ./bms flash: file names in OpenOCD's interface/ and target/.
 set(BMS_PROBE stlink)
 set(BMS_PROBE_TARGET stm32f4x)

@@ -1,4 +1,5 @@
-# STM32F405RG, Cortex-M4F, on a forklift's 16-cell board. No emulator has its CAN controller; tests/firmware runs the image on a model of it.
+# STM32F405RG, Cortex-M4F, on the board of a forklift with 16 cells. No emulator has its CAN controller; tests/firmware
+# runs the image on a model of it.
 set(BMS_SCALAR_DEFINITION "")
 set(BMS_DEFAULT_CELL table9)
 set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/memory.ld)
@@ -10,11 +11,12 @@ set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)
 set(BMS_CAN_DEFINITION BMS_CAN_BIT_RATE=250000)
 set(BMS_SAMPLES bq76952)
-# bytes that the chip's image may take: flash, static RAM, stack at its deepest; the longest that a sample may keep it busy (tests/firmware/board_budget.hpp)
+# Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
+# sample [ms] (tests/firmware/board_budget.hpp).
 set(BMS_BUDGET_FLASH 65536)
 set(BMS_BUDGET_RAM 16384)
 set(BMS_BUDGET_STACK 4096)
 set(BMS_BUDGET_SAMPLE_MS 50)
-# ./bms flash: OpenOCD's interface/ and target/
+# Debug probe and target for ./bms flash: file names in OpenOCD's interface/ and target/.
 set(BMS_PROBE stlink)
 set(BMS_PROBE_TARGET stm32f4x)

@@ -332,7 +332,7 @@ extern "C" void can1_rx0_interrupt() {
   if ((status & rf_pending) == 0) return;
   const stm32f4::CanMailbox& box = stm32f4::can1_receive_fifo_0();
   const std::uint32_t length = box.length_and_time & 15U;
-  can::Frame frame{box.identifier >> 21, static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
+  bms::can::Frame frame{box.identifier >> 21, static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
   put_bytes<std::uint32_t>(frame.data, 0, box.data_low);
   put_bytes<std::uint32_t>(frame.data, 4, box.data_high);
   stm32f4::can1_rf0r() = rf_release;

@@ -112,7 +112,8 @@ inline std::vector<Message> messages_on_the_bus(double samples_per_second, doubl
   }
   if (profile == Profile::cia418) {
     all.push_back(
-        {"(heartbeat)", canopen::heartbeat_id + hal::canopen_node, 1, 1e-6 * canopen::Node::heartbeat_us, jitter_s});
+        {"(heartbeat)", firmware::canopen::heartbeat_id + hal::canopen_node, 1,
+         1e-6 * firmware::canopen::Node::heartbeat_us, jitter_s});
     for (const firmware::Cia418Profile::Pdo& pdo : firmware::Cia418Profile::pdos)
       all.push_back({pdo.name, pdo.id, pdo.length, 1e-6 * firmware::Cia418Profile::cycle_us, jitter_s});
   }
