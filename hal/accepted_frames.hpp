@@ -1,4 +1,4 @@
-// What the firmware listens to on the bus: a back end with acceptance filters lets nothing else in.
+// Identifiers that the firmware receives. A back end with acceptance filters rejects all others.
 #pragma once
 
 #include <array>
@@ -10,9 +10,9 @@
 
 namespace bms::hal {
 
-inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.hpp holds it to be the DBC file's
+inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.hpp compares it with the DBC file
 
-/// Network management and requests to the battery's SDO server, if the image is a CANopen node
+/// Network management and requests to the battery's SDO server, in an image that is a CANopen node
 /// (firmware/cia418_profile.hpp).
 inline constexpr auto profile_ids = [] {
   if constexpr (vehicle_profile == VehicleProfile::cia418)
@@ -21,7 +21,7 @@ inline constexpr auto profile_ids = [] {
     return std::array<std::uint16_t, 0>{};
 }();
 
-/// All of hal/sample_frames.hpp, commands, and those of the profile.
+/// Identifiers of hal/sample_frames.hpp, of commands and of the vehicle profile.
 inline constexpr auto accepted_ids = []() {
   constexpr std::size_t of_samples = last_sample_frame_id - first_sample_frame_id + 1;
   std::array<std::uint16_t, of_samples + 1 + profile_ids.size()> ids{};

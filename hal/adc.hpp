@@ -1,4 +1,4 @@
-// The converter of the chip: one conversion after the other. Back ends: stm32f4/adc.
+// The chip's own analog-to-digital converter, one conversion per call. Back ends: stm32f4/adc.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,14 @@ namespace bms::hal {
 
 enum class AnalogInput : std::uint8_t { voltage, current, temperature, reference };
 
+/// Configures pins and converter. Call once, before the first conversion.
 void adc_start();
 
-/// 0 to 4,095; nothing when the converter does not get ready. 5 us, the reference 24 us; 50 us at most.
+/// Returns 0 to 4,095, or nothing if the conversion does not finish. Takes 5 us, for the reference 24 us, at most 50
+/// us.
 std::optional<std::uint16_t> adc_convert(AnalogInput input);
 
-/// What the reference read at the maker's, at a supply of 3.3 V.
+/// Counts of the internal reference at a supply of 3.3 V, as the manufacturer measured them on this chip.
 std::uint16_t adc_reference_at_3v3();
 
 }  // namespace bms::hal

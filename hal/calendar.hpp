@@ -1,5 +1,5 @@
-// A clock that goes on while the power is off. Back ends: stm32f4/calendar (its own supply and crystal),
-// emulated/calendar (the host's), absent/calendar (a board without a battery for it).
+// Calendar clock that runs while the power is off. Back ends: stm32f4/calendar (own supply and crystal),
+// emulated/calendar (the host's clock), absent/calendar (a board without a backup battery).
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace bms::hal {
 
-/// Once, before the others; does not wait.
+/// Call once, before the other functions. Returns at once.
 void calendar_start();
 
-/// Seconds since 1970-01-01 UTC; nothing where no clock runs on, none was set, or its supply was away.
+/// Seconds since 1970-01-01 UTC; nothing if the board has no calendar clock, it was not set, or it lost its supply.
 std::optional<std::uint32_t> calendar_s();
 
-/// 2000-01-01 to 2099-12-31. False: not taken (another time, no clock), or not yet: its oscillator may need five
-/// seconds from the start of the board.
+/// unix_s: 2000-01-01 to 2099-12-31. Returns false if the time is outside this range, if the board has no calendar
+/// clock, or if its oscillator is not ready yet: it may need five seconds after the start of the board.
 bool calendar_set(std::uint32_t unix_s);
 
 CalendarState calendar_state();

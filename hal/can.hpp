@@ -1,8 +1,7 @@
-// A classic CAN bus: frames out, standard ones and those of 29 bits; standard ones in. Sending may wait for the line,
-// receiving never does. Back ends: stm32f4/bxcan (a real bus), slcan/ (text over a UART), absent/ (nobody listens).
+// A classic CAN bus: sends standard and 29-bit frames, receives standard frames. Sending may wait for the line,
+// receiving never does. Back ends: stm32f4/bxcan (a real bus), slcan/ (text over a UART), absent/ (no bus).
 //
-// can_receive() and can_listening() look after the bus beside: starting, errors, bus-off. Call one of them every 10 ms
-// or so.
+// can_receive() and can_listening() also handle start, errors and bus-off. Call one of them about every 10 ms.
 #pragma once
 
 #include <cstdint>
@@ -11,41 +10,39 @@
 
 namespace bms::hal {
 
-/// Never waits: the bus is up when can_health() says so.
+/// Returns at once. can_health() shows when the node is on the bus.
 void can_start();
 
-/// Whether anybody would hear a frame: a bus that is up and acknowledges what is sent, an SLCAN channel that was
-/// opened.
+/// Returns true if another node would receive a frame: the bus is up and acknowledges, or the SLCAN channel is open.
 bool can_listening();
 
-/// False when the frame could not be queued: it, or a less urgent one, is dropped.
+/// Returns false if the queue was full and this frame or a less urgent one was dropped.
 bool can_send(const can::Frame& frame);
 
-/// The next received frame, if there is one.
+/// Returns true and the next received frame, or false if no frame waits.
 bool can_receive(can::Frame& frame);
 
-/// Fault confinement of ISO 11898-1, by the error counters.
+/// Fault confinement state of ISO 11898-1, from the error counters.
 enum class CanState : std::uint8_t {
   absent = 0,    ///< no bus on this board
-  starting = 1,  ///< not on the bus: it was not idle yet, the clock is not good enough, the SLCAN channel is closed
+  starting = 1,  ///< not on the bus: no idle bus yet, crystal failed, or SLCAN channel closed
   active = 2,
-  warning = 3,  ///< an error counter has reached 96
-  passive = 4,  ///< 128
+  warning = 3,  ///< an error counter is 96 or more
+  passive = 4,  ///< an error counter is 128 or more
   bus_off = 5,  ///< transmit errors above 255
 };
 
 struct CanHealth {
   CanState state = CanState::absent;
   std::uint8_t transmit_errors = 0, receive_errors = 0;  ///< counters of ISO 11898-1
-  // since boot; they wrap
-  std::uint32_t sent = 0;      ///< frames that another node has acknowledged
+  // Counters since boot; they wrap.
+  std::uint32_t sent = 0;      ///< frames that another node acknowledged
   std::uint32_t received = 0;  ///< frames
-  std::uint32_t dropped = 0;   ///< frames given to can_send() that did not get out
-  std::uint32_t lost =
-      0;  ///< frames (SLCAN: bytes) that came and found no place: nobody had called can_receive() in time
-  std::uint32_t overruns = 0;  ///< times that the controller's own buffer was full, a frame or more each
+  std::uint32_t dropped = 0;   ///< frames given to can_send() that were not sent
+  std::uint32_t lost = 0;      ///< received frames (SLCAN: bytes) lost because can_receive() was called too rarely
+  std::uint32_t overruns = 0;  ///< times that the controller's FIFO was full; each lost one frame or more
   std::uint32_t bus_offs = 0;
-  std::uint32_t failed_starts = 0;  ///< times that the bus did not become idle: a wire that is stuck, another bit rate
+  std::uint32_t failed_starts = 0;  ///< times that the bus did not become idle: stuck wire, or another bit rate
 };
 CanHealth can_health();
 

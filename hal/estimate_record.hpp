@@ -1,4 +1,4 @@
-// Where every estimate is kept word for word. Back ends: emulated/samples_stream (a file), absent/ (nowhere).
+// Destination of every estimate in a replay. Back ends: emulated/samples_stream (a file), absent/ (discards it).
 #pragma once
 
 #include <cstdint>
@@ -6,6 +6,7 @@
 
 namespace bms::hal {
 
+/// words: one estimate, as the host compares it bit by bit.
 void record_estimate(std::span<const std::uint32_t> words);
 
 }  // namespace bms::hal

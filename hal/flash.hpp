@@ -2,17 +2,18 @@
 //
 //   erase     sets every bit of one sector
 //   program   clears bits of one word; a word is programmed once between two erases, or again with the same value or
-//   with 0 read      any bytes
+//             with 0
+//   read      any bytes
 //
-// A loss of power while a word is programmed leaves any of its bits cleared, one while a sector is erased leaves
-// anything in it; bits that were on their way may read differently each time. Neither call checks what was written: who
-// needs that reads it back.
+// A loss of power while a word is programmed may clear any of its bits; while a sector is erased it leaves undefined
+// content. Bits that were being changed may read differently each time. Erase and program do not verify; a caller that
+// needs it reads the content back.
 //
-// Time: a word 16 us (100 at most), an erase of 16 KiB 250 ms (500 at most; STM32F405 datasheet DS8626, "Flash memory
-// programming", x32). The chip has one bank: a core that runs from flash stands still meanwhile, interrupts too, and
-// SysTick loses what it would have counted.
+// Time: a word 16 us (at most 100), an erase of 16 KiB 250 ms (at most 500; STM32F405 datasheet DS8626, "Flash memory
+// programming", x32). The chip has one bank: a core that runs from flash stops meanwhile, including its interrupts, and
+// SysTick loses that time.
 //
-// Back ends: stm32f4/ (sectors set aside in the board's memory.ld), emulated/ (a file through the debugger, or RAM),
+// Back ends: stm32f4/ (sectors reserved in the board's memory.ld), emulated/ (a file through the debugger, or RAM),
 // absent/ (none).
 #pragma once
 
@@ -22,20 +23,20 @@
 namespace bms::hal {
 
 struct FlashSize {
-  std::uint32_t sectors = 0;  ///< 0: there is no flash for data
+  std::uint32_t sectors = 0;  ///< 0: no flash for data
   std::uint32_t sector_bytes = 0;
 };
 
-/// Before any other call.
+/// Call before the other functions.
 FlashSize flash_start();
 
-/// False when the chip reports an error or does not get ready; the content is anything then.
+/// Returns false if the chip reports an error or does not finish; the content is then undefined.
 bool flash_erase(std::uint32_t sector);
 
-/// at: bytes from the sector's beginning, a multiple of 4. False as above.
+/// at: bytes from the beginning of the sector, a multiple of 4. Returns false as flash_erase() does.
 bool flash_program(std::uint32_t sector, std::uint32_t at, std::uint32_t word);
 
-/// Inside one sector.
+/// Reads within one sector. at: bytes from its beginning.
 void flash_read(std::uint32_t sector, std::uint32_t at, std::span<std::uint8_t> into);
 
 }  // namespace bms::hal

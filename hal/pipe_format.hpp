@@ -1,10 +1,10 @@
-// The records of emulated/can_pipe.cpp, which hil/emulated_link.cpp speaks on the other side:
+// Record format between emulated/can_pipe.cpp on the board and hil/emulated_link.cpp on the host:
 //
 //   record    u32 id, u8 length, u8 of_block, u8 long_id, u8 0, u8 data[8]        little-endian, 16 bytes
-//   block     records; of_block: how many of this block are left after this one, 255 at most
+//   block     up to 128 records; of_block: number of records that follow in this block
 //
-// A block to the board begins with a record of length `tick`, whose data are the time; an empty block from it is one
-// record of length `nothing`.
+// A block to the board begins with a record of length `tick`, whose data are the time [us]. An empty block from the
+// board is one record of length `nothing`.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ inline constexpr std::size_t record_size = 16, length_at = 4, of_block_at = 5, l
                              most_records = 128;
 inline constexpr std::uint8_t nothing = 0xFF, tick = 0xFE;
 
-/// All but of_block.
+/// Writes all fields except of_block.
 constexpr void put(std::span<std::uint8_t> record, const can::Frame& frame) {
   put_bytes(record, 0, frame.id);
   record[length_at] = frame.length;

@@ -1,5 +1,5 @@
-// Bytes on their way from a serial port's interrupt to the program. One writer, one reader: the indices need no lock on
-// a single core.
+// Bytes from a serial port's interrupt to the program. One writer, one reader: on a single core the indices need no
+// lock.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@ namespace bms::hal {
 
 class ReceivedBytes {
  public:
-  /// From the interrupt. What does not fit is lost and counted.
+  /// Called by the interrupt. A byte that does not fit is lost and counted.
   void push(char byte) {
     const std::uint32_t at = head_.load(std::memory_order_relaxed);
     if (at - tail_.load(std::memory_order_acquire) == buffer_.size()) {
@@ -21,7 +21,7 @@ class ReceivedBytes {
     head_.store(at + 1, std::memory_order_release);
   }
 
-  /// From the program; false: there is none.
+  /// Called by the program. Returns false if no byte is waiting.
   bool pop(char& byte) {
     const std::uint32_t at = tail_.load(std::memory_order_relaxed);
     if (at == head_.load(std::memory_order_acquire)) return false;

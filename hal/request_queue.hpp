@@ -1,5 +1,5 @@
-// Frames that came between the samples and wait for next_request() (hal/requests.hpp). Eight are kept; of more, the
-// oldest.
+// Frames that arrived between the samples and wait for next_request() (hal/requests.hpp). Holds eight frames; while it
+// is full, new frames are dropped.
 #pragma once
 
 #include <array>

@@ -1,15 +1,17 @@
-// Samples over CAN, for boards whose measuring chain is not there: the last frame completes the sample. Identifiers
-// ascend in the order of sending, so that a node that sends by them keeps it.
+// Samples as CAN frames, for boards without a measuring chain of their own. The last frame completes the sample.
+// Identifiers ascend in sending order, so a node that sends by priority keeps the order.
 //
-//   0x310  i32 soc_ppb, i32 soc_sigma_ppb            the starting point, before the first sample
-//   0x311  u32 CRC-32, u16 frames, u16 counter       optional: over id and data of all that follow up to the time; how
-//   many they are 0x312  i32 current_ua, i32 voltage_uv            of a pack: over all cells 0x313  i32 dc_link_uv, i32
-//   0 optional: on the load's side of the contactors 0x314 to 0x31B  i32 uv, i32 uv                   of a pack: cells
-//   1 and 2, 3 and 4, ... 0x31C  4 x i16 temperature_cdegc                 of a pack 0x31D  u48 time_us, i16
-//   temperature_cdegc        completes the sample; of a pack: no temperature
+//   0x310           i32 soc_ppb, i32 soc_sigma_ppb       starting point, before the first sample
+//   0x311           u32 CRC-32, u16 frames, u16 counter  optional check: CRC over identifier and data of all following
+//                                                        frames up to 0x31D; `frames` is their number
+//   0x312           i32 current_ua, i32 voltage_uv       of a pack: voltage over all cells
+//   0x313           i32 dc_link_uv, i32 0                optional: load side of the contactors
+//   0x314 to 0x31B  i32 uv, i32 uv                       of a pack: cells 1 and 2, 3 and 4, ...
+//   0x31C           4 x i16 temperature_cdegc            of a pack
+//   0x31D           u48 time_us, i16 temperature_cdegc   completes the sample; of a pack: no temperature
 //
-// A frame that gets lost is a missing reading; with a check before it, a sample of which a bit or a frame is wrong is
-// none.
+// A lost frame makes its readings missing. With a check frame, a sample with a wrong bit or a missing frame is
+// rejected as a whole.
 #pragma once
 
 #include <array>
@@ -29,12 +31,12 @@ inline constexpr std::uint16_t start_frame_id = 0x310, check_frame_id = 0x311, r
                                time_frame_id = 0x31D, first_sample_frame_id = start_frame_id,
                                last_sample_frame_id = time_frame_id;
 
-/// Whether the frame is one of these.
+/// Returns true if the identifier belongs to a sample or a starting point.
 constexpr bool is_sample_frame(const can::Frame& frame) {
   return !frame.long_id && frame.id >= first_sample_frame_id && frame.id <= last_sample_frame_id;
 }
 
-/// CRC-32 (IEEE 802.3) of what a check covers, continued: begins with ~0, ends inverted.
+/// Adds identifier and data of one frame to a CRC-32 (IEEE 802.3); initial value ~0, final value inverted.
 constexpr std::uint32_t update_crc(std::uint32_t crc, const can::Frame& frame) {
   const auto add_byte = [&](std::uint8_t byte) {
     crc ^= byte;
@@ -55,10 +57,11 @@ constexpr std::array<can::Frame, 2> frames_of(const measurement::Sample& s) {
   return frames;
 }
 
-/// Frames of a pack's sample, cells in pairs, with a check before them.
+/// Number of frames of a pack's sample: check, current, DC link, cells in pairs, temperatures, time.
 template <std::size_t Cells>
 inline constexpr std::size_t pack_frames = 5 + (Cells + 1) / 2;
 
+/// counter: sequence number of the sample, any start value.
 template <std::size_t Cells>
 constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement::PackSample<Cells>& s,
                                                                std::int32_t dc_link_uv, std::uint16_t counter) {
@@ -98,12 +101,12 @@ constexpr can::Frame frame_of(const measurement::StartingPoint& p) {
   return frame;
 }
 
-/// Frames to samples.
+/// Assembles samples from frames.
 template <std::size_t Cells>
 class SampleFrames {
  public:
-  /// True when `frame` completed a sample, which sample() then holds until the next frame. Frames of another length or
-  /// number change nothing.
+  /// Returns true if `frame` completed a valid sample, which sample() holds until the next call. Frames with another
+  /// length or identifier change nothing.
   constexpr bool receive(const can::Frame& frame) {
     if (frame.length != 8 || !is_sample_frame(frame) || frame.id == start_frame_id) return false;
     if (done_) begin();
@@ -141,8 +144,8 @@ class SampleFrames {
   }
 
   constexpr const measurement::PackSample<Cells>& sample() const { return building_; }
-  constexpr std::int32_t dc_link_uv() const { return dc_link_uv_; }  ///< measurement::no_reading: nobody says
-  constexpr std::uint32_t rejected() const { return rejected_; }     ///< samples that were not what was checked
+  constexpr std::int32_t dc_link_uv() const { return dc_link_uv_; }  ///< [uV]; no_reading: not received
+  constexpr std::uint32_t rejected() const { return rejected_; }     ///< samples with a wrong CRC or frame count
 
  private:
   constexpr void begin() {

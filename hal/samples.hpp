@@ -1,6 +1,6 @@
-// Where measurements come from, as the estimator takes them.
-// Back ends: bq76952/samples (a monitoring chip), remote/samples (another node), emulated/samples_can (frames),
-// emulated/samples_stream (a recording through the debugger's file access).
+// Source of the measurements for estimator and protection.
+// Back ends: bq76952/samples (a monitoring chip), adc/samples (the chip's own converter), remote/samples (another
+// node), emulated/samples_can (CAN frames), emulated/samples_stream (a recording through the debugger's files).
 #pragma once
 
 #include <optional>
@@ -10,11 +10,11 @@
 
 namespace bms::hal {
 
-/// Waits for the next sample; it stays until the next call. nullptr: there will be none (a replay has ended); never on
+/// Waits for the next sample, which stays valid until the next call. Returns nullptr when a replay has ended; never on
 /// a truck.
 const measurement::PackSample<pack_cells>* next_sample();
 
-/// What is known of the state of charge before the first sample. Asked once, after the first next_sample().
+/// Known state of charge before the first sample, if any. Call once, after the first next_sample().
 std::optional<measurement::StartingPoint> starting_point();
 
 }  // namespace bms::hal

@@ -1,15 +1,14 @@
-// A supply that sinks: what is to be kept is kept while there is still some. Back ends: stm32f4/supply; absent/supply
-// (nobody watches it).
+// Falling supply voltage: the firmware stores its data while the supply still lasts. Back ends: stm32f4/supply,
+// absent/supply (the supply is not monitored).
 #pragma once
 
 namespace bms::hal {
 
-/// Wherever main() waits.
+/// Calls supply_failing() once after each fall of the supply. Call it wherever main() waits.
 void supply_attend();
 
-/// The firmware's own (firmware/main.cpp): called by supply_attend() once each time the supply has fallen below its
-/// threshold; no longer than one record takes, 0.2 ms, 1.2 at most. A function by name, not by pointer: how deep the
-/// stack gets is read from the image.
+/// Defined by the firmware (firmware/main.cpp): stores one record, which takes 0.2 ms, at most 1.2 ms. It is called by
+/// name, not through a pointer, so that the stack depth can be computed from the image.
 void supply_failing();
 
 }  // namespace bms::hal

@@ -1,4 +1,4 @@
-// One serial port, 8N1. Received bytes are buffered by interrupt; what nobody reads in time is lost and counted.
+// One serial port, 8N1. An interrupt buffers the received bytes; bytes that do not fit are lost and counted.
 #pragma once
 
 #include <cstdint>
@@ -6,11 +6,13 @@
 
 namespace bms::hal {
 
+/// baud: bits per second.
 void uart_start(std::uint32_t baud);
 
 /// Returns when the last byte is in the transmitter.
 void uart_write(std::span<const char> bytes);
 
+/// Returns false if no byte is waiting.
 bool uart_read(char& byte);
 
 /// Bytes lost because the buffer was full.

@@ -102,6 +102,7 @@ BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& i
   ChildProcess qemu(command, log);
 
   BoardRun run;
+  static_assert(estimator::estimate_words == hal::words_per_estimate);
   const std::size_t row = sizeof(estimator::EstimateWords) + states * sizeof(std::uint32_t);
   std::string bytes(samples.size() * row, '\0');
   std::size_t have = 0, first_block = 0;

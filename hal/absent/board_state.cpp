@@ -1,4 +1,4 @@
-// Nothing is known against it.
+// No self-tests: reports no fault.
 #include "hal/board_state.hpp"
 
 namespace bms::hal {

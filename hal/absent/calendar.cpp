@@ -1,4 +1,4 @@
-// Time stops with the power.
+// No calendar clock.
 #include "hal/calendar.hpp"
 
 namespace bms::hal {

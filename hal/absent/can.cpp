@@ -1,4 +1,4 @@
-// A bus that nobody listens to.
+// No CAN bus.
 #include "hal/can.hpp"
 
 namespace bms::hal {

@@ -1,4 +1,4 @@
-// Estimates are kept nowhere.
+// Discards the estimates.
 #include "hal/estimate_record.hpp"
 
 namespace bms::hal {

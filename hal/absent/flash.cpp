@@ -1,4 +1,4 @@
-// No flash for data: nothing is kept.
+// No flash for data: nothing is stored.
 #include "hal/flash.hpp"
 
 namespace bms::hal {

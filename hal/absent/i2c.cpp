@@ -1,4 +1,4 @@
-// A bus with nobody on it.
+// A bus without devices.
 #include "hal/i2c.hpp"
 
 namespace bms::hal {

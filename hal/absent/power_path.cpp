@@ -1,4 +1,4 @@
-// Nothing to switch.
+// No contactors.
 #include "hal/power_path.hpp"
 
 #include "measurement/sample.hpp"

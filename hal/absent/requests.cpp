@@ -1,4 +1,4 @@
-// Nobody asks.
+// No requests.
 #include "hal/requests.hpp"
 
 namespace bms::hal {

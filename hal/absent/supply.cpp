@@ -1,4 +1,4 @@
-// Nobody watches the supply.
+// The supply is not monitored.
 #include "hal/supply.hpp"
 
 namespace bms::hal {

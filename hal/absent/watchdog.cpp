@@ -1,4 +1,4 @@
-// No watchdog: a replay runs faster than any clock, and a write to a register that QEMU does not have costs as much as
+// No watchdog: a replay runs faster than real time, and a write to a register that QEMU does not have costs as much as
 // half an estimate.
 #include "hal/watchdog.hpp"
 

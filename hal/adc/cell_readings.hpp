@@ -1,17 +1,18 @@
-// What a converter's counts mean on a single-cell board: volts, amperes, degrees of one cell, in the integers of a
-// sample.
+// Conversion of converter counts of a single-cell board to voltage, current and temperature of a sample.
 //
-//   supply      = 3.3 V * reference_at_3v3 / reference       the internal reference, measured by the same converter
-//   (RM0090, 13.10) pin         = supply * counts / 4095 voltage     = pin * divider                              times
-//   (1 + gain), plus offset current     = (pin - supply / 2) / (amplifier * shunt)   times (1 + gain), plus offset; > 0
-//   charges temperature = of a 10 kohm thermistor 103AT, pulled up to the supply by 10 kohm: straight lines between the
-//   maker's values each 10 K, off by 0.45 K at most from -25 to 85 degrees C
+//   supply      = 3.3 V * reference_at_3v3 / reference       internal reference, same converter (RM0090, 13.10)
+//   pin         = supply * counts / 4095
+//   voltage     = pin * divider                              times (1 + gain), plus offset
+//   current     = (pin - supply / 2) / (amplifier * shunt)   times (1 + gain), plus offset; > 0 charges
+//   temperature   thermistor 103AT of 10 kohm, pulled up to the supply by 10 kohm; linear between the manufacturer's
+//                 values each 10 K, with an error of at most 0.45 K from -25 to 85 degrees C
 //
-// Counts are sums over many conversions: their noise averages the converter's steps out (0.8 mV at the pin, AN2834 of
-// ST). A converter that says nothing, a supply beyond 2.4 to 3.6 V: no reading; a thermistor that is off or shorted: no
-// temperature. An amplifier at its rail gives its range, which is above the short-circuit threshold.
+// Counts are sums over many conversions; their noise averages out the converter's steps (0.8 mV at the pin, ST AN2834).
+// There is no reading if the converter does not answer or the supply is outside 2.4 to 3.6 V, and no temperature if the
+// thermistor is open or shorted. A saturated amplifier gives its full range, which is above the short-circuit
+// threshold.
 //
-// All in integers of 64 bits; cost: 5 divisions, some 600 instructions a sample (Cortex-M4F).
+// 64-bit integers only. Cost: 5 divisions, about 600 instructions per sample (Cortex-M4F).
 #pragma once
 
 #include <array>
@@ -23,14 +24,14 @@
 
 namespace bms::hal::adc {
 
-/// What stands between the cell and the pins.
+/// Divider, amplifier and shunt between the cell and the pins.
 struct AnalogFrontEnd {
-  std::int32_t divider_ppm = 2'000'000;  ///< cell over pin: two equal resistors
-  std::int32_t amplifier = 20;           ///< of the shunt's voltage, around half the supply (INA240A1)
-  std::int32_t shunt_uohm = 2'000;       ///< +-41 A
+  std::int32_t divider_ppm = 2'000'000;  ///< cell voltage / pin voltage: two equal resistors
+  std::int32_t amplifier = 20;           ///< gain for the shunt voltage, around half the supply (INA240A1)
+  std::int32_t shunt_uohm = 2'000;       ///< range +-41 A
 };
 
-/// Sums, and of how many conversions each.
+/// Sums of converter counts and the number of conversions in them.
 struct AdcCounts {
   std::uint32_t n = 0, voltage = 0, current = 0, temperature = 0;
   std::uint32_t n_reference = 0, reference = 0;
@@ -43,7 +44,7 @@ namespace detail {
 struct Point {
   std::int32_t cdegc, ohm;
 };
-/// Semitec, AT thermistors, 103AT.
+/// Data sheet of Semitec, AT thermistors, 103AT.
 inline constexpr std::array<Point, 13> thermistor{{{-3'000, 111'300},
                                                    {-2'000, 67'770},
                                                    {-1'000, 42'470},
@@ -59,8 +60,8 @@ inline constexpr std::array<Point, 13> thermistor{{{-3'000, 111'300},
                                                    {9'000, 1'266}}};
 inline constexpr std::int32_t pull_up_ohm = 10'000;
 
-/// Of the supply, in millionths: falls with temperature.
-constexpr std::int32_t share_ppm(std::int32_t ohm) {
+/// Pin voltage / supply of a thermistor with `ohm`, in 1e-6. Falls with temperature.
+constexpr std::int32_t ratio_ppm(std::int32_t ohm) {
   return static_cast<std::int32_t>(1'000'000LL * ohm / (ohm + pull_up_ohm));
 }
 
@@ -70,19 +71,20 @@ constexpr std::int64_t rounded_quotient(std::int64_t a, std::int64_t by) {
 
 }  // namespace detail
 
-/// Beyond the ends of the table the last line goes on, a little; what no thermistor gives is no temperature.
-constexpr std::int16_t temperature_of(std::int32_t share_ppm) {
+/// ratio_ppm: pin voltage / supply, 1e-6. Extrapolates the first and the last line of the table to -40 and 100 degrees
+/// C; beyond, a thermistor is open or shorted: no_temperature.
+constexpr std::int16_t temperature_of(std::int32_t ratio_ppm) {
   using namespace detail;
-  if (share_ppm > 960'000 || share_ppm < 80'000) return measurement::no_temperature;  // below -40, above 100 degrees C
+  if (ratio_ppm > 960'000 || ratio_ppm < 80'000) return measurement::no_temperature;  // below -40, above 100 degrees C
   std::size_t k = 1;
-  while (k + 1 < thermistor.size() && share_ppm < detail::share_ppm(thermistor[k].ohm)) ++k;
+  while (k + 1 < thermistor.size() && ratio_ppm < detail::ratio_ppm(thermistor[k].ohm)) ++k;
   const Point warm = thermistor[k], cold = thermistor[k - 1];
-  const std::int32_t from = detail::share_ppm(cold.ohm), to = detail::share_ppm(warm.ohm);
+  const std::int32_t from = detail::ratio_ppm(cold.ohm), to = detail::ratio_ppm(warm.ohm);
   return static_cast<std::int16_t>(
-      cold.cdegc + rounded_quotient(std::int64_t{share_ppm - from} * (warm.cdegc - cold.cdegc), to - from));
+      cold.cdegc + rounded_quotient(std::int64_t{ratio_ppm - from} * (warm.cdegc - cold.cdegc), to - from));
 }
 
-/// reference_at_3v3: counts that the maker has measured of this chip. The time is left alone.
+/// Writes all fields of `into` except the time. reference_at_3v3: adc_reference_at_3v3() of hal/adc.hpp.
 constexpr void read(const AdcCounts& c, std::uint32_t reference_at_3v3, const AnalogFrontEnd& front_end,
                     const SensorCalibration& calibration, measurement::Sample& into) {
   using detail::rounded_quotient;

@@ -1,8 +1,8 @@
-// Samples of one cell by the chip's own converter, one each period of the board's clock: each millisecond a conversion
-// of every input, four of the current, summed up. A sample is their mean: what a current did in between is in it, but
-// for the millisecond in which the last sample was worked on.
+// Samples of one cell by the chip's own converter, one per period of the board's clock. Every millisecond each input is
+// converted once, the current four times. A sample is the mean of these, so it contains current changes within the
+// period, except in the millisecond in which the last sample was processed.
 //
-// The load is switched by pins; nothing is measured behind them.
+// Contactors are switched by pins; the DC link is not measured.
 #include "hal/samples.hpp"
 #include "hal/adc.hpp"
 #include "hal/adc/cell_readings.hpp"
@@ -20,24 +20,24 @@ namespace {
 static_assert(pack_cells == 1);
 constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
 constexpr adc::AnalogFrontEnd front_end;
-constexpr std::uint32_t currents_a_round = 4;
+constexpr std::uint32_t currents_per_round = 4;
 
 SensorCalibration correction;
 measurement::PackSample<1> pack;
 std::uint64_t due_us = 0;
 bool started = false;
 
-void hear_the_bus() {
+void receive_frames() {
   can::Frame frame;
   while (can_receive(frame)) dispatch_frame(frame);
 }
 
-/// One of each; a round that is not whole counts for nothing.
+/// Adds one conversion of each input, four of the current. Adds nothing if one of them fails.
 void convert(adc::AdcCounts& sums) {
   const auto voltage = adc_convert(AnalogInput::voltage), temperature = adc_convert(AnalogInput::temperature),
              reference = adc_convert(AnalogInput::reference);
   std::uint32_t current = 0;
-  for (std::uint32_t k = 0; k < currents_a_round; ++k) {
+  for (std::uint32_t k = 0; k < currents_per_round; ++k) {
     const auto one = adc_convert(AnalogInput::current);
     if (!one) return;
     current += *one;
@@ -62,14 +62,14 @@ const measurement::PackSample<1>* next_sample() {
     due_us = now_us() + period_us;
   }
   adc::AdcCounts sums;
-  for (hear_the_bus(); now_us() < due_us; hear_the_bus()) {
+  for (receive_frames(); now_us() < due_us; receive_frames()) {
     wait_for_interrupt();
     convert(sums);
   }
   measurement::Sample sample;
   sample.time_us = now_us();
   due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
-  sums.current = (sums.current + currents_a_round / 2) / currents_a_round;
+  sums.current = (sums.current + currents_per_round / 2) / currents_per_round;
   adc::read(sums, adc_reference_at_3v3(), front_end, correction, sample);
   pack.time_us = sample.time_us;
   pack.current_ua = sample.current_ua;

@@ -12,14 +12,14 @@ namespace bms::hal::bq76952 {
 namespace {
 
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
-constexpr std::size_t settings_a_sample = 8;
-constexpr std::uint8_t patience = 5;        // samples, for a mode to be entered or left
-constexpr std::uint8_t most_failures = 2;   // samples in a row
-constexpr std::uint8_t scan_is_old = 2;     // samples without everything measured once
-constexpr std::uint8_t charge_is_old = 15;  // samples: 1.5 s of a counter of seconds
-constexpr std::uint64_t tell_again_us = 5'000'000;
+constexpr std::size_t settings_per_sample = 8;
+constexpr std::uint8_t max_wait_samples = 5;   // until a mode is entered or left
+constexpr std::uint8_t max_failures = 2;       // samples in a row
+constexpr std::uint8_t max_scan_age = 2;       // samples without a complete scan
+constexpr std::uint8_t max_charge_still = 15;  // samples: 1.5 s of a counter of seconds
+constexpr std::uint64_t refresh_interval_us = 5'000'000;
 
-/// Until the chip has taken what was written.
+/// Waits until the chip has processed what was written.
 void settle() {
   const std::uint64_t since = now_us();
   while (now_us() - since < 2'000) wait_for_interrupt();
@@ -33,7 +33,7 @@ std::int16_t cdegc(std::int16_t tenth_k) {
   const int value = tenth_k * 10 - 27'315;
   const auto narrow = static_cast<std::int16_t>(
       std::clamp<int>(value, std::numeric_limits<std::int16_t>::min(), std::numeric_limits<std::int16_t>::max()));
-  return measurement::temperature_possible(narrow) ? narrow : measurement::no_temperature;  // an open or shorted sensor
+  return measurement::temperature_possible(narrow) ? narrow : measurement::no_temperature;  // open or shorted sensor
 }
 
 }  // namespace
@@ -46,21 +46,32 @@ void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   if (state_ == State::measure) {
     if (measure(into))
       failures_ = 0;
-    else if (state_ == State::measure && ++failures_ >= most_failures)
+    else if (state_ == State::measure && ++failures_ >= max_failures)
       reset_measurement();
-    if (into.current_ua == measurement::no_reading) mean_current_.lose();
+    if (into.current_ua == measurement::no_reading) mean_current_.reset();
     return;
   }
   if (state_ == State::absent && now_us() < next_try_us_) return;
-  const bool good = state_ == State::absent    ? find()
-                    : state_ == State::compare ? compare()
-                    : state_ == State::enter   ? enter()
-                    : state_ == State::write   ? write()
-                                               : leave();
-  if (!good) rest();
+  if (!advance()) rest();
 }
 
-/// Not there, or not as it should be: later again.
+/// One step towards measuring. Returns false if the chip is missing or not as expected.
+bool FrontEnd::advance() {
+  switch (state_) {
+    case State::absent:
+      return detect();
+    case State::compare:
+      return compare();
+    case State::enter:
+      return enter();
+    case State::write:
+      return write();
+    default:
+      return leave();
+  }
+}
+
+/// Tries again later, after twice the last rest.
 void FrontEnd::rest() {
   state_ = State::absent;
   rest_us_ = rest_us_ == 0 ? first_rest_us : std::min(2 * rest_us_, longest_rest_us);
@@ -75,9 +86,9 @@ void FrontEnd::reset_measurement() {
   failures_ = 0;
 }
 
-bool FrontEnd::find() {
+bool FrontEnd::detect() {
   std::uint16_t status = 0;
-  if (!wire_.find(status)) return false;
+  if (!wire_.detect(status)) return false;
   std::array<std::uint8_t, 2> number{};
   if (!wire_.select(get_device_number)) return false;
   settle();
@@ -101,9 +112,9 @@ bool FrontEnd::find() {
   return wire_.select(sleep_disable);
 }
 
-/// Blocks of the data memory against the settings that lie in them. False: it could not be read.
-bool FrontEnd::memory_is_right(bool& right) {
-  right = true;
+/// Compares the data memory, block by block, with the settings. Returns false if it could not be read.
+bool FrontEnd::compare_memory(bool& matches) {
+  matches = true;
   for (std::size_t k = 0; k < settings_.size();) {
     const std::uint16_t begin = settings_[k].address;
     std::array<std::uint8_t, buffer_bytes> block{};
@@ -113,7 +124,7 @@ bool FrontEnd::memory_is_right(bool& right) {
     for (; k < settings_.size() && settings_[k].address + settings_[k].bytes <= begin + buffer_bytes; ++k) {
       if (get_bytes<std::uint32_t>(block, static_cast<std::size_t>(settings_[k].address - begin), settings_[k].bytes) !=
           settings_[k].value)
-        right = false;
+        matches = false;
     }
   }
   return true;
@@ -121,12 +132,12 @@ bool FrontEnd::memory_is_right(bool& right) {
 
 bool FrontEnd::compare() {
   std::uint16_t status = 0;
-  bool right = false;
-  if (!wire_.find(status) || !memory_is_right(right)) return false;
+  bool matches = false;
+  if (!wire_.detect(status) || !compare_memory(matches)) return false;
   waited_ = 0;
   swapped_ = false;
   next_setting_ = 0;
-  if (right && (status & (was_reset | in_config_update)) == 0) {
+  if (matches && (status & (was_reset | in_config_update)) == 0) {
     state_ = State::leave;
     return true;
   }
@@ -136,14 +147,14 @@ bool FrontEnd::compare() {
 
 bool FrontEnd::enter() {
   std::uint16_t status = 0;
-  if (!wire_.find(status)) return false;
-  if ((status & in_config_update) == 0) return ++waited_ < patience;
+  if (!wire_.detect(status)) return false;
+  if ((status & in_config_update) == 0) return ++waited_ < max_wait_samples;
   state_ = State::write;
   return write();
 }
 
 bool FrontEnd::write() {
-  for (std::size_t k = 0; k < settings_a_sample && next_setting_ < settings_.size(); ++k, ++next_setting_) {
+  for (std::size_t k = 0; k < settings_per_sample && next_setting_ < settings_.size(); ++k, ++next_setting_) {
     const Setting& s = settings_[next_setting_];
     std::array<std::uint8_t, 4> bytes{};
     put_bytes(bytes, 0, s.value);
@@ -151,9 +162,9 @@ bool FrontEnd::write() {
     settle();
   }
   if (next_setting_ < settings_.size()) return true;
-  bool right = false;
-  if (!memory_is_right(right)) return false;
-  if (!right) {
+  bool matches = false;
+  if (!compare_memory(matches)) return false;
+  if (!matches) {
     ++counters_.wrong_setting;
     return false;
   }
@@ -165,8 +176,8 @@ bool FrontEnd::write() {
 
 bool FrontEnd::leave() {
   std::uint16_t status = 0;
-  if (!wire_.find(status)) return false;
-  if ((status & in_config_update) != 0) return ++waited_ < patience;
+  if (!wire_.detect(status)) return false;
+  if ((status & in_config_update) != 0) return ++waited_ < max_wait_samples;
   if (wire_.check == Check::plain) {
     if (swapped_) return false;
     swapped_ = true;
@@ -175,14 +186,14 @@ bool FrontEnd::leave() {
   state_ = State::measure;
   failures_ = 0;
   rest_us_ = 0;
-  scans_ago_ = scan_is_old;
-  charge_stands_ = 0;
-  sent_bleed_ = static_cast<std::uint16_t>(~bleed_);  // what it bleeds is not known: tell it
+  scan_age_ = max_scan_age;
+  charge_still_ = 0;
+  sent_bleed_ = static_cast<std::uint16_t>(~bleed_);  // unknown, so send it
   return true;
 }
 
-/// Neither reset nor back in its configuration since the last sample.
-bool FrontEnd::still_the_same() {
+/// Returns true if the chip was not reset and is not in CONFIG_UPDATE mode.
+bool FrontEnd::no_reset() {
   std::uint16_t status = 0;
   if (!wire_.read_word(battery_status, status)) return false;
   if ((status & (was_reset | in_config_update)) == 0) return true;
@@ -191,9 +202,9 @@ bool FrontEnd::still_the_same() {
   return false;
 }
 
-/// In the order of who needs it most; ends at the first thing that cannot be had.
+/// Reads in the order of importance; ends at the first failed transfer.
 bool FrontEnd::measure(measurement::PackSample<cell_inputs>& into) {
-  if (!still_the_same()) return false;
+  if (!no_reset()) return false;
   if (!wire_.select(get_currents)) return false;
   if (!read_scan(into)) return false;
   if (!read_current(into)) return false;
@@ -204,7 +215,7 @@ bool FrontEnd::measure(measurement::PackSample<cell_inputs>& into) {
 }
 
 bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
-  // the alarm bits first: values that are read after them are as fresh as they say
+  // The alarm bits come first, so the values read after them are at least as fresh as they state.
   std::array<std::uint8_t, hdq_temperature + 2 - alarm_status> alarm_and_temperatures;
   if (!wire_.read(alarm_status, alarm_and_temperatures)) return false;
   const auto alarm = get_bytes<std::uint16_t>(alarm_and_temperatures, 0);
@@ -214,15 +225,15 @@ bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   std::array<std::uint8_t, ld_voltage + 2 - first_cell> voltages;
   if (!wire_.read(first_cell, voltages)) return false;
 
-  scans_ago_ = (alarm & all_scanned) != 0 ? std::uint8_t{0}
-                                          : static_cast<std::uint8_t>(std::min(scans_ago_ + 1, int{scan_is_old}));
+  scan_age_ = (alarm & all_scanned) != 0 ? std::uint8_t{0}
+                                         : static_cast<std::uint8_t>(std::min(scan_age_ + 1, int{max_scan_age}));
   fresh_ = (alarm & cells_scanned) != 0;
   if (!fresh_) {
     ++counters_.not_fresh;
     return true;
   }
   for (std::size_t k = 0; k < cell_inputs; ++k) into.cell_uv[k] = cell_uv(get_bytes<std::int16_t>(voltages, 2 * k));
-  if (scans_ago_ >= scan_is_old) return true;
+  if (scan_age_ >= max_scan_age) return true;
   into.pack_uv = get_bytes<std::int16_t>(voltages, stack_voltage - first_cell) * voltage_step_uv;
   dc_link_uv_ = get_bytes<std::int16_t>(voltages, ld_voltage - first_cell) * voltage_step_uv;
   constexpr std::array<std::uint8_t, measurement::max_temperatures> sensors{ts1_temperature, ts3_temperature,
@@ -240,14 +251,14 @@ bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
     return false;
   const auto time_s = get_bytes<std::uint32_t>(charge, charge_time_at);
   if (time_s != charge_time_s_)
-    charge_stands_ = 0;
-  else if (fresh_ && charge_stands_ < charge_is_old)
-    ++charge_stands_;
+    charge_still_ = 0;
+  else if (fresh_ && charge_still_ < max_charge_still)
+    ++charge_still_;
   charge_time_s_ = time_s;
   const auto steps = get_bytes<std::int16_t>(currents, cc3_current_at);
   constexpr auto limits = std::numeric_limits<std::int16_t>{};
-  if (!fresh_ || charge_stands_ >= charge_is_old || steps == limits.min() || steps == limits.max())
-    return true;  // nothing converts; or more than it can say
+  if (!fresh_ || charge_still_ >= max_charge_still || steps == limits.min() || steps == limits.max())
+    return true;  // no conversion, or outside its range
   const auto counted =
       static_cast<std::int64_t>(static_cast<std::uint64_t>(get_bytes<std::uint32_t>(charge, charge_at)) << 32 |
                                 get_bytes<std::uint32_t>(charge, charge_fraction_at));
@@ -256,7 +267,7 @@ bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
 }
 
 bool FrontEnd::refresh_balancing() {
-  if (bleed_ == sent_bleed_ && (bleed_ == 0 || now_us() - sent_bleed_us_ < tell_again_us)) return true;
+  if (bleed_ == sent_bleed_ && (bleed_ == 0 || now_us() - sent_bleed_us_ < refresh_interval_us)) return true;
   std::array<std::uint8_t, 2> cells{};
   put_bytes(cells, 0, bleed_);
   if (!wire_.send(balance_cells, cells)) return false;
@@ -267,7 +278,7 @@ bool FrontEnd::refresh_balancing() {
   if (!wire_.fetch(balance_cells, bled)) return false;
   if (bled != cells) {
     ++counters_.bleed_wrong;
-    return true;  // told again with the next sample
+    return true;  // sent again with the next sample
   }
   sent_bleed_ = bleed_;
   sent_bleed_us_ = now_us();

@@ -1,4 +1,4 @@
-// Addresses of the BQ76952: TI's technical reference manual SLUUBY2B, chapter 12 (commands) and 13 (data memory).
+// Addresses of the BQ76952: TI's technical reference manual SLUUBY2B, chapters 12 (commands) and 13 (data memory).
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace bms::hal::bq76952 {
 
-inline constexpr std::uint8_t i2c_address = 0x08;       // 0x10 with the bit for write [9.4]
+inline constexpr std::uint8_t i2c_address = 0x08;       // 0x10 with the write bit [9.4]
 inline constexpr std::uint16_t device_number = 0x7695;  // [12.2]
 
 // direct commands [12.1], two bytes each
@@ -20,7 +20,7 @@ inline constexpr std::uint16_t in_deep_sleep = 1U << 2;  // of control_status
 // bits of battery_status
 inline constexpr std::uint16_t in_config_update = 1U << 0, was_reset = 1U << 3, security = 3U << 8, sealed = 3U << 8;
 
-// bits of alarm_status, latched until 1 is written [6.5]: the cells were all measured once more; everything was
+// bits of alarm_status, latched until 1 is written [6.5]: all cells were measured again; all inputs were
 inline constexpr std::uint16_t cells_scanned = 1U << 1, all_scanned = 1U << 7;
 
 // subcommands [12.2, 12.3]
@@ -28,7 +28,7 @@ inline constexpr std::uint16_t get_device_number = 0x0001, get_currents = 0x0075
                                exit_deep_sleep = 0x000E, balance_cells = 0x0083, set_config_update = 0x0090,
                                exit_config_update = 0x0092, sleep_disable = 0x009A, swap_comm_mode = 0x29BC;
 
-// what the transfer buffer holds
+// content of the transfer buffer
 inline constexpr std::size_t buffer_bytes = 32, buffer_overhead = 4;  // the length counts address, checksum and itself
 inline constexpr std::size_t cc3_current_at = 20;                     // of get_currents: userA [4.6]
 inline constexpr std::size_t charge_at = 0, charge_fraction_at = 4,

@@ -1,9 +1,9 @@
-// Samples that the board measures by itself, one each period of its own clock; beside it the bus is heard for requests
-// and for the starting point. A front end that does not answer makes samples without readings: estimator and protection
-// are told that nothing is measured.
+// Samples that the board measures itself, one per period of its own clock. Between samples it receives CAN frames:
+// requests and the starting point. If the front end does not answer, the sample has no readings, so estimator and
+// protection know that nothing is measured.
 //
-// A sample that comes late because the core was held up (an erase of flash) does not make the next ones come early: the
-// period begins anew.
+// If the core was stopped (an erase of flash) and a sample is late, the next period starts at this sample; the
+// following samples are not early.
 #include "hal/samples.hpp"
 #include "hal/bq76952/front_end.hpp"
 #include "hal/can.hpp"
@@ -26,7 +26,7 @@ measurement::PackSample<pack_cells> sample;
 std::uint64_t due_us = 0;
 bool started = false;
 
-void hear_the_bus() {
+void receive_frames() {
   can::Frame frame;
   while (can_receive(frame)) dispatch_frame(frame);
 }
@@ -39,7 +39,7 @@ const measurement::PackSample<pack_cells>* next_sample() {
     started = true;
     due_us = now_us() + period_us;
   }
-  for (hear_the_bus(); now_us() < due_us; hear_the_bus()) wait_for_interrupt();
+  for (receive_frames(); now_us() < due_us; receive_frames()) wait_for_interrupt();
   sample.time_us = now_us();
   due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
   front_end.read(sample);

@@ -12,9 +12,9 @@ namespace bms::hal::bq76952 {
 namespace {
 
 constexpr std::uint8_t address_to_write = i2c_address << 1, address_to_read = i2c_address << 1 | 1;
-constexpr int most_asks = 3;  // for an answer that is not there yet: 3.5 ms of I2C
+constexpr int max_attempts = 3;  // to read an answer that is not ready yet: 3.5 ms of I2C
 
-/// Of address and data as bytes, inverted sum (13.1).
+/// Inverted sum of the bytes of address and data (13.1).
 std::uint8_t checksum(std::uint16_t address, std::span<const std::uint8_t> data) {
   auto sum = static_cast<std::uint8_t>((address & 0xFF) + (address >> 8));
   for (const std::uint8_t byte : data) sum = static_cast<std::uint8_t>(sum + byte);
@@ -23,7 +23,7 @@ std::uint8_t checksum(std::uint16_t address, std::span<const std::uint8_t> data)
 
 }  // namespace
 
-bool Wire::bad(std::uint32_t& counter) {
+bool Wire::fail(std::uint32_t& counter) {
   ++counter;
   return false;
 }
@@ -31,12 +31,12 @@ bool Wire::bad(std::uint32_t& counter) {
 bool Wire::transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
   ++counters_.transfers;
   const I2cResult result = i2c_transfer(i2c_address, out, in);
-  again_ = result == I2cResult::no_acknowledge;
+  retry_useful_ = result == I2cResult::no_acknowledge;
   switch (result) {
     case I2cResult::done:
       return true;
     case I2cResult::no_acknowledge:
-      return bad(counters_.not_acknowledged);
+      return fail(counters_.not_acknowledged);
     case I2cResult::bus_stuck:
       ++counters_.stuck;
       break;
@@ -45,7 +45,7 @@ bool Wire::transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> i
       break;
   }
   const bool free = i2c_recover();
-  again_ = free && result == I2cResult::bus_stuck;
+  retry_useful_ = free && result == I2cResult::bus_stuck;
   return false;
 }
 
@@ -56,8 +56,8 @@ bool Wire::read_once(std::uint8_t command, std::span<std::uint8_t> into) {
   if (into.size() > most_bytes || !transfer(out, std::span(raw).first(2 * into.size()))) return false;
   std::uint8_t crc = crc8(crc8(crc8(0, address_to_write), command), address_to_read);
   for (std::size_t k = 0; k < into.size(); ++k) {
-    again_ = true;
-    if (crc8(crc, raw[2 * k]) != raw[2 * k + 1]) return bad(counters_.bad_crc);
+    retry_useful_ = true;
+    if (crc8(crc, raw[2 * k]) != raw[2 * k + 1]) return fail(counters_.bad_crc);
     into[k] = raw[2 * k];
     crc = 0;
   }
@@ -66,7 +66,7 @@ bool Wire::read_once(std::uint8_t command, std::span<std::uint8_t> into) {
 
 bool Wire::read(std::uint8_t command, std::span<std::uint8_t> into) {
   if (read_once(command, into)) return true;
-  if (!again_) return false;
+  if (!retry_useful_) return false;
   ++counters_.repeated;
   return read_once(command, into);
 }
@@ -90,7 +90,7 @@ bool Wire::write(std::uint8_t command, std::span<const std::uint8_t> data) {
     crc = 0;
   }
   if (transfer(std::span(out).first(n), {})) return true;
-  if (!again_) return false;
+  if (!retry_useful_) return false;
   ++counters_.repeated;
   return transfer(std::span(out).first(n), {});
 }
@@ -103,17 +103,17 @@ bool Wire::select(std::uint16_t address) {
 
 bool Wire::fetch(std::uint16_t address, std::span<std::uint8_t> into) {
   std::array<std::uint8_t, 2 + buffer_bytes + 2> all;  // address, data, checksum, length
-  for (int k = 0; k < most_asks; ++k) {
+  for (int k = 0; k < max_attempts; ++k) {
     if (!read(subcommand_low, all)) return false;
-    if (get_bytes<std::uint16_t>(all, 0) != address) {  // 0xFF while the chip is at it
+    if (get_bytes<std::uint16_t>(all, 0) != address) {  // 0xFF while the chip is busy
       ++counters_.not_ready;
       continue;
     }
     const std::size_t length = all[2 + buffer_bytes + 1];
     if (length < buffer_overhead + into.size() || length > buffer_overhead + buffer_bytes)
-      return bad(counters_.bad_checksum);
+      return fail(counters_.bad_checksum);
     const auto data = std::span<const std::uint8_t>(all).subspan(2, length - buffer_overhead);
-    if (checksum(address, data) != all[2 + buffer_bytes]) return bad(counters_.bad_checksum);
+    if (checksum(address, data) != all[2 + buffer_bytes]) return fail(counters_.bad_checksum);
     std::copy_n(data.begin(), into.size(), into.begin());
     return true;
   }
@@ -130,12 +130,13 @@ bool Wire::send(std::uint16_t address, std::span<const std::uint8_t> data) {
   return write(subcommand_low, std::span(bytes).first(data.size() + 2)) && write(buffer_checksum, end);
 }
 
-bool Wire::find(std::uint16_t& status) {
-  std::array<std::uint8_t, 4> raw{};  // a chip that talks plainly gives what is behind it
+bool Wire::detect(std::uint16_t& status) {
+  std::array<std::uint8_t, 4> raw{};  // a chip without CRCs sends the following registers
   const std::array<std::uint8_t, 1> out{battery_status};
-  if (!transfer(out, raw) && !(again_ && transfer(out, raw))) return false;
+  if (!transfer(out, raw) && !(retry_useful_ && transfer(out, raw))) return false;
   const std::uint8_t first = crc8(crc8(crc8(crc8(0, address_to_write), battery_status), address_to_read), raw[0]);
-  check = raw[1] == first && raw[3] == crc8(0, raw[2]) ? Check::checked : Check::plain;
+  const bool crcs_match = raw[1] == first && raw[3] == crc8(0, raw[2]);
+  check = crcs_match ? Check::checked : Check::plain;
   status = static_cast<std::uint16_t>(check == Check::checked ? raw[0] | raw[2] << 8 : raw[0] | raw[1] << 8);
   return true;
 }

@@ -1,14 +1,14 @@
 // Bit timing of ST's bxCAN from its clock, at compile time (RM0090, 32.7.7; CAN_BTR, 32.9.2).
 //
 //   bit = 1 + ts1 + ts2 quanta, a quantum = brp / clock      sample point after 1 + ts1 quanta
-//   brp 1..1024, ts1 1..16, ts2 1..8, sjw 1..4 and never above ts2, 8 to 25 quanta a bit (ISO 11898-1)
+//   brp 1..1024, ts1 1..16, ts2 1..8, sjw 1..4 and never above ts2, 8 to 25 quanta per bit (ISO 11898-1)
 //
-// bit_timing() takes the exact rate only, then the sample point nearest to 87.5 % (CiA 301, table of bit rates), then
-// most quanta, and the largest jump width. What cannot be reached does not compile.
+// bit_timing() accepts only the exact bit rate. It then selects the sample point nearest to 87.5 % (CiA 301, table of
+// bit rates), then the most quanta, and the largest jump width. A bit rate that cannot be reached does not compile.
 //
-// 42 MHz, as the STM32F405 has it at 168 MHz: 125 and 250 kbit/s at 87.5 % exactly. 500 kbit/s have 84 cycles a bit,
-// which leave 12, 14 or 21 quanta and 85.7 % at best: outside `near_recommendation`, inside what CiA 301 allows, and
-// whoever wants it says so.
+// 42 MHz, the clock of the STM32F405 at 168 MHz, gives 125 and 250 kbit/s at exactly 87.5 %. At 500 kbit/s a bit has 84
+// cycles, hence 12, 14 or 21 quanta, and the best sample point is 85.7 %. That is outside `near_recommendation` but
+// inside `cia301_allows`, which the caller then has to pass.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct BitTiming {
 
   constexpr std::uint32_t quanta() const { return 1 + ts1 + ts2; }
   constexpr std::uint32_t sample_point_ppm() const { return (1 + ts1) * 1'000'000 / quanta(); }
-  /// CAN_BTR, normal mode.
+  /// Value of CAN_BTR, normal mode.
   constexpr std::uint32_t btr() const { return (sjw - 1) << 24 | (ts2 - 1) << 20 | (ts1 - 1) << 16 | (brp - 1); }
   constexpr bool operator==(const BitTiming&) const = default;
 };
@@ -34,7 +34,7 @@ inline constexpr SamplePointRange near_recommendation{recommended_ppm - recommen
                                                       recommended_ppm + recommended_ppm / 100};
 inline constexpr SamplePointRange cia301_allows{850'000, 900'000};
 
-// Not defined: a call of one ends the compilation, and its name says why.
+// Not defined: a call stops the compilation, and the name gives the reason.
 void bit_rate_not_supported();
 void clock_not_divisible_to_bit_rate();
 void no_sample_point_in_accepted_range();
@@ -53,7 +53,10 @@ consteval BitTiming bit_timing(std::uint32_t clock_hz, std::uint32_t bits_per_se
       const BitTiming t{static_cast<std::uint32_t>(clock_hz / per_step), ts1, ts2, ts2 < 4 ? ts2 : 4};
       const std::uint32_t at = t.sample_point_ppm(),
                           error = at > recommended_ppm ? at - recommended_ppm : recommended_ppm - at;
-      if (error < least_error) best = t, least_error = error;
+      if (error < least_error) {
+        best = t;
+        least_error = error;
+      }
     }
   }
   if (least_error == 1'000'000) clock_not_divisible_to_bit_rate();

@@ -1,7 +1,7 @@
-// Frames that wait for a transmit mailbox, in the order in which the bus would take them: by arbitration, and of one
-// identifier the older first. Full: the least urgent goes, be it the new one.
+// Frames that wait for a transmit mailbox, in the order of arbitration; frames with the same identifier by age. If the
+// queue is full, the least urgent frame is dropped, which may be the new one.
 //
-// Depth: frames; the numbers that give the order of age wrap safely. Cost: a pass over the frames that wait.
+// Depth: frames. Sequence numbers give the age and may wrap. Cost: one pass over the waiting frames.
 #pragma once
 
 #include <array>
@@ -14,12 +14,12 @@ namespace bms::hal::bxcan {
 
 struct WaitingFrame {
   can::Frame frame;
-  std::uint32_t number = 0;  ///< of can_send()
+  std::uint32_t number = 0;  ///< sequence number of the can_send() call
 };
 
-/// The arbitration field's bits as they come on the wire: lower wins, equal is the same identifier. A frame of 29 bits
-/// has SRR and IDE recessive behind its first eleven and so loses to the standard frame with these eleven (ISO
-/// 11898-1, 10.4.2).
+/// Bits of the arbitration field in the order on the wire: the lower value wins, equal values mean the same identifier.
+/// A 29-bit frame has SRR and IDE recessive after its first eleven bits, so it loses against the standard frame with
+/// these eleven bits (ISO 11898-1, 10.4.2).
 constexpr std::uint32_t arbitration(const can::Frame& frame) {
   return frame.long_id ? frame.id >> 18 << 21 | 3U << 19 | (frame.id & 0x3'FFFFU) << 1 : frame.id << 21;
 }
@@ -32,7 +32,7 @@ constexpr bool more_urgent(const WaitingFrame& a, const WaitingFrame& b) {
 template <std::size_t Depth>
 class TransmitQueue {
  public:
-  /// False when a frame was given up for want of a place: the least urgent of all.
+  /// Returns false if the queue was full and the least urgent frame, possibly the new one, was dropped.
   constexpr bool insert(const WaitingFrame& waiting) {
     const bool room = size_ < Depth;
     if (!room && !more_urgent(waiting, frames_[0])) return false;
@@ -46,7 +46,7 @@ class TransmitQueue {
     return room;
   }
 
-  /// The most urgent one that `may`, taken out; false: none.
+  /// Removes the most urgent frame that `may` accepts. Returns false if no frame qualifies.
   template <class May>
   constexpr bool pop(WaitingFrame& out, May&& may) {
     const WaitingFrame* found = most_urgent(may);
@@ -58,6 +58,7 @@ class TransmitQueue {
     return true;
   }
 
+  /// Returns the most urgent frame that `may` accepts, or nullptr.
   template <class May>
   constexpr const WaitingFrame* most_urgent(May&& may) const {
     for (std::size_t k = size_; k-- > 0;) {

@@ -1,4 +1,4 @@
-// ARMv6-M: no FPU, no vector table elsewhere, one kind of fault and no register that tells why.
+// ARMv6-M: no FPU, fixed vector table, a single kind of fault and no register with its reason.
 #include "hal/cortex_m/core.hpp"
 
 namespace bms::hal::cortex_m {

@@ -19,10 +19,10 @@ Register& scb_cpacr() { return at<0xE000ED88>(); }
 }  // namespace
 
 void start_core() {
-  scb_cpacr() = scb_cpacr() | 15U << 20;                        // FPU, before anything can use it
-  scb_vtor() = reinterpret_cast<std::uint32_t>(image_vectors);  // flash is at 0 too, unless the boot pins say otherwise
+  scb_cpacr() = scb_cpacr() | 15U << 20;                        // FPU on, before any code uses it
+  scb_vtor() = reinterpret_cast<std::uint32_t>(image_vectors);  // the boot pins may map other memory to 0
   asm volatile("dsb\n isb" ::: "memory");
-  scb_shcsr() = scb_shcsr() | 7U << 16;  // memory, bus and usage faults under their own name
+  scb_shcsr() = scb_shcsr() | 7U << 16;  // separate memory, bus and usage faults
 }
 
 void read_fault_status(FaultRecord& record) {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::uint32_t magic = 0xFA017BAD;
 
-/// In RAM that start-up leaves alone.
+/// In RAM that start-up does not initialise.
 struct StoredFault {
   std::uint32_t magic;
   FaultRecord fault;

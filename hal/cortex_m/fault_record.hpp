@@ -1,11 +1,11 @@
-// The record that a fault leaves behind for the run after it; hal/power.hpp tells it.
+// Record of a processor fault, which survives the reset and which last_fault() of hal/power.hpp returns.
 #pragma once
 
 #include "hal/power.hpp"
 
 namespace bms::hal::cortex_m {
 
-/// At start-up: what the last run has kept; forgotten for the next.
+/// Call at start-up. Reads the record of the last run and deletes it.
 void read_stored_fault();
 
 void store_fault(const FaultRecord& record);

@@ -1,4 +1,4 @@
-// On a board there is nothing to return to.
+// Without a debugger the end of the program is a reset.
 #include "hal/cortex_m/fault_record.hpp"
 #include "hal/power.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 extern "C" {
-// from the linker script
+// defined by the linker script
 extern const std::uint8_t image_vectors[], image_vectors_end[], image_code_begin[], image_code_end[], image_data_load[],
     image_data_begin[], image_data_end[];
 }
@@ -13,13 +13,13 @@ namespace bms::hal::cortex_m {
 
 namespace {
 
-/// Written after linking; volatile, because the compiler knows another value.
+/// cmake/image_check.py writes it after linking; volatile, because the compiler sees another value.
 struct Check {
   std::uint32_t crc, inverse;
 };
 [[gnu::section(".image_check"), gnu::used]] constinit const volatile Check check{0xFFFF'FFFF, 0xFFFF'FFFF};
 
-/// Four bits at a time.
+/// CRC-32 of four bits.
 constexpr auto table = [] {
   std::array<std::uint32_t, 16> t{};
   for (std::uint32_t k = 0; k < t.size(); ++k) {
@@ -29,7 +29,7 @@ constexpr auto table = [] {
   return t;
 }();
 
-std::uint32_t more(std::uint32_t crc, const std::uint8_t* begin, const std::uint8_t* end) {
+std::uint32_t update_crc(std::uint32_t crc, const std::uint8_t* begin, const std::uint8_t* end) {
   for (const volatile std::uint8_t* at = begin; at < end; ++at) {
     crc ^= *at;
     crc = crc >> 4 ^ table[crc & 15];
@@ -41,9 +41,9 @@ std::uint32_t more(std::uint32_t crc, const std::uint8_t* begin, const std::uint
 }  // namespace
 
 bool image_intact() {
-  std::uint32_t crc = more(0xFFFF'FFFF, image_vectors, image_vectors_end);
-  crc = more(crc, image_code_begin, image_code_end);
-  crc = ~more(crc, image_data_load, image_data_load + (image_data_end - image_data_begin));
+  std::uint32_t crc = update_crc(0xFFFF'FFFF, image_vectors, image_vectors_end);
+  crc = update_crc(crc, image_code_begin, image_code_end);
+  crc = ~update_crc(crc, image_data_load, image_data_load + (image_data_end - image_data_begin));
   return crc == check.crc && ~crc == check.inverse;
 }
 

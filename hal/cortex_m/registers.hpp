@@ -1,5 +1,5 @@
-// Registers that every Cortex-M has: ARMv6-M Architecture Reference Manual (section in brackets), the same addresses in
-// ARMv7-M.
+// Registers of every Cortex-M. Sections of the ARMv6-M Architecture Reference Manual in brackets; ARMv7-M has the same
+// addresses.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ inline Register& at() {
 
 namespace cortex_m {
 
-// interrupt controller [B3.4]: interrupts 0 to 31, 32 to 63
+// interrupt controller [B3.4]: interrupts 0 to 31 and 32 to 63
 inline Register& nvic_iser0() { return at<0xE000E100>(); }
 inline Register& nvic_icer0() { return at<0xE000E180>(); }
 inline Register& nvic_iser1() { return at<0xE000E104>(); }

@@ -4,10 +4,10 @@ namespace bms::hal::cortex_m {
 
 namespace {
 
-constexpr std::size_t words_a_call = 128;
+constexpr std::size_t words_per_call = 128;
 
-const volatile std::uint32_t* lowest_used = nullptr;  // so far
-const volatile std::uint32_t* looking_at = nullptr;
+const volatile std::uint32_t* lowest_used = nullptr;  // minimum so far
+const volatile std::uint32_t* next_word = nullptr;
 
 volatile std::uint32_t& mpu(std::uint32_t offset) {
   return *reinterpret_cast<volatile std::uint32_t*>(0xE000ED90 + offset);
@@ -27,8 +27,8 @@ void guard_stack() {
   static_assert(guard_bytes == 1U << 10);
   mpu_rnr() = 0;
   mpu_rbar() = reinterpret_cast<std::uint32_t>(image_stack_limit);
-  mpu_rasr() = 1U << 28 | 9U << 1 | 1U;  // no code, no access (AP 0), 2^(9 + 1) bytes, on
-  mpu_ctrl() = 1U << 2 | 1U;             // everything else as without; off in hard faults
+  mpu_rasr() = 1U << 28 | 9U << 1 | 1U;  // execute never, no access (AP 0), 2^(9 + 1) bytes, enabled
+  mpu_ctrl() = 1U << 2 | 1U;             // default map elsewhere; off in hard faults
   asm volatile("dsb\n isb" ::: "memory");
 }
 
@@ -38,7 +38,7 @@ void unguard_stack() {
 }
 
 bool stack_guard_intact() {
-  if ((mpu_ctrl() & 1) != 0) return true;  // nobody has got past it
+  if ((mpu_ctrl() & 1) != 0) return true;  // any access would have been a fault
   for (std::size_t k = 1; k <= guard_words_checked; ++k) {
     if (*(bottom() - k) != paint) return false;
   }
@@ -48,14 +48,14 @@ bool stack_guard_intact() {
 std::uint32_t stack_free() {
   if (lowest_used == nullptr) {
     lowest_used = image_stack_top;
-    looking_at = bottom();
+    next_word = bottom();
   }
-  for (std::size_t k = 0; k < words_a_call; ++k, ++looking_at) {
-    if (looking_at >= lowest_used) {
-      looking_at = bottom();
+  for (std::size_t k = 0; k < words_per_call; ++k, ++next_word) {
+    if (next_word >= lowest_used) {
+      next_word = bottom();
       break;
     }
-    if (*looking_at != paint) lowest_used = looking_at;
+    if (*next_word != paint) lowest_used = next_word;
   }
   return static_cast<std::uint32_t>(4 * (lowest_used - bottom()));
 }

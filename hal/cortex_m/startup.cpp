@@ -1,5 +1,5 @@
-// From reset to main(): the core, .data and .bss, constructors; and the handler of faults, which records what the core
-// saw and resets it (one that stops would leave contactors as they are until the watchdog bites).
+// From reset to main(): core, .data, .bss and constructors. The fault handler records the state of the core and resets
+// it; a handler that stops would leave the contactors as they are until the watchdog resets the core.
 #include <cstdint>
 
 #include "hal/cortex_m/core.hpp"
@@ -20,20 +20,20 @@ bool bms::hal::cortex_m::ram_failed() { return !ram_good; }
 
 extern "C" {
 
-// from the linker script
+// defined by the linker script
 extern std::uint32_t image_data_load[], image_data_begin[], image_data_end[], image_bss_begin[], image_bss_end[];
 extern void (*image_constructors_begin[])();
 extern void (*image_constructors_end[])();
 
 int main();
 
-/// The RAM is tried by what is inline here: there is no stack to trust.
+/// Everything up to the RAM test is inline, because the stack is not tested yet.
 [[noreturn]] void reset_handler() {
   using namespace bms::hal;
   cortex_m::start_core();
   std::uint32_t* stack = nullptr;
   asm volatile("mov %0, sp" : "=r"(stack));
-  stack -= 16;  // what is below is free
+  stack -= 16;  // RAM below this address is unused
   const bool good =
       cortex_m::ram_passes(image_data_begin, image_bss_end) && cortex_m::ram_passes(image_stack_limit, stack);
   cortex_m::paint_stack(stack);
@@ -46,7 +46,7 @@ int main();
   finish(main());
 }
 
-/// frame: r0-r3, r12, lr, pc, psr as the core stacked them (ARMv6-M and ARMv7-M, B1.5.6).
+/// frame: r0-r3, r12, lr, pc, psr as the core pushed them (ARMv6-M and ARMv7-M, B1.5.6).
 [[noreturn, gnu::used]] void record_fault(const std::uint32_t* frame) {
   using namespace bms::hal;
   cortex_m::unguard_stack();
@@ -56,7 +56,7 @@ int main();
   const auto at = reinterpret_cast<std::uintptr_t>(frame),
              ram = reinterpret_cast<std::uintptr_t>(image_stack_limit + cortex_m::guard_bytes / 4),
              top = reinterpret_cast<std::uintptr_t>(image_stack_top);
-  if (at >= ram && at <= top - 8 * sizeof *frame) {  // else the stack itself was the fault
+  if (at >= ram && at <= top - 8 * sizeof *frame) {  // otherwise the stack pointer itself was wrong
     record.lr = frame[5];
     record.pc = frame[6];
     record.psr = frame[7];
@@ -65,18 +65,19 @@ int main();
   cortex_m::system_reset();
 }
 
-/// Takes the stacked frame, then a fresh stack: the old one may be what failed. In instructions that ARMv6-M has.
+/// Passes on the pushed frame and starts a new stack, because the old one may have failed. Uses ARMv6-M instructions
+/// only.
 [[gnu::naked]] void fault_handler() {
   asm volatile(
       ".syntax unified\n"
       "mov r0, lr\n"
-      "lsls r0, r0, #29\n"  // bit 2 of lr: which stack
+      "lsls r0, r0, #29\n"  // bit 2 of lr selects the stack
       "mrs r0, msp\n"
       "bpl 1f\n"
       "mrs r0, psp\n"
       "1: ldr r1, =image_stack_top\n"
       "msr msp, r1\n"
-      "bl record_fault\n"  // reaches further than b, and does not come back
+      "bl record_fault\n"  // longer range than b; does not return
       ".ltorg\n");
 }
 

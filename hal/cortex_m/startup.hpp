@@ -1,9 +1,9 @@
-// What start-up has found out before there were data.
+// Result of the RAM test at start-up.
 #pragma once
 
 namespace bms::hal::cortex_m {
 
-/// Of data and stack, by a march (ram_test.hpp).
+/// Returns true if the march test (ram_test.hpp) of data and stack failed.
 bool ram_failed();
 
 }  // namespace bms::hal::cortex_m

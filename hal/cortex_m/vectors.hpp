@@ -1,5 +1,5 @@
-// The vector table: every exception and interrupt that nobody serves is a fault. A chip makes its own from this
-// (hal/<chip>/vectors.cpp).
+// Vector table in which every exception and interrupt without a handler is a fault. A chip builds its own table from
+// this one (hal/<chip>/vectors.cpp).
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 extern "C" {
 
-extern std::uint32_t image_stack_top[];  // from the linker script
+extern std::uint32_t image_stack_top[];  // defined by the linker script
 
 [[noreturn]] void reset_handler();
 void fault_handler();
@@ -25,7 +25,7 @@ struct VectorTable {
   std::uint32_t* stack;
   std::array<Handler, core_exceptions - 1 + Interrupts> handlers;
 
-  /// exception: 16 and above are the chip's interrupts 0 and above.
+  /// exception: the chip's interrupt k has number 16 + k.
   constexpr void serve(std::size_t exception, Handler handler) { handlers[exception - 1] = handler; }
 };
 

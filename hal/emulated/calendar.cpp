@@ -1,4 +1,4 @@
-// The host's clock, which nobody sets from here.
+// The host's clock, which the board cannot set.
 #include "hal/calendar.hpp"
 #include "hal/emulated/semihosting.hpp"
 

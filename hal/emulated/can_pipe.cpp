@@ -1,10 +1,10 @@
-// The CAN bus of an emulated board in lock step with a program on the host: frames as records through two of the
-// debugger's files, which are named pipes (pipe_format.hpp). Command line "fw TO_BOARD FROM_BOARD".
+// The CAN bus of an emulated board in lock step with a program on the host. Frames are records in two of the debugger's
+// files, which are named pipes (pipe_format.hpp). Command line: "fw TO_BOARD FROM_BOARD".
 //
-// The firmware works until it asks for a frame a second time and has none: then what it sent goes out as a block, and
-// it waits for one of the other side. That begins with a record of length `tick`, whose data are the time: this board's
-// clock. An empty block is one record of length `nothing`. The end of the file closes the channel and ends the program.
-// So a run is the same every time, and as fast as both sides compute. Exit code 3: no such files.
+// The firmware works until it asks for a frame a second time and none is left. Then it sends its frames as a block and
+// waits for a block of the host. That block begins with a record of length `tick`, whose data set the board's clock. An
+// empty block is one record of length `nothing`. The end of the file closes the channel and ends the program.
+// A run is therefore repeatable, and as fast as both sides compute. Exit code 3: the files are missing.
 #include <array>
 #include <span>
 
@@ -49,7 +49,7 @@ void flush() {
   out_count = 0;
 }
 
-/// Waits for a block. False: there will be none.
+/// Waits for a block. Returns false if the file has ended.
 bool refill() {
   in_next = in_count = 0;
   do {
@@ -82,7 +82,7 @@ bool can_receive(can::Frame& frame) {
   while (open) {
     if (in_next == in_count) {
       had_none = !had_none;
-      if (had_none) return false;  // what to do without a frame comes first
+      if (had_none) return false;  // first the firmware does its work without a frame
       flush();
       if (!refill()) finish(0);
     }
@@ -104,4 +104,4 @@ void wait_for_interrupt() {}
 
 }  // namespace bms::hal
 
-extern "C" void clock_interrupt() {}  // no timer runs
+extern "C" void clock_interrupt() {}  // no timer is running

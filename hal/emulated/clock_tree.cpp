@@ -1,4 +1,4 @@
-// QEMU has no clock control: its registers read 0, and the core's clock is 168 MHz from the start.
+// QEMU does not emulate the clock control: its registers read 0, and the core runs at 168 MHz from the start.
 #include "hal/stm32f4/clock_tree.hpp"
 
 namespace bms::hal::stm32f4 {

@@ -1,8 +1,8 @@
-// Three sectors of 16 KiB as the chip has them, kept in a file of the host: command line "fw FILE". Without one they
-// last as long as the emulator runs, resets included. A file that is new or of another size begins as bytes 0, as worn
-// flash may.
+// Three sectors of 16 KiB, as on the chip, in a file of the host. Command line: "fw FILE". Without a file the content
+// lasts as long as the emulator runs, resets included. A file that is new or has another size starts as bytes 0, which
+// worn flash may contain.
 //
-// QEMU gives this board 192 KiB of RAM in one block where the chip has 128 KiB: the sectors lie above the chip's.
+// QEMU gives this board one block of 192 KiB RAM, where the chip has 128 KiB: the sectors lie above the chip's RAM.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -16,11 +16,11 @@ namespace bms::hal {
 namespace {
 
 constexpr FlashSize size{3, 16 * 1024};
-constexpr std::uintptr_t above_the_chips_ram = 0x20020000;
+constexpr std::uintptr_t address_above_ram = 0x20020000;
 int file = -1;
 
 std::span<unsigned char> memory() {
-  return {reinterpret_cast<unsigned char*>(above_the_chips_ram), std::size_t{size.sectors} * size.sector_bytes};
+  return {reinterpret_cast<unsigned char*>(address_above_ram), std::size_t{size.sectors} * size.sector_bytes};
 }
 
 bool write_back(std::size_t at, std::size_t bytes) {

@@ -1,5 +1,5 @@
-// Samples from CAN frames (hal/sample_frames.hpp): the measuring chain of a board that has none. Closing the channel
-// ends them.
+// Samples from CAN frames (hal/sample_frames.hpp), for a board without a measuring chain. They end when the host closes
+// the channel.
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/frame_dispatch.hpp"
@@ -21,18 +21,18 @@ const measurement::PackSample<pack_cells>* next_sample() {
   while (true) {
     can::Frame frame;
     while (can_receive(frame)) {
-      was_listening = true;  // who closes the channel right after a sample, while it is being worked on, ends them, too
+      was_listening = true;  // the host may close the channel right after a sample, while it is being processed
       if (dispatch_frame(frame) && frames.receive(frame))
-        return &frames.sample();  // a frame that gets lost later is a missing reading, not the old one again
+        return &frames.sample();  // a lost frame makes a reading missing, it does not repeat the old one
     }
     if (was_listening && !can_listening()) return nullptr;
     was_listening = can_listening();
-    watchdog_feed();  // waiting for the other side is no fault of this one
+    watchdog_feed();  // waiting for the host is normal here
     wait_for_interrupt();
   }
 }
 
-void power_path_set(const PowerPath&) {}  // who simulates the load hears it on the bus
+void power_path_set(const PowerPath&) {}  // the simulated load receives it as a CAN frame
 std::int32_t dc_link_uv() { return frames.dc_link_uv(); }
 
 }  // namespace bms::hal

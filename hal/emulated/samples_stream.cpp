@@ -1,10 +1,9 @@
-// A recording through the debugger's files, in blocks, as fast as the core computes: command line "fw SAMPLES
-// ESTIMATES". Formats in hal/stream_format.hpp; either file may be a named pipe, OUT is opened first. A part of a
-// sample at the end is left out. Exit code 3: no such files, not a stream, or estimates that could not be written.
+// A recording through the debugger's files, in blocks, as fast as the core computes. Command line: "fw SAMPLES
+// ESTIMATES". Formats: hal/stream_format.hpp. Either file may be a named pipe; ESTIMATES is opened first. An incomplete
+// sample at the end is ignored. Exit code 3: a file is missing, is not a stream, or cannot be written.
 #include <algorithm>
 #include <array>
 
-#include "estimator/pack_estimator.hpp"
 #include "hal/emulated/semihosting.hpp"
 #include "hal/estimate_record.hpp"
 #include "hal/power.hpp"
@@ -15,7 +14,7 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::size_t block = BMS_STREAM_BLOCK;  // samples at a time: as the board has room
+constexpr std::size_t block = BMS_STREAM_BLOCK;  // samples per transfer, limited by the board's RAM
 constexpr int bad_stream = 3;
 
 template <class T>
@@ -23,15 +22,15 @@ std::span<unsigned char> bytes_of(std::span<T> items) {
   return {reinterpret_cast<unsigned char*>(items.data()), items.size_bytes()};
 }
 
-// bytes, not Samples: those are not zero at first, so that the whole block would be kept in flash
+// Bytes instead of Samples: the initial values of a Sample are not zero, so the whole block would be stored in flash.
 alignas(measurement::Sample) std::array<unsigned char, block * sizeof(measurement::Sample)> samples;
 std::size_t sample_count = 0, next = 0;
-std::array<std::uint32_t, block * estimator::estimate_words> estimates;
+std::array<std::uint32_t, block * words_per_estimate> estimates;
 std::size_t estimate_size = 0;
 StreamHeader header;
 int in = -1, out = -1;
 
-/// Fills all of `into` unless the stream ends: a pipe gives what it has.
+/// Reads until `into` is full or the stream ends, because a pipe may return less per call. Returns the bytes read.
 std::size_t read_fully(std::span<unsigned char> into) {
   std::size_t have = 0;
   while (have < into.size()) {
@@ -69,11 +68,11 @@ const measurement::PackSample<pack_cells>* next_sample() {
     if (sample_count == 0) return nullptr;
   }
   const measurement::Sample& sample = *reinterpret_cast<const measurement::Sample*>(
-      &samples[sizeof(measurement::Sample) * next++]);  // read() has put one there
+      &samples[sizeof(measurement::Sample) * next++]);  // read_fully() wrote one there
   static measurement::PackSample<pack_cells> pack;
   pack.time_us = sample.time_us;
   pack.current_ua = sample.current_ua;
-  pack.cell_uv.fill(sample.voltage_uv);  // a recording knows one cell
+  pack.cell_uv.fill(sample.voltage_uv);  // a recording has one cell
   pack.temperature_cdegc[0] = sample.temperature_cdegc;
   return &pack;
 }

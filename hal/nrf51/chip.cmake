@@ -1,4 +1,4 @@
-# nRF51822, Cortex-M0; its flash has no driver here. What every board with this chip has (cmake/firmware.cmake).
+# nRF51822, Cortex-M0, without a flash driver. Settings of every board with this chip (cmake/firmware.cmake).
 set(BMS_CPU_FLAGS -mcpu=cortex-m0 -mthumb)
 set(BMS_CORE armv6m)
 set(BMS_REPLACED_IN_EMULATION "")

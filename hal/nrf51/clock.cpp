@@ -1,5 +1,5 @@
-// Microseconds from timer 0: this chip's core has no SysTick. An interrupt each millisecond, so that no turn of its 32
-// bits (71 minutes) is missed.
+// Microseconds from timer 0, because this core has no SysTick. An interrupt every millisecond detects each wrap of the
+// 32-bit count (71 minutes).
 #include "hal/clock.hpp"
 
 #include "hal/nrf51/registers.hpp"
@@ -9,18 +9,18 @@ namespace bms::hal {
 namespace {
 
 constexpr std::uint32_t wake_every_us = 1'000;
-constexpr unsigned patience =
-    100'000;  // a crystal needs 1 ms; the internal oscillator runs meanwhile, and where it stays away
+/// Polls until the crystal is given up. It needs 1 ms; without it the internal oscillator continues to run.
+constexpr unsigned max_polls = 100'000;
 
-volatile std::uint32_t turns = 0, seen_us = 0;
+volatile std::uint32_t wraps = 0, seen_us = 0;
 
-/// With interrupts off, or from the only one that asks.
+/// Call with interrupts disabled, or from the timer interrupt.
 [[gnu::always_inline]] inline std::uint64_t read_timer() {
   nrf51::timer_capture1() = 1;
   const std::uint32_t us = nrf51::timer_cc1();
-  if (us < seen_us) turns = turns + 1;
+  if (us < seen_us) wraps = wraps + 1;
   seen_us = us;
-  return static_cast<std::uint64_t>(turns) << 32 | us;
+  return static_cast<std::uint64_t>(wraps) << 32 | us;
 }
 
 }  // namespace
@@ -28,7 +28,7 @@ volatile std::uint32_t turns = 0, seen_us = 0;
 void clock_start() {
   using namespace nrf51;
   clock_hfclkstart() = 1;
-  for (unsigned k = 0; k < patience && clock_hfclkstarted() == 0; ++k) {
+  for (unsigned k = 0; k < max_polls && clock_hfclkstarted() == 0; ++k) {
   }
   timer_bitmode() = 3;    // 32 bits
   timer_prescaler() = 4;  // 16 MHz / 2^4

@@ -1,6 +1,6 @@
-// Registers of the nRF51822 that this firmware touches, by hand from Nordic's nRF51 Series Reference Manual v3.0
-// (chapter in brackets). Peripherals do what is written to a task and say what has happened in an event, which stays
-// until 0 is written to it.
+// Registers of the nRF51822 that this firmware uses, from Nordic's nRF51 Series Reference Manual v3.0 (chapter in
+// brackets). A write to a task register starts an action; an event register reports that something happened, until 0 is
+// written to it.
 #pragma once
 
 #include "hal/cortex_m/registers.hpp"

@@ -1,4 +1,4 @@
-// UART on P0.24 (TX) and P0.25 (RX), which the micro:bit's USB interface is connected to.
+// UART on P0.24 (TX) and P0.25 (RX), the pins of the micro:bit's USB interface.
 #include "hal/uart.hpp"
 
 #include "hal/nrf51/registers.hpp"

@@ -6,7 +6,7 @@ extern "C" {
 
 void clock_interrupt();
 
-// an image without a UART does not serve its interrupt
+// default handler for an image without a UART
 [[gnu::weak, gnu::naked]] void uart_interrupt() { asm volatile("ldr r0, =fault_handler\n bx r0\n .ltorg"); }
 
 }  // extern "C"
@@ -15,7 +15,7 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::size_t interrupts = 32;  // ARMv6-M has no more
+constexpr std::size_t interrupts = 32;  // maximum of ARMv6-M
 
 constexpr auto table() {
   auto all = cortex_m::fault_vectors<interrupts>();

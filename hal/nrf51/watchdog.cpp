@@ -1,4 +1,4 @@
-// Watchdog on the 32,768 Hz oscillator, which it starts by itself.
+// Watchdog on the 32,768 Hz oscillator, which it starts itself.
 #include "hal/watchdog.hpp"
 
 #include "hal/nrf51/registers.hpp"
@@ -7,7 +7,7 @@ namespace bms::hal {
 
 void watchdog_start(std::uint32_t timeout_ms) {
   nrf51::wdt_crv() = timeout_ms * 32'768 / 1'000;
-  nrf51::wdt_rren() = 1;  // fed by one register
+  nrf51::wdt_rren() = 1;  // one feed register
   nrf51::wdt_start() = 1;
 }
 

@@ -1,10 +1,10 @@
-// Samples that another node on the bus measures and sends (hal/sample_frames.hpp), for a board whose own measuring
-// chain is not there yet. The load and its contactors are on the bus, too.
+// Samples that another node on the bus measures and sends (hal/sample_frames.hpp), for a board without a measuring
+// chain of its own. The load and its contactors are also on the bus.
 //
-// When none has come for five sample periods, 1.2 s at most, one without readings is given, and one each period from
-// then on: estimator and protection are told that nothing is measured, go on and lose certainty as they should, and the
-// watchdog (2 s, at least 1.36 s by its oscillator) is fed by work, not by waiting. Its time goes on from the sender's
-// last one. A sender whose time falls back by more than that patience has begun anew: its time is taken to go on, too.
+// If no sample arrives for five sample periods (at most 1.2 s), this back end returns a sample without readings, and
+// one more per period from that moment. Estimator and protection then know that nothing is measured, and the watchdog
+// (2 s, at least 1.36 s by its oscillator) is fed by work instead of waiting. The time continues from the sender's last
+// time. If a sender's time falls back by more than the timeout, the sender has restarted; its time continues as well.
 #include "hal/samples.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
@@ -17,13 +17,13 @@ namespace bms::hal {
 namespace {
 
 constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
-constexpr std::uint64_t longest_us = 1'200'000, patience_us = 5 * period_us < longest_us ? 5 * period_us : longest_us,
-                        again_us = period_us < longest_us ? period_us : longest_us;
+constexpr std::uint64_t max_wait_us = 1'200'000, timeout_us = 5 * period_us < max_wait_us ? 5 * period_us : max_wait_us,
+                        repeat_us = period_us < max_wait_us ? period_us : max_wait_us;
 
 SampleFrames<pack_cells> frames;
-measurement::PackSample<pack_cells> nothing, given;
-std::uint64_t given_us = 0, last_us = 0, before_us = 0;  // before_us: what came before the sender's own zero
-bool silent = false;                                     ///< the last one given was without readings
+measurement::PackSample<pack_cells> no_readings, given;
+std::uint64_t given_us = 0, last_us = 0, offset_us = 0;  // offset_us: own time at the sender's zero
+bool silent = false;                                     ///< the last sample had no readings
 
 }  // namespace
 
@@ -32,13 +32,13 @@ const measurement::PackSample<pack_cells>* next_sample() {
     can::Frame frame;
     while (can_receive(frame)) {
       if (!dispatch_frame(frame) || !frames.receive(frame))
-        continue;  // a frame that gets lost later is a missing reading, not the old one again
+        continue;  // a lost frame makes a reading missing, it does not repeat the old one
       given = frames.sample();
-      given.time_us += before_us;
-      if (given.time_us + patience_us < last_us) {
-        const std::uint64_t goes_on_us = last_us + (now_us() - given_us) - given.time_us;
-        before_us += goes_on_us;
-        given.time_us += goes_on_us;
+      given.time_us += offset_us;
+      if (given.time_us + timeout_us < last_us) {
+        const std::uint64_t gap_us = last_us + (now_us() - given_us) - given.time_us;
+        offset_us += gap_us;
+        given.time_us += gap_us;
       }
       given_us = now_us();
       silent = false;
@@ -46,11 +46,11 @@ const measurement::PackSample<pack_cells>* next_sample() {
       return &given;
     }
     const std::uint64_t now = now_us(), waited = now - given_us;
-    if (waited >= (silent ? again_us : patience_us)) {
-      nothing.time_us = last_us += waited;
+    if (waited >= (silent ? repeat_us : timeout_us)) {
+      no_readings.time_us = last_us += waited;
       given_us = now;
       silent = true;
-      return &nothing;
+      return &no_readings;
     }
     wait_for_interrupt();
   }

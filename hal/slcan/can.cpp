@@ -1,5 +1,4 @@
-// CAN as SLCAN text over the board's UART. The channel is closed at boot; nothing is sent before the other side opens
-// it.
+// CAN as SLCAN text over the board's UART. The channel is closed at boot; nothing is sent before the host opens it.
 #include "hal/can.hpp"
 
 #include "hal/slcan/codec.hpp"
@@ -16,7 +15,7 @@ bool listening = false;
 
 void answer(std::string_view text) { uart_write({text.data(), text.size()}); }
 
-/// What an adapter answers to a line that is no frame for us; \a where it refuses.
+/// Answer of an adapter to a line without a data frame; \a rejects the line.
 std::string_view answer_to(std::string_view line) {
   if (slcan::is_other_frame(line)) return listening ? "\r" : "\a";
   if (line.size() == 2 && line[0] == 'S' && line[1] >= '0' && line[1] <= '8')
@@ -69,7 +68,7 @@ bool can_receive(can::Frame& frame) {
   return false;
 }
 
-// a UART has no bus errors, and nobody acknowledges: state and lost bytes are all there is
+// A UART has neither bus errors nor acknowledges, so only the state and the lost bytes are known.
 CanHealth can_health() { return {.state = listening ? CanState::active : CanState::starting, .lost = uart_lost()}; }
 
 }  // namespace bms::hal

@@ -1,12 +1,13 @@
-// SLCAN, the text that cheap CAN adapters speak (Lawicel CAN232 manual): portable, for the firmware and for the host.
+// SLCAN, the text protocol of low-cost CAN adapters (Lawicel CAN232 manual), for the firmware and the host.
 //
-//   tIIILDD..\r        standard frame: 3 hex digits of id, length, data; upper case when sent, either case when
-//   received TIIIIIIIILDD..\r   29-bit frame, 8 digits of id      rIIIL\r, RIIIIIIIIL\r   remote request: well known,
-//   of no use here O\r, C\r           open and close the channel Sn\r, V\r, v\r, N\r, F\r   bit rate, versions, serial
-//   number, status
+//   tIIILDD..\r        standard frame: 3 hex digits of identifier, length, data. Sends upper case, accepts either case.
+//   TIIIIIIIILDD..\r   29-bit frame: 8 hex digits of identifier
+//   rIIIL\r, RIIIIIIIIL\r   remote request: recognised, not used
+//   O\r, C\r           open and close the channel
+//   Sn\r, V\r, v\r, N\r, F\r   bit rate, versions, serial number, status
 //
-// Each line is answered by \r (after the text that was asked for, if any) or, refused, by \a.
-// A line that is too long, not hexadecimal or of the wrong length is refused as a whole and harms nothing.
+// Each line is answered by \r, after the requested text if there is one, or rejected by \a. A line that is too long, is
+// not hexadecimal or has the wrong length is rejected as a whole and has no effect.
 #pragma once
 
 #include <array>
@@ -21,7 +22,7 @@ namespace bms::hal::slcan {
 
 inline constexpr std::size_t longest_frame = 1 + 8 + 1 + 16 + 1;
 
-/// A frame as text; the part of `text` that is in use. frame.length above 8 counts as 8.
+/// Writes a frame as text and returns the used part of `text`. A frame.length above 8 counts as 8.
 constexpr std::string_view encode(const can::Frame& frame, std::array<char, longest_frame>& text) {
   constexpr std::string_view hex = "0123456789ABCDEF";
   std::size_t n = 0;
@@ -38,7 +39,7 @@ constexpr std::string_view encode(const can::Frame& frame, std::array<char, long
   return {text.data(), n};
 }
 
-/// A hex digit's value; 16 when it is none.
+/// Value of a hex digit; 16 for any other character.
 constexpr unsigned digit(char c) {
   if (c >= '0' && c <= '9') return static_cast<unsigned>(c - '0');
   if (c >= 'A' && c <= 'F') return static_cast<unsigned>(c - 'A') + 10;
@@ -46,14 +47,14 @@ constexpr unsigned digit(char c) {
   return 16;
 }
 
-/// A line without its end; false: not a data frame.
+/// line: without the final \r. Returns false, and leaves `frame` unchanged, if it is not a valid data frame.
 constexpr bool decode(std::string_view line, can::Frame& frame) {
   if (line.empty() || (line[0] != 't' && line[0] != 'T')) return false;
   can::Frame decoded;
   decoded.long_id = line[0] == 'T';
   const std::size_t before_data = decoded.long_id ? 10 : 5;
   if (line.size() < before_data || digit(line[1]) > (decoded.long_id ? 1U : 7U)) return false;
-  for (std::size_t k = 1; k + 1 < before_data; ++k) {  // no substr(): what it may throw brings half a C library along
+  for (std::size_t k = 1; k + 1 < before_data; ++k) {  // no substr(): its exception would link much of the C library
     if (digit(line[k]) > 15) return false;
     decoded.id = decoded.id << 4 | digit(line[k]);
   }
@@ -69,7 +70,7 @@ constexpr bool decode(std::string_view line, can::Frame& frame) {
   return true;
 }
 
-/// Whether a line is a remote request, which decode() does not return.
+/// Returns true if the line is a valid remote request, which decode() does not return.
 constexpr bool is_other_frame(std::string_view line) {
   if (line.empty() || (line[0] != 'r' && line[0] != 'R')) return false;
   const std::size_t id_digits = line[0] == 'r' ? 3 : 8;
@@ -80,11 +81,10 @@ constexpr bool is_other_frame(std::string_view line) {
   return digit(line[1 + id_digits]) <= 8 && digit(line[1]) <= (id_digits == 3 ? 7U : 1U);
 }
 
-/// Collects bytes to lines.
+/// Assembles lines from bytes.
 class LineReader {
  public:
-  /// True when `byte` ended a line, which line() then holds until the next call. A line that was too long comes out
-  /// empty.
+  /// Returns true if `byte` ended a line, which line() returns until the next call. A line that is too long is empty.
   constexpr bool push(char byte) {
     if (ended_) {
       length_ = 0;

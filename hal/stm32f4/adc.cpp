@@ -1,6 +1,6 @@
 // ADC1, one conversion at a time (RM0090, 13): PA1 current, PA2 voltage, PA3 temperature, channel 17 the internal
-// reference. 84 cycles of sampling at 21 MHz are 4 us, which a source of 50 kohm settles in (datasheet DS8626, ADC
-// characteristics, R_AIN); the reference asks for 10 us (13.3, t_S_vrefint), 480 cycles are 23.
+// reference. Sampling takes 84 cycles of 21 MHz, 4 us, in which a source of 50 kohm settles (datasheet DS8626, ADC
+// characteristics, R_AIN). The reference needs 10 us (13.3, t_S_vrefint); 480 cycles are 23 us.
 #include "hal/adc.hpp"
 
 #include "hal/stm32f4/registers.hpp"
@@ -12,8 +12,8 @@ namespace {
 using namespace stm32f4;
 
 constexpr std::uint32_t converted = 1U << 1, on = 1U << 0, begin = 1U << 30;
-constexpr unsigned patience =
-    1'000;  // polls of some 6 cycles: 36 us at 168 MHz, more at 16; the longest conversion takes 23.4
+/// About 6 cycles each: 36 us at 168 MHz, more at 16 MHz. The longest conversion takes 23.4 us.
+constexpr unsigned max_polls = 1'000;
 
 constexpr std::uint32_t channel(AnalogInput input) {
   switch (input) {
@@ -39,7 +39,7 @@ void adc_start() {
   adc1_smpr1() = 7U << 21;                     // channel 17: 480 cycles
   adc1_smpr2() = 4U << 3 | 4U << 6 | 4U << 9;  // channels 1 to 3: 84 cycles
   adc1_cr1() = 0;                              // 12 bits
-  adc1_cr2() = on;  // ready within 3 us; the reference within 10: long before the first round
+  adc1_cr2() = on;                             // ready in 3 us, the reference in 10
 }
 
 std::optional<std::uint16_t> adc_convert(AnalogInput input) {
@@ -47,7 +47,7 @@ std::optional<std::uint16_t> adc_convert(AnalogInput input) {
   adc1_sqr3() = channel(input);
   adc1_sr() = 0;
   adc1_cr2() = on | begin;
-  for (unsigned k = 0; k < patience; ++k) {
+  for (unsigned k = 0; k < max_polls; ++k) {
     if ((adc1_sr() & converted) != 0) return static_cast<std::uint16_t>(adc1_dr() & 0xFFFU);
   }
   return std::nullopt;

@@ -1,22 +1,21 @@
 // CAN1 on PB8 (RX) and PB9 (TX), alternate function 9 (datasheet, table 9). Registers: RM0090, 32.9.
 //
-// Out: three mailboxes that the controller sends by identifier (TXFP = 0), behind them a queue of 32 frames in the same
-// order. A more urgent frame that finds all three taken has the least urgent one aborted, which goes back into the
-// queue. Two frames of one identifier are never in mailboxes together: the controller would send them by the mailbox's
-// number, not by age. In: filters for accepted_ids, standard frames all of them, the controller's FIFO of three, by
-// interrupt into a ring of 64.
+// Transmission: three mailboxes, which the controller sends by identifier (TXFP = 0), and a queue of 32 frames in the
+// same order. If a more urgent frame finds all mailboxes taken, the least urgent one is aborted and returns to the
+// queue. Two frames with the same identifier are never in mailboxes together, because the controller would send them by
+// mailbox number instead of age.
+// Reception: filters for accepted_ids (standard frames), the controller's FIFO of three, an interrupt, a ring of 64.
 //
-// Going on the bus (32.4) and coming back after bus-off (32.7.6) are steps that service() looks at, each with a time
-// after which it is given up and tried again later; nothing here waits in a loop for the bus.
-//   bus-off         what waits is dropped; after a rest of 100 ms, doubled each time up to 1.6 s and 100 ms again once
-//   a frame got out,
-//                   the controller is told to recover, which takes 128 times 11 recessive bits
-//   nobody hears    frames wait and none got out for 100 ms (no acknowledge, a stuck wire, a bus that is full): what
-//   waits is dropped,
-//                   can_listening() is false for a second or until a frame comes in, then fresh frames try again
-//   no idle bus     100 ms after asking: counted, again after the rest
-//   no crystal      never on the bus: the internal oscillator is off by up to 8 % (datasheet, HSI), a bit may be by 0.5
-//   %
+// Going on the bus (32.4) and recovery after bus-off (32.7.6) are phases that service() checks. Each has a timeout
+// after which it is tried again later; no function waits in a loop for the bus.
+//   bus-off         drops the waiting frames. After a rest of 100 ms the controller starts its recovery, which takes
+//   128
+//                   times 11 recessive bits. The rest doubles each time up to 1.6 s; a sent frame resets it to 100 ms.
+//   no progress     frames wait and none was sent for 100 ms (no acknowledge, stuck wire, full bus): drops the waiting
+//                   frames. can_listening() is false for a second or until a frame arrives; then sending starts again.
+//   no idle bus     100 ms after the request: counts a failed start and tries again after the rest
+//   no crystal      never on the bus: the internal oscillator has an error of up to 8 % (datasheet, HSI), a bit allows
+//                   0.5 %
 #include <array>
 #include <atomic>
 
@@ -38,7 +37,7 @@ using namespace stm32f4;
 constexpr bxcan::BitTiming timing = bxcan::bit_timing(crystal_apb1_hz, BMS_CAN_BIT_RATE);
 constexpr auto banks = bxcan::filter_banks(accepted_ids);
 
-constexpr std::uint64_t step_us = 100'000, hearing_us = 100'000, silence_us = 1'000'000;
+constexpr std::uint64_t phase_timeout_us = 100'000, no_progress_us = 100'000, pause_us = 1'000'000;
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
 
 constexpr std::uint32_t mcr_inrq = 1U << 0, mcr_rflm = 1U << 3, mcr_reset = 1U << 15, msr_inak = 1U << 0;
@@ -50,7 +49,7 @@ constexpr std::uint32_t finished(std::uint32_t box) { return 1U << (8 * box); }
 constexpr std::uint32_t succeeded(std::uint32_t box) { return 2U << (8 * box); }
 constexpr std::uint32_t abort_request(std::uint32_t box) { return 0x80U << (8 * box); }
 
-// ---- out: shared with the interrupt ----
+// ---- transmission: shared with the interrupt ----
 
 struct Mailbox {
   bxcan::WaitingFrame waiting;
@@ -58,14 +57,14 @@ struct Mailbox {
 };
 std::array<Mailbox, 3> mailboxes;
 bxcan::TransmitQueue<32> queue;
-std::uint32_t numbers = 0;
+std::uint32_t next_number = 0;
 std::atomic<std::uint32_t> sent{0}, dropped{0};
 
 void count(std::atomic<std::uint32_t>& counter, std::uint32_t more = 1) {
   counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
 }
 
-/// While one lives, the transmit interrupt waits.
+/// Disables the transmit interrupt while an object exists.
 class TransmitInterruptLock {
  public:
   TransmitInterruptLock() {
@@ -112,8 +111,8 @@ void load(std::uint32_t k, const bxcan::WaitingFrame& waiting) {
   box.identifier = (frame.long_id ? frame.id << 3 | extended : frame.id << 21) | transmit_request;
 }
 
-/// All are taken: the least urgent frame comes back, if it is less urgent than the one that waits; at once, or after
-/// its end if it is under way.
+/// Call when all mailboxes are taken. If the least urgent frame in them is less urgent than `waiting`, aborts it: at
+/// once, or after its transmission has failed.
 void make_room_for(const bxcan::WaitingFrame& waiting) {
   std::uint32_t least = 0;
   for (std::uint32_t k = 1; k < mailboxes.size(); ++k) {
@@ -125,17 +124,17 @@ void make_room_for(const bxcan::WaitingFrame& waiting) {
 
 void refill() {
   take_back_finished();
-  const auto may_go = [](const bxcan::WaitingFrame& w) { return !in_a_mailbox(w.frame); };
+  const auto not_in_mailbox = [](const bxcan::WaitingFrame& w) { return !in_a_mailbox(w.frame); };
   for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
     bxcan::WaitingFrame next;
     if (mailboxes[k].taken) continue;
-    if (!queue.pop(next, may_go)) return;
+    if (!queue.pop(next, not_in_mailbox)) return;
     load(k, next);
   }
-  if (const bxcan::WaitingFrame* next = queue.most_urgent(may_go)) make_room_for(*next);
+  if (const bxcan::WaitingFrame* next = queue.most_urgent(not_in_mailbox)) make_room_for(*next);
 }
 
-void drop_what_waits() {
+void drop_waiting_frames() {
   const TransmitInterruptLock lock;
   count(dropped, static_cast<std::uint32_t>(queue.size()));
   queue.clear();
@@ -146,31 +145,31 @@ void drop_what_waits() {
   }
 }
 
-bool anything_waits() {
+bool frames_waiting() {
   const TransmitInterruptLock lock;
   return queue.size() > 0 || mailboxes[0].taken || mailboxes[1].taken || mailboxes[2].taken;
 }
 
-// ---- in: one writer (the interrupt), one reader ----
+// ---- reception: one writer (the interrupt), one reader ----
 
 std::array<can::Frame, 64> ring;
 std::atomic<std::uint32_t> received{0}, taken{0}, lost{0}, overruns{0};
 
-// ---- the bus ----
+// ---- state of the bus ----
 
 enum class Phase : std::uint8_t { off, resting, entering, joining, on };
 Phase phase = Phase::off;
-std::uint64_t phase_since_us = 0, progress_us = 0, silent_since_us = 0;
+std::uint64_t phase_since_us = 0, progress_us = 0, paused_since_us = 0;
 std::uint32_t rest_us = first_rest_us, bus_offs = 0, failed_starts = 0, seen_sent = 0, seen_received = 0;
-bool silent = false;
+bool paused = false;
 
-void go(Phase next) {
+void enter(Phase next) {
   phase = next;
   phase_since_us = now_us();
 }
 
 void configure() {
-  can1_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO keeps what it has: two frames make a sample
+  can1_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO discards new frames instead of old ones
   can1_btr() = timing.btr();
   can1_fmr() = can1_fmr() | 1U;
   constexpr std::uint32_t all = (1U << banks.size()) - 1;
@@ -188,12 +187,12 @@ void configure() {
 }
 
 void ask_for_initialisation() {
-  can1_mcr() = mcr_inrq | mcr_rflm;  // and no longer asleep
-  go(Phase::entering);
+  can1_mcr() = mcr_inrq | mcr_rflm;  // also leaves sleep mode
+  enter(Phase::entering);
 }
 
-/// The step took too long.
-void give_up() {
+/// The phase took too long.
+void abandon_phase() {
   ++failed_starts;
   if (phase == Phase::entering) {
     const TransmitInterruptLock lock;
@@ -203,24 +202,24 @@ void give_up() {
   } else {
     can1_mcr() = mcr_inrq | mcr_rflm;
   }
-  go(Phase::resting);
+  enter(Phase::resting);
 }
 
 void watch_transmission() {
   const std::uint32_t out = sent.load(std::memory_order_relaxed), in = received.load(std::memory_order_relaxed);
   const std::uint64_t now = now_us();
   if (out != seen_sent) rest_us = first_rest_us;
-  if (silent && (in != seen_received || now - silent_since_us >= silence_us)) {
-    silent = false;
+  if (paused && (in != seen_received || now - paused_since_us >= pause_us)) {
+    paused = false;
     progress_us = now;
   }
-  if (out != seen_sent || !anything_waits()) progress_us = now;
+  if (out != seen_sent || !frames_waiting()) progress_us = now;
   seen_sent = out;
   seen_received = in;
-  if (silent || now - progress_us < hearing_us) return;
-  silent = true;
-  silent_since_us = now;
-  drop_what_waits();
+  if (paused || now - progress_us < no_progress_us) return;
+  paused = true;
+  paused_since_us = now;
+  drop_waiting_frames();
 }
 
 void service() {
@@ -235,25 +234,25 @@ void service() {
       return ask_for_initialisation();
     case Phase::entering:
       if (!initialising) {
-        if (elapsed >= step_us) give_up();
+        if (elapsed >= phase_timeout_us) abandon_phase();
         return;
       }
       configure();
       can1_mcr() = mcr_rflm;
-      return go(Phase::joining);
+      return enter(Phase::joining);
     case Phase::joining:
       if (!initialising && !bus_off) {
-        silent = false;
+        paused = false;
         progress_us = now_us();
-        return go(Phase::on);
+        return enter(Phase::on);
       }
-      if (elapsed >= step_us) give_up();
+      if (elapsed >= phase_timeout_us) abandon_phase();
       return;
     case Phase::on:
       if (!bus_off) return watch_transmission();
       ++bus_offs;
-      drop_what_waits();
-      return go(Phase::resting);
+      drop_waiting_frames();
+      return enter(Phase::resting);
   }
 }
 
@@ -265,7 +264,7 @@ void can_start() {
   if (clocks().core_hz != crystal_core_hz) return;
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 1;
   rcc_apb1enr() = rcc_apb1enr() | 1U << 25;
-  gpiob_pupdr() = (gpiob_pupdr() & ~(3U << 16)) | 1U << 16;  // recessive where no transceiver is
+  gpiob_pupdr() = (gpiob_pupdr() & ~(3U << 16)) | 1U << 16;  // recessive if there is no transceiver
   gpiob_afrh() = (gpiob_afrh() & ~255U) | 0x99U;
   gpiob_moder() = (gpiob_moder() & ~(15U << 16)) | 10U << 16;
   nvic_iser0() = 1U << can1_tx_interrupt | 1U << can1_rx0_interrupt;
@@ -274,16 +273,16 @@ void can_start() {
 
 bool can_listening() {
   service();
-  return on_the_bus() && !silent;
+  return on_the_bus() && !paused;
 }
 
 bool can_send(const can::Frame& frame) {
   const TransmitInterruptLock lock;
-  if (!on_the_bus() || silent) {
+  if (!on_the_bus() || paused) {
     count(dropped);
     return false;
   }
-  const bool kept = queue.insert({frame, numbers++});
+  const bool kept = queue.insert({frame, next_number++});
   if (!kept) count(dropped);
   refill();
   return kept;

@@ -1,4 +1,4 @@
-# STM32F405, Cortex-M4F. What every board with this chip has (cmake/firmware.cmake).
+# STM32F405, Cortex-M4F. Settings of every board with this chip (cmake/firmware.cmake).
 set(BMS_CPU_FLAGS -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16)
 set(BMS_CORE armv7m)
 set(BMS_REPLACED_IN_EMULATION clock_tree)

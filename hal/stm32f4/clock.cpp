@@ -1,4 +1,4 @@
-// Microseconds from the SysTick timer: an interrupt each millisecond, the timer's value in between.
+// Microseconds from the SysTick timer: an interrupt every millisecond, and the timer's value in between.
 #include "hal/clock.hpp"
 
 #include "hal/stm32f4/clock_tree.hpp"
@@ -23,7 +23,7 @@ void clock_start() {
 }
 
 std::uint64_t now_us() {
-  // read until no interrupt came in between
+  // read again if an interrupt occurred in between
   while (true) {
     const std::uint32_t high = milliseconds_high, low = milliseconds_low;
     const std::uint32_t ticks = stm32f4::syst_rvr() - stm32f4::syst_cvr();

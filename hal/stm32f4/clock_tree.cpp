@@ -10,11 +10,11 @@ constexpr Clocks internal_oscillator{16'000'000, 16'000'000};
 constexpr Clocks crystal_and_pll{168'000'000, 84'000'000};
 Clocks reached = internal_oscillator;
 
-/// Some tens of milliseconds at 16 MHz: a crystal needs 2 (datasheet, table 40), the PLL 0.3.
-constexpr unsigned patience = 100'000;
+/// Some tens of milliseconds at 16 MHz. A crystal needs 2 ms (datasheet, table 40), the PLL 0.3 ms.
+constexpr unsigned max_polls = 100'000;
 
-bool comes_up(Register& reg, std::uint32_t mask, std::uint32_t value) {
-  for (unsigned k = 0; k < patience; ++k) {
+bool wait_for(Register& reg, std::uint32_t mask, std::uint32_t value) {
+  for (unsigned k = 0; k < max_polls; ++k) {
     if ((reg & mask) == value) return true;
   }
   return false;
@@ -25,21 +25,21 @@ bool comes_up(Register& reg, std::uint32_t mask, std::uint32_t value) {
 Clocks start_clocks() {
   constexpr std::uint32_t hse_on = 1U << 16, hse_ready = 1U << 17, pll_on = 1U << 24, pll_ready = 1U << 25;
   rcc_cr() = rcc_cr() | hse_on;
-  if (!comes_up(rcc_cr(), hse_ready, hse_ready)) return reached;
+  if (!wait_for(rcc_cr(), hse_ready, hse_ready)) return reached;
 
-  rcc_apb1enr() = rcc_apb1enr() | 1U << 28;  // power interface, then scale 1: needed above 144 MHz
+  rcc_apb1enr() = rcc_apb1enr() | 1U << 28;  // power interface, then voltage scale 1, needed above 144 MHz
   pwr_cr() = pwr_cr() | 1U << 14;
 
   // 25 MHz / 25 * 336 / 2 = 168 MHz; / 7 = 48 MHz
   rcc_pllcfgr() = 25U | 336U << 6 | 0U << 16 | 1U << 22 | 7U << 24;
   rcc_cr() = rcc_cr() | pll_on;
-  if (!comes_up(rcc_cr(), pll_ready, pll_ready)) return reached;
+  if (!wait_for(rcc_cr(), pll_ready, pll_ready)) return reached;
 
   flash_acr() = 5U | 1U << 8 | 1U << 9 | 1U << 10;  // 5 wait states, prefetch, both caches
-  if (!comes_up(flash_acr(), 7U, 5U)) return reached;
+  if (!wait_for(flash_acr(), 7U, 5U)) return reached;
   rcc_cfgr() = 5U << 10 | 4U << 13 | 2U;  // APB1 / 4, APB2 / 2, PLL as system clock
-  if (!comes_up(rcc_cfgr(), 3U << 2, 2U << 2)) {
-    rcc_cfgr() = 0;  // the internal oscillator, undivided: what `reached` says
+  if (!wait_for(rcc_cfgr(), 3U << 2, 2U << 2)) {
+    rcc_cfgr() = 0;  // the internal oscillator, undivided, as in `reached`
     return reached;
   }
   return reached = crystal_and_pll;

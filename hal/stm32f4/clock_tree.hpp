@@ -1,4 +1,4 @@
-// Clocks of the chip. Back ends: stm32f4/clock_tree (the chip itself), emulated/clock_tree.
+// Clock tree of the chip. Back ends: stm32f4/clock_tree (the chip itself), emulated/clock_tree.
 #pragma once
 
 #include <cstdint>
@@ -7,17 +7,17 @@ namespace bms::hal::stm32f4 {
 
 struct Clocks {
   std::uint32_t core_hz;
-  std::uint32_t apb2_hz;  ///< of USART1
+  std::uint32_t apb2_hz;  ///< clock of USART1
 };
 
-/// On the crystal; what is derived from APB1 is good for CAN (0.5 %) then only.
+/// Clocks on the crystal. Only then is APB1 accurate enough for CAN (0.5 %).
 inline constexpr std::uint32_t crystal_core_hz = 168'000'000, crystal_apb1_hz = 42'000'000;
 
-/// 168 MHz from the 25 MHz crystal through the PLL; 16 MHz from the internal oscillator when crystal or PLL do not come
-/// up.
+/// Starts 168 MHz from the 25 MHz crystal through the PLL; stays at the 16 MHz of the internal oscillator if crystal or
+/// PLL do not start.
 Clocks start_clocks();
 
-/// What start_clocks() has reached; the internal oscillator before.
+/// Result of start_clocks(); before it, the internal oscillator.
 const Clocks& clocks();
 
 }  // namespace bms::hal::stm32f4

@@ -1,5 +1,5 @@
-// PC6 main plus, PC7 main minus, PC8 pre-charge, PC9 charge enable; high closes; none while the supply is low.
-// Registers: RM0090, 8.4.
+// PC6 main plus, PC7 main minus, PC8 precharge, PC9 charge enable. A high level closes. While the supply is low, all
+// are open. Registers: RM0090, 8.4.
 #include "hal/contactor_pins.hpp"
 
 #include "hal/stm32f4/registers.hpp"
@@ -9,15 +9,14 @@ namespace bms::hal {
 
 void contactor_pins_set(const PowerPath& wanted) {
   using namespace stm32f4;
-  const std::uint32_t high = supply_low()
-                                 ? 0U
-                                 : (wanted.main_plus ? 1U << 6 : 0U) | (wanted.main_minus ? 1U << 7 : 0U) |
-                                       (wanted.precharge ? 1U << 8 : 0U) | (wanted.charge_enable ? 1U << 9 : 0U);
+  std::uint32_t high = 0;
+  if (!supply_low()) {
+    high = (wanted.main_plus ? 1U << 6 : 0U) | (wanted.main_minus ? 1U << 7 : 0U) | (wanted.precharge ? 1U << 8 : 0U) |
+           (wanted.charge_enable ? 1U << 9 : 0U);
+  }
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 2;
-  gpioc_bsrr() =
-      high |
-      (~high & 15U << 6)
-          << 16;  // the level first, then the output; both every time: a register that was disturbed is right again
+  // First the level, then the output mode. Every call writes all registers, which repairs a disturbed one.
+  gpioc_bsrr() = high | (~high & 15U << 6) << 16;
   gpioc_otyper() = gpioc_otyper() & ~(15U << 6);
   gpioc_moder() = (gpioc_moder() & ~(255U << 12)) | 0x55U << 12;
 }

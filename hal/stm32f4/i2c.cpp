@@ -1,13 +1,14 @@
-// I2C1 on PB6 (SCL) and PB7 (SDA), alternate function 4 (datasheet, table 9), asked register by register; no interrupt,
-// no DMA. Registers and the order of events: RM0090, 27.3.3 and 27.6. USART1 of hal/stm32f4/uart.cpp has the same pins:
-// an image has one of both.
+// I2C1 on PB6 (SCL) and PB7 (SDA), alternate function 4 (datasheet, table 9), by polling: no interrupt, no DMA.
+// Registers and order of events: RM0090, 27.3.3 and 27.6. USART1 of hal/stm32f4/uart.cpp has the same pins, so an image
+// has only one of the two.
 //
-// Reading ends as 27.3.3 wants it: one byte (acknowledge off before the address is cleared), two (POS), more (the last
-// three by BTF), so that an interrupt between two registers may take as long as it likes. An interrupt makes a transfer
-// longer, not wrong: the clock waits.
+// The end of a read follows 27.3.3: one byte (acknowledge off before the address flag is cleared), two bytes (POS),
+// more (the last three by BTF). An interrupt between two register accesses may therefore take any time: it makes a
+// transfer longer, not wrong, because the clock waits.
 //
-// The controller's BUSY may stay set with both wires high (erratum "I2C analog filter may provide wrong value, locking
-// BUSY flag", STM32F405 errata ES0182): i2c_recover() moves both wires as outputs and resets the controller.
+// The controller's BUSY flag may stay set with both wires high (erratum "I2C analog filter may provide wrong value,
+// locking BUSY flag", STM32F405 errata ES0182). i2c_recover() then drives both wires as outputs and resets the
+// controller.
 #include "hal/i2c.hpp"
 
 #include "hal/clock.hpp"
@@ -27,14 +28,14 @@ constexpr std::uint32_t sr1_started = 1U << 0, sr1_address = 1U << 1, sr1_finish
                         sr1_empty = 1U << 7;
 constexpr std::uint32_t sr1_bus_error = 1U << 8, sr1_arbitration = 1U << 9, sr1_no_acknowledge = 1U << 10;
 constexpr std::uint32_t sr2_busy = 1U << 1;
-constexpr std::uint32_t half_bit_us = 5;  // of a clock made by hand: 100 kHz
+constexpr std::uint32_t half_bit_us = 5;  // of the recovery clock: 100 kHz
 
 struct Speed {
   std::uint32_t ccr, trise;
 };
 
-/// Fast mode, low for two thirds: ccr = clock / (3 x 400 kHz), never faster; trise = 300 ns of clocks + 1
-/// (27.6.8, 27.6.9).
+/// Fast mode, clock low for two thirds: ccr = clock / (3 x 400 kHz), rounded up so that it is never faster; trise =
+/// clock periods in 300 ns, plus 1 (27.6.8, 27.6.9).
 constexpr Speed speed(std::uint32_t apb1_hz) {
   return {1U << 15 | (apb1_hz + 1'199'999) / 1'200'000, apb1_hz / 1'000 * 300 / 1'000'000 + 1};
 }
@@ -44,7 +45,7 @@ static_assert(speed(16'000'000).ccr == (1U << 15 | 14) && speed(16'000'000).tris
 void set(std::uint32_t bits) { i2c1_cr1() = i2c1_cr1() | bits; }
 void clear(std::uint32_t bits) { i2c1_cr1() = i2c1_cr1() & ~bits; }
 
-/// SR1 was read, and said so: now the clock goes on.
+/// Reading SR2 after SR1 clears the address flag, and the clock continues.
 void clear_address() {
   const std::uint32_t read = i2c1_sr2();
   static_cast<void>(read);
@@ -71,7 +72,7 @@ void pause() {
   }
 }
 
-/// One transfer, with the time that is left for it.
+/// One transfer with its time limit.
 class Transfer {
  public:
   explicit Transfer(std::uint32_t longest_us) : until_us_(now_us() + longest_us) {}
@@ -109,8 +110,8 @@ class Transfer {
         if (const auto r = wait(sr1_received); r != I2cResult::done) return r;
         in[at] = static_cast<std::uint8_t>(i2c1_dr());
       }
-      if (const auto r = wait(sr1_finished); r != I2cResult::done)
-        return r;  // the third last is in DR, the second last behind it
+      // Now the third last byte is in DR, and the second last in the shift register.
+      if (const auto r = wait(sr1_finished); r != I2cResult::done) return r;
       clear(cr1_ack);
       in[at++] = static_cast<std::uint8_t>(i2c1_dr());
       if (const auto r = wait(sr1_finished); r != I2cResult::done) return r;
@@ -122,7 +123,7 @@ class Transfer {
     return I2cResult::done;
   }
 
-  /// The stop that was asked for is out when the bus is no longer busy.
+  /// Waits until the requested stop is sent and the bus is no longer busy.
   I2cResult end() {
     while ((i2c1_sr2() & sr2_busy) != 0) {
       if (now_us() > until_us_) return I2cResult::timed_out;
@@ -159,7 +160,7 @@ void i2c_start() {
   gpiob_bsrr() = scl | sda;
   gpiob_otyper() = gpiob_otyper() | scl | sda;
   gpiob_afrl() = (gpiob_afrl() & ~(255U << 24)) | 0x44U << 24;
-  i2c_recover();  // who was in the middle of a byte when this core was reset still is
+  i2c_recover();  // a device may still wait in the middle of a byte after a reset of this core
 }
 
 I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
@@ -173,7 +174,7 @@ I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, 
     set(cr1_stop);
   }
   if (result == I2cResult::bus_stuck || result == I2cResult::timed_out) {
-    configure();  // lets go of both wires
+    configure();  // releases both wires
     return result;
   }
   const I2cResult ended = transfer.end();
@@ -189,8 +190,8 @@ bool i2c_recover() {
     gpiob_bsrr() = scl;
     pause();
   }
-  for (const std::uint32_t level :
-       {scl << 16, sda << 16, scl, sda}) {  // a stop: the data wire rises while the clock is high
+  // a stop: the data wire rises while the clock is high
+  for (const std::uint32_t level : {scl << 16, sda << 16, scl, sda}) {
     gpiob_bsrr() = level;
     pause();
   }

@@ -7,7 +7,7 @@ namespace bms::hal {
 
 namespace {
 
-/// RM0090, 7.3.21. Several bits are set at once: the more telling one first.
+/// csr: RM0090, 7.3.21. Several bits may be set; the more specific cause comes first.
 ResetCause cause_of(std::uint32_t csr) {
   if ((csr & 1U << 29) != 0 || (csr & 1U << 30) != 0) return ResetCause::watchdog;
   if ((csr & 1U << 31) != 0) return ResetCause::low_power;
@@ -20,11 +20,11 @@ ResetCause cause_of(std::uint32_t csr) {
 
 ResetCause read_reset_cause() {
   const ResetCause cause = cause_of(stm32f4::rcc_csr());
-  stm32f4::rcc_csr() = stm32f4::rcc_csr() | 1U << 24;  // forget
+  stm32f4::rcc_csr() = stm32f4::rcc_csr() | 1U << 24;  // RMVF clears the cause
   return cause;
 }
 
-const ResetCause cause = read_reset_cause();  // before main(): the register says nothing of it later
+const ResetCause cause = read_reset_cause();  // before main(): the register is cleared after it was read
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Registers of the STM32F405 that this firmware touches, by hand from ST's RM0090 (section in brackets); those of every
+// Registers of the STM32F405 that this firmware uses, from ST's RM0090 (section in brackets). Registers of every
 // Cortex-M: hal/cortex_m/registers.hpp.
 #pragma once
 

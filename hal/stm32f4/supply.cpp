@@ -38,7 +38,7 @@ bool brown_out_reset_low() { return (flash_optcr() & brown_out_level) != 0; }
 
 }  // namespace bms::hal
 
-/// All open: written as it is, because nothing that main() has half done may come between.
+/// Opens all contactors. It writes the register itself, because main() may be in the middle of contactor_pins_set().
 extern "C" void pvd_interrupt() {
   using namespace bms::hal;
   stm32f4::exti_pr() = 1U << 16;

@@ -1,22 +1,23 @@
-// The detector of a supply that sinks (RM0090, 5.2.3), and the option bytes that say when the chip resets itself for it
+// Detector of a falling supply (RM0090, 5.2.3), and the option bytes that select the voltage of the brown-out reset
 // (3.6.2, 3.9.6).
 //
-//   3.03 V (2.95 to 3.09)   the detector, PLS 7, falling; 3.14 V rising: contactors open at once, in the interrupt;
-//   then one record is kept 2.83 V (2.75 to 2.90)   reset, if the option bytes say level 3; else at a voltage at which
-//   words of flash are not programmed any more (2.7 V)
+//   3.03 V (2.95 to 3.09)   detector, PLS 7, falling (3.14 V rising): the interrupt opens the contactors at once, then
+//                           the firmware stores one record
+//   2.83 V (2.75 to 2.90)   reset, if the option bytes select level 3; otherwise the reset comes below 2.7 V, where
+//                           words of flash can no longer be programmed
 //
 // (datasheet DS8626, embedded reset and power control block characteristics)
 #pragma once
 
 namespace bms::hal::stm32f4 {
 
-/// After the contactors' outputs may be used.
+/// Call before the contactors' outputs are used.
 void supply_start();
 
-/// Below the threshold now.
+/// Returns true while the supply is below the detector's threshold.
 bool supply_low();
 
-/// Option bytes: any level but 3.
+/// Returns true if the option bytes select another level than 3.
 bool brown_out_reset_low();
 
 }  // namespace bms::hal::stm32f4

@@ -6,7 +6,7 @@ extern "C" {
 
 void clock_interrupt();
 
-// an image without a UART or CAN does not serve its interrupt
+// default handlers for an image without these peripherals
 [[gnu::weak, gnu::naked]] void usart1_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void can1_tx_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void can1_rx0_interrupt() { asm volatile("b fault_handler"); }
