@@ -11,8 +11,8 @@ namespace {
 
 using hal::I2cResult;
 
-/// Remainder of the message, eight zeros behind it, divided by x^8 + x^2 + x + 1; bit by bit, as on paper.
-std::uint8_t remainder(const std::vector<std::uint8_t>& message) {
+/// CRC by long division: the message followed by eight zeros, modulo x^8 + x^2 + x + 1, bit by bit.
+std::uint8_t crc_of(const std::vector<std::uint8_t>& message) {
   std::vector<bool> bits;
   for (const std::uint8_t byte : message) {
     for (int k = 7; k >= 0; --k) bits.push_back((byte >> k & 1) != 0);
@@ -31,7 +31,7 @@ std::uint8_t remainder(const std::vector<std::uint8_t>& message) {
 
 constexpr std::array<std::uint8_t, 4> temperature_register{0x70, 0x74, 0x76, 0x6A};
 constexpr std::array<std::uint16_t, 4> temperature_pin{0x92FD, 0x92FF, 0x9300, 0x92FA};
-constexpr double as_a_step = 36;  // 10 mAh
+constexpr double as_per_step = 36;  // 10 mAh
 
 void put(std::span<std::uint8_t> to, std::size_t at, std::uint32_t value, std::size_t bytes) {
   for (std::size_t k = 0; k < bytes; ++k) to[at + k] = static_cast<std::uint8_t>(value >> 8 * k);
@@ -41,7 +41,7 @@ void put(std::span<std::uint8_t> to, std::size_t at, std::uint32_t value, std::s
 
 Bq76952Model::Bq76952Model() { reset(); }
 
-/// As delivered: the defaults of the manual, as far as anything here depends on them.
+/// Factory state: those defaults of the manual that the model uses.
 void Bq76952Model::reset() {
   memory_.clear();
   direct_ = {};
@@ -68,7 +68,7 @@ void Bq76952Model::reset() {
   slot_left_us_ = 3'000;
   cc1_left_us_ = 250'000;
   low_ = high_ = 0;
-  heard_us_ = time_us;
+  last_transfer_us_ = time_us;
 }
 
 std::uint32_t Bq76952Model::memory(std::uint16_t address, std::size_t bytes) const {
@@ -88,7 +88,7 @@ void Bq76952Model::set_memory(std::uint16_t address, std::size_t bytes, std::uin
 bool Bq76952Model::enables_contactors() const {
   const auto driven = [&](std::uint16_t pin) {
     return memory(pin, 1) == 0xAA;
-  };  // low when faulty, high from REG1, which has to be on
+  };  // low at a fault; high comes from REG1, which has to be on
   return driven(0x9301) && driven(0x9302) && memory(0x9236, 1) == 0x0D && (memory(0x9237, 1) & 1) != 0 && !config_ &&
          safety_a_ == 0 && safety_c_ == 0;
 }
@@ -121,7 +121,7 @@ void Bq76952Model::step(std::uint64_t us) {
   cc1_as_ += current_a * s;
   if (time_us >= balancing_until_us_) balancing_ = 0;
   for (std::size_t k = 0; k < 16; ++k) bled_s[k] += (balancing_ >> k & 1) != 0 ? s : 0;
-  if ((memory(0x9263, 1) & 2) != 0 && time_us - heard_us_ > 1'000'000ULL * memory(0x92B2, 2)) safety_c_ |= 2;
+  if ((memory(0x9263, 1) & 2) != 0 && time_us - last_transfer_us_ > 1'000'000ULL * memory(0x92B2, 2)) safety_c_ |= 2;
   slot_left_us_ -= us;
   cc1_left_us_ -= us;
   const bool measures = !frozen && !config_ && !deep_sleep && !gone;
@@ -134,7 +134,7 @@ void Bq76952Model::step(std::uint64_t us) {
     if (measures) {
       const double capacity_gain =
           static_cast<double>(std::bit_cast<float>(memory(0x91AC, 4))) / 298261.6178 * shunt_mohm / 7.5684;
-      counted_ += std::llround(cc1_as_ * capacity_gain / as_a_step * 4294967296.0);
+      counted_ += std::llround(cc1_as_ * capacity_gain / as_per_step * 4294967296.0);
       ++quarter_seconds_;
     }
     cc1_left_us_ = 250'000;
@@ -174,7 +174,7 @@ void Bq76952Model::scan_ends() {
           2);
   }
   alarm_ |= 1U << 1 & alarm_enable_;
-  if (only_cells) loop_ = 3;  // the slots of stack, LD and thermistors stand still
+  if (only_cells) loop_ = 3;  // skips the slots of stack, LD and thermistors
   if (!only_cells && ++loop_ >= 3) {
     loop_ = 0;
     alarm_ |= 1U << 7 & alarm_enable_;
@@ -324,7 +324,7 @@ I2cResult Bq76952Model::take(std::span<const std::uint8_t> out) {
     const std::uint8_t byte = out[k];
     if (checked_) {
       message.push_back(byte);
-      if (++k >= out.size() || remainder(message) != out[k]) return I2cResult::no_acknowledge;
+      if (++k >= out.size() || crc_of(message) != out[k]) return I2cResult::no_acknowledge;
       message.clear();
     }
     write_register(at, byte);
@@ -339,7 +339,7 @@ void Bq76952Model::give(std::uint8_t command, bool written, std::span<std::uint8
   for (std::size_t k = 0; k < in.size(); ++k, ++command) {
     in[k] = register_byte(command);
     message.push_back(in[k]);
-    if (checks && ++k < in.size()) in[k] = remainder(message);
+    if (checks && ++k < in.size()) in[k] = crc_of(message);
     message.clear();
   }
 }
@@ -349,7 +349,7 @@ I2cResult Bq76952Model::transfer(std::uint8_t address, std::span<const std::uint
   const std::size_t on_wire = 1 + out.size() + (in.empty() ? 0 : 1 + in.size());
   const bool hit = fault.kind != Fault::none && fault.count > 0 && fault.at-- <= 0;
   if (hit) --fault.count;
-  if (stuck_) return I2cResult::bus_stuck;  // until somebody makes clocks
+  if (stuck_) return I2cResult::bus_stuck;  // until the host sends clocks
   if (hung || (hit && fault.kind == Fault::timed_out)) {
     advance(hal::i2c_time_us(out.size() + in.size()));
     stuck_ = true;
@@ -360,7 +360,7 @@ I2cResult Bq76952Model::transfer(std::uint8_t address, std::span<const std::uint
     advance(25);
     return I2cResult::no_acknowledge;
   }
-  heard_us_ = time_us;
+  last_transfer_us_ = time_us;
   safety_c_ = 0;
   bytes_sent += static_cast<unsigned>(on_wire);
   const auto us = static_cast<unsigned>(on_wire * 45 / 2 + (in.empty() ? 5 : 8));
@@ -369,7 +369,7 @@ I2cResult Bq76952Model::transfer(std::uint8_t address, std::span<const std::uint
   if (!in.empty()) give(out[0], true, in);
   if (hit && fault.kind == Fault::flipped_bit) {
     if (in.empty())
-      result = I2cResult::no_acknowledge;  // the chip has seen a wrong CRC
+      result = I2cResult::no_acknowledge;  // the chip received a wrong CRC
     else
       in[(transfers * 7) % in.size()] ^= static_cast<std::uint8_t>(1U << transfers % 8);
   }

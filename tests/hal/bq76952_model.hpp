@@ -1,8 +1,8 @@
-// A BQ76952 on an I2C bus, written from its manual and independent of the driver: bytes with a CRC found by polynomial
-// division, subcommands, data memory, CONFIG_UPDATE mode, the scan of its cells in slots, three current filters,
-// balancing with its 20 s, the host watchdog; and what may go wrong.
+// Model of a BQ76952 on an I2C bus, written from its manual and independent of the driver: bytes with a CRC by
+// polynomial division, subcommands, data memory, CONFIG_UPDATE mode, the scan of the cells in slots, three current
+// filters, balancing with its limit of 20 s, host watchdog, and faults.
 //
-// Time passes by advance() and by what is on the wire (22.5 us a byte and 2.5 us a start or stop, 400 kHz).
+// Time passes in advance() and on the wire (22.5 us per byte and 2.5 us per start or stop, 400 kHz).
 #pragma once
 
 #include <array>
@@ -20,22 +20,22 @@ class Bq76952Model {
  public:
   Bq76952Model();
 
-  // the world
+  // inputs of the chip
   std::array<double, 16> cell_v{};
   double stack_v = 0, ld_v = 0, current_a = 0, shunt_mohm = 0.1;
-  double cc3_loses = 0;                                 ///< part of the current that the mean CC3 does not show
+  double cc3_loses = 0;                                 ///< fraction of the current that CC3 does not contain
   std::array<double, 4> temperature_c{25, 25, 25, 25};  ///< at TS1, TS3, HDQ, CFETOFF
-  double charge_as = 0;                                 ///< that really flowed
+  double charge_as = 0;                                 ///< true charge
   std::uint64_t time_us = 0;
-  std::array<double, 16> bled_s{};  ///< how long each cell was bled
+  std::array<double, 16> bled_s{};  ///< bleeding time of each cell
 
-  // what may go wrong
+  // faults
   bool gone = false, hung = false, frozen = false, torn_buffer = false, only_cells = false, crc_from_otp = false,
        deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
   std::uint16_t device_number = 0x7695;
   struct Fault {
     enum Kind { none, no_acknowledge, flipped_bit, timed_out, reset } kind = none;
-    int at = 0, count = 0;  ///< transfers from now, and how many
+    int at = 0, count = 0;  ///< first faulty transfer, counted from now; number of them
   } fault;
 
   hal::I2cResult transfer(std::uint8_t address, std::span<const std::uint8_t> out, std::span<std::uint8_t> in);
@@ -48,12 +48,12 @@ class Bq76952Model {
   bool checked() const { return checked_; }
   bool in_config() const { return config_; }
   std::uint16_t balancing() const { return balancing_; }
-  /// DDSG and DCHG both high: the contactor drivers are enabled.
+  /// Returns true if DDSG and DCHG are high, which enables the contactor drivers.
   bool enables_contactors() const;
 
   unsigned transfers = 0, bytes_sent = 0, clocked_us = 0;
-  std::vector<std::uint16_t> commands;  ///< subcommands, in their order
-  std::vector<std::string> violations;  ///< what a host must not do
+  std::vector<std::uint16_t> commands;  ///< received subcommands in order
+  std::vector<std::string> violations;  ///< violations of the manual by the host
 
  private:
   void step(std::uint64_t us);
@@ -74,7 +74,7 @@ class Bq76952Model {
   std::array<std::uint8_t, 32> buffer_{};
   std::uint8_t low_ = 0, high_ = 0, checksum_ = 0, length_ = 0;
   std::uint64_t busy_until_us_ = 0, slot_left_us_ = 3'000, cc1_left_us_ = 250'000, balancing_until_us_ = 0,
-                heard_us_ = 0, over_since_us_ = 0;
+                last_transfer_us_ = 0, over_since_us_ = 0;
   std::uint16_t alarm_ = 0, alarm_enable_ = 0xF800, balancing_ = 0;
   std::uint8_t safety_a_ = 0, safety_c_ = 0;
   bool checked_ = false, config_ = false, was_reset_ = true, stuck_ = false;

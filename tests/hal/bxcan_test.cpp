@@ -1,5 +1,5 @@
-// What of the bxCAN back end needs no register: bit timing against a search over all settings, filters, the queue
-// behind the mailboxes.
+// The parts of the bxCAN back end without registers: bit timing against a search over all settings, filters, and the
+// transmit queue.
 #include "hal/bxcan/bit_timing.hpp"
 #include "hal/bxcan/filter_banks.hpp"
 #include "hal/bxcan/transmit_queue.hpp"
@@ -17,7 +17,7 @@
 namespace bms::hal::bxcan {
 namespace {
 
-// as the STM32F405 has it, written down by hand: 42 MHz / 42 / 8 = 125 kbit/s, sample after 7 of 8 quanta...
+// STM32F405, calculated by hand: 42 MHz / 42 / 8 = 125 kbit/s, sample point after 7 of 8 quanta...
 static_assert(bit_timing(42'000'000, 250'000) == BitTiming{21, 6, 1, 1});
 static_assert(bit_timing(42'000'000, 125'000) == BitTiming{21, 13, 2, 2});
 static_assert(bit_timing(42'000'000, 500'000, cia301_allows) == BitTiming{6, 11, 2, 2});
@@ -25,7 +25,7 @@ static_assert(bit_timing(42'000'000, 500'000, cia301_allows).sample_point_ppm() 
 static_assert(bit_timing(42'000'000, 250'000).btr() == (0U << 24 | 0U << 20 | 5U << 16 | 20U));
 static_assert(bit_timing(40'000'000, 500'000) == BitTiming{5, 13, 2, 2}, "what a core at 160 MHz would reach");
 
-/// Whether bit_timing() compiles for it.
+/// True if bit_timing() compiles for these arguments.
 template <std::uint32_t Clock, std::uint32_t Rate>
 concept Reachable = requires {
   typename std::integral_constant<std::uint32_t, bit_timing(Clock, Rate).brp>;
@@ -36,10 +36,10 @@ static_assert(!Reachable<42'000'000, 800'000>, "not a whole number of cycles");
 static_assert(!Reachable<8'000'000, 1'000'001> && !Reachable<42'000'000, 0>);
 static_assert(!Reachable<25'000'000, 7'000>);
 
-/// All register values that give the rate exactly, by the definition of the bit in RM0090 and nothing of the header.
+/// Searches all register values that give the exact rate, by the definition of the bit in RM0090, without the header.
 struct Found {
   double nearest = 1;   // distance of the sample point from 87.5 %
-  int most_quanta = 0;  // with that
+  int most_quanta = 0;  // at this distance
 };
 Found search(double clock_hz, double rate) {
   Found found;
@@ -71,7 +71,7 @@ void is_the_best(std::uint32_t clock_hz, std::uint32_t rate, const BitTiming& t)
   EXPECT_GE(t.sjw, 1U);
 }
 
-TEST(BitTiming, IsTheBestThatASearchOverAllRegisterValuesFinds) {
+TEST(BitTiming, IsTheBestOfASearchOverAllRegisterValues) {
   is_the_best(42'000'000, 125'000, bit_timing(42'000'000, 125'000, anywhere));
   is_the_best(42'000'000, 250'000, bit_timing(42'000'000, 250'000, anywhere));
   is_the_best(42'000'000, 500'000, bit_timing(42'000'000, 500'000, anywhere));
@@ -83,7 +83,7 @@ TEST(BitTiming, IsTheBestThatASearchOverAllRegisterValuesFinds) {
   is_the_best(25'000'000, 250'000, bit_timing(25'000'000, 250'000, anywhere));
 }
 
-TEST(FilterBanks, HoldEachIdentifierOnceInBits15To5AndRepeatTheLast) {
+TEST(FilterBanks, ContainEachIdentifierOnceInBits15To5AndRepeatTheLast) {
   constexpr auto banks = filter_banks(std::array<std::uint16_t, 5>{0x310, 0x311, 0x312, 0x7FF, 0x001});
   ASSERT_EQ(banks.size(), 2U);
   EXPECT_EQ(banks[0].fr1, 0x62206200U);
@@ -92,9 +92,9 @@ TEST(FilterBanks, HoldEachIdentifierOnceInBits15To5AndRepeatTheLast) {
   EXPECT_EQ(banks[1].fr2, 0x00200020U);
 }
 
-/// ISO 11898-1, 10.4.2, bit by bit: eleven bits, then RTR and IDE of a standard frame (both 0), SRR and IDE of a long
-/// one (both 1) and its other eighteen.
-TEST(TransmitQueue, GivesFramesOfBothKindsInTheOrderOfTheWire) {
+/// ISO 11898-1, 10.4.2, bit by bit: eleven bits, then RTR and IDE of a standard frame (both 0), or SRR and IDE of a
+/// 29-bit frame (both 1) and its other eighteen bits.
+TEST(TransmitQueue, ReturnsStandardAnd29BitFramesInTheOrderOfArbitration) {
   const auto on_the_wire = [](const can::Frame& f) {
     std::vector<int> bits;
     for (int k = 10; k >= 0; --k) bits.push_back(static_cast<int>((f.long_id ? f.id >> 18 : f.id) >> k & 1));
@@ -121,12 +121,12 @@ TEST(TransmitQueue, GivesFramesOfBothKindsInTheOrderOfTheWire) {
   }
 }
 
-/// A reference that holds everything and sorts.
-TEST(TransmitQueue, GivesTheMostUrgentAndOfOneIdentifierTheOldestWhateverComes) {
+/// Reference: a list of all frames, sorted.
+TEST(TransmitQueue, AlwaysReturnsTheMostUrgentFrameAndTheOldestOfOneIdentifier) {
   TransmitQueue<8> queue;
   std::vector<std::pair<unsigned, std::uint32_t>> expected;  // id, number
   std::mt19937 random(7);
-  std::uint32_t number = 0xFFFFFF80;  // wraps on the way
+  std::uint32_t number = 0xFFFFFF80;  // wraps during the test
   std::uint32_t first = number;
   unsigned given_up = 0;
   for (int k = 0; k < 20'000; ++k) {

@@ -14,7 +14,7 @@ namespace {
 constexpr double reference_v = 1.21;
 constexpr std::uint32_t reference_at_3v3 = 1'502;  // 1.21 / 3.3 * 4095
 
-/// What the converter gives for a cell, by volts and ohms.
+/// Computes the converter's counts from the voltages and resistances of a cell.
 struct Bench {
   double supply_v = 3.3, cell_v = 3.3, current_a = 0, celsius = 25;
   std::uint32_t n = 100;
@@ -38,7 +38,7 @@ struct Bench {
   }
 };
 
-TEST(CellReadings, AreTheCellsAtEverySupply) {
+TEST(CellReadings, EqualTheCellsAtEverySupply) {
   for (double supply_v = 3.0; supply_v <= 3.55; supply_v += 0.05) {
     for (double cell_v = 1.5; cell_v <= 4.3; cell_v += 0.1) {
       EXPECT_NEAR(1e-6 * (Bench{.supply_v = supply_v, .cell_v = cell_v}.read().voltage_uv), cell_v, 0.0005 * cell_v)
@@ -52,7 +52,7 @@ TEST(CellReadings, AreTheCellsAtEverySupply) {
   }
 }
 
-TEST(CellReadings, TemperatureIsWithin045KelvinFromMinus25To85DegreesAndFallsNowhere) {
+TEST(CellReadings, TemperatureIsWithin045KelvinFromMinus25To85DegreesAndMonotonic) {
   double worst = 0;
   std::int16_t before = -10'000;
   for (double celsius = -25; celsius <= 85; celsius += 0.25) {
@@ -65,7 +65,7 @@ TEST(CellReadings, TemperatureIsWithin045KelvinFromMinus25To85DegreesAndFallsNow
   EXPECT_LT(worst, 0.45);
 }
 
-TEST(CellReadings, AThermistorThatIsOffOrShortedIsNoTemperature) {
+TEST(CellReadings, AnOpenOrShortedThermistorGivesNoTemperature) {
   AdcCounts c = Bench{}.counts();
   measurement::Sample s;
   for (const std::uint32_t rail : {0U, 4'095U * c.n}) {
@@ -76,7 +76,7 @@ TEST(CellReadings, AThermistorThatIsOffOrShortedIsNoTemperature) {
   }
 }
 
-TEST(CellReadings, CorrectionsAreAGainAndAnOffset) {
+TEST(CellReadings, TheCalibrationAppliesAGainAndAnOffset) {
   const Bench bench{.cell_v = 3.2, .current_a = -10};
   const measurement::Sample plain = bench.read(), corrected = bench.read({.voltage_gain_ppm = 2'000,
                                                                           .voltage_offset_uv = -3'000,
@@ -86,12 +86,12 @@ TEST(CellReadings, CorrectionsAreAGainAndAnOffset) {
   EXPECT_NEAR(corrected.current_ua, 0.99 * plain.current_ua + 50'000, 1);
 }
 
-TEST(CellReadings, AnAmplifierAtItsRailReadsMoreThanAShortCircuit) {
+TEST(CellReadings, ASaturatedAmplifierReadsMoreThanTheShortCircuitThreshold) {
   EXPECT_GT(Bench{.current_a = 500}.read().current_ua, 40'000'000);
   EXPECT_LT(Bench{.current_a = -500}.read().current_ua, -40'000'000);
 }
 
-TEST(CellReadings, AConverterOrASupplyThatCannotBeIsNoReading) {
+TEST(CellReadings, ASilentConverterOrAnImpossibleSupplyGivesNoReading) {
   const auto nothing = [](AdcCounts c) {
     measurement::Sample s;
     read(c, reference_at_3v3, {}, {}, s);
@@ -107,7 +107,7 @@ TEST(CellReadings, AConverterOrASupplyThatCannotBeIsNoReading) {
   EXPECT_TRUE(nothing(Bench{.supply_v = 2.3}.counts()));
 }
 
-TEST(CellReadings, OfAsManyConversionsAsAPeriodOfAMinuteHoldsNothingOverflows) {
+TEST(CellReadings, TheConversionsOfAOneMinutePeriodDoNotOverflow) {
   const measurement::Sample s = Bench{.cell_v = 4.2, .current_a = 35, .n = 240'000}.read();
   EXPECT_NEAR(1e-6 * s.voltage_uv, 4.2, 0.0021);
   EXPECT_NEAR(1e-6 * s.current_ua, 35, 0.02);

@@ -11,7 +11,7 @@ constexpr std::uint32_t day_s = 86'400;
 
 std::uint32_t digits(int n) { return static_cast<std::uint32_t>(n / 10 * 16 + n % 10); }
 
-/// By the C library's calendar.
+/// Reference: the calendar of the C library.
 RtcTime expected(std::uint32_t s) {
   const std::time_t t = s;
   std::tm of{};
@@ -22,10 +22,10 @@ RtcTime expected(std::uint32_t s) {
               digits(of.tm_mday)};
 }
 
-TEST(RtcTime, IsTheCLibrarysOfEveryDayOfTheCenturyAndBack) {
+TEST(RtcTime, EqualsTheCLibraryForEveryDayOfTheCenturyInBothDirections) {
   std::uint32_t second = 0, days = 0;
   for (std::uint64_t day = first_of_2000_s; day <= last_of_2099_s; day += day_s, ++days) {
-    second = (second + 49'999) % day_s;  // prime to a day: all hours, minutes and seconds come
+    second = (second + 49'999) % day_s;  // coprime to a day, so all hours, minutes and seconds occur
     for (const std::uint32_t at : {0U, second, day_s - 1}) {
       const auto s = static_cast<std::uint32_t>(day) + at;
       const RtcTime t = rtc_time(s), e = expected(s);
@@ -37,7 +37,7 @@ TEST(RtcTime, IsTheCLibrarysOfEveryDayOfTheCenturyAndBack) {
   EXPECT_EQ(days, 36'525U);
 }
 
-TEST(RtcTime, OfDigitsThatAreNoDateThereIsNone) {
+TEST(RtcTime, DigitsWithoutAValidDateGiveNoTime) {
   const RtcTime good = rtc_time(1'800'000'000);
   EXPECT_TRUE(unix_s(good));
   EXPECT_FALSE(unix_s({good.tr, 0})) << "month 0, day 0: as after a loss of the backup supply";

@@ -16,8 +16,8 @@ std::string encoded(const can::Frame& frame) {
   return std::string(slcan::encode(frame, text));
 }
 
-// the examples of the Lawicel CAN232 manual's transmit command
-TEST(Slcan, WritesWhatTheManualShows) {
+// examples of the transmit command in the Lawicel CAN232 manual
+TEST(Slcan, EncodesTheExamplesOfTheManual) {
   EXPECT_EQ(encoded({0x100, 0, {}}), "t1000\r");
   EXPECT_EQ(encoded({0x10, 2, {0x11, 0x22}}), "t01021122\r");
   EXPECT_EQ(encoded({0x7FF, 8, {0xDE, 0xAD, 0xBE, 0xEF, 0, 1, 2, 3}}), "t7FF8DEADBEEF00010203\r");
@@ -25,7 +25,7 @@ TEST(Slcan, WritesWhatTheManualShows) {
   EXPECT_EQ(encoded({0x10, 2, {0x11, 0x22}, true}), "T0000001021122\r");
 }
 
-TEST(Slcan, EveryFrameComesBack) {
+TEST(Slcan, EveryFrameIsDecodedAsEncoded) {
   std::mt19937_64 random(1);
   for (int run = 0; run < 10'000; ++run) {
     const bool long_id = run % 3 == 0;
@@ -48,7 +48,7 @@ TEST(Slcan, EveryFrameComesBack) {
   }
 }
 
-TEST(Slcan, RefusesWhatIsNoFrameAndLeavesTheLastOneAlone) {
+TEST(Slcan, RejectsLinesWithoutAFrameAndLeavesTheLastFrameUnchanged) {
   for (const char* line :
        {"",           "t",          "t100",        "t1009",          "t10021",  "t1002112", "t100211223",
         "t8001",      "t80000",     "tG000",       "t1001G1",        "t1001 1", "T1000",    "T00000100",
@@ -60,7 +60,7 @@ TEST(Slcan, RefusesWhatIsNoFrameAndLeavesTheLastOneAlone) {
   }
 }
 
-TEST(Slcan, AnyBytesNeverDoHarmAndTheNextLineIsRead) {
+TEST(Slcan, RandomBytesHaveNoEffectOnTheNextLine) {
   std::mt19937_64 random(2);
   slcan::LineReader reader;
   for (int run = 0; run < 2'000; ++run) {
@@ -81,7 +81,7 @@ TEST(Slcan, AnyBytesNeverDoHarmAndTheNextLineIsRead) {
   }
 }
 
-TEST(SampleFrames, CarryASampleAndAStart) {
+TEST(SampleFrames, CarryASampleAndAStartingPoint) {
   measurement::Sample sent;
   sent.time_us = (std::uint64_t{1} << 48) - 5;
   sent.current_ua = -123'456'789;
@@ -128,11 +128,11 @@ TEST(SampleFrames, CarryAPack) {
   EXPECT_EQ(received.rejected(), 0U);
 }
 
-TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
+TEST(SampleFrames, ACheckedSampleWithAFlippedBitOrALostFrameIsRejected) {
   const auto frames = frames_of(some_pack(), 51'000'000, 7);
   for (std::size_t broken = 0; broken < frames.size(); ++broken) {
     for (unsigned bit = 0; bit < 64; ++bit) {
-      if (broken == 0 && bit >= 48) continue;  // its own counter
+      if (broken == 0 && bit >= 48) continue;  // the counter is not covered by the check
       SampleFrames<16> received;
       bool complete = false;
       for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -142,18 +142,18 @@ TEST(SampleFrames, ACheckedSampleWithAnyBitTurnedOrAnyFrameLostIsNone) {
       }
       EXPECT_FALSE(complete) << broken << " " << bit;
     }
-    if (broken == 0) continue;  // without a check everything is taken
+    if (broken == 0) continue;  // without a check frame nothing is rejected
     SampleFrames<16> received;
     bool complete = false;
     for (std::size_t k = 0; k < frames.size(); ++k) complete = (k != broken && received.receive(frames[k])) || complete;
     EXPECT_FALSE(complete) << broken;
-    // the next whole one is taken again
+    // the next complete sample is accepted
     for (const can::Frame& frame : frames) complete = received.receive(frame);
     EXPECT_TRUE(complete) << broken;
   }
 }
 
-TEST(SampleFrames, WhatGetsLostIsMissingAndNotTheLastReadingAgain) {
+TEST(SampleFrames, ALostFrameMakesItsReadingMissingInsteadOfRepeatingTheLastOne) {
   measurement::Sample s{1, -5, 3'300'000, 2'500};
   SampleFrames<1> received;
   for (const can::Frame& frame : frames_of(s)) received.receive(frame);

@@ -1,5 +1,5 @@
-// The thermistor 103AT by Steinhart and Hart's equation through three of its maker's values (-20, 25 and 70 degrees C):
-// what it has at a temperature, without the firmware's table.
+// The thermistor 103AT by the equation of Steinhart and Hart through three values of the manufacturer (-20, 25 and 70
+// degrees C): its resistance at a temperature, independent of the firmware's table.
 #pragma once
 
 #include <array>

@@ -1,0 +1,29 @@
+#include "tests/hal/bq76952_board.hpp"
+
+#include "hal/clock.hpp"
+#include "hal/contactor_pins.hpp"
+
+namespace bms {
+
+Bq76952Model* chip = nullptr;
+std::vector<can::Frame> arriving;
+std::vector<hal::PowerPath> switched;
+
+namespace hal {
+I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
+  return chip->transfer(address, out, in);
+}
+bool i2c_recover() { return chip->recover(); }
+void i2c_start() {}
+std::uint64_t now_us() { return chip->time_us; }
+void wait_for_interrupt() { chip->advance(1'000 - chip->time_us % 1'000); }
+bool can_receive(can::Frame& frame) {
+  if (arriving.empty()) return false;
+  frame = arriving.front();
+  arriving.erase(arriving.begin());
+  return true;
+}
+void contactor_pins_set(const PowerPath& wanted) { switched.push_back(wanted); }
+}  // namespace hal
+
+}  // namespace bms
