@@ -1,21 +1,20 @@
-// Which cells to bleed so that all are full together: by state of charge, not by voltage, which says nothing on LFP's
-// plateau and is bent by resistance while current flows.
+// Selects the cells to bleed so that all are full together: by state of charge, not by voltage. On the plateau of LFP
+// the voltage says little, and under current the resistance changes it.
 //
-//   measured   once a charge, when the mean cell has reached 95 %, current does not flow out and every cell is known to
-//   1 %:
+//   measured   once per charge, when the mean cell has reached 95 %, no discharge current flows, and every cell is
+//              known to 1 %:
 //              excess = (soc of the cell) - (lowest soc) - 2 (sigma of the one + sigma of the other)
-//              bled are cells whose excess is above the dead band of half a percent
-//   bled       that charge and no more, counted by V / R, over the next hours: while charging or at rest, never while
-//   driving
+//              Cells whose excess is above the dead band of 0.5 % are bled.
+//   bled       exactly that charge, counted by V / R, over the next hours, while charging or at rest, not while driving
 //
-// An amount that is fixed at the top is why a cell of less capacity is not chased: it is level there and low at the
-// bottom, and at the bottom nothing is measured. Of a difference the part that is not sure stays. The sigmas are added,
-// not their squares: the lowest of sixteen is the one whose error is the largest, and a root would bleed after noise.
-// Cells of one monitoring chip that may not bleed beside each other take turns of eight seconds. What is left to bleed
-// is not stored: the next full charge finds it again.
+// The charge is fixed at the top, so a cell with a smaller capacity is not bled for it: it is level at the top and low
+// at the bottom, and at the bottom nothing is measured. The uncertain part of a difference remains. The sigmas are
+// added linearly, because the lowest of sixteen cells is the one with the largest error; a root of squares would bleed
+// after noise. If neighbours on one monitoring chip may not bleed together, they take turns of eight seconds. The
+// remaining charge is not stored; the next full charge measures it again.
 //
-// Voltages read while a cell bleeds are lower by the drop over its sense wires: measure with the bleeders off, or know
-// the drop. Memory: 8 bytes a cell. Integers only.
+// While a cell is bled, its reading is lower by the voltage drop on the sense wires: measure with the resistors off, or
+// know the drop. Memory: 8 bytes per cell. Integers only.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +29,7 @@ namespace bms::protection {
 
 struct BalancingPlan {
   std::int32_t bleed_ohm, rest_ua, lowest_uv, max_cdegc;
-  std::int64_t uams_per_ppb;  ///< charge of 1e-9 of the capacity [uA ms]
+  std::int64_t uams_per_ppb;  ///< charge per 1e-9 of the capacity [uA ms]
   bool neighbours_may_bleed;
 };
 
@@ -47,23 +46,23 @@ constexpr BalancingPlan balancing_plan(const PackDesign& d) {
 template <std::size_t Cells>
 struct BalancingInput {
   const std::array<std::int32_t, Cells>& cell_uv;
-  const std::array<std::int32_t, Cells>& soc_ppb;  ///< of each cell less the mean's; measurement::no_reading: not known
+  const std::array<std::int32_t, Cells>& soc_ppb;  ///< of each cell minus the mean; no_reading: unknown
   const std::array<std::int32_t, Cells>& sigma_ppb;
-  std::int32_t mean_soc_ppb, current_ua, highest_cdegc;  ///< measurement::no_reading: not known
-  bool allowed;                                          ///< no fault is in the way
+  std::int32_t mean_soc_ppb, current_ua, highest_cdegc;  ///< no_reading: unknown
+  bool allowed;                                          ///< no fault forbids it
 };
 
 template <std::size_t Cells>
 class Balancing {
  public:
-  static_assert(Cells <= 32, "a bit each");
+  static_assert(Cells <= 32, "one bit per cell");
   static constexpr std::int32_t top_ppb = 950'000'000, rearm_below_ppb = 850'000'000, dead_band_ppb = 5'000'000,
                                 max_sigma_ppb = 10'000'000;
   static constexpr std::uint32_t turn_us = 8'000'000;
 
   constexpr explicit Balancing(const BalancingPlan& plan) : plan_(&plan) {}
 
-  /// Cells to bleed until the next call, a bit each.
+  /// Returns the cells to bleed until the next call, one bit each. step_us: time since the last call.
   constexpr std::uint32_t update(const BalancingInput<Cells>& in, std::uint32_t step_us) {
     count_bled(in.cell_uv, step_us);
     turn_us_ = (turn_us_ + step_us) % (2 * turn_us);
@@ -76,7 +75,8 @@ class Balancing {
         in.highest_cdegc > plan_->max_cdegc)
       return 0;
     constexpr std::uint32_t even = 0x5555'5555;
-    const std::uint32_t turn = plan_->neighbours_may_bleed ? 0xFFFF'FFFF : turn_us_ < turn_us ? even : ~even;
+    std::uint32_t turn = 0xFFFF'FFFF;
+    if (!plan_->neighbours_may_bleed) turn = turn_us_ < turn_us ? even : ~even;
     for (std::size_t k = 0; k < Cells; ++k) {
       const std::uint32_t mask = std::uint32_t{1} << k;
       if (remaining_uams_[k] > 0 && (turn & mask) != 0 && in.cell_uv[k] >= plan_->lowest_uv) mask_ |= mask;
@@ -84,8 +84,9 @@ class Balancing {
     return mask_;
   }
 
+  /// Call when the resistors are switched off for another reason.
   constexpr void stop() { mask_ = 0; }
-  /// Until the last cell is done, if nothing interrupts it.
+  /// Time until the last cell is done without interruption [s]. cell_uv: voltage of a cell.
   constexpr std::uint32_t left_s(std::int32_t cell_uv) const {
     const std::int64_t most_uams = *std::max_element(remaining_uams_.begin(), remaining_uams_.end());
     if (most_uams <= 0 || cell_uv <= 0) return 0;
@@ -109,19 +110,19 @@ class Balancing {
     std::size_t lowest = Cells;
     for (std::size_t k = 0; k < Cells; ++k) {
       if (in.soc_ppb[k] == measurement::no_reading || in.sigma_ppb[k] > max_sigma_ppb)
-        return;  // a cell that is not known may be the lowest
+        return;  // an unknown cell may be the lowest
       if (lowest == Cells || in.soc_ppb[k] < in.soc_ppb[lowest]) lowest = k;
     }
     for (std::size_t k = 0; k < Cells; ++k) {
-      const std::int64_t sure =
+      const std::int64_t excess_ppb =
           std::int64_t{in.soc_ppb[k]} - in.soc_ppb[lowest] - 2 * (std::int64_t{in.sigma_ppb[k]} + in.sigma_ppb[lowest]);
-      remaining_uams_[k] = sure > dead_band_ppb ? sure * plan_->uams_per_ppb : 0;
+      remaining_uams_[k] = excess_ppb > dead_band_ppb ? excess_ppb * plan_->uams_per_ppb : 0;
     }
     measured_ = true;
   }
 
   const BalancingPlan* plan_;
-  std::array<std::int64_t, Cells> remaining_uams_{};  ///< to be bled
+  std::array<std::int64_t, Cells> remaining_uams_{};  ///< charge still to bleed, by cell
   std::uint32_t mask_ = 0, turn_us_ = 0, left_us_ = 0;
   bool measured_ = false;
 };

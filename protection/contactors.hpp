@@ -1,31 +1,33 @@
-// The pack's three contactors, their order, and whether they did what they were told.
+// The pack's three contactors: their order, and whether they did what was commanded.
 //
 //                 main+  main-  pre    leaves for
-//   off             -      -     -     self_test      a truck or a charger asks, anew since it was last followed, and
-//   no fault forbids it
+//   off             -      -     -     self_test      a truck or a charger makes a new request, and no fault forbids it
 //                                      safe           a fault opens
-//   self_test       -      -     -     precharge      three parts, each of one test time: all open, pre-charge relay
-//   alone, main- alone. In none may
-//                                                     the link rise: the other pole would be welded
-//   precharge       -      x     x     drive, charge  link at 15/16 of the pack; on the way it has to keep to the curve
-//   of an RC drive           x      x     -     unloading      nobody asks any more; a fault opens; current flows that
-//   is forbidden charge          x      x     -     the same; here the charger is enabled unloading       x      x -
-//   opening        no current flows, or a fault or forbidden current has had its time of grace opening         -      -
-//   -     off, safe      weld check: link falls by an eighth and no current flows; safe with a fault safe            -
-//   -     -     off            no fault opens any more and nobody asks
+//   self_test       -      -     -     precharge      after three parts of one test time each: all open, precharge
+//                   relay
+//                                                     alone, main- alone. A DC link that rises proves that the other
+//                                                     pole is welded.
+//   precharge       -      x     x     drive, charge  DC link at 15/16 of the pack; until then it follows an RC curve
+//   drive           x      x     -     unloading      the request ends, a fault opens, or forbidden current flows
+//   charge          x      x     -     the same; the charger is enabled
+//   unloading       x      x     -     opening        no current flows, or a fault or a forbidden current has used up
+//                                                     its grace time
+//   opening         -      -     -     off, safe      weld check: the DC link falls by an eighth and no current flows;
+//                                                     safe with a fault
+//   safe            -      -     -     off            no fault opens any more, and there is no request
 //
-// A severe fault opens at once from everywhere. Only what is severe, or has been told to cease and does not, is opened
-// under load; a truck that just takes its request back keeps the contactors until its current is gone. The state is
-// kept three times; one that contradicts itself or is none ends in safe, all open, with an internal fault.
+// A severe fault opens at once from every state. Only a severe fault, and a current that should have ceased and did
+// not, open under load. When a truck withdraws its request, the contactors stay closed until its current is zero. The
+// state is stored three times; contradicting copies or an invalid state lead to safe, all open, with an internal fault.
 //
-//   pre-charge  link(t) = pack (1 - exp(-t / RC)). Checked against the curve of the last half time constant that is
-//   over, less a fifth of the
-//               pack: slower is a load or a short on the link, and the resistor would burn. After six time constants it
-//               has failed.
-//   links       a link that stands at 7/8 of the pack while all is open, or rises by an eighth with one pole closed, or
-//   current while open: welded not closed  0.3 s after closing (table) the link is still a sixteenth below the pack
+//   precharge   dc_link(t) = pack (1 - exp(-t / RC)). It is compared with the curve at the last half time constant that
+//               is over, minus a fifth of the pack. A slower rise means a load or a short circuit on the DC link, and
+//               the resistor would burn. After six time constants the precharge has failed.
+//   welded      the DC link stays at 7/8 of the pack while all are open, it rises by an eighth with one pole closed, or
+//               current flows while open
+//   not closed  0.3 s after closing (table) the DC link is still a sixteenth below the pack
 //
-// Times are lengths that stop at their limit: nothing wraps. Integers only.
+// Times are durations that stop at their limit, so nothing wraps. Integers only.
 #pragma once
 
 #include <algorithm>
@@ -46,7 +48,7 @@ inline constexpr std::array<const char*, contactor_state_count> contactor_state_
 
 enum class Request : std::uint8_t { none, drive, charge };
 
-/// A bit each: a bool of eight has values that are neither, once a bit flips.
+/// One bit each, because a flipped bit in a whole byte could give a bool that is neither true nor false.
 struct Outputs {
   bool main_plus : 1 = false, main_minus : 1 = false, precharge : 1 = false, charge_enable : 1 = false;
 
@@ -58,7 +60,7 @@ struct ContactorPlan {
   std::uint32_t test_us, half_time_constant_us, dc_link_discharge_us;
   std::int32_t rest_ua;
 
-  /// Time in a state is counted up to that.
+  /// Limit up to which the time in a state is counted.
   constexpr std::uint32_t longest_us() const {
     return std::max({3 * test_us, 12 * half_time_constant_us, dc_link_discharge_us});
   }
@@ -72,21 +74,21 @@ constexpr ContactorPlan contactor_plan(const PackDesign& d) {
 
 struct ContactorInput {
   Request request = Request::none;
-  bool open = false, open_now = false;  ///< a fault with that reaction is there
+  bool open = false, open_now = false;  ///< a fault with this reaction is active
   bool charge_forbidden = false, discharge_forbidden = false;
   std::int32_t current_ua = measurement::no_reading, pack_uv = measurement::no_reading,
                dc_link_uv = measurement::no_reading;
   std::uint32_t step_us;
 };
 
-/// What the contactors find out by themselves.
+/// Faults that the contactors detect.
 struct ContactorEvents {
   bool precharge_failed : 1 = false, welded : 1 = false, not_closed : 1 = false;
 };
 
 class Contactors {
  public:
-  static constexpr std::uint32_t grace_us = 5'000'000;  ///< for a truck to ramp down when it is told 0 A
+  static constexpr std::uint32_t grace_us = 5'000'000;  ///< for a truck to reduce its current when 0 A are allowed
 
   constexpr explicit Contactors(const ContactorPlan& plan) : plan_(&plan) {}
 
@@ -107,7 +109,7 @@ class Contactors {
 
  private:
   static constexpr std::uint32_t max_half_time_constants = 12;
-  /// 1 - exp(-k / 2) less a fifth, k = 0 .. 11, in 1/1024.
+  /// 1 - exp(-k / 2) - 1/5 for k = 0 .. 11, in 1/1024.
   static constexpr std::array<std::int32_t, max_half_time_constants> min_precharge_curve = {
       0, 198, 442, 591, 681, 735, 768, 788, 800, 808, 812, 815};
 
@@ -115,7 +117,7 @@ class Contactors {
     state_.set(static_cast<std::uint32_t>(s));
     in_state_us_ = 0;
     dc_link_at_entry_uv_ = measurement::no_reading;
-    if (s != ContactorState::unloading) overrun_us_ = 0;  // a second reason is no second time of grace
+    if (s != ContactorState::unloading) overrun_us_ = 0;  // a second reason does not restart the grace time
   }
 
   constexpr void step(const ContactorInput& in) {
@@ -179,9 +181,10 @@ class Contactors {
     enter(ContactorState::self_test);
   }
 
-  /// Which of the three parts of the self-test.
+  /// Part of the self-test: 0 all open, 1 precharge relay alone, 2 main minus alone.
   constexpr std::uint32_t part() const {
-    return in_state_us_ < plan_->test_us ? 0 : in_state_us_ - plan_->test_us < plan_->test_us ? 1 : 2;
+    if (in_state_us_ < plan_->test_us) return 0;
+    return in_state_us_ - plan_->test_us < plan_->test_us ? 1 : 2;
   }
 
   constexpr void in_self_test(const ContactorInput& in) {
@@ -233,7 +236,7 @@ class Contactors {
     return in.current_ua != measurement::no_reading && ((in.charge_forbidden && in.current_ua > plan_->rest_ua) ||
                                                         (in.discharge_forbidden && in.current_ua < -plan_->rest_ua));
   }
-  /// How long current has flowed that is to cease. A reading that is missing now and then is no new beginning.
+  /// Counts the time in which a current flows that has to cease. A missing reading does not restart it.
   constexpr void count_grace(const ContactorInput& in, bool to_cease) {
     if (to_cease)
       count(overrun_us_, in.step_us, grace_us);
@@ -251,9 +254,9 @@ class Contactors {
       return enter(faulted ? ContactorState::safe : ContactorState::off);
     check_opened(in);
     if (in_state_us_ < plan_->test_us || (!flows && in_state_us_ < plan_->dc_link_discharge_us))
-      events_.welded = weld_detected_;  // it may still fall; what is not known is no weld
+      events_.welded = weld_detected_;  // the DC link may still fall; unknown is not welded
     if (in_state_us_ < plan_->dc_link_discharge_us) return;
-    // nothing contradicts, nothing proves: without readings there is no way to close again either
+    // Without readings a weld is neither proven nor excluded; nor can the contactors close again.
     if (faulted)
       enter(ContactorState::safe);
     else if (!events_.welded)
@@ -265,7 +268,7 @@ class Contactors {
     if (!in.open && !in.open_now && in.request == Request::none) enter(ContactorState::off);
   }
 
-  /// While everything is open, or one pole is.
+  /// Checks for a weld while all contactors or one pole are open.
   constexpr void check_opened(const ContactorInput& in) {
     const bool flows = in.current_ua != measurement::no_reading && magnitude(in.current_ua) > plan_->rest_ua;
     const bool stands = in.dc_link_uv != measurement::no_reading && in.pack_uv != measurement::no_reading &&
@@ -280,12 +283,10 @@ class Contactors {
   const ContactorPlan* plan_;
   Guarded state_{static_cast<std::uint32_t>(ContactorState::off)};
   std::uint32_t in_state_us_ = 0, overrun_us_ = 0;
-  Request last_request_ =
-      Request::none;  ///< the request that was followed last: it has to be made anew to be followed again
-  std::int32_t dc_link_at_entry_uv_ = measurement::no_reading;  ///< the lowest the link has been in the self-test
+  Request last_request_ = Request::none;  ///< the request that was followed last; only a new request is followed again
+  std::int32_t dc_link_at_entry_uv_ = measurement::no_reading;  ///< lowest DC link in this self-test
   ContactorEvents events_;
-  bool weld_detected_ : 1 =
-      false;  ///< by the self-test, whose proof is gone with the next sample; until the next start
+  bool weld_detected_ : 1 = false;  ///< by the self-test; kept until the next start
   Outputs outputs_;
 };
 

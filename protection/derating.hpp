@@ -1,20 +1,19 @@
-// Currents that are allowed: what the cell can take by its model, ramped down before a limit cuts off.
+// Allowed currents: the limit by the model of the cell, ramped down before a protection opens.
 //
-//   allowed = lowest of (continuous limit, model's limit, ramp over voltage, ramp over temperature, ramp over soc),
-//   halved by a fault that
-//             derates, 0 by one that forbids; it moves by no more than the continuous limit a second downwards, a fifth
-//             of that upwards
+//   allowed = lowest of (continuous limit, model's limit, ramp over voltage, ramp over temperature, ramp over soc);
+//             halved by a fault that derates, 0 by a fault that forbids. Per second it decreases by at most the
+//             continuous limit and increases by at most a fifth of it.
 //
-//   charge       highest cell  1 up to 6 % of the span below the upper limit, 0 there       soc     1 up to 95 %, a
-//   fifth from 100 % on
-//                temperature   0 at 0 degrees C, 1 from 10; 1 up to 20 K below the upper limit, 0 15 K below
-//   discharge    lowest cell   1 from 30 % of the span above the lower limit, 0 there       soc     1 down to 10 %, a
-//   fifth at 0
+//   charge       highest cell  1 up to 6 % of the span below the upper limit, 0 at the limit
+//                soc           1 up to 95 %, 1/5 from 100 % on
+//                temperature   0 at 0 degrees C, 1 from 10; 1 up to 20 K below the upper limit, 0 from 15 K below
+//   discharge    lowest cell   1 from 30 % of the span above the lower limit, 0 at the limit
+//                soc           1 down to 10 %, 1/5 at 0
 //                temperature   0 at the lower limit, 1 from 15 K above; 1 up to 10 K below the upper limit, 0 there
 //
-// soc never ends a current: it may be wrong, so the last fifth is left to the voltage. Charging goes by soc plus sigma,
-// discharging by soc less sigma. What forbids acts at once, everything else in the bounded way. No temperature known:
-// no charging, half of the discharging.
+// The soc alone never reduces a current to 0, because it may be wrong; the last fifth is left to the voltage. Charging
+// uses soc plus sigma, discharging soc minus sigma. A fault that forbids acts at once, everything else at the bounded
+// rate. Without a known temperature: no charging, half of the discharging.
 #pragma once
 
 #include <algorithm>
@@ -25,13 +24,13 @@
 
 namespace bms::protection {
 
-/// A line between two points, level outside; in 1/1024.
+/// A line between two points, constant outside; values in 1/1024.
 struct Ramp {
   std::int32_t from, to;  ///< from < to
   std::int32_t at_from, at_to;
 
   constexpr std::int32_t at(std::int32_t value) const {
-    if (value <= from) return at_from;  // before a division of 64 bits that most samples do not need
+    if (value <= from) return at_from;  // avoids the 64-bit division in most samples
     if (value >= to) return at_to;
     return at_from +
            static_cast<std::int32_t>(static_cast<std::int64_t>(at_to - at_from) * (value - from) / (to - from));
@@ -60,7 +59,7 @@ constexpr DeratingPlan derating_plan(const PackDesign& d) {
           .discharge_soc = {0, 100'000'000, fifth, all}};
 }
 
-/// What the allowed currents go by; measurement::no_reading where something is not known.
+/// Inputs of the allowed currents; measurement::no_reading: unknown.
 struct DeratingInput {
   std::int32_t highest_cell_uv = measurement::no_reading, lowest_cell_uv = measurement::no_reading;
   std::int32_t highest_cdegc = measurement::no_reading, lowest_cdegc = measurement::no_reading;
@@ -70,7 +69,7 @@ struct DeratingInput {
   bool derate = false, charge_forbidden = false, discharge_forbidden = false;
 };
 
-/// Both >= 0.
+/// Allowed currents, both >= 0.
 struct AllowedCurrent {
   std::int32_t charge_ua = 0, discharge_ua = 0;
 };
@@ -81,6 +80,7 @@ class Derating {
 
   constexpr explicit Derating(const DeratingPlan& plan) : plan_(&plan) {}
 
+  /// step_us: time since the last call.
   constexpr AllowedCurrent update(const DeratingInput& in, std::uint32_t step_us) {
     const bool temperature_known = in.highest_cdegc != measurement::no_reading;
     std::int32_t charge = temperature_known ? 1024 : 0, discharge = temperature_known ? 1024 : 512;
@@ -99,16 +99,17 @@ class Derating {
       lower(charge, plan_->charge_soc, soc_ppb + sigma_ppb);
       lower(discharge, plan_->discharge_soc, soc_ppb - sigma_ppb);
     }
-    move(allowed_.charge_ua, plan_->charge_max_ua, charge, in.model_charge_ua, in.derate, step_us);
-    move(allowed_.discharge_ua, plan_->discharge_max_ua, discharge, in.model_discharge_ua, in.derate, step_us);
+    ramp_towards(allowed_.charge_ua, plan_->charge_max_ua, charge, in.model_charge_ua, in.derate, step_us);
+    ramp_towards(allowed_.discharge_ua, plan_->discharge_max_ua, discharge, in.model_discharge_ua, in.derate, step_us);
     if (in.charge_forbidden) allowed_.charge_ua = 0;
     if (in.discharge_forbidden) allowed_.discharge_ua = 0;
     return allowed_;
   }
 
  private:
-  static constexpr void move(std::int32_t& allowed_ua, std::int32_t most_ua, std::int32_t share, std::int32_t model_ua,
-                             bool derate, std::uint32_t step_us) {
+  /// Moves allowed_ua towards its target. share: of most_ua, in 1/1024.
+  static constexpr void ramp_towards(std::int32_t& allowed_ua, std::int32_t most_ua, std::int32_t share,
+                                     std::int32_t model_ua, bool derate, std::uint32_t step_us) {
     const auto part = [](std::int32_t ua, std::uint32_t of_2_20) {
       return static_cast<std::int32_t>((static_cast<std::int64_t>(ua) * of_2_20) >> 20);
     };
@@ -116,7 +117,7 @@ class Derating {
     if (model_ua != measurement::no_reading) target_ua = std::min(target_ua, std::max(model_ua, std::int32_t{0}));
     if (derate) target_ua /= 2;
     const std::int32_t down_ua =
-        part(most_ua, std::min<std::uint32_t>(step_us, 1U << 20));  // 2^20 us for a second: 5 % slower
+        part(most_ua, std::min<std::uint32_t>(step_us, 1U << 20));  // 2^20 us instead of 1 s: 5 % slower
     allowed_ua = std::clamp(target_ua, allowed_ua - down_ua, allowed_ua + down_ua / rise_divisor);
   }
 

@@ -1,19 +1,18 @@
-// Applies the table to the quantities of a sample: which faults are there, which was the first.
+// Applies the table to the quantities of a sample: active faults, first cause.
 //
-//   comes      the first sample beyond the threshold starts the delay. From then on a step counts up when the sample at
-//   its end is beyond,
-//              down when it is not; at 0 the start is forgotten, at the delay the fault is there. So noise around the
-//              threshold counts by what it does on the whole, not by its luckiest sample (as counter-based debouncing
-//              of AUTOSAR's diagnostic event manager).
-//   goes       once every sample for so long has been at the release threshold or better; any other starts that anew.
-//   unknown    a quantity that is not known (measurement::no_reading) neither brings nor ends a fault; times stand
-//   still. first      the fault that came first since the last clear, the gravest if several came in one sample. A
-//   warning gives way to the first fault,
-//              and what has gone by itself to the next that comes.
-//   kept       faults of Recovery::service are told to be stored, and given back at the next start.
+//   raised     The first sample beyond the threshold starts the delay. Each later step counts up if its sample is
+//              beyond the threshold, and down if not. At 0 the delay is reset; at its end the fault is raised. Noise
+//              around the threshold therefore counts by its mean effect, not by single samples (as the counter-based
+//              debouncing of AUTOSAR's diagnostic event manager).
+//   released   after every sample for the recovery time was at the release threshold or better; any other sample
+//              restarts this time
+//   unknown    A quantity that is unknown (measurement::no_reading) neither raises nor ends a fault; timers stop.
+//   first      The fault that was raised first since the last clear; of several in one sample, the most severe. A
+//              warning is replaced by the first fault, and a cause that ended by itself by the next fault.
+//   latched    faults of Recovery::service; the firmware stores them and returns them at the next start
 //
-// No time of day is kept, only lengths, which stop at their limit: nothing wraps. The set of faults is guarded against
-// flipped bits. Cost: README.md. Integers only.
+// The monitor stores durations, not times of day, and they stop at their limit, so nothing wraps. The set of active
+// faults is guarded against flipped bits. Cost: README.md. Integers only.
 #pragma once
 
 #include <array>
@@ -28,6 +27,7 @@ namespace bms::protection {
 
 using Quantities = std::array<std::int32_t, quantity_count>;
 
+/// All quantities measurement::no_reading.
 constexpr Quantities unknown_quantities() {
   Quantities q{};
   q.fill(measurement::no_reading);
@@ -45,18 +45,18 @@ struct FirstCause {
 
 class FaultMonitor {
  public:
-  /// kept: what the last run stored of kept().
+  /// rules: must outlive this object. latched: latched() of the last run, from storage.
   constexpr FaultMonitor(const Rules& rules, std::uint32_t latched)
       : rules_(&rules),
         service_faults_(faults_with(rules, Recovery::service)),
         active_(latched & service_faults_),
         clearable_(latched & service_faults_) {}
 
-  /// step_us: since the last call. servable: nothing has been closed since the start. Returns the faults that came with
-  /// this sample.
+  /// step_us: time since the last call. may_clear_latched: no contactor has closed since the start. Returns the faults
+  /// that this sample raised, one bit each.
   constexpr std::uint32_t update(const Quantities& quantities, std::uint32_t step_us, std::uint64_t time_us,
                                  Clear clear, bool may_clear_latched) {
-    const Clear pressed = clear_before_ == Clear::none ? clear : Clear::none;  // a key that is held clears once
+    const Clear pressed = clear_before_ == Clear::none ? clear : Clear::none;  // a held key clears once
     clear_before_ = clear;
     if (!may_clear_latched) clearable_ = 0;
     const std::uint32_t before = active_.value();
@@ -75,7 +75,7 @@ class FaultMonitor {
     const std::uint32_t raised = now & ~before;
     if (pressed != Clear::none && (first_.fault >= fault_count || (now >> first_.fault & 1) == 0)) {
       first_ = {};
-      update_first_cause(before & now, 0, time_us);  // what the command could not end
+      update_first_cause(before & now, 0, time_us);  // faults that the command could not end
     }
     update_first_cause(raised, before & now, time_us);
     return raised;
@@ -85,12 +85,11 @@ class FaultMonitor {
   constexpr std::uint32_t latched() const { return active_.value() & service_faults_; }
   constexpr const FirstCause& first() const { return first_; }
   constexpr bool intact() const { return active_.intact(); }
-  /// When it is not: whatever any copy says is there, and an internal fault besides.
+  /// Call if not intact(): sets every fault that any copy contains, and an internal fault.
   constexpr void fail_safe() { active_.set(active_.any() | bit(Fault::internal_fault)); }
 
  private:
-  /// Of a fault that is not there: how long its quantity has been beyond; of one that is there: how long it has been
-  /// good.
+  /// Inactive fault: how long its quantity has been beyond the threshold. Active fault: how long it has been good.
   struct Timer {
     std::uint32_t us = 0;
     bool runs = false;
@@ -123,7 +122,7 @@ class FaultMonitor {
     t = {};
     return true;
   }
-  /// The first sample starts, the others count, up to what is asked for.
+  /// The first sample starts the timer, later ones advance it up to most_us.
   static constexpr void count(Timer& t, std::uint32_t step_us, std::uint32_t most_us) {
     if (t.runs) t.us = t.us >= most_us || step_us >= most_us - t.us ? most_us : t.us + step_us;
     t.runs = true;
@@ -131,22 +130,23 @@ class FaultMonitor {
 
   constexpr void update_first_cause(std::uint32_t raised, std::uint32_t still, std::uint64_t time_us) {
     if (raised == 0) return;
-    std::size_t gravest = fault_count;
+    std::size_t most_severe = fault_count;
     for (std::size_t k = 0; k < fault_count; ++k) {
-      if ((raised >> k & 1) != 0 && (gravest == fault_count || (*rules_)[k].reaction > (*rules_)[gravest].reaction))
-        gravest = k;
+      if ((raised >> k & 1) != 0 &&
+          (most_severe == fault_count || (*rules_)[k].reaction > (*rules_)[most_severe].reaction))
+        most_severe = k;
     }
     const auto mild = [&](std::size_t k) { return (*rules_)[k].reaction <= Reaction::derate; };
-    if (first_.fault < fault_count && (still >> first_.fault & 1) != 0 && (!mild(first_.fault) || mild(gravest)))
+    if (first_.fault < fault_count && (still >> first_.fault & 1) != 0 && (!mild(first_.fault) || mild(most_severe)))
       return;
-    first_ = {static_cast<std::uint8_t>(gravest), time_us};
+    first_ = {static_cast<std::uint8_t>(most_severe), time_us};
   }
 
   const Rules* rules_;
   std::uint32_t service_faults_;
   std::array<Timer, fault_count> timer_{};
   Guarded active_;
-  std::uint32_t clearable_;  ///< faults that a service command may end: kept from before the start
+  std::uint32_t clearable_;  ///< latched before the start: a service command may end them
   FirstCause first_;
   Clear clear_before_ = Clear::none;
 };

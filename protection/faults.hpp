@@ -1,7 +1,7 @@
-// What can be wrong with a pack: one bit each, and the name that the bus, the README and a person read.
+// Faults of a pack: one bit each, and the name that the bus, the README and people use.
 //
-// The order is that of the bits in frame Faults of can/greybox_bms.dbc; it is never changed, only continued. Names
-// become the names of the DBC's signals (words joined, capitals) and stand in its table of first causes.
+// The order is the order of the bits in frame Faults of can/greybox_bms.dbc. It never changes; new faults are added at
+// the end. The names become the DBC's signal names (joined words in capitals) and stand in its table of first causes.
 #pragma once
 
 #include <array>
@@ -84,21 +84,21 @@ inline constexpr std::array<const char*, fault_count> fault_names = {"cell overv
 constexpr const char* name_of(Fault f) { return fault_names[static_cast<std::size_t>(f)]; }
 constexpr std::uint32_t bit(Fault f) { return 1U << static_cast<unsigned>(f); }
 
-/// What follows, from mild to grave.
+/// What the firmware does while a fault is active, in the order of severity.
 enum class Reaction : std::uint8_t {
-  warn,              ///< told, nothing else
-  derate,            ///< half the current, either way
-  forbid_charge,     ///< none may flow in; contactors stay closed as long as none does
-  forbid_discharge,  ///< none may flow out; the same
-  open,              ///< no current is allowed; the contactors open when it has ceased, or after a time of grace
-  open_now,          ///< severe: the contactors open at once, whatever flows
+  warn,              ///< publish only
+  derate,            ///< halve the allowed currents
+  forbid_charge,     ///< allow no charge current; open only if it flows all the same
+  forbid_discharge,  ///< allow no discharge current; open only if it flows all the same
+  open,              ///< allow no current; open when it is zero, or after a grace time
+  open_now,          ///< severe: open at once, under any current
 };
 
-/// How a fault ends when what raised it is beyond its release threshold.
+/// How a fault ends after its quantity has passed the release threshold.
 enum class Recovery : std::uint8_t {
-  automatic,  ///< after the time in the table
-  on_clear,   ///< by a clear command after that time
-  service,    ///< kept over a power cycle; after one, by a service command before anything has been closed
+  automatic,  ///< after the recovery time of the table
+  on_clear,   ///< by a clear command after the recovery time
+  service,    ///< latched over a power cycle; then by a service command before any contactor closes
 };
 
 }  // namespace bms::protection

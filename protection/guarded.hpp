@@ -1,7 +1,7 @@
-// A word that a flipped bit cannot change unnoticed: kept three times, as it is, inverted, and against a pattern. Any
-// one or two bits that flip anywhere in the three leave two copies that contradict each other.
+// A word that detects flipped bits. It is stored three times: unchanged, inverted, and xored with a pattern. Any one or
+// two flipped bits in the three copies leave at least two copies that contradict each other.
 //
-// Cost: three stores to set, two comparisons to read.
+// Cost: three stores to set, two comparisons to check.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,15 @@ class Guarded {
   constexpr void set(std::uint32_t value) {
     value_ = value;
     inverted_ = ~value;
-    pattern_ = value ^ against;
+    pattern_ = value ^ xor_pattern;
   }
-  constexpr std::uint32_t value() const { return value_; }  ///< good for something only while intact
-  constexpr bool intact() const { return value_ == ~inverted_ && value_ == (pattern_ ^ against); }
-  constexpr std::uint32_t any() const {
-    return value_ | ~inverted_ | (pattern_ ^ against);
-  }  ///< bits that any copy has
+  constexpr std::uint32_t value() const { return value_; }  ///< valid only while intact()
+  constexpr bool intact() const { return value_ == ~inverted_ && value_ == (pattern_ ^ xor_pattern); }
+  /// Bits that are set in any of the three copies.
+  constexpr std::uint32_t any() const { return value_ | ~inverted_ | (pattern_ ^ xor_pattern); }
 
  private:
-  static constexpr std::uint32_t against = 0x5A3C'96A5;
+  static constexpr std::uint32_t xor_pattern = 0x5A3C'96A5;
   std::uint32_t value_, inverted_, pattern_;
 };
 

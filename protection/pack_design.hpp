@@ -1,6 +1,5 @@
-// What protection has to know of a pack: the limits of its cells, how many, which sensors it has, what hangs on its
-// contactors. Doubles in SI units, as cell files hold them; everything derived from it is an integer and made in the
-// compiler.
+// Design of a pack: limits and number of cells, sensors, DC link. Values are doubles in SI units as in a cell file; all
+// derived values are integers, computed at compile time.
 #pragma once
 
 #include <algorithm>
@@ -11,26 +10,25 @@
 namespace bms::protection {
 
 struct PackDesign {
-  model::Limits limits;  ///< of a cell
+  model::Limits limits;  ///< limits of one cell
   double capacity_ah;
   std::uint8_t cells = 16;
-  std::uint8_t temperatures = 1;  ///< sensors fitted, the first of PackSample's
+  std::uint8_t temperatures = 1;  ///< fitted sensors, the first ones of PackSample
   double sample_period_s = 0.1;
-  double start_s =
-      3;  ///< for the measuring chain to give its first sample (a BQ76952: 1.2 s with a reset and its settings)
-  double precharge_time_constant_s =
-      0.5;                            ///< pre-charge resistor times the capacitance of the link, e.g. 50 ohm and 10 mF
-  double dc_link_discharge_s = 5;     ///< within which the link falls by an eighth when nothing feeds it
-  double rest_current_c_rate = 0.02;  ///< below that no current flows: four offsets of a 0.5 % sensor
-  double bleed_ohm = 33;              ///< of a balancing resistor
-  bool neighbours_may_bleed =
-      false;  ///< of one monitoring chip at the same time (its datasheet; heat and shared wires)
-  double bleed_temperature_max_c = 55;  ///< no bleeding with a cell warmer than that
+  double start_s = 3;  ///< until the first sample of the measuring chain (BQ76952: 1.2 s with a reset and its settings)
+  double precharge_time_constant_s = 0.5;  ///< precharge resistor x capacitance of the DC link, e.g. 50 ohm x 10 mF
+  double dc_link_discharge_s = 5;          ///< time in which the DC link falls by an eighth without a supply
+  double rest_current_c_rate = 0.02;       ///< below it the current counts as zero: four offsets of a 0.5 % sensor
+  double bleed_ohm = 33;                   ///< balancing resistor
+  bool neighbours_may_bleed = false;       ///< allowed by the monitoring chip (its data sheet; heat, shared wires)
+  double bleed_temperature_max_c = 55;     ///< no balancing with a warmer cell
 };
 
+/// Rounded to 1e-6.
 constexpr std::int32_t in_micro(double value) {
   return static_cast<std::int32_t>(value * 1e6 + (value < 0 ? -0.5 : 0.5));
 }
+/// Rounded to 0.01.
 constexpr std::int32_t in_centi(double value) {
   return static_cast<std::int32_t>(value * 1e2 + (value < 0 ? -0.5 : 0.5));
 }

@@ -1,19 +1,15 @@
-// What the table compares, from what a pack measures. Nothing is mended: a reading that is missing or impossible counts
+// Quantities that the table compares, computed from a sample. Readings are not repaired: an impossible reading counts
 // as missing.
 //
-//   heat        h += ((I / limit)^2 - 1) dt while above 0, limit: 1.05 times the continuous one; a replica of what
-//   warms a cell, IEC 60255-149's
-//               idea without its exponential. Cools by itself at rest: 30 s of it are gone in 30 s.
-//   shift       a sense wire that is broken is pulled to somewhere between its neighbours: one cell reads low, the next
-//   as much too high.
-//               Counts when the two differ by less than half of it.
-//   stuck       a cell reads the same to the last digit, five samples or more, while the other cells moved by 20 mV; a
-//   temperature, while the
-//               others moved by 5 K. The others: mean without highest and lowest; of less than four cells, the pack's
-//               own reading.
+//   overload I2t      h += ((I / limit)^2 - 1) dt, not below 0, with limit = 1.05 x continuous limit: a thermal replica
+//                     after IEC 60255-149, without its exponential. At rest 30 s of overload decay in 30 s.
+//   opposite shift    a broken sense wire floats between its neighbours: one cell reads low, the next equally high.
+//                     Counts if the two shifts differ by less than half of the smaller.
+//   stuck             a cell repeats its reading exactly for five samples or more while the other cells moved by 20 mV;
+//                     a temperature, while the others moved by 5 K. The others: their mean without highest and lowest;
+//                     with less than four cells, the pack's own reading.
 //
-// What was not measured makes its quantities unknown (measurement::no_reading). Memory: 9 bytes a cell. Cost:
-// README.md.
+// A quantity that cannot be computed is unknown (measurement::no_reading). Memory: 9 bytes per cell. Cost: README.md.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +25,7 @@ namespace bms::protection {
 
 /// Limits of a pack as integers.
 struct PackLimits {
-  std::int32_t charge_ua_256th, discharge_ua_256th;  ///< from where the current heats, over 256
+  std::int32_t charge_ua_256th, discharge_ua_256th;  ///< 1.05 x continuous limit / 256
   std::uint8_t temperatures;
 };
 
@@ -39,7 +35,7 @@ constexpr PackLimits pack_limits(const PackDesign& d) {
           std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures)};
 }
 
-/// A cell's voltage that can be one, or be asked to be protected from: a reversed one reads a little below 0.
+/// Returns true for a possible cell voltage. A reversed cell reads a little below 0.
 constexpr bool cell_possible(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
 
 template <std::size_t Cells>
@@ -51,22 +47,21 @@ class PackQuantities {
 
   constexpr explicit PackQuantities(const PackLimits& limits) : limits_(limits) {}
 
-  /// step_us: since the last one.
+  /// Writes the quantities of the sample into q. step_us: time since the last sample.
   constexpr void update(const measurement::PackSample<Cells>& sample, std::uint32_t step_us, Quantities& q) {
     update_cells(sample, q);
     update_current(sample.current_ua, step_us, q);
     update_temperatures(sample.temperature_cdegc, q);
   }
 
-  constexpr std::int32_t sum_uv() const {
-    return sum_uv_;
-  }  ///< of all cells of the last sample, or measurement::no_reading
+  /// Sum of all cells of the last sample [uV], or measurement::no_reading.
+  constexpr std::int32_t sum_uv() const { return sum_uv_; }
 
  private:
   struct Repeats {
-    std::int32_t value = measurement::no_reading,
-                 others;  ///< the reading, and where the others were when it last changed
-    std::uint8_t count;
+    std::int32_t value = measurement::no_reading;
+    std::int32_t others;  ///< mean of the others when `value` last changed
+    std::uint8_t count;   ///< samples without a change
   };
 
   static constexpr bool stuck(Repeats& r, std::int32_t value, std::int32_t others, std::int32_t move) {
@@ -86,12 +81,12 @@ class PackQuantities {
         continue;
       }
       sum += uv;
-      high = std::max(high, uv);  // measurement::no_reading is less than any
+      high = std::max(high, uv);  // no_reading is less than any voltage
       low = low == measurement::no_reading ? uv : std::min(low, uv);
     }
     const auto known = static_cast<std::int32_t>(Cells) - missing;
     sum_uv_ = missing == 0 ? sum : measurement::no_reading;
-    const bool pack_known = sample.pack_uv >= 0;  // measurement::no_reading is less
+    const bool pack_known = sample.pack_uv >= 0;  // no_reading is less
     at(q, Quantity::voltages_missing) = missing + (pack_known ? 0 : 1);
     at(q, Quantity::pack_uv) = pack_known ? sample.pack_uv : measurement::no_reading;
     at(q, Quantity::sum_error_uv) =
@@ -101,11 +96,12 @@ class PackQuantities {
     at(q, Quantity::spread_uv) = known > 0 ? high - low : measurement::no_reading;
     at(q, Quantity::opposite_shift_uv) =
         known > 0 ? opposite_shift(sample.cell_uv, sum / known) : measurement::no_reading;
-    at(q, Quantity::voltages_stuck) =
-        known == 0   ? measurement::no_reading
-        : known >= 4 ? cells_stuck(sample.cell_uv, (sum - high - low) / (known - 2))
-        : pack_known ? cells_stuck(sample.cell_uv, sample.pack_uv / static_cast<std::int32_t>(Cells))
-                     : measurement::no_reading;
+    std::int32_t stuck_cells = measurement::no_reading;
+    if (known >= 4)
+      stuck_cells = cells_stuck(sample.cell_uv, (sum - high - low) / (known - 2));
+    else if (known > 0 && pack_known)
+      stuck_cells = cells_stuck(sample.cell_uv, sample.pack_uv / static_cast<std::int32_t>(Cells));
+    at(q, Quantity::voltages_stuck) = stuck_cells;
   }
 
   static constexpr std::int32_t opposite_shift(const std::array<std::int32_t, Cells>& cell_uv, std::int32_t mean_uv) {
@@ -140,7 +136,7 @@ class PackQuantities {
     at(q, Quantity::discharge_overload_i2t_us) = known ? discharge_overload_i2t_us_ : measurement::no_reading;
   }
 
-  /// times_256: current over its limit, less than 0 the other way; beyond ten it counts as ten, which is a short
+  /// times_256: current / limit in 1/256, negative in the other direction. Above ten it counts as ten, which is a short
   /// circuit anyway.
   static constexpr void integrate_overload(std::int32_t& overload_i2t_us, std::int32_t times_256,
                                            std::uint32_t step_us) {

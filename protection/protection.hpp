@@ -1,16 +1,15 @@
-// Protection of a pack of cells in series: what it measures and what the estimator knows of it go in, what may be done
-// comes out.
+// Protection of a pack of cells in series: samples and estimates in, allowed actions out.
 //
-//   constexpr auto pack = protection_plan(design);              in the compiler, of as many cells; has to outlive what
-//   uses it Protection<16> protection(pack, kept);                      kept: what the last run told to store decision
-//   = protection.update(sample, estimate, orders);     with every sample decision = protection.without_sample(now_us);
-//   when none came: from the loop, as often as it likes, in the same clock
+//   constexpr auto pack = protection_plan(design);              at compile time, for the same number of cells
+//   Protection<16> protection(pack, latched);                   latched: stored by the last run
+//   decision = protection.update(sample, estimate, inputs);     with every sample
+//   decision = protection.without_sample(now_us);               while none arrives
 //
-// Order of a step: quantities of the sample, faults by the table, allowed currents, contactors, balancing. What the
-// contactors find out counts with the next sample; they themselves act on it at once. A sample that is not later than
-// the one before is not used; five of them in a row count as none. Until the first one of the run nothing closes, and
-// missing is only what has not come when the measuring chain should be up. Bounded time, no heap, integers only: the
-// same on every core. Cost: README.md.
+// Order of a step: quantities of the sample, faults by the table, allowed currents, contactors, balancing. Faults that
+// the contactors detect enter the table with the next sample; the contactors themselves react at once. A sample that is
+// not later than the one before is ignored; five of them in a row count as missing. Until the first sample of a run
+// nothing closes, and samples are missing only after the start time of the measuring chain. Bounded time, no heap,
+// integers only: the same result on every core. Cost: README.md.
 #pragma once
 
 #include <algorithm>
@@ -30,62 +29,62 @@ namespace bms::protection {
 
 struct ProtectionPlan {
   Rules rules;
-  std::uint32_t derates, forbid_charge, forbid_discharge, open,
-      open_now;  ///< faults with that reaction; who opens forbids as well
+  // Faults with this reaction, one bit each. Faults that open are also in both `forbid` masks.
+  std::uint32_t derates, forbid_charge, forbid_discharge, open, open_now;
   PackLimits limits;
   DeratingPlan derating;
   ContactorPlan contactors;
   BalancingPlan balancing;
   std::uint8_t cells;
-  std::uint32_t start_us;  ///< within which the first sample has to come
+  std::uint32_t start_us;  ///< time limit of the first sample
 };
 
 constexpr ProtectionPlan protection_plan(const PackDesign& design) {
   const Rules rules = rules_of(protection_table(design));
   const std::uint32_t open_now = faults_with(rules, Reaction::open_now), open = faults_with(rules, Reaction::open);
-  return {rules,
-          faults_with(rules, Reaction::derate),
-          faults_with(rules, Reaction::forbid_charge) | open | open_now,
-          faults_with(rules, Reaction::forbid_discharge) | open | open_now,
-          open,
-          open_now,
-          pack_limits(design),
-          derating_plan(design),
-          contactor_plan(design),
-          balancing_plan(design),
-          design.cells,
-          in_us(design.start_s)};
+  return {.rules = rules,
+          .derates = faults_with(rules, Reaction::derate),
+          .forbid_charge = faults_with(rules, Reaction::forbid_charge) | open | open_now,
+          .forbid_discharge = faults_with(rules, Reaction::forbid_discharge) | open | open_now,
+          .open = open,
+          .open_now = open_now,
+          .limits = pack_limits(design),
+          .derating = derating_plan(design),
+          .contactors = contactor_plan(design),
+          .balancing = balancing_plan(design),
+          .cells = design.cells,
+          .start_us = in_us(design.start_s)};
 }
 
-/// What is known of the cells beside a sample; measurement::no_reading where it is not.
+/// Estimates that go with a sample; measurement::no_reading: unknown.
 template <std::size_t Cells>
 struct PackEstimate {
   std::int32_t soc_ppb = measurement::no_reading, soc_sigma_ppb = 0;  ///< of the mean cell, 1e-9
   std::int32_t model_charge_ua = measurement::no_reading,
-               model_discharge_ua = measurement::no_reading;  ///< CurrentLimits, both >= 0
+               model_discharge_ua = measurement::no_reading;  ///< state of function, both >= 0
   bool voltage_rejected = false;                              ///< Flag::voltage_rejected
-  std::array<std::int32_t, Cells> cell_soc_ppb =
-      measurement::PackSample<Cells>{}.cell_uv;  ///< of each cell less the mean's
+  /// soc of each cell minus the mean, 1e-9.
+  std::array<std::int32_t, Cells> cell_soc_ppb = measurement::PackSample<Cells>{}.cell_uv;
   std::array<std::int32_t, Cells> cell_sigma_ppb{};
 };
 
-/// What others want, and what the board says of itself.
+/// Requests and commands from the bus, and results of the board's self-tests.
 struct ExternalInputs {
   Request request = Request::none;
-  Clear clear = Clear::none;                          ///< while it is pressed
-  std::int32_t dc_link_uv = measurement::no_reading;  ///< on the load's side of the contactors
-  bool board_fault = false;  ///< a reset by the watchdog, with the first sample; a self-test of the board that failed
+  Clear clear = Clear::none;                          ///< as long as the key is pressed
+  std::int32_t dc_link_uv = measurement::no_reading;  ///< load side of the contactors
+  bool board_fault = false;                           ///< failed self-test; with the first sample, a watchdog reset
   bool storage_fault = false;
 };
 
 struct Decision {
-  std::uint32_t faults = 0, raised = 0;  ///< a bit each (Fault): there now, and those that this step brought
-  std::uint32_t latched = 0;             ///< to be stored, and given to the next start
+  std::uint32_t faults = 0, raised = 0;  ///< one bit each (Fault): active, and raised by this step
+  std::uint32_t latched = 0;             ///< to be stored for the next start
   FirstCause first;
   ContactorState state = ContactorState::off;
   Outputs outputs;
   AllowedCurrent allowed;
-  std::uint32_t bleed = 0;  ///< cells, a bit each
+  std::uint32_t bleed = 0;  ///< one bit per cell
   std::uint32_t bleed_left_s = 0;
 };
 
@@ -95,6 +94,7 @@ class Protection {
   static constexpr std::uint32_t longest_step_us = 60'000'000;
   static constexpr std::uint8_t ignored_samples = 5;
 
+  /// plan: must outlive this object. latched: Decision::latched of the last run, from storage.
   constexpr explicit Protection(const ProtectionPlan& plan, std::uint32_t latched = 0)
       : plan_(&plan),
         quantities_(plan.limits),
@@ -106,6 +106,7 @@ class Protection {
     decision_.latched = monitor_.latched();
   }
 
+  /// Call with every sample.
   constexpr const Decision& update(const measurement::PackSample<Cells>& sample, const PackEstimate<Cells>& estimate,
                                    const ExternalInputs& inputs) {
     decision_.raised = 0;
@@ -136,12 +137,7 @@ class Protection {
         (faults & bit(Fault::temperature_lost)) != 0 && at(q, Quantity::highest_cdegc) == measurement::no_reading;
     const bool no_charge = (faults & plan_->forbid_charge) != 0 || temperature_unknown,
                no_discharge = (faults & plan_->forbid_discharge) != 0;
-    const bool closed = may_drive();
-    decision_.allowed = derating_.update(
-        {at(q, Quantity::highest_cell_uv), at(q, Quantity::lowest_cell_uv), at(q, Quantity::highest_cdegc),
-         at(q, Quantity::lowest_cdegc), estimate.soc_ppb, estimate.soc_sigma_ppb, estimate.model_charge_ua,
-         estimate.model_discharge_ua, (faults & plan_->derates) != 0, no_charge || !closed, no_discharge || !closed},
-        step_us);
+    update_allowed_currents(q, estimate, no_charge, no_discharge, step_us);
     const std::int32_t pack_uv =
         at(q, Quantity::pack_uv) != measurement::no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
     switch_contactors({.request = inputs.request,
@@ -152,14 +148,19 @@ class Protection {
                        .dc_link_uv = inputs.dc_link_uv,
                        .step_us = step_us});
     if (!may_drive()) decision_.allowed = {};
-    decision_.bleed = balancing_.update(
-        {sample.cell_uv, estimate.cell_soc_ppb, estimate.cell_sigma_ppb, estimate.soc_ppb, sample.current_ua,
-         at(q, Quantity::highest_cdegc), (faults & (plan_->open | plan_->open_now)) == 0},
-        step_us);
+    decision_.bleed = balancing_.update({.cell_uv = sample.cell_uv,
+                                         .soc_ppb = estimate.cell_soc_ppb,
+                                         .sigma_ppb = estimate.cell_sigma_ppb,
+                                         .mean_soc_ppb = estimate.soc_ppb,
+                                         .current_ua = sample.current_ua,
+                                         .highest_cdegc = at(q, Quantity::highest_cdegc),
+                                         .allowed = (faults & (plan_->open | plan_->open_now)) == 0},
+                                        step_us);
     decision_.bleed_left_s = balancing_.left_s(at(q, Quantity::lowest_cell_uv));
     return decision_;
   }
 
+  /// Call from the loop while no sample arrives, as often as wanted. now_us: the clock of the samples.
   constexpr const Decision& without_sample(std::uint64_t now_us) {
     decision_.raised = 0;
     if (!started_) {
@@ -176,7 +177,7 @@ class Protection {
   }
 
   constexpr const Decision& decision() const { return decision_; }
-  /// For tests that flip bits.
+  /// For tests of flipped bits.
   constexpr Contactors& contactors() { return contactors_; }
 
  private:
@@ -189,7 +190,7 @@ class Protection {
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(us, most_age_us));
   }
 
-  /// One of which nothing was read is none.
+  /// Returns true if at least one value was read. A sample without readings counts as missing.
   static constexpr bool has_reading(const measurement::PackSample<Cells>& s) {
     return s.current_ua != measurement::no_reading || s.pack_uv != measurement::no_reading ||
            std::any_of(s.cell_uv.begin(), s.cell_uv.end(),
@@ -210,8 +211,8 @@ class Protection {
   }
 
   constexpr void update_faults(Quantities& q, std::uint32_t step_us, const ExternalInputs& inputs) {
-    const bool intact =
-        monitor_.intact() && contactors_.intact() && plan_->cells == Cells;  // a plan of another pack is no plan
+    // A plan for another number of cells is an internal fault, too.
+    const bool intact = monitor_.intact() && contactors_.intact() && plan_->cells == Cells;
     if (!monitor_.intact()) monitor_.fail_safe();
     const ContactorEvents& seen = contactors_.events();
     at(q, Quantity::precharge_off_curve) = seen.precharge_failed;
@@ -224,6 +225,23 @@ class Protection {
     decision_.first = monitor_.first();
   }
 
+  constexpr void update_allowed_currents(const Quantities& q, const PackEstimate<Cells>& estimate, bool no_charge,
+                                         bool no_discharge, std::uint32_t step_us) {
+    const bool closed = may_drive();
+    decision_.allowed = derating_.update({.highest_cell_uv = at(q, Quantity::highest_cell_uv),
+                                          .lowest_cell_uv = at(q, Quantity::lowest_cell_uv),
+                                          .highest_cdegc = at(q, Quantity::highest_cdegc),
+                                          .lowest_cdegc = at(q, Quantity::lowest_cdegc),
+                                          .soc_ppb = estimate.soc_ppb,
+                                          .soc_sigma_ppb = estimate.soc_sigma_ppb,
+                                          .model_charge_ua = estimate.model_charge_ua,
+                                          .model_discharge_ua = estimate.model_discharge_ua,
+                                          .derate = (monitor_.active() & plan_->derates) != 0,
+                                          .charge_forbidden = no_charge || !closed,
+                                          .discharge_forbidden = no_discharge || !closed},
+                                         step_us);
+  }
+
   constexpr void switch_contactors(ContactorInput in) {
     in.open = (monitor_.active() & plan_->open) != 0;
     in.open_now = (monitor_.active() & plan_->open_now) != 0;
@@ -232,7 +250,7 @@ class Protection {
     closed_once_ = closed_once_ || decision_.outputs.any_closed();
   }
 
-  /// A step that knows nothing but that no sample came.
+  /// A step without a sample: all quantities but the age of the last sample are unknown.
   constexpr const Decision& update_without_readings(std::uint32_t step_us, std::int32_t age_us,
                                                     bool board_fault = false) {
     Quantities q = unknown_quantities();

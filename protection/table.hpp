@@ -1,17 +1,17 @@
-// All protections of a pack as one table: data, derived from the limits of its cells.
+// All protections of a pack as one table: data, computed from the limits of its cells.
 //
-//   a fault comes   when its quantity is beyond the threshold for so long (delay; fault_monitor.hpp says what noise
-//   does to that) a fault goes    when its quantity is back at the release threshold or better for so long, in the way
-//   that its recovery says
+//   raised     when the quantity has been beyond the threshold for the delay (fault_monitor.hpp: effect of noise)
+//   released   when the quantity has been at the release threshold or better for the recovery time, and then as the
+//              recovery demands: automatic, by a clear command, or by service
 //
-// Voltages are limits of the cell and fractions of its span (highest less lowest limit): 1.65 V for LFP, so 1 % is 16.5
-// mV. Currents are multiples of the continuous limit. The same table in words and with the figures of one pack:
-// README.md, made from this.
+// Voltages are the limits of the cell and fractions of its span (highest minus lowest limit): 1.65 V for LFP, so 1 % is
+// 16.5 mV. Currents are multiples of the continuous limit. README.md shows the same table with the values of one pack,
+// generated from this.
 //
 // Sources: limits of voltage and current, Table 2 of Energies 14 (2021) 6221. No charging of a graphite cell below 0
-// degrees C: lithium plates (Petzl, Kasper, Danzer, J. Power Sources 275 (2015) 799, on LFP). Copper of the negative
-// collector dissolves in a cell that is discharged too deep and later shorts it (Guo et al., Scientific Reports 6
-// (2016) 30248).
+// degrees C, because lithium plates (Petzl, Kasper, Danzer, J. Power Sources 275 (2015) 799, on LFP). In a cell that is
+// discharged too deeply, the copper of the negative collector dissolves and later shorts the cell (Guo et al.,
+// Scientific Reports 6 (2016) 30248).
 #pragma once
 
 #include <algorithm>
@@ -24,29 +24,29 @@
 
 namespace bms::protection {
 
-/// What is compared, in integers; quantities.hpp says how each comes about.
+/// Quantities that the table compares, in integers; pack_quantities.hpp computes them from samples.
 enum class Quantity : std::uint8_t {
   highest_cell_uv,
   lowest_cell_uv,
   pack_uv,
-  charge_overload_i2t_us,  ///< integral of (I / limit)^2 - 1 over time, not below 0, while charging
+  charge_overload_i2t_us,  ///< overload integral I2t of the charge current
   discharge_overload_i2t_us,
   current_magnitude_ua,
   highest_cdegc,
   lowest_cdegc,
-  opposite_shift_uv,        ///< of two neighbours from the mean: by how much both, in opposite ways
-  spread_uv,                ///< highest less lowest cell
-  estimator_contradiction,  ///< the estimator disbelieves what it reads: 0 or 1
-  sum_error_uv,             ///< sum of cells less pack, magnitude
-  voltages_missing,         ///< how many readings
+  opposite_shift_uv,        ///< two neighbouring cells shifted from the mean in opposite directions
+  spread_uv,                ///< highest minus lowest cell
+  estimator_contradiction,  ///< 0 or 1: the estimator rejects the voltage
+  sum_error_uv,             ///< magnitude of sum of cells minus pack
+  voltages_missing,         ///< number of cells, and the pack
   voltages_stuck,
   currents_missing,  ///< 0 or 1
   temperatures_missing,
   temperatures_stuck,
-  precharge_off_curve,  ///< 0 or 1, these three from the contactors
+  precharge_off_curve,  ///< 0 or 1; this and the next two come from the contactors
   welded,
   not_closed,
-  sample_age_us,    ///< since the last sample that could be used
+  sample_age_us,    ///< since the last usable sample
   integrity_error,  ///< 0 or 1
   storage_failed,   ///< 0 or 1
 };
@@ -64,16 +64,48 @@ struct Rule {
   Reaction reaction;
 };
 
-/// A rule with the reason for its delay; the words stay out of firmware that does not ask for them.
+/// One protection as it is written in the table. Thresholds are in the unit of the quantity.
+struct Protected {
+  Fault fault;
+  struct {
+    Quantity quantity;
+    Sense sense;
+    std::int32_t threshold;
+    double delay_s;
+  } raised;
+  struct {
+    std::int32_t threshold;
+    double after_s;
+    Recovery recovery;
+  } released;
+  Reaction reaction;
+  const char* why;  ///< reason for the delay
+};
+
+/// A rule with the reason for its delay. Firmware that does not use the reasons does not contain them.
 struct Row {
   Rule rule;
   const char* why;
 };
 
+constexpr Row row(const Protected& p) {
+  return {.rule = {.threshold = p.raised.threshold,
+                   .release = p.released.threshold,
+                   .delay_us = in_us(p.raised.delay_s),
+                   .recover_us = in_us(p.released.after_s),
+                   .fault = p.fault,
+                   .quantity = p.raised.quantity,
+                   .sense = p.raised.sense,
+                   .recovery = p.released.recovery,
+                   .reaction = p.reaction},
+          .why = p.why};
+}
+
 using Table = std::array<Row, fault_count>;
 using Rules = std::array<Rule, fault_count>;
 
-/// Permanent current above the limit that counts as such: what a sensor of 1 % and a controller may be off.
+/// Ratio of current to limit above which the current is an overload: allows for the errors of a 1 % sensor and a
+/// controller.
 inline constexpr double overcurrent_from = 1.05;
 
 constexpr Table protection_table(const PackDesign& d) {
@@ -90,97 +122,201 @@ constexpr Table protection_table(const PackDesign& d) {
   const auto pack_high_v = [&](double of_span) { return in_micro(cells * (l.voltage_max_v + of_span * span_v)); };
   const auto pack_low_v = [&](double of_span) { return in_micro(cells * (l.voltage_min_v + of_span * span_v)); };
   const auto span = [&](double of_span) { return in_micro(of_span * span_v); };
+  const auto cell_count = static_cast<std::int32_t>(d.cells);
+  const auto hot_c = [&](double above_max) { return in_centi(l.temperature_max_c + above_max); };
+  const auto cold_c = [&](double above_min) { return in_centi(l.temperature_min_c + above_min); };
   const double freezing_c = std::max(l.temperature_min_c, 0.0);
-  const auto row = [](Fault f, Quantity q, Sense s, std::int32_t threshold, double delay_s, std::int32_t release,
-                      double recover_s, Recovery recovery, Reaction reaction, const char* why) {
-    return Row{{threshold, release, in_us(delay_s), in_us(recover_s), f, q, s, recovery, reaction}, why};
-  };
   return {{
-      row(cell_overvoltage_warning, highest_cell_uv, above, high_v(0), 1, high_v(-0.03), 5, automatic, derate,
-          "an inverter's current step rings for less"),
-      row(cell_overvoltage, highest_cell_uv, above, high_v(0.03), 2, high_v(-0.06), 60, automatic, forbid_charge,
-          "a charger that is told 0 A needs a second or two; a minute lets the cell relax"),
-      row(cell_overvoltage_severe, highest_cell_uv, above, high_v(0.1), 0.2, high_v(-0.06), 10, on_clear, open_now,
-          "two samples at 10 Hz, so that one bad reading opens nothing under load"),
-      row(cell_undervoltage_warning, lowest_cell_uv, below, low_v(0.3), 5, low_v(0.36), 5, automatic, derate,
-          "lifting a load takes seconds and dips that deep when cold"),
-      row(cell_undervoltage, lowest_cell_uv, below, low_v(0), 2, low_v(0.55), 60, automatic, forbid_discharge,
-          "a truck ramps down within one; released above where an empty cell comes to rest"),
-      row(cell_undervoltage_severe, lowest_cell_uv, below, low_v(-0.12), 0.2, low_v(0), 10, on_clear, open_now,
-          "two samples at 10 Hz; released at the limit, so that an empty pack can be charged"),
-      row(pack_overvoltage, pack_uv, above, pack_high_v(0.02), 2, pack_high_v(-0.06), 60, automatic, forbid_charge,
-          "as a cell's; by a second measurement"),
-      row(pack_undervoltage, pack_uv, below, pack_low_v(0.06), 2, pack_low_v(0.55), 60, automatic, forbid_discharge,
-          "as a cell's; by a second measurement"),
-      row(charge_overcurrent, charge_overload_i2t_us, above, 30'000'000, 0, 15'000'000, 30, automatic, forbid_charge,
-          "the integral is the delay: twice the limit for 10 s, half as much again for 24 s"),
-      row(discharge_overcurrent, discharge_overload_i2t_us, above, 30'000'000, 0, 15'000'000, 30, automatic,
-          forbid_discharge, "the same"),
-      row(short_circuit, current_magnitude_ua, above, in_micro(5 * most_a), 0, in_micro(most_a), 10, service, open_now,
-          "none: one sample; fuse and comparator are faster, this keeps it open"),
-      row(overtemperature_warning, highest_cdegc, above, in_centi(l.temperature_max_c - 5), 5,
-          in_centi(l.temperature_max_c - 8), 30, automatic, derate, "a cell needs minutes to warm, a thermistor 10 s"),
-      row(overtemperature, highest_cdegc, above, in_centi(l.temperature_max_c), 5, in_centi(l.temperature_max_c - 10),
-          60, automatic, open, "the same"),
-      row(charge_overtemperature, highest_cdegc, above, in_centi(l.temperature_max_c - 15), 5,
-          in_centi(l.temperature_max_c - 18), 60, automatic, forbid_charge, "the same"),
-      row(undertemperature, lowest_cdegc, below, in_centi(l.temperature_min_c), 5, in_centi(l.temperature_min_c + 3),
-          60, automatic, forbid_discharge, "the same"),
-      row(charge_undertemperature, lowest_cdegc, below, in_centi(freezing_c), 5, in_centi(freezing_c + 2), 60,
-          automatic, forbid_charge, "the same"),
-      row(open_wire, opposite_shift_uv, above, span(0.15), 0.5, span(0.06), 10, on_clear, open,
-          "a relay's bounce and a burst of noise last 100 ms"),
-      row(imbalance, spread_uv, above, span(0.2), 30, span(0.12), 60, automatic, warn,
-          "at the knees cells part for as long as a load lasts"),
-      row(current_implausible, estimator_contradiction, above, 0, 60, 0, 60, automatic, derate,
-          "a model may be wrong for some of its correlation time of a minute"),
-      row(sum_mismatch, sum_error_uv, above, static_cast<std::int32_t>(cells) * span(0.03), 1,
-          static_cast<std::int32_t>(cells) * span(0.015), 10, on_clear, open,
-          "both are not sampled at the same moment of a step"),
-      row(voltage_missing, voltages_missing, above, 0, 0.5, 0, 5, automatic, open,
-          "a monitoring chip is read again and woken within"),
-      row(voltage_stuck, voltages_stuck, above, 0, 1, 0, 10, on_clear, open, "five samples have agreed already"),
-      row(current_missing, currents_missing, above, 0, 0.5, 0, 5, automatic, open, "a sensor is asked again within"),
-      row(temperature_lost, temperatures_missing, above, 0, 2, 0, 10, automatic, derate,
-          "temperatures wait: a plug that is loose for a moment"),
-      row(temperature_stuck, temperatures_stuck, above, 0, 10, 0, 60, automatic, derate, "temperatures wait"),
-      row(deep_discharge, lowest_cell_uv, below, in_micro(0.75 * l.voltage_min_v), 10, in_micro(0.8 * l.voltage_min_v),
-          0, service, open, "no load that the rows above allow lasts that long"),
-      row(precharge_failed, precharge_off_curve, above, 0, 0, 0, 10, on_clear, open_now,
-          "none: the time is in the curve; the resistor cools for ten seconds before another"),
-      row(contactor_welded, welded, above, 0, 0.2, 0, 10, service, open_now, "two samples at 10 Hz"),
-      row(contactor_not_closed, not_closed, above, 0, 0.3, 0, 10, on_clear, open_now,
-          "a contactor closes and stops bouncing within 50 ms"),
-      row(samples_missing, sample_age_us, above, in_micro(5 * d.sample_period_s), 0, in_micro(2 * d.sample_period_s), 1,
-          automatic, open_now,
-          "none: five sample periods are the threshold; until the first, the measuring chain has its time to start"),
-      row(internal_fault, integrity_error, above, 0, 0, 0, 0, on_clear, open_now,
-          "none: what cannot be trusted does nothing"),
-      row(storage_fault, storage_failed, above, 0, 0, 0, 0, on_clear, warn,
-          "none: the store has tried again by itself"),
+      row({.fault = cell_overvoltage_warning,
+           .raised = {.quantity = highest_cell_uv, .sense = above, .threshold = high_v(0), .delay_s = 1},
+           .released = {.threshold = high_v(-0.03), .after_s = 5, .recovery = automatic},
+           .reaction = derate,
+           .why = "the ringing of an inverter's current step is shorter"}),
+      row({.fault = cell_overvoltage,
+           .raised = {.quantity = highest_cell_uv, .sense = above, .threshold = high_v(0.03), .delay_s = 2},
+           .released = {.threshold = high_v(-0.06), .after_s = 60, .recovery = automatic},
+           .reaction = forbid_charge,
+           .why = "a charger needs one to two seconds to obey a limit of 0 A; in a minute the cell relaxes"}),
+      row({.fault = cell_overvoltage_severe,
+           .raised = {.quantity = highest_cell_uv, .sense = above, .threshold = high_v(0.1), .delay_s = 0.2},
+           .released = {.threshold = high_v(-0.06), .after_s = 10, .recovery = on_clear},
+           .reaction = open_now,
+           .why = "two samples at 10 Hz, so that a single wrong reading does not open under load"}),
+      row({.fault = cell_undervoltage_warning,
+           .raised = {.quantity = lowest_cell_uv, .sense = below, .threshold = low_v(0.3), .delay_s = 5},
+           .released = {.threshold = low_v(0.36), .after_s = 5, .recovery = automatic},
+           .reaction = derate,
+           .why = "lifting a load takes seconds and causes such a dip when the cells are cold"}),
+      row({.fault = cell_undervoltage,
+           .raised = {.quantity = lowest_cell_uv, .sense = below, .threshold = low_v(0), .delay_s = 2},
+           .released = {.threshold = low_v(0.55), .after_s = 60, .recovery = automatic},
+           .reaction = forbid_discharge,
+           .why = "a truck reduces its current within one second; released above the rest voltage of an empty cell"}),
+      row({.fault = cell_undervoltage_severe,
+           .raised = {.quantity = lowest_cell_uv, .sense = below, .threshold = low_v(-0.12), .delay_s = 0.2},
+           .released = {.threshold = low_v(0), .after_s = 10, .recovery = on_clear},
+           .reaction = open_now,
+           .why = "two samples at 10 Hz; released at the limit, so that an empty pack can be charged"}),
+      row({.fault = pack_overvoltage,
+           .raised = {.quantity = pack_uv, .sense = above, .threshold = pack_high_v(0.02), .delay_s = 2},
+           .released = {.threshold = pack_high_v(-0.06), .after_s = 60, .recovery = automatic},
+           .reaction = forbid_charge,
+           .why = "as for a cell, by a second measurement"}),
+      row({.fault = pack_undervoltage,
+           .raised = {.quantity = pack_uv, .sense = below, .threshold = pack_low_v(0.06), .delay_s = 2},
+           .released = {.threshold = pack_low_v(0.55), .after_s = 60, .recovery = automatic},
+           .reaction = forbid_discharge,
+           .why = "as for a cell, by a second measurement"}),
+      row({.fault = charge_overcurrent,
+           .raised = {.quantity = charge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
+           .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},
+           .reaction = forbid_charge,
+           .why = "the integral is the delay: 10 s at twice the limit, 24 s at 1.5 times the limit"}),
+      row({.fault = discharge_overcurrent,
+           .raised = {.quantity = discharge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
+           .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},
+           .reaction = forbid_discharge,
+           .why = "as for the charge current"}),
+      row({.fault = short_circuit,
+           .raised =
+               {.quantity = current_magnitude_ua, .sense = above, .threshold = in_micro(5 * most_a), .delay_s = 0},
+           .released = {.threshold = in_micro(most_a), .after_s = 10, .recovery = service},
+           .reaction = open_now,
+           .why = "no delay: fuse and comparator are faster, this fault keeps the contactors open"}),
+      row({.fault = overtemperature_warning,
+           .raised = {.quantity = highest_cdegc, .sense = above, .threshold = hot_c(-5), .delay_s = 5},
+           .released = {.threshold = hot_c(-8), .after_s = 30, .recovery = automatic},
+           .reaction = derate,
+           .why = "a cell warms up in minutes, a thermistor follows in 10 s"}),
+      row({.fault = overtemperature,
+           .raised = {.quantity = highest_cdegc, .sense = above, .threshold = hot_c(0), .delay_s = 5},
+           .released = {.threshold = hot_c(-10), .after_s = 60, .recovery = automatic},
+           .reaction = open,
+           .why = "as for the warning"}),
+      row({.fault = charge_overtemperature,
+           .raised = {.quantity = highest_cdegc, .sense = above, .threshold = hot_c(-15), .delay_s = 5},
+           .released = {.threshold = hot_c(-18), .after_s = 60, .recovery = automatic},
+           .reaction = forbid_charge,
+           .why = "as for the warning"}),
+      row({.fault = undertemperature,
+           .raised = {.quantity = lowest_cdegc, .sense = below, .threshold = cold_c(0), .delay_s = 5},
+           .released = {.threshold = cold_c(3), .after_s = 60, .recovery = automatic},
+           .reaction = forbid_discharge,
+           .why = "as for the warning"}),
+      row({.fault = charge_undertemperature,
+           .raised = {.quantity = lowest_cdegc, .sense = below, .threshold = in_centi(freezing_c), .delay_s = 5},
+           .released = {.threshold = in_centi(freezing_c + 2), .after_s = 60, .recovery = automatic},
+           .reaction = forbid_charge,
+           .why = "as for the warning"}),
+      row({.fault = open_wire,
+           .raised = {.quantity = opposite_shift_uv, .sense = above, .threshold = span(0.15), .delay_s = 0.5},
+           .released = {.threshold = span(0.06), .after_s = 10, .recovery = on_clear},
+           .reaction = open,
+           .why = "relay bounce and noise bursts last 100 ms"}),
+      row({.fault = imbalance,
+           .raised = {.quantity = spread_uv, .sense = above, .threshold = span(0.2), .delay_s = 30},
+           .released = {.threshold = span(0.12), .after_s = 60, .recovery = automatic},
+           .reaction = warn,
+           .why = "near a knee of the OCV the cell voltages differ as long as a load lasts"}),
+      row({.fault = current_implausible,
+           .raised = {.quantity = estimator_contradiction, .sense = above, .threshold = 0, .delay_s = 60},
+           .released = {.threshold = 0, .after_s = 60, .recovery = automatic},
+           .reaction = derate,
+           .why = "model errors have a correlation time of about a minute"}),
+      row({.fault = sum_mismatch,
+           .raised = {.quantity = sum_error_uv, .sense = above, .threshold = cell_count * span(0.03), .delay_s = 1},
+           .released = {.threshold = cell_count * span(0.015), .after_s = 10, .recovery = on_clear},
+           .reaction = open,
+           .why = "cells and pack are not sampled at the same moment of a current step"}),
+      row({.fault = voltage_missing,
+           .raised = {.quantity = voltages_missing, .sense = above, .threshold = 0, .delay_s = 0.5},
+           .released = {.threshold = 0, .after_s = 5, .recovery = automatic},
+           .reaction = open,
+           .why = "in this time the monitoring chip is read again and woken"}),
+      row({.fault = voltage_stuck,
+           .raised = {.quantity = voltages_stuck, .sense = above, .threshold = 0, .delay_s = 1},
+           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .reaction = open,
+           .why = "five equal samples have come before"}),
+      row({.fault = current_missing,
+           .raised = {.quantity = currents_missing, .sense = above, .threshold = 0, .delay_s = 0.5},
+           .released = {.threshold = 0, .after_s = 5, .recovery = automatic},
+           .reaction = open,
+           .why = "in this time the sensor is read again"}),
+      row({.fault = temperature_lost,
+           .raised = {.quantity = temperatures_missing, .sense = above, .threshold = 0, .delay_s = 2},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
+           .reaction = derate,
+           .why = "temperatures change slowly, and a plug may be loose for a moment"}),
+      row({.fault = temperature_stuck,
+           .raised = {.quantity = temperatures_stuck, .sense = above, .threshold = 0, .delay_s = 10},
+           .released = {.threshold = 0, .after_s = 60, .recovery = automatic},
+           .reaction = derate,
+           .why = "temperatures change slowly"}),
+      row({.fault = deep_discharge,
+           .raised = {.quantity = lowest_cell_uv,
+                      .sense = below,
+                      .threshold = in_micro(0.75 * l.voltage_min_v),
+                      .delay_s = 10},
+           .released = {.threshold = in_micro(0.8 * l.voltage_min_v), .after_s = 0, .recovery = service},
+           .reaction = open,
+           .why = "no load that the faults above allow lasts as long"}),
+      row({.fault = precharge_failed,
+           .raised = {.quantity = precharge_off_curve, .sense = above, .threshold = 0, .delay_s = 0},
+           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .reaction = open_now,
+           .why = "no delay: the time is in the curve; the resistor cools for ten seconds before the next attempt"}),
+      row({.fault = contactor_welded,
+           .raised = {.quantity = welded, .sense = above, .threshold = 0, .delay_s = 0.2},
+           .released = {.threshold = 0, .after_s = 10, .recovery = service},
+           .reaction = open_now,
+           .why = "two samples at 10 Hz"}),
+      row({.fault = contactor_not_closed,
+           .raised = {.quantity = not_closed, .sense = above, .threshold = 0, .delay_s = 0.3},
+           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .reaction = open_now,
+           .why = "a contactor closes and stops bouncing within 50 ms"}),
+      row({.fault = samples_missing,
+           .raised =
+               {.quantity = sample_age_us, .sense = above, .threshold = in_micro(5 * d.sample_period_s), .delay_s = 0},
+           .released = {.threshold = in_micro(2 * d.sample_period_s), .after_s = 1, .recovery = automatic},
+           .reaction = open_now,
+           .why = "no delay: the threshold is five sample periods; before the first sample it is the start time of the "
+                  "measuring chain"}),
+      row({.fault = internal_fault,
+           .raised = {.quantity = integrity_error, .sense = above, .threshold = 0, .delay_s = 0},
+           .released = {.threshold = 0, .after_s = 0, .recovery = on_clear},
+           .reaction = open_now,
+           .why = "no delay: an untrusted state must not drive outputs"}),
+      row({.fault = storage_fault,
+           .raised = {.quantity = storage_failed, .sense = above, .threshold = 0, .delay_s = 0},
+           .released = {.threshold = 0, .after_s = 0, .recovery = on_clear},
+           .reaction = warn,
+           .why = "no delay: the storage has already tried again"}),
   }};
 }
 
-/// What firmware needs of it.
+/// The table without its reasons, for the firmware.
 constexpr Rules rules_of(const Table& table) {
   Rules rules{};
   for (std::size_t k = 0; k < fault_count; ++k) rules[k] = table[k].rule;
   return rules;
 }
 
-/// Faults of a table that have this reaction.
+/// One bit for each fault with this reaction.
 constexpr std::uint32_t faults_with(const Rules& rules, Reaction reaction) {
   std::uint32_t all = 0;
   for (const Rule& r : rules) all |= r.reaction == reaction ? bit(r.fault) : 0;
   return all;
 }
+/// One bit for each fault with this recovery.
 constexpr std::uint32_t faults_with(const Rules& rules, Recovery recovery) {
   std::uint32_t all = 0;
   for (const Rule& r : rules) all |= r.recovery == recovery ? bit(r.fault) : 0;
   return all;
 }
 
-/// Row k is that of bit k, and no release is on the wrong side of its threshold.
+/// Returns true if row k belongs to bit k and no release is on the wrong side of its threshold.
 constexpr bool consistent(const Rules& rules) {
   for (std::size_t k = 0; k < fault_count; ++k) {
     const Rule& r = rules[k];

@@ -1,4 +1,4 @@
-// The table in words: Markdown, a line a protection. For README.md and its test; firmware has no use for it.
+// The table as Markdown, one line per protection, for README.md and its test. The firmware does not use it.
 #pragma once
 
 #include <cmath>
@@ -29,20 +29,20 @@ constexpr const char* text_of(Reaction r) {
 constexpr const char* text_of(Recovery r) {
   switch (r) {
     case Recovery::automatic:
-      return "by itself";
+      return "automatic";
     case Recovery::on_clear:
-      return "when cleared";
+      return "clear command";
     case Recovery::service:
-      return "power cycle and service";
+      return "service after a power cycle";
   }
   return "";
 }
 
-/// Of a quantity: what it is, its unit in the table, and how many of the integers make one.
+/// Name of a quantity, and its unit in the table.
 struct QuantityText {
   const char* what = "";
   const char* unit = "";
-  double scale = 1;
+  double scale = 1;  ///< integer units per unit
   int digits = 0;
 };
 constexpr QuantityText text_of(Quantity q) {
@@ -54,11 +54,11 @@ constexpr QuantityText text_of(Quantity q) {
     case Quantity::pack_uv:
       return {"pack", "V", 1e6, 2};
     case Quantity::charge_overload_i2t_us:
-      return {"excess of I² while charging, over 1.05 of the limit", "s", 1e6, 0};
+      return {"overload integral I²t of charging, above 1.05 of the limit", "s", 1e6, 0};
     case Quantity::discharge_overload_i2t_us:
-      return {"the same while discharging", "s", 1e6, 0};
+      return {"overload integral I²t of discharging", "s", 1e6, 0};
     case Quantity::current_magnitude_ua:
-      return {"current, either way", "A", 1e6, 1};
+      return {"magnitude of the current", "A", 1e6, 1};
     case Quantity::highest_cdegc:
       return {"warmest sensor", "°C", 1e2, 0};
     case Quantity::lowest_cdegc:
@@ -66,11 +66,11 @@ constexpr QuantityText text_of(Quantity q) {
     case Quantity::opposite_shift_uv:
       return {"opposite shift of neighbours", "V", 1e6, 3};
     case Quantity::spread_uv:
-      return {"highest less lowest cell", "V", 1e6, 3};
+      return {"highest minus lowest cell", "V", 1e6, 3};
     case Quantity::estimator_contradiction:
-      return {"the model disbelieves the readings"};
+      return {"voltage rejected by the estimator"};
     case Quantity::sum_error_uv:
-      return {"sum of cells less pack", "V", 1e6, 3};
+      return {"sum of cells minus pack", "V", 1e6, 3};
     case Quantity::voltages_missing:
       return {"voltages missing"};
     case Quantity::voltages_stuck:
@@ -82,21 +82,22 @@ constexpr QuantityText text_of(Quantity q) {
     case Quantity::temperatures_stuck:
       return {"sensors stuck"};
     case Quantity::precharge_off_curve:
-      return {"pre-charge off its curve"};
+      return {"precharge below its curve"};
     case Quantity::welded:
-      return {"link stands, or current flows, while open"};
+      return {"DC link stays up, or current flows, while open"};
     case Quantity::not_closed:
-      return {"link below the pack while closed"};
+      return {"DC link below the pack while closed"};
     case Quantity::sample_age_us:
-      return {"time since a sample", "s", 1e6, 1};
+      return {"time since the last sample", "s", 1e6, 1};
     case Quantity::integrity_error:
-      return {"state contradicts itself, watchdog"};
+      return {"corrupted state, failed self-test, or watchdog reset"};
     case Quantity::storage_failed:
-      return {"the store says so"};
+      return {"storage reports a failure"};
   }
   return {};
 }
 
+/// The rows of a table with a header.
 inline std::string markdown(const Table& table) {
   const auto number = [](double value, int digits) {
     char text[32];
@@ -104,7 +105,7 @@ inline std::string markdown(const Table& table) {
     return std::string(text);
   };
   std::string out =
-      "| bit | fault | comes when | for | goes when | for | how | reaction | why so long "
+      "| bit | fault | raised when | for | released when | for | recovery | reaction | reason for the delay "
       "|\n|---|---|---|---|---|---|---|---|---|\n";
   for (std::size_t k = 0; k < fault_count; ++k) {
     const Rule& r = table[k].rule;

@@ -1,5 +1,5 @@
-// CRC-32 of IEEE 802.3 (polynomial 0x04C11DB7, reflected, start and final xor all ones), four bits at a time: a table
-// of 64 bytes.
+// CRC-32 of IEEE 802.3 (polynomial 0x04C11DB7, reflected, initial value and final xor all ones), four bits per step,
+// with a table of 64 bytes.
 #pragma once
 
 #include <array>
@@ -10,6 +10,7 @@ namespace bms::storage {
 
 class Crc32 {
  public:
+  /// Adds bytes; may be called several times.
   constexpr Crc32& add(std::span<const std::uint8_t> bytes) {
     for (const std::uint8_t byte : bytes) {
       sum_ = table[(sum_ ^ byte) & 15U] ^ sum_ >> 4;

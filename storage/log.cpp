@@ -4,6 +4,7 @@
 
 #include "hal/bytes.hpp"
 #include "storage/crc32.hpp"
+#include "storage/log_line.hpp"
 
 namespace bms::storage {
 
@@ -12,58 +13,16 @@ namespace {
 using hal::get_bytes;
 using hal::put_bytes;
 
-constexpr std::uint32_t erased_mark = 0x44534552, format = 1;  // "RESD"
-constexpr std::uint8_t copy_bit = 0x80;
-constexpr std::size_t identity_bytes = 8, commit_at = 8, check_at = 12;  // of a header
 constexpr std::uint16_t longest_record = 1 + max_payload_bytes / line_bytes;
 constexpr std::array<std::uint8_t, 4> zeros{};
 constexpr int tries_in_a_sector = 3, max_scans = 16;
 
-using Line = std::array<std::uint8_t, line_bytes>;
-
-constexpr std::uint16_t lines_of(std::size_t payload_bytes) {
-  return static_cast<std::uint16_t>(1 + (payload_bytes + line_bytes - 1) / line_bytes);
-}
-
-/// Of numbers that wrap.
+/// Comparison of numbers that wrap.
 constexpr bool later(std::uint32_t a, std::uint32_t b) { return static_cast<std::int32_t>(a - b) > 0; }
-
-Line read_line(std::uint8_t sector, std::uint32_t line) {
-  Line bytes;
-  hal::flash_read(sector, line * line_bytes, bytes);
-  return bytes;
-}
-
-Line mark_line() {
-  Line bytes{};
-  put_bytes(bytes, 0, erased_mark);
-  put_bytes(bytes, 4, format);
-  put_bytes(bytes, 12, crc32(std::span(bytes).first(12)));
-  return bytes;
-}
 
 bool replaces(const RecordLocation& later_one, const RecordLocation& r) {
   return later_one.kind.type == r.kind.type && later_one.kind.layout >= r.kind.layout &&
          later(later_one.number, r.number);
-}
-
-/// Programs whole words, the last one filled up with ones, and reads them back.
-bool program(std::uint8_t sector, std::uint32_t at, std::span<const std::uint8_t> bytes) {
-  for (std::size_t k = 0; k < bytes.size(); k += 4) {
-    const std::size_t n = std::min<std::size_t>(4, bytes.size() - k);
-    std::uint32_t word = 0xFFFFFFFF;
-    for (std::size_t j = 0; j < n; ++j)
-      word = (word & ~(0xFFU << (8 * j))) | static_cast<std::uint32_t>(bytes[k + j]) << (8 * j);
-    if (!hal::flash_program(sector, at + static_cast<std::uint32_t>(k), word)) return false;
-  }
-  for (std::size_t k = 0; k < bytes.size();) {
-    Line back;
-    const std::size_t n = std::min<std::size_t>(back.size(), bytes.size() - k);
-    hal::flash_read(sector, at + static_cast<std::uint32_t>(k), std::span(back).first(n));
-    if (!std::ranges::equal(std::span(back).first(n), bytes.subspan(k, n))) return false;
-    k += n;
-  }
-  return true;
 }
 
 }  // namespace
@@ -72,7 +31,7 @@ void Log::open() {
   *this = {};
   const hal::FlashSize size = hal::flash_start();
   const std::uint32_t lines = size.sector_bytes / line_bytes;
-  // a power of two, so that the numbers of lines still fit when they wrap
+  // A power of two, so that the numbers of lines remain unique when they wrap.
   const bool usable =
       size.sectors >= 2 && lines >= 4U * longest_record && lines <= 0x8000 && (lines & (lines - 1)) == 0;
   if (!usable) return;
@@ -82,7 +41,7 @@ void Log::open() {
   }
 }
 
-/// False: a torn record that reads now so and now otherwise has made a difference; look again.
+/// Returns false if a torn record read differently the second time; then scan again.
 bool Log::scan() {
   active_sector_ = none;
   record_count_ = 0;
@@ -101,22 +60,21 @@ bool Log::scan() {
   for (std::uint8_t s = 0; s < sectors; ++s) {
     if (s == active_sector_) continue;
     const bool ahead = found[s].begun && later(found[s].base, base_);
-    const bool twice =
-        found[s].begun &&
-        found[s].base == base_;  // no run of a log writes that: its numbers would be taken for those in charge
+    // The log never writes two sectors of one round; the numbers in the other would look like those of the active one.
+    const bool same_round = found[s].begun && found[s].base == base_;
     interrupted_ = interrupted_ || ahead;
-    if (!ahead && !twice) survey(s, adding);
+    if (!ahead && !same_round) survey(s, adding);
   }
   const Survey again = survey(active_sector_, adding);
   last_ = again.last;
   last_end_ = again.last_end;
-  const bool alike = again.any && again.original == found[active_sector_].original;
-  if (!alike) last_.reset();
-  last_record_secured_ = alike && interrupted_;  // a move is begun only when nothing is in doubt
-  return alike;
+  const bool unchanged = again.any && again.original == found[active_sector_].original;
+  if (!unchanged) last_.reset();
+  last_record_secured_ = unchanged && interrupted_;  // a move begins only when no record is uncertain
+  return unchanged;
 }
 
-/// The furthest that holds more than copies; if there is none any more, the furthest with copies.
+/// The sector with the highest numbers that contains more than copies; otherwise the highest one with copies.
 void Log::find_active_sector(std::span<const Survey> found) {
   const auto sectors = static_cast<std::uint8_t>(found.size());
   for (std::uint8_t s = 0; s < sectors; ++s) {
@@ -130,8 +88,8 @@ void Log::find_active_sector(std::span<const Survey> found) {
   }
 }
 
-template <class See>
-Log::Survey Log::survey(std::uint8_t sector, See&& see) const {
+template <class Visit>
+Log::Survey Log::survey(std::uint8_t sector, Visit&& visit) const {
   Survey s{};
   for (std::uint16_t at = 1; at < lines_;) {
     const auto header = identity_in(read_line(sector, at), at);
@@ -148,7 +106,7 @@ Log::Survey Log::survey(std::uint8_t sector, See&& see) const {
       s.original = s.original || !header->copy;
       s.last = {header->kind, sector, header->length, at, header->number};
       s.last_end = end;
-      see(s.last);
+      visit(s.last);
     }
     at = end;
   }
@@ -188,11 +146,11 @@ bool Log::blank(std::uint8_t sector, std::uint16_t from, std::uint16_t lines) co
 }
 
 bool Log::marked(std::uint8_t sector) const { return read_line(sector, 0) == mark_line(); }
-bool Log::mark(std::uint8_t sector) const { return program(sector, 0, mark_line()); }
-/// Before an erase: one that is cut short must not leave the old mark over cells that are half erased.
-bool Log::unmark(std::uint8_t sector) const { return program(sector, 0, Line{}); }
+bool Log::mark(std::uint8_t sector) const { return program_and_verify(sector, 0, mark_line()); }
+/// Call before an erase: an interrupted erase must not leave the old mark above half-erased cells.
+bool Log::unmark(std::uint8_t sector) const { return program_and_verify(sector, 0, Line{}); }
 
-/// Into those in force, without those it replaces; the order of calls does not matter.
+/// Adds a current record and removes those that it replaces. The order of calls does not matter.
 void Log::add_record(const RecordLocation& record) {
   const auto begin = records_.begin(), end = begin + static_cast<std::ptrdiff_t>(record_count_);
   if (std::any_of(begin, end,
@@ -244,7 +202,7 @@ StoreResult Log::store(Kind kind, std::span<const std::uint8_t> payload) {
     together += lines_of(r.length);
     ++records;
   }
-  if (together > lines_ / 2U || records > max_records) return StoreResult::rejected;  // without flash, of no lines
+  if (together > lines_ / 2U || records > max_records) return StoreResult::rejected;  // without flash, lines_ is 0
   if (append(kind, payload, longest_record) == StoreResult::stored) return StoreResult::stored;
   return move(kind, payload);
 }
@@ -258,14 +216,14 @@ bool Log::secure_last_record() {
       continue;
     }
     void_torn_records();
-    append(last_->kind, *bytes, 0);  // there is room: every other record leaves some
+    append(last_->kind, *bytes, 0);  // every other record leaves room for it
     last_record_secured_ = true;
   }
   return last_record_secured_;
 }
 
-/// Behind the last complete record: what was begun is made certain, so that every later boot sees the same, and void.
-/// next_ is behind it.
+/// Completes everything that was begun after the last complete record, so that each later boot reads the same, and
+/// makes it void. next_ is the line after it.
 void Log::void_torn_records() {
   next_ = last_end_;
   for (std::uint16_t at = last_end_; at < lines_;) {
@@ -273,20 +231,20 @@ void Log::void_torn_records() {
     const std::uint32_t place = at * line_bytes;
     const auto word = [&](std::size_t k) { return std::span(bytes).subspan(k, 4); };
     if (const auto header = identity_in(bytes, at)) {
-      program(active_sector_, place + check_at, word(check_at));
-      program(active_sector_, place + commit_at, zeros);
+      program_and_verify(active_sector_, place + check_at, word(check_at));
+      program_and_verify(active_sector_, place + commit_at, zeros);
       next_ = at = static_cast<std::uint16_t>(at + lines_of(header->length));
       continue;
     }
     const bool numbered = get_bytes<std::uint32_t>(bytes, 0) == base_ + at;
     if (numbered) {
-      program(active_sector_, place, word(0));
-      program(active_sector_, place + check_at, zeros);
+      program_and_verify(active_sector_, place, word(0));
+      program_and_verify(active_sector_, place + check_at, zeros);
     }
-    // else: nothing, or a number that was not finished: it will be begun again
-    const bool more = std::any_of(bytes.begin() + 4, bytes.end(), [](std::uint8_t byte) { return byte != 0xFF; });
+    // Otherwise the line is empty or has an unfinished number, which is written again later.
+    const bool other_bits = std::any_of(bytes.begin() + 4, bytes.end(), [](std::uint8_t byte) { return byte != 0xFF; });
     ++at;
-    if (numbered || more) next_ = at;
+    if (numbered || other_bits) next_ = at;
   }
 }
 
@@ -308,7 +266,7 @@ StoreResult Log::append(Kind kind, std::span<const std::uint8_t> payload, std::u
 
 StoreResult Log::move(Kind kind, std::span<const std::uint8_t> payload) {
   if ((active_sector_ == none || interrupted_) && needs_erase())
-    return StoreResult::needs_erase;  // what lies there may yet turn out to be a record
+    return StoreResult::needs_erase;  // a dirty sector may still contain a record
   const std::uint32_t others = active_sector_ == none ? size_.sectors : size_.sectors - 1;
   for (std::uint32_t steps = 1; steps <= others; ++steps) {
     const std::uint8_t sector = after(steps);
@@ -335,7 +293,7 @@ bool Log::move_into(std::uint8_t sector, std::uint32_t base, Kind kind, std::spa
     if (old.kind.type == kind.type && old.kind.layout <= kind.layout) continue;
     std::array<std::uint8_t, max_payload_bytes> bytes;
     const auto content = read(old, bytes);
-    if (!content) continue;  // it has decayed since it was found
+    if (!content) continue;  // its bits have decayed since it was found
     moved[count] = place(old.kind, old.length);
     if (!write(moved[count], true, *content)) return false;
     ++count;
@@ -352,8 +310,8 @@ bool Log::move_into(std::uint8_t sector, std::uint32_t base, Kind kind, std::spa
   return true;
 }
 
-/// The identity with its check first: whoever finds them knows how many lines are taken. The checksum of it all last:
-/// with it the record is.
+/// Writes the identity and its check first: they state how many lines are used. The checksum of the whole record comes
+/// last and makes the record valid.
 bool Log::write(const RecordLocation& record, bool copy, std::span<const std::uint8_t> payload) const {
   Line header{};
   put_bytes(header, 0, record.number);
@@ -365,8 +323,9 @@ bool Log::write(const RecordLocation& record, bool copy, std::span<const std::ui
   put_bytes(commit, 0, Crc32().add(identity).add(payload).value());
   put_bytes(check, 0, crc32(identity));
   const std::uint32_t at = record.line * line_bytes;
-  return program(record.sector, at, identity) && program(record.sector, at + check_at, check) &&
-         program(record.sector, at + line_bytes, payload) && program(record.sector, at + commit_at, commit);
+  return program_and_verify(record.sector, at, identity) && program_and_verify(record.sector, at + check_at, check) &&
+         program_and_verify(record.sector, at + line_bytes, payload) &&
+         program_and_verify(record.sector, at + commit_at, commit);
 }
 
 bool Log::needs_erase() const {
@@ -386,10 +345,10 @@ bool Log::erase_next_sector() {
     state_[sector] = good ? Sector::erased : Sector::broken;
     return good;
   }
-  return true;  // what was to be erased has come in charge meanwhile
+  return true;  // the sector to erase has become active meanwhile
 }
 
-/// Only where a record in the sector in charge has decayed is an older one of its kind in force.
+/// Copies the current records in `sector` to the active sector. They exist only if a newer one has decayed there.
 void Log::copy_records_from(std::uint8_t sector) {
   for (std::size_t k = 0; k < record_count_; ++k) {
     if (records_[k].sector != sector) continue;
@@ -397,17 +356,18 @@ void Log::copy_records_from(std::uint8_t sector) {
     const RecordLocation record = records_[k];
     const auto bytes = read(record, payload);
     if (bytes && append(record.kind, *bytes, 0) == StoreResult::stored)
-      k = static_cast<std::size_t>(-1);  // those in force are others now
+      k = static_cast<std::size_t>(-1);  // the current records have changed
   }
 }
 
 std::uint32_t Log::broken() const { return static_cast<std::uint32_t>(std::ranges::count(state_, Sector::broken)); }
 bool Log::operational() const { return size_.sectors >= 2 + broken(); }
 std::uint32_t Log::erase_cycles() const {
-  return size_.sectors == 0 ? 0 : (active_sector_ == none ? 0 : base_ / lines_ / size_.sectors + 1);
+  if (size_.sectors == 0 || active_sector_ == none) return 0;
+  return base_ / lines_ / size_.sectors + 1;
 }
 
-/// Round the sectors from the one in charge; sector 0 is the first of all.
+/// Sector `steps` after the active one, in turn; without an active one, counted from sector 0.
 std::uint8_t Log::after(std::uint32_t steps) const {
   return static_cast<std::uint8_t>((active_sector_ == none ? steps - 1 : active_sector_ + steps) % size_.sectors);
 }

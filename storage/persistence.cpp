@@ -16,7 +16,7 @@ constexpr std::uint16_t charge_at_least_minutes = 60, cells_every_minutes = 30, 
                         fault_every_minutes = 10;
 constexpr std::uint8_t most_faults_at_once = 16;
 constexpr std::uint64_t uaus_per_uah = 3'600'000'000;
-constexpr std::uint16_t processor_fault_code = 0xFF00;  // and the exception's number
+constexpr std::uint16_t processor_fault_code = 0xFF00;  // plus the exception number
 
 constexpr std::array known_kinds{ChargeRecord::kind, CellsRecord::kind, HealthRecord::kind, EventsRecord::kind,
                                  SettingsRecord::kind};
@@ -34,14 +34,14 @@ bool put(Log& log, const R& record) {
   return log.store(R::kind, encode(record, bytes)) == StoreResult::stored;
 }
 
-bool apart(std::int32_t a, std::int32_t b, std::int32_t by) { return std::abs(std::int64_t{a} - b) >= by; }
+bool differs_by(std::int32_t a, std::int32_t b, std::int32_t by) { return std::abs(std::int64_t{a} - b) >= by; }
 
-constexpr std::uint16_t counted(std::uint16_t minutes) {
+constexpr std::uint16_t incremented(std::uint16_t minutes) {
   return minutes < 0xFFFF ? static_cast<std::uint16_t>(minutes + 1) : minutes;
 }
 
-/// The power stayed on over those.
-constexpr bool only_the_core(hal::ResetCause cause) {
+/// Returns true for causes that reset only the core.
+constexpr bool power_stayed_on(hal::ResetCause cause) {
   return cause == hal::ResetCause::software || cause == hal::ResetCause::watchdog || cause == hal::ResetCause::pin;
 }
 
@@ -57,7 +57,7 @@ void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRec
   if (HealthRecord health; get(log_, health)) health_ = health;
   get(log_, events_);
   get(log_, settings_);
-  if (only_the_core(cause))
+  if (power_stayed_on(cause))
     off_s_ = 0;
   else if (charge_known_ && calendar_s && charge_stored_.calendar_s != 0 && *calendar_s >= charge_stored_.calendar_s)
     off_s_ = *calendar_s - charge_stored_.calendar_s;
@@ -83,7 +83,7 @@ std::optional<measurement::StartingPoint> Persistence::starting_point() const {
   return estimator::starting_point_after_off_time(stored, off_s_);
 }
 
-/// What was counted since the last call, in whole units; the rest stays.
+/// Adds whole units counted since the last call; the fractions remain.
 void Persistence::advance_time() {
   charge_.charged_uah += charged_uaus_ / uaus_per_uah;
   charged_uaus_ %= uaus_per_uah;
@@ -97,9 +97,9 @@ void Persistence::advance_time() {
 
 void Persistence::store(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s) {
   advance_time();
-  charge_minutes_ = counted(charge_minutes_);
-  cells_minutes_ = counted(cells_minutes_);
-  health_minutes_ = counted(health_minutes_);
+  charge_minutes_ = incremented(charge_minutes_);
+  cells_minutes_ = incremented(cells_minutes_);
+  health_minutes_ = incremented(health_minutes_);
   if (faults_at_once_ < most_faults_at_once && ++fault_minutes_ >= fault_every_minutes) {
     fault_minutes_ = 0;
     ++faults_at_once_;
@@ -108,9 +108,9 @@ void Persistence::store(const EstimatorSnapshot& now, std::optional<std::uint32_
     const auto moved_ppb = static_cast<std::uint32_t>(std::abs(std::int64_t{now.pack->soc_ppb} - soc_before_ppb_));
     soc_before_ppb_ = now.pack->soc_ppb;
     const bool first = !charge_known_ || !stored_in_this_run_;
-    const bool has_moved = apart(now.pack->soc_ppb, charge_stored_.pack.soc_ppb, moved_soc_ppb) ||
-                           apart(now.pack->soc_sigma_ppb, charge_stored_.pack.soc_sigma_ppb,
-                                 std::max(moved_soc_ppb / 10, charge_stored_.pack.soc_sigma_ppb / 10));
+    const bool has_moved = differs_by(now.pack->soc_ppb, charge_stored_.pack.soc_ppb, moved_soc_ppb) ||
+                           differs_by(now.pack->soc_sigma_ppb, charge_stored_.pack.soc_sigma_ppb,
+                                      std::max(moved_soc_ppb / 10, charge_stored_.pack.soc_sigma_ppb / 10));
     const bool long_ago =
         charge_minutes_ >= charge_at_least_minutes &&
         (charge_.charged_uah != charge_stored_.charged_uah || charge_.discharged_uah != charge_stored_.discharged_uah);
@@ -164,7 +164,7 @@ void Persistence::store_charge(const estimator::StoredEstimate& now, std::uint32
 void Persistence::store_cells(std::span<const CellsRecord::Cell> now) {
   if (now.empty() || now.size() > CellsRecord::max_cells) return;
   bool moved = cells_.count != now.size();
-  for (std::size_t k = 0; !moved && k < now.size(); ++k) moved = apart(now[k].soc, cells_.cell[k].soc, moved_cell);
+  for (std::size_t k = 0; !moved && k < now.size(); ++k) moved = differs_by(now[k].soc, cells_.cell[k].soc, moved_cell);
   if (!moved) return;
   CellsRecord next;
   next.count = static_cast<std::uint8_t>(now.size());
@@ -175,17 +175,17 @@ void Persistence::store_cells(std::span<const CellsRecord::Cell> now) {
 }
 
 void Persistence::store_health(const HealthRecord& now) {
-  const bool moved = !health_ || apart(now.capacity_ppm, health_->capacity_ppm, moved_health_ppm) ||
-                     apart(now.resistance_ppm, health_->resistance_ppm, moved_health_ppm) ||
-                     apart(now.capacity_sigma_ppm, health_->capacity_sigma_ppm, moved_health_ppm) ||
-                     apart(now.resistance_sigma_ppm, health_->resistance_sigma_ppm, moved_health_ppm);
+  const bool moved = !health_ || differs_by(now.capacity_ppm, health_->capacity_ppm, moved_health_ppm) ||
+                     differs_by(now.resistance_ppm, health_->resistance_ppm, moved_health_ppm) ||
+                     differs_by(now.capacity_sigma_ppm, health_->capacity_sigma_ppm, moved_health_ppm) ||
+                     differs_by(now.resistance_sigma_ppm, health_->resistance_sigma_ppm, moved_health_ppm);
   if (!moved || !put(log_, now)) return;
   health_ = now;
   health_minutes_ = 0;
 }
 
 void Persistence::store_events() { events_changed_ = !put(log_, events_); }
-/// While some are left of those that may be written at once; what could not be written is none of them.
+/// Writes the events if the rate limit allows it. A failed write does not count.
 void Persistence::store_events_in_turn() {
   if (faults_at_once_ == 0) return;
   store_events();

@@ -1,18 +1,18 @@
-// What the battery remembers, and when it writes it down. Wear is bounded whatever happens:
+// What the battery stores, and when. The policy bounds the wear of the flash in all cases:
 //
-//   charge    once a minute at most, when soc has moved by 0.1 % or its sigma by a tenth; after an hour if anything has
-//   changed cells     every half hour at most, when one has moved by 0.1 % health    every hour at most, when one value
-//   has moved by 0.1 % events    a fault at once: sixteen in a row, then one every ten minutes; starts and resets with
-//   the first minute of a run, so that a
-//             battery that starts again and again writes nothing
+//   charge    at most once a minute, if soc has moved by 0.1 % or its sigma by a tenth; after an hour if any charge
+//   flowed cells     at most every half hour, if one has moved by 0.1 % health    at most every hour, if one value has
+//   moved by 0.1 % events    a fault at once: sixteen in a row, then one every ten minutes. Starts and resets with the
+//                            first minute of a
+//             run, so a battery that restarts repeatedly writes nothing.
 //   settings  when set
-//   all that has changed, at once: power_failing()
+//   all       power_failing() writes all changes at once
 //
-// What could not be written is tried again a minute later. Erasing is the caller's to time: start() does it before
-// anything runs, later erase_next_sector() when the core may stand still for half a second (hal/flash.hpp), e.g. with
-// open contactors or without current.
+// A failed write is tried again a minute later. The caller decides when to erase: start() erases before anything runs,
+// later erase_next_sector() when the core may stop for half a second (hal/flash.hpp), e.g. with open contactors or
+// without current.
 //
-// Time is the samples' own. Cost of a sample: counting its charge, some thirty instructions; less without flash.
+// Time is the samples' time. Cost per sample: counting its charge, about thirty instructions; less without flash.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@
 
 namespace bms::storage {
 
-/// What the estimator knows at the moment.
+/// Current results of the estimator.
 struct EstimatorSnapshot {
   std::optional<estimator::StoredEstimate> pack;  ///< nothing: not started
   std::span<const CellsRecord::Cell> cells;
@@ -37,14 +37,15 @@ struct EstimatorSnapshot {
 
 class Persistence {
  public:
-  /// At boot: reads what was stored, erases what is to be erased. calendar_s: hal/calendar.hpp.
+  /// Call at boot: reads the stored records and erases sectors in advance. calendar_s: hal/calendar.hpp.
   void start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,
              std::optional<std::uint32_t> calendar_s);
 
-  /// Where to begin, if that is known: as stored, as unsure as the time off and what was not written any more make it.
+  /// Starting point of the estimator, if any: the stored one, with a sigma widened for the time off and for the last
+  /// minute before the record.
   std::optional<measurement::StartingPoint> starting_point() const;
 
-  /// Every sample. True once a minute: keep() is to be called.
+  /// Call with every sample: counts its charge and time. Returns true once a minute; then call store().
   bool count(const measurement::Sample& sample) {
     if (log_.sectors() == 0) return false;
     const std::uint64_t us = counting_ && sample.time_us > time_us_ ? sample.time_us - time_us_ : 0;
@@ -58,17 +59,18 @@ class Persistence {
     since_us_ += step_us;
     return since_us_ >= minute_us;
   }
+  /// Writes the records that are due.
   void store(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
-  /// code: not 0; what it means is the caller's.
+  /// Records a fault. code: not 0, defined by the caller.
   void fault(std::uint16_t code);
-  /// False: no room for another key.
+  /// Stores a setting. Returns false if there is no room for another key.
   bool set(std::uint16_t key, std::int32_t value);
-  /// The supply goes, or the battery is switched off. Charge first, 0.2 ms; 2 ms for everything, 12 at most.
+  /// Call before the battery is switched off: writes charge first, 0.2 ms; everything takes 2 ms, at most 12 ms.
   void power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
-  /// The supply sinks, and may stop sinking: charge alone, 0.2 ms, 1.2 at most where there is room for it in its
-  /// sector, 20 where there is not.
+  /// Call when the supply falls, which may be temporary: writes charge alone, 0.2 ms; at most 1.2 ms if its sector has
+  /// room, otherwise at most 20 ms.
   void supply_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   bool needs_erase() const { return log_.needs_erase(); }
@@ -80,9 +82,9 @@ class Persistence {
   const EventsRecord& events() const { return events_; }
   const SettingsRecord& settings() const { return settings_; }
   const Log& log() const { return log_; }
-  /// Records that a newer firmware has left: they are kept, and cannot be read.
+  /// Number of records of a newer firmware, which are preserved but cannot be read.
   std::uint32_t newer_records() const;
-  std::optional<std::uint32_t> off_s() const { return off_s_; }  ///< how long the power was away, if that is known
+  std::optional<std::uint32_t> off_s() const { return off_s_; }  ///< time without power, if known
 
  private:
   static constexpr std::uint32_t minute_us = 60'000'000;
@@ -102,7 +104,7 @@ class Persistence {
   std::optional<HealthRecord> health_;
   EventsRecord events_;
   SettingsRecord settings_;
-  bool charge_known_ = false;  ///< charge_stored_ is from a record
+  bool charge_known_ = false;  ///< charge_stored_ was read from a record
   bool events_changed_ = false, settings_changed_ = false, stored_in_this_run_ = false;
   std::optional<std::uint32_t> off_s_;
   std::int32_t soc_before_ppb_ = 0;

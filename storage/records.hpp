@@ -1,11 +1,10 @@
-// What is stored, and how it lies in a record: little-endian, field after field (hal/bytes.hpp). A record is decoded
-// only if it has the length that its layout says; a record of an older layout is read by what is left of that layout
-// here.
+// Stored records and their layout: little-endian, field after field (hal/bytes.hpp). A record is decoded only if it has
+// the length of its layout. Older layouts are read by the code that remains for them here.
 //
 //   type      layout  bytes  content
-//   charge    2       32     state of charge, charge moved, time in operation: the only one that is written often
+//   charge    2       32     state of charge, charge counters, time in operation; the only record that is written often
 //             1       8      (older) state of charge alone
-//   cells     1       1+4n   each cell beside the mean
+//   cells     1       1+4n   each cell relative to the mean
 //   health    1       16     capacity and resistance
 //   events    1       118    starts, resets by cause, the last sixteen faults
 //   settings  1       3+6n   values by key
@@ -26,7 +25,7 @@ namespace bms::storage {
 using Payload = std::span<std::uint8_t, max_payload_bytes>;
 using Bytes = std::span<const std::uint8_t>;
 
-/// Writes field after field.
+/// Writes the fields of a record in order.
 class Encoder {
  public:
   constexpr explicit Encoder(Payload into) : into_(into) {}
@@ -43,7 +42,7 @@ class Encoder {
   std::size_t at_ = 0;
 };
 
-/// Reads them again; beyond the end, zeros.
+/// Reads the fields of a record in order; zeros beyond its end.
 class Decoder {
  public:
   constexpr explicit Decoder(Bytes from) : from_(from) {}
@@ -68,8 +67,8 @@ struct ChargeRecord {
   static constexpr Kind kind{1, 2};
 
   estimator::StoredEstimate pack;
-  std::uint32_t moved_ppb =
-      0;  ///< by which soc may have moved since: what it moved before this was written; 0 at a shutdown
+  /// Possible movement of soc after this record: its movement in the minute before; 0 at a shutdown.
+  std::uint32_t moved_ppb = 0;
   std::uint64_t charged_uah = 0, discharged_uah = 0;
   std::uint32_t operating_s = 0;
   std::uint32_t calendar_s = 0;  ///< hal/calendar.hpp; 0: no clock
@@ -77,7 +76,7 @@ struct ChargeRecord {
   constexpr bool operator==(const ChargeRecord&) const = default;
 };
 
-/// Thousandths of a full cycle: what was discharged over the capacity.
+/// Full cycles in 1/1000: discharged charge over the capacity.
 constexpr std::uint64_t cycles_milli(const ChargeRecord& r, std::uint32_t capacity_uah) {
   return capacity_uah == 0 ? 0 : r.discharged_uah * 1'000 / capacity_uah;
 }
@@ -94,12 +93,12 @@ constexpr Bytes encode(const ChargeRecord& r, Payload into) {
       .bytes();
 }
 
-/// The estimator's soc goes a little beyond 0 and 1; one that goes further, or a sigma that cannot be, is nothing to go
-/// by.
+/// Clamps soc to 0..1; the estimator's may be a little beyond. If soc is further out, or sigma is impossible, sigma is
+/// set to that of an unknown soc.
 constexpr estimator::StoredEstimate plausible(estimator::StoredEstimate e) {
-  constexpr std::int32_t one = 1'000'000'000, beyond = one / 4, anything = 289'000'000;
-  if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > anything)
-    e.soc_sigma_ppb = anything;
+  constexpr std::int32_t one = 1'000'000'000, beyond = one / 4, unknown_sigma = 289'000'000;
+  if (e.soc_ppb < -beyond || e.soc_ppb > one + beyond || e.soc_sigma_ppb <= 0 || e.soc_sigma_ppb > unknown_sigma)
+    e.soc_sigma_ppb = unknown_sigma;
   e.soc_ppb = std::clamp(e.soc_ppb, std::int32_t{0}, one);
   return e;
 }
@@ -107,7 +106,7 @@ constexpr estimator::StoredEstimate plausible(estimator::StoredEstimate e) {
 constexpr bool decode(Bytes from, std::uint8_t layout, ChargeRecord& r) {
   Decoder d(from);
   if (layout == 1 && from.size() == 8) {
-    // soc alone, by a firmware that counted nothing: counters begin at 0, and how fast soc moved was not known
+    // This firmware stored soc alone: the counters start at 0, and the movement of soc is unknown.
     constexpr std::uint32_t a_minute_at_1c_ppb = 16'666'667;
     r = {};
     r.moved_ppb = a_minute_at_1c_ppb;
@@ -132,7 +131,7 @@ struct CellsRecord {
   static constexpr Kind kind{2, 1};
   static constexpr std::size_t max_cells = 16;
   struct Cell {
-    std::int16_t soc = 0;     ///< less the mean's, in 1e-5: +-0.32
+    std::int16_t soc = 0;     ///< minus the mean, in 1e-5: +-0.32
     std::uint16_t sigma = 0;  ///< in 1e-5
     constexpr bool operator==(const Cell&) const = default;
   };
@@ -162,7 +161,7 @@ constexpr bool decode(Bytes from, std::uint8_t layout, CellsRecord& r) {
   return true;
 }
 
-/// Against the cell file, in millionths; 1,000,000 is as new.
+/// Relative to the cell file, in 1e-6; 1,000,000 is a new cell.
 struct HealthRecord {
   static constexpr Kind kind{3, 1};
 
@@ -193,18 +192,18 @@ struct EventsRecord {
   static constexpr Kind kind{4, 1};
   static constexpr std::size_t causes = 7, max_faults = 16;
   struct Fault {
-    std::uint16_t code = 0;         ///< 0: none
-    std::uint32_t operating_s = 0;  ///< when
+    std::uint16_t code = 0;         ///< 0: no fault
+    std::uint32_t operating_s = 0;  ///< time of the fault
     constexpr bool operator==(const Fault&) const = default;
   };
 
   std::uint32_t starts = 0;
-  std::array<std::uint16_t, causes> resets{};  ///< by hal::ResetCause; stays at 65,535
-  std::uint32_t faults = 0;                    ///< ever; the newest is at (faults - 1) modulo 16
+  std::array<std::uint16_t, causes> resets{};  ///< by hal::ResetCause; saturates at 65,535
+  std::uint32_t faults = 0;                    ///< total; the newest is at (faults - 1) modulo 16
   std::array<Fault, max_faults> fault{};
 
   constexpr void add(const Fault& f) { fault[faults++ % max_faults] = f; }
-  /// back: 0 for the newest, below 16.
+  /// back: 0 for the newest, at most 15.
   constexpr Fault last(std::uint32_t back) const {
     return back < faults ? fault[(faults - 1 - back) % max_faults] : Fault{};
   }
@@ -233,8 +232,7 @@ constexpr bool decode(Bytes from, std::uint8_t layout, EventsRecord& r) {
   return true;
 }
 
-/// Values that were set in the field, by key; what is not there has its default. Who gives a key a meaning never gives
-/// it another.
+/// Values set in the field, by key; a missing key has its default. The meaning of a key never changes.
 struct SettingsRecord {
   static constexpr Kind kind{5, 1};
   static constexpr std::size_t max_settings = 24;
@@ -244,7 +242,7 @@ struct SettingsRecord {
     constexpr bool operator==(const Setting&) const = default;
   };
 
-  std::uint16_t revision = 0;  ///< one more with every change
+  std::uint16_t revision = 0;  ///< incremented with each change
   std::uint8_t count = 0;
   std::array<Setting, max_settings> setting{};
 
@@ -254,7 +252,7 @@ struct SettingsRecord {
     }
     return std::nullopt;
   }
-  /// False: no room for another key.
+  /// Returns false if there is no room for another key.
   constexpr bool set(std::uint16_t key, std::int32_t value) {
     std::size_t k = 0;
     while (k < count && setting[k].key != key) ++k;

@@ -1,8 +1,7 @@
 // The stack: [image_stack_limit, image_stack_top) of the linker script; it grows down.
 //
 //   guard   its lowest part, unused. With a memory protection unit (ARMv7-M) an access is a processor fault, recorded
-//   as
-//           exception 4. Without one, every sample checks that the guard still contains the paint.
+//           as exception 4. Without one, every sample checks that the guard still contains the paint.
 //   paint   the remaining part, filled at start-up: words that no longer contain the paint were used
 #pragma once
 

@@ -9,8 +9,8 @@
 // Going on the bus (32.4) and recovery after bus-off (32.7.6) are phases that service() checks. Each has a timeout
 // after which it is tried again later; no function waits in a loop for the bus.
 //   bus-off         drops the waiting frames. After a rest of 100 ms the controller starts its recovery, which takes
-//   128
-//                   times 11 recessive bits. The rest doubles each time up to 1.6 s; a sent frame resets it to 100 ms.
+//                   128 times 11 recessive bits. The rest doubles each time up to 1.6 s; a sent frame resets it to 100
+//                   ms.
 //   no progress     frames wait and none was sent for 100 ms (no acknowledge, stuck wire, full bus): drops the waiting
 //                   frames. can_listening() is false for a second or until a frame arrives; then sending starts again.
 //   no idle bus     100 ms after the request: counts a failed start and tries again after the rest

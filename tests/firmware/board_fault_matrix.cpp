@@ -563,8 +563,8 @@ std::string markdown(const MatrixResult& result) {
     return fmt::format("{:.1f} to {:.1f} s", 1e-3 * t.soonest_ms, 1e-3 * t.latest_ms);
   };
   std::string out =
-      "| fault | table | silent below, of cases | told just above it after | three sigma above | during others | of "
-      "cases | open after |\n|---|---|---|---|---|---|---|---|\n";
+      "| fault | table | silent below, number of cases | raised just above it after | three sigma above | during other "
+      "faults | number of cases | open after |\n|---|---|---|---|---|---|---|---|\n";
   for (std::size_t k = 0; k < in_frames; ++k) {
     const MatrixRow& r = result.rows[k];
     const std::string stated = k == charge_heat || k == discharge_heat
@@ -576,7 +576,7 @@ std::string markdown(const MatrixResult& result) {
   out += fmt::format("\n{} cases, {} samples: {} missed, {} false.", result.cases, result.samples, result.missed,
                      result.falsely);
   if (result.shift_samples > 0)
-    out += fmt::format(" {} of the samples are the shift with noise: none told.", result.shift_samples);
+    out += fmt::format(" {} of the samples are the shift with noise, without a fault.", result.shift_samples);
   return out + "\n";
 }
 
