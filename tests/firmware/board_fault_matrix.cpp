@@ -131,7 +131,7 @@ class BoardTruck : public TruckPack {
     ++result_.samples;
     expected = oracle_.check(sample, contradicts());
     for (std::size_t k = 0; k < fault_count; ++k) {
-      if (!told_by_samples(k) || has(not_judged, k) || has(expected, k) == has(faults, k)) continue;
+      if (!visible_in_samples(k) || has(not_judged, k) || has(expected, k) == has(faults, k)) continue;
       ++(has(expected, k) ? result_.missed : result_.falsely);
       complain(fmt::format("{} {}, value {}", expected_rows[k].name, has(expected, k) ? "missed" : "false",
                            oracle_.values[k].value_or(measurement::no_reading)));
@@ -188,7 +188,7 @@ std::int32_t level(std::size_t k, bool above) {
 /// Beyond the threshold by up to three sigma, as somebody measures it: what stays the same to the last digit is another
 /// fault.
 void hold(std::size_t k, BoardTruck& truck, measurement::PackSample<16>& s, PackEstimate<16>& e) {
-  const bool measured = told_by_samples(k) && levels(expected_rows[k]).noise > 0;
+  const bool measured = visible_in_samples(k) && levels(expected_rows[k]).noise > 0;
   const int sign = expected_rows[k].beyond == '>' ? 1 : -1;
   bring(
       k,
@@ -230,7 +230,7 @@ class Matrix {
       const std::string name = expected_rows[k].name;
       all.push_back({"just below " + name, [k](MatrixResult& r) { below(k, r); }});
       all.push_back({"just above " + name, [k](MatrixResult& r) { above(k, r); }});
-      const bool measured = told_by_samples(k) && levels(expected_rows[k]).noise > 0;
+      const bool measured = visible_in_samples(k) && levels(expected_rows[k]).noise > 0;
       if (measured) {
         for (const int offset : one_of<int>({-1, 0, 1})) {
           all.push_back({fmt::format("noise {} {}",
@@ -240,7 +240,7 @@ class Matrix {
                                      name),
                          [k, offset](MatrixResult& r) { noisy(k, offset, r); }});
         }
-      } else if (told_by_samples(k)) {
+      } else if (visible_in_samples(k)) {
         all.push_back({"now and then " + name, [k](MatrixResult& r) { loose(k, r); }});
       }
       std::vector<std::size_t> others;

@@ -43,8 +43,15 @@ programs = [
     ("tests/protection/contactors_test.cpp", "protection_test", []),
     ("tests/protection/derating_test.cpp", "protection_test", []),
     ("tests/protection/table_test.cpp", "protection_test", []),
+    ("tests/protection/contactor_limits_test.cpp", "protection_test", []),
+    ("tests/protection/contactor_walk_test.cpp", "protection_test", []),
     ("tests/protection/fault_matrix_test.cpp", "protection_test", []),
+    ("tests/protection/first_cause_test.cpp", "protection_test", []),
+    ("tests/protection/pack_quantities_test.cpp", "protection_test", []),
+    ("tests/protection/sampled_protection_test.cpp", "protection_test", []),
     ("tests/protection/protection_test.cpp", "protection_test", []),
+    ("tests/protection/missing_samples_test.cpp", "protection_test", []),
+    ("tests/protection/flipped_bits_test.cpp", "protection_test", []),
     ("tests/protection/balancing_test.cpp", "protection_test", []),
     ("tests/storage/records_test.cpp", "storage_test", []),
     ("tests/storage/persistence_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", *store]),
@@ -53,8 +60,8 @@ programs = [
 ]
 # the test that is tried first for files without one of their name
 first = {
-    "table_text": "table_test", "faults": "table_test", "pack_design": "table_test", "pack_quantities": "fault_matrix_test", "fault_monitor": "fault_matrix_test",
-    "guarded": "contactors_test", "crc32": "records_test",
+    "table_text": "table_test", "faults": "table_test", "pack_design": "table_test", "fault_monitor": "fault_matrix_test",
+    "guarded": "contactor_walk_test", "crc32": "records_test", "log_line": "log_test",
 }
 checks = ["-O1", "-g0", "-w", "-D_GLIBCXX_ASSERTIONS", "-DBMS_POWER_CUT_SEQUENCES=60"]
 compiler = "clang++"  # half the time of g++

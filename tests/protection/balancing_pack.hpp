@@ -1,6 +1,6 @@
-// A pack to balance, simulated by itself: sixteen cells, each with its own capacity, charge, resistance and bleeding
-// resistor, on the plant's open-circuit curve, each read with an offset of its own; driven and charged once a day. What
-// a rule that chooses the cells to bleed makes of it.
+// Simulation of a pack to be balanced: sixteen cells, each with its own capacity, charge, resistance, balancing
+// resistor and reading error, on the plant's open-circuit curve. The pack is driven and charged once a day, under a
+// rule that selects the cells to bleed.
 #pragma once
 
 #include <algorithm>
@@ -44,8 +44,8 @@ struct BalancedPack {
   }
 };
 
-/// Cells that leave a factory and a year of storage: charge +-3 %, resistance +-15 %, readings +-3 mV; capacity +-0.5 %
-/// but for one that may be weak.
+/// Cells after a year of storage: charge +-3 %, resistance +-15 %, readings +-3 mV, capacity +-0.5 %. weak_by: fraction
+/// of capacity that one cell lacks.
 inline BalancedPack pack_out_of_balance(std::uint64_t seed, double weak_by) {
   plant::Random random(seed);
   BalancedPack p;
@@ -58,11 +58,10 @@ inline BalancedPack pack_out_of_balance(std::uint64_t seed, double weak_by) {
   return p;
 }
 
-/// The cells that a rule bleeds for the next seconds.
+/// Returns the cells to bleed for the next seconds, one bit each.
 using BleedRule = std::function<std::uint32_t(const BalancedPack&, double seconds)>;
 
-/// By charge: the firmware's own, with an estimator that knows the differences to a sigma and is off by as much, anew
-/// every day.
+/// By charge: the firmware's rule, with an estimator whose differences have an error of one sigma, drawn every day.
 class ByCharge {
  public:
   explicit ByCharge(double sigma, const PackDesign& design = forklift) : plan_(balancing_plan(design)), sigma_(sigma) {}
@@ -79,8 +78,13 @@ class ByCharge {
       soc[k] = static_cast<std::int32_t>(1e9 * (p.soc[k] - p.mean_soc() + off_[k]));
       sigma[k] = static_cast<std::int32_t>(1e9 * sigma_);
     }
-    return balancing_.update({uv, soc, sigma, static_cast<std::int32_t>(1e9 * p.mean_soc()),
-                              static_cast<std::int32_t>(1e6 * p.current_a), 2'500, true},
+    return balancing_.update({.cell_uv = uv,
+                              .soc_ppb = soc,
+                              .sigma_ppb = sigma,
+                              .mean_soc_ppb = static_cast<std::int32_t>(1e9 * p.mean_soc()),
+                              .current_ua = static_cast<std::int32_t>(1e6 * p.current_a),
+                              .highest_cdegc = 2'500,
+                              .allowed = true},
                              static_cast<std::uint32_t>(1e6 * seconds));
   }
   const Balancing<balanced_cells>& balancing() const { return balancing_; }
@@ -93,8 +97,8 @@ class ByCharge {
   plant::Random random_{17};
 };
 
-/// By voltage: every cell that reads 5 mV more than the lowest, while charging or at rest, from from_v on; turns as the
-/// firmware's.
+/// By voltage: every cell that reads 5 mV more than the lowest and more than from_v, while charging or at rest, in the
+/// same turns as the firmware.
 class ByVoltage {
  public:
   explicit ByVoltage(double from_v) : from_v_(from_v) {}
@@ -116,16 +120,16 @@ class ByVoltage {
 };
 
 struct BalancingFigures {
-  std::vector<double> spread;   ///< of soc when a charge ends, by day
-  std::vector<double> bled_ah;  ///< of all cells, by day
+  std::vector<double> spread;   ///< spread of soc at the end of each day's charge
+  std::vector<double> bled_ah;  ///< all cells, by day
 };
 
-/// When a truck is charged: just before it is driven, or as soon as it comes home.
+/// Time of charging: just before the truck drives, or right after it returns.
 enum class Habit { before_the_shift, after_the_shift };
 
-/// A day: driven down at 3 A till the first cell is at 10 % or 4.5 Ah are drawn, and charged at 3 A until the first
-/// cell is at 3.6 V under current; ten hours of rest before the charge and a quarter of an hour after it, or the other
-/// way round.
+/// Simulates days. Each day the truck is discharged at 3 A until the first cell is at 10 % or 4.5 Ah are drawn, and
+/// charged at 3 A until the first cell reads 3.6 V under current. It rests ten hours before the charge and a quarter of
+/// an hour after it, or the other way round.
 inline BalancingFigures balance(BalancedPack p, const BleedRule& rule, int days,
                                 Habit habit = Habit::before_the_shift) {
   BalancingFigures f;
@@ -145,7 +149,10 @@ inline BalancingFigures balance(BalancedPack p, const BleedRule& rule, int days,
       for (double t = 0; t < seconds; t += step_s) step(0);
     };
     const auto lowest = [&] { return *std::min_element(p.soc.begin(), p.soc.end()); };
-    while (lowest() > 0.1 && drawn_ah < 4.5) step(-3), drawn_ah += 3 * step_s / 3'600;
+    while (lowest() > 0.1 && drawn_ah < 4.5) {
+      step(-3);
+      drawn_ah += 3 * step_s / 3'600;
+    }
     rest(habit == Habit::before_the_shift ? 36'000 : 900);
     const auto highest_v = [&] {
       double v = 0;

@@ -14,46 +14,46 @@ double sum(const std::vector<double>& v, std::size_t from, std::size_t to) {
                          0.0);
 }
 
-TEST(BalancingByCharge, BringsFourPercentOfSpreadBelowTwoWithinTenDaysAndRests) {
+TEST(BalancingByCharge, ReducesASpreadOfFourPercentBelowTwoInTenDaysAndThenStops) {
   const BalancingFigures f = balance(pack_out_of_balance(1, 0), ByCharge(0.002), 40);
   EXPECT_GT(f.spread.front(), 0.04);
-  EXPECT_LT(f.spread[10], 0.02);  // dead band 0.5 %, two sigma of each cell 0.8 %, what the estimate is off 0.4 %
+  EXPECT_LT(f.spread[10], 0.02);  // dead band 0.5 %, two sigma of each cell 0.8 %, error of the estimate 0.4 %
   EXPECT_LT(f.spread.back(), 0.02);
-  EXPECT_EQ(sum(f.bled_ah, 20, 40), 0) << "in balance nothing is bled";
+  EXPECT_EQ(sum(f.bled_ah, 20, 40), 0) << "a balanced pack is not bled";
 }
 
-TEST(BalancingByCharge, DoesNotChaseACellOfLessCapacity) {
+TEST(BalancingByCharge, DoesNotBleedForACellWithLessCapacity) {
   const BalancingFigures f = balance(pack_out_of_balance(2, 0.1), ByCharge(0.002), 60);
   EXPECT_LT(f.spread.back(), 0.025);
   EXPECT_EQ(sum(f.bled_ah, 30, 60), 0);
 }
 
-TEST(BalancingByCharge, BeatsVoltageOnThePlateau) {
+TEST(BalancingByCharge, IsBetterThanVoltageOnThePlateau) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const auto pack = pack_out_of_balance(seed, 0.1);
     const BalancingFigures charge = balance(pack, ByCharge(0.002), 60), anywhere = balance(pack, ByVoltage(0), 60),
                            top = balance(pack, ByVoltage(3.4), 60);
     EXPECT_LT(charge.spread.back(), 0.5 * anywhere.spread.back()) << seed;
     EXPECT_LT(sum(charge.bled_ah, 0, 60), 0.2 * sum(anywhere.bled_ah, 0, 60)) << seed;
-    EXPECT_GT(sum(anywhere.bled_ah, 50, 60), 0.05) << "for ever";
-    EXPECT_LT(charge.spread[5], 0.5 * top.spread[5]) << seed << ": faster than in the minutes above the knee";
+    EXPECT_GT(sum(anywhere.bled_ah, 50, 60), 0.05) << "bleeds permanently";
+    EXPECT_LT(charge.spread[5], 0.5 * top.spread[5]) << seed << ": faster than above the knee";
     EXPECT_LT(sum(charge.bled_ah, 0, 60), 0.2 * sum(top.bled_ah, 0, 60)) << seed;
   }
 }
 
-TEST(BalancingByCharge, TakesNextToNothingFromAPackInBalanceHoweverWrongTheEstimate) {
+TEST(BalancingByCharge, BleedsAlmostNothingInABalancedPackWithAnyErrorOfTheEstimate) {
   for (const double sigma : {0.002, 0.0099, 0.03}) {
     BalancedPack p = pack_out_of_balance(3, 0);
     p.soc.fill(0.5);
     p.capacity_ah.fill(6);
     const BalancingFigures f = balance(p, ByCharge(sigma), 30);
-    // at 1 % the lowest of sixteen is sometimes 4.5 sigma below the highest; cells lose 2 to 3 % a month by
-    // themselves, 2.4 Ah
-    EXPECT_LE(sum(f.bled_ah, 0, 30), sigma > 0.01 || sigma < 0.005 ? 0.0 : 0.8) << sigma << ": in a month, from 96 Ah";
+    // At 1 % the lowest of sixteen is sometimes 4.5 sigma below the highest. For comparison, self-discharge is 2 to 3 %
+    // a month, 2.4 Ah.
+    EXPECT_LE(sum(f.bled_ah, 0, 30), sigma > 0.01 || sigma < 0.005 ? 0.0 : 0.8) << sigma << ": in a month, of 96 Ah";
   }
 }
 
-/// A balancer at the top of a charge, with the fourth cell 3 % and the sixth 4 % above the others.
+/// Balancing at the top of a charge: the fourth cell is 3 %, the sixth and seventh are 4 % above the others.
 struct AtTheTop {
   explicit AtTheTop(bool neighbours = false) : design(forklift) {
     design.neighbours_may_bleed = neighbours;
@@ -64,7 +64,13 @@ struct AtTheTop {
     sigma.fill(2'000'000);
   }
   std::uint32_t step(double seconds = 1) {
-    return balancing.update({uv, soc, sigma, mean_ppb, current_ua, warmest, allowed},
+    return balancing.update({.cell_uv = uv,
+                             .soc_ppb = soc,
+                             .sigma_ppb = sigma,
+                             .mean_soc_ppb = mean_ppb,
+                             .current_ua = current_ua,
+                             .highest_cdegc = warmest,
+                             .allowed = allowed},
                             static_cast<std::uint32_t>(1e6 * seconds));
   }
   std::uint32_t both_turns() {
@@ -80,11 +86,11 @@ struct AtTheTop {
   bool allowed = true;
 };
 
-TEST(Balancing, BleedsWhatIsAboveTheLowestByTwoSigmaAndTheDeadBand) {
+TEST(Balancing, BleedsCellsAboveTheLowestByTwoSigmaAndTheDeadBand) {
   AtTheTop b;
   EXPECT_EQ(b.both_turns(), 1U << 3 | 1U << 5 | 1U << 6);
   AtTheTop edge;
-  edge.soc[3] = 2 * (2'000'000 + 2'000'000) + 5'000'000;  // two sigma of each and the dead band
+  edge.soc[3] = 2 * (2'000'000 + 2'000'000) + 5'000'000;  // two sigma of each cell, and the dead band
   EXPECT_EQ(edge.both_turns(), 1U << 5 | 1U << 6);
   AtTheTop beyond;
   beyond.soc[3] = 2 * (2'000'000 + 2'000'000) + 5'000'001;
@@ -95,7 +101,7 @@ TEST(Balancing, BleedsWhatIsAboveTheLowestByTwoSigmaAndTheDeadBand) {
   EXPECT_EQ(unsure.both_turns(), 1U << 5 | 1U << 6);
 }
 
-TEST(Balancing, NeverBleedsNeighboursAtOnceUnlessTheDesignAllowsIt) {
+TEST(Balancing, NeverBleedsNeighboursTogetherUnlessTheDesignAllowsIt) {
   AtTheTop b;
   for (int k = 0; k < 100; ++k) {
     const std::uint32_t mask = b.step();
@@ -105,7 +111,7 @@ TEST(Balancing, NeverBleedsNeighboursAtOnceUnlessTheDesignAllowsIt) {
   EXPECT_EQ(free.step(), 1U << 3 | 1U << 5 | 1U << 6);
 }
 
-TEST(Balancing, StopsWhileDrivingWhenWarmWhenEmptyWhenForbiddenAndWhenNothingIsKnown) {
+TEST(Balancing, StopsWhileDrivingWhenWarmWhenEmptyWhenForbiddenAndWhenUnknown) {
   AtTheTop b(true);
   ASSERT_NE(b.step(), 0U);
   b.current_ua = -3'000'000;
@@ -129,16 +135,16 @@ TEST(Balancing, StopsWhileDrivingWhenWarmWhenEmptyWhenForbiddenAndWhenNothingIsK
   EXPECT_EQ(b.step(), 0U);
 }
 
-TEST(Balancing, GoesByItsLimitsToTheLastDigit) {
+TEST(Balancing, AppliesItsLimitsToTheLastDigit) {
   AtTheTop b(true);
   b.mean_ppb = 949'999'999;
   EXPECT_EQ(b.step(), 0U) << "below 95 %";
   b.mean_ppb = 950'000'000;
   b.current_ua = -120'001;
-  EXPECT_EQ(b.step(), 0U) << "a fiftieth of 1C is no rest any more";
+  EXPECT_EQ(b.step(), 0U) << "more than a fiftieth of 1C is not rest";
   b.current_ua = -120'000;
   b.sigma[9] = 10'000'000;
-  EXPECT_EQ(b.step(), 1U << 3 | 1U << 5 | 1U << 6) << "all known to 1 % is known";
+  EXPECT_EQ(b.step(), 1U << 3 | 1U << 5 | 1U << 6) << "sigma of 1 % is sufficient";
   b.sigma[9] = 2'000'000;
   b.warmest = 5'500;
   b.uv[3] = 2'990'000;
@@ -150,26 +156,35 @@ TEST(Balancing, GoesByItsLimitsToTheLastDigit) {
   b.mean_ppb = 850'000'000;
   b.step();
   b.mean_ppb = 950'000'000;
-  EXPECT_NE(b.step(), 0U) << "the same charge: measured once";
+  EXPECT_NE(b.step(), 0U) << "one measurement per charge";
   b.mean_ppb = 849'999'999;
   b.step();
   b.mean_ppb = 950'000'000;
-  EXPECT_EQ(b.step(), 0U) << "measured anew, they are level";
+  EXPECT_EQ(b.step(), 0U) << "measured again, the cells are level";
 }
 
-TEST(Balancing, OfThirtyTwoCellsEveryOtherHasItsTurnOfEightSeconds) {
+TEST(Balancing, GivesEverySecondOfThirtyTwoCellsATurnOfEightSeconds) {
   const BalancingPlan plan = balancing_plan(forklift);
   Balancing<32> balancing(plan);
   std::array<std::int32_t, 32> uv{}, soc{}, sigma{};
   uv.fill(3'330'000);
   soc.fill(30'000'000);
   soc[31] = 0;
-  const auto step = [&] { return balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 1'000'000); };
-  EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 7'999'999), 0x5555'5555U);
-  EXPECT_EQ(balancing.update({uv, soc, sigma, 960'000'000, 0, 2'500, true}, 1), 0x2AAA'AAAAU);
+  const auto step = [&](std::uint32_t step_us = 1'000'000) {
+    return balancing.update({.cell_uv = uv,
+                             .soc_ppb = soc,
+                             .sigma_ppb = sigma,
+                             .mean_soc_ppb = 960'000'000,
+                             .current_ua = 0,
+                             .highest_cdegc = 2'500,
+                             .allowed = true},
+                            step_us);
+  };
+  EXPECT_EQ(step(7'999'999), 0x5555'5555U);
+  EXPECT_EQ(step(1), 0x2AAA'AAAAU);
   std::uint32_t before = step();
   while (step() == before) {
-  }  // to the beginning of a turn
+  }  // until the beginning of a turn
   before = ~before & 0x7FFF'FFFFU;
   for (int turn = 0; turn < 6; ++turn) {
     ASSERT_TRUE(before == 0x5555'5555U || before == 0x2AAA'AAAAU) << std::hex << before;
@@ -179,20 +194,20 @@ TEST(Balancing, OfThirtyTwoCellsEveryOtherHasItsTurnOfEightSeconds) {
   }
 }
 
-TEST(Balancing, TellsNoTimeLeftOfNothingToBleedNorByAVoltageThatIsNotKnown) {
+TEST(Balancing, ReportsNoRemainingTimeWithoutChargeToBleedOrWithoutAVoltage) {
   AtTheTop b(true);
-  EXPECT_EQ(b.balancing.left_s(3'330'000), 0U) << "nothing was measured yet";
+  EXPECT_EQ(b.balancing.left_s(3'330'000), 0U) << "not measured yet";
   b.step();
-  EXPECT_NEAR(b.balancing.left_s(3'330'000), 32e-3 * 6 * 3'600 / (3.33 / 33), 5) << "all at once: no turns to wait for";
+  EXPECT_NEAR(b.balancing.left_s(3'330'000), 32e-3 * 6 * 3'600 / (3.33 / 33), 5) << "all together, without turns";
   EXPECT_EQ(b.balancing.left_s(measurement::no_reading), 0U);
   EXPECT_EQ(b.balancing.left_s(0), 0U);
-  EXPECT_EQ(b.balancing.left_s(1), b.balancing.left_s(33)) << "less than a microampere is taken for one";
+  EXPECT_EQ(b.balancing.left_s(1), b.balancing.left_s(33)) << "the current is at least a microampere";
   b.step(60);
-  for (int k = 0; k < 1'000; ++k) b.step(60);  // ends in the middle of a step: a little more than planned
+  for (int k = 0; k < 1'000; ++k) b.step(60);  // ends within a step, so slightly more charge is bled
   EXPECT_EQ(b.balancing.left_s(3'330'000), 0U);
 }
 
-TEST(Balancing, TellsNoMoreTimeThanItHasDigitsFor) {
+TEST(Balancing, SaturatesTheRemainingTime) {
   AtTheTop b;
   b.plan.uams_per_ppb *= 100;
   b.soc[5] = 900'000'000;
@@ -200,23 +215,23 @@ TEST(Balancing, TellsNoMoreTimeThanItHasDigitsFor) {
   EXPECT_EQ(b.balancing.left_s(1), 0xFFFF'FFFFU);
 }
 
-TEST(Balancing, CountsTheTimeThatACellWasBledAndNoOther) {
-  AtTheTop whole(true), odd(true);
-  whole.step();
+TEST(Balancing, CountsOnlyTheTimeInWhichACellWasBled) {
+  AtTheTop even(true), odd(true);
+  even.step();
   odd.step();
-  for (int k = 0; k < 2'000; ++k) whole.step(0.1);
-  for (int k = 0; k < 1'998; ++k) odd.step(0.1001);  // parts of milliseconds add up
-  EXPECT_NEAR(whole.balancing.left_s(3'330'000), odd.balancing.left_s(3'330'000), 1);
+  for (int k = 0; k < 2'000; ++k) even.step(0.1);
+  for (int k = 0; k < 1'998; ++k) odd.step(0.1001);  // fractions of milliseconds add up
+  EXPECT_NEAR(even.balancing.left_s(3'330'000), odd.balancing.left_s(3'330'000), 1);
   const std::uint32_t left_s = odd.balancing.left_s(3'330'000);
   odd.balancing.stop();
   odd.step(3'600);
-  EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "the bleeders were off meanwhile";
+  EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "the resistors were off";
   odd.uv.fill(measurement::no_reading);
   odd.step(3'600);
-  EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "how much it was is not known";
+  EXPECT_EQ(odd.balancing.left_s(3'330'000), left_s) << "the bled charge is unknown";
 }
 
-TEST(Balancing, RoundsWhatItKnowsOfThePackToTheNearestAndTakesAResistorForAnOhmAtLeast) {
+TEST(Balancing, RoundsTheDesignAndAssumesAtLeastOneOhm) {
   PackDesign d = forklift;
   d.bleed_ohm = 32.6;
   d.capacity_ah = 1.00015;
@@ -227,10 +242,10 @@ TEST(Balancing, RoundsWhatItKnowsOfThePackToTheNearestAndTakesAResistorForAnOhmA
   EXPECT_EQ(balancing_plan(d).bleed_ohm, 32);
   EXPECT_EQ(balancing_plan(d).uams_per_ppb, 3'600) << "3600.36 As";
   d.bleed_ohm = 0.2;
-  EXPECT_EQ(balancing_plan(d).bleed_ohm, 1) << "it is divided by";
+  EXPECT_EQ(balancing_plan(d).bleed_ohm, 1) << "it is a divisor";
 }
 
-TEST(Balancing, MeasuresNothingBelowTheTopNorWithACellThatIsNotKnown) {
+TEST(Balancing, MeasuresNothingBelowTheTopNorWithAnUnknownCell) {
   AtTheTop b;
   b.mean_ppb = 940'000'000;
   EXPECT_EQ(b.both_turns(), 0U);
@@ -245,13 +260,14 @@ TEST(Balancing, MeasuresNothingBelowTheTopNorWithACellThatIsNotKnown) {
   b.both_turns();
   b.current_ua = 0;
   b.mean_ppb = 940'000'000;
-  EXPECT_EQ(b.both_turns(), 0U) << "not while current flows out";
+  EXPECT_EQ(b.both_turns(), 0U) << "not while discharging";
 }
 
-TEST(Balancing, BleedsTheChargeThatItMeasuredAndNoMoreUntilTheNextCharge) {
+TEST(Balancing, BleedsTheMeasuredChargeAndNoMoreUntilTheNextCharge) {
   AtTheTop b;
   const double sure_ppb = 40'000'000 - 8'000'000, expected_as = sure_ppb * 1e-9 * 6 * 3'600;  // 0.204 Ah
-  const double left_at_first_s = (b.step(), b.balancing.left_s(3'330'000));
+  b.step();
+  const double left_at_first_s = b.balancing.left_s(3'330'000);
   EXPECT_NEAR(left_at_first_s, 2 * expected_as / (3.33 / 33), 20);
   double bled_as = 0, seconds = 0;
   while (b.balancing.left_s(3'330'000) > 0 && seconds < 40'000) {
@@ -260,7 +276,7 @@ TEST(Balancing, BleedsTheChargeThatItMeasuredAndNoMoreUntilTheNextCharge) {
   }
   EXPECT_NEAR(bled_as, expected_as, 0.3);
   EXPECT_NEAR(seconds, left_at_first_s, 20);
-  EXPECT_EQ(b.both_turns(), 0U) << "the estimate has not moved, and nothing is measured twice";
+  EXPECT_EQ(b.both_turns(), 0U) << "one measurement per charge";
   b.mean_ppb = 800'000'000;
   b.step();
   b.mean_ppb = 960'000'000;

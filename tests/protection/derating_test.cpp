@@ -36,85 +36,86 @@ DeratingInput with(void (*change)(DeratingInput&)) {
   return in;
 }
 
-/// Hand-reckoned from the ramps' words: span 1.65 V, -20 to 60 degrees C, 6 A.
-TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
-  const Point points[] = {
-      {"nothing near", good, 6, 6},
-      {"full at 6 % of the span below the top", with([](auto& i) { i.highest_cell_uv = 3'551'000; }), 6, 6},
-      {"half way to the top", with([](auto& i) { i.highest_cell_uv = 3'600'500; }), 3, 6},
-      {"at the top", with([](auto& i) { i.highest_cell_uv = 3'650'000; }), 0, 6},
-      {"above it", with([](auto& i) { i.highest_cell_uv = 3'900'000; }), 0, 6},
-      {"30 % of the span above the bottom", with([](auto& i) { i.lowest_cell_uv = 2'495'000; }), 6, 6},
-      {"half of that", with([](auto& i) { i.lowest_cell_uv = 2'247'500; }), 6, 3},
-      {"at the bottom", with([](auto& i) { i.lowest_cell_uv = 2'000'000; }), 6, 0},
-      {"freezing", with([](auto& i) { i.lowest_cdegc = 0; }), 0, 6},
-      {"5 degrees", with([](auto& i) { i.lowest_cdegc = 500; }), 3, 6},
-      {"10 degrees", with([](auto& i) { i.lowest_cdegc = 1'000; }), 6, 6},
-      {"-12.5 degrees", with([](auto& i) { i.lowest_cdegc = -1'250; }), 0, 3},
-      {"40 degrees", with([](auto& i) { i.highest_cdegc = 4'000; }), 6, 6},
-      {"42.5 degrees", with([](auto& i) { i.highest_cdegc = 4'250; }), 3, 6},
-      {"45 degrees", with([](auto& i) { i.highest_cdegc = 4'500; }), 0, 6},
-      {"55 degrees", with([](auto& i) { i.highest_cdegc = 5'500; }), 0, 3},
-      {"95 %", with([](auto& i) { i.soc_ppb = 950'000'000; }), 6, 6},
-      {"100 %: a fifth is left", with([](auto& i) { i.soc_ppb = 1'000'000'000; }), 1.2, 6},
-      {"120 %", with([](auto& i) { i.soc_ppb = 1'200'000'000; }), 1.2, 6},
-      {"10 %", with([](auto& i) { i.soc_ppb = 100'000'000; }), 6, 6},
-      {"0 %: a fifth is left", with([](auto& i) { i.soc_ppb = 0; }), 6, 1.2},
-      {"10 % known to 5 %", with([](auto& i) {
-         i.soc_ppb = 100'000'000;
-         i.soc_sigma_ppb = 50'000'000;
-       }),
-       6, 3.6},
-      {"95 % known to 2.5 %", with([](auto& i) {
-         i.soc_ppb = 950'000'000;
-         i.soc_sigma_ppb = 25'000'000;
-       }),
-       3.6, 6},
-      {"40 % known to 60 %", with([](auto& i) {
-         i.soc_ppb = 400'000'000;
-         i.soc_sigma_ppb = 600'000'000;
-       }),
-       1.2, 1.2},
-      {"any soc, known to nothing", with([](auto& i) { i.soc_sigma_ppb = 2'000'000'000; }), 1.2, 1.2},
-      {"210 % known to nothing", with([](auto& i) {
-         i.soc_ppb = 2'100'000'000;
-         i.soc_sigma_ppb = 2'100'000'000;
-       }),
-       1.2, 1.2},
-      {"-200 % known to nothing", with([](auto& i) {
-         i.soc_ppb = -2'000'000'000;
-         i.soc_sigma_ppb = 2'000'000'000;
-       }),
-       1.2, 1.2},
-      {"95 % with a sigma that cannot be", with([](auto& i) {
-         i.soc_ppb = 950'000'000;
-         i.soc_sigma_ppb = -50'000'000;
-       }),
-       6, 6},
-      {"soc not known", with([](auto& i) { i.soc_ppb = measurement::no_reading; }), 6, 6},
-      {"the model allows 2 A and 4 A", with([](auto& i) {
-         i.model_charge_ua = 2'000'000;
-         i.model_discharge_ua = 4'000'000;
-       }),
-       2, 4},
-      {"the model says less than nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = -1'000'000; }),
-       0, 0},
-      {"the model allows 2 A and a fault halves", with([](auto& i) {
-         i.model_charge_ua = 2'000'000;
-         i.derate = true;
-       }),
-       1, 3},
-      {"the model allows nothing", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = 0; }), 0, 0},
-      {"a fault halves", with([](auto& i) { i.derate = true; }), 3, 3},
-      {"charge forbidden", with([](auto& i) { i.charge_forbidden = true; }), 0, 6},
-      {"discharge forbidden", with([](auto& i) { i.discharge_forbidden = true; }), 6, 0},
-      {"no temperature", with([](auto& i) { i.highest_cdegc = i.lowest_cdegc = measurement::no_reading; }), 0, 3},
-  };
+/// Calculated by hand from the ramps: span 1.65 V, -20 to 60 degrees C, 6 A.
+const Point points[] = {
+    {"far from all limits", good, 6, 6},
+    {"6 % of the span below the upper limit", with([](auto& i) { i.highest_cell_uv = 3'551'000; }), 6, 6},
+    {"3 % below the upper limit", with([](auto& i) { i.highest_cell_uv = 3'600'500; }), 3, 6},
+    {"at the upper limit", with([](auto& i) { i.highest_cell_uv = 3'650'000; }), 0, 6},
+    {"above it", with([](auto& i) { i.highest_cell_uv = 3'900'000; }), 0, 6},
+    {"30 % of the span above the lower limit", with([](auto& i) { i.lowest_cell_uv = 2'495'000; }), 6, 6},
+    {"15 % above the lower limit", with([](auto& i) { i.lowest_cell_uv = 2'247'500; }), 6, 3},
+    {"at the lower limit", with([](auto& i) { i.lowest_cell_uv = 2'000'000; }), 6, 0},
+    {"freezing", with([](auto& i) { i.lowest_cdegc = 0; }), 0, 6},
+    {"5 degrees", with([](auto& i) { i.lowest_cdegc = 500; }), 3, 6},
+    {"10 degrees", with([](auto& i) { i.lowest_cdegc = 1'000; }), 6, 6},
+    {"-12.5 degrees", with([](auto& i) { i.lowest_cdegc = -1'250; }), 0, 3},
+    {"40 degrees", with([](auto& i) { i.highest_cdegc = 4'000; }), 6, 6},
+    {"42.5 degrees", with([](auto& i) { i.highest_cdegc = 4'250; }), 3, 6},
+    {"45 degrees", with([](auto& i) { i.highest_cdegc = 4'500; }), 0, 6},
+    {"55 degrees", with([](auto& i) { i.highest_cdegc = 5'500; }), 0, 3},
+    {"95 %", with([](auto& i) { i.soc_ppb = 950'000'000; }), 6, 6},
+    {"100 %: a fifth remains", with([](auto& i) { i.soc_ppb = 1'000'000'000; }), 1.2, 6},
+    {"120 %", with([](auto& i) { i.soc_ppb = 1'200'000'000; }), 1.2, 6},
+    {"10 %", with([](auto& i) { i.soc_ppb = 100'000'000; }), 6, 6},
+    {"0 %: a fifth remains", with([](auto& i) { i.soc_ppb = 0; }), 6, 1.2},
+    {"10 %, sigma 5 %", with([](auto& i) {
+       i.soc_ppb = 100'000'000;
+       i.soc_sigma_ppb = 50'000'000;
+     }),
+     6, 3.6},
+    {"95 %, sigma 2.5 %", with([](auto& i) {
+       i.soc_ppb = 950'000'000;
+       i.soc_sigma_ppb = 25'000'000;
+     }),
+     3.6, 6},
+    {"40 %, sigma 60 %", with([](auto& i) {
+       i.soc_ppb = 400'000'000;
+       i.soc_sigma_ppb = 600'000'000;
+     }),
+     1.2, 1.2},
+    {"50 %, sigma 200 %", with([](auto& i) { i.soc_sigma_ppb = 2'000'000'000; }), 1.2, 1.2},
+    {"210 %, sigma 210 %", with([](auto& i) {
+       i.soc_ppb = 2'100'000'000;
+       i.soc_sigma_ppb = 2'100'000'000;
+     }),
+     1.2, 1.2},
+    {"-200 %, sigma 200 %", with([](auto& i) {
+       i.soc_ppb = -2'000'000'000;
+       i.soc_sigma_ppb = 2'000'000'000;
+     }),
+     1.2, 1.2},
+    {"95 %, negative sigma", with([](auto& i) {
+       i.soc_ppb = 950'000'000;
+       i.soc_sigma_ppb = -50'000'000;
+     }),
+     6, 6},
+    {"unknown soc", with([](auto& i) { i.soc_ppb = measurement::no_reading; }), 6, 6},
+    {"the model allows 2 A and 4 A", with([](auto& i) {
+       i.model_charge_ua = 2'000'000;
+       i.model_discharge_ua = 4'000'000;
+     }),
+     2, 4},
+    {"the model allows negative currents", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = -1'000'000; }),
+     0, 0},
+    {"the model allows 2 A, and a fault derates", with([](auto& i) {
+       i.model_charge_ua = 2'000'000;
+       i.derate = true;
+     }),
+     1, 3},
+    {"the model allows 0 A", with([](auto& i) { i.model_charge_ua = i.model_discharge_ua = 0; }), 0, 0},
+    {"a fault derates", with([](auto& i) { i.derate = true; }), 3, 3},
+    {"charge forbidden", with([](auto& i) { i.charge_forbidden = true; }), 0, 6},
+    {"discharge forbidden", with([](auto& i) { i.discharge_forbidden = true; }), 6, 0},
+    {"unknown temperature", with([](auto& i) { i.highest_cdegc = i.lowest_cdegc = measurement::no_reading; }), 0, 3},
+};
+
+TEST(Derating, RampsDownBeforeEachLimit) {
   for (const Point& p : points) {
     const AllowedCurrent a = steady_state(p.in);
     EXPECT_NEAR(a.charge_ua / 1e6, p.charge_a, 0.004) << p.what;  // less than 1/1024 of 6 A
     EXPECT_NEAR(a.discharge_ua / 1e6, p.discharge_a, 0.004) << p.what;
-    // all is all, and nothing is nothing
+    // The full current and 0 are exact.
     if (p.charge_a == 0 || p.charge_a == 6) {
       EXPECT_EQ(a.charge_ua, 1e6 * p.charge_a) << p.what;
     }
@@ -124,7 +125,7 @@ TEST(Derating, RampsDownBeforeEachLimitAsItsWordsSay) {
   }
 }
 
-TEST(Derating, MovesByNoMoreThanItsSlewWhateverComes) {
+TEST(Derating, NeverExceedsItsSlewRate) {
   plant::Random random(5);
   Derating d(plan6a);
   AllowedCurrent before;
@@ -133,17 +134,15 @@ TEST(Derating, MovesByNoMoreThanItsSlewWhateverComes) {
                                    : low + static_cast<std::int32_t>(random.uniform() * (high - low));
   };
   for (int k = 0; k < 20'000; ++k) {
-    DeratingInput in{any(1'000'000, 4'000'000),
-                     any(1'000'000, 4'000'000),
-                     any(-3'000, 7'000),
-                     any(-3'000, 7'000),
-                     any(-200'000'000, 1'200'000'000),
-                     any(0, 900'000'000),
-                     any(0, 10'000'000),
-                     any(0, 10'000'000),
-                     random.uniform() < 0.3,
-                     false,
-                     false};
+    DeratingInput in{.highest_cell_uv = any(1'000'000, 4'000'000),
+                     .lowest_cell_uv = any(1'000'000, 4'000'000),
+                     .highest_cdegc = any(-3'000, 7'000),
+                     .lowest_cdegc = any(-3'000, 7'000),
+                     .soc_ppb = any(-200'000'000, 1'200'000'000),
+                     .soc_sigma_ppb = any(0, 900'000'000),
+                     .model_charge_ua = any(0, 10'000'000),
+                     .model_discharge_ua = any(0, 10'000'000),
+                     .derate = random.uniform() < 0.3};
     const std::uint32_t step_us = static_cast<std::uint32_t>(random.uniform() * 200'000);
     const AllowedCurrent now = d.update(in, step_us);
     const double down_a = 6 * step_us * 1e-6 + 2e-6, up_a = down_a / 5 + 2e-6;
@@ -158,7 +157,7 @@ TEST(Derating, MovesByNoMoreThanItsSlewWhateverComes) {
   }
 }
 
-TEST(Derating, IsContinuousInWhatItGoesBy) {
+TEST(Derating, IsContinuousInItsInputs) {
   const auto sweep = [](std::int32_t DeratingInput::*field, std::int32_t from, std::int32_t to, std::int32_t step) {
     DeratingInput in = good;
     in.*field = from;
@@ -178,8 +177,8 @@ TEST(Derating, IsContinuousInWhatItGoesBy) {
   sweep(&DeratingInput::soc_ppb, -100'000'000, 1'100'000'000, 1'000'000);
 }
 
-/// A second is 2^20 us there: 5 % slower.
-TEST(Derating, GoesDownInASecondAndUpInFive) {
+/// Derating counts 2^20 us as a second, which is 5 % slower.
+TEST(Derating, DecreasesInASecondAndIncreasesInFive) {
   for (const auto& [derate_again, expected_s] : {std::pair{false, 2.5 * 1.05}, std::pair{true, 0.5 * 1.05}}) {
     Derating d(plan6a);
     DeratingInput in = good;
@@ -191,11 +190,11 @@ TEST(Derating, GoesDownInASecondAndUpInFive) {
     EXPECT_NEAR(took_s, expected_s, 0.02);
   }
   Derating d(plan6a);
-  EXPECT_EQ(d.update(good, 60'000'000).charge_ua, 1'200'000) << "a minute without a step is no more than a second";
+  EXPECT_EQ(d.update(good, 60'000'000).charge_ua, 1'200'000) << "a step of a minute counts as a second";
 }
 
-/// Of a cell that charges and discharges at different rates, and of one that may not freeze at all.
-TEST(Derating, OfAnotherCellGoesByItsOwnLimits) {
+/// A cell with different limits for charge and discharge, and a minimum temperature above freezing.
+TEST(Derating, OfAnotherCellUsesItsLimits) {
   PackDesign design = forklift;
   design.limits = {.voltage_min_v = 2.5,
                    .voltage_max_v = 4.2,
@@ -214,7 +213,7 @@ TEST(Derating, OfAnotherCellGoesByItsOwnLimits) {
   EXPECT_EQ(allowed(in).charge_ua, 1'500'000);
   EXPECT_EQ(allowed(in).discharge_ua, 3'000'000);
   in.lowest_cdegc = 500;
-  EXPECT_EQ(allowed(in).charge_ua, 0) << "charged from its own lowest temperature on";
+  EXPECT_EQ(allowed(in).charge_ua, 0) << "charging starts above its own minimum temperature";
   EXPECT_EQ(allowed(in).discharge_ua, 0);
   in.lowest_cdegc = 1'000;
   EXPECT_NEAR(allowed(in).charge_ua, 750'000, 2'000);
@@ -227,7 +226,7 @@ TEST(Derating, ForbidsAtOnceAndAllowsSlowly) {
   DeratingInput in = good;
   in.charge_forbidden = true;
   EXPECT_EQ(d.update(in, 100'000).charge_ua, 0);
-  EXPECT_NEAR(d.update(good, 100'000).charge_ua, 120'000, 10'000) << "five seconds back to full";
+  EXPECT_NEAR(d.update(good, 100'000).charge_ua, 120'000, 10'000) << "full current after five seconds";
 }
 
 }  // namespace

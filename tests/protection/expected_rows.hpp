@@ -1,5 +1,5 @@
-// What the table has to say for sixteen cells of the paper's kind (2.0 to 3.65 V, 6 A, -20 to 60 degrees C, sampled ten
-// times a second), reckoned by hand from its words: a table entry that is wrong differs from this.
+// Expected table for sixteen cells of the paper's kind (2.0 to 3.65 V, 6 A, -20 to 60 degrees C, ten samples per
+// second), calculated by hand, so that a wrong table entry differs.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ inline constexpr PackDesign forklift{.limits = table9_limits, .capacity_ah = 6, 
 
 struct ExpectedRow {
   const char* name;
-  const char* signal;  ///< in frame Faults
+  const char* signal;  ///< signal of frame Faults
   char beyond;         ///< '>' or '<'
   std::int32_t threshold;
   int delay_ms;

@@ -1,5 +1,5 @@
-// What faults there have to be, found another way: quantities straight from their definitions, delays from the whole
-// history, numbers from expected_rows.hpp. In integers of milliseconds and micro-units, so that equal means equal.
+// Faults that must be active, computed independently: quantities from their definitions, delays from the whole history,
+// numbers from expected_rows.hpp. Integers of milliseconds and micro-units, so results can be compared exactly.
 #pragma once
 
 #include <algorithm>
@@ -17,39 +17,48 @@ namespace bms::protection {
 
 using Value = std::optional<std::int64_t>;
 
-/// One row over the samples of its quantity. Score: milliseconds beyond less milliseconds not beyond since it last was
-/// at 0, counted from the first sample beyond; the fault is there when it reaches the delay.
+/// Oracle of one row over the samples of its quantity. Score: milliseconds beyond minus milliseconds not beyond the
+/// threshold since it was last 0, from the first sample beyond. The fault is raised when the score reaches the delay.
 class RowOracle {
  public:
   explicit RowOracle(const ExpectedRow& row) : row_(&row) {}
 
-  /// cleared: a clear command that could end it came with this sample.
+  /// cleared: a clear command that may end the fault came with this sample.
   bool check(Value value, int step_ms, bool cleared) {
-    if (!value) return there_;
-    if (!there_) {
+    if (!value) return active_;
+    if (!active_) {
       const bool beyond = row_->beyond == '>' ? *value > row_->threshold : *value < row_->threshold;
       if (score_ < 0)
         score_ = beyond ? 0 : -1;
       else
         score_ += beyond ? step_ms : -step_ms;
       if (score_ <= 0 && !beyond) score_ = -1;
-      if (score_ >= row_->delay_ms) there_ = true, good_ms_ = -1;
-      return there_;
+      if (score_ >= row_->delay_ms) {
+        active_ = true;
+        good_ms_ = -1;
+      }
+      return active_;
     }
     const bool good = row_->beyond == '>' ? *value <= row_->release : *value >= row_->release;
-    good_ms_ = !good ? -1 : good_ms_ < 0 ? 0 : good_ms_ + step_ms;
-    if (good_ms_ >= row_->recover_ms && (row_->recovery == 'a' || cleared)) there_ = false, score_ = -1;
-    return there_;
+    if (!good)
+      good_ms_ = -1;
+    else
+      good_ms_ = good_ms_ < 0 ? 0 : good_ms_ + step_ms;
+    if (good_ms_ >= row_->recover_ms && (row_->recovery == 'a' || cleared)) {
+      active_ = false;
+      score_ = -1;
+    }
+    return active_;
   }
 
  private:
   const ExpectedRow* row_;
   int score_ = -1, good_ms_ = -1;
-  bool there_ = false;
+  bool active_ = false;
 };
 
-/// The quantity of every row, from samples of sixteen cells and four temperatures. Rows of heat and of contactors are
-/// not told (nullopt).
+/// Quantity of every row, from samples of sixteen cells and four temperatures; nullopt for rows of overload integrals
+/// and contactors.
 class QuantityOracle {
  public:
   using Sample16 = measurement::PackSample<16>;
@@ -91,7 +100,7 @@ class QuantityOracle {
   }
 
  private:
-  /// From half a volt reversed to six.
+  /// From -0.5 V (reversed) to 6 V.
   static bool readable(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
 
   static Value largest(const std::vector<std::int64_t>& v) {
@@ -104,7 +113,9 @@ class QuantityOracle {
   static Value shift(const Sample16& s) {
     std::int64_t sum = 0, n = 0;
     for (const std::int32_t v : s.cell_uv) {
-      if (readable(v)) sum += v, ++n;
+      if (!readable(v)) continue;
+      sum += v;
+      ++n;
     }
     if (n == 0) return {};
     const std::int64_t mean = sum / n;
@@ -121,7 +132,7 @@ class QuantityOracle {
     return most;
   }
 
-  /// Mean of the cells but the highest and the lowest.
+  /// Mean of the cells without the highest and the lowest.
   static std::int64_t middle(const Sample16& s) {
     std::vector<std::int64_t> v;
     for (const std::int32_t uv : s.cell_uv) {
@@ -151,8 +162,9 @@ class QuantityOracle {
       const auto others = [&](std::size_t i) {
         std::int64_t sum = 0, n = 0;
         for (std::size_t o = 0; o < 4; ++o) {
-          if (o != k && history_[i].temperature_cdegc[o] != measurement::no_temperature)
-            sum += history_[i].temperature_cdegc[o], ++n;
+          if (o == k || history_[i].temperature_cdegc[o] == measurement::no_temperature) continue;
+          sum += history_[i].temperature_cdegc[o];
+          ++n;
         }
         return n > 0 ? sum / n : 0;
       };
@@ -163,8 +175,7 @@ class QuantityOracle {
     }
     return count;
   }
-  /// The last readings that are there are all the same, six or more, and the others are elsewhere than at the first of
-  /// them.
+  /// Returns true if the last six or more known readings are equal and the others have moved since the first of them.
   template <class Reading, class There, class Others>
   bool stuck(const Reading& reading, const There& there, const Others& others, std::int64_t move) const {
     const std::size_t last = history_.size() - 1;

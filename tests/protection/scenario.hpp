@@ -1,5 +1,5 @@
-// A thousand samples of a pack with everything happening to it, and what protection decides, as one number: the same on
-// host and board.
+// A thousand samples of a pack with many conditions and faults, and all decisions of the protection as one hash: equal
+// on host and board.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace bms::protection {
 
 inline constexpr ProtectionPlan scenario_plan = protection_plan(forklift);
 
-/// Integers only. A linear congruence is chance enough here (Numerical Recipes' constants).
+/// Integers only. Random numbers from a linear congruential generator (constants of Numerical Recipes).
 class Scenario {
  public:
   template <class Step>
@@ -48,7 +48,8 @@ class Scenario {
     sample.time_us = 100'000U * static_cast<std::uint64_t>(k);
     const bool closed = outputs_.main_plus;
     const std::int32_t ramp = (k % 200 < 100 ? k % 100 : 100 - k % 100) * 400;
-    sample.current_ua = (closed ? (k % 40 < 30 ? -4'000'000 : 2'000'000) : 0) + chance(30'000);
+    const std::int32_t load_ua = k % 40 < 30 ? -4'000'000 : 2'000'000;
+    sample.current_ua = (closed ? load_ua : 0) + chance(30'000);
     if (k > 700 && k < 760) sample.current_ua *= 3;
     std::int32_t sum = 0;
     for (std::size_t c = 0; c < 16; ++c) {
@@ -68,9 +69,12 @@ class Scenario {
     estimate.model_charge_ua = 5'000'000;
     estimate.model_discharge_ua = 5'500'000;
     inputs.request = k % 800 < 20 ? Request::none : Request::drive;
-    dc_link_uv_ = closed                                      ? sum
-                  : outputs_.precharge && outputs_.main_minus ? dc_link_uv_ + (sum - dc_link_uv_) / 5
-                                                              : dc_link_uv_ - dc_link_uv_ / 16;
+    if (closed)
+      dc_link_uv_ = sum;
+    else if (outputs_.precharge && outputs_.main_minus)
+      dc_link_uv_ += (sum - dc_link_uv_) / 5;
+    else
+      dc_link_uv_ -= dc_link_uv_ / 16;
     inputs.dc_link_uv = dc_link_uv_;
   }
 

@@ -1,5 +1,5 @@
-// Sixteen cells in a truck that drives, and every protection brought to a value there: the scenarios of the fault
-// matrix, for protection on this machine (fault_matrix_test.cpp) and for a board's image in the emulator
+// Sixteen cells in a driving truck, and a way to bring the quantity of every protection to a value: the cases of the
+// fault matrix, for protection on the host (sampled_protection_test.cpp) and for a board's image in the emulator
 // (tests/firmware/board_fault_matrix.hpp).
 #pragma once
 
@@ -21,7 +21,7 @@ inline constexpr std::uint32_t step_us = 100'000;
 
 constexpr bool has(std::uint32_t faults, std::size_t k) { return (faults >> k & 1) != 0; }
 
-/// A value that is good and one that is just beyond; noise: three sigma in the unit of the quantity.
+/// Values around a threshold. noise: three sigma. All in the unit of the quantity.
 struct Levels {
   std::int32_t good, just_below, just_above, noise;
 };
@@ -31,21 +31,25 @@ inline Levels levels(const ExpectedRow& e) {
   const std::int32_t noise = width / 4;
   return {e.release - sign * (width > 0 ? 1 : 0), e.threshold, e.threshold + sign, noise};
 }
-/// Three sigma of what is measured of row k, not of what its hysteresis could bear.
+/// Three sigma of the measurement noise of row k.
 constexpr std::int32_t measured_noise(std::size_t k) {
-  return k >= 11 && k <= 15 ? 15 : k == 10 ? 30'000 : k == 6 || k == 7 || k == 19 ? 60'000 : 3'000;
+  if (k >= 11 && k <= 15) return 15;                    // temperatures
+  if (k == 10) return 30'000;                           // current
+  return k == 6 || k == 7 || k == 19 ? 60'000 : 3'000;  // pack, cells
 }
 
-constexpr bool told_by_samples(std::size_t k) { return k < 26 && k != 8 && k != 9; }
-/// What stands still is found when the others have moved.
+/// Rows whose quantity comes from samples, without the overload integrals.
+
+constexpr bool visible_in_samples(std::size_t k) { return k < 26 && k != 8 && k != 9; }
+/// Stuck readings are detected only after the others have moved.
 constexpr bool waits_for_others(std::size_t k) { return k == 21 || k == 24; }
 
-/// What the pack measures while the contactors are as somebody wants them. Readings are off by noise of up to three
-/// sigma: 1 mV, 10 mA, 0.05 K, 20 mV over the pack.
+/// Measurements of a pack with given contactor states. The noise is limited to three sigma: sigma is 1 mV, 10 mA, 0.05
+/// K, 20 mV over the pack.
 class TruckPack {
  public:
   using Change = std::function<void(measurement::PackSample<16>&, PackEstimate<16>&, ExternalInputs&)>;
-  /// What there is to be measured of a cell, without noise.
+  /// True values of a cell.
   struct CellTrajectory {
     double current_ua, voltage_uv, temperature_cdegc;
   };
@@ -58,8 +62,8 @@ class TruckPack {
     estimate = PackEstimate<16>{};
     const bool closed = out.main_plus && out.main_minus;
     sample.time_us = step_ * step_us;
-    const double slow = std::abs(static_cast<double>(step_ % 400) - 200) /
-                        200;  // 0 .. 1 .. 0 in 40 s: the load moves all cells, and the air
+    // 0 .. 1 .. 0 in 40 s: the load changes all cells and the temperature.
+    const double slow = std::abs(static_cast<double>(step_ % 400) - 200) / 200;
     const CellTrajectory cell =
         trajectory.value_or(CellTrajectory{closed ? -2e6 - 1e6 * slow : 0, 3.30e6 - 60e3 * slow, 2'000 + 1'200 * slow});
     sample.current_ua = static_cast<std::int32_t>(cell.current_ua + 30e3 * chance());
@@ -98,7 +102,7 @@ class TruckPack {
   measurement::PackSample<16> sample;
   PackEstimate<16> estimate;
   ExternalInputs inputs;
-  std::optional<CellTrajectory> trajectory;  ///< instead of its own, of 40 s
+  std::optional<CellTrajectory> trajectory;  ///< replaces the built-in trajectory of 40 s
   std::int32_t pack_offset_uv = 0;
   bool pack_follows = true, noisy_pack = true;
 
@@ -108,21 +112,21 @@ class TruckPack {
   double dc_link_uv_ = 0;
 };
 
-/// What faults there have to be of all rows that samples tell but heat, sample after sample.
+/// Expected faults of the rows visible in samples.
 class TruckOracle {
  public:
-  /// A bit each; the others are 0.
+  /// Returns one bit per active fault; 0 for other rows.
   std::uint32_t check(const measurement::PackSample<16>& sample, bool voltage_rejected) {
     values = quantities_.check(sample, voltage_rejected);
     std::uint32_t there = 0;
     for (std::size_t k = 0; k < 26; ++k) {
-      if (told_by_samples(k) && rows_[k].check(values[k], step_ms, false)) there |= 1U << k;
+      if (visible_in_samples(k) && rows_[k].check(values[k], step_ms, false)) there |= 1U << k;
     }
     return there;
   }
   static constexpr std::uint32_t rows() {
     std::uint32_t all = 0;
-    for (std::size_t k = 0; k < 26; ++k) all |= told_by_samples(k) ? 1U << k : 0;
+    for (std::size_t k = 0; k < 26; ++k) all |= visible_in_samples(k) ? 1U << k : 0;
     return all;
   }
 
@@ -133,10 +137,8 @@ class TruckOracle {
   std::vector<RowOracle> rows_{std::begin(expected_rows), std::end(expected_rows)};
 };
 
-/// Brings the quantity of row k to a value, as the physics would; for rows that count, 1 for there and 0 for not. k:
-/// told by samples.
-inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurement::PackSample<16>& s,
-                   PackEstimate<16>& e) {
+/// Sets the readings of cells and pack so that the quantity of row k has the value.
+inline void inject_voltage(std::size_t k, std::int32_t value, TruckPack& truck, measurement::PackSample<16>& s) {
   switch (k) {
     case 0:
     case 1:
@@ -155,18 +157,6 @@ inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurem
       s.pack_uv = value;
       truck.pack_follows = false;
       break;
-    case 10:
-      s.current_ua = -value;
-      break;
-    case 11:
-    case 12:
-    case 13:
-      s.temperature_cdegc[1] = static_cast<std::int16_t>(value);
-      break;
-    case 14:
-    case 15:
-      s.temperature_cdegc[3] = static_cast<std::int16_t>(value);
-      break;
     case 16:
       for (auto& uv : s.cell_uv) uv = 3'300'000 + (s.time_us / step_us % 2 == 0 ? 1'000 : -1'000);
       s.cell_uv[7] = s.cell_uv[0] - value;
@@ -179,9 +169,6 @@ inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurem
         if (c != 2 && c != 9) s.cell_uv[c] = s.cell_uv[0] + static_cast<std::int32_t>(c);
       }
       break;
-    case 18:
-      e.voltage_rejected = value > 0;
-      break;
     case 19:
       truck.pack_offset_uv = -value;
       truck.noisy_pack = false;
@@ -191,6 +178,31 @@ inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurem
       break;
     case 21:
       if (value > 0) s.cell_uv[13] = 3'287'654;
+      break;
+    default:
+      std::abort();
+  }
+}
+
+/// Sets readings so that the quantity of row k has the value; for rows that count readings, 1 raises the fault and 0
+/// does not. k: visible_in_samples().
+inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurement::PackSample<16>& s,
+                   PackEstimate<16>& e) {
+  switch (k) {
+    case 10:
+      s.current_ua = -value;
+      break;
+    case 11:
+    case 12:
+    case 13:
+      s.temperature_cdegc[1] = static_cast<std::int16_t>(value);
+      break;
+    case 14:
+    case 15:
+      s.temperature_cdegc[3] = static_cast<std::int16_t>(value);
+      break;
+    case 18:
+      e.voltage_rejected = value > 0;
       break;
     case 22:
       if (value > 0) s.current_ua = measurement::no_reading;
@@ -202,7 +214,7 @@ inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurem
       if (value > 0) s.temperature_cdegc[0] = 2'345;
       break;
     default:
-      std::abort();
+      inject_voltage(k, value, truck, s);
   }
 }
 

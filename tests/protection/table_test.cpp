@@ -19,7 +19,7 @@ constexpr Table table = protection_table(forklift);
 static_assert(consistent(rules_of(table)));
 static_assert(std::size(expected_rows) == fault_count);
 
-TEST(ProtectionTable, SaysWhatWasReckonedByHandForThePapersCell) {
+TEST(ProtectionTable, EqualsTheValuesCalculatedByHandForThePapersCell) {
   for (std::size_t k = 0; k < fault_count; ++k) {
     const ExpectedRow& e = expected_rows[k];
     const Rule& r = table[k].rule;
@@ -29,11 +29,8 @@ TEST(ProtectionTable, SaysWhatWasReckonedByHandForThePapersCell) {
     EXPECT_EQ(r.delay_us, 1'000U * static_cast<unsigned>(e.delay_ms)) << e.name;
     EXPECT_EQ(r.release, e.release) << e.name;
     EXPECT_EQ(r.recover_us, 1'000U * static_cast<unsigned>(e.recover_ms)) << e.name;
-    EXPECT_EQ(r.recovery == Recovery::automatic  ? 'a'
-              : r.recovery == Recovery::on_clear ? 'c'
-                                                 : 's',
-              e.recovery)
-        << e.name;
+    constexpr char recovery_letters[] = {'a', 'c', 's'};  // in the order of Recovery
+    EXPECT_EQ(recovery_letters[static_cast<std::size_t>(r.recovery)], e.recovery) << e.name;
     EXPECT_STREQ(text_of(r.reaction), e.reaction) << e.name;
     EXPECT_GT(std::string(table[k].why).size(), 5U) << e.name << " has no reason for its delay";
   }
@@ -61,20 +58,20 @@ TEST(ProtectionTable, IsConsistentForAnyCellAndNumberOfCells) {
   }
 }
 
-TEST(ProtectionTable, IsToldFromOneThatContradictsItself) {
+TEST(ProtectionTable, IsConsistentAndAContradictionIsDetected) {
   for (std::size_t k = 0; k < fault_count; ++k) {
     Rules rules = rules_of(table);
     ASSERT_TRUE(consistent(rules));
     rules[k].release = rules[k].threshold + (rules[k].sense == Sense::above ? 1 : -1);
-    EXPECT_FALSE(consistent(rules)) << name_of(rules[k].fault) << " would go before it comes";
+    EXPECT_FALSE(consistent(rules)) << name_of(rules[k].fault) << " would be released before it is raised";
     rules[k].release = rules[k].threshold;
     EXPECT_TRUE(consistent(rules)) << name_of(rules[k].fault);
     rules[k].fault = static_cast<Fault>((k + 1) % fault_count);
-    EXPECT_FALSE(consistent(rules)) << name_of(table[k].rule.fault) << " would raise another's bit";
+    EXPECT_FALSE(consistent(rules)) << name_of(table[k].rule.fault) << " would raise the bit of another fault";
   }
 }
 
-TEST(ProtectionTable, SaysWhichFaultsHaveAReactionOrARecovery) {
+TEST(ProtectionTable, GivesTheFaultsOfEachReactionAndRecovery) {
   const Rules rules = rules_of(table);
   std::uint32_t by_reaction = 0, by_recovery = 0;
   for (const Reaction r : {Reaction::warn, Reaction::derate, Reaction::forbid_charge, Reaction::forbid_discharge,
@@ -90,8 +87,8 @@ TEST(ProtectionTable, SaysWhichFaultsHaveAReactionOrARecovery) {
   EXPECT_EQ(by_recovery, 0xFFFF'FFFFU);
 }
 
-/// Half of the last digit is half, whichever the sign.
-TEST(IntegersOfAPack, AreTheNearest) {
+/// Rounding is symmetric for both signs.
+TEST(IntegersOfAPack, AreRounded) {
   for (const double sign : {1.0, -1.0}) {
     const int s = static_cast<int>(sign);
     EXPECT_EQ(in_micro(sign * 1.234'567'4), s * 1'234'567);
@@ -104,7 +101,7 @@ TEST(IntegersOfAPack, AreTheNearest) {
   EXPECT_EQ(in_us(0.000'001'6), 2U);
 }
 
-TEST(ProtectionTable, OfAnotherPackGoesByItsCellsTheirNumberAndItsSamples) {
+TEST(ProtectionTable, OfAnotherPackUsesItsCellsTheirNumberAndItsSamplePeriod) {
   PackDesign d = forklift;
   d.limits = {.voltage_min_v = 2.5,
               .voltage_max_v = 4.2,
@@ -118,10 +115,9 @@ TEST(ProtectionTable, OfAnotherPackGoesByItsCellsTheirNumberAndItsSamples) {
   EXPECT_EQ(rule(Fault::pack_overvoltage).threshold, 4 * 4'234'000) << "4.2 V and a fiftieth of 1.7 V";
   EXPECT_EQ(rule(Fault::pack_undervoltage).threshold, 4 * 2'602'000);
   EXPECT_EQ(rule(Fault::sum_mismatch).threshold, 4 * 51'000);
-  EXPECT_EQ(rule(Fault::short_circuit).threshold, 15'000'000) << "of the larger of both limits";
+  EXPECT_EQ(rule(Fault::short_circuit).threshold, 15'000'000) << "from the larger limit";
   EXPECT_EQ(rule(Fault::short_circuit).release, 3'000'000);
-  EXPECT_EQ(rule(Fault::charge_undertemperature).threshold, 500)
-      << "it must not be charged even where water does not freeze";
+  EXPECT_EQ(rule(Fault::charge_undertemperature).threshold, 500) << "its own minimum temperature is above 0 degrees C";
   EXPECT_EQ(rule(Fault::charge_undertemperature).release, 700);
   EXPECT_EQ(rule(Fault::samples_missing).threshold, 1'250'000);
   EXPECT_EQ(rule(Fault::samples_missing).release, 500'000);
@@ -129,13 +125,13 @@ TEST(ProtectionTable, OfAnotherPackGoesByItsCellsTheirNumberAndItsSamples) {
   EXPECT_EQ(rule(Fault::short_circuit).threshold, 20'000'000);
 }
 
-TEST(ProtectionTable, IsTheOneInTheReadme) {
+TEST(ProtectionTable, EqualsTheTableInTheReadme) {
   const std::string readme = files::read_file(BMS_SOURCE_DIR "/protection/README.md");
   EXPECT_NE(readme.find(markdown(table)), std::string::npos)
       << "run ./bms figures, or build/host/tests/write_protection_figures";
 }
 
-/// The texts of VAL_ <id> <signal> in the DBC file.
+/// Texts of VAL_ <id> <signal> in the DBC file, by value.
 std::map<int, std::string> values_in_dbc(const std::string& dbc, const std::string& of) {
   const std::size_t begin = dbc.find("\nVAL_ " + of + " "), end = dbc.find(";", begin);
   std::map<int, std::string> values;
@@ -147,7 +143,7 @@ std::map<int, std::string> values_in_dbc(const std::string& dbc, const std::stri
   return values;
 }
 
-TEST(ProtectionTable, HasTheNamesOfTheBus) {
+TEST(ProtectionTable, HasTheNamesOfTheDbcFile) {
   const std::string dbc = files::read_file(BMS_SOURCE_DIR "/can/greybox_bms.dbc");
   const auto causes = values_in_dbc(dbc, "406 FirstCause");
   ASSERT_EQ(causes.size(), fault_count + 2);
