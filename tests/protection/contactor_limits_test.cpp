@@ -22,7 +22,7 @@ TEST(WeldedContactor, IsADcLinkThatRisesByAnEighthAboveItsLowestInTheSelfTest) {
     // The DC link is still falling after the last drive.
     for (const std::int32_t dc_link_uv : {40'000'000, 35'000'000, 30'000'000, 25'000'000})
       EXPECT_EQ(f.step(0.1, dc_link_uv), self_test);
-    // A missing reading is no weld, and the lowest DC link is kept.
+    // A missing reading does not count as a weld, and the lowest DC link is kept.
     f.step(0.1, measurement::no_reading);
     EXPECT_FALSE(f.welded());
     f.in.pack_uv = measurement::no_reading;
