@@ -54,8 +54,11 @@ programs = [
     ("tests/protection/flipped_bits_test.cpp", "protection_test", []),
     ("tests/protection/balancing_test.cpp", "protection_test", []),
     ("tests/storage/records_test.cpp", "storage_test", []),
-    ("tests/storage/persistence_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", *store]),
+    ("tests/storage/persistence_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", "tests/storage/fed_watchdog.cpp", *store]),
+    ("tests/storage/persistence_schedule_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", "tests/storage/fed_watchdog.cpp", *store]),
     ("tests/storage/log_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
+    ("tests/storage/power_cut_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
+    ("tests/storage/worn_flash_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
     ("tests/firmware/telemetry_test.cpp", "telemetry_test", ["tests/firmware/host_hal.cpp", "hal/absent/flash.cpp", *store]),
 ]
 # the test that is tried first for files without one of their name
@@ -336,7 +339,8 @@ def main():
     parser.add_argument("--again")
     arguments = parser.parse_args()
     known = equivalents()
-    identity = lambda m: (m["file"], m["from"], m["to"])
+    code = lambda line: re.sub(r"\s*//.*", "", line)  # a new comment does not make another mutant
+    identity = lambda m: (m["file"], code(m["from"]), code(m["to"]))
     if arguments.again:
         todo = [m for m in json.load(open(arguments.again))["mutants"] if m["result"] == "survived"]
         todo = iter([mutant_of(m["file"], m["begin"], m["end"], m["new"]) for m in todo])

@@ -52,17 +52,17 @@ void FlashModel::make_unsteady(std::uint32_t sector, std::uint32_t at, std::uint
   unsteady_ = {sector, at / 4 * 4, static_cast<std::uint32_t>(bits) << (8 * (at % 4)), every, 0};
 }
 
-bool FlashModel::power_goes() {
+bool FlashModel::power_fails() {
   if (steps_++ != cut_at_) return false;
   cut_at_ = never;
   return true;
 }
 
 bool FlashModel::erase(std::uint32_t sector) {
-  const bool cut = power_goes();
+  const bool cut = power_fails();
   ++erases_[sector];
   const Worn& worn = worn_[sector];
-  // a cut: every word as it was, erased, or some of its cells on their way; now and then as good as done
+  // An interrupted erase: every word unchanged, erased, or partly erased; sometimes completely erased.
   const std::uint32_t kind = random() % 4;
   for (std::uint32_t at = 0; at < size_.sector_bytes; at += 4) {
     Word& w = word(sector, at);
@@ -73,7 +73,7 @@ bool FlashModel::erase(std::uint32_t sector) {
       w.weak = (w.weak | ~w.bits) & (how == 1 ? random() & random() & random() : random());
       w.bits |= moved;
       w.erased = false;
-      w.asked = 0;  // whatever is programmed here is a mistake
+      w.asked = 0;  // programming here is a violation
       continue;
     }
     w = {};
@@ -84,7 +84,7 @@ bool FlashModel::erase(std::uint32_t sector) {
 }
 
 bool FlashModel::program(std::uint32_t sector, std::uint32_t at, std::uint32_t value) {
-  const bool cut = power_goes();
+  const bool cut = power_fails();
   Word& w = word(sector, at);
   const bool may = w.erased || value == w.asked || value == 0;
   if (!may) ++violations_;
@@ -92,7 +92,7 @@ bool FlashModel::program(std::uint32_t sector, std::uint32_t at, std::uint32_t v
   w.erased = false;
   w.asked = value;
   if (cut) {
-    // any of the cells on their way: done, not begun, or in between
+    // Each bit to be cleared: cleared, unchanged, or in between.
     const std::uint32_t begun = random() % 4 == 0 ? to_clear : to_clear & random();
     w.weak |= begun & (random() % 4 == 0 ? 0xFFFFFFFF : random());
     w.bits &= ~(begun & ~w.weak);
@@ -111,7 +111,7 @@ std::uint32_t FlashModel::seen(std::uint32_t sector, std::uint32_t at) {
       ++unsteady_.reads % unsteady_.every == 0)
     bits ^= unsteady_.bits;
   if (w.weak != 0) {
-    // alike for a while, then otherwise: a whole record may read well once
+    // Equal readings for a while, then another one, so that a whole record may read correctly once.
     const std::uint32_t draw = random();
     if (draw % 4 == 0)
       bits &= ~w.weak;

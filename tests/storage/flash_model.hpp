@@ -1,6 +1,6 @@
-// Flash as hal/flash.hpp describes it, cell by cell, with what goes wrong: the power that goes in the middle of a step,
-// cells that read differently each time, sectors that wear out. Knows nothing of storage/. Strict: whoever programs a
-// word that is not erased is told so.
+// Model of the flash of hal/flash.hpp, bit by bit, with its faults: loss of power during a step, bits that read
+// differently each time, sectors that wear out. Independent of storage/. It counts every word that is programmed
+// without an erase.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace bms {
 
-/// Thrown out of the step in whose middle the power goes.
+/// Thrown by the step during which the power fails.
 struct PowerCut {};
-/// Thrown out of a read beyond the limit.
+/// Thrown by a read beyond the limit.
 struct TooManyReads {};
 
 class FlashModel {
  public:
   FlashModel(hal::FlashSize size, std::uint64_t seed);
 
-  /// The power goes in the middle of the step so many steps from now (0: the next one). A step is a word programmed or
-  /// a sector erased.
+  /// Lets the power fail during a later step; steps = 0: during the next one. A step programs a word or erases a
+  /// sector.
   void cut_in(std::uint64_t steps) { cut_at_ = steps_ + steps; }
   void no_cut() { cut_at_ = never; }
   void reseed(std::uint64_t seed) { random_.seed(seed); }
@@ -29,17 +29,17 @@ class FlashModel {
 
   enum class Wear { erase_fails, erase_leaves_zeros, bits_stuck_at_one, bits_stuck_at_zero };
   void wear_out(std::uint32_t sector, Wear how);
-  void fill(std::uint32_t sector, const std::vector<std::uint8_t>& bytes);  ///< the rest as it was
+  void fill(std::uint32_t sector, const std::vector<std::uint8_t>& bytes);  ///< the remaining bytes are unchanged
   std::vector<std::uint8_t> bytes(std::uint32_t sector);
-  void flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits);  ///< a cell that decays
+  void flip(std::uint32_t sector, std::uint32_t at, std::uint8_t bits);  ///< decayed bits
 
-  /// A cell that reads otherwise every so many-th time that it is read.
+  /// Bits that read wrongly in every `every`-th read.
   void make_unsteady(std::uint32_t sector, std::uint32_t at, std::uint8_t bits, std::uint32_t every);
-  /// Who reads more words than that is thrown out: it would never end.
+  /// Throws TooManyReads after this number of words, to detect an endless loop.
   void limit_reads(std::uint64_t words) { reads_left_ = words; }
 
   const std::vector<std::uint64_t>& erases() const { return erases_; }
-  std::uint64_t violations() const { return violations_; }  ///< words programmed that were not erased
+  std::uint64_t violations() const { return violations_; }  ///< words programmed without an erase
 
   hal::FlashSize size() const { return size_; }
   bool erase(std::uint32_t sector);
@@ -49,9 +49,9 @@ class FlashModel {
  private:
   static constexpr std::uint64_t never = ~0ULL;
   struct Word {
-    std::uint32_t bits = 0xFFFFFFFF;   ///< as they are for sure
-    std::uint32_t weak = 0;            ///< these read as 0 or 1
-    std::uint32_t asked = 0xFFFFFFFF;  ///< what it was programmed with since the last erase
+    std::uint32_t bits = 0xFFFFFFFF;   ///< stable value
+    std::uint32_t weak = 0;            ///< bits that read as 0 or 1
+    std::uint32_t asked = 0xFFFFFFFF;  ///< programmed value since the last erase
     bool erased = true;
   };
   struct Worn {
@@ -60,7 +60,7 @@ class FlashModel {
   };
   Word& word(std::uint32_t sector, std::uint32_t at) { return words_[(sector * size_.sector_bytes + at) / 4]; }
   std::uint32_t seen(std::uint32_t sector, std::uint32_t at);
-  bool power_goes();
+  bool power_fails();
   std::uint32_t random() { return static_cast<std::uint32_t>(random_()); }
 
   hal::FlashSize size_;
@@ -74,7 +74,7 @@ class FlashModel {
   } unsteady_;
 };
 
-/// What hal/flash.hpp works on in this program; may be nothing.
+/// Selects the flash behind hal/flash.hpp; nullptr: no flash.
 void plug_in(FlashModel* model);
 
 }  // namespace bms

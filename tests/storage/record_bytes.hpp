@@ -1,4 +1,4 @@
-// A record as storage/log.hpp describes it, written here a second time: what flash may hold is made without the log.
+// A record as storage/log.hpp describes it, encoded independently, so that tests can write flash without the log.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace bms {
 
-/// Bit by bit, as IEEE 802.3 has it.
+/// CRC-32 bit by bit, as IEEE 802.3 defines it.
 inline std::uint32_t crc32_by_bits(const std::vector<std::uint8_t>& bytes) {
   std::uint32_t sum = ~0U;
   for (const std::uint8_t byte : bytes) {
@@ -22,7 +22,7 @@ inline void put(std::vector<std::uint8_t>& to, std::uint32_t value) {
   for (int k = 0; k < 4; ++k) to.push_back(static_cast<std::uint8_t>(value >> (8 * k)));
 }
 
-/// Header and payload, filled up to whole lines. number: its low bits are its line in the sector.
+/// Header and payload, filled up to whole lines. number: its low bits are the line in the sector.
 inline std::vector<std::uint8_t> record_bytes(std::uint32_t number, std::uint8_t type, std::uint8_t layout,
                                               const std::vector<std::uint8_t>& payload) {
   std::vector<std::uint8_t> bytes;

@@ -1,4 +1,4 @@
-// What is stored, field by field; the older layout; what is not a record.
+// Stored records field by field, the older layout, and bytes that are not a record.
 #include "storage/records.hpp"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ CellsRecord full_cells() {
   return c;
 }
 
-TEST(ChargeRecord, LiesLittleEndianFieldAfterField) {
+TEST(ChargeRecord, IsLittleEndianFieldAfterField) {
   ChargeRecord r;
   r.pack = {0x11223344, 0x0A0B0C0D};
   r.moved_ppb = 5;
@@ -53,8 +53,8 @@ TEST(ChargeRecord, LiesLittleEndianFieldAfterField) {
                               5,    6,    0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 1, 0xFF, 0xFF, 0xFF, 0xFF}));
 }
 
-/// Who updates the firmware finds what the one before has stored.
-TEST(Records, LieUnderTheNumbersTheyAlwaysHadAndInTheirOrder) {
+/// A firmware update must find the records of the version before.
+TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   EXPECT_EQ(ChargeRecord::kind, (Kind{1, 2}));
   EXPECT_EQ(CellsRecord::kind, (Kind{2, 1}));
   EXPECT_EQ(HealthRecord::kind, (Kind{3, 1}));
@@ -82,7 +82,7 @@ TEST(Records, LieUnderTheNumbersTheyAlwaysHadAndInTheirOrder) {
   EXPECT_EQ(bytes_of(settings), (Raw{1, 0, 1, 2, 1, 0xFE, 0xFF, 0xFF, 0xFF}));
 }
 
-TEST(Records, OfANewBatteryHoldNothing) {
+TEST(Records, OfANewBatteryAreEmpty) {
   EXPECT_EQ(bytes_of(ChargeRecord{}), Raw(32, 0));
   EXPECT_EQ(bytes_of(CellsRecord{}), Raw(1, 0));
   EXPECT_EQ(bytes_of(HealthRecord{}), Raw(16, 0));
@@ -95,38 +95,38 @@ TEST(Records, OfANewBatteryHoldNothing) {
   r.discharged_uah = 9'000'000;
   EXPECT_EQ(cycles_milli(r, 6'000'000), 1'500U);
   EXPECT_EQ(cycles_milli(r, 1), 9'000'000'000U);
-  EXPECT_EQ(cycles_milli(r, 0), 0U) << "of no capacity there are none";
+  EXPECT_EQ(cycles_milli(r, 0), 0U) << "no cycles without a capacity";
 }
 
 template <class R>
-void comes_back(const R& record) {
+void is_decoded_as_encoded(const R& record) {
   const Raw bytes = bytes_of(record);
   EXPECT_LE(bytes.size(), max_payload_bytes);
   R back;
   ASSERT_TRUE(decode(bytes, R::kind.layout, back));
   EXPECT_TRUE(back == record);
   for (std::size_t n = 0; n < bytes.size(); ++n)
-    EXPECT_FALSE(decode(Bytes(bytes).first(n), R::kind.layout, back)) << "cut to " << n;
+    EXPECT_FALSE(decode(Bytes(bytes).first(n), R::kind.layout, back)) << "shortened to " << n;
   Raw longer = bytes;
   longer.push_back(0);
   EXPECT_FALSE(decode(longer, R::kind.layout, back));
-  EXPECT_FALSE(decode(bytes, R::kind.layout + 1, back)) << "a newer layout is not guessed at";
+  EXPECT_FALSE(decode(bytes, R::kind.layout + 1, back)) << "a newer layout is not decoded";
 }
 
-TEST(Records, ComeBackAsTheyWereAndAreNotReadFromAnotherLength) {
+TEST(Records, AreDecodedAsEncodedAndOnlyFromTheirLength) {
   ChargeRecord charge;
   charge.pack = {987'654'321, 12'345'678};
   charge.charged_uah = 123'456'789'012;
-  comes_back(charge);
-  comes_back(full_cells());
-  comes_back(CellsRecord{});
-  comes_back(HealthRecord{912'000, 3'000, 1'430'000, 20'000});
-  comes_back(full_events());
-  comes_back(full_settings());
-  comes_back(SettingsRecord{});
+  is_decoded_as_encoded(charge);
+  is_decoded_as_encoded(full_cells());
+  is_decoded_as_encoded(CellsRecord{});
+  is_decoded_as_encoded(HealthRecord{912'000, 3'000, 1'430'000, 20'000});
+  is_decoded_as_encoded(full_events());
+  is_decoded_as_encoded(full_settings());
+  is_decoded_as_encoded(SettingsRecord{});
 }
 
-TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithSigmaForAMinuteThatWasNotCounted) {
+TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithTheSigmaOfAMinute) {
   const Raw layout_1{0x00, 0x46, 0xC3, 0x23, 0x80, 0x96, 0x98, 0x00};  // 600,000,000 and 10,000,000 ppb
   ChargeRecord r;
   r.charged_uah = 99;
@@ -138,14 +138,14 @@ TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithSigmaForAMinuteThatWasNotCounte
   EXPECT_FALSE(decode(layout_1, 2, r));
 }
 
-TEST(ChargeRecord, ASocThatCannotBeIsNotBelieved) {
+TEST(ChargeRecord, AnImpossibleSocIsNotAccepted) {
   EXPECT_EQ(plausible({1'040'000'000, 5}).soc_ppb, 1'000'000'000);
   EXPECT_EQ(plausible({1'040'000'000, 5}).soc_sigma_ppb, 5);
   EXPECT_EQ(plausible({-2'000'000'000, 5}).soc_sigma_ppb, 289'000'000);
   EXPECT_EQ(plausible({500'000'000, -5}).soc_sigma_ppb, 289'000'000);
   EXPECT_EQ(plausible({500'000'000, 0}).soc_sigma_ppb, 289'000'000);
   EXPECT_EQ(plausible({500'000'000, 1}).soc_sigma_ppb, 1);
-  EXPECT_EQ(plausible({500'000'000, 289'000'001}).soc_sigma_ppb, 289'000'000) << "anything is as wide as it gets";
+  EXPECT_EQ(plausible({500'000'000, 289'000'001}).soc_sigma_ppb, 289'000'000) << "sigma of an unknown soc";
   for (const std::int32_t edge : {-250'000'000, 1'250'000'000}) {
     const std::int32_t beyond = edge < 0 ? edge - 1 : edge + 1, end = edge < 0 ? 0 : 1'000'000'000;
     EXPECT_EQ(plausible({edge, 5}), (estimator::StoredEstimate{end, 5}));
@@ -155,7 +155,7 @@ TEST(ChargeRecord, ASocThatCannotBeIsNotBelieved) {
   EXPECT_EQ(plausible({1'000'000'000, 5}), (estimator::StoredEstimate{1'000'000'000, 5}));
 }
 
-TEST(EventsRecord, HoldsTheLastSixteenFaultsNewestFirst) {
+TEST(EventsRecord, ContainsTheLastSixteenFaultsNewestFirst) {
   const EventsRecord e = full_events();
   EXPECT_EQ(e.faults, 20U);
   EXPECT_EQ(e.last(0).code, 20);
@@ -167,7 +167,7 @@ TEST(EventsRecord, HoldsTheLastSixteenFaultsNewestFirst) {
   EXPECT_EQ(few.last(1).code, 0);
 }
 
-TEST(SettingsRecord, KeepsAValueByKeyAndSaysWhenItIsFull) {
+TEST(SettingsRecord, StoresAValueByKeyAndReportsWhenItIsFull) {
   SettingsRecord s = full_settings();
   EXPECT_EQ(s.get(14), -200'000);
   EXPECT_FALSE(s.get(15));
@@ -180,7 +180,7 @@ TEST(SettingsRecord, KeepsAValueByKeyAndSaysWhenItIsFull) {
   EXPECT_EQ(s.revision, revision + 1);
 }
 
-TEST(Records, OfRandomBytesAreReadWithoutHarm) {
+TEST(Records, OfRandomBytesAreReadSafely) {
   std::mt19937 random(1);
   for (int k = 0; k < 100'000; ++k) {
     Raw bytes(random() % 160);
