@@ -167,7 +167,7 @@ std::string mechanism_cost() {
   using Set = std::vector<std::pair<const char*, std::vector<double>>>;
   const auto row = [&](const Set& set, bool errors) {
     const files::CellFile cell = table9_with(set, errors);
-    const firmware::StepCost cost = count_instructions(
+    const firmware::StepCost cost = firmware::count_instructions(
         board, images::firmware_image(board.name, cell, images::Image::replay), all, host_sim::state_count(cell));
     std::string names = errors ? "`noise.errors_are_states`" : "";
     for (const auto& [id, values] : set) names += fmt::format("{}`{}`", names.empty() ? "" : ", ", id);

@@ -383,6 +383,13 @@ class Matrix {
   plant::Random random_;
 };
 
+/// Time to detection according to the table of the protections.
+std::string stated_time(std::size_t k) {
+  if (k == charge_overload || k == discharge_overload)
+    return fmt::format("{:.1f} s at twice the limit", 1e-3 * ideal_overload_ms());
+  return fmt::format("{:.1f} s", k == no_samples ? 0.5 : 1e-3 * expected_rows[k].delay_ms);
+}
+
 void merge(DetectionTime& into, const DetectionTime& from) {
   if (from.cases == 0) return;
   into.soonest_ms = into.cases == 0 ? from.soonest_ms : std::min(into.soonest_ms, from.soonest_ms);
@@ -454,10 +461,7 @@ std::string markdown(const MatrixResult& result) {
       "cases | open after |\n|---|---|---|---|---|---|---|---|\n";
   for (std::size_t k = 0; k < in_frames; ++k) {
     const MatrixRow& r = result.rows[k];
-    const std::string stated = k == charge_overload || k == discharge_overload
-                                   ? fmt::format("{:.1f} s at twice the limit", 1e-3 * ideal_overload_ms())
-                                   : fmt::format("{:.1f} s", k == no_samples ? 0.5 : 1e-3 * expected_rows[k].delay_ms);
-    out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", expected_rows[k].name, stated, r.silent,
+    out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", expected_rows[k].name, stated_time(k), r.silent,
                        time(r.above), time(r.in_noise), time(r.during), r.during.cases, time(r.opened));
   }
   out += fmt::format("\n{} cases, {} samples: {} missed, {} false.", result.cases, result.samples, result.missed,

@@ -451,7 +451,7 @@ void BxcanModel::receive(const WireFrame& f) {
     for (unsigned k = 0; k < 4; ++k) w |= static_cast<std::uint32_t>(f.data[from + k]) << (8 * k);
     return w;
   };
-  const std::uint32_t rir = f.extended ? f.id << 3 | 4U | (f.remote ? 2U : 0U) : f.id << 21 | (f.remote ? 2U : 0U);
+  const std::uint32_t rir = (f.extended ? f.id << 3 | 4U : f.id << 21) | (f.remote ? 2U : 0U);
   const Received r{rir, f.length, word(0), word(4)};
   if (fifo_.size() == 3) {
     overrun_ = true;

@@ -60,7 +60,8 @@ class I2cPins : public UnicornBoard::Peripheral {
 
   explicit I2cPins(const Bq76952Model& chip) : chip_(chip) {}
   std::uint32_t read(std::uint32_t offset, double) override {
-    return offset == 0x10 ? (chip_.hung ? 0x80 : 0xC0) : registers_[offset / 4];
+    if (offset != 0x10) return registers_[offset / 4];
+    return chip_.hung ? 0x80 : 0xC0;
   }
   void write(std::uint32_t offset, std::uint32_t value, double) override { registers_[offset / 4] = value; }
 

@@ -369,7 +369,11 @@ bool UnicornBoard::take_fault(int error) {
   const bool no_code = error == UC_ERR_FETCH_UNMAPPED || error == UC_ERR_FETCH_PROT;
   const bool access = error == UC_ERR_READ_UNMAPPED || error == UC_ERR_WRITE_UNMAPPED || error == UC_ERR_WRITE_PROT ||
                       error == UC_ERR_READ_PROT;
-  registers_[scs + 0xD28] |= no_code ? 1U << 8 : access ? 1U << 9 : 1U << 16;  // IBUSERR, PRECISERR, UNDEFINSTR
+  constexpr std::uint32_t ibuserr = 1U << 8, preciserr = 1U << 9, undefinstr = 1U << 16;
+  if (no_code)
+    registers_[scs + 0xD28] |= ibuserr;
+  else
+    registers_[scs + 0xD28] |= access ? preciserr : undefinstr;
   enter(no_code || access ? 5 : 6);
   return true;
 }
