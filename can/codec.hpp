@@ -1,10 +1,11 @@
-// Values in the bits of a CAN frame, little-endian, and its end-to-end protection. What is where: greybox_bms.dbc, from
-// which the messages that use this are generated (cmake/dbc_header.py).
+// Packs values into the bits of a CAN frame (little-endian) and adds the end-to-end protection. The messages that use
+// it are generated from the DBC files (cmake/dbc_header.py).
 //
-// In float: a signal of more than 24 bits is an integer. NaN is sent as the signal's invalid value; what does not fit
-// saturates at the signal's range.
+// Arithmetic is float; a signal of more than 24 bits is an integer. NaN is sent as the invalid value of the signal.
+// Values outside the range of the signal are clamped.
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <cstdint>
 #include <limits>
@@ -23,7 +24,7 @@ struct SignalLayout {
   std::int32_t invalid;  ///< raw
 };
 
-/// What a raw value means, for people.
+/// Name of a raw value, for people.
 struct ValueName {
   std::int32_t raw;
   const char* text;
@@ -44,12 +45,19 @@ constexpr std::uint64_t get_raw(const Frame& frame, unsigned start, unsigned bit
   return (bits_of(frame) >> start) & mask(bits);
 }
 
+/// Not-a-number becomes `lowest`.
+constexpr float clamped(float value, float lowest, float highest) {
+  if (!(value > lowest)) return lowest;
+  return value > highest ? highest : value;
+}
+
+// put() writes the value of a signal, get() reads it. Types: the one that cmake/dbc_header.py chooses.
+
 template <SignalLayout s>
 constexpr void put(Frame& frame, float value) {
   std::int32_t raw = s.invalid;
   if (value == value || !s.has_invalid) {
-    const float clamped = !(value > s.lowest) ? s.lowest : value > s.highest ? s.highest : value;
-    const float counts = (clamped - s.offset) / s.factor;
+    const float counts = (clamped(value, s.lowest, s.highest) - s.offset) / s.factor;
     raw = static_cast<std::int32_t>(counts + (counts < 0 ? -0.5F : 0.5F));
   }
   put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(raw)));
@@ -57,14 +65,15 @@ constexpr void put(Frame& frame, float value) {
 template <SignalLayout s>
 constexpr void put(Frame& frame, std::uint32_t value) {
   constexpr auto most = s.bits > 24 ? static_cast<std::uint32_t>(mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
-  put_raw(frame, s.start, s.bits, value <= most ? value : s.has_invalid ? static_cast<std::uint32_t>(s.invalid) : most);
+  constexpr std::uint32_t if_above = s.has_invalid ? static_cast<std::uint32_t>(s.invalid) : most;
+  put_raw(frame, s.start, s.bits, value <= most ? value : if_above);
 }
 
 template <SignalLayout s>
 constexpr void put(Frame& frame, std::int32_t value) {
   constexpr auto most = static_cast<std::int32_t>(mask(s.bits - 1));
-  const std::int32_t clamped = value > most ? most : value < -most - 1 ? -most - 1 : value;
-  put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(clamped)));
+  const std::int32_t sent = std::clamp<std::int32_t>(value, -most - 1, most);
+  put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(sent)));
 }
 
 template <SignalLayout s>
@@ -88,11 +97,11 @@ constexpr std::int32_t get(const Frame& frame) {
   return static_cast<std::int32_t>(value_of<s>(frame));
 }
 
-// AUTOSAR end-to-end protection, profile 1: CRC-8 SAE J1850 (polynomial 0x1D, start 0, nothing inverted) over the data
-// id, low byte first, and all bytes but its own, the first; a counter of 0 to 14 in the low half of the second. It
-// finds what is corrupted, repeated, lost, or sent as another message.
+// AUTOSAR end-to-end protection, profile 1. Byte 0: CRC-8 SAE J1850 (polynomial 0x1D, initial value 0, no inversion)
+// over the data id, low byte first, and bytes 1 to 7. Low half of byte 1: a counter from 0 to 14. It reveals corrupted,
+// repeated, lost and mistaken frames.
 
-inline constexpr std::uint8_t counters = 15;
+inline constexpr std::uint8_t counters = 15;  ///< values of the counter
 
 constexpr std::uint8_t crc8(std::uint8_t crc, std::uint8_t byte) {
   crc = static_cast<std::uint8_t>(crc ^ byte);
@@ -108,10 +117,12 @@ constexpr void protect(Frame& frame, std::uint16_t data_id, std::uint8_t counter
   put_raw(frame, 8, 4, counter);
   frame.data[0] = crc_of(frame, data_id);
 }
+/// Returns true if length and CRC are right.
 constexpr bool intact(const Frame& frame, std::uint16_t data_id) {
   return frame.length == 8 && frame.data[0] == crc_of(frame, data_id);
 }
 constexpr std::uint8_t counter_of(const Frame& frame) { return frame.data[1] & 0x0F; }
+/// Counter of the next frame.
 constexpr std::uint8_t next(std::uint8_t counter) {
   return counter + 1 < counters ? static_cast<std::uint8_t>(counter + 1) : std::uint8_t{0};
 }

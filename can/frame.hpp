@@ -1,4 +1,4 @@
-// A frame of classic CAN (ISO 11898-1): what the drivers carry and the codec packs.
+// A frame of classic CAN (ISO 11898-1), as the drivers send it and the codec packs it.
 #pragma once
 
 #include <array>

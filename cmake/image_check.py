@@ -33,7 +33,7 @@ class Elf:
             yield self.text(table[6], name), value
 
     def offset_of(self, address):
-        """Position in the file of the byte that is loaded at this flash address (p_paddr); None if there is none."""
+        """Position in the file of the byte that is loaded at this flash address (p_paddr); None if no byte is."""
         for kind, offset, _, physical, in_file, _, _, _ in self.segments:
             if kind == 1 and physical <= address < physical + in_file:
                 return offset + address - physical

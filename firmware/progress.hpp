@@ -7,7 +7,7 @@
 //   published   telemetry has reached its last frame. It does not matter whether a node listens or the bus accepts it.
 //
 // Missing readings count as progress: the protection opens the contactors for them, and a reset would not help. A part
-// that hangs never returns to this class. Each part is asked for its result, so that a skipped call is noticed, too.
+// that hangs never returns to this class. The class checks results, not calls, so it also notices a skipped call.
 #pragma once
 
 #include <cstdint>

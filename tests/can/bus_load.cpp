@@ -1,11 +1,10 @@
-// Load of the bus and worst-case response of every message of can/greybox_bms.dbc (response_time.hpp), as a table;
-// beside them the frames of a sample of 16 cells, which are on the bus only if another node measures the cells, and
-// those of the J1939 profile. The responses are those with all.
+// Prints bus load and worst-case response time of every message of can/greybox_bms.dbc (response_time.hpp). The table
+// includes the frames of a sample of 16 cells, which are on the bus only if another node measures the cells, and those
+// of the J1939 profile. The response times hold for all of them together.
 //
-//   bus_load [BITS_PER_SECOND [SAMPLES_PER_SECOND]]      250000, 10
+//   bus_load [BITS_PER_SECOND [SAMPLES_PER_SECOND]]      default: 250000, 10
 //
-// Exit code 1 when the load is 30 % or more, with those frames and that profile or without, or a message may come later
-// than its next one is due.
+// Exit code 1 if the load is 30 % or more in any combination, or if a message may come later than its next one is due.
 #include <cstdlib>
 #include <string>
 #include <utility>
@@ -21,7 +20,7 @@ int main(int argc, char** argv) {
   const bool first_read = argc < 2 || *end == '\0';
   const double samples_per_second = argc > 2 ? std::strtod(argv[2], &end) : 10;
   if (argc > 3 || !first_read || (argc > 2 && *end != '\0') || !(bits_per_second > 0) || !(samples_per_second > 0)) {
-    fmt::print(stderr, "usage: bus_load [BITS_PER_SECOND [SAMPLES_PER_SECOND]], numbers above 0\n");
+    fmt::print(stderr, "usage: bus_load [BITS_PER_SECOND [SAMPLES_PER_SECOND]], both above 0\n");
     return 2;
   }
   constexpr double most = 0.3;
@@ -36,18 +35,18 @@ int main(int argc, char** argv) {
     fmt::print("{:<#10x} {:20} {:9.0f} {:5} {:7.2f} {:11.2f}{}\n", m.id, m.name, 1e3 * m.period_s, worst_bits(m),
                100 * load({m}, bits_per_second), 1e3 * response, response <= m.period_s ? "" : "  too late");
   }
-  fmt::print("{:.0f} bit/s, {:g} samples a second, load to be below {:.0f} %\n", bits_per_second, samples_per_second,
-             100 * most);
+  fmt::print("{:.0f} bit/s, {:g} samples per second, limit of the load: {:.0f} %\n", bits_per_second,
+             samples_per_second, 100 * most);
   bool light = true;
-  for (const auto& [cells, by_whom] : {std::pair{Cells::measured_by_the_board, "the board measures its cells"},
-                                       {Cells::measured_by_another_node, "another node measures and sends them"}}) {
-    for (const auto& [profile, beside] : {std::pair{Profile::none, ""},
-                                          {Profile::cia418, ", CiA 418 profile beside"},
-                                          {Profile::j1939, ", J1939 profile beside"}}) {
+  for (const auto& [cells, measured_by] : {std::pair{Cells::measured_by_the_board, "the board measures its cells"},
+                                           {Cells::measured_by_another_node, "another node measures and sends them"}}) {
+    for (const auto& [profile, added] : {std::pair{Profile::none, ""},
+                                         {Profile::cia418, ", with CiA 418 profile"},
+                                         {Profile::j1939, ", with J1939 profile"}}) {
       const auto on_the_bus = messages_on_the_bus(samples_per_second, sample_to_queue_s, cells, profile);
       const double part = load(on_the_bus, bits_per_second);
       light = light && part < most;
-      fmt::print("{:59} {:2} messages, load {:5.2f} %\n", fmt::format("{}{}", by_whom, beside), on_the_bus.size(),
+      fmt::print("{:59} {:2} messages, load {:5.2f} %\n", fmt::format("{}{}", measured_by, added), on_the_bus.size(),
                  100 * part);
     }
   }

@@ -1,11 +1,10 @@
-// Frames of every message of the DBC file, of random values, of values beyond the range and of values that are not
-// known:
+// Prints frames of every message of the DBC file with random values, values beyond the range and values that are not
+// known. One line each: {"id": 384, "data": "0f...", "values": {"Soc": 54.3, "SocSigma": null, ...}}
 //
-//   random_frames SEED COUNT [j1939]        j1939: of can/j1939_profile.dbc; a line each: {"id": 384, "data": "0f...",
-//   "values": {"Soc": 54.3, "SocSigma": null, ...}}
+//   random_frames SEED COUNT [j1939]        j1939: messages of can/j1939_profile.dbc
 //
-// values: what went in, held within the signal's range; null: not known. decode_frames.py reads them with another
-// decoder.
+// values: the input, clamped to the range of the signal; null: not known. decode_frames.py decodes the frames with
+// another decoder.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -25,46 +24,57 @@ using namespace bms;
 std::mt19937 chance;
 double uniform() { return std::uniform_real_distribution<double>()(chance); }
 
+enum class Kind { below, above, lowest, highest, within };
+
+/// Half of all frames have values within the range.
+Kind random_kind() {
+  const auto kind = chance() % 8;
+  return kind < 4 ? static_cast<Kind>(kind) : Kind::within;
+}
+
+std::string entry(const char* name, bool known, const std::string& value) {
+  return fmt::format("\"{}\": {}", name, known ? value : "null");
+}
+
+/// Sets the value of a signal and returns its entry of "values".
+std::string set(const char* name, float& value, const can::SignalLayout& s, Kind kind) {
+  const double span = s.highest - s.lowest;
+  double x = s.lowest;
+  if (kind == Kind::below) x = s.lowest - span * uniform();
+  if (kind == Kind::above) x = s.highest + span * uniform();
+  if (kind == Kind::highest) x = s.highest;
+  if (kind == Kind::within) x = s.lowest + span * uniform();
+  const bool known = !s.has_invalid || chance() % 5 != 0;
+  value = known ? static_cast<float>(x) : can::unknown;
+  const double clamped = std::clamp(x, static_cast<double>(s.lowest), static_cast<double>(s.highest));
+  return entry(name, known, fmt::format("{}", clamped));
+}
+std::string set(const char* name, std::int32_t& value, const can::SignalLayout& s, Kind) {
+  const auto most = static_cast<std::int32_t>(can::mask(s.bits - 1));
+  value = static_cast<std::int32_t>(chance());
+  return entry(name, true, fmt::format("{}", std::clamp(value, -most - 1, most)));
+}
+std::string set(const char* name, std::uint32_t& value, const can::SignalLayout& s, Kind kind) {
+  const auto most = s.bits > 24 ? static_cast<std::uint32_t>(can::mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
+  if (kind == Kind::highest)
+    value = most;
+  else if (kind == Kind::above && s.bits <= 24)
+    value = most + 1 + static_cast<std::uint32_t>(chance() % 100);
+  else
+    value = static_cast<std::uint32_t>(chance() % (std::uint64_t{most} + 1));
+  const bool known = !s.has_invalid || (value <= most && value != static_cast<std::uint32_t>(s.invalid));
+  if (s.bits <= 24) return entry(name, known, fmt::format("{}", std::min(value, most)));
+  const double factor = s.factor == 1 ? 1 : 1e-3;  // more than 24 bits with a factor: the value is raw in C++
+  return entry(name, known, fmt::format("{}", static_cast<double>(value) * factor + static_cast<double>(s.offset)));
+}
+
 template <class Message>
 void line() {
   Message m;
   std::string values;
-  const int kind = static_cast<int>(chance() % 8);
+  const Kind kind = random_kind();
   m.each([&](const char* name, const char*, auto& value, const can::SignalLayout& s) {
-    if constexpr (std::same_as<std::remove_reference_t<decltype(value)>, float>) {
-      const double span = s.highest - s.lowest;
-      const double x = kind == 0   ? s.lowest - span * uniform()
-                       : kind == 1 ? s.highest + span * uniform()
-                       : kind == 2 ? s.lowest
-                       : kind == 3 ? s.highest
-                                   : s.lowest + span * uniform();
-      const bool known = !s.has_invalid || chance() % 5 != 0;
-      value = known ? static_cast<float>(x) : can::unknown;
-      const double clamped = std::min(std::max(x, static_cast<double>(s.lowest)), static_cast<double>(s.highest));
-      values +=
-          fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, known ? fmt::format("{}", clamped) : "null");
-    } else if constexpr (std::same_as<std::remove_reference_t<decltype(value)>, std::int32_t>) {
-      const auto most = static_cast<std::int32_t>(can::mask(s.bits - 1));
-      value = static_cast<std::int32_t>(chance());
-      values += fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name, std::clamp(value, -most - 1, most));
-    } else {
-      const auto most =
-          s.bits > 24 ? static_cast<std::uint32_t>(can::mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
-      value = kind == 3                   ? most
-              : kind == 1 && s.bits <= 24 ? most + 1 + static_cast<std::uint32_t>(chance() % 100)
-                                          : static_cast<std::uint32_t>(chance() % (std::uint64_t{most} + 1));
-      const bool known = !s.has_invalid || (value <= most && value != static_cast<std::uint32_t>(s.invalid));
-      // of more than 24 bits with a factor: raw in C++
-      if (s.bits > 24)
-        values += fmt::format(
-            "{}\"{}\": {}", values.empty() ? "" : ", ", name,
-            !known ? "null"
-                   : fmt::format("{}", static_cast<double>(value) * static_cast<double>(s.factor == 1 ? 1 : 1e-3) +
-                                           static_cast<double>(s.offset)));
-      else
-        values += fmt::format("{}\"{}\": {}", values.empty() ? "" : ", ", name,
-                              known ? fmt::format("{}", std::min(value, most)) : "null");
-    }
+    values += (values.empty() ? "" : ", ") + set(name, value, s, kind);
   });
   can::Frame frame;
   if constexpr (requires { m.frame(); })

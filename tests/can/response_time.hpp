@@ -1,12 +1,15 @@
-// How long a frame takes at worst from its sample to the end on the wire: R. I. Davis, A. Burns, R. J. Bril, J. J.
+// Worst-case response time of a frame, from its sample to its end on the wire: R. I. Davis, A. Burns, R. J. Bril, J. J.
 // Lukkien, "Controller Area Network (CAN) schedulability analysis: refuted, revisited and revised", Real-Time Systems
 // 35 (2007) 239-272.
 //
-//   bits of a standard frame of s bytes, stuffed at worst, with intermission    34 + 8 s + 13 + (34 + 8 s - 1) / 4 (eq.
-//   2): 8 bytes 135 of a frame of 29 bits                                                       54 instead of 34
-//   (section 2.1): 160 busy period      t    = B + sum over k of higher priority and m itself of ceil((t + J_k) / T_k)
-//   C_k                (eq. 9) queueing delay   w(q) = B + q C + sum over k of higher priority of ceil((w + J_k + bit)
-//   / T_k) C_k                 (eq. 12) response         R    = max over q of J + w(q) - q T + C (eq. 13, 14)
+//   worst bits of a standard frame of s bytes, with stuff bits and intermission (eq. 2):
+//     34 + 8 s + 13 + (34 + 8 s - 1) / 4                     8 bytes: 135; with 29 bits, 54 instead of 34: 160
+//   busy period (eq. 9), sum over all k of higher priority and m itself:
+//     t = B + sum ceil((t + J_k) / T_k) C_k
+//   queueing delay (eq. 12), sum over all k of higher priority:
+//     w(q) = B + q C + sum ceil((w + J_k + bit) / T_k) C_k
+//   response time (eq. 13, 14):
+//     R = max over q of J + w(q) - q T + C
 #pragma once
 
 #include <algorithm>
@@ -30,7 +33,7 @@ struct Message {
   std::uint32_t id = 0;
   unsigned length = 8;  ///< bytes
   double period_s = 1;
-  double jitter_s = 0;   ///< between what asks for it and its place in the queue
+  double jitter_s = 0;   ///< from the event to the place in the queue
   bool long_id = false;  ///< 29 bits
 };
 
@@ -39,9 +42,8 @@ constexpr unsigned worst_bits(unsigned length, bool long_id = false) {
   return stuffed + 13 + (stuffed - 1) / 4;
 }
 constexpr unsigned worst_bits(const Message& m) { return worst_bits(m.length, m.long_id); }
-constexpr std::uint32_t urgency(const Message& m) {
-  return hal::bxcan::arbitration({m.id, 0, {}, m.long_id});
-}  ///< lower wins
+/// Arbitration value: the lower one wins.
+constexpr std::uint32_t urgency(const Message& m) { return hal::bxcan::arbitration({m.id, 0, {}, m.long_id}); }
 
 inline double load(const std::vector<Message>& messages, double bits_per_second) {
   double bits_each_second = 0;
@@ -49,8 +51,8 @@ inline double load(const std::vector<Message>& messages, double bits_per_second)
   return bits_each_second / bits_per_second;
 }
 
-/// Worst-case response of message `which` [s]; infinity when the bus is full. time_s(m): its time on the wire;
-/// blocking_s: of a frame less urgent that is under way.
+/// Worst-case response time of message `which` [s]; infinity if the bus is full. blocking_s: time of a less urgent
+/// frame that is already being sent. time_s(m): time of a frame on the wire.
 template <class Time>
 double response_s(const std::vector<Message>& messages, std::size_t which, double blocking_s, double bit_s,
                   Time&& time_s) {
@@ -83,19 +85,19 @@ double response_s(const std::vector<Message>& messages, std::size_t which, doubl
   return worst;
 }
 
-/// From a complete sample to its last frame in the queue: what the firmware works until then. Of 16 cells 0.9 ms at an
-/// instruction a cycle (bxcan_board_test measures it), two cycles on the chip at most.
+/// Time of the firmware from a complete sample to the last of its frames in the queue. bxcan_board_test measures half
+/// of it at one cycle per instruction; the chip needs at most two.
 inline constexpr double sample_to_queue_s = 2e-3;
 
-/// Where the samples come from: of a chip on the board, or in frames of the bus (hal/sample_frames.hpp).
+/// Source of the samples: a chip on the board, or frames on the bus (hal/sample_frames.hpp).
 enum class Cells { measured_by_the_board, measured_by_another_node };
-/// What the image sends beside the battery's own messages (build option BMS_VEHICLE_PROFILE).
+/// Additional messages of the image (build option BMS_VEHICLE_PROFILE).
 enum class Profile { none, cia418, j1939 };
 inline constexpr std::size_t cells_of_a_pack = 16;
 
-/// What is in the DBC file: by its cycle time, or, without one, with every sample (of those that are sent once this is
-/// too much); and the frames that bring a sample, if it comes by the bus; of their sender, which keeps their order, the
-/// latest bound holds for all. jitter_s: from a complete sample to the queue.
+/// All messages of the DBC file. Without a cycle time, a message counts with every sample (also one that is sent once).
+/// Added are the frames that bring a sample, if they come over the bus, and those of the profile. The sender of samples
+/// keeps their order, so the latest bound holds for all of its frames. jitter_s: from a complete sample to the queue.
 inline std::vector<Message> messages_on_the_bus(double samples_per_second, double jitter_s, Cells cells,
                                                 Profile profile = Profile::none) {
   std::vector<Message> all;
@@ -111,9 +113,8 @@ inline std::vector<Message> messages_on_the_bus(double samples_per_second, doubl
       all.push_back({"(of a sample)", f.id, f.length, 1 / samples_per_second, 0});
   }
   if (profile == Profile::cia418) {
-    all.push_back(
-        {"(heartbeat)", firmware::canopen::heartbeat_id + hal::canopen_node, 1,
-         1e-6 * firmware::canopen::Node::heartbeat_us, jitter_s});
+    all.push_back({"(heartbeat)", firmware::canopen::heartbeat_id + hal::canopen_node, 1,
+                   1e-6 * firmware::canopen::Node::heartbeat_us, jitter_s});
     for (const firmware::Cia418Profile::Pdo& pdo : firmware::Cia418Profile::pdos)
       all.push_back({pdo.name, pdo.id, pdo.length, 1e-6 * firmware::Cia418Profile::cycle_us, jitter_s});
   }
@@ -127,9 +128,9 @@ inline std::vector<Message> messages_on_the_bus(double samples_per_second, doubl
   return all;
 }
 
-/// Blocking by two frames, the longest that there are: the one that is under way, and one more that gets in when a
-/// mailbox is filled a moment after the bus has become free (the analysis lets a node offer its most urgent frame at
-/// once).
+/// Worst-case response time on this bus. Two of the longest frames block: the one being sent, and one more that is sent
+/// first if a mailbox is filled just after the bus became free. (The analysis assumes that a node offers its most
+/// urgent frame immediately.)
 inline double response_on_the_bus_s(const std::vector<Message>& messages, std::size_t which, double bits_per_second) {
   const bool long_ones = std::any_of(messages.begin(), messages.end(), [](const Message& m) { return m.long_id; });
   return response_s(messages, which, 2 * worst_bits(8, long_ones) / bits_per_second, 1 / bits_per_second,

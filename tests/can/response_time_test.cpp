@@ -7,8 +7,8 @@
 namespace bms::can_bus {
 namespace {
 
-/// Section 3.1 of the paper, table 2: what the older analysis gave as 3 ms for C.
-TEST(ResponseTime, IsThatOfThePapersExampleWhereTheSecondInstanceIsTheWorst) {
+/// Table 2 in section 3.1 of the paper. The older analysis gave 3 ms for C.
+TEST(ResponseTime, AgreesWithThePapersExampleInWhichTheSecondInstanceIsWorst) {
   const std::vector<Message> messages{{"A", 1, 8, 2.5e-3, 0}, {"B", 2, 8, 3.5e-3, 0}, {"C", 3, 8, 3.5e-3, 0}};
   const auto a_millisecond = [](const Message&) { return 1e-3; };
   EXPECT_NEAR(response_s(messages, 0, 1e-3, 8e-6, a_millisecond), 2e-3, 1e-9);
@@ -16,7 +16,7 @@ TEST(ResponseTime, IsThatOfThePapersExampleWhereTheSecondInstanceIsTheWorst) {
   EXPECT_NEAR(response_s(messages, 2, 0, 8e-6, a_millisecond), 3.5e-3, 1e-9);
 }
 
-TEST(ResponseTime, OfAFullBusIsNeverAndAFrameIs135BitsAtMost) {
+TEST(ResponseTime, IsInfiniteOnAFullBusAndAFrameHasAtMost135Bits) {
   const std::vector<Message> messages{{"A", 1, 8, 1e-3, 0}, {"B", 2, 8, 1e-3, 0}};
   EXPECT_TRUE(std::isinf(response_on_the_bus_s(messages, 1, 250e3)));
   EXPECT_FALSE(std::isinf(response_on_the_bus_s(messages, 0, 250e3)));
@@ -26,18 +26,18 @@ TEST(ResponseTime, OfAFullBusIsNeverAndAFrameIs135BitsAtMost) {
   EXPECT_NEAR(load(messages, 250e3), 1.08, 1e-9);
 }
 
-TEST(ResponseTime, EveryMessageOfTheFileIsInTheTable) {
+TEST(ResponseTime, CoversEveryMessageOfTheDbcFile) {
   const std::size_t in_the_file = std::tuple_size_v<can::Messages>;
   EXPECT_EQ(messages_on_the_bus(10, 0, Cells::measured_by_the_board).size(), in_the_file);
   const auto with_samples = messages_on_the_bus(10, 0, Cells::measured_by_another_node);
   EXPECT_EQ(with_samples.size(), in_the_file + 13)
-      << "check, current and voltage, link, eight of cells, temperatures, time";
+      << "check, current and voltage, DC link, eight of cells, temperatures, time";
   std::set<std::uint32_t> ids;
   for (const Message& m : with_samples)
     EXPECT_TRUE(ids.insert(m.id).second) << "two messages with the identifier of " << m.name;
 }
 
-TEST(ResponseTime, WithEitherProfileTheBusStaysBelow30PercentAndEveryFrameComesBeforeTheNext) {
+TEST(ResponseTime, StaysBelowThePeriodAndTheLoadBelow30PercentWithEitherProfile) {
   constexpr double bits_per_second = 250e3;
   const auto without = messages_on_the_bus(10, sample_to_queue_s, Cells::measured_by_another_node);
   const auto judge = [&](Profile profile, std::size_t more, double more_bits_each_second) {
@@ -53,7 +53,7 @@ TEST(ResponseTime, WithEitherProfileTheBusStaysBelow30PercentAndEveryFrameComesB
   judge(Profile::cia418, 4, 2 * 65 + 5 * (85 + 125 + 85));
   const auto all = judge(Profile::j1939, 6, 7 * 160);
   for (std::size_t k = 0; k < all.size(); ++k)
-    EXPECT_EQ(all[k].long_id, k + 6 >= all.size()) << all[k].name << ": the battery's own messages go first";
+    EXPECT_EQ(all[k].long_id, k + 6 >= all.size()) << all[k].name << ": the battery's own messages are sent first";
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ std::vector<measurement::Sample> two_minutes() {
 BudgetRun run_in_unicorn(const std::string& board_name) {
   UnicornBoard board(images::firmware_image(board_name, files::read_cell("table9"), images::Image::remote));
   if (!board.run_until([&] { return board.can.on_the_bus(); }, 3'000))
-    throw std::runtime_error(board_name + " does not come up");
+    throw std::runtime_error(board_name + " does not start");
   std::uint16_t counter = 0;
   for (const measurement::Sample& s : two_minutes()) {
     measurement::PackSample<16> pack;
@@ -52,20 +52,20 @@ BudgetRun run_in_unicorn(const std::string& board_name) {
     for (const can::Frame& frame : hal::frames_of(pack, 0, counter++)) {
       board.can.deliver(frame);
       if (!board.run_until([&] { return !board.can.receive_interrupt(); }, 1))
-        throw std::runtime_error(board_name + " takes no frame");
+        throw std::runtime_error(board_name + " receives no frame");
     }
     if (!board.run_until([&] { return board.watchdog_feeds > fed; }, 100))
-      throw std::runtime_error(board_name + " does not end a sample");
+      throw std::runtime_error(board_name + " does not finish a sample");
     board.run_for_ms(15);
   }
   const auto& seen = board.can.seen;
-  const auto told = std::find_if(seen.rbegin(), seen.rend(),
-                                 [](const SeenFrame& f) { return f.from_board && f.frame.id == can::Board::id; });
-  if (told == seen.rend()) throw std::runtime_error(board_name + " does not tell how long a sample takes");
-  return {board.stack_used(), can::Board::of(told->frame).longest_sample};
+  const auto report = std::find_if(seen.rbegin(), seen.rend(),
+                                   [](const SeenFrame& f) { return f.from_board && f.frame.id == can::Board::id; });
+  if (report == seen.rend()) throw std::runtime_error(board_name + " does not report how long a sample takes");
+  return {board.stack_used(), can::Board::of(report->frame).longest_sample};
 }
 
-/// The emulator's memory from `begin` on, by its monitor at the socket.
+/// Memory of the emulator from `begin` on, read through its monitor at a socket.
 std::string memory_of(const std::filesystem::path& monitor, std::uint32_t begin, std::uint32_t size,
                       const std::filesystem::path& file) {
   sockaddr_un address{};
@@ -73,17 +73,17 @@ std::string memory_of(const std::filesystem::path& monitor, std::uint32_t begin,
   std::strncpy(address.sun_path, monitor.c_str(), sizeof address.sun_path - 1);
   const int line = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const std::string command = fmt::format("memsave {:#x} {:#x} \"{}\"\nquit\n", begin, size, file.string());
-  const bool said = connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
+  const bool sent = connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
                     send(line, command.data(), command.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(command.size());
-  for (char c = 0; said && recv(line, &c, 1, 0) > 0;) continue;  // until it has quit
+  for (char c = 0; sent && recv(line, &c, 1, 0) > 0;) continue;  // until it has ended
   close(line);
-  const std::string memory = said ? files::read_file(file) : "";
+  const std::string memory = sent ? files::read_file(file) : "";
   if (memory.size() != size) throw std::runtime_error("no memory from the emulator's monitor");
   return memory;
 }
 
-/// An instruction takes 8 ns, 1.3 cycles at 168 MHz, or 64 ns, one at 16 MHz. The stack: up to the firmware's own
-/// paint.
+/// An instruction takes 8 ns (1.3 cycles at 168 MHz) or 64 ns (one cycle at 16 MHz). The stack is measured down to the
+/// pattern that the firmware wrote.
 BudgetRun run_in_qemu(const images::EmulatedBoard& emulated) {
   const std::string& board_name = emulated.name;
   const auto image = images::firmware_image(board_name, files::read_cell("table9"), images::Image::application);
@@ -100,10 +100,10 @@ BudgetRun run_in_qemu(const images::EmulatedBoard& emulated) {
     board.telemetry();
   }
   board.send_sample(two_minutes().back().time_us + 1'000'000, 0, 3'300'000,
-                    2500);  // it has written the record when it answers
-  can::Frame told;
-  if (!hal::slcan::decode(board.read_until("t1B98"), told))
-    throw std::runtime_error(board_name + " does not tell how long a sample takes");
+                    2500);  // when it answers, the record is written
+  can::Frame report;
+  if (!hal::slcan::decode(board.read_until("t1B98"), report))
+    throw std::runtime_error(board_name + " does not report how long a sample takes");
   board.telemetry();
   const images::ImageFile file(image);
   const std::uint32_t top = file.symbol("image_stack_top"),
@@ -111,7 +111,7 @@ BudgetRun run_in_qemu(const images::EmulatedBoard& emulated) {
   const std::string memory = memory_of(monitor, bottom, top - bottom, folder.path() / "ram");
   std::size_t free = 0;
   while (free + 4 <= memory.size() && memory.compare(free, 4, "\xA5\xA5\xA5\xA5") == 0) free += 4;
-  return {memory.size() - free, can::Board::of(told).longest_sample};
+  return {memory.size() - free, can::Board::of(report).longest_sample};
 }
 
 }  // namespace

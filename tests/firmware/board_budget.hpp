@@ -1,6 +1,6 @@
-// What the image of each board's chip takes of flash, RAM and stack, against what its board.cmake allows:
-// BMS_BUDGET_FLASH, BMS_BUDGET_RAM, BMS_BUDGET_STACK, in bytes, BMS_BUDGET_SAMPLE_MS. A new board joins by its folder.
-// The table in boards/README.md is written by `./bms figures`.
+// Flash, RAM and stack of the image of each board, compared with its board.cmake: BMS_BUDGET_FLASH, BMS_BUDGET_RAM and
+// BMS_BUDGET_STACK in bytes, BMS_BUDGET_SAMPLE_MS. A new board is found by its folder. `./bms figures` writes the table
+// in boards/README.md.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 namespace bms::firmware {
 
 struct BoardFigures {
-  std::uint64_t flash = 0;        ///< code, constants, and what .data begins with
+  std::uint64_t flash = 0;        ///< code, constants, initial values of .data
   std::uint64_t ram = 0;          ///< static
   std::uint64_t stack_worst = 0;  ///< tests/firmware/stack_depth.hpp
 };
@@ -21,19 +21,17 @@ struct BoardBudget {
 };
 BoardBudget budget_of(const std::string& board);
 
-/// The image is built if need be, with the built-in cell table9.
+/// Builds the image if necessary, with the built-in cell table9.
 BoardFigures figures_of(const std::string& board);
 
 struct BudgetRun {
-  std::uint64_t stack = 0;  ///< the deepest that was written to [bytes]
-  double sample_ms = 0;     ///< the longest from a sample to the end of all that is done with it, as the board itself
-                            ///< tells (Board.LongestSample)
+  std::uint64_t stack = 0;  ///< deepest written word [bytes]
+  double sample_ms = 0;     ///< longest processing time of a sample, as the board reports it (Board.LongestSample)
 };
 
-/// Two minutes of the shift's samples, at the end of each of which the record is written: in Unicorn what QEMU does not
-/// have (the image whose samples come over CAN; an instruction is a cycle, flash makes the core wait), in QEMU the
-/// application with the emulated pins (an instruction takes 8 ns, UART and flash no time). Nothing: neither has the
-/// board.
+/// Runs two minutes of the shift; after each minute a record is written. Boards that QEMU does not emulate run in
+/// Unicorn with samples over CAN: an instruction takes one cycle, and flash makes the core wait. In QEMU an instruction
+/// takes 8 ns, UART and flash take no time. Returns nothing if no emulator has the board.
 std::optional<BudgetRun> run_of(const std::string& board);
 
 /// The rows of the table in boards/README.md.

@@ -1,4 +1,4 @@
-// Flash, RAM and stack of every board in boards/ against its budget, and the way the stack's depth is found.
+// Compares flash, RAM and stack of every board with its budget, and tests how the stack depth is determined.
 #include <regex>
 
 #include <gtest/gtest.h>
@@ -16,23 +16,24 @@ namespace {
 
 class Budgets : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(Budgets, HoldTheImageOfTheChip) {
+TEST_P(Budgets, CoverTheImageOfTheChip) {
   const BoardFigures f = figures_of(GetParam());
   const BoardBudget budget = budget_of(GetParam());
   EXPECT_LE(f.flash, budget.flash);
   EXPECT_LE(f.ram, budget.ram);
   EXPECT_LE(f.stack_worst, budget.stack);
   const files::CommittedFigures flash(BMS_SOURCE_DIR "/boards/README.md", "budgets");
-  ASSERT_TRUE(flash.has(GetParam())) << "boards/README.md: ./bms figures writes its row";
-  EXPECT_LE(static_cast<double>(f.flash), 1.05 * flash.at(GetParam())) << "./bms figures if it is worth it";
+  ASSERT_TRUE(flash.has(GetParam())) << "no row in boards/README.md: run ./bms figures";
+  EXPECT_LE(static_cast<double>(f.flash), 1.05 * flash.at(GetParam()))
+      << "if the growth is worth it, run ./bms figures";
 }
 
-TEST_P(Budgets, HoldTwoMinutesOfItsRun) {
+TEST_P(Budgets, CoverTwoMinutesOfARun) {
   const auto run = run_of(GetParam());
-  if (!run) GTEST_SKIP() << "no emulator runs the image of " << GetParam() << " without a program beside it";
+  if (!run) GTEST_SKIP() << "no emulator runs the image of " << GetParam() << " without a host program";
   const std::uint64_t worst = figures_of(GetParam()).stack_worst;
   EXPECT_LE(run->stack, worst);
-  EXPECT_GT(3 * run->stack, worst) << "what was measured did not go where it is deep";
+  EXPECT_GT(3 * run->stack, worst) << "the run did not reach the deep functions";
   EXPECT_GT(run->sample_ms, 0);
   EXPECT_LE(run->sample_ms, budget_of(GetParam()).sample_ms);
 }
@@ -69,30 +70,30 @@ const std::string main_calls_two = R"(
  8000214:	4770      	bx	lr
 )";
 
-TEST(StackDepth, IsTheDeepestWayThroughTheCalls) {
+TEST(StackDepth, IsTheDeepestPathThroughTheCalls) {
   const Functions functions = functions_of(main_calls_two);
   EXPECT_EQ(functions.at(0x8000000).stack, 36U);
   EXPECT_EQ(functions.at(0x8000200).stack, 24U);
   const Depth d = depth_from(functions, 0x8000000, {});
   EXPECT_EQ(d.bytes, 60U);
-  EXPECT_EQ(d.way, (std::vector<std::string>{"main", "deep(int)", "leaf()"}));
+  EXPECT_EQ(d.path, (std::vector<std::string>{"main", "deep(int)", "leaf()"}));
 }
 
-TEST(StackDepth, CountsACallAfterThePrologueIsTakenBackAsDeepAsBefore) {
+TEST(StackDepth, CountsABranchAfterAnEpilogueAsDeepAsBefore) {
   const Functions f = functions_of(
       "08000000 <f>:\n 8000000:\tb510\tpush\t{r4, lr}\n 8000002:\td001\tbeq.n\t8000008 <f+0x8>\n "
       "8000004:\tbd10\tpop\t{r4, pc}\n 8000008:\tb084\tsub\tsp, #16\n");
   EXPECT_EQ(f.at(0x8000000).stack, 24U);
 }
 
-TEST(StackDepth, TakesALargeFrameOfTheCortexM0) {
+TEST(StackDepth, CountsALargeFrameOfTheCortexM0) {
   const Functions f = functions_of(
       "00000000 <f>:\n   0:\tb510\tpush\t{r4, lr}\n   2:\t4c01\tldr\tr4, [pc, #4]\t@ (8 <f+0x8>)\n   "
       "4:\t44a5\tadd\tsp, r4\n   6:\tbd10\tpop\t{r4, pc}\n   8:\tfffffdf8 \t.word\t0xfffffdf8\n");
   EXPECT_EQ(f.at(0).stack, 8U + 0x208);
 }
 
-TEST(StackDepth, RefusesWhatItCannotTell) {
+TEST(StackDepth, RejectsWhatItCannotDetermine) {
   const Functions pointer = functions_of("00000000 <f>:\n   0:\t4798\tblx\tr3\n   2:\t4770\tbx\tlr\n");
   EXPECT_THROW(depth_from(pointer, 0, {}), std::runtime_error);
   EXPECT_EQ(depth_from(pointer, 0, {{"f", {}}}).bytes, 0U);
@@ -102,8 +103,8 @@ TEST(StackDepth, RefusesWhatItCannotTell) {
   EXPECT_THROW(functions_of("00000000 <f>:\n   0:\t4798\tsub.w\tsp, sp, r3\n"), std::runtime_error);
 }
 
-/// The compiler's own figure (-fstack-usage) of every function that it knows, of the same image.
-TEST(StackDepth, OfAFunctionIsWhatTheCompilerSays) {
+/// Compared with the figures of the compiler (-fstack-usage) for the same image.
+TEST(StackDepth, OfAFunctionAgreesWithTheCompiler) {
   const auto image =
       images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application);
   std::map<std::string, std::uint32_t> compiler;

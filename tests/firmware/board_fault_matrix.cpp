@@ -9,170 +9,17 @@
 
 #include <fmt/format.h>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
-#include "estimator/estimate.hpp"
-#include "files/cell_file.hpp"
 #include "files/recording.hpp"
-#include "hal/bytes.hpp"
-#include "hal/sample_frames.hpp"
-#include "hil/board_link.hpp"
-#include "host_sim/replay.hpp"
-#include "images/firmware_image.hpp"
-#include "tests/protection/simulated_truck.hpp"
+#include "tests/firmware/board_truck.hpp"
 
 namespace bms::protection {
 
 namespace {
 
-constexpr std::size_t charge_heat = 8, discharge_heat = 9, implausible = 18, precharge = 26, welded = 27,
-                      not_closed = 28, no_samples = 29;
-constexpr std::size_t in_frames = 30;                 // faults that frames can bring about
-constexpr int opens_within_ms = 5'000 + 2 * step_ms;  // what opens waits five seconds for the current to cease
-constexpr double most_a = 6;
-
-std::string_view reaction_of(std::size_t k) { return expected_rows[k].reaction; }
-bool opens(std::size_t k) {
-  return reaction_of(k) == "open" || reaction_of(k) == "open now" || reaction_of(k) == "forbid discharge";
-}
-
-/// Built once.
-const std::filesystem::path& image() {
-  static const auto path = images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::hil);
-  return path;
-}
-
-/// The board at the other end, and what it said last.
-class BoardTruck : public TruckPack {
- public:
-  BoardTruck(std::uint64_t seed, MatrixResult& result, std::int32_t soc_ppb = 600'000'000)
-      : TruckPack(seed), result_(result), link_(hil::emulated_link("stm32f405_forklift", image())) {
-    receive(link_->exchange(0, std::vector{hal::frame_of(measurement::StartingPoint{soc_ppb, 20'000'000})}));
-  }
-
-  bool drive_off(const Change& change = {}) {
-    for (int k = 0; k < 100 && contactors.state != can::ContactorState::state_drive; ++k) step(change);
-    return contactors.state == can::ContactorState::state_drive;
-  }
-
-  void step(const Change& change = {}) {
-    measure(told(), change);
-    if (link) inputs.dc_link_uv = link(*this);
-    std::vector<can::Frame> frames;
-    if (steps() % 10 == 1) frames.push_back(request());
-    const auto measured = hal::frames_of(sample, inputs.dc_link_uv, static_cast<std::uint16_t>(steps()));
-    frames.insert(frames.end(), measured.begin(), measured.end());
-    heard_faults_ = false;
-    receive(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
-    if (!heard_faults_) complain("did not say Faults with a sample");
-    judge();
-    if (result_.traced) trace();
-  }
-
-  /// 100 ms without a sample.
-  void wait() {
-    measure(told());
-    std::vector<can::Frame> frames;
-    if (steps() % 10 == 1) frames.push_back(request());
-    receive(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
-  }
-
-  Outputs told() const {
-    return {.main_plus = contactors.main_plus != 0,
-            .main_minus = contactors.main_minus != 0,
-            .precharge = contactors.precharge != 0,
-            .charge_enable = contactors.charge_enable != 0};
-  }
-  bool is_closed() const { return contactors.main_plus != 0 && contactors.main_minus != 0; }
-  void complain(const std::string& what) {
-    ++wrong;
-    if (result_.wrong.size() < 100)
-      result_.wrong.push_back(fmt::format("{} at {:.1f} s", what, 0.1 * static_cast<double>(steps())));
-  }
-
-  std::function<std::int32_t(const TruckPack&)> link;  ///< instead of the truck's own
-  std::uint32_t faults = 0, expected = 0;
-  std::uint32_t not_judged = 0;  ///< rows that the oracle does not know here
-  std::uint32_t flags = 0;       ///< of the estimate
-  bool contradicts() const { return (flags & estimator::voltage_rejected) != 0; }
-  can::ContactorState contactors;
-  can::AllowedCurrent allowed;
-  int wrong = 0;
-
- private:
-  can::Frame request() {
-    can::Command command;
-    command.code = can::Command::code_request;
-    command.argument = static_cast<std::uint32_t>(inputs.request);
-    return command.frame(asked_ = can::next(asked_));
-  }
-
-  void receive(const std::vector<can::Frame>& frames) {
-    for (const can::Frame& f : frames) {
-      if (f.id == can::Faults::id)
-        faults = hal::get_bytes<std::uint32_t>(f.data, 2), heard_faults_ = true;  // bits 16 to 47
-      if (f.id == can::ContactorState::id) contactors = can::ContactorState::of(f);
-      if (f.id == can::AllowedCurrent::id) allowed = can::AllowedCurrent::of(f);
-      if (f.id == can::Status::id) flags = can::Status::of(f).flags;
-    }
-  }
-
-  void trace() {
-    std::string names;
-    for (std::size_t k = 0; k < fault_count; ++k)
-      names += has(faults, k) ? fmt::format(" [{}]", expected_rows[k].name) : "";
-    const auto [low, high] = std::minmax_element(sample.cell_uv.begin(), sample.cell_uv.end());
-    result_.trace += fmt::format(
-        "{:7.1f} s  {:7.2f} A  {:.3f} to {:.3f} V  {}  discharge {:.2f} A, charge {:.2f} A {}\n",
-        0.1 * static_cast<double>(steps()), 1e-6 * sample.current_ua, 1e-6 * *low, 1e-6 * *high,
-        contactor_state_names[static_cast<std::size_t>(contactors.state)], allowed.discharge, allowed.charge, names);
-  }
-
-  void judge() {
-    ++result_.samples;
-    expected = oracle_.check(sample, contradicts());
-    for (std::size_t k = 0; k < fault_count; ++k) {
-      if (!visible_in_samples(k) || has(not_judged, k) || has(expected, k) == has(faults, k)) continue;
-      ++(has(expected, k) ? result_.missed : result_.falsely);
-      complain(fmt::format("{} {}, value {}", expected_rows[k].name, has(expected, k) ? "missed" : "false",
-                           oracle_.values[k].value_or(measurement::no_reading)));
-    }
-    for (std::size_t k = 0; k < fault_count; ++k) {
-      if (!has(faults, k)) told_at_us_[k] = sample.time_us;
-    }
-    drove_ = drove_ || contactors.state == can::ContactorState::state_drive;
-    bool may_open = inputs.request == Request::none;
-    for (std::size_t k = 0; k < fault_count; ++k)
-      may_open = may_open || (has(faults, k) && opens(k)) ||
-                 (has(faults, k) && reaction_of(k) == "forbid charge" && sample.current_ua > 0);
-    forbidden_ = forbidden_ || may_open;
-    if (drove_ && !forbidden_ && !is_closed()) complain("contactors opened without a fault that opens");
-    for (std::size_t k = 0; k < fault_count; ++k) {
-      if (!has(faults, k)) continue;
-      const bool no_discharge = opens(k), no_charge = reaction_of(k) == "forbid charge" || reaction_of(k) == "open" ||
-                                                      reaction_of(k) == "open now";
-      if (reaction_of(k) == "open now" &&
-          (contactors.main_plus != 0 || contactors.main_minus != 0 || contactors.precharge != 0))
-        complain(std::string(expected_rows[k].name) + ": a contactor is closed");
-      if (no_discharge && allowed.discharge > 0)
-        complain(std::string(expected_rows[k].name) + ": discharge is allowed");
-      if (no_charge && allowed.charge > 0) complain(std::string(expected_rows[k].name) + ": charge is allowed");
-      if (reaction_of(k) == "derate" && sample.time_us - told_at_us_[k] >= 1'000'000 &&
-          (allowed.discharge > 0.5 * most_a + 0.02 || allowed.charge > 0.5 * most_a + 0.02))
-        complain(std::string(expected_rows[k].name) + ": more than half the current is allowed");
-    }
-  }
-
-  MatrixResult& result_;
-  std::unique_ptr<hil::BoardLink> link_;
-  TruckOracle oracle_;
-  std::uint8_t asked_ = 0;
-  std::array<std::uint64_t, fault_count> told_at_us_{};
-  bool heard_faults_ = false, drove_ = false, forbidden_ = false;
-};
-
-/// The same as inject(), of a board whose estimator is its own: it disbelieves what is beside its model.
-void bring(std::size_t k, std::int32_t value, BoardTruck& truck, measurement::PackSample<16>& s, PackEstimate<16>& e) {
-  if (k == charge_heat || k == discharge_heat) {
+/// Like inject(), for a board with its own estimator, which rejects voltages that contradict its model.
+void bring_about(std::size_t k, std::int32_t value, BoardTruck& truck, measurement::PackSample<16>& s,
+                 PackEstimate<16>& e) {
+  if (k == charge_overload || k == discharge_overload) {
     s.current_ua = value;
   } else if (k == implausible) {
     for (auto& uv : s.cell_uv) uv -= value > 0 && uv != measurement::no_reading ? 300'000 : 0;
@@ -181,33 +28,33 @@ void bring(std::size_t k, std::int32_t value, BoardTruck& truck, measurement::Pa
   }
 }
 std::int32_t level(std::size_t k, bool above) {
-  if (k == charge_heat) return above ? 12'000'000 : 6'270'000;
-  if (k == discharge_heat) return above ? -12'000'000 : -6'270'000;
+  if (k == charge_overload) return above ? 12'000'000 : 6'270'000;
+  if (k == discharge_overload) return above ? -12'000'000 : -6'270'000;
   return above ? levels(expected_rows[k]).just_above : levels(expected_rows[k]).just_below;
 }
-/// Beyond the threshold by up to three sigma, as somebody measures it: what stays the same to the last digit is another
-/// fault.
-void hold(std::size_t k, BoardTruck& truck, measurement::PackSample<16>& s, PackEstimate<16>& e) {
+/// Keeps the condition of fault k, beyond its threshold by up to three sigma of noise. A constant reading would be
+/// another fault.
+void keep(std::size_t k, BoardTruck& truck, measurement::PackSample<16>& s, PackEstimate<16>& e) {
   const bool measured = visible_in_samples(k) && levels(expected_rows[k]).noise > 0;
   const int sign = expected_rows[k].beyond == '>' ? 1 : -1;
-  bring(
+  bring_about(
       k,
       level(k, true) + (measured ? sign * static_cast<std::int32_t>(measured_noise(k) * std::abs(truck.chance())) : 0),
       truck, s, e);
 }
-/// Twice the limit, over 1.05 of it: the integral is full after 30 s / (i^2 - 1).
-int ideal_heat_ms() {
+/// Twice the limit, relative to 1.05 of it: the overload integral is full after 30 s / (i^2 - 1).
+int ideal_overload_ms() {
   const double i = 2 / 1.05;
   return static_cast<int>(30'000 / (i * i - 1));
 }
 int delay_ms(std::size_t k) {
-  return k == charge_heat || k == discharge_heat ? ideal_heat_ms() : expected_rows[k].delay_ms;
+  return k == charge_overload || k == discharge_overload ? ideal_overload_ms() : expected_rows[k].delay_ms;
 }
 /// An integral in 256ths is off by 1.4 %.
 int tolerance_ms(std::size_t k) {
-  return step_ms + (k == charge_heat || k == discharge_heat ? delay_ms(k) * 14 / 1'000 : 0);
+  return step_ms + (k == charge_overload || k == discharge_overload ? delay_ms(k) * 14 / 1'000 : 0);
 }
-/// How long until the estimator disbelieves is its own affair; what stands still is found when the others have moved.
+/// The estimator decides when it rejects the voltage; a stuck reading is detected when the others have changed.
 bool begins_by_itself(std::size_t k) { return k == implausible || waits_for_others(k); }
 int patience_ms(std::size_t k) { return delay_ms(k) + (begins_by_itself(k) ? 120'000 : 3'000); }
 
@@ -233,15 +80,12 @@ class Matrix {
       const bool measured = visible_in_samples(k) && levels(expected_rows[k]).noise > 0;
       if (measured) {
         for (const int offset : one_of<int>({-1, 0, 1})) {
-          all.push_back({fmt::format("noise {} {}",
-                                     offset < 0   ? "below"
-                                     : offset > 0 ? "above"
-                                                  : "around",
-                                     name),
+          static constexpr std::array where{"below", "around", "above"};
+          all.push_back({fmt::format("noise {} {}", where[static_cast<std::size_t>(offset + 1)], name),
                          [k, offset](MatrixResult& r) { noisy(k, offset, r); }});
         }
       } else if (visible_in_samples(k)) {
-        all.push_back({"now and then " + name, [k](MatrixResult& r) { loose(k, r); }});
+        all.push_back({"sometimes " + name, [k](MatrixResult& r) { loose(k, r); }});
       }
       std::vector<std::size_t> others;
       for (std::size_t other = 0; other < 26; ++other) {
@@ -253,7 +97,7 @@ class Matrix {
                        [k, other](MatrixResult& r) { during(k, other, r); }});
       }
     }
-    const std::vector<std::size_t> harmless = {0, 3, 11, 13, 15, 17, 23};  // contactors close all the same
+    const std::vector<std::size_t> harmless = {0, 3, 11, 13, 15, 17, 23};  // the contactors close in spite of these
     for (const std::size_t k : {precharge, welded, not_closed, no_samples}) {
       const std::string name = expected_rows[k].name;
       all.push_back({"just below " + name, [k](MatrixResult& r) { contactors(k, false, {}, r); }});
@@ -279,26 +123,26 @@ class Matrix {
     return plan.rules[k].quantity;
   }
 
-  /// The eight hours of recordings/forklift_shift.csv, every second ten times with noise of its own: no fault is there,
-  /// none may be told.
+  /// The eight hours of recordings/forklift_shift.csv, every second ten times with different noise. There is no fault,
+  /// so none may be published.
   static void shift(MatrixResult& result) {
     const std::vector<measurement::Sample> seconds =
         files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
-    BoardTruck truck(6, result, 980'000'000);
+    BoardTruck truck(6, result, 0.98);
     const auto is = [&](const measurement::Sample& at) {
       truck.trajectory = {static_cast<double>(at.current_ua), static_cast<double>(at.voltage_uv),
                           static_cast<double>(at.temperature_cdegc)};
     };
     is(seconds.front());
-    if (!truck.drive_off()) return truck.complain("does not drive off");
+    if (!truck.drive_off()) return truck.complain("does not start to drive");
     const std::uint64_t before = result.samples;
     for (const measurement::Sample& second : seconds) {
       is(second);
       for (int tenth = 0; tenth < 10; ++tenth) {
         truck.step();
-        if (truck.faults != 0) return truck.complain(fmt::format("told faults {:08x}", truck.faults));
-        if (truck.expected != 0) return truck.complain(fmt::format("there are faults {:08x}", truck.expected));
-        if (!truck.is_closed()) return truck.complain("does not drive any more");
+        if (truck.faults != 0) return truck.complain(fmt::format("published faults {:08x}", truck.faults));
+        if (truck.expected != 0) return truck.complain(fmt::format("the oracle has faults {:08x}", truck.expected));
+        if (!truck.is_closed()) return truck.complain("stopped driving");
       }
     }
     result.shift_samples = result.samples - before;
@@ -306,42 +150,46 @@ class Matrix {
 
   static void below(std::size_t k, MatrixResult& result) {
     BoardTruck truck(k + 1, result);
-    if (!truck.drive_off()) return truck.complain("does not drive off");
+    if (!truck.drive_off()) return truck.complain("does not start to drive");
     for (int t = 0; t < patience_ms(k); t += step_ms) {
-      truck.step([&](auto& s, auto& e, auto&) { bring(k, level(k, false), truck, s, e); });
+      truck.step([&](auto& s, auto& e, auto&) { bring_about(k, level(k, false), truck, s, e); });
       if (has(truck.faults, k)) return truck.complain("false");
     }
     if (truck.wrong == 0) ++result.rows[k].silent;
   }
 
-  /// The time until it is told; and of a fault that opens, until the contactors are. Nothing: complained.
+  static std::nullopt_t missed(BoardTruck& truck) {
+    truck.complain(fmt::format("missed, faults {:08x}, contactors {}, flags of the estimate {:x}", truck.faults,
+                               truck.contactors.state, truck.flags));
+    return std::nullopt;
+  }
+
+  /// Returns the time until the fault is published, and records that until the contactors are open. Nothing: a
+  /// deviation.
   static std::optional<int> reaction(std::size_t k, BoardTruck& truck, const TruckPack::Change& change,
                                      MatrixResult& result, int offset_ms = 0) {
-    int told_ms = -1, opened_ms = truck.is_closed() ? -1 : 0;
+    int published_ms = -1, opened_ms = truck.is_closed() ? -1 : 0;
     std::optional<int> since = begins_by_itself(k) ? std::nullopt : std::optional(0);
     const int most_ms = patience_ms(k) + opens_within_ms + 1'000;
     for (int t = offset_ms; t < most_ms; t += step_ms) {
       truck.step(change);
       if (!since && (k == implausible ? truck.contradicts() : has(truck.expected, k)))
         since = k == implausible ? t : t - delay_ms(k);
-      if (told_ms < 0 && has(truck.faults, k)) told_ms = t;
+      if (published_ms < 0 && has(truck.faults, k)) published_ms = t;
       if (opened_ms < 0 && !truck.is_closed()) opened_ms = t;
-      if (told_ms >= 0 && (opened_ms >= 0 || !opens(k) || k == charge_heat)) break;
+      if (published_ms >= 0 && (opened_ms >= 0 || !opens(k) || k == charge_overload)) break;
     }
-    const bool taken_away = (k == charge_heat || k == discharge_heat) && told_ms < 0 &&
-                            !truck.is_closed();  // by another fault that the oracle knows: no current flows
+    const bool taken_away = (k == charge_overload || k == discharge_overload) && published_ms < 0 &&
+                            !truck.is_closed();  // another expected fault has opened: no current flows
     if (taken_away && truck.wrong == 0) return std::nullopt;
-    if (told_ms < 0 || !since)
-      return truck.complain(fmt::format("missed, faults {:08x}, contactors {}, flags of the estimate {:x}",
-                                        truck.faults, truck.contactors.state, truck.flags)),
-             std::nullopt;
-    const int after_ms = told_ms - *since;
-    if (after_ms < delay_ms(k) - (k == charge_heat || k == discharge_heat ? tolerance_ms(k) : 0))
+    if (published_ms < 0 || !since) return missed(truck);
+    const int after_ms = published_ms - *since;
+    if (after_ms < delay_ms(k) - (k == charge_overload || k == discharge_overload ? tolerance_ms(k) : 0))
       truck.complain(fmt::format("after {} ms: too soon", after_ms));
     if (after_ms > delay_ms(k) + tolerance_ms(k)) truck.complain(fmt::format("after {} ms: too late", after_ms));
     if (opens(k) && opened_ms != 0) {
-      if (opened_ms < 0 || opened_ms > told_ms + (reaction_of(k) == "open now" ? 0 : opens_within_ms))
-        truck.complain(fmt::format("opened {} ms after it was told", opened_ms - told_ms));
+      if (opened_ms < 0 || opened_ms > published_ms + (reaction_of(k) == "open now" ? 0 : opens_within_ms))
+        truck.complain(fmt::format("opened {} ms after the message", opened_ms - published_ms));
       result.rows[k].opened.add(opened_ms - *since);
     }
     return after_ms;
@@ -349,155 +197,185 @@ class Matrix {
 
   static void above(std::size_t k, MatrixResult& result) {
     BoardTruck truck(k + 40, result);
-    if (!truck.drive_off()) return truck.complain("does not drive off");
-    // an estimator that is still looking for its state of charge disbelieves nothing
+    if (!truck.drive_off()) return truck.complain("does not start to drive");
+    // an estimator that still searches for its state of charge rejects no voltage
     for (int t = 0; k == implausible && t < 300'000 && truck.flags != 0; t += step_ms) truck.step();
     if (const auto ms = reaction(
-            k, truck, [&](auto& s, auto& e, auto&) { bring(k, level(k, true), truck, s, e); }, result))
+            k, truck, [&](auto& s, auto& e, auto&) { bring_about(k, level(k, true), truck, s, e); }, result))
       result.rows[k].above.add(*ms);
   }
 
   static void noisy(std::size_t k, int offset, MatrixResult& result) {
     const ExpectedRow& row = expected_rows[k];
     BoardTruck truck(100 + k * 3 + static_cast<std::size_t>(offset + 1), result);
-    if (!truck.drive_off()) return truck.complain("does not drive off");
+    if (!truck.drive_off()) return truck.complain("does not start to drive");
     const std::int32_t noise = measured_noise(k), sign = row.beyond == '>' ? 1 : -1;
-    int told_ms = -1;
+    int published_ms = -1;
     for (int t = 0; t < row.delay_ms + 20'000; t += step_ms) {
       const auto value =
           row.threshold + sign * offset * (noise + 2) + static_cast<std::int32_t>(noise * truck.chance());
-      truck.step([&](auto& s, auto& e, auto&) { bring(k, value, truck, s, e); });
-      if (told_ms < 0 && has(truck.faults, k)) told_ms = t;
+      truck.step([&](auto& s, auto& e, auto&) { bring_about(k, value, truck, s, e); });
+      if (published_ms < 0 && has(truck.faults, k)) published_ms = t;
     }
-    if (offset < 0 && told_ms >= 0) truck.complain("false");
-    if (offset > 0 && (told_ms < row.delay_ms || told_ms > row.delay_ms + step_ms))
-      truck.complain(fmt::format("told after {} ms", told_ms));
-    if (offset > 0) result.rows[k].in_noise.add(told_ms);
+    if (offset < 0 && published_ms >= 0) truck.complain("false");
+    if (offset > 0 && (published_ms < row.delay_ms || published_ms > row.delay_ms + step_ms))
+      truck.complain(fmt::format("published after {} ms", published_ms));
+    if (offset > 0) result.rows[k].in_noise.add(published_ms);
     if (offset < 0 && truck.wrong == 0) ++result.rows[k].silent;
   }
 
-  /// Of what is there or not: now and then. The oracle says when that is a fault.
+  /// A condition that holds only in some samples. The oracle decides when it is a fault.
   static void loose(std::size_t k, MatrixResult& result) {
     BoardTruck truck(200 + k, result);
-    if (!truck.drive_off()) return truck.complain("does not drive off");
+    if (!truck.drive_off()) return truck.complain("does not start to drive");
     for (int t = 0; t < 60'000; t += step_ms) {
       const bool now = truck.chance() > 0.15;  // a third of the samples
-      truck.step([&](auto& s, auto& e, auto&) { bring(k, now ? 1 : 0, truck, s, e); });
+      truck.step([&](auto& s, auto& e, auto&) { bring_about(k, now ? 1 : 0, truck, s, e); });
     }
   }
 
   static void during(std::size_t k, std::size_t other, MatrixResult& result) {
     BoardTruck truck(1'000 + 32 * k + other, result);
-    if (!truck.drive_off()) return truck.complain("does not drive off");
+    if (!truck.drive_off()) return truck.complain("does not start to drive");
     for (int t = 0; t < delay_ms(other) + 500; t += step_ms) {
-      truck.step([&](auto& s, auto& e, auto&) { hold(other, truck, s, e); });
+      truck.step([&](auto& s, auto& e, auto&) { keep(other, truck, s, e); });
     }
-    if (!has(truck.faults, other)) return truck.complain("the other is not there");
-    // from a turn on the others go far enough from where they were
+    if (!has(truck.faults, other)) return truck.complain("the other fault is not active");
+    // after a turning point the other readings change far enough
     while (waits_for_others(k) && truck.steps() % 200 != 0)
-      truck.step([&](auto& s, auto& e, auto&) { hold(other, truck, s, e); });
+      truck.step([&](auto& s, auto& e, auto&) { keep(other, truck, s, e); });
     const auto both = [&](auto& s, auto& e, auto&) {
-      hold(other, truck, s, e);
-      bring(k, level(k, true), truck, s, e);
+      keep(other, truck, s, e);
+      bring_about(k, level(k, true), truck, s, e);
     };
-    if (shares(k, other)) {  // one takes away what the other is seen by: the oracle knows
+    if (shares(k, other)) {  // one fault hides the other: the oracle decides
       for (int t = 0; t < delay_ms(k) + 1'500; t += step_ms) truck.step(both);
       return;
     }
     if (const auto ms = reaction(k, truck, both, result)) result.rows[k].during.add(*ms);
   }
-  /// Both are brought about by the same readings, or one by the loss of what the other needs.
+  /// Returns true if the same readings cause both faults, or if one needs a reading that the other removes.
   static bool shares(std::size_t k, std::size_t other) {
-    const auto heat_or_current = [](std::size_t r) {
-      return r == charge_heat || r == discharge_heat || r == 10 || r == 22;
+    const auto overload_or_current = [](std::size_t r) {
+      return r == charge_overload || r == discharge_overload || r == 10 || r == 22;
     };
     const auto cells = [](std::size_t r) {
       return r <= 7 || r == 16 || r == 17 || r == 19 || r == 20 || r == 21 || r == 25 || r == implausible;
     };
     const auto warm = [](std::size_t r) { return (r >= 11 && r <= 15) || r == 23 || r == 24; };
     const bool open_already =
-        k == implausible || (heat_or_current(k) && opens(other));  // without current there is none to be too much
-    return open_already || (heat_or_current(k) && heat_or_current(other)) || (cells(k) && cells(other)) ||
+        k == implausible || (overload_or_current(k) && opens(other));  // without current there is no overcurrent
+    return open_already || (overload_or_current(k) && overload_or_current(other)) || (cells(k) && cells(other)) ||
            (warm(k) && warm(other));
   }
 
-  /// Pre-charge, welded and not closed by the link's voltage, and samples that do not come. other: a fault that is
-  /// there before.
-  static void contactors(std::size_t k, bool above, std::optional<std::size_t> other, MatrixResult& result) {
-    BoardTruck truck(3'000 + 10 * k + (above ? 1 : 0), result);
-    const auto change = [&](auto& s, auto& e, auto&) {
-      if (other) hold(*other, truck, s, e);
-    };
-    truck.inputs.request = Request::none;
-    for (int t = 0; t < (other ? delay_ms(*other) + 500 : 1'000); t += step_ms) truck.step(change);
-    if (other && !has(truck.faults, *other)) return truck.complain("the other is not there");
-    truck.inputs.request = Request::drive;
-    int in_precharge = 0, holds_since = -1, now = 0, told = -1, opened = -1;
-    const auto holds = [&](bool yes) {
-      if (yes && holds_since < 0) holds_since = now;
-    };
-    if (k == precharge) {
-      // a hair above the least that the curve allows, or below it, from half a time constant on
-      truck.link = [&](const TruckPack& t) {
-        if (!truck.told().precharge || !truck.told().main_minus) return truck.is_closed() ? t.sample.pack_uv : 0;
-        ++in_precharge;
-        const int halves = in_precharge * step_ms / 250;
-        if (above) holds(halves >= 1);
-        const double least = 1 - std::exp(-0.5 * halves) - 0.2;
-        if (!above && halves >= 11) return t.sample.pack_uv;
-        return static_cast<std::int32_t>(t.sample.pack_uv * std::max(0.0, least + (above ? -0.002 : 0.002)));
-      };
-    } else if (k == welded) {
-      // the link rises by an eighth with the pre-charge relay alone
-      truck.link = [&](const TruckPack& t) -> std::int32_t {
-        const Outputs o = truck.told();
-        if (o.precharge && !o.main_minus) return holds(above), t.sample.pack_uv / 8 + (above ? 1 : 0);
-        if (o.precharge && o.main_minus)
-          return ++in_precharge, static_cast<std::int32_t>(t.sample.pack_uv * (1 - std::exp(-0.2 * in_precharge)));
-        return truck.is_closed() ? t.sample.pack_uv : 0;
-      };
-    } else if (k == not_closed) {
-      // a sixteenth below the pack with both closed
-      truck.link = [&](const TruckPack& t) -> std::int32_t {
-        const Outputs o = truck.told();
-        if (o.precharge && o.main_minus)
-          return ++in_precharge, static_cast<std::int32_t>(t.sample.pack_uv * (1 - std::exp(-0.2 * in_precharge)));
-        if (!truck.is_closed()) return 0;
-        holds(above);
-        return static_cast<std::int32_t>(std::int64_t{t.sample.pack_uv} * 960 / 1024) - (above ? 1 : 0);
-      };
+  /// A fault of precharge or contactors, caused by the DC-link voltage, or missing samples.
+  struct ContactorCase {
+    std::size_t fault;
+    bool above;
+    int now_ms = 0, holds_since_ms = -1, in_precharge = 0;  ///< in_precharge: samples
+
+    void condition_holds(bool yes) {
+      if (yes && holds_since_ms < 0) holds_since_ms = now_ms;
     }
-    if (k == no_samples) {
-      if (!truck.drive_off(change)) return truck.complain("does not drive off");
-      if (!above) {
-        for (int gap = 0; gap < 4; ++gap) truck.wait();  // half a second from sample to sample
-      } else {
-        holds(true);
-      }
+  };
+
+  /// Just above the lowest voltage that the curve allows, or just below it, from half a time constant on.
+  static std::int32_t link_of_precharge(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+    if (!truck.outputs().precharge || !truck.outputs().main_minus) return truck.is_closed() ? pack_uv : 0;
+    ++c.in_precharge;
+    const int halves = c.in_precharge * step_ms / 250;
+    if (c.above) c.condition_holds(halves >= 1);
+    const double least = 1 - std::exp(-0.5 * halves) - 0.2;
+    if (!c.above && halves >= 11) return pack_uv;
+    return static_cast<std::int32_t>(pack_uv * std::max(0.0, least + (c.above ? -0.002 : 0.002)));
+  }
+  static std::int32_t precharged(ContactorCase& c, std::int32_t pack_uv) {
+    ++c.in_precharge;
+    return static_cast<std::int32_t>(pack_uv * (1 - std::exp(-0.2 * c.in_precharge)));
+  }
+  /// The DC link rises to an eighth with the precharge contactor alone.
+  static std::int32_t link_of_welded(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+    const Outputs o = truck.outputs();
+    if (o.precharge && !o.main_minus) {
+      c.condition_holds(c.above);
+      return pack_uv / 8 + (c.above ? 1 : 0);
     }
-    for (; now < (above ? 12'000 : 10'000); now += step_ms) {
-      if (k == no_samples && above)
+    if (o.precharge && o.main_minus) return precharged(c, pack_uv);
+    return truck.is_closed() ? pack_uv : 0;
+  }
+  /// The DC link is a sixteenth below the pack voltage with both contactors closed.
+  static std::int32_t link_of_not_closed(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+    const Outputs o = truck.outputs();
+    if (o.precharge && o.main_minus) return precharged(c, pack_uv);
+    if (!truck.is_closed()) return 0;
+    c.condition_holds(c.above);
+    return static_cast<std::int32_t>(std::int64_t{pack_uv} * 960 / 1024) - (c.above ? 1 : 0);
+  }
+  static void set_link(ContactorCase& c, BoardTruck& truck) {
+    if (c.fault == precharge)
+      truck.link = [&](const TruckPack& t) { return link_of_precharge(c, truck, t.sample.pack_uv); };
+    if (c.fault == welded) truck.link = [&](const TruckPack& t) { return link_of_welded(c, truck, t.sample.pack_uv); };
+    if (c.fault == not_closed)
+      truck.link = [&](const TruckPack& t) { return link_of_not_closed(c, truck, t.sample.pack_uv); };
+  }
+
+  /// Starts to drive, then makes a pause of half a second between two samples, or stops the samples.
+  static bool stop_samples(ContactorCase& c, BoardTruck& truck, const TruckPack::Change& change) {
+    if (!truck.drive_off(change)) return false;
+    c.condition_holds(c.above);
+    for (int gap = 0; !c.above && gap < 4; ++gap) truck.wait();
+    return true;
+  }
+
+  struct Times {
+    int published_ms = -1, opened_ms = -1;
+  };
+  static Times run(ContactorCase& c, BoardTruck& truck, const TruckPack::Change& change) {
+    Times t;
+    for (; c.now_ms < (c.above ? 12'000 : 10'000); c.now_ms += step_ms) {
+      if (c.fault == no_samples && c.above)
         truck.wait();
       else
         truck.step(change);
-      if (told < 0 && has(truck.faults, k)) told = now;
-      const Outputs o = truck.told();
-      if (told >= 0 && opened < 0 && !o.main_plus && !o.main_minus && !o.precharge) opened = now;
-      if (opened >= 0) break;
+      if (t.published_ms < 0 && has(truck.faults, c.fault)) t.published_ms = c.now_ms;
+      const Outputs o = truck.outputs();
+      if (t.published_ms >= 0 && !o.main_plus && !o.main_minus && !o.precharge) {
+        t.opened_ms = c.now_ms;
+        break;
+      }
     }
+    return t;
+  }
+
+  /// other: a fault that is active before.
+  static void contactors(std::size_t k, bool above, std::optional<std::size_t> other, MatrixResult& result) {
+    BoardTruck truck(3'000 + 10 * k + (above ? 1 : 0), result);
+    const auto change = [&](auto& s, auto& e, auto&) {
+      if (other) keep(*other, truck, s, e);
+    };
+    truck.inputs.request = Request::none;
+    for (int t = 0; t < (other ? delay_ms(*other) + 500 : 1'000); t += step_ms) truck.step(change);
+    if (other && !has(truck.faults, *other)) return truck.complain("the other fault is not active");
+    truck.inputs.request = Request::drive;
+    ContactorCase c{k, above};
+    set_link(c, truck);
+    if (k == no_samples && !stop_samples(c, truck, change)) return truck.complain("does not start to drive");
+    const Times t = run(c, truck, change);
     if (!above) {
-      if (told >= 0) truck.complain("false");
+      if (t.published_ms >= 0) truck.complain("false");
       if (!truck.is_closed()) truck.complain("does not drive");
       if (truck.wrong == 0) ++result.rows[k].silent;
       return;
     }
-    if (told < 0 || holds_since < 0) return truck.complain("missed");
-    // time without a sample counts from the last that came
-    const int after_ms = told - holds_since + (k == no_samples ? step_ms : 0);
+    if (t.published_ms < 0 || c.holds_since_ms < 0) return truck.complain("missed");
+    const int before_ms = k == no_samples ? step_ms : 0;  // time without a sample counts from the last sample
+    const int after_ms = t.published_ms - c.holds_since_ms + before_ms;
     const int stated_ms = k == no_samples ? 500 : expected_rows[k].delay_ms;
-    if (after_ms > stated_ms + step_ms) truck.complain(fmt::format("told after {} ms: too late", after_ms));
-    if (opened < 0 || opened > told) truck.complain("a contactor is closed when it is told");
-    result.rows[k].opened.add(opened - holds_since + (k == no_samples ? step_ms : 0));
+    if (after_ms > stated_ms + step_ms) truck.complain(fmt::format("published after {} ms: too late", after_ms));
+    if (t.opened_ms < 0 || t.opened_ms > t.published_ms)
+      truck.complain("a contactor is closed when the fault is published");
+    result.rows[k].opened.add(t.opened_ms - c.holds_since_ms + before_ms);
     (other ? result.rows[k].during : result.rows[k].above).add(after_ms);
   }
 
@@ -505,11 +383,47 @@ class Matrix {
   plant::Random random_;
 };
 
+/// Time to detection according to the table of the protections.
+std::string stated_time(std::size_t k) {
+  if (k == charge_overload || k == discharge_overload)
+    return fmt::format("{:.1f} s at twice the limit", 1e-3 * ideal_overload_ms());
+  return fmt::format("{:.1f} s", k == no_samples ? 0.5 : 1e-3 * expected_rows[k].delay_ms);
+}
+
 void merge(DetectionTime& into, const DetectionTime& from) {
   if (from.cases == 0) return;
   into.soonest_ms = into.cases == 0 ? from.soonest_ms : std::min(into.soonest_ms, from.soonest_ms);
   into.latest_ms = std::max(into.latest_ms, from.latest_ms);
   into.cases += from.cases;
+}
+
+void merge(MatrixResult& all, const MatrixResult& one, const std::string& name) {
+  ++all.cases;
+  all.samples += one.samples;
+  all.shift_samples += one.shift_samples;
+  all.missed += one.missed;
+  all.falsely += one.falsely;
+  for (const std::string& line : one.wrong) all.wrong.push_back(name + ": " + line);
+  if (one.traced) all.trace += name + "\n" + one.trace;
+  for (std::size_t k = 0; k < fault_count; ++k) {
+    all.rows[k].silent += one.rows[k].silent;
+    merge(all.rows[k].above, one.rows[k].above);
+    merge(all.rows[k].in_noise, one.rows[k].in_noise);
+    merge(all.rows[k].during, one.rows[k].during);
+    merge(all.rows[k].opened, one.rows[k].opened);
+  }
+}
+
+MatrixResult result_of(const Matrix::Case& one, bool traced) {
+  MatrixResult result;
+  result.rows.resize(fault_count);
+  result.traced = traced;
+  try {
+    one.run(result);
+  } catch (const std::exception& e) {
+    result.wrong.push_back(e.what());
+  }
+  return result;
 }
 
 }  // namespace
@@ -525,30 +439,9 @@ MatrixResult run_fault_matrix(bool every, std::uint64_t seed, unsigned threads, 
   for (unsigned t = 0; t < threads; ++t) {
     workers.emplace_back([&] {
       for (std::size_t c = next++; c < cases.size(); c = next++) {
-        MatrixResult mine;
-        mine.rows.resize(fault_count);
-        mine.traced = !only.empty();
-        try {
-          cases[c].run(mine);
-        } catch (const std::exception& e) {
-          mine.wrong.push_back(e.what());
-        }
+        const MatrixResult result = result_of(cases[c], !only.empty());
         const std::lock_guard lock(one_at_a_time);
-        MatrixResult& all = matrix.result;
-        ++all.cases;
-        all.samples += mine.samples;
-        all.shift_samples += mine.shift_samples;
-        all.missed += mine.missed;
-        all.falsely += mine.falsely;
-        for (const std::string& line : mine.wrong) all.wrong.push_back(cases[c].name + ": " + line);
-        if (mine.traced) all.trace += cases[c].name + "\n" + mine.trace;
-        for (std::size_t k = 0; k < fault_count; ++k) {
-          all.rows[k].silent += mine.rows[k].silent;
-          merge(all.rows[k].above, mine.rows[k].above);
-          merge(all.rows[k].in_noise, mine.rows[k].in_noise);
-          merge(all.rows[k].during, mine.rows[k].during);
-          merge(all.rows[k].opened, mine.rows[k].opened);
-        }
+        merge(matrix.result, result, cases[c].name);
       }
     });
   }
@@ -557,26 +450,24 @@ MatrixResult run_fault_matrix(bool every, std::uint64_t seed, unsigned threads, 
 }
 
 std::string markdown(const MatrixResult& result) {
-  const auto told = [](const DetectionTime& t) {
+  const auto time = [](const DetectionTime& t) {
     if (t.cases == 0) return std::string("-");
     if (t.soonest_ms == t.latest_ms) return fmt::format("{:.1f} s", 1e-3 * t.latest_ms);
     return fmt::format("{:.1f} to {:.1f} s", 1e-3 * t.soonest_ms, 1e-3 * t.latest_ms);
   };
   std::string out =
-      "| fault | table | silent below, number of cases | raised just above it after | three sigma above | during other "
-      "faults | number of cases | open after |\n|---|---|---|---|---|---|---|---|\n";
+      "| fault | table | silent below, of cases | published just above it after | three sigma above | during others | "
+      "of "
+      "cases | open after |\n|---|---|---|---|---|---|---|---|\n";
   for (std::size_t k = 0; k < in_frames; ++k) {
     const MatrixRow& r = result.rows[k];
-    const std::string stated = k == charge_heat || k == discharge_heat
-                                   ? fmt::format("{:.1f} s at twice the limit", 1e-3 * ideal_heat_ms())
-                                   : fmt::format("{:.1f} s", k == no_samples ? 0.5 : 1e-3 * expected_rows[k].delay_ms);
-    out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", expected_rows[k].name, stated, r.silent,
-                       told(r.above), told(r.in_noise), told(r.during), r.during.cases, told(r.opened));
+    out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", expected_rows[k].name, stated_time(k), r.silent,
+                       time(r.above), time(r.in_noise), time(r.during), r.during.cases, time(r.opened));
   }
   out += fmt::format("\n{} cases, {} samples: {} missed, {} false.", result.cases, result.samples, result.missed,
                      result.falsely);
   if (result.shift_samples > 0)
-    out += fmt::format(" {} of the samples are the shift with noise, without a fault.", result.shift_samples);
+    out += fmt::format(" {} of the samples are the shift with noise: no fault published.", result.shift_samples);
   return out + "\n";
 }
 

@@ -1,5 +1,5 @@
-// A part of the fault matrix against the forklift board's image in the emulator: every protection below, above, in
-// noise and during another fault. All of it: ./bms faults
+// A part of the fault matrix on the image of the forklift board in the emulator: every protection below, above, in
+// noise and during another fault. The whole matrix: ./bms faults
 #include "tests/firmware/board_fault_matrix.hpp"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace bms::protection {
 namespace {
 
-TEST(BoardFaultMatrix, TellsEveryFaultInItsTimeAndNoOtherAndOpensAsTheTableSays) {
+TEST(BoardFaultMatrix, EveryFaultIsPublishedInItsTimeAndNoOtherAndOpensAsTheTableSays) {
   const MatrixResult result = run_fault_matrix(false, 1, 2);
   for (const std::string& line : result.wrong) ADD_FAILURE() << line;
   EXPECT_EQ(result.missed, 0U);
@@ -17,7 +17,7 @@ TEST(BoardFaultMatrix, TellsEveryFaultInItsTimeAndNoOtherAndOpensAsTheTableSays)
   EXPECT_GT(result.cases, 100U);
   EXPECT_GT(result.samples, 20'000U);
   for (std::size_t k = 0; k < fault_count; ++k) {
-    if (k >= 30) continue;  // by no frame: unicorn boards
+    if (k >= 30) continue;  // no frame causes them: tested on the boards in Unicorn
     EXPECT_GE(result.rows[k].silent, 1) << expected_rows[k].name;
     EXPECT_EQ(result.rows[k].above.cases, 1) << expected_rows[k].name;
   }

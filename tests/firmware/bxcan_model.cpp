@@ -13,7 +13,7 @@ constexpr unsigned error_frame_bits = 6 + 8 + 3,
 
 can::Frame to_can_frame(const WireFrame& f) { return {f.id, f.length, f.data, f.extended}; }
 
-/// Lower wins: identifier, then RTR, then IDE as the bits come.
+/// The lower value wins: identifier, RTR and IDE in the order of the bits.
 std::uint64_t arbitration_field(const WireFrame& f) {
   if (!f.extended) return static_cast<std::uint64_t>(f.id) << 21 | (f.remote ? 1ULL << 20 : 0);
   return static_cast<std::uint64_t>(f.id >> 18) << 21 | 3ULL << 19 | static_cast<std::uint64_t>(f.id & 0x3FFFF) << 1 |
@@ -31,10 +31,14 @@ unsigned bits_on_the_wire(const WireFrame& f) {
   };
   put(0, 1);
   if (f.extended) {
-    put(f.id >> 18, 11), put(3, 2), put(f.id & 0x3FFFF, 18), put(f.remote ? 1 : 0, 1), put(0, 2);
+    put(f.id >> 18, 11);
+    put(3, 2);
+    put(f.id & 0x3FFFF, 18);
   } else {
-    put(f.id, 11), put(f.remote ? 1 : 0, 1), put(0, 2);
+    put(f.id, 11);
   }
+  put(f.remote ? 1 : 0, 1);
+  put(0, 2);
   put(f.length, 4);
   for (unsigned k = 0; !f.remote && k < std::min<unsigned>(f.length, 8); ++k) put(f.data[k], 8);
   unsigned crc = 0;  // x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1
@@ -45,7 +49,10 @@ unsigned bits_on_the_wire(const WireFrame& f) {
   for (const int b : bits) {
     run = b == last ? run + 1 : 1;
     last = b;
-    if (run == 5) ++stuffed, last = 1 - b, run = 1;
+    if (run < 5) continue;
+    ++stuffed;
+    last = 1 - b;
+    run = 1;
   }
   return static_cast<unsigned>(bits.size()) + stuffed + 1 + 2 + 7 +
          3;  // CRC delimiter, acknowledge, end of frame, intermission
@@ -142,7 +149,9 @@ void BxcanModel::write(std::uint32_t at, std::uint32_t value) {
     case 0x0C:
       if ((value & 16) != 0) overrun_ = false;
       if ((value & 8) != 0) full_ = false;
-      if ((value & 32) != 0 && !fifo_.empty()) fifo_.pop_front(), full_ = false;
+      if ((value & 32) == 0 || fifo_.empty()) return;
+      fifo_.pop_front();
+      full_ = false;
       return;
     case 0x14:
       ier_ = value;
@@ -163,7 +172,9 @@ void BxcanModel::write(std::uint32_t at, std::uint32_t value) {
     case 0x20C:
     case 0x214:
       if (!filters_open) violations.push_back("filters are set up without FINIT");
-      (at == 0x204 ? fm1r_ : at == 0x20C ? fs1r_ : ffa1r_) = value;
+      if (at == 0x204) fm1r_ = value;
+      if (at == 0x20C) fs1r_ = value;
+      if (at == 0x214) ffa1r_ = value;
       return;
     case 0x21C:
       fa1r_ = value;
@@ -183,7 +194,7 @@ void BxcanModel::write_mcr(std::uint32_t value) {
   if ((value & 1U << 15) != 0) return reset();
   mcr_ = value;
   const bool initialise = (value & 1) != 0, sleep = (value & 2) != 0;
-  // from normal mode the hardware first waits for the end of what is on the wire (32.4.1): bit()
+  // from normal mode the hardware first waits for the end of the current frame (32.4.1): bit()
   if (initialise && !sleep && (mode_ == Mode::sleep || mode_ == Mode::joining || bus_off_))
     mode_ = Mode::initialisation;
   if (!initialise && !sleep && mode_ == Mode::initialisation) {
@@ -206,7 +217,7 @@ void BxcanModel::write_tsr(std::uint32_t value) {
   }
 }
 
-/// An attempt that failed is the last one when it is to be aborted, or without automatic retransmission (NART).
+/// A failed attempt is the last one if an abort was requested, or without automatic retransmission (NART).
 void BxcanModel::given_up(Mailbox& m) {
   if (m.abort || (mcr_ & 16) != 0) complete(m, false);
 }
@@ -221,7 +232,7 @@ void BxcanModel::complete(Mailbox& m, bool ok) {
 void BxcanModel::write_mailbox(std::size_t box, unsigned word, std::uint32_t value) {
   Mailbox& m = mailboxes_[box];
   if (m.requested) {
-    violations.push_back("transmit mailbox " + std::to_string(box) + " is written while it waits");
+    violations.push_back("transmit mailbox " + std::to_string(box) + " is written while it is pending");
     return;
   }
   if (word == 1) m.tdtr = value;
@@ -282,16 +293,21 @@ void BxcanModel::recessive_bit() {
   start_frame();
 }
 
-void BxcanModel::start_frame() {
-  const int box = on_the_bus() && suspended_bits_ == 0 ? scheduled() : -1;
-  auto other = others.end();
+std::deque<BxcanModel::Other>::iterator BxcanModel::most_urgent_other() {
+  auto best = others.end();
   bool one_in_front = false;
   for (auto o = others.begin(); o != others.end(); ++o) {
     if (o->in_order && std::exchange(one_in_front, true)) continue;
     if (o->from_bit <= now_bit &&
-        (other == others.end() || arbitration_field(o->frame) < arbitration_field(other->frame)))
-      other = o;
+        (best == others.end() || arbitration_field(o->frame) < arbitration_field(best->frame)))
+      best = o;
   }
+  return best;
+}
+
+void BxcanModel::start_frame() {
+  const int box = on_the_bus() && suspended_bits_ == 0 ? scheduled() : -1;
+  const auto other = most_urgent_other();
   if (box < 0 && other == others.end()) return;
   begun_bit_ = now_bit;
   outcome_ = 0;
@@ -312,12 +328,17 @@ void BxcanModel::start_frame() {
     sending_ = box;
     other_ = {ours};
     busy_bits_ = bits_on_the_wire(ours);
-    if (!timing_fits(clock_hz_))
-      outcome_ = bit_dominant_error, busy_bits_ = 20 + error_frame_bits;
-    else if (corrupt_sent > 0)
-      --corrupt_sent, outcome_ = bit_dominant_error, busy_bits_ = 40 + error_frame_bits;
-    else if (!others_acknowledge)
-      outcome_ = acknowledge_error, busy_bits_ += error_frame_bits - 11;
+    if (!timing_fits(clock_hz_)) {
+      outcome_ = bit_dominant_error;
+      busy_bits_ = 20 + error_frame_bits;
+    } else if (corrupt_sent > 0) {
+      --corrupt_sent;
+      outcome_ = bit_dominant_error;
+      busy_bits_ = 40 + error_frame_bits;
+    } else if (!others_acknowledge) {
+      outcome_ = acknowledge_error;
+      busy_bits_ += error_frame_bits - 11;
+    }
     return;
   }
   if (box >= 0) {
@@ -329,10 +350,14 @@ void BxcanModel::start_frame() {
   other_ = *other;
   others.erase(other);
   busy_bits_ = bits_on_the_wire(other_.frame);
-  if (mode_ == Mode::normal && !timing_fits(clock_hz_))
-    outcome_ = stuff_error, busy_bits_ = 20 + error_frame_bits;
-  else if (corrupt_received > 0)
-    --corrupt_received, outcome_ = crc_error, busy_bits_ += error_frame_bits - 11;
+  if (mode_ == Mode::normal && !timing_fits(clock_hz_)) {
+    outcome_ = stuff_error;
+    busy_bits_ = 20 + error_frame_bits;
+  } else if (corrupt_received > 0) {
+    --corrupt_received;
+    outcome_ = crc_error;
+    busy_bits_ += error_frame_bits - 11;
+  }
 }
 
 void BxcanModel::end_frame() {
@@ -356,14 +381,20 @@ void BxcanModel::end_frame() {
   if (!other_sends_) return;
   other_sends_ = false;
   if (outcome_ != 0) {
-    if (on_the_bus()) lec_ = outcome_, ++rec_;
-    others.push_front(other_);  // its sender tries again
+    if (on_the_bus()) {
+      lec_ = outcome_;
+      ++rec_;
+    }
+    others.push_front(other_);  // its sender repeats it
     return;
   }
   seen.push_back({to_can_frame(other_.frame), false, begun_bit_, now_bit});
   if (!on_the_bus()) return;
   lec_ = 0;
-  rec_ = rec_ > 127 ? 120 : rec_ > 0 ? rec_ - 1 : 0;
+  if (rec_ > 127)
+    rec_ = 120;
+  else if (rec_ > 0)
+    --rec_;
   if (accepted(other_.frame)) receive(other_.frame);
 }
 
@@ -376,11 +407,14 @@ void BxcanModel::transmit_error(unsigned code, bool counts) {
   bus_off_ = true;
   ++times_off;
   off_since_bit = now_bit;
-  if ((mcr_ & 64) != 0) recovering_ = true, sequences_ = 0;  // ABOM
+  if ((mcr_ & 64) != 0) {  // ABOM
+    recovering_ = true;
+    sequences_ = 0;
+  }
 }
 
-/// The wire is held low: whoever sends sees it at once, whoever listens misses the stuff bit; after that every eight
-/// bits count (ISO 11898-1, 12.1.4).
+/// The wire is held low. A sender detects it at once, a receiver by the missing stuff bit. After that every eight bits
+/// count as an error (ISO 11898-1, 12.1.4).
 void BxcanModel::dominant_bit() {
   recessive_run_ = 0;
   ++dominant_run_;
@@ -417,7 +451,7 @@ void BxcanModel::receive(const WireFrame& f) {
     for (unsigned k = 0; k < 4; ++k) w |= static_cast<std::uint32_t>(f.data[from + k]) << (8 * k);
     return w;
   };
-  const std::uint32_t rir = f.extended ? f.id << 3 | 4U | (f.remote ? 2U : 0U) : f.id << 21 | (f.remote ? 2U : 0U);
+  const std::uint32_t rir = (f.extended ? f.id << 3 | 4U : f.id << 21) | (f.remote ? 2U : 0U);
   const Received r{rir, f.length, word(0), word(4)};
   if (fifo_.size() == 3) {
     overrun_ = true;
@@ -428,7 +462,7 @@ void BxcanModel::receive(const WireFrame& f) {
   full_ = fifo_.size() == 3;
 }
 
-/// 32.7.4, figure 342. Outside FINIT only.
+/// Acceptance filters, 32.7.4, figure 342. Active only outside FINIT.
 bool BxcanModel::accepted(const WireFrame& f) const {
   if ((fmr_ & 1) != 0) return false;
   const std::uint32_t base_id = f.extended ? f.id >> 18 : f.id;

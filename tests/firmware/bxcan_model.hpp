@@ -1,10 +1,10 @@
-// ST's bxCAN as its registers show it, on a wire with other nodes, written from RM0090, 32, and ISO 11898-1 alone: it
-// shares nothing with hal/.
+// Register model of ST's bxCAN on a bus with other nodes. Written only from RM0090, 32, and ISO 11898-1; it shares no
+// code with hal/.
 //
-// Time goes in bits of the bus. Frames are whole: their length is exact (CRC and stuff bits are computed), arbitration
-// is decided at their start, errors happen inside them. The test holds the other nodes: what they send, whether they
-// acknowledge, what breaks. What a driver must not do (write a mailbox that is taken, a bit timing while on the bus, a
-// filter that is active) is in violations.
+// Time counts in bits of the bus. Frames are whole: their length is exact (CRC and stuff bits are computed),
+// arbitration is decided at their start, errors occur within them. The test controls the other nodes: what they send,
+// whether they acknowledge, which errors occur. `violations` lists driver errors: a write to a pending mailbox, to the
+// bit timing on the bus, or to an active filter.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace bms::firmware {
 
-/// As on the wire, 29-bit frames and remote requests included.
+/// A frame on the wire, also with 29 bits or as a remote request.
 struct WireFrame {
   std::uint32_t id = 0;
   bool extended = false, remote = false;
@@ -52,18 +52,18 @@ class BxcanModel {
   std::uint32_t bits_per_second = 250'000;
   bool others_acknowledge = true;
   bool stuck_dominant = false;
-  unsigned corrupt_sent = 0;      ///< so many of the board's next attempts meet an error
-  unsigned corrupt_received = 0;  ///< so many of the others' next frames do
+  unsigned corrupt_sent = 0;      ///< number of the board's next attempts that fail
+  unsigned corrupt_received = 0;  ///< number of the other nodes' next frames that fail
   struct Other {
     WireFrame frame;
-    std::uint64_t from_bit = 0;  ///< not before
-    bool in_order = false;  ///< not before those in front of it that are so, too: a node that sends first in, first out
+    std::uint64_t from_bit = 0;  ///< earliest time
+    bool in_order = false;       ///< sent after earlier frames that have this set, too (FIFO of one node)
   };
   std::deque<Other> others;
-  /// Into the receive FIFO without the wire: a sample that came another way.
+  /// Puts a frame into the receive FIFO without the bus.
   void deliver(const can::Frame& frame) { receive(wire_frame(frame)); }
 
-  // what a test looks at
+  // what a test checks
   std::uint64_t now_bit = 0;
   std::vector<SeenFrame> seen;
   std::vector<std::string> violations;
@@ -93,6 +93,7 @@ class BxcanModel {
   void given_up(Mailbox& box);
   std::uint32_t mailbox_status() const;
   int scheduled() const;
+  std::deque<Other>::iterator most_urgent_other();
   void start_frame();
   void end_frame();
   void dominant_bit();
@@ -120,7 +121,7 @@ class BxcanModel {
   bool other_sends_ = false;
   Other other_{};
   std::uint64_t begun_bit_ = 0;
-  unsigned outcome_ = 0;  ///< 0: arrives; else the last error code
+  unsigned outcome_ = 0;  ///< 0: arrives; otherwise the last error code
   std::uint32_t clock_hz_ = 0;
 };
 

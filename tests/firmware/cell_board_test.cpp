@@ -1,5 +1,6 @@
-// The single-cell board's image in Unicorn, a register model of the chip's converter on its pins: what the cell has is
-// on the CAN bus, a correction moves it, and a converter that hangs takes its readings with it, not the firmware.
+// The image of the single-cell board in Unicorn, with a register model of the chip's converter: the readings of the
+// cell are on the CAN bus, a correction changes them, and a converter that hangs stops its readings but not the
+// firmware.
 #include <cmath>
 #include <random>
 
@@ -18,7 +19,7 @@ namespace {
 
 using ::testing::IsEmpty;
 
-/// ADC1 as its registers show it (RM0090, 13), its inputs by volts and ohms; noise of one count.
+/// Register model of ADC1 (RM0090, 13) with inputs in volts and ohms and a noise of one count.
 class Converter : public UnicornBoard::Peripheral {
  public:
   static constexpr std::uint32_t base = 0x40012000;
@@ -56,11 +57,11 @@ class Converter : public UnicornBoard::Peripheral {
     if (channel == 17 && ((registers_[0x304] & 1U << 23) == 0 || sampling / mhz < 10))
       violations.push_back("the reference is off, or sampled for less than 10 us");
     const double ohm = thermistor_ohm(celsius);
-    const double pin_v = channel == 1    ? supply_v / 2 + 20 * 0.002 * current_a
-                         : channel == 2  ? cell_v / 2
-                         : channel == 3  ? supply_v * ohm / (ohm + 10'000)
-                         : channel == 17 ? 1.21
-                                         : 0;
+    double pin_v = 0;
+    if (channel == 1) pin_v = supply_v / 2 + 20 * 0.002 * current_a;
+    if (channel == 2) pin_v = cell_v / 2;
+    if (channel == 3) pin_v = supply_v * ohm / (ohm + 10'000);
+    if (channel == 17) pin_v = 1.21;
     value_ =
         static_cast<std::uint32_t>(std::clamp(std::lround(4'095 * pin_v / supply_v + noise_(random_)), 0L, 4'095L));
     ready_us_ = now_us + (sampling + 12) / mhz;
@@ -80,7 +81,7 @@ class CellBoard : public ::testing::Test {
  protected:
   CellBoard() {
     board.plugged = {{Converter::base, &converter}};
-    board.run_for_ms(900);  // a new chip's store is erased first
+    board.run_for_ms(900);  // a new chip first erases its data sectors
   }
   void TearDown() override {
     EXPECT_THAT(converter.violations, IsEmpty());
@@ -94,7 +95,7 @@ class CellBoard : public ::testing::Test {
     for (const SeenFrame& s : board.can.seen) {
       if (s.from_board && s.frame.id == Message::id) found = Message::of(s.frame);
     }
-    if (!found) throw std::runtime_error("not told");
+    if (!found) throw std::runtime_error("not sent");
     return *found;
   }
   std::uint32_t command(std::uint32_t code, std::int32_t argument) {
@@ -113,22 +114,23 @@ class CellBoard : public ::testing::Test {
   std::uint8_t counter_ = 0;
 };
 
-TEST_F(CellBoard, WhatTheCellHasIsOnTheBus) {
+TEST_F(CellBoard, ReadingsOfTheCellAreOnTheBus) {
   for (const double current_a : {-5.5, 0.0, 3.0}) {
     converter.current_a = current_a;
     converter.cell_v = 3.3 + 0.01 * current_a;
     converter.celsius = 25 + 3 * current_a;
     board.run_for_ms(320);
-    const auto told = last<can::PackElectrical>();
-    EXPECT_NEAR(told.voltage, converter.cell_v, 0.003) << "0.03 % of the reference, and the bus's millivolt";
-    EXPECT_NEAR(told.current, current_a, 0.03);
-    EXPECT_NEAR(told.temperature, converter.celsius, 0.5);
+    const auto electrical = last<can::PackElectrical>();
+    EXPECT_NEAR(electrical.voltage, converter.cell_v, 0.003)
+        << "0.03 % of the reference, plus a millivolt of the signal";
+    EXPECT_NEAR(electrical.current, current_a, 0.03);
+    EXPECT_NEAR(electrical.temperature, converter.celsius, 0.5);
   }
   EXPECT_GT(converter.conversions, 7U * 900U);
   EXPECT_GE(board.estimates, 9U);
 }
 
-/// A current that flows for a tenth of the time between two samples is a tenth in the next.
+/// A current that flows for a tenth of the period counts as a tenth in the next sample.
 TEST_F(CellBoard, ASampleIsTheMeanOfItsPeriod) {
   const unsigned before = board.estimates;
   ASSERT_TRUE(board.run_until([&] { return board.estimates > before; }, 200));
@@ -142,7 +144,7 @@ TEST_F(CellBoard, ASampleIsTheMeanOfItsPeriod) {
   EXPECT_NEAR(last<can::PackElectrical>().current, -3, 0.35) << "to the millisecond";
 }
 
-TEST_F(CellBoard, ACorrectionMovesTheReadingAndOutlivesThePower) {
+TEST_F(CellBoard, ACorrectionChangesTheReadingAndSurvivesALossOfPower) {
   converter.current_a = -4;
   EXPECT_EQ(command(can::Command::code_voltage_gain, 10'000), can::CommandAnswer::result_done);
   EXPECT_EQ(command(can::Command::code_current_offset, 1'000'000), can::CommandAnswer::result_done);
@@ -154,16 +156,16 @@ TEST_F(CellBoard, ACorrectionMovesTheReadingAndOutlivesThePower) {
   again.flash.bytes = board.flash.bytes;
   again.plugged = {{Converter::base, &converter}};
   again.run_for_ms(250);
-  std::optional<can::PackElectrical> told;
+  std::optional<can::PackElectrical> electrical;
   for (const SeenFrame& s : again.can.seen) {
-    if (s.from_board && s.frame.id == can::PackElectrical::id) told = can::PackElectrical::of(s.frame);
+    if (s.from_board && s.frame.id == can::PackElectrical::id) electrical = can::PackElectrical::of(s.frame);
   }
-  ASSERT_TRUE(told);
-  EXPECT_NEAR(told->voltage, 1.01 * 3.3, 0.003);
-  EXPECT_NEAR(told->current, -3, 0.03);
+  ASSERT_TRUE(electrical);
+  EXPECT_NEAR(electrical->voltage, 1.01 * 3.3, 0.003);
+  EXPECT_NEAR(electrical->current, -3, 0.03);
 }
 
-TEST_F(CellBoard, AConverterThatHangsTakesOnlyItsReadingsWithIt) {
+TEST_F(CellBoard, AHangingConverterStopsOnlyItsReadings) {
   converter.hangs = true;
   const unsigned before = board.estimates;
   board.run_for_ms(1'000);

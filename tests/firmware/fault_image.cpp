@@ -1,11 +1,11 @@
-// Provokes a fault and reads, after the reset that follows, what the hal has kept of it.
+// Provokes a fault and, after the reset that follows, checks the fault record of hal/.
 //
-//   command line "fw KIND"   KIND: address (a load where nothing is), undefined (an instruction that is none),
-//                            stack (the stack pointer outside RAM), overflow (calls without end: the stack grows into
+//   command line "fw KIND"   KIND: address (a load from unmapped memory), undefined (an invalid instruction),
+//                            stack (the stack pointer outside RAM), overflow (endless recursion: the stack grows into
 //                            its guard)
-//   exit code                0: the record of the last run names that fault; otherwise the check that failed, below
+//   exit code                0: the record agrees with the fault; otherwise the failed check, see Exit
 //
-// The second run must follow by itself, with RAM as it was: the same binary decides by last_fault() which run it is.
+// The second run must start by itself with unchanged RAM. The image decides by last_fault() which run it is.
 #include <array>
 #include <string_view>
 
@@ -56,25 +56,25 @@ enum Exit : int {
   wrong_address = 13,
   wrong_exception = 14,
   unknown_kind = 15,
-  got_past = 16
+  guard_was_overwritten = 16
 };
 
 const auto* const nowhere = reinterpret_cast<const std::uint32_t*>(0x30000000);
 
 std::uint32_t address(const void* p) { return reinterpret_cast<std::uint32_t>(p); }
 
-/// In RAM that a reset leaves alone.
+/// In RAM that a reset does not change.
 [[gnu::section(".noinit")]] volatile std::uint32_t below_the_stack;
 
 #pragma GCC diagnostic ignored "-Winfinite-recursion"
-/// A frame of 200 bytes, each time.
+/// Takes a frame of 200 bytes in each call.
 [[gnu::noinline]] std::uint32_t deeper(std::uint32_t n) {
   volatile std::uint32_t frame[50];
   frame[n % 50] = n;
   return deeper(n + 1) + frame[n % 50];
 }
 
-Exit judged(std::string_view kind, const bms::hal::FaultRecord& fault) {
+Exit compare_record(std::string_view kind, const bms::hal::FaultRecord& fault) {
   constexpr std::uint32_t precise_bus_error = 1U << 9, address_valid = 1U << 15, undefined_instruction = 1U << 16,
                           bus_fault = 5, usage_fault = 6;
   if (kind == "address") {
@@ -97,7 +97,7 @@ Exit judged(std::string_view kind, const bms::hal::FaultRecord& fault) {
     if ((fault.cfsr & memory_address_valid) != 0 &&
         (fault.address < guard || fault.address >= guard + bms::hal::cortex_m::guard_bytes))
       return wrong_address;
-    return below_the_stack == 0x1234'5678 ? as_expected : got_past;
+    return below_the_stack == 0x1234'5678 ? as_expected : guard_was_overwritten;
   }
   return fault.exception != 0 && fault.pc == 0 ? as_expected : wrong_pc;  // no frame could be stacked
 }
@@ -110,7 +110,7 @@ int main() {
   std::array<const char*, 2> words{};
   if (semihosting::arguments(text, words) != words.size()) return unknown_kind;
   const std::string_view kind = words[1];
-  if (const auto fault = last_fault()) return judged(kind, *fault);
+  if (const auto fault = last_fault()) return compare_record(kind, *fault);
   below_the_stack = 0x1234'5678;
   if (kind == "overflow") return static_cast<int>(deeper(0)) | no_fault_came;
   if (kind == "address") return static_cast<int>(read_from(nowhere)) | no_fault_came;

@@ -1,6 +1,9 @@
-// The whole fault matrix against the forklift board's image; with --write its table goes to protection/README.md, with
-// --only TEXT the cases whose names hold it are told sample by sample. Exit: 1 when anything is missed, false or late.
-// ./bms faults [TEXT]
+// Runs the whole fault matrix on the image of the forklift board: ./bms faults [TEXT]
+//
+//   --write        writes the table to protection/README.md
+//   --only TEXT    runs the cases whose names contain TEXT, and prints every sample
+//
+// Exit code 1 if a fault is missed, false or late.
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -19,7 +22,7 @@ int main(int count, char** words) {
     fmt::print("{}", result.trace);
     for (const std::string& line : result.wrong) fmt::print("{}\n", line);
     const std::string table = protection::markdown(result);
-    fmt::print("{}{} complaints\n", table, result.wrong.size());
+    fmt::print("{}{} deviations\n", table, result.wrong.size());
     if (count > 1 && std::strcmp(words[1], "--write") == 0) {
       files::replace_figures(BMS_SOURCE_DIR "/protection/README.md", "fault matrix", table);
     }

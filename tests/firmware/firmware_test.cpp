@@ -1,5 +1,5 @@
-// The firmware images of the emulated board: what is in them, what a step costs, what they say on CAN, what a fault
-// leaves behind.
+// The firmware images of the emulated boards: their symbols, the cost of a step, their CAN messages, and the record of
+// a fault.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ TEST(FirmwareImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
   EXPECT_THAT(forbidden_in(symbols_of(image(images::Image::replay))), IsEmpty());
 }
 
-TEST(FirmwareImage, WhatIsForbiddenIsFoundWhereItIs) {
+TEST(FirmwareImage, ForbiddenSymbolsAreFoundInAHostProgram) {
   const auto found = forbidden_in(symbols_of(BMS_TOOL, ""));
   EXPECT_THAT(found, ::testing::Contains(StartsWith("operator new")));
   EXPECT_THAT(found, ::testing::Contains(StartsWith("__cxa_throw")));
@@ -57,25 +57,25 @@ TEST(FirmwareImage, WhatIsForbiddenIsFoundWhereItIs) {
             5U);
 }
 
-/// The table in estimator/README.md, which `./bms figures` writes, against what is measured here.
+/// Compares the table in estimator/README.md, which `./bms figures` writes, with new measurements.
 TEST(FirmwareImage, CostsNoMoreThanTheTableSays) {
   const files::CommittedFigures table(BMS_SOURCE_DIR "/estimator/README.md", "netduinoplus2");
   const auto measured = step_figures(images::emulated_boards().front(), files::read_cell("table9"), shift());
   ASSERT_FALSE(measured.empty());
   for (const auto& [name, value] : measured) {
     ASSERT_TRUE(table.has(name)) << name;
-    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": run ./bms figures if it is worth it";
+    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": if the growth is worth it, run ./bms figures";
   }
 }
 
-TEST(ProtectionImage, CostsNoMoreThanTheTableSaysAndDecidesWhatTheHostDecides) {
+TEST(ProtectionImage, CostsNoMoreThanTheTableSaysAndDecidesAsTheHost) {
   const files::CommittedFigures table(BMS_SOURCE_DIR "/protection/README.md", "netduinoplus2");
   const auto measured = protection_figures(images::emulated_boards().front(),
-                                           files::read_cell("table9"));  // throws when the board decides otherwise
+                                           files::read_cell("table9"));  // throws if the board decides otherwise
   ASSERT_FALSE(measured.empty());
   for (const auto& [name, value] : measured) {
     ASSERT_TRUE(table.has(name)) << name;
-    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": run ./bms figures if it is worth it";
+    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": if the growth is worth it, run ./bms figures";
   }
 }
 
@@ -106,7 +106,7 @@ TEST(MicrobitImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
   EXPECT_THAT(forbidden_in(symbols_of(microbit_image(images::Image::replay))), IsEmpty());
 }
 
-/// Telemetry tells in float, a few times a sample; the estimator and what is known beside it know no float.
+/// Telemetry computes in float; step, condition and cell differences do not.
 TEST(MicrobitImage, EstimatesWithoutSoftwareFloat) {
   const auto objects = microbit_image(images::Image::application).parent_path() / "CMakeFiles";
   for (const char* object :
@@ -125,11 +125,11 @@ TEST(MicrobitImage, CostsNoMoreThanTheTableSays) {
   ASSERT_FALSE(measured.empty());
   for (const auto& [name, value] : measured) {
     ASSERT_TRUE(table.has(name)) << name;
-    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": run ./bms figures if it is worth it";
+    EXPECT_LE(value, 1.05 * table.at(name)) << name << ": if the growth is worth it, run ./bms figures";
   }
 }
 
-TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
+TEST(SlcanBoard, TelemetryAgreesWithTheReplay) {
   const auto all = shift();
   const std::vector<measurement::Sample> part(all.begin() + 3000, all.begin() + 4200);
   const measurement::StartingPoint start = host_sim::starting_point(host_sim::SocPrior{0.8, 0.05}).value();
@@ -150,7 +150,7 @@ TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
     ASSERT_NEAR(t.soc, 5e4 * expected.soc, 0.51) << k;
     ASSERT_NEAR(t.soc_sigma, 5e4 * expected.soc_sigma, 0.51) << k;
     if (k > 0) {
-      ASSERT_NEAR(t.soc_display, displayed, 5e4 * 0.002) << k << ": 0.5 % a minute, and what is counted";
+      ASSERT_NEAR(t.soc_display, displayed, 5e4 * 0.002) << k << ": 0.5 % per minute, plus the counted charge";
     }
     displayed = t.soc_display;
     ASSERT_EQ(t.voltage, static_cast<unsigned>(std::lround(1e-3 * part[k].voltage_uv))) << k;
@@ -162,12 +162,12 @@ TEST(SlcanBoard, TelemetryIsTheReplaysEstimate) {
     ASSERT_EQ(t.sample_counter, (k + 1) % 65536) << k;
     ASSERT_EQ(t.status_counter, k % 15) << k;
   }
-  EXPECT_NE(std::lround(1e4 * host.rows.back().soc), 8000) << "the part was to move the state of charge";
+  EXPECT_NE(std::lround(1e4 * host.rows.back().soc), 8000) << "the samples must change the state of charge";
   board.write("C\r");
   EXPECT_EQ(board.wait(), 0);
 }
 
-TEST(SlcanBoard, TellsWhichCellFileItHolds) {
+TEST(SlcanBoard, ReportsItsCellFile) {
   const files::CellFile cell = files::read_cell("table9");
   SlcanBoard board(image(images::Image::application));
   board.read();
@@ -186,7 +186,7 @@ TEST(SlcanBoard, TellsWhichCellFileItHolds) {
   EXPECT_EQ(identity[7], '0') << "patch";
 }
 
-TEST(SlcanBoard, HostileBytesAreRefusedAndTheNextSampleIsTaken) {
+TEST(SlcanBoard, InvalidBytesAreRejectedAndTheNextSampleIsProcessed) {
   SlcanBoard board(image(images::Image::application));
   board.read();
   board.write("t3128\rO\r");
@@ -200,9 +200,9 @@ TEST(SlcanBoard, HostileBytesAreRefusedAndTheNextSampleIsTaken) {
     EXPECT_EQ(board.read(), "\a") << line.substr(0, 20);
   }
   board.write("T0000031280011223344556677\rt31D4" + std::string(8, '0') + "\rt3008" + std::string(16, '0') +
-              "\r");  // well formed, not ours
+              "\r");  // valid frames for other nodes
   for (int k = 0; k < 3; ++k) EXPECT_EQ(board.read(), "");
-  // a time frame whose reading got lost: flagged as missing, not the last reading again
+  // a time frame whose reading was lost: flagged as missing, the last reading is not repeated
   board.send_sample(0, 0, 3'300'000, 2500);
   const BoardTelemetry first = board.telemetry();
   EXPECT_NE(first.soc, 0xFFFFU);
@@ -220,7 +220,7 @@ TEST(SlcanBoard, HostileBytesAreRefusedAndTheNextSampleIsTaken) {
 class Fault : public ::testing::TestWithParam<const char*> {};
 
 /// The image exits with the number of its check that failed (tests/firmware/fault_image.cpp).
-TEST_P(Fault, LeavesARecordThatTheNextRunReads) {
+TEST_P(Fault, LeavesARecordForTheNextRun) {
   const images::TemporaryFolder folder;
   auto command = images::emulator_command(images::emulated_boards().front(), image(images::Image::fault), {GetParam()});
   command.insert(command.end(), {"-serial", "none"});

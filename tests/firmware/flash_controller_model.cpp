@@ -45,7 +45,7 @@ void FlashControllerModel::write(std::uint32_t at, std::uint32_t value) {
   }
 }
 
-/// 3.6.1: two keys, one after the other; anything else locks until a reset.
+/// 3.6.1: two keys in sequence unlock; anything else locks until a reset.
 void FlashControllerModel::unlock(std::uint32_t key) {
   if (keys_ == Keys::none && (cr_ & lock) != 0 && key == 0x45670123) {
     keys_ = Keys::first;
@@ -67,14 +67,14 @@ void FlashControllerModel::control(std::uint32_t value) {
   cr_ = value & ~strt;
   if ((value & strt) == 0) return;
   if ((value & (ser | mer | pg)) != ser)
-    violations.push_back("an erase that is none of one sector");
+    violations.push_back("an erase that is not a sector erase");
   else
     erase(value >> 3 & 15);
 }
 
 void FlashControllerModel::erase(std::uint32_t number) {
   if (number < 1 || number > sectors) {
-    violations.push_back("sector " + std::to_string(number) + " is erased, which holds code");
+    violations.push_back("sector " + std::to_string(number) + " holds code and is erased");
     sr_ |= wrperr;
     return;
   }
@@ -97,12 +97,13 @@ void FlashControllerModel::write_memory(std::uint32_t at, unsigned size, std::ui
     return;
   }
   if (size != 1U << (cr_ >> 8 & 3)) {
-    violations.push_back("flash is written by another width than PSIZE says");
+    violations.push_back("flash is written with a width other than PSIZE");
     sr_ |= pgperr;
     return;
   }
   const std::uint32_t before = read_memory(at, size), erased = size == 4 ? 0xFFFFFFFF : (1U << (8 * size)) - 1;
-  if (before != erased && value != before && value != 0) violations.push_back("flash is programmed that is not erased");
+  if (before != erased && value != before && value != 0)
+    violations.push_back("flash is programmed without being erased");
   for (unsigned k = 0; k < size && !worn_out; ++k) bytes[at + k] &= static_cast<std::uint8_t>(value >> (8 * k));
   ++words_programmed;
   stall_us_ += word_us;

@@ -1,9 +1,9 @@
-// The STM32F405's flash interface as its registers show it, with the three sectors behind the vectors, written from
-// RM0090, 3, and the datasheet alone: it shares nothing with hal/. Programming clears bits; erasing sets those of a
-// sector; the core, which runs from flash, stands still meanwhile.
+// Register model of the STM32F405's flash interface with the three sectors after the vectors. Written only from RM0090,
+// 3, and the datasheet; it shares no code with hal/. Programming clears bits, erasing sets all bits of a sector. The
+// core runs from flash and stops meanwhile.
 //
-// What a driver must not do (a control register that is locked, a word that is not erased, another width than it set
-// up) is in violations.
+// `violations` lists driver errors: access to a locked register, programming of a word that is not erased, a wrong
+// width.
 #pragma once
 
 #include <cstdint>
@@ -22,16 +22,16 @@ class FlashControllerModel {
   /// offset from `memory`; size: bytes at once.
   std::uint32_t read_memory(std::uint32_t offset, unsigned size) const;
   void write_memory(std::uint32_t offset, unsigned size, std::uint32_t value);
-  /// Of the registers; what is stored stays.
+  /// Resets the registers. The stored data stay.
   void reset();
-  /// For how long the core stands still since this was asked last.
+  /// Returns how long the core has been stopped since the last call.
   double take_stall_us();
 
   std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(sectors * sector_bytes, 0xFF);
-  std::uint32_t option_bytes = 0x0FFFAAED & ~(3U << 2);  ///< FLASH_OPTCR as delivered, but brown-out reset at level 3
+  std::uint32_t option_bytes = 0x0FFFAAED & ~(3U << 2);  ///< FLASH_OPTCR as delivered, except brown-out reset level 3
   std::vector<std::string> violations;
   unsigned words_programmed = 0, sectors_erased = 0;
-  bool worn_out = false;  ///< what is programmed does not stay, and no error flag says so
+  bool worn_out = false;  ///< programming has no effect and sets no error flag
 
  private:
   enum class Keys { none, first, refused_until_reset };

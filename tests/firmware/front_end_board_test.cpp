@@ -1,7 +1,6 @@
-// The forklift board's own image in Unicorn, its I2C controller a register model, a model of the front end on its wire:
-// what the cells have is on the CAN bus, and a chip that goes, hangs or is reset takes the readings with it, not the
-// firmware. A truck around it follows the contactors' pins: they close in their order and open in the time that
-// protection's table gives.
+// The image of the forklift board in Unicorn, with register models of I2C controller and front end: the cell voltages
+// are on the CAN bus, and a front end that disappears, hangs or is reset stops its readings but not the firmware. A
+// simulated truck follows the contactor pins: they close in the right order and open in the time of protection's table.
 #include <cmath>
 #include <functional>
 
@@ -47,7 +46,7 @@ class FrontEndBoard : public ::testing::Test {
     }
     return found;
   }
-  /// As on the bus [V], 0 to 8.19; a cell that is not known is above.
+  /// Cell voltage on the bus [V], 0 to 8.18; above: not known.
   double cell_on_the_bus(std::size_t k) const {
     const auto frame = last(0x190U + static_cast<unsigned>(k / 4));
     if (!frame) return -1;
@@ -65,8 +64,8 @@ class FrontEndBoard : public ::testing::Test {
   UnicornBoard board{image()};
 };
 
-TEST_F(FrontEndBoard, TheCellsOfTheModelAreOnTheBusToTheMillivolt) {
-  board.run_for_ms(3'600 + 750);  // a new chip's store is erased first, three sectors of 0.25 s
+TEST_F(FrontEndBoard, CellVoltagesAreOnTheBusToTheMillivolt) {
+  board.run_for_ms(3'600 + 750);  // a new chip first erases three sectors, 0.25 s each
   expect_cells();
   EXPECT_EQ(i2c.ccr, 0x8023U) << "400 kHz from 42 MHz, RM0090, 27.6.8";
   EXPECT_EQ(i2c.frequency_mhz, 42U);
@@ -75,7 +74,7 @@ TEST_F(FrontEndBoard, TheCellsOfTheModelAreOnTheBusToTheMillivolt) {
   fmt::print("stack {} bytes, {} transfers\n", board.stack_used(), i2c.transfers);
 }
 
-TEST_F(FrontEndBoard, AChipThatIsGoneThenHangsThenIsBackTakesOnlyItsReadingsWithIt) {
+TEST_F(FrontEndBoard, AFrontEndThatDisappearsHangsAndReturnsStopsOnlyItsReadings) {
   board.run_for_ms(3'000);
   expect_cells();
   chip.gone = true;
@@ -95,13 +94,13 @@ TEST_F(FrontEndBoard, AChipThatIsGoneThenHangsThenIsBackTakesOnlyItsReadingsWith
   expect_cells();
 }
 
-TEST_F(FrontEndBoard, ContactorsAreOpenWhileNobodyAsks) {
+TEST_F(FrontEndBoard, ContactorsAreOpenWithoutARequest) {
   board.run_for_ms(2'500);
   EXPECT_EQ(board.register_value(0x40020818), 15U << 22) << "GPIOC_BSRR: PC6 to PC9 low";
   EXPECT_EQ(board.register_value(0x40020800) >> 12 & 0xFF, 0x55U) << "outputs";
 }
 
-/// The pins that close something, as the last write to GPIOC's set and reset register left them.
+/// Contactor pins according to the last write to GPIOC's set and reset register.
 struct Pins {
   bool main_plus, main_minus, precharge, charge_enable;
   bool any_closed() const { return main_plus || main_minus || precharge; }
@@ -112,7 +111,7 @@ struct Load {
   bool plus_fails = false, minus_welded = false;
 };
 
-/// A truck of 10 mF behind the pins, that asks for power each second and takes what its driver wants.
+/// A truck with a DC link of 10 mF that requests power every second and draws the current of `load`.
 class Truck : public FrontEndBoard {
  protected:
   Truck() {
@@ -123,22 +122,22 @@ class Truck : public FrontEndBoard {
     const std::uint32_t high = board.register_value(0x40020818);
     return {(high >> 6 & 1) != 0, (high >> 7 & 1) != 0, (high >> 8 & 1) != 0, (high >> 9 & 1) != 0};
   }
-  /// 10 ms of the circuit.
+  /// Simulates 10 ms of the circuit.
   void step() {
-    if (asks && steps_++ % 100 == 0) {
+    if (requests_power && steps_++ % 100 == 0) {
       can::Command command;
       command.code = can::Command::code_request;
       command.argument = 1;  // drive
       asked_ = can::next(asked_);
       board.can.others.push_back({wire_frame(command.frame(asked_)), 0});
     }
-    const Pins told = driven();
-    const bool plus = told.main_plus && !load.plus_fails, minus = told.main_minus || load.minus_welded;
+    const Pins on = driven();
+    const bool plus = on.main_plus && !load.plus_fails, minus = on.main_minus || load.minus_welded;
     if (plus && minus) {
       chip.ld_v = chip.stack_v;
       chip.current_a = load.current_a;
     } else {
-      if (told.precharge && minus)
+      if (on.precharge && minus)
         chip.ld_v += (chip.stack_v - chip.ld_v) * (1 - std::exp(-0.01 / 0.5));
       else
         chip.ld_v *= std::exp(-0.01 / (load.current_a == 0 ? 1.5 : 0.05));
@@ -146,7 +145,7 @@ class Truck : public FrontEndBoard {
     }
     board.run_for_ms(10);
   }
-  /// Milliseconds until it is so, or -1.
+  /// Returns the milliseconds until the condition holds, or -1.
   int until(const std::function<bool(const Pins&)>& is, int most_ms) {
     for (int ms = 0; ms <= most_ms; ms += 10) {
       if (is(driven())) return ms;
@@ -155,7 +154,7 @@ class Truck : public FrontEndBoard {
     return -1;
   }
   bool drive_off() {
-    asks = true;
+    requests_power = true;
     if (until([](const Pins& p) { return p.main_plus && p.main_minus; }, 8'000) < 0) return false;
     load.current_a = -3;
     for (int k = 0; k < 60; ++k) step();
@@ -166,7 +165,7 @@ class Truck : public FrontEndBoard {
     return frame ? can::Faults::of(*frame) : can::Faults{};
   }
 
-  bool asks = false;
+  bool requests_power = false;
   Load load;
 
  private:
@@ -174,33 +173,33 @@ class Truck : public FrontEndBoard {
   std::uint8_t asked_ = 0;
 };
 
-TEST_F(Truck, DrivesOffOverTheResistorAndTheSecondPoleClosesOnlyOnAFullLink) {
-  asks = true;
+TEST_F(Truck, PrechargesAndClosesTheSecondPoleOnlyOnAFullDcLink) {
+  requests_power = true;
   ASSERT_GE(until([](const Pins& p) { return p.precharge; }, 4'000), 0);
-  EXPECT_FALSE(driven().main_minus) << "the relay alone: is the other pole welded?";
+  EXPECT_FALSE(driven().main_minus) << "precharge contactor alone: tests whether the other pole is welded";
   ASSERT_GE(until([](const Pins& p) { return !p.precharge && p.main_minus; }, 1'000), 200);
   ASSERT_GE(until([](const Pins& p) { return p.precharge && p.main_minus; }, 1'000), 200);
   const int charged_ms = until([](const Pins& p) { return p.main_plus; }, 3'000);
-  EXPECT_NEAR(charged_ms, 500 * std::log(16.0), 250) << "15/16 of the pack";
+  EXPECT_NEAR(charged_ms, 500 * std::log(16.0), 250) << "15/16 of the pack voltage";
   EXPECT_GE(chip.ld_v, 15.0 / 16 * chip.stack_v);
   EXPECT_FALSE(driven().precharge);
-  EXPECT_FALSE(driven().charge_enable) << "nobody charges";
+  EXPECT_FALSE(driven().charge_enable) << "no request to charge";
   for (int k = 0; k < 100; ++k) step();
   EXPECT_TRUE(driven().main_plus && driven().main_minus);
   EXPECT_EQ(faults().first_cause, 0U);
 }
 
-/// What happens to the pack while it drives; the pins are open within delay_ms of the table, a sample's period and the
-/// front end's own time to measure.
-struct Mishap {
+/// A fault while driving. The pins open within delay_ms of the table, plus a sample period and the measuring time of
+/// the front end.
+struct InjectedFault {
   const char* name;
   std::function<void(Bq76952Model&, Load&)> happens;
   int delay_ms;
-  std::function<bool(const can::Faults&)> told;
+  std::function<bool(const can::Faults&)> is_published;
 };
-class Pulls : public Truck, public ::testing::WithParamInterface<Mishap> {};
+class OpensOnFault : public Truck, public ::testing::WithParamInterface<InjectedFault> {};
 
-TEST_P(Pulls, ThePinsOpenInTime) {
+TEST_P(OpensOnFault, ThePinsOpenInTime) {
   ASSERT_TRUE(drive_off());
   EXPECT_EQ(faults().first_cause, 0U);
   const auto open = [](const Pins& p) { return !p.any_closed(); };
@@ -210,33 +209,33 @@ TEST_P(Pulls, ThePinsOpenInTime) {
     step();
   }
   EXPECT_GE(ms, GetParam().delay_ms);
-  EXPECT_LE(ms, GetParam().delay_ms + 100 + 250) << "a period of samples, and a scan of the chip";
+  EXPECT_LE(ms, GetParam().delay_ms + 100 + 250) << "a sample period, and a scan of the front end";
   step();
-  EXPECT_TRUE(GetParam().told(faults()));
+  EXPECT_TRUE(GetParam().is_published(faults()));
 }
 
-// what the contactors find, 0.3 s of it, counts with the next sample (protection/protection.hpp)
-INSTANTIATE_TEST_SUITE_P(On, Pulls,
-                         ::testing::Values(Mishap{"SevereOvervoltage", [](auto& chip, auto&) { chip.cell_v[5] = 3.9; },
-                                                  200, [](const auto& f) { return f.cell_overvoltage_severe == 1; }},
-                                           Mishap{"SevereUndervoltage", [](auto& chip, auto&) { chip.cell_v[9] = 1.7; },
-                                                  200, [](const auto& f) { return f.cell_undervoltage_severe == 1; }},
-                                           Mishap{"ShortCircuit", [](auto&, auto& load) { load.current_a = -45; }, 0,
-                                                  [](const auto& f) { return f.short_circuit == 1; }},
-                                           Mishap{"AContactorThatFallsOff",
-                                                  [](auto&, auto& load) { load.plus_fails = true; }, 400,
-                                                  [](const auto& f) { return f.contactor_not_closed == 1; }}),
-                         [](const auto& p) { return std::string(p.param.name); });
+// a fault found by the contactor control, after 0.3 s, counts with the next sample (protection/protection.hpp)
+INSTANTIATE_TEST_SUITE_P(
+    On, OpensOnFault,
+    ::testing::Values(InjectedFault{"SevereOvervoltage", [](auto& chip, auto&) { chip.cell_v[5] = 3.9; }, 200,
+                                    [](const auto& f) { return f.cell_overvoltage_severe == 1; }},
+                      InjectedFault{"SevereUndervoltage", [](auto& chip, auto&) { chip.cell_v[9] = 1.7; }, 200,
+                                    [](const auto& f) { return f.cell_undervoltage_severe == 1; }},
+                      InjectedFault{"ShortCircuit", [](auto&, auto& load) { load.current_a = -45; }, 0,
+                                    [](const auto& f) { return f.short_circuit == 1; }},
+                      InjectedFault{"AContactorThatOpens", [](auto&, auto& load) { load.plus_fails = true; }, 400,
+                                    [](const auto& f) { return f.contactor_not_closed == 1; }}),
+    [](const auto& p) { return std::string(p.param.name); });
 
-TEST_F(Truck, WithAPoleWeldedGetsNoPower) {
+TEST_F(Truck, GetsNoPowerWithAWeldedPole) {
   load.minus_welded = true;
-  asks = true;
+  requests_power = true;
   EXPECT_LT(until([](const Pins& p) { return p.main_plus; }, 4'000), 0);
   EXPECT_EQ(faults().contactor_welded, 1U);
   EXPECT_FALSE(driven().any_closed());
 }
 
-TEST_F(Truck, WhoseStoreIsWornOutIsToldSoAndDrives) {
+TEST_F(Truck, DrivesWithWornOutFlashAndReportsIt) {
   board.flash.worn_out = true;
   EXPECT_TRUE(drive_off());
   EXPECT_EQ(faults().storage_fault, 1U);

@@ -1,4 +1,5 @@
-// The forklift board's firmware on this machine, with a flash model of its own: what a board ought to say and to keep.
+// The firmware of the forklift board on this machine, with its own flash model: the reference for sent frames and
+// stored records.
 #pragma once
 
 #include <optional>
@@ -11,7 +12,7 @@ namespace bms::firmware {
 
 using Pack = measurement::PackSample<16>;
 
-/// firmware/board_cell.hpp of this board, with the cell from its file.
+/// The application's Board of this board, with the cell from its file.
 struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
   static const protection::ProtectionPlan& plan() {
     static const auto plan = protection::protection_plan(design(0.1));
@@ -19,14 +20,14 @@ struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
   }
 };
 
-/// What comes to the board at one time.
+/// Input of the board for one sample.
 struct Input {
   Pack pack;
   std::int32_t dc_link_uv = 0;
-  std::optional<can::Frame> command;  ///< before the sample
+  std::optional<can::Frame> command;  ///< received before the sample
 };
 
-/// All sectors, one behind the other.
+/// All sectors, one after the other.
 inline void fill(FlashModel& flash, const std::vector<std::uint8_t>& bytes) {
   const std::uint32_t each = flash.size().sector_bytes;
   for (std::uint32_t k = 0; k < flash.size().sectors; ++k)
@@ -41,20 +42,19 @@ inline std::vector<std::uint8_t> bytes_of(FlashModel& flash) {
   return all;
 }
 
-/// The same firmware on this machine, with a flash of its own.
 class HostBoard {
  public:
-  static constexpr std::uint32_t sectors = 3, sector_bytes = 0x4000;  // of the STM32F405, those behind the vectors
+  static constexpr std::uint32_t sectors = 3, sector_bytes = 0x4000;  // of the STM32F405, after the vectors
 
   explicit HostBoard(const std::vector<std::uint8_t>& flash,
-                     const std::optional<measurement::StartingPoint>& told = std::nullopt) {
+                     const std::optional<measurement::StartingPoint>& start = std::nullopt) {
     fill(flash_, flash);
     plug_in(&flash_);
     host_hal::sent.clear();
     host_hal::requests.clear();
     host_hal::switched = {};
     persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
-    application_.emplace(told ? told : stored_starting_point(persistence_, host_hal::table9().hash),
+    application_.emplace(start ? start : stored_starting_point(persistence_, host_hal::table9().hash),
                          messages::Identity{host_hal::table9().hash, 0x000100},
                          static_cast<float>(host_hal::table9().parameters.capacity_ah), persistence_);
   }

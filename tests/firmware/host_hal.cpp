@@ -14,7 +14,7 @@ void host_hal::begin() {
   fed = 0;
   board_state = {};
   calendar_was_set_to = 0;
-  calendar_takes = true;
+  calendar_accepts = true;
   calibrated = {};
 }
 
@@ -44,7 +44,7 @@ BoardState board_state() { return host_hal::board_state; }
 std::uint64_t now_us() { return 0; }
 bool calendar_set(std::uint32_t unix_s) {
   host_hal::calendar_was_set_to = unix_s;
-  return host_hal::calendar_takes;
+  return host_hal::calendar_accepts;
 }
 void calibrate(const SensorCalibration& c) { host_hal::calibrated = c; }
 

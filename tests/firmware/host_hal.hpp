@@ -1,6 +1,6 @@
-// The functions of hal/ that the firmware's application calls, on this machine: what it sends, switches and records is
-// kept here, what it reads is set here. The flash is another file's (hal/absent/flash.cpp,
-// tests/storage/flash_model.hpp). And the application's parts with cell table9.
+// The functions of hal/ that the application calls, for tests on this machine. Variables hold what the application has
+// sent, switched and recorded, and what it reads. The flash is in another file (hal/absent/flash.cpp or
+// tests/storage/flash_model.hpp). Also: the application's Board with the cell table9.
 #pragma once
 
 #include <cstdint>
@@ -25,13 +25,13 @@ inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;
 inline hal::BoardState board_state;
 inline std::uint32_t calendar_was_set_to = 0;
-inline bool calendar_takes = true;
+inline bool calendar_accepts = true;
 inline hal::SensorCalibration calibrated;
 
-/// As at the start of a program.
+/// Resets all variables.
 void begin();
 
-/// The last frame of a message that was sent.
+/// The last sent frame of a message.
 template <class Message>
 std::optional<Message> last() {
   for (auto f = sent.rbegin(); f != sent.rend(); ++f) {
@@ -45,7 +45,7 @@ inline const files::CellFile& table9() {
   return cell;
 }
 
-/// Of firmware/board_cell.hpp all but plan(), which a test's board adds.
+/// The application's Board with the cell table9, except plan(), which the board of a test adds.
 template <std::size_t Cells>
 struct Table9Board {
   using Estimator = estimator::SocEstimator<float>;
@@ -64,9 +64,9 @@ struct Table9Board {
                                bool limits_wanted) {
     condition.update(tables(), sample, e, estimator.state(), limits_wanted);
   }
-  static void update_cells(estimator::PackCells<float, Cells>& of, const measurement::PackSample<Cells>& pack,
+  static void update_cells(estimator::PackCells<float, Cells>& differences, const measurement::PackSample<Cells>& pack,
                            const estimator::Estimate<float>& e) {
-    of.update(tables(), pack, e);
+    differences.update(tables(), pack, e);
   }
   static const model::PlausibleRange& plausible() { return tables().plausible; }
   static protection::PackDesign design(double sample_period_s) {

@@ -16,7 +16,8 @@ void I2cControllerModel::update(double now_us) {
     ready_us_ = 0;
     switch (phase_) {
       case Phase::starting:
-        phase_ = Phase::started, sb_ = true;
+        phase_ = Phase::started;
+        sb_ = true;
         break;
       case Phase::addressing:
         address_done();
@@ -95,7 +96,7 @@ std::uint32_t I2cControllerModel::read(std::uint32_t offset, double now_us) {
     case 0x04:
       return cr2_;
     case 0x10: {
-      if (!received_) violations.push_back("DR is read with nothing in it");
+      if (!received_) violations.push_back("DR is read while empty");
       const std::uint8_t byte = dr_;
       received_ = shift_full_;
       if (shift_full_) {
@@ -129,33 +130,38 @@ std::uint32_t I2cControllerModel::read(std::uint32_t offset, double now_us) {
   }
 }
 
+void I2cControllerModel::write_cr1(std::uint32_t value, double now_us) {
+  if ((value & reset) != 0 || (value & on) == 0) {
+    phase_ = Phase::idle;
+    sb_ = address_ = received_ = shift_full_ = empty_ = refused_ = stop_wanted_ = dr_waits_ = false;
+    out_.clear();
+    ready_us_ = 0;
+    cr1_ = value & ~(start | stop_bit);
+    return;
+  }
+  if ((value & start) != 0 && (cr1_ & start) == 0) {
+    if (phase_ != Phase::idle && !(phase_ == Phase::sending && ready_us_ == 0))
+      violations.push_back("a start during a transfer");
+    phase_ = Phase::starting;
+    empty_ = false;
+    ready_us_ = now_us + start_us;
+  }
+  cr1_ = value & ~start;
+  if ((value & stop_bit) != 0) {
+    stop_wanted_ = true;
+    if (phase_ != Phase::receiving || ready_us_ == 0) stop();
+  }
+}
+
 void I2cControllerModel::write(std::uint32_t offset, std::uint32_t value, double now_us) {
   update(now_us);
   switch (offset) {
     case 0x00:
-      if ((value & reset) != 0 || (value & on) == 0) {
-        phase_ = Phase::idle;
-        sb_ = address_ = received_ = shift_full_ = empty_ = refused_ = stop_wanted_ = dr_waits_ = false;
-        out_.clear();
-        ready_us_ = 0;
-        cr1_ = value & ~(start | stop_bit);
-        return;
-      }
-      if ((value & start) != 0 && (cr1_ & start) == 0) {
-        if (phase_ != Phase::idle && !(phase_ == Phase::sending && ready_us_ == 0))
-          violations.push_back("a start in the middle of something");
-        phase_ = Phase::starting;
-        empty_ = false;
-        ready_us_ = now_us + start_us;
-      }
-      cr1_ = value & ~start;
-      if ((value & stop_bit) != 0) {
-        stop_wanted_ = true;
-        if (phase_ != Phase::receiving || ready_us_ == 0) stop();
-      }
+      write_cr1(value, now_us);
       return;
     case 0x04:
-      cr2_ = value, frequency_mhz = value & 63;
+      cr2_ = value;
+      frequency_mhz = value & 63;
       return;
     case 0x10:
       if (sb_) {
@@ -173,7 +179,7 @@ void I2cControllerModel::write(std::uint32_t offset, std::uint32_t value, double
           empty_ = false;
         }
       } else {
-        violations.push_back("DR is written when nothing can be sent");
+        violations.push_back("DR is written outside a transfer");
       }
       return;
     case 0x14:

@@ -1,9 +1,9 @@
-// ST's I2C controller (the one of STM32F1 to F4) as its registers show it, written from RM0090, 27: flags with the time
-// that bytes take at 400 kHz, a clock that waits while nobody reads or writes, the acknowledge that the program has to
-// withdraw in time. On its wire hangs tests/hal/bq76952_model.
+// Register model of ST's I2C controller (STM32F1 to F4), written from RM0090, 27: flags with the byte times of 400 kHz,
+// a clock that is stretched while the program neither reads nor writes, and the acknowledge that the program must
+// withdraw in time. The device on the bus is tests/hal/bq76952_model.
 //
-// A write reaches the chip when it is ended; that the chip refuses a byte of it is not shown. What a driver must not do
-// is in violations.
+// A write reaches the device when it ends; a refused byte within a write is not modelled. `violations` lists driver
+// errors.
 #pragma once
 
 #include <array>
@@ -38,6 +38,7 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
   void byte_received();
   void begin_reception(double now_us);
   void stop();
+  void write_cr1(std::uint32_t value, double now_us);
   bool pending(double now_us) const { return ready_us_ > 0 && now_us >= ready_us_ && !chip_.hung; }
 
   Bq76952Model& chip_;
@@ -52,14 +53,15 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
   std::size_t at_ = 0;
 };
 
-/// Port B as far as I2C sees it: both wires high, or the clock held low.
+/// The I2C pins of port B: both wires high, or the clock held low.
 class I2cPins : public UnicornBoard::Peripheral {
  public:
   static constexpr std::uint32_t base = 0x40020400;
 
   explicit I2cPins(const Bq76952Model& chip) : chip_(chip) {}
   std::uint32_t read(std::uint32_t offset, double) override {
-    return offset == 0x10 ? (chip_.hung ? 0x80 : 0xC0) : registers_[offset / 4];
+    if (offset != 0x10) return registers_[offset / 4];
+    return chip_.hung ? 0x80 : 0xC0;
   }
   void write(std::uint32_t offset, std::uint32_t value, double) override { registers_[offset / 4] = value; }
 

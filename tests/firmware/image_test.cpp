@@ -1,5 +1,4 @@
-// An image as a file: the same bytes from the same sources, and the bill of materials beside it against the linker's
-// map.
+// The image as a file: the same sources give the same bytes, and its bill of materials agrees with the linker's map.
 #include <map>
 #include <regex>
 #include <set>
@@ -19,17 +18,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// From a copy of the sources in another place, without a compiler cache: one that answered would only show that it is
-/// the same as itself.
+/// Builds a copy of the sources in another folder. Without a compiler cache, because a cached result proves nothing.
 TEST(Image, HasTheSameBytesFromAnotherFolder) {
   const auto here =
       images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application);
   const images::TemporaryFolder folder;
   const fs::path sources = folder.path() / "other sources", build = folder.path() / "other build";
   fs::create_directory(sources);
-  for (const char* name :
-       {"CMakeLists.txt", "cmake", "boards", "can", "hal", "storage", "firmware", "estimator", "model", "protection",
-        "arithmetic", "measurement"}) {
+  for (const char* name : {"CMakeLists.txt", "cmake", "boards", "can", "hal", "storage", "firmware", "estimator",
+                           "model", "protection", "arithmetic", "measurement"}) {
     fs::copy(fs::path(BMS_SOURCE_DIR) / name, sources / name, fs::copy_options::recursive);
   }
   images::output_of({"cmake", "-S", sources, "-B", build, "-G", "Ninja", "-DBMS_BOARD=stm32f405_forklift",
@@ -44,7 +41,7 @@ TEST(Image, HasTheSameBytesFromAnotherFolder) {
   EXPECT_EQ(there.find(BMS_SOURCE_DIR), std::string::npos);
 }
 
-/// Every line of the map's that names a member of an archive; by archive.
+/// Linked members of each archive, according to the map.
 std::map<std::string, std::set<std::string>> members_in(const std::string& map) {
   std::map<std::string, std::set<std::string>> found;
   static const std::regex member("/([^/ ()]*\\.a)\\(([^)]*)\\)");
@@ -71,7 +68,7 @@ TEST(BillOfMaterials, NamesEveryArchiveAndMemberOfTheLinkersMapWithVersionAndLic
         has_cell = true;
         const std::string hash = c.at("hashes")[0].at("content");
         EXPECT_EQ(hash, files::sha256(cell.text));
-        EXPECT_EQ(std::stoul(hash.substr(0, 8), nullptr, 16), cell.hash) << "what is on CAN";
+        EXPECT_EQ(std::stoul(hash.substr(0, 8), nullptr, 16), cell.hash) << "the hash in the message Identity";
         continue;
       }
       EXPECT_EQ(c.at("type"), "library");

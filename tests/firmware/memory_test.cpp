@@ -1,22 +1,23 @@
-// What the forklift board's firmware knows over a loss of power, on this machine: state of charge, its cells, faults
-// for the workshop, corrections.
+// What the firmware of the forklift board restores after a loss of power, on this machine: state of charge, cells,
+// service faults, corrections.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "tests/firmware/host_board.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::firmware {
 namespace {
 
 using host_hal::last;
 
-class Memory : public ::testing::Test {
+class StoredStateTest : public ::testing::Test {
  protected:
   void SetUp() override { host_hal::begin(); }
   void TearDown() override { host_hal::begin(); }
 
-  /// A second, with 2 A out of sixteen cells of which the fifth is 30 mV above the others.
+  /// The next sample, a second later: 2 A discharge; the fifth of sixteen cells is 30 mV above the others.
   Input second() {
     ++seconds_;
     Input in;
@@ -31,7 +32,7 @@ class Memory : public ::testing::Test {
   void run(HostBoard& board, int count) {
     for (int k = 0; k < count; ++k) board.process_sample(second());
   }
-  void ask(HostBoard& board, std::uint32_t code, std::uint32_t argument) {
+  void send_command(HostBoard& board, std::uint32_t code, std::uint32_t argument) {
     can::Command command;
     command.code = code;
     command.argument = argument;
@@ -42,14 +43,14 @@ class Memory : public ::testing::Test {
 
   const std::vector<std::uint8_t> new_chip =
       std::vector<std::uint8_t>(HostBoard::sectors * HostBoard::sector_bytes, 0xFF);
-  const measurement::StartingPoint start{600'000'000, 20'000'000};
+  const measurement::StartingPoint start = starting_at(0.6, 0.02);
 
  private:
   unsigned seconds_ = 0;
   std::uint8_t counter_ = 0;
 };
 
-TEST_F(Memory, ARunBeginsWhereTheOneBeforeItEnded) {
+TEST_F(StoredStateTest, ARunContinuesFromTheEndOfThePreviousOne) {
   std::vector<std::uint8_t> kept;
   can::PackState before;
   can::CellExtremes cells;
@@ -58,11 +59,11 @@ TEST_F(Memory, ARunBeginsWhereTheOneBeforeItEnded) {
     run(board, 600);
     before = last<can::PackState>().value();
     cells = last<can::CellExtremes>().value();
-    ASSERT_GT(cells.soc_spread, 1.0F) << "30 mV are some percent";
+    ASSERT_GT(cells.soc_spread, 1.0F) << "30 mV are a few percent";
     board.shut_down();
     kept = board.flash();
   }
-  host_hal::cause = hal::ResetCause::pin;  // which takes no time
+  host_hal::cause = hal::ResetCause::pin;  // takes no time
   HostBoard board(kept);
   run(board, 1);
   EXPECT_EQ(last<can::StartingSoc>()->given, can::StartingSoc::given_yes);
@@ -70,11 +71,11 @@ TEST_F(Memory, ARunBeginsWhereTheOneBeforeItEnded) {
   EXPECT_GE(last<can::PackState>()->soc_sigma, before.soc_sigma);
   EXPECT_LT(last<can::PackState>()->soc_sigma, before.soc_sigma + 0.5F);
   EXPECT_NEAR(last<can::CellExtremes>()->soc_spread, cells.soc_spread, 0.3F)
-      << "each cell's difference is remembered, to 0.001 %";
+      << "the difference of each cell is restored to 0.001 %";
   EXPECT_NEAR(board.persistence().charge().operating_s, 600, 1);
 }
 
-TEST_F(Memory, OfAnotherCellFileNothingIsTakenUpUntilSomebodyHasSeenIt) {
+TEST_F(StoredStateTest, DataOfAnotherCellFileAreNotUsedAndFaultsMustBeCleared) {
   std::vector<std::uint8_t> kept;
   {
     HostBoard board(new_chip, start);
@@ -82,7 +83,7 @@ TEST_F(Memory, OfAnotherCellFileNothingIsTakenUpUntilSomebodyHasSeenIt) {
     board.shut_down();
     kept = board.flash();
   }
-  {  // as if that had been an image with another cell
+  {  // as if the previous image had another cell file
     FlashModel flash({HostBoard::sectors, HostBoard::sector_bytes}, 2);
     fill(flash, kept);
     plug_in(&flash);
@@ -96,14 +97,14 @@ TEST_F(Memory, OfAnotherCellFileNothingIsTakenUpUntilSomebodyHasSeenIt) {
   EXPECT_EQ(last<can::StartingSoc>()->given, can::StartingSoc::given_no);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 1U) << "until it is cleared";
   EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()), 0x12345678U);
-  ask(board, can::Command::code_clear_faults, 1);
+  send_command(board, can::Command::code_clear_faults, 1);
   run(board, 2);
   EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()),
             host_hal::table9().hash);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
 }
 
-TEST_F(Memory, AShortCircuitIsThereUntilTheWorkshopClearsIt) {
+TEST_F(StoredStateTest, AShortCircuitStaysUntilAWorkshopClearsIt) {
   std::vector<std::uint8_t> kept;
   {
     HostBoard board(new_chip, start);
@@ -112,25 +113,25 @@ TEST_F(Memory, AShortCircuitIsThereUntilTheWorkshopClearsIt) {
     in.pack.current_ua = -60'000'000;
     board.process_sample(in);
     EXPECT_EQ(last<can::Faults>()->short_circuit, 1U);
-    kept = board.flash();  // the power goes at once
+    kept = board.flash();  // the power is lost at once
   }
   HostBoard board(kept, start);
   run(board, 20);
   EXPECT_EQ(last<can::Faults>()->short_circuit, 1U);
-  ask(board, can::Command::code_clear_faults, 0);
+  send_command(board, can::Command::code_clear_faults, 0);
   run(board, 2);
-  EXPECT_EQ(last<can::Faults>()->short_circuit, 1U) << "not a driver's to clear";
-  ask(board, can::Command::code_clear_faults, 1);
+  EXPECT_EQ(last<can::Faults>()->short_circuit, 1U) << "a driver cannot clear it";
+  send_command(board, can::Command::code_clear_faults, 1);
   run(board, 2);
   EXPECT_EQ(last<can::Faults>()->short_circuit, 0U);
 }
 
-TEST_F(Memory, ACorrectionIsTakenAtOnceAndKept) {
+TEST_F(StoredStateTest, ACorrectionIsAppliedAtOnceAndStored) {
   std::vector<std::uint8_t> kept;
   {
     HostBoard board(new_chip, start);
     run(board, 2);
-    ask(board, can::Command::code_voltage_offset, static_cast<std::uint32_t>(-1'500));
+    send_command(board, can::Command::code_voltage_offset, static_cast<std::uint32_t>(-1'500));
     EXPECT_EQ(host_hal::calibrated.voltage_offset_uv, -1'500);
     kept = board.flash();
   }
@@ -139,7 +140,7 @@ TEST_F(Memory, ACorrectionIsTakenAtOnceAndKept) {
   EXPECT_EQ(stored_calibration(board.persistence()).current_gain_ppm, 0);
 }
 
-TEST_F(Memory, WhatDoesNotFitIsStoredAsTheNearestThatDoes) {
+TEST_F(StoredStateTest, ValuesOutOfRangeAreStoredClamped) {
   EXPECT_NEAR(scaled_to_integer(0.9234567F, 1e6F), 923'457, 1);
   EXPECT_EQ(scaled_to_integer(-5e3F, 1e6F), -2'147'000'000);
   EXPECT_EQ(scaled_to_integer(5e3F, 1e6F), 2'147'000'000);

@@ -1,5 +1,5 @@
-// What sixteen cells beside their mean cost on the board: a thousand steps of their differences over a load that turns,
-// for the instruction counter. Exit code 0: a cell that was made weaker is found.
+// Measures the cost of the cell differences of sixteen cells on a board: a thousand steps with an alternating load, for
+// the instruction counter. Exit code 0: the weaker cell is detected.
 #include "cell_constants.hpp"
 #include "estimator/cell_differences.hpp"
 
@@ -16,6 +16,7 @@ using Pack = estimator::CellDifferences<float, 16>;
 
 int main() {
   using namespace bms;
+  using firmware::Pack;
   Pack pack;
   Pack::Observation observation;
   float soc = 0.95F;
@@ -26,11 +27,11 @@ int main() {
     const auto at = model::look_up(generated::cell<float>, soc, interval);
     const float drop_v = (at.r0_ohm + at.r1_ohm) * current_a;
     for (std::size_t cell = 0; cell < 16; ++cell) {
-      observation.usable[cell] = cell != 15 || k % 3 != 0;  // one channel comes and goes
-      const float more = cell == 7 ? 0.3F : -0.02F;         // resistance of the eighth
+      observation.usable[cell] = cell != 15 || k % 3 != 0;  // one reading is missing from time to time
+      const float more = cell == 7 ? 0.3F : -0.02F;         // extra resistance of the eighth cell
       observation.voltage_v[cell] = at.ocv_v + drop_v * (1 + more);
     }
-    pack_step(pack, soc, current_a, moved, observation);
+    firmware::pack_step(pack, soc, current_a, moved, observation);
   }
   return pack[7].resistance() > 0.15F && pack[0].resistance() < 0.05F ? 0 : 1;
 }

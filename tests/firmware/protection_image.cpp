@@ -1,5 +1,5 @@
-// What protecting sixteen cells costs on the board: a thousand samples of a pack with everything happening to it, for
-// the instruction counter. Exit code 0: the board decides what the host decides.
+// Measures the cost of protecting sixteen cells on a board: a thousand samples with all kinds of faults, for the
+// instruction counter. Exit code 0: the board decides as the host.
 #include "tests/protection/scenario.hpp"
 
 namespace bms::protection {

@@ -1,4 +1,4 @@
-// The application's image in the emulator, switched off and on again: its flash is a file that both runs share.
+// Switches the application image in the emulator off and on again. Both runs share a file as flash.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ std::filesystem::path image() {
   return images::firmware_image("netduinoplus2", files::read_cell("table9"), images::Image::application);
 }
 
-/// Seven minutes of the shift; a reading a second.
+/// Seven minutes of the shift, one sample per second.
 std::vector<measurement::Sample> some_minutes() {
   const auto all = files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
   return {all.begin() + 3'000, all.begin() + 3'420};
@@ -45,7 +45,7 @@ class Board {
     for (const measurement::Sample& s : part) last = sample(s);
     return last;
   }
-  /// With the first sample: state, broken sectors, newer records, erases, starts.
+  /// Sends the first sample and returns the message Storage: state, broken sectors, newer records, erases, starts.
   std::string storage(const measurement::Sample& s) {
     board_.send_sample(s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc);
     return board_.read_until("t1B88").substr(5);
@@ -59,7 +59,7 @@ class Board {
   SlcanBoard board_;
 };
 
-/// The frame that tells a start, of what telemetry said.
+/// The frame with a starting point, taken from telemetry.
 std::string start(const BoardTelemetry& t) {
   std::string frame = "t3108";
   for (const std::uint32_t ppb : {20'000U * t.soc, 20'000U * t.soc_sigma}) {
@@ -71,8 +71,8 @@ std::string start(const BoardTelemetry& t) {
 class Resume : public ::testing::Test {
  protected:
   std::filesystem::path flash() const { return folder_.path() / "flash"; }
-  /// A board that remembers nothing and is told where to begin.
-  BoardTelemetry told_of(const BoardTelemetry& t, const measurement::Sample& s) const {
+  /// Starts a board without stored data from a given starting point.
+  BoardTelemetry start_given(const BoardTelemetry& t, const measurement::Sample& s) const {
     Board board(folder_.path() / "empty");
     board.send(start(t).c_str());
     return board.sample(s);
@@ -81,11 +81,11 @@ class Resume : public ::testing::Test {
   std::vector<measurement::Sample> part_ = some_minutes();
 };
 
-void say(const char* what, const BoardTelemetry& t) {
+void print_soc(const char* what, const BoardTelemetry& t) {
   std::printf("%s: soc %.2f %% +- %.2f %%\n", what, t.soc / percent, t.soc_sigma / percent);
 }
 
-TEST_F(Resume, AfterAShutdownSocGoesOnWhereItWas) {
+TEST_F(Resume, AfterAShutdownSocContinues) {
   BoardTelemetry before;
   {
     Board board(flash());
@@ -99,20 +99,21 @@ TEST_F(Resume, AfterAShutdownSocGoesOnWhereItWas) {
     Board board(folder_.path() / "another");
     fresh = board.sample(part_.back());
   }
-  const BoardTelemetry told = told_of(before, part_.back());
+  const BoardTelemetry given = start_given(before, part_.back());
   Board board(flash());
   const BoardTelemetry after = board.sample(part_.back());
-  say("at the shutdown", before);
-  say("resumed, with the first voltage in it", after);
-  say("told what was shown at the shutdown", told);
-  say("without what was stored", fresh);
-  EXPECT_NEAR(after.soc, told.soc, 2) << "counts of 0.002 %: as if it had been told, to the last digit that is shown";
-  EXPECT_NEAR(after.soc_sigma, told.soc_sigma, 2);
+  print_soc("at the shutdown", before);
+  print_soc("resumed, including the first voltage", after);
+  print_soc("started from the value shown at the shutdown", given);
+  print_soc("without stored data", fresh);
+  EXPECT_NEAR(after.soc, given.soc, 2)
+      << "counts of 0.002 %: equal to a given starting point, to the last digit of the message";
+  EXPECT_NEAR(after.soc_sigma, given.soc_sigma, 2);
   EXPECT_LT(std::abs(static_cast<int>(after.soc) - static_cast<int>(before.soc)), static_cast<int>(before.soc_sigma));
-  EXPECT_GT(fresh.soc_sigma, 3 * after.soc_sigma) << "a voltage on the plateau says little";
+  EXPECT_GT(fresh.soc_sigma, 3 * after.soc_sigma) << "a voltage on the plateau carries little information";
 }
 
-TEST_F(Resume, AfterTheSupplyWasCutSocIsThatOfTheLastMinuteAndSigmaSaysSo) {
+TEST_F(Resume, AfterALossOfSupplySocIsThatOfTheLastMinuteWithALargerSigma) {
   BoardTelemetry before;
   {
     Board board(flash());
@@ -121,14 +122,14 @@ TEST_F(Resume, AfterTheSupplyWasCutSocIsThatOfTheLastMinuteAndSigmaSaysSo) {
   }  // the emulator is killed
   Board board(flash());
   const BoardTelemetry after = board.sample(part_.back());
-  say("when the supply was cut", before);
-  say("resumed", after);
-  EXPECT_NEAR(after.soc, before.soc, 2 * percent) << "what a minute moves at 1C";
+  print_soc("when the supply was cut", before);
+  print_soc("resumed", after);
+  EXPECT_NEAR(after.soc, before.soc, 2 * percent) << "change in a minute at 1C";
   EXPECT_LT(std::abs(static_cast<int>(after.soc) - static_cast<int>(before.soc)),
             2 * static_cast<int>(after.soc_sigma));
 }
 
-TEST_F(Resume, AStartThatIsToldWinsOverWhatWasStored) {
+TEST_F(Resume, AGivenStartingPointReplacesTheStoredOne) {
   {
     Board board(flash());
     board.send(start_at_80_percent_to_1);
@@ -144,7 +145,7 @@ TEST_F(Resume, AStartThatIsToldWinsOverWhatWasStored) {
   EXPECT_NEAR(board.sample(part_[0]).soc, 90 * percent, 0.2 * percent);
 }
 
-TEST_F(Resume, TheBusIsToldHowOftenItStartedAndThatItsFlashWorks) {
+TEST_F(Resume, StorageMessageCountsTheStarts) {
   for (int starts = 1; starts <= 3; ++starts) {
     Board board(flash());
     const std::string bytes = board.storage(part_[0]);
@@ -155,7 +156,7 @@ TEST_F(Resume, TheBusIsToldHowOftenItStartedAndThatItsFlashWorks) {
   }
 }
 
-TEST_F(Resume, AFlashFileOfAnyContentIsUsed) {
+TEST_F(Resume, AFlashFileOfAnyContentIsUsable) {
   std::string noise(3 * 16 * 1024, '\0');
   unsigned state = 1;
   for (char& c : noise) c = static_cast<char>((state = state * 1'664'525 + 1'013'904'223) >> 24);
@@ -167,9 +168,9 @@ TEST_F(Resume, AFlashFileOfAnyContentIsUsed) {
     before = board.drive({part_.begin(), part_.begin() + 200});
     board.switch_off();
   }
-  const BoardTelemetry told = told_of(before, part_[0]);
+  const BoardTelemetry given = start_given(before, part_[0]);
   Board board(flash());
-  EXPECT_NEAR(board.sample(part_[0]).soc, told.soc, 2);
+  EXPECT_NEAR(board.sample(part_[0]).soc, given.soc, 2);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ void RtcModel::write_bdcr(std::uint32_t value, bool allowed, double now_us) {
   if ((value & domain_reset) != 0) return reset_domain();
   const std::uint32_t selected = bdcr >> 8 & 3, wanted = value >> 8 & 3;
   if (selected != 0 && wanted != selected)
-    violations.push_back("the clock's source is chosen again without a reset of the backup domain");
+    violations.push_back("the clock source is changed without a reset of the backup domain");
   if ((value & lse_on) != 0 && (bdcr & lse_on) == 0) crystal_on_us_ = now_us;
   bdcr = (bdcr & lse_ready) | (value & ~lse_ready);
   advance(now_us);
@@ -36,9 +36,10 @@ void RtcModel::reset_domain() {
 
 double RtcModel::hz() const {
   if ((bdcr & enabled) == 0 || initialising_) return 0;
-  const double source = (bdcr >> 8 & 3) == 1   ? ((bdcr & lse_ready) != 0 ? 32'768 : 0)
-                        : (bdcr >> 8 & 3) == 2 ? 32'000
-                                               : 0;
+  const std::uint32_t selected = bdcr >> 8 & 3;
+  double source = 0;
+  if (selected == 1 && (bdcr & lse_ready) != 0) source = 32'768;
+  if (selected == 2) source = 32'000;
   return source / ((prer_ >> 16 & 0x7F) + 1) / ((prer_ & 0x7FFF) + 1);
 }
 
@@ -69,12 +70,12 @@ void RtcModel::second() {
 void RtcModel::power_away(double seconds, bool battery) {
   if (!battery) {
     reset_domain();
-  } else if ((bdcr >> 8 & 3) == 1) {  // the internal oscillator is not VBAT's
+  } else if ((bdcr >> 8 & 3) == 1) {  // VBAT does not supply the internal oscillator
     fraction_s_ += seconds * hz();
     for (; fraction_s_ >= 1; fraction_s_ -= 1) second();
   }
   at_us_ = 0;
-  if ((bdcr & lse_on) != 0) crystal_on_us_ = -crystal_after_us;  // it ran on
+  if ((bdcr & lse_on) != 0) crystal_on_us_ = -crystal_after_us;  // it kept running
   synchronised_ = false;
   keys_ = 0;
 }
@@ -106,7 +107,9 @@ std::uint32_t RtcModel::read(std::uint32_t at, double now_us) {
 void RtcModel::write(std::uint32_t at, std::uint32_t value, double now_us) {
   advance(now_us);
   if (at == 0x24) {
-    keys_ = value == 0xCA ? 1 : value == 0x53 && keys_ == 1 ? 2 : 0;
+    const bool second_key = value == 0x53 && keys_ == 1;
+    keys_ = second_key ? 2 : 0;
+    if (value == 0xCA) keys_ = 1;
     return;
   }
   if (at == 0x50) {
@@ -114,11 +117,11 @@ void RtcModel::write(std::uint32_t at, std::uint32_t value, double now_us) {
     return;
   }
   if (keys_ != 2) {
-    violations.push_back("a register of the clock is written while locked");
+    violations.push_back("a clock register is written while locked");
     return;
   }
   if (at == 0x0C) {
-    if ((bdcr & enabled) == 0) violations.push_back("the clock is set while off");
+    if ((bdcr & enabled) == 0) violations.push_back("the clock is set while it is off");
     const bool was = initialising_;
     initialising_ = (value & 1U << 7) != 0;
     if (initialising_) synchronised_ = false;
@@ -128,7 +131,7 @@ void RtcModel::write(std::uint32_t at, std::uint32_t value, double now_us) {
     return;
   }
   if (!initialising_) {
-    violations.push_back("the calendar is written outside of its initialisation");
+    violations.push_back("the calendar is written outside initialisation");
     return;
   }
   if (at == 0x10) {

@@ -1,6 +1,6 @@
-// The STM32F405's real-time clock and its backup domain as the registers show them, from RM0090, 5.1.2, 7.3.20 and 26,
-// alone: it shares nothing with hal/. Its calendar counts by the rules of the Gregorian one. It lives longer than a
-// board: power_away() is what happens to it in between.
+// Register model of the STM32F405's real-time clock and backup domain. Written only from RM0090, 5.1.2, 7.3.20 and 26;
+// it shares no code with hal/. The calendar is Gregorian. The model outlives a board: power_away() is the time between
+// two.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +22,9 @@ class RtcModel {
   /// allowed: DBP of PWR_CR.
   void write_bdcr(std::uint32_t value, bool allowed, double now_us);
 
-  /// battery: at VBAT. The next board's time begins at 0.
+  /// The power is off for some seconds. battery: connected to VBAT. The time of the next board begins at 0.
   void power_away(double seconds, bool battery);
-  /// A reset of the core: the shadow registers come anew.
+  /// A reset of the core: the shadow registers are loaded again.
   void core_reset() { synchronised_ = false; }
 
   bool crystal = true;

@@ -80,7 +80,7 @@ std::string SlcanBoard::read() {
     pollfd p{line_, POLLIN, 0};
     std::array<char, 4096> bytes;
     const ssize_t n = poll(&p, 1, 10'000) > 0 ? recv(line_, bytes.data(), bytes.size(), 0) : 0;
-    if (n <= 0) throw std::runtime_error("the board has stopped talking after: " + received_);
+    if (n <= 0) throw std::runtime_error("the board has stopped sending after: " + received_);
     received_.append(bytes.data(), static_cast<std::size_t>(n));
   }
 }

@@ -1,6 +1,5 @@
-// The firmware's application image in the emulator, talked to as a CAN adapter on a serial line is. Numbers and ids are
-// those of the pages in hal/slcan/codec.hpp, hal/sample_frames.hpp and of can/greybox_bms.dbc, written here a second
-// time on purpose.
+// The application image in the emulator, connected like a CAN adapter on a serial line. Numbers and identifiers are
+// those of hal/slcan/codec.hpp, hal/sample_frames.hpp and can/greybox_bms.dbc, written a second time on purpose.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +12,7 @@
 
 namespace bms::firmware {
 
-/// What one sample was answered with.
+/// The answer to one sample.
 struct BoardTelemetry {
   unsigned soc = 0, soc_sigma = 0, soc_display = 0, soc_quality = 0;  ///< raw, 0.002 %
   unsigned voltage = 0;                                               ///< mV
@@ -25,7 +24,7 @@ struct BoardTelemetry {
 
 class SlcanBoard {
  public:
-  /// arguments: the program's; the first is the file that is its flash for data. more: options of the emulator.
+  /// arguments: of the program; the first is the file used as data flash. more: options of the emulator.
   explicit SlcanBoard(const std::filesystem::path& application_image, const std::vector<std::string>& arguments = {},
                       const std::vector<std::string>& more = {},
                       const images::EmulatedBoard& board = images::emulated_boards().front());
@@ -36,7 +35,7 @@ class SlcanBoard {
   void write(const std::string& bytes) const;
   /// The next answer: a line up to \r (without it), or "\a". Throws std::runtime_error after ten seconds of silence.
   std::string read();
-  /// Lines until one begins with `what`; that one.
+  /// Reads lines until one begins with `what`, and returns that line.
   std::string read_until(const std::string& what);
 
   void send_sample(std::uint64_t time_us, std::int32_t current_ua, std::int32_t voltage_uv,
@@ -44,7 +43,7 @@ class SlcanBoard {
   /// The frames up to the status frame that ends a sample.
   BoardTelemetry telemetry();
 
-  /// Exit code of the emulator, after the firmware has ended.
+  /// Waits for the end of the firmware and returns the exit code of the emulator.
   int wait() { return emulator_.wait(); }
 
  private:

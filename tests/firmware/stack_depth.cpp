@@ -22,7 +22,7 @@ struct Instruction {
   std::string name, operands;
 };
 
-/// "name\toperands" without what objdump remarks, its widths (.w, .n) taken off.
+/// Name and operands without the remarks of objdump and without width suffixes (.w, .n).
 Instruction instruction_of(const std::string& line) {
   std::istringstream in(line);
   Instruction i;
@@ -59,8 +59,8 @@ std::int32_t bytes_of_list(const std::string& operands) {
 
 std::int32_t after_hash(const std::string& operands) { return std::stoi(operands.substr(operands.rfind('#') + 1)); }
 
-/// What an instruction adds to the stack, in bytes; less than 0 takes off. literals: of registers that hold a constant,
-/// which ARMv6-M makes large frames with.
+/// Bytes that an instruction adds to the stack; negative if it removes some. literals: constants in registers, with
+/// which ARMv6-M makes large frames.
 std::int32_t pushed(const Instruction& i, const std::map<std::string, std::int32_t>& literals, std::int32_t large_frame,
                     const std::string& function) {
   const std::string& o = i.operands;
@@ -99,8 +99,8 @@ std::optional<std::uint32_t> target(const Instruction& i) {
   return static_cast<std::uint32_t>(std::stoul(i.operands.substr(begin, open - begin), nullptr, 16));
 }
 
-/// Of one function: its instructions in the order of their addresses. Where a way in is not seen (a table's, a backward
-/// one) the depth is the deepest before.
+/// Analyses one function; its instructions are in the order of their addresses. After an unseen jump (from a table, or
+/// backwards) the depth is the deepest so far.
 Function function_of(const std::string& name, const std::vector<Instruction>& body,
                      const std::map<std::uint32_t, std::int32_t>& words) {
   Function f{name, 0, {}, false};
@@ -122,18 +122,18 @@ Function function_of(const std::string& name, const std::vector<Instruction>& bo
     } else {
       literals.erase(i.operands.substr(0, i.operands.find(',')));
     }
-    const bool only_perhaps =
-        i.name.starts_with("pop") && i.name != "pop";  // in an IT block: the way on has not taken it off
-    const std::int32_t more = only_perhaps ? 0 : pushed(i, literals, large_frame, name);
+    const bool conditional =
+        i.name.starts_with("pop") && i.name != "pop";  // in an IT block: the other path has not removed it
+    const std::int32_t more = conditional ? 0 : pushed(i, literals, large_frame, name);
     if (i.name == "add" && i.operands.starts_with("sp, r") && more > 0) large_frame = more;
     if (i.name == "pop") popped = i.operands;
     depth += more;
-    if (depth < 0) throw std::runtime_error("more is taken off the stack than was put there in " + name);
+    if (depth < 0) throw std::runtime_error("more is removed from the stack than was added in " + name);
     deepest = std::max(deepest, depth);
     if (const auto to = target(i)) {
       const bool own = *to >= body.front().address && *to <= body.back().address;
       const bool call =
-          i.name == "bl" && (!own || *to == body.front().address);  // ARMv6-M jumps by bl where b does not reach
+          i.name == "bl" && (!own || *to == body.front().address);  // ARMv6-M jumps by bl beyond the range of b
       if (own && !call) depth_at[*to] = std::max(depth_at[*to], depth);
       if (!call && *to == body.front().address && depth > 0)
         throw std::runtime_error("a loop that takes more stack each time in " + name);
@@ -141,9 +141,9 @@ Function function_of(const std::string& name, const std::vector<Instruction>& bo
       falls_through = i.name != "b" && (i.name != "bl" || call);
     } else if (returns(i) || one_of(i.name, {"tbb", "tbh", "udf"}) ||
                (i.name == "mov" && i.operands.starts_with("pc,"))) {
-      falls_through = false;  // mov pc: a table, as tbb is where there is none
+      falls_through = false;  // mov pc: a jump table without tbb
     } else if (i.name == "bx" && popped.find(i.operands) != std::string::npos) {
-      falls_through = false;  // a return, where pop cannot change the instruction set
+      falls_through = false;  // a return on cores whose pop cannot change the instruction set
     } else if (i.name == "blx" || i.name == "bx" || (i.name == "ldr" && i.operands.starts_with("pc,"))) {
       f.by_pointer |= i.operands != "lr";
       falls_through = i.name == "blx";
@@ -158,7 +158,7 @@ class Deepest {
   Deepest(const Functions& functions, const ByPointer& by_pointer) : functions_(functions), by_pointer_(by_pointer) {}
 
   Depth from(std::uint32_t address) {
-    auto found = functions_.upper_bound(address);  // the libraries have functions with a second way in
+    auto found = functions_.upper_bound(address);  // library functions may have a second entry
     if (found == functions_.begin())
       throw std::runtime_error(fmt::format("a call to {:#x}, where no function is", address));
     address = (--found)->first;
@@ -170,16 +170,16 @@ class Deepest {
     for (const std::uint32_t callee : callees(f)) {
       if (callee == address && times > 1) continue;
       Depth d = from(callee);
-      if (d.bytes > below.bytes || below.way.empty()) below = std::move(d);
+      if (d.bytes > below.bytes || below.path.empty()) below = std::move(d);
     }
     active_.erase(address);
     below.bytes += times * f.stack;
-    below.way.insert(below.way.begin(), f.name);
+    below.path.insert(below.path.begin(), f.name);
     return known_[address] = below;
   }
 
  private:
-  /// Functions that call themselves a known number of times.
+  /// Number of activations of a function that calls itself a known number of times.
   static std::uint32_t repeated(const Function& f) {
     const bool halves = f.name.find("bms::arithmetic::step_response<") !=
                         std::string::npos;  // arithmetic/exponential.hpp: from 32 down to 1/4
@@ -205,8 +205,8 @@ class Deepest {
   std::set<std::uint32_t> active_;
 };
 
-/// Who calls by pointer in the images, and whom: constructors from reset, and the switch tables of libgcc, which return
-/// into their caller.
+/// Calls by pointer in the images: constructors from reset, and the switch tables of libgcc, which return into their
+/// caller.
 const ByPointer& calls_by_pointer() {
   static const ByPointer known = {{"reset_handler", {"_GLOBAL__sub_I_"}}, {"__gnu_thumb1_case_", {}}};
   return known;

@@ -1,14 +1,14 @@
-// How deep an image's stack can get, from its instructions: what each function takes and whom it calls, down to the
-// libraries' functions.
+// Worst-case stack depth of an image, from its instructions: the stack of each function and its calls, including
+// library functions.
 //
-//   worst = the deepest way from reset + frame of an interrupt + the deepest way from an interrupt's handler + frame of
-//   a fault in it
+//   worst = deepest path from reset + frame of an interrupt + deepest path from an interrupt handler
+//           + frame of a fault in it
 //
-// Interrupts have one priority (tests/firmware/unicorn_board.hpp), so at most one is on the stack; the handler of a
-// fault begins at the stack's top again. What a function takes is its deepest point, wherever in it the call is: an
-// upper bound. Read from the text of arm-none-eabi-objdump, Thumb of ARMv6-M and ARMv7-M. Throws std::runtime_error
-// where that does not tell: recursion, a call by pointer from a function that `by_pointer` does not name, a stack
-// pointer that is computed.
+// Interrupts have one priority (tests/firmware/unicorn_board.hpp), so at most one is on the stack. The fault handler
+// starts again at the top of the stack. A function counts with its deepest point, wherever the call is: an upper bound.
+// Input is the text of arm-none-eabi-objdump (Thumb, ARMv6-M and ARMv7-M). Throws std::runtime_error if the depth
+// cannot be determined: recursion, a call by pointer from a function that `by_pointer` does not name, a computed stack
+// pointer.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct Function {
   std::string name;                  ///< demangled
   std::uint32_t stack = 0;           ///< bytes, at its deepest
   std::vector<std::uint32_t> calls;  ///< addresses
-  bool by_pointer = false;           ///< it calls somebody that the text does not tell
+  bool by_pointer = false;           ///< it calls a function that the text does not name
 };
 using Functions = std::map<std::uint32_t, Function>;  ///< by address
 
@@ -32,17 +32,17 @@ Functions functions_of(const std::string& disassembly);
 
 struct Depth {
   std::uint32_t bytes = 0;
-  std::vector<std::string> way;  ///< from the root to the deepest function
+  std::vector<std::string> path;  ///< from the root to the deepest function
 };
 
-/// by_pointer: whom a function means that calls by pointer; both as beginnings of names.
+/// by_pointer: the callees of each function that calls by pointer. Names are given by their beginnings.
 using ByPointer = std::map<std::string, std::vector<std::string>>;
 Depth depth_from(const Functions& functions, std::uint32_t root, const ByPointer& by_pointer);
 
 struct StackDepth {
   Depth reset, interrupt;
-  std::uint32_t frame =
-      0;  ///< bytes that the core stacks (ARMv7-M, B1.5.6): 8 words, 26 with an FPU, and one to align them
+  /// Bytes that the core stacks (ARMv7-M, B1.5.6): 8 words, 26 with an FPU, plus one for alignment.
+  std::uint32_t frame = 0;
   std::uint32_t worst() const { return reset.bytes + interrupt.bytes + 2 * frame; }
 };
 StackDepth stack_depth(const std::filesystem::path& image);

@@ -18,7 +18,7 @@ namespace bms::firmware {
 
 namespace {
 
-/// What the emulator needs to count the instructions of a function.
+/// Options with which the emulator counts the instructions of a function.
 std::vector<std::string> counting(const std::filesystem::path& image, const char* function, const std::string& log) {
   const auto symbols = symbols_of(image);
   const Symbol counted = symbol_named(symbols, function), interrupt = symbol_named(symbols, "clock_interrupt");
@@ -37,7 +37,7 @@ StepCost counted_in(const std::string& log) {
   if (std::sscanf(text.c_str(), "calls %llu first %llu min %llu max %llu sum %llu", &calls, &first, &least, &most,
                   &sum) != 5 ||
       calls < 2) {
-    throw std::runtime_error("the instruction counter said: " + text);
+    throw std::runtime_error("unexpected output of the instruction counter: " + text);
   }
   return {calls, first, least, most, static_cast<double>(sum) / static_cast<double>(calls - 1)};
 }
@@ -99,7 +99,7 @@ std::vector<std::pair<std::string, double>> core_figures(const images::EmulatedB
                                                          const std::vector<measurement::Sample>& samples) {
   const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
                                            samples, host_sim::state_count(cell));
-  const StepCost besides =
+  const StepCost condition =
       count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay), samples,
                          host_sim::state_count(cell), "bms::firmware::BoardCell::update_condition(");
   const ImageSize size = size_of(images::firmware_image(board.name, cell, images::Image::application));
@@ -107,7 +107,7 @@ std::vector<std::pair<std::string, double>> core_figures(const images::EmulatedB
   return {{"step, mean [instructions]", cost.mean},
           {"step, longest [instructions]", number(cost.most)},
           {"first step, which starts the filter [instructions]", number(cost.first)},
-          {"quality, display, health beside a step, mean [instructions]", besides.mean},
+          {"quality, display, health per sample, mean [instructions]", condition.mean},
           {"flash of the whole application [bytes]", number(size.text)},
           {"RAM of the whole application, without stack [bytes]", number(size.data + size.bss)}};
 }
@@ -117,7 +117,7 @@ std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedB
                                                          const std::vector<measurement::Sample>& samples) {
   const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
                                            samples, host_sim::state_count(cell));
-  const StepCost besides =
+  const StepCost condition =
       count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay), samples,
                          host_sim::state_count(cell), "bms::firmware::BoardCell::update_condition(");
   const StepCost pack = count_instructions(board, images::firmware_image(board.name, cell, images::Image::pack),
@@ -127,12 +127,12 @@ std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedB
   return {{"step, mean [instructions]", cost.mean},
           {"step, longest [instructions]", number(cost.most)},
           {"first step, which starts the filter [instructions]", number(cost.first)},
-          {"quality, display, health beside a step, mean [instructions]", besides.mean},
-          {"sixteen cells beside their mean, mean [instructions]", pack.mean},
+          {"quality, display, health per sample, mean [instructions]", condition.mean},
+          {"differences of sixteen cells, mean [instructions]", pack.mean},
           {"stack of a step [bytes]", number(f.step_stack)},
           {"code of estimator and model [bytes]", number(f.estimator_text)},
           {"the cell's tables [bytes]", number(f.cell_tables)},
-          {"state of one of sixteen cells beside their mean [bytes]", number(sizeof(estimator::CellDifference<float>))},
+          {"state of the difference of one cell [bytes]", number(sizeof(estimator::CellDifference<float>))},
           {"state of one cell [bytes]", number(sizeof(estimator::CellState<float, model::OneRc>))},
           {"state of one estimator with its input checks [bytes]", number(sizeof(estimator::SocEstimator<float>))},
           {"state of quality, display, limits and health [bytes]",

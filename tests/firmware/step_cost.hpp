@@ -1,4 +1,4 @@
-// What an estimator step costs on an emulated board, counted in instructions (tests/firmware/instruction_count.c).
+// Cost of an estimator step on an emulated board, in instructions (tests/firmware/instruction_count.c).
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,13 @@ struct StepCost {
   double mean = 0;  ///< of all calls but the first, which starts the estimator
 };
 
-/// Instructions inside a function of the firmware and all that it calls, interrupts left out. states: that the cell's
-/// estimates tell besides.
+/// Counts the instructions of a function and its callees, without interrupts. states: number of additional states in
+/// the estimates of the cell.
 StepCost count_instructions(const images::EmulatedBoard& board, const std::filesystem::path& replay_image,
                             const std::vector<measurement::Sample>& samples, std::size_t states = 0,
                             const char* function = "bms::firmware::estimator_step(");
 
-/// The same of an image that needs no samples and ends by itself.
+/// The same for an image that needs no samples and ends by itself.
 StepCost count_instructions(const images::EmulatedBoard& board, const std::filesystem::path& image,
                             const char* function);
 
@@ -32,23 +32,23 @@ StepCost count_instructions(const images::EmulatedBoard& board, const std::files
 struct Footprint {
   std::uint64_t estimator_text = 0;  ///< code of estimator and model, start-up of the filter included
   std::uint64_t cell_tables = 0;     ///< the cell's constants
-  std::uint64_t step_stack = 0;      ///< frame of a step; what it calls is inline
+  std::uint64_t step_stack = 0;      ///< frame of a step; its callees are inline
   std::uint64_t image_text = 0;      ///< code and constants of the whole application
   std::uint64_t image_ram = 0;       ///< its data and bss, without the stack
 };
 Footprint footprint(const std::filesystem::path& application_image);
 
-/// The rows of the table in estimator/README.md that a board in integers has: what it is, and the figure.
+/// Rows (name and figure) of the table in estimator/README.md for a board with fixed point.
 std::vector<std::pair<std::string, double>> core_figures(const images::EmulatedBoard& board,
                                                          const files::CellFile& cell,
                                                          const std::vector<measurement::Sample>& samples);
 
-/// The rows of the float board's.
+/// Rows of the table for a board with float.
 std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedBoard& board,
                                                          const files::CellFile& cell,
                                                          const std::vector<measurement::Sample>& samples);
 
-/// The rows of the table of costs in protection/README.md.
+/// Rows of the table in protection/README.md.
 std::vector<std::pair<std::string, double>> protection_figures(const images::EmulatedBoard& board,
                                                                const files::CellFile& cell);
 

@@ -1,6 +1,6 @@
-// The forklift board's image in Unicorn with the chip's real-time clock and its watch on the supply: a command sets the
-// clock, a rest is as long as it was, a clock that lost its battery says so; a supply that sinks opens the contactors
-// at once and leaves a record.
+// The image of the forklift board in Unicorn with real-time clock and supply detector: a command sets the clock, the
+// length of a rest is known, a clock that lost its battery reports it; a falling supply opens the contactors at once
+// and leaves a record.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ std::optional<Message> last(const UnicornBoard& board) {
   return found;
 }
 
-/// One run of the board: its clock, and what was stored, live longer.
+/// One run of the board. Clock and flash outlive it.
 class BoardRun {
  public:
   explicit BoardRun(RtcModel& rtc, std::vector<std::uint8_t>& flash, std::uint32_t flags)
@@ -62,7 +62,7 @@ class BoardRun {
     return (words[1] & 1) != 0 ? std::optional(words[0]) : std::nullopt;
   }
   std::uint32_t calendar() { return last<can::Board>(board)->calendar; }
-  /// Samples a second apart, ten a second.
+  /// Sends samples whose times are a second apart, ten per second.
   void drive(unsigned seconds) {
     for (unsigned k = 0; k < seconds; ++k) {
       measurement::PackSample<16> s;
@@ -92,7 +92,7 @@ class Calendar : public ::testing::Test {
       std::vector<std::uint8_t>(FlashControllerModel::sectors * FlashControllerModel::sector_bytes, 0xFF);
 };
 
-TEST_F(Calendar, ThatWasNeverSetSaysSoAndOneThatIsSetGoesOnIntoTheNewYearWithoutPower) {
+TEST_F(Calendar, ReportsNeverSetAndOnceSetContinuesIntoTheNewYearWithoutPower) {
   {
     BoardRun run(rtc, flash, power_on);
     run.board.run_for_ms(2'100);
@@ -107,11 +107,11 @@ TEST_F(Calendar, ThatWasNeverSetSaysSoAndOneThatIsSetGoesOnIntoTheNewYearWithout
   BoardRun again(rtc, flash, power_on);
   again.board.run_for_ms(700);
   EXPECT_EQ(again.calendar(), can::Board::calendar_runs);
-  EXPECT_NEAR(again.time().value_or(0), new_years_eve_2031 + 86'400 + 2.3, 1.5) << "1 January 2032 it was, and is";
+  EXPECT_NEAR(again.time().value_or(0), new_years_eve_2031 + 86'400 + 2.3, 1.5) << "1 January 2032";
   EXPECT_EQ(rtc.date.year, 32);
 }
 
-TEST_F(Calendar, WithoutItsBatteryItIsNotSetAndNoTimeIsMadeUp) {
+TEST_F(Calendar, IsNotSetAfterALossOfPowerWithoutABattery) {
   {
     BoardRun run(rtc, flash, power_on);
     run.board.run_for_ms(2'100);
@@ -124,12 +124,12 @@ TEST_F(Calendar, WithoutItsBatteryItIsNotSetAndNoTimeIsMadeUp) {
   EXPECT_FALSE(again.time());
 }
 
-TEST_F(Calendar, WithoutItsCrystalItIsSetAfterFiveSecondsAndWorthNothingAfterALossOfPower) {
+TEST_F(Calendar, WithoutACrystalCanBeSetAfterFiveSecondsAndIsLostWithThePower) {
   rtc.crystal = false;
   {
     BoardRun run(rtc, flash, power_on);
     run.board.run_for_ms(2'100);
-    EXPECT_EQ(run.set_time(new_years_eve_2031), can::CommandAnswer::result_refused) << "it may come up yet";
+    EXPECT_EQ(run.set_time(new_years_eve_2031), can::CommandAnswer::result_refused) << "the crystal may still start up";
     run.board.run_for_ms(3'000);
     EXPECT_EQ(run.set_time(new_years_eve_2031), can::CommandAnswer::result_done);
     run.board.run_for_ms(1'600);
@@ -140,16 +140,16 @@ TEST_F(Calendar, WithoutItsCrystalItIsSetAfterFiveSecondsAndWorthNothingAfterALo
   {
     BoardRun reset(rtc, flash, by_pin);
     reset.board.run_for_ms(700);
-    EXPECT_EQ(reset.calendar(), can::Board::calendar_runs_roughly) << "a reset of the core takes nothing from it";
+    EXPECT_EQ(reset.calendar(), can::Board::calendar_runs_roughly) << "a reset of the core does not change it";
   }
   rtc.power_away(3'600, true);
   BoardRun again(rtc, flash, power_on);
   again.board.run_for_ms(700);
-  EXPECT_EQ(again.calendar(), can::Board::calendar_never_set) << "it stood for an hour";
+  EXPECT_EQ(again.calendar(), can::Board::calendar_never_set) << "it stopped for an hour";
   EXPECT_FALSE(again.time());
 }
 
-TEST_F(Calendar, ATimeBeyondItsCenturyIsRefused) {
+TEST_F(Calendar, RefusesATimeBeyondItsCentury) {
   BoardRun run(rtc, flash, power_on);
   run.board.run_for_ms(2'100);
   EXPECT_EQ(run.set_time(946'684'799), can::CommandAnswer::result_refused);
@@ -157,8 +157,8 @@ TEST_F(Calendar, ATimeBeyondItsCenturyIsRefused) {
   EXPECT_FALSE(run.time());
 }
 
-/// 0.2 % a day of rest (estimator/restart.hpp): three days by the clock, a week that is doubted without.
-TEST_F(Calendar, TheStartAfterARestIsAsOldAsTheClockSays) {
+/// 0.2 % per day of rest (estimator/restart.hpp): three days by the clock, an assumed week without it.
+TEST_F(Calendar, DeterminesTheSelfDischargeOfARest) {
   std::optional<can::PackState> before;
   {
     BoardRun run(rtc, flash, power_on);
@@ -176,7 +176,7 @@ TEST_F(Calendar, TheStartAfterARestIsAsOldAsTheClockSays) {
     return 1e-7 * last<can::StartingSoc>(again.board)->soc_ppb;
   };
   ASSERT_TRUE(before);
-  EXPECT_NEAR(start(true), before->soc - 3 * 0.2, 0.1) << "2 A for three seconds since the record are 0.03 %";
+  EXPECT_NEAR(start(true), before->soc - 3 * 0.2, 0.1) << "2 A for three seconds after the record are 0.03 %";
   EXPECT_NEAR(start(false), before->soc - 7 * 0.2, 0.1);
 }
 
@@ -192,12 +192,12 @@ class Supply : public ::testing::Test {
 
 constexpr std::uint32_t pins = 0x40020818, all_low = 15U << 22;  // GPIOC_BSRR
 
-TEST_F(Supply, ThatSinksOpensInTheInterruptKeepsOneRecordAndIsTold) {
+TEST_F(Supply, FallingOpensInTheInterruptStoresOneRecordAndIsPublished) {
   board.run_for_ms(1'100);
   run.drive(5);
   ASSERT_EQ(last<can::Board>(board)->supply_low, 0U);
   EXPECT_EQ(board.register_value(0x40007000) & 0xF0, 0xF0U) << "PLS 7, detector on";
-  EXPECT_NE(board.register_value(pins), all_low) << "so that it can be told who wrote it";
+  EXPECT_NE(board.register_value(pins), all_low) << "so that a later write is visible";
   const unsigned written = board.flash.words_programmed;
   const double fell_ms = board.now_ms();
   board.supply(true);
@@ -206,10 +206,10 @@ TEST_F(Supply, ThatSinksOpensInTheInterruptKeepsOneRecordAndIsTold) {
   board.run_for_ms(5);
   const unsigned record = board.flash.words_programmed - written;
   EXPECT_GE(record, 12U) << "header and 32 bytes";
-  EXPECT_LE(record, 24U) << "and what was last before the start once more: 0.4 ms";
+  EXPECT_LE(record, 24U) << "plus the last record before the start once more: 0.4 ms";
   board.run_for_ms(600);
   const unsigned with_the_fault = board.flash.words_programmed;
-  EXPECT_LE(with_the_fault - written, record + 40) << "the internal fault is noted with the next sample: 0.6 ms";
+  EXPECT_LE(with_the_fault - written, record + 40) << "the internal fault is stored with the next sample: 0.6 ms";
   EXPECT_EQ(last<can::Board>(board)->supply_low, 1U);
   EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
   board.supply(false);
@@ -218,10 +218,10 @@ TEST_F(Supply, ThatSinksOpensInTheInterruptKeepsOneRecordAndIsTold) {
   const unsigned before = board.flash.words_programmed;
   board.supply(true);
   board.run_for_ms(5);
-  EXPECT_GT(board.flash.words_programmed, before) << "the next time again";
+  EXPECT_GT(board.flash.words_programmed, before) << "a second fall stores again";
 }
 
-TEST_F(Supply, TheRecordHoldsWhatWasCountedToTheLastSample) {
+TEST_F(Supply, RecordHoldsTheChargeUpToTheLastSample) {
   board.run_for_ms(1'100);
   run.drive(20);
   const auto before = last<can::PackState>(board);
@@ -230,12 +230,12 @@ TEST_F(Supply, TheRecordHoldsWhatWasCountedToTheLastSample) {
   flash = board.flash.bytes;
   RtcModel other;
   auto stored = flash;
-  BoardRun again(other, stored, by_pin);  // no time has passed: nothing is taken off
+  BoardRun again(other, stored, by_pin);  // no time has passed: no self-discharge
   again.board.run_for_ms(700);
   EXPECT_NEAR(1e-7 * last<can::StartingSoc>(again.board)->soc_ppb, before->soc, 0.0021);
 }
 
-TEST_F(Supply, OptionBytesThatLetItRunTooLowAreTold) {
+TEST_F(Supply, OptionBytesThatAllowATooLowSupplyAreReported) {
   board.run_for_ms(1'700);
   EXPECT_EQ(last<can::Board>(board)->brown_out_reset_low, 0U) << "level 3";
   UnicornBoard other(image());

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, systick_exception = 15, pvd = 16 + 1,
                         can_tx = 16 + 19, can_rx0 = 16 + 20, untouched = 0xA5A5A5A5;
-constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends a call from outside
+constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends call()
 
 void must(uc_err error, const char* what) {
   if (error != UC_ERR_OK) throw std::runtime_error(fmt::format("{}: {}", what, uc_strerror(error)));
@@ -89,7 +89,7 @@ void UnicornBoard::start() {
   set_reg(UC_ARM_REG_PC, vectors[1] | 1);
 }
 
-/// RM0090, 7.1.1: everything but the backup domain, and the flags that say why.
+/// RM0090, 7.1.1: resets everything except the backup domain and the reset flags.
 void UnicornBoard::start_again(std::uint32_t flags) {
   resets.push_back(flags);
   reset_flags = flags;
@@ -191,9 +191,9 @@ std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
   switch (a) {
     case 0x40023800:
       return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) |
-             3U;  // RCC_CR: what is on is ready
+             3U;  // RCC_CR: what is on is ready at once
     case 0x40023808:
-      return (value & ~12U) | (value & 3) << 2;  // RCC_CFGR: the switch is at once
+      return (value & ~12U) | (value & 3) << 2;  // RCC_CFGR: the clock switches at once
     case 0x40007004:
       return supply_low_ && (register_value(0x40007000) & 1U << 4) != 0
                  ? 4U
@@ -307,7 +307,7 @@ void UnicornBoard::deliver_interrupt() {
   enter(static_cast<std::uint32_t>(exception));
 }
 
-/// ARMv7-M, B1.5.6: the frame, with the FPU's part when the program has used it.
+/// ARMv7-M, B1.5.6: stacks the frame, with the FPU part if the program has used the FPU.
 void UnicornBoard::enter(std::uint32_t exception) {
   const std::uint32_t control = reg(UC_ARM_REG_CONTROL), psr = reg(UC_ARM_REG_XPSR);
   const bool fpu = (control & 4) != 0;
@@ -324,7 +324,7 @@ void UnicornBoard::enter(std::uint32_t exception) {
     frame[24] = reg(UC_ARM_REG_FPSCR);
   }
   sp = (sp & ~4U) - static_cast<std::uint32_t>(4 * frame.size());
-  if (uc_mem_write(core_, sp, frame.data(), 4 * frame.size()) != UC_ERR_OK) {  // B1.5.6: a bus fault of its own
+  if (uc_mem_write(core_, sp, frame.data(), 4 * frame.size()) != UC_ERR_OK) {  // B1.5.6: this is a bus fault
     if (!may_start_again) throw std::runtime_error("no stack for an interrupt");
     registers_[scs + 0xD28] |= 1U << 12;
     exception = 5;
@@ -332,7 +332,7 @@ void UnicornBoard::enter(std::uint32_t exception) {
   set_reg(UC_ARM_REG_SP, sp);
   set_reg(UC_ARM_REG_LR, fpu ? 0xFFFFFFE9 : 0xFFFFFFF9);
   set_reg(UC_ARM_REG_CONTROL, control & ~4U);
-  set_reg(UC_ARM_REG_XPSR, 1U << 24);  // out of an IT block
+  set_reg(UC_ARM_REG_XPSR, 1U << 24);  // outside an IT block
   std::uint32_t handler = 0;
   must(uc_mem_read(core_, 0x08000000 + 4 * exception, &handler, 4), "vector");
   set_reg(UC_ARM_REG_PC, handler | 1);
@@ -363,19 +363,23 @@ void UnicornBoard::leave(std::uint32_t exc_return) {
   exception_ = 0;
 }
 
-/// What a chip would do where Unicorn stops: the fault's own exception, its cause in CFSR (ARMv7-M, B3.2.15).
+/// Where Unicorn stops, a chip takes the exception of the fault, with its cause in CFSR (ARMv7-M, B3.2.15).
 bool UnicornBoard::take_fault(int error) {
   if (!may_start_again) return false;
   const bool no_code = error == UC_ERR_FETCH_UNMAPPED || error == UC_ERR_FETCH_PROT;
   const bool access = error == UC_ERR_READ_UNMAPPED || error == UC_ERR_WRITE_UNMAPPED || error == UC_ERR_WRITE_PROT ||
                       error == UC_ERR_READ_PROT;
-  registers_[scs + 0xD28] |= no_code ? 1U << 8 : access ? 1U << 9 : 1U << 16;  // IBUSERR, PRECISERR, UNDEFINSTR
+  constexpr std::uint32_t ibuserr = 1U << 8, preciserr = 1U << 9, undefinstr = 1U << 16;
+  if (no_code)
+    registers_[scs + 0xD28] |= ibuserr;
+  else
+    registers_[scs + 0xD28] |= access ? preciserr : undefinstr;
   enter(no_code || access ? 5 : 6);
   return true;
 }
 
 void UnicornBoard::find_it_blocks() {
-  std::map<std::uint32_t, bool> regions;  // from there on there is code, or data between it (AAELF32, mapping symbols)
+  std::map<std::uint32_t, bool> regions;  // from this address on: code, or data (AAELF32, mapping symbols)
   for (const Symbol& s : symbols_) {
     if (s.address < 0x08000000 || s.address >= 0x08100000) continue;
     if (s.name.starts_with("$t") || s.name.starts_with("$d"))
@@ -398,9 +402,9 @@ void UnicornBoard::find_it_blocks() {
   if (it_blocks_.empty()) throw std::runtime_error("an image without mapping symbols");
 }
 
-/// Unicorn 2.0.1, told to stop while a block of IT is under way, ends the block and now and then (where a translation
-/// block begins inside of it) leaves the program counter in it, with the block's state (EPSR.IT) at its end: the last
-/// instruction would run twice. A stop in the middle has that state.
+/// If Unicorn 2.0.1 is stopped within an IT block, it finishes the block. If a translation block begins inside, it
+/// leaves the program counter within the IT block although EPSR.IT is that of its end, and the last instruction would
+/// run twice. A regular stop within an IT block has the state of the block.
 std::uint32_t UnicornBoard::behind_it_block(std::uint32_t pc) const {
   if ((reg(UC_ARM_REG_XPSR) & 0x0600FC00) != 0) return pc;
   const auto next = it_blocks_.upper_bound(pc);
@@ -426,7 +430,7 @@ void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
 
 void UnicornBoard::slice() {
   if (sleeping_ || (program_held && !handling_)) {
-    // to the next bit or tick, whichever can wake
+    // to the next bit or tick, whichever comes first
     pass(std::min(next_systick_ > ticks_ ? next_systick_ - ticks_ : 1, next_bit_ > ticks_ ? next_bit_ - ticks_ : 1));
   } else {
     const auto count = static_cast<std::size_t>(1 + random_() % 200);
@@ -434,11 +438,11 @@ void UnicornBoard::slice() {
     pass(count * ticks_a_cycle() + static_cast<std::uint64_t>(flash.take_stall_us() * (ticks_per_second / 1e6)));
   }
   deliver_interrupt();
-  const bool bites = watchdog_ticks_ > 1 && ticks_ - fed_at_ > watchdog_ticks_;
-  if (bites) ended_ = "the watchdog bites";
+  const bool watchdog_expired = watchdog_ticks_ > 1 && ticks_ - fed_at_ > watchdog_ticks_;
+  if (watchdog_expired) ended_ = "the watchdog has reset the core";
   if (ended_.empty()) return;
   if (!may_start_again) throw std::runtime_error(ended_);
-  start_again(1U << 26 | (bites ? 1U << 29 : 1U << 28));  // each pulls the reset pin, too
+  start_again(1U << 26 | (watchdog_expired ? 1U << 29 : 1U << 28));  // each also pulls the reset pin
 }
 
 void UnicornBoard::run_for_ms(double ms) {
@@ -460,7 +464,7 @@ std::vector<std::uint32_t> UnicornBoard::call(const std::string& function, std::
   uc_context* context = nullptr;
   must(uc_context_alloc(core_, &context), "context");
   must(uc_context_save(core_, context), "context");
-  const std::uint32_t result = ccm + 64;  // the far end of the stack
+  const std::uint32_t result = ccm + 64;  // the lowest words of the stack
   set_reg(UC_ARM_REG_R0, result);
   set_reg(UC_ARM_REG_LR, return_of_call | 1);
   uc_emu_start(core_, address_of(function) | 1, return_of_call, 0, 1'000'000);
@@ -489,7 +493,7 @@ void UnicornBoard::supply(bool low) {
 std::uint32_t UnicornBoard::stack_used() const {
   std::vector<std::uint32_t> words(ccm_size / 4);
   must(uc_mem_read(core_, ccm, words.data(), ccm_size), "stack");
-  std::size_t free = 64;  // below: can_health()
+  std::size_t free = 64;  // below: results of call()
   while (free < words.size() && words[free] == untouched) ++free;
   return static_cast<std::uint32_t>(ccm_size - 4 * free);
 }

@@ -1,11 +1,10 @@
-// A board's firmware image on this machine: Unicorn runs the Cortex-M4F's instructions, and what it lacks is here:
-// exception entry and return with the FPU's frame (ARMv7-M, B1.5), faults, the NVIC's enables, SysTick, sleep until an
-// interrupt, and of the chip the clock tree, watchdog, reset, bxCAN (bxcan_model.hpp) and the flash interface
+// Runs the firmware image of a board on this machine. Unicorn executes the instructions of the Cortex-M4F. This class
+// adds exception entry and return with the FPU frame (ARMv7-M, B1.5), faults, interrupt enables, SysTick, sleep until
+// an interrupt, and of the chip: clock tree, watchdog, reset, bxCAN (bxcan_model.hpp) and flash interface
 // (flash_controller_model.hpp). Interrupts come between instructions, after a seeded random number of them.
 //
-// Time: an instruction is a core cycle; sleeping costs none, time goes on to the next event; while flash is programmed
-// or erased the core stands still. All interrupts have one priority, as the firmware sets them: none interrupts
-// another.
+// Time: an instruction takes one core cycle; sleep advances the time to the next event; while flash is programmed or
+// erased the core is stopped. All interrupts have the same priority, as the firmware sets them, so they do not nest.
 #pragma once
 
 #include <array>
@@ -34,25 +33,26 @@ class UnicornBoard {
   UnicornBoard(const UnicornBoard&) = delete;
   UnicornBoard& operator=(const UnicornBoard&) = delete;
 
-  /// Throws std::runtime_error when the firmware faults, resets or starves the watchdog; or, if it may start again,
-  /// only when it does nothing that a chip could do.
+  /// Throws std::runtime_error if the firmware faults, resets the core or does not feed the watchdog. If it may start
+  /// again, throws only for what a chip cannot do.
   void run_for_ms(double ms);
-  /// False when it did not become so in time.
+  /// Returns false if the condition did not become true in time.
   bool run_until(const std::function<bool()>& becomes, double within_ms);
 
   double now_ms() const { return static_cast<double>(ticks_) / (ticks_per_second / 1e3); }
   double ms_at_bit(std::uint64_t bit) const { return 1e3 * static_cast<double>(bit) / can.bits_per_second; }
   hal::CanHealth can_health();
   std::uint32_t register_value(std::uint32_t address) const;
-  /// Bytes of stack that were ever written.
+  /// Bytes of stack that were written at least once.
   std::uint32_t stack_used() const;
 
   std::uint32_t reset_flags = 0x0E000000;  ///< RCC_CSR: power on
-  /// Faults are taken, and a reset starts the firmware again as on a chip: RAM is as it was, the peripherals are not.
+  /// Faults are handled, and a reset starts the firmware again as on a chip: RAM keeps its content, peripherals do not.
   bool may_start_again = false;
-  std::vector<std::uint32_t> resets;  ///< the flags of each
+  std::vector<std::uint32_t> resets;  ///< reset flags of each reset
 
-  /// A function, whose name begins so, begins with these instructions from now on, in flash; unpatch(): as it was.
+  /// Replaces the first instructions of a function in flash. unpatch() restores them. The name is given by its
+  /// beginning.
   using Instructions = std::array<std::uint16_t, 2>;
   void patch(const std::string& function, Instructions with);
   void unpatch();
@@ -60,28 +60,28 @@ class UnicornBoard {
       undefined{0xDE00, 0xDE00};  ///< wfi, b to it; bx lr; udf #0
   std::uint32_t address_of(const std::string& function) const;
   void flip_bit(std::uint32_t address, unsigned bit);
-  /// A bit of the RAM that does not change.
+  /// Makes a bit of the RAM stuck.
   void stick(std::uint32_t address, unsigned bit, bool at);
 
-  /// What else answers at the addresses of the chip's peripherals.
+  /// A further peripheral of the chip.
   struct Peripheral {
     virtual ~Peripheral() = default;
     virtual std::uint32_t read(std::uint32_t offset, double now_us) = 0;
     virtual void write(std::uint32_t offset, std::uint32_t value, double now_us) = 0;
   };
-  std::map<std::uint32_t, Peripheral*> plugged;  ///< by the base of its kilobyte
+  std::map<std::uint32_t, Peripheral*> plugged;  ///< by base address, one kilobyte each
 
-  RtcModel* rtc = nullptr;  ///< with it the backup domain's control register; outlives a board, as its battery does
-  /// PVDO of PWR_CSR, and the interrupt that the detector raises for it.
+  RtcModel* rtc = nullptr;  ///< with the control register of the backup domain; outlives a board
+  /// Sets PVDO of PWR_CSR and raises the interrupt of the detector.
   void supply(bool low);
-  /// Calls a function of the firmware between two of its instructions, as a debugger would; it returns so many words by
-  /// address.
+  /// Calls a function of the firmware between two instructions, as a debugger does. The function returns `words` words
+  /// through an address.
   std::vector<std::uint32_t> call(const std::string& function, std::size_t words);
 
   BxcanModel can;
   FlashControllerModel flash;
-  bool receive_interrupt_held = false;  ///< the CAN receive interrupt waits, as behind a long one
-  bool program_held = false;            ///< main() does not go on, interrupts are served
+  bool receive_interrupt_held = false;  ///< the CAN receive interrupt waits, as after a long interrupt
+  bool program_held = false;            ///< main() is stopped, interrupts are handled
   unsigned estimates = 0;               ///< calls of estimator_step()
   unsigned watchdog_feeds = 0;
   double longest_unfed_ms = 0;
@@ -89,7 +89,7 @@ class UnicornBoard {
 
  private:
   static constexpr std::uint64_t ticks_per_second =
-      336'000'000;  // of 168 and 16 MHz and of bits of 125 to 500 kbit/s a multiple
+      336'000'000;  // a multiple of 168 MHz, 16 MHz and of bit rates of 125 to 500 kbit/s
 
   void load(const std::filesystem::path& image);
   void slice();
@@ -114,8 +114,7 @@ class UnicornBoard {
 
   uc_struct* core_ = nullptr;
   std::vector<Symbol> symbols_;
-  std::map<std::uint32_t, std::uint32_t>
-      it_blocks_;  ///< from the first instruction behind the IT to the first behind the block
+  std::map<std::uint32_t, std::uint32_t> it_blocks_;  ///< first instruction after the IT -> first one after the block
   std::vector<std::pair<std::uint32_t, Instructions>> patched_;
   std::mt19937 random_;
   bool crystal_, handling_ = false, sleeping_ = false, systick_pending_ = false, supply_low_ = false,

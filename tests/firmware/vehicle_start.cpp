@@ -1,6 +1,6 @@
-// What can/messages.md says of times and bytes, as the firmware's application does it: a truck that is switched on,
-// drives, is switched off, meets a fault and clears it. Sixteen cells table9 at rest, a sample each 0.1 s, pre-charge
-// of 0.5 s (resistor times capacitance). One JSON object on standard output; cmake/dbc_page.py makes the page with it.
+// Measures the times and bytes of can/messages.md with the application: a truck is switched on, drives, is switched
+// off, gets a fault and clears it. Sixteen cells table9 at rest, a sample every 0.1 s, precharge time constant 0.5 s.
+// Prints one JSON object; cmake/dbc_page.py puts it into the page.
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "tests/firmware/host_hal.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::firmware {
 namespace {
@@ -27,7 +28,7 @@ struct Board : Table9Board<16> {
   }
 };
 
-/// The truck's side: hears what is on the bus, asks once a second.
+/// The truck: receives what is on the bus and sends its request once a second.
 class Truck {
  public:
   void command(std::uint32_t code, std::uint32_t with) {
@@ -37,19 +38,19 @@ class Truck {
     requests.push_back(c.frame(counter_));
     counter_ = can::next(counter_);
   }
-  /// A sample passes.
+  /// Processes one sample.
   void pass() {
     ++samples_;
-    if (asks && samples_ % 10 == 0) command(can::Command::code_request, argument);
+    if (requests_power && samples_ % 10 == 0) command(can::Command::code_request, argument);
     measurement::PackSample<16> sample;
     sample.time_us = 100'000U * static_cast<std::uint64_t>(samples_);
     sample.current_ua = 0;
     double pack_v = 0;
     for (std::size_t k = 0; k < 16; ++k) {
       const double v = k == 0 ? first_cell_v : 3.28;
-      sample.cell_uv[k] =
-          static_cast<std::int32_t>(1e6 * v) +
-          static_cast<std::int32_t>((static_cast<std::size_t>(samples_) * 7 + 3 * k) % 11) * 50;  // a converter's steps
+      sample.cell_uv[k] = static_cast<std::int32_t>(1e6 * v) +
+                          static_cast<std::int32_t>((static_cast<std::size_t>(samples_) * 7 + 3 * k) % 11) *
+                              50;  // quantisation of a converter
       pack_v += v;
     }
     sample.pack_uv = static_cast<std::int32_t>(1e6 * pack_v);
@@ -65,26 +66,31 @@ class Truck {
     receive();
   }
   double now_s() const { return period_s * samples_; }
-  /// Samples pass until it is so; after a minute it is none of this firmware.
-  template <class So>
-  double until(So&& so) {
+  /// Processes samples until the condition holds and returns the time. Throws std::runtime_error after a minute.
+  template <class Condition>
+  double until(Condition&& holds) {
     const double begin_s = now_s();
-    while (!so()) {
+    while (!holds()) {
       pass();
-      if (now_s() - begin_s > 60) throw std::runtime_error("what can/messages.md tells does not come within a minute");
+      if (now_s() - begin_s > 60)
+        throw std::runtime_error("an event of can/messages.md does not occur within a minute");
     }
     return now_s() - begin_s;
   }
   double until_state(std::uint32_t state) {
     return until([&] { return contactors.state == state; });
   }
-  void drives() { asks = true, argument = 1, command(can::Command::code_request, 1); }
+  void request_drive() {
+    requests_power = true;
+    argument = 1;
+    command(can::Command::code_request, 1);
+  }
 
   can::ContactorState contactors;
   can::AllowedCurrent allowed;
   can::Faults faults;
   can::CommandAnswer answer;
-  bool received = false, asks = false;
+  bool received = false, requests_power = false;
   std::uint32_t argument = 0;
   double first_cell_v = 3.28;
 
@@ -101,49 +107,73 @@ class Truck {
   }
 
   storage::Persistence persistence_;
-  Application<Board> application_{measurement::StartingPoint{500'000'000, 10'000'000}, {}, 6, persistence_};
+  Application<Board> application_{starting_at(0.5, 0.01), {}, 6, persistence_};
   std::uint8_t counter_ = 0;
   int samples_ = 0;
   double dc_link_v_ = 0;
 };
 
-void tell() {
-  using S = can::ContactorState;
-  Truck truck;
-  std::string json;
-  const auto say = [&](const char* name, double seconds) { json += fmt::format(",\n  \"{}\": {:.1f}", name, seconds); };
-  say("first_frames_s", truck.until([&] { return truck.received; }));
-  truck.drives();
-  const double asked_s = truck.now_s();
-  const auto since_asked_s = [&] { return truck.now_s() - asked_s; };
-  truck.until_state(S::state_self_test), say("self_test_s", since_asked_s());
-  truck.until_state(S::state_precharge), say("precharge_s", since_asked_s());
-  truck.until_state(S::state_drive), say("drive_s", since_asked_s());
-  truck.until([&] { return truck.allowed.discharge > 0; }), say("allowed_s", since_asked_s());
-  truck.until([&] { return truck.allowed.discharge >= 3; }), say("half_allowed_s", since_asked_s());
-  truck.asks = false;
-  truck.command(can::Command::code_request, 1);
-  say("silent_until_open_s", truck.until([&] { return truck.contactors.main_plus == 0; }));
-  truck.until_state(S::state_off);
+/// Entries of the JSON object.
+class Entries {
+ public:
+  void seconds(const char* name, double value) { add(name, fmt::format("{:.1f}", value)); }
+  void add(const char* name, const std::string& value) { text_ += fmt::format(",\n  \"{}\": {}", name, value); }
+  const std::string& text() const { return text_; }
 
-  truck.drives();
+ private:
+  std::string text_;
+};
+
+void start_and_stop(Truck& truck, Entries& entries) {
+  using S = can::ContactorState;
+  entries.seconds("first_frames_s", truck.until([&] { return truck.received; }));
+  truck.request_drive();
+  const double requested_s = truck.now_s();
+  const auto add = [&](const char* name) { entries.seconds(name, truck.now_s() - requested_s); };
+  truck.until_state(S::state_self_test);
+  add("self_test_s");
+  truck.until_state(S::state_precharge);
+  add("precharge_s");
+  truck.until_state(S::state_drive);
+  add("drive_s");
+  truck.until([&] { return truck.allowed.discharge > 0; });
+  add("allowed_s");
+  truck.until([&] { return truck.allowed.discharge >= 3; });
+  add("half_allowed_s");
+  truck.requests_power = false;
+  truck.command(can::Command::code_request, 1);
+  entries.seconds("silent_until_open_s", truck.until([&] { return truck.contactors.main_plus == 0; }));
+  truck.until_state(S::state_off);
+}
+
+void fault_and_clear(Truck& truck, Entries& entries) {
+  using S = can::ContactorState;
+  truck.request_drive();
   truck.until_state(S::state_drive);
   truck.first_cell_v = 3.9;
-  say("severe_until_open_s", truck.until([&] { return truck.contactors.main_plus == 0; }));
+  entries.seconds("severe_until_open_s", truck.until([&] { return truck.contactors.main_plus == 0; }));
   truck.first_cell_v = 3.28;
   truck.until_state(S::state_safe);
   const double safe_at_s = truck.now_s();
-  truck.asks = true, truck.argument = 0;  // what the truck has to ask for: nothing
+  truck.requests_power = true;
+  truck.argument = 0;  // the truck withdraws its request
   truck.until([&] { return truck.now_s() - safe_at_s > 1; });
   truck.command(can::Command::code_clear_faults, 0);
   truck.pass();
   truck.pass();
-  json += fmt::format(",\n  \"clear_too_early\": {}", truck.faults.cell_overvoltage_severe);
+  entries.add("clear_too_early", fmt::format("{}", truck.faults.cell_overvoltage_severe));
   truck.until([&] { return truck.now_s() - safe_at_s > 12; });
   truck.command(can::Command::code_clear_faults, 0);
-  say("clear_until_off_s", truck.until_state(S::state_off));
-  truck.drives();
-  say("drive_again_s", truck.until_state(S::state_drive));
+  entries.seconds("clear_until_off_s", truck.until_state(S::state_off));
+  truck.request_drive();
+  entries.seconds("drive_again_s", truck.until_state(S::state_drive));
+}
+
+void print_page_values() {
+  Truck truck;
+  Entries entries;
+  start_and_stop(truck, entries);
+  fault_and_clear(truck, entries);
 
   can::Command command;
   command.code = can::Command::code_request;
@@ -156,7 +186,7 @@ void tell() {
   fmt::print(
       "{{\n  \"example_id\": {}, \"example_data_id\": {}, \"example_counter\": 5, \"example_bytes\": \"{}\", "
       "\"example_crc_over\": \"{}\", \"example_crc\": {}{},\n  \"request_lasts_s\": {:g}, \"grace_s\": {:g}\n}}\n",
-      frame.id, can::Command::data_id, data, protected_bytes, frame.data[0], json,
+      frame.id, can::Command::data_id, data, protected_bytes, frame.data[0], entries.text(),
       1e-6 * static_cast<double>(Requested::request_timeout_us), 1e-6 * protection::Contactors::grace_us);
 }
 
@@ -165,7 +195,7 @@ void tell() {
 
 int main() {
   try {
-    bms::firmware::tell();
+    bms::firmware::print_page_values();
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "vehicle_start: {}\n", e.what());

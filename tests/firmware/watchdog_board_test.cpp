@@ -1,6 +1,6 @@
-// The forklift board's image in Unicorn, parts of it made to hang or to do nothing: the watchdog bites, and the next
-// run says so and keeps the contactors open. What is no standstill of the firmware (nobody on the bus, a measuring
-// chain that is gone) it survives.
+// The image of the forklift board in Unicorn. Parts of it are made to hang or to do nothing: the watchdog resets the
+// core, and the next run reports it and keeps the contactors open. A missing bus or measuring chain does not stop the
+// firmware.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using ::testing::IsEmpty;
 constexpr std::uint32_t by_watchdog = 1U << 29 | 1U << 26, by_software = 1U << 28 | 1U << 26;
 constexpr double watchdog_ms = 2'000;
 
-/// Of the frames that came after a time, the last of a message.
+/// The last frame of a message after a given time.
 template <class Message>
 std::optional<Message> last(const UnicornBoard& board, std::uint64_t after_bit = 0) {
   std::optional<Message> found;
@@ -33,12 +33,12 @@ std::optional<Message> last(const UnicornBoard& board, std::uint64_t after_bit =
 class Watchdog : public ::testing::Test {
  protected:
   Watchdog() { board.may_start_again = true; }
-  void run() { board.run_for_ms(1'800); }  // a new chip's store is erased first
+  void run() { board.run_for_ms(1'800); }  // a new chip first erases its data sectors
   UnicornBoard board{
       images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application)};
 };
 
-TEST(Progress, IsMadeOnlyByASampleThatWentAllItsWay) {
+TEST(Progress, NeedsACompletelyProcessedSample) {
   const auto second = [](const Progress::SampleProgress& done) {
     Progress p;
     EXPECT_TRUE(p.complete({1'000, 1'000, 1}));
@@ -47,11 +47,11 @@ TEST(Progress, IsMadeOnlyByASampleThatWentAllItsWay) {
   EXPECT_TRUE(second({2'000, 2'000, 2}));
   EXPECT_FALSE(second({1'000, 1'000, 2})) << "the same sample again";
   EXPECT_FALSE(second({500, 500, 2})) << "an older one";
-  EXPECT_FALSE(second({2'000, 1'000, 2})) << "the estimator has not taken it";
-  EXPECT_FALSE(second({2'000, 2'000, 1})) << "it was not told";
+  EXPECT_FALSE(second({2'000, 1'000, 2})) << "the estimator has not processed it";
+  EXPECT_FALSE(second({2'000, 2'000, 1})) << "it was not published";
 }
 
-TEST(Progress, ComesBackWhenAllGoesOnAndItsCounterWraps) {
+TEST(Progress, ContinuesWhenAllPartsContinueAndTheCounterWraps) {
   Progress p;
   EXPECT_FALSE(p.complete({1'000, 1'000, 0xFFFF'FFFF}));
   EXPECT_TRUE(p.complete({2'000, 2'000, 0}));
@@ -59,15 +59,15 @@ TEST(Progress, ComesBackWhenAllGoesOnAndItsCounterWraps) {
   EXPECT_TRUE(p.complete({4'000, 4'000, 2}));
 }
 
-/// Each of the three alone, the others as they are: once it hangs, once it returns without having done anything.
+/// One part fails, the others work: it hangs, or it returns without doing anything.
 struct Stall {
   const char* name;
   const char* function;
   UnicornBoard::Instructions instructions;
 };
-class OneStands : public Watchdog, public ::testing::WithParamInterface<Stall> {};
+class OnePartStops : public Watchdog, public ::testing::WithParamInterface<Stall> {};
 
-TEST_P(OneStands, TheWatchdogBitesAndTheNextRunOpensAndTellsWhy) {
+TEST_P(OnePartStops, TheWatchdogResetsTheCore) {
   run();
   ASSERT_THAT(board.resets, IsEmpty());
   EXPECT_GT(board.watchdog_feeds, 5U);
@@ -75,10 +75,10 @@ TEST_P(OneStands, TheWatchdogBitesAndTheNextRunOpensAndTellsWhy) {
   const double stands_ms = board.now_ms();
   ASSERT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 2 * watchdog_ms)) << "the watchdog was fed";
   EXPECT_THAT(board.resets, ElementsAre(by_watchdog));
-  EXPECT_NEAR(board.now_ms() - stands_ms, watchdog_ms, 150) << "a sample's time, and a step of the watchdog's";
+  EXPECT_NEAR(board.now_ms() - stands_ms, watchdog_ms, 150) << "plus a sample period and a step of the watchdog";
 }
 INSTANTIATE_TEST_SUITE_P(
-    Parts, OneStands,
+    Parts, OnePartStops,
     ::testing::Values(Stall{"SamplingHangs", "bms::hal::bq76952::FrontEnd::read(", UnicornBoard::hangs},
                       Stall{"EstimationHangs", "bms::firmware::estimator_step(", UnicornBoard::hangs},
                       Stall{"EstimationDoesNothing", "bms::firmware::estimator_step(", UnicornBoard::returns},
@@ -86,9 +86,9 @@ INSTANTIATE_TEST_SUITE_P(
                       Stall{"TimeStands", "clock_interrupt", UnicornBoard::returns}),
     [](const auto& p) { return std::string(p.param.name); });
 
-TEST_F(Watchdog, AfterItHasBittenTheNextRunSaysSoAndIsSafe) {
+TEST_F(Watchdog, AfterItsResetTheNextRunReportsItAndIsSafe) {
   run();
-  board.patch("bms::firmware::estimator_step(", UnicornBoard::hangs);  // interrupts go on
+  board.patch("bms::firmware::estimator_step(", UnicornBoard::hangs);  // interrupts continue
   ASSERT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 2 * watchdog_ms));
   board.unpatch();
   const std::uint64_t again = board.can.now_bit;
@@ -107,7 +107,7 @@ const std::filesystem::path& forklift() {
 }
 std::uint32_t symbol(const char* name) { return images::ImageFile(forklift()).symbol(name); }
 
-TEST_F(Watchdog, AFaultOfTheProcessorResetsAtOnceAndTheNextRunTellsWhereItWas) {
+TEST_F(Watchdog, AProcessorFaultResetsAtOnceAndTheNextRunReportsItsAddress) {
   run();
   const double before_ms = board.now_ms();
   board.patch("bms::firmware::estimator_step(", UnicornBoard::undefined);
@@ -128,8 +128,8 @@ TEST_F(Watchdog, AFaultOfTheProcessorResetsAtOnceAndTheNextRunTellsWhereItWas) {
   EXPECT_EQ(last<can::Faults>(board, again)->internal_fault, 1U);
 }
 
-/// On a core without a memory protection unit (Unicorn's has none); firmware_test has the other in QEMU.
-TEST_F(Watchdog, AStackThatHasGrownIntoItsGuardIsToldAndOpens) {
+/// On a core without a memory protection unit, like that of Unicorn. With one: firmware_test in QEMU.
+TEST_F(Watchdog, AStackThatHasGrownIntoItsGuardIsReportedAndOpens) {
   run();
   board.run_for_ms(2'500);
   EXPECT_EQ(last<can::Board>(board)->stack_overrun, 0U);
@@ -140,40 +140,40 @@ TEST_F(Watchdog, AStackThatHasGrownIntoItsGuardIsToldAndOpens) {
   EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
 }
 
-TEST_F(Watchdog, OneBitOfTheImageThatIsNotAsItWasBuiltIsTold) {
+TEST_F(Watchdog, OneWrongBitOfTheImageIsReported) {
   board.flip_bit(symbol("image_code_end") - 6, 3);
   run();
   EXPECT_EQ(last<can::Board>(board)->image_failed, 1U);
   EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
 }
 
-TEST_F(Watchdog, AnImageAsItWasBuiltIsWhole) {
+TEST_F(Watchdog, AnUnchangedImagePassesItsCheck) {
   run();
-  const auto told = last<can::Board>(board);
-  EXPECT_EQ(told->image_failed | told->ram_failed | told->stack_overrun, 0U);
+  const auto status = last<can::Board>(board);
+  EXPECT_EQ(status->image_failed | status->ram_failed | status->stack_overrun, 0U);
   EXPECT_EQ(last<can::Faults>(board)->internal_fault, 0U);
 }
 
-/// In the data, and in the stack where it never comes; either way.
-TEST(Ram, ABitThatDoesNotChangeIsTold) {
+/// In the data, and in an unused part of the stack; stuck at 0 and at 1.
+TEST(Ram, AStuckBitIsReported) {
   for (const std::uint32_t address : {symbol("image_bss_end") - 1, symbol("image_stack_limit") + 2'001}) {
     for (const bool at : {false, true}) {
       UnicornBoard board(forklift());
       board.stick(address, 6, at);
       board.run_for_ms(1'800);
-      const auto told = last<can::Board>(board);
-      ASSERT_TRUE(told);
-      EXPECT_EQ(told->ram_failed, 1U) << std::hex << address << at;
+      const auto status = last<can::Board>(board);
+      ASSERT_TRUE(status);
+      EXPECT_EQ(status->ram_failed, 1U) << std::hex << address << at;
       EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
     }
   }
 }
 
-TEST_F(Watchdog, NobodyOnTheBusNorAtTheMeasuringChainIsNoStandstill) {
+TEST_F(Watchdog, AMissingBusAndMeasuringChainAreNoReasonForAReset) {
   board.can.others_acknowledge = false;  // and nothing is plugged in at I2C1
   board.run_for_ms(6'000);
   EXPECT_THAT(board.resets, IsEmpty());
-  EXPECT_LT(board.longest_unfed_ms, 1'360) << "the fastest that the watchdog's oscillator may run";
+  EXPECT_LT(board.longest_unfed_ms, 1'360) << "shortest timeout of the watchdog within the tolerance of its oscillator";
 }
 
 }  // namespace
