@@ -112,7 +112,7 @@ CanLog read_can_log(const std::string& path) {
     throw files::BadInput(path, 1,
                           "no samples among its frames, expected SampleCurrent, SampleVoltage, SampleTime (0x199 to "
                           "0x19B): switch the log of samples on by a command");
-  files::Recording& r = log.recording;
+  measurement::Recording& r = log.recording;
   const std::uint64_t begin_us = log.samples.front().time_us;
   for (const measurement::Sample& s : log.samples) {
     r.time_s.push_back(1e-6 * static_cast<double>(s.time_us - begin_us));

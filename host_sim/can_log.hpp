@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "files/recording.hpp"
 #include "host_sim/replay.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms::host_sim {
 
 struct CanLog {
-  files::Recording recording;  ///< the same as numbers; its warnings tell of what is missing
+  measurement::Recording recording;  ///< the same as numbers; its warnings tell of what is missing
   std::vector<measurement::Sample> samples;
   std::optional<measurement::StartingPoint> start;
   bool from_the_start = false;  ///< begins with the firmware's first sample, and says where it began

@@ -138,7 +138,7 @@ std::optional<Difference> first_difference(const Track& host, const Track& board
 }
 
 void evaluate(ReplayResult& result) {
-  const files::Recording& r = result.recording;
+  const measurement::Recording& r = result.recording;
   const std::vector<EstimateRow>& rows = result.track.rows;
   const bool has_reference = !r.soc_ref.empty();
 

@@ -9,7 +9,7 @@
 
 #include "estimator/estimate.hpp"
 #include "files/cell_file.hpp"
-#include "files/recording.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms::host_sim {
 
@@ -75,7 +75,7 @@ struct VoltageFigures {
 };
 
 struct ReplayResult {
-  files::Recording recording;
+  measurement::Recording recording;
   files::CellFile cell;
   std::string target;
   ScalarKind scalar = ScalarKind::float32;

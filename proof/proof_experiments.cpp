@@ -166,7 +166,7 @@ double rms(const workflow::RecordingComparison& c, const std::vector<double>& si
 }
 
 /// Mean voltage of a slow run within 2 % around a soc, at half its current and more.
-double slow_voltage(const files::Recording& r, double soc) {
+double slow_voltage(const measurement::Recording& r, double soc) {
   double most_a = 0, sum = 0;
   for (const double i : r.current_a) most_a = std::max(most_a, std::abs(i));
   std::size_t count = 0;
@@ -176,7 +176,7 @@ double slow_voltage(const files::Recording& r, double soc) {
   return count > 0 ? sum / static_cast<double>(count) : nothing;
 }
 
-double slow_current(const files::Recording& r) {
+double slow_current(const measurement::Recording& r) {
   double sum = 0;
   std::size_t count = 0;
   for (const double i : r.current_a) {
@@ -193,7 +193,7 @@ double median(std::vector<double> values) {
 }
 
 /// Ohmic resistance: median of voltage over current where the current jumps, and that median's standard error.
-Value edge_resistance(const files::Recording& r, double least_a = 1) {
+Value edge_resistance(const measurement::Recording& r, double least_a = 1) {
   std::vector<double> ratios;
   for (std::size_t k = 1; k < r.rows(); ++k) {
     const double di = r.current_a[k] - r.current_a[k - 1];
@@ -209,7 +209,7 @@ Value edge_resistance(const files::Recording& r, double least_a = 1) {
 struct Rows {
   std::size_t from = 0, to = 0;  ///< to: one behind
 };
-std::vector<Rows> rests(const files::Recording& r, double at_least_s) {
+std::vector<Rows> rests(const measurement::Recording& r, double at_least_s) {
   std::vector<Rows> list;
   for (std::size_t k = 0; k < r.rows();) {
     std::size_t end = k;
@@ -226,7 +226,7 @@ struct Idle {
   Value reading_a;
   double on_s = 0;
 };
-Idle idle_of(const files::Recording& r) {
+Idle idle_of(const measurement::Recording& r) {
   Idle idle;
   double sum = 0, squares = 0;
   std::size_t count = 0;
@@ -268,7 +268,8 @@ struct Concealed {
 void one_hysteresis(ProofLab& lab, ProofExperiment& e, const Concealed& what) {
   const std::string at = what.folder + "/";
   const files::CellFile& cell = lab.identified(what.cell, {at + "ocv_P25_dis"}, at + what.drive);
-  const files::Recording &charge = lab.recording(at + "ocv_P25_chg"), &discharge = lab.recording(at + "ocv_P25_dis");
+  const measurement::Recording &charge = lab.recording(at + "ocv_P25_chg"),
+                               &discharge = lab.recording(at + "ocv_P25_dis");
   const double gap_v = slow_voltage(charge, 0.5) - slow_voltage(discharge, 0.5),
                slow_a = (slow_current(charge) + slow_current(discharge)) / 2;
   const auto& rc = cell.parameters.rc;
@@ -364,7 +365,7 @@ void temperature(ProofLab& lab, ProofExperiment& e) {
       std::map<double, double> ohm;
       for (const AtTemperature& t : temperatures) {
         workflow::RecordingComparison c = lab.scored(r, t.recording, &extended);
-        files::Recording simulated = c.recording;
+        measurement::Recording simulated = c.recording;
         simulated.voltage_v = c.extended_v;
         ohm[t.temperature_c] = edge_resistance(simulated).value;
         if (keep) scored[t.temperature_c] = std::move(c);
@@ -462,7 +463,7 @@ void relaxation(ProofLab& lab, ProofExperiment& e) {
 /// Charge that is read and does not arrive, as the findings have it, in Ah over a recording; of capacity_change
 /// nothing.
 std::optional<Value> lost_charge(const workflow::DiagnoseResult& r) {
-  const files::Recording& recording = r.recordings.front().recording;
+  const measurement::Recording& recording = r.recordings.front().recording;
   double charged_ah = 0;
   for (std::size_t k = 1; k < recording.rows(); ++k)
     charged_ah += std::max(0.0, recording.current_a[k]) * (recording.time_s[k] - recording.time_s[k - 1]) / 3'600;
@@ -550,27 +551,27 @@ struct Sizes {
 };
 struct Injected {
   const char *id, *what;
-  std::vector<Sizes> (*into)(files::Recording& r);  ///< changes the recording; what was put in
+  std::vector<Sizes> (*into)(measurement::Recording& r);  ///< changes the recording; what was put in
 };
 
-double half_time_s(const files::Recording& r) { return std::round((r.time_s.front() + r.time_s.back()) / 2); }
+double half_time_s(const measurement::Recording& r) { return std::round((r.time_s.front() + r.time_s.back()) / 2); }
 
 constexpr double clipped_a = 25, burst_ohm = 0.010;
 
-std::vector<Sizes> offset_by_150_ma(files::Recording& r) {
+std::vector<Sizes> offset_by_150_ma(measurement::Recording& r) {
   for (double& i : r.current_a) i += 0.15;
   return {{"offset_a", "A", 0.15, 0.03}};
 }
-std::vector<Sizes> gain_of_8_percent(files::Recording& r) {
+std::vector<Sizes> gain_of_8_percent(measurement::Recording& r) {
   for (double& i : r.current_a) i *= 1.08;
   return {{"gain_error", "1", 0.08, 0.016}};
 }
-std::vector<Sizes> late_by_two_samples(files::Recording& r) {
+std::vector<Sizes> late_by_two_samples(measurement::Recording& r) {
   for (std::size_t k = r.rows(); k-- > 0;) r.current_a[k] = r.current_a[k >= 2 ? k - 2 : 0];
   const double delay_s = 2 * r.duration_s() / static_cast<double>(r.rows() - 1);
   return {{"delay_s", "s", delay_s, 0.2 * delay_s}};
 }
-std::vector<Sizes> clipped(files::Recording& r) {
+std::vector<Sizes> clipped(measurement::Recording& r) {
   double more_a = 0;
   std::size_t count = 0;
   for (double& i : r.current_a) {
@@ -582,7 +583,7 @@ std::vector<Sizes> clipped(files::Recording& r) {
   const double mean_a = count > 0 ? more_a / static_cast<double>(count) : 0;
   return {{"limit_a", "A", clipped_a, 0.2 * clipped_a}, {"excess_a", "A", mean_a, 0.2 * mean_a}};
 }
-std::vector<Sizes> contact_worse_at_half_time(files::Recording& r) {
+std::vector<Sizes> contact_worse_at_half_time(measurement::Recording& r) {
   const double since_s = half_time_s(r);
   for (std::size_t k = 0; k < r.rows(); ++k) {
     if (r.time_s[k] >= since_s) r.voltage_v[k] += 0.003 * r.current_a[k];
@@ -590,7 +591,7 @@ std::vector<Sizes> contact_worse_at_half_time(files::Recording& r) {
   return {{"resistance_ohm", "ohm", 0.003, 0.0006}, {"onset_s", "s", since_s, 120}};
 }
 /// Bursts of 5 to 30 s, a minute or more apart, as a loose plug has them.
-std::vector<Sizes> contact_bursts(files::Recording& r) {
+std::vector<Sizes> contact_bursts(measurement::Recording& r) {
   experiments::SplitMix chance(20);
   const auto between = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(chance.bits() >> 11) * 0x1p-53;
@@ -605,7 +606,7 @@ std::vector<Sizes> contact_bursts(files::Recording& r) {
   }
   return {{"resistance_ohm", "ohm", burst_ohm, 0.2 * burst_ohm}};
 }
-std::vector<Sizes> voltage_higher_by_15_mv(files::Recording& r) {
+std::vector<Sizes> voltage_higher_by_15_mv(measurement::Recording& r) {
   for (double& v : r.voltage_v) v += 0.015;
   return {{"offset_v", "V", 0.015, 0.003}};
 }
@@ -626,7 +627,7 @@ void instrument_faults(ProofLab& lab, ProofExperiment& e) {
   e.notes.push_back("The untouched recording: " + said_of(untouched));
   ProofPoints points{"Size found over size put in", "", "found / put in", {}, {{"found", {}}}};
   for (const Injected& fault : faults) {
-    files::Recording r = lab.recording(base);
+    measurement::Recording r = lab.recording(base);
     const std::vector<Sizes> sizes = fault.into(r);
     const workflow::DiagnoseResult& d = lab.diagnosed(untouched.extended_cell, base + ", " + fault.what, {r});
     claim_named(e, std::string(fault.id) + ".named", fault.what, d, {fault.id}, "put into the recording");

@@ -19,7 +19,7 @@ namespace {
 
 using model::catalogue;
 
-workflow::RecordingComparison begun(const files::Recording& r, const files::CellFile& cell) {
+workflow::RecordingComparison begun(const measurement::Recording& r, const files::CellFile& cell) {
   if (r.soc_ref.empty() || !std::isfinite(r.soc_ref.front()))
     throw files::BadInput(r.path, 1, "no soc_ref at the start, expected the reference state of charge");
   return {r,
@@ -31,7 +31,7 @@ workflow::RecordingComparison begun(const files::Recording& r, const files::Cell
 
 }  // namespace
 
-const files::Recording& ProofLab::recording(const std::string& name) {
+const measurement::Recording& ProofLab::recording(const std::string& name) {
   return recordings_.get(name, [&] { return files::read_recording(path(name)); });
 }
 
@@ -60,7 +60,7 @@ const files::CellFile& ProofLab::identified(const std::string& name, const std::
 const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
                                                     const std::vector<std::string>& names) {
   std::string together;
-  std::vector<files::Recording> list;
+  std::vector<measurement::Recording> list;
   for (const std::string& name : names) {
     together += (together.empty() ? "" : " + ") + name;
     list.push_back(recording(name));
@@ -69,7 +69,7 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
 }
 
 const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell, const std::string& name,
-                                                    const std::vector<files::Recording>& list) {
+                                                    const std::vector<measurement::Recording>& list) {
   const std::string key = cell.name + ": " + name;
   return *diagnoses_.get(key, [&] {
     const auto begin = std::chrono::steady_clock::now();
@@ -77,7 +77,7 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
     r->cell = cell;
     std::vector<diagnosis::PreparedRecording> records;
     double rows = 0;
-    for (const files::Recording& recording : list) {
+    for (const measurement::Recording& recording : list) {
       r->recordings.push_back(begun(recording, cell));
       records.push_back(r->recordings.back().record);
       rows += static_cast<double>(recording.rows());

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "files/recording.hpp"
+#include "measurement/recording.hpp"
 #include "proof/proof.hpp"
 #include "workflow/diagnosis_result.hpp"
 
@@ -56,7 +56,7 @@ class ProofLab {
 
   /// name: "a123_26650/udds_P25_A002".
   std::string path(const std::string& name) const { return folder_ + "/" + name + ".csv"; }
-  const files::Recording& recording(const std::string& name);
+  const measurement::Recording& recording(const std::string& name);
 
   const files::CellFile& built_in(const std::string& name);
   /// As `bms identify --ocv ... --recording ... --start a123_26650 --window 0.95:0.15` makes it.
@@ -67,7 +67,7 @@ class ProofLab {
   const workflow::DiagnoseResult& diagnosed(const files::CellFile& cell, const std::vector<std::string>& recordings);
   /// The same of recordings that were changed; `name` tells them apart.
   const workflow::DiagnoseResult& diagnosed(const files::CellFile& cell, const std::string& name,
-                                            const std::vector<files::Recording>& recordings);
+                                            const std::vector<measurement::Recording>& recordings);
 
   /// What cell file and extended cell say of a recording that the diagnosis did not use.
   /// instead: of what was found.
@@ -85,7 +85,7 @@ class ProofLab {
   workflow::Progress progress_;
   std::mutex progress_mutex_;
   double done_ = 0;
-  LazyMap<files::Recording> recordings_;
+  LazyMap<measurement::Recording> recordings_;
   LazyMap<files::CellFile> cells_;
   LazyMap<std::shared_ptr<workflow::DiagnoseResult>> diagnoses_;
 };

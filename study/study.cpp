@@ -14,6 +14,7 @@
 #include "host_sim/gaussian_noise.hpp"
 #include "identification/linear_models.hpp"
 #include "identification/prefilter.hpp"
+#include "measurement/recording_checks.hpp"
 #include "plant/truth_cell.hpp"
 #include "workflow/identification_data.hpp"
 
@@ -529,9 +530,9 @@ StudyResult study_recordings(const model::CellParameters<>& cell, const std::vec
   result.source = fmt::format("{} recordings", paths.size());
   std::vector<Part> parts;
   for (const std::string& path : paths) {
-    files::Recording r = files::read_recording(path);
-    files::compare_with_cell(r, cell);
-    for (const files::Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
+    measurement::Recording r = files::read_recording(path);
+    measurement::compare_with_cell(r, cell);
+    for (const measurement::Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
     const workflow::IdentificationData d = workflow::identification_data(r, {{std::nullopt, false}, {}, cell});
     parts.push_back(
         {std::filesystem::path(path).stem().string(), d.record.data, d.record.initial_soc, d.soc_min, d.soc_max});

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "files/page_content.hpp"
-#include "files/recording.hpp"
 #include "identification/data.hpp"
+#include "measurement/recording.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms::study {
@@ -28,7 +28,7 @@ struct StudyResult {
   std::vector<files::PageTable> tables;
   std::vector<StudyClaim> claims;
   std::vector<files::PageChart> charts;
-  std::vector<files::Warning> warnings;
+  std::vector<measurement::Warning> warnings;
   std::size_t fits = 0;  ///< identifications done
   double seconds = 0;
 };

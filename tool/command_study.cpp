@@ -55,7 +55,7 @@ std::string page_of_study(const study::StudyResult& r) {
                              {},
                              {},
                              r.charts};
-  for (const files::Warning& w : r.warnings) content.warnings.push_back(w.text);
+  for (const measurement::Warning& w : r.warnings) content.warnings.push_back(w.text);
   files::PageTable claims{
       "claims", "What the paper says, and whether it holds here", {"statement", "holds", "evidence"}, {}, ""};
   for (const study::StudyClaim& c : r.claims)
@@ -106,7 +106,7 @@ int run(const StudyOptions& options) {
   if (!options.output.json.empty()) write_output(options.output.json, json);
   if (!options.output.report.empty()) write_output(options.output.report, page);
 
-  for (const files::Warning& w : result.warnings) warn(w.text);
+  for (const measurement::Warning& w : result.warnings) warn(w.text);
   std::string text =
       fmt::format("{} identifications in {:.1f} s, of {}.\n", result.fits, result.seconds, result.source);
   for (const study::StudyClaim& c : result.claims)

@@ -28,13 +28,13 @@ struct SlowRuns {
 
 /// Those nearest to 25 degrees C first.
 std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
-  std::vector<files::Recording> recordings;
+  std::vector<measurement::Recording> recordings;
   for (const std::string& path : paths) recordings.push_back(files::read_recording(path));
   std::vector<SlowRuns> all;
   for (const TemperatureGroup& like : group_by_temperature(recordings)) {
     SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
     for (const std::size_t k : like.recordings) {
-      const files::Recording& r = recordings[k];
+      const measurement::Recording& r = recordings[k];
       runs.runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
       runs.files += (runs.files.empty() ? "" : ", ") + std::filesystem::path(paths[k]).filename().string();
     }
@@ -46,7 +46,7 @@ std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
 }
 
 /// Of the temperatures that were recorded; nothing: none.
-std::optional<double> mean_temperature_c(const files::Recording& recording) {
+std::optional<double> mean_temperature_c(const measurement::Recording& recording) {
   double sum = 0;
   std::size_t count = 0;
   for (const double t : recording.temperature_c) {
@@ -58,7 +58,7 @@ std::optional<double> mean_temperature_c(const files::Recording& recording) {
 
 }  // namespace
 
-std::vector<TemperatureGroup> group_by_temperature(const std::vector<files::Recording>& recordings) {
+std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings) {
   constexpr double alike_k = 5;
   std::vector<std::pair<double, std::size_t>> means;
   std::vector<std::size_t> all;
@@ -139,11 +139,11 @@ OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v
   return taken;
 }
 
-void identify_noise(const std::vector<files::Recording>& recordings, const id::FitStatistics& judge,
+void identify_noise(const std::vector<measurement::Recording>& recordings, const id::FitStatistics& judge,
                     const std::vector<id::Parameter>& parameters, model::CellParameters<>& p) {
   std::vector<double> voltage_steps, current_steps;
   double step_s = 1;
-  for (const files::Recording& r : recordings) {
+  for (const measurement::Recording& r : recordings) {
     const double quiet_a = 0.02 * p.capacity_ah;
     for (std::size_t k = 2; k < r.rows(); ++k) {
       if (std::abs(r.current_a[k]) > quiet_a || std::abs(r.current_a[k - 1]) > quiet_a ||

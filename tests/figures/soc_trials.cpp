@@ -20,7 +20,7 @@ struct Trouble {
   std::optional<double> from_soc;
 };
 
-files::Recording troubled(files::Recording r, const Trouble& t) {
+measurement::Recording troubled(measurement::Recording r, const Trouble& t) {
   std::size_t first = 0;
   if (t.from_soc)
     first = static_cast<std::size_t>(
@@ -52,7 +52,8 @@ std::string row(const SocTrial& t, Sums& all) {
   host_sim::ReplayResult r;
   r.cell = t.cell;
   r.recording = t.recording;
-  r.track = host_sim::run_on_host(t.cell, files::samples(r.recording), host_sim::starting_point(t.prior), r.scalar);
+  r.track =
+      host_sim::run_on_host(t.cell, measurement::samples(r.recording), host_sim::starting_point(t.prior), r.scalar);
   host_sim::evaluate(r);
   std::vector<float> sigmas;
   for (const host_sim::EstimateRow& e : r.track.rows) sigmas.push_back(static_cast<float>(e.soc_sigma));
@@ -81,7 +82,7 @@ void each_soc_trial(const std::filesystem::path& data, const std::function<void(
   const auto run = [&](const std::string& folder, const char* name,
                        std::initializer_list<const std::vector<Trouble>*> lists) {
     const files::CellFile cell = files::read_cell(folder + "_extended");
-    const files::Recording r = files::read_recording((data / folder / (std::string(name) + ".csv")).string());
+    const measurement::Recording r = files::read_recording((data / folder / (std::string(name) + ".csv")).string());
     for (const auto* list : lists) {
       for (const Trouble& t : *list) f({name, t.title, cell, troubled(r, t), t.prior});
     }

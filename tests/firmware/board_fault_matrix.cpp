@@ -283,7 +283,7 @@ class Matrix {
   /// none may be told.
   static void shift(MatrixResult& result) {
     const std::vector<measurement::Sample> seconds =
-        files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+        measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
     BoardTruck truck(6, result, 980'000'000);
     const auto is = [&](const measurement::Sample& at) {
       truck.trajectory = {static_cast<double>(at.current_ua), static_cast<double>(at.voltage_uv),

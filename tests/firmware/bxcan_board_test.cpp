@@ -35,7 +35,7 @@ const std::filesystem::path& image() {
 
 /// Sixteen of the recording's cell, a millivolt from each to the next, that are the recording's voltage in the mean.
 std::vector<Pack> part_of_the_shift(std::size_t count) {
-  const auto all = files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  const auto all = measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
   std::vector<Pack> part(count);
   for (std::size_t k = 0; k < count; ++k) {
     const measurement::Sample& s = all[3000 + k];

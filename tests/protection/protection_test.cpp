@@ -702,7 +702,7 @@ TEST(Protection, OfOneCellOpensForItToo) {
 /// Sixteen cells made of the shipped shift's one: each with an offset of charge (by the slope where it is), a
 /// resistance of its own and noise. The shift is sampled once a second; protection of such a pack knows that.
 TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
-  const files::Recording shift = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  const measurement::Recording shift = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
   PackDesign design = forklift;
   design.sample_period_s = 1;
   design.precharge_time_constant_s = 2;
