@@ -9,6 +9,7 @@
 
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "images/child_process.hpp"
 #include "tool/command_identify.hpp"
 #include "workflow/diagnosis_comparison.hpp"

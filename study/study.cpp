@@ -11,6 +11,7 @@
 
 #include "experiments/experiment.hpp"
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "host_sim/gaussian_noise.hpp"
 #include "identification/linear_models.hpp"
 #include "identification/prefilter.hpp"

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "hil/session.hpp"
 #include "images/firmware_image.hpp"
 #include "measurement/recording_checks.hpp"

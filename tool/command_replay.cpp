@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "files/text_file.hpp"
 #include "host_sim/can_log.hpp"
 #include "host_sim/simulation.hpp"

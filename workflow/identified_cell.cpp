@@ -10,6 +10,7 @@
 
 #include "files/bad_input.hpp"
 #include "files/cell_fields.hpp"
+#include "files/recording.hpp"
 #include "host_sim/simulation.hpp"
 #include "identification/ocv_curve.hpp"
 

@@ -200,7 +200,7 @@ TEST_F(Tool, AReplaySaysWhichMechanismsTheEstimatorDoesWithout) {
               MatchesRegex("warning: [^\n]*channel_skew: in the cell file, but the estimator does without[^\n]*\n"));
   run = run_tool("replay " + shift + " --cell " + cell + " --quiet --scalar fixed");
   EXPECT_EQ(run.exit_code, 2);
-  EXPECT_THAT(run.err, HasSubstr("'mechanism.charge_transfer' does not compute in fixed point"));
+  EXPECT_THAT(run.err, HasSubstr("'mechanism.charge_transfer' cannot be computed in fixed point"));
 }
 
 TEST_F(Tool, SimulatedNoiseHasTheSizeAskedForAndFollowsTheSeed) {

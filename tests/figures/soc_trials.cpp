@@ -8,6 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "files/recording.hpp"
+#include "measurement/statistics.hpp"
+
 namespace bms {
 
 namespace {
@@ -42,12 +45,6 @@ struct Sums {
   std::vector<float> sigmas;
 };
 
-double median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::string row(const SocTrial& t, Sums& all) {
   host_sim::ReplayResult r;
   r.cell = t.cell;
@@ -60,10 +57,10 @@ std::string row(const SocTrial& t, Sums& all) {
   all.samples += sigmas.size();
   all.inside += *r.soc.within_2_sigma * static_cast<double>(sigmas.size());
   all.sigmas.insert(all.sigmas.end(), sigmas.begin(), sigmas.end());
-  return fmt::format("| {} | {} | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % | {:+.0f} +- {:.0f} mA |\n",
-                     t.name, t.trouble, 100 * *r.soc.rmse, 100 * *r.soc.rmse_after_30min,
-                     100 * *r.soc.max_error_after_30min, 100 * *r.soc.within_2_sigma, 100 * median(sigmas),
-                     1e3 * *r.soc.current_offset_a, 1e3 * *r.soc.current_offset_sigma_a);
+  return fmt::format(
+      "| {} | {} | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % | {:+.0f} +- {:.0f} mA |\n", t.name, t.trouble,
+      100 * *r.soc.rmse, 100 * *r.soc.rmse_after_30min, 100 * *r.soc.max_error_after_30min, 100 * *r.soc.within_2_sigma,
+      100 * measurement::upper_median(sigmas), 1e3 * *r.soc.current_offset_a, 1e3 * *r.soc.current_offset_sigma_a);
 }
 
 }  // namespace
@@ -102,7 +99,8 @@ std::string soc_trials(const std::filesystem::path& data) {
   Sums all;
   each_soc_trial(data, [&](const SocTrial& t) { table += row(t, all); });
   return table + fmt::format("| all | | | | | {:.1f} % | {:.2f} % | |\n",
-                             100 * all.inside / static_cast<double>(all.samples), 100 * median(all.sigmas));
+                             100 * all.inside / static_cast<double>(all.samples),
+                             100 * measurement::upper_median(all.sigmas));
 }
 
 }  // namespace bms

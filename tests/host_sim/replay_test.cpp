@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "files/recording.hpp"
+
 namespace bms::host_sim {
 namespace {
 

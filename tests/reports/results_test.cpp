@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "files/recording.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 
