@@ -183,7 +183,7 @@ std::string json_of(const study::StudyResult& r) {
   }
   json["claims"] = Json::array();
   for (const study::StudyClaim& c : r.claims)
-    json["claims"].push_back({{"claim", c.claim}, {"holds", c.holds}, {"evidence", c.evidence}});
+    json["claims"].push_back({{"claim", c.claim}, {"holds", c.holds}, {"evidence", c.result}});
   json["identifications"] = r.fits;
   json["wall_s"] = r.seconds;
   json["warnings"] = warnings_of(r.warnings);
