@@ -22,7 +22,7 @@ class TomlTable {
   std::vector<double> numbers(const std::string& key);
   std::vector<std::string> texts(const std::string& key);
   TomlTable table(const std::string& key);
-  /// [[key]]: one element per table of that name; empty if there is none.
+  /// [[key]]: one element per table of that name; empty if the key is missing.
   std::vector<TomlTable> tables(const std::string& key);
 
   /// Returns true if the key is there, and marks it as known.

@@ -21,7 +21,7 @@ const Finding* finding_of(const workflow::DiagnoseResult& r, std::string_view me
   return nullptr;
 }
 
-/// Place of a parameter; info.parameters if there is none of that name.
+/// Place of a parameter by its name; info.parameters if the mechanism does not have it.
 std::size_t parameter_index(const model::MechanismInfo& info, std::string_view name) {
   std::size_t k = 0;
   while (k < info.parameters && info.parameter[k].name != name) ++k;

@@ -27,7 +27,7 @@ struct ParameterName {
 /// Returns true if the catalogue has that parameter.
 bool has_parameter(const ParameterName& name);
 
-/// Reads the keys `mechanism` and `parameter`. Throws BadInput if the catalogue does not have them.
+/// Reads the keys `mechanism` and `parameter`. Throws BadInput if they are unknown.
 ParameterName read_parameter_name(files::TomlTable& table);
 
 /// Returns true if the diagnosis names the mechanism.
