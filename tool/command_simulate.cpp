@@ -102,8 +102,13 @@ int run(const SimulateOptions& options) {
 
   const auto cell = model::prepare<double, model::max_intervals>(cell_file.parameters);
   const auto begin = std::chrono::steady_clock::now();
-  const auto rows = host_sim::simulate(cell, cell_file.parameters.capacity_ah, cell_file.mechanisms, recording.time_s,
-                                       recording.current_a, recording.temperature_c, options.initial_soc);
+  const auto rows = host_sim::simulate({.cell = cell,
+                                        .capacity_ah = cell_file.parameters.capacity_ah,
+                                        .mechanisms = cell_file.mechanisms,
+                                        .time_s = recording.time_s,
+                                        .current_a = recording.current_a,
+                                        .temperature_c = recording.temperature_c,
+                                        .initial_soc = options.initial_soc});
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   write_output(options.out, csv_of(recording, rows, options));
 

@@ -280,8 +280,13 @@ id::DataSet without_mechanisms(const files::CellFile& cell, const Identification
   id::DataSet record = of.record;
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
   const auto simulated = [&](std::span<const model::MechanismSetting> mechanisms) {
-    return host_sim::simulate(tables, cell.parameters.capacity_ah, mechanisms, record.data.time_s,
-                              record.data.current_a, of.temperature_c, record.initial_soc);
+    return host_sim::simulate({.cell = tables,
+                               .capacity_ah = cell.parameters.capacity_ah,
+                               .mechanisms = mechanisms,
+                               .time_s = record.data.time_s,
+                               .current_a = record.data.current_a,
+                               .temperature_c = of.temperature_c,
+                               .initial_soc = record.initial_soc});
   };
   const auto with = simulated(cell.mechanisms), without = simulated({});
   for (std::size_t k = 0; k < record.data.size(); ++k)
@@ -305,8 +310,13 @@ void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, f
   std::size_t count = 0;
   for (const IdentificationData& of : data) {
     const id::Data& d = of.record.data;
-    const auto rows = host_sim::simulate(tables, capacity_ah, cell.mechanisms, d.time_s, d.current_a, of.temperature_c,
-                                         of.record.initial_soc);
+    const auto rows = host_sim::simulate({.cell = tables,
+                                          .capacity_ah = capacity_ah,
+                                          .mechanisms = cell.mechanisms,
+                                          .time_s = d.time_s,
+                                          .current_a = d.current_a,
+                                          .temperature_c = of.temperature_c,
+                                          .initial_soc = of.record.initial_soc});
     double sum_v = 0;
     std::size_t in_sum = 0;
     const auto take = [&] {

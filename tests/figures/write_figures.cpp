@@ -301,7 +301,13 @@ std::string identification_speed() {
     return best_s;
   };
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
-  const double simulation_s = fastest_s([&] { host_sim::simulate(tables, 6, r.data.time_s, r.data.current_a, 0.98); });
+  const double simulation_s = fastest_s([&] {
+    host_sim::simulate({.cell = tables,
+                        .capacity_ah = 6,
+                        .time_s = r.data.time_s,
+                        .current_a = r.data.current_a,
+                        .initial_soc = 0.98});
+  });
   std::string table = fmt::format(
       "| 20,000 samples | time | as many simulations |\n|---|---|---|\n| simulation, open loop | {:.2f} ms | 1 |\n",
       1e3 * simulation_s);
