@@ -1,32 +1,40 @@
-# Embeds files in a C++ source:
+# Compiles files into a program.
 #
-#   cmake -DOUT=x.cpp -DHEADER=h.hpp -DNAMES=a|b -DFILES=fa|fb -P embed.cmake
+#   bms_embed(OUT_VARIABLE NAME HEADER h.hpp NAMESPACE n NAMES a b FILES fa fb [LIST function TYPE Type])
 #
-# Each file becomes a constant of its name. With CELLS=ON the source holds the list of built-in cells instead.
+# writes NAME.cpp in the build folder and sets OUT_VARIABLE to its path. Without LIST it has one std::string_view for each
+# name. With LIST it has `const std::vector<Type>& function()`, a list of {name, text}. HEADER declares them.
+if(NOT CMAKE_SCRIPT_MODE_FILE)
+  function(bms_embed out_variable name)
+    cmake_parse_arguments(arg "" "HEADER;NAMESPACE;LIST;TYPE" "NAMES;FILES" ${ARGN})
+    set(out ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+    list(JOIN arg_NAMES "|" names)
+    list(JOIN arg_FILES "|" files)
+    add_custom_command(OUTPUT ${out}
+      COMMAND ${CMAKE_COMMAND} -DOUT=${out} -DHEADER=${arg_HEADER} -DNAMESPACE=${arg_NAMESPACE} -DLIST=${arg_LIST} -DTYPE=${arg_TYPE}
+        "-DNAMES=${names}" "-DFILES=${files}" -P ${PROJECT_SOURCE_DIR}/cmake/embed.cmake
+      DEPENDS ${arg_FILES} ${PROJECT_SOURCE_DIR}/cmake/embed.cmake VERBATIM)
+    set(${out_variable} ${out} PARENT_SCOPE)
+  endfunction()
+  return()
+endif()
+
 string(REPLACE "|" ";" names "${NAMES}")
 string(REPLACE "|" ";" files "${FILES}")
-set(source "#include \"${HEADER}\"\n\n")
-if(CELLS)
-  string(APPEND source "namespace bms::files {\n\nconst std::vector<BuiltInCell>& built_in_cells() {\n"
-    "  static const std::vector<BuiltInCell> cells = {\n")
-else()
-  string(APPEND source "namespace bms::reports::embedded {\n\n")
+set(source "#include \"${HEADER}\"\n\nnamespace ${NAMESPACE} {\n\n")
+if(LIST)
+  string(APPEND source "const std::vector<${TYPE}>& ${LIST}() {\n  static const std::vector<${TYPE}> list = {\n")
 endif()
-list(LENGTH names count)
-math(EXPR last "${count} - 1")
-foreach(k RANGE ${last})
-  list(GET names ${k} name)
-  list(GET files ${k} file)
+foreach(name file IN ZIP_LISTS names files)
   file(READ "${file}" content)
-  if(CELLS)
+  if(LIST)
     string(APPEND source "      {\"${name}\", R\"bms_embed(${content})bms_embed\"},\n")
   else()
     string(APPEND source "const std::string_view ${name} = R\"bms_embed(${content})bms_embed\";\n\n")
   endif()
 endforeach()
-if(CELLS)
-  string(APPEND source "  };\n  return cells;\n}\n\n}  // namespace bms::files\n")
-else()
-  string(APPEND source "}  // namespace bms::reports::embedded\n")
+if(LIST)
+  string(APPEND source "  };\n  return list;\n}\n\n")
 endif()
+string(APPEND source "}  // namespace ${NAMESPACE}\n")
 file(WRITE "${OUT}" "${source}")

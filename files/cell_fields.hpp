@@ -1,11 +1,11 @@
-// Every key of a cell file, once: reader and writer both go through this list, in this order.
+// All keys of a cell file, in their order in the file. Reader and writer both use this list.
 #pragma once
 
 #include "model/cell_parameters.hpp"
 
 namespace bms::files {
 
-/// Keys of an RC table: of [rc] and of each [[at_temperature]].
+/// Keys of an RC table: [rc] and each [[at_temperature]].
 template <class Visitor, class Table>
 void visit_rc(Visitor& visitor, Table& rc) {
   visitor.column("soc", rc.soc);
@@ -17,8 +17,8 @@ void visit_rc(Visitor& visitor, Table& rc) {
   visitor.optional_column("c1_std_f", rc.c1_std_f);
 }
 
-/// visitor.number(key, double&), .column(key, Column&), .optional_number, _column, _flag, and .table(key) before a
-/// table's own keys.
+/// Calls visitor.number(key, double&), .column(key, Column&), .optional_number, .optional_column, .optional_flag, and
+/// .table(key) before the keys of a table.
 template <class Visitor, class Parameters>
 void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("capacity_ah", p.capacity_ah);

@@ -1,4 +1,4 @@
-// Measured figures as they stand in a README: a Markdown table between two comments.
+// Measured figures in a README: a Markdown table between two comments.
 //
 //   <!-- figures: NAME -->
 //   | what | figure | ...
@@ -13,7 +13,7 @@ namespace bms::files {
 
 class CommittedFigures {
  public:
-  /// Rows whose second column begins with a number. Throws std::runtime_error when the file has no such table.
+  /// Reads the rows whose second column begins with a number. Throws std::runtime_error if the file has no such table.
   CommittedFigures(const std::filesystem::path& readme, const std::string& name);
   bool has(const std::string& what) const { return figures_.contains(what); }
   double at(const std::string& what) const { return figures_.at(what); }
@@ -22,7 +22,7 @@ class CommittedFigures {
   std::map<std::string, double> figures_;
 };
 
-/// Writes `table` in place of what stands between the comments. Throws std::runtime_error when the file has none.
+/// Replaces the text between the comments with `table`. Throws std::runtime_error if the file has no such comments.
 void replace_figures(const std::filesystem::path& readme, const std::string& name, const std::string& table);
 
 }  // namespace bms::files

@@ -1,4 +1,4 @@
-// Tables and charts of a report, before they are a page.
+// Tables and charts of a report, independent of HTML.
 #pragma once
 
 #include <optional>
@@ -7,9 +7,9 @@
 
 namespace bms::files {
 
-/// One number of a table, and the paper's in its place.
+/// One cell of a table: a text, or a number and the number of the paper.
 struct PageCell {
-  std::string text;  ///< what stands there; a number with its digits
+  std::string text;  ///< as shown; a number with its digits
   std::optional<double> value, paper;
 };
 
@@ -18,14 +18,14 @@ struct PageTable {
   std::string title;
   std::vector<std::string> head;
   std::vector<std::vector<PageCell>> rows;  ///< the first cell names the row
-  std::string note;                         ///< where it differs from the paper, and why
+  std::string note;                         ///< differences from the paper, and why
 };
 
 struct PageChart {
   std::string title;
-  std::vector<std::string> labels;  ///< of the columns after time
+  std::vector<std::string> labels;  ///< one for each column
   std::vector<double> time_s;
-  std::vector<std::vector<double>> columns;  ///< NaN: nothing there
+  std::vector<std::vector<double>> columns;  ///< NaN: no value
 };
 
 struct PageContent {

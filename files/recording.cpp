@@ -14,15 +14,19 @@
 
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
+#include "measurement/recording_checks.hpp"
 
 namespace bms::files {
+
+using measurement::Recording;
 
 namespace {
 
 constexpr std::size_t minimum_rows = 10;
-constexpr std::size_t longest_quote = 40;
+constexpr std::size_t longest_quote = 40;  ///< characters
+constexpr double longest_s = 3.2e8;        ///< ten years
 
-/// A piece of the file in a message: short, printable.
+/// Text of the file for a message: short and printable.
 std::string in_quotes(std::string_view text) {
   std::string out;
   for (const char c : text.substr(0, longest_quote)) out += c >= ' ' && c <= '~' ? c : '?';
@@ -36,8 +40,8 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Plain decimals of up to 15 digits, as recordings have them: mantissa and power of ten are exact doubles, so the
-/// quotient is correctly rounded. Everything else goes to from_chars.
+/// Fast path for plain decimals of up to 15 digits: mantissa and power of ten are exact doubles, so the quotient is
+/// correctly rounded. from_chars reads everything else.
 std::optional<double> number(std::string_view text) {
   static constexpr std::array<double, 16> ten = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                                  1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
@@ -68,11 +72,11 @@ std::optional<double> number(std::string_view text) {
   return value;
 }
 
-/// The columns of a recording in the order of the file.
+/// One column, in the order of the file.
 struct Column {
-  std::vector<double>* into = nullptr;  // nullptr: ignored
+  std::vector<double>* into = nullptr;  ///< nullptr: not used
   std::string name;
-  bool sparse = false;  // mostly empty, NaN where it is
+  bool sparse = false;  ///< a field may be empty, and is NaN then
 };
 
 class Parser {
@@ -133,14 +137,22 @@ class Parser {
   }
 
   Column column(const std::string& name) {
+    struct Known {
+      std::string_view name;
+      std::vector<double>& into;
+    };
+    Recording& r = recording_;
+    const Known known[] = {{"time_s", r.time_s},
+                           {"current_a", r.current_a},
+                           {"voltage_v", r.voltage_v},
+                           {"temperature_c", r.temperature_c},
+                           {"soc_ref", r.soc_ref},
+                           {"current_ref_a", r.current_ref_a},
+                           {"voltage_ref_v", r.voltage_ref_v}};
     std::vector<double>* into = nullptr;
-    if (name == "time_s") into = &recording_.time_s;
-    if (name == "current_a") into = &recording_.current_a;
-    if (name == "voltage_v") into = &recording_.voltage_v;
-    if (name == "temperature_c") into = &recording_.temperature_c;
-    if (name == "soc_ref") into = &recording_.soc_ref;
-    if (name == "current_ref_a") into = &recording_.current_ref_a;
-    if (name == "voltage_ref_v") into = &recording_.voltage_ref_v;
+    for (const Known& one : known) {
+      if (one.name == name) into = &one.into;
+    }
     for (const Column& other : columns_) {
       if (into != nullptr && other.into == into) refuse("column " + in_quotes(name) + " twice", "each column once");
     }
@@ -200,12 +212,11 @@ class Parser {
   void missing() {
     if (missing_ > 0) {
       recording_.warnings.push_back(
-          {"missing_reading", fmt::format("{} readings are 'nan', the first in line {}: they are treated as missing",
-                                          missing_, first_missing_line_)});
+          {"missing_reading",
+           fmt::format("readings that are 'nan': {}, the first in line {}; they are treated as missing", missing_,
+                       first_missing_line_)});
     }
   }
-
-  static constexpr double longest_s = 3.2e8;
 
   std::string_view rest_, line_;
   std::size_t line_number_ = 0;
@@ -215,85 +226,11 @@ class Parser {
   Recording recording_;
 };
 
-/// Of those that are numbers; 0 when there is none.
-double median(std::vector<double> values) {
-  std::erase_if(values, [](double v) { return std::isnan(v); });
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-void check_time(Recording& r) {
-  std::vector<double> steps;
-  steps.reserve(r.rows());
-  std::size_t duplicates = 0, first_duplicate = 0;
-  for (std::size_t k = 1; k < r.rows(); ++k) {
-    const double step = r.time_s[k] - r.time_s[k - 1];
-    if (step > 0)
-      steps.push_back(step);
-    else if (duplicates++ == 0)
-      first_duplicate = k;
-  }
-  if (duplicates > 0) {
-    r.warnings.push_back({"duplicate_time",
-                          fmt::format("{} rows have the time of the row before, the first at {:g} s: they are left out",
-                                      duplicates, r.time_s[first_duplicate])});
-  }
-  const double usual = median(steps);
-  std::size_t gaps = 0, first_gap = 0;
-  for (std::size_t k = 1; k < r.rows(); ++k) {
-    if (usual > 0 && r.time_s[k] - r.time_s[k - 1] > 10 * usual && gaps++ == 0) first_gap = k;
-  }
-  if (gaps > 0) {
-    r.warnings.push_back({"gap", fmt::format("{} gaps longer than {:g} s, the first after {:g} s", gaps, 10 * usual,
-                                             r.time_s[first_gap - 1])});
-  }
-}
-
-/// Where current rises, a cell's voltage rises. A recording that says the opposite has the other sign convention.
-void check_sign(Recording& r) {
-  double together = 0, current2 = 0, voltage2 = 0;
-  for (std::size_t k = 1; k < r.voltage_v.size(); ++k) {
-    const double di = r.current_a[k] - r.current_a[k - 1], dv = r.voltage_v[k] - r.voltage_v[k - 1];
-    if (std::isnan(di) || std::isnan(dv)) continue;
-    together += di * dv;
-    current2 += di * di;
-    voltage2 += dv * dv;
-  }
-  if (together < -0.3 * std::sqrt(current2 * voltage2) && together < 0) {
-    r.warnings.push_back(
-        {"current_inverted",
-         "voltage falls where current rises: the current's sign looks inverted (current_a > 0 must charge)"});
-  }
-}
-
-std::size_t count_outside(const std::vector<double>& values, double low, double high) {
-  return static_cast<std::size_t>(
-      std::count_if(values.begin(), values.end(), [&](double v) { return v < low || v > high; }));
-}
-
-std::int32_t micro(double value) {
-  if (std::isnan(value)) return measurement::no_reading;
-  constexpr double limit = std::numeric_limits<std::int32_t>::max();
-  return static_cast<std::int32_t>(std::llround(std::clamp(value * 1e6, -limit, limit)));
-}
-
-std::int16_t centidegrees(double value) {
-  if (std::isnan(value)) return measurement::no_temperature;
-  return static_cast<std::int16_t>(std::lround(std::clamp(value * 100, -32'767.0, 32'767.0)));
-}
-
 }  // namespace
 
 Recording parse_recording(const std::string& text, const std::string& path, VoltageColumn voltage) {
   Recording recording = Parser(text, path).parse(voltage);
-  check_time(recording);
-  check_sign(recording);
-  if (count_outside(recording.soc_ref, -0.5, 1.5) > 0) {
-    recording.warnings.push_back(
-        {"soc_ref_in_percent", "soc_ref leaves 0..1: it looks like percent, expected a fraction"});
-  }
+  measurement::check_recording(recording);
   return recording;
 }
 
@@ -304,51 +241,6 @@ Recording read_recording(const std::string& path, VoltageColumn voltage) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   recording.read_mb_per_second = static_cast<double>(text.size()) / 1e6 / seconds;
   return recording;
-}
-
-void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
-  const model::Limits& l = cell.limits;
-  const double usual_v = median(r.voltage_v);
-  if (usual_v > 100 * l.voltage_max_v) {
-    r.warnings.push_back(
-        {"voltage_in_mv",
-         fmt::format("voltages around {:g} look like millivolts, expected volts; they are not used", usual_v)});
-  } else if (const std::size_t n = count_outside(r.voltage_v, l.voltage_min_v - 0.05, l.voltage_max_v + 0.05); n > 0) {
-    r.warnings.push_back({"outside_cell_range", fmt::format("{} voltages are outside the cell's {} to {} V", n,
-                                                            l.voltage_min_v, l.voltage_max_v)});
-  }
-  std::vector<double> magnitudes;
-  for (const double i : r.current_a) {
-    if (std::abs(i) > 0) magnitudes.push_back(std::abs(i));
-  }
-  const double larger_a = std::max(l.charge_current_max_a, l.discharge_current_max_a);
-  // no cell takes sixty times its capacity an hour
-  if (const double usual_a = median(magnitudes); usual_a > 20 * larger_a || usual_a > 60 * cell.capacity_ah) {
-    r.warnings.push_back({"current_in_ma", fmt::format("currents around {:g} look like milliamperes, expected amperes",
-                                                       median(magnitudes))});
-  } else if (const std::size_t n =
-                 count_outside(r.current_a, -1.05 * l.discharge_current_max_a, 1.05 * l.charge_current_max_a);
-             n > 0) {
-    r.warnings.push_back({"outside_cell_range", fmt::format("{} currents are outside the cell's continuous {} to {} A",
-                                                            n, -l.discharge_current_max_a, l.charge_current_max_a)});
-  }
-  if (const std::size_t n = count_outside(r.temperature_c, l.temperature_min_c, l.temperature_max_c); n > 0) {
-    r.warnings.push_back({"outside_cell_range", fmt::format("{} temperatures are outside the cell's {} to {} degrees C",
-                                                            n, l.temperature_min_c, l.temperature_max_c)});
-  }
-}
-
-std::vector<measurement::Sample> samples(const Recording& r) {
-  std::vector<measurement::Sample> out(r.rows());
-  for (std::size_t k = 0; k < r.rows(); ++k) {
-    out[k].time_us = static_cast<std::uint64_t>(std::llround((r.time_s[k] - r.time_s.front()) * 1e6));
-    out[k].current_ua = micro(r.current_a[k]);
-    const bool of_the_cell = r.voltage_ref_v.empty() || r.current_ref_a.empty() ||
-                             !(r.current_ref_a[k] == 0 && std::isfinite(r.voltage_ref_v[k]));
-    if (!r.voltage_v.empty() && of_the_cell) out[k].voltage_uv = micro(r.voltage_v[k]);
-    if (!r.temperature_c.empty()) out[k].temperature_cdegc = centidegrees(r.temperature_c[k]);
-  }
-  return out;
 }
 
 }  // namespace bms::files

@@ -37,7 +37,7 @@ void write_file(const std::filesystem::path& wanted, std::string_view content) {
   std::error_code none;
   const bool special = std::filesystem::exists(wanted, none) && !std::filesystem::is_regular_file(wanted, none) &&
                        !std::filesystem::is_directory(wanted, none);
-  if (special) {  // a pipe, a device: there is nothing to replace
+  if (special) {  // a pipe or a device cannot be renamed
     std::ofstream out(wanted, std::ios::binary);
     out.write(content.data(), static_cast<std::streamsize>(content.size()));
     out.close();
@@ -45,7 +45,7 @@ void write_file(const std::filesystem::path& wanted, std::string_view content) {
       throw BadInput(wanted.string(), 1, "cannot be written (" + system_message() + "), expected a place to write to");
     return;
   }
-  // a link stays one: what it leads to is replaced
+  // a symbolic link is kept: the file that it points to is replaced
   const std::filesystem::path path =
       std::filesystem::is_symlink(wanted, none) ? std::filesystem::weakly_canonical(wanted, none) : wanted;
   const std::filesystem::path temporary = path.string() + "." + std::to_string(getpid()) + ".tmp";

@@ -1,4 +1,4 @@
-// Whole files: read at once, written whole or not at all.
+// Reads and writes whole files. A file is written completely or not at all.
 #pragma once
 
 #include <filesystem>
@@ -7,11 +7,11 @@
 
 namespace bms::files {
 
-/// Content of a regular file. Throws BadInput when there is none to read.
+/// Content of a regular file. Throws BadInput if it cannot be read.
 std::string read_file(const std::filesystem::path& path);
 
-/// Writes to a temporary file beside `path`, then renames: nobody ever sees half of it. What is no regular file (a
-/// pipe, /dev/stdout) is written to as it is. Throws BadInput when it can't.
+/// Writes to a temporary file next to `path` and renames it, so that no other program sees an incomplete file. A path
+/// that is not a regular file (a pipe, /dev/stdout) is written directly. Throws BadInput if it cannot be written.
 void write_file(const std::filesystem::path& path, std::string_view content);
 
 /// SHA-256 in lower-case hexadecimal.

@@ -22,7 +22,7 @@ constexpr double shutdown_s = 20,
 /// Current, temperature and, replayed, voltage at a time of the drive.
 class LoadProfile {
  public:
-  explicit LoadProfile(const files::Recording& r) : r_(r) {}
+  explicit LoadProfile(const measurement::Recording& r) : r_(r) {}
 
   /// Times must ascend.
   void go_to(double time_s) {
@@ -45,7 +45,7 @@ class LoadProfile {
     return column[row_ - 1] + t * (column[row_] - column[row_ - 1]);
   }
 
-  const files::Recording& r_;
+  const measurement::Recording& r_;
   std::size_t row_ = 0;
 };
 

@@ -12,16 +12,17 @@
 #include <string>
 #include <vector>
 
-#include "files/recording.hpp"
 #include "hil/board_link.hpp"
 #include "hil/injection.hpp"
 #include "hil/simulated_pack.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms::hil {
 
 struct SessionPlan {
-  files::CellFile cell;      ///< the pack's, in truth
-  files::Recording profile;  ///< its current is the load's; with voltages, and replayed: its voltages are the cells'
+  files::CellFile cell;  ///< the pack's, in truth
+  measurement::Recording
+      profile;             ///< its current is the load's; with voltages, and replayed: its voltages are the cells'
   bool replayed = false;   ///< the cells read what was recorded; its current flows only while the contactors are closed
   std::size_t cells = 16;  ///< 1 or 16: as the board has
   double initial_soc = 0.9;             ///< of the pack

@@ -15,12 +15,12 @@ namespace bms::host_sim {
 
 namespace {
 
-/// Samples from their three frames; a frame that is wrong, or of another sample, begins anew.
+/// Assembles samples from their three frames. A frame that is invalid, or of another sample, starts again.
 class Samples {
  public:
   explicit Samples(CanLog& log) : log_(log) {}
 
-  void take(const can::Frame& frame) {
+  void receive(const can::Frame& frame) {
     if (is<can::SampleCurrent>(frame)) {
       const auto m = can::SampleCurrent::of(frame);
       counter_ = static_cast<std::uint16_t>(m.sample_counter);
@@ -62,11 +62,16 @@ class Samples {
     if (log_.samples.empty())
       log_.from_the_start = starts_ && counter_ == 1;
     else if (const std::uint16_t missing = static_cast<std::uint16_t>(counter_ - last_ - 1); missing != 0)
-      lost_ += missing, broken_ = true;
+      note_lost(missing);
     last_ = counter_;
     log_.samples.push_back(building_);
     log_.hashes.emplace_back();
     if (!broken_) log_.unbroken = log_.samples.size();
+  }
+
+  void note_lost(std::uint16_t missing) {
+    lost_ += missing;
+    broken_ = true;
   }
 
   CanLog& log_;
@@ -101,7 +106,7 @@ CanLog read_can_log(const std::string& path) {
     while (!source->ended()) {
       const std::size_t n = source->read(room, 0);
       for (std::size_t k = 0; k < n; ++k) {
-        if (room[k].kind == monitor::FrameKind::standard) samples.take(monitor::to_can_frame(room[k]));
+        if (room[k].kind == monitor::FrameKind::standard) samples.receive(monitor::to_can_frame(room[k]));
       }
     }
     malformed = source->malformed();
@@ -109,10 +114,11 @@ CanLog read_can_log(const std::string& path) {
     throw files::BadInput(path, refused.line == 0 ? 1 : refused.line, refused.what());
   }
   if (log.samples.size() < 2)
-    throw files::BadInput(path, 1,
-                          "no samples among its frames, expected SampleCurrent, SampleVoltage, SampleTime (0x199 to "
-                          "0x19B): switch the log of samples on by a command");
-  files::Recording& r = log.recording;
+    throw files::BadInput(
+        path, 1,
+        "no samples, expected the frames SampleCurrent, SampleVoltage and SampleTime (0x199 to 0x19B): "
+        "switch on the log of samples with a command");
+  measurement::Recording& r = log.recording;
   const std::uint64_t begin_us = log.samples.front().time_us;
   for (const measurement::Sample& s : log.samples) {
     r.time_s.push_back(1e-6 * static_cast<double>(s.time_us - begin_us));
@@ -121,12 +127,13 @@ CanLog read_can_log(const std::string& path) {
     r.temperature_c.push_back(number(s.temperature_cdegc, measurement::no_temperature, 1e-2));
   }
   if (!log.from_the_start)
-    r.warnings.push_back({"log_from_later",
-                          "the log does not begin with the firmware's first sample: its estimates cannot be compared"});
+    r.warnings.push_back(
+        {"log_from_later",
+         "the log does not begin with the first sample of the firmware: the estimates cannot be compared"});
   if (samples.lost() > 0)
-    r.warnings.push_back({"samples_lost", fmt::format("{} samples are not in the log, the first after sample {}",
+    r.warnings.push_back({"samples_lost", fmt::format("samples missing in the log: {}, the first after sample {}",
                                                       samples.lost(), log.unbroken)});
-  if (malformed > 0) r.warnings.push_back({"not_a_frame", fmt::format("{} lines are no frames", malformed)});
+  if (malformed > 0) r.warnings.push_back({"not_a_frame", fmt::format("lines that are not frames: {}", malformed)});
   return log;
 }
 

@@ -1,5 +1,5 @@
-// A truck's log: CAN frames as candump keeps them (also gzip), with the samples as the firmware's estimator saw them
-// and a hash of all that it computed. What a replay of the samples gives can be compared with that, bit for bit.
+// A CAN log of a truck in candump format (also gzip). It has the samples that the estimator of the firmware received
+// and a hash of its estimates, so that a replay of the samples can be compared with the firmware bit by bit.
 #pragma once
 
 #include <cstdint>
@@ -7,29 +7,29 @@
 #include <string>
 #include <vector>
 
-#include "files/recording.hpp"
 #include "host_sim/replay.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms::host_sim {
 
 struct CanLog {
-  files::Recording recording;  ///< the same as numbers; its warnings tell of what is missing
+  measurement::Recording recording;  ///< the samples as numbers; its warnings name what is missing
   std::vector<measurement::Sample> samples;
   std::optional<measurement::StartingPoint> start;
-  bool from_the_start = false;  ///< begins with the firmware's first sample, and says where it began
+  bool from_the_start = false;  ///< begins with the first sample of the firmware, and has its starting point
   std::vector<std::optional<std::uint32_t>> hashes;  ///< after each sample
-  std::size_t unbroken = 0;                          ///< samples before the first that got lost
+  std::size_t unbroken = 0;                          ///< samples before the first lost one
   std::optional<std::uint32_t> cell_hash;
 };
 
-/// Whether the file begins as a candump log does, or as gzip.
+/// Returns true if the file begins like a candump log, or like gzip.
 bool is_can_log(const std::string& path);
 
-/// Throws BadInput: no frames, no samples among them.
+/// Throws BadInput if the file cannot be read or has no samples.
 CanLog read_can_log(const std::string& path);
 
-/// Compares a replay of log.samples with what the firmware computed. Nothing: all that can be compared is equal; else
-/// where it is not, in words. compared: samples whose hash was.
+/// Compares a replay of log.samples with the estimates of the firmware. Returns nothing if all that can be compared is
+/// equal, else the first difference in words. compared: number of samples that were compared.
 std::optional<std::string> difference_to_log(const CanLog& log, const Track& track, std::size_t& compared);
 
 }  // namespace bms::host_sim

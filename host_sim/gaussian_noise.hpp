@@ -1,5 +1,5 @@
-// Reproducible normal noise: the same seed gives the same values on every machine (std::normal_distribution does not
-// promise that).
+// Reproducible normal noise: the same seed gives the same values on every machine, which std::normal_distribution does
+// not guarantee.
 #pragma once
 
 #include <cmath>
@@ -14,7 +14,7 @@ class GaussianNoise {
  public:
   explicit GaussianNoise(std::uint64_t seed) : random_(seed) {}
 
-  /// Standard normal; Box-Muller, one of the pair.
+  /// A standard normal value (Box-Muller; the second value of the pair is not used).
   double next() {
     const double radius = std::sqrt(-2 * std::log(1 - uniform())), angle = 2 * std::numbers::pi * uniform();
     return radius * std::cos(angle);

@@ -17,12 +17,12 @@ namespace bms::host_sim {
 namespace {
 
 constexpr double thirty_minutes_s = 1'800;
-/// As an estimator::ExtendedEstimate tells them.
-constexpr std::array<const char*, told_errors> error_names = {"voltage_error_v", "current_offset_a",
-                                                              "current_offset_sigma_a"};
+/// The first values of an estimator::ExtendedEstimate if sensor errors are states.
+constexpr std::array<const char*, error_values> error_names = {"voltage_error_v", "current_offset_a",
+                                                               "current_offset_sigma_a"};
 constexpr std::size_t current_offset_at = 1, current_offset_sigma_at = 2;
 
-/// The value of an estimate's word as a board writes it.
+/// The number that a word of an estimate holds, as a board writes it.
 double number_of(std::uint32_t word, ScalarKind scalar) {
   if (scalar == ScalarKind::float32) return std::bit_cast<float>(word);
   return static_cast<double>(
@@ -137,67 +137,95 @@ std::optional<Difference> first_difference(const Track& host, const Track& board
   return std::nullopt;
 }
 
-void evaluate(ReplayResult& result) {
-  const files::Recording& r = result.recording;
-  const std::vector<EstimateRow>& rows = result.track.rows;
-  const bool has_reference = !r.soc_ref.empty();
+namespace {
 
-  ErrorFigure soc, soc_later, prediction, open_loop;
-  FitFigure fit;
-  std::size_t inside = 0;
-  const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
-  if (!result.prior) result.initial_soc = rows.front().soc;
-  const bool start_known = has_reference && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1;
-  // a shift of the start is about what was believed
-  const double shift = value_of(result.cell.mechanisms, model::InitialSoc::id, 0),
-               started = result.prior ? result.initial_soc : result.initial_soc - shift;
-  const auto open = simulate(cell, result.cell.parameters.capacity_ah, result.cell.mechanisms, r.time_s, r.current_a,
-                             r.temperature_c, start_known ? r.soc_ref.front() - shift : started);
-
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const EstimateRow& e = rows[k];
-    if (has_reference && !std::isnan(r.soc_ref[k])) {
-      const double error = e.soc - r.soc_ref[k];
-      soc.add(error);
-      if (r.time_s[k] - r.time_s.front() >= thirty_minutes_s) soc_later.add(error);
-      if (std::abs(error) <= 2 * e.soc_sigma) ++inside;
-    }
-    // a reading that the filter did not believe says nothing about its prediction
-    constexpr std::uint32_t not_believed = estimator::voltage_missing | estimator::voltage_implausible |
+/// Flags of a sample whose voltage the filter did not use: its prediction cannot be judged.
+constexpr std::uint32_t voltage_not_used = estimator::voltage_missing | estimator::voltage_implausible |
                                            estimator::voltage_stuck | estimator::time_not_increasing |
                                            estimator::not_started;
-    if (k > 0 && (e.flags & not_believed) == 0) prediction.add(r.voltage_v[k] - e.voltage_predicted_v);
-    if ((e.flags & (estimator::voltage_missing | estimator::voltage_implausible)) == 0) {
-      open_loop.add(r.voltage_v[k] - open[k].voltage_v);
-      fit.add(r.voltage_v[k], open[k].voltage_v);
-    }
-    result.open_loop_v.push_back(open[k].voltage_v);
+constexpr std::uint32_t voltage_not_measured = estimator::voltage_missing | estimator::voltage_implausible;
+
+/// The open loop starts at the reference state of charge, if the recording has one.
+double open_loop_start(const ReplayResult& result) {
+  const measurement::Recording& r = result.recording;
+  // the mechanism initial_soc is a shift of the user's assumption, not of a reference or an estimate
+  const double shift = value_of(result.cell.mechanisms, model::InitialSoc::id, 0);
+  const bool reference = !r.soc_ref.empty() && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1;
+  if (reference) return r.soc_ref.front() - shift;
+  return result.prior ? result.initial_soc : result.initial_soc - shift;
+}
+
+SocFigures soc_figures(const ReplayResult& result) {
+  const measurement::Recording& r = result.recording;
+  const std::vector<EstimateRow>& rows = result.track.rows;
+  ErrorFigure all, later;
+  std::size_t inside = 0;
+  for (std::size_t k = 0; k < rows.size() && !r.soc_ref.empty(); ++k) {
+    if (std::isnan(r.soc_ref[k])) continue;
+    const double error = rows[k].soc - r.soc_ref[k];
+    all.add(error);
+    if (r.time_s[k] - r.time_s.front() >= thirty_minutes_s) later.add(error);
+    if (std::abs(error) <= 2 * rows[k].soc_sigma) ++inside;
   }
-  result.soc.final = rows.back().soc;
-  result.soc.final_sigma = rows.back().soc_sigma;
+  SocFigures figures;
+  figures.final = rows.back().soc;
+  figures.final_sigma = rows.back().soc_sigma;
   if (result.cell.parameters.noise.errors_are_states) {
     const std::size_t last = (rows.size() - 1) * result.track.state_names.size();
-    result.soc.current_offset_a = result.track.states[last + current_offset_at];
-    result.soc.current_offset_sigma_a = result.track.states[last + current_offset_sigma_at];
+    figures.current_offset_a = result.track.states[last + current_offset_at];
+    figures.current_offset_sigma_a = result.track.states[last + current_offset_sigma_at];
   }
-  if (soc.count() > 0) {
-    result.soc.rmse = soc.rms();
-    result.soc.max_error = soc.max();
-    result.soc.within_2_sigma = static_cast<double>(inside) / static_cast<double>(soc.count());
+  if (all.count() > 0) {
+    figures.rmse = all.rms();
+    figures.max_error = all.max();
+    figures.within_2_sigma = static_cast<double>(inside) / static_cast<double>(all.count());
   }
-  if (soc_later.count() > 0) {
-    result.soc.rmse_after_30min = soc_later.rms();
-    result.soc.max_error_after_30min = soc_later.max();
+  if (later.count() > 0) {
+    figures.rmse_after_30min = later.rms();
+    figures.max_error_after_30min = later.max();
   }
-  result.voltage = {};
+  return figures;
+}
+
+VoltageFigures voltage_figures(const ReplayResult& result) {
+  const std::vector<double>& measured_v = result.recording.voltage_v;
+  const std::vector<EstimateRow>& rows = result.track.rows;
+  ErrorFigure prediction, open_loop;
+  FitFigure fit;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (k > 0 && (rows[k].flags & voltage_not_used) == 0) prediction.add(measured_v[k] - rows[k].voltage_predicted_v);
+    if ((rows[k].flags & voltage_not_measured) != 0) continue;
+    open_loop.add(measured_v[k] - result.open_loop_v[k]);
+    fit.add(measured_v[k], result.open_loop_v[k]);
+  }
+  VoltageFigures figures;
   if (prediction.count() > 0) {
-    result.voltage.prediction_rmse_v = prediction.rms();
-    result.voltage.prediction_max_v = prediction.max();
+    figures.prediction_rmse_v = prediction.rms();
+    figures.prediction_max_v = prediction.max();
   }
   if (open_loop.count() > 0) {
-    result.voltage.open_loop_rmse_v = open_loop.rms();
-    result.voltage.open_loop_fit_percent = fit.percent();
+    figures.open_loop_rmse_v = open_loop.rms();
+    figures.open_loop_fit_percent = fit.percent();
   }
+  return figures;
+}
+
+}  // namespace
+
+void evaluate(ReplayResult& result) {
+  const measurement::Recording& r = result.recording;
+  if (!result.prior) result.initial_soc = result.track.rows.front().soc;
+  const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
+  const auto open_loop = simulate({.cell = cell,
+                                   .capacity_ah = result.cell.parameters.capacity_ah,
+                                   .mechanisms = result.cell.mechanisms,
+                                   .time_s = r.time_s,
+                                   .current_a = r.current_a,
+                                   .temperature_c = r.temperature_c,
+                                   .initial_soc = open_loop_start(result)});
+  for (const SimulatedRow& row : open_loop) result.open_loop_v.push_back(row.voltage_v);
+  result.soc = soc_figures(result);
+  result.voltage = voltage_figures(result);
 }
 
 std::string trace_csv(const ReplayResult& result) {

@@ -1,6 +1,9 @@
-// A recording through the estimator with one scalar. The estimator of every combination of states that a cell file may
-// ask for is compiled for each scalar, which takes half a minute: each has a file of its own, replay_run_float.cpp and
-// so on.
+// Replays a recording through the estimator with one scalar type.
+//
+// The estimator is compiled for every number of states that a cell file may ask for, and for each scalar. This takes
+// half a minute, so each scalar has a source of its own. In fixed point the estimator consists of many small functions,
+// and inlining all of them takes a minute of compile time: the estimators with mechanisms are compiled apart, with
+// little inlining.
 #pragma once
 
 #include <algorithm>
@@ -16,13 +19,13 @@
 
 namespace bms::host_sim {
 
-/// What an estimator::ExtendedEstimate tells first where errors are states: the voltage's error, the current's offset,
-/// the offset's standard deviation.
-inline constexpr std::size_t told_errors = 3;
+/// Number of the first values of an estimator::ExtendedEstimate if sensor errors are states: error of the voltage,
+/// offset of the current, standard deviation of the offset.
+inline constexpr std::size_t error_values = 3;
 
 namespace replay_detail {
 
-inline constexpr double timing_s = 0.03;  // long enough that a clock and a cold cache do not matter
+inline constexpr double timing_s = 0.03;  ///< long enough for the clock and a cold cache
 
 template <class S>
 EstimateRow row_of(const estimator::Estimate<S>& e) {
@@ -81,7 +84,7 @@ Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& sa
   return track;
 }
 
-/// A cell with mechanisms: as many states in the filter as they have voltages.
+/// Runs the estimator with as many states as the mechanisms of the cell have voltages.
 template <class S, bool Errors, std::size_t Voltages = 0>
 Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell,
                    const std::vector<measurement::Sample>& samples,
@@ -91,8 +94,22 @@ Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::Cho
     if (cell.laws.voltage_states() > Voltages) return run_extended<S, Errors, Voltages + 1>(cell, samples, start);
   }
   return run_estimator<estimator::SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>>(
-      cell, samples, start, (Errors ? told_errors : 0) + cell.laws.states());
+      cell, samples, start, (Errors ? error_values : 0) + cell.laws.states());
 }
+
+/// errors: sensor errors are states of the filter.
+template <class S>
+Track run_with_mechanisms(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, bool errors,
+                          const std::vector<measurement::Sample>& samples,
+                          const std::optional<measurement::StartingPoint>& start) {
+  return errors ? run_extended<S, true>(cell, samples, start) : run_extended<S, false>(cell, samples, start);
+}
+
+using FixedExtendedCell =
+    model::ExtendedCell<arithmetic::FixedPoint, model::max_intervals, model::ChosenLaws<arithmetic::FixedPoint>>;
+extern template Track run_with_mechanisms<arithmetic::FixedPoint>(
+    const FixedExtendedCell& cell, bool errors, const std::vector<measurement::Sample>& samples,
+    const std::optional<measurement::StartingPoint>& start);
 
 }  // namespace replay_detail
 
@@ -106,8 +123,7 @@ Track run(const files::CellFile& file, const std::vector<measurement::Sample>& s
     return replay_detail::run_estimator<estimator::SocEstimator<S>>(cell, samples, start, 0);
   const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> extended{
       cell, model::chosen<S>(mechanisms, file.parameters.capacity_ah)};
-  return errors ? replay_detail::run_extended<S, true>(extended, samples, start)
-                : replay_detail::run_extended<S, false>(extended, samples, start);
+  return replay_detail::run_with_mechanisms<S>(extended, errors, samples, start);
 }
 
 extern template Track run<float>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,

@@ -19,7 +19,7 @@ namespace bms::images {
 
 namespace {
 
-int decoded(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
+int exit_status(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
 
 }  // namespace
 
@@ -52,7 +52,7 @@ bool ChildProcess::running() {
 
 int ChildProcess::wait() {
   while (!ended_) ended_ = waitpid(pid_, &status_, 0) == pid_ || errno != EINTR;
-  return decoded(status_);
+  return exit_status(status_);
 }
 
 std::string output_of(const std::vector<std::string>& argv) {
@@ -78,7 +78,7 @@ bool in_path(const std::string& program) {
 TemporaryFolder::TemporaryFolder() {
   std::string name = (std::filesystem::temp_directory_path() / "bms.XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr)
-    throw std::runtime_error("no temporary folder: " + std::generic_category().message(errno));
+    throw std::runtime_error("cannot create a temporary folder: " + std::generic_category().message(errno));
   path_ = name;
 }
 

@@ -1,4 +1,4 @@
-// Programs run by the tool: started without a shell, ended with it.
+// Programs that the tool runs: started without a shell, killed when the tool ends.
 #pragma once
 
 #include <sys/types.h>
@@ -9,17 +9,18 @@
 
 namespace bms::images {
 
-/// A running program. Killed by the destructor if it has not ended.
+/// A running program. The destructor kills it if it is still running.
 class ChildProcess {
  public:
-  /// argv[0] is looked up in PATH. Output goes to `log` (both streams), input is empty. Throws std::runtime_error.
+  /// argv[0] is searched in PATH. Both output streams go to `log`; the input is empty. Throws std::runtime_error if the
+  /// program cannot be started.
   ChildProcess(const std::vector<std::string>& argv, const std::filesystem::path& log);
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   bool running();
-  /// Waits for the end; exit status, or 128 + signal.
+  /// Waits for the end. Returns the exit status, or 128 + signal.
   int wait();
 
  private:
@@ -28,12 +29,14 @@ class ChildProcess {
   bool ended_ = false;
 };
 
-/// Runs a program to its end; what it printed on both streams. Throws std::runtime_error, with that, when it fails.
+/// Runs a program to its end. Returns the text of both output streams. Throws std::runtime_error, with that text, if
+/// the exit status is not 0.
 std::string output_of(const std::vector<std::string>& argv);
 
+/// Returns true if an executable of that name is in PATH.
 bool in_path(const std::string& program);
 
-/// A folder of its own for temporary files, removed with its content.
+/// A new folder for temporary files. The destructor removes it with its content.
 class TemporaryFolder {
  public:
   TemporaryFolder();

@@ -21,9 +21,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int silence_ms = 30'000;  // an emulator that says nothing for so long has hung
+constexpr int silence_ms = 30'000;  ///< an emulator without output for so long hangs
 
-/// The recording as the image reads it.
+/// Writes the samples as the image reads them.
 void write_stream(const std::filesystem::path& path, const std::vector<measurement::Sample>& samples,
                   const std::optional<measurement::StartingPoint>& start) {
   hal::StreamHeader header;
@@ -37,18 +37,19 @@ void write_stream(const std::filesystem::path& path, const std::vector<measureme
   for (std::size_t k = 0; k < samples.size(); ++k) {
     measurement::Sample clean{};
     std::memset(static_cast<void*>(&clean), 0,
-                sizeof clean);  // no stray bytes in the padding: the file is reproducible
+                sizeof clean);  // padding of 0: the file is reproducible
     clean = samples[k];
     std::memcpy(bytes.data() + sizeof header + k * sizeof(measurement::Sample), &clean, sizeof clean);
   }
   files::write_file(path, bytes);
 }
 
-/// Read end of a named pipe; opening it does not wait for the writer.
+/// Read end of a named pipe. It is opened without waiting for the writer.
 class Pipe {
  public:
   explicit Pipe(const std::filesystem::path& path) {
-    if (mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error("no pipe in " + path.parent_path().string());
+    if (mkfifo(path.c_str(), 0600) != 0)
+      throw std::runtime_error("cannot create a pipe in " + path.parent_path().string());
     fd_ = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   }
   ~Pipe() { close(fd_); }
@@ -59,7 +60,7 @@ class Pipe {
     pollfd p{fd_, POLLIN, 0};
     return poll(&p, 1, timeout_ms) > 0;
   }
-  /// Bytes read; 0: the writer has gone (or never came); -1: nothing yet.
+  /// Returns the bytes read; 0: there is no writer (any more); -1: nothing yet.
   ssize_t read(char* into, std::size_t size) const { return ::read(fd_, into, size); }
 
  private:
@@ -80,7 +81,7 @@ std::vector<std::string> emulator_command(const EmulatedBoard& board, const std:
   for (const std::string& argument : semihosting) {
     if (argument.find(' ') != std::string::npos)
       throw files::BadInput(argument, 1,
-                            "a space in the name, expected a TMPDIR without");  // it parts the program's words
+                            "a space in the name, expected a TMPDIR without a space");  // it separates arguments
     config += ",arg=";
     for (const char c : argument) config += c == ',' ? std::string(",,") : std::string(1, c);
   }
@@ -107,20 +108,20 @@ BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& i
   std::string bytes(samples.size() * row, '\0');
   std::size_t have = 0, first_block = 0;
   Clock::time_point first_at, last_at;
-  auto heard_at = Clock::now();
+  auto last_answer = Clock::now();
   for (bool answering = true; answering && have < bytes.size();) {
     pipe.wait(20);
-    const bool running = qemu.running();  // asked before reading: what a finished emulator has written is still read
+    const bool running = qemu.running();  // before reading: the last output of a finished emulator is read
     const ssize_t n = pipe.read(bytes.data() + have, bytes.size() - have);
     if (n > 0) {
       have += static_cast<std::size_t>(n);
-      last_at = heard_at = Clock::now();
+      last_at = last_answer = Clock::now();
       if (first_block == 0) {
         first_block = have;
         first_at = last_at;
       }
     } else {
-      answering = running && Clock::now() - heard_at < std::chrono::milliseconds(silence_ms);
+      answering = running && Clock::now() - last_answer < std::chrono::milliseconds(silence_ms);
       if (n == 0 && running) usleep(1'000);  // no writer yet: poll() returns at once
     }
   }

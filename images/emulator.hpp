@@ -1,4 +1,4 @@
-// An emulated board: the firmware's replay image in QEMU, samples in, estimates out.
+// An emulated board: runs the replay image of the firmware in QEMU. It receives samples and returns estimates.
 #pragma once
 
 #include <filesystem>
@@ -14,30 +14,31 @@ namespace bms::images {
 
 struct BoardRun {
   std::vector<estimator::EstimateWords> words;
-  std::vector<std::uint32_t> state_words;  ///< of what the filter knows besides, row by row
-  double steps_per_second = 0;  ///< from the first block of estimates to the last: the emulator's start-up is not in it
+  std::vector<std::uint32_t> state_words;  ///< further states of the filter, `states` for each sample
+  double steps_per_second = 0;             ///< from the first block of estimates to the last, without the start of the
+                                           ///< emulator
 };
 
-/// Boards that can be emulated: folder in boards/, QEMU's name, arithmetic.
 struct EmulatedBoard {
-  std::string name;
-  std::string machine;
-  host_sim::ScalarKind scalar;
+  std::string name;             ///< folder in boards/
+  std::string machine;          ///< its name in QEMU
+  host_sim::ScalarKind scalar;  ///< number type of its estimator
 };
 const std::vector<EmulatedBoard>& emulated_boards();
 
-/// Command line of the emulator for `image`; `semihosting`: the program's arguments.
+/// Command line of the emulator for `image`. semihosting: the arguments of the image. Throws BadInput if one of them
+/// has a space.
 std::vector<std::string> emulator_command(const EmulatedBoard& board, const std::filesystem::path& image,
                                           const std::vector<std::string>& semihosting);
 
-/// Streams samples through `image` (a *_replay.elf). `more`: further options of the emulator.
-/// states: of mechanisms, in each estimate. Throws std::runtime_error when the emulator fails or stops answering.
+/// Runs `image` (a *_replay.elf) with these samples. more: further options of the emulator; states: number of states of
+/// mechanisms in each estimate. Throws std::runtime_error if the emulator fails or stops answering.
 BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& image,
                       const std::vector<measurement::Sample>& samples,
                       const std::optional<measurement::StartingPoint>& start, const std::vector<std::string>& more = {},
                       std::size_t states = 0);
 
-/// The same with the board's firmware for this cell, which is built if need be, as numbers.
+/// The same with the firmware of the board for this cell, which is built if necessary. Throws as firmware_image(), too.
 host_sim::Track run_on_board(const EmulatedBoard& board, const files::CellFile& cell,
                              const std::vector<measurement::Sample>& samples,
                              const std::optional<measurement::StartingPoint>& start);

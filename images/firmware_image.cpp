@@ -19,7 +19,7 @@ namespace bms::images {
 
 namespace {
 
-/// The source tree: where the tool was built from, or BMS_ROOT.
+/// The source tree: BMS_ROOT, or the folder from which the tool was built.
 std::filesystem::path source_tree() {
   const char* root = std::getenv("BMS_ROOT");
   return root != nullptr ? root : BMS_SOURCE_DIR;
@@ -33,7 +33,7 @@ std::filesystem::path board_file(const std::string& board) {
   return file;
 }
 
-/// Held while a folder is built in: two runs at once would build over each other.
+/// Locks a build folder: two runs at once would overwrite each other's files.
 class Lock {
  public:
   explicit Lock(const std::filesystem::path& path) : fd_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
@@ -49,7 +49,7 @@ class Lock {
 
 void run_step(const std::vector<std::string>& argv, const std::filesystem::path& log) {
   if (ChildProcess(argv, log).wait() == 0) return;
-  throw std::runtime_error("the firmware does not build, see " + log.string());
+  throw std::runtime_error("the build of the firmware failed, see " + log.string());
 }
 
 const char* ending(Image image) {

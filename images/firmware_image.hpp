@@ -1,4 +1,4 @@
-// Firmware images made on demand: one per board and cell file, kept under build/.
+// Firmware images, built on demand: one per board and cell file, stored under build/.
 #pragma once
 
 #include <filesystem>
@@ -9,26 +9,26 @@
 
 namespace bms::images {
 
-/// What an image is for: its end after "bms_<board>" (cmake/firmware.cmake).
+/// Purpose of an image: the end of its name after "bms_<board>" (cmake/firmware.cmake).
 enum class Image { application, remote, replay, hil, bench, fault, pack, protection };
 
-/// `image` of `board` with the tables of `cell`, built if it is not there yet. Needs the source tree, CMake and the
-/// board's cross compiler; throws BadInput when they are missing and std::runtime_error when the build fails.
-/// vehicle_profile: as BMS_VEHICLE_PROFILE of cmake/firmware.cmake.
+/// Builds `image` of `board` with the tables of `cell`, if it is not there yet, and returns its path. vehicle_profile:
+/// BMS_VEHICLE_PROFILE of cmake/firmware.cmake. Needs the source tree, CMake and the cross compiler of the board.
+/// Throws BadInput if they are missing and std::runtime_error if the build fails.
 std::filesystem::path firmware_image(const std::string& board, const files::CellFile& cell, Image image,
                                      const std::string& vehicle_profile = "none");
 
-/// Names of the folders in boards/ that are one, in their order.
+/// Names of all boards, in alphabetical order.
 std::vector<std::string> board_names();
 
-/// What board.cmake sets a variable to. Throws BadInput when there is no such board, std::runtime_error when it does
-/// not set it.
+/// Value of a variable in board.cmake. Throws BadInput if there is no such board, std::runtime_error if board.cmake
+/// does not set the variable.
 std::string board_setting(const std::string& board, const std::string& name);
 
-/// What goes onto the board's chip; where the board is also emulated its other images run in the emulator only.
+/// The image for the chip of the board. If the board is also emulated, its other images run in the emulator only.
 Image chip_image(const std::string& board);
 
-/// Cells in series that a board measures, as its board.cmake says. Throws BadInput when there is no such board.
+/// Number of cells in series that a board measures, from its board.cmake. Throws BadInput if there is no such board.
 std::size_t board_cells(const std::string& board);
 
 }  // namespace bms::images

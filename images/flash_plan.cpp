@@ -19,9 +19,10 @@ std::vector<LoadedPart> parts_to_write(const std::vector<LoadedPart>& parts,
   std::vector<LoadedPart> joined;
   for (const LoadedPart& part : parts) {
     if (storage && part.address < storage->end && part.address + part.bytes.size() > storage->begin) {
-      throw std::runtime_error(fmt::format(
-          "the image has {} bytes for {:#010x}, where the stored records are ({:#010x} to {:#010x}): not written",
-          part.bytes.size(), part.address, storage->begin, storage->end));
+      throw std::runtime_error(
+          fmt::format("the image has {} bytes at {:#010x}, where the stored records are ({:#010x} to {:#010x}): "
+                      "nothing was written",
+                      part.bytes.size(), part.address, storage->begin, storage->end));
     }
     const bool records_between =
         storage && !joined.empty() && joined.back().address < storage->begin && part.address >= storage->end;
@@ -31,11 +32,11 @@ std::vector<LoadedPart> parts_to_write(const std::vector<LoadedPart>& parts,
     }
     LoadedPart& before = joined.back();
     if (part.address < before.address + before.bytes.size())
-      throw std::runtime_error(fmt::format("the image has two contents for {:#010x}", part.address));
+      throw std::runtime_error(fmt::format("the image has two parts at {:#010x}", part.address));
     before.bytes.resize(part.address - before.address, '\xFF');
     before.bytes += part.bytes;
   }
-  if (joined.empty()) throw std::runtime_error("the image has nothing for the flash");
+  if (joined.empty()) throw std::runtime_error("the image has no bytes for the flash");
   return joined;
 }
 
@@ -65,29 +66,30 @@ std::vector<std::string> openocd_command(const Probe& probe, const std::vector<P
 }
 
 FlashFailure failure_in(const std::string& log, const Probe& probe) {
-  const auto said = [&](const char* words) { return log.find(words) != std::string::npos; };
-  if (said("Can't find"))
+  const auto contains = [&](const char* words) { return log.find(words) != std::string::npos; };
+  if (contains("Can't find"))
     return {fmt::format("OpenOCD has no interface/{}.cfg or target/{}.cfg", probe.interface, probe.target), true};
-  if (said("LIBUSB_ERROR_ACCESS"))
+  if (contains("LIBUSB_ERROR_ACCESS"))
     return {
-        "the probe may not be opened: its USB device belongs to somebody else (openocd's udev rules, group plugdev)",
+        "no permission to open the USB device of the probe: install the udev rules of OpenOCD, join the group plugdev",
         true};
   for (const char* words : {"open failed", "unable to find a matching", "No device matches", "No J-Link device found",
                             "no device found", "unable to open"}) {
-    if (said(words))
-      return {fmt::format("no {} probe{} found: is it plugged in? another kind: --probe", probe.interface,
-                          probe.serial.empty() ? "" : " with the serial number " + probe.serial),
+    if (contains(words))
+      return {fmt::format("no {} probe{} found: is it connected? For another kind of probe use --probe",
+                          probe.interface, probe.serial.empty() ? "" : " with the serial number " + probe.serial),
               true};
   }
-  if (said("image verified"))
-    return {"the image is in the flash, but the stored records are not what they were; they are kept beside the image",
+  if (contains("image verified"))
+    return {"the image is in the flash, but the stored records have changed; a copy of them is next to the image",
             false};
   for (const char* words : {"checksum mismatch", "verify failed", "Verify Failed", "diff 0 address"}) {
-    if (said(words)) return {"the flash does not hold what was written to it", false};
+    if (contains(words)) return {"the flash does not contain what was written to it", false};
   }
   for (const char* words : {"init mode failed", "unable to connect to the target", "Cannot read IDR",
                             "Target not examined", "Error connecting DP", "SWD DPIDR", "all ones", "all zeroes"}) {
-    if (said(words)) return {"the probe is there, but no chip answers: power, SWDIO, SWCLK, NRST, GND?", false};
+    if (contains(words))
+      return {"the probe is connected, but the chip does not answer: check power, SWDIO, SWCLK, NRST and GND", false};
   }
   std::string last = "OpenOCD failed";
   std::istringstream lines(log);

@@ -1,6 +1,8 @@
-// What OpenOCD is told to write an image onto a chip: only the places that the image has bytes for, one after the
-// other, so that nothing between them is erased; read back and compared; the stored records (storage/) read before and
-// compared after; reset.
+// The commands with which OpenOCD writes an image into the flash of a chip.
+//
+// Only the places for which the image has bytes are written, one after the other, so that nothing between them is
+// erased. They are read back and compared. The stored records (storage/) are read before and compared afterwards. At
+// the end the chip is reset.
 #pragma once
 
 #include <cstdint>
@@ -13,41 +15,43 @@
 
 namespace bms::images {
 
-/// From `begin` up to, not including, `end`: whole sectors.
+/// Whole sectors, [begin, end).
 struct AddressRange {
   std::uint32_t begin = 0, end = 0;
 };
 
 struct Probe {
-  std::string interface;  ///< file in OpenOCD's interface/, without .cfg
-  std::string target;     ///< file in its target/
-  std::string serial;     ///< of the probe, where there are several; empty: the one that is there
+  std::string interface;  ///< file in interface/ of OpenOCD, without .cfg
+  std::string target;     ///< file in target/ of OpenOCD, without .cfg
+  std::string serial;     ///< serial number, if there are several probes; empty: the only one
 };
 
-/// A part of the image in a file of its own, as it is handed over.
+/// A part of the image in a separate file, for OpenOCD.
 struct PartFile {
   std::uint32_t address = 0;
   std::filesystem::path path;
 };
 
-/// Sectors for stored records that the image says it leaves alone (image_storage_begin, image_storage_end); none on a
-/// board without.
+/// Sectors of the stored records, which the image does not use (symbols image_storage_begin, image_storage_end).
+/// Nothing if the board has no storage.
 std::optional<AddressRange> storage_of(const ImageFile& image);
 
-/// What is written: one part on each side of the stored records, gaps as erased flash is (two parts in one sector would
-/// erase each other). Throws std::runtime_error when a part lies in the stored records' sectors.
+/// The parts to write: one on each side of the stored records. Gaps are filled with 0xFF, as erased flash reads,
+/// because two parts in one sector would erase each other. Throws std::runtime_error if a part lies in the sectors of
+/// the stored records.
 std::vector<LoadedPart> parts_to_write(const std::vector<LoadedPart>& parts,
                                        const std::optional<AddressRange>& storage);
 
-/// Program and arguments. kept: file that the stored records are read into.
+/// Program and arguments. kept: file for a copy of the stored records.
 std::vector<std::string> openocd_command(const Probe& probe, const std::vector<PartFile>& parts,
                                          const std::optional<AddressRange>& storage, const std::filesystem::path& kept);
 
-/// What it said, in one sentence, when it failed.
+/// Why OpenOCD failed, in one sentence.
 struct FlashFailure {
   std::string what;
-  bool nothing_to_talk_to = false;  ///< no probe: nothing was tried
+  bool no_probe = false;  ///< nothing was tried
 };
+/// Reads the cause from the log of OpenOCD.
 FlashFailure failure_in(const std::string& log, const Probe& probe);
 
 }  // namespace bms::images

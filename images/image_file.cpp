@@ -45,7 +45,7 @@ ImageFile::ImageFile(const std::filesystem::path& path) : path_(path.string()) {
   const auto header = file.at<Elf32_Ehdr>(0);
   if (std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 || header.e_ident[EI_CLASS] != ELFCLASS32 ||
       header.e_ident[EI_DATA] != ELFDATA2LSB) {
-    throw std::runtime_error(path_ + " is no image of a 32-bit little-endian controller");
+    throw std::runtime_error(path_ + " is not an ELF image of a 32-bit little-endian controller");
   }
   for (std::size_t k = 0; k < header.e_phnum; ++k) {
     const auto p = file.at<Elf32_Phdr>(header.e_phoff + k * sizeof(Elf32_Phdr));
@@ -59,7 +59,7 @@ ImageFile::ImageFile(const std::filesystem::path& path) : path_(path.string()) {
   const auto content = [&](const Elf32_Shdr& s) {
     return s.sh_type == SHT_NOBITS ? std::string() : file.part(s.sh_offset, s.sh_size);
   };
-  if (header.e_shstrndx >= headers.size()) return;  // stripped of its sections
+  if (header.e_shstrndx >= headers.size()) return;  // without sections
   const std::string names = content(headers[header.e_shstrndx]);
   for (const Elf32_Shdr& s : headers) {
     sections_[name_in(names, s.sh_name)] = content(s);
@@ -78,7 +78,7 @@ std::string ImageFile::at(std::uint32_t address, std::size_t size) const {
         size <= part.bytes.size() - (address - part.address))
       return part.bytes.substr(address - part.address, size);
   }
-  throw std::runtime_error("nothing at " + std::to_string(address) + " in " + path_);
+  throw std::runtime_error("no bytes at address " + std::to_string(address) + " in " + path_);
 }
 
 std::uint32_t ImageFile::symbol(const std::string& name) const {

@@ -1,5 +1,5 @@
-// What an image puts where: the parts of an ELF file of a 32-bit little-endian controller that a flash loader reads
-// (System V ABI, chapters 4 and 5). Throws std::runtime_error when the file is none, or ends too early.
+// Reads an image: an ELF file of a 32-bit little-endian controller (System V ABI, chapters 4 and 5). Throws
+// std::runtime_error if the file is not such an image, or ends too early.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace bms::images {
 
-/// Bytes for one place of the flash; where they are while the program runs is not told.
+/// Bytes for one place of the flash. address: where they are stored, not where they are used.
 struct LoadedPart {
   std::uint32_t address = 0;
   std::string bytes;
@@ -20,14 +20,14 @@ class ImageFile {
  public:
   explicit ImageFile(const std::filesystem::path& path);
 
-  /// By address, without those that have no bytes in the file.
+  /// Ascending by address, without those that have no bytes in the file.
   const std::vector<LoadedPart>& parts() const { return parts_; }
-  /// Bytes that the file has for this place. Throws where it has none.
+  /// The bytes at an address. Throws if the file has none there.
   std::string at(std::uint32_t address, std::size_t size) const;
   bool has_symbol(const std::string& name) const { return symbols_.contains(name); }
-  /// Value of a symbol.
+  /// Value of a symbol. Throws if there is no such symbol.
   std::uint32_t symbol(const std::string& name) const;
-  /// Bytes of a section.
+  /// Bytes of a section. Throws if there is no such section.
   const std::string& section(const std::string& name) const;
 
  private:

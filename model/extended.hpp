@@ -220,8 +220,8 @@ class OpenLoopSimulation {
       return look_up(cell_, soc, interval_);
   }
   void limit_soc() {
-    if (value(soc_) < -0.25) soc_ = S(-0.25);
-    if (value(soc_) > 1.25) soc_ = S(1.25);
+    if (value(soc_) < min_soc) soc_ = S(min_soc);
+    if (value(soc_) > max_soc) soc_ = S(max_soc);
   }
 
   const Tables& cell_;

@@ -10,13 +10,14 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "proof/experiment_file.hpp"
 #include "proof/proof_lab.hpp"
 
 namespace bms::proof {
 
 std::string ProofClaim::verdict() const {
   if (!holds) return "fails";
-  return within_uncertainty.value_or(true) ? "holds" : "holds, but too sure of itself";
+  return within_uncertainty.value_or(true) ? "holds" : "holds, but its uncertainty is too small";
 }
 
 std::size_t ProofExperiment::holding() const {
@@ -38,63 +39,75 @@ std::size_t ProofResult::holding() const {
 
 std::vector<std::string> proof_names() {
   std::vector<std::string> names;
-  for (const ProofEntry& entry : proof_list()) names.push_back(entry.id);
+  for (const Experiment& e : experiments()) names.push_back(e.id);
   return names;
 }
 
-ProofResult prove(const std::string& folder, const std::string& only, const workflow::Progress& progress) {
-  const auto begin = std::chrono::steady_clock::now();
-  std::vector<const ProofEntry*> chosen;
-  double work = 1;
-  for (const ProofEntry& entry : proof_list()) {
-    if (!only.empty() && only != entry.id) continue;
-    chosen.push_back(&entry);
-    work += entry.rows;
-  }
-  ProofLab lab(folder, work, progress);
-  for (const ProofEntry* entry : chosen) {
-    for (const std::string& name : entry->recordings) {
-      if (!std::filesystem::is_regular_file(lab.path(name))) {
-        throw files::BadInput(lab.path(name), 1,
-                              "no such recording, expected a folder with a123_26650 and a123_esctoolbox in --data "
-                              "(host_sim/README.md names their source)");
-      }
+namespace {
+
+void require_recordings(const ProofLab& lab, const std::vector<const Experiment*>& chosen) {
+  for (const Experiment* e : chosen) {
+    for (const std::string& name : e->recordings) {
+      if (std::filesystem::is_regular_file(lab.path(name))) continue;
+      throw files::BadInput(lab.path(name), 1,
+                            "no such recording, expected a folder with a123_26650 and a123_esctoolbox in --data "
+                            "(proof/README.md names their source)");
     }
   }
-  ProofResult result;
-  for (const ProofEntry* entry : chosen)
-    result.experiments.push_back({entry->id, entry->title, entry->method, {}, {}, {}, {}, {}});
+}
 
+/// An experiment that ends early is a claim that fails.
+ProofClaim failure(const Experiment& e, const std::string& what) {
+  ProofClaim claim;
+  claim.id = e.id + ".run";
+  claim.claim = "the experiment runs to its end";
+  claim.claimed = what;
+  return claim;
+}
+
+/// Runs the experiments on all processors. results: one for each.
+void run_all(const std::vector<const Experiment*>& chosen, ProofLab& lab, std::vector<ProofExperiment>& results) {
   std::atomic<std::size_t> next = 0;
   std::exception_ptr bad_input;
-  std::mutex refusing;
-  const auto work_on = [&] {
+  std::mutex mutex;
+  const auto work = [&] {
     for (std::size_t k = next++; k < chosen.size(); k = next++) {
+      const Experiment& e = *chosen[k];
       try {
-        chosen[k]->run(lab, result.experiments[k]);
+        e.procedure->run(lab, results[k]);
+        results[k].notes.insert(results[k].notes.end(), e.notes.begin(), e.notes.end());
       } catch (const files::BadInput&) {
-        const std::lock_guard lock(refusing);
+        const std::lock_guard lock(mutex);
         if (!bad_input) bad_input = std::current_exception();
       } catch (const std::exception& error) {
-        result.experiments[k].claims.push_back({fmt::format("{}.run", chosen[k]->id),
-                                                "the experiment runs to its end",
-                                                error.what(),
-                                                "",
-                                                "",
-                                                {},
-                                                {},
-                                                {},
-                                                false});
+        results[k].claims.push_back(failure(e, error.what()));
       }
     }
   };
+  const std::size_t threads = std::min<std::size_t>(std::max(1U, std::thread::hardware_concurrency()), chosen.size());
   std::vector<std::thread> others;
-  for (std::size_t n = 1; n < std::min<std::size_t>(std::max(1U, std::thread::hardware_concurrency()), chosen.size());
-       ++n)
-    others.emplace_back(work_on);
-  work_on();
+  for (std::size_t n = 1; n < threads; ++n) others.emplace_back(work);
+  work();
   for (std::thread& other : others) other.join();
   if (bad_input) std::rethrow_exception(bad_input);
+}
+
+}  // namespace
+
+ProofResult prove(const std::string& folder, const std::string& only, const workflow::Progress& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<const Experiment*> chosen;
+  double work = 1;
+  for (const Experiment& e : experiments()) {
+    if (!only.empty() && only != e.id) continue;
+    chosen.push_back(&e);
+    work += e.rows;
+  }
+  ProofLab lab(folder, work, progress);
+  require_recordings(lab, chosen);
+  ProofResult result;
+  for (const Experiment* e : chosen) result.experiments.push_back({e->id, e->title, e->method, {}, {}, {}, {}, {}});
+  run_all(chosen, lab, result.experiments);
   result.diagnoses = lab.diagnoses();
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (progress) progress(1, "done");

@@ -1,9 +1,8 @@
-// bms proof: what the diagnosis claims of real recordings, each confirmed or refuted by a measurement that it did not
-// see.
+// bms proof: compares the diagnosis of real recordings with measurements that it did not use.
 //
-// Every experiment conceals physics from a cell file, or puts a fault into a recording, lets the diagnosis say what is
-// missing, and measures the same elsewhere. How far both may differ stands beside each claim and was fixed before. What
-// fails stands as failing.
+// Each experiment (proof/experiments/*.toml) conceals physics from a cell file or adds a fault to a recording,
+// diagnoses it, and measures the same quantity independently. The tolerance of each claim was fixed beforehand and is
+// printed next to it. Claims that fail are reported as failing.
 #pragma once
 
 #include <functional>
@@ -15,40 +14,41 @@
 
 namespace bms::proof {
 
-/// A number that the tool gave, and the same number measured by other means.
+/// A number of the diagnosis, and the same number measured independently.
 struct ProofNumber {
-  std::optional<double> claimed;  ///< nothing: the tool gave none
+  std::optional<double> claimed;  ///< nothing: the diagnosis gave none
   double claimed_sigma = 0;
   double measured = 0, measured_sigma = 0;
   double allowed = 0;  ///< largest difference for the claim to hold
   std::string unit;
 };
 
-/// Error of the cell file and of the extended one on a recording that was not used.
+/// RMS error [V] of the cell file and of the extended one on a recording that the diagnosis did not use.
 struct ProofErrors {
   double before_v = 0, after_v = 0;
-  double allowed = 0.5;  ///< after over before, for the claim to hold
+  double allowed = 0.5;  ///< largest after / before for the claim to hold
 };
 
 struct ProofClaim {
   std::string id;         ///< "hysteresis.udds_P25_A002.half_gap"
   std::string claim;      ///< what is to be shown
-  std::string claimed;    ///< by the tool, with its uncertainty
-  std::string measured;   ///< independently
-  std::string tolerance;  ///< when it holds
+  std::string claimed;    ///< by the diagnosis, with its uncertainty
+  std::string measured;   ///< independently, and how
+  std::string tolerance;  ///< the condition for the claim to hold
   std::optional<ProofNumber> number;
   std::optional<ProofErrors> errors;
-  std::optional<bool> within_uncertainty;  ///< two deviations of tool and measurement; nothing: no number with one
+  std::optional<bool> within_uncertainty;  ///< within two standard deviations of diagnosis and measurement together;
+                                           ///< nothing: no number with a standard deviation
   bool holds = false;
 
-  /// "holds", "holds, but too sure of itself", "fails".
+  /// "holds", "holds, but its uncertainty is too small", "fails".
   std::string verdict() const;
 };
 
 struct ProofLines {
   std::string title;
-  std::vector<std::string> labels;  ///< of the columns after x
-  std::vector<double> x;            ///< hours, or seconds since the start of a rest
+  std::vector<std::string> labels;  ///< one for each column
+  std::vector<double> x;            ///< time in x_unit
   std::string x_unit;
   std::vector<std::vector<double>> columns;
 };
@@ -62,22 +62,22 @@ struct ProofBars {
   std::vector<Row> rows;
 };
 
-/// Measured points, and what was predicted of them.
+/// Measured points, and predictions of them.
 struct ProofPoints {
   struct Point {
     double x = 0, y = 0, sigma = 0;
   };
   struct Curve {
     std::string name;
-    std::vector<Point> points;  ///< sigma: of the prediction
+    std::vector<Point> points;  ///< sigma: standard deviation of the prediction
   };
   std::string title, x_title, y_title;
   std::vector<Point> measured;
   std::vector<Curve> predicted;
-  std::vector<std::string> names = {};  ///< of x = 1, 2, ...; empty: x is a number
+  std::vector<std::string> names = {};  ///< names of x = 1, 2, ...; empty: x is a number
 };
 
-/// One line of the list: what is done, and what came of it.
+/// An experiment with its results.
 struct ProofExperiment {
   std::string id, title, method;
   std::vector<ProofClaim> claims;
@@ -86,10 +86,10 @@ struct ProofExperiment {
   std::vector<ProofPoints> points;
   std::vector<std::string> notes;
 
-  std::size_t holding() const;
+  std::size_t holding() const;  ///< number of claims that hold
 };
 
-/// A diagnosis that claims rest on.
+/// A diagnosis that claims are based on.
 struct ProofDiagnosis {
   std::string name;  ///< "cell: recordings"
   std::string verdict, statement;
@@ -106,10 +106,11 @@ struct ProofResult {
   std::size_t holding() const;
 };
 
-/// Names of the experiments, in order.
+/// Ids of the experiments, in order.
 std::vector<std::string> proof_names();
 
-/// only: one experiment's name, or empty for all. Throws BadInput when a recording that is needed is not in the folder.
+/// Runs the experiments, as many at once as there are processors. folder: the recordings; only: the id of one
+/// experiment, or empty for all. Throws BadInput if a recording is missing in the folder.
 ProofResult prove(const std::string& folder, const std::string& only, const workflow::Progress& progress);
 
 }  // namespace bms::proof

@@ -9,29 +9,51 @@
 
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
-#include "images/child_process.hpp"
-#include "tool/command_identify.hpp"
+#include "files/recording.hpp"
+#include "identification/identify.hpp"
 #include "workflow/diagnosis_comparison.hpp"
+#include "workflow/identification_data.hpp"
+#include "workflow/identified_cell.hpp"
 
 namespace bms::proof {
 
 namespace {
 
+namespace id = identification;
 using model::catalogue;
 
-workflow::RecordingComparison begun(const files::Recording& r, const files::CellFile& cell) {
+constexpr double ocv_error_v = 0.002;  ///< largest error of the OCV's straight pieces
+constexpr workflow::SocWindow identified_window{.high = 0.95, .low = 0.15};
+constexpr double smallest_initial_soc_sigma = 1e-4;
+
+/// A recording that starts from its reference state of charge.
+workflow::RecordingComparison prepared(const measurement::Recording& r, const files::CellFile& cell) {
   if (r.soc_ref.empty() || !std::isfinite(r.soc_ref.front()))
     throw files::BadInput(r.path, 1, "no soc_ref at the start, expected the reference state of charge");
   return {r,
           workflow::record_of(r, std::filesystem::path(r.path).stem().string(), cell.parameters, r.soc_ref.front(),
-                              std::max(cell.parameters.tolerance.initial_soc, 1e-4), true),
+                              std::max(cell.parameters.tolerance.initial_soc, smallest_initial_soc_sigma), true),
           {},
           {}};
 }
 
+/// "ocv_hysteresis: half_gap_v 18.4 +- 0.4 mV; or slow_polarisation".
+std::string text_of(const diagnosis::Finding& f) {
+  const model::MechanismInfo& info = catalogue[f.setting.index];
+  std::string text(info.id);
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    const model::Parameter& p = info.parameter[k];
+    text += fmt::format("{} {} {}", k == 0 ? ":" : ",", p.name,
+                        diagnosis::parameter_text(p, f.setting.value[k], f.setting.deviation[k]));
+  }
+  for (std::size_t k = 0; k < f.equivalent_to.size(); ++k)
+    text += (k == 0 ? "; or " : ", ") + std::string(catalogue[f.equivalent_to[k]].id);
+  return text;
+}
+
 }  // namespace
 
-const files::Recording& ProofLab::recording(const std::string& name) {
+const measurement::Recording& ProofLab::recording(const std::string& name) {
   return recordings_.get(name, [&] { return files::read_recording(path(name)); });
 }
 
@@ -39,37 +61,54 @@ const files::CellFile& ProofLab::built_in(const std::string& name) {
   return cells_.get(name, [&] { return files::read_cell(name); });
 }
 
-const files::CellFile& ProofLab::identified(const std::string& name, const std::vector<std::string>& ocv,
-                                            const std::string& recording) {
-  return cells_.get(name, [&] {
-    report_progress(0, "identifying " + name);
-    const images::TemporaryFolder folder;
-    tool::IdentifyOptions options;
-    for (const std::string& slow : ocv) options.ocv.push_back(path(slow));
-    options.recordings = {path(recording)};
-    options.start = "a123_26650";
-    options.window = "0.95:0.15";
-    options.name = name;
-    options.out = (folder.path() / "cell.toml").string();
-    options.output.quiet = true;
-    tool::run(options);
-    return files::read_cell(options.out);
+const files::CellFile& ProofLab::identified(const IdentifiedCell& cell) {
+  return cells_.get(cell.name, [&] {
+    report_progress(0, "identifying " + cell.name);
+    return identify(cell);
   });
+}
+
+files::CellFile ProofLab::identify(const IdentifiedCell& wanted) {
+  files::CellFile cell = files::read_cell("a123_26650");
+  const double start_capacity_ah = cell.parameters.capacity_ah;
+  std::vector<std::string> slow_runs;
+  for (const std::string& name : wanted.ocv) slow_runs.push_back(path(name));
+  workflow::identify_ocv(slow_runs, ocv_error_v, false, cell);
+
+  const measurement::Recording drive = recording(wanted.drive);
+  const workflow::IdentificationData data =
+      workflow::identification_data(drive, {{}, identified_window, cell.parameters});
+  id::GreyBoxOptions options;
+  options.soc_nodes = id::nodes_for(data.soc_min, data.soc_max);
+  options.bounds = workflow::circuit_bounds(cell.parameters.capacity_ah);
+  options.estimate_ocv_branch = cell.parameters.ocv.half_gap_v.size > 0;
+  options.voltage_sigma_v = cell.parameters.noise.voltage_v;
+  const id::Identification found =
+      id::identify_grey_box(id::started_from_rests(cell.parameters, data.record.data, options.bounds), {data.record},
+                            options, id::Method::trust_region_reflective);
+
+  cell.name = wanted.name;
+  cell.parameters = found.cell;
+  workflow::identify_noise({drive}, found.estimation, found.parameters, cell.parameters);
+  cell.parameters.noise.current_offset_a *= cell.parameters.capacity_ah / start_capacity_ah;
+  cell.parameters.noise.current_unknown_a *= cell.parameters.capacity_ah / start_capacity_ah;
+  workflow::round_digits(cell);
+  return files::parse_cell(files::cell_text(cell), wanted.name);
 }
 
 const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
                                                     const std::vector<std::string>& names) {
-  std::string together;
-  std::vector<files::Recording> list;
+  std::string all_names;
+  std::vector<measurement::Recording> list;
   for (const std::string& name : names) {
-    together += (together.empty() ? "" : " + ") + name;
+    all_names += (all_names.empty() ? "" : " + ") + name;
     list.push_back(recording(name));
   }
-  return diagnosed(cell, together, list);
+  return diagnosed(cell, all_names, list);
 }
 
 const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell, const std::string& name,
-                                                    const std::vector<files::Recording>& list) {
+                                                    const std::vector<measurement::Recording>& list) {
   const std::string key = cell.name + ": " + name;
   return *diagnoses_.get(key, [&] {
     const auto begin = std::chrono::steady_clock::now();
@@ -77,25 +116,25 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
     r->cell = cell;
     std::vector<diagnosis::PreparedRecording> records;
     double rows = 0;
-    for (const files::Recording& recording : list) {
-      r->recordings.push_back(begun(recording, cell));
+    for (const measurement::Recording& recording : list) {
+      r->recordings.push_back(prepared(recording, cell));
       records.push_back(r->recordings.back().record);
       rows += static_cast<double>(recording.rows());
     }
-    diagnosis::Options how;
+    diagnosis::Options options;
     double reported = 0;
-    how.progress = [&](double done, const std::string&) {
+    options.progress = [&](double done, const std::string&) {
       report_progress(rows * std::max(0.0, done - reported), key);
       reported = std::max(reported, done);
     };
-    r->diagnosis = diagnosis::diagnose(cell.parameters, cell.mechanisms, records, how);
+    r->diagnosis = diagnosis::diagnose(cell.parameters, cell.mechanisms, records, options);
     report_progress(rows * (1 - reported), key);
     diagnosis::describe(r->diagnosis, cell.parameters, records);
     workflow::compare(*r);
     r->baseline = workflow::figures(r->recordings, &workflow::RecordingComparison::base_v);
     r->extended = workflow::figures(r->recordings, &workflow::RecordingComparison::extended_v);
     r->extended_cell = workflow::extended_cell(*r);
-    r->extended_cell.name = key + " (extended)";  // names diagnoses made with it
+    r->extended_cell.name = key + " (extended)";  // part of the names of the diagnoses made with it
     r->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return r;
   });
@@ -107,7 +146,7 @@ workflow::RecordingComparison ProofLab::scored(const workflow::DiagnoseResult& o
   one.cell = of.cell;
   one.diagnosis = of.diagnosis;
   if (instead != nullptr) one.diagnosis.extended = *instead;
-  one.holdouts.push_back(begun(recording(name), of.cell));
+  one.holdouts.push_back(prepared(recording(name), of.cell));
   workflow::compare(one);
   return one.holdouts.front();
 }
@@ -119,23 +158,13 @@ std::vector<ProofDiagnosis> ProofLab::diagnoses() const {
     try {
       r = value.get().get();
     } catch (const std::exception&) {
-      continue;  // the experiment has said so
+      continue;  // the experiment reports it
     }
     ProofDiagnosis d{name, name_of(r->diagnosis.verdict), r->diagnosis.statement, {}, 0, 0, r->wall_s};
     if (r->baseline) d.before_v = r->baseline->rmse_v;
     if (r->extended) d.after_v = r->extended->rmse_v;
-    for (const diagnosis::Finding& f : r->diagnosis.findings) {
-      if (!r->named()) break;
-      const model::MechanismInfo& info = catalogue[f.setting.index];
-      std::string text(info.id);
-      for (std::size_t k = 0; k < info.parameters; ++k) {
-        const model::Parameter& p = info.parameter[k];
-        text += fmt::format("{} {} {}", k == 0 ? ":" : ",", p.name,
-                            diagnosis::parameter_text(p, f.setting.value[k], f.setting.deviation[k]));
-      }
-      for (std::size_t k = 0; k < f.equivalent_to.size(); ++k)
-        text += (k == 0 ? "; or " : ", ") + std::string(catalogue[f.equivalent_to[k]].id);
-      d.found.push_back(text);
+    if (r->named()) {
+      for (const diagnosis::Finding& f : r->diagnosis.findings) d.found.push_back(text_of(f));
     }
     list.push_back(std::move(d));
   }

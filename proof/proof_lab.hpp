@@ -1,5 +1,5 @@
-// What the experiments of bms proof share: recordings, identified cells and diagnoses, each made once however many ask
-// for it.
+// What the experiments of bms proof share: recordings, identified cells and diagnoses. Each is made once, however many
+// experiments need it.
 #pragma once
 
 #include <atomic>
@@ -11,13 +11,14 @@
 #include <string>
 #include <vector>
 
-#include "files/recording.hpp"
+#include "measurement/recording.hpp"
 #include "proof/proof.hpp"
 #include "workflow/diagnosis_result.hpp"
 
 namespace bms::proof {
 
-/// Values by name, made by who asks first; who asks meanwhile waits. A failure is thrown to everybody.
+/// Values by name. The first caller makes the value; callers that come meanwhile wait for it. A failure is thrown to
+/// all of them.
 template <class Value>
 class LazyMap {
  public:
@@ -40,7 +41,7 @@ class LazyMap {
     }
     return value.get();
   }
-  /// Once nobody asks any more.
+  /// To be called when no thread uses get() any more.
   const std::map<std::string, std::shared_future<Value>>& all() const { return values_; }
 
  private:
@@ -48,36 +49,44 @@ class LazyMap {
   std::map<std::string, std::shared_future<Value>> values_;
 };
 
+/// A cell file that an experiment identifies: OCV from slow runs, R0, R1, C1 from a drive recording.
+struct IdentifiedCell {
+  std::string name;
+  std::vector<std::string> ocv;  ///< slow charge and discharge
+  std::string drive;
+};
+
+/// Recordings are named by folder and file, "a123_26650/udds_P25_A002". All functions but diagnoses() may be called
+/// from several threads. Throws BadInput if a recording cannot be used.
 class ProofLab {
  public:
-  /// work: of all that will be asked, in rows to diagnose.
+  /// work: all rows that will be diagnosed, for the progress.
   ProofLab(std::string folder, double work, workflow::Progress progress)
       : folder_(std::move(folder)), work_(work), progress_(std::move(progress)) {}
 
-  /// name: "a123_26650/udds_P25_A002".
   std::string path(const std::string& name) const { return folder_ + "/" + name + ".csv"; }
-  const files::Recording& recording(const std::string& name);
+  const measurement::Recording& recording(const std::string& name);
 
   const files::CellFile& built_in(const std::string& name);
   /// As `bms identify --ocv ... --recording ... --start a123_26650 --window 0.95:0.15` makes it.
-  const files::CellFile& identified(const std::string& name, const std::vector<std::string>& ocv,
-                                    const std::string& recording);
+  const files::CellFile& identified(const IdentifiedCell& cell);
 
-  /// Start: soc_ref's first value, believed to the cell file's tolerance. Hold-outs: scored().
+  /// Diagnoses recordings. They start from the first value of soc_ref, with the tolerance of the cell file.
   const workflow::DiagnoseResult& diagnosed(const files::CellFile& cell, const std::vector<std::string>& recordings);
-  /// The same of recordings that were changed; `name` tells them apart.
+  /// The same for recordings that were changed; `name` identifies them.
   const workflow::DiagnoseResult& diagnosed(const files::CellFile& cell, const std::string& name,
-                                            const std::vector<files::Recording>& recordings);
+                                            const std::vector<measurement::Recording>& recordings);
 
-  /// What cell file and extended cell say of a recording that the diagnosis did not use.
-  /// instead: of what was found.
+  /// Voltages of the cell file and of the extended cell for a recording that the diagnosis did not use. instead: an
+  /// extended cell other than the diagnosed one.
   workflow::RecordingComparison scored(const workflow::DiagnoseResult& diagnosis, const std::string& recording,
                                        const diagnosis::Hypothesis* instead = nullptr);
 
-  /// All diagnoses, by name; once nobody works any more.
+  /// All diagnoses, by name. To be called when all experiments have ended.
   std::vector<ProofDiagnosis> diagnoses() const;
 
  private:
+  files::CellFile identify(const IdentifiedCell& cell);
   void report_progress(double rows, const std::string& what);
 
   std::string folder_;
@@ -85,18 +94,9 @@ class ProofLab {
   workflow::Progress progress_;
   std::mutex progress_mutex_;
   double done_ = 0;
-  LazyMap<files::Recording> recordings_;
+  LazyMap<measurement::Recording> recordings_;
   LazyMap<files::CellFile> cells_;
   LazyMap<std::shared_ptr<workflow::DiagnoseResult>> diagnoses_;
 };
-
-/// The list of bms proof: one line, one experiment.
-struct ProofEntry {
-  const char *id, *title, *method;
-  void (*run)(ProofLab& lab, ProofExperiment& into);
-  std::vector<std::string> recordings;  ///< that it needs
-  double rows;  ///< to be diagnosed for it, beyond those of the entries before; for the time left
-};
-const std::vector<ProofEntry>& proof_list();
 
 }  // namespace bms::proof

@@ -331,7 +331,7 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
                  {"named", r.named()},
                  {"subtitle", fmt::format("{} ({:.1f} h) against the cell file of {}", files, hours, r.cell.name)}};
   report["warnings"] = json::array();
-  for (const files::Warning& w : r.warnings) report["warnings"].push_back(without_folder(w.text, r));
+  for (const measurement::Warning& w : r.warnings) report["warnings"].push_back(without_folder(w.text, r));
   report["faults"] = json::array();
   for (const diagnosis::DataFault& f : d.faults) report["faults"].push_back(f.text);
   report["strips"] = strips(r);

@@ -17,7 +17,7 @@ std::string identify_report(const IdentifyResult& r, const std::vector<id::Data>
       {},
       {},
       {}};
-  for (const files::Warning& w : r.warnings) content.warnings.push_back(w.text);
+  for (const measurement::Warning& w : r.warnings) content.warnings.push_back(w.text);
   const auto cell = [](const std::string& text) { return files::PageCell{text, {}, {}}; };
   files::PageTable parameters{"parameters",
                               "Parameters",

@@ -14,9 +14,9 @@ using Json = nlohmann::ordered_json;
 
 Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
-Json warnings_of(const std::vector<files::Warning>& warnings) {
+Json warnings_of(const std::vector<measurement::Warning>& warnings) {
   Json list = Json::array();
-  for (const files::Warning& w : warnings) list.push_back(w.id + ": " + w.text);
+  for (const measurement::Warning& w : warnings) list.push_back(w.id + ": " + w.text);
   return list;
 }
 
@@ -183,7 +183,7 @@ std::string json_of(const study::StudyResult& r) {
   }
   json["claims"] = Json::array();
   for (const study::StudyClaim& c : r.claims)
-    json["claims"].push_back({{"claim", c.claim}, {"holds", c.holds}, {"evidence", c.evidence}});
+    json["claims"].push_back({{"claim", c.claim}, {"holds", c.holds}, {"evidence", c.result}});
   json["identifications"] = r.fits;
   json["wall_s"] = r.seconds;
   json["warnings"] = warnings_of(r.warnings);

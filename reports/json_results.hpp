@@ -21,7 +21,7 @@ struct SimulateResult {
   std::size_t samples = 0;
   double duration_s = 0, initial_soc = 0, final_soc = 0, final_voltage_v = 0;
   double steps_per_second = 0;
-  std::vector<files::Warning> warnings;
+  std::vector<measurement::Warning> warnings;
 };
 std::string json_of(const SimulateResult& result);
 
@@ -39,7 +39,7 @@ struct IdentifyResult {
   std::vector<std::pair<std::string, identification::FitStatistics>> validations;  ///< of all
   std::optional<double> coulombic_efficiency;
   double wall_s = 0;
-  std::vector<files::Warning> warnings;
+  std::vector<measurement::Warning> warnings;
 };
 std::string json_of(const IdentifyResult& result);
 

@@ -13,7 +13,7 @@
 
 namespace bms::reports {
 
-std::vector<std::size_t> shown_rows(const files::Recording& r, std::size_t most) {
+std::vector<std::size_t> shown_rows(const measurement::Recording& r, std::size_t most) {
   std::vector<std::size_t> shown;
   const std::size_t stretch = 6 * r.rows() / most;
   for (std::size_t from = 0; from < r.rows(); from += std::max<std::size_t>(1, stretch)) {
@@ -97,12 +97,12 @@ json figures(const host_sim::ReplayResult& r) {
 std::string data(const host_sim::ReplayResult& r) {
   const auto rows = shown_rows(r.recording);
   const auto& e = r.track.rows;
-  const files::Recording& rec = r.recording;
+  const measurement::Recording& rec = r.recording;
   json page = {{"title", "State of charge over " + file_name(r)},
                {"statement", statement(r)},
                {"warnings", json::array()},
                {"figures", figures(r)}};
-  for (const files::Warning& w : rec.warnings) page["warnings"].push_back(w.text);
+  for (const measurement::Warning& w : rec.warnings) page["warnings"].push_back(w.text);
   json& columns = page["columns"];
   const auto add = [&](const char* name, int decimals, const Value& value) {
     columns[name] = column(rows, decimals, value);

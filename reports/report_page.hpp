@@ -24,7 +24,7 @@ std::string in_script(std::string json);
 
 /// Rows to show: all, or of each stretch its first and last and where voltage and current are lowest and highest, so
 /// that no peak is lost. More than `most` are thinned: a screen has a few thousand columns.
-std::vector<std::size_t> shown_rows(const files::Recording& recording, std::size_t most = 40'000);
+std::vector<std::size_t> shown_rows(const measurement::Recording& recording, std::size_t most = 40'000);
 
 /// One sentence for a person: where the state of charge ended, and how far it can be trusted.
 std::string statement(const host_sim::ReplayResult& result);

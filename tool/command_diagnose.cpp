@@ -14,6 +14,7 @@
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 #include "host_sim/replay.hpp"
+#include "measurement/recording_checks.hpp"
 #include "reports/diagnosis_page.hpp"
 #include "reports/json_results.hpp"
 #include "workflow/diagnosis_comparison.hpp"
@@ -41,49 +42,50 @@ Start told_start(const files::CellFile& cell, double soc, const std::string& fro
   return {soc, std::max(cell.parameters.tolerance.initial_soc, 1e-4), true, from};
 }
 
-std::optional<Start> reference_start(const files::Recording& r, const files::CellFile& cell) {
+std::optional<Start> reference_start(const measurement::Recording& r, const files::CellFile& cell) {
   if (r.soc_ref.empty() || !(r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1)) return std::nullopt;
   return told_start(cell, r.soc_ref.front(),
                     fmt::format("starts at soc_ref's first value, {:.1f} %", 100 * r.soc_ref.front()));
 }
 
 /// As the estimator reads it: the OCV curve asked with what the present current leaves open.
-Start voltage_start(const files::Recording& r, const files::CellFile& cell) {
+Start voltage_start(const measurement::Recording& r, const files::CellFile& cell) {
   const auto first = std::find_if(r.voltage_v.begin(), r.voltage_v.end(), [](double v) { return std::isfinite(v); });
   if (first == r.voltage_v.end()) return {};
-  files::Recording one;
+  measurement::Recording one;
   const auto k = static_cast<std::size_t>(first - r.voltage_v.begin());
   one.time_s = {0};
   one.current_a = {r.current_a[k]};
   one.voltage_v = {r.voltage_v[k]};
   if (!r.temperature_c.empty()) one.temperature_c = {r.temperature_c[k]};
   const host_sim::EstimateRow row =
-      host_sim::run_on_host(cell, files::samples(one), std::nullopt, host_sim::ScalarKind::float64).rows.front();
+      host_sim::run_on_host(cell, measurement::samples(one), std::nullopt, host_sim::ScalarKind::float64).rows.front();
   return {row.soc, row.soc_sigma, false,
           fmt::format("starts where the first voltage says, {:.0f} % give or take {:.0f} %", 100 * row.soc,
                       100 * row.soc_sigma)};
 }
 
-Start start_of(const files::Recording& r, const files::CellFile& cell, const std::optional<double>& given) {
+Start start_of(const measurement::Recording& r, const files::CellFile& cell, const std::optional<double>& given) {
   if (given) return told_start(cell, *given, "");
   if (const auto start = reference_start(r, cell)) return *start;
   return voltage_start(r, cell);
 }
 
 /// A later recording's own reference goes before what was said of the first.
-Start start_of_holdout(const files::Recording& r, const files::CellFile& cell, const std::optional<double>& given) {
+Start start_of_holdout(const measurement::Recording& r, const files::CellFile& cell,
+                       const std::optional<double>& given) {
   if (const auto start = reference_start(r, cell)) return *start;
   return start_of(r, cell, given);
 }
 
 workflow::RecordingComparison opened(const std::string& path, const files::CellFile& cell,
                                      const std::optional<double>& given,
-                                     Start (*rule)(const files::Recording&, const files::CellFile&,
+                                     Start (*rule)(const measurement::Recording&, const files::CellFile&,
                                                    const std::optional<double>&),
-                                     std::vector<files::Warning>& warnings) {
+                                     std::vector<measurement::Warning>& warnings) {
   workflow::RecordingComparison c{files::read_recording(path), {}, {}, {}};
-  files::compare_with_cell(c.recording, cell.parameters);
-  for (const files::Warning& w : c.recording.warnings) warnings.push_back({w.id, path + ": " + w.text});
+  measurement::compare_with_cell(c.recording, cell.parameters);
+  for (const measurement::Warning& w : c.recording.warnings) warnings.push_back({w.id, path + ": " + w.text});
   const Start start = rule(c.recording, cell, given);
   if (!start.from.empty()) warnings.push_back({"initial_soc", path + ": " + start.from});
   c.record =
@@ -184,7 +186,7 @@ int run(const DiagnoseOptions& options) {
                                   100 * result.soc->extended_rmse, 100 * result.soc->baseline_rmse)});
   }
 
-  for (const files::Warning& w : result.warnings) warn(w.text);
+  for (const measurement::Warning& w : result.warnings) warn(w.text);
   if (!options.out.empty()) write_output(options.out, files::cell_text(result.extended_cell));
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));

@@ -60,7 +60,7 @@ int run(const FlashOptions& o) {
     return 0;
   }
   const images::FlashFailure failure = images::failure_in(files::read_file(log), probe);
-  if (failure.nothing_to_talk_to) throw files::BadInput(o.board, 1, failure.what);
+  if (failure.no_probe) throw files::BadInput(o.board, 1, failure.what);
   fmt::print(stderr, "bms: {}: {}; OpenOCD's log is {}\n", o.board, failure.what, log);
   return 1;
 }

@@ -7,8 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "hil/session.hpp"
 #include "images/firmware_image.hpp"
+#include "measurement/recording_checks.hpp"
 #include "monitor/candump_line.hpp"
 #include "reports/report_page.hpp"
 
@@ -31,7 +33,7 @@ std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, con
                                  {"after_s", x.after_s ? Json(*x.after_s) : Json()},
                                  {"in_time", x.in_time}});
   }
-  for (const files::Warning& w : plan.profile.warnings) warnings.push_back(w.id + ": " + w.text);
+  for (const measurement::Warning& w : plan.profile.warnings) warnings.push_back(w.id + ": " + w.text);
   return Json{{"command", "hil"},
               {"board", options.board},
               {"cell", plan.cell.name},
@@ -93,7 +95,7 @@ std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, c
     volts.columns[1].push_back(p.highest_v);
   }
   files::PageContent page{"In the loop: " + options.board, statement, {}, {}, {soc, current, volts}};
-  for (const files::Warning& w : plan.profile.warnings) page.warnings.push_back(w.text);
+  for (const measurement::Warning& w : plan.profile.warnings) page.warnings.push_back(w.text);
   if (!faults.rows.empty()) page.tables.push_back(faults);
   if (!injection_results.rows.empty()) page.tables.push_back(injection_results);
   return reports::page_of(page);
@@ -132,8 +134,8 @@ int run(const HilOptions& options) {
   const std::string& input = plan.replayed ? options.recording : options.profile;
   plan.profile =
       files::read_recording(input, plan.replayed ? files::VoltageColumn::required : files::VoltageColumn::optional);
-  files::compare_with_cell(plan.profile, plan.cell.parameters);
-  for (const files::Warning& w : plan.profile.warnings) warn(input + ": " + w.text);
+  measurement::compare_with_cell(plan.profile, plan.cell.parameters);
+  for (const measurement::Warning& w : plan.profile.warnings) warn(input + ": " + w.text);
   plan.cells = images::board_cells(options.board);
   plan.initial_soc = options.initial_soc;
   plan.announced_soc = options.announced_soc;

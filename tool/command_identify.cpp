@@ -15,6 +15,7 @@
 #include "identification/identify.hpp"
 #include "identification/linear_models.hpp"
 #include "identification/prefilter.hpp"
+#include "measurement/recording_checks.hpp"
 #include "reports/identify_page.hpp"
 #include "reports/json_results.hpp"
 #include "workflow/identification_data.hpp"
@@ -69,7 +70,7 @@ workflow::SocWindow validation_window(const IdentifyOptions& options) {
 /// recordings: the first that was identified from, then those that validate.
 void finish(const IdentifyOptions& options, const std::vector<id::Data>& recordings,
             std::chrono::steady_clock::time_point begin, reports::IdentifyResult& result) {
-  for (const files::Warning& w : result.warnings) warn(w.text);
+  for (const measurement::Warning& w : result.warnings) warn(w.text);
   result.out = options.out;
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
@@ -94,7 +95,8 @@ struct Group {
   std::vector<id::DataSet> records;
 };
 
-std::vector<Group> grouped(const std::vector<files::Recording>& recordings, const std::vector<id::DataSet>& records) {
+std::vector<Group> grouped(const std::vector<measurement::Recording>& recordings,
+                           const std::vector<id::DataSet>& records) {
   std::vector<Group> groups;
   for (const workflow::TemperatureGroup& like : workflow::group_by_temperature(recordings)) {
     Group& group = groups.emplace_back(Group{like.temperature_c, {}});
@@ -205,15 +207,15 @@ int run(const IdentifyOptions& options) {
 
   workflow::DataOptions data{workflow::initial_soc_of(options.initial_soc),
                              workflow::window_of("--window", options.window), cell.parameters};
-  std::vector<files::Recording> recordings;
+  std::vector<measurement::Recording> recordings;
   std::vector<id::DataSet> records;
   std::vector<workflow::IdentificationData> measured;
   double soc_min = 1, soc_max = 0;
   for (const std::string& path : options.recordings) {
     recordings.push_back(files::read_recording(path));
-    files::Recording& r = recordings.back();
-    files::compare_with_cell(r, cell.parameters);
-    for (const files::Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
+    measurement::Recording& r = recordings.back();
+    measurement::compare_with_cell(r, cell.parameters);
+    for (const measurement::Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
     workflow::IdentificationData d = workflow::identification_data(r, data);
     filter(options, path, d.record.data);
     records.push_back(has_hysteresis ? workflow::without_mechanisms(cell, d) : d.record);

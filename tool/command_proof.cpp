@@ -54,7 +54,7 @@ int run(const ProofOptions& options) {
     if (!std::filesystem::is_directory(path, error))
       throw files::BadInput(path.string(), 1,
                             "no folder, expected one with the recordings a123_26650 and a123_esctoolbox "
-                            "(host_sim/README.md names their source)");
+                            "(proof/README.md names their source)");
   }
   const proof::ProofResult result = proof::prove(options.data, options.only, progress_on_terminal(0.2, proof_progress));
   if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));

@@ -5,11 +5,13 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "files/text_file.hpp"
 #include "host_sim/can_log.hpp"
 #include "host_sim/simulation.hpp"
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
+#include "measurement/recording_checks.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 
@@ -79,13 +81,13 @@ int run(const ReplayOptions& options) {
   std::optional<host_sim::CanLog> log;
   if (host_sim::is_can_log(options.recording)) log = host_sim::read_can_log(options.recording);
   result.recording = log ? log->recording : files::read_recording(options.recording);
-  files::compare_with_cell(result.recording, result.cell.parameters);
+  measurement::compare_with_cell(result.recording, result.cell.parameters);
   if (const std::string ids = not_estimated(result.cell); !ids.empty()) {
     result.recording.warnings.push_back(
         {"not_in_estimator",
          ids + ": in the cell file, but the estimator does without (it sees no readings to come and no bursts)"});
   }
-  for (const files::Warning& warning : result.recording.warnings) warn(options.recording + ": " + warning.text);
+  for (const measurement::Warning& warning : result.recording.warnings) warn(options.recording + ": " + warning.text);
 
   if (log && log->cell_hash && *log->cell_hash != result.cell.hash) {
     result.recording.warnings.push_back(
@@ -93,7 +95,7 @@ int run(const ReplayOptions& options) {
                                         *log->cell_hash, result.cell.hash)});
     warn(options.recording + ": " + result.recording.warnings.back().text);
   }
-  const auto samples = log ? log->samples : bms::files::samples(result.recording);
+  const auto samples = log ? log->samples : bms::measurement::samples(result.recording);
   if (options.initial_soc) {
     result.prior = host_sim::SocPrior{*options.initial_soc, options.initial_soc_sigma};
     result.initial_soc = *options.initial_soc;

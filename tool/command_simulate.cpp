@@ -12,6 +12,7 @@
 #include "files/recording.hpp"
 #include "host_sim/gaussian_noise.hpp"
 #include "host_sim/simulation.hpp"
+#include "measurement/recording_checks.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 
@@ -19,7 +20,7 @@ namespace bms::tool {
 
 namespace {
 
-std::string csv_of(const files::Recording& r, const std::vector<host_sim::SimulatedRow>& rows,
+std::string csv_of(const measurement::Recording& r, const std::vector<host_sim::SimulatedRow>& rows,
                    const SimulateOptions& options) {
   host_sim::GaussianNoise noise(options.seed);
   const bool temperature = !r.temperature_c.empty();  // what mechanisms followed goes along: a replay needs it
@@ -91,18 +92,23 @@ int run(const SimulateOptions& options) {
   files::CellFile cell_file = files::read_cell(options.cell);
   for (const std::string& mechanism : options.with)
     files::put_mechanism(cell_file, mechanism_of(mechanism, cell_file.parameters.capacity_ah));
-  files::Recording recording = files::read_recording(
+  measurement::Recording recording = files::read_recording(
       input, options.recording.empty() ? files::VoltageColumn::optional : files::VoltageColumn::required);
-  files::compare_with_cell(recording, cell_file.parameters);
+  measurement::compare_with_cell(recording, cell_file.parameters);
   if (bursts_unknown(cell_file))
     recording.warnings.push_back(
         {"bursts_unknown", "contact_intermittent does not act: when its bursts are is not in a cell file"});
-  for (const files::Warning& warning : recording.warnings) warn(input + ": " + warning.text);
+  for (const measurement::Warning& warning : recording.warnings) warn(input + ": " + warning.text);
 
   const auto cell = model::prepare<double, model::max_intervals>(cell_file.parameters);
   const auto begin = std::chrono::steady_clock::now();
-  const auto rows = host_sim::simulate(cell, cell_file.parameters.capacity_ah, cell_file.mechanisms, recording.time_s,
-                                       recording.current_a, recording.temperature_c, options.initial_soc);
+  const auto rows = host_sim::simulate({.cell = cell,
+                                        .capacity_ah = cell_file.parameters.capacity_ah,
+                                        .mechanisms = cell_file.mechanisms,
+                                        .time_s = recording.time_s,
+                                        .current_a = recording.current_a,
+                                        .temperature_c = recording.temperature_c,
+                                        .initial_soc = options.initial_soc});
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   write_output(options.out, csv_of(recording, rows, options));
 

@@ -55,11 +55,11 @@ std::string page_of_study(const study::StudyResult& r) {
                              {},
                              {},
                              r.charts};
-  for (const files::Warning& w : r.warnings) content.warnings.push_back(w.text);
+  for (const measurement::Warning& w : r.warnings) content.warnings.push_back(w.text);
   files::PageTable claims{
       "claims", "What the paper says, and whether it holds here", {"statement", "holds", "evidence"}, {}, ""};
   for (const study::StudyClaim& c : r.claims)
-    claims.rows.push_back({{c.claim, {}, {}}, {c.holds ? "yes" : "no", {}, {}}, {c.evidence, {}, {}}});
+    claims.rows.push_back({{c.claim, {}, {}}, {c.holds ? "yes" : "no", {}, {}}, {c.result, {}, {}}});
   content.tables.push_back(std::move(claims));
   content.tables.insert(content.tables.end(), r.tables.begin(), r.tables.end());
   return reports::page_of(content);
@@ -106,11 +106,11 @@ int run(const StudyOptions& options) {
   if (!options.output.json.empty()) write_output(options.output.json, json);
   if (!options.output.report.empty()) write_output(options.output.report, page);
 
-  for (const files::Warning& w : result.warnings) warn(w.text);
+  for (const measurement::Warning& w : result.warnings) warn(w.text);
   std::string text =
       fmt::format("{} identifications in {:.1f} s, of {}.\n", result.fits, result.seconds, result.source);
   for (const study::StudyClaim& c : result.claims)
-    text += fmt::format("  {} {}: {}\n", c.holds ? "yes" : "no ", c.claim, c.evidence);
+    text += fmt::format("  {} {}: {}\n", c.holds ? "yes" : "no ", c.claim, c.result);
   print_summary(options.output, text + "Report: " + (folder / "study.html").string());
   return 0;
 }

@@ -41,8 +41,9 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
 
 }  // namespace
 
-diagnosis::PreparedRecording record_of(const files::Recording& r, std::string name, const model::CellParameters<>& cell,
-                                       double initial_soc, double sigma, bool soc_given) {
+diagnosis::PreparedRecording record_of(const measurement::Recording& r, std::string name,
+                                       const model::CellParameters<>& cell, double initial_soc, double sigma,
+                                       bool soc_given) {
   const bool any_temperature =
       std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
   diagnosis::PreparedRecording record{
@@ -94,7 +95,7 @@ std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
     const auto start =
         host_sim::starting_point(host_sim::SocPrior{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)});
     const host_sim::Track track =
-        host_sim::run_on_host(cell, files::samples(c.recording), start, host_sim::ScalarKind::float32);
+        host_sim::run_on_host(cell, measurement::samples(c.recording), start, host_sim::ScalarKind::float32);
     for (std::size_t k = 0; k < track.rows.size(); ++k) figure.add(track.rows[k].soc - c.recording.soc_ref[k]);
   };
   for (const RecordingComparison& c : r.holdouts) {

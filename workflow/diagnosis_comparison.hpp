@@ -7,8 +7,9 @@ namespace bms::workflow {
 
 /// A recording as the diagnosis takes it, trusted readings summed up; initial soc, its standard deviation, and whether
 /// it was told.
-diagnosis::PreparedRecording record_of(const files::Recording& r, std::string name, const model::CellParameters<>& cell,
-                                       double initial_soc, double sigma, bool soc_given);
+diagnosis::PreparedRecording record_of(const measurement::Recording& r, std::string name,
+                                       const model::CellParameters<>& cell, double initial_soc, double sigma,
+                                       bool soc_given);
 
 /// What both models say, open loop from where each recording begins: fills base_v and extended_v of recordings and
 /// hold-outs.

@@ -8,7 +8,7 @@
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/next_experiment.hpp"
 #include "files/cell_file.hpp"
-#include "files/recording.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms::workflow {
 
@@ -24,7 +24,7 @@ struct SocErrors {
 
 /// One recording and what both models say of it, nothing fitted to it but the mechanisms found.
 struct RecordingComparison {
-  files::Recording recording;
+  measurement::Recording recording;
   diagnosis::PreparedRecording record;
   std::vector<double> base_v, extended_v;  ///< empty: no voltage to compare with
 };
@@ -38,7 +38,7 @@ struct DiagnoseResult {
   std::optional<diagnosis::NextExperiment> next;  ///< what would settle which of several causes it is
   std::string out;
   double wall_s = 0;
-  std::vector<files::Warning> warnings;
+  std::vector<measurement::Warning> warnings;
 
   /// Whether the verdict names mechanisms: then they are in the extended cell.
   bool named() const { return diagnosis::names(diagnosis.verdict); }

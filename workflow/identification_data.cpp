@@ -33,7 +33,7 @@ double soc_at(const model::OcvTable<double>& ocv, double voltage_v) {
 
 }  // namespace
 
-IdentificationData identification_data(const files::Recording& recording, const DataOptions& options) {
+IdentificationData identification_data(const measurement::Recording& recording, const DataOptions& options) {
   const std::size_t rows = recording.rows();
   const bool estimate = options.initial.estimate || (!options.initial.value && recording.soc_ref.empty());
   // the state of charge of each row: the reference if there is one, else counted

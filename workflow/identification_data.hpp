@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "files/recording.hpp"
 #include "identification/grey_box.hpp"
+#include "measurement/recording.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms::workflow {
@@ -34,7 +34,7 @@ struct IdentificationData {
 
 /// A whole recording is simulated from its start, but only voltages inside the window count; where the start is to be
 /// estimated, the recording begins at the window. Throws BadInput when nothing of it lies in the window.
-IdentificationData identification_data(const files::Recording& recording, const DataOptions& options);
+IdentificationData identification_data(const measurement::Recording& recording, const DataOptions& options);
 
 /// "estimate", a number, or nothing. Throws BadInput.
 InitialSoc initial_soc_of(const std::string& text);

@@ -10,6 +10,7 @@
 
 #include "files/bad_input.hpp"
 #include "files/cell_fields.hpp"
+#include "files/recording.hpp"
 #include "host_sim/simulation.hpp"
 #include "identification/ocv_curve.hpp"
 
@@ -28,13 +29,13 @@ struct SlowRuns {
 
 /// Those nearest to 25 degrees C first.
 std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
-  std::vector<files::Recording> recordings;
+  std::vector<measurement::Recording> recordings;
   for (const std::string& path : paths) recordings.push_back(files::read_recording(path));
   std::vector<SlowRuns> all;
   for (const TemperatureGroup& like : group_by_temperature(recordings)) {
     SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
     for (const std::size_t k : like.recordings) {
-      const files::Recording& r = recordings[k];
+      const measurement::Recording& r = recordings[k];
       runs.runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
       runs.files += (runs.files.empty() ? "" : ", ") + std::filesystem::path(paths[k]).filename().string();
     }
@@ -46,7 +47,7 @@ std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
 }
 
 /// Of the temperatures that were recorded; nothing: none.
-std::optional<double> mean_temperature_c(const files::Recording& recording) {
+std::optional<double> mean_temperature_c(const measurement::Recording& recording) {
   double sum = 0;
   std::size_t count = 0;
   for (const double t : recording.temperature_c) {
@@ -58,7 +59,7 @@ std::optional<double> mean_temperature_c(const files::Recording& recording) {
 
 }  // namespace
 
-std::vector<TemperatureGroup> group_by_temperature(const std::vector<files::Recording>& recordings) {
+std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings) {
   constexpr double alike_k = 5;
   std::vector<std::pair<double, std::size_t>> means;
   std::vector<std::size_t> all;
@@ -139,11 +140,11 @@ OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v
   return taken;
 }
 
-void identify_noise(const std::vector<files::Recording>& recordings, const id::FitStatistics& judge,
+void identify_noise(const std::vector<measurement::Recording>& recordings, const id::FitStatistics& judge,
                     const std::vector<id::Parameter>& parameters, model::CellParameters<>& p) {
   std::vector<double> voltage_steps, current_steps;
   double step_s = 1;
-  for (const files::Recording& r : recordings) {
+  for (const measurement::Recording& r : recordings) {
     const double quiet_a = 0.02 * p.capacity_ah;
     for (std::size_t k = 2; k < r.rows(); ++k) {
       if (std::abs(r.current_a[k]) > quiet_a || std::abs(r.current_a[k - 1]) > quiet_a ||
@@ -279,8 +280,13 @@ id::DataSet without_mechanisms(const files::CellFile& cell, const Identification
   id::DataSet record = of.record;
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
   const auto simulated = [&](std::span<const model::MechanismSetting> mechanisms) {
-    return host_sim::simulate(tables, cell.parameters.capacity_ah, mechanisms, record.data.time_s,
-                              record.data.current_a, of.temperature_c, record.initial_soc);
+    return host_sim::simulate({.cell = tables,
+                               .capacity_ah = cell.parameters.capacity_ah,
+                               .mechanisms = mechanisms,
+                               .time_s = record.data.time_s,
+                               .current_a = record.data.current_a,
+                               .temperature_c = of.temperature_c,
+                               .initial_soc = record.initial_soc});
   };
   const auto with = simulated(cell.mechanisms), without = simulated({});
   for (std::size_t k = 0; k < record.data.size(); ++k)
@@ -304,8 +310,13 @@ void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, f
   std::size_t count = 0;
   for (const IdentificationData& of : data) {
     const id::Data& d = of.record.data;
-    const auto rows = host_sim::simulate(tables, capacity_ah, cell.mechanisms, d.time_s, d.current_a, of.temperature_c,
-                                         of.record.initial_soc);
+    const auto rows = host_sim::simulate({.cell = tables,
+                                          .capacity_ah = capacity_ah,
+                                          .mechanisms = cell.mechanisms,
+                                          .time_s = d.time_s,
+                                          .current_a = d.current_a,
+                                          .temperature_c = of.temperature_c,
+                                          .initial_soc = of.record.initial_soc});
     double sum_v = 0;
     std::size_t in_sum = 0;
     const auto take = [&] {

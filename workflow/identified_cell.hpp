@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "files/cell_file.hpp"
-#include "files/recording.hpp"
 #include "identification/hysteresis_gap.hpp"
 #include "identification/identify.hpp"
+#include "measurement/recording.hpp"
 #include "workflow/identification_data.hpp"
 
 namespace bms::workflow {
@@ -16,7 +16,7 @@ namespace bms::workflow {
 struct OcvResult {
   std::optional<double> coulombic_efficiency;          ///< discharged over charged; only of a run of each kind
   std::vector<identification::GapAtTemperature> gaps;  ///< of each temperature with a run of each kind
-  std::vector<files::Warning> warnings;
+  std::vector<measurement::Warning> warnings;
 };
 
 /// OCV, gap and capacity of slow charge and discharge recordings, with as few straight pieces as stay within
@@ -43,7 +43,7 @@ void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, f
 
 /// Noise and tolerance: of the measuring chain by the recordings' rests, of the model by what it leaves over on
 /// `judge`, and by what lies on the side of the OCV's gap that it does not lean to.
-void identify_noise(const std::vector<files::Recording>& recordings, const identification::FitStatistics& judge,
+void identify_noise(const std::vector<measurement::Recording>& recordings, const identification::FitStatistics& judge,
                     const std::vector<identification::Parameter>& parameters, model::CellParameters<>& p);
 
 /// Recordings within a few kelvins of each other, by their place in a list.
@@ -52,7 +52,7 @@ struct TemperatureGroup {
   std::vector<std::size_t> recordings;
 };
 /// Ascending; one of 25 degrees C for all where one of them has no temperature.
-std::vector<TemperatureGroup> group_by_temperature(const std::vector<files::Recording>& recordings);
+std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings);
 
 /// Seven digits of every number: more are noise.
 void round_digits(files::CellFile& cell);

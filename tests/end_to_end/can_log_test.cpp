@@ -94,14 +94,14 @@ TEST_F(CanLogTool, WhatIsMissingIsSaid) {
   const std::string log = log_of();
   const auto lost = run_tool("replay " + without_lines(log, " 19A#", 200, 3) + " --json -");
   EXPECT_EQ(lost.exit_code, 0);
-  EXPECT_THAT(lost.out, HasSubstr("samples_lost: 3 samples are not in the log, the first after sample 200"));
+  EXPECT_THAT(lost.out, HasSubstr("samples_lost: samples missing in the log: 3, the first after sample 200"));
   const auto later = run_tool("replay " + without_lines(log, " 199#", 0, 50) + " --json -");
   EXPECT_EQ(later.exit_code, 0);
   EXPECT_THAT(later.out, HasSubstr("log_from_later"));
   EXPECT_TRUE(Json::parse(later.out)["verified_against"].is_null());
   const auto none = run_tool("replay " + without_lines(log, " 19B#", 0, 1'000'000));
   EXPECT_EQ(none.exit_code, 2);
-  EXPECT_THAT(none.err, HasSubstr("no samples among its frames"));
+  EXPECT_THAT(none.err, HasSubstr("no samples, expected the frames"));
 }
 
 TEST_F(CanLogTool, HostileBytesEndInALine) {

@@ -186,17 +186,17 @@ TEST(Flash, SaysWhatIsMissing) {
 
 TEST(Flash, SaysWhatWentWrong) {
   const images::Probe probe{"stlink", "stm32f4x", ""};
-  EXPECT_TRUE(images::failure_in("Error: open failed\n", probe).nothing_to_talk_to);
+  EXPECT_TRUE(images::failure_in("Error: open failed\n", probe).no_probe);
   const images::FlashFailure no_chip = images::failure_in(
       "Info : Target voltage: 3.2\nError: init mode failed (unable to connect to the target)\n", probe);
-  EXPECT_FALSE(no_chip.nothing_to_talk_to);
-  EXPECT_THAT(no_chip.what, HasSubstr("no chip answers"));
+  EXPECT_FALSE(no_chip.no_probe);
+  EXPECT_THAT(no_chip.what, HasSubstr("the chip does not answer"));
   EXPECT_THAT(
       images::failure_in(
           "Error: checksum mismatch - attempting binary compare\ndiff 0 address 0x08000000. Was 0xff instead of 0x00\n",
           probe)
           .what,
-      HasSubstr("does not hold"));
+      HasSubstr("does not contain"));
   EXPECT_THAT(images::failure_in("image verified\nError: checksum mismatch\n", probe).what,
               HasSubstr("stored records"));
   EXPECT_EQ(images::failure_in("Info : x\nError: something else\n", probe).what, "something else");

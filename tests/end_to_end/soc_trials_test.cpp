@@ -26,7 +26,8 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
     host_sim::ReplayResult r;
     r.cell = t.cell;
     r.recording = t.recording;
-    r.track = host_sim::run_on_host(t.cell, files::samples(t.recording), host_sim::starting_point(t.prior), r.scalar);
+    r.track =
+        host_sim::run_on_host(t.cell, measurement::samples(t.recording), host_sim::starting_point(t.prior), r.scalar);
     host_sim::evaluate(r);
     SCOPED_TRACE(t.name + ", " + t.trouble);
     ++trials;
@@ -71,7 +72,7 @@ TEST(SocTrials, AreBitEqualOnTheBoard) {
   if (!there()) GTEST_SKIP() << "the real recordings are not there: " << data;
   const images::EmulatedBoard& board = images::emulated_boards().front();
   each_soc_trial(data, [&](const SocTrial& t) {
-    const auto all = files::samples(t.recording);
+    const auto all = measurement::samples(t.recording);
     const auto start = host_sim::starting_point(t.prior);
     const auto difference = host_sim::first_difference(host_sim::run_on_host(t.cell, all, start, board.scalar),
                                                        images::run_on_board(board, t.cell, all, start), board.scalar);

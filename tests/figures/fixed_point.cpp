@@ -29,7 +29,7 @@ std::vector<FixedPointRun> fixed_point_runs(const std::filesystem::path& shift, 
 
 Deviation deviation(const FixedPointRun& run) {
   const files::CellFile cell = files::read_cell(run.cell);
-  const auto all = files::samples(files::read_recording(run.recording));
+  const auto all = measurement::samples(files::read_recording(run.recording));
   const auto rows = [&](host_sim::ScalarKind scalar) {
     return host_sim::run_on_host(cell, all, std::nullopt, scalar).rows;
   };
@@ -45,7 +45,7 @@ Deviation deviation(const FixedPointRun& run) {
 
 std::optional<host_sim::Difference> difference_on_microbit(const FixedPointRun& run) {
   const files::CellFile cell = files::read_cell(run.cell);
-  const auto all = files::samples(files::read_recording(run.recording));
+  const auto all = measurement::samples(files::read_recording(run.recording));
   const host_sim::Track host = host_sim::run_on_host(cell, all, std::nullopt, host_sim::ScalarKind::fixed),
                         board = images::run_on_board(images::emulated_boards().back(), cell, all, std::nullopt);
   return host_sim::first_difference(host, board, host_sim::ScalarKind::fixed);

@@ -8,6 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "files/recording.hpp"
+#include "measurement/statistics.hpp"
+
 namespace bms {
 
 namespace {
@@ -20,7 +23,7 @@ struct Trouble {
   std::optional<double> from_soc;
 };
 
-files::Recording troubled(files::Recording r, const Trouble& t) {
+measurement::Recording troubled(measurement::Recording r, const Trouble& t) {
   std::size_t first = 0;
   if (t.from_soc)
     first = static_cast<std::size_t>(
@@ -42,27 +45,22 @@ struct Sums {
   std::vector<float> sigmas;
 };
 
-double median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::string row(const SocTrial& t, Sums& all) {
   host_sim::ReplayResult r;
   r.cell = t.cell;
   r.recording = t.recording;
-  r.track = host_sim::run_on_host(t.cell, files::samples(r.recording), host_sim::starting_point(t.prior), r.scalar);
+  r.track =
+      host_sim::run_on_host(t.cell, measurement::samples(r.recording), host_sim::starting_point(t.prior), r.scalar);
   host_sim::evaluate(r);
   std::vector<float> sigmas;
   for (const host_sim::EstimateRow& e : r.track.rows) sigmas.push_back(static_cast<float>(e.soc_sigma));
   all.samples += sigmas.size();
   all.inside += *r.soc.within_2_sigma * static_cast<double>(sigmas.size());
   all.sigmas.insert(all.sigmas.end(), sigmas.begin(), sigmas.end());
-  return fmt::format("| {} | {} | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % | {:+.0f} +- {:.0f} mA |\n",
-                     t.name, t.trouble, 100 * *r.soc.rmse, 100 * *r.soc.rmse_after_30min,
-                     100 * *r.soc.max_error_after_30min, 100 * *r.soc.within_2_sigma, 100 * median(sigmas),
-                     1e3 * *r.soc.current_offset_a, 1e3 * *r.soc.current_offset_sigma_a);
+  return fmt::format(
+      "| {} | {} | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % | {:+.0f} +- {:.0f} mA |\n", t.name, t.trouble,
+      100 * *r.soc.rmse, 100 * *r.soc.rmse_after_30min, 100 * *r.soc.max_error_after_30min, 100 * *r.soc.within_2_sigma,
+      100 * measurement::upper_median(sigmas), 1e3 * *r.soc.current_offset_a, 1e3 * *r.soc.current_offset_sigma_a);
 }
 
 }  // namespace
@@ -81,7 +79,7 @@ void each_soc_trial(const std::filesystem::path& data, const std::function<void(
   const auto run = [&](const std::string& folder, const char* name,
                        std::initializer_list<const std::vector<Trouble>*> lists) {
     const files::CellFile cell = files::read_cell(folder + "_extended");
-    const files::Recording r = files::read_recording((data / folder / (std::string(name) + ".csv")).string());
+    const measurement::Recording r = files::read_recording((data / folder / (std::string(name) + ".csv")).string());
     for (const auto* list : lists) {
       for (const Trouble& t : *list) f({name, t.title, cell, troubled(r, t), t.prior});
     }
@@ -101,7 +99,8 @@ std::string soc_trials(const std::filesystem::path& data) {
   Sums all;
   each_soc_trial(data, [&](const SocTrial& t) { table += row(t, all); });
   return table + fmt::format("| all | | | | | {:.1f} % | {:.2f} % | |\n",
-                             100 * all.inside / static_cast<double>(all.samples), 100 * median(all.sigmas));
+                             100 * all.inside / static_cast<double>(all.samples),
+                             100 * measurement::upper_median(all.sigmas));
 }
 
 }  // namespace bms

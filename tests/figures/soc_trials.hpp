@@ -7,8 +7,8 @@
 #include <string>
 
 #include "files/cell_file.hpp"
-#include "files/recording.hpp"
 #include "host_sim/replay.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms {
 
@@ -16,7 +16,7 @@ namespace bms {
 struct SocTrial {
   std::string name, trouble;
   const files::CellFile& cell;
-  files::Recording recording;
+  measurement::Recording recording;
   host_sim::SocPrior prior;
 };
 

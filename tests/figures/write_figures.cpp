@@ -51,7 +51,8 @@ host_sim::ReplayResult replayed(const Case& c) {
   r.cell = files::read_cell(c.cell);
   r.recording = files::read_recording(c.recording);
   r.target = "host";
-  r.track = host_sim::run_on_host(r.cell, files::samples(r.recording), host_sim::starting_point(c.prior), r.scalar);
+  r.track =
+      host_sim::run_on_host(r.cell, measurement::samples(r.recording), host_sim::starting_point(c.prior), r.scalar);
   host_sim::evaluate(r);
   return r;
 }
@@ -84,7 +85,7 @@ std::string real_accuracy() {
   }
   std::sort(files.begin(), files.end());
   for (const auto& file : files) {
-    const files::Recording r = files::read_recording(file.string());
+    const measurement::Recording r = files::read_recording(file.string());
     if (r.soc_ref.empty()) continue;
     table += accuracy_row({file.stem().string(), file.string(), "a123_26650", std::nullopt});
     if (file.stem() == "udds_P25_A002")
@@ -111,7 +112,7 @@ std::string thousand_hours() {
 std::string step_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
   for (const auto& [what, value] : firmware::step_figures(images::emulated_boards().front(), files::read_cell("table9"),
-                                                          files::samples(files::read_recording(shift)))) {
+                                                          measurement::samples(files::read_recording(shift)))) {
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   }
   return table;
@@ -120,7 +121,7 @@ std::string step_cost() {
 std::string microbit_cost() {
   std::string table = "| what | figure |\n|---|---|\n";
   for (const auto& [what, value] : firmware::core_figures(images::emulated_boards().back(), files::read_cell("table9"),
-                                                          files::samples(files::read_recording(shift)))) {
+                                                          measurement::samples(files::read_recording(shift)))) {
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   }
   return table;
@@ -161,7 +162,7 @@ std::string mechanism_cost() {
       warm{"temperature_resistance", {15'000, 30'000}}, heat{"self_heating", {1}}, shape{"ocv_shape", {0.02, -0.01}},
       entropic{"entropic_ocv", {1e-4, 2e-4, -1e-4, 1e-4}}, transfer{"charge_transfer", {0.3, 0.5}},
       offset{"current_offset", {0.02}}, gain{"voltage_gain", {0.001}};
-  const auto all = files::samples(files::read_recording(shift));
+  const auto all = measurement::samples(files::read_recording(shift));
   const images::EmulatedBoard& board = images::emulated_boards().front();
   std::string table = "| table9 with | step, mean [instructions] | step, longest |\n|---|---|---|\n";
   using Set = std::vector<std::pair<const char*, std::vector<double>>>;
@@ -209,8 +210,8 @@ std::string mechanism_tables() {
 std::string speed() {
   std::string table = "| what | figure |\n|---|---|\n";
   const files::CellFile cell = files::read_cell("table9");
-  const files::Recording recording = files::read_recording(shift);
-  const auto all = files::samples(recording);
+  const measurement::Recording recording = files::read_recording(shift);
+  const auto all = measurement::samples(recording);
   for (const host_sim::ScalarKind scalar :
        {host_sim::ScalarKind::float32, host_sim::ScalarKind::float64, host_sim::ScalarKind::fixed}) {
     table += fmt::format("| replay on the host, {} | {:.1f} million steps/s |\n", host_sim::name_of(scalar),
@@ -281,7 +282,7 @@ std::string identification_speed() {
   namespace id = identification;
   constexpr std::size_t samples_used = 20'000;
   const files::CellFile cell = files::read_cell("table9");
-  const files::Recording recording = files::read_recording(shift);
+  const measurement::Recording recording = files::read_recording(shift);
   id::DataSet r;
   r.data = {{recording.time_s.begin(), recording.time_s.begin() + samples_used},
             {recording.current_a.begin(), recording.current_a.begin() + samples_used},
@@ -300,7 +301,13 @@ std::string identification_speed() {
     return best_s;
   };
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
-  const double simulation_s = fastest_s([&] { host_sim::simulate(tables, 6, r.data.time_s, r.data.current_a, 0.98); });
+  const double simulation_s = fastest_s([&] {
+    host_sim::simulate({.cell = tables,
+                        .capacity_ah = 6,
+                        .time_s = r.data.time_s,
+                        .current_a = r.data.current_a,
+                        .initial_soc = 0.98});
+  });
   std::string table = fmt::format(
       "| 20,000 samples | time | as many simulations |\n|---|---|---|\n| simulation, open loop | {:.2f} ms | 1 |\n",
       1e3 * simulation_s);

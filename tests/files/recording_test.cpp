@@ -8,11 +8,13 @@
 #include <random>
 
 #include "files/cell_file.hpp"
+#include "measurement/recording_checks.hpp"
 #include "tests/files/rejected_input.hpp"
 
 namespace bms::files {
 namespace {
 
+using measurement::Recording;
 using ::testing::HasSubstr;
 
 /// Twenty good rows with a load that the voltage follows.
@@ -36,9 +38,9 @@ std::string refusal(const std::string& text) {
 /// Ids of the warnings that an accepted recording carries.
 std::vector<std::string> warnings(const std::string& text) {
   Recording r = parse_recording(text, "log.csv");
-  compare_with_cell(r, read_cell("table9").parameters);
+  measurement::compare_with_cell(r, read_cell("table9").parameters);
   std::vector<std::string> ids;
-  for (const Warning& w : r.warnings) ids.push_back(w.id);
+  for (const measurement::Warning& w : r.warnings) ids.push_back(w.id);
   return ids;
 }
 
@@ -59,7 +61,7 @@ TEST(Recording, ReferencesAreThereWhereTheyAreGivenAndNoReadingIsMissing) {
   EXPECT_EQ(r.voltage_ref_v[9], 3.31);
   EXPECT_TRUE(std::isnan(r.voltage_ref_v[12]));
   EXPECT_TRUE(r.warnings.empty());
-  const std::vector<measurement::Sample> seen = samples(r);
+  const std::vector<measurement::Sample> seen = measurement::samples(r);
   EXPECT_EQ(seen[4].voltage_uv, measurement::no_reading) << "contactor open, a source on the sense wires";
   EXPECT_EQ(seen[9].voltage_uv, 3'300'000) << "a meter on the cell";
 }
@@ -199,30 +201,12 @@ TEST(Recording, AnyBytesAreEitherReadOrRefused) {
     try {
       const Recording r = parse_recording(text, "log.csv");
       ASSERT_GE(r.rows(), 10U);
-      ASSERT_EQ(samples(r).size(), r.rows());
+      ASSERT_EQ(measurement::samples(r).size(), r.rows());
     } catch (const BadInput& error) {
       ASSERT_THAT(error.what(), HasSubstr("log.csv:"));
       ASSERT_EQ(std::string(error.what()).find('\n'), std::string::npos);
     }
   }
-}
-
-TEST(Recording, SamplesAreMicroUnitsFromTheFirstRowAndMissingReadingsAreSaid) {
-  Recording r;
-  r.time_s = {100.5, 101.5000004, 103};
-  r.current_a = {-1.2345678, std::nan(""), 5'000};
-  r.voltage_v = {3.2, std::nan(""), -9'999};
-  r.temperature_c = {-12.34, std::nan(""), 1e6};
-  const auto s = samples(r);
-  EXPECT_EQ(s[0].time_us, 0U);
-  EXPECT_EQ(s[1].time_us, 1'000'000U);
-  EXPECT_EQ(s[0].current_ua, -1'234'568);
-  EXPECT_EQ(s[1].current_ua, measurement::no_reading);
-  EXPECT_EQ(s[2].current_ua, 2'147'483'647) << "saturates, and is implausible";
-  EXPECT_EQ(s[1].voltage_uv, measurement::no_reading);
-  EXPECT_EQ(s[2].voltage_uv, -2'147'483'647) << "not the value that means missing";
-  EXPECT_EQ(s[0].temperature_cdegc, -1'234);
-  EXPECT_EQ(s[1].temperature_cdegc, measurement::no_temperature);
 }
 
 TEST(Recording, AProfileNeedsNoVoltage) {

@@ -32,7 +32,7 @@ namespace bms::firmware {
 namespace {
 
 std::vector<measurement::Sample> two_minutes() {
-  const auto all = files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  const auto all = measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
   return {all.begin() + 3000, all.begin() + 3125};
 }
 

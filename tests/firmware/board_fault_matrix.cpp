@@ -127,7 +127,7 @@ class Matrix {
   /// so none may be published.
   static void shift(MatrixResult& result) {
     const std::vector<measurement::Sample> seconds =
-        files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+        measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
     BoardTruck truck(6, result, 0.98);
     const auto is = [&](const measurement::Sample& at) {
       truck.trajectory = {static_cast<double>(at.current_ua), static_cast<double>(at.voltage_uv),
@@ -456,9 +456,8 @@ std::string markdown(const MatrixResult& result) {
     return fmt::format("{:.1f} to {:.1f} s", 1e-3 * t.soonest_ms, 1e-3 * t.latest_ms);
   };
   std::string out =
-      "| fault | table | silent below, of cases | published just above it after | three sigma above | during others | "
-      "of "
-      "cases | open after |\n|---|---|---|---|---|---|---|---|\n";
+      "| fault | table | silent below, number of cases | raised just above it after | three sigma above | during other "
+      "faults | number of cases | open after |\n|---|---|---|---|---|---|---|---|\n";
   for (std::size_t k = 0; k < in_frames; ++k) {
     const MatrixRow& r = result.rows[k];
     out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", expected_rows[k].name, stated_time(k), r.silent,
@@ -467,7 +466,7 @@ std::string markdown(const MatrixResult& result) {
   out += fmt::format("\n{} cases, {} samples: {} missed, {} false.", result.cases, result.samples, result.missed,
                      result.falsely);
   if (result.shift_samples > 0)
-    out += fmt::format(" {} of the samples are the shift with noise: no fault published.", result.shift_samples);
+    out += fmt::format(" {} of the samples are the shift with noise, without a fault.", result.shift_samples);
   return out + "\n";
 }
 

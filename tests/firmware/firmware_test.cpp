@@ -31,7 +31,7 @@ std::filesystem::path microbit_image(images::Image kind) {
 const images::EmulatedBoard& microbit() { return images::emulated_boards().back(); }
 
 std::vector<measurement::Sample> shift() {
-  return files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  return measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
 }
 
 TEST(FirmwareImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {

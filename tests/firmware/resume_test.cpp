@@ -24,7 +24,7 @@ std::filesystem::path image() {
 
 /// Seven minutes of the shift, one sample per second.
 std::vector<measurement::Sample> some_minutes() {
-  const auto all = files::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  const auto all = measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
   return {all.begin() + 3'000, all.begin() + 3'420};
 }
 

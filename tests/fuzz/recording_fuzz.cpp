@@ -7,6 +7,7 @@
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
+#include "measurement/recording_checks.hpp"
 #include "tests/fuzz/require.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -14,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   static const files::CellFile cell = files::read_cell("table9");
   try {
-    files::Recording r =
+    measurement::Recording r =
         files::parse_recording(std::string(reinterpret_cast<const char*>(data) + 1, size - 1), "fuzz.csv",
                                (data[0] & 1) != 0 ? files::VoltageColumn::required : files::VoltageColumn::optional);
     require(r.rows() >= 10 && r.current_a.size() == r.rows());
@@ -22,9 +23,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       require(column->empty() || column->size() == r.rows());
     for (std::size_t k = 0; k < r.rows(); ++k)
       require(std::isfinite(r.time_s[k]) && (k == 0 || r.time_s[k] >= r.time_s[k - 1]));
-    files::compare_with_cell(r, cell.parameters);
-    if (!r.voltage_v.empty()) require(files::samples(r).size() <= r.rows());
-    for (const files::Warning& w : r.warnings) require(!w.id.empty() && w.text.find('\n') == std::string::npos);
+    measurement::compare_with_cell(r, cell.parameters);
+    if (!r.voltage_v.empty()) require(measurement::samples(r).size() <= r.rows());
+    for (const measurement::Warning& w : r.warnings) require(!w.id.empty() && w.text.find('\n') == std::string::npos);
   } catch (const files::BadInput& e) {
     const std::string what = e.what();
     require(!what.empty() && what.find('\n') == std::string::npos);

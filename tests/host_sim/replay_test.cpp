@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "files/recording.hpp"
+
 namespace bms::host_sim {
 namespace {
 
@@ -16,7 +18,7 @@ ReplayResult replayed(const std::optional<SocPrior>& prior, ScalarKind scalar = 
   result.target = "host";
   result.scalar = scalar;
   result.recording = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
-  result.track = run_on_host(result.cell, files::samples(result.recording), starting_point(prior), scalar);
+  result.track = run_on_host(result.cell, measurement::samples(result.recording), starting_point(prior), scalar);
   evaluate(result);
   return result;
 }

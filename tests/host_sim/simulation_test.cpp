@@ -1,10 +1,10 @@
 #include "host_sim/simulation.hpp"
-#include "experiments/experiment.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "experiments/experiment.hpp"
 #include "files/cell_file.hpp"
 #include "identification/goodness_of_fit.hpp"
 
@@ -19,13 +19,14 @@ TEST(Simulation, CountsTheChargeAndRestsAtTheOpenCircuitVoltage) {
     time_s.push_back(k);
     current_a.push_back(k > 0 && k <= 1'800 ? -6 : 0);  // half an hour at 1C, then rest
   }
-  const auto rows = simulate(cell, p.capacity_ah, time_s, current_a, 0.95);
+  const auto rows = simulate(
+      {.cell = cell, .capacity_ah = p.capacity_ah, .time_s = time_s, .current_a = current_a, .initial_soc = 0.95});
   EXPECT_NEAR(rows.back().soc, 0.45, 1e-12);
   EXPECT_NEAR(rows.back().voltage_v, 3.281 + 0.01 * 0.45, 1e-9);
   EXPECT_NEAR(rows[1'800].voltage_v - rows[1'801].voltage_v, -6 * 0.0132 - 0.0085 * 6 * 0.082, 0.005);
 }
 
-TEST(Figures, FitIsA6AndIgnoresMissingReadings) {
+TEST(Figures, FitIsEquationA6AndIgnoresMissingReadings) {
   FitFigure fit;
   ErrorFigure error;
   const double measured[] = {1, 2, 3, std::nan(""), 4}, simulated[] = {1, 2, 3, 7, 3};
@@ -39,7 +40,7 @@ TEST(Figures, FitIsA6AndIgnoresMissingReadings) {
   EXPECT_EQ(error.max(), 1);
 }
 
-TEST(Experiment, EveryProfileStaysWithin1CAndIsTheSameEachTime) {
+TEST(Experiment, EveryProfileStaysWithin1CAndIsReproducible) {
   for (const experiments::Experiment& e : experiments::experiments()) {
     const auto a = *experiments::experiment(e.name, {.capacity_ah = 2.5}),
                b = *experiments::experiment(e.name, {.capacity_ah = 2.5});
@@ -52,7 +53,7 @@ TEST(Experiment, EveryProfileStaysWithin1CAndIsTheSameEachTime) {
   EXPECT_FALSE(experiments::experiment("no_such_thing", {}).has_value());
 }
 
-TEST(Experiment, WhatTellsCausesApartStaysInTheCellAndSaysWhatToLog) {
+TEST(Experiment, DiagnosticProfilesStayWithinTheCellAndHaveInstructions) {
   int designs = 0;
   for (const experiments::Experiment& e : experiments::experiments()) {
     if (std::isnan(e.start_soc)) continue;
@@ -70,7 +71,7 @@ TEST(Experiment, WhatTellsCausesApartStaysInTheCellAndSaysWhatToLog) {
         ASSERT_EQ(row.current_a, 0) << e.name;
       }
       if (std::isfinite(row.source_v)) {
-        ASSERT_TRUE(row.contactor_open) << "nobody takes the sense wires off a cell that is loaded: " << e.name;
+        ASSERT_TRUE(row.contactor_open) << "the sense wires must not be disconnected from a loaded cell: " << e.name;
       }
     }
     EXPECT_LE(before_s, 12 * 3'600) << e.name;

@@ -40,8 +40,12 @@ TEST(GreyBox, SimulatesWhatTheModelSimulates) {
   const GreyBox grey_box(cell, {record}, options);
   Eigen::VectorXd voltage(300);
   ASSERT_TRUE(grey_box.simulate(grey_box.start(), 0, voltage, nullptr));
-  const auto expected = host_sim::simulate(model::prepare<double, model::max_intervals>(cell), 6, record.data.time_s,
-                                           record.data.current_a, 0.85);
+  const auto tables = model::prepare<double, model::max_intervals>(cell);
+  const auto expected = host_sim::simulate({.cell = tables,
+                                            .capacity_ah = 6,
+                                            .time_s = record.data.time_s,
+                                            .current_a = record.data.current_a,
+                                            .initial_soc = 0.85});
   for (Eigen::Index k = 0; k < 300; ++k)
     ASSERT_NEAR(voltage[k], expected[static_cast<std::size_t>(k)].voltage_v, 1e-12);
 }

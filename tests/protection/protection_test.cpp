@@ -293,7 +293,7 @@ TEST(Protection, OpensForAPackOfOneCell) {
 /// Sixteen cells made from the cell of the shipped shift, each with its own offset, resistance and noise. The shift is
 /// sampled once a second, which the design of the pack states.
 TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
-  const files::Recording shift = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  const measurement::Recording shift = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
   PackDesign design = forklift;
   design.sample_period_s = 1;
   design.precharge_time_constant_s = 2;

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "files/recording.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 
@@ -15,8 +16,8 @@ host_sim::ReplayResult replayed() {
   result.cell = files::read_cell("table9");
   result.target = "host";
   result.recording = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
-  result.track =
-      host_sim::run_on_host(result.cell, files::samples(result.recording), std::nullopt, host_sim::ScalarKind::float32);
+  result.track = host_sim::run_on_host(result.cell, measurement::samples(result.recording), std::nullopt,
+                                       host_sim::ScalarKind::float32);
   host_sim::evaluate(result);
   return result;
 }

@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
   send(bus,
        hal::frame_of(host_sim::starting_point(host_sim::SocPrior{std::atof(argv[3]), std::atof(argv[4])}).value()));
   std::size_t fed = 0;
-  for (const measurement::Sample& sample : files::samples(files::read_recording(argv[2]))) {
+  for (const measurement::Sample& sample : measurement::samples(files::read_recording(argv[2]))) {
     for (const can::Frame& frame : hal::frames_of(sample)) send(bus, frame);
     if (!answered(bus)) {
       std::fprintf(stderr, "no answer to sample %zu\n", fed);

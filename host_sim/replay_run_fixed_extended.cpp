@@ -1,0 +1,9 @@
+#include "host_sim/replay_run.hpp"
+
+namespace bms::host_sim::replay_detail {
+
+template Track run_with_mechanisms<arithmetic::FixedPoint>(const FixedExtendedCell& cell, bool errors,
+                                                           const std::vector<measurement::Sample>& samples,
+                                                           const std::optional<measurement::StartingPoint>& start);
+
+}  // namespace bms::host_sim::replay_detail

@@ -1,0 +1,42 @@
+#include "measurement/recording.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace bms::measurement {
+
+namespace {
+
+std::int32_t micro(double value) {
+  if (std::isnan(value)) return no_reading;
+  constexpr double limit = std::numeric_limits<std::int32_t>::max();
+  return static_cast<std::int32_t>(std::llround(std::clamp(value * 1e6, -limit, limit)));
+}
+
+std::int16_t centidegrees(double value) {
+  if (std::isnan(value)) return no_temperature;
+  constexpr double limit = std::numeric_limits<std::int16_t>::max();
+  return static_cast<std::int16_t>(std::lround(std::clamp(value * 100, -limit, limit)));
+}
+
+bool is_voltage_of_the_cell(const Recording& r, std::size_t row) {
+  if (r.voltage_ref_v.empty() || r.current_ref_a.empty()) return true;
+  return !(r.current_ref_a[row] == 0 && std::isfinite(r.voltage_ref_v[row]));
+}
+
+}  // namespace
+
+std::vector<Sample> samples(const Recording& r) {
+  std::vector<Sample> out(r.rows());
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    out[k].time_us = static_cast<std::uint64_t>(std::llround((r.time_s[k] - r.time_s.front()) * 1e6));
+    out[k].current_ua = micro(r.current_a[k]);
+    if (!r.voltage_v.empty() && is_voltage_of_the_cell(r, k)) out[k].voltage_uv = micro(r.voltage_v[k]);
+    if (!r.temperature_c.empty()) out[k].temperature_cdegc = centidegrees(r.temperature_c[k]);
+  }
+  return out;
+}
+
+}  // namespace bms::measurement

@@ -1,0 +1,46 @@
+// A recording in memory: current, voltage and temperature over time, one column each. files/recording.hpp reads it from
+// CSV; replay, identification and diagnosis use the same columns.
+//
+// Row k: current_a is the mean current over the interval that ends at time_s (> 0 charges); voltage_v is sampled at
+// time_s. NaN is a missing reading; time_s has none.
+//
+// current_ref_a and voltage_ref_v are the readings of a trusted instrument in the same row. An open contactor is 0 A.
+// voltage_ref_v is measured at the terminals of the cell. With the contactor open it may be the voltage of a reference
+// source in place of the cell: in a row with current_ref_a = 0 and a voltage_ref_v, voltage_v is not the cell's.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "measurement/sample.hpp"
+
+namespace bms::measurement {
+
+/// A doubt about a recording that can be used nevertheless. The ids are part of the JSON output.
+struct Warning {
+  std::string id;    ///< "gap"; the list: measurement/recording_checks.hpp
+  std::string text;  ///< one sentence for the user
+};
+
+struct Recording {
+  std::string path;            ///< for messages
+  std::vector<double> time_s;  ///< does not decrease
+  std::vector<double> current_a;
+  std::vector<double> voltage_v;      ///< empty: a profile
+  std::vector<double> temperature_c;  ///< empty: not recorded
+  std::vector<double> soc_ref;        ///< reference state of charge, 0 .. 1; empty: unknown
+  std::vector<double> current_ref_a;  ///< NaN: no reading; empty: no such column
+  std::vector<double> voltage_ref_v;  ///< NaN: no reading; empty: no such column
+  std::vector<Warning> warnings;
+  double read_mb_per_second = 0;  ///< speed of reading and parsing the file
+
+  std::size_t rows() const { return time_s.size(); }
+  double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }
+};
+
+/// The recording as the estimator receives it: integers in micro-units, time from the first row. A voltage that may be
+/// a reference source's is left out.
+std::vector<Sample> samples(const Recording& recording);
+
+}  // namespace bms::measurement

@@ -1,0 +1,131 @@
+#include "measurement/recording_checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <fmt/format.h>
+
+#include "measurement/statistics.hpp"
+
+namespace bms::measurement {
+
+namespace {
+
+constexpr double gap_steps = 10;               ///< a longer step is a gap, in median steps
+constexpr double inverted_correlation = -0.3;  ///< of the steps of current and voltage
+constexpr double soc_ref_min = -0.5, soc_ref_max = 1.5;
+constexpr double millivolt_factor = 100;   ///< median voltage over the cell's largest voltage
+constexpr double milliampere_factor = 20;  ///< median current over the cell's largest current
+constexpr double largest_c_rate = 60;      ///< [1/h] no cell sustains more
+constexpr double voltage_margin_v = 0.05;  ///< beyond the limits of the cell file
+constexpr double current_margin_factor = 1.05;
+
+void check_time(Recording& r) {
+  std::vector<double> steps;
+  steps.reserve(r.rows());
+  std::size_t duplicates = 0, first_duplicate = 0;
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    const double step = r.time_s[k] - r.time_s[k - 1];
+    if (step > 0)
+      steps.push_back(step);
+    else if (duplicates++ == 0)
+      first_duplicate = k;
+  }
+  if (duplicates > 0) {
+    r.warnings.push_back(
+        {"duplicate_time",
+         fmt::format("rows that repeat the time of the previous row: {}, the first at {:g} s; they are not used",
+                     duplicates, r.time_s[first_duplicate])});
+  }
+  const double largest_s = gap_steps * upper_median(steps);
+  std::size_t gaps = 0, first_gap = 0;
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    if (r.time_s[k] - r.time_s[k - 1] > largest_s && gaps++ == 0) first_gap = k;
+  }
+  if (gaps > 0) {
+    r.warnings.push_back({"gap", fmt::format("gaps longer than {:g} s: {}, the first after {:g} s", largest_s, gaps,
+                                             r.time_s[first_gap - 1])});
+  }
+}
+
+/// The voltage of a cell rises where its current rises. If it falls, the recording has the other sign convention.
+void check_sign(Recording& r) {
+  double product = 0, current2 = 0, voltage2 = 0;
+  for (std::size_t k = 1; k < r.voltage_v.size(); ++k) {
+    const double di = r.current_a[k] - r.current_a[k - 1], dv = r.voltage_v[k] - r.voltage_v[k - 1];
+    if (std::isnan(di) || std::isnan(dv)) continue;
+    product += di * dv;
+    current2 += di * di;
+    voltage2 += dv * dv;
+  }
+  if (product < inverted_correlation * std::sqrt(current2 * voltage2) && product < 0) {
+    r.warnings.push_back({"current_inverted",
+                          "the voltage falls where the current rises: the sign of the current looks inverted, "
+                          "expected current_a > 0 while charging"});
+  }
+}
+
+std::size_t count_outside(const std::vector<double>& values, double low, double high) {
+  return static_cast<std::size_t>(
+      std::count_if(values.begin(), values.end(), [&](double v) { return v < low || v > high; }));
+}
+
+void warn_outside(Recording& r, std::size_t count, const std::string& what, double low, double high,
+                  const std::string& unit) {
+  if (count == 0) return;
+  r.warnings.push_back(
+      {"outside_cell_range", fmt::format("{} outside the cell's {} to {} {}: {}", what, low, high, unit, count)});
+}
+
+void check_voltage(Recording& r, const model::Limits& limits) {
+  const double usual_v = upper_median(r.voltage_v);
+  if (usual_v > millivolt_factor * limits.voltage_max_v) {
+    r.warnings.push_back(
+        {"voltage_in_mv",
+         fmt::format("voltages around {:g} look like millivolts, expected volts; they are not used", usual_v)});
+    return;
+  }
+  warn_outside(
+      r, count_outside(r.voltage_v, limits.voltage_min_v - voltage_margin_v, limits.voltage_max_v + voltage_margin_v),
+      "voltages", limits.voltage_min_v, limits.voltage_max_v, "V");
+}
+
+void check_current(Recording& r, const model::CellParameters<>& cell) {
+  const model::Limits& limits = cell.limits;
+  std::vector<double> magnitudes;
+  for (const double i : r.current_a) {
+    if (std::abs(i) > 0) magnitudes.push_back(std::abs(i));
+  }
+  const double usual_a = upper_median(magnitudes);
+  const double largest_a = std::max(limits.charge_current_max_a, limits.discharge_current_max_a);
+  if (usual_a > milliampere_factor * largest_a || usual_a > largest_c_rate * cell.capacity_ah) {
+    r.warnings.push_back(
+        {"current_in_ma", fmt::format("currents around {:g} look like milliamperes, expected amperes", usual_a)});
+    return;
+  }
+  warn_outside(r,
+               count_outside(r.current_a, -current_margin_factor * limits.discharge_current_max_a,
+                             current_margin_factor * limits.charge_current_max_a),
+               "continuous currents", -limits.discharge_current_max_a, limits.charge_current_max_a, "A");
+}
+
+}  // namespace
+
+void check_recording(Recording& r) {
+  check_time(r);
+  check_sign(r);
+  if (count_outside(r.soc_ref, soc_ref_min, soc_ref_max) > 0) {
+    r.warnings.push_back(
+        {"soc_ref_in_percent", "soc_ref is far outside 0 to 1: it looks like percent, expected a fraction"});
+  }
+}
+
+void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
+  check_voltage(r, cell.limits);
+  check_current(r, cell);
+  warn_outside(r, count_outside(r.temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c),
+               "temperatures", cell.limits.temperature_min_c, cell.limits.temperature_max_c, "degrees C");
+}
+
+}  // namespace bms::measurement

@@ -1,0 +1,26 @@
+// Plausibility of a recording: what looks wrong, but can be used. Each finding becomes a warning of the recording.
+//
+//   id                    the recording                                             found by
+//   duplicate_time        has rows with the time of the previous row                check_recording
+//   gap                   has a time step far above the median                      check_recording
+//   current_inverted      has a voltage that falls where the current rises          check_recording
+//   soc_ref_in_percent    has a soc_ref far outside 0 .. 1                          check_recording
+//   voltage_in_mv         has voltages that only make sense in millivolts           compare_with_cell
+//   current_in_ma         has currents that only make sense in milliamperes         compare_with_cell
+//   outside_cell_range    has values outside the limits of the cell file            compare_with_cell
+//   ignored_column        has columns that are not used                             files::parse_recording
+//   missing_reading       has readings that are 'nan'                               files::parse_recording
+#pragma once
+
+#include "measurement/recording.hpp"
+#include "model/cell_parameters.hpp"
+
+namespace bms::measurement {
+
+/// Adds the warnings that need no cell: time, sign of the current, unit of soc_ref.
+void check_recording(Recording& recording);
+
+/// Adds the warnings that need the limits and the capacity of a cell: units, values outside its range.
+void compare_with_cell(Recording& recording, const model::CellParameters<>& cell);
+
+}  // namespace bms::measurement

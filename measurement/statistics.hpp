@@ -1,0 +1,52 @@
+// Statistics of a list of values, for the host. NaN is a missing value and is left out.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace bms::measurement {
+
+/// The element at index floor(fraction * n) of the n sorted values, 0 <= fraction < 1. NaN if there is no value.
+template <class Real>
+Real quantile(std::vector<Real> values, double fraction) {
+  std::erase_if(values, [](Real v) { return std::isnan(v); });
+  if (values.empty()) return std::numeric_limits<Real>::quiet_NaN();
+  const auto index = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), values.begin() + index, values.end());
+  return values[static_cast<std::size_t>(index)];
+}
+
+/// The element at index n / 2 of the n sorted values: for an even n the larger one of the two in the middle. NaN if
+/// there is no value.
+template <class Real>
+Real upper_median(const std::vector<Real>& values) {
+  return quantile(values, 0.5);
+}
+
+/// For an even number of values the mean of the two in the middle. NaN if there is no value.
+template <class Real>
+Real median(std::vector<Real> values) {
+  std::erase_if(values, [](Real v) { return std::isnan(v); });
+  if (values.empty()) return std::numeric_limits<Real>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+/// Root mean square. 0 if there is no value.
+inline double rms(std::span<const double> values) {
+  double squares = 0;
+  std::size_t count = 0;
+  for (const double v : values) {
+    if (std::isnan(v)) continue;
+    squares += v * v;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0;
+}
+
+}  // namespace bms::measurement

@@ -1,0 +1,62 @@
+#include "study/paper_tables.hpp"
+
+#include <charconv>
+#include <map>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+
+namespace bms::study {
+
+namespace {
+
+std::vector<std::string> fields_of(const std::string& line) {
+  std::vector<std::string> fields;
+  std::istringstream in(line);
+  for (std::string field; std::getline(in, field, ',');) fields.push_back(field);
+  return fields;
+}
+
+}  // namespace
+
+PaperTable::PaperTable(const std::string& text, const std::string& path) {
+  std::istringstream lines(text);
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    if (line.empty() || line.starts_with('#')) continue;
+    const std::vector<std::string> fields = fields_of(line);
+    if (columns_ == 0) {
+      if (fields.size() < 2) throw files::BadInput(path, number, "one column, expected a header with two or more");
+      columns_ = fields.size() - 1;
+      continue;
+    }
+    if (fields.size() != columns_ + 1)
+      throw files::BadInput(path, number,
+                            fmt::format("{} fields, expected {} as in the header", fields.size(), columns_ + 1));
+    std::vector<double>& row = rows_.emplace_back();
+    for (std::size_t k = 1; k < fields.size(); ++k) {
+      const char* const end = fields[k].data() + fields[k].size();
+      double value = 0;
+      if (const auto [stop, error] = std::from_chars(fields[k].data(), end, value); error != std::errc() || stop != end)
+        throw files::BadInput(path, number, fmt::format("'{}' is not a number, expected a number", fields[k]));
+      row.push_back(value);
+    }
+  }
+  if (rows_.empty())
+    throw files::BadInput(path, std::max<std::size_t>(number, 1), "no rows, expected a header and rows");
+}
+
+const PaperTable& paper_table(int number) {
+  static const std::map<std::string, PaperTable> tables = [] {
+    std::map<std::string, PaperTable> all;
+    for (const PaperTableText& file : paper_table_texts())
+      all.emplace(file.name, PaperTable(file.text, "study/paper/" + file.name + ".csv"));
+    return all;
+  }();
+  return tables.at(fmt::format("table{}", number));
+}
+
+}  // namespace bms::study
