@@ -96,7 +96,7 @@ TEST(DiagnosisPage, ShowsWhatWhereHowMuchBeforeAndAfterWhyAndWhatRemains) {
   EXPECT_GE(count(dom, "<svg"), 8U);  // strip and its scale, how much, before and after, why, remains, regimes, limits
   EXPECT_THAT(dom, HasSubstr("charged or discharged last"));
   EXPECT_THAT(dom, HasSubstr("of the mismatch explained"));
-  EXPECT_THAT(dom, HasSubstr("not used: r.csv"));
+  EXPECT_THAT(dom, HasSubstr("hold-out: r.csv"));
   EXPECT_THAT(dom, HasSubstr("slow_polarisation"));
   EXPECT_EQ(count(dom, "NaN"), count(content(folder.path() / "report.html"), "NaN")) << "no coordinate is lost";
 }
@@ -107,7 +107,7 @@ TEST(DiagnosisPage, WithoutAMismatchItShowsWhatWouldHaveShown) {
   const std::string dom = diagnosis_dom("", "", folder);
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
   EXPECT_THAT(dom, HasSubstr("NO MISMATCH"));
-  EXPECT_THAT(dom, HasSubstr("what chance does not reach"));
+  EXPECT_THAT(dom, HasSubstr("threshold of significance"));
   EXPECT_GE(count(dom, "<canvas"), 4U);
 }
 
