@@ -1,7 +1,6 @@
 #include "proof/proof_lab.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 
@@ -9,9 +8,11 @@
 
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
+#include "files/text_file.hpp"
 #include "images/child_process.hpp"
-#include "tool/command_identify.hpp"
+#include "workflow/diagnose_recordings.hpp"
 #include "workflow/diagnosis_comparison.hpp"
+#include "workflow/identify_cell.hpp"
 
 namespace bms::proof {
 
@@ -22,11 +23,8 @@ using model::catalogue;
 workflow::RecordingComparison begun(const files::Recording& r, const files::CellFile& cell) {
   if (r.soc_ref.empty() || !std::isfinite(r.soc_ref.front()))
     throw files::BadInput(r.path, 1, "no soc_ref at the start, expected the reference state of charge");
-  return {r,
-          workflow::record_of(r, std::filesystem::path(r.path).stem().string(), cell.parameters, r.soc_ref.front(),
-                              std::max(cell.parameters.tolerance.initial_soc, 1e-4), true),
-          {},
-          {}};
+  return workflow::prepared(r, std::filesystem::path(r.path).stem().string(), cell,
+                            workflow::given_start(cell, r.soc_ref.front()));
 }
 
 }  // namespace
@@ -44,15 +42,14 @@ const files::CellFile& ProofLab::identified(const std::string& name, const std::
   return cells_.get(name, [&] {
     report_progress(0, "identifying " + name);
     const images::TemporaryFolder folder;
-    tool::IdentifyOptions options;
+    workflow::IdentifyOptions options;
     for (const std::string& slow : ocv) options.ocv.push_back(path(slow));
     options.recordings = {path(recording)};
     options.start = "a123_26650";
-    options.window = "0.95:0.15";
+    options.window = {0.95, 0.15};
     options.name = name;
     options.out = (folder.path() / "cell.toml").string();
-    options.output.quiet = true;
-    tool::run(options);
+    files::write_file(options.out, files::cell_text(*workflow::identify_cell(options).cell_file));
     return files::read_cell(options.out);
   });
 }
@@ -72,14 +69,10 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
                                                     const std::vector<files::Recording>& list) {
   const std::string key = cell.name + ": " + name;
   return *diagnoses_.get(key, [&] {
-    const auto begin = std::chrono::steady_clock::now();
-    auto r = std::make_shared<workflow::DiagnoseResult>();
-    r->cell = cell;
-    std::vector<diagnosis::PreparedRecording> records;
+    workflow::DiagnoseInput input{cell, {}, {}, {}};
     double rows = 0;
     for (const files::Recording& recording : list) {
-      r->recordings.push_back(begun(recording, cell));
-      records.push_back(r->recordings.back().record);
+      input.recordings.push_back(begun(recording, cell));
       rows += static_cast<double>(recording.rows());
     }
     diagnosis::Options how;
@@ -88,15 +81,9 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
       report_progress(rows * std::max(0.0, done - reported), key);
       reported = std::max(reported, done);
     };
-    r->diagnosis = diagnosis::diagnose(cell.parameters, cell.mechanisms, records, how);
+    auto r = std::make_shared<workflow::DiagnoseResult>(workflow::diagnose_recordings(std::move(input), how));
     report_progress(rows * (1 - reported), key);
-    diagnosis::describe(r->diagnosis, cell.parameters, records);
-    workflow::compare(*r);
-    r->baseline = workflow::figures(r->recordings, &workflow::RecordingComparison::base_v);
-    r->extended = workflow::figures(r->recordings, &workflow::RecordingComparison::extended_v);
-    r->extended_cell = workflow::extended_cell(*r);
     r->extended_cell.name = key + " (extended)";  // names diagnoses made with it
-    r->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return r;
   });
 }

@@ -231,9 +231,9 @@ TEST_F(DiagnoseTool, ABrokenRecordingIsADataFaultWithItsPlace) {
 
 TEST_F(DiagnoseTool, SaysWhereTheStartWasTakenFrom) {
   const json referenced = result("--cell table9 --recording " + shift);
-  EXPECT_THAT(referenced["warnings"].dump(), HasSubstr("starts at soc_ref's first value, 98.0 %"));
+  EXPECT_THAT(referenced["warnings"].dump(), HasSubstr("starts at the first value of soc_ref, 98.0 %"));
   const json read = result("--cell table9 --recording " + simulated("now.csv", hysteresis));
-  EXPECT_THAT(read["warnings"].dump(), HasSubstr("starts where the first voltage says"));
+  EXPECT_THAT(read["warnings"].dump(), HasSubstr("starts at the state of charge estimated from the first voltage"));
   EXPECT_GT(read["recordings"][0]["initial_soc_sigma"], 0.005);
   const json told = result("--cell table9 --initial-soc 0.97 --recording " + shift);
   EXPECT_EQ(told["recordings"][0]["initial_soc"], 0.97);
