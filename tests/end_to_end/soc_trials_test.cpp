@@ -1,5 +1,5 @@
-// The estimator on real recordings of which no drive went into its cell files, or only a window: what it must not fall
-// behind, and the same bits on the emulated board.
+// The estimator on real recordings that its cell files were not identified from, except for one window: limits of its
+// error, and bit equality on the emulated board.
 #include <algorithm>
 #include <vector>
 
@@ -64,7 +64,7 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
   EXPECT_GT(inside / samples_seen, 0.95);
   const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
   std::nth_element(sigmas.begin(), middle, sigmas.end());
-  EXPECT_LT(*middle, 0.02) << "always wide is no honesty";
+  EXPECT_LT(*middle, 0.02) << "a band that is always wide is useless";
 }
 
 TEST(SocTrials, AreBitEqualOnTheBoard) {
