@@ -14,10 +14,15 @@ namespace {
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
+double load_a(int second) {
+  if (second % 60 < 30) return -5.0;
+  return second % 60 < 40 ? 1.5 : -0.5;
+}
+
 /// Five minutes of a pulsed load.
 std::string short_drive(const std::filesystem::path& folder) {
   std::string csv = "time_s,current_a\n";
-  for (int k = 0; k <= 300; ++k) csv += fmt::format("{},{}\n", k, k % 60 < 30 ? -5.0 : k % 60 < 40 ? 1.5 : -0.5);
+  for (int k = 0; k <= 300; ++k) csv += fmt::format("{},{}\n", k, load_a(k));
   const auto path = folder / "drive.csv";
   files::write_file(path, csv);
   return path.string();

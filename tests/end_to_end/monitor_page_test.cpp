@@ -229,7 +229,8 @@ TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndLoadsNothingElse) {
       << "a point each half second: the last is of 299.5 s";
   EXPECT_GT(browser.value_of("charts.current.yAxisRange()[1] - charts.current.yAxisRange()[0]").get<double>(), 20);
   EXPECT_EQ(browser.value_of("document.querySelectorAll('#messages tr').length"), 9) << "a head and eight messages";
-  EXPECT_EQ(browser.value_of("document.getElementById('figure-cells').hidden"), true) << "this bus has no cell voltages";
+  EXPECT_EQ(browser.value_of("document.getElementById('figure-cells').hidden"), true)
+      << "this bus has no cell voltages";
   EXPECT_EQ(
       browser.value_of("document.body.innerText.includes('NaN') || document.body.innerText.includes('undefined')"),
       false);

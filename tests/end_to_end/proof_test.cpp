@@ -44,16 +44,15 @@ class ProofTool : public ::testing::Test {
       profile += std::to_string(300 * k) + "," + std::to_string(k < 5 || k > 372 ? 0 : current_a) + "\n";
     return profile;
   }
-  /// Pulses with a rest at the end.
+  /// Pulses of a minute, with a rest at the start and at the end.
+  static double current_a(int k) {
+    if (k < 30 || k > 420) return 0;
+    if (k % 60 < 30) return -2.5;
+    return k % 60 < 45 ? 1.5 : 0.005;
+  }
   static std::string drive(double scale) {
     std::string profile = "time_s,current_a\n";
-    for (int k = 0; k < 500; ++k)
-      profile += std::to_string(k) + "," +
-                 std::to_string(k < 30 || k > 420 ? 0
-                                                  : scale * (k % 60 < 30   ? -2.5
-                                                             : k % 60 < 45 ? 1.5
-                                                                           : 0.005)) +
-                 "\n";
+    for (int k = 0; k < 500; ++k) profile += std::to_string(k) + "," + std::to_string(scale * current_a(k)) + "\n";
     return profile;
   }
   void small_folder() const {
