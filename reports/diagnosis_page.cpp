@@ -354,10 +354,11 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
     files += (files.empty() ? "" : ", ") + c.record.name;
     hours += c.record.duration_s() / 3'600;
   }
-  json report = {{"verdict", name_of(d.verdict)},
-                 {"statement", d.statement},
-                 {"named", r.named()},
-                 {"subtitle", fmt::format("{} ({:.1f} h) against the cell file of {}", files, hours, r.cell.name)}};
+  json report = {
+      {"verdict", name_of(d.verdict)},
+      {"statement", d.statement},
+      {"named", r.named()},
+      {"subtitle", fmt::format("{} ({:.1f} h), compared with the cell file of {}", files, hours, r.cell.name)}};
   report["warnings"] = json::array();
   for (const files::Warning& w : r.warnings) report["warnings"].push_back(without_folder(w.text, r));
   report["faults"] = json::array();
