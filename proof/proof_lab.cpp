@@ -1,7 +1,6 @@
 #include "proof/proof_lab.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 
@@ -10,31 +9,24 @@
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
-#include "identification/identify.hpp"
+#include "workflow/diagnose_recordings.hpp"
 #include "workflow/diagnosis_comparison.hpp"
-#include "workflow/identification_data.hpp"
-#include "workflow/identified_cell.hpp"
+#include "workflow/identify_cell.hpp"
 
 namespace bms::proof {
 
 namespace {
 
-namespace id = identification;
 using model::catalogue;
 
-constexpr double ocv_error_v = 0.002;  ///< largest error of the OCV's straight pieces
 constexpr workflow::SocWindow identified_window{.high = 0.95, .low = 0.15};
-constexpr double smallest_initial_soc_sigma = 1e-4;
 
 /// A recording that starts from its reference state of charge.
 workflow::RecordingComparison prepared(const measurement::Recording& r, const files::CellFile& cell) {
   if (r.soc_ref.empty() || !std::isfinite(r.soc_ref.front()))
     throw files::BadInput(r.path, 1, "no soc_ref at the start, expected the reference state of charge");
-  return {r,
-          workflow::record_of(r, std::filesystem::path(r.path).stem().string(), cell.parameters, r.soc_ref.front(),
-                              std::max(cell.parameters.tolerance.initial_soc, smallest_initial_soc_sigma), true),
-          {},
-          {}};
+  return workflow::prepared(r, std::filesystem::path(r.path).stem().string(), cell,
+                            workflow::given_start(cell, r.soc_ref.front()));
 }
 
 /// "ocv_hysteresis: half_gap_v 18.4 +- 0.4 mV; or slow_polarisation".
@@ -64,36 +56,14 @@ const files::CellFile& ProofLab::built_in(const std::string& name) {
 const files::CellFile& ProofLab::identified(const IdentifiedCell& cell) {
   return cells_.get(cell.name, [&] {
     report_progress(0, "identifying " + cell.name);
-    return identify(cell);
+    workflow::IdentifyOptions options;
+    for (const std::string& slow : cell.ocv) options.ocv.push_back(path(slow));
+    options.recordings = {path(cell.drive)};
+    options.start = "a123_26650";
+    options.window = identified_window;
+    options.name = cell.name;
+    return files::parse_cell(files::cell_text(*workflow::identify_cell(options).cell_file), cell.name);
   });
-}
-
-files::CellFile ProofLab::identify(const IdentifiedCell& wanted) {
-  files::CellFile cell = files::read_cell("a123_26650");
-  const double start_capacity_ah = cell.parameters.capacity_ah;
-  std::vector<std::string> slow_runs;
-  for (const std::string& name : wanted.ocv) slow_runs.push_back(path(name));
-  workflow::identify_ocv(slow_runs, ocv_error_v, false, cell);
-
-  const measurement::Recording drive = recording(wanted.drive);
-  const workflow::IdentificationData data =
-      workflow::identification_data(drive, {{}, identified_window, cell.parameters});
-  id::GreyBoxOptions options;
-  options.soc_nodes = id::nodes_for(data.soc_min, data.soc_max);
-  options.bounds = workflow::circuit_bounds(cell.parameters.capacity_ah);
-  options.estimate_ocv_branch = cell.parameters.ocv.half_gap_v.size > 0;
-  options.voltage_sigma_v = cell.parameters.noise.voltage_v;
-  const id::Identification found =
-      id::identify_grey_box(id::started_from_rests(cell.parameters, data.record.data, options.bounds), {data.record},
-                            options, id::Method::trust_region_reflective);
-
-  cell.name = wanted.name;
-  cell.parameters = found.cell;
-  workflow::identify_noise({drive}, found.estimation, found.parameters, cell.parameters);
-  cell.parameters.noise.current_offset_a *= cell.parameters.capacity_ah / start_capacity_ah;
-  cell.parameters.noise.current_unknown_a *= cell.parameters.capacity_ah / start_capacity_ah;
-  workflow::round_digits(cell);
-  return files::parse_cell(files::cell_text(cell), wanted.name);
 }
 
 const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
@@ -111,14 +81,10 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
                                                     const std::vector<measurement::Recording>& list) {
   const std::string key = cell.name + ": " + name;
   return *diagnoses_.get(key, [&] {
-    const auto begin = std::chrono::steady_clock::now();
-    auto r = std::make_shared<workflow::DiagnoseResult>();
-    r->cell = cell;
-    std::vector<diagnosis::PreparedRecording> records;
+    workflow::DiagnoseInput input{cell, {}, {}, {}};
     double rows = 0;
     for (const measurement::Recording& recording : list) {
-      r->recordings.push_back(prepared(recording, cell));
-      records.push_back(r->recordings.back().record);
+      input.recordings.push_back(prepared(recording, cell));
       rows += static_cast<double>(recording.rows());
     }
     diagnosis::Options options;
@@ -127,15 +93,9 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
       report_progress(rows * std::max(0.0, done - reported), key);
       reported = std::max(reported, done);
     };
-    r->diagnosis = diagnosis::diagnose(cell.parameters, cell.mechanisms, records, options);
+    auto r = std::make_shared<workflow::DiagnoseResult>(workflow::diagnose_recordings(std::move(input), options));
     report_progress(rows * (1 - reported), key);
-    diagnosis::describe(r->diagnosis, cell.parameters, records);
-    workflow::compare(*r);
-    r->baseline = workflow::figures(r->recordings, &workflow::RecordingComparison::base_v);
-    r->extended = workflow::figures(r->recordings, &workflow::RecordingComparison::extended_v);
-    r->extended_cell = workflow::extended_cell(*r);
     r->extended_cell.name = key + " (extended)";  // part of the names of the diagnoses made with it
-    r->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return r;
   });
 }

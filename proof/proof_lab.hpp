@@ -86,7 +86,6 @@ class ProofLab {
   std::vector<ProofDiagnosis> diagnoses() const;
 
  private:
-  files::CellFile identify(const IdentifiedCell& cell);
   void report_progress(double rows, const std::string& what);
 
   std::string folder_;

@@ -21,8 +21,8 @@ using diagnosis::text_of_mechanism;
 using model::catalogue;
 using nlohmann::json;
 
-constexpr std::size_t strip_bins = 600;     ///< over all recordings: a screen's width of the strip
-constexpr std::size_t chart_rows = 40'000;  ///< the same of the charts
+constexpr std::size_t strip_bins = 600;     ///< of the strip, over all recordings: the width of a screen
+constexpr std::size_t chart_rows = 40'000;  ///< of the charts, over all recordings
 constexpr std::size_t regime_bins = 30;
 
 json rounded(double value, int decimals) {
@@ -30,13 +30,15 @@ json rounded(double value, int decimals) {
   return std::isfinite(value) ? json(std::round(value * scale) / scale) : json(nullptr);
 }
 
+json rms_mv(const ErrorFigure& error) { return error.count() > 0 ? rounded(1e3 * error.rms(), 3) : json(nullptr); }
+
 json spans_of(const std::vector<model::Span>& spans) {
   json list = json::array();
   for (const model::Span& s : spans) list.push_back({rounded(s.start_s, 1), rounded(s.end_s, 1)});
   return list;
 }
 
-/// soc over a recording as the extended model has it; counted from the start where there is none.
+/// SOC over a recording by the extended model; by coulomb counting if there is no extended model.
 std::vector<double> soc_of(const workflow::DiagnoseResult& r, std::size_t n) {
   if (n < r.diagnosis.views.size() && r.diagnosis.views[n].soc.size() == r.recordings[n].record.size())
     return r.diagnosis.views[n].soc;
@@ -51,7 +53,7 @@ std::vector<double> soc_of(const workflow::DiagnoseResult& r, std::size_t n) {
   return soc;
 }
 
-/// One recording in bins of time: how far both models are off, and what was going on.
+/// One recording in bins of time: errors of both models, SOC, current and temperature.
 json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins) {
   const workflow::RecordingComparison& c = r.recordings[n];
   const diagnosis::PreparedRecording& record = c.record;
@@ -65,7 +67,7 @@ json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins
   for (std::size_t b = 0; b < bins; ++b) {
     ErrorFigure before, after;
     double low_a = std::nan(""), high_a = std::nan(""), sum_c = 0;
-    std::size_t warm = 0;
+    std::size_t temperatures = 0;
     const std::size_t first = k;
     for (; k < record.size() && (record.time_s[k] <= from_s + width_s * static_cast<double>(b + 1) || b + 1 == bins);
          ++k) {
@@ -73,15 +75,17 @@ json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins
       after.add(record.voltage_v[k] - c.extended_v[k]);
       low_a = std::fmin(low_a, record.current_a[k]);
       high_a = std::fmax(high_a, record.current_a[k]);
-      if (!record.temperature_c.empty() && std::isfinite(record.temperature_c[k]))
-        sum_c += record.temperature_c[k], ++warm;
+      if (record.temperature_c.empty() || !std::isfinite(record.temperature_c[k])) continue;
+      sum_c += record.temperature_c[k];
+      ++temperatures;
     }
-    strip["before_mv"].push_back(before.count() > 0 ? rounded(1e3 * before.rms(), 3) : json(nullptr));
-    strip["after_mv"].push_back(after.count() > 0 ? rounded(1e3 * after.rms(), 3) : json(nullptr));
+    strip["before_mv"].push_back(rms_mv(before));
+    strip["after_mv"].push_back(rms_mv(after));
     strip["soc"].push_back(k > first ? rounded(100 * soc[k - 1], 2) : json(nullptr));
     strip["low_a"].push_back(rounded(low_a, 4));
     strip["high_a"].push_back(rounded(high_a, 4));
-    strip["temperature_c"].push_back(warm > 0 ? rounded(sum_c / static_cast<double>(warm), 2) : json(nullptr));
+    strip["temperature_c"].push_back(temperatures > 0 ? rounded(sum_c / static_cast<double>(temperatures), 2)
+                                                      : json(nullptr));
   }
   if (n == 0) strip["spans"] = spans_of(r.diagnosis.spans);
   return strip;
@@ -124,11 +128,11 @@ json mechanisms(const workflow::DiagnoseResult& r) {
                             {"at_bound", k < f.at_bound.size() && f.at_bound[k] != 0}});
     }
     for (const std::size_t m : f.equivalent_to) rivals.push_back(text_of_mechanism(m).name);
-    const diagnosis::MechanismText& words = text_of_mechanism(f.setting.index);
+    const diagnosis::MechanismText& text = text_of_mechanism(f.setting.index);
     list.push_back({{"id", info.id},
-                    {"name", words.name},
-                    {"meaning", words.meaning},
-                    {"action", words.action},
+                    {"name", text.name},
+                    {"meaning", text.meaning},
+                    {"action", text.action},
                     {"because", f.because},
                     {"probability", rounded(f.probability, 3)},
                     {"rms_mv", rounded(1e3 * f.rms_contribution_v, 3)},
@@ -138,7 +142,7 @@ json mechanisms(const workflow::DiagnoseResult& r) {
   return list;
 }
 
-/// Of a set that differs from the best in one mechanism only that: "leakage for current_offset".
+/// Name of a candidate. A set that differs from the best in one mechanism is named by it: "leakage for current_offset".
 std::string candidate_name(const std::vector<std::size_t>& ids, const std::vector<std::size_t>& best) {
   const auto lacks = [](const std::vector<std::size_t>& set) {
     return [&set](std::size_t m) { return std::find(set.begin(), set.end(), m) == set.end(); };
@@ -158,7 +162,7 @@ json candidates(const workflow::DiagnoseResult& r) {
   std::set<std::string> seen;
   for (const diagnosis::Ranked& c : r.diagnosis.candidates) {
     const std::string name = candidate_name(c.ids, r.diagnosis.candidates.front().ids);
-    if (!seen.insert(name).second) continue;  // the same from another start
+    if (!seen.insert(name).second) continue;  // the same set, found from other initial values
     const bool tied =
         std::any_of(r.diagnosis.findings.begin(), r.diagnosis.findings.end(), [&](const diagnosis::Finding& f) {
           return std::find(c.ids.begin(), c.ids.end(), f.setting.index) == c.ids.end() &&
@@ -180,8 +184,8 @@ json figure(const std::string& name, const std::optional<workflow::OpenLoopFigur
 json figures(const workflow::DiagnoseResult& r) {
   json list = json::array();
   if (r.baseline_holdout && r.extended_holdout)
-    list.push_back(figure(r.holdouts.size() == 1 ? "not used: " + r.holdouts.front().record.name
-                                                 : fmt::format("{} recordings not used", r.holdouts.size()),
+    list.push_back(figure(r.holdouts.size() == 1 ? "hold-out: " + r.holdouts.front().record.name
+                                                 : fmt::format("{} hold-out recordings", r.holdouts.size()),
                           r.baseline_holdout, r.extended_holdout));
   if (r.baseline && r.extended)
     list.push_back(figure(r.recordings.size() == 1 ? "diagnosed: " + r.recordings.front().record.name
@@ -218,76 +222,100 @@ json charts(const workflow::DiagnoseResult& r) {
   return list;
 }
 
-/// How far the cell file is off over one axis, and how long the recordings were there.
+// ---- errors over an axis: SOC, current, temperature, time since a current step
+
 struct Axis {
   const char *id, *title, *unit;
   bool logarithmic;
 };
+constexpr Axis axes[] = {{"soc", "State of charge", "%", false},
+                         {"current_c", "Current, > 0 charges", "C", false},
+                         {"temperature_c", "Temperature", "°C", false},
+                         {"since_edge_s", "Time since a step of the current", "s", true}};
 
+/// Position on a logarithmic axis of time; half a second and less is the lowest.
+double log_position(double seconds) { return std::log10(std::max(seconds, 0.5)); }
+
+/// All rows of the recordings: the position on the axis (NaN: unknown) and the errors of both models, in V.
+struct AxisRows {
+  std::vector<double> at, before_v, after_v;
+};
+
+AxisRows rows_of(const workflow::DiagnoseResult& r, const Axis& axis) {
+  const double capacity_ah = r.cell.parameters.capacity_ah, step_a = 0.1 * capacity_ah;
+  const std::string_view id = axis.id;
+  AxisRows rows;
+  for (std::size_t n = 0; n < r.recordings.size(); ++n) {
+    const workflow::RecordingComparison& c = r.recordings[n];
+    const std::vector<double> soc = soc_of(r, n);
+    double known_a = 0, edge_s = c.record.time_s.front();
+    for (std::size_t k = 0; k < c.record.size(); ++k) {
+      const double previous_a = known_a;
+      if (std::isfinite(c.record.current_a[k])) known_a = c.record.current_a[k];
+      if (std::abs(known_a - previous_a) > step_a) edge_s = c.record.time_s[k];
+      double x = c.record.time_s[k] - edge_s;
+      if (id == "soc")
+        x = 100 * soc[k];
+      else if (id == "current_c")
+        x = known_a / capacity_ah;
+      else if (id == "temperature_c")
+        x = c.record.temperature_c.empty() ? std::nan("") : c.record.temperature_c[k];
+      rows.at.push_back(axis.logarithmic ? log_position(x) : x);
+      rows.before_v.push_back(c.record.voltage_v[k] - c.base_v[k]);
+      rows.after_v.push_back(c.record.voltage_v[k] - c.extended_v[k]);
+    }
+  }
+  return rows;
+}
+
+/// The range of an axis in which the diagnosis found most of the mismatch, on the scale of the picture.
+json found_range(const diagnosis::Regime& g, const Axis& axis) {
+  const auto place = [&](double x) {
+    if (g.axis == "soc") return 100 * x;
+    return axis.logarithmic ? log_position(x) : x;
+  };
+  return {{"from", rounded(place(g.from), 4)},
+          {"to", rounded(place(g.to), 4)},
+          {"share", rounded(g.share, 3)},
+          {"usual", rounded(g.usual, 3)}};
+}
+
+/// RMS errors and time in bins from `low` to `high`.
+json binned(const workflow::DiagnoseResult& r, const Axis& axis, const AxisRows& rows, double low, double high) {
+  std::vector<ErrorFigure> before(regime_bins), after(regime_bins);
+  for (std::size_t k = 0; k < rows.at.size(); ++k) {
+    if (!std::isfinite(rows.at[k])) continue;
+    const auto bin =
+        static_cast<std::size_t>(std::min((rows.at[k] - low) / (high - low) * regime_bins, regime_bins - 1.0));
+    before[bin].add(rows.before_v[k]);
+    after[bin].add(rows.after_v[k]);
+  }
+  json one = {{"title", axis.title},       {"unit", axis.unit},        {"logarithmic", axis.logarithmic},
+              {"low", rounded(low, 4)},    {"high", rounded(high, 4)}, {"before_mv", json::array()},
+              {"after_mv", json::array()}, {"time", json::array()}};
+  for (std::size_t b = 0; b < regime_bins; ++b) {
+    one["before_mv"].push_back(rms_mv(before[b]));
+    one["after_mv"].push_back(r.named() ? rms_mv(after[b]) : json(nullptr));
+    one["time"].push_back(rounded(static_cast<double>(before[b].count()) / static_cast<double>(rows.at.size()), 4));
+  }
+  for (const diagnosis::Regime& g : r.diagnosis.regimes) {
+    if (g.axis == axis.id) one["found"] = found_range(g, axis);
+  }
+  return one;
+}
+
+/// One picture per axis on which the recordings have a range.
 json regimes(const workflow::DiagnoseResult& r) {
-  constexpr Axis axes[] = {{"soc", "State of charge", "%", false},
-                           {"current_c", "Current, charging to the right", "C", false},
-                           {"temperature_c", "Temperature", "degrees C", false},
-                           {"since_edge_s", "Time since a step of the current", "s", true}};
-  const double capacity_ah = r.cell.parameters.capacity_ah;
   json list = json::array();
   for (const Axis& axis : axes) {
-    std::vector<double> at, before, after;
-    for (std::size_t n = 0; n < r.recordings.size(); ++n) {
-      const workflow::RecordingComparison& c = r.recordings[n];
-      const std::vector<double> soc = soc_of(r, n);
-      double known_a = 0, edge_s = c.record.time_s.front();
-      for (std::size_t k = 0; k < c.record.size(); ++k) {
-        const double previous_a = known_a;
-        if (std::isfinite(c.record.current_a[k])) known_a = c.record.current_a[k];
-        if (std::abs(known_a - previous_a) > 0.1 * capacity_ah) edge_s = c.record.time_s[k];
-        const std::string_view id = axis.id;
-        double x = c.record.time_s[k] - edge_s;
-        if (id == "soc")
-          x = 100 * soc[k];
-        else if (id == "current_c")
-          x = known_a / capacity_ah;
-        else if (id == "temperature_c")
-          x = c.record.temperature_c.empty() ? std::nan("") : c.record.temperature_c[k];
-        if (axis.logarithmic) x = std::log10(std::max(x, 0.5));
-        at.push_back(x);
-        before.push_back(c.record.voltage_v[k] - c.base_v[k]);
-        after.push_back(c.record.voltage_v[k] - c.extended_v[k]);
-      }
-    }
+    const AxisRows rows = rows_of(r, axis);
     double low = 1e300, high = -1e300;
-    for (const double x : at) {
-      if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
+    for (const double x : rows.at) {
+      if (!std::isfinite(x)) continue;
+      low = std::min(low, x);
+      high = std::max(high, x);
     }
-    if (!(high - low > 1e-6)) continue;
-    std::vector<ErrorFigure> error_before(regime_bins), error_after(regime_bins);
-    for (std::size_t k = 0; k < at.size(); ++k) {
-      if (!std::isfinite(at[k])) continue;
-      const auto bin =
-          static_cast<std::size_t>(std::min((at[k] - low) / (high - low) * regime_bins, regime_bins - 1.0));
-      error_before[bin].add(before[k]);
-      error_after[bin].add(after[k]);
-    }
-    json one = {{"title", axis.title},       {"unit", axis.unit},        {"logarithmic", axis.logarithmic},
-                {"low", rounded(low, 4)},    {"high", rounded(high, 4)}, {"before_mv", json::array()},
-                {"after_mv", json::array()}, {"time", json::array()}};
-    for (std::size_t b = 0; b < regime_bins; ++b) {
-      one["before_mv"].push_back(error_before[b].count() > 0 ? rounded(1e3 * error_before[b].rms(), 3) : json(nullptr));
-      one["after_mv"].push_back(r.named() && error_after[b].count() > 0 ? rounded(1e3 * error_after[b].rms(), 3)
-                                                                        : json(nullptr));
-      one["time"].push_back(rounded(static_cast<double>(error_before[b].count()) / static_cast<double>(at.size()), 4));
-    }
-    for (const diagnosis::Regime& g : r.diagnosis.regimes) {
-      if (g.axis != axis.id) continue;
-      const auto place = [&](double x) {
-        return g.axis == "soc" ? 100 * x : axis.logarithmic ? std::log10(std::max(x, 0.5)) : x;
-      };
-      one["found"] = {{"from", rounded(place(g.from), 4)},
-                      {"to", rounded(place(g.to), 4)},
-                      {"share", rounded(g.share, 3)},
-                      {"usual", rounded(g.usual, 3)}};
-    }
-    list.push_back(std::move(one));
+    if (high - low > 1e-6) list.push_back(binned(r, axis, rows, low, high));
   }
   return list;
 }
@@ -306,7 +334,7 @@ json limits(const workflow::DiagnoseResult& r) {
   return list;
 }
 
-/// A warning with the file's name in place of its path.
+/// A warning with the file's name instead of its path.
 std::string without_folder(const std::string& text, const workflow::DiagnoseResult& r) {
   for (const auto* list : {&r.recordings, &r.holdouts}) {
     for (const workflow::RecordingComparison& c : *list) {
@@ -326,10 +354,11 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
     files += (files.empty() ? "" : ", ") + c.record.name;
     hours += c.record.duration_s() / 3'600;
   }
-  json report = {{"verdict", name_of(d.verdict)},
-                 {"statement", d.statement},
-                 {"named", r.named()},
-                 {"subtitle", fmt::format("{} ({:.1f} h) against the cell file of {}", files, hours, r.cell.name)}};
+  json report = {
+      {"verdict", name_of(d.verdict)},
+      {"statement", d.statement},
+      {"named", r.named()},
+      {"subtitle", fmt::format("{} ({:.1f} h), compared with the cell file of {}", files, hours, r.cell.name)}};
   report["warnings"] = json::array();
   for (const measurement::Warning& w : r.warnings) report["warnings"].push_back(without_folder(w.text, r));
   report["faults"] = json::array();
@@ -346,9 +375,9 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
   report["candidates"] = candidates(r);
   report["tie"] = diagnosis::decision::same;
   report["detected"] = diagnosis::decision::detected;
-  report["remains"] = {{"rmse_mv", rounded(1e3 * d.unexplained_rmse_v, 3)},
-                       {"share", rounded(d.unexplained_share, 4)},
-                       {"explained", rounded(d.explained_share, 4)}};
+  report["unexplained"] = {{"rmse_mv", rounded(1e3 * d.unexplained_rmse_v, 3)},
+                           {"share", rounded(d.unexplained_share, 4)},
+                           {"explained", rounded(d.explained_share, 4)}};
   report["regimes"] = regimes(r);
   report["limits"] = limits(r);
   report["not_testable"] = json::array();
@@ -360,7 +389,9 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
                                  {"command", diagnosis::command(*r.next)}}
                           : json(nullptr);
   report["charts"] = charts(r);
-  return page(embedded::diagnosis_html, embedded::diagnosis_js, "bms diagnose",
+  const std::string script = std::string(embedded::diagnosis_strip_js) + std::string(embedded::diagnosis_regimes_js) +
+                             std::string(embedded::diagnosis_js);
+  return page(embedded::diagnosis_html, script, "bms diagnose",
               in_script(report.dump(-1, ' ', false, json::error_handler_t::replace)));
 }
 

@@ -1,4 +1,4 @@
-// The page of a diagnosis: what it is, where, how much, before and after, why, what remains; then the curves.
+// The page of a diagnosis: cause, location, size, before and after, reason, unexplained residual; then the curves.
 #pragma once
 
 #include <string>

@@ -1,16 +1,13 @@
-// The report of an identification.
+// The page of bms identify.
 #pragma once
 
 #include <string>
-#include <vector>
 
-#include "identification/data.hpp"
-#include "reports/json_results.hpp"
+#include "workflow/identify_cell.hpp"
 
 namespace bms::reports {
 
-/// Parameters, figures, and how the voltage is followed. recordings: the first that was identified from, then those
-/// that validate.
-std::string identify_report(const IdentifyResult& result, const std::vector<identification::Data>& recordings);
+/// Parameters, goodness of fit and voltages, for the identification data and each validation recording.
+std::string identify_report(const workflow::IdentifyResult& result);
 
 }  // namespace bms::reports

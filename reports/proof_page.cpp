@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Six digits: more no screen shows.
+/// Six significant digits, more than a screen can show.
 json number(double value) {
   return std::isfinite(value) ? json(std::stod(fmt::format("{:.6g}", value))) : json(nullptr);
 }

@@ -1,4 +1,4 @@
-// The page of bms proof: every claim with its picture, then what each experiment shows.
+// The page of bms proof: every claim with its picture, then the plots of each experiment.
 #pragma once
 
 #include <string>

@@ -34,7 +34,7 @@ std::vector<std::size_t> shown_rows(const measurement::Recording& r, std::size_t
 
 std::string in_script(std::string json) {
   for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;)
-    json.replace(at, 1, "\\u003c");  // no </script> from a file's name
+    json.replace(at, 1, "\\u003c");  // a file name must not close the script element
   return json;
 }
 
@@ -43,7 +43,7 @@ namespace {
 using nlohmann::json;
 using Value = std::function<double(std::size_t)>;
 
-/// Rounded: digits that no screen shows would only make the page larger.
+/// Rounded, because further digits would only make the page larger.
 json column(const std::vector<std::size_t>& rows, int decimals, const Value& value) {
   const double scale = std::pow(10, decimals);
   json values = json::array();
@@ -73,9 +73,9 @@ json figures(const host_sim::ReplayResult& r) {
   percent_row("largest error", r.soc.max_error);
   percent_row("RMS error after 30 minutes", r.soc.rmse_after_30min);
   percent_row("largest error after 30 minutes", r.soc.max_error_after_30min);
-  percent_row("reference within two sigma", r.soc.within_2_sigma);
+  percent_row("samples with the reference within two sigma", r.soc.within_2_sigma);
   if (r.soc.current_offset_a)
-    row("current reads too high by, at the end",
+    row("offset of the current sensor at the end",
         fmt::format("{:+.0f} +- {:.0f} mA", 1e3 * *r.soc.current_offset_a, 1e3 * *r.soc.current_offset_sigma_a));
   group("Voltage");
   const host_sim::VoltageFigures& v = r.voltage;
@@ -88,9 +88,9 @@ json figures(const host_sim::ReplayResult& r) {
   row("cell", r.cell.name);
   row("samples", fmt::format("{}", r.track.rows.size()));
   row("duration", fmt::format("{:.2f} h", r.recording.duration_s() / 3600));
-  row("computed by", r.target == "host" ? "this machine" : "emulated " + r.target);
+  row("computed by", r.target == "host" ? "this computer" : "emulated " + r.target);
   row("arithmetic", host_sim::name_of(r.scalar));
-  if (r.verified_against) row("bit for bit equal on", *r.verified_against);
+  if (r.verified_against) row("bit-identical on", *r.verified_against);
   return f;
 }
 
@@ -119,7 +119,7 @@ std::string data(const host_sim::ReplayResult& r) {
   return in_script(text_of(page));
 }
 
-/// The page with its places filled in, each once.
+/// The page with each @NAME@ replaced by its content.
 std::string filled(std::string_view page, const std::function<std::string(std::string_view)>& content) {
   std::string out;
   while (true) {
@@ -140,19 +140,20 @@ std::string statement(const host_sim::ReplayResult& r) {
                                  r.recording.duration_s() / 3600, 100 * r.soc.final, 100 * r.soc.final_sigma);
   if (r.soc.rmse) {
     text += fmt::format(
-        " Against the reference the estimate was off by {:.2f} % RMS, {:.2f} % at most; the reference lies within two "
-        "sigma in {:.0f} % of the samples.",
+        " Its error against the reference was {:.2f} % RMS, {:.2f} % at most; the reference is within two sigma for "
+        "{:.0f} % of the samples.",
         100 * *r.soc.rmse, 100 * *r.soc.max_error, 100 * *r.soc.within_2_sigma);
   }
   if (r.soc.current_offset_a && std::abs(*r.soc.current_offset_a) > 2 * *r.soc.current_offset_sigma_a) {
-    text += fmt::format(" By then the current seemed to read {:.0f} mA too {} (standard deviation {:.0f} mA).",
-                        1e3 * std::abs(*r.soc.current_offset_a), *r.soc.current_offset_a < 0 ? "low" : "high",
+    text += fmt::format(" The current sensor seems to read {} by {:.0f} mA (standard deviation {:.0f} mA).",
+                        *r.soc.current_offset_a < 0 ? "low" : "high", 1e3 * std::abs(*r.soc.current_offset_a),
                         1e3 * *r.soc.current_offset_sigma_a);
   }
-  if (r.verified_against)
-    text += fmt::format(" {} computed the same bits.", *r.verified_against == "log"
-                                                           ? std::string("The firmware that wrote the log")
-                                                           : "The emulated " + *r.verified_against);
+  if (r.verified_against) {
+    text += fmt::format(" {} computed bit-identical estimates.", *r.verified_against == "log"
+                                                                     ? std::string("The firmware that wrote the log")
+                                                                     : "The emulated " + *r.verified_against);
+  }
   return text;
 }
 

@@ -1,4 +1,4 @@
-// Reports: one HTML file each with its data, its plots and their script inside. Opens without a network.
+// Reports: one HTML file each, with data, plots and script inside. It opens without a network.
 #pragma once
 
 #include <cstddef>
@@ -12,21 +12,20 @@
 namespace bms::reports {
 
 std::string replay_report(const host_sim::ReplayResult& result);
-/// Tables and charts one below the other.
+/// A page of tables and charts, one below the other.
 std::string page_of(const files::PageContent& content);
 
-/// The frame of every page (report/page.html) around a body and its script. data: JSON that the script finds as
-/// `report`.
+/// The frame of every page (page/page.html) around a body and its script. data: JSON, which the script has as `report`.
 std::string page(std::string_view body, std::string_view script, std::string_view title, const std::string& data);
 
-/// JSON as it may stand inside a script.
+/// JSON that is safe inside a script element.
 std::string in_script(std::string json);
 
-/// Rows to show: all, or of each stretch its first and last and where voltage and current are lowest and highest, so
-/// that no peak is lost. More than `most` are thinned: a screen has a few thousand columns.
+/// Indices of the rows to draw: all, or about `most`. Of each stretch, the first and the last row and the extremes of
+/// voltage and current are drawn, so that no peak is lost.
 std::vector<std::size_t> shown_rows(const measurement::Recording& recording, std::size_t most = 40'000);
 
-/// One sentence for a person: where the state of charge ended, and how far it can be trusted.
+/// The result for a person: the state of charge at the end, with its uncertainty.
 std::string statement(const host_sim::ReplayResult& result);
 
 }  // namespace bms::reports

@@ -1,5 +1,4 @@
-#include "tool/command_flash.hpp"
-
+// bms flash: builds a board's image and writes it onto the chip with OpenOCD.
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
@@ -8,12 +7,19 @@
 #include "images/child_process.hpp"
 #include "images/firmware_image.hpp"
 #include "images/flash_plan.hpp"
+#include "tool/commands.hpp"
 
 namespace bms::tool {
 
 namespace {
 
-/// As a shell takes it.
+struct FlashOptions {
+  std::string board = "stm32f405_forklift", cell;  ///< cell empty: the board's own
+  std::string probe, serial;                       ///< probe empty: the board's own (BMS_PROBE in board.cmake)
+  bool dry_run = false;
+};
+
+/// The word with the quotes that a shell needs.
 std::string quoted(const std::string& word) {
   if (word.find_first_of(" {}'\"\\$;&|<>*?()") == std::string::npos) return word;
   std::string text = "'";
@@ -21,8 +27,9 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
-std::vector<images::PartFile> written_beside(const std::filesystem::path& image,
-                                             const std::vector<images::LoadedPart>& parts) {
+/// Writes each part to a file next to the image.
+std::vector<images::PartFile> write_parts(const std::filesystem::path& image,
+                                          const std::vector<images::LoadedPart>& parts) {
   std::vector<images::PartFile> files;
   for (const images::LoadedPart& part : parts) {
     files.push_back({part.address, fmt::format("{}.{:08x}.bin", image.string(), part.address)});
@@ -31,21 +38,21 @@ std::vector<images::PartFile> written_beside(const std::filesystem::path& image,
   return files;
 }
 
-}  // namespace
-
-int run(const FlashOptions& o) {
+/// Returns 0 if the image was written, compared and started, 1 if OpenOCD failed. Throws BadInput if OpenOCD, the probe
+/// or the board is missing.
+int flash(const FlashOptions& o) {
   images::Probe probe{o.probe, images::board_setting(o.board, "BMS_PROBE_TARGET"), o.serial};
   if (probe.interface.empty()) probe.interface = images::board_setting(o.board, "BMS_PROBE");
-  if (!o.dry_run && !images::in_path("openocd"))
+  if (!o.dry_run && !images::in_path("openocd")) {
     throw files::BadInput("openocd", 1,
-                          "not installed, expected OpenOCD (Debian: apt-get install openocd; ./bms flash does)");
-
+                          "not installed, expected OpenOCD (Debian: apt-get install openocd; ./bms flash installs it)");
+  }
   const auto image = images::firmware_image(
       o.board, files::read_cell(o.cell.empty() ? images::board_setting(o.board, "BMS_DEFAULT_CELL") : o.cell),
       images::chip_image(o.board));
   const images::ImageFile file(image);
   const auto storage = images::storage_of(file);
-  const auto parts = written_beside(image, images::parts_to_write(file.parts(), storage));
+  const auto parts = write_parts(image, images::parts_to_write(file.parts(), storage));
   const auto log = image.string() + ".openocd.log";
   const auto command = images::openocd_command(probe, parts, storage, image.string() + ".stored_before.bin");
   if (o.dry_run) {
@@ -56,7 +63,7 @@ int run(const FlashOptions& o) {
   }
   if (images::ChildProcess(command, log).wait() == 0) {
     fmt::print("{}: written, compared, started{}\n", image.string(),
-               storage ? "; the stored records are as they were" : "");
+               storage ? "; the stored records are unchanged" : "");
     return 0;
   }
   const images::FlashFailure failure = images::failure_in(files::read_file(log), probe);
@@ -64,5 +71,34 @@ int run(const FlashOptions& o) {
   fmt::print(stderr, "bms: {}: {}; OpenOCD's log is {}\n", o.board, failure.what, log);
   return 1;
 }
+
+class FlashCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c = *app.add_subcommand(
+        "flash", "Build a board's firmware, write it onto the chip with OpenOCD, compare it and reset the chip");
+    c.footer(
+        "The stored records in the flash are not erased.\n"
+        "Example: bms flash --board stm32f405_forklift --cell my_cell.toml");
+    c.add_option("--board", o_.board, "folder in boards/")->capture_default_str();
+    c.add_option("--cell", o_.cell, "cell file, or name of a built-in cell; the board's own if not given")
+        ->type_name("CELL");
+    c.add_option("--probe", o_.probe,
+                 "debug probe: stlink, cmsis-dap, jlink, ... (a file of OpenOCD's interface/); the board's own if not "
+                 "given");
+    c.add_option("--serial", o_.serial, "serial number of the probe, if there are several");
+    c.add_flag("--dry-run", o_.dry_run, "build, and print OpenOCD's command instead of running it");
+    return &c;
+  }
+
+  int run() override { return flash(o_); }
+
+ private:
+  FlashOptions o_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> flash_command() { return std::make_unique<FlashCommand>(); }
 
 }  // namespace bms::tool

@@ -1,24 +1,39 @@
-#include "tool/command_hil.hpp"
-
+// bms hil: firmware in the loop with a simulated pack or a recording.
 #include <cmath>
-#include <cstdio>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "files/bad_input.hpp"
 #include "files/recording.hpp"
+#include "measurement/recording_checks.hpp"
+#include "files/bad_input.hpp"
 #include "hil/session.hpp"
 #include "images/firmware_image.hpp"
-#include "measurement/recording_checks.hpp"
 #include "monitor/candump_line.hpp"
 #include "reports/report_page.hpp"
+#include "tool/commands.hpp"
+#include "tool/options.hpp"
 
 namespace bms::tool {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+struct HilOptions {
+  std::string board = "netduinoplus2";
+  std::string port;  ///< of a real board; empty: emulated
+  std::string cell = "table9", board_cell;
+  std::string profile, recording;  ///< one of the two
+  double initial_soc = 0.9;
+  std::optional<double> announced_soc;
+  double sample_period_s = 0.1;
+  unsigned seed = 1;
+  std::vector<std::string> faults;
+  std::string candump;
+  Output output;
+};
 
 std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, const hil::SessionResult& r) {
   Json faults = Json::array(), injection_results = Json::array(), warnings = Json::array();
@@ -61,29 +76,43 @@ std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, con
          "\n";
 }
 
+files::PageCell cell(const std::string& text) { return {text, {}, {}}; }
+
+files::PageTable fault_table(const hil::SessionResult& r) {
+  files::PageTable table{"faults", "Faults that the board reported", {"fault", "from, s", "to, s"}, {}, ""};
+  for (const hil::FaultEvent& f : r.faults) {
+    table.rows.push_back({cell(f.name), cell(fmt::format("{:.1f}", f.raised_at_s)),
+                          cell(f.cleared_at_s ? fmt::format("{:.1f}", *f.cleared_at_s) : "active at the end")});
+  }
+  return table;
+}
+
+/// "2.4", "not reported", or nothing if no fault is expected.
+std::string reaction_time(const hil::InjectionResult& x) {
+  if (x.after_s) return fmt::format("{:.1f}", *x.after_s);
+  return x.injection.expected.empty() ? "" : "not reported";
+}
+
+files::PageTable reaction_table(const hil::SessionResult& r) {
+  files::PageTable table{
+      "reactions", "Injected faults", {"injected", "expected fault", "within, s", "reported after, s"}, {}, ""};
+  for (const hil::InjectionResult& x : r.injection_results) {
+    const std::string& expected = x.injection.expected;
+    table.rows.push_back({cell(x.injection.text), cell(expected.empty() ? "no fault" : expected),
+                          cell(expected.empty() ? "" : fmt::format("{:.1f}", x.injection.within_s)),
+                          cell(reaction_time(x))});
+  }
+  return table;
+}
+
 std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, const hil::SessionResult& r,
                       const std::string& statement) {
-  files::PageTable faults{"faults", "Faults that the board told", {"fault", "from, s", "to, s"}, {}, ""},
-      injection_results{
-          "reactions", "What was broken on purpose", {"what", "expected", "within, s", "after, s"}, {}, ""};
-  for (const hil::FaultEvent& f : r.faults)
-    faults.rows.push_back({{f.name, {}, {}},
-                           {fmt::format("{:.1f}", f.raised_at_s), {}, {}},
-                           {f.cleared_at_s ? fmt::format("{:.1f}", *f.cleared_at_s) : "stays", {}, {}}});
-  for (const hil::InjectionResult& x : r.injection_results) {
-    injection_results.rows.push_back(
-        {{x.injection.text, {}, {}},
-         {x.injection.expected.empty() ? "no fault" : x.injection.expected, {}, {}},
-         {x.injection.expected.empty() ? "" : fmt::format("{:.1f}", x.injection.within_s), {}, {}},
-         {x.after_s                      ? fmt::format("{:.1f}", *x.after_s)
-          : x.injection.expected.empty() ? ""
-                                         : "not told",
-          {},
-          {}}});
-  }
-  files::PageChart soc{
-      "State of charge", {"told, %", "told + two sigma", "told - two sigma", "true, %"}, {}, {{}, {}, {}, {}}},
-      current{"Current, charging up", {"A"}, {}, {{}}}, volts{"Cells", {"lowest, V", "highest, V"}, {}, {{}, {}}};
+  files::PageChart soc{"State of charge",
+                       {"estimated, %", "estimated + two sigma", "estimated - two sigma", "true, %"},
+                       {},
+                       {{}, {}, {}, {}}};
+  files::PageChart current{"Current, > 0 charges", {"A"}, {}, {{}}};
+  files::PageChart volts{"Cell voltages", {"lowest, V", "highest, V"}, {}, {{}, {}}};
   for (const hil::TracePoint& p : r.trace) {
     for (files::PageChart* c : {&soc, &current, &volts}) c->time_s.push_back(p.time_s);
     soc.columns[0].push_back(100 * p.soc);
@@ -94,38 +123,41 @@ std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, c
     volts.columns[0].push_back(p.lowest_v);
     volts.columns[1].push_back(p.highest_v);
   }
-  files::PageContent page{"In the loop: " + options.board, statement, {}, {}, {soc, current, volts}};
+  files::PageContent page{"Hardware in the loop: " + options.board, statement, {}, {}, {soc, current, volts}};
   for (const measurement::Warning& w : plan.profile.warnings) page.warnings.push_back(w.text);
-  if (!faults.rows.empty()) page.tables.push_back(faults);
-  if (!injection_results.rows.empty()) page.tables.push_back(injection_results);
+  for (const files::PageTable& table : {fault_table(r), reaction_table(r)}) {
+    if (!table.rows.empty()) page.tables.push_back(table);
+  }
   return reports::page_of(page);
 }
 
 std::string statement_of(const hil::SessionResult& r) {
-  std::string text = fmt::format("{:.2f} h in the loop, {:.0f} times as fast as real: {} samples, {} frames",
+  std::string text = fmt::format("{:.2f} h in the loop, {:.0f} times real time: {} samples, {} frames",
                                  r.duration_s / 3'600, r.speedup, r.samples, r.frames);
   text += r.driving_after_s ? fmt::format(", contactors closed after {:.1f} s. ", *r.driving_after_s)
                             : ", contactors never closed. ";
-  text += fmt::format("State of charge told: {:.2f} % RMS, {:.2f} % at most, {:.1f} % of the time within two sigma.",
-                      100 * r.soc_rmse, 100 * r.soc_max_error, 100 * r.within_2_sigma);
-  if (r.cut_off_at_s)
+  text += fmt::format(
+      "Error of the published state of charge: {:.2f} % RMS, {:.2f} % at most; the true value is within two sigma for "
+      "{:.1f} % of the time.",
+      100 * r.soc_rmse, 100 * r.soc_max_error, 100 * r.within_2_sigma);
+  if (r.cut_off_at_s) {
     text += fmt::format(
-        " From {:.1f} s on the contactors were open while current flowed in the recording: what was told of the state "
-        "of charge since then is not judged.",
+        " At {:.1f} s the contactors opened while current flowed in the recording. The state of charge is not judged "
+        "after that.",
         *r.cut_off_at_s);
+  }
   std::size_t missed = 0;
   for (const hil::InjectionResult& x : r.injection_results) missed += x.in_time ? 0 : 1;
-  if (!r.injection_results.empty())
-    text += missed == 0 ? " Every fault that was put in was told in its time."
-                        : fmt::format(" {} of {} faults that were put in were not told in their time.", missed,
-                                      r.injection_results.size());
-  if (r.soc_wrong > 0) text += fmt::format(" {} times a wrong state of charge was told as valid.", r.soc_wrong);
+  if (!r.injection_results.empty() && missed == 0) text += " The board reported every injected fault in time.";
+  if (missed > 0) {
+    text +=
+        fmt::format(" The board did not report {} of {} injected faults in time.", missed, r.injection_results.size());
+  }
+  if (r.soc_wrong > 0) text += fmt::format(" It published a wrong state of charge as valid {} times.", r.soc_wrong);
   return text;
 }
 
-}  // namespace
-
-int run(const HilOptions& options) {
+hil::SessionPlan read(const HilOptions& options) {
   if (options.profile.empty() == options.recording.empty())
     throw files::BadInput("bms hil", 1, "one input needed, expected --profile or --recording");
   hil::SessionPlan plan;
@@ -142,41 +174,107 @@ int run(const HilOptions& options) {
   plan.sample_period_s = options.sample_period_s;
   plan.spread.seed = options.seed;
   for (const std::string& text : options.faults) plan.injections.push_back(hil::injection(text, plan.cells));
+  return plan;
+}
 
+/// dump: takes the board's frames in candump format if the options ask for them.
+hil::SessionResult compute(const HilOptions& options, const hil::SessionPlan& plan, std::string& dump) {
   const files::CellFile board_cell = options.board_cell.empty() ? plan.cell : files::read_cell(options.board_cell);
   const auto link =
       options.port.empty()
           ? hil::emulated_link(options.board, images::firmware_image(options.board, board_cell, images::Image::hil))
           : hil::serial_link(options.port);
-  std::string dump;
-  const auto keep = [&](double time_s, const can::Frame& f) {
+  const auto record = [&](double time_s, const can::Frame& f) {
     if (options.candump.empty()) return;
     monitor::append_dump_line(dump, monitor::to_bus_frame(f, std::llround(1e6 * time_s)), "can0");
   };
   const auto show = progress_on_terminal(1, [](double done, double left_s, const std::string&) {
     return fmt::format("in the loop: {:.0f} %, {:.0f} s left", 100 * done, std::isfinite(left_s) ? left_s : 0);
   });
-  const auto result = hil::run_session(*link, plan, keep, [&](double done) {
+  return hil::run_session(*link, plan, record, [&](double done) {
     if (show) show(done, "");
   });
+}
 
-  if (!options.candump.empty()) write_output(options.candump, dump);
+/// Returns the exit code: 1 if a fault was not reported in time, or a wrong state of charge was published as valid.
+int write(const HilOptions& options, const hil::SessionPlan& plan, const hil::SessionResult& result) {
+  const Output& output = options.output;
   const std::string statement = statement_of(result);
-  if (!options.output.json.empty()) write_output(options.output.json, json_of(options, plan, result));
-  if (!options.output.report.empty()) write_output(options.output.report, report_of(options, plan, result, statement));
-  print_summary(options.output, statement);
-  for (const hil::FaultEvent& f : result.faults)
-    print_summary(options.output, fmt::format("  {:>9.1f} s  {}{}", f.raised_at_s, f.name,
-                                              f.cleared_at_s ? fmt::format(", until {:.1f} s", *f.cleared_at_s) : ""));
-  if (!options.output.report.empty()) print_summary(options.output, "Report: " + options.output.report);
+  if (!output.json.empty()) write_output(output.json, json_of(options, plan, result));
+  if (!output.report.empty()) write_output(output.report, report_of(options, plan, result, statement));
+  print_summary(output, statement);
+  for (const hil::FaultEvent& f : result.faults) {
+    print_summary(output, fmt::format("  {:>9.1f} s  {}{}", f.raised_at_s, f.name,
+                                      f.cleared_at_s ? fmt::format(", until {:.1f} s", *f.cleared_at_s) : ""));
+  }
+  if (!output.report.empty()) print_summary(output, "Report: " + output.report);
   bool good = result.soc_wrong == 0;
   for (const hil::InjectionResult& x : result.injection_results) {
     if (x.in_time) continue;
     good = false;
-    fmt::print(stderr, "{}: expected {} within {:.1f} s, {}\n", x.injection.text, x.injection.expected,
-               x.injection.within_s, x.after_s ? fmt::format("it came after {:.1f} s", *x.after_s) : "it did not come");
+    fmt::print(
+        stderr, "{}: expected {} within {:.1f} s, {}\n", x.injection.text, x.injection.expected, x.injection.within_s,
+        x.after_s ? fmt::format("the board reported it after {:.1f} s", *x.after_s) : "the board did not report it");
   }
   return good ? 0 : 1;
 }
+
+class HilCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c = *app.add_subcommand(
+        "hil",
+        "Run the firmware in the loop with a simulated pack or a recording, and compare its CAN messages with the "
+        "true values");
+    c.footer(
+        "Faults: drop=P corrupt=P delay=P (fraction P of the frames to the board), cell_stuck=K cell_open=K "
+        "sense_wire=K cell_high=K cell_low=K (cell K),\n"
+        "current_stuck current_open temperature_open temperature_stuck overcurrent welded precharge_open silence; each "
+        "@START or @START-END in seconds\n"
+        "Example: bms hil --board netduinoplus2 --cell table9 --profile shift.csv --fault cell_open=3@600-660 --report "
+        "loop.html");
+    c.add_option("--board", o_.board, "folder in boards/; it is emulated unless --port names a real one")
+        ->capture_default_str();
+    c.add_option("--port", o_.port, "serial port of a board that speaks SLCAN")->type_name("DEVICE");
+    c.add_option("--cell", o_.cell, cell_help("cells of the simulated pack"))->capture_default_str();
+    c.add_option("--board-cell", o_.board_cell, "cell file for the board's firmware if it is not --cell")
+        ->type_name("CELL");
+    c.add_option("--profile", o_.profile, "current of the load: time_s, current_a, optionally temperature_c")
+        ->type_name("FILE");
+    c.add_option("--recording", o_.recording,
+                 "recording whose voltages are the cell voltages; its current flows while the contactors are closed")
+        ->type_name("FILE");
+    c.add_option("--initial-soc", o_.initial_soc, "state of charge of the pack at the start, 0..1")
+        ->check(Within(0.0, 1.0))
+        ->capture_default_str();
+    c.add_option("--announced-soc,--told-soc", o_.announced_soc,
+                 "initial state of charge that is sent to the board; not sent if not given")
+        ->check(Within(0.0, 1.0));
+    c.add_option("--sample-s", o_.sample_period_s, "sampling interval in s")
+        ->check(Within(0.01, 10.0))
+        ->capture_default_str();
+    c.add_option("--seed", o_.seed, "seed of the cells' spread and of the sensor noise")->capture_default_str();
+    c.add_option("--fault", o_.faults, "fault to inject; may be repeated")->type_name("NAME[=VALUE]@START[-END]");
+    c.add_option("--candump", o_.candump, "write the board's frames in the format of candump -L")->type_name("FILE");
+    add_output(c, o_.output);
+    return &c;
+  }
+
+  int run() override {
+    o_.output.set_own(o_.candump);
+    const hil::SessionPlan plan = read(o_);
+    std::string dump;
+    const hil::SessionResult result = compute(o_, plan, dump);
+    if (!o_.candump.empty()) write_output(o_.candump, dump);
+    return write(o_, plan, result);
+  }
+
+ private:
+  HilOptions o_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> hil_command() { return std::make_unique<HilCommand>(); }
 
 }  // namespace bms::tool

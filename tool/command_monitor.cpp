@@ -1,5 +1,4 @@
-#include "tool/command_monitor.hpp"
-
+// bms monitor: the CAN messages of the BMS, shown, logged and served as a page (monitor/).
 #include <poll.h>
 #include <unistd.h>
 
@@ -9,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -22,6 +22,8 @@
 #include "monitor/terminal.hpp"
 #include "reports/embedded_files.hpp"
 #include "reports/report_page.hpp"
+#include "tool/commands.hpp"
+#include "tool/options.hpp"
 
 namespace bms::tool {
 
@@ -30,10 +32,19 @@ namespace {
 using namespace monitor;
 using Clock = std::chrono::steady_clock;
 
-constexpr double screen_s = 0.2, page_s = 0.5, line_s = 1;
+constexpr double screen_s = 0.2, page_s = 0.5, line_s = 1, rate_s = 1;  ///< intervals of updates
 constexpr std::size_t buffer_bytes = 64 << 10;
 
-/// A file that grows while the monitor runs, line by line, so that what came before a power cut is there.
+struct MonitorOptions {
+  std::string source;  ///< monitor/frame_source.hpp
+  bool once = false;
+  std::optional<double> duration_s;  ///< by this computer's clock; for a log without a page by the log's own time
+  std::string csv, record;
+  std::optional<int> serve_port;  ///< 0: any free port
+  Output output;
+};
+
+/// A file that is written while the monitor runs, so that a power cut loses at most a second of it.
 class GrowingFile {
  public:
   explicit GrowingFile(const std::string& name) : name_(name) {
@@ -47,9 +58,9 @@ class GrowingFile {
   GrowingFile(const GrowingFile&) = delete;
   GrowingFile& operator=(const GrowingFile&) = delete;
 
-  bool wanted() const { return file_ != nullptr; }
+  bool is_open() const { return file_ != nullptr; }
   std::string& text() { return text_; }
-  /// Writes what has gathered; all: to the disk's door, else when it is much.
+  /// Writes the text so far; unless `all` is set, only once the buffer is full.
   void write(bool all) {
     if (file_ == nullptr || (!all && text_.size() < buffer_bytes)) return;
     if (std::fwrite(text_.data(), 1, text_.size(), file_) != text_.size() || std::fflush(file_) != 0) refuse();
@@ -65,10 +76,10 @@ class GrowingFile {
   std::FILE* file_ = nullptr;
 };
 
-/// True once every period of this machine's clock, or of seconds that it is told.
-class Every {
+/// A timer that is due once per period. The time is passed in: of this computer or of a log.
+class Timer {
  public:
-  explicit Every(double period_s) : period_s_(period_s) {}
+  explicit Timer(double period_s) : period_s_(period_s) {}
   bool due(double now_s) {
     if (begun_ && now_s >= last_s_ && now_s - last_s_ < period_s_) return false;
     last_s_ = now_s;
@@ -97,7 +108,7 @@ class Monitor {
         status_(BusState::find("Status")) {
     facts_.source = options.source;
     facts_.blocks = Terminal::shows_utf8();
-    csv_.text() += csv_.wanted() ? csv_head() : "";
+    csv_.text() += csv_.is_open() ? csv_head() : "";
     shown_ = !options.output.quiet && !options.output.uses_standard_output();
     if (options.serve_port) page_ = std::make_unique<LivePage>(live_page_html(), *options.serve_port);
     if (page_) fmt::print(options.output.uses_standard_output() ? stderr : stdout, "Page: {}\n", page_->url());
@@ -108,14 +119,14 @@ class Monitor {
   int run() {
     while (!done()) {
       const std::size_t n = source_->ended() ? 0 : source_->read(room_, wait_ms);
-      if (n == 0 && source_->ended()) poll(nullptr, 0, wait_ms);  // only the page goes on
+      if (n == 0 && source_->ended()) poll(nullptr, 0, wait_ms);  // only the page is left
       for (std::size_t k = 0; k < n && !satisfied(); ++k) receive(room_[k]);
       show(false);
     }
     finish();
     if (options_.once && !bus_.complete()) {
-      fmt::print(stderr, "{}: no complete picture in {:.1f} s and {} frames, {} of them of the BMS\n", options_.source,
-                 bus_.duration_s(), bus_.frames(), bus_.good());
+      fmt::print(stderr, "{}: no complete picture in {:.1f} s and {} frames, {} of them valid frames of the BMS\n",
+                 options_.source, bus_.duration_s(), bus_.frames(), bus_.good());
       return 1;
     }
     if (source_->live() && source_->ended()) {
@@ -140,16 +151,16 @@ class Monitor {
     if (page_ && !source_->live()) return page_done();
     return satisfied() || source_->ended();
   }
-  /// A log that has been read is still looked at; then the time is that of the page.
+  /// The page of a log stays up after the log has been read; --duration then counts this computer's time.
   bool page_done() const {
     return options_.once ? satisfied() || source_->ended() : options_.duration_s && elapsed_s() >= *options_.duration_s;
   }
 
   void receive(const BusFrame& frame) {
     const std::size_t message = bus_.receive(frame);
-    if (record_.wanted()) append_dump_line(record_.text(), frame, "can0");
+    if (record_.is_open()) append_dump_line(record_.text(), frame, "can0");
     if (message == status_) {
-      if (csv_.wanted()) csv_.text() += csv_row(bus_);
+      if (csv_.is_open()) csv_.text() += csv_row(bus_);
       if (page_) page_->add(bus_);
     }
     record_.write(false);
@@ -172,7 +183,7 @@ class Monitor {
       record_.write(true);
       csv_.write(true);
     }
-    if (page_ && page_every_.due(now_s)) page_->publish(json_of(as_of_now(), facts_, silent_s()));
+    if (page_ && page_timer_.due(now_s)) page_->publish(json_of(as_of_now(), facts_, silent_s()));
     if (terminal_) {
       if (screen_.due(now_s) || stop_.resized())
         terminal_->show(ansi_frame(screen(as_of_now(), facts_, Terminal::size())));
@@ -181,8 +192,8 @@ class Monitor {
     }
   }
 
-  /// For who looks: ages go on while the bus is silent. What is written goes by the frames' time alone, so that a
-  /// record gives the same.
+  /// The state for display, in which ages grow while the bus is silent. Files use the time of the frames alone, so that
+  /// a log of the same frames gives the same files.
   BusState as_of_now() const {
     BusState now = bus_;
     if (source_->live() && bus_.frames() > 0) now.advance_time(clock_us());
@@ -209,7 +220,7 @@ class Monitor {
     if (terminal_) {
       const auto picture = screen(as_of_now(), facts_, Terminal::size());
       terminal_.reset();
-      fmt::print("{}", plain_text(picture));  // stays on the terminal
+      fmt::print("{}", plain_text(picture));  // the last picture stays on the terminal
     }
     if (!options_.output.json.empty()) write_output(options_.output.json, json_of(bus_, facts_, silent_s()));
   }
@@ -226,20 +237,57 @@ class Monitor {
   std::unique_ptr<Terminal> terminal_;
   std::array<BusFrame, 256> room_{};
   Clock::time_point begin_ = Clock::now();
-  Every screen_{screen_s}, page_every_{page_s}, line_{line_s}, rate_{1};
+  Timer screen_{screen_s}, page_timer_{page_s}, line_{line_s}, rate_{rate_s};
   std::uint64_t rated_ = 0;
   double rated_s_ = 0;
 };
 
+class MonitorCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c = *app.add_subcommand(
+        "monitor", "Show and log the CAN messages of the BMS: a live screen on a terminal, else one line per second");
+    c.footer("Example: bms monitor can0 --record monday.log    then: bms monitor file:monday.log --csv monday.csv");
+    c.add_option("source", o_.source,
+                 "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter; file:DUMP.log: a log of candump -L, "
+                 "also gzip, '-' for standard input")
+        ->required();
+    c.add_flag("--once", o_.once, "stop after the first complete picture; exit code 1 if it never came");
+    c.add_option("--duration", o_.duration_s, "stop after this many seconds")->check(Within(0.01, 1e9))->type_name("S");
+    c.add_option("--csv", o_.csv, "write a row with every signal for each Status message, the last message of a sample")
+        ->check(not_empty())
+        ->type_name("FILE");
+    c.add_option("--record", o_.record, "write every frame in the format of candump -L")
+        ->check(not_empty())
+        ->type_name("FILE");
+    serve_ = c.add_option("--serve", o_.serve_port,
+                          "serve a page with live plots on 127.0.0.1 at this port, or at any free one; the address is "
+                          "printed")
+                 ->expected(0, 1)
+                 ->check(Within(0, 65'535))
+                 ->type_name("PORT");
+    add_json(c, o_.output, "no screen, no lines");
+    return &c;
+  }
+
+  int run() override {
+    o_.output.set_own(o_.csv);
+    if (serve_->count() > 0 && !o_.serve_port) o_.serve_port = 0;
+    if (o_.record == "-") throw files::BadInput("--record", 1, "standard output is not supported, expected a file");
+    try {
+      return std::make_unique<Monitor>(o_)->run();
+    } catch (const SourceError& error) {
+      throw files::BadInput(error.source, error.line, error.what());
+    }
+  }
+
+ private:
+  MonitorOptions o_;
+  CLI::Option* serve_ = nullptr;
+};
+
 }  // namespace
 
-int run(const MonitorOptions& options) {
-  if (options.record == "-") throw files::BadInput("--record", 1, "standard output is not for it, expected a file");
-  try {
-    return std::make_unique<Monitor>(options)->run();
-  } catch (const SourceError& refused) {
-    throw files::BadInput(refused.source, refused.line, refused.what());
-  }
-}
+std::unique_ptr<Command> monitor_command() { return std::make_unique<MonitorCommand>(); }
 
 }  // namespace bms::tool

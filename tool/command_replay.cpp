@@ -1,23 +1,48 @@
-#include "tool/command_replay.hpp"
-
-#include <cstdio>
+// bms replay: a recording through the estimator, on the host or on an emulated board.
+#include <optional>
 
 #include <fmt/format.h>
 
-#include "files/bad_input.hpp"
 #include "files/recording.hpp"
+#include "measurement/recording_checks.hpp"
+#include "files/bad_input.hpp"
 #include "files/text_file.hpp"
 #include "host_sim/can_log.hpp"
+#include "host_sim/replay.hpp"
 #include "host_sim/simulation.hpp"
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
-#include "measurement/recording_checks.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
+#include "tool/commands.hpp"
+#include "tool/options.hpp"
 
 namespace bms::tool {
 
 namespace {
+
+struct ReplayOptions {
+  std::string recording;
+  std::string cell = "table9";
+  std::string board_cell;  ///< cell file of the board's image; empty: the same
+  std::string target = "host";
+  std::string scalar = "float";
+  std::optional<double> initial_soc;
+  double initial_soc_sigma = 0.02;
+  bool verify = false;
+  std::string trace;
+  Output output;
+};
+
+/// A replay under way: what was read, and what has been computed.
+struct ReplayRun {
+  const images::EmulatedBoard* board = nullptr;  ///< nullptr: the host
+  std::optional<host_sim::CanLog> log;
+  std::vector<measurement::Sample> samples;
+  std::optional<measurement::StartingPoint> start;
+  std::size_t compared = 0;  ///< samples of the log whose estimates were compared
+  host_sim::ReplayResult result;
+};
 
 host_sim::ScalarKind scalar_of(const std::string& name) {
   if (name == "fixed") return host_sim::ScalarKind::fixed;
@@ -45,7 +70,8 @@ host_sim::Track run_on(const images::EmulatedBoard& board, const files::CellFile
   return images::run_on_board(board, cell, samples, start);
 }
 
-/// Mechanisms that do not act in the estimator; a shift of the start does, through what it is told.
+/// Ids of the mechanisms that the estimator leaves out. A shift of the initial SOC is not one of them: it moves the
+/// prior.
 std::string not_estimated(const files::CellFile& cell) {
   std::string ids;
   for (const model::MechanismSetting& m : cell.mechanisms) {
@@ -55,80 +81,87 @@ std::string not_estimated(const files::CellFile& cell) {
   return ids;
 }
 
-std::string summary(const host_sim::ReplayResult& r) {
-  std::string text = reports::statement(r);
-  text += fmt::format(
-      "\nOne-step voltage prediction {:.2f} mV RMS; open loop {:.2f} mV RMS, fit {:.1f} %. {:.2f} million steps/s ({}, "
-      "{}).",
-      1e3 * r.voltage.prediction_rmse_v.value_or(0), 1e3 * r.voltage.open_loop_rmse_v.value_or(0),
-      r.voltage.open_loop_fit_percent.value_or(0), r.track.steps_per_second / 1e6, r.target,
-      host_sim::name_of(r.scalar));
-  return text;
+void add_warnings(const ReplayOptions& options, ReplayRun& run) {
+  std::vector<measurement::Warning>& warnings = run.result.recording.warnings;
+  if (const std::string ids = not_estimated(run.result.cell); !ids.empty()) {
+    warnings.push_back(
+        {"not_in_estimator", ids + ": in the cell file, but the estimator leaves it out (it would need future samples, "
+                                   "or the times of the bursts)"});
+  }
+  if (run.log && run.log->cell_hash && *run.log->cell_hash != run.result.cell.hash) {
+    warnings.push_back({"other_cell_file", fmt::format("the firmware that wrote the log has cell file {:08x}, this is "
+                                                       "{:08x}",
+                                                       *run.log->cell_hash, run.result.cell.hash)});
+  }
+  for (const measurement::Warning& warning : warnings) warn(options.recording + ": " + warning.text);
 }
 
-}  // namespace
-
-int run(const ReplayOptions& options) {
-  host_sim::ReplayResult result;
+ReplayRun read(const ReplayOptions& options) {
+  ReplayRun run;
+  host_sim::ReplayResult& result = run.result;
   result.scalar = scalar_of(options.scalar);
   result.target = options.target;
-  const images::EmulatedBoard* board = options.target == "host" ? nullptr : &board_named(options.target);
-  if (!options.board_cell.empty() && board == nullptr)
-    throw files::BadInput("--board-cell", 1, "no board to flash it to, expected --target with a board");
-  if (options.verify && board == nullptr)
-    throw files::BadInput("--verify", 1, "nothing to compare the host with, expected --target with a board");
+  if (options.target != "host") run.board = &board_named(options.target);
+  if (!options.board_cell.empty() && run.board == nullptr)
+    throw files::BadInput("--board-cell", 1, "no board that uses it, expected --target with a board");
+  if (options.verify && run.board == nullptr)
+    throw files::BadInput("--verify", 1, "no board to compare the host with, expected --target with a board");
   result.cell = files::read_cell(options.cell);
-  std::optional<host_sim::CanLog> log;
-  if (host_sim::is_can_log(options.recording)) log = host_sim::read_can_log(options.recording);
-  result.recording = log ? log->recording : files::read_recording(options.recording);
+  if (host_sim::is_can_log(options.recording)) run.log = host_sim::read_can_log(options.recording);
+  result.recording = run.log ? run.log->recording : files::read_recording(options.recording);
   measurement::compare_with_cell(result.recording, result.cell.parameters);
-  if (const std::string ids = not_estimated(result.cell); !ids.empty()) {
-    result.recording.warnings.push_back(
-        {"not_in_estimator",
-         ids + ": in the cell file, but the estimator does without (it sees no readings to come and no bursts)"});
-  }
-  for (const measurement::Warning& warning : result.recording.warnings) warn(options.recording + ": " + warning.text);
-
-  if (log && log->cell_hash && *log->cell_hash != result.cell.hash) {
-    result.recording.warnings.push_back(
-        {"other_cell_file", fmt::format("the firmware that wrote the log has cell file {:08x}, this is {:08x}",
-                                        *log->cell_hash, result.cell.hash)});
-    warn(options.recording + ": " + result.recording.warnings.back().text);
-  }
-  const auto samples = log ? log->samples : bms::measurement::samples(result.recording);
+  add_warnings(options, run);
+  run.samples = run.log ? run.log->samples : measurement::samples(result.recording);
   if (options.initial_soc) {
     result.prior = host_sim::SocPrior{*options.initial_soc, options.initial_soc_sigma};
     result.initial_soc = *options.initial_soc;
   }
-  const auto start = log && !options.initial_soc
-                         ? log->start
-                         : host_sim::starting_point(
-                               result.prior, host_sim::value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
+  run.start = run.log && !options.initial_soc
+                  ? run.log->start
+                  : host_sim::starting_point(result.prior,
+                                             host_sim::value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
+  return run;
+}
 
-  if (board != nullptr) {
+void compute(const ReplayOptions& options, ReplayRun& run) {
+  host_sim::ReplayResult& result = run.result;
+  if (run.board != nullptr) {
     const files::CellFile board_cell = options.board_cell.empty() ? result.cell : files::read_cell(options.board_cell);
-    result.track = run_on(*board, board_cell, samples, start, result.scalar);
+    result.track = run_on(*run.board, board_cell, run.samples, run.start, result.scalar);
   }
-  if (board == nullptr || options.verify) {
-    host_sim::Track host = host_sim::run_on_host(result.cell, samples, start, result.scalar);
-    if (board == nullptr) {
+  if (run.board == nullptr || options.verify) {
+    host_sim::Track host = host_sim::run_on_host(result.cell, run.samples, run.start, result.scalar);
+    if (run.board == nullptr) {
       result.track = std::move(host);
     } else if (const auto d = host_sim::first_difference(host, result.track, result.scalar)) {
       const double at_s = d->sample < result.recording.rows() ? result.recording.time_s[d->sample] : 0;
       result.difference =
           fmt::format("host and {} differ first at sample {} (time {:g} s) in {}: host {:.9g}, board {:.9g}",
-                      board->name, d->sample, at_s, d->field, d->host, d->board);
+                      run.board->name, d->sample, at_s, d->field, d->host, d->board);
     } else {
-      result.verified_against = board->name;
+      result.verified_against = run.board->name;
     }
   }
-  std::size_t compared = 0;
-  if (log && !options.initial_soc && result.scalar != host_sim::ScalarKind::float64 && !result.difference) {
-    result.difference = host_sim::difference_to_log(*log, result.track, compared);
-    if (!result.difference && compared > 0) result.verified_against = "log";
+  if (run.log && !options.initial_soc && result.scalar != host_sim::ScalarKind::float64 && !result.difference) {
+    result.difference = host_sim::difference_to_log(*run.log, result.track, run.compared);
+    if (!result.difference && run.compared > 0) result.verified_against = "log";
   }
   host_sim::evaluate(result);
+}
 
+std::string summary(const host_sim::ReplayResult& r) {
+  return reports::statement(r) +
+         fmt::format(
+             "\nOne-step voltage prediction {:.2f} mV RMS; open loop {:.2f} mV RMS, fit {:.1f} %. {:.2f} million "
+             "steps/s ({}, {}).",
+             1e3 * r.voltage.prediction_rmse_v.value_or(0), 1e3 * r.voltage.open_loop_rmse_v.value_or(0),
+             r.voltage.open_loop_fit_percent.value_or(0), r.track.steps_per_second / 1e6, r.target,
+             host_sim::name_of(r.scalar));
+}
+
+/// Returns the exit code.
+int write(const ReplayOptions& options, const ReplayRun& run) {
+  const host_sim::ReplayResult& result = run.result;
   const std::string trace = host_sim::trace_csv(result);
   if (!options.trace.empty()) write_output(options.trace, trace);
   if (!options.output.report.empty()) write_output(options.output.report, reports::replay_report(result));
@@ -138,13 +171,63 @@ int run(const ReplayOptions& options) {
     return 1;
   }
   print_summary(options.output, summary(result));
-  if (result.verified_against)
+  if (result.verified_against) {
+    const bool log = run.compared > 0;
     print_summary(
         options.output,
-        fmt::format("Verified: {} estimates, every bit equal {}.", compared > 0 ? compared : result.track.words.size(),
-                    compared > 0 ? "to what the firmware computed" : "on " + *result.verified_against));
+        fmt::format("Verified: {} estimates, every bit equal {}.", log ? run.compared : result.track.words.size(),
+                    log ? "to what the firmware computed" : "on " + *result.verified_against));
+  }
   if (!options.output.report.empty()) print_summary(options.output, "Report: " + options.output.report);
   return 0;
 }
+
+class ReplayCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c = *app.add_subcommand(
+        "replay", "Run the state-of-charge estimator over a recording, on this computer or on an emulated board");
+    c.footer("Example: bms replay recordings/forklift_shift.csv --target netduinoplus2 --verify --report shift.html");
+    c.add_option("recording", o_.recording,
+                 "CSV file with time_s, current_a (> 0 charges), voltage_v and optionally temperature_c, soc_ref; or a "
+                 "candump log of the firmware's frames, whose estimates are compared with the replay")
+        ->required();
+    c.add_option("--cell", o_.cell, cell_help())->capture_default_str();
+    c.add_option("--initial-soc", o_.initial_soc,
+                 "state of charge at the start, 0..1; estimated from the first voltage if not given")
+        ->check(Within(0.0, 1.0));
+    c.add_option("--initial-soc-sigma", o_.initial_soc_sigma, "standard deviation of --initial-soc")
+        ->check(Within(1e-4, 1.0))
+        ->capture_default_str();
+    c.add_option("--target", o_.target, "host, or an emulated board by its folder in boards/: netduinoplus2, microbit")
+        ->capture_default_str();
+    c.add_option("--scalar", o_.scalar, "arithmetic: float, fixed or double")
+        ->check(CLI::IsMember({"float", "fixed", "double"}))
+        ->capture_default_str();
+    c.get_option("--initial-soc-sigma")->needs("--initial-soc");
+    c.add_flag("--verify", o_.verify,
+               "compute on host and board and compare every estimate bit by bit; exit code 1 if they differ");
+    c.add_option("--board-cell", o_.board_cell,
+                 "cell file for the board's firmware if it is not --cell; shows that --verify finds the difference")
+        ->type_name("CELL");
+    c.add_option("--trace", o_.trace, "write every estimate to a CSV file")->type_name("FILE");
+    add_output(c, o_.output);
+    return &c;
+  }
+
+  int run() override {
+    o_.output.set_own(o_.trace);
+    ReplayRun run = read(o_);
+    compute(o_, run);
+    return write(o_, run);
+  }
+
+ private:
+  ReplayOptions o_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> replay_command() { return std::make_unique<ReplayCommand>(); }
 
 }  // namespace bms::tool

@@ -1,41 +1,90 @@
-#include "tool/command_simulate.hpp"
-
+// bms simulate: the model's voltage for the current of a recording or a profile, open loop.
 #include <charconv>
 #include <chrono>
 #include <iterator>
-#include <random>
 
 #include <fmt/format.h>
 
+#include "measurement/recording_checks.hpp"
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 #include "host_sim/gaussian_noise.hpp"
 #include "host_sim/simulation.hpp"
-#include "measurement/recording_checks.hpp"
+#include "host_sim/simulation_result.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
+#include "tool/commands.hpp"
+#include "tool/options.hpp"
 
 namespace bms::tool {
 
 namespace {
 
-std::string csv_of(const measurement::Recording& r, const std::vector<host_sim::SimulatedRow>& rows,
-                   const SimulateOptions& options) {
-  host_sim::GaussianNoise noise(options.seed);
-  const bool temperature = !r.temperature_c.empty();  // what mechanisms followed goes along: a replay needs it
-  std::string csv = temperature ? "time_s,current_a,voltage_v,soc,temperature_c\n" : "time_s,current_a,voltage_v,soc\n";
-  csv.reserve(rows.size() * 48);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const double current_a = r.current_a[k] + options.noise_a * noise.next(),
-                 voltage_v = rows[k].voltage_v + options.noise_v * noise.next();
-    // digits below a nanovolt and a nanoampere carry nothing
-    fmt::format_to(std::back_inserter(csv), "{},{:.10g},{:.10g},{:.10g}", r.time_s[k], current_a, voltage_v,
-                   rows[k].soc);
-    if (temperature) fmt::format_to(std::back_inserter(csv), ",{}", r.temperature_c[k]);
-    csv += '\n';
+struct SimulateOptions {
+  std::string cell;
+  std::string recording, profile;  ///< one of the two
+  std::vector<std::string> with;   ///< "ID:param=value,...": mechanisms to add, or to use instead of the cell's own
+  double initial_soc = 0.5;
+  double noise_v = 0, noise_a = 0;  ///< standard deviations
+  unsigned long seed = 1;
+  std::string out;
+  Output output;
+
+  const std::string& input() const { return recording.empty() ? profile : recording; }
+};
+
+/// What was read, and what has been computed.
+struct SimulationRun {
+  files::CellFile cell;
+  measurement::Recording recording;
+  std::vector<host_sim::SimulatedRow> rows;
+  host_sim::SimulationResult result;
+};
+
+[[noreturn]] void refuse_mechanism(const std::string& what) { throw files::BadInput("--with", 1, what); }
+
+/// Sets one parameter from "param=value".
+void set_parameter(const model::MechanismInfo& info, const std::string& text, model::MechanismSetting& setting) {
+  const std::size_t equals = std::min(text.find('='), text.size());
+  const std::string name = text.substr(0, equals);
+  std::size_t k = 0;
+  while (k < info.parameters && info.parameter[k].name != name) ++k;
+  if (k == info.parameters) {
+    std::string names;
+    for (std::size_t i = 0; i < info.parameters; ++i)
+      names += (i == 0 ? "" : ", ") + std::string(info.parameter[i].name);
+    refuse_mechanism("no such parameter '" + name + "' of " + std::string(info.id) + ", expected one of: " + names);
   }
-  return csv;
+  const char *first = text.data() + std::min(equals + 1, text.size()), *last = text.data() + text.size();
+  const auto [stopped, error] = std::from_chars(first, last, setting.value[k]);
+  if (first == last || stopped != last || error != std::errc{})
+    refuse_mechanism("no value of '" + name + "', expected " + name + "=NUMBER");
+}
+
+/// "ID:param=value,..." as a cell file would have it; parameters that are not named keep their defaults.
+model::MechanismSetting mechanism_of(const std::string& text, double capacity_ah) {
+  const std::size_t colon = text.find(':');
+  const std::string id = text.substr(0, colon);
+  const std::size_t index = model::mechanism_index(id);
+  if (index == model::mechanism_count) {
+    std::string ids;
+    for (const model::MechanismInfo& info : model::catalogue) ids += (ids.empty() ? "" : ", ") + std::string(info.id);
+    refuse_mechanism("no such mechanism '" + id + "', expected one of: " + ids);
+  }
+  if (colon == std::string::npos) refuse_mechanism("'" + id + "' without parameters, expected ID:param=value,...");
+  const model::MechanismInfo& info = model::catalogue[index];
+  model::MechanismSetting setting = model::default_setting(index, capacity_ah);
+  for (std::size_t at = colon; at < text.size();) {
+    const std::size_t end = std::min(text.find(',', at + 1), text.size());
+    set_parameter(info, text.substr(at + 1, end - at - 1), setting);
+    at = end;
+  }
+  if (const std::size_t k = model::first_fault(setting, capacity_ah); k < info.parameters) {
+    refuse_mechanism(fmt::format("'{}' is out of range, expected {}", info.parameter[k].name,
+                                 files::range_of(info.parameter[k], capacity_ah)));
+  }
+  return setting;
 }
 
 bool bursts_unknown(const files::CellFile& file) {
@@ -43,107 +92,137 @@ bool bursts_unknown(const files::CellFile& file) {
                      [](const auto& m) { return model::catalogue[m.index].id == model::ContactIntermittent::id; });
 }
 
-/// "ID:param=value,..." as a cell file would have it.
-model::MechanismSetting mechanism_of(const std::string& text, double capacity_ah) {
-  const auto refuse = [&](const std::string& what) { throw files::BadInput("--with", 1, what); };
-  const std::size_t colon = text.find(':');
-  const std::string id = text.substr(0, colon);
-  const std::size_t index = model::mechanism_index(id);
-  if (index == model::mechanism_count) {
-    std::string ids;
-    for (const model::MechanismInfo& info : model::catalogue) ids += (ids.empty() ? "" : ", ") + std::string(info.id);
-    refuse("no such mechanism '" + id + "', expected one of: " + ids);
+SimulationRun read(const SimulateOptions& options) {
+  if (options.recording.empty() == options.profile.empty())
+    throw files::BadInput("bms simulate", 1, "one input needed, expected --recording or --profile");
+  SimulationRun run;
+  run.cell = files::read_cell(options.cell);
+  for (const std::string& mechanism : options.with)
+    files::put_mechanism(run.cell, mechanism_of(mechanism, run.cell.parameters.capacity_ah));
+  run.recording = files::read_recording(
+      options.input(), options.recording.empty() ? files::VoltageColumn::optional : files::VoltageColumn::required);
+  measurement::compare_with_cell(run.recording, run.cell.parameters);
+  if (bursts_unknown(run.cell)) {
+    run.recording.warnings.push_back(
+        {"bursts_unknown", "contact_intermittent has no effect: a cell file does not contain the times of its bursts"});
   }
-  if (colon == std::string::npos) refuse("'" + id + "' without parameters, expected ID:param=value,...");
-  const model::MechanismInfo& info = model::catalogue[index];
-  model::MechanismSetting setting = model::default_setting(index, capacity_ah);
-  for (std::size_t at = colon; at < text.size();) {
-    const std::size_t end = std::min(text.find(',', at + 1), text.size());
-    const std::string part = text.substr(at + 1, end - at - 1);
-    at = end;
-    const std::size_t equals = std::min(part.find('='), part.size());
-    const std::string name = part.substr(0, equals);
-    std::size_t k = 0;
-    while (k < info.parameters && info.parameter[k].name != name) ++k;
-    if (k == info.parameters) {
-      std::string names;
-      for (std::size_t i = 0; i < info.parameters; ++i)
-        names += (i == 0 ? "" : ", ") + std::string(info.parameter[i].name);
-      refuse("no such parameter '" + name + "' of " + id + ", expected one of: " + names);
-    }
-    const char *first = part.data() + std::min(equals + 1, part.size()), *last = part.data() + part.size();
-    const auto [stopped, error] = std::from_chars(first, last, setting.value[k]);
-    if (first == last || stopped != last || error != std::errc{})
-      refuse("no value of '" + name + "', expected " + name + "=NUMBER");
-  }
-  if (const std::size_t k = model::first_fault(setting, capacity_ah); k < info.parameters) {
-    refuse(fmt::format("'{}' is out of range, expected {}", info.parameter[k].name,
-                       files::range_of(info.parameter[k], capacity_ah)));
-  }
-  return setting;
+  for (const measurement::Warning& warning : run.recording.warnings) warn(options.input() + ": " + warning.text);
+  return run;
 }
+
+void compute(const SimulateOptions& options, SimulationRun& run) {
+  const auto cell = model::prepare<double, model::max_intervals>(run.cell.parameters);
+  const auto begin = std::chrono::steady_clock::now();
+  run.rows = host_sim::simulate({.cell = cell,
+                                 .capacity_ah = run.cell.parameters.capacity_ah,
+                                 .mechanisms = run.cell.mechanisms,
+                                 .time_s = run.recording.time_s,
+                                 .current_a = run.recording.current_a,
+                                 .temperature_c = run.recording.temperature_c,
+                                 .initial_soc = options.initial_soc});
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  run.result = {.cell = run.cell.name,
+                .input = options.input(),
+                .out = options.out,
+                .samples = run.rows.size(),
+                .duration_s = run.recording.duration_s(),
+                .initial_soc = options.initial_soc,
+                .final_soc = run.rows.back().soc,
+                .final_voltage_v = run.rows.back().voltage_v,
+                .steps_per_second = static_cast<double>(run.rows.size()) / seconds,
+                .warnings = run.recording.warnings};
+}
+
+std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
+  const measurement::Recording& r = run.recording;
+  host_sim::GaussianNoise noise(options.seed);
+  const bool temperature = !r.temperature_c.empty();  // a replay needs it, because mechanisms depend on it
+  std::string csv = temperature ? "time_s,current_a,voltage_v,soc,temperature_c\n" : "time_s,current_a,voltage_v,soc\n";
+  csv.reserve(run.rows.size() * 48);
+  for (std::size_t k = 0; k < run.rows.size(); ++k) {
+    const double current_a = r.current_a[k] + options.noise_a * noise.next();
+    const double voltage_v = run.rows[k].voltage_v + options.noise_v * noise.next();
+    // ten digits: far below a microvolt and a microampere
+    fmt::format_to(std::back_inserter(csv), "{},{:.10g},{:.10g},{:.10g}", r.time_s[k], current_a, voltage_v,
+                   run.rows[k].soc);
+    if (temperature) fmt::format_to(std::back_inserter(csv), ",{}", r.temperature_c[k]);
+    csv += '\n';
+  }
+  return csv;
+}
+
+files::PageContent page_content(const SimulationRun& run) {
+  const measurement::Recording& r = run.recording;
+  files::PageChart voltage{"Voltage, open loop", {"simulated, V"}, r.time_s, {{}}};
+  files::PageChart current{"Current, > 0 charges", {"A"}, r.time_s, {r.current_a}};
+  files::PageChart soc{"State of charge", {"%"}, r.time_s, {{}}};
+  if (!r.voltage_v.empty()) {
+    voltage.labels.push_back("measured, V");
+    voltage.columns.push_back(r.voltage_v);
+  }
+  for (const host_sim::SimulatedRow& row : run.rows) {
+    voltage.columns[0].push_back(row.voltage_v);
+    soc.columns[0].push_back(100 * row.soc);
+  }
+  return {
+      "Simulation of " + run.result.input, "Cell " + run.result.cell + ", open loop.", {}, {}, {voltage, current, soc}};
+}
+
+void write(const SimulateOptions& options, const SimulationRun& run) {
+  write_output(options.out, csv_of(options, run));
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(run.result));
+  if (!options.output.report.empty()) write_output(options.output.report, reports::page_of(page_content(run)));
+  if (options.out == "-") return;
+  print_summary(options.output, fmt::format("{} rows in {}: from {:.1f} % to {:.1f} % state of charge in {:.2f} h.",
+                                            run.rows.size(), options.out, 100 * options.initial_soc,
+                                            100 * run.result.final_soc, run.result.duration_s / 3'600));
+}
+
+class SimulateCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c = *app.add_subcommand("simulate", "Compute the model's voltage for a given current, open loop");
+    c.footer("Example: bms simulate --cell table9 --profile shift.csv --initial-soc 0.9 --out simulated.csv");
+    c.add_option("--cell", o_.cell, cell_help())->required();
+    auto* recording = c.add_option("--recording", o_.recording, "recording whose current is used")->type_name("FILE");
+    c.add_option("--profile", o_.profile, "current profile: a recording without voltage_v")
+        ->type_name("FILE")
+        ->excludes(recording);
+    c.add_option("--initial-soc", o_.initial_soc, "state of charge at the start, 0..1")
+        ->check(Within(0.0, 1.0))
+        ->capture_default_str();
+    c.add_option("--with", o_.with,
+                 "mechanism to add, or to use instead of the cell's own, for example "
+                 "ocv_hysteresis:half_gap_v=0.01,decay=40; may be repeated")
+        ->type_name("ID:param=value,...")
+        ->expected(1)
+        ->take_all();
+    c.add_option("--noise-v", o_.noise_v, "standard deviation in V of noise added to the voltage")
+        ->check(Within(0.0, 1e6));
+    c.add_option("--noise-a", o_.noise_a, "standard deviation in A of noise added to the current in the output")
+        ->check(Within(0.0, 1e6));
+    c.add_option("--seed", o_.seed, "seed of the noise")->capture_default_str();
+    c.add_option("--out", o_.out, "CSV file to write: time_s, current_a, voltage_v, soc")
+        ->required()
+        ->type_name("FILE");
+    add_output(c, o_.output);
+    return &c;
+  }
+
+  int run() override {
+    o_.output.set_own(o_.out);
+    SimulationRun run = read(o_);
+    compute(o_, run);
+    write(o_, run);
+    return 0;
+  }
+
+ private:
+  SimulateOptions o_;
+};
 
 }  // namespace
 
-int run(const SimulateOptions& options) {
-  const std::string& input = options.recording.empty() ? options.profile : options.recording;
-  if (options.recording.empty() == options.profile.empty())
-    throw files::BadInput("bms simulate", 1, "one input needed, expected --recording or --profile");
-  files::CellFile cell_file = files::read_cell(options.cell);
-  for (const std::string& mechanism : options.with)
-    files::put_mechanism(cell_file, mechanism_of(mechanism, cell_file.parameters.capacity_ah));
-  measurement::Recording recording = files::read_recording(
-      input, options.recording.empty() ? files::VoltageColumn::optional : files::VoltageColumn::required);
-  measurement::compare_with_cell(recording, cell_file.parameters);
-  if (bursts_unknown(cell_file))
-    recording.warnings.push_back(
-        {"bursts_unknown", "contact_intermittent does not act: when its bursts are is not in a cell file"});
-  for (const measurement::Warning& warning : recording.warnings) warn(input + ": " + warning.text);
-
-  const auto cell = model::prepare<double, model::max_intervals>(cell_file.parameters);
-  const auto begin = std::chrono::steady_clock::now();
-  const auto rows = host_sim::simulate({.cell = cell,
-                                        .capacity_ah = cell_file.parameters.capacity_ah,
-                                        .mechanisms = cell_file.mechanisms,
-                                        .time_s = recording.time_s,
-                                        .current_a = recording.current_a,
-                                        .temperature_c = recording.temperature_c,
-                                        .initial_soc = options.initial_soc});
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  write_output(options.out, csv_of(recording, rows, options));
-
-  reports::SimulateResult result{cell_file.name,
-                                 input,
-                                 options.out,
-                                 rows.size(),
-                                 recording.duration_s(),
-                                 options.initial_soc,
-                                 rows.back().soc,
-                                 rows.back().voltage_v,
-                                 static_cast<double>(rows.size()) / seconds,
-                                 recording.warnings};
-  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
-  if (!options.output.report.empty()) {
-    files::PageChart voltage{"Voltage, open loop", {"simulated, V"}, recording.time_s, {{}}},
-        current{"Current, charging up", {"A"}, recording.time_s, {recording.current_a}},
-        soc{"State of charge", {"%"}, recording.time_s, {{}}};
-    if (!recording.voltage_v.empty())
-      voltage.labels.push_back("measured, V"), voltage.columns.push_back(recording.voltage_v);
-    for (const host_sim::SimulatedRow& row : rows) {
-      voltage.columns[0].push_back(row.voltage_v);
-      soc.columns[0].push_back(100 * row.soc);
-    }
-    write_output(
-        options.output.report,
-        reports::page_of(
-            {"Simulation of " + input, "Cell " + cell_file.name + ", open loop.", {}, {}, {voltage, current, soc}}));
-  }
-  if (options.out != "-") {
-    print_summary(options.output,
-                  fmt::format("{} rows in {}: from {:.1f} % to {:.1f} % in {:.2f} h.", rows.size(), options.out,
-                              100 * options.initial_soc, 100 * rows.back().soc, recording.duration_s() / 3600));
-  }
-  return 0;
-}
+std::unique_ptr<Command> simulate_command() { return std::make_unique<SimulateCommand>(); }
 
 }  // namespace bms::tool

@@ -1,5 +1,4 @@
-#include "tool/command_study.hpp"
-
+// bms study: the paper's comparison of models, optimisers and experiments, as tables and one page.
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,12 +13,22 @@
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 #include "study/study.hpp"
+#include "tool/commands.hpp"
+#include "tool/options.hpp"
 
 namespace bms::tool {
 
 namespace {
 
-/// Quoted where a spreadsheet would stumble.
+struct StudyOptions {
+  std::string cell = "table9";  ///< OCV, capacity, and the initial values of the fits
+  std::string recordings;       ///< folder with CSV files; empty: the simulated plant
+  unsigned long seed = 1;       ///< of the plant's noise
+  std::string out;              ///< folder: tables as CSV, study.json, study.html
+  Output output;
+};
+
+/// A field of a CSV file, quoted if it contains a separator.
 std::string field(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -27,22 +36,22 @@ std::string field(const std::string& text) {
   return quoted + "\"";
 }
 
-/// Numbers where there are numbers; the paper's in columns of their own.
+/// Cells with a value as numbers; the paper's values in columns of their own.
 std::string csv_of(const files::PageTable& table) {
-  std::vector<bool> beside(table.head.size(), false);
+  std::vector<bool> has_paper(table.head.size(), false);
   for (const auto& row : table.rows) {
-    for (std::size_t k = 0; k < row.size(); ++k) beside[k] = beside[k] || row[k].paper;
+    for (std::size_t k = 0; k < row.size(); ++k) has_paper[k] = has_paper[k] || row[k].paper;
   }
   std::string csv;
   for (std::size_t k = 0; k < table.head.size(); ++k) {
     csv += (k > 0 ? "," : "") + field(table.head[k]);
-    if (beside[k]) csv += "," + field("paper: " + table.head[k]);
+    if (has_paper[k]) csv += "," + field("paper: " + table.head[k]);
   }
   csv += "\n";
   for (const auto& row : table.rows) {
     for (std::size_t k = 0; k < row.size(); ++k) {
       csv += (k > 0 ? "," : "") + (row[k].value ? fmt::format("{:.8g}", *row[k].value) : field(row[k].text));
-      if (beside[k]) csv += row[k].paper ? fmt::format(",{:.8g}", *row[k].paper) : ",";
+      if (has_paper[k]) csv += row[k].paper ? fmt::format(",{:.8g}", *row[k].paper) : ",";
     }
     csv += "\n";
   }
@@ -57,7 +66,7 @@ std::string page_of_study(const study::StudyResult& r) {
                              r.charts};
   for (const measurement::Warning& w : r.warnings) content.warnings.push_back(w.text);
   files::PageTable claims{
-      "claims", "What the paper says, and whether it holds here", {"statement", "holds", "evidence"}, {}, ""};
+      "claims", "Statements of the paper, and whether they hold here", {"statement", "holds", "observation"}, {}, ""};
   for (const study::StudyClaim& c : r.claims)
     claims.rows.push_back({{c.claim, {}, {}}, {c.holds ? "yes" : "no", {}, {}}, {c.result, {}, {}}});
   content.tables.push_back(std::move(claims));
@@ -65,7 +74,7 @@ std::string page_of_study(const study::StudyResult& r) {
   return reports::page_of(content);
 }
 
-study::StudyProgress progress_on_terminal() {
+study::StudyProgress study_progress() {
   if (!isatty(2)) return {};
   const auto begin = std::chrono::steady_clock::now();
   return [begin](std::size_t done, std::size_t all) {
@@ -75,28 +84,20 @@ study::StudyProgress progress_on_terminal() {
   };
 }
 
-}  // namespace
-
-int run(const StudyOptions& options) {
-  const files::CellFile cell = files::read_cell(options.cell);
+study::StudyResult compute(const StudyOptions& options, const files::CellFile& cell) {
+  if (options.recordings.empty()) return study::study_plant(cell.parameters, options.seed, study_progress());
   std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error)
-    throw files::BadInput(options.out, 1, "cannot be made (" + error.message() + "), expected a folder to write to");
-
-  study::StudyResult result;
-  if (options.recordings.empty()) {
-    result = study::study_plant(cell.parameters, options.seed, progress_on_terminal());
-  } else {
-    if (!std::filesystem::is_directory(options.recordings, error))
-      throw files::BadInput(options.recordings, 1, "no folder, expected one with recordings in CSV");
-    std::vector<std::string> paths;
-    for (const auto& entry : std::filesystem::directory_iterator(options.recordings)) {
-      if (entry.path().extension() == ".csv") paths.push_back(entry.path().string());
-    }
-    std::sort(paths.begin(), paths.end());
-    result = study::study_recordings(cell.parameters, paths, progress_on_terminal());
+  if (!std::filesystem::is_directory(options.recordings, error))
+    throw files::BadInput(options.recordings, 1, "no folder, expected one with recordings in CSV");
+  std::vector<std::string> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(options.recordings)) {
+    if (entry.path().extension() == ".csv") paths.push_back(entry.path().string());
   }
+  std::sort(paths.begin(), paths.end());
+  return study::study_recordings(cell.parameters, paths, study_progress());
+}
+
+void write(const StudyOptions& options, const study::StudyResult& result) {
   const std::filesystem::path folder = options.out;
   for (const files::PageTable& table : result.tables)
     write_output((folder / (table.id + ".csv")).string(), csv_of(table));
@@ -105,14 +106,47 @@ int run(const StudyOptions& options) {
   write_output((folder / "study.html").string(), page);
   if (!options.output.json.empty()) write_output(options.output.json, json);
   if (!options.output.report.empty()) write_output(options.output.report, page);
-
   for (const measurement::Warning& w : result.warnings) warn(w.text);
   std::string text =
       fmt::format("{} identifications in {:.1f} s, of {}.\n", result.fits, result.seconds, result.source);
   for (const study::StudyClaim& c : result.claims)
     text += fmt::format("  {} {}: {}\n", c.holds ? "yes" : "no ", c.claim, c.result);
   print_summary(options.output, text + "Report: " + (folder / "study.html").string());
-  return 0;
 }
+
+class StudyCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c =
+        *app.add_subcommand("study", "Compare models, optimisers and experiments as the paper does (Tables 4 to 9)");
+    c.footer("Example: bms study --out study");
+    c.add_option("--recordings", o_.recordings, "folder with recordings; a simulated cell is used if not given")
+        ->type_name("DIR");
+    c.add_option("--cell", o_.cell, cell_help("OCV, capacity and initial values"))->capture_default_str();
+    c.add_option("--seed", o_.seed, "seed of the simulated cell's noise")->capture_default_str();
+    c.add_option("--out", o_.out, "folder for the tables (CSV, JSON) and the page")->required()->type_name("DIR");
+    add_output(c, o_.output);
+    return &c;
+  }
+
+  int run() override {
+    o_.output.set_own("");
+    const files::CellFile cell = files::read_cell(o_.cell);
+    std::error_code error;
+    std::filesystem::create_directories(o_.out, error);
+    if (error) {
+      throw files::BadInput(o_.out, 1, "cannot be created (" + error.message() + "), expected a folder to write to");
+    }
+    write(o_, compute(o_, cell));
+    return 0;
+  }
+
+ private:
+  StudyOptions o_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> study_command() { return std::make_unique<StudyCommand>(); }
 
 }  // namespace bms::tool

@@ -14,6 +14,12 @@
 
 namespace bms::tool {
 
+void Output::set_own(const std::string& file) {
+  own = file;
+  if ((json == "-") + (report == "-") + (own == "-") > 1)
+    throw files::BadInput("-", 1, "more than one result for standard output, expected one");
+}
+
 void write_output(const std::string& file, const std::string& text) {
   if (file != "-") return files::write_file(file, text);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {

@@ -1,4 +1,4 @@
-// Where results go: what every command offers in the same way.
+// Where results go: the part that all commands do in the same way.
 #pragma once
 
 #include <functional>
@@ -9,26 +9,28 @@
 namespace bms::tool {
 
 struct Output {
-  std::string json;    ///< file, "-" for standard output, empty: none
-  std::string report;  ///< HTML file, empty: none
+  std::string json;    ///< file; "-" for standard output; empty: not written
+  std::string report;  ///< HTML file; empty: not written
   bool quiet = false;  ///< no summary on standard output
-  std::string main;    ///< the command's own file (--out, --trace); "-" for standard output
+  std::string own;     ///< the command's own file (--out, --trace); "-" for standard output
 
-  bool uses_standard_output() const { return json == "-" || report == "-" || main == "-"; }
+  /// Sets the command's own file. Throws BadInput if more than one result goes to standard output.
+  void set_own(const std::string& file);
+  bool uses_standard_output() const { return json == "-" || report == "-" || own == "-"; }
 };
 
 /// Writes `text` to the file, or to standard output for "-". Throws BadInput when it cannot be written.
 void write_output(const std::string& file, const std::string& text);
 
-/// A summary for a person; not when quiet, nor when standard output carries a result.
+/// Prints a summary for a person, unless --quiet is given or standard output carries a result.
 void print_summary(const Output& output, const std::string& text);
 
-/// Progress as one line of a terminal that is written over, every_s at most; nothing where standard error is no
-/// terminal. line: what to show, left_s being a guess (infinite at first).
+/// Shows progress on one line of the terminal, at most every `every_s` seconds; shows nothing if standard error is not
+/// a terminal. line: text for the share done (0..1), the time left in s (infinite at first) and the current part.
 workflow::Progress progress_on_terminal(
     double every_s, std::function<std::string(double done, double left_s, const std::string& what)> line);
 
-/// A warning: one line on standard error.
+/// Prints a warning as one line on standard error.
 void warn(const std::string& text);
 
 }  // namespace bms::tool

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "diagnosis/model_tolerance.hpp"
-#include "diagnosis/reference.hpp"
 #include "host_sim/replay.hpp"
 #include "identification/goodness_of_fit.hpp"
 
@@ -17,7 +16,7 @@ namespace {
 using diagnosis::Finding;
 using model::catalogue;
 
-/// Digits that say something; a value that rounding would carry over its bound stays.
+/// The value rounded to significant digits.
 double to_digits(double value, int digits) {
   return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.{}g}", value, digits));
 }
@@ -41,38 +40,26 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
 
 }  // namespace
 
-diagnosis::PreparedRecording record_of(const measurement::Recording& r, std::string name,
-                                       const model::CellParameters<>& cell, double initial_soc, double sigma,
-                                       bool soc_given) {
-  const bool any_temperature =
-      std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
-  diagnosis::PreparedRecording record{
-      std::move(name), r.time_s, r.current_a, r.voltage_v, any_temperature ? r.temperature_c : std::vector<double>{},
-      initial_soc,     sigma,    soc_given,   {}};
-  diagnosis::average_references(record, r.current_ref_a, r.voltage_ref_v, cell);
-  return record;
-}
-
 void compare(DiagnoseResult& r) {
   const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
-  const auto simulated = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h,
-                             std::vector<RecordingComparison>& list, std::vector<double> RecordingComparison::*into) {
+  const auto simulate = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h,
+                            std::vector<RecordingComparison>& list, std::vector<double> RecordingComparison::*into) {
     for (RecordingComparison& c : list) {
       diagnosis::Hypothesis here = h;
       here.bursts.clear();
       if (&list == &r.recordings && h.bursts.size() == list.size())
         here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
-      const diagnosis::LikelihoodModel evidence(cell, own, {c.record}, {});
-      c.*into = evidence.voltage(here, evidence.unchanged(), 0);
+      const diagnosis::LikelihoodModel likelihood(cell, own, {c.record}, {});
+      c.*into = likelihood.voltage(here, likelihood.unchanged(), 0);
     }
   };
   const diagnosis::Hypothesis base{own, own.size(), {}};
   diagnosis::Hypothesis extended = r.named() ? r.diagnosis.extended : base;
-  simulated(r.cell.parameters, base, r.recordings, &RecordingComparison::base_v);
-  simulated(r.cell.parameters, base, r.holdouts, &RecordingComparison::base_v);
-  simulated(r.diagnosis.cell, extended, r.recordings, &RecordingComparison::extended_v);
+  simulate(r.cell.parameters, base, r.recordings, &RecordingComparison::base_v);
+  simulate(r.cell.parameters, base, r.holdouts, &RecordingComparison::base_v);
+  simulate(r.diagnosis.cell, extended, r.recordings, &RecordingComparison::extended_v);
   if (r.named()) extended.settings = diagnosis::later_recording(r.diagnosis.extended);
-  simulated(r.diagnosis.cell, extended, r.holdouts, &RecordingComparison::extended_v);
+  simulate(r.diagnosis.cell, extended, r.holdouts, &RecordingComparison::extended_v);
 }
 
 std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& list,
@@ -107,6 +94,44 @@ std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
   return SocErrors{base.rms(), extended.rms()};
 }
 
+namespace {
+
+/// Adds a finding to the cell file with its source. A step of the contact resistance is there from the start.
+void add_finding(const DiagnoseResult& r, const std::string& files, const Finding& f, files::CellFile& cell) {
+  const double capacity_ah = r.cell.parameters.capacity_ah;
+  const model::MechanismInfo& info = catalogue[f.setting.index];
+  model::MechanismSetting setting = f.setting;
+  std::string source = fmt::format("bms diagnose of {}: {:.2f} mV RMS of the voltage, gain {:.0f}", files,
+                                   1e3 * f.rms_contribution_v, f.gain);
+  if (info.id == model::ContactStep::id) {
+    source += fmt::format("; since {:.0f} s of {}", setting.value[1], r.recordings.front().record.name);
+    setting.value[1] = 0;
+  }
+  if (!f.equivalent_to.empty()) source += "; these recordings cannot distinguish it from " + ids_of(f.equivalent_to);
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    const double short_value = to_digits(setting.value[k], 6);
+    if (short_value >= info.parameter[k].lower(capacity_ah) && short_value <= info.parameter[k].upper(capacity_ah))
+      setting.value[k] = short_value;
+    setting.deviation[k] = std::isfinite(setting.deviation[k]) ? to_digits(setting.deviation[k], 3) : 0;
+  }
+  files::put_mechanism(cell, setting);
+  cell.sources[files::table_of(info)] = source;
+}
+
+/// Widens the tolerance of OCV and drift to the residual of the extended cell on its own recordings.
+void widen_tolerance(const DiagnoseResult& r, const std::string& files, files::CellFile& cell) {
+  std::vector<diagnosis::PreparedRecording> records;
+  for (const RecordingComparison& c : r.recordings) records.push_back(c.record);
+  const double factor = diagnosis::tolerance_factor(cell.parameters, cell.mechanisms, std::move(records));
+  if (!(factor > 1)) return;
+  cell.parameters.tolerance = diagnosis::with_wider_tolerance(cell.parameters.tolerance, factor);
+  for (double* v : {&cell.parameters.tolerance.ocv_v, &cell.parameters.tolerance.drift_v}) *v = to_digits(*v, 4);
+  cell.sources["tolerance"] +=
+      fmt::format("; OCV and drift widened by a factor of {:g}, to the residual of {}", factor, files);
+}
+
+}  // namespace
+
 files::CellFile extended_cell(const DiagnoseResult& r) {
   files::CellFile cell = r.cell;
   std::string files;
@@ -116,40 +141,13 @@ files::CellFile extended_cell(const DiagnoseResult& r) {
     return cell;
   }
   if (!cell.name.ends_with("_extended")) cell.name += "_extended";
-  cell.source += fmt::format("; what bms diagnose found in {} added: {:.2f} mV RMS open loop, before {:.2f}", files,
+  cell.source += fmt::format("; with the findings of bms diagnose in {}: {:.2f} mV RMS open loop, before {:.2f}", files,
                              1e3 * r.extended->rmse_v, 1e3 * r.baseline->rmse_v);
   cell.parameters = with_short_numbers(r.diagnosis.cell);
   for (const char* table : {"ocv", "rc"})
-    cell.sources[table] += fmt::format("; moved within its tolerance to fit {} beside what was found", files);
-  const double capacity_ah = r.cell.parameters.capacity_ah;
-  for (const Finding& f : r.diagnosis.findings) {
-    const model::MechanismInfo& info = catalogue[f.setting.index];
-    model::MechanismSetting setting = f.setting;
-    std::string source = fmt::format("bms diagnose of {}: {:.2f} mV RMS of the voltage, gain {:.0f}", files,
-                                     1e3 * f.rms_contribution_v, f.gain);
-    if (info.id == model::ContactStep::id) {
-      source += fmt::format("; since {:.0f} s of {}", setting.value[1], r.recordings.front().record.name);
-      setting.value[1] = 0;
-    }
-    if (!f.equivalent_to.empty()) source += "; these recordings cannot tell it from " + ids_of(f.equivalent_to);
-    for (std::size_t k = 0; k < info.parameters; ++k) {
-      const double short_value = to_digits(setting.value[k], 6);
-      if (short_value >= info.parameter[k].lower(capacity_ah) && short_value <= info.parameter[k].upper(capacity_ah))
-        setting.value[k] = short_value;
-      setting.deviation[k] = std::isfinite(setting.deviation[k]) ? to_digits(setting.deviation[k], 3) : 0;
-    }
-    files::put_mechanism(cell, setting);
-    cell.sources[files::table_of(info)] = source;
-  }
-  std::vector<diagnosis::PreparedRecording> records;
-  for (const RecordingComparison& c : r.recordings) records.push_back(c.record);
-  if (const double factor = diagnosis::tolerance_factor(cell.parameters, cell.mechanisms, std::move(records));
-      factor > 1) {
-    cell.parameters.tolerance = diagnosis::with_wider_tolerance(cell.parameters.tolerance, factor);
-    for (double* v : {&cell.parameters.tolerance.ocv_v, &cell.parameters.tolerance.drift_v}) *v = to_digits(*v, 4);
-    cell.sources["tolerance"] +=
-        fmt::format("; of the OCV and the drift widened {:g} times, to what {} left over", factor, files);
-  }
+    cell.sources[table] += fmt::format("; adjusted within its tolerance to {}, together with the findings", files);
+  for (const Finding& f : r.diagnosis.findings) add_finding(r, files, f, cell);
+  widen_tolerance(r, files, cell);
   return cell;
 }
 

@@ -1,4 +1,4 @@
-// What bms diagnose has found, before it is JSON, a page or a cell file.
+// The result of a diagnosis with its comparisons, before it is JSON, a page or a cell file.
 #pragma once
 
 #include <optional>
@@ -8,25 +8,25 @@
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/next_experiment.hpp"
 #include "files/cell_file.hpp"
-#include "measurement/recording.hpp"
+#include "files/recording.hpp"
 
 namespace bms::workflow {
 
-/// How far an open loop is from what was measured; of several recordings together.
+/// Error of the open-loop voltage, over several recordings together.
 struct OpenLoopFigures {
   double rmse_v = 0, fit_percent = 0;
 };
 
-/// RMSE of the estimator's state of charge against soc_ref.
+/// RMS error of the estimated state of charge against soc_ref, as a fraction.
 struct SocErrors {
   double baseline_rmse = 0, extended_rmse = 0;
 };
 
-/// One recording and what both models say of it, nothing fitted to it but the mechanisms found.
+/// One recording and the voltages of both models. Nothing is fitted to it except the mechanisms found.
 struct RecordingComparison {
   measurement::Recording recording;
   diagnosis::PreparedRecording record;
-  std::vector<double> base_v, extended_v;  ///< empty: no voltage to compare with
+  std::vector<double> base_v, extended_v;  ///< open loop, by row
 };
 
 struct DiagnoseResult {
@@ -34,13 +34,13 @@ struct DiagnoseResult {
   diagnosis::Diagnosis diagnosis;
   std::vector<RecordingComparison> recordings, holdouts;
   std::optional<OpenLoopFigures> baseline, extended, baseline_holdout, extended_holdout;
-  std::optional<SocErrors> soc;                   ///< of the hold-outs that have a reference
-  std::optional<diagnosis::NextExperiment> next;  ///< what would settle which of several causes it is
+  std::optional<SocErrors> soc;                   ///< of the hold-outs with a reference
+  std::optional<diagnosis::NextExperiment> next;  ///< separates the causes that are still possible
   std::string out;
   double wall_s = 0;
   std::vector<measurement::Warning> warnings;
 
-  /// Whether the verdict names mechanisms: then they are in the extended cell.
+  /// Returns true if the verdict names mechanisms; they are then in the extended cell.
   bool named() const { return diagnosis::names(diagnosis.verdict); }
 };
 

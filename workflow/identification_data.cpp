@@ -13,6 +13,8 @@ namespace bms::workflow {
 
 namespace {
 
+constexpr std::size_t least_samples = 10;  ///< in the window; as in a recording
+
 std::optional<double> number(std::string_view text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -20,13 +22,15 @@ std::optional<double> number(std::string_view text) {
   return value;
 }
 
-/// Where the OCV is nearest to a voltage: where a search for the state of charge begins.
+/// The SOC whose OCV is nearest to the voltage; initial value of an estimate.
 double soc_at(const model::OcvTable<double>& ocv, double voltage_v) {
   double best = 0.5, nearest = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k + 1 < ocv.soc.size; ++k) {
     const double soc = std::clamp((voltage_v - ocv.b0_v[k]) / ocv.b1_v[k], ocv.soc[k], ocv.soc[k + 1]);
     const double distance = std::abs(ocv.b0_v[k] + ocv.b1_v[k] * soc - voltage_v);
-    if (distance < nearest) nearest = distance, best = soc;
+    if (distance >= nearest) continue;
+    nearest = distance;
+    best = soc;
   }
   return best;
 }
@@ -36,7 +40,7 @@ double soc_at(const model::OcvTable<double>& ocv, double voltage_v) {
 IdentificationData identification_data(const measurement::Recording& recording, const DataOptions& options) {
   const std::size_t rows = recording.rows();
   const bool estimate = options.initial.estimate || (!options.initial.value && recording.soc_ref.empty());
-  // the state of charge of each row: the reference if there is one, else counted
+  // SOC of each row: the reference if there is one, else by coulomb counting
   double start = options.initial.value.value_or(
       recording.soc_ref.empty() ? soc_at(options.cell.ocv, recording.voltage_v[0]) : recording.soc_ref[0]);
   std::vector<double> soc = recording.soc_ref;
@@ -60,10 +64,10 @@ IdentificationData identification_data(const measurement::Recording& recording, 
     d.soc_min = std::min(d.soc_min, soc[k]);
     d.soc_max = std::max(d.soc_max, soc[k]);
   }
-  if (used < 10) {
+  if (used < least_samples) {
     throw files::BadInput(recording.path, 1,
-                          fmt::format("{} samples in the window of {:g} to {:g}, expected data there", used,
-                                      options.window.high, options.window.low));
+                          fmt::format("{} samples in the window of {:g} to {:g}, expected at least {}", used,
+                                      options.window.high, options.window.low, least_samples));
   }
   const std::size_t from = estimate ? first : 0;
   for (std::size_t k = from; k <= last; ++k) {
@@ -75,7 +79,7 @@ IdentificationData identification_data(const measurement::Recording& recording, 
   }
   d.record.initial_soc = std::clamp(soc[from], 0.0, 1.0);
   d.record.estimate_initial_soc = estimate;
-  const double rested_a = 0.01 * options.cell.capacity_ah;
+  const double rested_a = 0.01 * options.cell.capacity_ah;  // C/100
   d.record.estimate_initial_v_rc = from > 0 || !(std::abs(recording.current_a[from]) < rested_a);
   return d;
 }
@@ -93,16 +97,16 @@ InitialSoc initial_soc_of(const std::string& text) {
 SocWindow window_of(const std::string& option, const std::string& text) {
   if (text.empty()) return {};
   const std::size_t colon = text.find(':');
-  const auto high = number(std::string_view(text).substr(0, colon)),
-             low = colon == std::string::npos ? std::nullopt : number(std::string_view(text).substr(colon + 1));
+  const auto high = number(std::string_view(text).substr(0, colon));
+  const auto low = colon == std::string::npos ? std::nullopt : number(std::string_view(text).substr(colon + 1));
   if (!high || !low || !(*high > *low))
     throw files::BadInput(option, 1, "'" + text + "' is not acceptable, expected HI:LO as in 0.8:0.5");
   return {*high, *low};
 }
 
 identification::CircuitBounds circuit_bounds(double capacity_ah) {
-  constexpr double of_table_3_ah = 6;
-  const double times = of_table_3_ah / capacity_ah;
+  constexpr double table_3_capacity_ah = 6;
+  const double times = table_3_capacity_ah / capacity_ah;
   identification::CircuitBounds b;
   b.r0_min_ohm = std::max(1e-5, b.r0_min_ohm * times);
   b.r0_max_ohm = std::min(0.5, b.r0_max_ohm * times);

@@ -1,21 +1,22 @@
-// From a recording to what is identified from: which part of it, and what is known of its state of charge.
+// From a recording to a data set for identification: which part is used, and what is known of its initial state.
 #pragma once
 
 #include <optional>
 #include <string>
 
+#include "files/recording.hpp"
 #include "identification/grey_box.hpp"
-#include "measurement/recording.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms::workflow {
 
-/// What the user says of the state of charge at the start.
+/// The user's statement about the state of charge at the start.
 struct InitialSoc {
-  std::optional<double> value;  ///< not given: soc_ref, if the recording has it
+  std::optional<double> value;  ///< not given: soc_ref if the recording has it, else estimated
   bool estimate = false;
 };
 
+/// Range of the state of charge whose samples count. The default is everything.
 struct SocWindow {
   double high = 2, low = -2;
 };
@@ -28,22 +29,23 @@ struct DataOptions {
 
 struct IdentificationData {
   identification::DataSet record;
-  std::vector<double> temperature_c;  ///< of the record's rows; empty: not recorded
-  double soc_min = 1, soc_max = 0;    ///< of the samples used
+  std::vector<double> temperature_c;  ///< by row of the data set; empty: not recorded
+  double soc_min = 1, soc_max = 0;    ///< of the samples that count
 };
 
-/// A whole recording is simulated from its start, but only voltages inside the window count; where the start is to be
-/// estimated, the recording begins at the window. Throws BadInput when nothing of it lies in the window.
+/// The recording is simulated from its start, but only voltages inside the window count; outside they are NaN. If the
+/// initial state of charge is to be estimated, the data set begins at the window. Throws BadInput if fewer than ten
+/// samples lie in the window.
 IdentificationData identification_data(const measurement::Recording& recording, const DataOptions& options);
 
-/// "estimate", a number, or nothing. Throws BadInput.
+/// Parses "estimate", a number from 0 to 1, or an empty text. Throws BadInput.
 InitialSoc initial_soc_of(const std::string& text);
 
-/// "HI:LO", or nothing: all. Throws BadInput that names `option`.
+/// Parses "HI:LO", or an empty text for the whole range. Throws BadInput that names `option`.
 SocWindow window_of(const std::string& option, const std::string& text);
 
-/// Table 3, which is for a cell of 6 Ah, for one of another size; C1 up to what a cell file may hold, for slow
-/// branches.
+/// The bounds of the paper's Table 3, which is for 6 Ah, scaled to another capacity. C1 reaches the limit of the cell
+/// file format, which slow RC branches need.
 identification::CircuitBounds circuit_bounds(double capacity_ah);
 
 }  // namespace bms::workflow

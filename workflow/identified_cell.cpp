@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "files/recording.hpp"
 #include "files/bad_input.hpp"
 #include "files/cell_fields.hpp"
-#include "files/recording.hpp"
 #include "host_sim/simulation.hpp"
 #include "identification/ocv_curve.hpp"
 
@@ -20,14 +20,14 @@ namespace id = identification;
 
 namespace {
 
-/// Slow runs of like temperature.
+/// Slow runs of similar temperature.
 struct SlowRuns {
-  double temperature_c = 25;
+  double temperature_c = reference_c;
   std::vector<id::SlowRun> runs;
   std::string files;
 };
 
-/// Those nearest to 25 degrees C first.
+/// Ordered by their distance to the reference temperature, the nearest first.
 std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
   std::vector<measurement::Recording> recordings;
   for (const std::string& path : paths) recordings.push_back(files::read_recording(path));
@@ -41,17 +41,19 @@ std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
     }
   }
   std::stable_sort(all.begin(), all.end(), [](const SlowRuns& a, const SlowRuns& b) {
-    return std::abs(a.temperature_c - 25) < std::abs(b.temperature_c - 25);
+    return std::abs(a.temperature_c - reference_c) < std::abs(b.temperature_c - reference_c);
   });
   return all;
 }
 
-/// Of the temperatures that were recorded; nothing: none.
+/// Mean of the recorded temperatures; nothing if no temperature was recorded.
 std::optional<double> mean_temperature_c(const measurement::Recording& recording) {
   double sum = 0;
   std::size_t count = 0;
   for (const double t : recording.temperature_c) {
-    if (std::isfinite(t)) sum += t, ++count;
+    if (!std::isfinite(t)) continue;
+    sum += t;
+    ++count;
   }
   if (count == 0) return std::nullopt;
   return sum / static_cast<double>(count);
@@ -60,19 +62,19 @@ std::optional<double> mean_temperature_c(const measurement::Recording& recording
 }  // namespace
 
 std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings) {
-  constexpr double alike_k = 5;
+  constexpr double largest_span_k = 5;
   std::vector<std::pair<double, std::size_t>> means;
   std::vector<std::size_t> all;
   for (std::size_t k = 0; k < recordings.size(); ++k) {
     all.push_back(k);
     if (const auto mean_c = mean_temperature_c(recordings[k])) means.emplace_back(*mean_c, k);
   }
-  if (means.size() < recordings.size()) return {{25, all}};
+  if (means.size() < recordings.size()) return {{reference_c, all}};
   std::sort(means.begin(), means.end());
   std::vector<TemperatureGroup> groups;
   double begin_c = 0;
   for (const auto& [temperature_c, k] : means) {
-    if (groups.empty() || temperature_c - begin_c > alike_k) {
+    if (groups.empty() || temperature_c - begin_c > largest_span_k) {
       groups.push_back({0, {}});
       begin_c = temperature_c;
     }
@@ -109,16 +111,17 @@ OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v
     error_v *= 1.5;
     if (error_v > 0.05)
       throw files::BadInput(paths.front(), 1,
-                            "the open-circuit voltage does not rise with the state of charge, expected slow runs of a "
-                            "whole charge or discharge");
+                            "the open-circuit voltage does not rise with the state of charge, expected slow "
+                            "recordings of a complete charge or discharge");
     pieces = id::fewest_pieces(curve, error_v);
   }
   if (error_v > max_error_v) {
     taken.warnings.push_back(
-        {"ocv_error", fmt::format("the straight pieces of the OCV are up to {:.1f} mV off, {:.1f} were asked for",
-                                  1e3 * pieces->largest_error_v, 1e3 * max_error_v)});
+        {"ocv_error",
+         fmt::format("the error of the straight pieces of the OCV is up to {:.1f} mV, {:.1f} mV were requested",
+                     1e3 * pieces->largest_error_v, 1e3 * max_error_v)});
   }
-  // a node of R0, R1, C1 may fall between two corners
+  // the prepared cell has an interval between neighbouring corners of the OCV or nodes of R0, R1, C1
   constexpr std::size_t most_corners = model::max_ocv_edges;
   if (both_branches && curve.coulombic_efficiency) id::add_gap_corners(*pieces, curve, error_v, most_corners);
   auto& ocv = cell.parameters.ocv;
@@ -150,17 +153,19 @@ void identify_noise(const std::vector<measurement::Recording>& recordings, const
       if (std::abs(r.current_a[k]) > quiet_a || std::abs(r.current_a[k - 1]) > quiet_a ||
           std::abs(r.current_a[k - 2]) > quiet_a)
         continue;
-      // second differences: what relaxes slowly is not noise
-      const double v = r.voltage_v[k] - 2 * r.voltage_v[k - 1] + r.voltage_v[k - 2],
-                   i = r.current_a[k] - 2 * r.current_a[k - 1] + r.current_a[k - 2];
-      if (std::isfinite(v) && std::isfinite(i)) voltage_steps.push_back(v * v), current_steps.push_back(i * i);
+      // second differences, because slow relaxation is not noise
+      const double v = r.voltage_v[k] - 2 * r.voltage_v[k - 1] + r.voltage_v[k - 2];
+      const double i = r.current_a[k] - 2 * r.current_a[k - 1] + r.current_a[k - 2];
+      if (!std::isfinite(v) || !std::isfinite(i)) continue;
+      voltage_steps.push_back(v * v);
+      current_steps.push_back(i * i);
     }
     step_s = std::max(0.01, r.duration_s() / static_cast<double>(r.rows() - 1));
   }
   const auto sigma = [](const std::vector<double>& squares) {
     double sum = 0;
     for (const double s : squares) sum += s;
-    return std::sqrt(sum / static_cast<double>(squares.size()) / 6);  // 1 + 4 + 1
+    return std::sqrt(sum / static_cast<double>(squares.size()) / 6);  // variance of a second difference: 1 + 4 + 1
   };
   constexpr std::size_t enough = 30;
   if (voltage_steps.size() >= enough) {
@@ -168,7 +173,7 @@ void identify_noise(const std::vector<measurement::Recording>& recordings, const
     p.noise.current_a = std::clamp(sigma(current_steps), 1e-4 * p.capacity_ah, 0.1 * p.capacity_ah);
   }
   double model_v = judge.rmse_v;
-  // with its mean, which is an error that lasts
+  // the mean is included, because it is a persistent error
   p.noise.model_correlation_s =
       std::clamp(id::correlation_length(id::without_missing(judge.error_v)) * step_s, 1.0, 20'000.0);
   if (p.ocv.half_gap_v.size > 0) {
@@ -176,9 +181,9 @@ void identify_noise(const std::vector<measurement::Recording>& recordings, const
     for (std::size_t k = 0; k < p.ocv.half_gap_v.size; ++k) {
       if (p.ocv.soc[k] > 0.1 && p.ocv.soc[k] < 0.95) gap_v = std::max(gap_v, p.ocv.half_gap_v[k]);
     }
-    // The voltage is somewhere between the slow curves, and the model leans: how far it is off on the other side no
-    // recording needs to have shown. As evenly distributed; and it lasts until the current has turned for a good part
-    // of an hour.
+    // The voltage is somewhere between the slow curves, and the model has a position between them. The error towards
+    // the far curve need not have appeared in any recording. It is taken as uniformly distributed, and it lasts until
+    // the current has reversed for a large part of an hour.
     model_v = std::max(model_v, (1 + std::abs(p.ocv.lean)) * gap_v / std::sqrt(3.0));
     p.noise.model_correlation_s = std::max(p.noise.model_correlation_s, 3'000.0);
     p.noise.rest_v = std::clamp((1 + std::abs(p.ocv.lean)) * gap_v, p.noise.rest_v, 0.2);
@@ -193,20 +198,22 @@ void identify_noise(const std::vector<measurement::Recording>& recordings, const
 
 namespace {
 
-/// The mechanism as the catalogue leaves it when nothing is said.
-model::MechanismSetting silent(std::string_view id, double capacity_ah) {
+/// The mechanism with the default values of the catalogue.
+model::MechanismSetting default_mechanism(std::string_view id, double capacity_ah) {
   return model::default_setting(model::mechanism_index(id), capacity_ah);
 }
 
-/// ln R over 1 / T: the least squares' activation energy of a column of the tables by temperature, held within 0 ..
-/// most.
+/// Activation energy in J/mol of a column of the tables: least squares of ln R over 1 / T, clamped to 0 .. most.
 template <class Value>
 double activation_j_per_mol(const std::vector<files::TemperatureTable>& tables, double most, Value value) {
   double x = 0, y = 0, xx = 0, xy = 0;
   const auto n = static_cast<double>(tables.size());
   for (const files::TemperatureTable& t : tables) {
     const double inverse = 1 / (t.temperature_c + 273.15), log = std::log(value(t.rc));
-    x += inverse, y += log, xx += inverse * inverse, xy += inverse * log;
+    x += inverse;
+    y += log;
+    xx += inverse * inverse;
+    xy += inverse * log;
   }
   return std::clamp(model::mechanism_detail::gas_constant_j_per_mol_k * (n * xy - x * y) / (n * xx - x * x), 0.0, most);
 }
@@ -217,40 +224,42 @@ double mean_of(const model::Column<double, model::max_rc_nodes>& column) {
   return sum / static_cast<double>(column.size);
 }
 
-/// What follows from resistances at several temperatures, or from the gap of slow runs at several; else nothing.
+/// From the resistances at several temperatures, or from the gap of slow runs at several temperatures. Nothing if there
+/// is only one temperature. source: gets the origin of the values.
 std::optional<model::MechanismSetting> temperature_dependence(const std::vector<files::TemperatureTable>& tables,
                                                               const std::optional<id::SlowGap>& gap, double capacity_ah,
                                                               std::string& source) {
-  model::MechanismSetting setting = silent("temperature_resistance", capacity_ah);
-  constexpr double usual_j_per_mol = 50'000,
-                   share = 0.3;  // of what reactions have in R0 of an iron phosphate cell, and how much of R0 that is
-  setting.value = {usual_j_per_mol, 0, 25, share, 0};
+  model::MechanismSetting setting = default_mechanism("temperature_resistance", capacity_ah);
+  // typical for a lithium iron phosphate cell: activation energy of the reactions in R0, and their share of R0
+  constexpr double typical_j_per_mol = 50'000, typical_share = 0.3;
+  setting.value = {typical_j_per_mol, 0, reference_c, typical_share, 0};
   if (tables.size() > 1) {
     setting.value[1] = activation_j_per_mol(tables, 90'000, [](const auto& rc) { return mean_of(rc.r1_ohm); });
-    // the share by least squares, its energy the usual one
-    const auto at_25 = std::min_element(tables.begin(), tables.end(), [](const auto& a, const auto& b) {
-      return std::abs(a.temperature_c - 25) < std::abs(b.temperature_c - 25);
+    // the share by least squares, with the typical energy
+    const auto nearest = std::min_element(tables.begin(), tables.end(), [](const auto& a, const auto& b) {
+      return std::abs(a.temperature_c - reference_c) < std::abs(b.temperature_c - reference_c);
     });
-    const auto more = [&](double temperature_c) {
-      return std::exp(model::mechanism_detail::energy_over_rt(usual_j_per_mol, 25.0) * (25 - temperature_c) /
-                      (temperature_c + 273.15)) -
+    const auto increase = [&](double temperature_c) {
+      return std::exp(model::mechanism_detail::energy_over_rt(typical_j_per_mol, reference_c) *
+                      (reference_c - temperature_c) / (temperature_c + 273.15)) -
              1;
     };
     double xx = 0, xy = 0;
     for (const files::TemperatureTable& t : tables) {
-      const double x = more(t.temperature_c) - more(at_25->temperature_c),
-                   y = mean_of(t.rc.r0_ohm) / mean_of(at_25->rc.r0_ohm) - 1;
-      xx += x * x, xy += x * y;
+      const double x = increase(t.temperature_c) - increase(nearest->temperature_c);
+      const double y = mean_of(t.rc.r0_ohm) / mean_of(nearest->rc.r0_ohm) - 1;
+      xx += x * x;
+      xy += x * y;
     }
-    setting.value[2] = at_25->temperature_c;
+    setting.value[2] = nearest->temperature_c;
     setting.value[3] = std::clamp(xy / xx, 0.02, 1.0);
-    source = fmt::format("resistances identified at {} temperatures; the activation energy of R0 is a usual one",
+    source = fmt::format("resistances identified at {} temperatures; the activation energy of R0 is a typical value",
                          tables.size());
     return setting;
   }
   if (gap && gap->overvoltage_v > 0) {
     setting.value[1] = gap->activation_j_per_mol;
-    source = "overvoltage in the gap of slow runs at several temperatures; R0 as usual";
+    source = "overvoltage in the gap of slow runs at several temperatures; typical values for R0";
     return setting;
   }
   return std::nullopt;
@@ -263,15 +272,16 @@ void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell) {
   const double between_v = model::plateau_half_gap_v(p.ocv);
   if (!(between_v > 0)) return;
   const auto gap = id::slow_gap(ocv.gaps);
-  // C/30 to C/35: what it drops over the circuit, or what grows in the cold
+  // overvoltage of the slow current (C/30 to C/35): over R0 and R1, or the part of the gap that grows in the cold
   const double over_v = gap ? gap->overvoltage_v : p.capacity_ah / 30 * (mean_of(p.rc.r0_ohm) + mean_of(p.rc.r1_ohm));
-  model::MechanismSetting setting = silent("ocv_hysteresis", p.capacity_ah);
+  model::MechanismSetting setting = default_mechanism("ocv_hysteresis", p.capacity_ah);
   setting.value[0] = std::clamp(between_v - over_v, 0.1 * between_v, 0.07);
   setting.value[4] = 1;
   files::put_mechanism(cell, setting);
   cell.sources["mechanism.ocv_hysteresis"] =
       gap ? fmt::format(
-                "gap of slow runs at {} temperatures, less an overvoltage of {:.1f} mV that follows {:.0f} kJ/mol",
+                "gap of slow runs at {} temperatures, less an overvoltage of {:.1f} mV with an activation energy of "
+                "{:.0f} kJ/mol",
                 ocv.gaps.size(), 1e3 * over_v, 1e-3 * gap->activation_j_per_mol)
           : fmt::format("gap of slow charge and discharge, less {:.1f} mV over R0 and R1", 1e3 * over_v);
 }
@@ -303,7 +313,7 @@ void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, f
     cell.sources["mechanism.temperature_resistance"] = source;
   }
   const double half_gap_v = host_sim::value_of(cell.mechanisms, "ocv_hysteresis", 0);
-  // what the recordings leave for longer than ten minutes, and a minor loop that they may not have shown
+  // residual of longer than ten minutes, and a minor hysteresis loop that the recordings need not have shown
   constexpr double lasting_s = 600, least_v = 0.003;
   const auto tables = model::prepare<double, model::max_intervals>(p);
   double squares_v2 = 0;
@@ -319,22 +329,25 @@ void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, f
                                           .initial_soc = of.record.initial_soc});
     double sum_v = 0;
     std::size_t in_sum = 0;
-    const auto take = [&] {
+    const auto add_mean = [&] {
       if (in_sum > 0) squares_v2 += sum_v * sum_v / static_cast<double>(in_sum);
       count += in_sum;
-      sum_v = 0, in_sum = 0;
+      sum_v = 0;
+      in_sum = 0;
     };
     for (std::size_t k = 0; k < d.size(); ++k) {
-      if (k > 0 && std::floor(d.time_s[k] / lasting_s) != std::floor(d.time_s[k - 1] / lasting_s)) take();
-      if (std::isfinite(d.voltage_v[k])) sum_v += d.voltage_v[k] - rows[k].voltage_v, ++in_sum;
+      if (k > 0 && std::floor(d.time_s[k] / lasting_s) != std::floor(d.time_s[k - 1] / lasting_s)) add_mean();
+      if (!std::isfinite(d.voltage_v[k])) continue;
+      sum_v += d.voltage_v[k] - rows[k].voltage_v;
+      ++in_sum;
     }
-    take();
+    add_mean();
   }
-  const double left_v = count > 0 ? std::sqrt(squares_v2 / static_cast<double>(count)) : 0;
-  p.noise.model_v = std::clamp(std::hypot(left_v, half_gap_v / 4), least_v, 0.2);
-  p.noise.model_correlation_s = 3'000;  // until the current has turned for a good part of an hour
+  const double residual_v = count > 0 ? std::sqrt(squares_v2 / static_cast<double>(count)) : 0;
+  p.noise.model_v = std::clamp(std::hypot(residual_v, half_gap_v / 4), least_v, 0.2);
+  p.noise.model_correlation_s = 3'000;  // until the current has reversed for a large part of an hour
   p.noise.rest_v = std::max(p.noise.model_v, 0.01);
-  // a sensor good to a hundredth of the 1C current, whose offset stays for a day's work
+  // a current sensor with an offset of up to a hundredth of the 1C current, constant over a working day
   p.noise.current_offset_a = 0.01 * capacity_ah;
   p.noise.current_offset_correlation_s = 36'000;
   p.noise.current_at_rest_a = 0.002 * capacity_ah;

@@ -1,4 +1,4 @@
-// What an identification leaves in a cell file beside R0, R1, C1: OCV and capacity of slow runs, and noise.
+// The parts of an identified cell file other than R0, R1, C1: OCV, capacity, mechanisms, noise.
 #pragma once
 
 #include <optional>
@@ -6,55 +6,59 @@
 #include <vector>
 
 #include "files/cell_file.hpp"
+#include "files/recording.hpp"
 #include "identification/hysteresis_gap.hpp"
 #include "identification/identify.hpp"
-#include "measurement/recording.hpp"
 #include "workflow/identification_data.hpp"
 
 namespace bms::workflow {
 
+/// Temperature of a cell file's own table, in degrees C.
+inline constexpr double reference_c = 25;
+
 struct OcvResult {
-  std::optional<double> coulombic_efficiency;          ///< discharged over charged; only of a run of each kind
-  std::vector<identification::GapAtTemperature> gaps;  ///< of each temperature with a run of each kind
+  std::optional<double> coulombic_efficiency;          ///< discharged over charged; needs a charge and a discharge
+  std::vector<identification::GapAtTemperature> gaps;  ///< at each temperature with a charge and a discharge
   std::vector<measurement::Warning> warnings;
 };
 
-/// OCV, gap and capacity of slow charge and discharge recordings, with as few straight pieces as stay within
-/// max_error_v; with more error, and a warning, where that cannot be. Of runs at several temperatures those nearest
-/// to 25 degrees C make the curve. both_branches: with corners where the gap bends, too. Throws BadInput when they are
-/// no slow runs.
+/// Writes OCV, gap and capacity of slow charge and discharge recordings into `cell`. The OCV has the fewest straight
+/// pieces with an error of at most max_error_v, in V; if the cell has no room for them, the error is larger and a
+/// warning says so. Of several temperatures, the one nearest to 25 degrees C gives the curve. both_branches: the pieces
+/// also follow the gap. Throws BadInput if the recordings are not slow runs.
 OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
                        files::CellFile& cell);
 
-/// The hysteresis between the measured curves of charge and discharge, as a mechanism; none where there was one run.
+/// Adds the hysteresis between the measured curves of charge and discharge as a mechanism, if there are both.
 void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell);
 
-/// Takes what the cell's mechanisms do to the voltage off a record, so that a circuit can be identified from the rest.
+/// The data set with the effect of the cell's mechanisms subtracted from its voltage, to identify the circuit alone.
 identification::DataSet without_mechanisms(const files::CellFile& cell, const IdentificationData& of);
 
-/// What an estimator needs besides: resistances that follow the temperature, errors that last as states of the filter,
-/// and noise as it then is. data: what was identified from, as measured.
+/// Source of the noise that extend() writes.
 inline constexpr const char* extended_noise =
-    "model: what they leave for longer than ten minutes, and a minor loop of the hysteresis; current offset: a sensor "
-    "good to a hundredth of the 1C current, over a day's work; "
-    "at rest: an open circuit, to a fifth of that; gain: half a percent of the reading and half a percent of the "
-    "capacity";
+    "model: residual of longer than ten minutes, and a minor loop of the hysteresis; current offset: up to a hundredth "
+    "of the 1C current, constant over a working day; at rest: a fifth of that; gain: half a percent of the reading and "
+    "half a percent of the capacity";
+
+/// Adds what an estimator needs in addition: resistances that depend on the temperature, persistent errors as states of
+/// the filter, and the noise that belongs to them. data: the recordings that the cell was identified from, as measured.
 void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell);
 
-/// Noise and tolerance: of the measuring chain by the recordings' rests, of the model by what it leaves over on
-/// `judge`, and by what lies on the side of the OCV's gap that it does not lean to.
+/// Writes noise and tolerance into `p`: noise of the measuring chain from the rests of the recordings, noise of the
+/// model from the residual `judge` and from the gap between the OCV branches.
 void identify_noise(const std::vector<measurement::Recording>& recordings, const identification::FitStatistics& judge,
                     const std::vector<identification::Parameter>& parameters, model::CellParameters<>& p);
 
-/// Recordings within a few kelvins of each other, by their place in a list.
+/// Recordings within 5 K of each other.
 struct TemperatureGroup {
-  double temperature_c = 25;  ///< mean, to a tenth
-  std::vector<std::size_t> recordings;
+  double temperature_c = reference_c;   ///< mean, rounded to a tenth
+  std::vector<std::size_t> recordings;  ///< indices
 };
-/// Ascending; one of 25 degrees C for all where one of them has no temperature.
+/// In order of temperature. A single group of 25 degrees C if any recording has no temperature.
 std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings);
 
-/// Seven digits of every number: more are noise.
+/// Rounds every number to seven significant digits.
 void round_digits(files::CellFile& cell);
 
 }  // namespace bms::workflow

@@ -1,6 +1,7 @@
 // Draws the page from `report`: {title, statement, warnings, figures: [[name, value] | [group]], columns: {...}}.
 (() => {
   'use strict';
+  const {clock} = drawing;
   document.getElementById('title').textContent = report.title;
   document.getElementById('statement').textContent = report.statement;
   document.getElementById('warnings').textContent = report.warnings.join(' \u00b7 ');
@@ -18,26 +19,29 @@
 
   const c = report.columns;
   const hours = c.time_s.map(t => t / 3600);
-  const clock = h => {
-    const s = Math.round(h * 3600), two = n => String(n).padStart(2, '0');
-    return Math.floor(s / 3600) + ':' + two(Math.floor(s / 60) % 60) + (s % 60 ? ':' + two(s % 60) : '');
-  };
   const rows = series => hours.map((h, k) => [h, ...series.map(f => f(k))]);
   const at = column => k => column[k];
   const band = (middle, half) => k => [100 * (middle[k] - half[k]), 100 * middle[k], 100 * (middle[k] + half[k])];
 
-  const chart = (name, labels, data, options) => new Dygraph(document.getElementById('chart-' + name), data, Object.assign({
-    labels: ['time', ...labels],
-    labelsDiv: document.getElementById('legend-' + name),
-    legend: 'always',
-    axisLabelFontSize: 12,
-    gridLineColor: '#e3e8ee',
-    strokeWidth: 1.3,
-    axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
-  }, options));
+  const chart = (name, labels, data, options) => new Dygraph(
+      document.getElementById('chart-' + name), data,
+      Object.assign(
+          {
+            labels: ['time', ...labels],
+            labelsDiv: document.getElementById('legend-' + name),
+            legend: 'always',
+            axisLabelFontSize: 12,
+            gridLineColor: '#e3e8ee',
+            strokeWidth: 1.3,
+            axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
+          },
+          options));
 
-  const in_percent = {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24, valueFormatter: v => v.toFixed(2)}};
-  // a range that the first moments of a wrong start do not blow up: what 99.5 % of the values need, and half as much again
+  const in_percent = {
+    x: {axisLabelFormatter: clock, valueFormatter: clock},
+    y: {axisLabelWidth: 58, pixelsPerLabel: 24, valueFormatter: v => v.toFixed(2)}
+  };
+  // a range that a wrong initial estimate does not widen: at most 1.5 times that of 99.5 % of the values
   const range = values => {
     const sizes = values.filter(Number.isFinite).map(Math.abs).sort((a, b) => a - b);
     if (sizes.length === 0) return null;
@@ -50,18 +54,26 @@
     soc_series.push(k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * c.soc_ref[k]));
   }
   const charts = [
-    chart('soc', soc_labels, rows(soc_series), {customBars: true, colors: ['#0b63b5', '#d1495b'], axes: in_percent, fillAlpha: 0.22}),
-    chart('voltage', ['open loop, V', 'measured, V', 'predicted one step ahead, V'], rows([at(c.open_loop_v), at(c.voltage_v), at(c.predicted_v)]),
-          {colors: ['#c9a227', '#2a2f36', '#0b63b5']}),
+    chart(
+        'soc', soc_labels, rows(soc_series),
+        {customBars: true, colors: ['#0b63b5', '#d1495b'], axes: in_percent, fillAlpha: 0.22}),
+    chart(
+        'voltage', ['open loop, V', 'measured, V', 'predicted one step ahead, V'],
+        rows([at(c.open_loop_v), at(c.voltage_v), at(c.predicted_v)]), {colors: ['#c9a227', '#2a2f36', '#0b63b5']}),
     chart('current', ['A'], rows([at(c.current_a)]), {colors: ['#2e7d4f'], fillGraph: true, fillAlpha: 0.15}),
     chart('innovation', ['mV'], rows([at(c.innovation_mv)]), {colors: ['#7a4fb0'], valueRange: range(c.innovation_mv)}),
   ];
   if (c.soc_ref) {
-    // zero with the filter's own band: the error should stay inside
-    const zeros = c.soc.map(() => 0), error = k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * (c.soc[k] - c.soc_ref[k]));
-    charts.push(chart('error', ['two sigma, %', 'error, %'], rows([band(zeros, c.two_sigma), error]),
-                      {customBars: true, colors: ['#9db8d2', '#d1495b'], axes: in_percent, fillAlpha: 0.35,
-                       valueRange: range(c.soc.map((v, k) => 100 * Math.max(Math.abs(v - c.soc_ref[k]), c.two_sigma[k])))}));
+    // the error should stay within the filter's own band around zero
+    const zeros = c.soc.map(() => 0),
+          error = k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * (c.soc[k] - c.soc_ref[k]));
+    charts.push(chart('error', ['two sigma, %', 'error, %'], rows([band(zeros, c.two_sigma), error]), {
+      customBars: true,
+      colors: ['#9db8d2', '#d1495b'],
+      axes: in_percent,
+      fillAlpha: 0.35,
+      valueRange: range(c.soc.map((v, k) => 100 * Math.max(Math.abs(v - c.soc_ref[k]), c.two_sigma[k])))
+    }));
   } else {
     document.getElementById('figure-error').remove();
   }

@@ -1,4 +1,5 @@
-// Draws the page from `report`: {title, statement, warnings, sections: [{title, note, table: {head, rows: [[{text, paper}]]}} | {title, chart: {labels, rows}}]}.
+// Draws the page from `report`: {title, statement, warnings, sections: [{title, note, table: {head, rows: [[{text,
+// paper}]]}} | {title, chart: {labels, rows}}]}.
 (() => {
   'use strict';
   const {make} = drawing;
@@ -27,8 +28,14 @@
       const legend = make(caption, 'span', '', 'legend');
       const div = make(box, 'div', undefined, 'chart tall');
       window.charts.push(new Dygraph(div, section.chart.rows, {
-        labels: ['time, s', ...section.chart.labels], labelsDiv: legend, legend: 'always', colors: colors, axisLabelFontSize: 12,
-        gridLineColor: '#e3e8ee', strokeWidth: 1.2, axes: {y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
+        labels: ['time, s', ...section.chart.labels],
+        labelsDiv: legend,
+        legend: 'always',
+        colors: colors,
+        axisLabelFontSize: 12,
+        gridLineColor: '#e3e8ee',
+        strokeWidth: 1.2,
+        axes: {y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
       }));
     }
     if (section.note) make(box, 'p', section.note, 'note');

@@ -1,4 +1,4 @@
-// The emulated board against the host: every bit, real recordings and the shift, and a difference when there is one.
+// The emulated board compared with the host, bit by bit, on real recordings and the shift.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,8 +10,6 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
-const std::filesystem::path data = BMS_DATA_DIR;
 const std::string on_board = " --target netduinoplus2 --verify ";
 
 TEST(Board, ComputesTheShiftBitForBitLikeTheHost) {
@@ -42,7 +40,7 @@ TEST(Board, ComputesARealRecordingBitForBitLikeTheHost) {
   }
 }
 
-TEST(Board, AnIdentifiedCellGoesThroughTheGeneratorAndComputesTheSameBits) {
+TEST(Board, ComputesAnIdentifiedCellBitForBitLikeTheHost) {
   const images::TemporaryFolder folder;
   const std::string cell = (folder.path() / "identified.toml").string();
   ASSERT_EQ(run_tool("identify --recording " + shift + " --out " + cell).exit_code, 0);
@@ -51,7 +49,7 @@ TEST(Board, AnIdentifiedCellGoesThroughTheGeneratorAndComputesTheSameBits) {
   EXPECT_THAT(run.out, HasSubstr("every bit equal"));
 }
 
-/// table9 with these tables behind it.
+/// table9 followed by these tables.
 std::filesystem::path extended_cell(const images::TemporaryFolder& folder, const std::string& name,
                                     const std::string& tables) {
   const auto path = folder.path() / (name + ".toml");
@@ -92,7 +90,7 @@ TEST(Board, ComputesAnExtendedCellBitForBitLikeTheHostAndShowsItsStates) {
   EXPECT_EQ(run_tool("replay " + shift + " --scalar fixed --cell " + cell).exit_code, 0);
 }
 
-TEST(Board, EstimatesErrorsThatLastBitForBitLikeTheHost) {
+TEST(Board, EstimatesPersistentErrorsBitForBitLikeTheHost) {
   const images::TemporaryFolder folder;
   for (const char* cell : {"a123_26650_extended", "a123_esctoolbox_extended"}) {
     const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
@@ -110,7 +108,7 @@ TEST(Board, EstimatesErrorsThatLastBitForBitLikeTheHost) {
               HasSubstr(",voltage_measured_v,voltage_error_v,current_offset_a,current_offset_sigma_a,flags\n"));
 }
 
-/// Every mechanism that a board runs, at once; with another order than the catalogue's.
+/// Every mechanism that a board runs, in another order than that of the catalogue.
 TEST(Board, ComputesEveryMechanismBitForBitLikeTheHost) {
   const images::TemporaryFolder folder;
   const std::string cell = extended_cell(folder, "everything", four_mechanisms + R"(
@@ -159,7 +157,7 @@ at_95_v_per_k = 1e-4
   EXPECT_THAT(run.out, HasSubstr("Verified: 28801 estimates, every bit equal on netduinoplus2."));
 }
 
-TEST(Board, TheGeneratorRefusesForIntegersWhatNeedsAnFpu) {
+TEST(Board, TheGeneratorRefusesMechanismsWithoutFixedPointSupport) {
   const images::TemporaryFolder folder;
   const auto cell = extended_cell(folder, "transfer", "\n[mechanism.charge_transfer]\nr0_share = 0.3\n");
   const std::string log = (folder.path() / "log").string(), out = (folder.path() / "out.hpp").string();
@@ -181,8 +179,8 @@ TEST(Microbit, ComputesTheShiftBitForBitLikeTheHost) {
   }
 }
 
-/// Readings that are missing, impossible and stuck; a gap; a clock that stands still.
-TEST(Microbit, ComputesARecordingWithTroubleBitForBitLikeTheHost) {
+/// Missing, impossible and stuck readings, a gap, and repeated times.
+TEST(Microbit, ComputesAFaultyRecordingBitForBitLikeTheHost) {
   const images::TemporaryFolder folder;
   const auto path = folder.path() / "trouble.csv";
   std::ifstream in(shift);
@@ -215,14 +213,14 @@ TEST(Microbit, ComputesARecordingWithTroubleBitForBitLikeTheHost) {
   EXPECT_THAT(run.out, HasSubstr("every bit equal on microbit"));
 }
 
-TEST(Microbit, RefusesToPretendAnotherArithmetic) {
+TEST(Microbit, RefusesAnotherArithmetic) {
   const ToolRun run = run_tool("replay " + shift + " --target microbit");
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, HasSubstr("expected --scalar fixed"));
 }
 
 /// table9 with R0 at 90 % one float step larger: 0.0135692 is 0x3c5e5128 as a float.
-TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
+TEST(Board, FindsAndNamesADifferenceOfOneUnitInTheLastPlace) {
   const images::TemporaryFolder folder;
   const auto other = folder.path() / "ulp.toml";
   ASSERT_EQ(std::nextafter(0.0135692F, 1.0F), 0.013569201F);
@@ -238,7 +236,7 @@ TEST(Board, OneParameterOneUnitInTheLastPlaceOffIsFoundAndNamed) {
           ".*host and netduinoplus2 differ first at sample [0-9]+ \\(time [0-9]+ s\\) in [a-z_]+: host [^\n]+\n"));
 }
 
-TEST(Board, ACellThatIsOutOfRangeIsRefusedByTheFirmwareBuild) {
+TEST(Board, TheFirmwareBuildRefusesACellThatIsOutOfRange) {
   const images::TemporaryFolder folder;
   const auto bad = folder.path() / "bad.toml";
   std::ofstream(bad) << files::replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0140197", "0.9");

@@ -1,4 +1,4 @@
-// A truck's log of CAN frames, replayed: to the very bits that the firmware computed, and what it says when it cannot.
+// A replay of a candump log: it reproduces the bits that the firmware computed, or names what is missing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -14,14 +14,12 @@ namespace {
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-const std::filesystem::path data = BMS_DATA_DIR;
-
 class CanLogTool : public ::testing::Test {
  protected:
   images::TemporaryFolder folder_;
   std::string path(const char* name) const { return (folder_.path() / name).string(); }
 
-  /// What the emulated board said of the beginning of the shift, with a bad wire.
+  /// The frames of the emulated board for the beginning of the shift, over a wire that loses frames.
   std::string log_of(const std::string& more = "") const {
     const std::string shift = content(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
     std::size_t end = 0;
@@ -48,8 +46,8 @@ class CanLogTool : public ::testing::Test {
   }
 };
 
-TEST_F(CanLogTool, ReplaysToTheVeryBitsThatTheFirmwareComputed) {
-  for (const char* more : {"", "--told-soc 0.7", "--fault drop=0.02@0", "--fault current_open@100-150"}) {
+TEST_F(CanLogTool, ReproducesEveryBitThatTheFirmwareComputed) {
+  for (const char* more : {"", "--announced-soc 0.7", "--fault drop=0.02@0", "--fault current_open@100-150"}) {
     const std::string log = log_of(more);
     const auto r = run_tool("replay " + log + " --json -");
     ASSERT_EQ(r.exit_code, 0) << more << r.err;
@@ -60,25 +58,25 @@ TEST_F(CanLogTool, ReplaysToTheVeryBitsThatTheFirmwareComputed) {
   }
 }
 
-TEST_F(CanLogTool, OfAnExtendedCellEveryStateIsCompared) {
+TEST_F(CanLogTool, ComparesEveryStateOfAnExtendedCell) {
   if (!std::filesystem::exists(data / "a123_26650")) GTEST_SKIP() << "the real recordings are not there: " << data;
   const auto hil = run_tool("hil --board netduinoplus2 --cell a123_26650_extended --recording " +
                             (data / "a123_26650" / "udds_P25_A002.csv").string() +
-                            " --sample-s 1 --told-soc 1 --candump " + path("truck.log"));
+                            " --sample-s 1 --announced-soc 1 --candump " + path("truck.log"));
   EXPECT_LT(hil.exit_code, 2) << hil.err;
   const auto r = run_tool("replay " + path("truck.log") + " --cell a123_26650_extended --json -");
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_EQ(Json::parse(r.out)["verified_against"], "log");
 }
 
-TEST_F(CanLogTool, AnotherCellFileIsSaidAndItsFirstDifferentEstimateIsNamed) {
+TEST_F(CanLogTool, ReportsAnotherCellFileAndTheFirstDifferentEstimate) {
   const auto r = run_tool("replay " + log_of() + " --cell a123_26650");
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_THAT(r.err, HasSubstr("has cell file"));
   EXPECT_THAT(r.err, HasSubstr("estimates differ from the firmware's at sample"));
 }
 
-TEST_F(CanLogTool, AHashThatIsOffByABitIsFound) {
+TEST_F(CanLogTool, FindsAHashWithOneWrongBit) {
   std::string text = content(log_of());
   std::size_t at = 0;
   for (int k = 0; k < 100; ++k) at = text.find(" 19B#", at + 1);  // the hundredth sample's time: a microsecond later
@@ -90,7 +88,7 @@ TEST_F(CanLogTool, AHashThatIsOffByABitIsFound) {
   EXPECT_THAT(r.out, HasSubstr("samples_lost"));
 }
 
-TEST_F(CanLogTool, WhatIsMissingIsSaid) {
+TEST_F(CanLogTool, ReportsMissingSamples) {
   const std::string log = log_of();
   const auto lost = run_tool("replay " + without_lines(log, " 19A#", 200, 3) + " --json -");
   EXPECT_EQ(lost.exit_code, 0);
@@ -104,10 +102,10 @@ TEST_F(CanLogTool, WhatIsMissingIsSaid) {
   EXPECT_THAT(none.err, HasSubstr("no samples, expected the frames"));
 }
 
-TEST_F(CanLogTool, HostileBytesEndInALine) {
+TEST_F(CanLogTool, RefusesHostileBytesInOneLine) {
   files::write_file(path("bad.log"), "(1.0) can0 199#00112233445566");
   EXPECT_EQ(run_tool("replay " + path("bad.log")).exit_code, 2);
-  files::write_file(path("bad.gz"), std::string("\x1f\x8b\x08garbage that is no gzip", 25));
+  files::write_file(path("bad.gz"), std::string("\x1f\x8b\x08garbage instead of gzip", 25));
   EXPECT_EQ(run_tool("replay " + path("bad.gz")).exit_code, 2);
 }
 

@@ -1,4 +1,4 @@
-// bms diagnose from the outside: contract, verdicts on recordings whose answer is known, data that says nothing, bad
+// bms diagnose from the outside: contract, verdicts on recordings with a known cause, data without information, bad
 // input.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,8 +20,6 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 
-const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
-
 class DiagnoseTool : public ::testing::Test {
  protected:
   std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
@@ -30,7 +28,7 @@ class DiagnoseTool : public ::testing::Test {
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return run.exit_code == 0 ? json::parse(content(path("r.json"))) : json();
   }
-  /// The first hours of the shift, with its first charge: a diagnosis of it takes a third of the time.
+  /// The first hours of the shift with the first charge; its diagnosis takes a third of the time.
   std::string morning() const {
     std::istringstream lines(content(shift));
     std::ofstream out(path("morning.csv"));
@@ -41,7 +39,7 @@ class DiagnoseTool : public ::testing::Test {
     }
     return path("morning.csv");
   }
-  /// Its current through the cell with a mechanism. `seed`: of the noise.
+  /// The same current simulated with a mechanism. seed: of the noise.
   std::string simulated(const std::string& name, const std::string& with, int seed = 1,
                         const std::string& initial_soc = "0.98") const {
     const ToolRun run =
@@ -61,14 +59,9 @@ class DiagnoseTool : public ::testing::Test {
   images::TemporaryFolder folder_;
 };
 
-/// Without what the contract lets differ.
-std::string steady(const std::string& text) {
-  return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), "");
-}
-
 constexpr const char* hysteresis = "ocv_hysteresis:half_gap_v=0.015,decay=40";
 
-TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndProvesItOnALaterRecording) {
+TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndConfirmsItOnAHoldOut) {
   const std::string later = simulated("later.csv", hysteresis, 2, "0.9");
   std::string text = content(later);
   text.replace(text.find(",soc"), 4, ",soc_ref");
@@ -88,7 +81,7 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndProvesItOnALaterRecording) {
   EXPECT_GT(r["baseline"]["holdout"]["rmse_v"], 0.008);
   EXPECT_LT(r["extended"]["holdout"]["rmse_v"], 0.0013) << "1 mV of noise";
   EXPECT_LT(r["soc"]["extended_rmse"], r["soc"]["baseline_rmse"]);
-  // the cell file goes on to others
+  // the extended cell file works in other commands
   const std::string cell = content(path("x.toml"));
   EXPECT_THAT(cell, HasSubstr("name = \"table9_extended\""));
   EXPECT_THAT(cell, HasSubstr("[mechanism.ocv_hysteresis]\nsource = \"bms diagnose of now.csv"));
@@ -97,10 +90,10 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndProvesItOnALaterRecording) {
   EXPECT_EQ(run_tool("replay " + shift + " --cell " + path("x.toml")).exit_code, 0);
   EXPECT_EQ(result("--cell " + path("x.toml") + " --initial-soc 0.98 --recording " + path("now.csv"))["verdict"],
             "NO_MISMATCH")
-      << "what the cell file has is no mismatch";
+      << "the extended cell file explains the recording";
 }
 
-TEST_F(DiagnoseTool, AContactThatGotWorseIsThereFromTheStartOfALaterRecording) {
+TEST_F(DiagnoseTool, AContactStepIsPresentFromTheStartOfALaterRecording) {
   const json r =
       result("--cell table9 --initial-soc 0.98 --recording " +
              simulated("now.csv", "contact_step:resistance_ohm=0.002,onset_s=5000") + " --holdout " +
@@ -113,7 +106,7 @@ TEST_F(DiagnoseTool, AContactThatGotWorseIsThereFromTheStartOfALaterRecording) {
   EXPECT_THAT(content(path("x.toml")), MatchesRegex("[^@]*since [45][0-9]{3} s of now.csv[^@]*"));
 }
 
-TEST_F(DiagnoseTool, TheShiftItselfIsNoMismatchAndLeavesTheCellAsItWas) {
+TEST_F(DiagnoseTool, TheShiftItselfHasNoMismatchAndLeavesTheCellUnchanged) {
   const json r = result("--cell table9 --initial-soc 0.98 --recording " + shift + " --out " + path("x.toml"));
   EXPECT_EQ(r["verdict"], "NO_MISMATCH");
   EXPECT_TRUE(r["mechanisms"].empty());
@@ -125,7 +118,7 @@ TEST_F(DiagnoseTool, TheShiftItselfIsNoMismatchAndLeavesTheCellAsItWas) {
   EXPECT_THAT(content(path("x.toml")), HasSubstr("NO_MISMATCH, nothing was added"));
 }
 
-TEST_F(DiagnoseTool, GivesWhatTheContractNamesWhateverTheVerdict) {
+TEST_F(DiagnoseTool, HasAllFieldsOfTheContractForEveryVerdict) {
   const auto complete = [](const json& r) {
     for (const char* key : {"command", "verdict", "statement", "location", "mechanisms", "candidates", "baseline",
                             "extended", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
@@ -167,7 +160,7 @@ TEST_F(DiagnoseTool, GivesWhatTheContractNamesWhateverTheVerdict) {
                                                      [](int k) { return 3'300 - 10.0 * (k / 60 % 3); })));
 }
 
-TEST_F(DiagnoseTool, DataThatSaysNothingIsNotTestableAndNeverAGuess) {
+TEST_F(DiagnoseTool, DataWithoutInformationIsNotTestable) {
   const auto level = [](int k) { return 3.29 + 0.001 * (k % 2); };
   const struct {
     const char* what;
@@ -199,7 +192,7 @@ TEST_F(DiagnoseTool, DataThatSaysNothingIsNotTestableAndNeverAGuess) {
   }
 }
 
-TEST_F(DiagnoseTool, WithoutTemperatureWhatNeedsItIsListed) {
+TEST_F(DiagnoseTool, WithoutATemperatureTheMechanismsThatNeedItAreListed) {
   std::string text;
   std::istringstream lines(content(shift));
   for (std::string line; std::getline(lines, line);) {
@@ -229,18 +222,18 @@ TEST_F(DiagnoseTool, ABrokenRecordingIsADataFaultWithItsPlace) {
   EXPECT_EQ(r["statement"], r["faults"][0]["text"]);
 }
 
-TEST_F(DiagnoseTool, SaysWhereTheStartWasTakenFrom) {
+TEST_F(DiagnoseTool, WarnsOfTheSourceOfTheInitialSoc) {
   const json referenced = result("--cell table9 --recording " + shift);
-  EXPECT_THAT(referenced["warnings"].dump(), HasSubstr("starts at soc_ref's first value, 98.0 %"));
+  EXPECT_THAT(referenced["warnings"].dump(), HasSubstr("starts at the first value of soc_ref, 98.0 %"));
   const json read = result("--cell table9 --recording " + simulated("now.csv", hysteresis));
-  EXPECT_THAT(read["warnings"].dump(), HasSubstr("starts where the first voltage says"));
+  EXPECT_THAT(read["warnings"].dump(), HasSubstr("starts at the state of charge estimated from the first voltage"));
   EXPECT_GT(read["recordings"][0]["initial_soc_sigma"], 0.005);
-  const json told = result("--cell table9 --initial-soc 0.97 --recording " + shift);
-  EXPECT_EQ(told["recordings"][0]["initial_soc"], 0.97);
+  const json given = result("--cell table9 --initial-soc 0.97 --recording " + shift);
+  EXPECT_EQ(given["recordings"][0]["initial_soc"], 0.97);
 }
 
-/// An offset of the voltage, which a gain explains as well on an LFP cell; then the sense wires on a source.
-TEST_F(DiagnoseTool, AsksForTheExperimentThatDecidesAndDecidesByIt) {
+/// A voltage offset, which a gain explains as well on an LFP cell; then the sense wires on a reference source.
+TEST_F(DiagnoseTool, RequestsTheExperimentThatDecidesAndDecidesByIt) {
   const std::string now = simulated("now.csv", "voltage_offset:offset_v=0.012");
   const json r = result("--cell table9 --initial-soc 0.98 --recording " + now + " --report " + path("r.html"));
   ASSERT_EQ(r["verdict"], "AMBIGUOUS");
@@ -252,7 +245,7 @@ TEST_F(DiagnoseTool, AsksForTheExperimentThatDecidesAndDecidesByIt) {
   EXPECT_THAT(next["why"].get<std::string>(), HasSubstr("To tell "));
   EXPECT_THAT(content(path("r.html")), HasSubstr("bms experiment meter_check"));
   ASSERT_EQ(run_tool("experiment meter_check --out " + path("p.csv")).exit_code, 0);
-  // what the faulty channel reads of the source, and of the resting cell
+  // readings of the faulty channel: of the source, and of the resting cell
   std::istringstream profile(content(path("p.csv")));
   std::ofstream later(path("later.csv"));
   std::string line;
@@ -299,7 +292,7 @@ TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
   EXPECT_THAT(help.out, HasSubstr("Example: bms diagnose"));
 }
 
-TEST_F(DiagnoseTool, TheSameInputGivesTheSameBytes) {
+TEST_F(DiagnoseTool, IsReproducible) {
   const std::string arguments = "diagnose --cell table9 --initial-soc 0.98 --recording " +
                                 simulated("now.csv", hysteresis) + " --json - --out " + path("x.toml") + " --report " +
                                 path("x.html");
@@ -307,7 +300,7 @@ TEST_F(DiagnoseTool, TheSameInputGivesTheSameBytes) {
   const std::string cell = content(path("x.toml")), page = content(path("x.html"));
   const ToolRun b = run_tool(arguments);
   ASSERT_EQ(a.exit_code, 0) << a.err;
-  EXPECT_EQ(steady(a.out), steady(b.out));
+  EXPECT_EQ(reproducible(a.out), reproducible(b.out));
   EXPECT_EQ(cell, content(path("x.toml")));
   EXPECT_EQ(page, content(path("x.html")));
 }

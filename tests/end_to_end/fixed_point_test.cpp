@@ -1,4 +1,4 @@
-// The estimator in integers: as good as in double, and the same bits on a Cortex-M0.
+// The estimator in fixed point: as accurate as in double, and bit-identical on a Cortex-M0.
 #include <gtest/gtest.h>
 
 #include "tests/figures/fixed_point.hpp"
@@ -22,7 +22,8 @@ TEST(FixedPoint, IsWithinATenthOfAPercentOfDoubleOverTheShiftAndEveryRealRecordi
   EXPECT_EQ(done, std::filesystem::exists(data) ? shift_and_recordings : 1U);
 }
 
-/// Of cells with mechanisms, whose steps are four times as long, every fourth; `write_figures fixed` compares them all.
+/// Only every fourth of the cells with mechanisms, because their steps take four times as long; `write_figures fixed`
+/// compares all.
 TEST(FixedPoint, OfTheMicrobitIsTheHostsBitForBitOverTheShiftAndRealRecordings) {
   std::size_t done = 0, of_extended = 0;
   for (const FixedPointRun& run : runs()) {

@@ -1,5 +1,5 @@
-// bms flash: what OpenOCD is told, and what it makes of it, without a probe: its dummy adapter, a processor that does
-// nothing and a flash in its memory.
+// bms flash: the commands for OpenOCD, and how OpenOCD executes them without a probe: with its dummy adapter, a test
+// processor without function and a simulated flash.
 #include <regex>
 
 #include <fmt/format.h>
@@ -56,7 +56,7 @@ std::vector<Written> written(const std::vector<std::string>& all) {
   return found;
 }
 
-TEST(Flash, TellsOpenOcdToWriteCompareAndReset) {
+TEST(Flash, MakesOpenOcdWriteCompareAndReset) {
   ASSERT_EQ(dry_run().exit_code, 0) << dry_run().err;
   EXPECT_THAT(dry_run().out, ::testing::StartsWith("openocd -f interface/stlink.cfg -f target/stm32f4x.cfg "));
   const auto all = commands(dry_run().out);
@@ -126,8 +126,8 @@ TEST(Flash, WritesPartsThatMayShareASectorAtOnce) {
   EXPECT_THROW(images::parts_to_write({{0, "abc"}, {2, "d"}}, std::nullopt), std::runtime_error);
 }
 
-/// The very commands, without those that read the chip's memory, which the processor that does nothing has not.
-TEST(Flash, OpenOcdTakesTheCommandsAndWritesNothingBetweenTheParts) {
+/// The same commands without those that read memory, which the test processor does not have.
+TEST(Flash, OpenOcdAcceptsTheCommandsAndWritesNothingBetweenTheParts) {
   const images::TemporaryFolder folder;
   std::string command =
       "openocd -c 'adapter driver dummy' -c 'transport select jtag' -c 'jtag newtap chip cpu -irlen 4' -c 'target "
@@ -144,13 +144,13 @@ TEST(Flash, OpenOcdTakesTheCommandsAndWritesNothingBetweenTheParts) {
   const std::string said = content(log);
   EXPECT_EQ(status, 0) << said;
   for (const Written& w : written(all)) {
-    bytes = (content(w.path).size() + 0xFFFF) & ~std::uint64_t{0xFFFF};  // the pretended flash has sectors of 64 KiB
+    bytes = (content(w.path).size() + 0xFFFF) & ~std::uint64_t{0xFFFF};  // the simulated flash has sectors of 64 KiB
     EXPECT_THAT(said, HasSubstr(fmt::format("wrote {} bytes from file {}", bytes, w.path)));
   }
   EXPECT_THAT(said, ::testing::Not(HasSubstr("extra erase range")));
 }
 
-/// Every board's probe and chip are known to OpenOCD, and the commands before init are words that it knows.
+/// OpenOCD knows the probe and the chip of every board, and the commands before init.
 TEST(Flash, OpenOcdKnowsEveryBoardsProbeAndChip) {
   for (const std::string& board : images::board_names()) {
     const images::TemporaryFolder folder;
@@ -166,8 +166,8 @@ TEST(Flash, OpenOcdKnowsEveryBoardsProbeAndChip) {
   }
 }
 
-TEST(Flash, SaysWhatIsMissing) {
-  // a serial number that no probe has: nothing is written where one is plugged in
+TEST(Flash, NamesWhatIsMissing) {
+  // a serial number that no probe has, so nothing is written even if a probe is connected
   const ToolRun no_probe = run_tool("flash --board stm32f405_forklift --serial no-such-probe");
   EXPECT_EQ(no_probe.exit_code, 2) << no_probe.out << no_probe.err;
   EXPECT_THAT(no_probe.err, HasSubstr("no stlink probe with the serial number no-such-probe found"));
@@ -184,7 +184,7 @@ TEST(Flash, SaysWhatIsMissing) {
   EXPECT_THAT(content(empty.path() / "err"), HasSubstr("openocd:1: not installed"));
 }
 
-TEST(Flash, SaysWhatWentWrong) {
+TEST(Flash, NamesTheFailure) {
   const images::Probe probe{"stlink", "stm32f4x", ""};
   EXPECT_TRUE(images::failure_in("Error: open failed\n", probe).no_probe);
   const images::FlashFailure no_chip = images::failure_in(

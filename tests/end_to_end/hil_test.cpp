@@ -14,12 +14,15 @@ namespace {
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
+double load_a(int second) {
+  if (second % 60 < 30) return -5.0;
+  return second % 60 < 40 ? 1.5 : -0.5;
+}
 
-/// Five minutes of a load that comes and goes.
+/// Five minutes of a pulsed load.
 std::string short_drive(const std::filesystem::path& folder) {
   std::string csv = "time_s,current_a\n";
-  for (int k = 0; k <= 300; ++k) csv += fmt::format("{},{}\n", k, k % 60 < 30 ? -5.0 : k % 60 < 40 ? 1.5 : -0.5);
+  for (int k = 0; k <= 300; ++k) csv += fmt::format("{},{}\n", k, load_a(k));
   const auto path = folder / "drive.csv";
   files::write_file(path, csv);
   return path.string();
@@ -29,7 +32,7 @@ Json of(const ToolRun& r) { return Json::parse(r.out); }
 
 class Hil : public ::testing::TestWithParam<const char*> {
  protected:
-  /// The forklift board in the loop with that; its result as JSON on standard output.
+  /// The forklift board in the loop with that load; the result is JSON on standard output.
   ToolRun loop(const std::string& arguments) const {
     return run_tool("hil --board stm32f405_forklift --json - --profile " + short_drive(folder_.path()) + " " +
                     arguments);
@@ -37,8 +40,8 @@ class Hil : public ::testing::TestWithParam<const char*> {
   images::TemporaryFolder folder_;
 };
 
-TEST_F(Hil, ADriveWithoutFaultsRaisesNoneAndTellsTheTruth) {
-  const auto r = loop("--initial-soc 0.6 --told-soc 0.6");
+TEST_F(Hil, ADriveWithoutFaultsRaisesNoFaultAndPublishesTheTrueSoc) {
+  const auto r = loop("--initial-soc 0.6 --announced-soc 0.6");
   ASSERT_EQ(r.exit_code, 0) << r.err;
   const Json j = of(r);
   EXPECT_EQ(j["cells"], 16);
@@ -52,7 +55,7 @@ TEST_F(Hil, ADriveWithoutFaultsRaisesNoneAndTellsTheTruth) {
   EXPECT_GT(j["frames"], 30'000);
 }
 
-TEST_F(Hil, TheSameRunIsTheSameAgain) {
+TEST_F(Hil, IsReproducible) {
   const auto run = [&] {
     Json j = of(loop("--fault drop=0.01@0 --seed 5 --candump " + (folder_.path() / "dump").string()));
     j.erase("speedup");
@@ -62,8 +65,8 @@ TEST_F(Hil, TheSameRunIsTheSameAgain) {
 }
 
 class HilFault : public Hil {};
-TEST_P(HilFault, AFaultThatIsPutInIsToldInItsTime) {
-  const auto r = loop(std::string("--initial-soc 0.6 --told-soc 0.6 --fault ") + GetParam());
+TEST_P(HilFault, AnInjectedFaultIsReportedInTime) {
+  const auto r = loop(std::string("--initial-soc 0.6 --announced-soc 0.6 --fault ") + GetParam());
   EXPECT_EQ(r.exit_code, 0) << r.err;
   const Json j = of(r);
   ASSERT_EQ(j["reactions"].size(), 1U);
@@ -79,29 +82,30 @@ INSTANTIATE_TEST_SUITE_P(Faults, HilFault,
                            return std::string(i.param).substr(0, std::string(i.param).find_first_of("=@"));
                          });
 
-TEST_F(Hil, ABadWireMakesNoWrongStateOfChargeValid) {
+TEST_F(Hil, AFaultyWireMakesNoWrongStateOfChargeValid) {
   for (const char* fault : {"drop=0.02@30", "corrupt=0.02@30", "delay=0.02@30"}) {
-    const auto r = loop(std::string("--initial-soc 0.6 --told-soc 0.6 --fault ") + fault);
+    const auto r = loop(std::string("--initial-soc 0.6 --announced-soc 0.6 --fault ") + fault);
     EXPECT_EQ(r.exit_code, 0) << fault << r.err;
     EXPECT_EQ(of(r)["soc"]["wrong_told_as_valid"], 0) << fault;
-    EXPECT_GT(of(r)["unanswered"], 100) << fault << ": samples that were not whole are none";
+    EXPECT_GT(of(r)["unanswered"], 100) << fault << ": incomplete samples do not count";
   }
 }
 
-TEST_F(Hil, AFaultThatIsNotToldEndsWith1) {
+TEST_F(Hil, AFaultThatIsNotReportedGivesExitCode1) {
   const auto r = loop("--fault welded@60 --fault cell_open=2@299.9-299.95");
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_THAT(r.err, HasSubstr("cell_open=2@299.9-299.95: expected VoltageMissing"));
 }
 
-TEST_F(Hil, ARecordingFlowsOnlyThroughClosedContactorsAndIsNoWeldedOne) {
+TEST_F(Hil, ARecordedCurrentFlowsOnlyThroughClosedContactors) {
   std::string csv = files::read_file(shift);
   std::size_t end = 0;
   for (int line = 0; line < 400; ++line) end = csv.find('\n', end) + 1;
   const std::string part = (folder_.path() / "part.csv").string();
   files::write_file(part, csv.substr(0, end));
   const auto replayed = [&](const std::string& more) {
-    return of(run_tool("hil --board netduinoplus2 --sample-s 1 --told-soc 0.98 --json - --recording " + part + more));
+    return of(
+        run_tool("hil --board netduinoplus2 --sample-s 1 --announced-soc 0.98 --json - --recording " + part + more));
   };
   const Json j = replayed("");
   EXPECT_LT(j["driving_after_s"], 30);
@@ -111,11 +115,11 @@ TEST_F(Hil, ARecordingFlowsOnlyThroughClosedContactorsAndIsNoWeldedOne) {
   const Json cut = replayed(" --fault current_open@350-360");
   ASSERT_TRUE(cut["cut_off_at_s"].is_number()) << "CurrentMissing opens";
   EXPECT_NEAR(cut["cut_off_at_s"].get<double>(), 356, 6);
-  EXPECT_LE(cut["soc"]["told"], 362) << "what is told past open contactors is not judged";
+  EXPECT_LE(cut["soc"]["told"], 362) << "the SOC after the contactors have opened is not judged";
   for (const Json& fault : cut["faults"]) EXPECT_NE(fault["name"], "ContactorWelded");
 }
 
-TEST_F(Hil, WhatItCannotRunItSaysInALine) {
+TEST_F(Hil, RefusesInvalidInputInOneLine) {
   EXPECT_EQ(run_tool("hil").exit_code, 2);
   EXPECT_EQ(run_tool("hil --profile " + shift + " --recording " + shift).exit_code, 2);
   const auto board = run_tool("hil --board nowhere --profile " + shift);

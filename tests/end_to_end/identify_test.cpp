@@ -13,9 +13,6 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 
-const std::filesystem::path data = BMS_DATA_DIR;
-const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
-
 class IdentifyTool : public ::testing::Test {
  protected:
   std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
@@ -28,7 +25,7 @@ class IdentifyTool : public ::testing::Test {
   images::TemporaryFolder folder_;
 };
 
-TEST_F(IdentifyTool, GivesWhatTheContractNames) {
+TEST_F(IdentifyTool, HasAllFieldsOfTheContract) {
   const json r = result("--recording " + shift + " --validate " + shift + " --validate-window 0.6:0.3");
   for (const char* key : {"command", "model", "optimizer", "samples", "parameters", "estimation", "validation",
                           "initial_state", "iterations", "evaluations", "converged", "reason", "wall_s", "warnings"}) {
@@ -65,7 +62,7 @@ TEST_F(IdentifyTool, EveryModelAndEveryOptimiserRuns) {
       const ToolRun run =
           run_tool("identify --recording " + path("s.csv") + " --initial-soc 1 --window 0.8:0.5 --nodes 0.65 --model " +
                    model + " --optimizer " + optimizer + " --out " + path("c.toml") + " --json " + path("r.json"));
-      ASSERT_LE(run.exit_code, 1) << model << " " << optimizer << ": " << run.err;  // 1: no circuit
+      ASSERT_LE(run.exit_code, 1) << model << " " << optimizer << ": " << run.err;  // 1: invalid circuit
       const json r = json::parse(content(path("r.json")));
       EXPECT_EQ(r["model"], model);
       EXPECT_EQ(r["optimizer"], optimizer);
@@ -76,7 +73,7 @@ TEST_F(IdentifyTool, EveryModelAndEveryOptimiserRuns) {
   }
 }
 
-TEST_F(IdentifyTool, BadDataIsRefusedInOneLineThatNamesIt) {
+TEST_F(IdentifyTool, RefusesBadDataInOneLineThatNamesIt) {
   std::ofstream(path("rest.csv")) << [] {
     std::string t = "time_s,current_a,voltage_v\n";
     for (int k = 0; k < 600; ++k) t += std::to_string(k) + ",0,3.3\n";
@@ -98,7 +95,7 @@ TEST_F(IdentifyTool, BadDataIsRefusedInOneLineThatNamesIt) {
   refused("--recording " + shift + " --model linear", "--model");
 }
 
-TEST_F(IdentifyTool, AnInvertedCurrentIsWarnedOf) {
+TEST_F(IdentifyTool, WarnsOfAnInvertedCurrent) {
   std::istringstream lines(content(shift));
   std::ofstream out(path("inverted.csv"));
   for (std::string line; std::getline(lines, line);) {
@@ -116,7 +113,7 @@ TEST_F(IdentifyTool, AnInvertedCurrentIsWarnedOf) {
   EXPECT_THAT(run.err, HasSubstr("ended at its bound"));
 }
 
-TEST_F(IdentifyTool, ARealCellIsPredictedOnRecordingsItWasNotIdentifiedFrom) {
+TEST_F(IdentifyTool, PredictsARealCellOnValidationRecordings) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
   const std::string common = "--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") +
                              " --start a123_26650 --window 0.95:0.10 --recording ";
@@ -128,7 +125,7 @@ TEST_F(IdentifyTool, ARealCellIsPredictedOnRecordingsItWasNotIdentifiedFrom) {
   EXPECT_NEAR(from_udds["coulombic_efficiency"], 0.998, 0.003);
 }
 
-/// Lines that say something of the cell, without its name and source.
+/// The values of a cell file: its lines without name and sources.
 std::string values_of(const std::string& cell) {
   std::istringstream lines(cell);
   std::string values;
@@ -138,7 +135,7 @@ std::string values_of(const std::string& cell) {
   return values;
 }
 
-TEST_F(IdentifyTool, TheBuiltInExtendedCellsAreWhatTheirCommandsMake) {
+TEST_F(IdentifyTool, ReproducesTheBuiltInExtendedCells) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
   const auto all = [](const std::filesystem::path& folder, std::vector<const char*> files) {
     std::string list;
@@ -165,7 +162,7 @@ TEST_F(IdentifyTool, TheBuiltInExtendedCellsAreWhatTheirCommandsMake) {
             values_of(content(cells / "a123_esctoolbox_extended.toml")));
 }
 
-TEST_F(IdentifyTool, SeveralTemperaturesGiveATableEach) {
+TEST_F(IdentifyTool, SeveralTemperaturesGiveOneTableEach) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
   const json r = result("--ocv " + real("ocv_P25_dis.csv") + " " + real("ocv_P25_chg.csv") +
                         " --start a123_26650 --window 0.9:0.2 --nodes 0.5 --recording " + real("dyn10_P05_A002.csv") +
@@ -203,7 +200,7 @@ TEST_F(IdentifyTool, StudyWritesTablesAndAPageAndFindsTheOrderOfThePaper) {
   }
 }
 
-TEST_F(IdentifyTool, StudyTakesAFolderOfRecordings) {
+TEST_F(IdentifyTool, StudyAcceptsAFolderOfRecordings) {
   for (const char* name : {"rest_5s", "high_1m_low_30s"}) {
     ASSERT_EQ(run_tool(std::string("experiment ") + name + " --out " + path("p.csv")).exit_code, 0);
     std::filesystem::create_directories(path("in"));

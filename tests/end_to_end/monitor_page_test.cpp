@@ -1,4 +1,4 @@
-// bms monitor --serve: the server as a stranger finds it, and the page in a real browser.
+// bms monitor --serve: the server from the outside, and the page in a real browser.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -55,7 +55,7 @@ class ServedPage : public ::testing::Test {
     EXPECT_EQ(::connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
     return line;
   }
-  /// What comes back within a second and a half, up to so many bytes.
+  /// The answer within a second and a half, up to so many bytes.
   std::string answer(const std::string& request, std::size_t most = 4'000) const {
     const int line = connect();
     const timeval wait{1, 500'000};
@@ -78,7 +78,7 @@ class ServedPage : public ::testing::Test {
   int port_ = 0;
 };
 
-TEST_F(ServedPage, IsOnlyForThisMachineByItsOwnNameAndOnlyToRead) {
+TEST_F(ServedPage, ServesOnlyThisComputerAndOnlyReads) {
   const auto get = [&](const std::string& method, const std::string& path, const std::string& host) {
     return answer(method + " " + path + " HTTP/1.1\r\n" + (host.empty() ? "" : "Host: " + host + "\r\n") +
                   "Connection: close\r\n\r\n");
@@ -98,7 +98,7 @@ TEST_F(ServedPage, IsOnlyForThisMachineByItsOwnNameAndOnlyToRead) {
   EXPECT_THAT(get("GET", "/../etc/passwd", own), StartsWith("HTTP/1.1 404"));
 }
 
-TEST_F(ServedPage, AStreamBeginsWithTheWholeHistoryAndTheSeventhIsToldToWait) {
+TEST_F(ServedPage, AStreamBeginsWithTheWholeHistoryAndTheSeventhIsRefused) {
   const std::string request = "GET /events HTTP/1.1\r\nHost: " + own_host() + "\r\n\r\n";
   const std::string first = answer(request, 60'000);
   EXPECT_THAT(first, AllOf(HasSubstr("text/event-stream"), HasSubstr("data: {\"picture\":{ \"command\": \"monitor\""),
@@ -123,7 +123,7 @@ TEST_F(ServedPage, APortThatIsTakenIsRefused) {
   EXPECT_THAT(run.err, HasSubstr("is not to be had"));
 }
 
-/// A browser that is asked by its debugging protocol through pipes (--remote-debugging-pipe: JSON objects, each ended
+/// A browser, controlled by its debugging protocol through pipes (--remote-debugging-pipe: JSON objects, each ended
 /// by a zero).
 class Browser {
  public:
@@ -208,7 +208,7 @@ class Browser {
   std::vector<std::string> requests_, errors_;
 };
 
-TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndAsksNobodyElse) {
+TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndLoadsNothingElse) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
   Browser browser(folder_.path() / "profile");
   browser.ask("Page.navigate", {{"url", url_}});
@@ -229,7 +229,8 @@ TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndAsksNobodyElse) {
       << "a point each half second: the last is of 299.5 s";
   EXPECT_GT(browser.value_of("charts.current.yAxisRange()[1] - charts.current.yAxisRange()[0]").get<double>(), 20);
   EXPECT_EQ(browser.value_of("document.querySelectorAll('#messages tr').length"), 9) << "a head and eight messages";
-  EXPECT_EQ(browser.value_of("document.getElementById('figure-cells').hidden"), true) << "this bus tells no cells";
+  EXPECT_EQ(browser.value_of("document.getElementById('figure-cells').hidden"), true)
+      << "this bus has no cell voltages";
   EXPECT_EQ(
       browser.value_of("document.body.innerText.includes('NaN') || document.body.innerText.includes('undefined')"),
       false);
@@ -242,7 +243,7 @@ TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndAsksNobodyElse) {
   EXPECT_TRUE(browser.errors().empty()) << browser.errors().front();
   EXPECT_THAT(browser.requests(), ::testing::UnorderedElementsAre(url_, url_ + "events"));
 
-  // the monitor ends: the page says so and keeps what it has
+  // after the monitor has ended, the page says so and keeps its values
   tool_.reset();
   EXPECT_TRUE(soon("document.getElementById('state').textContent === 'The monitor has ended'"));
   EXPECT_EQ(browser.value_of("document.getElementById('soc').textContent"), "53.4\u202f%");

@@ -58,7 +58,7 @@ class Monitor : public ::testing::Test {
   images::TemporaryFolder folder_;
 };
 
-TEST_F(Monitor, TellsALogAsOneJsonObject) {
+TEST_F(Monitor, WritesALogAsOneJsonObject) {
   const json p = picture(log(dump_of(61)));
   EXPECT_EQ(p["command"], "monitor");
   EXPECT_EQ(p["frames"], 488);
@@ -71,10 +71,10 @@ TEST_F(Monitor, TellsALogAsOneJsonObject) {
       << "a number of the DBC file's step, not of a float";
   EXPECT_EQ(p["messages"]["PackState"]["signals"]["Soc"]["unit"], "%");
   EXPECT_EQ(p["messages"]["Status"]["signals"]["ResetCause"]["words"], "power on");
-  EXPECT_FALSE(p["messages"].contains("SensorErrors")) << "never heard";
+  EXPECT_FALSE(p["messages"].contains("SensorErrors")) << "never received";
 }
 
-TEST_F(Monitor, WithoutATerminalSaysALineASecond) {
+TEST_F(Monitor, PrintsALinePerSecondWithoutATerminal) {
   const ToolRun run = run_tool("monitor " + log(dump_of(61)));
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(std::count(run.out.begin(), run.out.end(), '\n'), 61);
@@ -83,7 +83,7 @@ TEST_F(Monitor, WithoutATerminalSaysALineASecond) {
   EXPECT_EQ(run_tool("monitor --quiet " + log(dump_of(61))).out, "");
 }
 
-TEST_F(Monitor, ReadsALogFromStandardInputAndPacked) {
+TEST_F(Monitor, ReadsALogFromStandardInputAndCompressed) {
   const std::string file = log(dump_of(30));
   json expected = picture(file);
   ASSERT_EQ(std::system(("gzip -c " + path("bus.log") + " > " + path("bus.log.gz")).c_str()), 0);
@@ -94,7 +94,7 @@ TEST_F(Monitor, ReadsALogFromStandardInputAndPacked) {
   EXPECT_EQ(piped, expected);
 }
 
-TEST_F(Monitor, OnceEndsWithTheFirstCompletePictureOrSaysThatNoneCame) {
+TEST_F(Monitor, OnceEndsWithTheFirstCompletePictureOrReportsThatItNeverCame) {
   const json p = picture("--once " + log(dump_of(61)));
   EXPECT_EQ(p["complete"], true);
   EXPECT_LT(p["duration_s"].get<double>(), 2.1);
@@ -113,7 +113,7 @@ TEST_F(Monitor, CsvIsARowForEachStatusMessageThatReplayReads) {
   EXPECT_EQ(json::parse(replay.out)["samples"], 100);
 }
 
-TEST_F(Monitor, ARecordGivesTheSamePictureByteForByte) {
+TEST_F(Monitor, ALogOfTheSameFramesGivesTheSameJsonByteForByte) {
   std::string text = dump_of(100);
   text +=
       "(1200.000000) can0 12345678#0102\n(1200.000001) can0 123#R4\n(1200.000002) can0 "
@@ -136,7 +136,7 @@ TEST_F(Monitor, ARecordGivesTheSamePictureByteForByte) {
   EXPECT_EQ(p["messages"]["Status"]["wrong_length"], 1);
 }
 
-TEST_F(Monitor, RefusesInOneLineWhatItCannotUse) {
+TEST_F(Monitor, RefusesInvalidInputInOneLine) {
   for (const char* arguments :
        {"nonesuch0", "file:/nonesuch", "file:" BMS_SOURCE_DIR "/README.md", "file:/", "slcan:/dev/null",
         "file:x --record -", "file:x --serve 70000", "file:x --duration 0", "file:x --csv ''"}) {
@@ -152,7 +152,7 @@ TEST_F(Monitor, RefusesInOneLineWhatItCannotUse) {
   }
 }
 
-TEST_F(Monitor, AHostileLogIsCountedAndWhatIsGoodInItIsRead) {
+TEST_F(Monitor, CountsHostileLinesOfALogAndReadsTheValidOnes) {
   std::mt19937_64 random(5);
   std::string text;
   std::istringstream good(dump_of(200));
@@ -184,7 +184,7 @@ TEST_F(Monitor, AHostileLogIsCountedAndWhatIsGoodInItIsRead) {
   EXPECT_EQ(p["messages"]["PackState"]["lost"], 0);
 }
 
-/// Where the tool's standard output is a terminal of a size, or an adapter speaks to it.
+/// A terminal of a given size for the tool's standard output, or the line to an adapter.
 class PseudoTerminal {
  public:
   explicit PseudoTerminal(unsigned short columns = 80, unsigned short rows = 24) {
@@ -210,7 +210,7 @@ class PseudoTerminal {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  /// What is on the line until `what` is among it, five seconds at most.
+  /// Reads the line until `what` appears, for at most five seconds.
   std::string read_until(
       const std::string& what, std::function<void()> meanwhile = [] {}) const {
     std::string text;
@@ -238,7 +238,7 @@ class PseudoTerminal {
   char name_[64] = {};
 };
 
-/// The tool with a terminal of its own, listening to an adapter that the test plays.
+/// The tool on a terminal of its own, with an adapter that the test simulates.
 class LiveScreen : public ::testing::Test {
  protected:
   ~LiveScreen() override {
@@ -263,7 +263,7 @@ class LiveScreen : public ::testing::Test {
     }
     adapter_.read_until("O\r");
   }
-  /// A sample every tenth of a second while called.
+  /// Sends a sample every tenth of a second during the call.
   void talk() {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_) return;
@@ -302,7 +302,7 @@ class LiveScreen : public ::testing::Test {
   std::chrono::steady_clock::time_point next_{};
 };
 
-TEST_F(LiveScreen, DrawsOnTheAlternateScreenAndGivesTheTerminalBackOnCtrlC) {
+TEST_F(LiveScreen, DrawsOnTheAlternateScreenAndRestoresTheTerminalOnCtrlC) {
   start();
   const std::string first = shown_until("carried by counting");
   EXPECT_THAT(first, AllOf(HasSubstr("\x1b[?1049h\x1b[?25l"), HasSubstr("carried by counting")));
@@ -338,7 +338,7 @@ TEST_F(LiveScreen, FollowsTheTerminalsSize) {
   EXPECT_THAT(frame, AllOf(HasSubstr("Charge"), Not(HasSubstr("SocAnchor"))));
 }
 
-TEST_F(LiveScreen, GivesTheTerminalBackWhenItCrashes) {
+TEST_F(LiveScreen, RestoresTheTerminalAfterACrash) {
   start();
   shown_until("carried by counting");
   kill(pid_, SIGSEGV);
@@ -348,15 +348,15 @@ TEST_F(LiveScreen, GivesTheTerminalBackWhenItCrashes) {
   expect_terminal_as_before();
 }
 
-TEST_F(LiveScreen, GreysWhatIsStale) {
+TEST_F(LiveScreen, ShowsStaleValuesInGrey) {
   start();
   shown_until("carried by counting");
   EXPECT_THAT(shown_until("\x1b[1m80.0 %"), HasSubstr("\x1b[1m80.0 %"));
   EXPECT_THAT(terminal_.read_until("\x1b[90m80.0 %"), HasSubstr("\x1b[90m80.0 %")) << "after three seconds of silence";
 }
 
-TEST_F(LiveScreen, AnAdapterThatIsUnpluggedEndsItWithALine) {
-  // the adapter's side is this test's: closed, the tool reads an error
+TEST_F(LiveScreen, EndsWithALineWhenTheAdapterIsUnplugged) {
+  // the test closes the adapter's side, and the tool reads an error
   auto gone = std::make_unique<PseudoTerminal>();
   const images::TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string();
@@ -380,7 +380,7 @@ long memory_kb(pid_t pid) {
   return 0;
 }
 
-TEST(MonitorLoad, TenThousandFramesASecondAreTakenWithoutLossInConstantMemory) {
+TEST(MonitorLoad, ReadsTenThousandFramesPerSecondWithoutLossInConstantMemory) {
   // a shorter run of tests/vcan/load.sh: every frame of 4 s at 10,000 a second, by a pipe
   const images::TemporaryFolder folder;
   const std::string json_file = (folder.path() / "p.json").string(), count_file = (folder.path() / "count").string();

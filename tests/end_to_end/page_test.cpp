@@ -1,4 +1,4 @@
-// The report in a real browser: every chart drawn, the figures filled in, no error.
+// The reports in a real browser: all charts and figures are there, without a script error.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -40,12 +40,12 @@ TEST(ReportPage, DrawsFiveChartsAndTheFiguresWithoutAnError) {
   ASSERT_EQ(run_tool("replay " BMS_SOURCE_DIR "/recordings/forklift_shift.csv --report " + page.string()).exit_code, 0);
   const std::string dom = document_of(page, folder.path());
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U) << "only the listener's own text";
-  EXPECT_GE(count(dom, "<canvas"), 10U);  // two a chart
+  EXPECT_GE(count(dom, "<canvas"), 10U);  // two per chart
   EXPECT_THAT(dom, HasSubstr("one-step prediction, RMS</td>"));
   EXPECT_THAT(dom, HasSubstr("After 8.0 hours the battery is at"));
 }
 
-TEST(ReportPage, WithoutAReferenceThereIsNoErrorChart) {
+TEST(ReportPage, HasNoErrorChartWithoutAReference) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
   const images::TemporaryFolder folder;
   const auto page = folder.path() / "report.html", recording = folder.path() / "r.csv";
@@ -71,7 +71,7 @@ TEST(StudyPage, DrawsTablesAndChartsWithoutAnError) {
   EXPECT_THAT(dom, HasSubstr("paper 93.09"));
 }
 
-/// The shift's current through a cell with a hysteresis, diagnosed; with a later recording to prove it on.
+/// Page of a diagnosis: the current of the shift through a cell with a mechanism, with a later recording as hold-out.
 std::string diagnosis_dom(const std::string& with, const std::string& holdout, const images::TemporaryFolder& folder) {
   const std::string recording = (folder.path() / "r.csv").string(), page = (folder.path() / "report.html").string();
   EXPECT_EQ(run_tool("simulate --cell table9 --recording " BMS_SOURCE_DIR
@@ -87,27 +87,27 @@ std::string diagnosis_dom(const std::string& with, const std::string& holdout, c
   return document_of(page, folder.path());
 }
 
-TEST(DiagnosisPage, ShowsWhatWhereHowMuchBeforeAndAfterWhyAndWhatRemains) {
+TEST(DiagnosisPage, ShowsCauseLocationSizeComparisonReasonAndResidual) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
   const images::TemporaryFolder folder;
   const std::string dom = diagnosis_dom("--with ocv_hysteresis:half_gap_v=0.015,decay=40", "itself", folder);
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
-  EXPECT_GE(count(dom, "<canvas"), 8U);  // voltage and error of both recordings, two a chart
-  EXPECT_GE(count(dom, "<svg"), 8U);  // strip and its scale, how much, before and after, why, remains, regimes, limits
+  EXPECT_GE(count(dom, "<canvas"), 8U);  // voltage and error of both recordings, two per chart
+  EXPECT_GE(count(dom, "<svg"), 8U);     // strip, its scale, size, before and after, reasons, residual, regimes, limits
   EXPECT_THAT(dom, HasSubstr("charged or discharged last"));
   EXPECT_THAT(dom, HasSubstr("of the mismatch explained"));
-  EXPECT_THAT(dom, HasSubstr("not used: r.csv"));
+  EXPECT_THAT(dom, HasSubstr("hold-out: r.csv"));
   EXPECT_THAT(dom, HasSubstr("slow_polarisation"));
   EXPECT_EQ(count(dom, "NaN"), count(content(folder.path() / "report.html"), "NaN")) << "no coordinate is lost";
 }
 
-TEST(DiagnosisPage, WithoutAMismatchItShowsWhatWouldHaveShown) {
+TEST(DiagnosisPage, ShowsTheDetectionLimitsWithoutAMismatch) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
   const images::TemporaryFolder folder;
   const std::string dom = diagnosis_dom("", "", folder);
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
   EXPECT_THAT(dom, HasSubstr("NO MISMATCH"));
-  EXPECT_THAT(dom, HasSubstr("what chance does not reach"));
+  EXPECT_THAT(dom, HasSubstr("threshold of significance"));
   EXPECT_GE(count(dom, "<canvas"), 4U);
 }
 

@@ -1,5 +1,5 @@
-// bms proof from the outside: what it refuses, and what it writes of recordings that are small and simulated. Whether
-// its claims hold on real recordings is for a person to look at: ./bms proof.
+// bms proof from the outside: invalid input, and the output for small simulated recordings. Whether its claims hold on
+// real recordings is for a person to judge: ./bms proof.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ class ProofTool : public ::testing::Test {
  protected:
   std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
 
-  /// A current through the built-in cell, with soc_ref and a temperature: what a folder of recordings has.
+  /// A current through the built-in cell, with soc_ref and temperature as in the real recordings.
   void simulated(const std::string& name, const std::string& profile, const std::string& initial_soc,
                  double temperature_c, const std::string& with = "") const {
     std::ofstream(path("profile.csv")) << profile;
@@ -44,16 +44,15 @@ class ProofTool : public ::testing::Test {
       profile += std::to_string(300 * k) + "," + std::to_string(k < 5 || k > 372 ? 0 : current_a) + "\n";
     return profile;
   }
-  /// Pulses, and a rest at the end.
+  /// Pulses of a minute, with a rest at the start and at the end.
+  static double current_a(int k) {
+    if (k < 30 || k > 420) return 0;
+    if (k % 60 < 30) return -2.5;
+    return k % 60 < 45 ? 1.5 : 0.005;
+  }
   static std::string drive(double scale) {
     std::string profile = "time_s,current_a\n";
-    for (int k = 0; k < 500; ++k)
-      profile += std::to_string(k) + "," +
-                 std::to_string(k < 30 || k > 420 ? 0
-                                                  : scale * (k % 60 < 30   ? -2.5
-                                                             : k % 60 < 45 ? 1.5
-                                                                           : 0.005)) +
-                 "\n";
+    for (int k = 0; k < 500; ++k) profile += std::to_string(k) + "," + std::to_string(scale * current_a(k)) + "\n";
     return profile;
   }
   void small_folder() const {
@@ -74,7 +73,7 @@ class ProofTool : public ::testing::Test {
   images::TemporaryFolder folder_;
 };
 
-TEST_F(ProofTool, WithoutTheRecordingsThereIsOneClearLine) {
+TEST_F(ProofTool, RefusesMissingRecordingsInOneLine) {
   const ToolRun none = run_tool("proof --data " + path("nowhere"));
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, MatchesRegex("[^\n]*nowhere[^\n]*:1: no folder, expected [^\n]*a123_26650[^\n]*\n"));
@@ -121,16 +120,16 @@ TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
   EXPECT_EQ(r["claims"], claims);
   EXPECT_EQ(r["holding"], holding);
   EXPECT_GT(claims, 40U);
-  // the cell is the one that the recordings were simulated with: nothing of it depends on the temperature
+  // the recordings were simulated with the same cell, which does not depend on the temperature
   const auto& temperature = r["experiments"][2]["claims"][0];
   EXPECT_EQ(temperature["holds"], false) << temperature;
   EXPECT_FALSE(r["diagnoses"].empty());
-  // whichever experiment came first to a diagnosis that both need
+  // independent of which experiment made a shared diagnosis first
   ASSERT_EQ(run_tool("proof --quiet --data " + path("data") + " --json " + path("again.json")).exit_code, 0);
   const auto steady = [](const std::string& text) {
     return std::regex_replace(text, std::regex("\"wall_s\": [-0-9.e+]+"), "");
   };
-  EXPECT_EQ(steady(content(path("again.json"))), steady(content(path("r.json"))));
+  EXPECT_EQ(reproducible(content(path("again.json"))), reproducible(content(path("r.json"))));
 }
 
 }  // namespace

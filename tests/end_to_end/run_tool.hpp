@@ -1,4 +1,5 @@
-// Runs the built tool as a user does: arguments in; exit code, standard output and standard error out.
+// Runs the built tool as a user does: arguments in; exit code, standard output and standard error out. And what the
+// tests of the tool share.
 #pragma once
 
 #include <sys/wait.h>
@@ -7,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <regex>
 #include <string>
 
 #include "images/child_process.hpp"
@@ -23,12 +25,22 @@ inline std::string content(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+/// The forklift shift of this repository: eight hours at 1 Hz.
+inline const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
+/// Real recordings, which are not part of the repository; tests that need them skip if they are missing.
+inline const std::filesystem::path data = BMS_DATA_DIR;
+
 /// arguments: as typed in a shell.
 inline ToolRun run_tool(const std::string& arguments) {
   const images::TemporaryFolder folder;
   const std::string out = (folder.path() / "stdout").string(), err = (folder.path() / "stderr").string();
   const int status = std::system(("\"" BMS_TOOL "\" " + arguments + " >" + out + " 2>" + err).c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, content(out), content(err)};
+}
+
+/// JSON without the fields that differ from run to run.
+inline std::string reproducible(const std::string& json) {
+  return std::regex_replace(json, std::regex("\"(wall_s|[a-z_]*_per_second)\": [-0-9.e+]+"), "");
 }
 
 }  // namespace bms

@@ -1,4 +1,4 @@
-// What a replay shows: JSON and the page.
+// The results of a replay: JSON and page.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ host_sim::ReplayResult replayed() {
   return result;
 }
 
-TEST(Results, SayNullWhereThereIsNoReference) {
+TEST(Results, AreNullWithoutAReference) {
   host_sim::ReplayResult r = replayed();
   EXPECT_THAT(json_of(r, ""), Not(HasSubstr("\"rmse\": null")));
   r.recording.soc_ref.clear();
@@ -32,17 +32,17 @@ TEST(Results, SayNullWhereThereIsNoReference) {
   EXPECT_THAT(json_of(r, ""), HasSubstr("\"rmse\": null"));
 }
 
-TEST(Results, AnOffsetThatTheFilterIsSureOfIsSaid) {
+TEST(Results, ReportASignificantCurrentOffset) {
   host_sim::ReplayResult r = replayed();
-  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
+  EXPECT_THAT(statement(r), Not(HasSubstr("The current sensor seems to read")));
   r.soc.current_offset_a = -0.05;
   r.soc.current_offset_sigma_a = 0.02;
-  EXPECT_THAT(statement(r), HasSubstr("the current seemed to read 50 mA too low (standard deviation 20 mA)"));
+  EXPECT_THAT(statement(r), HasSubstr("The current sensor seems to read low by 50 mA (standard deviation 20 mA)"));
   r.soc.current_offset_sigma_a = 0.04;
-  EXPECT_THAT(statement(r), Not(HasSubstr("the current seemed to read")));
+  EXPECT_THAT(statement(r), Not(HasSubstr("The current sensor seems to read")));
 }
 
-TEST(Report, HoldsItsScriptAndDataAndReachesForNothing) {
+TEST(Report, ContainsItsScriptAndDataAndLoadsNothing) {
   host_sim::ReplayResult r = replayed();
   r.recording.path = "logs/</script><b>.csv";
   const std::string page = replay_report(r);

@@ -1,0 +1,21 @@
+// What bms simulate has computed, before it is JSON or a page.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "files/recording.hpp"
+
+namespace bms::host_sim {
+
+struct SimulationResult {
+  std::string cell;        ///< name of the cell
+  std::string input, out;  ///< files read and written
+  std::size_t samples = 0;
+  double duration_s = 0, initial_soc = 0, final_soc = 0, final_voltage_v = 0;
+  double steps_per_second = 0;
+  std::vector<files::Warning> warnings;
+};
+
+}  // namespace bms::host_sim

@@ -1,0 +1,151 @@
+#include "diagnosis/texts.hpp"
+#include "reports/json_parts.hpp"
+#include "reports/json_results.hpp"
+
+namespace bms::reports {
+
+namespace {
+
+Json ids_of(const std::vector<std::size_t>& mechanisms) {
+  Json ids = Json::array();
+  for (const std::size_t m : mechanisms) ids.push_back(model::catalogue[m].id);
+  return ids;
+}
+
+Json spans_of(const std::vector<model::Span>& spans) {
+  Json list = Json::array();
+  for (const model::Span& s : spans) list.push_back({{"start_s", s.start_s}, {"end_s", s.end_s}});
+  return list;
+}
+
+Json mechanism_of(const diagnosis::Finding& f) {
+  const model::MechanismInfo& info = model::catalogue[f.setting.index];
+  const diagnosis::MechanismText& text = diagnosis::text_of_mechanism(f.setting.index);
+  Json parameters = Json::array();
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    parameters.push_back({{"name", info.parameter[k].name},
+                          {"value", number(f.setting.value[k])},
+                          {"std", number(f.setting.deviation[k])},
+                          {"unit", info.parameter[k].unit},
+                          {"at_bound", k < f.at_bound.size() && f.at_bound[k] != 0}});
+  }
+  return {{"id", info.id},
+          {"name", text.name},
+          {"probability", number(f.probability)},
+          {"equivalent_to", ids_of(f.equivalent_to)},
+          {"parameters", std::move(parameters)},
+          {"rms_contribution_v", number(f.rms_contribution_v)},
+          {"gain", number(f.gain)},
+          {"because", f.because},
+          {"meaning", text.meaning},
+          {"action", text.action}};
+}
+
+Json figures_of(const std::optional<workflow::OpenLoopFigures>& f) {
+  return f ? Json{{"rmse_v", number(f->rmse_v)}, {"fit_percent", number(f->fit_percent)}} : Json(nullptr);
+}
+
+Json inputs_of(const std::vector<workflow::RecordingComparison>& recordings) {
+  Json list = Json::array();
+  for (const workflow::RecordingComparison& c : recordings) {
+    list.push_back({{"path", c.recording.path},
+                    {"samples", c.record.size()},
+                    {"duration_s", c.record.duration_s()},
+                    {"initial_soc", c.record.initial_soc},
+                    {"initial_soc_sigma", c.record.initial_soc_sigma}});
+  }
+  return list;
+}
+
+Json location_of(const diagnosis::Diagnosis& d) {
+  Json regimes = Json::array();
+  for (const diagnosis::Regime& g : d.regimes) {
+    regimes.push_back({{"axis", g.axis},
+                       {"from", number(g.from)},
+                       {"to", number(g.to)},
+                       {"share", number(g.share)},
+                       {"usual", number(g.usual)}});
+  }
+  return {
+      {"spans", spans_of(d.spans)}, {"regimes", std::move(regimes)}, {"explained_share", number(d.explained_share)}};
+}
+
+Json candidates_of(const diagnosis::Diagnosis& d) {
+  Json list = Json::array();
+  for (const diagnosis::Ranked& c : d.candidates) {
+    list.push_back({{"ids", ids_of(c.ids)},
+                    {"probability", number(c.probability)},
+                    {"log_likelihood_gain", number(c.gain)},
+                    {"explained_share", number(c.explained_share)}});
+  }
+  return list;
+}
+
+Json limits_of(const diagnosis::Diagnosis& d) {
+  Json list = Json::array();
+  for (const diagnosis::DetectionLimit& l : d.limits) {
+    const model::MechanismInfo& info = model::catalogue[l.mechanism];
+    list.push_back({{"id", info.id},
+                    {"parameter", info.parameter[l.parameter].name},
+                    {"value", number(l.value)},
+                    {"unit", info.parameter[l.parameter].unit}});
+  }
+  return list;
+}
+
+Json experiment_of(const diagnosis::NextExperiment& next) {
+  return {{"profile", next.profile},
+          {"separates", ids_of(next.separates)},
+          {"leaves", ids_of(next.leaves)},
+          {"why", diagnosis::why(next)},
+          {"command", diagnosis::command(next)},
+          {"instruction", diagnosis::instruction(next)},
+          {"start_soc", number(next.start_soc)},
+          {"duration_s", number(next.duration_s)},
+          {"expected_gain", number(next.gain)}};
+}
+
+}  // namespace
+
+std::string json_of(const workflow::DiagnoseResult& r) {
+  const diagnosis::Diagnosis& d = r.diagnosis;
+  Json json;
+  json["command"] = "diagnose";
+  json["cell"] = r.cell.name;
+  json["recordings"] = inputs_of(r.recordings);
+  json["holdouts"] = Json::array();
+  for (const workflow::RecordingComparison& c : r.holdouts)
+    json["holdouts"].push_back(
+        {{"path", c.recording.path}, {"samples", c.record.size()}, {"initial_soc", c.record.initial_soc}});
+  json["verdict"] = name_of(d.verdict);
+  json["statement"] = d.statement;
+  json["location"] = location_of(d);
+  json["mechanisms"] = Json::array();
+  if (r.named()) {
+    for (const diagnosis::Finding& f : d.findings) json["mechanisms"].push_back(mechanism_of(f));
+  }
+  json["candidates"] = candidates_of(d);
+  json["baseline"] = {{"recording", figures_of(r.baseline)}, {"holdout", figures_of(r.baseline_holdout)}};
+  json["extended"] = {{"recording", figures_of(r.extended)}, {"holdout", figures_of(r.extended_holdout)}};
+  json["soc"] =
+      r.soc ? Json{{"baseline_rmse", r.soc->baseline_rmse}, {"extended_rmse", r.soc->extended_rmse}} : Json(nullptr);
+  json["noise_floor_v"] = number(d.noise_floor_v);
+  json["unexplained"] = {{"rmse_v", number(d.unexplained_rmse_v)}, {"share", number(d.unexplained_share)}};
+  json["detection_limits"] = limits_of(d);
+  json["not_testable"] = Json::array();
+  for (const diagnosis::NotTestable& n : d.not_testable)
+    json["not_testable"].push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});
+  json["next_experiment"] = r.next ? experiment_of(*r.next) : Json(nullptr);
+  json["faults"] = Json::array();
+  for (const diagnosis::DataFault& f : d.faults)
+    json["faults"].push_back({{"id", f.id}, {"text", f.text}, {"spans", spans_of(f.spans)}});
+  json["decision"] = {{"base_cost", number(d.base_cost)},     {"best_cost", number(d.best_cost)},
+                      {"remaining", number(d.remaining)},     {"adequacy", number(d.adequacy)},
+                      {"fast_excess", number(d.fast_excess)}, {"far_out", number(d.far_out)}};
+  json["out"] = r.out;
+  json["wall_s"] = r.wall_s;
+  json["warnings"] = warnings_of(r.warnings);
+  return text_of(json);
+}
+
+}  // namespace bms::reports

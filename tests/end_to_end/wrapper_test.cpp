@@ -1,0 +1,91 @@
+// ./bms from the outside: its help lists every command, and help installs and builds nothing.
+#include <regex>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "files/text_file.hpp"
+#include "tests/end_to_end/run_tool.hpp"
+
+namespace bms {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsSubsetOf;
+using Names = std::set<std::string>;
+
+const std::string wrapper = BMS_SOURCE_DIR "/bms";
+
+/// The first group of every match.
+Names matches(const std::string& text, const std::string& pattern) {
+  const std::regex line(pattern, std::regex::ECMAScript | std::regex::multiline);
+  Names found;
+  for (std::sregex_iterator it(text.begin(), text.end(), line), end; it != end; ++it) found.insert((*it)[1]);
+  return found;
+}
+
+/// The commands that a help lists: two spaces, the name, spaces.
+Names listed(const std::string& help) { return matches(help, "^  ([a-z]+) "); }
+
+/// A copy of the wrapper in an otherwise empty folder. The programs that install and build leave a file when they run.
+class Wrapper : public ::testing::Test {
+ protected:
+  Wrapper() {
+    std::filesystem::copy_file(wrapper, checkout_ / "bms");
+    std::filesystem::create_directory(programs_);
+    for (const char* program : {"apt-get", "sudo", "cmake", "ninja", "dpkg-query"}) {
+      const auto path = programs_ / program;
+      files::write_file(path.string(), "#!/bin/sh\ntouch " + (checkout_ / "ran").string() + "\nexit 1\n");
+      std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+    }
+  }
+
+  /// Runs the copy; standard output and error together.
+  std::string run(const std::string& arguments, int expected_exit_code = 0) const {
+    const auto out = folder_.path() / "out";
+    const int status = std::system(("PATH=" + programs_.string() + ":$PATH " + (checkout_ / "bms").string() + " " +
+                                    arguments + " >" + out.string() + " 2>&1")
+                                       .c_str());
+    EXPECT_EQ(WEXITSTATUS(status), expected_exit_code) << arguments;
+    return content(out);
+  }
+  bool touched_nothing() const {
+    return !std::filesystem::exists(checkout_ / "ran") && !std::filesystem::exists(checkout_ / "build");
+  }
+
+  images::TemporaryFolder folder_;
+  std::filesystem::path checkout_ = folder_.path(), programs_ = folder_.path() / "programs";
+};
+
+TEST_F(Wrapper, HelpListsEveryCommandOfTheTool) {
+  const Names tool = listed(run_tool("--help").out);
+  EXPECT_THAT(tool, ::testing::Contains("replay"));
+  EXPECT_THAT(tool, IsSubsetOf(listed(run("help"))));
+}
+
+TEST_F(Wrapper, HelpListsEveryCommandOfItsOwnAndNoOther) {
+  Names known = listed(run_tool("--help").out);
+  for (const std::string& name : matches(content(wrapper), "^  ([a-z]+)(?: [|][^)]*)?[)] ")) known.insert(name);
+  EXPECT_THAT(known, ::testing::IsSupersetOf({"demo", "test", "lint", "help"}));
+  EXPECT_EQ(listed(run("help")), known);
+}
+
+TEST_F(Wrapper, HelpInstallsAndBuildsNothing) {
+  const std::string help = run("help");
+  for (const char* arguments : {"", "--help", "-h"}) EXPECT_EQ(run(arguments), help) << arguments;
+  EXPECT_TRUE(touched_nothing());
+}
+
+TEST_F(Wrapper, RefusesAnUnknownCommandWithoutInstallingAnything) {
+  EXPECT_THAT(run("tset", 2), HasSubstr("no such command 'tset'"));
+  EXPECT_TRUE(touched_nothing());
+}
+
+TEST_F(Wrapper, NamesWhatItInstallsForACommandOfTheTool) {
+  EXPECT_THAT(run("experiment rest_5s", 3), HasSubstr("libcli11-dev (the command line)"));
+  EXPECT_FALSE(touched_nothing()) << "these programs stand for those that install and build";
+}
+
+}  // namespace
+}  // namespace bms

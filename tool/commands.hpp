@@ -1,0 +1,21 @@
+// All subcommands of bms. Each is one file, command_NAME.cpp.
+#pragma once
+
+#include <memory>
+
+#include "tool/command.hpp"
+
+namespace bms::tool {
+
+std::unique_ptr<Command> replay_command();      ///< estimates for a recording, on the host or an emulated board
+std::unique_ptr<Command> simulate_command();    ///< model voltage for a current, open loop
+std::unique_ptr<Command> experiment_command();  ///< a current profile by name
+std::unique_ptr<Command> identify_command();    ///< recordings in, cell file out
+std::unique_ptr<Command> diagnose_command();    ///< where a cell file and recordings disagree, and why
+std::unique_ptr<Command> study_command();       ///< the paper's comparison of models, optimisers and experiments
+std::unique_ptr<Command> proof_command();       ///< the diagnosis of real recordings against measurements
+std::unique_ptr<Command> hil_command();         ///< a board in the loop with a simulated pack or a recording
+std::unique_ptr<Command> flash_command();       ///< writes a board's image onto the chip
+std::unique_ptr<Command> monitor_command();     ///< CAN frames as a screen, a log, a page
+
+}  // namespace bms::tool

@@ -1,0 +1,164 @@
+#include "workflow/diagnose_recordings.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "files/recording.hpp"
+#include "measurement/recording_checks.hpp"
+#include "diagnosis/next_experiment.hpp"
+#include "diagnosis/reference.hpp"
+#include "diagnosis/texts.hpp"
+#include "files/bad_input.hpp"
+#include "host_sim/replay.hpp"
+#include "workflow/diagnosis_comparison.hpp"
+
+namespace bms::workflow {
+
+namespace {
+
+constexpr double least_start_sigma = 1e-4;     ///< of a given initial SOC
+constexpr double significant_increase = 1.05;  ///< of an error on the hold-outs, before a warning says so
+
+/// The first value of soc_ref; nothing if it is missing or not a state of charge.
+std::optional<StartSoc> reference_start(const measurement::Recording& r, const files::CellFile& cell) {
+  if (r.soc_ref.empty() || !(r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1)) return std::nullopt;
+  return given_start(cell, r.soc_ref.front());
+}
+
+/// The estimator's result for the first sample with a voltage; nothing if no sample has one.
+std::optional<StartSoc> estimated_start(const measurement::Recording& r, const files::CellFile& cell) {
+  const auto first = std::find_if(r.voltage_v.begin(), r.voltage_v.end(), [](double v) { return std::isfinite(v); });
+  if (first == r.voltage_v.end()) return std::nullopt;
+  measurement::Recording one;
+  const auto k = static_cast<std::size_t>(first - r.voltage_v.begin());
+  one.time_s = {0};
+  one.current_a = {r.current_a[k]};
+  one.voltage_v = {r.voltage_v[k]};
+  if (!r.temperature_c.empty()) one.temperature_c = {r.temperature_c[k]};
+  const host_sim::EstimateRow row =
+      host_sim::run_on_host(cell, measurement::samples(one), std::nullopt, host_sim::ScalarKind::float64).rows.front();
+  return StartSoc{row.soc, row.soc_sigma, false};
+}
+
+enum class Priority { user_first, reference_first };
+
+/// Reads one recording and determines its start.
+RecordingComparison read(const std::string& path, const std::optional<double>& given, Priority priority,
+                         DiagnoseInput& input) {
+  measurement::Recording r = files::read_recording(path);
+  measurement::compare_with_cell(r, input.cell.parameters);
+  for (const measurement::Warning& w : r.warnings) input.warnings.push_back({w.id, path + ": " + w.text});
+  const auto reference = reference_start(r, input.cell);
+  StartSoc start;
+  std::string origin;
+  if (given && !(reference && priority == Priority::reference_first)) {
+    start = given_start(input.cell, *given);
+  } else if (reference) {
+    start = *reference;
+    origin = fmt::format("starts at the first value of soc_ref, {:.1f} %", 100 * start.soc);
+  } else if (const auto estimated = estimated_start(r, input.cell)) {
+    start = *estimated;
+    origin = fmt::format(
+        "starts at the state of charge estimated from the first voltage, {:.0f} % with a standard "
+        "deviation of {:.0f} %",
+        100 * start.soc, 100 * start.sigma);
+  }
+  if (!origin.empty()) input.warnings.push_back({"initial_soc", path + ": " + origin});
+  return prepared(std::move(r), std::filesystem::path(path).filename().string(), input.cell, start);
+}
+
+}  // namespace
+
+StartSoc given_start(const files::CellFile& cell, double soc) {
+  return {soc, std::max(cell.parameters.tolerance.initial_soc, least_start_sigma), true};
+}
+
+RecordingComparison prepared(measurement::Recording r, const std::string& name, const files::CellFile& cell,
+                             const StartSoc& start) {
+  const bool any_temperature =
+      std::any_of(r.temperature_c.begin(), r.temperature_c.end(), [](double t) { return std::isfinite(t); });
+  diagnosis::PreparedRecording record{.name = name,
+                                      .time_s = r.time_s,
+                                      .current_a = r.current_a,
+                                      .voltage_v = r.voltage_v,
+                                      .temperature_c = any_temperature ? r.temperature_c : std::vector<double>{},
+                                      .initial_soc = start.soc,
+                                      .initial_soc_sigma = start.sigma,
+                                      .initial_soc_given = start.given,
+                                      .checks = {}};
+  diagnosis::average_references(record, r.current_ref_a, r.voltage_ref_v, cell.parameters);
+  return {std::move(r), std::move(record), {}, {}};
+}
+
+DiagnoseInput read_diagnose_input(const DiagnoseOptions& options) {
+  const std::vector<double>& soc = options.initial_soc;
+  if (soc.size() > 1 && soc.size() != options.recordings.size()) {
+    throw files::BadInput("--initial-soc", 1,
+                          fmt::format("{} values for {} recordings, expected one for all or one for each", soc.size(),
+                                      options.recordings.size()));
+  }
+  const auto given = [&](std::size_t n) {
+    return soc.empty() ? std::nullopt : std::optional(soc[std::min(n, soc.size() - 1)]);
+  };
+  DiagnoseInput input;
+  input.cell = files::read_cell(options.cell);
+  for (const std::string& path : options.recordings)
+    input.recordings.push_back(read(path, given(input.recordings.size()), Priority::user_first, input));
+  for (const std::string& path : options.holdouts) {
+    input.holdouts.push_back(read(path, soc.size() == 1 ? given(0) : std::nullopt, Priority::reference_first, input));
+  }
+  return input;
+}
+
+DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  DiagnoseResult r;
+  r.cell = std::move(input.cell);
+  r.recordings = std::move(input.recordings);
+  r.holdouts = std::move(input.holdouts);
+  r.warnings = std::move(input.warnings);
+  std::vector<diagnosis::PreparedRecording> records;
+  for (const RecordingComparison& c : r.recordings) records.push_back(c.record);
+  r.diagnosis = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, records, options);
+  diagnosis::describe(r.diagnosis, r.cell.parameters, records);
+  for (const std::string& text : r.diagnosis.warnings) r.warnings.push_back({"readings", text});
+  compare(r);
+  r.baseline = figures(r.recordings, &RecordingComparison::base_v);
+  r.extended = figures(r.recordings, &RecordingComparison::extended_v);
+  r.baseline_holdout = figures(r.holdouts, &RecordingComparison::base_v);
+  r.extended_holdout = figures(r.holdouts, &RecordingComparison::extended_v);
+  r.extended_cell = extended_cell(r);
+  r.soc = soc_errors(r);
+  r.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return r;
+}
+
+void add_next_experiment(DiagnoseResult& r) {
+  if (!r.named()) return;
+  const bool temperature = std::any_of(r.recordings.begin(), r.recordings.end(),
+                                       [](const RecordingComparison& c) { return !c.record.temperature_c.empty(); });
+  r.next = diagnosis::next_experiment(r.cell.parameters, r.diagnosis, temperature);
+}
+
+void add_holdout_warnings(DiagnoseResult& r) {
+  if (!r.named()) return;
+  if (r.baseline_holdout && r.extended_holdout &&
+      r.extended_holdout->rmse_v > significant_increase * r.baseline_holdout->rmse_v) {
+    r.warnings.push_back(
+        {"holdout_worse", fmt::format("with the findings the error on the hold-out recordings increases from {:.1f} mV "
+                                      "to {:.1f} mV: do not rely on them",
+                                      1e3 * r.baseline_holdout->rmse_v, 1e3 * r.extended_holdout->rmse_v)});
+  }
+  if (r.soc && r.soc->extended_rmse > significant_increase * r.soc->baseline_rmse) {
+    r.warnings.push_back(
+        {"soc_worse", fmt::format("with the findings the error of the estimated state of charge increases from "
+                                  "{:.2f} % to {:.2f} %",
+                                  100 * r.soc->baseline_rmse, 100 * r.soc->extended_rmse)});
+  }
+}
+
+}  // namespace bms::workflow
