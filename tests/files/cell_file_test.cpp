@@ -98,8 +98,7 @@ TEST(CellFile, RefusesWhatIsOutOfRangeAndNamesKeyLineAndExpectation) {
 }
 
 TEST(CellFile, RefusesAFileThatIsNoText) {
-  EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)),
-              HasSubstr("cell.toml:2: a control character"));
+  EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a control character"));
 }
 
 TEST(CellFile, RefusesWhatItsParserDidNotExpect) {
