@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "files/recording.hpp"
-#include "measurement/recording_checks.hpp"
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "hil/session.hpp"
 #include "images/firmware_image.hpp"
+#include "measurement/recording_checks.hpp"
 #include "monitor/candump_line.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"

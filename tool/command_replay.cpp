@@ -3,15 +3,15 @@
 
 #include <fmt/format.h>
 
-#include "files/recording.hpp"
-#include "measurement/recording_checks.hpp"
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "files/text_file.hpp"
 #include "host_sim/can_log.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/simulation.hpp"
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
+#include "measurement/recording_checks.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"

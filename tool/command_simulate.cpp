@@ -5,13 +5,13 @@
 
 #include <fmt/format.h>
 
-#include "measurement/recording_checks.hpp"
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 #include "host_sim/gaussian_noise.hpp"
 #include "host_sim/simulation.hpp"
 #include "host_sim/simulation_result.hpp"
+#include "measurement/recording_checks.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"

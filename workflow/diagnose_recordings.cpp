@@ -7,13 +7,13 @@
 
 #include <fmt/format.h>
 
-#include "files/recording.hpp"
-#include "measurement/recording_checks.hpp"
 #include "diagnosis/next_experiment.hpp"
 #include "diagnosis/reference.hpp"
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
+#include "files/recording.hpp"
 #include "host_sim/replay.hpp"
+#include "measurement/recording_checks.hpp"
 #include "workflow/diagnosis_comparison.hpp"
 
 namespace bms::workflow {

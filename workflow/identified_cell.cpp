@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "files/recording.hpp"
 #include "files/bad_input.hpp"
 #include "files/cell_fields.hpp"
+#include "files/recording.hpp"
 #include "host_sim/simulation.hpp"
 #include "identification/ocv_curve.hpp"
 

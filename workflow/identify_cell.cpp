@@ -9,10 +9,10 @@
 
 #include <fmt/format.h>
 
-#include "measurement/recording_checks.hpp"
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
 #include "identification/prefilter.hpp"
+#include "measurement/recording_checks.hpp"
 #include "workflow/identified_cell.hpp"
 
 namespace bms::workflow {
@@ -92,7 +92,8 @@ void filter(const IdentifyOptions& options, const std::string& path, id::Data& d
   }
 }
 
-Inputs read_inputs(const IdentifyOptions& options, const StartCell& start, std::vector<measurement::Warning>& warnings) {
+Inputs read_inputs(const IdentifyOptions& options, const StartCell& start,
+                   std::vector<measurement::Warning>& warnings) {
   Inputs inputs;
   inputs.options = {options.initial_soc, options.window, start.cell.parameters};
   for (const std::string& path : options.recordings) {
