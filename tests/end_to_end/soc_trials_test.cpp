@@ -52,7 +52,7 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
       EXPECT_LT(*r.soc.rmse, 0.02);
     } else {
       const double most = largest_rmse(t.name, balanced);
-      const bool wrong = t.trouble.starts_with("started 30");
+      const bool wrong = t.trouble.starts_with("initial SOC 30 %");
       EXPECT_LT(wrong && balanced ? *r.soc.rmse_after_30min : *r.soc.rmse,
                 wrong ? most + (most > 0.01 ? 0.005 : 0.002) : most);
       if (!t.name.starts_with("dyn")) {
