@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "files/recording.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms::host_sim {
 
@@ -15,7 +15,7 @@ struct SimulationResult {
   std::size_t samples = 0;
   double duration_s = 0, initial_soc = 0, final_soc = 0, final_voltage_v = 0;
   double steps_per_second = 0;
-  std::vector<files::Warning> warnings;
+  std::vector<measurement::Warning> warnings;
 };
 
 }  // namespace bms::host_sim

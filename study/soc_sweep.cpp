@@ -10,7 +10,7 @@ namespace bms::study {
 
 namespace {
 
-constexpr const char* experiment = "high_1m_low_30s";
+constexpr const char* swept_experiment = "high_1m_low_30s";
 constexpr int claimed_from_tenth = 3, claimed_to_tenth = 8;  ///< the OCV of the plant has rounded corners at the ends
 constexpr int charted_tenth = 4;
 constexpr double largest_r0_error = 0.01, largest_rc_error = 0.05;  ///< relative
@@ -45,7 +45,7 @@ void identify_over_soc(Fitter& fitter, std::uint64_t& seed, StudyResult& result)
   double worst_r0 = 0, worst_rc = 0;
   for (int tenth = 1; tenth <= 10; ++tenth) {
     // the pulses discharge from their start
-    const StudyData part = run_on_plant(experiment, std::min(1.0, tenth / 10.0 + 0.01), ++seed);
+    const StudyData part = run_on_plant(swept_experiment, std::min(1.0, tenth / 10.0 + 0.01), ++seed);
     const id::Identification found = fitter.grey_box(part);
     std::vector<files::PageCell> row = {label(fmt::format("{} %", 10 * tenth))};
     for (std::size_t k = 0; k < 3; ++k) {

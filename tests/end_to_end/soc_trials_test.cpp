@@ -52,7 +52,7 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
       EXPECT_LT(*r.soc.rmse, 0.02);
     } else {
       const double most = largest_rmse(t.name, balanced);
-      const bool wrong = t.trouble.starts_with("started 30");
+      const bool wrong = t.trouble.starts_with("initial SOC 30 %");
       EXPECT_LT(wrong && balanced ? *r.soc.rmse_after_30min : *r.soc.rmse,
                 wrong ? most + (most > 0.01 ? 0.005 : 0.002) : most);
       if (!t.name.starts_with("dyn")) {
@@ -60,7 +60,7 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
       }
     }
     for (const host_sim::EstimateRow& e : r.track.rows) sigmas.push_back(e.soc_sigma);
-    if (t.trouble == "started right" && t.name.ends_with("_A002") && t.name.starts_with("dyn")) {
+    if (t.trouble == "initial SOC correct" && t.name.ends_with("_A002") && t.name.starts_with("dyn")) {
       EXPECT_NEAR(*r.soc.current_offset_a, 0.008, 2 * *r.soc.current_offset_sigma_a)
           << "7 to 9 mA are read while nothing flows";
     }

@@ -33,12 +33,12 @@ Deviation deviation(const FixedPointRun& run) {
   const auto rows = [&](host_sim::ScalarKind scalar) {
     return host_sim::run_on_host(cell, all, std::nullopt, scalar).rows;
   };
-  const auto fixed = rows(host_sim::ScalarKind::fixed), once = rows(host_sim::ScalarKind::float32),
-             twice = rows(host_sim::ScalarKind::float64);
+  const auto fixed = rows(host_sim::ScalarKind::fixed), float32 = rows(host_sim::ScalarKind::float32),
+             float64 = rows(host_sim::ScalarKind::float64);
   Deviation d{all.size()};
   for (std::size_t k = 0; k < all.size(); ++k) {
-    d.of_fixed = std::max(d.of_fixed, std::abs(fixed[k].soc - twice[k].soc));
-    d.of_float = std::max(d.of_float, std::abs(once[k].soc - twice[k].soc));
+    d.of_fixed = std::max(d.of_fixed, std::abs(fixed[k].soc - float64[k].soc));
+    d.of_float = std::max(d.of_float, std::abs(float32[k].soc - float64[k].soc));
   }
   return d;
 }

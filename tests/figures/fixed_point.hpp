@@ -1,10 +1,10 @@
-// The estimator in integers over the shift and every real recording: how far it is from the estimator in double, and
-// whether the Cortex-M0 computes the host's words.
+// The estimator in fixed point over the shift and every real recording: its difference from the estimator in double,
+// and whether the Cortex-M0 computes the same words as the host.
 //
-// Each recording with the cell file that is made for it; the drives and pulses of the first cell with the extended
-// file, too. Not the slow runs: a C/30 current that stays for hours is within what that file says may be the sensor's
-// offset, and is taken for it (estimator/current_at_rest.hpp). What soc is sought anew from then on is chance in every
-// scalar.
+// Each recording runs with its own cell file; the drives and pulses of the first cell also with the extended file. The
+// slow runs do not: a C/30 current that lasts for hours is within the offset that the extended file assumes for the
+// sensor, and is taken for it (estimator/current_at_rest.hpp). The state of charge is then estimated again, and where
+// it ends depends on rounding in every scalar.
 #pragma once
 
 #include <filesystem>
@@ -19,7 +19,7 @@ namespace bms {
 struct FixedPointRun {
   std::string recording, cell;
 };
-/// data: the folder of real recordings; where it is not, the shift alone.
+/// data: the folder of real recordings. If it does not exist, the shift alone.
 std::vector<FixedPointRun> fixed_point_runs(const std::filesystem::path& shift, const std::filesystem::path& data);
 
 /// Largest difference of soc from the estimator in double.
@@ -29,7 +29,7 @@ struct Deviation {
 };
 Deviation deviation(const FixedPointRun& run);
 
-/// Where the microbit's first word that is not the host's is, or nothing.
+/// The first word of the microbit that differs from the host, or nothing.
 std::optional<host_sim::Difference> difference_on_microbit(const FixedPointRun& run);
 
 }  // namespace bms

@@ -15,7 +15,7 @@ namespace bms {
 
 namespace {
 
-/// What is done to a recording, and what the estimator is told.
+/// A change to a recording, and the initial state of charge that the estimator receives.
 struct Trouble {
   std::string title;
   host_sim::SocPrior prior;
@@ -67,15 +67,15 @@ std::string row(const SocTrial& t, Sums& all) {
 
 void each_soc_trial(const std::filesystem::path& data, const std::function<void(const SocTrial&)>& f) {
   const host_sim::SocPrior right{1, 0.02};
-  const std::vector<Trouble> with_sensors_off = {
-      {"started right", right, 0, 1, 0, {}},       {"current + 30 mA", right, 0.03, 1, 0, {}},
+  const std::vector<Trouble> with_sensor_errors = {
+      {"initial SOC correct", right, 0, 1, 0, {}}, {"current + 30 mA", right, 0.03, 1, 0, {}},
       {"current - 30 mA", right, -0.03, 1, 0, {}}, {"current + 1 %", right, 0, 1.01, 0, {}},
       {"current - 1 %", right, 0, 0.99, 0, {}},    {"voltage + 5 mV", right, 0, 1, 0.005, {}},
       {"voltage - 5 mV", right, 0, 1, -0.005, {}}};
-  const std::vector<Trouble> from_full = {{"started 30 % wrong, believed to 30 %", {0.7, 0.3}, 0, 1, 0, {}}};
+  const std::vector<Trouble> from_full = {{"initial SOC 30 % too low, sigma 30 %", {0.7, 0.3}, 0, 1, 0, {}}};
   const std::vector<Trouble> from_the_middle = {
-      {"cut at 60 %, told 35 %, believed to 25 %", {0.35, 0.25}, 0, 1, 0, 0.6},
-      {"cut at 60 %, told 85 %, believed to 25 %", {0.85, 0.25}, 0, 1, 0, 0.6}};
+      {"cut at 60 %, initial SOC 35 %, sigma 25 %", {0.35, 0.25}, 0, 1, 0, 0.6},
+      {"cut at 60 %, initial SOC 85 %, sigma 25 %", {0.85, 0.25}, 0, 1, 0, 0.6}};
   const auto run = [&](const std::string& folder, const char* name,
                        std::initializer_list<const std::vector<Trouble>*> lists) {
     const files::CellFile cell = files::read_cell(folder + "_extended");
@@ -85,11 +85,11 @@ void each_soc_trial(const std::filesystem::path& data, const std::function<void(
     }
   };
   for (const char* name : {"udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"})
-    run("a123_26650", name, {&with_sensors_off, &from_full});
+    run("a123_26650", name, {&with_sensor_errors, &from_full});
   for (const char* name : {"dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002", "dyn10_P45_A002"})
-    run("a123_26650", name, {&with_sensors_off, &from_the_middle});
+    run("a123_26650", name, {&with_sensor_errors, &from_the_middle});
   for (const char* name : {"dyn50_P25", "dyn45_P05", "dyn30_N05"})
-    run("a123_esctoolbox", name, {&with_sensors_off, &from_full, &from_the_middle});
+    run("a123_esctoolbox", name, {&with_sensor_errors, &from_full, &from_the_middle});
 }
 
 std::string soc_trials(const std::filesystem::path& data) {

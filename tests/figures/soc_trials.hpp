@@ -1,5 +1,4 @@
-// The estimator on real recordings in trouble: started wrong, cut in the middle of the plateau, with sensors that are
-// off.
+// The estimator on real recordings with faults: a wrong start, a start in the middle of the plateau, sensor errors.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +11,7 @@
 
 namespace bms {
 
-/// One of them: what came of the recording, and what the estimator is told.
+/// One trial: the changed recording, and the initial state of charge that the estimator receives.
 struct SocTrial {
   std::string name, trouble;
   const files::CellFile& cell;
@@ -20,10 +19,11 @@ struct SocTrial {
   host_sim::SocPrior prior;
 };
 
-/// Recordings of data/a123_26650 and data/a123_esctoolbox, with the extended cell file of that name.
+/// Calls f for each trial with the recordings of data/a123_26650 and data/a123_esctoolbox, and the extended cell file
+/// of that name.
 void each_soc_trial(const std::filesystem::path& data, const std::function<void(const SocTrial&)>& f);
 
-/// Markdown: a row a trial; the last line over all of them.
+/// Markdown: one row for each trial; the last one over all trials.
 std::string soc_trials(const std::filesystem::path& data);
 
 }  // namespace bms

@@ -1,9 +1,14 @@
-// Measures what the READMEs quote and writes it there: `./bms figures`. With "step": only prints what a step costs on
-// the board; with "board": writes that and the keys of mechanisms, nothing of recordings and speeds; with "protection":
-// only what protection costs, with "budgets": only flash, RAM and stack of the boards; with "fixed": how far integers
-// are from double, and that the microbit computes them.
+// Measures the figures in the READMEs and writes them there: `./bms figures`.
 //
-// Figures of recordings that are not there are left as they stand. Speeds are those of the machine that ran this.
+//   argument      measures and writes
+//   (none)        all figures
+//   step          instructions of a step on the board, printed only
+//   board         figures that depend on the code alone, not on recordings or the machine
+//   protection    instructions of the protection
+//   budgets       flash, RAM and stack of the boards
+//   fixed         fixed point against double, and the microbit against the host
+//
+// Figures of recordings that are missing stay unchanged. Speeds are those of this machine.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -70,10 +75,10 @@ const std::string accuracy_heading =
 
 std::string shift_accuracy() {
   std::string table = accuracy_heading;
-  table += accuracy_row({"started by itself (98 %)", shift, "table9", std::nullopt});
-  table += accuracy_row({"told 98 %, which is right", shift, "table9", host_sim::SocPrior{0.98, 0.02}});
-  table += accuracy_row({"told 78 %, believed to 2 %", shift, "table9", host_sim::SocPrior{0.78, 0.02}});
-  table += accuracy_row({"told 78 %, believed to 20 %", shift, "table9", host_sim::SocPrior{0.78, 0.2}});
+  table += accuracy_row({"no initial SOC given (98 %)", shift, "table9", std::nullopt});
+  table += accuracy_row({"initial SOC 98 %, correct", shift, "table9", host_sim::SocPrior{0.98, 0.02}});
+  table += accuracy_row({"initial SOC 78 %, sigma 2 %", shift, "table9", host_sim::SocPrior{0.78, 0.02}});
+  table += accuracy_row({"initial SOC 78 %, sigma 20 %", shift, "table9", host_sim::SocPrior{0.78, 0.2}});
   return table;
 }
 
@@ -89,7 +94,7 @@ std::string real_accuracy() {
     if (r.soc_ref.empty()) continue;
     table += accuracy_row({file.stem().string(), file.string(), "a123_26650", std::nullopt});
     if (file.stem() == "udds_P25_A002")
-      table += accuracy_row({"the same, told 20 % less than it has, believed to 20 %", file.string(), "a123_26650",
+      table += accuracy_row({"the same, initial SOC 20 % too low, sigma 20 %", file.string(), "a123_26650",
                              host_sim::SocPrior{r.soc_ref.front() - 0.2, 0.2}});
   }
   return table;
@@ -127,8 +132,7 @@ std::string microbit_cost() {
   return table;
 }
 
-/// How far integers, and float, are from double over whole recordings, and whether the microbit computes the same words
-/// as the host.
+/// Difference of fixed point and float from double over whole recordings, and of the microbit from the host.
 std::string fixed_point() {
   std::string table =
       "| recording | cell | estimates | fixed point less double | float less double | words on the microbit "
@@ -144,7 +148,7 @@ std::string fixed_point() {
   return table;
 }
 
-/// table9 with mechanisms at usual values, as a cell file would have them.
+/// table9 with mechanisms.
 files::CellFile table9_with(const std::vector<std::pair<const char*, std::vector<double>>>& mechanisms, bool errors) {
   files::CellFile cell = files::read_cell("table9");
   cell.parameters.noise.errors_are_states = errors;
@@ -192,7 +196,7 @@ std::string mechanism_cost() {
   return table;
 }
 
-/// Keys of the mechanisms' tables in a cell file.
+/// Keys of the tables of mechanisms in a cell file.
 std::string mechanism_tables() {
   std::string table = "| table | key | unit | bounds | what |\n|---|---|---|---|---|\n";
   for (const model::MechanismInfo& info : model::catalogue) {
@@ -227,7 +231,7 @@ std::string speed() {
   return table;
 }
 
-/// Identified and judged as a user does it: bms identify, its JSON.
+/// Identification and validation by the command line, from its JSON.
 std::string identified_row(const std::vector<std::string>& from, const std::vector<std::string>& judges,
                            const std::string& more) {
   const images::TemporaryFolder folder;
@@ -333,7 +337,7 @@ std::string protection_cost() {
   return table;
 }
 
-/// What is the same on every machine and depends on the code alone.
+/// Figures that depend on the code alone.
 void write_board() {
   files::replace_figures(source / "protection/README.md", "netduinoplus2", protection_cost());
   files::replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
@@ -353,7 +357,7 @@ void run() {
     files::replace_figures(estimator, "trials", soc_trials(data));
     files::replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
   } else {
-    fmt::print(stderr, "{} is not there: the figures of real recordings stay\n", data.string());
+    fmt::print(stderr, "{} does not exist: the figures of real recordings stay unchanged\n", data.string());
   }
   files::replace_figures(source / "host_sim/README.md", "speed", speed());
   if (std::filesystem::exists(data))

@@ -15,12 +15,12 @@ using ::testing::HasSubstr;
 
 std::string table9_text() { return read_file(BMS_SOURCE_DIR "/model/cells/table9.toml"); }
 
-/// The one line that a bad file is refused with.
+/// The line with which a bad file is rejected.
 std::string refusal(const std::string& text) {
   return refusal_by("cell.toml", [&] { parse_cell(text, "cell.toml"); });
 }
 
-TEST(CellFile, HoldsThePapersTable9AndLimits) {
+TEST(CellFile, Table9HasTheValuesAndLimitsOfThePaper) {
   const CellFile cell = read_cell("table9");
   EXPECT_EQ(cell.name, "table9");
   const auto& p = cell.parameters;
@@ -42,7 +42,7 @@ TEST(CellFile, EveryBuiltInCellIsAccepted) {
   for (const BuiltInCell& cell : built_in_cells()) EXPECT_EQ(read_cell(cell.name).name, cell.name);
 }
 
-TEST(CellFile, SaysWhetherErrorsAreStates) {
+TEST(CellFile, ReadsWhetherSensorErrorsAreStates) {
   const std::string without = table9_text(),
                     with = replaced(without, "\n[tolerance]", "errors_are_states = true\n\n[tolerance]");
   EXPECT_FALSE(parse_cell(without, "x").parameters.noise.errors_are_states);
@@ -53,13 +53,13 @@ TEST(CellFile, SaysWhetherErrorsAreStates) {
               HasSubstr("'noise.errors_are_states' is not acceptable, expected true or false"));
 }
 
-TEST(CellFile, TellsWhichFileItIsByAHash) {
+TEST(CellFile, IsIdentifiedByTheHashOfItsText) {
   const std::string text = table9_text();
   EXPECT_EQ(parse_cell(text, "a").hash, parse_cell(text, "b").hash);
   EXPECT_NE(parse_cell(text, "a").hash, parse_cell(text + "\n", "a").hash);
 }
 
-TEST(CellFile, WhatIsWrittenIsReadBackDigitForDigit) {
+TEST(CellFile, WrittenValuesAreReadBackBitForBit) {
   for (const BuiltInCell& built_in : built_in_cells()) {
     CellFile cell = read_cell(built_in.name);
     cell.source = "with \"quotes\", a \\ and\na line";
@@ -85,7 +85,7 @@ TEST(CellFile, WhatIsWrittenIsReadBackDigitForDigit) {
   }
 }
 
-TEST(CellFile, RefusesWhatIsOutOfRangeAndNamesKeyLineAndExpectation) {
+TEST(CellFile, RejectsValuesOutOfRangeAndNamesKeyLineAndRange) {
   const std::string good = table9_text();
   EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = -6.0")),
               HasSubstr("'capacity_ah' is out of range, expected 0.01 to 1000 Ah"));
@@ -97,17 +97,17 @@ TEST(CellFile, RefusesWhatIsOutOfRangeAndNamesKeyLineAndExpectation) {
   EXPECT_THAT(refusal(replaced(good, "voltage_v = 0.001", "voltage_v = 0.0")), HasSubstr("'noise.voltage_v'"));
 }
 
-TEST(CellFile, RefusesAFileThatIsNoText) {
+TEST(CellFile, RejectsABinaryFile) {
   EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a control character"));
 }
 
-TEST(CellFile, RefusesWhatItsParserDidNotExpect) {
+TEST(CellFile, RejectsTextOnWhichTheParserAsserts) {
   for (const char* text : {"[/limits]\n", "[[/]]\n", "[a.\"b\"./]\n", "/ = 1\n"})
     EXPECT_THAT(refusal(text), HasSubstr("expected a cell file in TOML")) << text;
   EXPECT_THAT(refusal("a = 1\nb = [1,\n2]\n[/limits]\n"), HasSubstr("cell.toml:4:"));
 }
 
-TEST(CellFile, TakesCharactersBeyondAsciiInCommentsAndTextsAndNowhereElse) {
+TEST(CellFile, AcceptsCharactersBeyondAsciiOnlyInCommentsAndTexts) {
   const std::string good = table9_text(), entry = "chemistry = \"LiFePO4\"";
   for (const char* text :
        {"chemistry = \"Zelle \xC3\xA4 \\\" \xC7\xA2 #\"", "chemistry = 'Zelle \xC3\xA4 \" #'",
@@ -125,7 +125,7 @@ TEST(CellFile, TakesCharactersBeyondAsciiInCommentsAndTextsAndNowhereElse) {
   }
 }
 
-TEST(CellFile, NamesTheLineOfTheEntryThatIsWrong) {
+TEST(CellFile, NamesTheLineOfABadEntry) {
   const std::string good = table9_text();
   const std::string line = refusal(replaced(good, "420.558", "1.0"));
   const std::string before = good.substr(0, good.find("420.558"));
@@ -133,12 +133,12 @@ TEST(CellFile, NamesTheLineOfTheEntryThatIsWrong) {
   EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
 }
 
-TEST(CellFile, RefusesWhatIsMissingMisspeltOrOfTheWrongKind) {
+TEST(CellFile, RejectsMissingMisspeltAndWronglyTypedKeys) {
   const std::string good = table9_text();
   EXPECT_THAT(refusal(""), HasSubstr("'name' is missing"));
   EXPECT_THAT(refusal("\x01\x02 not toml at all"), HasSubstr("expected a cell file in TOML"));
   const std::size_t last_key = good.rfind("drift_v");
-  for (std::size_t end = 0; end < last_key; end += 97) refusal(good.substr(0, end));  // cut off anywhere
+  for (std::size_t end = 0; end < last_key; end += 97) refusal(good.substr(0, end));  // truncated at any place
   EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = \"six\"")), HasSubstr("expected a number"));
   EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_mah = 6000")),
               HasSubstr("'capacity_ah' is missing"));
@@ -174,7 +174,7 @@ const model::MechanismSetting& setting_of(const CellFile& file, std::string_view
   throw std::runtime_error("not there");
 }
 
-TEST(CellFile, HoldsMechanismsInTheOrderOfTheCatalogueAndTakesWhatIsNotSaidAsNeutral) {
+TEST(CellFile, MechanismsAreInCatalogueOrderAndMissingParametersAreNeutral) {
   const CellFile cell = parse_cell(table9_text() + mechanisms, "cell.toml");
   ASSERT_EQ(cell.mechanisms.size(), 3U);
   for (std::size_t k = 1; k < 3; ++k) EXPECT_GT(cell.mechanisms[k].index, cell.mechanisms[k - 1].index);
@@ -188,7 +188,7 @@ TEST(CellFile, HoldsMechanismsInTheOrderOfTheCatalogueAndTakesWhatIsNotSaidAsNeu
   EXPECT_TRUE(read_cell("table9").mechanisms.empty());
 }
 
-TEST(CellFile, EveryMechanismIsWrittenAndReadBackDigitForDigit) {
+TEST(CellFile, EveryMechanismIsWrittenAndReadBackBitForBit) {
   CellFile cell = read_cell("table9");
   for (std::size_t index = model::mechanism_count; index-- > 0;) {
     model::MechanismSetting m = model::default_setting(index, cell.parameters.capacity_ah);
@@ -212,7 +212,7 @@ TEST(CellFile, EveryMechanismIsWrittenAndReadBackDigitForDigit) {
   EXPECT_EQ(cell_text(again), cell_text(cell));
 }
 
-TEST(CellFile, WhatIsSilentAboutAParameterIsAcceptedForACellOfAnySize) {
+TEST(CellFile, AMissingParameterIsAcceptedForACellOfAnySize) {
   for (const double capacity_ah : {0.01, 2.5, 1'000.0}) {
     for (std::size_t index = 0; index < model::mechanism_count; ++index) {
       EXPECT_EQ(model::first_fault(model::default_setting(index, capacity_ah), capacity_ah),
@@ -222,7 +222,7 @@ TEST(CellFile, WhatIsSilentAboutAParameterIsAcceptedForACellOfAnySize) {
   }
 }
 
-TEST(CellFile, RefusesAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable) {
+TEST(CellFile, RejectsAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable) {
   const std::string good = table9_text() + mechanisms;
   EXPECT_THAT(refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")),
               HasSubstr("unknown key 'mechanism.hysteresis', expected one of: "));
@@ -246,7 +246,7 @@ TEST(CellFile, RefusesAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable
   EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
 }
 
-TEST(CellFile, AMissingFileIsRefusedWithTheNamesOfTheBuiltInCells) {
+TEST(CellFile, AMissingFileIsRejectedWithTheNamesOfTheBuiltInCells) {
   try {
     read_cell("table10");
     FAIL();

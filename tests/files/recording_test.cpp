@@ -44,14 +44,14 @@ std::vector<std::string> warnings(const std::string& text) {
   return ids;
 }
 
-/// Rows with columns of trusted instruments; `reference` by row.
+/// Rows with columns of trusted instruments; reference(k): their fields in row k.
 std::string with_references(const std::function<std::string(int)>& reference) {
   std::string text = "time_s,current_a,voltage_v,current_ref_a,voltage_ref_v\n";
   for (int k = 0; k < 20; ++k) text += std::to_string(k) + ",0.01,3.3," + reference(k) + "\n";
   return text;
 }
 
-TEST(Recording, ReferencesAreThereWhereTheyAreGivenAndNoReadingIsMissing) {
+TEST(Recording, ReferencesMayBeEmptyWithoutAWarning) {
   const Recording r = parse_recording(with_references([](int k) {
                                         return std::string(k < 5 ? "0,3.6" : k < 10 ? ",3.31" : k == 12 ? "nan," : ",");
                                       }),
@@ -66,7 +66,7 @@ TEST(Recording, ReferencesAreThereWhereTheyAreGivenAndNoReadingIsMissing) {
   EXPECT_EQ(seen[9].voltage_uv, 3'300'000) << "a meter on the cell";
 }
 
-TEST(Recording, ABadReferenceIsRefusedAndOnlyAReferenceMayBeEmpty) {
+TEST(Recording, ABadReferenceIsRejectedAndOnlyAReferenceMayBeEmpty) {
   EXPECT_THAT(refusal(with_references([](int k) { return std::string(k == 3 ? "0.1V," : ","); })),
               HasSubstr("log.csv:5: '0.1V' in column 'current_ref_a' is not a number, expected a number or nothing"));
   EXPECT_THAT(refusal(with_references([](int k) { return std::string(k == 3 ? "0" : ","); })),
@@ -92,7 +92,7 @@ TEST(Recording, ReadsColumnsByNameInAnyOrder) {
   EXPECT_TRUE(r.warnings.empty());
 }
 
-TEST(Recording, EveryDecimalIsReadToItsLastBit) {
+TEST(Recording, EveryDecimalIsRoundedCorrectly) {
   std::mt19937_64 random(1);
   std::string text = header;
   std::vector<std::string> numbers;
@@ -113,7 +113,7 @@ TEST(Recording, EveryDecimalIsReadToItsLastBit) {
     ASSERT_EQ(r.current_a[k], std::strtod(numbers[k].c_str(), nullptr)) << numbers[k];
 }
 
-TEST(Recording, AcceptsWhatSpreadsheetsAndLoggersWrite) {
+TEST(Recording, AcceptsTheFormatsOfSpreadsheetsAndLoggers) {
   EXPECT_THAT(warnings("time_s;current_a;voltage_v\n" + rows(";")), ::testing::IsEmpty());
   EXPECT_THAT(warnings("\xEF\xBB\xBF" + header + rows()), ::testing::IsEmpty());
   EXPECT_THAT(warnings("time_s,current_a,voltage_v\r\n" + rows(",", "\r\n")), ::testing::IsEmpty());
@@ -124,7 +124,7 @@ TEST(Recording, AcceptsWhatSpreadsheetsAndLoggersWrite) {
   EXPECT_EQ(parse_recording(without_last_newline.substr(0, without_last_newline.size() - 1), "log.csv").rows(), 20U);
 }
 
-TEST(Recording, RefusesWhatCannotBeARecording) {
+TEST(Recording, RejectsFilesThatAreNotRecordings) {
   EXPECT_THAT(refusal(""), HasSubstr("empty"));
   EXPECT_THAT(refusal("# nothing but a comment\n"), HasSubstr("only comments"));
   EXPECT_THAT(refusal(header), HasSubstr("0 rows"));
@@ -140,7 +140,7 @@ TEST(Recording, RefusesWhatCannotBeARecording) {
   EXPECT_THAT(refusal(rows()), HasSubstr("no column"));
 }
 
-TEST(Recording, RefusesALineThatIsWrongAndNamesIt) {
+TEST(Recording, RejectsABadLineAndNamesIt) {
   EXPECT_THAT(refusal(header + rows() + "20,abc,3.3\n"),
               HasSubstr("log.csv:22: 'abc' in column 'current_a' is not a number"));
   EXPECT_THAT(refusal(header + rows() + "20,,3.3\n"), HasSubstr("log.csv:22: '' in column 'current_a'"));
@@ -159,7 +159,7 @@ TEST(Recording, RefusesALineThatIsWrongAndNamesIt) {
   EXPECT_THAT(refusal(header + rows() + "20," + std::string(1'000'000, '9') + ",3.3\n"), HasSubstr("not a number"));
 }
 
-TEST(Recording, WarnsOfWhatLooksWrongAndNamesIt) {
+TEST(Recording, WarnsOfImplausibleValues) {
   using ::testing::ElementsAre;
   EXPECT_THAT(warnings(header + rows() + "500,0,3.3\n"), ElementsAre("gap"));
   EXPECT_THAT(warnings(header + rows() + "19,0,3.3\n"), ElementsAre("duplicate_time"));
@@ -183,7 +183,7 @@ TEST(Recording, WarnsOfWhatLooksWrongAndNamesIt) {
   EXPECT_THAT(warnings(percent), ElementsAre("soc_ref_in_percent"));
 }
 
-TEST(Recording, AnyBytesAreEitherReadOrRefused) {
+TEST(Recording, AnyBytesAreEitherReadOrRejected) {
   std::mt19937_64 random(9);
   const std::string good = header + rows();
   for (int run = 0; run < 3'000; ++run) {

@@ -1,4 +1,4 @@
-// What bad input is answered with.
+// The answer to bad input.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -10,14 +10,14 @@
 
 namespace bms::files {
 
-/// `text` with one piece changed, which must be there.
+/// The text with one piece replaced. The piece must be in it.
 inline std::string replaced(std::string text, const std::string& what, const std::string& by) {
   const std::size_t at = text.find(what);
   EXPECT_NE(at, std::string::npos) << what;
   return text.replace(at, what.size(), by);
 }
 
-/// The one line that `read` refuses its input with; the input is called `file`.
+/// The line with which `read` rejects its input; `file`: the name of the input.
 template <class Read>
 std::string refusal_by(const std::string& file, const Read& read) {
   try {

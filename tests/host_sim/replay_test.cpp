@@ -23,16 +23,16 @@ ReplayResult replayed(const std::optional<SocPrior>& prior, ScalarKind scalar = 
   return result;
 }
 
-// The figures of the issue that this estimator is built for; measured values are in estimator/README.md.
-TEST(ReplayOfTheShift, StartedRightIsWithin1Percent) {
+// The accuracy that the estimator must reach. estimator/README.md has the measured values.
+TEST(ReplayOfTheShift, WithARightStartTheErrorIsBelow1Percent) {
   const auto r = replayed(SocPrior{0.98});
   EXPECT_LT(*r.soc.rmse, 0.01);
   EXPECT_GT(*r.soc.within_2_sigma, 0.9);
 }
 
-TEST(ReplayOfTheShift, StartedByItselfIsWithin1Percent) { EXPECT_LT(*replayed(std::nullopt).soc.rmse, 0.01); }
+TEST(ReplayOfTheShift, WithoutAStartTheErrorIsBelow1Percent) { EXPECT_LT(*replayed(std::nullopt).soc.rmse, 0.01); }
 
-TEST(ReplayOfTheShift, Started20PercentWrongIsWithin1Point5PercentAfter30MinutesHoweverSureTheUserWas) {
+TEST(ReplayOfTheShift, WithAStart20PercentWrongTheErrorIsBelow1Point5PercentAfter30MinutesForAnyGivenSigma) {
   for (const double sigma : {0.02, 0.2, 0.3}) {
     const auto r = replayed(SocPrior{0.78, sigma});
     EXPECT_LT(*r.soc.rmse_after_30min, 0.015) << "sigma " << sigma;
@@ -40,10 +40,11 @@ TEST(ReplayOfTheShift, Started20PercentWrongIsWithin1Point5PercentAfter30Minutes
 }
 
 TEST(ReplayOfTheShift, FixedPointIsWithin1PercentOfDouble) {
-  const auto fixed = replayed(SocPrior{0.98}, ScalarKind::fixed), twice = replayed(SocPrior{0.98}, ScalarKind::float64);
+  const auto fixed = replayed(SocPrior{0.98}, ScalarKind::fixed),
+             float64 = replayed(SocPrior{0.98}, ScalarKind::float64);
   double largest = 0;
   for (std::size_t k = 0; k < fixed.track.rows.size(); ++k)
-    largest = std::max(largest, std::abs(fixed.track.rows[k].soc - twice.track.rows[k].soc));
+    largest = std::max(largest, std::abs(fixed.track.rows[k].soc - float64.track.rows[k].soc));
   EXPECT_LT(largest, 0.01);
   RecordProperty("largest_soc_difference", std::to_string(largest));
 }
@@ -64,7 +65,7 @@ TEST(Replay, ADifferenceOfOneBitIsFoundAndNamed) {
   EXPECT_EQ(first_difference(a, b, ScalarKind::float32)->field, "number of estimates");
 }
 
-TEST(Replay, WordsOfABoardBecomeTheNumbersThatTheHostHas) {
+TEST(Replay, WordsOfABoardAreTheNumbersOfTheHost) {
   for (const ScalarKind scalar : {ScalarKind::float32, ScalarKind::fixed}) {
     const auto r = replayed(SocPrior{0.9}, scalar);
     const auto rows = rows_of(r.track.words, scalar);
@@ -86,7 +87,7 @@ TEST(Replay, SocFiguresAreNullWithoutAReference) {
   EXPECT_FALSE(r.soc.rmse.has_value());
 }
 
-TEST(Replay, TraceHasARowForEverySampleAndTheContractsColumns) {
+TEST(Replay, TraceHasARowForEverySampleAndTheDocumentedColumns) {
   const auto r = replayed(std::nullopt);
   const std::string csv = trace_csv(r);
   EXPECT_TRUE(csv.starts_with("time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags\n"));

@@ -1,5 +1,5 @@
-// recordings/forklift_shift.csv: the experiment of that name as the true current of a truth cell, seen through its
-// instruments.
+// Makes recordings/forklift_shift.csv: the experiment of that name is the true current of a plant cell, which is
+// measured by imperfect instruments.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +17,16 @@ struct RecordedRow {
   double current_a;      ///< as measured: mean over the interval that ends at time_s
   double voltage_v;      ///< as measured at time_s
   double temperature_c;  ///< as measured at time_s
-  double soc;            ///< true
+  double soc;            ///< of the plant
 };
 
-/// Goes straight from start to end over the profile.
+/// Ambient temperature, linear over the profile.
 struct Ambient {
   double start_c = 20;
   double end_c = 20;
 };
 
-/// Drives the cell through the profile, whose current is the true one.
+/// Runs the cell with the profile, whose current is the true one, and measures it.
 std::vector<RecordedRow> record(const std::vector<bms::experiments::ProfileRow>& profile, Cell& cell,
                                 Instruments& instruments, const Ambient& ambient);
 

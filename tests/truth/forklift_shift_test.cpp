@@ -19,7 +19,7 @@ double charge_ah(const std::vector<bms::experiments::ProfileRow>& rows) {
   return sum_as / 3'600;
 }
 
-TEST(ForkliftShift, StaysWithin1CAndBetween10And100PercentWhateverTheSeed) {
+TEST(ForkliftShift, StaysWithin1CAndBetween10And100PercentForAnySeed) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const auto rows = bms::experiments::experiment("forklift_shift", {.seed = seed}).value();
     ASSERT_EQ(rows.size(), 28'801U);
@@ -40,7 +40,7 @@ TEST(ForkliftShift, StaysWithin1CAndBetween10And100PercentWhateverTheSeed) {
   }
 }
 
-TEST(ForkliftShift, HoldsTheSameChargeAtEveryStepAndScalesWithTheCell) {
+TEST(ForkliftShift, HasTheSameChargeAtEveryStepSizeAndScalesWithTheCell) {
   const double at_1s_ah = charge_ah(bms::experiments::experiment("forklift_shift").value());
   // Rounding to 1 mA, at random: 0.3 mA / sqrt(28,800) of 8 h.
   EXPECT_NEAR(charge_ah(bms::experiments::experiment("forklift_shift", {.step_s = 0.3}).value()), at_1s_ah, 1e-4);
@@ -49,7 +49,7 @@ TEST(ForkliftShift, HoldsTheSameChargeAtEveryStepAndScalesWithTheCell) {
               at_1s_ah * 2.5 / 6, 1e-4);
 }
 
-TEST(ForkliftShift, DiffersBySeedAndNoOtherNameIsKnown) {
+TEST(ForkliftShift, DiffersBySeedAndOtherNamesAreUnknown) {
   const auto one = bms::experiments::experiment("forklift_shift", {.seed = 1}).value(),
              other = bms::experiments::experiment("forklift_shift", {.seed = 2}).value();
   const auto equal = [](const bms::experiments::ProfileRow& a, const bms::experiments::ProfileRow& b) {

@@ -16,7 +16,7 @@ constexpr double ambient_c = 20;
 
 MonotoneCurve flat(double value) { return MonotoneCurve({{0, value}, {1, value}}); }
 
-/// Pulses of either direction and rests, a second each to a minute.
+/// Pulses in both directions and rests, of one second to one minute.
 struct Pulse {
   double current_a, duration_s;
 };
@@ -28,7 +28,7 @@ std::vector<Pulse> pulses(int count) {
   return all;
 }
 
-TEST(TruthOcv, MeetsTheTenLinesOfTable9ButAtItsTwoSharpCorners) {
+TEST(TruthOcv, EqualsTheTenLinesOfTable9ExceptAtItsTwoSharpCorners) {
   constexpr std::array b0_v = {2.871, 3.167, 3.181, 3.253, 3.281, 3.266, 3.152, 3.25, 3.314, 2.126};
   constexpr std::array b1_v = {3.35, 0.39, 0.32, 0.08, 0.01, 0.04, 0.23, 0.09, 0.01, 1.33};
   const MonotoneCurve ocv_v = table9_ocv_v();
@@ -40,7 +40,7 @@ TEST(TruthOcv, MeetsTheTenLinesOfTable9ButAtItsTwoSharpCorners) {
   }
 }
 
-TEST(TruthOcv, RisesEverywhereWithoutAJumpInItsSlope) {
+TEST(TruthOcv, RisesEverywhereWithAContinuousSlope) {
   const MonotoneCurve ocv_v = table9_ocv_v();
   constexpr double h = 1e-5;
   double slope_before_v = 0;
@@ -54,7 +54,7 @@ TEST(TruthOcv, RisesEverywhereWithoutAJumpInItsSlope) {
   }
 }
 
-TEST(TruthCircuit, GoesThroughTheValuesOfTable9AndStaysBetweenNeighbours) {
+TEST(TruthCircuit, InterpolatesTable9WithoutOvershoot) {
   constexpr std::array r1_ohm = {0.027101,   0.012339,   0.00998571, 0.009014,   0.00825815,
                                  0.00771709, 0.00740307, 0.00777491, 0.00822862, 0.0072376};
   const CircuitCurves circuit = table9_circuit();
@@ -79,11 +79,11 @@ TEST(TruthCell, ChangesItsSocByTheIntegralOfCurrentOverCapacity) {
     charge_as += static_cast<long double>(p.current_a * 0.01) * p.duration_s;
   }
   ASSERT_GT(std::abs(charge_as), 50);
-  // What is left is the last digit of soc itself.
+  // The rest is the rounding of soc itself.
   EXPECT_NEAR(cell.soc(), static_cast<double>(0.6L + charge_as / (3'600 * 5.0L)), 2e-16);
 }
 
-TEST(TruthCell, DoesNotLoseSmallCurrentsBesideALargeCharge) {
+TEST(TruthCell, DoesNotLoseSmallCurrentsNextToALargeCharge) {
   Cell cell({.capacity_ah = 5, .step_s = 1}, {.soc = 0.9});
   cell.run(-2, ambient_c, 4'500);
   constexpr int count = 200'000;
@@ -92,7 +92,7 @@ TEST(TruthCell, DoesNotLoseSmallCurrentsBesideALargeCharge) {
   EXPECT_NEAR(cell.soc(), 0.9 - 0.5 + count * 1e-4 / (3'600 * 5), 2e-16);
 }
 
-TEST(TruthCell, ShowsItsOpenCircuitVoltageAfterALongRest) {
+TEST(TruthCell, HasItsOpenCircuitVoltageAfterALongRest) {
   Cell cell({}, {.soc = 0.7});
   cell.run(-5, ambient_c, 1'800);
   EXPECT_LT(cell.voltage_v(), table9_ocv_v().at(cell.soc()) - 0.09);
@@ -101,7 +101,7 @@ TEST(TruthCell, ShowsItsOpenCircuitVoltageAfterALongRest) {
   EXPECT_NEAR(cell.voltage_v(), table9_ocv_v().at(cell.soc()), 1e-12);
 }
 
-TEST(TruthCell, AnswersAStepAsTheEquationsSolvedByHandDo) {
+TEST(TruthCell, FollowsTheAnalyticStepResponse) {
   constexpr double r0_ohm = 0.013, r1_ohm = 0.008, c1_f = 1'400, current_a = 4, ocv_v = 3.2;
   Cell cell({.ocv_v = flat(ocv_v), .circuit = {flat(r0_ohm), flat(r1_ohm), flat(c1_f)}}, {.soc = 0.5});
   for (int second = 1; second <= 60; ++second) {
@@ -128,7 +128,7 @@ TEST(TruthCell, ChangesByLessThanAMicrovoltWhenItsStepIsHalved) {
   EXPECT_LT(largest_v, 1e-6);
 }
 
-TEST(TruthCell, WarmsUntilItsHeatLeavesAndThenCoolsExponentially) {
+TEST(TruthCell, WarmsToItsSteadyStateAndThenCoolsExponentially) {
   constexpr double r0_ohm = 0.013, r1_ohm = 0.008, current_a = 5;
   const Thermal thermal{.heat_capacity_j_per_k = 100, .to_ambient_w_per_k = 0.2};
   Cell cell({.capacity_ah = 1e3, .circuit = {flat(r0_ohm), flat(r1_ohm), flat(100)}, .thermal = thermal},
@@ -173,7 +173,7 @@ TEST(Channel, ReadsGainErrorNoiseAndSteps) {
   EXPECT_NEAR(std::sqrt(square), std::sqrt(0.02 * 0.02 + 0.005 * 0.005 / 12), 0.0005);
 }
 
-TEST(Channel, DriftsWithItsSigmaAndForgetsInItsCorrelationTime) {
+TEST(Channel, DriftsWithItsSigmaAndCorrelationTime) {
   constexpr double sigma = 0.015, correlation_s = 200;
   double square = 0, product = 0;
   constexpr int channels = 4'000;
@@ -188,7 +188,7 @@ TEST(Channel, DriftsWithItsSigmaAndForgetsInItsCorrelationTime) {
   EXPECT_NEAR(product / (sigma * sigma), std::exp(-1.0), 0.06);
 }
 
-TEST(Instruments, RepeatThemselvesBySeedAndDoNotShareTheirNoise) {
+TEST(Instruments, AreReproducibleBySeedAndHaveIndependentNoise) {
   Instruments one({}, 5), same({}, 5), other({}, 6);
   int equal = 0, shared = 0;
   for (int k = 0; k < 1'000; ++k) {
