@@ -142,8 +142,8 @@ void evaluate(ReplayResult& result) {
   const std::vector<EstimateRow>& rows = result.track.rows;
   const bool has_reference = !r.soc_ref.empty();
 
-  ErrorFigure soc, soc_later, prediction, open_loop;
-  FitFigure fit;
+  identification::ErrorFigure soc, soc_later, prediction, open_loop;
+  identification::FitFigure fit;
   std::size_t inside = 0;
   const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
   if (!result.prior) result.initial_soc = rows.front().soc;

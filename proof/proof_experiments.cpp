@@ -157,7 +157,7 @@ void claim_better(ProofExperiment& e, const std::string& id, const std::string& 
 
 double rms(const workflow::RecordingComparison& c, const std::vector<double>& simulated, double soc_from = -1,
            double soc_to = 2) {
-  ErrorFigure error;
+  identification::ErrorFigure error;
   for (std::size_t k = 0; k < c.record.size(); ++k) {
     if (c.recording.soc_ref[k] >= soc_from && c.recording.soc_ref[k] <= soc_to)
       error.add(c.record.voltage_v[k] - simulated[k]);
@@ -433,7 +433,7 @@ void relaxation(ProofLab& lab, ProofExperiment& e) {
   for (std::size_t n = 0; n < found_rests.size(); ++n) {
     const Rows rest = found_rests[n];
     const std::size_t last = rest.to - 1;
-    ErrorFigure before, after;
+    identification::ErrorFigure before, after;
     ProofLines lines{fmt::format("Rest {} of pulse_P25_A002, relative to its end; diagnosed: {}", n + 1, diagnosed),
                      {"measured, mV", "cell file, mV", "extended, mV"},
                      {},

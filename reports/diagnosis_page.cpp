@@ -63,7 +63,7 @@ json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins
                 {"low_a", json::array()},     {"high_a", json::array()},   {"temperature_c", json::array()}};
   std::size_t k = 0;
   for (std::size_t b = 0; b < bins; ++b) {
-    ErrorFigure before, after;
+    identification::ErrorFigure before, after;
     double low_a = std::nan(""), high_a = std::nan(""), sum_c = 0;
     std::size_t warm = 0;
     const std::size_t first = k;
@@ -260,7 +260,7 @@ json regimes(const workflow::DiagnoseResult& r) {
       if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
     }
     if (!(high - low > 1e-6)) continue;
-    std::vector<ErrorFigure> error_before(regime_bins), error_after(regime_bins);
+    std::vector<identification::ErrorFigure> error_before(regime_bins), error_after(regime_bins);
     for (std::size_t k = 0; k < at.size(); ++k) {
       if (!std::isfinite(at[k])) continue;
       const auto bin =

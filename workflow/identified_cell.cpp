@@ -11,7 +11,7 @@
 #include "files/bad_input.hpp"
 #include "files/cell_fields.hpp"
 #include "host_sim/simulation.hpp"
-#include "identification/ocv_curve.hpp"
+#include "identification/ocv_pieces.hpp"
 
 namespace bms::workflow {
 
