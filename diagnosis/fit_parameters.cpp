@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "diagnosis/numerics.hpp"
+#include "diagnosis/thresholds.hpp"
 #include "model/cell.hpp"
 
 namespace bms::diagnosis {
@@ -47,12 +48,12 @@ bool FitParameters::at_bound(Eigen::Index j, double v) const {
 
 PriorDistance FitParameters::prior_distance(Eigen::Index j, double v) const {
   const model::Parameter& p = *at(j).parameter;
-  const double log_sigma = parameter_priors.log_sigma;
+  const double log_sigma = thresholds.priors.log_sigma;
   if (is_shape(j)) return {std::log(v / p.default_value(capacity_ah_)) / log_sigma, log_sigma};
   if (p.spread > 0) return {(v - p.typical) / p.spread, p.spread};
   const double common = p.common(capacity_ah_);
   if (common <= 0 || std::abs(v) <= common) return {};
-  const double sigma = parameter_priors.rarity * common;
+  const double sigma = thresholds.priors.rarity * common;
   return {(v - std::copysign(common, v)) / sigma, sigma};
 }
 

@@ -18,13 +18,6 @@ struct PriorDistance {
   double away = 0, sigma = 0;
 };
 
-/// Prior widths (docs/diagnosis_method.md).
-struct ParameterPriors {
-  double rarity = 0.5;   ///< of a strength beyond what is common: sigma over the common size
-  double log_sigma = 1;  ///< of a shape: a factor of e between its default and an unusual value
-};
-inline constexpr ParameterPriors parameter_priors{};
-
 class FitParameters {
  public:
   FitParameters(const model::CellParameters<>& cell, const Hypothesis& start);

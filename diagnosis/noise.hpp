@@ -18,12 +18,14 @@
 
 #include <Eigen/Core>
 
+#include "diagnosis/thresholds.hpp"
+
 namespace bms::diagnosis {
 
 struct NoiseModel {
   double white_v = 0.001;
-  double fast_v = 0.0015, fast_s = 60;
-  double slow_v = 0.001, slow_s = 3'600;
+  double fast_v = 0.0015, fast_s = thresholds.noise.fast_correlation_s;
+  double slow_v = 0.001, slow_s = thresholds.noise.slow_correlation_s;
   double edge = 1;  ///< factor on the error that a step of the current adds
   bool operator==(const NoiseModel&) const = default;
 };

@@ -1,4 +1,4 @@
-// Numbers that keep the arithmetic stable or bound its cost. A verdict does not depend on them: a fit that has
+// Numbers that keep the arithmetic stable or bound its cost. A verdict should not depend on them: a fit that has
 // converged stays where it is when one of them changes.
 #pragma once
 
@@ -37,13 +37,15 @@ struct Numerics {
     double shape_step = 1.5;                   ///< in ln, at once
     double linear_steps = 100;                 ///< a linear parameter's unit step is its range over this
     double bound_reach = 1e-9;                 ///< of the range, within which a value is at its bound
+    /// added to the diagonals of normal equations: absolute, and as shares of the largest or the own element
     double ridge = 1e-9, ridge_share = 1e-12, ridge_reach = 1e-6, ridge_covariance = 1e-12;
   };
 
   /// Linear algebra of signatures.
   struct Signatures {
-    double probing_strength = 1e-6;  ///< of the upper bound: a strength just above its bound at 0
-    double ridge_share = 1e-6, ridge = 1e-12, prior = 1e-9;
+    double probing_strength = 1e-6;            ///< of the upper bound: a strength just above its bound at 0
+    double ridge_share = 1e-6, ridge = 1e-12;  ///< added to the diagonal of a Gram matrix
+    double prior = 1e-9;                       ///< weak prior of the parameters in the fit, as a share
   };
 
   struct Noise {

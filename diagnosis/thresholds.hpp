@@ -51,9 +51,11 @@ struct Thresholds {
     double white_share_of_ocv = 0.2;       ///< white noise at least, as a share of tolerance.ocv_v: no model is better
     double quiet_c = 0.01;                 ///< [C] step of the current below which second differences show the noise
     std::size_t second_differences = 100;  ///< needed; with fewer the cell file's noise.voltage_v holds
+    double fast_correlation_s = 60;        ///< [s] of the fast part
+    double slow_correlation_s = 3'600;     ///< [s] of the slow part
     double white_at_least_v = 5e-5;        ///< [V]
-    double fast_at_least_v = 5e-4;         ///< [V] of the part with a memory of a minute
-    double slow_at_least_v = 5e-4;         ///< [V] of the part with a memory of an hour, before slow_times_drift
+    double fast_at_least_v = 5e-4;         ///< [V] of the fast part
+    double slow_at_least_v = 5e-4;         ///< [V] of the slow part, before slow_times_drift
     double slow_times_drift = 1.3;         ///< standard deviation of the slow part over tolerance.drift_v
     double edge_jitter = 0.05;          ///< share of a current step's R0 voltage that the reading next to it may miss:
                                         ///< voltage and current are never read at exactly the same moment
@@ -64,6 +66,12 @@ struct Thresholds {
     double amplitude_log_sigma = 0.15;  ///< of the prior of a noise amplitude above its nominal value, in ln: a factor
                                         ///< of 2 costs 21, of 4 85, of 10 240. Development split
     double same_amplitude = 1.25;       ///< two noise models whose amplitudes differ by less are the same
+  };
+
+  /// Priors of mechanisms' parameters, besides what the catalogue knows of them (model::Parameter::typical).
+  struct Priors {
+    double rarity = 0.5;   ///< of a strength beyond what is common: sigma over the common size
+    double log_sigma = 1;  ///< of a shape, in ln: a factor of e between its default and an unusual value
   };
 
   /// Removal of sensor noise from the current at constant load. Without it 7 of 11 healthy recordings had a finding,
@@ -99,8 +107,8 @@ struct Thresholds {
     double first_node_soc = 0.2, last_node_soc = 0.9;  ///< a table that ends inside stands for these as well
     double beyond_nodes_soc = 0.1;                     ///< beyond the outermost node within which the error doubles
     double corner_width_soc = 0.025;                   ///< half width of a rounded corner of the OCV, at most
-    double corner_share = 6;             ///< change of slope times half width over this is the corner's sigma: a curve
-                                         ///< that is round over a quarter of the piece misses the corner by a quarter
+    double corner_share = 6;  ///< change of slope times half width over this is the corner's sigma. A curve that is
+                              ///< round over a quarter of the pieces passes at change times width / 4: 1.5 sigma
     double capacity_sigma = 0.005;       ///< of the capacity, as a fraction
     double gain_sigma = 0.002;           ///< of the current sensor's gain
     double offset_at_most_c = 1e-3;      ///< [C] sigma of the wander of the current sensor's zero, at most
@@ -247,7 +255,7 @@ struct Thresholds {
   /// Readings of trusted instruments.
   struct References {
     double check_at_most_s = 300;           ///< [s] readings averaged to one check
-    double filter_share = 0.1;            ///< of a stretch at its start, where a filtered channel may still move
+    double filter_share = 0.1;              ///< of a stretch at its start, where a filtered channel may still move
     double still_v = 0.02, still_c = 0.02;  ///< [V], [C] by which a reference moves within a check
     double unsteady_share = 0.05;           ///< of an instrument's error that differs from time to time
     double meter_v = 3e-4;                  ///< [V] standard deviation of a trusted voltmeter
@@ -273,6 +281,7 @@ struct Thresholds {
 
   RecordingFaults recording;
   Noise noise;
+  Priors priors;
   CurrentDenoising denoising;
   Quantisation quantisation;
   Calibration calibration;
