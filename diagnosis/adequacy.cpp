@@ -8,7 +8,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Adequacy& limits = thresholds.adequacy;
+constexpr const Thresholds::Adequacy& adequacy_limits = thresholds.adequacy;
 
 double gained(const Adequacy& a) { return a.control_cost - a.best_cost; }
 
@@ -18,10 +18,11 @@ double explained_share(const Adequacy& a) {
 }
 
 bool is_unknown(const Adequacy& a, const Hypothesis& best) {
-  if (a.residual.gain <= limits.unexplained && a.residual.far_out <= limits.far_out) return false;
+  if (a.residual.gain <= adequacy_limits.unexplained && a.residual.far_out <= adequacy_limits.far_out) return false;
   // what is flexible gains on anything: if it is named, its residual must be white
-  const double enough = best.find(Signature::contact_bursts) != nullptr ? limits.explained_by_bursts : limits.explained;
-  return !a.found || a.explained < enough || a.residual.fast_excess > limits.fast_excess;
+  const double enough =
+      best.find(Signature::contact_bursts) != nullptr ? adequacy_limits.explained_by_bursts : adequacy_limits.explained;
+  return !a.found || a.explained < enough || a.residual.fast_excess > adequacy_limits.fast_excess;
 }
 
 }  // namespace
@@ -36,7 +37,7 @@ Adequacy judge(LikelihoodModel& likelihood, const NoiseModel& nominal, const Hyp
   a.explained = explained_share(a);
   // what explains little, and that incompletely, is not a cause
   if (!survivors.best.hypothesis.added().empty() && gained(a) < thresholds.decision.faint &&
-      a.explained < limits.explained) {
+      a.explained < adequacy_limits.explained) {
     survivors = {control, {}, {}, {}};
     a = {control_fit.cost, control_fit.cost, test_residual(likelihood, control_fit)};
     a.explained = explained_share(a);

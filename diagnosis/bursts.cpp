@@ -11,7 +11,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Bursts& limits = thresholds.bursts;
+constexpr const Thresholds::Bursts& burst_limits = thresholds.bursts;
 
 /// A stretch of rows and what the residual says of a resistance in it: gain of r is 2 r toward - r^2 size.
 struct Stretch {
@@ -71,8 +71,8 @@ class BurstFinder {
   /// Every stretch in which the residual asks for more (or for less) resistance by more than its price.
   std::vector<Stretch> stretches(bool more) {
     std::vector<Stretch> found;
-    for (const std::size_t length : limits.lengths_rows) {
-      const std::size_t step = std::max<std::size_t>(1, length / limits.overlap);
+    for (const std::size_t length : burst_limits.lengths_rows) {
+      const std::size_t step = std::max<std::size_t>(1, length / burst_limits.overlap);
       for (std::size_t first = 0; first + length < rows(); first += step) {
         Stretch s = stretch(first, first + length);
         if (!more) s.toward = -s.toward;
@@ -88,7 +88,7 @@ class BurstFinder {
     for (const Stretch& s : all) sizes_ohm.push_back(s.toward / s.size);
     std::sort(sizes_ohm.begin(), sizes_ohm.end());
     Selection best;
-    for (const double share : limits.resistance_quantiles) {
+    for (const double share : burst_limits.resistance_quantiles) {
       double ohm = sizes_ohm[static_cast<std::size_t>(share * static_cast<double>(sizes_ohm.size() - 1))];
       for (int round = 0; round < numerics.bursts.resistance_rounds; ++round) {
         const Selection here = chosen(all, ohm, rows());
@@ -123,16 +123,16 @@ class BurstFinder {
   bool has_plausible_extent(const Selection& selection) const {
     std::size_t inside = 0;
     for (const Stretch& s : selection.stretches) inside += s.end - s.first;
-    return inside >= limits.fewest_rows &&
-           static_cast<double>(inside) <= limits.loaded_share * static_cast<double>(loaded_);
+    return inside >= burst_limits.fewest_rows &&
+           static_cast<double>(inside) <= burst_limits.loaded_share * static_cast<double>(loaded_);
   }
 
   /// A contact opens at any time. What comes with the steps of the current is how the cell answers them.
   bool comes_with_edges(const Selection& selection) const {
     std::vector<char> near_edge(rows(), 0);
-    constexpr std::size_t reach = limits.near_edge_rows;
+    constexpr std::size_t reach = burst_limits.near_edge_rows;
     for (std::size_t k = 1; k < rows(); ++k) {
-      if (std::abs(current_a(k) - current_a(k - 1)) < limits.edge_current * largest_a_) continue;
+      if (std::abs(current_a(k) - current_a(k - 1)) < burst_limits.edge_current * largest_a_) continue;
       for (std::size_t j = k > reach ? k - reach : 0; j < std::min(rows(), k + reach); ++j) near_edge[j] = 1;
     }
     double loaded_near = 0;
@@ -140,7 +140,7 @@ class BurstFinder {
     std::size_t bursts_near = 0;
     for (const Stretch& s : selection.stretches) bursts_near += near_edge[(s.first + s.end) / 2] != 0 ? 1 : 0;
     const double share = loaded_near / static_cast<double>(std::max<std::size_t>(loaded_, 1));
-    return probability_of_at_least(bursts_near, selection.stretches.size(), share) < limits.edge_chance;
+    return probability_of_at_least(bursts_near, selection.stretches.size(), share) < burst_limits.edge_chance;
   }
 
   /// Takes the bursts out of the residual.
@@ -155,11 +155,11 @@ class BurstFinder {
 
  private:
   double current_a(std::size_t k) const { return std::isfinite(record_.current_a[k]) ? record_.current_a[k] : 0.0; }
-  bool is_loaded(double a) const { return std::abs(a) > limits.loaded_current * largest_a_; }
+  bool is_loaded(double a) const { return std::abs(a) > burst_limits.loaded_current * largest_a_; }
 
   Stretch stretch(std::size_t first, std::size_t end) {
     Stretch s{first, end, 0, 0};
-    column_.assign(std::min(end - first + limits.tail_rows, rows() - first), 0);
+    column_.assign(std::min(end - first + burst_limits.tail_rows, rows() - first), 0);
     bool any = false;
     for (std::size_t k = 0; k < end - first; ++k) {
       column_[k] = current_a(first + k);
@@ -226,7 +226,7 @@ std::vector<model::Span> find_bursts(const PreparedRecording& record, const std:
   // the control: what then still asks for less resistance, as chance does as often for more
   finder.subtract(best);
   const Selection control = chosen(finder.stretches(false), best.ohm, finder.rows());
-  if (best.gain < limits.control_times * control.gain + thresholds.decision.detected) return {};
+  if (best.gain < burst_limits.control_times * control.gain + thresholds.decision.detected) return {};
   found_ohm = best.ohm;
   return spans_of(std::move(best), record.time_s);
 }

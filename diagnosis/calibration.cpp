@@ -12,8 +12,8 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Calibration& limits = thresholds.calibration;
-constexpr const Thresholds::MovedTables& tables = thresholds.tables;
+constexpr const Thresholds::Calibration& calibration_limits = thresholds.calibration;
+constexpr const Thresholds::MovedTables& table_limits = thresholds.tables;
 
 /// Knots over a range, and one step beyond.
 std::vector<double> even_knots(double low, double high, double step) {
@@ -52,8 +52,8 @@ Calibration::SocRange Calibration::counted_range(const model::CellParameters<>& 
       high = std::max(high, row.soc);
     });
   }
-  low = std::clamp(low, limits.soc_lowest, 1.0);
-  return {low, std::clamp(high, low, limits.soc_highest)};
+  low = std::clamp(low, calibration_limits.soc_lowest, 1.0);
+  return {low, std::clamp(high, low, calibration_limits.soc_highest)};
 }
 
 template <class Sigma>
@@ -64,24 +64,26 @@ HatFunctions Calibration::hat_functions(std::vector<double> knots, Sigma sigma) 
 }
 
 void Calibration::add_ocv(const model::CellParameters<>& cell, SocRange range) {
-  const double ocv_v = std::max(cell.tolerance.ocv_v, limits.ocv_at_least_v);
-  ocv_ = hat_functions(even_knots(range.low, range.high, limits.ocv_knots_soc), [&](double) { return ocv_v; });
+  const double ocv_v = std::max(cell.tolerance.ocv_v, calibration_limits.ocv_at_least_v);
+  ocv_ =
+      hat_functions(even_knots(range.low, range.high, calibration_limits.ocv_knots_soc), [&](double) { return ocv_v; });
   const auto& ocv = cell.ocv;
   for (std::size_t k = 1; k + 1 < ocv.soc.size; ++k) {
     const double bend = std::abs(ocv.b1_v[k] - ocv.b1_v[k - 1]),
                  between = std::min(ocv.soc[k + 1] - ocv.soc[k], ocv.soc[k] - ocv.soc[k - 1]);
-    const double width = std::min(limits.corner_width_soc, between / 2), sigma_v = bend * width / limits.corner_share;
+    const double width = std::min(calibration_limits.corner_width_soc, between / 2),
+                 sigma_v = bend * width / calibration_limits.corner_share;
     if (sigma_v > ocv_v / 2 && ocv.soc[k] > range.low - width && ocv.soc[k] < range.high + width)
       corners_.push_back({ocv.soc[k], width, sigma_v, size_++});
   }
 }
 
 void Calibration::add_resistances(const model::CellParameters<>& cell, SocRange range) {
-  const double fraction = std::max(cell.tolerance.resistance_fraction, limits.resistance_at_least);
-  const double first_node = std::min(cell.rc.soc[0], limits.first_node_soc),
-               last_node = std::max(cell.rc.soc[cell.rc.soc.size - 1], limits.last_node_soc);
+  const double fraction = std::max(cell.tolerance.resistance_fraction, calibration_limits.resistance_at_least);
+  const double first_node = std::min(cell.rc.soc[0], calibration_limits.first_node_soc),
+               last_node = std::max(cell.rc.soc[cell.rc.soc.size - 1], calibration_limits.last_node_soc);
   const auto tolerance_at = [&](double soc) {
-    return fraction * (1 + std::max({0.0, first_node - soc, soc - last_node}) / limits.beyond_nodes_soc);
+    return fraction * (1 + std::max({0.0, first_node - soc, soc - last_node}) / calibration_limits.beyond_nodes_soc);
   };
   // the tolerance, or the identification's own standard deviation if it is larger
   const auto sigma_of = [&](const auto& value, const auto& deviation, double times) {
@@ -93,15 +95,18 @@ void Calibration::add_resistances(const model::CellParameters<>& cell, SocRange 
     };
   };
   const auto knots = [&](double step) { return even_knots(range.low, range.high, step); };
-  r0_ = hat_functions(knots(limits.r0_knots_soc), sigma_of(cell.rc.r0_ohm, cell.rc.r0_std_ohm, 1));
-  r1_ = hat_functions(knots(limits.rc_knots_soc), sigma_of(cell.rc.r1_ohm, cell.rc.r1_std_ohm, limits.r1_times));
-  c1_ = hat_functions(knots(limits.rc_knots_soc), sigma_of(cell.rc.c1_f, cell.rc.c1_std_f, limits.c1_times));
+  r0_ = hat_functions(knots(calibration_limits.r0_knots_soc), sigma_of(cell.rc.r0_ohm, cell.rc.r0_std_ohm, 1));
+  r1_ = hat_functions(knots(calibration_limits.rc_knots_soc),
+                      sigma_of(cell.rc.r1_ohm, cell.rc.r1_std_ohm, calibration_limits.r1_times));
+  c1_ = hat_functions(knots(calibration_limits.rc_knots_soc),
+                      sigma_of(cell.rc.c1_f, cell.rc.c1_std_f, calibration_limits.c1_times));
 }
 
 void Calibration::add_record(const model::CellParameters<>& cell, const PreparedRecording& r) {
   initial_soc_.push_back(size_++);
-  initial_soc_sigma_.push_back(std::max(r.initial_soc_sigma, limits.initial_soc_at_least));
-  const double every_s = std::max(cell.noise.current_offset_correlation_s, r.duration_s() / limits.offset_knots);
+  initial_soc_sigma_.push_back(std::max(r.initial_soc_sigma, calibration_limits.initial_soc_at_least));
+  const double every_s =
+      std::max(cell.noise.current_offset_correlation_s, r.duration_s() / calibration_limits.offset_knots);
   std::vector<double> at;
   for (double s = r.time_s.front(); s < r.time_s.back() + every_s; s += every_s) at.push_back(s);
   if (at.size() < 2) at.push_back(at.front() + every_s);
@@ -109,7 +114,7 @@ void Calibration::add_record(const model::CellParameters<>& cell, const Prepared
 }
 
 Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records)
-    : offset_a_(std::min(cell.noise.current_offset_a, limits.offset_at_most_c * cell.capacity_ah)) {
+    : offset_a_(std::min(cell.noise.current_offset_a, calibration_limits.offset_at_most_c * cell.capacity_ah)) {
   const SocRange range = counted_range(cell, records);
   add_ocv(cell, range);
   add_resistances(cell, range);
@@ -129,9 +134,11 @@ model::TablePoint<double> Calibration::change_at(double soc, const std::vector<d
 model::OcvTable<double> Calibration::moved_ocv(const model::OcvTable<double>& ocv, const std::vector<double>& u) const {
   std::vector<double> wanted = ocv_.knots();
   for (const Corner& c : corners_) {
-    if (std::abs(u[c.unknown]) > tables.corner_sigma) wanted.insert(wanted.end(), {c.soc - c.width, c.soc + c.width});
+    if (std::abs(u[c.unknown]) > table_limits.corner_sigma)
+      wanted.insert(wanted.end(), {c.soc - c.width, c.soc + c.width});
   }
-  const std::vector<double> edges = merged(values_of(ocv.soc), wanted, tables.edges_apart_soc, model::max_ocv_edges);
+  const std::vector<double> edges =
+      merged(values_of(ocv.soc), wanted, table_limits.edges_apart_soc, model::max_ocv_edges);
   model::OcvTable<double> moved;
   moved.lean = ocv.lean;
   for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -144,7 +151,7 @@ model::OcvTable<double> Calibration::moved_ocv(const model::OcvTable<double>& oc
     if (k + 1 == edges.size()) break;
     const double low_v = change_at(edges[k], u).ocv_v, high_v = change_at(edges[k + 1], u).ocv_v,
                  width = edges[k + 1] - edges[k];
-    const double turn_v = std::max((high_v - low_v) / width, -tables.slope_share * ocv.b1_v[here]),
+    const double turn_v = std::max((high_v - low_v) / width, -table_limits.slope_share * ocv.b1_v[here]),
                  middle_v = (low_v + high_v) / 2, middle = (edges[k] + edges[k + 1]) / 2;
     moved.b1_v.push_back(ocv.b1_v[here] + turn_v);
     moved.b0_v.push_back(ocv.b0_v[here] + middle_v - turn_v * middle);
@@ -155,10 +162,11 @@ model::OcvTable<double> Calibration::moved_ocv(const model::OcvTable<double>& oc
 model::RcTable<double> Calibration::moved_rc(const model::RcTable<double>& rc, const std::vector<double>& u) const {
   const auto value = [&](const auto& column, double soc) { return model::cell_detail::rc_value(rc, column, soc); };
   const auto resistance = [&](const auto& column, double soc, double times) {
-    return std::clamp(value(column, soc) * times, tables.resistance_lowest_ohm, tables.resistance_highest_ohm);
+    return std::clamp(value(column, soc) * times, table_limits.resistance_lowest_ohm,
+                      table_limits.resistance_highest_ohm);
   };
   model::RcTable<double> moved;
-  for (const double soc : merged(values_of(rc.soc), r0_.knots(), tables.nodes_apart_soc, model::max_rc_nodes)) {
+  for (const double soc : merged(values_of(rc.soc), r0_.knots(), table_limits.nodes_apart_soc, model::max_rc_nodes)) {
     const model::TablePoint<double> by = change_at(soc, u);
     moved.soc.push_back(soc);
     moved.r0_ohm.push_back(resistance(rc.r0_ohm, soc, by.r0_ohm));

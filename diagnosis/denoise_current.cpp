@@ -12,12 +12,12 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::CurrentDenoising& limits = thresholds.denoising;
+constexpr const Thresholds::CurrentDenoising& denoising_limits = thresholds.denoising;
 
 }  // namespace
 
 double current_noise(std::span<const double> a) {
-  constexpr std::size_t block = limits.block_rows;
+  constexpr std::size_t block = denoising_limits.block_rows;
   std::vector<double> spreads;
   for (std::size_t from = 0; from + block < a.size(); from += block) {
     double sum = 0;
@@ -30,8 +30,8 @@ double current_noise(std::span<const double> a) {
     }
     if (count > block / 2) spreads.push_back(std::sqrt(sum / static_cast<double>(count)));
   }
-  if (spreads.size() < limits.blocks) return 0;
-  const double calm_a = measurement::quantile(std::move(spreads), limits.calm_quantile);
+  if (spreads.size() < denoising_limits.blocks) return 0;
+  const double calm_a = measurement::quantile(std::move(spreads), denoising_limits.calm_quantile);
   return std::max(calm_a, quantisation_step(a) / std::sqrt(numerics.statistics.uniform_variance_denominator));
 }
 
@@ -41,18 +41,18 @@ std::vector<double> denoise_current(std::span<const double> a, double noise_a) {
   for (std::size_t k = 0; k < a.size(); ++k) {
     if (!std::isfinite(a[k])) continue;
     const auto near = [&](std::size_t j) {  // NaN is not
-      return std::abs(a[j] - a[k]) <= limits.neighbour_sigma * noise_a;
+      return std::abs(a[j] - a[k]) <= denoising_limits.neighbour_sigma * noise_a;
     };
     double sum = a[k], count = 1;
-    for (std::size_t j = k; j-- > 0 && k - j <= limits.reach_rows && near(j);) {
+    for (std::size_t j = k; j-- > 0 && k - j <= denoising_limits.reach_rows && near(j);) {
       sum += a[j];
       ++count;
     }
-    for (std::size_t j = k + 1; j < a.size() && j - k <= limits.reach_rows && near(j); ++j) {
+    for (std::size_t j = k + 1; j < a.size() && j - k <= denoising_limits.reach_rows && near(j); ++j) {
       sum += a[j];
       ++count;
     }
-    if (count > limits.neighbours) denoised[k] = sum / count;
+    if (count > denoising_limits.neighbours) denoised[k] = sum / count;
   }
   return denoised;
 }

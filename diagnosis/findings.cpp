@@ -10,11 +10,11 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Decision& decision = thresholds.decision;
-constexpr const Thresholds::Probability& probability = thresholds.probability;
+constexpr const Thresholds::Decision& finding_limits = thresholds.decision;
+constexpr const Thresholds::Probability& probability_limits = thresholds.probability;
 
 /// Weight of a hypothesis this far behind another one, in -2 log posterior.
-double weight(double behind) { return std::exp(-behind / (2 * probability.temper)); }
+double weight(double behind) { return std::exp(-behind / (2 * probability_limits.temper)); }
 
 /// A rival that cannot be distinguished from a finding.
 struct Equivalent {
@@ -53,8 +53,8 @@ Finding finding_of(Search& search, const Survivors& survivors, std::size_t m) {
     const std::size_t other = replacement_of(m, rival.hypothesis, best.hypothesis);
     weights += weight(behind);
     const auto alike = survivors.alike.find({m, other});
-    const bool inseparable = alike != survivors.alike.end() && alike->second > decision.inseparable;
-    if (behind < decision.tie || (inseparable && behind < decision.tie_inseparable))
+    const bool inseparable = alike != survivors.alike.end() && alike->second > finding_limits.inseparable;
+    if (behind < finding_limits.tie || (inseparable && behind < finding_limits.tie_inseparable))
       equivalents.push_back({behind, other, &rival});
   }
   std::sort(equivalents.begin(), equivalents.end(), [](const Equivalent& a, const Equivalent& b) {
@@ -65,7 +65,7 @@ Finding finding_of(Search& search, const Survivors& survivors, std::size_t m) {
     f.equivalent_to.push_back(e.mechanism);
     f.rivals.push_back({e.fit->hypothesis, e.fit->covariance});
   }
-  f.probability = probability.at_most / weights;
+  f.probability = probability_limits.at_most / weights;
   return f;
 }
 
@@ -105,10 +105,10 @@ std::vector<Ranked> ranking_of(Search& search, const LikelihoodModel& likelihood
     for (const HypothesisFit& f : grown.singles) rank(f);
   }
   std::stable_sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
-  const double best_gain = found ? ranking.front().gain : decision.detected;  // or that no mechanism is there
+  const double best_gain = found ? ranking.front().gain : finding_limits.detected;  // or that no mechanism is there
   double total = found ? 0 : 1;
   for (const Ranked& r : ranking) total += weight(best_gain - r.gain);
-  for (Ranked& r : ranking) r.probability = probability.at_most * weight(best_gain - r.gain) / total;
+  for (Ranked& r : ranking) r.probability = probability_limits.at_most * weight(best_gain - r.gain) / total;
   return ranking;
 }
 

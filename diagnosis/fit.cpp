@@ -20,7 +20,7 @@ struct LikelihoodModel::Linearisation {
 
 namespace {
 
-constexpr const Numerics::Fit& limits = numerics.fit;
+constexpr const Numerics::Fit& fit_numerics = numerics.fit;
 
 /// Room that each step has.
 struct StepBounds {
@@ -35,7 +35,7 @@ Eigen::VectorXd solve_with_fixed(const Eigen::MatrixXd& normal, const Eigen::Vec
   Eigen::MatrixXd s = normal;
   Eigen::VectorXd b = rhs;
   for (Eigen::Index j = 0; j < m; ++j)
-    s(j, j) += damping * normal(j, j) + limits.ridge + limits.ridge_share * normal.diagonal().maxCoeff();
+    s(j, j) += damping * normal(j, j) + fit_numerics.ridge + fit_numerics.ridge_share * normal.diagonal().maxCoeff();
   for (Eigen::Index j = 0; j < m; ++j) {
     if (is_fixed(j)) b -= normal.col(j) * at[j];
   }
@@ -109,7 +109,7 @@ class GaussNewton {
   std::shared_ptr<const Linearisation> around_;
   Eigen::MatrixXd schur_;    ///< of theta, u eliminated
   Eigen::VectorXd natural_;  ///< d parameter / d step
-  double damping_ = limits.damping;
+  double damping_ = fit_numerics.damping;
   int quiet_ = 0, renewals_ = 0;
 };
 
@@ -156,7 +156,7 @@ GaussNewton::NormalEquations GaussNewton::normal_equations() {
   schur_ = normal - cross.transpose() * e.solved;
   e.rhs = gradient - cross.transpose() * e.u_alone;
   Eigen::MatrixXd regular = schur_;
-  for (Eigen::Index j = 0; j < m_; ++j) regular(j, j) += limits.ridge_reach * schur_(j, j) + limits.ridge;
+  for (Eigen::Index j = 0; j < m_; ++j) regular(j, j) += fit_numerics.ridge_reach * schur_(j, j) + fit_numerics.ridge;
   e.within_reach += e.rhs.dot(regular.ldlt().solve(e.rhs));
   return e;
 }
@@ -167,13 +167,13 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
   for (Eigen::Index j = 0; j < m_; ++j)
     std::tie(room.low[j], room.high[j]) = parameters_.room(j, parameters_.of(fit_.hypothesis, j));
   Attempt result;
-  for (int attempt = 0; attempt < limits.attempts && !result.better; ++attempt) {
+  for (int attempt = 0; attempt < fit_numerics.attempts && !result.better; ++attempt) {
     const Eigen::VectorXd step = m_ > 0 ? bounded_step(schur_, e.rhs, damping_, room) : Eigen::VectorXd();
     Hypothesis trial = fit_.hypothesis;
     for (Eigen::Index j = 0; j < m_; ++j)
       parameters_.of(trial, j) = parameters_.moved(j, parameters_.of(fit_.hypothesis, j), step[j]);
     // where the base parameters' derivatives are stale, they go a shorter way as well
-    const double way = 1 / (1 + limits.calibration_way * damping_);
+    const double way = 1 / (1 + fit_numerics.calibration_way * damping_);
     Eigen::VectorXd toward = e.u_alone;
     if (m_ > 0) toward -= e.solved * step;
     const Eigen::VectorXd u = fit_.calibration + way * toward;
@@ -181,20 +181,20 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
     const double cost = cost_of(trial, u, residual);
     double promised = e.u_gradient.dot(e.u_alone);
     if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
-    if (fit_.cost - cost < limits.kept_promise * promised &&
-        promised > limits.promise + limits.promise_share * fit_.cost)
+    if (fit_.cost - cost < fit_numerics.kept_promise * promised &&
+        promised > fit_numerics.promise + fit_numerics.promise_share * fit_.cost)
       result.astray = true;
     if (!(cost < fit_.cost)) {  // also where there is no number
-      damping_ *= limits.damping_more;
+      damping_ *= fit_numerics.damping_more;
       continue;
     }
     result.better = true;
-    quiet_ = fit_.cost - cost < limits.quiet + limits.quiet_share * fit_.cost ? quiet_ + 1 : 0;
+    quiet_ = fit_.cost - cost < fit_numerics.quiet + fit_numerics.quiet_share * fit_.cost ? quiet_ + 1 : 0;
     fit_.hypothesis = trial;
     fit_.calibration = u;
     fit_.residual = residual;
     fit_.cost = cost;
-    damping_ = std::max(damping_ / limits.damping_less, limits.damping_least);
+    damping_ = std::max(damping_ / fit_numerics.damping_less, fit_numerics.damping_least);
   }
   return result;
 }
@@ -202,29 +202,30 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
 /// Linearises in the base parameters at the current point if the fit is far from the last linearisation or a step has
 /// not gained what it promised. Returns false if that is not worth it: the fit has converged.
 bool GaussNewton::linearise_again(const Attempt& attempt, int iteration, int& iterations) {
-  const int most = attempt.astray ? limits.renewals_astray : limits.renewals;
-  const bool pays = attempt.astray || !attempt.better || cost_at_start_ - fit_.cost > limits.far_gain;
+  const int most = attempt.astray ? fit_numerics.renewals_astray : fit_numerics.renewals;
+  const bool pays = attempt.astray || !attempt.better || cost_at_start_ - fit_.cost > fit_numerics.far_gain;
   if (renewals_ >= most || !pays) return false;
   ++renewals_;
   quiet_ = 0;
-  damping_ = attempt.astray ? std::max(limits.damping, damping_ / limits.damping_restart) : limits.damping;
+  damping_ =
+      attempt.astray ? std::max(fit_numerics.damping, damping_ / fit_numerics.damping_restart) : fit_numerics.damping;
   around_ = likelihood_.linearised(fit_.hypothesis, fit_.calibration);
-  iterations = std::max(iterations, iteration + limits.iterations_after_renewal);
+  iterations = std::max(iterations, iteration + fit_numerics.iterations_after_renewal);
   return true;
 }
 
 HypothesisFit GaussNewton::run(int iterations, double hopeless) {
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const NormalEquations equations = normal_equations();
-    if (equations.within_reach < limits.within_reach) {
+    if (equations.within_reach < fit_numerics.within_reach) {
       fit_.converged = true;
       break;
     }
-    if (iteration >= limits.iterations_before_hopeless &&
-        fit_.cost - limits.hopeless_times * equations.within_reach > hopeless)
+    if (iteration >= fit_numerics.iterations_before_hopeless &&
+        fit_.cost - fit_numerics.hopeless_times * equations.within_reach > hopeless)
       break;
     const Attempt attempt = attempt_step(equations);
-    const bool renewable = attempt.astray && renewals_ < limits.renewals_astray;
+    const bool renewable = attempt.astray && renewals_ < fit_numerics.renewals_astray;
     if (attempt.better && quiet_ == 0 && !renewable) continue;
     if (linearise_again(attempt, iteration, iterations)) continue;
     fit_.converged = true;
@@ -241,7 +242,7 @@ void GaussNewton::finish() {
   fit_.covariance = Eigen::MatrixXd::Zero(m_, m_);
   if (m_ == 0) return;
   Eigen::MatrixXd s = schur_;
-  const double ridge = limits.ridge_covariance * schur_.diagonal().maxCoeff() + limits.ridge_covariance;
+  const double ridge = fit_numerics.ridge_covariance * schur_.diagonal().maxCoeff() + fit_numerics.ridge_covariance;
   for (Eigen::Index j = 0; j < m_; ++j) s(j, j) += ridge;
   const Eigen::MatrixXd inverse = s.ldlt().solve(Eigen::MatrixXd::Identity(m_, m_));
   fit_.covariance = natural_.asDiagonal() * inverse * natural_.asDiagonal();

@@ -14,21 +14,22 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::ResidualTest& limits = thresholds.residual;
-constexpr Eigen::Index soc_knots = limits.soc_knots, fine_knots = limits.soc_fine_knots,
-                       voltage_knots = limits.voltage_knots, soc_current_knots = limits.soc_current_knots,
-                       time_knots = limits.time_knots, time_current_knots = limits.time_current_knots,
-                       memories = limits.memory_s.size(), leaps = limits.leaps_v.size();
+constexpr const Thresholds::ResidualTest& column_limits = thresholds.residual;
+constexpr Eigen::Index soc_knots = column_limits.soc_knots, fine_knots = column_limits.soc_fine_knots,
+                       voltage_knots = column_limits.voltage_knots, soc_current_knots = column_limits.soc_current_knots,
+                       time_knots = column_limits.time_knots, time_current_knots = column_limits.time_current_knots,
+                       memory_sizes = column_limits.memory_s.size(), leap_sizes = column_limits.leaps_v.size();
 /// Columns that all records share, and those of each record.
-constexpr Eigen::Index shared = 2 * soc_knots + fine_knots + voltage_knots + memories + soc_current_knots + 1 + leaps,
-                       per_record = time_knots + time_current_knots;
+constexpr Eigen::Index shared_columns = 2 * soc_knots + fine_knots + voltage_knots + memory_sizes + soc_current_knots +
+                                        1 + leap_sizes,
+                       columns_per_record = time_knots + time_current_knots;
 
-struct Range {
+struct ValueRange {
   double low, high;
 };
 
 /// Smallest and largest value.
-Range range_of(const std::vector<double>& values) {
+ValueRange range_of(const std::vector<double>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   return {*low, *high};
 }
@@ -40,7 +41,7 @@ class RowWriter {
 
   void value(double v) { row_(0, at_++) = v; }
   /// Weights of x at the knots of an even grid over a range, times a value.
-  void hat(Eigen::Index knots, Range range, double x, double value) {
+  void hat(Eigen::Index knots, ValueRange range, double x, double value) {
     const auto last = static_cast<double>(knots - 1);
     const double at = std::clamp((x - range.low) / std::max(range.high - range.low, numerics.grid.width_least) * last,
                                  0.0, last - numerics.grid.last_knot);
@@ -64,23 +65,23 @@ class Memory {
   /// load: current over the largest current.
   void step(double duration_s, double load, double moved_soc, double voltage_v) {
     const auto follow = [](double& x, double share, double target) { x += share * (target - x); };
-    follow(heading_, 1 - std::exp(-std::abs(moved_soc) / limits.heading_soc), moved_soc > 0 ? 1 : -1);
-    follow(heat_, 1 - std::exp(-duration_s / limits.heat_s), load * load);
+    follow(heading_, 1 - std::exp(-std::abs(moved_soc) / column_limits.heading_soc), moved_soc > 0 ? 1 : -1);
+    follow(heat_, 1 - std::exp(-duration_s / column_limits.heat_s), load * load);
     for (std::size_t t = 0; t < load_.size(); ++t)
-      follow(load_[t], 1 - std::exp(-duration_s / limits.memory_s[t]), load);
+      follow(load_[t], 1 - std::exp(-duration_s / column_limits.memory_s[t]), load);
     for (std::size_t l = 0; l < leap_v_.size(); ++l) {
-      if (std::abs(voltage_v - leap_v_[l]) >= limits.leaps_v[l]) leap_v_[l] = voltage_v;
+      if (std::abs(voltage_v - leap_v_[l]) >= column_limits.leaps_v[l]) leap_v_[l] = voltage_v;
     }
   }
-  double heading() const { return heading_; }                          ///< -1 discharged .. 1 charged last
-  double heat() const { return heat_; }                                ///< of the load, 0..1
-  const std::array<double, memories>& load() const { return load_; }   ///< by time constant
-  const std::array<double, leaps>& leap_v() const { return leap_v_; }  ///< reading that follows in leaps
+  double heading() const { return heading_; }                               ///< -1 discharged .. 1 charged last
+  double heat() const { return heat_; }                                     ///< of the load, 0..1
+  const std::array<double, memory_sizes>& load() const { return load_; }    ///< by time constant
+  const std::array<double, leap_sizes>& leap_v() const { return leap_v_; }  ///< reading that follows in leaps
 
  private:
   double heading_ = 0, heat_ = 0;
-  std::array<double, memories> load_{};
-  std::array<double, leaps> leap_v_{};
+  std::array<double, memory_sizes> load_{};
+  std::array<double, leap_sizes> leap_v_{};
 };
 
 double largest_current_a(const std::vector<PreparedRecording>& records) {
@@ -103,10 +104,10 @@ std::vector<ColumnFamily> families_of(std::size_t records) {
   family("the state of charge and the direction", 2 * soc_knots);
   family("the state of charge", fine_knots);
   family("the voltage itself", voltage_knots);
-  family("the load before", memories);
+  family("the load before", memory_sizes);
   family("the load at a state of charge", soc_current_knots);
   family("the heat of the load", 1);
-  family("how far the voltage has moved: a reading that follows in leaps", leaps);
+  family("how far the voltage has moved: a reading that follows in leaps", leap_sizes);
   for (std::size_t n = 0; n < records; ++n) {
     family("the time", time_knots);
     family("the load at a time", time_current_knots);
@@ -130,16 +131,19 @@ double power_at(const std::vector<double>& time_s, const std::vector<double>& va
 
 GenericColumns generic_columns(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const std::vector<PreparedRecording>& records = likelihood.records();
-  GenericColumns generic{families_of(records.size()),
-                         Columns::Zero(static_cast<Eigen::Index>(likelihood.samples()),
-                                       shared + per_record * static_cast<Eigen::Index>(records.size()))};
-  const double largest_a = largest_current_a(records), free_v = limits.free_v, fine_v = limits.fine_share * free_v;
+  GenericColumns generic{
+      families_of(records.size()),
+      Columns::Zero(static_cast<Eigen::Index>(likelihood.samples()),
+                    shared_columns + columns_per_record * static_cast<Eigen::Index>(records.size()))};
+  const double largest_a = largest_current_a(records), free_v = column_limits.free_v,
+               fine_v = column_limits.fine_share * free_v;
   Eigen::Index first_row = 0;
   for (std::size_t n = 0; n < records.size(); ++n) {
     const PreparedRecording& r = records[n];
     std::vector<double> soc;
     const std::vector<double> volts = likelihood.voltage(fit.hypothesis, fit.calibration, n, &soc);
-    const Range soc_range = range_of(soc), voltage_range = range_of(volts), time{r.time_s.front(), r.time_s.back()};
+    const ValueRange soc_range = range_of(soc), voltage_range = range_of(volts),
+                     time{r.time_s.front(), r.time_s.back()};
     Memory memory(volts.front());
     for_each_row(r, likelihood.cell().capacity_ah, [&](const CountedRow& counted) {
       const std::size_t k = counted.k;
@@ -154,7 +158,7 @@ GenericColumns generic_columns(const LikelihoodModel& likelihood, const Hypothes
       row.hat(soc_current_knots, soc_range, soc[k], free_v * load);
       row.value(free_v * memory.heat());
       for (const double leap_v : memory.leap_v()) row.value(leap_v - volts[k]);
-      row.skip(static_cast<Eigen::Index>(n) * per_record);
+      row.skip(static_cast<Eigen::Index>(n) * columns_per_record);
       row.hat(time_knots, time, r.time_s[k], free_v);
       row.hat(time_current_knots, time, r.time_s[k], free_v * load);
     });
@@ -164,9 +168,9 @@ GenericColumns generic_columns(const LikelihoodModel& likelihood, const Hypothes
 }
 
 std::vector<double> strange_frequencies(const PreparedRecording& r) {
-  const double lowest_hz = limits.periods / r.duration_s(),
-               highest_hz = std::min(limits.highest_hz,
-                                     limits.highest_per_row / (r.duration_s() / static_cast<double>(r.size())));
+  const double lowest_hz = column_limits.periods / r.duration_s(),
+               highest_hz = std::min(column_limits.highest_hz,
+                                     column_limits.highest_per_row / (r.duration_s() / static_cast<double>(r.size())));
   if (!(highest_hz > 2 * lowest_hz)) return {};
   std::vector<double> load(r.current_a);
   double mean = 0;
@@ -174,16 +178,17 @@ std::vector<double> strange_frequencies(const PreparedRecording& r) {
   for (double& a : load) a -= mean;
   // half a line's width apart at the low end, wider where that would be thousands
   std::vector<double> hz, power;
-  for (double f = lowest_hz; f < highest_hz && hz.size() < limits.frequencies;
-       f += std::max(limits.line_spacing / r.duration_s(), f / limits.frequency_resolution))
+  for (double f = lowest_hz; f < highest_hz && hz.size() < column_limits.frequencies;
+       f += std::max(column_limits.line_spacing / r.duration_s(), f / column_limits.frequency_resolution))
     hz.push_back(f);
   for (const double f : hz) power.push_back(power_at(r.time_s, load, f));
   std::vector<double> strange;
   for (std::size_t k = 0; k < hz.size(); ++k) {
-    constexpr std::size_t around = limits.frequency_neighbours;
+    constexpr std::size_t around = column_limits.frequency_neighbours;
     const auto from = power.begin() + static_cast<std::ptrdiff_t>(k - std::min(k, around)),
                to = power.begin() + static_cast<std::ptrdiff_t>(std::min(hz.size(), k + around + 1));
-    if (power[k] <= limits.load_power_times * measurement::median({from, to})) strange.push_back(hz[k]);
+    if (power[k] <= column_limits.load_power_times * measurement::upper_median(std::vector<double>(from, to)))
+      strange.push_back(hz[k]);
   }
   return strange;
 }

@@ -13,7 +13,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Noise& limits = thresholds.noise;
+constexpr const Thresholds::Noise& noise_limits = thresholds.noise;
 
 }  // namespace
 
@@ -37,7 +37,7 @@ LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vecto
 void LikelihoodModel::set_row_noise(const PreparedRecording& r) {
   std::vector<char>& usable = usable_.emplace_back(r.size(), 1);
   RowNoise& more = row_noise_.emplace_back(r.size());
-  const double soc_error = limits.soc_error_share * r.initial_soc_sigma, reach = limits.ocv_slope_reach,
+  const double soc_error = noise_limits.soc_error_share * r.initial_soc_sigma, reach = noise_limits.ocv_slope_reach,
                r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, numerics.middle_soc);
   double soc = r.initial_soc;  // held within 0..1: a count that has drifted outside says nothing about the slope
   std::uint8_t interval = 0;
@@ -46,11 +46,11 @@ void LikelihoodModel::set_row_noise(const PreparedRecording& r) {
     const std::size_t k = row.k;
     if (!std::isfinite(r.voltage_v[k])) usable[k] = 0;
     // the first row under load: what flowed before is not known
-    if (k == 0 && !(std::abs(r.current_a[k]) < limits.start_current_c * cell_.capacity_ah)) usable[k] = 0;
+    if (k == 0 && !(std::abs(r.current_a[k]) < noise_limits.start_current_c * cell_.capacity_ah)) usable[k] = 0;
     const double step_a = k > 0 ? row.current_a - row.previous_a : 0;
-    more.white_v2[k] = std::pow(limits.edge_jitter * r0_ohm * step_a, 2);
+    more.white_v2[k] = std::pow(noise_limits.edge_jitter * r0_ohm * step_a, 2);
     if (k > 0) more.white_v2[k - 1] = std::max(more.white_v2[k - 1], more.white_v2[k]);
-    more.edge_v2[k] = std::pow(limits.edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
+    more.edge_v2[k] = std::pow(noise_limits.edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
     if (k > 0) soc = std::clamp(soc + row.moved_soc, 0.0, 1.0);
     more.slow_v2[k] = std::pow(soc_error * (ocv_v(soc + reach) - ocv_v(soc - reach)) / (2 * reach), 2);
   });

@@ -14,7 +14,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Location& limits = thresholds.location;
+constexpr const Thresholds::Location& location_limits = thresholds.location;
 
 /// Measured less predicted, of the usable readings.
 measurement::MeanSquare error_v(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
@@ -42,7 +42,7 @@ std::vector<Axis> axes_of(const LikelihoodModel& likelihood, const HypothesisFit
     likelihood.voltage(fit.hypothesis, fit.calibration, n, &soc);
     double edge_s = r.time_s.front();
     for_each_row(r, capacity_ah, [&](const CountedRow& row) {
-      if (std::abs(row.current_a - row.previous_a) > limits.edge_c * capacity_ah) edge_s = r.time_s[row.k];
+      if (std::abs(row.current_a - row.previous_a) > location_limits.edge_c * capacity_ah) edge_s = r.time_s[row.k];
       soc_axis.value.push_back(soc[row.k]);
       current.value.push_back(row.current_a / capacity_ah);
       temperature.value.push_back(r.temperature_c.empty() ? std::nan("") : r.temperature_c[row.k]);
@@ -76,7 +76,7 @@ std::optional<Regime> sharpest_range(const Axis& axis, const std::vector<double>
     for (std::size_t b = a; b < bins; ++b) {
       share += energy[b];
       usual += time[b];
-      if (share < limits.regime_share) continue;
+      if (share < location_limits.regime_share) continue;
       if (usual > 0 && share / usual > sharpest) {
         sharpest = share / usual;
         best = {axis.name, low + (high - low) * static_cast<double>(a) / bins,
@@ -85,7 +85,7 @@ std::optional<Regime> sharpest_range(const Axis& axis, const std::vector<double>
       break;
     }
   }
-  return sharpest > limits.regime_sharper ? std::optional(best) : std::nullopt;
+  return sharpest > location_limits.regime_sharper ? std::optional(best) : std::nullopt;
 }
 
 }  // namespace
@@ -120,8 +120,9 @@ Contributions contributions(const LikelihoodModel& likelihood, const HypothesisF
 std::vector<model::Span> strongest_spans(const PreparedRecording& r, const std::vector<double>& energy) {
   std::vector<double> sorted = energy;
   if (sorted.empty() || !(*std::max_element(sorted.begin(), sorted.end()) > 0)) return {};
-  const double peak = measurement::order_statistic(sorted, sorted.size() - 1 - sorted.size() / limits.rows_per_outlier);
-  const double enough = peak / limits.peak_over_energy, apart_s = limits.spans_apart * r.duration_s();
+  const double peak =
+      measurement::order_statistic(sorted, sorted.size() - 1 - sorted.size() / location_limits.rows_per_outlier);
+  const double enough = peak / location_limits.peak_over_energy, apart_s = location_limits.spans_apart * r.duration_s();
   std::vector<model::Span> spans;
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (energy[k] < enough) continue;

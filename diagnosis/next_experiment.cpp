@@ -15,8 +15,8 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Design& limits = thresholds.design;
-constexpr const Numerics::Design& numeric = numerics.design;
+constexpr const Thresholds::Design& design_limits = thresholds.design;
+constexpr const Numerics::Design& design_numerics = numerics.design;
 
 /// A hypothesis as it holds for a later recording, and what the earlier ones know of it.
 struct Rival {
@@ -38,7 +38,7 @@ Rival in_later_recording(std::size_t mechanism, const Fitted& f) {
   const auto n = static_cast<Eigen::Index>(kept.size());
   Eigen::MatrixXd covariance = f.covariance(kept, kept);
   for (Eigen::Index i = 0; i < n; ++i)
-    covariance(i, i) = covariance(i, i) * (1 + numeric.covariance_share) + numeric.covariance;
+    covariance(i, i) = covariance(i, i) * (1 + design_numerics.covariance_share) + design_numerics.covariance;
   if (n > 0) r.information = covariance.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
   return r;
 }
@@ -50,14 +50,15 @@ double least_capacity_ah(double capacity_ah, const std::vector<Rival>& rivals) {
     for (const MechanismSetting& s : r.hypothesis.settings)
       least = std::min(least, knowledge_of(s.index).capacity_share(s));
   }
-  if (least >= limits.capacity_lost) return capacity_ah;
-  return std::floor(numeric.capacity_steps_per_ah * capacity_ah * least) / numeric.capacity_steps_per_ah;
+  if (least >= design_limits.capacity_lost) return capacity_ah;
+  return std::floor(design_numerics.capacity_steps_per_ah * capacity_ah * least) /
+         design_numerics.capacity_steps_per_ah;
 }
 
 /// What a hypothesis' current sensor reads of a current: its laws inverted by bisection.
 double read_a(const model::ChosenLaws<double>& laws, double true_a, double capacity_ah) {
   double low = 2 * std::min(true_a, 0.0) - capacity_ah, high = 2 * std::max(true_a, 0.0) + capacity_ah;
-  for (int k = 0; k < numeric.halvings; ++k) {
+  for (int k = 0; k < design_numerics.halvings; ++k) {
     const double middle = (low + high) / 2;
     (laws.true_current(middle) < true_a ? low : high) = middle;
   }
@@ -84,7 +85,7 @@ Plan planned(const experiments::Experiment& experiment, const Setting& setting, 
   Plan p{{}, bms::experiments::experiment(experiment.name, options).value()};
   PreparedRecording& r = p.record;
   r.initial_soc = experiment.start_soc;
-  r.initial_soc_sigma = std::max(setting.cell.tolerance.initial_soc, limits.initial_soc_at_least);
+  r.initial_soc_sigma = std::max(setting.cell.tolerance.initial_soc, design_limits.initial_soc_at_least);
   for (const experiments::ProfileRow& row : p.rows) {
     r.time_s.push_back(row.time_s);
     r.current_a.push_back(row.current_a);
@@ -97,7 +98,7 @@ Plan planned(const experiments::Experiment& experiment, const Setting& setting, 
 }
 
 /// What the instruments of a hypothesis would read on the course, and trusted ones alongside. within: set to false if
-/// the cell leaves its limits.
+/// the cell leaves its design_limits.
 PreparedRecording read_under(const Rival& truth, const Plan& plan, const model::CellParameters<>& cell, bool& within) {
   PreparedRecording r = plan.record;
   const std::vector<MechanismSetting>& settings = truth.hypothesis.settings;
@@ -119,7 +120,7 @@ PreparedRecording read_under(const Rival& truth, const Plan& plan, const model::
     r.voltage_v[k] = std::isfinite(row.source_v) ? laws.reading(row.source_v) : volts[k];
     current_ref_a.push_back(row.current_ref_a());
     voltage_ref_v.push_back(row.voltmeter ? terminal_v[k] : row.source_v);
-    within = within && soc[k] > limits.soc_lowest && soc[k] < limits.soc_highest &&
+    within = within && soc[k] > design_limits.soc_lowest && soc[k] < design_limits.soc_highest &&
              volts[k] > cell.limits.voltage_min_v && volts[k] < cell.limits.voltage_max_v;
   }
   average_references(r, current_ref_a, voltage_ref_v, cell);
@@ -156,10 +157,10 @@ struct Judged {
   bool all = false;  ///< separates every pair
 };
 
-/// What a course would show of a set of rivals, the finding first; nothing if the cell would leave its limits.
+/// What a course would show of a set of rivals, the finding first; nothing if the cell would leave its design_limits.
 std::optional<Judged> judged(const experiments::Experiment& e, const Setting& setting, double duration_s,
                              const std::vector<Rival>& set, NoiseModel noise) {
-  const double step_s = e.step_s < 1 ? e.step_s : std::max(1.0, std::ceil(duration_s / limits.rows));
+  const double step_s = e.step_s < 1 ? e.step_s : std::max(1.0, std::ceil(duration_s / design_limits.rows));
   const Plan plan = planned(e, setting, step_s);
   noise.white_v /= std::sqrt(std::max(step_s, 1.0));  // a row stands for so many readings
   bool within = true;
@@ -182,8 +183,8 @@ std::optional<Judged> judged(const experiments::Experiment& e, const Setting& se
     for (std::size_t a = 0; a < b; ++a) {
       const double gain =
           std::min(missed(set[b], seen[a], setting.cell, noise), missed(set[a], seen[b], setting.cell, noise));
-      j.sum += std::min(gain, limits.separates);
-      j.all = j.all && gain >= limits.separates;
+      j.sum += std::min(gain, design_limits.separates);
+      j.all = j.all && gain >= design_limits.separates;
       if (a == 0) from_finding = gain;
     }
     if (from_finding < thresholds.decision.tie) {
@@ -200,7 +201,8 @@ std::optional<Judged> judged(const experiments::Experiment& e, const Setting& se
 std::vector<std::pair<double, const experiments::Experiment*>> courses(const Setting& setting) {
   std::vector<std::pair<double, const experiments::Experiment*>> all;
   for (const experiments::Experiment& e : experiments::experiments()) {
-    if (std::isfinite(e.start_soc)) all.emplace_back(planned(e, setting, limits.survey_step_s).record.duration_s(), &e);
+    if (std::isfinite(e.start_soc))
+      all.emplace_back(planned(e, setting, design_limits.survey_step_s).record.duration_s(), &e);
   }
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return all;
@@ -212,7 +214,7 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
                                               bool temperature) {
   if (f.rivals.empty()) return std::nullopt;
   std::vector<Rival> set = {in_later_recording(f.setting.index, {d.extended, d.covariance})};
-  for (std::size_t k = 0; k < f.rivals.size() && set.size() < limits.rivals; ++k)
+  for (std::size_t k = 0; k < f.rivals.size() && set.size() < design_limits.rivals; ++k)
     set.push_back(in_later_recording(f.equivalent_to[k], f.rivals[k]));
   const Setting setting{cell, least_capacity_ah(cell.capacity_ah, set), temperature};
 

@@ -18,7 +18,7 @@ namespace bms::diagnosis {
 namespace {
 
 constexpr double no_reading = std::numeric_limits<double>::quiet_NaN();
-constexpr const Thresholds::RecordingFaults& limits = thresholds.recording;
+constexpr const Thresholds::RecordingFaults& fault_limits = thresholds.recording;
 
 using Record = PreparedRecording;
 using Cell = model::CellParameters<>;
@@ -30,7 +30,7 @@ double total_s(const std::vector<model::Span>& spans) {
 }
 
 std::size_t readings_at_most(const Record& r) {
-  return std::max<std::size_t>(limits.few_readings, r.size() / limits.rows_per_reading);
+  return std::max<std::size_t>(fault_limits.few_readings, r.size() / fault_limits.rows_per_reading);
 }
 
 /// Returns true if the units are wrong: the other checks would then say nothing.
@@ -41,14 +41,14 @@ bool check_units(Record& r, const Cell& cell, RecordingCheck& found) {
     if (std::isfinite(r.current_a[k])) largest_a = std::max(largest_a, std::abs(r.current_a[k]));
     if (std::isfinite(r.voltage_v[k])) volts.push_back(r.voltage_v[k]);
   }
-  const double usual_v = measurement::median(std::move(volts));
+  const double usual_v = measurement::upper_median(volts);
   const double limit_a = std::max(cell.limits.charge_current_max_a, cell.limits.discharge_current_max_a);
-  if (usual_v > limits.volts_at_most) {
+  if (usual_v > fault_limits.volts_at_most) {
     found.faults.push_back(
         {"voltage_in_mv",
          fmt::format("The voltage reads {:.0f}, which is in millivolts. Convert it to volts.", usual_v),
          {}});
-  } else if (largest_a > limits.amperes_times_limit * std::max(limit_a, cell.capacity_ah)) {
+  } else if (largest_a > fault_limits.amperes_times_limit * std::max(limit_a, cell.capacity_ah)) {
     found.faults.push_back(
         {"current_in_ma",
          fmt::format("The current reaches {:.0f} A, {:.0f} times the capacity per hour, so it is in milliamperes. "
@@ -61,8 +61,8 @@ bool check_units(Record& r, const Cell& cell, RecordingCheck& found) {
 
 /// Readings that no cell gives.
 void check_dropouts(Record& r, const Cell& cell, RecordingCheck& found) {
-  const double low_v = cell.limits.voltage_min_v - limits.outside_limits_v,
-               high_v = cell.limits.voltage_max_v + limits.outside_limits_v;
+  const double low_v = cell.limits.voltage_min_v - fault_limits.outside_limits_v,
+               high_v = cell.limits.voltage_max_v + fault_limits.outside_limits_v;
   std::vector<model::Span> spans;
   std::size_t dropped = 0;
   for (std::size_t k = 0; k < r.size(); ++k) {
@@ -87,14 +87,14 @@ void check_dropouts(Record& r, const Cell& cell, RecordingCheck& found) {
 
 /// Single readings far from both neighbours, which agree, while the current does not move.
 void check_spikes(Record& r, const Cell& cell, RecordingCheck& found) {
-  const double still_a = limits.spike_current_step_c * cell.capacity_ah;
+  const double still_a = fault_limits.spike_current_step_c * cell.capacity_ah;
   std::size_t spikes = 0;
   for (std::size_t k = 1; k + 1 < r.size(); ++k) {
     const double before = r.voltage_v[k - 1], after = r.voltage_v[k + 1], here = r.voltage_v[k];
     const bool still = std::abs(r.current_a[k] - r.current_a[k - 1]) < still_a &&
                        std::abs(r.current_a[k + 1] - r.current_a[k]) < still_a;
-    if (still && std::abs(after - before) < limits.spike_neighbours_v &&
-        std::abs(here - (before + after) / 2) > limits.spike_v) {
+    if (still && std::abs(after - before) < fault_limits.spike_neighbours_v &&
+        std::abs(here - (before + after) / 2) > fault_limits.spike_v) {
       r.voltage_v[k] = no_reading;
       ++spikes;
     }
@@ -123,8 +123,8 @@ std::vector<model::Span> stuck_spans(const Record& r, double c_rate_a) {
       length = 1;
     }
   }
-  const double usual = runs.size() > limits.runs_for_usual
-                           ? measurement::quantile(std::move(runs), limits.usual_run_quantile)
+  const double usual = runs.size() > fault_limits.runs_for_usual
+                           ? measurement::quantile(std::move(runs), fault_limits.usual_run_quantile)
                            : static_cast<double>(r.size());
   std::vector<model::Span> spans;
   std::size_t from = 0;
@@ -137,9 +137,11 @@ std::vector<model::Span> stuck_spans(const Record& r, double c_rate_a) {
       high = std::max(high, r.current_a[j]);
     }
     const std::size_t rows = k - from;
-    const bool under_load = rows >= limits.stuck_rows_loaded && high - low > limits.stuck_swing_c * c_rate_a,
-               for_long = rows >= limits.stuck_rows && static_cast<double>(rows) > limits.stuck_times_usual * usual &&
-                          high - low > limits.stuck_small_swing_c * c_rate_a;
+    const bool under_load =
+                   rows >= fault_limits.stuck_rows_loaded && high - low > fault_limits.stuck_swing_c * c_rate_a,
+               for_long = rows >= fault_limits.stuck_rows &&
+                          static_cast<double>(rows) > fault_limits.stuck_times_usual * usual &&
+                          high - low > fault_limits.stuck_small_swing_c * c_rate_a;
     if (under_load || for_long) spans.push_back({r.time_s[from], r.time_s[k - 1]});
     from = k;
   }
@@ -148,7 +150,7 @@ std::vector<model::Span> stuck_spans(const Record& r, double c_rate_a) {
 
 void check_stuck_voltage(Record& r, const Cell& cell, RecordingCheck& found) {
   const std::vector<model::Span> stuck = stuck_spans(r, cell.capacity_ah);
-  if (total_s(stuck) > std::max(limits.stuck_at_most_s, limits.stuck_at_most_share * r.duration_s())) {
+  if (total_s(stuck) > std::max(fault_limits.stuck_at_most_s, fault_limits.stuck_at_most_share * r.duration_s())) {
     found.faults.push_back(
         {"stuck_voltage",
          fmt::format(
@@ -173,19 +175,19 @@ void check_stuck_voltage(Record& r, const Cell& cell, RecordingCheck& found) {
 void check_gaps(Record& r, const Cell& cell, RecordingCheck& found) {
   std::vector<double> steps_s;
   for (std::size_t k = 1; k < r.size(); ++k) steps_s.push_back(r.time_s[k] - r.time_s[k - 1]);
-  const double usual_step_s = measurement::median(std::move(steps_s));
+  const double usual_step_s = measurement::upper_median(steps_s);
   const auto load_a = [&](std::size_t k) { return std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0; };
   std::vector<model::Span> gaps;
   double lost_soc = 0;
   for (std::size_t k = 1; k < r.size(); ++k) {
     const double dt_s = r.time_s[k] - r.time_s[k - 1];
-    if (dt_s <= limits.gap_steps * usual_step_s || dt_s < limits.gap_at_least_s) continue;
+    if (dt_s <= fault_limits.gap_steps * usual_step_s || dt_s < fault_limits.gap_at_least_s) continue;
     const double a = std::max(load_a(k), load_a(k - 1));
-    if (a < limits.gap_load_c * cell.capacity_ah) continue;
+    if (a < fault_limits.gap_load_c * cell.capacity_ah) continue;
     gaps.push_back({r.time_s[k - 1], r.time_s[k]});
     lost_soc += a * dt_s / (3'600 * cell.capacity_ah);
   }
-  if (lost_soc > limits.gaps_lose_soc || gaps.size() > limits.gaps_at_most) {
+  if (lost_soc > fault_limits.gaps_lose_soc || gaps.size() > fault_limits.gaps_at_most) {
     found.faults.push_back(
         {"gaps",
          fmt::format("The recording has {} gaps under load, {:.0f} s in total: up to {:.1f} % of the "
@@ -203,15 +205,16 @@ void check_sign(Record& r, const Cell& cell, RecordingCheck& found) {
   std::size_t edges = 0, against = 0;
   for (std::size_t k = 1; k < r.size(); ++k) {
     const double di = r.current_a[k] - r.current_a[k - 1], dv = r.voltage_v[k] - r.voltage_v[k - 1];
-    if (!std::isfinite(di) || !std::isfinite(dv) || std::abs(di) < limits.edge_c * cell.capacity_ah) continue;
+    if (!std::isfinite(di) || !std::isfinite(dv) || std::abs(di) < fault_limits.edge_c * cell.capacity_ah) continue;
     together += di * dv;
     current2 += di * di;
     voltage2 += dv * dv;
     ++edges;
     against += di * dv < 0 ? 1 : 0;
   }
-  if (edges >= limits.edges_for_sign && together < limits.inverted_correlation * std::sqrt(current2 * voltage2) &&
-      against > edges * limits.inverted_edges / limits.inverted_of) {
+  if (edges >= fault_limits.edges_for_sign &&
+      together < fault_limits.inverted_correlation * std::sqrt(current2 * voltage2) &&
+      against > edges * fault_limits.inverted_edges / fault_limits.inverted_of) {
     found.faults.push_back(
         {"current_inverted",
          "The voltage falls where the current rises, so the sign of the current is inverted. Charging "

@@ -14,7 +14,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Facts& limits = thresholds.facts;
+constexpr const Thresholds::Facts& fact_limits = thresholds.facts;
 
 /// Smallest and largest value.
 struct Range {
@@ -34,8 +34,8 @@ class Turns {
   bool turned(double soc) {
     if (heading_ > 0) farthest_ = std::max(farthest_, soc);
     if (heading_ < 0) farthest_ = std::min(farthest_, soc);
-    const bool begins = heading_ == 0 && std::abs(soc - start_) > limits.turn_soc,
-               turns = heading_ != 0 && (farthest_ - soc) * heading_ > limits.turn_soc;
+    const bool begins = heading_ == 0 && std::abs(soc - start_) > fact_limits.turn_soc,
+               turns = heading_ != 0 && (farthest_ - soc) * heading_ > fact_limits.turn_soc;
     if (begins) heading_ = soc > start_ ? 1 : -1;
     if (turns) heading_ = -heading_;
     if (begins || turns) farthest_ = soc;
@@ -49,18 +49,18 @@ class Turns {
 
 /// Is the largest current reached often enough, in visits apart from each other?
 std::optional<double> rail_a(double largest_a, double capacity_ah, std::span<const PreparedRecording> records) {
-  if (largest_a < limits.rail_c * capacity_ah) return std::nullopt;
+  if (largest_a < fact_limits.rail_c * capacity_ah) return std::nullopt;
   std::size_t near = 0, runs = 0;
   for (const PreparedRecording& r : records) {
     bool inside = false;
     for (const double a : r.current_a) {
-      const bool now = std::isfinite(a) && std::abs(a) > limits.rail_share * largest_a;
+      const bool now = std::isfinite(a) && std::abs(a) > fact_limits.rail_share * largest_a;
       near += now ? 1 : 0;
       runs += now && !inside ? 1 : 0;
       inside = now;
     }
   }
-  return near >= limits.rail_rows && runs >= limits.rail_runs ? std::optional(largest_a) : std::nullopt;
+  return near >= fact_limits.rail_rows && runs >= fact_limits.rail_runs ? std::optional(largest_a) : std::nullopt;
 }
 
 /// All that follows from the counted charge of one recording.
@@ -73,14 +73,14 @@ void count_charge(const PreparedRecording& r, RecordingFacts& facts, Range& soc,
       steps_s.push_back(row.duration_s);
       facts.throughput_soc += std::abs(row.moved_soc);
       facts.charged_soc += std::max(row.moved_soc, 0.0);
-      if (std::abs(row.current_a - row.previous_a) > limits.edge_c * facts.capacity_ah) ++facts.edges;
+      if (std::abs(row.current_a - row.previous_a) > fact_limits.edge_c * facts.capacity_ah) ++facts.edges;
     }
     soc.add(row.soc);
     const double c_rate = std::abs(row.current_a) / facts.capacity_ah;
-    rested_s = c_rate < limits.rest_c ? rested_s + row.duration_s : 0;
+    rested_s = c_rate < fact_limits.rest_c ? rested_s + row.duration_s : 0;
     facts.longest_rest_s = std::max(facts.longest_rest_s, rested_s);
-    if (c_rate > limits.rate_c)
-      rates.insert(static_cast<int>(std::lround(std::log(c_rate) / std::log(limits.rate_ratio))));
+    if (c_rate > fact_limits.rate_c)
+      rates.insert(static_cast<int>(std::lround(std::log(c_rate) / std::log(fact_limits.rate_ratio))));
     if (turns.turned(row.soc)) ++facts.reversals;
   });
 }
@@ -102,7 +102,7 @@ RecordingFacts recording_facts(double capacity_ah, std::span<const PreparedRecor
     for (const double a : r.current_a) {
       if (!std::isfinite(a)) continue;
       read_a.add(a);
-      facts.loaded_rows += std::abs(a) > limits.moving_c * capacity_ah ? 1 : 0;
+      facts.loaded_rows += std::abs(a) > fact_limits.moving_c * capacity_ah ? 1 : 0;
       facts.largest_a = std::max(facts.largest_a, std::abs(a));
     }
     for (const double c : r.temperature_c) {
@@ -112,7 +112,7 @@ RecordingFacts recording_facts(double capacity_ah, std::span<const PreparedRecor
       facts.away_k = std::max(facts.away_k, std::abs(c - model::reference_temperature_c));
     }
   }
-  if (!steps_s.empty()) facts.step_s = measurement::median(std::move(steps_s));
+  if (!steps_s.empty()) facts.step_s = measurement::upper_median(steps_s);
   facts.soc_span = soc.span();
   facts.read_span_a = read_a.span();
   facts.temperature_span_k = temperature_c.span();

@@ -10,15 +10,16 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::References& limits = thresholds.references;
+constexpr const Thresholds::References& reference_limits = thresholds.references;
 
-struct Stretch {
+struct StillStretch {
   std::size_t first = 0, last = 0;
 };
 
 /// Consecutive rows with a reference that moves by `still` at most.
-std::vector<Stretch> stretches(const std::vector<double>& time_s, std::span<const double> reference, double still) {
-  std::vector<Stretch> all;
+std::vector<StillStretch> stretches(const std::vector<double>& time_s, std::span<const double> reference,
+                                    double still) {
+  std::vector<StillStretch> all;
   bool inside = false;
   for (std::size_t k = 0; k < reference.size(); ++k) {
     if (!std::isfinite(reference[k])) {
@@ -26,7 +27,7 @@ std::vector<Stretch> stretches(const std::vector<double>& time_s, std::span<cons
       continue;
     }
     const bool goes_on = inside && std::abs(reference[k] - reference[all.back().first]) <= still &&
-                         time_s[k] - time_s[all.back().first] <= limits.check_at_most_s;
+                         time_s[k] - time_s[all.back().first] <= reference_limits.check_at_most_s;
     if (goes_on)
       all.back().last = k;
     else
@@ -45,8 +46,8 @@ struct Channel {
 };
 
 void add_checks(PreparedRecording& r, const Channel& channel, const model::CellParameters<>& cell) {
-  for (const Stretch& s : stretches(r.time_s, channel.reference, channel.still)) {
-    const double from_s = r.time_s[s.first] + limits.filter_share * (r.time_s[s.last] - r.time_s[s.first]);
+  for (const StillStretch& s : stretches(r.time_s, channel.reference, channel.still)) {
+    const double from_s = r.time_s[s.first] + reference_limits.filter_share * (r.time_s[s.last] - r.time_s[s.first]);
     Check c;
     c.channel = channel.kind;
     double n = 0;
@@ -70,14 +71,16 @@ void add_checks(PreparedRecording& r, const Channel& channel, const model::CellP
 double check_deviation(Check::Channel channel, double apart, double readings, const model::CellParameters<>& cell) {
   const bool voltage = channel == Check::Channel::voltage;
   const double noise = voltage ? cell.noise.voltage_v : cell.noise.current_a,
-               own = voltage ? limits.meter_v : limits.meter_c * cell.capacity_ah, unsteady = limits.unsteady_share;
+               own = voltage ? reference_limits.meter_v : reference_limits.meter_c * cell.capacity_ah,
+               unsteady = reference_limits.unsteady_share;
   return std::sqrt(noise * noise / readings + own * own + unsteady * unsteady * apart * apart);
 }
 
 void average_references(PreparedRecording& r, std::span<const double> current_ref_a,
                         std::span<const double> voltage_ref_v, const model::CellParameters<>& cell) {
-  add_checks(r, {Check::Channel::current, r.current_a, current_ref_a, limits.still_c * cell.capacity_ah}, cell);
-  add_checks(r, {Check::Channel::voltage, r.voltage_v, voltage_ref_v, limits.still_v}, cell);
+  add_checks(r, {Check::Channel::current, r.current_a, current_ref_a, reference_limits.still_c * cell.capacity_ah},
+             cell);
+  add_checks(r, {Check::Channel::voltage, r.voltage_v, voltage_ref_v, reference_limits.still_v}, cell);
   if (current_ref_a.empty() || voltage_ref_v.empty()) return;
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (current_ref_a[k] == 0 && std::isfinite(voltage_ref_v[k]))

@@ -14,7 +14,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::ResidualTest& limits = thresholds.residual;
+constexpr const Thresholds::ResidualTest& residual_limits = thresholds.residual;
 
 /// What gains most so far.
 struct Best {
@@ -38,7 +38,7 @@ void test_families(const LikelihoodModel& likelihood, const HypothesisFit& fit, 
     const Eigen::VectorXd x = solver.solve(toward.segment(f.first, f.count));
     // what the columns gain on noise alone: the trace of what they can follow
     const double freedom = solver.solve(own_gram).trace(),
-                 gain = toward.segment(f.first, f.count).dot(x) - limits.gain_per_freedom * freedom;
+                 gain = toward.segment(f.first, f.count).dot(x) - residual_limits.gain_per_freedom * freedom;
     if (gain <= best.gain) continue;
     best = {gain, f.depends_on, generic.columns.middleCols(f.first, f.count) * x};
   }
@@ -52,7 +52,7 @@ void test_frequencies(const LikelihoodModel& likelihood, const ResidualProjectio
     const auto [g, b] = projection.of(white);
     const Eigen::Vector2d x =
         (g + numerics.grid.sine_ridge * g.diagonal().maxCoeff() * Eigen::Matrix2d::Identity()).ldlt().solve(b);
-    const double gain = b.dot(x) - limits.gain_of_frequencies;
+    const double gain = b.dot(x) - residual_limits.gain_of_frequencies;
     if (gain <= best.gain) continue;
     best = {gain, "a period of its own", wave * x};
   }
@@ -64,14 +64,14 @@ void test_distribution(const Eigen::VectorXd& residual, ResidualTest& found) {
   for (const double r : residual) {
     if (r != 0) squares.push_back(r * r);
   }
-  if (squares.size() <= limits.rows) return;
-  const double far2 = limits.far_sigma * limits.far_sigma;
+  if (squares.size() <= residual_limits.rows) return;
+  const double far2 = residual_limits.far_sigma * residual_limits.far_sigma;
   double sum = 0;
   for (const double s : squares) sum += std::min(s, far2);  // winsorised: a few bad samples are no excess
   const auto count = static_cast<double>(squares.size());
   found.fast_excess = sum / count - 1;
   // what lies within the tolerance is not far out
-  const double variance = std::max(measurement::median(squares) / numerics.statistics.chi_square_median, 1.0);
+  const double variance = std::max(measurement::upper_median(squares) / numerics.statistics.chi_square_median, 1.0);
   const auto far = std::count_if(squares.begin(), squares.end(), [&](double s) { return s > far2 * variance; });
   found.far_out = static_cast<double>(far) / count;
 }

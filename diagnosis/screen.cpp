@@ -16,8 +16,8 @@ namespace bms::diagnosis {
 namespace {
 
 using model::Role;
-constexpr const Thresholds::Screening& limits = thresholds.screening;
-constexpr const Numerics::Signatures& numeric = numerics.signatures;
+constexpr const Thresholds::Screening& screening_limits = thresholds.screening;
+constexpr const Numerics::Signatures& signature_numerics = numerics.signatures;
 
 }  // namespace
 
@@ -26,8 +26,8 @@ double Screen::gain_of(const Probe& probe, Eigen::VectorXd& strengths) const {
   Eigen::MatrixXd g = gram_.block(probe.first, probe.first, n, n);
   const Eigen::VectorXd b = toward_.segment(probe.first, n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    g(i, i) *= 1 + numeric.ridge_share;
-    g(i, i) += numeric.ridge;
+    g(i, i) *= 1 + signature_numerics.ridge_share;
+    g(i, i) += signature_numerics.ridge;
   }
   strengths = g.ldlt().solve(b);
   return std::max(0.0, b.dot(strengths));
@@ -36,7 +36,8 @@ double Screen::gain_of(const Probe& probe, Eigen::VectorXd& strengths) const {
 double Screen::sigma_of(const Probe& probe) const {
   const auto n = static_cast<Eigen::Index>(probe.parameters.size());
   Eigen::MatrixXd g = gram_.block(probe.first, probe.first, n, n);
-  for (Eigen::Index i = 0; i < n; ++i) g(i, i) = g(i, i) * (1 + numeric.ridge_share) + numeric.ridge;
+  for (Eigen::Index i = 0; i < n; ++i)
+    g(i, i) = g(i, i) * (1 + signature_numerics.ridge_share) + signature_numerics.ridge;
   return std::sqrt(std::max(g.inverse()(0, 0), 0.0));
 }
 
@@ -49,7 +50,7 @@ void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
   const bool one_sided = first.low >= 0 && first.role == Role::strength;
   if (one_sided && found[0] + p.setting.value[p.parameters[0]] < 0) gain = 0;
   const std::size_t unknowns = p.parameters.size() + (is_searched(mechanism, capacity_ah) ? 1 : 0);
-  gain -= (static_cast<double>(unknowns) - 1) * limits.per_unknown;
+  gain -= (static_cast<double>(unknowns) - 1) * screening_limits.per_unknown;
 
   auto c = std::find_if(candidates_.begin(), candidates_.end(),
                         [&](const Candidate& other) { return other.mechanism == mechanism; });
@@ -58,7 +59,7 @@ void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
     best_.push_back(p);
     c = candidates_.end() - 1;
   }
-  const double limit = limits.limit_sigma * sigma_of(p);
+  const double limit = screening_limits.limit_sigma * sigma_of(p);
   if (c->limit == 0 || limit < c->limit) c->limit = limit;
   if (gain <= c->gain || std::isnan(gain)) return;
   c->gain = gain;
@@ -132,7 +133,7 @@ double Screen::alike(std::size_t a, std::size_t b) const {
     for (Eigen::Index j = 0; j < nb; ++j) toward[j] += x[i] * gram_(pa.first + i, pb.first + j);
   }
   Eigen::MatrixXd g = gram_.block(pb.first, pb.first, nb, nb);
-  for (Eigen::Index i = 0; i < nb; ++i) g(i, i) *= 1 + numeric.ridge_share;
+  for (Eigen::Index i = 0; i < nb; ++i) g(i, i) *= 1 + signature_numerics.ridge_share;
   return norm > 0 ? std::sqrt(std::clamp(toward.dot(g.ldlt().solve(toward)) / norm, 0.0, 1.0)) : 0;
 }
 

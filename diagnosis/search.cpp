@@ -14,9 +14,9 @@ namespace {
 using model::catalogue;
 using model::Role;
 
-constexpr const Thresholds::Decision& decision = thresholds.decision;
-constexpr const Thresholds::Screening& screening = thresholds.screening;
-constexpr const Numerics::Search& numeric = numerics.search;
+constexpr const Thresholds::Decision& search_limits = thresholds.decision;
+constexpr const Thresholds::Screening& candidate_limits = thresholds.screening;
+constexpr const Numerics::Search& search_numerics = numerics.search;
 
 /// What the unknowns of a mechanism cost. What is known of most cells is not an unknown.
 double price(std::size_t mechanism) {
@@ -26,7 +26,7 @@ double price(std::size_t mechanism) {
     unknowns += parameter.role != Role::given && parameter.spread == 0 ? 1 : 0;
   }
   unknowns += knowledge_of(mechanism).searched_unknowns;
-  return decision.per_unknown * (unknowns - 1);
+  return search_limits.per_unknown * (unknowns - 1);
 }
 
 double price(const Hypothesis& h) {
@@ -35,7 +35,7 @@ double price(const Hypothesis& h) {
   for (const auto& spans : h.bursts) bursts += spans.size();
   for (const std::size_t m : h.added()) {
     const bool in_bursts = knowledge_of(m).signature == Signature::contact_bursts;
-    sum += price(m) + decision.per_burst * static_cast<double>(in_bursts ? bursts : 0);
+    sum += price(m) + search_limits.per_burst * static_cast<double>(in_bursts ? bursts : 0);
   }
   return sum;
 }
@@ -95,7 +95,7 @@ double Search::score(const HypothesisFit& f) {
 }
 
 HypothesisFit Search::with_own_noise(HypothesisFit f) {
-  for (int round = 0; round < numeric.noise_rounds; ++round) {
+  for (int round = 0; round < search_numerics.noise_rounds; ++round) {
     double cost = 0;
     const NoiseModel noise =
         likelihood_.likeliest_noise(likelihood_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
@@ -151,7 +151,7 @@ bool Search::far_better(const HypothesisFit& around, const Candidate& c) {
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto far = far_start(with(around.hypothesis, c.start), u);
     if (far && likelihood_.residual(*far, u).squaredNorm() <
-                   likelihood_.residual(around.hypothesis, u).squaredNorm() - screening.worth_a_fit)
+                   likelihood_.residual(around.hypothesis, u).squaredNorm() - candidate_limits.worth_a_fit)
       return true;
   }
   return false;
@@ -159,11 +159,11 @@ bool Search::far_better(const HypothesisFit& around, const Candidate& c) {
 
 HypothesisFit Search::refined_onset(HypothesisFit best) {
   const PreparedRecording& r = likelihood_.records().front();
-  const double margin_s = numeric.onset_margin * r.duration_s(),
-               least_s = numeric.onset_rows * r.duration_s() / static_cast<double>(r.size());
-  for (double reach_s = r.duration_s() / numeric.onset_reach; reach_s > least_s; reach_s /= 2) {
+  const double margin_s = search_numerics.onset_margin * r.duration_s(),
+               least_s = search_numerics.onset_rows * r.duration_s() / static_cast<double>(r.size());
+  for (double reach_s = r.duration_s() / search_numerics.onset_reach; reach_s > least_s; reach_s /= 2) {
     const double middle_s = onset_of(best.hypothesis);
-    for (const double step : numeric.onset_steps) {
+    for (const double step : search_numerics.onset_steps) {
       Hypothesis h = best.hypothesis;
       // a step at either end of the recording is not a step
       onset_of(h) = std::clamp(middle_s + step * reach_s, r.time_s.front() + margin_s, r.time_s.back() - margin_s);
@@ -192,8 +192,8 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
     const Screen screen(likelihood_, from, over);
     std::vector<Candidate> worth;
     for (const Candidate& c : screen.candidates()) {
-      const bool promising = c.gain >= screening.worth_a_fit;
-      if (promising && worth.size() >= screening.fits) continue;
+      const bool promising = c.gain >= candidate_limits.worth_a_fit;
+      if (promising && worth.size() >= candidate_limits.fits) continue;
       if (!promising && !far_better(from, c)) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
@@ -218,11 +218,11 @@ std::vector<HypothesisFit> Search::in_place_of(const Replacement& r, const std::
     if (all[a].mechanism == r.mechanism) {
       for (std::size_t b = 0; b < all.size(); ++b) likeness[all[b].mechanism] = screen.alike(a, b);
     }
-    if (worth.size() < screening.rivals &&
-        all[a].gain >= std::max(screening.worth_a_fit, screening.rival_share * r.gain))
+    if (worth.size() < candidate_limits.rivals &&
+        all[a].gain >= std::max(candidate_limits.worth_a_fit, candidate_limits.rival_share * r.gain))
       worth.push_back(all[a]);
   }
-  return fitted(from, worth, r.best.cost + decision.hopeless);
+  return fitted(from, worth, r.best.cost + search_limits.hopeless);
 }
 
 std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
@@ -232,7 +232,7 @@ std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std
   for (const Candidate& c : candidates) fits.push_back(fit_with(around, c, hopeless));
   std::stable_sort(fits.begin(), fits.end(),
                    [](const HypothesisFit& a, const HypothesisFit& b) { return a.cost < b.cost; });
-  for (std::size_t k = 0; k < fits.size() && k < numeric.fits_with_own_noise; ++k) {
+  for (std::size_t k = 0; k < fits.size() && k < search_numerics.fits_with_own_noise; ++k) {
     if (fits[k].cost < hopeless) fits[k] = with_own_noise(fits[k]);
   }
   return fits;
@@ -241,7 +241,7 @@ std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std
 bool Search::carries(const HypothesisFit& before, const HypothesisFit& f) const {
   if (f.hypothesis.added().size() < 2) return true;
   const double was_v = std::min(lasting_error_v(likelihood_, before), plain_error_v(likelihood_, likelihood_.base()));
-  return lasting_error_v(likelihood_, f) <= decision.error_may_grow * was_v + decision.error_may_grow_v;
+  return lasting_error_v(likelihood_, f) <= search_limits.error_may_grow * was_v + search_limits.error_may_grow_v;
 }
 
 HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t mechanism) {
@@ -252,7 +252,8 @@ HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t mechanism)
 
 void Search::report(std::string_view what) {
   ++steps_;
-  if (progress_) progress_(1 - std::exp(-static_cast<double>(steps_) / numeric.progress_steps), std::string(what));
+  if (progress_)
+    progress_(1 - std::exp(-static_cast<double>(steps_) / search_numerics.progress_steps), std::string(what));
 }
 
 }  // namespace bms::diagnosis

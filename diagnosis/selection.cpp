@@ -10,7 +10,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Decision& decision = thresholds.decision;
+constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
@@ -38,7 +38,7 @@ class Elimination {
       const bool alone = found_.best.hypothesis.added().size() == 1;
       const HypothesisFit without = alone ? control_ : search_.without_one(found_.best, m);
       const double gain = found_.gains[m] = search_.gain(without, found_.best);
-      if (gain < decision.detected || !(alone || counts(gain, all_gain, rms_v.at(m))))
+      if (gain < selection_limits.detected || !(alone || counts(gain, all_gain, rms_v.at(m))))
         reduced.emplace_back(gain, without);
       else if (compare_with_rivals(m, without))
         return true;
@@ -60,8 +60,9 @@ class Elimination {
   /// One of several mechanisms must be seen, and must not be larger than the error: such ones cancel each other. Of
   /// these the one goes that is missed less.
   bool counts(double gain, double all_gain, double rms_v) const {
-    const bool seen = rms_v >= decision.noticeable * error_v_ || gain >= decision.noticeable_gain * all_gain;
-    return seen && rms_v <= decision.larger_than_error * error_v_;
+    const bool seen =
+        rms_v >= selection_limits.noticeable * error_v_ || gain >= selection_limits.noticeable_gain * all_gain;
+    return seen && rms_v <= selection_limits.larger_than_error * error_v_;
   }
 
   /// Returns true if a rival, or the same mechanisms from another start, has become the best.
@@ -73,7 +74,7 @@ class Elimination {
     for (HypothesisFit& rival : search_.in_place_of(replacement, scope_.searched, likeness)) {
       const bool same_mechanisms = rival.hypothesis.find(m) != nullptr;
       if (!search_.carries(without, rival)) continue;
-      const double ahead = same_mechanisms ? decision.better_start : decision.better_rival;
+      const double ahead = same_mechanisms ? selection_limits.better_start : selection_limits.better_rival;
       const bool replaceable = same_mechanisms || !scope_.expected.contains(m);
       if (replaceable && search_.score(rival) < search_.score(best) - ahead) {
         best = rival;
@@ -112,7 +113,7 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
   HypothesisFit& current = grown.fit;
   for (const std::size_t m : scope.expected) {
     const std::vector<HypothesisFit> fits = search.one_more(current, {m});
-    if (!fits.empty() && search.gain(current, fits.front()) > decision.detected) current = fits.front();
+    if (!fits.empty() && search.gain(current, fits.front()) > selection_limits.detected) current = fits.front();
   }
   std::vector<std::size_t> steady = scope.searched;
   std::erase_if(steady, comes_and_goes);
@@ -121,7 +122,7 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
     std::vector<HypothesisFit> fits = search.one_more(current, all ? scope.searched : steady);
     if (current.hypothesis.added().empty()) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
     std::erase_if(fits, [&](const HypothesisFit& f) { return !search.carries(current, f); });
-    const bool gains = !fits.empty() && search.gain(current, fits.front()) >= decision.detected;
+    const bool gains = !fits.empty() && search.gain(current, fits.front()) >= selection_limits.detected;
     if (gains)
       current = fits.front();
     else if (all)
