@@ -1,17 +1,18 @@
-// The control hypothesis: every base parameter free within what the calibration is good for (the cell file's
+// The control hypothesis: every base parameter is free within the accuracy of the calibration (the cell file's
 // [tolerance]).
 //
-// A mechanism must beat this, not the frozen model: a table that is 1 mV or 2 % off is no missing physics. Each unknown
-// is a standard normal one; its size in the model is its deviation:
+// A mechanism must explain more than this hypothesis, not more than the frozen model: a table that is off by 1 mV or 2
+// % is not missing physics. Each unknown has a standard normal prior; its size in the model is its standard deviation
+// (Thresholds::Calibration):
 //
-//   OCV         at knots every 5 % of soc: tolerance.ocv_v; where the table bends sharply, another one beside the
-//   corner: a smooth
-//               curve cuts a corner of straight lines by its change of slope times some soc
-//   R0, R1, C1  at knots every 10, 20, 20 %: 1, 2 and 4 times tolerance.resistance_fraction, or the identification's
-//   own deviation if
-//               that is more; more beyond the table's nodes, where it only carries on: towards empty resistances grow
-//   capacity    0.5 %;  gain of the current 0.2 %
-//   per record  initial soc; a slow wander of the current's zero, 0.1 % of 1C at most, in hours
+//   OCV         hat functions over soc, tolerance.ocv_v; and one at each sharp corner of the table: a smooth curve cuts
+//   a
+//               corner of straight lines by its change of slope times some soc
+//   R0, R1, C1  hat functions over soc, 1, 2 and 4 times tolerance.resistance_fraction, or the identification's own
+//               standard deviation if that is larger; more beyond the table's nodes, where it is only extrapolated:
+//               towards empty, resistances grow
+//   capacity    one unknown;  gain of the current sensor  one unknown
+//   per record  initial soc; a slow wander of the current sensor's zero, over hours
 #pragma once
 
 #include <algorithm>
@@ -20,61 +21,51 @@
 #include <span>
 #include <vector>
 
+#include "diagnosis/dual.hpp"
 #include "diagnosis/prepared_recording.hpp"
+#include "diagnosis/thresholds.hpp"
 #include "model/cell_parameters.hpp"
 #include "model/extended.hpp"
 
 namespace bms::diagnosis {
 
-/// Without its derivatives.
-template <class S>
-double number(const S& x) {
-  if constexpr (model::Dual<S>)
-    return x.a;
-  else
-    return x;
-}
-
-/// Values between evenly spaced knots, straight lines; constant outside.
-class Hats {
+/// Piecewise linear between knots, constant outside: one unknown per knot.
+class HatFunctions {
  public:
-  Hats() = default;
-  Hats(std::vector<double> knots, std::size_t first) : knots_(std::move(knots)), first_(first) {
+  HatFunctions() = default;
+  /// knots: ascending, two at least. first: place of the first knot's unknown. sigma(x): standard deviation at a knot.
+  template <class Sigma>
+  HatFunctions(std::vector<double> knots, std::size_t first, Sigma sigma) : knots_(std::move(knots)), first_(first) {
     for (std::size_t k = 0; k + 1 < knots_.size(); ++k) per_width_.push_back(1 / (knots_[k + 1] - knots_[k]));
+    for (const double x : knots_) sigma_.push_back(sigma(x));
   }
   std::size_t size() const { return knots_.size(); }
   const std::vector<double>& knots() const { return knots_; }
-  /// What an unknown of 1 makes of the value at knot k: deviation(knot's x).
-  template <class Deviation>
-  Hats& scaled(Deviation deviation) {
-    for (const double x : knots_) size_.push_back(deviation(x));
-    return *this;
-  }
 
-  /// The unknowns u between the knots around x, in their deviations. X, U: double or a dual number.
+  /// Value at x, u: all unknowns in standard deviations. X, U: double or a dual number.
   template <class X, class U>
   auto at(const X& x, const std::vector<U>& u) const {
     using S = decltype(x * u[0]);
     const double v = number(x);
-    if (v <= knots_.front()) return S(u[first_] * size_.front());
-    if (v >= knots_.back()) return S(u[first_ + knots_.size() - 1] * size_.back());
+    if (v <= knots_.front()) return S(u[first_] * sigma_.front());
+    if (v >= knots_.back()) return S(u[first_ + knots_.size() - 1] * sigma_.back());
     const std::size_t k = below(v);
-    const U low = u[first_ + k] * size_[k];
-    return S(low + (x - knots_[k]) * per_width_[k] * (u[first_ + k + 1] * size_[k + 1] - low));
+    const U low = u[first_ + k] * sigma_[k];
+    return S(low + (x - knots_[k]) * per_width_[k] * (u[first_ + k + 1] * sigma_[k + 1] - low));
   }
-  /// f(unknown, d value at x / d unknown), of those that say something there.
+  /// f(unknown, derivative of the value at x by it), for those with a derivative other than 0.
   template <class F>
   void each(double x, F&& f) const {
-    if (x <= knots_.front()) return f(first_, size_.front());
-    if (x >= knots_.back()) return f(first_ + knots_.size() - 1, size_.back());
+    if (x <= knots_.front()) return f(first_, sigma_.front());
+    if (x >= knots_.back()) return f(first_ + knots_.size() - 1, sigma_.back());
     const std::size_t k = below(x);
     const double t = (x - knots_[k]) * per_width_[k];
-    f(first_ + k, (1 - t) * size_[k]);
-    f(first_ + k + 1, t * size_[k + 1]);
+    f(first_ + k, (1 - t) * sigma_[k]);
+    f(first_ + k + 1, t * sigma_[k + 1]);
   }
 
  private:
-  /// The knot at or below x, which lies between the outermost.
+  /// The knot at or below x, which lies between the outermost knots.
   std::size_t below(double x) const {
     const double steps = (x - knots_.front()) * per_width_.front();
     std::size_t k = steps >= 1 ? std::min(static_cast<std::size_t>(steps), knots_.size() - 2) : 0;
@@ -83,45 +74,47 @@ class Hats {
     return k;
   }
 
-  std::vector<double> knots_, per_width_, size_;
+  std::vector<double> knots_, per_width_, sigma_;
   std::size_t first_ = 0;
 };
 
-/// What the base parameters move in a row: the OCV; shares of R0, R1, C1; the current's zero; shares of the capacity
-/// and of the gain. Each unknown acts through one of these alone, but for the start.
+/// What the base parameters change in a row: the OCV; fractions of R0, R1, C1; the current sensor's zero; fractions of
+/// the capacity and of the gain. Each unknown but the initial soc acts through exactly one of these levers.
 struct Lever {
   enum : std::size_t { ocv, r0, r1, c1, zero, capacity, gain, count };
 };
 
 class Calibration {
  public:
-  struct AsItIs {
+  struct Unchanged {
     template <class S>
     const S& operator()(std::size_t, const S& x) const {
       return x;
     }
   };
 
+  /// records: one at least, none empty.
   Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records);
 
+  /// Number of unknowns: the OCV's first, those of single recordings last.
   std::size_t size() const { return size_; }
 
-  /// Applies the unknowns to the tables at a soc. U: double or as S. pulled(lever, x): x, where a lever may be seized.
-  template <class S, class U, class Pulled = AsItIs>
+  /// Applies the unknowns to the tables at a soc. U: double or S. pulled(lever, x): x, or x with a derivative added.
+  template <class S, class U, class Pulled = Unchanged>
   void adjust(model::TablePoint<S>& at, const S& soc, const std::vector<U>& u, const Pulled& pulled = {}) const {
     at.ocv_v += pulled(Lever::ocv, ocv_.at(soc, u));
     for (const Corner& c : corners_) {
       const double apart = (number(soc) - c.soc) / c.width;
       if (apart <= -1 || apart >= 1) continue;
       const S t = (soc - S(c.soc)) * (1 / c.width);
-      at.ocv_v += u[c.unknown] * (c.deviation_v * (apart < 0 ? S(1) + t : S(1) - t));
+      at.ocv_v += u[c.unknown] * (c.sigma_v * (apart < 0 ? S(1) + t : S(1) - t));
     }
     at.r0_ohm *= factor(pulled(Lever::r0, r0_.at(soc, u)));
     at.r1_ohm *= factor(pulled(Lever::r1, r1_.at(soc, u)));
     at.c1_f *= factor(pulled(Lever::c1, c1_.at(soc, u)));
   }
-  /// f(lever, unknown, how far an unknown of 1 moves it), of all that act on a row. The OCV's come first among the
-  /// unknowns: they move no state.
+  /// f(lever, unknown, change of the lever per unit of the unknown), for all that act on a row. The OCV's come first
+  /// among the unknowns because they change no state.
   template <class F>
   void each_lever(std::size_t record, double time_s, double soc, F&& f) const {
     const auto through = [&](std::size_t lever) {
@@ -130,19 +123,19 @@ class Calibration {
     ocv_.each(soc, through(Lever::ocv));
     for (const Corner& c : corners_) {
       const double apart = std::abs(soc - c.soc) / c.width;
-      if (apart < 1) f(Lever::ocv, c.unknown, c.deviation_v * (1 - apart));
+      if (apart < 1) f(Lever::ocv, c.unknown, c.sigma_v * (1 - apart));
     }
     r0_.each(soc, through(Lever::r0));
     r1_.each(soc, through(Lever::r1));
     c1_.each(soc, through(Lever::c1));
     offset_[record].each(time_s, through(Lever::zero));
-    f(Lever::capacity, capacity_, capacity_size);
-    f(Lever::gain, gain_, gain_size);
+    f(Lever::capacity, capacity_, thresholds.calibration.capacity_sigma);
+    f(Lever::gain, gain_, thresholds.calibration.gain_sigma);
   }
   std::size_t ocv_unknowns() const { return ocv_.size() + corners_.size(); }
   std::size_t initial_soc_unknown(std::size_t record) const { return initial_soc_[record]; }
 
-  /// Error of the current's zero.
+  /// Error of the current sensor's zero [A].
   template <class S>
   S offset_a(std::size_t record, double time_s, const std::vector<S>& u) const {
     return offset_[record].at(time_s, u);
@@ -154,38 +147,51 @@ class Calibration {
   double initial_soc_size(std::size_t record) const { return initial_soc_sigma_[record]; }
   template <class S>
   S capacity_loss(const std::vector<S>& u) const {
-    return u[capacity_] * capacity_size;
+    return u[capacity_] * thresholds.calibration.capacity_sigma;
   }
   template <class S>
   S gain_error(const std::vector<S>& u) const {
-    return u[gain_] * gain_size;
+    return u[gain_] * thresholds.calibration.gain_sigma;
   }
-  /// The cell with its tables and capacity as the unknowns have them: what belongs to one recording alone (its start,
-  /// its wander of the zero, the gain of its sensor) is left out. Edges and nodes are added at the knots as far as a
-  /// cell file holds them.
+  /// The cell with its tables and capacity moved by the unknowns. What belongs to a single recording (its start, the
+  /// wander of the zero) or to the sensor (its gain) is left out. Edges and nodes are added at the knots as far as a
+  /// cell file has room for them.
   model::CellParameters<> applied(const model::CellParameters<>& cell, const std::vector<double>& u) const;
-  /// How many unknowns come before those of single recordings.
+  /// Number of unknowns that all recordings share; those of single recordings follow.
   std::size_t shared() const { return initial_soc_.front(); }
 
-  /// Deviation of the error of the current's zero; its memory is current_offset_correlation_s of the cell file.
+  /// Standard deviation of the error of the current sensor's zero [A]; its correlation time is
+  /// current_offset_correlation_s of the cell file.
   double offset_a() const { return offset_a_; }
 
  private:
   struct Corner {
-    double soc, width, deviation_v;
+    double soc, width, sigma_v;
     std::size_t unknown;
   };
-  static constexpr double capacity_size = 0.005, gain_size = 0.002;
+  struct SocRange {
+    double low, high;
+  };
 
-  /// 1 + x, and as much less as more: no unknown makes a resistance negative.
+  /// 1 + x, and its reciprocal for negative x: no unknown makes a resistance negative.
   template <class S>
   static S factor(const S& x) {
     return number(x) > 0 ? S(S(1) + x) : S(S(1) / (S(1) - x));
   }
+  static SocRange counted_range(const model::CellParameters<>& cell, std::span<const PreparedRecording> records);
+  template <class Sigma>
+  HatFunctions hat_functions(std::vector<double> knots, Sigma sigma);
+  void add_ocv(const model::CellParameters<>& cell, SocRange range);
+  void add_resistances(const model::CellParameters<>& cell, SocRange range);
+  void add_record(const model::CellParameters<>& cell, const PreparedRecording& r);
+  model::OcvTable<double> moved_ocv(const model::OcvTable<double>& ocv, const std::vector<double>& u) const;
+  model::RcTable<double> moved_rc(const model::RcTable<double>& rc, const std::vector<double>& u) const;
+  /// Change of the OCV, factors of R0, R1, C1.
+  model::TablePoint<double> change_at(double soc, const std::vector<double>& u) const;
 
-  Hats ocv_, r0_, r1_, c1_;
+  HatFunctions ocv_, r0_, r1_, c1_;
   std::vector<Corner> corners_;
-  std::vector<Hats> offset_;
+  std::vector<HatFunctions> offset_;  ///< by record
   std::vector<std::size_t> initial_soc_;
   std::vector<double> initial_soc_sigma_;
   std::size_t capacity_ = 0, gain_ = 0, size_ = 0;

@@ -1,5 +1,5 @@
-// Maximum a posteriori of a hypothesis: damped Gauss-Newton over the mechanisms' parameters, the base parameters
-// eliminated at every step (variable projection), bounds kept by an active set.
+// Maximum a posteriori of a hypothesis: damped Gauss-Newton over the mechanisms' parameters theta, the base parameters
+// u eliminated at every step (variable projection), bounds kept by an active set. Equations: docs/diagnosis_method.md.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -7,127 +7,63 @@
 
 #include <Eigen/Cholesky>
 
-#include "diagnosis/hypothesis.hpp"
+#include "diagnosis/fit_parameters.hpp"
+#include "diagnosis/likelihood_model.hpp"
 
 namespace bms::diagnosis {
 
-struct LikelihoodModel::Linear {
-  Columns columns;                     ///< white
-  Eigen::LLT<Eigen::MatrixXd> normal;  ///< columns' columns + 1
+/// J_u and the factors of J_u' J_u + I.
+struct LikelihoodModel::Linearisation {
+  Columns columns;  ///< J_u, white
+  Eigen::LLT<Eigen::MatrixXd> normal;
 };
 
 namespace {
 
-using model::catalogue;
+constexpr const Numerics::Fit& fit_numerics = numerics.fit;
 
-constexpr double rarity = 0.5;         // of a strength: what is beyond the common, over this share of it, in deviations
-constexpr double log_prior_width = 1;  // of a shape: a factor of e between its usual and an unusual value
-
-/// How far a parameter is from what is known of most cells, in deviations, and what a deviation is; 0: nothing is
-/// known.
-struct Known {
-  double away = 0, deviation = 0;
+/// Room that each step has.
+struct StepBounds {
+  Eigen::VectorXd low, high;
 };
 
-/// The sought parameters of a hypothesis as a fit moves them: shapes by their logarithm, all others linearly.
-class Unknowns {
- public:
-  Unknowns(const model::CellParameters<>& cell, const Hypothesis& start)
-      : capacity_ah_(cell.capacity_ah), sought_(start.sought()) {
-    // what is neither faster nor slower than R1 C1 is R1 C1
-    const double rc_s = model::cell_detail::rc_value(cell.rc, cell.rc.r1_ohm, 0.5) *
-                        model::cell_detail::rc_value(cell.rc, cell.rc.c1_f, 0.5);
-    for (const ParameterRef& s : sought_) {
-      const model::MechanismInfo& info = catalogue[start.settings[s.setting].index];
-      const model::Parameter& p = info.parameter[s.parameter];
-      const bool time = p.name == "time_constant_s";
-      const double low = p.lower(capacity_ah_), high = p.upper(capacity_ah_);
-      of_.push_back({&p, time && info.id == "slow_polarisation" ? std::clamp(2 * rc_s, low, 600.0) : low,
-                     time && info.id == "fast_polarisation" ? std::clamp(rc_s / 3, 1.0, high) : high});
-    }
-  }
-
-  Eigen::Index size() const { return static_cast<Eigen::Index>(of_.size()); }
-  const std::vector<ParameterRef>& sought() const { return sought_; }
-  double& of(Hypothesis& h, Eigen::Index j) const {
-    const ParameterRef& s = sought_[static_cast<std::size_t>(j)];
-    return h.settings[s.setting].value[s.parameter];
-  }
-
-  bool is_shape(Eigen::Index j) const { return at(j).parameter->role == model::Role::shape; }
-  double held(Eigen::Index j, double v) const { return std::clamp(v, at(j).low, at(j).high); }
-  /// d v / d step.
-  double natural(Eigen::Index j, double v) const { return is_shape(j) ? v : (at(j).high - at(j).low) / 100; }
-  double moved(Eigen::Index j, double v, double step) const {
-    return held(j, is_shape(j) ? v * std::exp(step) : v + natural(j, v) * step);
-  }
-  /// Steps to the bounds; a shape goes no farther than 1.5 at once.
-  std::pair<double, double> room(Eigen::Index j, double v) const {
-    const auto [low, high] = std::pair(at(j).low, at(j).high);
-    if (is_shape(j)) return {std::max(std::log(low / v), -1.5), std::min(std::log(high / v), 1.5)};
-    return {(low - v) / natural(j, v), (high - v) / natural(j, v)};
-  }
-  bool at_bound(Eigen::Index j, double v) const {
-    const double reach = 1e-9 * (at(j).high - at(j).low);
-    return v <= at(j).low + reach || v >= at(j).high - reach;
-  }
-
-  /// Of a shape by its logarithm.
-  Known known(Eigen::Index j, double v) const {
-    const model::Parameter& p = *at(j).parameter;
-    if (is_shape(j)) return {std::log(v / p.default_value(capacity_ah_)) / log_prior_width, log_prior_width};
-    if (p.spread > 0) return {(v - p.typical) / p.spread, p.spread};
-    const double common = p.common(capacity_ah_);
-    if (common <= 0 || std::abs(v) <= common) return {};
-    return {(v - std::copysign(common, v)) / (rarity * common), rarity * common};
-  }
-  double prior(Hypothesis& h) const {
-    double sum = 0;
-    for (Eigen::Index j = 0; j < size(); ++j) sum += std::pow(known(j, of(h, j)).away, 2);
-    return sum;
-  }
-
- private:
-  struct One {
-    const model::Parameter* parameter;
-    double low, high;
-  };
-  const One& at(Eigen::Index j) const { return of_[static_cast<std::size_t>(j)]; }
-
-  double capacity_ah_;
-  std::vector<ParameterRef> sought_;
-  std::vector<One> of_;
-};
-
-/// Step of damped normal equations. Those unknowns that would leave their room go to its end and no farther, and the
-/// others' steps are those beside that; one round after the other.
-Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorXd& rhs, double damping,
-                             const Eigen::VectorXd& to_low, const Eigen::VectorXd& to_high) {
+/// Solves the damped normal equations with some steps fixed.
+Eigen::VectorXd solve_with_fixed(const Eigen::MatrixXd& normal, const Eigen::VectorXd& rhs, double damping,
+                                 const std::vector<char>& fixed, const Eigen::VectorXd& at) {
   const Eigen::Index m = rhs.size();
-  std::vector<char> held(static_cast<std::size_t>(m), 0);
-  const auto is_held = [&](Eigen::Index j) { return held[static_cast<std::size_t>(j)] != 0; };
-  Eigen::VectorXd step = Eigen::VectorXd::Zero(m), reach(m);
+  const auto is_fixed = [&](Eigen::Index j) { return fixed[static_cast<std::size_t>(j)] != 0; };
+  Eigen::MatrixXd s = normal;
+  Eigen::VectorXd b = rhs;
+  for (Eigen::Index j = 0; j < m; ++j)
+    s(j, j) += damping * normal(j, j) + fit_numerics.ridge + fit_numerics.ridge_share * normal.diagonal().maxCoeff();
+  for (Eigen::Index j = 0; j < m; ++j) {
+    if (is_fixed(j)) b -= normal.col(j) * at[j];
+  }
+  for (Eigen::Index j = 0; j < m; ++j) {
+    if (!is_fixed(j)) continue;
+    s.row(j).setZero();
+    s.col(j).setZero();
+    s(j, j) = 1;
+    b[j] = at[j];
+  }
+  return s.ldlt().solve(b);
+}
+
+/// Step of the damped normal equations within bounds. Parameters that would leave their room go to its end and stay
+/// there while the others' steps are solved again, until all are inside (active set).
+Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorXd& rhs, double damping,
+                             const StepBounds& room) {
+  const Eigen::Index m = rhs.size();
+  std::vector<char> fixed(static_cast<std::size_t>(m), 0);
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(m), at(m);
   for (Eigen::Index round = 0; round <= m; ++round) {
-    Eigen::MatrixXd s = normal;
-    Eigen::VectorXd b = rhs;
-    for (Eigen::Index j = 0; j < m; ++j)
-      s(j, j) += damping * normal(j, j) + 1e-9 + 1e-12 * normal.diagonal().maxCoeff();
-    for (Eigen::Index j = 0; j < m; ++j) {
-      if (is_held(j)) b -= normal.col(j) * reach[j];
-    }
-    for (Eigen::Index j = 0; j < m; ++j) {
-      if (!is_held(j)) continue;
-      s.row(j).setZero();
-      s.col(j).setZero();
-      s(j, j) = 1;
-      b[j] = reach[j];
-    }
-    step = s.ldlt().solve(b);
+    step = solve_with_fixed(normal, rhs, damping, fixed, at);
     bool more = false;
     for (Eigen::Index j = 0; j < m; ++j) {
-      if (is_held(j) || (step[j] >= to_low[j] && step[j] <= to_high[j])) continue;
-      held[static_cast<std::size_t>(j)] = 1;
-      reach[j] = std::clamp(step[j], to_low[j], to_high[j]);
+      char& is_fixed = fixed[static_cast<std::size_t>(j)];
+      if (is_fixed != 0 || (step[j] >= room.low[j] && step[j] <= room.high[j])) continue;
+      is_fixed = 1;
+      at[j] = std::clamp(step[j], room.low[j], room.high[j]);
       more = true;
     }
     if (!more) break;
@@ -137,9 +73,188 @@ Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorX
 
 }  // namespace
 
-std::shared_ptr<const LikelihoodModel::Linear> LikelihoodModel::linear(const Hypothesis& h,
-                                                                       const Eigen::VectorXd& u) const {
-  auto made = std::make_shared<Linear>();
+/// One fit in progress.
+class GaussNewton {
+ public:
+  using Linearisation = LikelihoodModel::Linearisation;
+
+  GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& start, const Eigen::VectorXd& calibration);
+  HypothesisFit run(int iterations, double hopeless);
+
+ private:
+  /// The normal equations at the current point.
+  struct NormalEquations {
+    Eigen::VectorXd u_gradient, u_alone;  ///< of the base parameters, and their step if theta stays
+    Eigen::VectorXd rhs;                  ///< of theta, u eliminated
+    Eigen::MatrixXd solved;               ///< (J_u' J_u + I)^-1 J_u' J_theta: how u follows theta
+    double within_reach = 0;              ///< gain of the full step if all were linear and unbounded
+  };
+  struct Attempt {
+    bool better = false, astray = false;
+  };
+
+  double cost_of(Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& residual) const {
+    return residual.squaredNorm() + u.squaredNorm() + parameters_.prior(h);
+  }
+  NormalEquations normal_equations();
+  Attempt attempt_step(const NormalEquations& equations);
+  bool linearise_again(const Attempt& attempt, int iteration, int& iterations);
+  void finish();
+
+  const LikelihoodModel& likelihood_;
+  FitParameters parameters_;
+  Eigen::Index m_;  ///< number of parameters
+  HypothesisFit fit_;
+  double cost_at_start_ = 0;
+  std::shared_ptr<const Linearisation> around_;
+  Eigen::MatrixXd schur_;    ///< of theta, u eliminated
+  Eigen::VectorXd natural_;  ///< d parameter / d step
+  double damping_ = fit_numerics.damping;
+  int quiet_ = 0, renewals_ = 0;
+};
+
+GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& start, const Eigen::VectorXd& calibration)
+    : likelihood_(likelihood),
+      parameters_(likelihood.cell_, start),
+      m_(parameters_.size()),
+      fit_{start, calibration, {}, 0, likelihood.noise_, {}, std::vector<char>(static_cast<std::size_t>(m_), 0), false},
+      natural_(Eigen::VectorXd::Ones(m_)) {
+  for (Eigen::Index j = 0; j < m_; ++j) {
+    double& value = parameters_.of(fit_.hypothesis, j);
+    value = parameters_.clamped(j, value);
+  }
+  fit_.residual = likelihood.residual(fit_.hypothesis, fit_.calibration);
+  fit_.cost = cost_of(fit_.hypothesis, fit_.calibration, fit_.residual);
+  cost_at_start_ = fit_.cost;
+  if (!likelihood.nearby_) likelihood.linearise(likelihood.base(), likelihood.unchanged());
+  around_ = likelihood.nearby_;
+}
+
+GaussNewton::NormalEquations GaussNewton::normal_equations() {
+  Columns j_theta = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
+  for (Eigen::Index j = 0; j < m_; ++j) {
+    natural_[j] = parameters_.natural(j, parameters_.of(fit_.hypothesis, j));
+    j_theta.col(j) *= natural_[j];
+  }
+  const Columns& j_u = around_->columns;
+  NormalEquations e;
+  e.u_gradient = j_u.transpose() * fit_.residual - fit_.calibration;
+  e.u_alone = around_->normal.solve(e.u_gradient);
+  e.within_reach = e.u_gradient.dot(e.u_alone);
+  if (m_ == 0) return e;
+  Eigen::VectorXd gradient = j_theta.transpose() * fit_.residual;
+  Eigen::MatrixXd normal = j_theta.transpose() * j_theta;
+  for (Eigen::Index j = 0; j < m_; ++j) {
+    const PriorDistance prior = parameters_.prior_distance(j, parameters_.of(fit_.hypothesis, j));
+    if (prior.sigma == 0) continue;
+    const double per = parameters_.is_shape(j) ? 1 / prior.sigma : natural_[j] / prior.sigma;
+    gradient[j] -= prior.away * per;
+    normal(j, j) += per * per;
+  }
+  const Eigen::MatrixXd cross = j_u.transpose() * j_theta;
+  e.solved = around_->normal.solve(cross);
+  schur_ = normal - cross.transpose() * e.solved;
+  e.rhs = gradient - cross.transpose() * e.u_alone;
+  Eigen::MatrixXd regular = schur_;
+  for (Eigen::Index j = 0; j < m_; ++j) regular(j, j) += fit_numerics.ridge_reach * schur_(j, j) + fit_numerics.ridge;
+  e.within_reach += e.rhs.dot(regular.ldlt().solve(e.rhs));
+  return e;
+}
+
+/// Tries steps with growing damping until one lowers the cost.
+GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
+  StepBounds room{Eigen::VectorXd(m_), Eigen::VectorXd(m_)};
+  for (Eigen::Index j = 0; j < m_; ++j)
+    std::tie(room.low[j], room.high[j]) = parameters_.room(j, parameters_.of(fit_.hypothesis, j));
+  Attempt result;
+  for (int attempt = 0; attempt < fit_numerics.attempts && !result.better; ++attempt) {
+    const Eigen::VectorXd step = m_ > 0 ? bounded_step(schur_, e.rhs, damping_, room) : Eigen::VectorXd();
+    Hypothesis trial = fit_.hypothesis;
+    for (Eigen::Index j = 0; j < m_; ++j)
+      parameters_.of(trial, j) = parameters_.moved(j, parameters_.of(fit_.hypothesis, j), step[j]);
+    // where the base parameters' derivatives are stale, they go a shorter way as well
+    const double way = 1 / (1 + fit_numerics.calibration_way * damping_);
+    Eigen::VectorXd toward = e.u_alone;
+    if (m_ > 0) toward -= e.solved * step;
+    const Eigen::VectorXd u = fit_.calibration + way * toward;
+    const Eigen::VectorXd residual = likelihood_.residual(trial, u);
+    const double cost = cost_of(trial, u, residual);
+    double promised = e.u_gradient.dot(e.u_alone);
+    if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
+    if (fit_.cost - cost < fit_numerics.kept_promise * promised &&
+        promised > fit_numerics.promise + fit_numerics.promise_share * fit_.cost)
+      result.astray = true;
+    if (!(cost < fit_.cost)) {  // also where there is no number
+      damping_ *= fit_numerics.damping_more;
+      continue;
+    }
+    result.better = true;
+    quiet_ = fit_.cost - cost < fit_numerics.quiet + fit_numerics.quiet_share * fit_.cost ? quiet_ + 1 : 0;
+    fit_.hypothesis = trial;
+    fit_.calibration = u;
+    fit_.residual = residual;
+    fit_.cost = cost;
+    damping_ = std::max(damping_ / fit_numerics.damping_less, fit_numerics.damping_least);
+  }
+  return result;
+}
+
+/// Linearises in the base parameters at the current point if the fit is far from the last linearisation or a step has
+/// not gained what it promised. Returns false if that is not worth it: the fit has converged.
+bool GaussNewton::linearise_again(const Attempt& attempt, int iteration, int& iterations) {
+  const int most = attempt.astray ? fit_numerics.renewals_astray : fit_numerics.renewals;
+  const bool pays = attempt.astray || !attempt.better || cost_at_start_ - fit_.cost > fit_numerics.far_gain;
+  if (renewals_ >= most || !pays) return false;
+  ++renewals_;
+  quiet_ = 0;
+  damping_ =
+      attempt.astray ? std::max(fit_numerics.damping, damping_ / fit_numerics.damping_restart) : fit_numerics.damping;
+  around_ = likelihood_.linearised(fit_.hypothesis, fit_.calibration);
+  iterations = std::max(iterations, iteration + fit_numerics.iterations_after_renewal);
+  return true;
+}
+
+HypothesisFit GaussNewton::run(int iterations, double hopeless) {
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const NormalEquations equations = normal_equations();
+    if (equations.within_reach < fit_numerics.within_reach) {
+      fit_.converged = true;
+      break;
+    }
+    if (iteration >= fit_numerics.iterations_before_hopeless &&
+        fit_.cost - fit_numerics.hopeless_times * equations.within_reach > hopeless)
+      break;
+    const Attempt attempt = attempt_step(equations);
+    const bool renewable = attempt.astray && renewals_ < fit_numerics.renewals_astray;
+    if (attempt.better && quiet_ == 0 && !renewable) continue;
+    if (linearise_again(attempt, iteration, iterations)) continue;
+    fit_.converged = true;
+    break;
+  }
+  finish();
+  return fit_;
+}
+
+/// Bounds reached, covariance and standard deviations.
+void GaussNewton::finish() {
+  for (Eigen::Index j = 0; j < m_; ++j)
+    fit_.at_bound[static_cast<std::size_t>(j)] = parameters_.at_bound(j, parameters_.of(fit_.hypothesis, j)) ? 1 : 0;
+  fit_.covariance = Eigen::MatrixXd::Zero(m_, m_);
+  if (m_ == 0) return;
+  Eigen::MatrixXd s = schur_;
+  const double ridge = fit_numerics.ridge_covariance * schur_.diagonal().maxCoeff() + fit_numerics.ridge_covariance;
+  for (Eigen::Index j = 0; j < m_; ++j) s(j, j) += ridge;
+  const Eigen::MatrixXd inverse = s.ldlt().solve(Eigen::MatrixXd::Identity(m_, m_));
+  fit_.covariance = natural_.asDiagonal() * inverse * natural_.asDiagonal();
+  for (Eigen::Index j = 0; j < m_; ++j) {
+    const ParameterRef& p = parameters_.sought()[static_cast<std::size_t>(j)];
+    fit_.hypothesis.settings[p.setting].deviation[p.parameter] = std::sqrt(std::max(fit_.covariance(j, j), 0.0));
+  }
+}
+
+std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::linearised(const Hypothesis& h,
+                                                                                  const Eigen::VectorXd& u) const {
+  auto made = std::make_shared<Linearisation>();
   made->columns = calibration_derivatives(h, u);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(made->columns.cols(), made->columns.cols());
   normal.selfadjointView<Eigen::Lower>().rankUpdate(made->columns.transpose());
@@ -147,7 +262,7 @@ std::shared_ptr<const LikelihoodModel::Linear> LikelihoodModel::linear(const Hyp
   return made;
 }
 
-void LikelihoodModel::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linear(h, u); }
+void LikelihoodModel::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linearised(h, u); }
 
 HypothesisFit LikelihoodModel::fit(const Hypothesis& start, int iterations) const {
   return fit(start, unchanged(), iterations);
@@ -155,124 +270,7 @@ HypothesisFit LikelihoodModel::fit(const Hypothesis& start, int iterations) cons
 
 HypothesisFit LikelihoodModel::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations,
                                    double hopeless) const {
-  const Unknowns unknowns(cell_, start);
-  const Eigen::Index m = unknowns.size();
-  HypothesisFit fit{start, calibration, {}, 0, noise_, {}, std::vector<char>(static_cast<std::size_t>(m), 0), false};
-  for (Eigen::Index j = 0; j < m; ++j)
-    unknowns.of(fit.hypothesis, j) = unknowns.held(j, unknowns.of(fit.hypothesis, j));
-  const auto cost_of = [&](Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& r) {
-    return r.squaredNorm() + u.squaredNorm() + unknowns.prior(h);
-  };
-  fit.residual = residual(fit.hypothesis, fit.calibration);
-  fit.cost = cost_of(fit.hypothesis, fit.calibration, fit.residual);
-  const double cost_at_start = fit.cost;
-
-  if (!nearby_) linearise(base(), unchanged());
-  std::shared_ptr<const Linear> around = nearby_;
-  int renewals = 0;
-  constexpr int most_renewals = 6;
-  double damping = 1e-3;
-  Eigen::MatrixXd schur;
-  Eigen::VectorXd natural = Eigen::VectorXd::Ones(m);  // d parameter / d internal
-  int quiet = 0;
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    Columns j_theta = derivatives(fit.hypothesis, fit.calibration, unknowns.sought());  // of nothing sought: no columns
-    for (Eigen::Index j = 0; j < m; ++j) {
-      natural[j] = unknowns.natural(j, unknowns.of(fit.hypothesis, j));
-      j_theta.col(j) *= natural[j];
-    }
-    const Columns& j_u = around->columns;
-    const Eigen::VectorXd g_u = j_u.transpose() * fit.residual - fit.calibration;
-    const Eigen::VectorXd u_alone = around->normal.solve(g_u);
-    Eigen::VectorXd g(m), rhs(m);
-    Eigen::MatrixXd a(m, m), cross, solved;
-    if (m > 0) {
-      g = j_theta.transpose() * fit.residual;
-      a = j_theta.transpose() * j_theta;
-    }
-    for (Eigen::Index j = 0; j < m; ++j) {
-      const Known k = unknowns.known(j, unknowns.of(fit.hypothesis, j));
-      if (k.deviation == 0) continue;
-      const double per = unknowns.is_shape(j) ? 1 / k.deviation : natural[j] / k.deviation;
-      g[j] -= k.away * per;
-      a(j, j) += per * per;
-    }
-    // what a step could gain at most, were all linear and no bound in the way
-    double within_reach = g_u.dot(u_alone);
-    if (m > 0) {
-      cross = j_u.transpose() * j_theta;
-      solved = around->normal.solve(cross);
-      schur = a - cross.transpose() * solved;
-      rhs = g - cross.transpose() * u_alone;
-      Eigen::MatrixXd regular = schur;
-      for (Eigen::Index j = 0; j < m; ++j) regular(j, j) += 1e-6 * schur(j, j) + 1e-9;
-      within_reach += rhs.dot(regular.ldlt().solve(rhs));
-    }
-    if (within_reach < 0.2) {
-      fit.converged = true;
-      break;
-    }
-    if (iteration >= 3 && fit.cost - 2 * within_reach > hopeless) break;
-
-    Eigen::VectorXd to_low(m), to_high(m);
-    for (Eigen::Index j = 0; j < m; ++j)
-      std::tie(to_low[j], to_high[j]) = unknowns.room(j, unknowns.of(fit.hypothesis, j));
-    bool better = false, astray = false;
-    for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-      const Eigen::VectorXd step = m > 0 ? bounded_step(schur, rhs, damping, to_low, to_high) : Eigen::VectorXd();
-      Hypothesis trial = fit.hypothesis;
-      for (Eigen::Index j = 0; j < m; ++j)
-        unknowns.of(trial, j) = unknowns.moved(j, unknowns.of(fit.hypothesis, j), step[j]);
-      // where the base parameters' derivatives are stale, a shorter way is taken with theirs too
-      const double way = 1 / (1 + 0.02 * damping);
-      Eigen::VectorXd toward = u_alone;
-      if (m > 0) toward -= solved * step;
-      const Eigen::VectorXd u = fit.calibration + way * toward;
-      const Eigen::VectorXd r = residual(trial, u);
-      const double cost = cost_of(trial, u, r);
-      double promised = g_u.dot(u_alone);
-      if (m > 0) promised += 2 * rhs.dot(step) - step.dot(schur * step);
-      if (fit.cost - cost < 0.3 * promised && promised > 2 + 1e-3 * fit.cost) astray = true;
-      if (cost < fit.cost) {
-        better = true;
-        quiet = fit.cost - cost < 0.05 + 1e-5 * fit.cost ? quiet + 1 : 0;
-        fit.hypothesis = trial;
-        fit.calibration = u;
-        fit.residual = r;
-        fit.cost = cost;
-        damping = std::max(damping / 5, 1e-9);
-      } else {
-        damping *= 8;
-      }
-    }
-    if (better && quiet == 0 && !(astray && renewals < most_renewals)) continue;
-    // far from where the base parameters were linearised, or not what was promised: once more from here
-    if (renewals < (astray ? most_renewals : 2) && (astray || !better || cost_at_start - fit.cost > 50)) {
-      ++renewals;
-      quiet = 0;
-      damping = astray ? std::max(1e-3, damping / 64) : 1e-3;
-      around = linear(fit.hypothesis, fit.calibration);
-      iterations = std::max(iterations, iteration + 5);
-      continue;
-    }
-    fit.converged = true;
-    break;
-  }
-
-  for (Eigen::Index j = 0; j < m; ++j)
-    fit.at_bound[static_cast<std::size_t>(j)] = unknowns.at_bound(j, unknowns.of(fit.hypothesis, j)) ? 1 : 0;
-  fit.covariance = Eigen::MatrixXd::Zero(m, m);
-  if (m > 0) {
-    Eigen::MatrixXd s = schur;
-    for (Eigen::Index j = 0; j < m; ++j) s(j, j) += 1e-12 * schur.diagonal().maxCoeff() + 1e-12;
-    const Eigen::MatrixXd inverse = s.ldlt().solve(Eigen::MatrixXd::Identity(m, m));
-    fit.covariance = natural.asDiagonal() * inverse * natural.asDiagonal();
-    for (Eigen::Index j = 0; j < m; ++j) {
-      const ParameterRef& s_j = unknowns.sought()[static_cast<std::size_t>(j)];
-      fit.hypothesis.settings[s_j.setting].deviation[s_j.parameter] = std::sqrt(std::max(fit.covariance(j, j), 0.0));
-    }
-  }
-  return fit;
+  return GaussNewton(*this, start, calibration).run(iterations, hopeless);
 }
 
 }  // namespace bms::diagnosis

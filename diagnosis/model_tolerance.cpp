@@ -1,14 +1,13 @@
 #include "diagnosis/model_tolerance.hpp"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
-#include "diagnosis/decision.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/recording_check.hpp"
 #include "diagnosis/residual_test.hpp"
 #include "diagnosis/screen.hpp"
+#include "diagnosis/thresholds.hpp"
 
 namespace bms::diagnosis {
 
@@ -26,14 +25,14 @@ double tolerance_factor(const model::CellParameters<>& cell, const std::vector<m
   const auto enough = [&](double factor) {
     model::CellParameters<> wide = cell;
     wide.tolerance = with_wider_tolerance(wide.tolerance, factor);
-    LikelihoodModel evidence = likelihood_model_of(wide, mechanisms, records);
-    const HypothesisFit fit = evidence.fit(evidence.base());
-    const Remainder left = test_residual(evidence, fit);
-    if (left.gain > decision::much_left || left.far_out > decision::far_out) return false;
-    const Screen screen(evidence, fit, all);
-    return screen.candidates().empty() || screen.candidates().front().gain < decision::detected;
+    const LikelihoodModel likelihood = likelihood_model_of(wide, mechanisms, records);
+    const HypothesisFit fit = likelihood.fit(likelihood.base());
+    const ResidualTest left = test_residual(likelihood, fit);
+    if (left.gain > thresholds.adequacy.unexplained || left.far_out > thresholds.adequacy.far_out) return false;
+    const Screen screen(likelihood, fit, all);
+    return screen.candidates().empty() || screen.candidates().front().gain < thresholds.decision.detected;
   };
-  constexpr std::array factors = {1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0};
+  constexpr const auto& factors = thresholds.model_tolerance.factors;
   const auto* least = std::partition_point(factors.begin(), factors.end() - 1, [&](double f) { return !enough(f); });
   return *least;
 }

@@ -1,4 +1,4 @@
-// What an extended cell file is good to.
+// The accuracy of an extended cell file.
 #pragma once
 
 #include <vector>
@@ -9,12 +9,12 @@
 
 namespace bms::diagnosis {
 
-/// Of the OCV and of the drift.
+/// With the tolerances of the OCV and of the drift multiplied.
 model::Tolerance with_wider_tolerance(model::Tolerance tolerance, double factor);
 
-/// The smallest factor, 1 to 8, by which its tolerances of the OCV and of the drift must be widened so that these
-/// recordings, which it was made from, show neither a mechanism more nor an unknown part. A model is not better than
-/// what it leaves of its own recordings.
+/// The smallest factor (Thresholds::ModelTolerance, 1 to 8) by which the tolerances of the OCV and of the drift must be
+/// widened so that the recordings from which the file was made show neither another mechanism nor an unknown part. A
+/// model is not more accurate than the residual on its own recordings.
 double tolerance_factor(const model::CellParameters<>& cell, const std::vector<model::MechanismSetting>& mechanisms,
                         std::vector<PreparedRecording> records);
 

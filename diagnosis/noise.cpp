@@ -3,12 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/numerics.hpp"
+#include "diagnosis/thresholds.hpp"
+#include "measurement/statistics.hpp"
+
 namespace bms::diagnosis {
 
 double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
-  const auto of = [](double ratio) { return ratio > 1 ? std::pow(std::log(ratio) / 0.15, 2) : 0; };
-  return of(n.white_v / nominal.white_v) + of(n.fast_v / nominal.fast_v) + of(n.slow_v / nominal.slow_v) +
-         of(n.edge / nominal.edge);
+  const auto price = [](double ratio) {
+    return ratio > 1 ? std::pow(std::log(ratio) / thresholds.noise.amplitude_log_sigma, 2) : 0;
+  };
+  return price(n.white_v / nominal.white_v) + price(n.fast_v / nominal.fast_v) + price(n.slow_v / nominal.slow_v) +
+         price(n.edge / nominal.edge);
 }
 
 Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows,
@@ -16,17 +22,17 @@ Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const Ro
     : gains_(time_s.size()) {
   double ff = n.fast_v * n.fast_v, ss = n.slow_v * n.slow_v, fs = 0;  // covariance of (fast, slow), stationary at first
   const double fast_v2 = ff, slow_v2 = ss;
-  double last_s = -1, fast_left = 1, slow_left = 1;
+  double last_s = -1, fast_decay = 1, slow_decay = 1;
   for (std::size_t k = 0; k < gains_.size(); ++k) {
     Gain& g = gains_[k];
     const double to_next_s = k + 1 < gains_.size() ? time_s[k + 1] - time_s[k] : 0;
     if (to_next_s != last_s) {  // steps are mostly equal
       last_s = to_next_s;
-      fast_left = std::exp(-to_next_s / n.fast_s);
-      slow_left = std::exp(-to_next_s / n.slow_s);
+      fast_decay = std::exp(-to_next_s / n.fast_s);
+      slow_decay = std::exp(-to_next_s / n.slow_s);
     }
     const double size = slow_v2 > 0 ? std::sqrt(1 + rows.slow_v2[k] / slow_v2) : 1;
-    g = {0, 0, fast_left, slow_left, size, 0};
+    g = {0, 0, fast_decay, slow_decay, size, 0};
     ff += n.edge * n.edge * rows.edge_v2[k];
     if (usable[k] != 0) {
       const double with_fast = ff + size * fs, with_slow = fs + size * ss;
@@ -40,9 +46,9 @@ Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const Ro
       fs -= g.fast * with_slow;
       ss -= g.slow * with_slow;
     }
-    ff = fast_v2 + g.fast_left * g.fast_left * (ff - fast_v2);
-    ss = slow_v2 + g.slow_left * g.slow_left * (ss - slow_v2);
-    fs *= g.fast_left * g.slow_left;
+    ff = fast_v2 + g.fast_decay * g.fast_decay * (ff - fast_v2);
+    ss = slow_v2 + g.slow_decay * g.slow_decay * (ss - slow_v2);
+    fs *= g.fast_decay * g.slow_decay;
   }
 }
 
@@ -51,18 +57,18 @@ void Whitener::whiten(Eigen::Ref<Columns> columns) const {
     whiten(0, {columns.data(), gains_.size()});
     return;
   }
-  Eigen::RowVectorXd fast = Eigen::RowVectorXd::Zero(columns.cols()), slow = fast, news = fast;
+  Eigen::RowVectorXd fast = Eigen::RowVectorXd::Zero(columns.cols()), slow = fast, innovation = fast;
   for (std::size_t k = 0; k < gains_.size(); ++k) {
     const Gain& g = gains_[k];
     auto row = columns.row(static_cast<Eigen::Index>(k));
     if (g.weight > 0) {
-      news = row - fast - g.slow_size * slow;
-      fast = g.fast_left * (fast + g.fast * news);
-      slow = g.slow_left * (slow + g.slow * news);
-      row = g.weight * news;
+      innovation = row - fast - g.slow_size * slow;
+      fast = g.fast_decay * (fast + g.fast * innovation);
+      slow = g.slow_decay * (slow + g.slow * innovation);
+      row = g.weight * innovation;
     } else {
-      fast *= g.fast_left;
-      slow *= g.slow_left;
+      fast *= g.fast_decay;
+      slow *= g.slow_decay;
       row.setZero();
     }
   }
@@ -72,52 +78,53 @@ void Whitener::whiten(std::size_t first, std::span<double> values) const {
   double fast = 0, slow = 0;
   for (std::size_t k = 0; k < values.size(); ++k) {
     const Gain& g = gains_[first + k];
-    const double news = g.weight > 0 ? values[k] - fast - g.slow_size * slow : 0;
-    fast = g.fast_left * (fast + g.fast * news);
-    slow = g.slow_left * (slow + g.slow * news);
-    values[k] = g.weight * news;
+    const double innovation = g.weight > 0 ? values[k] - fast - g.slow_size * slow : 0;
+    fast = g.fast_decay * (fast + g.fast * innovation);
+    slow = g.slow_decay * (slow + g.slow * innovation);
+    values[k] = g.weight * innovation;
   }
 }
 
 double quantisation_step(std::span<const double> values) {
+  constexpr const Thresholds::Quantisation& limits = thresholds.quantisation;
   std::vector<double> steps;
   for (std::size_t k = 1; k < values.size(); ++k) {
     const double step = std::abs(values[k] - values[k - 1]);
-    if (step > 1e-9) steps.push_back(step);
+    if (step > numerics.noise.same_reading) steps.push_back(step);
   }
-  if (steps.size() < 20) return 0;
-  const auto low = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 50);
-  std::nth_element(steps.begin(), low, steps.end());
-  // a converter's readings lie on a grid of its step; those of a reading that sticks until it leaps do not
-  const double step = *low,
+  if (steps.size() < limits.steps) return 0;
+  const double step = measurement::quantile(steps, limits.step_quantile),
                zero = *std::find_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  // a converter's readings lie on a grid of its step; those of a reading that sticks until it leaps do not
   std::size_t moved = 0, on_grid = 0;
   for (std::size_t k = 1; k < values.size(); ++k) {
-    if (!(std::abs(values[k] - values[k - 1]) > 1e-9)) continue;
+    if (!(std::abs(values[k] - values[k - 1]) > numerics.noise.same_reading)) continue;
     const double at = (values[k] - zero) / step;
     ++moved;
-    if (std::abs(at - std::round(at)) < 0.15) ++on_grid;
+    if (std::abs(at - std::round(at)) < limits.grid_tolerance) ++on_grid;
   }
-  return on_grid * 5 > moved * 3 ? step : 0;
+  return on_grid * limits.on_grid_of > moved * limits.on_grid ? step : 0;
 }
 
 double white_noise(std::span<const double> v, std::span<const double> i, double quiet_a, double fallback_v) {
+  constexpr const Statistics& normal = numerics.statistics;
   std::vector<double> bends;
   for (std::size_t k = 2; k < v.size(); ++k) {
     const bool quiet = std::abs(i[k] - i[k - 1]) < quiet_a && std::abs(i[k - 1] - i[k - 2]) < quiet_a;
     const double bend = v[k] - 2 * v[k - 1] + v[k - 2];
     if (quiet && std::isfinite(bend)) bends.push_back(std::abs(bend));
   }
-  if (bends.size() < 100) return fallback_v;
+  if (bends.size() < thresholds.noise.second_differences) return fallback_v;
   const auto at = [&](double share) {
-    const auto nth = bends.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(bends.size() - 1));
-    std::nth_element(bends.begin(), nth, bends.end());
-    return *nth;
+    const auto rank = static_cast<std::size_t>(share * static_cast<double>(bends.size() - 1));
+    return measurement::order_statistic(bends, rank);
   };
-  // of a normal distribution's absolute values 50 % lie below 0.674 and 80 % below 1.282 sigma; second differences have
-  // sqrt(6) sigma
-  const double spread_v = std::max(at(0.5) / 0.6745, at(0.8) / 1.2816) / std::sqrt(6.0);
-  return std::max({spread_v, quantisation_step(v) / std::sqrt(12.0), 5e-5});
+  // two quantiles: with a coarse converter one of them may be 0
+  const double spread_v =
+      std::max(at(0.5) / normal.normal_abs_median, at(normal.quantile_80) / normal.normal_abs_quantile_80) /
+      std::sqrt(normal.second_difference_variance);
+  return std::max({spread_v, quantisation_step(v) / std::sqrt(normal.uniform_variance_denominator),
+                   thresholds.noise.white_at_least_v});
 }
 
 }  // namespace bms::diagnosis

@@ -1,16 +1,16 @@
-// What a healthy cell's residual looks like, on more than one time scale, and the filter that makes it white.
+// What the residual of a healthy cell looks like, on three time scales, and the filter that whitens it.
 //
-//   residual = white + fast + slow        white: new in every sample; fast, slow: Ornstein-Uhlenbeck, each with its own
-//   memory
+//   residual = white + fast + slow      white: independent from sample to sample
+//                                       fast, slow: Ornstein-Uhlenbeck processes with correlation times fast_s, slow_s
 //
-// A step of the current brings a new error with it (a resistance that is good to some per cent): the fast part is
-// widened there. Where the OCV is steep the slow part is: what is known of soc to some tenths of a per cent is not
-// known of the voltage to a millivolt.
+// A step of the current adds an error of its own, because a resistance is known only to a few per cent: the fast part
+// is widened there. Where the OCV is steep the slow part is widened: a soc known to a few tenths of a per cent is a
+// voltage that is not known to a millivolt.
 //
-// The white part alone would take every slow drift for physics; residuals of a drift are white from sample to sample
-// and still wrong for hours. The filter is the Kalman filter of the two slow parts: what it does not foresee, over how
-// well it can know, is white with variance 1. O(n), any sampling. (Astrom, Introduction to Stochastic Control Theory,
-// 1970, ch. 7.)
+// The white part alone would take every slow drift for physics: residuals of a drift look white from sample to sample
+// and are still wrong for hours. The whitener is the Kalman filter of the two correlated parts. Its innovations,
+// divided by their standard deviations, are white with variance 1. O(n), any sampling. (Astrom, Introduction to
+// Stochastic Control Theory, 1970, ch. 7.)
 #pragma once
 
 #include <span>
@@ -18,65 +18,68 @@
 
 #include <Eigen/Core>
 
+#include "diagnosis/thresholds.hpp"
+
 namespace bms::diagnosis {
 
 struct NoiseModel {
   double white_v = 0.001;
-  double fast_v = 0.0015, fast_s = 60;
-  double slow_v = 0.001, slow_s = 3'600;
-  double edge = 1;  ///< times what a step of the current is reckoned to bring
+  double fast_v = 0.0015, fast_s = thresholds.noise.fast_correlation_s;
+  double slow_v = 0.001, slow_s = thresholds.noise.slow_correlation_s;
+  double edge = 1;  ///< factor on the error that a step of the current adds
   bool operator==(const NoiseModel&) const = default;
 };
 
-/// What comes on top of it row by row, variances.
+/// Additional variances by row [V^2].
 struct RowNoise {
-  std::vector<double> white_v2;  ///< added to the white part
-  std::vector<double> edge_v2;   ///< what the fast part gains at a step of the current, before NoiseModel::edge
-  std::vector<double> slow_v2;   ///< added to the slow part, if there is one: where the OCV is steep, a small error of
-                                 ///< soc is a large one of the voltage
+  std::vector<double> white_v2;  ///< added to the white part, before NoiseModel::edge
+  std::vector<double> edge_v2;   ///< added to the fast part at a step of the current, before NoiseModel::edge
+  std::vector<double> slow_v2;   ///< added to the slow part, if there is one, where the OCV is steep
 
   explicit RowNoise(std::size_t rows = 0) : white_v2(rows, 0.0), edge_v2(rows, 0.0), slow_v2(rows, 0.0) {}
 };
 
-/// What it costs a hypothesis, in -2 log likelihood, that its residual is larger than the nominal noise: 0 where it is
-/// not. A factor of 2 costs 21, of 4 85, of 10 240: small against a gross mismatch, large against chance.
+/// -2 log prior of noise that is larger than the nominal one; 0 if no amplitude is. Each amplitude costs
+/// (ln ratio / Thresholds::Noise::amplitude_log_sigma)^2: little compared with a gross mismatch, much compared with
+/// chance.
 double price_of_noise(const NoiseModel& noise, const NoiseModel& nominal);
 
-/// Columns in, white columns out. Rows without a voltage give 0.
+/// One column per signature, one row per sample.
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// Columns in, white columns out. Rows that are not usable give 0.
 class Whitener {
  public:
-  /// As many rows as time_s has.
+  /// rows and usable: as long as time_s.
   Whitener(const NoiseModel& noise, std::span<const double> time_s, const RowNoise& rows, std::span<const char> usable);
 
-  /// In place, rows first .. first + size of columns.
+  /// In place; as many rows as time_s had.
   void whiten(Eigen::Ref<Columns> columns) const;
-  /// The same for one column that is 0 before row first.
+  /// The same for one column that is 0 before row `first`.
   void whiten(std::size_t first, std::span<double> values) const;
-  /// Sum of the logarithms of the variances: the part of -2 log likelihood that does not depend on the residual.
+  /// Sum of the logarithms of the innovations' variances: the part of -2 log likelihood without the residual.
   double log_determinant() const { return log_determinant_; }
-  /// Rows that count.
+  /// Number of usable rows.
   std::size_t used() const { return used_; }
 
  private:
   struct Gain {
-    double fast, slow;            ///< of the filter
-    double fast_left, slow_left;  ///< what remains of each until the next row
-    double slow_size;             ///< the slow part in units of its deviation far from any slope
-    double weight;                ///< 1 / standard deviation of what is not foreseen; 0: row not used
+    double fast, slow;              ///< Kalman gain of each state
+    double fast_decay, slow_decay;  ///< of each state until the next row
+    double slow_size;               ///< standard deviation of the slow part over that on a flat OCV
+    double weight;                  ///< 1 / standard deviation of the innovation; 0: row not used
   };
   std::vector<Gain> gains_;
   double log_determinant_ = 0;
   std::size_t used_ = 0;
 };
 
-/// White noise of a voltage channel: from second differences where the current is quiet, at least a quantisation
-/// step's. quiet_a: how far the current may move. Returns fallback_v when there are too few such rows.
+/// Standard deviation of a voltage channel's white noise [V]: from second differences where the current moves by less
+/// than quiet_a, and at least that of the quantisation. fallback_v if there are too few such rows.
 double white_noise(std::span<const double> voltage_v, std::span<const double> current_a, double quiet_a,
                    double fallback_v);
 
-/// Smallest step between two different readings that occurs often, where readings lie on a grid of it; 0: none found.
+/// Step of the grid on which readings lie; 0 if they lie on none. NaN is skipped; one finite value at least.
 double quantisation_step(std::span<const double> values);
 
 }  // namespace bms::diagnosis

@@ -3,24 +3,19 @@
 #include <algorithm>
 
 #include "diagnosis/denoise_current.hpp"
+#include "diagnosis/thresholds.hpp"
 
 namespace bms::diagnosis {
 
-namespace {
-
-/// No model is better from sample to sample than this share of what its OCV is good to.
-constexpr double least_white = 0.2;
-
-}  // namespace
-
 NoiseModel nominal_noise(const std::vector<PreparedRecording>& records, const model::CellParameters<>& cell) {
+  constexpr const Thresholds::Noise& limits = thresholds.noise;
   NoiseModel noise;
-  noise.white_v = least_white * cell.tolerance.ocv_v;
+  noise.white_v = limits.white_share_of_ocv * cell.tolerance.ocv_v;
   for (const PreparedRecording& r : records)
-    noise.white_v =
-        std::max(noise.white_v, white_noise(r.voltage_v, r.current_a, 0.01 * cell.capacity_ah, cell.noise.voltage_v));
-  noise.fast_v = std::max(cell.tolerance.ocv_v, 5e-4);
-  noise.slow_v = 1.3 * std::max(cell.tolerance.drift_v, 5e-4);
+    noise.white_v = std::max(
+        noise.white_v, white_noise(r.voltage_v, r.current_a, limits.quiet_c * cell.capacity_ah, cell.noise.voltage_v));
+  noise.fast_v = std::max(cell.tolerance.ocv_v, limits.fast_at_least_v);
+  noise.slow_v = limits.slow_times_drift * std::max(cell.tolerance.drift_v, limits.slow_at_least_v);
   return noise;
 }
 
@@ -28,8 +23,10 @@ LikelihoodModel likelihood_model_of(const model::CellParameters<>& cell,
                                     const std::vector<model::MechanismSetting>& own,
                                     std::vector<PreparedRecording> records) {
   const NoiseModel noise = nominal_noise(records, cell);
-  for (PreparedRecording& r : records)
-    r.current_a = denoise_current(r.current_a, std::min(current_noise(r.current_a), 1.5 * cell.noise.current_a));
+  for (PreparedRecording& r : records) {
+    const double at_most_a = thresholds.denoising.noise_times_file * cell.noise.current_a;
+    r.current_a = denoise_current(r.current_a, std::min(current_noise(r.current_a), at_most_a));
+  }
   return {cell, own, std::move(records), noise};
 }
 

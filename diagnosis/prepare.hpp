@@ -1,20 +1,20 @@
-// A recording that is trusted, made ready for fits: the noise that is there before any hypothesis, the current without
-// its sensor's noise.
+// Checked recordings made ready for fits: the noise that exists before any hypothesis, and the current without its
+// sensor's noise.
 #pragma once
 
 #include <vector>
 
-#include "diagnosis/hypothesis.hpp"
+#include "diagnosis/likelihood_model.hpp"
 #include "diagnosis/noise.hpp"
 #include "diagnosis/prepared_recording.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms::diagnosis {
 
-/// White as the voltages are, fast and slow as the cell file's tolerance has them.
+/// White noise as measured in the voltages, fast and slow noise from the cell file's tolerance.
 NoiseModel nominal_noise(const std::vector<PreparedRecording>& records, const model::CellParameters<>& cell);
 
-/// Of recordings whose data faults have been looked for and whose bad readings are taken out (trust.hpp).
+/// records: checked, their bad readings removed (recording_check.hpp). own: mechanisms of the cell file.
 LikelihoodModel likelihood_model_of(const model::CellParameters<>& cell,
                                     const std::vector<model::MechanismSetting>& own,
                                     std::vector<PreparedRecording> records);

@@ -1,4 +1,4 @@
-// What a diagnosis looks at: one recording and what is believed of its start.
+// The input of a diagnosis: one recording, its initial state of charge, and checks of its instruments.
 #pragma once
 
 #include <cstddef>
@@ -7,14 +7,14 @@
 
 namespace bms::diagnosis {
 
-/// Instrument against a trusted one, over a stretch in which both stood still.
+/// An instrument compared with a trusted one over a stretch in which both stood still.
 struct Check {
   enum class Channel { current, voltage } channel = Channel::current;
   double time_s = 0;     ///< its middle
   double current_a = 0;  ///< mean reading
   double read = 0;       ///< mean of the instrument [A or V]
-  double reference = 0;  ///< mean of the trusted one
-  double deviation = 1;  ///< of read less reference when the instrument is as a hypothesis has it
+  double reference = 0;  ///< mean of the trusted one [A or V]
+  double deviation = 1;  ///< standard deviation of read less reference if the hypothesis holds
 };
 
 /// Columns of equal length, time_s ascending. current_a[k]: mean over the interval that ends at time_s[k], > 0 charges.
@@ -22,12 +22,12 @@ struct PreparedRecording {
   std::string name;
   std::vector<double> time_s;
   std::vector<double> current_a;      ///< NaN: no reading
-  std::vector<double> voltage_v;      ///< NaN: no reading, or one that is not to be used
+  std::vector<double> voltage_v;      ///< NaN: no reading, or one that must not be used
   std::vector<double> temperature_c;  ///< empty: not recorded
   double initial_soc = 0.5;
-  double initial_soc_sigma = 0.005;  ///< how far that is believed
-  bool initial_soc_given = true;     ///< by a user; otherwise read off the first voltage
-  std::vector<Check> checks;         ///< reference.hpp makes them
+  double initial_soc_sigma = 0.005;  ///< its standard deviation
+  bool initial_soc_given = true;     ///< by a user; otherwise derived from the first voltage
+  std::vector<Check> checks;         ///< made by reference.hpp
 
   std::size_t size() const { return time_s.size(); }
   double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }

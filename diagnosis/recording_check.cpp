@@ -1,180 +1,236 @@
+// One check per fault of a recording, in the order in which they are made: what an earlier one removes, the later ones
+// do not see.
 #include "diagnosis/recording_check.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <fmt/format.h>
+
+#include "diagnosis/thresholds.hpp"
+#include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
 
 namespace {
 
 constexpr double no_reading = std::numeric_limits<double>::quiet_NaN();
+constexpr const Thresholds::RecordingFaults& fault_limits = thresholds.recording;
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+using Record = PreparedRecording;
+using Cell = model::CellParameters<>;
 
-double covered_s(const std::vector<model::Span>& spans) {
+double total_s(const std::vector<model::Span>& spans) {
   double sum = 0;
   for (const model::Span& s : spans) sum += s.end_s - s.start_s;
   return sum;
 }
 
-/// Stretches where a reading does not change although the cell is loaded and unloaded, or its noise should show.
-std::vector<model::Span> stuck_voltage(const PreparedRecording& r, double c_rate_a) {
-  std::vector<model::Span> spans;
-  // a converter whose last digit flickers does not stand still for long: how long, its other readings tell
-  std::vector<std::size_t> runs;
-  for (std::size_t k = 1, length = 1; k < r.size(); ++k) {
-    length = r.voltage_v[k] == r.voltage_v[k - 1] ? length + 1 : (runs.push_back(length), 1);
+std::size_t readings_at_most(const Record& r) {
+  return std::max<std::size_t>(fault_limits.few_readings, r.size() / fault_limits.rows_per_reading);
+}
+
+/// Returns true if the units are wrong: the other checks would then say nothing.
+bool check_units(Record& r, const Cell& cell, RecordingCheck& found) {
+  std::vector<double> volts;
+  double largest_a = 0;
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    if (std::isfinite(r.current_a[k])) largest_a = std::max(largest_a, std::abs(r.current_a[k]));
+    if (std::isfinite(r.voltage_v[k])) volts.push_back(r.voltage_v[k]);
   }
-  std::sort(runs.begin(), runs.end());
-  const std::size_t usual = runs.size() > 200 ? runs[runs.size() * 99 / 100] : r.size();
+  const double usual_v = measurement::upper_median(volts);
+  const double limit_a = std::max(cell.limits.charge_current_max_a, cell.limits.discharge_current_max_a);
+  if (usual_v > fault_limits.volts_at_most) {
+    found.faults.push_back(
+        {"voltage_in_mv",
+         fmt::format("The voltage reads {:.0f}, which is in millivolts. Convert it to volts.", usual_v),
+         {}});
+  } else if (largest_a > fault_limits.amperes_times_limit * std::max(limit_a, cell.capacity_ah)) {
+    found.faults.push_back(
+        {"current_in_ma",
+         fmt::format("The current reaches {:.0f} A, {:.0f} times the capacity per hour, so it is in milliamperes. "
+                     "Convert it to amperes.",
+                     largest_a, largest_a / cell.capacity_ah),
+         {}});
+  }
+  return !found.faults.empty();
+}
+
+/// Readings that no cell gives.
+void check_dropouts(Record& r, const Cell& cell, RecordingCheck& found) {
+  const double low_v = cell.limits.voltage_min_v - fault_limits.outside_limits_v,
+               high_v = cell.limits.voltage_max_v + fault_limits.outside_limits_v;
+  std::vector<model::Span> spans;
+  std::size_t dropped = 0;
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    if (!std::isfinite(r.voltage_v[k]) || (r.voltage_v[k] >= low_v && r.voltage_v[k] <= high_v)) continue;
+    const bool goes_on = k > 0 && !spans.empty() && spans.back().end_s == r.time_s[k - 1];
+    if (!goes_on) spans.push_back({r.time_s[k], r.time_s[k]});
+    spans.back().end_s = r.time_s[k];
+    r.voltage_v[k] = no_reading;
+    ++dropped;
+  }
+  if (dropped > readings_at_most(r)) {
+    found.faults.push_back(
+        {"dropouts",
+         fmt::format("The voltage drops out in {} of {} samples. Check the sense wires and the logger.", dropped,
+                     r.size()),
+         spans});
+  } else if (dropped > 0) {
+    found.warnings.push_back(
+        fmt::format("{} voltage readings outside {:g} to {:g} V are not used", dropped, low_v, high_v));
+  }
+}
+
+/// Single readings far from both neighbours, which agree, while the current does not move.
+void check_spikes(Record& r, const Cell& cell, RecordingCheck& found) {
+  const double still_a = fault_limits.spike_current_step_c * cell.capacity_ah;
+  std::size_t spikes = 0;
+  for (std::size_t k = 1; k + 1 < r.size(); ++k) {
+    const double before = r.voltage_v[k - 1], after = r.voltage_v[k + 1], here = r.voltage_v[k];
+    const bool still = std::abs(r.current_a[k] - r.current_a[k - 1]) < still_a &&
+                       std::abs(r.current_a[k + 1] - r.current_a[k]) < still_a;
+    if (still && std::abs(after - before) < fault_limits.spike_neighbours_v &&
+        std::abs(here - (before + after) / 2) > fault_limits.spike_v) {
+      r.voltage_v[k] = no_reading;
+      ++spikes;
+    }
+  }
+  if (spikes > readings_at_most(r)) {
+    found.faults.push_back({"dropouts",
+                            fmt::format("The voltage has {} spikes that no current explains. Check the sense wires and "
+                                        "the logger.",
+                                        spikes),
+                            {}});
+  } else if (spikes > 0) {
+    found.warnings.push_back(fmt::format("{} single spikes of the voltage are not used", spikes));
+  }
+}
+
+/// Stretches where the voltage does not change although the cell is loaded and unloaded, or its noise should show.
+std::vector<model::Span> stuck_spans(const Record& r, double c_rate_a) {
+  // a converter whose last digit flickers does not stand still for long: how long, its other readings show
+  std::vector<double> runs;
+  double length = 1;
+  for (std::size_t k = 1; k < r.size(); ++k) {
+    if (r.voltage_v[k] == r.voltage_v[k - 1]) {
+      ++length;
+    } else {
+      runs.push_back(length);
+      length = 1;
+    }
+  }
+  const double usual = runs.size() > fault_limits.runs_for_usual
+                           ? measurement::quantile(std::move(runs), fault_limits.usual_run_quantile)
+                           : static_cast<double>(r.size());
+  std::vector<model::Span> spans;
   std::size_t from = 0;
   for (std::size_t k = 1; k <= r.size(); ++k) {
     if (k < r.size() && r.voltage_v[k] == r.voltage_v[from]) continue;
-    double low = 1e9, high = -1e9;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
     for (std::size_t j = from; j < k; ++j) {
       if (!std::isfinite(r.current_a[j])) continue;
       low = std::min(low, r.current_a[j]);
       high = std::max(high, r.current_a[j]);
     }
-    // at constant current on a flat curve a good reading stands still too
-    if ((k - from >= 8 && high - low > 0.25 * c_rate_a) ||
-        (k - from >= 60 && k - from > 12 * usual && high - low > 0.02 * c_rate_a))
-      spans.push_back({r.time_s[from], r.time_s[k - 1]});
+    const std::size_t rows = k - from;
+    const bool under_load =
+                   rows >= fault_limits.stuck_rows_loaded && high - low > fault_limits.stuck_swing_c * c_rate_a,
+               for_long = rows >= fault_limits.stuck_rows &&
+                          static_cast<double>(rows) > fault_limits.stuck_times_usual * usual &&
+                          high - low > fault_limits.stuck_small_swing_c * c_rate_a;
+    if (under_load || for_long) spans.push_back({r.time_s[from], r.time_s[k - 1]});
     from = k;
   }
   return spans;
 }
 
-}  // namespace
-
-RecordingCheck check_recording(PreparedRecording& r, const model::CellParameters<>& cell) {
-  RecordingCheck trust;
-  const double c_rate_a = cell.capacity_ah;
-  const auto fault = [&](const char* id, std::string text, std::vector<model::Span> spans = {}) {
-    trust.faults.push_back({id, std::move(text), std::move(spans)});
-  };
-
-  // units
-  std::vector<double> sizes_a, volts, steps_s;
-  for (std::size_t k = 0; k < r.size(); ++k) {
-    if (std::isfinite(r.current_a[k])) sizes_a.push_back(std::abs(r.current_a[k]));
-    if (std::isfinite(r.voltage_v[k])) volts.push_back(r.voltage_v[k]);
-    if (k > 0) steps_s.push_back(r.time_s[k] - r.time_s[k - 1]);
-  }
-  const double largest_a = sizes_a.empty() ? 0 : *std::max_element(sizes_a.begin(), sizes_a.end());
-  const double usual_v = median(volts), usual_step_s = median(steps_s);
-  if (usual_v > 100) {
-    fault("voltage_in_mv", fmt::format("The voltage reads {:.0f}: millivolts where volts are expected.", usual_v));
-    return trust;
-  }
-  const double limit_a = std::max(cell.limits.charge_current_max_a, cell.limits.discharge_current_max_a);
-  if (largest_a > 60 * std::max(limit_a, c_rate_a)) {
-    fault(
-        "current_in_ma",
-        fmt::format("The current reaches {:.0f} A, {:.0f} times the capacity: milliamperes where amperes are expected.",
-                    largest_a, largest_a / c_rate_a));
-    return trust;
-  }
-
-  // readings that no cell gives
-  const double low_v = cell.limits.voltage_min_v - 0.8, high_v = cell.limits.voltage_max_v + 0.8;
-  std::vector<model::Span> dropouts;
-  std::size_t dropped = 0;
-  for (std::size_t k = 0; k < r.size(); ++k) {
-    if (!std::isfinite(r.voltage_v[k]) || (r.voltage_v[k] >= low_v && r.voltage_v[k] <= high_v)) continue;
-    const bool goes_on = k > 0 && !dropouts.empty() && dropouts.back().end_s == r.time_s[k - 1];
-    if (goes_on)
-      dropouts.back().end_s = r.time_s[k];
-    else
-      dropouts.push_back({r.time_s[k], r.time_s[k]});
-    r.voltage_v[k] = no_reading;
-    ++dropped;
-  }
-  if (dropped > std::max<std::size_t>(20, r.size() / 500))
-    fault("dropouts", fmt::format("The voltage drops out in {} of {} samples.", dropped, r.size()), dropouts);
-  else if (dropped > 0)
-    trust.warnings.push_back(
-        fmt::format("{} voltage readings outside {:g} to {:g} V are not used", dropped, low_v, high_v));
-
-  // single spikes: far from both neighbours, which agree, while the current does not move
-  std::size_t spikes = 0;
-  for (std::size_t k = 1; k + 1 < r.size(); ++k) {
-    const double before = r.voltage_v[k - 1], after = r.voltage_v[k + 1], here = r.voltage_v[k];
-    const bool quiet = std::abs(r.current_a[k] - r.current_a[k - 1]) < 0.05 * c_rate_a &&
-                       std::abs(r.current_a[k + 1] - r.current_a[k]) < 0.05 * c_rate_a;
-    if (quiet && std::abs(after - before) < 0.01 && std::abs(here - (before + after) / 2) > 0.25) {
-      r.voltage_v[k] = no_reading;
-      ++spikes;
-    }
-  }
-  if (spikes > std::max<std::size_t>(20, r.size() / 500))
-    fault("dropouts", fmt::format("The voltage has {} spikes that no current explains.", spikes));
-  else if (spikes > 0)
-    trust.warnings.push_back(fmt::format("{} single spikes of the voltage are not used", spikes));
-
-  // a channel that has stopped
-  const auto stuck = stuck_voltage(r, c_rate_a);
-  if (covered_s(stuck) > std::max(45.0, 0.004 * r.duration_s())) {
-    fault("stuck_voltage",
-          fmt::format("The voltage does not move for {:.0f} s in all while the current does.", covered_s(stuck)),
-          stuck);
+void check_stuck_voltage(Record& r, const Cell& cell, RecordingCheck& found) {
+  const std::vector<model::Span> stuck = stuck_spans(r, cell.capacity_ah);
+  if (total_s(stuck) > std::max(fault_limits.stuck_at_most_s, fault_limits.stuck_at_most_share * r.duration_s())) {
+    found.faults.push_back(
+        {"stuck_voltage",
+         fmt::format(
+             "The voltage does not move for {:.0f} s in total while the current does. Check the voltage channel.",
+             total_s(stuck)),
+         stuck});
   } else if (!stuck.empty()) {
-    std::size_t taken = 0;
+    std::size_t removed = 0;
     for (std::size_t k = 0; k < r.size(); ++k) {
       for (const model::Span& s : stuck) {
-        if (r.time_s[k] > s.start_s && r.time_s[k] <= s.end_s) r.voltage_v[k] = no_reading, ++taken;
+        if (r.time_s[k] <= s.start_s || r.time_s[k] > s.end_s) continue;
+        r.voltage_v[k] = no_reading;
+        ++removed;
       }
     }
-    trust.warnings.push_back(fmt::format("{} voltage readings that do not move with the current are not used", taken));
+    found.warnings.push_back(
+        fmt::format("{} voltage readings that do not move with the current are not used", removed));
   }
+}
 
-  // clock: gaps under load lose charge that nobody counted
+/// Gaps under load: charge that flowed in them was not counted.
+void check_gaps(Record& r, const Cell& cell, RecordingCheck& found) {
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < r.size(); ++k) steps_s.push_back(r.time_s[k] - r.time_s[k - 1]);
+  const double usual_step_s = measurement::upper_median(steps_s);
+  const auto load_a = [&](std::size_t k) { return std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0; };
   std::vector<model::Span> gaps;
   double lost_soc = 0;
   for (std::size_t k = 1; k < r.size(); ++k) {
     const double dt_s = r.time_s[k] - r.time_s[k - 1];
-    if (dt_s <= 10 * usual_step_s || dt_s < 5) continue;
-    const double load_a = std::max(std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0,
-                                   std::isfinite(r.current_a[k - 1]) ? std::abs(r.current_a[k - 1]) : 0);
-    if (load_a < 0.05 * c_rate_a) continue;
+    if (dt_s <= fault_limits.gap_steps * usual_step_s || dt_s < fault_limits.gap_at_least_s) continue;
+    const double a = std::max(load_a(k), load_a(k - 1));
+    if (a < fault_limits.gap_load_c * cell.capacity_ah) continue;
     gaps.push_back({r.time_s[k - 1], r.time_s[k]});
-    lost_soc += load_a * dt_s / (3'600 * c_rate_a);
+    lost_soc += a * dt_s / (3'600 * cell.capacity_ah);
   }
-  if (lost_soc > 0.02 || gaps.size() >= 3) {
-    fault("gaps",
-          fmt::format(
-              "The recording stops {} times under load, {:.0f} s in all: up to {:.1f} % of the charge is not known.",
-              gaps.size(), covered_s(gaps), 100 * lost_soc),
-          gaps);
+  if (lost_soc > fault_limits.gaps_lose_soc || gaps.size() > fault_limits.gaps_at_most) {
+    found.faults.push_back(
+        {"gaps",
+         fmt::format("The recording has {} gaps under load, {:.0f} s in total: up to {:.1f} % of the "
+                     "charge is unknown. Record again without gaps.",
+                     gaps.size(), total_s(gaps), 100 * lost_soc),
+         gaps});
   } else if (!gaps.empty()) {
-    trust.warnings.push_back(fmt::format("{} gaps under load", gaps.size()));
+    found.warnings.push_back(fmt::format("{} gaps under load", gaps.size()));
   }
+}
 
-  // sign: at edges of the current the voltage must follow
+/// At edges of the current the voltage must follow.
+void check_sign(Record& r, const Cell& cell, RecordingCheck& found) {
   double together = 0, current2 = 0, voltage2 = 0;
   std::size_t edges = 0, against = 0;
   for (std::size_t k = 1; k < r.size(); ++k) {
     const double di = r.current_a[k] - r.current_a[k - 1], dv = r.voltage_v[k] - r.voltage_v[k - 1];
-    if (!std::isfinite(di) || !std::isfinite(dv) || std::abs(di) < 0.15 * c_rate_a) continue;
+    if (!std::isfinite(di) || !std::isfinite(dv) || std::abs(di) < fault_limits.edge_c * cell.capacity_ah) continue;
     together += di * dv;
     current2 += di * di;
     voltage2 += dv * dv;
     ++edges;
     against += di * dv < 0 ? 1 : 0;
   }
-  if (edges >= 2 && together < -0.5 * std::sqrt(current2 * voltage2) && against > edges * 7 / 10) {
-    fault("current_inverted",
-          "The voltage falls where the current rises: the current's sign is inverted, expected > 0 while charging.");
+  if (edges >= fault_limits.edges_for_sign &&
+      together < fault_limits.inverted_correlation * std::sqrt(current2 * voltage2) &&
+      against > edges * fault_limits.inverted_edges / fault_limits.inverted_of) {
+    found.faults.push_back(
+        {"current_inverted",
+         "The voltage falls where the current rises, so the sign of the current is inverted. Charging "
+         "must be positive: change the sign.",
+         {}});
   }
-  return trust;
+}
+
+}  // namespace
+
+RecordingCheck check_recording(PreparedRecording& r, const model::CellParameters<>& cell) {
+  RecordingCheck found;
+  if (check_units(r, cell, found)) return found;
+  for (const auto check : {check_dropouts, check_spikes, check_stuck_voltage, check_gaps, check_sign})
+    check(r, cell, found);
+  return found;
 }
 
 }  // namespace bms::diagnosis

@@ -1,7 +1,7 @@
-// Can the recording be believed at all? What no physics can explain is looked for first: a diagnosis on top of it would
-// name a mechanism for a broken clock.
+// Is the recording usable at all? What no physics can explain is checked first: a diagnosis on top of it would name a
+// mechanism for a broken clock.
 //
-// Faults that fill a recording end the diagnosis (DATA_FAULT); a few bad readings are taken out and told.
+// Faults of the whole recording end the diagnosis (DATA_FAULT). Single bad readings are removed and reported.
 #pragma once
 
 #include <string>
@@ -14,18 +14,17 @@
 namespace bms::diagnosis {
 
 struct DataFault {
-  std::string id;  ///< "current_inverted", "current_in_ma", "voltage_in_mv", "gaps", "stuck_voltage", "stuck_current",
-                   ///< "dropouts", "too_short", "clock"
-  std::string text;                ///< one sentence
+  std::string id;    ///< "voltage_in_mv", "current_in_ma", "dropouts", "stuck_voltage", "gaps", "current_inverted"
+  std::string text;  ///< what is wrong and what to do next
   std::vector<model::Span> spans;  ///< where
 };
 
 struct RecordingCheck {
-  std::vector<DataFault> faults;      ///< that forbid a diagnosis
-  std::vector<std::string> warnings;  ///< readings that were taken out
+  std::vector<DataFault> faults;      ///< that prevent a diagnosis
+  std::vector<std::string> warnings;  ///< readings that were removed
 };
 
-/// Takes unusable readings out of the record (NaN) and says what it found.
+/// Removes unusable readings from the record (NaN) and reports what it found.
 RecordingCheck check_recording(PreparedRecording& record, const model::CellParameters<>& cell);
 
 }  // namespace bms::diagnosis

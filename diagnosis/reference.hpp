@@ -1,6 +1,6 @@
-// Readings of trusted instruments beside a recording. Leakage and an error of the current's zero have the same
-// recording; with the contactor open, what the sensor reads is its own. An offset and a gain of the voltage differ on a
-// source of two voltages; a contact lies between the voltage that is read and the cell's own terminals.
+// Readings of trusted instruments alongside a recording. A leakage and an error of the current sensor's zero have the
+// same recording; with the contactor open, the sensor reads its own error. An offset and a gain of the voltage differ
+// on a source of two voltages. A contact lies between the voltage that is read and the cell's own terminals.
 #pragma once
 
 #include <span>
@@ -10,14 +10,14 @@
 
 namespace bms::diagnosis {
 
-/// Sums rows that have a reference up to checks of five minutes at most. Columns as long as the record, NaN where there
-/// was none, or empty. With the contactor open (current_ref_a 0) voltage_ref_v may be a source's in place of the
-/// cell's: such a voltage is taken out of the record (NaN).
+/// Averages rows that have a reference to checks, over Thresholds::References::check_at_most_s at most. Columns as long
+/// as the record, NaN where there was no reference, or empty. With the contactor open (current_ref_a 0) voltage_ref_v
+/// may be a source's voltage instead of the cell's: such a voltage is removed from the record (NaN).
 void average_references(PreparedRecording& record, std::span<const double> current_ref_a,
                         std::span<const double> voltage_ref_v, const model::CellParameters<>& cell);
 
-/// How well a mean of so many readings can be compared: noise, the reference's own error, and an error that is not
-/// quite steady. apart: reading less reference.
+/// Standard deviation of a mean of so many readings less its reference: noise, the reference's own error, and an error
+/// that is not quite steady. apart: reading less reference [A or V].
 double check_deviation(Check::Channel channel, double apart, double readings, const model::CellParameters<>& cell);
 
 }  // namespace bms::diagnosis

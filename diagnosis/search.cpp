@@ -5,7 +5,7 @@
 #include <limits>
 #include <set>
 
-#include "diagnosis/decision.hpp"
+#include "diagnosis/thresholds.hpp"
 
 namespace bms::diagnosis {
 
@@ -14,142 +14,132 @@ namespace {
 using model::catalogue;
 using model::Role;
 
-constexpr int usual_iterations = 12;
-constexpr std::size_t temperature_resistance = mechanism_index("temperature_resistance");
+constexpr const Thresholds::Decision& search_limits = thresholds.decision;
+constexpr const Thresholds::Screening& candidate_limits = thresholds.screening;
+constexpr const Numerics::Search& search_numerics = numerics.search;
 
-/// What its unknowns cost a mechanism; what is known of most cells is none.
-double price(std::size_t mechanism, std::size_t bursts) {
+/// What the unknowns of a mechanism cost. What is known of most cells is not an unknown.
+double price(std::size_t mechanism) {
   double unknowns = 0;
-  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p)
-    unknowns +=
-        catalogue[mechanism].parameter[p].role != Role::given && catalogue[mechanism].parameter[p].spread == 0 ? 1 : 0;
-  if (catalogue[mechanism].id == "contact_step") unknowns += 4;  // its moment was sought too
-  return decision::per_unknown * (unknowns - 1) + decision::per_burst * static_cast<double>(bursts);
+  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) {
+    const model::Parameter& parameter = catalogue[mechanism].parameter[p];
+    unknowns += parameter.role != Role::given && parameter.spread == 0 ? 1 : 0;
+  }
+  unknowns += knowledge_of(mechanism).searched_unknowns;
+  return search_limits.per_unknown * (unknowns - 1);
 }
 
 double price(const Hypothesis& h) {
   double sum = 0;
   std::size_t bursts = 0;
   for (const auto& spans : h.bursts) bursts += spans.size();
-  for (const std::size_t m : h.added()) sum += price(m, m == mechanism_index("contact_intermittent") ? bursts : 0);
+  for (const std::size_t m : h.added()) {
+    const bool in_bursts = knowledge_of(m).signature == Signature::contact_bursts;
+    sum += price(m) + search_limits.per_burst * static_cast<double>(in_bursts ? bursts : 0);
+  }
   return sum;
 }
 
-/// What speaks for a mechanism before any voltage is looked at: a cell far from its file's temperature has other
-/// resistances.
-double known_before(double away_k, const Hypothesis& h) {
-  if (h.find(temperature_resistance) == nullptr || h.own > 0) return 0;
-  return std::clamp((away_k - 5) * 1.5, 0.0, 15.0);
+/// Gain of the mechanisms that a hypothesis adds before any voltage is looked at; 0 if the cell file has some of its
+/// own.
+double known_beforehand(const RecordingFacts& facts, const Hypothesis& h) {
+  if (h.own > 0) return 0;
+  double sum = 0;
+  for (const std::size_t m : h.added()) sum += knowledge_of(m).prior_gain(facts);
+  return sum;
 }
 
 /// RMS of a raw residual, of the voltages that were read.
-double reading_error_v(const LikelihoodModel& evidence, const Columns& raw) {
-  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(evidence.readings())).squaredNorm() /
-                   static_cast<double>(std::max<std::size_t>(evidence.used(), 1)));
+double reading_error_v(const LikelihoodModel& likelihood, const Columns& raw) {
+  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(likelihood.readings())).squaredNorm() /
+                   static_cast<double>(std::max<std::size_t>(likelihood.used(), 1)));
 }
 
-/// With the base parameters where a fit has them, but for those that belong to a single recording.
-double lasting_error_v(const LikelihoodModel& evidence, const HypothesisFit& f) {
+/// With the base parameters of the fit, except those that belong to a single recording.
+double lasting_error_v(const LikelihoodModel& likelihood, const HypothesisFit& f) {
   Eigen::VectorXd u = f.calibration;
-  u.tail(u.size() - static_cast<Eigen::Index>(evidence.calibration().shared())).setZero();
-  return reading_error_v(evidence, evidence.raw_residual(f.hypothesis, u));
+  u.tail(u.size() - static_cast<Eigen::Index>(likelihood.calibration().shared())).setZero();
+  return reading_error_v(likelihood, likelihood.raw_residual(f.hypothesis, u));
+}
+
+bool alike(const NoiseModel& a, const NoiseModel& b) {
+  const auto near = [](double x, double y) {
+    return x < thresholds.noise.same_amplitude * y && y < thresholds.noise.same_amplitude * x;
+  };
+  return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
+}
+
+double& onset_of(Hypothesis& h) {
+  return std::find_if(
+             h.settings.begin(), h.settings.end(),
+             [](const MechanismSetting& s) { return knowledge_of(s.index).signature == Signature::contact_change; })
+      ->value[contact_onset];
 }
 
 }  // namespace
 
-double away_k(const LikelihoodModel& evidence) {
-  double away = 0;
-  for (const PreparedRecording& r : evidence.records()) {
-    for (const double c : r.temperature_c) {
-      if (std::isfinite(c)) away = std::max(away, std::abs(c - 25));
-    }
-  }
-  return away;
-}
-
-double plain_error_v(const LikelihoodModel& evidence, const Hypothesis& h) {
-  return reading_error_v(evidence, evidence.raw_residual(h, evidence.unchanged()));
+double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h) {
+  return reading_error_v(likelihood, likelihood.raw_residual(h, likelihood.unchanged()));
 }
 
 double Search::total(const HypothesisFit& f) const {
   double cost = 0;
-  evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+  likelihood_.likeliest_noise(likelihood_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
   return cost + f.cost - f.residual.squaredNorm();
 }
 
 double Search::score(const HypothesisFit& f) {
   const auto known = totals_.find(f.cost);
   const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
-  return sum + price(f.hypothesis) - known_before(away_k_, f.hypothesis);
+  return sum + price(f.hypothesis) - known_beforehand(likelihood_.facts(), f.hypothesis);
 }
 
-HypothesisFit Search::settled(HypothesisFit f) {
-  for (int round = 0; round < 2; ++round) {
+HypothesisFit Search::with_own_noise(HypothesisFit f) {
+  for (int round = 0; round < search_numerics.noise_rounds; ++round) {
     double cost = 0;
     const NoiseModel noise =
-        evidence_.likeliest_noise(evidence_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+        likelihood_.likeliest_noise(likelihood_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
     if (noise == f.noise) break;
-    evidence_.set_noise(noise);
-    f = evidence_.fit(f.hypothesis, f.calibration, 5);
+    likelihood_.set_noise(noise);
+    f = likelihood_.fit(f.hypothesis, f.calibration, numerics.fit.refit_iterations);
   }
   return f;
 }
 
 double Search::gain(const HypothesisFit& less, const HypothesisFit& more) {
-  return score(less) + known_before(away_k_, less.hypothesis) - score(more) - known_before(away_k_, more.hypothesis);
+  const RecordingFacts& facts = likelihood_.facts();
+  return score(less) + known_beforehand(facts, less.hypothesis) - score(more) -
+         known_beforehand(facts, more.hypothesis);
 }
 
 HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, double hopeless) {
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
-  HypothesisFit best = evidence_.fit(h, around.calibration, usual_iterations, hopeless);
+  HypothesisFit best = likelihood_.fit(h, around.calibration, numerics.fit.iterations, hopeless);
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto farther = far_start(h, u);
     if (!farther) continue;
-    HypothesisFit other = evidence_.fit(*farther, u, usual_iterations, hopeless);
+    HypothesisFit other = likelihood_.fit(*farther, u, numerics.fit.iterations, hopeless);
     if (other.cost < best.cost) best = std::move(other);
   }
-  if (catalogue[c.mechanism].id == "contact_step") best = refined_onset(best);
-  tell(catalogue[c.mechanism].id);
+  if (knowledge_of(c.mechanism).signature == Signature::contact_change) best = refined_onset(best);
+  report(catalogue[c.mechanism].id);
   return best;
 }
 
 std::array<Eigen::VectorXd, 2> Search::far_bases(const HypothesisFit& around) const {
-  return {around.calibration, evidence_.unchanged()};
+  return {around.calibration, likelihood_.unchanged()};
 }
 
 std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) {
   MechanismSetting& s = h.settings.back();
-  const std::string_view id = catalogue[s.index].id;
-  std::vector<std::vector<double>> tries;
-  if (id == "capacity_change")
-    tries = {{-0.1}, {0.04}, {0.08}, {0.14}, {0.2}, {0.28}};
-  else if (id == "current_gain")
-    tries = {{-0.12}, {-0.06}, {0.06}, {0.12}};
-  else if (id == "initial_soc")
-    tries = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
-  else if (id == "ocv_shape")
-    tries = {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
-  else if (id == "current_offset" || id == "leakage") {
-    double hours = 0;
-    for (const PreparedRecording& r : evidence_.records()) hours += r.duration_s() / 3'600;
-    const double per_soc_a = evidence_.cell().capacity_ah / std::max(hours, 0.1),
-                 most_a = catalogue[s.index].parameter[0].upper(evidence_.cell().capacity_ah);
-    for (const double soc : {-0.12, -0.06, -0.03, 0.03, 0.06, 0.12}) {
-      if (std::abs(soc) * per_soc_a < most_a && (soc > 0 || catalogue[s.index].parameter[0].low < 0))
-        tries.push_back({soc * per_soc_a});
-    }
-  } else if (id == "slow_polarisation") {
-    for (const double tau_s : {200.0, 600.0}) {
-      for (const double lag_s : {120.0, 300.0}) tries.push_back({s.value[0], tau_s, s.value[2], lag_s});
-    }
-  }
-  if (tries.empty()) return std::nullopt;
-  double least = evidence_.residual(h, u).squaredNorm();
+  const std::vector<std::vector<double>> starts = knowledge_of(s.index).far_starts(s, likelihood_.facts());
+  if (starts.empty()) return std::nullopt;
+  double least = likelihood_.residual(h, u).squaredNorm();
   std::optional<Hypothesis> best;
-  for (const auto& t : tries) {
-    for (std::size_t p = 0; p < t.size(); ++p) s.value[p] = t[p];
-    const double cost = evidence_.residual(h, u).squaredNorm();
+  for (const std::vector<double>& start : starts) {
+    std::copy(start.begin(), start.end(), s.value.begin());
+    const double cost = likelihood_.residual(h, u).squaredNorm();
     if (cost >= least) continue;
     least = cost;
     best = h;
@@ -160,62 +150,51 @@ std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd&
 bool Search::far_better(const HypothesisFit& around, const Candidate& c) {
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto far = far_start(with(around.hypothesis, c.start), u);
-    if (far && evidence_.residual(*far, u).squaredNorm() <
-                   evidence_.residual(around.hypothesis, u).squaredNorm() - decision::worth_a_fit)
+    if (far && likelihood_.residual(*far, u).squaredNorm() <
+                   likelihood_.residual(around.hypothesis, u).squaredNorm() - candidate_limits.worth_a_fit)
       return true;
   }
   return false;
 }
 
 HypothesisFit Search::refined_onset(HypothesisFit best) {
-  const PreparedRecording& r = evidence_.records().front();
-  const auto setting = [](HypothesisFit& f) -> MechanismSetting& {
-    return *std::find_if(f.hypothesis.settings.begin(), f.hypothesis.settings.end(),
-                         [](const MechanismSetting& s) { return s.index == mechanism_index("contact_step"); });
-  };
-  double reach_s = r.duration_s() / 40;
-  Eigen::VectorXd residual;
-  while (reach_s > 1.5 * r.duration_s() / static_cast<double>(r.size())) {
-    const double middle_s = setting(best).value[1];
-    for (const double step : {-1.0, -0.5, 0.5, 1.0}) {
+  const PreparedRecording& r = likelihood_.records().front();
+  const double margin_s = search_numerics.onset_margin * r.duration_s(),
+               least_s = search_numerics.onset_rows * r.duration_s() / static_cast<double>(r.size());
+  for (double reach_s = r.duration_s() / search_numerics.onset_reach; reach_s > least_s; reach_s /= 2) {
+    const double middle_s = onset_of(best.hypothesis);
+    for (const double step : search_numerics.onset_steps) {
       Hypothesis h = best.hypothesis;
-      for (MechanismSetting& s : h.settings) {
-        // a step at either end is no step
-        if (s.index == mechanism_index("contact_step"))
-          s.value[1] = std::clamp(middle_s + step * reach_s, r.time_s.front() + 0.04 * r.duration_s(),
-                                  r.time_s.back() - 0.04 * r.duration_s());
-      }
-      residual = evidence_.residual(h, best.calibration);
+      // a step at either end of the recording is not a step
+      onset_of(h) = std::clamp(middle_s + step * reach_s, r.time_s.front() + margin_s, r.time_s.back() - margin_s);
+      const Eigen::VectorXd residual = likelihood_.residual(h, best.calibration);
       const double cost = residual.squaredNorm() + (best.cost - best.residual.squaredNorm());
-      if (cost < best.cost) {
-        best.cost = cost;
-        best.residual = residual;
-        best.hypothesis = h;
-      }
+      if (!(cost < best.cost)) continue;
+      best.cost = cost;
+      best.residual = residual;
+      best.hypothesis = h;
     }
-    reach_s /= 2;
   }
-  return evidence_.fit(best.hypothesis, best.calibration, 4);
-}
-
-bool Search::alike(const NoiseModel& a, const NoiseModel& b) {
-  const auto near = [](double x, double y) { return x < 1.25 * y && y < 1.25 * x; };
-  return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
+  return likelihood_.fit(best.hypothesis, best.calibration, numerics.fit.onset_iterations);
 }
 
 std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const std::vector<std::size_t>& over) {
-  // by the nominal noise, which asks for everything to be explained, and by that of what is left, which asks for the
-  // large first
+  // with the nominal noise, which asks for everything to be explained, and with that of the current residual, which
+  // asks for the large effects first
   std::vector<HypothesisFit> fits;
   std::set<std::size_t> tried;
   for (const NoiseModel& noise : {nominal_, around.noise}) {
     if (!fits.empty() && alike(noise, nominal_)) break;
-    evidence_.set_noise(noise);
-    const HypothesisFit from = noise == around.noise ? around : evidence_.fit(around.hypothesis, around.calibration, 5);
-    const Screen screen(evidence_, from, over);
+    likelihood_.set_noise(noise);
+    const HypothesisFit from =
+        noise == around.noise ? around
+                              : likelihood_.fit(around.hypothesis, around.calibration, numerics.fit.refit_iterations);
+    const Screen screen(likelihood_, from, over);
     std::vector<Candidate> worth;
     for (const Candidate& c : screen.candidates()) {
-      if (c.gain < decision::worth_a_fit ? !far_better(from, c) : worth.size() >= decision::most_fits) continue;
+      const bool promising = c.gain >= candidate_limits.worth_a_fit;
+      if (promising && worth.size() >= candidate_limits.fits) continue;
+      if (!promising && !far_better(from, c)) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
     const std::vector<HypothesisFit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
@@ -226,54 +205,55 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
   return fits;
 }
 
-std::vector<HypothesisFit> Search::in_place_of(std::size_t m, const HypothesisFit& best, const HypothesisFit& less,
-                                               const std::vector<std::size_t>& over, double gain_of_m,
+std::vector<HypothesisFit> Search::in_place_of(const Replacement& r, const std::vector<std::size_t>& over,
                                                std::map<std::size_t, double>& likeness) {
-  // they must stand up to the noise that the best leaves
-  evidence_.set_noise(best.noise);
-  const HypothesisFit from = evidence_.fit(less.hypothesis, less.calibration, 5);
-  const Screen screen(evidence_, from, over);
-  const auto& all = screen.candidates();
+  // rivals must be as good with the noise that the best leaves
+  likelihood_.set_noise(r.best.noise);
+  const HypothesisFit from =
+      likelihood_.fit(r.without.hypothesis, r.without.calibration, numerics.fit.refit_iterations);
+  const Screen screen(likelihood_, from, over);
+  const std::vector<Candidate>& all = screen.candidates();
   std::vector<Candidate> worth;
   for (std::size_t a = 0; a < all.size(); ++a) {
-    if (all[a].mechanism == m) {
+    if (all[a].mechanism == r.mechanism) {
       for (std::size_t b = 0; b < all.size(); ++b) likeness[all[b].mechanism] = screen.alike(a, b);
     }
-    if (worth.size() < decision::most_rivals && all[a].gain >= std::max(decision::worth_a_fit, 0.1 * gain_of_m))
+    if (worth.size() < candidate_limits.rivals &&
+        all[a].gain >= std::max(candidate_limits.worth_a_fit, candidate_limits.rival_share * r.gain))
       worth.push_back(all[a]);
   }
-  return fitted(from, worth, best.cost + decision::hopeless);
+  return fitted(from, worth, r.best.cost + search_limits.hopeless);
 }
 
 std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
                                           double hopeless) {
   std::vector<HypothesisFit> fits;
-  if (!around.hypothesis.added().empty()) evidence_.linearise(around.hypothesis, around.calibration);
-  for (const Candidate& c : candidates) {
-    fits.push_back(fit_with(around, c, hopeless));
-  }
+  if (!around.hypothesis.added().empty()) likelihood_.linearise(around.hypothesis, around.calibration);
+  for (const Candidate& c : candidates) fits.push_back(fit_with(around, c, hopeless));
   std::stable_sort(fits.begin(), fits.end(),
                    [](const HypothesisFit& a, const HypothesisFit& b) { return a.cost < b.cost; });
-  for (std::size_t k = 0; k < fits.size() && k < 3; ++k) {
-    if (fits[k].cost < hopeless) fits[k] = settled(fits[k]);
+  for (std::size_t k = 0; k < fits.size() && k < search_numerics.fits_with_own_noise; ++k) {
+    if (fits[k].cost < hopeless) fits[k] = with_own_noise(fits[k]);
   }
   return fits;
 }
 
 bool Search::carries(const HypothesisFit& before, const HypothesisFit& f) const {
   if (f.hypothesis.added().size() < 2) return true;
-  const double was_v = std::min(lasting_error_v(evidence_, before), plain_error_v(evidence_, evidence_.base()));
-  return lasting_error_v(evidence_, f) <= decision::may_grow * was_v + 3e-4;
+  const double was_v = std::min(lasting_error_v(likelihood_, before), plain_error_v(likelihood_, likelihood_.base()));
+  return lasting_error_v(likelihood_, f) <= search_limits.error_may_grow * was_v + search_limits.error_may_grow_v;
 }
 
-HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t m) {
-  evidence_.set_noise(f.noise);
-  return settled(evidence_.fit(without(f.hypothesis, m), f.calibration, 8));
+HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t mechanism) {
+  likelihood_.set_noise(f.noise);
+  return with_own_noise(
+      likelihood_.fit(without(f.hypothesis, mechanism), f.calibration, numerics.fit.reduced_iterations));
 }
 
-void Search::tell(std::string_view what) {
+void Search::report(std::string_view what) {
   ++steps_;
-  if (progress_) progress_(1 - std::exp(-static_cast<double>(steps_) / 20), std::string(what));
+  if (progress_)
+    progress_(1 - std::exp(-static_cast<double>(steps_) / search_numerics.progress_steps), std::string(what));
 }
 
 }  // namespace bms::diagnosis

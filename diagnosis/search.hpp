@@ -1,4 +1,4 @@
-// Fits of hypotheses against each other: one mechanism more, another in its place, one less; and what each is worth.
+// Fits of hypotheses compared with each other: one mechanism more, another in its place, one less; and their scores.
 #pragma once
 
 #include <array>
@@ -9,77 +9,82 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/hypothesis.hpp"
+#include "diagnosis/likelihood_model.hpp"
 #include "diagnosis/screen.hpp"
 
 namespace bms::diagnosis {
 
-/// How far the cell was from the temperature that its file is for.
-double away_k(const LikelihoodModel& evidence);
-/// RMS of measured less predicted by a hypothesis with the cell file's own base parameters: what an extended cell file
-/// will do.
-double plain_error_v(const LikelihoodModel& evidence, const Hypothesis& h);
+/// Receives the share that is done, 0..1, and what was done last.
+using Progress = std::function<void(double, const std::string&)>;
+
+/// RMS of measured less predicted [V] by a hypothesis with the cell file's own base parameters: what an extended cell
+/// file would achieve.
+double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h);
 
 class Search {
  public:
-  /// Both must outlive it.
-  Search(LikelihoodModel& evidence, const std::function<void(double, const std::string&)>& progress)
-      : evidence_(evidence), progress_(progress), nominal_(evidence.noise()), away_k_(away_k(evidence)) {}
+  /// Both must outlive it. Its noise model is taken as the nominal one.
+  Search(LikelihoodModel& likelihood, const Progress& progress)
+      : likelihood_(likelihood), progress_(progress), nominal_(likelihood.noise()) {}
 
-  /// -2 log posterior, what its unknowns cost included, less what was known before: the smaller the better.
+  const NoiseModel& nominal_noise() const { return nominal_; }
+
+  /// -2 log posterior with the cost of its unknowns, less the gain known beforehand: the smaller the better.
   double score(const HypothesisFit& f);
 
-  /// Fitted again under the noise that its own residual speaks of.
-  HypothesisFit settled(HypothesisFit f);
+  /// Fitted again with the noise model that its own residual makes most probable.
+  HypothesisFit with_own_noise(HypothesisFit f);
 
-  /// What a hypothesis gains over a smaller one, whatever was known before.
+  /// Gain of a hypothesis over a smaller one, without what was known beforehand.
   double gain(const HypothesisFit& less, const HypothesisFit& more);
 
-  /// The best of adding one mechanism to what is there.
+  /// All fits with one mechanism of `over` added, the best first.
   std::vector<HypothesisFit> one_more(const HypothesisFit& around, const std::vector<std::size_t>& over);
 
-  /// What could stand in the place of mechanism m of the best hypothesis, and m itself from another start; less:
-  /// without m. likeness: of each to m.
-  std::vector<HypothesisFit> in_place_of(std::size_t m, const HypothesisFit& best, const HypothesisFit& less,
-                                         const std::vector<std::size_t>& over, double gain_of_m,
+  struct Replacement {
+    std::size_t mechanism;  ///< of the best hypothesis, to be replaced
+    const HypothesisFit& best;
+    const HypothesisFit& without;  ///< without the mechanism
+    double gain;                   ///< of the mechanism
+  };
+  /// Fits with another mechanism of `over` in the place of one, and with that one from another start. likeness: of each
+  /// mechanism's signature to the replaced one's, filled in.
+  std::vector<HypothesisFit> in_place_of(const Replacement& r, const std::vector<std::size_t>& over,
                                          std::map<std::size_t, double>& likeness);
 
-  /// Whether a cell file with it would do as well as with what was there: what only helps together with the start and
-  /// the wander that this recording needed is no cause. A first one may: of two that hide each other, one alone makes
-  /// it worse.
+  /// Returns true if a cell file with it would do as well as with what was there. What helps only together with the
+  /// start and the sensor's wander in this recording is not a cause. A first mechanism always passes: of two that hide
+  /// each other, one alone makes the error larger.
   bool carries(const HypothesisFit& before, const HypothesisFit& f) const;
 
-  /// The rest of a fit, fitted again from where it was.
-  HypothesisFit without_one(const HypothesisFit& f, std::size_t m);
+  /// The rest of a fit without a mechanism, fitted again from where it was.
+  HypothesisFit without_one(const HypothesisFit& f, std::size_t mechanism);
 
-  /// Progress.
-  void tell(std::string_view what);
+  /// Reports progress by one step.
+  void report(std::string_view what);
 
  private:
-  /// -2 log posterior with the noise that the residual speaks of, at its price.
+  /// -2 log posterior with the noise model that the residual makes most probable, at its price.
   double total(const HypothesisFit& f) const;
-  /// A candidate added to what is there and fitted from its estimate; shapes far apart are tried from two sides.
+  /// A candidate added to what is there, fitted from its estimate and from far starts.
   HypothesisFit fit_with(const HypothesisFit& around, const Candidate& c, double hopeless);
-  /// Where a knee of the OCV is passed, an effect on the charge is not linear: the best of some strengths far from the
-  /// estimate.
+  /// The best of some strengths far from the signature's estimate; nothing if none is better than it.
   std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u);
-  /// From where: where the base parameters have gone, and the cell file, which they may have left because of what is
-  /// missing.
+  /// Base parameters for far starts: those of the fit, and those of the cell file, which the fit may have left because
+  /// a mechanism is missing.
   std::array<Eigen::VectorXd, 2> far_bases(const HypothesisFit& around) const;
-  /// Whether one is, where the screen, which is linear, sees nothing.
+  /// Returns true if a far start is better where the signature, which is linear, sees nothing.
   bool far_better(const HypothesisFit& around, const Candidate& c);
-  /// The moment of a contact's step, to the sample.
+  /// The moment at which a contact has changed, to the row.
   HypothesisFit refined_onset(HypothesisFit best);
-  static bool alike(const NoiseModel& a, const NoiseModel& b);
-  /// The candidates fitted; the foremost again with the noise that they leave, which is smaller when much has been
+  /// The candidates fitted, by cost; the foremost with the noise that they leave, which is smaller if much is
   /// explained.
   std::vector<HypothesisFit> fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
                                     double hopeless);
 
-  LikelihoodModel& evidence_;
-  const std::function<void(double, const std::string&)>& progress_;
+  LikelihoodModel& likelihood_;
+  const Progress& progress_;
   NoiseModel nominal_;
-  double away_k_;
   std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
   int steps_ = 0;
 };

@@ -10,6 +10,13 @@
 
 namespace bms::measurement {
 
+/// Value of this rank; rank 0 is the smallest value, rank < values.size(). No NaN. Reorders the values. O(n).
+inline double order_statistic(std::span<double> values, std::size_t rank) {
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
 /// The element at index floor(fraction * n) of the n sorted values, 0 <= fraction < 1. NaN if there is no value.
 template <class Real>
 Real quantile(std::vector<Real> values, double fraction) {
@@ -48,5 +55,22 @@ inline double rms(std::span<const double> values) {
   }
   return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0;
 }
+
+/// Root mean square of values that are added one by one. No NaN.
+class MeanSquare {
+ public:
+  void add(double value) {
+    sum_ += value * value;
+    ++count_;
+  }
+  std::size_t count() const { return count_; }
+  double sum() const { return sum_; }  ///< of the squares
+  /// 0 if there is no value.
+  double root() const { return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : 0; }
+
+ private:
+  double sum_ = 0;
+  std::size_t count_ = 0;
+};
 
 }  // namespace bms::measurement

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <tuple>
+#include <type_traits>
+#include <utility>
 
 #include "model/mechanisms/capacity_change.hpp"
 #include "model/mechanisms/channel_skew.hpp"
@@ -78,6 +80,22 @@ constexpr std::size_t mechanism_index(std::string_view id) {
   std::size_t k = 0;
   while (k < mechanism_count && catalogue[k].id != id) ++k;
   return k;
+}
+
+/// The same for its type.
+template <class M>
+inline constexpr std::size_t mechanism_index_of = mechanism_index(M::id);
+
+/// Calls f(std::type_identity<M>{}) for the mechanism M with this index; nothing if there is none.
+template <class F>
+constexpr void visit_mechanism(std::size_t index, F&& f) {
+  [&]<std::size_t... K>(std::index_sequence<K...>) {
+    const auto visit = [&]<std::size_t k>() {
+      if (index == k) f(std::type_identity<std::tuple_element_t<k, Catalogue>>{});
+    };
+    (visit.template operator()<K>(), ...);
+  }
+  (std::make_index_sequence<mechanism_count>{});
 }
 
 }  // namespace bms::model

@@ -43,6 +43,9 @@
 
 namespace bms::model {
 
+/// Temperature at which the tables of a cell file are valid, unless its mechanisms say otherwise [degrees C].
+inline constexpr double reference_temperature_c = 25;
+
 /// What a parameter does. Of a mechanism whose strengths are all at their neutral value nothing is seen.
 enum class Role {
   strength,  ///< 0: no effect

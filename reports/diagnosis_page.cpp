@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/decision.hpp"
 #include "diagnosis/texts.hpp"
+#include "diagnosis/thresholds.hpp"
 #include "identification/goodness_of_fit.hpp"
 #include "reports/embedded_files.hpp"
 #include "reports/report_page.hpp"
@@ -375,8 +375,8 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
                         : json(nullptr);
   report["has_holdout"] = !r.holdouts.empty();
   report["candidates"] = candidates(r);
-  report["tie"] = diagnosis::decision::same;
-  report["detected"] = diagnosis::decision::detected;
+  report["tie"] = diagnosis::thresholds.decision.tie;
+  report["detected"] = diagnosis::thresholds.decision.detected;
   report["unexplained"] = {{"rmse_mv", rounded(1e3 * d.unexplained_rmse_v, 3)},
                            {"share", rounded(d.unexplained_share, 4)},
                            {"explained", rounded(d.explained_share, 4)}};

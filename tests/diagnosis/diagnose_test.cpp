@@ -1,4 +1,4 @@
-// The chain on the plant's cell, whose equations are not those of the catalogue.
+// The whole diagnosis of recordings of the plant's cell, whose equations are not those of the catalogue.
 #include "diagnosis/diagnose.hpp"
 
 #include <cmath>
@@ -52,7 +52,7 @@ TEST(Diagnose, NamesAContactThatHasChangedAndWhen) {
   EXPECT_NEAR(d.findings.front().setting.value[1], 4'000, 60);
 }
 
-TEST(Diagnose, VoltageOffsetAndGainAreTheSameToAnLfpCell) {
+TEST(Diagnose, VoltageOffsetAndGainAreAmbiguousForAnLfpCell) {
   const Diagnosis d =
       diagnose(test::table9(), {},
                {test::recorded(test::drive(2, 14), 0.7, 14, [](std::size_t, double, double) { return 0.015; })});
@@ -72,7 +72,7 @@ TEST(Diagnose, WhatNoMechanismExplainsIsUnknown) {
   EXPECT_EQ(d.verdict, Verdict::unknown);
 }
 
-TEST(Diagnose, APeriodThatTheLoadDoesNotHaveIsUnknownAndTold) {
+TEST(Diagnose, APeriodThatTheLoadDoesNotHaveIsUnknownAndNamed) {
   const Diagnosis d =
       diagnose(test::table9(), {}, {test::recorded(test::drive(2, 18), 0.7, 18, [](std::size_t k, double, double) {
                  return 0.003 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 173);
@@ -98,7 +98,7 @@ TEST(Diagnose, BurstsOfALooseContactAreFoundWhereTheyAre) {
   EXPECT_LT(outside, inside / 3);
 }
 
-TEST(Diagnose, TheExtendedCellHasItsTablesWhereTheyFitBesideWhatWasFound) {
+TEST(Diagnose, TheExtendedCellMovesItsTablesToFitTogetherWithTheFindings) {
   // 2 mV of the table are its own error, a third of the resistance is not
   const auto add_v = [](std::size_t, double current_a, double) { return 0.002 + 0.004 * current_a; };
   const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(2, 20), 0.7, 20, add_v)});
@@ -114,7 +114,7 @@ TEST(Diagnose, TheExtendedCellHasItsTablesWhereTheyFitBesideWhatWasFound) {
   EXPECT_EQ(model::first_fault(d.cell).what, nullptr) << model::first_fault(d.cell).key;
 }
 
-TEST(Diagnose, WithoutInformationNothingIsSaid) {
+TEST(Diagnose, WithoutInformationNothingIsTestable) {
   PreparedRecording rest = test::recorded(std::vector<double>(3'000, 0.0), 0.7, 16);
   EXPECT_EQ(diagnose(test::table9(), {}, {rest}).verdict, Verdict::not_testable);
   PreparedRecording constant = test::recorded(std::vector<double>(3'000, -3.0), 0.9, 17);
@@ -126,8 +126,8 @@ TEST(Diagnose, WithoutInformationNothingIsSaid) {
   EXPECT_EQ(diagnose(test::table9(), {}, {brief}).verdict, Verdict::not_testable);
 }
 
-/// At a current sensor's offset that moves the charge by several per cent, the knees are too far away for a line to
-/// point there.
+/// An offset of the current sensor that moves the charge by several per cent: the knees of the OCV are then too far
+/// away for a linear estimate to find them.
 TEST(Diagnose, FindsAnOffsetThatMovesTheKneesFar) {
   PreparedRecording r = test::recorded(test::drive(4, 31), 0.9, 31);
   for (double& a : r.current_a) a += 0.2;  // 13 % of soc
@@ -138,20 +138,20 @@ TEST(Diagnose, FindsAnOffsetThatMovesTheKneesFar) {
   EXPECT_THAT(set, Contains("current_offset"));
 }
 
-TEST(Diagnose, LeakageAndAnOffsetAreNotBesideEachOther) {
+TEST(Diagnose, LeakageAndCurrentOffsetExcludeEachOtherWithoutATrustedAmmeter) {
   PreparedRecording r = test::recorded(test::drive(2, 32), 0.7, 32);
-  LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
+  LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
   const std::size_t leakage = model::mechanism_index("leakage"), offset = model::mechanism_index("current_offset");
-  const Hypothesis leaking = with(evidence.base(), leakage, 6);
-  EXPECT_TRUE(not_testable(evidence, leaking, offset).has_value());
-  EXPECT_FALSE(not_testable(evidence, evidence.base(), offset).has_value());
+  const Hypothesis leaking = with(likelihood.base(), leakage, 6);
+  EXPECT_TRUE(not_testable(likelihood, leaking, offset).has_value());
+  EXPECT_FALSE(not_testable(likelihood, likelihood.base(), offset).has_value());
   r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002}};
   const LikelihoodModel trusted(test::table9(), {}, {r}, NoiseModel{});
-  EXPECT_FALSE(not_testable(trusted, leaking, offset).has_value()) << "a trusted ammeter tells them apart";
+  EXPECT_FALSE(not_testable(trusted, leaking, offset).has_value()) << "a trusted ammeter distinguishes them";
 }
 
-/// A late channel is seen at the edges alone: hardly any of the mean square, and beyond doubt.
-TEST(Diagnose, WhatIsSeenAtMomentsStandsBesideWhatIsLargeThroughout) {
+/// A late channel shows at the edges alone: little of the mean square, but significant.
+TEST(Diagnose, AShortEffectIsFoundTogetherWithALargePermanentOne) {
   std::vector<double> gentle = test::drive(2, 34);
   for (double& a : gentle) a *= 0.1;
   PreparedRecording r = test::recorded(gentle, 0.7, 34);
@@ -161,19 +161,19 @@ TEST(Diagnose, WhatIsSeenAtMomentsStandsBesideWhatIsLargeThroughout) {
   EXPECT_THAT(ids_of(d), Contains("channel_skew"));
 }
 
-TEST(Diagnose, AFileIsGoodToWhatItLeavesOfItsOwnRecordings) {
-  const auto left_over = [](double v) {
+TEST(Diagnose, ToleranceIsWidenedUntilOwnRecordingsShowNothing) {
+  const auto residual_of = [](double v) {
     return test::recorded(test::drive(2, 33), 0.7, 33, [v](std::size_t k, double, double) {
       return v * std::sin(2 * 3.14159265 * static_cast<double>(k) / 1'234);
     });
   };
-  EXPECT_EQ(tolerance_factor(test::table9(), {}, {left_over(0)}), 1);
-  const double factor = tolerance_factor(test::table9(), {}, {left_over(0.012)});
+  EXPECT_EQ(tolerance_factor(test::table9(), {}, {residual_of(0)}), 1);
+  const double factor = tolerance_factor(test::table9(), {}, {residual_of(0.012)});
   EXPECT_GT(factor, 1);
   model::CellParameters<> wide = test::table9();
   wide.tolerance = with_wider_tolerance(wide.tolerance, factor);
-  EXPECT_EQ(diagnose(test::table9(), {}, {left_over(0.012)}).verdict, Verdict::unknown);
-  EXPECT_EQ(diagnose(wide, {}, {left_over(0.012)}).verdict, Verdict::no_mismatch);
+  EXPECT_EQ(diagnose(test::table9(), {}, {residual_of(0.012)}).verdict, Verdict::unknown);
+  EXPECT_EQ(diagnose(wide, {}, {residual_of(0.012)}).verdict, Verdict::no_mismatch);
 }
 
 }  // namespace

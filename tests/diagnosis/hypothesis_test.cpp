@@ -1,4 +1,4 @@
-#include "diagnosis/hypothesis.hpp"
+#include "diagnosis/likelihood_model.hpp"
 
 #include <ceres/jet.h>
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@
 namespace bms::diagnosis {
 namespace {
 
-/// Table 9's lines meet within a millivolt; a derivative does not see such a step, a difference does.
+/// Table 9's lines meet within a millivolt. A finite difference sees such a step, a derivative does not.
 model::CellParameters<> without_steps(model::CellParameters<> cell) {
   for (std::size_t k = 1; k < cell.ocv.b0_v.size; ++k) {
     cell.ocv.b0_v[k] = cell.ocv.b0_v[k - 1] + (cell.ocv.b1_v[k - 1] - cell.ocv.b1_v[k]) * cell.ocv.soc[k];
@@ -18,7 +18,7 @@ model::CellParameters<> without_steps(model::CellParameters<> cell) {
   return cell;
 }
 
-LikelihoodModel plant_evidence(std::uint64_t seed = 1) {
+LikelihoodModel plant_likelihood(std::uint64_t seed = 1) {
   PreparedRecording r = test::recorded(test::drive(1, seed), 0.7, seed);
   r.temperature_c.assign(r.size(), 15.0);
   for (std::size_t k = 0; k < r.size(); ++k)
@@ -27,10 +27,10 @@ LikelihoodModel plant_evidence(std::uint64_t seed = 1) {
 }
 
 /// The mechanism well away from its neutral values.
-Hypothesis acting(const LikelihoodModel& evidence, std::size_t mechanism) {
-  const double ah = evidence.cell().capacity_ah;
+Hypothesis acting(const LikelihoodModel& likelihood, std::size_t mechanism) {
+  const double ah = likelihood.cell().capacity_ah;
   const model::MechanismInfo& info = model::catalogue[mechanism];
-  Hypothesis h = with(evidence.base(), mechanism, ah);
+  Hypothesis h = with(likelihood.base(), mechanism, ah);
   for (std::size_t p = 0; p < info.parameters; ++p) {
     const model::Parameter& parameter = info.parameter[p];
     if (parameter.role == model::Role::strength) h.settings.back().value[p] = 0.07 * parameter.upper(ah);
@@ -40,38 +40,38 @@ Hypothesis acting(const LikelihoodModel& evidence, std::size_t mechanism) {
   return h;
 }
 
-/// Every parameter of every mechanism: what the dual numbers say and what a small change does.
-TEST(Hypothesis, DerivativesAreThoseOfTheSimulation) {
-  const LikelihoodModel evidence = plant_evidence();
-  const double ah = evidence.cell().capacity_ah;
-  const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(evidence.calibration().size()), 0.3);
+/// Every parameter of every mechanism: dual numbers against finite differences.
+TEST(Hypothesis, DerivativesEqualFiniteDifferences) {
+  const LikelihoodModel likelihood = plant_likelihood();
+  const double ah = likelihood.cell().capacity_ah;
+  const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(likelihood.calibration().size()), 0.3);
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
     const model::MechanismInfo& info = model::catalogue[m];
     if (info.id == "contact_intermittent") continue;
-    const Hypothesis h = acting(evidence, m);
+    const Hypothesis h = acting(likelihood, m);
     const std::vector<ParameterRef> sought = h.sought();
-    const Columns exact = evidence.derivatives(h, u, sought);
+    const Columns exact = likelihood.derivatives(h, u, sought);
     for (std::size_t j = 0; j < sought.size(); ++j) {
       const model::Parameter& parameter = info.parameter[sought[j].parameter];
       const double step = 1e-7 * (parameter.upper(ah) - parameter.lower(ah));
       Hypothesis more = h, less = h;
       more.settings.back().value[sought[j].parameter] += step;
       less.settings.back().value[sought[j].parameter] -= step;
-      const Eigen::VectorXd difference = (evidence.residual(less, u) - evidence.residual(more, u)) / (2 * step);
+      const Eigen::VectorXd difference = (likelihood.residual(less, u) - likelihood.residual(more, u)) / (2 * step);
       const Eigen::VectorXd column = exact.col(static_cast<Eigen::Index>(j));
       EXPECT_LT((difference - column).norm(), 0.01 * column.norm() + 1e-6) << info.id << " " << parameter.name;
     }
   }
 }
 
-/// By every base parameter, each a dual number that goes through the whole recording: slow and plain. One record, one
-/// mechanism.
-Columns plain_calibration_derivatives(const LikelihoodModel& evidence, const Hypothesis& h, const Eigen::VectorXd& at) {
+/// By every base parameter, as a dual number through the whole recording: slow but simple. One record, one mechanism.
+Columns plain_calibration_derivatives(const LikelihoodModel& likelihood, const Hypothesis& h,
+                                      const Eigen::VectorXd& at) {
   constexpr Eigen::Index lanes = 16;
   using S = ceres::Jet<double, lanes>;
-  const model::CellParameters<>& cell = evidence.cell();
-  const PreparedRecording& r = evidence.records().front();
-  const Calibration& calibration = evidence.calibration();
+  const model::CellParameters<>& cell = likelihood.cell();
+  const PreparedRecording& r = likelihood.records().front();
+  const Calibration& calibration = likelihood.calibration();
   const auto tables = model::prepare<double, model::max_intervals>(cell);
   const model::MechanismInfo& info = model::catalogue[h.settings.back().index];
   const auto setting = [&](const char* id, std::size_t p) { return info.id == id ? h.settings.back().value[p] : 0; };
@@ -100,19 +100,20 @@ Columns plain_calibration_derivatives(const LikelihoodModel& evidence, const Hyp
       columns.row(static_cast<Eigen::Index>(k)).segment(first, here) = v.v.head(here).transpose();
     }
   }
-  evidence.whiten(columns);
+  likelihood.whiten(columns);
   return columns;
 }
 
-/// Carried from row to row or one by one through everything: the same but for rounding, whatever acts beside them.
-TEST(Hypothesis, BaseParametersCarriedTogetherAreThoseOneByOne) {
-  const LikelihoodModel evidence = plant_evidence();
+/// Carried from row to row, or one by one through the whole recording: the same except for rounding, with any
+/// mechanism.
+TEST(Hypothesis, CarriedBaseParameterDerivativesEqualThoseOneByOne) {
+  const LikelihoodModel likelihood = plant_likelihood();
   const Eigen::VectorXd u =
-      Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(evidence.calibration().size()), -0.5, 0.7);
+      Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(likelihood.calibration().size()), -0.5, 0.7);
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
-    const Hypothesis h = acting(evidence, m);
-    const Columns plain = plain_calibration_derivatives(evidence, h, u),
-                  carried = evidence.calibration_derivatives(h, u);
+    const Hypothesis h = acting(likelihood, m);
+    const Columns plain = plain_calibration_derivatives(likelihood, h, u),
+                  carried = likelihood.calibration_derivatives(h, u);
     for (Eigen::Index k = 0; k < u.size(); ++k) {
       EXPECT_LT((carried.col(k) - plain.col(k)).norm(), 1e-9 * plain.col(k).norm() + 1e-12)
           << model::catalogue[m].id << " " << k;
@@ -120,44 +121,44 @@ TEST(Hypothesis, BaseParametersCarriedTogetherAreThoseOneByOne) {
   }
 }
 
-TEST(Hypothesis, DerivativesByTheBaseParametersToo) {
+TEST(Hypothesis, BaseParameterDerivativesEqualFiniteDifferences) {
   // two recordings, and checks of both channels
-  const LikelihoodModel one = plant_evidence(2);
+  const LikelihoodModel one = plant_likelihood(2);
   std::vector<PreparedRecording> records(2, one.records().front());
   records[1].initial_soc = 0.65;
   for (PreparedRecording& r : records)
     r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002},
                 {Check::Channel::voltage, 1'800, 2, 3.3, 3.301, 0.001}};
-  const LikelihoodModel evidence(one.cell(), {}, records, NoiseModel{});
-  const Hypothesis h = evidence.base();
-  Eigen::VectorXd u = evidence.unchanged();
-  const Columns exact = evidence.calibration_derivatives(h, u);
+  const LikelihoodModel likelihood(one.cell(), {}, records, NoiseModel{});
+  const Hypothesis h = likelihood.base();
+  Eigen::VectorXd u = likelihood.unchanged();
+  const Columns exact = likelihood.calibration_derivatives(h, u);
   for (Eigen::Index k = 0; k < u.size(); ++k) {
     Eigen::VectorXd more = u, less = u;
     more[k] += 1e-5;
     less[k] -= 1e-5;
-    const Eigen::VectorXd difference = (evidence.residual(h, less) - evidence.residual(h, more)) / 2e-5;
+    const Eigen::VectorXd difference = (likelihood.residual(h, less) - likelihood.residual(h, more)) / 2e-5;
     EXPECT_LT((difference - exact.col(k)).norm(), 0.02 * exact.col(k).norm() + 1e-3) << k;
   }
 }
 
 TEST(Hypothesis, AFitIsNeverWorseThanWhereItBegan) {
-  const LikelihoodModel evidence = plant_evidence(3);
-  const HypothesisFit base = evidence.fit(evidence.base());
+  const LikelihoodModel likelihood = plant_likelihood(3);
+  const HypothesisFit base = likelihood.fit(likelihood.base());
   for (const char* id : {"ocv_hysteresis", "slow_polarisation", "fast_polarisation", "capacity_change",
                          "resistance_growth", "ocv_shape"}) {
-    const HypothesisFit fit =
-        evidence.fit(with(base.hypothesis, model::mechanism_index(id), evidence.cell().capacity_ah), base.calibration);
+    const HypothesisFit fit = likelihood.fit(
+        with(base.hypothesis, model::mechanism_index(id), likelihood.cell().capacity_ah), base.calibration);
     EXPECT_LE(fit.cost, base.cost + 1) << id;
   }
 }
 
-TEST(Hypothesis, FindsAStrengthThatWasPutIn) {
+TEST(Hypothesis, FindsAKnownStrength) {
   const double more_ohm = 0.004;
   const PreparedRecording r = test::recorded(
       test::drive(2, 4), 0.7, 4, [&](std::size_t, double current_a, double) { return more_ohm * current_a; });
-  const LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
-  const HypothesisFit fit = evidence.fit(with(evidence.base(), model::mechanism_index("resistance_growth"), 6));
+  const LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
+  const HypothesisFit fit = likelihood.fit(with(likelihood.base(), model::mechanism_index("resistance_growth"), 6));
   const MechanismSetting& found = fit.hypothesis.settings.back();
   EXPECT_NEAR(found.value[0], more_ohm / 0.0133, 0.03);
   EXPECT_GT(found.deviation[0], 0.001);
@@ -165,13 +166,13 @@ TEST(Hypothesis, FindsAStrengthThatWasPutIn) {
   EXPECT_TRUE(fit.converged);
 }
 
-/// A fit may be asked about where its simulation has run away.
-TEST(Bursts, EndWhateverTheResidual) {
-  const LikelihoodModel evidence = plant_evidence(5);
-  std::vector<double> residual_v(evidence.readings(), 0.001);
+/// Bursts may be searched in the residual of a simulation that has diverged.
+TEST(Bursts, SearchEndsForAnyResidual) {
+  const LikelihoodModel likelihood = plant_likelihood(5);
+  std::vector<double> residual_v(likelihood.readings(), 0.001);
   for (std::size_t k = 1'000; k < 1'020; ++k) residual_v[k] = k % 2 == 0 ? 1e298 : -1e298;
   double ohm = 0;
-  EXPECT_TRUE(find_bursts(evidence.records().front(), residual_v, evidence.whitener(0), ohm).empty());
+  EXPECT_TRUE(find_bursts(likelihood.records().front(), residual_v, likelihood.whitener(0), ohm).empty());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Which experiment is asked for, and whether what it adds decides.
+// Which experiment is proposed, and whether its recording decides.
 #include "diagnosis/next_experiment.hpp"
 
 #include <gmock/gmock.h>
@@ -17,13 +17,13 @@ MechanismSetting setting(std::string_view id, std::initializer_list<double> valu
   return s;
 }
 
-/// A diagnosis that has found these, each as well known as a recording tells it, and cannot tell them apart.
+/// A diagnosis that has found the first of a set and cannot distinguish the others from it.
 Diagnosis undecided(const std::vector<MechanismSetting>& set, double deviation) {
-  const LikelihoodModel evidence(test::table9(), {}, {test::recorded(test::drive(0.1, 1), 0.7, 1)}, NoiseModel{});
+  const LikelihoodModel likelihood(test::table9(), {}, {test::recorded(test::drive(0.1, 1), 0.7, 1)}, NoiseModel{});
   Diagnosis d;
   d.verdict = Verdict::ambiguous;
   const auto fitted = [&](const MechanismSetting& s) {
-    Fitted f{with(evidence.base(), s), {}};
+    Fitted f{with(likelihood.base(), s), {}};
     const auto n = static_cast<Eigen::Index>(f.hypothesis.sought().size());
     f.covariance = Eigen::MatrixXd::Identity(n, n) * deviation * deviation;
     return f;
@@ -40,17 +40,17 @@ Diagnosis undecided(const std::vector<MechanismSetting>& set, double deviation) 
   return d;
 }
 
-TEST(NextExperiment, LeakageAndAnOffsetArePartedByAnOpenContactor) {
+TEST(NextExperiment, AnOpenContactorSeparatesLeakageFromAnOffset) {
   const auto next = next_experiment(
       test::table9(), undecided({setting("leakage", {0.05}), setting("current_offset", {-0.05})}, 0.003), false);
   ASSERT_TRUE(next);
   EXPECT_EQ(next->profile, "zero_current") << "the shortest in which nothing flows";
   EXPECT_THAT(next->separates, testing::ElementsAre(index_of("leakage"), index_of("current_offset")));
   EXPECT_GE(next->gain, 40);
-  EXPECT_THAT(why(*next), testing::StartsWith("To tell "));
+  EXPECT_THAT(why(*next), testing::StartsWith("To distinguish "));
 }
 
-TEST(NextExperiment, EveryUsualSetHasADesignThatPartsIt) {
+TEST(NextExperiment, EveryUsualSetHasACourseThatSeparatesIt) {
   const std::vector<std::vector<MechanismSetting>> sets = {
       {setting("voltage_offset", {0.01}), setting("voltage_gain", {0.003})},
       {setting("current_gain", {0.03}), setting("capacity_change", {0.03})},
@@ -69,7 +69,7 @@ TEST(NextExperiment, EveryUsualSetHasADesignThatPartsIt) {
   }
 }
 
-TEST(NextExperiment, IsLaidOutForTheChargeThatTheCellMayHoldAtLeast) {
+TEST(NextExperiment, IsLaidOutForTheSmallestPossibleCapacity) {
   const auto next = next_experiment(
       test::table9(), undecided({setting("capacity_change", {0.25}), setting("ocv_shape", {0.05, 0.05})}, 1e-3), false);
   ASSERT_TRUE(next);
@@ -77,12 +77,12 @@ TEST(NextExperiment, IsLaidOutForTheChargeThatTheCellMayHoldAtLeast) {
   EXPECT_THAT(command(*next), testing::HasSubstr("--capacity-ah 4.5"));
 }
 
-TEST(NextExperiment, WhatStandsAloneNeedsNone) {
+TEST(NextExperiment, AFindingWithoutRivalsNeedsNoExperiment) {
   Diagnosis d = undecided({setting("leakage", {0.05})}, 0.003);
   EXPECT_FALSE(next_experiment(test::table9(), d, true));
 }
 
-/// An hour's drive, then half an hour with the contactor open; read_a: what the sensor says there.
+/// An hour of driving, then half an hour with the contactor open.
 PreparedRecording with_open_contactor(double offset_a) {
   std::vector<double> current_a = test::drive(2, 31);
   for (std::size_t k = 3'600; k < 5'400; ++k) current_a[k] = 0;
@@ -99,17 +99,17 @@ TEST(Reference, TheReadingOfAnOpenContactorDecidesBetweenLeakageAndAnOffset) {
   const PreparedRecording r = with_open_contactor(offset_a);
   ASSERT_GE(r.checks.size(), 5U);
   const auto cost = [](const PreparedRecording& record, const char* id) {
-    const LikelihoodModel evidence(test::table9(), {}, {record}, NoiseModel{});
-    return evidence.fit(with(evidence.base(), index_of(id), 6)).cost;
+    const LikelihoodModel likelihood(test::table9(), {}, {record}, NoiseModel{});
+    return likelihood.fit(with(likelihood.base(), index_of(id), 6)).cost;
   };
   PreparedRecording without = r;
   without.checks.clear();
   EXPECT_LT(std::abs(cost(without, "leakage") - cost(without, "current_offset")), 7)
-      << "the voltage alone does not tell";
+      << "the voltage alone does not decide";
   EXPECT_GT(cost(r, "leakage") - cost(r, "current_offset"), 30);
 }
 
-TEST(Reference, ChecksOfTheVoltageTellAnOffsetFromAGainAndAContact) {
+TEST(Reference, VoltageChecksDistinguishAnOffsetFromAGainAndAContact) {
   PreparedRecording r = test::recorded(test::drive(1, 32), 0.7, 32, [](std::size_t, double, double) { return 0.01; });
   std::vector<double> reference_a(r.size(), std::nan("")), reference_v(r.size(), std::nan(""));
   for (std::size_t k = 600; k < 1'800; ++k) {
@@ -119,42 +119,43 @@ TEST(Reference, ChecksOfTheVoltageTellAnOffsetFromAGainAndAContact) {
   }
   average_references(r, reference_a, reference_v, test::table9());
   EXPECT_TRUE(std::isnan(r.voltage_v[700])) << "a source's voltage is not the cell's";
-  const LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
-  EXPECT_EQ(evidence.used(), r.size() - 1'200 - (std::abs(r.current_a[0]) < 0.06 ? 0 : 1));
-  const auto cost = [&](const char* id) { return evidence.fit(with(evidence.base(), index_of(id), 6)).cost; };
+  const LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
+  EXPECT_EQ(likelihood.used(), r.size() - 1'200 - (std::abs(r.current_a[0]) < 0.06 ? 0 : 1));
+  const auto cost = [&](const char* id) { return likelihood.fit(with(likelihood.base(), index_of(id), 6)).cost; };
   EXPECT_GT(cost("voltage_gain") - cost("voltage_offset"), 30);
   EXPECT_GT(cost("contact_step") - cost("voltage_offset"), 30);
 }
 
-/// The derivatives of the checks, all mechanisms that they see.
-TEST(Reference, DerivativesOfChecksAreThoseOfTheSimulation) {
+/// Of all mechanisms that a check depends on.
+TEST(Reference, DerivativesOfChecksEqualFiniteDifferences) {
   PreparedRecording r = with_open_contactor(0.1);
   r.checks.push_back({Check::Channel::voltage, 4'000, 2, 3.31, 3.3, 0.001});
   r.checks.push_back({Check::Channel::voltage, 4'100, -2, 3.21, 3.2, 0.001});
-  const LikelihoodModel evidence(test::table9(), {}, {r}, NoiseModel{});
+  const LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
   const auto checks = static_cast<Eigen::Index>(r.checks.size());
-  const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(evidence.calibration().size()), 0.2);
+  const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(likelihood.calibration().size()), 0.2);
   for (const char* id : {"current_offset", "current_gain", "voltage_offset", "voltage_gain", "contact_step"}) {
-    Hypothesis h = with(evidence.base(), index_of(id), 6);
+    Hypothesis h = with(likelihood.base(), index_of(id), 6);
     h.settings.back().value[0] = 0.01;
-    const Eigen::VectorXd exact = evidence.derivatives(h, u, std::vector<ParameterRef>{{0, 0}}).col(0).tail(checks);
+    const Eigen::VectorXd exact = likelihood.derivatives(h, u, std::vector<ParameterRef>{{0, 0}}).col(0).tail(checks);
     Hypothesis more = h, less = h;
     more.settings.back().value[0] += 1e-6;
     less.settings.back().value[0] -= 1e-6;
-    const Eigen::VectorXd difference = (evidence.residual(less, u) - evidence.residual(more, u)).tail(checks) / 2e-6;
+    const Eigen::VectorXd difference =
+        (likelihood.residual(less, u) - likelihood.residual(more, u)).tail(checks) / 2e-6;
     EXPECT_GT(exact.norm(), 0.1) << id;
     EXPECT_LT((difference - exact).norm(), 1e-4 * exact.norm()) << id;
   }
 }
 
-TEST(LikelihoodModel, ALaterRecordingKeepsTheContactAndForgetsTheWrongStart) {
+TEST(LikelihoodModel, ALaterRecordingKeepsTheContactAndNotTheWrongStart) {
   const PreparedRecording r = test::recorded(test::drive(0.5, 33), 0.7, 33);
-  const LikelihoodModel evidence(test::table9(), {}, {r, r}, NoiseModel{});
-  const Eigen::VectorXd none = evidence.unchanged();
-  const std::vector<double> plain = evidence.voltage(evidence.base(), none, 1);
-  EXPECT_EQ(evidence.voltage(with(evidence.base(), setting("initial_soc", {0.1})), none, 1), plain);
+  const LikelihoodModel likelihood(test::table9(), {}, {r, r}, NoiseModel{});
+  const Eigen::VectorXd none = likelihood.unchanged();
+  const std::vector<double> plain = likelihood.voltage(likelihood.base(), none, 1);
+  EXPECT_EQ(likelihood.voltage(with(likelihood.base(), setting("initial_soc", {0.1})), none, 1), plain);
   const std::vector<double> contact =
-      evidence.voltage(with(evidence.base(), setting("contact_step", {0.005, 1'000})), none, 1);
+      likelihood.voltage(with(likelihood.base(), setting("contact_step", {0.005, 1'000})), none, 1);
   EXPECT_NEAR(contact[500] - plain[500], 0.005 * r.current_a[500], 1e-9)
       << "before the moment at which the first one got it";
 }

@@ -17,7 +17,7 @@ struct Drawn {
   Columns residual;
 };
 
-/// Noise exactly as the model has it.
+/// Noise drawn from the model itself.
 Drawn drawn(const NoiseModel& n, std::size_t samples, std::uint64_t seed) {
   plant::Random random(seed);
   Drawn d{{}, RowNoise(samples), std::vector<char>(samples, 1), Columns(static_cast<Eigen::Index>(samples), 1)};
@@ -34,7 +34,7 @@ Drawn drawn(const NoiseModel& n, std::size_t samples, std::uint64_t seed) {
   return d;
 }
 
-TEST(Whitener, MakesItsOwnNoiseWhite) {
+TEST(Whitener, WhitensItsOwnNoise) {
   const NoiseModel n{.white_v = 0.001, .fast_v = 0.003, .fast_s = 60, .slow_v = 0.005, .slow_s = 3'600};
   Drawn d = drawn(n, 40'000, 1);
   d.usable[100] = 0;
@@ -62,7 +62,7 @@ TEST(Whitener, ASlowDriftIsWorthFewSamplesAndAStepMany) {
   EXPECT_GT(columns.col(1).squaredNorm(), 1'000);
 }
 
-TEST(Whitener, WhereTheOcvPlungesALargeErrorIsLittle) {
+TEST(Whitener, ALargeErrorCountsLittleWhereTheOcvIsSteep) {
   NoiseModel n;
   const std::size_t samples = 2'000;
   Drawn d = drawn(n, samples, 4);
@@ -76,7 +76,7 @@ TEST(Whitener, WhereTheOcvPlungesALargeErrorIsLittle) {
   EXPECT_LT(steep.squaredNorm(), 10);
 }
 
-TEST(WhiteNoise, IsReadWhereTheCurrentIsQuiet) {
+TEST(WhiteNoise, IsMeasuredWhereTheCurrentIsConstant) {
   plant::Random random(3);
   std::vector<double> voltage_v, current_a;
   for (int k = 0; k < 5'000; ++k) {
@@ -90,7 +90,7 @@ TEST(WhiteNoise, IsReadWhereTheCurrentIsQuiet) {
       << "a quantised channel is no better than its step";
 }
 
-TEST(QuietCurrent, KeepsStepsAndLosesNoise) {
+TEST(DenoiseCurrent, KeepsStepsAndRemovesNoise) {
   plant::Random random(4);
   std::vector<double> read_a, true_a;
   for (int k = 0; k < 4'000; ++k) {
@@ -98,12 +98,12 @@ TEST(QuietCurrent, KeepsStepsAndLosesNoise) {
     read_a.push_back(true_a.back() + 0.02 * random.normal());
   }
   EXPECT_NEAR(current_noise(read_a), 0.02, 0.005);
-  const std::vector<double> quiet_a = denoise_current(read_a, 0.02);
+  const std::vector<double> denoised_a = denoise_current(read_a, 0.02);
   double before = 0, after = 0;
   for (std::size_t k = 0; k < read_a.size(); ++k) {
     before += std::pow(read_a[k] - true_a[k], 2);
-    after += std::pow(quiet_a[k] - true_a[k], 2);
-    ASSERT_NEAR(quiet_a[k], true_a[k], 0.09) << k;
+    after += std::pow(denoised_a[k] - true_a[k], 2);
+    ASSERT_NEAR(denoised_a[k], true_a[k], 0.09) << k;
   }
   EXPECT_LT(after, before / 10);
 }

@@ -21,12 +21,12 @@ PreparedRecording healthy() { return test::recorded(test::drive(1, 1), 0.7, 1); 
 
 TEST(RecordingCheck, AHealthyRecordingHasNoFault) {
   PreparedRecording r = healthy();
-  const RecordingCheck trust = check_recording(r, test::table9());
-  EXPECT_TRUE(trust.faults.empty());
-  EXPECT_TRUE(trust.warnings.empty());
+  const RecordingCheck check = check_recording(r, test::table9());
+  EXPECT_TRUE(check.faults.empty());
+  EXPECT_TRUE(check.warnings.empty());
 }
 
-TEST(RecordingCheck, AReadingThatStandsStillAtConstantCurrentOnAFlatCurveIsNoFault) {
+TEST(RecordingCheck, AConstantReadingAtConstantCurrentOnAFlatOcvIsAccepted) {
   PreparedRecording r = healthy();
   for (std::size_t k = 1'000; k < 1'400; ++k) {
     r.current_a[k] = -6 + 0.003 * (k % 2 == 0 ? 1 : -1);
@@ -61,13 +61,13 @@ TEST(RecordingCheck, FindsWhatNoPhysicsExplains) {
   EXPECT_THAT(faults_of(gaps), ElementsAre("gaps"));
 }
 
-TEST(RecordingCheck, AFewBadReadingsAreTakenOutAndTold) {
+TEST(RecordingCheck, AFewBadReadingsAreRemovedAndReported) {
   PreparedRecording r = healthy();
   r.voltage_v[500] = 0;
   r.voltage_v[700] = 4.9;
-  const RecordingCheck trust = check_recording(r, test::table9());
-  EXPECT_TRUE(trust.faults.empty());
-  EXPECT_EQ(trust.warnings.size(), 1U);
+  const RecordingCheck check = check_recording(r, test::table9());
+  EXPECT_TRUE(check.faults.empty());
+  EXPECT_EQ(check.warnings.size(), 1U);
   EXPECT_TRUE(std::isnan(r.voltage_v[500]));
   EXPECT_TRUE(std::isnan(r.voltage_v[700]));
 }

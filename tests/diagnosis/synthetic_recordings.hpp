@@ -1,4 +1,5 @@
-// Recordings of cells that the diagnosis does not know, for its tests.
+// Synthetic recordings for the tests of the diagnosis: the plant's cell, with equations that the diagnosis does not
+// know.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@
 
 namespace bms::test {
 
-/// Two-way drive for so many hours: charging and discharging spells of up to 2C, with rests; 1 s samples.
+/// Drive of so many hours: charging and discharging spells of up to 2C, with rests; samples every second.
 inline std::vector<double> drive(double hours, std::uint64_t seed, double capacity_ah = 6) {
   plant::Random random(seed);
   std::vector<double> current_a;
@@ -33,7 +34,8 @@ inline std::vector<double> drive(double hours, std::uint64_t seed, double capaci
   return current_a;
 }
 
-/// What instruments read of the plant's cell: Table 9 made smooth, a millivolt and ten milliamperes of noise.
+/// The plant's cell (Table 9 made smooth) as instruments with 1 mV and 10 mA of noise read it. add_v(row, current,
+/// soc): added to the voltage.
 inline diagnosis::PreparedRecording recorded(const std::vector<double>& current_a, double initial_soc,
                                              std::uint64_t seed,
                                              const std::function<double(std::size_t, double, double)>& add_v = {}) {

@@ -1,0 +1,51 @@
+#include "diagnosis/adequacy.hpp"
+
+#include <algorithm>
+
+#include "diagnosis/thresholds.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+constexpr const Thresholds::Adequacy& adequacy_limits = thresholds.adequacy;
+
+double gained(const Adequacy& a) { return a.control_cost - a.best_cost; }
+
+double explained_share(const Adequacy& a) {
+  const double gain = std::max(gained(a), 0.0);
+  return gain + a.residual.gain > 0 ? gain / (gain + a.residual.gain) : 1;
+}
+
+bool is_unknown(const Adequacy& a, const Hypothesis& best) {
+  if (a.residual.gain <= adequacy_limits.unexplained && a.residual.far_out <= adequacy_limits.far_out) return false;
+  // what is flexible gains on anything: if it is named, its residual must be white
+  const double enough =
+      best.find(Signature::contact_bursts) != nullptr ? adequacy_limits.explained_by_bursts : adequacy_limits.explained;
+  return !a.found || a.explained < enough || a.residual.fast_excess > adequacy_limits.fast_excess;
+}
+
+}  // namespace
+
+Adequacy judge(LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& control,
+               Survivors& survivors) {
+  likelihood.set_noise(nominal);
+  const int iterations = numerics.fit.nominal_iterations;
+  const HypothesisFit control_fit = likelihood.fit(control.hypothesis, control.calibration, iterations),
+                      best_fit = likelihood.fit(survivors.best.hypothesis, survivors.best.calibration, iterations);
+  Adequacy a{control_fit.cost, best_fit.cost, test_residual(likelihood, best_fit)};
+  a.explained = explained_share(a);
+  // what explains little, and that incompletely, is not a cause
+  if (!survivors.best.hypothesis.added().empty() && gained(a) < thresholds.decision.faint &&
+      a.explained < adequacy_limits.explained) {
+    survivors = {control, {}, {}, {}};
+    a = {control_fit.cost, control_fit.cost, test_residual(likelihood, control_fit)};
+    a.explained = explained_share(a);
+  }
+  likelihood.set_noise(survivors.best.noise);
+  a.found = !survivors.best.hypothesis.added().empty();
+  a.unknown = is_unknown(a, survivors.best.hypothesis);
+  return a;
+}
+
+}  // namespace bms::diagnosis

@@ -1,0 +1,190 @@
+// Derivatives of the predicted voltage: dual numbers through the simulation.
+#include <algorithm>
+
+#include <ceres/jet.h>
+
+#include "diagnosis/likelihood_model.hpp"
+#include "diagnosis/simulation_run.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+/// Derivatives that go through the simulation at once.
+enum : std::size_t { few_lanes = 4, many_lanes = 8 };
+
+/// The base parameters for derivatives along one row: a lane per lever, then one per state as it was before the row.
+template <class S>
+struct OnLevers : AtUnknowns<S> {
+  using Plain = AtUnknowns<S>;
+
+  S capacity_loss() const { return pulled(Plain::capacity_loss(), Lever::capacity); }
+  S gain_error() const { return pulled(Plain::gain_error(), Lever::gain); }
+  S offset_a(std::size_t record, double time_s) const { return pulled(Plain::offset_a(record, time_s), Lever::zero); }
+  void adjust(model::TablePoint<S>& at, const S& soc) const {
+    this->calibration.adjust(at, soc, this->u, [](std::size_t lever, const S& x) { return pulled(x, lever); });
+  }
+  void before_row(model::OpenLoopSimulation<S>& simulation) const {
+    Eigen::Index lane = Lever::count;
+    simulation.each_state([&](S& state) {
+      state.v.setZero();
+      state.v[lane++] = 1;
+    });
+  }
+
+ private:
+  static S pulled(S s, std::size_t lever) {
+    s.v[static_cast<Eigen::Index>(lever)] += 1;
+    return s;
+  }
+};
+
+/// The hypothesis' settings as dual numbers.
+template <class Jet>
+std::vector<model::MechanismValues<Jet>> dual_values(const Hypothesis& h) {
+  std::vector<model::MechanismValues<Jet>> values;
+  for (const MechanismSetting& s : h.settings) {
+    auto& v = values.emplace_back();
+    for (std::size_t p = 0; p < v.size(); ++p) v[p] = Jet(s.value[p]);
+  }
+  return values;
+}
+
+/// An unknown that acts on a row, through a lever.
+struct Pull {
+  Eigen::Index lever, unknown;
+  double size;
+};
+
+/// Carries the derivatives of all states by all unknowns that move a state from row to row.
+template <class Jet>
+class CarriedStates {
+ public:
+  /// still: unknowns that move no state; they come first.
+  CarriedStates(Eigen::Index states, Eigen::Index unknowns, Eigen::Index still)
+      : still_(still), states_(states, unknowns - still), next_(states_) {}
+
+  void restart(Eigen::Index initial_soc_unknown, double initial_soc_size) {
+    states_.setZero();
+    states_(0, initial_soc_unknown - still_) = initial_soc_size;
+  }
+  /// The row's voltage by all unknowns, into out; then the states after the row.
+  template <class Out>
+  void step(const Jet& voltage, model::OpenLoopSimulation<Jet>& simulation, const std::vector<Pull>& pulls, Out out) {
+    Eigen::Index count = 0;
+    simulation.each_state([&](const Jet& state) {
+      auto to = next_.row(count++);
+      through_states(state, to);
+      for (const Pull& p : pulls) {
+        if (p.unknown >= still_) to[p.unknown - still_] += state.v[p.lever] * p.size;
+      }
+    });
+    out.head(still_).setZero();
+    through_states(voltage, out.tail(states_.cols()));
+    for (const Pull& p : pulls) out[p.unknown] += voltage.v[p.lever] * p.size;
+    states_.swap(next_);
+  }
+
+ private:
+  template <class Row>
+  void through_states(const Jet& of, Row to) const {
+    to.setZero();
+    constexpr Eigen::Index first = Lever::count;
+    for (Eigen::Index s = 0; s + first < of.v.size(); ++s) {
+      if (const double by = of.v[s + first]; by != 0) to += by * states_.row(s);  // most are 0
+    }
+  }
+
+  Eigen::Index still_;
+  Columns states_, next_;  // d state / d unknown
+};
+
+}  // namespace
+
+template <std::size_t Lanes>
+void LikelihoodModel::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const ParameterRef> by,
+                             std::size_t first, std::size_t here, Columns& columns) const {
+  using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
+  std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
+  const std::vector<double> unknowns(u.data(), u.data() + u.size());
+  for (std::size_t lane = 0; lane < here; ++lane)
+    values[by[first + lane].setting][by[first + lane].parameter].v[static_cast<Eigen::Index>(lane)] = 1;
+  Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
+  const auto put = [&](Eigen::Index at, const Jet& v) {
+    for (std::size_t lane = 0; lane < here; ++lane)
+      columns(at, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
+  };
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    run<Jet>(
+        values, h, AtUnknowns<Jet>{calibration_, unknowns}, r,
+        [&](std::size_t, const Jet& v, const auto&) { put(row++, v); },
+        [&](std::size_t, const Jet& expected) { put(check_row++, expected); });
+  }
+}
+
+Columns LikelihoodModel::derivatives(const Hypothesis& h, const Eigen::VectorXd& u,
+                                     std::span<const ParameterRef> by) const {
+  Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(by.size()));
+  if (by.empty()) return columns;
+  for (std::size_t first = 0; first < by.size();) {
+    const bool few = by.size() - first <= few_lanes;
+    const std::size_t here = std::min<std::size_t>(few ? few_lanes : many_lanes, by.size() - first);
+    if (few)
+      derive<few_lanes>(h, u, by, first, here, columns);
+    else
+      derive<many_lanes>(h, u, by, first, here, columns);
+    first += here;
+  }
+  whiten(columns);
+  return columns;
+}
+
+template <std::size_t Lanes>
+void LikelihoodModel::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const {
+  using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
+  const std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
+  const std::vector<double> unknowns(u.data(), u.data() + u.size());
+  const OnLevers<Jet> base{{calibration_, unknowns}};
+  std::vector<Pull> pulls;
+  const auto pull = [&](std::size_t record, double time_s, double soc) {
+    pulls.clear();
+    calibration_.each_lever(record, time_s, soc, [&](std::size_t lever, std::size_t unknown, double size) {
+      pulls.push_back({static_cast<Eigen::Index>(lever), static_cast<Eigen::Index>(unknown), size});
+    });
+  };
+  CarriedStates<Jet> states(static_cast<Eigen::Index>(Lanes - Lever::count), columns.cols(),
+                            static_cast<Eigen::Index>(calibration_.ocv_unknowns()));
+  Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    const PreparedRecording& record = records_[r];
+    states.restart(static_cast<Eigen::Index>(calibration_.initial_soc_unknown(r)), calibration_.initial_soc_size(r));
+    run<Jet>(
+        values, h, base, r,
+        [&](std::size_t k, const Jet& v, auto& simulation) {
+          pull(r, record.time_s[k], simulation.soc().a);
+          states.step(v, simulation, pulls, columns.row(row++));
+        },
+        [&](std::size_t j, const Jet& expected) {
+          pull(r, record.checks[j].time_s, 0);
+          auto out = columns.row(check_row++);
+          out.setZero();
+          for (const Pull& p : pulls) out[p.unknown] += expected.v[p.lever] * p.size;
+        });
+  }
+}
+
+Columns LikelihoodModel::calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(calibration_.size()));
+  std::size_t states = 0;
+  for (const MechanismSetting& s : h.settings) states += model::catalogue[s.index].states;
+  constexpr std::size_t one_law = Lever::count + model::OneRc<double>::states + 1,
+                        all_laws = Lever::count + model::OpenLoopSimulation<double>::most_states;
+  if (states <= 1)
+    carry<one_law>(h, u, columns);
+  else
+    carry<all_laws>(h, u, columns);
+  whiten(columns);
+  return columns;
+}
+
+}  // namespace bms::diagnosis

@@ -1,0 +1,69 @@
+// A hysteresis of the OCV. Its signature varies the two branch positions as well: times the half gap they are linear.
+#pragma once
+
+#include <fmt/format.h>
+
+#include "diagnosis/mechanism.hpp"
+#include "model/mechanisms/ocv_hysteresis.hpp"
+
+namespace bms::diagnosis {
+
+template <>
+struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> {
+  static constexpr MechanismText text = {
+      .id = model::OcvHysteresis::id,
+      .name = "a hysteresis of the OCV",
+      .brief = "the open-circuit voltage remembers the direction of the last charge",
+      .mark = "follows the direction of the charge moved and stays through every rest, however long",
+      .meaning =
+          "After charging the cell rests higher than after discharging at the same state of charge, as LiFePO4 does.",
+      .action =
+          "Use the extended cell file: with one curve for both directions, every estimate from a rest voltage is off."};
+  static constexpr bool probes_places = true;
+  static constexpr bool report_limit = true;
+  static constexpr Fact facts = Fact::reversals | Fact::rests;
+  static constexpr std::size_t half_gap = 0, ocv_at = 2, initial = 3, measured = 4;  ///< places of the parameters
+  static constexpr double probing_share = 0.02;  ///< of the largest half gap: small enough to be linear
+  static constexpr double smallest_start_v = 0.001, largest_start_v = 0.06;  ///< [V] half gap where a fit begins
+  static constexpr double smallest_throughput_soc = 0.03;                    ///< charge moved, over the capacity
+  static constexpr double charged_soc = 0.9;  ///< a later recording that begins above it was charged last
+
+  static std::string claim(const MechanismSetting& s) {
+    return fmt::format(
+        "the open-circuit voltage depends on whether the cell was charged or discharged last, by {} to either side",
+        size_text(s, half_gap));
+  }
+  static std::vector<double> probing_shapes(double) { return {12, 30, 80, 220}; }
+  static void adjust_probe(MechanismSetting& probe, const RecordingFacts& facts) {
+    probe.value[half_gap] = probing_share * model::OcvHysteresis::parameters[half_gap].upper(facts.capacity_ah);
+  }
+  /// The signature's strengths are the half gap and its products with the positions.
+  static MechanismSetting start(const SignatureFit& s) {
+    MechanismSetting start = s.probe;
+    const double probed_v = s.probe.value[half_gap],
+                 here_v = std::clamp(s.found[0] + probed_v, smallest_start_v, largest_start_v);
+    start.value[half_gap] = here_v;
+    start.value[ocv_at] = std::clamp(s.found[1] * probed_v / here_v, -1.0, 1.0);
+    start.value[initial] = std::clamp(s.found[2] * probed_v / here_v, -1.0, 1.0);
+    return start;
+  }
+  static std::optional<std::string> not_testable(const TestConditions& c) {
+    if (c.facts.throughput_soc < smallest_throughput_soc) return "too little charge is moved";
+    return std::nullopt;
+  }
+  /// A cell file with the gap between charge and discharge says that there is a hysteresis.
+  static bool expected(const model::CellParameters<>& cell, const RecordingFacts&) {
+    return cell.ocv.half_gap_v.size > 0;
+  }
+  static void after_full_charge(MechanismSetting& s) { s.value[initial] = 1; }
+  template <class S>
+  static void set_up(SimulationSetup<S>& setup, model::MechanismValues<S> value) {
+    if (setup.record > 0 && setup.recording.initial_soc > charged_soc) {
+      value[initial] = S(1);
+      value[measured] = S(0);
+    }
+    setup.template choose<model::OcvHysteresis>(value);
+  }
+};
+
+}  // namespace bms::diagnosis

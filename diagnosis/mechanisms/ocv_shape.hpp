@@ -1,0 +1,35 @@
+// An OCV curve that has slid along the state of charge.
+#pragma once
+
+#include <fmt/format.h>
+
+#include "diagnosis/mechanism.hpp"
+#include "diagnosis/mechanisms/needs_soc_span.hpp"
+#include "model/mechanisms/ocv_shape.hpp"
+
+namespace bms::diagnosis {
+
+template <>
+struct Knowledge<model::OcvShape> : DefaultKnowledge<model::OcvShape> {
+  static constexpr MechanismText text = {
+      .id = model::OcvShape::id,
+      .name = "an OCV curve that has slid",
+      .brief = "the steps of the OCV lie at another state of charge",
+      .mark = "moves the steps of the OCV curve along the state of charge and leaves its ends",
+      .meaning = "The electrodes have slipped against each other: loss of lithium or of active material.",
+      .action = "Record a new slow OCV curve, and measure the capacity with it."};
+  static constexpr Fact facts = Fact::soc_span;
+
+  static std::string claim(const MechanismSetting& s) {
+    const auto& parameter = model::OcvShape::parameters;
+    return fmt::format("the OCV curve has slid along the state of charge, by {} at {} % and {} at {} %",
+                       quantity(s.value[0], s.deviation[0], "%"), number_in(parameter[0].name),
+                       quantity(s.value[1], s.deviation[1], "%"), number_in(parameter[1].name));
+  }
+  static std::optional<std::string> not_testable(const TestConditions& c) { return needs_soc_span(c); }
+  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts&) {
+    return {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
+  }
+};
+
+}  // namespace bms::diagnosis

@@ -1,0 +1,124 @@
+#include "diagnosis/recording_facts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "diagnosis/charge_count.hpp"
+#include "diagnosis/thresholds.hpp"
+#include "measurement/statistics.hpp"
+#include "model/mechanism.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+constexpr const Thresholds::Facts& fact_limits = thresholds.facts;
+
+/// Smallest and largest value.
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  void add(double x) {
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+  double span() const { return high > low ? high - low : 0; }
+};
+
+/// Counts how often the charge turns: it has gone back by turn_soc from its farthest point.
+class Turns {
+ public:
+  explicit Turns(double soc) : start_(soc), farthest_(soc) {}
+  /// Returns true if the charge has turned in this row.
+  bool turned(double soc) {
+    if (heading_ > 0) farthest_ = std::max(farthest_, soc);
+    if (heading_ < 0) farthest_ = std::min(farthest_, soc);
+    const bool begins = heading_ == 0 && std::abs(soc - start_) > fact_limits.turn_soc,
+               turns = heading_ != 0 && (farthest_ - soc) * heading_ > fact_limits.turn_soc;
+    if (begins) heading_ = soc > start_ ? 1 : -1;
+    if (turns) heading_ = -heading_;
+    if (begins || turns) farthest_ = soc;
+    return turns;
+  }
+
+ private:
+  double start_, farthest_;
+  int heading_ = 0;
+};
+
+/// Is the largest current reached often enough, in visits apart from each other?
+std::optional<double> rail_a(double largest_a, double capacity_ah, std::span<const PreparedRecording> records) {
+  if (largest_a < fact_limits.rail_c * capacity_ah) return std::nullopt;
+  std::size_t near = 0, runs = 0;
+  for (const PreparedRecording& r : records) {
+    bool inside = false;
+    for (const double a : r.current_a) {
+      const bool now = std::isfinite(a) && std::abs(a) > fact_limits.rail_share * largest_a;
+      near += now ? 1 : 0;
+      runs += now && !inside ? 1 : 0;
+      inside = now;
+    }
+  }
+  return near >= fact_limits.rail_rows && runs >= fact_limits.rail_runs ? std::optional(largest_a) : std::nullopt;
+}
+
+/// All that follows from the counted charge of one recording.
+void count_charge(const PreparedRecording& r, RecordingFacts& facts, Range& soc, std::set<int>& rates,
+                  std::vector<double>& steps_s) {
+  Turns turns(r.initial_soc);
+  double rested_s = 0;
+  for_each_row(r, facts.capacity_ah, [&](const CountedRow& row) {
+    if (row.k > 0) {
+      steps_s.push_back(row.duration_s);
+      facts.throughput_soc += std::abs(row.moved_soc);
+      facts.charged_soc += std::max(row.moved_soc, 0.0);
+      if (std::abs(row.current_a - row.previous_a) > fact_limits.edge_c * facts.capacity_ah) ++facts.edges;
+    }
+    soc.add(row.soc);
+    const double c_rate = std::abs(row.current_a) / facts.capacity_ah;
+    rested_s = c_rate < fact_limits.rest_c ? rested_s + row.duration_s : 0;
+    facts.longest_rest_s = std::max(facts.longest_rest_s, rested_s);
+    if (c_rate > fact_limits.rate_c)
+      rates.insert(static_cast<int>(std::lround(std::log(c_rate) / std::log(fact_limits.rate_ratio))));
+    if (turns.turned(row.soc)) ++facts.reversals;
+  });
+}
+
+}  // namespace
+
+RecordingFacts recording_facts(double capacity_ah, std::span<const PreparedRecording> records) {
+  RecordingFacts facts;
+  facts.capacity_ah = capacity_ah;
+  Range soc, read_a, temperature_c;
+  std::set<int> rates;
+  std::vector<double> steps_s;
+  for (const PreparedRecording& r : records) {
+    facts.duration_s += r.duration_s();
+    facts.duration_h += r.duration_s() / 3'600;
+    facts.start_given = facts.start_given || r.initial_soc_given;
+    facts.trusted_instruments = facts.trusted_instruments || !r.checks.empty();
+    count_charge(r, facts, soc, rates, steps_s);
+    for (const double a : r.current_a) {
+      if (!std::isfinite(a)) continue;
+      read_a.add(a);
+      facts.loaded_rows += std::abs(a) > fact_limits.moving_c * capacity_ah ? 1 : 0;
+      facts.largest_a = std::max(facts.largest_a, std::abs(a));
+    }
+    for (const double c : r.temperature_c) {
+      if (!std::isfinite(c)) continue;
+      temperature_c.add(c);
+      facts.temperature = true;
+      facts.away_k = std::max(facts.away_k, std::abs(c - model::reference_temperature_c));
+    }
+  }
+  if (!steps_s.empty()) facts.step_s = measurement::upper_median(steps_s);
+  facts.soc_span = soc.span();
+  facts.read_span_a = read_a.span();
+  facts.temperature_span_k = temperature_c.span();
+  facts.rates = rates.size();
+  facts.rail_a = rail_a(facts.largest_a, capacity_ah, records);
+  return facts;
+}
+
+}  // namespace bms::diagnosis

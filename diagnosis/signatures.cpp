@@ -1,0 +1,132 @@
+#include "diagnosis/signatures.hpp"
+
+#include <cmath>
+
+#include "diagnosis/testability.hpp"
+#include "diagnosis/thresholds.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+using model::catalogue;
+using model::Role;
+
+/// Collects probes and their columns.
+class Collector {
+ public:
+  Collector(const LikelihoodModel& likelihood, const HypothesisFit& around)
+      : likelihood_(likelihood), around_(around) {}
+
+  void add_derivatives(std::size_t mechanism) {
+    const model::MechanismInfo& info = catalogue[mechanism];
+    for (const MechanismSetting& setting : probe_settings(likelihood_, mechanism)) {
+      const Hypothesis probe = with(around_.hypothesis, setting);
+      Probe p{setting, {}, count_};
+      std::vector<ParameterRef> by;
+      for (std::size_t k = 0; k < info.parameters; ++k) {
+        const Role role = info.parameter[k].role;
+        if (role != Role::strength && !(role == Role::place && knowledge_of(mechanism).probes_places)) continue;
+        p.parameters.push_back(k);
+        by.push_back({probe.settings.size() - 1, k});
+      }
+      add(std::move(p), likelihood_.derivatives(probe, around_.calibration, by));
+    }
+  }
+
+  /// A resistance from a moment on: the current after it, one column per moment of the first recording. Later
+  /// recordings have it from their start.
+  void add_contact_change(std::size_t mechanism) {
+    constexpr std::size_t moments = thresholds.screening.moments, margin = thresholds.screening.moments_margin;
+    const std::vector<PreparedRecording>& records = likelihood_.records();
+    const PreparedRecording& first = records.front();
+    Columns steps = Columns::Zero(static_cast<Eigen::Index>(likelihood_.samples()), moments);
+    const Eigen::Index from = count_;
+    for (std::size_t m = 0; m < moments; ++m) {
+      const std::size_t onset = (m + margin) * first.size() / (moments + 2 * margin);
+      Eigen::Index row = 0;
+      for (const PreparedRecording& r : records) {
+        for (std::size_t k = 0; k < r.size(); ++k, ++row) {
+          const bool changed = &r != &first || k >= onset;
+          if (changed && std::isfinite(r.current_a[k])) steps(row, static_cast<Eigen::Index>(m)) = r.current_a[k];
+        }
+      }
+      MechanismSetting setting{mechanism, {}, {}};
+      setting.value[contact_onset] = first.time_s[onset];
+      probes_.push_back({setting, {contact_resistance}, from + static_cast<Eigen::Index>(m)});
+    }
+    likelihood_.whiten(steps);
+    count_ += steps.cols();
+    blocks_.push_back(std::move(steps));
+  }
+
+  SignatureSet collected() && {
+    SignatureSet set{std::move(probes_), Columns(static_cast<Eigen::Index>(likelihood_.samples()), count_)};
+    Eigen::Index at = 0;
+    for (const Columns& block : blocks_) {
+      set.columns.middleCols(at, block.cols()) = block;
+      at += block.cols();
+    }
+    return set;
+  }
+
+ private:
+  void add(Probe probe, Columns block) {
+    count_ += block.cols();
+    probes_.push_back(std::move(probe));
+    blocks_.push_back(std::move(block));
+  }
+
+  const LikelihoodModel& likelihood_;
+  const HypothesisFit& around_;
+  std::vector<Probe> probes_;
+  std::vector<Columns> blocks_;
+  Eigen::Index count_ = 0;
+};
+
+}  // namespace
+
+std::vector<MechanismSetting> probe_settings(const LikelihoodModel& likelihood, std::size_t mechanism) {
+  const double capacity_ah = likelihood.cell().capacity_ah;
+  const model::MechanismInfo& info = catalogue[mechanism];
+  const MechanismKnowledge& knowledge = knowledge_of(mechanism);
+  std::vector<double> shapes = knowledge.probing_shapes(capacity_ah);
+  const bool shaped = !shapes.empty();
+  if (!shaped) shapes = {0};
+  std::vector<MechanismSetting> settings;
+  for (const double shape : shapes) {
+    MechanismSetting& setting = settings.emplace_back(model::default_setting(mechanism, capacity_ah));
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      const model::Parameter& parameter = info.parameter[k];
+      if (parameter.role == Role::shape && shaped) setting.value[k] = shape;
+      if (parameter.role == Role::strength && parameter.low >= 0)
+        setting.value[k] = numerics.signatures.probing_strength * parameter.upper(capacity_ah);
+    }
+    knowledge.adjust_probe(setting, likelihood.facts());
+  }
+  return settings;
+}
+
+bool is_searched(std::size_t mechanism, double capacity_ah) {
+  const MechanismKnowledge& knowledge = knowledge_of(mechanism);
+  return knowledge.signature == Signature::contact_change || !knowledge.probing_shapes(capacity_ah).empty();
+}
+
+SignatureSet signatures(const LikelihoodModel& likelihood, const HypothesisFit& around,
+                        const std::vector<std::size_t>& over) {
+  const Hypothesis& h = around.hypothesis;
+  Collector collector(likelihood, around);
+  for (const Signature kind : {Signature::derivatives, Signature::contact_change}) {
+    for (const std::size_t mechanism : over) {
+      if (knowledge_of(mechanism).signature != kind) continue;
+      if (h.find(mechanism) != nullptr || not_testable(likelihood, h, mechanism)) continue;
+      if (kind == Signature::derivatives)
+        collector.add_derivatives(mechanism);
+      else
+        collector.add_contact_change(mechanism);
+    }
+  }
+  return std::move(collector).collected();
+}
+
+}  // namespace bms::diagnosis

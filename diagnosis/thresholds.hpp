@@ -1,0 +1,305 @@
+// Every number that a verdict depends on. What belongs to one mechanism alone stands in diagnosis/mechanisms/, what
+// only keeps the arithmetic stable in numerics.hpp.
+//
+// Costs and gains are differences of -2 log posterior (docs/diagnosis_method.md): an effect of x standard deviations
+// gains x^2. Currents in multiples of the capacity per hour end in _c (1C), shares and states of charge are fractions.
+//
+// Origin. "Development split": set on the concealed cases of `benchmark development 1`. Where no other origin is
+// given, a number is from the first development split and was not derived again.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace bms::diagnosis {
+
+struct Thresholds {
+  /// Is the recording usable at all? Wide limits: a fault of the recording exceeds them by far.
+  struct RecordingFaults {
+    double volts_at_most = 100;          ///< [V] median above it: the file is in millivolts; no single cell has 100 V
+    double amperes_times_limit = 60;     ///< largest current over the cell's limit above it: milliamperes
+    double outside_limits_v = 0.8;       ///< [V] beyond the cell's voltage limits a reading is a dropout
+    std::size_t few_readings = 20;       ///< dropouts or spikes up to this number are removed and reported
+    std::size_t rows_per_reading = 500;  ///< or one of them in so many rows; more is a fault
+    double spike_v = 0.25;               ///< [V] from the mean of both neighbours
+    double spike_neighbours_v = 0.01;    ///< [V] by which the neighbours differ at most
+    double spike_current_step_c = 0.05;  ///< [C] by which the current moves at most
+    std::size_t stuck_rows_loaded = 8;   ///< rows with equal voltage while the current moves by stuck_swing_c
+    double stuck_swing_c = 0.25;         ///< [C]
+    std::size_t stuck_rows = 60;         ///< the same for small movements of the current; on a flat OCV at constant
+                                         ///< current a good reading stands still as well
+    double stuck_small_swing_c = 0.02;   ///< [C]
+    double stuck_times_usual = 12;       ///< and longer than this times the usual run of equal readings
+    double usual_run_quantile = 0.99;    ///< which of the runs of equal readings is the usual one
+    std::size_t runs_for_usual = 200;    ///< runs needed to know it
+    double stuck_at_most_s = 45;         ///< [s] in total, or
+    double stuck_at_most_share = 0.004;  ///< of the recording; more is a fault
+    double gap_steps = 10;               ///< a step of the clock longer than this times the median is a gap,
+    double gap_at_least_s = 5;           ///< [s] if it is this long
+    double gap_load_c = 0.05;            ///< [C] current next to it from which charge is lost
+    double gaps_lose_soc = 0.02;         ///< soc that the gaps may have moved; above it is a fault
+    std::size_t gaps_at_most = 2;        ///< number of gaps under load; more are a fault
+    double edge_c = 0.15;                ///< [C] step of the current at which the sign is checked
+    std::size_t edges_for_sign = 2;      ///< number of steps needed
+    double inverted_correlation = -0.5;  ///< of current and voltage steps
+    std::size_t inverted_edges = 7;      ///< more than so many of
+    std::size_t inverted_of = 10;        ///< so many steps go the wrong way
+  };
+
+  /// Noise that exists before any hypothesis.
+  struct Noise {
+    double white_share_of_ocv = 0.2;       ///< white noise at least, as a share of tolerance.ocv_v: no model is better
+    double quiet_c = 0.01;                 ///< [C] step of the current below which second differences show the noise
+    std::size_t second_differences = 100;  ///< needed; with fewer the cell file's noise.voltage_v holds
+    double fast_correlation_s = 60;        ///< [s] of the fast part
+    double slow_correlation_s = 3'600;     ///< [s] of the slow part
+    double white_at_least_v = 5e-5;        ///< [V]
+    double fast_at_least_v = 5e-4;         ///< [V] of the fast part
+    double slow_at_least_v = 5e-4;         ///< [V] of the slow part, before slow_times_drift
+    double slow_times_drift = 1.3;         ///< standard deviation of the slow part over tolerance.drift_v
+    double edge_jitter = 0.05;          ///< share of a current step's R0 voltage that the reading next to it may miss:
+                                        ///< voltage and current are never read at exactly the same moment
+    double edge_error = 0.4;            ///< share of tolerance.resistance_fraction that differs from step to step
+    double soc_error_share = 0.3;       ///< soc error of the OCV table as a share of the start's standard deviation
+    double ocv_slope_reach = 0.01;      ///< soc around the counted one over which the OCV slope is taken
+    double start_current_c = 0.01;      ///< [C] above it the first row is not used: the load before is unknown
+    double amplitude_log_sigma = 0.15;  ///< of the prior of a noise amplitude above its nominal value, in ln: a factor
+                                        ///< of 2 costs 21, of 4 85, of 10 240. Development split
+    double same_amplitude = 1.25;       ///< two noise models whose amplitudes differ by less are the same
+  };
+
+  /// Priors of mechanisms' parameters, besides what the catalogue knows of them (model::Parameter::typical).
+  struct Priors {
+    double rarity = 0.5;   ///< of a strength beyond what is common: sigma over the common size
+    double log_sigma = 1;  ///< of a shape, in ln: a factor of e between its default and an unusual value
+  };
+
+  /// Removal of sensor noise from the current at constant load. Without it 7 of 11 healthy recordings had a finding,
+  /// with it 1 of 11 (development split).
+  struct CurrentDenoising {
+    std::size_t block_rows = 30;    ///< in which the noise is measured
+    std::size_t blocks = 5;         ///< needed
+    double calm_quantile = 0.2;     ///< of the blocks' noise: the calm ones show the sensor
+    std::size_t reach_rows = 30;    ///< averaged to either side
+    double neighbour_sigma = 4.5;   ///< a neighbour differs by no more than this times the noise
+    double neighbours = 4;          ///< more rows than this are averaged, or the reading stays
+    double noise_times_file = 1.5;  ///< the noise is at most this times the cell file's noise.current_a
+  };
+
+  /// Steps between readings that a converter makes.
+  struct Quantisation {
+    std::size_t steps = 20;        ///< needed
+    double step_quantile = 0.02;   ///< of the steps: the converter's own is among the smallest
+    double grid_tolerance = 0.15;  ///< of a step, for a reading on the grid
+    std::size_t on_grid = 3;       ///< more than so many of
+    std::size_t on_grid_of = 5;    ///< so many changed readings lie on the grid
+  };
+
+  /// The control hypothesis: how far the base parameters may move.
+  struct Calibration {
+    double soc_lowest = -0.1, soc_highest = 1.1;       ///< range of the knots
+    double ocv_at_least_v = 2e-4;                      ///< [V] tolerance of the OCV at least
+    double resistance_at_least = 2e-3;                 ///< tolerance of the resistances at least, as a fraction
+    double ocv_knots_soc = 0.05;                       ///< distance of the OCV's knots
+    double r0_knots_soc = 0.1;                         ///< of R0's
+    double rc_knots_soc = 0.2;                         ///< of R1's and C1's
+    double r1_times = 2, c1_times = 4;                 ///< tolerance of R1 and C1 over that of R0
+    double first_node_soc = 0.2, last_node_soc = 0.9;  ///< a table that ends inside stands for these as well
+    double beyond_nodes_soc = 0.1;                     ///< beyond the outermost node within which the error doubles
+    double corner_width_soc = 0.025;                   ///< half width of a rounded corner of the OCV, at most
+    double corner_share = 6;  ///< change of slope times half width over this is the corner's sigma. A curve that is
+                              ///< round over a quarter of the pieces passes at change times width / 4: 1.5 sigma
+    double capacity_sigma = 0.005;       ///< of the capacity, as a fraction
+    double gain_sigma = 0.002;           ///< of the current sensor's gain
+    double offset_at_most_c = 1e-3;      ///< [C] sigma of the wander of the current sensor's zero, at most
+    double offset_knots = 12;            ///< per recording at most
+    double initial_soc_at_least = 1e-4;  ///< sigma of the start at least
+  };
+
+  /// Moved base parameters written back into a cell file's tables.
+  struct MovedTables {
+    double corner_sigma = 0.3;                               ///< a corner moved by more gets two edges of its own
+    double edges_apart_soc = 0.004, nodes_apart_soc = 0.02;  ///< between entries, so that a table stays readable
+    double slope_share = 0.9;  ///< of the slope that may be taken away: the OCV goes on rising
+    double resistance_lowest_ohm = 1e-5, resistance_highest_ohm = 0.5;  ///< as the cell file's reader accepts
+  };
+
+  /// What counts as a rest, an edge, a turn of the charge (recording_facts.hpp).
+  struct Facts {
+    double rest_c = 0.02;      ///< [C] below it the cell rests; in wording only
+    double moving_c = 0.02;    ///< [C] above it a reading counts as load
+    double edge_c = 0.05;      ///< [C] step of the current
+    double rate_c = 0.05;      ///< [C] above it currents are sorted by size; in wording only
+    double rate_ratio = 1.33;  ///< of two sizes of current; in wording only
+    double turn_soc = 0.01;    ///< charge that goes back before its direction has turned; in wording only
+    double rail_c = 0.2;       ///< [C] the largest current at least, to see a sensor's end
+    double rail_share = 0.9;   ///< of the largest current that is near the end
+    std::size_t rail_rows = 4, rail_runs = 2;  ///< rows near it and separate visits needed
+  };
+
+  /// NOT_TESTABLE: below these nothing can be said of any mechanism.
+  struct Information {
+    std::size_t readings = 50;     ///< usable voltages
+    double duration_s = 300;       ///< [s]
+    std::size_t loaded_rows = 10;  ///< rows with load
+    double current_span_c = 0.02;  ///< [C] between the smallest and the largest reading
+  };
+
+  /// Signatures: which mechanism is worth a fit, and how small it could be and still be found.
+  struct Screening {
+    double worth_a_fit = 5;          ///< first-order gain below which a mechanism is not fitted
+    std::size_t fits = 6;            ///< at most, of mechanisms added to what is there
+    std::size_t rivals = 5;          ///< at most, of mechanisms in the place of another
+    double rival_share = 0.1;        ///< of the gain of the mechanism that a rival's first-order gain must reach
+    double per_unknown = 2;          ///< gain that noise alone gives to every unknown after the first
+    double limit_sigma = 4.76;       ///< detection limit in standard deviations of the strength: found in 9 of 10
+                                     ///< recordings at one false alarm in 100
+    double start_share = 0.6;        ///< a fit begins within this share of the bounds
+    std::size_t moments = 40;        ///< onsets tried of a contact that has changed
+    std::size_t moments_margin = 2;  ///< of them left out at each end of the recording
+    double near_onset_s = 120;       ///< [s] around a contact's change where a burst is part of that change
+  };
+
+  /// Bursts of a loose contact.
+  struct Bursts {
+    std::array<std::size_t, 6> lengths_rows = {2, 4, 8, 16, 32, 64};  ///< of stretches tried
+    std::size_t overlap = 4;                                          ///< stretches begin every length / overlap rows
+    std::size_t tail_rows = 40;       ///< in which the whitener's response to a stretch has decayed
+    std::size_t fewest_rows = 3;      ///< in total: one bad reading is not a contact
+    double loaded_share = 0.35;       ///< of the loaded rows at most: bursts are the exception
+    double loaded_current = 0.02;     ///< of the largest current, above which a row is loaded
+    double edge_current = 0.2;        ///< of the largest current: a step next to which the model itself may be off
+    std::size_t near_edge_rows = 64;  ///< around such a step
+    double edge_chance = 0.01;        ///< probability below which bursts come with the steps of the current: how a
+                                      ///< cell answers a step. 5 of 5 in a healthy recording (development split)
+    double control_times = 2;         ///< gain over that of stretches that ask for less resistance, which no
+                                      ///< contact has
+    std::array<double, 9> resistance_quantiles = {0.05, 0.15, 0.25, 0.35, 0.5, 0.65, 0.75, 0.85, 0.95};  ///< tried
+  };
+
+  /// Model selection.
+  struct Decision {
+    double detected = 26;            ///< gain over the calibration that chance reaches in 1 of 216 healthy
+                                     ///< recordings (development split)
+    double per_unknown = 3;          ///< cost of every unknown after the first
+    double per_burst = 12;           ///< cost of every burst: its two ends were sought
+    double hopeless = 80;            ///< a rival this far behind the best is not fitted to the end
+    double tie = 7;                  ///< rivals this close cannot be distinguished
+    double inseparable = 0.97;       ///< correlation of signatures above which two mechanisms are one class
+    double tie_inseparable = 30;     ///< within a class rivals this close are all named: they differ by how well
+                                     ///< an equation fits, not by what was seen
+    double better_start = 1;         ///< by which the same mechanisms from another start must be better
+    double better_rival = 0.5;       ///< by which another mechanism must be better to replace one
+    double faint = 52;               ///< gain, twice `detected`, below which a cause must explain its share: 2 of
+                                     ///< 144 healthy recordings had such a finding (development split)
+    double noticeable = 0.02;        ///< share of the error by which one of several causes moves the voltage, or
+    double noticeable_gain = 0.05;   ///< of the gain of all together: the mean square of a short effect is small
+    double larger_than_error = 3;    ///< one of several causes moves the voltage by no more times the error: two
+                                     ///< that cancel each other are larger
+    double error_may_grow = 1.15;    ///< of the error without the start's and the sensor's own unknowns, by adding
+                                     ///< a cause,
+    double error_may_grow_v = 3e-4;  ///< [V] plus this
+  };
+
+  /// Is what was found enough?
+  struct Adequacy {
+    double explained = 0.8;             ///< share of the gain that a cause must explain
+    double explained_by_bursts = 0.98;  ///< the same for a mechanism that is free to come and go
+    double unexplained = 40;            ///< gain of generic columns from which something unknown is there
+    double fast_excess = 0.25;          ///< variance of the whitened residual above 1 that noise does not reach
+    double far_out = 0.003;             ///< share of the whitened residual beyond 4 sigma. 0.001 at most in 144
+                                        ///< healthy recordings, 0.1 where a converter sticks (development split)
+  };
+
+  /// Probabilities that are reported.
+  struct Probability {
+    double temper = 1.5;    ///< log likelihoods are divided by it: they are too sure of themselves
+    double at_most = 0.93;  ///< so many verdicts were right where nothing came near (development split)
+  };
+
+  /// Columns without physics over the residual of the best hypothesis.
+  struct ResidualTest {
+    double free_v = 0.02;             ///< [V] prior standard deviation of a generic voltage
+    double fine_share = 0.25;         ///< of it, for the columns with many knots
+    double gain_per_freedom = 1.6;    ///< subtracted per degree of freedom: what noise alone gains, with a margin
+    double gain_of_frequencies = 14;  ///< what the best of some hundred frequencies gains on noise
+    std::size_t time_knots = 30, time_current_knots = 6, soc_knots = 8, soc_fine_knots = 24, soc_current_knots = 4,
+                voltage_knots = 30;
+    std::array<double, 6> memory_s = {4, 15, 60, 250, 1'000, 4'000};  ///< [s] time constants of the load's memory
+    double heading_soc = 0.02;                                        ///< charge over which the direction is remembered
+    double heat_s = 1'500;                                            ///< [s] over which the load's heat is remembered
+    std::array<double, 5> leaps_v = {0.002, 0.004, 0.008, 0.016, 0.032};  ///< [V] of a reading that follows in leaps
+    double frequency_resolution = 160;     ///< neighbouring frequencies differ by at most 1 / this
+    std::size_t frequencies = 640;         ///< at most
+    std::size_t frequency_neighbours = 6;  ///< on either side, for the load's usual power
+    double load_power_times = 3;   ///< the load's power at a frequency over its usual one: a profile that repeats
+                                   ///< itself has the period, so a small error of the model has it too
+    double periods = 4;            ///< in the recording at least
+    double highest_hz = 0.02;      ///< [Hz]
+    double highest_per_row = 0.1;  ///< and this per row
+    double line_spacing = 0.5;     ///< of frequencies, in units of 1 / duration
+    double far_sigma = 4;          ///< beyond it a whitened residual is far out; also the winsorising limit
+    std::size_t rows = 100;        ///< needed for far_out and fast_excess
+  };
+
+  /// Where a mismatch lies.
+  struct Location {
+    std::size_t rows_per_outlier = 500;  ///< the largest of so many rows does not count as the peak
+    double peak_over_energy = 25;        ///< energy above peak / this belongs to a span: a fifth of the amplitude
+    double spans_apart = 0.1;            ///< of the recording; spans closer than that are one
+    double edge_c = 0.1;                 ///< [C] step of the current from which time is counted
+    double regime_share = 0.7;           ///< of the energy, which a regime holds
+    double regime_sharper = 1.25;        ///< energy share over time share from which a regime is reported
+  };
+
+  /// Readings of trusted instruments.
+  struct References {
+    double check_at_most_s = 300;           ///< [s] readings averaged to one check
+    double filter_share = 0.1;              ///< of a stretch at its start, where a filtered channel may still move
+    double still_v = 0.02, still_c = 0.02;  ///< [V], [C] by which a reference moves within a check
+    double unsteady_share = 0.05;           ///< of an instrument's error that differs from time to time
+    double meter_v = 3e-4;                  ///< [V] standard deviation of a trusted voltmeter
+    double meter_c = 3e-5;                  ///< [C] of a trusted ammeter
+  };
+
+  /// The next experiment.
+  struct Design {
+    double separates = 40;      ///< expected gain from which two hypotheses are separated: more than
+                                ///< Decision::tie_inseparable, because no forecast is exact
+    std::size_t rivals = 5;     ///< hypotheses compared at most, the finding included
+    double rows = 1'500;        ///< of a simulated course at most: a coarse one is enough to choose by
+    double survey_step_s = 10;  ///< [s] step by which the courses' durations are compared
+    double soc_lowest = 0.02, soc_highest = 0.99;  ///< that the cell may reach
+    double capacity_lost = 0.995;                  ///< share of the capacity below which the course is made smaller
+    double initial_soc_at_least = 1e-4;            ///< sigma of the start
+  };
+
+  /// Tolerances of an extended cell file are widened by one of these factors (model_tolerance.hpp).
+  struct ModelTolerance {
+    std::array<double, 7> factors = {1, 1.5, 2, 3, 4, 6, 8};
+  };
+
+  RecordingFaults recording;
+  Noise noise;
+  Priors priors;
+  CurrentDenoising denoising;
+  Quantisation quantisation;
+  Calibration calibration;
+  MovedTables tables;
+  Facts facts;
+  Information information;
+  Screening screening;
+  Bursts bursts;
+  Decision decision;
+  Adequacy adequacy;
+  Probability probability;
+  ResidualTest residual;
+  Location location;
+  References references;
+  Design design;
+  ModelTolerance model_tolerance;
+};
+
+inline constexpr Thresholds thresholds{};
+
+}  // namespace bms::diagnosis

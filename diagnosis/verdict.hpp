@@ -1,0 +1,97 @@
+// The result of a diagnosis.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "diagnosis/hypothesis.hpp"
+#include "diagnosis/noise.hpp"
+#include "diagnosis/recording_check.hpp"
+#include "model/cell_parameters.hpp"
+
+namespace bms::diagnosis {
+
+enum class Verdict { no_mismatch, cause, causes, ambiguous, unknown, data_fault, not_testable };
+const char* name_of(Verdict verdict);
+
+/// Whether the verdict names mechanisms.
+inline bool names(Verdict verdict) {
+  return verdict == Verdict::cause || verdict == Verdict::causes || verdict == Verdict::ambiguous;
+}
+
+/// A range of one axis in which most of the mismatch lies.
+struct Regime {
+  std::string axis;  ///< "soc", "current_c", "temperature_c", "since_edge_s"
+  double from = 0, to = 0;
+  double share = 0;  ///< of the mismatch's energy
+  double usual = 0;  ///< share of the time that the recordings spend there
+};
+
+/// A hypothesis with the values found, and the covariance of its estimated parameters.
+struct Fitted {
+  Hypothesis hypothesis;
+  Eigen::MatrixXd covariance;
+};
+
+struct Finding {
+  MechanismSetting setting;    ///< values and standard deviations
+  std::vector<char> at_bound;  ///< by parameter
+  double probability = 0;
+  std::vector<std::size_t> equivalent_to;  ///< catalogue indices that these recordings cannot distinguish from it
+  std::vector<Fitted> rivals;              ///< all findings, with each of equivalent_to in its place
+  double gain = 0;                         ///< cost without it less cost with it
+  double rms_contribution_v = 0;           ///< RMS change of the voltage by it [V]
+  std::string because;                     ///< why this one and not a rival
+};
+
+/// A set of mechanisms that was fitted, and how well.
+struct Ranked {
+  std::vector<std::size_t> ids;
+  double probability = 0, gain = 0, explained_share = 0;
+};
+
+struct DetectionLimit {
+  std::size_t mechanism = 0;
+  std::size_t parameter = 0;
+  double value = 0;  ///< in the parameter's unit
+};
+
+struct NotTestable {
+  std::size_t mechanism = 0;
+  std::string reason;
+};
+
+/// For plots, one value per row.
+struct RecordingView {
+  std::vector<double> base_v, extended_v, soc;
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::not_testable;
+  std::string statement;           ///< what is wrong, how sure, what to do next
+  std::vector<model::Span> spans;  ///< of the first record
+  std::vector<Regime> regimes;     ///< the sharpest first
+  double explained_share = 0;
+  std::vector<Finding> findings;   ///< the largest gain first
+  std::vector<Ranked> candidates;  ///< the largest gain first
+  double noise_floor_v = 0;
+  double unexplained_rmse_v = 0, unexplained_share = 0;
+  std::vector<DetectionLimit> limits;
+  std::vector<NotTestable> not_testable;
+  std::vector<DataFault> faults;
+  std::vector<std::string> warnings;
+  Hypothesis extended;               ///< the cell's own mechanisms and those found
+  model::CellParameters<> cell;      ///< base parameters moved, within their tolerance, to where they fit together with
+                                     ///< the findings; as given without findings
+  Eigen::MatrixXd covariance;        ///< of the estimated parameters of `extended`
+  NoiseModel noise;                  ///< nominal
+  std::vector<RecordingView> views;  ///< by record
+  // the numbers behind the verdict
+  std::string remaining_goes_with;  ///< what the unexplained residual depends on, if there is much of it
+  double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, far_out = 0;
+};
+
+}  // namespace bms::diagnosis
