@@ -3,7 +3,7 @@
 #
 #   telemetry.sh BMS FEEDER IMAGE RECORDING SOC SIGMA FOLDER
 #
-#   emulator -> pseudo-terminal -> slcand -> slcan0 -> cangw -> vcan0 <- cangen (as fast as it can; all kinds of frames)
+#   emulator <-> pseudo-terminal <-> slcand <-> slcan0 -> cangw -> vcan0 <- noise (feed_samples: a frame for each of the firmware)
 #
 # leaves in FOLDER: candump.log, the BMS's frames by candump; record.log, rows.csv and monitor.json by bms monitor.
 # The emulator is outside of User-Mode Linux, where the firmware's polling would take the one processor.
@@ -12,22 +12,19 @@ PATH=$PATH:/usr/sbin:/sbin
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 pids=()
 trap 'for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done' EXIT
-soon() { for _ in {1..400}; do "$@" >/dev/null 2>&1 && return; sleep 0.05; done; echo "telemetry.sh: never came true: $*" >&2; exit 1; }
-
-settled() {  # a file that has not grown for half a second
-  local before=-1 now
-  for _ in {1..120}; do
-    now=$(stat -c %s "$1")
-    [ "$now" != "$before" ] || return 0
-    before=$now
-    sleep 0.5
+soon() {  # two minutes: a limit for what has failed, not for what is slow
+  local until=$((SECONDS + 120))
+  until "$@" >/dev/null 2>&1; do
+    [ $SECONDS -lt $until ] || { echo "telemetry.sh: never came true: $*" >&2; exit 1; }
+    sleep 0.05
   done
 }
 
-firmware_answers() {  # an emulated UART loses what comes before the firmware has started it
+# An emulated UART drops what comes before the firmware has started it, so the question is repeated until the answer comes. cat reads the answers:
+# while `read -d` of bash waits, it has the terminal turn each \r that arrives into \n.
+firmware_answers() {
   printf 'V\r' >&3
-  local answer
-  read -r -t 0.2 -d V answer <&3 && read -r -t 0.2 -d $'\r' answer <&3 && [ "$answer" = 1010 ]
+  grep -q $'V1010\r' "$1"
 }
 
 outside() {
@@ -37,12 +34,15 @@ outside() {
   line=$(grep -o '/dev/pts/[0-9]*' "$folder/emulator.log")
   exec 3<>"$line"
   stty raw -echo <&3
-  soon firmware_answers
-  VCAN_TTY=$line "$here/with_vcan.sh" "$here/telemetry.sh" --on-the-bus "$@"
+  cat <&3 >"$folder/answers" & local reader=$!
+  soon firmware_answers "$folder/answers"
+  kill $reader
+  wait $reader || true
+  VCAN_SECONDS=900 VCAN_TTY=$line "$here/with_vcan.sh" "$here/telemetry.sh" --on-the-bus "$@"
 }
 
 on_the_bus() {
-  local bms=$1 feeder=$2 recording=$4 soc=$5 sigma=$6 folder=$7 dump monitor
+  local bms=$1 feeder=$2 recording=$4 soc=$5 sigma=$6 folder=$7 dump monitor last
   slcand -F -o -c -s6 "$VCAN_LINE" slcan0 >"$folder/slcand.log" 2>&1 & pids+=($!)
   soon test -e /sys/class/net/slcan0
   ip link set slcan0 txqueuelen 1000 up
@@ -51,11 +51,12 @@ on_the_bus() {
   "$bms" monitor vcan0 --record "$folder/record.log" --csv "$folder/rows.csv" --json "$folder/monitor.json" --quiet & monitor=$!
   pids+=($dump $monitor)
   soon test -e "$folder/record.log"  # made when the monitor listens
-  cangen vcan0 -g 0 -i -I 5A5 -L 8 -D r >/dev/null 2>&1 & pids+=($!)
-  cangen vcan0 -g 1 -i -m -I 6A6 >/dev/null 2>&1 & pids+=($!)
-  "$feeder" slcan0 "$recording" "$soc" "$sigma" || { ip -s link; cat /proc/net/softnet_stat; exit 1; } >&2
-  kill "${pids[@]: -2}"
-  settled "$folder/candump.log"  # on a busy machine it writes long after the bus has become silent
+  soon grep -q '^ *vcan0 *180 ' /proc/net/can/rcvlist_fil  # so does candump
+  "$feeder" slcan0 vcan0 "$recording" "$soc" "$sigma" >"$folder/fed" || { ip -s link; cat /proc/net/softnet_stat; exit 1; } >&2
+  cat "$folder/fed"
+  last=$(sed -n 's/^last frame //p' "$folder/fed")
+  soon grep -q "$last" "$folder/candump.log"
+  soon grep -q "$last" "$folder/record.log"
   kill -INT $monitor $dump
   wait $monitor
   wait $dump || true
