@@ -122,7 +122,7 @@ TEST_F(ServedPage, APortThatIsTakenIsRefused) {
   const ToolRun run = run_tool("monitor file:" + (folder_.path() / "bus.log").string() +
                                " --quiet --duration 1 --serve " + std::to_string(port_));
   EXPECT_EQ(run.exit_code, 2);
-  EXPECT_THAT(run.err, HasSubstr("is not to be had"));
+  EXPECT_THAT(run.err, HasSubstr("is in use"));
 }
 
 /// A browser, controlled by its debugging protocol through pipes (--remote-debugging-pipe: JSON objects, each ended
