@@ -1,7 +1,6 @@
-// A recording into a firmware that listens on a CAN interface, in lock step: the frames of a sample, then wait for the
-// status frame that ends what it is answered with. For each frame of the firmware it sends one frame of noise to a
-// second interface. The amount of noise is fixed by that: the buffers of those who read there hold all of it, however
-// slow this machine is.
+// Sends a recording to firmware on a CAN interface in lock step: the frames of a sample, then it waits for the status
+// frame that ends the answer. For each frame of the firmware it sends one frame of noise to a second interface. The
+// amount of noise is therefore bounded, and the buffers of all readers hold it even on a slow machine.
 //
 //   feed_samples INTERFACE NOISE_INTERFACE RECORDING.csv SOC SIGMA
 //
@@ -30,10 +29,10 @@ namespace {
 using namespace bms;
 
 constexpr canid_t status_id = 0x182;
-constexpr std::array of_the_bms{can_filter{0x180, 0x7E0}};
-constexpr int patience_ms = 120'000;  // a limit for what has failed, not for what is slow
+constexpr std::array bms_ids{can_filter{0x180, 0x7E0}};
+constexpr int patience_ms = 120'000;  // a limit for a failure, not for a slow machine
 
-/// A raw socket that receives what the filters let through; -1: there is no such interface.
+/// A raw socket with receive filters; -1 if the interface does not exist.
 int open_bus(const char* interface, std::span<const can_filter> filters) {
   const int bus = socket(PF_CAN, SOCK_RAW, CAN_RAW), on = 1;
   setsockopt(bus, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), static_cast<socklen_t>(filters.size_bytes()));
@@ -52,18 +51,22 @@ void send(int bus, const can::Frame& frame) {
   raw.can_id = frame.id;
   raw.can_dlc = frame.length;
   std::memcpy(raw.data, frame.data.data(), frame.data.size());
-  while (write(bus, &raw, sizeof raw) != static_cast<ssize_t>(sizeof raw)) usleep(1'000);  // the queue is full
+  while (write(bus, &raw, sizeof raw) != static_cast<ssize_t>(sizeof raw)) usleep(1'000);  // while the queue is full
 }
 
-/// Frames that are not the firmware's.
+/// Sends frames that are not those of the BMS.
 class Noise {
  public:
   explicit Noise(int bus) : bus_(bus) {}
   bool send() {
     canfd_frame raw{};
     const unsigned kind = sent_++ % 8;  // 0: remote, 1 and 2: long, 3: CAN FD, 4: of any length
-    raw.can_id = kind == 0 ? 0x6A6U | CAN_RTR_FLAG : kind < 3 ? (random_() & CAN_EFF_MASK) | CAN_EFF_FLAG : 0x5A5;
-    raw.len = static_cast<__u8>(kind == 3 ? 64 : kind == 4 ? random_() % 9 : 8);
+    raw.can_id = 0x5A5;
+    if (kind == 0) raw.can_id = 0x6A6U | CAN_RTR_FLAG;
+    if (kind == 1 || kind == 2) raw.can_id = (random_() & CAN_EFF_MASK) | CAN_EFF_FLAG;
+    raw.len = 8;
+    if (kind == 3) raw.len = 64;
+    if (kind == 4) raw.len = static_cast<__u8>(random_() % 9);
     for (__u8& byte : raw.data) byte = static_cast<__u8>(random_());
     const std::size_t bytes = kind == 3 ? CANFD_MTU : CAN_MTU;
     return write(bus_, &raw, bytes) == static_cast<ssize_t>(bytes);
@@ -75,7 +78,7 @@ class Noise {
   std::mt19937 random_{1};
 };
 
-/// The status frame, after noise for each frame; nothing when it does not come.
+/// Returns the status frame, or nothing if it does not arrive. Sends one frame of noise per received frame.
 std::optional<can_frame> answer(int bus, Noise& noise) {
   can_frame raw{};
   pollfd p{bus, POLLIN, 0};
@@ -91,7 +94,7 @@ std::optional<can_frame> answer(int bus, Noise& noise) {
 
 int main(int argc, char** argv) {
   if (argc != 6) return 2;
-  const int bus = open_bus(argv[1], of_the_bms), noisy = open_bus(argv[2], {});
+  const int bus = open_bus(argv[1], bms_ids), noisy = open_bus(argv[2], {});
   if (bus < 0 || noisy < 0) return 1;
   Noise noise(noisy);
   send(bus,
