@@ -13,13 +13,13 @@ class ReceivedBytes {
   /// Called by the interrupt. A byte that does not fit is lost and counted.
   void push(char byte) {
     const std::uint32_t at = head_.load(std::memory_order_relaxed);
-    if (at - tail_.load(std::memory_order_acquire) == buffer_.size()) {
-      lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-      return;
-    }
+    if (at - tail_.load(std::memory_order_acquire) == buffer_.size()) return lose();
     buffer_[at % buffer_.size()] = byte;
     head_.store(at + 1, std::memory_order_release);
   }
+
+  /// Called by the interrupt. Counts a byte that the receiver lost.
+  void lose() { lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed); }
 
   /// Called by the program. Returns false if no byte is waiting.
   bool pop(char& byte) {

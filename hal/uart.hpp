@@ -15,7 +15,7 @@ void uart_write(std::span<const char> bytes);
 /// Returns false if no byte is waiting.
 bool uart_read(char& byte);
 
-/// Bytes lost because the buffer was full.
+/// Number of lost bytes. On the stm32f4 each overrun of the receiver counts as one, although it may have lost more.
 std::uint32_t uart_lost();
 
 }  // namespace bms::hal

@@ -1,4 +1,4 @@
-// A board on the other end of a CAN bus, in lock step: frames in, and what it answers to them.
+// The connection to a board on a CAN bus.
 #pragma once
 
 #include <filesystem>
@@ -14,17 +14,17 @@ namespace bms::hil {
 class BoardLink {
  public:
   virtual ~BoardLink() = default;
-  /// Sends, and returns all that the board says until it has nothing more to do. time_s: what the board's clock shows
-  /// then, if it follows. Throws std::runtime_error when it has stopped.
+  /// Sends `frames` and returns the frames that the board sends in response. `time_s` sets the clock of an emulated
+  /// board. Throws std::runtime_error if the board has stopped.
   virtual std::vector<can::Frame> exchange(double time_s, std::span<const can::Frame> frames) = 0;
 };
 
-/// Firmware in the emulator (an image whose bus is hal/emulated/can_pipe). `command`: the emulator's, its program's
-/// arguments left open.
+/// Runs `image` in the emulator of `board`, in lock step: exchange() returns when the firmware waits for input again.
+/// The CAN bus of the image is hal/emulated/can_pipe.
 std::unique_ptr<BoardLink> emulated_link(const std::string& board, const std::filesystem::path& image);
 
-/// A board on a serial port that speaks SLCAN. It is not in lock step: its answer ends with its status message, or
-/// after a second.
+/// A board that speaks SLCAN on a serial port. It does not run in lock step: exchange() returns after the Status
+/// message that answers a sample, or after one second. Throws files::BadInput if the port cannot be opened.
 std::unique_ptr<BoardLink> serial_link(const std::string& port);
 
 }  // namespace bms::hil

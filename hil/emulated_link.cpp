@@ -18,25 +18,25 @@ namespace {
 
 using namespace hal::pipe;
 
-constexpr int silence_ms = 30'000;
+constexpr int longest_silence_ms = 30'000, poll_ms = 100;
 
-class File {
+class FileDescriptor {
  public:
-  explicit File(int fd) : fd_(fd) {
+  explicit FileDescriptor(int fd) : fd_(fd) {
     if (fd_ < 0) throw std::runtime_error("cannot open a pipe to the emulator");
   }
-  ~File() { close(fd_); }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
+  ~FileDescriptor() { close(fd_); }
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
   int operator*() const { return fd_; }
 
  private:
   int fd_;
 };
 
-std::filesystem::path pipe_in(const std::filesystem::path& folder, const char* name) {
+std::filesystem::path make_pipe(const std::filesystem::path& folder, const char* name) {
   auto path = folder / name;
-  if (mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error("no pipe in " + folder.string());
+  if (mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error("cannot make a pipe in " + folder.string());
   return path;
 }
 
@@ -44,38 +44,38 @@ const images::EmulatedBoard& emulator_of(const std::string& board) {
   for (const images::EmulatedBoard& b : images::emulated_boards()) {
     if (b.name == board) return b;
   }
-  return images::emulated_boards().front();  // of the same chip: the images of a board that no emulator knows
+  return images::emulated_boards().front();  // a board with the same chip, for boards without an emulator of their own
 }
 
 /// The other side of hal/emulated/can_pipe.cpp.
 class EmulatedLink : public BoardLink {
  public:
   EmulatedLink(const std::string& board, const std::filesystem::path& image)
-      : to_path_(pipe_in(folder_.path(), "to_board")),
-        from_path_(pipe_in(folder_.path(), "from_board")),
-        // opened for both ways: neither side waits for the other to come
+      : to_path_(make_pipe(folder_.path(), "to_board")),
+        from_path_(make_pipe(folder_.path(), "from_board")),
+        // opened for reading and writing, so that open() does not wait for the other side
         to_(open(to_path_.c_str(), O_RDWR | O_CLOEXEC)),
         from_(open(from_path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)),
         emulator_(command(board, image), folder_.path() / "log") {}
 
   std::vector<can::Frame> exchange(double time_s, std::span<const can::Frame> frames) override {
-    auto answer = first_ ? read_block() : std::vector<can::Frame>{};  // what it said before it was asked anything
+    auto answer = first_ ? read_block() : std::vector<can::Frame>{};  // what it sends at start-up
     first_ = false;
     do {
       const auto part = frames.first(std::min(frames.size(), most_records - 1));
       frames = frames.subspan(part.size());
       write_block(static_cast<std::uint64_t>(1e6 * time_s), part);
-      const auto said = read_block();
-      answer.insert(answer.end(), said.begin(), said.end());
+      const auto received = read_block();
+      answer.insert(answer.end(), received.begin(), received.end());
     } while (!frames.empty());
     return answer;
   }
 
  private:
   std::vector<std::string> command(const std::string& board, const std::filesystem::path& image) {
-    auto words = images::emulator_command(emulator_of(board), image, {to_path_.string(), from_path_.string()});
-    words.insert(words.end(), {"-serial", "none"});
-    return words;
+    auto arguments = images::emulator_command(emulator_of(board), image, {to_path_.string(), from_path_.string()});
+    arguments.insert(arguments.end(), {"-serial", "none"});
+    return arguments;
   }
 
   void write_block(std::uint64_t time_us, std::span<const can::Frame> frames) {
@@ -119,9 +119,9 @@ class EmulatedLink : public BoardLink {
         continue;
       }
       pollfd p{*from_, POLLIN, 0};
-      if (poll(&p, 1, 100) > 0) continue;
-      silent_ms += 100;
-      if (!emulator_.running() || silent_ms > silence_ms) throw stopped();
+      if (poll(&p, 1, poll_ms) > 0) continue;
+      silent_ms += poll_ms;
+      if (!emulator_.running() || silent_ms > longest_silence_ms) throw stopped();
     }
     begin_ += record_size;
     return {bytes_.data() + begin_ - record_size, record_size};
@@ -133,7 +133,7 @@ class EmulatedLink : public BoardLink {
 
   images::TemporaryFolder folder_;
   std::filesystem::path to_path_, from_path_;
-  File to_, from_;
+  FileDescriptor to_, from_;
   images::ChildProcess emulator_;
   std::array<unsigned char, 65'536> bytes_{};
   std::size_t begin_ = 0, end_ = 0;

@@ -11,22 +11,23 @@ namespace bms::hil {
 
 namespace {
 
-enum class Value { none, part, cell };
+enum class Value { none, probability, cell };
 
 struct Kind {
   const char* name;
   Value value;
   const char* expected;
-  double within_s;  ///< the table's delay (protection/README.md), and half a second for what is in the way: samples,
-                    ///< this message's cycle
+  double within_s;  ///< the delay in the table of protection/README.md, without `latency_s`
 };
 
-constexpr double on_the_way_s = 0.5;
+constexpr double latency_s = 0.5;      // of the samples and of the cycle of the message Faults
+constexpr double no_deadline_s = 1e9;  // depends on when the contactors next switch
+constexpr std::int32_t cell_high_uv = 4'050'000, cell_low_uv = cell_low_uv;
 constexpr Kind kinds[] = {
-    {"drop", Value::part, "", 0},
-    {"corrupt", Value::part, "", 0},
-    {"delay", Value::part, "", 0},
-    {"cell_stuck", Value::cell, "VoltageStuck", 1 + 30},  // once the others have moved
+    {"drop", Value::probability, "", 0},
+    {"corrupt", Value::probability, "", 0},
+    {"delay", Value::probability, "", 0},
+    {"cell_stuck", Value::cell, "VoltageStuck", 1 + 30},  // after the other cells have moved
     {"cell_open", Value::cell, "VoltageMissing", 0.5},
     {"sense_wire", Value::cell, "OpenWire", 0.5},
     {"cell_high", Value::cell, "CellOvervoltageSevere", 0.2},
@@ -36,9 +37,9 @@ constexpr Kind kinds[] = {
     {"temperature_open", Value::none, "TemperatureLost", 2},
     {"temperature_stuck", Value::none, "", 0},
     {"overcurrent", Value::none, "DischargeOvercurrent", 30},
-    {"welded", Value::none, "ContactorWelded", 1e9},  // when the contactors open next
-    {"precharge_open", Value::none, "PrechargeFailed", 1e9},
-    {"silence", Value::none, "SamplesMissing", 0.5 + 0.2},  // the table's, and a sample at either end
+    {"welded", Value::none, "ContactorWelded", no_deadline_s},
+    {"precharge_open", Value::none, "PrechargeFailed", no_deadline_s},
+    {"silence", Value::none, "SamplesMissing", 0.5 + 0.2},  // the table's delay and one sample at each end
 };
 
 [[noreturn]] void refuse(const std::string& text, const std::string& what) {
@@ -55,7 +56,7 @@ double number(const std::string& text, std::string_view part, const char* what) 
 
 }  // namespace
 
-Injection injection(const std::string& text, std::size_t cells) {
+Injection parse_injection(const std::string& text, std::size_t cells) {
   const std::string_view all = text;
   const std::size_t at = all.find('@');
   if (at == std::string_view::npos) refuse(text, "expected NAME[=VALUE]@START[-END] in seconds");
@@ -69,21 +70,21 @@ Injection injection(const std::string& text, std::size_t cells) {
     names += (names.empty() ? "" : ", ") + std::string(k.name);
   }
   if (kind == nullptr) refuse(text, "expected one of: " + names);
-  Injection i{text, name, 0, 0, 1e300, kind->expected, kind->within_s + on_the_way_s};
+  Injection i{text, name, 0, 0, 1e300, kind->expected, kind->within_s + latency_s};
+  const bool is_probability = kind->value == Value::probability;
+  const char* example = is_probability ? "=0.01@60" : "=3@60";
+  const char* expected_value = is_probability ? "a probability, 0 to 1" : "a cell, from 1";
   if ((kind->value == Value::none) != (equals == std::string_view::npos))
-    refuse(text, kind->value == Value::none
-                     ? "takes no value"
-                     : "expected a value, as in " + name + (kind->value == Value::part ? "=0.01@60" : "=3@60"));
-  if (kind->value != Value::none)
-    i.value = number(text, what.substr(equals + 1), kind->value == Value::part ? "a part, 0 to 1" : "a cell, from 1");
-  if (kind->value == Value::part && i.value > 1) refuse(text, "expected a part, 0 to 1");
+    refuse(text, kind->value == Value::none ? "takes no value" : "expected a value, as in " + name + example);
+  if (kind->value != Value::none) i.value = number(text, what.substr(equals + 1), expected_value);
+  if (is_probability && i.value > 1) refuse(text, "expected a probability, 0 to 1");
   const double most = static_cast<double>(name == "sense_wire" ? cells - 1 : cells);
   if (kind->value == Value::cell && !(i.value >= 1 && i.value <= most && i.value == static_cast<int>(i.value)))
     refuse(text, fmt::format("expected a cell, 1 to {}", most));
   const std::size_t dash = when.find('-');
   i.from_s = number(text, when.substr(0, dash), "seconds");
   if (dash != std::string_view::npos) i.to_s = number(text, when.substr(dash + 1), "seconds");
-  if (!(i.to_s > i.from_s)) refuse(text, "expected an end after its start");
+  if (!(i.to_s > i.from_s)) refuse(text, "expected an end after the start");
   return i;
 }
 
@@ -101,13 +102,12 @@ void Injector::apply(double time_s, measurement::PackSample<max_cells>& s) {
   if (const auto* i = find("cell_stuck", time_s)) s.cell_uv[cell_of(*i)] = last_.cell_uv[cell_of(*i)];
   if (const auto* i = find("cell_open", time_s)) s.cell_uv[cell_of(*i)] = measurement::no_reading;
   if (const auto* i = find("sense_wire", time_s)) {
-    const std::int32_t both = s.cell_uv[cell_of(*i)] +
-                              s.cell_uv[cell_of(*i) + 1];  // the monitor's own input currents divide it, not in halves
-    s.cell_uv[cell_of(*i)] = both / 5 * 2;
+    const std::int32_t both = s.cell_uv[cell_of(*i)] + s.cell_uv[cell_of(*i) + 1];
+    s.cell_uv[cell_of(*i)] = both / 5 * 2;  // the input currents of the front end divide the sum, but not in halves
     s.cell_uv[cell_of(*i) + 1] = both - s.cell_uv[cell_of(*i)];
   }
-  if (const auto* i = find("cell_high", time_s)) s.cell_uv[cell_of(*i)] = 4'050'000;
-  if (const auto* i = find("cell_low", time_s)) s.cell_uv[cell_of(*i)] = 1'700'000;
+  if (const auto* i = find("cell_high", time_s)) s.cell_uv[cell_of(*i)] = cell_high_uv;
+  if (const auto* i = find("cell_low", time_s)) s.cell_uv[cell_of(*i)] = cell_low_uv;
   if (active("current_stuck", time_s)) s.current_ua = last_.current_ua;
   if (active("current_open", time_s)) s.current_ua = measurement::no_reading;
   if (active("temperature_open", time_s)) s.temperature_cdegc[0] = measurement::no_temperature;

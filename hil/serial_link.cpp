@@ -21,22 +21,22 @@ class SerialLink : public BoardLink {
  public:
   explicit SerialLink(const std::string& port) : fd_(open(port.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC)) {
     if (fd_ < 0)
-      throw files::BadInput(port, 1, "cannot be opened, expected a serial port of a board or a pseudo-terminal");
+      throw files::BadInput(port, 1, "cannot be opened, expected the serial port of a board or a pseudo-terminal");
     termios line{};
     if (tcgetattr(fd_, &line) == 0) {
       cfmakeraw(&line);
       cfsetspeed(&line, B921600);
       tcsetattr(fd_, TCSANOW, &line);
     }
-    send("\rC\rS6\rO\r");
-    listen(0, 200);
+    send("\rC\rS6\rO\r");  // end a partial line, close, 500 kbit/s, open
+    listen(0, start_up_ms);
   }
   SerialLink(const SerialLink&) = delete;
   SerialLink& operator=(const SerialLink&) = delete;
   ~SerialLink() override {
     try {
       send("C\r");
-    } catch (const std::exception&) {  // it has gone already
+    } catch (const std::exception&) {  // the port is already closed
     }
     close(fd_);
   }
@@ -44,17 +44,17 @@ class SerialLink : public BoardLink {
   std::vector<can::Frame> exchange(double, std::span<const can::Frame> frames) override {
     std::array<char, hal::slcan::longest_frame> text;
     std::string lines;
-    bool asks = false;
+    bool has_sample = false;
     for (const can::Frame& f : frames) {
       lines += hal::slcan::encode(f, text);
-      asks = asks || f.id == hal::time_frame_id;
+      has_sample = has_sample || f.id == hal::time_frame_id;
     }
     send(lines);
-    return listen(asks ? can::Status::id : 0, asks ? patience_ms : 20);
+    return has_sample ? listen(can::Status::id, answer_ms) : listen(0, other_answer_ms);
   }
 
  private:
-  static constexpr int patience_ms = 1'000;
+  static constexpr int start_up_ms = 200, answer_ms = 1'000, other_answer_ms = 20;
 
   void send(std::string_view bytes) {
     while (!bytes.empty()) {
@@ -64,7 +64,7 @@ class SerialLink : public BoardLink {
     }
   }
 
-  /// Until a frame of that id, or for so long.
+  /// Frames until one with the id `last_id` (0: none), for at most `most_ms`.
   std::vector<can::Frame> listen(std::uint16_t last_id, int most_ms) {
     std::vector<can::Frame> frames;
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(most_ms);

@@ -5,13 +5,20 @@
 
 namespace bms::hil {
 
+namespace {
+
+constexpr double precharge_time_constant_s = 0.5, dc_link_discharge_time_constant_s = 5;
+constexpr double initial_temperature_c = 25;
+constexpr double pack_noise_per_cell_noise = 4;  // of the pack voltage: sqrt(16)
+
+}  // namespace
+
 double dc_link_voltage_after(double dc_link_v, double pack_v, const ContactorCommand& closed, bool welded,
                              double duration_s) {
-  constexpr double precharge_time_constant_s = 0.5, falls_in_s = 5;
   if (closed.conducts(welded)) return pack_v;
   if (closed.precharge && closed.main_minus)
     return dc_link_v + (pack_v - dc_link_v) * (1 - std::exp(-duration_s / precharge_time_constant_s));
-  return dc_link_v * std::exp(-duration_s / falls_in_s);
+  return dc_link_v * std::exp(-duration_s / dc_link_discharge_time_constant_s);
 }
 
 SimulatedPack::SimulatedPack(const files::CellFile& cell, std::size_t cells, double initial_soc,
@@ -24,12 +31,12 @@ SimulatedPack::SimulatedPack(const files::CellFile& cell, std::size_t cells, dou
   std::normal_distribution<double> normal;
   simulations_.reserve(cells);
   for (std::size_t k = 0; k < cells; ++k) {
-    const double soc = cells > 1 ? spread.soc * normal(random_) : 0,
-                 capacity = cells > 1 ? spread.capacity * normal(random_) : 0;
-    const double own_ah = capacity_ah_ * (1 + capacity);
+    const double soc_offset = cells > 1 ? spread.soc * normal(random_) : 0,
+                 capacity_offset = cells > 1 ? spread.capacity * normal(random_) : 0;
+    const double own_ah = capacity_ah_ * (1 + capacity_offset);
     simulations_.emplace_back(tables_, own_ah, model::chosen<double>(cell.mechanisms, own_ah),
-                              std::clamp(initial_soc + soc, 0.0, 1.0));
-    voltage_v_[k] = simulations_[k].step(0, 0, 0, 25, [](auto&, const auto&) {});
+                              std::clamp(initial_soc + soc_offset, 0.0, 1.0));
+    voltage_v_[k] = simulations_[k].step(0, 0, 0, initial_temperature_c, [](auto&, const auto&) {});
   }
 }
 
@@ -62,7 +69,8 @@ measurement::PackSample<max_cells> SimulatedPack::read(std::uint64_t time_us, do
   s.current_ua = micro(current_a_ + spread_.current_noise_a * normal(random_));
   for (std::size_t k = 0; k < simulations_.size(); ++k)
     s.cell_uv[k] = micro(voltage_v_[k] + spread_.voltage_noise_v * normal(random_));
-  s.pack_uv = simulations_.size() == 1 ? s.cell_uv[0] : micro(pack_v() + 4 * spread_.voltage_noise_v * normal(random_));
+  const double pack_noise_v = pack_noise_per_cell_noise * spread_.voltage_noise_v;
+  s.pack_uv = simulations_.size() == 1 ? s.cell_uv[0] : micro(pack_v() + pack_noise_v * normal(random_));
   for (auto& t : s.temperature_cdegc)
     t = static_cast<std::int16_t>(std::lround(100 * (temperature_c + spread_.temperature_noise_c * normal(random_))));
   return s;

@@ -1,9 +1,10 @@
-// The pack that a board under test believes it measures: cells in series by a cell file, no two alike, a load behind
-// contactors, and the sensors. Truth and readings apart, so that what the board says can be judged.
+// The pack that a board under test measures: cells in series, contactors, DC link and sensors. The true values and the
+// readings are separate, so that the messages of the board can be judged.
 //
-//   cells     model/extended.hpp in double precision, each with its own capacity and state of charge, drawn from a seed
-//   link      the load's capacitance: rises over the pre-charge resistor, follows the pack while both contactors are
-//   closed, falls else sensors   white noise; what is broken of them: hil/injection.hpp
+//   cells     model/extended.hpp in double precision; capacity and state of charge of each cell are drawn from a seed
+//   DC link   capacitance of the load: charges through the pre-charge resistor, follows the pack while both main
+//             contactors are closed, and discharges otherwise
+//   sensors   white noise; their faults are injected by hil/injection.hpp
 #pragma once
 
 #include <array>
@@ -19,21 +20,22 @@ namespace bms::hil {
 
 inline constexpr std::size_t max_cells = 16;
 
+/// Standard deviations, between the cells and of the sensors' noise.
 struct PackSpread {
   std::uint32_t seed = 1;
-  double soc = 0.01, capacity = 0.01;  ///< one sigma between cells
+  double soc = 0.01, capacity = 0.01;  ///< fractions
   double voltage_noise_v = 0.001, current_noise_a = 0.01, temperature_noise_c = 0.05;
 };
 
-/// What the contactors are told; as ContactorState on CAN.
+/// Which contactors the board commands to close, as in the message ContactorState.
 struct ContactorCommand {
   bool main_plus = false, main_minus = false, precharge = false;
 
-  /// Whether current can flow; welded: main+ does not open.
+  /// Returns true if load current can flow. `welded`: main+ does not open.
   constexpr bool conducts(bool welded) const { return (main_plus || welded) && main_minus; }
 };
 
-/// The link's voltage after a time with the contactors so.
+/// DC-link voltage after `duration_s` with these contactors.
 double dc_link_voltage_after(double dc_link_v, double pack_v, const ContactorCommand& closed, bool welded,
                              double duration_s);
 
@@ -41,8 +43,8 @@ class SimulatedPack {
  public:
   SimulatedPack(const files::CellFile& cell, std::size_t cells, double initial_soc, const PackSpread& spread);
 
-  /// demand_a: what load or charger would have; flows while both main contactors are closed. welded: main+ does not
-  /// open.
+  /// Simulates `duration_s`. `demand_a`, the current of load or charger (> 0 charges), flows only while the contactors
+  /// conduct. `welded`: main+ does not open.
   void run(double demand_a, const ContactorCommand& closed, bool welded, double temperature_c, double duration_s);
 
   double current_a() const { return current_a_; }
@@ -52,7 +54,7 @@ class SimulatedPack {
   double pack_v() const;
   std::size_t cells() const { return simulations_.size(); }
 
-  /// As the sensors read it; of what a board has no sensor for, nothing.
+  /// Readings with sensor noise. Cells that the pack does not have stay without a reading.
   measurement::PackSample<max_cells> read(std::uint64_t time_us, double temperature_c);
 
  private:

@@ -13,11 +13,12 @@ namespace bms::monitor {
 namespace {
 
 constexpr std::int64_t stale_without_cycle_us = 3'000'000;
-constexpr std::int64_t farthest_us = std::int64_t{1} << 60;  // 36,500 years: differences and their sums do not overflow
-constexpr std::int64_t clock_set_us = 1'000'000;
+constexpr std::int64_t largest_time_us = std::int64_t{1} << 60;  // 36,500 years; sums and differences do not overflow
+constexpr std::int64_t clock_set_us = 1'000'000;                 // a larger step back means that a clock was set
 constexpr double smoothing = 1.0 / 8;
+constexpr int stale_cycles = 3, most_digits = 9;
 
-/// 0.002 of 0.002F.
+/// The shortest decimal number that rounds to `value`: 0.002 for 0.002F.
 double decimal(float value) {
   std::array<char, 32> text;
   const auto written = std::to_chars(text.data(), text.data() + text.size(), value);
@@ -28,23 +29,31 @@ double decimal(float value) {
 
 int digits_of(double step) {
   int digits = 0;
-  while (digits < 9 && std::abs(step - std::round(step)) > 1e-9 * step) step *= 10, ++digits;
+  while (digits < most_digits && std::abs(step - std::round(step)) > 1e-9 * step) {
+    step *= 10;
+    ++digits;
+  }
   return digits;
 }
 
-/// What the frame's raw value is in decimals: 54.302, not the product of two floats. A float of at most 24 bits holds
-/// that raw value exactly, and its one rounding is less than half of a step.
-double exact(const SignalInfo& signal, double value) {
-  const bool counts = signal.integer || signal.raw;
-  if (counts && signal.layout.has_invalid &&
-      value == (signal.layout.is_signed ? signal.layout.invalid
-                                        : static_cast<double>(static_cast<std::uint32_t>(signal.layout.invalid))))
+/// The raw value that means "invalid".
+double invalid_raw(const can::SignalLayout& layout) {
+  if (layout.is_signed) return layout.invalid;
+  return static_cast<double>(static_cast<std::uint32_t>(layout.invalid));
+}
+
+double raw_of(const SignalInfo& signal, double value) {
+  if (signal.raw) return value;
+  return std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
+}
+
+/// The decimal value of a signal: 54.302, not the product of two floats. A float holds a raw value of up to 24 bits
+/// exactly, and the rounding of the product is less than half a step.
+double decimal_value(const SignalInfo& signal, double value) {
+  if ((signal.integer || signal.raw) && signal.layout.has_invalid && value == invalid_raw(signal.layout))
     return std::numeric_limits<double>::quiet_NaN();
   if (signal.integer || !std::isfinite(value)) return value;
-  const double raw =
-      signal.raw
-          ? value
-          : std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
+  const double raw = raw_of(signal, value);
   const double scale = std::pow(10, signal.digits);
   return std::round((raw * signal.factor + signal.offset) * scale) / scale;
 }
@@ -75,23 +84,24 @@ MessageInfo info_of() {
   Message message;
   message.each([&](const char* name, const char* unit, const auto& value, const can::SignalLayout& layout) {
     const double factor = decimal(layout.factor), offset = decimal(layout.offset);
-    const bool counts = std::is_integral_v<std::remove_cvref_t<decltype(value)>>,
-               as_they_are = factor == 1 && offset == 0;
+    const bool integral = std::is_integral_v<std::remove_cvref_t<decltype(value)>>,
+               unscaled = factor == 1 && offset == 0;
     info.signals.push_back(
-        {name, unit, "", counts && as_they_are, counts && !as_they_are, layout, {}, factor, offset, digits_of(factor)});
+        {name, unit, "", integral && unscaled, integral && !unscaled, layout, {}, factor, offset, digits_of(factor)});
   });
   std::size_t k = 0;
   Message::each_in_words([&](const char*, const char* comment, std::span<const can::ValueName> names) {
     info.signals[k].comment = comment;
-    info.signals[k++].names = names;
+    info.signals[k].names = names;
+    ++k;
   });
   return info;
 }
 
-template <class... Message, class... OfProfile>
-std::vector<MessageInfo> infos_of(std::tuple<Message...>*, std::tuple<OfProfile...>*) {
+template <class... Message, class... ProfileMessage>
+std::vector<MessageInfo> infos_of(std::tuple<Message...>*, std::tuple<ProfileMessage...>*) {
   static_assert(sizeof...(Message) < 255);
-  return {info_of<Message>()..., info_of<OfProfile>()...};
+  return {info_of<Message>()..., info_of<ProfileMessage>()...};
 }
 
 }  // namespace
@@ -114,8 +124,9 @@ BusState::BusState() {
 }
 
 std::size_t BusState::receive(const BusFrame& frame) {
-  const std::size_t none_of_ours = states_.size();
-  const std::int64_t time_us = std::clamp(frame.time_us, -farthest_us, farthest_us);  // any log may come
+  const std::size_t not_accepted = states_.size();
+  const std::int64_t time_us =
+      std::clamp(frame.time_us, -largest_time_us, largest_time_us);  // a log may contain any time
   if (frames_++ == 0) first_us_ = last_us_ = now_us_ = time_us;
   if (time_us < last_us_ - clock_set_us) clock_set_back(time_us);
   last_us_ = std::max(last_us_, time_us);
@@ -123,22 +134,22 @@ std::size_t BusState::receive(const BusFrame& frame) {
   switch (frame.kind) {
     case FrameKind::remote:
       ++remote_;
-      return none_of_ours;
+      return not_accepted;
     case FrameKind::fd:
       ++fd_;
-      return none_of_ours;
+      return not_accepted;
     case FrameKind::error:
       ++errors_;
       error_classes_ |= frame.id;
-      return none_of_ours;
+      return not_accepted;
     case FrameKind::extended:
     case FrameKind::standard:
       break;
   }
   const std::size_t message = message_of(frame);
-  if (message != none_of_ours) return receive_known(message, to_can_frame(frame), time_us) ? message : none_of_ours;
+  if (message != not_accepted) return receive_known(message, to_can_frame(frame), time_us) ? message : not_accepted;
   count_unknown(frame);
-  return none_of_ours;
+  return not_accepted;
 }
 
 std::size_t BusState::message_of(const BusFrame& frame) const {
@@ -152,12 +163,12 @@ std::size_t BusState::message_of(const BusFrame& frame) const {
 }
 
 void BusState::clock_set_back(std::int64_t to_us) {
-  first_us_ = std::max(first_us_ - (last_us_ - to_us), -2 * farthest_us);
+  first_us_ = std::max(first_us_ - (last_us_ - to_us), -2 * largest_time_us);
   last_us_ = now_us_ = to_us;
   for (MessageState& state : states_) state.last_us = std::min(state.last_us, to_us);
 }
 
-/// Counts what is wrong with a frame of a message.
+/// Counts the error of the frame if there is one.
 bool BusState::is_intact(const MessageInfo& info, MessageState& state, const can::Frame& frame) const {
   if (frame.length != 8) {
     ++state.wrong_length;
@@ -185,11 +196,12 @@ bool BusState::receive_known(std::size_t message, const can::Frame& frame, std::
   if (!is_intact(info, state, frame)) return false;
   if (const auto since_us = static_cast<double>(time_us - state.last_us); state.frames > 0 && since_us > 0)
     state.period_us += state.period_us > 0 ? smoothing * (since_us - state.period_us) : since_us;
-  ++good_;
+  ++accepted_;
   ++state.frames;
   state.last_us = time_us;
   info.decode(frame, state.values);
-  for (std::size_t s = 0; s < state.values.size(); ++s) state.values[s] = exact(info.signals[s], state.values[s]);
+  for (std::size_t s = 0; s < state.values.size(); ++s)
+    state.values[s] = decimal_value(info.signals[s], state.values[s]);
   return true;
 }
 
@@ -216,7 +228,7 @@ double BusState::age_s(std::size_t message) const {
 bool BusState::stale(std::size_t message) const {
   const std::int64_t cycle_us = messages()[message].cycle_us;
   return states_[message].frames == 0 ||
-         now_us_ - states_[message].last_us > (cycle_us > 0 ? 3 * cycle_us : stale_without_cycle_us);
+         now_us_ - states_[message].last_us > (cycle_us > 0 ? stale_cycles * cycle_us : stale_without_cycle_us);
 }
 
 std::size_t BusState::find(std::string_view message) {

@@ -16,8 +16,8 @@ using hal::slcan::digit;
 
 constexpr std::uint32_t error_flag = 0x2000'0000, longest_id = 0x1FFF'FFFF;  // linux/can.h
 
-/// Up to the next blank; takes it and the blanks after it away.
-std::string_view word(std::string_view& rest) {
+/// Removes the first word and the spaces after it, and returns the word.
+std::string_view take_word(std::string_view& rest) {
   const std::size_t end = std::min(rest.find(' '), rest.size());
   const std::string_view first = rest.substr(0, end);
   rest.remove_prefix(end);
@@ -61,7 +61,7 @@ bool parse_id(std::string_view text, BusFrame& frame) {
   return true;
 }
 
-/// Pairs of digits, maybe with dots between them.
+/// Pairs of hexadecimal digits, with optional dots between them.
 bool parse_data(std::string_view text, std::size_t most, BusFrame& frame) {
   std::size_t n = 0;
   for (std::size_t at = 0; at < text.size(); ++n) {
@@ -97,9 +97,9 @@ bool parse_content(std::string_view text, BusFrame& frame) {
 
 bool parse_dump_line(std::string_view line, BusFrame& frame) {
   BusFrame parsed;
-  if (!parse_time(word(line), parsed.time_us)) return false;
-  if (word(line).empty()) return false;  // interface
-  const std::string_view content = word(line), direction = word(line);
+  if (!parse_time(take_word(line), parsed.time_us)) return false;
+  if (take_word(line).empty()) return false;  // interface
+  const std::string_view content = take_word(line), direction = take_word(line);
   if (!line.empty() || !(direction.empty() || direction == "R" || direction == "T")) return false;
   const std::size_t mark = content.find('#');
   if (mark == std::string_view::npos || !parse_id(content.substr(0, mark), parsed) ||

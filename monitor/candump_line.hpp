@@ -1,11 +1,11 @@
-// A line of a candump log (candump -L, candump -l), read and written:
+// A line of a candump log (candump -L, candump -l): parser and writer.
 //
-//   (1436509052.249713) can0 182#0123456789ABCDEF     data; an id of 8 digits is a 29-bit one
-//   (1436509052.249713) can0 182#R8                   remote request, length asked for
-//   (1436509052.249713) can0 182##1001122             CAN FD: a digit of flags, then data
+//   (1436509052.249713) can0 182#0123456789ABCDEF          data; an id of 8 digits has 29 bits
+//   (1436509052.249713) can0 182#R8                        remote request with the requested length
+//   (1436509052.249713) can0 182##1001122                  CAN FD: one digit of flags, then data
 //   (1436509052.249713) can0 20000004#0004000000000000     error report
 //
-// A direction at the end (R or T, candump -x) is read over. Anything else is no frame. Total: any bytes may come.
+// A direction at the end (R or T, candump -x) is ignored. All other lines are rejected; any bytes are safe.
 #pragma once
 
 #include <cstddef>
@@ -16,19 +16,19 @@
 
 namespace bms::monitor {
 
-/// The longest line that can be a frame, and room to spare; what is longer is none.
+/// Longer lines are not frames.
 inline constexpr std::size_t longest_dump_line = 512;
 
-/// False: `line` (without its end) is no frame, and `frame` is as it was.
+/// Returns false, and leaves `frame` unchanged, if `line` is not a frame. `line` has no line end.
 bool parse_dump_line(std::string_view line, BusFrame& frame);
 
-/// Appends the line with its end. interface: without blanks.
+/// Appends the line and its end. `interface` must not contain spaces.
 void append_dump_line(std::string& text, const BusFrame& frame, std::string_view interface);
 
-/// Collects bytes to lines, of bounded length: a longer one comes out empty and marked.
+/// Splits bytes into lines of bounded length. A longer line is empty, and too_long() is true.
 class DumpLines {
  public:
-  /// True when `byte` ended a line, which line() holds until the next call.
+  /// Returns true if `byte` ends a line. line() is then valid until the next call.
   bool push(char byte) {
     if (ended_) {
       text_.clear();
@@ -42,11 +42,12 @@ class DumpLines {
       return false;
     }
     if (!text_.empty() && text_.back() == '\r') text_.pop_back();
-    return ended_ = true;
+    ended_ = true;
+    return true;
   }
   std::string_view line() const { return too_long_ ? std::string_view{} : std::string_view{text_}; }
   bool too_long() const { return too_long_; }
-  /// Whether a line without an end is left over.
+  /// Returns true if the last line has no end yet.
   bool pending() const { return !ended_ && (!text_.empty() || too_long_); }
 
  private:

@@ -14,7 +14,7 @@ std::unique_ptr<FrameSource> open_source(const std::string& name) {
   if (name.starts_with("file:")) return open_dump(name.substr(5));
   if (name.starts_with("slcan:")) return open_slcan(name.substr(6));
   if (name.empty() || name.find_first_of(":/. ") != std::string::npos) {
-    throw SourceError(name, 1, "no such source, expected a CAN interface (can0), slcan:DEVICE or file:DUMP.log");
+    throw SourceError(name, 1, "unknown source, expected a CAN interface (can0), slcan:DEVICE or file:DUMP.log");
   }
   return open_socketcan(name);
 }

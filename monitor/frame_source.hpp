@@ -1,12 +1,14 @@
-// Where frames come from, behind one small interface:
+// Sources of CAN frames behind one interface:
 //
-//   can0, vcan0, ...        SocketCAN: raw socket, kernel time stamps, error frames, the kernel's count of what it had
-//   to drop slcan:/dev/ttyACM0      a serial adapter or a pseudo-terminal, by hal/slcan/codec.hpp: set to 500 kbit/s
-//   (S6), opened (O), closed at the end (C);
-//                           921,600 baud where the line has a rate. Time is when the frame was read.
-//   file:DUMP.log           candump -L, maybe compressed by gzip; file:- is standard input. Time is the log's.
+//   can0, vcan0, ...        SocketCAN: raw socket with kernel time stamps, error frames and the kernel's count of
+//                           dropped frames
+//   slcan:/dev/ttyACM0      a serial adapter or pseudo-terminal, hal/slcan/codec.hpp: set to 500 kbit/s (S6), opened
+//                           (O), closed at the end (C); 921,600 baud if the port has a baud rate. The time of a frame
+//                           is the time when it was read.
+//   file:DUMP.log           candump -L, plain or compressed by gzip; file:- is standard input. Times are those of the
+//                           log.
 //
-// Memory is bounded whatever comes. What is no frame is counted.
+// Memory use is bounded for any input. Malformed lines are counted.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +21,7 @@
 
 namespace bms::monitor {
 
-/// A source that is not there, or not what it should be; what() says what was expected. Line 0: none.
+/// The source does not exist or has the wrong type; what() says what was expected. `line` is 0 if no line applies.
 struct SourceError : std::runtime_error {
   SourceError(const std::string& name, std::size_t at, const std::string& what)
       : std::runtime_error(what), source(name), line(at) {}
@@ -31,28 +33,28 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  /// Frames that are there, at most room.size(); waits up to wait_ms for the first. 0: none in that time, a signal
-  /// came, or ended().
+  /// Reads available frames into `room` and returns their number. Waits up to wait_ms for the first. Returns 0 after
+  /// that time, after a signal, or at the end.
   virtual std::size_t read(std::span<BusFrame> room, int wait_ms) = 0;
-  /// Nothing will come any more: end of file, adapter unplugged.
+  /// Returns true after the last frame: at the end of the file, or when the adapter was unplugged.
   virtual bool ended() const = 0;
-  /// Whether its time is this machine's clock; otherwise time is what its frames say.
+  /// Returns true if times are those of this machine's clock, false if they are those of a log.
   virtual bool live() const = 0;
 
-  std::uint64_t malformed() const { return malformed_; }  ///< lines that are no frame
-  std::uint64_t dropped() const { return dropped_; }      ///< frames that the kernel had no room for
+  std::uint64_t malformed() const { return malformed_; }  ///< lines that are not frames
+  std::uint64_t dropped() const { return dropped_; }      ///< frames that the kernel dropped
 
  protected:
   std::uint64_t malformed_ = 0, dropped_ = 0;
 };
 
-/// Throws SourceError.
+/// By the notation above. Throws SourceError.
 std::unique_ptr<FrameSource> open_source(const std::string& name);
 
-/// Of this machine, as SocketCAN stamps frames.
+/// This machine's time since 1970, the clock of SocketCAN's time stamps.
 std::int64_t clock_us();
 
-// One each, for open_source().
+// Each throws SourceError.
 std::unique_ptr<FrameSource> open_socketcan(const std::string& interface);
 std::unique_ptr<FrameSource> open_slcan(const std::string& device);
 std::unique_ptr<FrameSource> open_dump(const std::string& path);

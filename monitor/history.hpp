@@ -1,5 +1,5 @@
-// What the live page plots: the last 7,200 points, half a second apart at least (an hour, two at one sample a second).
-// Fixed memory.
+// The points of the live page: the last 7,200, at least half a second apart. That is one hour, or two hours with one
+// sample per second. Memory use is constant.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ class History {
   static constexpr std::int64_t min_interval_us = 500'000;
 
   History() { points_.reserve(capacity); }
-  /// Whether a point of that time is wanted: later than the last by the least gap, or earlier (a clock was set).
+  /// Returns true if `time_us` is later than the last point by the minimum interval, or earlier (a clock was set).
   bool is_due(std::int64_t time_us) const {
     return count_ == 0 || time_us - last_us_ >= min_interval_us || time_us < last_us_;
   }
@@ -42,7 +42,7 @@ class History {
     ++count_;
     last_us_ = time_us;
   }
-  /// Points ever added; those from first() on are there.
+  /// Points added since the start. Points first() to count() - 1 are available.
   std::uint64_t count() const { return count_; }
   std::uint64_t first() const { return count_ - points_.size(); }
   const HistoryPoint& at(std::uint64_t k) const { return points_[k % capacity]; }

@@ -20,6 +20,8 @@ namespace bms::monitor {
 namespace {
 
 constexpr int most_streams = 6;
+constexpr std::size_t longest_request_body = 1'024;
+constexpr int forbidden = 403, method_not_allowed = 405, service_unavailable = 503;  // HTTP
 
 void append(std::string& text, const HistoryPoint& p) {
   auto out = std::back_inserter(text);
@@ -45,19 +47,19 @@ struct LivePage::Server {
   std::thread thread;
   std::atomic<int> streams{0};
 
-  std::mutex guard;  // of what follows
+  std::mutex guard;  // of the members below
   std::condition_variable changed;
   History history;
   std::string picture;
   std::uint64_t version = 0;
   bool stopping = false;
 
-  /// What a stream has sent.
+  /// How much a stream has sent.
   struct Position {
     std::uint64_t version = 0, points = 0;
   };
 
-  /// Waits for news, and puts them into `event`; a comment when there are none in a second. False: the end.
+  /// Waits for news and writes them to `event`, or a comment after one second without news. Returns false at the end.
   bool next(Position& at, std::string& event) {
     std::unique_lock lock(guard);
     changed.wait_for(lock, std::chrono::seconds(1), [&] { return stopping || version != at.version; });
@@ -81,12 +83,12 @@ struct LivePage::Server {
     return true;
   }
 
-  bool ours(const std::string& host) const {
+  bool is_own_host(const std::string& host) const {
     return host == fmt::format("127.0.0.1:{}", port) || host == fmt::format("localhost:{}", port);
   }
 
-  /// True: answered here.
-  bool refused(const httplib::Request& request, httplib::Response& response) const {
+  /// Sets the headers of the response. Returns true if the request is rejected.
+  bool reject(const httplib::Request& request, httplib::Response& response) const {
     response.set_header("Content-Security-Policy",
                         "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
                         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
@@ -94,10 +96,10 @@ struct LivePage::Server {
     response.set_header("X-Content-Type-Options", "nosniff");
     response.set_header("Referrer-Policy", "no-referrer");
     response.set_header("Cache-Control", "no-store");
-    if (!ours(request.get_header_value("Host")))
-      response.status = 403;
+    if (!is_own_host(request.get_header_value("Host")))
+      response.status = forbidden;
     else if (request.method != "GET")
-      response.status = 405;
+      response.status = method_not_allowed;
     else
       return false;
     return true;
@@ -106,7 +108,7 @@ struct LivePage::Server {
   void stream(httplib::Response& response) {
     if (streams.fetch_add(1) >= most_streams) {
       --streams;
-      response.status = 503;
+      response.status = service_unavailable;
       return;
     }
     auto at = std::make_shared<Position>();
@@ -129,25 +131,27 @@ LivePage::LivePage(std::string html, int port) : server_(std::make_unique<Server
   s.html = std::move(html);
   s.http.new_task_queue = [] {
     return new httplib::ThreadPool(most_streams + 2);
-  };  // NOLINT(cppcoreguidelines-owning-memory): the server takes it
+  };  // NOLINT(cppcoreguidelines-owning-memory): the server owns it
   s.http.set_socket_options([](socket_t socket) {
     const int on = 1;
-    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on,
-               sizeof on);  // not SO_REUSEPORT: a port that is taken must be seen to be
+    // not SO_REUSEPORT: binding to a port in use must fail
+    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   });
-  s.http.set_payload_max_length(1'024);
+  s.http.set_payload_max_length(longest_request_body);
   s.http.set_pre_routing_handler([&s](const httplib::Request& request, httplib::Response& response) {
-    return s.refused(request, response) ? httplib::Server::HandlerResponse::Handled
-                                        : httplib::Server::HandlerResponse::Unhandled;
+    return s.reject(request, response) ? httplib::Server::HandlerResponse::Handled
+                                       : httplib::Server::HandlerResponse::Unhandled;
   });
   s.http.Get("/", [&s](const httplib::Request&, httplib::Response& response) {
     response.set_content(s.html, "text/html; charset=utf-8");
   });
   s.http.Get("/events", [&s](const httplib::Request&, httplib::Response& response) { s.stream(response); });
-  s.port = port > 0 ? (s.http.bind_to_port("127.0.0.1", port) ? port : -1) : s.http.bind_to_any_port("127.0.0.1");
+  if (port <= 0)
+    s.port = s.http.bind_to_any_port("127.0.0.1");
+  else
+    s.port = s.http.bind_to_port("127.0.0.1", port) ? port : -1;
   if (s.port < 0)
-    throw SourceError("--serve", 1,
-                      fmt::format("port {} of 127.0.0.1 is not to be had, expected one that is free", port));
+    throw SourceError("--serve", 1, fmt::format("port {} of 127.0.0.1 is in use, expected a free port", port));
   s.thread = std::thread([&s] { s.http.listen_after_bind(); });
 }
 
@@ -157,8 +161,8 @@ LivePage::~LivePage() {
     server_->stopping = true;
   }
   server_->changed.notify_all();
-  while (!server_->http.is_running())
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // stopping before it listens would be forgotten
+  // stop() has no effect before the server listens
+  while (!server_->http.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   server_->http.stop();
   server_->thread.join();
 }
@@ -166,7 +170,7 @@ LivePage::~LivePage() {
 std::string LivePage::url() const { return fmt::format("http://127.0.0.1:{}/", server_->port); }
 
 void LivePage::add(const BusState& bus) {
-  if (!server_->history.is_due(bus.now_us())) return;  // only this thread writes
+  if (!server_->history.is_due(bus.now_us())) return;  // no lock: only this thread writes the history
   const HistoryPoint point = point_of(bus);
   const std::lock_guard lock(server_->guard);
   server_->history.add(point, bus.now_us());

@@ -1,14 +1,15 @@
-// The live page: a small HTTP server on 127.0.0.1 that hands out one page and a stream of events (cpp-httplib).
+// The live page: an HTTP server on 127.0.0.1 (cpp-httplib) that serves one page and a stream of events.
 //
-//   GET /          the page, all inside
-//   GET /events    server-sent events: {"picture": what json_of() says, "points": [[time_s, soc, two sigma, A, V,
-//   degrees C, cells...]]};
-//                  the first event of a connection brings the whole history, each later one what is new, twice a second
-//                  at most
+//   GET /          the page, self-contained
+//   GET /events    server-sent events: {"picture": output of json_of(),
+//                  "points": [[time_s, soc, two sigma, A, V, degrees C, cells...]]}
+//                  The first event of a connection contains the whole history, each later one the new points. At most
+//                  two events per second.
 //
-// Only for this machine and its user: anything but GET is refused (405), so is a Host that is not ours (403: a foreign
-// page whose name was pointed at 127.0.0.1), other pages may neither read nor frame it, and the page itself may fetch
-// from nowhere else (its Content-Security-Policy). Six streams at most, the next is told to wait (503).
+// Only this machine and its user have access. Methods other than GET are rejected (405), and so is a foreign Host
+// header (403), which a page of another domain that resolves to 127.0.0.1 would send. Other pages can neither read nor
+// frame the page, and its Content-Security-Policy lets it fetch only from this server. At most six streams; the next
+// gets 503.
 #pragma once
 
 #include <memory>
@@ -20,16 +21,16 @@ namespace bms::monitor {
 
 class LivePage {
  public:
-  /// port 0: any that is free. Throws SourceError when it is taken.
+  /// Starts the server. Port 0: any free port. Throws SourceError if the port is in use.
   LivePage(std::string html, int port);
   ~LivePage();
   LivePage(const LivePage&) = delete;
   LivePage& operator=(const LivePage&) = delete;
 
   std::string url() const;
-  /// A point for the plots, if the history wants one now.
+  /// Adds a point to the history if one is due.
   void add(const BusState& bus);
-  /// The picture as JSON, and what was added since.
+  /// Sends `picture`, the output of json_of(), and the new points to all streams.
   void publish(std::string picture);
 
  private:

@@ -13,23 +13,25 @@ namespace bms::monitor {
 
 namespace {
 
-constexpr std::pair<estimator::Flag, const char*> flag_words[] = {
+constexpr int most_cells = 64;
+
+constexpr std::pair<estimator::Flag, const char*> flag_texts[] = {
     {estimator::voltage_missing, "voltage missing"},
     {estimator::voltage_implausible, "voltage implausible"},
     {estimator::voltage_stuck, "voltage stuck"},
     {estimator::current_missing, "current missing"},
     {estimator::current_implausible, "current implausible"},
-    {estimator::time_gap, "gap in time"},
-    {estimator::time_not_increasing, "time not later"},
+    {estimator::time_gap, "time gap"},
+    {estimator::time_not_increasing, "time not increasing"},
     {estimator::not_started, "not started"},
     {estimator::soc_ambiguous, "more than one state of charge fits"},
-    {estimator::voltage_rejected, "voltage disbelieved"}};
+    {estimator::voltage_rejected, "voltage rejected"}};
 
-std::vector<TextItem> flags_in_words(const Reading& flags) {
+std::vector<TextItem> flag_items(const Reading& flags) {
   std::vector<TextItem> set;
   if (!flags.known()) return set;
   auto bits = static_cast<std::uint32_t>(flags.value);
-  for (const auto& [bit, text] : flag_words) {
+  for (const auto& [bit, text] : flag_texts) {
     if ((bits & bit) != 0) set.push_back({text, "", flags.stale});
     bits &= ~static_cast<std::uint32_t>(bit);
   }
@@ -37,13 +39,13 @@ std::vector<TextItem> flags_in_words(const Reading& flags) {
   return set;
 }
 
-/// see(signal, value, stale) for each signal of a message that has been heard; false: it has not.
-template <class See>
-bool each_signal(const BusState& bus, std::string_view message, See&& see) {
+/// Calls use(signal, value, stale) for each signal of a message. Returns false if the message was never received.
+template <class Use>
+bool each_signal(const BusState& bus, std::string_view message, Use&& use) {
   const std::size_t k = BusState::find(message);
   if (k == messages().size() || bus.states()[k].frames == 0) return false;
   for (std::size_t s = 0; s < messages()[k].signals.size(); ++s)
-    see(messages()[k].signals[s], bus.states()[k].values[s], bus.stale(k));
+    use(messages()[k].signals[s], bus.states()[k].values[s], bus.stale(k));
   return true;
 }
 
@@ -57,7 +59,7 @@ std::vector<Reading> cells_of(const BusState& bus) {
       if (!name.starts_with("Cell") || !std::isfinite(value)) return;
       int number = 0;
       std::from_chars(name.data() + 4, name.data() + name.size(), number);
-      if (number < 1 || number > 64) return;
+      if (number < 1 || number > most_cells) return;
       if (cells.size() < static_cast<std::size_t>(number)) cells.resize(static_cast<std::size_t>(number));
       cells[static_cast<std::size_t>(number) - 1] = {value, age_s, stale};
     });
@@ -84,9 +86,16 @@ PackView::Cells PackView::cells() const {
   for (std::size_t k = 0; k < cells_v.size(); ++k) {
     if (!cells_v[k].known()) continue;
     const double v = cells_v[k].value;
-    if (c.count == 0 || v < c.lowest_v) c.lowest = k, c.lowest_v = v;
-    if (c.count == 0 || v > c.highest_v) c.highest = k, c.highest_v = v;
-    c.mean_v += (v - c.mean_v) / static_cast<double>(++c.count);
+    if (c.count == 0 || v < c.lowest_v) {
+      c.lowest = k;
+      c.lowest_v = v;
+    }
+    if (c.count == 0 || v > c.highest_v) {
+      c.highest = k;
+      c.highest_v = v;
+    }
+    ++c.count;
+    c.mean_v += (v - c.mean_v) / static_cast<double>(c.count);
   }
   return c;
 }
@@ -97,7 +106,9 @@ PackView pack_view(const BusState& bus) {
   v.soc_sigma_percent = bus.reading("PackState", "SocSigma");
   v.soc_display_percent = bus.reading("PackState", "SocDisplay");
   each_signal(bus, "PackState", [&](const SignalInfo& signal, double value, bool stale) {
-    if (std::string_view(signal.name) == "SocQuality") v.soc_quality = {text_of(signal, value), signal.comment, stale};
+    if (std::string_view(signal.name) != "SocQuality") return;
+    v.soc_quality = {text_of(signal, value), signal.comment, stale};
+    if (std::isfinite(value)) v.soc_quality_value = static_cast<int>(value);
   });
   v.voltage_v = bus.reading("PackElectrical", "Voltage");
   v.current_a = bus.reading("PackElectrical", "Current");
@@ -113,11 +124,12 @@ PackView pack_view(const BusState& bus) {
   v.cells_v = cells_of(bus);
   each_signal(bus, "ContactorState", [&](const SignalInfo& signal, double value, bool stale) {
     if (!std::isfinite(value) || (signal.layout.bits == 1 && value == 0)) return;
-    const std::string text = text_of(signal, value);
-    v.contactor.push_back({std::string_view(signal.name) == "State" ? text
-                           : signal.layout.bits == 1                ? signal.name
-                                                                    : fmt::format("{} {}", signal.name, text),
-                           signal.comment, stale});
+    std::string text = text_of(signal, value);
+    if (signal.layout.bits == 1)
+      text = signal.name;
+    else if (std::string_view(signal.name) != "State")
+      text = fmt::format("{} {}", signal.name, text);
+    v.contactor.push_back({text, signal.comment, stale});
   });
   v.faults_received = each_signal(bus, "Faults", [&](const SignalInfo& signal, double value, bool stale) {
     if (!std::isfinite(value) || value == 0) return;
@@ -126,7 +138,7 @@ PackView pack_view(const BusState& bus) {
     else
       v.fault_details.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
   });
-  v.flags = flags_in_words(bus.reading("Status", "Flags"));
+  v.flags = flag_items(bus.reading("Status", "Flags"));
   return v;
 }
 

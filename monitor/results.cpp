@@ -19,9 +19,9 @@ Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nul
 Json fraction(const Reading& percent) { return number(std::round(percent.value * 1e7) / 1e9); }
 Json seconds(double s) { return number(std::round(s * 1e6) / 1e6); }
 
-Json list_of(const std::vector<TextItem>& words) {
+Json list_of(const std::vector<TextItem>& items) {
   Json list = Json::array();
-  for (const TextItem& w : words) list.push_back(w.text);
+  for (const TextItem& item : items) list.push_back(item.text);
   return list;
 }
 
@@ -124,9 +124,9 @@ std::string csv_head() {
 std::string csv_row(const BusState& bus) {
   std::string row = fmt::format("{:.6f}", bus.duration_s());
   auto out = std::back_inserter(row);
-  const auto field = [&](double value, bool integer, bool there) {
+  const auto field = [&](double value, bool integer, bool valid) {
     row += ',';
-    if (!there || !std::isfinite(value)) return;
+    if (!valid || !std::isfinite(value)) return;
     if (integer)
       fmt::format_to(out, "{}", static_cast<std::int64_t>(value));
     else

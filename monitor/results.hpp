@@ -1,4 +1,4 @@
-// What the monitor hands to programs: one JSON object, and rows of CSV.
+// The output of the monitor for other programs: one JSON object, and rows of CSV.
 #pragma once
 
 #include <string>
@@ -8,14 +8,14 @@
 
 namespace bms::monitor {
 
-/// One JSON object: the battery, each message with its signals, what was wrong. From the frames alone, so that a record
-/// gives the same, but for `source` and `silent_s` (how long ago the last frame came).
+/// One JSON object: the battery, each message with its signals, and the errors of the bus. It depends only on the
+/// frames, except for `source` and `silent_s`, the time since the last frame.
 std::string json_of(const BusState& bus, const ScreenFacts& facts, double silent_s = 0);
 
-/// time_s (since the first frame), current_a, voltage_v, temperature_c as in a recording, then every signal of the DBC
-/// file as "Message.Signal [unit]".
+/// The columns time_s (since the first frame), current_a, voltage_v and temperature_c of a recording, then each signal
+/// of the DBC files as "Message.Signal [unit]".
 std::string csv_head();
-/// One row: the last values as they stand; empty where not known, never said or stale.
+/// One row of last values; a field is empty if the value is invalid, never received or stale.
 std::string csv_row(const BusState& bus);
 
 }  // namespace bms::monitor

@@ -7,45 +7,15 @@
 
 #include <fmt/format.h>
 
+#include "monitor/message_table.hpp"
 #include "monitor/pack_view.hpp"
 
 namespace bms::monitor {
 
 namespace {
 
-/// Bytes of a character of the few that are written here (UTF-8).
-std::size_t bytes_of(char first) {
-  const auto byte = static_cast<unsigned char>(first);
-  return byte < 0x80 ? 1 : byte < 0xE0 ? 2 : byte < 0xF0 ? 3 : 4;
-}
-
-std::size_t columns_of(std::string_view text) {
-  std::size_t n = 0;
-  for (std::size_t at = 0; at < text.size(); at += bytes_of(text[at])) ++n;
-  return n;
-}
-
-/// What came from outside: printable ASCII alone.
-std::string clean(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) {
-    if (c < 0x20 || c > 0x7E) c = '?';
-  }
-  return out;
-}
-
-TextStyle ink_of(bool stale, TextStyle fresh = TextStyle::plain) { return stale ? TextStyle::faint : fresh; }
-
 std::string number(const Reading& r, int digits, const char* unit) {
   return r.known() ? fmt::format("{:.{}f}{}", r.value, digits, unit) : fmt::format("-{}", unit);
-}
-
-/// "3 s", "4 min", "-"
-std::string age(double age_s) {
-  if (!std::isfinite(age_s)) return "-";
-  if (age_s < 9.95) return fmt::format("{:.1f} s", age_s);
-  if (age_s < 100) return fmt::format("{:.0f} s", age_s);
-  return age_s < 6'000 ? fmt::format("{:.0f} min", age_s / 60) : fmt::format("{:.0f} h", age_s / 3'600);
 }
 
 std::string clock(double seconds) {
@@ -53,7 +23,15 @@ std::string clock(double seconds) {
   return fmt::format("{}:{:02}:{:02}", s / 3'600, s / 60 % 60, s % 60);
 }
 
-/// Draws on bounded lines, in blocks or in ASCII.
+constexpr double silent_after_s = 3;
+constexpr int soc_from_voltage = 1, soc_from_counting = 2;  // values of the signal SocQuality
+constexpr double smallest_bar_range_v = 0.05;               // of the cell bars, so that noise does not look large
+constexpr std::size_t least_cell_columns = 20, most_cell_columns = 60, cell_text_columns = 12;
+constexpr std::size_t columns_for_rate = 70, columns_for_direction = 60, columns_for_long_lines = 62;
+constexpr std::size_t two_part_columns = 150, left_columns = 84;  // pack on the left, messages on the right
+constexpr std::size_t rows_for_fault_comments = 16;
+
+/// Draws lines of a given width, with block characters or in ASCII.
 class Drawing {
  public:
   Drawing(const BusState& bus, const ScreenFacts& facts, std::size_t columns)
@@ -61,34 +39,39 @@ class Drawing {
 
   ScreenLine head() const {
     ScreenLine line;
-    line.add("bms monitor ", TextStyle::strong).add(clean(facts_.source).substr(0, columns_ / 2));
+    line.add("bms monitor ", TextStyle::strong).add(printable(facts_.source).substr(0, columns_ / 2));
     line.add(fmt::format("  {}  {} frames", clock(bus_.duration_s()), bus_.frames()));
-    if (columns_ >= 70) line.add(fmt::format("  {:.0f}/s", facts_.frames_per_second));
+    if (columns_ >= columns_for_rate) line.add(fmt::format("  {:.0f}/s", facts_.frames_per_second));
     if (bus_.frames() == 0)
-      line.add("  nothing heard yet", TextStyle::warning);
-    else if (const double silent_s = 1e-6 * static_cast<double>(bus_.now_us() - bus_.last_us()); silent_s > 3)
-      line.add(fmt::format("  silent for {}", age(silent_s)), TextStyle::alarm);
+      line.add("  no frames received yet", TextStyle::warning);
+    else if (const double silent_s = 1e-6 * static_cast<double>(bus_.now_us() - bus_.last_us());
+             silent_s > silent_after_s)
+      line.add(fmt::format("  silent for {}", age_text(silent_s)), TextStyle::alarm);
     return line;
   }
 
-  /// What is wrong with the bus, in words; empty: nothing.
+  /// Errors of the bus; empty without errors.
   ScreenLine troubles() const {
     std::uint64_t lost = 0, repeated = 0, crc = 0, length = 0;
-    for (const MessageState& m : bus_.states())
-      lost += m.lost, repeated += m.repeated, crc += m.crc_errors, length += m.wrong_length;
+    for (const MessageState& m : bus_.states()) {
+      lost += m.lost;
+      repeated += m.repeated;
+      crc += m.crc_errors;
+      length += m.wrong_length;
+    }
     ScreenLine line;
-    const auto say = [&](std::uint64_t count, const char* what, TextStyle ink) {
-      if (count > 0) line.add(line.columns() == 0 ? "Bus      " : ", ").add(fmt::format("{} {}", count, what), ink);
+    const auto report = [&](std::uint64_t count, const char* what, TextStyle style) {
+      if (count > 0) line.add(line.columns() == 0 ? "Bus      " : ", ").add(fmt::format("{} {}", count, what), style);
     };
-    say(facts_.dropped, "dropped by the kernel", TextStyle::alarm);
-    say(lost, "lost", TextStyle::warning);
-    say(crc, "CRC errors", TextStyle::warning);
-    say(length, "of wrong length", TextStyle::warning);
-    say(repeated, "repeated", TextStyle::warning);
-    say(facts_.malformed, "malformed lines", TextStyle::warning);
-    say(bus_.errors(), "error reports", TextStyle::alarm);
-    say(bus_.unknown_frames(), "of other ids", TextStyle::faint);
-    say(bus_.remote() + bus_.fd(), "remote or FD", TextStyle::faint);
+    report(facts_.dropped, "dropped by the kernel", TextStyle::alarm);
+    report(lost, "lost", TextStyle::warning);
+    report(crc, "CRC errors", TextStyle::warning);
+    report(length, "with wrong length", TextStyle::warning);
+    report(repeated, "repeated", TextStyle::warning);
+    report(facts_.malformed, "malformed lines", TextStyle::warning);
+    report(bus_.errors(), "error reports", TextStyle::alarm);
+    report(bus_.unknown_frames(), "with other ids", TextStyle::faint);
+    report(bus_.remote() + bus_.fd(), "remote or FD", TextStyle::faint);
     return line;
   }
 
@@ -96,16 +79,16 @@ class Drawing {
     ScreenLine line;
     line.add("Charge   ");
     const Reading &soc = pack_.soc_percent, &sigma = pack_.soc_sigma_percent;
-    line.add(number(soc, 1, " %"), ink_of(soc.stale, TextStyle::strong));
+    line.add(number(soc, 1, " %"), style_of(soc.stale, TextStyle::strong));
     if (sigma.known())
-      line.add(fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value), ink_of(sigma.stale));
-    if (!pack_.soc_quality.text.empty()) line.add("  " + pack_.soc_quality.text, ink_of(soc.stale, quality_ink()));
-    if (columns_ >= 70 && pack_.soc_display_percent.known())
+      line.add(fmt::format(" {} {:.1f}", facts_.blocks ? "\u00b1" : "+-", 2 * sigma.value), style_of(sigma.stale));
+    if (!pack_.soc_quality.text.empty()) line.add("  " + pack_.soc_quality.text, style_of(soc.stale, quality_style()));
+    if (columns_ >= columns_for_rate && pack_.soc_display_percent.known())
       line.add(fmt::format("  (display {:.1f} %)", pack_.soc_display_percent.value), TextStyle::faint);
     return line;
   }
 
-  /// 0 to 100 %: solid up to the lower end of the two-sigma band, the band, a mark at the estimate.
+  /// A bar from 0 to 100 %: filled up to the lower end of the two-sigma band, then the band; a mark at the estimate.
   ScreenLine soc_bar() const {
     ScreenLine line;
     const std::size_t width = columns_ < 12 ? 0 : columns_ - 2;
@@ -120,11 +103,11 @@ class Drawing {
       if (!soc.known())
         line.add(".", TextStyle::faint);
       else if (column(soc.value) >= left && (column(soc.value) < right || k + 1 == width))
-        line.add(facts_.blocks ? "\u2503" : "|", ink_of(soc.stale, TextStyle::strong));
+        line.add(facts_.blocks ? "\u2503" : "|", style_of(soc.stale, TextStyle::strong));
       else if (column(soc.value - half) >= right)
-        line.add(facts_.blocks ? "\u2588" : "#", ink_of(soc.stale, TextStyle::bar));
+        line.add(facts_.blocks ? "\u2588" : "#", style_of(soc.stale, TextStyle::bar));
       else if (column(soc.value + half) > left)
-        line.add(facts_.blocks ? "\u2592" : "~", ink_of(soc.stale, TextStyle::band));
+        line.add(facts_.blocks ? "\u2592" : "~", style_of(soc.stale, TextStyle::band));
       else
         line.add(" ");
     }
@@ -135,31 +118,28 @@ class Drawing {
   ScreenLine electrical() const {
     ScreenLine line;
     const bool stale = pack_.voltage_v.stale;
-    const char* direction = !pack_.current_a.known() || pack_.current_a.value == 0 ? ""
-                            : pack_.current_a.value > 0                            ? " charging"
-                                                                                   : " discharging";
-    line.add("Pack     ").add(number(pack_.voltage_v, 3, " V"), ink_of(stale, TextStyle::strong)).add("   ");
-    line.add(number(pack_.current_a, 2, " A"), ink_of(stale, TextStyle::strong))
-        .add(columns_ >= 60 ? direction : "", ink_of(stale))
+    line.add("Pack     ").add(number(pack_.voltage_v, 3, " V"), style_of(stale, TextStyle::strong)).add("   ");
+    line.add(number(pack_.current_a, 2, " A"), style_of(stale, TextStyle::strong))
+        .add(columns_ >= columns_for_direction ? direction() : "", style_of(stale))
         .add("   ");
-    line.add(number(pack_.temperature_c, 1, facts_.blocks ? " \u00b0C" : " degC"), ink_of(stale, TextStyle::strong));
+    line.add(number(pack_.temperature_c, 1, facts_.blocks ? " \u00b0C" : " degC"), style_of(stale, TextStyle::strong));
     return line;
   }
 
   ScreenLine limits() const {
     ScreenLine line;
     const bool stale = pack_.discharge_now_a.stale;
-    if (columns_ < 62)
+    if (columns_ < columns_for_long_lines)
       return line.add("Limits   ")
           .add(fmt::format("-{}  +{}", number(pack_.discharge_now_a, 0, " A"), number(pack_.charge_now_a, 0, " A")),
-               ink_of(stale));
+               style_of(stale));
     line.add("Limits   ")
         .add(fmt::format("discharge {} (10 s {})", number(pack_.discharge_now_a, 0, " A"),
                          number(pack_.discharge_10s_a, 0, " A")),
-             ink_of(stale));
+             style_of(stale));
     line.add(
         fmt::format("   charge {} (10 s {})", number(pack_.charge_now_a, 0, " A"), number(pack_.charge_10s_a, 0, " A")),
-        ink_of(stale));
+        style_of(stale));
     return line;
   }
 
@@ -170,27 +150,27 @@ class Drawing {
                                            : "");
     };
     ScreenLine line;
-    if (columns_ < 62)
+    if (columns_ < columns_for_long_lines)
       return line.add("Health   ")
           .add(fmt::format("{}  R {}", number(pack_.capacity_percent, 1, " %"),
                            number(pack_.resistance_percent, 0, " %")),
-               ink_of(pack_.capacity_percent.stale));
+               style_of(pack_.capacity_percent.stale));
     line.add("Health   ")
         .add("capacity " + with_band(pack_.capacity_percent, pack_.capacity_sigma_percent),
-             ink_of(pack_.capacity_percent.stale));
+             style_of(pack_.capacity_percent.stale));
     line.add("   resistance " + with_band(pack_.resistance_percent, pack_.resistance_sigma_percent),
-             ink_of(pack_.resistance_percent.stale));
+             style_of(pack_.resistance_percent.stale));
     return line;
   }
 
   ScreenLine contactor() const {
     ScreenLine line;
     for (const TextItem& w : pack_.contactor)
-      line.add(line.columns() == 0 ? "Contactor " : ", ").add(clean(w.text), ink_of(w.stale, TextStyle::strong));
+      line.add(line.columns() == 0 ? "Contactor " : ", ").add(printable(w.text), style_of(w.stale, TextStyle::strong));
     return line;
   }
 
-  /// One line, or with room one a fault and its comment.
+  /// One line; or one line for each fault, with its comment, if `room` is large enough.
   std::vector<ScreenLine> faults(std::size_t room) const {
     std::vector<ScreenLine> lines;
     if (!pack_.faults_received) return lines;
@@ -200,13 +180,14 @@ class Drawing {
       ScreenLine& line = lines.emplace_back();
       line.add("Faults   ");
       for (std::size_t k = 0; k < pack_.faults.size(); ++k)
-        line.add(k == 0 ? "" : ", ").add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, TextStyle::alarm));
+        line.add(k == 0 ? "" : ", ")
+            .add(printable(pack_.faults[k].text), style_of(pack_.faults[k].stale, TextStyle::alarm));
     } else {
       for (std::size_t k = 0; k < pack_.faults.size(); ++k) {
         lines.emplace_back()
             .add(k == 0 ? "Faults   " : "         ")
-            .add(clean(pack_.faults[k].text), ink_of(pack_.faults[k].stale, TextStyle::alarm))
-            .add("  " + clean(pack_.faults[k].comment), TextStyle::faint);
+            .add(printable(pack_.faults[k].text), style_of(pack_.faults[k].stale, TextStyle::alarm))
+            .add("  " + printable(pack_.faults[k].comment), TextStyle::faint);
       }
     }
     return lines;
@@ -215,18 +196,18 @@ class Drawing {
   ScreenLine fault_details() const {
     ScreenLine line;
     for (const TextItem& w : pack_.fault_details)
-      line.add(line.columns() == 0 ? "         " : ", ").add(clean(w.text), ink_of(w.stale));
+      line.add(line.columns() == 0 ? "         " : ", ").add(printable(w.text), style_of(w.stale));
     return line;
   }
 
   ScreenLine flags() const {
     ScreenLine line;
     for (const TextItem& w : pack_.flags)
-      line.add(line.columns() == 0 ? "Estimate " : ", ").add(w.text, ink_of(w.stale, TextStyle::warning));
+      line.add(line.columns() == 0 ? "Estimate " : ", ").add(w.text, style_of(w.stale, TextStyle::warning));
     return line;
   }
 
-  /// Summary, then bars in as many columns as fit; nothing more when there is no room for them.
+  /// A summary, then a bar for each cell in up to eight columns; only the summary if `room` is too small for them.
   std::vector<ScreenLine> cells(std::size_t room) const {
     std::vector<ScreenLine> lines;
     const auto c = pack_.cells();
@@ -236,101 +217,47 @@ class Drawing {
     summary.add("Cells    ")
         .add(fmt::format("min {:.3f} V (cell {})  max {:.3f} V (cell {})  ", c.lowest_v, c.lowest + 1, c.highest_v,
                          c.highest + 1),
-             ink_of(stale));
-    summary.add(fmt::format("delta {:.0f} mV", 1e3 * (c.highest_v - c.lowest_v)), ink_of(stale, TextStyle::strong));
-    // bars over a range that shows millivolts but does not make noise look large
-    const double span_v = std::max(0.05, 1.25 * (c.highest_v - c.lowest_v)), from_v = c.highest_v - span_v;
-    const std::size_t least = 20, fit = std::max<std::size_t>(1, columns_ / least);
+             style_of(stale));
+    summary.add(fmt::format("delta {:.0f} mV", 1e3 * (c.highest_v - c.lowest_v)), style_of(stale, TextStyle::strong));
+    const double span_v = std::max(smallest_bar_range_v, 1.25 * (c.highest_v - c.lowest_v)),
+                 from_v = c.highest_v - span_v;
+    const std::size_t fit = std::max<std::size_t>(1, columns_ / least_cell_columns);
     for (const std::size_t across : {std::size_t{1}, std::size_t{2}, std::size_t{4}, std::size_t{8}}) {
       const std::size_t rows = (pack_.cells_v.size() + across - 1) / across;
       if (across > fit || rows >= room) continue;
       for (std::size_t row = 0; row < rows; ++row) {
         ScreenLine& line = lines.emplace_back();
         for (std::size_t k = row; k < pack_.cells_v.size(); k += rows)
-          cell(line, k, std::min<std::size_t>(columns_ / across, 60), from_v, span_v);
+          cell(line, k, std::min<std::size_t>(columns_ / across, most_cell_columns), from_v, span_v);
       }
       break;
     }
     return lines;
   }
 
-  std::vector<ScreenLine> message_table() const {
-    std::vector<ScreenLine> lines;
-    lines.emplace_back().add(fmt::format("{:<16} {:>8} {:>7} {:>8} {:>5} {:>5} {:>5} {:>6}", "Message", "per s", "age",
-                                         "frames", "lost", "CRC", "rep.", "length"),
-                             TextStyle::strong);
-    for (std::size_t k = 0; k < messages().size(); ++k) {
-      if (bus_.states()[k].frames > 0 || bus_.states()[k].crc_errors + bus_.states()[k].wrong_length > 0)
-        lines.push_back(message(k));
-    }
-    return lines;
-  }
-
-  /// The same with each signal below its message.
-  std::vector<ScreenLine> signal_table() const {
-    auto lines = message_table();
-    std::vector<ScreenLine> all{lines.front()};
-    std::size_t at = 1;
-    for (std::size_t k = 0; k < messages().size(); ++k) {
-      const MessageState& state = bus_.states()[k];
-      if (state.frames == 0 && state.crc_errors + state.wrong_length == 0) continue;
-      all.push_back(lines[at++]);
-      for (std::size_t s = 0; state.frames > 0 && s < state.values.size(); ++s) {
-        all.emplace_back()
-            .add(fmt::format("  {:<24} ", messages()[k].signals[s].name), TextStyle::faint)
-            .add(clean(text_of(messages()[k].signals[s], state.values[s])), ink_of(bus_.stale(k)));
-      }
-    }
-    return all;
-  }
-
-  std::vector<ScreenLine> unknown_ids() const {
-    std::vector<ScreenLine> lines;
-    if (bus_.unknown_frames() == 0) return lines;
-    ScreenLine& line = lines.emplace_back();
-    line.add("Other ids");
-    for (const auto& u : bus_.unknown_ids()) {
-      const std::string text = fmt::format(" {:0{}X}:{}", u.id, u.long_id ? 8 : 3, u.frames);
-      if (line.columns() + text.size() > columns_) return lines;
-      line.add(text, TextStyle::faint);
-    }
-    return lines;
-  }
-
  private:
-  TextStyle quality_ink() const {
-    const std::string& q = pack_.soc_quality.text;
-    return q.starts_with("told") ? TextStyle::good : q.starts_with("carried") ? TextStyle::plain : TextStyle::warning;
+  const char* direction() const {
+    if (!pack_.current_a.known() || pack_.current_a.value == 0) return "";
+    return pack_.current_a.value > 0 ? " charging" : " discharging";
   }
 
-  ScreenLine message(std::size_t k) const {
-    const MessageState& m = bus_.states()[k];
-    ScreenLine line;
-    const bool stale = bus_.stale(k);
-    line.add(fmt::format("{:<16} {:>8.{}f} {:>7} {:>8}", messages()[k].name, m.rate_hz(), m.rate_hz() < 99.95 ? 1 : 0,
-                         age(bus_.age_s(k)), m.frames),
-             ink_of(stale));
-    const auto count = [&](std::uint64_t n, int width) {
-      line.add(fmt::format(" {:>{}}", n, width), n > 0 ? TextStyle::warning : ink_of(true));
-    };
-    count(m.lost, 5);
-    count(m.crc_errors, 5);
-    count(m.repeated, 5);
-    count(m.wrong_length, 6);
-    return line;
+  TextStyle quality_style() const {
+    if (pack_.soc_quality_value == soc_from_voltage) return TextStyle::good;
+    return pack_.soc_quality_value == soc_from_counting ? TextStyle::plain : TextStyle::warning;
   }
 
-  /// " 3 3.2812 ######    " in so many columns, the last a blank.
+  /// Adds "  3  3.281 ######    " in `width` columns; the last is a space.
   void cell(ScreenLine& line, std::size_t k, std::size_t width, double from_v, double span_v) const {
     const Reading& r = pack_.cells_v[k];
-    const std::size_t begin = line.columns(), room = width > 12 ? width - 12 : 0;
+    const std::size_t begin = line.columns(), room = width > cell_text_columns ? width - cell_text_columns : 0;
     const auto c = pack_.cells();
-    const TextStyle ink = ink_of(r.stale, k == c.lowest    ? TextStyle::warning
-                                          : k == c.highest ? TextStyle::good
-                                                           : TextStyle::plain);
-    line.add(fmt::format("{:>3} {:>6} ", k + 1, r.known() ? fmt::format("{:.3f}", r.value) : "-"), ink);
-    if (r.known()) line.add(bar((r.value - from_v) / span_v, room), ink_of(r.stale, TextStyle::bar));
-    line.to(begin + width);
+    TextStyle fresh = TextStyle::plain;
+    if (k == c.highest) fresh = TextStyle::good;
+    if (k == c.lowest) fresh = TextStyle::warning;
+    line.add(fmt::format("{:>3} {:>6} ", k + 1, r.known() ? fmt::format("{:.3f}", r.value) : "-"),
+             style_of(r.stale, fresh));
+    if (r.known()) line.add(bar((r.value - from_v) / span_v, room), style_of(r.stale, TextStyle::bar));
+    line.pad_to(begin + width);
   }
 
   std::string bar(double part, std::size_t columns) const {
@@ -357,10 +284,10 @@ void add(std::vector<ScreenLine>& lines, std::vector<ScreenLine> more) {
   for (ScreenLine& line : more) lines.push_back(std::move(line));
 }
 
-/// All that is about the battery; room: lines that it may have.
+/// The lines about the battery; `room` is the number of rows.
 std::vector<ScreenLine> pack_part(const Drawing& d, std::size_t room) {
   std::vector<ScreenLine> lines;
-  const bool roomy = room >= 16;
+  const bool roomy = room >= rows_for_fault_comments;
   add(lines, d.soc());
   add(lines, d.soc_bar());
   add(lines, d.electrical());
@@ -374,113 +301,53 @@ std::vector<ScreenLine> pack_part(const Drawing& d, std::size_t room) {
   return lines;
 }
 
+std::vector<ScreenLine> right_part(const BusState& bus, std::size_t room) {
+  auto signals = signal_table(bus);
+  return signals.size() > room ? message_table(bus) : signals;
+}
+
+std::vector<ScreenLine> side_by_side(const std::vector<ScreenLine>& left, const std::vector<ScreenLine>& right) {
+  std::vector<ScreenLine> lines;
+  for (std::size_t k = 0; k < std::max(left.size(), right.size()); ++k) {
+    ScreenLine& line = lines.emplace_back();
+    if (k < left.size()) line.append(left[k]);
+    line.cut(left_columns - 2);
+    if (k < right.size()) line.pad_to(left_columns).append(right[k]);
+  }
+  return lines;
+}
+
 }  // namespace
 
-ScreenLine& ScreenLine::add(std::string_view text, TextStyle ink) {
-  if (text.empty()) return *this;
-  if (!pieces_.empty() && pieces_.back().ink == ink)
-    pieces_.back().text += text;
-  else
-    pieces_.push_back({std::string(text), ink});
-  return *this;
-}
-
-ScreenLine& ScreenLine::to(std::size_t column) {
-  const std::size_t now = columns();
-  if (now < column) add(std::string(column - now, ' '));
-  return *this;
-}
-
-ScreenLine& ScreenLine::append(const ScreenLine& other) {
-  for (const Piece& piece : other.pieces_) add(piece.text, piece.ink);
-  return *this;
-}
-
-void ScreenLine::cut(std::size_t most) {
-  std::size_t left = most;
-  for (std::size_t k = 0; k < pieces_.size(); ++k) {
-    std::string& text = pieces_[k].text;
-    std::size_t at = 0;
-    for (; at < text.size() && left > 0; --left) at += bytes_of(text[at]);
-    text.resize(std::min(at, text.size()));
-    if (text.empty()) {
-      pieces_.resize(k);
-      return;
-    }
-  }
-}
-
-std::size_t ScreenLine::columns() const {
-  std::size_t n = 0;
-  for (const Piece& piece : pieces_) n += columns_of(piece.text);
-  return n;
-}
-
 std::vector<ScreenLine> screen(const BusState& bus, const ScreenFacts& facts, const ScreenSize& size) {
-  constexpr std::size_t beside = 150, left_columns = 84;
-  const bool two = size.columns >= beside;
-  const Drawing all(bus, facts, size.columns), pack(bus, facts, two ? left_columns - 2 : size.columns);
+  const bool two_parts = size.columns >= two_part_columns;
+  const Drawing all(bus, facts, size.columns);
   std::vector<ScreenLine> lines;
   add(lines, all.head());
   add(lines, all.troubles());
-  if (two) {
-    lines.emplace_back();
-    const std::size_t room = size.rows > lines.size() ? size.rows - lines.size() : 0;
-    auto left = pack_part(pack, room), right = all.signal_table();
-    if (right.size() > room) right = all.message_table();
-    for (std::size_t k = 0; k < std::max(left.size(), right.size()); ++k) {
-      ScreenLine& line = lines.emplace_back();
-      if (k < left.size()) line.append(left[k]);
-      line.cut(left_columns - 2);
-      if (k < right.size()) line.to(left_columns).append(right[k]);
-    }
+  if (two_parts) lines.emplace_back();
+  const std::size_t room = size.rows > lines.size() ? size.rows - lines.size() : 0;
+  if (two_parts) {
+    add(lines, side_by_side(pack_part(Drawing(bus, facts, left_columns - 2), room), right_part(bus, room)));
   } else {
-    const std::size_t room = size.rows > lines.size() ? size.rows - lines.size() : 0;
-    const auto table = all.message_table(), signals = all.signal_table();
-    const std::size_t wanted = room > table.size() + 10 ? room - table.size() - 1 : room;
-    add(lines, pack_part(pack, wanted));
+    const auto table = message_table(bus), signals = signal_table(bus);
+    add(lines, pack_part(all, room > table.size() + 10 ? room - table.size() - 1 : room));
     if (lines.size() + 3 < size.rows) {
       lines.emplace_back();
       add(lines, lines.size() + signals.size() < size.rows ? signals : table);
     }
   }
-  if (lines.size() < size.rows) add(lines, all.unknown_ids());
+  if (lines.size() < size.rows) add(lines, unknown_id_lines(bus, size.columns));
   if (lines.size() > size.rows) lines.resize(size.rows);
   for (ScreenLine& line : lines) line.cut(size.columns);
   return lines;
 }
 
-std::string plain_text(const std::vector<ScreenLine>& lines) {
-  std::string text;
-  for (const ScreenLine& line : lines) {
-    std::string whole;
-    for (const auto& piece : line.pieces()) whole += piece.text;
-    whole.erase(whole.find_last_not_of(' ') + 1);
-    text += whole + "\n";
-  }
-  return text;
-}
-
-std::string ansi_frame(const std::vector<ScreenLine>& lines) {
-  static constexpr std::array<const char*, 8> inks = {"",         "\x1b[90m",   "\x1b[1m",  "\x1b[32m",
-                                                      "\x1b[33m", "\x1b[1;31m", "\x1b[34m", "\x1b[36m"};
-  std::string text = "\x1b[?2026h\x1b[H";
-  for (std::size_t k = 0; k < lines.size(); ++k) {
-    if (k > 0) text += "\r\n";
-    for (const auto& piece : lines[k].pieces()) {
-      const char* ink = inks[static_cast<std::size_t>(piece.ink)];
-      text += ink + piece.text + (*ink != '\0' ? "\x1b[0m" : "");
-    }
-    text += "\x1b[K";
-  }
-  return text + "\x1b[J\x1b[?2026l";
-}
-
 std::string status_line(const BusState& bus, const ScreenFacts& facts) {
   const PackView p = pack_view(bus);
   std::string text = clock(bus.duration_s());
-  if (bus.good() == 0) {
-    text += fmt::format("  nothing of the BMS in {} frames", bus.frames());
+  if (bus.accepted() == 0) {
+    text += fmt::format("  no BMS message in {} frames", bus.frames());
   } else {
     text +=
         fmt::format("  {} +- {}  {}  {}  {}", number(p.soc_percent, 2, " %"),
@@ -489,12 +356,15 @@ std::string status_line(const BusState& bus, const ScreenFacts& facts) {
     if (!p.soc_quality.text.empty()) text += "  " + p.soc_quality.text;
     if (const auto c = p.cells(); c.count > 0)
       text += fmt::format("  cells {:.3f} to {:.3f} V", c.lowest_v, c.highest_v);
-    for (const TextItem& w : p.contactor) text += "  " + clean(w.text);
-    for (const TextItem& w : p.faults) text += "  FAULT " + clean(w.text);
-    if (p.soc_percent.stale) text += fmt::format("  stale for {}", age(p.soc_percent.age_s));
+    for (const TextItem& w : p.contactor) text += "  " + printable(w.text);
+    for (const TextItem& w : p.faults) text += "  FAULT " + printable(w.text);
+    if (p.soc_percent.stale) text += fmt::format("  stale for {}", age_text(p.soc_percent.age_s));
   }
   std::uint64_t lost = 0, crc = 0;
-  for (const MessageState& m : bus.states()) lost += m.lost, crc += m.crc_errors + m.wrong_length;
+  for (const MessageState& m : bus.states()) {
+    lost += m.lost;
+    crc += m.crc_errors + m.wrong_length;
+  }
   if (lost > 0) text += fmt::format("  {} lost", lost);
   if (crc > 0) text += fmt::format("  {} damaged", crc);
   if (facts.dropped > 0) text += fmt::format("  {} dropped", facts.dropped);

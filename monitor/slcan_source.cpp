@@ -23,7 +23,7 @@ class Slcan : public FrameSource {
                         "cannot be opened, expected a serial port (" + std::generic_category().message(errno) + ")");
     if (tcgetattr(fd_, &before_) != 0) {
       close(fd_);
-      throw SourceError(device, 1, "no serial port, expected one, as /dev/ttyACM0");
+      throw SourceError(device, 1, "is not a serial port, expected one, for example /dev/ttyACM0");
     }
     termios raw = before_;
     cfmakeraw(&raw);
@@ -31,7 +31,7 @@ class Slcan : public FrameSource {
     cfsetspeed(&raw, B921600);
     tcsetattr(fd_, TCSANOW, &raw);
     tcflush(fd_, TCIOFLUSH);
-    send("\rC\rS6\rO\r");  // the first ends whatever stands in the adapter's line
+    send("\rC\rS6\rO\r");  // the first \r ends a partial line of the adapter
   }
   ~Slcan() override {
     send("C\r");
@@ -47,10 +47,10 @@ class Slcan : public FrameSource {
     pollfd p{fd_, POLLIN, 0};
     if (poll(&p, 1, wait_ms) <= 0) return 0;
     const ssize_t n = ::read(fd_, bytes_.data(), bytes_.size());
-    if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) ended_ = true;  // unplugged: end of file or EIO
+    if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) ended_ = true;  // unplugged: end of file, or EIO
     if (n <= 0) return 0;
     used_ = 0;
-    held_ = static_cast<std::size_t>(n);
+    size_ = static_cast<std::size_t>(n);
     at_us_ = clock_us();
     return decode(room);
   }
@@ -58,20 +58,22 @@ class Slcan : public FrameSource {
   bool live() const override { return true; }
 
  private:
+  static constexpr int most_tries = 100, retry_us = 10'000;
+
   void send(std::string_view text) const {
-    for (int tries = 0; tries < 100 && !text.empty(); ++tries) {
+    for (int tries = 0; tries < most_tries && !text.empty(); ++tries) {
       const ssize_t n = write(fd_, text.data(), text.size());
       if (n > 0)
         text.remove_prefix(static_cast<std::size_t>(n));
       else if (n < 0 && errno != EAGAIN && errno != EINTR)
         return;
       else
-        usleep(10'000);
+        usleep(retry_us);
     }
   }
   std::size_t decode(std::span<BusFrame> room) {
     std::size_t taken = 0;
-    while (used_ < held_ && taken < room.size()) {
+    while (used_ < size_ && taken < room.size()) {
       if (!stream_.push(bytes_[used_++], room[taken])) continue;
       room[taken++].time_us = at_us_;
     }
@@ -84,7 +86,7 @@ class Slcan : public FrameSource {
   bool ended_ = false;
   SlcanStream stream_;
   std::array<char, 4096> bytes_{};
-  std::size_t used_ = 0, held_ = 0;
+  std::size_t used_ = 0, size_ = 0;
   std::int64_t at_us_ = 0;
 };
 

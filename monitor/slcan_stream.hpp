@@ -1,7 +1,7 @@
-// The bytes of an SLCAN adapter, decoded to frames. Total: any bytes may come.
+// Decodes the bytes of an SLCAN adapter to frames. Any bytes are safe.
 //
-// Beside frames an adapter sends answers: an empty line, \a where it refuses, z or Z for a frame it sent, and what V,
-// v, N, F ask for.
+// In addition to frames an adapter sends answers: an empty line, \a for a rejected command, z or Z for a sent frame,
+// and the answers to V, v, N and F.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace bms::monitor {
 
 class SlcanStream {
  public:
-  /// True when `byte` completed a frame; its time is left to the caller.
+  /// Returns true if `byte` completes a frame. The caller sets its time.
   bool push(char byte, BusFrame& frame) {
     if (byte == '\a' || !reader_.push(byte)) return false;
     const std::string_view line = reader_.line();
@@ -24,7 +24,7 @@ class SlcanStream {
       return true;
     }
     if (hal::slcan::is_other_frame(line)) {
-      frame = request(line);
+      frame = remote_request(line);
       return true;
     }
     if (!line.empty() && std::string_view("zZVvNF").find(line[0]) == std::string_view::npos) ++malformed_;
@@ -33,8 +33,8 @@ class SlcanStream {
   std::uint64_t malformed() const { return malformed_; }
 
  private:
-  /// line: is_other_frame.
-  static BusFrame request(std::string_view line) {
+  /// `line` must be a remote request.
+  static BusFrame remote_request(std::string_view line) {
     BusFrame frame;
     frame.long_id = line[0] == 'R';
     frame.kind = FrameKind::remote;

@@ -18,9 +18,10 @@ namespace bms::monitor {
 
 namespace {
 
-constexpr int receive_buffer_bytes = 8 << 20;  // some 10,000 frames, a second of a full bus
+constexpr int receive_buffer_bytes = 8 << 20;  // about 10,000 frames, one second of a fully loaded bus
+constexpr std::uint8_t fd_flag_mask = 15;
 
-/// A raw socket; many frames with one system call.
+/// A raw socket that reads many frames per system call.
 class SocketCan : public FrameSource {
  public:
   explicit SocketCan(const std::string& interface) {
@@ -30,7 +31,7 @@ class SocketCan : public FrameSource {
           interface, 1,
           "no such network interface, expected a CAN interface that is up (ip link), slcan:DEVICE or file:DUMP.log");
     fd_ = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
-    if (fd_ < 0) refuse(interface, "no CAN sockets on this machine, expected a kernel with can_raw");
+    if (fd_ < 0) reject(interface, "this machine has no CAN sockets, expected a kernel with can_raw");
     const int on = 1, bytes = receive_buffer_bytes;
     const can_err_mask_t all_errors = CAN_ERR_MASK;
     setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &all_errors, sizeof all_errors);
@@ -43,7 +44,7 @@ class SocketCan : public FrameSource {
     address.can_family = AF_CAN;
     address.can_ifindex = static_cast<int>(index);
     if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-      refuse(interface, "no CAN interface, expected one that is (ip -details link)");
+      reject(interface, "is not a CAN interface, expected one (ip -details link)");
     for (std::size_t k = 0; k < batch; ++k) {
       parts_[k] = {&frames_[k], sizeof frames_[k]};
       messages_[k].msg_hdr.msg_iov = &parts_[k];
@@ -63,7 +64,7 @@ class SocketCan : public FrameSource {
     }
     const int n =
         recvmmsg(fd_, messages_.data(), static_cast<unsigned>(std::min(batch, room.size())), MSG_DONTWAIT, nullptr);
-    if (n < 0 && errno == ENODEV) ended_ = true;  // the interface is gone; one that is only down may come back
+    if (n < 0 && errno == ENODEV) ended_ = true;  // the interface was removed; one that is down may come up again
     std::size_t taken = 0;
     for (int k = 0; k < n; ++k) taken += receive(static_cast<std::size_t>(k), room[taken]) ? 1U : 0U;
     return taken;
@@ -74,28 +75,33 @@ class SocketCan : public FrameSource {
  private:
   static constexpr std::size_t batch = 64;
 
-  [[noreturn]] void refuse(const std::string& interface, const char* what) const {
+  [[noreturn]] void reject(const std::string& interface, const char* what) const {
     const std::string why = std::generic_category().message(errno);
     if (fd_ >= 0) close(fd_);
     throw SourceError(interface, 1, std::string(what) + " (" + why + ")");
   }
 
+  static FrameKind kind_of(canid_t id, std::size_t bytes) {
+    if ((id & CAN_ERR_FLAG) != 0) return FrameKind::error;
+    if (bytes == CANFD_MTU) return FrameKind::fd;
+    if ((id & CAN_RTR_FLAG) != 0) return FrameKind::remote;
+    return (id & CAN_EFF_FLAG) != 0 ? FrameKind::extended : FrameKind::standard;
+  }
+
+  /// Returns false if message `k` is not a frame.
   bool receive(std::size_t k, BusFrame& frame) {
     const canfd_frame& raw = frames_[k];
     const std::size_t bytes = messages_[k].msg_len;
     if (bytes != CAN_MTU && bytes != CANFD_MTU) return false;
     frame = {};
     frame.time_us = time_and_drops(messages_[k].msg_hdr);
-    frame.long_id = (raw.can_id & CAN_EFF_FLAG) != 0;
-    frame.id = raw.can_id & (frame.long_id || (raw.can_id & CAN_ERR_FLAG) != 0 ? CAN_EFF_MASK : CAN_SFF_MASK);
-    frame.kind = (raw.can_id & CAN_ERR_FLAG) != 0   ? FrameKind::error
-                 : bytes == CANFD_MTU               ? FrameKind::fd
-                 : (raw.can_id & CAN_RTR_FLAG) != 0 ? FrameKind::remote
-                 : frame.long_id                    ? FrameKind::extended
-                                                    : FrameKind::standard;
-    if (frame.kind == FrameKind::error) frame.long_id = false;
-    frame.fd_flags = frame.kind == FrameKind::fd ? raw.flags & 15U : 0;
-    frame.length = std::min<std::uint8_t>(raw.len, frame.kind == FrameKind::fd ? 64 : 8);
+    const bool long_id = (raw.can_id & CAN_EFF_FLAG) != 0;
+    frame.kind = kind_of(raw.can_id, bytes);
+    frame.long_id = long_id && frame.kind != FrameKind::error;
+    frame.id = raw.can_id & (long_id || frame.kind == FrameKind::error ? CAN_EFF_MASK : CAN_SFF_MASK);
+    const bool is_fd = frame.kind == FrameKind::fd;
+    frame.fd_flags = is_fd ? raw.flags & fd_flag_mask : 0;
+    frame.length = std::min<std::uint8_t>(raw.len, is_fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN);
     if (frame.kind != FrameKind::remote) std::memcpy(frame.data.data(), raw.data, frame.length);
     return true;
   }
@@ -111,7 +117,7 @@ class SocketCan : public FrameSource {
       } else if (c->cmsg_type == SO_RXQ_OVFL) {
         std::uint32_t now = 0;
         std::memcpy(&now, CMSG_DATA(c), sizeof now);
-        dropped_ += now - drops_seen_;  // the kernel's counter wraps
+        dropped_ += now - drops_seen_;  // unsigned: the kernel's counter wraps around
         drops_seen_ = now;
       }
     }

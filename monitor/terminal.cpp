@@ -16,11 +16,11 @@ namespace bms::monitor {
 
 namespace {
 
-// What signal handlers reach; they can't be given an object.
+// Global, because a signal handler cannot be given an object.
 termios before;
 volatile sig_atomic_t entered = 0, stop_asked = 0, size_changed = 0;
 bool input_is_terminal = false;
-constexpr std::array crashes = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+constexpr std::array crash_signals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 
 void write_all(std::string_view text) {
   while (!text.empty()) {
@@ -63,12 +63,12 @@ void on_crash(int number) {
 }
 
 void on_suspend(int) {
-  const int kept = errno;
+  const int errno_before = errno;
   leave();
-  static_cast<void>(raise(SIGSTOP));  // until SIGCONT
+  static_cast<void>(raise(SIGSTOP));  // the program continues here after SIGCONT
   enter();
   size_changed = 1;
-  errno = kept;
+  errno = errno_before;
 }
 
 void on_stop(int) { stop_asked = 1; }
@@ -85,14 +85,14 @@ void handle(int number, void (*handler)(int)) {
 
 Terminal::Terminal() {
   input_is_terminal = isatty(STDIN_FILENO) != 0 && tcgetattr(STDIN_FILENO, &before) == 0;
-  for (const int number : crashes) handle(number, on_crash);
+  for (const int number : crash_signals) handle(number, on_crash);
   handle(SIGTSTP, on_suspend);
   enter();
 }
 
 Terminal::~Terminal() {
   leave();
-  for (const int number : crashes) static_cast<void>(signal(number, SIG_DFL));
+  for (const int number : crash_signals) static_cast<void>(signal(number, SIG_DFL));
   static_cast<void>(signal(SIGTSTP, SIG_DFL));
 }
 
@@ -104,7 +104,7 @@ ScreenSize Terminal::size() {
 
 bool Terminal::shows_utf8() {
   for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {
-    const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing here sets one
+    const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): this program does not set variables
     if (value == nullptr || *value == '\0') continue;
     const std::string_view text = value;
     return text.find("UTF-8") != text.npos || text.find("utf8") != text.npos || text.find("UTF8") != text.npos ||

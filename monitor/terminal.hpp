@@ -1,8 +1,8 @@
-// The terminal that the live screen is on: alternate screen, no cursor, keys as they are pressed. Given back as it was
-// by the destructor, and when the program crashes or is stopped (Ctrl-Z). One at a time.
+// The terminal of the live screen: alternate screen, no cursor, unbuffered keys. The destructor restores it; it is also
+// restored when the program crashes or is stopped (Ctrl-Z). Only one object at a time.
 //
-// Plain escape codes (ECMA-48, and xterm's 1049, 25 and 2026) rather than ncurses: a frame is a string that tests
-// compare, it is written in one piece, and nothing depends on a terminal database.
+// It uses plain escape codes (ECMA-48, and xterm's 1049, 25 and 2026) instead of ncurses: a frame is a string that
+// tests compare, it is written at once, and no terminal database is needed.
 #pragma once
 
 #include <string>
@@ -18,17 +18,17 @@ class Terminal {
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
-  /// Of standard output, asked anew each time; where nobody knows, 80 x 24.
+  /// The current size of standard output; 80 x 24 if unknown.
   static ScreenSize size();
-  /// Whether it shows UTF-8, by the environment's locale (LC_ALL, LC_CTYPE, LANG).
+  /// Returns true if the locale of the environment (LC_ALL, LC_CTYPE, LANG) is UTF-8.
   static bool shows_utf8();
 
   void show(const std::string& frame) const;
-  /// Whether q was pressed.
+  /// Returns true if q was pressed since the last call.
   bool quit_pressed() const;
 };
 
-/// From its beginning on SIGINT, SIGTERM and SIGHUP ask the program to end, and SIGWINCH interrupts waiting.
+/// While it exists, SIGINT, SIGTERM and SIGHUP request the end of the program, and SIGWINCH interrupts waiting.
 class StopRequest {
  public:
   StopRequest();
@@ -36,7 +36,7 @@ class StopRequest {
   StopRequest(const StopRequest&) = delete;
   StopRequest& operator=(const StopRequest&) = delete;
   bool requested() const;
-  /// Whether the terminal's size changed since the last call.
+  /// Returns true if the size of the terminal changed since the last call.
   bool resized();
 };
 

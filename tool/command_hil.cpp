@@ -173,7 +173,7 @@ hil::SessionPlan read(const HilOptions& options) {
   plan.announced_soc = options.announced_soc;
   plan.sample_period_s = options.sample_period_s;
   plan.spread.seed = options.seed;
-  for (const std::string& text : options.faults) plan.injections.push_back(hil::injection(text, plan.cells));
+  for (const std::string& text : options.faults) plan.injections.push_back(hil::parse_injection(text, plan.cells));
   return plan;
 }
 

@@ -126,7 +126,7 @@ class Monitor {
     finish();
     if (options_.once && !bus_.complete()) {
       fmt::print(stderr, "{}: no complete picture in {:.1f} s and {} frames, {} of them valid frames of the BMS\n",
-                 options_.source, bus_.duration_s(), bus_.frames(), bus_.good());
+                 options_.source, bus_.duration_s(), bus_.frames(), bus_.accepted());
       return 1;
     }
     if (source_->live() && source_->ended()) {

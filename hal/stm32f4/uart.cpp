@@ -9,7 +9,7 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::uint32_t received = 1U << 5, transmitter_free = 1U << 7;
+constexpr std::uint32_t overrun = 1U << 3, received = 1U << 5, transmitter_free = 1U << 7;
 
 ReceivedBytes received_bytes;
 
@@ -40,7 +40,15 @@ std::uint32_t uart_lost() { return received_bytes.lost(); }
 
 }  // namespace bms::hal
 
+/// Each of the two flags raises the interrupt until SR and then DR are read. A byte that is complete between these
+/// reads sets ORE without RXNE (RM0090, 30.3.3).
 extern "C" void usart1_interrupt() {
   using namespace bms::hal;
-  while ((stm32f4::usart1_sr() & received) != 0) received_bytes.push(static_cast<char>(stm32f4::usart1_dr()));
+  std::uint32_t status = stm32f4::usart1_sr();
+  while ((status & (received | overrun)) != 0) {
+    const auto byte = static_cast<char>(stm32f4::usart1_dr());
+    if ((status & received) != 0) received_bytes.push(byte);
+    if ((status & overrun) != 0) received_bytes.lose();
+    status = stm32f4::usart1_sr();
+  }
 }

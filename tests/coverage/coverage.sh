@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Lines that the tests of firmware, estimator, protection, storage and the portable half of hal run: built with --coverage (preset host-coverage), run here and counted.
-# The table goes to tests/README.md. Of templates only what is instantiated is code that can be counted; headers of those folders that no test includes are named.
+# Line coverage of firmware, estimator, protection, storage and the portable part of hal. It runs the tests, which are
+# built with --coverage (preset host-coverage), and writes the table to tests/README.md. Templates count only where they
+# are instantiated; headers that no test includes are listed.
 #
-#   coverage.sh BUILD_FOLDER TEST...      exit 1: below 95 % of the lines of firmware/ or estimator/
+#   coverage.sh BUILD_FOLDER TEST...      exit code 1: less than 95 % of the lines of firmware/ or estimator/ run
 set -euo pipefail
 folder=$1; shift
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -12,8 +13,8 @@ find "$folder" -name '*.gcda' -delete
 for test; do
   "$folder/tests/$test" --gtest_brief=1 >>"$log" 2>&1 || { echo "coverage: $test fails: $log" >&2; exit 3; }
 done
-gcovr --root "$root" --object-directory "$folder" --exclude-throw-branches --json-summary "$folder/coverage.json" --txt "$folder/coverage.txt" \
-  --filter "$root/(firmware|estimator|protection|storage|hal)/" "$folder" >>"$log" 2>&1
+gcovr --root "$root" --object-directory "$folder" --exclude-throw-branches --json-summary "$folder/coverage.json" \
+  --txt "$folder/coverage.txt" --filter "$root/(firmware|estimator|protection|storage|hal)/" "$folder" >>"$log" 2>&1
 python3 - "$root" "$folder/coverage.json" <<'PYTHON'
 import json, pathlib, re, sys
 root, counted = pathlib.Path(sys.argv[1]), json.load(open(sys.argv[2]))["files"]
@@ -29,13 +30,14 @@ for folder in ("firmware", "estimator", "protection", "storage", "hal"):
 table = "\n".join(table) + "\n"
 print(table)
 readme = root / "tests/README.md"
-readme.write_text(re.sub(r"(<!-- figures: coverage -->\n).*?(<!-- end of figures -->)", lambda m: m[1] + table + m[2], readme.read_text(), flags=re.S))
+readme.write_text(re.sub(r"(<!-- figures: coverage -->\n).*?(<!-- end of figures -->)",
+                         lambda m: m[1] + table + m[2], readme.read_text(), flags=re.S))
 for f in sorted(counted, key=lambda f: f["line_covered"] - f["line_total"])[:12]:
     if f["line_covered"] < f["line_total"]:
-        print(f"{f['filename']}: {f['line_total'] - f['line_covered']} of {f['line_total']} lines are not run")
+        print(f"{f['filename']}: {f['line_total'] - f['line_covered']} of {f['line_total']} lines do not run")
 for folder in ("firmware", "estimator", "protection", "storage"):
     for path in sorted((root / folder).glob("*.?pp")):
         if f"{folder}/{path.name}" not in seen:
-            print(f"{folder}/{path.name}: no line of it is compiled into these tests")
+            print(f"{folder}/{path.name}: no line is compiled into these tests")
 sys.exit(1 if bad else 0)
 PYTHON

@@ -49,7 +49,7 @@ SlcanBoard::SlcanBoard(const std::filesystem::path& image, const std::vector<std
   address.sun_family = AF_UNIX;
   const std::string path = (folder_.path() / "uart").string();
   std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
-  for (int tries = 0; tries < 1000; ++tries) {
+  for (int tries = 0; tries < 12'000; ++tries) {
     line_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (connect(line_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return;
     close(line_);
@@ -79,7 +79,7 @@ std::string SlcanBoard::read() {
     }
     pollfd p{line_, POLLIN, 0};
     std::array<char, 4096> bytes;
-    const ssize_t n = poll(&p, 1, 10'000) > 0 ? recv(line_, bytes.data(), bytes.size(), 0) : 0;
+    const ssize_t n = poll(&p, 1, 120'000) > 0 ? recv(line_, bytes.data(), bytes.size(), 0) : 0;
     if (n <= 0) throw std::runtime_error("the board has stopped sending after: " + received_);
     received_.append(bytes.data(), static_cast<std::size_t>(n));
   }

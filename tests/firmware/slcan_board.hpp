@@ -33,7 +33,8 @@ class SlcanBoard {
   SlcanBoard& operator=(const SlcanBoard&) = delete;
 
   void write(const std::string& bytes) const;
-  /// The next answer: a line up to \r (without it), or "\a". Throws std::runtime_error after ten seconds of silence.
+  /// The next answer: a line up to \r (without it), or "\a". Throws std::runtime_error after two minutes of silence: a
+  /// limit for what has failed, not for what is slow.
   std::string read();
   /// Reads lines until one begins with `what`, and returns that line.
   std::string read_until(const std::string& what);

@@ -96,7 +96,8 @@ void UnicornBoard::start_again(std::uint32_t flags) {
   registers_.clear();
   ended_.clear();
   handling_ = sleeping_ = systick_pending_ = supply_pending_ = false;
-  exception_ = systick_csr_ = systick_rvr_ = enabled_ = 0;
+  exception_ = systick_csr_ = systick_rvr_ = 0;
+  enabled_ = 0;
   fed_at_ = watchdog_ticks_ = 0;
   can.write(0, 1U << 15);
   flash.reset();
@@ -176,6 +177,12 @@ std::uint32_t UnicornBoard::register_value(std::uint32_t address) const {
   return found == registers_.end() ? 0 : found->second;
 }
 
+std::uint32_t UnicornBoard::word(std::uint32_t address) const {
+  std::uint32_t value = 0;
+  must(uc_mem_read(core_, address, &value, sizeof value), "memory");
+  return value;
+}
+
 std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808) & 3) == 2 ? 168'000'000 : 16'000'000; }
 
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
@@ -212,7 +219,10 @@ std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
       return static_cast<std::uint32_t>(next_systick_ > ticks_ ? (next_systick_ - ticks_) / ticks_a_cycle() : 0);
     case scs + 0x100:
     case scs + 0x180:
-      return enabled_;
+      return static_cast<std::uint32_t>(enabled_);
+    case scs + 0x104:
+    case scs + 0x184:
+      return static_cast<std::uint32_t>(enabled_ >> 32);
     default:
       return value;
   }
@@ -267,7 +277,13 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
       enabled_ |= value;
       return;
     case scs + 0x180:
-      enabled_ &= ~value;
+      enabled_ &= ~std::uint64_t{value};
+      return;
+    case scs + 0x104:
+      enabled_ |= std::uint64_t{value} << 32;
+      return;
+    case scs + 0x184:
+      enabled_ &= ~(std::uint64_t{value} << 32);
       return;
     case scs + 0xD0C:
       if ((value & 4) != 0) ended_ = "the firmware has reset the core";
@@ -295,6 +311,10 @@ int UnicornBoard::pending_exception() const {
   if ((enabled_ & 1U << 1) != 0 && supply_pending_) return pvd;
   if ((enabled_ & 1U << 19) != 0 && can.transmit_interrupt()) return can_tx;
   if (!receive_interrupt_held && (enabled_ & 1U << 20) != 0 && can.receive_interrupt()) return can_rx0;
+  for (const auto& [base, peripheral] : plugged) {
+    const int number = peripheral->interrupt(1e3 * now_ms());
+    if (number >= 0 && (enabled_ >> number & 1) != 0) return 16 + number;
+  }
   return 0;
 }
 

@@ -43,6 +43,8 @@ class UnicornBoard {
   double ms_at_bit(std::uint64_t bit) const { return 1e3 * static_cast<double>(bit) / can.bits_per_second; }
   hal::CanHealth can_health();
   std::uint32_t register_value(std::uint32_t address) const;
+  /// Reads a word of the memory.
+  std::uint32_t word(std::uint32_t address) const;
   /// Bytes of stack that were written at least once.
   std::uint32_t stack_used() const;
 
@@ -68,6 +70,11 @@ class UnicornBoard {
     virtual ~Peripheral() = default;
     virtual std::uint32_t read(std::uint32_t offset, double now_us) = 0;
     virtual void write(std::uint32_t offset, std::uint32_t value, double now_us) = 0;
+    /// The number of the requested interrupt (RM0090, table 61), or -1.
+    virtual int interrupt(double now_us) {
+      static_cast<void>(now_us);
+      return -1;
+    }
   };
   std::map<std::uint32_t, Peripheral*> plugged;  ///< by base address, one kilobyte each
 
@@ -120,7 +127,8 @@ class UnicornBoard {
   bool crystal_, handling_ = false, sleeping_ = false, systick_pending_ = false, supply_low_ = false,
                  supply_pending_ = false;
   std::map<std::uint32_t, std::uint32_t> registers_;
-  std::uint32_t systick_csr_ = 0, systick_rvr_ = 0, enabled_ = 0;
+  std::uint32_t systick_csr_ = 0, systick_rvr_ = 0;
+  std::uint64_t enabled_ = 0;  ///< interrupts 0 to 63
   std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0, fed_at_ = 0, watchdog_ticks_ = 0;
   std::string ended_;
   std::uint32_t exception_ = 0;

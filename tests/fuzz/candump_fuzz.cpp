@@ -1,5 +1,5 @@
-// Any bytes as a candump log: by lines into the parser, what is a frame into the state of the bus, and that onto a
-// screen. A frame that was read comes back from the line that is written of it.
+// Any bytes as a candump log: its lines go to the parser, the frames to the bus state, and the state to a screen. A
+// parsed frame that is written and parsed again must be equal.
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -28,7 +28,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(again.id == frame.id && again.kind == frame.kind && again.length == frame.length &&
             again.data == frame.data && again.time_us == frame.time_us);
   }
-  require(bus.unknown_ids().size() <= 64 && bus.good() <= bus.frames());
+  require(bus.unknown_ids().size() <= 64 && bus.accepted() <= bus.frames());
   const ScreenSize size_of_screen{1 + size % 200, 1 + size % 60};
   const auto picture = screen(bus, {}, size_of_screen);
   require(picture.size() <= size_of_screen.rows);

@@ -1,4 +1,4 @@
-// Any text as a cell file: refused in a line, or read; what was read is written and read again as the same.
+// Any text as a cell file: it is rejected with one line, or read. A cell that is written and read again must be equal.
 #include <cstdint>
 #include <string>
 

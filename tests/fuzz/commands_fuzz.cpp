@@ -1,6 +1,5 @@
-// Any frames to the command handler, 12 bytes each: id, length, how its check is made, data. Nothing crashes; only a
-// whole command of which the counter is new is answered; what is set is one of the values there are; what is refused
-// changes nothing.
+// Any frames to the command handler, 12 bytes each: id, length, how the CRC is made, data. Nothing crashes. Only an
+// intact command with a new counter is answered. All settings have valid values. A rejected command changes nothing.
 #include <cstdint>
 
 #include "firmware/commands.hpp"
@@ -18,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     frame.length = data[2] % 16;
     for (std::size_t k = 0; k < 8; ++k) frame.data[k] = data[4 + k];
     now_us += static_cast<std::uint64_t>(data[1]) << data[3] % 40;
-    if ((data[3] & 0xC0) != 0) {  // most with a check that is right
+    if ((data[3] & 0xC0) != 0) {  // most commands have a valid CRC
       can::Command c = can::Command::of(frame);
       c.code %= 8;
       if ((data[3] & 0x40) != 0) c.argument %= 4;

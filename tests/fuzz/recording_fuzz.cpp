@@ -1,5 +1,5 @@
-// Any text as a recording: refused in a line, or read; then its columns are as long as its times, these go forward, and
-// samples can be made of it.
+// Any text as a recording: it is rejected with one line, or read. Then its columns have equal lengths, its times do not
+// decrease, and it can be converted to samples.
 #include <cmath>
 #include <cstdint>
 #include <string>

@@ -1,8 +1,8 @@
-// What has to be so whatever the input is.
+// Aborts if a condition that must hold for any input does not hold.
 #pragma once
 
 #include <cstdlib>
 
-inline void require(bool true_of_any_input) {
-  if (!true_of_any_input) std::abort();
+inline void require(bool condition) {
+  if (!condition) std::abort();
 }

@@ -1,4 +1,4 @@
-// Any bytes from a serial adapter: frames are what they may be, and a whole frame after whatever came is read.
+// Any bytes from a serial adapter: all frames are valid, and a complete frame after any bytes is read.
 #include <cstddef>
 #include <cstdint>
 #include <string_view>

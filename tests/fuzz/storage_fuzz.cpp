@@ -1,8 +1,7 @@
-// Any bytes in flash, then any use of it: nothing crashes or loops, no word is programmed twice in what the log has
-// erased itself, and what was kept is found.
+// Any bytes in flash, then any sequence of operations. Nothing crashes or loops, no word is programmed twice in sectors
+// that the log erased, and a stored record is found again.
 //
-//   input   3 sectors, each a byte that says how it is filled, then its records as the tests write them or raw bytes;
-//   then what is done
+//   input   3 sectors, each a byte that selects how it is filled, then its records or raw bytes; then the operations
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -10,6 +9,7 @@
 
 #include "hal/watchdog.hpp"
 #include "storage/persistence.hpp"
+#include "tests/fuzz/require.hpp"
 #include "tests/storage/flash_model.hpp"
 #include "tests/storage/record_bytes.hpp"
 
@@ -53,7 +53,7 @@ std::vector<std::uint8_t> sector(Input& input) {
     bytes.resize(sector_bytes, 0xFF);
     return bytes;
   }
-  // records with right checksums; the content is anything
+  // records with valid checksums and any content
   const std::uint32_t base = how < 0xC0 ? 64U * (how & 7U) : input.word();
   for (std::uint8_t records = input.byte() % 20; records > 0 && bytes.size() < sector_bytes; --records) {
     const auto line = static_cast<std::uint32_t>(bytes.size() / 16);
@@ -63,10 +63,6 @@ std::vector<std::uint8_t> sector(Input& input) {
   }
   bytes.resize(sector_bytes, 0xFF);
   return bytes;
-}
-
-void must(bool holds) {
-  if (!holds) std::abort();
 }
 
 }  // namespace
@@ -91,7 +87,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           storage::Persistence p;
           p.start(static_cast<hal::ResetCause>(what >> 4 & 7), std::nullopt, input.word());
           const auto start = p.starting_point();
-          must(!start || (start->soc_ppb >= 0 && start->soc_ppb <= 1'000'000'000 && start->soc_sigma_ppb > 0));
+          require(!start || (start->soc_ppb >= 0 && start->soc_ppb <= 1'000'000'000 && start->soc_sigma_ppb > 0));
           p.fault(what);
           p.set(what, what);
           p.power_failing({estimator::StoredEstimate{static_cast<std::int32_t>(input.word()),
@@ -112,7 +108,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           flash.no_cut();
           std::array<std::uint8_t, storage::max_payload_bytes> into;
           const auto found = log.load(kind.type, kind.layout, into);
-          must(found && std::equal(found->payload.begin(), found->payload.end(), payload.begin(), payload.end()));
+          require(found && std::equal(found->payload.begin(), found->payload.end(), payload.begin(), payload.end()));
         }
       }
     } catch (const PowerCut&) {

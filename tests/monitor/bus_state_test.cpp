@@ -32,7 +32,7 @@ BusFrame pack_state(float soc, std::uint8_t counter, std::int64_t time_us) {
   return to_bus_frame(m.frame(counter), time_us);
 }
 
-TEST(BusState, HoldsTheLastValueOfEachSignalAsItWasSent) {
+TEST(BusState, StoresTheLastValueOfEachSignal) {
   Traffic traffic;
   BusState bus;
   for (int k = 0; k < 20; ++k) receive_all(bus, traffic.sample());
@@ -40,26 +40,26 @@ TEST(BusState, HoldsTheLastValueOfEachSignalAsItWasSent) {
   EXPECT_EQ(bus.reading("Status", "SampleCounter").value, 20);
   EXPECT_EQ(bus.reading("Identity", "CellHash").value, 0xCAFE1234);
   EXPECT_EQ(bus.reading("CurrentLimits", "ChargeTenSeconds").value, 24);
-  EXPECT_FALSE(bus.reading("SensorErrors", "CurrentOffset").known()) << "never sent";
+  EXPECT_FALSE(bus.reading("SensorErrors", "CurrentOffset").known()) << "never received";
   EXPECT_FALSE(bus.reading("NoSuchMessage", "Soc").known());
   EXPECT_FALSE(bus.reading("PackState", "NoSuchSignal").known());
 }
 
-TEST(BusState, AValueThatIsSentAsNotKnownIsNotKnown) {
+TEST(BusState, AnInvalidValueIsUnknownButNotStale) {
   BusState bus;
   bus.receive(pack_state(54, 0, 0));
   EXPECT_TRUE(bus.reading("PackState", "Soc").known());
   bus.receive(pack_state(can::unknown, 1, 10));
   EXPECT_FALSE(bus.reading("PackState", "Soc").known());
-  EXPECT_FALSE(bus.reading("PackState", "Soc").stale) << "it was said just now that it is not known";
+  EXPECT_FALSE(bus.reading("PackState", "Soc").stale) << "the invalid value itself is new";
   can::PackState m;
   m.soc_quality = 15;
   bus.receive(to_bus_frame(m.frame(2), 20));
-  EXPECT_FALSE(bus.reading("PackState", "SocQuality").known()) << "an integer's Invalid as well";
+  EXPECT_FALSE(bus.reading("PackState", "SocQuality").known()) << "the invalid value of an integer signal";
   EXPECT_EQ(pack_view(bus).soc_quality.text, "not known");
 }
 
-TEST(BusState, EachMessageOfTheDbcFilesIsThereWithWordsUnitsAndComments) {
+TEST(BusState, EachMessageOfTheDbcFilesHasItsNamesUnitsAndComments) {
   std::set<std::uint32_t> ids;
   for (const MessageInfo& m : messages()) {
     ids.insert(m.id);
@@ -74,7 +74,7 @@ TEST(BusState, EachMessageOfTheDbcFilesIsThereWithWordsUnitsAndComments) {
   EXPECT_EQ(text_of(pack.signals[1], 54.3), "54.300 %");
 }
 
-TEST(BusState, CountsWhatTheCounterSaysIsMissing) {
+TEST(BusState, CountsFramesThatAreMissingAccordingToTheCounter) {
   BusState bus;
   for (const int counter : {0, 1, 2, 5, 14, 0, 1})
     bus.receive(pack_state(50, static_cast<std::uint8_t>(counter), counter));
@@ -83,23 +83,23 @@ TEST(BusState, CountsWhatTheCounterSaysIsMissing) {
   EXPECT_EQ(state(bus, "PackState").repeated, 0U);
 }
 
-TEST(BusState, ARepeatedFrameIsNotNews) {
+TEST(BusState, ARepeatedFrameIsNotAccepted) {
   BusState bus;
   bus.receive(pack_state(50, 3, 0));
   for (int k = 1; k <= 10; ++k) bus.receive(pack_state(60, 3, k * second_us));
   EXPECT_EQ(state(bus, "PackState").repeated, 10U);
   EXPECT_EQ(bus.reading("PackState", "Soc").value, 50);
-  EXPECT_TRUE(bus.reading("PackState", "Soc").stale) << "who repeats himself hangs";
+  EXPECT_TRUE(bus.reading("PackState", "Soc").stale) << "a sender that repeats a frame hangs";
 }
 
-TEST(BusState, AFrameThatIsDamagedOrOfAnotherLengthChangesNothing) {
+TEST(BusState, ACorruptedFrameOrAWrongLengthChangesNoValue) {
   BusState bus;
   bus.receive(pack_state(50, 0, 0));
   for (std::size_t byte = 0; byte < 8; ++byte) {
     for (unsigned bit = 0; bit < 8; ++bit) {
-      BusFrame damaged = pack_state(60, 1, second_us);
-      damaged.data[byte] = static_cast<std::uint8_t>(damaged.data[byte] ^ (1U << bit));
-      bus.receive(damaged);
+      BusFrame corrupted = pack_state(60, 1, second_us);
+      corrupted.data[byte] = static_cast<std::uint8_t>(corrupted.data[byte] ^ (1U << bit));
+      bus.receive(corrupted);
     }
   }
   EXPECT_EQ(state(bus, "PackState").crc_errors, 64U);
@@ -112,11 +112,11 @@ TEST(BusState, AFrameThatIsDamagedOrOfAnotherLengthChangesNothing) {
   BusFrame of_another = pack_state(60, 1, second_us);
   of_another.id = can::PackElectrical::id;
   bus.receive(of_another);
-  EXPECT_EQ(state(bus, "PackElectrical").crc_errors, 1U) << "the data id is in the CRC";
+  EXPECT_EQ(state(bus, "PackElectrical").crc_errors, 1U) << "the CRC includes the data id";
   can::Frame fifteen = to_can_frame(pack_state(60, 0, 0));
   can::protect(fifteen, can::PackState::data_id, 15);
   bus.receive(to_bus_frame(fifteen, second_us));
-  EXPECT_EQ(state(bus, "PackState").crc_errors, 65U) << "no sender counts to 15";
+  EXPECT_EQ(state(bus, "PackState").crc_errors, 65U) << "15 is not a valid counter";
   EXPECT_EQ(state(bus, "PackState").frames, 1U);
   EXPECT_EQ(bus.reading("PackState", "Soc").value, 50);
 }
@@ -125,7 +125,7 @@ TEST(BusState, IsStaleAfterThreeCyclesOrThreeSeconds) {
   Traffic traffic(0);
   BusState bus;
   receive_all(bus, traffic.sample());
-  for (const char* name : {"PackState", "CurrentLimits"}) {  // no cycle time; a second
+  for (const char* name : {"PackState", "CurrentLimits"}) {  // without a cycle time; one second
     const std::size_t k = BusState::find(name);
     BusState later = bus;
     later.advance_time(3 * second_us);
@@ -133,10 +133,10 @@ TEST(BusState, IsStaleAfterThreeCyclesOrThreeSeconds) {
     later.advance_time(3 * second_us + 1);
     EXPECT_TRUE(later.stale(k)) << name;
   }
-  EXPECT_TRUE(bus.stale(BusState::find("SensorErrors"))) << "never heard";
+  EXPECT_TRUE(bus.stale(BusState::find("SensorErrors"))) << "never received";
 }
 
-TEST(BusState, RateIsThatOfTheMessage) {
+TEST(BusState, RateFollowsThePeriodOfTheMessage) {
   Traffic traffic(0, 50'000);
   BusState bus;
   for (int k = 0; k < 200; ++k) receive_all(bus, traffic.sample());
@@ -144,7 +144,7 @@ TEST(BusState, RateIsThatOfTheMessage) {
   EXPECT_NEAR(state(bus, "Health").rate_hz(), 1, 0.01);
 }
 
-TEST(BusState, AClockThatIsSetBackMakesNothingStaleForEver) {
+TEST(BusState, AClockSetBackDoesNotMakeMessagesStaleForever) {
   Traffic first(1'000'000 * second_us), second(100 * second_us);
   BusState bus;
   for (int k = 0; k < 60; ++k) receive_all(bus, first.sample());
@@ -152,10 +152,10 @@ TEST(BusState, AClockThatIsSetBackMakesNothingStaleForEver) {
   EXPECT_FALSE(bus.stale(BusState::find("PackState")));
   EXPECT_NEAR(bus.duration_s(), 118, 0.01);
   for (int k = 0; k < 5; ++k) bus.receive(to_bus_frame({0x7AA, 0, {}}, (160 + k) * second_us));
-  EXPECT_TRUE(bus.stale(BusState::find("PackState"))) << "but what has ended is";
+  EXPECT_TRUE(bus.stale(BusState::find("PackState"))) << "no longer received";
 }
 
-TEST(BusState, UnknownIdsHaveAFixedTableAndTheRestIsCounted) {
+TEST(BusState, UnknownIdsHaveATableOfFixedSizeAndTheOthersAreCounted) {
   BusState bus;
   for (std::uint32_t id = 0; id < 100'000; ++id) {
     BusFrame frame;
@@ -180,16 +180,16 @@ TEST(BusState, FramesOfOtherKindsAreCountedAndNotDecoded) {
     bus.receive(frame);
   }
   EXPECT_EQ(bus.frames(), 4U);
-  EXPECT_EQ(bus.good(), 0U);
+  EXPECT_EQ(bus.accepted(), 0U);
   EXPECT_EQ(bus.remote(), 1U);
   EXPECT_EQ(bus.errors(), 1U);
   EXPECT_EQ(bus.fd(), 1U);
   EXPECT_EQ(bus.unknown_frames(), 1U);
 }
 
-TEST(BusState, AFrameOf29BitsOfTheProfileIsNamedAndReadWithoutCounterOrCrc) {
+TEST(BusState, AFrameOfTheJ1939ProfileIsDecodedWithoutCounterAndCrc) {
   BusState bus;
-  BusFrame frame;  // DC_SOURCE_STATUS_1 by hand: 52.8 V, 12.345 A out
+  BusFrame frame;  // DC_SOURCE_STATUS_1, packed by hand: 52.8 V, 12.345 A discharge
   frame.kind = FrameKind::extended;
   frame.long_id = true;
   frame.id = 0x19FFFD80;
@@ -198,12 +198,12 @@ TEST(BusState, AFrameOf29BitsOfTheProfileIsNamedAndReadWithoutCounterOrCrc) {
   for (int k = 0; k < 3; ++k) {
     frame.time_us = k * second_us;
     EXPECT_EQ(bus.receive(frame), BusState::find("DcSourceStatus1"))
-        << "the same bytes again are news where nothing counts";
+        << "without a counter the same bytes are a new frame";
   }
-  EXPECT_EQ(bus.good(), 3U);
+  EXPECT_EQ(bus.accepted(), 3U);
   EXPECT_EQ(bus.unknown_frames(), 0U);
   EXPECT_NEAR(bus.reading("DcSourceStatus1", "Voltage").value, 52.8, 1e-9);
-  EXPECT_NEAR(bus.reading("DcSourceStatus1", "Current").value, 12.345, 1e-9) << "32 bits: not through a float";
+  EXPECT_NEAR(bus.reading("DcSourceStatus1", "Current").value, 12.345, 1e-9) << "32 bits do not fit in a float";
   EXPECT_EQ(state(bus, "DcSourceStatus1").repeated, 0U);
   EXPECT_THAT(json_of(bus, {}), HasSubstr("\"DcSourceStatus1\""));
   EXPECT_THAT(plain_text(screen(bus, {}, {120, 40})), HasSubstr("DcSourceStatus1"));
@@ -217,14 +217,14 @@ TEST(BusState, AFrameOf29BitsOfTheProfileIsNamedAndReadWithoutCounterOrCrc) {
   frame.long_id = false;
   frame.id &= 0x7FF;
   bus.receive(frame);
-  EXPECT_EQ(bus.unknown_frames(), 1U) << "its lower eleven bits are another message";
+  EXPECT_EQ(bus.unknown_frames(), 1U) << "its lower eleven bits are a different id";
 }
 
-TEST(BusState, IsCompleteWhenASampleAndASecondOfItWereHeard) {
+TEST(BusState, IsCompleteAfterASampleAndTheLongestCycle) {
   Traffic traffic(0);
   BusState bus;
   receive_all(bus, traffic.sample());
-  EXPECT_FALSE(bus.complete()) << "SensorErrors may come";
+  EXPECT_FALSE(bus.complete()) << "SensorErrors may still arrive";
   receive_all(bus, traffic.sample());
   EXPECT_FALSE(bus.complete());
   receive_all(bus, traffic.sample());
@@ -234,7 +234,7 @@ TEST(BusState, IsCompleteWhenASampleAndASecondOfItWereHeard) {
   EXPECT_FALSE(noise.complete());
 }
 
-TEST(BusState, AnyFramesDoNoHarm) {
+TEST(BusState, AcceptsAnyFrames) {
   std::mt19937_64 random(4);
   BusState bus;
   for (int run = 0; run < 200'000; ++run) {
@@ -247,7 +247,7 @@ TEST(BusState, AnyFramesDoNoHarm) {
     frame.long_id = frame.kind == FrameKind::extended;
     frame.length = static_cast<std::uint8_t>(random() % 9);
     for (std::uint8_t& byte : frame.data) byte = static_cast<std::uint8_t>(random());
-    if (frame.kind == FrameKind::standard && random() % 2 == 0) {  // right in all but its values
+    if (frame.kind == FrameKind::standard && random() % 2 == 0) {  // valid but for its values
       for (const MessageInfo& m : messages()) {
         if (m.id != frame.id || m.long_id) continue;
         can::Frame whole = to_can_frame(frame);
@@ -263,10 +263,10 @@ TEST(BusState, AnyFramesDoNoHarm) {
       EXPECT_FALSE(screen(bus, {}, {200, 60}).empty());
     }
   }
-  EXPECT_GT(bus.good(), 10'000U);
+  EXPECT_GT(bus.accepted(), 10'000U);
 }
 
-TEST(PackView, SaysWhichBitsOfTheEstimatesFlagsAreSet) {
+TEST(PackView, NamesTheFlagsOfTheEstimateThatAreSet) {
   Traffic traffic;
   traffic.flags = 1U << 2 | 1U << 9 | 1U << 30;
   BusState bus;
@@ -278,7 +278,7 @@ TEST(PackView, SaysWhichBitsOfTheEstimatesFlagsAreSet) {
   EXPECT_EQ(view.flags[2].text, "unknown flags 0x40000000");
 }
 
-TEST(Results, CsvHasAValueForEachNameAndLeavesOutWhatIsStale) {
+TEST(Results, CsvHasAFieldForEachColumnAndOmitsStaleValues) {
   Traffic traffic(0);
   BusState bus;
   receive_all(bus, traffic.sample());
@@ -291,7 +291,7 @@ TEST(Results, CsvHasAValueForEachNameAndLeavesOutWhatIsStale) {
   EXPECT_EQ(csv_row(bus), "0.000000" + std::string(static_cast<std::size_t>(commas(csv_head())), ',') + "\n");
 }
 
-TEST(History, KeepsAnHourAtAtMostTwoPointsASecondAndNeverMore) {
+TEST(History, StoresOneHourWithAtMostTwoPointsPerSecond) {
   Traffic traffic(0, 100'000);
   BusState bus;
   History history;

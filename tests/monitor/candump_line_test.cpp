@@ -17,7 +17,7 @@ BusFrame parsed(std::string_view line) {
   return frame;
 }
 
-// lines as can-utils writes them
+// These lines are as can-utils writes them.
 TEST(CandumpLine, ReadsEachKindOfFrame) {
   const BusFrame standard = parsed("(1436509052.249713) vcan0 044#2A366C2BBA");
   EXPECT_EQ(standard.kind, FrameKind::standard);
@@ -30,7 +30,7 @@ TEST(CandumpLine, ReadsEachKindOfFrame) {
   EXPECT_EQ(extended.kind, FrameKind::extended);
   EXPECT_TRUE(extended.long_id);
   EXPECT_EQ(extended.id, 0x18FF50E5U);
-  EXPECT_EQ(parsed("(1.000000) can0 00000123#").kind, FrameKind::extended) << "eight digits make a 29-bit id";
+  EXPECT_EQ(parsed("(1.000000) can0 00000123#").kind, FrameKind::extended) << "an id of eight digits has 29 bits";
 
   EXPECT_EQ(parsed("(1.000000) can0 123#R").kind, FrameKind::remote);
   EXPECT_EQ(parsed("(1.000000) can0 12345678#R8").length, 8);
@@ -47,7 +47,7 @@ TEST(CandumpLine, ReadsEachKindOfFrame) {
   EXPECT_EQ(parsed("(1.000000) can0 182#01.02.03 R").length, 3);
 }
 
-TEST(CandumpLine, RefusesWhatIsNoneAndLeavesTheFrameAlone) {
+TEST(CandumpLine, RejectsOtherLinesAndLeavesTheFrameUnchanged) {
   for (const char* line : {"",
                            "(",
                            "()",
@@ -86,7 +86,7 @@ TEST(CandumpLine, RefusesWhatIsNoneAndLeavesTheFrameAlone) {
   }
 }
 
-TEST(CandumpLine, EveryFrameComesBack) {
+TEST(CandumpLine, WrittenFramesAreReadBackUnchanged) {
   std::mt19937_64 random(3);
   for (int run = 0; run < 20'000; ++run) {
     BusFrame sent;
@@ -115,7 +115,7 @@ TEST(CandumpLine, EveryFrameComesBack) {
   }
 }
 
-TEST(DumpLines, AHugeLineIsOneThatIsTooLongAndTheNextIsWhole) {
+TEST(DumpLines, AHugeLineIsTooLongAndTheNextIsReadInFull) {
   DumpLines lines;
   for (int k = 0; k < 1'000'000; ++k) ASSERT_FALSE(lines.push('('));
   ASSERT_TRUE(lines.push('\n'));
@@ -128,43 +128,43 @@ TEST(DumpLines, AHugeLineIsOneThatIsTooLongAndTheNextIsWhole) {
   EXPECT_EQ(lines.line(), "next");
 }
 
-/// Frames and what was no frame, of the bytes that an adapter sends.
-struct Heard {
+/// The frames and the number of malformed lines in the bytes of an adapter.
+struct Decoded {
   std::vector<BusFrame> frames;
   std::uint64_t malformed = 0;
 };
-Heard heard(std::string_view bytes) {
-  Heard h;
+Decoded decode(std::string_view bytes) {
+  Decoded decoded;
   SlcanStream stream;
   BusFrame frame;
   for (const char c : bytes) {
-    if (stream.push(c, frame)) h.frames.push_back(frame);
+    if (stream.push(c, frame)) decoded.frames.push_back(frame);
   }
-  h.malformed = stream.malformed();
-  return h;
+  decoded.malformed = stream.malformed();
+  return decoded;
 }
 
 TEST(SlcanStream, ReadsFramesBetweenTheAdaptersAnswers) {
-  const Heard h = heard("\r\a\rt1238DEADBEEF01020304\rz\rV1010\rT18FF50E521122\rr1234\rR000001238\r\at0440\r");
-  EXPECT_EQ(h.malformed, 0U);
-  ASSERT_EQ(h.frames.size(), 5U);
-  EXPECT_EQ(h.frames[0].kind, FrameKind::standard);
-  EXPECT_EQ(h.frames[0].data[3], 0xEF);
-  EXPECT_EQ(h.frames[1].kind, FrameKind::extended);
-  EXPECT_EQ(h.frames[1].id, 0x18FF50E5U);
-  EXPECT_EQ(h.frames[1].length, 2);
-  EXPECT_EQ(h.frames[1].data[1], 0x22);
-  EXPECT_EQ(h.frames[2].kind, FrameKind::remote);
-  EXPECT_EQ(h.frames[2].id, 0x123U);
-  EXPECT_EQ(h.frames[2].length, 4);
-  EXPECT_TRUE(h.frames[3].long_id);
-  EXPECT_EQ(h.frames[4].id, 0x44U) << "a refusal before it does no harm";
+  const Decoded decoded = decode("\r\a\rt1238DEADBEEF01020304\rz\rV1010\rT18FF50E521122\rr1234\rR000001238\r\at0440\r");
+  EXPECT_EQ(decoded.malformed, 0U);
+  ASSERT_EQ(decoded.frames.size(), 5U);
+  EXPECT_EQ(decoded.frames[0].kind, FrameKind::standard);
+  EXPECT_EQ(decoded.frames[0].data[3], 0xEF);
+  EXPECT_EQ(decoded.frames[1].kind, FrameKind::extended);
+  EXPECT_EQ(decoded.frames[1].id, 0x18FF50E5U);
+  EXPECT_EQ(decoded.frames[1].length, 2);
+  EXPECT_EQ(decoded.frames[1].data[1], 0x22);
+  EXPECT_EQ(decoded.frames[2].kind, FrameKind::remote);
+  EXPECT_EQ(decoded.frames[2].id, 0x123U);
+  EXPECT_EQ(decoded.frames[2].length, 4);
+  EXPECT_TRUE(decoded.frames[3].long_id);
+  EXPECT_EQ(decoded.frames[4].id, 0x44U) << "\\a before it has no effect";
 }
 
-TEST(SlcanStream, CountsWhatIsNoFrameAndGoesOn) {
-  const Heard h = heard("t12\rt1239\r\xff\xfe\rtGGG0\r" + std::string(100'000, 't') + "\rx\rt0440\r");
-  ASSERT_EQ(h.frames.size(), 1U);
-  EXPECT_EQ(h.malformed, 5U) << "the huge line comes out empty";
+TEST(SlcanStream, CountsMalformedLinesAndContinues) {
+  const Decoded decoded = decode("t12\rt1239\r\xff\xfe\rtGGG0\r" + std::string(100'000, 't') + "\rx\rt0440\r");
+  ASSERT_EQ(decoded.frames.size(), 1U);
+  EXPECT_EQ(decoded.malformed, 5U) << "the huge line counts as empty";
 }
 
 }  // namespace

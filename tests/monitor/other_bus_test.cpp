@@ -1,5 +1,5 @@
-// The monitor's own sources with another DBC file (other.dbc): cells, faults, a contactor and a message that nobody has
-// heard of are shown without a line of code for them.
+// The sources of the monitor with another DBC file (other.dbc). It shows cells, faults, a contactor and a new message
+// without any code for them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -26,11 +26,19 @@ class OtherBus : public ::testing::Test {
   }
   void send_cells() {
     can::CellVoltages1 a;
-    a.cell1 = 3.301F, a.cell2 = 3.302F, a.cell3 = 3.271F, a.cell4 = 3.304F;
+    a.cell1 = 3.301F;
+    a.cell2 = 3.302F;
+    a.cell3 = 3.271F;
+    a.cell4 = 3.304F;
     can::CellVoltages2 b;
-    b.cell5 = 3.305F, b.cell6 = 3.306F, b.cell7 = 3.307F, b.cell8 = 3.318F;
+    b.cell5 = 3.305F;
+    b.cell6 = 3.306F;
+    b.cell7 = 3.307F;
+    b.cell8 = 3.318F;
     can::CellVoltages3 c;
-    c.cell9 = 3.309F, c.cell11 = 3.311F, c.cell12 = 3.312F;  // the tenth is not known
+    c.cell9 = 3.309F;  // cell 10 is invalid
+    c.cell11 = 3.311F;
+    c.cell12 = 3.312F;
     send(a);
     send(b);
     send(c);
@@ -50,7 +58,7 @@ TEST_F(OtherBus, ShowsCellsAsBarsWithLowestHighestAndDifference) {
   EXPECT_THAT(text(80, 24), HasSubstr("Cells    min 3.271 V (cell 3)  max 3.318 V (cell 8)  delta 47 mV"));
   EXPECT_THAT(text(80, 24), HasSubstr("  8  3.318 ########"));
   EXPECT_THAT(text(80, 24), HasSubstr(" 10      -"));
-  EXPECT_THAT(text(80, 24), Not(HasSubstr(" 13 "))) << "a pack of twelve";
+  EXPECT_THAT(text(80, 24), Not(HasSubstr(" 13 "))) << "a pack of twelve cells";
   const PackView view = pack_view(bus_);
   EXPECT_EQ(view.cells().count, 11U);
   EXPECT_EQ(view.cells_v.size(), 12U);
@@ -58,7 +66,7 @@ TEST_F(OtherBus, ShowsCellsAsBarsWithLowestHighestAndDifference) {
   EXPECT_EQ(nlohmann::json::parse(json_of(bus_, {}))["pack"]["cells_v"][2], 3.271);
 }
 
-TEST_F(OtherBus, NamesTheFaultsThatAreSetAndTheContactorsState) {
+TEST_F(OtherBus, NamesTheActiveFaultsAndTheStateOfTheContactors) {
   can::Faults faults;
   send(faults);
   EXPECT_THAT(text(80, 24), HasSubstr("Faults   none"));
@@ -68,7 +76,7 @@ TEST_F(OtherBus, NamesTheFaultsThatAreSetAndTheContactorsState) {
   send(faults);
   EXPECT_THAT(text(80, 24), HasSubstr("Faults   ShortCircuit  More than a fuse can bear.\n         Overtemperature  "
                                       "Too hot.\n         FirstCause short circuit\n"));
-  EXPECT_THAT(text(80, 8), HasSubstr("Faults   ShortCircuit, Overtemperature\n")) << "one line where rows are few";
+  EXPECT_THAT(text(80, 8), HasSubstr("Faults   ShortCircuit, Overtemperature\n")) << "one line on a small screen";
   EXPECT_THAT(status_line(bus_, {}), HasSubstr("FAULT ShortCircuit  FAULT Overtemperature"));
   EXPECT_EQ(nlohmann::json::parse(json_of(bus_, {}))["pack"]["faults"],
             (nlohmann::json{"ShortCircuit", "Overtemperature"}));
@@ -79,7 +87,7 @@ TEST_F(OtherBus, NamesTheFaultsThatAreSetAndTheContactorsState) {
   EXPECT_THAT(text(80, 24), HasSubstr("Contactor drive, MainPlus\n"));
 }
 
-TEST_F(OtherBus, AMessageThatWasAddedIsThere) {
+TEST_F(OtherBus, ShowsAMessageThatIsOnlyInThisDbcFile) {
   can::Novelty novelty;
   novelty.depth = -12.5F;
   send(novelty);
@@ -89,11 +97,11 @@ TEST_F(OtherBus, AMessageThatWasAddedIsThere) {
   EXPECT_EQ(nlohmann::json::parse(json_of(bus_, {}))["messages"]["Novelty"]["signals"]["Depth"]["value"], -12.5);
 }
 
-TEST_F(OtherBus, ItsOwnCycleTimeMakesAMessageStale) {
+TEST_F(OtherBus, TheCycleTimeOfTheDbcFileMakesAMessageStale) {
   send_cells();
   bus_.advance_time(300'001);
   EXPECT_TRUE(bus_.stale(BusState::find("CellVoltages1"))) << "three times a tenth of a second";
-  EXPECT_FALSE(bus_.stale(BusState::find("CellVoltages2"))) << "no cycle time";
+  EXPECT_FALSE(bus_.stale(BusState::find("CellVoltages2"))) << "without a cycle time";
 }
 
 }  // namespace

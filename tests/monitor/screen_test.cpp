@@ -34,11 +34,11 @@ std::vector<std::string> rows(const BusState& bus, const ScreenSize& size, bool 
   return all;
 }
 
-/// Ink of the piece that holds `text`.
-TextStyle ink_of(const std::vector<ScreenLine>& lines, const std::string& text) {
+/// Style of the piece that contains `text`.
+TextStyle style_of(const std::vector<ScreenLine>& lines, const std::string& text) {
   for (const ScreenLine& line : lines) {
     for (const auto& piece : line.pieces()) {
-      if (piece.text.find(text) != std::string::npos) return piece.ink;
+      if (piece.text.find(text) != std::string::npos) return piece.style;
     }
   }
   ADD_FAILURE() << text << " is not on the screen";
@@ -59,7 +59,7 @@ TEST(Screen, On80x24ShowsTheBatteryAndTheMessages) {
               ::testing::Contains(StartsWith("PackState             1.0   0.0 s       61     0     0     0      0")));
 }
 
-TEST(Screen, On40x10ShowsWhatMattersMost) {
+TEST(Screen, On40x10ShowsTheMostImportantLines) {
   const auto r = rows(after(61), {40, 10});
   ASSERT_LE(r.size(), 10U);
   for (const std::string& row : r) {
@@ -74,7 +74,7 @@ TEST(Screen, On40x10ShowsWhatMattersMost) {
   EXPECT_EQ(r[5], "Health   97.5 %  R 112 %");
 }
 
-TEST(Screen, On200x60ShowsEachSignalBesideTheBattery) {
+TEST(Screen, On200x60ShowsEachSignalNextToTheBattery) {
   const auto r = rows(after(61), {200, 60});
   ASSERT_LE(r.size(), 60U);
   std::string all;
@@ -85,7 +85,7 @@ TEST(Screen, On200x60ShowsEachSignalBesideTheBattery) {
   EXPECT_THAT(r[2], ::testing::AllOf(StartsWith("Charge   80.0 %"), HasSubstr("Message")));
 }
 
-TEST(Screen, FitsIntoEverySizeAndShowsTheChargeWhereverThereIsRoom) {
+TEST(Screen, FitsEverySizeAndShowsTheChargeIfThereIsRoom) {
   const BusState bus = after(30, 0xFFFFFFFF);
   for (std::size_t columns = 1; columns < 260; columns += 3) {
     for (std::size_t height = 1; height < 80; height += 3) {
@@ -99,31 +99,31 @@ TEST(Screen, FitsIntoEverySizeAndShowsTheChargeWhereverThereIsRoom) {
   }
 }
 
-TEST(Screen, InAsciiHasNothingElse) {
+TEST(Screen, InAsciiModeContainsOnlyAscii) {
   const std::string text = plain_text(screen(after(5), facts(false), {200, 60}));
   EXPECT_TRUE(std::all_of(text.begin(), text.end(), [](char c) { return (c >= 0x20 && c < 0x7F) || c == '\n'; }));
   EXPECT_THAT(text, HasSubstr("###~~|~"));
 }
 
-TEST(Screen, WhatIsStaleIsFaintAndWhatIsNotIsNot) {
+TEST(Screen, OnlyStaleValuesAreFaint) {
   BusState bus = after(5);
-  EXPECT_EQ(ink_of(screen(bus, facts(), {80, 24}), "80.0 %"), TextStyle::strong);
-  EXPECT_EQ(ink_of(screen(bus, facts(), {80, 24}), "discharge 60 A"), TextStyle::plain);
+  EXPECT_EQ(style_of(screen(bus, facts(), {80, 24}), "80.0 %"), TextStyle::strong);
+  EXPECT_EQ(style_of(screen(bus, facts(), {80, 24}), "discharge 60 A"), TextStyle::plain);
   for (int k = 0; k < 10; ++k) bus.receive(to_bus_frame({0x7AA, 0, {}}, (5 + k) * 1'000'000));
   const auto stale = screen(bus, facts(), {80, 24});
   for (const char* text : {"80.0 %", " V", "discharge 60 A", "capacity", "PackState"})
-    EXPECT_EQ(ink_of(stale, text), TextStyle::faint) << text;
-  EXPECT_THAT(plain_text(stale), Not(HasSubstr("silent"))) << "the bus lives";
+    EXPECT_EQ(style_of(stale, text), TextStyle::faint) << text;
+  EXPECT_THAT(plain_text(stale), Not(HasSubstr("silent"))) << "frames still arrive";
   bus.advance_time(60'000'000);
   EXPECT_THAT(plain_text(screen(bus, facts(), {80, 24})), HasSubstr("silent for 46 s"));
 }
 
-TEST(Screen, SaysWhatIsWrongWithTheBus) {
+TEST(Screen, ShowsTheErrorsOfTheBus) {
   BusState bus = after(5);
   EXPECT_THAT(plain_text(screen(bus, facts(), {80, 24})), Not(HasSubstr("Bus  ")));
-  BusFrame damaged = Traffic(5'000'000).sample().back();
-  damaged.data[3] = static_cast<std::uint8_t>(damaged.data[3] ^ 1);
-  bus.receive(damaged);
+  BusFrame corrupted = Traffic(5'000'000).sample().back();
+  corrupted.data[3] = static_cast<std::uint8_t>(corrupted.data[3] ^ 1);
+  bus.receive(corrupted);
   bus.receive(to_bus_frame({0x7AA, 0, {}}, 5'000'000));
   ScreenFacts more = facts();
   more.dropped = 17;
@@ -131,18 +131,18 @@ TEST(Screen, SaysWhatIsWrongWithTheBus) {
   const auto lines = screen(bus, more, {80, 24});
   EXPECT_THAT(plain_text(lines), HasSubstr("Bus      17 dropped by the kernel, 1 CRC errors, 3 malformed lines"));
   EXPECT_THAT(plain_text(lines), HasSubstr("Other ids 7AA:1"));
-  EXPECT_EQ(ink_of(lines, "17 dropped"), TextStyle::alarm);
+  EXPECT_EQ(style_of(lines, "17 dropped"), TextStyle::alarm);
 }
 
-TEST(Screen, BeforeAnythingIsHeardSaysSo) {
-  EXPECT_THAT(plain_text(screen({}, facts(), {80, 24})), HasSubstr("nothing heard yet"));
-  EXPECT_EQ(status_line({}, facts()), "0:00:00  nothing of the BMS in 0 frames");
+TEST(Screen, SaysThatNoFramesWereReceived) {
+  EXPECT_THAT(plain_text(screen({}, facts(), {80, 24})), HasSubstr("no frames received yet"));
+  EXPECT_EQ(status_line({}, facts()), "0:00:00  no BMS message in 0 frames");
 }
 
-TEST(Screen, ANameFromOutsideCannotSpeakToTheTerminal) {
-  ScreenFacts evil = facts();
-  evil.source = "slcan:/dev/\x1b]0;x\x07\xff";
-  EXPECT_EQ(plain_text(screen(after(1), evil, {80, 24})).find_first_of("\x1b\x07\xff"), std::string::npos);
+TEST(Screen, ASourceNameCannotContainEscapeCodes) {
+  ScreenFacts malicious = facts();
+  malicious.source = "slcan:/dev/\x1b]0;x\x07\xff";
+  EXPECT_EQ(plain_text(screen(after(1), malicious, {80, 24})).find_first_of("\x1b\x07\xff"), std::string::npos);
 }
 
 TEST(Screen, AFrameIsOneSynchronisedUpdateWithoutClearingFirst) {
@@ -150,11 +150,11 @@ TEST(Screen, AFrameIsOneSynchronisedUpdateWithoutClearingFirst) {
   EXPECT_THAT(frame, StartsWith("\x1b[?2026h\x1b[H"));
   EXPECT_THAT(frame, ::testing::EndsWith("\x1b[J\x1b[?2026l"));
   EXPECT_THAT(frame, Not(HasSubstr("\x1b[2J")));
-  EXPECT_THAT(frame, Not(::testing::EndsWith("\n"))) << "a last line's end would scroll a full screen";
+  EXPECT_THAT(frame, Not(::testing::EndsWith("\n"))) << "a line end after the last row would scroll the screen";
   EXPECT_THAT(frame, HasSubstr("\x1b[1m80.0 %\x1b[0m"));
 }
 
-TEST(StatusLine, SaysTheBatteryInOneLine) {
+TEST(StatusLine, ShowsTheBatteryInOneLine) {
   EXPECT_EQ(status_line(after(61), facts()),
             "0:01:00  79.99 % +- 1.72  3.320 V  5.04 A  24.2 degC  carried by counting");
   BusState bus = after(5);

@@ -1,5 +1,5 @@
-// What a BMS says on CAN, made up: a truck that is driven and charged, sample after sample, in the order the firmware
-// sends.
+// Synthetic CAN traffic of a BMS in a truck that drives and charges, sample by sample, in the order in which the
+// firmware sends.
 #pragma once
 
 #include <cmath>
@@ -16,7 +16,7 @@ class Traffic {
   explicit Traffic(std::int64_t begin_us = 1'700'000'000'000'000, std::int64_t step_us = 1'000'000)
       : begin_us_(begin_us), step_us_(step_us) {}
 
-  /// The frames of the next sample; those of each second come first, the status frame last.
+  /// The frames of the next sample. Messages that are sent once per second come first, the status message last.
   std::vector<BusFrame> sample() {
     frames_.clear();
     const auto k = static_cast<float>(samples_);

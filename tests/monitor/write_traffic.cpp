@@ -1,9 +1,9 @@
-// Traffic of tests/monitor/traffic.hpp on standard output, a frame after the other at an even pace:
+// Writes the traffic of tests/monitor/traffic.hpp to standard output at a constant rate:
 //
-//   write_traffic dump  FRAMES_PER_S SECONDS       candump lines; FRAMES_PER_S 0: as fast as they are taken
-//   write_traffic slcan FRAMES_PER_S SECONDS       as a serial adapter sends them
+//   write_traffic dump  FRAMES_PER_S SECONDS       candump lines; FRAMES_PER_S 0: as fast as they are read
+//   write_traffic slcan FRAMES_PER_S SECONDS       SLCAN lines, as a serial adapter sends them
 //
-// Ends with the number of frames on standard error.
+// At the end it writes the number of frames to standard error.
 #include <time.h>
 #include <unistd.h>
 
@@ -34,8 +34,8 @@ int main(int argc, char** argv) {
   if (argc != 4) return 2;
   const bool slcan = std::string(argv[1]) == "slcan";
   const double per_s = std::atof(argv[2]), seconds = std::atof(argv[3]);
-  constexpr double frames_a_sample = 4;
-  const auto step_us = static_cast<std::int64_t>(per_s > 0 ? 1e6 * frames_a_sample / per_s : 10'000);
+  constexpr double frames_per_sample = 4;
+  const auto step_us = static_cast<std::int64_t>(per_s > 0 ? 1e6 * frames_per_sample / per_s : 10'000);
   const std::int64_t begin_us = monitor::clock_us();
   monitor::Traffic traffic(begin_us, step_us);
   unsigned long frames = 0;

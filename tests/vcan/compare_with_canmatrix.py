@@ -1,9 +1,10 @@
-"""Frames that candump saw, decoded by canmatrix from the DBC file, against what bms monitor made of the same bus.
+"""Compares the frames of a candump log, decoded by canmatrix, with the output of bms monitor for the same bus.
 
     compare_with_canmatrix.py DBC candump.log rows.csv monitor.json
 
-At each Status frame all values heard so far must be those of the monitor's row, and nothing where the last frame is older than three cycle times, or
-3 s without one; at the end those of its JSON. Prints what was compared.
+At each Status frame the last received values must equal those of the monitor's row. A field must be empty if its last
+frame is older than three cycle times, or 3 s without a cycle time. At the end the values must equal those of the JSON.
+Prints what was compared. Exit code 1: a value differs.
 """
 import contextlib
 import csv
@@ -34,44 +35,49 @@ def values_of(frame, data):
 
 
 def same(text, value):
-    return text in ("", None) if value is None else text not in ("", None) and math.isclose(float(text), value, rel_tol=1e-12, abs_tol=1e-12)
+    if text in ("", None) or value is None:
+        return text in ("", None) and value is None
+    return math.isclose(float(text), value, rel_tol=1e-12, abs_tol=1e-12)
 
 
-heard, heard_us, count, at, compared, problems = {}, {}, {}, 0, 0, []
+received, received_us, count, at, compared, problems = {}, {}, {}, 0, 0, []
 for line in open(sys.argv[2]):
     identity, data = line.split()[2].split("#")
     frame = frames.get(int(identity, 16))
     if frame is None:
         continue
-    heard[frame.name] = values_of(frame, bytes.fromhex(data))
+    received[frame.name] = values_of(frame, bytes.fromhex(data))
     now_us = int(line[1:line.index(")")].replace(".", ""))
-    heard_us[frame.name] = now_us
+    received_us[frame.name] = now_us
     count[frame.name] = count.get(frame.name, 0) + 1
     if frame.name != "Status":
         continue
     if at >= len(rows):
         problems.append("more Status frames than rows")
         break
-    for name, values in heard.items():
+    for name, values in received.items():
         sender = next(f for f in frames.values() if f.name == name)
-        stale = now_us - heard_us[name] > (3_000 * sender.cycle_time or 3_000_000)
+        stale = now_us - received_us[name] > (3_000 * sender.cycle_time or 3_000_000)
         for signal in sender.signals:
             if signal.name in values:
                 column = f"{name}.{signal.name}" + (f" [{signal.unit}]" if signal.unit else "")
                 compared += 1
                 if not same(rows[at][column], None if stale else values[signal.name]):
-                    problems.append(f"row {at}, {column}: {rows[at][column]!r} in the CSV, {values[signal.name]} by canmatrix")
+                    problems.append(f"row {at}, {column}: {rows[at][column]!r} in the CSV, "
+                                    f"{values[signal.name]} by canmatrix")
     at += 1
 if at != len(rows):
     problems.append(f"{at} Status frames, {len(rows)} rows")
-for name, values in heard.items():
+for name, values in received.items():
     message = report["messages"][name]
     if message["frames"] != count[name]:
         problems.append(f"{name}: {message['frames']} frames in the JSON, {count[name]} in candump's log")
     for signal, value in values.items():
         compared += 1
         if not same(message["signals"][signal]["value"], value):
-            problems.append(f"{name}.{signal}: {message['signals'][signal]['value']} in the JSON, {value} by canmatrix")
-print(f"{at} samples, {sum(count.values())} frames of {len(count)} messages, {compared} values, {len(problems)} problems")
+            in_json = message["signals"][signal]["value"]
+            problems.append(f"{name}.{signal}: {in_json} in the JSON, {value} by canmatrix")
+print(f"{at} samples, {sum(count.values())} frames of {len(count)} messages, {compared} values, "
+      f"{len(problems)} problems")
 print("\n".join(problems[:20]))
 sys.exit(1 if problems or at == 0 else 0)

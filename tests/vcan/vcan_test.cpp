@@ -1,6 +1,5 @@
-// The firmware on a real CAN bus (SocketCAN, in User-Mode Linux where this machine has none), with noise beside it:
-// what bms monitor says of it is what bms replay says of the same samples, and what candump and canmatrix make of the
-// same frames.
+// The firmware on a real CAN bus with noise: SocketCAN, in User-Mode Linux if this machine has no vcan0. The output of
+// bms monitor must agree with bms replay for the same samples, and with candump and canmatrix for the same frames.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// Exit code, standard output and standard error of a command of the shell.
+/// Exit code, standard output and standard error of a shell command.
 ToolRun run_shell(const std::string& command) {
   const images::TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string(), err = (folder.path() / "err").string();
@@ -25,7 +24,7 @@ ToolRun run_shell(const std::string& command) {
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, content(out), content(err)};
 }
 
-/// Rows 3000 to 3000 + count of the shift, as a recording of its own.
+/// Writes `count` rows of the forklift shift, from row 3000 on, as a recording.
 void write_part(const std::filesystem::path& path, int count) {
   std::ifstream in(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
   std::ofstream out(path);
@@ -54,7 +53,7 @@ std::vector<double> column(const std::filesystem::path& csv, const std::string& 
   return values;
 }
 
-TEST(Vcan, MonitorAndCandumpShowOnANoisyBusWhatReplaySaysOfTheSameSamples) {
+TEST(Vcan, MonitorAndCandumpAgreeWithReplayOnANoisyBus) {
   constexpr int samples = 200;
   const images::TemporaryFolder folder;
   const auto part = folder.path() / "part.csv", trace = folder.path() / "trace.csv";
@@ -72,30 +71,30 @@ TEST(Vcan, MonitorAndCandumpShowOnANoisyBusWhatReplaySaysOfTheSameSamples) {
   ASSERT_EQ(run.exit_code, 0) << run.out << run.err << content(folder.path() / "emulator.log");
   EXPECT_THAT(run.out, HasSubstr(fmt::format("{} samples", samples)));
 
-  const auto told = nlohmann::json::parse(content(folder.path() / "monitor.json"));
-  EXPECT_EQ(told["dropped"], 0);
-  EXPECT_GT(told["other_ids"]["frames"], 2'000) << "there was to be noise";
-  EXPECT_GT(told["other_kinds"]["remote"], 0);
-  EXPECT_GT(told["other_kinds"]["fd"], 0);
-  for (const auto& [name, message] : told["messages"].items()) {
+  const auto report = nlohmann::json::parse(content(folder.path() / "monitor.json"));
+  EXPECT_EQ(report["dropped"], 0);
+  EXPECT_GT(report["other_ids"]["frames"], 2'000) << "the bus must be noisy";
+  EXPECT_GT(report["other_kinds"]["remote"], 0);
+  EXPECT_GT(report["other_kinds"]["fd"], 0);
+  for (const auto& [name, message] : report["messages"].items()) {
     EXPECT_EQ(message["lost"], 0) << name;
     EXPECT_EQ(message["repeated"], 0) << name;
     EXPECT_EQ(message["crc_errors"], 0) << name;
   }
-  EXPECT_EQ(told["messages"]["Status"]["frames"], samples);
+  EXPECT_EQ(report["messages"]["Status"]["frames"], samples);
 
-  // what the firmware says of each sample; half a step of 0.002 %
+  // the published estimate of each sample, within half a step of 0.002 %
   const auto soc = column(trace, "soc"), sigma = column(trace, "soc_sigma"),
-             shown = column(folder.path() / "rows.csv", "PackState.Soc [%]"),
-             shown_sigma = column(folder.path() / "rows.csv", "PackState.SocSigma [%]");
+             monitored = column(folder.path() / "rows.csv", "PackState.Soc [%]"),
+             monitored_sigma = column(folder.path() / "rows.csv", "PackState.SocSigma [%]");
   ASSERT_EQ(soc.size(), samples);
-  ASSERT_EQ(shown.size(), samples);
+  ASSERT_EQ(monitored.size(), samples);
   for (int k = 0; k < samples; ++k) {
-    ASSERT_NEAR(shown[k], 100 * soc[k], 0.00101) << k;
-    ASSERT_NEAR(shown_sigma[k], 100 * sigma[k], 0.00101) << k;
+    ASSERT_NEAR(monitored[k], 100 * soc[k], 0.00101) << k;
+    ASSERT_NEAR(monitored_sigma[k], 100 * sigma[k], 0.00101) << k;
   }
-  EXPECT_NEAR(told["pack"]["soc"].get<double>(), soc.back(), 1.01e-5);
-  EXPECT_GT(std::abs(soc.back() - soc.front()), 1e-3) << "the state of charge was to move";
+  EXPECT_NEAR(report["pack"]["soc"].get<double>(), soc.back(), 1.01e-5);
+  EXPECT_GT(std::abs(soc.back() - soc.front()), 1e-3) << "the state of charge must change";
 
   const ToolRun other =
       run_shell(fmt::format("/usr/bin/python3 {}/tests/vcan/compare_with_canmatrix.py {}/can/greybox_bms.dbc "
@@ -104,10 +103,10 @@ TEST(Vcan, MonitorAndCandumpShowOnANoisyBusWhatReplaySaysOfTheSameSamples) {
   EXPECT_EQ(other.exit_code, 0) << other.out << other.err;
   std::printf("%s", other.out.c_str());
 
-  // what was recorded on that bus tells the same when it is read again
+  // the recorded log gives the same report
   const auto again = run_tool("monitor file:" + (folder.path() / "record.log").string() + " --json -");
   ASSERT_EQ(again.exit_code, 0) << again.err;
-  auto live = told, replayed = nlohmann::json::parse(again.out);
+  auto live = report, replayed = nlohmann::json::parse(again.out);
   for (auto* json : {&live, &replayed}) {
     json->erase("source");
     json->erase("silent_s");

@@ -1,6 +1,6 @@
 /* Lets Debian 12's User-Mode Linux (6.1) run on processors whose extended state is larger than the 2,696 bytes that it
- * saves (AMX has 11,008): the host's kernel refuses to set a part of it with EFAULT. Preloaded, this ptrace() reads the
- * whole state, lays the caller's part over it and writes the whole. Elsewhere it changes nothing. */
+ * saves (AMX has 11,008). The host's kernel rejects a partial state with EFAULT. This preloaded ptrace() reads the
+ * whole state, copies the caller's part over it and writes the whole state. On other processors it has no effect. */
 #define _GNU_SOURCE
 #include <elf.h>
 #include <errno.h>
@@ -11,7 +11,7 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-/* As the C library does it: what is peeked comes back as the result. */
+/* As in the C library: a peeked word is returned as the result. */
 static long kernel_ptrace(long request, long pid, void* address, void* data) {
   long peeked = 0;
   const int peeks = request == PTRACE_PEEKTEXT || request == PTRACE_PEEKDATA || request == PTRACE_PEEKUSER;
