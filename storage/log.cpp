@@ -180,7 +180,7 @@ std::optional<Log::LoadedRecord> Log::load(std::uint8_t type, std::uint8_t known
   return std::nullopt;
 }
 
-/// Nothing: it cannot be read any more.
+/// Returns nothing if the record can no longer be read.
 std::optional<std::span<const std::uint8_t>> Log::read(const RecordLocation& record,
                                                        std::span<std::uint8_t, max_payload_bytes> into) const {
   const auto payload = into.first(record.length);
