@@ -180,12 +180,12 @@ std::optional<Log::LoadedRecord> Log::load(std::uint8_t type, std::uint8_t known
   return std::nullopt;
 }
 
-/// Nothing: it cannot be read any more.
+/// Returns nothing if the record can no longer be read.
 std::optional<std::span<const std::uint8_t>> Log::read(const RecordLocation& record,
                                                        std::span<std::uint8_t, max_payload_bytes> into) const {
   const auto payload = into.first(record.length);
   hal::flash_read(record.sector, (record.line + 1U) * line_bytes, payload);
-  // of what is in `into`, not of what another reading might give
+  // the checksum of `into`, because another read may differ
   const Line header = read_line(record.sector, record.line);
   Crc32 sum;
   sum.add(std::span(header).first(identity_bytes)).add(payload);

@@ -42,7 +42,7 @@ TEST(CellReadings, EqualTheCellsAtEverySupply) {
   for (double supply_v = 3.0; supply_v <= 3.55; supply_v += 0.05) {
     for (double cell_v = 1.5; cell_v <= 4.3; cell_v += 0.1) {
       EXPECT_NEAR(1e-6 * (Bench{.supply_v = supply_v, .cell_v = cell_v}.read().voltage_uv), cell_v, 0.0005 * cell_v)
-          << "a count of the reference at the maker's is 0.067 %, half of it its error";
+          << "one count of the manufacturer's reference value is 0.067 %; half of it is the error";
     }
     for (double current_a = -30; current_a <= 30; current_a += 5) {
       EXPECT_NEAR(1e-6 * (Bench{.supply_v = supply_v, .current_a = current_a}.read().current_ua), current_a,

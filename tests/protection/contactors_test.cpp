@@ -209,8 +209,8 @@ TEST(Precharge, FailsAtOnceWhenTheDcLinkIsSlowerThanItsCurve) {
                         {"a quarter slower", 0.62, 0, false},
                         {"twice as slow", 1, 0, true},
                         {"DC link shorted", 0.5, 1, true},
-                        {"a load that holds it at half", 0.5, 0.5, true},
-                        {"a load that holds it at 7/8", 0.5, 0.125, true}}) {
+                        {"a load that keeps it at half", 0.5, 0.5, true},
+                        {"a load that keeps it at 7/8", 0.5, 0.125, true}}) {
     ContactorBench b;
     b.time_constant_s = c.time_constant_s;
     b.load_fraction = c.load_fraction;
