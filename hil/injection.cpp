@@ -22,7 +22,7 @@ struct Kind {
 
 constexpr double latency_s = 0.5;      // of the samples and of the cycle of the message Faults
 constexpr double no_deadline_s = 1e9;  // depends on when the contactors next switch
-constexpr std::int32_t cell_high_uv = 4'050'000, cell_low_uv = cell_low_uv;
+constexpr std::int32_t cell_high_uv = 4'050'000, cell_low_uv = 1'700'000;
 constexpr Kind kinds[] = {
     {"drop", Value::probability, "", 0},
     {"corrupt", Value::probability, "", 0},
@@ -42,7 +42,7 @@ constexpr Kind kinds[] = {
     {"silence", Value::none, "SamplesMissing", 0.5 + 0.2},  // the table's delay and one sample at each end
 };
 
-[[noreturn]] void refuse(const std::string& text, const std::string& what) {
+[[noreturn]] void reject(const std::string& text, const std::string& what) {
   throw files::BadInput("--fault", 1, "'" + text + "': " + what);
 }
 
@@ -50,7 +50,7 @@ double number(const std::string& text, std::string_view part, const char* what) 
   double value = 0;
   const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
   if (error != std::errc{} || end != part.data() + part.size() || !(value >= 0))
-    refuse(text, fmt::format("expected {} instead of '{}'", what, part));
+    reject(text, fmt::format("expected {} instead of '{}'", what, part));
   return value;
 }
 
@@ -59,7 +59,7 @@ double number(const std::string& text, std::string_view part, const char* what) 
 Injection parse_injection(const std::string& text, std::size_t cells) {
   const std::string_view all = text;
   const std::size_t at = all.find('@');
-  if (at == std::string_view::npos) refuse(text, "expected NAME[=VALUE]@START[-END] in seconds");
+  if (at == std::string_view::npos) reject(text, "expected NAME[=VALUE]@START[-END] in seconds");
   const std::string_view what = all.substr(0, at), when = all.substr(at + 1);
   const std::size_t equals = what.find('=');
   const std::string name(what.substr(0, equals));
@@ -69,22 +69,22 @@ Injection parse_injection(const std::string& text, std::size_t cells) {
     if (k.name == name) kind = &k;
     names += (names.empty() ? "" : ", ") + std::string(k.name);
   }
-  if (kind == nullptr) refuse(text, "expected one of: " + names);
+  if (kind == nullptr) reject(text, "expected one of: " + names);
   Injection i{text, name, 0, 0, 1e300, kind->expected, kind->within_s + latency_s};
   const bool is_probability = kind->value == Value::probability;
   const char* example = is_probability ? "=0.01@60" : "=3@60";
   const char* expected_value = is_probability ? "a probability, 0 to 1" : "a cell, from 1";
   if ((kind->value == Value::none) != (equals == std::string_view::npos))
-    refuse(text, kind->value == Value::none ? "takes no value" : "expected a value, as in " + name + example);
+    reject(text, kind->value == Value::none ? "takes no value" : "expected a value, as in " + name + example);
   if (kind->value != Value::none) i.value = number(text, what.substr(equals + 1), expected_value);
-  if (is_probability && i.value > 1) refuse(text, "expected a probability, 0 to 1");
+  if (is_probability && i.value > 1) reject(text, "expected a probability, 0 to 1");
   const double most = static_cast<double>(name == "sense_wire" ? cells - 1 : cells);
   if (kind->value == Value::cell && !(i.value >= 1 && i.value <= most && i.value == static_cast<int>(i.value)))
-    refuse(text, fmt::format("expected a cell, 1 to {}", most));
+    reject(text, fmt::format("expected a cell, 1 to {}", most));
   const std::size_t dash = when.find('-');
   i.from_s = number(text, when.substr(0, dash), "seconds");
   if (dash != std::string_view::npos) i.to_s = number(text, when.substr(dash + 1), "seconds");
-  if (!(i.to_s > i.from_s)) refuse(text, "expected an end after the start");
+  if (!(i.to_s > i.from_s)) reject(text, "expected an end after the start");
   return i;
 }
 
