@@ -129,7 +129,7 @@ std::string ambiguous_text(const Diagnosis& d, const RecordingFacts& facts) {
   const Finding& f = d.findings.front();
   std::vector<std::string> parts = {claim(f.setting)};
   for (const std::size_t m : f.equivalent_to) parts.push_back(brief_of(m));
-  return fmt::format("{} Either {}. This recording cannot distinguish them; another experiment can.",
+  return fmt::format("{} Either {}. This recording cannot distinguish them. Another experiment is needed.",
                      model_error(facts), joined(parts, "or"));
 }
 

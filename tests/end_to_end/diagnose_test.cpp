@@ -111,7 +111,7 @@ TEST_F(DiagnoseTool, TheShiftItselfHasNoMismatchAndLeavesTheCellUnchanged) {
   EXPECT_EQ(r["verdict"], "NO_MISMATCH");
   EXPECT_TRUE(r["mechanisms"].empty());
   EXPECT_GT(r["detection_limits"].size(), 10U);
-  EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("it would have shown"));
+  EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("would have revealed"));
   EXPECT_TRUE(r["baseline"]["holdout"].is_null());
   EXPECT_EQ(r["baseline"]["recording"], r["extended"]["recording"]);
   EXPECT_THAT(content(path("x.toml")), HasSubstr("name = \"table9\"\n"));
