@@ -1,8 +1,8 @@
-// Simpler rules on the same cases, scored by the same score: what the diagnosis has to be better than.
+// Simpler rules on the same cases, with the same score: the diagnosis must be better than these.
 //
-// Each gets the recording as the diagnosis prepares it: bad readings taken out, the current quieted where it is
-// constant. Each knows the noise floor that the diagnosis begins with (converter, cell file's tolerance and drift).
-// None looks for data faults. README.md tells each in a paragraph.
+// Each rule gets the recording as the diagnosis prepares it: invalid readings removed, sensor noise removed from the
+// current at constant load. Each knows the noise floor that the diagnosis begins with (converter, tolerance and drift
+// of the cell file). They do not check for data faults. README.md describes each rule.
 #pragma once
 
 #include <array>
@@ -11,31 +11,31 @@
 
 namespace bms::benchmark {
 
-/// RMS of a residual that is a mismatch, in noise floors: in quarters, the least that calls no more than a tenth of the
-/// development split's nulls one.
+/// RMS of the residual, in noise floors, above which a rule reports a mismatch: the smallest multiple of 0.25 with
+/// mismatches in at most a tenth of the nulls of the development split.
 inline constexpr double frozen_factor = 2, refit_factor = 0.75;
 
-/// The cell file as it is. A residual above the factor is UNKNOWN: it names nothing.
+/// The cell file without any change. A residual above the factor is UNKNOWN; no cause is named.
 Outcome frozen_model(const truth::Case& c);
 
-/// Every base parameter refitted to the recording, within the cell file's tolerance; the hold-out is predicted with
-/// them. Names nothing.
+/// All base parameters are fitted to the recording within the tolerance of the cell file; the hold-out is predicted
+/// with them. No cause is named.
 Outcome base_refit(const truth::Case& c);
 
-/// The same, ten times as free.
+/// The same with ten times the tolerance.
 Outcome free_refit(const truth::Case& c);
 
-/// Mechanisms added as long as AICc falls, which takes the residual for white noise of unknown variance. At most five.
+/// Mechanisms are added as long as AICc falls, at most five. AICc assumes white noise of unknown variance.
 Outcome aicc_forward(const truth::Case& c);
 
-/// The mechanism whose signature has the largest cosine with the frozen model's residual, as both are.
+/// The mechanism whose signature has the largest cosine with the residual of the frozen model, without whitening.
 Outcome nearest_signature(const truth::Case& c);
 
 struct Method {
   const char* name;
   Outcome (*run)(const truth::Case& c);
 };
-/// Ours first.
+/// This project's diagnosis first.
 inline constexpr std::array<Method, 6> methods = {
     Method{"greybox-bms", run_case},      Method{"frozen", frozen_model},
     Method{"base refit", base_refit},     Method{"free refit", free_refit},

@@ -1,7 +1,7 @@
-// The concealed benchmark: every case of a split through the diagnosis and through simpler rules, a line per case, then
-// the tables.
+// The concealed benchmark: runs the diagnosis and simpler rules on every case of a split, prints a line per case and
+// then the tables.
 //
-//   0 done; 2 bad usage; 3 a fault of ours
+// Exit code: 0 done; 2 bad usage; 3 internal error
 #include <atomic>
 #include <cstdio>
 #include <exception>
@@ -48,7 +48,7 @@ std::string line_of(std::size_t index, const Outcome& o) {
   for (const auto& set : o.sets) found += (found.empty() ? "" : " + ") + joined(set, "~");
   std::string line = fmt::format(
       "{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n",
-      index, o.answer.kind, joined(o.answer.ids, "+"), o.answer.strength, o.answer.profile,
+      index, truth::name_of(o.answer.kind), joined(o.answer.ids, "+"), o.answer.strength, o.answer.profile,
       bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v,
       1e3 * o.holdout_floor_v, o.wall_s, o.figures);
   if (o.next) {
@@ -71,7 +71,7 @@ std::string json_of(const Options& options, const std::vector<Column>& columns) 
   for (const Column& c : columns) {
     Json& list = json["methods"][c.method] = Json::array();
     for (const Outcome& o : c.outcomes) {
-      list.push_back({{"kind", o.answer.kind},
+      list.push_back({{"kind", truth::name_of(o.answer.kind)},
                       {"ids", o.answer.ids},
                       {"strength", o.answer.strength},
                       {"profile", o.answer.profile},
@@ -95,7 +95,7 @@ void run(const Options& options) {
   const std::size_t cases = truth::case_count(split);
   if (options.first >= cases) throw bms::files::BadInput("--first", 1, fmt::format("there are {} cases", cases));
   const std::size_t count = std::min(options.count.value_or(cases), cases - options.first);
-  // a run takes long: is there a place for its tables?
+  // a run takes long: check first that the file has a place for the tables
   if (!options.readme.empty()) bms::files::CommittedFigures(options.readme, options.split);
 
   std::vector<Column> columns;
@@ -108,7 +108,7 @@ void run(const Options& options) {
   const auto work = [&] {
     for (std::size_t k = next++; k < count; k = next++) {
       const truth::Case c = truth::make_case(split, options.seed, options.first + k);
-      if (!options.kind.empty() && c.answer.kind != options.kind) continue;
+      if (!options.kind.empty() && options.kind != truth::name_of(c.answer.kind)) continue;
       for (std::size_t m = 0; m < columns.size(); ++m) columns[m].outcomes[k] = bms::benchmark::methods[m].run(c);
       const std::scoped_lock lock(printing);
       fmt::print("{}", line_of(options.first + k, columns.front().outcomes[k]));
@@ -119,7 +119,7 @@ void run(const Options& options) {
   for (unsigned k = 0; k < std::max(1U, std::thread::hardware_concurrency()); ++k) threads.emplace_back(work);
   for (std::thread& t : threads) t.join();
 
-  for (Column& c : columns) std::erase_if(c.outcomes, [](const Outcome& o) { return o.answer.kind.empty(); });
+  for (Column& c : columns) std::erase_if(c.outcomes, [](const Outcome& o) { return o.name.empty(); });
   const std::string report = bms::benchmark::report(options.split, options.seed, columns);
   fmt::print("\n{}", report);
   if (!options.json.empty()) bms::files::write_file(options.json, json_of(options, columns));
@@ -129,19 +129,19 @@ void run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"The diagnosis and simpler rules on concealed cases, scored by what was concealed"};
+  CLI::App app{"Run the diagnosis and simpler rules on concealed cases and score their answers"};
   app.name("benchmark");
   app.footer("Example: benchmark development 1 --readme benchmark/README.md");
   Options o;
-  app.add_option("split", o.split, "development: cases to look at; final: cases to count once")
+  app.add_option("split", o.split, "development: cases for development; final: cases that are run once")
       ->required()
       ->check(CLI::IsMember({"development", "final"}));
-  app.add_option("seed", o.seed, "of the cases")->required()->type_name("SEED");
-  app.add_option("--first", o.first, "first case")->capture_default_str();
-  app.add_option("--count", o.count, "how many; without it all that are left")->check(CLI::PositiveNumber);
-  app.add_option("--kind", o.kind, "only cases of this kind")
+  app.add_option("seed", o.seed, "seed of the cases")->required()->type_name("SEED");
+  app.add_option("--first", o.first, "index of the first case")->capture_default_str();
+  app.add_option("--count", o.count, "number of cases; default: all from the first on")->check(CLI::PositiveNumber);
+  app.add_option("--kind", o.kind, "run only cases of this kind")
       ->check(CLI::IsMember(std::vector<std::string>(truth::case_kinds.begin(), truth::case_kinds.end())));
-  app.add_flag("--no-baselines", o.no_baselines, "the diagnosis alone");
+  app.add_flag("--no-baselines", o.no_baselines, "run only the diagnosis");
   app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
   app.add_option("--readme", o.readme,
                  "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")

@@ -11,21 +11,11 @@ namespace bms::benchmark {
 
 namespace {
 
-std::vector<std::vector<std::string>> sets_of(const diagnosis::Diagnosis& d) {
-  std::vector<std::vector<std::string>> sets;
-  const auto id = [](std::size_t m) { return std::string(model::catalogue[m].id); };
-  for (const diagnosis::Finding& f : d.findings) {
-    auto& set = sets.emplace_back(1, id(f.setting.index));
-    for (const std::size_t e : f.equivalent_to) set.push_back(id(e));
-  }
-  return sets;
-}
-
 bool contains(const std::vector<std::string>& list, const std::string& id) {
   return std::find(list.begin(), list.end(), id) != list.end();
 }
 
-/// As the technician does it: the profile at the recording's own rate, references where it has them.
+/// The profile at the sampling rate of the recording, with the readings of the reference instruments that it asks for.
 diagnosis::PreparedRecording carried_out(const truth::Case& c, const model::CellParameters<>& cell,
                                          const diagnosis::NextExperiment& next) {
   const double step_s = std::min(next.step_s, c.recording.time_s[1] - c.recording.time_s[0]);
@@ -55,6 +45,16 @@ diagnosis::PreparedRecording carried_out(const truth::Case& c, const model::Cell
 }
 
 }  // namespace
+
+std::vector<std::vector<std::string>> sets_of(const diagnosis::Diagnosis& d) {
+  std::vector<std::vector<std::string>> sets;
+  const auto id = [](std::size_t m) { return std::string(model::catalogue[m].id); };
+  for (const diagnosis::Finding& f : d.findings) {
+    auto& set = sets.emplace_back(1, id(f.setting.index));
+    for (const std::size_t e : f.equivalent_to) set.push_back(id(e));
+  }
+  return sets;
+}
 
 std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell,
                                   const diagnosis::PreparedRecording& recording, const diagnosis::Diagnosis& first) {

@@ -1,4 +1,4 @@
-// The experiment that an undecided diagnosis asks for, run on the concealed cell, and the diagnosis of both recordings
+// The experiment that an ambiguous diagnosis proposes, run on the concealed cell, and the diagnosis of both recordings
 // together.
 #pragma once
 
@@ -12,14 +12,18 @@
 namespace bms::benchmark {
 
 struct FollowUp {
-  std::string profile;  ///< empty: none was named
+  std::string profile;  ///< empty: no experiment was proposed
   double expected_gain = 0, duration_s = 0, plan_wall_s = 0;
-  std::vector<std::vector<std::string>> sets;  ///< of both recordings: each finding and what cannot be told from it
-  bool separated = false;  ///< the truth is named, and nothing of what the first diagnosis confused it with
+  /// For each finding from both recordings: the finding and its rivals.
+  std::vector<std::vector<std::string>> sets;
+  bool separated = false;  ///< the true effect is named and no rival of the first diagnosis
 };
 
-/// Nothing unless the diagnosis is ambiguous. The answer is looked at when all is done.
+/// Empty unless the diagnosis is ambiguous. The answer is used only after the second diagnosis.
 std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell,
                                   const diagnosis::PreparedRecording& recording, const diagnosis::Diagnosis& first);
+
+/// For each finding: its id and the ids of its rivals.
+std::vector<std::vector<std::string>> sets_of(const diagnosis::Diagnosis& d);
 
 }  // namespace bms::benchmark

@@ -26,6 +26,23 @@ double overlap(const std::vector<model::Span>& spans, double start_s, double end
   return all > 0 ? inside / all : 0;
 }
 
+std::string id_of(std::size_t mechanism) { return std::string(model::catalogue[mechanism].id); }
+
+/// The figures behind the decision.
+std::string figures_of(const diagnosis::Diagnosis& d) {
+  std::string figures =
+      fmt::format("base {:.0f} best {:.0f} remaining {:.0f} ({}) adequacy {:.2f} fast {:.2f} far {:.4f}", d.base_cost,
+                  d.best_cost, d.remaining, d.remaining_goes_with, d.adequacy, d.fast_excess, d.far_out);
+  for (const diagnosis::Finding& f : d.findings) {
+    figures += fmt::format(" | {} {:.0f}", id_of(f.setting.index), f.gain);
+    for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p)
+      figures += fmt::format(" {:.3g}", f.setting.value[p]);
+  }
+  if (d.findings.empty() && !d.candidates.empty())
+    figures += fmt::format(" | nearest {} {:.1f}", id_of(d.candidates.front().ids.front()), d.candidates.front().gain);
+  return figures;
+}
+
 }  // namespace
 
 model::CellParameters<> cell_of(const truth::CalibratedCell& c) {
@@ -67,30 +84,18 @@ void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& s
 
 Outcome run_case(const truth::Case& c) {
   const model::CellParameters<> cell = cell_of(c.cell);
+  const diagnosis::PreparedRecording recording =
+      record_of(c.recording, c.given_initial_soc, cell.tolerance.initial_soc);
   const auto begin = std::chrono::steady_clock::now();
-  const diagnosis::Diagnosis d =
-      diagnosis::diagnose(cell, {}, {record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc)});
+  const diagnosis::Diagnosis d = diagnosis::diagnose(cell, {}, {recording});
   Outcome o;
   o.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   o.name = c.name;
   o.verdict = d.verdict;
-  const auto id = [](std::size_t m) { return std::string(model::catalogue[m].id); };
-  for (const diagnosis::Finding& f : d.findings) {
-    o.found.push_back(id(f.setting.index));
-    auto& set = o.sets.emplace_back(1, id(f.setting.index));
-    for (const std::size_t e : f.equivalent_to) set.push_back(id(e));
-  }
+  o.sets = sets_of(d);
+  for (const auto& set : o.sets) o.found.push_back(set.front());
   o.probability = d.findings.empty() ? 0 : d.findings.front().probability;
-  o.figures =
-      fmt::format("base {:.0f} best {:.0f} remaining {:.0f} ({}) adequacy {:.2f} fast {:.2f} far {:.4f}", d.base_cost,
-                  d.best_cost, d.remaining, d.remaining_goes_with, d.adequacy, d.fast_excess, d.far_out);
-  for (const diagnosis::Finding& f : d.findings) {
-    o.figures += fmt::format(" | {} {:.0f}", id(f.setting.index), f.gain);
-    for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p)
-      o.figures += fmt::format(" {:.3g}", f.setting.value[p]);
-  }
-  if (d.findings.empty() && !d.candidates.empty())
-    o.figures += fmt::format(" | nearest {} {:.1f}", id(d.candidates.front().ids.front()), d.candidates.front().gain);
+  o.figures = figures_of(d);
 
   std::vector<double> holdout_v;
   if (!c.holdout.time_s.empty()) {
@@ -98,7 +103,7 @@ Outcome run_case(const truth::Case& c) {
                                    record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
   compare(o, c, d.spans, holdout_v);
-  o.next = follow_up(c, cell, record_of(c.recording, c.believed_initial_soc, cell.tolerance.initial_soc), d);
+  o.next = follow_up(c, cell, recording, d);
   return o;
 }
 

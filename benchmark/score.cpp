@@ -3,13 +3,101 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace bms::benchmark {
 
 namespace {
 
+using diagnosis::Verdict;
+using truth::CaseKind;
+
+/// Effects at this strength [detection limits] and above count as detectable.
+constexpr double detectable = 2;
+
+/// Hold-out error, in noise floors, up to which a prediction counts as good; or the part of the error above the floor
+/// that may remain.
+constexpr double good_holdout_floors = 1.3, good_holdout_part = 0.1;
+
 bool contains(const std::vector<std::string>& list, const std::string& id) {
   return std::find(list.begin(), list.end(), id) != list.end();
+}
+
+/// Returns true if the verdict names causes.
+bool named(const Outcome& o) {
+  return !o.found.empty() &&
+         (o.verdict == Verdict::cause || o.verdict == Verdict::causes || o.verdict == Verdict::ambiguous);
+}
+
+/// Returns true if finding k is the effect `id`, is of its class, or cannot be distinguished from it.
+bool finds(const Outcome& o, std::size_t k, const std::string& id) {
+  return contains(o.sets[k], id) || class_of(o.found[k]) == class_of(id);
+}
+
+/// Expected calibration error: findings in five bins of their probability.
+class Calibration {
+ public:
+  void add(double probability, bool right) {
+    Bin& b = bins_[static_cast<std::size_t>(std::min(probability * 5, 4.0))];
+    b.probability += probability;
+    b.right += right ? 1 : 0;
+    ++count_;
+  }
+  std::size_t count() const { return count_; }
+  double error() const {
+    double error = 0;
+    for (const Bin& b : bins_) {
+      if (count_ > 0) error += std::abs(b.probability - b.right) / static_cast<double>(count_);
+    }
+    return error;
+  }
+
+ private:
+  struct Bin {
+    double probability = 0, right = 0;
+  };
+  std::array<Bin, 5> bins_{};
+  std::size_t count_ = 0;
+};
+
+void count_holdout(const Outcome& o, Share& share) {
+  if (o.holdout_before_v <= 0 || !o.answer.repeats_in_holdout) return;
+  const double floor = o.holdout_floor_v;
+  const double before = std::max(0.0, o.holdout_before_v * o.holdout_before_v - floor * floor);
+  const double after = std::max(0.0, o.holdout_after_v * o.holdout_after_v - floor * floor);
+  share.count(o.holdout_after_v <= good_holdout_floors * floor || after <= good_holdout_part * before);
+}
+
+/// A detectable single effect that raised an alarm. Returns the size of the largest reported set.
+std::size_t count_findings(const Outcome& o, Score& s) {
+  const std::string& id = o.answer.ids.front();
+  s.first.count(named(o) && o.found.front() == id);
+  s.first_class.count(named(o) && class_of(o.found.front()) == class_of(id));
+  bool in = false;
+  std::size_t size = 0;
+  for (const auto& set : o.sets) {
+    in = in || contains(set, id);
+    size = std::max(size, set.size());
+  }
+  s.in_set.count(named(o) && in);
+  return size;
+}
+
+void count_pair(const Outcome& o, Score& s) {
+  const std::vector<std::string>& ids = o.answer.ids;
+  std::size_t right = 0;
+  bool wrong = false;
+  for (std::size_t k = 0; k < o.found.size(); ++k) {
+    const bool hit = std::any_of(ids.begin(), ids.end(), [&](const std::string& id) { return finds(o, k, id); });
+    wrong = wrong || !hit;
+  }
+  for (const std::string& id : ids) {
+    bool hit = false;
+    for (std::size_t k = 0; k < o.found.size(); ++k) hit = hit || finds(o, k, id);
+    right += hit ? 1 : 0;
+  }
+  s.pair_both.count(named(o) && right == 2);
+  s.pair_one_none_wrong.count(named(o) && right >= 1 && !wrong);
 }
 
 }  // namespace
@@ -24,85 +112,44 @@ Interval wilson(const Share& share) {
 }
 
 std::string class_of(const std::string& id) {
-  if (id == "voltage_gain") return "voltage_offset";
-  if (id == "coulombic_loss" || id == "leakage") return "current_offset";
+  static constexpr std::array<std::pair<const char*, const char*>, 3> classes = {
+      {{"voltage_gain", "voltage_offset"}, {"coulombic_loss", "current_offset"}, {"leakage", "current_offset"}}};
+  for (const auto& [member, name] : classes) {
+    if (id == member) return name;
+  }
   return id;
 }
 
+bool no_alarm(const Outcome& o) { return o.verdict == Verdict::no_mismatch || o.verdict == Verdict::not_testable; }
+
 Score score(const std::vector<Outcome>& outcomes) {
-  using diagnosis::Verdict;
   Score s;
   std::vector<double> overlaps;
   double set_sizes = 0, wall_s = 0;
-  struct Bin {
-    double said = 0, right = 0, count = 0;
-  };
-  std::array<Bin, 5> bins{};
+  Calibration calibration;
   for (const Outcome& o : outcomes) {
     wall_s += o.wall_s;
-    const bool quiet = o.verdict == Verdict::no_mismatch || o.verdict == Verdict::not_testable;
-    const auto& ids = o.answer.ids;
-    if (o.answer.kind == "null") s.false_alarms.count(!quiet);
-    if (o.answer.kind == "data_fault") s.data_fault.count(o.verdict == Verdict::data_fault);
-    if (o.answer.kind == "outside" && o.answer.strength >= 2) s.outside_unknown.count(o.verdict == Verdict::unknown);
-    const bool named = !o.found.empty() &&
-                       (o.verdict == Verdict::cause || o.verdict == Verdict::causes || o.verdict == Verdict::ambiguous);
-    if (o.answer.kind == "single") {
-      s.detected_all.count(!quiet);
-      if (o.answer.strength >= 2) {
-        s.detected.count(!quiet);
-        if (!quiet) {
-          s.first.count(named && o.found.front() == ids.front());
-          s.first_class.count(named && class_of(o.found.front()) == class_of(ids.front()));
-          bool in = false;
-          std::size_t size = 0;
-          for (const auto& set : o.sets) {
-            in = in || contains(set, ids.front());
-            size = std::max(size, set.size());
-          }
-          s.in_set.count(named && in);
-          set_sizes += static_cast<double>(size);
-        }
-        if (!quiet) overlaps.push_back(o.overlap);
-        if (o.holdout_before_v > 0 && ids.front() != "contact_intermittent") {
-          const double floor = o.holdout_floor_v,
-                       before = std::max(0.0, o.holdout_before_v * o.holdout_before_v - floor * floor),
-                       after = std::max(0.0, o.holdout_after_v * o.holdout_after_v - floor * floor);
-          s.holdout.count(o.holdout_after_v <= 1.3 * floor || after <= 0.1 * before);
-        }
+    const CaseKind kind = o.answer.kind;
+    const bool strong = o.answer.strength >= detectable, alarm = !no_alarm(o);
+    if (kind == CaseKind::null) s.false_alarms.count(alarm);
+    if (kind == CaseKind::data_fault) s.data_fault.count(o.verdict == Verdict::data_fault);
+    if (kind == CaseKind::outside && strong) s.outside_unknown.count(o.verdict == Verdict::unknown);
+    if (kind == CaseKind::single) s.detected_all.count(alarm);
+    if (kind == CaseKind::single && strong) {
+      s.detected.count(alarm);
+      if (alarm) {
+        set_sizes += static_cast<double>(count_findings(o, s));
+        overlaps.push_back(o.overlap);
       }
+      count_holdout(o, s.holdout);
     }
-    if (o.answer.kind == "single" && o.next) s.separated.count(o.next->separated);
-    if (o.answer.kind == "pair" && ids.size() == 2) {
-      std::size_t right = 0;
-      bool wrong = false;
-      for (std::size_t k = 0; k < o.found.size(); ++k) {
-        bool hit = false;
-        for (const std::string& id : ids) hit = hit || contains(o.sets[k], id) || class_of(o.found[k]) == class_of(id);
-        wrong = wrong || !hit;
-      }
-      for (const std::string& id : ids) {
-        bool hit = false;
-        for (std::size_t k = 0; k < o.found.size(); ++k)
-          hit = hit || contains(o.sets[k], id) || class_of(o.found[k]) == class_of(id);
-        right += hit ? 1 : 0;
-      }
-      s.pair_both.count(named && right == 2);
-      s.pair_one_none_wrong.count(named && right >= 1 && !wrong);
-    }
-    if (named && (o.answer.kind == "single" || o.answer.kind == "null" || o.answer.kind == "outside")) {
-      Bin& b = bins[static_cast<std::size_t>(std::min(o.probability * 5, 4.0))];
-      b.said += o.probability;
-      b.right += o.answer.kind == "single" && o.found.front() == ids.front() ? 1 : 0;
-      b.count += 1;
-      ++s.named;
-    }
+    if (kind == CaseKind::single && o.next) s.separated.count(o.next->separated);
+    if (kind == CaseKind::pair && o.answer.ids.size() == 2) count_pair(o, s);
+    if (named(o) && (kind == CaseKind::single || kind == CaseKind::null || kind == CaseKind::outside))
+      calibration.add(o.probability, kind == CaseKind::single && o.found.front() == o.answer.ids.front());
   }
-  double all = 0;
-  for (const Bin& b : bins) all += b.count;
-  for (const Bin& b : bins) {
-    if (b.count > 0) s.calibration_error += std::abs(b.said - b.right) / all;
-  }
+  s.named = calibration.count();
+  s.calibration_error = calibration.error();
   if (!overlaps.empty()) {
     std::sort(overlaps.begin(), overlaps.end());
     s.median_overlap = overlaps[overlaps.size() / 2];

@@ -13,6 +13,8 @@ namespace bms::benchmark {
 
 namespace {
 
+constexpr const char *nothing = "(nothing)", *outside = "(outside the catalogue)";
+
 std::string text(const Share& s) {
   if (s.of == 0) return "-";
   const Interval i = wilson(s);
@@ -24,7 +26,7 @@ struct Row {
   std::string (*cell)(const Score&);
 };
 
-// What is required is what the benchmark was made to ask; it does not follow from what was measured.
+// The requirements were set before the benchmark was run; they do not follow from its results.
 constexpr std::array rows = {
     Row{"false alarms on nulls", "<= 2 %", [](const Score& s) { return text(s.false_alarms); }},
     Row{"detected at twice the detection limit and above", ">= 95 %", [](const Score& s) { return text(s.detected); }},
@@ -52,13 +54,30 @@ constexpr std::array rows = {
     Row{"seconds a case", "", [](const Score& s) { return fmt::format("{:.1f}", s.mean_wall_s); }},
 };
 
-bool quiet(const Outcome& o) {
-  return o.verdict == diagnosis::Verdict::no_mismatch || o.verdict == diagnosis::Verdict::not_testable;
+/// The class of the true effect; an effect outside the catalogue has no class.
+std::string truth_of(const truth::Answer& answer) {
+  switch (answer.kind) {
+    case truth::CaseKind::null:
+      return nothing;
+    case truth::CaseKind::outside:
+      return outside;
+    default:
+      return class_of(answer.ids.front());
+  }
+}
+
+std::string named_first(const Outcome& o) {
+  if (no_alarm(o)) return nothing;
+  if (o.found.empty() || o.verdict == diagnosis::Verdict::unknown) return diagnosis::name_of(o.verdict);
+  return class_of(o.found.front());
 }
 
 std::string heading(const std::vector<Column>& columns, const std::string& first) {
   std::string line = "| " + first + " |", rule = "|---|";
-  for (const Column& c : columns) line += " " + c.method + " |", rule += "---|";
+  for (const Column& c : columns) {
+    line += " " + c.method + " |";
+    rule += "---|";
+  }
   return line + "\n" + rule + "\n";
 }
 
@@ -78,24 +97,19 @@ std::string figures_table(const std::vector<Column>& columns) {
 }
 
 std::string confusion_table(const std::vector<Outcome>& outcomes) {
-  std::map<std::string, std::map<std::string, std::size_t>> said;
+  std::map<std::string, std::map<std::string, std::size_t>> counts_of;
   for (const Outcome& o : outcomes) {
-    const bool known = o.answer.kind == "single" && o.answer.strength >= 2;
-    if (!known && o.answer.kind != "null" && o.answer.kind != "outside") continue;
-    // of what is outside, the ids are no class of ours
-    const std::string truth = known                     ? class_of(o.answer.ids.front())
-                              : o.answer.kind == "null" ? "(nothing)"
-                                                        : "(outside the catalogue)";
-    const bool named = !o.found.empty() && o.verdict != diagnosis::Verdict::unknown;
-    ++said[truth][quiet(o) ? "(nothing)" : named ? class_of(o.found.front()) : diagnosis::name_of(o.verdict)];
+    const bool strong = o.answer.kind == truth::CaseKind::single && o.answer.strength >= 2;
+    if (strong || o.answer.kind == truth::CaseKind::null || o.answer.kind == truth::CaseKind::outside)
+      ++counts_of[truth_of(o.answer)][named_first(o)];
   }
   std::string table = "| truth | cases | right | else |\n|---|---|---|---|\n";
-  for (const auto& [truth, counts] : said) {
+  for (const auto& [truth, counts] : counts_of) {
     std::size_t all = 0, right = 0;
     std::vector<std::pair<std::size_t, std::string>> others;
     for (const auto& [name, count] : counts) {
       all += count;
-      const bool same = name == truth || (truth == "(outside the catalogue)" && name == "UNKNOWN");
+      const bool same = name == truth || (truth == outside && name == diagnosis::name_of(diagnosis::Verdict::unknown));
       if (same)
         right = count;
       else
@@ -115,7 +129,7 @@ std::string detection_table(const std::vector<Column>& columns) {
     double from, to;
   };
   std::string table = heading(columns, "strength");
-  // some effects are plain to see at any size worth naming
+  // some effects are clearly visible at every amplitude worth reporting
   for (const Bin& bin : {Bin{"below 0.5", 0, 0.5}, Bin{"0.5 to 1", 0.5, 1}, Bin{"1 to 2", 1, 2}, Bin{"2 to 4", 2, 4},
                          Bin{"4 to 8", 4, 8}, Bin{"above 8", 8, 1e300}}) {
     std::string line = fmt::format("| {} |", bin.text);
@@ -123,8 +137,8 @@ std::string detection_table(const std::vector<Column>& columns) {
     for (const Column& c : columns) {
       Share detected;
       for (const Outcome& o : c.outcomes) {
-        if (o.answer.kind == "single" && o.answer.strength >= bin.from && o.answer.strength < bin.to)
-          detected.count(!quiet(o));
+        if (o.answer.kind == truth::CaseKind::single && o.answer.strength >= bin.from && o.answer.strength < bin.to)
+          detected.count(!no_alarm(o));
       }
       cases = std::max(cases, detected.of);
       line += " " + text(detected) + " |";

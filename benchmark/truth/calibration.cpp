@@ -9,10 +9,10 @@ namespace bms::benchmark::truth {
 
 namespace {
 
-constexpr int grid = 200;  // edges lie on whole half percents
+constexpr int grid = 200;  // edges lie on multiples of 0.5 %
 
-/// Splits where the straight line is worst until it is good or the edges are used up. error(left, right, at): of the
-/// line at `at`.
+/// Splits where the straight line has its largest error, until that error is below `good` or there are `most` edges.
+/// error(left, right, at): error at `at` of the line from left to right.
 std::vector<double> place_edges(int first, std::size_t least, std::size_t most, double good,
                                 const std::function<double(double, double, double)>& error) {
   std::vector<int> edges = {first, grid};
@@ -23,7 +23,10 @@ std::vector<double> place_edges(int first, std::size_t least, std::size_t most, 
     for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
       for (int at = edges[k] + 2; at <= edges[k + 1] - 2; ++at) {
         const double e = std::abs(error(soc(edges[k]), soc(edges[k + 1]), soc(at)));
-        if (e > worst) worst = e, where = at;
+        if (e > worst) {
+          worst = e;
+          where = at;
+        }
       }
     }
     if (where < 0 || (worst < good && edges.size() >= least)) break;
@@ -38,29 +41,34 @@ double on_line(double left, double right, double at, double left_value, double r
   return left_value + (at - left) / (right - left) * (right_value - left_value);
 }
 
-/// Values at the edges whose connecting lines fit best between 2 % and 98 %, each place with its weight.
+/// Values at the edges whose connecting lines fit best between 2 % and 98 % SOC; weight: of each place.
 std::vector<double> fit_lines(const std::vector<double>& edges, const std::function<double(double)>& value,
                               const std::function<double(double)>& weight) {
   const std::size_t n = edges.size();
-  std::vector<double> diagonal(n, 0.0), beside(n, 0.0), right_side(n, 0.0);
+  std::vector<double> diagonal(n, 0.0), off_diagonal(n, 0.0), right_side(n, 0.0);
   std::size_t k = 0;
   for (double soc = std::max(0.02, edges.front()); soc <= 0.98; soc += 0.001) {
     while (k + 2 < n && soc > edges[k + 1]) ++k;
     const double b = (soc - edges[k]) / (edges[k + 1] - edges[k]), a = 1 - b, w = weight(soc);
-    diagonal[k] += w * a * a, diagonal[k + 1] += w * b * b, beside[k] += w * a * b;
-    right_side[k] += w * a * value(soc), right_side[k + 1] += w * b * value(soc);
+    diagonal[k] += w * a * a;
+    diagonal[k + 1] += w * b * b;
+    off_diagonal[k] += w * a * b;
+    right_side[k] += w * a * value(soc);
+    right_side[k + 1] += w * b * value(soc);
   }
-  for (std::size_t e = 0; e < n; ++e) {  // a little towards the curve itself, for the ends
-    const double hold = 0.5 * weight(edges[e]);
-    diagonal[e] += hold, right_side[e] += hold * value(edges[e]);
+  for (std::size_t e = 0; e < n; ++e) {  // a small weight on the curve itself, for the ends
+    const double own = 0.5 * weight(edges[e]);
+    diagonal[e] += own;
+    right_side[e] += own * value(edges[e]);
   }
   for (std::size_t e = 1; e < n; ++e) {
-    const double share = beside[e - 1] / diagonal[e - 1];
-    diagonal[e] -= share * beside[e - 1], right_side[e] -= share * right_side[e - 1];
+    const double share = off_diagonal[e - 1] / diagonal[e - 1];
+    diagonal[e] -= share * off_diagonal[e - 1];
+    right_side[e] -= share * right_side[e - 1];
   }
   std::vector<double> values(n);
   for (std::size_t e = n; e-- > 0;)
-    values[e] = (right_side[e] - (e + 1 < n ? beside[e] * values[e + 1] : 0)) / diagonal[e];
+    values[e] = (right_side[e] - (e + 1 < n ? off_diagonal[e] * values[e + 1] : 0)) / diagonal[e];
   return values;
 }
 
@@ -72,8 +80,7 @@ CalibratedCell calibrate(const HealthyCell& cell, double share, plant::Random& r
 
   const Curve& ocv = cell.ocv_v;
   made.ocv_soc =
-      place_edges(0, 10, 20, between(random, 0.0015, 0.003),  // halved by the fit
-
+      place_edges(0, 10, 20, between(random, 0.0015, 0.003),  // the fit halves it
                   [&](double l, double r, double at) { return on_line(l, r, at, ocv.at(l), ocv.at(r)) - ocv.at(at); });
   const SmoothRandom ocv_error(random), r0_error(random), r1_error(random), c1_error(random);
   std::vector<double> edge_v = fit_lines(
@@ -83,7 +90,7 @@ CalibratedCell calibrate(const HealthyCell& cell, double share, plant::Random& r
   double left_v = edge_v[0];
   for (std::size_t k = 0; k + 1 < made.ocv_soc.size(); ++k) {
     const double left = made.ocv_soc[k], width = made.ocv_soc[k + 1] - left;
-    const double right_v = std::max(edge_v[k + 1], left_v + 0.0005 * width);  // a cell file rises
+    const double right_v = std::max(edge_v[k + 1], left_v + 0.0005 * width);  // the OCV of a cell file rises
     made.ocv_b1_v.push_back((right_v - left_v) / width);
     made.ocv_b0_v.push_back(left_v - made.ocv_b1_v.back() * left);
     left_v = right_v;
@@ -95,12 +102,14 @@ CalibratedCell calibrate(const HealthyCell& cell, double share, plant::Random& r
     };
     return std::max({off(cell.r0_ohm), off(cell.r1_ohm), 0.6 * off(cell.c1_f)});
   });
-  const auto fit = [&](const Curve& curve) {  // in proportion
+  const auto fit = [&](const Curve& curve) {  // relative error
     return fit_lines(
         made.rc_soc, [&](double soc) { return curve.at(soc); },
         [&](double soc) { return 1 / (curve.at(soc) * curve.at(soc)); });
   };
-  made.r0_ohm = fit(cell.r0_ohm), made.r1_ohm = fit(cell.r1_ohm), made.c1_f = fit(cell.c1_f);
+  made.r0_ohm = fit(cell.r0_ohm);
+  made.r1_ohm = fit(cell.r1_ohm);
+  made.c1_f = fit(cell.c1_f);
   for (std::size_t k = 0; k < made.rc_soc.size(); ++k) {
     made.r0_ohm[k] *= 1 + share * made.resistance_tolerance * r0_error.at(made.rc_soc[k]);
     made.r1_ohm[k] *= 1 + share * made.resistance_tolerance * r1_error.at(made.rc_soc[k]);

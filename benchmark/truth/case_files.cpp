@@ -19,7 +19,7 @@ std::string rounded(double value, int decimals) {
   return {digits.data(), written.ptr};
 }
 
-/// All digits that tell the number from its neighbours, never an exponent.
+/// As many digits as distinguish the number from its neighbours, without an exponent.
 std::string exact(double value) {
   std::array<char, 400> digits{};
   const auto written = std::to_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::fixed);
@@ -50,7 +50,7 @@ std::string csv_of(const Series& series) {
 
 std::string cell_toml(const CalibratedCell& cell, const std::string& name) {
   const double q = cell.capacity_ah;
-  std::string text = "# Made by benchmark/truth: what somebody believes of a cell that he has calibrated.\n";
+  std::string text = "# Made by benchmark/truth: the cell file of a calibrated cell.\n";
   const auto table = [&](const char* title, const char* source,
                          std::initializer_list<std::pair<const char*, std::string>> entries) {
     text += std::string("\n[") + title + "]\nsource = \"" + source + "\"\n";
@@ -82,7 +82,7 @@ std::string cell_toml(const CalibratedCell& cell, const std::string& name) {
          {"current_offset_a", exact(0.0005 * q)},
          {"current_offset_correlation_s", "3600.0"},
          {"current_unknown_a", exact(0.2 * q)}});
-  table("tolerance", "what the calibration is good for",
+  table("tolerance", "errors of the simulated calibration",
         {{"ocv_v", exact(cell.ocv_tolerance_v)},
          {"resistance_fraction", exact(cell.resistance_tolerance)},
          {"initial_soc", exact(cell.initial_soc_tolerance)},

@@ -1,4 +1,4 @@
-// A case as files, to be looked at with the ordinary tool.
+// A case as files that `bms` reads.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace bms::benchmark::truth {
 /// Columns time_s, current_a, voltage_v, temperature_c (unless empty), soc_ref.
 std::string csv_of(const Series& series);
 
-/// A cell file that `bms` takes.
+/// The cell file.
 std::string cell_toml(const CalibratedCell& cell, const std::string& name);
 
 }  // namespace bms::benchmark::truth

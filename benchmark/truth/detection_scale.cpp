@@ -10,7 +10,7 @@ namespace bms::benchmark::truth {
 
 namespace {
 
-/// Innovations of the drifts' Kalman filter, each by its standard deviation.
+/// Innovations of the Kalman filter of both drifts, each divided by its standard deviation.
 class Whitener {
  public:
   Whitener(double white_v, double step_s, std::size_t count) {
@@ -56,7 +56,7 @@ double hat(double soc, double centre, double spacing) { return std::max(0.0, 1 -
 
 struct DetectionScale::Columns {
   Whitener whitener;
-  Eigen::MatrixXd nuisance;  ///< whitened, each times its standard deviation
+  Eigen::MatrixXd nuisance;  ///< whitened columns, each scaled by its sigma
   std::optional<Eigen::LDLT<Eigen::MatrixXd>> gram;
 };
 
@@ -80,7 +80,7 @@ DetectionScale::DetectionScale(const HealthyCell& cell, const Stimulus& stimulus
       return hat(healthy.soc[k], 0.2 * n, 0.2) * cell.r0_ohm.at(healthy.soc[k]) * stimulus.current_a[k];
     });
   add(0.05, [&](std::size_t k) { return healthy.v1_v[k]; });
-  // what acts through soc moves the overvoltages too, so the cell itself says what it does
+  // a change of SOC also changes the overvoltages, so the cell is simulated again
   const auto add_change = [&](const CellEffects& effects, const Stimulus& other_stimulus, double start_soc) {
     const CellTrace other = run_cell(cell, effects, other_stimulus, start_soc);
     add(1, [&](std::size_t k) { return other.voltage_v[k] - healthy.voltage_v[k]; });
@@ -107,7 +107,8 @@ double DetectionScale::overlap_root(const std::vector<double>& a_v, const std::v
   const Eigen::VectorXd a = columns_->whitener.white(a_v), b = columns_->whitener.white(b_v);
   const Eigen::VectorXd to_a = columns_->nuisance.transpose() * a, to_b = columns_->nuisance.transpose() * b;
   const double lambda = a.dot(b) - to_a.dot(columns_->gram->solve(to_b));
-  return std::copysign(std::sqrt(std::abs(lambda)), lambda) / 4.76;
+  constexpr double detection_limit_sigmas = 4.76;  // see the header
+  return std::copysign(std::sqrt(std::abs(lambda)), lambda) / detection_limit_sigmas;
 }
 
 double DetectionScale::cosine_similarity(const std::vector<double>& a_v, const std::vector<double>& b_v) const {

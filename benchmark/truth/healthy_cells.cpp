@@ -13,10 +13,10 @@ Curve tabulated(const plant::MonotoneCurve& curve) {
   return Curve([&](double soc) { return curve.at(soc); });
 }
 
-/// Table 9's plateaus with other heights.
+/// The plateaus of Table 9 with other heights.
 Curve ocv_like_table9(plant::Random& random) {
   constexpr std::array rises_v = {0.335, 0.039, 0.032, 0.008, 0.0012, 0.004, 0.023, 0.009, 0.0012, 0.133};
-  const double roundness = between(random, 0.1, 0.5);  // how much of each line is left to the corner
+  const double roundness = between(random, 0.1, 0.5);  // part of each line that its corners round off
   double knot_v = between(random, 2.82, 2.9);
   std::vector<plant::Point> points = {{0, knot_v}};
   for (std::size_t k = 0; k < rises_v.size(); ++k) {
@@ -30,7 +30,7 @@ Curve ocv_like_table9(plant::Random& random) {
   return tabulated(plant::MonotoneCurve(std::move(points)));
 }
 
-/// Two plateaus: graphite's stages seen through a flat positive electrode.
+/// Two plateaus: the stages of graphite against a flat positive electrode.
 Curve ocv_of_stages(plant::Random& random) {
   const double plateau_v = between(random, 3.19, 3.21), slope_v = between(random, 0.006, 0.02);
   const double first_at = between(random, 0.24, 0.33), first_v = between(random, 0.03, 0.05),
@@ -41,7 +41,7 @@ Curve ocv_of_stages(plant::Random& random) {
   const double full_v = between(random, 0.1, 0.16), full_width = between(random, 0.013, 0.022);
   const auto stage = [](double soc, double at, double width) { return 1 / (1 + std::exp(-(soc - at) / width)); };
   return Curve([=](double soc) {
-    const double z = std::fmin(std::fmax(soc, -0.02), 1.02);  // the knees go on straight
+    const double z = std::fmin(std::fmax(soc, -0.02), 1.02);  // straight beyond the knees
     const double beyond = soc - z;
     const double empty = empty_v * std::exp(-z / empty_width), full = full_v * std::exp((z - 1) / full_width);
     return plateau_v + 0.025 + slope_v * z + first_v * stage(z, first_at, first_width) +
@@ -50,13 +50,13 @@ Curve ocv_of_stages(plant::Random& random) {
   });
 }
 
-Curve over_soc(plant::Random& random, const std::array<double, 10>& table, double scale, double unlike) {
+Curve over_soc(plant::Random& random, const std::array<double, 10>& table, double scale, double variation) {
   const SmoothRandom wave(random);
   const double lowest = std::exp(between(random, -0.05, 0.25));  // the table is flat below 10 %
   std::vector<plant::Point> points = {{0, scale * lowest * table[0]}};
   for (std::size_t k = 0; k < table.size(); ++k) {
     const double soc = static_cast<double>(k + 1) / 10;
-    points.push_back({soc, scale * table[k] * std::exp(unlike * wave.at(soc))});
+    points.push_back({soc, scale * table[k] * std::exp(variation * wave.at(soc))});
   }
   const plant::MonotoneCurve curve(std::move(points));
   return Curve([&](double soc) { return curve.at(std::fmin(std::fmax(soc, 0), 1)); });
@@ -82,7 +82,7 @@ HealthyCell draw_healthy_cell(plant::Random& random) {
   cell.c1_f =
       over_soc(random, {420.558, 833.847, 1109.31, 1249.35, 1399.3, 1473.69, 1526.64, 1509.14, 1445.43, 1927.32},
                std::clamp(size * std::exp(0.25 * random.normal()) / quality, 0.3, 43.0),
-               0.05);  // a cell file takes 100 to 100,000 F
+               0.05);  // range of a cell file: 100 to 100,000 F
   cell.thermal.heat_capacity_j_per_k *= size * std::exp(0.1 * random.normal());
   cell.thermal.to_ambient_w_per_k *= between(random, 1, 2.5) * std::cbrt(size * size);
   return cell;

@@ -1,4 +1,4 @@
-// Healthy cells by chance: LiFePO4 of 2 to 280 Ah, around Table 9 of the paper, no two alike.
+// Random healthy cells: LiFePO4 of 2 to 280 Ah, similar to Table 9 of the paper.
 #pragma once
 
 #include "benchmark/truth/concealed_cell.hpp"
@@ -6,9 +6,9 @@
 
 namespace bms::benchmark::truth {
 
-/// Resistances go with 6 Ah / Q, C1 with Q / 6 Ah, each times a chance of its own; the thermal node with Q and Q^(2/3).
-/// Half of the OCV curves follow Table 9 with chance steps, rounded or not; the others are made of two plateaus,
-/// logistic stages and two exponential knees.
+/// Resistances scale with 6 Ah / Q and C1 with Q / 6 Ah, each times a random factor; the thermal node scales with Q and
+/// Q^(2/3). Half of the OCV curves follow Table 9 with random steps, rounded or not. The others consist of two
+/// plateaus, logistic steps and two exponential knees.
 HealthyCell draw_healthy_cell(plant::Random& random);
 
 }  // namespace bms::benchmark::truth

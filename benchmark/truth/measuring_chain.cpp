@@ -12,13 +12,16 @@ void filter(double time_s, double step_s, std::vector<double>& values) {
   if (time_s <= 0) return;
   const double kept = std::exp(-step_s / time_s);
   double state = values.front();
-  for (double& value : values) value = state = value + kept * (state - value);
+  for (double& value : values) {
+    state = value + kept * (state - value);
+    value = state;
+  }
 }
 
 }  // namespace
 
 std::vector<double> faulty_current_a(const CurrentFaults& faults, double step_s, const std::vector<double>& current_a) {
-  std::vector<double> seen = current_a;
+  std::vector<double> measured = current_a;
   if (faults.late_s != 0) {
     const double steps = faults.late_s / step_s, whole = std::floor(steps), part = steps - whole;
     const auto last = static_cast<std::ptrdiff_t>(current_a.size()) - 1;
@@ -27,17 +30,17 @@ std::vector<double> faulty_current_a(const CurrentFaults& faults, double step_s,
     };
     for (std::ptrdiff_t k = 0; k <= last; ++k) {
       const std::ptrdiff_t from = k - static_cast<std::ptrdiff_t>(whole);
-      seen[static_cast<std::size_t>(k)] = (1 - part) * at(from) + part * at(from - 1);
+      measured[static_cast<std::size_t>(k)] = (1 - part) * at(from) + part * at(from - 1);
     }
   }
-  filter(faults.filter_s, step_s, seen);
-  for (std::size_t k = 0; k < seen.size(); ++k) {
-    seen[k] *= 1 + faults.gain;
-    if (faults.offset_scale != 0) seen[k] += faults.offset_scale * faults.offset_a[k];
+  filter(faults.filter_s, step_s, measured);
+  for (std::size_t k = 0; k < measured.size(); ++k) {
+    measured[k] *= 1 + faults.gain;
+    if (faults.offset_scale != 0) measured[k] += faults.offset_scale * faults.offset_a[k];
     if (faults.saturates_a > 0)
-      seen[k] /= std::pow(1 + std::pow(std::abs(seen[k]) / faults.saturates_a, faults.knee), 1 / faults.knee);
+      measured[k] /= std::pow(1 + std::pow(std::abs(measured[k]) / faults.saturates_a, faults.knee), 1 / faults.knee);
   }
-  return seen;
+  return measured;
 }
 
 std::vector<double> faulty_voltage_v(const VoltageFaults& faults, double step_s, std::vector<double> voltage_v) {
@@ -55,20 +58,20 @@ std::vector<double> faulty_voltage_v(const VoltageFaults& faults, double step_s,
 
 void stick(const VoltageFaults& faults, std::vector<double>& voltage_v) {
   if (faults.sticks_v <= 0) return;
-  double held = voltage_v.front();
+  double reading_v = voltage_v.front();
   for (double& v : voltage_v) {
-    if (std::abs(v - held) > faults.sticks_v) held = v;
-    v = held;
+    if (std::abs(v - reading_v) > faults.sticks_v) reading_v = v;
+    v = reading_v;
   }
 }
 
 std::vector<double> faulty_temperature_c(const TemperatureFaults& faults, double step_s,
                                          const std::vector<double>& temperature_c) {
-  std::vector<double> seen = temperature_c;
-  filter(20, step_s, seen);
-  filter(faults.lag_s, step_s, seen);
-  for (double& t : seen) t += faults.offset_k;
-  return seen;
+  std::vector<double> measured = temperature_c;
+  filter(20, step_s, measured);
+  filter(faults.lag_s, step_s, measured);
+  for (double& t : measured) t += faults.offset_k;
+  return measured;
 }
 
 std::vector<double> read_by(plant::Channel channel, double step_s, const std::vector<double>& values) {

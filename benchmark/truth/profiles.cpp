@@ -53,7 +53,7 @@ namespace {
 
 constexpr double minute_s = 60;
 
-/// Lays one stretch of constant current after the other until the time is used up.
+/// Appends stretches of constant current until the duration is reached.
 class Plan {
  public:
   Plan(const ProfileRequest& request) : request_(request), soc_(request.start_soc) {
@@ -69,7 +69,8 @@ class Plan {
   double fastest_charge() const { return request_.fastest_charge; }
   double fastest_discharge() const { return request_.fastest_discharge; }
 
-  /// False when the range of soc (or the time) ended it early. The ends of the range are approached slowly.
+  /// Returns false if the end of the SOC range or of the duration cut it short. The current is limited near the ends of
+  /// the range.
   bool hold(double c_rate, double duration_s) {
     const auto samples = static_cast<std::size_t>(std::max(1.0, std::round(duration_s / request_.step_s)));
     for (std::size_t k = 0; k < samples && !done(); ++k) {
@@ -84,7 +85,7 @@ class Plan {
     return !done();
   }
   void rest(double duration_s) { hold(0, duration_s); }
-  /// At c_rate > 0, up or down.
+  /// Charges or discharges to `soc` at c_rate > 0.
   bool go_to(double soc, double c_rate) {
     return hold(soc > soc_ ? c_rate : -c_rate, std::abs(soc - soc_) / c_rate * 3'600);
   }
@@ -102,7 +103,7 @@ void forklift_shift(Plan& plan, double current_scale, plant::Random& random) {
   plan.rest(between(random, 2, 8) * minute_s);
   const double pace = between(random, 0.7, 1.4);
   while (!plan.done()) {
-    if (plan.soc() < plan.lowest() + 0.06 || chance(random, 0.004)) {  // to the charger, at a break or when empty
+    if (plan.soc() < plan.lowest() + 0.06 || chance(random, 0.004)) {  // charge at a break or when empty
       plan.rest(between(random, 2, 15) * minute_s);
       plan.hold(between(random, 0.4, 1), between(random, 25, 60) * minute_s);
       plan.rest(between(random, 2, 10) * minute_s);
@@ -180,6 +181,14 @@ void full_cycle(Plan& plan, plant::Random& random) {
   plan.rest(20 * minute_s);
 }
 
+/// Away from the ends of the range; elsewhere it usually turns.
+double next_direction(const Plan& plan, double direction, plant::Random& random) {
+  constexpr double near = 0.03;
+  if (plan.soc() < plan.lowest() + near) return 1;
+  if (plan.soc() > plan.highest() - near) return -1;
+  return chance(random, 0.75) ? -direction : direction;
+}
+
 void minor_loops(Plan& plan, plant::Random& random) {
   constexpr std::array rates = {0.2, 0.33, 0.5, 1.0, 1.5};
   plan.rest(between(random, 10, 20) * minute_s);
@@ -189,10 +198,7 @@ void minor_loops(Plan& plan, plant::Random& random) {
     const double rate = std::max(one_of(random, rates), far > 0.15 ? 0.5 : 0.2);
     plan.go_to(plan.soc() + direction * far, rate);  // or to the end of the range
     if (chance(random, 0.5)) plan.rest(between(random, 8, 35) * minute_s);
-    direction = plan.soc() < plan.lowest() + 0.03    ? 1
-                : plan.soc() > plan.highest() - 0.03 ? -1
-                : chance(random, 0.75)               ? -direction
-                                                     : direction;
+    direction = next_direction(plan, direction, random);
   }
 }
 

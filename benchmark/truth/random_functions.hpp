@@ -1,16 +1,22 @@
-// Draws beyond plant/random.hpp, and smooth random functions. Uses libm: the same bits on one machine, not on every
-// machine.
+// Random draws in addition to plant/random.hpp, and smooth random functions. They use libm: the bits are the same on
+// one machine, not on every machine.
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
 #include "plant/random.hpp"
 
 namespace bms::benchmark::truth {
+
+/// A seed that depends on both arguments.
+inline std::uint64_t derived_seed(std::uint64_t a, std::uint64_t b) {
+  return plant::Random(plant::Random(a).bits() ^ b).bits();
+}
 
 inline double between(plant::Random& random, double low, double high) { return low + (high - low) * random.uniform(); }
 inline double log_between(plant::Random& random, double low, double high) {
@@ -27,7 +33,7 @@ auto one_of(plant::Random& random, const Choices& choices) {
   return choices[below(random, choices.size())];
 }
 
-/// Five waves over 0..1, the slower the larger; root mean square 1 over 0..1.
+/// Sum of five waves over 0..1; slow waves are larger. RMS 1 over 0..1.
 class SmoothRandom {
  public:
   explicit SmoothRandom(plant::Random& random) {
@@ -54,7 +60,7 @@ class SmoothRandom {
   double norm_ = 1;
 };
 
-/// Ornstein-Uhlenbeck of standard deviation 1, as long as count steps of step_s.
+/// Ornstein-Uhlenbeck process of standard deviation 1: count samples, step_s apart.
 inline std::vector<double> ornstein_uhlenbeck(std::uint64_t seed, std::size_t count, double step_s,
                                               double correlation_s) {
   plant::Random random(seed);

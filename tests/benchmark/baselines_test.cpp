@@ -1,4 +1,4 @@
-// Every baseline does what its name says, on some cases of the development split.
+// Each baseline on some cases of the development split, and the tables.
 #include "benchmark/baselines.hpp"
 
 #include <algorithm>
@@ -17,16 +17,17 @@ namespace {
 
 using diagnosis::Verdict;
 using testing::HasSubstr;
+using truth::CaseKind;
 
 constexpr auto split = truth::Split::development;
 
-/// Six cases with nothing to find, made once; of each the first two hours or so, which is enough and quicker.
+/// Six nulls, made once; only the first 8,000 rows of each, for speed.
 const std::vector<truth::Case>& nulls() {
   static const std::vector<truth::Case> made = [] {
     std::vector<truth::Case> chosen;
     for (std::size_t k = 0; chosen.size() < 6 && k < truth::case_count(split); ++k) {
       truth::Case c = truth::make_case(split, 1, k);
-      if (c.answer.kind != "null") continue;
+      if (c.answer.kind != CaseKind::null) continue;
       for (auto* column : {&c.recording.time_s, &c.recording.current_a, &c.recording.voltage_v,
                            &c.recording.temperature_c, &c.recording.soc})
         column->resize(std::min<std::size_t>(column->size(), 8'000));
@@ -50,14 +51,14 @@ TEST(Baselines, AWhiteLikelihoodFindsCausesInHealthyCells) {
   for (const truth::Case& c : nulls()) {
     const Outcome o = aicc_forward(c);
     named += o.found.empty() ? 0 : 1;
-    EXPECT_EQ(o.answer.kind, "null");
+    EXPECT_EQ(o.answer.kind, CaseKind::null);
     EXPECT_LE(o.found.size(), 5U);
     EXPECT_EQ(o.found.size(), o.sets.size());
   }
   EXPECT_GE(named, 4U);
 }
 
-TEST(Baselines, TheFrozenModelTellsALargeEffectAndNamesNothing) {
+TEST(Baselines, TheFrozenModelDetectsALargeEffectAndNamesNoCause) {
   const Outcome o = frozen_model(grown());
   EXPECT_EQ(o.verdict, Verdict::unknown);
   EXPECT_TRUE(o.found.empty());
@@ -68,11 +69,11 @@ TEST(Baselines, TheFrozenModelTellsALargeEffectAndNamesNothing) {
   EXPECT_LE(alarms, 2U);
 }
 
-TEST(Baselines, AFreeRefitTakesALargeResistanceIntoItsTablesAndTheHoldoutHasIt) {
-  const Outcome held = base_refit(grown()), o = free_refit(grown());
+TEST(Baselines, AFreeRefitMovesALargeResistanceGrowthIntoItsTablesAndPredictsTheHoldout) {
+  const Outcome within_tolerance = base_refit(grown()), o = free_refit(grown());
   EXPECT_TRUE(o.found.empty());
   EXPECT_LT(o.holdout_after_v, 0.6 * o.holdout_before_v);
-  EXPECT_GT(held.holdout_after_v, o.holdout_after_v) << "the tolerance holds it back";
+  EXPECT_GT(within_tolerance.holdout_after_v, o.holdout_after_v) << "the tolerance limits the fit";
 }
 
 TEST(Baselines, TheNearestSignatureOfAPlainLargeResistanceIsAResistance) {
@@ -82,11 +83,11 @@ TEST(Baselines, TheNearestSignatureOfAPlainLargeResistanceIsAResistance) {
   EXPECT_LT(o.holdout_after_v, 0.6 * o.holdout_before_v);
   for (const truth::Case& c : nulls()) {
     EXPECT_EQ(nearest_signature(c).verdict == Verdict::no_mismatch, frozen_model(c).verdict == Verdict::no_mismatch)
-        << "one detects as the other";
+        << "both use the same threshold";
   }
 }
 
-TEST(Tables, AWilsonIntervalIsNarrowerForMoreCasesAndInsideZeroToOne) {
+TEST(Tables, AWilsonIntervalAgreesWithPublishedTables) {
   const Interval none = wilson({0, 36});  // 0 of 36: 0 to 9.6 % (tables of binomial intervals)
   EXPECT_EQ(none.low, 0);
   EXPECT_NEAR(none.high, 0.0964, 5e-4);
@@ -96,8 +97,8 @@ TEST(Tables, AWilsonIntervalIsNarrowerForMoreCasesAndInsideZeroToOne) {
   EXPECT_EQ(wilson({0, 0}).high, 1);
 }
 
-Outcome said(const std::string& kind, const std::vector<std::string>& ids, double strength, Verdict verdict,
-             const std::vector<std::string>& found) {
+Outcome outcome(CaseKind kind, const std::vector<std::string>& ids, double strength, Verdict verdict,
+                const std::vector<std::string>& found) {
   Outcome o;
   o.answer.kind = kind;
   o.answer.ids = ids;
@@ -109,11 +110,12 @@ Outcome said(const std::string& kind, const std::vector<std::string>& ids, doubl
   return o;
 }
 
-TEST(Tables, EveryMethodHasItsColumnAndEveryMistakeItsPlace) {
-  const std::vector<Outcome> ours = {said("null", {}, 0, Verdict::no_mismatch, {}),
-                                     said("single", {"leakage"}, 3, Verdict::cause, {"current_offset"}),
-                                     said("single", {"resistance_growth"}, 5, Verdict::cause, {"contact_step"}),
-                                     said("outside", {"memory_bump"}, 3, Verdict::unknown, {})};
+TEST(Tables, EveryMethodHasAColumnAndEveryConfusionARow) {
+  const std::vector<Outcome> ours = {
+      outcome(CaseKind::null, {}, 0, Verdict::no_mismatch, {}),
+      outcome(CaseKind::single, {"leakage"}, 3, Verdict::cause, {"current_offset"}),
+      outcome(CaseKind::single, {"resistance_growth"}, 5, Verdict::cause, {"contact_step"}),
+      outcome(CaseKind::outside, {"memory_bump"}, 3, Verdict::unknown, {})};
   std::vector<Outcome> theirs = ours;
   theirs[0].verdict = Verdict::unknown;
   const std::string text = report("development", 7, {{"ours", ours}, {"theirs", theirs}});
@@ -126,12 +128,13 @@ TEST(Tables, EveryMethodHasItsColumnAndEveryMistakeItsPlace) {
   EXPECT_THAT(text, HasSubstr("| (outside the catalogue) | 1 | 1 |  |"));
 }
 
-TEST(Tables, AReadmeKeepsWhatStandsAroundThem) {
+TEST(Tables, AReadmeKeepsTheTextAroundTheTables) {
   const std::filesystem::path readme = std::filesystem::temp_directory_path() / "bms_benchmark_readme_test.md";
   const std::string before = "# x\n<!-- figures: development -->\n",
                     after = "<!-- end of figures -->\n<!-- figures: final -->\nNot run yet.\n<!-- end of figures -->\n";
   files::write_file(readme, before + "old\n" + after);
-  const std::string text = report("development", 1, {{"ours", {said("null", {}, 0, Verdict::no_mismatch, {})}}});
+  const std::string text =
+      report("development", 1, {{"ours", {outcome(CaseKind::null, {}, 0, Verdict::no_mismatch, {})}}});
   for (int times = 0; times < 2; ++times) {
     files::replace_figures(readme, "development", text);
     EXPECT_EQ(files::read_file(readme), before + text + after);
