@@ -158,7 +158,7 @@ double open_loop_start(const ReplayResult& result) {
 SocFigures soc_figures(const ReplayResult& result) {
   const measurement::Recording& r = result.recording;
   const std::vector<EstimateRow>& rows = result.track.rows;
-  ErrorFigure all, later;
+  identification::ErrorFigure all, later;
   std::size_t inside = 0;
   for (std::size_t k = 0; k < rows.size() && !r.soc_ref.empty(); ++k) {
     if (std::isnan(r.soc_ref[k])) continue;
@@ -190,8 +190,8 @@ SocFigures soc_figures(const ReplayResult& result) {
 VoltageFigures voltage_figures(const ReplayResult& result) {
   const std::vector<double>& measured_v = result.recording.voltage_v;
   const std::vector<EstimateRow>& rows = result.track.rows;
-  ErrorFigure prediction, open_loop;
-  FitFigure fit;
+  identification::ErrorFigure prediction, open_loop;
+  identification::FitFigure fit;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (k > 0 && (rows[k].flags & voltage_not_used) == 0) prediction.add(measured_v[k] - rows[k].voltage_predicted_v);
     if ((rows[k].flags & voltage_not_measured) != 0) continue;

@@ -1,4 +1,4 @@
-// What is identified from: one stretch of a recording, evenly or unevenly sampled.
+// The data of an identification: one stretch of a recording, evenly or unevenly sampled.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace bms::identification {
 
-/// Columns of equal length. current_a[k]: mean over the interval that ends at time_s[k], > 0 charges; voltage_v[k] at
+/// Columns of equal length. current_a[k]: mean over the interval that ends at time_s[k], > 0 charges; voltage_v[k]: at
 /// time_s[k].
 struct Data {
   std::vector<double> time_s;

@@ -1,13 +1,13 @@
-// Figures of merit of a prediction against a measurement.
+// Figures of merit of a prediction compared with a measurement.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
-namespace bms {
+namespace bms::identification {
 
-/// Root mean square and largest absolute value of errors, one by one.
+/// RMS and largest absolute value of errors; NaN is left out.
 class ErrorFigure {
  public:
   void add(double error) {
@@ -25,7 +25,7 @@ class ErrorFigure {
   std::size_t count_ = 0;
 };
 
-/// fit = 100 (1 - |y - y_hat| / |y - mean(y)|) in percent (Eq. A6). 0 where y does not vary.
+/// fit = 100 (1 - |y - y_hat| / |y - mean(y)|) in percent (Eq. A6); 0 where y is constant. NaN is left out.
 class FitFigure {
  public:
   void add(double measured, double simulated) {
@@ -43,4 +43,4 @@ class FitFigure {
   std::size_t count_ = 0;
 };
 
-}  // namespace bms
+}  // namespace bms::identification

@@ -16,14 +16,14 @@ namespace bms::identification {
 
 namespace {
 
-enum Lane { by_soc, by_v_rc, by_r0, by_r1, by_c1, lanes = 6 };  // an even number: the compiler takes two at a time
+enum Lane { by_soc, by_v_rc, by_r0, by_r1, by_c1, lanes = 6 };  // an even number for SIMD with two lanes
 using Local = ceres::Jet<double, lanes>;
 using Tables = model::Cell<double, model::max_intervals>;
 
 double value_of(double v) { return v; }
 double value_of(const Local& v) { return v.a; }
 
-/// An independent variable of the step: its own lane is 1.
+/// An independent variable of the step: its derivative in its own lane is 1.
 template <class S>
 S local(double value, int own_lane) {
   if constexpr (std::same_as<S, double>)
@@ -32,7 +32,7 @@ S local(double value, int own_lane) {
     return Local(value, own_lane);
 }
 
-/// A table's value: its slope by soc, and a lane of its own where it is an unknown.
+/// A value of a table with its slope by SOC, and a lane of its own if it is an unknown.
 Local tabled(double value, double delta, double per_width, int own_lane = -1) {
   Local v(value);
   v.v[by_soc] = delta * per_width;
@@ -57,10 +57,13 @@ model::TablePoint<S> localised(const model::TablePoint<double>& at) {
   }
 }
 
+/// |SOC| from which on a simulation counts as not finite.
+constexpr double largest_soc = 7;
+
 /// RMS of the logarithmic ratio of neighbours in Table 9: R0, R1, C1.
 constexpr std::array<double, 3> neighbours_differ = {0.044, 0.28, 0.27};
 
-/// Which two nodes a soc lies between and how the table weighs them.
+/// The two nodes around an SOC and the weight of the upper one.
 struct Between {
   std::size_t below = 0, above = 0;
   double weight_above = 0;
@@ -73,7 +76,7 @@ Between between(const std::vector<double>& nodes, double soc) {
   return {above - 1, above, (soc - nodes[above - 1]) / (nodes[above] - nodes[above - 1])};
 }
 
-/// Between the edges by a straight line, beyond as at the end.
+/// Linear between the edges, constant beyond.
 double half_gap_v(const model::OcvTable<double>& ocv, double soc) {
   const auto begin = ocv.soc.value.begin(), end = begin + static_cast<std::ptrdiff_t>(ocv.soc.size);
   const auto above = static_cast<std::size_t>(std::upper_bound(begin, end, soc) - begin);
@@ -83,7 +86,47 @@ double half_gap_v(const model::OcvTable<double>& ocv, double soc) {
   return ocv.half_gap_v[above - 1] + t * (ocv.half_gap_v[above] - ocv.half_gap_v[above - 1]);
 }
 
+struct Limits {
+  double lower, upper, scale;
+};
+
+Limits limits_of(Quantity quantity, const CircuitBounds& b) {
+  switch (quantity) {
+    case Quantity::r0:
+      return {b.r0_min_ohm, b.r0_max_ohm, 0.01};
+    case Quantity::r1:
+      return {b.r1_min_ohm, b.r1_max_ohm, 0.01};
+    case Quantity::c1:
+      return {b.c1_min_f, b.c1_max_f, 1'000};
+    case Quantity::ocv_branch:
+      return {-1, 1, 0.1};
+    case Quantity::initial_soc:
+      return {-0.05, 1.05, 0.1};
+    case Quantity::initial_v_rc:
+      return {-0.5, 0.5, 0.01};  // V
+  }
+  return {};
+}
+
 }  // namespace
+
+const char* Unknown::name() const {
+  switch (quantity) {
+    case Quantity::r0:
+      return "r0_ohm";
+    case Quantity::r1:
+      return "r1_ohm";
+    case Quantity::c1:
+      return "c1_f";
+    case Quantity::ocv_branch:
+      return "ocv_lean";
+    case Quantity::initial_v_rc:
+      return "initial_v_rc_v";
+    case Quantity::initial_soc:
+      return "initial_soc";
+  }
+  return "";
+}
 
 model::CellParameters<> with_ocv_branch(const model::CellParameters<>& cell, double ocv_branch) {
   model::CellParameters<> moved = cell;
@@ -104,54 +147,61 @@ GreyBox::GreyBox(const model::CellParameters<>& cell, std::vector<DataSet> recor
     : cell_(cell), records_(std::move(records)), options_(std::move(options)) {
   if (options_.soc_nodes.empty()) throw std::invalid_argument("no soc nodes to identify R0, R1, C1 at");
   if (records_.empty()) throw std::invalid_argument("no recording to identify from");
-  for (const char* name : {"r0_ohm", "r1_ohm", "c1_f"}) {
-    for (const double soc : options_.soc_nodes) unknowns_.push_back({name, soc, 0});
+  for (const Quantity quantity : {Quantity::r0, Quantity::r1, Quantity::c1}) {
+    for (const double soc : options_.soc_nodes) unknowns_.push_back({quantity, soc});
   }
   if (options_.estimate_ocv_branch) {
     if (cell_.ocv.half_gap_v.size == 0)
-      throw std::invalid_argument("no gap between charge and discharge for the OCV to lean in");
-    unknowns_.push_back({"ocv_lean", 0, 0});
+      throw std::invalid_argument("the cell file has no half gap, so the OCV branch position cannot be identified");
+    unknowns_.push_back({Quantity::ocv_branch});
   }
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    if (records_[r].data.size() < 2) throw std::invalid_argument("a recording of less than two samples");
+    if (records_[r].data.size() < 2) throw std::invalid_argument("a recording has fewer than two samples");
     samples_ += records_[r].data.size();
-    if (records_[r].estimate_initial_v_rc) unknowns_.push_back({"initial_v_rc_v", records_[r].initial_soc, r});
+    if (records_[r].estimate_initial_v_rc) unknowns_.push_back({Quantity::initial_v_rc, records_[r].initial_soc, r});
     if (!records_[r].estimate_initial_soc) continue;
-    unknowns_.push_back({"initial_soc", records_[r].initial_soc, r});
-    if (records_[r].initial_soc_sigma > 0) ++beliefs_;
+    unknowns_.push_back({Quantity::initial_soc, records_[r].initial_soc, r});
+    if (records_[r].initial_soc_sigma > 0) ++priors_;
   }
 }
 
-std::optional<Eigen::Index> GreyBox::unknown(const std::string& name, std::size_t record) const {
+std::optional<Eigen::Index> GreyBox::unknown(Quantity quantity, std::size_t record) const {
   for (std::size_t k = 3 * nodes(); k < unknowns_.size(); ++k) {
-    if (unknowns_[k].name == name && unknowns_[k].record == record) return static_cast<Eigen::Index>(k);
+    if (unknowns_[k].quantity == quantity && unknowns_[k].record == record) return static_cast<Eigen::Index>(k);
   }
   return std::nullopt;
 }
 
 Eigen::VectorXd GreyBox::start() const {
+  const auto rc = [&](const auto& column, double soc) { return model::cell_detail::rc_value(cell_.rc, column, soc); };
+  const auto value_of = [&](const Unknown& u) -> double {
+    switch (u.quantity) {
+      case Quantity::r0:
+        return rc(cell_.rc.r0_ohm, u.soc);
+      case Quantity::r1:
+        return rc(cell_.rc.r1_ohm, u.soc);
+      case Quantity::c1:
+        return rc(cell_.rc.c1_f, u.soc);
+      case Quantity::ocv_branch:
+        return cell_.ocv.lean;
+      case Quantity::initial_soc:
+        return u.soc;
+      case Quantity::initial_v_rc:
+        return 0;
+    }
+    return 0;
+  };
   Eigen::VectorXd x(static_cast<Eigen::Index>(unknowns_.size()));
-  const LeastSquares limits = problem();
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(k)];
-    double value = 0;
-    if (u.name == "r0_ohm")
-      value = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, u.soc);
-    else if (u.name == "r1_ohm")
-      value = model::cell_detail::rc_value(cell_.rc, cell_.rc.r1_ohm, u.soc);
-    else if (u.name == "c1_f")
-      value = model::cell_detail::rc_value(cell_.rc, cell_.rc.c1_f, u.soc);
-    else if (u.name == "ocv_lean")
-      value = cell_.ocv.lean;
-    else if (u.name == "initial_soc")
-      value = u.soc;
-    x[k] = std::clamp(value, limits.lower[k], limits.upper[k]);
+    const Limits limits = limits_of(u.quantity, options_.bounds);
+    x[k] = std::clamp(value_of(u), limits.lower, limits.upper);
   }
   return x;
 }
 
 model::CellParameters<> GreyBox::cell_with(const Eigen::VectorXd& x) const {
-  const auto ocv_branch = unknown("ocv_lean", 0);
+  const auto ocv_branch = unknown(Quantity::ocv_branch, 0);
   model::CellParameters<> cell = ocv_branch ? with_ocv_branch(cell_, x[*ocv_branch]) : cell_;
   cell.rc = {};
   for (std::size_t k = 0; k < nodes(); ++k) {
@@ -172,8 +222,8 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
   const DataSet& record = records_[r];
   const Data& data = record.data;
   const auto tables = std::make_unique<Tables>(model::prepare<double, model::max_intervals>(cell_with(x)));
-  const auto v_rc_unknown = unknown("initial_v_rc_v", r), soc_unknown = unknown("initial_soc", r),
-             lean_unknown = unknown("ocv_lean", 0);
+  const auto v_rc_unknown = unknown(Quantity::initial_v_rc, r), soc_unknown = unknown(Quantity::initial_soc, r),
+             branch_unknown = unknown(Quantity::ocv_branch, 0);
   const double per_as = 1 / (3'600 * cell_.capacity_ah);
 
   double soc = soc_unknown ? x[*soc_unknown] : record.initial_soc;
@@ -182,7 +232,7 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
   if (v_rc_unknown) v_rc_by[*v_rc_unknown] = 1;
 
   const auto n = static_cast<Eigen::Index>(nodes());
-  // adds what a local derivative by R0, R1 or C1 (column 0, 1, 2) means for the two nodes beside soc
+  // adds a local derivative by R0, R1 or C1 (column 0, 1, 2) to the two nodes around the SOC
   const auto spread = [&](Eigen::VectorXd& by, double derivative, Eigen::Index column, const Between& b) {
     by[column * n + static_cast<Eigen::Index>(b.below)] += derivative * (1 - b.weight_above);
     by[column * n + static_cast<Eigen::Index>(b.above)] += derivative * b.weight_above;
@@ -193,11 +243,11 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
     const double duration_s = k == 0 ? 0 : data.time_s[k] - data.time_s[k - 1];
     const double current_a = std::isfinite(data.current_a[k]) ? data.current_a[k] : 0;
     soc += current_a * duration_s * per_as;
-    if (!(std::abs(soc) < 7)) return false;
+    if (!(std::abs(soc) < largest_soc)) return false;
     const auto at = localised<S>(model::look_up(*tables, soc, interval));
     const model::StepInput<S> input{S(current_a), S(duration_s)};
-    [[maybe_unused]] Between beside;
-    if constexpr (with_derivatives) beside = between(options_.soc_nodes, soc);
+    [[maybe_unused]] Between around;
+    if constexpr (with_derivatives) around = between(options_.soc_nodes, soc);
 
     if (duration_s > 0) {
       const S state =
@@ -205,8 +255,8 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
       v_rc_v = value_of(state);
       if constexpr (with_derivatives) {
         v_rc_by *= state.v[by_v_rc];
-        spread(v_rc_by, state.v[by_r1], 1, beside);
-        spread(v_rc_by, state.v[by_c1], 2, beside);
+        spread(v_rc_by, state.v[by_r1], 1, around);
+        spread(v_rc_by, state.v[by_c1], 2, around);
         if (soc_unknown) v_rc_by[*soc_unknown] += state.v[by_soc];
       }
     }
@@ -216,9 +266,9 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
     voltage_v[row] = value_of(voltage);
     if constexpr (with_derivatives) {
       voltage_by = v_rc_by * voltage.v[by_v_rc];
-      spread(voltage_by, voltage.v[by_r0], 0, beside);
+      spread(voltage_by, voltage.v[by_r0], 0, around);
       if (soc_unknown) voltage_by[*soc_unknown] += voltage.v[by_soc];
-      if (lean_unknown) voltage_by[*lean_unknown] += half_gap_v(cell_.ocv, soc);
+      if (branch_unknown) voltage_by[*branch_unknown] += half_gap_v(cell_.ocv, soc);
       derivatives->row(row) = voltage_by.transpose();
     }
   }
@@ -237,73 +287,75 @@ LeastSquares GreyBox::problem() const {
   p.upper.resize(n);
   p.scale.resize(n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const std::string& name = unknowns_[static_cast<std::size_t>(k)].name;
-    const CircuitBounds& b = options_.bounds;
-    const auto set = [&](double lower, double upper, double scale) {
-      p.lower[k] = lower;
-      p.upper[k] = upper;
-      p.scale[k] = scale;
-    };
-    if (name == "r0_ohm")
-      set(b.r0_min_ohm, b.r0_max_ohm, 0.01);
-    else if (name == "r1_ohm")
-      set(b.r1_min_ohm, b.r1_max_ohm, 0.01);
-    else if (name == "c1_f")
-      set(b.c1_min_f, b.c1_max_f, 1'000);
-    else if (name == "ocv_lean")
-      set(-1, 1, 0.1);
-    else if (name == "initial_soc")
-      set(-0.05, 1.05, 0.1);
-    else
-      set(-0.5, 0.5, 0.01);
+    const Limits limits = limits_of(unknowns_[static_cast<std::size_t>(k)].quantity, options_.bounds);
+    p.lower[k] = limits.lower;
+    p.upper[k] = limits.upper;
+    p.scale[k] = limits.scale;
   }
   p.evaluate = [this](const Eigen::VectorXd& x, Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian) {
-    const auto rows = static_cast<Eigen::Index>(samples_ + beliefs_ + ties());
-    residuals.setZero(rows);
-    if (jacobian != nullptr) jacobian->setZero(rows, x.size());
-    Eigen::Index from = 0, belief = static_cast<Eigen::Index>(samples_);
-    for (std::size_t r = 0; r < records_.size(); ++r) {
-      const DataSet& record = records_[r];
-      const auto count = static_cast<Eigen::Index>(record.data.size());
-      if (jacobian != nullptr) {
-        Eigen::Ref<Eigen::MatrixXd> part = jacobian->middleRows(from, count);
-        if (!simulate(x, r, residuals.segment(from, count), &part)) return false;
-      } else if (!simulate(x, r, residuals.segment(from, count), nullptr)) {
-        return false;
-      }
-      for (Eigen::Index k = 0; k < count; ++k) {
-        const double measured_v = record.data.voltage_v[static_cast<std::size_t>(k)];
-        if (std::isfinite(measured_v)) {
-          residuals[from + k] -= measured_v;
-          continue;
-        }
-        residuals[from + k] = 0;
-        if (jacobian != nullptr) jacobian->row(from + k).setZero();
-      }
-      from += count;
-      if (const auto soc = unknown("initial_soc", r); soc && record.initial_soc_sigma > 0) {
-        const Eigen::Index column = *soc;
-        const double weight = options_.voltage_sigma_v / record.initial_soc_sigma;
-        residuals[belief] = weight * (x[column] - record.initial_soc);
-        if (jacobian != nullptr) (*jacobian)(belief, column) = weight;
-        ++belief;
-      }
-    }
-    if (ties() == 0) return true;
-    const auto count = static_cast<Eigen::Index>(nodes());
-    for (Eigen::Index k = 0, row = belief; k < 3 * count; ++k) {
-      if (k % count == count - 1) continue;
-      const double weight_v = options_.tie_v / neighbours_differ[static_cast<std::size_t>(k / count)];
-      residuals[row] = weight_v * std::log(x[k + 1] / x[k]);
-      if (jacobian != nullptr) {
-        (*jacobian)(row, k) = -weight_v / x[k];
-        (*jacobian)(row, k + 1) = weight_v / x[k + 1];
-      }
-      ++row;
-    }
-    return true;
+    return evaluate(x, residuals, jacobian);
   };
   return p;
+}
+
+bool GreyBox::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian) const {
+  const auto rows = static_cast<Eigen::Index>(samples_ + priors_ + ties());
+  residuals.setZero(rows);
+  if (jacobian != nullptr) jacobian->setZero(rows, x.size());
+  Eigen::Index from = 0, prior = static_cast<Eigen::Index>(samples_);
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    const DataSet& record = records_[r];
+    if (!add_simulation(x, r, from, residuals, jacobian)) return false;
+    from += static_cast<Eigen::Index>(record.data.size());
+    if (const auto soc = unknown(Quantity::initial_soc, r); soc && record.initial_soc_sigma > 0) {
+      const Eigen::Index column = *soc;
+      const double weight = options_.voltage_sigma_v / record.initial_soc_sigma;
+      residuals[prior] = weight * (x[column] - record.initial_soc);
+      if (jacobian != nullptr) (*jacobian)(prior, column) = weight;
+      ++prior;
+    }
+  }
+  if (ties() > 0) add_ties(x, prior, residuals, jacobian);
+  return true;
+}
+
+/// Rows of recording r, from row `from` on. Returns false if the simulation is not finite.
+bool GreyBox::add_simulation(const Eigen::VectorXd& x, std::size_t r, Eigen::Index from, Eigen::VectorXd& residuals,
+                             Eigen::MatrixXd* jacobian) const {
+  const Data& data = records_[r].data;
+  const auto count = static_cast<Eigen::Index>(data.size());
+  if (jacobian != nullptr) {
+    Eigen::Ref<Eigen::MatrixXd> part = jacobian->middleRows(from, count);
+    if (!simulate(x, r, residuals.segment(from, count), &part)) return false;
+  } else if (!simulate(x, r, residuals.segment(from, count), nullptr)) {
+    return false;
+  }
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double measured_v = data.voltage_v[static_cast<std::size_t>(k)];
+    if (std::isfinite(measured_v)) {
+      residuals[from + k] -= measured_v;
+      continue;
+    }
+    residuals[from + k] = 0;
+    if (jacobian != nullptr) jacobian->row(from + k).setZero();
+  }
+  return true;
+}
+
+/// Logarithmic ratios of neighbouring nodes, weighted by those of Table 9.
+void GreyBox::add_ties(const Eigen::VectorXd& x, Eigen::Index row, Eigen::VectorXd& residuals,
+                       Eigen::MatrixXd* jacobian) const {
+  const auto count = static_cast<Eigen::Index>(nodes());
+  for (Eigen::Index k = 0; k < 3 * count; ++k) {
+    if (k % count == count - 1) continue;
+    const double weight_v = options_.tie_v / neighbours_differ[static_cast<std::size_t>(k / count)];
+    residuals[row] = weight_v * std::log(x[k + 1] / x[k]);
+    if (jacobian != nullptr) {
+      (*jacobian)(row, k) = -weight_v / x[k];
+      (*jacobian)(row, k + 1) = weight_v / x[k + 1];
+    }
+    ++row;
+  }
 }
 
 std::vector<double> nodes_for(double soc_min, double soc_max) {

@@ -1,11 +1,11 @@
-// Nonlinear grey box (section 3.2.4): the 1RC model of model/one_rc.hpp over recordings, with R0, R1, C1 at nodes of
-// soc and the initial states as unknowns. Simulation error: open loop, the measured voltage is compared with, never fed
+// Nonlinear grey box (paper, 3.2.4): the 1RC model of model/one_rc.hpp over recordings. The unknowns are R0, R1, C1 at
+// nodes of SOC and the initial states. The residual is the simulation error: open loop, no measured voltage is fed
 // back.
 //
-// Unknowns, in this order: R0 at each node, R1 at each node, C1 at each node, the OCV's lean between slow discharge and
-// charge if asked for, then per record v_rc and soc at its start, those that are asked for. Derivatives: the model's
-// own step under automatic differentiation by (soc, v_rc, R0, R1, C1), the chain rule over time and nodes by hand, so
-// that a node more costs one multiplication a sample.
+// Order of the unknowns: R0 at each node, R1 at each node, C1 at each node, the OCV branch position if asked for, then
+// for each recording v_rc and SOC at its start, where asked for. The derivatives come from the step of the model under
+// automatic differentiation by (soc, v_rc, R0, R1, C1); the chain rule over time and nodes is written by hand, so that
+// one node more costs one multiplication per sample.
 #pragma once
 
 #include <cstddef>
@@ -19,14 +19,13 @@
 
 namespace bms::identification {
 
-/// One recording and what is known of its start.
+/// One recording and what is known of its initial state.
 struct DataSet {
   Data data;
-  double initial_soc = 0.5;  ///< true, believed, or where the search begins
-  double initial_soc_sigma =
-      0;  ///< how far that is believed; 0 where initial_soc is not estimated, or nothing is known
+  double initial_soc = 0.5;      ///< fixed; or the prior; or the start value of the search
+  double initial_soc_sigma = 0;  ///< of the prior; 0: fixed, or estimated without a prior
   bool estimate_initial_soc = false;
-  bool estimate_initial_v_rc = true;  ///< otherwise the record begins at rest
+  bool estimate_initial_v_rc = true;  ///< false: the recording begins at rest
 };
 
 /// Bounds of R0, R1, C1 at every node: Table 3.
@@ -39,59 +38,71 @@ struct CircuitBounds {
 struct GreyBoxOptions {
   std::vector<double> soc_nodes;  ///< ascending, one or more; one: constant parameters
   CircuitBounds bounds;
-  bool estimate_ocv_branch = false;  ///< needs the cell's ocv.half_gap_v
-  double voltage_sigma_v = 0.001;    ///< weight of a voltage residual against a belief
-  double tie_v =
-      0;  ///< residual where neighbouring nodes differ as much as those of Table 9 do; 0: each stands for itself
+  bool estimate_ocv_branch = false;  ///< needs ocv.half_gap_v of the cell
+  double voltage_sigma_v = 0.001;    ///< weight of a voltage residual against a prior
+  /// Residual of two neighbouring nodes that differ as much as those of Table 9 do; 0: nodes are independent.
+  double tie_v = 0;
 };
 
-/// What an unknown is.
+enum class Quantity { r0, r1, c1, ocv_branch, initial_v_rc, initial_soc };
+
 struct Unknown {
-  std::string name;        ///< "r0_ohm", "r1_ohm", "c1_f", "ocv_lean", "initial_v_rc_v", "initial_soc"
-  double soc = 0;          ///< of the node; of the record's start for its states
+  Quantity quantity;
+  double soc = 0;          ///< of the node; of the start of the recording for its states
   std::size_t record = 0;  ///< for its states
+
+  /// "r0_ohm", "r1_ohm", "c1_f", "ocv_lean", "initial_v_rc_v", "initial_soc"
+  const char* name() const;
 };
 
 class GreyBox {
  public:
   /// cell: OCV, capacity, and R0, R1, C1 to start from (at the nodes by interpolation).
-  /// Throws std::invalid_argument: no nodes, no records, a record of less than two samples, a lean without a gap.
+  /// Throws std::invalid_argument: no nodes, no recordings, a recording with fewer than two samples, an OCV branch
+  /// position without a half gap.
   GreyBox(const model::CellParameters<>& cell, std::vector<DataSet> records, GreyBoxOptions options);
 
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
-  /// The cell's own values, moved inside the bounds.
+  const std::vector<DataSet>& records() const { return records_; }
+  const GreyBoxOptions& options() const { return options_; }
+  /// The values of the cell, clamped to the bounds.
   Eigen::VectorXd start() const;
-  /// Residuals in V, simulated less measured; rows without a voltage are 0. Then one row per believed initial soc, and
-  /// one per pair of neighbouring nodes where these are tied.
+  /// Residuals in V: simulated minus measured, 0 in rows without a voltage. Then one row per prior of an initial SOC,
+  /// and one per pair of neighbouring nodes where these are tied. The problem refers to this object.
   LeastSquares problem() const;
   std::size_t samples() const { return samples_; }
 
-  /// Terminal voltage over record r. derivatives: samples by unknowns, if asked for. False: not finite.
+  /// Terminal voltage over recording r. derivatives: samples by unknowns, or null. Returns false if not finite.
   bool simulate(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::VectorXd> voltage_v,
                 Eigen::Ref<Eigen::MatrixXd>* derivatives) const;
 
-  /// The cell with R0, R1, C1 of x at the nodes, and the OCV leaning as x says.
+  /// The cell with R0, R1, C1 and the OCV branch position of x.
   model::CellParameters<> cell_with(const Eigen::VectorXd& x) const;
 
  private:
   template <class S>
   bool run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::VectorXd> voltage_v,
            Eigen::Ref<Eigen::MatrixXd>* derivatives) const;
+  bool evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian) const;
+  bool add_simulation(const Eigen::VectorXd& x, std::size_t r, Eigen::Index from, Eigen::VectorXd& residuals,
+                      Eigen::MatrixXd* jacobian) const;
+  void add_ties(const Eigen::VectorXd& x, Eigen::Index row, Eigen::VectorXd& residuals,
+                Eigen::MatrixXd* jacobian) const;
   std::size_t nodes() const { return options_.soc_nodes.size(); }
-  std::optional<Eigen::Index> unknown(const std::string& name, std::size_t record) const;
+  std::size_t ties() const { return options_.tie_v > 0 ? 3 * (nodes() - 1) : 0; }
+  std::optional<Eigen::Index> unknown(Quantity quantity, std::size_t record) const;
 
   model::CellParameters<> cell_;
   std::vector<DataSet> records_;
   GreyBoxOptions options_;
   std::vector<Unknown> unknowns_;
-  std::size_t samples_ = 0, beliefs_ = 0;
-  std::size_t ties() const { return options_.tie_v > 0 ? 3 * (nodes() - 1) : 0; }
+  std::size_t samples_ = 0, priors_ = 0;
 };
 
-/// The cell with its OCV at another place between slow discharge (-1) and charge (1).
+/// The cell with its OCV at another branch position: -1 slow discharge, 1 slow charge.
 model::CellParameters<> with_ocv_branch(const model::CellParameters<>& cell, double ocv_branch);
 
-/// Nodes for data that covers soc_min..soc_max: one in the middle if it is narrow, else at tenths as in Table 9.
+/// Nodes for data from soc_min to soc_max: one in the middle if the range is narrow, otherwise at tenths as in Table 9.
 std::vector<double> nodes_for(double soc_min, double soc_max);
 
 }  // namespace bms::identification

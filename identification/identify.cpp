@@ -14,7 +14,18 @@ namespace bms::identification {
 
 namespace {
 
-/// Those of `values` where `by` is a number.
+constexpr std::size_t fewest_samples = 10;
+constexpr double least_excitation_c_rate = 0.02;  // step of the current from sample to sample
+constexpr double uncertain_fraction = 0.5;        // standard deviation over value that gives a warning
+
+/// Start values of the time constant, as multiples of the given one: C1 decides which of several minima is found.
+constexpr double time_constants[] = {1, 0.2, 5};
+constexpr double same_cost = 1e-4;  // relative difference of two optima that count as the same
+
+/// Standard deviation of a state of charge of which nothing is known: uniform over 0..1.
+constexpr double unknown_soc_std = 0.29;
+
+/// The elements of `values` at which `by` is finite.
 Eigen::VectorXd where(const Eigen::VectorXd& values, const Eigen::VectorXd& by) {
   std::vector<double> kept;
   for (Eigen::Index k = 0; k < values.size(); ++k) {
@@ -25,7 +36,7 @@ Eigen::VectorXd where(const Eigen::VectorXd& values, const Eigen::VectorXd& by) 
 
 bool measured(const Data& data, std::size_t k) { return std::isfinite(data.voltage_v[k]); }
 
-/// Refuses what no search could find anything in.
+/// Rejects data from which nothing can be identified.
 void require_excitation(const std::vector<DataSet>& records) {
   double largest_step_a = 0, capacity_ah = 0;
   std::size_t samples = 0;
@@ -37,65 +48,62 @@ void require_excitation(const std::vector<DataSet>& records) {
         largest_step_a = std::max(largest_step_a, std::abs(r.data.current_a[k] - r.data.current_a[k - 1]));
     }
   }
-  if (samples < 10) throw std::invalid_argument("less than 10 samples in the window, expected data to identify from");
-  if (largest_step_a < 0.02 * capacity_ah) {
+  if (samples < fewest_samples)
+    throw std::invalid_argument("fewer than 10 samples in the window, expected a longer recording");
+  if (largest_step_a < least_excitation_c_rate * capacity_ah) {
     throw std::invalid_argument(
-        "the current hardly changes: r0_ohm, r1_ohm and c1_f cannot be seen, expected current pulses as of the "
+        "the current hardly changes, so r0_ohm, r1_ohm and c1_f cannot be identified, expected current pulses as in "
+        "the "
         "experiment high_1m_low_30s");
   }
 }
 
-const char* experiment_that_shows(const std::string& name) {
-  if (name == "initial_soc") return "a rest of an hour before or after (ocv_1h_rest) would show it";
-  if (name == "ocv_lean")
-    return "a recording that both charges and discharges over the same state of charge would show it";
-  return "pulses of 1 min with rests of 30 s (experiment high_1m_low_30s) at that state of charge would show it";
+const char* experiment_that_shows(Quantity quantity) {
+  switch (quantity) {
+    case Quantity::initial_soc:
+      return "a rest of one hour before or after it (experiment ocv_1h_rest) determines it";
+    case Quantity::ocv_branch:
+      return "a recording that both charges and discharges over the same state of charge determines it";
+    default:
+      return "pulses of 1 min with rests of 30 s (experiment high_1m_low_30s) at that state of charge determine it";
+  }
 }
 
-void warn(Identification& result) {
-  for (const Parameter& p : result.parameters) {
-    const std::string where = fmt::format("{} at {:.0f} %", p.name, 100 * p.soc);
-    if (!p.identifiable)
-      result.warnings.push_back(
-          fmt::format("not_seen: {} cannot be seen in this data; {}", where, experiment_that_shows(p.name)));
-    else if (p.at_bound)
-      result.warnings.push_back(
-          fmt::format("at_bound: {} ended at its bound of {:g}; {}", where, p.value, experiment_that_shows(p.name)));
-    else if (p.std > 0.5 * std::abs(p.value) && p.name != "ocv_lean") {
-      result.warnings.push_back(fmt::format("uncertain: {} is {:.3g} with a standard deviation of {:.2g}; {}", where,
-                                            p.value, p.std, experiment_that_shows(p.name)));
-    }
-  }
+void warn_of_parameter(const Parameter& p, Quantity quantity, std::vector<std::string>& warnings) {
+  const std::string where = fmt::format("{} at {:.0f} %", p.name, 100 * p.soc);
+  const char* experiment = experiment_that_shows(quantity);
+  if (!p.identifiable)
+    warnings.push_back(fmt::format("not_seen: this recording does not determine {}; {}", where, experiment));
+  else if (p.at_bound)
+    warnings.push_back(fmt::format("at_bound: {} ended at its bound of {:g}; {}", where, p.value, experiment));
+  else if (p.std > uncertain_fraction * std::abs(p.value) && quantity != Quantity::ocv_branch)
+    warnings.push_back(fmt::format("uncertain: {} is {:.3g} with a standard deviation of {:.2g}; {}", where, p.value,
+                                   p.std, experiment));
+}
+
+void warn_of_search(Identification& result) {
   for (const InitialState& state : result.initial) {
-    if (!state.observable) {
-      result.warnings.push_back(
-          fmt::format("initial_soc_not_observable: the state of charge at the start may be off by {:.0f} % (standard "
-                      "deviation); {}",
-                      100 * state.soc_std, experiment_that_shows("initial_soc")));
-    }
+    if (state.observable) continue;
+    result.warnings.push_back(fmt::format(
+        "initial_soc_not_observable: the state of charge at the start has a standard deviation of {:.0f} %; {}",
+        100 * state.soc_std, experiment_that_shows(Quantity::initial_soc)));
   }
   if (!result.optimum.converged) result.warnings.push_back("not_converged: " + result.optimum.reason);
   if (result.starts > 1 && result.agreeing == 1) {
     result.warnings.push_back(
-        fmt::format("several_minima: {} starts ended at different places, the best was taken", result.starts));
+        fmt::format("several_minima: {} start values led to different results, the best one was used", result.starts));
   }
 }
 
-/// Time constants the search begins with, as multiples of the start's: C1 decides which of several minima is found.
-constexpr double time_constants[] = {1, 0.2, 5};
-
-Identification identified(const model::CellParameters<>& start, const std::vector<DataSet>& records,
-                          const GreyBoxOptions& options, Method method, const Stopping& stopping) {
-  const GreyBox grey_box(start, records, options);
-  const LeastSquares problem = grey_box.problem();
-  const auto nodes = static_cast<Eigen::Index>(options.soc_nodes.size());
-
-  Identification result;
+/// The best of the optima from all start values.
+void search(const GreyBox& grey_box, const LeastSquares& problem, Method method, const Stopping& stopping,
+            Identification& result) {
+  const auto nodes = static_cast<Eigen::Index>(grey_box.options().soc_nodes.size());
   std::vector<double> costs;
   int evaluations = 0;
-  for (const double times : time_constants) {
+  for (const double factor : time_constants) {
     Eigen::VectorXd x = grey_box.start();
-    x.segment(2 * nodes, nodes) *= times;
+    x.segment(2 * nodes, nodes) *= factor;
     Optimum found = minimise(problem, x, method, stopping);
     costs.push_back(found.cost);
     evaluations += found.evaluations;
@@ -104,58 +112,79 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
   result.optimum.evaluations = evaluations;
   result.starts = static_cast<int>(costs.size());
   result.agreeing = static_cast<int>(std::count_if(
-      costs.begin(), costs.end(), [&](double c) { return c <= result.optimum.cost * (1 + 1e-4) + 1e-18; }));
+      costs.begin(), costs.end(), [&](double c) { return c <= result.optimum.cost * (1 + same_cost) + 1e-18; }));
+}
 
-  const Eigen::VectorXd& x = result.optimum.x;
+/// Uncertainty at the optimum. Rows without a measured voltage are left out.
+Uncertainty uncertainty_at(const GreyBox& grey_box, const LeastSquares& problem, const Optimum& optimum,
+                           double ocv_tolerance_v) {
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
-  if (!problem.evaluate(x, residuals, &jacobian))
-    throw std::invalid_argument("the simulation leaves all bounds, expected a start nearer to the cell");
-  // rows that were not measured are not data
+  if (!problem.evaluate(optimum.x, residuals, &jacobian))
+    throw std::invalid_argument("the simulation is not finite, expected a start nearer to the cell");
+  const auto samples = static_cast<Eigen::Index>(grey_box.samples());
   Eigen::Index rows = 0, sampled = 0;
   for (Eigen::Index k = 0; k < residuals.size(); ++k) {
-    if (k == static_cast<Eigen::Index>(grey_box.samples())) sampled = rows;
+    if (k == samples) sampled = rows;
     if (residuals[k] == 0 && jacobian.row(k).isZero(0)) continue;
     residuals[rows] = residuals[k];
     jacobian.row(rows++) = jacobian.row(k);
   }
-  if (residuals.size() == static_cast<Eigen::Index>(grey_box.samples())) sampled = rows;
+  if (residuals.size() == samples) sampled = rows;
   residuals.conservativeResize(rows);
   jacobian.conservativeResize(rows, Eigen::NoChange);
-  const Uncertainty u = uncertainty(residuals, jacobian, sampled, result.optimum.at_bound, start.tolerance.ocv_v);
-  result.correlation = u.correlation;
-  result.correlation_length = u.correlation_length;
-  result.cell = grey_box.cell_with(x);
-  for (std::size_t r = 0; r < records.size(); ++r) result.initial.push_back({records[r].initial_soc, 0, 0, true});
+  return uncertainty(residuals, jacobian, sampled, optimum.at_bound, ocv_tolerance_v);
+}
+
+/// Parameters, initial states and their warnings from the unknowns at the optimum.
+void set_parameters(const GreyBox& grey_box, const Uncertainty& u, Identification& result) {
+  const Eigen::VectorXd& x = result.optimum.x;
+  for (const DataSet& record : grey_box.records()) result.initial.push_back({record.initial_soc, 0, 0, true});
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const Unknown& unknown = grey_box.unknowns()[static_cast<std::size_t>(k)];
-    const bool at_bound = result.optimum.at_bound[k] != 0;
-    if (unknown.name == "initial_v_rc_v") {
+    const bool at_bound = result.optimum.at_bound[k] != 0, identifiable = u.identifiable[k] != 0;
+    if (unknown.quantity == Quantity::initial_v_rc) {
       result.initial[unknown.record].v_rc_v = x[k];
-    } else if (unknown.name == "initial_soc") {
+    } else if (unknown.quantity == Quantity::initial_soc) {
       InitialState& state = result.initial[unknown.record];
-      constexpr double uniform = 0.29;  // standard deviation of a state of charge of which nothing is known
       state.soc = x[k];
-      state.soc_std = u.identifiable[k] != 0 && !at_bound ? std::min(uniform, u.std_with_offset(k)) : uniform;
+      state.soc_std = identifiable && !at_bound ? std::min(unknown_soc_std, u.std_with_offset(k)) : unknown_soc_std;
       state.observable = state.soc_std <= observable_soc_std;
     } else {
-      result.parameters.push_back({unknown.name, unknown.soc, x[k], u.std(k), u.std_white(k), std::abs(u.offset[k]),
-                                   at_bound, at_bound || u.identifiable[k] != 0});
+      result.parameters.push_back({.name = unknown.name(),
+                                   .soc = unknown.soc,
+                                   .value = x[k],
+                                   .std = u.std(k),
+                                   .std_white = u.std_white(k),
+                                   .by_ocv_tolerance = std::abs(u.offset[k]),
+                                   .at_bound = at_bound,
+                                   .identifiable = at_bound || identifiable});
+      warn_of_parameter(result.parameters.back(), unknown.quantity, result.warnings);
     }
   }
-  for (std::size_t k = 0; k < options.soc_nodes.size(); ++k) {
-    const auto deviation = [&](Eigen::Index column) { return u.std(column * nodes + static_cast<Eigen::Index>(k)); };
-    result.cell.rc.r0_std_ohm.push_back(deviation(0));
-    result.cell.rc.r1_std_ohm.push_back(deviation(1));
-    result.cell.rc.c1_std_f.push_back(deviation(2));
-  }
+}
 
+/// The identified cell, with the standard deviations of its RC table.
+model::CellParameters<> identified_cell(const GreyBox& grey_box, const Eigen::VectorXd& x, const Uncertainty& u) {
+  const std::size_t nodes = grey_box.options().soc_nodes.size();
+  model::CellParameters<> cell = grey_box.cell_with(x);
+  for (std::size_t k = 0; k < nodes; ++k) {
+    const auto std_of = [&](std::size_t column) { return u.std(static_cast<Eigen::Index>(column * nodes + k)); };
+    cell.rc.r0_std_ohm.push_back(std_of(0));
+    cell.rc.r1_std_ohm.push_back(std_of(1));
+    cell.rc.c1_std_f.push_back(std_of(2));
+  }
+  return cell;
+}
+
+/// Statistics of the first recording, with the fit and errors over all recordings.
+void set_estimation(const GreyBox& grey_box, const Uncertainty& u, Identification& result) {
   FitFigure open_loop, one_step;
   ErrorFigure error;
-  for (std::size_t r = 0; r < records.size(); ++r) {
-    const Data& data = records[r].data;
+  for (std::size_t r = 0; r < grey_box.records().size(); ++r) {
+    const Data& data = grey_box.records()[r].data;
     Eigen::VectorXd simulated(static_cast<Eigen::Index>(data.size()));
-    grey_box.simulate(x, r, simulated, nullptr);
+    grey_box.simulate(result.optimum.x, r, simulated, nullptr);
     if (r == 0) {
       result.fading = fading(without_missing(fit_of(data.voltage_v, simulated, data.current_a, 0).error_v));
       result.estimation = fit_of(data.voltage_v, simulated, data.current_a, result.fading);
@@ -175,7 +204,21 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
   result.estimation.largest_v = error.max();
   result.estimation.samples = error.count();
   result.estimation.output_variance_v2 = u.output_variance_v2;
-  warn(result);
+}
+
+Identification identified(const model::CellParameters<>& start, const std::vector<DataSet>& records,
+                          const GreyBoxOptions& options, Method method, const Stopping& stopping) {
+  const GreyBox grey_box(start, records, options);
+  const LeastSquares problem = grey_box.problem();
+  Identification result;
+  search(grey_box, problem, method, stopping, result);
+  const Uncertainty u = uncertainty_at(grey_box, problem, result.optimum, start.tolerance.ocv_v);
+  result.correlation = u.correlation;
+  result.correlation_length = u.correlation_length;
+  set_parameters(grey_box, u, result);
+  result.cell = identified_cell(grey_box, result.optimum.x, u);
+  set_estimation(grey_box, u, result);
+  warn_of_search(result);
   return result;
 }
 
@@ -215,8 +258,8 @@ Identification identify_grey_box(const model::CellParameters<>& start, const std
                                  const GreyBoxOptions& options, Method method, const Stopping& stopping) {
   require_excitation(records);
   if (options.soc_nodes.size() < 2) return identified(start, records, options, method, stopping);
-  // First as if nothing depended on soc: where the search for the nodes begins, and a measure of how far neighbours may
-  // differ before the residuals, which come in runs, say so.
+  // First with constant parameters: this gives the start values of the nodes. Its residuals, which come in runs, are
+  // the measure of how far neighbouring nodes may differ.
   GreyBoxOptions constant = options;
   constant.soc_nodes = {0.5};
   const Identification first = identified(start, records, constant, method, stopping);
@@ -235,7 +278,7 @@ model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, 
   try {
     readings = read_rests(data);
   } catch (const std::invalid_argument&) {
-    return started;  // times or currents that it cannot read; the fit says what is wrong with them
+    return started;  // invalid times or currents; the fit reports what is wrong with them
   }
   for (std::size_t k = 0; k < started.rc.soc.size; ++k) {
     if (std::isfinite(readings.r0_ohm)) started.rc.r0_ohm[k] = std::clamp(readings.r0_ohm, b.r0_min_ohm, b.r0_max_ohm);
@@ -261,7 +304,7 @@ FitStatistics validate(const model::CellParameters<>& cell, const DataSet& recor
     x[2 * nodes + k] = cell.rc.c1_f[node];
   }
   if (fixed_start.estimate_initial_v_rc) {
-    // the voltage is linear in v_rc at the start: one step of Gauss and Newton is exact
+    // the voltage is linear in v_rc at the start, so one Gauss-Newton step is exact
     x[3 * nodes] = 0;
     Eigen::VectorXd residuals;
     Eigen::MatrixXd jacobian;
@@ -271,7 +314,7 @@ FitStatistics validate(const model::CellParameters<>& cell, const DataSet& recor
     }
   }
   Eigen::VectorXd simulated(static_cast<Eigen::Index>(record.data.size()));
-  if (!grey_box.simulate(x, 0, simulated, nullptr)) throw std::invalid_argument("the simulation leaves all bounds");
+  if (!grey_box.simulate(x, 0, simulated, nullptr)) throw std::invalid_argument("the simulation is not finite");
   return fit_of(record.data.voltage_v, simulated, record.data.current_a, fading);
 }
 

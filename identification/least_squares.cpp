@@ -20,9 +20,9 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double rounding = 100 * epsilon;  // of a sum of squares, relative
-constexpr double dependent_columns =
-    1e-11;  // pivot of a column of length 1, below which it is a combination of the others
+constexpr double rounding = 100 * epsilon;  // relative rounding error of a sum of squares
+/// Pivot of a column of length 1 below which the column depends linearly on the others.
+constexpr double dependent_columns = 1e-11;
 
 void require(bool condition, const char* message) {
   if (!condition) throw std::invalid_argument(message);
@@ -32,7 +32,7 @@ VectorXd given_or(const VectorXd& values, Index n, double otherwise) {
   return values.size() == 0 ? VectorXd::Constant(n, otherwise) : values;
 }
 
-/// R of [J diag(scale), r]. Each round takes the R so far and the next rows.
+/// R of [J diag(scale), r]. Each round reduces the R so far and the next rows.
 MatrixXd triangle(const MatrixXd& jacobian, const VectorXd& residuals, const VectorXd& scale) {
   const Index m = jacobian.rows(), n = jacobian.cols(), rows = std::max<Index>(256, 4 * n);
   MatrixXd block = MatrixXd::Zero(n + 1 + rows, n + 1);
@@ -80,7 +80,7 @@ bool Optimisation::evaluate(const VectorXd& x, bool derivatives) {
   ++evaluations_;
   const Index m = residuals_.size();
   if (!problem_.evaluate(x, residuals_, derivatives ? &jacobian_ : nullptr)) {
-    residuals_.resize(m);  // whatever was left in it
+    residuals_.resize(m);  // its content is not used
     return false;
   }
   require(residuals_.size() > 0 && (m == 0 || residuals_.size() == m),
@@ -116,7 +116,7 @@ bool Optimisation::update_derivatives(const VectorXd& x) {
   column_norms_ = column_norms_.cwiseMax(factor_.colwise().norm().transpose());
   const double largest = column_norms_.maxCoeff();
   for (double& norm : column_norms_) {
-    if (!(norm > 0)) norm = largest > 0 ? largest : 1;  // nothing is known of this unknown yet
+    if (!(norm > 0)) norm = largest > 0 ? largest : 1;  // no information about this unknown yet
   }
   return true;
 }
@@ -142,11 +142,11 @@ double Optimisation::relative(const VectorXd& gradient) const {
 
 bool Optimisation::is_short(const VectorXd& step, double tolerance) const {
   const auto is_short_times = [&](const VectorXd& weights) {
-    const VectorXd size =
-        x_.cwiseQuotient(scale_).cwiseAbs() + VectorXd::Constant(x_.size(), tolerance);  // an optimum at 0 ends, too
+    const VectorXd size = x_.cwiseQuotient(scale_).cwiseAbs() +
+                          VectorXd::Constant(x_.size(), tolerance);  // so that a search with its optimum at 0 ends
     return weights.cwiseProduct(step).norm() <= tolerance * weights.cwiseProduct(size).norm();
   };
-  // also as the residuals see it: without `scale` a large unknown would hide a small one
+  // also weighted by the effect on the residuals: without `scale` a large unknown would hide a small one
   return is_short_times(VectorXd::Ones(x_.size())) && is_short_times(column_norms_);
 }
 
@@ -160,8 +160,8 @@ VectorXd Optimisation::after(const VectorXd& step) const {
   return x;
 }
 
-/// What is left to gain, as the undamped, complete Gauss-Newton step sees it. Asked of every method alike: its own step
-/// may be short only because it is damped, bisected or bounded by a radius.
+/// The expected decrease of the cost by the undamped, complete Gauss-Newton step. It is the same for every method,
+/// because the step of a method may be short only by damping, bisection or a radius.
 Optimisation::Outlook Optimisation::outlook(const Indices& free) const {
   const VectorXd gradient = gradient_(free);
   MatrixXd a = factor_(Eigen::all, free);
@@ -184,11 +184,10 @@ std::string Optimisation::convergence_reason(const Indices& free) const {
   if (!(cost_ > 0)) return "The residuals are zero.";
   const Outlook here = outlook(free);
   if (here.gradient <= stopping_.gradient)
-    return sentence("The gradient has vanished: it is, relative, ", here.gradient);
-  if (here.short_step)
-    return sentence("What is left of the step is shorter than its tolerance, relative ", stopping_.step);
+    return sentence("The gradient is zero within its tolerance, relative value: ", here.gradient);
+  if (here.short_step) return sentence("The step is shorter than its tolerance, relative value: ", stopping_.step);
   if (iterations_ > 0 && here.decrease <= stopping_.cost && last_decrease_ <= stopping_.cost) {
-    return sentence("The cost falls no more: the decrease expected is, relative, ", here.decrease);
+    return sentence("The cost does not decrease any more, expected relative decrease: ", here.decrease);
   }
   return "";
 }
@@ -199,8 +198,7 @@ bool Optimisation::finished() {
   if (!why.empty()) {
     end(true, why);
   } else if (iterations_ >= stopping_.iterations) {
-    end(false, sentence("Not converged in " + std::to_string(iterations_) +
-                            " iterations: a decrease is still expected of, relative, ",
+    end(false, sentence("Not converged in " + std::to_string(iterations_) + " iterations, expected relative decrease: ",
                         outlook(free()).decrease));
   }
   return ended_;
@@ -211,16 +209,18 @@ void Optimisation::no_decrease() {
   const Outlook here = outlook(free());
   const double decrease = here.decrease;
   if (decrease <= std::max(stopping_.cost, rounding)) {
-    end(true, sentence("No smaller cost is found, nor expected: the decrease would be, relative, ", decrease));
+    end(true, sentence("No smaller cost was found, and none is expected, expected relative decrease: ", decrease));
   } else if (here.gradient <= std::sqrt(rounding)) {
-    // less cannot be seen in the cost, which is of second order in x; where J loses rank at the optimum, `decrease` is
-    // no guide
-    end(true, sentence("No smaller cost is found, and the gradient is as small as can be told from the cost, relative ",
-                       here.gradient));
+    // The cost is of second order in x, so it cannot show a smaller gradient. Where J loses rank at the optimum,
+    // `decrease` cannot be used.
+    end(true,
+        sentence("No smaller cost was found, and the gradient is as small as the cost can resolve, relative value: ",
+                 here.gradient));
   } else {
     end(false,
-        sentence("Not converged: no smaller cost is found, though the derivatives promise a decrease of, relative, ",
-                 decrease));
+        sentence(
+            "Not converged: no smaller cost was found, although the derivatives promise a decrease, relative value: ",
+            decrease));
   }
 }
 
@@ -235,7 +235,12 @@ Optimum Optimisation::result() const {
   found.x = x_;
   found.cost = cost_;
   found.at_bound = Eigen::VectorXi::Zero(size());
-  for (Index i = 0; i < size(); ++i) found.at_bound[i] = x_[i] <= lower_[i] ? -1 : x_[i] >= upper_[i] ? 1 : 0;
+  for (Index i = 0; i < size(); ++i) {
+    if (x_[i] <= lower_[i])
+      found.at_bound[i] = -1;
+    else if (x_[i] >= upper_[i])
+      found.at_bound[i] = 1;
+  }
   if (gradient_.size() > 0) found.gradient = relative(gradient_(free()));
   found.iterations = iterations_;
   found.evaluations = evaluations_;
@@ -268,7 +273,7 @@ VectorXd step_within_bounds(const Optimisation& run, const Solve& solve) {
   }
   if (run.expected_change(step) < 0) return step;
 
-  // Several bounds at once have bent it uphill: straight on instead, to the first bound.
+  // Several bounds together made the step increase the cost: use the straight step up to the first bound instead.
   free = run.free();
   for (bool starts_inside = false; !starts_inside && !free.empty();) {
     const VectorXd p = solve(a(Eigen::all, free), run.rotated(), free);

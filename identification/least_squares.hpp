@@ -1,5 +1,5 @@
-// Nonlinear least squares: minimise 1/2 |r(x)|^2, lower <= x <= upper. The problem, what came out, and the methods of
-// the paper (Appendix B). Values of x of very different size (ohm and farad) are common: `scale` says what one is like.
+// Nonlinear least squares: minimise 1/2 |r(x)|^2 with lower <= x <= upper. Problem, result, and the methods of the
+// paper (Appendix B). The unknowns often differ greatly in size (ohm and farad): `scale` is the typical size of each.
 #pragma once
 
 #include <functional>
@@ -10,11 +10,11 @@
 namespace bms::identification {
 
 struct LeastSquares {
-  /// r of length m, J = dr/dx (m by n) where it is asked for. False: not defined at x (a simulation that left the
-  /// finite numbers).
+  /// Sets r (length m) and, unless null, J = dr/dx (m by n). Returns false if r is not defined at x, e.g. because a
+  /// simulation is not finite.
   std::function<bool(const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian)> evaluate;
-  Eigen::VectorXd lower, upper;  ///< of length n, or empty: none. Infinite entries: none on that side. lower < upper
-  Eigen::VectorXd scale;         ///< typical size of each x, > 0, or empty: all 1
+  Eigen::VectorXd lower, upper;  ///< of length n, or empty: no bounds. Infinite entries: no bound there. lower < upper
+  Eigen::VectorXd scale;         ///< typical size of each unknown, > 0; empty: all 1
 };
 
 enum class Method {
@@ -26,27 +26,27 @@ enum class Method {
 };
 
 struct Stopping {
-  double gradient =
-      1e-10;            ///< largest scaled, projected gradient, relative to |r| times the largest scaled column of J
+  /// Largest scaled, projected gradient, relative to |r| times the largest scaled column of J.
+  double gradient = 1e-10;
   double step = 1e-9;   ///< |scaled step| / |scaled x|
-  double cost = 1e-12;  ///< relative decrease, expected and reached
+  double cost = 1e-12;  ///< relative decrease of the cost, expected and reached
   int iterations = 200;
 };
 
 struct Optimum {
-  Eigen::VectorXd x;         ///< never outside the bounds, not even while searching
+  Eigen::VectorXd x;         ///< never outside the bounds, not even during the search
   double cost = 0;           ///< 1/2 |r(x)|^2
   double gradient = 0;       ///< at x, as Stopping::gradient measures it
   Eigen::VectorXi at_bound;  ///< -1 at the lower bound, 1 at the upper, 0 inside
   int iterations = 0;        ///< accepted steps
   int evaluations = 0;       ///< of r, with or without its derivatives
   bool converged = false;
-  std::string reason;  ///< why it ended, for a person
+  std::string reason;  ///< why the search ended, a sentence for the user
 };
 
-/// Throws std::invalid_argument when sizes disagree, lower >= upper or the start is not finite. A start outside the
-/// bounds is moved inside. A start where r is not defined: not converged, with that reason. The same arguments give the
-/// same result, bit for bit.
+/// Throws std::invalid_argument if sizes differ, lower >= upper or the start is not finite. A start outside the bounds
+/// is clamped. If r is not defined at the start, the result is not converged, with that reason. The same arguments give
+/// a bit-identical result.
 Optimum minimise(const LeastSquares& problem, const Eigen::VectorXd& start, Method method,
                  const Stopping& stopping = {});
 

@@ -14,9 +14,9 @@ namespace bms::identification {
 
 namespace {
 
-constexpr Eigen::Index pieces = 10;  // as the OCV of the paper has
+constexpr Eigen::Index pieces = 10;  // as many as the OCV of the paper has
 
-/// Where w lies on the curve.
+/// Position of w on the curve.
 struct Place {
   Eigen::Index below = 0;
   double weight_above = 0;
@@ -36,8 +36,8 @@ double through(const StaticCurve& curve, double w_v) {
   return curve.y_v[k] + p.weight_above * (curve.y_v[k + 1] - curve.y_v[k]);
 }
 
-/// The problem of the linear block with the curve's inner values as further unknowns; its ends stay, or gain and offset
-/// would be there twice.
+/// The problem of the linear block with the inner values of the curve as further unknowns. The ends of the curve are
+/// fixed, because gain and offset are already unknowns of the linear block.
 LeastSquares with_curve(const Data& data, const Structure& structure, const StaticCurve& start,
                         const Eigen::VectorXd& linear_start) {
   const LeastSquares linear = simulation_error(data, structure, linear_start);
@@ -74,6 +74,45 @@ Eigen::VectorXd simulated(const LinearModel& m, const Data& data) {
   return v;
 }
 
+/// A curve y = w over the range of w, and its problem.
+LeastSquares begin_curve(const Data& data, Eigen::VectorXd& start, const Stopping& stopping, LinearModel& m) {
+  const Eigen::Index linear = start.size();
+  const LeastSquares problem = simulation_error(data, m.structure, start);
+  start = minimise(problem, start, Method::trust_region_reflective, stopping).x;
+  const Eigen::VectorXd w = simulate(to_model(start, m.structure), data.current_a);
+  m.curve.w_from_v = w.minCoeff();
+  m.curve.w_step_v = std::max(1e-6, (w.maxCoeff() - w.minCoeff()) / static_cast<double>(pieces));
+  for (Eigen::Index k = 0; k <= pieces; ++k)
+    m.curve.y_v.push_back(m.curve.w_from_v + static_cast<double>(k) * m.curve.w_step_v);
+  LeastSquares with = with_curve(data, m.structure, m.curve, start);
+  start.conservativeResize(linear + pieces - 1);
+  for (Eigen::Index k = 1; k < pieces; ++k) start[linear + k - 1] = m.curve.y_v[static_cast<std::size_t>(k)];
+  return with;
+}
+
+/// The circuit parameters of the model and their standard deviations, with warnings.
+void set_circuit(const LinearModel& m, const Data& data, double soc, const Uncertainty& u, Identification& found) {
+  const double step_s = even_step_s(data.time_s), capacity_c = 3'600 * data.capacity_ah;
+  const DiscreteCoefficients c{m.model.b[0], m.model.b[1], m.model.b[2], m.model.f[0], m.model.f[1]};
+  const Intersample input =
+      m.kind == LinearKind::transfer_function ? Intersample::zero_order_hold : Intersample::first_order_hold;
+  const CircuitResult reading = circuit_from_discrete(c, step_s, capacity_c, input);
+  const CircuitParameters std = circuit_std(c, u.covariance.topLeftCorner<5, 5>(), step_s, capacity_c, input);
+  const CircuitParameters std_white =
+      circuit_std(c, u.covariance_white.topLeftCorner<5, 5>(), step_s, capacity_c, input);
+  const auto add = [&](const char* name, double CircuitParameters::*value) {
+    found.parameters.push_back(
+        {.name = name, .soc = soc, .value = reading.circuit.*value, .std = std.*value, .std_white = std_white.*value});
+  };
+  add("b1_v", &CircuitParameters::b1_v);
+  add("r0_ohm", &CircuitParameters::r0_ohm);
+  add("r1_ohm", &CircuitParameters::r1_ohm);
+  add("c1_f", &CircuitParameters::c1_f);
+  for (const std::string& what : reading.implausible)
+    found.warnings.push_back("no_circuit: " + what +
+                             "; the model follows the voltage, but it does not describe a circuit");
+}
+
 }  // namespace
 
 LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc,
@@ -85,22 +124,10 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
   m.structure = kind == LinearKind::transfer_function
                     ? transfer_function(cell.ocv.b0_v[model::cell_detail::ocv_piece(cell.ocv, soc)])
                     : output_error();
-  if (kind == LinearKind::transfer_function) m.structure.estimate_initial = true;
   Eigen::VectorXd start = to_unknowns(start_values(data, m.structure), m.structure);
-  LeastSquares problem = simulation_error(data, m.structure, start);
   const Eigen::Index linear = start.size();
-  if (kind == LinearKind::hammerstein_wiener) {
-    // from the best linear block on
-    start = minimise(problem, start, Method::trust_region_reflective, stopping).x;
-    const Eigen::VectorXd w = simulate(to_model(start, m.structure), data.current_a);
-    m.curve.w_from_v = w.minCoeff();
-    m.curve.w_step_v = std::max(1e-6, (w.maxCoeff() - w.minCoeff()) / static_cast<double>(pieces));
-    for (Eigen::Index k = 0; k <= pieces; ++k)
-      m.curve.y_v.push_back(m.curve.w_from_v + static_cast<double>(k) * m.curve.w_step_v);
-    problem = with_curve(data, m.structure, m.curve, start);
-    start.conservativeResize(linear + pieces - 1);
-    for (Eigen::Index k = 1; k < pieces; ++k) start[linear + k - 1] = m.curve.y_v[static_cast<std::size_t>(k)];
-  }
+  const LeastSquares problem = kind == LinearKind::hammerstein_wiener ? begin_curve(data, start, stopping, m)
+                                                                      : simulation_error(data, m.structure, start);
   found.optimum = minimise(problem, start, method, stopping);
   const Eigen::VectorXd& x = found.optimum.x;
   m.model = to_model(x.head(linear), m.structure);
@@ -116,26 +143,9 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
   found.fading = fading(residuals);
   found.estimation = fit_of(data.voltage_v, simulated(m, data), data.current_a, found.fading);
   found.estimation.output_variance_v2 = u.output_variance_v2;
-
-  const double step_s = even_step_s(data.time_s), capacity_c = 3'600 * data.capacity_ah;
-  const DiscreteCoefficients c{m.model.b[0], m.model.b[1], m.model.b[2], m.model.f[0], m.model.f[1]};
-  const Intersample input =
-      kind == LinearKind::transfer_function ? Intersample::zero_order_hold : Intersample::first_order_hold;
-  const CircuitResult reading = circuit_from_discrete(c, step_s, capacity_c, input);
-  const CircuitParameters std = circuit_std(c, u.covariance.topLeftCorner<5, 5>(), step_s, capacity_c, input);
-  const CircuitParameters std_white =
-      circuit_std(c, u.covariance_white.topLeftCorner<5, 5>(), step_s, capacity_c, input);
-  const auto add = [&](const char* name, double CircuitParameters::*value) {
-    found.parameters.push_back({name, soc, reading.circuit.*value, std.*value, std_white.*value, 0, false, true});
-  };
-  add("b1_v", &CircuitParameters::b1_v);
-  add("r0_ohm", &CircuitParameters::r0_ohm);
-  add("r1_ohm", &CircuitParameters::r1_ohm);
-  add("c1_f", &CircuitParameters::c1_f);
-  for (const std::string& what : reading.implausible)
-    found.warnings.push_back("no_circuit: " + what + ": the model follows the voltage, but is no circuit");
+  set_circuit(m, data, soc, u, found);
   if (!stable(m.model.f))
-    found.warnings.push_back(fmt::format("unstable: a pole lies at {:.6f}", largest_pole(m.model.f)));
+    found.warnings.push_back(fmt::format("unstable: the model has a pole at {:.6f}", largest_pole(m.model.f)));
   if (!found.optimum.converged) found.warnings.push_back("not_converged: " + found.optimum.reason);
   return out;
 }
@@ -146,8 +156,8 @@ FitStatistics validate(const LinearModel& model, const Data& data, double fading
   Eigen::MatrixXd jacobian;
   const Eigen::VectorXd w = simulate(m.model, data.current_a, &jacobian);
   const auto nf = static_cast<Eigen::Index>(m.model.f.size());
-  // The free response is linear in its start; behind the curve it is fitted where the curve is straight: measured
-  // voltages are taken back through it by its own slope, a few times.
+  // The free response is linear in its start. Behind the curve it is fitted with the slope of the curve, in a few
+  // iterations.
   Eigen::VectorXd initial = Eigen::VectorXd::Zero(nf);
   const auto free = jacobian.rightCols(nf);
   for (int pass = 0; pass < (m.curve.y_v.empty() ? 1 : 10); ++pass) {

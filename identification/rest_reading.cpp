@@ -6,99 +6,27 @@
 #include <optional>
 #include <stdexcept>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
+
+#include "identification/decay_fit.hpp"
 
 namespace bms::identification {
 
 namespace {
 
-constexpr double steady_part = 0.05;  // a loaded sample that differs by less from the last belongs to the same load
-constexpr double load_line_s = 20;    // length of the line under load, where the current was steady for so long
-constexpr double plain_line_s = 5;    // the same where tau and R1 are not known, and what bends is in the line
-constexpr double partial = 0.02;      // a last loaded sample smaller by more than this part holds the step
-constexpr std::size_t fewest = 6;     // samples of a rest: three unknowns, and as many again to judge them by
+constexpr double steady_part = 0.05;  // largest relative difference of samples of the same load
+constexpr double load_line_s = 20;    // longest line under load
+constexpr double plain_line_s = 5;    // the same where tau and R1 are not known, because the voltage then bends
+constexpr double partial = 0.02;      // a last loaded sample that is smaller by this part contains the step
+constexpr std::size_t fewest = 6;     // samples of a rest: three unknowns and three degrees of freedom
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
-}
-
-/// Samples of one rest; the load before it ends with sample `loaded`.
+/// Samples of one rest. The load before it ends with sample `loaded`.
 struct Rest {
   std::size_t loaded = 0, begin = 0, end = 0;  // [begin, end)
   double step_s = 0;
 };
 
-struct Trace {
-  std::vector<double> t_s, v;  // t from the step
-};
-
-struct Decay {
-  double level_v = 0, amplitude_v = 0, tau_s = 0;  // A, B
-  double squares = INFINITY;
-};
-
-/// A and B for a given tau.
-Decay decay_of(const Trace& trace, double tau_s) {
-  double s1 = 0, se = 0, see = 0, sv = 0, sev = 0;
-  const double v0 = trace.v.front();  // voltages differ by millivolts: keep their digits
-  for (std::size_t k = 0; k < trace.v.size(); ++k) {
-    const double e = std::exp(-trace.t_s[k] / tau_s), v = trace.v[k] - v0;
-    s1 += 1, se += e, see += e * e, sv += v, sev += e * v;
-  }
-  Decay d{0, 0, tau_s, INFINITY};
-  const double determinant = s1 * see - se * se;
-  if (!(determinant > 1e-12 * s1 * see)) return d;
-  d.amplitude_v = (s1 * sev - se * sv) / determinant;
-  d.level_v = v0 + (sv - d.amplitude_v * se) / s1;
-  d.squares = 0;
-  for (std::size_t k = 0; k < trace.v.size(); ++k) {
-    const double left = d.level_v + d.amplitude_v * std::exp(-trace.t_s[k] / tau_s) - trace.v[k];
-    d.squares += left * left;
-  }
-  return d;
-}
-
-/// Best tau: a grid, because a long flat tail makes second minima, then golden section between its neighbours.
-Decay best_decay(const Trace& trace) {
-  const double least = std::max(trace.t_s.back() / static_cast<double>(trace.t_s.size()) / 3, 1e-3),
-               most = 10 * trace.t_s.back();
-  constexpr int taus = 40;
-  const double ratio = std::pow(most / least, 1.0 / taus);
-  Decay best;
-  for (int k = 0; k <= taus; ++k) {
-    const Decay d = decay_of(trace, least * std::pow(ratio, k));
-    if (d.squares < best.squares) best = d;
-  }
-  if (!std::isfinite(best.squares)) return best;
-  double low = std::log(best.tau_s / ratio), high = std::log(best.tau_s * ratio);
-  for (int k = 0; k < 40; ++k) {
-    const double part = (std::numbers::phi - 1) * (high - low);
-    const Decay left = decay_of(trace, std::exp(high - part)), right = decay_of(trace, std::exp(low + part));
-    (left.squares < right.squares ? high : low) = left.squares < right.squares ? low + part : high - part;
-    if (left.squares < best.squares) best = left;
-    if (right.squares < best.squares) best = right;
-  }
-  return best;
-}
-
-/// The trace without samples further than five (robust) standard deviations from the fit: a loose contact, a lost bit.
-Trace without_outliers(const Trace& trace, const Decay& decay) {
-  std::vector<double> left;
-  for (std::size_t k = 0; k < trace.v.size(); ++k)
-    left.push_back(std::abs(decay.level_v + decay.amplitude_v * std::exp(-trace.t_s[k] / decay.tau_s) - trace.v[k]));
-  const double bound = std::max(5 * 1.4826 * median(left), 1e-9);
-  Trace kept;
-  for (std::size_t k = 0; k < trace.v.size(); ++k) {
-    if (left[k] > bound) continue;
-    kept.t_s.push_back(trace.t_s[k]);
-    kept.v.push_back(trace.v[k]);
-  }
-  return kept;
-}
-
-/// Straight line through v(t), its value at t = 0 and the variance of that with unit variance of v.
+/// Value of a straight line at t = 0, and its variance for unit variance of the voltages.
 struct AtZero {
   double v = 0, variance = 0;
 };
@@ -106,8 +34,11 @@ struct AtZero {
 AtZero line_at_zero(const Trace& trace) {
   const double n = static_cast<double>(trace.v.size());
   double t_mean = 0, v_mean = 0, tt = 0, tv = 0;
-  for (std::size_t k = 0; k < trace.v.size(); ++k) t_mean += trace.t_s[k] / n, v_mean += trace.v[k] / n;
-  if (trace.v.size() < 4) return {trace.v.front(), 1};  // the one next to the step
+  for (std::size_t k = 0; k < trace.v.size(); ++k) {
+    t_mean += trace.t_s[k] / n;
+    v_mean += trace.v[k] / n;
+  }
+  if (trace.v.size() < 4) return {trace.v.front(), 1};  // the sample next to the step
   for (std::size_t k = 0; k < trace.v.size(); ++k) {
     tt += (trace.t_s[k] - t_mean) * (trace.t_s[k] - t_mean);
     tv += (trace.t_s[k] - t_mean) * (trace.v[k] - v_mean);
@@ -126,7 +57,7 @@ double median_voltage(const Data& data, std::size_t from, std::size_t to) {
 
 PointReading points_of(const Data& data, const Rest& rest, double step_a) {
   PointReading p;
-  // neighbours that belong to the same point: 1 % of the rest, on the side of the step where the point lies
+  // samples of the same point: within 1 % of the rest, on the same side of the step
   const double near_s = 0.01 * (data.time_s[rest.end - 1] - rest.step_s);
   const auto within = [&](std::size_t k, std::size_t centre) {
     return std::abs(data.time_s[k] - data.time_s[centre]) <= near_s;
@@ -161,59 +92,84 @@ PointReading points_of(const Data& data, const Rest& rest, double step_a) {
   return p;
 }
 
-/// The current as the RC element feels it at the samples 0 .. loaded, then at the step; and the last one's derivative
-/// by tau.
-struct Felt {
+/// Current through R1 at the samples 0 .. loaded and at the step, and the derivative of the last one by tau.
+struct R1Current {
   std::vector<double> current_a;
   double slope_by_tau = 0;
 };
 
-Felt felt_current(const Data& data, const Rest& rest, double tau_s) {
-  Felt felt{{0}, 0};
+R1Current r1_current(const Data& data, const Rest& rest, double tau_s) {
+  R1Current r1{{0}, 0};
   for (std::size_t k = 1; k <= rest.loaded + 1; ++k) {
-    const bool at_step = k > rest.loaded;  // the load's part of the interval that holds the step
-    const double step_s = (at_step ? rest.step_s : data.time_s[k]) - data.time_s[k - 1],
-                 current_a = data.current_a[at_step ? k - 1 : k];
-    const double p = std::exp(-step_s / tau_s), before_a = felt.current_a.back();
-    felt.slope_by_tau = p * felt.slope_by_tau + (before_a - current_a) * p * step_s / (tau_s * tau_s);
-    felt.current_a.push_back(p * before_a + (1 - p) * current_a);
+    const bool at_step = k > rest.loaded;  // the part under load of the interval with the step
+    const double step_s = (at_step ? rest.step_s : data.time_s[k]) - data.time_s[k - 1];
+    const double current_a = data.current_a[at_step ? k - 1 : k];
+    const double p = std::exp(-step_s / tau_s), before_a = r1.current_a.back();
+    r1.slope_by_tau = p * r1.slope_by_tau + (before_a - current_a) * p * step_s / (tau_s * tau_s);
+    r1.current_a.push_back(p * before_a + (1 - p) * current_a);
   }
-  return felt;
+  return r1;
 }
 
-/// Voltage under load at the step: the RC element's part by r1_ohm (0: not known), the rest of it a straight line.
-AtZero load_at_step(const Data& data, const Rest& rest, const Felt& felt, double r1_ohm) {
+/// Voltage under load at the step: the part of the RC element by r1_ohm (0: not known), the rest by a straight line.
+AtZero load_at_step(const Data& data, const Rest& rest, const R1Current& r1, double r1_ohm) {
   Trace load;
   const double loaded_a = data.current_a[rest.loaded], longest_s = r1_ohm > 0 ? load_line_s : plain_line_s;
   for (std::size_t k = rest.loaded + 1; k-- > 0;) {
-    // the first sample of a load may have lain under it for part of its interval only
+    // the load may have begun within the interval of its first sample
     if (std::abs(data.current_a[k] - loaded_a) > steady_part * std::abs(loaded_a) ||
         rest.step_s - data.time_s[k] > longest_s)
       break;
     if (!std::isfinite(data.voltage_v[k])) continue;
     load.t_s.push_back(data.time_s[k] - rest.step_s);
-    load.v.push_back(data.voltage_v[k] - r1_ohm * felt.current_a[k]);
+    load.v.push_back(data.voltage_v[k] - r1_ohm * r1.current_a[k]);
   }
   if (load.v.empty()) return {NAN, NAN};
   AtZero a = line_at_zero(load);
-  a.v += r1_ohm * felt.current_a.back();
+  a.v += r1_ohm * r1.current_a.back();
   return a;
 }
 
-std::optional<RestReading> read(const Data& data, const Rest& rest, const RestReadingOptions& options) {
-  Trace trace;
+std::optional<FittedDecay> fit_rest(const Data& data, const Rest& rest) {
+  FittedDecay fitted;
+  Trace all;
   for (std::size_t k = rest.begin; k < rest.end; ++k) {
     if (!std::isfinite(data.voltage_v[k])) continue;
-    trace.t_s.push_back(data.time_s[k] - rest.step_s);
-    trace.v.push_back(data.voltage_v[k]);
+    all.t_s.push_back(data.time_s[k] - rest.step_s);
+    all.v.push_back(data.voltage_v[k]);
   }
-  if (trace.v.size() < fewest) return std::nullopt;
-  Decay decay = best_decay(trace);
-  if (!std::isfinite(decay.squares)) return std::nullopt;
-  const Trace kept = without_outliers(trace, decay);
-  if (kept.v.size() < fewest) return std::nullopt;
-  decay = best_decay(kept);
-  if (!std::isfinite(decay.squares)) return std::nullopt;
+  if (all.v.size() < fewest) return std::nullopt;
+  fitted.decay = best_decay(all);
+  if (!std::isfinite(fitted.decay.squares)) return std::nullopt;
+  fitted.trace = without_outliers(all, fitted.decay);
+  if (fitted.trace.v.size() < fewest) return std::nullopt;
+  fitted.decay = best_decay(fitted.trace);
+  if (!std::isfinite(fitted.decay.squares)) return std::nullopt;
+  return fitted;
+}
+
+bool positive(double x) { return std::isfinite(x) && x > 0; }
+
+/// R1 and C1 with their standard deviations.
+void set_rc(const FittedDecay& fitted, const R1Current& r1, double rest_a, double variance_v2, double largest_std,
+            RestReading& out) {
+  const Decay& decay = fitted.decay;
+  const Eigen::Matrix3d covariance = covariance_of(fitted, variance_v2);
+  const double decaying_a = rest_a - r1.current_a.back();  // current through R1 that still decays
+  out.r1_ohm = -decay.amplitude_v / decaying_a;
+  out.c1_f = out.tau_s / out.r1_ohm;
+  out.tau_std_s = std::sqrt(covariance(2, 2));
+  const Eigen::Vector3d r1_by{0, out.r1_ohm / decay.amplitude_v, out.r1_ohm * r1.slope_by_tau / decaying_a};
+  const Eigen::Vector3d c1_by = Eigen::Vector3d{0, 0, 1 / out.r1_ohm} - out.c1_f / out.r1_ohm * r1_by;
+  out.r1_std_ohm = std::sqrt(r1_by.dot(covariance * r1_by));
+  out.c1_std_f = std::sqrt(c1_by.dot(covariance * c1_by));
+  out.rc_usable = positive(out.r1_ohm) && positive(out.c1_f) && out.tau_std_s < largest_std * out.tau_s;
+}
+
+std::optional<RestReading> read(const Data& data, const Rest& rest, const RestReadingOptions& options) {
+  const std::optional<FittedDecay> fitted = fit_rest(data, rest);
+  if (!fitted) return std::nullopt;
+  const Decay& decay = fitted->decay;
 
   RestReading out;
   out.time_s = rest.step_s;
@@ -222,96 +178,107 @@ std::optional<RestReading> read(const Data& data, const Rest& rest, const RestRe
   std::vector<double> resting;
   for (std::size_t k = rest.begin; k < rest.end; ++k) resting.push_back(data.current_a[k]);
   const double rest_a = median(resting), step_a = rest_a - out.load_a;
-  const std::size_t n = kept.v.size();
-  const double variance_v2 = decay.squares / static_cast<double>(n - 3);
-  out.residual_v = std::sqrt(decay.squares / static_cast<double>(n));
+  const auto n = static_cast<double>(fitted->trace.v.size());
+  constexpr double unknowns = 3;  // A, B, tau
+  const double variance_v2 = decay.squares / (n - unknowns);
+  out.residual_v = std::sqrt(decay.squares / n);
   out.tau_s = decay.tau_s;
   out.relaxed_fraction = -std::expm1(-out.rest_s / out.tau_s);
 
-  // Covariance of A, B, tau, and of the first samples' level among them.
-  Eigen::MatrixXd slope(static_cast<Eigen::Index>(n), 3);
-  for (std::size_t k = 0; k < n; ++k) {
-    const double e = std::exp(-kept.t_s[k] / decay.tau_s);
-    slope.row(static_cast<Eigen::Index>(k)) << 1, e, decay.amplitude_v * e * kept.t_s[k] / (decay.tau_s * decay.tau_s);
-  }
-  const Eigen::Vector3d size = slope.colwise().norm().cwiseMax(1e-300);
-  slope *= size.cwiseInverse().asDiagonal();
-  const Eigen::Matrix3d normal = slope.transpose() * slope;
-  const Eigen::Matrix3d inverse = normal.completeOrthogonalDecomposition().pseudoInverse();
-  const Eigen::Matrix3d covariance =
-      variance_v2 * (size.cwiseInverse().asDiagonal() * inverse * size.cwiseInverse().asDiagonal());
-
-  std::size_t first = 0;
-  double first_left_v = 0;  // what the fit leaves in the first samples: a faster relaxation, if there is one
-  while (first < n && (first < 5 || kept.t_s[first] < kept.t_s[0] + 0.02 * decay.tau_s)) {
-    first_left_v += kept.v[first] - decay.level_v - decay.amplitude_v * std::exp(-kept.t_s[first] / decay.tau_s);
-    ++first;
-  }
-  first_left_v /= static_cast<double>(first);
-  const Felt felt = felt_current(data, rest, decay.tau_s);
-  const double lasting_a = rest_a - felt.current_a.back();  // what the element has still to forget
-  out.r1_ohm = -decay.amplitude_v / lasting_a;
-  out.c1_f = out.tau_s / out.r1_ohm;
-  out.tau_std_s = std::sqrt(covariance(2, 2));
-  const Eigen::Vector3d r1_by{0, out.r1_ohm / decay.amplitude_v, out.r1_ohm * felt.slope_by_tau / lasting_a};
-  const Eigen::Vector3d c1_by = Eigen::Vector3d{0, 0, 1 / out.r1_ohm} - out.c1_f / out.r1_ohm * r1_by;
-  out.r1_std_ohm = std::sqrt(r1_by.dot(covariance * r1_by));
-  out.c1_std_f = std::sqrt(c1_by.dot(covariance * c1_by));
-  const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
-  out.rc_usable = positive(out.r1_ohm) && positive(out.c1_f) && out.tau_std_s < options.largest_std * out.tau_s;
-
-  const AtZero a = load_at_step(data, rest, felt, out.rc_usable ? out.r1_ohm : 0);
-  const double b_v = decay.level_v + decay.amplitude_v + first_left_v;
+  const R1Current r1 = r1_current(data, rest, decay.tau_s);
+  set_rc(*fitted, r1, rest_a, variance_v2, options.largest_std, out);
+  const FirstSamples first = first_samples(*fitted);
+  const AtZero a = load_at_step(data, rest, r1, out.rc_usable ? out.r1_ohm : 0);
+  const double b_v = decay.level_v + decay.amplitude_v + first.residual_v;
   out.r0_ohm = (b_v - a.v) / step_a;
-  out.r0_std_ohm = std::sqrt(variance_v2 * (a.variance + 1 / static_cast<double>(first))) / std::abs(step_a);
+  out.r0_std_ohm = std::sqrt(variance_v2 * (a.variance + 1 / static_cast<double>(first.count))) / std::abs(step_a);
   out.r0_usable = positive(out.r0_ohm);
   out.points = points_of(data, rest, step_a);
   return out;
 }
 
-}  // namespace
-
-RestReadings read_rests(const Data& data, const RestReadingOptions& options) {
+void require_recording(const Data& data) {
   if (data.current_a.size() != data.size() || data.voltage_v.size() != data.size())
     throw std::invalid_argument("time, current and voltage differ in length");
-  if (!(data.capacity_ah > 0)) throw std::invalid_argument("a load is judged by the capacity, which is not given");
+  if (!(data.capacity_ah > 0)) throw std::invalid_argument("the capacity is missing, which defines what a load is");
   for (std::size_t k = 0; k < data.size(); ++k) {
     if (!std::isfinite(data.current_a[k])) throw std::invalid_argument("a current is not a finite number");
     if (k > 0 && !(data.time_s[k] > data.time_s[k - 1]))
       throw std::invalid_argument("time does not rise from sample to sample");
   }
-  const double load_a = options.load_c_rate * data.capacity_ah, quiet_a = options.rest_c_rate * data.capacity_ah;
-  const auto loaded = [&](std::size_t k) { return std::abs(data.current_a[k]) >= load_a; };
-  const auto quiet = [&](std::size_t k) { return std::abs(data.current_a[k]) < quiet_a; };
+}
 
-  RestReadings out;
-  bool any_load = false;
-  std::size_t long_enough = 0;
-  for (std::size_t k = 1; k < data.size(); ++k) {
-    any_load = any_load || loaded(k);
-    if (!quiet(k) || quiet(k - 1)) continue;
-    Rest rest{k - 1, k, k, data.time_s[k - 1]};
-    while (rest.end < data.size() && quiet(rest.end)) ++rest.end;
-    if (data.time_s[rest.end - 1] - rest.step_s < options.duration_s) continue;
-    // Two steady loaded samples, then the rest, or one between that holds the step: its mean tells where.
-    const auto same = [&](std::size_t one, std::size_t other) {
-      return std::abs(data.current_a[one] - data.current_a[other]) < options.steady * std::abs(data.current_a[other]);
-    };
-    const std::size_t last = rest.loaded;
-    if (last >= 2 && loaded(last - 1) && same(last - 2, last - 1)) {
-      const double part = data.current_a[last] / data.current_a[last - 1];
-      if (!(part > 0 && part < 1 + options.steady)) continue;
-      if (part < 1 - partial) {
-        rest.step_s = data.time_s[last - 1] + part * (data.time_s[last] - data.time_s[last - 1]);
-        --rest.loaded;
-      }
-    } else if (!loaded(last) || last == 0 || !same(last - 1, last)) {
-      continue;
+/// Finds the rests of a recording that follow a steady load.
+class RestSearch {
+ public:
+  RestSearch(const Data& data, const RestReadingOptions& options)
+      : data_(data),
+        options_(options),
+        load_a_(options.load_c_rate * data.capacity_ah),
+        rest_a_(options.rest_c_rate * data.capacity_ah) {
+    for (std::size_t k = 1; k < data.size(); ++k) {
+      any_load_ = any_load_ || loaded(k);
+      if (!resting(k) || resting(k - 1)) continue;
+      if (const auto rest = rest_from(k)) rests_.push_back(*rest);
     }
-    ++long_enough;
-    if (const auto reading = read(data, rest, options)) out.rests.push_back(*reading);
   }
 
+  bool any_load() const { return any_load_; }
+  const std::vector<Rest>& rests() const { return rests_; }
+
+ private:
+  bool loaded(std::size_t k) const { return std::abs(data_.current_a[k]) >= load_a_; }
+  bool resting(std::size_t k) const { return std::abs(data_.current_a[k]) < rest_a_; }
+  bool same(std::size_t one, std::size_t other) const {
+    return std::abs(data_.current_a[one] - data_.current_a[other]) < options_.steady * std::abs(data_.current_a[other]);
+  }
+
+  /// The rest that begins with sample k. Before it there are two steady loaded samples, and possibly one more that
+  /// contains the step: its mean current gives the instant. Empty: too short, or no steady load.
+  std::optional<Rest> rest_from(std::size_t k) const {
+    Rest rest{k - 1, k, k, data_.time_s[k - 1]};
+    while (rest.end < data_.size() && resting(rest.end)) ++rest.end;
+    if (data_.time_s[rest.end - 1] - rest.step_s < options_.duration_s) return std::nullopt;
+    const std::size_t last = rest.loaded;
+    if (last >= 2 && loaded(last - 1) && same(last - 2, last - 1)) {
+      const double part = data_.current_a[last] / data_.current_a[last - 1];
+      if (!(part > 0 && part < 1 + options_.steady)) return std::nullopt;
+      if (part < 1 - partial) {
+        rest.step_s = data_.time_s[last - 1] + part * (data_.time_s[last] - data_.time_s[last - 1]);
+        --rest.loaded;
+      }
+      return rest;
+    }
+    const bool steady = loaded(last) && last > 0 && same(last - 1, last);
+    return steady ? std::optional(rest) : std::nullopt;
+  }
+
+  const Data& data_;
+  const RestReadingOptions& options_;
+  const double load_a_, rest_a_;
+  bool any_load_ = false;
+  std::vector<Rest> rests_;
+};
+
+/// Why a median is missing; empty if both are known.
+const char* reason_of(const RestReadings& out, const RestSearch& search) {
+  if (!search.any_load()) return "the current never reaches the load from which a step into a rest must start";
+  if (search.rests().empty()) return "no steady load is followed by a rest that is long enough";
+  if (out.rests.empty()) return "the rests contain too few measured voltages";
+  if (out.r0_from == 0) return "no rest gives a positive R0, so the sign of the current may be inverted";
+  if (out.rc_from == 0) return "no rest is long enough to determine the time constant, so R1 and C1 are not known";
+  return "";
+}
+
+}  // namespace
+
+RestReadings read_rests(const Data& data, const RestReadingOptions& options) {
+  require_recording(data);
+  const RestSearch search(data, options);
+  RestReadings out;
+  for (const Rest& rest : search.rests()) {
+    if (const auto reading = read(data, rest, options)) out.rests.push_back(*reading);
+  }
   std::vector<double> r0, r1, tau, c1;
   for (const RestReading& r : out.rests) {
     if (r.r0_usable) r0.push_back(r.r0_ohm);
@@ -323,17 +290,12 @@ RestReadings read_rests(const Data& data, const RestReadingOptions& options) {
   out.r0_from = r0.size();
   out.rc_from = r1.size();
   if (!r0.empty()) out.r0_ohm = median(r0);
-  if (!r1.empty()) out.r1_ohm = median(r1), out.tau_s = median(tau), out.c1_f = median(c1);
-  if (!any_load)
-    out.reason = "the current never reaches the load that a step into a rest must start from";
-  else if (long_enough == 0)
-    out.reason = "no steady load is followed by a rest that is long enough";
-  else if (out.rests.empty())
-    out.reason = "the rests hold too few measured voltages";
-  else if (r0.empty())
-    out.reason = "no rest gives a positive R0: is the sign of the current right?";
-  else if (r1.empty())
-    out.reason = "no rest is long enough to tell the time constant: R1 and C1 are not known";
+  if (!r1.empty()) {
+    out.r1_ohm = median(r1);
+    out.tau_s = median(tau);
+    out.c1_f = median(c1);
+  }
+  out.reason = reason_of(out, search);
   return out;
 }
 

@@ -12,8 +12,8 @@ namespace bms::identification {
 
 namespace {
 
-/// Sum over all pairs of samples at most `window` apart, weighted by 1 - distance / window, of score score'. As sums
-/// over a moving window, whose products have just these weights.
+/// Sum of score score' over all pairs of samples at most `window` apart, weighted by 1 - distance / window. Computed
+/// with sums over a moving window, whose products have these weights.
 Eigen::MatrixXd long_run(const Eigen::MatrixXd& scores, Eigen::Index window) {
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(scores.cols(), scores.cols());
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(scores.cols());
@@ -26,6 +26,61 @@ Eigen::MatrixXd long_run(const Eigen::MatrixXd& scores, Eigen::Index window) {
   return total.selfadjointView<Eigen::Lower>();
 }
 
+/// The columns of J that count, each scaled to length 1, so that one threshold serves ohm and farad.
+struct FreeColumns {
+  std::vector<Eigen::Index> index;  ///< of the parameter
+  Eigen::VectorXd norm;
+  Eigen::MatrixXd scaled;
+  Eigen::Index size() const { return static_cast<Eigen::Index>(index.size()); }
+  Eigen::Index of(Eigen::Index k) const { return index[static_cast<std::size_t>(k)]; }
+};
+
+FreeColumns free_columns(const Eigen::MatrixXd& jacobian, const Eigen::VectorXi& fixed) {
+  constexpr double negligible = 1e-14;  // length of a column, relative to the longest
+  FreeColumns free;
+  const double largest = jacobian.size() > 0 ? jacobian.colwise().norm().maxCoeff() : 0;
+  for (Eigen::Index k = 0; k < jacobian.cols(); ++k) {
+    if (fixed[k] == 0 && jacobian.col(k).norm() > negligible * largest) free.index.push_back(k);
+  }
+  free.norm.resize(free.size());
+  free.scaled.resize(jacobian.rows(), free.size());
+  for (Eigen::Index k = 0; k < free.size(); ++k) {
+    free.norm[k] = jacobian.col(free.of(k)).norm();
+    free.scaled.col(k) = jacobian.col(free.of(k)) / free.norm[k];
+  }
+  return free;
+}
+
+/// (J'J)^-1 of the scaled columns without the directions that the data do not determine. Sets `identifiable`.
+Eigen::MatrixXd pseudo_inverse(const FreeColumns& free, Eigen::VectorXi& identifiable) {
+  constexpr double undetermined = 1e-12;  // eigenvalue
+  constexpr double largest_part = 0.01;   // of a parameter that lies in undetermined directions
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(free.scaled.transpose() * free.scaled));
+  Eigen::VectorXd inverse = eigen.eigenvalues();
+  for (double& value : inverse) value = value > undetermined ? 1 / value : 0;
+  for (Eigen::Index k = 0; k < free.size(); ++k) {
+    double hidden = 0;
+    for (Eigen::Index e = 0; e < free.size(); ++e)
+      hidden += inverse[e] > 0 ? 0 : eigen.eigenvectors()(k, e) * eigen.eigenvectors()(k, e);
+    identifiable[free.of(k)] = hidden < largest_part ? 1 : 0;
+  }
+  return eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+/// The middle of the coloured covariance: the long-run covariance of the scores of the samples, and the priors.
+Eigen::MatrixXd coloured_scores(const Eigen::VectorXd& sample_residuals, Eigen::MatrixXd scores, const Uncertainty& u) {
+  const Eigen::Index data = sample_residuals.size(), priors = scores.rows() - data;
+  const Eigen::MatrixXd of_priors =
+      scores.bottomRows(priors).transpose() * scores.bottomRows(priors) * (u.output_variance_v2 * u.correlation_length);
+  const auto parameters = static_cast<double>(scores.cols()), n = static_cast<double>(data);
+  scores.conservativeResize(data, Eigen::NoChange);
+  scores.array().colwise() *= sample_residuals.array();
+  const auto window = static_cast<Eigen::Index>(std::clamp(6 * u.correlation_length, 1.0, std::max(1.0, 0.25 * n)));
+  // parameters take some freedom from the residuals, and the window takes some from the long run
+  const double freedom = n / std::max(1.0, n - parameters) * n / (n - static_cast<double>(window - 1));
+  return long_run(scores, window) * freedom + of_priors;
+}
+
 }  // namespace
 
 double Uncertainty::std(Eigen::Index k) const { return std::sqrt(std::max(0.0, covariance(k, k))); }
@@ -34,59 +89,27 @@ double Uncertainty::std_white(Eigen::Index k) const { return std::sqrt(std::max(
 
 Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data,
                         const Eigen::VectorXi& fixed, double offset_v) {
-  const Eigen::Index m = jacobian.rows(), n = jacobian.cols(), beliefs = m - data;
+  const Eigen::Index n = jacobian.cols();
   Uncertainty u;
   u.covariance = u.covariance_white = Eigen::MatrixXd::Zero(n, n);
   u.correlation = Eigen::MatrixXd::Identity(n, n);
   u.identifiable = Eigen::VectorXi::Zero(n);
   u.offset = Eigen::VectorXd::Zero(n);
 
-  // free parameters in units of what moves the voltage by the same amount, so that one threshold serves ohm and farad
-  std::vector<Eigen::Index> free;
-  const double largest = jacobian.size() > 0 ? jacobian.colwise().norm().maxCoeff() : 0;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    if (fixed[k] == 0 && jacobian.col(k).norm() > 1e-14 * largest) free.push_back(k);
-  }
-  const auto f = static_cast<Eigen::Index>(free.size());
+  const FreeColumns free = free_columns(jacobian, fixed);
+  const Eigen::Index f = free.size();
   u.output_variance_v2 = residuals.head(data).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, data - f));
   u.correlation_length = correlation_length(residuals.head(data));
   if (f == 0) return u;
-  Eigen::VectorXd norm(f);
-  Eigen::MatrixXd scores(m, f);
-  for (Eigen::Index k = 0; k < f; ++k) {
-    norm[k] = jacobian.col(free[static_cast<std::size_t>(k)]).norm();
-    scores.col(k) = jacobian.col(free[static_cast<std::size_t>(k)]) / norm[k];
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(scores.transpose() * scores));
-  // directions that the data do not show: their parameters are not seen, the others are judged without them
-  constexpr double unseen = 1e-12;
-  Eigen::VectorXd inverse = eigen.eigenvalues();
-  for (Eigen::Index k = 0; k < f; ++k) inverse[k] = inverse[k] > unseen ? 1 / inverse[k] : 0;
-  for (Eigen::Index k = 0; k < f; ++k) {
-    double hidden = 0;
-    for (Eigen::Index e = 0; e < f; ++e)
-      hidden += inverse[e] > 0 ? 0 : eigen.eigenvectors()(k, e) * eigen.eigenvectors()(k, e);
-    u.identifiable[free[static_cast<std::size_t>(k)]] = hidden < 0.01 ? 1 : 0;
-  }
-  const Eigen::MatrixXd bread = eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
-  const Eigen::VectorXd shift = bread * scores.topRows(data).colwise().sum().transpose() * offset_v;
-  const Eigen::MatrixXd of_beliefs = scores.bottomRows(beliefs).transpose() * scores.bottomRows(beliefs) *
-                                     (u.output_variance_v2 * u.correlation_length);
-  scores.conservativeResize(data, Eigen::NoChange);
-  scores.array().colwise() *= residuals.head(data).array();
-  const auto window = static_cast<Eigen::Index>(
-      std::clamp(6 * u.correlation_length, 1.0, std::max(1.0, 0.25 * static_cast<double>(data))));
-  // parameters take some freedom from the residuals, and the window some from the long run
-  const auto n_data = static_cast<double>(data);
-  const double freedom =
-      n_data / std::max(1.0, n_data - static_cast<double>(f)) * n_data / (n_data - static_cast<double>(window - 1));
-  const Eigen::MatrixXd coloured = bread * (long_run(scores, window) * freedom + of_beliefs) * bread;
+  const Eigen::MatrixXd inverse = pseudo_inverse(free, u.identifiable);
+  const Eigen::VectorXd shift = inverse * free.scaled.topRows(data).colwise().sum().transpose() * offset_v;
+  const Eigen::MatrixXd coloured = inverse * coloured_scores(residuals.head(data), free.scaled, u) * inverse;
   for (Eigen::Index a = 0; a < f; ++a) {
-    u.offset[free[static_cast<std::size_t>(a)]] = shift[a] / norm[a];
+    u.offset[free.of(a)] = shift[a] / free.norm[a];
     for (Eigen::Index b = 0; b < f; ++b) {
-      const Eigen::Index row = free[static_cast<std::size_t>(a)], column = free[static_cast<std::size_t>(b)];
-      u.covariance(row, column) = coloured(a, b) / (norm[a] * norm[b]);
-      u.covariance_white(row, column) = u.output_variance_v2 * bread(a, b) / (norm[a] * norm[b]);
+      const double norms = free.norm[a] * free.norm[b];
+      u.covariance(free.of(a), free.of(b)) = coloured(a, b) / norms;
+      u.covariance_white(free.of(a), free.of(b)) = u.output_variance_v2 * inverse(a, b) / norms;
     }
   }
   for (Eigen::Index a = 0; a < n; ++a) {

@@ -1,13 +1,14 @@
-// How far the parameters of a fit are to be believed.
+// Uncertainty of the parameters of a fit.
 //
-//   white      s^2 (J'J)^-1, as if each residual were new
-//   coloured   (J'J)^-1 J' W J (J'J)^-1, W from the residuals as they follow each other: residuals of a battery model
-//   come in long
-//              runs, each run counts once (Newey and West, Econometrica 55 (1987) 703, Bartlett window)
-//   offset     what a voltage error that is constant over the record (of the OCV curve, of the sensor) would move; more
-//   samples do not help
+//   white      s^2 (J'J)^-1, as if the residuals were white
+//   coloured   (J'J)^-1 J' W J (J'J)^-1, W from the autocorrelation of the residuals. Residuals of a battery model come
+//   in
+//              long runs; each run counts once (Newey and West, Econometrica 55 (1987) 703, Bartlett window)
+//   offset     change of the parameters by a voltage error that is constant over the recording (of the OCV curve, of
+//   the
+//              sensor); more samples do not reduce it
 //
-// Parameters at a bound are held there and have no deviation of their own.
+// Parameters at a bound are fixed there and have no standard deviation.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,21 +16,21 @@
 namespace bms::identification {
 
 struct Uncertainty {
-  Eigen::MatrixXd covariance;  ///< coloured; 0 for parameters that were held
+  Eigen::MatrixXd covariance;  ///< coloured; 0 for fixed parameters
   Eigen::MatrixXd covariance_white;
   Eigen::MatrixXd correlation;    ///< of `covariance`; 1 on its diagonal
-  double output_variance_v2 = 0;  ///< of the residuals, over samples less parameters
-  double correlation_length = 1;  ///< samples over which residuals are alike
-  Eigen::VectorXd offset;         ///< how far each parameter would move with the constant error
-  Eigen::VectorXi identifiable;   ///< 0: nothing in the data depends on this parameter, or only together with others
+  double output_variance_v2 = 0;  ///< of the residuals, over samples minus parameters
+  double correlation_length = 1;  ///< samples over which residuals are correlated
+  Eigen::VectorXd offset;         ///< change of each parameter by the constant error
+  Eigen::VectorXi identifiable;   ///< 0: the data do not depend on this parameter, or only together with others
 
   double std(Eigen::Index k) const;
   double std_white(Eigen::Index k) const;
   double std_with_offset(Eigen::Index k) const;
 };
 
-/// residuals: m. jacobian: m by n. The first `data` rows are samples in order, the rest beliefs, which count as one run
-/// of residuals each. held: n, not 0 for parameters at a bound. offset_v: a constant error to reckon with, >= 0.
+/// residuals: m. jacobian: m by n. The first `data` rows are samples in order; the others are priors, each of which
+/// counts as one run of residuals. fixed: n, not 0 for parameters at a bound. offset_v: the constant error, >= 0.
 Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data,
                         const Eigen::VectorXi& fixed, double offset_v);
 

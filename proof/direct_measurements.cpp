@@ -30,7 +30,7 @@ Range read_range(files::TomlTable& table, const std::string& key) {
 }
 
 double rms_error_v(const workflow::RecordingComparison& c, const std::vector<double>& simulated_v, Range range) {
-  ErrorFigure error;
+  identification::ErrorFigure error;
   for (std::size_t k = 0; k < c.record.size(); ++k) {
     if (c.recording.soc_ref[k] >= range.from && c.recording.soc_ref[k] <= range.to)
       error.add(c.record.voltage_v[k] - simulated_v[k]);

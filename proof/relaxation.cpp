@@ -33,7 +33,7 @@ class Relaxation : public Procedure {
   void claim_rest(const workflow::RecordingComparison& c, const Rows& rest, std::size_t number,
                   ProofExperiment& e) const {
     const std::size_t last = rest.end - 1;
-    ErrorFigure before, after;
+    identification::ErrorFigure before, after;
     ProofLines lines{
         fmt::format("Rest {} of {}, relative to its end; diagnosed: {}", number, stem(rests_of_), stem(diagnosed_)),
         {"measured, mV", "cell file, mV", "extended, mV"},

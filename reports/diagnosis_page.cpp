@@ -30,7 +30,9 @@ json rounded(double value, int decimals) {
   return std::isfinite(value) ? json(std::round(value * scale) / scale) : json(nullptr);
 }
 
-json rms_mv(const ErrorFigure& error) { return error.count() > 0 ? rounded(1e3 * error.rms(), 3) : json(nullptr); }
+json rms_mv(const identification::ErrorFigure& error) {
+  return error.count() > 0 ? rounded(1e3 * error.rms(), 3) : json(nullptr);
+}
 
 json spans_of(const std::vector<model::Span>& spans) {
   json list = json::array();
@@ -65,7 +67,7 @@ json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins
                 {"low_a", json::array()},     {"high_a", json::array()},   {"temperature_c", json::array()}};
   std::size_t k = 0;
   for (std::size_t b = 0; b < bins; ++b) {
-    ErrorFigure before, after;
+    identification::ErrorFigure before, after;
     double low_a = std::nan(""), high_a = std::nan(""), sum_c = 0;
     std::size_t temperatures = 0;
     const std::size_t first = k;
@@ -282,7 +284,7 @@ json found_range(const diagnosis::Regime& g, const Axis& axis) {
 
 /// RMS errors and time in bins from `low` to `high`.
 json binned(const workflow::DiagnoseResult& r, const Axis& axis, const AxisRows& rows, double low, double high) {
-  std::vector<ErrorFigure> before(regime_bins), after(regime_bins);
+  std::vector<identification::ErrorFigure> before(regime_bins), after(regime_bins);
   for (std::size_t k = 0; k < rows.at.size(); ++k) {
     if (!std::isfinite(rows.at[k])) continue;
     const auto bin =

@@ -64,8 +64,8 @@ void compare(DiagnoseResult& r) {
 
 std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& list,
                                        std::vector<double> RecordingComparison::*simulated) {
-  ErrorFigure error;
-  FitFigure fit;
+  identification::ErrorFigure error;
+  identification::FitFigure fit;
   for (const RecordingComparison& c : list) {
     for (std::size_t k = 0; k < c.record.size(); ++k) {
       error.add(c.record.voltage_v[k] - (c.*simulated)[k]);
@@ -77,8 +77,8 @@ std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& l
 }
 
 std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
-  ErrorFigure base, extended;
-  const auto add = [](const files::CellFile& cell, const RecordingComparison& c, ErrorFigure& figure) {
+  identification::ErrorFigure base, extended;
+  const auto add = [](const files::CellFile& cell, const RecordingComparison& c, identification::ErrorFigure& figure) {
     const auto start =
         host_sim::starting_point(host_sim::SocPrior{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)});
     const host_sim::Track track =

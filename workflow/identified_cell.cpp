@@ -12,7 +12,7 @@
 #include "files/cell_fields.hpp"
 #include "files/recording.hpp"
 #include "host_sim/simulation.hpp"
-#include "identification/ocv_curve.hpp"
+#include "identification/ocv_pieces.hpp"
 
 namespace bms::workflow {
 

@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_bisections = 10;  // a step still too long then says that J has lost rank
+constexpr int most_bisections = 10;  // if the step is still too long, J has lost rank
 
 VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
   const Eigen::BDCSVD<MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
@@ -32,7 +32,7 @@ VectorXd subspace_step(const Optimisation& run, double tolerance) {
       run, [&](const MatrixXd& a, const VectorXd& b, const Indices&) { return subspace_step(a, b, tolerance); });
 }
 
-/// Bisections that were needed, more than most_bisections if in vain.
+/// Number of bisections; more than most_bisections if no smaller cost was found.
 int move_along(Optimisation& run, const VectorXd& step) {
   const double slope = run.gradient().dot(step);
   double length = 1;
@@ -43,8 +43,8 @@ int move_along(Optimisation& run, const VectorXd& step) {
   return most_bisections + 1;
 }
 
-/// The last resort where J has lost rank and its step leads too far: down the gradient, columns of J brought to one
-/// length.
+/// For a J that has lost rank and gives a step that is too long: a step along the negative gradient, with the columns
+/// of J scaled to one length.
 bool move_down_gradient(Optimisation& run) {
   VectorXd step = VectorXd::Zero(run.size());
   for (const Index i : run.free()) step[i] = -run.gradient()[i] / (run.column_norms()[i] * run.column_norms()[i]);
@@ -56,7 +56,7 @@ bool move_down_gradient(Optimisation& run) {
 }  // namespace
 
 void search_gauss_newton(Optimisation& run) {
-  // what the toolbox leaves out, GnPinvConst = 1e4
+  // the tolerance of the toolbox, GnPinvConst = 1e4
   const double tolerance =
       1e4 * static_cast<double>(std::max(run.rows(), run.size())) * std::numeric_limits<double>::epsilon();
   while (!run.finished()) {
@@ -65,14 +65,14 @@ void search_gauss_newton(Optimisation& run) {
 }
 
 void search_adaptive_gauss_newton(Optimisation& run) {
-  // The paper's are for the eigenvalues of J'J: start 1e-4, up by 2, down by 4. Here their roots.
+  // The values of Wills & Ninness hold for the eigenvalues of J'J: start 1e-4, up by 2, down by 4. Here: their roots.
   constexpr double start = 1e-2, up = 1.4142135623730951, down = 2, smallest = 1e-12, largest = 0.5;
   double gamma = start;
-  bool in_vain = false;  // the last search, in a larger subspace
+  bool in_vain = false;  // the last line search failed in a larger subspace
   while (!run.finished()) {
     const VectorXd step = subspace_step(run, gamma);
     const bool exhausted =
-        -run.expected_change(step) <= run.stopping().cost * run.cost();  // nothing left in this subspace
+        -run.expected_change(step) <= run.stopping().cost * run.cost();  // no further decrease in this subspace
     if ((exhausted && (in_vain || gamma <= smallest)) || (in_vain && gamma >= largest)) {
       if (!move_down_gradient(run)) run.no_decrease();
       in_vain = false;

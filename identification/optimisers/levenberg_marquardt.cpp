@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Minimises |A p + b|^2 + damping |D p|^2, by QR of both on top of each other.
+/// Minimises |A p + b|^2 + damping |D p|^2 by QR of both stacked.
 VectorXd damped_step(const MatrixXd& a, const VectorXd& b, const VectorXd& weights, double damping) {
   const Index n = a.rows(), columns = a.cols();
   MatrixXd both = MatrixXd::Zero(n + columns, columns);
@@ -29,7 +29,7 @@ VectorXd damped_step(const MatrixXd& a, const VectorXd& b, const VectorXd& weigh
 }  // namespace
 
 void search_levenberg_marquardt(Optimisation& run) {
-  constexpr double largest_damping = 1e30;  // relative to J'J: no step is left
+  constexpr double largest_damping = 1e30;  // relative to J'J: the step is zero
   double damping = 1e-3, raise = 2;
   while (!run.finished()) {
     const VectorXd step = step_within_bounds(run, [&](const MatrixXd& a, const VectorXd& b, const Indices& free) {

@@ -31,7 +31,7 @@ void search_steepest_descent(Optimisation& run) {
     VectorXd direction = VectorXd::Zero(run.size());
     for (const Eigen::Index i : run.free()) direction[i] = -run.gradient()[i];
     const double curvature = (run.factor() * direction).squaredNorm();
-    double length = curvature > 0 ? direction.squaredNorm() / curvature : 1;  // the best one if r were linear
+    double length = curvature > 0 ? direction.squaredNorm() / curvature : 1;  // the best length for a linear r
 
     Trial best = try_length(run, direction, length);
     if (best.sufficient) {

@@ -1,11 +1,12 @@
 // Trust region with affine scaling and reflections: Coleman & Li, "An interior trust region approach for nonlinear
 // minimization subject to bounds", SIAM J. Optim. 6 (1996); Branch, Coleman & Li, SIAM J. Sci. Comput. 21 (1999).
 //
-//   v_i    distance to the bound that the gradient points at, at most 1 (a bound further off than x is large is none
-//   yet) D      sqrt(v_i) / column norm i; steps p = D q model  1/2 |R D q + Q'r|^2 + 1/2 q'Cq,  C_i = |g_i| / column
-//   norm i^2 where v_i is a distance, else 0
+//   v_i    distance to the bound in the direction of the negative gradient, at most 1 (a bound further away than the
+//          size of x has no effect yet)
+//   D      sqrt(v_i) / column norm i; steps p = D q
+//   model  1/2 |R D q + Q'r|^2 + 1/2 q'Cq, C_i = |g_i| / column norm i^2 where v_i is a distance, otherwise 0
 //
-// Iterates stay off the bounds; where one is the limit, the last step is onto it.
+// Iterates stay off the bounds. If the optimum is at a bound, the last step goes onto it.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -38,7 +39,7 @@ class ScaledModel {
       if (distance < 1) curvature_[i] = std::abs(g) / (norm * norm);
       interior_gradient[i] = v * g;
     }
-    remaining_ = run.relative(interior_gradient);
+    optimality_ = run.relative(interior_gradient);
     gradient_ = scaling_.cwiseProduct(run.gradient());
     MatrixXd both = MatrixXd::Zero(2 * n, n);
     both.topRows(n) = run.factor() * scaling_.asDiagonal();
@@ -51,7 +52,7 @@ class ScaledModel {
 
   const VectorXd& scaling() const { return scaling_; }
   const VectorXd& gradient() const { return gradient_; }
-  double remaining() const { return remaining_; }  ///< v_i g_i, relative; 0 at an optimum, bounds or none
+  double optimality() const { return optimality_; }  ///< v_i g_i, relative; 0 at an optimum, with or without bounds
 
   double curvature_term(const VectorXd& q) const { return 0.5 * curvature_.dot(q.cwiseAbs2()); }
   double change(const VectorXd& q) const { return run_.expected_change(scaling_.cwiseProduct(q)) + curvature_term(q); }
@@ -63,7 +64,7 @@ class ScaledModel {
       const VectorXd q = at(0);
       if (q.norm() <= radius) return q;
     }
-    // |q(shift)| = radius: Newton for 1 / |q|, nearly linear in the shift, between bounds that close in
+    // |q(shift)| = radius: Newton's method for 1 / |q|, which is nearly linear in the shift, between bounds
     double low = 0, high = values_.cwiseProduct(along_).norm() / radius, shift = 1e-3 * high;
     for (int k = 0; k < 60; ++k) {
       const VectorXd q = at(shift);
@@ -84,12 +85,13 @@ class ScaledModel {
     return q.norm() > radius ? VectorXd(q * (radius / q.norm())) : q;
   }
 
-  /// Best multiple of `direction`, from `least` to `most`, added to `from`.
+  /// `from` plus the best multiple of `direction` between `least` and `most`.
   VectorXd best_along(const VectorXd& from, const VectorXd& direction, double least, double most) const {
     const double at_0 = change(from), at_1 = change(from + direction);
     const double slope = (change(from + 0.5 * direction) - at_0) * 4 - (at_1 - at_0);  // exact: the model is a parabola
     const double curve = 2 * (at_1 - at_0 - slope);
-    const double t = curve > 0 ? -slope / curve : slope < 0 ? most : least;
+    const double end = slope < 0 ? most : least;
+    const double t = curve > 0 ? -slope / curve : end;
     return from + std::clamp(t, least, most) * direction;
   }
 
@@ -106,10 +108,10 @@ class ScaledModel {
   const Optimisation& run_;
   VectorXd scaling_, curvature_, gradient_, values_, along_;
   MatrixXd vectors_;
-  double remaining_ = 0;
+  double optimality_ = 0;
 };
 
-/// Multiple of `direction` that leads from `from` to the first bound.
+/// Multiple of `direction` from `from` to the first bound.
 double to_bound(const Optimisation& run, const VectorXd& from, const VectorXd& direction) {
   double length = infinity;
   for (Index i = 0; i < run.size(); ++i) {
@@ -119,7 +121,7 @@ double to_bound(const Optimisation& run, const VectorXd& from, const VectorXd& d
   return std::max(length, 0.0);
 }
 
-/// Multiple of `direction` that leads from `from`, inside the radius, to it.
+/// Multiple of `direction` from `from`, which is within the radius, to the radius.
 double to_radius(const VectorXd& from, const VectorXd& direction, double radius) {
   const double a = direction.squaredNorm(), b = from.dot(direction),
                c = std::min(from.squaredNorm() - radius * radius, 0.0);
@@ -128,11 +130,12 @@ double to_radius(const VectorXd& from, const VectorXd& direction, double radius)
   return b > 0 ? -c / (b + root) : (root - b) / a;
 }
 
-/// q of the best of: the trust region's step, cut at the first bound; the same reflected there; the scaled gradient's.
+/// q of the best of three steps: that of the trust region up to the first bound, the same reflected there, and that
+/// along the scaled gradient.
 VectorXd best_step(const Optimisation& run, const ScaledModel& model, double radius) {
   const VectorXd zero = VectorXd::Zero(run.size()), &d = model.scaling();
-  const double keep_off = std::max(
-      0.995, 1 - model.remaining());  // of the way to a bound; all of it in the end, or the convergence were linear
+  // part of the way to a bound; it tends to 1, otherwise the convergence would be linear
+  const double keep_off = std::max(0.995, 1 - model.optimality());
   const VectorXd full = model.minimum(radius);
   const VectorXd step = d.cwiseProduct(full);
   const double hit = to_bound(run, zero, step);
@@ -160,10 +163,10 @@ VectorXd best_step(const Optimisation& run, const ScaledModel& model, double rad
   return best;
 }
 
-/// A step onto the bounds that are the limit: those nearer than the minimum along the one unknown.
+/// A step onto the active bounds: those nearer than the minimum along their unknown.
 struct Landing {
   VectorXd step;
-  Indices elsewhere;  ///< the unknowns that it does not concern
+  Indices elsewhere;  ///< the other unknowns
 };
 
 Landing landing(const Optimisation& run) {
@@ -183,7 +186,7 @@ void land(Optimisation& run, const Landing& landing) {
   if (!landing.step.isZero(0)) run.move_to(run.after(landing.step));
 }
 
-/// One step that lowers the cost, after as many smaller radii as it takes. False: there is none.
+/// One step that decreases the cost, with smaller radii as necessary. Returns false if there is none.
 bool move(Optimisation& run, double& radius) {
   const ScaledModel model(run);
   for (;;) {
@@ -200,7 +203,7 @@ bool move(Optimisation& run, double& radius) {
     }
     if (cost < before) {
       if (run.move_to(x)) return true;
-      radius = 0.25 * size;  // r is defined there, J is not
+      radius = 0.25 * size;  // J is not defined there, although r is
     }
   }
 }

@@ -85,7 +85,8 @@ TEST_F(IdentifyTool, RefusesBadDataInOneLineThatNamesIt) {
     EXPECT_THAT(run.err, HasSubstr(what)) << arguments;
     EXPECT_FALSE(std::filesystem::exists(path("none.toml"))) << arguments;
   };
-  refused("--recording " + path("rest.csv"), "r0_ohm, r1_ohm and c1_f cannot be seen, expected current pulses");
+  refused("--recording " + path("rest.csv"),
+          "so r0_ohm, r1_ohm and c1_f cannot be identified, expected current pulses");
   refused("--recording " + shift + " --window 0.1:0.05", "0 samples in the window of 0.1 to 0.05");
   refused("--recording " + shift + " --window 0.1", "expected HI:LO");
   refused("--recording " + shift + " --window 0.2:0.8", "expected HI:LO");

@@ -27,8 +27,8 @@ TEST(Simulation, CountsTheChargeAndRestsAtTheOpenCircuitVoltage) {
 }
 
 TEST(Figures, FitIsEquationA6AndIgnoresMissingReadings) {
-  FitFigure fit;
-  ErrorFigure error;
+  identification::FitFigure fit;
+  identification::ErrorFigure error;
   const double measured[] = {1, 2, 3, std::nan(""), 4}, simulated[] = {1, 2, 3, 7, 3};
   for (int k = 0; k < 5; ++k) {
     fit.add(measured[k], simulated[k]);

@@ -84,7 +84,7 @@ TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
     ASSERT_TRUE(problem.evaluate(moved, below, nullptr));
     const Eigen::VectorXd numeric = (above - below) / (2 * h);
     EXPECT_LT((numeric - jacobian.col(k)).norm(), 2e-6 * (numeric.norm() + 1e-9))
-        << grey_box.unknowns()[static_cast<std::size_t>(k)].name << " " << k;
+        << grey_box.unknowns()[static_cast<std::size_t>(k)].name() << " " << k;
   }
 }
 

@@ -135,7 +135,7 @@ TEST(Identify, RefusesARestAndNamesWhatWouldShowIt) {
     identify_grey_box(table9(), {r}, options, Method::trust_region_reflective);
     FAIL();
   } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("r0_ohm, r1_ohm and c1_f cannot be seen"));
+    EXPECT_THAT(error.what(), HasSubstr("so r0_ohm, r1_ohm and c1_f cannot be identified"));
     EXPECT_THAT(error.what(), HasSubstr("high_1m_low_30s"));
   }
 }

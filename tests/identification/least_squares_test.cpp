@@ -304,7 +304,8 @@ TEST(LeastSquares, WrongDerivativesAreNotCalledAnOptimum) {
   for (const Method method : all_methods) {
     const Optimum found = minimise(problem, vector_of({3, 4}), method);
     EXPECT_FALSE(found.converged) << name_of(method);
-    EXPECT_THAT(found.reason, HasSubstr("no smaller cost is found, though the derivatives promise")) << name_of(method);
+    EXPECT_THAT(found.reason, HasSubstr("no smaller cost was found, although the derivatives promise"))
+        << name_of(method);
   }
 }
 

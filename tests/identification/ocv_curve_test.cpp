@@ -1,4 +1,4 @@
-#include "identification/ocv_curve.hpp"
+#include "identification/ocv_pieces.hpp"
 
 #include <gtest/gtest.h>
 
