@@ -16,7 +16,7 @@ void require(double step_s, double capacity_c) {
 }
 
 template <class Scalar>
-Scalar held_tau(const Scalar& pole, double step_s) {
+Scalar zoh_tau(const Scalar& pole, double step_s) {
   using std::log;
   return -step_s / log(pole);
 }
@@ -32,12 +32,12 @@ std::array<Scalar, 4> backwards(const std::array<Scalar, 5>& x, double step_s, d
   const Scalar r1 = (c0 - c2) * d / (4 * capacity_c * step_s) - r0 - b1 * tau / capacity_c;
   if (input == Intersample::first_order_hold) return {b1, r0, r1, tau / r1};
   const Scalar& p = a2;
-  const Scalar held_r1 = r1 * (1.0 + p) / (2.0 * p);
-  return {b1, r0 - b1 * step_s / (2 * capacity_c) - held_r1 * (1.0 - p) / (1.0 + p), held_r1,
-          held_tau(p, step_s) / held_r1};
+  const Scalar zoh_r1 = r1 * (1.0 + p) / (2.0 * p);
+  return {b1, r0 - b1 * step_s / (2 * capacity_c) - zoh_r1 * (1.0 - p) / (1.0 + p), zoh_r1,
+          zoh_tau(p, step_s) / zoh_r1};
 }
 
-/// Roots of z^2 + a1 z + a2; the smaller one from the product, for the subtraction loses it.
+/// Roots of z^2 + a1 z + a2; the smaller one from the product, because a subtraction would lose its digits.
 std::array<std::complex<double>, 2> poles(double a1, double a2) {
   const std::complex<double> root = std::sqrt(std::complex<double>(a1 * a1 / 4 - a2));
   const std::complex<double> larger = -a1 / 2 + (a1 > 0 ? -root : root);
@@ -53,7 +53,7 @@ CircuitResult circuit_from_discrete(const DiscreteCoefficients& c, double step_s
   const auto [one, other] = poles(c.a1, c.a2);
   CircuitResult out;
   out.circuit = {values[0], values[1], values[2], values[3]};
-  out.tau_s = input == Intersample::zero_order_hold ? held_tau(c.a2, step_s) : step_s * (1 + c.a2) / (2 * (1 - c.a2));
+  out.tau_s = input == Intersample::zero_order_hold ? zoh_tau(c.a2, step_s) : step_s * (1 + c.a2) / (2 * (1 - c.a2));
   out.integrator_pole_error = std::min(std::abs(1.0 - one), std::abs(1.0 - other));
 
   const auto judge = [&](const char* name, double value) {
@@ -66,7 +66,7 @@ CircuitResult circuit_from_discrete(const DiscreteCoefficients& c, double step_s
   };
   for (std::size_t k = 0; k < values.size(); ++k) judge(circuit_names[k], values[k]);
   judge("tau_s", out.tau_s);
-  if (one.imag() != 0) out.implausible.emplace_back("the poles are complex: no such circuit swings");
+  if (one.imag() != 0) out.implausible.emplace_back("the poles are complex, which such a circuit cannot have");
   return out;
 }
 
@@ -87,7 +87,7 @@ DiscreteCoefficients discrete_from_circuit(const CircuitParameters& circuit, dou
 Eigen::Matrix4d circuit_covariance(const DiscreteCoefficients& c, const Eigen::Matrix<double, 5, 5>& covariance,
                                    double step_s, double capacity_c, Intersample input) {
   require(step_s, capacity_c);
-  constexpr double tiny = 1e-100;  // complex step: no difference is taken, so no rounding whatever its size
+  constexpr double tiny = 1e-100;  // complex step: it needs no difference, so rounding does not depend on its size
   Eigen::Matrix<double, 4, 5> slope;
   for (std::size_t j = 0; j < 5; ++j) {
     std::array<std::complex<double>, 5> x{c.c0, c.c1, c.c2, c.a1, c.a2};

@@ -33,7 +33,7 @@ VectorXd through_f(const std::vector<double>& f, const Values& u) {
   return v;
 }
 
-/// v, `by` samples later, zeros before.
+/// v, delayed by `by` samples, with zeros before.
 VectorXd later(const VectorXd& v, Index by) {
   VectorXd out = VectorXd::Zero(v.size());
   if (by < v.size()) out.tail(v.size() - by) = v.head(v.size() - by);
@@ -79,12 +79,12 @@ std::vector<double> from_roots(const std::vector<std::complex<double>>& all) {
   return f;
 }
 
-/// First sample that a free response can be exact in.
+/// First sample in which a free response can be exact.
 std::size_t first_within_reach(const Structure& s) {
   return s.estimate_initial && s.nk + s.nb > s.nf + 1 ? s.nk + s.nb - 1 - s.nf : 0;
 }
 
-/// Rows of what was measured and is within reach.
+/// Rows with a measured voltage within reach of the free response.
 std::vector<Index> measured(const Data& data, const Structure& s) {
   std::vector<Index> rows;
   for (std::size_t k = first_within_reach(s); k < data.size(); ++k) {
@@ -105,7 +105,7 @@ void require(const Data& data, const Structure& structure) {
     throw std::invalid_argument("fewer measured voltages than unknowns of the discrete model");
 }
 
-/// Least squares with columns brought to one size.
+/// Least squares with columns scaled to one size.
 VectorXd solve(Eigen::MatrixXd a, const VectorXd& y) {
   VectorXd size = a.colwise().norm();
   for (double& s : size) s = s > 0 && std::isfinite(s) ? s : 1;
@@ -133,9 +133,9 @@ Candidate with_best_rest(const std::vector<double>& f, const Data& data, const S
   if (!a.allFinite()) return c;
 
   VectorXd y(at(rows.size()));
-  const double held_v = s.estimate_offset ? 0 : s.offset_v;
+  const double fixed_v = s.estimate_offset ? 0 : s.offset_v;
   for (Index k = 0; k < y.size(); ++k)
-    y[k] = data.voltage_v[static_cast<std::size_t>(rows[static_cast<std::size_t>(k)])] - held_v;
+    y[k] = data.voltage_v[static_cast<std::size_t>(rows[static_cast<std::size_t>(k)])] - fixed_v;
   const VectorXd x = solve(a, y);
   if (!x.allFinite()) return c;
   c.cost = (a * x - y).squaredNorm() / 2;
@@ -146,8 +146,8 @@ Candidate with_best_rest(const std::vector<double>& f, const Data& data, const S
   return c;
 }
 
-/// At most about `count` of the rows, one of each stretch, at changing places: even ones might meet the same phase of
-/// every pulse.
+/// About `count` of the rows at most: one of each stretch, at changing places, because evenly spaced rows might meet
+/// the same phase of every pulse.
 std::vector<Index> some_of(const std::vector<Index>& rows, std::size_t count) {
   const std::size_t stretch = rows.size() / count + 1;
   if (stretch == 1) return rows;
@@ -160,12 +160,15 @@ std::vector<Index> some_of(const std::vector<Index>& rows, std::size_t count) {
 /// F of the equation error F y = B u + F(1) offset + start, both signals filtered by 1/filter before.
 std::optional<std::vector<double>> equation_error(const Data& data, const Structure& s,
                                                   const std::vector<double>& filter) {
-  // A hole in the voltage takes the last value: good enough to start from.
+  // a missing voltage is replaced by the last one, which is sufficient for start values
   std::vector<double> y = data.voltage_v;
   const auto first = std::find_if(y.begin(), y.end(), [](double v) { return std::isfinite(v); });
   double last = *first;
   const double level = s.estimate_offset ? *first : s.offset_v;
-  for (double& v : y) last = std::isfinite(v) ? v : last, v = last - level;
+  for (double& v : y) {
+    last = std::isfinite(v) ? v : last;
+    v = last - level;
+  }
 
   const VectorXd filtered_y = through_f(filter, y), filtered_u = through_f(filter, data.current_a);
   std::vector<VectorXd> columns;
@@ -242,14 +245,14 @@ VectorXd simulate(const DiscreteModel& model, const std::vector<double>& input, 
     const Index nb = at(b.size()), nf = at(f.size());
     jacobian->resize(n, nb + 2 * nf + 1);
     for (Index i = 0; i < nb; ++i) jacobian->col(i) = later(charged, at(nk) + i);
-    // F v = B u  =>  F dv/df_j = -v[k-1-j];  the free response alike, but its first nf values do not depend on F
+    // F v = B u  =>  F dv/df_j = -v[k-1-j];  the same for the free response, but its first nf values do not depend on F
     const VectorXd sensitivity = through_f(f, VectorXd(-forced));
     for (Index j = 0; j < nf; ++j) {
       jacobian->col(nb + j) = later(sensitivity, j + 1);
       if (!freely) continue;
-      VectorXd drive = later(-free, j + 1);
-      drive.head(std::min(nf, n)).setZero();
-      jacobian->col(nb + j) += through_f(f, drive);
+      VectorXd input_of_free = later(-free, j + 1);
+      input_of_free.head(std::min(nf, n)).setZero();
+      jacobian->col(nb + j) += through_f(f, input_of_free);
     }
     jacobian->col(nb + nf).setOnes();
     for (Index j = 0; j < nf; ++j)
@@ -280,7 +283,7 @@ LeastSquares simulation_error(const Data& data, const Structure& s, const Vector
   if (start.size() != at(s.unknowns()))
     throw std::invalid_argument("the number of unknowns is not that of the structure");
   LeastSquares problem;
-  // b share a size, whatever one of them is; poles are of size 1
+  // all b have the same scale; poles have the scale 1
   VectorXd scale = start.cwiseAbs();
   const Index nb = at(s.nb), nf = at(s.nf);
   scale.head(nb).setConstant(std::max(scale.head(nb).maxCoeff(), 1e-6));
@@ -324,7 +327,7 @@ DiscreteModel start_values(const Data& data, const Structure& s, int refinements
   const auto [least, most] = std::minmax_element(data.current_a.begin(), data.current_a.end());
   if (!(*most - *least > 0))
     throw std::invalid_argument(
-        "the current never changes: no model of its effect can be identified; a step or pulses would show it");
+        "the current never changes, so its effect cannot be identified; expected a step or pulses");
   const std::vector<Index> rows = measured(data, s), few = some_of(rows, 2'000);
   Candidate best;
   const auto consider = [&](const std::vector<double>& f) {
@@ -339,12 +342,16 @@ DiscreteModel start_values(const Data& data, const Structure& s, int refinements
     filter = mirrored_inside(*f);
     consider(filter);
   }
-  // The equation error under noise may end with a fast second pole, in the valley of a minimum that is not the best.
+  // With noise the equation error may lead to a fast second pole, near a minimum that is not the best.
   if (s.nf == 2) {
     double fast = 1, slow = INFINITY, least_cost = INFINITY;  // time constants in samples
     const auto try_poles = [&](double i, double j) {
       const double p = std::exp(-1 / i), q = std::exp(-1 / j), cost = consider({-(p + q), p * q});
-      if (cost < least_cost) least_cost = cost, fast = i, slow = j;
+      if (cost < least_cost) {
+        least_cost = cost;
+        fast = i;
+        slow = j;
+      }
     };
     const double n = static_cast<double>(data.size());
     for (double i = 1; i < n; i *= 4) {
@@ -362,7 +369,7 @@ DiscreteModel start_values(const Data& data, const Structure& s, int refinements
   }
   if (std::isfinite(best.cost)) best = with_best_rest(best.model.f, data, s, rows);
   if (!std::isfinite(best.cost))
-    throw std::invalid_argument("no start for the discrete model: its linear least squares did not stay finite");
+    throw std::invalid_argument("no start values for the discrete model: its linear least squares are not finite");
   return best.model;
 }
 

@@ -32,15 +32,22 @@ std::optional<SlowGap> slow_gap(const std::vector<GapAtTemperature>& gaps) {
       return std::exp(model::mechanism_detail::energy_over_rt(energy, 25.0) * (25 - temperature_c) /
                       (temperature_c + 273.15));
     };
-    // two unknowns, neither negative
+    // two unknowns that are not negative
     double a = 0, aa = 0, g = 0, ag = 0, gg = 0;
     const auto n = static_cast<double>(gaps.size());
     for (const GapAtTemperature& at : gaps) {
       const double f = factor(at.temperature_c);
-      a += f, aa += f * f, g += at.half_gap_v, ag += f * at.half_gap_v, gg += at.half_gap_v * at.half_gap_v;
+      a += f;
+      aa += f * f;
+      g += at.half_gap_v;
+      ag += f * at.half_gap_v;
+      gg += at.half_gap_v * at.half_gap_v;
     }
     double over_v = std::max(0.0, (n * ag - a * g) / (n * aa - a * a)), m_v = (g - over_v * a) / n;
-    if (m_v < 0) m_v = 0, over_v = std::max(0.0, ag / aa);
+    if (m_v < 0) {
+      m_v = 0;
+      over_v = std::max(0.0, ag / aa);
+    }
     const double squares =
         gg - 2 * m_v * g - 2 * over_v * ag + n * m_v * m_v + 2 * m_v * over_v * a + over_v * over_v * aa;
     const double residual_v = std::sqrt(std::max(0.0, squares) / n);

@@ -1,5 +1,5 @@
-// Slow charge and discharge lie apart by hysteresis, which temperature hardly changes, and by what the slow current
-// drops over the cell, which grows in the cold. Runs at several temperatures tell them apart:
+// Slow charge and slow discharge differ by hysteresis, which hardly depends on the temperature, and by the overvoltage
+// of the slow current, which grows in the cold. Runs at several temperatures separate both:
 //
 //   half gap (T) = M + U a(T)     a(T) = exp(E / R_gas (1 / T - 1 / T_ref)),  T_ref = 25 degrees C
 #pragma once
@@ -23,10 +23,10 @@ struct SlowGap {
   double residual_v = 0;            ///< RMS
 };
 
-/// Half the gap between 20 and 80 % of soc; nothing of a single run.
+/// Mean half gap between 20 and 80 % of SOC; empty for a single kind of run.
 std::optional<double> plateau_half_gap_v(const OcvCurve& curve);
 
-/// Least squares. Nothing with less than three temperatures, or of less than 20 K.
+/// Least squares. Empty with fewer than three temperatures, or if they span less than 20 K.
 std::optional<SlowGap> slow_gap(const std::vector<GapAtTemperature>& gaps);
 
 }  // namespace bms::identification

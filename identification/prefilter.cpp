@@ -9,7 +9,7 @@ namespace bms::identification {
 
 namespace {
 
-constexpr std::size_t padding = 9;  // three times the number of coefficients, as scipy.signal.filtfilt has it
+constexpr std::size_t padding = 9;  // three times the number of coefficients, as in scipy.signal.filtfilt
 
 double upper_median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -23,10 +23,10 @@ void require_finite(const std::vector<double>& values) {
   }
 }
 
-/// Direct form II transposed, its two states those of a constant input values[0].
+/// Direct form II transposed. The two states start as those of a constant input values[0].
 void run(const SecondOrderFilter& filter, std::vector<double>& values) {
   const auto& [b, a] = filter;
-  // gain 1: output = input = values[0]
+  // at gain 1, output = input = values[0]
   double late = (b[2] - a[2]) * values[0], next = (1 - b[0]) * values[0];
   for (double& v : values) {
     const double in = v;
@@ -83,7 +83,7 @@ std::vector<double> filter_causal(const SecondOrderFilter& filter, const std::ve
 }
 
 std::vector<double> filter_zero_phase(const SecondOrderFilter& filter, const std::vector<double>& values) {
-  if (values.size() <= padding) throw std::invalid_argument("a filter forward and backward needs at least 10 values");
+  if (values.size() <= padding) throw std::invalid_argument("a zero-phase filter needs at least 10 values");
   require_finite(values);
   const std::size_t n = values.size();
   std::vector<double> padded;
@@ -99,7 +99,7 @@ std::vector<double> filter_zero_phase(const SecondOrderFilter& filter, const std
 }
 
 Offset offset_at_rest(const Data& data, const RestCriterion& criterion) {
-  if (!(data.capacity_ah > 0)) throw std::invalid_argument("a rest is judged by the capacity, which is not given");
+  if (!(data.capacity_ah > 0)) throw std::invalid_argument("the capacity is missing, which defines what a rest is");
   const std::vector<bool> is_quiet = quiet(data.current_a, criterion.current_c_rate * data.capacity_ah);
   Offset offset;
   double sum = 0, squares = 0;
@@ -108,7 +108,7 @@ Offset offset_at_rest(const Data& data, const RestCriterion& criterion) {
     std::size_t end = begin;
     while (end < data.size() && is_quiet[end]) ++end;
     if (data.time_s[end - 1] - data.time_s[begin] >= criterion.duration_s) {
-      // the median lets one or two samples of a load pass as quiet: two at each end go
+      // the median counts one or two samples of a load as quiet, so two at each end are left out
       for (std::size_t k = begin + 2; k + 2 < end; ++k) {
         sum += data.current_a[k];
         squares += data.current_a[k] * data.current_a[k];

@@ -1,8 +1,8 @@
-// Current filter before an identification (paper, 3.1): second-order Butterworth low-pass, and removal of the sensor's
-// offset.
+// Current filter before an identification (paper, 3.1): second-order Butterworth low-pass, and removal of the offset of
+// the current sensor.
 //
-// Either direction only (causal: the current comes out late, so the voltage must be filtered alike) or forward and
-// backward (zero phase: in time, attenuation twice, 6 dB at the cutoff). Evenly sampled data only.
+// Causal (forward only): the current is delayed, so the voltage must pass the same filter. Zero phase (forward and
+// backward): no delay, twice the attenuation, 6 dB at the cutoff. Evenly sampled data only.
 #pragma once
 
 #include <array>
@@ -30,31 +30,30 @@ struct SecondOrderFilter {
 /// Processing, 7.1. Throws std::invalid_argument unless 0 < cutoff_hz < sample_rate_hz / 2.
 SecondOrderFilter butterworth_low_pass(double cutoff_hz, double sample_rate_hz);
 
-/// One pass, begun in the steady state of the first value: a constant comes out unchanged from the first sample on.
+/// One pass that starts in the steady state of the first value, so that a constant does not change.
 /// Throws std::invalid_argument when a value is not finite.
 std::vector<double> filter_causal(const SecondOrderFilter& filter, const std::vector<double>& values);
 
-/// Forward and backward over the values and 9 more at each end, mirrored through the end point, each pass begun in the
-/// steady state (Gustafsson 1996 treats the choice; this one is scipy.signal.filtfilt's default). Throws
+/// Forward and backward over the values and 9 more at each end, mirrored through the end point. Each pass starts in the
+/// steady state (Gustafsson 1996 discusses the choice; this is the default of scipy.signal.filtfilt). Throws
 /// std::invalid_argument: fewer than 10 values, one not finite.
 std::vector<double> filter_zero_phase(const SecondOrderFilter& filter, const std::vector<double>& values);
 
-/// What counts as a rest of the current.
+/// When the current counts as at rest.
 struct RestCriterion {
-  double current_c_rate =
-      0.02;  ///< |i| below this times the capacity [1/h]; a lasting trickle below it would be taken for offset
-  double duration_s = 30;  ///< for at least so long
+  double current_c_rate = 0.02;  ///< largest |current|; a lasting smaller current would be taken for offset
+  double duration_s = 30;        ///< shortest rest
 };
 
 struct Offset {
-  double current_a = 0;      ///< mean over the rests, 0 when there is none
-  double current_std_a = 0;  ///< of that mean, as if every sample were new
-  std::size_t samples = 0;   ///< it is the mean of; 0: no rest, nothing known
+  double current_a = 0;      ///< mean over the rests; 0 without a rest
+  double current_std_a = 0;  ///< standard deviation of the mean, for white noise
+  std::size_t samples = 0;   ///< number of samples at rest; 0: the offset is not known
 };
 
-/// Zero error of the current sensor. A rest's first and last two samples are left out: a step may lie within their
-/// interval; a single spike does not end a rest (median of five). Sampling may be uneven. Throws std::invalid_argument
-/// unless capacity_ah > 0.
+/// Offset of the current sensor. The first and last two samples of a rest are left out, because a step may lie within
+/// their interval. A single spike does not end a rest (median of five). Sampling may be uneven. Throws
+/// std::invalid_argument unless capacity_ah > 0.
 Offset offset_at_rest(const Data& data, const RestCriterion& criterion = {});
 
 enum class Phase { causal, zero };
@@ -67,8 +66,8 @@ struct Prefilter {
 };
 
 struct Prefiltered {
-  Data data;      ///< time as before; current filtered, and the voltage too when the phase is causal: both late alike
-  Offset offset;  ///< what was subtracted; samples = 0: nothing
+  Data data;      ///< filtered current; with a causal phase also the voltage, so that both have the same delay
+  Offset offset;  ///< subtracted from the current; samples = 0: nothing
 };
 
 /// Subtracts the offset, then filters. Throws std::invalid_argument as the functions above; the voltage may lack values

@@ -28,8 +28,7 @@ double correlation_length(const Eigen::VectorXd& residuals) {
   if (!(power > 0)) return 1;
   const double white_band = 2 / std::sqrt(static_cast<double>(residuals.size()));
   double length = 1;
-  // at growing distances, each standing for those since the one before: a run of hours costs no more than one of
-  // seconds
+  // at growing lags, each of which stands for those since the one before, so that long runs cost little
   Eigen::Index before = 0;
   for (Eigen::Index lag = 1; lag < residuals.size() / 2; lag = std::max(lag + 1, lag + lag / 8)) {
     const double correlation = product(residuals, residuals, lag) / power;

@@ -15,7 +15,7 @@ double Channel::read(double true_value, double elapsed_s) {
   return p.step > 0 ? std::round(reading / p.step) * p.step : reading;
 }
 
-// A seed of its own for each: a changed channel leaves the others as they were.
+// Each channel has its own seed, so that a change of one channel does not affect the others.
 Instruments::Instruments(const InstrumentParameters& parameters, std::uint64_t seed)
     : current_a(parameters.current_a, 3 * seed),
       voltage_v(parameters.voltage_v, 3 * seed + 1),

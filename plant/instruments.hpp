@@ -1,9 +1,9 @@
-// What stands between the cell and the recording: gain error, slow drift of the zero, noise, steps.
+// The measuring chain between cell and recording: gain error, slow drift of the offset, noise, quantisation.
 //
 //   reading = round_to_step((1 + gain_error) * true value + drift + noise)
 //
-// The drift is an Ornstein-Uhlenbeck process: it stays around zero with drift_sigma and forgets itself within
-// drift_correlation_s; it is not known at the start either. Seeded, the same on every machine.
+// The drift is an Ornstein-Uhlenbeck process around zero with the standard deviation drift_sigma and the correlation
+// time drift_correlation_s; its start value is random as well. The same seed gives the same readings on every machine.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace bms::plant {
 
-/// drift_sigma, noise_sigma and step in the unit of what is measured.
+/// drift_sigma, noise_sigma and step have the unit of the measured quantity.
 struct ChannelParameters {
   double gain_error = 0;  ///< fraction
   double drift_sigma = 0;
@@ -25,7 +25,7 @@ class Channel {
  public:
   Channel(const ChannelParameters& parameters, std::uint64_t seed);
 
-  /// elapsed_s since the reading before, far less than drift_correlation_s.
+  /// elapsed_s: since the previous reading, much less than drift_correlation_s.
   double read(double true_value, double elapsed_s);
   double drift() const { return drift_; }
 
@@ -35,7 +35,7 @@ class Channel {
   double drift_;
 };
 
-/// A forklift's measuring chain: shunt with amplifier, cell monitor IC, thermistor.
+/// The measuring chain of a forklift: shunt with amplifier, cell monitor IC, thermistor.
 struct InstrumentParameters {
   ChannelParameters current_a = {
       .gain_error = 0.002, .drift_sigma = 0.015, .drift_correlation_s = 3'600, .noise_sigma = 0.010, .step = 0.005};

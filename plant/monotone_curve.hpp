@@ -1,8 +1,8 @@
-// A smooth curve through points: cubic between neighbours, continuous slope, no overshoot. It rises where the points
-// rise.
+// A smooth curve through points: cubic between neighbours, with a continuous slope and without overshoot. It is
+// monotone where the points are.
 //
-// The slope at a point is the weighted harmonic mean of the two neighbouring chords, 0 where they differ in sign
-// (Fritsch and Butland, 1984); at an end, and straight on beyond it, the slope of the last chord.
+// The slope at a point is the weighted harmonic mean of the two neighbouring chords, or 0 where they differ in sign
+// (Fritsch and Butland, 1984). At and beyond an end it is the slope of the last chord.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
-// Chance that is the same on every machine: integers (xoshiro256++, seeded by splitmix64) and exact sums, no libm, no
-// <random>.
+// Random numbers that are the same on every machine: integers (xoshiro256++, seeded by splitmix64) and exact sums,
+// without libm and <random>.
 #pragma once
 
 #include <array>
@@ -34,8 +34,8 @@ class Random {
   /// 0 <= u < 1.
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
 
-  /// Mean 0, variance 1: the sum of twelve uniforms, which a normal density fits to 1 % up to 2.5 sigma; never
-  /// beyond 6.
+  /// Mean 0, variance 1: the sum of twelve uniform numbers. It agrees with the normal density to 1 % up to 2.5 sigma
+  /// and never exceeds 6.
   double normal() {
     double sum = -6;
     for (int k = 0; k < 12; ++k) sum += uniform();

@@ -9,11 +9,11 @@
 namespace bms::plant {
 
 MonotoneCurve table9_ocv_v() {
-  // where neighbouring lines of Table 9 (b0 + b1 soc) meet: 0 %, 10 % ... 100 %
+  // where neighbouring lines of Table 9 (b0 + b1 SOC) meet: 0 %, 10 % ... 100 %
   constexpr std::array knots_v = {2.871, 3.206, 3.245, 3.277, 3.285, 3.286, 3.290, 3.313, 3.322, 3.323, 3.456};
   std::vector<Point> points = {{0, knots_v.front()}};
   for (std::size_t k = 0; k + 1 < knots_v.size(); ++k) {
-    // the middle of each line is kept, the corners between them are left to the curve
+    // the middle of each line is fixed; the curve rounds the corners between the lines
     for (const double along : {0.1, 0.3, 0.7, 0.9}) {
       points.push_back({(static_cast<double>(k) + along) / 10, knots_v[k] + along * (knots_v[k + 1] - knots_v[k])});
     }

@@ -1,25 +1,25 @@
-// The cell that is "real" in the tests: what the estimator and the identification are judged against.
+// The reference cell of the tests: estimator and identification are compared with it.
 //
-//   OCV      smooth in soc along the paper's Table 9, corners rounded
-//   circuit  d v_rc / dt = I / C1 - v_rc / (R1 C1),  V = OCV + v_rc + R0 I,  R0, R1, C1 smooth in soc
+//   OCV      smooth in SOC along Table 9 of the paper, with rounded corners
+//   circuit  d v_rc / dt = I / C1 - v_rc / (R1 C1),  V = OCV + v_rc + R0 I,  R0, R1, C1 smooth in SOC
 //   thermal  one node: C dT/dt = heat - G (T - ambient)
 //
 // The differential equations are integrated by Runge-Kutta 4 in steps of at most step_s, with the parameters at the
-// momentary soc; charge is counted by compensated summation. Currents > 0 charge. Nothing here comes from model/ or
-// estimator/, so that a mistake there cannot hide by being made twice. No libm: with -ffp-contract=off the same bits
-// everywhere.
+// momentary SOC; charge is counted by compensated summation. Currents > 0 charge. Nothing here comes from model/ or
+// estimator/, so that an error there cannot be repeated here. It uses no libm: with -ffp-contract=off the bits are the
+// same on every machine.
 #pragma once
 
 #include "plant/monotone_curve.hpp"
 
 namespace bms::plant {
 
-/// Open-circuit voltage [V] over soc. Meets the ten lines of Table 9 within 1 mV, but at the two sharp corners: up to
-/// 11 mV within 2.5 % of soc around 10 %, up to 4.5 mV within 1 % around 90 %.
+/// Open-circuit voltage [V] over SOC. It agrees with the ten lines of Table 9 within 1 mV except at the two sharp
+/// corners: up to 11 mV within 2.5 % of SOC around 10 %, up to 4.5 mV within 1 % around 90 %.
 MonotoneCurve table9_ocv_v();
 
-/// Over soc. Through the values of Table 9, flat below 10 %. Straight lines between them differ by up to 3 % above 20 %
-/// of soc, by up to 11 % (C1) below.
+/// Parameters over SOC. The curves pass through the values of Table 9 and are flat below 10 %. Straight lines between
+/// the values differ from them by up to 3 % above 20 % SOC, and by up to 11 % (C1) below.
 struct CircuitCurves {
   MonotoneCurve r0_ohm;
   MonotoneCurve r1_ohm;
@@ -27,7 +27,7 @@ struct CircuitCurves {
 };
 CircuitCurves table9_circuit();
 
-/// Not from the paper: 140 g of cell at 1 J/(gK), in a row of neighbours with little air; time constant 24 min.
+/// Not from the paper: a cell of 140 g at 1 J/(gK) between neighbours with little air; time constant 24 min.
 struct Thermal {
   double heat_capacity_j_per_k = 140;
   double to_ambient_w_per_k = 0.1;
@@ -51,17 +51,17 @@ class Cell {
  public:
   Cell(CellParameters parameters, CellState start);
 
-  /// Holds the current for so long.
+  /// Applies a constant current for a duration.
   void run(double current_a, double ambient_c, double duration_s);
 
   double soc() const { return soc_at(0); }
   double v_rc_v() const { return dynamic_.v_rc_v; }
   double temperature_c() const { return dynamic_.temperature_c; }
-  /// At the terminals, under the current of the last run; at rest before the first.
+  /// At the terminals, under the current of the last run; at rest before the first run.
   double voltage_v() const;
 
  private:
-  /// What the differential equations move, or their rates of change per second.
+  /// State of the differential equations, or its rate of change per second.
   struct DynamicState {
     double v_rc_v;
     double temperature_c;
@@ -73,7 +73,7 @@ class Cell {
   double start_soc_;
   DynamicState dynamic_;
   double current_a_ = 0;
-  double charge_as_ = 0, lost_as_ = 0;  ///< since the start; lost_as_ is what rounding took from charge_as_
+  double charge_as_ = 0, lost_as_ = 0;  ///< since the start; lost_as_: rounding error of charge_as_
 };
 
 }  // namespace bms::plant

@@ -186,7 +186,7 @@ void land(Optimisation& run, const Landing& landing) {
   if (!landing.step.isZero(0)) run.move_to(run.after(landing.step));
 }
 
-/// One step that decreases the cost, with smaller radii as necessary. Returns false if there is none.
+/// One step that decreases the cost, with smaller radii as necessary. Returns false if no step decreases it.
 bool move(Optimisation& run, double& radius) {
   const ScaledModel model(run);
   for (;;) {
