@@ -30,7 +30,7 @@ TEST(CircuitFromDiscrete, ForwardIsEq12To16AsPrinted) {
   EXPECT_NEAR(c.a1, -(1 + c.a2), 1e-15);
 }
 
-// Eq. 10 with s = 2/T (1 - z^-1)/(1 + z^-1), at three points of z: a source beside the paper's algebra.
+// Eq. 10 with s = 2/T (1 - z^-1)/(1 + z^-1), at three points of z: independent of the algebra of the paper.
 TEST(CircuitFromDiscrete, ForwardIsTheBilinearTransformOfEq10) {
   const double b1 = 0.13, r0 = 0.0126, r1 = 0.0192, c1 = 2000, t = 1, cn = capacity_c;
   const DiscreteCoefficients c = discrete_from_circuit({b1, r0, r1, c1}, t, cn);
@@ -101,7 +101,7 @@ TEST(CircuitFromDiscrete, GivesOnesForTheCoefficientsOfOnes) {
 // What Eq. 17 says of R0 and R1 by Eq. 12-16, T and b1 aside (R0 and R1 - its b1 part need neither): 12.4 mohm, where
 // the paper has 11.9; and R1 + b1 tau / C_n = 8.2 mohm, where the paper has 1.3. Its R1 and C1 are not those of its
 // coefficients.
-TEST(CircuitFromDiscrete, ReadsFromEq17AnotherR1ThanThePaperPrints) {
+TEST(CircuitFromDiscrete, GivesAnotherR1ForEq17ThanThePaper) {
   const CircuitResult r = circuit_from_discrete({0.01317, -0.02263, 0.00946, -1.82, 0.8203}, 1, capacity_c);
   EXPECT_NEAR(r.circuit.r0_ohm, 0.01243, 1e-5);
   EXPECT_NEAR(r.circuit.r1_ohm + r.circuit.b1_v * r.tau_s / capacity_c, 0.00822, 1e-5);
@@ -109,7 +109,7 @@ TEST(CircuitFromDiscrete, ReadsFromEq17AnotherR1ThanThePaperPrints) {
 }
 
 /// Recursion of the held circuit, sample by sample, from its equations (2), (9) with exact exponentials.
-TEST(CircuitFromDiscrete, HeldInputIsTheCircuitUnderACurrentHeldOverEachInterval) {
+TEST(CircuitFromDiscrete, ZeroOrderHoldIsTheCircuitWithAConstantCurrentInEachInterval) {
   const CircuitParameters in{0.4, 0.012, 0.02, 1'500};
   const double t = 5, pole = std::exp(-t / (in.r1_ohm * in.c1_f));
   const DiscreteCoefficients c = discrete_from_circuit(in, t, capacity_c, Intersample::zero_order_hold);
@@ -125,7 +125,7 @@ TEST(CircuitFromDiscrete, HeldInputIsTheCircuitUnderACurrentHeldOverEachInterval
 }
 
 // The header's figures of what Eq. 12-16 make of a held current.
-TEST(CircuitFromDiscrete, ReadingHeldDataByEq12To16MovesR0AndR1ByHalfAStepOverTau) {
+TEST(CircuitFromDiscrete, Eq12To16OnZeroOrderHoldDataMoveR0AndR1ByHalfAStepOverTau) {
   const CircuitParameters in{0.4, 0.012, 0.02, 2'500};  // tau = 50 s
   const CircuitResult r =
       circuit_from_discrete(discrete_from_circuit(in, 1, capacity_c, Intersample::zero_order_hold), 1, capacity_c);
@@ -135,11 +135,11 @@ TEST(CircuitFromDiscrete, ReadingHeldDataByEq12To16MovesR0AndR1ByHalfAStepOverTa
   EXPECT_NEAR(r.circuit.b1_v, in.b1_v, 1e-8);
 }
 
-TEST(CircuitFromDiscrete, NamesWhatIsNegativeInfiniteOrComplexAndClipsNothing) {
+TEST(CircuitFromDiscrete, NamesNegativeInfiniteAndComplexResultsAndDoesNotClampThem) {
   using testing::Contains;
   const DiscreteCoefficients good = discrete_from_circuit({0.13, 0.0126, 0.0192, 8333}, 1, capacity_c);
   DiscreteCoefficients c = good;
-  c.c2 += 0.002;  // less R1 than nothing
+  c.c2 += 0.002;  // negative R1
   const CircuitResult negative = circuit_from_discrete(c, 1, capacity_c);
   EXPECT_LT(negative.circuit.r1_ohm, 0);
   EXPECT_LT(negative.circuit.c1_f, 0);
@@ -158,13 +158,13 @@ TEST(CircuitFromDiscrete, NamesWhatIsNegativeInfiniteOrComplexAndClipsNothing) {
   EXPECT_THAT(swinging.implausible, Contains(testing::HasSubstr("complex")));
   EXPECT_NEAR(swinging.integrator_pole_error, std::hypot(0.2, 0.4), 1e-12);
 
-  c.a1 = -0.9, c.a2 = -0.1;  // a pole below 0: no held circuit
+  c.a1 = -0.9, c.a2 = -0.1;  // a negative pole, which no circuit with zero-order hold has
   EXPECT_THAT(circuit_from_discrete(c, 1, capacity_c, Intersample::zero_order_hold).implausible,
               Contains("tau_s is not finite"));
   EXPECT_THAT(circuit_from_discrete(good, 1, capacity_c).implausible, testing::IsEmpty());
 }
 
-TEST(CircuitFromDiscrete, RefusesATimeOrCapacityThatIsNotPositive) {
+TEST(CircuitFromDiscrete, RejectsATimeOrCapacityThatIsNotPositive) {
   for (const double bad : {0.0, -1.0, std::nan(""), double{INFINITY}}) {
     EXPECT_THROW(circuit_from_discrete({}, bad, 1), std::invalid_argument);
     EXPECT_THROW(circuit_from_discrete({}, 1, bad), std::invalid_argument);

@@ -30,7 +30,7 @@ void expect_near(const VectorXd& ours, const std::vector<double>& theirs, double
     ASSERT_NEAR(ours[static_cast<Eigen::Index>(k)], theirs[k], tolerance) << what << ", sample " << k;
 }
 
-/// Levenberg-Marquardt as short as it gets: these tests are about the problem, not the search.
+/// A minimal Levenberg-Marquardt method: these tests are about the problem, not about the search.
 VectorXd search(const LeastSquares& problem, VectorXd x, VectorXd* deviation = nullptr) {
   VectorXd r, tried_r;
   Eigen::MatrixXd jacobian;
@@ -116,7 +116,7 @@ TEST(DiscreteModel, SimulatesAsScipysLfilterDoes) {
 }
 
 // y[k] = 0.5 y[k-1] + 2 u[k-1] + 3 u[k-2] for u = 1 0 0 ...: 0 2 4 2 1; offset 10; free response from 8: 8 4 2 1 0.5
-TEST(DiscreteModel, SimulatesWhatAHandComputes) {
+TEST(DiscreteModel, SimulatesValuesComputedByHand) {
   const std::vector<double> impulse{1, 0, 0, 0, 0};
   expect_near(simulate({{2, 3}, {-0.5}, 1, 0, {}}, impulse), {0, 2, 4, 2, 1}, 0, "delay of one");
   expect_near(simulate({{2, 3}, {-0.5}, 0, 0, {}}, impulse), {2, 4, 2, 1, 0.5}, 0, "none");
@@ -179,7 +179,7 @@ TEST(DiscreteModel, DerivativesAreCentralDifferences) {
   }
 }
 
-TEST(DiscreteModel, RefusesAFreeResponseOfTheWrongLengthAndAnEmptyDenominator) {
+TEST(DiscreteModel, RejectsAFreeResponseOfTheWrongLengthAndAnEmptyDenominator) {
   EXPECT_THROW(simulate({{1}, {}, 0, 0, {}}, {1}), std::invalid_argument);
   EXPECT_THROW(simulate({{1}, {-1.5, 0.5}, 0, 0, {1}}, {1}), std::invalid_argument);
 }
@@ -261,7 +261,7 @@ TEST(Identification, OfARecordCutOutOfARunComesBackTo1e6) {
   }
 }
 
-// The circuit is what one wants in the end: 0.1 % of it from data without noise.
+// The circuit to 0.1 % from data without noise.
 TEST(Identification, LeadsBackToTheCircuit) {
   const Structure structure = transfer_function(2.9);
   const Data data = data_of(tf_of_cell(), pulses(3'600), 0);
@@ -279,7 +279,7 @@ TEST(Identification, LeadsBackToTheCircuit) {
 // 60 fits of each: no unknown further than three standard deviations more often than chance has it (0.27 % of 60 x 7:
 // one or two; allow 6), and the root mean square of the normalised errors is 1 (chi square of 60: +-9 %, three of
 // them).
-TEST(Identification, UnderNoiseErrsAsItsStandardDeviationsSay) {
+TEST(Identification, HasErrorsOfTheSizeOfItsStandardDeviations) {
   const auto u = pulses(1'800);
   const struct {
     const char* name;
@@ -381,7 +381,7 @@ TEST(SimulationError, IsNotDefinedForAnUnstableModelButForAnIntegrator) {
   EXPECT_FALSE(problem.evaluate(x, r, nullptr));
 }
 
-TEST(SimulationError, RefusesDataItCannotUse) {
+TEST(SimulationError, RejectsInvalidData) {
   const Structure structure = transfer_function(2.9);
   const Data good = data_of(tf_of_cell(), pulses(100), 0);
   const VectorXd x = to_unknowns(tf_of_cell(), structure);

@@ -13,7 +13,7 @@ namespace {
 
 model::CellParameters<> table9() { return files::read_cell("table9").parameters; }
 
-/// An irregular drive that crosses edges of the tables.
+/// An irregular current that crosses edges of the tables.
 Data irregular(std::size_t samples) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -29,7 +29,7 @@ Data irregular(std::size_t samples) {
   return d;
 }
 
-TEST(GreyBox, SimulatesWhatTheModelSimulates) {
+TEST(GreyBox, SimulatesTheSameVoltageAsTheOpenLoopSimulation) {
   const auto cell = table9();
   GreyBoxOptions options;
   for (std::size_t k = 0; k < cell.rc.soc.size; ++k) options.soc_nodes.push_back(cell.rc.soc[k]);
@@ -50,7 +50,7 @@ TEST(GreyBox, SimulatesWhatTheModelSimulates) {
     ASSERT_NEAR(voltage[k], expected[static_cast<std::size_t>(k)].voltage_v, 1e-12);
 }
 
-TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
+TEST(GreyBox, DerivativesAreDifferencesOfTheSimulation) {
   model::CellParameters<> cell = table9();
   for (std::size_t k = 0; k < cell.ocv.soc.size; ++k)
     cell.ocv.half_gap_v.push_back(0.02 + 0.01 * static_cast<double>(k % 3));
@@ -88,19 +88,19 @@ TEST(GreyBox, DerivativesAreThoseOfTheSimulation) {
   }
 }
 
-TEST(GreyBox, LeaningMovesTheCurveByItsGap) {
+TEST(GreyBox, TheOcvBranchPositionMovesTheCurveByItsHalfGap) {
   model::CellParameters<> cell = table9();
   for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.03);
-  const auto leant = with_ocv_branch(cell, -0.5);
+  const auto moved_ocv = with_ocv_branch(cell, -0.5);
   for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) {
-    EXPECT_NEAR(leant.ocv.b0_v[k], cell.ocv.b0_v[k] - 0.015, 1e-12);
-    EXPECT_NEAR(leant.ocv.b1_v[k], cell.ocv.b1_v[k], 1e-12);
+    EXPECT_NEAR(moved_ocv.ocv.b0_v[k], cell.ocv.b0_v[k] - 0.015, 1e-12);
+    EXPECT_NEAR(moved_ocv.ocv.b1_v[k], cell.ocv.b1_v[k], 1e-12);
   }
-  const auto back = with_ocv_branch(leant, 0);
+  const auto back = with_ocv_branch(moved_ocv, 0);
   for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) EXPECT_NEAR(back.ocv.b0_v[k], cell.ocv.b0_v[k], 1e-12);
 }
 
-TEST(GreyBox, RefusesWhatIsNoProblem) {
+TEST(GreyBox, RejectsMissingNodesRecordingsAndHalfGaps) {
   DataSet record;
   record.data = irregular(20);
   EXPECT_THROW(GreyBox(table9(), {record}, {}), std::invalid_argument);
@@ -111,7 +111,7 @@ TEST(GreyBox, RefusesWhatIsNoProblem) {
   EXPECT_THROW(GreyBox(table9(), {record}, options), std::invalid_argument);
 }
 
-TEST(GreyBox, NodesFollowWhatTheDataCovers) {
+TEST(GreyBox, NodesCoverTheRangeOfTheData) {
   EXPECT_EQ(nodes_for(0.48, 0.52), (std::vector<double>{0.5}));
   EXPECT_EQ(nodes_for(0.22, 0.98).size(), 9U);
   EXPECT_EQ(nodes_for(0.0, 1.0).size(), 11U);

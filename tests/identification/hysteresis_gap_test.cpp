@@ -11,7 +11,7 @@ double factor(double energy_j_per_mol, double c) {
   return std::exp(energy_j_per_mol / 8.314462618 * (1 / (c + 273.15) - 1 / 298.15));
 }
 
-TEST(SlowGap, PartsHysteresisFromWhatGrowsInTheCold) {
+TEST(SlowGap, SeparatesHysteresisFromTheOvervoltageThatGrowsInTheCold) {
   std::vector<GapAtTemperature> gaps;
   int odd = 1;
   for (const double c : {-15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0})
@@ -24,7 +24,7 @@ TEST(SlowGap, PartsHysteresisFromWhatGrowsInTheCold) {
   EXPECT_LT(gap->residual_v, 0.0006);
 }
 
-TEST(SlowGap, OfAGapThatDoesNotGrowAllIsHysteresis) {
+TEST(SlowGap, IsAllHysteresisIfTheGapDoesNotGrow) {
   const auto gap = slow_gap({{-5, 0.01}, {20, 0.01}, {45, 0.01}});
   ASSERT_TRUE(gap);
   EXPECT_NEAR(gap->hysteresis_v, 0.01, 1e-6);

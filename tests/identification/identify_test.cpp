@@ -1,4 +1,4 @@
-// Identification judged on the truth plant: different equations, noise on both readings.
+// Identification compared with the plant: different equations, noise on current and voltage.
 #include "identification/identify.hpp"
 
 #include <gmock/gmock.h>
@@ -16,7 +16,7 @@ using ::testing::StartsWith;
 
 model::CellParameters<> table9() { return files::read_cell("table9").parameters; }
 
-/// Begins far from the truth.
+/// Start values far from the truth.
 model::CellParameters<> wrong_start() {
   model::CellParameters<> cell = table9();
   for (std::size_t k = 0; k < cell.rc.soc.size; ++k) {
@@ -35,7 +35,13 @@ DataSet record_of(const PlantRun& run, double initial_soc) {
   return r;
 }
 
-TEST(Identify, RecoversTheTruthAtMidSocAndKnowsHowWell) {
+double truth_of(const plant::CircuitCurves& circuit, const Parameter& p) {
+  if (p.name == "r0_ohm") return circuit.r0_ohm.at(p.soc);
+  if (p.name == "r1_ohm") return circuit.r1_ohm.at(p.soc);
+  return circuit.c1_f.at(p.soc);
+}
+
+TEST(Identify, RecoversTheTruthAtMidSocWithARealisticStandardDeviation) {
   const auto profile = *experiments::experiment("high_1m_low_30s");
   const PlantRun run = run_plant(profile, 0.5);
   const double soc = (run.soc_min + run.soc_max) / 2;
@@ -67,7 +73,7 @@ TEST(Identify, RecoversTheTruthAtMidSocAndKnowsHowWell) {
   }
 }
 
-TEST(Identify, FindsTheTablesFromAShiftAndPredictsAnother) {
+TEST(Identify, IdentifiesTheTablesFromAShiftAndPredictsAnotherShift) {
   const auto shift = *experiments::experiment("forklift_shift", {6, 11}),
              other = *experiments::experiment("forklift_shift", {6, 12});
   std::mt19937_64 random(1);
@@ -80,20 +86,18 @@ TEST(Identify, FindsTheTablesFromAShiftAndPredictsAnother) {
   const plant::CircuitCurves circuit = plant::table9_circuit();
   for (const Parameter& p : found.parameters) {
     if (p.soc < 0.35 || p.soc > 0.75) continue;
-    const double is = p.name == "r0_ohm"   ? circuit.r0_ohm.at(p.soc)
-                      : p.name == "r1_ohm" ? circuit.r1_ohm.at(p.soc)
-                                           : circuit.c1_f.at(p.soc);
+    const double is = truth_of(circuit, p);
     EXPECT_NEAR(p.value, is, (p.name == "r0_ohm" ? 0.015 : 0.08) * is) << p.name << " at " << p.soc;
   }
-  DataSet judge = record_of(unseen, 0.98);
-  judge.data = noisy(unseen.data, random);
-  const FitStatistics fit = validate(found.cell, judge, found.fading);
+  DataSet validation = record_of(unseen, 0.98);
+  validation.data = noisy(unseen.data, random);
+  const FitStatistics fit = validate(found.cell, validation, found.fading);
   EXPECT_LT(fit.rmse_v, 0.0016);
   EXPECT_GT(fit.fit_percent, 95);
 }
 
-TEST(Identify, InitialSocOnThePlateauIsNotClaimed) {
-  // the paper's case: 40 %, pulses; it found 29.17 %
+TEST(Identify, InitialSocOnThePlateauIsNotObservable) {
+  // the case of the paper: pulses at 40 %; it found 29.17 %
   const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.45);
   std::mt19937_64 random(3);
   DataSet r = record_of(run, 0.55);
@@ -107,7 +111,7 @@ TEST(Identify, InitialSocOnThePlateauIsNotClaimed) {
   EXPECT_THAT(found.warnings, Contains(StartsWith("initial_soc_not_observable: ")));
 }
 
-TEST(Identify, InitialSocOnASlopeIsFound) {
+TEST(Identify, InitialSocOnASlopeIsIdentified) {
   const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.16);
   std::mt19937_64 random(3);
   DataSet r = record_of(run, 0.18);
@@ -121,7 +125,7 @@ TEST(Identify, InitialSocOnASlopeIsFound) {
   EXPECT_NEAR(found.initial[0].soc, 0.16, 0.01);
 }
 
-TEST(Identify, RefusesARestAndNamesWhatWouldShowIt) {
+TEST(Identify, RejectsARestAndNamesTheExperimentThatIsNeeded) {
   DataSet r;
   for (int k = 0; k < 600; ++k) {
     r.data.time_s.push_back(k);
@@ -140,7 +144,7 @@ TEST(Identify, RefusesARestAndNamesWhatWouldShowIt) {
   }
 }
 
-TEST(Identify, OnePulseWithoutARestWarnsOfC1) {
+TEST(Identify, OnePulseWithoutARestGivesAWarning) {
   std::vector<experiments::ProfileRow> profile;
   for (int k = 0; k < 32; ++k)
     profile.push_back({static_cast<double>(k), k >= 30 ? -6.0 : 0.0});  // two seconds, then it ends
@@ -155,7 +159,7 @@ TEST(Identify, OnePulseWithoutARestWarnsOfC1) {
   EXPECT_THAT(found.warnings, Contains(HasSubstr("high_1m_low_30s")));
 }
 
-TEST(Identify, AnInvertedCurrentEndsAtABoundAndIsNamed) {
+TEST(Identify, AnInvertedCurrentEndsAtABoundAndGivesAWarning) {
   const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.5);
   DataSet r = record_of(run, 0.5);
   for (double& i : r.data.current_a) i = -i;

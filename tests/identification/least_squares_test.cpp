@@ -1,5 +1,5 @@
-// The optimisers on published problems (more_garbow_hillstrom.hpp); on the fit of a step response, beside SciPy; and on
-// bad input.
+// The optimisers on published problems (more_garbow_hillstrom.hpp), on the fit of a step response compared with SciPy,
+// and on invalid input.
 #include "identification/least_squares.hpp"
 
 #include <algorithm>
@@ -45,15 +45,15 @@ bool reaches(const Optimum& found, double sum_of_squares, double zero = 1e-11) {
   return 2 * found.cost <= sum_of_squares * (1 + 2e-6) + zero;
 }
 
-/// A method that does not arrive in 200 iterations.
+/// A method that does not converge in 200 iterations.
 struct Exception {
   Method method;
   const char* problem;
 };
 
-TEST(LeastSquares, FourMethodsReachThePublishedMinimaAndSaySo) {
-  // Brown-Dennis: the residuals are large, Gauss-Newton's curvature is wrong there and all four creep. Meyer and agn: a
-  // narrow valley in units that differ by 1e6, see below with `scale`.
+TEST(LeastSquares, FourMethodsReachThePublishedMinimaAndReportConvergence) {
+  // Brown-Dennis: the residuals are large, the Gauss-Newton curvature is wrong and all four methods converge slowly.
+  // Meyer and agn: a narrow valley in units that differ by 1e6, see below with `scale`.
   const Exception not_in_200[] = {{Method::subspace_gauss_newton, "Brown-Dennis"},
                                   {Method::levenberg_marquardt, "Brown-Dennis"},
                                   {Method::trust_region_reflective, "Brown-Dennis"},
@@ -70,7 +70,7 @@ TEST(LeastSquares, FourMethodsReachThePublishedMinimaAndSaySo) {
         EXPECT_TRUE(reaches(found, p.sum_of_squares, p.zero) ||
                     (reaches(found, p.local_sum_of_squares) && 2 * found.cost >= p.local_sum_of_squares * (1 - 2e-6)))
             << 2 * found.cost << ": " << found.reason;
-        // J loses rank at that local minimum: it is reached, but a subspace cannot tell that it is one
+        // J loses rank at that local minimum: it is reached, but a subspace method cannot detect that
         if (p.local_sum_of_squares == infinity) {
           EXPECT_TRUE(found.converged) << found.reason;
         }
@@ -84,7 +84,7 @@ TEST(LeastSquares, FourMethodsReachThePublishedMinimaAndSaySo) {
   EXPECT_GE(compared, 14 * 4 - 4);
 }
 
-TEST(LeastSquares, SteepestDescentIsNeverCalledConvergedWhereItIsNot) {
+TEST(LeastSquares, SteepestDescentNeverReportsConvergenceAwayFromAMinimum) {
   for (const Published& p : published()) {
     const Optimum found = solve(p, Method::steepest_descent);
     const bool there = reaches(found, p.sum_of_squares, p.zero) || reaches(found, p.local_sum_of_squares);
@@ -95,7 +95,7 @@ TEST(LeastSquares, SteepestDescentIsNeverCalledConvergedWhereItIsNot) {
   }
 }
 
-TEST(LeastSquares, SteepestDescentReachesTheMinimumGivenTime) {
+TEST(LeastSquares, SteepestDescentReachesTheMinimumWithManyIterations) {
   Stopping patient;
   patient.iterations = 20'000;
   for (const Published& p : published()) {
@@ -120,7 +120,7 @@ TEST(LeastSquares, ALinearProblemIsSolvedByEveryMethod) {
   }
 }
 
-/// Points where r was asked for.
+/// Points where r was evaluated.
 struct Visits {
   LeastSquares problem;
   std::shared_ptr<std::vector<VectorXd>> points = std::make_shared<std::vector<VectorXd>>();
@@ -185,7 +185,7 @@ TEST(LeastSquares, AnOptimumOnABoundIsFoundAndNamed) {
   }
 }
 
-TEST(LeastSquares, NoPointOutsideTheBoundsIsEverAskedFor) {
+TEST(LeastSquares, NoPointOutsideTheBoundsIsEvaluated) {
   std::size_t asked = 0;
   for (const Bounded& b : bounded()) {
     for (const Method method : all_methods) {
@@ -254,7 +254,7 @@ TEST(LeastSquares, PlacesWhereTheResidualsAreNotDefinedAreAvoided) {
   }
 }
 
-TEST(LeastSquares, AStartWithoutResidualsIsNotAnOptimum) {
+TEST(LeastSquares, AStartWithoutResidualsIsNotConverged) {
   LeastSquares problem;
   for (const Method method : all_methods) {
     problem.evaluate = [](const VectorXd&, VectorXd&, MatrixXd*) { return false; };
@@ -273,7 +273,7 @@ TEST(LeastSquares, AStartWithoutResidualsIsNotAnOptimum) {
   }
 }
 
-TEST(LeastSquares, AnUnknownWithoutEffectAndTwoThatAreOneAreSurvived) {
+TEST(LeastSquares, AnUnknownWithoutEffectAndTwoDependentUnknownsAreAccepted) {
   LeastSquares problem;
   problem.evaluate = differentiated([](const Jets& x) {
     return Jets{x[0] + x[1] - 2.0, exp(x[0] + x[1]) - std::exp(2.0), 0.0 * x[2] + 0.1};
@@ -293,7 +293,7 @@ TEST(LeastSquares, FewerResidualsThanUnknownsAreSolved) {
     EXPECT_LE(minimise(problem, vector_of({1, 3, 1}), method).cost, 1e-15) << name_of(method);
 }
 
-TEST(LeastSquares, WrongDerivativesAreNotCalledAnOptimum) {
+TEST(LeastSquares, WrongDerivativesAreNotReportedAsConverged) {
   LeastSquares problem;
   problem.evaluate = [](const VectorXd& x, VectorXd& r, MatrixXd* jacobian) {
     r.resize(2);
@@ -309,7 +309,7 @@ TEST(LeastSquares, WrongDerivativesAreNotCalledAnOptimum) {
   }
 }
 
-TEST(LeastSquares, ArgumentsThatCannotBeMeantAreRefused) {
+TEST(LeastSquares, InvalidArgumentsAreRejected) {
   LeastSquares good;
   good.evaluate = differentiated(rosenbrock);
   const VectorXd start = vector_of({-1.2, 1});
@@ -414,7 +414,7 @@ TEST(StepResponseFit, EveryMethodFindsOhmAndFarad) {
   }
 }
 
-/// What an iteration costs beside r and J, in products J'J of the same run.
+/// Cost of an iteration in addition to r and J, in products J'J of the same run.
 TEST(LeastSquares, AlgebraOfOneIterationIsSmall) {
   const Index m = 20'000, n = 5;
   const MatrixXd a = MatrixXd::Random(m, n);
@@ -438,7 +438,7 @@ TEST(LeastSquares, AlgebraOfOneIterationIsSmall) {
   }
   for (const Method method : all_methods) {
     double algebra_s = infinity;
-    for (int round = 0; round < 5; ++round) {  // the quickest: another program may be at work beside this one
+    for (int round = 0; round < 5; ++round) {  // the fastest round, because other programs may be running
       in_evaluation_s = 0;
       const auto begin = now();
       const Optimum found = minimise(problem, VectorXd::Ones(n), method);
@@ -452,7 +452,7 @@ TEST(LeastSquares, AlgebraOfOneIterationIsSmall) {
   }
 }
 
-class BesideScipy : public ::testing::Test {
+class ComparedWithScipy : public ::testing::Test {
  protected:
   void SetUp() override {
     python_ = python_with_scipy();
@@ -504,7 +504,7 @@ class BesideScipy : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(BesideScipy, TheStepResponseHasTheSameOptimumToSixDigits) {
+TEST_F(ComparedWithScipy, TheStepResponseHasTheSameOptimumToSixDigits) {
   const StepResponse data = step_response(500);
   const LeastSquares problem = fit_of(data);
   const auto values = reference(data, problem);
@@ -514,7 +514,7 @@ TEST_F(BesideScipy, TheStepResponseHasTheSameOptimumToSixDigits) {
   EXPECT_EQ(nls.at_bound, Eigen::VectorXi::Zero(3));
 }
 
-TEST_F(BesideScipy, WithABoundInTheWayTheOptimumIsTheSameToSixDigits) {
+TEST_F(ComparedWithScipy, WithABoundInTheWayTheOptimumIsTheSameToSixDigits) {
   const StepResponse data = step_response(500);
   for (const bool on_r0 : {true, false}) {
     LeastSquares problem = fit_of(data);
@@ -530,7 +530,7 @@ TEST_F(BesideScipy, WithABoundInTheWayTheOptimumIsTheSameToSixDigits) {
   }
 }
 
-TEST(LeastSquares, MethodsGoByTheirShortNames) {
+TEST(LeastSquares, MethodsHaveShortNames) {
   std::string names;
   for (const Method method : all_methods) names += std::string(name_of(method)) + ' ';
   EXPECT_EQ(names, "gn agn lm sd nls ");

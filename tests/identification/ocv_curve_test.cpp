@@ -12,6 +12,11 @@ namespace {
 
 constexpr double gap_v = 0.025;
 
+double hysteresis_v(double current_a) {
+  if (current_a == 0) return 0;
+  return current_a > 0 ? gap_v : -gap_v;
+}
+
 /// A slow run of the truth cell with `gap_v` of hysteresis added, rests at both ends.
 SlowRun slow_run(bool charges, double noise_v = 0.0005) {
   constexpr double c_rate = 1.0 / 25;
@@ -23,10 +28,7 @@ SlowRun slow_run(bool charges, double noise_v = 0.0005) {
   std::mt19937_64 random(charges ? 1 : 2);
   std::normal_distribution<double> normal;
   for (std::size_t k = 0; k < run.data.size(); ++k)
-    run.data.voltage_v[k] += (profile[k].current_a > 0   ? gap_v
-                              : profile[k].current_a < 0 ? -gap_v
-                                                         : 0) +
-                             noise_v * normal(random);
+    run.data.voltage_v[k] += hysteresis_v(profile[k].current_a) + noise_v * normal(random);
   return {run.data, {}};
 }
 
@@ -38,18 +40,18 @@ TEST(OcvCurve, IsTheMiddleOfChargeAndDischargeAndKeepsTheGap) {
   for (std::size_t k = 20; k + 20 < curve.soc.size(); k += 7) {
     ASSERT_NEAR(curve.ocv_v[k], truth_v.at(curve.soc[k]), 0.0015) << curve.soc[k];
     ASSERT_NEAR(curve.half_gap_v[k], gap_v + 0.24 * 0.022, 0.005)
-        << curve.soc[k];  // what C/25 drops over R0 + R1 is part of it
+        << curve.soc[k];  // includes the overvoltage of C/25 over R0 + R1
   }
 }
 
-TEST(OcvCurve, OneRunAloneIsTakenAsItIs) {
+TEST(OcvCurve, OneRunAloneIsUsedUnchanged) {
   const OcvCurve curve = ocv_curve({slow_run(false)});
   EXPECT_FALSE(curve.coulombic_efficiency);
   EXPECT_EQ(curve.half_gap_v[500], 0);
   EXPECT_NEAR(curve.ocv_v[500], plant::table9_ocv_v().at(0.5) - gap_v - 0.005, 0.002);
 }
 
-TEST(OcvCurve, RefusesWhatIsNoSlowRun) {
+TEST(OcvCurve, RejectsRunsThatAreNotSlowOrNotComplete) {
   const auto profile = *experiments::experiment("high_1m_low_30s");
   EXPECT_THROW(ocv_curve({{run_plant(profile, 0.5).data, {}}}), std::invalid_argument);
   EXPECT_THROW(ocv_curve({}), std::invalid_argument);
@@ -76,13 +78,14 @@ TEST(OcvPieces, AreFewRisingAndWithinTheError) {
   }
 }
 
-TEST(OcvPieces, HaveMoreCornersWhereTheGapBends) {
+TEST(OcvPieces, HaveMoreCornersWhereTheHalfGapBends) {
   OcvCurve curve;
   for (int k = 0; k <= 1000; ++k) {
     const double s = k / 1000.0;
     curve.soc.push_back(s);
     curve.ocv_v.push_back(3.2 + 0.1 * s);
-    curve.half_gap_v.push_back(0.02 + 0.01 * std::exp(-std::pow((s - 0.7) / 0.05, 2)));  // knees that lie apart
+    curve.half_gap_v.push_back(
+        0.02 + 0.01 * std::exp(-std::pow((s - 0.7) / 0.05, 2)));  // the knees of charge and discharge differ
   }
   auto pieces = *fewest_pieces(curve, 0.002);
   ASSERT_EQ(pieces.soc.size(), 2U);
@@ -103,7 +106,7 @@ TEST(OcvPieces, HaveMoreCornersWhereTheGapBends) {
   EXPECT_EQ(pieces.soc.size(), 5U);
 }
 
-TEST(OcvPieces, FollowACurveThatPlunges) {
+TEST(OcvPieces, FollowASteepCurve) {
   OcvCurve curve;
   for (int k = 0; k <= 1000; ++k) {
     const double s = k / 1000.0;
@@ -114,18 +117,23 @@ TEST(OcvPieces, FollowACurveThatPlunges) {
   const auto pieces = fewest_pieces(curve, 0.002);
   ASSERT_TRUE(pieces);
   for (std::size_t k = 1; k < pieces->soc.size(); ++k) {
-    EXPECT_GE(pieces->soc[k] - pieces->soc[k - 1], 0.002 - 1e-12) << "a cell file holds no narrower ones";
+    EXPECT_GE(pieces->soc[k] - pieces->soc[k - 1], 0.002 - 1e-12) << "a cell file accepts no narrower pieces";
     EXPECT_LT((pieces->ocv_v[k] - pieces->ocv_v[k - 1]) / (pieces->soc[k] - pieces->soc[k - 1]), 250);
   }
   EXPECT_LE(pieces->largest_error_v, 0.002);
 }
 
-TEST(OcvPieces, FindTheCornersOfWhatIsMadeOfPieces) {
+double three_lines_v(double soc) {
+  if (soc < 0.2) return 3 + soc;
+  return soc < 0.7 ? 3.2 + 0.02 * (soc - 0.2) : 3.21 + 0.5 * (soc - 0.7);
+}
+
+TEST(OcvPieces, FindTheCornersOfAPolyline) {
   OcvCurve curve;
   for (int k = 0; k <= 1000; ++k) {
     const double s = k / 1000.0;
     curve.soc.push_back(s);
-    curve.ocv_v.push_back(s < 0.2 ? 3 + s : s < 0.7 ? 3.2 + 0.02 * (s - 0.2) : 3.21 + 0.5 * (s - 0.7));
+    curve.ocv_v.push_back(three_lines_v(s));
     curve.half_gap_v.push_back(0);
   }
   const auto pieces = fewest_pieces(curve, 0.001);

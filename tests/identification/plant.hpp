@@ -1,4 +1,4 @@
-// A day at the cycler with the truth cell: profiles through the plant, readings with noise.
+// Profiles through the cell of plant/, and readings with noise.
 #pragma once
 
 #include <random>
@@ -12,7 +12,7 @@
 namespace bms::identification {
 
 struct PlantRun {
-  Data data;  ///< exact
+  Data data;  ///< without noise
   double soc_min = 1, soc_max = 0;
   std::vector<double> soc;
 };

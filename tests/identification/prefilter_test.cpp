@@ -58,7 +58,7 @@ TEST(Butterworth, AgreesWithScipyInCoefficientsAndInBothPhases) {
 }
 
 // At a quarter of the sampling rate the warped frequency is tan(pi/4) = 1: b = 1/(2 + sqrt 2) (1 2 1), a1 = 0.
-TEST(Butterworth, AtAQuarterOfTheRateIsWhatAHandComputes) {
+TEST(Butterworth, AtAQuarterOfTheRateAgreesWithValuesComputedByHand) {
   const SecondOrderFilter f = butterworth_low_pass(25, 100);
   const double b0 = 1 / (2 + std::sqrt(2.0));
   EXPECT_NEAR(f.b[0], b0, 1e-15);
@@ -77,20 +77,20 @@ TEST(Butterworth, HasGainOneAtZeroHalfThePowerAtTheCutoffAndNothingAtHalfTheRate
   }
 }
 
-TEST(Butterworth, RefusesACutoffOutsideZeroToHalfTheRate) {
+TEST(Butterworth, RejectsACutoffOutsideZeroToHalfTheRate) {
   for (const double cutoff : {0.0, -1.0, 0.5, 0.7, std::nan("")})
     EXPECT_THROW(butterworth_low_pass(cutoff, 1), std::invalid_argument) << cutoff;
   EXPECT_NO_THROW(butterworth_low_pass(0.4999, 1));
 }
 
-TEST(Filters, LeaveAConstantAsItIsFromTheFirstSampleOn) {
+TEST(Filters, DoNotChangeAConstant) {
   const SecondOrderFilter f = butterworth_low_pass(0.03, 1);
   const std::vector<double> constant(50, -2.5);
   for (const auto& filtered : {filter_causal(f, constant), filter_zero_phase(f, constant)})
     expect_near(filtered, constant, 1e-11, "constant");
 }
 
-TEST(Filters, ForwardAndBackwardDelaysNothingAndOneWayDoes) {
+TEST(Filters, HaveNoDelayForwardAndBackwardAndADelayInOneDirection) {
   std::vector<double> pulse(401, 0);
   for (std::size_t k = 190; k <= 210; ++k) pulse[k] = 1;
   const SecondOrderFilter f = butterworth_low_pass(0.02, 1);
@@ -104,7 +104,7 @@ TEST(Filters, ForwardAndBackwardDelaysNothingAndOneWayDoes) {
   EXPECT_NEAR(centre(filter_causal(f, pulse)), 200 + std::sqrt(2.0) / (2 * std::tan(0.02 * std::numbers::pi)), 1e-3);
 }
 
-TEST(Filters, RefuseTooFewValuesAndWhatIsNotANumber) {
+TEST(Filters, RejectTooFewValuesAndNan) {
   const SecondOrderFilter f = butterworth_low_pass(0.1, 1);
   EXPECT_THROW(filter_zero_phase(f, std::vector<double>(9, 1)), std::invalid_argument);
   EXPECT_NO_THROW(filter_zero_phase(f, std::vector<double>(10, 1)));
@@ -115,7 +115,7 @@ TEST(Filters, RefuseTooFewValuesAndWhatIsNotANumber) {
   EXPECT_THROW(filter_zero_phase(f, hole), std::invalid_argument);
 }
 
-TEST(EvenStep, TakesOnePercentOfJitterAndNoMore) {
+TEST(EvenStep, AcceptsOnePercentOfJitter) {
   auto t = evenly(100, 0.5);
   EXPECT_EQ(even_step_s(t), 0.5);
   t[50] += 0.0045;
@@ -142,7 +142,7 @@ Data rest_load_rest(double offset_a, double noise_a) {
   return data;
 }
 
-TEST(Offset, IsTheMeanOverTheRestsAndKnowsItsError) {
+TEST(Offset, IsTheMeanOverTheRestsWithItsStandardDeviation) {
   const Offset exact = offset_at_rest(rest_load_rest(0.04, 0));
   EXPECT_NEAR(exact.current_a, 0.04, 1e-15);
   EXPECT_EQ(exact.samples, 192U);  // two at each end of two rests left out
@@ -151,7 +151,7 @@ TEST(Offset, IsTheMeanOverTheRestsAndKnowsItsError) {
   EXPECT_NEAR(noisy.current_std_a, 0.02 / std::sqrt(192.0), 0.0003);
 }
 
-TEST(Offset, IsNotTakenFromAShortPauseALoadOrATrickleAboveTheThreshold) {
+TEST(Offset, IgnoresAShortPauseALoadAndASmallCurrentAboveTheThreshold) {
   Data data = rest_load_rest(0.04, 0);
   for (std::size_t k = 0; k < 300; ++k) {
     if (data.current_a[k] > 0) data.current_a[k] = k < 280 ? 0.2 : 0.04;  // C/30; then 20 s of pause
@@ -161,7 +161,7 @@ TEST(Offset, IsNotTakenFromAShortPauseALoadOrATrickleAboveTheThreshold) {
   EXPECT_EQ(offset.current_a, 0);
 }
 
-TEST(Offset, SurvivesASpikeWithinARest) {
+TEST(Offset, ToleratesASpikeWithinARest) {
   Data data = rest_load_rest(0.04, 0);
   data.current_a[50] = 0.5;
   EXPECT_EQ(offset_at_rest(data).samples, 192U);
@@ -183,7 +183,7 @@ TEST(Prefilter, SubtractsTheOffsetAndReportsIt) {
   EXPECT_EQ(kept.offset.samples, 0U);
 }
 
-TEST(Prefilter, OneWayMakesVoltageAndCurrentLateAlike) {
+TEST(Prefilter, CausalDelaysVoltageAndCurrentAlike) {
   Data data = rest_load_rest(0, 0);
   for (std::size_t k = 0; k < 300; ++k) data.voltage_v[k] = 3.3 + 0.01 * data.current_a[k];
   const Prefiltered out = prefilter(data, {.cutoff_hz = 0.05, .phase = Phase::causal});
@@ -195,7 +195,7 @@ TEST(Prefilter, OneWayMakesVoltageAndCurrentLateAlike) {
   EXPECT_NO_THROW(prefilter(data, {.phase = Phase::zero}));
 }
 
-TEST(Prefilter, RefusesUnevenSamplingWithASentence) {
+TEST(Prefilter, RejectsUnevenSampling) {
   Data data = rest_load_rest(0, 0);
   data.time_s[200] += 0.3;
   try {

@@ -12,7 +12,7 @@
 namespace bms::identification {
 namespace {
 
-/// A cell with one RC element, solved in closed form over stretches of constant current.
+/// A cell with one RC element, in closed form for stretches of constant current.
 struct Cell {
   double r0_ohm = 0.0126, r1_ohm = 0.0192, tau_s = 60, ocv_v = 3.2, slope_v = 0.3, capacity_ah = 6;
 };
@@ -27,8 +27,7 @@ struct Sampling {
   unsigned seed = 1;
 };
 
-/// Current: mean over the interval that ends with the sample; voltage at the sample, a step at that very instant not
-/// yet in it.
+/// Current: mean over the interval that ends with the sample; voltage at the sample, before a step at the same instant.
 Data recording(const Cell& cell, const std::vector<Stretch>& stretches, const Sampling& sampling = {}) {
   std::mt19937 random(sampling.seed);
   std::normal_distribution<double> noise(0, 1);
@@ -77,7 +76,7 @@ void expect_cell(const RestReadings& readings, const Cell& cell, const Relative&
   EXPECT_NEAR(readings.c1_f / (cell.tau_s / cell.r1_ohm), 1, tolerance.r1 + tolerance.tau) << what;
 }
 
-TEST(RestReading, FindsTheCellAt1HzAnd10HzUnder1mVOfNoiseWhicheverWayTheCurrentWent) {
+TEST(RestReading, FindsTheCellAt1HzAnd10HzWith1mVOfNoiseInBothCurrentDirections) {
   for (const double step_s : {1.0, 0.1}) {
     for (const double current_a : {-6.0, 6.0, -3.0}) {
       for (unsigned seed = 1; seed <= 8; ++seed) {
@@ -188,7 +187,7 @@ TEST(RestReading, PassesOverSpikesHolesAndUnevenSamples) {
   expect_cell(read_rests(thinned), {}, {0.03, 0.1, 0.15}, "spikes");
 }
 
-TEST(RestReading, IsNotMovedByNoiseOfTheCurrentOrATrickle) {
+TEST(RestReading, IsNotBiasedByCurrentNoiseOrASmallCurrentAtRest) {
   expect_cell(read_rests(recording({}, ocv_test(-6), {.noise_a = 0.02})), {}, {0.03, 0.1, 0.15}, "noise");
   std::vector<Stretch> trickle = ocv_test(-6);
   for (Stretch& s : trickle) {
@@ -198,7 +197,7 @@ TEST(RestReading, IsNotMovedByNoiseOfTheCurrentOrATrickle) {
 }
 
 // One bad rest of five does not move the median; one rest too short for tau does not count for it.
-TEST(RestReading, CombinesByTheMedianOfWhatIsUsable) {
+TEST(RestReading, CombinesTheUsableRestsByTheirMedian) {
   Data data = recording({}, ocv_test(-6, 5));
   for (std::size_t k = 430; k < 1'000; ++k) data.voltage_v[k] += 0.05 * std::sin(static_cast<double>(k) / 20);
   expect_cell(read_rests(data), {}, {0.03, 0.1, 0.15}, "one of five");
@@ -212,7 +211,7 @@ TEST(RestReading, CombinesByTheMedianOfWhatIsUsable) {
   EXPECT_FALSE(r.rests[2].rc_usable);
 }
 
-TEST(RestReading, SaysWhyThereIsNothingToRead) {
+TEST(RestReading, GivesTheReasonIfThereIsNothingToRead) {
   const auto reason = [](const std::vector<Stretch>& s) {
     const RestReadings r = read_rests(recording({}, s));
     EXPECT_TRUE(r.rests.empty());
@@ -238,7 +237,7 @@ TEST(RestReading, SaysWhyThereIsNothingToRead) {
   EXPECT_NEAR(brief.r0_ohm, 0.0126, 0.001);
 }
 
-TEST(RestReading, RefusesColumnsThatAreNoRecording) {
+TEST(RestReading, RejectsInvalidColumns) {
   const Data good = recording({}, ocv_test(-6, 1));
   Data bad = good;
   bad.capacity_ah = 0;

@@ -1,4 +1,4 @@
-// SciPy as an independent reference: of the tests only, never of the product.
+// SciPy as an independent reference; only the tests use it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 
 namespace bms::identification {
 
-/// A python3 with scipy, or nothing. The second: a distribution's, beside one that a person installed.
+/// A python3 with scipy, or an empty text. The second candidate is that of the distribution, next to an installed one.
 inline std::string python_with_scipy() {
   for (const std::string python : {"python3", "/usr/bin/python3"}) {
     if (std::system((python + " -c 'import scipy.optimize' > /dev/null 2>&1").c_str()) == 0) return python;

@@ -1,4 +1,7 @@
-"""Numbers of scipy for prefilter_test and discrete_model_test: one line a column, its name and then its values, 17 digits."""
+"""Numbers of scipy for prefilter_test and discrete_model_test.
+
+Prints one line per column: its name and then its values with 17 digits.
+"""
 import numpy as np
 from scipy import signal
 

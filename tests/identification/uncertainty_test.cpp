@@ -12,7 +12,7 @@
 namespace bms::identification {
 namespace {
 
-/// Noise that fades by `fading` a sample, of unit variance.
+/// Autoregressive noise with a lag-one correlation of `fading` and unit variance.
 Eigen::VectorXd coloured(std::mt19937_64& random, Eigen::Index n, double fading) {
   std::normal_distribution<double> normal;
   Eigen::VectorXd e(n);
@@ -26,10 +26,10 @@ Eigen::VectorXd coloured(std::mt19937_64& random, Eigen::Index n, double fading)
 
 struct Coverage {
   double coloured = 0,
-         white = 0;  ///< fraction of draws whose truth lies within two deviations, mean of both parameters
+         white = 0;  ///< fraction of draws with the truth within two sigma, mean of both parameters
 };
 
-/// A straight-line regression whose answer is known, drawn often.
+/// Many draws of a linear regression with a known result.
 Coverage coverage(double fading) {
   constexpr Eigen::Index n = 3'000;
   constexpr int draws = 400;
@@ -50,20 +50,20 @@ Coverage coverage(double fading) {
   return c;
 }
 
-TEST(Uncertainty, OfWhiteResidualsIsTheTextbookOne) {
+TEST(Uncertainty, OfWhiteResidualsIsThatOfTheTextbook) {
   const Coverage c = coverage(0);
   EXPECT_NEAR(c.white, 0.954, 0.025);
   EXPECT_NEAR(c.coloured, 0.954, 0.03);
 }
 
-TEST(Uncertainty, OfResidualsInRunsCountsRunsWhereTheWhiteFormulaIsFarOff) {
+TEST(Uncertainty, OfCorrelatedResidualsCountsRunsWhereTheWhiteFormulaIsWrong) {
   const Coverage c = coverage(0.97);
   EXPECT_GT(c.coloured, 0.88);
   EXPECT_LT(c.coloured, 0.99);
   EXPECT_LT(c.white, 0.5);
 }
 
-TEST(Uncertainty, NamesWhatTheDataDoesNotShow) {
+TEST(Uncertainty, FindsTheParametersThatTheDataDoNotDetermine) {
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(100, 4);
   for (Eigen::Index k = 0; k < 100; ++k)
     jacobian.row(k) << std::sin(0.3 * static_cast<double>(k)), 0, static_cast<double>(k % 7),
@@ -82,7 +82,7 @@ TEST(Uncertainty, NamesWhatTheDataDoesNotShow) {
   EXPECT_EQ(with_one_fixed.std(3), 0);
 }
 
-TEST(Uncertainty, AConstantErrorMovesWhatLooksConstant) {
+TEST(Uncertainty, AConstantErrorMovesParametersWithAConstantEffect) {
   Eigen::MatrixXd jacobian(50, 2);
   for (Eigen::Index k = 0; k < 50; ++k) jacobian.row(k) << 4, k % 2 == 0 ? 1 : -1;
   const Uncertainty u = uncertainty(Eigen::VectorXd::Constant(50, 1e-9), jacobian, 50, Eigen::VectorXi::Zero(2), 0.002);
@@ -90,7 +90,7 @@ TEST(Uncertainty, AConstantErrorMovesWhatLooksConstant) {
   EXPECT_NEAR(u.offset[1], 0, 1e-12);
 }
 
-TEST(Residuals, TellWhiteFromColouredAndBias) {
+TEST(Residuals, DistinguishWhiteNoiseColouredNoiseAndBias) {
   std::mt19937_64 random(2);
   const Eigen::VectorXd current = coloured(random, 4'000, 0.9), white = coloured(random, 4'000, 0),
                         slow = coloured(random, 4'000, 0.95);
@@ -107,7 +107,7 @@ TEST(Residuals, TellWhiteFromColouredAndBias) {
   EXPECT_LT(of_white.input_correlated, 0.3);
 }
 
-TEST(Residuals, PredictionTakesTheLastErrorAlong) {
+TEST(Residuals, PredictionUsesTheLastError) {
   std::mt19937_64 random(4);
   const Eigen::VectorXd slow = coloured(random, 20'000, 0.9);
   const double f = fading(slow);
