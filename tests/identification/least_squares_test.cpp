@@ -149,7 +149,7 @@ const std::vector<Bounded>& bounded() {
       {"Rosenbrock left of 0.5", rosenbrock, {-1.2, 1}, {-infinity, -infinity}, {0.5, infinity}, {0.5, 0.25}, {1, 0}},
       // x1 = 1.5: 200 (x0^2 - 1.5) 2 x0 = 2 (1 - x0)
       {"Rosenbrock above 1.5", rosenbrock, {-1.2, 2}, {0, 1.5}, {infinity, infinity}, {1.2243707487, 1.5}, {0, -1}},
-      {"Rosenbrock, bounds that are none", rosenbrock, {-1.2, 1}, {-10, -10}, {10, 10}, {1, 1}, {0, 0}},
+      {"Rosenbrock, inactive bounds", rosenbrock, {-1.2, 1}, {-10, -10}, {10, 10}, {1, 1}, {0, 0}},
       {"Rosenbrock from a bound that must be left", rosenbrock, {-1.5, 1.5}, {-1.5, -2}, {2, 1.5}, {1, 1}, {0, 0}},
       {"Rosenbrock started outside", rosenbrock, {-7, 9}, {-2, -2}, {0.5, 3}, {0.5, 0.25}, {1, 0}},
       {"Beale in a corner", beale, {1, 1}, {0, 0.6}, {2, 2}, {2, 0.6}, {1, -1}},
