@@ -1,4 +1,4 @@
-// Figures of a profile: how long, how much charge, how large a current.
+// Figures of a profile: duration, charge, largest current.
 #pragma once
 
 #include <algorithm>

@@ -6,6 +6,8 @@
 
 #include <Eigen/Dense>
 
+#include "measurement/statistics.hpp"
+
 namespace bms::identification {
 
 namespace {
@@ -37,14 +39,6 @@ Decay decay_of(const Trace& trace, double tau_s) {
 
 }  // namespace
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
-}
-
-/// Best tau: first on a grid, because a long flat tail makes further minima, then by golden section between grid
-/// points.
 Decay best_decay(const Trace& trace) {
   const double least = std::max(trace.t_s.back() / static_cast<double>(trace.t_s.size()) / 3, 1e-3),
                most = 10 * trace.t_s.back();
@@ -76,7 +70,7 @@ Trace without_outliers(const Trace& trace, const Decay& decay) {
   for (std::size_t k = 0; k < trace.v.size(); ++k)
     residual_v.push_back(
         std::abs(decay.level_v + decay.amplitude_v * std::exp(-trace.t_s[k] / decay.tau_s) - trace.v[k]));
-  const double bound = std::max(5 * 1.4826 * median(residual_v), 1e-9);
+  const double bound = std::max(5 * 1.4826 * measurement::median(residual_v), 1e-9);
   Trace kept;
   for (std::size_t k = 0; k < trace.v.size(); ++k) {
     if (residual_v[k] > bound) continue;

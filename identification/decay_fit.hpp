@@ -41,7 +41,4 @@ struct FirstSamples {
 };
 FirstSamples first_samples(const FittedDecay& fitted);
 
-/// Of an even number of values the mean of the two in the middle. At least one value.
-double median(std::vector<double> values);
-
 }  // namespace bms::identification

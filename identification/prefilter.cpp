@@ -5,17 +5,13 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "measurement/statistics.hpp"
+
 namespace bms::identification {
 
 namespace {
 
 constexpr std::size_t padding = 9;  // three times the number of coefficients, as in scipy.signal.filtfilt
-
-double upper_median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 void require_finite(const std::vector<double>& values) {
   if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) {
@@ -43,7 +39,7 @@ std::vector<bool> quiet(const std::vector<double>& current_a, double below_a) {
     const std::size_t from = k < 2 ? 0 : k - 2, to = std::min(k + 3, current_a.size());
     std::vector<double> around;
     for (std::size_t j = from; j < to; ++j) around.push_back(std::abs(current_a[j]));
-    is_quiet[k] = upper_median(around) < below_a;
+    is_quiet[k] = measurement::upper_median(around) < below_a;
   }
   return is_quiet;
 }
@@ -56,7 +52,7 @@ double even_step_s(const std::vector<double>& time_s) {
   for (std::size_t k = 1; k < time_s.size(); ++k) steps_s.push_back(time_s[k] - time_s[k - 1]);
   if (!std::all_of(steps_s.begin(), steps_s.end(), [](double s) { return s > 0 && std::isfinite(s); }))
     throw std::invalid_argument("time does not rise from sample to sample");
-  const double step_s = upper_median(steps_s);
+  const double step_s = measurement::upper_median(steps_s);
   for (const double s : steps_s) {
     if (std::abs(s - step_s) > largest_jitter * step_s)
       throw std::invalid_argument(

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "identification/decay_fit.hpp"
+#include "measurement/statistics.hpp"
 
 namespace bms::identification {
 
@@ -52,7 +53,7 @@ double median_voltage(const Data& data, std::size_t from, std::size_t to) {
   for (std::size_t k = from; k < to; ++k) {
     if (std::isfinite(data.voltage_v[k])) v.push_back(data.voltage_v[k]);
   }
-  return v.empty() ? NAN : median(v);
+  return v.empty() ? NAN : measurement::median(v);
 }
 
 PointReading points_of(const Data& data, const Rest& rest, double step_a) {
@@ -177,7 +178,7 @@ std::optional<RestReading> read(const Data& data, const Rest& rest, const RestRe
   out.load_a = data.current_a[rest.loaded];
   std::vector<double> resting;
   for (std::size_t k = rest.begin; k < rest.end; ++k) resting.push_back(data.current_a[k]);
-  const double rest_a = median(resting), step_a = rest_a - out.load_a;
+  const double rest_a = measurement::median(resting), step_a = rest_a - out.load_a;
   const auto n = static_cast<double>(fitted->trace.v.size());
   constexpr double unknowns = 3;  // A, B, tau
   const double variance_v2 = decay.squares / (n - unknowns);
@@ -289,11 +290,11 @@ RestReadings read_rests(const Data& data, const RestReadingOptions& options) {
   }
   out.r0_from = r0.size();
   out.rc_from = r1.size();
-  if (!r0.empty()) out.r0_ohm = median(r0);
+  if (!r0.empty()) out.r0_ohm = measurement::median(r0);
   if (!r1.empty()) {
-    out.r1_ohm = median(r1);
-    out.tau_s = median(tau);
-    out.c1_f = median(c1);
+    out.r1_ohm = measurement::median(r1);
+    out.tau_s = measurement::median(tau);
+    out.c1_f = measurement::median(c1);
   }
   out.reason = reason_of(out, search);
   return out;
