@@ -50,6 +50,8 @@ std::vector<model::MechanismValues<Jet>> dual_values(const Hypothesis& h) {
   return values;
 }
 
+}  // namespace
+
 /// An unknown that acts on a row, through a lever.
 struct Pull {
   Eigen::Index lever, unknown;
@@ -98,8 +100,6 @@ class CarriedStates {
   Eigen::Index still_;
   Columns states_, next_;  // d state / d unknown
 };
-
-}  // namespace
 
 template <std::size_t Lanes>
 void LikelihoodModel::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const ParameterRef> by,

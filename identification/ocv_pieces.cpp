@@ -79,17 +79,17 @@ class FewestPieces {
                                          return a.pieces != b.pieces ? a.pieces < b.pieces : a.squares < b.squares;
                                        });
     if (last->pieces == unreached) return std::nullopt;
-    OcvPieces pieces;
+    OcvPieces corner_points;
     for (auto at = static_cast<std::size_t>(last - best_.begin());; at = best_[at].from) {
-      pieces.soc.push_back(curve_.soc[at / levels]);
-      pieces.ocv_v.push_back(height(at / levels, at % levels));
-      pieces.half_gap_v.push_back(curve_.half_gap_v[at / levels]);
+      corner_points.soc.push_back(curve_.soc[at / levels]);
+      corner_points.ocv_v.push_back(height(at / levels, at % levels));
+      corner_points.half_gap_v.push_back(curve_.half_gap_v[at / levels]);
       if (at / levels == 0) break;
     }
-    std::reverse(pieces.soc.begin(), pieces.soc.end());
-    std::reverse(pieces.ocv_v.begin(), pieces.ocv_v.end());
-    std::reverse(pieces.half_gap_v.begin(), pieces.half_gap_v.end());
-    return pieces;
+    std::reverse(corner_points.soc.begin(), corner_points.soc.end());
+    std::reverse(corner_points.ocv_v.begin(), corner_points.ocv_v.end());
+    std::reverse(corner_points.half_gap_v.begin(), corner_points.half_gap_v.end());
+    return corner_points;
   }
 
  private:
