@@ -2,8 +2,8 @@
 #
 #   bms_embed(OUT_VARIABLE NAME HEADER h.hpp NAMESPACE n NAMES a b FILES fa fb [LIST function TYPE Type])
 #
-# writes NAME.cpp in the build folder and sets OUT_VARIABLE to its path. Without LIST it has one std::string_view for each
-# name. With LIST it has `const std::vector<Type>& function()`, a list of {name, text}. HEADER declares them.
+# Writes NAME.cpp in the build folder and sets OUT_VARIABLE to its path. Without LIST the file has one std::string_view
+# per name. With LIST it has `const std::vector<Type>& function()`, a list of {name, text}. HEADER declares them.
 if(NOT CMAKE_SCRIPT_MODE_FILE)
   function(bms_embed out_variable name)
     cmake_parse_arguments(arg "" "HEADER;NAMESPACE;LIST;TYPE" "NAMES;FILES" ${ARGN})
@@ -11,7 +11,8 @@ if(NOT CMAKE_SCRIPT_MODE_FILE)
     list(JOIN arg_NAMES "|" names)
     list(JOIN arg_FILES "|" files)
     add_custom_command(OUTPUT ${out}
-      COMMAND ${CMAKE_COMMAND} -DOUT=${out} -DHEADER=${arg_HEADER} -DNAMESPACE=${arg_NAMESPACE} -DLIST=${arg_LIST} -DTYPE=${arg_TYPE}
+      COMMAND ${CMAKE_COMMAND} -DOUT=${out} -DHEADER=${arg_HEADER} -DNAMESPACE=${arg_NAMESPACE} -DLIST=${arg_LIST}
+        -DTYPE=${arg_TYPE}
         "-DNAMES=${names}" "-DFILES=${files}" -P ${PROJECT_SOURCE_DIR}/cmake/embed.cmake
       DEPENDS ${arg_FILES} ${PROJECT_SOURCE_DIR}/cmake/embed.cmake VERBATIM)
     set(${out_variable} ${out} PARENT_SCOPE)

@@ -228,6 +228,17 @@ std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
   }
 }
 
+/// IWDG_KR: 0xCCCC starts the watchdog, 0xAAAA feeds it.
+void UnicornBoard::write_watchdog(std::uint32_t key) {
+  if (key == 0xCCCC) watchdog_ticks_ = 1;
+  if (key != 0xAAAA) return;
+  ++watchdog_feeds;
+  if (fed_at_ != 0)
+    longest_unfed_ms = std::max(longest_unfed_ms, static_cast<double>(ticks_ - fed_at_) / (ticks_per_second / 1e3));
+  fed_at_ = ticks_;
+  watchdog_ticks_ = register_value(0x40003008) * (ticks_per_second / 500);  // a count is 2 ms
+}
+
 void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
   if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) {
     if ((register_value(0x40023840) & 1U << 25) != 0)
@@ -243,15 +254,8 @@ void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
   if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end())
     return found->second->write(a & 0x3FF, value, 1e3 * now_ms());
   switch (a) {
-    case 0x40003000:  // IWDG_KR
-      if (value == 0xCCCC) watchdog_ticks_ = 1;
-      if (value != 0xAAAA) return;
-      ++watchdog_feeds;
-      if (fed_at_ != 0)
-        longest_unfed_ms = std::max(longest_unfed_ms, static_cast<double>(ticks_ - fed_at_) / (ticks_per_second / 1e3));
-      fed_at_ = ticks_;
-      watchdog_ticks_ = register_value(0x40003008) * (ticks_per_second / 500);  // a count is 2 ms
-      return;
+    case 0x40003000:
+      return write_watchdog(value);
     case 0x40013C14:
       if ((value & 1U << 16) != 0) supply_pending_ = false;
       return;

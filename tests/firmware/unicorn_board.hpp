@@ -111,6 +111,7 @@ class UnicornBoard {
   int pending_exception() const;
   std::uint32_t peripheral_read(std::uint32_t address);
   void peripheral_write(std::uint32_t address, std::uint32_t value);
+  void write_watchdog(std::uint32_t key);
   std::uint32_t core_hz() const;
   std::uint64_t ticks_a_cycle() const { return ticks_per_second / core_hz(); }
   std::uint32_t reg(int id) const;
