@@ -13,6 +13,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -51,7 +52,7 @@ struct Experiment {
   std::string_view name;
   std::string_view description;
   void (*build)(ProfileBuilder&);
-  double start_soc = std::nan("");    ///< required initial SOC; NaN: any
+  double start_soc = std::numeric_limits<double>::quiet_NaN();  ///< required initial SOC; NaN: any
   std::string_view instruction = {};  ///< to the technician: preparation and logging; empty: none
   double step_s = 1;                  ///< longest useful sampling step
 };
