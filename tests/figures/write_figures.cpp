@@ -337,6 +337,30 @@ std::string protection_cost() {
   return table;
 }
 
+/// The rooms by floor, as checks/arrows.py draws them.
+std::string floors() {
+  return "```\n" + images::output_of({"python3", (source / "checks/arrows.py").string(), "--draw"}) + "```\n";
+}
+
+/// A picture of the report of the shift, by the browser that also tests the pages.
+void draw_report(const std::filesystem::path& picture) {
+  const images::TemporaryFolder folder;
+  const std::string page = (folder.path() / "shift.html").string();
+  images::output_of({BMS_TOOL, "replay", shift, "--initial-soc", "0.98", "--quiet", "--report", page});
+  images::output_of({"chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+                     "--disable-background-networking", "--disable-component-update", "--disable-sync",
+                     "--hide-scrollbars", "--user-data-dir=" + (folder.path() / "browser").string(),
+                     "--virtual-time-budget=10000", "--window-size=1280,900", "--screenshot=" + picture.string(),
+                     "file://" + page});
+}
+
+/// Picture and tables of the project's README, from the same code.
+void write_front_page() {
+  files::replace_figures(source / "README.md", "headline", shift_accuracy());
+  files::replace_figures(source / "README.md", "floors", floors());
+  draw_report(source / "docs/figures/forklift_shift.png");
+}
+
 /// Figures that depend on the code alone.
 void write_board() {
   files::replace_figures(source / "protection/README.md", "netduinoplus2", protection_cost());
@@ -350,6 +374,7 @@ void write_board() {
 void run() {
   const auto estimator = source / "estimator/README.md";
   write_board();
+  write_front_page();
   files::replace_figures(estimator, "shift", shift_accuracy());
   files::replace_figures(estimator, "duty", thousand_hours());
   if (std::filesystem::exists(data)) {
@@ -372,6 +397,8 @@ int main(int argc, char** argv) {
   try {
     if (argc > 1 && std::string_view(argv[1]) == "step")
       fmt::print("{}\n{}", bms::step_cost(), bms::mechanism_cost());
+    else if (argc > 1 && std::string_view(argv[1]) == "readme")
+      bms::write_front_page();
     else if (argc > 1 && std::string_view(argv[1]) == "board")
       bms::write_board();
     else if (argc > 1 && std::string_view(argv[1]) == "budgets")

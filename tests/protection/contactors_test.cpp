@@ -11,7 +11,6 @@ namespace bms::protection {
 namespace {
 
 using enum ContactorState;
-constexpr std::int32_t pack_uv = rested_pack_uv;
 
 TEST(Contactors, StartOffWithEverythingOpen) {
   ContactorBench b;
