@@ -242,7 +242,7 @@ TEST_F(DiagnoseTool, RequestsTheExperimentThatDecidesAndDecidesByIt) {
   EXPECT_EQ(next["profile"], "meter_check");
   EXPECT_EQ(next["separates"].size(), r["mechanisms"][0]["equivalent_to"].size() + 1);
   EXPECT_GT(next["expected_gain"], 7);
-  EXPECT_THAT(next["why"].get<std::string>(), HasSubstr("To tell "));
+  EXPECT_THAT(next["why"].get<std::string>(), HasSubstr("To distinguish "));
   EXPECT_THAT(content(path("r.html")), HasSubstr("bms experiment meter_check"));
   ASSERT_EQ(run_tool("experiment meter_check --out " + path("p.csv")).exit_code, 0);
   // readings of the faulty channel: of the source, and of the resting cell

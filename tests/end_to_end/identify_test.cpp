@@ -110,7 +110,7 @@ TEST_F(IdentifyTool, WarnsOfAnInvertedCurrent) {
   out.close();
   const ToolRun run =
       run_tool("identify --recording " + path("inverted.csv") + " --window 0.6:0.5 --out " + path("c.toml"));
-  EXPECT_THAT(run.err, HasSubstr("the current's sign looks inverted"));
+  EXPECT_THAT(run.err, HasSubstr("the sign of the current looks inverted"));
   EXPECT_THAT(run.err, HasSubstr("ended at its bound"));
 }
 
