@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -108,7 +109,7 @@ TEST(CircuitFromDiscrete, GivesAnotherR1ForEq17ThanThePaper) {
   EXPECT_NEAR(r.integrator_pole_error, 0.0017, 1e-4);  // F(1) = 0.0003, the other pole 0.18 away
 }
 
-/// Recursion of the held circuit, sample by sample, from its equations (2), (9) with exact exponentials.
+/// The circuit under a zero-order hold, sample by sample, from Eq. 2 and 9 with exact exponentials.
 TEST(CircuitFromDiscrete, ZeroOrderHoldIsTheCircuitWithAConstantCurrentInEachInterval) {
   const CircuitParameters in{0.4, 0.012, 0.02, 1'500};
   const double t = 5, pole = std::exp(-t / (in.r1_ohm * in.c1_f));
@@ -120,7 +121,10 @@ TEST(CircuitFromDiscrete, ZeroOrderHoldIsTheCircuitWithAConstantCurrentInEachInt
     v_rc = pole * v_rc + in.r1_ohm * (1 - pole) * u;
     const double y = c.c0 * u + c.c1 * u1 + c.c2 * u2 - c.a1 * y1 - c.a2 * y2;
     ASSERT_NEAR(y, in.b1_v * soc + v_rc + in.r0_ohm * u, 1e-14);
-    y2 = y1, y1 = y, u2 = u1, u1 = u;
+    y2 = y1;
+    y1 = y;
+    u2 = u1;
+    u1 = u;
   }
 }
 
@@ -153,12 +157,14 @@ TEST(CircuitFromDiscrete, NamesNegativeInfiniteAndComplexResultsAndDoesNotClampT
   EXPECT_THAT(infinite.implausible, Contains("b1_v is not finite"));
 
   c = good;
-  c.a1 = -1.6, c.a2 = 0.8;
-  const CircuitResult swinging = circuit_from_discrete(c, 1, capacity_c);
-  EXPECT_THAT(swinging.implausible, Contains(testing::HasSubstr("complex")));
-  EXPECT_NEAR(swinging.integrator_pole_error, std::hypot(0.2, 0.4), 1e-12);
+  c.a1 = -1.6;
+  c.a2 = 0.8;
+  const CircuitResult oscillating = circuit_from_discrete(c, 1, capacity_c);
+  EXPECT_THAT(oscillating.implausible, Contains(testing::HasSubstr("complex")));
+  EXPECT_NEAR(oscillating.integrator_pole_error, std::hypot(0.2, 0.4), 1e-12);
 
-  c.a1 = -0.9, c.a2 = -0.1;  // a negative pole, which no circuit with zero-order hold has
+  c.a1 = -0.9;
+  c.a2 = -0.1;  // a negative pole, which no circuit with zero-order hold has
   EXPECT_THAT(circuit_from_discrete(c, 1, capacity_c, Intersample::zero_order_hold).implausible,
               Contains("tau_s is not finite"));
   EXPECT_THAT(circuit_from_discrete(good, 1, capacity_c).implausible, testing::IsEmpty());
@@ -182,7 +188,7 @@ TEST(CircuitCovariance, IsWhatCentralDifferencesGive) {
       const double h = 1e-7;
       const auto moved = [&](double by) {
         DiscreteCoefficients x = c;
-        (j == 0 ? x.c0 : j == 1 ? x.c1 : j == 2 ? x.c2 : j == 3 ? x.a1 : x.a2) += by;
+        *std::array{&x.c0, &x.c1, &x.c2, &x.a1, &x.a2}[static_cast<std::size_t>(j)] += by;
         const CircuitParameters r = circuit_from_discrete(x, t, capacity_c, input).circuit;
         return Eigen::Vector4d{r.b1_v, r.r0_ohm, r.r1_ohm, r.c1_f};
       };

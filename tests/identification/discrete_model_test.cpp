@@ -375,7 +375,8 @@ TEST(SimulationError, IsNotDefinedForAnUnstableModelButForAnIntegrator) {
   VectorXd x = to_unknowns(tf_of_cell(), structure), r;
   const LeastSquares problem = simulation_error(data, structure, x);
   EXPECT_TRUE(problem.evaluate(x, r, nullptr));
-  x[3] = -1.95, x[4] = 0.949;  // F(1) < 0: a pole beyond 1
+  x[3] = -1.95;
+  x[4] = 0.949;  // F(1) < 0: a pole beyond 1
   EXPECT_FALSE(problem.evaluate(x, r, nullptr));
   x[3] = std::nan("");
   EXPECT_FALSE(problem.evaluate(x, r, nullptr));
