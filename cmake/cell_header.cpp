@@ -1,12 +1,15 @@
 // Generates the constexpr header of a cell for the firmware.
 //
-//   cell_header CELL OUT.hpp [fixed]      CELL: a built-in name or a path; fixed: for a board that computes in integers
+//   cell_header CELL OUT.hpp [fixed]            CELL: a built-in name or a path; fixed: for a board that computes in
+//                                               integers
+//   cell_header --parameters OUT.hpp CELL...    only the parameters of built-in cells, one constant for each: for tests
 //
 // Mechanisms that an estimator cannot run (on_board in model/mechanism.hpp) are left out, as in the host's estimator.
 // Numbers have the digits that give back the same double. The compiler prepares the tables for the scalar of the board
 // with the constexpr function that the host runs, too. A rejected cell gives exit code 2 and one line.
 #include <cstdio>
 #include <exception>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -96,9 +99,31 @@ inline constexpr model::ExtendedCell<S, model::interval_count(parameters), Laws<
                      fmt::arg("values", values));
 }
 
-std::string header(const bms::files::CellFile& file) {
+std::string initialiser(const bms::files::CellFile& file) {
   Initialiser values;
   bms::files::visit_cell(values, file.parameters);
+  return values.text();
+}
+
+std::string parameters_header(std::span<char* const> names) {
+  std::string constants;
+  for (const char* name : names) {
+    constants += fmt::format("\n/// Cell file '{0}'.\ninline constexpr model::CellParameters<double> {0}{{{1}}};\n",
+                             name, initialiser(bms::files::read_cell(name)));
+  }
+  return fmt::format(R"(// Made at build time from the built-in cell files; do not edit.
+#pragma once
+
+#include "model/cell_parameters.hpp"
+
+namespace bms::built_in_cells {{
+{}
+}}  // namespace bms::built_in_cells
+)",
+                     constants);
+}
+
+std::string header(const bms::files::CellFile& file) {
   return fmt::format(
       R"(// Generated from the cell file '{name}'. Do not edit.
 #pragma once
@@ -122,18 +147,23 @@ static_assert(model::first_fault(parameters).what == nullptr, "a parameter of th
 )",
       fmt::arg("model", bms::files::on_board(file.mechanisms).empty() ? "cell" : "extended"),
       fmt::arg("extension", extension(file)), fmt::arg("name", file.name), fmt::arg("hash", file.hash),
-      fmt::arg("values", values.text()));
+      fmt::arg("values", initialiser(file)));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  const bool parameters_only = argc >= 4 && argv[1] == std::string_view("--parameters");
   const bool fixed = argc == 4 && argv[3] == std::string_view("fixed");
-  if (argc != 3 && !fixed) {
-    std::fputs("usage: cell_header CELL OUT.hpp [fixed]\n", stderr);
+  if (argc != 3 && !fixed && !parameters_only) {
+    std::fputs("usage: cell_header CELL OUT.hpp [fixed]\n       cell_header --parameters OUT.hpp CELL...\n", stderr);
     return 2;
   }
   try {
+    if (parameters_only) {
+      bms::files::write_file(argv[2], parameters_header({argv + 3, argv + argc}));
+      return 0;
+    }
     const bms::files::CellFile cell = bms::files::read_cell(argv[1]);
     if (fixed) bms::files::reject_if_fpu_needed(cell);
     bms::files::write_file(argv[2], header(cell));

@@ -6,9 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "estimator/soc_estimator.hpp"
-#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
+#include "tests/cells.hpp"
+#include "tests/start_at.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -60,9 +61,8 @@ struct Pack {
   plant::Random random{3};
   std::vector<plant::Cell> truth;
   std::vector<double> more_ohm;
-  model::Cell<S, model::max_intervals> tables =
-      model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
-  SocEstimator<S> mean{measurement::StartingPoint{880'000'000, 10'000'000}};
+  model::Cell<S, model::max_intervals> tables = tests::prepared<S>();
+  SocEstimator<S> mean{tests::start_at(0.88, 0.01)};
   CellDifferences<S, cells> differences;
   std::uint64_t time_us = 0;
 };

@@ -3,14 +3,14 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
-#include "files/cell_file.hpp"
+#include "tests/cells.hpp"
 
 namespace bms::estimator {
 namespace {
 
 template <class S>
 auto cell() {
-  return model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
+  return tests::prepared<S>();
 }
 
 template <class Scalar>

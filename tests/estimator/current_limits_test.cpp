@@ -5,15 +5,15 @@
 
 #include <gtest/gtest.h>
 
-#include "files/cell_file.hpp"
 #include "plant/truth_cell.hpp"
+#include "tests/cells.hpp"
 
 namespace bms::estimator {
 namespace {
 
 /// table9 as a cell that may be driven as hard as its voltage allows.
 model::CellParameters<> hard() {
-  model::CellParameters<> p = files::read_cell("table9").parameters;
+  model::CellParameters<> p = tests::table9;
   p.limits.charge_current_max_a = p.limits.discharge_current_max_a = 400;
   return p;
 }
@@ -43,7 +43,7 @@ TEST(CurrentLimits, ACellThatIsDrivenByThemReachesItsVoltageLimitsAndDoesNotPass
 }
 
 TEST(CurrentLimits, AreNoMoreThanTheFileAllows) {
-  const auto [discharge_a, charge_a] = limits<double>(files::read_cell("table9").parameters, 0.5, 10);
+  const auto [discharge_a, charge_a] = limits<double>(tests::table9, 0.5, 10);
   EXPECT_EQ(discharge_a, 6);
   EXPECT_EQ(charge_a, 6);
 }

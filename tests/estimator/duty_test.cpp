@@ -1,4 +1,4 @@
-#include "tests/figures/duty.hpp"
+#include "tests/estimator/duty.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,9 +6,10 @@
 #include <random>
 
 #include "estimator/soc_estimator.hpp"
-#include "files/cell_file.hpp"
 #include "model/extended.hpp"
+#include "tests/cells.hpp"
 #include "tests/model/usual_mechanisms.hpp"
+#include "tests/start_at.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -25,7 +26,7 @@ constexpr std::size_t mechanism_state_count = HostLaws<double>::most_states;
 
 template <class S>
 Cells<S> table9_with(const std::vector<MechanismSetting>& mechanisms) {
-  return {prepare<S, max_intervals>(files::read_cell("table9").parameters), chosen<S>(mechanisms, capacity_ah)};
+  return {tests::prepared<S>(), chosen<S>(mechanisms, capacity_ah)};
 }
 
 /// All that a board runs.
@@ -87,7 +88,7 @@ struct Work {
 };
 /// A shift of pulses as a cell with these mechanisms answers it, read with noise of 1 mV.
 Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, double soc) {
-  const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
+  const auto cell = tests::prepared<double>();
   OpenLoopSimulation<double> simulation(cell, capacity_ah, chosen<double>(mechanisms, capacity_ah), soc);
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.001);
@@ -124,10 +125,10 @@ const std::vector<std::string_view> some = {"ocv_hysteresis", "slow_polarisation
 
 TEST(ExtendedEstimator, FollowsACellThatThePlainModelLoses) {
   const Work w = work(usual(some), 10'000, 0.9);
-  const measurement::StartingPoint start{900'000'000, 50'000'000};
+  const measurement::StartingPoint start = tests::start_at(0.9, 0.05);
   const auto with = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
   SocEstimator<double> estimator(start);
-  const auto plain_cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
+  const auto plain_cell = tests::prepared<double>();
   double with_rms = 0, plain_rms = 0;
   std::size_t inside = 0;
   for (std::size_t k = 0; k < w.samples.size(); ++k) {
@@ -147,7 +148,7 @@ TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
   truth[0].value = {0.02, 40, 0, 1};
   told[0].value = {0.02, 40, 0, -1};
   const Work w = work(truth, 6'000, 0.93);  // where the curve is steep, soc is known and the rest is hysteresis
-  const auto e = run<float, 1>(table9_with<float>(told), w.samples, {930'000'000, 5'000'000});
+  const auto e = run<float, 1>(table9_with<float>(told), w.samples, tests::start_at(0.93, 0.005));
   EXPECT_NEAR(e.front().extra[0], -0.02, 1e-6);
   EXPECT_NEAR(e[50].extra[0], 0.02, 0.012);
   EXPECT_NEAR(e.back().soc, w.soc.back(), 0.02);
@@ -156,10 +157,10 @@ TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
 /// With errors as states.
 template <class S, std::size_t Voltages>
 Cells<S> table9_with_errors(const std::vector<MechanismSetting>& mechanisms) {
-  files::CellFile file = files::read_cell("table9");
-  file.parameters.noise.current_offset_a = 0.06;  // a hundredth of 1C
-  file.parameters.noise.current_offset_correlation_s = 36'000;
-  return {prepare<S, max_intervals>(file.parameters), chosen<S>(mechanisms, capacity_ah)};
+  CellParameters<> parameters = tests::table9;
+  parameters.noise.current_offset_a = 0.06;  // a hundredth of 1C
+  parameters.noise.current_offset_correlation_s = 36'000;
+  return {tests::prepared<S>(parameters), chosen<S>(mechanisms, capacity_ah)};
 }
 template <class S, std::size_t Voltages>
 auto run_with_errors(const std::vector<MechanismSetting>& mechanisms, const std::vector<measurement::Sample>& samples,
@@ -211,10 +212,10 @@ TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
   for (const double offset_a : {-0.08, 0.08}) {
     Work w = work({}, 13'000, 0.95);  // to 20 % of charge
     for (measurement::Sample& s : w.samples) s.current_ua += static_cast<std::int32_t>(1e6 * offset_a);
-    const measurement::StartingPoint start{950'000'000, 10'000'000};
+    const measurement::StartingPoint start = tests::start_at(0.95, 0.01);
     const auto e = run_with_errors<float, 0>({}, w.samples, start);
     SocEstimator<float> plain(start);
-    const auto plain_cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
+    const auto plain_cell = tests::prepared<float>();
     Estimate<float> without;
     for (const measurement::Sample& s : w.samples) without = plain.step(plain_cell, s);
     const double found_a = 6 * e.back().extra[1], sigma_a = 6 * e.back().extra[2];
@@ -228,7 +229,7 @@ TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
 /// An hour at rest, then the work of the others.
 Work work_after_a_rest(double sensor_a, double truly_a) {
   Work w;
-  const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
+  const auto cell = tests::prepared<double>();
   OpenLoopSimulation<double> simulation(cell, capacity_ah, {}, 0.6);
   for (std::uint64_t k = 0; k < 7'200; ++k) {
     const double current_a = k < 3'600 ? truly_a : -1;
@@ -244,13 +245,13 @@ template <class S>
 auto run_with_rest(double at_rest_a, const std::vector<measurement::Sample>& samples,
                    const measurement::StartingPoint& start, double gain = 0) {
   using Estimator = SocEstimator<S, ExtendedRc<0, mechanism_state_count, true>::template Of>;
-  auto parameters = files::read_cell("table9").parameters;
+  auto parameters = tests::table9;
   parameters.noise.current_offset_a = 0.06;
   parameters.noise.current_offset_correlation_s = 36'000;
   parameters.noise.current_at_rest_a = at_rest_a;
   parameters.noise.current_gain = gain;
   parameters.noise.errors_are_states = true;
-  const Cells<S> cell{prepare<S, max_intervals>(parameters), {}};
+  const Cells<S> cell{tests::prepared<S>(parameters), {}};
   Estimator estimator(start);
   std::vector<typename Estimator::Result> estimates;
   for (const measurement::Sample& s : samples) estimates.push_back(estimator.step(cell, s));
@@ -260,7 +261,7 @@ auto run_with_rest(double at_rest_a, const std::vector<measurement::Sample>& sam
 TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
   for (const double sensor_a : {-0.07, 0.07}) {
     const Work w = work_after_a_rest(sensor_a, 0);
-    const measurement::StartingPoint start{600'000'000, 5'000'000};
+    const measurement::StartingPoint start = tests::start_at(0.6, 0.005);
     const auto e = run_with_rest<float>(0.012, w.samples, start);
     EXPECT_NEAR(6 * e[59].extra[1], 0, 0.005) << "a minute first";
     EXPECT_NEAR(6 * e[3'599].extra[1], sensor_a, 0.012);
@@ -275,14 +276,14 @@ TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
 
 TEST(ExtendedEstimator, BelievesASmallCurrentWhereNobodySaysWhatFlowsAtRest) {
   const Work w = work_after_a_rest(0, -0.07);  // a display that is left on
-  const auto e = run_with_rest<float>(0, w.samples, {600'000'000, 5'000'000});
+  const auto e = run_with_rest<float>(0, w.samples, tests::start_at(0.6, 0.005));
   EXPECT_NEAR(6 * e[3'599].extra[1], 0, 0.01);
   EXPECT_NEAR(e[3'599].soc, w.soc[3'599], 0.002);
 }
 
 TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
   // on the plateau no voltage helps; 6 A for 36 minutes are 60 % of 6 Ah
-  const measurement::StartingPoint start{900'000'000, 1'000'000};
+  const measurement::StartingPoint start = tests::start_at(0.9, 0.001);
   std::vector<measurement::Sample> out, out_and_back;
   for (std::uint64_t k = 0; k < 2'160; ++k) {
     out.push_back({k * 1'000'000, k == 0 ? 0 : -6'000'000, measurement::no_reading, 2'500});
@@ -302,7 +303,7 @@ TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
 
 TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
   const Work w = work(usual(some), 1'500, 0.77);
-  const measurement::StartingPoint start{770'000'000, 5'000'000};
+  const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
   const auto twice = run_with_errors<double, 3>(usual(some), w.samples, start);
   const auto single = run_with_errors<float, 3>(usual(some), w.samples, start);
   const auto fixed = run_with_errors<FixedPoint, 3>(usual(some), w.samples, start);
@@ -317,7 +318,7 @@ TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
 
 TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
   const Work w = work(usual(some), 1'500, 0.77);
-  const measurement::StartingPoint start{770'000'000, 5'000'000};
+  const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
   const auto twice = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
   const auto single = run<float, 3>(table9_with<float>(usual(some)), w.samples, start);
   const auto fixed = run<FixedPoint, 3>(table9_with<FixedPoint>(usual(some)), w.samples, start);
@@ -332,9 +333,9 @@ TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
 TEST(ExtendedEstimator, ACellWhoseMechanismsAreNeutralGivesThePlainCellsBits) {
   const Work w = work({}, 2'000, 0.77);
   auto neutral = default_setting(mechanism_index("resistance_growth"), capacity_ah);
-  const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, {770'000'000, 20'000'000});
-  SocEstimator<float> plain(measurement::StartingPoint{770'000'000, 20'000'000});
-  const auto cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
+  const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, tests::start_at(0.77, 0.02));
+  SocEstimator<float> plain(tests::start_at(0.77, 0.02));
+  const auto cell = tests::prepared<float>();
   for (std::size_t k = 0; k < w.samples.size(); ++k)
     ASSERT_EQ(words(static_cast<const Estimate<float>&>(e[k])), words(plain.step(cell, w.samples[k]))) << k;
 }
@@ -371,8 +372,7 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
 TEST(ExtendedEstimator, CountsThroughASensorThatIsOff) {
   auto off = usual({"current_offset", "current_gain", "capacity_change"});
   const auto cell = table9_with<float>(off);
-  SocEstimator<float, ExtendedRc<0, mechanism_state_count>::Of> estimator(
-      measurement::StartingPoint{500'000'000, 5'000'000});
+  SocEstimator<float, ExtendedRc<0, mechanism_state_count>::Of> estimator(tests::start_at(0.5, 0.005));
   estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Estimate<float> e;
   for (std::uint64_t k = 1; k <= 3'600; ++k)

@@ -9,19 +9,19 @@
 
 #include "estimator/restart.hpp"
 #include "estimator/soc_estimator.hpp"
-#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
+#include "tests/cells.hpp"
+#include "tests/start_at.hpp"
 
 namespace bms::estimator {
 namespace {
 
-auto table9() { return model::prepare<float, model::max_intervals>(files::read_cell("table9").parameters); }
-
 std::int32_t micro(double x) { return static_cast<std::int32_t>(std::lround(1e6 * x)); }
 
-measurement::StartingPoint starting_point(double soc, double sigma) {
-  return {static_cast<std::int32_t>(1e9 * soc), static_cast<std::int32_t>(1e9 * sigma)};
+StoredEstimate stored(double soc, double sigma) {
+  const measurement::StartingPoint known = tests::start_at(soc, sigma);
+  return {known.soc_ppb, known.soc_sigma_ppb};
 }
 
 /// A cell at work, and the estimator beside it.
@@ -46,7 +46,7 @@ struct Truck {
   double error() const { return estimate.soc - cell.soc(); }
 
   plant::Cell cell;
-  model::Cell<float, model::max_intervals> tables = table9();
+  model::Cell<float, model::max_intervals> tables = tests::prepared<float>();
   SocEstimator<float> estimator;
   Estimate<float> estimate;
   plant::Random random{7};
@@ -54,7 +54,7 @@ struct Truck {
 };
 
 TEST(Complaint, SmallCurrentsOverDaysAreForgotten) {
-  Truck truck(0.6, starting_point(0.6, 0.01));
+  Truck truck(0.6, tests::start_at(0.6, 0.01));
   for (int k = 0; k < 4 * 86'400; ++k)
     truck.second(-0.012);  // a display that is left on: 19 % of the charge in four days
   EXPECT_NEAR(truck.cell.soc(), 0.408, 0.001);
@@ -62,11 +62,11 @@ TEST(Complaint, SmallCurrentsOverDaysAreForgotten) {
 }
 
 TEST(Complaint, AfterARebootInTheMiddleOfACharge) {
-  Truck before(0.3, starting_point(0.3, 0.01));
+  Truck before(0.3, tests::start_at(0.3, 0.01));
   for (int k = 0; k < 3'600; ++k) before.second(1.8);
-  const StoredEstimate stored{static_cast<std::int32_t>(1e9F * before.estimate.soc),
-                              static_cast<std::int32_t>(1e9F * before.estimate.soc_sigma)};
-  Truck after(before.cell.soc(), starting_point_after_off_time(stored, 30));
+  const StoredEstimate last{static_cast<std::int32_t>(1e9F * before.estimate.soc),
+                            static_cast<std::int32_t>(1e9F * before.estimate.soc_sigma)};
+  Truck after(before.cell.soc(), starting_point_after_off_time(last, 30));
   after.second(1.8);  // under current from the first sample on
   EXPECT_NEAR(after.error(), 0, 0.01) << "not read from a voltage that the charger lifts";
   for (int k = 0; k < 600; ++k) after.second(1.8);
@@ -74,16 +74,16 @@ TEST(Complaint, AfterARebootInTheMiddleOfACharge) {
 }
 
 TEST(Complaint, AfterANightWithoutAClockALotIsMissing) {
-  const measurement::StartingPoint morning = starting_point_after_off_time({500'000'000, 5'000'000}, std::nullopt);
+  const measurement::StartingPoint morning = starting_point_after_off_time(stored(0.5, 0.005), std::nullopt);
   EXPECT_NEAR(1e-9 * morning.soc_ppb, 0.5, 0.02);
   EXPECT_LT(1e-9 * morning.soc_sigma_ppb, 0.08);
   EXPECT_GE(2e-9 * morning.soc_sigma_ppb,
-            0.5 - 1e-9 * starting_point_after_off_time({500'000'000, 5'000'000}, 60U * 86'400).soc_ppb)
+            0.5 - 1e-9 * starting_point_after_off_time(stored(0.5, 0.005), 60U * 86'400).soc_ppb)
       << "two months would still be believed";
 }
 
 TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
-  const measurement::StartingPoint spring = starting_point_after_off_time({500'000'000, 5'000'000}, 120U * 86'400);
+  const measurement::StartingPoint spring = starting_point_after_off_time(stored(0.5, 0.005), 120U * 86'400);
   Truck truck(0.3, spring);  // more was lost than thought
   truck.second(0);
   EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma);
@@ -91,7 +91,7 @@ TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
 }
 
 TEST(Complaint, TheSocIsNoLongerUpdatedAndNobodySaysSo) {
-  Truck truck(0.7, starting_point(0.7, 0.005));
+  Truck truck(0.7, tests::start_at(0.7, 0.005));
   truck.hour();
   truck.time_us += 3'600'000'000;  // the task hung for an hour
   truck.cell.run(-3, 25, 3'600);
@@ -102,7 +102,7 @@ TEST(Complaint, TheSocIsNoLongerUpdatedAndNobodySaysSo) {
 
 TEST(Complaint, ASensorsOffsetOfHalfAPercentOf1C) {
   for (const double offset_a : {-0.03, 0.03}) {
-    Truck truck(0.95, starting_point(0.95, 0.01));
+    Truck truck(0.95, tests::start_at(0.95, 0.01));
     for (int h = 0; h < 3; ++h) truck.hour([&](measurement::Sample& s) { s.current_ua += micro(offset_a); });
     EXPECT_NEAR(truck.error(), 0, 0.02) << offset_a;
     EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << offset_a;
@@ -111,7 +111,7 @@ TEST(Complaint, ASensorsOffsetOfHalfAPercentOf1C) {
 
 TEST(Complaint, ASensorsGainOfOnePercent) {
   for (const double gain : {0.99, 1.01}) {
-    Truck truck(0.95, starting_point(0.95, 0.01));
+    Truck truck(0.95, tests::start_at(0.95, 0.01));
     for (int h = 0; h < 3; ++h)
       truck.hour([&](measurement::Sample& s) { s.current_ua = static_cast<std::int32_t>(gain * s.current_ua); });
     EXPECT_NEAR(truck.error(), 0, 0.02) << gain;
@@ -120,7 +120,7 @@ TEST(Complaint, ASensorsGainOfOnePercent) {
 
 TEST(Complaint, AWrongStartIsBelievedForEver) {
   for (const double wrong : {0.25, -0.25}) {
-    Truck truck(0.65, starting_point(0.65 + wrong, 0.25));
+    Truck truck(0.65, tests::start_at(0.65 + wrong, 0.25));
     for (int k = 0; k < 3'600 * 2; ++k) {
       truck.second(k % 120 < 40 ? -6 * (0.5 + truck.random.uniform()) : k % 120 < 60 ? 3 : 0);
       ASSERT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << "second " << k;
@@ -130,13 +130,13 @@ TEST(Complaint, AWrongStartIsBelievedForEver) {
 }
 
 TEST(Complaint, TheTemperatureSensorIsLost) {
-  Truck truck(0.8, starting_point(0.8, 0.01));
+  Truck truck(0.8, tests::start_at(0.8, 0.01));
   truck.hour([](measurement::Sample& s) { s.temperature_cdegc = measurement::no_temperature; });
   EXPECT_NEAR(truck.error(), 0, 0.01);
 }
 
 TEST(Complaint, TheSignOfTheCurrentIsLost) {
-  Truck truck(0.8, starting_point(0.8, 0.01));
+  Truck truck(0.8, tests::start_at(0.8, 0.01));
   double worst = 0;
   std::uint32_t flags = 0;
   for (int h = 0; h < 3; ++h) {

@@ -5,9 +5,10 @@
 #include <gtest/gtest.h>
 
 #include "estimator/soc_estimator.hpp"
-#include "files/cell_file.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
+#include "tests/cells.hpp"
+#include "tests/start_at.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -25,10 +26,10 @@ struct Day {
   ResistanceHealth<S> resistance;
 
   Day(double capacity_ah, double more_ohm, int turns) {
-    const auto cell = model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
+    const auto cell = tests::prepared<S>();
     plant::Cell truth({.capacity_ah = capacity_ah}, {.soc = 0.97, .v_rc_v = 0, .temperature_c = 25});
     plant::Random random(11);
-    SocEstimator<S> estimator(measurement::StartingPoint{970'000'000, 10'000'000});
+    SocEstimator<S> estimator(tests::start_at(0.97, 0.01));
     std::uint64_t time_us = 0;
     for (int turn = 0; turn < turns; ++turn) {
       for (int k = 0; k < 20'000; ++k) {

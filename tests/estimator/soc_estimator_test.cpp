@@ -6,14 +6,15 @@
 #include <cmath>
 #include <random>
 
-#include "files/cell_file.hpp"
+#include "tests/cells.hpp"
+#include "tests/start_at.hpp"
 
 namespace bms::estimator {
 namespace {
 
 template <class S>
 auto table9() {
-  return model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
+  return tests::prepared<S>();
 }
 
 /// Samples of an hour of work at 1 Hz. The voltage is rough on purpose (R0 only): these tests are about the filter's
@@ -56,8 +57,8 @@ TEST(SocEstimator, StateOfOneCellFitsIn24Bytes) { EXPECT_EQ(sizeof(CellState<flo
 
 TEST(SocEstimator, EveryScalarTellsTheSameStory) {
   const auto samples = work(1'000);
-  const measurement::StartingPoint start{
-      770'000'000, 5'000'000};  // between two edges: on one, the last bit decides which slope holds
+  // between two edges of the table: on an edge, the last bit decides which slope holds
+  const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
   const auto single = run<float>(samples, SocEstimator<float>(start));
   const auto twice = run<double>(samples, SocEstimator<double>(start));
   const auto fixed = run<arithmetic::FixedPoint>(samples, SocEstimator<arithmetic::FixedPoint>(start));
@@ -75,11 +76,11 @@ TEST(SocEstimator, EveryScalarTellsTheSameStory) {
 
 TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   const auto cell = table9<float>();
-  SocEstimator<float> without_voltage(measurement::StartingPoint{650'000'000, 50'000'000});
+  SocEstimator<float> without_voltage(tests::start_at(0.65, 0.05));
   auto e = without_voltage.step(cell, {0, 0, measurement::no_reading, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.05, 1e-6);
-  SocEstimator<float> sure(measurement::StartingPoint{650'000'000, 5'000'000});
+  SocEstimator<float> sure(tests::start_at(0.65, 0.005));
   e = sure.step(cell, {0, 0, 3'300'000, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
@@ -87,19 +88,19 @@ TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
 
 TEST(SocEstimator, AWideBeliefAndTheFirstVoltageAreWeighedTogether) {
   const auto cell = table9<float>();
-  const auto started = [&](std::int32_t soc_ppb, std::int32_t sigma_ppb, std::int32_t voltage_uv) {
-    return SocEstimator<float>(measurement::StartingPoint{soc_ppb, sigma_ppb}).step(cell, {0, 0, voltage_uv, 2'500});
+  const auto started = [&](double soc, double sigma, std::int32_t voltage_uv) {
+    return SocEstimator<float>(tests::start_at(soc, sigma)).step(cell, {0, 0, voltage_uv, 2'500});
   };
   // 3.23 V is 16 %: where the curve is steep the voltage decides
-  auto e = started(400'000'000, 200'000'000, 3'230'000);
+  auto e = started(0.4, 0.2, 3'230'000);
   EXPECT_NEAR(e.soc, 0.16, 0.02);
   EXPECT_LT(e.soc_sigma, 0.035);  // 8 mV of a rested cell, 7 mV that a current before may have left, over 0.32 V
   // 3.283 V is anything from 37 to 53 %: there the belief does
-  e = started(450'000'000, 30'000'000, 3'285'000);
+  e = started(0.45, 0.03, 3'285'000);
   EXPECT_NEAR(e.soc, 0.45, 0.01);
   EXPECT_NEAR(e.soc_sigma, 0.03, 0.006);
   // a belief that the voltage flatly contradicts was wrong altogether
-  e = started(980'000'000, 20'000'000, 3'230'000);
+  e = started(0.98, 0.02, 3'230'000);
   EXPECT_NEAR(e.soc, 0.16, 0.03);
 }
 
@@ -108,7 +109,7 @@ TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
   const auto cell = table9<double>();
   for (const double truth : {0.55, 0.65, 0.75, 0.85}) {
     const auto at = model::look_up(cell, truth);
-    SocEstimator<double> estimator(measurement::StartingPoint{930'000'000, 150'000'000});
+    SocEstimator<double> estimator(tests::start_at(0.93, 0.15));
     Estimate<double> e = estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
     for (std::uint64_t s = 1; s <= 600; ++s)
       e = estimator.step(cell, {s * 1'000'000, 0, static_cast<std::int32_t>(1e6 * at.ocv_v), 2'500});
@@ -121,7 +122,7 @@ TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
 TEST(SocEstimator, ACertaintyThatCannotBeIsGivenUp) {
   const auto cell = table9<double>();
   const auto at = model::look_up(cell, 0.98);
-  SocEstimator<double> estimator(measurement::StartingPoint{200'000'000, 2'000'000});
+  SocEstimator<double> estimator(tests::start_at(0.2, 0.002));
   estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Estimate<double> e;
   std::uint32_t flags = 0;
@@ -136,7 +137,7 @@ TEST(SocEstimator, ACertaintyThatCannotBeIsGivenUp) {
 
 TEST(SocEstimator, OneReadingThatCannotBeIsFlaggedAndMovesNothing) {
   auto samples = work(1'000);
-  const SocEstimator<float> estimator(measurement::StartingPoint{800'000'000, 5'000'000});
+  const SocEstimator<float> estimator(tests::start_at(0.8, 0.005));
   const auto without = run<float>(samples, estimator);
   samples[500].voltage_uv += 300'000;
   const auto with = run<float>(samples, estimator);
@@ -149,7 +150,7 @@ TEST(SocEstimator, SigmaGoesOnGrowingOverAGapOfHours) {
   const auto cell = table9<float>();
   double before = 0;
   for (const std::uint64_t hours : {1U, 3U, 10U, 1'000U}) {
-    SocEstimator<float> estimator(measurement::StartingPoint{500'000'000, 5'000'000});
+    SocEstimator<float> estimator(tests::start_at(0.5, 0.005));
     estimator.step(cell, {0, 0, 3'285'000, 2'500});
     estimator.step(cell, {1'000'000, 0, 3'285'000, 2'500});
     const auto e =
@@ -212,7 +213,7 @@ TEST(SocEstimator, AGapIsFlaggedOnceAndMakesSigmaGrow) {
   auto samples = work(1'200);
   for (std::size_t k = 600; k < 1'200; ++k) samples[k].time_us += 600'000'000;
   samples[600].current_ua = 0;
-  const auto e = run<float>(samples, SocEstimator<float>(measurement::StartingPoint{800'000'000, 5'000'000}));
+  const auto e = run<float>(samples, SocEstimator<float>(tests::start_at(0.8, 0.005)));
   EXPECT_EQ(e[600].flags, time_gap);
   EXPECT_EQ(e[601].flags, 0U);
   EXPECT_EQ(e[599].flags, 0U);
@@ -237,7 +238,7 @@ TEST(SocEstimator, IgnoresASampleThatIsNotLater) {
 TEST(SocEstimator, AStuckVoltageDoesNotDragTheEstimateAlong) {
   auto samples = work(3'600);
   for (std::size_t k = 600; k < samples.size(); ++k) samples[k].voltage_uv = samples[599].voltage_uv;
-  const auto stuck = run<float>(samples, SocEstimator<float>(measurement::StartingPoint{800'000'000, 20'000'000}));
+  const auto stuck = run<float>(samples, SocEstimator<float>(tests::start_at(0.8, 0.02)));
   std::size_t flagged = 0;
   for (const auto& e : stuck) flagged += (e.flags & voltage_stuck) != 0 ? 1 : 0;
   EXPECT_GT(flagged, 1'000U);
@@ -277,7 +278,7 @@ TEST(SocEstimator, TheSameSamplesGiveTheSameBits) {
 }
 
 TEST(SocEstimator, AFirmwareTableOfExactSizeGivesTheSameBitsAsTheHostsLargeOne) {
-  static const auto parameters = files::read_cell("table9").parameters;
+  constexpr const auto& parameters = tests::table9;
   ASSERT_EQ(model::interval_count(parameters), 12U);
   const auto exact = model::prepare<float, 12>(parameters);
   const auto large = table9<float>();

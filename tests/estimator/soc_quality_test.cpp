@@ -2,14 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "files/cell_file.hpp"
+#include "tests/cells.hpp"
 
 namespace bms::estimator {
 namespace {
 
 struct Watched {
-  model::Cell<double, model::max_intervals> cell =
-      model::prepare<double, model::max_intervals>(files::read_cell("table9").parameters);
+  model::Cell<double, model::max_intervals> cell = tests::prepared<double>();
   SocQuality<double> quality;
 
   SocQuality<double>::Result at(double soc, double sigma, double current_a = 0, double counted = 0,

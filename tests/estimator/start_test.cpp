@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "files/cell_file.hpp"
+#include "tests/cells.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -22,7 +22,7 @@ auto read(const Cell& cell, const V& ocv_v, double sigma_v) {
 
 template <class S>
 std::pair<double, double> start(double voltage_v, double sigma_v) {
-  const auto cell = model::prepare<S, model::max_intervals>(files::read_cell("table9").parameters);
+  const auto cell = tests::prepared<S>();
   const auto belief = read(cell, arithmetic::Voltage<S>(voltage_v), sigma_v);
   return {arithmetic::as_double(belief.soc), std::sqrt(arithmetic::as_double(belief.variance))};
 }
@@ -43,7 +43,7 @@ TYPED_TEST(StartOfEveryScalar, IsAsWideAsThePlateau) {
 }
 
 TYPED_TEST(StartOfEveryScalar, HoldsTheTruthWithinTwoSigmaOnTheWholeCurve) {
-  const auto cell = model::prepare<double, model::max_intervals>(files::read_cell("table9").parameters);
+  const auto cell = tests::prepared<double>();
   for (double soc = 0.01; soc < 1; soc += 0.01) {
     for (const double error_v : {-0.005, 0.0, 0.005}) {  // one standard deviation of a rested voltage
       const auto [found, sigma] = start<TypeParam>(model::look_up(cell, soc).ocv_v + error_v, 0.005);

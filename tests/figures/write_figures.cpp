@@ -30,7 +30,7 @@
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
 #include "study/study.hpp"
-#include "tests/figures/duty.hpp"
+#include "tests/estimator/duty.hpp"
 #include "tests/figures/fixed_point.hpp"
 #include "tests/figures/soc_trials.hpp"
 #include "tests/firmware/board_budget.hpp"

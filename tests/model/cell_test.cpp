@@ -6,12 +6,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "files/cell_file.hpp"
+#include "tests/cells.hpp"
 
 namespace bms::model {
 namespace {
-
-CellParameters<> table9() { return files::read_cell("table9").parameters; }
 
 template <class Scalar>
 class CellOfEveryScalar : public ::testing::Test {};
@@ -22,7 +20,7 @@ TYPED_TEST_SUITE(CellOfEveryScalar, Scalars);
 constexpr double knot_v[] = {2.871, 3.206, 3.245, 3.277, 3.285, 3.286, 3.290, 3.313, 3.322, 3.323, 3.456};
 
 TYPED_TEST(CellOfEveryScalar, JoinsTheKnotsOfTable9ByStraightLinesWithin1mV) {
-  const auto cell = prepare<TypeParam, max_intervals>(table9());
+  const auto cell = tests::prepared<TypeParam>();
   for (std::size_t k = 0; k < 10; ++k) {
     for (const double t : {0.02, 0.5, 0.98}) {
       const auto at = look_up(cell, Soc<TypeParam>((static_cast<double>(k) + t) / 10));
@@ -32,7 +30,7 @@ TYPED_TEST(CellOfEveryScalar, JoinsTheKnotsOfTable9ByStraightLinesWithin1mV) {
 }
 
 TYPED_TEST(CellOfEveryScalar, InterpolatesResistancesBetweenNodesAndHoldsThemBelowTheFirst) {
-  const auto cell = prepare<TypeParam, max_intervals>(table9());
+  const auto cell = tests::prepared<TypeParam>();
   const auto at = [&](double soc) { return look_up(cell, Soc<TypeParam>(soc)); };
   EXPECT_NEAR(as_double(at(0.35).r0_ohm), (0.0133872 + 0.0132749) / 2, 1e-8);
   EXPECT_NEAR(as_double(at(0.35).r1_ohm), (0.00998571 + 0.009014) / 2, 1e-8);
@@ -44,7 +42,7 @@ TYPED_TEST(CellOfEveryScalar, InterpolatesResistancesBetweenNodesAndHoldsThemBel
 }
 
 TYPED_TEST(CellOfEveryScalar, GoesOnAlongTheEndLinesOutside) {
-  const auto cell = prepare<TypeParam, max_intervals>(table9());
+  const auto cell = tests::prepared<TypeParam>();
   EXPECT_NEAR(as_double(look_up(cell, Soc<TypeParam>(-0.2)).ocv_v), 2.871 - 0.2 * 3.35, 1e-6);
   EXPECT_NEAR(as_double(look_up(cell, Soc<TypeParam>(1.2)).ocv_v), 2.126 + 1.2 * 1.33, 1e-6);
   const auto above = look_up(cell, Soc<TypeParam>(1.2));
@@ -54,7 +52,7 @@ TYPED_TEST(CellOfEveryScalar, GoesOnAlongTheEndLinesOutside) {
 double slope_v(const auto& at) { return at.ocv_delta_v * at.per_width; }
 
 TEST(Cell, AnEdgeBelongsToTheIntervalAboveItAndSoDoesItsSlope) {
-  const auto cell = prepare<double, max_intervals>(table9());
+  const auto cell = tests::prepared<double>();
   const double b1_v[] = {3.35, 0.39, 0.32, 0.08, 0.01, 0.04, 0.23, 0.09, 0.01, 1.33};
   for (std::size_t k = 0; k < 10; ++k) {
     EXPECT_NEAR(slope_v(look_up(cell, static_cast<double>(k) / 10)), b1_v[k], 1e-9) << k;
@@ -64,8 +62,8 @@ TEST(Cell, AnEdgeBelongsToTheIntervalAboveItAndSoDoesItsSlope) {
 
 TEST(Cell, SlopesAreTheDerivatives) {
   using Jet = ceres::Jet<double, 1>;
-  const auto jets = prepare<Jet, max_intervals>(table9());
-  const auto cell = prepare<double, max_intervals>(table9());
+  const auto jets = tests::prepared<Jet>();
+  const auto cell = tests::prepared<double>();
   for (double soc = -0.2; soc < 1.2; soc += 0.0123) {
     const auto at = look_up(cell, soc);
     const auto jet = look_up(jets, Jet(soc, 0));
@@ -77,7 +75,7 @@ TEST(Cell, SlopesAreTheDerivatives) {
 }
 
 TEST(Cell, FindsTheSameIntervalFromAnywhere) {
-  const auto cell = prepare<float, max_intervals>(files::read_cell("a123_26650").parameters);
+  const auto cell = tests::prepared<float>(tests::a123_26650);
   for (float soc = -0.3F; soc < 1.3F; soc += 0.0007F) {
     const std::size_t expected = interval_of(cell, soc, 0);
     for (std::size_t from = 0; from < cell.size; ++from)
@@ -86,7 +84,7 @@ TEST(Cell, FindsTheSameIntervalFromAnywhere) {
 }
 
 TEST(Cell, UnevenEdgesAndNodesShareOneRow) {
-  CellParameters<> p = table9();
+  CellParameters<> p = tests::table9;
   p.ocv.soc[1] = 0.07;  // an OCV edge of its own
   p.ocv.b0_v[1] = p.ocv.b0_v[0] + (p.ocv.b1_v[0] - p.ocv.b1_v[1]) * 0.07;
   p.ocv.b0_v[2] = p.ocv.b0_v[1] + (p.ocv.b1_v[1] - p.ocv.b1_v[2]) * 0.2;
@@ -100,7 +98,7 @@ TEST(Cell, UnevenEdgesAndNodesShareOneRow) {
 
 TEST(Cell, CountsOfChargeFitIn32BitsFromACoinCellToAThousandAmpereHours) {
   for (const double capacity_ah : {0.01, 2.5, 6.0, 280.0, 1'000.0}) {
-    CellParameters<> p = table9();
+    CellParameters<> p = tests::table9;
     p.capacity_ah = capacity_ah;
     const auto cell = prepare<float, max_intervals>(p);
     EXPECT_GE(cell.charge.capacity_uaus >> cell.charge.shift, 1 << 28) << capacity_ah;

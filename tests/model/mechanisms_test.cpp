@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "files/cell_file.hpp"
 #include "model/extended_rc.hpp"
+#include "tests/cells.hpp"
 #include "tests/model/usual_mechanisms.hpp"
 
 namespace bms::model {
@@ -61,7 +61,7 @@ template <class S>
 void expect_no_effect(std::size_t index) {
   ChosenLaws<S> laws;
   choose<S>(laws, index, without_strength(index), capacity_ah);
-  const auto cell = prepare<S, max_intervals>(files::read_cell("table9").parameters);
+  const auto cell = tests::prepared<S>();
   auto x = laws.initial();
   for (const Row& row : input_of(200)) {
     const Current<S> a = Current<S>(row.current_a);
@@ -109,8 +109,7 @@ template <class S>
 Walk<S> walk(const std::vector<MechanismSetting>& mechanisms, const std::vector<Row>& rows) {
   using Laws = ChosenLaws<S>;
   using Model = typename ExtendedRc<Laws::most_voltage_states, Laws::most_states>::template Of<S>;
-  const ExtendedCell<S, max_intervals, Laws> cell{prepare<S, max_intervals>(files::read_cell("table9").parameters),
-                                                  chosen<S>(mechanisms, capacity_ah)};
+  const ExtendedCell<S, max_intervals, Laws> cell{tests::prepared<S>(), chosen<S>(mechanisms, capacity_ah)};
   const Laws& laws = cell.laws;
   typename Model::State x{};
   const auto initial = laws.initial();
@@ -157,7 +156,7 @@ TEST_P(EveryMechanism, ComputesTheSameVoltageInFloatAndFixedPointAsInDouble) {
 /// Open loop; parameters as they come.
 template <class S>
 std::vector<S> course(std::size_t index, const MechanismValues<S>& values, const std::vector<Row>& rows) {
-  static const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
+  static const auto cell = tests::prepared<double>();
   ChosenLaws<S> laws;
   choose<S>(laws, index, values, capacity_ah);
   S start(0.815);
@@ -225,7 +224,7 @@ TEST(Laws, KnownAtCompileTimeGiveTheSameDigitsAsChosenAtRunTime) {
       law(CurrentOffset{}), law(SlowPolarisation{}), law(OcvHysteresis{}), law(TemperatureResistance{}));
   EXPECT_EQ(laws.most_states, 3U);
   EXPECT_EQ(laws.voltage_states(), chosen_laws.voltage_states());
-  const auto cell = prepare<float, max_intervals>(files::read_cell("table9").parameters);
+  const auto cell = tests::prepared<float>();
   auto x = laws.initial();
   auto y = chosen_laws.initial();
   for (const Row& row : input_of(1'000)) {
@@ -274,7 +273,7 @@ TEST(OcvHysteresis, BetweenMeasuredBranchesMovesWithTheChargeAndStops) {
 
 /// Charge branch and discharge branch are the curves that the file was made of.
 TEST(OcvHysteresis, FollowsTheShapeOfTheFilesGap) {
-  CellParameters<> p = files::read_cell("table9").parameters;
+  CellParameters<> p = tests::table9;
   p.ocv.half_gap_v = {};
   for (std::size_t k = 0; k < p.ocv.soc.size; ++k)
     p.ocv.half_gap_v.push_back(0.01 + 0.01 * std::abs(p.ocv.soc[k] - 0.5));
@@ -354,7 +353,7 @@ TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
 
 TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
   // the OCV is that of a cell ahead in soc by what the polarisation says; R0 and v_rc are not
-  const auto cell = prepare<double, max_intervals>(files::read_cell("table9").parameters);
+  const auto cell = tests::prepared<double>();
   const std::vector<MechanismSetting> slow = {
       {mechanism_index("slow_polarisation"), {0.003, 100, 0, 8 * 0.003 * 3'600 * capacity_ah}, {}}};
   OpenLoopSimulation<double> with(cell, capacity_ah, chosen<double>(slow, capacity_ah), 0.3),

@@ -6,14 +6,14 @@
 #include <cmath>
 #include <random>
 
-#include "files/cell_file.hpp"
+#include "tests/cells.hpp"
 
 namespace bms::model {
 namespace {
 
 /// A cell with the same R0, R1, C1 everywhere, for which the step response is known in closed form.
 CellParameters<> constant_cell() {
-  CellParameters<> p = files::read_cell("table9").parameters;
+  CellParameters<> p = tests::table9;
   for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
     p.rc.r0_ohm[k] = 0.013;
     p.rc.r1_ohm[k] = 0.02;
@@ -51,8 +51,7 @@ TEST(OneRc, ChargingRaisesTheVoltageAtOnceByR0AndLaterByR1) {
 /// Both analytic Jacobians against automatic differentiation, of states all over and on the interval edges themselves.
 TEST(OneRc, AnalyticJacobiansAreTheDerivativesAt1000RandomStatesAndAllEdges) {
   using Jet = ceres::Jet<double, 2>;
-  for (const char* name : {"table9", "a123_26650"}) {
-    const CellParameters<> p = files::read_cell(name).parameters;
+  for (const CellParameters<>& p : {tests::table9, tests::a123_26650}) {
     const auto cell = prepare<double, max_intervals>(p);
     const auto jets = prepare<Jet, max_intervals>(p);
     std::mt19937 random(7);
@@ -87,7 +86,7 @@ TEST(OneRc, AnalyticJacobiansAreTheDerivativesAt1000RandomStatesAndAllEdges) {
 
 template <class S>
 void expect_close_to_double(double tolerance_v) {
-  const CellParameters<> p = files::read_cell("table9").parameters;
+  const CellParameters<> p = tests::table9;
   const auto cell = prepare<S, max_intervals>(p);
   const auto reference = prepare<double, max_intervals>(p);
   for (const double soc : {-0.05, 0.0, 0.03, 0.1, 0.47, 0.8, 0.99, 1.05}) {

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "files/recording.hpp"
 #include "plant/random.hpp"
+#include "tests/forklift_shift.hpp"
 #include "tests/protection/protection_bench.hpp"
 #include "tests/protection/scenario.hpp"
 
@@ -293,7 +293,7 @@ TEST(Protection, OpensForAPackOfOneCell) {
 /// Sixteen cells made from the cell of the shipped shift, each with its own offset, resistance and noise. The shift is
 /// sampled once a second, which the design of the pack states.
 TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
-  const measurement::Recording shift = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  const std::vector<tests::ShiftRow> shift = tests::forklift_shift(BMS_SOURCE_DIR);
   PackDesign design = forklift;
   design.sample_period_s = 1;
   design.precharge_time_constant_s = 2;
@@ -304,34 +304,34 @@ TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
   ExternalInputs inputs{.request = Request::drive};
   double dc_link_v = 0;
   std::size_t driven = 0;
-  for (std::size_t row = 0; row < shift.rows(); ++row) {
+  for (const tests::ShiftRow& row : shift) {
     measurement::PackSample<16> s;
     const Outputs out = p.decision().outputs;
     const bool closed = out.main_plus && out.main_minus;
-    s.time_us = static_cast<std::uint64_t>(1e6 * shift.time_s[row]);
-    s.current_ua = static_cast<std::int32_t>(1e6 * ((closed ? shift.current_a[row] : 0) + noise(0.01)));
+    s.time_us = static_cast<std::uint64_t>(1e6 * row.time_s);
+    s.current_ua = static_cast<std::int32_t>(1e6 * ((closed ? row.current_a : 0) + noise(0.01)));
     double sum_v = 0;
     for (std::size_t k = 0; k < 16; ++k) {
       const double off_v = 0.004 * (static_cast<double>(k % 7) - 3),
                    more_ohm = 0.001 * (static_cast<double>(k % 5) - 2);
-      const double v = shift.voltage_v[row] + off_v + more_ohm * shift.current_a[row];
+      const double v = row.voltage_v + off_v + more_ohm * row.current_a;
       sum_v += v;
       s.cell_uv[k] = static_cast<std::int32_t>(1e6 * (std::round((v + noise(0.001)) * 1e3) / 1e3));
     }
     s.pack_uv = static_cast<std::int32_t>(1e6 * (sum_v + noise(0.02)));
     for (std::size_t k = 0; k < 4; ++k)
       s.temperature_cdegc[k] =
-          static_cast<std::int16_t>(100 * shift.temperature_c[row] + 30 * static_cast<double>(k) + noise(5));
+          static_cast<std::int16_t>(100 * row.temperature_c + 30 * static_cast<double>(k) + noise(5));
     if (closed)
       dc_link_v = sum_v;
     else
       dc_link_v = out.precharge && out.main_minus ? dc_link_v + (sum_v - dc_link_v) * 0.39 : dc_link_v * 0.9;
     inputs.dc_link_uv = static_cast<std::int32_t>(1e6 * dc_link_v);
     const Decision& d = p.update(s, PackEstimate<16>{}, inputs);
-    ASSERT_EQ(d.faults, 0U) << "row " << row;
+    ASSERT_EQ(d.faults, 0U) << row.time_s << " s";
     driven += d.state == ContactorState::drive ? 1U : 0U;
   }
-  EXPECT_GT(driven, shift.rows() - 60);
+  EXPECT_GT(driven, shift.size() - 60);
 }
 
 TEST(Protection, DecidesTheSameOnHostAndBoard) { EXPECT_EQ(scenario_hash(1'000), expected_scenario_hash); }

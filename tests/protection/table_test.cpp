@@ -1,15 +1,15 @@
 #include "protection/table.hpp"
 
+#include <fstream>
 #include <iterator>
 #include <regex>
 #include <string>
 
 #include <gtest/gtest.h>
 
-#include "files/cell_file.hpp"
-#include "files/text_file.hpp"
 #include "protection/contactors.hpp"
 #include "protection/table_text.hpp"
+#include "tests/cells.hpp"
 #include "tests/protection/expected_rows.hpp"
 
 namespace bms::protection {
@@ -18,6 +18,11 @@ namespace {
 constexpr Table table = protection_table(forklift);
 static_assert(consistent(rules_of(table)));
 static_assert(std::size(expected_rows) == fault_count);
+
+std::string text_of_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
 
 TEST(ProtectionTable, EqualsTheValuesCalculatedByHandForThePapersCell) {
   for (std::size_t k = 0; k < fault_count; ++k) {
@@ -37,7 +42,7 @@ TEST(ProtectionTable, EqualsTheValuesCalculatedByHandForThePapersCell) {
 }
 
 TEST(ProtectionTable, LimitsAreThoseOfTheShippedCellFile) {
-  const model::Limits l = files::read_cell("table9").parameters.limits;
+  const model::Limits l = tests::table9.limits;
   EXPECT_EQ(l.voltage_min_v, table9_limits.voltage_min_v);
   EXPECT_EQ(l.voltage_max_v, table9_limits.voltage_max_v);
   EXPECT_EQ(l.charge_current_max_a, table9_limits.charge_current_max_a);
@@ -126,7 +131,7 @@ TEST(ProtectionTable, OfAnotherPackUsesItsCellsTheirNumberAndItsSamplePeriod) {
 }
 
 TEST(ProtectionTable, EqualsTheTableInTheReadme) {
-  const std::string readme = files::read_file(BMS_SOURCE_DIR "/protection/README.md");
+  const std::string readme = text_of_file(BMS_SOURCE_DIR "/protection/README.md");
   EXPECT_NE(readme.find(markdown(table)), std::string::npos)
       << "run ./bms figures, or build/host/tests/write_protection_figures";
 }
@@ -144,7 +149,7 @@ std::map<int, std::string> values_in_dbc(const std::string& dbc, const std::stri
 }
 
 TEST(ProtectionTable, HasTheNamesOfTheDbcFile) {
-  const std::string dbc = files::read_file(BMS_SOURCE_DIR "/can/greybox_bms.dbc");
+  const std::string dbc = text_of_file(BMS_SOURCE_DIR "/can/greybox_bms.dbc");
   const auto causes = values_in_dbc(dbc, "406 FirstCause");
   ASSERT_EQ(causes.size(), fault_count + 2);
   EXPECT_EQ(causes.at(0), "none");

@@ -9,10 +9,11 @@
 #include <limits>
 
 #include "estimator/soc_estimator.hpp"
-#include "files/cell_file.hpp"
 #include "model/extended.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
+#include "tests/cells.hpp"
+#include "tests/start_at.hpp"
 
 namespace bms {
 
@@ -110,7 +111,7 @@ DutyFigures duty(const Cell& cell, const Drift& drift, std::uint64_t seed, int h
     double squares = 0, count = 0, time_s = 0;
   };
   DutyWorld world(drift, seed);
-  Estimator estimator(measurement::StartingPoint{900'000'000, 20'000'000});
+  Estimator estimator(tests::start_at(0.9, 0.02));
   DutyFigures figures;
   Part first, middle, last;
   const int seconds = hours * 3'600, tenth = seconds / 10;
@@ -147,17 +148,15 @@ DutyFigures duty(const Cell& cell, const Drift& drift, std::uint64_t seed, int h
 /// The two cases of the tests and of the README: table9 as it is, with sensors as in its file; and with sensor errors
 /// as states, sensors that drift by half a percent of 1C, and a voltage channel that drifts by 2 mV.
 inline DutyFigures duty_as_in_the_file() {
-  return duty<estimator::SocEstimator<float>>(
-      model::prepare<float, model::max_intervals>(files::read_cell("table9").parameters), {}, 1);
+  return duty<estimator::SocEstimator<float>>(tests::prepared<float>(), {}, 1);
 }
 inline DutyFigures duty_with_errors() {
   using Laws = model::ChosenLaws<float>;
-  files::CellFile file = files::read_cell("table9");
-  file.parameters.noise.current_offset_a = 0.06;  // a hundredth of 1C, over a shift: as identify --extend writes it
-  file.parameters.noise.current_offset_correlation_s = 36'000;
-  file.parameters.noise.model_correlation_s = 3'000;
-  const model::ExtendedCell<float, model::max_intervals, Laws> cell{
-      model::prepare<float, model::max_intervals>(file.parameters), {}};
+  model::CellParameters<> parameters = tests::table9;
+  parameters.noise.current_offset_a = 0.06;  // a hundredth of 1C, over a shift: as identify --extend writes it
+  parameters.noise.current_offset_correlation_s = 36'000;
+  parameters.noise.model_correlation_s = 3'000;
+  const model::ExtendedCell<float, model::max_intervals, Laws> cell{tests::prepared<float>(parameters), {}};
   return duty<estimator::SocEstimator<float, model::ExtendedRc<0, Laws::most_states, true>::Of>>(
       cell, {0.03, 36'000, 0.002, 36'000}, 1);
 }
