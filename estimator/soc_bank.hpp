@@ -37,6 +37,7 @@ class SocBank {
 
  public:
   static constexpr int points = 64;
+  static constexpr double max_share = 1.9;            ///< largest `share` of step()
   static constexpr double close_below_sigma = 0.025;  ///< one sigma, below which a line through the curve does as well
   static constexpr double open_above_sigma = 0.03;    ///< and above which it does not
 

@@ -1,36 +1,48 @@
-// State of charge of one cell: an extended Kalman filter over a cell model's states, one sample in, one estimate out.
+// State of charge of one cell: an extended Kalman filter over the states of a cell model. One sample in, one estimate
+// out.
 //
-//   predict   charge counted in integers, other states by the model's exact step, covariance by its analytic transition
-//   correct   by the voltage, if it may be believed; otherwise the prediction stands and sigma grows
+//   predict   count the charge in integers, advance the other states by the model's exact step, propagate the
+//   covariance
+//             with the analytic state transition
+//   correct   with the voltage, if the checks accept it; otherwise the prediction stands and sigma grows
 //
-// One body for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states). The laws of
-// the mechanisms come with the cell; where it has none, nothing of them is left. No heap, no exceptions, no libm but
-// sqrt, no clock: the same samples give the same bits on every core (float and fixed point; compile with
-// -ffp-contract=off).
+// The parts, each with its own header:
 //
-// Voltage noise: a reading's own noise is new in every sample, the model's error is not. One that lasts for T seconds
-// counts once per T: at a step dt its variance is taken T / dt times. It is larger where the OCV is steep (the soc axis
-// of its table is good to tolerance.initial_soc) and under current (R0 and R1 are good to
-// tolerance.resistance_fraction).
+//   input_check.hpp         which readings are used
+//   step_constants.hpp      what depends on the time step and the temperature alone
+//   persistent_errors.hpp   errors that last for hours: as noise or as states
+//   outlier_gate.hpp        voltages that contradict everything known
+//   ambiguous_soc.hpp       the bank of hypotheses, open while the SOC is not known to 3 %: a line through the OCV
+//   curve
+//                           would be certain of one value
+//   cell_state.hpp          the state itself
 //
-// While soc is not known to 3 %, a bank of hypotheses keeps it (soc_bank.hpp): a line through the OCV curve would be
-// sure of one.
+// One source for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states). The laws of
+// the mechanisms come with the cell; a cell without mechanisms pays nothing for them. No heap, no exceptions, no libm
+// function except sqrt, no clock: the same samples give the same bits on every core (float and fixed point; compile
+// with -ffp-contract=off).
+//
+// Voltage noise: it is larger where the OCV is steep, because the SOC axis of the table has an uncertainty of
+// tolerance.initial_soc, and under current, because R0 and R1 have one of tolerance.resistance_fraction.
 //
 // Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost in instructions:
 // estimator/README.md.
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
-#include "estimator/charge.hpp"
-#include "estimator/current_at_rest.hpp"
+#include "estimator/ambiguous_soc.hpp"
+#include "estimator/cell_state.hpp"
 #include "estimator/estimate.hpp"
 #include "estimator/input_check.hpp"
-#include "estimator/soc_bank.hpp"
+#include "estimator/outlier_gate.hpp"
+#include "estimator/persistent_errors.hpp"
 #include "estimator/start.hpp"
-#include "estimator/ud_covariance.hpp"
+#include "estimator/step_constants.hpp"
 #include "estimator/voltage_uncertainty.hpp"
 #include "measurement/sample.hpp"
 #include "model/extended_rc.hpp"
@@ -38,115 +50,111 @@
 
 namespace bms::estimator {
 
-/// What is remembered of one cell from sample to sample.
-template <class S, template <class> class Model>
-struct CellState {
-  Charge<S> charge;
-  UdCovariance<S, Model<S>::states> covariance;
-  typename Model<S>::State model_state{};
-};
-
 template <class S, template <class> class ModelOf = model::ExtendedRc<0, 0>::Of>
 class SocEstimator {
+  using Errors = PersistentErrors<S, ModelOf>;
+
  public:
   using Model = ModelOf<S>;
   using Scalar = S;
   static constexpr std::size_t states = Model::states;
-  static constexpr std::size_t extra_values = Model::values - 1 + (Model::errors_are_states ? 1 : 0);
+  static constexpr std::size_t extra_values = Errors::values + Model::values - Model::first_mechanism_state;
   using Result = std::conditional_t<extra_values == 0, Estimate<S>, ExtendedEstimate<S, extra_values>>;
 
   constexpr SocEstimator() = default;
 
-  /// Begins at a known state of charge instead of one read from the first voltage.
+  /// Starts from a known state of charge instead of the first voltage.
   constexpr explicit SocEstimator(const measurement::StartingPoint& from) : from_{from}, has_start_{true} {}
 
-  /// The only call. cell: prepared for S, the same in every call.
+  /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
   constexpr Result step(const Cell& cell, const measurement::Sample& sample) {
     if (!started_) return start(cell, sample);
     if (sample.time_us <= time_us_) return repeated_estimate(cell, time_not_increasing);
 
-    std::uint32_t flags = 0;
     const std::uint64_t step_us = sample.time_us - time_us_;
     time_us_ = sample.time_us;
+    std::uint32_t flags = 0;
     const AcceptedCurrent current = check_.current(sample.current_ua, cell.plausible, flags);
-    if (step_us != step_us_) set_time_step(cell, step_us, flags);
-    if (sample.temperature_cdegc >> 8 != temperature_bin_) [[unlikely]]
-      update_temperature(cell, sample.temperature_cdegc);
+    if (step_us != constants_.step_us()) set_time_step(cell, step_us, flags);
+    if (sample.temperature_cdegc >> temperature_bin_bits != temperature_bin_) [[unlikely]]
+      set_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
     const StepInput input{laws.true_current(Model::without_offset(arithmetic::from_micro<Current>(current.ua),
                                                                   state_.model_state, cell.noise)),
-                          duration_s_, temperature(laws, sample)};
+                          constants_.duration_s(), temperature(laws, sample.temperature_cdegc)};
     count_charge(cell, counted_ua(laws, input, current.ua), step_us);
 
     const Soc soc = state_.charge.soc(cell.charge);
-    const auto at =
-        look_up(model::OperatingPoint{cell, input, Model::mechanism_states(state_.model_state)}, soc, interval_);
-    const auto discretisation = Model::discretise(laws, state_.model_state, at, input, error_decay_);
-
+    const auto at = look_up(operating_point(cell, input), soc, interval_);
+    const auto discretisation = Model::discretise(laws, state_.model_state, at, input, constants_.error_decay());
     auto noise = Model::noise(laws, discretisation, cell.noise);
-    noise[Model::soc] = soc_noise_;
-    if ((flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]] {
-      const bool measured = (flags & (current_missing | current_implausible)) == 0;
-      noise[Model::soc] = Variance(soc_noise_ + unknown_charge_variance(cell, measured ? Current(0) : input.current_a));
-      if (!measured) {  // what drops over the resistances is not known then
-        const Voltage unknown_v =
-            steady_state_drop_v<S>(at, Current(arithmetic::magnitude(input.current_a) + cell.noise.unknown_a));
-        noise[0] = Variance(noise[0] + unknown_v * unknown_v);
-      }
-    }
-    if constexpr (Model::errors_are_states)
-      noise[Model::soc] =
-          Variance(noise[Model::soc] + gain_error_variance(Soc(soc - since_anchor_.soc), cell.noise.gain));
+    noise[Model::soc] = constants_.soc_noise();
+    if ((flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]]
+      add_unknown_current(cell, at, input, flags, noise);
+    errors_.add_gain_error(noise[Model::soc], soc, cell.noise.gain);
     state_.covariance.propagate(Model::state_transition(state_.model_state, at, discretisation, input), noise);
     state_.model_state = Model::advance(state_.model_state, at, discretisation, input);
 
     const Voltage predicted_v = Model::voltage(laws, state_.model_state, at, input);
-    if constexpr (Model::errors_are_states) update_offset_at_rest(cell, current, step_us);
-    if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * input.current_a), cell.plausible, flags)) {
-      const Voltage innovation_v = arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v;
-      correct(cell, at, input, soc, innovation_v, flags);
-    }
+    errors_.update_offset_at_rest(state_, cell, current, step_us, constants_.duration_s());
+    if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * input.current_a), cell.plausible, flags))
+      correct(cell, at, input, soc, arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v, flags);
     Result estimate;
     estimate.voltage_predicted_v = predicted_v;
     estimate.flags = flags;
-    fill_state(cell, estimate);
-    if constexpr (Model::errors_are_states) bound_gain_error(estimate.soc, estimate.soc_sigma, cell.noise.gain);
+    report_state(cell, estimate);
+    errors_.bound_gain_error(estimate.soc, estimate.soc_sigma, cell.noise.gain);
     return estimate;
   }
 
   constexpr const CellState<S, ModelOf>& state() const { return state_; }
-  /// Of the last sample that was taken.
+  /// Time of the last accepted sample.
   constexpr std::uint64_t time_us() const { return time_us_; }
 
  private:
   using StepInput = model::StepInput<S>;
+  using At = model::TablePoint<S>;
   using Soc = arithmetic::Soc<S>;
   using Voltage = arithmetic::Voltage<S>;
   using Current = arithmetic::Current<S>;
+  using Temperature = arithmetic::Temperature<S>;
   using Variance = arithmetic::Variance<S>;
   using Fraction = arithmetic::Fraction<S>;
   using TimeStep = arithmetic::TimeStep<S>;
-  using Count = arithmetic::Count<S>;
-  using Coupling = arithmetic::Coupling<S>;
 
-  static constexpr std::uint32_t longest_step_us =
-      4'095'000'000U;  // TimeStep's range; the RC branch has settled after that
-  static constexpr std::int16_t reference_cdegc = 2'500;
-  static constexpr int longest_gap_counts = 1'000;  // 23 days; nothing is known after that
+  static constexpr int longest_gap_counts = 1'000;  ///< of longest_count_us: 23 days; nothing is known after that
 
-  /// Current that ends as charge. Without a law that makes another of it, the reading itself.
+  static constexpr int temperature_bin_bits = 8;  ///< a bin of temperatures is 2.56 K wide
+  static constexpr std::int16_t no_temperature_bin = 0x7FFF;
+
+  template <class Cell>
+  constexpr auto operating_point(const Cell& cell, const StepInput& input) const {
+    return model::OperatingPoint{cell, input, Model::mechanism_states(state_.model_state)};
+  }
+
+  /// What acts on the cell: the accepted current and the last possible temperature, corrected for known errors of the
+  /// sensors.
+  template <class Cell>
+  constexpr StepInput step_input(const Cell& cell, std::int32_t current_ua, std::int16_t temperature_cdegc) {
+    const auto& laws = laws_of(cell);
+    return {laws.true_current(
+                Model::without_offset(arithmetic::from_micro<Current>(current_ua), state_.model_state, cell.noise)),
+            constants_.duration_s(), temperature(laws, temperature_cdegc)};
+  }
+
+  /// Current that ends as charge. Without a law that changes it, this is the reading itself.
   template <class Laws>
   static constexpr std::int32_t counted_ua(const Laws& laws, const StepInput& input, std::int32_t read_ua) {
     return Model::errors_are_states || laws.changes_charge() ? arithmetic::to_micro(laws.counted(input)) : read_ua;
   }
 
-  /// The last one that can be, 25 degrees C at first.
+  /// The last possible temperature; 25 degrees C before the first one.
   template <class Laws>
-  constexpr arithmetic::Temperature<S> temperature(const Laws& laws, const measurement::Sample& sample) {
-    if constexpr (std::same_as<Laws, model::LawSet<S>>) return arithmetic::Temperature<S>(25);  // nobody asks
-    if (measurement::temperature_possible(sample.temperature_cdegc)) temperature_cdegc_ = sample.temperature_cdegc;
-    return laws.true_temperature(arithmetic::from_centi<arithmetic::Temperature<S>>(temperature_cdegc_));
+  constexpr Temperature temperature(const Laws& laws, std::int16_t cdegc) {
+    if constexpr (std::same_as<Laws, model::LawSet<S>>) return Temperature(25);  // no law uses it
+    if (measurement::temperature_possible(cdegc)) temperature_cdegc_ = cdegc;
+    return laws.true_temperature(arithmetic::from_centi<Temperature>(temperature_cdegc_));
   }
 
   template <class Cell>
@@ -161,280 +169,124 @@ class SocEstimator {
     state_.charge.count(current_ua, static_cast<std::uint32_t>(step_us), cell.charge);
   }
 
-  /// What depends on the step's length alone is computed when the length changes.
   template <class Cell>
   [[gnu::noinline]] constexpr void set_time_step(const Cell& cell, std::uint64_t step_us, std::uint32_t& flags) {
-    step_us_ = step_us;
-    const std::uint32_t capped_us = step_us < longest_step_us ? static_cast<std::uint32_t>(step_us) : longest_step_us;
-    check_.gap(capped_us, flags);
-    duration_s_ = arithmetic::seconds<S>(capped_us);
-    const model::FilterNoise<S>& n = cell.noise;
-    const auto correlated_samples = arithmetic::ratio<arithmetic::Count<S>>(n.model_correlation_s, duration_s_);
-    correlated_samples_ = correlated_samples > arithmetic::Count<S>(1) ? correlated_samples : arithmetic::Count<S>(1);
-    update_resistance_noise();
-    const auto most = Fraction(1.9);
-    bank_share_ = correlated_samples > arithmetic::Count<S>(SocBank<S>::points)
-                      ? arithmetic::ratio<Fraction>(arithmetic::Count<S>(2 * SocBank<S>::points), correlated_samples)
-                      : most;
-    const Soc white = accumulated_soc(n.white_soc_per_s);
-    soc_noise_ = Variance(white * white);
-    if constexpr (!Model::errors_are_states)
-      soc_noise_ = soc_noise_ + arithmetic::product<Variance>(n.walk_soc2_per_s, duration_s_);
-    error_decay_ = Model::error_decay(n, duration_s_);
+    check_.gap(constants_.capped(step_us), flags);
+    constants_.set_time_step(cell.noise, step_us);
   }
 
-  /// Every 2.56 K anew: in the cold, resistances are larger than a file says that does not follow the temperature, by
-  /// some 40 kJ/mol (lithium iron phosphate, 30 to 60); by so much they are doubted.
   template <class Cell>
-  [[gnu::noinline]] constexpr void update_temperature(const Cell& cell, std::int16_t cdegc) {
-    temperature_bin_ = static_cast<std::int16_t>(cdegc >> 8);
-    resistance_error_ = Coupling(cell.noise.resistance_error);
-    if (measurement::temperature_possible(cdegc) && cdegc < reference_cdegc &&
-        !laws_of(cell).resistances_follow_temperature()) {
-      constexpr double usual = model::mechanism_detail::energy_over_rt(40'000.0, 25.0);
-      const auto factor =
-          model::mechanism_detail::arrhenius<S>(arithmetic::Factor<S>(usual), arithmetic::Temperature<S>(25),
-                                                arithmetic::from_centi<arithmetic::Temperature<S>>(cdegc));
-      resistance_error_ = Coupling(resistance_error_ + Coupling(factor - arithmetic::Factor<S>(1)));
-    }
-    update_resistance_noise();
-  }
-  constexpr void update_resistance_noise() {
-    resistance_noise_ =
-        arithmetic::product<Coupling>(Coupling(resistance_error_ * resistance_error_), correlated_samples_);
+  [[gnu::noinline]] constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
+    temperature_bin_ = static_cast<std::int16_t>(cdegc >> temperature_bin_bits);
+    constants_.set_temperature(cell, cdegc);
   }
 
-  /// What adds up to by the end of the step, 1 at most.
-  constexpr Soc accumulated_soc(const Soc& per_s) const {
-    const Soc most(1), once = per_s * duration_s_;
-    Soc sum = once;
-    for (std::uint64_t left_us = step_us_; left_us > longest_step_us && sum < most; left_us -= longest_step_us)
-      sum += once;
-    return sum < most ? sum : most;
-  }
-
-  /// Variance to add when the charge of a step may be wrong by a current that nobody measured, and what was counted
-  /// instead may have ceased. Such an error goes on in the same direction, so standard deviations add: (sigma + d)^2 -
-  /// sigma^2.
+  /// Process noise of a step in which a current flowed that was not measured.
   template <class Cell>
-  constexpr Variance unknown_charge_variance(const Cell& cell, const Current& counted_a) const {
-    const Soc d = accumulated_soc(
-        Soc(cell.noise.unknown_soc_per_s + arithmetic::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
-    const Soc sigma = arithmetic::root<Soc>(state_.covariance.template variance<Model::soc>());
-    return Variance(d * d) + Variance((sigma + sigma) * d);
+  constexpr void add_unknown_current(const Cell& cell, const At& at, const StepInput& input, std::uint32_t flags,
+                                     typename Model::Variances& noise) const {
+    const bool measured = (flags & (current_missing | current_implausible)) == 0;
+    // such an error keeps its sign, so standard deviations add: (sigma + d)^2 - sigma^2
+    const Soc d = constants_.unknown_charge(cell, measured ? Current(0) : input.current_a);
+    const Soc sigma = arithmetic::root<Soc>(state_.soc_variance());
+    noise[Model::soc] = Variance(constants_.soc_noise() + (Variance(d * d) + Variance((sigma + sigma) * d)));
+    if (measured) return;
+    // the drop over the resistances is unknown as well
+    const Voltage unknown_v =
+        steady_state_drop_v<S>(at, Current(arithmetic::magnitude(input.current_a) + cell.noise.unknown_a));
+    noise[0] = Variance(noise[0] + unknown_v * unknown_v);
   }
-
-  using Correction = std::array<Voltage, states>;
-
-  constexpr void apply_correction(const Correction& correction, const model::ChargeScale<S>& scale) {
-#pragma GCC unroll 8
-    for (std::size_t i = 0; i < states; ++i) {
-      if (i != Model::soc) state_.model_state[Model::value_index(i)] += correction[i];
-    }
-    state_.charge.correct(correction[Model::soc], scale);
-  }
-
-  /// A current that rests is the sensor's offset, but for what the cell file says may flow then.
-  template <class Cell>
-  constexpr void update_offset_at_rest(const Cell& cell, const AcceptedCurrent& current, std::uint64_t step_us) {
-    if (!(cell.noise.at_rest_per_h2 > Variance(0))) return;
-    if (!current.measured) return at_rest_.reset();
-    if (!at_rest_.is_at_rest(current.ua, step_us, cell.noise.at_rest)) return;
-    const auto correlated_samples =
-        arithmetic::ratio<Count>(arithmetic::Duration<S>(static_cast<int>(CurrentAtRest::correlation_s)), duration_s_);
-    const Voltage read = arithmetic::ratio<Voltage>(arithmetic::from_micro<Current>(current.ua), cell.noise.one_c_a);
-    typename Model::MeasurementJacobian h{};
-    h[Model::last] = arithmetic::VoltagePerSoc<S>(1);
-    const Variance noise = arithmetic::product<Variance>(cell.noise.at_rest_per_h2,
-                                                         correlated_samples > Count(1) ? correlated_samples : Count(1));
-    apply_correction(state_.covariance.observe(h, noise, Voltage(read - state_.model_state[Model::current_offset])),
-                     cell.charge);
-  }
-
-  /// What a wrong gain makes of the charge that was counted since soc was last known, c: its standard deviation is gain
-  /// c, so a step's part of the variance is gain^2 ((c + d)^2 - c^2). Charge that comes back takes it away again, which
-  /// a covariance cannot: then it stays.
-  constexpr Variance gain_error_variance(const Soc& d, const Fraction& gain) {
-    const Soc before = since_anchor_.counted;
-    since_anchor_.counted = Soc(before + d);
-    const Variance more = Variance((before + since_anchor_.counted) * d);
-    return more > Variance(0) ? arithmetic::product<Variance>(arithmetic::product<Variance>(more, gain), gain)
-                              : Variance(0);
-  }
-  /// A gain's part of sigma is not more than sigma.
-  constexpr void bound_gain_error(const Soc& soc, const Soc& sigma, const Fraction& gain) {
-    since_anchor_.soc = soc;
-    if (!(arithmetic::magnitude(Soc(since_anchor_.counted * gain)) > sigma)) return;
-    const auto most = arithmetic::ratio<Soc>(sigma, Soc(gain));
-    since_anchor_.counted = since_anchor_.counted > Soc(0) ? most : Soc(-most);
-  }
-
-  static constexpr double outlier_sigmas =
-      8;  // standard deviations; a cell that was emptied fast shows five of them for minutes
-  static constexpr double uncorrelated_share =
-      1.0 / 4;                                 // of the variance of an error that lasts: half of it comes and goes
-  static constexpr double min_error_v = 0.01;  // of any model, whatever its file says
-  static constexpr std::uint32_t restart_after_us =
-      600'000'000;  // of it before soc is sought anew: near empty a cell needs minutes to recover
-  static constexpr std::uint32_t outlier_reset_us = 60'000'000;  // without it, and it is forgotten
-
-  using At = model::TablePoint<S>;
 
   template <class Cell>
   constexpr void correct(const Cell& cell, const At& at, const StepInput& input, const Soc& soc,
                          const Voltage& innovation_v, std::uint32_t& flags) {
     const Voltage drop_v = steady_state_drop_v<S>(at, input.current_a);
     const Variance drop_v2 = drop_v * drop_v;
-    if (bank_.open()) [[unlikely]] {
+    if (ambiguous_.open()) [[unlikely]] {
       flags |= soc_ambiguous;
-      return update_from_bank(cell, input.current_a, input.temperature_c, soc, innovation_v);
+      return correct_from_bank(cell, input.current_a, input.temperature_c, soc, innovation_v);
     }
-    if (arithmetic::magnitude(innovation_v) > Voltage(outlier_sigmas * min_error_v)) [[unlikely]] {
+    if (OutlierGate<S>::is_suspect(innovation_v)) [[unlikely]] {
       if (reject_outlier(cell, input.current_a, input.temperature_c, soc, innovation_v)) {
         flags |= voltage_rejected;
         return;
       }
     }
-    Variance error_v2 = at.error_v2;
-    if constexpr (Model::errors_are_states)
-      error_v2 = Variance(arithmetic::product<Variance>(cell.noise.model_v2, Fraction(uncorrelated_share)) +
-                          soc_axis_variance(cell, at));
-    const Variance model_v2 = Variance(arithmetic::product<Variance>(error_v2, correlated_samples_) +
-                                       arithmetic::product<Variance>(drop_v2, resistance_noise_));
+    const Variance model_v2 =
+        Variance(arithmetic::product<Variance>(
+                     Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell, at); }),
+                     constants_.correlated_samples()) +
+                 arithmetic::product<Variance>(drop_v2, constants_.resistance_noise()));
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
-    apply_correction(
+    state_.apply(
         state_.covariance.observe(Model::measurement_jacobian(laws_of(cell), at, input), noise_v2, innovation_v),
         cell.charge);
   }
 
-  /// An innovation that the model's error and soc's own sigma do not explain, for ten minutes, is soc's: it is sought
-  /// anew. True: it is.
+  // These two take their arguments by value: an argument passed by address would be kept in memory in every step.
+
+  /// Returns true if the voltage was rejected. After OutlierGate::restart_after_us of rejections the bank is opened
+  /// around the present SOC, which estimates it again from the voltages.
   template <class Cell>
-  [[gnu::noinline]] constexpr bool reject_outlier(const Cell& cell, Current current_a,
-                                                  arithmetic::Temperature<S> temperature_c, Soc soc,
-                                                  Voltage innovation_v) {
-    const StepInput input{current_a, duration_s_, temperature_c};
+  [[gnu::noinline]] constexpr bool reject_outlier(const Cell& cell, Current current_a, Temperature temperature_c,
+                                                  Soc soc, Voltage innovation_v) {
+    const StepInput input{current_a, constants_.duration_s(), temperature_c};
     std::uint8_t interval = interval_;
-    const At at =
-        look_up(model::OperatingPoint{cell, input, Model::mechanism_states(state_.model_state)}, soc, interval);
+    const At at = look_up(operating_point(cell, input), soc, interval);
     const auto h = Model::measurement_jacobian(laws_of(cell), at, input);
-    const Variance of_soc_v2 = arithmetic::product<Variance>(
-        arithmetic::product<Variance>(state_.covariance.template variance<Model::soc>(), h[Model::soc]), h[Model::soc]);
-    const Variance error_v2 =
-        Variance(Variance(at.error_v2 - cell.noise.model_v2) +
-                 Variance(persistent_variance(cell) + drop_variance_v2<S>(at, current_a, resistance_error_)));
-    const Variance all_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
-    if (!(Variance(innovation_v * innovation_v) > Variance(all_v2 * Count(outlier_sigmas * outlier_sigmas))))
-      return false;
-    if (time_us_ - last_outlier_us_ > outlier_reset_us + step_us_) outlier_duration_us_ = 0;
-    last_outlier_us_ = time_us_;
-    outlier_duration_us_ += step_us_ < outlier_reset_us ? static_cast<std::uint32_t>(step_us_) : outlier_reset_us;
-    if (outlier_duration_us_ < restart_after_us) return true;  // one bad reading is not believed
-    outlier_duration_us_ = 0;
-    const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points)),
-        variance = state_.covariance.template variance<Model::soc>();
-    restart_around(cell, {soc, variance < finest ? finest : variance});
+    const Variance variance = state_.soc_variance();
+    const Variance of_soc_v2 =
+        arithmetic::product<Variance>(arithmetic::product<Variance>(variance, h[Model::soc]), h[Model::soc]);
+    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) +
+                                       Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state_) +
+                                                drop_variance_v2<S>(at, current_a, constants_.resistance_error())));
+    const Variance innovation_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
+    if (!OutlierGate<S>::is_outlier(innovation_v, innovation_v2)) return false;
+    if (gate_.has_persisted(time_us_, constants_.step_us())) {
+      const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points));
+      const SocDistribution<S> before{soc, variance < finest ? finest : variance};
+      ambiguous_.open_at(cell, state_, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
+    }
     return true;
   }
 
-  /// Of what the tables' soc axis is good to, on the curve there. In the cold surfaces are further ahead of what is
-  /// counted, as much as resistances are larger: knees come elsewhere.
   template <class Cell>
-  static constexpr Variance soc_axis_variance(const Cell& cell, const At& at) {
-    const Variance soc_axis_variance = Variance(at.error_v2 - cell.noise.model_v2);
-    if constexpr (std::same_as<std::remove_cvref_t<decltype(laws_of(cell))>, model::LawSet<S>>)
-      return soc_axis_variance;
-    else
-      return at.activation > arithmetic::Factor<S>(1)
-                 ? arithmetic::product<Variance>(arithmetic::product<Variance>(soc_axis_variance, at.activation),
-                                                 at.activation)
-                 : soc_axis_variance;
-  }
-
-  /// Opens the bank around a belief that may be mistaken.
-  template <class Cell>
-  constexpr void restart_around(const Cell& cell, const SocDistribution<S>& before) {
-    open_bank(cell, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
-  }
-  template <class Cell, class Misfit>
-  constexpr void open_bank(const Cell& cell, const Soc& mean, const Misfit& misfit) {
-    std::uint8_t interval = 0;
-    bank_.open_at(mean, persistent_variance(cell),
-                  [&](const Soc& soc) { return misfit(soc, Fraction(0.5 / SocBank<S>::points), interval); });
-  }
-
-  /// Of an error that lasts while the bank is open: the model's, and of the states that are not corrected then.
-  template <class Cell>
-  constexpr Variance persistent_variance(const Cell& cell) const {
-    Variance sum = Model::errors_are_states ? Variance{} : cell.noise.model_v2;
-    const auto states_v2 = state_.covariance.variances();
-    for (std::size_t k = 0; k < Model::soc; ++k) sum = Variance(sum + states_v2[k]);
-    return sum;
-  }
-
-  /// While it is open, soc is the bank's; the other states go on as predicted.
-  /// Arguments by value: one passed by address would be kept in memory in every step.
-  template <class Cell>
-  [[gnu::noinline]] constexpr void update_from_bank(const Cell& cell, Current current_a,
-                                                    arithmetic::Temperature<S> temperature_c, Soc soc,
-                                                    Voltage innovation_v) {
-    const StepInput input{current_a, duration_s_, temperature_c};
-    const auto& laws = laws_of(cell);
-    std::uint8_t interval = interval_;
-    const model::OperatingPoint operating_point{cell, input, Model::mechanism_states(state_.model_state)};
-    const At middle = look_up(operating_point, soc, interval);
-    const Voltage expected_v = Model::voltage(laws, state_.model_state, middle, input);
-    const Variance new_v2 = Variance(arithmetic::product<Variance>(cell.noise.model_v2, Fraction(uncorrelated_share)) +
-                                     drop_variance_v2<S>(middle, current_a, resistance_error_));
-    const auto observation = [&](const Soc& there) -> typename SocBank<S>::Observation {
-      const At at = look_up(operating_point, there, interval);
-      return {.off_v = Voltage(innovation_v + (expected_v - Model::voltage(laws, state_.model_state, at, input))),
-              .half_v = Voltage(ocv_slope<S>(at) * Fraction(0.5 / SocBank<S>::points)),
-              .new_v2 = Variance(new_v2 + soc_axis_variance(cell, at))};
-    };
-    const auto bank_update = bank_.step(
-        soc, bank_share_, cell.noise.voltage_v2,
-        Variance(persistent_variance(cell) + drop_variance_v2<S>(middle, current_a, resistance_error_)), observation);
-    if (!bank_update.ready) return;
-    state_.charge.correct(bank_update.moved, cell.charge);
-    state_.covariance.template reset<Model::soc>(bank_update.variance);
-    if (bank_update.variance < Variance(SocBank<S>::close_below_sigma * SocBank<S>::close_below_sigma)) bank_.close();
+  [[gnu::noinline]] constexpr void correct_from_bank(const Cell& cell, Current current_a, Temperature temperature_c,
+                                                     Soc soc, Voltage innovation_v) {
+    const StepInput input{current_a, constants_.duration_s(), temperature_c};
+    ambiguous_.update(cell, input, constants_, soc, innovation_v, interval_, state_);
   }
 
   template <class Cell>
-  constexpr void fill_state(const Cell& cell, Result& estimate) const {
+  constexpr void report_state(const Cell& cell, Result& estimate) const {
     estimate.soc = state_.charge.soc(cell.charge);
-    estimate.soc_sigma = arithmetic::root<Soc>(state_.covariance.template variance<Model::soc>());
+    estimate.soc_sigma = arithmetic::root<Soc>(state_.soc_variance());
     estimate.v_rc_v = state_.model_state[0];
     if constexpr (extra_values > 0) {
-      std::size_t next = 0;
-      if constexpr (Model::errors_are_states) {
-        estimate.extra[next++] = state_.model_state[Model::voltage_error];
-        estimate.extra[next++] = state_.model_state[Model::current_offset];
-        estimate.extra[next++] = arithmetic::root<Voltage>(state_.covariance.template variance<Model::last>());
-      }
+      Errors::report(state_, estimate.extra);
+      std::size_t next = Errors::values;
       for (std::size_t k = Model::first_mechanism_state; k < Model::values; ++k)
         estimate.extra[next++] = state_.model_state[k];
     }
   }
 
+  /// The present estimate, for a sample that is not later than the last one.
   template <class Cell>
   [[gnu::noinline]] constexpr Result repeated_estimate(const Cell& cell, std::uint32_t flags) const {
     Result estimate;
     estimate.flags = flags;
     const StepInput rest{Current(0), TimeStep(1)};
     std::uint8_t interval = interval_;
-    const auto at = look_up(model::OperatingPoint{cell, rest, Model::mechanism_states(state_.model_state)},
-                            state_.charge.soc(cell.charge), interval);
+    const auto at = look_up(operating_point(cell, rest), state_.charge.soc(cell.charge), interval);
     estimate.voltage_predicted_v = Model::voltage(laws_of(cell), state_.model_state, at, rest);
-    fill_state(cell, estimate);
+    report_state(cell, estimate);
     return estimate;
   }
 
   template <class Cell>
   [[gnu::noinline]] constexpr Result start(const Cell& cell, const measurement::Sample& sample) {
-    Result estimate;
     time_us_ = sample.time_us;
+    Result estimate;
     const AcceptedCurrent current = check_.current(sample.current_ua, cell.plausible, estimate.flags);
     const bool voltage = InputCheck<S>::voltage_present(sample.voltage_uv, cell.plausible, estimate.flags);
     if (!voltage && !has_start_) {
@@ -444,83 +296,77 @@ class SocEstimator {
       return estimate;
     }
     started_ = true;
-
     const auto& laws = laws_of(cell);
     const StepInput input{laws.true_current(arithmetic::from_micro<Current>(current.ua)), TimeStep(1),
-                          temperature(laws, sample)};
-    SocDistribution<S> belief{soc_of_ppb(from_.soc_ppb), Variance{}};
-    const Soc believed_sigma = soc_of_ppb(from_.soc_sigma_ppb);
-    belief.variance = Variance(believed_sigma * believed_sigma);
-    // how much the current has built up is unknown: half of what it can, give or take the same; and what flowed before
-    // it
-    const model::OperatingPoint operating_point{cell, input, Model::mechanism_states(state_.model_state)};
-    auto at = look_up(operating_point, has_start_ ? belief.soc : Soc(0.5), interval_);
-    const Voltage half_v = at.r1_ohm * Fraction(0.5) * input.current_a;
-    const Voltage before_v = at.r1_ohm * cell.noise.unknown_a;
-    const Variance half_v2 = Variance(half_v * half_v) + Variance(before_v * before_v);
-    std::array<Variance, states> variances{};
-    variances[0] = cell.noise.v_rc_v2 + half_v2;
-    Model::start(laws, state_.model_state, variances, at, input, cell.noise);
-    // a belief finer than the points of the grid needs no help from a voltage
-    const auto finest = Soc(2.0 / start_points);
-    if (!has_start_ || believed_sigma > finest) {
-      const Voltage load_v = half_v + Model::sum_v(state_.model_state) + at.r0_ohm * input.current_a;
-      Variance reading_v2 = cell.noise.rest_v2 + half_v2;
-      for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
-      if (!current.measured) {
-        const Voltage unknown_v = at.r0_ohm * cell.noise.unknown_a;
-        reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
-      }
-      const Voltage ocv_v =
-          voltage ? Voltage(Model::true_voltage(laws, arithmetic::from_micro<Voltage>(sample.voltage_uv)) - load_v)
-                  : Voltage(0);
-      const SocDistribution<S> before = belief;
-      const StartMisfit<S, decltype(operating_point)> misfit{operating_point, voltage ? &ocv_v : nullptr, reading_v2,
-                                                             has_start_ ? &before : nullptr};
-      if (voltage) belief = soc_from(misfit);
-      if (belief.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma)) {
-        state_.covariance.set_diagonal(variances);  // what the bank is told of the other states
-        open_bank(cell, belief.soc, misfit);
-      }
-      at = look_up(operating_point, belief.soc, interval_);
-    }
-    state_.charge.set(belief.soc, cell.charge);
-    state_.model_state[0] = half_v;
-    variances[Model::soc] = belief.variance;
-    state_.covariance.set_diagonal(variances);
+                          temperature(laws, sample.temperature_cdegc)};
+    const At at = start_state(cell, input, current.measured, voltage ? &sample.voltage_uv : nullptr);
     estimate.voltage_predicted_v = Model::voltage(laws, state_.model_state, at, input);
-    fill_state(cell, estimate);
-    if constexpr (Model::errors_are_states) since_anchor_.soc = estimate.soc;
+    report_state(cell, estimate);
+    errors_.start(estimate.soc);
     return estimate;
   }
 
+  /// Sets the state, and opens the bank if the SOC is ambiguous. voltage_uv: nullptr if it is missing. Returns the
+  /// tables at the first SOC.
+  template <class Cell>
+  constexpr At start_state(const Cell& cell, const StepInput& input, bool current_measured,
+                           const std::int32_t* voltage_uv) {
+    SocDistribution<S> soc = given_soc();
+    const auto tables = operating_point(cell, input);
+    At at = look_up(tables, has_start_ ? soc.soc : Soc(0.5), interval_);
+    const StartPolarisation<S> rc = start_polarisation<S>(at, input.current_a, cell.noise);
+    typename Model::Variances variances{};
+    variances[0] = cell.noise.v_rc_v2 + rc.variance_v2;
+    Model::start(laws_of(cell), state_.model_state, variances, at, input, cell.noise);
+    // a start that is finer than the points of the grid needs no help from a voltage
+    if (!has_start_ || soc_of_ppb(from_.soc_sigma_ppb) > Soc(2.0 / start_points)) {
+      const Voltage load_v = rc.v_rc_v + Model::sum_v(state_.model_state) + at.r0_ohm * input.current_a;
+      Variance reading_v2 = cell.noise.rest_v2 + rc.variance_v2;
+      for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
+      if (!current_measured) {
+        const Voltage unknown_v = at.r0_ohm * cell.noise.unknown_a;
+        reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
+      }
+      const bool voltage = voltage_uv != nullptr;
+      const Voltage ocv_v =
+          voltage ? Voltage(Model::true_voltage(laws_of(cell), arithmetic::from_micro<Voltage>(*voltage_uv)) - load_v)
+                  : Voltage(0);
+      const SocDistribution<S> before = soc;
+      const StartMisfit<S, decltype(tables)> misfit{tables, voltage ? &ocv_v : nullptr, reading_v2,
+                                                    has_start_ ? &before : nullptr};
+      if (voltage) soc = soc_from(misfit);
+      if (soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma)) {
+        state_.covariance.set_diagonal(variances);  // the bank needs the variances of the other states
+        ambiguous_.open_at(cell, state_, soc.soc, misfit);
+      }
+      at = look_up(tables, soc.soc, interval_);
+    }
+    state_.charge.set(soc.soc, cell.charge);
+    state_.model_state[0] = rc.v_rc_v;
+    variances[Model::soc] = soc.variance;
+    state_.covariance.set_diagonal(variances);
+    return at;
+  }
+
+  constexpr SocDistribution<S> given_soc() const {
+    const Soc sigma = soc_of_ppb(from_.soc_sigma_ppb);
+    return {soc_of_ppb(from_.soc_ppb), Variance(sigma * sigma)};
+  }
   static constexpr Soc soc_of_ppb(std::int32_t ppb) {
     return Soc(arithmetic::from_micro<arithmetic::Current<S>>(ppb) * Fraction(1e-3));
   }
 
   CellState<S, ModelOf> state_;
   InputCheck<S> check_;
-  struct SinceAnchor {
-    Soc soc{}, counted{};
-  };
-  struct Empty {};
-  [[no_unique_address]] std::conditional_t<Model::errors_are_states, SinceAnchor, Empty> since_anchor_;
-  [[no_unique_address]] std::conditional_t<Model::errors_are_states, CurrentAtRest, Empty> at_rest_;
+  [[no_unique_address]] Errors errors_;
   std::uint64_t time_us_ = 0;
-  std::uint64_t step_us_ = 0;
-  std::uint64_t last_outlier_us_ = 0;
-  std::uint32_t outlier_duration_us_ = 0;
   std::uint8_t interval_ = 0;
   std::int16_t temperature_cdegc_ = 2'500;
-  TimeStep duration_s_{};
-  Variance soc_noise_{};
-  Count correlated_samples_{1};
-  Coupling resistance_error_{}, resistance_noise_{};  ///< of R0 + R1; and as it counts in the noise of a step
-  std::int16_t temperature_bin_ = 0x7FFF;             ///< no temperature's
-  Fraction bank_share_{};
-  [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
-  SocBank<S> bank_;
+  std::int16_t temperature_bin_ = no_temperature_bin;
+  StepConstants<S, Model, Errors> constants_;
+  AmbiguousSoc<S, ModelOf> ambiguous_;
   measurement::StartingPoint from_;
+  OutlierGate<S> gate_;
   bool has_start_ = false, started_ = false;
 };
 

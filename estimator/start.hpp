@@ -22,6 +22,25 @@ struct SocDistribution {
   arithmetic::Variance<S> variance;
 };
 
+/// Voltage of the RC branch at the start.
+template <class S>
+struct StartPolarisation {
+  arithmetic::Voltage<S> v_rc_v;
+  arithmetic::Variance<S> variance_v2;
+};
+
+/// Nobody knows how long the present current has flowed. The RC branch is assumed to be charged to half of its final
+/// voltage, with a standard deviation of the same size; the current before that adds to it (noise.current_unknown_a).
+template <class S>
+constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at,
+                                                  const arithmetic::Current<S>& current_a,
+                                                  const model::FilterNoise<S>& noise) {
+  using namespace model;
+  const Voltage<S> half_v = at.r1_ohm * Fraction<S>(0.5) * current_a;
+  const Voltage<S> before_v = at.r1_ohm * noise.unknown_a;
+  return {half_v, Variance<S>(half_v * half_v) + Variance<S>(before_v * before_v)};
+}
+
 inline constexpr int start_points = 256;
 
 /// What speaks against a soc: a reading of the OCV, a belief, or both. All >= 0.

@@ -1,0 +1,112 @@
+// Values that depend only on the length of the time step and on the temperature. They are computed when one of these
+// changes, not in every step: duration, process noise of the SOC, decay of persistent errors, weights of the voltage.
+//
+// A voltage reading's own noise is independent from sample to sample; the model's error is not. An error that persists
+// for T seconds must count once per T, so at a step dt its variance is multiplied by T / dt (correlated_samples).
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+
+#include "estimator/soc_bank.hpp"
+#include "measurement/sample.hpp"
+#include "model/extended_rc.hpp"
+
+namespace bms::estimator {
+
+template <class S, class Model, class Errors>
+class StepConstants {
+  using Soc = arithmetic::Soc<S>;
+  using Current = arithmetic::Current<S>;
+  using Variance = arithmetic::Variance<S>;
+  using Fraction = arithmetic::Fraction<S>;
+  using Count = arithmetic::Count<S>;
+  using Coupling = arithmetic::Coupling<S>;
+  using Temperature = arithmetic::Temperature<S>;
+  using Factor = arithmetic::Factor<S>;
+
+ public:
+  /// Range of TimeStep. The RC branch has settled after that.
+  static constexpr std::uint32_t longest_step_us = 4'095'000'000U;
+
+  constexpr std::uint64_t step_us() const { return step_us_; }
+  constexpr const arithmetic::TimeStep<S>& duration_s() const { return duration_s_; }  ///< longest_step_us at most
+  constexpr const Variance& soc_noise() const { return soc_noise_; }                   ///< process noise in a step
+  constexpr const Count& correlated_samples() const { return correlated_samples_; }    ///< >= 1
+  /// Standard deviation of R0 + R1, relative.
+  constexpr const Coupling& resistance_error() const { return resistance_error_; }
+  /// Variance of R0 + R1, relative, times correlated_samples.
+  constexpr const Coupling& resistance_noise() const { return resistance_noise_; }
+  constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
+  constexpr const typename Model::OptionalErrorDecay& error_decay() const { return error_decay_; }
+
+  static constexpr std::uint32_t capped(std::uint64_t step_us) {
+    return step_us < longest_step_us ? static_cast<std::uint32_t>(step_us) : longest_step_us;
+  }
+
+  constexpr void set_time_step(const model::FilterNoise<S>& noise, std::uint64_t step_us) {
+    step_us_ = step_us;
+    duration_s_ = arithmetic::seconds<S>(capped(step_us));
+    const auto correlated_samples = arithmetic::ratio<Count>(noise.model_correlation_s, duration_s_);
+    correlated_samples_ = correlated_samples > Count(1) ? correlated_samples : Count(1);
+    update_resistance_noise();
+    bank_share_ = correlated_samples > Count(SocBank<S>::points)
+                      ? arithmetic::ratio<Fraction>(Count(2 * SocBank<S>::points), correlated_samples)
+                      : Fraction(SocBank<S>::max_share);
+    const Soc white = accumulated_soc(noise.white_soc_per_s);
+    soc_noise_ = Errors::soc_noise(Variance(white * white), noise, duration_s_);
+    error_decay_ = Model::error_decay(noise, duration_s_);
+  }
+
+  /// In the cold, resistances are larger than a cell file says that does not follow the temperature. The filter assumes
+  /// an activation energy of 40 kJ/mol (30 to 60 for lithium iron phosphate) and adds the increase to their
+  /// uncertainty.
+  template <class Cell>
+  constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
+    resistance_error_ = Coupling(cell.noise.resistance_error);
+    if (measurement::temperature_possible(cdegc) && cdegc < reference_cdegc &&
+        !laws_of(cell).resistances_follow_temperature()) {
+      constexpr double energy = model::mechanism_detail::energy_over_rt(assumed_activation_j_per_mol, 25.0);
+      const auto factor = model::mechanism_detail::arrhenius<S>(Factor(energy), Temperature(25),
+                                                                arithmetic::from_centi<Temperature>(cdegc));
+      resistance_error_ = Coupling(resistance_error_ + Coupling(factor - Factor(1)));
+    }
+    update_resistance_noise();
+  }
+
+  /// SOC by which the charge of a step may be wrong when the current was not measured: an unknown current flowed, and
+  /// the current that was counted instead may have ended. 1 at most.
+  template <class Cell>
+  constexpr Soc unknown_charge(const Cell& cell, const Current& counted_a) const {
+    return accumulated_soc(
+        Soc(cell.noise.unknown_soc_per_s + arithmetic::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
+  }
+
+ private:
+  static constexpr std::int16_t reference_cdegc = 2'500;
+  static constexpr double assumed_activation_j_per_mol = 40'000;
+
+  constexpr void update_resistance_noise() {
+    resistance_noise_ =
+        arithmetic::product<Coupling>(Coupling(resistance_error_ * resistance_error_), correlated_samples_);
+  }
+
+  /// Sum over the step of a rate per second, 1 at most.
+  constexpr Soc accumulated_soc(const Soc& per_s) const {
+    const Soc most(1), once = per_s * duration_s_;
+    Soc sum = once;
+    for (std::uint64_t left_us = step_us_; left_us > longest_step_us && sum < most; left_us -= longest_step_us)
+      sum += once;
+    return sum < most ? sum : most;
+  }
+
+  std::uint64_t step_us_ = 0;
+  arithmetic::TimeStep<S> duration_s_{};
+  Variance soc_noise_{};
+  Count correlated_samples_{1};
+  Coupling resistance_error_{}, resistance_noise_{};
+  Fraction bank_share_{};
+  [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
+};
+
+}  // namespace bms::estimator

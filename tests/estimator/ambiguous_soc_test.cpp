@@ -1,0 +1,64 @@
+#include "estimator/ambiguous_soc.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "estimator/start.hpp"
+#include "tests/cells.hpp"
+
+namespace bms::estimator {
+namespace {
+
+template <class S>
+using Model = model::ExtendedRc<0, 0>::Of<S>;
+
+/// A filter's state with an open bank, and a cell at rest with another SOC.
+struct Restart {
+  explicit Restart(double soc) {
+    state.charge.set(soc, cell.charge);
+    state.covariance.set_diagonal({1e-8, 0.3 * 0.3});
+    constants.set_time_step(cell.noise, 1'000'000);
+    constants.set_temperature(cell, 2'500);
+    const SocDistribution<double> before{soc, 0.3 * 0.3};
+    ambiguous.open_at(cell, state, soc, StartMisfit<double, decltype(cell)>{cell, nullptr, 0, &before});
+  }
+  /// One second at rest; the voltage is the OCV at true_soc.
+  void second(double true_soc) {
+    const double soc = state.charge.soc(cell.charge);
+    std::uint8_t interval = 0;
+    const double innovation_v =
+        model::look_up(cell, true_soc, interval).ocv_v - model::look_up(cell, soc, interval).ocv_v;
+    ambiguous.update(cell, {0, 1, 25}, constants, soc, innovation_v, interval, state);
+  }
+
+  model::Cell<double, model::max_intervals> cell = tests::prepared<double>();
+  CellState<double, Model> state;
+  StepConstants<double, Model<double>, PersistentErrors<double, Model>> constants;
+  AmbiguousSoc<double, Model> ambiguous;
+};
+
+TEST(AmbiguousSoc, FindsTheSocWhereTheCurveIsSteepAndCloses) {
+  Restart r(0.5);
+  EXPECT_TRUE(r.ambiguous.open());
+  for (int k = 0; k < 1'800 && r.ambiguous.open(); ++k) r.second(0.05);
+  EXPECT_FALSE(r.ambiguous.open());
+  EXPECT_NEAR(r.state.charge.soc(r.cell.charge), 0.05, 0.02);
+  EXPECT_LT(std::sqrt(r.state.soc_variance()), SocBank<double>::close_below_sigma);
+}
+
+TEST(AmbiguousSoc, StaysOpenOnThePlateau) {
+  Restart r(0.5);
+  for (int k = 0; k < 1'800; ++k) r.second(0.5);
+  EXPECT_TRUE(r.ambiguous.open());
+  EXPECT_GT(std::sqrt(r.state.soc_variance()), SocBank<double>::close_below_sigma);
+}
+
+TEST(AmbiguousSoc, TheModelsErrorAndTheStatesThatAreNotCorrectedPersist) {
+  const Restart r(0.5);
+  EXPECT_DOUBLE_EQ((AmbiguousSoc<double, Model>::persistent_variance(r.cell.noise, r.state)),
+                   r.cell.noise.model_v2 + 1e-8);
+}
+
+}  // namespace
+}  // namespace bms::estimator

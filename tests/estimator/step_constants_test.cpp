@@ -1,0 +1,58 @@
+#include "estimator/step_constants.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "estimator/persistent_errors.hpp"
+#include "tests/cells.hpp"
+
+namespace bms::estimator {
+namespace {
+
+template <class S>
+using Model = model::ExtendedRc<0, 0>::Of<S>;
+template <class S>
+using Constants = StepConstants<S, Model<S>, PersistentErrors<S, Model>>;
+
+TEST(StepConstants, AnErrorThatPersistsCountsOncePerItsCorrelationTime) {
+  const auto cell = tests::prepared<double>();
+  Constants<double> c;
+  c.set_time_step(cell.noise, 500'000);
+  EXPECT_DOUBLE_EQ(c.duration_s(), 0.5);
+  EXPECT_DOUBLE_EQ(c.correlated_samples(), cell.noise.model_correlation_s / 0.5);
+  c.set_time_step(cell.noise, 4'000'000'000);
+  EXPECT_EQ(c.correlated_samples(), 1) << "a step longer than the correlation time is one sample";
+}
+
+TEST(StepConstants, AStepLongerThanItsTypeIsCutButItsUnknownChargeIsNot) {
+  const auto cell = tests::prepared<double>();
+  Constants<double> c;
+  c.set_time_step(cell.noise, 5'000'000'000);
+  EXPECT_DOUBLE_EQ(c.duration_s(), 4'095);
+  const double rate = cell.noise.unknown_soc_per_s;
+  c.set_time_step(cell.noise, 1'000'000);
+  EXPECT_DOUBLE_EQ(c.unknown_charge(cell, 0.0), rate);
+  EXPECT_DOUBLE_EQ(c.unknown_charge(cell, -3.0), rate + 3.0 / 6 / 3'600);
+  c.set_time_step(cell.noise, 86'400'000'000);
+  EXPECT_EQ(c.unknown_charge(cell, 6.0), 1) << "not more than the capacity";
+}
+
+TEST(StepConstants, TheColdMakesResistancesUncertainAndTheHeatDoesNot) {
+  const auto cell = tests::prepared<double>();
+  Constants<double> c;
+  c.set_time_step(cell.noise, 1'000'000);
+  c.set_temperature(cell, 2'500);
+  EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
+  c.set_temperature(cell, 4'500);
+  EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
+  c.set_temperature(cell, -500);
+  const double more = std::exp(40'000 / 8.314462618 * (1 / 268.15 - 1 / 298.15)) - 1;
+  EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + more, 1e-6);
+  EXPECT_NEAR(c.resistance_noise(), std::pow(c.resistance_error(), 2) * c.correlated_samples(), 1e-9);
+  c.set_temperature(cell, measurement::no_temperature);
+  EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
+}
+
+}  // namespace
+}  // namespace bms::estimator
