@@ -31,6 +31,7 @@ namespace extended_detail {
 
 /// The place of a law that integers cannot compute.
 struct NoLaw {
+  static constexpr LawMembers members = law_member::none;
   template <class... Any>
   constexpr explicit NoLaw(const Any&...) {}
 };

@@ -13,6 +13,7 @@
 #include <tuple>
 #include <type_traits>
 
+#include "model/law.hpp"
 #include "model/mechanism.hpp"
 
 namespace bms::model {
@@ -58,6 +59,10 @@ constexpr std::size_t voltage_states_of() {
 
 template <class S, class... Slots>
 class LawSet {
+  static_assert(
+      (true && ... && MechanismLaw<typename extended_detail::LawIn<Slots>::type, S>),
+      "a law must declare exactly the members that it has (model/law.hpp): a misspelt one would have no effect");
+
  public:
   static constexpr std::size_t most_states =
       (std::size_t{0} + ... + extended_detail::states_of<typename extended_detail::LawIn<Slots>::type>());

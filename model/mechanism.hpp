@@ -39,6 +39,7 @@
 
 #include "arithmetic/scalar.hpp"
 #include "model/cell.hpp"
+#include "model/law.hpp"
 #include "model/one_rc.hpp"
 
 namespace bms::model {

@@ -18,6 +18,7 @@ struct CapacityChange {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::counted;
     Factor<S> faster;
 
     template <class Real>

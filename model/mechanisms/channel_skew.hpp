@@ -18,6 +18,7 @@ struct ChannelSkew {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::none;
     S delay_s;
 
     template <class Real>

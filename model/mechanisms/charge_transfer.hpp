@@ -23,6 +23,7 @@ struct ChargeTransfer {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables;
     Factor<S> r0_share, r1_share;
     Current<S> twice_i0_a;
 

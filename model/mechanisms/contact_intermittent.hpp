@@ -24,6 +24,7 @@ struct ContactIntermittent {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables | law_member::at;
     Resistance<S> added_ohm;
     std::span<const Span> bursts;  ///< ascending, of the recording at hand; none: a contact that holds
     std::size_t next = 0;

@@ -19,6 +19,7 @@ struct ContactStep {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables | law_member::at;
     Resistance<S> added_ohm;
     double onset_s = 0;
     bool active = true;

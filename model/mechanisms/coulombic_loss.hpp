@@ -15,6 +15,7 @@ struct CoulombicLoss {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::counted;
     Fraction<S> stored_fraction;
 
     template <class Real>

@@ -20,6 +20,7 @@ struct CurrentClipping {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::true_current;
     Current<S> excess_a, limit_a, from_a;
 
     template <class Real>

@@ -15,6 +15,7 @@ struct CurrentGain {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::true_current;
     Factor<S> factor;
 
     template <class Real>

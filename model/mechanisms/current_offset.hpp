@@ -15,6 +15,7 @@ struct CurrentOffset {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::true_current;
     Current<S> offset_a;
 
     template <class Real>

@@ -16,6 +16,7 @@ struct DirectionAsymmetry {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables;
     Factor<S> charging;
 
     template <class Real>

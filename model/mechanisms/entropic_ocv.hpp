@@ -23,6 +23,7 @@ struct EntropicOcv {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables;
     std::array<Voltage<S>, 4> v_per_k;
     std::array<Voltage<S>, 3> delta_v_per_k;
     std::array<Soc<S>, 4> node = {Soc<S>(0.10), Soc<S>(0.40), Soc<S>(0.70), Soc<S>(0.95)};

@@ -21,6 +21,8 @@ struct FastPolarisation {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members =
+        law_member::states | law_member::voltage_states | law_member::initial | law_member::relaxation;
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = true;
     Resistance<S> r_ohm;

@@ -15,6 +15,7 @@ struct InitialSoc {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::none;
     Soc<S> shift;
 
     template <class Real>

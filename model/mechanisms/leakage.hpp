@@ -16,6 +16,7 @@ struct Leakage {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::counted;
     Current<S> lost_a;
 
     template <class Real>

@@ -42,6 +42,9 @@ struct OcvHysteresis {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::apply_state | law_member::states | law_member::voltage_states |
+                                          law_member::initial | law_member::relaxation | law_member::initial_sigma_v |
+                                          law_member::steady_state_sigma_v;
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = true;
     Voltage<S> half_gap_v, ocv_at_v, initial_v;

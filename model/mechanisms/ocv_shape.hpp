@@ -21,6 +21,7 @@ struct OcvShape {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::ocv_soc | law_member::ocv_soc_slope;
     Soc<S> low, high;
 
     template <class Real>

@@ -16,6 +16,7 @@ struct PolarisationGrowth {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables;
     Factor<S> r1_times, c1_times;
 
     template <class Real>

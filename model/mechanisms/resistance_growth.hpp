@@ -15,6 +15,7 @@ struct ResistanceGrowth {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables;
     Factor<S> factor;
 
     template <class Real>

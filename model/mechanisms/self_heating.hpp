@@ -25,6 +25,8 @@ struct SelfHeating {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::apply_state | law_member::states | law_member::voltage_states |
+                                          law_member::state_unit | law_member::initial | law_member::relaxation;
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = false;
     static constexpr StateUnit state_unit{"k", 100};

@@ -33,6 +33,8 @@ struct SlowPolarisation {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::soc_shift_per_v | law_member::states |
+                                          law_member::voltage_states | law_member::initial | law_member::relaxation;
     static constexpr std::size_t states = 2;
     static constexpr bool voltage_states = true;
     std::array<Resistance<S>, 2> r_ohm{};

@@ -29,6 +29,7 @@ struct TemperatureResistance {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables | law_member::resistances_follow_temperature;
     static constexpr bool resistances_follow_temperature = true;
     Factor<S> r0_energy, r1_energy;  ///< over R T_ref
     Temperature<S> reference_c;

@@ -18,6 +18,7 @@ struct TemperatureSensor {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::true_temperature;
     Temperature<S> offset_k;
     Duration<S> lag_s;
 

@@ -15,6 +15,7 @@ struct VoltageGain {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::reading;
     Factor<S> factor;
 
     template <class Real>

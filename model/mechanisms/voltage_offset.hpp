@@ -15,6 +15,7 @@ struct VoltageOffset {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::reading;
     Voltage<S> offset_v;
 
     template <class Real>
