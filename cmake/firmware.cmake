@@ -7,6 +7,7 @@
 #   bms_<board>_bench.elf       the application of an emulated board for the chip: with clock tree, ends in a reset
 #   bms_<board>_fault.elf       tests/firmware/fault_image.cpp, built on request
 #   bms_<board>_pack.elf        tests/firmware/pack_image.cpp, built on request
+#   bms_<board>_filter_forms.elf  tests/firmware/filter_forms_image.cpp, built on request, needs Eigen
 #   bms_<board>_protection.elf  tests/firmware/protection_image.cpp, built on request
 #
 # A board that QEMU emulates (BMS_EMULATED ON) has all but the remote image. Another board has the first two, and the
@@ -197,3 +198,8 @@ endfunction()
 bms_test_image(fault -Os)
 bms_test_image(pack -O2 ${cell_header})
 bms_test_image(protection -O2)
+find_path(BMS_EIGEN Eigen/Core PATHS /usr/include/eigen3 NO_CMAKE_FIND_ROOT_PATH)
+if(BMS_EIGEN)
+  bms_test_image(filter_forms -O2 ${cell_header})
+  target_include_directories(filter_forms_image SYSTEM PRIVATE ${BMS_EIGEN})
+endif()

@@ -64,6 +64,8 @@ const char* ending(Image image) {
       return "_bench";
     case Image::fault:
       return "_fault";
+    case Image::filter_forms:
+      return "_filter_forms";
     case Image::pack:
       return "_pack";
     case Image::protection:

@@ -141,6 +141,15 @@ std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedB
           {"RAM of the whole application, without stack [bytes]", number(f.image_ram)}};
 }
 
+std::vector<std::pair<std::string, StepCost>> filter_form_costs(const images::EmulatedBoard& board,
+                                                                const files::CellFile& cell) {
+  const auto image = images::firmware_image(board.name, cell, images::Image::filter_forms);
+  return {{"U-D factors, `ud_covariance.hpp`", count_instructions(board, image, "bms::firmware::ud_step(")},
+          {"Eigen, Joseph form", count_instructions(board, image, "bms::firmware::eigen_joseph_step(")},
+          {"Eigen, plain form, which can lose its positive variances",
+           count_instructions(board, image, "bms::firmware::eigen_plain_step(")}};
+}
+
 std::vector<std::pair<std::string, double>> protection_figures(const images::EmulatedBoard& board,
                                                                const files::CellFile& cell) {
   const auto image = images::firmware_image(board.name, cell, images::Image::protection);

@@ -48,6 +48,11 @@ std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedB
                                                          const files::CellFile& cell,
                                                          const std::vector<measurement::Sample>& samples);
 
+/// The same filter with its covariance in three forms (tests/firmware/filter_forms_image.cpp): what it is, and its
+/// cost.
+std::vector<std::pair<std::string, StepCost>> filter_form_costs(const images::EmulatedBoard& board,
+                                                                const files::CellFile& cell);
+
 /// Rows of the table in protection/README.md.
 std::vector<std::pair<std::string, double>> protection_figures(const images::EmulatedBoard& board,
                                                                const files::CellFile& cell);
