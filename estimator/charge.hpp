@@ -1,11 +1,10 @@
-// The charge in a cell, counted in integers: a float32 sum of 10 mA over 10 ms into a cell of 6 Ah would stay where it
-// is.
+// The charge of a cell, counted in integers. A float32 sum of 10 mA over 10 ms into a cell of 6 Ah would never change.
 //
 //   charge += current_ua * duration_us        exact, in 1e-12 A s
 //   soc     = charge / capacity               read in counts of 2^shift (model::ChargeScale), below 4e-9
 //
-// Held within -1/4 .. 5/4 of the capacity: nothing overflows however long a sensor lies (asserted below).
-// A dual number (an unknown of a fit) keeps its derivatives instead: Charge<Jet> sums in Jets.
+// The charge is clamped to -1/4 .. 5/4 of the capacity: nothing overflows, however long a sensor is wrong (asserted
+// below). A dual number (an unknown of a fit) keeps its derivatives instead: Charge<Jet> sums in Jets.
 #pragma once
 
 #include <concepts>
@@ -21,12 +20,12 @@ namespace charge_ranges {
 
 using namespace model;
 inline constexpr double largest_uaus = accepted::capacity_ah.high * 3'600e12;
-static_assert(max_soc * largest_uaus + max_soc * largest_uaus < 0x1p63, "full, and corrected as far as it can be");
+static_assert(max_soc * largest_uaus + max_soc * largest_uaus < 0x1p63, "full, plus the largest correction");
 static_assert(max_soc * largest_uaus + 0x1p31 * longest_count_us < 0x1p63,
-              "full, and the largest current for as long as can be counted at once");
+              "full, plus the largest current over the longest count");
 static_assert(max_soc * 0x1p29 < 0x1p31, "read in counts");
 static_assert(accepted::capacity_ah.low * 3'600e12 / 0x1p32 > 5'000,
-              "the upper half tells the smallest cell's soc to a five-thousandth");
+              "the upper 32 bits resolve 1/5000 of the smallest cell");
 
 }  // namespace charge_ranges
 
@@ -44,7 +43,7 @@ class Charge {
     correct(soc, scale);
   }
 
-  /// current_ua: not below -2^31 + 1; duration_us: at most longest_count_us.
+  /// current_ua: at least -2^31 + 1; duration_us: at most longest_count_us.
   constexpr void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
     uaus_ += arithmetic::wide_product(current_ua, static_cast<std::int32_t>(duration_us));
     limit_soc(scale);
@@ -68,7 +67,7 @@ class Charge {
  private:
   static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
     const Soc most(model::max_soc);
-    const Soc clamped = delta > most ? most : delta < -most ? -most : delta;
+    const Soc clamped = arithmetic::clamped(delta, most);
     if constexpr (arithmetic::is_q<Soc>) {
       return Soc(clamped * scale.counts_per_soc).raw();
     } else {
@@ -76,8 +75,8 @@ class Charge {
     }
   }
 
-  /// 1/2 with the sign of x. A builtin, because it takes the sign without a branch, which noise would mispredict every
-  /// other time.
+  /// 1/2 with the sign of x. A builtin copies the sign without a branch; a branch on noise would be mispredicted every
+  /// second time.
   static constexpr Soc half_signed(Soc x) {
     if constexpr (std::same_as<Soc, float>)
       return __builtin_copysignf(0.5F, x);
@@ -86,7 +85,7 @@ class Charge {
   }
 
   constexpr void limit_soc(const Scale& scale) {
-    // the upper half tells, to less than a five-thousandth of the smallest cell
+    // the upper 32 bits are enough: they resolve 1/5000 of the smallest cell
     const auto upper = static_cast<std::uint32_t>(uaus_ >> 32),
                lowest = static_cast<std::uint32_t>(scale.lowest_uaus >> 32);
     if (upper - lowest < static_cast<std::uint32_t>(scale.highest_uaus >> 32) - lowest) [[likely]]

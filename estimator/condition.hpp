@@ -1,9 +1,8 @@
-// What a display, a vehicle and a workshop want to know beside an estimate: how soc is known, a soc that never jumps,
-// what current can be given and taken, what is left of capacity and resistance. One place that asks each of them with
-// every sample.
+// What a display, a vehicle and a workshop need in addition to an estimate: the quality of the SOC, a SOC that never
+// jumps, the current limits, the remaining capacity and the resistance. Each sample updates them all here.
 //
-// Cost: two look-ups of the tables a sample; the current limits, 64 steps of the model, once a second while anybody
-// asks.
+// Cost: two table look-ups a sample. The current limits take 64 steps of the model, once a second while they are
+// wanted.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +22,7 @@ class Condition {
   using S = typename Estimator::Scalar;
   using Model = typename Estimator::Model;
 
-  /// After the estimator's step with the same sample. limits_wanted: whether anybody asks for them.
+  /// Call it after the estimator's step with the same sample. limits_wanted: whether the current limits are needed.
   template <class Cell, class State>
   constexpr void update(const Cell& cell, const measurement::Sample& sample, const Estimate<S>& estimate,
                         const State& state, bool limits_wanted) {
@@ -56,10 +55,10 @@ class Condition {
       limited_us_ = sample.time_us;
       const Voltage<S> margin_v = root<Voltage<S>>(at.error_v2),
                        most_v = (cell.limits.voltage_max_v - cell.limits.voltage_min_v) * Fraction<S>(0.125);
-      const Voltage<S> held_v = margin_v < most_v ? margin_v : most_v;
+      const Voltage<S> kept_v = margin_v < most_v ? margin_v : most_v;
       const auto limits = [&](int duration_s) __attribute__((noinline)) {
         return current_limits<Model>(cell, x, estimate.soc, estimate.soc_sigma, input.temperature_c,
-                                     TimeStep<S>(duration_s), held_v);
+                                     TimeStep<S>(duration_s), kept_v);
       };
       limits_now_ = limits(1);
       limits_10s_ = limits(10);
@@ -68,8 +67,8 @@ class Condition {
 
   constexpr const typename SocQuality<S>::Result& quality() const { return soc_quality_; }
   constexpr const arithmetic::Soc<S>& display_soc() const { return display_soc_; }
-  constexpr bool limits_known() const { return limits_known_; }                 ///< whether they have been reckoned
-  constexpr const CurrentLimits<S>& limits_now() const { return limits_now_; }  ///< for a second
+  constexpr bool limits_known() const { return limits_known_; }                 ///< whether they have been computed
+  constexpr const CurrentLimits<S>& limits_now() const { return limits_now_; }  ///< for one second
   constexpr const CurrentLimits<S>& limits_10s() const { return limits_10s_; }
   constexpr Health<S> capacity() const { return capacity_.health(); }
   constexpr Health<S> resistance() const { return resistance_.health(); }

@@ -1,8 +1,8 @@
-// Whether a current sensor reads nothing but its own offset: while the circuit is open, that is its reading.
+// Finds out whether a current sensor reads only its own offset: while the circuit is open, the reading is the offset.
 //
-// A reading rests when for a minute it stays within `still` of where it began and is small enough to be an offset. What
-// may still flow then, the cell file says (noise.current_at_rest_a: a cell tester's leakage, a vehicle's electronics
-// beside an open contactor); where it says 0, nobody knows, and small currents are believed as they are.
+// A reading rests if it stays within `still_ua` of its start for one minute and is small enough to be an offset. The
+// cell file says what may still flow then (noise.current_at_rest_a: leakage of a cell tester, a vehicle's electronics
+// in parallel to an open contactor). If this value is 0, it is unknown, and small currents are taken as they are.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,10 @@ namespace bms::estimator {
 class CurrentAtRest {
  public:
   static constexpr std::uint32_t min_rest_us = 60'000'000;
-  static constexpr std::uint32_t correlation_s =
-      600;  ///< what flows in a rest is the same for so long: it is told once
+  /// The current that flows at rest is constant for so long: it counts as one measurement.
+  static constexpr std::uint32_t correlation_s = 600;
 
-  /// With every measured current; true: it rests.
+  /// To be called with every measured current. Returns true if it rests.
   constexpr bool is_at_rest(std::int32_t current_ua, std::uint64_t step_us, const model::RestingCurrent& limits) {
     const bool small = current_ua <= limits.largest_ua && current_ua >= -limits.largest_ua;
     const bool still = small && rest_us_ != 0 && current_ua - start_ua_ <= limits.still_ua &&
@@ -34,7 +34,7 @@ class CurrentAtRest {
 
  private:
   std::int32_t start_ua_ = 0;
-  std::uint32_t rest_us_ = 0;  ///< 0: it moves
+  std::uint32_t rest_us_ = 0;  ///< 0: the current moves
 };
 
 }  // namespace bms::estimator

@@ -1,11 +1,11 @@
-// What a cell can give and take for a while without leaving its limits of use (state of function), by the very model
-// that the filter steps: the constant current that ends at a voltage limit, found by halving; no more than the cell
-// file allows anyway.
+// State of function: the current that a cell can deliver or accept for a given time within its limits. It is computed
+// with the model that the filter steps: bisection finds the constant current that ends at a voltage limit. The result
+// is at most the current limit of the cell file.
 //
-//   V(I, t) = voltage of the model after t seconds of I from the present state, soc moved by I t
+//   V(I, t) = voltage of the model after t seconds of I from the present state, with the SOC moved by I t
 //
-// V rises with I. Cost: 2 x 16 steps of the model without its covariance, so it is asked for when it is told, not with
-// every sample.
+// V rises with I. Cost: 2 x 16 steps of the model without its covariance, so the limits are computed when they are
+// needed, not with every sample.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ struct CurrentLimits {
   arithmetic::Current<S> discharge_a{}, charge_a{};  ///< both >= 0
 };
 
-/// x: of the filter. off: how far soc may be off, e.g. its standard deviation: what is drawn is reckoned from the
-/// lower, what is charged from the higher. duration_s: how long the current lasts, above 0. margin_v: by how much less
-/// than the limits the voltage may reach, e.g. one standard deviation of the model's error.
+/// x: state of the filter. off: possible error of soc, e.g. its standard deviation; discharge starts from soc - off,
+/// charge from soc + off. duration_s: of the current, > 0. margin_v: distance of the voltage from its limits, e.g. one
+/// standard deviation of the model's error.
 template <class Model, class Cell, class S = typename Cell::Scalar>
 constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model::State& x,
                                           const arithmetic::Soc<S>& soc, const arithmetic::Soc<S>& off,
@@ -41,7 +41,7 @@ constexpr CurrentLimits<S> current_limits(const Cell& cell, const typename Model
     return Voltage<S>(
         Model::voltage(laws, Model::advance(x, at, Model::discretise(laws, x, at, input), input), at, input));
   };
-  /// The largest current of that sign, up to most, that is good; 0 where none is.
+  /// The largest current up to most_a that is good; 0 if no current is.
   const auto largest = [&](const Current<S>& most_a, const auto& good) {
     if (good(most_a)) return most_a;
     Current<S> low_a(0), high_a = most_a;

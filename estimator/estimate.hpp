@@ -1,4 +1,4 @@
-// What the estimator says after each sample.
+// The output of the estimator after each sample.
 #pragma once
 
 #include <array>
@@ -10,19 +10,19 @@
 
 namespace bms::estimator {
 
-/// Why an estimate is worth less than usual; several at once are or-ed. Bits 0-7: the sample; 8-15: the estimator.
+/// Why an estimate is less accurate than usual; several reasons are or-ed. Bits 0-7: the sample; 8-15: the estimator.
 enum Flag : std::uint32_t {
   voltage_missing = 1U << 0,
-  voltage_implausible = 1U << 1,  ///< outside what the cell can have
-  voltage_stuck = 1U << 2,        ///< the same reading while the model moves
+  voltage_implausible = 1U << 1,  ///< outside the range that the cell can have
+  voltage_stuck = 1U << 2,        ///< the reading stays the same while the model's voltage changes
   current_missing = 1U << 3,
   current_implausible = 1U << 4,
-  time_gap = 1U << 5,             ///< more than ten times the usual step: charge in between is uncertain
+  time_gap = 1U << 5,             ///< more than ten times the usual step: the charge in between is uncertain
   time_not_increasing = 1U << 6,  ///< the sample was ignored
   not_started = 1U << 8,          ///< no usable voltage yet and no starting point
   soc_ambiguous = 1U << 9,        ///< more than one state of charge fits the voltages so far; soc_sigma spans them
-  voltage_rejected =
-      1U << 10,  ///< far from all that the model can explain: not used; when it lasts, soc is sought anew
+  /// Far from every voltage that the model can explain, so not used. If this persists, the SOC is estimated again.
+  voltage_rejected = 1U << 10,
 };
 
 template <class S>
@@ -30,25 +30,25 @@ struct Estimate {
   arithmetic::Soc<S> soc{};                      ///< fraction, after the correction by this sample's voltage
   arithmetic::Soc<S> soc_sigma{};                ///< its standard deviation
   arithmetic::Voltage<S> v_rc_v{};               ///< after the correction
-  arithmetic::Voltage<S> voltage_predicted_v{};  ///< before it: what the model expected of this sample
+  arithmetic::Voltage<S> voltage_predicted_v{};  ///< before it: the voltage that the model expected
   std::uint32_t flags = 0;                       ///< Flag
 };
 
-/// The same with what the filter of an extended cell knows besides (model/extended_rc.hpp), after the correction: where
-/// errors are states, the voltage's [V], the current's offset [part of the capacity per hour] and its standard
-/// deviation; then the mechanisms' states.
+/// An estimate with the other states of an extended cell (model/extended_rc.hpp), after the correction: if errors are
+/// states, the voltage error [V], the current offset [capacity per hour] and its standard deviation; then the states of
+/// the mechanisms.
 template <class S, std::size_t N>
 struct ExtendedEstimate : Estimate<S> {
   std::array<arithmetic::Voltage<S>, N> extra{};
 };
 
-/// Number of 32-bit words of an estimate, and their names in that order: the unit of comparison between host and board.
+/// Number of 32-bit words of an estimate, and their names in that order: host and board are compared word by word.
 inline constexpr std::size_t estimate_words = 5;
 inline constexpr std::array<const char*, estimate_words> estimate_word_names = {"soc", "soc_sigma", "v_rc_v",
                                                                                 "voltage_predicted_v", "flags"};
 using EstimateWords = std::array<std::uint32_t, estimate_words>;
 
-/// One number of an estimate as the bits that both sides must share.
+/// The bits of one number of an estimate. Host and board must agree in them.
 template <class T>
 constexpr std::uint32_t word(const T& value) {
   if constexpr (arithmetic::is_q<T>) {
@@ -64,7 +64,7 @@ constexpr EstimateWords words(const Estimate<S>& e) {
   return {word(e.soc), word(e.soc_sigma), word(e.v_rc_v), word(e.voltage_predicted_v), e.flags};
 }
 
-/// What is known besides comes after the others.
+/// The other states follow the five words.
 template <class S, std::size_t N>
 constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEstimate<S, N>& e) {
   std::array<std::uint32_t, estimate_words + N> all{};
@@ -74,8 +74,8 @@ constexpr std::array<std::uint32_t, estimate_words + N> words(const ExtendedEsti
   return all;
 }
 
-/// A number for all estimates of a run: two runs that agree in it were equal in every bit. FNV-1a, 32 bits, over the
-/// words, low byte first (G. Fowler, L. Noll, K. Vo, draft-eastlake-fnv).
+/// Hash of all estimates of a run, to compare two runs. FNV-1a, 32 bits, over the words, low byte first (G. Fowler,
+/// L. Noll, K. Vo, draft-eastlake-fnv).
 class EstimateHash {
  public:
   template <std::size_t N>

@@ -1,15 +1,14 @@
-// State of health from ordinary use: what capacity and resistances are now, against the cell file, each with a standard
+// State of health from ordinary use: present capacity and resistance relative to the cell file, each with a standard
 // deviation.
 //
-//   capacity     between two visits to parts of the OCV curve that are steep, the counted charge over the difference of
-//   soc that the
-//                voltage told there: moved / (soc_b - soc_a). What counting may have lost meanwhile widens it.
-//   resistances  at edges of the current, what the voltage moved more than the model said, over what the model said
-//   falls off over
-//                R0 and what R1 has charged up to: (e_k - e_k-1) / (drop_k - drop_k-1)
+//   capacity     between two visits to steep parts of the OCV curve: counted charge over the difference of the SOCs
+//   that
+//                the voltages gave, moved / (soc_b - soc_a). Possible errors of the counting widen its sigma
+//   resistance   at current edges: change of the voltage beyond the model's, over the change of the drop that the model
+//                computes for R0 and the charged part of R1, (e_k - e_k-1) / (drop_k - drop_k-1)
 //
-// Each is a random constant that a scalar Kalman filter narrows; no more than a floor, because errors of the tables
-// last.
+// Each is a random constant that a scalar Kalman filter estimates. Its sigma has a lower limit, because errors of the
+// tables persist.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,7 @@
 
 namespace bms::estimator {
 
-/// Against the cell file: 1 is as new.
+/// Relative to the cell file: 1 is as new.
 template <class S>
 struct Health {
   arithmetic::Factor<S> ratio{1};
@@ -32,21 +31,21 @@ class CapacityHealth {
   using Fraction = arithmetic::Fraction<S>;
 
  public:
-  static constexpr double initial_sigma = 0.1;  ///< one sigma of a cell nobody has measured
+  static constexpr double initial_sigma = 0.1;  ///< standard deviation for an unmeasured cell
   static constexpr double min_sigma = 0.003;
-  static constexpr double known_soc = 0.02;      ///< voltages that tell soc no better are left out
-  static constexpr double min_moved_soc = 0.3;   ///< of the capacity, between two visits
-  static constexpr double max_visit_soc = 0.05;  ///< of the capacity
+  static constexpr double known_soc = 0.02;      ///< voltages that give the SOC less accurately are not used
+  static constexpr double min_moved_soc = 0.3;   ///< between two visits
+  static constexpr double max_visit_soc = 0.05;  ///< charge moved during one visit
   static constexpr std::uint16_t min_readings = 10;
 
-  /// One reading. soc: as estimated; off: by how much its voltage alone says otherwise, along the slope there;
-  /// variance: of that; usable: whether it may be asked; counted: how far the charge moved soc since the last call,
-  /// lost2: variance of that.
+  /// One reading. soc: estimate; off: SOC by the voltage alone minus soc, along the slope there; variance: of that SOC;
+  /// usable: whether the voltage may be used; counted: change of the SOC by the counted charge since the last call;
+  /// lost2: variance of counted.
   constexpr void update(const Soc& soc, const Soc& off, const Variance& variance, bool usable, const Soc& counted,
                         const Variance& lost2) {
     moved_ = Soc(moved_ + counted);
     if (reference_.readings > 0) reference_.variance = Variance(reference_.variance + lost2);
-    // farther away the slope is another
+    // further away the slope differs
     const bool good =
         usable && variance < Variance(known_soc * known_soc) && arithmetic::magnitude(off) < Soc(known_soc);
     const Soc voltage_soc = Soc(soc + off);
@@ -75,7 +74,8 @@ class CapacityHealth {
     here_ = {};
     if (visit.readings < min_readings) return;
     if (reference_.readings == 0) return set_reference(visit);
-    const Soc moved = Soc(visit.moved - reference_.moved), apart = Soc(visit.voltage_soc - reference_.voltage_soc);
+    const Soc moved = Soc(visit.moved - reference_.moved);
+    const Soc apart = Soc(visit.voltage_soc - reference_.voltage_soc);
     if (arithmetic::magnitude(moved) < Soc(min_moved_soc) || arithmetic::magnitude(apart) < Soc(min_moved_soc / 2)) {
       if (visit.variance < reference_.variance) set_reference(visit);
       return;
@@ -94,7 +94,7 @@ class CapacityHealth {
   }
   constexpr void set_reference(const Visit& visit) {
     reference_ = visit;
-    // only differences count: they stay small
+    // only differences matter; this keeps the numbers small
     moved_ = Soc(moved_ - visit.moved);
     begun_ = Soc(begun_ - visit.moved);
     reference_.moved = Soc(0);
@@ -114,13 +114,13 @@ class ResistanceHealth {
   using Soc = arithmetic::Soc<S>;
 
  public:
-  static constexpr double initial_sigma = 0.3;  ///< one sigma
+  static constexpr double initial_sigma = 0.3;  ///< standard deviation for an unmeasured cell
   static constexpr double min_sigma = 0.01;
-  static constexpr double table_sigma = 0.05;  ///< what the tables are wrong by at any one soc and temperature
+  static constexpr double table_sigma = 0.05;  ///< error of the tables at one SOC and temperature
   static constexpr double min_edge_v = 0.003;
 
-  /// A reading one step after the last one. innovation_v: measured less predicted; drop_v: what falls off over R0 and
-  /// what of R1's has built up within the step, as the model has it; reading_v2: variance of a reading.
+  /// A reading one step after the last one. innovation_v: measured minus predicted; drop_v: over R0 and the part of R1
+  /// that was charged within the step, by the model; reading_v2: variance of a reading.
   constexpr void update(const Voltage& innovation_v, const Voltage& drop_v, const Variance& reading_v2) {
     const Voltage more_v = innovation_v - innovation_v_, edge_v = drop_v - drop_v_;
     const bool edge = follows_ && arithmetic::magnitude(edge_v) > Voltage(min_edge_v);
@@ -139,7 +139,7 @@ class ResistanceHealth {
     const auto least = Variance(min_sigma * min_sigma);
     if (variance_ < least) variance_ = least;
   }
-  /// The next reading does not follow the last one: a gap, or no voltage.
+  /// The next reading does not follow the last one, because of a gap or a missing voltage.
   constexpr void interrupt() { follows_ = false; }
 
   constexpr Health<S> health() const {

@@ -1,14 +1,16 @@
-// The cells of a pack: one full estimator follows their mean, and what makes each another is estimated beside it
-// (cell_differences.hpp).
+// The cells of a pack: one full estimator follows the mean cell, and the difference of each cell from it is estimated
+// separately (cell_differences.hpp).
 //
-//   const measurement::Sample mean = mean_cell(sample, cell.plausible);     what the estimator of the mean cell is
-//   given: integers, the same everywhere cells.update(cell, sample, estimate);                      after its step
+//   const measurement::Sample mean = mean_cell(sample, cell.plausible);   input of the mean cell's estimator; integers,
+//                                                                         equal on every core
+//   cells.update(cell, sample, estimate);                                 after its step
 //
-// A cell whose reading cannot be one does not count, nor does one that is far from the middle one (a broken wire, a
-// converter that is stuck); one that is off counts as if it were 0.1 V off, so that no cell alone moves the mean by
-// much. Where no cell can be read, the pack's own voltage over their number stands in.
+// The mean leaves out implausible readings and readings far from the median (a broken wire, a stuck converter). A
+// reading that is off counts as 0.1 V off at most, so that no cell alone moves the mean by much. If no cell can be
+// read, the pack voltage over the number of cells is used.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -23,10 +25,11 @@ constexpr bool is_plausible(std::int32_t uv, const model::PlausibleRange& plausi
   return uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv;
 }
 
-inline constexpr std::int32_t outlier_uv = 300'000;        ///< from the middle cell: no cell of the same pack
-inline constexpr std::int32_t max_deviation_uv = 100'000;  ///< as much of it counts
+inline constexpr std::int32_t outlier_uv = 300'000;        ///< from the median: not a reading of the same pack
+inline constexpr std::int32_t max_deviation_uv = 100'000;  ///< of a reading from the median, as it counts in the mean
 
-/// The middle one of those that can be read; of an even number, the lower. measurement::no_reading: there is none.
+/// Median of the plausible readings; of an even number, the lower one. measurement::no_reading if no reading is
+/// plausible.
 template <std::size_t Cells>
 constexpr std::int32_t median_cell_uv(const measurement::PackSample<Cells>& pack,
                                       const model::PlausibleRange& plausible) {
@@ -41,35 +44,36 @@ constexpr std::int32_t median_cell_uv(const measurement::PackSample<Cells>& pack
   return count > 0 ? sorted[(count - 1) / 2] : measurement::no_reading;
 }
 
+/// The mean cell as a sample.
 template <std::size_t Cells>
 constexpr measurement::Sample mean_cell(const measurement::PackSample<Cells>& pack,
                                         const model::PlausibleRange& plausible) {
   measurement::Sample mean{pack.time_us, pack.current_ua, measurement::no_reading, measurement::no_temperature};
-  std::int32_t sum_uv = 0, cells = 0, sum_cdegc = 0,
-               sensors = 0;  // plausible is below 6 V: 16 of them are far from the end
+  std::int32_t sum_uv = 0, cells = 0;  // plausible readings are below 6 V: 16 of them are far from the end of 32 bits
+  std::int32_t sum_cdegc = 0, sensors = 0;
   const std::int32_t median_uv = median_cell_uv(pack, plausible);
   for (const std::int32_t uv : pack.cell_uv) {
     const std::int32_t off_uv = is_plausible(uv, plausible) ? uv - median_uv : outlier_uv;
     if (off_uv >= outlier_uv || off_uv <= -outlier_uv) continue;
-    sum_uv += median_uv + (off_uv > max_deviation_uv    ? max_deviation_uv
-                           : off_uv < -max_deviation_uv ? -max_deviation_uv
-                                                        : off_uv);
+    sum_uv += median_uv + std::clamp(off_uv, -max_deviation_uv, max_deviation_uv);
     ++cells;
   }
   for (const std::int16_t cdegc : pack.temperature_cdegc) {
-    if (measurement::temperature_possible(cdegc)) sum_cdegc += cdegc, ++sensors;
+    if (!measurement::temperature_possible(cdegc)) continue;
+    sum_cdegc += cdegc;
+    ++sensors;
   }
   if (cells > 0)
     mean.voltage_uv = sum_uv / cells;
   else if constexpr (Cells == 1)
-    mean.voltage_uv = pack.cell_uv[0];  // the estimator says what is wrong with it
+    mean.voltage_uv = pack.cell_uv[0];  // the estimator flags what is wrong with it
   else if (pack.pack_uv != measurement::no_reading)
     mean.voltage_uv = pack.pack_uv / static_cast<std::int32_t>(Cells);
   if (sensors > 0) mean.temperature_cdegc = static_cast<std::int16_t>(sum_cdegc / sensors);
   return mean;
 }
 
-/// A pack of one cell as it is measured without a monitor.
+/// The sample of a single cell as the sample of a pack.
 constexpr measurement::PackSample<1> single_cell_pack(const measurement::Sample& s) {
   measurement::PackSample<1> pack;
   pack.time_us = s.time_us;
@@ -80,10 +84,11 @@ constexpr measurement::PackSample<1> single_cell_pack(const measurement::Sample&
   return pack;
 }
 
+/// The differences of all cells, updated with samples of the pack.
 template <class S, std::size_t Cells>
 class PackCells {
  public:
-  /// After the mean cell's step with the same sample.
+  /// Call it after the mean cell's step with the same sample.
   template <class Cell>
   constexpr void update(const Cell& cell, const measurement::PackSample<Cells>& pack, const Estimate<S>& mean) {
     using namespace model;
@@ -110,7 +115,7 @@ class PackCells {
                       correlated_samples > Count<S>(1) ? correlated_samples : Count<S>(1), observation);
   }
 
-  /// What is known of a cell from before: soc less the mean's, and how far to believe it.
+  /// Starts cell k from a stored difference: SOC minus the mean's, and its standard deviation.
   constexpr void begin(std::size_t k, const arithmetic::Soc<S>& soc, const arithmetic::Soc<S>& sigma) {
     differences_.begin(k, soc, sigma);
   }

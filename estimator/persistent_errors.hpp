@@ -41,8 +41,8 @@ class PersistentErrorsInSigma {
                                       const arithmetic::TimeStep<S>& duration_s) {
     return white + arithmetic::product<Variance>(noise.walk_soc2_per_s, duration_s);
   }
-  /// Variance of the model's voltage error that is no state of the filter. error_v2: all of it at this SOC;
-  /// soc_axis_v2(): its part from the SOC axis of the tables.
+  /// Variance of that part of the model's voltage error which the filter does not estimate. error_v2: all of it at this
+  /// SOC; soc_axis_v2(): its part from the SOC axis of the tables.
   template <class F>
   static constexpr Variance error_in_noise(const Noise&, const Variance& error_v2, F&&) {
     return error_v2;

@@ -1,18 +1,18 @@
-// Where soc may be while a voltage leaves several answers: a grid of hypotheses that all move with the charge that is
-// counted, each with what the voltages so far speak against it. A straight line through the OCV curve, which is what a
-// Kalman filter lays, would pick one of them and be sure of it.
+// Hypotheses over the state of charge, while a voltage fits several values: a grid of SOCs that all move with the
+// counted charge, each with a misfit that sums up what the voltages say against it. A straight line through the OCV
+// curve, as a Kalman filter uses it, would choose one of them and be certain.
 //
-//   e_k = |v - V(soc_k) - b_k| - w_k           beyond half a step of the grid on the curve, w_k
+//   e_k = |v - V(soc_k) - b_k| - w_k           beyond w_k, half a step of the grid on the curve
 //   misfit_k += e_k^2 / (2 (p + r)) + ln r / 2         b_k += p / (p + r) e_k
 //
-// The model's error is a lasting one, b, and each hypothesis has its own, of standard deviation noise.model_v at first:
-// what is off by as much for hours speaks once, and a knee of the curve that is passed, or is not, speaks for itself.
-// r: what is new in every correlation time: where the curve is steep it is large, so nothing there is far off; that it
-// could be anything is what speaks against it, ln r. The variance of b, p, is the same for all.
+// The model's error persists: each hypothesis has its own bias b_k, with the standard deviation noise.model_v at first.
+// A constant deviation over hours therefore counts once, and crossing a knee of the curve, or not, decides. r is the
+// variance that is uncorrelated after one correlation time. Where the curve is steep, r is large, so every voltage fits
+// there; the term ln r compensates for this. The variance p of the biases is the same for all hypotheses.
 //
-// In turns, a point at a time: `points` samples add to the misfits, as many sum the weights exp(-misfit) up, then mean
-// and variance are known anew. So a step costs the same whenever it comes. (The point-mass filter of R. Bucy and K.
-// Senne, Automatica 7 (1971) 287, on one state whose motion is known.)
+// One point is processed per sample: during `points` samples the misfits are updated, during the next `points` the
+// weights exp(-misfit) are summed; then mean and variance are computed. So every step costs the same. (The point-mass
+// filter of R. Bucy and K. Senne, Automatica 7 (1971) 287, on one state whose motion is known.)
 //
 // Memory: 8 bytes a point, one bank for an estimator.
 #pragma once
@@ -32,20 +32,20 @@ class SocBank {
   using Variance = arithmetic::Variance<S>;
   using Fraction = arithmetic::Fraction<S>;
   using Exponent = arithmetic::Exponent<S>;
-  using Misfit = arithmetic::Current<S>;  // to 2,048 in 32 bits
+  using Misfit = arithmetic::Current<S>;  // below 2,048 in 32 bits
   using Sum = arithmetic::Current<S>;     // of `points` fractions
 
  public:
   static constexpr int points = 64;
   static constexpr double max_share = 1.9;            ///< largest `share` of step()
-  static constexpr double close_below_sigma = 0.025;  ///< one sigma, below which a line through the curve does as well
-  static constexpr double open_above_sigma = 0.03;    ///< and above which it does not
+  static constexpr double close_below_sigma = 0.025;  ///< sigma below which a line through the curve is as good
+  static constexpr double open_above_sigma = 0.03;    ///< sigma above which it is not
 
   constexpr bool open() const { return open_; }
   constexpr void close() { open_ = false; }
 
-  /// Begins. misfit(soc): what speaks against it so far, >= 0. mean: where the filter now has soc. persistent_variance:
-  /// of the model's error.
+  /// Starts. mean: present SOC of the filter; persistent_variance: of the model's error; misfit(soc): initial misfit,
+  /// >= 0.
   template <class F>
   constexpr void open_at(const Soc& mean, const Variance& persistent_variance, F&& misfit) {
     open_ = true;
@@ -61,21 +61,21 @@ class SocBank {
     }
   }
 
-  /// What a voltage says to one hypothesis.
+  /// A voltage as one hypothesis sees it.
   struct Observation {
-    Voltage off_v;    ///< measured less expected
+    Voltage off_v;    ///< measured minus expected
     Voltage half_v;   ///< half a step of the grid on the curve
-    Variance new_v2;  ///< variance of what is new in every correlation time
+    Variance new_v2;  ///< variance that is uncorrelated after one correlation time
   };
   struct BankUpdate {
     bool ready = false;
-    Soc moved{};  ///< the mean, by
+    Soc moved{};  ///< change of the mean
     Variance variance{};
   };
 
-  /// One sample. soc: where the filter has it, mean and what was counted since; share: of a correlation time that
-  /// passes in 2 points samples, 1.9 at most; white_v2: of the reading; persistent_variance as above, forgotten in
-  /// model::persistent_error_correlations correlation times; seen(soc_k): Seen.
+  /// One sample. soc: of the filter, the mean plus the charge counted since; share: correlation times that pass in
+  /// 2 `points` samples, max_share at most; white_v2: variance of the reading; persistent_variance: as in open_at(), it
+  /// decays in model::persistent_error_correlations correlation times; observation(soc_k): Observation.
   template <class F>
   constexpr BankUpdate step(const Soc& soc, const Fraction& share, const Variance& white_v2,
                             const Variance& persistent_variance, F&& observation) {
@@ -86,7 +86,7 @@ class SocBank {
       accumulate_moments(k);
     if (++turn_ < 2 * points) return {};
     turn_ = 0;
-    // what the biases have been told, and have forgotten
+    // the biases were corrected, and decayed
     const Fraction decayed = decay_in(share), mean_gain = Fraction(gain_sum_ * Fraction(1.0 / points));
     bias_v2_ = Variance(bias_v2_ - arithmetic::product<Variance>(bias_v2_, mean_gain));
     bias_v2_ = Variance(bias_v2_ + arithmetic::product<Variance>(
@@ -105,7 +105,7 @@ class SocBank {
   static constexpr Soc grid(int k) { return Soc(arithmetic::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }
 
  private:
-  static constexpr int most = 4;  ///< that one comparison may add to a misfit
+  static constexpr int most = 4;  ///< largest increase of a misfit by one voltage
 
   static constexpr Misfit clamped(const Misfit& m) { return m > Misfit(200) ? Misfit(200) : m; }
 
@@ -113,7 +113,7 @@ class SocBank {
     return share * Fraction(1.0 / model::persistent_error_correlations);
   }
 
-  /// ln(v2 / 1 mV^2) / 2, 0 below that; straight lines between powers of four, within 0.06.
+  /// ln(v2 / 1 mV^2) / 2, and 0 below 1 mV^2; linear between powers of four, within 0.06.
   static constexpr Misfit half_log(Variance v2) {
     const auto unit = Variance(1e-6), four = Variance(4e-6);
     const auto ln_2 = Misfit(0.69314718);
@@ -126,20 +126,24 @@ class SocBank {
                      : sum;
   }
 
+  /// Part of off_v outside of +-half_v.
+  static constexpr Voltage beyond(const Voltage& off_v, const Voltage& half_v) {
+    if (off_v > half_v) return Voltage(off_v - half_v);
+    return off_v < -half_v ? Voltage(off_v + half_v) : Voltage(0);
+  }
+
   constexpr void update_misfit(std::size_t k, const Fraction& share, const Variance& white_v2,
                                const Observation& observation) {
     if (k == 0) next_least_ = Misfit(2'000);
     bias_v_[k] = Voltage(bias_v_[k] - bias_v_[k] * decay_in(share));
     const Voltage off_v = observation.off_v - bias_v_[k];
-    const Voltage beyond_v = off_v > observation.half_v    ? Voltage(off_v - observation.half_v)
-                             : off_v < -observation.half_v ? Voltage(off_v + observation.half_v)
-                                                           : Voltage(0);
+    const Voltage beyond_v = beyond(off_v, observation.half_v);
     const Variance noise_v2 = Variance(
         white_v2 + (share < Fraction(1) ? arithmetic::ratio<Variance>(observation.new_v2, share) : observation.new_v2));
     const Variance all_v2 = Variance(bias_v2_ + noise_v2);
     const auto squares = arithmetic::ratio<Exponent>(Variance(beyond_v * beyond_v), Variance(all_v2 + all_v2));
     const auto gain = arithmetic::ratio<Fraction>(bias_v2_, all_v2);
-    const bool far = squares > Exponent(most);  // as much may be one bad reading
+    const bool far = squares > Exponent(most);  // this may be one bad reading
     if (!far) bias_v_[k] = Voltage(bias_v_[k] + gain * beyond_v);
     gain_sum_ = Sum(gain_sum_ + gain);
     const Misfit width =

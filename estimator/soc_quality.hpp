@@ -1,11 +1,10 @@
-// Whether the voltage tells soc here and now, or charge counting carries it; and for how long, and over how much
-// charge, it has.
+// Whether the voltage determines the SOC now, or charge counting carries it; for how long, and over how much charge, it
+// has been carried.
 //
-//   observable   where 2 % of soc move the OCV by more than the model's error of the voltage
-//   anchored     observable, and soc known to 2 %: from here the counting starts
+//   observable   2 % of SOC change the OCV by more than the model's voltage error
+//   anchored     observable, and the SOC is known to 2 %: time and charge are counted from here
 //
-// For displays and for decisions (balance, recalibrate, allow a full charge); asked when it is told, not with every
-// sample.
+// For displays and for decisions (balance, recalibrate, allow a full charge).
 #pragma once
 
 #include <cstdint>
@@ -25,11 +24,11 @@ class SocQuality {
 
   struct Result {
     bool observable = false;
-    std::uint32_t since_anchor_s = 0;  ///< since the last anchor; since the start where there was none
-    Soc since_anchor_soc{};            ///< charge moved since, either way, in capacities; 7 at most
+    std::uint32_t since_anchor_s = 0;  ///< since the last anchor, or since the start before the first one
+    Soc since_anchor_soc{};            ///< charge moved since then in either direction, in capacities; 7 at most
   };
 
-  /// at: what the tables say at the estimate's soc under drive. counted: how far the charge moved soc since the last
+  /// at: tables at the estimate's SOC under this input. counted: change of the SOC by the counted charge since the last
   /// call.
   constexpr Result update(const Estimate<S>& estimate, const model::TablePoint<S>& at, const model::StepInput<S>& input,
                           const Soc& counted, std::uint32_t step_ms, const arithmetic::Fraction<S>& resistance_error) {
@@ -40,13 +39,13 @@ class SocQuality {
                          (estimate.flags & unobservable_flags) == 0;
     if (result_.observable && estimate.soc_sigma < Soc(known_soc)) {
       result_.since_anchor_s = 0;
-      remainder_ms_ = 0;
+      part_of_second_ms_ = 0;
       result_.since_anchor_soc = Soc(0);
       return result_;
     }
-    remainder_ms_ += step_ms;
-    result_.since_anchor_s += remainder_ms_ / 1'000;
-    remainder_ms_ %= 1'000;
+    part_of_second_ms_ += step_ms;
+    result_.since_anchor_s += part_of_second_ms_ / 1'000;
+    part_of_second_ms_ %= 1'000;
     const Soc sum = Soc(result_.since_anchor_soc + magnitude(counted));
     result_.since_anchor_soc = sum > Soc(7) ? Soc(7) : sum;
     return result_;
@@ -57,7 +56,7 @@ class SocQuality {
       voltage_missing | voltage_implausible | voltage_stuck | not_started | soc_ambiguous | voltage_rejected;
 
   Result result_;
-  std::uint32_t remainder_ms_ = 0;
+  std::uint32_t part_of_second_ms_ = 0;
 };
 
 }  // namespace bms::estimator

@@ -1,9 +1,8 @@
-// Where an estimate begins when nobody says where: the state of charge that a first voltage tells, with what it leaves
-// open.
+// The first state of charge, from a rested voltage, with the uncertainty that it leaves.
 //
-// The voltage, less half of what the present current may have built up in the RC branch, is a reading of the OCV curve
-// with a standard deviation. Every soc from 0 to 1 is held possible and weighed by how well its OCV fits; mean and
-// standard deviation of that distribution are the start. On the plateau that is a wide band, as it should be.
+// The voltage, minus half of the voltage that the present current may have built up in the RC branch, is a reading of
+// the OCV curve with a standard deviation. Every SOC from 0 to 1 is weighted by how well its OCV fits; the start is the
+// mean and standard deviation of this distribution. On the plateau that is a wide band, as it should be.
 //
 // Cost: one pass over 256 points, once.
 #pragma once
@@ -15,7 +14,7 @@
 
 namespace bms::estimator {
 
-/// A state of charge and how sure it is.
+/// A state of charge with its variance.
 template <class S>
 struct SocDistribution {
   arithmetic::Soc<S> soc;
@@ -43,15 +42,16 @@ constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at
 
 inline constexpr int start_points = 256;
 
-/// What speaks against a soc: a reading of the OCV, a belief, or both. All >= 0.
+/// Misfit of a SOC to a reading of the OCV, to a prior, or to both; >= 0.
 template <class S, class Cell>
 struct StartMisfit {
   const Cell& cell;
-  const arithmetic::Voltage<S>* ocv_v;  ///< the reading; nullptr: none
-  arithmetic::Variance<S> variance_v2;  ///< of it
-  const SocDistribution<S>* before;     ///< nullptr: none; else with a deviation of at least two points' spacing
+  const arithmetic::Voltage<S>* ocv_v;  ///< the reading; nullptr if it is missing
+  arithmetic::Variance<S> variance_v2;  ///< of the reading
+  const SocDistribution<S>*
+      before;  ///< the prior, with a standard deviation of two points' spacing or more; nullptr if it is missing
 
-  /// half_step: half the spacing of the points that it is asked for.
+  /// half_step: half the spacing of the points for which this is called.
   constexpr arithmetic::Exponent<S> operator()(const arithmetic::Soc<S>& soc, const arithmetic::Fraction<S>& half_step,
                                                std::uint8_t& interval) const {
     using namespace model;
@@ -59,30 +59,29 @@ struct StartMisfit {
     if (ocv_v != nullptr) {
       const auto at = look_up(cell, soc, interval);
       const Voltage<S> off_v = *ocv_v - at.ocv_v;
-      // half a point's width on the curve counts as uncertainty too: steep parts have few points
+      // half a point's width on the curve counts as uncertainty as well: steep parts have few points
       const Voltage<S> half_width_v = product<Voltage<S>>(ocv_slope<S>(at), half_step);
       const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
       misfit = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
     }
     if (before == nullptr) return misfit;
     const Soc<S> off = soc - before->soc;
-    const auto of_belief = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
-    const Exponent<S> mistaken(
-        8);  // one belief in 3,000 is wrong altogether: a voltage that speaks clearly against it wins
-    return Exponent<S>(misfit + (of_belief < mistaken ? of_belief : mistaken));
+    const auto of_prior = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
+    const Exponent<S> most(8);  // one prior in 3,000 is entirely wrong: a voltage that clearly contradicts it wins
+    return Exponent<S>(misfit + (of_prior < most ? of_prior : most));
   }
 };
 
-/// Mean and variance of soc.
+/// Mean and variance of the SOC, weighted by exp(-misfit).
 template <class S, class Cell>
-constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell>& speaks_against) {
+constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell>& misfit_of) {
   using namespace model;
   constexpr int points = start_points;
   const Fraction<S> spacing(1.0 / points), half_step(0.5 / points);
   const auto point = [&](int k) { return Soc<S>(Current<S>(2 * k + 1) * half_step); };
   std::uint8_t interval = 0;
-  const auto misfit = [&](int k) { return speaks_against(point(k), half_step, interval); };
-  // misfit of the best point is taken off all of them, so that a voltage outside the curve still has weights
+  const auto misfit = [&](int k) { return misfit_of(point(k), half_step, interval); };
+  // the smallest misfit is subtracted from all, so that a voltage outside the curve still has weights
   Exponent<S> least = misfit(0);
   for (int k = 1; k < points; ++k) {
     const Exponent<S> m = misfit(k);
@@ -100,7 +99,7 @@ constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell>& speaks_against
     const Fraction<S> weight = (Fraction<S>(1) - step_response<S>(Exponent<S>(misfit(k) - least))) * spacing;
     second = Variance<S>(second + weight * Fraction<S>(off * off));
   }
-  // the points' own spacing is the least that can be known
+  // the spacing of the points limits the accuracy
   const Variance<S> variance = Variance<S>(ratio<Fraction<S>>(second, weights)) + Variance<S>(spacing * spacing);
   return {mean, variance};
 }

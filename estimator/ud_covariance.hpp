@@ -1,14 +1,14 @@
-// Covariance of the state as P = U D U', U unit upper triangular, D diagonal: symmetric by construction, and positive
-// as long as every entry of D is, which each of the two operations below only ever makes from sums and quotients of
-// positive numbers. The same digits carry twice the range of P itself, so that float and fixed point are enough.
+// Covariance of the state as P = U D U', U unit upper triangular, D diagonal: symmetric by construction. P is positive
+// while every entry of D is, and both operations below compute D from sums and quotients of positive numbers only. The
+// factors need half the digits of P itself, so that float and fixed point are enough.
 //
-// propagate: P <- F P F' + diag(q), F upper triangular      modified weighted Gram-Schmidt (Thornton 1976); of the last
-// state's two columns its projection leaves one, of weight d q / (d f^2 + q) observe:   one scalar measurement z = h x
-// + noise(r)       Bierman 1977
+//   propagate   P <- F P F' + diag(q), F upper triangular      modified weighted Gram-Schmidt (Thornton 1976). The
+//               projection of the last state merges its two columns into one, with the weight d q / (d f^2 + q)
+//   observe     one scalar measurement z = h x + noise(r)      Bierman 1977
 //
 // Both as in G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation" (1977), chapters V and VI.
-// The last state's variance is D's last entry, with no arithmetic: soc's place, where nothing moves it.
-// State: N (N + 1) / 2 numbers. Cost: in estimator/README.md.
+// The last entry of D is the variance of the last state, without arithmetic; this is the SOC's place if no state acts
+// on it. Memory: N (N + 1) / 2 numbers. Cost: estimator/README.md.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ template <class S, std::size_t N>
 class UdCovariance {
   using Variance = arithmetic::Variance<S>;
   using Coupling = arithmetic::Coupling<S>;
-  using State = arithmetic::Voltage<S>;  // also soc: the same range in every scalar
+  using State = arithmetic::Voltage<S>;  // also SOC: the same range in every scalar
 
  public:
   using Matrix = std::array<std::array<Coupling, N>, N>;
@@ -34,10 +34,10 @@ class UdCovariance {
     u_ = {};
   }
 
-  /// D: what each state's variance is beside the later ones, the last one's all of it.
+  /// D: the variance of each state given the later ones; for the last state its whole variance.
   constexpr const Variances& variances() const { return d_; }
 
-  /// State K is known anew, from elsewhere: that well, and from none of the others.
+  /// Resets state K: sets its variance and removes its correlation with all other states.
   template <std::size_t K>
   constexpr void reset(const Variance& variance) {
     d_[K] = variance;
@@ -47,10 +47,10 @@ class UdCovariance {
     }
   }
 
-  /// Process noise of the last state alone, which moves no other.
+  /// Adds process noise to the last state alone.
   constexpr void add_noise_to_last(const Variance& by) { d_[N - 1] = Variance(d_[N - 1] + by); }
 
-  /// Of state K, all of it.
+  /// Whole variance of state K.
   template <std::size_t K>
   constexpr Variance variance() const {
     Variance sum = d_[K];
@@ -75,8 +75,8 @@ class UdCovariance {
       }
     }
     Variances d = d_;
-    // The last row has one entry in either block, so what it leaves of the others is alike in both: one column in place
-    // of two.
+    // The last row has one entry in each block. After its projection the remainders in both blocks are proportional, so
+    // one column replaces two.
     {
       const Coupling f_last = state[N - 1][N - 1];
       const Variance sum =
@@ -124,11 +124,11 @@ class UdCovariance {
     }
   }
 
-  /// Takes in a measurement with sensitivity h, noise variance r > 0 and innovation e (measured less predicted);
-  /// returns the correction of each state, P h' e / (h P h' + r).
+  /// Updates with a measurement: Jacobian h, noise variance r > 0, innovation e (measured minus predicted). Returns the
+  /// correction of each state, P h' e / (h P h' + r).
   constexpr std::array<State, N> observe(const Row& h, const Variance& r, const State& e) {
     std::array<Variance, N> b{};  // U D U' h', built column by column
-    Variance alpha = r;           // variance of the innovation, of the states so far
+    Variance alpha = r;           // variance of the innovation, from the states so far
     Variance per_alpha{};         // 1 / alpha
 #pragma GCC unroll 8
     for (std::size_t j = 0; j < N; ++j) {
@@ -154,7 +154,7 @@ class UdCovariance {
     return correction;
   }
 
-  /// P itself, row by row: for reports and tests.
+  /// P itself, row by row; for reports and tests.
   constexpr std::array<std::array<double, N>, N> dense() const {
     std::array<std::array<double, N>, N> p{};
     for (std::size_t i = 0; i < N; ++i) {
