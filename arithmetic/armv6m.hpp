@@ -37,8 +37,8 @@ template <int shift, int bits>
       static_cast<std::int64_t>(static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | low));
 }
 
-/// rounded_product() by halves, for 17 <= shift <= 31: the lowest 16 bits of the product are not needed, the carry of
-/// the last bit shifted out rounds. What is beyond half of the range is left to far_out().
+/// Rounded product from four 16-bit products, for 17 <= shift <= 31. The lowest 16 bits of the product are not needed;
+/// the carry of the last bit shifted out rounds. Results beyond half of the range are left to far_out().
 template <int shift, int bits>
 [[gnu::noinline, gnu::const]] inline std::int32_t rounded_by_halves(std::int32_t a, std::int32_t b) {
   std::uint32_t low, b0;

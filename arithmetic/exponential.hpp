@@ -1,12 +1,13 @@
-// 1 - exp(-x) for x >= 0: the part of a step response that has settled after x time constants.
+// 1 - exp(-x) for x >= 0: the settled part of a step response after x time constants.
 //
-// A polynomial of its own instead of libm, whose last bit differs between libraries and cores. 1 - exp(-x) rather than
-// exp(-x), because steps are short against the time constant and the difference to 1 would have lost its digits.
+// A polynomial instead of libm, whose last bit differs between libraries and cores. 1 - exp(-x) instead of exp(-x),
+// because steps are short compared with the time constant and the difference to 1 would have lost its digits.
 //
 //   x <= 1/4:  x (c0 + x (c1 + ...))         relative error 3.4e-7 for float, 1e-15 for double; fixed point: of its
-//   steps x >  1/4:  halved until it is not, then   settled(2x) = settled(x) (2 - settled(x))   as often x > 32:    1
+//   steps x >  1/4:  halved until it is not, then  settled(2x) = settled(x) (2 - settled(x))  once per halving x > 32:
+//   1
 //
-// Negative x and NaN give a value of no meaning, but end.
+// Negative x and NaN give a meaningless value, but the computation ends.
 #pragma once
 
 #include <array>
@@ -25,7 +26,7 @@ inline constexpr bool short_mantissa = std::same_as<S, float> || std::same_as<S,
 /// (1 - exp(-x)) / x on [0, 1/4], degree 3: interpolation in the Chebyshev nodes, error below 2.4e-7.
 inline constexpr std::array<double, 4> chebyshev = {0.9999997659, -0.4999699927, 0.1660622501, -0.03772897426};
 
-/// The same by its Taylor series, 1 / (n + 1)! with alternating sign; the first term left out is below 1e-17.
+/// Taylor series of the same function, 1 / (n + 1)! with alternating sign; the first omitted term is below 1e-17.
 inline constexpr std::array<double, 12> taylor = {
     1.0,         -1.0 / 2,      1.0 / 6,       -1.0 / 24,        1.0 / 120,        -1.0 / 720,
     1.0 / 5'040, -1.0 / 40'320, 1.0 / 362'880, -1.0 / 3'628'800, 1.0 / 39'916'800, -1.0 / 479'001'600};
@@ -58,13 +59,13 @@ constexpr S with_derivative(S x, const decltype(S::a)& p) {
 
 }  // namespace exponential_detail
 
-/// Beyond where the polynomial holds.
+/// Returns true if x is beyond the range of the polynomial.
 template <class S>
 constexpr bool long_step(const Fraction<S>& x) {
   return x > Fraction<S>(0.25);
 }
 
-/// x <= 1/4 only.
+/// 1 - exp(-x) for x <= 1/4.
 template <class S>
 constexpr Fraction<S> step_response_short(Fraction<S> x) {
   using F = Fraction<S>;
@@ -82,6 +83,7 @@ constexpr Fraction<S> step_response_short(Fraction<S> x) {
   return F(x * q);
 }
 
+/// 1 - exp(-x).
 template <class S>
 constexpr Fraction<S> step_response(const Exponent<S>& x) {
   using F = Fraction<S>;
@@ -94,7 +96,7 @@ constexpr Fraction<S> step_response(const Exponent<S>& x) {
   return step_response_short<S>(F(x));
 }
 
-/// After a step, at 1 / time constant: x = duration * rate is made as long as it needs to be.
+/// 1 - exp(-duration * rate); rate = 1 / time constant. The product is computed in the wider type if it is long.
 template <class S>
 constexpr Fraction<S> step_response_after(const TimeStep<S>& duration_s, const Rate<S>& rate_per_s) {
   const Fraction<S> x = duration_s * rate_per_s;

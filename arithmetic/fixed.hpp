@@ -2,10 +2,10 @@
 //
 //   Q<I, F>  holds  -2^I < value < 2^I  in steps of 2^-F,  as int32_t when I + F <= 31, else as int64_t
 //
-// A sum or a product gets a type wide enough to hold every possible result, so that arithmetic cannot overflow: it
-// would not compile. Where 63 bits are not enough, fraction bits are dropped, never integer bits. A value is narrowed
-// only when it is stored in a named type (`const Voltage v = r0 * current;`): that conversion rounds to nearest and
-// saturates at the range's end. No implicit conversion comes in from or goes out to floating point.
+// A sum or a product gets a type that holds every possible result. Arithmetic therefore cannot overflow: it would not
+// compile. If 63 bits are not enough, fraction bits are dropped, never integer bits. A value is narrowed only when it
+// is stored in a named type (`const Voltage v = r0 * current;`): this conversion rounds to nearest and saturates at the
+// end of the range. There is no implicit conversion from or to floating point.
 //
 // The same integer instructions run on every core, so the bits are equal on host and target. No 128-bit type is needed.
 // Source of the notation: Texas Instruments' Qm.n, sign bit not counted.
@@ -28,12 +28,12 @@ class Q;
 template <class A, class B>
 class Product;
 
-/// 2^exponent, 0 <= exponent < 31: a factor that only shifts.
+/// 2^exponent, 0 <= exponent < 31: a factor that is a shift.
 struct PowerOfTwo {
   std::int32_t exponent = 0;
 
   constexpr PowerOfTwo() = default;
-  /// The nearest from below, for constants and host-side conversions.
+  /// The largest power of two that is not above the value; for constants and conversions on the host.
   constexpr explicit PowerOfTwo(double value) {
     while (exponent < 30 && value >= 2) {
       value /= 2;
@@ -60,7 +60,7 @@ constexpr std::int64_t shifted(std::int64_t v, int shift) {
   return (v >> -shift) + ((v & (half * 2 - 1)) >= half ? 1 : 0);
 }
 
-/// v * 2^shift, held inside +-limit.
+/// v * 2^shift, clamped to +-limit.
 constexpr std::int64_t saturated_shift(std::int64_t v, int shift, std::int64_t limit) {
   if (shift > 0) {
     const std::int64_t room = limit >> shift;
@@ -68,10 +68,10 @@ constexpr std::int64_t saturated_shift(std::int64_t v, int shift, std::int64_t l
     if (v < -room) return -limit;
   }
   const std::int64_t r = shifted(v, shift);
-  return r > limit ? limit : r < -limit ? -limit : r;
+  return clamped(r, limit);
 }
 
-/// v * 2^up, 0 <= up < 31, held within +-limit.
+/// v * 2^up, 0 <= up < 31, clamped to +-limit.
 constexpr std::int32_t shifted_up(std::int32_t v, std::int32_t up, std::int32_t limit) {
   const std::int32_t room = limit >> up;
   if (v > room) return limit;
@@ -79,8 +79,7 @@ constexpr std::int32_t shifted_up(std::int32_t v, std::int32_t up, std::int32_t 
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(v) << up);
 }
 
-/// v, which has fewer than From bits, times 2^Shift, rounded to nearest, as a number of To bits, held within +-(2^To -
-/// 1).
+/// v, which has at most From bits, times 2^Shift, rounded to nearest, as a number of To bits, clamped to +-(2^To - 1).
 template <int From, int Shift, int To, class Raw>
 constexpr auto converted(Raw v) {
   using Out = std::conditional_t<(To <= 31), std::int32_t, std::int64_t>;
@@ -90,9 +89,9 @@ constexpr auto converted(Raw v) {
       return static_cast<Out>(static_cast<std::conditional_t<(To <= 31), std::uint32_t, std::uint64_t>>(v) << Shift);
     } else {
       constexpr auto room = static_cast<Raw>(Shift < 63 ? static_cast<std::uint64_t>(limit) >> Shift : 0);
-      return v > room    ? limit
-             : v < -room ? static_cast<Out>(-limit)
-                         : static_cast<Out>(static_cast<std::uint64_t>(v) << Shift);
+      if (v > room) return limit;
+      if (v < -room) return static_cast<Out>(-limit);
+      return static_cast<Out>(static_cast<std::uint64_t>(v) << Shift);
     }
   } else if constexpr (-Shift > From) {
     return Out{0};
@@ -106,12 +105,12 @@ constexpr auto converted(Raw v) {
         return low;
       return r < 0 ? -limit : limit;
     } else {
-      return static_cast<Out>(r > limit ? limit : r < -limit ? -limit : r);
+      return static_cast<Out>(clamped<Raw>(r, limit));
     }
   }
 }
 
-/// a * b * 2^-drop, rounded towards minus infinity, for 64 x 32 bit; the caller's types promise that the result fits.
+/// a * b * 2^-drop, rounded towards minus infinity, for 64 x 32 bit; the caller's types guarantee that the result fits.
 constexpr std::int64_t wider_product(std::int64_t a, std::int32_t b, int drop) {
   const std::int64_t high = (a >> 32) * b;                                 // |.| < 2^62
   const std::int64_t low = static_cast<std::int64_t>(a & 0xFFFFFFFF) * b;  // |.| < 2^63
@@ -143,7 +142,7 @@ class Q {
   /// Whole numbers, e.g. Q<2, 29>(1). Saturates.
   constexpr explicit Q(int whole) : raw_{static_cast<Raw>(fixed_detail::saturated_shift(whole, F, raw_limit))} {}
 
-  /// Constants and host-side conversions; saturates, NaN becomes 0. Not for the step on a core without FPU.
+  /// For constants and conversions on the host; saturates, NaN becomes 0. Not for the step on a core without FPU.
   constexpr explicit Q(double value) {
     const double scaled = value * static_cast<double>(std::uint64_t{1} << F);
     const double limit = static_cast<double>(raw_limit);
@@ -159,13 +158,13 @@ class Q {
 
   /// From another range: rounds to nearest, saturates.
   template <int I2, int F2>
-  constexpr Q(Q<I2, F2> other)  // NOLINT(google-explicit-constructor): narrowing at a named type is the idea
+  constexpr Q(Q<I2, F2> other)  // NOLINT(google-explicit-constructor): narrowing at a named type is intended
       : raw_{fixed_detail::converted<I2 + F2, F - F2, I + F>(other.raw())} {}
 
-  /// The same from a number with its own power of two.
+  /// The same from a number with its own exponent.
   constexpr Q(Scaled other) : raw_{other.in_steps(F, raw_limit)} {}  // NOLINT(google-explicit-constructor)
 
-  /// A product: the same, without its exact value in between where that would be longer.
+  /// From a product: the same, without computing its exact value first if that would take longer.
   template <class A, class B>
   constexpr Q(const Product<A, B>& product) : raw_{stored(product)} {}  // NOLINT(google-explicit-constructor)
   template <class A>
@@ -207,8 +206,8 @@ namespace fixed_detail {
 constexpr int larger(int a, int b) { return a > b ? a : b; }
 constexpr int smaller(int a, int b) { return a < b ? a : b; }
 
-/// Type that holds every sum or difference of the two. Where bits are short, one is left unused for the operands' own
-/// rounding.
+/// Type that holds every sum or difference of the two. If bits are scarce, one stays unused for the rounding of the
+/// operands.
 template <int I1, int F1, int I2, int F2>
 struct Sum {
   static constexpr int i = larger(I1, I2) + 1;
@@ -265,7 +264,7 @@ constexpr auto exact(const T& x) {
 
 }  // namespace fixed_detail
 
-/// Two factors, multiplied when it is known where the product goes: stored at once in a named type, else exactly.
+/// Two factors. They are multiplied when the destination is known: directly into a named type, else exactly.
 template <class A, class B>
 class Product {
  public:
@@ -280,7 +279,7 @@ class Product {
   B b;
 };
 
-/// By a power of two: stored in a named type it is a shift, as a number with its own exponent not even that.
+/// Product by a power of two: a shift when stored in a named type, a change of the exponent in a scaled number.
 template <class A>
 class Product<A, PowerOfTwo> {
  public:
@@ -333,13 +332,13 @@ constexpr bool operator==(Q<I1, F1> a, Q<I2, F2> b) {
   return (a <=> b) == 0;
 }
 
-/// Of either kind: fixed point, or with a power of two of its own.
+/// Fixed point, or a number with its own exponent.
 template <class T>
 concept InIntegers = is_q<T> || is_product<T> || std::same_as<T, Scaled> || std::same_as<T, PowerOfTwo>;
 
 /// numerator / denominator stored in R, relative error below 2^-26 + 2^-27 + 2^-29 (product and reciprocal,
 /// arithmetic/scaled.hpp) plus 2^-29 for each operand of more than 30 bits, and half a step of R; saturates; x / 0 is
-/// R's end, 0 / 0 is 0.
+/// the end of R's range, 0 / 0 is 0.
 template <InIntegers R, InIntegers A, InIntegers B>
 constexpr R ratio(const A& numerator, const B& denominator) {
   return R(Scaled(numerator) * Scaled(denominator).reciprocal());

@@ -1,4 +1,4 @@
-// What fixed point (fixed.hpp) and scaled numbers (scaled.hpp) are made of, in C++ that every core runs: rounded
+// The operations under fixed point (fixed.hpp) and scaled numbers (scaled.hpp), in C++ that every core runs: rounded
 // products, and sums and products of numbers that are packed as mantissa and exponent. A back end (backend.hpp) may
 // have faster functions for a core; they give the same bits.
 #pragma once
@@ -19,6 +19,13 @@ constexpr UpperPart upper_product(std::int32_t a, std::int32_t b) {
   return {static_cast<std::int32_t>(all >> 32), static_cast<std::uint32_t>(all)};
 }
 
+/// x limited to -most .. most; most >= 0.
+template <class T>
+[[gnu::always_inline]] constexpr T clamped(T x, T most) {
+  if (x > most) return most;
+  return x < -most ? T(-most) : x;
+}
+
 namespace portable {
 
 /// product * 2^-shift, rounded to nearest (ties up), clamped to +-(2^bits - 1).
@@ -26,7 +33,7 @@ template <int shift, int bits>
 constexpr std::int32_t rounded(std::int64_t product) {
   constexpr std::int64_t limit = (std::int64_t{1} << bits) - 1;
   const std::int64_t r = shift == 0 ? product : (product >> shift) + (product >> (shift - 1) & 1);
-  return static_cast<std::int32_t>(r > limit ? limit : r < -limit ? -limit : r);
+  return static_cast<std::int32_t>(clamped(r, limit));
 }
 
 // Numbers with a power of two of their own: value = mantissa * 2^exponent, 2^29 <= |mantissa| < 2^30, or 0.

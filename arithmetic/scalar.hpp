@@ -1,9 +1,9 @@
-// The numbers the physics is written in: one type per quantity, chosen by the scalar.
+// The number types of the physics: one type per quantity, chosen by the scalar.
 //
 //   float, double, ceres::Jet   every quantity is that type; the names below only document
 //   FixedPoint                  every quantity has its own range and step (arithmetic/fixed.hpp)
 //
-// An expression of quantities is plain algebra. Storing it in a named quantity is where a fixed-point value is rounded:
+// An expression of quantities is plain algebra. A fixed-point value is rounded when it is stored in a named quantity:
 //
 //   const Voltage<S> drop_v = r0_ohm * current_a;
 //
@@ -43,25 +43,24 @@ struct Quantities {  // a floating-point or dual number: one type for all
 };
 
 template <>
-struct Quantities<FixedPoint> {  // in 30 bits where they are added: the sum of two then has 31
+struct Quantities<FixedPoint> {  // 30 bits for quantities that are added: the sum of two then has 31
   using Soc = Q<3, 27>;          // +-8, step 7.5e-9
-  using PerSoc = PowerOfTwo;     // up to 2,048: an interval is not narrower
+  using PerSoc = PowerOfTwo;     // up to 2,048: no interval is narrower
   using Voltage = Q<3, 27>;      // +-8 V, step 7.5 nV; also every other state but soc
   using VoltagePerSoc = Scaled;
   using Current = Q<11, 19>;      // +-2,048 A, step 2 uA
   using Resistance = Q<0, 30>;    // below 1 ohm, step 1 nohm
   using Capacitance = Q<17, 13>;  // below 131 kF
   using Duration = Q<17, 13>;     // time constants, below 131,072 s
-  using TimeStep =
-      Q<12, 19>;  // one step, below 4,096 s (a longer one counts as 4,096 s: everything has settled), step 1.9 us
-  using Rate = Q<3, 28>;         // 1 / time constant: 0.125 s and longer
-  using Exponent = Q<15, 47>;    // time step times rate
-  using Fraction = Q<1, 29>;     // +-2
-  using Variance = Scaled;       // 30 bits, of any size
-  using Coupling = Scaled;       // one state per unit of another
-  using Count = Scaled;          // samples that share one error
-  using Temperature = Q<9, 21>;  // +-512 degrees C or K, step 0.5 uK
-  using Factor = Q<7, 23>;       // what a resistance is multiplied by: below 128
+  using TimeStep = Q<12, 19>;     // below 4,096 s, step 1.9 us; a longer one counts as 4,096 s: everything has settled
+  using Rate = Q<3, 28>;          // 1 / time constant: 0.125 s and longer
+  using Exponent = Q<15, 47>;     // time step times rate
+  using Fraction = Q<1, 29>;      // +-2
+  using Variance = Scaled;        // 30 bits, of any size
+  using Coupling = Scaled;        // one state per unit of another
+  using Count = Scaled;           // number of samples that share one error
+  using Temperature = Q<9, 21>;   // +-512 degrees C or K, step 0.5 uK
+  using Factor = Q<7, 23>;        // multiplies a resistance; below 128
 };
 
 template <class S>
@@ -99,7 +98,7 @@ using Temperature = typename Quantities<S>::Temperature;  ///< degrees C
 template <class S>
 using Factor = typename Quantities<S>::Factor;  ///< 1
 
-/// a * b stored in R. Needed only where both operands are wide (variances); elsewhere write a * b.
+/// a * b stored in R. Needed only if both operands are wide (variances); elsewhere write a * b.
 template <class R, class A, class B>
 constexpr R product(const A& a, const B& b) {
   return R(a * b);
@@ -127,7 +126,7 @@ constexpr R from_micro(std::int32_t micro) {
   }
 }
 
-/// Microseconds as a step. us < 2^32.
+/// Microseconds as a time step.
 template <class S>
 constexpr TimeStep<S> seconds(std::uint32_t us) {
   if constexpr (is_q<TimeStep<S>>)
@@ -138,7 +137,7 @@ constexpr TimeStep<S> seconds(std::uint32_t us) {
     return S(static_cast<double>(us) * 1e-6);
 }
 
-/// Without its sign.
+/// Absolute value.
 template <class T>
 constexpr T magnitude(const T& x) {
   if constexpr (std::same_as<T, float>)
@@ -158,23 +157,23 @@ constexpr R from_centi(std::int16_t centi) {
     return R(static_cast<double>(centi) * 0.01);
 }
 
-/// The measurement in integer micro-units that is nearest to a quantity, held within +-2,147 of its units.
+/// The nearest integer in micro-units, clamped to +-2,147 of the quantity's units.
 template <class T>
 constexpr std::int32_t to_micro(const T& x) {
   if constexpr (is_q<T>) {
     static_assert(T::integer_bits + T::fraction_bits <= 31);
     constexpr std::int64_t most = 2'147'483'647, half = std::int64_t{1} << (T::fraction_bits - 1);
     const std::int64_t micro = (static_cast<std::int64_t>(x.raw()) * 1'000'000 + half) >> T::fraction_bits;
-    return static_cast<std::int32_t>(micro > most ? most : micro < -most ? -most : micro);
+    return static_cast<std::int32_t>(arithmetic::clamped(micro, most));
   } else if constexpr (std::floating_point<T>) {
-    const T most(2'147), clamped = x > most ? most : x < -most ? -most : x;
+    const T clamped = arithmetic::clamped(x, T(2'147));
     return static_cast<std::int32_t>(clamped * T(1'000'000) + (clamped < T(0) ? T(-0.5) : T(0.5)));
   } else {
     return to_micro(x.a);  // a dual number
   }
 }
 
-/// Number without its derivatives, as double: for reports and tests, never in the step.
+/// The value as double, for reports and tests; never in the step.
 template <class T>
 requires(InIntegers<T> || std::floating_point<T>) constexpr double as_double(const T& x) {
   return static_cast<double>(x);

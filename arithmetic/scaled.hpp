@@ -46,7 +46,8 @@ class Scaled {
   constexpr Scaled() = default;
   constexpr explicit Scaled(int whole) : Scaled(of(static_cast<std::int32_t>(whole), 0)) {}
 
-  /// Constants and host-side conversions, by the bits of the double; what is not finite or below 2^-923 becomes 0.
+  /// For constants and conversions on the host, from the bits of the double; what is not finite or below 2^-923 becomes
+  /// 0.
   [[gnu::always_inline]] constexpr explicit Scaled(double value) {
     const auto bits = std::bit_cast<std::uint64_t>(value);
     const auto biased = static_cast<std::int32_t>(bits >> 52 & 0x7FF);
@@ -122,7 +123,7 @@ class Scaled {
     return a.mantissa_ == b.mantissa_ && (a.mantissa_ == 0 || a.exponent_ == b.exponent_);
   }
 
-  /// 1 / x; of 0, the end of the range.
+  /// 1 / x; for 0 the end of the range.
   constexpr Scaled reciprocal() const {
     if (mantissa_ == 0) return unpacked(portable::packed(one_mantissa, highest));
     return unpacked(inverse(mantissa_, exponent_));
@@ -134,7 +135,7 @@ class Scaled {
     return unpacked(square_root(mantissa_, exponent_));
   }
 
-  /// In steps of 2^-fraction_bits to the nearest, clamped to +-end.
+  /// In steps of 2^-fraction_bits, rounded to nearest, clamped to +-end.
   constexpr std::int32_t in_steps(int fraction_bits, std::int32_t end) const {
     return rounded(mantissa_, exponent_ + fraction_bits, end);
   }
@@ -193,7 +194,7 @@ class Scaled {
     return all;
   }();
 
-  /// Two Newton steps x += x (1 - m x), in products of 32 bits: what they leave out above is known to be 1.
+  /// Two Newton steps x += x (1 - m x), in products of 32 bits: the omitted upper bits are known to be 1.
   BMS_CALLED static constexpr Packed inverse(std::int32_t signed_m, std::int32_t e) {
     const auto m = static_cast<std::uint32_t>(signed_m < 0 ? -signed_m : signed_m);
     std::int32_t x = seeds[(m >> 22) - 128];                                                  // 2^-15; 8 bits are right
@@ -225,7 +226,7 @@ class Scaled {
     return all;
   }();
 
-  /// One Newton step for y = 1 / sqrt(v), v in 1/4 .. 1; then s = v y, corrected by half of what v - s^2 leaves over s.
+  /// One Newton step for y = 1 / sqrt(v), v in 1/4 .. 1; then s = v y, corrected by (v - s^2) / (2 s).
   BMS_CALLED static constexpr Packed square_root(std::int32_t m, std::int32_t e) {
     const bool odd = (e & 1) != 0;
     const std::uint32_t v = static_cast<std::uint32_t>(m) << (odd ? 1 : 2);  // 2^-32
@@ -250,7 +251,7 @@ class Scaled {
     }
     if (up < -31) return 0;
     const std::int32_t r = up == 0 ? m : ((m >> (-up - 1)) + 1) >> 1;
-    return r > end ? end : r < -end ? -end : r;
+    return clamped(r, end);
   }
 
   std::int32_t mantissa_ = 0, exponent_ = of_zero;
