@@ -1,5 +1,5 @@
-// The mechanisms there are, each once. Adding one: its file in model/mechanisms/, its line here (model/README.md).
-// The order is that in which laws act: sensors first, then what warms, then what changes the tables.
+// All mechanisms, each once. To add one: its file in model/mechanisms/ and its line here (model/README.md).
+// Laws act in this order: sensors, then charge, then states, then tables, then the voltage reading.
 #pragma once
 
 #include <tuple>
@@ -42,7 +42,7 @@ using Catalogue = std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentCli
 
 inline constexpr std::size_t mechanism_count = std::tuple_size_v<Catalogue>;
 
-/// What can be said of a mechanism without its type.
+/// Properties of a mechanism that do not need its type.
 struct MechanismInfo {
   std::string_view id;
   Domain domain = Domain::physics;
@@ -75,7 +75,7 @@ constexpr std::array<MechanismInfo, sizeof...(M)> infos(std::tuple<M...>*) {
 inline constexpr std::array<MechanismInfo, mechanism_count> catalogue =
     mechanism_detail::infos(static_cast<Catalogue*>(nullptr));
 
-/// Place in the catalogue; mechanism_count when there is none of that id.
+/// Index in the catalogue; mechanism_count if the id is unknown.
 constexpr std::size_t mechanism_index(std::string_view id) {
   std::size_t k = 0;
   while (k < mechanism_count && catalogue[k].id != id) ++k;

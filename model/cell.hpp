@@ -1,20 +1,21 @@
-// A cell prepared for stepping with one scalar: the tables of its file merged into one row of intervals over soc, each
-// with what a step needs, and the noise figures turned into the units of the filter.
+// A cell prepared for stepping with one scalar: the tables of its file merged into one row of SOC intervals, with
+// everything that a step needs, and the noise figures in the units of the filter.
 //
-//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) * per_width,  value = value at start + t
-//   * delta
+//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) * per_width,
+//                                                           value = value at start + t * delta
 //
-// per_width is the power of two next to 1 / width, not below it: a shift in integers. t ends below 2, delta is what a
-// value changes by while t goes from 0 to 1.
+// per_width is the smallest power of two not below 1 / width: a shift in integers. t is below 2; delta is the change of
+// a value while t goes from 0 to 1.
 //
-// The edges of the OCV table and the nodes of the RC table share one search. Beyond 0 and 1 the OCV's end lines go on
-// (a clamp would have slope 0 just where an estimate that has overshot needs one to find back) and R0, R1, C1 stay
-// constant. An edge belongs to the interval above it, so does the slope there.
+// The edges of the OCV table and the nodes of the RC table share one search. Outside 0 .. 1 the end lines of the OCV
+// continue, and R0, R1, C1 stay constant. (A clamped OCV would have slope 0, and an estimate that has overshot needs a
+// slope to return.) An edge belongs to the interval above it, and so does the slope there.
 //
-// prepare() is constexpr: firmware runs it in the compiler, the host at run time, with the same digits in the same
-// order. Cost of look_up: in estimator/README.md with the step.
+// prepare() is constexpr: the compiler runs it for the firmware, the host runs it at run time, with the same operations
+// in the same order. Cost of look_up: part of the step in estimator/README.md.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
@@ -25,9 +26,9 @@
 
 namespace bms::model {
 
-using namespace arithmetic;  // physics is written in its number types and functions
+using namespace arithmetic;  // the physics uses these number types and functions
 
-/// All that the tables say about one interval of soc.
+/// The tables in one interval of SOC.
 template <class S>
 struct Interval {
   Soc<S> start{};
@@ -36,58 +37,59 @@ struct Interval {
   Resistance<S> r0_ohm{}, r0_delta_ohm{};
   Resistance<S> r1_ohm{}, r1_delta_ohm{};
   Capacitance<S> c1_f{}, c1_delta_f{};
-  Factor<S> gap{1}, gap_delta{};  ///< of the distance between charge and discharge (ocv.half_gap_v): over what it is in
-                                  ///< the middle of the curve
-  Variance<S> error_v2{};  ///< of the voltage there, lasting: noise.model_v, and the slope times what the soc axis is
-                           ///< good to (tolerance.initial_soc)
+  /// Distance between charge and discharge curve (ocv.half_gap_v), relative to that in the middle of the curve.
+  Factor<S> gap{1}, gap_delta{};
+  /// Variance of the persistent voltage error: noise.model_v, and the slope times the uncertainty of the SOC axis
+  /// (tolerance.initial_soc).
+  Variance<S> error_v2{};
 };
 
-/// Charge is counted in microampere-microseconds [1e-12 A s], in 64-bit integers, and read in counts of 2^shift of
-/// them: fine enough that nothing is lost (one count is below 4e-9 of the capacity), coarse enough for 32 bits.
+/// Charge is counted in microampere-microseconds [1e-12 A s] in 64-bit integers. It is read in counts of 2^shift of
+/// this unit: one count is below 4e-9 of the capacity, and the range needs 32 bits.
 template <class S>
 struct ChargeScale {
   std::int64_t capacity_uaus = 0;
-  std::int64_t lowest_uaus = 0;   ///< where counting stops: min_soc
-  std::int64_t highest_uaus = 0;  ///< max_soc
+  std::int64_t lowest_uaus = 0;   ///< lower limit of the counter: min_soc
+  std::int64_t highest_uaus = 0;  ///< upper limit: max_soc
   int shift = 0;
-  Soc<S> soc_per_count{};   ///< fixed point: per 2^27 counts (what Soc holds as 1), 0.25 .. 0.5
+  Soc<S> soc_per_count{};   ///< fixed point: per 2^27 counts (the raw value of 1), 0.25 .. 0.5
   Soc<S> counts_per_soc{};  ///< its inverse; fixed point: in 2^27 counts
 };
 
-/// A current reading that rests (estimator/current_at_rest.hpp).
+/// Limits of a current reading at rest (estimator/current_at_rest.hpp).
 struct RestingCurrent {
-  std::int32_t largest_ua = 0, still_ua = 0;
+  std::int32_t largest_ua = 0;  ///< that can be an offset, either sign
+  std::int32_t still_ua = 0;    ///< by which a resting reading may move
 };
 
-/// Noise as the filter uses it, in its own units.
+/// Noise in the filter's units.
 template <class S>
 struct FilterNoise {
   Variance<S> voltage_v2{};           ///< white, per sample
-  Variance<S> model_v2{};             ///< of all that Interval::error_v2 holds, what is the same everywhere
-  Duration<S> model_correlation_s{};  ///< how long Interval::error_v2 and the resistances' error last
-  Fraction<S> resistance_error{};     ///< of R0 + R1
+  Variance<S> model_v2{};             ///< the part of Interval::error_v2 that does not depend on the SOC
+  Duration<S> model_correlation_s{};  ///< correlation time of Interval::error_v2 and of the resistance error
+  Fraction<S> resistance_error{};     ///< relative standard deviation of R0 + R1
   Variance<S> v_rc_v2{};              ///< in the steady state
   Variance<S> rest_v2{};
   Soc<S> white_soc_per_s{};       ///< current_a over the capacity
   Variance<S> walk_soc2_per_s{};  ///< slow current error: 2 offset^2 correlation / capacity^2
-  Variance<S>
-      offset_per_h2{};  ///< the same as a state of the filter: current_offset_a over the capacity in Ah, squared
+  Variance<S> offset_per_h2{};    ///< the same as a state: (current_offset_a over the capacity in Ah)^2
   Duration<S> current_offset_correlation_s{};
-  Variance<S> at_rest_per_h2{};  ///< current_at_rest_a over the capacity in Ah, squared; 0: not known
+  Variance<S> at_rest_per_h2{};  ///< (current_at_rest_a over the capacity in Ah)^2; 0: unknown
   RestingCurrent at_rest;
   Fraction<S> gain{};          ///< current_gain
-  Current<S> one_c_a{};        ///< the capacity in one hour
+  Current<S> one_c_a{};        ///< moves the capacity in one hour
   Soc<S> unknown_soc_per_s{};  ///< current_unknown_a over the capacity
   Current<S> unknown_a{};
 };
 
-/// A reading outside is not a measurement.
+/// A reading outside this range is not a measurement.
 struct PlausibleRange {
   std::int32_t voltage_min_uv = 0, voltage_max_uv = 0;
   std::int32_t current_max_ua = 0;  ///< either way
 };
 
-/// Limits of use, and what a current makes of soc.
+/// Limits of use, and the SOC per charge.
 template <class S>
 struct OperatingLimits {
   Voltage<S> voltage_min_v{}, voltage_max_v{};
@@ -108,7 +110,7 @@ struct Cell {
   std::size_t size = 0;  ///< intervals in use
 };
 
-/// What the tables say at one soc, and how much it changes over the interval: d / d soc = delta * per_width.
+/// The tables at one SOC, with the change of each value over the interval: d / d soc = delta * per_width.
 template <class S>
 struct TablePoint {
   PerSoc<S> per_width;
@@ -118,13 +120,13 @@ struct TablePoint {
   Capacitance<S> c1_f, c1_delta_f;
   Variance<S> error_v2{};
   Factor<S> gap{1}, gap_delta{};
-  Factor<S> activation{1};  ///< by how much resistances that the tables do not hold differ with the temperature
-  VoltagePerSoc<S> shifted_ocv_slope_v{0};  ///< of the OCV, by the soc at which laws read it elsewhere
+  Factor<S> activation{1};                  ///< temperature factor of resistances that are not in the tables
+  VoltagePerSoc<S> shifted_ocv_slope_v{0};  ///< slope of the OCV at the SOC where the laws read it
 };
 
 namespace cell_detail {
 
-/// OCV edges and RC nodes, ascending, each once.
+/// OCV edges and RC nodes, ascending, without duplicates.
 template <class Real>
 constexpr auto merged_edges(const CellParameters<Real>& p) {
   Column<double, max_ocv_edges + max_rc_nodes + 2> merged;
@@ -137,7 +139,7 @@ constexpr auto merged_edges(const CellParameters<Real>& p) {
   return merged;
 }
 
-/// Column of the RC table at soc: linear between nodes, constant outside.
+/// A column of the RC table at soc: linear between nodes, constant outside.
 template <class Real, std::size_t Max>
 constexpr Real rc_value(const RcTable<Real>& rc, const Column<Real, Max>& column, double soc) {
   if (soc <= rc.soc[0]) return column[0];
@@ -167,11 +169,11 @@ constexpr std::size_t ocv_piece(const OcvTable<Real>& ocv, double soc) {
 
 }  // namespace cell_detail
 
-/// The middle of the curve: where a lithium iron phosphate cell's voltage hardly moves, in soc. Beyond, slow charge and
-/// discharge part by their knees.
+/// The plateau of a lithium iron phosphate cell, in SOC. Outside, slow charge and slow discharge differ by the position
+/// of their knees.
 inline constexpr double plateau_from_soc = 0.2, plateau_to_soc = 0.9;
 
-/// Half the distance between charge and discharge in the middle of the curve [V]; 0: not known.
+/// Mean half gap between the charge and the discharge curve on the plateau [V]; 0 if unknown.
 template <class Real>
 constexpr double plateau_half_gap_v(const OcvTable<Real>& ocv) {
   double area = 0, width = 0;
@@ -188,136 +190,172 @@ constexpr double plateau_half_gap_v(const OcvTable<Real>& ocv) {
 
 namespace cell_detail {
 
-/// The half gap over that of the middle; at the ends it is more of the current that it was measured with than of the
-/// cell.
+/// Half gap relative to that of the plateau, 0 .. 2. At the ends it depends more on the current of the measurement than
+/// on the cell.
 template <class Real>
-constexpr double gap_at(const OcvTable<Real>& ocv, double middle_v, double soc) {
-  if (!(middle_v > 0)) return 1;
+constexpr double gap_at(const OcvTable<Real>& ocv, double plateau_gap_v, double soc) {
+  if (!(plateau_gap_v > 0)) return 1;
   const std::size_t k = ocv_piece(ocv, soc);
-  const double t = soc <= 0 ? 0 : soc >= 1 ? 1 : (soc - ocv.soc[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
-  const double gap = (ocv.half_gap_v[k] + t * (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k])) / middle_v;
-  return gap < 0 ? 0 : gap > 2 ? 2 : gap;
+  double t = 0;
+  if (soc >= 1)
+    t = 1;
+  else if (soc > 0)
+    t = (soc - ocv.soc[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
+  const double gap = (ocv.half_gap_v[k] + t * (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k])) / plateau_gap_v;
+  return std::clamp(gap, 0.0, 2.0);
 }
 
 }  // namespace cell_detail
 
-/// Number of intervals that prepare() will make: two outside and one between each pair of edges or nodes.
+/// Number of intervals that prepare() makes: two outside, and one between each pair of neighbouring edges or nodes.
 template <class Real>
 constexpr std::size_t interval_count(const CellParameters<Real>& p) {
   return cell_detail::merged_edges(p).size + 1;
 }
 
-/// A voltage that is known no better says nothing.
+/// Largest variance of a voltage error [V^2]; a less accurate voltage contains no information.
 inline constexpr double max_error_v2 = 0.04;
 
-/// A sensor of more is not there: of what is plausible, and of what may have flowed unseen.
+/// Largest current of any sensor [A]; limits the plausible range and the unknown current.
 inline constexpr double max_current_a = 2'000;
 
+/// Largest time constant of the filter [s]: the range of Duration in fixed point.
+inline constexpr double longest_duration_s = 131'000;
+
+/// Width of the two intervals outside 0 .. 1, in SOC.
 inline constexpr double outer_width = 0.125;
 
-/// Where counting stops, in soc.
+/// Limits of the counted charge, in SOC.
 inline constexpr double min_soc = -0.25, max_soc = 1.25;
 
 inline constexpr std::size_t max_intervals = max_ocv_edges + max_rc_nodes + 3;
 
-/// Prepares p, which first_fault() has found good, for scalar S. Max >= interval_count(p).
+namespace cell_detail {
+
+/// A current in microamperes, max_current_a at most.
+constexpr std::int32_t micro_a(double a) {
+  return static_cast<std::int32_t>(1e6 * (a < max_current_a ? a : max_current_a));
+}
+
+/// The tables between two neighbouring edges or nodes. plateau_gap_v: see gap_at().
+template <class S, class Real>
+constexpr Interval<S> interval_between(const CellParameters<Real>& p, double from, double to, double plateau_gap_v) {
+  Interval<S> i;
+  double width = 1;  // of t from 0 to 1
+  while (width > to - from) width /= 2;
+  const double part = width / (to - from);
+  const std::size_t piece = ocv_piece(p.ocv, from);
+  const auto line = [&]<class Value>(const auto& column, Value& at_start, Value& delta) {
+    const Real start = rc_value(p.rc, column, from);
+    at_start = Value(start);
+    delta = Value((rc_value(p.rc, column, to) - start) * part);
+  };
+  i.start = Soc<S>(from);
+  i.per_width = PerSoc<S>(1.0 / width);
+  i.ocv_v = Voltage<S>(p.ocv.b0_v[piece] + p.ocv.b1_v[piece] * from);
+  i.ocv_delta_v = Voltage<S>(p.ocv.b1_v[piece] * width);
+  line(p.rc.r0_ohm, i.r0_ohm, i.r0_delta_ohm);
+  line(p.rc.r1_ohm, i.r1_ohm, i.r1_delta_ohm);
+  line(p.rc.c1_f, i.c1_f, i.c1_delta_f);
+  const double gap = gap_at(p.ocv, plateau_gap_v, from);
+  i.gap = Factor<S>(gap);
+  i.gap_delta = Factor<S>((gap_at(p.ocv, plateau_gap_v, to) - gap) * part);
+  const double axis_v = plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc,
+               model_v2 = p.noise.model_v * p.noise.model_v, error_v2 = model_v2 + axis_v * axis_v;
+  const double most_v2 =
+      model_v2 > max_error_v2 ? model_v2 : max_error_v2;  // never less than the part that does not depend on the SOC
+  i.error_v2 = Variance<S>(error_v2 < most_v2 ? error_v2 : most_v2);
+  return i;
+}
+
+template <class S>
+constexpr ChargeScale<S> charge_scale(double capacity_as) {
+  ChargeScale<S> c;
+  c.capacity_uaus = static_cast<std::int64_t>(capacity_as * 1e12 + 0.5);
+  while ((c.capacity_uaus >> c.shift) >= (std::int64_t{1} << 29)) ++c.shift;
+  static_assert(min_soc == -0.25 && max_soc == 1.25);
+  c.lowest_uaus = -(c.capacity_uaus / 4);
+  c.highest_uaus = c.capacity_uaus + c.capacity_uaus / 4;
+  const double per_soc =
+      static_cast<double>(c.capacity_uaus) / (0x1p28 * static_cast<double>(std::int64_t{1} << c.shift));
+  double unit = 0x1p28;
+  if constexpr (is_q<Soc<S>>) unit /= static_cast<double>(std::int32_t{1} << Soc<S>::fraction_bits);
+  c.counts_per_soc = Soc<S>(per_soc * unit);
+  c.soc_per_count = Soc<S>(1 / (per_soc * unit));
+  return c;
+}
+
+template <class S, class Real>
+constexpr FilterNoise<S> filter_noise(const CellParameters<Real>& p, double capacity_as) {
+  FilterNoise<S> f;
+  const Noise& n = p.noise;
+  const auto square = [](double v) { return v * v; };
+  f.voltage_v2 = Variance<S>(square(n.voltage_v));
+  f.model_v2 = Variance<S>(square(n.model_v));
+  f.model_correlation_s = Duration<S>(n.model_correlation_s);
+  f.resistance_error = Fraction<S>(p.tolerance.resistance_fraction);
+  f.v_rc_v2 = Variance<S>(square(n.v_rc_v));
+  f.rest_v2 = Variance<S>(square(n.rest_v));
+  f.white_soc_per_s = Soc<S>(n.current_a / capacity_as);
+  f.walk_soc2_per_s = Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
+  f.offset_per_h2 = Variance<S>(square(n.current_offset_a / p.capacity_ah));
+  f.current_offset_correlation_s = Duration<S>(
+      n.current_offset_correlation_s < longest_duration_s ? n.current_offset_correlation_s : longest_duration_s);
+  f.at_rest_per_h2 = Variance<S>(square(n.current_at_rest_a / p.capacity_ah));
+  f.at_rest = {micro_a(3 * (n.current_offset_a + n.current_at_rest_a)), micro_a(n.current_offset_a)};
+  f.gain = Fraction<S>(n.current_gain);
+  f.one_c_a = Current<S>(p.capacity_ah);
+  f.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
+  f.unknown_a = Current<S>(n.current_unknown_a < max_current_a ? n.current_unknown_a : max_current_a);
+  return f;
+}
+
+constexpr PlausibleRange plausible_range(const Limits& l) {
+  PlausibleRange r;
+  // half a volt and ten times the current beyond the limits of use: a reading there can still be right
+  r.voltage_min_uv = static_cast<std::int32_t>((l.voltage_min_v - 0.5) * 1e6);
+  r.voltage_max_uv = static_cast<std::int32_t>((l.voltage_max_v + 0.5) * 1e6);
+  const double larger =
+      l.charge_current_max_a > l.discharge_current_max_a ? l.charge_current_max_a : l.discharge_current_max_a;
+  r.current_max_ua = micro_a(10 * larger);
+  return r;
+}
+
+}  // namespace cell_detail
+
+/// Prepares p for scalar S. p has been accepted by first_fault(); Max >= interval_count(p).
 template <class S, std::size_t Max, class Real>
 constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   namespace d = cell_detail;
   Cell<S, Max> cell;
-
   const auto edges = d::merged_edges(p);
-  const double middle_gap_v = plateau_half_gap_v(p.ocv);
+  const double plateau_gap_v = plateau_half_gap_v(p.ocv);
   const auto add = [&](double from, double to) {
-    double width = 1;  // that t = 1 stands for
-    while (width > to - from) width /= 2;
-    const double part = width / (to - from);
-    const std::size_t piece = d::ocv_piece(p.ocv, from);
-    Interval<S>& i = cell.interval[cell.size];
-    const auto line = [&]<class Value>(const auto& column, Value& at_start, Value& delta) {
-      const Real start = d::rc_value(p.rc, column, from);
-      at_start = Value(start);
-      delta = Value((d::rc_value(p.rc, column, to) - start) * part);
-    };
-    i.start = Soc<S>(from);
-    cell.edge[cell.size] = i.start;
-    i.per_width = PerSoc<S>(1.0 / width);
-    i.ocv_v = Voltage<S>(p.ocv.b0_v[piece] + p.ocv.b1_v[piece] * from);
-    i.ocv_delta_v = Voltage<S>(p.ocv.b1_v[piece] * width);
-    line(p.rc.r0_ohm, i.r0_ohm, i.r0_delta_ohm);
-    line(p.rc.r1_ohm, i.r1_ohm, i.r1_delta_ohm);
-    line(p.rc.c1_f, i.c1_f, i.c1_delta_f);
-    const double gap = d::gap_at(p.ocv, middle_gap_v, from);
-    i.gap = Factor<S>(gap);
-    i.gap_delta = Factor<S>((d::gap_at(p.ocv, middle_gap_v, to) - gap) * part);
-    const double axis_v = d::plain(p.ocv.b1_v[piece]) * p.tolerance.initial_soc,
-                 model_v2 = p.noise.model_v * p.noise.model_v, error_v2 = model_v2 + axis_v * axis_v;
-    const double most_v2 =
-        model_v2 > max_error_v2 ? model_v2 : max_error_v2;  // never less than what is the same everywhere
-    i.error_v2 = Variance<S>(error_v2 < most_v2 ? error_v2 : most_v2);
+    cell.interval[cell.size] = d::interval_between<S>(p, from, to, plateau_gap_v);
+    cell.edge[cell.size] = cell.interval[cell.size].start;
     ++cell.size;
   };
-  // outside, a width stands for "from there on": t goes on beyond 0 and 1
+  // the outer intervals have no outer edge: t continues beyond 0 and 1
   add(-outer_width, 0);
   for (std::size_t k = 0; k + 1 < edges.size; ++k) add(edges[k], edges[k + 1]);
   add(1, 1 + outer_width);
-  // out of reach: a simulation's soc may be anywhere, the estimator's is held within -1/4 .. 5/4
-  const double nowhere = is_q<Soc<S>> ? 7.9 : 1e30;
-  cell.edge[0] = Soc<S>(-nowhere);
-  cell.edge[cell.size] = Soc<S>(nowhere);
+  // out of reach: the soc of a simulation may have any value, the estimator's is clamped to -1/4 .. 5/4
+  const double out_of_reach = is_q<Soc<S>> ? 7.9 : 1e30;
+  cell.edge[0] = Soc<S>(-out_of_reach);
+  cell.edge[cell.size] = Soc<S>(out_of_reach);
 
   const double capacity_as = p.capacity_ah * 3'600;
-  cell.charge.capacity_uaus = static_cast<std::int64_t>(capacity_as * 1e12 + 0.5);
-  while ((cell.charge.capacity_uaus >> cell.charge.shift) >= (std::int64_t{1} << 29)) ++cell.charge.shift;
-  static_assert(min_soc == -0.25 && max_soc == 1.25);
-  cell.charge.lowest_uaus = -(cell.charge.capacity_uaus / 4);
-  cell.charge.highest_uaus = cell.charge.capacity_uaus + cell.charge.capacity_uaus / 4;
-  const double per_soc = static_cast<double>(cell.charge.capacity_uaus) /
-                         (268'435'456.0 * static_cast<double>(std::int64_t{1} << cell.charge.shift));
-  double unit = 268'435'456.0;
-  if constexpr (is_q<Soc<S>>) unit /= static_cast<double>(std::int32_t{1} << Soc<S>::fraction_bits);
-  cell.charge.counts_per_soc = Soc<S>(per_soc * unit);
-  cell.charge.soc_per_count = Soc<S>(1 / (per_soc * unit));
-
-  const Noise& n = p.noise;
-  const auto square = [](double v) { return v * v; };
-  cell.noise.voltage_v2 = Variance<S>(square(n.voltage_v));
-  cell.noise.model_v2 = Variance<S>(square(n.model_v));
-  cell.noise.model_correlation_s = Duration<S>(n.model_correlation_s);
-  cell.noise.resistance_error = Fraction<S>(p.tolerance.resistance_fraction);
-  cell.noise.v_rc_v2 = Variance<S>(square(n.v_rc_v));
-  cell.noise.rest_v2 = Variance<S>(square(n.rest_v));
-  cell.noise.white_soc_per_s = Soc<S>(n.current_a / capacity_as);
-  cell.noise.walk_soc2_per_s =
-      Variance<S>(2 * square(n.current_offset_a / capacity_as) * n.current_offset_correlation_s);
-  cell.noise.offset_per_h2 = Variance<S>(square(n.current_offset_a / p.capacity_ah));
-  cell.noise.current_offset_correlation_s =
-      Duration<S>(n.current_offset_correlation_s < 131'000 ? n.current_offset_correlation_s : 131'000);
-  cell.noise.at_rest_per_h2 = Variance<S>(square(n.current_at_rest_a / p.capacity_ah));
-  const auto micro = [](double a) { return static_cast<std::int32_t>(1e6 * (a < max_current_a ? a : max_current_a)); };
-  cell.noise.at_rest = {micro(3 * (n.current_offset_a + n.current_at_rest_a)), micro(n.current_offset_a)};
-  cell.noise.gain = Fraction<S>(n.current_gain);
-  cell.noise.one_c_a = Current<S>(p.capacity_ah);
-  cell.noise.unknown_soc_per_s = Soc<S>(n.current_unknown_a / capacity_as);
-  cell.noise.unknown_a = Current<S>(n.current_unknown_a < max_current_a ? n.current_unknown_a : max_current_a);
-
+  cell.charge = d::charge_scale<S>(capacity_as);
+  cell.noise = d::filter_noise<S>(p, capacity_as);
   cell.limits = {Voltage<S>(p.limits.voltage_min_v), Voltage<S>(p.limits.voltage_max_v),
                  Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a),
                  Fraction<S>(1 / capacity_as)};
-
-  // half a volt and ten times the current beyond the limits of use: a sensor still tells the truth there, a fault does
-  // not
-  cell.plausible.voltage_min_uv = static_cast<std::int32_t>((p.limits.voltage_min_v - 0.5) * 1e6);
-  cell.plausible.voltage_max_uv = static_cast<std::int32_t>((p.limits.voltage_max_v + 0.5) * 1e6);
-  const double larger = p.limits.charge_current_max_a > p.limits.discharge_current_max_a
-                            ? p.limits.charge_current_max_a
-                            : p.limits.discharge_current_max_a;
-  cell.plausible.current_max_ua = micro(10 * larger);
+  cell.plausible = d::plausible_range(p.limits);
   return cell;
 }
 
-/// Interval that holds soc (fixed point: within +-7.9), found from a nearby one: a step moves soc by little. The result
-/// does not depend on `from`.
+/// Interval that contains soc (fixed point: within +-7.9). The search starts at `from`, because a step moves soc by
+/// little; the result does not depend on it.
 template <class S, std::size_t Max>
 constexpr std::size_t interval_of(const Cell<S, Max>& cell, const Soc<S>& soc, std::size_t from) {
   std::size_t k = from;
@@ -326,7 +364,7 @@ constexpr std::size_t interval_of(const Cell<S, Max>& cell, const Soc<S>& soc, s
   return k;
 }
 
-/// interval: where the last look-up ended, 0 at first; updated.
+/// interval: result of the last look-up, 0 at first; updated.
 template <class S, std::size_t Max>
 constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std::uint8_t& interval) {
   const std::size_t k = interval_of(cell, soc, interval);

@@ -1,10 +1,10 @@
 // A cell as its file describes it: the tables of the paper and the figures around them, in SI units, before they are
-// prepared for a scalar (model/cell.hpp). The host fills it from TOML at run time; for firmware a generator writes the
-// same structure as a constexpr header, so that both start from the same digits.
+// prepared for a scalar (model/cell.hpp). The host fills this structure from TOML at run time. For firmware, a
+// generator writes the same structure as a constexpr header, so both start from the same digits.
 //
 //   Real: double, or ceres::Jet where a parameter is an unknown of a fit
 //
-// first_fault() is the one list of what a cell file may hold; host and build refuse by it.
+// first_fault() is the only list of what a cell file may contain; host and build both use it.
 #pragma once
 
 #include <array>
@@ -23,21 +23,21 @@ struct Column {
   constexpr void push_back(const Real& v) { value[size++] = v; }
 };
 
-/// What a cell file may hold: wide enough for any lithium cell from a coin to 1,000 Ah (Table 3 of the paper bounds the
-/// fit of one of 6 Ah). model/fixed_ranges.hpp proves with these that fixed point has room for all of it.
+/// Ranges that a cell file may contain: wide enough for any lithium cell from a coin cell to 1,000 Ah (Table 3 of the
+/// paper bounds the fit of a cell of 6 Ah). model/fixed_ranges.hpp proves that fixed point has room for all of them.
 namespace accepted {
 
 struct Range {
   double low, high;
 };
 inline constexpr Range capacity_ah{0.01, 1'000};
-inline constexpr Range voltage_v{0.5, 5};             ///< limits of use, and the open-circuit voltage from soc 0 to 1
+inline constexpr Range voltage_v{0.5, 5};             ///< limits of use, and the OCV from SOC 0 to 1
 inline constexpr Range current_a{1e-3, 2'000};        ///< limits of use
-inline constexpr Range slope_v{1e-6, 60};             ///< of the open-circuit voltage, per unit of soc
+inline constexpr Range slope_v{1e-6, 60};             ///< slope of the OCV, per unit of SOC
 inline constexpr Range resistance_ohm{1e-5, 0.5};     ///< R0 and R1
 inline constexpr Range capacitance_f{100, 100'000};   ///< C1
 inline constexpr Range time_constant_s{0.2, 50'000};  ///< R1 C1
-inline constexpr double least_width = 0.0005;         ///< of soc, between any two edges or nodes
+inline constexpr double least_width = 0.0005;         ///< of SOC, between any two edges or nodes
 inline constexpr Range lasts_s{0, 86'400};            ///< noise.model_correlation_s
 inline constexpr Range unknown_c{1e-3, 10};           ///< noise.current_unknown_a over the 1C current
 inline constexpr double most_gain = 0.2, most_resistance_error = 1;
@@ -53,8 +53,8 @@ struct OcvTable {
   Column<double, max_ocv_edges> soc;  ///< edges, ascending, first 0, last 1
   Column<Real, max_ocv_edges> b0_v;   ///< [V], one less than edges
   Column<Real, max_ocv_edges> b1_v;   ///< [V per unit of soc], > 0
-  // where slow charge and discharge part (hysteresis), if it is known; the 1RC model does without
-  Column<double, max_ocv_edges> half_gap_v{};  ///< [V] at the edges, half of charge less discharge; or empty
+  // hysteresis between slow charge and slow discharge, if it is known; the 1RC model does not use it
+  Column<double, max_ocv_edges> half_gap_v{};  ///< [V] at the edges, half of charge minus discharge; or empty
   double lean = 0;                             ///< -1..1: b0, b1 are the middle of both plus lean * half_gap
 };
 
@@ -66,7 +66,7 @@ struct RcTable {
   Column<Real, max_rc_nodes> r1_ohm;
   Column<Real, max_rc_nodes> c1_f;
   Column<double, max_rc_nodes> r0_std_ohm{}, r1_std_ohm{},
-      c1_std_f{};  ///< standard deviations of an identification, or empty
+      c1_std_f{};  ///< standard deviations from an identification, or empty
 };
 
 /// Limits of use, from the manufacturer.
@@ -79,34 +79,34 @@ struct Limits {
   double temperature_max_c = 0;
 };
 
-/// Half of the model's error comes and goes within Noise::model_correlation_s, half lasts so many times as long.
+/// Half of the model's error has the correlation time Noise::model_correlation_s, half has one this many times as long.
 inline constexpr int persistent_error_correlations = 8;
 
-/// Errors that the estimator reckons with, as standard deviations.
+/// Errors that the estimator expects, as standard deviations.
 struct Noise {
-  double voltage_v = 0;                     ///< voltage reading, new in every sample
-  double model_v = 0;                       ///< model's own voltage error, lasting
-  double model_correlation_s = 0;           ///< how long it lasts
+  double voltage_v = 0;                     ///< voltage reading, white
+  double model_v = 0;                       ///< the model's voltage error, correlated
+  double model_correlation_s = 0;           ///< its correlation time
   double v_rc_v = 0;                        ///< error of the RC voltage in the steady state
-  double rest_v = 0;                        ///< voltage read at rest against the OCV curve (hysteresis, relaxation)
-  double current_a = 0;                     ///< current reading, new in every sample
+  double rest_v = 0;                        ///< rested voltage relative to the OCV curve (hysteresis, relaxation)
+  double current_a = 0;                     ///< current reading, white
   double current_offset_a = 0;              ///< slow error of the current reading
-  double current_offset_correlation_s = 0;  ///< how long it lasts
-  double current_unknown_a = 0;             ///< current to be expected while there is no reading
-  double current_at_rest_a = 0;  ///< what may still flow while the reading rests, where errors are states; 0: a resting
-                                 ///< reading is believed as it is
-  double current_gain = 0;  ///< of the current reading and of the capacity that it is divided by, relative, lasting;
-                            ///< where errors are states
-  bool errors_are_states =
-      false;  ///< the filter estimates the current's offset and the model's lasting error; else it widens sigma by them
+  double current_offset_correlation_s = 0;  ///< its correlation time
+  double current_unknown_a = 0;             ///< expected current while the reading is missing
+  /// Current that may flow while the reading rests; used if errors are states. 0: unknown, the reading is taken as it
+  /// is.
+  double current_at_rest_a = 0;
+  /// Relative error of the current's gain and of the capacity; used if errors are states.
+  double current_gain = 0;
+  /// The filter estimates the current's offset and the model's persistent error; otherwise they only widen sigma.
+  bool errors_are_states = false;
 };
 
-/// What the calibration is good for: a difference inside it is not a mismatch.
+/// Accuracy of the calibration; only a larger difference is a mismatch.
 struct Tolerance {
   double ocv_v = 0;
-  double resistance_fraction = 0;  ///< of R0 and R1; the estimator believes a voltage under current as much less
-  double initial_soc =
-      0;  ///< of the tables' soc axis; where the OCV is steep, the estimator believes a voltage as much less
+  double resistance_fraction = 0;  ///< of R0 and R1; increases the voltage noise of the estimator under current
+  double initial_soc = 0;          ///< of the tables' SOC axis; increases the voltage noise where the OCV is steep
   double drift_v = 0;
 };
 
@@ -120,22 +120,20 @@ struct CellParameters {
   Tolerance tolerance;
 };
 
-/// Why a set of parameters is refused; what == nullptr: it is not.
+/// Why a set of parameters is refused; what is nullptr if it is accepted.
 struct CellFault {
   const char* key = nullptr;   ///< as in the cell file, e.g. "ocv.b1_v"
   std::size_t index = 0;       ///< of the table entry
   const char* what = nullptr;  ///< what is expected
 };
 
-/// By `accepted`.
-constexpr CellFault first_fault(const CellParameters<double>& p) {
-  // written so that NaN is outside
-  const auto outside = [](double v, double low, double high) { return !(v >= low && v <= high); };
-  const auto beyond = [&](double v, accepted::Range range) { return outside(v, range.low, range.high); };
+namespace parameters_detail {
 
-  if (beyond(p.capacity_ah, accepted::capacity_ah)) return {"capacity_ah", 0, "0.01 to 1000 Ah"};
+/// Also true for NaN.
+constexpr bool outside(double v, double low, double high) { return !(v >= low && v <= high); }
+constexpr bool beyond(double v, accepted::Range range) { return outside(v, range.low, range.high); }
 
-  const Limits& l = p.limits;
+constexpr CellFault fault_of(const Limits& l) {
   if (beyond(l.voltage_min_v, accepted::voltage_v)) return {"limits.voltage_min_v", 0, "0.5 to 5 V"};
   if (outside(l.voltage_max_v, l.voltage_min_v + 0.1, accepted::voltage_v.high))
     return {"limits.voltage_max_v", 0, "voltage_min_v + 0.1 to 5 V"};
@@ -145,8 +143,10 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (outside(l.temperature_min_c, -60, 100)) return {"limits.temperature_min_c", 0, "-60 to 100 degrees C"};
   if (outside(l.temperature_max_c, l.temperature_min_c, 150))
     return {"limits.temperature_max_c", 0, "temperature_min_c to 150 degrees C"};
+  return {};
+}
 
-  const auto& o = p.ocv;
+constexpr CellFault fault_of(const OcvTable<double>& o) {
   if (o.soc.size < 2) return {"ocv.soc", 0, "two edges or more"};
   if (o.b0_v.size + 1 != o.soc.size) return {"ocv.b0_v", 0, "one value less than ocv.soc"};
   if (o.b1_v.size + 1 != o.soc.size) return {"ocv.b1_v", 0, "one value less than ocv.soc"};
@@ -171,8 +171,11 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
     if (outside(o.half_gap_v[k], -0.5, 1)) return {"ocv.half_gap_v", k, "-0.5 to 1 V"};
   }
   if (outside(o.lean, -1, 1)) return {"ocv.lean", 0, "-1 to 1"};
+  return {};
+}
 
-  const auto& r = p.rc;
+/// o: the nodes must keep a distance from its edges.
+constexpr CellFault fault_of(const RcTable<double>& r, const OcvTable<double>& o) {
   if (r.soc.size < 1) return {"rc.soc", 0, "one node or more"};
   if (r.r0_ohm.size != r.soc.size) return {"rc.r0_ohm", 0, "as many values as rc.soc"};
   if (r.r1_ohm.size != r.soc.size) return {"rc.r1_ohm", 0, "as many values as rc.soc"};
@@ -202,14 +205,16 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
     if (beyond(r.r1_ohm[k] * r.c1_f[k], accepted::time_constant_s))
       return {"rc.c1_f", k, "a time constant r1 * c1 of 0.2 to 50000 s"};
   }
+  return {};
+}
 
-  const Noise& n = p.noise;
+/// c_rate_1_a: the 1C current.
+constexpr CellFault fault_of(const Noise& n, double c_rate_1_a) {
   if (outside(n.voltage_v, 1e-5, 0.5)) return {"noise.voltage_v", 0, "0.00001 to 0.5 V"};
   if (outside(n.model_v, 1e-5, 0.5)) return {"noise.model_v", 0, "0.00001 to 0.5 V"};
   if (beyond(n.model_correlation_s, accepted::lasts_s)) return {"noise.model_correlation_s", 0, "0 to 86400 s"};
   if (outside(n.v_rc_v, 1e-5, 0.5)) return {"noise.v_rc_v", 0, "0.00001 to 0.5 V"};
   if (outside(n.rest_v, 1e-4, 0.5)) return {"noise.rest_v", 0, "0.0001 to 0.5 V"};
-  const double c_rate_1_a = p.capacity_ah;
   if (outside(n.current_a, 1e-7 * c_rate_1_a, c_rate_1_a))
     return {"noise.current_a", 0, "1e-7 to 1 times the 1C current"};
   if (outside(n.current_offset_a, 1e-6 * c_rate_1_a, c_rate_1_a))
@@ -222,13 +227,28 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (outside(n.current_at_rest_a, 0, 0.1 * c_rate_1_a))
     return {"noise.current_at_rest_a", 0, "0 to 0.1 times the 1C current"};
   if (outside(n.current_gain, 0, accepted::most_gain)) return {"noise.current_gain", 0, "0 to 0.2"};
+  return {};
+}
 
-  const Tolerance& t = p.tolerance;
+constexpr CellFault fault_of(const Tolerance& t) {
   if (outside(t.ocv_v, 0, 0.1)) return {"tolerance.ocv_v", 0, "0 to 0.1 V"};
   if (outside(t.resistance_fraction, 0, accepted::most_resistance_error))
     return {"tolerance.resistance_fraction", 0, "0 to 1"};
   if (outside(t.initial_soc, 0, 1)) return {"tolerance.initial_soc", 0, "0 to 1"};
   if (outside(t.drift_v, 0, 0.1)) return {"tolerance.drift_v", 0, "0 to 0.1 V"};
+  return {};
+}
+
+}  // namespace parameters_detail
+
+/// The first parameter outside `accepted`.
+constexpr CellFault first_fault(const CellParameters<double>& p) {
+  namespace d = parameters_detail;
+  if (d::beyond(p.capacity_ah, accepted::capacity_ah)) return {"capacity_ah", 0, "0.01 to 1000 Ah"};
+  for (const CellFault& fault : {d::fault_of(p.limits), d::fault_of(p.ocv), d::fault_of(p.rc, p.ocv),
+                                 d::fault_of(p.noise, p.capacity_ah), d::fault_of(p.tolerance)}) {
+    if (fault.what != nullptr) return fault;
+  }
   return {};
 }
 

@@ -1,18 +1,18 @@
-// The readings of a recording with what needs the readings around them undone: a current that comes late, a temperature
-// that lags.
+// The readings of a recording with two faults undone that need the readings around them: a delayed current and a
+// temperature that lags.
 //
-//   current      whole steps of the delay: the mean of what was read over (t[k - 1] + delay, t[k] + delay], the charge
-//   read by then
-//                interpolated linearly; before the first row and after the last the current is taken to go on.
-//                What is left, a part p of a step: a late reading is (1 - p) of its own interval's current and p of
-//                that before, an early one of that after; solved row by row. (Reading between the rows instead would
-//                smear an edge twice.)
+//   current      Whole steps of the delay: the mean of the current over (t[k - 1] + delay, t[k] + delay], from the
+//   charge
+//                by linear interpolation; before the first row and after the last the current continues.
+//                The rest, a part p of a step: a late reading contains (1 - p) of the current of its own interval and p
+//                of the one before; an early one p of the one after. This is solved row by row. (Reading between the
+//                rows instead would smear an edge twice.)
 //   temperature  T + lag dT/dt, dT/dt the least-squares slope over half a minute to either side
 //
-// A missing current (NaN) is the last one known, 0 at first; a missing temperature the last one known, 25 degrees C at
-// first. Undone by laws instead, one reading at a time: offset, gain, clipping (model/extended.hpp).
+// A missing current (NaN) is replaced by the last known one, 0 at first; a missing temperature by the last known one,
+// 25 degrees C at first. Laws undo offset, gain and clipping, one reading at a time (model/extended.hpp).
 //
-// S: double or a dual number, of the delay and the lag. Host only: it holds copies of the columns.
+// S: double or a dual number, for derivatives by the delay and the lag. Host only: it copies the columns.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@
 
 namespace bms::model {
 
-using namespace arithmetic;  // physics is written in its number types and functions
+using namespace arithmetic;  // the physics uses these number types and functions
 
 template <class S>
 class CorrectedReadings {
@@ -45,8 +45,8 @@ class CorrectedReadings {
     if (lagging_) slopes();
   }
 
-  /// What flowed in the interval that ends at row k; of the first row, which has none, and of a row that is not later
-  /// than the one before: what is read at that moment.
+  /// Current in the interval that ends at row k. For the first row, and for a row that is not later than the one
+  /// before, the current at that moment.
   S current(std::size_t k) const { return late_ ? true_a_[k] : S(current_a_[k]); }
 
   S temperature(std::size_t k) const {
@@ -57,7 +57,7 @@ class CorrectedReadings {
  private:
   static constexpr double default_temperature_c = 25;
   static constexpr double half_window_s = 30;
-  static constexpr double most_part = 0.45;  ///< of a step; at half a step nothing tells the two rows apart
+  static constexpr double most_part = 0.45;  ///< of a step; at half a step the two rows cannot be separated
 
   static double value(const S& s) {
     if constexpr (Dual<S>)
@@ -72,7 +72,7 @@ class CorrectedReadings {
       s = v;
     return s;
   }
-  /// Something to undo, or to differentiate by.
+  /// Returns true if there is a fault to undo, or a derivative to compute.
   static bool acts(const S& s) {
     if constexpr (!Dual<S>)
       return s != 0;
@@ -111,7 +111,8 @@ class CorrectedReadings {
     const auto duration_s = [&](std::size_t k) { return k == 0 ? 0 : time_s_[k] - time_s_[k - 1]; };
     const auto part = [&](std::size_t k) {
       const S p = S(rest_s / duration_s(k));
-      return value(p) > most_part ? S(most_part) : value(p) < -most_part ? S(-most_part) : p;
+      if (value(p) > most_part) return S(most_part);
+      return value(p) < -most_part ? S(-most_part) : p;
     };
     true_a_.clear();
     for (const double a : moved_a) true_a_.push_back(S(a));
@@ -128,7 +129,7 @@ class CorrectedReadings {
         true_a_[k] = S((moved_a[k] - p * true_a_[k + 1]) / (1.0 - p));
       }
     } else {
-      // nothing but whole steps: not a digit differs; the derivative is the mean of both sides'
+      // whole steps only: the values stay the same; the derivative is the mean of both sides
       for (std::size_t k = 1; k + 1 < rows; ++k) {
         if (duration_s(k) > 0)
           true_a_[k] = with_value(S(part(k) * ((moved_a[k + 1] - moved_a[k - 1]) / 2)), moved_a[k]);
@@ -136,7 +137,7 @@ class CorrectedReadings {
     }
   }
 
-  /// Row whose interval holds the time, looked for from row `near`; the last one for what comes after.
+  /// Row whose interval contains the time; the search starts at row `near`. The last row for later times.
   std::size_t row_at(double time_s, std::size_t near) const {
     std::size_t j = near;
     while (j + 1 < time_s_.size() && time_s_[j] < time_s) ++j;
@@ -144,7 +145,7 @@ class CorrectedReadings {
     return j;
   }
 
-  /// Mean of what was read over each row's interval, moved by so much.
+  /// Mean current over each row's interval, shifted by delay_s.
   std::vector<double> moved_by(double delay_s) const {
     if (delay_s == 0) return current_a_;
     std::vector<double> charge_as(time_s_.size(), 0), moved_a = current_a_;
@@ -163,7 +164,7 @@ class CorrectedReadings {
     return moved_a;
   }
 
-  /// Sums over a window that moves along: each row comes in once and leaves once. At least the neighbours are in it.
+  /// Sums over a moving window: each row enters once and leaves once. The window contains at least the neighbours.
   void slopes() {
     const std::size_t rows = time_s_.size();
     c_per_s_.assign(rows, 0);
@@ -171,7 +172,11 @@ class CorrectedReadings {
     double n = 0, t = 0, tt = 0, c = 0, tc = 0;
     const auto take = [&](std::size_t k, double sign) {
       const double s = time_s_[k] - time_s_[0], warm = temperature_c_[k] - temperature_c_[0];
-      n += sign, t += sign * s, tt += sign * s * s, c += sign * warm, tc += sign * s * warm;
+      n += sign;
+      t += sign * s;
+      tt += sign * s * s;
+      c += sign * warm;
+      tc += sign * s * warm;
     };
     std::size_t from = 0, to = 0;  // rows in the sums: from .. to - 1
     for (std::size_t k = 0; k < rows; ++k) {

@@ -1,10 +1,10 @@
-// The base model with a set of mechanisms, open loop: what the simulation, the diagnosis and its fits run.
+// The 1RC model with a set of mechanisms, open loop: for the simulation, the diagnosis and its fits.
 //
 //   Laws<S, M...>        the mechanisms of a cell known at compile time, all acting (firmware)
 //   ChosenLaws<S>        any of the catalogue, chosen at run time (host)
 //
-// Both call the same laws in the same order, that of model/catalogue.hpp: the same digits. What no law of a set touches
-// costs nothing in Laws and an `if` per mechanism in ChosenLaws.
+// Both call the same laws in the same order, that of model/catalogue.hpp, with the same results. A call that no law of
+// the set has costs nothing in Laws and one `if` per mechanism in ChosenLaws.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@
 
 namespace bms::model {
 
-/// The mechanism of that id.
+/// The mechanism with this index in the catalogue.
 template <std::size_t index>
 using MechanismAt = std::tuple_element_t<index, Catalogue>;
 
@@ -29,7 +29,7 @@ using Laws = LawSet<S, typename M::template Law<S>...>;
 
 namespace extended_detail {
 
-/// The place of a law that integers cannot compute.
+/// Takes the place of a law that needs an FPU where the scalar is fixed point.
 struct NoLaw {
   static constexpr LawMembers members = law_member::none;
   template <class... Any>
@@ -52,8 +52,7 @@ struct Chosen<S, std::tuple<M...>> {
   using type = LawSet<S, std::optional<typename LawFor<S, M>::type>...>;
 };
 
-/// Laws that add to the voltage come before those whose states do something else: the filter's states are then the
-/// first ones.
+/// Laws whose states add to the voltage come before laws with other states, so that the filter's states come first.
 template <class... M>
 constexpr bool voltage_states_first(std::tuple<M...>*) {
   bool others = false, good = true;
@@ -79,11 +78,11 @@ using MechanismValues = std::array<Real, max_mechanism_parameters>;
 struct MechanismSetting {
   std::size_t index = 0;  ///< in the catalogue
   MechanismValues<> value{};
-  MechanismValues<> deviation{};  ///< standard deviations; 0: not known, or given
+  MechanismValues<> deviation{};  ///< standard deviations; 0: unknown, or the value was given
 };
 
-/// Place of the first parameter whose value is out of its bounds or whose deviation is none; the number of parameters:
-/// all are good.
+/// Index of the first parameter whose value is outside its bounds or whose standard deviation is invalid; the number of
+/// parameters if all are valid.
 constexpr std::size_t first_fault(const MechanismSetting& setting, double capacity_ah) {
   const MechanismInfo& info = catalogue[setting.index];
   std::size_t k = 0;
@@ -96,7 +95,7 @@ constexpr std::size_t first_fault(const MechanismSetting& setting, double capaci
   return k;
 }
 
-/// All parameters as a cell file means them that says nothing of them: no effect.
+/// All parameters at their default values: the mechanism has no effect.
 constexpr MechanismSetting default_setting(std::size_t index, double capacity_ah) {
   MechanismSetting setting{index, {}, {}};
   for (std::size_t k = 0; k < catalogue[index].parameters; ++k)
@@ -120,13 +119,13 @@ constexpr void choose_at(ChosenLaws<S>& laws, std::size_t index, const Mechanism
 
 }  // namespace extended_detail
 
-/// Adds the mechanism with that index in the catalogue, or changes it.
+/// Adds the mechanism with this index in the catalogue, or replaces its parameters.
 template <class S, class Real>
 constexpr void choose(ChosenLaws<S>& laws, std::size_t index, const MechanismValues<Real>& values, double capacity_ah) {
   extended_detail::choose_at<S, Real, 0>(laws, index, values, capacity_ah);
 }
 
-/// All of a cell file.
+/// The laws of all mechanisms of a cell file.
 template <class S>
 constexpr ChosenLaws<S> chosen(std::span<const MechanismSetting> settings, double capacity_ah) {
   ChosenLaws<S> laws;
@@ -134,7 +133,7 @@ constexpr ChosenLaws<S> chosen(std::span<const MechanismSetting> settings, doubl
   return laws;
 }
 
-/// What the tables say for a dual number, from tables that are not unknowns themselves.
+/// The tables for a dual number; the tables themselves are constants.
 template <Dual S>
 TablePoint<S> look_up_dual(const Cell<double, max_intervals>& cell, const S& soc, std::uint8_t& interval) {
   const TablePoint<double> p = look_up(cell, soc.a, interval);
@@ -156,7 +155,7 @@ TablePoint<S> look_up_dual(const Cell<double, max_intervals>& cell, const S& soc
           .gap_delta = S(p.gap_delta)};
 }
 
-/// A cell on its way through a recording, open loop. S: double or a dual number.
+/// Open-loop simulation of a cell over a recording. S: double or a dual number.
 template <class S>
 class OpenLoopSimulation {
  public:
@@ -165,9 +164,9 @@ class OpenLoopSimulation {
   OpenLoopSimulation(const Tables& cell, double capacity_ah, const ChosenLaws<S>& laws, const S& initial_soc)
       : cell_(cell), per_capacity_(1 / (3'600 * capacity_ah)), laws_(laws), soc_(initial_soc), x_(laws_.initial()) {}
 
-  /// One row: duration_s since the row before (0: the state stays), current that was read (of a channel that is not
-  /// late), the temperature (NaN: none). adjust(TablePoint&, soc): what else changes the tables. Returns the voltage
-  /// that would be read.
+  /// One row: duration_s since the row before (0: the state stays), the current that was read (without delay), the
+  /// temperature (NaN if missing). adjust(TablePoint&, soc): further changes of the tables. Returns the voltage that
+  /// the sensor would read.
   template <class Adjust>
   S step(double time_s, double duration_s, const S& read_a, const S& read_c, Adjust&& adjust) {
     laws_.at(time_s);
@@ -191,7 +190,7 @@ class OpenLoopSimulation {
   const S& soc() const { return soc_; }
   const S& v_rc_v() const { return v_rc_[0]; }
 
-  /// All that the next row knows of those before it: soc, v_rc, the laws' states. f(S&).
+  /// Calls f(S&) for each state that the next row depends on: SOC, v_rc, the laws' states.
   template <class F>
   void each_state(F&& f) {
     f(soc_);
@@ -207,7 +206,7 @@ class OpenLoopSimulation {
     else
       return s;
   }
-  /// In value, or as a function of what is sought.
+  /// Returns true if values or derivatives differ.
   static bool differs(const S& a, const S& b) {
     if constexpr (Dual<S>)
       return a.a != b.a || a.v != b.v;

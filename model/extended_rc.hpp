@@ -1,21 +1,21 @@
-// The 1RC model with a set of mechanisms, as the filter steps it: states v_rc, the mechanisms' voltages, soc.
+// The 1RC model with a set of mechanisms, as the filter steps it: states v_rc, the mechanisms' voltages, SOC.
 //
-//   Voltages   states of mechanisms that add to the voltage and that the filter corrects
-//   Held       all states of mechanisms; those that are not corrected (a warmth) come last
-//   Errors     whether two lasting errors are states as well: by how much the model's voltage is too low [V], and by
-//   how much the
-//              current reads too high, as part of the capacity per hour [1/h]. Both are first-order Gauss-Markov
-//              processes: noise.model_v over `persistent_error_correlations` times noise.model_correlation_s,
-//              noise.current_offset_a over its own correlation time
+//   Voltages          states of mechanisms that add to the voltage and that the filter corrects
+//   MechanismStates   all states of mechanisms; those that are not corrected (a temperature rise) come last
+//   Errors            whether two persistent errors are states as well: the amount by which the model's voltage is too
+//                     low [V], and the amount by which the current reads too high, in capacities per hour [1/h]. Both
+//                     are first-order Gauss-Markov processes: noise.model_v over `persistent_error_correlations` times
+//                     noise.model_correlation_s, noise.current_offset_a over its own correlation time
 //
-//   covariance   v_rc, voltage error, mechanisms' voltages, soc, current offset        what the offset moves comes
-//   before it values       v_rc, voltage error, current offset, mechanisms' states               soc is counted
-//   elsewhere
+//   covariance   v_rc, voltage error, mechanisms' voltages, SOC, current offset      (a state comes before those that
+//                                                                                     act on it)
+//   values       v_rc, voltage error, current offset, mechanisms' states             (the SOC is counted separately)
 //
-// A mechanism's state depends on itself and on the current alone: x' = x + p (target - x), d x' / d x = 1 - p, nothing
-// by soc. What its laws make of the tables runs through the tables' own derivatives. ExtendedRc<0, 0> is OneRc.
+// A mechanism's state depends on itself and on the current only: x' = x + alpha (target - x), d x' / d x = 1 - alpha,
+// no derivative by SOC. The laws' effect on the tables enters through the tables' own derivatives. ExtendedRc<0, 0> is
+// OneRc.
 //
-// The laws come with the cell: a Cell has none, an ExtendedCell has those of its file.
+// The laws come with the cell: a Cell has no laws, an ExtendedCell has those of its file.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@
 
 namespace bms::model {
 
-/// A prepared cell and what the 1RC model leaves out of it. SomeLaws: Laws or ChosenLaws (model/extended.hpp).
+/// A prepared cell with the laws of its mechanisms. SomeLaws: Laws or ChosenLaws (model/extended.hpp).
 template <class S, std::size_t Max, class SomeLaws>
 struct ExtendedCell : Cell<S, Max> {
   SomeLaws laws;
@@ -43,7 +43,7 @@ constexpr const SomeLaws& laws_of(const ExtendedCell<S, Max, SomeLaws>& cell) {
   return cell.laws;
 }
 
-/// A cell under one drive and with one state of its mechanisms: what its tables then say.
+/// A cell with the input and the mechanism states for which its tables are evaluated.
 template <class Tables, class StepInput, class Voltage>
 struct OperatingPoint {
   const Tables& cell;
@@ -93,13 +93,15 @@ struct ExtendedRc {
     using MeasurementJacobian = std::array<VoltagePerSoc<S>, states>;
     using Variances = std::array<Variance<S>, states>;
 
-    /// Where among the values the covariance's state i is; i != soc.
+    /// Index among the values of state i of the covariance; i != soc.
     static constexpr std::size_t value_index(std::size_t i) {
-      return !Errors ? i : i > soc ? current_offset : i < first_voltage ? i : i - first_voltage + first_mechanism_state;
+      if (!Errors) return i;
+      if (i > soc) return current_offset;
+      return i < first_voltage ? i : i - first_voltage + first_mechanism_state;
     }
     static constexpr const Voltage<S>* mechanism_states(const State& x) { return x.data() + first_mechanism_state; }
 
-    /// How much of the two errors is forgotten in a step: of its duration alone.
+    /// Share of the two errors that decays in a step; depends on its duration alone.
     struct ErrorDecay {
       Fraction<S> voltage_error{}, current_offset{};
     };
@@ -125,7 +127,7 @@ struct ExtendedRc {
       return {Base::discretise(at, input.duration_s), laws.discretise(mechanism_states(x), at, input), error_decay};
     }
 
-    /// What the current sensor reads, less its offset.
+    /// Current reading minus the estimated offset.
     static constexpr Current<S> without_offset(const Current<S>& read_a, const State& x, const FilterNoise<S>& noise) {
       if constexpr (Errors)
         return Current<S>(read_a - noise.one_c_a * x[current_offset]);
@@ -148,7 +150,7 @@ struct ExtendedRc {
       return next;
     }
 
-    /// What the sensor reads.
+    /// Voltage that the sensor reads.
     template <class SomeLaws>
     static constexpr Voltage<S> voltage(const SomeLaws& laws, const State& x, const TablePoint<S>& at,
                                         const StepInput<S>& input) {
@@ -157,7 +159,7 @@ struct ExtendedRc {
       return laws.reading(v);
     }
 
-    /// The terminal's voltage of a reading.
+    /// Terminal voltage of a reading.
     template <class SomeLaws>
     static constexpr Voltage<S> true_voltage(const SomeLaws& laws, const Voltage<S>& read_v) {
       if (!laws.changes_reading()) return read_v;
@@ -184,7 +186,7 @@ struct ExtendedRc {
       f[soc][soc] = Coupling<S>(1);
       if constexpr (Errors) {
         f[voltage_error][voltage_error] = Coupling<S>(Fraction<S>(1) - discretisation.error_decay.voltage_error);
-        // what an offset drops over the resistances is below a millivolt
+        // the drop of an offset over the resistances is below a millivolt
         f[soc][last] = -Coupling<S>(input.duration_s * Fraction<S>(1.0 / 3'600));
         f[last][last] = Coupling<S>(Fraction<S>(1) - discretisation.error_decay.current_offset);
       }
@@ -214,8 +216,8 @@ struct ExtendedRc {
       return h;
     }
 
-    /// Process noise of a step but soc's: what decays in it, 1 - (1 - p)^2, comes back to the variance of the steady
-    /// state.
+    /// Process noise of a step, without the SOC's: it replaces the share that decays, 1 - (1 - alpha)^2, of the
+    /// steady-state variance.
     template <class SomeLaws>
     static constexpr Variances noise(const SomeLaws& laws, const Discretisation& discretisation,
                                      const FilterNoise<S>& of) {
@@ -237,8 +239,8 @@ struct ExtendedRc {
       return q;
     }
 
-    /// The lasting errors' and the mechanisms' part of a start under a current of which nobody knows how long it has
-    /// flowed: half of what it can have built up, give or take the same. Sets the mechanisms' states in x and all these
+    /// Start of the persistent errors and of the mechanisms under a current that has flowed for an unknown time: half
+    /// of the final voltage, with a standard deviation of the same size. Sets the mechanisms' states in x and their
     /// variances.
     template <class SomeLaws>
     static constexpr void start(const SomeLaws& laws, State& x, Variances& variances, const TablePoint<S>& at,
@@ -268,12 +270,12 @@ struct ExtendedRc {
     static constexpr Variance<S> steady_state_noise(const Variance<S>& steady, const Fraction<S>& alpha) {
       return product<Variance<S>>(steady, Fraction<S>(alpha * Fraction<S>(Fraction<S>(2) - alpha)));
     }
-    /// Of a long time that a short one is, 1 at most.
+    /// short_s / long_s, 1 at most.
     template <class Time>
     static constexpr Fraction<S> part(const Time& short_s, const Duration<S>& long_s) {
       return long_s > Duration<S>(short_s) ? ratio<Fraction<S>>(Duration<S>(short_s), long_s) : Fraction<S>(1);
     }
-    /// A reading is a straight line of the voltage.
+    /// Slope of the reading, which is linear in the voltage.
     template <class SomeLaws>
     static constexpr Voltage<S> gain(const SomeLaws& laws) {
       return Voltage<S>(laws.reading(Voltage<S>(1)) - laws.reading(Voltage<S>(0)));

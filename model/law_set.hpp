@@ -1,10 +1,10 @@
-// A set of mechanisms' laws, called one after the other. What no law of the set touches costs nothing; what is optional
-// costs an `if`.
+// A set of mechanisms' laws, called one after the other. A call that no law of the set has costs nothing; an optional
+// law costs an `if`.
 //
 //   LawSet<S, Law...>                   laws that all act
-//   LawSet<S, std::optional<Law>...>    laws of which some act
+//   LawSet<S, std::optional<Law>...>    laws that act if they are set
 //
-// States stand one behind the other in the order of the laws; those of laws that do not act take no place.
+// The states are stored one after the other in the order of the laws; laws that do not act take no place.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ namespace bms::model {
 
 namespace extended_detail {
 
-/// A law as it stands in a slot.
+/// The law of a slot.
 template <class Slot>
 struct LawIn {
   using type = Slot;
@@ -105,12 +105,13 @@ class LawSet {
     });
     return a;
   }
-  /// Where the OCV is read: x, the laws' states.
+  /// SOC at which the OCV is read. x: the laws' states.
   template <class X>
   constexpr Soc<S> ocv_soc(Soc<S> soc, const X& x) const {
     each_with_states([&](const auto& law, std::size_t first) { soc = ocv_soc(law, soc, x, first); });
     return soc;
   }
+  /// d ocv_soc / d soc.
   template <class X>
   constexpr Coupling<S> ocv_soc_slope(Soc<S> soc, const X& x) const {
     Coupling<S> slope(1);
@@ -120,7 +121,7 @@ class LawSet {
     });
     return slope;
   }
-  /// By how much soc is read ahead per volt of each voltage state.
+  /// Shift of the SOC at which the OCV is read, per volt of each voltage state.
   template <class Couplings>
   constexpr void soc_shift_per_v(Couplings& out) const {
     each_with_states([&](const auto& law, std::size_t first) {
@@ -144,7 +145,7 @@ class LawSet {
     return v;
   }
 
-  /// Whether any law makes another current of the one that is read, on its way to the charge.
+  /// Returns true if a law changes the current between reading and charge.
   constexpr bool changes_charge() const {
     bool any = false;
     each([&](const auto& law) {
@@ -153,7 +154,7 @@ class LawSet {
     });
     return any;
   }
-  /// Else the resistances are those of the cell file's temperature, whatever it is.
+  /// Returns false if the resistances are those of the cell file at every temperature.
   constexpr bool resistances_follow_temperature() const {
     bool any = false;
     each([&](const auto& law) {
@@ -161,6 +162,7 @@ class LawSet {
     });
     return any;
   }
+  /// Returns true if a law changes the voltage reading.
   constexpr bool changes_reading() const {
     bool any = false;
     each([&](const auto& law) {
@@ -174,7 +176,7 @@ class LawSet {
     each([&](const auto& law) { count += states_of(law); });
     return count;
   }
-  /// Those that add to the voltage: the first ones.
+  /// Number of states that add to the voltage; they come first.
   constexpr std::size_t voltage_states() const {
     std::size_t count = 0;
     each([&](const auto& law) { count += extended_detail::voltage_states_of<std::remove_cvref_t<decltype(law)>>(); });
@@ -189,7 +191,7 @@ class LawSet {
     });
     return x;
   }
-  /// How each state moves in a step. x: the laws' states before it.
+  /// The relaxation of each state in a step. x: the laws' states before it.
   template <class X>
   constexpr Relaxations discretise(const X& x, const TablePoint<S>& at, const StepInput<S>& input) const {
     Relaxations r{};
@@ -198,7 +200,7 @@ class LawSet {
     });
     return r;
   }
-  /// Variances of the voltage states: of each, its law's own or otherwise(state).
+  /// Variances of the voltage states: the law's own sigma if it has one, else otherwise(state).
   template <class Variances, class Own, class Otherwise>
   constexpr void variances(Variances& out, Own own, Otherwise otherwise) const {
     each_with_states([&](const auto& law, std::size_t first) {
@@ -213,7 +215,7 @@ class LawSet {
       }
     });
   }
-  /// Voltage states advanced, and what they add to the terminal's voltage.
+  /// Advances the states if `moving`. Returns the sum of the voltage states.
   constexpr Voltage<S> advance(States& x, const TablePoint<S>& at, const StepInput<S>& input, bool moving) const {
     Voltage<S> sum(0);
     each_with_states([&](const auto& law, std::size_t first) {

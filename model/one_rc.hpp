@@ -3,14 +3,13 @@
 //   d v_rc / dt = -v_rc / (R1 C1) + I / C1        d soc / dt = I / (3600 C_n)        V = OCV(soc) + v_rc + R0 I
 //
 // Current > 0 charges; v_rc > 0 while charging (v_rc = -x1 of Eq. 9; the sign of R0 u in Eq. 3 and 5 is an erratum).
-// One step is exact for a current that is constant over it (zero-order hold), with R1 and C1 taken at the soc after the
-// step:
+// One step is exact for a constant current (zero-order hold), with R1 and C1 at the SOC after the step:
 //
-//   p = 1 - exp(-dt / (R1 C1))        v_rc' = v_rc + p (R1 I - v_rc)
+//   alpha = 1 - exp(-dt / (R1 C1))        v_rc' = v_rc + alpha (R1 I - v_rc)
 //
-// A model gives the filter: `states` (soc is always the last), how the states before soc advance, the voltage, and the
-// derivatives of both. A state may depend on itself and on later states only, so that the transition matrix is upper
-// triangular; a second RC or a hysteresis voltage comes before soc, a sensor offset would come after.
+// A model provides the number of states (the SOC is the last here), the step of the states before the SOC, the voltage,
+// and the derivatives of both. A state may depend on itself and on later states only, so that the state transition is
+// upper triangular: a second RC branch or a hysteresis voltage comes before the SOC, a sensor offset after it.
 #pragma once
 
 #include <array>
@@ -21,12 +20,12 @@
 
 namespace bms::model {
 
-/// What acts on the cell during one step.
+/// Input of one time step.
 template <class S>
 struct StepInput {
   Current<S> current_a;                               ///< mean over the step, > 0 charges
   TimeStep<S> duration_s;                             ///< > 0
-  Temperature<S> temperature_c = Temperature<S>(25);  ///< of the cell; read by mechanisms only
+  Temperature<S> temperature_c = Temperature<S>(25);  ///< of the cell; used by mechanisms only
 };
 
 template <class S>
@@ -37,11 +36,11 @@ struct OneRc {
   using StateTransition = std::array<std::array<Coupling<S>, states>, states>;
   using MeasurementJacobian = std::array<VoltagePerSoc<S>, states>;
 
-  /// How far the RC branch settles within a step, for the tables at one soc.
+  /// Discretised RC branch for one step, from the tables at one SOC.
   struct Discretisation {
     Rate<S> rate_per_s;             ///< 1 / (R1 C1)
-    Fraction<S> alpha;              ///< p
-    Fraction<S> alpha_by_log_rate;  ///< dp / d ln rate = x exp(-x) of x = duration / (R1 C1)
+    Fraction<S> alpha;              ///< 1 - exp(-x), x = duration / (R1 C1)
+    Fraction<S> alpha_by_log_rate;  ///< d alpha / d ln rate = x exp(-x)
   };
 
   static constexpr Discretisation discretise(const TablePoint<S>& at, const TimeStep<S>& duration_s) {
@@ -54,7 +53,7 @@ struct OneRc {
     return {rate_per_s, alpha, remaining * x};
   }
 
-  /// v_rc at the start of the step; `at` and `settling` belong to the soc at its end.
+  /// x: at the start of the step; at and discretisation: at the SOC at its end.
   static constexpr State advance(const State& x, const TablePoint<S>& at, const Discretisation& discretisation,
                                  const StepInput<S>& input) {
     return {Voltage<S>(x[0] + Voltage<S>(discretisation.alpha * gap_v(x, at, input)))};
@@ -65,12 +64,12 @@ struct OneRc {
     return at.ocv_v + x[0] + Voltage<S>(at.r0_ohm * input.current_a);
   }
 
-  /// d (state after) / d (state before), upper triangular. The derivative by soc runs through R1, C1 and dp/dx =
-  /// exp(-x).
+  /// d (state after) / d (state before), upper triangular. The derivative by SOC comes through R1, C1 and
+  /// d alpha / dx = exp(-x).
   static constexpr StateTransition state_transition(const State& x, const TablePoint<S>& at,
                                                     const Discretisation& discretisation, const StepInput<S>& input) {
     const Fraction<S> remaining = Fraction<S>(1) - discretisation.alpha;
-    // over one interval: tau, p, and what v_rc goes to
+    // changes over one interval: of tau, of alpha, and of the final v_rc
     const Duration<S> tau_delta_s = Duration<S>(at.r1_delta_ohm * at.c1_f) + Duration<S>(at.r1_ohm * at.c1_delta_f);
     const Ratio tau_change = tau_delta_s * discretisation.rate_per_s;
     const Ratio alpha_delta = discretisation.alpha_by_log_rate * tau_change;
@@ -90,7 +89,7 @@ struct OneRc {
  private:
   using Ratio = Current<S>;  // relative changes over an interval: below 2,048
 
-  /// How far v_rc is from where the current leads it.
+  /// Distance of v_rc from its final value under this current.
   static constexpr Voltage<S> gap_v(const State& x, const TablePoint<S>& at, const StepInput<S>& input) {
     return Voltage<S>(at.r1_ohm * input.current_a) - x[0];
   }

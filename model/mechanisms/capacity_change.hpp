@@ -1,4 +1,4 @@
-// Another capacity than the cell file's: soc moves faster for the same charge.
+// The capacity differs from the cell file's: the SOC moves faster or slower for the same charge.
 //
 //   d soc / dt = I / (3600 C_n (1 - f))
 #pragma once
@@ -12,8 +12,7 @@ struct CapacityChange {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"loss_fraction", "1", Role::strength, 0, -0.3, 0.6, Per::cell, "f: part of the capacity that is gone",
-                0.25},
+      Parameter{"loss_fraction", "1", Role::strength, 0, -0.3, 0.6, Per::cell, "f: lost share of the capacity", 0.25},
   };
 
   template <class S>

@@ -1,6 +1,6 @@
-// Current and voltage are not read at the same time: the current of row k is that of an interval which ended `delay`
-// earlier than the voltage was read (< 0: later). Undone by reading the charge that has flowed at shifted times; it
-// needs the readings to come, so it exists on the host alone.
+// Current and voltage are not sampled at the same time: the current of row k belongs to an interval that ended `delay`
+// before the voltage was sampled (< 0: after). It is undone by reading the charge at shifted times. This needs later
+// readings, so the mechanism exists on the host only.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -13,7 +13,7 @@ struct ChannelSkew {
   static constexpr bool on_board = false;
   static constexpr bool needs_fpu = true;
   static constexpr std::array parameters = {
-      Parameter{"delay_s", "s", Role::strength, 0, -15, 15, Per::cell, "current behind the voltage"},
+      Parameter{"delay_s", "s", Role::strength, 0, -15, 15, Per::cell, "delay of the current relative to the voltage"},
   };
 
   template <class S>

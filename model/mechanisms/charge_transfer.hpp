@@ -1,9 +1,9 @@
-// Non-linear charge transfer: the overvoltage of a reaction grows with the logarithm of a large current (Butler-Volmer
-// with equal transfer coefficients).
+// Non-linear charge transfer: the overpotential of a reaction grows with the logarithm of a large current
+// (Butler-Volmer with equal transfer coefficients).
 //
 //   eta = (2 R T / F) asinh(I / (2 I_0)):  a share of R0 and of R1 becomes  R asinh(x) / x,  x = I / (2 I_0)
 //
-// At small currents nothing changes: the shares keep the resistance that the cell file has.
+// At small currents nothing changes: there the shares have the resistance of the cell file.
 #pragma once
 
 #include "model/mechanism.hpp"

@@ -1,5 +1,5 @@
-// A loose contact: R0 plus a constant in bursts. Which bursts is read off a recording and says nothing about another
-// one.
+// A loose contact: a resistance is added to R0 in bursts. The bursts are read from one recording and are not valid for
+// another one.
 #pragma once
 
 #include <span>
@@ -8,7 +8,7 @@
 
 namespace bms::model {
 
-/// A stretch of time, both ends included.
+/// A time interval, both ends included.
 struct Span {
   double start_s = 0, end_s = 0;
 };
@@ -19,14 +19,14 @@ struct ContactIntermittent {
   static constexpr bool on_board = false;
   static constexpr std::array parameters = {
       Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 1, Per::siemens, "added to R0 in a burst"},
-      Parameter{"share", "1", Role::given, 0, 0, 1, Per::cell, "of the time that is bursts"},
+      Parameter{"share", "1", Role::given, 0, 0, 1, Per::cell, "share of the time in bursts"},
   };
 
   template <class S>
   struct Law {
     static constexpr LawMembers members = law_member::tables | law_member::at;
     Resistance<S> added_ohm;
-    std::span<const Span> bursts;  ///< ascending, of the recording at hand; none: a contact that holds
+    std::span<const Span> bursts;  ///< ascending, of the present recording; empty: the contact is good
     std::size_t next = 0;
     bool active = false;
 

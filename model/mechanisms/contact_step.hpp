@@ -1,5 +1,5 @@
-// A contact has become worse at a moment and stays so: R0 plus a constant from then on. On a board, where recordings do
-// not begin again, it is there all the time.
+// A contact becomes worse at one moment and stays so: from that moment a resistance is added to R0. On a board, which
+// does not start recordings again, it is always added.
 #pragma once
 
 #include "arithmetic/exponential.hpp"
@@ -14,7 +14,7 @@ struct ContactStep {
   static constexpr std::array parameters = {
       Parameter{"resistance_ohm", "ohm", Role::strength, 0, -0.05, 0.5, Per::siemens, "added to R0"},
       Parameter{"onset_s", "s", Role::given, 0, -1e12, 1e12, Per::cell,
-                "time in the recording; later recordings have it from their start"},
+                "time in the recording; in later recordings it acts from the start"},
   };
 
   template <class S>

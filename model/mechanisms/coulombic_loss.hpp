@@ -1,4 +1,4 @@
-// Not all charge that goes in comes out: a part of the charging current ends in side reactions.
+// Not all charge that is charged can be discharged: side reactions consume a share of the charging current.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -10,7 +10,8 @@ struct CoulombicLoss {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"loss_fraction", "1", Role::strength, 0, -0.02, 0.1, Per::cell, "1 - eta", 0.03},
+      Parameter{"loss_fraction", "1", Role::strength, 0, -0.02, 0.1, Per::cell, "1 - eta, eta: coulombic efficiency",
+                0.03},
   };
 
   template <class S>

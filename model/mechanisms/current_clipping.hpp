@@ -1,5 +1,5 @@
-// The current sensor ends at +-L: what it reads there is less than what flows, on average by e. Beyond L the reading is
-// bent before it stops: from (1 - knee) L on.
+// The current sensor saturates at +-L: beyond L, the true current exceeds the reading by e on average. The reading
+// bends before it saturates, from (1 - knee) L on.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -13,9 +13,9 @@ struct CurrentClipping {
   static constexpr bool needs_fpu = true;
   static constexpr std::array parameters = {
       Parameter{"excess_a", "A", Role::strength, 0, 0, 8, Per::ah,
-                "e: current beyond L, mean over the time at the end; bounds in multiples of 1C"},
+                "e: mean current beyond L while the sensor saturates; bounds in multiples of 1C"},
       Parameter{"limit_a", "A", Role::given, 1, 0, 100, Per::ah, "L, the largest reading"},
-      Parameter{"knee", "1", Role::shape, 0.1, 0.01, 0.7, Per::cell, "part of L over which the sensor bends"},
+      Parameter{"knee", "1", Role::shape, 0.1, 0.01, 0.7, Per::cell, "share of L over which the reading bends"},
   };
 
   template <class S>

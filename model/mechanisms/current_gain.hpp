@@ -1,4 +1,4 @@
-// The current sensor reads too much by a fraction: I = I_read / (1 + g).
+// The current sensor has a gain error: I = I_read / (1 + g).
 #pragma once
 
 #include "model/mechanism.hpp"

@@ -1,4 +1,4 @@
-// The current sensor reads a constant too much: I = I_read - b.
+// The current sensor has an offset: I = I_read - b.
 #pragma once
 
 #include "model/mechanism.hpp"

@@ -1,4 +1,4 @@
-// Charging meets another resistance than discharging: R0 and R1 times (1 + a) while the current is positive.
+// The resistance differs between charge and discharge: R0 and R1 times (1 + a) while the current is positive.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -11,7 +11,7 @@ struct DirectionAsymmetry {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"charge_fraction", "1", Role::strength, 0, -0.6, 1.5, Per::cell,
-                "a: resistance of charging over discharging, less 1"},
+                "a: charge resistance over discharge resistance, minus 1"},
   };
 
   template <class S>

@@ -1,6 +1,6 @@
-// The open-circuit voltage follows the temperature (entropy of the reaction):
+// The open-circuit voltage depends on the temperature (reaction entropy):
 //
-//   V += dU/dT(soc) (T - T_ref),  dU/dT linear in soc between 10, 40, 70 and 95 %, constant outside
+//   V += dU/dT(soc) (T - T_ref),  dU/dT linear in SOC between 10, 40, 70 and 95 %, constant outside
 #pragma once
 
 #include "arithmetic/exponential.hpp"
@@ -14,7 +14,7 @@ struct EntropicOcv {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"at_10_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell,
-                "dU/dT at 10 % of soc; -0.6 to 0.4 mV/K is usual for LFP and graphite", 0.0005},
+                "dU/dT at 10 % SOC; -0.6 to 0.4 mV/K is usual for LFP and graphite", 0.0005},
       Parameter{"at_40_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 40 %", 0.0005},
       Parameter{"at_70_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 70 %", 0.0005},
       Parameter{"at_95_v_per_k", "V/K", Role::strength, 0, -0.001, 0.001, Per::cell, "the same at 95 %", 0.0005},
@@ -46,7 +46,7 @@ struct EntropicOcv {
           if (!(soc < node[k + 1])) continue;
           const Fraction<S> t = Soc<S>(soc - node[k]) * per_width[k];
           here = v_per_k[k] + t * delta_v_per_k[k];
-          if constexpr (!Dual<S>) {  // over one interval of the tables; a dual number has it already
+          if constexpr (!Dual<S>) {  // per interval of the tables; a dual number contains it already
             const VoltagePerSoc<S> slope_v = Voltage<S>(delta_v_per_k[k] * per_width[k]) * warmer_k;
             at.ocv_delta_v = at.ocv_delta_v + ratio<Voltage<S>>(slope_v, at.per_width);
           }

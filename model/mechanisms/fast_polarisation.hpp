@@ -1,8 +1,9 @@
-// A polarisation faster than R1 C1: double layer and charge transfer, seen in the first seconds after an edge.
+// A polarisation faster than R1 C1: double layer and charge transfer, visible in the first seconds after a current
+// edge.
 //
 //   du/dt = (R I - u) / tau        V += u
 //
-// R is that at the temperature of the cell file, where the file has a temperature_resistance.
+// R is the resistance at the temperature of the cell file, if the file has a temperature_resistance.
 #pragma once
 
 #include "arithmetic/exponential.hpp"

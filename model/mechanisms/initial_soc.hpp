@@ -1,4 +1,4 @@
-// The state of charge at the start was another than believed.
+// The initial state of charge differs from the given one.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -10,7 +10,7 @@ struct InitialSoc {
   static constexpr Domain domain = Domain::start;
   static constexpr bool on_board = false;
   static constexpr std::array parameters = {
-      Parameter{"shift", "1", Role::strength, 0, -0.5, 0.5, Per::cell, "true less believed soc"},
+      Parameter{"shift", "1", Role::strength, 0, -0.5, 0.5, Per::cell, "true minus given SOC"},
   };
 
   template <class S>

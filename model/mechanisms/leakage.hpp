@@ -1,4 +1,4 @@
-// The cell loses charge by itself: a current inside it, or beside it, that no sensor sees.
+// A current that no sensor measures discharges the cell, inside it or in parallel to it.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -10,8 +10,7 @@ struct Leakage {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"current_a", "A", Role::strength, 0, -0.002, 0.05, Per::ah,
-                "lost all the time; bounds in multiples of 1C"},
+      Parameter{"current_a", "A", Role::strength, 0, -0.002, 0.05, Per::ah, "constant loss; bounds in multiples of 1C"},
   };
 
   template <class S>

@@ -1,20 +1,20 @@
-// Hysteresis of the open-circuit voltage, one state h:
+// Hysteresis of the open-circuit voltage, with one state h:
 //
 //   V += M (h - h_0)      -1 <= h <= 1
 //
-// h_0 is where the cell file's OCV lies between the branches: -1 the discharge branch, 0 the middle, 1 the charge
-// branch. h is not changed by rest, however long. How it moves, and M, by `measured`:
+// h_0 is the branch position of the cell file's OCV: -1 the discharge branch, 0 the middle, 1 the charge branch. Rest
+// does not change h. `measured` selects how h moves, and M:
 //
-//   0   dh/dt = gamma |I| / (3600 C_n) (sgn I - h), M the same everywhere (Plett, J. Power Sources 134 (2004) 252, Part
-//   2, with its decay
-//       in charge moved). What diagnosis seeks
-//   1   dh/dt = gamma I / (3600 C_n), stopped at -1 and 1, and M follows the cell file's half_gap_v over soc: at h = -1
-//   and 1 the OCV is the
-//       curve that was measured in discharge and charge. Where a drive recovers some of what it takes, a cell stays
-//       near its discharge branch, knees and all; the first law, whose mean h is charge less discharge over their sum,
-//       puts it half way
+//   0   dh/dt = gamma |I| / (3600 C_n) (sgn I - h), M constant (Plett, J. Power Sources 134 (2004) 252, Part 2, with
+//   its
+//       decay in moved charge). The diagnosis searches for this form
+//   1   dh/dt = gamma I / (3600 C_n), limited to -1 .. 1, and M follows the cell file's half_gap_v over SOC: at h = -1
+//   and
+//       1 the OCV is the curve that was measured in discharge and in charge. In a drive with regenerative braking a
+//       cell stays near its discharge branch, with the knees of that branch. The first form, whose mean h is (charge -
+//       discharge) / (charge + discharge), puts it halfway
 //
-// The state carried is M h, M that of the middle of the curve.
+// The state is M h, with M of the middle of the curve.
 #pragma once
 
 #include "arithmetic/exponential.hpp"
@@ -28,16 +28,15 @@ struct OcvHysteresis {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"half_gap_v", "V", Role::strength, 0, 0, 0.07, Per::cell,
-                "half of charge less discharge branch, M; 3 to 40 mV is usual for LFP", 0.04},
+                "M: half of charge minus discharge branch; 3 to 40 mV is usual for LFP", 0.04},
       Parameter{"decay", "1", Role::shape, 40, 8, 400, Per::cell,
-                "gamma: 1 / decay of the capacity moved leads from one branch to 63 % of the way to the other; "
-                "measured: to half of it"},
+                "gamma: a charge of 1 / decay of the capacity covers 63 % of the way from one branch to the other; "
+                "measured: half of the way"},
       Parameter{"ocv_at", "1", Role::place, 0, -1, 1, Per::cell,
-                "h_0: where the OCV of the cell file lies, -1 discharge .. 1 charge branch"},
+                "h_0: branch position of the cell file's OCV, -1 discharge .. 1 charge branch"},
       Parameter{"initial", "1", Role::place, 0, -1, 1, Per::cell, "h at the start of a recording"},
       Parameter{"measured", "1", Role::given, 0, 0, 1, Per::cell,
-                "1: between the curves of charge and discharge in the cell file; 0: exponentially, and the same gap "
-                "everywhere"},
+                "1: between the charge and discharge curves of the cell file; 0: exponentially, with a constant gap"},
   };
 
   template <class S>
@@ -74,16 +73,16 @@ struct OcvHysteresis {
       const Voltage<S> step_v = half_gap_v * Fraction<S>(far ? Exponent<S>(0) : moved);
       return {!far && left_v > step_v ? ratio<Fraction<S>>(step_v, left_v) : Fraction<S>(1), target, exponentially};
     }
-    constexpr Voltage<S> initial_sigma_v() const { return half_gap_v; }  // h may be anything
+    constexpr Voltage<S> initial_sigma_v() const { return half_gap_v; }  // h is unknown
     constexpr Voltage<S> steady_state_sigma_v() const {
       return Voltage<S>(half_gap_v * Fraction<S>(0.25));
-    }  // one state is not the whole of it: minor loops
+    }  // one state does not describe minor loops
     constexpr void apply_state(TablePoint<S>& at, const Voltage<S>& state_v, const StepInput<S>&) const {
       if (!measured) {
         at.ocv_v = at.ocv_v - ocv_at_v;
         return;
       }
-      // the state itself is added with the others
+      // the state itself is added with the other voltage states
       at.ocv_v = at.ocv_v + Voltage<S>(state_v * Factor<S>(at.gap - Factor<S>(1))) - Voltage<S>(ocv_at_v * at.gap);
       at.ocv_delta_v = at.ocv_delta_v + Voltage<S>(Voltage<S>(state_v - ocv_at_v) * at.gap_delta);
     }

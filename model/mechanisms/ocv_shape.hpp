@@ -1,9 +1,9 @@
-// The open-circuit voltage's steps lie at another soc than in the cell file: one electrode has slipped against the
-// other (loss of lithium) or lost material. The curve is read elsewhere:
+// The knees of the open-circuit voltage lie at another SOC than in the cell file: one electrode has shifted relative to
+// the other (loss of lithium) or lost material. The curve is read at a shifted SOC:
 //
 //   V = OCV(soc + d(soc)),  d linear between 0 at empty, d_1 at 20 %, d_2 at 80 % and 0 at full
 //
-// Empty and full stay where the voltage limits put them; in between the stages of the graphite slide together.
+// Empty and full stay at the voltage limits; in between the stages of the graphite shift together.
 #pragma once
 
 #include "model/mechanism.hpp"

@@ -1,4 +1,4 @@
-// A polarisation larger or slower everywhere than the cell file's.
+// A polarisation larger or slower than the cell file's, at every SOC.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -10,8 +10,8 @@ struct PolarisationGrowth {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"r1_fraction", "1", Role::strength, 0, -0.8, 6, Per::cell, "R1 times 1 + this"},
-      Parameter{"c1_fraction", "1", Role::strength, 0, -0.8, 6, Per::cell, "C1 times 1 + this"},
+      Parameter{"r1_fraction", "1", Role::strength, 0, -0.8, 6, Per::cell, "relative increase of R1"},
+      Parameter{"c1_fraction", "1", Role::strength, 0, -0.8, 6, Per::cell, "relative increase of C1"},
   };
 
   template <class S>

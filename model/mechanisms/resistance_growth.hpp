@@ -1,4 +1,4 @@
-// An ohmic resistance larger everywhere than the cell file's: ageing, or a lead.
+// An ohmic resistance larger than the cell file's, at every SOC: ageing, or a lead.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -10,7 +10,7 @@ struct ResistanceGrowth {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"fraction", "1", Role::strength, 0, -0.6, 5, Per::cell, "R0 times 1 + this"},
+      Parameter{"fraction", "1", Role::strength, 0, -0.6, 5, Per::cell, "relative increase of R0"},
   };
 
   template <class S>

@@ -1,9 +1,8 @@
-// The cell's inside is warmer than its surface by what the current heats it, and its resistances follow (Arrhenius):
+// The current heats the inside of the cell above its surface, and the resistances follow (Arrhenius):
 //
 //   dw/dt = (R_th I^2 (R0 + R1) - w) / tau        R = R exp(E / R_gas (1 / (T + w) - 1 / T))
 //
-// The state carried is w in units of 100 K. What follows the temperature that is measured belongs to
-// temperature_resistance.
+// The state is w in units of 100 K. The dependence on the measured temperature belongs to temperature_resistance.
 #pragma once
 
 #include "arithmetic/exponential.hpp"
@@ -17,10 +16,10 @@ struct SelfHeating {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"thermal_resistance_k_per_w", "K/W", Role::strength, 0, 0, 300, Per::siemens,
-                "R_th from inside to where the temperature is measured", 20},
+                "R_th from the inside to the temperature sensor", 20},
       Parameter{"time_constant_s", "s", Role::shape, 900, 60, 6000, Per::cell, "tau"},
       Parameter{"activation_j_per_mol", "J/mol", Role::given, 25000, 5000, 80000, Per::cell,
-                "E of R0 and R1; only its product with R_th shows"},
+                "E of R0 and R1; only its product with R_th is observable"},
   };
 
   template <class S>
@@ -30,7 +29,7 @@ struct SelfHeating {
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = false;
     static constexpr StateUnit state_unit{"k", 100};
-    Factor<S> energy;   ///< over R T, T at 25 degrees C
+    Factor<S> energy;   ///< E / (R_gas T), T = 25 degrees C
     Coupling<S> per_w;  ///< 100 K per W
     Rate<S> rate_per_s;
 

@@ -1,12 +1,13 @@
-// Diffusion that is slower than R1 C1, as the first two modes of a ladder:
+// Diffusion slower than R1 C1, as the first two modes of a ladder:
 //
 //   du_k/dt = (R_k I - u_k) / tau_k,  R_1 = (1 - w) R, tau_1 = tau,  R_2 = w R, tau_2 = tau / 9
-//   V = OCV(soc + t_lag (i_1 + i_2) / C_n) + ... + u_1 + u_2,  i_k = u_k / R the current as the modes have it
+//   V = OCV(soc + t_lag (i_1 + i_2) / C_n) + ... + u_1 + u_2,  i_k = u_k / R the current as the modes see it
 //
-// The voltage sees the surface of the particles, which is ahead of the mean that is counted: besides what it costs
-// everywhere, the steps of the OCV come early under load. Of diffusion into a sphere of radius r, t_lag = r^2 / (15 D).
+// The voltage depends on the surface of the particles, which is ahead of the mean that is counted. In addition to a
+// voltage drop, the knees of the OCV therefore come early under load. For diffusion into a sphere of radius r,
+// t_lag = r^2 / (15 D).
 //
-// R is that at the temperature of the cell file, where the file has a temperature_resistance.
+// R is the resistance at the temperature of the cell file, if the file has a temperature_resistance.
 //
 // w = 0 is a second RC branch; diffusion into a plate or a sphere has modes at 1, 1/9, 1/25 ... of the longest time
 // constant (Warburg element of finite length).
@@ -23,12 +24,12 @@ struct SlowPolarisation {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"resistance_ohm", "ohm", Role::strength, 0, 0, 0.12, Per::siemens,
-                "R of both modes, after a pulse that is long against tau"},
+                "R of both modes, after a pulse much longer than tau"},
       Parameter{"time_constant_s", "s", Role::shape, 600, 60, 20000, Per::cell, "tau of the slowest mode"},
       Parameter{"faster_share", "1", Role::place, 0.1, 0, 0.6, Per::cell,
                 "w: share of the mode that is nine times faster"},
       Parameter{"surface_lag_s", "s", Role::strength, 0, 0, 900, Per::cell,
-                "t_lag: in a lasting current the surface is ahead by what flows in it", 0, 0, 200},
+                "t_lag: under a constant current the surface is ahead by the charge of this time", 0, 0, 200},
   };
 
   template <class S>
@@ -43,7 +44,7 @@ struct SlowPolarisation {
 
     template <class Real>
     constexpr Law(const std::array<Real, 4>& p, double capacity_ah) {
-      // the modes carry the lag too, so they must carry something
+      // the lag is a multiple of the modes' voltages, so R must not be 0
       constexpr double least_ohm_ah = 1e-6;
       const Real r = p[3] > Real(0) ? p[0] + Real(least_ohm_ah / capacity_ah) : p[0];
       r_ohm = {Resistance<S>(r * (Real(1) - p[2])), Resistance<S>(r * p[2])};

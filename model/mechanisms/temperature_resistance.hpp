@@ -1,11 +1,12 @@
-// Resistances that follow the temperature by Arrhenius, but for what contacts and foils have in R0:
+// Resistances that depend on the temperature by Arrhenius, except for the share of contacts and foils in R0:
 //
-//   R0(T) = R0 (1 - s + s a_0)    R1(T) = R1 a_1    a_k = exp(E_k / R_gas (1 / T - 1 / T_ref)),  T_ref: where the cell
-//   file was made
+//   R0(T) = R0 (1 - s + s a_0)    R1(T) = R1 a_1    a_k = exp(E_k / R_gas (1 / T - 1 / T_ref))
 //
-// C1 stays, so the time constant follows R1. Fast and slow polarisation follow a_1, their time constants stay.
+// T_ref is the temperature at which the cell file was made. C1 is constant, so the time constant follows R1. Fast and
+// slow polarisation follow a_1, their time constants are constant.
 //
-// At one temperature E_0 and s look alike: what is known of E_0 decides, and the deviations say so.
+// At one temperature E_0 and s have the same effect: prior knowledge of E_0 decides, and the standard deviations show
+// it.
 #pragma once
 
 #include "arithmetic/exponential.hpp"
@@ -19,12 +20,12 @@ struct TemperatureResistance {
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
       Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 60000, Per::cell,
-                "E_0: of what reactions have in R0, 40 to 60 kJ/mol; 5 to 30 kJ/mol where s is 1", 0, 50000, 10000},
+                "E_0: of the reactions in R0, 40 to 60 kJ/mol; 5 to 30 kJ/mol if s is 1", 0, 50000, 10000},
       Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell,
                 "E_1; 30 to 70 kJ/mol is usual", 70000},
       Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell,
                 "temperature of the cell file's resistances"},
-      Parameter{"r0_share", "1", Role::place, 1, 0.02, 1, Per::cell, "s: share of R0 that follows the temperature"},
+      Parameter{"r0_share", "1", Role::place, 1, 0.02, 1, Per::cell, "s: share of R0 that depends on the temperature"},
   };
 
   template <class S>

@@ -1,6 +1,6 @@
-// The temperature is read elsewhere than where it acts: T = T_read - b, and what is read lags.
+// The temperature sensor has an offset and a lag.
 //
-//   T = T_read - b + lag dT_read/dt        (the lag on the host alone, where readings are smoothed over a minute)
+//   T = T_read - b + lag dT_read/dt        (the lag on the host only, where readings are smoothed over a minute)
 #pragma once
 
 #include "model/mechanism.hpp"

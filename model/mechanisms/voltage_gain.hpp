@@ -1,4 +1,4 @@
-// The voltage sensor reads too much by a fraction: V_read = (1 + g) V.
+// The voltage sensor has a gain error: V_read = (1 + g) V.
 #pragma once
 
 #include "model/mechanism.hpp"

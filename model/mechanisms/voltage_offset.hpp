@@ -1,4 +1,4 @@
-// The voltage sensor reads a constant too much: V_read = V + b.
+// The voltage sensor has an offset: V_read = V + b.
 #pragma once
 
 #include "model/mechanism.hpp"
