@@ -29,7 +29,7 @@ TEST(Exponential, IsZeroAtZeroAndOneFarOut) {
   EXPECT_EQ(static_cast<double>(step_response<FixedPoint>(Q<15, 47>(20'000))), 1.0);
 }
 
-TEST(Exponential, DerivativeIsWhatRemains) {
+TEST(Exponential, DerivativeIsTheUnsettledPart) {
   for (const double x : {0.001, 0.2, 0.2500001, 0.6, 3.0, 17.0}) {
     const auto p = step_response<ceres::Jet<double, 1>>({x, 0});
     EXPECT_NEAR(p.v[0], std::exp(-x), 1e-13) << x;

@@ -16,8 +16,7 @@ namespace {
 
 constexpr std::size_t cells = 16;
 
-/// Sixteen cells of the plant in series, each with its own soc, capacity and resistance, and the estimators beside
-/// them.
+/// Sixteen cells of the plant in series, each with its own soc, capacity and resistance, and their estimators.
 template <class S>
 struct Pack {
   explicit Pack(double weak_by = 0) {
@@ -29,22 +28,22 @@ struct Pack {
     }
   }
 
-  void second(double current_a, std::size_t silent = cells) {
-    typename CellDifferences<S, cells>::Observation seen;
+  void second(double current_a, std::size_t missing = cells) {
+    typename CellDifferences<S, cells>::Observation observation;
     double sum = 0;
     for (std::size_t k = 0; k < cells; ++k) {
       truth[k].run(current_a, 25, 1);
       const double v = truth[k].voltage_v() + more_ohm[k] * current_a + 0.001 * random.normal();
       sum += v;
-      seen.voltage_v[k] = arithmetic::Voltage<S>(v);
-      seen.usable[k] = k != silent;
+      observation.voltage_v[k] = arithmetic::Voltage<S>(v);
+      observation.usable[k] = k != missing;
     }
     time_us += 1'000'000;
     const double read_a = current_a + 0.01 * random.normal();
     const auto e = mean.step(tables, {time_us, static_cast<std::int32_t>(1e6 * read_a),
                                       static_cast<std::int32_t>(1e6 * sum / cells), 2'500});
     differences.step(tables, e.soc, e.soc_sigma, arithmetic::Current<S>(read_a), arithmetic::Soc<S>(read_a / 21'600),
-                     arithmetic::Count<S>(60), seen);
+                     arithmetic::Count<S>(60), observation);
   }
   double mean_soc() const {
     double sum = 0;
@@ -89,7 +88,7 @@ TYPED_TEST(CellDifferencesOfEveryScalar, AreFoundWhereTheCurveIsSteepAndHonestWh
   }
 }
 
-TYPED_TEST(CellDifferencesOfEveryScalar, OneCellWeakerIsSeen) {
+TYPED_TEST(CellDifferencesOfEveryScalar, FindTheWeakestCell) {
   Pack<TypeParam> pack(0.08);
   pack.hours(1.2);
   std::size_t weakest = 0;
@@ -100,7 +99,7 @@ TYPED_TEST(CellDifferencesOfEveryScalar, OneCellWeakerIsSeen) {
   EXPECT_NEAR(arithmetic::as_double(pack.differences[5].soc()), pack.truth[5].soc() - pack.mean_soc(), 0.015);
 }
 
-TEST(CellDifferences, ACellThatIsNotHeardBecomesUncertain) {
+TEST(CellDifferences, ACellWithoutReadingsBecomesUncertain) {
   Pack<double> pack;
   pack.hours(0.5);
   const double before = pack.differences[3].soc_sigma();

@@ -17,7 +17,7 @@ class ConditionOfEveryScalar : public ::testing::Test {};
 using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(ConditionOfEveryScalar, Scalars);
 
-/// The plant's cell, an estimator and what is told beside it.
+/// The plant's cell, an estimator and its condition.
 template <class S>
 struct Truck {
   using Estimator = SocEstimator<S>;
@@ -48,7 +48,7 @@ struct Truck {
 
 double load(int k) { return k % 60 < 30 ? -6 : k % 60 < 40 ? 3 : 0; }
 
-TYPED_TEST(ConditionOfEveryScalar, TellsOfAShiftWhatItsPartsTell) {
+TYPED_TEST(ConditionOfEveryScalar, ReportsOverAShiftWhatItsPartsReport) {
   Truck<TypeParam> truck(0.95, tests::start_at(0.95, 0.01));
   double shown = 0.95, largest_jump = 0;
   bool observable = false, bridged = false;
@@ -69,7 +69,7 @@ TYPED_TEST(ConditionOfEveryScalar, TellsOfAShiftWhatItsPartsTell) {
   EXPECT_EQ(arithmetic::as_double(truck.condition.limits_now().discharge_a), 6) << "what the file allows";
 }
 
-TYPED_TEST(ConditionOfEveryScalar, LimitsAreReckonedWhenSomebodyAsks) {
+TYPED_TEST(ConditionOfEveryScalar, LimitsAreComputedWhenTheyAreWanted) {
   Truck<TypeParam> truck(0.5, tests::start_at(0.5, 0.01));
   for (int k = 0; k < 10; ++k) truck.second(0, false);
   EXPECT_EQ(arithmetic::as_double(truck.condition.limits_now().discharge_a), 0);

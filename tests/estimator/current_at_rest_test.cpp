@@ -24,8 +24,8 @@ TEST(CurrentAtRest, ASmallReadingThatStaysForAMinuteRests) {
 TEST(CurrentAtRest, OneThatMovesOrIsTooLargeForAnOffsetDoesNot) {
   CurrentAtRest r;
   EXPECT_TRUE(after(r, 100, 30'000));
-  EXPECT_FALSE(r.is_at_rest(56'000, second_us, resting)) << "further than an offset wanders";
-  EXPECT_FALSE(after(r, 59, 56'000)) << "the minute begins anew";
+  EXPECT_FALSE(r.is_at_rest(56'000, second_us, resting)) << "more than an offset drifts";
+  EXPECT_FALSE(after(r, 59, 56'000)) << "the minute starts again";
   EXPECT_TRUE(after(r, 2, 56'000));
   EXPECT_FALSE(after(r, 1'000, 81'000));
   EXPECT_FALSE(after(r, 1'000, -81'000));

@@ -72,14 +72,14 @@ TEST(CurrentLimits, WhatHasBuiltUpCounts) {
   EXPECT_LT(limits<double>(hard(), 0.5, 1, 0, 0.05).second, limits<double>(hard(), 0.5, 1, 0, 0).second - 1);
 }
 
-TEST(CurrentLimits, EveryScalarSaysTheSame) {
+TEST(CurrentLimits, EveryScalarGivesTheSameLimits) {
   for (const double soc : {0.05, 0.4, 0.95}) {
-    const auto twice = limits<double>(hard(), soc, 10), once = limits<float>(hard(), soc, 10),
+    const auto float64 = limits<double>(hard(), soc, 10), float32 = limits<float>(hard(), soc, 10),
                fixed = limits<arithmetic::FixedPoint>(hard(), soc, 10);
-    EXPECT_NEAR(once.first, twice.first, 0.02);
-    EXPECT_NEAR(fixed.first, twice.first, 0.02);
-    EXPECT_NEAR(once.second, twice.second, 0.02);
-    EXPECT_NEAR(fixed.second, twice.second, 0.02);
+    EXPECT_NEAR(float32.first, float64.first, 0.02);
+    EXPECT_NEAR(fixed.first, float64.first, 0.02);
+    EXPECT_NEAR(float32.second, float64.second, 0.02);
+    EXPECT_NEAR(fixed.second, float64.second, 0.02);
   }
 }
 

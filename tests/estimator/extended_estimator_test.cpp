@@ -144,11 +144,11 @@ TEST(ExtendedEstimator, FollowsACellThatThePlainModelLoses) {
 }
 
 TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
-  std::vector<MechanismSetting> truth = {usual("ocv_hysteresis")}, told = truth;
+  std::vector<MechanismSetting> truth = {usual("ocv_hysteresis")}, given = truth;
   truth[0].value = {0.02, 40, 0, 1};
-  told[0].value = {0.02, 40, 0, -1};
+  given[0].value = {0.02, 40, 0, -1};
   const Work w = work(truth, 6'000, 0.93);  // where the curve is steep, soc is known and the rest is hysteresis
-  const auto e = run<float, 1>(table9_with<float>(told), w.samples, tests::start_at(0.93, 0.005));
+  const auto e = run<float, 1>(table9_with<float>(given), w.samples, tests::start_at(0.93, 0.005));
   EXPECT_NEAR(e.front().extra[0], -0.02, 1e-6);
   EXPECT_NEAR(e[50].extra[0], 0.02, 0.012);
   EXPECT_NEAR(e.back().soc, w.soc.back(), 0.02);
@@ -274,7 +274,7 @@ TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
   }
 }
 
-TEST(ExtendedEstimator, BelievesASmallCurrentWhereNobodySaysWhatFlowsAtRest) {
+TEST(ExtendedEstimator, TakesASmallCurrentAsItIsWhereTheCurrentAtRestIsUnknown) {
   const Work w = work_after_a_rest(0, -0.07);  // a display that is left on
   const auto e = run_with_rest<float>(0, w.samples, tests::start_at(0.6, 0.005));
   EXPECT_NEAR(6 * e[3'599].extra[1], 0, 0.01);
@@ -298,35 +298,35 @@ TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
   EXPECT_NEAR(std::sqrt(sigma(with) * sigma(with) - sigma(without) * sigma(without)), 0.02 * 0.6, 0.0005);
   const auto returned = run_with_rest<float>(0, out_and_back, start, 0.02);
   EXPECT_NEAR(std::sqrt(sigma(returned) * sigma(returned) - sigma(without) * sigma(without)), 0.02 * 0.3, 0.0005)
-      << "what it was in the middle stays";
+      << "the variance of the middle stays";
 }
 
-TEST(ExtendedEstimator, EveryScalarTellsTheSameStoryOfErrors) {
+TEST(ExtendedEstimator, EveryScalarGivesTheSameErrorStates) {
   const Work w = work(usual(some), 1'500, 0.77);
   const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
-  const auto twice = run_with_errors<double, 3>(usual(some), w.samples, start);
-  const auto single = run_with_errors<float, 3>(usual(some), w.samples, start);
+  const auto float64 = run_with_errors<double, 3>(usual(some), w.samples, start);
+  const auto float32 = run_with_errors<float, 3>(usual(some), w.samples, start);
   const auto fixed = run_with_errors<FixedPoint, 3>(usual(some), w.samples, start);
   for (std::size_t k = 0; k < w.samples.size(); ++k) {
-    ASSERT_NEAR(single[k].soc, twice[k].soc, 1e-4) << k;
-    ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 2e-4) << k;
-    ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 2e-4) << k;
+    ASSERT_NEAR(float32[k].soc, float64[k].soc, 1e-4) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc), float64[k].soc, 2e-4) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc_sigma), float64[k].soc_sigma, 2e-4) << k;
     for (std::size_t i = 0; i < 3; ++i)
-      ASSERT_NEAR(as_double(fixed[k].extra[i]), twice[k].extra[i], 1e-4) << k << " " << i;
+      ASSERT_NEAR(as_double(fixed[k].extra[i]), float64[k].extra[i], 1e-4) << k << " " << i;
   }
 }
 
-TEST(ExtendedEstimator, EveryScalarTellsTheSameStory) {
+TEST(ExtendedEstimator, EveryScalarGivesTheSameEstimates) {
   const Work w = work(usual(some), 1'500, 0.77);
   const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
-  const auto twice = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
-  const auto single = run<float, 3>(table9_with<float>(usual(some)), w.samples, start);
+  const auto float64 = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
+  const auto float32 = run<float, 3>(table9_with<float>(usual(some)), w.samples, start);
   const auto fixed = run<FixedPoint, 3>(table9_with<FixedPoint>(usual(some)), w.samples, start);
   for (std::size_t k = 0; k < w.samples.size(); ++k) {
-    ASSERT_NEAR(single[k].soc, twice[k].soc, 5e-5) << k;
-    ASSERT_NEAR(as_double(fixed[k].soc), twice[k].soc, 1e-4) << k;
-    ASSERT_NEAR(as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
-    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(single[k].extra[i], as_double(fixed[k].extra[i]), 2e-5) << k;
+    ASSERT_NEAR(float32[k].soc, float64[k].soc, 5e-5) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc), float64[k].soc, 1e-4) << k;
+    ASSERT_NEAR(as_double(fixed[k].soc_sigma), float64[k].soc_sigma, 1e-4) << k;
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(float32[k].extra[i], as_double(fixed[k].extra[i]), 2e-5) << k;
   }
 }
 

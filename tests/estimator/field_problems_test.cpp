@@ -1,4 +1,4 @@
-// What users of battery monitors complain of, each as a case that must not come back. The cell is the plant's.
+// Problems that users of battery monitors report, each as a test named after the report. The cell is the plant's.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -24,7 +24,7 @@ StoredEstimate stored(double soc, double sigma) {
   return {known.soc_ppb, known.soc_sigma_ppb};
 }
 
-/// A cell at work, and the estimator beside it.
+/// A cell at work with its estimator.
 struct Truck {
   explicit Truck(double soc, std::optional<measurement::StartingPoint> start = {})
       : cell({}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}),
@@ -53,7 +53,7 @@ struct Truck {
   std::uint64_t time_us = 0;
 };
 
-TEST(Complaint, SmallCurrentsOverDaysAreForgotten) {
+TEST(Complaint, SmallCurrentsOverDaysAreNotCounted) {
   Truck truck(0.6, tests::start_at(0.6, 0.01));
   for (int k = 0; k < 4 * 86'400; ++k)
     truck.second(-0.012);  // a display that is left on: 19 % of the charge in four days
@@ -79,7 +79,7 @@ TEST(Complaint, AfterANightWithoutAClockALotIsMissing) {
   EXPECT_LT(1e-9 * morning.soc_sigma_ppb, 0.08);
   EXPECT_GE(2e-9 * morning.soc_sigma_ppb,
             0.5 - 1e-9 * starting_point_after_off_time(stored(0.5, 0.005), 60U * 86'400).soc_ppb)
-      << "two months would still be believed";
+      << "two months without power stay within two sigma";
 }
 
 TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
@@ -90,7 +90,7 @@ TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
   EXPECT_GT(truck.estimate.soc_sigma, 0.03);
 }
 
-TEST(Complaint, TheSocIsNoLongerUpdatedAndNobodySaysSo) {
+TEST(Complaint, TheSocIsNoLongerUpdatedAndNothingReportsIt) {
   Truck truck(0.7, tests::start_at(0.7, 0.005));
   truck.hour();
   truck.time_us += 3'600'000'000;  // the task hung for an hour
@@ -118,14 +118,14 @@ TEST(Complaint, ASensorsGainOfOnePercent) {
   }
 }
 
-TEST(Complaint, AWrongStartIsBelievedForEver) {
+TEST(Complaint, AWrongStartIsNeverCorrected) {
   for (const double wrong : {0.25, -0.25}) {
     Truck truck(0.65, tests::start_at(0.65 + wrong, 0.25));
     for (int k = 0; k < 3'600 * 2; ++k) {
       truck.second(k % 120 < 40 ? -6 * (0.5 + truck.random.uniform()) : k % 120 < 60 ? 3 : 0);
       ASSERT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << "second " << k;
     }
-    EXPECT_NEAR(truck.error(), 0, 0.02) << "two knees have been passed";
+    EXPECT_NEAR(truck.error(), 0, 0.02) << "the SOC has crossed two knees";
   }
 }
 

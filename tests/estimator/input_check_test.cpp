@@ -8,7 +8,7 @@ namespace {
 constexpr model::PlausibleRange plausible{
     .voltage_min_uv = 1'500'000, .voltage_max_uv = 4'100'000, .current_max_ua = 60'000'000};
 
-TEST(InputCheck, ReplacesACurrentThatCannotBeByTheLastOneBelieved) {
+TEST(InputCheck, ReplacesAnImplausibleCurrentByTheLastAcceptedOne) {
   InputCheck<float> check;
   std::uint32_t flags = 0;
   EXPECT_EQ(check.current(-3'000'000, plausible, flags).ua, -3'000'000);
@@ -22,7 +22,7 @@ TEST(InputCheck, ReplacesACurrentThatCannotBeByTheLastOneBelieved) {
   EXPECT_EQ(flags, current_implausible);
 }
 
-TEST(InputCheck, TellsAMissingVoltageFromOneThatCannotBe) {
+TEST(InputCheck, DistinguishesAMissingVoltageFromAnImplausibleOne) {
   InputCheck<float> check;
   std::uint32_t flags = 0;
   EXPECT_FALSE(check.voltage_usable(measurement::no_reading, 3.3F, plausible, flags));
@@ -33,7 +33,7 @@ TEST(InputCheck, TellsAMissingVoltageFromOneThatCannotBe) {
   EXPECT_EQ(flags, voltage_implausible);
 }
 
-TEST(InputCheck, CallsAVoltageStuckWhenTheModelMovesAndItDoesNotAndTrustsItAgainWhenItChanges) {
+TEST(InputCheck, AVoltageIsStuckWhenTheModelMovesAndItDoesNotAndIsAcceptedAgainWhenItChanges) {
   InputCheck<float> check;
   std::uint32_t flags = 0;
   for (int k = 0; k <= 5; ++k) EXPECT_TRUE(check.voltage_usable(3'300'000, 3.3F, plausible, flags));

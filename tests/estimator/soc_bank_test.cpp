@@ -45,7 +45,7 @@ Asked<S> asked(double sigma_v) {
   return a;
 }
 
-TYPED_TEST(SocBankOfEveryScalar, KnowsNothingAtFirst) {
+TYPED_TEST(SocBankOfEveryScalar, IsUniformAtFirst) {
   auto a = asked<TypeParam>(0.01);
   for (int k = 0; k < 128; ++k) a.sample(0.3, 0, 0, 0.01);
   EXPECT_NEAR(a.soc, 0.5, 0.01);
@@ -59,7 +59,7 @@ TYPED_TEST(SocBankOfEveryScalar, OnAPlateauItIsAsWideAsThePlateau) {
   EXPECT_NEAR(std::sqrt(a.variance), 0.6 / std::sqrt(12.0), 0.03);
 }
 
-TYPED_TEST(SocBankOfEveryScalar, AKneeThatIsPassedTellsWhichHypothesisWasRight) {
+TYPED_TEST(SocBankOfEveryScalar, CrossingAKneeDecidesBetweenTheHypotheses) {
   auto a = asked<TypeParam>(0.01);
   double truth = 0.85;
   for (int k = 0; k < 128 * 40; ++k, truth -= 0.3 / (128 * 40)) a.sample(truth, -0.3 / (128 * 40), 0.2, 0.01);
@@ -78,8 +78,8 @@ TYPED_TEST(SocBankOfEveryScalar, OneBadReadingDoesNotRuleTheTruthOut) {
   EXPECT_NEAR(std::sqrt(a.variance), 0.09, 0.02);
 }
 
-/// 1.5 deviations too much for 20 correlation times, on the lower plateau and over the knee: no certainty of the upper
-/// one. As curve_v, and below 0.1 steep, where soc is no surer than elsewhere: nothing there is far off.
+/// 1.5 standard deviations too much for 20 correlation times, on the lower plateau and over the knee: no certainty of
+/// the upper one. As curve_v, and below 0.1 steep, where soc is no surer than elsewhere: nothing there is far off.
 TYPED_TEST(SocBankOfEveryScalar, WhereAnythingCouldBeReadIsNotMoreLikelyForIt) {
   using S = TypeParam;
   auto a = asked<S>(0.01);
@@ -99,7 +99,7 @@ TYPED_TEST(SocBankOfEveryScalar, WhereAnythingCouldBeReadIsNotMoreLikelyForIt) {
   EXPECT_GT(soc, 0.3) << "the steep end must not draw the mean to it";
 }
 
-TYPED_TEST(SocBankOfEveryScalar, AnErrorThatLastsSpeaksOnce) {
+TYPED_TEST(SocBankOfEveryScalar, APersistentErrorCountsOnce) {
   auto a = asked<TypeParam>(0.03);
   a.off_v = 0.045;
   double truth = 0.5;

@@ -17,8 +17,8 @@ auto table9() {
   return tests::prepared<S>();
 }
 
-/// Samples of an hour of work at 1 Hz. The voltage is rough on purpose (R0 only): these tests are about the filter's
-/// manners.
+/// Samples of an hour of work at 1 Hz. The voltage is a coarse model on purpose (R0 only): these tests are about the
+/// behaviour of the filter.
 std::vector<measurement::Sample> work(std::size_t count) {
   std::vector<measurement::Sample> samples(count);
   std::mt19937 random(5);
@@ -55,22 +55,23 @@ void expect_finite(const Estimate<float>& e, const std::string& where) {
 
 TEST(SocEstimator, StateOfOneCellFitsIn24Bytes) { EXPECT_EQ(sizeof(CellState<float, model::OneRc>), 24U); }
 
-TEST(SocEstimator, EveryScalarTellsTheSameStory) {
+TEST(SocEstimator, EveryScalarGivesTheSameEstimates) {
   const auto samples = work(1'000);
   // between two edges of the table: on an edge, the last bit decides which slope holds
   const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
-  const auto single = run<float>(samples, SocEstimator<float>(start));
-  const auto twice = run<double>(samples, SocEstimator<double>(start));
+  const auto float32 = run<float>(samples, SocEstimator<float>(start));
+  const auto float64 = run<double>(samples, SocEstimator<double>(start));
   const auto fixed = run<arithmetic::FixedPoint>(samples, SocEstimator<arithmetic::FixedPoint>(start));
   using Jet = ceres::Jet<double, 3>;
   const auto jets = run<Jet>(samples, SocEstimator<Jet>(start));
   for (std::size_t k = 0; k < samples.size(); ++k) {
-    ASSERT_NEAR(single[k].soc, twice[k].soc, 2e-5) << k;
-    ASSERT_NEAR(arithmetic::as_double(fixed[k].soc), twice[k].soc, 1e-4)
+    ASSERT_NEAR(float32[k].soc, float64[k].soc, 2e-5) << k;
+    ASSERT_NEAR(arithmetic::as_double(fixed[k].soc), float64[k].soc, 1e-4)
         << k;  // a tenth of what is asked of fixed point in the end
-    ASSERT_NEAR(arithmetic::as_double(fixed[k].soc_sigma), twice[k].soc_sigma, 1e-4) << k;
-    ASSERT_NEAR(jets[k].soc.a, twice[k].soc, 1e-5) << k;  // Charge<Jet> does not cut its corrections to counts of 4e-9
-    ASSERT_NEAR(jets[k].voltage_predicted_v.a, twice[k].voltage_predicted_v, 1e-5) << k;
+    ASSERT_NEAR(arithmetic::as_double(fixed[k].soc_sigma), float64[k].soc_sigma, 1e-4) << k;
+    ASSERT_NEAR(jets[k].soc.a, float64[k].soc, 1e-5)
+        << k;  // Charge<Jet> does not cut its corrections to counts of 4e-9
+    ASSERT_NEAR(jets[k].voltage_predicted_v.a, float64[k].voltage_predicted_v, 1e-5) << k;
   }
 }
 
@@ -86,7 +87,7 @@ TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
 }
 
-TEST(SocEstimator, AWideBeliefAndTheFirstVoltageAreWeighedTogether) {
+TEST(SocEstimator, AWidePriorAndTheFirstVoltageAreCombined) {
   const auto cell = table9<float>();
   const auto started = [&](double soc, double sigma, std::int32_t voltage_uv) {
     return SocEstimator<float>(tests::start_at(soc, sigma)).step(cell, {0, 0, voltage_uv, 2'500});
@@ -117,9 +118,9 @@ TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
   }
 }
 
-/// 20 %, told for certain, where it is 98 %: the voltage is 150 mV too high for ever. After ten minutes that is asked
-/// about.
-TEST(SocEstimator, ACertaintyThatCannotBeIsGivenUp) {
+/// The start is 20 % with a small sigma, the truth is 98 %: the voltage stays 150 mV too high. After ten minutes the
+/// SOC is estimated again.
+TEST(SocEstimator, AContradictedStartIsGivenUp) {
   const auto cell = table9<double>();
   const auto at = model::look_up(cell, 0.98);
   SocEstimator<double> estimator(tests::start_at(0.2, 0.002));
@@ -135,7 +136,7 @@ TEST(SocEstimator, ACertaintyThatCannotBeIsGivenUp) {
   EXPECT_LE(std::abs(e.soc - 0.98), 2 * e.soc_sigma);
 }
 
-TEST(SocEstimator, OneReadingThatCannotBeIsFlaggedAndMovesNothing) {
+TEST(SocEstimator, OneOutlierIsFlaggedAndChangesNothing) {
   auto samples = work(1'000);
   const SocEstimator<float> estimator(tests::start_at(0.8, 0.005));
   const auto without = run<float>(samples, estimator);
