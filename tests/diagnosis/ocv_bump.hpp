@@ -16,6 +16,7 @@ struct OcvBump {
 
   template <class S>
   struct Law {
+    static constexpr LawMembers members = law_member::tables;
     Voltage<S> height_v;
 
     template <class Real>

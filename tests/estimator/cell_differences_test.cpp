@@ -9,7 +9,7 @@
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 #include "tests/cells.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -61,7 +61,7 @@ struct Pack {
   std::vector<plant::Cell> truth;
   std::vector<double> more_ohm;
   model::Cell<S, model::max_intervals> tables = tests::prepared<S>();
-  SocEstimator<S> mean{tests::start_at(0.88, 0.01)};
+  SocEstimator<S> mean{starting_at(0.88, 0.01)};
   CellDifferences<S, cells> differences;
   std::uint64_t time_us = 0;
 };

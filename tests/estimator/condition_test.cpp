@@ -7,7 +7,7 @@
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 #include "tests/cells.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -49,7 +49,7 @@ struct Truck {
 double load(int k) { return k % 60 < 30 ? -6 : k % 60 < 40 ? 3 : 0; }
 
 TYPED_TEST(ConditionOfEveryScalar, ReportsOverAShiftWhatItsPartsReport) {
-  Truck<TypeParam> truck(0.95, tests::start_at(0.95, 0.01));
+  Truck<TypeParam> truck(0.95, starting_at(0.95, 0.01));
   double shown = 0.95, largest_jump = 0;
   bool observable = false, bridged = false;
   for (int k = 0; k < 6'000; ++k) {
@@ -70,7 +70,7 @@ TYPED_TEST(ConditionOfEveryScalar, ReportsOverAShiftWhatItsPartsReport) {
 }
 
 TYPED_TEST(ConditionOfEveryScalar, LimitsAreComputedWhenTheyAreWanted) {
-  Truck<TypeParam> truck(0.5, tests::start_at(0.5, 0.01));
+  Truck<TypeParam> truck(0.5, starting_at(0.5, 0.01));
   for (int k = 0; k < 10; ++k) truck.second(0, false);
   EXPECT_EQ(arithmetic::as_double(truck.condition.limits_now().discharge_a), 0);
   truck.second(0, true);
@@ -78,7 +78,7 @@ TYPED_TEST(ConditionOfEveryScalar, LimitsAreComputedWhenTheyAreWanted) {
 }
 
 TYPED_TEST(ConditionOfEveryScalar, WithoutAVoltageNothingIsLearnedAndTheDisplayGoesOn) {
-  Truck<TypeParam> truck(0.9, tests::start_at(0.9, 0.01));
+  Truck<TypeParam> truck(0.9, starting_at(0.9, 0.01));
   truck.second(0);
   const double before = arithmetic::as_double(truck.condition.display_soc());
   for (int k = 0; k < 600; ++k) truck.second(-6, true, false);

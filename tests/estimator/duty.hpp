@@ -13,7 +13,7 @@
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 #include "tests/cells.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms {
 
@@ -111,7 +111,7 @@ DutyFigures duty(const Cell& cell, const Drift& drift, std::uint64_t seed, int h
     double squares = 0, count = 0, time_s = 0;
   };
   DutyWorld world(drift, seed);
-  Estimator estimator(tests::start_at(0.9, 0.02));
+  Estimator estimator(starting_at(0.9, 0.02));
   DutyFigures figures;
   Part first, middle, last;
   const int seconds = hours * 3'600, tenth = seconds / 10;

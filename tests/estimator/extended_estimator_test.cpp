@@ -9,7 +9,7 @@
 #include "model/extended.hpp"
 #include "tests/cells.hpp"
 #include "tests/model/usual_mechanisms.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -125,7 +125,7 @@ const std::vector<std::string_view> some = {"ocv_hysteresis", "slow_polarisation
 
 TEST(ExtendedEstimator, FollowsACellThatThePlainModelLoses) {
   const Work w = work(usual(some), 10'000, 0.9);
-  const measurement::StartingPoint start = tests::start_at(0.9, 0.05);
+  const measurement::StartingPoint start = starting_at(0.9, 0.05);
   const auto with = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
   SocEstimator<double> estimator(start);
   const auto plain_cell = tests::prepared<double>();
@@ -148,7 +148,7 @@ TEST(ExtendedEstimator, FindsTheBranchOfAHysteresisThatItStartedWrongOn) {
   truth[0].value = {0.02, 40, 0, 1};
   given[0].value = {0.02, 40, 0, -1};
   const Work w = work(truth, 6'000, 0.93);  // where the curve is steep, soc is known and the rest is hysteresis
-  const auto e = run<float, 1>(table9_with<float>(given), w.samples, tests::start_at(0.93, 0.005));
+  const auto e = run<float, 1>(table9_with<float>(given), w.samples, starting_at(0.93, 0.005));
   EXPECT_NEAR(e.front().extra[0], -0.02, 1e-6);
   EXPECT_NEAR(e[50].extra[0], 0.02, 0.012);
   EXPECT_NEAR(e.back().soc, w.soc.back(), 0.02);
@@ -212,7 +212,7 @@ TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
   for (const double offset_a : {-0.08, 0.08}) {
     Work w = work({}, 13'000, 0.95);  // to 20 % of charge
     for (measurement::Sample& s : w.samples) s.current_ua += static_cast<std::int32_t>(1e6 * offset_a);
-    const measurement::StartingPoint start = tests::start_at(0.95, 0.01);
+    const measurement::StartingPoint start = starting_at(0.95, 0.01);
     const auto e = run_with_errors<float, 0>({}, w.samples, start);
     SocEstimator<float> plain(start);
     const auto plain_cell = tests::prepared<float>();
@@ -261,7 +261,7 @@ auto run_with_rest(double at_rest_a, const std::vector<measurement::Sample>& sam
 TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
   for (const double sensor_a : {-0.07, 0.07}) {
     const Work w = work_after_a_rest(sensor_a, 0);
-    const measurement::StartingPoint start = tests::start_at(0.6, 0.005);
+    const measurement::StartingPoint start = starting_at(0.6, 0.005);
     const auto e = run_with_rest<float>(0.012, w.samples, start);
     EXPECT_NEAR(6 * e[59].extra[1], 0, 0.005) << "a minute first";
     EXPECT_NEAR(6 * e[3'599].extra[1], sensor_a, 0.012);
@@ -276,14 +276,14 @@ TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {
 
 TEST(ExtendedEstimator, TakesASmallCurrentAsItIsWhereTheCurrentAtRestIsUnknown) {
   const Work w = work_after_a_rest(0, -0.07);  // a display that is left on
-  const auto e = run_with_rest<float>(0, w.samples, tests::start_at(0.6, 0.005));
+  const auto e = run_with_rest<float>(0, w.samples, starting_at(0.6, 0.005));
   EXPECT_NEAR(6 * e[3'599].extra[1], 0, 0.01);
   EXPECT_NEAR(e[3'599].soc, w.soc[3'599], 0.002);
 }
 
 TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
   // on the plateau no voltage helps; 6 A for 36 minutes are 60 % of 6 Ah
-  const measurement::StartingPoint start = tests::start_at(0.9, 0.001);
+  const measurement::StartingPoint start = starting_at(0.9, 0.001);
   std::vector<measurement::Sample> out, out_and_back;
   for (std::uint64_t k = 0; k < 2'160; ++k) {
     out.push_back({k * 1'000'000, k == 0 ? 0 : -6'000'000, measurement::no_reading, 2'500});
@@ -303,7 +303,7 @@ TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
 
 TEST(ExtendedEstimator, EveryScalarGivesTheSameErrorStates) {
   const Work w = work(usual(some), 1'500, 0.77);
-  const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
+  const measurement::StartingPoint start = starting_at(0.77, 0.005);
   const auto float64 = run_with_errors<double, 3>(usual(some), w.samples, start);
   const auto float32 = run_with_errors<float, 3>(usual(some), w.samples, start);
   const auto fixed = run_with_errors<FixedPoint, 3>(usual(some), w.samples, start);
@@ -318,7 +318,7 @@ TEST(ExtendedEstimator, EveryScalarGivesTheSameErrorStates) {
 
 TEST(ExtendedEstimator, EveryScalarGivesTheSameEstimates) {
   const Work w = work(usual(some), 1'500, 0.77);
-  const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
+  const measurement::StartingPoint start = starting_at(0.77, 0.005);
   const auto float64 = run<double, 3>(table9_with<double>(usual(some)), w.samples, start);
   const auto float32 = run<float, 3>(table9_with<float>(usual(some)), w.samples, start);
   const auto fixed = run<FixedPoint, 3>(table9_with<FixedPoint>(usual(some)), w.samples, start);
@@ -333,8 +333,8 @@ TEST(ExtendedEstimator, EveryScalarGivesTheSameEstimates) {
 TEST(ExtendedEstimator, ACellWhoseMechanismsAreNeutralGivesThePlainCellsBits) {
   const Work w = work({}, 2'000, 0.77);
   auto neutral = default_setting(mechanism_index("resistance_growth"), capacity_ah);
-  const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, tests::start_at(0.77, 0.02));
-  SocEstimator<float> plain(tests::start_at(0.77, 0.02));
+  const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, starting_at(0.77, 0.02));
+  SocEstimator<float> plain(starting_at(0.77, 0.02));
   const auto cell = tests::prepared<float>();
   for (std::size_t k = 0; k < w.samples.size(); ++k)
     ASSERT_EQ(words(static_cast<const Estimate<float>&>(e[k])), words(plain.step(cell, w.samples[k]))) << k;
@@ -372,7 +372,7 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
 TEST(ExtendedEstimator, CountsThroughASensorThatIsOff) {
   auto off = usual({"current_offset", "current_gain", "capacity_change"});
   const auto cell = table9_with<float>(off);
-  SocEstimator<float, ExtendedRc<0, mechanism_state_count>::Of> estimator(tests::start_at(0.5, 0.005));
+  SocEstimator<float, ExtendedRc<0, mechanism_state_count>::Of> estimator(starting_at(0.5, 0.005));
   estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Estimate<float> e;
   for (std::uint64_t k = 1; k <= 3'600; ++k)

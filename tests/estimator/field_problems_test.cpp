@@ -12,7 +12,7 @@
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 #include "tests/cells.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 std::int32_t micro(double x) { return static_cast<std::int32_t>(std::lround(1e6 * x)); }
 
 StoredEstimate stored(double soc, double sigma) {
-  const measurement::StartingPoint known = tests::start_at(soc, sigma);
+  const measurement::StartingPoint known = starting_at(soc, sigma);
   return {known.soc_ppb, known.soc_sigma_ppb};
 }
 
@@ -54,7 +54,7 @@ struct Truck {
 };
 
 TEST(Complaint, SmallCurrentsOverDaysAreNotCounted) {
-  Truck truck(0.6, tests::start_at(0.6, 0.01));
+  Truck truck(0.6, starting_at(0.6, 0.01));
   for (int k = 0; k < 4 * 86'400; ++k)
     truck.second(-0.012);  // a display that is left on: 19 % of the charge in four days
   EXPECT_NEAR(truck.cell.soc(), 0.408, 0.001);
@@ -62,7 +62,7 @@ TEST(Complaint, SmallCurrentsOverDaysAreNotCounted) {
 }
 
 TEST(Complaint, AfterARebootInTheMiddleOfACharge) {
-  Truck before(0.3, tests::start_at(0.3, 0.01));
+  Truck before(0.3, starting_at(0.3, 0.01));
   for (int k = 0; k < 3'600; ++k) before.second(1.8);
   const StoredEstimate last{static_cast<std::int32_t>(1e9F * before.estimate.soc),
                             static_cast<std::int32_t>(1e9F * before.estimate.soc_sigma)};
@@ -91,7 +91,7 @@ TEST(Complaint, AfterAWinterInStorageItIsAsSureAsBefore) {
 }
 
 TEST(Complaint, TheSocIsNoLongerUpdatedAndNothingReportsIt) {
-  Truck truck(0.7, tests::start_at(0.7, 0.005));
+  Truck truck(0.7, starting_at(0.7, 0.005));
   truck.hour();
   truck.time_us += 3'600'000'000;  // the task hung for an hour
   truck.cell.run(-3, 25, 3'600);
@@ -102,7 +102,7 @@ TEST(Complaint, TheSocIsNoLongerUpdatedAndNothingReportsIt) {
 
 TEST(Complaint, ASensorsOffsetOfHalfAPercentOf1C) {
   for (const double offset_a : {-0.03, 0.03}) {
-    Truck truck(0.95, tests::start_at(0.95, 0.01));
+    Truck truck(0.95, starting_at(0.95, 0.01));
     for (int h = 0; h < 3; ++h) truck.hour([&](measurement::Sample& s) { s.current_ua += micro(offset_a); });
     EXPECT_NEAR(truck.error(), 0, 0.02) << offset_a;
     EXPECT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << offset_a;
@@ -111,7 +111,7 @@ TEST(Complaint, ASensorsOffsetOfHalfAPercentOf1C) {
 
 TEST(Complaint, ASensorsGainOfOnePercent) {
   for (const double gain : {0.99, 1.01}) {
-    Truck truck(0.95, tests::start_at(0.95, 0.01));
+    Truck truck(0.95, starting_at(0.95, 0.01));
     for (int h = 0; h < 3; ++h)
       truck.hour([&](measurement::Sample& s) { s.current_ua = static_cast<std::int32_t>(gain * s.current_ua); });
     EXPECT_NEAR(truck.error(), 0, 0.02) << gain;
@@ -120,7 +120,7 @@ TEST(Complaint, ASensorsGainOfOnePercent) {
 
 TEST(Complaint, AWrongStartIsNeverCorrected) {
   for (const double wrong : {0.25, -0.25}) {
-    Truck truck(0.65, tests::start_at(0.65 + wrong, 0.25));
+    Truck truck(0.65, starting_at(0.65 + wrong, 0.25));
     for (int k = 0; k < 3'600 * 2; ++k) {
       truck.second(k % 120 < 40 ? -6 * (0.5 + truck.random.uniform()) : k % 120 < 60 ? 3 : 0);
       ASSERT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << "second " << k;
@@ -130,13 +130,13 @@ TEST(Complaint, AWrongStartIsNeverCorrected) {
 }
 
 TEST(Complaint, TheTemperatureSensorIsLost) {
-  Truck truck(0.8, tests::start_at(0.8, 0.01));
+  Truck truck(0.8, starting_at(0.8, 0.01));
   truck.hour([](measurement::Sample& s) { s.temperature_cdegc = measurement::no_temperature; });
   EXPECT_NEAR(truck.error(), 0, 0.01);
 }
 
 TEST(Complaint, TheSignOfTheCurrentIsLost) {
-  Truck truck(0.8, tests::start_at(0.8, 0.01));
+  Truck truck(0.8, starting_at(0.8, 0.01));
   double worst = 0;
   std::uint32_t flags = 0;
   for (int h = 0; h < 3; ++h) {

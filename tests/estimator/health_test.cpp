@@ -8,7 +8,7 @@
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
 #include "tests/cells.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -29,7 +29,7 @@ struct Day {
     const auto cell = tests::prepared<S>();
     plant::Cell truth({.capacity_ah = capacity_ah}, {.soc = 0.97, .v_rc_v = 0, .temperature_c = 25});
     plant::Random random(11);
-    SocEstimator<S> estimator(tests::start_at(0.97, 0.01));
+    SocEstimator<S> estimator(starting_at(0.97, 0.01));
     std::uint64_t time_us = 0;
     for (int turn = 0; turn < turns; ++turn) {
       for (int k = 0; k < 20'000; ++k) {

@@ -5,7 +5,7 @@
 #include "estimator/soc_estimator.hpp"
 #include "plant/truth_cell.hpp"
 #include "tests/cells.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -70,7 +70,7 @@ TEST(PackCells, FindsTheCellThatIsEmptierThanTheOthers) {
   std::vector<plant::Cell> cells;
   const double soc[] = {0.30, 0.30, 0.24, 0.30};
   for (const double s : soc) cells.emplace_back(plant::CellParameters{}, plant::CellState{.soc = s});
-  SocEstimator<float> estimator(tests::start_at(0.285, 0.01));
+  SocEstimator<float> estimator(starting_at(0.285, 0.01));
   PackCells<float, 4> pack;
   for (std::uint64_t k = 0; k < 3'600; ++k) {
     const double current_a = k % 60 < 40 ? -2 : 0.5;
@@ -94,7 +94,7 @@ TEST(PackCells, FindsTheCellThatIsEmptierThanTheOthers) {
 }
 
 TEST(PackCells, SurvivesGapsTimesThatGoBackAndCellsThatAreGone) {
-  SocEstimator<float> estimator(tests::start_at(0.5, 0.01));
+  SocEstimator<float> estimator(starting_at(0.5, 0.01));
   PackCells<float, 4> pack;
   for (const std::uint64_t time_us : {std::uint64_t{0}, std::uint64_t{1'000'000}, std::uint64_t{1'000'000},
                                       std::uint64_t{0}, std::uint64_t{1} << 60, (std::uint64_t{1} << 60) + 1}) {

@@ -9,7 +9,7 @@
 #include "estimator/soc_estimator.hpp"
 #include "tests/cells.hpp"
 #include "tests/estimator/eigen_covariance.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -51,7 +51,7 @@ TEST(ReferenceFilter, EveryFormOfTheCovarianceGivesTheSameEstimate) {
 
 TEST(ReferenceFilter, IsWhatTheEstimatorComputesWhereItsGuardsHaveNothingToDo) {
   const auto cell = tests::prepared<double>();
-  SocEstimator<double> estimator(tests::start_at(0.77, 0.005));
+  SocEstimator<double> estimator(starting_at(0.77, 0.005));
   const auto first = estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Joseph reference(first.soc, first.soc_sigma, std::sqrt(estimator.state().covariance.variance<0>()));
   std::uint64_t time_us = 0;

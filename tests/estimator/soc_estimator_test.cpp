@@ -7,7 +7,7 @@
 #include <random>
 
 #include "tests/cells.hpp"
-#include "tests/start_at.hpp"
+#include "tests/starting_point.hpp"
 
 namespace bms::estimator {
 namespace {
@@ -58,7 +58,7 @@ TEST(SocEstimator, StateOfOneCellFitsIn24Bytes) { EXPECT_EQ(sizeof(CellState<flo
 TEST(SocEstimator, EveryScalarGivesTheSameEstimates) {
   const auto samples = work(1'000);
   // between two edges of the table: on an edge, the last bit decides which slope holds
-  const measurement::StartingPoint start = tests::start_at(0.77, 0.005);
+  const measurement::StartingPoint start = starting_at(0.77, 0.005);
   const auto float32 = run<float>(samples, SocEstimator<float>(start));
   const auto float64 = run<double>(samples, SocEstimator<double>(start));
   const auto fixed = run<arithmetic::FixedPoint>(samples, SocEstimator<arithmetic::FixedPoint>(start));
@@ -77,11 +77,11 @@ TEST(SocEstimator, EveryScalarGivesTheSameEstimates) {
 
 TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   const auto cell = table9<float>();
-  SocEstimator<float> without_voltage(tests::start_at(0.65, 0.05));
+  SocEstimator<float> without_voltage(starting_at(0.65, 0.05));
   auto e = without_voltage.step(cell, {0, 0, measurement::no_reading, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.05, 1e-6);
-  SocEstimator<float> sure(tests::start_at(0.65, 0.005));
+  SocEstimator<float> sure(starting_at(0.65, 0.005));
   e = sure.step(cell, {0, 0, 3'300'000, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
@@ -90,7 +90,7 @@ TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
 TEST(SocEstimator, AWidePriorAndTheFirstVoltageAreCombined) {
   const auto cell = table9<float>();
   const auto started = [&](double soc, double sigma, std::int32_t voltage_uv) {
-    return SocEstimator<float>(tests::start_at(soc, sigma)).step(cell, {0, 0, voltage_uv, 2'500});
+    return SocEstimator<float>(starting_at(soc, sigma)).step(cell, {0, 0, voltage_uv, 2'500});
   };
   // 3.23 V is 16 %: where the curve is steep the voltage decides
   auto e = started(0.4, 0.2, 3'230'000);
@@ -110,7 +110,7 @@ TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
   const auto cell = table9<double>();
   for (const double truth : {0.55, 0.65, 0.75, 0.85}) {
     const auto at = model::look_up(cell, truth);
-    SocEstimator<double> estimator(tests::start_at(0.93, 0.15));
+    SocEstimator<double> estimator(starting_at(0.93, 0.15));
     Estimate<double> e = estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
     for (std::uint64_t s = 1; s <= 600; ++s)
       e = estimator.step(cell, {s * 1'000'000, 0, static_cast<std::int32_t>(1e6 * at.ocv_v), 2'500});
@@ -123,7 +123,7 @@ TEST(SocEstimator, ACorrectionOverAKneeIsNotSurerThanTheFlatSideAllows) {
 TEST(SocEstimator, AContradictedStartIsGivenUp) {
   const auto cell = table9<double>();
   const auto at = model::look_up(cell, 0.98);
-  SocEstimator<double> estimator(tests::start_at(0.2, 0.002));
+  SocEstimator<double> estimator(starting_at(0.2, 0.002));
   estimator.step(cell, {0, 0, measurement::no_reading, 2'500});
   Estimate<double> e;
   std::uint32_t flags = 0;
@@ -138,7 +138,7 @@ TEST(SocEstimator, AContradictedStartIsGivenUp) {
 
 TEST(SocEstimator, OneOutlierIsFlaggedAndChangesNothing) {
   auto samples = work(1'000);
-  const SocEstimator<float> estimator(tests::start_at(0.8, 0.005));
+  const SocEstimator<float> estimator(starting_at(0.8, 0.005));
   const auto without = run<float>(samples, estimator);
   samples[500].voltage_uv += 300'000;
   const auto with = run<float>(samples, estimator);
@@ -151,7 +151,7 @@ TEST(SocEstimator, SigmaGoesOnGrowingOverAGapOfHours) {
   const auto cell = table9<float>();
   double before = 0;
   for (const std::uint64_t hours : {1U, 3U, 10U, 1'000U}) {
-    SocEstimator<float> estimator(tests::start_at(0.5, 0.005));
+    SocEstimator<float> estimator(starting_at(0.5, 0.005));
     estimator.step(cell, {0, 0, 3'285'000, 2'500});
     estimator.step(cell, {1'000'000, 0, 3'285'000, 2'500});
     const auto e =
@@ -214,7 +214,7 @@ TEST(SocEstimator, AGapIsFlaggedOnceAndMakesSigmaGrow) {
   auto samples = work(1'200);
   for (std::size_t k = 600; k < 1'200; ++k) samples[k].time_us += 600'000'000;
   samples[600].current_ua = 0;
-  const auto e = run<float>(samples, SocEstimator<float>(tests::start_at(0.8, 0.005)));
+  const auto e = run<float>(samples, SocEstimator<float>(starting_at(0.8, 0.005)));
   EXPECT_EQ(e[600].flags, time_gap);
   EXPECT_EQ(e[601].flags, 0U);
   EXPECT_EQ(e[599].flags, 0U);
@@ -239,7 +239,7 @@ TEST(SocEstimator, IgnoresASampleThatIsNotLater) {
 TEST(SocEstimator, AStuckVoltageDoesNotDragTheEstimateAlong) {
   auto samples = work(3'600);
   for (std::size_t k = 600; k < samples.size(); ++k) samples[k].voltage_uv = samples[599].voltage_uv;
-  const auto stuck = run<float>(samples, SocEstimator<float>(tests::start_at(0.8, 0.02)));
+  const auto stuck = run<float>(samples, SocEstimator<float>(starting_at(0.8, 0.02)));
   std::size_t flagged = 0;
   for (const auto& e : stuck) flagged += (e.flags & voltage_stuck) != 0 ? 1 : 0;
   EXPECT_GT(flagged, 1'000U);

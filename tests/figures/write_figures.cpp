@@ -1,8 +1,9 @@
-// Measures the figures in the READMEs and writes them there: `./bms figures`.
+// Measures the figures in the READMEs and in docs/figures/ and writes them there: `./bms figures`.
 //
 //   argument      measures and writes
 //   (none)        all figures
-//   step          instructions of a step on the board, printed only
+//   step          instructions of a step on the boards, printed only
+//   filter        instructions of the filter with each form of the covariance
 //   board         figures that depend on the code alone, not on recordings or the machine
 //   protection    instructions of the protection
 //   budgets       flash, RAM and stack of the boards
@@ -120,6 +121,16 @@ std::string step_cost() {
                                                           measurement::samples(files::read_recording(shift)))) {
     table += fmt::format("| {} | {:.0f} |\n", what, value);
   }
+  return table;
+}
+
+/// The same filter with its covariance in three forms.
+std::string filter_forms() {
+  std::string table =
+      "| covariance of the filter, two states | step, mean [instructions] | step, longest |\n|---|---|---|\n";
+  for (const auto& [what, cost] :
+       firmware::filter_form_costs(images::emulated_boards().front(), files::read_cell("table9")))
+    table += fmt::format("| {} | {:.0f} | {} |\n", what, cost.mean, cost.most);
   return table;
 }
 
@@ -367,19 +378,20 @@ void write_board() {
   files::replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
   files::replace_figures(source / "estimator/README.md", "microbit", microbit_cost());
   files::replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
+  files::replace_figures(source / "estimator/README.md", "filter forms", filter_forms());
   files::replace_figures(source / "model/cells/README.md", "mechanisms", mechanism_tables());
   files::replace_figures(source / "boards/README.md", "budgets", firmware::board_table());
 }
 
 void run() {
-  const auto estimator = source / "estimator/README.md";
+  const auto estimator = source / "estimator/README.md", trials = source / "docs/figures/soc_trials.md";
   write_board();
   write_front_page();
   files::replace_figures(estimator, "shift", shift_accuracy());
   files::replace_figures(estimator, "duty", thousand_hours());
   if (std::filesystem::exists(data)) {
-    files::replace_figures(estimator, "real", real_accuracy());
-    files::replace_figures(estimator, "trials", soc_trials(data));
+    files::replace_figures(trials, "real", real_accuracy());
+    files::replace_figures(trials, "trials", soc_trials(data));
     files::replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
   } else {
     fmt::print(stderr, "{} does not exist: the figures of real recordings stay unchanged\n", data.string());
@@ -396,7 +408,9 @@ void run() {
 int main(int argc, char** argv) {
   try {
     if (argc > 1 && std::string_view(argv[1]) == "step")
-      fmt::print("{}\n{}", bms::step_cost(), bms::mechanism_cost());
+      fmt::print("{}\n{}\n{}\n{}", bms::step_cost(), bms::microbit_cost(), bms::filter_forms(), bms::mechanism_cost());
+    else if (argc > 1 && std::string_view(argv[1]) == "filter")
+      bms::files::replace_figures(bms::source / "estimator/README.md", "filter forms", bms::filter_forms());
     else if (argc > 1 && std::string_view(argv[1]) == "readme")
       bms::write_front_page();
     else if (argc > 1 && std::string_view(argv[1]) == "board")
