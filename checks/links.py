@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Refuses a relative link in a Markdown file that leads nowhere: checks/links.py [--root FOLDER]
 
-A link is `[text](path)` or `[text](path#heading)`; the path must exist, and the heading must be one of the target's (in GitHub's form:
-lower case, words joined by hyphens). Links with a scheme (https:) are not looked at. Exit code: 0 no fault, 1 faults.
+A link is `[text](path)` or `[text](path#heading)`; the path must exist, and the heading must be one of the target's (in
+GitHub's form: lower case, words joined by hyphens). Links with a scheme (https:) are not looked at. Exit code: 0 no
+fault, 1 faults.
 """
 import argparse
 import re
@@ -24,7 +25,8 @@ def anchors(page: Path) -> set[str]:
 
 
 def faults(root: Path):
-    listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "*.md"], cwd=root, capture_output=True, text=True)
+    command = ["git", "ls-files", "-co", "--exclude-standard", "*.md"]
+    listed = subprocess.run(command, cwd=root, capture_output=True, text=True)
     pages = [root / name for name in listed.stdout.split()] or sorted(root.rglob("*.md"))
     for page in pages:
         if not page.exists():

@@ -58,6 +58,9 @@ BREACHES = [  # check, file, what is added to it, what the check must say
     ("lengths", "model/cell.hpp", LONG_FUNCTION, "model/cell.hpp:3: function steps has 61 lines"),
     ("lengths", "model/cell.hpp", 400 * "//\n", "model/cell.hpp:1: the file has 402 lines"),
     ("lengths", "checks/long.toml", '"model/cell.hpp" = "A list."\n', "model/cell.hpp is not above its guide"),
+    ("statements", DIAGNOSE, "int f(int a) { return a ? 1 : a > 2 ? 3 : 4; }\n", "diagnose.cpp:4: a conditional"),
+    ("statements", DIAGNOSE, "int f(int a) { return a ? (a > 2 ? 3 : 4) : 1; }\n", "diagnose.cpp:4: a conditional"),
+    ("statements", DIAGNOSE, "void f(int a, int b) {\n  if (a) a = 1, b = 2;\n}\n", "diagnose.cpp:5: a comma"),
     ("words", "model/cell.hpp", "// A value of 15,\n// which is none.\n", "model/cell.hpp:4: is none ->"),
     ("words", "model/cell.hpp", "void know_anew(int state);\n", "model/cell.hpp:3: know_anew ->"),
     ("words", DIAGNOSE, 'auto text = "a fault beside it";\n', "diagnose.cpp:4: beside ->"),
@@ -80,7 +83,7 @@ def outcome(check, root):
 
 def faults_of(root):
     """Yields a message for each check that does not behave."""
-    checks = ["arrows", "literals", "lengths", "words", "format"]
+    checks = ["arrows", "literals", "lengths", "statements", "words", "format"]
     for path, text in CLEAN.items():
         write(root, path, text)
     for check in checks:

@@ -2,7 +2,8 @@
 """Refuses words that are not the field's words. words.toml lists them and says what to write instead.
 
 Its [[word]] tables hold for comments, texts (string literals) and whole pages (.md, .html). Its [[name]] tables hold
-for the names of the code and of the files. An #include line is not read: the included file reports its own name.
+for the names of the code and of the files. Names in `relied_on` are left out. An #include line is not
+read: the included file reports its own name.
 
 Exit code: 0 none of the words, 1 at least one, 2 words.toml cannot be used.
 """
@@ -44,6 +45,19 @@ def prose_and_code(text, path):
     return "".join(prose), "" if path.endswith(DATA) else "".join(code) + text[last:]
 
 
+def without_avoided(text, path):
+    """The text without the last column of tables headed "not": the glossary lists the words to avoid there."""
+    if not path.endswith(".md"):
+        return text
+    lines, inside = text.split("\n"), False
+    for k, line in enumerate(lines):
+        inside = line.startswith("|") and (inside or line.endswith("| not |"))
+        if inside:
+            start = line.rstrip(" |").rfind("|") + 1
+            lines[k] = line[:start] + sources.masked(line[start:], BARRIER)
+    return "\n".join(lines)
+
+
 def words_of(name):
     """know_anew, KnowAnew -> " know anew " """
     return " " + re.sub(r"_+|(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name).lower().strip() + " "
@@ -69,10 +83,12 @@ def findings(root, data):
     rules = [(re.compile(word["refuse"].replace(" ", r"\s+"), re.I), word["write"], tuple(word.get("only", [""])))
              for word in data["word"]]
     instead = refused_names(data["name"])
+    relied_on = re.compile("|".join(data.get("relied_on", ())) or r"(?!)")
     for path in sources.paths(root, READ):
         if path in data.get("skip", ()):
             continue
-        text = sources.read(root, path)
+        text = without_avoided(sources.read(root, path), path)
+        text = relied_on.sub(lambda name: sources.masked(name[0], BARRIER), text)
         prose, code = prose_and_code(text, path)
         found = {(m.start(), " ".join(m[0].split()), write) for rule, write, only in rules if path.startswith(only)
                  for m in rule.finditer(prose)}

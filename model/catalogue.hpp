@@ -86,7 +86,8 @@ constexpr std::size_t mechanism_index(std::string_view id) {
 template <class M>
 inline constexpr std::size_t mechanism_index_of = mechanism_index(M::id);
 
-/// Calls f(std::type_identity<M>{}) for the mechanism M with this index; nothing if there is none.
+/// Calls f(std::type_identity<M>{}) for the mechanism M with this index; does nothing for an index beyond the
+/// catalogue.
 template <class F>
 constexpr void visit_mechanism(std::size_t index, F&& f) {
   [&]<std::size_t... K>(std::index_sequence<K...>) {

@@ -55,7 +55,7 @@ struct OcvTable {
   Column<Real, max_ocv_edges> b1_v;   ///< [V per unit of soc], > 0
   // hysteresis between slow charge and slow discharge, if it is known; the 1RC model does not use it
   Column<double, max_ocv_edges> half_gap_v{};  ///< [V] at the edges, half of charge minus discharge; or empty
-  double lean = 0;                             ///< -1..1: b0, b1 are the middle of both plus lean * half_gap
+  double lean = 0;  ///< branch position, -1..1: b0, b1 are the middle of both plus this times half_gap
 };
 
 /// Equivalent circuit at nodes of soc; linear in between, constant outside.

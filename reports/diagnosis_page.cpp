@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/charge_count.hpp"
 #include "diagnosis/texts.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "identification/goodness_of_fit.hpp"
@@ -45,13 +46,9 @@ std::vector<double> soc_of(const workflow::DiagnoseResult& r, std::size_t n) {
   if (n < r.diagnosis.views.size() && r.diagnosis.views[n].soc.size() == r.recordings[n].record.size())
     return r.diagnosis.views[n].soc;
   const diagnosis::PreparedRecording& record = r.recordings[n].record;
-  std::vector<double> soc(record.size());
-  double at = record.initial_soc, known_a = 0;
-  for (std::size_t k = 0; k < soc.size(); ++k) {
-    if (std::isfinite(record.current_a[k])) known_a = record.current_a[k];
-    if (k > 0) at += known_a * (record.time_s[k] - record.time_s[k - 1]) / (3'600 * r.cell.parameters.capacity_ah);
-    soc[k] = at;
-  }
+  std::vector<double> soc;
+  diagnosis::for_each_row(record, r.cell.parameters.capacity_ah,
+                          [&](const diagnosis::CountedRow& row) { soc.push_back(row.soc); });
   return soc;
 }
 

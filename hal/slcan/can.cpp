@@ -62,7 +62,10 @@ bool can_receive(can::Frame& frame) {
   while (uart_read(byte)) {
     if (!reader.push(byte)) continue;
     const bool is_frame = slcan::decode(reader.line(), frame);
-    answer(!is_frame ? answer_to(reader.line()) : listening ? "\r" : "\a");
+    if (is_frame)
+      answer(listening ? "\r" : "\a");
+    else
+      answer(answer_to(reader.line()));
     if (is_frame && listening && !frame.long_id) return true;
   }
   return false;

@@ -22,7 +22,8 @@ inline std::vector<double> drive(double hours, std::uint64_t seed, double capaci
   double soc_moved = 0;
   while (current_a.size() < samples) {
     const double spell_s = 20 + 160 * random.uniform(), level = random.uniform();
-    double c = level < 0.25 ? 0 : level < 0.65 ? -2 * random.uniform() : 1.6 * random.uniform();
+    double c = 0;
+    if (level >= 0.25) c = (level < 0.65 ? -2 : 1.6) * random.uniform();
     if (soc_moved < -0.4) c = std::abs(c);
     if (soc_moved > 0.05) c = -std::abs(c);
     for (int k = 0; k < static_cast<int>(spell_s); ++k) {

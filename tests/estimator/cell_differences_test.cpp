@@ -53,8 +53,12 @@ struct Pack {
   double error(std::size_t k) const {
     return arithmetic::as_double(differences[k].soc()) - (truth[k].soc() - mean_soc());
   }
+  static double load(int k) {
+    if (k % 100 < 50) return -6;
+    return k % 100 < 60 ? 4 : 0;
+  }
   void hours(double h) {
-    for (int k = 0; k < static_cast<int>(h * 3'600); ++k) second(k % 100 < 50 ? -6 : k % 100 < 60 ? 4 : 0);
+    for (int k = 0; k < static_cast<int>(h * 3'600); ++k) second(load(k));
   }
 
   plant::Random random{3};

@@ -46,7 +46,10 @@ struct Truck {
   std::uint64_t time_us = 0;
 };
 
-double load(int k) { return k % 60 < 30 ? -6 : k % 60 < 40 ? 3 : 0; }
+double load(int k) {
+  if (k % 60 < 30) return -6;
+  return k % 60 < 40 ? 3 : 0;
+}
 
 TYPED_TEST(ConditionOfEveryScalar, ReportsOverAShiftWhatItsPartsReport) {
   Truck<TypeParam> truck(0.95, starting_at(0.95, 0.01));

@@ -94,11 +94,9 @@ Work work(const std::vector<MechanismSetting>& mechanisms, std::size_t count, do
   std::normal_distribution<double> noise(0, 0.001);
   Work w;
   for (std::size_t k = 0; k < count; ++k) {
-    const double current_a = k < 60              ? 0
-                             : (k / 40) % 3 == 0 ? -5
-                             : (k / 40) % 3 == 1 ? 1.5
-                                                 : -0.2,
-                 temperature_c = 15 + 1e-3 * static_cast<double>(k);
+    constexpr double phases_a[] = {-5, 1.5, -0.2};
+    const double current_a = k < 60 ? 0 : phases_a[(k / 40) % 3];
+    const double temperature_c = 15 + 1e-3 * static_cast<double>(k);
     const double v =
         simulation.step(static_cast<double>(k), k == 0 ? 0 : 1, current_a, temperature_c, [](auto&, const auto&) {}) +
         noise(random);
@@ -137,7 +135,8 @@ TEST(ExtendedEstimator, FollowsACellThatThePlainModelLoses) {
     plain_rms += std::pow(estimator.step(plain_cell, w.samples[k]).soc - w.soc[k], 2);
     if (std::abs(error) < 2 * with[k].soc_sigma) ++inside;
   }
-  with_rms = std::sqrt(with_rms / 10'000), plain_rms = std::sqrt(plain_rms / 10'000);
+  with_rms = std::sqrt(with_rms / 10'000);
+  plain_rms = std::sqrt(plain_rms / 10'000);
   EXPECT_LT(with_rms, 0.02);  // nobody knows the branch at the start: 8 mV of it are a few percent there
   EXPECT_GT(plain_rms, 2 * with_rms);
   EXPECT_GT(inside, 9'500U);
@@ -287,11 +286,8 @@ TEST(ExtendedEstimator, AGainMakesSigmaGrowWithTheChargeThatWasCounted) {
   std::vector<measurement::Sample> out, out_and_back;
   for (std::uint64_t k = 0; k < 2'160; ++k) {
     out.push_back({k * 1'000'000, k == 0 ? 0 : -6'000'000, measurement::no_reading, 2'500});
-    out_and_back.push_back({k * 1'000'000,
-                            k == 0      ? 0
-                            : k < 1'080 ? -6'000'000
-                                        : 6'000'000,
-                            measurement::no_reading, 2'500});
+    const std::int32_t current_ua = k < 1'080 ? -6'000'000 : 6'000'000;
+    out_and_back.push_back({k * 1'000'000, k == 0 ? 0 : current_ua, measurement::no_reading, 2'500});
   }
   const auto without = run_with_rest<float>(0, out, start), with = run_with_rest<float>(0, out, start, 0.02);
   const auto sigma = [](const auto& e) { return static_cast<double>(e.back().soc_sigma); };
@@ -350,9 +346,8 @@ TEST(ExtendedEstimator, NothingThatComesInMakesTheStateNotANumber) {
     for (int k = 0; k < 2'000; ++k) {
       time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
       const auto anything = [&](std::int32_t normal) {
-        return random() % 3 == 0   ? static_cast<std::int32_t>(random())
-               : random() % 7 == 0 ? measurement::no_reading
-                                   : normal;
+        if (random() % 3 == 0) return static_cast<std::int32_t>(random());
+        return random() % 7 == 0 ? measurement::no_reading : normal;
       };
       const auto e = estimator.step(
           cell, {time_us, anything(-3'000'000), anything(3'280'000), static_cast<std::int16_t>(random())});

@@ -40,8 +40,13 @@ struct Truck {
     estimate = estimator.step(tables, s);
   }
   /// An hour of lifting and driving, with 0.3C of mean load.
+  /// 40 s of driving, 20 s of charging, a minute of rest.
+  double load(int k) {
+    if (k % 120 < 40) return -6 * (0.5 + random.uniform());
+    return k % 120 < 60 ? 3 : 0;
+  }
   void hour(const std::function<void(measurement::Sample&)>& spoil = {}) {
-    for (int k = 0; k < 3'600; ++k) second(k % 120 < 40 ? -6 * (0.5 + random.uniform()) : k % 120 < 60 ? 3 : 0, spoil);
+    for (int k = 0; k < 3'600; ++k) second(load(k), spoil);
   }
   double error() const { return estimate.soc - cell.soc(); }
 
@@ -122,7 +127,7 @@ TEST(Complaint, AWrongStartIsNeverCorrected) {
   for (const double wrong : {0.25, -0.25}) {
     Truck truck(0.65, starting_at(0.65 + wrong, 0.25));
     for (int k = 0; k < 3'600 * 2; ++k) {
-      truck.second(k % 120 < 40 ? -6 * (0.5 + truck.random.uniform()) : k % 120 < 60 ? 3 : 0);
+      truck.second(truck.load(k));
       ASSERT_LE(std::abs(truck.error()), 2 * truck.estimate.soc_sigma) << "second " << k;
     }
     EXPECT_NEAR(truck.error(), 0, 0.02) << "the SOC has crossed two knees";

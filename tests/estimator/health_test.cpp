@@ -35,7 +35,8 @@ struct Day {
       for (int k = 0; k < 20'000; ++k) {
         const bool down = turn % 2 == 0;
         if (down ? truth.soc() < 0.04 : truth.soc() > 0.97) break;
-        const double current_a = down ? (k % 60 < 40 ? -6 : -1.5) : 3;
+        const double load_a = k % 60 < 40 ? -6 : -1.5;
+        const double current_a = down ? load_a : 3;
         truth.run(current_a, 25, 1);
         time_us += 1'000'000;
         const measurement::Sample s{

@@ -27,7 +27,8 @@ void hour(F&& f) {
   model::OneRc<double>::State x{};
   double soc = 0.77;
   for (int k = 1; k <= 3'600; ++k) {
-    const double current_a = (k / 40) % 3 == 0 ? -5 : (k / 40) % 3 == 1 ? 1 : 0;
+    constexpr double phases_a[] = {-5, 1, 0};
+    const double current_a = phases_a[(k / 40) % 3];
     soc += current_a / 3'600 / 6;
     const auto at = model::look_up(cell, soc);
     x = model::OneRc<double>::advance(x, at, model::OneRc<double>::discretise(at, 1), {current_a, 1});

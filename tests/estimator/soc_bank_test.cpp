@@ -1,5 +1,6 @@
 #include "estimator/soc_bank.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -13,7 +14,7 @@ using Scalars = ::testing::Types<float, double, arithmetic::FixedPoint>;
 TYPED_TEST_SUITE(SocBankOfEveryScalar, Scalars);
 
 /// A curve that is flat but for a knee: 3.2 V, from 0.6 to 0.7 up to 3.3 V.
-double curve_v(double soc) { return 3.2 + 0.02 * soc + (soc < 0.6 ? 0 : soc > 0.7 ? 0.1 : soc - 0.6); }
+double curve_v(double soc) { return 3.2 + 0.02 * soc + std::clamp(soc - 0.6, 0.0, 0.1); }
 
 template <class S>
 struct Asked {

@@ -24,10 +24,8 @@ std::vector<measurement::Sample> work(std::size_t count) {
   std::mt19937 random(5);
   double soc = 0.8;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::int32_t current_ua = k < 60              ? 0
-                                    : (k / 40) % 3 == 0 ? -5'000'000
-                                    : (k / 40) % 3 == 1 ? 1'000'000
-                                                        : -200'000;
+    constexpr std::int32_t phases_ua[] = {-5'000'000, 1'000'000, -200'000};
+    const std::int32_t current_ua = k < 60 ? 0 : phases_ua[(k / 40) % 3];
     soc += current_ua * 1e-6 / 3'600 / 6;
     const double voltage_v = 3.25 + 0.09 * soc + 0.015 * current_ua * 1e-6;
     samples[k] = {k * 1'000'000, current_ua,
@@ -257,9 +255,8 @@ TEST(SocEstimator, NothingThatComesInMakesTheStateNotANumber) {
     for (int k = 0; k < 2'000; ++k) {
       time_us += random() % 5 == 0 ? random() >> (random() % 64) : random() % 2'000'000;
       const auto anything = [&](std::int32_t usual) {
-        return random() % 3 == 0   ? static_cast<std::int32_t>(random())
-               : random() % 7 == 0 ? measurement::no_reading
-                                   : usual;
+        if (random() % 3 == 0) return static_cast<std::int32_t>(random());
+        return random() % 7 == 0 ? measurement::no_reading : usual;
       };
       const measurement::Sample sample{time_us, anything(-3'000'000), anything(3'280'000),
                                        static_cast<std::int16_t>(random())};

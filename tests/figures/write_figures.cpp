@@ -213,7 +213,9 @@ std::string mechanism_tables() {
   for (const model::MechanismInfo& info : model::catalogue) {
     for (std::size_t k = 0; k < info.parameters; ++k) {
       const model::Parameter& p = info.parameter[k];
-      const char* per = p.per == model::Per::ah ? " per Ah" : p.per == model::Per::siemens ? ", over Ah" : "";
+      const char* per = "";
+      if (p.per == model::Per::ah) per = " per Ah";
+      if (p.per == model::Per::siemens) per = ", over Ah";
       table += fmt::format("| {} | `{}` | {} | {:g} .. {:g}{} | {} |\n",
                            k > 0 ? "" : "`[" + files::table_of(info) + "]`" + (info.on_board ? "" : " *host*"), p.name,
                            p.unit == "1" ? "" : p.unit, p.low, p.high, per, p.meaning);

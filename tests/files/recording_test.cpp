@@ -52,10 +52,12 @@ std::string with_references(const std::function<std::string(int)>& reference) {
 }
 
 TEST(Recording, ReferencesMayBeEmptyWithoutAWarning) {
-  const Recording r = parse_recording(with_references([](int k) {
-                                        return std::string(k < 5 ? "0,3.6" : k < 10 ? ",3.31" : k == 12 ? "nan," : ",");
-                                      }),
-                                      "log.csv");
+  const auto references = [](int k) -> std::string {
+    if (k < 5) return "0,3.6";
+    if (k < 10) return ",3.31";
+    return k == 12 ? "nan," : ",";
+  };
+  const Recording r = parse_recording(with_references(references), "log.csv");
   EXPECT_EQ(r.current_ref_a[4], 0);
   EXPECT_TRUE(std::isnan(r.current_ref_a[5]));
   EXPECT_EQ(r.voltage_ref_v[9], 3.31);
@@ -100,11 +102,13 @@ TEST(Recording, EveryDecimalIsRoundedCorrectly) {
     char number[64];
     const double value = std::ldexp(static_cast<double>(random() >> 11), -static_cast<int>(random() % 100)) *
                          (random() % 2 == 0 ? 1 : -1);
-    std::snprintf(number, sizeof number,
-                  random() % 3 == 0   ? "%.3e"
-                  : random() % 2 == 0 ? "%.9f"
-                                      : "%.17g",
-                  std::fmod(value, 1e6));
+    const double shown = std::fmod(value, 1e6);
+    if (random() % 3 == 0)
+      std::snprintf(number, sizeof number, "%.3e", shown);
+    else if (random() % 2 == 0)
+      std::snprintf(number, sizeof number, "%.9f", shown);
+    else
+      std::snprintf(number, sizeof number, "%.17g", shown);
     numbers.emplace_back(number);
     text += std::to_string(k) + "," + number + ",3.3\n";
   }

@@ -298,9 +298,10 @@ std::uint8_t Bq76952Model::register_byte(std::uint8_t at) const {
 bool Bq76952Model::write_register(std::uint8_t at, std::uint8_t value) {
   if (at == 0x3E)
     low_ = value;
-  else if (at == 0x3F)
-    high_ = value, command(static_cast<std::uint16_t>(high_ << 8 | low_));
-  else if (at >= 0x40 && at < 0x60)
+  else if (at == 0x3F) {
+    high_ = value;
+    command(static_cast<std::uint16_t>(high_ << 8 | low_));
+  } else if (at >= 0x40 && at < 0x60)
     buffer_[static_cast<std::size_t>(at - 0x40)] = value;
   else if (at == 0x60)
     checksum_ = value;

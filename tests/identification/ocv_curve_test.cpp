@@ -22,8 +22,8 @@ SlowRun slow_run(bool charges, double noise_v = 0.0005) {
   constexpr double c_rate = 1.0 / 25;
   std::vector<experiments::ProfileRow> profile;
   const int moving = 25 * 360;
-  for (int k = 0; k <= moving + 720; ++k)
-    profile.push_back({10.0 * k, k > 360 && k <= 360 + moving ? (charges ? 6 : -6) * c_rate : 0.0});
+  const double current_a = (charges ? 6 : -6) * c_rate;
+  for (int k = 0; k <= moving + 720; ++k) profile.push_back({10.0 * k, k > 360 && k <= 360 + moving ? current_a : 0.0});
   PlantRun run = run_plant(profile, charges ? 0.0 : 1.0);
   std::mt19937_64 random(charges ? 1 : 2);
   std::normal_distribution<double> normal;

@@ -96,7 +96,10 @@ TEST(Filters, HaveNoDelayForwardAndBackwardAndADelayInOneDirection) {
   const SecondOrderFilter f = butterworth_low_pass(0.02, 1);
   const auto centre = [](const std::vector<double>& v) {
     double sum = 0, moment = 0;
-    for (std::size_t k = 0; k < v.size(); ++k) sum += v[k], moment += static_cast<double>(k) * v[k];
+    for (std::size_t k = 0; k < v.size(); ++k) {
+      sum += v[k];
+      moment += static_cast<double>(k) * v[k];
+    }
     return moment / sum;
   };
   EXPECT_NEAR(centre(filter_zero_phase(f, pulse)), 200, 1e-6);

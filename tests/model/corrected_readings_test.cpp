@@ -22,7 +22,10 @@ Columns uneven(std::size_t rows, double shortest_s = 0) {
   double time_s = 100;
   for (std::size_t k = 0; k < rows; ++k) {
     c.time_s.push_back(time_s);
-    time_s += k % 37 == 36 ? 40 : k % 11 == 10 ? shortest_s : 0.5 + uniform(random);
+    if (k % 37 == 36)
+      time_s += 40;
+    else
+      time_s += k % 11 == 10 ? shortest_s : 0.5 + uniform(random);
     c.current_a.push_back(10 * uniform(random) - 5);
     c.temperature_c.push_back(20 + 0.01 * time_s);
   }

@@ -33,7 +33,8 @@ std::vector<Row> input_of(std::size_t rows) {
   std::vector<Row> all;
   double time_s = 0, current_a = 0;
   for (std::size_t k = 0; k < rows; ++k) {
-    const double duration_s = k == 0 ? 0 : k % 50 == 0 ? 0.1 : 1;
+    const double step_s = k % 50 == 0 ? 0.1 : 1;
+    const double duration_s = k == 0 ? 0 : step_s;
     time_s += duration_s;
     if (k % 20 == 0) current_a = k % 100 == 0 ? 0 : std::round(1e3 * (14 * uniform(random) - 8)) * 1e-3;
     all.push_back({time_s, duration_s, current_a, 20 + 10 * std::sin(1e-3 * time_s)});

@@ -241,9 +241,10 @@ TEST(BusState, AcceptsAnyFrames) {
     BusFrame frame;
     frame.time_us = static_cast<std::int64_t>(random() % 100'000'000'000'000'000);
     frame.kind = static_cast<FrameKind>(random() % 5);
-    frame.id = static_cast<std::uint32_t>(frame.kind == FrameKind::standard ? 0x180 + random() % 16
-                                          : run % 4 == 0                    ? can::j1939::DcSourceStatus1::id
-                                                                            : random() % 0x1FFFFFFF);
+    if (frame.kind == FrameKind::standard)
+      frame.id = static_cast<std::uint32_t>(0x180 + random() % 16);
+    else
+      frame.id = run % 4 == 0 ? can::j1939::DcSourceStatus1::id : static_cast<std::uint32_t>(random() % 0x1FFFFFFF);
     frame.long_id = frame.kind == FrameKind::extended;
     frame.length = static_cast<std::uint8_t>(random() % 9);
     for (std::uint8_t& byte : frame.data) byte = static_cast<std::uint8_t>(random());

@@ -67,7 +67,7 @@ bool FlashModel::erase(std::uint32_t sector) {
   for (std::uint32_t at = 0; at < size_.sector_bytes; at += 4) {
     Word& w = word(sector, at);
     if (cut || worn.erase_fails) {
-      const std::uint32_t how = kind == 0 ? 1 : kind == 1 ? 2 : random() % 3;
+      const std::uint32_t how = kind < 2 ? kind + 1 : random() % 3;
       if (how == 0) continue;
       const std::uint32_t moved = how == 1 ? 0xFFFFFFFF : random() | random();
       w.weak = (w.weak | ~w.bits) & (how == 1 ? random() & random() & random() : random());

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <vector>
 
@@ -73,9 +74,11 @@ TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   events.add({0x0605, 0x04030201});
   Raw expected(118, 0);
   expected[0] = 9;
-  expected[16] = 7, expected[17] = 8;
+  expected[16] = 7;
+  expected[17] = 8;
   expected[18] = 1;
-  expected[22] = 5, expected[23] = 6, expected[24] = 1, expected[25] = 2, expected[26] = 3, expected[27] = 4;
+  const Raw event = {5, 6, 1, 2, 3, 4};
+  std::copy(event.begin(), event.end(), expected.begin() + 22);
   EXPECT_EQ(bytes_of(events), expected);
   SettingsRecord settings;
   EXPECT_TRUE(settings.set(0x0102, -2));

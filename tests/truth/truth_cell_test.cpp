@@ -35,7 +35,9 @@ TEST(TruthOcv, EqualsTheTenLinesOfTable9ExceptAtItsTwoSharpCorners) {
   for (int k = 0; k < 1'000; ++k) {
     const double soc = (k + 0.5) / 1'000;
     const auto line = static_cast<std::size_t>(k / 100);
-    const double tolerance_v = std::abs(soc - 0.1) < 0.025 ? 0.011 : std::abs(soc - 0.9) < 0.01 ? 0.0045 : 0.0015;
+    double tolerance_v = 0.0015;
+    if (std::abs(soc - 0.1) < 0.025) tolerance_v = 0.011;
+    if (std::abs(soc - 0.9) < 0.01) tolerance_v = 0.0045;
     EXPECT_NEAR(ocv_v.at(soc), b0_v[line] + b1_v[line] * soc, tolerance_v) << soc;
   }
 }
