@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 std::string table9_text() { return read_file(BMS_SOURCE_DIR "/model/cells/table9.toml"); }
 
 /// The line with which a bad file is rejected.
-std::string refusal(const std::string& text) {
+std::string cell_refusal(const std::string& text) {
   return refusal_by("cell.toml", [&] { parse_cell(text, "cell.toml"); });
 }
 
@@ -49,7 +49,7 @@ TEST(CellFile, ReadsWhetherSensorErrorsAreStates) {
   const CellFile cell = parse_cell(with, "x");
   EXPECT_TRUE(cell.parameters.noise.errors_are_states);
   EXPECT_TRUE(parse_cell(cell_text(cell), "x").parameters.noise.errors_are_states);
-  EXPECT_THAT(refusal(replaced(with, "errors_are_states = true", "errors_are_states = 1")),
+  EXPECT_THAT(cell_refusal(replaced(with, "errors_are_states = true", "errors_are_states = 1")),
               HasSubstr("'noise.errors_are_states' is not acceptable, expected true or false"));
 }
 
@@ -78,33 +78,33 @@ TEST(CellFile, WrittenValuesAreReadBackBitForBit) {
     EXPECT_EQ(again.sources.at("rc"), cell.sources.at("rc"));
     ASSERT_EQ(again.at_temperature.size(), 2U);
     EXPECT_EQ(again.at_temperature[0].rc.r0_ohm[0], 0.0371);
-    EXPECT_THAT(refusal(replaced(text, "temperature_c = 25.0", "temperature_c = -25.0")),
+    EXPECT_THAT(cell_refusal(replaced(text, "temperature_c = 25.0", "temperature_c = -25.0")),
                 HasSubstr("temperatures that ascend"));
-    EXPECT_THAT(refusal(replaced(text, "0.0371", "7.0")),
+    EXPECT_THAT(cell_refusal(replaced(text, "0.0371", "7.0")),
                 HasSubstr("'at_temperature.r0_ohm' at -5 degrees C is out of range"));
   }
 }
 
 TEST(CellFile, RejectsValuesOutOfRangeAndNamesKeyLineAndRange) {
   const std::string good = table9_text();
-  EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = -6.0")),
+  EXPECT_THAT(cell_refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = -6.0")),
               HasSubstr("'capacity_ah' is out of range, expected 0.01 to 1000 Ah"));
-  EXPECT_THAT(refusal(replaced(good, "0.0140197", "0.9")), HasSubstr("'rc.r0_ohm'"));
-  EXPECT_THAT(refusal(replaced(good, "420.558", "nan")), HasSubstr("'rc.c1_f'"));
-  EXPECT_THAT(refusal(replaced(good, "3.35,  0.39", "-3.35,  0.39")), HasSubstr("a curve that rises"));
-  EXPECT_THAT(refusal(replaced(good, "3.167", "3.267")), HasSubstr("pieces that meet within 5 mV"));
-  EXPECT_THAT(refusal(replaced(good, "[0.0,   0.1,   0.2", "[0.0,   0.2,   0.1")), HasSubstr("edges that ascend"));
-  EXPECT_THAT(refusal(replaced(good, "voltage_v = 0.001", "voltage_v = 0.0")), HasSubstr("'noise.voltage_v'"));
+  EXPECT_THAT(cell_refusal(replaced(good, "0.0140197", "0.9")), HasSubstr("'rc.r0_ohm'"));
+  EXPECT_THAT(cell_refusal(replaced(good, "420.558", "nan")), HasSubstr("'rc.c1_f'"));
+  EXPECT_THAT(cell_refusal(replaced(good, "3.35,  0.39", "-3.35,  0.39")), HasSubstr("a curve that rises"));
+  EXPECT_THAT(cell_refusal(replaced(good, "3.167", "3.267")), HasSubstr("pieces that meet within 5 mV"));
+  EXPECT_THAT(cell_refusal(replaced(good, "[0.0,   0.1,   0.2", "[0.0,   0.2,   0.1")), HasSubstr("edges that ascend"));
+  EXPECT_THAT(cell_refusal(replaced(good, "voltage_v = 0.001", "voltage_v = 0.0")), HasSubstr("'noise.voltage_v'"));
 }
 
 TEST(CellFile, RejectsABinaryFile) {
-  EXPECT_THAT(refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a control character"));
+  EXPECT_THAT(cell_refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a control character"));
 }
 
 TEST(CellFile, RejectsTextOnWhichTheParserAsserts) {
   for (const char* text : {"[/limits]\n", "[[/]]\n", "[a.\"b\"./]\n", "/ = 1\n"})
-    EXPECT_THAT(refusal(text), HasSubstr("expected a cell file in TOML")) << text;
-  EXPECT_THAT(refusal("a = 1\nb = [1,\n2]\n[/limits]\n"), HasSubstr("cell.toml:4:"));
+    EXPECT_THAT(cell_refusal(text), HasSubstr("expected a cell file in TOML")) << text;
+  EXPECT_THAT(cell_refusal("a = 1\nb = [1,\n2]\n[/limits]\n"), HasSubstr("cell.toml:4:"));
 }
 
 TEST(CellFile, AcceptsCharactersBeyondAsciiOnlyInCommentsAndTexts) {
@@ -121,13 +121,13 @@ TEST(CellFile, AcceptsCharactersBeyondAsciiOnlyInCommentsAndTexts) {
   EXPECT_NO_THROW(parse_cell("\xEF\xBB\xBF" + good, "cell.toml")) << "a byte order mark";
   for (const char* text : {"chemistry = \xC7\xA2\"table9\"", "chem\xC3\xAFstry = \"table9\"",
                            "chemistry = \"LiFePO4\"\n\xC7\xA2", "chemistry = 'LiFePO4' \xC7\xA2 '"}) {
-    EXPECT_THAT(refusal(replaced(good, entry, text)), HasSubstr("cell.toml:")) << text;
+    EXPECT_THAT(cell_refusal(replaced(good, entry, text)), HasSubstr("cell.toml:")) << text;
   }
 }
 
 TEST(CellFile, NamesTheLineOfABadEntry) {
   const std::string good = table9_text();
-  const std::string line = refusal(replaced(good, "420.558", "1.0"));
+  const std::string line = cell_refusal(replaced(good, "420.558", "1.0"));
   const std::string before = good.substr(0, good.find("420.558"));
   const auto number = 1 + std::count(before.begin(), before.end(), '\n');
   EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
@@ -135,21 +135,22 @@ TEST(CellFile, NamesTheLineOfABadEntry) {
 
 TEST(CellFile, RejectsMissingMisspeltAndWronglyTypedKeys) {
   const std::string good = table9_text();
-  EXPECT_THAT(refusal(""), HasSubstr("'name' is missing"));
-  EXPECT_THAT(refusal("\x01\x02 not toml at all"), HasSubstr("expected a cell file in TOML"));
+  EXPECT_THAT(cell_refusal(""), HasSubstr("'name' is missing"));
+  EXPECT_THAT(cell_refusal("\x01\x02 not toml at all"), HasSubstr("expected a cell file in TOML"));
   const std::size_t last_key = good.rfind("drift_v");
-  for (std::size_t end = 0; end < last_key; end += 97) refusal(good.substr(0, end));  // truncated at any place
-  EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = \"six\"")), HasSubstr("expected a number"));
-  EXPECT_THAT(refusal(replaced(good, "capacity_ah = 6.0", "capacity_mah = 6000")),
+  for (std::size_t end = 0; end < last_key; end += 97) cell_refusal(good.substr(0, end));  // truncated at any place
+  EXPECT_THAT(cell_refusal(replaced(good, "capacity_ah = 6.0", "capacity_ah = \"six\"")),
+              HasSubstr("expected a number"));
+  EXPECT_THAT(cell_refusal(replaced(good, "capacity_ah = 6.0", "capacity_mah = 6000")),
               HasSubstr("'capacity_ah' is missing"));
-  EXPECT_THAT(refusal(replaced(good, "model_v = 0.003", "model_v = 0.003\nmodell_v = 0.003")),
+  EXPECT_THAT(cell_refusal(replaced(good, "model_v = 0.003", "model_v = 0.003\nmodell_v = 0.003")),
               HasSubstr("unknown key 'noise.modell_v'"));
-  EXPECT_THAT(refusal(replaced(good, "0.7,  0.8,   0.9,   1.0]", "0.7,  0.8,   0.9]")), HasSubstr("ocv"));
-  EXPECT_THAT(refusal(replaced(good, "name = \"table9\"", "name = \"../x\\\"\"")), HasSubstr("'name'"));
-  EXPECT_THAT(refusal(replaced(good, "1927.32]", "[1927.32]]")), HasSubstr("expected a number"));
+  EXPECT_THAT(cell_refusal(replaced(good, "0.7,  0.8,   0.9,   1.0]", "0.7,  0.8,   0.9]")), HasSubstr("ocv"));
+  EXPECT_THAT(cell_refusal(replaced(good, "name = \"table9\"", "name = \"../x\\\"\"")), HasSubstr("'name'"));
+  EXPECT_THAT(cell_refusal(replaced(good, "1927.32]", "[1927.32]]")), HasSubstr("expected a number"));
   std::string many = "0.5";
   for (int k = 0; k < 100; ++k) many += ", 0.5";
-  EXPECT_THAT(refusal(replaced(good, "1927.32]", many + "]")), HasSubstr("at most 64 numbers"));
+  EXPECT_THAT(cell_refusal(replaced(good, "1927.32]", many + "]")), HasSubstr("at most 64 numbers"));
 }
 
 constexpr const char* mechanisms = R"(
@@ -224,24 +225,26 @@ TEST(CellFile, AMissingParameterIsAcceptedForACellOfAnySize) {
 
 TEST(CellFile, RejectsAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable) {
   const std::string good = table9_text() + mechanisms;
-  EXPECT_THAT(refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")),
+  EXPECT_THAT(cell_refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")),
               HasSubstr("unknown key 'mechanism.hysteresis', expected one of: "));
-  EXPECT_THAT(refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")), HasSubstr("ocv_hysteresis"));
-  EXPECT_THAT(refusal(replaced(good, "instrument.current_offset", "mechanism.current_offset")),
+  EXPECT_THAT(cell_refusal(replaced(good, "mechanism.ocv_hysteresis", "mechanism.hysteresis")),
+              HasSubstr("ocv_hysteresis"));
+  EXPECT_THAT(cell_refusal(replaced(good, "instrument.current_offset", "mechanism.current_offset")),
               HasSubstr("unknown key 'mechanism.current_offset'"));
-  EXPECT_THAT(refusal(replaced(good, "mechanism.initial_soc", "instrument.initial_soc")),
+  EXPECT_THAT(cell_refusal(replaced(good, "mechanism.initial_soc", "instrument.initial_soc")),
               HasSubstr("unknown key 'instrument.initial_soc'"));
-  EXPECT_THAT(refusal(replaced(good, "decay = 55", "dekay = 55")),
+  EXPECT_THAT(cell_refusal(replaced(good, "decay = 55", "dekay = 55")),
               HasSubstr("unknown key 'mechanism.ocv_hysteresis.dekay', expected one of: decay, decay_std, half_gap_v"));
-  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = \"fast\"")), HasSubstr("expected a number"));
-  EXPECT_THAT(refusal(replaced(good, "decay = 55", "decay = nan")),
+  EXPECT_THAT(cell_refusal(replaced(good, "decay = 55", "decay = \"fast\"")), HasSubstr("expected a number"));
+  EXPECT_THAT(cell_refusal(replaced(good, "decay = 55", "decay = nan")),
               HasSubstr("'mechanism.ocv_hysteresis.decay' is out of range, expected 8 to 400"));
-  EXPECT_THAT(refusal(replaced(good, "offset_a = 0.03", "offset_a = 3")),
+  EXPECT_THAT(cell_refusal(replaced(good, "offset_a = 0.03", "offset_a = 3")),
               HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -0.6 to 0.6 A"));
-  EXPECT_THAT(refusal(replaced(good, "half_gap_v_std = 0.001", "half_gap_v_std = -1")),
+  EXPECT_THAT(cell_refusal(replaced(good, "half_gap_v_std = 0.001", "half_gap_v_std = -1")),
               HasSubstr("'mechanism.ocv_hysteresis.half_gap_v_std' is out of range, expected 0 or more"));
-  EXPECT_THAT(refusal("mechanism = 1\n" + table9_text()), HasSubstr("'mechanism' is not acceptable, expected a table"));
-  const std::string line = refusal(replaced(good, "decay = 55", "decay = 1"));
+  EXPECT_THAT(cell_refusal("mechanism = 1\n" + table9_text()),
+              HasSubstr("'mechanism' is not acceptable, expected a table"));
+  const std::string line = cell_refusal(replaced(good, "decay = 55", "decay = 1"));
   const auto number = std::count(good.begin(), good.end(), '\n');
   EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
 }

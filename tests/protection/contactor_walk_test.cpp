@@ -15,7 +15,6 @@ namespace bms::protection {
 namespace {
 
 using enum ContactorState;
-constexpr std::int32_t pack_uv = rested_pack_uv;
 
 /// The bytes that determine all later steps.
 std::array<std::uint8_t, sizeof(Contactors)> bytes(const Contactors& c) {
@@ -32,7 +31,7 @@ std::vector<ContactorInput> input_classes() {
     for (int faults = 0; faults < 16; ++faults) {
       for (const std::int32_t current_ua : {unknown, -3'000'000, 0, 3'000'000}) {
         for (const std::int32_t dc_link_uv : {unknown, 0, 30'000'000, 46'000'000, 49'000'000, 52'800'000}) {
-          for (const std::int32_t stack_uv : {unknown, pack_uv}) {
+          for (const std::int32_t stack_uv : {unknown, rested_pack_uv}) {
             if (stack_uv == unknown && dc_link_uv > 0) continue;
             inputs.push_back({.request = r,
                               .open = (faults & 1) != 0,
@@ -119,7 +118,7 @@ TEST(Contactors, InAnInvalidStateEndInSafeEvenIfAllCopiesAgree) {
     words[at + 2] ^= 3 ^ none;
     std::memcpy(static_cast<void*>(&f.contactors), words.data(), sizeof(Contactors));
     EXPECT_FALSE(f.contactors.intact()) << none;
-    EXPECT_EQ(f.step(0.1, pack_uv), safe) << none;
+    EXPECT_EQ(f.step(0.1, rested_pack_uv), safe) << none;
     EXPECT_EQ(f.contactors.outputs(), Outputs{});
   }
 }

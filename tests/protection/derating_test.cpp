@@ -11,11 +11,11 @@ namespace bms::protection {
 namespace {
 
 constexpr DeratingPlan plan6a = derating_plan(forklift);
-constexpr DeratingInput good{.highest_cell_uv = 3'300'000,
-                             .lowest_cell_uv = 3'290'000,
-                             .highest_cdegc = 2'500,
-                             .lowest_cdegc = 2'400,
-                             .soc_ppb = 500'000'000};
+constexpr DeratingInput far_from_limits{.highest_cell_uv = 3'300'000,
+                                        .lowest_cell_uv = 3'290'000,
+                                        .highest_cdegc = 2'500,
+                                        .lowest_cdegc = 2'400,
+                                        .soc_ppb = 500'000'000};
 
 AllowedCurrent steady_state(const DeratingInput& in) {
   Derating d(plan6a);
@@ -31,14 +31,14 @@ struct Point {
 };
 
 DeratingInput with(void (*change)(DeratingInput&)) {
-  DeratingInput in = good;
+  DeratingInput in = far_from_limits;
   change(in);
   return in;
 }
 
 /// Calculated by hand from the ramps: span 1.65 V, -20 to 60 degrees C, 6 A.
 const Point points[] = {
-    {"far from all limits", good, 6, 6},
+    {"far from all limits", far_from_limits, 6, 6},
     {"6 % of the span below the upper limit", with([](auto& i) { i.highest_cell_uv = 3'551'000; }), 6, 6},
     {"3 % below the upper limit", with([](auto& i) { i.highest_cell_uv = 3'600'500; }), 3, 6},
     {"at the upper limit", with([](auto& i) { i.highest_cell_uv = 3'650'000; }), 0, 6},
@@ -159,7 +159,7 @@ TEST(Derating, NeverExceedsItsSlewRate) {
 
 TEST(Derating, IsContinuousInItsInputs) {
   const auto sweep = [](std::int32_t DeratingInput::*field, std::int32_t from, std::int32_t to, std::int32_t step) {
-    DeratingInput in = good;
+    DeratingInput in = far_from_limits;
     in.*field = from;
     AllowedCurrent before = steady_state(in);
     for (std::int32_t v = from; v <= to; v += step) {
@@ -181,7 +181,7 @@ TEST(Derating, IsContinuousInItsInputs) {
 TEST(Derating, DecreasesInASecondAndIncreasesInFive) {
   for (const auto& [derate_again, expected_s] : {std::pair{false, 2.5 * 1.05}, std::pair{true, 0.5 * 1.05}}) {
     Derating d(plan6a);
-    DeratingInput in = good;
+    DeratingInput in = far_from_limits;
     in.derate = !derate_again;
     for (int k = 0; k < 1'000; ++k) d.update(in, 10'000);
     in.derate = derate_again;
@@ -190,7 +190,7 @@ TEST(Derating, DecreasesInASecondAndIncreasesInFive) {
     EXPECT_NEAR(took_s, expected_s, 0.02);
   }
   Derating d(plan6a);
-  EXPECT_EQ(d.update(good, 60'000'000).charge_ua, 1'200'000) << "a step of a minute counts as a second";
+  EXPECT_EQ(d.update(far_from_limits, 60'000'000).charge_ua, 1'200'000) << "a step of a minute counts as a second";
 }
 
 /// A cell with different limits for charge and discharge, and a minimum temperature above freezing.
@@ -222,11 +222,11 @@ TEST(Derating, OfAnotherCellUsesItsLimits) {
 
 TEST(Derating, ForbidsAtOnceAndAllowsSlowly) {
   Derating d(plan6a);
-  for (int k = 0; k < 100; ++k) d.update(good, 100'000);
-  DeratingInput in = good;
+  for (int k = 0; k < 100; ++k) d.update(far_from_limits, 100'000);
+  DeratingInput in = far_from_limits;
   in.charge_forbidden = true;
   EXPECT_EQ(d.update(in, 100'000).charge_ua, 0);
-  EXPECT_NEAR(d.update(good, 100'000).charge_ua, 120'000, 10'000) << "full current after five seconds";
+  EXPECT_NEAR(d.update(far_from_limits, 100'000).charge_ua, 120'000, 10'000) << "full current after five seconds";
 }
 
 }  // namespace

@@ -8,8 +8,6 @@
 namespace bms::protection {
 namespace {
 
-constexpr const ProtectionPlan& pack = forklift_plan;
-
 class EveryProtection : public ::testing::TestWithParam<std::size_t> {
  protected:
   const ExpectedRow& row = expected_rows[GetParam()];
@@ -152,7 +150,7 @@ TEST_P(ServicedProtection, IsLatchedOverAPowerCycleAndEndedByServiceBeforeAConta
   first.run(row.delay_ms + 2 * step_ms);
   ASSERT_EQ(first.monitor.latched(), 1U << GetParam());
   for (const bool closed_before : {false, true}) {
-    FaultMonitor next(pack.rules, first.monitor.latched());
+    FaultMonitor next(forklift_plan.rules, first.monitor.latched());
     FaultRig good;
     const auto step = [&](Clear clear, bool may_serve) { next.update(good.values, step_us, 0, clear, may_serve); };
     EXPECT_TRUE(has(next.active(), GetParam()));
@@ -167,9 +165,9 @@ TEST_P(ServicedProtection, IsLatchedOverAPowerCycleAndEndedByServiceBeforeAConta
 }
 
 TEST_P(EveryProtection, CountsToTheMicrosecond) {
-  FaultMonitor monitor(pack.rules, 0);
+  FaultMonitor monitor(forklift_plan.rules, 0);
   FaultRig rig;
-  const Rule& rule = pack.rules[GetParam()];
+  const Rule& rule = forklift_plan.rules[GetParam()];
   const auto step = [&](std::int32_t value, std::uint32_t us, Clear clear = Clear::none) {
     rig.set(row, value);
     monitor.update(rig.values, us, 0, clear, false);
@@ -215,7 +213,7 @@ TEST_P(EveryProtection, IsNeitherRaisedNorEndedWhileItsQuantityIsUnknown) {
 }
 
 TEST(ProtectionTable, LatchesOnlyServiceFaultsOverAPowerCycle) {
-  const FaultMonitor m(pack.rules, 0xFFFF'FFFF);
+  const FaultMonitor m(forklift_plan.rules, 0xFFFF'FFFF);
   for (std::size_t k = 0; k < fault_count; ++k)
     EXPECT_EQ(has(m.active(), k), expected_rows[k].recovery == 's') << expected_rows[k].name;
 }

@@ -9,10 +9,8 @@
 namespace bms::protection {
 namespace {
 
-constexpr const ProtectionPlan& pack = forklift_plan;
-
 struct Cause {
-  FaultMonitor monitor{pack.rules, 0};
+  FaultMonitor monitor{forklift_plan.rules, 0};
   FaultRig good;
   std::uint64_t time_us = 0;
   void step(Clear clear = Clear::none, int steps = 1) {

@@ -13,8 +13,6 @@
 namespace bms::protection {
 namespace {
 
-constexpr const ProtectionPlan& pack = forklift_plan;
-
 TEST(Protection, WithoutSamplesOpensAfterFivePeriodsAndNeedsANewRequestToClose) {
   ProtectionBench b;
   b.drive_off();
@@ -105,7 +103,7 @@ TEST(Protection, CountsSamplesWithoutReadingsAsMissing) {
     if (one == 1) s.pack_uv = 52'000'000;
     if (one == 2) s.cell_uv[15] = 3'300'000;
     if (one == 3) s.temperature_cdegc[3] = 2'000;
-    Protection<16> p(pack);
+    Protection<16> p(forklift_plan);
     for (int k = 0; k < 10; ++k) {
       p.update(s, b.estimate, b.inputs);
       s.time_us += 100'000;
@@ -116,7 +114,7 @@ TEST(Protection, CountsSamplesWithoutReadingsAsMissing) {
 }
 
 TEST(Protection, AWatchdogResetIsAFaultEvenIfNothingIsMeasured) {
-  Protection<16> p(pack);
+  Protection<16> p(forklift_plan);
   measurement::PackSample<16> empty;
   ExternalInputs inputs{.board_fault = true};
   empty.time_us = 100'000;
@@ -125,7 +123,7 @@ TEST(Protection, AWatchdogResetIsAFaultEvenIfNothingIsMeasured) {
 }
 
 TEST(Protection, WithoutASampleAfterTheStartTimeReportsAFault) {
-  Protection<16> p(pack);
+  Protection<16> p(forklift_plan);
   for (std::uint64_t now = 0; now <= 3'000'000; now += 10'000)
     EXPECT_EQ(p.without_sample(now).faults, 0U) << "the start time of the front end";
   EXPECT_NE(p.without_sample(3'000'001).faults & bit(Fault::samples_missing), 0U);
@@ -215,7 +213,7 @@ TEST(Protection, AHeldKeyCountsOnceOverAGapOfTheSamples) {
 }
 
 TEST(Protection, IsClearedEvenWhileNothingIsMeasured) {
-  Protection<16> p(pack);
+  Protection<16> p(forklift_plan);
   measurement::PackSample<16> empty;
   for (int k = 1; k <= 60; ++k) {
     empty.time_us = 100'000U * static_cast<unsigned>(k);

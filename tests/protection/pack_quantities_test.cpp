@@ -9,8 +9,6 @@
 namespace bms::protection {
 namespace {
 
-constexpr const ProtectionPlan& pack = forklift_plan;
-
 /// Random readings in which every cell and every sensor is sometimes the highest, the lowest, missing, stuck, or
 /// shifted against its neighbour.
 TEST(Quantities, OfAnySampleEqualTheirDefinitions) {
@@ -18,7 +16,7 @@ TEST(Quantities, OfAnySampleEqualTheirDefinitions) {
   const auto whole = [&](int from, int to) { return from + static_cast<int>(random.uniform() * (to - from + 1)); };
   int shifted = 0, stuck_cells = 0, stuck_sensors = 0;
   for (int run = 0; run < 60; ++run) {
-    PackQuantities<16> quantities(pack.limits);
+    PackQuantities<16> quantities(forklift_plan.limits);
     QuantityOracle oracle;
     measurement::PackSample<16> s;
     const double missing = run % 3 == 0 ? 0 : 0.05, same = run % 2 == 0 ? 0.2 : 0.9;
@@ -49,7 +47,7 @@ TEST(Quantities, OfAnySampleEqualTheirDefinitions) {
       const auto expected = oracle.check(s, false);
       for (std::size_t k = 0; k < 26; ++k) {
         if (!visible_in_samples(k) || k == 18) continue;  // row 18 comes from the estimator
-        ASSERT_EQ(at(q, pack.rules[k].quantity), expected[k].value_or(measurement::no_reading))
+        ASSERT_EQ(at(q, forklift_plan.rules[k].quantity), expected[k].value_or(measurement::no_reading))
             << expected_rows[k].name << ", run " << run << ", sample " << step;
       }
       shifted += expected[16].value_or(0) > 0 ? 1 : 0;
@@ -74,7 +72,7 @@ TEST(Quantities, OfImpossibleReadingsAreMissing) {
   };
   for (const Case& c : {Case{-500'000, -6'000, true}, Case{6'000'000, 15'000, true}, Case{-500'001, -6'001, false},
                         Case{6'000'001, 15'001, false}}) {
-    PackQuantities<16> quantities(pack.limits);
+    PackQuantities<16> quantities(forklift_plan.limits);
     measurement::PackSample<16> s;
     s.cell_uv.fill(3'300'000);
     s.temperature_cdegc.fill(2'500);
@@ -92,7 +90,7 @@ TEST(Quantities, OfImpossibleReadingsAreMissing) {
 /// With too few other cells, the pack's own reading shows whether they moved.
 template <std::size_t Cells>
 std::int32_t stuck_in_a_small_pack(std::int32_t others_move_uv, bool pack_known, bool one_missing = false) {
-  PackQuantities<Cells> quantities(pack.limits);
+  PackQuantities<Cells> quantities(forklift_plan.limits);
   measurement::PackSample<Cells> s;
   Quantities q = unknown_quantities();
   for (int k = 0; k < 7; ++k) {
@@ -119,7 +117,7 @@ TEST(Quantities, OfLessThanFourCellsUseThePacksOwnReading) {
 }
 
 TEST(Quantities, OfOneReadableCellAreItsOwnAndOfNoCellAreUnknown) {
-  PackQuantities<16> quantities(pack.limits);
+  PackQuantities<16> quantities(forklift_plan.limits);
   measurement::PackSample<16> s;
   Quantities q = unknown_quantities();
   s.cell_uv[6] = 3'300'000;
@@ -205,7 +203,7 @@ TEST(OverloadIntegral, ACurrentIntegratesItsSquareOverTheLimit) {
 }
 
 TEST(OverloadIntegral, ARestReducesItByExactlyItsTime) {
-  PackQuantities<16> quantities(pack.limits);
+  PackQuantities<16> quantities(forklift_plan.limits);
   measurement::PackSample<16> s;
   Quantities q = unknown_quantities();
   s.current_ua = 12'000'000;

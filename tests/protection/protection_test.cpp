@@ -13,8 +13,6 @@
 namespace bms::protection {
 namespace {
 
-constexpr const ProtectionPlan& pack = forklift_plan;
-
 TEST(Protection, OpensTheContactorsWithin300msOfASevereOvervoltage) {
   ProtectionBench b;
   b.drive_off();
@@ -208,10 +206,10 @@ TEST(Protection, AStorageFailureIsAWarningAndARejectedVoltageDerates) {
 }
 
 TEST(Protection, ReportsOnlyTheLatchedFaultsBeforeTheFirstSample) {
-  const Protection<16> fresh(pack);
+  const Protection<16> fresh(forklift_plan);
   EXPECT_EQ(fresh.decision().faults, 0U);
   EXPECT_EQ(fresh.decision().first.time_us, 0U);
-  const Protection<16> p(pack, bit(Fault::short_circuit) | bit(Fault::cell_overvoltage));
+  const Protection<16> p(forklift_plan, bit(Fault::short_circuit) | bit(Fault::cell_overvoltage));
   const Decision& d = p.decision();
   EXPECT_EQ(d.faults, bit(Fault::short_circuit)) << "only service ends it";
   EXPECT_EQ(d.latched, bit(Fault::short_circuit));
@@ -227,7 +225,7 @@ TEST(Protection, ReportsOnlyTheLatchedFaultsBeforeTheFirstSample) {
 
 TEST(Protection, ServiceEndsAFaultLatchedBeforeTheStartAndNoLaterOne) {
   ProtectionBench b;
-  b.protection = Protection<16>(pack, bit(Fault::short_circuit));
+  b.protection = Protection<16>(forklift_plan, bit(Fault::short_circuit));
   b.inputs.request = Request::drive;
   b.run(110);
   EXPECT_EQ(b.protection.decision().state, ContactorState::safe) << "latched faults stay";

@@ -6,8 +6,6 @@
 namespace bms::protection {
 namespace {
 
-constexpr const ProtectionPlan& pack = forklift_plan;
-
 /// Protection on a truck. Compares the active faults with the oracle for every sample.
 class Truck : public TruckPack {
  public:
@@ -28,7 +26,7 @@ class Truck : public TruckPack {
     return faults;
   }
 
-  Protection<16> protection{pack};
+  Protection<16> protection{forklift_plan};
   bool wrong = false;
 
  private:
@@ -101,7 +99,9 @@ TEST_P(EveryMeasuredProtection, IsNeitherMissedNorFalseInNoiseAroundItsThreshold
 TEST_P(EverySampledProtection, IsRaisedDuringEveryOtherFaultVisibleInSamples) {
   const std::size_t k = GetParam();
   for (std::size_t other = 0; other < 26; ++other) {
-    if (other == k || !visible_in_samples(other) || pack.rules[other].quantity == pack.rules[k].quantity) continue;
+    if (other == k || !visible_in_samples(other) ||
+        forklift_plan.rules[other].quantity == forklift_plan.rules[k].quantity)
+      continue;
     Truck truck(1'000 + 32 * k + other);
     const int before_ms = std::min(expected_rows[other].delay_ms, 12'000) + 500;
     const int long_ms = before_ms + std::min(row.delay_ms, 12'000) + 1'500;
