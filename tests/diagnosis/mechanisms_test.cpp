@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/texts.hpp"
+#include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
 namespace {
