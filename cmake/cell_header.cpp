@@ -36,7 +36,7 @@ class Initialiser {
     text_ += (std::exchange(inside_, true) ? "},\n" : "\n") + ("    ." + key + " = {");
   }
   void number(const std::string& key, double value) { text_ += "." + key + " = " + literal(value) + ", "; }
-  void optional_number(const std::string& key, double value) { number(key, value); }
+  void optional_number(const std::string& key, double value, double /*omitted*/ = 0) { number(key, value); }
   void optional_flag(const std::string& key, bool value) {
     text_ += "." + key + " = " + (value ? "true" : "false") + ", ";
   }

@@ -50,8 +50,8 @@ Hypothesis with(const Hypothesis& h, const MechanismSetting& setting) {
   return more;
 }
 
-Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah) {
-  return with(h, model::default_setting(mechanism, capacity_ah));
+Hypothesis with(const Hypothesis& h, std::size_t mechanism, const model::CellParameters<>& cell) {
+  return with(h, model::default_setting(mechanism, cell));
 }
 
 Hypothesis without(const Hypothesis& h, std::size_t mechanism) {

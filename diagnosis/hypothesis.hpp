@@ -32,7 +32,7 @@ struct Hypothesis {
 };
 
 /// With this mechanism added, its strengths at their neutral values.
-Hypothesis with(const Hypothesis& h, std::size_t mechanism, double capacity_ah);
+Hypothesis with(const Hypothesis& h, std::size_t mechanism, const model::CellParameters<>& cell);
 /// With this setting added.
 Hypothesis with(const Hypothesis& h, const MechanismSetting& setting);
 /// Without a mechanism that it adds.

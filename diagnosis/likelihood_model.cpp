@@ -23,7 +23,7 @@ LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vecto
       tables_(model::prepare<double, model::max_intervals>(cell)),
       own_(std::move(own)),
       records_(std::move(records)),
-      facts_(recording_facts(cell.capacity_ah, records_)),
+      facts_(recording_facts(cell, records_)),
       calibration_(cell, records_) {
   for (const PreparedRecording& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording with fewer than two rows");

@@ -92,7 +92,7 @@ Plan planned(const experiments::Experiment& experiment, const Setting& setting, 
     r.voltage_v.push_back(0);
     const bool given = std::isfinite(row.temperature_c);
     if (setting.temperature || given)
-      r.temperature_c.push_back(given ? row.temperature_c : model::reference_temperature_c);
+      r.temperature_c.push_back(given ? row.temperature_c : setting.cell.reference_temperature_c);
   }
   return p;
 }

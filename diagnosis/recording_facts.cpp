@@ -8,7 +8,6 @@
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/statistics.hpp"
-#include "model/mechanism.hpp"
 
 namespace bms::diagnosis {
 
@@ -87,9 +86,11 @@ void count_charge(const PreparedRecording& r, RecordingFacts& facts, Range& soc,
 
 }  // namespace
 
-RecordingFacts recording_facts(double capacity_ah, std::span<const PreparedRecording> records) {
+RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<const PreparedRecording> records) {
   RecordingFacts facts;
+  const double capacity_ah = cell.capacity_ah;
   facts.capacity_ah = capacity_ah;
+  facts.reference_c = cell.reference_temperature_c;
   Range soc, read_a, temperature_c;
   std::set<int> rates;
   std::vector<double> steps_s;
@@ -109,7 +110,7 @@ RecordingFacts recording_facts(double capacity_ah, std::span<const PreparedRecor
       if (!std::isfinite(c)) continue;
       temperature_c.add(c);
       facts.temperature = true;
-      facts.away_k = std::max(facts.away_k, std::abs(c - model::reference_temperature_c));
+      facts.away_k = std::max(facts.away_k, std::abs(c - facts.reference_c));
     }
   }
   if (!steps_s.empty()) facts.step_s = measurement::upper_median(steps_s);

@@ -8,12 +8,14 @@
 #include <span>
 
 #include "diagnosis/prepared_recording.hpp"
+#include "model/cell_parameters.hpp"
 
 namespace bms::diagnosis {
 
 /// Of all recordings together. Thresholds of a rest, an edge, a turn: Thresholds::Facts.
 struct RecordingFacts {
   double capacity_ah = 1;
+  double reference_c = model::default_reference_temperature_c;  ///< reference temperature of the cell file
   double duration_s = 0;
   double duration_h = 0;          ///< the same [h]
   double step_s = 1;              ///< median time between rows
@@ -26,7 +28,7 @@ struct RecordingFacts {
   double soc_span = 0;            ///< of the counted soc
   bool temperature = false;       ///< was recorded
   double temperature_span_k = 0;  ///< 0: not recorded, or constant
-  double away_k = 0;              ///< largest distance from model::reference_temperature_c; 0: not recorded
+  double away_k = 0;              ///< largest distance from reference_c; 0: not recorded
   double longest_rest_s = 0;
   std::size_t reversals = 0;         ///< turns of the charge's direction
   std::size_t rates = 0;             ///< sizes of current
@@ -36,6 +38,6 @@ struct RecordingFacts {
   double error_v = 0;            ///< RMS of measured less cell file's voltage; 0 unless describe() fills it in
 };
 
-RecordingFacts recording_facts(double capacity_ah, std::span<const PreparedRecording> records);
+RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<const PreparedRecording> records);
 
 }  // namespace bms::diagnosis

@@ -95,7 +95,7 @@ std::vector<MechanismSetting> probe_settings(const LikelihoodModel& likelihood, 
   if (!shaped) shapes = {0};
   std::vector<MechanismSetting> settings;
   for (const double shape : shapes) {
-    MechanismSetting& setting = settings.emplace_back(model::default_setting(mechanism, capacity_ah));
+    MechanismSetting& setting = settings.emplace_back(model::default_setting(mechanism, likelihood.cell()));
     for (std::size_t k = 0; k < info.parameters; ++k) {
       const model::Parameter& parameter = info.parameter[k];
       if (parameter.role == Role::shape && shaped) setting.value[k] = shape;

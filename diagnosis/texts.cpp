@@ -226,7 +226,7 @@ std::string because(const Diagnosis& d, const Finding& f, const RecordingFacts& 
 }
 
 void describe(Diagnosis& d, const model::CellParameters<>& cell, const std::vector<PreparedRecording>& records) {
-  RecordingFacts facts = recording_facts(cell.capacity_ah, records);
+  RecordingFacts facts = recording_facts(cell, records);
   measurement::MeanSquare error;
   for (std::size_t n = 0; n < std::min(records.size(), d.views.size()); ++n) {
     for (std::size_t k = 0; k < d.views[n].base_v.size(); ++k) {

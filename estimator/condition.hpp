@@ -42,7 +42,7 @@ class Condition {
     const StepInput<S> input{current_a, seconds<S>(step_us),
                              measurement::temperature_possible(sample.temperature_cdegc)
                                  ? laws.true_temperature(from_centi<Temperature<S>>(sample.temperature_cdegc))
-                                 : Temperature<S>(25)};
+                                 : Temperature<S>(assumed_ambient_c)};
     const auto at = look_up(OperatingPoint{cell, input, Model::mechanism_states(x)}, estimate.soc, interval_);
     const Rate<S> per_s = current_a * cell.limits.soc_per_as;
     const Soc<S> counted = input.duration_s * per_s;

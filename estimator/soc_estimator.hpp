@@ -149,10 +149,10 @@ class SocEstimator {
     return Model::errors_are_states || laws.changes_charge() ? arithmetic::to_micro(laws.counted(input)) : read_ua;
   }
 
-  /// The last possible temperature; 25 degrees C before the first one.
+  /// The last possible temperature; model::assumed_ambient_c before the first one.
   template <class Laws>
   constexpr Temperature temperature(const Laws& laws, std::int16_t cdegc) {
-    if constexpr (std::same_as<Laws, model::LawSet<S>>) return Temperature(25);  // no law uses it
+    if constexpr (std::same_as<Laws, model::LawSet<S>>) return Temperature(model::assumed_ambient_c);  // no law uses it
     if (measurement::temperature_possible(cdegc)) temperature_cdegc_ = cdegc;
     return laws.true_temperature(arithmetic::from_centi<Temperature>(temperature_cdegc_));
   }
@@ -361,7 +361,7 @@ class SocEstimator {
   [[no_unique_address]] Errors errors_;
   std::uint64_t time_us_ = 0;
   std::uint8_t interval_ = 0;
-  std::int16_t temperature_cdegc_ = 2'500;
+  std::int16_t temperature_cdegc_ = static_cast<std::int16_t>(100 * model::assumed_ambient_c);
   std::int16_t temperature_bin_ = no_temperature_bin;
   StepConstants<S, Model, Errors> constants_;
   AmbiguousSoc<S, ModelOf> ambiguous_;

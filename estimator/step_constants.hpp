@@ -58,16 +58,14 @@ class StepConstants {
     error_decay_ = Model::error_decay(noise, duration_s_);
   }
 
-  /// In the cold, resistances are larger than a cell file says that does not follow the temperature. The filter assumes
-  /// an activation energy of 40 kJ/mol (30 to 60 for lithium iron phosphate) and adds the increase to their
-  /// uncertainty.
+  /// In the cold, resistances are larger than a cell file says that does not follow the temperature. The filter adds
+  /// the increase to their uncertainty (model::assumed_activation_j_per_mol).
   template <class Cell>
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     resistance_error_ = Coupling(cell.noise.resistance_error);
-    if (measurement::temperature_possible(cdegc) && cdegc < reference_cdegc &&
+    if (measurement::temperature_possible(cdegc) && cdegc < cell.reference.cdegc &&
         !laws_of(cell).resistances_follow_temperature()) {
-      constexpr double energy = model::mechanism_detail::energy_over_rt(assumed_activation_j_per_mol, 25.0);
-      const auto factor = model::mechanism_detail::arrhenius<S>(Factor(energy), Temperature(25),
+      const auto factor = model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c,
                                                                 arithmetic::from_centi<Temperature>(cdegc));
       resistance_error_ = Coupling(resistance_error_ + Coupling(factor - Factor(1)));
     }
@@ -83,9 +81,6 @@ class StepConstants {
   }
 
  private:
-  static constexpr std::int16_t reference_cdegc = 2'500;
-  static constexpr double assumed_activation_j_per_mol = 40'000;
-
   constexpr void update_resistance_noise() {
     resistance_noise_ =
         arithmetic::product<Coupling>(Coupling(resistance_error_ * resistance_error_), correlated_samples_);

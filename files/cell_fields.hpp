@@ -17,11 +17,12 @@ void visit_rc(Visitor& visitor, Table& rc) {
   visitor.optional_column("c1_std_f", rc.c1_std_f);
 }
 
-/// Calls visitor.number(key, double&), .column(key, Column&), .optional_number, .optional_column, .optional_flag, and
-/// .table(key) before the keys of a table.
+/// Calls visitor.number(key, double&), .column(key, Column&), .optional_number (with the value of a file
+/// without the key, 0 if not given), .optional_column, .optional_flag, and .table(key) before the keys of a table.
 template <class Visitor, class Parameters>
 void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("capacity_ah", p.capacity_ah);
+  visitor.optional_number("reference_temperature_c", p.reference_temperature_c, model::default_reference_temperature_c);
 
   visitor.table("limits");
   visitor.number("voltage_min_v", p.limits.voltage_min_v);

@@ -28,7 +28,7 @@ model::MechanismSetting read_mechanism(TomlTable& table, std::size_t index, Cell
   const std::string name = table_of(info);
   const double capacity_ah = file.parameters.capacity_ah;
   if (table.has("source")) file.sources[name] = table.text("source");
-  model::MechanismSetting setting = model::default_setting(index, capacity_ah);
+  model::MechanismSetting setting = model::default_setting(index, file.parameters);
   for (std::size_t k = 0; k < info.parameters; ++k) {
     const std::string key(info.parameter[k].name), deviation = key + "_std";
     if (table.has(key)) setting.value[k] = table.number(key);
@@ -74,7 +74,7 @@ class Reader {
     (*sources_)[key] = inner_->text("source");
   }
   void number(const std::string& key, double& into) { into = current().number(key); }
-  void optional_number(const std::string& key, double& into) {
+  void optional_number(const std::string& key, double& into, double /*omitted*/ = 0) {
     if (current().has(key)) number(key, into);
   }
   void optional_flag(const std::string& key, bool& into) {
@@ -110,8 +110,8 @@ class Writer {
     text_ += fmt::format("\n[{}]\nsource = {}\n", key, quoted(source == sources_.end() ? "" : source->second));
   }
   void number(const std::string& key, double value) { text_ += key + " = " + literal(value) + "\n"; }
-  void optional_number(const std::string& key, double value) {
-    if (value != 0) number(key, value);
+  void optional_number(const std::string& key, double value, double omitted = 0) {
+    if (value != omitted) number(key, value);
   }
   void optional_flag(const std::string& key, bool value) {
     if (value) text_ += key + " = true\n";

@@ -14,7 +14,7 @@ namespace bms::files {
 
 /// R0, R1, C1 identified at a temperature. For information: the model uses [rc].
 struct TemperatureTable {
-  double temperature_c = 25;
+  double temperature_c = 0;
   model::RcTable<double> rc;
 };
 

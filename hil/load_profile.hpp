@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "measurement/recording.hpp"
+#include "model/temperature.hpp"
 
 namespace bms::hil {
-
-inline constexpr double default_temperature_c = 25;
 
 /// A cursor on a recording, which must outlive it. Times are seconds since its first row.
 class LoadProfile {
@@ -25,7 +24,7 @@ class LoadProfile {
   double current_a() const { return std::isfinite(recording_.current_a[row_]) ? recording_.current_a[row_] : 0; }
   double temperature_c() const {
     const bool missing = recording_.temperature_c.empty() || !std::isfinite(recording_.temperature_c[row_]);
-    return missing ? default_temperature_c : recording_.temperature_c[row_];
+    return missing ? model::assumed_ambient_c : recording_.temperature_c[row_];
   }
   /// Interpolated linearly between the rows.
   double voltage_v(double time_s) const { return interpolated(recording_.voltage_v, time_s); }

@@ -8,7 +8,6 @@ namespace bms::hil {
 namespace {
 
 constexpr double precharge_time_constant_s = 0.5, dc_link_discharge_time_constant_s = 5;
-constexpr double initial_temperature_c = 25;
 constexpr double pack_noise_per_cell_noise = 4;  // of the pack voltage: sqrt(16)
 
 }  // namespace
@@ -36,7 +35,7 @@ SimulatedPack::SimulatedPack(const files::CellFile& cell, std::size_t cells, dou
     const double own_ah = capacity_ah_ * (1 + capacity_offset);
     simulations_.emplace_back(tables_, own_ah, model::chosen<double>(cell.mechanisms, own_ah),
                               std::clamp(initial_soc + soc_offset, 0.0, 1.0));
-    voltage_v_[k] = simulations_[k].step(0, 0, 0, initial_temperature_c, [](auto&, const auto&) {});
+    voltage_v_[k] = simulations_[k].step(0, 0, 0, model::assumed_ambient_c, [](auto&, const auto&) {});
   }
 }
 

@@ -19,7 +19,7 @@ std::optional<double> plateau_half_gap_v(const OcvCurve& curve) {
   return sum / static_cast<double>(count);
 }
 
-std::optional<SlowGap> slow_gap(const std::vector<GapAtTemperature>& gaps) {
+std::optional<SlowGap> slow_gap(const std::vector<GapAtTemperature>& gaps, double reference_c) {
   const auto colder = [](const GapAtTemperature& a, const GapAtTemperature& b) {
     return a.temperature_c < b.temperature_c;
   };
@@ -29,7 +29,7 @@ std::optional<SlowGap> slow_gap(const std::vector<GapAtTemperature>& gaps) {
   std::optional<SlowGap> best;
   for (double energy = 10'000; energy <= 80'000; energy += 500) {
     const auto factor = [&](double temperature_c) {
-      return std::exp(model::mechanism_detail::energy_over_rt(energy, 25.0) * (25 - temperature_c) /
+      return std::exp(model::mechanism_detail::energy_over_rt(energy, reference_c) * (reference_c - temperature_c) /
                       (temperature_c + 273.15));
     };
     // two unknowns that are not negative

@@ -12,6 +12,10 @@
 
 namespace bms::model {
 
+/// Temperature at which the tables of a cell file are valid if the file does not state it [degrees C]: that of most
+/// data sheets.
+inline constexpr double default_reference_temperature_c = 25;
+
 /// Up to Max values of one table column.
 template <class Real, std::size_t Max>
 struct Column {
@@ -31,6 +35,7 @@ struct Range {
   double low, high;
 };
 inline constexpr Range capacity_ah{0.01, 1'000};
+inline constexpr Range reference_temperature_c{-40, 80};
 inline constexpr Range voltage_v{0.5, 5};             ///< limits of use, and the OCV from SOC 0 to 1
 inline constexpr Range current_a{1e-3, 2'000};        ///< limits of use
 inline constexpr Range slope_v{1e-6, 60};             ///< slope of the OCV, per unit of SOC
@@ -113,6 +118,7 @@ struct Tolerance {
 template <class Real = double>
 struct CellParameters {
   double capacity_ah = 0;
+  double reference_temperature_c = default_reference_temperature_c;  ///< at which `ocv` and `rc` are valid
   Limits limits;
   OcvTable<Real> ocv;
   RcTable<Real> rc;
@@ -245,6 +251,8 @@ constexpr CellFault fault_of(const Tolerance& t) {
 constexpr CellFault first_fault(const CellParameters<double>& p) {
   namespace d = parameters_detail;
   if (d::beyond(p.capacity_ah, accepted::capacity_ah)) return {"capacity_ah", 0, "0.01 to 1000 Ah"};
+  if (d::beyond(p.reference_temperature_c, accepted::reference_temperature_c))
+    return {"reference_temperature_c", 0, "-40 to 80 degrees C"};
   for (const CellFault& fault : {d::fault_of(p.limits), d::fault_of(p.ocv), d::fault_of(p.rc, p.ocv),
                                  d::fault_of(p.noise, p.capacity_ah), d::fault_of(p.tolerance)}) {
     if (fault.what != nullptr) return fault;

@@ -10,7 +10,7 @@
 //   temperature  T + lag dT/dt, dT/dt the least-squares slope over half a minute to either side
 //
 // A missing current (NaN) is replaced by the last known one, 0 at first; a missing temperature by the last known one,
-// 25 degrees C at first. Laws undo offset, gain and clipping, one reading at a time (model/extended.hpp).
+// assumed_ambient_c at first. Laws undo offset, gain and clipping, one reading at a time (model/extended.hpp).
 //
 // S: double or a dual number, for derivatives by the delay and the lag. Host only: it copies the columns.
 #pragma once
@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "arithmetic/exponential.hpp"
+#include "model/temperature.hpp"
 
 namespace bms::model {
 
@@ -39,8 +40,8 @@ class CorrectedReadings {
         lag_s_(lag_s),
         late_(acts(delay_s)),
         lagging_(acts(lag_s)) {
-    temperature_c_ = temperature_c.empty() ? std::vector<double>(time_s.size(), default_temperature_c)
-                                           : known(temperature_c, default_temperature_c);
+    temperature_c_ = temperature_c.empty() ? std::vector<double>(time_s.size(), assumed_ambient_c)
+                                           : known(temperature_c, assumed_ambient_c);
     if (late_) undo_delay();
     if (lagging_) slopes();
   }
@@ -55,7 +56,6 @@ class CorrectedReadings {
   }
 
  private:
-  static constexpr double default_temperature_c = 25;
   static constexpr double half_window_s = 30;
   static constexpr double most_part = 0.45;  ///< of a step; at half a step the two rows cannot be separated
 

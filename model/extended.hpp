@@ -96,10 +96,13 @@ constexpr std::size_t first_fault(const MechanismSetting& setting, double capaci
 }
 
 /// All parameters at their default values: the mechanism has no effect.
-constexpr MechanismSetting default_setting(std::size_t index, double capacity_ah) {
+template <class Real>
+constexpr MechanismSetting default_setting(std::size_t index, const CellParameters<Real>& cell) {
   MechanismSetting setting{index, {}, {}};
-  for (std::size_t k = 0; k < catalogue[index].parameters; ++k)
-    setting.value[k] = catalogue[index].parameter[k].default_value(capacity_ah);
+  for (std::size_t k = 0; k < catalogue[index].parameters; ++k) {
+    const Parameter& p = catalogue[index].parameter[k];
+    setting.value[k] = p.is_reference_temperature ? cell.reference_temperature_c : p.default_value(cell.capacity_ah);
+  }
   return setting;
 }
 

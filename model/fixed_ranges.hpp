@@ -60,6 +60,9 @@ static_assert(static_cast<double>(PerSoc<S>(2 / accepted::least_width)) >= 1 / a
 static_assert(holds<Current<S>>(accepted::current_a) && holds<Current<S>>(max_current_a) &&
               max_current_a * 1e6 < 0x1p31);
 static_assert(holds<Current<S>>(accepted::capacity_ah.high), "the 1C current");
+static_assert(holds<Temperature<S>>(accepted::reference_temperature_c) &&
+              holds<Factor<S>>(mechanism_detail::energy_over_rt(assumed_activation_j_per_mol,
+                                                                accepted::reference_temperature_c.low)));
 static_assert(holds<Duration<S>>(accepted::lasts_s));
 static_assert(holds<Fraction<S>>(accepted::most_gain) && holds<Fraction<S>>(accepted::most_resistance_error));
 static_assert(holds<Fraction<S>>(1 / (3'600 * accepted::capacity_ah.low)), "SOC per ampere-second");

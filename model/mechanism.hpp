@@ -41,13 +41,12 @@
 
 #include "arithmetic/scalar.hpp"
 #include "model/cell.hpp"
+#include "model/cell_parameters.hpp"
 #include "model/law.hpp"
 #include "model/one_rc.hpp"
+#include "model/temperature.hpp"
 
 namespace bms::model {
-
-/// Temperature at which the tables of a cell file are valid, unless its mechanisms say otherwise [degrees C].
-inline constexpr double reference_temperature_c = 25;
 
 /// The role of a parameter. A mechanism has no effect if all its strengths are at their neutral values.
 enum class Role {
@@ -73,7 +72,8 @@ struct Parameter {
   std::string_view meaning;  ///< and the source of the bounds, if there is one
   double usual =
       0;  ///< of a strength: size beyond which it is rare, scaled like the bounds; 0: all sizes are equally likely
-  double typical = 0, spread = 0;  ///< mean and standard deviation among cells; spread 0: unknown
+  double typical = 0, spread = 0;         ///< mean and standard deviation among cells; spread 0: unknown
+  bool is_reference_temperature = false;  ///< the default value is that of the cell file, not `neutral`
 
   constexpr double scale(double capacity_ah) const {
     if (per == Per::cell) return 1;
@@ -82,11 +82,21 @@ struct Parameter {
   constexpr double lower(double capacity_ah) const { return low * scale(capacity_ah); }
   constexpr double upper(double capacity_ah) const { return high * scale(capacity_ah); }
   constexpr double common(double capacity_ah) const { return usual * scale(capacity_ah); }
-  /// The value if the cell file has no entry for it: neutral, scaled like the bounds and clamped to them.
+  /// The value if the cell file has no entry for it: neutral, scaled like the bounds and clamped to them. For a
+  /// reference temperature, default_setting() (model/extended.hpp) takes that of the cell file instead.
   constexpr double default_value(double capacity_ah) const {
     return std::clamp(neutral * scale(capacity_ah), lower(capacity_ah), upper(capacity_ah));
   }
 };
+
+/// The parameter reference_c of a mechanism that depends on the temperature.
+constexpr Parameter reference_temperature(std::string_view meaning) {
+  constexpr accepted::Range range = accepted::reference_temperature_c;
+  Parameter p{"reference_c", "degC",     Role::given, default_reference_temperature_c,
+              range.low,     range.high, Per::cell,   meaning};
+  p.is_reference_temperature = true;
+  return p;
+}
 
 inline constexpr std::size_t max_mechanism_parameters = 5;
 inline constexpr std::size_t max_mechanism_states = 2;
@@ -114,33 +124,6 @@ constexpr Voltage<S> relaxed(const Voltage<S>& x, const Relaxation<S>& r) {
 }
 
 namespace mechanism_detail {
-
-/// exp(x) for |x| <= 4.5, the range of Factor.
-template <class S>
-constexpr Factor<S> exponential(const Exponent<S>& x) {
-  const Exponent<S> none(0), most(4.5);
-  if (x < none) return Factor<S>(Fraction<S>(1) - step_response<S>(-x < most ? Exponent<S>(-x) : most));
-  const Fraction<S> remaining = Fraction<S>(Fraction<S>(1) - step_response<S>(x < most ? x : most));
-  return ratio<Factor<S>>(Fraction<S>(1), remaining);
-}
-
-/// Arrhenius factor of a resistance with this activation energy, relative to reference_c. energy_over_rt: E / (R
-/// T_ref).
-///   exp(E / R (1 / T - 1 / T_ref)) = exp((E / (R T_ref)) (T_ref - T) / T)
-template <class S>
-constexpr Factor<S> arrhenius(const Factor<S>& energy_over_rt, const Temperature<S>& reference_c,
-                              const Temperature<S>& temperature_c) {
-  const Temperature<S> kelvin = temperature_c + Temperature<S>(273.15);
-  if (kelvin < Temperature<S>(150)) return Factor<S>(1);  // not a temperature
-  const auto relative = ratio<Fraction<S>>(Temperature<S>(reference_c - temperature_c), kelvin);
-  return exponential<S>(Exponent<S>(energy_over_rt * relative));
-}
-
-inline constexpr double gas_constant_j_per_mol_k = 8.314462618;
-template <class Real>
-constexpr Real energy_over_rt(const Real& energy_j_per_mol, const Real& reference_c) {
-  return energy_j_per_mol / (Real(gas_constant_j_per_mol_k) * (reference_c + Real(273.15)));
-}
 
 template <class S>
 constexpr void scale(Resistance<S>& value, Resistance<S>& delta, const Factor<S>& by) {

@@ -17,15 +17,16 @@
 
 #include "arithmetic/exponential.hpp"
 #include "model/cell.hpp"
+#include "model/temperature.hpp"
 
 namespace bms::model {
 
 /// Input of one time step.
 template <class S>
 struct StepInput {
-  Current<S> current_a;                               ///< mean over the step, > 0 charges
-  TimeStep<S> duration_s;                             ///< > 0
-  Temperature<S> temperature_c = Temperature<S>(25);  ///< of the cell; used by mechanisms only
+  Current<S> current_a;                                              ///< mean over the step, > 0 charges
+  TimeStep<S> duration_s;                                            ///< > 0
+  Temperature<S> temperature_c = Temperature<S>(assumed_ambient_c);  ///< of the cell; used by mechanisms only
 };
 
 template <class S>

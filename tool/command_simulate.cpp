@@ -63,7 +63,8 @@ void set_parameter(const model::MechanismInfo& info, const std::string& text, mo
 }
 
 /// "ID:param=value,..." as a cell file would have it; parameters that are not named keep their defaults.
-model::MechanismSetting mechanism_of(const std::string& text, double capacity_ah) {
+model::MechanismSetting mechanism_of(const std::string& text, const model::CellParameters<>& cell) {
+  const double capacity_ah = cell.capacity_ah;
   const std::size_t colon = text.find(':');
   const std::string id = text.substr(0, colon);
   const std::size_t index = model::mechanism_index(id);
@@ -74,7 +75,7 @@ model::MechanismSetting mechanism_of(const std::string& text, double capacity_ah
   }
   if (colon == std::string::npos) refuse_mechanism("'" + id + "' without parameters, expected ID:param=value,...");
   const model::MechanismInfo& info = model::catalogue[index];
-  model::MechanismSetting setting = model::default_setting(index, capacity_ah);
+  model::MechanismSetting setting = model::default_setting(index, cell);
   for (std::size_t at = colon; at < text.size();) {
     const std::size_t end = std::min(text.find(',', at + 1), text.size());
     set_parameter(info, text.substr(at + 1, end - at - 1), setting);
@@ -98,7 +99,7 @@ SimulationRun read(const SimulateOptions& options) {
   SimulationRun run;
   run.cell = files::read_cell(options.cell);
   for (const std::string& mechanism : options.with)
-    files::put_mechanism(run.cell, mechanism_of(mechanism, run.cell.parameters.capacity_ah));
+    files::put_mechanism(run.cell, mechanism_of(mechanism, run.cell.parameters));
   run.recording = files::read_recording(
       options.input(), options.recording.empty() ? files::VoltageColumn::optional : files::VoltageColumn::required);
   measurement::compare_with_cell(run.recording, run.cell.parameters);

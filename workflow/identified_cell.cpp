@@ -13,6 +13,7 @@
 #include "files/recording.hpp"
 #include "host_sim/simulation.hpp"
 #include "identification/ocv_pieces.hpp"
+#include "workflow/reference_temperature.hpp"
 
 namespace bms::workflow {
 
@@ -22,17 +23,17 @@ namespace {
 
 /// Slow runs of similar temperature.
 struct SlowRuns {
-  double temperature_c = reference_c;
+  double temperature_c = 0;
   std::vector<id::SlowRun> runs;
   std::string files;
 };
 
 /// Ordered by their distance to the reference temperature, the nearest first.
-std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
+std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths, double reference_c) {
   std::vector<measurement::Recording> recordings;
   for (const std::string& path : paths) recordings.push_back(files::read_recording(path));
   std::vector<SlowRuns> all;
-  for (const TemperatureGroup& like : group_by_temperature(recordings)) {
+  for (const TemperatureGroup& like : group_by_temperature(recordings, reference_c)) {
     SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
     for (const std::size_t k : like.recordings) {
       const measurement::Recording& r = recordings[k];
@@ -40,7 +41,7 @@ std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths) {
       runs.files += (runs.files.empty() ? "" : ", ") + std::filesystem::path(paths[k]).filename().string();
     }
   }
-  std::stable_sort(all.begin(), all.end(), [](const SlowRuns& a, const SlowRuns& b) {
+  std::stable_sort(all.begin(), all.end(), [&](const SlowRuns& a, const SlowRuns& b) {
     return std::abs(a.temperature_c - reference_c) < std::abs(b.temperature_c - reference_c);
   });
   return all;
@@ -61,7 +62,8 @@ std::optional<double> mean_temperature_c(const measurement::Recording& recording
 
 }  // namespace
 
-std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings) {
+std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings,
+                                                   double reference_c) {
   constexpr double largest_span_k = 5;
   std::vector<std::pair<double, std::size_t>> means;
   std::vector<std::size_t> all;
@@ -93,7 +95,7 @@ std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement
 OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
                        files::CellFile& cell) {
   OcvResult taken;
-  const auto groups = slow_runs(paths);
+  const auto groups = slow_runs(paths, cell.parameters.reference_temperature_c);
   const std::string& files = groups.front().files;
   std::vector<id::OcvCurve> curves;
   try {
@@ -199,8 +201,8 @@ void identify_noise(const std::vector<measurement::Recording>& recordings, const
 namespace {
 
 /// The mechanism with the default values of the catalogue.
-model::MechanismSetting default_mechanism(std::string_view id, double capacity_ah) {
-  return model::default_setting(model::mechanism_index(id), capacity_ah);
+model::MechanismSetting default_mechanism(std::string_view id, const model::CellParameters<>& cell) {
+  return model::default_setting(model::mechanism_index(id), cell);
 }
 
 /// Activation energy in J/mol of a column of the tables: least squares of ln R over 1 / T, clamped to 0 .. most.
@@ -225,18 +227,20 @@ double mean_of(const model::Column<double, model::max_rc_nodes>& column) {
 }
 
 /// From the resistances at several temperatures, or from the gap of slow runs at several temperatures. Nothing if there
-/// is only one temperature. source: gets the origin of the values.
-std::optional<model::MechanismSetting> temperature_dependence(const std::vector<files::TemperatureTable>& tables,
-                                                              const std::optional<id::SlowGap>& gap, double capacity_ah,
+/// is only one temperature. Its reference is the temperature of [rc]. source: gets the origin of the values.
+std::optional<model::MechanismSetting> temperature_dependence(const files::CellFile& cell,
+                                                              const std::optional<id::SlowGap>& gap,
                                                               std::string& source) {
-  model::MechanismSetting setting = default_mechanism("temperature_resistance", capacity_ah);
+  const std::vector<files::TemperatureTable>& tables = cell.at_temperature;
+  const double reference_c = cell.parameters.reference_temperature_c;
+  model::MechanismSetting setting = default_mechanism("temperature_resistance", cell.parameters);
   // typical for a lithium iron phosphate cell: activation energy of the reactions in R0, and their share of R0
   constexpr double typical_j_per_mol = 50'000, typical_share = 0.3;
   setting.value = {typical_j_per_mol, 0, reference_c, typical_share, 0};
   if (tables.size() > 1) {
     setting.value[1] = activation_j_per_mol(tables, 90'000, [](const auto& rc) { return mean_of(rc.r1_ohm); });
     // the share by least squares, with the typical energy
-    const auto nearest = std::min_element(tables.begin(), tables.end(), [](const auto& a, const auto& b) {
+    const auto nearest = std::min_element(tables.begin(), tables.end(), [&](const auto& a, const auto& b) {
       return std::abs(a.temperature_c - reference_c) < std::abs(b.temperature_c - reference_c);
     });
     const auto increase = [&](double temperature_c) {
@@ -271,10 +275,10 @@ void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell) {
   const model::CellParameters<>& p = cell.parameters;
   const double between_v = model::plateau_half_gap_v(p.ocv);
   if (!(between_v > 0)) return;
-  const auto gap = id::slow_gap(ocv.gaps);
+  const auto gap = id::slow_gap(ocv.gaps, p.reference_temperature_c);
   // overvoltage of the slow current (C/30 to C/35): over R0 and R1, or the part of the gap that grows in the cold
   const double over_v = gap ? gap->overvoltage_v : p.capacity_ah / 30 * (mean_of(p.rc.r0_ohm) + mean_of(p.rc.r1_ohm));
-  model::MechanismSetting setting = default_mechanism("ocv_hysteresis", p.capacity_ah);
+  model::MechanismSetting setting = default_mechanism("ocv_hysteresis", p);
   setting.value[0] = std::clamp(between_v - over_v, 0.1 * between_v, 0.07);
   setting.value[4] = 1;
   files::put_mechanism(cell, setting);
@@ -308,8 +312,13 @@ void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, f
   model::CellParameters<>& p = cell.parameters;
   const double capacity_ah = p.capacity_ah;
   std::string source;
-  if (const auto setting = temperature_dependence(cell.at_temperature, id::slow_gap(ocv.gaps), capacity_ah, source)) {
+  if (const auto setting = temperature_dependence(cell, id::slow_gap(ocv.gaps, p.reference_temperature_c), source)) {
     files::put_mechanism(cell, *setting);
+    if (const double identified_c = setting->value[2]; identified_c != p.reference_temperature_c) {
+      move_resistances(cell, p.reference_temperature_c);
+      cell.sources["rc"] += fmt::format("; moved from {:g} to {:g} degrees C by mechanism.temperature_resistance",
+                                        identified_c, p.reference_temperature_c);
+    }
     cell.sources["mechanism.temperature_resistance"] = source;
   }
   const double half_gap_v = host_sim::value_of(cell.mechanisms, "ocv_hysteresis", 0);
@@ -360,7 +369,7 @@ namespace {
 struct Rounding {
   static void table(const char*) {}
   static void number(const char*, double& value) { value = std::stod(fmt::format("{:.7g}", value)); }
-  static void optional_number(const char* key, double& value) { number(key, value); }
+  static void optional_number(const char* key, double& value, double /*omitted*/ = 0) { number(key, value); }
   static void optional_flag(const char*, bool&) {}
   template <class Column>
   static void column(const char* key, Column& values) {

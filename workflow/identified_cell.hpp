@@ -13,9 +13,6 @@
 
 namespace bms::workflow {
 
-/// Temperature of a cell file's own table, in degrees C.
-inline constexpr double reference_c = 25;
-
 struct OcvResult {
   std::optional<double> coulombic_efficiency;          ///< discharged over charged; needs a charge and a discharge
   std::vector<identification::GapAtTemperature> gaps;  ///< at each temperature with a charge and a discharge
@@ -24,7 +21,8 @@ struct OcvResult {
 
 /// Writes OCV, gap and capacity of slow charge and discharge recordings into `cell`. The OCV has the fewest straight
 /// pieces with an error of at most max_error_v, in V; if the cell has no room for them, the error is larger and a
-/// warning says so. Of several temperatures, the one nearest to 25 degrees C gives the curve. both_branches: the pieces
+/// warning says so. Of several temperatures, the one nearest to the cell's reference temperature gives the
+/// curve. both_branches: the pieces
 /// also follow the gap. Throws BadInput if the recordings are not slow runs.
 OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
                        files::CellFile& cell);
@@ -43,6 +41,7 @@ inline constexpr const char* extended_noise =
 
 /// Adds what an estimator needs in addition: resistances that depend on the temperature, persistent errors as states of
 /// the filter, and the noise that belongs to them. data: the recordings that the cell was identified from, as measured.
+/// The resistances move to the cell's reference temperature if it is known how they depend on the temperature.
 void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell);
 
 /// Writes noise and tolerance into `p`: noise of the measuring chain from the rests of the recordings, noise of the
@@ -52,11 +51,12 @@ void identify_noise(const std::vector<measurement::Recording>& recordings, const
 
 /// Recordings within 5 K of each other.
 struct TemperatureGroup {
-  double temperature_c = reference_c;   ///< mean, rounded to a tenth
+  double temperature_c = 0;             ///< mean, rounded to a tenth
   std::vector<std::size_t> recordings;  ///< indices
 };
-/// In order of temperature. A single group of 25 degrees C if any recording has no temperature.
-std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings);
+/// In order of temperature. A single group of the reference temperature if any recording has no temperature.
+std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings,
+                                                   double reference_c);
 
 /// Rounds every number to seven significant digits.
 void round_digits(files::CellFile& cell);

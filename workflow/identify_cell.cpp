@@ -14,6 +14,7 @@
 #include "identification/prefilter.hpp"
 #include "measurement/recording_checks.hpp"
 #include "workflow/identified_cell.hpp"
+#include "workflow/reference_temperature.hpp"
 
 namespace bms::workflow {
 
@@ -40,7 +41,7 @@ struct Inputs {
 
 /// Data sets of similar temperature.
 struct Group {
-  double temperature_c = reference_c;
+  double temperature_c = 0;
   std::vector<id::DataSet> data_sets;
 };
 
@@ -63,6 +64,7 @@ StartCell read_start(const IdentifyOptions& options) {
   start.cell = files::read_cell(options.start);
   start.capacity_ah = start.cell.parameters.capacity_ah;
   model::CellParameters<>& p = start.cell.parameters;
+  p.reference_temperature_c = options.reference_temperature_c.value_or(p.reference_temperature_c);
   if (!options.ocv.empty()) start.ocv = identify_ocv(options.ocv, options.ocv_error_v, options.extend, start.cell);
   if (options.capacity_ah > 0) p.capacity_ah = options.capacity_ah;
   if (options.extend) identify_hysteresis(start.ocv, start.cell);
@@ -156,6 +158,7 @@ void identify_linear_cell(const IdentifyOptions& options, StartCell start, const
   cell.parameters.rc.r0_ohm.push_back(p[1].value);
   cell.parameters.rc.r1_ohm.push_back(p[2].value);
   cell.parameters.rc.c1_f.push_back(p[3].value);
+  state_reference(cell, !options.ocv.empty());
   cell.name = options.name;
   cell.source = fmt::format("R0, R1, C1 identified from {}; everything else from {}",
                             file_name(options.recordings.front()), options.start);
@@ -172,9 +175,9 @@ void identify_linear_cell(const IdentifyOptions& options, StartCell start, const
 
 // ---- the grey box
 
-std::vector<Group> grouped(const Inputs& inputs) {
+std::vector<Group> grouped(const Inputs& inputs, double reference_c) {
   std::vector<Group> groups;
-  for (const TemperatureGroup& like : group_by_temperature(inputs.recordings)) {
+  for (const TemperatureGroup& like : group_by_temperature(inputs.recordings, reference_c)) {
     Group& group = groups.emplace_back(Group{like.temperature_c, {}});
     for (const std::size_t k : like.recordings) group.data_sets.push_back(inputs.data_sets[k]);
   }
@@ -182,7 +185,7 @@ std::vector<Group> grouped(const Inputs& inputs) {
 }
 
 /// Index of the group whose temperature is nearest to the reference.
-std::size_t nearest_to_reference(std::span<const Group> groups) {
+std::size_t nearest_to_reference(std::span<const Group> groups, double reference_c) {
   std::size_t nearest = 0;
   for (std::size_t k = 0; k < groups.size(); ++k) {
     if (std::abs(groups[k].temperature_c - reference_c) < std::abs(groups[nearest].temperature_c - reference_c))
@@ -217,11 +220,11 @@ std::vector<files::TemperatureTable> temperature_tables(const IdentifyOptions& o
   return tables;
 }
 
-/// Fits the grey box to each group; the cell takes its tables by temperature.
-void fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inputs& inputs, IdentifyResult& result) {
+/// Fits the grey box to each group; the cell takes its tables by temperature. Returns the temperature of the main one.
+double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inputs& inputs, IdentifyResult& result) {
   const model::CellParameters<>& p = start.cell.parameters;
-  const auto groups = grouped(inputs);
-  const std::size_t main_group = nearest_to_reference(groups);
+  const auto groups = grouped(inputs, p.reference_temperature_c);
+  const std::size_t main_group = nearest_to_reference(groups, p.reference_temperature_c);
   const Group& main = groups[main_group];
   id::GreyBoxOptions grey_box;
   grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(inputs.soc_min, inputs.soc_max) : options.nodes;
@@ -239,6 +242,7 @@ void fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inputs
     throw files::BadInput(options.recordings.front(), 1, error.what());
   }
   result.data = {main.data_sets.front().data};
+  return main.temperature_c;
 }
 
 /// Where the values of the cell file come from.
@@ -264,9 +268,23 @@ void write_sources(const IdentifyOptions& options, const IdentifyResult& result,
                       : fmt::format("model: residual of {}; current offset as in {}", validated_on, options.start));
 }
 
+/// Warns if [rc] is not at the temperature that the cell file states. identified_c: temperature of its recordings.
+void check_reference(const files::CellFile& cell, double identified_c, bool extended,
+                     std::vector<measurement::Warning>& warnings) {
+  constexpr double near_k = 5;  // as far apart as recordings of one temperature can be
+  const double reference_c = cell.parameters.reference_temperature_c;
+  const bool moved = extended && cell.at_temperature.size() > 1;
+  if (moved || std::abs(identified_c - reference_c) <= near_k) return;
+  warnings.push_back({"reference_temperature",
+                      fmt::format("R0, R1, C1 were identified at {:g} degrees C, but the reference temperature of the "
+                                  "cell file is {:g} degrees C; use --reference-temperature {:g}, or --extend with "
+                                  "recordings at several temperatures",
+                                  identified_c, reference_c, identified_c)});
+}
+
 void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, const Inputs& inputs,
                             IdentifyResult& result) {
-  fit_grey_box(options, start, inputs, result);
+  const double identified_c = fit_grey_box(options, start, inputs, result);
   validate(
       options, inputs.options,
       [&](const id::DataSet& d) { return id::validate(result.identification.cell, d, result.identification.fading); },
@@ -280,7 +298,9 @@ void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, con
   write_sources(options, result, cell);
   noise.current_offset_a *= cell.parameters.capacity_ah / start.capacity_ah;
   noise.current_unknown_a *= cell.parameters.capacity_ah / start.capacity_ah;
+  state_reference(cell, !options.ocv.empty());
   if (options.extend) extend(start.ocv, inputs.measured, cell);
+  check_reference(cell, identified_c, options.extend, result.warnings);
   if (const model::CellFault fault = model::first_fault(cell.parameters); fault.what != nullptr) {
     throw files::BadInput(options.out, 1,
                           out_of_range(fault) + "; more or other recordings, or fewer --nodes, may help");

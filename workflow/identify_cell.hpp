@@ -20,19 +20,20 @@ struct IdentifyOptions {
   identification::Method method = identification::Method::trust_region_reflective;
   std::string start = "table9";  ///< cell file with the initial values, and with what is not identified
   InitialSoc initial_soc;
-  SocWindow window;                          ///< samples that count
-  std::vector<std::string> validate;         ///< files that are only compared with
-  std::optional<SocWindow> validate_window;  ///< not given: `window`
-  std::vector<double> nodes;                 ///< SOC nodes of R0, R1, C1; empty: by the range of the recordings
-  double filter_hz = 0;                      ///< cut-off frequency of the low-pass on the current; 0: no filter
-  bool remove_offset = false;                ///< subtract the mean current of the rests
-  double ocv_error_v = 0.002;                ///< largest error of the straight pieces of the OCV
-  std::optional<double> ocv_branch;          ///< branch position of the OCV, -1 discharge .. 1 charge; not given:
-                                             ///< identified if the data determine it
-  bool extend = false;                       ///< add the mechanisms and error states that an estimator needs
-  double capacity_ah = 0;                    ///< 0: of the OCV recordings, else of `start`
-  std::string name;                          ///< of the cell
-  std::string out;                           ///< file that the caller will write; used in messages only
+  SocWindow window;                               ///< samples that count
+  std::vector<std::string> validate;              ///< files that are only compared with
+  std::optional<SocWindow> validate_window;       ///< not given: `window`
+  std::vector<double> nodes;                      ///< SOC nodes of R0, R1, C1; empty: by the range of the recordings
+  double filter_hz = 0;                           ///< cut-off frequency of the low-pass on the current; 0: no filter
+  bool remove_offset = false;                     ///< subtract the mean current of the rests
+  double ocv_error_v = 0.002;                     ///< largest error of the straight pieces of the OCV
+  std::optional<double> ocv_branch;               ///< branch position of the OCV, -1 discharge .. 1 charge; not given:
+                                                  ///< identified if the data determine it
+  bool extend = false;                            ///< add the mechanisms and error states that an estimator needs
+  std::optional<double> reference_temperature_c;  ///< of the cell file; not given: that of `start`
+  double capacity_ah = 0;                         ///< 0: of the OCV recordings, else of `start`
+  std::string name;                               ///< of the cell
+  std::string out;                                ///< file that the caller will write; used in messages only
 };
 
 struct IdentifyResult {

@@ -46,7 +46,7 @@ struct Knowledge<model::TemperatureResistance> : DefaultKnowledge<model::Tempera
     if (!c.facts.temperature) return "no temperature was recorded";
     if (std::max(c.facts.temperature_span_k, c.facts.away_k) < smallest_difference_k)
       return fmt::format("the temperature is within {:.1f} K of the cell file's {:g} degrees C", c.facts.away_k,
-                         model::reference_temperature_c);
+                         c.facts.reference_c);
     return std::nullopt;
   }
   static bool expected(const model::CellParameters<>&, const RecordingFacts& facts) { return facts.away_k > certain_k; }

@@ -1,8 +1,10 @@
 // The current heats the inside of the cell above its surface, and the resistances follow (Arrhenius):
 //
-//   dw/dt = (R_th I^2 (R0 + R1) - w) / tau        R = R exp(E / R_gas (1 / (T + w) - 1 / T))
+//   dw/dt = (R_th I^2 (R0 + R1) - w) / tau        R = R exp(E / R_gas (1 / (T_ref + w) - 1 / T_ref))
 //
-// The state is w in units of 100 K. The dependence on the measured temperature belongs to temperature_resistance.
+// The rise w counts from the reference temperature, whatever the measured one: the error is a part of E, which is only
+// known to some extent. The state is w in units of 100 K. The dependence on the measured temperature belongs to
+// temperature_resistance.
 #pragma once
 
 #include "arithmetic/exponential.hpp"
@@ -20,6 +22,7 @@ struct SelfHeating {
       Parameter{"time_constant_s", "s", Role::shape, 900, 60, 6000, Per::cell, "tau"},
       Parameter{"activation_j_per_mol", "J/mol", Role::given, 25000, 5000, 80000, Per::cell,
                 "E of R0 and R1; only its product with R_th is observable"},
+      reference_temperature("T_ref, from which the temperature rises"),
   };
 
   template <class S>
@@ -29,13 +32,15 @@ struct SelfHeating {
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = false;
     static constexpr StateUnit state_unit{"k", 100};
-    Factor<S> energy;   ///< E / (R_gas T), T = 25 degrees C
+    Factor<S> energy;  ///< E / (R_gas T_ref)
+    Temperature<S> reference_c;
     Coupling<S> per_w;  ///< 100 K per W
     Rate<S> rate_per_s;
 
     template <class Real>
-    constexpr Law(const std::array<Real, 3>& p, double)
-        : energy(Factor<S>(mechanism_detail::energy_over_rt(p[2], Real(25)))),
+    constexpr Law(const std::array<Real, 4>& p, double)
+        : energy(Factor<S>(mechanism_detail::energy_over_rt(p[2], p[3]))),
+          reference_c(Temperature<S>(p[3])),
           per_w(Coupling<S>(p[0] / Real(100))),
           rate_per_s(Rate<S>(Real(1) / p[1])) {}
 
@@ -46,7 +51,6 @@ struct SelfHeating {
       return {step_response_after<S>(input.duration_s, rate_per_s), Voltage<S>(heat_w * per_w)};
     }
     constexpr void apply_state(TablePoint<S>& at, const Voltage<S>& hundred_k, const StepInput<S>&) const {
-      const Temperature<S> reference_c(25);
       const Temperature<S> inside_c = reference_c + Temperature<S>(Coupling<S>(hundred_k) * Coupling<S>(100));
       const Factor<S> less = mechanism_detail::arrhenius<S>(energy, reference_c, inside_c);
       mechanism_detail::scale<S>(at.r0_ohm, at.r0_delta_ohm, less);

@@ -2,8 +2,8 @@
 //
 //   R0(T) = R0 (1 - s + s a_0)    R1(T) = R1 a_1    a_k = exp(E_k / R_gas (1 / T - 1 / T_ref))
 //
-// T_ref is the temperature at which the cell file was made. C1 is constant, so the time constant follows R1. Fast and
-// slow polarisation follow a_1, their time constants are constant.
+// T_ref is the temperature at which the cell file's resistances are valid. C1 is constant, so the time constant follows
+// R1. Fast and slow polarisation follow a_1, their time constants are constant.
 //
 // At one temperature E_0 and s have the same effect: prior knowledge of E_0 decides, and the standard deviations show
 // it.
@@ -23,8 +23,7 @@ struct TemperatureResistance {
                 "E_0: of the reactions in R0, 40 to 60 kJ/mol; 5 to 30 kJ/mol if s is 1", 0, 50000, 10000},
       Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell,
                 "E_1; 30 to 70 kJ/mol is usual", 70000},
-      Parameter{"reference_c", "degC", Role::given, 25, -40, 80, Per::cell,
-                "temperature of the cell file's resistances"},
+      reference_temperature("temperature of the cell file's resistances"),
       Parameter{"r0_share", "1", Role::place, 1, 0.02, 1, Per::cell, "s: share of R0 that depends on the temperature"},
   };
 

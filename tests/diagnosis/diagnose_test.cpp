@@ -142,7 +142,7 @@ TEST(Diagnose, LeakageAndCurrentOffsetExcludeEachOtherWithoutATrustedAmmeter) {
   PreparedRecording r = test::recorded(test::drive(2, 32), 0.7, 32);
   LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
   const std::size_t leakage = model::mechanism_index("leakage"), offset = model::mechanism_index("current_offset");
-  const Hypothesis leaking = with(likelihood.base(), leakage, 6);
+  const Hypothesis leaking = with(likelihood.base(), leakage, likelihood.cell());
   EXPECT_TRUE(not_testable(likelihood, leaking, offset).has_value());
   EXPECT_FALSE(not_testable(likelihood, likelihood.base(), offset).has_value());
   r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002}};

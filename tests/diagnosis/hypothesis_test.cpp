@@ -30,7 +30,7 @@ LikelihoodModel plant_likelihood(std::uint64_t seed = 1) {
 Hypothesis acting(const LikelihoodModel& likelihood, std::size_t mechanism) {
   const double ah = likelihood.cell().capacity_ah;
   const model::MechanismInfo& info = model::catalogue[mechanism];
-  Hypothesis h = with(likelihood.base(), mechanism, ah);
+  Hypothesis h = with(likelihood.base(), mechanism, likelihood.cell());
   for (std::size_t p = 0; p < info.parameters; ++p) {
     const model::Parameter& parameter = info.parameter[p];
     if (parameter.role == model::Role::strength) h.settings.back().value[p] = 0.07 * parameter.upper(ah);
@@ -147,8 +147,8 @@ TEST(Hypothesis, AFitIsNeverWorseThanWhereItBegan) {
   const HypothesisFit base = likelihood.fit(likelihood.base());
   for (const char* id : {"ocv_hysteresis", "slow_polarisation", "fast_polarisation", "capacity_change",
                          "resistance_growth", "ocv_shape"}) {
-    const HypothesisFit fit = likelihood.fit(
-        with(base.hypothesis, model::mechanism_index(id), likelihood.cell().capacity_ah), base.calibration);
+    const HypothesisFit fit =
+        likelihood.fit(with(base.hypothesis, model::mechanism_index(id), likelihood.cell()), base.calibration);
     EXPECT_LE(fit.cost, base.cost + 1) << id;
   }
 }
@@ -158,7 +158,8 @@ TEST(Hypothesis, FindsAKnownStrength) {
   const PreparedRecording r = test::recorded(
       test::drive(2, 4), 0.7, 4, [&](std::size_t, double current_a, double) { return more_ohm * current_a; });
   const LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
-  const HypothesisFit fit = likelihood.fit(with(likelihood.base(), model::mechanism_index("resistance_growth"), 6));
+  const HypothesisFit fit =
+      likelihood.fit(with(likelihood.base(), model::mechanism_index("resistance_growth"), likelihood.cell()));
   const MechanismSetting& found = fit.hypothesis.settings.back();
   EXPECT_NEAR(found.value[0], more_ohm / 0.0133, 0.03);
   EXPECT_GT(found.deviation[0], 0.001);

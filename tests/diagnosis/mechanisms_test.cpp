@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/texts.hpp"
+#include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
 namespace {
@@ -40,7 +41,8 @@ TEST(Mechanisms, FarStartsAreNotAboveTheUpperBound) {
   facts.duration_h = 3;
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
     const model::MechanismInfo& info = model::catalogue[m];
-    for (const std::vector<double>& start : knowledge_of(m).far_starts(model::default_setting(m, 6), facts)) {
+    for (const std::vector<double>& start :
+         knowledge_of(m).far_starts(model::default_setting(m, test::table9()), facts)) {
       ASSERT_LE(start.size(), info.parameters) << info.id;
       for (std::size_t p = 0; p < start.size(); ++p)
         EXPECT_LE(std::abs(start[p]), info.parameter[p].upper(6)) << info.id;  // a fit clamps to the lower bound

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t index_of(std::string_view id) { return model::mechanism_index(id); }
 
 MechanismSetting setting(std::string_view id, std::initializer_list<double> values) {
-  MechanismSetting s = model::default_setting(index_of(id), 6);
+  MechanismSetting s = model::default_setting(index_of(id), test::table9());
   std::copy(values.begin(), values.end(), s.value.begin());
   return s;
 }
@@ -100,7 +100,7 @@ TEST(Reference, TheReadingOfAnOpenContactorDecidesBetweenLeakageAndAnOffset) {
   ASSERT_GE(r.checks.size(), 5U);
   const auto cost = [](const PreparedRecording& record, const char* id) {
     const LikelihoodModel likelihood(test::table9(), {}, {record}, NoiseModel{});
-    return likelihood.fit(with(likelihood.base(), index_of(id), 6)).cost;
+    return likelihood.fit(with(likelihood.base(), index_of(id), likelihood.cell())).cost;
   };
   PreparedRecording without = r;
   without.checks.clear();
@@ -121,7 +121,9 @@ TEST(Reference, VoltageChecksDistinguishAnOffsetFromAGainAndAContact) {
   EXPECT_TRUE(std::isnan(r.voltage_v[700])) << "a source's voltage is not the cell's";
   const LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
   EXPECT_EQ(likelihood.used(), r.size() - 1'200 - (std::abs(r.current_a[0]) < 0.06 ? 0 : 1));
-  const auto cost = [&](const char* id) { return likelihood.fit(with(likelihood.base(), index_of(id), 6)).cost; };
+  const auto cost = [&](const char* id) {
+    return likelihood.fit(with(likelihood.base(), index_of(id), likelihood.cell())).cost;
+  };
   EXPECT_GT(cost("voltage_gain") - cost("voltage_offset"), 30);
   EXPECT_GT(cost("contact_step") - cost("voltage_offset"), 30);
 }
@@ -135,7 +137,7 @@ TEST(Reference, DerivativesOfChecksEqualFiniteDifferences) {
   const auto checks = static_cast<Eigen::Index>(r.checks.size());
   const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(likelihood.calibration().size()), 0.2);
   for (const char* id : {"current_offset", "current_gain", "voltage_offset", "voltage_gain", "contact_step"}) {
-    Hypothesis h = with(likelihood.base(), index_of(id), 6);
+    Hypothesis h = with(likelihood.base(), index_of(id), likelihood.cell());
     h.settings.back().value[0] = 0.01;
     const Eigen::VectorXd exact = likelihood.derivatives(h, u, std::vector<ParameterRef>{{0, 0}}).col(0).tail(checks);
     Hypothesis more = h, less = h;

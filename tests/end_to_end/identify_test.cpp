@@ -2,6 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/end_to_end/run_tool.hpp"
@@ -12,6 +17,7 @@ namespace {
 using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
+using ::testing::Not;
 
 class IdentifyTool : public ::testing::Test {
  protected:
@@ -179,6 +185,64 @@ TEST_F(IdentifyTool, SeveralTemperaturesGiveOneTableEach) {
   EXPECT_GT(r0_ohm[5], r0_ohm[25]) << "cold cells resist";
   EXPECT_GT(r0_ohm[25], r0_ohm[45]);
   EXPECT_EQ(run_tool("replay " + shift + " --cell " + path("cell.toml")).exit_code, 0);
+}
+
+/// Simulates table9, whose resistances follow the temperature, for an hour and a half of pulses.
+std::string recording_at(const std::string& folder, double temperature_c) {
+  std::string profile = "time_s,current_a,temperature_c\n";
+  for (int k = 0; k < 5'400; ++k) {
+    const int minute = k / 60 % 6;
+    const double current_a = minute < 2 ? -4 : minute == 3 ? 3 : 0;
+    profile += fmt::format("{},{},{}\n", k, current_a, temperature_c);
+  }
+  const std::string name = fmt::format("{}/at_{:.0f}", folder, temperature_c);
+  std::ofstream(name + "_profile.csv") << profile;
+  const ToolRun run = run_tool("simulate --cell table9 --initial-soc 0.6 --noise-v 0.0002 --profile " + name +
+                               "_profile.csv --out " + name + ".csv --with temperature_resistance:" +
+                               "r0_activation_j_per_mol=50000,r1_activation_j_per_mol=40000,r0_share=0.3");
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  return name + ".csv";
+}
+
+TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
+  const std::string warm = recording_at(folder_.path().string(), 18.5),
+                    cold = recording_at(folder_.path().string(), -10);
+  const std::string recordings = "--recording " + warm + " " + cold + " --initial-soc 0.6 --nodes 0.5 ";
+  result(recordings + "--extend --reference-temperature 20");
+  const std::string cell = content(path("cell.toml"));
+  EXPECT_THAT(cell, HasSubstr("\nreference_temperature_c = 20.0\n"));
+  EXPECT_THAT(cell, HasSubstr("\nreference_c = 20.0\n"));
+  EXPECT_THAT(cell, HasSubstr("moved from 18.5 to 20 degrees C"));
+  const auto of_rc = [](const std::string& text, const std::string& key) {
+    return std::stod(text.substr(text.find(key + " = [", text.find("[rc]")) + key.size() + 4));
+  };
+  const double by = 1 / 8.314462618 * (1 / 293.15 - 1 / 298.15), at_10_k = 1 / 8.314462618 * (1 / 291.65 - 1 / 293.15);
+  // table9 at 45 and 55 % is the cell that was simulated
+  const double r0_ohm = of_rc(cell, "r0_ohm");
+  EXPECT_NEAR(r0_ohm / (0.013237 * (0.7 + 0.3 * std::exp(50'000 * by))), 1, 0.02);
+
+  // without --extend nothing is known of other temperatures: the resistances are those of the nearest recordings
+  const json plain = result(recordings + "--reference-temperature 20");
+  EXPECT_THAT(content(path("cell.toml")), HasSubstr("\nreference_temperature_c = 20.0\n"));
+  EXPECT_NEAR(of_rc(content(path("cell.toml")), "r1_ohm") / of_rc(cell, "r1_ohm"), std::exp(40'000 * at_10_k), 0.01);
+  EXPECT_TRUE(plain["warnings"].empty());
+
+  const json far = result("--recording " + cold + " --initial-soc 0.6 --nodes 0.5");
+  EXPECT_THAT(content(path("cell.toml")), Not(HasSubstr("reference_temperature_c")));
+  EXPECT_THAT(far["warnings"].dump(), HasSubstr("identified at -10 degrees C"));
+}
+
+TEST_F(IdentifyTool, TheGeneratedHeaderHasTheReferenceTemperature) {
+  const std::string start = content(std::filesystem::path(BMS_SOURCE_DIR) / "model/cells/table9.toml");
+  const std::size_t after = start.find("capacity_ah");
+  std::ofstream(path("cold.toml")) << start.substr(0, after) << "reference_temperature_c = -5.0\n"
+                                   << start.substr(after)
+                                   << "\n[mechanism.temperature_resistance]\nr1_activation_j_per_mol = 40000\n";
+  const std::string command =
+      std::string("\"") + BMS_CELL_HEADER_TOOL + "\" " + path("cold.toml") + " " + path("h.hpp");
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_THAT(content(path("h.hpp")), HasSubstr(".reference_temperature_c = -5.0, "));
+  EXPECT_THAT(content(path("h.hpp")), HasSubstr("std::array<double, 4>{0.0, 40000.0, -5.0, 1.0}"));
 }
 
 TEST_F(IdentifyTool, StudyWritesTablesAndAPageAndFindsTheOrderOfThePaper) {

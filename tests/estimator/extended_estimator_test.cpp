@@ -328,7 +328,7 @@ TEST(ExtendedEstimator, EveryScalarGivesTheSameEstimates) {
 
 TEST(ExtendedEstimator, ACellWhoseMechanismsAreNeutralGivesThePlainCellsBits) {
   const Work w = work({}, 2'000, 0.77);
-  auto neutral = default_setting(mechanism_index("resistance_growth"), capacity_ah);
+  auto neutral = default_setting(mechanism_index("resistance_growth"), tests::table9);
   const auto e = run<float, 0>(table9_with<float>({neutral}), w.samples, starting_at(0.77, 0.02));
   SocEstimator<float> plain(starting_at(0.77, 0.02));
   const auto cell = tests::prepared<float>();

@@ -54,5 +54,18 @@ TEST(StepConstants, TheColdMakesResistancesUncertainAndTheHeatDoesNot) {
   EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
 }
 
+TEST(StepConstants, TheColdBeginsBelowTheReferenceTemperatureOfTheCell) {
+  auto parameters = tests::table9;
+  parameters.reference_temperature_c = 10;
+  const auto cell = tests::prepared<double>(parameters);
+  Constants<double> c;
+  c.set_time_step(cell.noise, 1'000'000);
+  c.set_temperature(cell, 1'000);
+  EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
+  c.set_temperature(cell, -500);
+  const double more = std::exp(40'000 / 8.314462618 * (1 / 268.15 - 1 / 283.15)) - 1;
+  EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + more, 1e-6);
+}
+
 }  // namespace
 }  // namespace bms::estimator

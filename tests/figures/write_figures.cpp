@@ -164,7 +164,7 @@ files::CellFile table9_with(const std::vector<std::pair<const char*, std::vector
   files::CellFile cell = files::read_cell("table9");
   cell.parameters.noise.errors_are_states = errors;
   for (const auto& [id, values] : mechanisms) {
-    model::MechanismSetting m = model::default_setting(model::mechanism_index(id), cell.parameters.capacity_ah);
+    model::MechanismSetting m = model::default_setting(model::mechanism_index(id), cell.parameters);
     std::copy(values.begin(), values.end(), m.value.begin());
     files::put_mechanism(cell, m);
   }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "files/text_file.hpp"
@@ -12,6 +13,7 @@ namespace bms::files {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string table9_text() { return read_file(BMS_SOURCE_DIR "/model/cells/table9.toml"); }
 
@@ -51,6 +53,51 @@ TEST(CellFile, ReadsWhetherSensorErrorsAreStates) {
   EXPECT_TRUE(parse_cell(cell_text(cell), "x").parameters.noise.errors_are_states);
   EXPECT_THAT(cell_refusal(replaced(with, "errors_are_states = true", "errors_are_states = 1")),
               HasSubstr("'noise.errors_are_states' is not acceptable, expected true or false"));
+}
+
+constexpr const char* temperature_mechanisms = R"(
+[mechanism.self_heating]
+[mechanism.temperature_resistance]
+[mechanism.entropic_ocv]
+reference_c = 10
+)";
+
+/// The reference temperature of a mechanism.
+double reference_of(const CellFile& cell, std::string_view id) {
+  for (const model::MechanismSetting& m : cell.mechanisms) {
+    const model::MechanismInfo& info = model::catalogue[m.index];
+    for (std::size_t k = 0; k < info.parameters; ++k) {
+      if (info.id == id && info.parameter[k].name == "reference_c") return m.value[k];
+    }
+  }
+  throw std::runtime_error("not there");
+}
+
+TEST(CellFile, ReadsTheReferenceTemperatureAndItsMechanismsTakeIt) {
+  const std::string without = table9_text() + temperature_mechanisms,
+                    with = replaced(without, "capacity_ah = 6.0", "capacity_ah = 6.0\nreference_temperature_c = -12.5");
+  const CellFile usual = parse_cell(without, "x"), cold = parse_cell(with, "x");
+  EXPECT_EQ(usual.parameters.reference_temperature_c, 25);
+  EXPECT_EQ(cold.parameters.reference_temperature_c, -12.5);
+  for (const char* id : {"self_heating", "temperature_resistance"}) {
+    EXPECT_EQ(reference_of(usual, id), 25) << id;
+    EXPECT_EQ(reference_of(cold, id), -12.5) << id;
+  }
+  EXPECT_EQ(reference_of(cold, "entropic_ocv"), 10) << "its own";
+  EXPECT_THAT(cell_text(usual), Not(HasSubstr("reference_temperature_c")));
+  EXPECT_EQ(parse_cell(cell_text(cold), "x").parameters.reference_temperature_c, -12.5);
+  EXPECT_EQ(cell_text(parse_cell(cell_text(cold), "x")), cell_text(cold));
+}
+
+TEST(CellFile, RejectsAReferenceTemperatureOutOfRangeWithItsLine) {
+  for (const char* bad : {"-40.5", "80.5", "nan"}) {
+    const std::string text = replaced(table9_text(), "capacity_ah = 6.0",
+                                      std::string("capacity_ah = 6.0\nreference_temperature_c = ") + bad);
+    const auto line =
+        1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(text.find("reference_t")), '\n');
+    EXPECT_EQ(refusal(text), "cell.toml:" + std::to_string(line) +
+                                 ": 'reference_temperature_c' is out of range, expected -40 to 80 degrees C");
+  }
 }
 
 TEST(CellFile, IsIdentifiedByTheHashOfItsText) {
@@ -192,7 +239,7 @@ TEST(CellFile, MechanismsAreInCatalogueOrderAndMissingParametersAreNeutral) {
 TEST(CellFile, EveryMechanismIsWrittenAndReadBackBitForBit) {
   CellFile cell = read_cell("table9");
   for (std::size_t index = model::mechanism_count; index-- > 0;) {
-    model::MechanismSetting m = model::default_setting(index, cell.parameters.capacity_ah);
+    model::MechanismSetting m = model::default_setting(index, cell.parameters);
     for (std::size_t k = 0; k < model::catalogue[index].parameters; ++k) {
       const model::Parameter& p = model::catalogue[index].parameter[k];
       m.value[k] =
@@ -215,9 +262,10 @@ TEST(CellFile, EveryMechanismIsWrittenAndReadBackBitForBit) {
 
 TEST(CellFile, AMissingParameterIsAcceptedForACellOfAnySize) {
   for (const double capacity_ah : {0.01, 2.5, 1'000.0}) {
+    model::CellParameters<> p;
+    p.capacity_ah = capacity_ah;
     for (std::size_t index = 0; index < model::mechanism_count; ++index) {
-      EXPECT_EQ(model::first_fault(model::default_setting(index, capacity_ah), capacity_ah),
-                model::catalogue[index].parameters)
+      EXPECT_EQ(model::first_fault(model::default_setting(index, p), capacity_ah), model::catalogue[index].parameters)
           << model::catalogue[index].id;
     }
   }

@@ -281,7 +281,7 @@ TEST(OcvHysteresis, FollowsTheShapeOfTheFilesGap) {
   const double middle_v = plateau_half_gap_v(p.ocv);
   EXPECT_NEAR(middle_v, 0.012, 0.001);
   const auto cell = prepare<double, max_intervals>(p);
-  auto setting = default_setting(mechanism_index("ocv_hysteresis"), capacity_ah);
+  auto setting = default_setting(mechanism_index("ocv_hysteresis"), tests::table9);
   setting.value = {middle_v, 40, 0, -1, 1};
   const auto laws = chosen<double>(std::vector{setting}, capacity_ah);
   const auto x = laws.initial();
@@ -341,7 +341,7 @@ TEST(OcvShape, KeepsTheEndsAndSlidesByWhatItSaysInBetween) {
 }
 
 TEST(SelfHeating, ReachesTheTemperatureOfItsThermalResistance) {
-  const SelfHeating::Law<double> law(std::array<double, 3>{10, 900, 25'000}, capacity_ah);
+  const SelfHeating::Law<double> law(std::array<double, 4>{10, 900, 25'000, 25}, capacity_ah);
   TablePoint<double> at{};
   at.r0_ohm = 0.03;
   at.r1_ohm = 0.02;
@@ -372,6 +372,64 @@ TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
                 1e-12)
         << k;
   }
+}
+
+/// table9 with mechanisms that depend on the temperature, valid at a temperature. What a cell file of 25 degrees C
+/// states is converted here by formulas of this test. self_heating keeps the reference of 25 degrees C for its own.
+struct ReferencedCell {
+  explicit ReferencedCell(double reference_c) {
+    const double by = 1 / 8.314462618 * (1 / (reference_c + 273.15) - 1 / 298.15), r0_a = std::exp(50'000 * by),
+                 r1_a = std::exp(40'000 * by), entropy_v_per_k = 2e-4;
+    p.reference_temperature_c = reference_c;
+    for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
+      p.rc.r0_ohm[k] *= 0.7 + 0.3 * r0_a;
+      p.rc.r1_ohm[k] *= r1_a;
+    }
+    for (std::size_t k = 0; k < p.ocv.b0_v.size; ++k) p.ocv.b0_v[k] += entropy_v_per_k * (reference_c - 25);
+    add("fast_polarisation", {0.002 * r1_a, 1.5});
+    add("self_heating", {8, 900, 25'000, 25});
+    add("temperature_resistance", {50'000, 40'000});
+    settings.back().value[3] = 0.3 * r0_a / (0.7 + 0.3 * r0_a);
+    add("entropic_ocv", {entropy_v_per_k, entropy_v_per_k, entropy_v_per_k, entropy_v_per_k});
+  }
+  void add(std::string_view id, std::initializer_list<double> values) {
+    std::copy(values.begin(), values.end(),
+              settings.emplace_back(default_setting(mechanism_index(id), p)).value.begin());
+  }
+  std::vector<double> voltages() const {
+    const auto cell = tests::prepared<double>(p);
+    OpenLoopSimulation<double> simulation(cell, p.capacity_ah, chosen<double>(settings, p.capacity_ah), 0.6);
+    std::vector<double> all;
+    for (const Row& r : input_of(3'000)) {
+      all.push_back(simulation.step(r.time_s, r.duration_s, r.current_a, r.temperature_c - 15,
+                                    [](TablePoint<double>&, double) {}));
+    }
+    return all;
+  }
+  CellParameters<> p = tests::table9;
+  std::vector<MechanismSetting> settings;
+};
+
+TEST(ReferenceTemperature, TheSameCellAtAnotherReferenceHasTheSameVoltages) {
+  const std::vector<double> at_25 = ReferencedCell(25).voltages();
+  for (const double reference_c : {20.0, 32.0}) {
+    const ReferencedCell other(reference_c);
+    EXPECT_EQ(other.settings[2].value[2], reference_c) << "temperature_resistance takes the cell's";
+    EXPECT_EQ(other.settings[3].value[4], reference_c) << "entropic_ocv takes the cell's";
+    const std::vector<double> v = other.voltages();
+    for (std::size_t k = 0; k < v.size(); ++k) ASSERT_NEAR(v[k], at_25[k], 1e-12) << k;
+  }
+}
+
+TEST(SelfHeating, TakesTheReferenceTemperatureOfTheCell) {
+  CellParameters<> p = tests::table9;
+  p.reference_temperature_c = 5;
+  const auto setting = default_setting(mechanism_index("self_heating"), p);
+  const SelfHeating::Law<double> law(std::array<double, 4>{10, 900, 25'000, setting.value[3]}, capacity_ah);
+  TablePoint<double> at{};
+  at.r0_ohm = 0.03;
+  law.apply_state(at, 0.18, {});
+  EXPECT_NEAR(at.r0_ohm / 0.03, std::exp(25'000 / 8.314462618 * (1 / (278.15 + 18) - 1 / 278.15)), 1e-9);
 }
 
 TEST(TemperatureResistance, LeavesTheShareOfContactsAndFoilsAlone) {

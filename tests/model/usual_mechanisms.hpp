@@ -29,7 +29,7 @@ inline const std::vector<UsualMechanism>& usual_mechanisms() {
       {"slow_polarisation", {0.004, 600, 0.2, 150}},
       {"fast_polarisation", {0.002, 1.5}},
       {"ocv_hysteresis", {0.008, 40, 0.2, -0.5}},
-      {"self_heating", {8, 900, 25'000}},
+      {"self_heating", {8, 900, 25'000, 26}},
       {"resistance_growth", {0.3}},
       {"polarisation_growth", {0.2, -0.3}},
       {"direction_asymmetry", {0.2}},

@@ -1,0 +1,45 @@
+// The temperature dependence of resistances by Arrhenius, and the temperature of a cell that was not measured.
+#pragma once
+
+#include "arithmetic/exponential.hpp"
+
+namespace bms::model {
+
+using namespace arithmetic;  // the physics uses these number types and functions
+
+/// Temperature of a cell whose temperature was never measured [degrees C]: that of a room. It says nothing about the
+/// cell file.
+inline constexpr double assumed_ambient_c = 25;
+
+namespace mechanism_detail {
+
+/// exp(x) for |x| <= 4.5, the range of Factor.
+template <class S>
+constexpr Factor<S> exponential(const Exponent<S>& x) {
+  const Exponent<S> none(0), most(4.5);
+  if (x < none) return Factor<S>(Fraction<S>(1) - step_response<S>(-x < most ? Exponent<S>(-x) : most));
+  const Fraction<S> remaining = Fraction<S>(Fraction<S>(1) - step_response<S>(x < most ? x : most));
+  return ratio<Factor<S>>(Fraction<S>(1), remaining);
+}
+
+/// Arrhenius factor of a resistance with this activation energy, relative to reference_c. energy_over_rt: E / (R
+/// T_ref).
+///   exp(E / R (1 / T - 1 / T_ref)) = exp((E / (R T_ref)) (T_ref - T) / T)
+template <class S>
+constexpr Factor<S> arrhenius(const Factor<S>& energy_over_rt, const Temperature<S>& reference_c,
+                              const Temperature<S>& temperature_c) {
+  const Temperature<S> kelvin = temperature_c + Temperature<S>(273.15);
+  if (kelvin < Temperature<S>(150)) return Factor<S>(1);  // not a temperature
+  const auto relative = ratio<Fraction<S>>(Temperature<S>(reference_c - temperature_c), kelvin);
+  return exponential<S>(Exponent<S>(energy_over_rt * relative));
+}
+
+inline constexpr double gas_constant_j_per_mol_k = 8.314462618;
+template <class Real>
+constexpr Real energy_over_rt(const Real& energy_j_per_mol, const Real& reference_c) {
+  return energy_j_per_mol / (Real(gas_constant_j_per_mol_k) * (reference_c + Real(273.15)));
+}
+
+}  // namespace mechanism_detail
+
+}  // namespace bms::model
