@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <span>
 #include <vector>
 
 #include "identification/grey_box.hpp"
@@ -80,7 +81,7 @@ model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, 
 FitStatistics validate(const model::CellParameters<>& cell, const DataSet& record, double fading);
 
 /// The figures of a simulation. NaN: not measured.
-FitStatistics fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
-                     const std::vector<double>& current_a, double fading);
+FitStatistics fit_of(std::span<const double> measured_v, const Eigen::VectorXd& simulated_v,
+                     std::span<const double> current_a, double fading);
 
 }  // namespace bms::identification
