@@ -107,8 +107,7 @@ Outcome refit(const truth::Case& c, double freedom) {
   std::vector<diagnosis::PreparedRecording> records{q.recording};
   if (!q.holdout.time_s.empty()) {
     records.push_back(q.holdout);
-    std::fill(records.back().voltage_v.begin(), records.back().voltage_v.end(),
-              std::numeric_limits<double>::quiet_NaN());
+    records.back().voltage_v = std::vector<double>(q.holdout.size(), std::numeric_limits<double>::quiet_NaN());
   }
   // only the ratio of noise and tolerance counts: a tenth of the noise stands for ten times the tolerance
   const LikelihoodModel likelihood(q.cell, {}, records,

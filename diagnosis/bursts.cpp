@@ -199,7 +199,7 @@ class BurstFinder {
   std::size_t loaded_ = 0;  ///< rows with load
 };
 
-std::vector<model::Span> spans_of(Selection selection, const std::vector<double>& time_s) {
+std::vector<model::Span> spans_of(Selection selection, std::span<const double> time_s) {
   std::sort(selection.stretches.begin(), selection.stretches.end(),
             [](const Stretch& a, const Stretch& b) { return a.first < b.first; });
   std::vector<model::Span> spans;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/numerics.hpp"
@@ -116,7 +117,7 @@ std::vector<ColumnFamily> families_of(std::size_t records) {
 }
 
 /// Power of a channel at a frequency.
-double power_at(const std::vector<double>& time_s, const std::vector<double>& value, double frequency_hz) {
+double power_at(std::span<const double> time_s, const std::vector<double>& value, double frequency_hz) {
   double re = 0, im = 0;
   for (std::size_t k = 0; k < value.size(); ++k) {
     if (!std::isfinite(value[k])) continue;
@@ -172,7 +173,7 @@ std::vector<double> strange_frequencies(const PreparedRecording& r) {
                highest_hz = std::min(column_limits.highest_hz,
                                      column_limits.highest_per_row / (r.duration_s() / static_cast<double>(r.size())));
   if (!(highest_hz > 2 * lowest_hz)) return {};
-  std::vector<double> load(r.current_a);
+  std::vector<double> load = r.current_a.copy();
   double mean = 0;
   for (const double a : load) mean += std::isfinite(a) ? a / static_cast<double>(load.size()) : 0;
   for (double& a : load) a -= mean;
@@ -194,7 +195,7 @@ std::vector<double> strange_frequencies(const PreparedRecording& r) {
 }
 
 Columns sine_columns(const LikelihoodModel& likelihood, double frequency_hz) {
-  const std::vector<double>& time_s = likelihood.records().front().time_s;
+  const measurement::Column& time_s = likelihood.records().front().time_s;
   Columns wave = Columns::Zero(static_cast<Eigen::Index>(likelihood.samples()), 2);
   for (std::size_t k = 0; k < time_s.size(); ++k) {
     const double turn = 2 * std::numbers::pi * frequency_hz * time_s[k];

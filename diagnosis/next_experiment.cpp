@@ -87,12 +87,12 @@ Plan planned(const experiments::Experiment& experiment, const Setting& setting, 
   r.initial_soc = experiment.start_soc;
   r.initial_soc_sigma = std::max(setting.cell.tolerance.initial_soc, design_limits.initial_soc_at_least);
   for (const experiments::ProfileRow& row : p.rows) {
-    r.time_s.push_back(row.time_s);
-    r.current_a.push_back(row.current_a);
-    r.voltage_v.push_back(0);
+    r.time_s.edit().push_back(row.time_s);
+    r.current_a.edit().push_back(row.current_a);
+    r.voltage_v.edit().push_back(0);
     const bool given = std::isfinite(row.temperature_c);
     if (setting.temperature || given)
-      r.temperature_c.push_back(given ? row.temperature_c : setting.cell.reference_temperature_c);
+      r.temperature_c.edit().push_back(given ? row.temperature_c : setting.cell.reference_temperature_c);
   }
   return p;
 }
@@ -104,7 +104,7 @@ PreparedRecording read_under(const Rival& truth, const Plan& plan, const model::
   const std::vector<MechanismSetting>& settings = truth.hypothesis.settings;
   const model::ChosenLaws<double> laws = model::chosen<double>(settings, cell.capacity_ah);
   double known_a = 0, known_read_a = read_a(laws, 0, cell.capacity_ah);
-  for (double& a : r.current_a) {
+  for (double& a : r.current_a.edit()) {
     if (a != known_a) {
       known_a = a;
       known_read_a = read_a(laws, a, cell.capacity_ah);
@@ -117,7 +117,7 @@ PreparedRecording read_under(const Rival& truth, const Plan& plan, const model::
   const std::vector<double> volts = predict(cell, settings, r, &soc), terminal_v = predict(cell, inside, r);
   for (std::size_t k = 0; k < r.size(); ++k) {
     const experiments::ProfileRow& row = plan.rows[k];
-    r.voltage_v[k] = std::isfinite(row.source_v) ? laws.reading(row.source_v) : volts[k];
+    r.voltage_v.edit()[k] = std::isfinite(row.source_v) ? laws.reading(row.source_v) : volts[k];
     current_ref_a.push_back(row.current_ref_a());
     voltage_ref_v.push_back(row.voltmeter ? terminal_v[k] : row.source_v);
     within = within && soc[k] > design_limits.soc_lowest && soc[k] < design_limits.soc_highest &&

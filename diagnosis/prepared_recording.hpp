@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "measurement/column.hpp"
+
 namespace bms::diagnosis {
 
 /// An instrument compared with a trusted one over a stretch in which both stood still.
@@ -17,13 +19,14 @@ struct Check {
   double deviation = 1;  ///< standard deviation of read less reference if the hypothesis holds
 };
 
-/// Columns of equal length, time_s ascending. current_a[k]: mean over the interval that ends at time_s[k], > 0 charges.
+/// The columns are those of the recording, except for values that a check has removed. Equal length, time_s ascending.
+/// current_a[k]: mean over the interval that ends at time_s[k], > 0 charges.
 struct PreparedRecording {
   std::string name;
-  std::vector<double> time_s;
-  std::vector<double> current_a;      ///< NaN: no reading
-  std::vector<double> voltage_v;      ///< NaN: no reading, or one that must not be used
-  std::vector<double> temperature_c;  ///< empty: not recorded
+  measurement::Column time_s;
+  measurement::Column current_a;      ///< NaN: no reading
+  measurement::Column voltage_v;      ///< NaN: no reading, or one that must not be used
+  measurement::Column temperature_c;  ///< empty: not recorded
   double initial_soc = 0.5;
   double initial_soc_sigma = 0.005;  ///< its standard deviation
   bool initial_soc_given = true;     ///< by a user; otherwise derived from the first voltage

@@ -70,7 +70,7 @@ void check_dropouts(Record& r, const Cell& cell, RecordingCheck& found) {
     const bool goes_on = k > 0 && !spans.empty() && spans.back().end_s == r.time_s[k - 1];
     if (!goes_on) spans.push_back({r.time_s[k], r.time_s[k]});
     spans.back().end_s = r.time_s[k];
-    r.voltage_v[k] = no_reading;
+    r.voltage_v.edit()[k] = no_reading;
     ++dropped;
   }
   if (dropped > readings_at_most(r)) {
@@ -95,7 +95,7 @@ void check_spikes(Record& r, const Cell& cell, RecordingCheck& found) {
                        std::abs(r.current_a[k + 1] - r.current_a[k]) < still_a;
     if (still && std::abs(after - before) < fault_limits.spike_neighbours_v &&
         std::abs(here - (before + after) / 2) > fault_limits.spike_v) {
-      r.voltage_v[k] = no_reading;
+      r.voltage_v.edit()[k] = no_reading;
       ++spikes;
     }
   }
@@ -162,7 +162,7 @@ void check_stuck_voltage(Record& r, const Cell& cell, RecordingCheck& found) {
     for (std::size_t k = 0; k < r.size(); ++k) {
       for (const model::Span& s : stuck) {
         if (r.time_s[k] <= s.start_s || r.time_s[k] > s.end_s) continue;
-        r.voltage_v[k] = no_reading;
+        r.voltage_v.edit()[k] = no_reading;
         ++removed;
       }
     }

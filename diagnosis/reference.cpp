@@ -17,8 +17,7 @@ struct StillStretch {
 };
 
 /// Consecutive rows with a reference that moves by `still` at most.
-std::vector<StillStretch> stretches(const std::vector<double>& time_s, std::span<const double> reference,
-                                    double still) {
+std::vector<StillStretch> stretches(std::span<const double> time_s, std::span<const double> reference, double still) {
   std::vector<StillStretch> all;
   bool inside = false;
   for (std::size_t k = 0; k < reference.size(); ++k) {
@@ -40,7 +39,7 @@ std::vector<StillStretch> stretches(const std::vector<double>& time_s, std::span
 /// An instrument and its reference.
 struct Channel {
   Check::Channel kind;
-  const std::vector<double>& read;
+  std::span<const double> read;
   std::span<const double> reference;
   double still;
 };
@@ -84,7 +83,7 @@ void average_references(PreparedRecording& r, std::span<const double> current_re
   if (current_ref_a.empty() || voltage_ref_v.empty()) return;
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (current_ref_a[k] == 0 && std::isfinite(voltage_ref_v[k]))
-      r.voltage_v[k] = std::numeric_limits<double>::quiet_NaN();
+      r.voltage_v.edit()[k] = std::numeric_limits<double>::quiet_NaN();
   }
 }
 

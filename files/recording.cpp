@@ -73,7 +73,7 @@ std::optional<double> number(std::string_view text) {
 }
 
 /// One column, in the order of the file.
-struct Column {
+struct FileColumn {
   std::vector<double>* into = nullptr;  ///< nullptr: not used
   std::string name;
   bool sparse = false;  ///< a field may be empty, and is NaN then
@@ -130,16 +130,17 @@ class Parser {
       if (columns_.back().into == nullptr) ignored += (ignored.empty() ? "" : ", ") + in_quotes(columns_.back().name);
       if (more) names.remove_prefix(end + 1);
     }
-    require("time_s", recording_.time_s);
-    require("current_a", recording_.current_a);
-    if (voltage == VoltageColumn::required) require("voltage_v", recording_.voltage_v);
+    require("time_s");
+    require("current_a");
+    if (voltage == VoltageColumn::required) require("voltage_v");
     if (!ignored.empty()) recording_.warnings.push_back({"ignored_column", "columns not used: " + ignored});
   }
 
-  Column column(const std::string& name) {
+  FileColumn column(const std::string& name) {
     struct Known {
       std::string_view name;
-      std::vector<double>& into;
+      measurement::Column& into;
+      bool sparse = false;
     };
     Recording& r = recording_;
     const Known known[] = {{"time_s", r.time_s},
@@ -147,21 +148,22 @@ class Parser {
                            {"voltage_v", r.voltage_v},
                            {"temperature_c", r.temperature_c},
                            {"soc_ref", r.soc_ref},
-                           {"current_ref_a", r.current_ref_a},
-                           {"voltage_ref_v", r.voltage_ref_v}};
-    std::vector<double>* into = nullptr;
+                           {"current_ref_a", r.current_ref_a, true},
+                           {"voltage_ref_v", r.voltage_ref_v, true}};
+    FileColumn found{nullptr, name};
     for (const Known& one : known) {
-      if (one.name == name) into = &one.into;
+      if (one.name == name) found = {&one.into.edit(), name, one.sparse};
     }
-    for (const Column& other : columns_) {
-      if (into != nullptr && other.into == into) refuse("column " + in_quotes(name) + " twice", "each column once");
+    for (const FileColumn& other : columns_) {
+      if (found.into != nullptr && other.into == found.into)
+        refuse("column " + in_quotes(name) + " twice", "each column once");
     }
-    return {into, name, into == &recording_.current_ref_a || into == &recording_.voltage_ref_v};
+    return found;
   }
 
-  void require(const char* name, const std::vector<double>& column) const {
-    for (const Column& c : columns_) {
-      if (c.into == &column) return;
+  void require(const char* name) const {
+    for (const FileColumn& c : columns_) {
+      if (c.name == name) return;
     }
     refuse(fmt::format("no column '{}' in {}", name, in_quotes(line_)), "a header with time_s, current_a, voltage_v");
   }
@@ -170,7 +172,7 @@ class Parser {
     const std::size_t rows =
         rest_.size() / std::max<std::size_t>(rest_.find('\n') == std::string_view::npos ? 1 : rest_.find('\n') + 1, 8) +
         1;
-    for (const Column& c : columns_) {
+    for (const FileColumn& c : columns_) {
       if (c.into != nullptr) c.into->reserve(rows);
     }
   }
@@ -190,7 +192,7 @@ class Parser {
       if (columns_[k].into != nullptr) columns_[k].into->push_back(value(fields.substr(0, length), columns_[k]));
       if (!last) fields.remove_prefix(length + 1);
     }
-    const std::vector<double>& t = recording_.time_s;
+    const measurement::Column& t = recording_.time_s;
     if (std::isnan(t.back())) refuse("time_s is not a number", "a time in seconds");
     if (t.size() > 1 && t.back() < t[t.size() - 2])
       refuse(fmt::format("time goes back from {:g} s to {:g} s", t[t.size() - 2], t.back()),
@@ -199,7 +201,7 @@ class Parser {
       refuse(fmt::format("time_s = {:g}", t.back()), "a recording of less than ten years");
   }
 
-  double value(std::string_view field, const Column& column) {
+  double value(std::string_view field, const FileColumn& column) {
     if (column.sparse && trimmed(field).empty()) return std::numeric_limits<double>::quiet_NaN();
     const auto v = number(field);
     if (!v)
@@ -221,7 +223,7 @@ class Parser {
   std::string_view rest_, line_;
   std::size_t line_number_ = 0;
   char separator_ = ',';
-  std::vector<Column> columns_;
+  std::vector<FileColumn> columns_;
   std::size_t missing_ = 0, first_missing_line_ = 0;
   Recording recording_;
 };

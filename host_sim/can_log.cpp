@@ -121,10 +121,10 @@ CanLog read_can_log(const std::string& path) {
   measurement::Recording& r = log.recording;
   const std::uint64_t begin_us = log.samples.front().time_us;
   for (const measurement::Sample& s : log.samples) {
-    r.time_s.push_back(1e-6 * static_cast<double>(s.time_us - begin_us));
-    r.current_a.push_back(number(s.current_ua, measurement::no_reading, 1e-6));
-    r.voltage_v.push_back(number(s.voltage_uv, measurement::no_reading, 1e-6));
-    r.temperature_c.push_back(number(s.temperature_cdegc, measurement::no_temperature, 1e-2));
+    r.time_s.edit().push_back(1e-6 * static_cast<double>(s.time_us - begin_us));
+    r.current_a.edit().push_back(number(s.current_ua, measurement::no_reading, 1e-6));
+    r.voltage_v.edit().push_back(number(s.voltage_uv, measurement::no_reading, 1e-6));
+    r.temperature_c.edit().push_back(number(s.temperature_cdegc, measurement::no_temperature, 1e-2));
   }
   if (!log.from_the_start)
     r.warnings.push_back(

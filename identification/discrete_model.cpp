@@ -161,7 +161,7 @@ std::vector<Index> some_of(const std::vector<Index>& rows, std::size_t count) {
 std::optional<std::vector<double>> equation_error(const Data& data, const Structure& s,
                                                   const std::vector<double>& filter) {
   // a missing voltage is replaced by the last one, which is sufficient for start values
-  std::vector<double> y = data.voltage_v;
+  std::vector<double> y = data.voltage_v.copy();
   const auto first = std::find_if(y.begin(), y.end(), [](double v) { return std::isfinite(v); });
   double last = *first;
   const double level = s.estimate_offset ? *first : s.offset_v;
@@ -226,7 +226,7 @@ DiscreteModel to_model(const VectorXd& unknowns, const Structure& s) {
   return model;
 }
 
-VectorXd simulate(const DiscreteModel& model, const std::vector<double>& input, Eigen::MatrixXd* jacobian) {
+VectorXd simulate(const DiscreteModel& model, std::span<const double> input, Eigen::MatrixXd* jacobian) {
   const auto& [b, f, nk, offset_v, initial_v] = model;
   if (f.empty()) throw std::invalid_argument("a discrete model needs at least one coefficient in the denominator");
   if (!initial_v.empty() && initial_v.size() != f.size())

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -55,7 +56,7 @@ DiscreteModel to_model(const Eigen::VectorXd& unknowns, const Structure& structu
 /// everything estimated and all nf initial values: b, f, offset, initial. Exact (sensitivity filters), cost about 10
 /// filters for nb = 3, nf = 2. Throws std::invalid_argument when f is empty or initial_v has neither 0 nor nf values.
 /// The output of an unstable model may not be finite.
-Eigen::VectorXd simulate(const DiscreteModel& model, const std::vector<double>& input,
+Eigen::VectorXd simulate(const DiscreteModel& model, std::span<const double> input,
                          Eigen::MatrixXd* jacobian = nullptr);
 
 /// Largest absolute value of the roots of F.

@@ -224,8 +224,8 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
 
 }  // namespace
 
-FitStatistics fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
-                     const std::vector<double>& current_a, double fading) {
+FitStatistics fit_of(std::span<const double> measured_v, const Eigen::VectorXd& simulated_v,
+                     std::span<const double> current_a, double fading) {
   FitStatistics fit;
   FitFigure open_loop, one_step;
   ErrorFigure error;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -80,7 +81,7 @@ model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, 
 FitStatistics validate(const model::CellParameters<>& cell, const DataSet& record, double fading);
 
 /// The figures of a simulation. NaN: not measured.
-FitStatistics fit_of(const std::vector<double>& measured_v, const Eigen::VectorXd& simulated_v,
-                     const std::vector<double>& current_a, double fading);
+FitStatistics fit_of(std::span<const double> measured_v, const Eigen::VectorXd& simulated_v,
+                     std::span<const double> current_a, double fading);
 
 }  // namespace bms::identification

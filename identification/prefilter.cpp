@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t padding = 9;  // three times the number of coefficients, as in scipy.signal.filtfilt
 
-void require_finite(const std::vector<double>& values) {
+void require_finite(std::span<const double> values) {
   if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) {
     throw std::invalid_argument("a value to be filtered is not a finite number");
   }
@@ -33,7 +33,7 @@ void run(const SecondOrderFilter& filter, std::vector<double>& values) {
 }
 
 /// |i| below the threshold, by the median of five samples.
-std::vector<bool> quiet(const std::vector<double>& current_a, double below_a) {
+std::vector<bool> quiet(std::span<const double> current_a, double below_a) {
   std::vector<bool> is_quiet(current_a.size());
   for (std::size_t k = 0; k < current_a.size(); ++k) {
     const std::size_t from = k < 2 ? 0 : k - 2, to = std::min(k + 3, current_a.size());
@@ -46,7 +46,7 @@ std::vector<bool> quiet(const std::vector<double>& current_a, double below_a) {
 
 }  // namespace
 
-double even_step_s(const std::vector<double>& time_s) {
+double even_step_s(std::span<const double> time_s) {
   if (time_s.size() < 2) throw std::invalid_argument("fewer than two samples: no sampling time");
   std::vector<double> steps_s;
   for (std::size_t k = 1; k < time_s.size(); ++k) steps_s.push_back(time_s[k] - time_s[k - 1]);
@@ -71,14 +71,14 @@ SecondOrderFilter butterworth_low_pass(double cutoff_hz, double sample_rate_hz) 
   return {{b0, 2 * b0, b0}, {1, 2 * (squared - 1) / norm, (1 - std::numbers::sqrt2 * warped + squared) / norm}};
 }
 
-std::vector<double> filter_causal(const SecondOrderFilter& filter, const std::vector<double>& values) {
+std::vector<double> filter_causal(const SecondOrderFilter& filter, std::span<const double> values) {
   require_finite(values);
-  std::vector<double> filtered = values;
+  std::vector<double> filtered(values.begin(), values.end());
   if (!filtered.empty()) run(filter, filtered);
   return filtered;
 }
 
-std::vector<double> filter_zero_phase(const SecondOrderFilter& filter, const std::vector<double>& values) {
+std::vector<double> filter_zero_phase(const SecondOrderFilter& filter, std::span<const double> values) {
   if (values.size() <= padding) throw std::invalid_argument("a zero-phase filter needs at least 10 values");
   require_finite(values);
   const std::size_t n = values.size();
@@ -125,7 +125,7 @@ Prefiltered prefilter(const Data& data, const Prefilter& settings) {
   Prefiltered out{data, {}};
   if (settings.remove_offset) {
     out.offset = offset_at_rest(data, settings.rest);
-    for (double& i : out.data.current_a) i -= out.offset.current_a;
+    for (double& i : out.data.current_a.edit()) i -= out.offset.current_a;
   }
   if (settings.phase == Phase::zero) {
     out.data.current_a = filter_zero_phase(filter, out.data.current_a);

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "identification/data.hpp"
@@ -18,7 +19,7 @@ inline constexpr double largest_jitter = 0.01;
 
 /// Median step [s]. Throws std::invalid_argument: fewer than two samples, time that does not rise, jitter above
 /// largest_jitter.
-double even_step_s(const std::vector<double>& time_s);
+double even_step_s(std::span<const double> time_s);
 
 /// (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2), gain 1 at frequency 0.
 struct SecondOrderFilter {
@@ -32,12 +33,12 @@ SecondOrderFilter butterworth_low_pass(double cutoff_hz, double sample_rate_hz);
 
 /// One pass that starts in the steady state of the first value, so that a constant does not change.
 /// Throws std::invalid_argument when a value is not finite.
-std::vector<double> filter_causal(const SecondOrderFilter& filter, const std::vector<double>& values);
+std::vector<double> filter_causal(const SecondOrderFilter& filter, std::span<const double> values);
 
 /// Forward and backward over the values and 9 more at each end, mirrored through the end point. Each pass starts in the
 /// steady state (Gustafsson 1996 discusses the choice; this is the default of scipy.signal.filtfilt). Throws
 /// std::invalid_argument: fewer than 10 values, one not finite.
-std::vector<double> filter_zero_phase(const SecondOrderFilter& filter, const std::vector<double>& values);
+std::vector<double> filter_zero_phase(const SecondOrderFilter& filter, std::span<const double> values);
 
 /// When the current counts as at rest.
 struct RestCriterion {

@@ -1,5 +1,5 @@
 // A recording in memory: current, voltage and temperature over time, one column each. files/recording.hpp reads it from
-// CSV; replay, identification and diagnosis use the same columns.
+// CSV; replay, identification and diagnosis view the same columns (measurement/column.hpp).
 //
 // Row k: current_a is the mean current over the interval that ends at time_s (> 0 charges); voltage_v is sampled at
 // time_s. NaN is a missing reading; time_s has none.
@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "measurement/column.hpp"
 #include "measurement/sample.hpp"
 
 namespace bms::measurement {
@@ -24,14 +25,14 @@ struct Warning {
 };
 
 struct Recording {
-  std::string path;            ///< for messages
-  std::vector<double> time_s;  ///< does not decrease
-  std::vector<double> current_a;
-  std::vector<double> voltage_v;      ///< empty: a profile
-  std::vector<double> temperature_c;  ///< empty: not recorded
-  std::vector<double> soc_ref;        ///< reference state of charge, 0 .. 1; empty: unknown
-  std::vector<double> current_ref_a;  ///< NaN: no reading; empty: no such column
-  std::vector<double> voltage_ref_v;  ///< NaN: no reading; empty: no such column
+  std::string path;  ///< for messages
+  Column time_s;     ///< does not decrease
+  Column current_a;
+  Column voltage_v;      ///< empty: a profile
+  Column temperature_c;  ///< empty: not recorded
+  Column soc_ref;        ///< reference state of charge, 0 .. 1; empty: unknown
+  Column current_ref_a;  ///< NaN: no reading; empty: no such column
+  Column voltage_ref_v;  ///< NaN: no reading; empty: no such column
   std::vector<Warning> warnings;
   double read_mb_per_second = 0;  ///< speed of reading and parsing the file
 

@@ -66,7 +66,7 @@ void check_sign(Recording& r) {
   }
 }
 
-std::size_t count_outside(const std::vector<double>& values, double low, double high) {
+std::size_t count_outside(const Column& values, double low, double high) {
   return static_cast<std::size_t>(
       std::count_if(values.begin(), values.end(), [&](double v) { return v < low || v > high; }));
 }
@@ -79,7 +79,7 @@ void warn_outside(Recording& r, std::size_t count, const std::string& what, doub
 }
 
 void check_voltage(Recording& r, const model::Limits& limits) {
-  const double usual_v = upper_median(r.voltage_v);
+  const double usual_v = upper_median(r.voltage_v.copy());
   if (usual_v > millivolt_factor * limits.voltage_max_v) {
     r.warnings.push_back(
         {"voltage_in_mv",

@@ -98,16 +98,7 @@ struct OperatingLimits {
   Fraction<S> soc_per_as{};                      ///< 1 / (3600 capacity)
 };
 
-/// In the cold, resistances are larger than a cell file says that does not follow the temperature. The filter assumes
-/// this activation energy of them: 30 to 60 kJ/mol for lithium iron phosphate.
-inline constexpr double assumed_activation_j_per_mol = 40'000;
-
-/// The temperature at which the tables are valid.
-template <class S>
-struct ReferenceTemperature {
-  std::int16_t cdegc = 0;
-  Temperature<S> c{};
-  Factor<S> energy_over_rt{};  ///< of assumed_activation_j_per_mol
+Factor<S> energy_over_rt{};  ///< of assumed_activation_j_per_mol
 };
 
 template <class S, std::size_t Max>
@@ -335,12 +326,6 @@ constexpr PlausibleRange plausible_range(const Limits& l) {
   return r;
 }
 
-template <class S>
-constexpr ReferenceTemperature<S> reference_temperature(double c) {
-  return {static_cast<std::int16_t>(100 * c + (c < 0 ? -0.5 : 0.5)), Temperature<S>(c),
-          Factor<S>(mechanism_detail::energy_over_rt(assumed_activation_j_per_mol, c))};
-}
-
 }  // namespace cell_detail
 
 /// Prepares p for scalar S. p has been accepted by first_fault(); Max >= interval_count(p).
@@ -371,7 +356,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
                  Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a),
                  Fraction<S>(1 / capacity_as)};
   cell.plausible = d::plausible_range(p.limits);
-  cell.reference = d::reference_temperature<S>(p.reference_temperature_c);
+  cell.reference = ReferenceTemperature<S>::of(p.reference_temperature_c);
   return cell;
 }
 

@@ -1,6 +1,8 @@
 // The temperature dependence of resistances by Arrhenius, and the temperature of a cell that was not measured.
 #pragma once
 
+#include <cstdint>
+
 #include "arithmetic/exponential.hpp"
 
 namespace bms::model {
@@ -41,5 +43,15 @@ constexpr Real energy_over_rt(const Real& energy_j_per_mol, const Real& referenc
 }
 
 }  // namespace mechanism_detail
+
+/// In the cold, resistances are larger than a cell file says that does not follow the temperature. The filter assumes
+/// this activation energy of them: 30 to 60 kJ/mol for lithium iron phosphate.
+inline constexpr double assumed_activation_j_per_mol = 40'000;
+
+/// The temperature at which the tables are valid.
+template <class S>
+struct ReferenceTemperature {
+  std::int16_t cdegc = 0;
+  Temperature<S> c{};
 
 }  // namespace bms::model

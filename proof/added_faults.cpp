@@ -18,19 +18,20 @@ using measurement::Recording;
 // Each adds a fault of the given amount and returns the sizes that the diagnosis should find.
 
 std::vector<double> add_current_offset(Recording& r, double amount_a) {
-  for (double& i : r.current_a) i += amount_a;
+  for (double& i : r.current_a.edit()) i += amount_a;
   return {amount_a};
 }
 
 std::vector<double> add_current_gain(Recording& r, double amount) {
-  for (double& i : r.current_a) i *= 1 + amount;
+  for (double& i : r.current_a.edit()) i *= 1 + amount;
   return {amount};
 }
 
 /// The current is read some samples late. Size: the delay in seconds.
 std::vector<double> add_skew(Recording& r, double samples) {
   const auto late = static_cast<std::size_t>(samples);
-  for (std::size_t k = r.rows(); k-- > 0;) r.current_a[k] = r.current_a[k >= late ? k - late : 0];
+  std::vector<double>& current_a = r.current_a.edit();
+  for (std::size_t k = r.rows(); k-- > 0;) current_a[k] = current_a[k >= late ? k - late : 0];
   return {samples * r.duration_s() / static_cast<double>(r.rows() - 1)};
 }
 
@@ -38,7 +39,7 @@ std::vector<double> add_skew(Recording& r, double samples) {
 std::vector<double> add_clipping(Recording& r, double limit_a) {
   double excess_a = 0;
   std::size_t count = 0;
-  for (double& i : r.current_a) {
+  for (double& i : r.current_a.edit()) {
     if (std::abs(i) <= limit_a) continue;
     excess_a += std::abs(i) - limit_a;
     ++count;
@@ -51,7 +52,7 @@ std::vector<double> add_clipping(Recording& r, double limit_a) {
 std::vector<double> add_contact_step(Recording& r, double ohm) {
   const double onset_s = std::round((r.time_s.front() + r.time_s.back()) / 2);
   for (std::size_t k = 0; k < r.rows(); ++k) {
-    if (r.time_s[k] >= onset_s) r.voltage_v[k] += ohm * r.current_a[k];
+    if (r.time_s[k] >= onset_s) r.voltage_v.edit()[k] += ohm * r.current_a[k];
   }
   return {ohm, onset_s};
 }
@@ -71,13 +72,13 @@ std::vector<double> add_contact_bursts(Recording& r, double ohm) {
       begin_s = end_s + between(pause_min_s, pause_max_s);
       end_s = begin_s + between(burst_min_s, burst_max_s);
     }
-    if (r.time_s[k] >= begin_s && r.time_s[k] <= end_s) r.voltage_v[k] += ohm * r.current_a[k];
+    if (r.time_s[k] >= begin_s && r.time_s[k] <= end_s) r.voltage_v.edit()[k] += ohm * r.current_a[k];
   }
   return {ohm};
 }
 
 std::vector<double> add_voltage_offset(Recording& r, double amount_v) {
-  for (double& v : r.voltage_v) v += amount_v;
+  for (double& v : r.voltage_v.edit()) v += amount_v;
   return {amount_v};
 }
 

@@ -17,7 +17,7 @@ void add_row(Fitter& fitter, const std::string& filter, const StudyData& part, f
 
 StudyData without_offset(StudyData part) {
   const id::Offset offset = id::offset_at_rest(part.data);
-  for (double& i : part.data.current_a) i -= offset.current_a;
+  for (double& i : part.data.current_a.edit()) i -= offset.current_a;
   return part;
 }
 

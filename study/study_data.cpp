@@ -15,9 +15,9 @@ constexpr double current_noise_a = 0.010, voltage_noise_v = 0.001;
 constexpr double window_margin_soc = 0.001;
 
 void add(StudyData& part, double time_s, double current_a, double voltage_v, double soc) {
-  part.data.time_s.push_back(time_s);
-  part.data.current_a.push_back(current_a);
-  part.data.voltage_v.push_back(voltage_v);
+  part.data.time_s.edit().push_back(time_s);
+  part.data.current_a.edit().push_back(current_a);
+  part.data.voltage_v.edit().push_back(voltage_v);
   part.soc_min = std::min(part.soc_min, soc);
   part.soc_max = std::max(part.soc_max, soc);
 }

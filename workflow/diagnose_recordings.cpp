@@ -35,10 +35,10 @@ std::optional<StartSoc> estimated_start(const measurement::Recording& r, const f
   if (first == r.voltage_v.end()) return std::nullopt;
   measurement::Recording one;
   const auto k = static_cast<std::size_t>(first - r.voltage_v.begin());
-  one.time_s = {0};
-  one.current_a = {r.current_a[k]};
-  one.voltage_v = {r.voltage_v[k]};
-  if (!r.temperature_c.empty()) one.temperature_c = {r.temperature_c[k]};
+  one.time_s = r.time_s.part(k, 1);
+  one.current_a = r.current_a.part(k, 1);
+  one.voltage_v = r.voltage_v.part(k, 1);
+  one.temperature_c = r.temperature_c.part(k, 1);
   const host_sim::EstimateRow row =
       host_sim::run_on_host(cell, measurement::samples(one), std::nullopt, host_sim::ScalarKind::float64).rows.front();
   return StartSoc{row.soc, row.soc_sigma, false};
@@ -85,7 +85,7 @@ RecordingComparison prepared(measurement::Recording r, const std::string& name, 
                                       .time_s = r.time_s,
                                       .current_a = r.current_a,
                                       .voltage_v = r.voltage_v,
-                                      .temperature_c = any_temperature ? r.temperature_c : std::vector<double>{},
+                                      .temperature_c = any_temperature ? r.temperature_c : measurement::Column{},
                                       .initial_soc = start.soc,
                                       .initial_soc_sigma = start.sigma,
                                       .initial_soc_given = start.given,

@@ -35,29 +35,33 @@ double soc_at(const model::OcvTable<double>& ocv, double voltage_v) {
   return best;
 }
 
+/// SOC of each row by coulomb counting; a missing current moves no charge.
+std::vector<double> counted_soc(const measurement::Recording& r, double start, double capacity_ah) {
+  std::vector<double> soc(1, start);
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    const double current_a = std::isfinite(r.current_a[k]) ? r.current_a[k] : 0;
+    soc.push_back(soc.back() + current_a * (r.time_s[k] - r.time_s[k - 1]) / (3'600 * capacity_ah));
+  }
+  return soc;
+}
+
 }  // namespace
 
 IdentificationData identification_data(const measurement::Recording& recording, const DataOptions& options) {
   const std::size_t rows = recording.rows();
   const bool estimate = options.initial.estimate || (!options.initial.value && recording.soc_ref.empty());
   // SOC of each row: the reference if there is one, else by coulomb counting
-  double start = options.initial.value.value_or(
+  const double start = options.initial.value.value_or(
       recording.soc_ref.empty() ? soc_at(options.cell.ocv, recording.voltage_v[0]) : recording.soc_ref[0]);
-  std::vector<double> soc = recording.soc_ref;
-  if (soc.empty() || options.initial.value) {
-    soc.assign(1, start);
-    for (std::size_t k = 1; k < rows; ++k) {
-      const double current_a = std::isfinite(recording.current_a[k]) ? recording.current_a[k] : 0;
-      soc.push_back(soc.back() +
-                    current_a * (recording.time_s[k] - recording.time_s[k - 1]) / (3'600 * options.cell.capacity_ah));
-    }
-  }
+  measurement::Column soc = recording.soc_ref;
+  if (soc.empty() || options.initial.value) soc = counted_soc(recording, start, options.cell.capacity_ah);
   IdentificationData d;
+  const auto within = [&](double at) { return at <= options.window.high && at >= options.window.low; };
   identification::Data& data = d.record.data;
   data.capacity_ah = options.cell.capacity_ah;
   std::size_t first = rows, last = 0, used = 0;
   for (std::size_t k = 0; k < rows; ++k) {
-    if (!(soc[k] <= options.window.high && soc[k] >= options.window.low)) continue;
+    if (!within(soc[k])) continue;
     first = std::min(first, k);
     last = k;
     ++used;
@@ -70,12 +74,13 @@ IdentificationData identification_data(const measurement::Recording& recording, 
                                       options.window.high, options.window.low, least_samples));
   }
   const std::size_t from = estimate ? first : 0;
-  for (std::size_t k = from; k <= last; ++k) {
-    const bool counts = soc[k] <= options.window.high && soc[k] >= options.window.low;
-    data.time_s.push_back(recording.time_s[k]);
-    data.current_a.push_back(recording.current_a[k]);
-    if (!recording.temperature_c.empty()) d.temperature_c.push_back(recording.temperature_c[k]);
-    data.voltage_v.push_back(counts ? recording.voltage_v[k] : std::numeric_limits<double>::quiet_NaN());
+  const std::size_t count = last + 1 - from;
+  data.time_s = recording.time_s.part(from, count);
+  data.current_a = recording.current_a.part(from, count);
+  data.voltage_v = recording.voltage_v.part(from, count);
+  d.temperature_c = recording.temperature_c.part(from, count);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!within(soc[from + k])) data.voltage_v.edit()[k] = std::numeric_limits<double>::quiet_NaN();
   }
   d.record.initial_soc = std::clamp(soc[from], 0.0, 1.0);
   d.record.estimate_initial_soc = estimate;

@@ -29,7 +29,7 @@ struct DataOptions {
 
 struct IdentificationData {
   identification::DataSet record;
-  std::vector<double> temperature_c;  ///< by row of the data set; empty: not recorded
+  measurement::Column temperature_c;  ///< by row of the data set; empty: not recorded
   double soc_min = 1, soc_max = 0;    ///< of the samples that count
 };
 

@@ -304,7 +304,7 @@ id::DataSet without_mechanisms(const files::CellFile& cell, const Identification
   };
   const auto with = simulated(cell.mechanisms), without = simulated({});
   for (std::size_t k = 0; k < record.data.size(); ++k)
-    record.data.voltage_v[k] -= with[k].voltage_v - without[k].voltage_v;
+    record.data.voltage_v.edit()[k] -= with[k].voltage_v - without[k].voltage_v;
   return record;
 }
 

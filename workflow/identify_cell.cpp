@@ -83,7 +83,7 @@ void filter(const IdentifyOptions& options, const std::string& path, id::Data& d
         warnings.push_back(
             {"no_rest", path + ": no rest that shows the offset of the current, so no offset was subtracted"});
       }
-      for (double& i : data.current_a) i -= offset.current_a;
+      for (double& i : data.current_a.edit()) i -= offset.current_a;
     }
     if (options.filter_hz > 0) {
       data.current_a = id::filter_zero_phase(

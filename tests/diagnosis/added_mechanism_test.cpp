@@ -55,9 +55,9 @@ PreparedRecording recording_with_bump(double height_v) {
     const double sign = k / 1'200 % 2 == 0 ? -1 : 1, current_a = k % 90 < 60 ? sign * 6 : 0;
     cell.run(current_a, 25, 1);
     const double apart = std::abs(cell.soc() - 0.5);
-    r.time_s.push_back(k);
-    r.current_a.push_back(current_a + 0.01 * random.normal());
-    r.voltage_v.push_back(cell.voltage_v() + height_v * std::max(0.0, 1 - 20 * apart) + 0.001 * random.normal());
+    r.time_s.edit().push_back(k);
+    r.current_a.edit().push_back(current_a + 0.01 * random.normal());
+    r.voltage_v.edit().push_back(cell.voltage_v() + height_v * std::max(0.0, 1 - 20 * apart) + 0.001 * random.normal());
   }
   return r;
 }

@@ -118,7 +118,7 @@ TEST(Diagnose, WithoutInformationNothingIsTestable) {
   PreparedRecording rest = test::recorded(std::vector<double>(3'000, 0.0), 0.7, 16);
   EXPECT_EQ(diagnose(test::table9(), {}, {rest}).verdict, Verdict::not_testable);
   PreparedRecording constant = test::recorded(std::vector<double>(3'000, -3.0), 0.9, 17);
-  constant.current_a[0] = -3;
+  constant.current_a.edit()[0] = -3;
   const Diagnosis d = diagnose(test::table9(), {}, {constant});
   EXPECT_EQ(d.verdict, Verdict::not_testable);
   EXPECT_EQ(d.not_testable.size(), model::mechanism_count);
@@ -130,7 +130,7 @@ TEST(Diagnose, WithoutInformationNothingIsTestable) {
 /// away for a linear estimate to find them.
 TEST(Diagnose, FindsAnOffsetThatMovesTheKneesFar) {
   PreparedRecording r = test::recorded(test::drive(4, 31), 0.9, 31);
-  for (double& a : r.current_a) a += 0.2;  // 13 % of soc
+  for (double& a : r.current_a.edit()) a += 0.2;  // 13 % of soc
   const Diagnosis d = diagnose(test::table9(), {}, {r});
   ASSERT_FALSE(d.findings.empty());
   std::vector<std::string> set = ids_of(d);
@@ -155,7 +155,7 @@ TEST(Diagnose, AShortEffectIsFoundTogetherWithALargePermanentOne) {
   std::vector<double> gentle = test::drive(2, 34);
   for (double& a : gentle) a *= 0.1;
   PreparedRecording r = test::recorded(gentle, 0.7, 34);
-  for (std::size_t k = r.size() - 1; k > 0; --k) r.voltage_v[k] = r.voltage_v[k - 1] + 0.06;
+  for (std::size_t k = r.size() - 1; k > 0; --k) r.voltage_v.edit()[k] = r.voltage_v[k - 1] + 0.06;
   const Diagnosis d = diagnose(test::table9(), {}, {r});
   EXPECT_EQ(d.findings.size(), 2U);
   EXPECT_THAT(ids_of(d), Contains("channel_skew"));

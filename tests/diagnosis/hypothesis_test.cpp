@@ -20,9 +20,9 @@ model::CellParameters<> without_steps(model::CellParameters<> cell) {
 
 LikelihoodModel plant_likelihood(std::uint64_t seed = 1) {
   PreparedRecording r = test::recorded(test::drive(1, seed), 0.7, seed);
-  r.temperature_c.assign(r.size(), 15.0);
+  r.temperature_c = std::vector<double>(r.size(), 15.0);
   for (std::size_t k = 0; k < r.size(); ++k)
-    r.temperature_c[k] += 10.0 * static_cast<double>(k) / static_cast<double>(r.size());
+    r.temperature_c.edit()[k] += 10.0 * static_cast<double>(k) / static_cast<double>(r.size());
   return {without_steps(test::table9()), {}, {r}, NoiseModel{}};
 }
 

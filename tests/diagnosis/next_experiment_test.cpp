@@ -88,7 +88,7 @@ PreparedRecording with_open_contactor(double offset_a) {
   for (std::size_t k = 3'600; k < 5'400; ++k) current_a[k] = 0;
   PreparedRecording r = test::recorded(current_a, 0.7, 31);
   std::vector<double> reference_a(r.size(), std::nan(""));
-  for (std::size_t k = 0; k < r.size(); ++k) r.current_a[k] += offset_a;
+  for (std::size_t k = 0; k < r.size(); ++k) r.current_a.edit()[k] += offset_a;
   for (std::size_t k = 3'600; k < 5'400; ++k) reference_a[k] = 0;
   average_references(r, reference_a, {}, test::table9());
   return r;
@@ -115,7 +115,7 @@ TEST(Reference, VoltageChecksDistinguishAnOffsetFromAGainAndAContact) {
   for (std::size_t k = 600; k < 1'800; ++k) {
     reference_a[k] = 0;
     reference_v[k] = k / 120 % 2 == 0 ? 2.5 : 3.6;
-    r.voltage_v[k] = reference_v[k] + 0.01;
+    r.voltage_v.edit()[k] = reference_v[k] + 0.01;
   }
   average_references(r, reference_a, reference_v, test::table9());
   EXPECT_TRUE(std::isnan(r.voltage_v[700])) << "a source's voltage is not the cell's";

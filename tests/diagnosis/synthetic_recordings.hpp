@@ -47,10 +47,10 @@ inline diagnosis::PreparedRecording recorded(const std::vector<double>& current_
   r.initial_soc = initial_soc;
   for (std::size_t k = 0; k < current_a.size(); ++k) {
     cell.run(current_a[k], 25, 1);
-    r.time_s.push_back(static_cast<double>(k));
-    r.current_a.push_back(current_a[k] + 0.01 * random.normal());
-    r.voltage_v.push_back(cell.voltage_v() + (add_v ? add_v(k, current_a[k], cell.soc()) : 0) +
-                          0.001 * random.normal());
+    r.time_s.edit().push_back(static_cast<double>(k));
+    r.current_a.edit().push_back(current_a[k] + 0.01 * random.normal());
+    r.voltage_v.edit().push_back(cell.voltage_v() + (add_v ? add_v(k, current_a[k], cell.soc()) : 0) +
+                                 0.001 * random.normal());
   }
   return r;
 }

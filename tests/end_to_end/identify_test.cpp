@@ -192,7 +192,8 @@ std::string recording_at(const std::string& folder, double temperature_c) {
   std::string profile = "time_s,current_a,temperature_c\n";
   for (int k = 0; k < 5'400; ++k) {
     const int minute = k / 60 % 6;
-    const double current_a = minute < 2 ? -4 : minute == 3 ? 3 : 0;
+    constexpr double minutes_a[] = {-4, -4, 0, 3, 0, 0};
+    const double current_a = minutes_a[minute];
     profile += fmt::format("{},{},{}\n", k, current_a, temperature_c);
   }
   const std::string name = fmt::format("{}/at_{:.0f}", folder, temperature_c);

@@ -30,12 +30,12 @@ measurement::Recording troubled(measurement::Recording r, const Trouble& t) {
         std::find_if(r.soc_ref.begin(), r.soc_ref.end(), [&](double s) { return s < *t.from_soc; }) -
         r.soc_ref.begin());
   for (auto* column : {&r.time_s, &r.current_a, &r.voltage_v, &r.temperature_c, &r.soc_ref}) {
-    if (!column->empty()) column->erase(column->begin(), column->begin() + static_cast<std::ptrdiff_t>(first));
+    *column = column->part(first, column->size());
   }
   const double start_s = r.time_s.front();
-  for (double& s : r.time_s) s -= start_s;
-  for (double& a : r.current_a) a = a * t.gain + t.offset_a;
-  for (double& v : r.voltage_v) v += t.offset_v;
+  for (double& s : r.time_s.edit()) s -= start_s;
+  for (double& a : r.current_a.edit()) a = a * t.gain + t.offset_a;
+  for (double& v : r.voltage_v.edit()) v += t.offset_v;
   return r;
 }
 

@@ -301,10 +301,8 @@ std::string identification_speed() {
   const files::CellFile cell = files::read_cell("table9");
   const measurement::Recording recording = files::read_recording(shift);
   id::DataSet r;
-  r.data = {{recording.time_s.begin(), recording.time_s.begin() + samples_used},
-            {recording.current_a.begin(), recording.current_a.begin() + samples_used},
-            {recording.voltage_v.begin(), recording.voltage_v.begin() + samples_used},
-            6};
+  r.data = {recording.time_s.part(0, samples_used), recording.current_a.part(0, samples_used),
+            recording.voltage_v.part(0, samples_used), 6};
   r.initial_soc = 0.98;
   r.estimate_initial_soc = true;
   r.initial_soc_sigma = 0.01;

@@ -21,9 +21,9 @@ Data irregular(std::size_t samples) {
   d.capacity_ah = 6;
   double time_s = 0;
   for (std::size_t k = 0; k < samples; ++k) {
-    d.time_s.push_back(time_s);
-    d.current_a.push_back(k == 0 ? 0 : 6 * uniform(random) - 2);
-    d.voltage_v.push_back(3.2 + 0.05 * uniform(random));
+    d.time_s.edit().push_back(time_s);
+    d.current_a.edit().push_back(k == 0 ? 0 : 6 * uniform(random) - 2);
+    d.voltage_v.edit().push_back(3.2 + 0.05 * uniform(random));
     time_s += 1 + 30 * (1 + uniform(random));
   }
   return d;
@@ -63,7 +63,7 @@ TEST(GreyBox, DerivativesAreDifferencesOfTheSimulation) {
   first.initial_soc = 0.86;
   first.estimate_initial_soc = true;
   first.initial_soc_sigma = 0.02;
-  first.data.voltage_v[17] = std::nan("");
+  first.data.voltage_v.edit()[17] = std::nan("");
   second.data = irregular(120);
   second.initial_soc = 0.4;
   const GreyBox grey_box(cell, {first, second}, options);

@@ -128,9 +128,9 @@ TEST(Identify, InitialSocOnASlopeIsIdentified) {
 TEST(Identify, RejectsARestAndNamesTheExperimentThatIsNeeded) {
   DataSet r;
   for (int k = 0; k < 600; ++k) {
-    r.data.time_s.push_back(k);
-    r.data.current_a.push_back(0.001 * (k % 2));
-    r.data.voltage_v.push_back(3.3);
+    r.data.time_s.edit().push_back(k);
+    r.data.current_a.edit().push_back(0.001 * (k % 2));
+    r.data.voltage_v.edit().push_back(3.3);
   }
   r.data.capacity_ah = 6;
   GreyBoxOptions options;
@@ -162,7 +162,7 @@ TEST(Identify, OnePulseWithoutARestGivesAWarning) {
 TEST(Identify, AnInvertedCurrentEndsAtABoundAndGivesAWarning) {
   const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.5);
   DataSet r = record_of(run, 0.5);
-  for (double& i : r.data.current_a) i = -i;
+  for (double& i : r.data.current_a.edit()) i = -i;
   GreyBoxOptions options;
   options.soc_nodes = {0.5};
   const Identification found = identify_grey_box(table9(), {r}, options, Method::trust_region_reflective);
