@@ -1,8 +1,7 @@
 // A cell prepared for stepping with one scalar: the tables of its file merged into one row of SOC intervals, with
 // everything that a step needs, and the noise figures in the units of the filter.
 //
-//   soc in [start of interval k, start of interval k + 1):  t = (soc - start) * per_width,
-//                                                           value = value at start + t * delta
+//   soc in [start of interval k, start of k + 1):  t = (soc - start) * per_width, value = value at start + t * delta
 //
 // per_width is the smallest power of two not below 1 / width: a shift in integers. t is below 2; delta is the change of
 // a value while t goes from 0 to 1.
