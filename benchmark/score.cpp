@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "measurement/statistics.hpp"
+
 namespace bms::benchmark {
 
 namespace {
@@ -150,10 +152,7 @@ Score score(const std::vector<Outcome>& outcomes) {
   }
   s.named = calibration.count();
   s.calibration_error = calibration.error();
-  if (!overlaps.empty()) {
-    std::sort(overlaps.begin(), overlaps.end());
-    s.median_overlap = overlaps[overlaps.size() / 2];
-  }
+  if (!overlaps.empty()) s.median_overlap = measurement::upper_median(overlaps);
   s.mean_set_size = s.in_set.of > 0 ? set_sizes / static_cast<double>(s.in_set.of) : 0;
   s.mean_wall_s = outcomes.empty() ? 0 : wall_s / static_cast<double>(outcomes.size());
   return s;

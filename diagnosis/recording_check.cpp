@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "diagnosis/thresholds.hpp"
+#include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
@@ -173,9 +174,7 @@ void check_stuck_voltage(Record& r, const Cell& cell, RecordingCheck& found) {
 
 /// Gaps under load: charge that flowed in them was not counted.
 void check_gaps(Record& r, const Cell& cell, RecordingCheck& found) {
-  std::vector<double> steps_s;
-  for (std::size_t k = 1; k < r.size(); ++k) steps_s.push_back(r.time_s[k] - r.time_s[k - 1]);
-  const double usual_step_s = measurement::upper_median(steps_s);
+  const double usual_step_s = measurement::upper_median(measurement::time_steps(r.time_s));
   const auto load_a = [&](std::size_t k) { return std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0; };
   std::vector<model::Span> gaps;
   double lost_soc = 0;
@@ -201,20 +200,10 @@ void check_gaps(Record& r, const Cell& cell, RecordingCheck& found) {
 
 /// At edges of the current the voltage must follow.
 void check_sign(Record& r, const Cell& cell, RecordingCheck& found) {
-  double together = 0, current2 = 0, voltage2 = 0;
-  std::size_t edges = 0, against = 0;
-  for (std::size_t k = 1; k < r.size(); ++k) {
-    const double di = r.current_a[k] - r.current_a[k - 1], dv = r.voltage_v[k] - r.voltage_v[k - 1];
-    if (!std::isfinite(di) || !std::isfinite(dv) || std::abs(di) < fault_limits.edge_c * cell.capacity_ah) continue;
-    together += di * dv;
-    current2 += di * di;
-    voltage2 += dv * dv;
-    ++edges;
-    against += di * dv < 0 ? 1 : 0;
-  }
-  if (edges >= fault_limits.edges_for_sign &&
-      together < fault_limits.inverted_correlation * std::sqrt(current2 * voltage2) &&
-      against > edges * fault_limits.inverted_edges / fault_limits.inverted_of) {
+  const measurement::StepCorrelation edges =
+      measurement::step_correlation(r.current_a, r.voltage_v, fault_limits.edge_c * cell.capacity_ah);
+  if (edges.steps >= fault_limits.edges_for_sign && edges.product < fault_limits.inverted_correlation * edges.limit &&
+      edges.opposed > edges.steps * fault_limits.inverted_edges / fault_limits.inverted_of) {
     found.faults.push_back(
         {"current_inverted",
          "The voltage falls where the current rises, so the sign of the current is inverted. Charging "

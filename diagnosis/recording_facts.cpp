@@ -7,6 +7,7 @@
 
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
@@ -49,17 +50,17 @@ class Turns {
 /// Is the largest current reached often enough, in visits apart from each other?
 std::optional<double> rail_a(double largest_a, double capacity_ah, std::span<const PreparedRecording> records) {
   if (largest_a < fact_limits.rail_c * capacity_ah) return std::nullopt;
-  std::size_t near = 0, runs = 0;
+  std::size_t near = 0, visits = 0;
   for (const PreparedRecording& r : records) {
-    bool inside = false;
-    for (const double a : r.current_a) {
-      const bool now = std::isfinite(a) && std::abs(a) > fact_limits.rail_share * largest_a;
-      near += now ? 1 : 0;
-      runs += now && !inside ? 1 : 0;
-      inside = now;
+    const auto at_rail = [&](std::size_t k) {
+      return std::isfinite(r.current_a[k]) && std::abs(r.current_a[k]) > fact_limits.rail_share * largest_a;
+    };
+    for (const measurement::Rows& visit : measurement::consecutive_rows(r.size(), at_rail)) {
+      near += visit.size();
+      ++visits;
     }
   }
-  return near >= fact_limits.rail_rows && runs >= fact_limits.rail_runs ? std::optional(largest_a) : std::nullopt;
+  return near >= fact_limits.rail_rows && visits >= fact_limits.rail_runs ? std::optional(largest_a) : std::nullopt;
 }
 
 /// All that follows from the counted charge of one recording.

@@ -8,6 +8,7 @@
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "hal/sample_frames.hpp"
 #include "hil/load_profile.hpp"
+#include "measurement/statistics.hpp"
 #include "protection/contactors.hpp"
 
 namespace bms::hil {
@@ -60,7 +61,7 @@ double clamp_to_allowed(double wanted_a, const can::AllowedCurrent& allowed) {
 class SocErrors {
  public:
   void add(double error, double sigma) {
-    squares_ += error * error;
+    errors_.add(error);
     if (std::abs(error) <= 2 * sigma) ++inside_;
     if (std::abs(error) > std::max(3 * sigma, soc_tolerance)) ++wrong_;
     largest_ = std::max(largest_, std::abs(error));
@@ -72,15 +73,14 @@ class SocErrors {
     result.soc_max_error = largest_;
     if (sigmas_.empty()) return;
     const auto count = static_cast<double>(sigmas_.size());
-    result.soc_rmse = std::sqrt(squares_ / count);
+    result.soc_rmse = errors_.root();
     result.within_2_sigma = static_cast<double>(inside_) / count;
-    const auto middle = sigmas_.begin() + static_cast<std::ptrdiff_t>(sigmas_.size() / 2);
-    std::nth_element(sigmas_.begin(), middle, sigmas_.end());
-    result.median_sigma = static_cast<double>(*middle);
+    result.median_sigma = static_cast<double>(measurement::upper_median(sigmas_));
   }
 
  private:
-  double squares_ = 0, largest_ = 0;
+  measurement::MeanSquare errors_;
+  double largest_ = 0;
   std::uint64_t inside_ = 0, wrong_ = 0;
   std::vector<float> sigmas_;
 };

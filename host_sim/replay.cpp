@@ -188,7 +188,7 @@ SocFigures soc_figures(const ReplayResult& result) {
 }
 
 VoltageFigures voltage_figures(const ReplayResult& result) {
-  const std::vector<double>& measured_v = result.recording.voltage_v;
+  const measurement::Column& measured_v = result.recording.voltage_v;
   const std::vector<EstimateRow>& rows = result.track.rows;
   identification::ErrorFigure prediction, open_loop;
   identification::FitFigure fit;

@@ -64,7 +64,7 @@ struct Gridded {
 };
 
 /// A grid point gets the mean of the samples within one step of it, weighted by their distance.
-Gridded gridded(const Data& d, const std::vector<double>& soc, double largest_a) {
+Gridded gridded(const Data& d, const measurement::Column& soc, double largest_a) {
   Gridded g;
   g.first = d.size();
   for (std::size_t k = 1; k < d.size(); ++k) {
@@ -108,7 +108,7 @@ Run on_grid(const SlowRun& slow) {
   if (d.size() < fewest_samples) throw std::invalid_argument("an OCV recording with fewer than 100 samples");
   const Moved moved = moved_charge(d);
   require_slow_run(moved);
-  const std::vector<double> soc = slow.soc.empty() ? counted_soc(d, moved) : slow.soc;
+  const measurement::Column soc = slow.soc.empty() ? measurement::Column(counted_soc(d, moved)) : slow.soc;
   const Gridded g = gridded(d, soc, moved.largest_a);
   const auto [lowest, highest] = std::minmax_element(soc.begin(), soc.end());
   if (g.first >= g.last || *highest - *lowest < least_coverage)

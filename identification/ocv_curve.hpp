@@ -16,7 +16,7 @@ namespace bms::identification {
 struct SlowRun {
   Data data;
   /// SOC of each sample; empty: counted, from 1 to 0 for a discharge and from 0 to 1 for a charge.
-  std::vector<double> soc;
+  measurement::Column soc;
 };
 
 /// Voltages on an even grid of SOC from 0 to 1.

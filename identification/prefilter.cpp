@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::identification {
@@ -48,8 +49,7 @@ std::vector<bool> quiet(std::span<const double> current_a, double below_a) {
 
 double even_step_s(std::span<const double> time_s) {
   if (time_s.size() < 2) throw std::invalid_argument("fewer than two samples: no sampling time");
-  std::vector<double> steps_s;
-  for (std::size_t k = 1; k < time_s.size(); ++k) steps_s.push_back(time_s[k] - time_s[k - 1]);
+  const std::vector<double> steps_s = measurement::time_steps(time_s);
   if (!std::all_of(steps_s.begin(), steps_s.end(), [](double s) { return s > 0 && std::isfinite(s); }))
     throw std::invalid_argument("time does not rise from sample to sample");
   const double step_s = measurement::upper_median(steps_s);
@@ -99,19 +99,15 @@ Offset offset_at_rest(const Data& data, const RestCriterion& criterion) {
   const std::vector<bool> is_quiet = quiet(data.current_a, criterion.current_c_rate * data.capacity_ah);
   Offset offset;
   double sum = 0, squares = 0;
-  for (std::size_t begin = 0; begin < data.size(); ++begin) {
-    if (!is_quiet[begin]) continue;
-    std::size_t end = begin;
-    while (end < data.size() && is_quiet[end]) ++end;
-    if (data.time_s[end - 1] - data.time_s[begin] >= criterion.duration_s) {
-      // the median counts one or two samples of a load as quiet, so two at each end are left out
-      for (std::size_t k = begin + 2; k + 2 < end; ++k) {
-        sum += data.current_a[k];
-        squares += data.current_a[k] * data.current_a[k];
-        ++offset.samples;
-      }
+  const auto quiet_at = [&](std::size_t k) { return is_quiet[k]; };
+  for (const auto& [begin, end] : measurement::consecutive_rows(data.size(), quiet_at)) {
+    if (data.time_s[end - 1] - data.time_s[begin] < criterion.duration_s) continue;
+    // the median counts one or two samples of a load as quiet, so two at each end are left out
+    for (std::size_t k = begin + 2; k + 2 < end; ++k) {
+      sum += data.current_a[k];
+      squares += data.current_a[k] * data.current_a[k];
+      ++offset.samples;
     }
-    begin = end;
   }
   if (offset.samples == 0) return offset;
   const double n = static_cast<double>(offset.samples);

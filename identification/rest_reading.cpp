@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "identification/decay_fit.hpp"
+#include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::identification {
@@ -213,14 +214,13 @@ void require_recording(const Data& data) {
 class RestSearch {
  public:
   RestSearch(const Data& data, const RestReadingOptions& options)
-      : data_(data),
-        options_(options),
-        load_a_(options.load_c_rate * data.capacity_ah),
-        rest_a_(options.rest_c_rate * data.capacity_ah) {
-    for (std::size_t k = 1; k < data.size(); ++k) {
-      any_load_ = any_load_ || loaded(k);
-      if (!resting(k) || resting(k - 1)) continue;
-      if (const auto rest = rest_from(k)) rests_.push_back(*rest);
+      : data_(data), options_(options), load_a_(options.load_c_rate * data.capacity_ah) {
+    const double rest_a = options.rest_c_rate * data.capacity_ah;
+    for (std::size_t k = 1; k < data.size(); ++k) any_load_ = any_load_ || loaded(k);
+    const auto resting = [&](std::size_t k) { return std::abs(data.current_a[k]) < rest_a; };
+    for (const measurement::Rows& rows : measurement::consecutive_rows(data.size(), resting)) {
+      if (rows.begin == 0) continue;  // no load before it
+      if (const auto rest = rest_after_load(rows)) rests_.push_back(*rest);
     }
   }
 
@@ -229,16 +229,14 @@ class RestSearch {
 
  private:
   bool loaded(std::size_t k) const { return std::abs(data_.current_a[k]) >= load_a_; }
-  bool resting(std::size_t k) const { return std::abs(data_.current_a[k]) < rest_a_; }
   bool same(std::size_t one, std::size_t other) const {
     return std::abs(data_.current_a[one] - data_.current_a[other]) < options_.steady * std::abs(data_.current_a[other]);
   }
 
-  /// The rest that begins with sample k. Before it there are two steady loaded samples, and possibly one more that
-  /// contains the step: its mean current gives the instant. Empty: too short, or no steady load.
-  std::optional<Rest> rest_from(std::size_t k) const {
-    Rest rest{k - 1, k, k, data_.time_s[k - 1]};
-    while (rest.end < data_.size() && resting(rest.end)) ++rest.end;
+  /// The rest in these rows. Before it there are two steady loaded samples, and possibly one more that contains the
+  /// step: its mean current gives the instant. Empty: too short, or no steady load.
+  std::optional<Rest> rest_after_load(const measurement::Rows& rows) const {
+    Rest rest{rows.begin - 1, rows.begin, rows.end, data_.time_s[rows.begin - 1]};
     if (data_.time_s[rest.end - 1] - rest.step_s < options_.duration_s) return std::nullopt;
     const std::size_t last = rest.loaded;
     if (last >= 2 && loaded(last - 1) && same(last - 2, last - 1)) {
@@ -256,7 +254,7 @@ class RestSearch {
 
   const Data& data_;
   const RestReadingOptions& options_;
-  const double load_a_, rest_a_;
+  const double load_a_;
   bool any_load_ = false;
   std::vector<Rest> rests_;
 };

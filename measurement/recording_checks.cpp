@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::measurement {
@@ -51,15 +52,8 @@ void check_time(Recording& r) {
 
 /// The voltage of a cell rises where its current rises. If it falls, the recording has the other sign convention.
 void check_sign(Recording& r) {
-  double product = 0, current2 = 0, voltage2 = 0;
-  for (std::size_t k = 1; k < r.voltage_v.size(); ++k) {
-    const double di = r.current_a[k] - r.current_a[k - 1], dv = r.voltage_v[k] - r.voltage_v[k - 1];
-    if (std::isnan(di) || std::isnan(dv)) continue;
-    product += di * dv;
-    current2 += di * di;
-    voltage2 += dv * dv;
-  }
-  if (product < inverted_correlation * std::sqrt(current2 * voltage2) && product < 0) {
+  const StepCorrelation all = step_correlation(r.current_a, r.voltage_v, 0);
+  if (all.product < inverted_correlation * all.limit && all.product < 0) {
     r.warnings.push_back({"current_inverted",
                           "the voltage falls where the current rises: the sign of the current looks inverted, "
                           "expected current_a > 0 while charging"});

@@ -97,9 +97,6 @@ struct OperatingLimits {
   Fraction<S> soc_per_as{};                      ///< 1 / (3600 capacity)
 };
 
-Factor<S> energy_over_rt{};  ///< of assumed_activation_j_per_mol
-};
-
 template <class S, std::size_t Max>
 struct Cell {
   using Scalar = S;

@@ -53,5 +53,12 @@ template <class S>
 struct ReferenceTemperature {
   std::int16_t cdegc = 0;
   Temperature<S> c{};
+  Factor<S> energy_over_rt{};  ///< of assumed_activation_j_per_mol
+
+  static constexpr ReferenceTemperature of(double c) {
+    return {static_cast<std::int16_t>(100 * c + (c < 0 ? -0.5 : 0.5)), Temperature<S>(c),
+            Factor<S>(mechanism_detail::energy_over_rt(assumed_activation_j_per_mol, c))};
+  }
+};
 
 }  // namespace bms::model

@@ -76,14 +76,11 @@ Value edge_resistance_ohm(const measurement::Recording& r) {
                       std::sqrt(static_cast<double>(ratios.size()))};
 }
 
-std::vector<Rows> rests(const measurement::Recording& r, double at_least_s) {
-  std::vector<Rows> list;
-  for (std::size_t k = 0; k < r.rows();) {
-    std::size_t end = k;
-    while (end < r.rows() && std::abs(r.current_a[end]) < rest_a) ++end;
-    if (end > k && r.time_s[end - 1] - r.time_s[k] >= at_least_s) list.push_back({k, end});
-    k = std::max(k + 1, end);
-  }
+std::vector<measurement::Rows> rests(const measurement::Recording& r, double at_least_s) {
+  const auto resting = [&](std::size_t k) { return std::abs(r.current_a[k]) < rest_a; };
+  std::vector<measurement::Rows> list = measurement::consecutive_rows(r.rows(), resting);
+  std::erase_if(
+      list, [&](const measurement::Rows& rest) { return r.time_s[rest.end - 1] - r.time_s[rest.begin] < at_least_s; });
   return list;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "measurement/recording.hpp"
+#include "measurement/spans.hpp"
 #include "proof/findings.hpp"
 #include "workflow/diagnosis_result.hpp"
 
@@ -32,11 +33,8 @@ double slow_current_a(const measurement::Recording& r);
 /// 1.5 s, with the standard error of that median.
 Value edge_resistance_ohm(const measurement::Recording& r);
 
-struct Rows {
-  std::size_t begin = 0, end = 0;
-};
 /// Rests, |current| < 20 mA, of at least that duration.
-std::vector<Rows> rests(const measurement::Recording& r, double at_least_s);
+std::vector<measurement::Rows> rests(const measurement::Recording& r, double at_least_s);
 
 /// The current that is read while none flows and the channel is on. In the rests of the cycler itself the channel is
 /// off and reads exactly 0.

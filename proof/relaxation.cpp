@@ -25,12 +25,12 @@ class Relaxation : public Procedure {
     add_named(e, named_, {{"recording", stem(diagnosed_)}}, r);
     const workflow::RecordingComparison c = lab.scored(r, rests_of_);
     std::size_t number = 0;
-    for (const Rows& rest : rests(c.recording, rest_at_least_s_)) claim_rest(c, rest, ++number, e);
+    for (const measurement::Rows& rest : rests(c.recording, rest_at_least_s_)) claim_rest(c, rest, ++number, e);
   }
 
  private:
   /// The voltage relative to the end of the rest, so that the OCV does not matter.
-  void claim_rest(const workflow::RecordingComparison& c, const Rows& rest, std::size_t number,
+  void claim_rest(const workflow::RecordingComparison& c, const measurement::Rows& rest, std::size_t number,
                   ProofExperiment& e) const {
     const std::size_t last = rest.end - 1;
     identification::ErrorFigure before, after;

@@ -61,8 +61,9 @@ files::PageTable fit_table(const workflow::IdentifyResult& r) {
 }
 
 void add_charts(const std::string& name, const id::Data& data, const id::FitStatistics& f, files::PageContent& page) {
-  files::PageChart voltage{name + ": voltage", {"measured, V", "simulated, V"}, data.time_s, {data.voltage_v, {}}};
-  files::PageChart error{name + ": measured minus simulated voltage, mV", {"mV"}, data.time_s, {{}}};
+  files::PageChart voltage{
+      name + ": voltage", {"measured, V", "simulated, V"}, data.time_s.copy(), {data.voltage_v.copy(), {}}};
+  files::PageChart error{name + ": measured minus simulated voltage, mV", {"mV"}, data.time_s.copy(), {{}}};
   for (Eigen::Index k = 0; k < f.error_v.size(); ++k) {
     voltage.columns[1].push_back(data.voltage_v[static_cast<std::size_t>(k)] - f.error_v[k]);
     error.columns[0].push_back(1e3 * f.error_v[k]);

@@ -137,10 +137,10 @@ void add_charts(const ModelFits& best, const StudyData& part, id::FitStatistics 
                 const std::string& error_title, StudyResult& result) {
   files::PageChart voltage{fmt::format("{}: current and voltage", part.name),
                            {"voltage, V", "current / 10, A"},
-                           part.data.time_s,
-                           {part.data.voltage_v, {}}};
+                           part.data.time_s.copy(),
+                           {part.data.voltage_v.copy(), {}}};
   for (const double i : part.data.current_a) voltage.columns[1].push_back(i / 10);
-  files::PageChart error{error_title, {}, part.data.time_s, {}};
+  files::PageChart error{error_title, {}, part.data.time_s.copy(), {}};
   for (std::size_t k = 0; k < models; ++k) {
     if (!best[k].usable) continue;
     const Eigen::VectorXd& e = (best[k].*statistics).error_v;

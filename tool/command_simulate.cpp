@@ -154,12 +154,12 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
 
 files::PageContent page_content(const SimulationRun& run) {
   const measurement::Recording& r = run.recording;
-  files::PageChart voltage{"Voltage, open loop", {"simulated, V"}, r.time_s, {{}}};
-  files::PageChart current{"Current, > 0 charges", {"A"}, r.time_s, {r.current_a}};
-  files::PageChart soc{"State of charge", {"%"}, r.time_s, {{}}};
+  files::PageChart voltage{"Voltage, open loop", {"simulated, V"}, r.time_s.copy(), {{}}};
+  files::PageChart current{"Current, > 0 charges", {"A"}, r.time_s.copy(), {r.current_a.copy()}};
+  files::PageChart soc{"State of charge", {"%"}, r.time_s.copy(), {{}}};
   if (!r.voltage_v.empty()) {
     voltage.labels.push_back("measured, V");
-    voltage.columns.push_back(r.voltage_v);
+    voltage.columns.push_back(r.voltage_v.copy());
   }
   for (const host_sim::SimulatedRow& row : run.rows) {
     voltage.columns[0].push_back(row.voltage_v);

@@ -82,9 +82,9 @@ Data data_of(const DiscreteModel& model, const std::vector<double>& input, doubl
   data.capacity_ah = 6;
   const VectorXd y = simulate(model, input);
   for (std::size_t k = 0; k < input.size(); ++k) {
-    data.time_s.push_back(static_cast<double>(k));
-    data.current_a.push_back(input[k]);
-    data.voltage_v.push_back(y[static_cast<Eigen::Index>(k)] + noise_v * noise(random));
+    data.time_s.edit().push_back(static_cast<double>(k));
+    data.current_a.edit().push_back(input[k]);
+    data.voltage_v.edit().push_back(y[static_cast<Eigen::Index>(k)] + noise_v * noise(random));
   }
   return data;
 }
@@ -344,7 +344,7 @@ TEST(SimulationError, HasExactDerivativesInEveryStructure) {
   } cases[] = {{tf_of_cell(), transfer_function(2.9)}, {oe, output_error()}, {oe_of_cell(), output_error(true)}};
   for (const auto& [model, structure] : cases) {
     Data data = data_of(model, pulses(200), 0.001);
-    data.voltage_v[70] = std::nan("");
+    data.voltage_v.edit()[70] = std::nan("");
     const VectorXd x = to_unknowns(model, structure);
     const LeastSquares problem = simulation_error(data, structure, x);
     ASSERT_EQ(problem.scale.size(), x.size());
@@ -387,17 +387,17 @@ TEST(SimulationError, RejectsInvalidData) {
   const Data good = data_of(tf_of_cell(), pulses(100), 0);
   const VectorXd x = to_unknowns(tf_of_cell(), structure);
   Data bad = good;
-  bad.time_s[50] += 0.2;
+  bad.time_s.edit()[50] += 0.2;
   EXPECT_THROW(simulation_error(bad, structure, x), std::invalid_argument);
   EXPECT_THROW(start_values(bad, structure), std::invalid_argument);
   bad = good;
-  bad.current_a[50] = std::nan("");
+  bad.current_a.edit()[50] = std::nan("");
   EXPECT_THROW(simulation_error(bad, structure, x), std::invalid_argument);
   bad = good;
-  for (std::size_t k = 5; k < 100; ++k) bad.voltage_v[k] = std::nan("");
+  for (std::size_t k = 5; k < 100; ++k) bad.voltage_v.edit()[k] = std::nan("");
   EXPECT_THROW(start_values(bad, structure), std::invalid_argument);
   bad = good;
-  bad.current_a.pop_back();
+  bad.current_a.edit().pop_back();
   EXPECT_THROW(simulation_error(bad, structure, x), std::invalid_argument);
   bad = good;
   bad.current_a.assign(100, -2);

@@ -28,7 +28,7 @@ SlowRun slow_run(bool charges, double noise_v = 0.0005) {
   std::mt19937_64 random(charges ? 1 : 2);
   std::normal_distribution<double> normal;
   for (std::size_t k = 0; k < run.data.size(); ++k)
-    run.data.voltage_v[k] += hysteresis_v(profile[k].current_a) + noise_v * normal(random);
+    run.data.voltage_v.edit()[k] += hysteresis_v(profile[k].current_a) + noise_v * normal(random);
   return {run.data, {}};
 }
 
@@ -56,7 +56,7 @@ TEST(OcvCurve, RejectsRunsThatAreNotSlowOrNotComplete) {
   EXPECT_THROW(ocv_curve({{run_plant(profile, 0.5).data, {}}}), std::invalid_argument);
   EXPECT_THROW(ocv_curve({}), std::invalid_argument);
   SlowRun half = slow_run(false);
-  half.soc.assign(half.data.size(), 0.5);
+  half.soc = std::vector<double>(half.data.size(), 0.5);
   EXPECT_THROW(ocv_curve({half}), std::invalid_argument);
 }
 

@@ -141,7 +141,7 @@ Data rest_load_rest(double offset_a, double noise_a) {
   std::normal_distribution<double> noise(0, 1);
   Data data{evenly(300, 1), {}, std::vector<double>(300, 3.3), 6};
   for (std::size_t k = 0; k < 300; ++k)
-    data.current_a.push_back((k >= 100 && k < 200 ? -6.0 : 0.0) + offset_a + noise_a * noise(random));
+    data.current_a.edit().push_back((k >= 100 && k < 200 ? -6.0 : 0.0) + offset_a + noise_a * noise(random));
   return data;
 }
 
@@ -157,7 +157,7 @@ TEST(Offset, IsTheMeanOverTheRestsWithItsStandardDeviation) {
 TEST(Offset, IgnoresAShortPauseALoadAndASmallCurrentAboveTheThreshold) {
   Data data = rest_load_rest(0.04, 0);
   for (std::size_t k = 0; k < 300; ++k) {
-    if (data.current_a[k] > 0) data.current_a[k] = k < 280 ? 0.2 : 0.04;  // C/30; then 20 s of pause
+    if (data.current_a[k] > 0) data.current_a.edit()[k] = k < 280 ? 0.2 : 0.04;  // C/30; then 20 s of pause
   }
   const Offset offset = offset_at_rest(data);
   EXPECT_EQ(offset.samples, 0U);
@@ -166,7 +166,7 @@ TEST(Offset, IgnoresAShortPauseALoadAndASmallCurrentAboveTheThreshold) {
 
 TEST(Offset, ToleratesASpikeWithinARest) {
   Data data = rest_load_rest(0.04, 0);
-  data.current_a[50] = 0.5;
+  data.current_a.edit()[50] = 0.5;
   EXPECT_EQ(offset_at_rest(data).samples, 192U);
   EXPECT_NEAR(offset_at_rest(data).current_a, 0.04, 0.46 / 192 + 1e-12);
   data.capacity_ah = 0;
@@ -188,19 +188,19 @@ TEST(Prefilter, SubtractsTheOffsetAndReportsIt) {
 
 TEST(Prefilter, CausalDelaysVoltageAndCurrentAlike) {
   Data data = rest_load_rest(0, 0);
-  for (std::size_t k = 0; k < 300; ++k) data.voltage_v[k] = 3.3 + 0.01 * data.current_a[k];
+  for (std::size_t k = 0; k < 300; ++k) data.voltage_v.edit()[k] = 3.3 + 0.01 * data.current_a[k];
   const Prefiltered out = prefilter(data, {.cutoff_hz = 0.05, .phase = Phase::causal});
   for (std::size_t k = 0; k < 300; ++k)
     ASSERT_NEAR(out.data.voltage_v[k], 3.3 + 0.01 * out.data.current_a[k], 1e-12) << k;
   EXPECT_GT(out.data.current_a[100], -3) << "late";
-  data.voltage_v[3] = std::nan("");
+  data.voltage_v.edit()[3] = std::nan("");
   EXPECT_THROW(prefilter(data, {.phase = Phase::causal}), std::invalid_argument);
   EXPECT_NO_THROW(prefilter(data, {.phase = Phase::zero}));
 }
 
 TEST(Prefilter, RejectsUnevenSampling) {
   Data data = rest_load_rest(0, 0);
-  data.time_s[200] += 0.3;
+  data.time_s.edit()[200] += 0.3;
   try {
     prefilter(data, {});
     FAIL();

@@ -49,10 +49,10 @@ Data recording(const Cell& cell, const std::vector<Stretch>& stretches, const Sa
       rest_of_step_s -= part_s;
     }
     const double mean_a = t == 0 ? 0 : (charge_c - before_c) / sampling.step_s, i = stretches[now].current_a;
-    data.time_s.push_back(t);
-    data.current_a.push_back(mean_a + sampling.noise_a * noise(random));
-    data.voltage_v.push_back(cell.ocv_v + cell.slope_v * charge_c / cell.capacity_ah / 3'600 + v_rc +
-                             (t == 0 ? 0 : cell.r0_ohm * i) + sampling.noise_v * noise(random));
+    data.time_s.edit().push_back(t);
+    data.current_a.edit().push_back(mean_a + sampling.noise_a * noise(random));
+    data.voltage_v.edit().push_back(cell.ocv_v + cell.slope_v * charge_c / cell.capacity_ah / 3'600 + v_rc +
+                                    (t == 0 ? 0 : cell.r0_ohm * i) + sampling.noise_v * noise(random));
   }
   return data;
 }
@@ -173,16 +173,16 @@ TEST(RestReading, StandardDeviationsAreWhatRepetitionScatters) {
 
 TEST(RestReading, PassesOverSpikesHolesAndUnevenSamples) {
   Data data = recording({}, ocv_test(-6));
-  for (std::size_t k = 7; k < data.size(); k += 50) data.voltage_v[k] += 0.5;
-  for (std::size_t k = 9; k < data.size(); k += 30) data.voltage_v[k] = std::nan("");
+  for (std::size_t k = 7; k < data.size(); k += 50) data.voltage_v.edit()[k] += 0.5;
+  for (std::size_t k = 9; k < data.size(); k += 30) data.voltage_v.edit()[k] = std::nan("");
   Data thinned;
   thinned.capacity_ah = data.capacity_ah;
   for (std::size_t k = 0; k < data.size(); ++k) {
     const bool resting_long = k % 960 > 500 && k % 3 != 0;  // every third sample of the end of a rest
     if (resting_long) continue;
-    thinned.time_s.push_back(data.time_s[k]);
-    thinned.current_a.push_back(data.current_a[k]);
-    thinned.voltage_v.push_back(data.voltage_v[k]);
+    thinned.time_s.edit().push_back(data.time_s[k]);
+    thinned.current_a.edit().push_back(data.current_a[k]);
+    thinned.voltage_v.edit().push_back(data.voltage_v[k]);
   }
   expect_cell(read_rests(thinned), {}, {0.03, 0.1, 0.15}, "spikes");
 }
@@ -199,7 +199,7 @@ TEST(RestReading, IsNotBiasedByCurrentNoiseOrASmallCurrentAtRest) {
 // One bad rest of five does not move the median; one rest too short for tau does not count for it.
 TEST(RestReading, CombinesTheUsableRestsByTheirMedian) {
   Data data = recording({}, ocv_test(-6, 5));
-  for (std::size_t k = 430; k < 1'000; ++k) data.voltage_v[k] += 0.05 * std::sin(static_cast<double>(k) / 20);
+  for (std::size_t k = 430; k < 1'000; ++k) data.voltage_v.edit()[k] += 0.05 * std::sin(static_cast<double>(k) / 20);
   expect_cell(read_rests(data), {}, {0.03, 0.1, 0.15}, "one of five");
 
   std::vector<Stretch> mixed = ocv_test(-6, 2);
@@ -227,10 +227,10 @@ TEST(RestReading, GivesTheReasonIfThereIsNothingToRead) {
   EXPECT_FALSE(nothing.reason.empty());
 
   Data blind = recording({}, ocv_test(-6));
-  for (double& v : blind.voltage_v) v = std::nan("");
+  for (double& v : blind.voltage_v.edit()) v = std::nan("");
   EXPECT_THAT(read_rests(blind).reason, testing::HasSubstr("too few measured"));
   Data reversed = recording({}, ocv_test(-6));
-  for (double& i : reversed.current_a) i = -i;
+  for (double& i : reversed.current_a.edit()) i = -i;
   EXPECT_THAT(read_rests(reversed).reason, testing::HasSubstr("sign"));
   const RestReadings brief = read_rests(recording({.tau_s = 500}, {{-6, 600}, {0, 35}}));
   EXPECT_THAT(brief.reason, testing::HasSubstr("time constant"));
@@ -243,13 +243,13 @@ TEST(RestReading, RejectsInvalidColumns) {
   bad.capacity_ah = 0;
   EXPECT_THROW(read_rests(bad), std::invalid_argument);
   bad = good;
-  bad.voltage_v.pop_back();
+  bad.voltage_v.edit().pop_back();
   EXPECT_THROW(read_rests(bad), std::invalid_argument);
   bad = good;
-  bad.time_s[5] = bad.time_s[4];
+  bad.time_s.edit()[5] = bad.time_s[4];
   EXPECT_THROW(read_rests(bad), std::invalid_argument);
   bad = good;
-  bad.current_a[5] = std::nan("");
+  bad.current_a.edit()[5] = std::nan("");
   EXPECT_THROW(read_rests(bad), std::invalid_argument);
 }
 
