@@ -34,7 +34,7 @@ class LoadProfile {
   }
 
  private:
-  double interpolated(const std::vector<double>& column, double time_s) const {
+  double interpolated(const measurement::Column& column, double time_s) const {
     if (row_ == 0) return column[0];
     const double from_s = recording_.time_s[row_ - 1] - recording_.time_s.front(),
                  to_s = recording_.time_s[row_] - recording_.time_s.front();
