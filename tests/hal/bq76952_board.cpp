@@ -1,5 +1,8 @@
 #include "tests/hal/bq76952_board.hpp"
 
+#include <cstdio>
+#include <cstdlib>
+
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
 
@@ -8,6 +11,18 @@ namespace bms {
 Bq76952Model* chip = nullptr;
 std::vector<can::Frame> arriving;
 std::vector<hal::PowerPath> switched;
+
+ChipVariant variant_under_test() {
+  const char* wanted = std::getenv("BMS_CHIP_VARIANT");
+  const auto all = all_chip_variants();
+  for (const ChipVariant& variant : all) {
+    if (variant.name == (wanted == nullptr ? "nominal" : wanted)) return variant;
+  }
+  std::printf("BMS_CHIP_VARIANT: %s is not a variant of the chip; expected one of", wanted);
+  for (const ChipVariant& variant : all) std::printf(" %s", variant.name.c_str());
+  std::printf("\n");
+  std::exit(2);
+}
 
 namespace hal {
 I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {

@@ -15,7 +15,7 @@ using ::testing::IsEmpty;
 
 // hal/bq76952/samples.cpp has a single front end for the whole program, so one test covers all of it.
 TEST(Bq76952Samples, ComeEvery100msWithOrWithoutTheChipReceiveRequestsAndSwitchContactors) {
-  Bq76952Model model;
+  Bq76952Model model{variant_under_test()};
   chip = &model;
   model.cell_v.fill(3.3);
   model.stack_v = 52.8;

@@ -114,7 +114,7 @@ class Bq76952 : public ::testing::Test {
     model.violations.clear();
   }
 
-  Bq76952Model model;
+  Bq76952Model model{variant_under_test()};
   FrontEnd front_end{settings};
   measurement::PackSample<16> sample;
 
