@@ -168,8 +168,8 @@ void add_gap_corners(OcvPieces& pieces, const OcvCurve& curve, double error_v, s
       const double off_v =
           std::abs(pieces.half_gap_v[piece] + t * (pieces.half_gap_v[piece + 1] - pieces.half_gap_v[piece]) -
                    curve.half_gap_v[k]);
-      constexpr double narrowest = 0.0025;
-      if (off_v > largest_v && soc - from > narrowest && to - soc > narrowest) {
+      constexpr double least_distance = 0.0025;
+      if (off_v > largest_v && soc - from > least_distance && to - soc > least_distance) {
         largest_v = off_v;
         worst = k;
         before = piece;

@@ -84,7 +84,7 @@ const std::array<Protections::Rule, 14> Protections::rules{{
      [](const Memory& m) { return comparator_us(m[ocd2_delay]); },
      [](const Context& x) { return current_at_least(x.memory, x.measured, ocd_recovery_threshold); },
      common_recovery_us},
-    // Thresholds SLUUCF2C and LibreSolar; delay SLUUBY1B, 13.6.7: 1 is no delay, else (n - 1) x 15 us
+    // Thresholds SLUUCF2C and LibreSolar; delay SLUUBY1B, 13.6.7: 1 means without delay, else (n - 1) x 15 us
     {a, scd,
      [](const Context& x) {
        constexpr std::array<double, 16> mv{10, 20, 40, 60, 80, 100, 125, 150, 175, 200, 250, 300, 350, 400, 450, 500};
