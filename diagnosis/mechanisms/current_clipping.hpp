@@ -25,8 +25,8 @@ struct Knowledge<model::CurrentClipping> : DefaultKnowledge<model::CurrentClippi
                        quantity(s.value[limit], 0, "A"), size_text(s, 0));
   }
   static std::vector<double> probing_shapes(double) { return {0.02, 0.15, 0.5}; }
-  static void adjust_probe(MechanismSetting& probe, const RecordingFacts& facts) {
-    probe.value[limit] = facts.rail_a.value_or(probe.value[limit]);
+  static void adjust_probe(MechanismSetting& probe, const RecordingFacts& seen) {
+    probe.value[limit] = seen.rail_a.value_or(probe.value[limit]);
   }
   static std::optional<std::string> not_testable(const TestConditions& c) {
     if (!c.facts.rail_a) return "the largest current is reached too seldom";

@@ -27,8 +27,8 @@ struct Knowledge<model::CurrentOffset> : DefaultKnowledge<model::CurrentOffset> 
     return fmt::format("the current sensor reads {} too {}", size_text(s, 0), s.value[0] >= 0 ? "high" : "low");
   }
   static std::optional<std::string> not_testable(const TestConditions& c) { return constant_current::too_short(c); }
-  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& facts) {
-    return constant_current::far_starts(model::CurrentOffset::parameters[0], facts);
+  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& seen) {
+    return constant_current::far_starts(model::CurrentOffset::parameters[0], seen);
   }
 };
 

@@ -30,8 +30,8 @@ struct Knowledge<model::Leakage> : DefaultKnowledge<model::Leakage> {
                        size_text(s, 0));
   }
   static std::optional<std::string> not_testable(const TestConditions& c) { return constant_current::too_short(c); }
-  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& facts) {
-    return constant_current::far_starts(model::Leakage::parameters[0], facts);
+  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& seen) {
+    return constant_current::far_starts(model::Leakage::parameters[0], seen);
   }
 };
 

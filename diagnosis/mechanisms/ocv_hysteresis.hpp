@@ -34,8 +34,8 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
         size_text(s, half_gap));
   }
   static std::vector<double> probing_shapes(double) { return {12, 30, 80, 220}; }
-  static void adjust_probe(MechanismSetting& probe, const RecordingFacts& facts) {
-    probe.value[half_gap] = probing_share * model::OcvHysteresis::parameters[half_gap].upper(facts.capacity_ah);
+  static void adjust_probe(MechanismSetting& probe, const RecordingFacts& seen) {
+    probe.value[half_gap] = probing_share * model::OcvHysteresis::parameters[half_gap].upper(seen.capacity_ah);
   }
   /// The signature's strengths are the half gap and its products with the positions.
   static MechanismSetting start(const SignatureFit& s) {

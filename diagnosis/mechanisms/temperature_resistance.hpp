@@ -49,9 +49,9 @@ struct Knowledge<model::TemperatureResistance> : DefaultKnowledge<model::Tempera
                          c.facts.reference_c);
     return std::nullopt;
   }
-  static bool expected(const model::CellParameters<>&, const RecordingFacts& facts) { return facts.away_k > certain_k; }
-  static double prior_gain(const RecordingFacts& facts) {
-    return std::clamp((facts.away_k - prior_from_k) * prior_per_k, 0.0, prior_at_most);
+  static bool expected(const model::CellParameters<>&, const RecordingFacts& seen) { return seen.away_k > certain_k; }
+  static double prior_gain(const RecordingFacts& seen) {
+    return std::clamp((seen.away_k - prior_from_k) * prior_per_k, 0.0, prior_at_most);
   }
 };
 
