@@ -15,6 +15,8 @@ constexpr double gamma = 1 - std::numbers::sqrt2 / 2;
 constexpr double instant_s = 1e-12;
 /// Steps are whole multiples of it, so that sums of times with rounding errors find the stored factors.
 constexpr double tick_s = 1e-10;
+/// Above the rounding errors, so that a diode without current and voltage does not turn on and off.
+constexpr double zero_a = 1e-9, zero_v = 1e-9;
 constexpr int most_diode_turns = 40;
 constexpr std::size_t most_stored = 512;
 
@@ -218,7 +220,7 @@ bool Circuit::turn_diodes() {
   for (Element& element : elements_) {
     if (element.kind != Kind::diode) continue;
     const double across_v = voltage_v(element.from) - voltage_v(element.to);
-    const bool conducts = element.closed ? element.current_a > -1e-12 : across_v > element.emf_v + 1e-9;
+    const bool conducts = element.closed ? element.current_a > -zero_a : across_v > element.emf_v + zero_v;
     if (conducts == element.closed) continue;
     element.closed = conducts;
     state_ ^= std::uint64_t{1} << element.bit;

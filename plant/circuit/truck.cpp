@@ -182,13 +182,12 @@ void Truck::track_peaks() {
 void Truck::advance(double duration_s) {
   constexpr double rounding_s = 1e-10;
   const double end_s = time_s() + duration_s;
-  double step_s = 0;
   for (double rest_s = duration_s; rest_s > rounding_s; rest_s = end_s - time_s()) {
-    update_supplies(step_s);
+    update_supplies(last_step_s_);
     move_contacts();
     update_drive();
     update_charger();
-    step_s = circuit_.step(step_limit_s(rest_s));
+    const double step_s = last_step_s_ = circuit_.step(step_limit_s(rest_s));
     track_peaks();
     update_cells(step_s);
     update_resistor(step_s);

@@ -36,7 +36,7 @@ void build_charger(Circuit& circuit, TruckNetwork& n, const TruckParameters& p) 
   n.charger_plus = circuit.add_node();
   const std::size_t inner = circuit.add_node();
   n.charger_source = circuit.add_current_source(n.l_minus, inner);
-  n.charger_limit = circuit.add(Diode{.from = inner, .to = n.l_minus, .on_ohm = 1e-4});
+  n.charger_limit = circuit.add(Diode{.from = inner, .to = n.l_minus, .on_ohm = 1e-3});
   circuit.add(Diode{.from = inner, .to = n.charger_plus});
   circuit.add(Branch{.from = n.charger_plus,
                      .to = n.l_minus,

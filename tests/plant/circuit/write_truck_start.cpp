@@ -1,5 +1,5 @@
-// Prints a start of the truck as CSV: pre-charge, drive, recuperation, opening. write_start [SEED]; without a seed the
-// components have their typical values.
+// Prints a start of the truck as CSV: pre-charge, drive, recuperation, opening. write_truck_start [SEED]; without a
+// seed the components have their typical values.
 #include <cstdio>
 #include <cstdlib>
 
@@ -12,15 +12,17 @@ using namespace bms::plant;
 void set(ControllerPins& pins, Relay relay, PinLevel level) { pins.relay[static_cast<std::size_t>(relay)] = level; }
 
 void print_header() {
-  std::puts("time_s,b_plus_v,l_plus_v,l_minus_v,dc_link_v,current_a,precharge_a,pc1_v,pc0_v,ld_v,vdda_v,pb14_v,resistor_c,cell_1_v");
+  std::puts(
+      "time_s,b_plus_v,l_plus_v,l_minus_v,dc_link_v,current_a,precharge_a,pc1_v,pc0_v,ld_v,vdda_v,pb14_v,resistor_c,"
+      "cell_1_v");
 }
 
 void print_line(const Truck& truck) {
   const PinVoltages pins = truck.pins();
   const TrueVoltages v = truck.voltages();
-  std::printf("%.5f,%.4f,%.4f,%.4f,%.4f,%.3f,%.4f,%.5f,%.5f,%.4f,%.4f,%.3f,%.2f,%.5f\n", truck.time_s(), v.b_plus_v, v.l_plus_v,
-              v.l_minus_v, v.dc_link_v(), truck.current_a(), truck.contact_a(Relay::precharge), pins.pc1_v, pins.pc0_v,
-              pins.ld_v, pins.vdda_v, pins.pb14_v, truck.precharge_resistor_c(), truck.cell_v(0));
+  std::printf("%.5f,%.4f,%.4f,%.4f,%.4f,%.3f,%.4f,%.5f,%.5f,%.4f,%.4f,%.3f,%.2f,%.5f\n", truck.time_s(), v.b_plus_v,
+              v.l_plus_v, v.l_minus_v, v.dc_link_v(), truck.current_a(), truck.contact_a(Relay::precharge), pins.pc1_v,
+              pins.pc0_v, pins.ld_v, pins.vdda_v, pins.pb14_v, truck.precharge_resistor_c(), truck.cell_v(0));
 }
 
 void run(Truck& truck, double duration_s) {
