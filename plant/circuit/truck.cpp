@@ -97,8 +97,8 @@ void Truck::update_supplies(double duration_s) {
     contactors_[k].set_coil_v(driven ? coil_supply_v : 0);
     coils_a += contactors_[k].coil_a();
   }
-  settled_coil_a_ = coils_a + (settled_coil_a_ - coils_a) / (1 + duration_s / supply.rail_recovery_s);
-  const double new_a = std::max(0.0, coils_a - settled_coil_a_);
+  steady_coil_a_ = coils_a + (steady_coil_a_ - coils_a) / (1 + duration_s / supply.rail_recovery_s);
+  const double new_a = std::max(0.0, coils_a - steady_coil_a_);
   vdda_v_ = std::max(0.0, supply.vdda_v - depth_v(vdda_dips_, time_s()) - supply.rail_ohm * new_a);
   for (std::size_t k = 0; k < 2; ++k) {
     circuit_.set_emf_v(network_.bias[k], vdda_v_);

@@ -126,7 +126,7 @@ class Truck {
   Drive drive_;
   ChargerDemand charger_;
   std::vector<SupplyDip> vdda_dips_, coil_dips_;
-  double vdda_v_, settled_coil_a_ = 0;
+  double vdda_v_, steady_coil_a_ = 0;
   double last_step_s_ = 0;
   double resistor_c_, counted_heat_j_ = 0;
   std::vector<ContactEvent> events_;

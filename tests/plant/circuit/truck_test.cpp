@@ -28,7 +28,7 @@ Truck running(TruckParameters world) {
 }
 
 TEST(Truck, BiasedDividersShowTheVoltagesOfTheDcLink) {
-  const Situation all = settled(typical_world(), 20, {Relay::main_plus});
+  const Situation all = at_rest_after(typical_world(), 20, {Relay::main_plus});
   EXPECT_NEAR(all.plus_v, all.v.l_plus_v, 1e-3);
   EXPECT_NEAR(all.minus_v, all.v.l_minus_v, 1e-3);
   EXPECT_NEAR(all.v.l_minus_v, all.v.b_plus_v - 20, 0.01);

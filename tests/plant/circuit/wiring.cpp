@@ -17,7 +17,7 @@ void weld(Truck& truck, std::initializer_list<Relay> closed) {
   for (const Relay relay : closed) truck.contactor(relay).set_fault(ContactorFault::welded);
 }
 
-Situation settled(TruckParameters world, double start_v, std::initializer_list<Relay> closed) {
+Situation at_rest_after(TruckParameters world, double start_v, std::initializer_list<Relay> closed) {
   world.dc_link.start_v = start_v;
   Truck truck(world);
   weld(truck, closed);

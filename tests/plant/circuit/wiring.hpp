@@ -21,7 +21,7 @@ Situation situation(const Truck& truck);
 void weld(Truck& truck, std::initializer_list<Relay> closed);
 
 /// The contacts in `closed`, and no other, have been closed for 60 ms; the DC link was charged to start_v.
-Situation settled(TruckParameters world, double start_v, std::initializer_list<Relay> closed);
+Situation at_rest_after(TruckParameters world, double start_v, std::initializer_list<Relay> closed);
 
 /// Open-circuit voltage of the battery.
 double battery_v(const TruckParameters& world);

@@ -34,7 +34,7 @@ double floating_plus_v(const TruckParameters& world, double dc_link_v, double vd
 
 TEST(Wiring, AllOpenTheDcLinkFloatsAroundTheBiasOfTheDividers) {
   for_all_worlds([](const TruckParameters& world) {
-    const Situation open = settled(world, world.dc_link.start_v, {});
+    const Situation open = at_rest_after(world, world.dc_link.start_v, {});
     const double expected_v = floating_plus_v(world, open.v.dc_link_v(), world.supply.vdda_v);
     EXPECT_NEAR(open.v.l_plus_v, expected_v, 0.02);  // the open contacts have 10 Gohm
     // Not "at Vc / 2 or less": the bias lifts both, by 1.65 V at most
@@ -45,7 +45,7 @@ TEST(Wiring, AllOpenTheDcLinkFloatsAroundTheBiasOfTheDividers) {
 TEST(Wiring, AClosedOrWeldedContactOfThePositiveSideHoldsLPlusAtBPlus) {
   for_all_worlds([](const TruckParameters& world) {
     for (const Relay relay : {Relay::main_plus, Relay::precharge}) {
-      const Situation one = settled(world, world.dc_link.start_v, {relay});
+      const Situation one = at_rest_after(world, world.dc_link.start_v, {relay});
       EXPECT_NEAR(one.v.l_plus_v, one.v.b_plus_v, 0.02);  // 52 ohm x 0.2 mA
       EXPECT_NEAR(one.v.l_minus_v, one.v.b_plus_v - one.v.dc_link_v(), 0.02);
     }
@@ -54,17 +54,17 @@ TEST(Wiring, AClosedOrWeldedContactOfThePositiveSideHoldsLPlusAtBPlus) {
 
 TEST(Wiring, AClosedOrWeldedMinusContactorHoldsLMinusAtZero) {
   for_all_worlds([](const TruckParameters& world) {
-    const Situation one = settled(world, world.dc_link.start_v, {Relay::main_minus});
+    const Situation one = at_rest_after(world, world.dc_link.start_v, {Relay::main_minus});
     EXPECT_NEAR(one.v.l_minus_v, 0, 1e-6);
     EXPECT_NEAR(one.v.l_plus_v, one.v.dc_link_v(), 1e-6);
-    const Situation with_precharge = settled(world, 0, {Relay::main_minus, Relay::precharge});
+    const Situation with_precharge = at_rest_after(world, 0, {Relay::main_minus, Relay::precharge});
     EXPECT_NEAR(with_precharge.v.l_minus_v, 0, 1e-3);
   });
 }
 
 TEST(Wiring, AnOpenPrechargePathLeavesLPlusFarBelowBPlus) {
   for_all_worlds([](const TruckParameters& world) {
-    const Situation open = settled(world, world.dc_link.start_v, {});
+    const Situation open = at_rest_after(world, world.dc_link.start_v, {});
     EXPECT_LT(open.v.l_plus_v, open.v.b_plus_v / 2 + 1.72);
   });
 }
@@ -72,9 +72,9 @@ TEST(Wiring, AnOpenPrechargePathLeavesLPlusFarBelowBPlus) {
 TEST(Wiring, WithTheDcLinkAtBPlusAllClosedPositionsLookAlike) {
   TruckParameters world = typical_world();
   const double full_v = battery_v(world);
-  const Situation plus = settled(world, full_v, {Relay::main_plus}),
-                  minus = settled(world, full_v, {Relay::main_minus});
-  const Situation precharge = settled(world, full_v, {Relay::precharge});
+  const Situation plus = at_rest_after(world, full_v, {Relay::main_plus}),
+                  minus = at_rest_after(world, full_v, {Relay::main_minus});
+  const Situation precharge = at_rest_after(world, full_v, {Relay::precharge});
   for (const Situation& one : {plus, minus, precharge}) {
     EXPECT_NEAR(one.v.l_plus_v, full_v, 0.02);
     EXPECT_NEAR(one.v.l_minus_v, 0, 0.02);

@@ -42,19 +42,19 @@ void print_statements(double tolerance) {
     const auto add_difference = [](Row& row, double v, double shown_as_v, double expected_v) {
       row.add(v - expected_v, shown_as_v - expected_v);
     };
-    const Situation open = settled(world, start_v, {});
+    const Situation open = at_rest_after(world, start_v, {});
     add_difference(open_plus, open.v.l_plus_v, open.plus_v, open.v.dc_link_v() / 2);
     add_difference(open_minus, open.v.l_minus_v, open.minus_v, -open.v.dc_link_v() / 2);
-    const Situation k1 = settled(world, start_v, {Relay::main_plus});
+    const Situation k1 = at_rest_after(world, start_v, {Relay::main_plus});
     add_difference(main_plus, k1.v.l_plus_v, k1.plus_v, k1.v.b_plus_v);
     add_difference(main_plus_minus, k1.v.l_minus_v, k1.minus_v, k1.v.b_plus_v - k1.v.dc_link_v());
-    const Situation k3 = settled(world, start_v, {Relay::precharge});
+    const Situation k3 = at_rest_after(world, start_v, {Relay::precharge});
     add_difference(precharge, k3.v.l_plus_v, k3.plus_v, k3.v.b_plus_v);
     add_difference(precharge_minus, k3.v.l_minus_v, k3.minus_v, k3.v.b_plus_v - k3.v.dc_link_v());
-    const Situation k2 = settled(world, start_v, {Relay::main_minus});
+    const Situation k2 = at_rest_after(world, start_v, {Relay::main_minus});
     add_difference(minus, k2.v.l_minus_v, k2.minus_v, 0);
     add_difference(minus_plus, k2.v.l_plus_v, k2.plus_v, k2.v.dc_link_v());
-    const Situation k23 = settled(world, start_v, {Relay::main_minus, Relay::precharge});
+    const Situation k23 = at_rest_after(world, start_v, {Relay::main_minus, Relay::precharge});
     add_difference(both, k23.v.l_minus_v, k23.minus_v, 0);
     // K3 is switched on and its relay or its resistor is open; K2 is switched on with K3 and stays open
     add_difference(no_relay, open.v.l_plus_v, open.plus_v, open.v.b_plus_v);
@@ -85,8 +85,8 @@ void print_blind_spots() {
   for (const double ld_ohm : {0.5e6, 1e6, 2e6, 5e6, 1e9}) {
     TruckParameters world = typical_world();
     world.front_end.ld_ohm = ld_ohm;
-    const double empty_v = settled(world, 0, {}).v.l_minus_v;
-    const Situation full = settled(world, 40, {});
+    const double empty_v = at_rest_after(world, 0, {}).v.l_minus_v;
+    const Situation full = at_rest_after(world, 40, {});
     const double slope = (full.v.l_minus_v - empty_v) / full.v.dc_link_v();
     std::printf("| %.1f | %.2f | %.2f | %.2f |\n", ld_ohm / 1e6, empty_v, -empty_v / slope, slope);
   }
