@@ -31,6 +31,7 @@ class Column {
   double operator[](std::size_t row) const { return (*values_)[first_ + row]; }
   double front() const { return *begin(); }
   double back() const { return *(end() - 1); }
+  bool operator==(const Column& other) const { return std::equal(begin(), end(), other.begin(), other.end()); }
 
   /// `count` rows from row `first` on, or fewer at the end. A view: no value is copied.
   Column part(std::size_t first, std::size_t count) const {

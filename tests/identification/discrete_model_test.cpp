@@ -180,8 +180,8 @@ TEST(DiscreteModel, DerivativesAreCentralDifferences) {
 }
 
 TEST(DiscreteModel, RejectsAFreeResponseOfTheWrongLengthAndAnEmptyDenominator) {
-  EXPECT_THROW(simulate({{1}, {}, 0, 0, {}}, {1}), std::invalid_argument);
-  EXPECT_THROW(simulate({{1}, {-1.5, 0.5}, 0, 0, {1}}, {1}), std::invalid_argument);
+  EXPECT_THROW(simulate({{1}, {}, 0, 0, {}}, std::vector{1.0}), std::invalid_argument);
+  EXPECT_THROW(simulate({{1}, {-1.5, 0.5}, 0, 0, {1}}, std::vector{1.0}), std::invalid_argument);
 }
 
 TEST(Poles, AreFoundAndMirrored) {
@@ -253,8 +253,7 @@ TEST(Identification, OfARecordCutOutOfARunComesBackTo1e6) {
   for (const auto& [name, model, structure] : kinds) {
     Data data = data_of(model, pulses(4'000), 0);
     ASSERT_NE(data.current_a[399], 0);
-    for (auto* column : {&data.time_s, &data.current_a, &data.voltage_v})
-      column->erase(column->begin(), column->begin() + 400);
+    for (auto* column : {&data.time_s, &data.current_a, &data.voltage_v}) *column = column->part(400, column->size());
     const VectorXd start = to_unknowns(start_values(data, structure), structure),
                    x = search(simulation_error(data, structure, start), start);
     expect_unknowns(x.head(5), to_unknowns(model, structure).head(5), 1e-6, name);
@@ -400,7 +399,7 @@ TEST(SimulationError, RejectsInvalidData) {
   bad.current_a.edit().pop_back();
   EXPECT_THROW(simulation_error(bad, structure, x), std::invalid_argument);
   bad = good;
-  bad.current_a.assign(100, -2);
+  bad.current_a = std::vector<double>(100, -2);
   EXPECT_THROW(start_values(bad, structure), std::invalid_argument) << "a current that never changes";
   EXPECT_THROW(simulation_error(good, structure, VectorXd::Zero(3)), std::invalid_argument);
 }

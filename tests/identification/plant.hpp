@@ -27,9 +27,9 @@ inline PlantRun run_plant(std::span<const experiments::ProfileRow> profile, doub
   for (const experiments::ProfileRow& row : profile) {
     if (row.time_s > before_s) cell.run(row.current_a, ambient_c, row.time_s - before_s);
     before_s = row.time_s;
-    run.data.time_s.push_back(row.time_s);
-    run.data.current_a.push_back(row.current_a);
-    run.data.voltage_v.push_back(cell.voltage_v());
+    run.data.time_s.edit().push_back(row.time_s);
+    run.data.current_a.edit().push_back(row.current_a);
+    run.data.voltage_v.edit().push_back(cell.voltage_v());
     run.soc.push_back(cell.soc());
     run.soc_min = std::min(run.soc_min, cell.soc());
     run.soc_max = std::max(run.soc_max, cell.soc());
@@ -40,8 +40,8 @@ inline PlantRun run_plant(std::span<const experiments::ProfileRow> profile, doub
 /// White noise on both readings.
 inline Data noisy(Data data, std::mt19937_64& random, double voltage_v = 0.001, double current_a = 0.010) {
   std::normal_distribution<double> normal;
-  for (double& v : data.voltage_v) v += voltage_v * normal(random);
-  for (double& i : data.current_a) i += current_a * normal(random);
+  for (double& v : data.voltage_v.edit()) v += voltage_v * normal(random);
+  for (double& i : data.current_a.edit()) i += current_a * normal(random);
   return data;
 }
 

@@ -132,7 +132,7 @@ TEST(EvenStep, AcceptsOnePercentOfJitter) {
   t[10] = t[9];
   EXPECT_THROW(even_step_s(t), std::invalid_argument) << "time that stands still";
   EXPECT_THROW(even_step_s({}), std::invalid_argument);
-  EXPECT_THROW(even_step_s({1}), std::invalid_argument);
+  EXPECT_THROW(even_step_s(std::vector{1.0}), std::invalid_argument);
 }
 
 /// 100 s rest, 100 s at -6 A, 100 s rest, with a sensor 40 mA off.
