@@ -40,6 +40,49 @@ CLEAN = {
     DIAGNOSE: '#include "files/cell_file.hpp"\n\ndouble half(double x) { return 0.5 * x; }\n',
     "README.md": "The residual is not significant.\n",
 }
+SAFETY_CLEAN = {
+    "protection/faults.hpp": "enum class Fault { hot, cold };  // not: warm\n",
+    "protection/README.md": "<!-- figures: table -->\n"
+    "| bit | fault | raised when | for | released when | for | recovery | reaction | reason |\n"
+    "| 0 | hot | x > 60 | 5 s | x < 50 | 60 s | automatic | open | slow |\n"
+    "| 1 | cold | x < 0 | 5 s | x > 2 | 60 s | automatic | open | slow |\n<!-- end of figures -->\n",
+    "protection/table.hpp": "int rows(int hot, int cold);  // and warm\n",
+    "tests/table_test.cpp": "TEST(Table, IsRight) {}\nTEST_F(Row, Opens) {}\n",
+    "docs/safety/requirements.toml": '[[requirement]]\nid = "SR-01"\ntext = "It opens."\nhazards = ["H-01"]\n'
+    'faults = ["hot", "cold"]\ncode = ["protection/table.hpp:rows"]\ntests = ["Table.IsRight", "Row.Opens"]\n'
+    'assumptions = ["A-01"]\n[[requirement]]\nid = "SR-02"\ntext = "It brakes."\nhazards = ["H-01"]\n'
+    'assumptions = ["A-01"]\nlimits = ["L-01"]\n',
+    "docs/safety/hazards.md": "| H-01 | fire | S2 | F2 | P1 | d | No fire. | open | 60 s |\n",
+    "docs/safety/assumptions.md": "| A-01 | fuse | It melts. |\n| L-01 | It is slow. | late |\n",
+    "docs/safety/failures.md": "| F-01 | wire | none | *hot*, `Row.Opens` | 5 s | open | - |\n",
+    "docs/safety/traceability.md": "".join(f"<!-- figures: {name} -->\n<!-- end of figures -->\n"
+                                          for name in ("rows", "hazards", "requirements")),
+}
+DATA = "docs/safety/requirements.toml"
+SAFETY_BREACHES = [  # file, what is added or replaced, what the check must say
+    ("protection/faults.hpp", ("cold", "cold, stuck"), f"{DATA}:1: no requirement names the fault stuck"),
+    ("protection/faults.hpp", ("cold", "cold, stuck"), "README.md:1: the generated table has no row for stuck"),
+    ("protection/README.md", ("60 |", "65 |"), "docs/safety/traceability.md:1: the table rows is out of date"),
+    ("protection/table.hpp", ("rows", "lines"), f"{DATA}:2: SR-01: protection/table.hpp:rows: rows is not in the code"),
+    ("tests/table_test.cpp", ("IsRight", "IsGood"), f"{DATA}:2: SR-01: Table.IsRight: neither a test"),
+    ("tests/table_test.cpp", ("Opens", "Closes"), "failures.md:1: F-01 names Row.Opens: neither a test"),
+    (DATA, ('"cold"', '"warm"'), f"{DATA}:2: SR-01: names warm, which does not exist among the faults"),
+    (DATA, ('"cold"', '"warm"'), "no requirement names the fault cold"),
+    (DATA, ("table.hpp:rows", "table.hpp:warm"), "warm is not in the code of protection/table.hpp"),
+    (DATA, ("table.hpp:rows", "table.hpp:hot"), "the requirements of the fault cold name only code of other faults"),
+    (DATA, ('code = ["protection/table.hpp:rows"]', "code = []"), f"{DATA}:2: SR-01: has no code"),
+    (DATA, ('tests = ["Table.IsRight", "Row.Opens"]', "tests = []"), f"{DATA}:2: SR-01: has no tests"),
+    (DATA, ('hazards = ["H-01"]\nfaults', 'hazards = []\nfaults'), f"{DATA}:2: SR-01: has no hazard"),
+    (DATA, ('"A-01"]\nlimits', '"A-02"]\nlimits'), f"{DATA}:10: SR-02: names A-02, which does not exist"),
+    (DATA, ('"L-01"', '"L-02"'), f"{DATA}:10: SR-02: names L-02, which does not exist among the limits"),
+    (DATA, ('"SR-02"', '"SR-01"'), "SR-01 is there twice"),
+    (DATA, ('text = "It brakes."', 'text = "It brakes."\nhazard = []'), "SR-02: unknown key hazard"),
+    ("docs/safety/hazards.md", ("| d |", "| c |"), "hazards.md:1: H-01: S2 F2 P1 c: expected S, F, P and PLr d"),
+    ("docs/safety/hazards.md", "| H-02 | gas | S1 | F1 | P1 | a | - | - | - |\n", "no requirement names H-02"),
+    ("docs/safety/assumptions.md", "| A-02 | fan | It turns. |\n", "assumptions.md:3: no requirement names A-02"),
+    ("docs/safety/assumptions.md", "| L-01 | Again. | - |\n", "assumptions.md:3: L-01 is there twice"),
+    ("docs/safety/failures.md", ("*hot*", "*warm*"), "failures.md:1: F-01 names the protection row warm"),
+]
 LONG_FUNCTION = "void steps() {\n" + "  step();\n" * 59 + "}\n"
 BREACHES = [  # check, file, what is added to it, what the check must say
     ("arrows", "model/cell.hpp", '#include "files/cell_file.hpp"\n', "model/cell.hpp:3: room model includes files"),
@@ -104,6 +147,26 @@ def faults_of(root):
             shutil.rmtree(os.path.join(root, os.path.dirname(path)))
 
 
+def faults_of_the_safety_check(root):
+    """Yields a message for each breach of a small safety file that checks/safety.py accepts."""
+    for path, text in SAFETY_CLEAN.items():
+        write(root, path, text)
+    if not outcome("safety", root)[0]:
+        yield "safety: accepts tables that were never written"
+    sources.run([sys.executable, os.path.join(OWN, "safety.py"), "--root", root, "--write"])
+    if outcome("safety", root)[0]:
+        yield f"safety: fails on a clean tree\n{outcome('safety', root)[1]}"
+    for path, change, message in SAFETY_BREACHES:
+        before = SAFETY_CLEAN[path]
+        write(root, path, before + change if isinstance(change, str) else before.replace(*change))
+        code, said = outcome("safety", root)
+        if code != 1 or message not in said:
+            yield f'safety: does not refuse a breach in {path}, expected "{message}"\n{said}'
+        else:
+            print(f"safety: refuses a breach in {path}: {message}")
+        write(root, path, before)
+
+
 def faults_of_the_projects_rooms(root):
     """The project's own rooms.toml must refuse a header of the estimator that includes the reader of cell files."""
     paths = sources.paths(PROJECT, (*sources.CPP, "rooms.toml"))
@@ -123,7 +186,7 @@ def faults_of_the_projects_rooms(root):
 
 def main():
     faults = []
-    for part in (faults_of, faults_of_the_projects_rooms):
+    for part in (faults_of, faults_of_the_safety_check, faults_of_the_projects_rooms):
         with tempfile.TemporaryDirectory() as root:
             faults += part(root)
     print("\n".join(faults + [f"planted breaches: {len(faults)} faults"]))
