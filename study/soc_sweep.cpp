@@ -18,11 +18,11 @@ constexpr double largest_r0_error = 0.01, largest_rc_error = 0.05;  ///< relativ
 void add_charts(const StudyData& part, const id::Identification& found, StudyResult& result) {
   files::PageChart voltage{"1 min HIGH, 30 s LOW at 40 %: measured and simulated (Fig. 12)",
                            {"measured, V", "simulated, V"},
-                           part.data.time_s,
-                           {part.data.voltage_v, {}}};
+                           part.data.time_s.copy(),
+                           {part.data.voltage_v.copy(), {}}};
   files::PageChart error{"Its error (Fig. 13) and that one step ahead (Fig. 14), mV",
                          {"simulated", "one step ahead"},
-                         part.data.time_s,
+                         part.data.time_s.copy(),
                          {{}, {std::numeric_limits<double>::quiet_NaN()}}};
   const Eigen::VectorXd& e = found.estimation.error_v;
   for (Eigen::Index k = 0; k < e.size(); ++k) {
