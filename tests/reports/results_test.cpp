@@ -25,7 +25,7 @@ host_sim::ReplayResult replayed() {
 TEST(Results, AreNullWithoutAReference) {
   host_sim::ReplayResult r = replayed();
   EXPECT_THAT(json_of(r, ""), Not(HasSubstr("\"rmse\": null")));
-  r.recording.soc_ref.clear();
+  r.recording.soc_ref = {};
   r.soc = {};
   r.open_loop_v.clear();
   host_sim::evaluate(r);
