@@ -4,8 +4,9 @@
 // because steps are short compared with the time constant and the difference to 1 would have lost its digits.
 //
 //   x <= 1/4:  x (c0 + x (c1 + ...))         relative error 3.4e-7 for float, 1e-15 for double; fixed point: of its
-//   steps x >  1/4:  halved until it is not, then  settled(2x) = settled(x) (2 - settled(x))  once per halving x > 32:
-//   1
+//                                            steps
+//   x >  1/4:  halved until it is not, then  settled(2x) = settled(x) (2 - settled(x))  once per halving
+//   x >  32:   1
 //
 // Negative x and NaN give a meaningless value, but the computation ends.
 #pragma once

@@ -6,8 +6,7 @@
 // (Thresholds::Calibration):
 //
 //   OCV         hat functions over soc, tolerance.ocv_v; and one at each sharp corner of the table: a smooth curve cuts
-//   a
-//               corner of straight lines by its change of slope times some soc
+//               a corner of straight lines by its change of slope times some soc
 //   R0, R1, C1  hat functions over soc, 1, 2 and 4 times tolerance.resistance_fraction, or the identification's own
 //               standard deviation if that is larger; more beyond the table's nodes, where it is only extrapolated:
 //               towards empty, resistances grow

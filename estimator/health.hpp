@@ -2,8 +2,7 @@
 // deviation.
 //
 //   capacity     between two visits to steep parts of the OCV curve: counted charge over the difference of the SOCs
-//   that
-//                the voltages gave, moved / (soc_b - soc_a). Possible errors of the counting widen its sigma
+//                that the voltages gave, moved / (soc_b - soc_a). Possible errors of the counting widen its sigma
 //   resistance   at current edges: change of the voltage beyond the model's, over the change of the drop that the model
 //                computes for R0 and the charged part of R1, (e_k - e_k-1) / (drop_k - drop_k-1)
 //

@@ -2,8 +2,7 @@
 // out.
 //
 //   predict   count the charge in integers, advance the other states by the model's exact step, propagate the
-//   covariance
-//             with the analytic state transition
+//             covariance with the analytic state transition
 //   correct   with the voltage, if the checks accept it; otherwise the prediction stands and sigma grows
 //
 // The parts, each with its own header:
@@ -13,8 +12,7 @@
 //   persistent_errors.hpp   errors that last for hours: as noise or as states
 //   outlier_gate.hpp        voltages that contradict everything known
 //   ambiguous_soc.hpp       the bank of hypotheses, open while the SOC is not known to 3 %: a line through the OCV
-//   curve
-//                           would be certain of one value
+//                           curve would be certain of one value
 //   cell_state.hpp          the state itself
 //
 // One source for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states). The laws of

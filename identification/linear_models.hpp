@@ -3,8 +3,8 @@
 //
 //   tf   transfer function, Eq. 11: voltage minus b0 of the OCV line
 //   oe   output error, Eq. 18-22: one sample of delay, offset estimated
-//   hw   Hammerstein-Wiener: oe with its output w passed through a curve of straight pieces, y = g(w), starting at y =
-//   w
+//   hw   Hammerstein-Wiener: oe with its output w passed through a curve of straight pieces, y = g(w), starting at
+//        y = w
 //
 // All three minimise their simulation error, on evenly sampled data. Eq. 12-16 give the circuit. A parameter that is
 // negative or not finite there is reported and not clamped.

@@ -2,11 +2,9 @@
 //
 //   white      s^2 (J'J)^-1, as if the residuals were white
 //   coloured   (J'J)^-1 J' W J (J'J)^-1, W from the autocorrelation of the residuals. Residuals of a battery model come
-//   in
-//              long runs; each run counts once (Newey and West, Econometrica 55 (1987) 703, Bartlett window)
+//              in long runs; each run counts once (Newey and West, Econometrica 55 (1987) 703, Bartlett window)
 //   offset     change of the parameters by a voltage error that is constant over the recording (of the OCV curve, of
-//   the
-//              sensor); more samples do not reduce it
+//              the sensor); more samples do not reduce it
 //
 // Parameters at a bound are fixed there and have no standard deviation.
 #pragma once

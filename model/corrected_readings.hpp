@@ -2,8 +2,7 @@
 // temperature that lags.
 //
 //   current      Whole steps of the delay: the mean of the current over (t[k - 1] + delay, t[k] + delay], from the
-//   charge
-//                by linear interpolation; before the first row and after the last the current continues.
+//                charge by linear interpolation; before the first row and after the last the current continues.
 //                The rest, a part p of a step: a late reading contains (1 - p) of the current of its own interval and p
 //                of the one before; an early one p of the one after. This is solved row by row. (Reading between the
 //                rows instead would smear an edge twice.)

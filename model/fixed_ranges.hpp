@@ -13,9 +13,9 @@
 //   v_rc   and the states of mechanisms and errors: x' = x + alpha (target - x), 0 <= alpha <= 1, lies between x and
 //          target, and both fit their type
 //   U, D   30 bits and an exponent in 32 more (arithmetic/scaled.hpp). In every step each entry results from a sum,
-//   which
-//          limits its exponent to +-1,024. Fewer than a hundred products lie between two sums, and 100 x 1,024 is far
-//          below 2^31. D stays positive: sums, products and quotients of positive numbers keep 30 digits of any size
+//          which limits its exponent to +-1,024. Fewer than a hundred products lie between two sums, and 100 x 1,024 is
+//          far below 2^31. D stays positive: sums, products and quotients of positive numbers keep 30 digits of any
+//          size
 //
 // tests/estimator/adversarial_inputs_test.cpp tries to break this with random cell files and samples, every signed
 // operation checked.

@@ -10,7 +10,8 @@
 //   Soc<S> ocv_soc(Soc<S>)                                         SOC at which the OCV table is read
 //   Coupling<S> ocv_soc_slope(Soc<S>)                              its derivative; only with ocv_soc
 //   Coupling<S> soc_shift_per_v()                                  shift of that SOC per volt of the law's voltage
-//   states void tables(TablePoint<S>&, Soc<S>, const StepInput<S>&)       changes OCV, R0, R1, C1 at this SOC and input
+//                                                                  states
+//   void tables(TablePoint<S>&, Soc<S>, const StepInput<S>&)       changes OCV, R0, R1, C1 at this SOC and input
 //   Voltage<S> initial(std::size_t i)                              state i before the first step
 //   Relaxation<S> relaxation(std::size_t i, const TablePoint<S>&, const StepInput<S>&)
 //                                                                  step of state i; with a fourth argument,
@@ -23,7 +24,8 @@
 //                                                                  filter; default: half of the voltage that the
 //                                                                  current can have built up, and noise.v_rc_v
 //   void at(double time_s)                                         host only: time in the recording at the end of a
-//   step states, voltage_states, state_unit, resistances_follow_temperature     static constants
+//                                                                  step
+//   states, voltage_states, state_unit, resistances_follow_temperature     static constants
 //
 // Every state relaxes towards a target, x' = x + alpha (target - x). With `voltage_states` it is a voltage that adds to
 // the terminal voltage and that the filter corrects; otherwise only apply_state() uses it, and the filter does not

@@ -1,10 +1,11 @@
 // What the battery stores, and when. The policy bounds the wear of the flash in all cases:
 //
 //   charge    at most once a minute, if soc has moved by 0.1 % or its sigma by a tenth; after an hour if any charge
-//   flowed cells     at most every half hour, if one has moved by 0.1 % health    at most every hour, if one value has
-//   moved by 0.1 % events    a fault at once: sixteen in a row, then one every ten minutes. Starts and resets with the
-//                            first minute of a
-//             run, so a battery that restarts repeatedly writes nothing.
+//             flowed
+//   cells     at most every half hour, if one has moved by 0.1 %
+//   health    at most every hour, if one value has moved by 0.1 %
+//   events    a fault at once: sixteen in a row, then one every ten minutes. Starts and resets with the first minute of
+//             a run, so a battery that restarts repeatedly writes nothing.
 //   settings  when set
 //   all       power_failing() writes all changes at once
 //

@@ -72,7 +72,7 @@ class ProofCommand final : public Command {
   CLI::App* add(CLI::App& app) override {
     CLI::App& c = *app.add_subcommand(
         "proof", "Compare the diagnosis of real recordings with measurements that it did not use; takes minutes");
-    c.footer("Experiments: " + experiment_names() + "\nExample: bms proof --data recordings --report proof.html");
+    c.footer("Experiments: " + experiment_names() + "\nExample: bms proof --data FOLDER --report proof.html");
     c.add_option("--data", o_.data, "folder with the recordings in a123_26650 and a123_esctoolbox")
         ->required()
         ->type_name("DIR");

@@ -3,8 +3,7 @@
 //   faults   current: delay, low-pass, gain, offset, saturation;  voltage: low-pass, gain, offset, integral
 //            non-linearity, interference;  temperature: lag, offset
 //   healthy  gain error, Ornstein-Uhlenbeck drift, white noise, converter steps (plant/instruments.hpp); thermistor
-//   with
-//            a lag
+//            with a lag
 //
 // The faults contain no random numbers except the drift of their own size.
 #pragma once

@@ -1,4 +1,5 @@
-// ./bms from the outside: its help lists every command, and help installs and builds nothing.
+// ./bms from the outside: its help and docs/commands.md list every command, help installs and builds nothing, and a
+// command names the packages that it needs.
 #include <regex>
 #include <set>
 
@@ -13,6 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsSubsetOf;
+using ::testing::Not;
 using Names = std::set<std::string>;
 
 const std::string wrapper = BMS_SOURCE_DIR "/bms";
@@ -85,6 +87,39 @@ TEST_F(Wrapper, RefusesAnUnknownCommandWithoutInstallingAnything) {
 TEST_F(Wrapper, NamesWhatItInstallsForACommandOfTheTool) {
   EXPECT_THAT(run("experiment rest_5s", 3), HasSubstr("libcli11-dev (the command line)"));
   EXPECT_FALSE(touched_nothing()) << "these programs stand for those that install and build";
+}
+
+TEST_F(Wrapper, InstallsTheCrossCompilerAndTheEmulatorForEachCommandThatBuildsAnImage) {
+  for (const char* arguments : {"hil", "hil --board stm32f405_forklift", "replay a.csv --target netduinoplus2",
+                                "replay a.csv --target=microbit --scalar fixed", "flash --board stm32f405_cell"}) {
+    const std::string said = run(arguments, 3);
+    EXPECT_THAT(said, HasSubstr("gcc-arm-none-eabi (")) << arguments;
+    EXPECT_THAT(said, HasSubstr("qemu-system-arm (")) << arguments;
+  }
+  EXPECT_THAT(run("flash", 3), HasSubstr("openocd ("));
+  for (const char* arguments : {"replay microbit", "simulate --out netduinoplus2", "hil --help"}) {
+    EXPECT_THAT(run(arguments, 3), Not(HasSubstr("gcc-arm-none-eabi"))) << arguments;
+  }
+}
+
+TEST_F(Wrapper, KnowsEveryFuzzTarget) {
+  const std::filesystem::path folder = BMS_SOURCE_DIR "/tests/fuzz", copied = checkout_ / "tests" / "fuzz";
+  std::filesystem::create_directories(copied);
+  std::filesystem::copy_file(folder / "CMakeLists.txt", copied / "CMakeLists.txt");
+  Names sources;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().stem().string();
+    if (entry.path().extension() == ".cpp" && name.ends_with("_fuzz")) sources.insert(name);
+  }
+  EXPECT_THAT(sources, ::testing::Contains("storage_fuzz"));
+  EXPECT_EQ(matches(run("fuzz", 2), "\\b([a-z_]+_fuzz)\\b"), sources);
+  EXPECT_THAT(run("fuzz stroage_fuzz", 2), HasSubstr("no such fuzz target 'stroage_fuzz'"));
+  EXPECT_TRUE(touched_nothing());
+}
+
+TEST_F(Wrapper, CommandsPageHasARowForEveryCommandAndNoOther) {
+  const Names rows = matches(content(BMS_SOURCE_DIR "/docs/commands.md"), "^[|] `(?:[.]/)?bms ([a-z]+)");
+  EXPECT_EQ(rows, listed(run("help")));
 }
 
 }  // namespace

@@ -58,8 +58,6 @@ int tolerance_ms(std::size_t k) {
 bool begins_by_itself(std::size_t k) { return k == implausible || waits_for_others(k); }
 int patience_ms(std::size_t k) { return delay_ms(k) + (begins_by_itself(k) ? 120'000 : 3'000); }
 
-bool on_the_truck(std::size_t k) { return k < 26; }
-
 class Matrix {
  public:
   Matrix(bool every, std::uint64_t seed) : every_(every), random_(seed) { result.rows.resize(fault_count); }
@@ -72,7 +70,7 @@ class Matrix {
   std::vector<Case> cases() {
     std::vector<Case> all;
     if (every_) all.push_back({"the shift", shift});
-    for (std::size_t k = 0; k < in_frames; ++k) {
+    for (std::size_t k = 0; k < fault_count; ++k) {
       if (!on_the_truck(k)) continue;
       const std::string name = expected_rows[k].name;
       all.push_back({"just below " + name, [k](MatrixResult& r) { below(k, r); }});
@@ -88,8 +86,9 @@ class Matrix {
         all.push_back({"sometimes " + name, [k](MatrixResult& r) { loose(k, r); }});
       }
       std::vector<std::size_t> others;
-      for (std::size_t other = 0; other < 26; ++other) {
-        if (other != k && quantity_of(other) != quantity_of(k) && other != implausible && !waits_for_others(other))
+      for (std::size_t other = 0; other < fault_count; ++other) {
+        if (on_the_truck(other) && other != k && quantity_of(other) != quantity_of(k) && other != implausible &&
+            !waits_for_others(other))
           others.push_back(other);
       }
       for (const std::size_t other : one_of(others)) {
@@ -98,7 +97,7 @@ class Matrix {
       }
     }
     const std::vector<std::size_t> harmless = {0, 3, 11, 13, 15, 17, 23};  // the contactors close in spite of these
-    for (const std::size_t k : {precharge, welded, not_closed, no_samples}) {
+    for (const std::size_t k : contactor_rows) {
       const std::string name = expected_rows[k].name;
       all.push_back({"just below " + name, [k](MatrixResult& r) { contactors(k, false, {}, r); }});
       all.push_back({"just above " + name, [k](MatrixResult& r) { contactors(k, true, {}, r); }});
@@ -458,7 +457,8 @@ std::string markdown(const MatrixResult& result) {
   std::string out =
       "| fault | table | silent below, number of cases | raised just above it after | three sigma above | during other "
       "faults | number of cases | open after |\n|---|---|---|---|---|---|---|---|\n";
-  for (std::size_t k = 0; k < in_frames; ++k) {
+  for (std::size_t k = 0; k < fault_count; ++k) {
+    if (!in_frames(k)) continue;
     const MatrixRow& r = result.rows[k];
     out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", expected_rows[k].name, stated_time(k), r.silent,
                        time(r.above), time(r.in_noise), time(r.during), r.during.cases, time(r.opened));

@@ -25,8 +25,24 @@
 namespace bms::protection {
 
 inline constexpr std::size_t charge_overload = 8, discharge_overload = 9, implausible = 18, precharge = 26, welded = 27,
-                             not_closed = 28, no_samples = 29;
-inline constexpr std::size_t in_frames = 30;  // number of faults that frames can cause
+                             not_closed = 28, no_samples = 29, internal_error = 30, failed_storage = 31;
+/// Faults of precharge, contactors and missing samples: cases of their own.
+inline constexpr std::array contactor_rows{precharge, welded, not_closed, no_samples};
+/// Returns true if frames can cause fault k; the others are tested on the boards in Unicorn.
+constexpr bool in_frames(std::size_t k) { return k != internal_error && k != failed_storage; }
+/// Returns true if a change of the truck's samples can cause fault k.
+constexpr bool on_the_truck(std::size_t k) {
+  return visible_in_samples(k) || k == charge_overload || k == discharge_overload;
+}
+constexpr bool every_row_has_a_case() {
+  for (std::size_t k = 0; k < fault_count; ++k) {
+    if (in_frames(k) && !on_the_truck(k) && std::ranges::find(contactor_rows, k) == contactor_rows.end()) return false;
+  }
+  return true;
+}
+static_assert(every_row_has_a_case(),
+              "a row has no case in the fault matrix of the board: add it to visible_in_samples() and inject() of "
+              "simulated_truck.hpp, or to contactor_rows with its link_of function, or to in_frames()");
 inline constexpr int opens_within_ms =
     5'000 + 2 * step_ms;              // a fault that opens waits five seconds for the current to end
 inline constexpr double limit_a = 6;  // of table9
