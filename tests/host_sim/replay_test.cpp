@@ -80,7 +80,7 @@ TEST(Replay, WordsOfABoardAreTheNumbersOfTheHost) {
 
 TEST(Replay, SocFiguresAreNullWithoutAReference) {
   ReplayResult r = replayed(std::nullopt);
-  r.recording.soc_ref.clear();
+  r.recording.soc_ref = {};
   r.soc = {};
   r.open_loop_v.clear();
   evaluate(r);
