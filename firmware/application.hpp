@@ -26,6 +26,7 @@
 #include "hal/estimate_record.hpp"
 #include "hal/power_path.hpp"
 #include "hal/requests.hpp"
+#include "hal/supply.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
@@ -137,7 +138,9 @@ class Application {
     if (board_.cell_file_changed && inputs.clear != protection::Clear::none) [[unlikely]]
       accept_cell_file();
     inputs.dc_link_uv = hal::dc_link_uv();
-    inputs.board_fault = board_.unfit() || board_.state.supply_low ||
+    const std::uint32_t supply_falls = hal::supply_falls();
+    const bool supply_fell = supply_falls != supply_falls_;  // the level may be good again
+    inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_fell ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
     first_ = false;
@@ -145,6 +148,10 @@ class Application {
     const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
+    if (supply_fell && !decision.outputs.any_closed()) [[unlikely]] {
+      hal::supply_acknowledge(supply_falls);
+      supply_falls_ = supply_falls;
+    }
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
@@ -205,6 +212,7 @@ class Application {
   storage::Persistence& persistence_;
   std::uint32_t cell_hash_;
   BoardStatus board_;
+  std::uint32_t supply_falls_ = 0;  ///< of which protection knows
   bool first_ = true;
 };
 

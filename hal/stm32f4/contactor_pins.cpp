@@ -1,5 +1,5 @@
-// PC6 main plus, PC7 main minus, PC8 precharge, PC9 charge enable. A high level closes. While the supply is low, all
-// are open. Registers: RM0090, 8.4.
+// PC6 main plus, PC7 main minus, PC8 precharge, PC9 charge enable. A high level closes. All are open while the supply
+// is low, and after a fall of it until the firmware has acknowledged it. Registers: RM0090, 8.4.
 #include "hal/contactor_pins.hpp"
 
 #include "hal/stm32f4/registers.hpp"
@@ -10,13 +10,14 @@ namespace bms::hal {
 void contactor_pins_set(const PowerPath& wanted) {
   using namespace stm32f4;
   std::uint32_t high = 0;
-  if (!supply_low()) {
+  if (!supply_low() && !supply_fell()) {
     high = (wanted.main_plus ? 1U << 6 : 0U) | (wanted.main_minus ? 1U << 7 : 0U) | (wanted.precharge ? 1U << 8 : 0U) |
            (wanted.charge_enable ? 1U << 9 : 0U);
   }
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 2;
   // First the level, then the output mode. Every call writes all registers, which repairs a disturbed one.
   gpioc_bsrr() = high | (~high & 15U << 6) << 16;
+  if (supply_fell()) gpioc_bsrr() = (15U << 6) << 16;  // the interrupt may have come since the supply was checked
   gpioc_otyper() = gpioc_otyper() & ~(15U << 6);
   gpioc_moder() = (gpioc_moder() & ~(255U << 12)) | 0x55U << 12;
 }

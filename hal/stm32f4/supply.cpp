@@ -10,7 +10,9 @@ namespace {
 constexpr std::uint32_t detector_on = 1U << 4, highest_level = 7U << 5, output = 1U << 2, line = 1U << 16,
                         brown_out_level = 3U << 2;
 
-volatile bool fell = false;
+volatile bool fell = false;               ///< supply_failing() is due
+volatile std::uint32_t falls = 0;         ///< written by the interrupt only
+volatile std::uint32_t acknowledged = 0;  ///< written by main() only
 
 }  // namespace
 
@@ -20,7 +22,12 @@ void supply_attend() {
   supply_failing();
 }
 
+std::uint32_t supply_falls() { return falls; }
+void supply_acknowledge(std::uint32_t known) { acknowledged = known; }
+
 namespace stm32f4 {
+
+bool supply_fell() { return falls != acknowledged; }
 
 void supply_start() {
   rcc_apb1enr() = rcc_apb1enr() | 1U << 28;
@@ -44,4 +51,5 @@ extern "C" void pvd_interrupt() {
   stm32f4::exti_pr() = 1U << 16;
   stm32f4::gpioc_bsrr() = 15U << 22;  // PC6 to PC9 low (hal/stm32f4/contactor_pins.cpp)
   fell = true;
+  falls = falls + 1;
 }

@@ -160,6 +160,12 @@ class Truck : public FrontEndBoard {
     for (int k = 0; k < 60; ++k) step();
     return driven().main_plus && driven().main_minus;
   }
+  void clear_faults() {
+    can::Command command;
+    command.code = can::Command::code_clear_faults;
+    asked_ = can::next(asked_);
+    board.can.others.push_back({wire_frame(command.frame(asked_)), 0});
+  }
   can::Faults faults() const {
     const auto frame = last(can::Faults::id);
     return frame ? can::Faults::of(*frame) : can::Faults{};
@@ -234,6 +240,39 @@ TEST_F(Truck, GetsNoPowerWithAWeldedPole) {
   EXPECT_EQ(faults().contactor_welded, 1U);
   EXPECT_FALSE(driven().any_closed());
 }
+
+/// Dips of the supply that begin at any time between two samples and last for less than the time between them.
+class DipWhileDriving : public Truck, public ::testing::WithParamInterface<int> {};
+
+TEST_P(DipWhileDriving, OpensUntilFaultsAreClearedAndThenPrecharges) {
+  for (const double phase_ms : {3.0, 31.0, 57.0, 88.0}) {
+    ASSERT_TRUE(drive_off()) << phase_ms;
+    board.run_for_ms(phase_ms);
+    board.supply(true);
+    board.run_for_ms(GetParam());
+    EXPECT_FALSE(driven().any_closed()) << "the interrupt";
+    board.supply(false);
+    for (int k = 0; k < 30; ++k) {
+      step();
+      ASSERT_FALSE(driven().any_closed()) << phase_ms << " ms, " << k;
+    }
+    EXPECT_EQ(faults().internal_fault, 1U);
+    requests_power = false;  // the request expires
+    load.current_a = 0;
+    for (int k = 0; k < 700; ++k) step();
+    clear_faults();
+    for (int k = 0; k < 50; ++k) {
+      step();
+      ASSERT_FALSE(driven().any_closed()) << phase_ms << " ms, without a request";
+    }
+    requests_power = true;
+    ASSERT_GE(until([](const Pins& p) { return p.any_closed(); }, 4'000), 0) << phase_ms;
+    EXPECT_FALSE(driven().main_plus) << "self-test and precharge come first";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Ms, DipWhileDriving, ::testing::Values(1, 20, 99),
+                         [](const auto& p) { return std::to_string(p.param); });
 
 TEST_F(Truck, DrivesWithWornOutFlashAndReportsIt) {
   board.flash.worn_out = true;

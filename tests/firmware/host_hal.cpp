@@ -13,6 +13,7 @@ void host_hal::begin() {
   fault.reset();
   fed = 0;
   board_state = {};
+  supply_falls = supply_acknowledged = 0;
   calendar_was_set_to = 0;
   calendar_accepts = true;
   calibrated = {};
@@ -40,6 +41,8 @@ ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }
 std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
 void watchdog_feed() { ++host_hal::fed; }
+std::uint32_t supply_falls() { return host_hal::supply_falls; }
+void supply_acknowledge(std::uint32_t falls) { host_hal::supply_acknowledged = falls; }
 BoardState board_state() { return host_hal::board_state; }
 std::uint64_t now_us() { return 0; }
 bool calendar_set(std::uint32_t unix_s) {

@@ -24,6 +24,7 @@ inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;
 inline hal::BoardState board_state;
+inline std::uint32_t supply_falls = 0, supply_acknowledged = 0;
 inline std::uint32_t calendar_was_set_to = 0;
 inline bool calendar_accepts = true;
 inline hal::SensorCalibration calibrated;

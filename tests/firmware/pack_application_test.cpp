@@ -56,6 +56,29 @@ TEST_F(PackTest, AfterAWatchdogResetNothingClosesBeforeFaultsAreCleared) {
   EXPECT_EQ(last<can::Faults>().value().internal_fault, 1U);
 }
 
+TEST_F(PackTest, ADipOfTheSupplyBetweenTwoSamplesOpensUntilFaultsAreCleared) {
+  std::uint8_t counter = 0;
+  const auto request_s = [&](int seconds) {
+    for (int k = 0; k < seconds; ++k) {
+      send_command(can::Command::code_request, 1, counter = can::next(counter));
+      second();
+    }
+  };
+  request_s(20);
+  ASSERT_TRUE(driving());
+  host_hal::supply_falls = 3;
+  second();
+  EXPECT_EQ(host_hal::supply_acknowledged, 3U);
+  EXPECT_FALSE(host_hal::switched.main_plus || host_hal::switched.main_minus || host_hal::switched.precharge);
+  EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
+  request_s(10);
+  EXPECT_FALSE(driving());
+  send_command(can::Command::code_clear_faults, 0, 14);
+  for (int k = 0; k < 7; ++k) second();  // the request must expire before a new one counts
+  request_s(20);
+  EXPECT_TRUE(driving());
+}
+
 /// While the condition lasts, no request closes a contactor and no command clears the fault.
 TEST_F(PackTest, AnUnfitBoardClosesNothing) {
   const auto drive_s = [&](int seconds) {
