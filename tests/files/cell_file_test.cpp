@@ -95,8 +95,8 @@ TEST(CellFile, RejectsAReferenceTemperatureOutOfRangeWithItsLine) {
                                       std::string("capacity_ah = 6.0\nreference_temperature_c = ") + bad);
     const auto line =
         1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(text.find("reference_t")), '\n');
-    EXPECT_EQ(refusal(text), "cell.toml:" + std::to_string(line) +
-                                 ": 'reference_temperature_c' is out of range, expected -40 to 80 degrees C");
+    EXPECT_EQ(cell_refusal(text), "cell.toml:" + std::to_string(line) +
+                                      ": 'reference_temperature_c' is out of range, expected -40 to 80 degrees C");
   }
 }
 
