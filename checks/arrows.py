@@ -13,7 +13,6 @@ It fails when
 
 Exit code: 0 all arrows allowed, 1 a rule is broken, 2 rooms.toml cannot be used.
 """
-import argparse
 import graphlib
 import os
 import re
@@ -131,9 +130,7 @@ def drawing(rooms):
 
 
 def main():
-    own = os.path.dirname(os.path.abspath(__file__))
-    options = argparse.ArgumentParser(description="Checks that each room includes only what rooms.toml allows.")
-    options.add_argument("--root", default=os.path.dirname(own), help="top folder of the project")
+    options = sources.options("Checks that each room includes only what rooms.toml allows.")
     options.add_argument("--rooms", help="another rooms.toml (default: ROOT/checks/rooms.toml)")
     options.add_argument("--draw", action="store_true", help="print the rooms by floor and check nothing")
     options.add_argument("--found", action="store_true", help="print what each room includes, as lines for rooms.toml")

@@ -3,7 +3,6 @@
 
 Exit code: 0 nothing to change, 1 a file is not formatted, 2 clang-format cannot be used.
 """
-import argparse
 import os
 import sys
 
@@ -15,8 +14,7 @@ AT_ONCE = 50  # files for one run of clang-format
 
 def main():
     own = os.path.dirname(os.path.abspath(__file__))
-    options = argparse.ArgumentParser(description="Checks the format of the sources.")
-    options.add_argument("--root", default=os.path.dirname(own), help="top folder of the project")
+    options = sources.options("Checks the format of the sources.")
     options.add_argument("--fix", action="store_true", help="format the files instead")
     given = options.parse_args()
     style = "--style=file:" + os.path.join(os.path.dirname(own), ".clang-format")

@@ -11,7 +11,6 @@ universal-ctags finds the functions.
 
 Exit code: 0 nothing to refuse, 1 something above a guide, 2 ctags or long.toml cannot be used.
 """
-import argparse
 import json
 import os
 import re
@@ -80,9 +79,7 @@ def measure(root):
 
 
 def main():
-    own = os.path.dirname(os.path.abspath(__file__))
-    options = argparse.ArgumentParser(description="Measures functions, files and line widths.")
-    options.add_argument("--root", default=os.path.dirname(own), help="top folder of the project")
+    options = sources.options("Measures functions, files and line widths.")
     options.add_argument("--list", action="store_true", help="print all that is above a guide, longest first")
     given = options.parse_args()
     try:

@@ -14,8 +14,6 @@ The check cannot see whether `1e-6 * x` converts a unit or scales by a chosen nu
 
 Exit code: 0 no bare number, 1 at least one.
 """
-import argparse
-import os
 import re
 import sys
 
@@ -62,9 +60,7 @@ def bare_numbers(text, path="x.cpp"):
 
 
 def main():
-    own = os.path.dirname(os.path.abspath(__file__))
-    options = argparse.ArgumentParser(description="Refuses bare numbers in the sources of the diagnosis.")
-    options.add_argument("--root", default=os.path.dirname(own), help="top folder of the project")
+    options = sources.options("Refuses bare numbers in the sources of the diagnosis.")
     given = options.parse_args()
     paths = [path for path in sources.paths(given.root, [".cpp"]) if path.startswith("diagnosis/")]
     count = 0

@@ -14,7 +14,6 @@ requirements.toml connects each row of the protection table with hazards, code a
 
 Exit code: 0 no fault, 1 faults, 2 a file of the safety file is missing or unreadable.
 """
-import argparse
 import os
 import re
 import sys
@@ -45,15 +44,6 @@ def table_rows(text, id_pattern):
             yield number, cells
 
 
-def code_of(text, path):
-    """The text without comments and string literals."""
-    code = list(text)
-    for kind, start, end in sources.parts(text, path):
-        if kind in ("comment", "string"):
-            code[start:end] = sources.masked(text[start:end], " ")
-    return "".join(code)
-
-
 class SafetyFile:
     """All that the safety file and the sources state, as read from the tree."""
 
@@ -63,7 +53,7 @@ class SafetyFile:
         self.requirements = tomllib.loads(self.data_text)["requirement"]
         self.every_row = tomllib.loads(self.data_text).get("every_row", {}).get("tests", [])
         body = re.search(r"enum class Fault\b[^{]*\{(.*?)\}", sources.read(root, FAULTS), re.S)
-        self.faults = re.findall(r"\w+", code_of(body[1], FAULTS)) if body else []
+        self.faults = re.findall(r"\w+", sources.code(body[1], FAULTS)) if body else []
         table = re.search(MARKS.format("table"), sources.read(root, TABLE), re.S)
         self.rows = {cells[1].replace(" ", "_"): cells for _, cells in table_rows(table[0] if table else "", r"\d+")}
         self.hazards = list(table_rows(sources.read(root, HAZARDS), r"H-\d+"))
@@ -92,7 +82,7 @@ def missing_code(root, item):
     path, _, symbol = item.partition(":")
     if not symbol or not os.path.isfile(os.path.join(root, path)):
         return f"{item}: the file does not exist, or no symbol is named"
-    code = code_of(sources.read(root, path), path)
+    code = sources.code(sources.read(root, path), path)
     absent = [part for part in symbol.split("::") if not re.search(rf"\b{re.escape(part)}\b", code)]
     return f"{item}: {absent[0]} is not in the code of {path}" if absent else None
 
@@ -243,9 +233,7 @@ def stale(safety, write):
 
 
 def main():
-    own = os.path.dirname(os.path.abspath(__file__))
-    options = argparse.ArgumentParser(description="Refuses gaps in docs/safety/ and writes its tables.")
-    options.add_argument("--root", default=os.path.dirname(own), help="top folder of the project")
+    options = sources.options("Refuses gaps in docs/safety/ and writes its tables.")
     options.add_argument("--write", action="store_true", help="write the tables of traceability.md")
     given = options.parse_args()
     try:

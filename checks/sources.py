@@ -1,4 +1,5 @@
 """The files of the project and their text in parts: code, comments, strings. Used by every check of this folder."""
+import argparse
 import os
 import re
 import subprocess
@@ -46,8 +47,25 @@ def masked(piece, mark):
     return re.sub(r"\S", mark, piece)
 
 
+def code(text, path):
+    """The text without comments, strings and includes, every position as it was."""
+    kept = list(text)
+    for kind, start, end in parts(text, path):
+        if kind != "number":
+            kept[start:end] = masked(text[start:end], " ")
+    return "".join(kept)
+
+
 def line_of(text, position):
     return text.count("\n", 0, position) + 1
+
+
+def options(description):
+    """The command line of a check: --root, and what the check adds."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))),
+                        help="top folder of the project")
+    return parser
 
 
 def run(command, **options):

@@ -3,8 +3,6 @@
 
 Exit code: 0 none, 1 at least one.
 """
-import argparse
-import os
 import re
 import sys
 
@@ -15,14 +13,6 @@ TOKEN = re.compile(r"::|[-+*/%&|^]=|[=!<>]=|->|\+\+|--|\w+|[^\s\w]")
 DIRECTIVE = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.M)
 ASSIGNED = ("=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "++", "--")
 HEADS = ("if", "for", "while", "switch")
-
-
-def code_of(text, path):
-    """The text without comments, strings and directives, every position as it was."""
-    code = list(text)
-    for _, start, end in sources.parts(text, path):
-        code[start:end] = sources.masked(text[start:end], " ")
-    return DIRECTIVE.sub(lambda line: sources.masked(line[0], " "), "".join(code))
 
 
 def nested_conditionals(tokens):
@@ -96,15 +86,14 @@ def comma_statements(tokens):
 
 
 def main():
-    own = os.path.dirname(os.path.abspath(__file__))
-    options = argparse.ArgumentParser(description="Refuses nested conditional operators and comma statements.")
-    options.add_argument("--root", default=os.path.dirname(own), help="top folder of the project")
+    options = sources.options("Refuses nested conditional operators and comma statements.")
     given = options.parse_args()
     paths = sources.paths(given.root, sources.CPP)
     faults = 0
     for path in paths:
         text = sources.read(given.root, path)
-        tokens = [(token.start(), token[0]) for token in TOKEN.finditer(code_of(text, path))]
+        code = DIRECTIVE.sub(lambda line: sources.masked(line[0], " "), sources.code(text, path))
+        tokens = [(token.start(), token[0]) for token in TOKEN.finditer(code)]
         for what, positions in (("a conditional operator inside another one", nested_conditionals(tokens)),
                                 ("a comma statement", comma_statements(tokens))):
             for position in positions:

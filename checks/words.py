@@ -7,7 +7,6 @@ read: the included file reports its own name.
 
 Exit code: 0 none of the words, 1 at least one, 2 words.toml cannot be used.
 """
-import argparse
 import collections
 import os
 import re
@@ -101,8 +100,7 @@ def findings(root, data):
 
 def main():
     own = os.path.dirname(os.path.abspath(__file__))
-    options = argparse.ArgumentParser(description="Refuses words that are not the field's words.")
-    options.add_argument("--root", default=os.path.dirname(own), help="top folder of the project")
+    options = sources.options("Refuses words that are not the field's words.")
     options.add_argument("--words", default=os.path.join(own, "words.toml"), help="another words.toml")
     options.add_argument("--count", action="store_true", help="print only how often, by replacement and by room")
     options.add_argument("paths", nargs="*", help="only files whose path begins so")
