@@ -139,8 +139,7 @@ class Application {
       accept_cell_file();
     inputs.dc_link_uv = hal::dc_link_uv();
     const std::uint32_t supply_falls = hal::supply_falls();
-    const bool supply_fell = supply_falls != supply_falls_;  // the level may be good again
-    inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_fell ||
+    inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
     first_ = false;
@@ -148,10 +147,8 @@ class Application {
     const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
-    if (supply_fell && !decision.outputs.any_closed()) [[unlikely]] {
+    if (supply_falls != 0 && !decision.outputs.any_closed()) [[unlikely]]
       hal::supply_acknowledge(supply_falls);
-      supply_falls_ = supply_falls;
-    }
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
@@ -212,7 +209,6 @@ class Application {
   storage::Persistence& persistence_;
   std::uint32_t cell_hash_;
   BoardStatus board_;
-  std::uint32_t supply_falls_ = 0;  ///< of which protection knows
   bool first_ = true;
 };
 

@@ -12,7 +12,7 @@ namespace bms::hal {
 /// Calls supply_failing() once after each fall of the supply. Call it wherever main() waits.
 void supply_attend();
 
-/// Number of falls of the supply since the start.
+/// Number of falls of the supply that have not been acknowledged.
 std::uint32_t supply_falls();
 
 /// Allows outputs to close again. Call with the number that protection has received, after it has opened all outputs.

@@ -4,20 +4,21 @@
 
 #include "hal/stm32f4/registers.hpp"
 #include "hal/stm32f4/supply.hpp"
+#include "hal/supply.hpp"
 
 namespace bms::hal {
 
 void contactor_pins_set(const PowerPath& wanted) {
   using namespace stm32f4;
   std::uint32_t high = 0;
-  if (!supply_low() && !supply_fell()) {
+  if (!supply_low() && supply_falls() == 0) {
     high = (wanted.main_plus ? 1U << 6 : 0U) | (wanted.main_minus ? 1U << 7 : 0U) | (wanted.precharge ? 1U << 8 : 0U) |
            (wanted.charge_enable ? 1U << 9 : 0U);
   }
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 2;
   // First the level, then the output mode. Every call writes all registers, which repairs a disturbed one.
   gpioc_bsrr() = high | (~high & 15U << 6) << 16;
-  if (supply_fell()) gpioc_bsrr() = (15U << 6) << 16;  // the interrupt may have come since the supply was checked
+  if (supply_falls() != 0) gpioc_bsrr() = (15U << 6) << 16;  // the interrupt may have come since the supply was checked
   gpioc_otyper() = gpioc_otyper() & ~(15U << 6);
   gpioc_moder() = (gpioc_moder() & ~(255U << 12)) | 0x55U << 12;
 }

@@ -22,12 +22,10 @@ void supply_attend() {
   supply_failing();
 }
 
-std::uint32_t supply_falls() { return falls; }
-void supply_acknowledge(std::uint32_t known) { acknowledged = known; }
+std::uint32_t supply_falls() { return falls - acknowledged; }
+void supply_acknowledge(std::uint32_t known) { acknowledged = acknowledged + known; }
 
 namespace stm32f4 {
-
-bool supply_fell() { return falls != acknowledged; }
 
 void supply_start() {
   rcc_apb1enr() = rcc_apb1enr() | 1U << 28;

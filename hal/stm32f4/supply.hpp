@@ -17,9 +17,6 @@ void supply_start();
 /// Returns true while the supply is below the detector's threshold.
 bool supply_low();
 
-/// Returns true from a fall of the supply until the firmware has acknowledged it (hal/supply.hpp).
-bool supply_fell();
-
 /// Returns true if the option bytes select another level than 3.
 bool brown_out_reset_low();
 

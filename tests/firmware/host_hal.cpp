@@ -42,7 +42,10 @@ std::optional<FaultRecord> last_fault() { return host_hal::fault; }
 std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
 void watchdog_feed() { ++host_hal::fed; }
 std::uint32_t supply_falls() { return host_hal::supply_falls; }
-void supply_acknowledge(std::uint32_t falls) { host_hal::supply_acknowledged = falls; }
+void supply_acknowledge(std::uint32_t falls) {
+  host_hal::supply_falls -= falls;
+  host_hal::supply_acknowledged += falls;
+}
 BoardState board_state() { return host_hal::board_state; }
 std::uint64_t now_us() { return 0; }
 bool calendar_set(std::uint32_t unix_s) {
