@@ -40,13 +40,9 @@ void check_time(Recording& r) {
                      duplicates, r.time_s[first_duplicate])});
   }
   const double largest_s = gap_steps * upper_median(steps);
-  std::size_t gaps = 0, first_gap = 0;
-  for (std::size_t k = 1; k < r.rows(); ++k) {
-    if (r.time_s[k] - r.time_s[k - 1] > largest_s && gaps++ == 0) first_gap = k;
-  }
-  if (gaps > 0) {
-    r.warnings.push_back({"gap", fmt::format("gaps longer than {:g} s: {}, the first after {:g} s", largest_s, gaps,
-                                             r.time_s[first_gap - 1])});
+  if (const auto rows = rows_after_gaps(r.time_s, largest_s); !rows.empty()) {
+    r.warnings.push_back({"gap", fmt::format("gaps longer than {:g} s: {}, the first after {:g} s", largest_s,
+                                             rows.size(), r.time_s[rows.front() - 1])});
   }
 }
 
