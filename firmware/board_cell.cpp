@@ -17,11 +17,16 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
-  static constexpr auto plan = protection::protection_plan({.limits = generated::parameters.limits,
-                                                            .capacity_ah = generated::parameters.capacity_ah,
-                                                            .cells = cells,
-                                                            .temperatures = cells > 1 ? 4 : 1,
-                                                            .sample_period_s = hal::sample_period_s});
+  static constexpr protection::PackDesign design{.limits = generated::parameters.limits,
+                                                 .capacity_ah = generated::parameters.capacity_ah,
+                                                 .cells = cells,
+                                                 .temperatures = cells > 1 ? 4 : 1,
+                                                 .sample_period_s = hal::sample_period_s,
+                                                 .current_range_a = hal::current_range_a};
+  static_assert(protection::current_sensor_suffices(design),
+                "the current sensor of the board (BMS_CURRENT_RANGE_A) ends below a short circuit of this cell");
+  static constexpr auto plan = protection::protection_plan(design);
+  static_assert(protection::consistent(plan.rules), "limits of the cell contradict each other");
   return plan;
 }
 

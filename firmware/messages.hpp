@@ -152,14 +152,24 @@ constexpr can::Temperatures temperatures(const measurement::PackSample<Cells>& p
   return m;
 }
 
-constexpr can::Faults faults(const protection::Decision& d) {
-  can::Faults m;
-  std::size_t k = 0;
+/// Sets the signals of one bit, in their order.
+template <class Message>
+constexpr Message fault_bits(std::uint32_t faults) {
+  Message m;
   m.each([&](const char*, const char*, std::uint32_t& value, const can::SignalLayout& s) {
-    if (s.bits == 1) value = d.faults >> k++ & 1;
+    if (s.bits != 1) return;
+    value = faults & 1;
+    faults >>= 1;
   });
+  return m;
+}
+constexpr can::Faults faults(const protection::Decision& d) {
+  auto m = fault_bits<can::Faults>(static_cast<std::uint32_t>(d.faults));
   m.first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
   return m;
+}
+constexpr can::MoreFaults more_faults(const protection::Decision& d) {
+  return fault_bits<can::MoreFaults>(static_cast<std::uint32_t>(d.faults >> 32));
 }
 
 constexpr can::ContactorState contactor_state(const protection::Decision& d) {

@@ -101,7 +101,9 @@ class Telemetry {
   }
 
   void publish_protection(const protection::Decision& d) {
-    send_if_due_or_changed<can::Faults>(d.faults != published_faults_, [&] { return messages::faults(d); });
+    const bool faults_changed = d.faults != published_faults_;
+    send_if_due_or_changed<can::Faults>(faults_changed, [&] { return messages::faults(d); });
+    send_if_due_or_changed<can::MoreFaults>(faults_changed, [&] { return messages::more_faults(d); });
     send_if_due_or_changed<can::ContactorState>(d.state != published_state_ || d.outputs != published_outputs_,
                                                 [&] { return messages::contactor_state(d); });
     send_if_due<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
@@ -154,7 +156,8 @@ class Telemetry {
   std::optional<measurement::StartingPoint> start_;
   typename SendStatesOf<can::Messages>::type sent_{};
   estimator::EstimateHash hash_;
-  std::uint32_t now_us_ = 0, published_faults_ = 0, published_ = 0;
+  protection::FaultSet published_faults_ = 0;
+  std::uint32_t now_us_ = 0, published_ = 0;
   protection::ContactorState published_state_ = protection::ContactorState::off;
   protection::Outputs published_outputs_;
   std::uint16_t samples_ = 0;

@@ -20,6 +20,8 @@ inline std::deque<can::Frame> requests;
 inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
 inline std::int32_t dc_link_reading_uv = 0;
+inline std::uint32_t second_line = 0;
+inline std::int32_t second_current_reading_ua = measurement::no_reading;
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;

@@ -156,7 +156,7 @@ TEST(Protection, FollowsARequestMadeBeforeTheFirstSample) {
 TEST(Protection, DecidesTheSameAcrossAWrapOfTheClock) {
   const auto run = [](std::uint64_t start_us) {
     ProtectionBench b(start_us);
-    std::vector<std::tuple<std::uint32_t, int, bool, std::int32_t, std::uint64_t>> all;
+    std::vector<std::tuple<FaultSet, int, bool, std::int32_t, std::uint64_t>> all;
     b.inputs.request = Request::drive;
     for (int k = 0; k < 900; ++k) {
       if (k == 60) b.load_ua = -3'000'000;
