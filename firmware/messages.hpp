@@ -10,6 +10,7 @@
 #include "estimator/pack_estimator.hpp"
 #include "hal/board_state.hpp"
 #include "hal/power.hpp"
+#include "hal/second_line.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
@@ -170,6 +171,16 @@ constexpr can::Faults faults(const protection::Decision& d) {
 }
 constexpr can::MoreFaults more_faults(const protection::Decision& d) {
   return fault_bits<can::MoreFaults>(static_cast<std::uint32_t>(d.faults >> 32));
+}
+
+/// trips: hal::SecondLineTrip, in the order of the signals.
+constexpr can::FrontEnd front_end(std::uint32_t trips, const hal::FrontEndHealth& health) {
+  auto m = fault_bits<can::FrontEnd>(trips);
+  m.state = static_cast<std::uint32_t>(health.state);
+  m.lost = std::min<std::uint32_t>(health.lost, 255U);
+  m.resets = std::min<std::uint32_t>(health.resets, 255U);
+  m.crc_errors = std::min<std::uint32_t>(health.bad_crc, 65'535U);
+  return m;
 }
 
 constexpr can::ContactorState contactor_state(const protection::Decision& d) {

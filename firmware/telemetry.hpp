@@ -107,6 +107,10 @@ class Telemetry {
     send_if_due_or_changed<can::ContactorState>(d.state != published_state_ || d.outputs != published_outputs_,
                                                 [&] { return messages::contactor_state(d); });
     send_if_due<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
+    const std::uint32_t trips = hal::second_line_trips();
+    send_if_due_or_changed<can::FrontEnd>(trips != published_trips_,
+                                          [&] { return messages::front_end(trips, hal::front_end_health()); });
+    published_trips_ = trips;
     published_faults_ = d.faults;
     published_state_ = d.state;
     published_outputs_ = d.outputs;
@@ -157,7 +161,7 @@ class Telemetry {
   typename SendStatesOf<can::Messages>::type sent_{};
   estimator::EstimateHash hash_;
   protection::FaultSet published_faults_ = 0;
-  std::uint32_t now_us_ = 0, published_ = 0;
+  std::uint32_t now_us_ = 0, published_ = 0, published_trips_ = 0;
   protection::ContactorState published_state_ = protection::ContactorState::off;
   protection::Outputs published_outputs_;
   std::uint16_t samples_ = 0;

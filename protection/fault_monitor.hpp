@@ -133,13 +133,11 @@ class FaultMonitor {
     if (raised == 0) return;
     std::size_t most_severe = fault_count;
     for (std::size_t k = 0; k < fault_count; ++k, raised >>= 1) {
-      if ((raised & 1) != 0 &&
-          (most_severe == fault_count || (*rules_)[k].reaction > (*rules_)[most_severe].reaction))
+      if ((raised & 1) != 0 && (most_severe == fault_count || (*rules_)[k].reaction > (*rules_)[most_severe].reaction))
         most_severe = k;
     }
     const auto mild = [&](std::size_t k) { return (*rules_)[k].reaction <= Reaction::derate; };
-    if (first_.fault < fault_count && is_first(still) && (!mild(first_.fault) || mild(most_severe)))
-      return;
+    if (first_.fault < fault_count && is_first(still) && (!mild(first_.fault) || mild(most_severe))) return;
     first_ = {static_cast<std::uint8_t>(most_severe), time_us};
   }
 

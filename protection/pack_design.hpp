@@ -26,7 +26,7 @@ struct PackDesign {
   double bleed_ohm = 33;                   ///< balancing resistor
   bool neighbours_may_bleed = false;       ///< allowed by the monitoring chip (its data sheet; heat, shared wires)
   double bleed_temperature_max_c = 55;     ///< no balancing with a warmer cell
-  double recovery_c_rate = 0.05;  ///< largest charge current of a pack with severe undervoltage: C/20
+  double recovery_c_rate = 0.05;           ///< largest charge current of a pack with severe undervoltage: C/20
   /// Largest current that the sensor can measure. Beyond it, its reading stays at the end of the range.
   double current_range_a = max_reading_a;
   /// Worst-case errors of a cell's and of the pack's reading (front end at -40 to 85 degrees C, after calibration).

@@ -81,7 +81,7 @@ struct ExternalInputs {
   std::int32_t dc_link_uv = measurement::no_reading;  ///< load side of the contactors
   bool board_fault = false;                           ///< failed self-test; with the first sample, a watchdog reset
   bool storage_fault = false;
-  std::uint32_t second_line = 0;  ///< trips of the front end: protection/second_line.hpp
+  std::uint32_t second_line = 0;                             ///< trips of the front end: protection/second_line.hpp
   std::int32_t second_current_ua = measurement::no_reading;  ///< of the second current sensor, if one is fitted
 };
 

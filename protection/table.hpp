@@ -46,10 +46,10 @@ enum class Quantity : std::uint8_t {
   precharge_off_curve,  ///< 0 or 1; this and the next two come from the contactors
   welded,
   not_closed,
-  sample_age_us,    ///< since the last usable sample
-  integrity_error,  ///< 0 or 1
-  storage_failed,   ///< 0 or 1
-  second_line_trips,     ///< 0 or 1, as all that follow but the difference of the sensors
+  sample_age_us,      ///< since the last usable sample
+  integrity_error,    ///< 0 or 1
+  storage_failed,     ///< 0 or 1
+  second_line_trips,  ///< 0 or 1, as all that follow but the difference of the sensors
   second_line_broken,
   current_difference_ua,  ///< magnitude, less the share of the current that the gains explain
   temperatures_unknown,   ///< no sensor has a reading
@@ -162,7 +162,8 @@ constexpr Table protection_table(const PackDesign& d) {
            .raised = {.quantity = lowest_cell_uv, .sense = below, .threshold = low_v(-0.12), .delay_s = 0.2},
            .released = {.threshold = low_v(0), .after_s = 10, .recovery = on_clear},
            .reaction = open_now,
-           .why = "two samples at 10 Hz; released at the limit, up to which a pack is charged with a recovery current"}),
+           .why =
+               "two samples at 10 Hz; released at the limit, up to which a pack is charged with a recovery current"}),
       row({.fault = pack_overvoltage,
            .raised = {.quantity = pack_uv, .sense = above, .threshold = pack_high_v(0.02), .delay_s = 2},
            .released = {.threshold = pack_high_v(-0.06), .after_s = 60, .recovery = automatic},
@@ -184,8 +185,10 @@ constexpr Table protection_table(const PackDesign& d) {
            .reaction = forbid_discharge,
            .why = "as for the charge current"}),
       row({.fault = short_circuit,
-           .raised =
-               {.quantity = current_magnitude_ua, .sense = above, .threshold = in_micro(short_circuit_a(d)), .delay_s = 0},
+           .raised = {.quantity = current_magnitude_ua,
+                      .sense = above,
+                      .threshold = in_micro(short_circuit_a(d)),
+                      .delay_s = 0},
            .released = {.threshold = in_micro(most_a), .after_s = 10, .recovery = service},
            .reaction = open_now,
            .why = "no delay: fuse and comparator are faster, this fault keeps the contactors open"}),

@@ -23,7 +23,8 @@ void bring_about(std::size_t k, std::int32_t value, BoardTruck& truck, measureme
     s.current_ua = value;
   } else if (k == exceeded) {
     // 1.1 times the allowed current plus the rest current of 2 % of 6 Ah
-    s.current_ua = static_cast<std::int32_t>(-1e6 * (1.1 * static_cast<double>(truck.allowed.discharge) + 0.12)) - value;
+    s.current_ua =
+        static_cast<std::int32_t>(-1e6 * (1.1 * static_cast<double>(truck.allowed.discharge) + 0.12)) - value;
   } else if (k == implausible) {
     for (auto& uv : s.cell_uv) uv -= value > 0 && uv != measurement::no_reading ? 300'000 : 0;
   } else {
@@ -262,9 +263,7 @@ class Matrix {
   }
   /// Returns true if the same readings cause both faults, or if one needs a reading that the other removes.
   static bool shares(std::size_t k, std::size_t other) {
-    const auto overload_or_current = [](std::size_t r) {
-      return of_the_current(r) || r == 10 || r == 22;
-    };
+    const auto overload_or_current = [](std::size_t r) { return of_the_current(r) || r == 10 || r == 22; };
     const auto cells = [](std::size_t r) {
       return r <= 7 || r == 16 || r == 17 || r == 19 || r == 20 || r == 21 || r == 25 || r == implausible;
     };

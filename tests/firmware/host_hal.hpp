@@ -21,6 +21,7 @@ inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
 inline std::int32_t dc_link_reading_uv = 0;
 inline std::uint32_t second_line = 0;
+inline hal::FrontEndHealth front_end;
 inline std::int32_t second_current_reading_ua = measurement::no_reading;
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
