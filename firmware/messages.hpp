@@ -153,34 +153,48 @@ constexpr can::Temperatures temperatures(const measurement::PackSample<Cells>& p
   return m;
 }
 
-/// Sets the signals of one bit, in their order.
+/// Returns true if the signals of one bit follow each other from bit 16 on.
 template <class Message>
-constexpr Message fault_bits(std::uint32_t faults) {
-  Message m;
-  m.each([&](const char*, const char*, std::uint32_t& value, const can::SignalLayout& s) {
-    if (s.bits != 1) return;
-    value = faults & 1;
-    faults >>= 1;
+constexpr bool bits_follow_each_other() {
+  unsigned next = 16;
+  bool follow = true;
+  Message{}.each([&](const char*, const char*, const std::uint32_t&, const can::SignalLayout& s) {
+    if (s.bits == 1) follow = follow && s.start == next++;
   });
-  return m;
-}
-constexpr can::Faults faults(const protection::Decision& d) {
-  auto m = fault_bits<can::Faults>(static_cast<std::uint32_t>(d.faults));
-  m.first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
-  return m;
-}
-constexpr can::MoreFaults more_faults(const protection::Decision& d) {
-  return fault_bits<can::MoreFaults>(static_cast<std::uint32_t>(d.faults >> 32));
+  return follow;
 }
 
-/// trips: hal::SecondLineTrip, in the order of the signals.
-constexpr can::FrontEnd front_end(std::uint32_t trips, const hal::FrontEndHealth& health) {
-  auto m = fault_bits<can::FrontEnd>(trips);
-  m.state = static_cast<std::uint32_t>(health.state);
-  m.lost = std::min<std::uint32_t>(health.lost, 255U);
-  m.resets = std::min<std::uint32_t>(health.resets, 255U);
-  m.crc_errors = std::min<std::uint32_t>(health.bad_crc, 65'535U);
-  return m;
+/// A message whose signals of one bit are written as one word, which takes a tenth of the code.
+template <class Message>
+struct BitMessage {
+  static_assert(bits_follow_each_other<Message>());
+  std::uint64_t raw = 0;   ///< bits 16 to 63 of the frame
+  std::uint8_t state = 0;  ///< bits 12 to 15
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{Message::id, 8, {}};
+    can::put_raw(out, 12, 52, raw << 4 | state);
+    can::protect(out, Message::data_id, counter);
+    return out;
+  }
+};
+
+constexpr BitMessage<can::Faults> faults(const protection::Decision& d) {
+  static_assert(can::Faults::first_cause_layout.start == 48);
+  const std::uint32_t first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
+  return {std::uint64_t{first_cause} << 32 | static_cast<std::uint32_t>(d.faults)};
+}
+constexpr BitMessage<can::MoreFaults> more_faults(const protection::Decision& d) { return {d.faults >> 32}; }
+
+/// trips: hal::SecondLineTrip, in the order of the signals. Counters saturate.
+constexpr BitMessage<can::FrontEnd> front_end(std::uint32_t trips, const hal::FrontEndHealth& health) {
+  using M = can::FrontEnd;
+  static_assert(M::state_layout.start == 12 && M::lost_layout.start == 32 && M::resets_layout.start == 40 &&
+                M::crc_errors_layout.start == 48);
+  const std::uint32_t counters = std::min<std::uint32_t>(health.bad_crc, 65'535U) << 16 |
+                                 std::min<std::uint32_t>(health.resets, 255U) << 8 |
+                                 std::min<std::uint32_t>(health.lost, 255U);
+  return {std::uint64_t{counters} << 16 | trips, static_cast<std::uint8_t>(health.state)};
 }
 
 constexpr can::ContactorState contactor_state(const protection::Decision& d) {

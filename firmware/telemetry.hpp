@@ -82,6 +82,14 @@ class Telemetry {
 
   template <class Message>
   void send(const Message& message) {
+    send_as<Message>(message);
+  }
+  template <class Message>
+  void send(const messages::BitMessage<Message>& message) {
+    send_as<Message>(message);
+  }
+  template <class Message, class Content>
+  void send_as(const Content& message) {
     auto& sent = std::get<SendState<Message>>(sent_);
     hal::can_send(message.frame(sent.counter));
     sent.counter = can::next(sent.counter);

@@ -16,7 +16,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 #include "measurement/pack_sample.hpp"
 #include "protection/fault_monitor.hpp"
@@ -27,7 +26,7 @@ namespace bms::protection {
 /// Limits of a pack as integers.
 struct PackLimits {
   std::int32_t charge_ua_256th, discharge_ua_256th;  ///< 1.05 x continuous limit / 256
-  std::int32_t common_range_ua;                      ///< that both current sensors can measure
+  std::int32_t common_range_ua;                      ///< that both current sensors can measure, at most 1,000 A
   std::int32_t gain_error_256ths;                    ///< of both current sensors together
   std::uint8_t temperatures;
 };
@@ -35,7 +34,7 @@ struct PackLimits {
 constexpr PackLimits pack_limits(const PackDesign& d) {
   const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
   return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a),
-          in_micro(std::min(d.current_range_a, d.second_current_range_a)),
+          in_micro(std::min({d.current_range_a, d.second_current_range_a, 1'000.0})),
           static_cast<std::int32_t>(256 * d.current_gain_error + 0.5),
           std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures)};
 }
@@ -46,10 +45,7 @@ constexpr std::int32_t current_difference_ua(const PackLimits& limits, std::int3
   if (first_ua == measurement::no_reading || second_ua == measurement::no_reading) return measurement::no_reading;
   const std::int32_t most = limits.common_range_ua, a = std::clamp(first_ua, -most, most),
                      b = std::clamp(second_ua, -most, most);
-  const std::int32_t larger = std::max(magnitude(a), magnitude(b));
-  const std::int64_t difference = std::int64_t{a} - b;
-  const std::int64_t unexplained = std::max(difference, -difference) - larger / 256 * limits.gain_error_256ths;
-  return static_cast<std::int32_t>(std::min<std::int64_t>(unexplained, std::numeric_limits<std::int32_t>::max()));
+  return magnitude(a - b) - std::max(magnitude(a), magnitude(b)) / 256 * limits.gain_error_256ths;
 }
 
 /// Returns true for a possible cell voltage. A reversed cell reads a little below 0.
