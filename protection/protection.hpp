@@ -166,7 +166,7 @@ class Protection {
                                          .mean_soc_ppb = estimate.soc_ppb,
                                          .current_ua = sample.current_ua,
                                          .highest_cdegc = at(q, Quantity::highest_cdegc),
-                                         .allowed = (faults & (plan_->open | plan_->open_now)) == 0},
+                                         .allowed = (monitor_.active() & (plan_->open | plan_->open_now)) == 0},
                                         step_us);
     decision_.bleed_left_s = balancing_.left_s(at(q, Quantity::lowest_cell_uv));
     return decision_;
