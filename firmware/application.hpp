@@ -26,12 +26,25 @@
 #include "hal/estimate_record.hpp"
 #include "hal/power_path.hpp"
 #include "hal/requests.hpp"
+#include "hal/second_current.hpp"
+#include "hal/second_line.hpp"
 #include "hal/supply.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
 namespace bms::firmware {
+
+namespace second_line = protection::second_line;
+static_assert(second_line::cell_undervoltage == hal::cell_undervoltage &&
+                  second_line::cell_overvoltage == hal::cell_overvoltage &&
+                  second_line::charge_overcurrent == hal::charge_overcurrent &&
+                  second_line::discharge_overcurrent == hal::discharge_overcurrent &&
+                  second_line::short_circuit == hal::short_circuit && second_line::temperature == hal::temperature &&
+                  second_line::host_silence == hal::host_silence &&
+                  second_line::permanent_failure == hal::permanent_failure &&
+                  second_line::pins_wrong == hal::pins_wrong,
+              "protection/second_line.hpp and hal/second_line.hpp number the trips differently");
 
 /// Only the battery's own messages. Other profiles: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
 struct WithoutVehicleProfile {
@@ -51,8 +64,7 @@ class Application {
   Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
               float capacity_ah, storage::Persistence& persistence)
       : estimator_{start ? Estimator(*start) : Estimator()},
-        protection_{Board::plan(),
-                    static_cast<std::uint32_t>(persistence.settings().get(latched_faults_key).value_or(0))},
+        protection_{Board::plan(), stored_latched_faults(persistence)},
         telemetry_{identity, start},
         capacity_ah_{capacity_ah},
         persistence_{persistence},
@@ -138,12 +150,14 @@ class Application {
     if (board_.cell_file_changed && inputs.clear != protection::Clear::none) [[unlikely]]
       accept_cell_file();
     inputs.dc_link_uv = hal::dc_link_uv();
+    inputs.second_line = hal::second_line_trips();
+    inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
     inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
     first_ = false;
-    const std::uint32_t latched_before = protection_.decision().latched;
+    const protection::FaultSet latched_before = protection_.decision().latched;
     const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
@@ -152,7 +166,7 @@ class Application {
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
-      persistence_.set(latched_faults_key, static_cast<std::int32_t>(decision.latched));
+      store_latched_faults(decision.latched, latched_before);
   }
 
   /// Clearing the faults confirms the new cell file: from now on the stored data belong to it.
@@ -161,10 +175,20 @@ class Application {
     board_.cell_file_changed = false;
   }
 
-  [[gnu::noinline]] void store_faults(std::uint32_t raised) {
-    for (std::uint16_t k = 0; k < protection::fault_count; ++k) {
-      if ((raised >> k & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
+  [[gnu::noinline]] void store_faults(protection::FaultSet raised) {
+    for (std::uint16_t k = 0; k < protection::fault_count; ++k, raised >>= 1) {
+      if ((raised & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
     }
+  }
+
+  /// Writes only the word that has changed.
+  [[gnu::noinline]] void store_latched_faults(protection::FaultSet now, protection::FaultSet before) {
+    const auto store = [&](std::uint16_t key, int shift) {
+      if (((now ^ before) >> shift & 0xFFFF'FFFF) != 0)
+        persistence_.set(key, static_cast<std::int32_t>(static_cast<std::uint32_t>(now >> shift)));
+    };
+    store(latched_faults_key, 0);
+    store(more_latched_faults_key, 32);
   }
 
   void handle_requests(std::uint64_t now_us) {

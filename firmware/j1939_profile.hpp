@@ -80,10 +80,10 @@ constexpr DcSourceStatus4 status_4(const protection::Decision& d, const protecti
 
 constexpr DcSourceStatus6 status_6(const protection::Decision& d) {
   using protection::bit, protection::Fault;
-  constexpr std::uint32_t above =
+  constexpr protection::FaultSet above =
       bit(Fault::cell_overvoltage) | bit(Fault::cell_overvoltage_severe) | bit(Fault::pack_overvoltage);
-  constexpr std::uint32_t below = bit(Fault::cell_undervoltage) | bit(Fault::cell_undervoltage_severe) |
-                                  bit(Fault::pack_undervoltage) | bit(Fault::deep_discharge);
+  constexpr protection::FaultSet below = bit(Fault::cell_undervoltage) | bit(Fault::cell_undervoltage_severe) |
+                                         bit(Fault::pack_undervoltage) | bit(Fault::deep_discharge);
   auto m = message_of_instance<DcSourceStatus6>();
   m.high_voltage_limit = flag((d.faults & (above | bit(Fault::cell_overvoltage_warning))) != 0);
   m.high_voltage_disconnect = flag((d.faults & above) != 0 && !d.outputs.main_plus);

@@ -10,6 +10,7 @@
 #include "estimator/pack_estimator.hpp"
 #include "hal/board_state.hpp"
 #include "hal/power.hpp"
+#include "hal/second_line.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
@@ -152,14 +153,48 @@ constexpr can::Temperatures temperatures(const measurement::PackSample<Cells>& p
   return m;
 }
 
-constexpr can::Faults faults(const protection::Decision& d) {
-  can::Faults m;
-  std::size_t k = 0;
-  m.each([&](const char*, const char*, std::uint32_t& value, const can::SignalLayout& s) {
-    if (s.bits == 1) value = d.faults >> k++ & 1;
+/// Returns true if the signals of one bit follow each other from bit 16 on.
+template <class Message>
+constexpr bool bits_follow_each_other() {
+  unsigned next = 16;
+  bool follow = true;
+  Message{}.each([&](const char*, const char*, const std::uint32_t&, const can::SignalLayout& s) {
+    if (s.bits == 1) follow = follow && s.start == next++;
   });
-  m.first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
-  return m;
+  return follow;
+}
+
+/// A message whose signals of one bit are written as one word, which takes a tenth of the code.
+template <class Message>
+struct BitMessage {
+  static_assert(bits_follow_each_other<Message>());
+  std::uint64_t raw = 0;   ///< bits 16 to 63 of the frame
+  std::uint8_t state = 0;  ///< bits 12 to 15
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{Message::id, 8, {}};
+    can::put_raw(out, 12, 52, raw << 4 | state);
+    can::protect(out, Message::data_id, counter);
+    return out;
+  }
+};
+
+constexpr BitMessage<can::Faults> faults(const protection::Decision& d) {
+  static_assert(can::Faults::first_cause_layout.start == 48);
+  const std::uint32_t first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
+  return {std::uint64_t{first_cause} << 32 | static_cast<std::uint32_t>(d.faults)};
+}
+constexpr BitMessage<can::MoreFaults> more_faults(const protection::Decision& d) { return {d.faults >> 32}; }
+
+/// trips: hal::SecondLineTrip, in the order of the signals. Counters saturate.
+constexpr BitMessage<can::FrontEnd> front_end(std::uint32_t trips, const hal::FrontEndHealth& health) {
+  using M = can::FrontEnd;
+  static_assert(M::state_layout.start == 12 && M::lost_layout.start == 32 && M::resets_layout.start == 40 &&
+                M::crc_errors_layout.start == 48);
+  const std::uint32_t counters = std::min<std::uint32_t>(health.bad_crc, 65'535U) << 16 |
+                                 std::min<std::uint32_t>(health.resets, 255U) << 8 |
+                                 std::min<std::uint32_t>(health.lost, 255U);
+  return {std::uint64_t{counters} << 16 | trips, static_cast<std::uint8_t>(health.state)};
 }
 
 constexpr can::ContactorState contactor_state(const protection::Decision& d) {

@@ -16,8 +16,9 @@
 namespace bms::firmware {
 
 // Keys of the stored settings and codes of the stored faults.
-inline constexpr std::uint16_t latched_faults_key = 1;  ///< protection::Decision::latched
-inline constexpr std::uint16_t cell_file_key = 2;       ///< hash of the cell file that the stored data belong to
+inline constexpr std::uint16_t latched_faults_key = 1;       ///< bits 0 to 31 of protection::Decision::latched
+inline constexpr std::uint16_t more_latched_faults_key = 3;  ///< its bits 32 to 63
+inline constexpr std::uint16_t cell_file_key = 2;            ///< hash of the cell file that the stored data belong to
 /// Four keys for hal::SensorCalibration: gain [ppm] and offset [uV] of the voltage, gain [ppm] and offset [uA] of the
 /// current.
 inline constexpr std::uint16_t first_calibration_key = 16;
@@ -67,6 +68,14 @@ class StateToStoreOf {
   storage::EstimatorSnapshot values_;
   std::array<storage::CellsRecord::Cell, Cells> cells_{};
 };
+
+/// Faults that were latched in the last run.
+inline protection::FaultSet stored_latched_faults(const storage::Persistence& persistence) {
+  const auto word = [&](std::uint16_t key) {
+    return static_cast<std::uint32_t>(persistence.settings().get(key).value_or(0));
+  };
+  return protection::FaultSet{word(more_latched_faults_key)} << 32 | word(latched_faults_key);
+}
 
 /// Calibration of the measuring chain from the stored settings; 0 where nothing is stored.
 inline hal::SensorCalibration stored_calibration(const storage::Persistence& persistence) {

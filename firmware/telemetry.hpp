@@ -82,6 +82,14 @@ class Telemetry {
 
   template <class Message>
   void send(const Message& message) {
+    send_as<Message>(message);
+  }
+  template <class Message>
+  void send(const messages::BitMessage<Message>& message) {
+    send_as<Message>(message);
+  }
+  template <class Message, class Content>
+  void send_as(const Content& message) {
     auto& sent = std::get<SendState<Message>>(sent_);
     hal::can_send(message.frame(sent.counter));
     sent.counter = can::next(sent.counter);
@@ -101,10 +109,16 @@ class Telemetry {
   }
 
   void publish_protection(const protection::Decision& d) {
-    send_if_due_or_changed<can::Faults>(d.faults != published_faults_, [&] { return messages::faults(d); });
+    const bool faults_changed = d.faults != published_faults_;
+    send_if_due_or_changed<can::Faults>(faults_changed, [&] { return messages::faults(d); });
+    send_if_due_or_changed<can::MoreFaults>(faults_changed, [&] { return messages::more_faults(d); });
     send_if_due_or_changed<can::ContactorState>(d.state != published_state_ || d.outputs != published_outputs_,
                                                 [&] { return messages::contactor_state(d); });
     send_if_due<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
+    const std::uint32_t trips = hal::second_line_trips();
+    send_if_due_or_changed<can::FrontEnd>(trips != published_trips_,
+                                          [&] { return messages::front_end(trips, hal::front_end_health()); });
+    published_trips_ = trips;
     published_faults_ = d.faults;
     published_state_ = d.state;
     published_outputs_ = d.outputs;
@@ -154,7 +168,8 @@ class Telemetry {
   std::optional<measurement::StartingPoint> start_;
   typename SendStatesOf<can::Messages>::type sent_{};
   estimator::EstimateHash hash_;
-  std::uint32_t now_us_ = 0, published_faults_ = 0, published_ = 0;
+  protection::FaultSet published_faults_ = 0;
+  std::uint32_t now_us_ = 0, published_ = 0, published_trips_ = 0;
   protection::ContactorState published_state_ = protection::ContactorState::off;
   protection::Outputs published_outputs_;
   std::uint16_t samples_ = 0;

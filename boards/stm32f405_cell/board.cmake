@@ -6,6 +6,7 @@ set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/../stm32f405_forklift/memory.ld)
 set(BMS_CHIP stm32f4)
 set(BMS_CELLS 1)
 set(BMS_SAMPLE_PERIOD_S 0.1)
+set(BMS_CURRENT_RANGE_A 41)  # 1.65 V / (20 x 2 mohm): hal/adc/cell_readings.hpp
 set(BMS_EMULATED OFF)
 set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)

@@ -6,6 +6,7 @@ set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/memory.ld)
 set(BMS_CHIP stm32f4)
 set(BMS_CELLS 16)
 set(BMS_SAMPLE_PERIOD_S 0.1)
+set(BMS_CURRENT_RANGE_A 2000)  # 200 mV at 0.1 mohm
 set(BMS_EMULATED OFF)
 set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)

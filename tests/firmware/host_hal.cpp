@@ -9,6 +9,9 @@ void host_hal::begin() {
   recorded.clear();
   switched = {};
   dc_link_reading_uv = 0;
+  second_line = 0;
+  front_end = {};
+  second_current_reading_ua = measurement::no_reading;
   cause = hal::ResetCause::power_on;
   fault.reset();
   fed = 0;
@@ -37,6 +40,9 @@ void record_estimate(std::span<const std::uint32_t> words) {
 }
 void power_path_set(const PowerPath& wanted) { host_hal::switched = wanted; }
 std::int32_t dc_link_uv() { return host_hal::dc_link_reading_uv; }
+std::uint32_t second_line_trips() { return host_hal::second_line; }
+FrontEndHealth front_end_health() { return host_hal::front_end; }
+std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }
 std::optional<std::uint32_t> calendar_s() { return std::nullopt; }

@@ -2,6 +2,7 @@
 // service faults, corrections.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/firmware/host_board.hpp"
@@ -124,6 +125,28 @@ TEST_F(StoredStateTest, AShortCircuitStaysUntilAWorkshopClearsIt) {
   send_command(board, can::Command::code_clear_faults, 1);
   run(board, 2);
   EXPECT_EQ(last<can::Faults>()->short_circuit, 0U);
+}
+
+TEST_F(StoredStateTest, AFailedSecondLineStaysUntilAWorkshopClearsIt) {
+  std::vector<std::uint8_t> kept;
+  {
+    HostBoard board(new_chip, start);
+    run(board, 5);
+    host_hal::second_line = hal::permanent_failure;
+    run(board, 2);
+    EXPECT_EQ(last<can::MoreFaults>()->second_line_failed, 1U);
+    kept = board.flash();
+    host_hal::second_line = 0;
+  }
+  HostBoard board(kept, start);
+  run(board, 20);
+  EXPECT_EQ(last<can::MoreFaults>()->second_line_failed, 1U);
+  EXPECT_EQ(last<can::Faults>()->short_circuit, 0U);
+  const auto& last_faults = board.persistence().events().fault;
+  EXPECT_TRUE(std::any_of(last_faults.begin(), last_faults.end(), [](const auto& f) { return f.code == 34; }));
+  send_command(board, can::Command::code_clear_faults, 1);
+  run(board, 2);
+  EXPECT_EQ(last<can::MoreFaults>()->second_line_failed, 0U);
 }
 
 TEST_F(StoredStateTest, ACorrectionIsAppliedAtOnceAndStored) {

@@ -1,0 +1,128 @@
+// One wrong reading of a cell against the pack's own measurement, and large cells.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/cells.hpp"
+#include "tests/protection/protection_bench.hpp"
+
+namespace bms::protection {
+namespace {
+
+/// Time until the contactors are open [s]; -1: 20 s are not enough. pack_uv: measured by its own divider.
+double opens_after_s(const std::function<void(measurement::PackSample<16>&)>& change, FaultSet& faults) {
+  ProtectionBench b;
+  b.drive_off();
+  for (int k = 1; k <= 200; ++k) {
+    b.sample.time_us = b.time_us += b.period;
+    for (std::size_t c = 0; c < 16; ++c)
+      b.sample.cell_uv[c] = 3'300'000 + static_cast<std::int32_t>(500 * ((static_cast<std::size_t>(k) + c) % 3));
+    b.sample.pack_uv = 16 * 3'300'500;
+    b.sample.current_ua = -3'000'000;
+    change(b.sample);
+    b.inputs.dc_link_uv = b.sample.pack_uv;
+    faults |= b.protection.update(b.sample, b.estimate, b.inputs).faults;
+    if (!b.protection.decision().outputs.any_closed()) return 0.1 * k;
+  }
+  return -1;
+}
+
+TEST(HiddenCell, AChannelThatReadsHalfAVoltLowHidesNoOverchargedCell) {
+  FaultSet faults = 0;
+  const double after_s = opens_after_s(
+      [](auto& s) {  // the cell has 4.1 V and reads 3.6 V; the pack has its true voltage
+        s.cell_uv[6] = 3'600'000;
+        s.pack_uv += 4'100'000 - 3'300'500;
+      },
+      faults);
+  EXPECT_EQ(faults, bit(Fault::sum_mismatch));
+  EXPECT_NEAR(after_s, 1 + 5 + 0.1, 0.21) << "a second, and the grace time";
+}
+
+TEST(HiddenCell, ASenseTapThatIsHalfAVoltLowShiftsTwoNeighbours) {
+  FaultSet faults = 0;
+  const double after_s = opens_after_s(
+      [](auto& s) {
+        s.cell_uv[6] -= 500'000;
+        s.cell_uv[7] += 500'000;
+      },
+      faults);
+  EXPECT_NE(faults & bit(Fault::open_wire), 0U);
+  EXPECT_GE(after_s, 0);
+  EXPECT_LE(after_s, 0.5 + 5 + 0.3);
+}
+
+/// All errors at their worst with the same sign: 5 mV per cell, 0.2 V of the pack. A load ramps between 0 and its
+/// limit in a second, again and again; cells have a drop of 0.16 V then, and pack and cells are read 63 ms apart.
+TEST(SumOfCells, WorstErrorsOfGoodReadingsAndLoadRampsAreNoFault) {
+  for (const double sign : {-1.0, 1.0}) {
+    ProtectionBench b;
+    b.drive_off();
+    const auto load = [](double t_s) { return std::abs(t_s - 2 * std::round(t_s / 2)); };  // 0 .. 1 .. 0 in 2 s
+    for (int k = 0; k < 600; ++k) {
+      const double t_s = 0.1 * k;
+      b.sample.time_us = b.time_us += b.period;
+      const auto cell_v = [&](double at_s) { return 3.3 - 0.16 * load(at_s); };
+      for (std::size_t c = 0; c < 16; ++c)
+        b.sample.cell_uv[c] =
+            static_cast<std::int32_t>(1e6 * (cell_v(t_s) + sign * 0.005)) + (k + static_cast<int>(c)) % 3;
+      b.sample.pack_uv = static_cast<std::int32_t>(1e6 * (16 * cell_v(t_s + 0.063) - sign * 0.2));
+      b.sample.current_ua = static_cast<std::int32_t>(-6e6 * load(t_s));
+      b.inputs.dc_link_uv = b.sample.pack_uv;
+      ASSERT_EQ(b.protection.update(b.sample, b.estimate, b.inputs).faults, 0U) << t_s << " s, " << sign;
+    }
+  }
+}
+
+/// Cells in parallel, up to the largest current that a cell file may have.
+constexpr PackDesign of_cells_with(double limit_a) {
+  PackDesign d = forklift;
+  d.capacity_ah = limit_a / 2;
+  d.limits.charge_current_max_a = d.limits.discharge_current_max_a = limit_a;
+  return d;
+}
+constexpr ProtectionPlan of_430_a = protection_plan(of_cells_with(430)),
+                         of_1000_a = protection_plan(of_cells_with(1'000)),
+                         of_2000_a = protection_plan(of_cells_with(2'000));
+
+TEST(LargeCells, Of430And1000AmperesAreProtectedUpToTheEndOfAReading) {
+  for (const ProtectionPlan* plan : {&of_430_a, &of_1000_a}) {
+    const double limit_a = 1e-6 * plan->derating.discharge_max_ua;
+    EXPECT_TRUE(consistent(plan->rules));
+    EXPECT_TRUE(current_sensor_suffices(of_cells_with(limit_a)));
+    EXPECT_NEAR(1e-6 * plan->rule(Fault::short_circuit).threshold, 0.9 * 2'147, 0.1);
+    for (const int sign : {-1, 1}) {
+      ProtectionBench b(0, *plan);
+      b.drive_off();
+      b.load_ua = sign * static_cast<std::int32_t>(1e6 * limit_a);
+      b.run(300);
+      EXPECT_EQ(b.protection.decision().faults & ~bit(Fault::allowed_current_exceeded), 0U) << limit_a;
+      EXPECT_TRUE(b.protection.decision().outputs.any_closed()) << limit_a;
+      EXPECT_NEAR(1e-6 * b.protection.decision().allowed.discharge_ua, limit_a, 0.001 * limit_a);
+      b.load_ua = sign * 2'147'000'000;
+      EXPECT_FALSE(b.step().outputs.any_closed()) << limit_a;
+      EXPECT_NE(b.protection.decision().faults & bit(Fault::short_circuit), 0U);
+    }
+  }
+}
+
+TEST(LargeCells, Of2000AmperesAreRefusedByTheCellFileAndByTheBuild) {
+  EXPECT_FALSE(current_sensor_suffices(of_cells_with(2'000)));
+  EXPECT_GT(of_2000_a.rule(Fault::short_circuit).threshold, 0) << "saturated, not overflowed";
+  EXPECT_GT(of_2000_a.derating.discharge_max_ua, 1'999'000'000);
+  model::CellParameters<double> p = tests::table9;
+  for (const double limit_a : {430.0, 1'000.0, 1'200.0, 2'000.0}) {
+    p.limits.charge_current_max_a = p.limits.discharge_current_max_a = limit_a;
+    const model::CellFault fault = model::first_fault(p);
+    if (limit_a <= 1'200) {
+      EXPECT_EQ(fault.what, nullptr) << limit_a;
+      EXPECT_TRUE(current_sensor_suffices(of_cells_with(limit_a))) << "what a cell file may contain can be protected";
+    } else {
+      EXPECT_STREQ(fault.key, "limits.charge_current_max_a");
+      EXPECT_STREQ(fault.what, "0.001 to 1200 A, so that a short circuit is within a reading (2147 A)");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bms::protection
