@@ -72,8 +72,11 @@ struct PackEstimate {
 struct ExternalInputs {
   Request request = Request::none;
   Clear clear = Clear::none;                          ///< as long as the key is pressed
-  std::int32_t dc_link_uv = measurement::no_reading;  ///< load side of the contactors
-  bool board_fault = false;                           ///< failed self-test; with the first sample, a watchdog reset
+  /// L+ and L-, the load side of the contactors, against the negative end of the cells.
+  std::int32_t link_plus_uv = measurement::no_reading, link_minus_uv = measurement::no_reading;
+  AuxiliaryContacts auxiliary = {};
+  bool contact_lost = false;  ///< a main contact has opened by itself, perhaps only for a moment
+  bool board_fault = false;   ///< failed self-test; with the first sample, a watchdog reset
   bool storage_fault = false;
 };
 
@@ -82,6 +85,8 @@ struct Decision {
   std::uint32_t latched = 0;             ///< to be stored for the next start
   FirstCause first;
   ContactorState state = ContactorState::off;
+  Pole welded_pole = Pole::none;  ///< found since the start, not necessarily a fault
+  AuxiliaryContacts auxiliary = {};
   Outputs outputs;
   AllowedCurrent allowed;
   std::uint32_t bleed = 0;  ///< one bit per cell
@@ -143,9 +148,12 @@ class Protection {
     switch_contactors({.request = inputs.request,
                        .charge_forbidden = no_charge,
                        .discharge_forbidden = no_discharge,
+                       .contact_lost = inputs.contact_lost,
                        .current_ua = sample.current_ua,
                        .pack_uv = pack_uv,
-                       .dc_link_uv = inputs.dc_link_uv,
+                       .link_plus_uv = inputs.link_plus_uv,
+                       .link_minus_uv = inputs.link_minus_uv,
+                       .auxiliary = inputs.auxiliary,
                        .step_us = step_us});
     if (!may_drive()) decision_.allowed = {};
     decision_.bleed = balancing_.update({.cell_uv = sample.cell_uv,
@@ -247,6 +255,8 @@ class Protection {
     in.open_now = (monitor_.active() & plan_->open_now) != 0;
     decision_.outputs = contactors_.update(in);
     decision_.state = contactors_.state();
+    decision_.welded_pole = contactors_.welded_pole();
+    decision_.auxiliary = in.auxiliary;
     closed_once_ = closed_once_ || decision_.outputs.any_closed();
   }
 
