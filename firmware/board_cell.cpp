@@ -21,7 +21,8 @@ const protection::ProtectionPlan& BoardCell::plan() {
                                                             .capacity_ah = generated::parameters.capacity_ah,
                                                             .cells = cells,
                                                             .temperatures = cells > 1 ? 4 : 1,
-                                                            .sample_period_s = hal::sample_period_s});
+                                                            .sample_period_s = hal::sample_period_s,
+                                                            .dc_link = hal::has_dc_link});
   return plan;
 }
 
