@@ -62,11 +62,11 @@ constexpr std::array<can::Frame, 2> frames_of(const measurement::Sample& s) {
 template <std::size_t Cells>
 inline constexpr std::size_t pack_frames = 5 + (Cells + 1) / 2;
 
-/// counter: sequence number of the sample, any start value.
+/// link_plus_uv, link_minus_uv: no_reading if unknown. counter: sequence number of the sample, any start value.
 template <std::size_t Cells>
 constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement::PackSample<Cells>& s,
-                                                               std::int32_t link_plus_uv, std::int32_t link_minus_uv,
-                                                               std::uint16_t counter) {
+                                                               std::int32_t link_plus_uv, std::uint16_t counter,
+                                                               std::int32_t link_minus_uv = 0) {
   static_assert(Cells <= 16);
   std::array<can::Frame, pack_frames<Cells>> frames{};
   std::size_t n = 1;

@@ -41,15 +41,14 @@
 // Times are durations that stop at their limit, so nothing wraps. Integers only.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
 #include "measurement/sample.hpp"
+#include "protection/contactor_plan.hpp"
 #include "protection/dc_link.hpp"
 #include "protection/guarded.hpp"
-#include "protection/pack_design.hpp"
 
 namespace bms::protection {
 
@@ -74,26 +73,6 @@ struct AuxiliaryContacts {
 
   constexpr bool operator==(const AuxiliaryContacts&) const = default;
 };
-
-struct ContactorPlan {
-  static constexpr std::uint32_t without_readings_us = 5'000'000;  ///< longest opening without readings
-  static constexpr std::uint32_t max_half_time_constants = 14;
-
-  std::uint32_t test_us, half_time_constant_us;
-  std::int32_t rest_ua, max_closing_gap_uv;
-  bool dc_link;
-
-  /// Limit up to which the time in a state is counted.
-  constexpr std::uint32_t longest_us() const {
-    return std::max({test_us, max_half_time_constants * half_time_constant_us, without_readings_us});
-  }
-};
-
-constexpr ContactorPlan contactor_plan(const PackDesign& d) {
-  const std::uint32_t half_us = in_us(d.precharge_time_constant_s / 2);
-  return {std::max(half_us, in_us(3 * d.sample_period_s)), half_us, in_micro(d.rest_current_c_rate * d.capacity_ah),
-          in_micro(d.closing_current_max_a * d.closing_loop_ohm), d.dc_link};
-}
 
 struct ContactorInput {
   Request request = Request::none;
@@ -260,14 +239,7 @@ class Contactors {
     check_opened(in, link);
     if (link.known()) check_part(link);
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
-    if (events_.welded) {
-      weld_detected_ = weld_detected_ || suspected_;
-      suspected_ = true;
-      if (weld_detected_) enter(ContactorState::opening);
-      return;
-    }
-    suspected_ = false;
-    if (in_state_us_ < plan_->test_us) return;
+    if (suspect_weld() || in_state_us_ < plan_->test_us) return;
     if (!proven_) return fail_precharge(link);
     if (part() < last_part) return enter(ContactorState::self_test, part() + 1);
     const std::int32_t gap_uv = link.known() ? link.gap_uv() : measurement::no_reading;
@@ -275,14 +247,21 @@ class Contactors {
     first_gap_uv_ = last_gap_uv_ = gap_uv;
   }
 
+  /// Returns true if this sample shows a weld. Two in a row prove it.
+  constexpr bool suspect_weld() {
+    const bool proven = events_.welded && suspected_;
+    suspected_ = events_.welded;
+    weld_detected_ = weld_detected_ || proven;
+    if (proven) enter(ContactorState::opening);
+    return events_.welded;
+  }
+
   /// Proves that the commanded contactor has closed, or that another one is closed. link: known.
   constexpr void check_part(const DcLink& link) {
     const std::int32_t link_uv = link.link_uv();
     if (lowest_link_uv_ == measurement::no_reading || link_uv < lowest_link_uv_) lowest_link_uv_ = link_uv;
-    if (part() > 0 && link_uv - lowest_link_uv_ > link.pack_uv / 8) {
-      events_.welded = true;
-      welded_pole_ = part() == 1 ? Pole::minus : Pole::plus;
-    }
+    if (part() > 0 && link_uv - lowest_link_uv_ > link.pack_uv / 8)
+      found_welded(part() == 1 ? Pole::minus : Pole::plus);
     if (settled()) proven_ = proven_ || part() == 0 || (part() == 1 ? link.plus_at_pack() : link.minus_at_zero());
   }
 
@@ -294,6 +273,8 @@ class Contactors {
 
   constexpr void in_precharge(const ContactorInput& in, const DcLink& link) {
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
+    if (const Pole pole = closed_while_off(in, link); pole != Pole::none) found_welded(pole);
+    if (suspect_weld()) return;
     const std::uint32_t half = in_state_us_ / plan_->half_time_constant_us;
     if (half >= ContactorPlan::max_half_time_constants) return fail_precharge(link);
     if (!link.known()) return;
@@ -308,7 +289,7 @@ class Contactors {
       last_gap_uv_ = gap_uv;
       last_half_ = static_cast<std::uint8_t>(half);
     }
-    if ((still || gap_uv <= pack_uv / 50) && gap_uv <= plan_->max_closing_gap_uv) close(in);
+    if ((still || gap_uv <= pack_uv / 50) && gap_uv <= plan_->max_closing_gap_uv && link.minus_at_zero()) close(in);
   }
 
   constexpr void closed(const ContactorInput& in, const DcLink& link, Request mine) {
@@ -370,7 +351,10 @@ class Contactors {
   constexpr void check_opened(const ContactorInput& in, const DcLink& link) {
     const bool flows = in.current_ua != measurement::no_reading && !rests(in);
     const Pole pole = closed_while_off(in, link);
-    if (pole == Pole::none && !flows) return;
+    if (pole != Pole::none || flows) found_welded(pole);
+  }
+  /// pole: none or unknown if the current shows it.
+  constexpr void found_welded(Pole pole) {
     events_.welded = true;
     if (pole == Pole::plus || pole == Pole::minus)
       welded_pole_ = pole;

@@ -71,7 +71,7 @@ struct PackEstimate {
 /// Requests and commands from the bus, and results of the board's self-tests.
 struct ExternalInputs {
   Request request = Request::none;
-  Clear clear = Clear::none;                          ///< as long as the key is pressed
+  Clear clear = Clear::none;  ///< as long as the key is pressed
   /// L+ and L-, the load side of the contactors, against the negative end of the cells.
   std::int32_t link_plus_uv = measurement::no_reading, link_minus_uv = measurement::no_reading;
   AuxiliaryContacts auxiliary = {};

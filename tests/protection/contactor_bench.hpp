@@ -102,18 +102,16 @@ struct FedContactors {
     contactors.update(in);
     return contactors.state();
   }
-  /// Runs to a state with a normal DC link. It stays empty in precharge if that is the state.
-  FedContactors& to(ContactorState s, Request r = Request::drive) {
+  /// Runs to a state with a normal DC link, which starts with first_uv.
+  FedContactors& to(ContactorState s, Request r = Request::drive, std::int32_t first_uv = 0) {
     in.request = r;
-    std::int32_t dc_link_uv = 0;
+    std::int32_t dc_link_uv = first_uv;
     for (int k = 0; k < 1'000 && contactors.state() != s; ++k) {
       const Outputs out = contactors.outputs();
       if (out.main_plus)
         dc_link_uv = rested_pack_uv;
       else if (out.main_minus && out.precharge)
         dc_link_uv += (rested_pack_uv - dc_link_uv) / 5;
-      else
-        dc_link_uv = 0;
       step(0.1, dc_link_uv);
     }
     EXPECT_EQ(contactors.state(), s);

@@ -77,8 +77,8 @@ TEST(WiredPrecharge, EndsWithEveryLoadOfTheTable) {
     double bleeder_ohm, idle_w;
   };
   constexpr double none = std::numeric_limits<double>::infinity();
-  for (const Load& load : {Load{"none", none, 0}, Load{"10 kohm", 10e3, 0}, Load{"1 kohm", 1e3, 0}, Load{"1 W", none, 1},
-                           Load{"5 W", none, 5}, Load{"5 W and 1 kohm", 1e3, 5}}) {
+  for (const Load& load : {Load{"none", none, 0}, Load{"10 kohm", 10e3, 0}, Load{"1 kohm", 1e3, 0},
+                           Load{"1 W", none, 1}, Load{"5 W", none, 5}, Load{"5 W and 1 kohm", 1e3, 5}}) {
     for (const double soc : {0.02, 0.5}) {  // 47 V and 52.6 V
       plant::TruckParameters world = plant::typical_world();
       for (plant::StringCell& cell : world.cells) cell.soc = soc;

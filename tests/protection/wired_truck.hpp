@@ -1,5 +1,5 @@
-// Contactors of the forklift's pack in the electrical world of plant/circuit: pins out, voltages at the pins in. How the
-// pins read is written from the wiring table of boards/stm32f405_forklift/README.md.
+// Contactors of the forklift's pack in the electrical world of plant/circuit: pins out, voltages at the pins in. How
+// the pins read is written from the wiring table of boards/stm32f405_forklift/README.md.
 #pragma once
 
 #include <algorithm>
@@ -99,9 +99,9 @@ class WiredTruck {
   plant::Truck truck;
   Request request = Request::none;
   bool open_now = false;
-  ContactorEvents seen;       ///< any event since the start
-  bool fault = false;         ///< a row of the table was raised
-  bool rows_react = true;     ///< the rows of the table open
+  ContactorEvents seen;    ///< any event since the start
+  bool fault = false;      ///< a row of the table was raised
+  bool rows_react = true;  ///< the rows of the table open
 
  private:
   /// The delays of the rows precharge failed, contactor welded and contactor not closed.
