@@ -186,7 +186,9 @@ class Session {
     const double temperature_c = profile_.temperature_c();
     pack_.run(load_a(step), step.contactors, step.welded, temperature_c, step.duration_s);
     Measured measured{pack_.read(static_cast<std::uint64_t>(std::llround(1e6 * step.time_s)), temperature_c),
-                      pack_.soc(), pack_.dc_link_v(), {}};
+                      pack_.soc(),
+                      pack_.dc_link_v(),
+                      {}};
     if (plan_.replayed) replace_by_recording(step, measured);
     measured.link = link_poles(step.contactors.connects_plus(step.welded), step.contactors.main_minus,
                                plan_.replayed ? 1e-6 * measured.sample.pack_uv : pack_.pack_v(), measured.dc_link_v);

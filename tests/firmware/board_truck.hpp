@@ -76,8 +76,8 @@ class BoardTruck : public TruckPack {
     if (link) set_link(link(*this));
     std::vector<can::Frame> frames;
     if (steps() % 10 == 1) frames.push_back(request());
-    const auto measured = hal::frames_of(sample, inputs.link_plus_uv, static_cast<std::uint16_t>(steps()),
-                                         inputs.link_minus_uv);
+    const auto measured =
+        hal::frames_of(sample, inputs.link_plus_uv, static_cast<std::uint16_t>(steps()), inputs.link_minus_uv);
     frames.insert(frames.end(), measured.begin(), measured.end());
     received_faults_ = false;
     receive(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));

@@ -366,7 +366,7 @@ TEST(AuxiliaryContact, ThatIsOpenWhileItsOutputIsOnOpensEverythingAtOnce) {
       follow();
     }
     ASSERT_EQ(b.contactors.state(), drive);
-    (plus ? b.in.auxiliary.main_plus_closed : b.in.auxiliary.main_minus_closed) = false;
+    b.in.auxiliary = {.fitted = true, .main_plus_closed = !plus, .main_minus_closed = plus};
     b.step();
     EXPECT_EQ(b.contactors.state(), opening);
     EXPECT_EQ(b.contactors.outputs(), Outputs{});
