@@ -17,6 +17,8 @@
 # board.cmake chooses the CAN back end and the source of the samples:
 #   BMS_CAN        slcan, or bxcan with a bit rate
 #   BMS_SAMPLES    bq76952 (a chip on the board), adc (the controller), remote (another node), emulated
+#   BMS_DC_LINK    false: a single switch without a measured DC link and without precharge
+#   BMS_AUXILIARY_CONTACTS  of the main contactors: stm32f4 (PB14, PB15), or absent
 #
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (can/messages.md): cia418 for a CANopen charger, with the
 # nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
@@ -43,9 +45,12 @@ set(fixed_point false)
 if(BMS_SCALAR_DEFINITION MATCHES BMS_FIXED_POINT)
   set(fixed_point true)
 endif()
+if(NOT DEFINED BMS_DC_LINK)
+  set(BMS_DC_LINK true)
+endif()
 bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
   CELLS ${BMS_CELLS} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
-  FIXED_POINT ${fixed_point}
+  FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
@@ -127,17 +132,22 @@ bms_objects(hal_clock -Os ${chip}/clock.cpp)
 bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar})
 bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})
 # Back ends by BMS_CAN and BMS_SAMPLES.
-set(no_second_line ${absent_hal}/second_line.cpp ${absent_hal}/second_current.cpp)
+set(auxiliary_contacts ${absent_hal}/auxiliary_contacts.cpp)
+if(DEFINED BMS_AUXILIARY_CONTACTS)
+  set(auxiliary_contacts ${hal}/${BMS_AUXILIARY_CONTACTS}/auxiliary_contacts.cpp)
+endif()
+set(no_second_line ${absent_hal}/second_line.cpp)
+set(no_contacts ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp ${no_second_line})
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
 set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp
-  ${no_second_line})
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp
-  ${no_second_line})
+  ${no_contacts})
+set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp ${no_contacts})
 set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp
-  ${no_second_line})
+  ${no_contacts})
 set(samples_bq76952 ${absent_hal}/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp
-  ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${no_second_line})
+  ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp
+  ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts} ${no_second_line})
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
@@ -147,7 +157,7 @@ set(no_hardware watchdog flash calendar board_state supply)
 list(TRANSFORM no_hardware PREPEND ${absent_hal}/)
 list(TRANSFORM no_hardware APPEND .cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
-  ${absent_hal}/requests.cpp ${no_hardware} ${absent_hal}/calibration.cpp ${no_second_line})
+  ${absent_hal}/requests.cpp ${no_hardware} ${absent_hal}/calibration.cpp ${no_contacts})
 target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
 bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp ${no_hardware})
 

@@ -149,7 +149,12 @@ class Application {
     inputs.clear = std::exchange(requested_.clear, protection::Clear::none);
     if (board_.cell_file_changed && inputs.clear != protection::Clear::none) [[unlikely]]
       accept_cell_file();
-    inputs.dc_link_uv = hal::dc_link_uv();
+    const hal::LinkVoltages link = hal::link_voltages();
+    inputs.link_plus_uv = link.plus_uv;
+    inputs.link_minus_uv = link.minus_uv;
+    const hal::AuxiliaryContacts contacts = hal::auxiliary_contacts();
+    inputs.auxiliary = {contacts.fitted, contacts.main_plus_closed, contacts.main_minus_closed};
+    inputs.contact_lost = contacts.losses != 0;
     inputs.second_line = hal::second_line_trips();
     inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
@@ -161,8 +166,10 @@ class Application {
     const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
-    if (supply_falls != 0 && !decision.outputs.any_closed()) [[unlikely]]
+    if (!decision.outputs.any_closed()) {
       hal::supply_acknowledge(supply_falls);
+      hal::acknowledge_contact_losses(contacts.losses);
+    }
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]

@@ -13,6 +13,7 @@ constexpr protection::PackDesign board_design() {
           .cells = hal::pack_cells,
           .temperatures = hal::pack_cells > 1 ? 4 : 1,
           .sample_period_s = hal::sample_period_s,
+          .dc_link = hal::has_dc_link,
           .current_range_a = hal::current_range_a};
 }
 

@@ -204,6 +204,12 @@ constexpr can::ContactorState contactor_state(const protection::Decision& d) {
   m.main_minus = d.outputs.main_minus ? 1 : 0;
   m.precharge = d.outputs.precharge ? 1 : 0;
   m.charge_enable = d.outputs.charge_enable ? 1 : 0;
+  if ((d.faults & bit(protection::Fault::contactor_welded)) != 0)  // after a power cycle the pole is not known
+    m.welded_pole =
+        static_cast<std::uint32_t>(d.welded_pole == protection::Pole::none ? protection::Pole::unknown : d.welded_pole);
+  m.auxiliary_fitted = d.auxiliary.fitted ? 1 : 0;
+  m.auxiliary_plus = d.auxiliary.main_plus_closed ? 1 : 0;
+  m.auxiliary_minus = d.auxiliary.main_minus_closed ? 1 : 0;
   if (d.first.fault != protection::no_fault)
     m.first_cause_time = static_cast<float>(static_cast<std::uint32_t>(d.first.time_us / 100'000)) * 0.1F;
   return m;

@@ -5,7 +5,8 @@
 //   0x311           u32 CRC-32, u16 frames, u16 counter  optional check: CRC over identifier and data of all following
 //                                                        frames up to 0x31D; `frames` is their number
 //   0x312           i32 current_ua, i32 voltage_uv       of a pack: voltage over all cells
-//   0x313           i32 dc_link_uv, i32 0                optional: load side of the contactors
+//   0x313           i32 link_plus_uv, i32 link_minus_uv  optional: load side of main plus and of main minus against the
+//                                                        negative end of the cells
 //   0x314 to 0x31B  i32 uv, i32 uv                       of a pack: cells 1 and 2, 3 and 4, ...
 //   0x31C           4 x i16 temperature_cdegc            of a pack
 //   0x31D           u48 time_us, i16 temperature_cdegc   completes the sample; of a pack: no temperature
@@ -61,10 +62,11 @@ constexpr std::array<can::Frame, 2> frames_of(const measurement::Sample& s) {
 template <std::size_t Cells>
 inline constexpr std::size_t pack_frames = 5 + (Cells + 1) / 2;
 
-/// counter: sequence number of the sample, any start value.
+/// link_plus_uv, link_minus_uv: no_reading if unknown. counter: sequence number of the sample, any start value.
 template <std::size_t Cells>
 constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement::PackSample<Cells>& s,
-                                                               std::int32_t dc_link_uv, std::uint16_t counter) {
+                                                               std::int32_t link_plus_uv, std::uint16_t counter,
+                                                               std::int32_t link_minus_uv = 0) {
   static_assert(Cells <= 16);
   std::array<can::Frame, pack_frames<Cells>> frames{};
   std::size_t n = 1;
@@ -75,7 +77,7 @@ constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement
     put_bytes(frame.data, 4, second);
   };
   pair(reading_frame_id, s.current_ua, s.pack_uv);
-  pair(dc_link_frame_id, dc_link_uv, 0);
+  pair(dc_link_frame_id, link_plus_uv, link_minus_uv);
   for (std::size_t k = 0; k < Cells; k += 2)
     pair(static_cast<std::uint16_t>(first_cells_frame_id + k / 2), s.cell_uv[k],
          k + 1 < Cells ? s.cell_uv[k + 1] : measurement::no_reading);
@@ -124,7 +126,8 @@ class SampleFrames {
       building_.pack_uv = get_bytes<std::int32_t>(frame.data, 4);
       if constexpr (Cells == 1) building_.cell_uv[0] = building_.pack_uv;
     } else if (frame.id == dc_link_frame_id) {
-      dc_link_uv_ = get_bytes<std::int32_t>(frame.data, 0);
+      link_plus_uv_ = get_bytes<std::int32_t>(frame.data, 0);
+      link_minus_uv_ = get_bytes<std::int32_t>(frame.data, 4);
     } else if (frame.id >= first_cells_frame_id && frame.id < temperatures_frame_id) {
       const std::size_t first = std::size_t{2} * (frame.id - first_cells_frame_id);
       if (first < Cells) building_.cell_uv[first] = get_bytes<std::int32_t>(frame.data, 0);
@@ -144,20 +147,21 @@ class SampleFrames {
   }
 
   constexpr const measurement::PackSample<Cells>& sample() const { return building_; }
-  constexpr std::int32_t dc_link_uv() const { return dc_link_uv_; }  ///< [uV]; no_reading: not received
-  constexpr std::uint32_t rejected() const { return rejected_; }     ///< samples with a wrong CRC or frame count
+  constexpr std::int32_t link_plus_uv() const { return link_plus_uv_; }  ///< [uV]; no_reading: not received
+  constexpr std::int32_t link_minus_uv() const { return link_minus_uv_; }
+  constexpr std::uint32_t rejected() const { return rejected_; }  ///< samples with a wrong CRC or frame count
 
  private:
   constexpr void begin() {
     building_ = {};
-    dc_link_uv_ = measurement::no_reading;
+    link_plus_uv_ = link_minus_uv_ = measurement::no_reading;
     crc_ = ~0U;
     frames_ = 0;
     checked_ = done_ = false;
   }
 
   measurement::PackSample<Cells> building_{};
-  std::int32_t dc_link_uv_ = measurement::no_reading;
+  std::int32_t link_plus_uv_ = measurement::no_reading, link_minus_uv_ = measurement::no_reading;
   std::uint32_t crc_ = ~0U, expected_crc_ = 0, rejected_ = 0;
   std::uint16_t frames_ = 0, expected_frames_ = 0;
   bool checked_ = false, done_ = false;

@@ -35,7 +35,7 @@ can::Frame request(protection::Request what, std::uint8_t counter) {
 }
 
 template <std::size_t Cells>
-std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, double dc_link_v,
+std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, const LinkPoles& link,
                                    std::uint16_t counter) {
   measurement::PackSample<Cells> s;
   s.time_us = all.time_us;
@@ -43,7 +43,7 @@ std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all
   s.pack_uv = Cells == 1 ? all.cell_uv[0] : all.pack_uv;
   std::copy_n(all.cell_uv.begin(), Cells, s.cell_uv.begin());
   s.temperature_cdegc = all.temperature_cdegc;
-  const auto frames = hal::frames_of(s, micro(dc_link_v), counter);
+  const auto frames = hal::frames_of(s, micro(link.plus_v), counter, micro(link.minus_v));
   return {frames.begin(), frames.end()};
 }
 
@@ -140,6 +140,7 @@ class Session {
     measurement::PackSample<max_cells> sample;
     double soc_true = 0;  ///< NaN: unknown
     double dc_link_v = 0;
+    LinkPoles link;
   };
 
   void announce_soc() {
@@ -185,8 +186,12 @@ class Session {
     const double temperature_c = profile_.temperature_c();
     pack_.run(load_a(step), step.contactors, step.welded, temperature_c, step.duration_s);
     Measured measured{pack_.read(static_cast<std::uint64_t>(std::llround(1e6 * step.time_s)), temperature_c),
-                      pack_.soc(), pack_.dc_link_v()};
+                      pack_.soc(),
+                      pack_.dc_link_v(),
+                      {}};
     if (plan_.replayed) replace_by_recording(step, measured);
+    measured.link = link_poles(step.contactors.connects_plus(step.welded), step.contactors.main_minus,
+                               plan_.replayed ? 1e-6 * measured.sample.pack_uv : pack_.pack_v(), measured.dc_link_v);
     return measured;
   }
 
@@ -215,8 +220,8 @@ class Session {
 
   std::vector<can::Frame> sample_frames(const Measured& measured, std::uint64_t k) const {
     const auto counter = static_cast<std::uint16_t>(k);
-    return plan_.cells == 1 ? frames_for<1>(measured.sample, measured.dc_link_v, counter)
-                            : frames_for<max_cells>(measured.sample, measured.dc_link_v, counter);
+    return plan_.cells == 1 ? frames_for<1>(measured.sample, measured.link, counter)
+                            : frames_for<max_cells>(measured.sample, measured.link, counter);
   }
 
   void judge(const Step& step, const Measured& measured) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "files/cell_file.hpp"
+#include "hil/link_poles.hpp"
 #include "measurement/pack_sample.hpp"
 #include "model/extended.hpp"
 
@@ -33,6 +34,7 @@ struct ContactorCommand {
 
   /// Returns true if load current can flow. `welded`: main+ does not open.
   constexpr bool conducts(bool welded) const { return (main_plus || welded) && main_minus; }
+  constexpr bool connects_plus(bool welded) const { return main_plus || precharge || welded; }
 };
 
 /// DC-link voltage after `duration_s` with these contactors.

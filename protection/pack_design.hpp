@@ -20,8 +20,12 @@ struct PackDesign {
   std::uint8_t temperatures = 1;  ///< fitted sensors, the first ones of PackSample
   double sample_period_s = 0.1;
   double start_s = 3;  ///< until the first sample of the measuring chain (BQ76952: 1.2 s with a reset and its settings)
+  /// Main plus closes when pack and DC link differ by at most the product: current that it may make, and resistance of
+  /// pack, cables and DC-link capacitor.
+  double closing_current_max_a = 600, closing_loop_ohm = 0.015;
+  /// Measured and precharged. false: a single switch for a load without capacitor.
+  bool dc_link = true;
   double precharge_time_constant_s = 0.5;  ///< precharge resistor x capacitance of the DC link, e.g. 50 ohm x 10 mF
-  double dc_link_discharge_s = 5;          ///< time in which the DC link falls by an eighth without a supply
   double rest_current_c_rate = 0.02;       ///< below it the current counts as zero: four offsets of a 0.5 % sensor
   double bleed_ohm = 33;                   ///< balancing resistor
   bool neighbours_may_bleed = false;       ///< allowed by the monitoring chip (its data sheet; heat, shared wires)

@@ -77,9 +77,12 @@ struct PackEstimate {
 /// Requests and commands from the bus, and results of the board's self-tests.
 struct ExternalInputs {
   Request request = Request::none;
-  Clear clear = Clear::none;                          ///< as long as the key is pressed
-  std::int32_t dc_link_uv = measurement::no_reading;  ///< load side of the contactors
-  bool board_fault = false;                           ///< failed self-test; with the first sample, a watchdog reset
+  Clear clear = Clear::none;  ///< as long as the key is pressed
+  /// L+ and L-, the load side of the contactors, against the negative end of the cells.
+  std::int32_t link_plus_uv = measurement::no_reading, link_minus_uv = measurement::no_reading;
+  AuxiliaryContacts auxiliary = {};
+  bool contact_lost = false;  ///< a main contact has opened by itself, perhaps only for a moment
+  bool board_fault = false;   ///< failed self-test; with the first sample, a watchdog reset
   bool storage_fault = false;
   std::uint32_t second_line = 0;                             ///< trips of the front end: protection/second_line.hpp
   std::int32_t second_current_ua = measurement::no_reading;  ///< of the second current sensor, if one is fitted
@@ -90,6 +93,8 @@ struct Decision {
   FaultSet latched = 0;             ///< to be stored for the next start
   FirstCause first;
   ContactorState state = ContactorState::off;
+  Pole welded_pole = Pole::none;  ///< found since the start, not necessarily a fault
+  AuxiliaryContacts auxiliary = {};
   Outputs outputs;
   AllowedCurrent allowed;
   std::uint32_t bleed = 0;  ///< one bit per cell
@@ -154,9 +159,12 @@ class Protection {
     switch_contactors({.request = inputs.request,
                        .charge_forbidden = no_charge,
                        .discharge_forbidden = no_discharge,
+                       .contact_lost = inputs.contact_lost,
                        .current_ua = sample.current_ua,
                        .pack_uv = pack_uv,
-                       .dc_link_uv = inputs.dc_link_uv,
+                       .link_plus_uv = inputs.link_plus_uv,
+                       .link_minus_uv = inputs.link_minus_uv,
+                       .auxiliary = inputs.auxiliary,
                        .step_us = step_us},
                       faults);
     if (!may_drive()) decision_.allowed = {};
@@ -295,6 +303,8 @@ class Protection {
     in.open_now = (faults & plan_->open_now) != 0;
     decision_.outputs = contactors_.update(in);
     decision_.state = contactors_.state();
+    decision_.welded_pole = contactors_.welded_pole();
+    decision_.auxiliary = in.auxiliary;
     closed_once_ = closed_once_ || decision_.outputs.any_closed();
   }
 

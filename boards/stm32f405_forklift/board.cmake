@@ -12,6 +12,7 @@ set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)
 set(BMS_CAN_DEFINITION BMS_CAN_BIT_RATE=250000)
 set(BMS_SAMPLES bq76952)
+set(BMS_AUXILIARY_CONTACTS stm32f4)  # absent: a truck whose main contactors have none
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
 # sample [ms] (tests/firmware/board_budget.hpp).
 set(BMS_BUDGET_FLASH 65536)

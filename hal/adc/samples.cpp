@@ -79,6 +79,6 @@ const measurement::PackSample<1>* next_sample() {
 }
 
 void power_path_set(const PowerPath& wanted) { contactor_pins_set(wanted); }
-std::int32_t dc_link_uv() { return measurement::no_reading; }
+LinkVoltages link_voltages() { return {}; }
 
 }  // namespace bms::hal

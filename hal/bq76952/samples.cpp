@@ -50,6 +50,5 @@ void power_path_set(const PowerPath& wanted) {
   contactor_pins_set(wanted);
   front_end.bleed(wanted.bleed);
 }
-std::int32_t dc_link_uv() { return front_end.dc_link_uv(); }
 
 }  // namespace bms::hal

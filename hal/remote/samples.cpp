@@ -57,6 +57,6 @@ const measurement::PackSample<pack_cells>* next_sample() {
 }
 
 void power_path_set(const PowerPath&) {}
-std::int32_t dc_link_uv() { return frames.dc_link_uv(); }
+LinkVoltages link_voltages() { return {frames.link_plus_uv(), frames.link_minus_uv()}; }
 
 }  // namespace bms::hal

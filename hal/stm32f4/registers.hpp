@@ -40,6 +40,7 @@ inline Register& gpiob_bsrr() { return at<0x40020418>(); }
 // GPIOC [8.4]
 inline Register& gpioc_moder() { return at<0x40020800>(); }
 inline Register& gpioc_otyper() { return at<0x40020804>(); }
+inline Register& gpioc_odr() { return at<0x40020814>(); }
 inline Register& gpioc_bsrr() { return at<0x40020818>(); }
 
 // ADC1 [13.13]
@@ -93,11 +94,12 @@ struct CanFilterBank {
 inline CanFilterBank& can1_filter_bank(std::uint32_t k) { return reinterpret_cast<CanFilterBank*>(0x40006640)[k]; }
 inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20;
 
-// external interrupts [12.3]
+// external interrupts [12.3], their ports [9.2]
+inline Register& syscfg_exticr4() { return at<0x40013814>(); }
 inline Register& exti_imr() { return at<0x40013C00>(); }
 inline Register& exti_rtsr() { return at<0x40013C08>(); }
 inline Register& exti_pr() { return at<0x40013C14>(); }
-inline constexpr unsigned pvd_interrupt = 1;
+inline constexpr unsigned pvd_interrupt = 1, exti15_10_interrupt = 40;
 
 // real-time clock [26.6]
 inline Register& rtc_tr() { return at<0x40002800>(); }

@@ -11,6 +11,7 @@ void clock_interrupt();
 [[gnu::weak, gnu::naked]] void can1_tx_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void can1_rx0_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void pvd_interrupt() { asm volatile("b fault_handler"); }
+[[gnu::weak, gnu::naked]] void exti15_10_interrupt() { asm volatile("b fault_handler"); }
 
 }  // extern "C"
 
@@ -27,6 +28,7 @@ constexpr auto table() {
   all.serve(cortex_m::core_exceptions + stm32f4::can1_tx_interrupt, ::can1_tx_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_rx0_interrupt, ::can1_rx0_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::pvd_interrupt, ::pvd_interrupt);
+  all.serve(cortex_m::core_exceptions + stm32f4::exti15_10_interrupt, ::exti15_10_interrupt);
   return all;
 }
 

@@ -311,44 +311,53 @@ class Matrix {
     }
   };
 
-  /// Just above the lowest voltage that the curve allows, or just below it, from half a time constant on.
-  static std::int32_t link_of_precharge(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+  /// Poles of a DC link with this voltage, where the commanded contactors connect them.
+  static hil::LinkPoles poles(const BoardTruck& truck, std::int32_t pack_uv, double dc_link_uv) {
+    const Outputs o = truck.outputs();
+    return hil::link_poles(o.main_plus || o.precharge, o.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
+  }
+  /// Just above the lowest voltage that the curve allows, or just below it, from half a time constant on. The curve
+  /// starts at an empty DC link and has 1.5 times the time constant, minus a fifth of the pack.
+  static double link_of_precharge(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
     if (!truck.outputs().precharge || !truck.outputs().main_minus) return truck.is_closed() ? pack_uv : 0;
     ++c.in_precharge;
     const int halves = c.in_precharge * step_ms / 250;
     if (c.above) c.condition_holds(halves >= 1);
-    const double least = 1 - std::exp(-0.5 * halves) - 0.2;
+    const double least = 1 - std::exp(-0.5 * halves / 1.5) - 0.2;
     if (!c.above && halves >= 11) return pack_uv;
-    return static_cast<std::int32_t>(pack_uv * std::max(0.0, least + (c.above ? -0.002 : 0.002)));
+    return pack_uv * std::max(0.0, least + (c.above ? -0.002 : 0.002));
   }
-  static std::int32_t precharged(ContactorCase& c, std::int32_t pack_uv) {
+  static double precharged(ContactorCase& c, std::int32_t pack_uv) {
     ++c.in_precharge;
-    return static_cast<std::int32_t>(pack_uv * (1 - std::exp(-0.2 * c.in_precharge)));
+    return pack_uv * (1 - std::exp(-0.2 * c.in_precharge));
   }
-  /// The DC link rises to an eighth with the precharge contactor alone.
-  static std::int32_t link_of_welded(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+  /// The DC link rises by an eighth with the precharge contactor alone.
+  static double link_of_welded(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
     const Outputs o = truck.outputs();
     if (o.precharge && !o.main_minus) {
       c.condition_holds(c.above);
       return pack_uv / 8 + (c.above ? 1 : 0);
     }
-    if (o.precharge && o.main_minus) return precharged(c, pack_uv);
+    if (o.precharge && o.main_minus && !o.main_plus) return precharged(c, pack_uv);
     return truck.is_closed() ? pack_uv : 0;
   }
-  /// The DC link is a sixteenth below the pack voltage with both contactors closed.
-  static std::int32_t link_of_not_closed(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+  /// L+ is a sixteenth below the pack voltage with both contactors closed.
+  static double link_of_not_closed(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
     const Outputs o = truck.outputs();
-    if (o.precharge && o.main_minus) return precharged(c, pack_uv);
+    if (o.precharge && o.main_minus && !o.main_plus) return precharged(c, pack_uv);
     if (!truck.is_closed()) return 0;
     c.condition_holds(c.above);
-    return static_cast<std::int32_t>(std::int64_t{pack_uv} * 960 / 1024) - (c.above ? 1 : 0);
+    return pack_uv - pack_uv / 16 - (c.above ? 1 : 0);
   }
   static void set_link(ContactorCase& c, BoardTruck& truck) {
-    if (c.fault == precharge)
-      truck.link = [&](const TruckPack& t) { return link_of_precharge(c, truck, t.sample.pack_uv); };
-    if (c.fault == welded) truck.link = [&](const TruckPack& t) { return link_of_welded(c, truck, t.sample.pack_uv); };
-    if (c.fault == not_closed)
-      truck.link = [&](const TruckPack& t) { return link_of_not_closed(c, truck, t.sample.pack_uv); };
+    const auto from = [&](double (*link_of)(ContactorCase&, const BoardTruck&, std::int32_t)) {
+      truck.link = [&c, &truck, link_of](const TruckPack& t) {
+        return poles(truck, t.sample.pack_uv, link_of(c, truck, t.sample.pack_uv));
+      };
+    };
+    if (c.fault == precharge) from(link_of_precharge);
+    if (c.fault == welded) from(link_of_welded);
+    if (c.fault == not_closed) from(link_of_not_closed);
   }
 
   /// Starts to drive, then makes a pause of half a second between two samples, or stops the samples.

@@ -80,10 +80,11 @@ class BoardTruck : public TruckPack {
 
   void step(const Change& change = {}) {
     measure(outputs(), change);
-    if (link) inputs.dc_link_uv = link(*this);
+    if (link) set_link(link(*this));
     std::vector<can::Frame> frames;
     if (steps() % 10 == 1) frames.push_back(request());
-    const auto measured = hal::frames_of(sample, inputs.dc_link_uv, static_cast<std::uint16_t>(steps()));
+    const auto measured =
+        hal::frames_of(sample, inputs.link_plus_uv, static_cast<std::uint16_t>(steps()), inputs.link_minus_uv);
     frames.insert(frames.end(), measured.begin(), measured.end());
     received_faults_ = false;
     receive(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
@@ -113,7 +114,7 @@ class BoardTruck : public TruckPack {
       result_.wrong.push_back(fmt::format("{} at {:.1f} s", what, 0.1 * static_cast<double>(steps())));
   }
 
-  std::function<std::int32_t(const TruckPack&)> link;  ///< DC link instead of that of the truck
+  std::function<hil::LinkPoles(const TruckPack&)> link;  ///< DC link instead of that of the truck
   FaultSet faults = 0, expected = 0;
   FaultSet not_judged = 0;  ///< rows that the oracle cannot judge in this case
   std::uint32_t flags = 0;  ///< of the estimate

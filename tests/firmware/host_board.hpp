@@ -23,7 +23,7 @@ struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
 /// Input of the board for one sample.
 struct Input {
   Pack pack;
-  std::int32_t dc_link_uv = 0;
+  hal::LinkVoltages link{0, 0};
   std::optional<can::Frame> command;  ///< received before the sample
 };
 
@@ -63,7 +63,7 @@ class HostBoard {
   HostBoard& operator=(const HostBoard&) = delete;
 
   void process_sample(const Input& in) {
-    host_hal::dc_link_reading_uv = in.dc_link_uv;
+    host_hal::link_readings = in.link;
     if (in.command) host_hal::requests.push_back(*in.command);
     application_->process_sample(in.pack);
   }

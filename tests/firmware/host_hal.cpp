@@ -1,5 +1,7 @@
 #include "tests/firmware/host_hal.hpp"
 
+#include "hil/link_poles.hpp"
+
 namespace bms {
 
 void host_hal::begin() {
@@ -8,7 +10,8 @@ void host_hal::begin() {
   requests.clear();
   recorded.clear();
   switched = {};
-  dc_link_reading_uv = 0;
+  link_readings = {0, 0};
+  contacts = {};
   second_line = 0;
   front_end = {};
   second_current_reading_ua = measurement::no_reading;
@@ -20,6 +23,12 @@ void host_hal::begin() {
   calendar_was_set_to = 0;
   calendar_accepts = true;
   calibrated = {};
+}
+
+void host_hal::set_link(double pack_v, double dc_link_v) {
+  const hil::LinkPoles poles =
+      hil::link_poles(switched.main_plus || switched.precharge, switched.main_minus, pack_v, dc_link_v);
+  link_readings = {static_cast<std::int32_t>(1e6 * poles.plus_v), static_cast<std::int32_t>(1e6 * poles.minus_v)};
 }
 
 namespace hal {
@@ -39,7 +48,9 @@ void record_estimate(std::span<const std::uint32_t> words) {
   host_hal::recorded.emplace_back(words.begin(), words.end());
 }
 void power_path_set(const PowerPath& wanted) { host_hal::switched = wanted; }
-std::int32_t dc_link_uv() { return host_hal::dc_link_reading_uv; }
+LinkVoltages link_voltages() { return host_hal::link_readings; }
+AuxiliaryContacts auxiliary_contacts() { return host_hal::contacts; }
+void acknowledge_contact_losses(std::uint32_t losses) { host_hal::contacts.losses -= losses; }
 std::uint32_t second_line_trips() { return host_hal::second_line; }
 FrontEndHealth front_end_health() { return host_hal::front_end; }
 std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }

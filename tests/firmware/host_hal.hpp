@@ -11,6 +11,8 @@
 #include "files/cell_file.hpp"
 #include "firmware/application.hpp"
 #include "hal/power.hpp"
+#include "hal/power_path.hpp"
+#include "hal/second_current.hpp"
 
 namespace bms::host_hal {
 
@@ -19,7 +21,8 @@ inline std::vector<can::Frame> sent;
 inline std::deque<can::Frame> requests;
 inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
-inline std::int32_t dc_link_reading_uv = 0;
+inline hal::LinkVoltages link_readings{0, 0};
+inline hal::AuxiliaryContacts contacts;
 inline std::uint32_t second_line = 0;
 inline hal::FrontEndHealth front_end;
 inline std::int32_t second_current_reading_ua = measurement::no_reading;
@@ -34,6 +37,9 @@ inline hal::SensorCalibration calibrated;
 
 /// Resets all variables.
 void begin();
+
+/// Sets the readings of the DC link, with ideal contactors as commanded last.
+void set_link(double pack_v, double dc_link_v);
 
 /// The last sent frame of a message.
 template <class Message>

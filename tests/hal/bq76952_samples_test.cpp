@@ -39,7 +39,6 @@ TEST(Bq76952Samples, ComeEvery100msWithOrWithoutTheChipReceiveRequestsAndSwitchC
     }
     if (k == 49) {
       EXPECT_EQ(s->cell_uv[3], 3'300'000);
-      EXPECT_EQ(hal::dc_link_uv(), 40'000'000);
     }
   }
   ASSERT_TRUE(hal::starting_point().has_value());

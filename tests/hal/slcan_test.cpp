@@ -116,7 +116,7 @@ measurement::PackSample<16> some_pack() {
 TEST(SampleFrames, CarryAPack) {
   const auto sent = some_pack();
   SampleFrames<16> received;
-  const auto frames = frames_of(sent, 51'000'000, 7);
+  const auto frames = frames_of(sent, 51'000'000, 7, -2'000'000);
   EXPECT_TRUE(std::ranges::is_sorted(frames, {}, &can::Frame::id)) << "a node that sends by identifier keeps the order";
   for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(received.receive(frames[k]), k + 1 == frames.size()) << k;
   EXPECT_EQ(received.sample().time_us, sent.time_us);
@@ -124,7 +124,8 @@ TEST(SampleFrames, CarryAPack) {
   EXPECT_EQ(received.sample().pack_uv, sent.pack_uv);
   EXPECT_EQ(received.sample().cell_uv, sent.cell_uv);
   EXPECT_EQ(received.sample().temperature_cdegc, sent.temperature_cdegc);
-  EXPECT_EQ(received.dc_link_uv(), 51'000'000);
+  EXPECT_EQ(received.link_plus_uv(), 51'000'000);
+  EXPECT_EQ(received.link_minus_uv(), -2'000'000);
   EXPECT_EQ(received.rejected(), 0U);
 }
 

@@ -1,17 +1,27 @@
 // A pack on a bench whose state a test sets, with protection and a simulated DC link.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 
 #include <gtest/gtest.h>
 
+#include "hil/link_poles.hpp"
 #include "protection/protection.hpp"
 #include "tests/protection/expected_rows.hpp"
 
 namespace bms::protection {
 
 inline constexpr ProtectionPlan forklift_plan = protection_plan(forklift);
+
+/// Sets the poles of a DC link where these contactors connect them.
+inline void set_poles(ExternalInputs& inputs, const Outputs& closed, double pack_uv, double dc_link_uv) {
+  const hil::LinkPoles poles =
+      hil::link_poles(closed.main_plus || closed.precharge, closed.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
+  inputs.link_plus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.plus_v));
+  inputs.link_minus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.minus_v));
+}
 
 /// A pack in a state that the test sets. Its readings always change a little.
 struct ProtectionBench {
@@ -40,7 +50,9 @@ struct ProtectionBench {
       dc_link_uv += (static_cast<double>(sample.pack_uv) - dc_link_uv) * 0.18;
     else
       dc_link_uv *= 0.97;
-    inputs.dc_link_uv = static_cast<std::int32_t>(dc_link_uv);
+    const Outputs connected{
+        .main_plus = out.main_plus || plus_welded, .main_minus = out.main_minus, .precharge = out.precharge};
+    set_poles(inputs, connected, sample.pack_uv, dc_link_uv);
     return protection.update(sample, estimate, inputs);
   }
   void run(int steps) {
@@ -63,7 +75,7 @@ struct ProtectionBench {
   std::uint32_t period, count = 0;
   std::int32_t base_uv = 3'300'000, load_ua = 0;
   double dc_link_uv = 0;
-  bool closed = false;
+  bool closed = false, plus_welded = false;
   std::function<void(measurement::PackSample<16>&)> change;
 };
 

@@ -76,7 +76,14 @@ class Scenario {
       dc_link_uv_ += (sum - dc_link_uv_) / 5;
     else
       dc_link_uv_ -= dc_link_uv_ / 16;
-    inputs.dc_link_uv = dc_link_uv_;
+    // Poles of the DC link as the wiring gives them: at the pack, at 0 V, or floating.
+    if (outputs_.main_minus)
+      inputs.link_minus_uv = 0;
+    else if (outputs_.main_plus || outputs_.precharge)
+      inputs.link_minus_uv = sum - dc_link_uv_;
+    else
+      inputs.link_minus_uv = 1'278'000 - dc_link_uv_ / 5 * 3;
+    inputs.link_plus_uv = inputs.link_minus_uv + dc_link_uv_;
   }
 
   std::uint32_t state_ = 1;
