@@ -1,6 +1,8 @@
 // Functions of the board other than the estimator step. They are compiled for size, not for speed.
 #include "firmware/board_cell.hpp"
 
+#include "firmware/board_design.hpp"
+
 namespace bms::firmware {
 
 void BoardCell::update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
@@ -17,11 +19,7 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
-  static constexpr auto plan = protection::protection_plan({.limits = generated::parameters.limits,
-                                                            .capacity_ah = generated::parameters.capacity_ah,
-                                                            .cells = cells,
-                                                            .temperatures = cells > 1 ? 4 : 1,
-                                                            .sample_period_s = hal::sample_period_s});
+  static constexpr auto plan = protection::protection_plan(board_design());
   return plan;
 }
 
