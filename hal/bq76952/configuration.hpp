@@ -23,7 +23,7 @@ inline constexpr std::size_t cell_inputs = 16;
 /// Inputs of a pack of `cells` cells, 2 to 16, one bit each: its highest cell is between VC16 and VC15, the others are
 /// the lowest ones. Unused inputs are connected to their neighbour.
 constexpr std::uint16_t inputs_of_pack(std::size_t cells) {
-  return static_cast<std::uint16_t>((1U << (cells - 1)) - 1 | 1U << (cell_inputs - 1));
+  return static_cast<std::uint16_t>(((1U << (cells - 1)) - 1) | 1U << (cell_inputs - 1));
 }
 
 /// Components around the chip, and thresholds of its own protections. A threshold is rounded away from the normal range
@@ -80,7 +80,7 @@ constexpr std::uint32_t at_least(double value) {  // a remainder of rounding err
 }
 constexpr std::uint32_t comparator_delay(double s) { return nearest(s / 0.0033) - 2; }
 constexpr std::uint32_t shunt_steps(const Board& b, double a) {
-  return std::max(at_least(a * b.shunt_mohm / shunt_step_mv), 2U);
+  return std::max<std::uint32_t>(at_least(a * b.shunt_mohm / shunt_step_mv), 2);
 }
 constexpr std::uint32_t short_circuit_step(const Board& b) {
   std::uint32_t k = 0;
@@ -188,8 +188,8 @@ struct Configuration {
   std::span<const Setting> settings;
   std::int32_t current_step_ua, current_end_ua;
   std::int32_t current_na_per_count;  ///< of the 32-bit counts [4.12]: 256 of them are a step of CC Gain
-  std::uint32_t host_silence_us;
-  std::uint8_t cells;                                   ///< connected inputs
+  std::uint32_t max_silence_us;       ///< of this core: 9/10 of the chip's time, as the clocks differ
+  std::uint8_t cells;                 ///< connected inputs
   std::array<std::uint8_t, cell_inputs> input_of_cell;  ///< of the cells from the lowest on
 };
 
@@ -199,7 +199,7 @@ constexpr Configuration configuration(const Board& b, std::span<const Setting> s
                   current_step_ua(b),
                   static_cast<std::int32_t>(1e6 * current_end_a(b) + 0.5),
                   static_cast<std::int32_t>(7.5684e6 / b.shunt_mohm / 256 + 0.5),
-                  b.host_silence_s * 1'000'000U,
+                  b.host_silence_s * 900'000U,
                   0,
                   {}};
   for (std::uint8_t k = 0; k < cell_inputs; ++k) {

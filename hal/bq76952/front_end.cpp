@@ -1,6 +1,7 @@
 #include "hal/bq76952/front_end.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 #include "hal/bytes.hpp"
@@ -66,9 +67,7 @@ void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   if (trips_ != 0) ++counters_.trips;
 }
 
-bool FrontEnd::silent() const {
-  return ran_ && now_us() - answered_us_ >= configuration_.host_silence_us / 10 * 9;  // the clocks differ
-}
+bool FrontEnd::silent() const { return ran_ && now_us() - answered_us_ >= configuration_->max_silence_us; }
 
 /// One step towards measuring. Returns false if the chip is missing or not as expected.
 bool FrontEnd::advance() {
@@ -131,7 +130,7 @@ bool FrontEnd::detect() {
 /// Compares the data memory, block by block, with the settings. Returns false if it could not be read.
 bool FrontEnd::compare_memory(bool& matches) {
   matches = true;
-  const std::span<const Setting> settings = configuration_.settings;
+  const std::span<const Setting> settings = configuration_->settings;
   for (std::size_t k = 0; k < settings.size();) {
     const std::uint16_t begin = settings[k].address;
     std::array<std::uint8_t, buffer_bytes> block{};
@@ -174,7 +173,7 @@ bool FrontEnd::enter() {
 }
 
 bool FrontEnd::write() {
-  const std::span<const Setting> settings = configuration_.settings;
+  const std::span<const Setting> settings = configuration_->settings;
   for (std::size_t k = 0; k < settings_per_sample && next_setting_ < settings.size(); ++k, ++next_setting_) {
     const Setting& s = settings[next_setting_];
     std::array<std::uint8_t, 4> bytes{};
@@ -249,12 +248,11 @@ bool FrontEnd::read_words(std::uint8_t command, std::span<std::uint8_t> into, st
   if (!wire_.read(command, into)) return false;
   for (std::size_t k = from; k < into.size(); k += 2) {
     const int move = get_bytes<std::int16_t>(into, k) - get_bytes<std::int16_t>(last, k);
-    if (move > max_move || move < -max_move) {
-      if (!wire_.read(command, into)) return false;
-      break;
-    }
+    if (move <= max_move && move >= -max_move) continue;
+    if (!wire_.read(command, into)) return false;
+    break;
   }
-  std::copy(into.begin(), into.end(), last.begin());
+  std::memcpy(last.data(), into.data(), into.size());
   return true;
 }
 
@@ -277,8 +275,8 @@ bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
     ++counters_.not_fresh;
     return true;
   }
-  for (std::size_t n = 0; n < configuration_.cells; ++n) {
-    const std::size_t k = configuration_.input_of_cell[n];
+  for (std::size_t n = 0; n < configuration_->cells; ++n) {
+    const std::size_t k = configuration_->input_of_cell[n];
     into.cell_uv[k] = cell_uv(get_bytes<std::int16_t>(voltages, 2 * k));
   }
   if (scan_age_ >= max_scan_age) return true;
@@ -295,12 +293,12 @@ bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
 /// Current of CC3 in its two forms, limited to the range; no_reading if they contradict each other. `steps` is not
 /// defined outside of 16 bits.
 std::int32_t FrontEnd::current_ua(std::int32_t counts, std::int16_t steps) {
-  const std::int32_t end = configuration_.current_end_ua;
-  const std::int64_t ua = std::int64_t{counts} * configuration_.current_na_per_count / 1'000;
+  const std::int32_t end = configuration_->current_end_ua;
+  const std::int64_t ua = std::int64_t{counts} * configuration_->current_na_per_count / 1'000;
   if (ua >= end) return end;
   if (ua <= -end) return -end;
   const auto current = static_cast<std::int32_t>(ua);
-  const std::int32_t off = current / configuration_.current_step_ua - steps,
+  const std::int32_t off = current / configuration_->current_step_ua - steps,
                      most = 2 + (steps < 0 ? -steps : steps) / 256;
   if (off >= -most && off <= most) return current;
   ++counters_.current_differs;
@@ -321,7 +319,7 @@ bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
   if (!fresh_ || charge_still_ >= max_charge_still) return true;
   const std::int32_t cc3 =
       current_ua(get_bytes<std::int32_t>(currents, cc3_counts_at), get_bytes<std::int16_t>(currents, cc3_current_at));
-  const std::int32_t end = configuration_.current_end_ua;
+  const std::int32_t end = configuration_->current_end_ua;
   into.current_ua = cc3;
   if (cc3 == measurement::no_reading) return true;
   if (cc3 >= end || cc3 <= -end) {
@@ -331,7 +329,7 @@ bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
   const auto counted =
       static_cast<std::int64_t>(static_cast<std::uint64_t>(get_bytes<std::uint32_t>(charge, charge_at)) << 32 |
                                 get_bytes<std::uint32_t>(charge, charge_fraction_at));
-  const std::int64_t counted_uas = MeanCurrent::charge_uas(counted, configuration_.current_step_ua);
+  const std::int64_t counted_uas = MeanCurrent::charge_uas(counted, configuration_->current_step_ua);
   into.current_ua = std::clamp(mean_current_.update(cc3, counted_uas, into.time_us, end), -end, end);
   return true;
 }

@@ -50,8 +50,12 @@ class FrontEnd {
     std::uint32_t current_differs = 0;  ///< samples in which the two forms of the current contradicted each other
   };
 
+  /// All zero, so that it needs no space in flash; use() it before the first read().
+  constexpr FrontEnd() = default;
+  explicit constexpr FrontEnd(const Configuration& configuration) { use(configuration); }
+
   /// configuration: must outlive this object.
-  explicit constexpr FrontEnd(const Configuration& configuration) : configuration_(configuration) {}
+  constexpr void use(const Configuration& configuration) { configuration_ = &configuration; }
 
   /// Call once per sample, with into.time_us set. Writes the fresh readings, cells at the place of their input; all
   /// other fields are no_reading.
@@ -96,7 +100,7 @@ class FrontEnd {
   void rest();
   void reset_measurement();
 
-  const Configuration& configuration_;
+  const Configuration* configuration_ = nullptr;
   Wire wire_;
   MeanCurrent mean_current_;
   Counters counters_;
@@ -106,7 +110,7 @@ class FrontEnd {
   std::size_t next_setting_ = 0;
   std::uint8_t waited_ = 0, failures_ = 0;
   bool swapped_ = false, fresh_ = false;
-  std::int32_t dc_link_uv_ = measurement::no_reading;
+  std::int32_t dc_link_uv_ = 0;
   std::uint8_t scan_age_ = 0;  ///< samples since all inputs were measured
   std::uint32_t charge_time_s_ = 0;
   std::uint8_t charge_still_ = 0;  ///< samples since the charge counter's time advanced

@@ -24,8 +24,7 @@ namespace {
 
 constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
 
-bq76952::FrontEnd front_end{bq76952::board_configuration};
-measurement::PackSample<bq76952::cell_inputs> inputs;
+bq76952::FrontEnd front_end;
 measurement::PackSample<pack_cells> sample;
 SensorCalibration correction;
 std::uint64_t due_us = 0;
@@ -41,10 +40,12 @@ void receive_frames() {
 const measurement::PackSample<pack_cells>* next_sample() {
   if (!started) {
     i2c_start();
+    front_end.use(bq76952::board_configuration);
     started = true;
     due_us = now_us() + period_us;
   }
   for (receive_frames(); now_us() < due_us; receive_frames()) wait_for_interrupt();
+  measurement::PackSample<bq76952::cell_inputs> inputs;
   inputs.time_us = now_us();
   due_us = inputs.time_us - due_us < period_us ? due_us + period_us : inputs.time_us + period_us;
   if (front_end.silent()) [[unlikely]]
