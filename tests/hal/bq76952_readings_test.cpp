@@ -94,14 +94,18 @@ TEST_F(LargePack, CountsTheChargeInItsOwnUnit) {
 // ---- a register that changes while it is read ----
 
 TEST_F(Bq76952, AValueAcrossAByteBoundaryIsNeverOffByAByte) {
+  set_cells(3.327, 0);
+  model.stack_v = 51.19;
   start();
   std::mt19937 random(4);
-  std::uniform_int_distribution<std::uint64_t> phase_us(0, 31'000);
+  std::uniform_int_distribution<std::uint64_t> before_us(1'000, 31'000);
   for (int run = 0; run < 3'000; ++run) {
-    const double v = run % 2 == 0 ? 3.328 : 3.327;  // 0x0D00 and 0x0CFF
+    const std::uint64_t us = before_us(random);
+    model.advance(90'000 - us - model.time_us % 100);
+    const double v = run % 2 == 0 ? 3.328 : 3.327;  // 0x0D00 and 0x0CFF, of this scan or of the last one
     for (double& cell : model.cell_v) cell = v;
     model.stack_v = run % 2 == 0 ? 51.2 : 51.19;  // 0x1400 and 0x13FF in steps of 10 mV
-    next(70'000 + phase_us(random));
+    next();
     for (const std::int32_t uv : sample.cell_uv) {
       if (uv != no_reading) ASSERT_NEAR(uv, 3'327'500, 600) << run;
     }
