@@ -22,16 +22,19 @@ TEST_F(Bq76952, ACurrentBeyondTheRangeReadsAsItsEndWithItsSign) {
     model.current_a = a;
     model.advance(300'000);
     next(400'000);
-    if (std::abs(a) > 327.67)
+    if (std::abs(a) > 327.67) {
       EXPECT_EQ(sample.current_ua, a > 0 ? 327'670'000 : -327'670'000) << a;
-    else
+    } else {
       EXPECT_NEAR(sample.current_ua * 1e-6, a, 0.0023 * 650) << "after a step: 0.23 % of it";
+    }
     EXPECT_NE(sample.cell_uv[0], no_reading);
   }
   model.current_a = 500;
   for (int k = 0; k < 100; ++k) {
     next();
-    if (k > 3) ASSERT_EQ(sample.current_ua, 327'670'000) << k << ", whatever charge is counted";
+    if (k > 3) {
+      ASSERT_EQ(sample.current_ua, 327'670'000) << k << ", whatever charge is counted";
+    }
   }
 }
 
@@ -107,9 +110,13 @@ TEST_F(Bq76952, AValueAcrossAByteBoundaryIsNeverOffByAByte) {
     model.stack_v = run % 2 == 0 ? 51.2 : 51.19;  // 0x1400 and 0x13FF in steps of 10 mV
     next();
     for (const std::int32_t uv : sample.cell_uv) {
-      if (uv != no_reading) ASSERT_NEAR(uv, 3'327'500, 600) << run;
+      if (uv != no_reading) {
+        ASSERT_NEAR(uv, 3'327'500, 600) << run;
+      }
     }
-    if (sample.pack_uv != no_reading) ASSERT_NEAR(sample.pack_uv, 51'195'000, 6'000) << run;
+    if (sample.pack_uv != no_reading) {
+      ASSERT_NEAR(sample.pack_uv, 51'195'000, 6'000) << run;
+    }
   }
 }
 

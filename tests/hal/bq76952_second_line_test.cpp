@@ -36,11 +36,11 @@ struct Trip {
   bool opens_dsg, opens_chg;
 };
 
-class EveryProtection : public SecondLine, public ::testing::WithParamInterface<Trip> {};
+class EveryProtectionOfTheChip : public SecondLine, public ::testing::WithParamInterface<Trip> {};
 
 // Thresholds of board_under_test in the chip's steps: COV 3.8456 V, CUV 1.9734 V, OCC and OCD1 36 mV, OCD2 46 mV,
 // SCD 60 mV. Delays 1 s, 0.42 s, 0.3 s, 0.45 ms.
-TEST_P(EveryProtection, OpensItsPinsAndIsReported) {
+TEST_P(EveryProtectionOfTheChip, OpensItsPinsAndIsReported) {
   run();
   GetParam().begin(model);
   const int samples = GetParam().within_ms / 100 + 2;
@@ -52,7 +52,7 @@ TEST_P(EveryProtection, OpensItsPinsAndIsReported) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Of, EveryProtection,
+    Of, EveryProtectionOfTheChip,
     ::testing::Values(
         Trip{"CellUndervoltage", cell_undervoltage, 1'000, [](auto& m) { m.cell_v[3] = 1.97; }, true, false},
         Trip{"CellOvervoltage", cell_overvoltage, 1'000, [](auto& m) { m.cell_v[6] = 3.85; }, false, true},

@@ -225,7 +225,9 @@ TEST_F(Bq76952, ABufferWithAWrongChecksumGivesNoCurrent) {
   for (int k = 0; k < 20; ++k) {
     next();
     // Where the checksum has never been right, the CRCs and a second read are the check of the same bytes.
-    if (variant.dastatus_checksum_right) ASSERT_EQ(sample.current_ua, measurement::no_reading);
+    if (variant.dastatus_checksum_right) {
+      ASSERT_EQ(sample.current_ua, measurement::no_reading);
+    }
     expect_correct_or_no_reading();
   }
   EXPECT_EQ(front_end.wire().bad_checksum > 3, variant.dastatus_checksum_right);
