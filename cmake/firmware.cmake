@@ -136,18 +136,18 @@ set(auxiliary_contacts ${absent_hal}/auxiliary_contacts.cpp)
 if(DEFINED BMS_AUXILIARY_CONTACTS)
   set(auxiliary_contacts ${hal}/${BMS_AUXILIARY_CONTACTS}/auxiliary_contacts.cpp)
 endif()
-set(no_second_line ${absent_hal}/second_line.cpp)
-set(no_contacts ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp ${no_second_line})
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
-set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp
-  ${no_contacts})
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp ${no_contacts})
+set(no_chain ${absent_hal}/calibration.cpp ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp
+  ${absent_hal}/second_current.cpp)  # for a board without a measuring chain
+set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${no_chain})
+set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${no_chain})
 set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp
-  ${no_contacts})
-set(samples_bq76952 ${absent_hal}/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp
-  ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp
-  ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts} ${no_second_line})
+  ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp)
+# The settings of the chip's own protections follow the cell file.
+set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
+  ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header} ${chip}/i2c.cpp
+  ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts})
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
@@ -157,7 +157,7 @@ set(no_hardware watchdog flash calendar board_state supply)
 list(TRANSFORM no_hardware PREPEND ${absent_hal}/)
 list(TRANSFORM no_hardware APPEND .cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
-  ${absent_hal}/requests.cpp ${no_hardware} ${absent_hal}/calibration.cpp ${no_contacts})
+  ${absent_hal}/requests.cpp ${no_hardware} ${no_chain})
 target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
 bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp ${no_hardware})
 

@@ -174,6 +174,8 @@ class Application {
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
       store_latched_faults(decision.latched, latched_before);
+    if ((latched_before & ~decision.latched) != 0) [[unlikely]]
+      hal::second_line_clear();
   }
 
   /// Clearing the faults confirms the new cell file: from now on the stored data belong to it.
@@ -204,8 +206,9 @@ class Application {
       if (auto answer = commands_.handle(frame, now_us, requested_)) {
         if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time))
           answer->result = can::CommandAnswer::result_refused;
-        if (const auto calibration_change = std::exchange(requested_.calibration_change, std::nullopt))
-          apply_calibration(*calibration_change);
+        if (const auto change = std::exchange(requested_.calibration_change, std::nullopt);
+            change && !apply_calibration(*change))
+          answer->result = can::CommandAnswer::result_refused;
         telemetry_.answer(*answer);
       } else {
         vehicle_profile_.receive(frame);
@@ -213,10 +216,11 @@ class Application {
     }
   }
 
-  [[gnu::noinline]] void apply_calibration(const Requested::CalibrationChange& calibration_change) {
-    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + calibration_change.which),
-                     calibration_change.value);
-    hal::calibrate(stored_calibration(persistence_));
+  /// Returns false if the measuring chain cannot be calibrated; then nothing is stored.
+  [[gnu::noinline]] bool apply_calibration(const Requested::CalibrationChange& change) {
+    if (!hal::calibrate(stored_calibration(persistence_, change))) return false;
+    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + change.which), change.value);
+    return true;
   }
 
   /// An erase stops the core for half a second, so it happens only while all contactors are open.

@@ -9,6 +9,7 @@
 
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
+#include "firmware/commands.hpp"
 #include "firmware/messages.hpp"
 #include "hal/calibration.hpp"
 #include "storage/persistence.hpp"
@@ -77,9 +78,12 @@ inline protection::FaultSet stored_latched_faults(const storage::Persistence& pe
   return protection::FaultSet{word(more_latched_faults_key)} << 32 | word(latched_faults_key);
 }
 
-/// Calibration of the measuring chain from the stored settings; 0 where nothing is stored.
-inline hal::SensorCalibration stored_calibration(const storage::Persistence& persistence) {
+/// Calibration of the measuring chain from the stored settings, with `change` in place of the stored value; 0 where
+/// nothing is stored.
+inline hal::SensorCalibration stored_calibration(
+    const storage::Persistence& persistence, const std::optional<Requested::CalibrationChange>& change = std::nullopt) {
   const auto value = [&](std::uint16_t k) {
+    if (change && change->which == k) return change->value;
     return persistence.settings().get(static_cast<std::uint16_t>(first_calibration_key + k)).value_or(0);
   };
   return {value(0), value(1), value(2), value(3)};

@@ -53,7 +53,10 @@ void convert(adc::AdcCounts& sums) {
 
 }  // namespace
 
-void calibrate(const SensorCalibration& calibration) { correction = calibration; }
+bool calibrate(const SensorCalibration& calibration) {
+  correction = calibration;
+  return true;
+}
 
 const measurement::PackSample<1>* next_sample() {
   if (!started) {

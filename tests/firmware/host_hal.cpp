@@ -23,6 +23,8 @@ void host_hal::begin() {
   calendar_was_set_to = 0;
   calendar_accepts = true;
   calibrated = {};
+  calibration_accepts = true;
+  second_line_cleared = 0;
 }
 
 void host_hal::set_link(double pack_v, double dc_link_v) {
@@ -69,7 +71,11 @@ bool calendar_set(std::uint32_t unix_s) {
   host_hal::calendar_was_set_to = unix_s;
   return host_hal::calendar_accepts;
 }
-void calibrate(const SensorCalibration& c) { host_hal::calibrated = c; }
+bool calibrate(const SensorCalibration& c) {
+  if (host_hal::calibration_accepts) host_hal::calibrated = c;
+  return host_hal::calibration_accepts;
+}
+void second_line_clear() { ++host_hal::second_line_cleared; }
 
 }  // namespace hal
 }  // namespace bms

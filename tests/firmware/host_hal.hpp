@@ -34,6 +34,8 @@ inline std::uint32_t supply_falls = 0, supply_acknowledged = 0;
 inline std::uint32_t calendar_was_set_to = 0;
 inline bool calendar_accepts = true;
 inline hal::SensorCalibration calibrated;
+inline bool calibration_accepts = true;
+inline int second_line_cleared = 0;
 
 /// Resets all variables.
 void begin();

@@ -196,6 +196,14 @@ TEST_F(TelemetryTest, ACorrectionIsStoredAndAppliedAtOnceAndOneOutOfRangeRefused
   EXPECT_EQ(stored_calibration(persistence).current_gain_ppm, 0);
 }
 
+TEST_F(TelemetryTest, ACorrectionThatTheMeasuringChainCannotApplyIsRefusedAndNotStored) {
+  calibration_accepts = false;
+  send_command(can::Command::code_current_gain, 1'000, 1);
+  application.process_sample(estimator::single_cell_pack(sample));
+  EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_refused);
+  EXPECT_EQ(stored_calibration(persistence).current_gain_ppm, 0);
+}
+
 TEST_F(TelemetryTest, SelfDiagnosisOfTheBoardIsPublished) {
   host_hal::board_state = {.brown_out_reset_low = true,
                            .clock_failed = true,
