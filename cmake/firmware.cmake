@@ -127,8 +127,9 @@ set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
 set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp)
 set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp)
-set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp)
-set(samples_bq76952 ${absent_hal}/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp
+set(own_samples ${hal}/frame_dispatch.cpp ${absent_hal}/starting_point.cpp)
+set(samples_adc ${hal}/adc/samples.cpp ${own_samples} ${chip}/adc.cpp ${chip}/contactor_pins.cpp)
+set(samples_bq76952 ${absent_hal}/calibration.cpp ${hal}/bq76952/samples.cpp ${own_samples}
   ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})

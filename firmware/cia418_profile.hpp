@@ -168,7 +168,7 @@ constexpr bool pdo_ids_are_unique() {
                 hal::canopen_charger <= 127 && hal::canopen_node != hal::canopen_charger;
   for (const Cia418Profile::Pdo& pdo : Cia418Profile::pdos) {
     std::apply([&](auto... m) { ((unique = unique && m.id != pdo.id), ...); }, can::Messages{});
-    for (const std::uint16_t id : hal::accepted_ids) unique = unique && id != pdo.id;
+    for (const std::uint16_t id : hal::request_and_sample_ids) unique = unique && id != pdo.id;
   }
   return unique;
 }

@@ -1,7 +1,8 @@
 // Samples as CAN frames, for boards without a measuring chain of their own. The last frame completes the sample.
 // Identifiers ascend in sending order, so a node that sends by priority keeps the order.
 //
-//   0x310           i32 soc_ppb, i32 soc_sigma_ppb       starting point, before the first sample
+//   0x310           i32 soc_ppb, i32 soc_sigma_ppb       starting point, before the first sample; ignored unless soc is
+//                                                        0 to 1 and sigma 0.001 to 0.289
 //   0x311           u32 CRC-32, u16 frames, u16 counter  optional check: CRC over identifier and data of all following
 //                                                        frames up to 0x31D; `frames` is their number
 //   0x312           i32 current_ua, i32 voltage_uv       of a pack: voltage over all cells
@@ -17,6 +18,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "hal/bytes.hpp"
@@ -30,6 +32,9 @@ inline constexpr std::uint16_t start_frame_id = 0x310, check_frame_id = 0x311, r
                                dc_link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
                                time_frame_id = 0x31D, first_sample_frame_id = start_frame_id,
                                last_sample_frame_id = time_frame_id;
+
+/// Range of a starting point's sigma. No estimate is better than the first; 1 / sqrt(12) is that of an unknown soc.
+inline constexpr std::int32_t min_start_sigma_ppb = 1'000'000, max_start_sigma_ppb = 289'000'000;
 
 /// Returns true if the identifier belongs to a sample or a starting point.
 constexpr bool is_sample_frame(const can::Frame& frame) {
@@ -101,6 +106,15 @@ constexpr can::Frame frame_of(const measurement::StartingPoint& p) {
   return frame;
 }
 
+/// Returns the starting point of a frame, or nothing if it is another frame or a value is out of range.
+constexpr std::optional<measurement::StartingPoint> starting_point_of(const can::Frame& frame) {
+  if (frame.long_id || frame.id != start_frame_id || frame.length != 8) return std::nullopt;
+  const measurement::StartingPoint p{get_bytes<std::int32_t>(frame.data, 0), get_bytes<std::int32_t>(frame.data, 4)};
+  const bool in_range = p.soc_ppb >= 0 && p.soc_ppb <= 1'000'000'000 && p.soc_sigma_ppb >= min_start_sigma_ppb &&
+                        p.soc_sigma_ppb <= max_start_sigma_ppb;
+  return in_range ? std::optional(p) : std::nullopt;
+}
+
 /// Assembles samples from frames.
 template <std::size_t Cells>
 class SampleFrames {
@@ -108,6 +122,7 @@ class SampleFrames {
   /// Returns true if `frame` completed a valid sample, which sample() holds until the next call. Frames with another
   /// length or identifier change nothing.
   constexpr bool receive(const can::Frame& frame) {
+    if (const auto start = starting_point_of(frame)) start_ = start;
     if (frame.length != 8 || !is_sample_frame(frame) || frame.id == start_frame_id) return false;
     if (done_) begin();
     if (frame.id == check_frame_id) {
@@ -146,6 +161,8 @@ class SampleFrames {
   constexpr const measurement::PackSample<Cells>& sample() const { return building_; }
   constexpr std::int32_t dc_link_uv() const { return dc_link_uv_; }  ///< [uV]; no_reading: not received
   constexpr std::uint32_t rejected() const { return rejected_; }     ///< samples with a wrong CRC or frame count
+  /// The last valid starting point that was received, if any.
+  constexpr const std::optional<measurement::StartingPoint>& starting_point() const { return start_; }
 
  private:
   constexpr void begin() {
@@ -157,18 +174,11 @@ class SampleFrames {
   }
 
   measurement::PackSample<Cells> building_{};
+  std::optional<measurement::StartingPoint> start_;
   std::int32_t dc_link_uv_ = measurement::no_reading;
   std::uint32_t crc_ = ~0U, expected_crc_ = 0, rejected_ = 0;
   std::uint16_t frames_ = 0, expected_frames_ = 0;
   bool checked_ = false, done_ = false;
 };
-
-constexpr bool is_starting_point(const can::Frame& frame) {
-  return !frame.long_id && frame.id == start_frame_id && frame.length == 8;
-}
-
-constexpr measurement::StartingPoint starting_point_of(const can::Frame& frame) {
-  return {get_bytes<std::int32_t>(frame.data, 0), get_bytes<std::int32_t>(frame.data, 4)};
-}
 
 }  // namespace bms::hal

@@ -96,10 +96,34 @@ TEST(SampleFrames, CarryASampleAndAStartingPoint) {
   EXPECT_EQ(received.sample().cell_uv[0], measurement::no_reading);
   EXPECT_EQ(received.sample().temperature_cdegc[0], -4'000);
   const can::Frame start = frame_of(measurement::StartingPoint{800'000'000, 20'000'000});
-  EXPECT_TRUE(is_starting_point(start));
-  EXPECT_EQ(starting_point_of(start).soc_ppb, 800'000'000);
-  EXPECT_EQ(starting_point_of(start).soc_sigma_ppb, 20'000'000);
-  EXPECT_FALSE(is_starting_point({start.id, 7, start.data}));
+  EXPECT_FALSE(received.receive(start));
+  ASSERT_TRUE(received.starting_point());
+  EXPECT_EQ(received.starting_point()->soc_ppb, 800'000'000);
+  EXPECT_EQ(received.starting_point()->soc_sigma_ppb, 20'000'000);
+}
+
+TEST(SampleFrames, IgnoreAStartingPointThatIsOutOfRange) {
+  const std::vector<can::Frame> of_others = {
+      {0x310, 8, {0x00, 0x94, 0x35, 0x77, 0x01, 0x00, 0x00, 0x00}},  // process data: would be 200 %, sigma 1e-9
+      frame_of({1'000'000'001, 20'000'000}),
+      frame_of({-1, 20'000'000}),
+      frame_of({500'000'000, 999'999}),
+      frame_of({500'000'000, 289'000'001}),
+      frame_of({500'000'000, 0}),
+      frame_of({500'000'000, -20'000'000}),
+      {0x310, 7, frame_of({500'000'000, 20'000'000}).data},
+      {0x310, 8, frame_of({500'000'000, 20'000'000}).data, true},
+      {0x311, 8, frame_of({500'000'000, 20'000'000}).data}};
+  SampleFrames<1> received;
+  for (const can::Frame& frame : of_others) {
+    received.receive(frame);
+    EXPECT_FALSE(received.starting_point());
+  }
+  for (const measurement::StartingPoint at_the_end : {measurement::StartingPoint{0, 1'000'000}, {1'000'000'000, 289'000'000}}) {
+    SampleFrames<1> others;
+    others.receive(frame_of(at_the_end));
+    EXPECT_TRUE(others.starting_point());
+  }
 }
 
 measurement::PackSample<16> some_pack() {
