@@ -15,6 +15,7 @@
 #include <array>
 #include <cstdint>
 
+#include "firmware/cycle.hpp"
 #include "hal/bytes.hpp"
 #include "hal/can.hpp"
 
@@ -51,14 +52,11 @@ class Node {
 
   /// Sends boot-up or a heartbeat if it is due. Call at each sample; now_us is the time of the sample.
   void update_heartbeat(std::uint32_t now_us) {
-    if (state_ == NodeState::boot_up) {
-      send_heartbeat(NodeState::boot_up);
-      state_ = NodeState::operational;
-      heartbeat_sent_us_ = now_us;
-    } else if (now_us - heartbeat_sent_us_ >= heartbeat_us) {
-      send_heartbeat(state_);
-      heartbeat_sent_us_ = now_us;
-    }
+    const bool boot_up = state_ == NodeState::boot_up;
+    if (boot_up) heartbeat_.restart();
+    if (!heartbeat_.due(now_us, heartbeat_us)) return;
+    send_heartbeat(state_);
+    if (boot_up) state_ = NodeState::operational;
   }
 
   /// Handles NMT and SDO requests. Returns true if the frame was for this node.
@@ -115,7 +113,7 @@ class Node {
     hal::can_send(answer);
   }
 
-  std::uint32_t heartbeat_sent_us_ = 0;
+  Cycle heartbeat_;
   std::uint8_t id_;
   NodeState state_ = NodeState::boot_up;
 };
