@@ -37,7 +37,8 @@ namespace bms::firmware {
 struct WithoutVehicleProfile {
   template <class Estimator, std::size_t Cells>
   constexpr void publish(const Snapshot<Estimator, Cells>&) {}
-  constexpr void receive(const can::Frame&) {}
+  constexpr void receive(const can::Frame&, std::uint64_t) {}
+  constexpr protection::Request request(protection::Request truck, std::uint64_t) const { return truck; }
 };
 
 template <class Board, class VehicleProfile = WithoutVehicleProfile>
@@ -69,7 +70,7 @@ class Application {
     const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
     const Result estimate = Board::step(estimator_, mean);
     hal::record_estimate(estimator::words(estimate));
-    const auto request = requested_.active_request(pack.time_us);
+    const auto request = vehicle_profile_.request(requested_.active_request(pack.time_us), pack.time_us);
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
@@ -177,7 +178,7 @@ class Application {
           apply_calibration(*calibration_change);
         telemetry_.answer(*answer);
       } else {
-        vehicle_profile_.receive(frame);
+        vehicle_profile_.receive(frame, now_us);
       }
     }
   }

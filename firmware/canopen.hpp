@@ -5,6 +5,7 @@
 //   700h + node   out    boot-up once, then the state every heartbeat_us
 //   600h + node   in     SDO: read or write an object in one frame (expedited transfer)
 //   580h + node   out    the answer, or an abort code
+//   700h + peer   in     heartbeat of one other node
 //
 // The node becomes operational without a master, because a truck may have none. In state "stopped" it sends only its
 // heartbeat. Segmented and block transfers are refused. The owner implements the objects: read(index, sub) and
@@ -116,6 +117,38 @@ class Node {
   Cycle heartbeat_;
   std::uint8_t id_;
   NodeState state_ = NodeState::boot_up;
+};
+
+/// Another node, as its heartbeat shows it.
+class Peer {
+ public:
+  /// Without a heartbeat for this time the node is gone: three times the one second that chargers have by default.
+  static constexpr std::uint64_t timeout_us = 3'000'000;
+
+  constexpr explicit Peer(std::uint8_t id) : id_(id) {}
+
+  constexpr void receive(const can::Frame& frame, std::uint64_t now_us) {
+    if (frame.long_id || frame.id != heartbeat_id + id_ || frame.length != 1) return;
+    const auto state = static_cast<NodeState>(frame.data[0] & 0x7F);  // bit 7 alternates in answers to node guarding
+    repeated_ = present(now_us) && state == state_;
+    state_ = state;
+    received_us_ = now_us;
+  }
+  /// Returns true if the node sends heartbeats and is not stopped.
+  constexpr bool present(std::uint64_t now_us) const {
+    return state_ != NodeState::stopped && now_us - received_us_ < timeout_us;
+  }
+  /// Returns true if two heartbeats in a row, the last one within the timeout, were "operational". A heartbeat has no
+  /// check code, so a single one is not enough to switch something on.
+  constexpr bool operational(std::uint64_t now_us) const {
+    return present(now_us) && repeated_ && state_ == NodeState::operational;
+  }
+
+ private:
+  std::uint64_t received_us_ = 0;
+  std::uint8_t id_;
+  NodeState state_ = NodeState::stopped;  ///< of the last heartbeat
+  bool repeated_ = false;                 ///< the heartbeat before had the same state
 };
 
 }  // namespace bms::firmware::canopen
