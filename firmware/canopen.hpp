@@ -122,8 +122,8 @@ class Node {
 /// Another node, as its heartbeat shows it.
 class Peer {
  public:
-  /// Without a heartbeat for this time the node is gone: three times the one second that chargers have by default.
-  static constexpr std::uint64_t timeout_us = 3'000'000;
+  /// Without a heartbeat for this time the node is gone. Chargers send one per second by default, and two may be lost.
+  static constexpr std::uint64_t timeout_us = 3'500'000;
 
   constexpr explicit Peer(std::uint8_t id) : id_(id) {}
 

@@ -119,7 +119,8 @@ TEST(SampleFrames, IgnoreAStartingPointThatIsOutOfRange) {
     received.receive(frame);
     EXPECT_FALSE(received.starting_point());
   }
-  for (const measurement::StartingPoint at_the_end : {measurement::StartingPoint{0, 1'000'000}, {1'000'000'000, 289'000'000}}) {
+  for (const measurement::StartingPoint at_the_end :
+       {measurement::StartingPoint{0, 1'000'000}, {1'000'000'000, 289'000'000}}) {
     SampleFrames<1> others;
     others.receive(frame_of(at_the_end));
     EXPECT_TRUE(others.starting_point());
@@ -150,6 +151,49 @@ TEST(SampleFrames, CarryAPack) {
   EXPECT_EQ(received.sample().temperature_cdegc, sent.temperature_cdegc);
   EXPECT_EQ(received.dc_link_uv(), 51'000'000);
   EXPECT_EQ(received.rejected(), 0U);
+}
+
+template <std::size_t Cells>
+measurement::PackSample<Cells> pack_of() {
+  measurement::PackSample<Cells> p;
+  p.time_us = 987'654'321;
+  p.current_ua = 12'345'678;
+  p.pack_uv = 3'300'000 * static_cast<std::int32_t>(Cells);
+  for (std::size_t k = 0; k < Cells; ++k) p.cell_uv[k] = 3'300'000 + static_cast<std::int32_t>(k);
+  p.temperature_cdegc = {2'500, 2'600, 2'700, 2'800};
+  return p;
+}
+
+template <std::size_t Cells>
+void expect_carried(const std::vector<std::uint32_t>& expected_ids) {
+  const auto frames = frames_of(pack_of<Cells>(), 51'000'000, 7);
+  std::vector<std::uint32_t> ids;
+  SampleFrames<Cells> received;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    ids.push_back(frames[k].id);
+    EXPECT_EQ(received.receive(frames[k]), k + 1 == frames.size()) << k;
+  }
+  EXPECT_EQ(ids, expected_ids) << Cells;
+  EXPECT_EQ(received.sample().time_us, 987'654'321U);
+  EXPECT_EQ(received.sample().cell_uv, pack_of<Cells>().cell_uv);
+  EXPECT_EQ(received.sample().temperature_cdegc, pack_of<Cells>().temperature_cdegc);
+}
+
+TEST(SampleFrames, CarryPacksOf8And15And24CellsWithoutFramesOfAbsentCells) {
+  expect_carried<8>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x31C, 0x31D});
+  expect_carried<15>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B, 0x31C, 0x31D});
+  expect_carried<24>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B, 0x31C, 0x31E, 0x31F,
+                      0x320, 0x321, 0x322});
+}
+
+TEST(SampleFrames, OfASmallPackCompleteNoSampleOfALargeOneNorTheOtherWayRound) {
+  SampleFrames<24> large;
+  for (const can::Frame& frame : frames_of(pack_of<16>(), 0, 1)) EXPECT_FALSE(large.receive(frame));
+  SampleFrames<16> small;
+  for (const can::Frame& frame : frames_of(pack_of<24>(), 0, 1)) EXPECT_FALSE(small.receive(frame));
+  for (const can::Frame& frame : frames_of(pack_of<16>(), 0, 2)) small.receive(frame);
+  EXPECT_EQ(small.sample().cell_uv, pack_of<16>().cell_uv);
+  EXPECT_EQ(small.rejected(), 0U);
 }
 
 TEST(SampleFrames, ACheckedSampleWithAFlippedBitOrALostFrameIsRejected) {
