@@ -14,8 +14,8 @@ namespace bms::firmware {
 
 class Cycle {
  public:
-  /// Returns true if the message is due, and starts the next cycle. Never within half a cycle after the last one. If the
-  /// time went back by more than a period, the message is due (unsigned differences).
+  /// Returns true if the message is due, and starts the next cycle. Never within half a cycle after the last one. If
+  /// the time went back by more than a period, the message is due (unsigned differences).
   constexpr bool due(std::uint32_t now_us, std::uint32_t cycle_us) {
     const std::uint32_t slack_us = std::min(half_period_us, cycle_us / 2);
     const std::uint32_t since_planned_us = now_us - planned_us_ + slack_us;  // >= 0: it left at most slack_us early

@@ -1,5 +1,5 @@
-# STM32F405RG, Cortex-M4F, on the board of a forklift with 8 to 16 cells. No emulator has its CAN controller; tests/firmware
-# runs the image on a model of it.
+# STM32F405RG, Cortex-M4F, on the board of a forklift with 8 to 16 cells. No emulator has its CAN controller;
+# tests/firmware runs the image on a model of it.
 set(BMS_SCALAR_DEFINITION "")
 set(BMS_DEFAULT_CELL table9)
 set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/memory.ld)

@@ -1,4 +1,5 @@
-// A board that measures itself: no other node can send its samples or its state of charge, so it receives only requests.
+// A board that measures itself: no other node can send its samples or its state of charge, so it receives only
+// requests.
 #include "hal/accepted_frames.hpp"
 #include "hal/samples.hpp"
 

@@ -130,7 +130,8 @@ TEST_F(BxcanBoard, AFullFifoAndAFullRingAreCountedAndTheNextSampleIsReceived) {
 TEST_F(BxcanBoard, OnlyAcceptedIdentifiersAreReceived) {
   run_until_it_listens(board);
   for (std::uint32_t id = 0; id < 0x800; id += 7) {
-    const bool accepted = std::find(hal::request_and_sample_ids.begin(), hal::request_and_sample_ids.end(), id) != hal::request_and_sample_ids.end();
+    const bool accepted = std::find(hal::request_and_sample_ids.begin(), hal::request_and_sample_ids.end(), id) !=
+                          hal::request_and_sample_ids.end();
     if (!accepted) board.can.others.push_back({{id, false, false, 8, {}}, 0});
   }
   for (const std::uint32_t id : hal::request_and_sample_ids) {
@@ -139,7 +140,8 @@ TEST_F(BxcanBoard, OnlyAcceptedIdentifiersAreReceived) {
       board.can.others.push_back({{id << 18 | tail, true, false, 8, {}}, 0});  // 29 bits
     for (std::uint32_t bit = 0; bit < 11; ++bit) {
       const std::uint32_t near = id ^ 1U << bit;
-      if (std::find(hal::request_and_sample_ids.begin(), hal::request_and_sample_ids.end(), near) == hal::request_and_sample_ids.end())
+      if (std::find(hal::request_and_sample_ids.begin(), hal::request_and_sample_ids.end(), near) ==
+          hal::request_and_sample_ids.end())
         board.can.others.push_back({{near, false, false, 8, {}}, 0});
     }
   }

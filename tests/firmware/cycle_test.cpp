@@ -73,14 +73,14 @@ std::map<std::uint32_t, CyclicMessage> hour_with_jitter_of(std::uint32_t jitter_
   std::mt19937 random(jitter_us);
   for (std::uint32_t k = 0; k < hour_us / sample_us; ++k) {
     pack.time_us = 7 + std::uint64_t{k} * sample_us + random() % (jitter_us + 1);
-    const Snapshot<estimator::SocEstimator<float>, all_cells> now{pack,     mean,  estimate,     condition,
-                                                                  cells,    decision, Board::plan(), persistence,
-                                                                  board,    6,     false};
+    const Snapshot<estimator::SocEstimator<float>, all_cells> now{
+        pack, mean, estimate, condition, cells, decision, Board::plan(), persistence, board, 6, false};
     telemetry.publish(now);
     j1939.publish(now);
     cia418.publish(now);
     for (const can::Frame& f : sent) {
-      if (const auto m = messages.find(f.id); m != messages.end()) m->second.send(static_cast<std::uint32_t>(pack.time_us));
+      if (const auto m = messages.find(f.id); m != messages.end())
+        m->second.send(static_cast<std::uint32_t>(pack.time_us));
     }
     sent.clear();
   }
@@ -133,7 +133,8 @@ TEST(Cycle, GoesOnWhenTheTimeWraps) {
   Cycle cycle;
   int sent = 0;
   std::uint32_t now_us = 0U - 1'000'000'000;
-  for (int k = 0; k < 20'000; ++k, now_us += 100'000) sent += cycle.due(now_us + static_cast<std::uint32_t>(k % 3), 500'000) ? 1 : 0;
+  for (int k = 0; k < 20'000; ++k, now_us += 100'000)
+    sent += cycle.due(now_us + static_cast<std::uint32_t>(k % 3), 500'000) ? 1 : 0;
   EXPECT_EQ(sent, 4'000);
 }
 
