@@ -23,10 +23,21 @@
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (can/messages.md): cia418 for a CANopen charger, with the
 # nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
 #
+# BMS_CELLS is the number of cells in series: that of board.cmake, or another one within the range that board.cmake
+# states, as -DBMS_CELLS=N.
+#
 # Whatever does not depend on the cell is compiled once for all images.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
+set(cells_wanted ${BMS_CELLS})
 include(${root}/boards/${BMS_BOARD}/board.cmake)
+if(cells_wanted)
+  set(BMS_CELLS ${cells_wanted})
+endif()
+if(NOT BMS_CELLS MATCHES "^[0-9]+$" OR BMS_CELLS LESS BMS_FEWEST_CELLS OR BMS_CELLS GREATER BMS_MOST_CELLS)
+  message(FATAL_ERROR "BMS_CELLS is ${BMS_CELLS}, but the board ${BMS_BOARD} measures from ${BMS_FEWEST_CELLS} to "
+    "${BMS_MOST_CELLS} cells in series. More than 16 cells need two monitoring chips: docs/packs_of_24_cells.md")
+endif()
 include(${root}/hal/${BMS_CHIP}/chip.cmake)  # compiler flags, core, flash, what QEMU replaces
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
@@ -152,6 +163,9 @@ bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} $
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
 target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
+if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
+  target_sources(hal_samples PRIVATE ${absent_hal}/starting_point.cpp)
+endif()
 bms_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
 set(no_hardware watchdog flash calendar board_state supply)
 list(TRANSFORM no_hardware PREPEND ${absent_hal}/)

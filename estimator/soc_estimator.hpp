@@ -27,6 +27,7 @@
 // estimator/README.md.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
@@ -61,8 +62,9 @@ class SocEstimator {
 
   constexpr SocEstimator() = default;
 
-  /// Starts from a known state of charge instead of the first voltage.
-  constexpr explicit SocEstimator(const measurement::StartingPoint& from) : from_{from}, has_start_{true} {}
+  /// Starts from a known state of charge instead of the first voltage. Both values are clamped to 0 to 1.
+  constexpr explicit SocEstimator(const measurement::StartingPoint& from)
+      : from_{clamped_to_one(from.soc_ppb), clamped_to_one(from.soc_sigma_ppb)}, has_start_{true} {}
 
   /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
@@ -346,6 +348,9 @@ class SocEstimator {
     return at;
   }
 
+  static constexpr std::int32_t clamped_to_one(std::int32_t ppb) {
+    return std::clamp<std::int32_t>(ppb, 0, 1'000'000'000);
+  }
   constexpr SocDistribution<S> given_soc() const {
     const Soc sigma = soc_of_ppb(from_.soc_sigma_ppb);
     return {soc_of_ppb(from_.soc_ppb), Variance(sigma * sigma)};

@@ -50,7 +50,8 @@ static_assert(second_line::cell_undervoltage == hal::cell_undervoltage &&
 struct WithoutVehicleProfile {
   template <class Estimator, std::size_t Cells>
   constexpr void publish(const Snapshot<Estimator, Cells>&) {}
-  constexpr void receive(const can::Frame&) {}
+  constexpr void receive(const can::Frame&, std::uint64_t) {}
+  constexpr protection::Request request(protection::Request truck, std::uint64_t) const { return truck; }
 };
 
 template <class Board, class VehicleProfile = WithoutVehicleProfile>
@@ -81,7 +82,7 @@ class Application {
     const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
     const Result estimate = Board::step(estimator_, mean);
     hal::record_estimate(estimator::words(estimate));
-    const auto request = requested_.active_request(pack.time_us);
+    const auto request = vehicle_profile_.request(requested_.active_request(pack.time_us), pack.time_us);
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
@@ -211,7 +212,7 @@ class Application {
           answer->result = can::CommandAnswer::result_refused;
         telemetry_.answer(*answer);
       } else {
-        vehicle_profile_.receive(frame);
+        vehicle_profile_.receive(frame, now_us);
       }
     }
   }

@@ -122,7 +122,8 @@ class J1939Profile {
     send_if_due<j1939::DcSourceStatus11>([&] { return j1939::status_11(now); });
   }
 
-  constexpr void receive(const can::Frame&) {}
+  constexpr void receive(const can::Frame&, std::uint64_t) {}
+  constexpr protection::Request request(protection::Request truck, std::uint64_t) const { return truck; }
 
  private:
   template <class Message>

@@ -94,12 +94,22 @@ constexpr float amperes(std::int32_t ua) {
   return ua != measurement::no_reading ? static_cast<float>(ua) * 1e-6F : can::unknown;
 }
 
+/// Packs of more cells have a voltage beyond the range of PackElectrical, and send PackVoltage.
+inline constexpr std::size_t max_cells_of_pack_electrical = 16;
+
 template <std::size_t Cells>
 constexpr can::PackElectrical pack_electrical(const measurement::PackSample<Cells>& pack) {
   can::PackElectrical m;
-  m.voltage = volts(pack.pack_uv);
+  if constexpr (Cells <= max_cells_of_pack_electrical) m.voltage = volts(pack.pack_uv);
   m.current = amperes(pack.current_ua);
   m.temperature = degrees(pack.temperature_cdegc[0]);
+  return m;
+}
+
+template <std::size_t Cells>
+constexpr can::PackVoltage pack_voltage(const measurement::PackSample<Cells>& pack) {
+  can::PackVoltage m;
+  m.voltage = volts(pack.pack_uv);
   return m;
 }
 

@@ -125,6 +125,7 @@ class Telemetry {
   }
 
   void publish_cells(const Snapshot<Estimator, Cells>& now) {
+    static_assert(Cells <= 24, "further cells have no message");
     send_if_due<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(now.pack); });
     if constexpr (Cells > 4)
       send_if_due<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(now.pack); });
@@ -132,6 +133,12 @@ class Telemetry {
       send_if_due<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(now.pack); });
     if constexpr (Cells > 12)
       send_if_due<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(now.pack); });
+    if constexpr (Cells > 16)
+      send_if_due<can::CellVoltages5>([&] { return messages::cell_voltages<can::CellVoltages5, 16>(now.pack); });
+    if constexpr (Cells > 20)
+      send_if_due<can::CellVoltages6>([&] { return messages::cell_voltages<can::CellVoltages6, 20>(now.pack); });
+    if constexpr (Cells > messages::max_cells_of_pack_electrical)
+      send_if_due<can::PackVoltage>([&] { return messages::pack_voltage(now.pack); });
     send_if_due<can::CellExtremes>([&] { return messages::cell_extremes(now.pack, now.cells); });
     send_if_due<can::Temperatures>([&] { return messages::temperatures(now.pack); });
     send_if_due<can::Balancing>([&] { return messages::balancing(now.decision); });

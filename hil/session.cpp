@@ -35,8 +35,8 @@ can::Frame request(protection::Request what, std::uint8_t counter) {
 }
 
 template <std::size_t Cells>
-std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, const LinkPoles& link,
-                                   std::uint16_t counter) {
+std::vector<can::Frame> frames_of_cells(const measurement::PackSample<max_cells>& all, const LinkPoles& link,
+                                        std::uint16_t counter) {
   measurement::PackSample<Cells> s;
   s.time_us = all.time_us;
   s.current_ua = all.current_ua;
@@ -45,6 +45,16 @@ std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all
   s.temperature_cdegc = all.temperature_cdegc;
   const auto frames = hal::frames_of(s, micro(link.plus_v), counter, micro(link.minus_v));
   return {frames.begin(), frames.end()};
+}
+
+/// The frames of a sample of the first `cells` cells, from 1 to max_cells.
+template <std::size_t Cells = max_cells>
+std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, std::size_t cells,
+                                   const LinkPoles& link, std::uint16_t counter) {
+  if constexpr (Cells > 1) {
+    if (cells < Cells) return frames_for<Cells - 1>(all, cells, link, counter);
+  }
+  return frames_of_cells<Cells>(all, link, counter);
 }
 
 /// Whether the board is ready for a load.
@@ -219,9 +229,7 @@ class Session {
   }
 
   std::vector<can::Frame> sample_frames(const Measured& measured, std::uint64_t k) const {
-    const auto counter = static_cast<std::uint16_t>(k);
-    return plan_.cells == 1 ? frames_for<1>(measured.sample, measured.link, counter)
-                            : frames_for<max_cells>(measured.sample, measured.link, counter);
+    return frames_for(measured.sample, plan_.cells, measured.link, static_cast<std::uint16_t>(k));
   }
 
   void judge(const Step& step, const Measured& measured) {

@@ -19,7 +19,7 @@
 
 namespace bms::hil {
 
-inline constexpr std::size_t max_cells = 16;
+inline constexpr std::size_t max_cells = 24;
 
 /// Standard deviations, between the cells and of the sensors' noise.
 struct PackSpread {

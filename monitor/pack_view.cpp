@@ -111,6 +111,7 @@ PackView pack_view(const BusState& bus) {
     if (std::isfinite(value)) v.soc_quality_value = static_cast<int>(value);
   });
   v.voltage_v = bus.reading("PackElectrical", "Voltage");
+  if (!v.voltage_v.known()) v.voltage_v = bus.reading("PackVoltage", "Voltage");  // more than 16 cells
   v.current_a = bus.reading("PackElectrical", "Current");
   v.temperature_c = bus.reading("PackElectrical", "Temperature");
   v.discharge_now_a = bus.reading("CurrentLimits", "DischargeNow");

@@ -129,7 +129,7 @@ constexpr bool decode(Bytes from, std::uint8_t layout, ChargeRecord& r) {
 
 struct CellsRecord {
   static constexpr Kind kind{2, 1};
-  static constexpr std::size_t max_cells = 16;
+  static constexpr std::size_t max_cells = 24;
   struct Cell {
     std::int16_t soc = 0;     ///< minus the mean, in 1e-5: +-0.32
     std::uint16_t sigma = 0;  ///< in 1e-5

@@ -15,6 +15,7 @@ namespace {
 
 struct FlashOptions {
   std::string board = "stm32f405_forklift", cell;  ///< cell empty: the board's own
+  std::size_t cells = 0;                           ///< in series; 0: the board's own number
   std::string probe, serial;                       ///< probe empty: the board's own (BMS_PROBE in board.cmake)
   bool dry_run = false;
 };
@@ -49,7 +50,7 @@ int flash(const FlashOptions& o) {
   }
   const auto image = images::firmware_image(
       o.board, files::read_cell(o.cell.empty() ? images::board_setting(o.board, "BMS_DEFAULT_CELL") : o.cell),
-      images::chip_image(o.board));
+      images::chip_image(o.board), "none", o.cells);
   const images::ImageFile file(image);
   const auto storage = images::storage_of(file);
   const auto parts = write_parts(image, images::parts_to_write(file.parts(), storage));
@@ -83,6 +84,7 @@ class FlashCommand final : public Command {
     c.add_option("--board", o_.board, "folder in boards/")->capture_default_str();
     c.add_option("--cell", o_.cell, "cell file, or name of a built-in cell; the board's own if not given")
         ->type_name("CELL");
+    c.add_option("--cells", o_.cells, "cells in series; the board's own number if not given");
     c.add_option("--probe", o_.probe,
                  "debug probe: stlink, cmsis-dap, jlink, ... (a file of OpenOCD's interface/); the board's own if not "
                  "given");

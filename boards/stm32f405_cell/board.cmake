@@ -5,6 +5,8 @@ set(BMS_DEFAULT_CELL table9)
 set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/../stm32f405_forklift/memory.ld)  # the same chip and memory layout
 set(BMS_CHIP stm32f4)
 set(BMS_CELLS 1)
+set(BMS_FEWEST_CELLS 1)
+set(BMS_MOST_CELLS 1)
 set(BMS_SAMPLE_PERIOD_S 0.1)
 set(BMS_CURRENT_RANGE_A 41)  # 1.65 V / (20 x 2 mohm): hal/adc/cell_readings.hpp
 set(BMS_EMULATED OFF)

@@ -4,7 +4,7 @@
 // same order. If a more urgent frame finds all mailboxes taken, the least urgent one is aborted and returns to the
 // queue. Two frames with the same identifier are never in mailboxes together, because the controller would send them by
 // mailbox number instead of age.
-// Reception: filters for accepted_ids (standard frames), the controller's FIFO of three, an interrupt, a ring of 64.
+// Reception: filters for accepted_ids() (standard frames), the controller's FIFO of three, an interrupt, a ring of 64.
 //
 // Going on the bus (32.4) and recovery after bus-off (32.7.6) are phases that service() checks. Each has a timeout
 // after which it is tried again later; no function waits in a loop for the bus.
@@ -35,7 +35,7 @@ namespace {
 using namespace stm32f4;
 
 constexpr bxcan::BitTiming timing = bxcan::bit_timing(crystal_apb1_hz, BMS_CAN_BIT_RATE);
-constexpr auto banks = bxcan::filter_banks(accepted_ids);
+static_assert(bxcan::fits(request_ids) && bxcan::fits(request_and_sample_ids));
 
 constexpr std::uint64_t phase_timeout_us = 100'000, no_progress_us = 100'000, pause_us = 1'000'000;
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
@@ -172,14 +172,17 @@ void configure() {
   can1_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO discards new frames instead of old ones
   can1_btr() = timing.btr();
   can1_fmr() = can1_fmr() | 1U;
-  constexpr std::uint32_t all = (1U << banks.size()) - 1;
+  const auto ids = accepted_ids();
+  const std::size_t banks = bxcan::bank_count(ids);
+  const std::uint32_t all = (1U << banks) - 1;
   can1_fa1r() = 0;
   can1_fs1r() = 0;    // 16 bits
   can1_fm1r() = all;  // lists
   can1_ffa1r() = 0;   // FIFO 0
-  for (std::uint32_t k = 0; k < banks.size(); ++k) {
-    can1_filter_bank(k).fr1 = banks[k].fr1;
-    can1_filter_bank(k).fr2 = banks[k].fr2;
+  for (std::uint32_t k = 0; k < banks; ++k) {
+    const bxcan::FilterBank bank = bxcan::filter_bank(ids, k);
+    can1_filter_bank(k).fr1 = bank.fr1;
+    can1_filter_bank(k).fr2 = bank.fr2;
   }
   can1_fa1r() = all;
   can1_fmr() = can1_fmr() & ~1U;

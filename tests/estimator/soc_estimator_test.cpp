@@ -85,6 +85,16 @@ TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
 }
 
+TEST(SocEstimator, AStartingPointBeyondTheEndsIsClampedToThem) {
+  const std::vector<measurement::Sample> no_voltage = {{0, 0, measurement::no_reading, 2'500}};
+  const auto first = [&](const measurement::StartingPoint& from) {
+    return run<float>(no_voltage, SocEstimator<float>(from)).front();
+  };
+  EXPECT_EQ(first({2'000'000'000, 1}).soc, first({1'000'000'000, 1}).soc);
+  EXPECT_EQ(first({-300'000'000, 1}).soc, first({0, 1}).soc);
+  EXPECT_EQ(first({500'000'000, -20'000'000}).soc_sigma, first({500'000'000, 0}).soc_sigma);
+}
+
 TEST(SocEstimator, AWidePriorAndTheFirstVoltageAreCombined) {
   const auto cell = table9<float>();
   const auto started = [&](double soc, double sigma, std::int32_t voltage_uv) {

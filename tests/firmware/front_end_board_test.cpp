@@ -86,6 +86,19 @@ class FrontEndBoard : public ::testing::Test {
   UnicornBoard board{image()};
 };
 
+/// On a CANopen bus, 0x310 to 0x31D are process data of other devices: receive PDO 2 of nodes 16 to 29.
+TEST_F(FrontEndBoard, NoFrameOfASampleOrOfAStartingPointIsReceived) {
+  for (int k = 0; k < 20; ++k) {
+    for (std::uint32_t id = 0x310; id <= 0x322; ++id)
+      board.can.others.push_back({{id, false, false, 8, {0x00, 0x65, 0xCD, 0x1D, 0x80, 0x96, 0x98, 0x00}}, 0});
+  }
+  board.run_for_ms(900);
+  EXPECT_EQ(board.can_health().received, 0U);
+  const auto start = last(can::StartingSoc::id);
+  ASSERT_TRUE(start);
+  EXPECT_EQ(can::StartingSoc::of(*start).given, can::StartingSoc::given_no) << "50 %, sigma 1 %";
+}
+
 TEST_F(FrontEndBoard, CellVoltagesAreOnTheBusToTheMillivolt) {
   board.run_for_ms(3'600 + 750);  // a new chip first erases three sectors, 0.25 s each
   expect_cells();

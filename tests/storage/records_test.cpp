@@ -34,10 +34,10 @@ SettingsRecord full_settings() {
   return s;
 }
 
-CellsRecord full_cells() {
+CellsRecord cells_record(std::uint8_t count) {
   CellsRecord c;
-  c.count = 16;
-  for (std::size_t k = 0; k < 16; ++k)
+  c.count = count;
+  for (std::size_t k = 0; k < count; ++k)
     c.cell[k] = {static_cast<std::int16_t>(-3000 + 400 * static_cast<int>(k)), static_cast<std::uint16_t>(40'000 + k)};
   return c;
 }
@@ -121,12 +121,22 @@ TEST(Records, AreDecodedAsEncodedAndOnlyFromTheirLength) {
   charge.pack = {987'654'321, 12'345'678};
   charge.charged_uah = 123'456'789'012;
   is_decoded_as_encoded(charge);
-  is_decoded_as_encoded(full_cells());
+  for (const std::uint8_t count : {std::uint8_t{8}, std::uint8_t{15}, std::uint8_t{16}, std::uint8_t{24}}) {
+    is_decoded_as_encoded(cells_record(count));
+    EXPECT_EQ(bytes_of(cells_record(count)).size(), 1U + 4U * count);
+  }
   is_decoded_as_encoded(CellsRecord{});
   is_decoded_as_encoded(HealthRecord{912'000, 3'000, 1'430'000, 20'000});
   is_decoded_as_encoded(full_events());
   is_decoded_as_encoded(full_settings());
   is_decoded_as_encoded(SettingsRecord{});
+}
+
+TEST(CellsRecord, OfMoreThan24CellsIsNotDecoded) {
+  Raw bytes(1 + 4 * 25, 1);
+  bytes[0] = 25;
+  CellsRecord cells;
+  EXPECT_FALSE(decode(bytes, CellsRecord::kind.layout, cells));
 }
 
 TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithTheSigmaOfAMinute) {
