@@ -5,7 +5,7 @@
 
 namespace bms::hal {
 
-/// Current at the moment of the call [uA], > 0 charges; measurement::no_reading: not fitted, or not known yet. Call
+/// Current at the moment of the call [uA], > 0 charges; measurement::no_reading: not fitted, or not known yet. Call it
 /// once per sample.
 std::int32_t second_current_ua();
 

@@ -35,7 +35,7 @@ can::Frame request(protection::Request what, std::uint8_t counter) {
 }
 
 template <std::size_t Cells>
-std::vector<can::Frame> frames_of_cells(const measurement::PackSample<max_cells>& all, const LinkPoles& link,
+std::vector<can::Frame> frames_of_cells(const measurement::PackSample<max_cells>& all, const plant::LinkPoles& link,
                                         std::uint16_t counter) {
   measurement::PackSample<Cells> s;
   s.time_us = all.time_us;
@@ -50,7 +50,7 @@ std::vector<can::Frame> frames_of_cells(const measurement::PackSample<max_cells>
 /// The frames of a sample of the first `cells` cells, from 1 to max_cells.
 template <std::size_t Cells = max_cells>
 std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, std::size_t cells,
-                                   const LinkPoles& link, std::uint16_t counter) {
+                                   const plant::LinkPoles& link, std::uint16_t counter) {
   if constexpr (Cells > 1) {
     if (cells < Cells) return frames_for<Cells - 1>(all, cells, link, counter);
   }
@@ -150,7 +150,7 @@ class Session {
     measurement::PackSample<max_cells> sample;
     double soc_true = 0;  ///< NaN: unknown
     double dc_link_v = 0;
-    LinkPoles link;
+    plant::LinkPoles link;
   };
 
   void announce_soc() {
@@ -200,8 +200,9 @@ class Session {
                       pack_.dc_link_v(),
                       {}};
     if (plan_.replayed) replace_by_recording(step, measured);
-    measured.link = link_poles(step.contactors.connects_plus(step.welded), step.contactors.main_minus,
-                               plan_.replayed ? 1e-6 * measured.sample.pack_uv : pack_.pack_v(), measured.dc_link_v);
+    measured.link =
+        plant::link_poles(step.contactors.connects_plus(step.welded), step.contactors.main_minus,
+                          plan_.replayed ? 1e-6 * measured.sample.pack_uv : pack_.pack_v(), measured.dc_link_v);
     return measured;
   }
 

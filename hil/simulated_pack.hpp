@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "files/cell_file.hpp"
-#include "hil/link_poles.hpp"
 #include "measurement/pack_sample.hpp"
 #include "model/extended.hpp"
+#include "plant/link_poles.hpp"
 
 namespace bms::hil {
 

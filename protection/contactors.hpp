@@ -94,8 +94,8 @@ class Contactors {
  public:
   static constexpr std::uint32_t grace_us = 5'000'000;  ///< for a truck to reduce its current when 0 A are allowed
   /// From a change of the outputs to the first reading that shows it: a contactor closes within 35 ms and opens within
-  /// 15 ms, and the inputs settle within 15 ms. It is also the time in which main plus closes next to the relay.
-  static constexpr std::uint32_t settling_us = 75'000;
+  /// 15 ms, and the inputs follow within 15 ms. It is also the time in which main plus closes next to the relay.
+  static constexpr std::uint32_t response_us = 75'000;
 
   constexpr explicit Contactors(const ContactorPlan& plan) : plan_(&plan) {}
 
@@ -106,12 +106,12 @@ class Contactors {
     if (in.open_now) not_closed_ = false;  // the table has it
     if (!intact()) enter(ContactorState::safe);
     count(in_state_us_, in.step_us, plan_->longest_us());
-    count(settled_us_, in.step_us, settling_us);
+    count(unchanged_us_, in.step_us, response_us);
     if (in.request != last_request_) last_request_ = Request::none;
     step(in, link);
     events_.not_closed = events_.not_closed || not_closed_;
     const Outputs next = outputs_in(in);
-    if (next != outputs_) settled_us_ = 0;
+    if (next != outputs_) unchanged_us_ = 0;
     return outputs_ = next;
   }
 
@@ -146,7 +146,7 @@ class Contactors {
     if (s != ContactorState::unloading) overrun_us_ = 0;  // a second reason does not restart the grace time
   }
 
-  constexpr bool settled() const { return settled_us_ == settling_us; }
+  constexpr bool outputs_visible() const { return unchanged_us_ == response_us; }
 
   constexpr void step(const ContactorInput& in, const DcLink& link) {
     const ContactorState s = state();
@@ -175,7 +175,7 @@ class Contactors {
   }
 
   constexpr Outputs outputs_in(const ContactorInput& in) const {
-    const bool closing = plan_->dc_link && in_state_us_ < settling_us;
+    const bool closing = plan_->dc_link && in_state_us_ < response_us;
     switch (state()) {
       case ContactorState::self_test:
         return {.main_plus = false, .main_minus = part() == 2, .precharge = part() == 1};
@@ -199,7 +199,7 @@ class Contactors {
   constexpr bool contact_opened(const ContactorInput& in, const DcLink& link) const {
     if (!outputs_.main_plus && !outputs_.main_minus) return false;
     if (in.contact_lost) return true;
-    if (!settled()) return false;
+    if (!outputs_visible()) return false;
     if (in.auxiliary.fitted && ((outputs_.main_plus && !in.auxiliary.main_plus_closed) ||
                                 (outputs_.main_minus && !in.auxiliary.main_minus_closed)))
       return true;
@@ -256,13 +256,14 @@ class Contactors {
     return events_.welded;
   }
 
-  /// Proves that the commanded contactor has closed, or that another one is closed. link: known.
+  /// Proves that the commanded contactor has closed, or that another one is closed. The voltages are known.
   constexpr void check_part(const DcLink& link) {
     const std::int32_t link_uv = link.link_uv();
     if (lowest_link_uv_ == measurement::no_reading || link_uv < lowest_link_uv_) lowest_link_uv_ = link_uv;
     if (part() > 0 && link_uv - lowest_link_uv_ > link.pack_uv / 8)
       found_welded(part() == 1 ? Pole::minus : Pole::plus);
-    if (settled()) proven_ = proven_ || part() == 0 || (part() == 1 ? link.plus_at_pack() : link.minus_at_zero());
+    if (outputs_visible())
+      proven_ = proven_ || part() == 0 || (part() == 1 ? link.plus_at_pack() : link.minus_at_zero());
   }
 
   constexpr void fail_precharge(const DcLink& link) {
@@ -341,7 +342,7 @@ class Contactors {
 
   /// Pole that is closed although its outputs are off.
   constexpr Pole closed_while_off(const ContactorInput& in, const DcLink& link) const {
-    if (!settled()) return Pole::none;
+    if (!outputs_visible()) return Pole::none;
     if (in.auxiliary.fitted && in.auxiliary.main_plus_closed && !outputs_.main_plus) return Pole::plus;
     if (in.auxiliary.fitted && in.auxiliary.main_minus_closed && !outputs_.main_minus) return Pole::minus;
     return link.known() && !outputs_.any_closed() ? link.closed_pole() : Pole::none;
@@ -365,7 +366,7 @@ class Contactors {
   const ContactorPlan* plan_;
   Guarded state_{static_cast<std::uint32_t>(ContactorState::off)};
   std::uint32_t in_state_us_ = 0, overrun_us_ = 0;
-  std::uint32_t settled_us_ = 0;                           ///< since the outputs changed, up to settling_us
+  std::uint32_t unchanged_us_ = 0;                         ///< since the outputs changed, up to response_us
   std::int32_t lowest_link_uv_ = measurement::no_reading;  ///< of this self-test
   std::int32_t first_gap_uv_ = measurement::no_reading, last_gap_uv_ = measurement::no_reading;  ///< of this precharge
   std::uint8_t last_half_ = 0;            ///< half time constant of last_gap_uv_

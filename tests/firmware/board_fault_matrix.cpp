@@ -312,9 +312,9 @@ class Matrix {
   };
 
   /// Poles of a DC link with this voltage, where the commanded contactors connect them.
-  static hil::LinkPoles poles(const BoardTruck& truck, std::int32_t pack_uv, double dc_link_uv) {
+  static plant::LinkPoles poles(const BoardTruck& truck, std::int32_t pack_uv, double dc_link_uv) {
     const Outputs o = truck.outputs();
-    return hil::link_poles(o.main_plus || o.precharge, o.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
+    return plant::link_poles(o.main_plus || o.precharge, o.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
   }
   /// Just above the lowest voltage that the curve allows, or just below it, from half a time constant on. The curve
   /// starts at an empty DC link and has 1.5 times the time constant, minus a fifth of the pack.

@@ -114,7 +114,7 @@ class BoardTruck : public TruckPack {
       result_.wrong.push_back(fmt::format("{} at {:.1f} s", what, 0.1 * static_cast<double>(steps())));
   }
 
-  std::function<hil::LinkPoles(const TruckPack&)> link;  ///< DC link instead of that of the truck
+  std::function<plant::LinkPoles(const TruckPack&)> link;  ///< DC link instead of that of the truck
   FaultSet faults = 0, expected = 0;
   FaultSet not_judged = 0;  ///< rows that the oracle cannot judge in this case
   std::uint32_t flags = 0;  ///< of the estimate

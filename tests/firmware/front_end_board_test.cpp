@@ -10,8 +10,8 @@
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "files/cell_file.hpp"
-#include "hil/link_poles.hpp"
 #include "images/firmware_image.hpp"
+#include "plant/link_poles.hpp"
 #include "tests/firmware/contactor_port_models.hpp"
 #include "tests/firmware/converter_model.hpp"
 #include "tests/firmware/i2c_controller_model.hpp"
@@ -78,7 +78,7 @@ class FrontEndBoard : public ::testing::Test {
   }
 
   Bq76952Model chip;
-  hil::LinkPoles poles = hil::link_poles(false, false, 0, 0);
+  plant::LinkPoles poles = plant::link_poles(false, false, 0, 0);
   I2cControllerModel i2c{chip};
   AuxiliaryPins pins{chip};
   ConverterModel converter;
@@ -175,7 +175,7 @@ class Truck : public FrontEndBoard {
       dc_link_v *= std::exp(-0.01 / (load.current_a == 0 ? 1.5 : 0.05));
     }
     chip.current_a = plus && minus ? load.current_a : 0;
-    poles = hil::link_poles(plus || relay, minus, chip.stack_v, dc_link_v);
+    poles = plant::link_poles(plus || relay, minus, chip.stack_v, dc_link_v);
     chip.ld_v = std::max(0.0, poles.plus_v);
   }
   /// Simulates 10 ms of the circuit.
@@ -259,7 +259,7 @@ TEST_F(Truck, DrivesAgainAtOnceWithAChargedDcLink) {
   EXPECT_EQ(faults().first_cause, 0U);
   requests_power = true;
   EXPECT_GE(until([](const Pins& p) { return p.main_plus; }, 3'000), 0);
-  EXPECT_EQ(faults().first_cause, 0U) << "a charged DC link is no weld";
+  EXPECT_EQ(faults().first_cause, 0U) << "a charged DC link is not a weld";
 }
 
 /// A fault while driving. The pins open within delay_ms of the table, plus a sample period and the measuring time of

@@ -1,6 +1,6 @@
 #include "tests/firmware/host_hal.hpp"
 
-#include "hil/link_poles.hpp"
+#include "plant/link_poles.hpp"
 
 namespace bms {
 
@@ -28,8 +28,8 @@ void host_hal::begin() {
 }
 
 void host_hal::set_link(double pack_v, double dc_link_v) {
-  const hil::LinkPoles poles =
-      hil::link_poles(switched.main_plus || switched.precharge, switched.main_minus, pack_v, dc_link_v);
+  const plant::LinkPoles poles =
+      plant::link_poles(switched.main_plus || switched.precharge, switched.main_minus, pack_v, dc_link_v);
   link_readings = {static_cast<std::int32_t>(1e6 * poles.plus_v), static_cast<std::int32_t>(1e6 * poles.minus_v)};
 }
 

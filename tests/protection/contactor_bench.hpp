@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "hil/link_poles.hpp"
+#include "plant/link_poles.hpp"
 #include "protection/contactors.hpp"
 #include "tests/protection/expected_rows.hpp"
 
@@ -20,7 +20,7 @@ inline void PrintTo(ContactorState s, std::ostream* out) { *out << contactor_sta
 inline constexpr ContactorPlan forklift_contactors = contactor_plan(forklift);
 inline constexpr std::int32_t rested_pack_uv = 52'800'000;
 
-inline void set_poles(ContactorInput& in, const hil::LinkPoles& poles) {
+inline void set_poles(ContactorInput& in, const plant::LinkPoles& poles) {
   in.link_plus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.plus_v));
   in.link_minus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.minus_v));
 }
@@ -55,7 +55,7 @@ struct ContactorBench {
       dc_link_v *= std::exp(-step_s / discharge_s);
       if (load_a < 0) dc_link_v *= 0.8;
     }
-    set_poles(in, hil::link_poles(plus || relay, minus, pack_v, dc_link_v));
+    set_poles(in, plant::link_poles(plus || relay, minus, pack_v, dc_link_v));
     in.current_ua = static_cast<std::int32_t>(1e6 * current_a);
     closed = plus && minus;
   }
@@ -91,8 +91,8 @@ struct FedContactors {
     const Outputs out = contactors.outputs();
     in.link_plus_uv = in.link_minus_uv = measurement::no_reading;
     if (dc_link_uv != measurement::no_reading)
-      set_poles(in, hil::link_poles(out.main_plus || out.precharge, out.main_minus, 1e-6 * rested_pack_uv,
-                                    1e-6 * dc_link_uv));
+      set_poles(in, plant::link_poles(out.main_plus || out.precharge, out.main_minus, 1e-6 * rested_pack_uv,
+                                      1e-6 * dc_link_uv));
     return step_with_poles(seconds, in.link_plus_uv, in.link_minus_uv);
   }
   ContactorState step_with_poles(double seconds, std::int32_t plus_uv, std::int32_t minus_uv) {

@@ -30,7 +30,7 @@ TEST(WeldedContactor, IsADcLinkThatRisesByAnEighthAboveItsLowestInTheSelfTest) {
     f.step(0.05, 0);
     f.in.pack_uv = rested_pack_uv;
     EXPECT_EQ(f.step(0.05, 26'000'000), self_test) << "noise";
-    EXPECT_EQ(f.step(0.05, 25'000'000 + rise_uv), self_test) << "one sample is no proof";
+    EXPECT_EQ(f.step(0.05, 25'000'000 + rise_uv), self_test) << "one sample does not prove it";
     EXPECT_EQ(f.welded(), rise_uv > eighth_uv);
     EXPECT_EQ(f.step(0.05, 25'000'000 + rise_uv), rise_uv > eighth_uv ? opening : self_test);
     EXPECT_EQ(f.welded(), rise_uv > eighth_uv);
@@ -176,7 +176,7 @@ TEST(Precharge, EndsAtTwoPercentOfThePack) {
   FedContactors above;
   above.to(precharge);
   above.step(0.25, 30'000'000);
-  EXPECT_EQ(above.step(0.01, rested_pack_uv + rested_pack_uv / 50 + 1), precharge) << "a link above the pack";
+  EXPECT_EQ(above.step(0.01, rested_pack_uv + rested_pack_uv / 50 + 1), precharge) << "a DC link above the pack";
   EXPECT_EQ(above.step(0.01, rested_pack_uv + rested_pack_uv / 50), drive);
 }
 
@@ -317,7 +317,7 @@ TEST(WeldedContactor, IsReportedThreeSamplesAfterTheOpening) {
   charged.to(drive);
   charged.in.open_now = true;
   charged.step(0.1, rested_pack_uv);
-  EXPECT_EQ(charged.step(0.3, rested_pack_uv), safe) << "a DC link that stays charged is no weld";
+  EXPECT_EQ(charged.step(0.3, rested_pack_uv), safe) << "a DC link that stays charged is not a weld";
   EXPECT_FALSE(charged.welded());
 }
 

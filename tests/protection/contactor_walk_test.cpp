@@ -27,8 +27,8 @@ struct Poles {
   std::int32_t plus_uv, minus_uv;
 };
 constexpr std::int32_t unknown = measurement::no_reading;
-/// Not measured; floating and empty; floating and full; plus closed on an empty link; plus closed and half full; minus
-/// closed and half full, 12 %, 1 % below the pack; both closed.
+/// Not measured; floating and empty; floating and full; plus closed on an empty DC link; plus closed and half full;
+/// minus closed and half full, 12 %, 1 % below the pack; both closed.
 constexpr Poles pole_classes[] = {{unknown, unknown},       {1'278'000, 1'278'000},   {22'300'000, -30'500'000},
                                   {52'800'000, 52'800'000}, {52'800'000, 26'000'000}, {26'000'000, 0},
                                   {46'500'000, 0},          {52'300'000, 0},          {52'800'000, 0}};

@@ -22,7 +22,7 @@ plant::TruckParameters world_of(std::uint64_t seed) {
 
 constexpr int worlds = 100;
 
-/// Key on, precharge, drive, recuperate, key off, restart with a charged link, key off.
+/// Key on, precharge, drive, recuperate, key off, restart with a charged DC link, key off.
 void drive_twice(WiredTruck& t, const std::string& name) {
   for (int start = 0; start < 2; ++start) {
     t.request = Request::drive;
@@ -105,7 +105,7 @@ TEST(WiredPrecharge, FailsWithALoadThatLeavesTooMuchVoltageForTheClosing) {
   EXPECT_TRUE(t.truck.events().empty() || t.worst_closing(Relay::main_plus).peak_a == 0);
 }
 
-/// The link stays at the charger's voltage in every state of the contactors, above or below the battery.
+/// The DC link stays at the charger's voltage in every state of the contactors, above or below the battery.
 TEST(WiredTrucks, DriveWithAChargerThatHoldsTheLinkUp) {
   for (const double held_v : {20.0, 45.0, 52.0, 52.6, 53.0, 56.0, 60.0}) {
     plant::TruckParameters world = plant::typical_world();

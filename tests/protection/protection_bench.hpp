@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "hil/link_poles.hpp"
+#include "plant/link_poles.hpp"
 #include "protection/protection.hpp"
 #include "tests/protection/expected_rows.hpp"
 
@@ -17,8 +17,8 @@ inline constexpr ProtectionPlan forklift_plan = protection_plan(forklift);
 
 /// Sets the poles of a DC link where these contactors connect them.
 inline void set_poles(ExternalInputs& inputs, const Outputs& closed, double pack_uv, double dc_link_uv) {
-  const hil::LinkPoles poles =
-      hil::link_poles(closed.main_plus || closed.precharge, closed.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
+  const plant::LinkPoles poles =
+      plant::link_poles(closed.main_plus || closed.precharge, closed.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
   inputs.link_plus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.plus_v));
   inputs.link_minus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.minus_v));
 }

@@ -10,7 +10,7 @@
 #include <functional>
 #include <optional>
 
-#include "hil/link_poles.hpp"
+#include "plant/link_poles.hpp"
 #include "plant/random.hpp"
 #include "protection/protection.hpp"
 #include "tests/protection/oracle.hpp"
@@ -94,10 +94,10 @@ class TruckPack {
     else
       dc_link_uv_ *= 0.97;
     const double pack_uv = closed && sample.pack_uv != measurement::no_reading ? sample.pack_uv : stack_v;
-    set_link(hil::link_poles(out.main_plus || out.precharge, out.main_minus, 1e-6 * pack_uv,
-                             closed ? 1e-6 * pack_uv : 1e-6 * dc_link_uv_));
+    set_link(plant::link_poles(out.main_plus || out.precharge, out.main_minus, 1e-6 * pack_uv,
+                               closed ? 1e-6 * pack_uv : 1e-6 * dc_link_uv_));
   }
-  void set_link(const hil::LinkPoles& poles) {
+  void set_link(const plant::LinkPoles& poles) {
     inputs.link_plus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.plus_v));
     inputs.link_minus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.minus_v));
   }

@@ -7,7 +7,7 @@
 //                 front end, 2.01 Mohm to 0 V; L+ - L- is the voltage of the capacitor
 #pragma once
 
-namespace bms::hil {
+namespace bms::plant {
 
 struct LinkPoles {
   double plus_v = 0, minus_v = 0;
@@ -22,4 +22,4 @@ constexpr LinkPoles link_poles(bool plus_closed, bool minus_closed, double pack_
   return {minus_v + dc_link_v, minus_v};
 }
 
-}  // namespace bms::hil
+}  // namespace bms::plant
