@@ -16,6 +16,7 @@
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/commands.hpp"
+#include "firmware/latched_faults.hpp"
 #include "firmware/progress.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
@@ -51,8 +52,8 @@ class Application {
   Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
               float capacity_ah, storage::Persistence& persistence)
       : estimator_{start ? Estimator(*start) : Estimator()},
-        protection_{Board::plan(),
-                    static_cast<std::uint32_t>(persistence.settings().get(latched_faults_key).value_or(0))},
+        latched_faults_{persistence, hal::reset_cause()},
+        protection_{Board::plan(), static_cast<std::uint32_t>(latched_faults_.faults())},
         telemetry_{identity, start},
         capacity_ah_{capacity_ah},
         persistence_{persistence},
@@ -73,6 +74,7 @@ class Application {
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
+    observe(pack, estimate);
     protect(pack, estimate, request);
     publish(pack, mean, estimate);
     handle_requests(pack.time_us);
@@ -112,9 +114,17 @@ class Application {
                                          .persistence = persistence_,
                                          .board = board_,
                                          .capacity_ah = capacity_ah_,
-                                         .log_samples = requested_.log_samples};
+                                         .log_samples = requested_.log_samples,
+                                         .stored_item = requested_.next_stored_item()};
     telemetry_.publish(now);
     vehicle_profile_.publish(now);
+  }
+
+  /// Readings for the stored faults and extremes.
+  [[gnu::noinline]] void observe(const measurement::PackSample<cells>& pack, const Result& estimate) {
+    std::optional<std::int32_t> soc_ppb;
+    if ((estimate.flags & estimator::not_started) == 0) soc_ppb = messages::ppb(estimate.soc);
+    persistence_.observe(readings(pack, soc_ppb, Board::plausible()));
   }
 
   void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
@@ -140,8 +150,10 @@ class Application {
     inputs.dc_link_uv = hal::dc_link_uv();
     const std::uint32_t supply_falls = hal::supply_falls();
     inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
+                         latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
-    inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
+    inputs.storage_fault =
+        persistence_.log().sectors() > 0 && (!persistence_.log().operational() || persistence_.full_for_long());
     first_ = false;
     const std::uint32_t latched_before = protection_.decision().latched;
     const auto& decision = protection_.update(pack, known, inputs);
@@ -152,7 +164,7 @@ class Application {
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
-      persistence_.set(latched_faults_key, static_cast<std::int32_t>(decision.latched));
+      latched_faults_.store(decision.latched);
   }
 
   /// Clearing the faults confirms the new cell file: from now on the stored data belong to it.
@@ -163,7 +175,8 @@ class Application {
 
   [[gnu::noinline]] void store_faults(std::uint32_t raised) {
     for (std::uint16_t k = 0; k < protection::fault_count; ++k) {
-      if ((raised >> k & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
+      if ((raised >> k & 1) != 0)
+        persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k), hal::calendar_s());
     }
   }
 
@@ -198,6 +211,7 @@ class Application {
   Estimator estimator_;
   estimator::Condition<Estimator> condition_;
   estimator::PackCells<typename Estimator::Scalar, cells> cells_;
+  LatchedFaults latched_faults_;
   protection::Protection<cells> protection_;
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;

@@ -16,8 +16,9 @@
 namespace bms::firmware {
 
 // Keys of the stored settings and codes of the stored faults.
-inline constexpr std::uint16_t latched_faults_key = 1;  ///< protection::Decision::latched
-inline constexpr std::uint16_t cell_file_key = 2;       ///< hash of the cell file that the stored data belong to
+inline constexpr std::uint16_t latched_faults_key = 1;       ///< bits 0 to 31 of protection::Decision::latched
+inline constexpr std::uint16_t more_latched_faults_key = 3;  ///< its bits 32 to 63
+inline constexpr std::uint16_t cell_file_key = 2;            ///< hash of the cell file that the stored data belong to
 /// Four keys for hal::SensorCalibration: gain [ppm] and offset [uV] of the voltage, gain [ppm] and offset [uA] of the
 /// current.
 inline constexpr std::uint16_t first_calibration_key = 16;
@@ -67,6 +68,29 @@ class StateToStoreOf {
   storage::EstimatorSnapshot values_;
   std::array<storage::CellsRecord::Cell, Cells> cells_{};
 };
+
+/// Readings of the pack for a fault that is stored now. Cell voltages that the sensor cannot measure are omitted.
+template <std::size_t Cells>
+constexpr storage::Readings readings(const measurement::PackSample<Cells>& pack, std::optional<std::int32_t> soc_ppb,
+                                     const model::PlausibleRange& plausible) {
+  storage::Readings r;
+  if (soc_ppb) r.soc = static_cast<std::uint8_t>(std::clamp<std::int32_t>(*soc_ppb / 5'000'000, 0, 200));
+  if (pack.current_ua != measurement::no_reading)
+    r.current = static_cast<std::int16_t>(std::clamp<std::int32_t>(pack.current_ua / 250'000, -8'191, 8'191));
+  for (const std::int32_t uv : pack.cell_uv) {
+    if (uv < plausible.voltage_min_uv || uv > plausible.voltage_max_uv) continue;
+    const auto mv = static_cast<std::uint16_t>(std::clamp<std::int32_t>(uv / 1'000, 0, 8'190));
+    if (r.highest_voltage == r.unknown_voltage || mv > r.highest_voltage) r.highest_voltage = mv;
+    if (mv < r.lowest_voltage) r.lowest_voltage = mv;
+  }
+  for (const std::int16_t cdegc : pack.temperature_cdegc) {
+    if (!measurement::temperature_possible(cdegc)) continue;
+    const auto degrees = static_cast<std::uint8_t>(std::clamp(cdegc / 100 + 60, 0, 254));
+    if (r.highest_temperature == r.unknown || degrees > r.highest_temperature) r.highest_temperature = degrees;
+    if (degrees < r.lowest_temperature) r.lowest_temperature = degrees;
+  }
+  return r;
+}
 
 /// Calibration of the measuring chain from the stored settings; 0 where nothing is stored.
 inline hal::SensorCalibration stored_calibration(const storage::Persistence& persistence) {

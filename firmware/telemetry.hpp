@@ -14,6 +14,7 @@
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "firmware/snapshot.hpp"
+#include "firmware/stored_data.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
@@ -50,6 +51,8 @@ class Telemetry {
       return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
     });
     published_alarming_ = now.board.alarming();
+    if (now.stored_item) [[unlikely]]
+      publish_stored(*now.stored_item, now.persistence, now.capacity_ah);
     if (now.log_samples) log(now.mean);
     send(messages::pack_state(now.estimate, now.condition));
     send(messages::pack_electrical(now.pack));
@@ -134,6 +137,22 @@ class Telemetry {
     can::LastFaultCause cause;
     cause.configurable_fault_status = fault->cfsr;
     send(cause);
+  }
+
+  [[gnu::noinline]] void publish_stored(std::uint32_t item, const storage::Persistence& stored, float capacity_ah) {
+    stored_data::send_item(item, stored, static_cast<std::uint32_t>(capacity_ah * 1e6F),
+                           [this]<class Message>(Message, std::uint64_t bits) {
+                             static_assert(Message::data_id == Message::id);
+                             send_bits(Message::id, bits, std::get<SendState<Message>>(sent_).counter);
+                           });
+  }
+
+  [[gnu::noinline]] static void send_bits(std::uint16_t id, std::uint64_t bits, std::uint8_t& counter) {
+    can::Frame frame{id, 8, {}, false};
+    can::put_raw(frame, 0, 64, bits);
+    can::protect(frame, id, counter);
+    hal::can_send(frame);
+    counter = can::next(counter);
   }
 
   void log(const measurement::Sample& sample) {

@@ -6,8 +6,10 @@
 //             1       8      (older) state of charge alone
 //   cells     1       1+4n   each cell relative to the mean
 //   health    1       16     capacity and resistance
-//   events    1       118    starts, resets by cause, the last sixteen faults
+//   events    2       230    starts, resets by cause, the last sixteen faults with readings of the pack
+//             1       118    (older) without readings
 //   settings  1       3+6n   values by key
+//   extremes  1       10     lowest and highest readings so far
 #pragma once
 
 #include <algorithm>
@@ -188,14 +190,50 @@ constexpr bool decode(Bytes from, std::uint8_t layout, HealthRecord& r) {
   return true;
 }
 
+/// Readings of the pack at one time: the raw values of the signals of StoredFaultPack and StoredFaultCells in
+/// can/greybox_bms.dbc. The highest raw value, of `current` the lowest, means "not known".
+struct Readings {
+  static constexpr std::uint8_t unknown = 255;
+  static constexpr std::int16_t unknown_current = -8192;
+  static constexpr std::uint16_t unknown_voltage = 8191;
+
+  std::uint8_t soc = unknown;              ///< in 0.5 %
+  std::int16_t current = unknown_current;  ///< in 0.25 A, > 0 charges
+  /// Of the temperature sensors, in degrees C above -60.
+  std::uint8_t highest_temperature = unknown, lowest_temperature = unknown;
+  std::uint16_t highest_voltage = unknown_voltage, lowest_voltage = unknown_voltage;  ///< of the cells [mV]
+  constexpr bool operator==(const Readings&) const = default;
+};
+
+constexpr std::uint64_t bits(const Readings& r) {
+  return std::uint64_t{r.soc} | std::uint64_t{static_cast<std::uint16_t>(r.current) & 0x3FFFU} << 8 |
+         std::uint64_t{r.highest_temperature} << 22 | std::uint64_t{r.lowest_temperature} << 30 |
+         std::uint64_t{r.highest_voltage & 0x1FFFU} << 38 | std::uint64_t{r.lowest_voltage} << 51;
+}
+
+constexpr Readings readings_of(std::uint64_t bits) {
+  const auto part = [bits](unsigned from, unsigned mask) { return static_cast<std::uint16_t>(bits >> from & mask); };
+  Readings r;
+  r.soc = static_cast<std::uint8_t>(part(0, 0xFF));
+  r.current = static_cast<std::int16_t>(static_cast<std::int16_t>(part(8, 0x3FFF) << 2) >> 2);
+  r.highest_temperature = static_cast<std::uint8_t>(part(22, 0xFF));
+  r.lowest_temperature = static_cast<std::uint8_t>(part(30, 0xFF));
+  r.highest_voltage = part(38, 0x1FFF);
+  r.lowest_voltage = part(51, 0x1FFF);
+  return r;
+}
+
 struct EventsRecord {
-  static constexpr Kind kind{4, 1};
+  static constexpr Kind kind{4, 2};
   static constexpr std::size_t causes = 7, max_faults = 16;
+  static constexpr std::uint16_t processor_fault_code = 0xFF00;  ///< plus the exception number, at most 127
   struct Fault {
-    std::uint16_t code = 0;         ///< 0: no fault
-    std::uint32_t operating_s = 0;  ///< time of the fault
+    std::uint16_t code = 0;    ///< 1 to 127, or a processor fault; 0: no fault
+    std::uint32_t time_s = 0;  ///< since 1970, if the calendar clock ran (from first_unix_s on); else in operation
+    Readings readings;
     constexpr bool operator==(const Fault&) const = default;
   };
+  static constexpr std::uint32_t first_unix_s = 946'684'800;  ///< 2000-01-01: 30 years of operation
 
   std::uint32_t starts = 0;
   std::array<std::uint16_t, causes> resets{};  ///< by hal::ResetCause; saturates at 65,535
@@ -210,24 +248,78 @@ struct EventsRecord {
   constexpr bool operator==(const EventsRecord&) const = default;
 };
 
+/// The code of a fault in seven bits; bit 7 marks a processor fault.
+constexpr std::uint8_t short_code(std::uint16_t code) {
+  return static_cast<std::uint8_t>((code & 0x7F) | (code >= EventsRecord::processor_fault_code ? 0x80 : 0));
+}
+
 constexpr Bytes encode(const EventsRecord& r, Payload into) {
   Encoder e(into);
   e.put(r.starts);
   for (const auto n : r.resets) e.put(n);
   e.put(r.faults);
-  for (const auto& f : r.fault) e.put(f.code).put(f.operating_s);
+  for (const auto& f : r.fault) e.put(short_code(f.code)).put(f.time_s).put(bits(f.readings));
   return e.bytes();
 }
 
 constexpr bool decode(Bytes from, std::uint8_t layout, EventsRecord& r) {
-  if (layout != 1 || from.size() != 118) return false;
+  const bool older = layout == 1 && from.size() == 118;
+  if (!older && (layout != 2 || from.size() != 230)) return false;
   Decoder d(from);
   d.get(r.starts);
   for (auto& n : r.resets) d.get(n);
   d.get(r.faults);
   for (auto& f : r.fault) {
-    d.get(f.code);
-    d.get(f.operating_s);
+    d.get(f.code, older ? 2 : 1);
+    if (!older && f.code >= 0x80)
+      f.code = static_cast<std::uint16_t>(EventsRecord::processor_fault_code + f.code - 0x80);
+    d.get(f.time_s);
+    f.readings = older ? Readings{} : readings_of(d.read<std::uint64_t>());
+  }
+  return true;
+}
+
+/// Lowest and highest reading so far of any cell, any temperature sensor and the current; units as Readings.
+struct ExtremesRecord {
+  static constexpr Kind kind{6, 1};
+  struct Extreme {
+    std::uint16_t voltage = Readings::unknown_voltage;
+    std::uint8_t temperature = Readings::unknown;
+    std::int16_t current = Readings::unknown_current;
+    constexpr bool operator==(const Extreme&) const = default;
+  };
+
+  Extreme lowest, highest;
+
+  constexpr void add(const Readings& r) {
+    widen(&Extreme::voltage, r.lowest_voltage, r.highest_voltage, Readings::unknown_voltage);
+    widen(&Extreme::temperature, r.lowest_temperature, r.highest_temperature, Readings::unknown);
+    widen(&Extreme::current, r.current, r.current, Readings::unknown_current);
+  }
+  constexpr bool operator==(const ExtremesRecord&) const = default;
+
+ private:
+  template <class T>
+  constexpr void widen(T Extreme::*value, T low, T high, T unknown) {
+    if (low == unknown || high == unknown) return;
+    if (lowest.*value == unknown || low < lowest.*value) lowest.*value = low;
+    if (highest.*value == unknown || high > highest.*value) highest.*value = high;
+  }
+};
+
+constexpr Bytes encode(const ExtremesRecord& r, Payload into) {
+  Encoder e(into);
+  for (const auto& x : {r.lowest, r.highest}) e.put(x.voltage).put(x.temperature).put(x.current);
+  return e.bytes();
+}
+
+constexpr bool decode(Bytes from, std::uint8_t layout, ExtremesRecord& r) {
+  if (layout != 1 || from.size() != 10) return false;
+  Decoder d(from);
+  for (auto* x : {&r.lowest, &r.highest}) {
+    d.get(x->voltage);
+    d.get(x->temperature);
+    d.get(x->current);
   }
   return true;
 }

@@ -19,11 +19,23 @@ Raw bytes_of(const R& record) {
   return {bytes.begin(), bytes.end()};
 }
 
+/// Different in every field, with both signs of the current.
+Readings some_readings(int k) {
+  Readings r;
+  r.soc = static_cast<std::uint8_t>(k);
+  r.current = static_cast<std::int16_t>(k % 2 == 0 ? -8'000 + k : 8'000 - k);
+  r.highest_temperature = static_cast<std::uint8_t>(200 - k);
+  r.lowest_temperature = static_cast<std::uint8_t>(20 + k);
+  r.highest_voltage = static_cast<std::uint16_t>(8'000 + k);
+  r.lowest_voltage = static_cast<std::uint16_t>(100 + k);
+  return r;
+}
+
 EventsRecord full_events() {
   EventsRecord e;
   e.starts = 0x01020304;
   for (std::size_t k = 0; k < e.resets.size(); ++k) e.resets[k] = static_cast<std::uint16_t>(1000 + k);
-  for (std::uint16_t k = 1; k <= 20; ++k) e.add({k, 100'000U * k});
+  for (std::uint16_t k = 1; k <= 20; ++k) e.add({k, 100'000U * k, some_readings(k)});
   return e;
 }
 
@@ -59,8 +71,9 @@ TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   EXPECT_EQ(ChargeRecord::kind, (Kind{1, 2}));
   EXPECT_EQ(CellsRecord::kind, (Kind{2, 1}));
   EXPECT_EQ(HealthRecord::kind, (Kind{3, 1}));
-  EXPECT_EQ(EventsRecord::kind, (Kind{4, 1}));
+  EXPECT_EQ(EventsRecord::kind, (Kind{4, 2}));
   EXPECT_EQ(SettingsRecord::kind, (Kind{5, 1}));
+  EXPECT_EQ(ExtremesRecord::kind, (Kind{6, 1}));
   CellsRecord cells;
   cells.count = 2;
   cells.cell[0] = {-2, 0x0102};
@@ -71,15 +84,28 @@ TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   EventsRecord events;
   events.starts = 9;
   events.resets[6] = 0x0807;
-  events.add({0x0605, 0x04030201});
-  Raw expected(118, 0);
+  events.add({0x65, 0x04030201, {0x11, -2, 0x33, 0x44, 0x1555, 0x0666}});
+  Raw expected(230, 0);
   expected[0] = 9;
   expected[16] = 7;
   expected[17] = 8;
   expected[18] = 1;
-  const Raw event = {5, 6, 1, 2, 3, 4};
+  // After code and time one word, from its lowest bit: soc 8 bits, current 14, highest and lowest temperature 8 each,
+  // highest and lowest voltage 13 each.
+  const std::uint64_t word = 0x11 | 0x3FFEULL << 8 | 0x33ULL << 22 | 0x44ULL << 30 | 0x1555ULL << 38 | 0x0666ULL << 51;
+  Raw event = {0x65, 1, 2, 3, 4};
+  for (int k = 0; k < 8; ++k) event.push_back(static_cast<std::uint8_t>(word >> (8 * k)));
   std::copy(event.begin(), event.end(), expected.begin() + 22);
+  const std::uint64_t unknown = 0xFF | 0x2000ULL << 8 | 0xFFFFULL << 22 | 0x3FF'FFFFULL << 38;
+  for (std::size_t other = 1; other < 16; ++other) {
+    for (std::size_t k = 0; k < 8; ++k)
+      expected[22 + 13 * other + 5 + k] = static_cast<std::uint8_t>(unknown >> (8 * k));
+  }
   EXPECT_EQ(bytes_of(events), expected);
+  ExtremesRecord extremes;
+  extremes.lowest = {0x0102, 3, -2};
+  extremes.highest = {0x0405, 6, 0x0708};
+  EXPECT_EQ(bytes_of(extremes), (Raw{2, 1, 3, 0xFE, 0xFF, 5, 4, 6, 8, 7}));
   SettingsRecord settings;
   EXPECT_TRUE(settings.set(0x0102, -2));
   EXPECT_EQ(bytes_of(settings), (Raw{1, 0, 1, 2, 1, 0xFE, 0xFF, 0xFF, 0xFF}));
@@ -89,7 +115,9 @@ TEST(Records, OfANewBatteryAreEmpty) {
   EXPECT_EQ(bytes_of(ChargeRecord{}), Raw(32, 0));
   EXPECT_EQ(bytes_of(CellsRecord{}), Raw(1, 0));
   EXPECT_EQ(bytes_of(HealthRecord{}), Raw(16, 0));
-  EXPECT_EQ(bytes_of(EventsRecord{}), Raw(118, 0));
+  EXPECT_EQ(bytes_of(EventsRecord{}).size(), 230U);
+  EXPECT_EQ(EventsRecord{}.last(0).code, 0);
+  EXPECT_EQ(bytes_of(ExtremesRecord{}), (Raw{0xFF, 0x1F, 0xFF, 0, 0xE0, 0xFF, 0x1F, 0xFF, 0, 0xE0})) << "not known";
   EXPECT_EQ(bytes_of(SettingsRecord{}), Raw(3, 0));
   EXPECT_EQ(SettingsRecord::Setting{}, (SettingsRecord::Setting{0, 0}));
   EXPECT_EQ(CellsRecord::Cell{}, (CellsRecord::Cell{0, 0}));
@@ -125,6 +153,14 @@ TEST(Records, AreDecodedAsEncodedAndOnlyFromTheirLength) {
   is_decoded_as_encoded(CellsRecord{});
   is_decoded_as_encoded(HealthRecord{912'000, 3'000, 1'430'000, 20'000});
   is_decoded_as_encoded(full_events());
+  EventsRecord with_processor_fault = full_events();
+  with_processor_fault.add({0xFF62, 5, some_readings(1)});  // the last interrupt of an STM32F405
+  with_processor_fault.add({127, 0xFFFFFFFF, {}});
+  is_decoded_as_encoded(with_processor_fault);
+  ExtremesRecord extremes;
+  extremes.add(some_readings(5));
+  is_decoded_as_encoded(extremes);
+  is_decoded_as_encoded(ExtremesRecord{});
   is_decoded_as_encoded(full_settings());
   is_decoded_as_encoded(SettingsRecord{});
 }
@@ -139,6 +175,42 @@ TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithTheSigmaOfAMinute) {
   EXPECT_EQ(r.moved_ppb, 16'666'667U) << "1C for a minute";
   EXPECT_EQ(r.charged_uah, 0U);
   EXPECT_FALSE(decode(layout_1, 2, r));
+}
+
+/// The layout before readings were added, as that firmware wrote it.
+TEST(EventsRecord, OfTheOlderLayoutIsReadWithoutReadings) {
+  Raw older(118, 0);
+  older[0] = 3;
+  older[18] = 2;
+  const Raw faults = {29, 0, 1, 2, 3, 4, 0x05, 0xFF, 9, 0, 0, 0};
+  std::copy(faults.begin(), faults.end(), older.begin() + 22);
+  EventsRecord e = full_events();
+  ASSERT_TRUE(decode(older, 1, e));
+  EXPECT_EQ(e.starts, 3U);
+  EXPECT_EQ(e.faults, 2U);
+  EXPECT_EQ(e.last(1), (EventsRecord::Fault{29, 0x04030201, {}}));
+  EXPECT_EQ(e.last(0), (EventsRecord::Fault{0xFF05, 9, {}})) << "a bus fault of the processor";
+  EXPECT_EQ(e.last(2), EventsRecord::Fault{});
+  EXPECT_FALSE(decode(older, 2, e));
+}
+
+TEST(ExtremesRecord, WidensWithEveryKnownReading) {
+  ExtremesRecord e;
+  e.add({});
+  EXPECT_EQ(e, ExtremesRecord{});
+  Readings r;
+  r.highest_voltage = r.lowest_voltage = 3'300;
+  e.add(r);
+  EXPECT_EQ(e.lowest.voltage, 3'300);
+  EXPECT_EQ(e.highest.voltage, 3'300);
+  EXPECT_EQ(e.highest.temperature, Readings::unknown) << "no sensor so far";
+  r = {100, -1'200, 90, 80, 3'400, 3'200};
+  e.add(r);
+  r = {100, 400, 85, 40, 3'350, 3'250};
+  e.add(r);
+  e.add({});
+  EXPECT_EQ(e.lowest, (ExtremesRecord::Extreme{3'200, 40, -1'200}));
+  EXPECT_EQ(e.highest, (ExtremesRecord::Extreme{3'400, 90, 400}));
 }
 
 TEST(ChargeRecord, AnImpossibleSocIsNotAccepted) {
@@ -163,9 +235,10 @@ TEST(EventsRecord, ContainsTheLastSixteenFaultsNewestFirst) {
   EXPECT_EQ(e.faults, 20U);
   EXPECT_EQ(e.last(0).code, 20);
   EXPECT_EQ(e.last(15).code, 5);
-  EXPECT_EQ(e.last(15).operating_s, 500'000U);
+  EXPECT_EQ(e.last(15).time_s, 500'000U);
+  EXPECT_EQ(e.last(15).readings, some_readings(5));
   EventsRecord few;
-  few.add({3, 4});
+  few.add({3, 4, {}});
   EXPECT_EQ(few.last(0).code, 3);
   EXPECT_EQ(few.last(1).code, 0);
 }
@@ -186,7 +259,7 @@ TEST(SettingsRecord, StoresAValueByKeyAndReportsWhenItIsFull) {
 TEST(Records, OfRandomBytesAreReadSafely) {
   std::mt19937 random(1);
   for (int k = 0; k < 100'000; ++k) {
-    Raw bytes(random() % 160);
+    Raw bytes(random() % 240);
     for (auto& b : bytes) b = static_cast<std::uint8_t>(random());
     const auto layout = static_cast<std::uint8_t>(random() % 4);
     ChargeRecord charge;
@@ -199,6 +272,8 @@ TEST(Records, OfRandomBytesAreReadSafely) {
     EXPECT_TRUE(!decode(bytes, layout, settings) || settings.count <= SettingsRecord::max_settings);
     decode(bytes, layout, health);
     if (decode(bytes, layout, events)) events.add(events.last(3));
+    ExtremesRecord extremes;
+    decode(bytes, layout, extremes);
   }
 }
 
