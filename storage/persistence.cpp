@@ -138,7 +138,11 @@ void Persistence::store(const EstimatorSnapshot& now, std::optional<std::uint32_
     const std::uint16_t every_minutes = log_.has_erased_sector() ? 1 : charge_in_last_sector_minutes;
     set_charge(*now.pack, std::min(moved_ppb, unknown_moved_ppb), calendar_s);
     charge_.moved_ppb *= every_minutes;
-    if (first || long_ago || (has_moved && charge_minutes_ >= every_minutes)) store_charge();
+    // A record whose sigma covers only a minute is followed by another one after a minute.
+    if (first || long_ago || (has_moved && charge_minutes_ >= std::min(covered_minutes_, every_minutes))) {
+      covered_minutes_ = every_minutes;
+      store_charge();
+    }
   }
   if (cells_minutes_ >= cells_every_minutes) store_cells(now.cells);
   if (health_minutes_ >= health_every_minutes) store_health(now.health);
@@ -151,6 +155,7 @@ void Persistence::power_failing(const EstimatorSnapshot& now, std::optional<std:
   advance_time();
   if (now.pack) {
     set_charge(*now.pack, 0, calendar_s);
+    covered_minutes_ = 1;
     store_charge();
   }
   if (events_changed_) store_events();
@@ -164,6 +169,7 @@ void Persistence::supply_failing(const EstimatorSnapshot& now, std::optional<std
   advance_time();
   if (now.pack) {
     set_charge(*now.pack, 0, calendar_s);
+    covered_minutes_ = 1;
     store_charge();
   }
 }

@@ -141,7 +141,7 @@ class Persistence {
   std::uint64_t time_us_ = 0, charged_uaus_ = 0, discharged_uaus_ = 0;
   std::uint32_t since_us_ = 0, us_ = 0;
   std::uint16_t charge_minutes_ = 0, cells_minutes_ = 0, health_minutes_ = 0, fault_minutes_ = 0, extremes_minutes_ = 0,
-                full_minutes_ = 0;
+                full_minutes_ = 0, covered_minutes_ = 1;
   std::uint8_t faults_at_once_ = 16;
 };
 

@@ -34,11 +34,11 @@ class FullLog : public PersistenceTest {
 
 TEST_F(FullLog, AfterAResetOfTheCoreSocIsThatOfTheLastMinute) {
   retained.assign(Persistence::retained_bytes, 0xA5);
-  for (const int hours : {19, 60}) {
+  for (const int hours : {19, 100}) {
     flash = FlashModel(chip, 1);
     boot();
     work(60 * hours);
-    EXPECT_EQ(p.full(), hours == 60);
+    EXPECT_EQ(p.full(), hours == 100);
     const auto used = p.charge();
     for (const ResetCause cause : {ResetCause::watchdog, ResetCause::software, ResetCause::pin}) {
       boot(cause);
@@ -52,7 +52,7 @@ TEST_F(FullLog, AfterAResetOfTheCoreSocIsThatOfTheLastMinute) {
 
 TEST_F(FullLog, AfterALossOfPowerTheTruthIsInsideTwoSigmaAtEveryTime) {
   boot();
-  for (int minutes = 0; minutes < 60 * 60; minutes += 7) {
+  for (int minutes = 0; minutes < 100 * 60; minutes += 7) {
     work(7);
     const FlashModel before = flash;
     for (const ResetCause cause : {ResetCause::power_on, ResetCause::brown_out, ResetCause::watchdog}) {
@@ -67,7 +67,7 @@ TEST_F(FullLog, AfterALossOfPowerTheTruthIsInsideTwoSigmaAtEveryTime) {
 
 TEST_F(FullLog, AfterAnEraseSocIsKnownAgain) {
   boot();
-  work(60 * 60);
+  work(100 * 60);
   ASSERT_TRUE(p.full());
   p.erase_next_sector();
   work(1);
