@@ -115,16 +115,18 @@ class Application {
                                          .board = board_,
                                          .capacity_ah = capacity_ah_,
                                          .log_samples = requested_.log_samples,
-                                         .stored_item = requested_.next_stored_item()};
+                                         .stored_part = requested_.next_stored_part()};
     telemetry_.publish(now);
     vehicle_profile_.publish(now);
   }
 
   /// Readings for the stored faults and extremes.
   [[gnu::noinline]] void observe(const measurement::PackSample<cells>& pack, const Result& estimate) {
-    std::optional<std::int32_t> soc_ppb;
-    if ((estimate.flags & estimator::not_started) == 0) soc_ppb = messages::ppb(estimate.soc);
-    persistence_.observe(readings(pack, soc_ppb, Board::plausible()));
+    storage::Readings now;
+    now.range = reading_range(pack.cell_uv, pack.temperature_cdegc, pack.current_ua, Board::plausible());
+    if ((estimate.flags & estimator::not_started) == 0)
+      now.soc = static_cast<std::uint8_t>(std::clamp<std::int32_t>(messages::ppb(estimate.soc) / 5'000'000, 0, 200));
+    persistence_.observe(now);
   }
 
   void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {

@@ -19,7 +19,7 @@ namespace bms::firmware {
 static_assert(can::Command::id == hal::command_frame_id, "the acceptance filter of a real bus would reject commands");
 
 /// Parts of the stored data that are sent one by one: sixteen faults, then a reset cause each, with other counters.
-inline constexpr std::uint32_t stored_items = 16 + 7;
+inline constexpr std::uint32_t stored_parts = 16 + 7;
 
 /// What the commands have requested so far.
 struct Requested {
@@ -42,7 +42,7 @@ struct Requested {
     return now_us - power_at_us < request_timeout_us ? power : protection::Request::none;
   }
   /// Returns the next item to be sent, if any: one with each sample.
-  constexpr std::optional<std::uint8_t> next_stored_item() {
+  constexpr std::optional<std::uint8_t> next_stored_part() {
     if (stored_next >= stored_end) return std::nullopt;
     return stored_next++;
   }
@@ -89,10 +89,10 @@ class Commands {
         return A::result_done;
       case can::Command::code_stored_data: {
         const std::uint32_t first = command.argument & 0xFF, count = command.argument >> 8;
-        if (first >= stored_items || count > stored_items) return A::result_refused;
+        if (first >= stored_parts || count > stored_parts) return A::result_refused;
         requested.stored_next = static_cast<std::uint8_t>(first);
         requested.stored_end =
-            static_cast<std::uint8_t>(count == 0 ? stored_items : std::min(first + count, stored_items));
+            static_cast<std::uint8_t>(count == 0 ? stored_parts : std::min(first + count, stored_parts));
         return A::result_done;
       }
       case can::Command::code_voltage_gain:

@@ -11,7 +11,6 @@
 #include <cstdint>
 
 #include "firmware/stored_state.hpp"
-#include "hal/bytes.hpp"
 #include "hal/calendar.hpp"
 #include "hal/power.hpp"
 #include "storage/crc32.hpp"
@@ -22,65 +21,51 @@ namespace bms::firmware {
 class LatchedFaults {
  public:
   /// persistence: already started, must outlive this object. cause: of this start.
-  LatchedFaults(storage::Persistence& persistence, hal::ResetCause cause)
-      : persistence_(persistence), faults_(setting(latched_faults_key)) {
-    faults_ |= std::uint64_t{setting(more_latched_faults_key)} << 32;
-    const Words stored = backup();
-    const bool intact = stored[check] == check_of(stored);
-    if (intact) {
-      faults_ |= stored[0] | std::uint64_t{stored[1]} << 32;
-      const bool power_was_off = cause == hal::ResetCause::power_on || cause == hal::ResetCause::brown_out;
-      supply_proven_ = stored[proven] != 0 || power_was_off;
-    }
+  [[gnu::noinline]] LatchedFaults(storage::Persistence& persistence, hal::ResetCause cause)
+      : persistence_(persistence) {
+    for (std::size_t k = 0; k < words_.size(); ++k) words_[k] = hal::backup_word(k);
+    if (words_[check] != check_word())
+      words_ = {};
+    else if (cause == hal::ResetCause::power_on || cause == hal::ResetCause::brown_out)
+      words_[proven] = 1;
+    for (std::size_t k = 0; k < keys.size(); ++k) words_[k] |= setting(k);
     store_in_backup();
   }
 
-  /// At the start: those of the last run. One bit each.
-  std::uint64_t faults() const { return faults_; }
+  /// One bit each; at the start, those of the last run.
+  std::uint64_t faults() const { return words_[0] | std::uint64_t{words_[1]} << 32; }
 
   [[gnu::noinline]] void store(std::uint64_t faults) {
-    faults_ = faults;
-    persistence_.set(latched_faults_key, static_cast<std::int32_t>(static_cast<std::uint32_t>(faults)));
-    // A pack that never had one of these faults does not need the second setting.
-    if (const auto high = static_cast<std::uint32_t>(faults >> 32); high != 0 || setting(more_latched_faults_key) != 0)
-      persistence_.set(more_latched_faults_key, static_cast<std::int32_t>(high));
+    for (std::size_t k = 0; k < keys.size(); ++k, faults >>= 32) {
+      words_[k] = static_cast<std::uint32_t>(faults);
+      if (words_[k] != setting(k)) persistence_.set(keys[k], static_cast<std::int32_t>(words_[k]));
+    }
     store_in_backup();
   }
 
   /// Returns true if a loss of power would lose a latched fault: flash that is worn out, and no backup.
   bool endangered() const {
-    const storage::Log& log = persistence_.log();
-    return faults_ != 0 && !supply_proven_ && log.sectors() > 0 && !log.operational() &&
-           !persistence_.settings_stored();
+    return (words_[0] | words_[1]) != 0 && words_[proven] == 0 && !persistence_.settings_stored() &&
+           persistence_.log().sectors() > 0 && !persistence_.log().operational();
   }
 
  private:
-  static constexpr std::size_t proven = 2, check = 3;
-  using Words = std::array<std::uint32_t, hal::backup_words>;
+  static constexpr std::array keys{latched_faults_key, more_latched_faults_key};
+  static constexpr std::size_t proven = 2, check = 3;  ///< words after those of the faults
 
-  std::uint32_t setting(std::uint16_t key) const {
-    return static_cast<std::uint32_t>(persistence_.settings().get(key).value_or(0));
+  std::uint32_t setting(std::size_t k) const {
+    return static_cast<std::uint32_t>(persistence_.settings().get(keys[k]).value_or(0));
   }
-  static std::uint32_t check_of(const Words& words) {
-    std::array<std::uint8_t, 4 * check> bytes;
-    for (std::size_t k = 0; k < check; ++k) hal::put_bytes(bytes, 4 * k, words[k]);
-    return storage::crc32(bytes);
-  }
-  static Words backup() {
-    Words words;
-    for (std::size_t k = 0; k < words.size(); ++k) words[k] = hal::backup_word(k);
-    return words;
+  std::uint32_t check_word() const {
+    return storage::crc32({reinterpret_cast<const std::uint8_t*>(words_.data()), 4 * check});
   }
   void store_in_backup() {
-    Words words{static_cast<std::uint32_t>(faults_), static_cast<std::uint32_t>(faults_ >> 32), supply_proven_, 0};
-    words[check] = check_of(words);
-    for (std::size_t k = 0; k < words.size(); ++k) hal::set_backup_word(k, words[k]);
-    supply_proven_ = supply_proven_ && backup() == words;
+    words_[check] = check_word();
+    for (std::size_t k = 0; k < words_.size(); ++k) hal::set_backup_word(k, words_[k]);
   }
 
   storage::Persistence& persistence_;
-  std::uint64_t faults_;
-  bool supply_proven_ = false;
+  std::array<std::uint32_t, hal::backup_words> words_;
 };
 
 }  // namespace bms::firmware

@@ -38,7 +38,7 @@ struct Snapshot {
   const BoardStatus& board;
   float capacity_ah;                        ///< of the cell file
   bool log_samples;                         ///< SampleCurrent to EstimateHash are sent, too
-  std::optional<std::uint8_t> stored_item;  ///< part of the stored data to be sent (firmware/stored_data.hpp)
+  std::optional<std::uint8_t> stored_part;  ///< part of the stored data to be sent (firmware/stored_data.hpp)
 
   constexpr bool soc_known() const { return (estimate.flags & estimator::not_started) == 0; }
 };

@@ -69,26 +69,21 @@ class StateToStoreOf {
   std::array<storage::CellsRecord::Cell, Cells> cells_{};
 };
 
-/// Readings of the pack for a fault that is stored now. Cell voltages that the sensor cannot measure are omitted.
-template <std::size_t Cells>
-constexpr storage::Readings readings(const measurement::PackSample<Cells>& pack, std::optional<std::int32_t> soc_ppb,
-                                     const model::PlausibleRange& plausible) {
-  storage::Readings r;
-  if (soc_ppb) r.soc = static_cast<std::uint8_t>(std::clamp<std::int32_t>(*soc_ppb / 5'000'000, 0, 200));
-  if (pack.current_ua != measurement::no_reading)
-    r.current = static_cast<std::int16_t>(std::clamp<std::int32_t>(pack.current_ua / 250'000, -8'191, 8'191));
-  for (const std::int32_t uv : pack.cell_uv) {
-    if (uv < plausible.voltage_min_uv || uv > plausible.voltage_max_uv) continue;
-    const auto mv = static_cast<std::uint16_t>(std::clamp<std::int32_t>(uv / 1'000, 0, 8'190));
-    if (r.highest_voltage == r.unknown_voltage || mv > r.highest_voltage) r.highest_voltage = mv;
-    if (mv < r.lowest_voltage) r.lowest_voltage = mv;
+/// Range of the readings of a sample. Readings that the sensors cannot give are omitted.
+inline storage::ReadingRange reading_range(std::span<const std::int32_t> cell_uv, std::span<const std::int16_t> cdegc,
+                                           std::int32_t current_ua, const model::PlausibleRange& plausible) {
+  using storage::ReadingRange;
+  ReadingRange r;
+  for (const std::int32_t uv : cell_uv) {
+    if (uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv)
+      r.add(ReadingRange::voltage, static_cast<std::int16_t>(uv / 1'000));
   }
-  for (const std::int16_t cdegc : pack.temperature_cdegc) {
-    if (!measurement::temperature_possible(cdegc)) continue;
-    const auto degrees = static_cast<std::uint8_t>(std::clamp(cdegc / 100 + 60, 0, 254));
-    if (r.highest_temperature == r.unknown || degrees > r.highest_temperature) r.highest_temperature = degrees;
-    if (degrees < r.lowest_temperature) r.lowest_temperature = degrees;
+  for (const std::int16_t t : cdegc) {
+    if (measurement::temperature_possible(t)) r.add(ReadingRange::temperature, static_cast<std::int16_t>(t / 100 + 60));
   }
+  if (current_ua != measurement::no_reading)
+    r.add(ReadingRange::current,
+          static_cast<std::int16_t>(std::clamp<std::int32_t>(current_ua / 250'000, -8'191, 8'191)));
   return r;
 }
 

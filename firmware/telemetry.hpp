@@ -51,8 +51,8 @@ class Telemetry {
       return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
     });
     published_alarming_ = now.board.alarming();
-    if (now.stored_item) [[unlikely]]
-      publish_stored(*now.stored_item, now.persistence, now.capacity_ah);
+    if (now.stored_part) [[unlikely]]
+      stored_data_.send(*now.stored_part, now.persistence, static_cast<std::uint32_t>(now.capacity_ah * 1e6F));
     if (now.log_samples) log(now.mean);
     send(messages::pack_state(now.estimate, now.condition));
     send(messages::pack_electrical(now.pack));
@@ -139,22 +139,6 @@ class Telemetry {
     send(cause);
   }
 
-  [[gnu::noinline]] void publish_stored(std::uint32_t item, const storage::Persistence& stored, float capacity_ah) {
-    stored_data::send_item(item, stored, static_cast<std::uint32_t>(capacity_ah * 1e6F),
-                           [this]<class Message>(Message, std::uint64_t bits) {
-                             static_assert(Message::data_id == Message::id);
-                             send_bits(Message::id, bits, std::get<SendState<Message>>(sent_).counter);
-                           });
-  }
-
-  [[gnu::noinline]] static void send_bits(std::uint16_t id, std::uint64_t bits, std::uint8_t& counter) {
-    can::Frame frame{id, 8, {}, false};
-    can::put_raw(frame, 0, 64, bits);
-    can::protect(frame, id, counter);
-    hal::can_send(frame);
-    counter = can::next(counter);
-  }
-
   void log(const measurement::Sample& sample) {
     if (samples_ == 1) {
       send(messages::starting_soc(start_));
@@ -172,6 +156,7 @@ class Telemetry {
   messages::Identity identity_;
   std::optional<measurement::StartingPoint> start_;
   typename SendStatesOf<can::Messages>::type sent_{};
+  StoredData stored_data_;
   estimator::EstimateHash hash_;
   std::uint32_t now_us_ = 0, published_faults_ = 0, published_ = 0;
   protection::ContactorState published_state_ = protection::ContactorState::off;

@@ -43,12 +43,16 @@ constexpr bool power_stayed_on(hal::ResetCause cause) {
 
 }  // namespace
 
+bool Persistence::put(Kind kind, Bytes payload) {
+  const StoreResult result = log_.store(kind, payload);
+  full_ = result == StoreResult::needs_erase;
+  return result == StoreResult::stored;
+}
+
 template <class R>
 bool Persistence::put(const R& record) {
   std::array<std::uint8_t, max_payload_bytes> bytes;
-  const StoreResult result = log_.store(R::kind, encode(record, bytes));
-  full_ = result == StoreResult::needs_erase;
-  return result == StoreResult::stored;
+  return put(R::kind, encode(record, bytes));
 }
 
 void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,
@@ -75,8 +79,7 @@ void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRec
   if (resets < 0xFFFF) ++resets;
   if (processor_fault)
     events_.add({static_cast<std::uint16_t>(EventsRecord::processor_fault_code | (processor_fault->exception & 0x7FU)),
-                 calendar_s.value_or(charge_.operating_s),
-                 {}});
+                 calendar_s.value_or(charge_.operating_s), packed({})});
   events_changed_ = true;
   for (std::uint32_t k = 0; k < log_.sectors() && log_.needs_erase(); ++k) {
     log_.erase_next_sector();
@@ -174,8 +177,13 @@ void Persistence::supply_failing(const EstimatorSnapshot& now, std::optional<std
   }
 }
 
+void Persistence::observe(const Readings& readings) {
+  readings_ = readings;
+  extremes_.range.add(readings.range);
+}
+
 void Persistence::fault(std::uint16_t code, std::optional<std::uint32_t> calendar_s) {
-  events_.add({code, calendar_s.value_or(charge_.operating_s), readings_});
+  events_.add({code, calendar_s.value_or(charge_.operating_s), packed(readings_)});
   events_changed_ = true;
   store_events_in_turn();
 }

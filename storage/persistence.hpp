@@ -70,10 +70,7 @@ class Persistence {
   void store(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   /// Call with every sample, before fault(): the readings that a fault is stored with.
-  void observe(const Readings& readings) {
-    readings_ = readings;
-    extremes_.add(readings);
-  }
+  void observe(const Readings& readings);
   /// Records a fault with its time and the readings. code: 1 to 127, defined by the caller.
   void fault(std::uint16_t code, std::optional<std::uint32_t> calendar_s = std::nullopt);
   /// Stores a setting. Returns false if it is not stored: there is no room for another key, or the write failed. After
@@ -110,6 +107,7 @@ class Persistence {
 
   template <class R>
   bool put(const R& record);
+  bool put(Kind kind, Bytes payload);
   void advance_time();
   void read_retained();
   void set_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,

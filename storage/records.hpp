@@ -9,7 +9,7 @@
 //   events    2       230    starts, resets by cause, the last sixteen faults with readings of the pack
 //             1       118    (older) without readings
 //   settings  1       3+6n   values by key
-//   extremes  1       10     lowest and highest readings so far
+//   extremes  1       12     lowest and highest readings so far
 #pragma once
 
 #include <algorithm>
@@ -190,37 +190,50 @@ constexpr bool decode(Bytes from, std::uint8_t layout, HealthRecord& r) {
   return true;
 }
 
-/// Readings of the pack at one time: the raw values of the signals of StoredFaultPack and StoredFaultCells in
-/// can/greybox_bms.dbc. The highest raw value, of `current` the lowest, means "not known".
-struct Readings {
-  static constexpr std::uint8_t unknown = 255;
-  static constexpr std::int16_t unknown_current = -8192;
-  static constexpr std::uint16_t unknown_voltage = 8191;
+/// Lowest and highest readings of the cells, the temperature sensors and the current.
+struct ReadingRange {
+  enum Quantity : std::uint8_t {
+    voltage,      ///< of a cell [mV], at most 8190
+    temperature,  ///< in degrees C above -60, at most 254
+    current,      ///< in 0.25 A, > 0 charges, at most 8191 either way
+  };
+  using Values = std::array<std::int16_t, 3>;
+  static constexpr Values unknown{8191, 255, -8192};
 
-  std::uint8_t soc = unknown;              ///< in 0.5 %
-  std::int16_t current = unknown_current;  ///< in 0.25 A, > 0 charges
-  /// Of the temperature sensors, in degrees C above -60.
-  std::uint8_t highest_temperature = unknown, lowest_temperature = unknown;
-  std::uint16_t highest_voltage = unknown_voltage, lowest_voltage = unknown_voltage;  ///< of the cells [mV]
+  Values lowest = unknown, highest = unknown;
+
+  [[gnu::noinline]] constexpr void add(std::size_t quantity, std::int16_t value) {
+    if (value == unknown[quantity]) return;
+    const bool first = lowest[quantity] == unknown[quantity];
+    if (first || value < lowest[quantity]) lowest[quantity] = value;
+    if (first || value > highest[quantity]) highest[quantity] = value;
+  }
+  constexpr void add(const ReadingRange& other) {
+    for (std::size_t k = 0; k < unknown.size(); ++k) {
+      add(k, other.lowest[k]);
+      add(k, other.highest[k]);
+    }
+  }
+  constexpr bool operator==(const ReadingRange&) const = default;
+};
+
+/// Readings of the pack at one time. The lowest and the highest current are equal.
+struct Readings {
+  std::uint8_t soc = 255;  ///< in 0.5 %; 255: not known
+  ReadingRange range;
   constexpr bool operator==(const Readings&) const = default;
 };
 
-constexpr std::uint64_t bits(const Readings& r) {
-  return std::uint64_t{r.soc} | std::uint64_t{static_cast<std::uint16_t>(r.current) & 0x3FFFU} << 8 |
-         std::uint64_t{r.highest_temperature} << 22 | std::uint64_t{r.lowest_temperature} << 30 |
-         std::uint64_t{r.highest_voltage & 0x1FFFU} << 38 | std::uint64_t{r.lowest_voltage} << 51;
-}
-
-constexpr Readings readings_of(std::uint64_t bits) {
-  const auto part = [bits](unsigned from, unsigned mask) { return static_cast<std::uint16_t>(bits >> from & mask); };
-  Readings r;
-  r.soc = static_cast<std::uint8_t>(part(0, 0xFF));
-  r.current = static_cast<std::int16_t>(static_cast<std::int16_t>(part(8, 0x3FFF) << 2) >> 2);
-  r.highest_temperature = static_cast<std::uint8_t>(part(22, 0xFF));
-  r.lowest_temperature = static_cast<std::uint8_t>(part(30, 0xFF));
-  r.highest_voltage = part(38, 0x1FFF);
-  r.lowest_voltage = part(51, 0x1FFF);
-  return r;
+/// All readings in one word, the raw values of the signals of StoredFaultPack and StoredFaultCells in
+/// can/greybox_bms.dbc. From the lowest bit: soc 8 bits, current 14, highest and lowest temperature 8 each, highest and
+/// lowest voltage 13 each.
+constexpr std::uint64_t packed(const Readings& r) {
+  const auto low = [&r](std::size_t k) { return static_cast<std::uint32_t>(r.range.lowest[k]); };
+  const auto high = [&r](std::size_t k) { return static_cast<std::uint32_t>(r.range.highest[k]); };
+  using enum ReadingRange::Quantity;
+  return (r.soc | (low(current) & 0x3FFFU) << 8 | high(temperature) << 22) |
+         static_cast<std::uint64_t>(low(temperature) | high(voltage) << 8) << 30 |
+         static_cast<std::uint64_t>(low(voltage)) << 51;
 }
 
 struct EventsRecord {
@@ -228,9 +241,9 @@ struct EventsRecord {
   static constexpr std::size_t causes = 7, max_faults = 16;
   static constexpr std::uint16_t processor_fault_code = 0xFF00;  ///< plus the exception number, at most 127
   struct Fault {
-    std::uint16_t code = 0;    ///< 1 to 127, or a processor fault; 0: no fault
-    std::uint32_t time_s = 0;  ///< since 1970, if the calendar clock ran (from first_unix_s on); else in operation
-    Readings readings;
+    std::uint16_t code = 0;      ///< 1 to 127, or a processor fault; 0: no fault
+    std::uint32_t time_s = 0;    ///< since 1970, if the calendar clock ran (from first_unix_s on); else in operation
+    std::uint64_t readings = 0;  ///< packed(Readings)
     constexpr bool operator==(const Fault&) const = default;
   };
   static constexpr std::uint32_t first_unix_s = 946'684'800;  ///< 2000-01-01: 30 years of operation
@@ -258,7 +271,7 @@ constexpr Bytes encode(const EventsRecord& r, Payload into) {
   e.put(r.starts);
   for (const auto n : r.resets) e.put(n);
   e.put(r.faults);
-  for (const auto& f : r.fault) e.put(short_code(f.code)).put(f.time_s).put(bits(f.readings));
+  for (const auto& f : r.fault) e.put(short_code(f.code)).put(f.time_s).put(f.readings);
   return e.bytes();
 }
 
@@ -274,52 +287,32 @@ constexpr bool decode(Bytes from, std::uint8_t layout, EventsRecord& r) {
     if (!older && f.code >= 0x80)
       f.code = static_cast<std::uint16_t>(EventsRecord::processor_fault_code + f.code - 0x80);
     d.get(f.time_s);
-    f.readings = older ? Readings{} : readings_of(d.read<std::uint64_t>());
+    f.readings = packed({});
+    if (!older) d.get(f.readings);
   }
   return true;
 }
 
-/// Lowest and highest reading so far of any cell, any temperature sensor and the current; units as Readings.
+/// Lowest and highest readings so far.
 struct ExtremesRecord {
   static constexpr Kind kind{6, 1};
-  struct Extreme {
-    std::uint16_t voltage = Readings::unknown_voltage;
-    std::uint8_t temperature = Readings::unknown;
-    std::int16_t current = Readings::unknown_current;
-    constexpr bool operator==(const Extreme&) const = default;
-  };
-
-  Extreme lowest, highest;
-
-  constexpr void add(const Readings& r) {
-    widen(&Extreme::voltage, r.lowest_voltage, r.highest_voltage, Readings::unknown_voltage);
-    widen(&Extreme::temperature, r.lowest_temperature, r.highest_temperature, Readings::unknown);
-    widen(&Extreme::current, r.current, r.current, Readings::unknown_current);
-  }
+  ReadingRange range;
   constexpr bool operator==(const ExtremesRecord&) const = default;
-
- private:
-  template <class T>
-  constexpr void widen(T Extreme::*value, T low, T high, T unknown) {
-    if (low == unknown || high == unknown) return;
-    if (lowest.*value == unknown || low < lowest.*value) lowest.*value = low;
-    if (highest.*value == unknown || high > highest.*value) highest.*value = high;
-  }
 };
 
 constexpr Bytes encode(const ExtremesRecord& r, Payload into) {
   Encoder e(into);
-  for (const auto& x : {r.lowest, r.highest}) e.put(x.voltage).put(x.temperature).put(x.current);
+  for (const auto* values : {&r.range.lowest, &r.range.highest}) {
+    for (const std::int16_t value : *values) e.put(value);
+  }
   return e.bytes();
 }
 
 constexpr bool decode(Bytes from, std::uint8_t layout, ExtremesRecord& r) {
-  if (layout != 1 || from.size() != 10) return false;
+  if (layout != 1 || from.size() != 12) return false;
   Decoder d(from);
-  for (auto* x : {&r.lowest, &r.highest}) {
-    d.get(x->voltage);
-    d.get(x->temperature);
-    d.get(x->current);
+  for (auto* values : {&r.range.lowest, &r.range.highest}) {
+    for (std::int16_t& value : *values) d.get(value);
   }
   return true;
 }
