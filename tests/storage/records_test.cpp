@@ -23,11 +23,9 @@ Raw bytes_of(const R& record) {
 Readings some_readings(int k) {
   Readings r;
   r.soc = static_cast<std::uint8_t>(k);
-  r.current = static_cast<std::int16_t>(k % 2 == 0 ? -8'000 + k : 8'000 - k);
-  r.highest_temperature = static_cast<std::uint8_t>(200 - k);
-  r.lowest_temperature = static_cast<std::uint8_t>(20 + k);
-  r.highest_voltage = static_cast<std::uint16_t>(8'000 + k);
-  r.lowest_voltage = static_cast<std::uint16_t>(100 + k);
+  const auto current = static_cast<std::int16_t>(k % 2 == 0 ? -8'000 + k : 8'000 - k);
+  r.range.lowest = {static_cast<std::int16_t>(100 + k), static_cast<std::int16_t>(20 + k), current};
+  r.range.highest = {static_cast<std::int16_t>(8'000 + k), static_cast<std::int16_t>(200 - k), current};
   return r;
 }
 
@@ -35,7 +33,7 @@ EventsRecord full_events() {
   EventsRecord e;
   e.starts = 0x01020304;
   for (std::size_t k = 0; k < e.resets.size(); ++k) e.resets[k] = static_cast<std::uint16_t>(1000 + k);
-  for (std::uint16_t k = 1; k <= 20; ++k) e.add({k, 100'000U * k, some_readings(k)});
+  for (std::uint16_t k = 1; k <= 20; ++k) e.add({k, 100'000U * k, packed(some_readings(k))});
   return e;
 }
 
@@ -84,7 +82,11 @@ TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   EventsRecord events;
   events.starts = 9;
   events.resets[6] = 0x0807;
-  events.add({0x65, 0x04030201, {0x11, -2, 0x33, 0x44, 0x1555, 0x0666}});
+  Readings readings;
+  readings.soc = 0x11;
+  readings.range.lowest = {0x0666, 0x44, -2};
+  readings.range.highest = {0x1555, 0x33, -2};
+  events.add({0x65, 0x04030201, packed(readings)});
   Raw expected(230, 0);
   expected[0] = 9;
   expected[16] = 7;
@@ -96,16 +98,11 @@ TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   Raw event = {0x65, 1, 2, 3, 4};
   for (int k = 0; k < 8; ++k) event.push_back(static_cast<std::uint8_t>(word >> (8 * k)));
   std::copy(event.begin(), event.end(), expected.begin() + 22);
-  const std::uint64_t unknown = 0xFF | 0x2000ULL << 8 | 0xFFFFULL << 22 | 0x3FF'FFFFULL << 38;
-  for (std::size_t other = 1; other < 16; ++other) {
-    for (std::size_t k = 0; k < 8; ++k)
-      expected[22 + 13 * other + 5 + k] = static_cast<std::uint8_t>(unknown >> (8 * k));
-  }
   EXPECT_EQ(bytes_of(events), expected);
   ExtremesRecord extremes;
-  extremes.lowest = {0x0102, 3, -2};
-  extremes.highest = {0x0405, 6, 0x0708};
-  EXPECT_EQ(bytes_of(extremes), (Raw{2, 1, 3, 0xFE, 0xFF, 5, 4, 6, 8, 7}));
+  extremes.range.lowest = {0x0102, 3, -2};
+  extremes.range.highest = {0x0405, 6, 0x0708};
+  EXPECT_EQ(bytes_of(extremes), (Raw{2, 1, 3, 0, 0xFE, 0xFF, 5, 4, 6, 0, 8, 7}));
   SettingsRecord settings;
   EXPECT_TRUE(settings.set(0x0102, -2));
   EXPECT_EQ(bytes_of(settings), (Raw{1, 0, 1, 2, 1, 0xFE, 0xFF, 0xFF, 0xFF}));
@@ -115,9 +112,10 @@ TEST(Records, OfANewBatteryAreEmpty) {
   EXPECT_EQ(bytes_of(ChargeRecord{}), Raw(32, 0));
   EXPECT_EQ(bytes_of(CellsRecord{}), Raw(1, 0));
   EXPECT_EQ(bytes_of(HealthRecord{}), Raw(16, 0));
-  EXPECT_EQ(bytes_of(EventsRecord{}).size(), 230U);
-  EXPECT_EQ(EventsRecord{}.last(0).code, 0);
-  EXPECT_EQ(bytes_of(ExtremesRecord{}), (Raw{0xFF, 0x1F, 0xFF, 0, 0xE0, 0xFF, 0x1F, 0xFF, 0, 0xE0})) << "not known";
+  EXPECT_EQ(bytes_of(EventsRecord{}), Raw(230, 0));
+  const Raw unknown{0xFF, 0x1F, 0xFF, 0, 0, 0xE0, 0xFF, 0x1F, 0xFF, 0, 0, 0xE0};
+  EXPECT_EQ(bytes_of(ExtremesRecord{}), unknown);
+  EXPECT_EQ(packed({}), 0xFF | 0x2000ULL << 8 | 0xFFFFULL << 22 | 0x3FF'FFFFULL << 38) << "no reading is known";
   EXPECT_EQ(bytes_of(SettingsRecord{}), Raw(3, 0));
   EXPECT_EQ(SettingsRecord::Setting{}, (SettingsRecord::Setting{0, 0}));
   EXPECT_EQ(CellsRecord::Cell{}, (CellsRecord::Cell{0, 0}));
@@ -154,11 +152,11 @@ TEST(Records, AreDecodedAsEncodedAndOnlyFromTheirLength) {
   is_decoded_as_encoded(HealthRecord{912'000, 3'000, 1'430'000, 20'000});
   is_decoded_as_encoded(full_events());
   EventsRecord with_processor_fault = full_events();
-  with_processor_fault.add({0xFF62, 5, some_readings(1)});  // the last interrupt of an STM32F405
+  with_processor_fault.add({0xFF62, 5, packed(some_readings(1))});  // the last interrupt of an STM32F405
   with_processor_fault.add({127, 0xFFFFFFFF, {}});
   is_decoded_as_encoded(with_processor_fault);
   ExtremesRecord extremes;
-  extremes.add(some_readings(5));
+  extremes.range.add(some_readings(5).range);
   is_decoded_as_encoded(extremes);
   is_decoded_as_encoded(ExtremesRecord{});
   is_decoded_as_encoded(full_settings());
@@ -188,29 +186,30 @@ TEST(EventsRecord, OfTheOlderLayoutIsReadWithoutReadings) {
   ASSERT_TRUE(decode(older, 1, e));
   EXPECT_EQ(e.starts, 3U);
   EXPECT_EQ(e.faults, 2U);
-  EXPECT_EQ(e.last(1), (EventsRecord::Fault{29, 0x04030201, {}}));
-  EXPECT_EQ(e.last(0), (EventsRecord::Fault{0xFF05, 9, {}})) << "a bus fault of the processor";
-  EXPECT_EQ(e.last(2), EventsRecord::Fault{});
+  EXPECT_EQ(e.last(1), (EventsRecord::Fault{29, 0x04030201, packed({})}));
+  EXPECT_EQ(e.last(0), (EventsRecord::Fault{0xFF05, 9, packed({})})) << "a bus fault of the processor";
+  EXPECT_EQ(e.last(2).code, 0);
   EXPECT_FALSE(decode(older, 2, e));
 }
 
-TEST(ExtremesRecord, WidensWithEveryKnownReading) {
-  ExtremesRecord e;
-  e.add({});
-  EXPECT_EQ(e, ExtremesRecord{});
-  Readings r;
-  r.highest_voltage = r.lowest_voltage = 3'300;
-  e.add(r);
-  EXPECT_EQ(e.lowest.voltage, 3'300);
-  EXPECT_EQ(e.highest.voltage, 3'300);
-  EXPECT_EQ(e.highest.temperature, Readings::unknown) << "no sensor so far";
-  r = {100, -1'200, 90, 80, 3'400, 3'200};
-  e.add(r);
-  r = {100, 400, 85, 40, 3'350, 3'250};
-  e.add(r);
-  e.add({});
-  EXPECT_EQ(e.lowest, (ExtremesRecord::Extreme{3'200, 40, -1'200}));
-  EXPECT_EQ(e.highest, (ExtremesRecord::Extreme{3'400, 90, 400}));
+TEST(ReadingRange, WidensWithEveryKnownReading) {
+  using enum ReadingRange::Quantity;
+  ReadingRange range;
+  range.add(ReadingRange{});
+  EXPECT_EQ(range, ReadingRange{});
+  range.add(voltage, 3'300);
+  EXPECT_EQ(range.lowest, (ReadingRange::Values{3'300, 255, -8'192})) << "no temperature and no current so far";
+  EXPECT_EQ(range.highest, range.lowest);
+  ReadingRange later;
+  later.lowest = {3'200, 40, -1'200};
+  later.highest = {3'250, 80, -1'200};
+  range.add(later);
+  later.lowest = {3'250, 50, 400};
+  later.highest = {3'400, 90, 400};
+  range.add(later);
+  range.add(ReadingRange{});
+  EXPECT_EQ(range.lowest, (ReadingRange::Values{3'200, 40, -1'200}));
+  EXPECT_EQ(range.highest, (ReadingRange::Values{3'400, 90, 400}));
 }
 
 TEST(ChargeRecord, AnImpossibleSocIsNotAccepted) {
@@ -236,7 +235,7 @@ TEST(EventsRecord, ContainsTheLastSixteenFaultsNewestFirst) {
   EXPECT_EQ(e.last(0).code, 20);
   EXPECT_EQ(e.last(15).code, 5);
   EXPECT_EQ(e.last(15).time_s, 500'000U);
-  EXPECT_EQ(e.last(15).readings, some_readings(5));
+  EXPECT_EQ(e.last(15).readings, packed(some_readings(5)));
   EventsRecord few;
   few.add({3, 4, {}});
   EXPECT_EQ(few.last(0).code, 3);
