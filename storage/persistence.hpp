@@ -77,11 +77,11 @@ class Persistence {
   /// a failed write the value is valid in this run, and the write is tried again every minute.
   bool set(std::uint16_t key, std::int32_t value);
   bool settings_stored() const { return !settings_changed_; }  ///< no write of a setting has failed
-  /// Call before the battery is switched off: writes charge first, 0.2 ms; everything takes 2 ms, at most 12 ms.
+  /// Call before the battery is switched off: writes charge first, 0.2 ms; everything takes 3 ms, at most 16 ms.
   void power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   /// Call when the supply falls, which may be temporary: writes charge alone, 0.2 ms; at most 1.2 ms if its sector has
-  /// room, otherwise at most 20 ms.
+  /// room, otherwise at most 24 ms.
   void supply_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   bool needs_erase() const { return log_.needs_erase(); }
