@@ -137,8 +137,8 @@ if(EXISTS ${chip}/board_state.cpp)
   set(chip_calendar ${chip}/calendar.cpp)
   set(chip_state ${chip}/board_state.cpp ${chip}/supply.cpp ${core}/image_check.cpp)
 endif()
-bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/${BMS_CORE}.cpp
-  ${chip}/vectors.cpp ${chip}/power.cpp)
+bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/retained.cpp
+  ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
 bms_objects(hal_clock -Os ${chip}/clock.cpp)
 bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar})
 bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})

@@ -16,6 +16,7 @@
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/commands.hpp"
+#include "firmware/latched_faults.hpp"
 #include "firmware/progress.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
@@ -65,7 +66,8 @@ class Application {
   Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
               float capacity_ah, storage::Persistence& persistence)
       : estimator_{start ? Estimator(*start) : Estimator()},
-        protection_{Board::plan(), stored_latched_faults(persistence)},
+        latched_faults_{persistence, hal::reset_cause()},
+        protection_{Board::plan(), latched_faults_.faults()},
         telemetry_{identity, start},
         capacity_ah_{capacity_ah},
         persistence_{persistence},
@@ -86,6 +88,7 @@ class Application {
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
+    observe(pack, estimate);
     protect(pack, estimate, request);
     publish(pack, mean, estimate);
     handle_requests(pack.time_us);
@@ -125,9 +128,19 @@ class Application {
                                          .persistence = persistence_,
                                          .board = board_,
                                          .capacity_ah = capacity_ah_,
-                                         .log_samples = requested_.log_samples};
+                                         .log_samples = requested_.log_samples,
+                                         .stored_part = requested_.next_stored_part()};
     telemetry_.publish(now);
     vehicle_profile_.publish(now);
+  }
+
+  /// Readings for the stored faults and extremes.
+  [[gnu::noinline]] void observe(const measurement::PackSample<cells>& pack, const Result& estimate) {
+    storage::Readings now;
+    now.range = reading_range(pack.cell_uv, pack.temperature_cdegc, pack.current_ua, Board::plausible());
+    if ((estimate.flags & estimator::not_started) == 0)
+      now.soc = static_cast<std::uint8_t>(std::clamp<std::int32_t>(messages::ppb(estimate.soc) / 5'000'000, 0, 200));
+    persistence_.observe(now);
   }
 
   void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
@@ -160,8 +173,10 @@ class Application {
     inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
     inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
+                         latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
-    inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
+    inputs.storage_fault =
+        persistence_.log().sectors() > 0 && (!persistence_.log().operational() || persistence_.full_for_long());
     first_ = false;
     const protection::FaultSet latched_before = protection_.decision().latched;
     const auto& decision = protection_.update(pack, known, inputs);
@@ -174,7 +189,7 @@ class Application {
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
-      store_latched_faults(decision.latched, latched_before);
+      latched_faults_.store(decision.latched);
     if ((latched_before & ~decision.latched) != 0) [[unlikely]]
       hal::second_line_clear();
   }
@@ -187,18 +202,8 @@ class Application {
 
   [[gnu::noinline]] void store_faults(protection::FaultSet raised) {
     for (std::uint16_t k = 0; k < protection::fault_count; ++k, raised >>= 1) {
-      if ((raised & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
+      if ((raised & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k), hal::calendar_s());
     }
-  }
-
-  /// Writes only the word that has changed.
-  [[gnu::noinline]] void store_latched_faults(protection::FaultSet now, protection::FaultSet before) {
-    const auto store = [&](std::uint16_t key, int shift) {
-      if (((now ^ before) >> shift & 0xFFFF'FFFF) != 0)
-        persistence_.set(key, static_cast<std::int32_t>(static_cast<std::uint32_t>(now >> shift)));
-    };
-    store(latched_faults_key, 0);
-    store(more_latched_faults_key, 32);
   }
 
   void handle_requests(std::uint64_t now_us) {
@@ -234,6 +239,7 @@ class Application {
   Estimator estimator_;
   estimator::Condition<Estimator> condition_;
   estimator::PackCells<typename Estimator::Scalar, cells> cells_;
+  LatchedFaults latched_faults_;
   protection::Protection<cells> protection_;
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;

@@ -277,6 +277,10 @@ constexpr can::SocAnchor soc_anchor(const Condition& condition) {
   return m;
 }
 
+inline std::uint32_t storing_state(const storage::Persistence& persistence) {
+  return persistence.full() ? can::Storage::state_full : can::Storage::state_works;
+}
+
 inline can::Storage storage(const storage::Persistence& persistence) {
   using M = can::Storage;
   const auto& log = persistence.log();
@@ -284,7 +288,7 @@ inline can::Storage storage(const storage::Persistence& persistence) {
   if (log.sectors() == 0)
     m.state = M::state_no_flash;
   else
-    m.state = log.operational() ? M::state_works : M::state_nothing_more_is_kept;
+    m.state = log.operational() ? storing_state(persistence) : M::state_nothing_more_is_kept;
   m.broken_sectors = std::min<std::uint32_t>(log.broken(), 15U);
   m.newer_records = std::min<std::uint32_t>(persistence.newer_records(), 15U);
   m.erases = std::min<std::uint32_t>(log.erase_cycles(), 65'535U);

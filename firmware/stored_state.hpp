@@ -70,12 +70,22 @@ class StateToStoreOf {
   std::array<storage::CellsRecord::Cell, Cells> cells_{};
 };
 
-/// Faults that were latched in the last run.
-inline protection::FaultSet stored_latched_faults(const storage::Persistence& persistence) {
-  const auto word = [&](std::uint16_t key) {
-    return static_cast<std::uint32_t>(persistence.settings().get(key).value_or(0));
-  };
-  return protection::FaultSet{word(more_latched_faults_key)} << 32 | word(latched_faults_key);
+/// Range of the readings of a sample. Readings that the sensors cannot give are omitted.
+inline storage::ReadingRange reading_range(std::span<const std::int32_t> cell_uv, std::span<const std::int16_t> cdegc,
+                                           std::int32_t current_ua, const model::PlausibleRange& plausible) {
+  using storage::ReadingRange;
+  ReadingRange r;
+  for (const std::int32_t uv : cell_uv) {
+    if (uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv)
+      r.add(ReadingRange::voltage, static_cast<std::int16_t>(uv / 1'000));
+  }
+  for (const std::int16_t t : cdegc) {
+    if (measurement::temperature_possible(t)) r.add(ReadingRange::temperature, static_cast<std::int16_t>(t / 100 + 60));
+  }
+  if (current_ua != measurement::no_reading)
+    r.add(ReadingRange::current,
+          static_cast<std::int16_t>(std::clamp<std::int32_t>(current_ua / 250'000, -8'191, 8'191)));
+  return r;
 }
 
 /// Calibration of the measuring chain from the stored settings, with `change` in place of the stored value; 0 where

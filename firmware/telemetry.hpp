@@ -14,6 +14,7 @@
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "firmware/snapshot.hpp"
+#include "firmware/stored_data.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
@@ -50,6 +51,8 @@ class Telemetry {
       return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
     });
     published_alarming_ = now.board.alarming();
+    if (now.stored_part) [[unlikely]]
+      stored_data_.send(*now.stored_part, now.persistence, static_cast<std::uint32_t>(now.capacity_ah * 1e6F));
     if (now.log_samples) log(now.mean);
     send(messages::pack_state(now.estimate, now.condition));
     send(messages::pack_electrical(now.pack));
@@ -174,6 +177,7 @@ class Telemetry {
   messages::Identity identity_;
   std::optional<measurement::StartingPoint> start_;
   typename SendStatesOf<can::Messages>::type sent_{};
+  StoredData stored_data_;
   estimator::EstimateHash hash_;
   protection::FaultSet published_faults_ = 0;
   std::uint32_t now_us_ = 0, published_ = 0, published_trips_ = 0;

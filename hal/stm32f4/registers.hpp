@@ -107,6 +107,7 @@ inline Register& rtc_dr() { return at<0x40002804>(); }
 inline Register& rtc_isr() { return at<0x4000280C>(); }
 inline Register& rtc_prer() { return at<0x40002810>(); }
 inline Register& rtc_wpr() { return at<0x40002824>(); }
+/// Backup register 0; 19 more follow.
 inline Register& rtc_bkp0r() { return at<0x40002850>(); }
 
 // independent watchdog [21.4]

@@ -69,6 +69,13 @@ class HostBoard {
   }
   void shut_down() { application_->shut_down(); }
   std::vector<std::uint8_t> flash() { return bytes_of(flash_); }
+  /// From now on no word can be programmed and no sector erased.
+  void wear_out_flash() {
+    for (std::uint32_t k = 0; k < sectors; ++k) {
+      flash_.wear_out(k, FlashModel::Wear::bits_stuck_at_one);
+      flash_.wear_out(k, FlashModel::Wear::erase_fails);
+    }
+  }
   const storage::Persistence& persistence() const { return persistence_; }
 
  private:

@@ -20,6 +20,10 @@ void host_hal::begin() {
   fed = 0;
   board_state = {};
   supply_falls = supply_acknowledged = 0;
+  calendar.reset();
+  backup = {};
+  backup_supplied = true;
+  can_health = {};
   calendar_was_set_to = 0;
   calendar_accepts = true;
   calibrated = {};
@@ -58,7 +62,12 @@ FrontEndHealth front_end_health() { return host_hal::front_end; }
 std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }
-std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
+std::optional<std::uint32_t> calendar_s() { return host_hal::calendar; }
+std::uint32_t backup_word(std::size_t k) { return host_hal::backup[k]; }
+void set_backup_word(std::size_t k, std::uint32_t value) {
+  if (host_hal::backup_supplied) host_hal::backup[k] = value;
+}
+CanHealth can_health() { return host_hal::can_health; }
 void watchdog_feed() { ++host_hal::fed; }
 std::uint32_t supply_falls() { return host_hal::supply_falls; }
 void supply_acknowledge(std::uint32_t falls) {

@@ -3,6 +3,7 @@
 // tests/storage/flash_model.hpp). Also: the application's Board with the cell table9.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -31,6 +32,10 @@ inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;
 inline hal::BoardState board_state;
 inline std::uint32_t supply_falls = 0, supply_acknowledged = 0;
+inline std::optional<std::uint32_t> calendar;
+inline std::array<std::uint32_t, hal::backup_words> backup{};
+inline bool backup_supplied = true;  ///< the backup words can be written
+inline hal::CanHealth can_health;
 inline std::uint32_t calendar_was_set_to = 0;
 inline bool calendar_accepts = true;
 inline hal::SensorCalibration calibrated;
