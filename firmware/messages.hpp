@@ -183,7 +183,7 @@ struct BitMessage {
 
   constexpr can::Frame frame(std::uint8_t counter) const {
     can::Frame out{Message::id, 8, {}};
-    can::put_raw(out, 12, 52, raw << 4 | state);
+    can::set_bits(out, raw << 16 | std::uint64_t{state} << 12);
     can::protect(out, Message::data_id, counter);
     return out;
   }

@@ -73,8 +73,16 @@ std::map<std::uint32_t, CyclicMessage> hour_with_jitter_of(std::uint32_t jitter_
   std::mt19937 random(jitter_us);
   for (std::uint32_t k = 0; k < hour_us / sample_us; ++k) {
     pack.time_us = 7 + std::uint64_t{k} * sample_us + random() % (jitter_us + 1);
-    const Snapshot<estimator::SocEstimator<float>, all_cells> now{
-        pack, mean, estimate, condition, cells, decision, Board::plan(), persistence, board, 6, false};
+    const Snapshot<estimator::SocEstimator<float>, all_cells> now{.pack = pack,
+                                                                  .mean = mean,
+                                                                  .estimate = estimate,
+                                                                  .condition = condition,
+                                                                  .cells = cells,
+                                                                  .decision = decision,
+                                                                  .plan = Board::plan(),
+                                                                  .persistence = persistence,
+                                                                  .board = board,
+                                                                  .capacity_ah = 6};
     telemetry.publish(now);
     j1939.publish(now);
     cia418.publish(now);

@@ -20,7 +20,8 @@ double opens_after_s(const std::function<void(measurement::PackSample<16>&)>& ch
     b.sample.pack_uv = 16 * 3'300'500;
     b.sample.current_ua = -3'000'000;
     change(b.sample);
-    b.inputs.dc_link_uv = b.sample.pack_uv;
+    b.inputs.link_plus_uv = b.sample.pack_uv;
+    b.inputs.link_minus_uv = 0;
     faults |= b.protection.update(b.sample, b.estimate, b.inputs).faults;
     if (!b.protection.decision().outputs.any_closed()) return 0.1 * k;
   }
@@ -68,7 +69,8 @@ TEST(SumOfCells, WorstErrorsOfGoodReadingsAndLoadRampsAreNoFault) {
             static_cast<std::int32_t>(1e6 * (cell_v(t_s) + sign * 0.005)) + (k + static_cast<int>(c)) % 3;
       b.sample.pack_uv = static_cast<std::int32_t>(1e6 * (16 * cell_v(t_s + 0.063) - sign * 0.2));
       b.sample.current_ua = static_cast<std::int32_t>(-6e6 * load(t_s));
-      b.inputs.dc_link_uv = b.sample.pack_uv;
+      b.inputs.link_plus_uv = b.sample.pack_uv;
+      b.inputs.link_minus_uv = 0;
       ASSERT_EQ(b.protection.update(b.sample, b.estimate, b.inputs).faults, 0U) << t_s << " s, " << sign;
     }
   }
