@@ -43,7 +43,7 @@ struct ProtectionBench {
     if (change) change(sample);
     std::int64_t sum = 0;
     for (const std::int32_t uv : sample.cell_uv) sum += uv;
-    sample.pack_uv = static_cast<std::int32_t>(sum);
+    sample.pack_uv = static_cast<std::int32_t>(sum) + pack_error_uv;
     if (closed)
       dc_link_uv = static_cast<double>(sample.pack_uv);
     else if (out.precharge && out.main_minus)
@@ -73,7 +73,7 @@ struct ProtectionBench {
   ExternalInputs inputs;
   std::uint64_t time_us;
   std::uint32_t period, count = 0;
-  std::int32_t base_uv = 3'300'000, load_ua = 0;
+  std::int32_t base_uv = 3'300'000, load_ua = 0, pack_error_uv = 0;  ///< error: of the pack's own measurement
   double dc_link_uv = 0;
   bool closed = false, plus_welded = false;
   std::function<void(measurement::PackSample<16>&)> change;
