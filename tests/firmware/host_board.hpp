@@ -24,7 +24,7 @@ struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
 struct Input {
   Pack pack;
   hal::LinkVoltages link{0, 0};
-  std::optional<can::Frame> command;  ///< received before the sample
+  std::optional<can::Frame> command = std::nullopt;  ///< received before the sample
 };
 
 /// All sectors, one after the other.
