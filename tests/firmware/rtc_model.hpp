@@ -3,6 +3,7 @@
 // two.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -43,7 +44,8 @@ class RtcModel {
   void reset_domain();
 
   double at_us_ = 0, fraction_s_ = 0, crystal_on_us_ = -1;
-  std::uint32_t prer_ = 0x007F00FF, mark_ = 0, dr_shadow_ = 0;
+  std::uint32_t prer_ = 0x007F00FF, dr_shadow_ = 0;
+  std::array<std::uint32_t, 20> backup_{};
   int keys_ = 0, prescaler_writes_ = 0;
   bool initialising_ = false, synchronised_ = false, dr_locked_ = false;
 };
