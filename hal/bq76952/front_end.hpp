@@ -122,7 +122,7 @@ class FrontEnd {
   // second line
   std::uint32_t trips_ = 0;
   std::uint64_t answered_us_ = 0;              ///< time of the last complete exchange
-  std::uint16_t alarm_ = 0;                    ///< of this sample
+  std::uint16_t alarm_ = 0;                    ///< Alarm Status of this sample, and trips not yet reported
   std::uint8_t safety_a_ = 0, safety_bc_ = 0;  ///< of the last sample
   std::uint8_t pins_wrong_ = 0;                ///< samples in a row
   bool failed_permanently_ = false, latched_ = false, clear_latch_ = false;
