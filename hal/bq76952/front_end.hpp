@@ -19,7 +19,7 @@
 // A current beyond the range reads as the end of the range with its sign. The current comes from CC3's 32-bit counts,
 // which do not wrap; it must agree with the 16 bits of CC3, or it is no_reading.
 //
-// Time: 11 transfers, 9.1 ms; 15 while balancing is sent and read back (README.md). Memory: 270 bytes.
+// Time: 11 transfers, 8.9 ms; 15 while balancing is sent and read back (README.md). Memory: 270 bytes.
 #pragma once
 
 #include <array>
