@@ -157,8 +157,8 @@ set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp
   ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp)
 # The settings of the chip's own protections follow the cell file.
 set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
-  ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header} ${chip}/i2c.cpp
-  ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts})
+  ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
+  ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts})
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})

@@ -19,8 +19,7 @@ constexpr std::uint8_t max_failures = 2;       // samples in a row
 constexpr std::uint8_t max_scan_age = 2;       // samples without a complete scan
 constexpr std::uint8_t max_charge_still = 15;  // samples: 1.5 s of a counter of seconds
 constexpr std::uint64_t refresh_interval_us = 5'000'000;
-constexpr std::uint8_t max_pins_wrong = 4;  // samples: the chip updates its outputs every 250 ms at the latest
-constexpr int max_move = 127;               // of a word between two samples; a torn word is off by 256
+constexpr int max_move = 127;  // of a word between two samples; a torn word is off by 256
 
 /// Waits until the chip has processed what was written.
 void settle() {
@@ -66,8 +65,6 @@ void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   if (measuring && complete) interrupted_ = false;
   if (trips_ != 0) ++counters_.trips;
 }
-
-bool FrontEnd::silent() const { return ran_ && now_us() - answered_us_ >= configuration_->max_silence_us; }
 
 /// One step towards measuring. Returns false if the chip is missing or not as expected.
 bool FrontEnd::advance() {
@@ -261,7 +258,9 @@ bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   std::array<std::uint8_t, hdq_temperature + 2 - alarm_status> alarm_and_temperatures;
   if (!read_words(alarm_status, alarm_and_temperatures, temperatures_, cfetoff_temperature - alarm_status))
     return false;
-  alarm_ = get_bytes<std::uint16_t>(alarm_and_temperatures, 0);
+  // Trips stay until read_second_line() has seen them, also if a transfer before it fails.
+  alarm_ = static_cast<std::uint16_t>((alarm_ & (tripped_a | tripped_bc)) |
+                                      get_bytes<std::uint16_t>(alarm_and_temperatures, 0));
   std::array<std::uint8_t, 2> seen{};
   put_bytes(seen, 0, static_cast<std::uint16_t>(alarm_ & (cells_scanned | all_scanned | tripped_a | tripped_bc)));
   if (!wire_.write(alarm_status, seen)) return false;
@@ -332,44 +331,6 @@ bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
   const std::int64_t counted_uas = MeanCurrent::charge_uas(counted, configuration_->current_step_ua);
   into.current_ua = std::clamp(mean_current_.update(cc3, counted_uas, into.time_us, end), -end, end);
   return true;
-}
-
-/// Reads what the chip's own protections have opened. What happened before the first sample of this core is not
-/// reported, unless it lasts: the contactors were open.
-bool FrontEnd::read_second_line() {
-  std::array<std::uint8_t, 5> safety{};  // status A, alert B, status B, alert C, status C
-  std::array<std::uint8_t, 1> fets{};
-  if (!wire_.read(safety_status_a, safety) || !wire_.read(fet_status, fets)) return false;
-  const std::uint8_t a = safety[0], b = safety[2], c = safety[4];
-  trips_ |= (a >> 2 & 0x0FU) | (a >> 3 & (discharge_overcurrent | short_circuit));
-  if (b != 0) trips_ |= temperature;
-  if ((c & host_watchdog) != 0) trips_ |= host_silence;
-  const bool latched = (c & short_circuit_latch) != 0;
-  if (latched && !latched_) trips_ |= short_circuit;
-  latched_ = latched;
-  if (failed_permanently_) trips_ |= permanent_failure;
-  // Trips that are over. Of register A only these recover unseen; of B and C the watchdog, by the first transfer.
-  if (ran_ && (alarm_ & tripped_a) != 0 && (a | safety_a_) == 0)
-    trips_ |= cell_undervoltage | cell_overvoltage | charge_overcurrent | discharge_overcurrent;
-  if (ran_ && (alarm_ & tripped_bc) != 0 && (b | c | safety_bc_) == 0) trips_ |= host_silence;
-  safety_a_ = a;
-  safety_bc_ = b | c;
-  if (pins_follow(a, c, fets[0]) || b != 0)
-    pins_wrong_ = 0;
-  else if (pins_wrong_ < max_pins_wrong)
-    ++pins_wrong_;
-  if (pins_wrong_ >= max_pins_wrong) trips_ |= pins_wrong;
-  ran_ = true;
-  return true;
-}
-
-/// Returns true if DDSG and DCHG are what the protections demand. Protections of register B are off.
-bool FrontEnd::pins_follow(std::uint8_t safety_a, std::uint8_t safety_c, std::uint8_t fets) {
-  const auto asserted = [&](std::uint8_t faults_a, std::uint8_t faults_c) {
-    return failed_permanently_ || (safety_a & faults_a) != 0 || (safety_c & faults_c) != 0;
-  };
-  return asserted(dsg_faults_a, dsg_faults_c) == ((fets & ddsg_asserted) != 0) &&
-         asserted(chg_faults_a, chg_faults_c) == ((fets & dchg_asserted) != 0);
 }
 
 bool FrontEnd::refresh_balancing() {

@@ -83,9 +83,11 @@ TEST_F(StoredStateTest, AShortCircuitStaysUntilAWorkshopClearsIt) {
   send_command(board, can::Command::code_clear_faults, 0);
   run(board, 2);
   EXPECT_EQ(last<can::Faults>()->short_circuit, 1U) << "a driver cannot clear it";
+  EXPECT_EQ(host_hal::second_line_cleared, 0);
   send_command(board, can::Command::code_clear_faults, 1);
   run(board, 2);
   EXPECT_EQ(last<can::Faults>()->short_circuit, 0U);
+  EXPECT_EQ(host_hal::second_line_cleared, 1) << "the front end's latch ends with the fault";
 }
 
 TEST_F(StoredStateTest, AFailedSecondLineStaysUntilAWorkshopClearsIt) {

@@ -133,6 +133,21 @@ TEST_F(SecondLine, ATripThatRecoversBetweenTwoSamplesIsReported) {
   EXPECT_EQ(trips_of_samples(20), 0U) << "once";
 }
 
+TEST_F(SecondLine, ATripIsReportedAlsoIfTheSampleThatFindsItFails) {
+  run();
+  model.set(bq::recovery_time, 0);
+  model.set(bq::cov_delay, 1);
+  model.cell_v[6] = 3.9;
+  model.advance(12'000);
+  model.cell_v[6] = 3.3;
+  model.advance(5'000);
+  model.torn_buffer = true;  // the current cannot be read
+  std::uint32_t trips = trips_of_samples(1);
+  model.torn_buffer = false;
+  trips |= trips_of_samples(1);
+  EXPECT_NE(trips & cell_overvoltage, 0U);
+}
+
 TEST_F(SecondLine, AnOvercurrentRecoversAtRestAfterItWasReported) {
   run();
   model.current_a = -365;
