@@ -74,7 +74,7 @@ class Application {
         cell_hash_{identity.cell_hash} {
     board_.cell_file_changed = stored_for_another_cell_file(persistence, cell_hash_);
     if (board_.cell_file_changed) return;
-    persistence.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
+    store_setting(cell_file_key, cell_hash_);
     if constexpr (cells > 1) restore_cells(cells_, persistence.cells());
   }
 
@@ -175,8 +175,8 @@ class Application {
     inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
                          latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
-    inputs.storage_fault =
-        persistence_.log().sectors() > 0 && (!persistence_.log().operational() || persistence_.full_for_long());
+    inputs.storage_fault = persistence_.log().sectors() > 0 &&
+                           (setting_lost_ || !persistence_.log().operational() || persistence_.full_for_long());
     first_ = false;
     const protection::FaultSet latched_before = protection_.decision().latched;
     const auto& decision = protection_.update(pack, known, inputs);
@@ -189,14 +189,19 @@ class Application {
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
-      latched_faults_.store(decision.latched);
+      setting_lost_ = !latched_faults_.store(decision.latched) || setting_lost_;
     if ((latched_before & ~decision.latched) != 0) [[unlikely]]
       hal::second_line_clear();
   }
 
+  /// A setting without room is a storage fault until the next start.
+  [[gnu::noinline]] void store_setting(std::uint16_t key, std::uint32_t value) {
+    if (!persistence_.set(key, static_cast<std::int32_t>(value))) setting_lost_ = true;
+  }
+
   /// Clearing the faults confirms the new cell file: from now on the stored data belong to it.
   [[gnu::noinline]] void accept_cell_file() {
-    persistence_.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
+    store_setting(cell_file_key, cell_hash_);
     board_.cell_file_changed = false;
   }
 
@@ -225,7 +230,8 @@ class Application {
   /// Returns false if the measuring chain cannot be calibrated; then nothing is stored.
   [[gnu::noinline]] bool apply_calibration(const Requested::CalibrationChange& change) {
     if (!hal::calibrate(stored_calibration(persistence_, change))) return false;
-    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + change.which), change.value);
+    store_setting(static_cast<std::uint16_t>(first_calibration_key + change.which),
+                  static_cast<std::uint32_t>(change.value));
     return true;
   }
 
@@ -251,7 +257,7 @@ class Application {
   storage::Persistence& persistence_;
   std::uint32_t cell_hash_;
   BoardStatus board_;
-  bool first_ = true;
+  bool first_ = true, setting_lost_ = false;
 };
 
 }  // namespace bms::firmware

@@ -35,12 +35,15 @@ class LatchedFaults {
   /// One bit each; at the start, those of the last run.
   std::uint64_t faults() const { return words_[0] | std::uint64_t{words_[1]} << 32; }
 
-  [[gnu::noinline]] void store(std::uint64_t faults) {
+  /// Returns false if flash has no room for the setting.
+  [[gnu::noinline]] bool store(std::uint64_t faults) {
+    bool stored = true;
     for (std::size_t k = 0; k < keys.size(); ++k, faults >>= 32) {
       words_[k] = static_cast<std::uint32_t>(faults);
-      if (words_[k] != setting(k)) persistence_.set(keys[k], static_cast<std::int32_t>(words_[k]));
+      if (words_[k] != setting(k)) stored = persistence_.set(keys[k], static_cast<std::int32_t>(words_[k])) && stored;
     }
     store_in_backup();
+    return stored;
   }
 
   /// Returns true if a loss of power would lose a latched fault: flash that is worn out, and no backup.
