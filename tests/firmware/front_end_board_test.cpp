@@ -46,7 +46,9 @@ class FrontEndBoard : public ::testing::Test {
     EXPECT_THAT(converter.violations, IsEmpty());
     EXPECT_THAT(chip.violations, IsEmpty());
     EXPECT_THAT(board.can.violations, IsEmpty());
-    if (clock_works) EXPECT_LT(board.longest_unfed_ms, 1'360);
+    if (clock_works) {
+      EXPECT_LT(board.longest_unfed_ms, 1'360);
+    }
   }
   std::optional<can::Frame> last(unsigned id) const {
     std::optional<can::Frame> found;
