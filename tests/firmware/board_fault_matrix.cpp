@@ -244,10 +244,13 @@ class Matrix {
   static void during(std::size_t k, std::size_t other, MatrixResult& result) {
     BoardTruck truck(1'000 + 64 * k + other, result);
     if (!truck.drive_off()) return truck.complain("does not start to drive");
-    // the truck draws its load while the allowed current still rises from 0
-    for (int t = 0; k == exceeded && t < 5'000; t += step_ms) truck.step();
     for (int t = 0; t < delay_ms(other) + 500; t += step_ms) {
-      truck.step([&](auto& s, auto& e, auto&) { keep(other, truck, s, e); });
+      truck.step([&](auto& s, auto& e, auto&) {
+        // until then the truck obeys, also while the allowed current changes
+        if (k == exceeded)
+          s.current_ua = std::max(s.current_ua, static_cast<std::int32_t>(-1e6F * truck.allowed.discharge));
+        keep(other, truck, s, e);
+      });
     }
     if (!has(truck.faults, other)) return truck.complain("the other fault is not active");
     // after a turning point the other readings change far enough
