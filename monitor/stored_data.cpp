@@ -79,8 +79,8 @@ bool StoredData::receive(const BusState& bus, std::size_t message) {
     others_.set(1);
   } else if (name == "StoredExtremes") {
     const bool is_highest = integer_of(bus, name, "Kind") == 1;
-    (is_highest ? highest : lowest) = {value_of(bus, name, "Voltage"), value_of(bus, name, "Temperature"),
-                                       value_of(bus, name, "Current")};
+    StoredExtreme& extreme = is_highest ? highest : lowest;
+    extreme = {value_of(bus, name, "Voltage"), value_of(bus, name, "Temperature"), value_of(bus, name, "Current")};
     others_.set(is_highest ? 3 : 2);
   } else if (name == "CanErrors") {
     can_state = name_in(name, "State", integer_of(bus, name, "State"));

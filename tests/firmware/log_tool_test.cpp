@@ -137,7 +137,7 @@ TEST_F(LogTool, ReadsAFaultOfTheEmulatedBoardAndAsksAgainForALostFrame) {
   EXPECT_EQ((*fault)["temperature_max_c"], 25);
   EXPECT_GT((*fault)["unix_time_s"], 1'700'000'000) << "the emulated calendar clock runs";
   EXPECT_NEAR(log["highest"]["cell_voltage_v"].get<double>(), 3.75, 0.0011);
-  EXPECT_EQ(log["lowest"]["current_a"], -6);
+  EXPECT_EQ(log["lowest"]["current_a"], -6) << log.dump();
   EXPECT_EQ(log["highest"]["current_a"], 3);
   EXPECT_NEAR(log["operating_s"].get<double>(), 90, 40);
   EXPECT_EQ(log["can"]["state"], "active");
