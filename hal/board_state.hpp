@@ -18,11 +18,12 @@ struct BoardState {
   bool ram_failed = false;     ///< a RAM cell did not store what was written
   bool image_failed = false;   ///< the flash differs from the linked image
   bool stack_overrun = false;  ///< the guard words below the stack have changed
-  bool clock_failed = false;   ///< the core runs on its internal oscillator without CAN, or its frequency was wrong
 
   // The board can work with these.
   bool supply_low = false;           ///< the supply is below the detector's threshold now
   bool brown_out_reset_low = false;  ///< the chip resets only below the voltage at which its flash can be programmed
+  /// The core runs on its internal oscillator without CAN, or its frequency was wrong: unfit as above.
+  bool clock_failed = false;
   CalendarState calendar = CalendarState::absent;
   std::uint16_t stack_free = 0xFFFF;  ///< minimum so far [bytes]; 0xFFFF: not measured
 

@@ -19,7 +19,7 @@ struct Range {
   std::uint32_t shortest, longest;
 };
 constexpr Range counts_of(std::uint32_t lowest_hz, std::uint32_t highest_hz) {
-  return {periods * timer_hz / highest_hz, periods * timer_hz / lowest_hz};
+  return {periods * timer_hz / highest_hz, periods * timer_hz / lowest_hz + 1};
 }
 constexpr Range of_lsi = counts_of(17'000, 47'000), of_lse = counts_of(32'440, 33'096);
 

@@ -2,7 +2,7 @@
 //
 //   crystal stops        clock security system (RM0090, 7.2.7): the core continues on the internal oscillator, and the
 //                        NMI opens the contactors, records a fault and resets the core (hal/stm32f4/vectors.cpp)
-//   wrong frequency      timer 5 measures eight periods of a slow oscillator (7.2.10, 18.4.21): of the 32,768 Hz
+//   wrong frequency      timer 5 measures eight periods of a slow oscillator (7.2.11, 18.4.20): of the 32,768 Hz
 //                        crystal, if it runs, to 1 %; otherwise of the internal one, 17 to 47 kHz (datasheet DS8626),
 //                        which finds a core below 0.36 and above 2.8 times its frequency for every oscillator. Eight
 //                        wrong measurements in a row open the contactors: 1.4 to 3.8 ms. The slow oscillator raises the

@@ -55,7 +55,7 @@ void TimerModel::edge(double count) {
 }
 
 void TimerModel::pass(double us, double clock_hz, double lsi_hz, double lse_hz) {
-  const std::uint32_t source = registers_[option] >> 6 & 3;  // 18.4.21, TI4_RMP
+  const std::uint32_t source = registers_[option] >> 6 & 3;  // 18.4.20, TI4_RMP
   double input_hz = 0;
   if (source == 1) input_hz = lsi_hz;
   if (source == 2) input_hz = lse_hz;
