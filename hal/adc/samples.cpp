@@ -62,9 +62,12 @@ const measurement::PackSample<1>* next_sample() {
     due_us = now_us() + period_us;
   }
   adc::AdcCounts sums;
+  std::uint64_t round_us = now_us();
   for (receive_frames(); now_us() < due_us; receive_frames()) {
     wait_for_interrupt();
+    if (now_us() < round_us) continue;  // another interrupt within the millisecond
     convert(sums);
+    round_us += 1'000;
   }
   measurement::Sample sample;
   sample.time_us = now_us();

@@ -62,6 +62,15 @@ inline Register& i2c1_sr2() { return at<0x40005418>(); }
 inline Register& i2c1_ccr() { return at<0x4000541C>(); }
 inline Register& i2c1_trise() { return at<0x40005420>(); }
 
+// timer 5 [18.4]
+inline Register& tim5_cr1() { return at<0x40000C00>(); }
+inline Register& tim5_dier() { return at<0x40000C0C>(); }
+inline Register& tim5_ccmr2() { return at<0x40000C1C>(); }
+inline Register& tim5_ccer() { return at<0x40000C20>(); }
+inline Register& tim5_ccr4() { return at<0x40000C40>(); }
+inline Register& tim5_or() { return at<0x40000C50>(); }
+inline constexpr unsigned tim5_interrupt = 50;
+
 // USART1 [30.6]
 inline Register& usart1_sr() { return at<0x40011000>(); }
 inline Register& usart1_dr() { return at<0x40011004>(); }
@@ -111,6 +120,14 @@ inline Register& rtc_bkp0r() { return at<0x40002850>(); }
 inline Register& iwdg_kr() { return at<0x40003000>(); }
 inline Register& iwdg_pr() { return at<0x40003004>(); }
 inline Register& iwdg_rlr() { return at<0x40003008>(); }
+inline Register& iwdg_sr() { return at<0x4000300C>(); }
+
+/// Priority of an interrupt [ARMv7-M B3.4.9], four bits: 0x00 is the most urgent and that of every interrupt in reset.
+inline volatile std::uint8_t& nvic_priority(unsigned interrupt) {
+  return reinterpret_cast<volatile std::uint8_t*>(0xE000E400)[interrupt];
+}
+/// Of the interrupts that serve a bus or a serial line. Supply and clock supervision interrupt their handlers.
+inline constexpr std::uint8_t communication_priority = 0x10;
 
 // SysTick [ARMv7-M B3.3]
 inline Register& syst_csr() { return at<0xE000E010>(); }

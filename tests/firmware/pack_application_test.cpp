@@ -88,8 +88,9 @@ TEST_F(PackTest, AnUnfitBoardClosesNothing) {
       second();
     }
   };
-  for (const auto condition : {&hal::BoardState::ram_failed, &hal::BoardState::image_failed,
-                               &hal::BoardState::stack_overrun, &hal::BoardState::supply_low}) {
+  for (const auto condition :
+       {&hal::BoardState::ram_failed, &hal::BoardState::image_failed, &hal::BoardState::stack_overrun,
+        &hal::BoardState::clock_failed, &hal::BoardState::supply_low}) {
     host_hal::board_state = {};
     host_hal::board_state.*condition = true;
     drive_s(5);
