@@ -13,9 +13,11 @@
 //                   ms.
 //   no progress     frames wait and none was sent for 100 ms (no acknowledge, stuck wire, full bus): drops the waiting
 //                   frames. can_listening() is false for a second or until a frame arrives; then sending starts again.
-//   no idle bus     100 ms after the request: counts a failed start and tries again after the rest
+//   no idle bus     100 ms after the request (longer below 250 kbit/s, where a recovery on a full bus needs it): counts
+//                   a failed start and tries again after the rest
 //   no crystal      never on the bus: the internal oscillator has an error of up to 8 % (datasheet, HSI), a bit allows
 //                   0.5 %
+#include <algorithm>
 #include <array>
 #include <atomic>
 
@@ -37,7 +39,9 @@ using namespace stm32f4;
 constexpr bxcan::BitTiming timing = bxcan::bit_timing(crystal_apb1_hz, BMS_CAN_BIT_RATE);
 constexpr auto banks = bxcan::filter_banks(accepted_ids);
 
-constexpr std::uint64_t phase_timeout_us = 100'000, no_progress_us = 100'000, pause_us = 1'000'000;
+constexpr std::uint32_t recovery_us = bxcan::longest_recovery_us(BMS_CAN_BIT_RATE), margin_us = recovery_us / 5;
+constexpr std::uint64_t phase_timeout_us = std::max<std::uint64_t>(100'000, recovery_us + margin_us),
+                        no_progress_us = 100'000, pause_us = 1'000'000;
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
 
 constexpr std::uint32_t mcr_inrq = 1U << 0, mcr_rflm = 1U << 3, mcr_reset = 1U << 15, msr_inak = 1U << 0;
@@ -267,6 +271,8 @@ void can_start() {
   gpiob_pupdr() = (gpiob_pupdr() & ~(3U << 16)) | 1U << 16;  // recessive if there is no transceiver
   gpiob_afrh() = (gpiob_afrh() & ~255U) | 0x99U;
   gpiob_moder() = (gpiob_moder() & ~(15U << 16)) | 10U << 16;
+  nvic_priority(can1_tx_interrupt) = communication_priority;
+  nvic_priority(can1_rx0_interrupt) = communication_priority;
   nvic_iser0() = 1U << can1_tx_interrupt | 1U << can1_rx0_interrupt;
   ask_for_initialisation();
 }

@@ -83,6 +83,13 @@ TEST(BitTiming, IsTheBestOfASearchOverAllRegisterValues) {
   is_the_best(25'000'000, 250'000, bit_timing(25'000'000, 250'000, anywhere));
 }
 
+/// 128 frames of 160 bits (29-bit identifier, 8 bytes, 29 stuff bits, intermission), by hand.
+TEST(BitTiming, GivesTheRecoveryOnAFullBusItsTime) {
+  EXPECT_EQ(longest_recovery_us(125'000), 163'840U);
+  EXPECT_EQ(longest_recovery_us(250'000), 81'920U);
+  EXPECT_EQ(longest_recovery_us(1'000'000), 20'480U);
+}
+
 TEST(FilterBanks, ContainEachIdentifierOnceInBits15To5AndRepeatTheLast) {
   constexpr auto banks = filter_banks(std::array<std::uint16_t, 5>{0x310, 0x311, 0x312, 0x7FF, 0x001});
   ASSERT_EQ(banks.size(), 2U);
