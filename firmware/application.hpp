@@ -59,7 +59,7 @@ class Application {
         cell_hash_{identity.cell_hash} {
     board_.cell_file_changed = stored_for_another_cell_file(persistence, cell_hash_);
     if (board_.cell_file_changed) return;
-    persistence.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
+    store_setting(cell_file_key, cell_hash_);
     if constexpr (cells > 1) restore_cells(cells_, persistence.cells());
   }
 
@@ -141,7 +141,7 @@ class Application {
     const std::uint32_t supply_falls = hal::supply_falls();
     inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
-    inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
+    inputs.storage_fault = persistence_.log().sectors() > 0 && (setting_lost_ || !persistence_.log().operational());
     first_ = false;
     const std::uint32_t latched_before = protection_.decision().latched;
     const auto& decision = protection_.update(pack, known, inputs);
@@ -152,12 +152,17 @@ class Application {
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
-      persistence_.set(latched_faults_key, static_cast<std::int32_t>(decision.latched));
+      store_setting(latched_faults_key, decision.latched);
+  }
+
+  /// A setting without room is a storage fault until the next start.
+  [[gnu::noinline]] void store_setting(std::uint16_t key, std::uint32_t value) {
+    if (!persistence_.set(key, static_cast<std::int32_t>(value))) setting_lost_ = true;
   }
 
   /// Clearing the faults confirms the new cell file: from now on the stored data belong to it.
   [[gnu::noinline]] void accept_cell_file() {
-    persistence_.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
+    store_setting(cell_file_key, cell_hash_);
     board_.cell_file_changed = false;
   }
 
@@ -183,8 +188,8 @@ class Application {
   }
 
   [[gnu::noinline]] void apply_calibration(const Requested::CalibrationChange& calibration_change) {
-    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + calibration_change.which),
-                     calibration_change.value);
+    store_setting(static_cast<std::uint16_t>(first_calibration_key + calibration_change.which),
+                  static_cast<std::uint32_t>(calibration_change.value));
     hal::calibrate(stored_calibration(persistence_));
   }
 
@@ -209,7 +214,7 @@ class Application {
   storage::Persistence& persistence_;
   std::uint32_t cell_hash_;
   BoardStatus board_;
-  bool first_ = true;
+  bool first_ = true, setting_lost_ = false;
 };
 
 }  // namespace bms::firmware

@@ -140,6 +140,26 @@ TEST_F(StoredStateTest, ACorrectionIsAppliedAtOnceAndStored) {
   EXPECT_EQ(stored_calibration(board.persistence()).current_gain_ppm, 0);
 }
 
+/// Another firmware has left so many settings that there is room for one more key: the hash of the cell file.
+TEST_F(StoredStateTest, ASettingWithoutRoomIsAStorageFault) {
+  std::vector<std::uint8_t> kept;
+  {
+    FlashModel flash({HostBoard::sectors, HostBoard::sector_bytes}, 2);
+    plug_in(&flash);
+    storage::Persistence persistence;
+    persistence.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
+    std::uint16_t key = 1'000;
+    for (std::size_t k = 1; k < storage::SettingsRecord::max_settings; ++k) ASSERT_TRUE(persistence.set(key++, 1));
+    kept = bytes_of(flash);
+  }
+  HostBoard board(kept, start);
+  run(board, 2);
+  EXPECT_EQ(last<can::Faults>()->storage_fault, 0U);
+  send_command(board, can::Command::code_voltage_offset, 1'000);
+  run(board, 2);
+  EXPECT_EQ(last<can::Faults>()->storage_fault, 1U) << "the correction is lost at the next start";
+}
+
 TEST_F(StoredStateTest, ValuesOutOfRangeAreStoredClamped) {
   EXPECT_NEAR(scaled_to_integer(0.9234567F, 1e6F), 923'457, 1);
   EXPECT_EQ(scaled_to_integer(-5e3F, 1e6F), -2'147'000'000);
