@@ -38,7 +38,7 @@ double RtcModel::hz() const {
   if ((bdcr & enabled) == 0 || initialising_) return 0;
   const std::uint32_t selected = bdcr >> 8 & 3;
   double source = 0;
-  if (selected == 1 && (bdcr & lse_ready) != 0) source = 32'768;
+  if (selected == 1 && (bdcr & lse_ready) != 0) source = crystal_hz;
   if (selected == 2) source = 32'000;
   return source / ((prer_ >> 16 & 0x7F) + 1) / ((prer_ & 0x7FFF) + 1);
 }

@@ -27,8 +27,11 @@ class RtcModel {
   /// A reset of the core: the shadow registers are loaded again.
   void core_reset() { synchronised_ = false; }
 
+  /// Output of the crystal oscillator. LSE_READY stays set if the crystal stops later.
+  double lse_hz() const { return crystal && (bdcr & 2) != 0 ? crystal_hz : 0; }
+
   bool crystal = true;
-  double crystal_after_us = 2e6;
+  double crystal_after_us = 2e6, crystal_hz = 32'768;
   std::uint32_t bdcr = 0;
   struct Date {
     int year = 0, month = 1, day = 1, hour = 0, minute = 0, second = 0;  ///< year of the century
