@@ -96,7 +96,7 @@ TEST_F(FrontEndBoard, NoFrameOfASampleOrOfAStartingPointIsReceived) {
     for (std::uint32_t id = 0x310; id <= 0x322; ++id)
       board.can.others.push_back({{id, false, false, 8, {0x00, 0x65, 0xCD, 0x1D, 0x80, 0x96, 0x98, 0x00}}, 0});
   }
-  board.run_for_ms(900);
+  board.run_for_ms(2'000);
   EXPECT_EQ(board.can_health().received, 0U);
   const auto start = last(can::StartingSoc::id);
   ASSERT_TRUE(start);
