@@ -27,7 +27,11 @@ std::filesystem::path source_tree() {
 
 std::filesystem::path board_file(const std::string& board) {
   const auto file = source_tree() / "boards" / board / "board.cmake";
-  if (!std::filesystem::exists(file))
+  // board.cmake is run, so it must not come from elsewhere: "../DIR"
+  const bool plain =
+      !board.empty() &&
+      board.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
+  if (!plain || !std::filesystem::exists(file))
     throw files::BadInput(
         board, 1, "no such board in " + (source_tree() / "boards").string() + ", expected the folder name of a board");
   return file;

@@ -28,6 +28,17 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
+/// Both become words of OpenOCD's language, where brackets and quotes run commands. A probe is a file of interface/,
+/// also in a folder of it.
+void check_probe(const images::Probe& probe) {
+  constexpr const char* letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+  const bool plain = probe.interface.find_first_not_of(std::string(letters) + "/") == std::string::npos;
+  if (!plain || probe.interface.starts_with('/') || probe.interface.find("..") != std::string::npos)
+    throw files::BadInput("--probe", 1, "'" + probe.interface + "' is not a probe, expected a name as stlink");
+  if (probe.serial.find_first_not_of(letters) != std::string::npos)
+    throw files::BadInput("--serial", 1, "'" + probe.serial + "' is not a serial number, expected letters and digits");
+}
+
 /// Writes each part to a file next to the image.
 std::vector<images::PartFile> write_parts(const std::filesystem::path& image,
                                           const std::vector<images::LoadedPart>& parts) {
@@ -44,6 +55,7 @@ std::vector<images::PartFile> write_parts(const std::filesystem::path& image,
 int flash(const FlashOptions& o) {
   images::Probe probe{o.probe, images::board_setting(o.board, "BMS_PROBE_TARGET"), o.serial};
   if (probe.interface.empty()) probe.interface = images::board_setting(o.board, "BMS_PROBE");
+  check_probe(probe);
   if (!o.dry_run && !images::in_path("openocd")) {
     throw files::BadInput("openocd", 1,
                           "not installed, expected OpenOCD (Debian: apt-get install openocd; ./bms flash installs it)");

@@ -266,6 +266,7 @@ class HilCommand final : public Command {
 
   int run() override {
     o_.output.set_own(o_.candump);
+    o_.output.protect({o_.recording, o_.profile, o_.cell, o_.board_cell});
     const hil::SessionPlan plan = read(o_);
     std::string dump;
     const hil::SessionResult result = compute(o_, plan, dump);
