@@ -8,6 +8,7 @@
 #include <cstring>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -101,6 +102,7 @@ void UnicornBoard::start_again(std::uint32_t flags) {
   fed_at_ = watchdog_ticks_ = 0;
   can.write(0, 1U << 15);
   flash.reset();
+  for (const auto& [base, peripheral] : plugged) peripheral->chip_reset();
   set_reg(UC_ARM_REG_CONTROL, 0);
   set_reg(UC_ARM_REG_PRIMASK, 0);
   set_reg(UC_ARM_REG_XPSR, 1U << 24);
@@ -459,7 +461,8 @@ void UnicornBoard::slice() {
   } else {
     const auto count = static_cast<std::size_t>(1 + random_() % 200);
     execute(reg(UC_ARM_REG_PC), count);
-    pass(count * ticks_a_cycle() + static_cast<std::uint64_t>(flash.take_stall_us() * (ticks_per_second / 1e6)));
+    const double waits_us = flash.take_stall_us() + std::exchange(stall_us, 0);
+    pass(count * ticks_a_cycle() + static_cast<std::uint64_t>(waits_us * (ticks_per_second / 1e6)));
   }
   deliver_interrupt();
   const bool watchdog_expired = watchdog_ticks_ > 1 && ticks_ - fed_at_ > watchdog_ticks_;
