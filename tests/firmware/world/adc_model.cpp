@@ -120,7 +120,7 @@ std::uint32_t AdcModel::read(std::uint32_t offset, double now_us) {
   update(now_us);
   if (offset == 0x00) {
     const Sequence& s = regular_.runs() ? regular_ : injected_sequence_;
-    if (s.runs() && ++idle_reads_ > 2) skipped_us = std::max(skipped_us, s.done_us - now_us);
+    if (s.runs() && ++idle_reads_ > 2) board_.stall_us = std::max(board_.stall_us, s.done_us - now_us);
     return sr_;
   }
   idle_reads_ = 0;

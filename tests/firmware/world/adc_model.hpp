@@ -2,7 +2,7 @@
 // injected sequences, single, scan and continuous conversion, sampling times, the end-of-conversion flags, overrun.
 // Conversion to 6, 8 and 10 bits, the watchdog, DMA and external triggers are not modelled and are violations.
 //
-// The reference is VDDA, so a reading is the ratio of a pin to VDDA. `violations` lists driver errors.
+// While the program polls the status register, the time until the end of the conversion is skipped. The reference is VDDA, so a reading is the ratio of a pin to VDDA. `violations` lists driver errors.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ class AdcModel : public firmware::UnicornBoard::Peripheral {
   static constexpr std::uint32_t base = 0x40012000;
   static constexpr unsigned temperature_channel = 16, reference_channel = 17, battery_channel = 18;
 
-  explicit AdcModel(const firmware::UnicornBoard& board, std::uint64_t seed = 1) : board_(board), random_(seed) {}
+  explicit AdcModel(firmware::UnicornBoard& board, std::uint64_t seed = 1) : board_(board), random_(seed) {}
 
   std::uint32_t read(std::uint32_t offset, double now_us) override;
   void write(std::uint32_t offset, std::uint32_t value, double now_us) override;
@@ -36,7 +36,6 @@ class AdcModel : public firmware::UnicornBoard::Peripheral {
   double noise_lsb = 0.7, offset_lsb = 0;
   std::vector<std::string> violations;
   std::uint64_t conversions = 0;
-  double skipped_us = 0;  ///< until the end of the conversion for which the program waits
 
  private:
   struct Sequence {
@@ -53,7 +52,7 @@ class AdcModel : public firmware::UnicornBoard::Peripheral {
   void write_cr2(std::uint32_t value, double now_us);
   void wrong(const char* what);
 
-  const firmware::UnicornBoard& board_;
+  firmware::UnicornBoard& board_;
   plant::Random random_;
   std::uint32_t sr_ = 0, cr1_ = 0, cr2_ = 0, ccr_ = 0, dr_ = 0;
   std::array<std::uint32_t, 2> smpr_{};

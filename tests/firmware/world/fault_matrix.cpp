@@ -138,7 +138,6 @@ class FaultCase {
     if (opened && !may_open) outcome_.fail("opened without a published cause: " + summary(world_));
     for (const std::string& finding : judge_.findings()) outcome_.fail(finding);
     if (!world_.closings_below_v(closing_limit_v).empty()) outcome_.fail(summary(world_));
-    if (const auto violations = world_.violations(); !violations.empty()) outcome_.fail("violation: " + violations.front());
     world_.each_step = {};
   }
 

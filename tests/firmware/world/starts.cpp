@@ -33,8 +33,7 @@ class Start {
     } catch (const Stop&) {
     }
     if (const auto closings = world_.closings_below_v(closing_limit_v); !closings.empty()) outcome_.fail(summary(world_));
-    const auto violations = world_.violations();
-    if (!violations.empty()) outcome_.fail(fmt::format("violation: {}", violations.front()));
+    for (const std::string& violation : world_.violations()) outcome_.texts[violation] = "violation";
     double inrush_a = 0;
     for (const auto& e : world_.truck.events()) {
       if (e.closes && (e.relay == Relay::main_plus || e.relay == Relay::main_minus)) inrush_a = std::max(inrush_a, e.peak_a);
@@ -117,9 +116,18 @@ Result run_starts(const Extent& extent) {
     result.table += fmt::format("| {} | {} | {:.1f} | {:.1f} |\n", what, *least < 0 ? 0 : s.size(), *least, *most);
   }
   double inrush_a = 0;
-  for (const Outcome& o : result.outcomes) inrush_a = std::max(inrush_a, o.value("inrush", 0));
+  std::map<std::string, int> violations;
+  for (const Outcome& o : result.outcomes) {
+    inrush_a = std::max(inrush_a, o.value("inrush", 0));
+    for (const auto& [violation, kind] : o.texts) ++violations[violation];
+  }
   result.table += fmt::format("\n{} worlds, {} complete the whole sequence. Largest current at the closing of a main contact: {:.0f} A.\n",
                               count, count - result.failed(), inrush_a);
+  for (const auto& [violation, worlds] : violations) {
+    result.table += fmt::format("\nAgainst the manual, in {} worlds: {}.\n", worlds, violation);
+    result.outcomes.emplace_back().name = "violations of a manual";
+    result.outcomes.back().fail(violation);
+  }
   return result;
 }
 
