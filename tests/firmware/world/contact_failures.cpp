@@ -141,7 +141,7 @@ class FailureCase {
   }
 
  private:
-  static std::vector<Row> rows() { return promised_rows(BMS_SOURCE_DIR "/protection/README.md"); }
+  static std::vector<Row> rows() { return promised_rows(BMS_SOURCE_DIR "/protection/README.md", truck_ah / printed_ah); }
 
   bool prepare() {
     if (failure_.when == When::before_start) {
@@ -190,7 +190,7 @@ class FailureCase {
 }  // namespace
 
 Result run_contact_failures(const Extent& extent) {
-  const Pack pack = pack_of(6);
+  const Pack pack = pack_of(truck_ah);
   std::vector<Failure> failures = contactor_failures();
   for (Failure& failure : other_failures()) failures.push_back(std::move(failure));
   Cases cases(extent.at_once);

@@ -54,7 +54,7 @@ bool begins(const std::string& text, const char* with) { return text.rfind(with,
 
 }  // namespace
 
-std::vector<Row> promised_rows(const std::filesystem::path& readme) {
+std::vector<Row> promised_rows(const std::filesystem::path& readme, double current_factor) {
   std::ifstream file(readme);
   std::vector<Row> rows;
   bool inside = false;
@@ -65,6 +65,8 @@ std::vector<Row> promised_rows(const std::filesystem::path& readme) {
     const auto c = columns(line);
     if (c.size() < 8) throw std::runtime_error(fmt::format("too few columns: {}", line));
     rows.push_back(row_of(c));
+    const bool current = rows.back().quantity == "magnitude of the current";
+    if (current) rows.back().threshold *= current_factor;
   }
   if (rows.empty()) throw std::runtime_error(fmt::format("{} has no table of protections", readme.string()));
   return rows;

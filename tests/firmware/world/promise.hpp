@@ -34,8 +34,9 @@ struct Row {
   Reaction reaction = Reaction::warn;
 };
 
-/// Throws std::runtime_error if the file has no such table, or a row cannot be read.
-std::vector<Row> promised_rows(const std::filesystem::path& readme);
+/// Thresholds of currents are multiplied by `current_factor`. Throws std::runtime_error if the file has no such table, or
+/// a row cannot be read.
+std::vector<Row> promised_rows(const std::filesystem::path& readme, double current_factor = 1);
 
 /// Time of the measuring chain: a scan of the front end, a sample period, processing and the bus.
 inline constexpr double chain_s = 0.45;

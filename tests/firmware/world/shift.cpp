@@ -18,7 +18,7 @@ class Shift {
   Shift(const Pack& pack, std::uint64_t seed, Outcome& outcome)
       : pack_(pack),
         world_(pack.image, random_setup(pack, seed)),
-        judge_(world_, promised_rows(BMS_SOURCE_DIR "/protection/README.md"), pack.limit_a),
+        judge_(world_, promised_rows(BMS_SOURCE_DIR "/protection/README.md", truck_ah / printed_ah), pack.limit_a),
         random_(seed + 7),
         outcome_(outcome) {
     world_.set_noise(cell_noise_v, shunt_noise_v);
@@ -103,7 +103,7 @@ class Shift {
 }  // namespace
 
 Result run_shift(const Extent& extent) {
-  const Pack pack = pack_of(6);
+  const Pack pack = pack_of(truck_ah);
   Cases cases(extent.at_once);
   const std::size_t trucks = extent.count == 0 ? extent.at_once : extent.count;
   const double minutes = extent.minutes / static_cast<double>(trucks);

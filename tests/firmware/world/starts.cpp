@@ -97,7 +97,7 @@ class Start {
 }  // namespace
 
 Result run_starts(const Extent& extent) {
-  const Pack pack = pack_of(6);
+  const Pack pack = pack_of(truck_ah);
   Cases cases(extent.at_once);
   const std::size_t count = extent.count == 0 ? 50 : extent.count;
   for (std::size_t k = 0; k < count; ++k) {

@@ -132,7 +132,7 @@ class Timeline {
 }  // namespace
 
 Result run_supply_dips(const Extent& extent) {
-  const Pack pack = pack_of(6);
+  const Pack pack = pack_of(truck_ah);
   const std::size_t count = extent.count == 0 ? 1'000 : extent.count, worlds = std::max<std::size_t>(1, count / 60);
   Cases cases(extent.at_once);
   std::vector<Outcome> broken;
