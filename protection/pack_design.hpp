@@ -13,6 +13,10 @@ namespace bms::protection {
 /// End of the range of a reading in microamperes.
 inline constexpr double max_reading_a = 2'147;
 
+/// Ratio of current to limit above which the current is an overload: allows for the errors of a 1 % sensor and a
+/// controller.
+inline constexpr double overcurrent_from = 1.05;
+
 struct PackDesign {
   model::Limits limits;  ///< limits of one cell
   double capacity_ah;
@@ -55,16 +59,19 @@ constexpr std::int32_t in_centi(double value) {
 constexpr std::int32_t magnitude(std::int32_t value) { return std::max(value, -value); }
 constexpr std::uint32_t in_us(double seconds) { return static_cast<std::uint32_t>(seconds * 1e6 + 0.5); }
 
+constexpr double largest_limit_a(const PackDesign& d) {
+  return std::max(d.limits.charge_current_max_a, d.limits.discharge_current_max_a);
+}
+/// Largest current that the sensor can measure and a reading can hold [A].
+constexpr double measurable_a(const PackDesign& d) { return std::min(d.current_range_a, max_reading_a); }
 /// Current that counts as a short circuit: five times the continuous limit, but within the range of the sensor. A tenth
-/// of the range is left for the errors of its gain.
+/// of the range is left for the errors of its gain, or less for a pack of more than 1,800 A.
 constexpr double short_circuit_a(const PackDesign& d) {
-  const double most_a = std::max(d.limits.charge_current_max_a, d.limits.discharge_current_max_a);
-  return std::min(5 * most_a, 0.9 * std::min(d.current_range_a, max_reading_a));
+  return std::min(5 * largest_limit_a(d), std::max(0.9 * measurable_a(d), overcurrent_from * largest_limit_a(d)));
 }
-/// Returns true if the current sensor can distinguish a short circuit from the overloads that the pack must carry: up
-/// to 1.5 times the continuous limit. Firmware for a design without it is not built.
-constexpr bool current_sensor_suffices(const PackDesign& d) {
-  return short_circuit_a(d) >= 1.5 * std::max(d.limits.charge_current_max_a, d.limits.discharge_current_max_a);
-}
+/// Returns true if a short circuit is within the range of the current sensor. Firmware for a design without it is not
+/// built. Up to 1,290 A overloads of 1.5 times the continuous limit are carried for their time; of larger packs, those
+/// above the range count as a short circuit.
+constexpr bool current_sensor_suffices(const PackDesign& d) { return short_circuit_a(d) <= 0.99 * measurable_a(d); }
 
 }  // namespace bms::protection

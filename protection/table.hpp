@@ -110,10 +110,6 @@ constexpr Row row(const Protected& p) {
 using Table = std::array<Row, fault_count>;
 using Rules = std::array<Rule, fault_count>;
 
-/// Ratio of current to limit above which the current is an overload: allows for the errors of a 1 % sensor and a
-/// controller.
-inline constexpr double overcurrent_from = 1.05;
-
 constexpr Table protection_table(const PackDesign& d) {
   using enum Fault;
   using enum Quantity;

@@ -32,6 +32,8 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
   std::vector<std::string> violations;
   unsigned transfers = 0;
   std::uint32_t ccr = 0, trise = 0, frequency_mhz = 0;
+  /// When the byte or condition on the wire ends; 0: nothing is on the wire.
+  double ready_us() const { return ready_us_; }
 
  private:
   enum class Phase { idle, starting, started, addressing, addressed, sending, receiving };

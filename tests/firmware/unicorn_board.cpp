@@ -8,6 +8,7 @@
 #include <cstring>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -108,6 +109,7 @@ void UnicornBoard::start_again(std::uint32_t flags) {
   can.write(0, 1U << 15);
   flash.reset();
   timer.reset();
+  for (const auto& [base, peripheral] : plugged) peripheral->chip_reset();
   set_reg(UC_ARM_REG_CONTROL, 0);
   set_reg(UC_ARM_REG_PRIMASK, 0);
   set_reg(UC_ARM_REG_XPSR, 1U << 24);
@@ -499,8 +501,9 @@ void UnicornBoard::slice() {
   } else {
     const auto count = static_cast<std::size_t>(1 + random_() % 200);
     execute(reg(UC_ARM_REG_PC), count);
+    const double waits_us = flash.take_stall_us() + std::exchange(stall_us, 0);
     pass(static_cast<std::uint64_t>(static_cast<double>(count) * ticks_a_cycle()) +
-         static_cast<std::uint64_t>(flash.take_stall_us() * (ticks_per_second / 1e6)));
+         static_cast<std::uint64_t>(waits_us * (ticks_per_second / 1e6)));
   }
   refuse_violations();
   deliver_interrupt();

@@ -90,12 +90,17 @@ class UnicornBoard {
       static_cast<void>(now_us);
       return -1;
     }
+    /// The chip is reset.
+    virtual void chip_reset() {}
   };
   std::map<std::uint32_t, Peripheral*> plugged;  ///< by base address, one kilobyte each
 
   RtcModel* rtc = nullptr;  ///< with the control register of the backup domain; outlives a board
   /// Sets PVDO of PWR_CSR and raises the interrupt of the detector.
   void supply(bool low);
+  /// Resets the chip, as the brown-out detector does. flags: of RCC_CSR.
+  void reset(std::uint32_t flags) { start_again(flags); }
+  double stall_us = 0;  ///< the core waits for so long after the instructions that run now; a peripheral sets it
   /// Calls a function of the firmware between two instructions, as a debugger does. The function returns `words` words
   /// through an address.
   std::vector<std::uint32_t> call(const std::string& function, std::size_t words);

@@ -1,0 +1,83 @@
+#include "tests/firmware/world/fault_causes.hpp"
+
+#include <cmath>
+
+namespace bms::world {
+
+namespace {
+
+constexpr std::uint64_t fault(unsigned bit) { return std::uint64_t{1} << bit; }
+constexpr std::uint64_t second_line = fault(32) | fault(28);  ///< its trip opens main plus
+
+}  // namespace
+
+SetQuantity actuator_of(const Row& row) {
+  const std::string& q = row.quantity;
+  if (q == "highest cell") return [](TruckWorld& w, double v) { w.hold_cell(7, v); };
+  if (q == "lowest cell") return [](TruckWorld& w, double v) { w.hold_cell(4, v); };
+  if (q == "pack") {
+    return [](TruckWorld& w, double v) {
+      for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, v / 16);
+    };
+  }
+  if (q == "warmest sensor") return [](TruckWorld& w, double c) { w.set_temperature(2, c); };
+  if (q == "coldest sensor") return [](TruckWorld& w, double c) { w.set_temperature(1, c); };
+  if (q == "sum of cells minus pack") return [](TruckWorld& w, double v) { w.sensors.stack_error_v = -v; };
+  if (q == "highest minus lowest cell") {
+    return [](TruckWorld& w, double v) {
+      double highest_v = 0;
+      for (std::size_t k = 0; k < 16; ++k) highest_v = k == 3 ? highest_v : std::max(highest_v, w.truck.cell_v(k));
+      w.hold_cell(3, highest_v - v);
+    };
+  }
+  if (q == "opposite shift of neighbours") {
+    return [](TruckWorld& w, double v) {
+      w.sensors.cell_error_v[9] = -v;
+      w.sensors.cell_error_v[10] = v;
+    };
+  }
+  return {};
+}
+
+std::vector<Cause> other_causes() {
+  std::vector<Cause> list;
+  list.push_back({29, "I2C: front end does not answer", [](TruckWorld& w) { w.chip.gone = true; }, 0.5, true,
+                  fault(20) | fault(22) | fault(23) | fault(36) | second_line});
+  list.push_back({29, "I2C: clock held low", [](TruckWorld& w) { w.chip.hung = true; }, 0.7, true,
+                  fault(20) | fault(22) | fault(23) | second_line});
+  list.push_back({29, "front end resets", [](TruckWorld& w) { w.chip.reset(); }, 0.7, true,
+                  fault(20) | fault(22) | fault(23) | second_line | fault(33)});
+  list.push_back({20, "front end stops measuring", [](TruckWorld& w) { w.chip.frozen = true; }, 0.5, true,
+                  fault(22) | fault(23) | fault(29) | fault(21) | second_line});
+  list.push_back({20, "a cell register reads 0", [](TruckWorld& w) { w.chip.zero_cells = 1U << 6; }, 0.3, true,
+                  fault(3) | fault(4) | fault(5) | fault(16) | fault(17) | fault(19) | fault(25) | second_line});
+  list.push_back({21, "a cell register is stuck", [](TruckWorld& w) { w.chip.stale_cells = 1U << 6; }, 3, false,
+                  fault(16) | fault(19), [](TruckWorld& w) {
+                    static int turn = 0;
+                    for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, ++turn / 16 % 2 == 0 ? 3.30 : 3.36);
+                  }});
+  list.push_back({22, "current beyond the range of the sensor", [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; }, 0.4, true,
+                  fault(8) | fault(9) | fault(10) | fault(18) | fault(34) | fault(37) | fault(27) | second_line});
+  for (std::size_t sensor = 0; sensor < 4; ++sensor) {
+    for (const double ohm : {Bq76952Inputs::open_ohm, 0.0}) {
+      list.push_back({23, "thermistor " + std::to_string(sensor + 1) + (ohm == 0 ? " shorted" : " broken"),
+                      [=](TruckWorld& w) { w.set_thermistor_ohm(sensor, ohm); }, 0.7});
+    }
+  }
+  list.push_back({24, "thermistor 1 stuck", [](TruckWorld& w) {
+                    for (std::size_t k = 1; k < 4; ++k) w.set_temperature(k, 25);
+                  },
+                  8, false, 0, [](TruckWorld& w) {
+                    for (std::size_t k = 1; k < 4; ++k) w.set_temperature(k, std::min(38.0, w.temperature_c(k) + 2.5 + 0.2 * static_cast<double>(k)));
+                  }});
+  return list;
+}
+
+std::vector<Background> backgrounds() {
+  return {{"a lost temperature", [](TruckWorld& w) { w.set_thermistor_ohm(0, Bq76952Inputs::open_ohm); }, fault(23)},
+          {"a warm cell", [](TruckWorld& w) { w.set_temperature(3, 57); }, fault(11) | fault(13)},
+          {"a cold cell", [](TruckWorld& w) { w.set_temperature(3, -3); }, fault(15)},
+          {"worn-out flash", [](TruckWorld& w) { w.board.flash.worn_out = true; }, fault(31)}};
+}
+
+}  // namespace bms::world

@@ -1,0 +1,279 @@
+// Every protection of the published table, caused at its physical source: just below its threshold, just above, with noise, and
+// during another fault, in each operating state. Reaction times count to the physical opening of a main contact.
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "tests/firmware/world/fault_causes.hpp"
+#include "tests/firmware/world/scenarios.hpp"
+
+namespace bms::world {
+
+namespace {
+
+constexpr double noise_v = 0.004, noise_a = 0.15, shunt_ohm = 1e-4;
+
+enum class Kind { below, above, noise_below, noise_above, during };
+
+struct Case {
+  std::string name;
+  Kind kind = Kind::above;
+  const Row* row = nullptr;
+  const Cause* cause = nullptr;            ///< if not by a quantity
+  const Background* background = nullptr;
+  double current_share = 0;                ///< of the limit, if the quantity is a current
+};
+
+double margin_of(const Row& row, Kind kind) {
+  const std::string& q = row.quantity;
+  double margin = 1.2;  // degrees
+  if (q == "highest cell" || q == "lowest cell") margin = 0.006;
+  if (q == "pack") margin = 0.1;
+  if (q == "highest minus lowest cell") margin = 0.015;
+  if (q == "sum of cells minus pack") margin = 0.08;
+  if (q == "opposite shift of neighbours") margin = 0.04;
+  const bool noise = kind == Kind::noise_above || kind == Kind::noise_below;
+  return noise && margin < 1 ? margin + (q == "pack" || q == "sum of cells minus pack" ? 12 : 5) * noise_v : margin;
+}
+
+class FaultCase {
+ public:
+  FaultCase(TruckWorld& world, const std::vector<Row>& rows, const Pack& pack, Operating state, const Case& c, Outcome& outcome)
+      : world_(world), judge_(world, rows, pack.limit_a), pack_(pack), state_(state), case_(c), outcome_(outcome) {}
+
+  void run() {
+    world_.vehicle.forget();
+    judge_.allowed = second_line;
+    world_.each_step = [this] { judge_.step(); };
+    if (noise()) add_noise();
+    if (case_.background != nullptr) {
+      judge_.allowed |= case_.background->faults;
+      case_.background->happens(world_);
+      world_.run_ms(4'000);
+    }
+    was_closed_ = world_.both_mains_closed();
+    begun_ms_ = world_.now_ms();
+    if (case_.cause != nullptr) {
+      by_cause(*case_.cause);
+    } else if (case_.current_share != 0) {
+      by_current();
+    } else {
+      by_quantity();
+    }
+    judge();
+  }
+
+ private:
+  static constexpr std::uint64_t second_line = std::uint64_t{1} << 32 | std::uint64_t{1} << 28;
+
+  bool noise() const { return case_.kind == Kind::noise_above || case_.kind == Kind::noise_below; }
+  bool silent() const { return case_.kind == Kind::below || case_.kind == Kind::noise_below; }
+
+  void add_noise() {
+    world_.set_noise(noise_v, noise_a * shunt_ohm);
+    judge_.more_tolerance_v = 3.5 * noise_v;
+    judge_.more_tolerance_a = 3 * noise_a;
+    judge_.more_delay_share = 0.3;
+    world_.run_ms(500);
+  }
+
+  void by_quantity() {
+    const SetQuantity set = actuator_of(*case_.row);
+    const double margin = margin_of(*case_.row, case_.kind), sign = case_.row->above == !silent() ? 1 : -1;
+    set(world_, case_.row->threshold + sign * margin);
+    world_.run_ms(1e3 * ((1 + judge_.more_delay_share) * case_.row->delay_s + (silent() ? 2 : grace_s + 1.5)));
+  }
+
+  void by_current() {
+    const double a = case_.current_share * pack_.limit_a;
+    world_.fine_steps(3'000, 1);
+    set_drive_a(world_, a);
+    const double f = std::abs(case_.current_share);
+    world_.run_ms(f < 1.05 ? 12'000 : 1e3 * (30 / (f * f - 1) * 1.3 + grace_s + 1.5));
+  }
+
+  void by_cause(const Cause& cause) {
+    judge_.expected = std::uint64_t{1} << cause.bit;
+    judge_.allowed |= cause.also;
+    judge_.blind = cause.blind;
+    cause.happens(world_);
+    const double rest_s = judge_.row(cause.bit).delay_s + cause.within_s + grace_s + 2;
+    for (double s = 0; s < rest_s; s += 1) {
+      if (cause.each_second) cause.each_second(world_);
+      world_.run_ms(1'000);
+    }
+    const double raised_ms = world_.vehicle.raised_ms(cause.bit, begun_ms_);
+    const double limit_s = judge_.row(cause.bit).delay_s + cause.within_s + chain_s;
+    if (raised_ms < 0) outcome_.fail(fmt::format("missed: {} ({})", judge_.row(cause.bit).name, summary(world_)));
+    if (raised_ms >= 0 && raised_ms - begun_ms_ > 1e3 * limit_s)
+      outcome_.fail(fmt::format("late: {} after {:.2f} s", judge_.row(cause.bit).name, 1e-3 * (raised_ms - begun_ms_)));
+  }
+
+  unsigned bit() const { return case_.cause != nullptr ? case_.cause->bit : case_.row->bit; }
+
+  /// Current in the direction that a fault forbids.
+  bool forbidden_current(Reaction reaction) const {
+    if (reaction == Reaction::forbid_charge) return state_ == Operating::charge || state_ == Operating::recuperate;
+    return reaction == Reaction::forbid_discharge && state_ == Operating::drive;
+  }
+
+  void judge() {
+    outcome_.values["bit"] = bit();
+    outcome_.values["silent"] = silent();
+    outcome_.values["missed"] = judge_.missed();
+    outcome_.values["false"] = judge_.falsely();
+    const double raised_ms = world_.vehicle.raised_ms(bit(), begun_ms_);
+    if (raised_ms >= 0) outcome_.values["raised"] = 1e-3 * (raised_ms - begun_ms_);
+    const bool opened = was_closed_ && world_.isolated();
+    if (opened) outcome_.values["opened"] = 1e-3 * (world_.opened_ms() - begun_ms_);
+    bool must_open = false, may_open = false;
+    for (const Row& row : judge_.rows()) {
+      if ((world_.vehicle.faults_seen() >> row.bit & 1) == 0) continue;
+      const bool opens = row.reaction == Reaction::open || row.reaction == Reaction::open_now || forbidden_current(row.reaction);
+      may_open = may_open || opens;
+      must_open = must_open || (opens && row.bit == bit() && !silent());
+    }
+    may_open = may_open || (world_.vehicle.faults_seen() >> 32) != 0;
+    if (was_closed_ && must_open && !opened) outcome_.fail("not opened: " + summary(world_));
+    if (opened && !may_open) outcome_.fail("opened without a published cause: " + summary(world_));
+    for (const std::string& finding : judge_.findings()) outcome_.fail(finding);
+    if (!world_.closings_below_v(closing_limit_v).empty()) outcome_.fail(summary(world_));
+    world_.each_step = {};
+  }
+
+  TruckWorld& world_;
+  Judge judge_;
+  const Pack& pack_;
+  Operating state_;
+  const Case& case_;
+  Outcome& outcome_;
+  double begun_ms_ = 0;
+  bool was_closed_ = false;
+};
+
+void add_quantity_cases(const std::vector<Row>& rows, const std::vector<Background>& background, std::vector<Case>& list) {
+  for (const Row& row : rows) {
+    if (!actuator_of(row)) continue;
+    const bool voltage = row.quantity.find("sensor") == std::string::npos;
+    const auto add = [&](Kind kind, const std::string& text, const Background* b = nullptr) {
+      list.push_back({.name = row.name + ", " + text, .kind = kind, .row = &row, .background = b});
+    };
+    add(Kind::below, "below");
+    add(Kind::above, "above");
+    if (voltage) add(Kind::noise_below, "noise below");
+    if (voltage) add(Kind::noise_above, "noise above");
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Background& b = background[(row.bit + 2 * k) % background.size()];
+      const bool temperature_is_used = !voltage && b.name != "worn-out flash" && b.name != "a lost temperature";
+      const Background& chosen = temperature_is_used ? background.back() : b;
+      if (k == 0 || !temperature_is_used) add(Kind::during, "during " + chosen.name, &chosen);
+    }
+  }
+}
+
+const Row* row_named(const std::vector<Row>& rows, const std::string& name) {
+  for (const Row& row : rows) {
+    if (row.name == name) return &row;
+  }
+  return nullptr;
+}
+
+std::vector<Case> cases_in(Operating state, const std::vector<Row>& rows, const std::vector<Cause>& causes,
+                           const std::vector<Background>& background) {
+  std::vector<Case> list;
+  add_quantity_cases(rows, background, list);
+  for (std::size_t k = 0; k < causes.size(); ++k) {
+    list.push_back({.name = causes[k].name, .cause = &causes[k]});
+    list.push_back({.name = causes[k].name + ", during worn-out flash", .kind = Kind::during, .cause = &causes[k],
+                    .background = &background.back()});
+  }
+  if (state != Operating::drive && state != Operating::standby) return list;
+  for (const double share : {1.0, 1.03, 1.3, 1.5, 2.0, 3.0, 4.5, 6.0, 20.0}) {
+    for (const int sign : {-1, 1}) {
+      const std::string name = share > 5 ? "short circuit" : sign < 0 ? "discharge overcurrent" : "charge overcurrent";
+      const Row* row = row_named(rows, name);
+      if (row == nullptr) continue;
+      list.push_back({.name = fmt::format("{} at {} of the limit", name, share), .kind = share < 1.05 ? Kind::below : Kind::above,
+                      .row = row, .current_share = sign * share});
+    }
+  }
+  return list;
+}
+
+struct Line {
+  int silent = 0, raised = 0, opened = 0, deviations = 0;
+  double soonest = 1e9, latest = -1, opened_soonest = 1e9, opened_latest = -1;
+};
+
+std::string table_of(const std::vector<Row>& rows, const std::vector<Outcome>& outcomes) {
+  std::map<unsigned, Line> lines;
+  double missed = 0, falsely = 0;
+  for (const Outcome& o : outcomes) {
+    Line& line = lines[static_cast<unsigned>(o.value("bit", 63))];
+    missed += o.value("missed", 0);
+    falsely += o.value("false", 0);
+    line.deviations += o.good ? 0 : 1;
+    line.silent += o.value("silent", 0) > 0 ? 1 : 0;
+    const double raised = o.value("raised", -1), opened = o.value("opened", -1);
+    if (raised >= 0) {
+      ++line.raised;
+      line.soonest = std::min(line.soonest, raised);
+      line.latest = std::max(line.latest, raised);
+    }
+    if (opened >= 0) {
+      ++line.opened;
+      line.opened_soonest = std::min(line.opened_soonest, opened);
+      line.opened_latest = std::max(line.opened_latest, opened);
+    }
+  }
+  std::string table = "| fault | table | silent below, cases | raised, cases | raised after [s] | contacts open after [s] | deviations |\n"
+                      "|---|---|---|---|---|---|---|\n";
+  for (const Row& row : rows) {
+    const auto found = lines.find(row.bit);
+    if (found == lines.end()) continue;
+    const Line& l = found->second;
+    table += fmt::format("| {} | {} s | {} | {} | {} | {} | {} |\n", row.name, row.delay_s, l.silent, l.raised,
+                         l.raised == 0 ? "-" : fmt::format("{:.2f} to {:.2f}", l.soonest, l.latest),
+                         l.opened == 0 ? "-" : fmt::format("{:.2f} to {:.2f}", l.opened_soonest, l.opened_latest), l.deviations);
+  }
+  return table + fmt::format("\n{} cases: {:.0f} missed, {:.0f} false.\n", outcomes.size(), missed, falsely);
+}
+
+}  // namespace
+
+Result run_fault_matrix(const Extent& extent) {
+  const Pack pack = pack_of(printed_ah);
+  const std::vector<Row> rows = promised_rows(BMS_SOURCE_DIR "/protection/README.md");
+  const std::vector<Cause> causes = other_causes();
+  const std::vector<Background> background = backgrounds();
+  Cases cases(extent.at_once);
+  std::vector<Outcome> broken;
+  plant::Random random(extent.seed);
+  for (const Operating state :
+       {Operating::off, Operating::standby, Operating::drive, Operating::recuperate, Operating::charge}) {
+    const std::vector<Case> list = cases_in(state, rows, causes, background);
+    TruckWorld world(pack.image, typical_setup(pack, extent.seed));
+    if (const std::string problem = bring_to(world, pack, state); !problem.empty()) {
+      broken.emplace_back().name = name_of(state);
+      broken.back().fail(problem);
+      fmt::print("FAILED {}\n", problem);
+      continue;
+    }
+    world.run_ms(3'000);
+    std::size_t left = extent.count == 0 ? list.size() : extent.count / 5;
+    const double share = static_cast<double>(left) / static_cast<double>(list.size());
+    for (const Case& c : list) {
+      const std::string name = fmt::format("{}: {}", name_of(state), c.name);
+      if (!extent.has(name) || left == 0 || (extent.count != 0 && random.uniform() > share)) continue;
+      --left;
+      world.run_ms(37 * random.uniform());  // any phase of the sample
+      cases.start(name, [&](Outcome& outcome) { FaultCase(world, rows, pack, state, c, outcome).run(); });
+    }
+  }
+  Result result{"fault matrix", "", cases.finish()};
+  result.table = table_of(rows, result.outcomes);
+  result.outcomes.insert(result.outcomes.end(), broken.begin(), broken.end());
+  return result;
+}
+
+}  // namespace bms::world

@@ -1,0 +1,36 @@
+// The scenarios of the world matrix. Each returns its outcomes and its table for the README of this folder.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/firmware/world/cases.hpp"
+#include "tests/firmware/world/operating.hpp"
+
+namespace bms::world {
+
+struct Result {
+  std::string name;   ///< of the table in README.md
+  std::string table;  ///< Markdown
+  std::vector<Outcome> outcomes;
+  unsigned failed() const;
+};
+
+struct Extent {
+  std::size_t count = 0;     ///< 0: all
+  std::uint64_t seed = 1;
+  std::string only;          ///< cases whose name contains this text; empty: all
+  double minutes = 10;       ///< of the shift
+  unsigned at_once = 2;
+  bool has(const std::string& name) const;  ///< `only` selects the case
+};
+
+Result run_starts(const Extent& extent);           ///< key on, drive, recuperate, charge, key off, restart
+Result run_contact_failures(const Extent& extent);  ///< failures of contactors, resistor, wires
+Result run_supply_dips(const Extent& extent);
+Result run_fault_matrix(const Extent& extent);
+Result run_overloads(const Extent& extent);
+Result run_shift(const Extent& extent);
+
+}  // namespace bms::world

@@ -1,0 +1,168 @@
+// Dips of the controller's supply and of the coils' supply at random times, in every state. No main contact may close on a DC link
+// far below the pack, neither at once nor at the next start.
+#include <cmath>
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "tests/firmware/world/scenarios.hpp"
+
+namespace bms::world {
+
+namespace {
+
+struct Dip {
+  bool coils = false;
+  double duration_ms = 0, depth_v = 0;
+};
+
+/// Of VDDA: from just below the detector's threshold to nothing. Of the coils: of any depth.
+Dip random_dip(plant::Random& random, const TruckWorld& world, double coil_v) {
+  Dip dip;
+  dip.coils = random.uniform() < 0.4;
+  dip.duration_ms = std::pow(200.0, random.uniform());
+  const double vdda_v = world.truck.pins().vdda_v;
+  const double least_v = vdda_v - 2.95, share = random.uniform();
+  dip.depth_v = dip.coils ? coil_v * (0.2 + 0.8 * share) : least_v + share * share * (vdda_v - least_v);
+  return dip;
+}
+
+void survive(TruckWorld& world, const Dip& dip, Outcome& outcome) {
+  const std::size_t before = world.truck.events().size();
+  const double start_ms = world.now_ms();
+  if (dip.coils) {
+    world.dip_coil_supply(0.5, dip.duration_ms, dip.depth_v);
+  } else {
+    world.dip_vdda(0.5, dip.duration_ms, dip.depth_v);
+  }
+  world.run_ms(dip.duration_ms + 4'000);
+  outcome.values["state after"] = world.vehicle.state();
+  outcome.values["resets"] = static_cast<double>(world.board.resets.size());
+  // the driver turns the key, faults are cleared, and the truck is to drive again
+  set_drive_a(world, 0);
+  set_charger_a(world, 0);
+  world.vehicle.request = Request::none;
+  world.run_ms(2'500);
+  for (int k = 0; k < 12; ++k) {
+    if (k % 4 == 0) world.vehicle.clear_faults();
+    world.run_ms(1'000);
+  }
+  world.vehicle.request = Request::drive;
+  const double ms = world.run_until([&] { return world.both_mains_closed(); }, 12'000);
+  if (ms < 0) outcome.fail("does not drive again: " + summary(world));
+  world.run_ms(200);
+  const auto closings = world.closings_below_v(closing_limit_v, before);
+  outcome.values["closings"] = static_cast<double>(closings.size());
+  if (!closings.empty()) {
+    outcome.fail(fmt::format("{} dip of {:.1f} ms by {:.2f} V at {:.1f} ms: {}", dip.coils ? "coil" : "VDDA", dip.duration_ms,
+                             dip.depth_v, start_ms, summary(world)));
+  }
+  outcome.values["faults"] = static_cast<double>(world.vehicle.faults_seen());
+}
+
+/// One run of a truck through all states, with dips at random times in copies of it.
+class Timeline {
+ public:
+  Timeline(const Pack& pack, std::uint64_t seed, std::size_t dips, Cases& cases)
+      : pack_(pack), setup_(random_setup(pack, seed)), world_(pack.image, setup_), random_(seed + 99), dips_(dips), cases_(cases) {}
+
+  /// Returns why the run had to end, or "".
+  std::string run() {
+    world_.run_ms(100);
+    world_.vehicle.request = Request::drive;
+    pass("start", 700, 12);
+    const auto closed = [&] { return world_.both_mains_closed(); };
+    pass_until("self-test and precharge", closed, 50);
+    if (!closed()) return summary(world_);
+    pass("main contactors close", 200, 8);
+    set_drive_a(world_, -0.5 * pack_.limit_a);
+    pass("drive", 2'000, 10);
+    set_drive_a(world_, 0.4 * pack_.limit_a);
+    pass("recuperation", 1'500, 6);
+    set_drive_a(world_, 0);
+    world_.vehicle.request = Request::none;
+    pass("key off", 1'500, 8);
+    world_.vehicle.request = Request::charge;
+    pass_until("precharge for charging", closed, 30);
+    if (!closed()) return summary(world_);
+    set_charger_a(world_, 0.5 * pack_.limit_a);
+    pass("charge", 2'000, 8);
+    return "";
+  }
+
+ private:
+  void dip(const std::string& state) {
+    if (started_ >= dips_) return;
+    const Dip falls = random_dip(random_, world_, setup_.truck.supply.coil_v);
+    cases_.start(fmt::format("{} {} {}", state, setup_.seed, started_++), [&](Outcome& outcome) {
+      outcome.texts["state"] = state;
+      outcome.values["coils"] = falls.coils;
+      survive(world_, falls, outcome);
+    });
+  }
+  /// `weight` is the number of dips of about 100.
+  void pass(const std::string& state, double ms, int weight) {
+    const double part = static_cast<double>(dips_) * weight / 132;
+    const auto count = static_cast<std::size_t>(part + random_.uniform());
+    for (std::size_t k = 0; k < count; ++k) {
+      world_.run_ms(ms / static_cast<double>(count) * random_.uniform() * 2);
+      dip(state);
+    }
+    if (count == 0) world_.run_ms(ms);
+  }
+  /// The time that it takes is not known before: the dips are this far apart.
+  void pass_until(const std::string& state, const std::function<bool()>& holds, int weight) {
+    const double part = static_cast<double>(dips_) * weight / 132, apart_ms = 2'500 / std::max(1.0, part);
+    for (double passed_ms = 0; !holds() && passed_ms < start_limit_ms;) {
+      const double ms = apart_ms * random_.uniform() * 2;
+      world_.run_until(holds, ms);
+      passed_ms += ms;
+      dip(state);
+    }
+  }
+
+  const Pack& pack_;
+  WorldSetup setup_;
+  TruckWorld world_;
+  plant::Random random_;
+  std::size_t dips_, started_ = 0;
+  Cases& cases_;
+};
+
+}  // namespace
+
+Result run_supply_dips(const Extent& extent) {
+  const Pack pack = pack_of(truck_ah);
+  const std::size_t count = extent.count == 0 ? 1'000 : extent.count, worlds = std::max<std::size_t>(1, count / 60);
+  Cases cases(extent.at_once);
+  std::vector<Outcome> broken;
+  for (std::size_t k = 0; k < worlds; ++k) {
+    const std::string problem = Timeline(pack, extent.seed + k, count / worlds, cases).run();
+    if (problem.empty()) continue;
+    broken.emplace_back().name = fmt::format("world {}", extent.seed + k);
+    broken.back().fail(problem);
+    fmt::print("FAILED {}: {}\n", broken.back().name, problem);
+  }
+  Result result{"supply dips", "", cases.finish()};
+  struct Line {
+    int dips = 0, coils = 0, resets = 0, closings = 0, stuck = 0;
+  };
+  std::map<std::string, Line> lines;
+  for (const Outcome& o : result.outcomes) {
+    Line& line = lines[o.text("state")];
+    ++line.dips;
+    line.coils += o.value("coils", 0) > 0 ? 1 : 0;
+    line.resets += o.value("resets", 0) > 0 ? 1 : 0;
+    line.closings += o.value("closings", 0) > 0 ? 1 : 0;
+    line.stuck += !o.good && o.value("closings", 0) == 0 ? 1 : 0;
+  }
+  result.table = "| state | dips | of the coil supply | with a reset | closings on a DC link 8 V below the pack | do not drive again |\n"
+                 "|---|---|---|---|---|---|\n";
+  for (const auto& [state, l] : lines) {
+    result.table += fmt::format("| {} | {} | {} | {} | {} | {} |\n", state, l.dips, l.coils, l.resets, l.closings, l.stuck);
+  }
+  result.outcomes.insert(result.outcomes.end(), broken.begin(), broken.end());
+  return result;
+}
+
+}  // namespace bms::world

@@ -1,0 +1,149 @@
+// The flashed image of the forklift board in a truck: the emulated core with its ports, ADC, I2C and CAN, the model of the front
+// end, and the circuit of battery, contactors and truck (plant/circuit). Wired as boards/stm32f405_forklift/README.md says.
+//
+// Nothing here knows states, thresholds or sequences of the firmware: it sees levels of pins and frames on the bus. One
+// step is at most 1 ms while something switches, and at most 5 ms otherwise. A step ends when the firmware writes to
+// the contactor port. The circuit takes steps of its own within it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plant/circuit/truck.hpp"
+#include "plant/random.hpp"
+#include "tests/firmware/i2c_controller_model.hpp"
+#include "tests/firmware/unicorn_board.hpp"
+#include "tests/firmware/world/adc_model.hpp"
+#include "tests/firmware/world/gpio_model.hpp"
+#include "tests/firmware/world/vehicle.hpp"
+#include "tests/hal/bq76952_model.hpp"
+
+namespace bms::world {
+
+struct WorldSetup {
+  plant::TruckParameters truck = plant::typical_world();
+  double detector_error_v = 0;                ///< of the supply detector, within +-0.07 V (DS8626, table 23)
+  double reset_v = 2.83, reset_ends_v = 2.92;  ///< brown-out reset, level 3 (DS8626, table 23)
+  double adc_offset_lsb = 0;
+  double cell_noise_v = 0, shunt_noise_v = 0;  ///< standard deviations of what the front end converts
+  std::uint32_t seed = 1;
+};
+
+/// Errors of what the front end senses; the circuit does not know them.
+struct SensorFaults {
+  std::array<double, 16> cell_error_v{};
+  double stack_error_v = 0;
+  double shunt_factor = 1;  ///< 0: a wire of the shunt is off
+};
+
+/// I2C of the board. A reset of the chip resets it. While the program polls a byte on the wire, the time is skipped.
+class WorldI2c : public firmware::UnicornBoard::Peripheral {
+ public:
+  WorldI2c(firmware::UnicornBoard& board, Bq76952Model& chip) : board_(board), chip_(chip), model_(std::in_place, chip) {}
+  std::uint32_t read(std::uint32_t offset, double now_us) override;
+  void write(std::uint32_t offset, std::uint32_t value, double now_us) override;
+  void chip_reset() override;
+  std::vector<std::string> violations() const;
+
+ private:
+  firmware::UnicornBoard& board_;
+  Bq76952Model& chip_;
+  std::optional<firmware::I2cControllerModel> model_;
+  std::vector<std::string> earlier_;
+  unsigned polls_ = 0;
+};
+
+class TruckWorld {
+ public:
+  static constexpr double never = std::numeric_limits<double>::infinity();
+
+  TruckWorld(const std::filesystem::path& image, const WorldSetup& setup);
+  TruckWorld(const TruckWorld&) = delete;
+  TruckWorld& operator=(const TruckWorld&) = delete;
+
+  void run_ms(double ms);
+  /// Returns the milliseconds until the condition holds at the end of a step, or a negative value.
+  double run_until(const std::function<bool()>& holds, double within_ms);
+  double now_ms() const { return board.now_ms(); }
+  double now_s() const { return 1e-3 * now_ms(); }
+
+  /// A dip that begins `delay_ms` from now.
+  void dip_vdda(double delay_ms, double duration_ms, double depth_v);
+  void dip_coil_supply(double delay_ms, double duration_ms, double depth_v);
+  /// Keeps the voltage of a cell by its charge; NaN ends it.
+  void hold_cell(std::size_t cell, double voltage_v);
+  void set_temperature(std::size_t sensor, double celsius);
+  /// 0: shorted; Bq76952Inputs::open_ohm: broken
+  void set_thermistor_ohm(std::size_t sensor, double ohm);
+  double temperature_c(std::size_t sensor) const { return celsius_[sensor]; }
+  void set_noise(double cell_v, double shunt_v) {
+    setup_.cell_noise_v = cell_v;
+    setup_.shunt_noise_v = shunt_v;
+  }
+  /// Steps of `step_ms` for the given time, for fast events.
+  void fine_steps(double duration_ms, double step_ms = 0.2);
+
+  bool closed(plant::Relay relay) const { return truck.contact_closed(relay); }
+  bool both_mains_closed() const { return closed(plant::Relay::main_plus) && closed(plant::Relay::main_minus); }
+  bool any_main_closed() const { return closed(plant::Relay::main_plus) || closed(plant::Relay::main_minus); }
+  /// The battery can supply no current: one main contact is open, and the precharge relay or the other one.
+  bool isolated() const;
+  Level pin(plant::Relay relay) const { return port_c.driven(6 + static_cast<unsigned>(relay)); }
+  double highest_cell_v() const, lowest_cell_v() const, pack_v() const;
+  /// Time at which the second main contact has opened last [ms], or a negative value.
+  double opened_ms() const { return opened_ms_; }
+
+  struct Closing {
+    double at_ms, across_v, peak_a, dc_link_v;
+    plant::Relay relay;
+    bool bounce;
+  };
+  /// Main contacts that connected the battery to a DC link more than `volt` below it, since an event number.
+  std::vector<Closing> closings_below_v(double volt, std::size_t since = 0) const;
+  /// Violations of the chip's manuals by the firmware.
+  std::vector<std::string> violations() const;
+
+  firmware::UnicornBoard board;
+  Bq76952Model chip;
+  plant::Truck truck;
+  GpioPort port_a, port_b, port_c;
+  ExtiModel exti;
+  AdcModel adc;
+  Vehicle vehicle;
+  SensorFaults sensors;
+  std::function<void()> each_step;
+  bool aux_fitted = true;  ///< false: the auxiliary contacts are not connected, the pins stay high
+
+ private:
+  void step(double limit_ms);
+  double step_ms() const;
+  void apply_pins();
+  void observe();
+  void update_supply(double vdda_v);
+  void update_chip();
+  void update_held_cells();
+  void update_auxiliary(unsigned pin, double pin_v, double vdda_v);
+
+  WorldSetup setup_;
+  WorldI2c i2c_;
+  plant::Random noise_;
+  double truck_start_s_ = 0, fine_until_ms_ = 0, fine_step_ms_ = 1, switching_until_ms_ = 0, opened_ms_ = -1;
+  double released_ms_ = never;
+  bool held_in_reset_ = false, supply_low_ = false, detected_ = false, were_closed_ = false;
+  std::size_t seen_events_ = 0;
+  std::uint64_t seen_writes_ = 0;
+  bool enables_[2] = {false, false};
+  std::array<double, 16> held_v_;
+  bool any_held_ = false;
+  std::array<double, 4> celsius_{25, 25, 25, 25}, ohm_{};
+  std::vector<double> edges_ms_;
+  plant::MonotoneCurve ocv_v_ = plant::table9_ocv_v();
+};
+
+}  // namespace bms::world

@@ -1,0 +1,141 @@
+#include "tests/firmware/world/vehicle.hpp"
+
+#include <fmt/format.h>
+
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+
+namespace bms::world {
+
+namespace {
+
+constexpr std::array names{"cell overvoltage warning",
+                           "cell overvoltage",
+                           "cell overvoltage severe",
+                           "cell undervoltage warning",
+                           "cell undervoltage",
+                           "cell undervoltage severe",
+                           "pack overvoltage",
+                           "pack undervoltage",
+                           "charge overcurrent",
+                           "discharge overcurrent",
+                           "short circuit",
+                           "overtemperature warning",
+                           "overtemperature",
+                           "charge overtemperature",
+                           "undertemperature",
+                           "charge undertemperature",
+                           "open wire",
+                           "imbalance",
+                           "current implausible",
+                           "sum mismatch",
+                           "voltage missing",
+                           "voltage stuck",
+                           "current missing",
+                           "temperature lost",
+                           "temperature stuck",
+                           "deep discharge",
+                           "precharge failed",
+                           "contactor welded",
+                           "contactor not closed",
+                           "samples missing",
+                           "internal fault",
+                           "storage fault",
+                           "second line tripped",
+                           "second line failed",
+                           "current sensors differ",
+                           "temperature unknown",
+                           "current unrequested",
+                           "allowed current exceeded"};
+constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F, pack_state_id = 0x180;
+constexpr double request_period_ms = 1'000;
+constexpr std::size_t most_seen = 4'096;
+
+std::uint64_t field(const can::Frame& frame, unsigned first, unsigned bits) {
+  std::uint64_t all = 0;
+  for (unsigned k = 0; k < 8; ++k) all |= static_cast<std::uint64_t>(frame.data[k]) << 8 * k;
+  return all >> first & ((std::uint64_t{1} << bits) - 1);
+}
+
+}  // namespace
+
+std::string fault_names(std::uint64_t faults) {
+  std::string text;
+  for (unsigned bit = 0; bit < 64; ++bit) {
+    if ((faults >> bit & 1) == 0) continue;
+    if (!text.empty()) text += ", ";
+    text += bit < names.size() ? names[bit] : fmt::format("fault {}", bit);
+  }
+  return text.empty() ? "none" : text;
+}
+
+void Vehicle::send(std::uint32_t code, std::uint32_t argument) {
+  can::Command command;
+  command.code = code;
+  command.argument = argument;
+  counter_ = can::next(counter_);
+  board_.can.others.push_back({firmware::wire_frame(command.frame(counter_)), 0, true});
+}
+
+void Vehicle::clear_faults(bool service) { send(can::Command::code_clear_faults, service ? 1 : 0); }
+
+double Vehicle::silent_ms() const { return board_.now_ms() - heard_ms_; }
+
+void Vehicle::publish(std::uint64_t faults, double at_ms) {
+  if (faults == faults_) return;
+  changes_.push_back({at_ms, faults & ~faults_, faults_ & ~faults});
+  faults_ = faults;
+  seen_ |= faults;
+}
+
+void Vehicle::read(const can::Frame& frame, double at_ms) {
+  ++frames[frame.id & 0x7FF];
+  switch (frame.id) {
+    case faults_id:
+      heard_ms_ = at_ms;
+      first_cause_ = static_cast<unsigned>(field(frame, 48, 6));
+      publish((faults_ & ~std::uint64_t{0xFFFFFFFF}) | field(frame, 16, 32), at_ms);
+      break;
+    case more_faults_id:
+      publish((faults_ & 0xFFFFFFFF) | field(frame, 16, 32) << 32, at_ms);
+      break;
+    case state_id:
+      state_ = static_cast<unsigned>(field(frame, 12, 4));
+      charge_enabled_ = field(frame, 19, 1) != 0;
+      break;
+    case allowed_id:
+      allowed_charge_a_ = 0.02 * static_cast<double>(field(frame, 16, 16));
+      allowed_discharge_a_ = 0.02 * static_cast<double>(field(frame, 32, 16));
+      break;
+    case pack_state_id:
+      soc_percent_ = 0.002 * static_cast<double>(field(frame, 16, 16));
+      break;
+    default:
+      break;
+  }
+}
+
+void Vehicle::update() {
+  auto& seen = board_.can.seen;
+  for (; read_ < seen.size(); ++read_) {
+    if (seen[read_].from_board) read(seen[read_].frame, board_.ms_at_bit(seen[read_].end_bit));
+  }
+  if (seen.size() > most_seen) {
+    seen.clear();
+    read_ = 0;
+  }
+  if (!talks) return;
+  const double now_ms = board_.now_ms();
+  if (request == sent_ && now_ms < next_request_ms_) return;
+  next_request_ms_ = now_ms + request_period_ms;
+  sent_ = request;
+  send(can::Command::code_request, static_cast<std::uint32_t>(request));
+}
+
+double Vehicle::raised_ms(unsigned bit, double from_ms) const {
+  for (const Change& change : changes_) {
+    if (change.at_ms >= from_ms && (change.raised >> bit & 1) != 0) return change.at_ms;
+  }
+  return -1;
+}
+
+}  // namespace bms::world

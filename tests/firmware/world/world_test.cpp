@@ -1,0 +1,100 @@
+// The flashed image of the forklift board in the circuit of a truck: a few cases of each scenario of `./bms world`, and the models of
+// the ports and of the ADC against the reference manual.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/firmware/world/promise.hpp"
+#include "tests/firmware/world/scenarios.hpp"
+
+namespace bms::world {
+namespace {
+
+using plant::Relay;
+using ::testing::IsEmpty;
+
+const Pack& pack() {
+  static const Pack built = pack_of(6);
+  return built;
+}
+
+void expect_good(const Result& result) {
+  EXPECT_FALSE(result.outcomes.empty());
+  for (const Outcome& o : result.outcomes) EXPECT_TRUE(o.good) << o.name << ": " << o.why;
+}
+
+Extent some(std::size_t count, const std::string& only = "") { return {.count = count, .only = only, .at_once = 2}; }
+
+TEST(World, ATruckWithRandomComponentsDrivesChargesAndRestartsWithAChargedDcLink) { expect_good(run_starts(some(3))); }
+
+TEST(World, AWeldedMainContactorIsFoundBeforeTheNextStart) {
+  expect_good(run_contact_failures(some(0, "K1 welds while driving")));
+  expect_good(run_contact_failures(some(0, "K2 welds while driving")));
+}
+
+TEST(World, ABurntOrShortedPrechargeResistorIsFound) {
+  expect_good(run_contact_failures(some(0, "resistor burnt")));
+  expect_good(run_contact_failures(some(0, "resistor shorted")));
+}
+
+TEST(World, DipsOfTheSupplyNeverCloseAMainContactOnAnEmptyDcLink) { expect_good(run_supply_dips(some(12))); }
+
+TEST(World, ProtectionsActOnPhysicalCauses) {
+  expect_good(run_fault_matrix(some(0, "drive: cell overvoltage severe, ")));
+  expect_good(run_fault_matrix(some(0, "drive: cell undervoltage severe, ")));
+  expect_good(run_fault_matrix(some(0, "off: I2C")));
+}
+
+TEST(World, AShiftWithNoiseHasNoFault) { expect_good(run_shift({.minutes = 3, .at_once = 2})); }
+
+/// The promise is read from the page as it is printed.
+TEST(Promise, ThePublishedTableHasTheRowsOfTheDbcFileInOrder) {
+  const auto rows = promised_rows(BMS_SOURCE_DIR "/protection/README.md");
+  ASSERT_GE(rows.size(), 32U);
+  EXPECT_EQ(rows[2].name, "cell overvoltage severe");
+  EXPECT_EQ(rows[2].quantity, "highest cell");
+  EXPECT_TRUE(rows[2].above);
+  EXPECT_EQ(rows[2].reaction, Reaction::open_now);
+  EXPECT_FALSE(rows[14].above) << "undertemperature";
+  for (unsigned k = 0; k < rows.size(); ++k) EXPECT_EQ(rows[k].bit, k);
+}
+
+/// RM0090, 13.3.8 to 13.5: a sequence of two in single conversions with EOCS, as software polls it.
+TEST(AdcModel, ConvertsASequenceInTheTimesOfTheManual) {
+  firmware::UnicornBoard board(pack().image);
+  board.run_until([&] { return (board.register_value(0x40023844) >> 8 & 1) != 0; }, 500);
+  if ((board.register_value(0x40023844) >> 8 & 1) == 0) GTEST_SKIP() << "this image does not clock the ADC";
+  AdcModel adc(board);
+  adc.noise_lsb = 0;
+  adc.pin_v = [](unsigned channel) { return channel == 11 ? 1.65 : 0.33; };
+  const double mhz = (board.register_value(0x40023808) & 3) == 2 ? 84 : 16;
+  adc.write(0x04, 1U << 8, 0);              // SCAN
+  adc.write(0x2C, 1U << 20, 0);             // two conversions
+  adc.write(0x34, 11 | 10U << 5, 0);        // L+, L-
+  adc.write(0x0C, 7U << 3 | 7, 0);          // 480 cycles
+  adc.write(0x08, 1 | 1U << 10, 0);         // ADON, EOCS
+  adc.write(0x08, 1 | 1U << 10 | 1U << 30, 10);
+  const double one_us = (480 + 12) / (mhz / 2);
+  EXPECT_EQ(adc.read(0x00, 10 + 0.98 * one_us) & 2, 0U);
+  EXPECT_EQ(adc.read(0x00, 10 + 1.02 * one_us) & 2, 2U);
+  EXPECT_NEAR(adc.read(0x4C, 10 + 1.03 * one_us), 4095 / 2.0, 1);
+  EXPECT_EQ(adc.read(0x00, 10 + 1.9 * one_us) & 2, 0U) << "cleared by reading DR";
+  EXPECT_NEAR(adc.read(0x4C, 10 + 2.1 * one_us), 409.5, 1);
+  EXPECT_THAT(adc.violations, IsEmpty());
+}
+
+TEST(GpioModel, APinDrivesOnlyAsAnOutput) {
+  TruckWorld world(pack().image, typical_setup(pack()));
+  EXPECT_EQ(world.pin(Relay::main_plus), Level::floating) << "before the firmware runs";
+  world.run_ms(2'500);
+  EXPECT_EQ(world.pin(Relay::main_plus), Level::low);
+  EXPECT_EQ(world.pin(Relay::charge), Level::low);
+  world.dip_vdda(1, 20, 3.3);
+  world.run_ms(10);
+  EXPECT_EQ(world.pin(Relay::main_plus), Level::floating) << "in reset";
+  world.run_ms(2'500);
+  EXPECT_EQ(world.pin(Relay::main_plus), Level::low);
+  EXPECT_THAT(world.violations(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace bms::world
