@@ -281,7 +281,7 @@ class Contactors {
     if (!link.known()) return;
     const std::int32_t gap_uv = link.gap_uv(), pack_uv = link.pack_uv;
     if (first_gap_uv_ == measurement::no_reading) first_gap_uv_ = last_gap_uv_ = gap_uv;
-    const std::int64_t slowest_uv = std::int64_t{first_gap_uv_} * slowest_gap[half] / 1024 + pack_uv / 5;
+    const std::int32_t slowest_uv = first_gap_uv_ / 1024 * slowest_gap[half] + pack_uv / 5;
     const bool too_fast = half == 0 && first_gap_uv_ > pack_uv / 8 && gap_uv < first_gap_uv_ / 8;
     if (too_fast || gap_uv > slowest_uv) return fail_precharge(link);
     bool still = false;
