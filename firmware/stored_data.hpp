@@ -122,8 +122,9 @@ inline void StoredData::send(std::uint32_t part, const storage::Persistence& sto
   using T = can::StoredThroughput;
   const storage::EventsRecord& events = stored.events();
   const storage::ChargeRecord& charge = stored.charge();
-  if (part < events.max_faults) return send_fault(part, events);
-  const std::uint32_t cause = part - events.max_faults;
+  constexpr std::uint32_t faults = storage::EventsRecord::max_faults;
+  if (part < faults) return send_fault(part, events);
+  const std::uint32_t cause = part - faults;
   put<N::cause_layout>(cause);
   put<N::resets_layout>(events.resets[cause]);
   put<N::faults_layout>(events.faults);

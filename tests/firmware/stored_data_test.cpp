@@ -254,7 +254,8 @@ TEST_F(StoredDataTest, NoMessageIsSentTwiceWithASampleAndAtMostThreeAre) {
     run(board, 1);
     std::set<std::uint32_t> ids;
     for (const can::Frame& frame : sent) {
-      if (frame.id >= 0x1A4 && frame.id <= 0x1AB) EXPECT_TRUE(ids.insert(frame.id).second) << frame.id;
+      const bool of_the_stored_data = frame.id >= 0x1A4 && frame.id <= 0x1AB;
+      EXPECT_TRUE(!of_the_stored_data || ids.insert(frame.id).second) << frame.id;
     }
     EXPECT_LE(ids.size(), 3U);
     frames += ids.size();

@@ -205,6 +205,29 @@ TEST_F(Calendar, BackupRegistersKeepALatchedFaultOverALossOfPower) {
   }
 }
 
+/// Soc moves so little that only the first minute is stored. The second one is in the RAM that the reset does not
+/// change.
+TEST_F(Calendar, AfterAResetByTheWatchdogSocIsThatOfTheLastMinute) {
+  BoardRun run(rtc, flash, power_on);
+  run.board.may_start_again = true;
+  run.board.run_for_ms(700);
+  run.drive(121, -200'000);
+  std::vector<float> soc;
+  for (const SeenFrame& s : run.board.can.seen) {
+    if (s.from_board && s.frame.id == can::PackState::id) soc.push_back(can::PackState::of(s.frame).soc);
+  }
+  ASSERT_EQ(soc.size(), 121U);
+  const float first_minute = soc[60], second_minute = soc[120];
+  ASSERT_GT(first_minute - second_minute, 0.03) << "200 mA for a minute are 0.056 % of 6 Ah";
+  run.board.patch("bms::firmware::estimator_step(", UnicornBoard::hangs);
+  run.drive(1);
+  ASSERT_TRUE(run.board.run_until([&] { return !run.board.resets.empty(); }, 5'000));
+  run.board.unpatch();
+  run.board.run_for_ms(1'000);
+  run.drive(1);
+  EXPECT_NEAR(1e-7 * last<can::StartingSoc>(run.board)->soc_ppb, second_minute, 0.01);
+}
+
 class Supply : public ::testing::Test {
  protected:
   Supply() : run(rtc, flash, power_on) {}

@@ -50,11 +50,7 @@ class Battery {
       send(cells);
       return frames;
     }
-    can::StoredCounts counts;
-    counts.cause = k - 16;
-    counts.resets = 10 * (k - 16);
-    counts.faults = faults;
-    send(counts);
+    send(counts_of(k - 16));
     if (k == 16) {
       can::StoredUse use;
       use.operating_time = 360'000;
@@ -84,6 +80,14 @@ class Battery {
   std::uint32_t faults = 2;
 
  private:
+  can::StoredCounts counts_of(std::uint32_t cause) const {
+    can::StoredCounts counts;
+    counts.cause = cause;
+    counts.resets = 10 * cause;
+    counts.faults = faults;
+    return counts;
+  }
+
   std::map<std::uint32_t, std::uint8_t> counters_;
 };
 
