@@ -100,6 +100,20 @@ TEST(Protection, LosesNoFaultByAFlippedBit) {
   }
 }
 
+/// The outputs are not stored redundantly: each sample derives them from the guarded state.
+TEST(Protection, RepairsFlippedOutputsWithTheNextSample) {
+  ProtectionBench closed;
+  closed.drive_off();
+  const Outputs expected = closed.protection.decision().outputs;
+  for (unsigned bits = 1; bits < 16; ++bits) {
+    ProtectionBench copy = closed;
+    auto* byte = reinterpret_cast<unsigned char*>(const_cast<Outputs*>(&copy.protection.contactors().outputs()));
+    *byte = static_cast<unsigned char>(*byte ^ bits);
+    EXPECT_NE(copy.protection.contactors().outputs(), expected) << bits;
+    EXPECT_EQ(copy.step().outputs, expected) << bits;
+  }
+}
+
 /// A flip in any bit of the contactors, not only in the guarded ones: they open, or a later step repairs the bit.
 TEST(Protection, NeverClosesAgainstASevereFaultAfterAnyFlippedBit) {
   ProtectionBench b;
