@@ -89,7 +89,8 @@ void AdcModel::ends(bool injected) {
   const unsigned code = convert(s.channel[s.at]);
   const bool last = s.at + 1 == s.length;
   if (injected) {
-    injected_[s.at] = static_cast<std::uint32_t>(static_cast<int>(code) - static_cast<int>(offsets_[s.at] & 0xFFF)) & 0xFFFF;
+    injected_[s.at] =
+        static_cast<std::uint32_t>(static_cast<int>(code) - static_cast<int>(offsets_[s.at] & 0xFFF)) & 0xFFFF;
     if (last) sr_ |= jeoc;
   } else {
     const bool each = (cr2_ & eocs) != 0;

@@ -1,5 +1,6 @@
-// Every protection of the published table, caused at its physical source: just below its threshold, just above, with noise, and
-// during another fault, in each operating state. Reaction times count to the physical opening of a main contact.
+// Every protection of the published table, caused at its physical source: just below its threshold, just above, with
+// noise, and during another fault, in each operating state. Reaction times count to the physical opening of a main
+// contact.
 #include <cmath>
 
 #include <fmt/format.h>
@@ -19,9 +20,9 @@ struct Case {
   std::string name;
   Kind kind = Kind::above;
   const Row* row = nullptr;
-  const Cause* cause = nullptr;            ///< if not by a quantity
+  const Cause* cause = nullptr;  ///< if not by a quantity
   const Background* background = nullptr;
-  double current_share = 0;                ///< of the limit, if the quantity is a current
+  double current_share = 0;  ///< of the limit, if the quantity is a current
 };
 
 double margin_of(const Row& row, Kind kind) {
@@ -38,7 +39,8 @@ double margin_of(const Row& row, Kind kind) {
 
 class FaultCase {
  public:
-  FaultCase(TruckWorld& world, const std::vector<Row>& rows, const Pack& pack, Operating state, const Case& c, Outcome& outcome)
+  FaultCase(TruckWorld& world, const std::vector<Row>& rows, const Pack& pack, Operating state, const Case& c,
+            Outcome& outcome)
       : world_(world), judge_(world, rows, pack.limit_a), pack_(pack), state_(state), case_(c), outcome_(outcome) {}
 
   void run() {
@@ -129,7 +131,8 @@ class FaultCase {
     bool must_open = false, may_open = false;
     for (const Row& row : judge_.rows()) {
       if ((world_.vehicle.faults_seen() >> row.bit & 1) == 0) continue;
-      const bool opens = row.reaction == Reaction::open || row.reaction == Reaction::open_now || forbidden_current(row.reaction);
+      const bool opens =
+          row.reaction == Reaction::open || row.reaction == Reaction::open_now || forbidden_current(row.reaction);
       may_open = may_open || opens;
       must_open = must_open || (opens && row.bit == bit() && !silent());
     }
@@ -151,7 +154,8 @@ class FaultCase {
   bool was_closed_ = false;
 };
 
-void add_quantity_cases(const std::vector<Row>& rows, const std::vector<Background>& background, std::vector<Case>& list) {
+void add_quantity_cases(const std::vector<Row>& rows, const std::vector<Background>& background,
+                        std::vector<Case>& list) {
   for (const Row& row : rows) {
     if (!actuator_of(row)) continue;
     const bool voltage = row.quantity.find("sensor") == std::string::npos;
@@ -184,17 +188,22 @@ std::vector<Case> cases_in(Operating state, const std::vector<Row>& rows, const 
   add_quantity_cases(rows, background, list);
   for (std::size_t k = 0; k < causes.size(); ++k) {
     list.push_back({.name = causes[k].name, .cause = &causes[k]});
-    list.push_back({.name = causes[k].name + ", during worn-out flash", .kind = Kind::during, .cause = &causes[k],
+    list.push_back({.name = causes[k].name + ", during worn-out flash",
+                    .kind = Kind::during,
+                    .cause = &causes[k],
                     .background = &background.back()});
   }
   if (state != Operating::drive && state != Operating::standby) return list;
   for (const double share : {1.0, 1.03, 1.3, 1.5, 2.0, 3.0, 4.5, 6.0, 20.0}) {
     for (const int sign : {-1, 1}) {
-      const std::string name = share > 5 ? "short circuit" : sign < 0 ? "discharge overcurrent" : "charge overcurrent";
+      std::string name = sign < 0 ? "discharge overcurrent" : "charge overcurrent";
+      if (share > 5) name = "short circuit";
       const Row* row = row_named(rows, name);
       if (row == nullptr) continue;
-      list.push_back({.name = fmt::format("{} at {} of the limit", name, share), .kind = share < 1.05 ? Kind::below : Kind::above,
-                      .row = row, .current_share = sign * share});
+      list.push_back({.name = fmt::format("{} at {} of the limit", name, share),
+                      .kind = share < 1.05 ? Kind::below : Kind::above,
+                      .row = row,
+                      .current_share = sign * share});
     }
   }
   return list;
@@ -226,15 +235,18 @@ std::string table_of(const std::vector<Row>& rows, const std::vector<Outcome>& o
       line.opened_latest = std::max(line.opened_latest, opened);
     }
   }
-  std::string table = "| fault | table | silent below, cases | raised, cases | raised after [s] | contacts open after [s] | deviations |\n"
-                      "|---|---|---|---|---|---|---|\n";
+  std::string table =
+      "| fault | table | silent below, cases | raised, cases | raised after [s] | contacts open after [s] | deviations "
+      "|\n"
+      "|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows) {
     const auto found = lines.find(row.bit);
     if (found == lines.end()) continue;
     const Line& l = found->second;
     table += fmt::format("| {} | {} s | {} | {} | {} | {} | {} |\n", row.name, row.delay_s, l.silent, l.raised,
                          l.raised == 0 ? "-" : fmt::format("{:.2f} to {:.2f}", l.soonest, l.latest),
-                         l.opened == 0 ? "-" : fmt::format("{:.2f} to {:.2f}", l.opened_soonest, l.opened_latest), l.deviations);
+                         l.opened == 0 ? "-" : fmt::format("{:.2f} to {:.2f}", l.opened_soonest, l.opened_latest),
+                         l.deviations);
   }
   return table + fmt::format("\n{} cases: {:.0f} missed, {:.0f} false.\n", outcomes.size(), missed, falsely);
 }
