@@ -37,9 +37,12 @@ constexpr std::uint64_t bits_of(const Frame& frame) {
   for (unsigned k = 0; k < 8; ++k) all |= static_cast<std::uint64_t>(frame.data[k]) << (8 * k);
   return all;
 }
-constexpr void put_raw(Frame& frame, unsigned start, unsigned bits, std::uint64_t raw) {
-  const std::uint64_t all = (bits_of(frame) & ~(mask(bits) << start)) | ((raw & mask(bits)) << start);
+constexpr void set_bits(Frame& frame, std::uint64_t all) {
   for (unsigned k = 0; k < 8; ++k) frame.data[k] = static_cast<std::uint8_t>(all >> (8 * k));
+}
+/// bits: at most 32. Out of line, as put_float(): an image has some 150 signals.
+[[gnu::noinline]] constexpr void put_raw(Frame& frame, unsigned start, unsigned bits, std::uint32_t raw) {
+  set_bits(frame, (bits_of(frame) & ~(mask(bits) << start)) | ((raw & mask(bits)) << start));
 }
 constexpr std::uint64_t get_raw(const Frame& frame, unsigned start, unsigned bits) {
   return (bits_of(frame) >> start) & mask(bits);
@@ -53,14 +56,17 @@ constexpr float clamped(float value, float lowest, float highest) {
 
 // put() writes the value of a signal, get() reads it. Types: the one that cmake/dbc_header.py chooses.
 
-template <SignalLayout s>
-constexpr void put(Frame& frame, float value) {
+[[gnu::noinline]] constexpr void put_float(Frame& frame, const SignalLayout& s, float value) {
   std::int32_t raw = s.invalid;
   if (value == value || !s.has_invalid) {
     const float counts = (clamped(value, s.lowest, s.highest) - s.offset) / s.factor;
     raw = static_cast<std::int32_t>(counts + (counts < 0 ? -0.5F : 0.5F));
   }
-  put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(raw)));
+  put_raw(frame, s.start, s.bits, static_cast<std::uint32_t>(raw));
+}
+template <SignalLayout s>
+constexpr void put(Frame& frame, float value) {
+  put_float(frame, s, value);
 }
 template <SignalLayout s>
 constexpr void put(Frame& frame, std::uint32_t value) {
@@ -73,7 +79,7 @@ template <SignalLayout s>
 constexpr void put(Frame& frame, std::int32_t value) {
   constexpr auto most = static_cast<std::int32_t>(mask(s.bits - 1));
   const std::int32_t sent = std::clamp<std::int32_t>(value, -most - 1, most);
-  put_raw(frame, s.start, s.bits, static_cast<std::uint64_t>(static_cast<std::int64_t>(sent)));
+  put_raw(frame, s.start, s.bits, static_cast<std::uint32_t>(sent));
 }
 
 template <SignalLayout s>

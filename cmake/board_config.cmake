@@ -1,4 +1,4 @@
-# bms_board_config(NAME FOLDER SOURCE TEXT [CELLS N] [SAMPLE_PERIOD_S S] [FIXED_POINT true|false]
+# bms_board_config(NAME FOLDER SOURCE TEXT [CELLS N] [SAMPLE_PERIOD_S S] [CURRENT_RANGE_A A] [FIXED_POINT true|false]
 #                  [VEHICLE_PROFILE none|cia418|j1939] [CANOPEN_NODE N] [CANOPEN_CHARGER N])
 #
 # Writes FOLDER/board_config.hpp: all that the C++ code knows about a board and about the build options. NAME becomes
@@ -6,11 +6,13 @@
 function(bms_board_config name folder)
   set(bms_config_CELLS 1)
   set(bms_config_SAMPLE_PERIOD_S 0.1)
+  set(bms_config_CURRENT_RANGE_A 2147)
   set(bms_config_FIXED_POINT false)
+  set(bms_config_DC_LINK true)
   set(bms_config_VEHICLE_PROFILE none)
   set(bms_config_CANOPEN_NODE 1)
   set(bms_config_CANOPEN_CHARGER 10)
-  set(settings CELLS SAMPLE_PERIOD_S FIXED_POINT VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER)
+  set(settings CELLS SAMPLE_PERIOD_S CURRENT_RANGE_A FIXED_POINT DC_LINK VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER)
   cmake_parse_arguments(arg "" "SOURCE;${settings}" "" ${ARGN})
   set(bms_config_source ${arg_SOURCE})
   foreach(setting ${settings})

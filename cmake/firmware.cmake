@@ -17,14 +17,27 @@
 # board.cmake chooses the CAN back end and the source of the samples:
 #   BMS_CAN        slcan, or bxcan with a bit rate
 #   BMS_SAMPLES    bq76952 (a chip on the board), adc (the controller), remote (another node), emulated
+#   BMS_DC_LINK    false: a single switch without a measured DC link and without precharge
+#   BMS_AUXILIARY_CONTACTS  of the main contactors: stm32f4 (PB14, PB15), or absent
 #
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (can/messages.md): cia418 for a CANopen charger, with the
 # nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
 #
+# BMS_CELLS is the number of cells in series: that of board.cmake, or another one within the range that board.cmake
+# states, as -DBMS_CELLS=N.
+#
 # Whatever does not depend on the cell is compiled once for all images.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
+set(cells_wanted ${BMS_CELLS})
 include(${root}/boards/${BMS_BOARD}/board.cmake)
+if(cells_wanted)
+  set(BMS_CELLS ${cells_wanted})
+endif()
+if(NOT BMS_CELLS MATCHES "^[0-9]+$" OR BMS_CELLS LESS BMS_FEWEST_CELLS OR BMS_CELLS GREATER BMS_MOST_CELLS)
+  message(FATAL_ERROR "BMS_CELLS is ${BMS_CELLS}, but the board ${BMS_BOARD} measures from ${BMS_FEWEST_CELLS} to "
+    "${BMS_MOST_CELLS} cells in series. More than 16 cells need two monitoring chips: docs/packs_of_24_cells.md")
+endif()
 include(${root}/hal/${BMS_CHIP}/chip.cmake)  # compiler flags, core, flash, what QEMU replaces
 if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
@@ -36,12 +49,19 @@ set(BMS_CANOPEN_CHARGER 10 CACHE STRING "CANopen node of the charger")
 if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939)$")
   message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418 or j1939")
 endif()
+if(NOT BMS_CURRENT_RANGE_A)
+  set(BMS_CURRENT_RANGE_A 2147)  # the end of the range of a reading
+endif()
 set(fixed_point false)
 if(BMS_SCALAR_DEFINITION MATCHES BMS_FIXED_POINT)
   set(fixed_point true)
 endif()
+if(NOT DEFINED BMS_DC_LINK)
+  set(BMS_DC_LINK true)
+endif()
 bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
-  CELLS ${BMS_CELLS} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} FIXED_POINT ${fixed_point}
+  CELLS ${BMS_CELLS} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
+  FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
@@ -117,29 +137,41 @@ if(EXISTS ${chip}/board_state.cpp)
   set(chip_calendar ${chip}/calendar.cpp)
   set(chip_state ${chip}/board_state.cpp ${chip}/supply.cpp ${core}/image_check.cpp)
 endif()
-bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/${BMS_CORE}.cpp
-  ${chip}/vectors.cpp ${chip}/power.cpp)
+bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/retained.cpp
+  ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
 bms_objects(hal_clock -Os ${chip}/clock.cpp)
 bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar})
 bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})
 # Back ends by BMS_CAN and BMS_SAMPLES.
+set(auxiliary_contacts ${absent_hal}/auxiliary_contacts.cpp)
+if(DEFINED BMS_AUXILIARY_CONTACTS)
+  set(auxiliary_contacts ${hal}/${BMS_AUXILIARY_CONTACTS}/auxiliary_contacts.cpp)
+endif()
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
-set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp)
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${absent_hal}/calibration.cpp)
-set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp)
-set(samples_bq76952 ${absent_hal}/calibration.cpp ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp
-  ${hal}/bq76952/front_end.cpp ${hal}/bq76952/wire.cpp ${chip}/i2c.cpp ${chip}/contactor_pins.cpp)
+set(no_chain ${absent_hal}/calibration.cpp ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp
+  ${absent_hal}/second_current.cpp)  # for a board without a measuring chain
+set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${no_chain})
+set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${no_chain})
+set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp
+  ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp)
+# The settings of the chip's own protections follow the cell file.
+set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
+  ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
+  ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts})
 bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_objects(hal_remote_samples -Os ${samples_remote})
 target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
+if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
+  target_sources(hal_samples PRIVATE ${absent_hal}/starting_point.cpp)
+endif()
 bms_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
 set(no_hardware watchdog flash calendar board_state supply)
 list(TRANSFORM no_hardware PREPEND ${absent_hal}/)
 list(TRANSFORM no_hardware APPEND .cpp)
 bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
-  ${absent_hal}/requests.cpp ${no_hardware} ${absent_hal}/calibration.cpp)
+  ${absent_hal}/requests.cpp ${no_hardware} ${no_chain})
 target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
 bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp ${no_hardware})
 

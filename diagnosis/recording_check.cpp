@@ -178,9 +178,9 @@ void check_gaps(Record& r, const Cell& cell, RecordingCheck& found) {
   const auto load_a = [&](std::size_t k) { return std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0; };
   std::vector<model::Span> gaps;
   double lost_soc = 0;
-  for (std::size_t k = 1; k < r.size(); ++k) {
+  for (const std::size_t k : measurement::rows_after_gaps(r.time_s, fault_limits.gap_steps * usual_step_s)) {
     const double dt_s = r.time_s[k] - r.time_s[k - 1];
-    if (dt_s <= fault_limits.gap_steps * usual_step_s || dt_s < fault_limits.gap_at_least_s) continue;
+    if (dt_s < fault_limits.gap_at_least_s) continue;
     const double a = std::max(load_a(k), load_a(k - 1));
     if (a < fault_limits.gap_load_c * cell.capacity_ah) continue;
     gaps.push_back({r.time_s[k - 1], r.time_s[k]});

@@ -78,7 +78,7 @@ class InputCheck {
   }
 
   /// Returns true and sets a flag if the step is a gap. step_us: time since the previous sample, > 0. To be called when
-  /// the step differs from the one before.
+  /// the step differs from the one before, or the one before was a gap.
   constexpr bool gap(std::uint32_t step_us, std::uint32_t& flags) {
     if (usual_step_us_ == 0) {
       usual_step_us_ = step_us;

@@ -49,7 +49,7 @@ template <std::size_t Cells>
 constexpr measurement::Sample mean_cell(const measurement::PackSample<Cells>& pack,
                                         const model::PlausibleRange& plausible) {
   measurement::Sample mean{pack.time_us, pack.current_ua, measurement::no_reading, measurement::no_temperature};
-  std::int32_t sum_uv = 0, cells = 0;  // plausible readings are below 6 V: 16 of them are far from the end of 32 bits
+  std::int32_t sum_uv = 0, cells = 0;  // plausible readings are below 6 V: 24 of them are far from the end of 32 bits
   std::int32_t sum_cdegc = 0, sensors = 0;
   const std::int32_t median_uv = median_cell_uv(pack, plausible);
   for (const std::int32_t uv : pack.cell_uv) {

@@ -27,6 +27,7 @@
 // estimator/README.md.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
@@ -61,8 +62,9 @@ class SocEstimator {
 
   constexpr SocEstimator() = default;
 
-  /// Starts from a known state of charge instead of the first voltage.
-  constexpr explicit SocEstimator(const measurement::StartingPoint& from) : from_{from}, has_start_{true} {}
+  /// Starts from a known state of charge instead of the first voltage. Both values are clamped to 0 to 1.
+  constexpr explicit SocEstimator(const measurement::StartingPoint& from)
+      : from_{clamped_to_one(from.soc_ppb), clamped_to_one(from.soc_sigma_ppb)}, has_start_{true} {}
 
   /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
@@ -74,7 +76,7 @@ class SocEstimator {
     time_us_ = sample.time_us;
     std::uint32_t flags = 0;
     const AcceptedCurrent current = check_.current(sample.current_ua, cell.plausible, flags);
-    if (step_us != constants_.step_us()) set_time_step(cell, step_us, flags);
+    if (step_us != checked_step_us_) set_time_step(cell, step_us, flags);
     if (sample.temperature_cdegc >> temperature_bin_bits != temperature_bin_) [[unlikely]]
       set_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
@@ -169,7 +171,8 @@ class SocEstimator {
 
   template <class Cell>
   [[gnu::noinline]] constexpr void set_time_step(const Cell& cell, std::uint64_t step_us, std::uint32_t& flags) {
-    check_.gap(constants_.capped(step_us), flags);
+    // a gap is checked again even if the next step is as long: gaps of equal length are gaps
+    checked_step_us_ = check_.gap(constants_.capped(step_us), flags) ? 0 : step_us;
     constants_.set_time_step(cell.noise, step_us);
   }
 
@@ -346,6 +349,9 @@ class SocEstimator {
     return at;
   }
 
+  static constexpr std::int32_t clamped_to_one(std::int32_t ppb) {
+    return std::clamp<std::int32_t>(ppb, 0, 1'000'000'000);
+  }
   constexpr SocDistribution<S> given_soc() const {
     const Soc sigma = soc_of_ppb(from_.soc_sigma_ppb);
     return {soc_of_ppb(from_.soc_ppb), Variance(sigma * sigma)};
@@ -358,6 +364,7 @@ class SocEstimator {
   InputCheck<S> check_;
   [[no_unique_address]] Errors errors_;
   std::uint64_t time_us_ = 0;
+  std::uint64_t checked_step_us_ = 0;  ///< last step that was not a gap; a step of this length is not checked again
   std::uint8_t interval_ = 0;
   std::int16_t temperature_cdegc_ = static_cast<std::int16_t>(100 * model::assumed_ambient_c);
   std::int16_t temperature_bin_ = no_temperature_bin;

@@ -199,10 +199,26 @@ void put_mechanism(CellFile& file, const model::MechanismSetting& setting) {
     file.mechanisms.insert(at, setting);
 }
 
+namespace {
+
+/// Returns true if all strengths are neutral.
+bool has_no_effect(const model::MechanismSetting& setting) {
+  const model::MechanismInfo& info = model::catalogue[setting.index];
+  bool neutral = true;
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    const model::Parameter& p = info.parameter[k];
+    if (p.role == model::Role::strength && setting.value[k] != p.neutral) neutral = false;
+  }
+  return neutral;
+}
+
+}  // namespace
+
 std::vector<model::MechanismSetting> on_board(const std::vector<model::MechanismSetting>& mechanisms) {
   std::vector<model::MechanismSetting> acting;
   for (const model::MechanismSetting& m : mechanisms) {
-    if (model::catalogue[m.index].on_board) acting.push_back(m);
+    if (model::catalogue[m.index].on_board && !(model::catalogue[m.index].states > 0 && has_no_effect(m)))
+      acting.push_back(m);
   }
   return acting;
 }

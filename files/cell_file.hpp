@@ -50,7 +50,8 @@ CellFile parse_cell(const std::string& text, const std::string& path);
 /// Text of a cell file with these values. parse_cell() of it returns the same bits.
 std::string cell_text(const CellFile& file);
 
-/// The mechanisms that the estimator on a board computes.
+/// The mechanisms that the estimator on a board computes. A mechanism with states whose strengths are all neutral is
+/// left out: it has no effect, and a state without variance and noise would make the filter divide 0 by 0.
 std::vector<model::MechanismSetting> on_board(const std::vector<model::MechanismSetting>& mechanisms);
 
 /// Throws BadInput if one of those needs an FPU.

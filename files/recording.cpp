@@ -25,6 +25,8 @@ namespace {
 constexpr std::size_t minimum_rows = 10;
 constexpr std::size_t longest_quote = 40;  ///< characters
 constexpr double longest_s = 3.2e8;        ///< ten years
+constexpr double largest_reading = 1e9;    ///< in any unit from microvolts to amperes
+constexpr std::size_t most_ignored_named = 10;
 
 /// Text of the file for a message: short and printable.
 std::string in_quotes(std::string_view text) {
@@ -92,9 +94,14 @@ class Parser {
     if (rest_.find('\0') != std::string_view::npos) refuse("not a text file", "a recording in CSV");
     header(voltage);
     reserve();
-    while (next_line()) row();
+    while (next_line()) {
+      if (recording_.rows() == measurement::most_rows)
+        refuse("more rows", fmt::format("at most {}: split the recording", measurement::most_rows));
+      row();
+    }
     if (recording_.rows() < minimum_rows)
       refuse(fmt::format("{} rows", recording_.rows()), fmt::format("{} or more", minimum_rows));
+    if (recording_.duration_s() <= 0) refuse("all rows have the same time", "times that increase");
     missing();
     return std::move(recording_);
   }
@@ -122,17 +129,20 @@ class Parser {
     if (!next_line()) refuse("only comments", "a header line and rows");
     separator_ = line_.find(';') != std::string_view::npos ? ';' : ',';
     std::string ignored;
+    std::size_t ignored_count = 0;
     std::string_view names = line_;
     for (bool more = true; more;) {
       const std::size_t end = names.find(separator_);
       more = end != std::string_view::npos;
       columns_.push_back(column(std::string(trimmed(names.substr(0, end)))));
-      if (columns_.back().into == nullptr) ignored += (ignored.empty() ? "" : ", ") + in_quotes(columns_.back().name);
+      if (columns_.back().into == nullptr && ++ignored_count <= most_ignored_named)
+        ignored += (ignored.empty() ? "" : ", ") + in_quotes(columns_.back().name);
       if (more) names.remove_prefix(end + 1);
     }
     require("time_s");
     require("current_a");
     if (voltage == VoltageColumn::required) require("voltage_v");
+    if (ignored_count > most_ignored_named) ignored += fmt::format(" and {} more", ignored_count - most_ignored_named);
     if (!ignored.empty()) recording_.warnings.push_back({"ignored_column", "columns not used: " + ignored});
   }
 
@@ -154,9 +164,9 @@ class Parser {
     for (const Known& one : known) {
       if (one.name == name) found = {&one.into.edit(), name, one.sparse};
     }
+    if (found.into == nullptr) return found;
     for (const FileColumn& other : columns_) {
-      if (found.into != nullptr && other.into == found.into)
-        refuse("column " + in_quotes(name) + " twice", "each column once");
+      if (other.into == found.into) refuse("column " + in_quotes(name) + " twice", "each column once");
     }
     return found;
   }
@@ -169,9 +179,8 @@ class Parser {
   }
 
   void reserve() {
-    const std::size_t rows =
-        rest_.size() / std::max<std::size_t>(rest_.find('\n') == std::string_view::npos ? 1 : rest_.find('\n') + 1, 8) +
-        1;
+    const std::size_t line = rest_.find('\n') == std::string_view::npos ? 1 : rest_.find('\n') + 1;
+    const std::size_t rows = std::min(measurement::most_rows, rest_.size() / std::max<std::size_t>(line, 8) + 1);
     for (const FileColumn& c : columns_) {
       if (c.into != nullptr) c.into->reserve(rows);
     }
@@ -207,6 +216,10 @@ class Parser {
     if (!v)
       refuse(fmt::format("{} in column '{}' is not a number", in_quotes(field), column.name),
              column.sparse ? "a number or nothing" : "a number");
+    if (std::abs(*v) > largest_reading && column.name != "time_s") {
+      refuse(fmt::format("{} in column '{}' is impossible", in_quotes(field), column.name),
+             fmt::format("a value from -{:g} to {:g}, or nan", largest_reading, largest_reading));
+    }
     if (std::isnan(*v) && !column.sparse && missing_++ == 0) first_missing_line_ = line_number_;
     return *v;
   }

@@ -6,8 +6,9 @@
 // starts with '#' is a comment. 'nan' is a missing reading. The reference columns may be empty in a row.
 // measurement/recording.hpp says what the columns mean.
 //
-// Rejected with BadInput: a missing column, a field that is not a number, time that decreases, fewer than 10 rows, an
-// empty file, a binary file. What looks wrong but can be used becomes a warning (measurement/recording_checks.hpp).
+// Rejected with BadInput: a missing column, a field that is not a number, a reading beyond +-1e9, time that decreases
+// or never increases, fewer than 10 rows or more than measurement::most_rows, an empty file, a binary file. What looks
+// wrong but can be used becomes a warning (measurement/recording_checks.hpp).
 #pragma once
 
 #include <string>

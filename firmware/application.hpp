@@ -16,6 +16,7 @@
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/commands.hpp"
+#include "firmware/latched_faults.hpp"
 #include "firmware/progress.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
@@ -26,6 +27,8 @@
 #include "hal/estimate_record.hpp"
 #include "hal/power_path.hpp"
 #include "hal/requests.hpp"
+#include "hal/second_current.hpp"
+#include "hal/second_line.hpp"
 #include "hal/supply.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
@@ -33,11 +36,23 @@
 
 namespace bms::firmware {
 
+namespace second_line = protection::second_line;
+static_assert(second_line::cell_undervoltage == hal::cell_undervoltage &&
+                  second_line::cell_overvoltage == hal::cell_overvoltage &&
+                  second_line::charge_overcurrent == hal::charge_overcurrent &&
+                  second_line::discharge_overcurrent == hal::discharge_overcurrent &&
+                  second_line::short_circuit == hal::short_circuit && second_line::temperature == hal::temperature &&
+                  second_line::host_silence == hal::host_silence &&
+                  second_line::permanent_failure == hal::permanent_failure &&
+                  second_line::pins_wrong == hal::pins_wrong,
+              "protection/second_line.hpp and hal/second_line.hpp number the trips differently");
+
 /// Only the battery's own messages. Other profiles: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
 struct WithoutVehicleProfile {
   template <class Estimator, std::size_t Cells>
   constexpr void publish(const Snapshot<Estimator, Cells>&) {}
-  constexpr void receive(const can::Frame&) {}
+  constexpr void receive(const can::Frame&, std::uint64_t) {}
+  constexpr protection::Request request(protection::Request truck, std::uint64_t) const { return truck; }
 };
 
 template <class Board, class VehicleProfile = WithoutVehicleProfile>
@@ -51,15 +66,15 @@ class Application {
   Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
               float capacity_ah, storage::Persistence& persistence)
       : estimator_{start ? Estimator(*start) : Estimator()},
-        protection_{Board::plan(),
-                    static_cast<std::uint32_t>(persistence.settings().get(latched_faults_key).value_or(0))},
+        latched_faults_{persistence, hal::reset_cause()},
+        protection_{Board::plan(), latched_faults_.faults()},
         telemetry_{identity, start},
         capacity_ah_{capacity_ah},
         persistence_{persistence},
         cell_hash_{identity.cell_hash} {
     board_.cell_file_changed = stored_for_another_cell_file(persistence, cell_hash_);
     if (board_.cell_file_changed) return;
-    persistence.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
+    store_setting(cell_file_key, cell_hash_);
     if constexpr (cells > 1) restore_cells(cells_, persistence.cells());
   }
 
@@ -69,10 +84,11 @@ class Application {
     const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
     const Result estimate = Board::step(estimator_, mean);
     hal::record_estimate(estimator::words(estimate));
-    const auto request = requested_.active_request(pack.time_us);
+    const auto request = vehicle_profile_.request(requested_.active_request(pack.time_us), pack.time_us);
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
+    observe(pack, estimate);
     protect(pack, estimate, request);
     publish(pack, mean, estimate);
     handle_requests(pack.time_us);
@@ -112,9 +128,19 @@ class Application {
                                          .persistence = persistence_,
                                          .board = board_,
                                          .capacity_ah = capacity_ah_,
-                                         .log_samples = requested_.log_samples};
+                                         .log_samples = requested_.log_samples,
+                                         .stored_part = requested_.next_stored_part()};
     telemetry_.publish(now);
     vehicle_profile_.publish(now);
+  }
+
+  /// Readings for the stored faults and extremes.
+  [[gnu::noinline]] void observe(const measurement::PackSample<cells>& pack, const Result& estimate) {
+    storage::Readings now;
+    now.range = reading_range(pack.cell_uv, pack.temperature_cdegc, pack.current_ua, Board::plausible());
+    if ((estimate.flags & estimator::not_started) == 0)
+      now.soc = static_cast<std::uint8_t>(std::clamp<std::int32_t>(messages::ppb(estimate.soc) / 5'000'000, 0, 200));
+    persistence_.observe(now);
   }
 
   void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
@@ -137,33 +163,51 @@ class Application {
     inputs.clear = std::exchange(requested_.clear, protection::Clear::none);
     if (board_.cell_file_changed && inputs.clear != protection::Clear::none) [[unlikely]]
       accept_cell_file();
-    inputs.dc_link_uv = hal::dc_link_uv();
+    const hal::LinkVoltages link = hal::link_voltages();
+    inputs.link_plus_uv = link.plus_uv;
+    inputs.link_minus_uv = link.minus_uv;
+    const hal::AuxiliaryContacts contacts = hal::auxiliary_contacts();
+    inputs.auxiliary = {contacts.fitted, contacts.main_plus_closed, contacts.main_minus_closed};
+    inputs.contact_lost = contacts.losses != 0;
+    inputs.second_line = hal::second_line_trips();
+    inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
     inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
+                         latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
-    inputs.storage_fault = persistence_.log().sectors() > 0 && !persistence_.log().operational();
+    inputs.storage_fault = persistence_.log().sectors() > 0 &&
+                           (setting_lost_ || !persistence_.log().operational() || persistence_.full_for_long());
     first_ = false;
-    const std::uint32_t latched_before = protection_.decision().latched;
+    const protection::FaultSet latched_before = protection_.decision().latched;
     const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
-    if (supply_falls != 0 && !decision.outputs.any_closed()) [[unlikely]]
+    if (!decision.outputs.any_closed()) {
       hal::supply_acknowledge(supply_falls);
+      hal::acknowledge_contact_losses(contacts.losses);
+    }
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
     if (decision.latched != latched_before) [[unlikely]]
-      persistence_.set(latched_faults_key, static_cast<std::int32_t>(decision.latched));
+      setting_lost_ = !latched_faults_.store(decision.latched) || setting_lost_;
+    if ((latched_before & ~decision.latched) != 0) [[unlikely]]
+      hal::second_line_clear();
+  }
+
+  /// A setting without room is a storage fault until the next start.
+  [[gnu::noinline]] void store_setting(std::uint16_t key, std::uint32_t value) {
+    if (!persistence_.set(key, static_cast<std::int32_t>(value))) setting_lost_ = true;
   }
 
   /// Clearing the faults confirms the new cell file: from now on the stored data belong to it.
   [[gnu::noinline]] void accept_cell_file() {
-    persistence_.set(cell_file_key, static_cast<std::int32_t>(cell_hash_));
+    store_setting(cell_file_key, cell_hash_);
     board_.cell_file_changed = false;
   }
 
-  [[gnu::noinline]] void store_faults(std::uint32_t raised) {
-    for (std::uint16_t k = 0; k < protection::fault_count; ++k) {
-      if ((raised >> k & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k));
+  [[gnu::noinline]] void store_faults(protection::FaultSet raised) {
+    for (std::uint16_t k = 0; k < protection::fault_count; ++k, raised >>= 1) {
+      if ((raised & 1) != 0) persistence_.fault(static_cast<std::uint16_t>(first_fault_code + k), hal::calendar_s());
     }
   }
 
@@ -173,19 +217,22 @@ class Application {
       if (auto answer = commands_.handle(frame, now_us, requested_)) {
         if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time))
           answer->result = can::CommandAnswer::result_refused;
-        if (const auto calibration_change = std::exchange(requested_.calibration_change, std::nullopt))
-          apply_calibration(*calibration_change);
+        if (const auto change = std::exchange(requested_.calibration_change, std::nullopt);
+            change && !apply_calibration(*change))
+          answer->result = can::CommandAnswer::result_refused;
         telemetry_.answer(*answer);
       } else {
-        vehicle_profile_.receive(frame);
+        vehicle_profile_.receive(frame, now_us);
       }
     }
   }
 
-  [[gnu::noinline]] void apply_calibration(const Requested::CalibrationChange& calibration_change) {
-    persistence_.set(static_cast<std::uint16_t>(first_calibration_key + calibration_change.which),
-                     calibration_change.value);
-    hal::calibrate(stored_calibration(persistence_));
+  /// Returns false if the measuring chain cannot be calibrated; then nothing is stored.
+  [[gnu::noinline]] bool apply_calibration(const Requested::CalibrationChange& change) {
+    if (!hal::calibrate(stored_calibration(persistence_, change))) return false;
+    store_setting(static_cast<std::uint16_t>(first_calibration_key + change.which),
+                  static_cast<std::uint32_t>(change.value));
+    return true;
   }
 
   /// An erase stops the core for half a second, so it happens only while all contactors are open.
@@ -198,6 +245,7 @@ class Application {
   Estimator estimator_;
   estimator::Condition<Estimator> condition_;
   estimator::PackCells<typename Estimator::Scalar, cells> cells_;
+  LatchedFaults latched_faults_;
   protection::Protection<cells> protection_;
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;
@@ -209,7 +257,7 @@ class Application {
   storage::Persistence& persistence_;
   std::uint32_t cell_hash_;
   BoardStatus board_;
-  bool first_ = true;
+  bool first_ = true, setting_lost_ = false;
 };
 
 }  // namespace bms::firmware

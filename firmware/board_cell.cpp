@@ -1,6 +1,8 @@
 // Functions of the board other than the estimator step. They are compiled for size, not for speed.
 #include "firmware/board_cell.hpp"
 
+#include "firmware/board_design.hpp"
+
 namespace bms::firmware {
 
 void BoardCell::update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
@@ -17,11 +19,11 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
-  static constexpr auto plan = protection::protection_plan({.limits = generated::parameters.limits,
-                                                            .capacity_ah = generated::parameters.capacity_ah,
-                                                            .cells = cells,
-                                                            .temperatures = cells > 1 ? 4 : 1,
-                                                            .sample_period_s = hal::sample_period_s});
+  constexpr auto design = board_design();
+  static_assert(protection::current_sensor_suffices(design),
+                "the current sensor of the board (BMS_CURRENT_RANGE_A) ends below a short circuit of this cell");
+  static constexpr auto plan = protection::protection_plan(design);
+  static_assert(protection::consistent(plan.rules), "limits of the cell contradict each other");
   return plan;
 }
 

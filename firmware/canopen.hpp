@@ -5,6 +5,7 @@
 //   700h + node   out    boot-up once, then the state every heartbeat_us
 //   600h + node   in     SDO: read or write an object in one frame (expedited transfer)
 //   580h + node   out    the answer, or an abort code
+//   700h + peer   in     heartbeat of one other node
 //
 // The node becomes operational without a master, because a truck may have none. In state "stopped" it sends only its
 // heartbeat. Segmented and block transfers are refused. The owner implements the objects: read(index, sub) and
@@ -15,6 +16,7 @@
 #include <array>
 #include <cstdint>
 
+#include "firmware/cycle.hpp"
 #include "hal/bytes.hpp"
 #include "hal/can.hpp"
 
@@ -51,14 +53,11 @@ class Node {
 
   /// Sends boot-up or a heartbeat if it is due. Call at each sample; now_us is the time of the sample.
   void update_heartbeat(std::uint32_t now_us) {
-    if (state_ == NodeState::boot_up) {
-      send_heartbeat(NodeState::boot_up);
-      state_ = NodeState::operational;
-      heartbeat_sent_us_ = now_us;
-    } else if (now_us - heartbeat_sent_us_ >= heartbeat_us) {
-      send_heartbeat(state_);
-      heartbeat_sent_us_ = now_us;
-    }
+    const bool boot_up = state_ == NodeState::boot_up;
+    if (boot_up) heartbeat_.restart();
+    if (!heartbeat_.due(now_us, heartbeat_us)) return;
+    send_heartbeat(state_);
+    if (boot_up) state_ = NodeState::operational;
   }
 
   /// Handles NMT and SDO requests. Returns true if the frame was for this node.
@@ -115,9 +114,41 @@ class Node {
     hal::can_send(answer);
   }
 
-  std::uint32_t heartbeat_sent_us_ = 0;
+  Cycle heartbeat_;
   std::uint8_t id_;
   NodeState state_ = NodeState::boot_up;
+};
+
+/// Another node, as its heartbeat shows it.
+class Peer {
+ public:
+  /// Without a heartbeat for this time the node is gone. Chargers send one per second by default, and two may be lost.
+  static constexpr std::uint64_t timeout_us = 3'500'000;
+
+  constexpr explicit Peer(std::uint8_t id) : id_(id) {}
+
+  constexpr void receive(const can::Frame& frame, std::uint64_t now_us) {
+    if (frame.long_id || frame.id != heartbeat_id + id_ || frame.length != 1) return;
+    const auto state = static_cast<NodeState>(frame.data[0] & 0x7F);  // bit 7 alternates in answers to node guarding
+    repeated_ = present(now_us) && state == state_;
+    state_ = state;
+    received_us_ = now_us;
+  }
+  /// Returns true if the node sends heartbeats and is not stopped.
+  constexpr bool present(std::uint64_t now_us) const {
+    return state_ != NodeState::stopped && now_us - received_us_ < timeout_us;
+  }
+  /// Returns true if two heartbeats in a row, the last one within the timeout, were "operational". A heartbeat has no
+  /// check code, so a single one is not enough to switch something on.
+  constexpr bool operational(std::uint64_t now_us) const {
+    return present(now_us) && repeated_ && state_ == NodeState::operational;
+  }
+
+ private:
+  std::uint64_t received_us_ = 0;
+  std::uint8_t id_;
+  NodeState state_ = NodeState::stopped;  ///< of the last heartbeat
+  bool repeated_ = false;                 ///< the heartbeat before had the same state
 };
 
 }  // namespace bms::firmware::canopen

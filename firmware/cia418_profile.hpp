@@ -8,7 +8,7 @@
 //   400h + charger   6070 requested charging current, 6081 state of charge
 //
 //   6000     u8    bit 0: ready to charge
-//   6001     u8    status of the charger, written by the charger
+//   6001     u8    status of the charger, written by the charger; only stored, because no text confirms its bits
 //   6010     i16   0.125 degC; 7FFFh: not known
 //   6020.1   u8    battery type; 0: not specified
 //   6020.2   u16   capacity [Ah]
@@ -17,6 +17,8 @@
 //   6060     u32   V / 1024; all ones: not known
 //   6070     u16   A / 16
 //   6081     u8    %; FFh: not known
+//
+// The charger's heartbeat (700h + charger) starts and ends the charge, see request().
 //
 // can/messages.md names the sources, and the points that no text confirms. CANopen has no end-to-end protection: use
 // the battery's own messages for everything that opens contactors. Cost: 0.7 % of a bus of 250 kbit/s. An SDO request
@@ -58,7 +60,19 @@ class Cia418Profile {
     if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
   }
 
-  void receive(const can::Frame& frame) { node_.receive(frame, *this); }
+  void receive(const can::Frame& frame, std::uint64_t now_us) {
+    charger_.receive(frame, now_us);
+    node_.receive(frame, *this);
+  }
+
+  /// The request that the contactors follow. truck: what the truck requests. An operational charger requests a charge,
+  /// until its heartbeat ends or has another state. While a charger is present no drive is requested, because a truck
+  /// must not drive with its charger connected (EN 1175): if the truck requests it, the contactors open.
+  constexpr protection::Request request(protection::Request truck, std::uint64_t now_us) const {
+    if (!charger_.present(now_us)) return truck;
+    if (truck == protection::Request::drive) return protection::Request::none;
+    return charger_.operational(now_us) ? protection::Request::charge : truck;
+  }
 
   /// Object dictionary, for the SDO server.
   canopen::Entry read(std::uint16_t index, std::uint8_t sub) const {
@@ -153,6 +167,7 @@ class Cia418Profile {
   }
 
   canopen::Node node_{static_cast<std::uint8_t>(hal::canopen_node)};
+  canopen::Peer charger_{static_cast<std::uint8_t>(hal::canopen_charger)};
   Cycle cycle_;
   std::uint32_t voltage_ = 0xFFFF'FFFF;
   std::int16_t temperature_ = no_value;
@@ -168,7 +183,7 @@ constexpr bool pdo_ids_are_unique() {
                 hal::canopen_charger <= 127 && hal::canopen_node != hal::canopen_charger;
   for (const Cia418Profile::Pdo& pdo : Cia418Profile::pdos) {
     std::apply([&](auto... m) { ((unique = unique && m.id != pdo.id), ...); }, can::Messages{});
-    for (const std::uint16_t id : hal::accepted_ids) unique = unique && id != pdo.id;
+    for (const std::uint16_t id : hal::request_and_sample_ids) unique = unique && id != pdo.id;
   }
   return unique;
 }

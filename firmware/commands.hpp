@@ -5,6 +5,7 @@
 // is answered "refused", an unknown code "no such command"; neither changes anything.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -16,6 +17,9 @@
 namespace bms::firmware {
 
 static_assert(can::Command::id == hal::command_frame_id, "the acceptance filter of a real bus would reject commands");
+
+/// Parts of the stored data that are sent one by one: sixteen faults, then a reset cause each, with other counters.
+inline constexpr std::uint32_t stored_parts = 16 + 7;
 
 /// What the commands have requested so far.
 struct Requested {
@@ -29,12 +33,18 @@ struct Requested {
   };
   std::optional<CalibrationChange> calibration_change;  ///< reset when applied
   protection::Clear clear = protection::Clear::none;    ///< reset when applied
+  std::uint8_t stored_next = 0, stored_end = 0;         ///< items of the stored data to be sent
   protection::Request power = protection::Request::none;
   std::uint64_t power_at_us = 0;  ///< time of the last request for power
 
   /// Returns the request for power. It expires if the vehicle does not repeat it.
   constexpr protection::Request active_request(std::uint64_t now_us) const {
     return now_us - power_at_us < request_timeout_us ? power : protection::Request::none;
+  }
+  /// Returns the next item to be sent, if any: one with each sample.
+  constexpr std::optional<std::uint8_t> next_stored_part() {
+    if (stored_next >= stored_end) return std::nullopt;
+    return stored_next++;
   }
 };
 
@@ -77,6 +87,14 @@ class Commands {
         requested.power = static_cast<protection::Request>(command.argument);
         requested.power_at_us = now_us;
         return A::result_done;
+      case can::Command::code_stored_data: {
+        const std::uint32_t first = command.argument & 0xFF, count = command.argument >> 8;
+        if (first >= stored_parts || count > stored_parts) return A::result_refused;
+        requested.stored_next = static_cast<std::uint8_t>(first);
+        requested.stored_end =
+            static_cast<std::uint8_t>(count == 0 ? stored_parts : std::min(first + count, stored_parts));
+        return A::result_done;
+      }
       case can::Command::code_voltage_gain:
       case can::Command::code_voltage_offset:
       case can::Command::code_current_gain:

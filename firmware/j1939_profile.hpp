@@ -80,10 +80,10 @@ constexpr DcSourceStatus4 status_4(const protection::Decision& d, const protecti
 
 constexpr DcSourceStatus6 status_6(const protection::Decision& d) {
   using protection::bit, protection::Fault;
-  constexpr std::uint32_t above =
+  constexpr protection::FaultSet above =
       bit(Fault::cell_overvoltage) | bit(Fault::cell_overvoltage_severe) | bit(Fault::pack_overvoltage);
-  constexpr std::uint32_t below = bit(Fault::cell_undervoltage) | bit(Fault::cell_undervoltage_severe) |
-                                  bit(Fault::pack_undervoltage) | bit(Fault::deep_discharge);
+  constexpr protection::FaultSet below = bit(Fault::cell_undervoltage) | bit(Fault::cell_undervoltage_severe) |
+                                         bit(Fault::pack_undervoltage) | bit(Fault::deep_discharge);
   auto m = message_of_instance<DcSourceStatus6>();
   m.high_voltage_limit = flag((d.faults & (above | bit(Fault::cell_overvoltage_warning))) != 0);
   m.high_voltage_disconnect = flag((d.faults & above) != 0 && !d.outputs.main_plus);
@@ -122,7 +122,8 @@ class J1939Profile {
     send_if_due<j1939::DcSourceStatus11>([&] { return j1939::status_11(now); });
   }
 
-  constexpr void receive(const can::Frame&) {}
+  constexpr void receive(const can::Frame&, std::uint64_t) {}
+  constexpr protection::Request request(protection::Request truck, std::uint64_t) const { return truck; }
 
  private:
   template <class Message>

@@ -3,6 +3,7 @@
 #include "firmware/board_cell.hpp"
 #include "hal/board_state.hpp"
 #include "hal/clock.hpp"
+#include "hal/retained.hpp"
 #include "hal/samples.hpp"
 #include "hal/supply.hpp"
 
@@ -27,7 +28,7 @@ int main() {
   hal::board_start();
   storage::Persistence persistence;
   // may erase, up to half a second per sector; so it comes before anything that must answer in time
-  persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
+  persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s(), hal::retained_ram());
   hal::calibrate(stored_calibration(persistence));
   hal::can_start();
   const auto* sample = hal::next_sample();

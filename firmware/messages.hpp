@@ -10,6 +10,7 @@
 #include "estimator/pack_estimator.hpp"
 #include "hal/board_state.hpp"
 #include "hal/power.hpp"
+#include "hal/second_line.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
 
@@ -93,12 +94,22 @@ constexpr float amperes(std::int32_t ua) {
   return ua != measurement::no_reading ? static_cast<float>(ua) * 1e-6F : can::unknown;
 }
 
+/// Packs of more cells have a voltage beyond the range of PackElectrical, and send PackVoltage.
+inline constexpr std::size_t max_cells_of_pack_electrical = 16;
+
 template <std::size_t Cells>
 constexpr can::PackElectrical pack_electrical(const measurement::PackSample<Cells>& pack) {
   can::PackElectrical m;
-  m.voltage = volts(pack.pack_uv);
+  if constexpr (Cells <= max_cells_of_pack_electrical) m.voltage = volts(pack.pack_uv);
   m.current = amperes(pack.current_ua);
   m.temperature = degrees(pack.temperature_cdegc[0]);
+  return m;
+}
+
+template <std::size_t Cells>
+constexpr can::PackVoltage pack_voltage(const measurement::PackSample<Cells>& pack) {
+  can::PackVoltage m;
+  m.voltage = volts(pack.pack_uv);
   return m;
 }
 
@@ -152,14 +163,48 @@ constexpr can::Temperatures temperatures(const measurement::PackSample<Cells>& p
   return m;
 }
 
-constexpr can::Faults faults(const protection::Decision& d) {
-  can::Faults m;
-  std::size_t k = 0;
-  m.each([&](const char*, const char*, std::uint32_t& value, const can::SignalLayout& s) {
-    if (s.bits == 1) value = d.faults >> k++ & 1;
+/// Returns true if the signals of one bit follow each other from bit 16 on.
+template <class Message>
+constexpr bool bits_follow_each_other() {
+  unsigned next = 16;
+  bool follow = true;
+  Message{}.each([&](const char*, const char*, const std::uint32_t&, const can::SignalLayout& s) {
+    if (s.bits == 1) follow = follow && s.start == next++;
   });
-  m.first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
-  return m;
+  return follow;
+}
+
+/// A message whose signals of one bit are written as one word, which takes a tenth of the code.
+template <class Message>
+struct BitMessage {
+  static_assert(bits_follow_each_other<Message>());
+  std::uint64_t raw = 0;   ///< bits 16 to 63 of the frame
+  std::uint8_t state = 0;  ///< bits 12 to 15
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{Message::id, 8, {}};
+    can::set_bits(out, raw << 16 | std::uint64_t{state} << 12);
+    can::protect(out, Message::data_id, counter);
+    return out;
+  }
+};
+
+constexpr BitMessage<can::Faults> faults(const protection::Decision& d) {
+  static_assert(can::Faults::first_cause_layout.start == 48);
+  const std::uint32_t first_cause = d.first.fault == protection::no_fault ? 0 : d.first.fault + 1U;
+  return {std::uint64_t{first_cause} << 32 | static_cast<std::uint32_t>(d.faults)};
+}
+constexpr BitMessage<can::MoreFaults> more_faults(const protection::Decision& d) { return {d.faults >> 32}; }
+
+/// trips: hal::SecondLineTrip, in the order of the signals. Counters saturate.
+constexpr BitMessage<can::FrontEnd> front_end(std::uint32_t trips, const hal::FrontEndHealth& health) {
+  using M = can::FrontEnd;
+  static_assert(M::state_layout.start == 12 && M::lost_layout.start == 32 && M::resets_layout.start == 40 &&
+                M::crc_errors_layout.start == 48);
+  const std::uint32_t counters = std::min<std::uint32_t>(health.bad_crc, 65'535U) << 16 |
+                                 std::min<std::uint32_t>(health.resets, 255U) << 8 |
+                                 std::min<std::uint32_t>(health.lost, 255U);
+  return {std::uint64_t{counters} << 16 | trips, static_cast<std::uint8_t>(health.state)};
 }
 
 constexpr can::ContactorState contactor_state(const protection::Decision& d) {
@@ -169,6 +214,12 @@ constexpr can::ContactorState contactor_state(const protection::Decision& d) {
   m.main_minus = d.outputs.main_minus ? 1 : 0;
   m.precharge = d.outputs.precharge ? 1 : 0;
   m.charge_enable = d.outputs.charge_enable ? 1 : 0;
+  if ((d.faults & bit(protection::Fault::contactor_welded)) != 0)  // after a power cycle the pole is not known
+    m.welded_pole =
+        static_cast<std::uint32_t>(d.welded_pole == protection::Pole::none ? protection::Pole::unknown : d.welded_pole);
+  m.auxiliary_fitted = d.auxiliary.fitted ? 1 : 0;
+  m.auxiliary_plus = d.auxiliary.main_plus_closed ? 1 : 0;
+  m.auxiliary_minus = d.auxiliary.main_minus_closed ? 1 : 0;
   if (d.first.fault != protection::no_fault)
     m.first_cause_time = static_cast<float>(static_cast<std::uint32_t>(d.first.time_us / 100'000)) * 0.1F;
   return m;
@@ -226,6 +277,10 @@ constexpr can::SocAnchor soc_anchor(const Condition& condition) {
   return m;
 }
 
+inline std::uint32_t storing_state(const storage::Persistence& persistence) {
+  return persistence.full() ? can::Storage::state_full : can::Storage::state_works;
+}
+
 inline can::Storage storage(const storage::Persistence& persistence) {
   using M = can::Storage;
   const auto& log = persistence.log();
@@ -233,7 +288,7 @@ inline can::Storage storage(const storage::Persistence& persistence) {
   if (log.sectors() == 0)
     m.state = M::state_no_flash;
   else
-    m.state = log.operational() ? M::state_works : M::state_nothing_more_is_kept;
+    m.state = log.operational() ? storing_state(persistence) : M::state_nothing_more_is_kept;
   m.broken_sectors = std::min<std::uint32_t>(log.broken(), 15U);
   m.newer_records = std::min<std::uint32_t>(persistence.newer_records(), 15U);
   m.erases = std::min<std::uint32_t>(log.erase_cycles(), 65'535U);

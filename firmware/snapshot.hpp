@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
@@ -35,8 +36,9 @@ struct Snapshot {
   const protection::ProtectionPlan& plan;
   const storage::Persistence& persistence;
   const BoardStatus& board;
-  float capacity_ah;  ///< of the cell file
-  bool log_samples;   ///< SampleCurrent to EstimateHash are sent, too
+  float capacity_ah;                        ///< of the cell file
+  bool log_samples;                         ///< SampleCurrent to EstimateHash are sent, too
+  std::optional<std::uint8_t> stored_part;  ///< part of the stored data to be sent (firmware/stored_data.hpp)
 
   constexpr bool soc_known() const { return (estimate.flags & estimator::not_started) == 0; }
 };

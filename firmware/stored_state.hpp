@@ -9,6 +9,7 @@
 
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
+#include "firmware/commands.hpp"
 #include "firmware/messages.hpp"
 #include "hal/calibration.hpp"
 #include "storage/persistence.hpp"
@@ -16,8 +17,9 @@
 namespace bms::firmware {
 
 // Keys of the stored settings and codes of the stored faults.
-inline constexpr std::uint16_t latched_faults_key = 1;  ///< protection::Decision::latched
-inline constexpr std::uint16_t cell_file_key = 2;       ///< hash of the cell file that the stored data belong to
+inline constexpr std::uint16_t latched_faults_key = 1;       ///< bits 0 to 31 of protection::Decision::latched
+inline constexpr std::uint16_t more_latched_faults_key = 3;  ///< its bits 32 to 63
+inline constexpr std::uint16_t cell_file_key = 2;            ///< hash of the cell file that the stored data belong to
 /// Four keys for hal::SensorCalibration: gain [ppm] and offset [uV] of the voltage, gain [ppm] and offset [uA] of the
 /// current.
 inline constexpr std::uint16_t first_calibration_key = 16;
@@ -68,9 +70,30 @@ class StateToStoreOf {
   std::array<storage::CellsRecord::Cell, Cells> cells_{};
 };
 
-/// Calibration of the measuring chain from the stored settings; 0 where nothing is stored.
-inline hal::SensorCalibration stored_calibration(const storage::Persistence& persistence) {
+/// Range of the readings of a sample. Readings that the sensors cannot give are omitted.
+inline storage::ReadingRange reading_range(std::span<const std::int32_t> cell_uv, std::span<const std::int16_t> cdegc,
+                                           std::int32_t current_ua, const model::PlausibleRange& plausible) {
+  using storage::ReadingRange;
+  ReadingRange r;
+  for (const std::int32_t uv : cell_uv) {
+    if (uv >= plausible.voltage_min_uv && uv <= plausible.voltage_max_uv)
+      r.add(ReadingRange::voltage, static_cast<std::int16_t>(uv / 1'000));
+  }
+  for (const std::int16_t t : cdegc) {
+    if (measurement::temperature_possible(t)) r.add(ReadingRange::temperature, static_cast<std::int16_t>(t / 100 + 60));
+  }
+  if (current_ua != measurement::no_reading)
+    r.add(ReadingRange::current,
+          static_cast<std::int16_t>(std::clamp<std::int32_t>(current_ua / 250'000, -8'191, 8'191)));
+  return r;
+}
+
+/// Calibration of the measuring chain from the stored settings, with `change` in place of the stored value; 0 where
+/// nothing is stored.
+inline hal::SensorCalibration stored_calibration(
+    const storage::Persistence& persistence, const std::optional<Requested::CalibrationChange>& change = std::nullopt) {
   const auto value = [&](std::uint16_t k) {
+    if (change && change->which == k) return change->value;
     return persistence.settings().get(static_cast<std::uint16_t>(first_calibration_key + k)).value_or(0);
   };
   return {value(0), value(1), value(2), value(3)};

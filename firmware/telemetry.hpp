@@ -14,6 +14,7 @@
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "firmware/snapshot.hpp"
+#include "firmware/stored_data.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
@@ -50,6 +51,8 @@ class Telemetry {
       return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
     });
     published_alarming_ = now.board.alarming();
+    if (now.stored_part) [[unlikely]]
+      stored_data_.send(*now.stored_part, now.persistence, static_cast<std::uint32_t>(now.capacity_ah * 1e6F));
     if (now.log_samples) log(now.mean);
     send(messages::pack_state(now.estimate, now.condition));
     send(messages::pack_electrical(now.pack));
@@ -82,6 +85,14 @@ class Telemetry {
 
   template <class Message>
   void send(const Message& message) {
+    send_as<Message>(message);
+  }
+  template <class Message>
+  void send(const messages::BitMessage<Message>& message) {
+    send_as<Message>(message);
+  }
+  template <class Message, class Content>
+  void send_as(const Content& message) {
     auto& sent = std::get<SendState<Message>>(sent_);
     hal::can_send(message.frame(sent.counter));
     sent.counter = can::next(sent.counter);
@@ -101,16 +112,23 @@ class Telemetry {
   }
 
   void publish_protection(const protection::Decision& d) {
-    send_if_due_or_changed<can::Faults>(d.faults != published_faults_, [&] { return messages::faults(d); });
+    const bool faults_changed = d.faults != published_faults_;
+    send_if_due_or_changed<can::Faults>(faults_changed, [&] { return messages::faults(d); });
+    send_if_due_or_changed<can::MoreFaults>(faults_changed, [&] { return messages::more_faults(d); });
     send_if_due_or_changed<can::ContactorState>(d.state != published_state_ || d.outputs != published_outputs_,
                                                 [&] { return messages::contactor_state(d); });
     send_if_due<can::AllowedCurrent>([&] { return messages::allowed_current(d); });
+    const std::uint32_t trips = hal::second_line_trips();
+    send_if_due_or_changed<can::FrontEnd>(trips != published_trips_,
+                                          [&] { return messages::front_end(trips, hal::front_end_health()); });
+    published_trips_ = trips;
     published_faults_ = d.faults;
     published_state_ = d.state;
     published_outputs_ = d.outputs;
   }
 
   void publish_cells(const Snapshot<Estimator, Cells>& now) {
+    static_assert(Cells <= 24, "further cells have no message");
     send_if_due<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(now.pack); });
     if constexpr (Cells > 4)
       send_if_due<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(now.pack); });
@@ -118,6 +136,12 @@ class Telemetry {
       send_if_due<can::CellVoltages3>([&] { return messages::cell_voltages<can::CellVoltages3, 8>(now.pack); });
     if constexpr (Cells > 12)
       send_if_due<can::CellVoltages4>([&] { return messages::cell_voltages<can::CellVoltages4, 12>(now.pack); });
+    if constexpr (Cells > 16)
+      send_if_due<can::CellVoltages5>([&] { return messages::cell_voltages<can::CellVoltages5, 16>(now.pack); });
+    if constexpr (Cells > 20)
+      send_if_due<can::CellVoltages6>([&] { return messages::cell_voltages<can::CellVoltages6, 20>(now.pack); });
+    if constexpr (Cells > messages::max_cells_of_pack_electrical)
+      send_if_due<can::PackVoltage>([&] { return messages::pack_voltage(now.pack); });
     send_if_due<can::CellExtremes>([&] { return messages::cell_extremes(now.pack, now.cells); });
     send_if_due<can::Temperatures>([&] { return messages::temperatures(now.pack); });
     send_if_due<can::Balancing>([&] { return messages::balancing(now.decision); });
@@ -153,8 +177,10 @@ class Telemetry {
   messages::Identity identity_;
   std::optional<measurement::StartingPoint> start_;
   typename SendStatesOf<can::Messages>::type sent_{};
+  StoredData stored_data_;
   estimator::EstimateHash hash_;
-  std::uint32_t now_us_ = 0, published_faults_ = 0, published_ = 0;
+  protection::FaultSet published_faults_ = 0;
+  std::uint32_t now_us_ = 0, published_ = 0, published_trips_ = 0;
   protection::ContactorState published_state_ = protection::ContactorState::off;
   protection::Outputs published_outputs_;
   std::uint16_t samples_ = 0;

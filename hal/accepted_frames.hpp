@@ -1,9 +1,11 @@
 // Identifiers that the firmware receives. A back end with acceptance filters rejects all others.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "board_config.hpp"  // generated from boards/<board>/board.cmake: vehicle_profile, canopen_node
 #include "hal/sample_frames.hpp"
@@ -12,23 +14,26 @@ namespace bms::hal {
 
 inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.hpp compares it with the DBC file
 
-/// Network management and requests to the battery's SDO server, in an image that is a CANopen node
-/// (firmware/cia418_profile.hpp).
-inline constexpr auto profile_ids = [] {
+/// Commands; network management, requests to the battery's SDO server and the charger's heartbeat in an image that is a
+/// CANopen node (firmware/cia418_profile.hpp).
+inline constexpr auto request_ids = [] {
   if constexpr (vehicle_profile == VehicleProfile::cia418)
-    return std::array<std::uint16_t, 2>{0x000, 0x600 + canopen_node};
+    return std::array<std::uint16_t, 4>{command_frame_id, 0x000, 0x600 + canopen_node, 0x700 + canopen_charger};
   else
-    return std::array<std::uint16_t, 0>{};
+    return std::array<std::uint16_t, 1>{command_frame_id};
 }();
 
-/// Identifiers of hal/sample_frames.hpp, of commands and of the vehicle profile.
-inline constexpr auto accepted_ids = []() {
+/// Also the identifiers of hal/sample_frames.hpp, for an image without a measuring chain of its own.
+inline constexpr auto request_and_sample_ids = [] {
   constexpr std::size_t of_samples = last_sample_frame_id - first_sample_frame_id + 1;
-  std::array<std::uint16_t, of_samples + 1 + profile_ids.size()> ids{};
+  std::array<std::uint16_t, of_samples + request_ids.size()> ids{};
   for (std::size_t k = 0; k < of_samples; ++k) ids[k] = static_cast<std::uint16_t>(first_sample_frame_id + k);
-  ids[of_samples] = command_frame_id;
-  for (std::size_t k = 0; k < profile_ids.size(); ++k) ids[of_samples + 1 + k] = profile_ids[k];
+  std::copy(request_ids.begin(), request_ids.end(), ids.begin() + of_samples);
   return ids;
 }();
+
+/// The identifiers that this image receives: one of the lists above, by the source of its samples. Back ends: absent/
+/// starting_point, remote/samples.
+std::span<const std::uint16_t> accepted_ids();
 
 }  // namespace bms::hal

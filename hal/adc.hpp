@@ -6,7 +6,14 @@
 
 namespace bms::hal {
 
-enum class AnalogInput : std::uint8_t { voltage, current, temperature, reference };
+enum class AnalogInput : std::uint8_t {
+  voltage,
+  current,
+  temperature,
+  reference,
+  link_plus,  ///< divider of the DC link at main plus
+  link_minus,
+};
 
 /// Configures pins and converter. Call once, before the first conversion.
 void adc_start();

@@ -22,17 +22,19 @@ struct BoardState {
   // The board can work with these.
   bool supply_low = false;           ///< the supply is below the detector's threshold now
   bool brown_out_reset_low = false;  ///< the chip resets only below the voltage at which its flash can be programmed
-  bool clock_failed = false;         ///< the crystal failed: the core runs slower, and CAN is off
+  /// The core runs on its internal oscillator without CAN, or its frequency was wrong: unfit as above.
+  bool clock_failed = false;
   CalendarState calendar = CalendarState::absent;
   std::uint16_t stack_free = 0xFFFF;  ///< minimum so far [bytes]; 0xFFFF: not measured
 
-  constexpr bool unfit() const { return ram_failed || image_failed || stack_overrun; }
+  constexpr bool unfit() const { return ram_failed || image_failed || stack_overrun || clock_failed; }
 };
 
 /// Runs the self-tests of the start. Call once, after clock and watchdog, before stored data are used.
 void board_start();
 
-/// Call with every sample. Each call searches a further part of the stack; about 1,000 instructions.
+/// Call with every sample. Each call searches a further part of the stack and checks a further part of the image; about
+/// 5,000 instructions.
 BoardState board_state();
 
 }  // namespace bms::hal

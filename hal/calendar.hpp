@@ -1,7 +1,8 @@
-// Calendar clock that runs while the power is off. Back ends: stm32f4/calendar (own supply and crystal),
-// emulated/calendar (the host's clock), absent/calendar (a board without a backup battery).
+// Calendar clock that runs while the power is off, and words that its supply preserves. Back ends: stm32f4/calendar
+// (own supply and crystal), emulated/calendar (the host's clock), absent/calendar (a board without a backup battery).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -20,5 +21,11 @@ std::optional<std::uint32_t> calendar_s();
 bool calendar_set(std::uint32_t unix_s);
 
 CalendarState calendar_state();
+
+inline constexpr std::size_t backup_words = 4;
+/// k below backup_words. 0 if the board has no backup supply. After a loss of that supply the content is undefined, so
+/// the user of it needs a checksum.
+std::uint32_t backup_word(std::size_t k);
+void set_backup_word(std::size_t k, std::uint32_t value);
 
 }  // namespace bms::hal

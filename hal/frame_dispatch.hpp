@@ -1,5 +1,5 @@
-// Sorts the received CAN frames for a back end of samples.hpp: parts of samples go to the back end; the starting point
-// and requests are stored until starting_point() and next_request() (requests.hpp) fetch them.
+// Sorts the received CAN frames for a back end of samples.hpp: parts of samples are the back end's, or ignored if the
+// board measures itself; requests are stored until next_request() (requests.hpp) fetches them.
 #pragma once
 
 #include "hal/can.hpp"

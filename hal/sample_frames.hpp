@@ -1,22 +1,28 @@
 // Samples as CAN frames, for boards without a measuring chain of their own. The last frame completes the sample.
 // Identifiers ascend in sending order, so a node that sends by priority keeps the order.
 //
-//   0x310           i32 soc_ppb, i32 soc_sigma_ppb       starting point, before the first sample
+//   0x310           i32 soc_ppb, i32 soc_sigma_ppb       starting point, before the first sample; ignored unless soc is
+//                                                        0 to 1 and sigma 0.001 to 0.289
 //   0x311           u32 CRC-32, u16 frames, u16 counter  optional check: CRC over identifier and data of all following
-//                                                        frames up to 0x31D; `frames` is their number
+//                                                        frames of the sample; `frames` is their number
 //   0x312           i32 current_ua, i32 voltage_uv       of a pack: voltage over all cells
-//   0x313           i32 dc_link_uv, i32 0                optional: load side of the contactors
+//   0x313           i32 link_plus_uv, i32 link_minus_uv  optional: load side of main plus and of main minus against the
+//                                                        negative end of the cells
 //   0x314 to 0x31B  i32 uv, i32 uv                       of a pack: cells 1 and 2, 3 and 4, ...
 //   0x31C           4 x i16 temperature_cdegc            of a pack
 //   0x31D           u48 time_us, i16 temperature_cdegc   completes the sample; of a pack: no temperature
+//   0x31E to 0x321  i32 uv, i32 uv                       of a pack of more than 16 cells: cells 17 and 18, ...
+//   0x322           as 0x31D, which is not sent          completes the sample of a pack of more than 16 cells
 //
 // A lost frame makes its readings missing. With a check frame, a sample with a wrong bit or a missing frame is
 // rejected as a whole.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "hal/bytes.hpp"
@@ -28,8 +34,27 @@ namespace bms::hal {
 
 inline constexpr std::uint16_t start_frame_id = 0x310, check_frame_id = 0x311, reading_frame_id = 0x312,
                                dc_link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
-                               time_frame_id = 0x31D, first_sample_frame_id = start_frame_id,
-                               last_sample_frame_id = time_frame_id;
+                               time_frame_id = 0x31D, cell_17_frame_id = 0x31E, large_pack_time_frame_id = 0x322,
+                               first_sample_frame_id = start_frame_id, last_sample_frame_id = large_pack_time_frame_id;
+
+/// The last frame of a sample of this number of cells.
+template <std::size_t Cells>
+inline constexpr std::uint16_t completing_frame_id = Cells > 16 ? large_pack_time_frame_id : time_frame_id;
+
+/// Identifier of the frame with this cell and its neighbour; cell: 0 to 23.
+constexpr std::uint16_t cells_frame_id(std::size_t cell) {
+  return static_cast<std::uint16_t>(cell < 16 ? first_cells_frame_id + cell / 2 : cell_17_frame_id + cell / 2 - 8);
+}
+
+/// The first of the two cells of a frame of a sample, or nothing if it has no cells.
+constexpr std::optional<std::size_t> first_cell_of(std::uint32_t id) {
+  if (id >= first_cells_frame_id && id < temperatures_frame_id) return std::size_t{2} * (id - first_cells_frame_id);
+  if (id >= cell_17_frame_id && id < large_pack_time_frame_id) return 16 + std::size_t{2} * (id - cell_17_frame_id);
+  return std::nullopt;
+}
+
+/// Range of a starting point's sigma. No estimate is better than the first; 1 / sqrt(12) is that of an unknown soc.
+inline constexpr std::int32_t min_start_sigma_ppb = 1'000'000, max_start_sigma_ppb = 289'000'000;
 
 /// Returns true if the identifier belongs to a sample or a starting point.
 constexpr bool is_sample_frame(const can::Frame& frame) {
@@ -61,11 +86,12 @@ constexpr std::array<can::Frame, 2> frames_of(const measurement::Sample& s) {
 template <std::size_t Cells>
 inline constexpr std::size_t pack_frames = 5 + (Cells + 1) / 2;
 
-/// counter: sequence number of the sample, any start value.
+/// link_plus_uv, link_minus_uv: no_reading if unknown. counter: sequence number of the sample, any start value.
 template <std::size_t Cells>
 constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement::PackSample<Cells>& s,
-                                                               std::int32_t dc_link_uv, std::uint16_t counter) {
-  static_assert(Cells <= 16);
+                                                               std::int32_t link_plus_uv, std::uint16_t counter,
+                                                               std::int32_t link_minus_uv = 0) {
+  static_assert(Cells <= 24);
   std::array<can::Frame, pack_frames<Cells>> frames{};
   std::size_t n = 1;
   const auto pair = [&](std::uint16_t id, std::int32_t first, std::int32_t second) {
@@ -75,16 +101,17 @@ constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement
     put_bytes(frame.data, 4, second);
   };
   pair(reading_frame_id, s.current_ua, s.pack_uv);
-  pair(dc_link_frame_id, dc_link_uv, 0);
+  pair(dc_link_frame_id, link_plus_uv, link_minus_uv);
   for (std::size_t k = 0; k < Cells; k += 2)
-    pair(static_cast<std::uint16_t>(first_cells_frame_id + k / 2), s.cell_uv[k],
-         k + 1 < Cells ? s.cell_uv[k + 1] : measurement::no_reading);
-  frames[n] = {temperatures_frame_id, 8, {}};
+    pair(cells_frame_id(k), s.cell_uv[k], k + 1 < Cells ? s.cell_uv[k + 1] : measurement::no_reading);
+  can::Frame& temperatures = frames[n++];
+  temperatures = {temperatures_frame_id, 8, {}};
   for (std::size_t k = 0; k < measurement::max_temperatures; ++k)
-    put_bytes(frames[n].data, 2 * k, s.temperature_cdegc[k]);
-  frames[++n] = {time_frame_id, 8, {}};
+    put_bytes(temperatures.data, 2 * k, s.temperature_cdegc[k]);
+  frames[n] = {completing_frame_id<Cells>, 8, {}};
   put_bytes(frames[n].data, 0, s.time_us, 6);
   put_bytes(frames[n].data, 6, measurement::no_temperature);
+  std::sort(frames.begin() + 1, frames.end(), [](const can::Frame& a, const can::Frame& b) { return a.id < b.id; });
   std::uint32_t crc = ~0U;
   for (std::size_t k = 1; k < frames.size(); ++k) crc = update_crc(crc, frames[k]);
   frames[0] = {check_frame_id, 8, {}};
@@ -101,14 +128,25 @@ constexpr can::Frame frame_of(const measurement::StartingPoint& p) {
   return frame;
 }
 
+/// Returns the starting point of a frame, or nothing if it is another frame or a value is out of range.
+constexpr std::optional<measurement::StartingPoint> starting_point_of(const can::Frame& frame) {
+  if (frame.long_id || frame.id != start_frame_id || frame.length != 8) return std::nullopt;
+  const measurement::StartingPoint p{get_bytes<std::int32_t>(frame.data, 0), get_bytes<std::int32_t>(frame.data, 4)};
+  const bool in_range = p.soc_ppb >= 0 && p.soc_ppb <= 1'000'000'000 && p.soc_sigma_ppb >= min_start_sigma_ppb &&
+                        p.soc_sigma_ppb <= max_start_sigma_ppb;
+  return in_range ? std::optional(p) : std::nullopt;
+}
+
 /// Assembles samples from frames.
 template <std::size_t Cells>
 class SampleFrames {
  public:
   /// Returns true if `frame` completed a valid sample, which sample() holds until the next call. Frames with another
-  /// length or identifier change nothing.
+  /// length or identifier change nothing, and neither do those of a pack of another size (above or up to 16 cells).
   constexpr bool receive(const can::Frame& frame) {
+    if (const auto start = starting_point_of(frame)) start_ = start;
     if (frame.length != 8 || !is_sample_frame(frame) || frame.id == start_frame_id) return false;
+    if (frame.id > completing_frame_id<Cells> || (Cells > 16 && frame.id == time_frame_id)) return false;
     if (done_) begin();
     if (frame.id == check_frame_id) {
       begin();
@@ -124,16 +162,16 @@ class SampleFrames {
       building_.pack_uv = get_bytes<std::int32_t>(frame.data, 4);
       if constexpr (Cells == 1) building_.cell_uv[0] = building_.pack_uv;
     } else if (frame.id == dc_link_frame_id) {
-      dc_link_uv_ = get_bytes<std::int32_t>(frame.data, 0);
-    } else if (frame.id >= first_cells_frame_id && frame.id < temperatures_frame_id) {
-      const std::size_t first = std::size_t{2} * (frame.id - first_cells_frame_id);
-      if (first < Cells) building_.cell_uv[first] = get_bytes<std::int32_t>(frame.data, 0);
-      if (first + 1 < Cells) building_.cell_uv[first + 1] = get_bytes<std::int32_t>(frame.data, 4);
+      link_plus_uv_ = get_bytes<std::int32_t>(frame.data, 0);
+      link_minus_uv_ = get_bytes<std::int32_t>(frame.data, 4);
+    } else if (const auto first = first_cell_of(frame.id)) {
+      if (*first < Cells) building_.cell_uv[*first] = get_bytes<std::int32_t>(frame.data, 0);
+      if (*first + 1 < Cells) building_.cell_uv[*first + 1] = get_bytes<std::int32_t>(frame.data, 4);
     } else if (frame.id == temperatures_frame_id) {
       for (std::size_t k = 0; k < measurement::max_temperatures; ++k)
         building_.temperature_cdegc[k] = get_bytes<std::int16_t>(frame.data, 2 * k);
     }
-    if (frame.id != time_frame_id) return false;
+    if (frame.id != completing_frame_id<Cells>) return false;
     building_.time_us = get_bytes<std::uint64_t>(frame.data, 0, 6);
     if (const auto cdegc = get_bytes<std::int16_t>(frame.data, 6); cdegc != measurement::no_temperature)
       building_.temperature_cdegc[0] = cdegc;
@@ -144,31 +182,27 @@ class SampleFrames {
   }
 
   constexpr const measurement::PackSample<Cells>& sample() const { return building_; }
-  constexpr std::int32_t dc_link_uv() const { return dc_link_uv_; }  ///< [uV]; no_reading: not received
-  constexpr std::uint32_t rejected() const { return rejected_; }     ///< samples with a wrong CRC or frame count
+  constexpr std::int32_t link_plus_uv() const { return link_plus_uv_; }  ///< [uV]; no_reading: not received
+  constexpr std::int32_t link_minus_uv() const { return link_minus_uv_; }
+  constexpr std::uint32_t rejected() const { return rejected_; }  ///< samples with a wrong CRC or frame count
+  /// The last valid starting point that was received, if any.
+  constexpr const std::optional<measurement::StartingPoint>& starting_point() const { return start_; }
 
  private:
   constexpr void begin() {
     building_ = {};
-    dc_link_uv_ = measurement::no_reading;
+    link_plus_uv_ = link_minus_uv_ = measurement::no_reading;
     crc_ = ~0U;
     frames_ = 0;
     checked_ = done_ = false;
   }
 
   measurement::PackSample<Cells> building_{};
-  std::int32_t dc_link_uv_ = measurement::no_reading;
+  std::optional<measurement::StartingPoint> start_;
+  std::int32_t link_plus_uv_ = measurement::no_reading, link_minus_uv_ = measurement::no_reading;
   std::uint32_t crc_ = ~0U, expected_crc_ = 0, rejected_ = 0;
   std::uint16_t frames_ = 0, expected_frames_ = 0;
   bool checked_ = false, done_ = false;
 };
-
-constexpr bool is_starting_point(const can::Frame& frame) {
-  return !frame.long_id && frame.id == start_frame_id && frame.length == 8;
-}
-
-constexpr measurement::StartingPoint starting_point_of(const can::Frame& frame) {
-  return {get_bytes<std::int32_t>(frame.data, 0), get_bytes<std::int32_t>(frame.data, 4)};
-}
 
 }  // namespace bms::hal

@@ -14,7 +14,8 @@ namespace bms::hal {
 /// a truck.
 const measurement::PackSample<pack_cells>* next_sample();
 
-/// Known state of charge before the first sample, if any. Call once, after the first next_sample().
+/// Known state of charge before the first sample, if any. Call once, after the first next_sample(). Boards that measure
+/// themselves have none (absent/starting_point): on their bus it could be another device's frame.
 std::optional<measurement::StartingPoint> starting_point();
 
 }  // namespace bms::hal

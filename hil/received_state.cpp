@@ -24,6 +24,9 @@ void ReceivedState::receive(double time_s, const can::Frame& frame) {
     case can::Faults::id:
       update_faults(time_s, can::Faults::of(frame));
       break;
+    case can::MoreFaults::id:
+      update_faults(time_s, can::MoreFaults::of(frame));
+      break;
     default:
       break;
   }
@@ -35,7 +38,8 @@ std::uint64_t ReceivedState::sum(std::uint64_t monitor::MessageState::*count) co
   return all;
 }
 
-void ReceivedState::update_faults(double time_s, can::Faults message) {
+template <class Message>
+void ReceivedState::update_faults(double time_s, Message message) {
   message.each([&](const char* name, const char*, auto& value, const can::SignalLayout& layout) {
     if (layout.bits != 1) return;
     const auto last = std::find_if(faults.rbegin(), faults.rend(), [&](const FaultEvent& f) { return f.name == name; });

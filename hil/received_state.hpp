@@ -11,7 +11,7 @@
 
 namespace bms::hil {
 
-/// One interval in which the board published a fault (a bit of the message Faults).
+/// One interval in which the board published a fault (a bit of the messages Faults and MoreFaults).
 struct FaultEvent {
   std::string name;  ///< as in the DBC file
   double raised_at_s = 0;
@@ -33,7 +33,9 @@ class ReceivedState {
 
  private:
   std::uint64_t sum(std::uint64_t monitor::MessageState::*count) const;
-  void update_faults(double time_s, can::Faults message);
+  /// Message: Faults or MoreFaults.
+  template <class Message>
+  void update_faults(double time_s, Message message);
 
   monitor::BusState bus_;
 };

@@ -35,16 +35,26 @@ can::Frame request(protection::Request what, std::uint8_t counter) {
 }
 
 template <std::size_t Cells>
-std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, double dc_link_v,
-                                   std::uint16_t counter) {
+std::vector<can::Frame> frames_of_cells(const measurement::PackSample<max_cells>& all, const plant::LinkPoles& link,
+                                        std::uint16_t counter) {
   measurement::PackSample<Cells> s;
   s.time_us = all.time_us;
   s.current_ua = all.current_ua;
   s.pack_uv = Cells == 1 ? all.cell_uv[0] : all.pack_uv;
   std::copy_n(all.cell_uv.begin(), Cells, s.cell_uv.begin());
   s.temperature_cdegc = all.temperature_cdegc;
-  const auto frames = hal::frames_of(s, micro(dc_link_v), counter);
+  const auto frames = hal::frames_of(s, micro(link.plus_v), counter, micro(link.minus_v));
   return {frames.begin(), frames.end()};
+}
+
+/// The frames of a sample of the first `cells` cells, from 1 to max_cells.
+template <std::size_t Cells = max_cells>
+std::vector<can::Frame> frames_for(const measurement::PackSample<max_cells>& all, std::size_t cells,
+                                   const plant::LinkPoles& link, std::uint16_t counter) {
+  if constexpr (Cells > 1) {
+    if (cells < Cells) return frames_for<Cells - 1>(all, cells, link, counter);
+  }
+  return frames_of_cells<Cells>(all, link, counter);
 }
 
 /// Whether the board is ready for a load.
@@ -140,6 +150,7 @@ class Session {
     measurement::PackSample<max_cells> sample;
     double soc_true = 0;  ///< NaN: unknown
     double dc_link_v = 0;
+    plant::LinkPoles link;
   };
 
   void announce_soc() {
@@ -185,8 +196,13 @@ class Session {
     const double temperature_c = profile_.temperature_c();
     pack_.run(load_a(step), step.contactors, step.welded, temperature_c, step.duration_s);
     Measured measured{pack_.read(static_cast<std::uint64_t>(std::llround(1e6 * step.time_s)), temperature_c),
-                      pack_.soc(), pack_.dc_link_v()};
+                      pack_.soc(),
+                      pack_.dc_link_v(),
+                      {}};
     if (plan_.replayed) replace_by_recording(step, measured);
+    measured.link =
+        plant::link_poles(step.contactors.connects_plus(step.welded), step.contactors.main_minus,
+                          plan_.replayed ? 1e-6 * measured.sample.pack_uv : pack_.pack_v(), measured.dc_link_v);
     return measured;
   }
 
@@ -214,9 +230,7 @@ class Session {
   }
 
   std::vector<can::Frame> sample_frames(const Measured& measured, std::uint64_t k) const {
-    const auto counter = static_cast<std::uint16_t>(k);
-    return plan_.cells == 1 ? frames_for<1>(measured.sample, measured.dc_link_v, counter)
-                            : frames_for<max_cells>(measured.sample, measured.dc_link_v, counter);
+    return frames_for(measured.sample, plan_.cells, measured.link, static_cast<std::uint16_t>(k));
   }
 
   void judge(const Step& step, const Measured& measured) {

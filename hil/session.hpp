@@ -23,7 +23,7 @@ struct SessionPlan {
   files::CellFile cell;            ///< of the simulated pack
   measurement::Recording profile;  ///< its current is the load; if replayed, its voltages are the cell voltages
   bool replayed = false;     ///< the cells read the recording; its current flows only while the contactors are closed
-  std::size_t cells = 16;    ///< 1 or 16, as the board has
+  std::size_t cells = 16;    ///< 1 to max_cells, as the board has
   double initial_soc = 0.9;  ///< of the pack
   std::optional<double> announced_soc;  ///< sent to the board at the start; empty: the board estimates it
   double sample_period_s = 0.1;

@@ -15,10 +15,11 @@
 #include "files/cell_file.hpp"
 #include "measurement/pack_sample.hpp"
 #include "model/extended.hpp"
+#include "plant/link_poles.hpp"
 
 namespace bms::hil {
 
-inline constexpr std::size_t max_cells = 16;
+inline constexpr std::size_t max_cells = 24;
 
 /// Standard deviations, between the cells and of the sensors' noise.
 struct PackSpread {
@@ -33,6 +34,7 @@ struct ContactorCommand {
 
   /// Returns true if load current can flow. `welded`: main+ does not open.
   constexpr bool conducts(bool welded) const { return (main_plus || welded) && main_minus; }
+  constexpr bool connects_plus(bool welded) const { return main_plus || precharge || welded; }
 };
 
 /// DC-link voltage after `duration_s` with these contactors.

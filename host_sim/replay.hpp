@@ -89,6 +89,8 @@ struct ReplayResult {
   VoltageFigures voltage;
   std::optional<std::string> verified_against;  ///< board with the same bits
   std::optional<std::string> difference;        ///< or the first difference, in words
+  std::size_t run = 0, runs = 0;                ///< of a CAN log: which run of the firmware, and their number
+  std::vector<std::string> doubts;              ///< why the estimates are not reliable (host_sim/judgement.hpp)
 };
 
 /// Fills soc, voltage and open_loop_v from the track and the recording. The open loop starts at soc_ref if there is

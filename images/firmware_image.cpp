@@ -27,7 +27,11 @@ std::filesystem::path source_tree() {
 
 std::filesystem::path board_file(const std::string& board) {
   const auto file = source_tree() / "boards" / board / "board.cmake";
-  if (!std::filesystem::exists(file))
+  // board.cmake is run, so it must not come from elsewhere: "../DIR"
+  const bool plain =
+      !board.empty() &&
+      board.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
+  if (!plain || !std::filesystem::exists(file))
     throw files::BadInput(
         board, 1, "no such board in " + (source_tree() / "boards").string() + ", expected the folder name of a board");
   return file;
@@ -75,6 +79,13 @@ const char* ending(Image image) {
   }
 }
 
+void check_cells(const std::string& board, std::size_t cells) {
+  const std::size_t fewest = std::stoul(board_setting(board, "BMS_FEWEST_CELLS")),
+                    most = std::stoul(board_setting(board, "BMS_MOST_CELLS"));
+  if (cells < fewest || cells > most)
+    throw files::BadInput(board, 1, fmt::format("{} cells, expected {} to {}", cells, fewest, most));
+}
+
 }  // namespace
 
 std::vector<std::string> board_names() {
@@ -102,12 +113,15 @@ Image chip_image(const std::string& board) {
 std::size_t board_cells(const std::string& board) { return std::stoul(board_setting(board, "BMS_CELLS")); }
 
 std::filesystem::path firmware_image(const std::string& board, const files::CellFile& cell, Image image,
-                                     const std::string& vehicle_profile) {
+                                     const std::string& vehicle_profile, std::size_t cells) {
   const auto root = source_tree();
   board_file(board);
+  const bool other_cells = cells != 0 && cells != board_cells(board);
+  if (other_cells) check_cells(board, cells);
   const auto folder = root / "build" / "firmware" /
-                      fmt::format("{}-{}-{:08x}{}", board, cell.name, cell.hash,
-                                  vehicle_profile == "none" ? "" : "-" + vehicle_profile);
+                      fmt::format("{}-{}-{:08x}{}{}", board, cell.name, cell.hash,
+                                  vehicle_profile == "none" ? "" : "-" + vehicle_profile,
+                                  other_cells ? fmt::format("-{}cells", cells) : "");
   for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
     if (!in_path(tool)) throw files::BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
   }
@@ -118,11 +132,21 @@ std::filesystem::path firmware_image(const std::string& board, const files::Cell
     files::write_file(cell_path, cell.text);
   if (!std::filesystem::exists(folder / "build.ninja")) {
     if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", board, cell.name);
-    run_step(
-        {"cmake", "-S", root.string(), "-B", folder.string(), "-G", "Ninja", "-DBMS_BOARD=" + board,
-         "-DBMS_CELL=" + cell_path.string(), "-DBMS_VEHICLE_PROFILE=" + vehicle_profile, "--toolchain",
-         (root / "cmake" / "toolchain-arm-none-eabi.cmake").string(), "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL},
-        log);
+    std::vector<std::string> configure = {"cmake",
+                                          "-S",
+                                          root.string(),
+                                          "-B",
+                                          folder.string(),
+                                          "-G",
+                                          "Ninja",
+                                          "-DBMS_BOARD=" + board,
+                                          "-DBMS_CELL=" + cell_path.string(),
+                                          "-DBMS_VEHICLE_PROFILE=" + vehicle_profile,
+                                          "--toolchain",
+                                          (root / "cmake" / "toolchain-arm-none-eabi.cmake").string(),
+                                          "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL};
+    if (other_cells) configure.push_back(fmt::format("-DBMS_CELLS={}", cells));
+    run_step(configure, log);
   }
   const std::string name = fmt::format("bms_{}{}.elf", board, ending(image));
   run_step({"cmake", "--build", folder.string(), "--target", name}, log);

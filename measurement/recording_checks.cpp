@@ -21,17 +21,13 @@ constexpr double milliampere_factor = 20;  ///< median current over the cell's l
 constexpr double largest_c_rate = 60;      ///< [1/h] no cell sustains more
 constexpr double voltage_margin_v = 0.05;  ///< beyond the limits of the cell file
 constexpr double current_margin_factor = 1.05;
+constexpr double most_capacities = 1.25;    ///< that a current can move in one direction: a full cell, and an error
+constexpr double millisecond_step_s = 100;  ///< the usual step of a log of 10 Hz whose milliseconds are read as seconds
 
 void check_time(Recording& r) {
-  std::vector<double> steps;
-  steps.reserve(r.rows());
   std::size_t duplicates = 0, first_duplicate = 0;
   for (std::size_t k = 1; k < r.rows(); ++k) {
-    const double step = r.time_s[k] - r.time_s[k - 1];
-    if (step > 0)
-      steps.push_back(step);
-    else if (duplicates++ == 0)
-      first_duplicate = k;
+    if (!(r.time_s[k] - r.time_s[k - 1] > 0) && duplicates++ == 0) first_duplicate = k;
   }
   if (duplicates > 0) {
     r.warnings.push_back(
@@ -39,14 +35,10 @@ void check_time(Recording& r) {
          fmt::format("rows that repeat the time of the previous row: {}, the first at {:g} s; they are not used",
                      duplicates, r.time_s[first_duplicate])});
   }
-  const double largest_s = gap_steps * upper_median(steps);
-  std::size_t gaps = 0, first_gap = 0;
-  for (std::size_t k = 1; k < r.rows(); ++k) {
-    if (r.time_s[k] - r.time_s[k - 1] > largest_s && gaps++ == 0) first_gap = k;
-  }
-  if (gaps > 0) {
-    r.warnings.push_back({"gap", fmt::format("gaps longer than {:g} s: {}, the first after {:g} s", largest_s, gaps,
-                                             r.time_s[first_gap - 1])});
+  const double largest_s = gap_steps * usual_step_s(r);
+  if (const auto rows = rows_after_gaps(r.time_s, largest_s); !rows.empty()) {
+    r.warnings.push_back({"gap", fmt::format("gaps longer than {:g} s: {}, the first after {:g} s", largest_s,
+                                             rows.size(), r.time_s[rows.front() - 1])});
   }
 }
 
@@ -104,7 +96,52 @@ void check_current(Recording& r, const model::CellParameters<>& cell) {
                "continuous currents", -limits.discharge_current_max_a, limits.charge_current_max_a, "A");
 }
 
+/// Largest difference between two states of charge that the current alone leads to, in Ah. Gaps do not count.
+double charge_range_ah(const Recording& r) {
+  const double gap_s = gap_steps * usual_step_s(r);
+  double charge_as = 0, lowest_as = 0, highest_as = 0;
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    const double step_s = r.time_s[k] - r.time_s[k - 1];
+    if (step_s > gap_s || std::isnan(r.current_a[k])) continue;
+    charge_as += r.current_a[k] * step_s;
+    lowest_as = std::min(lowest_as, charge_as);
+    highest_as = std::max(highest_as, charge_as);
+  }
+  return (highest_as - lowest_as) / 3'600;
+}
+
+/// A current that moves more than the capacity in one direction contradicts the time, the current or the capacity.
+void check_charge(Recording& r, const model::CellParameters<>& cell) {
+  for (const Warning& w : r.warnings) {
+    if (w.id == "current_in_ma") return;  // explains it
+  }
+  const double moved_ah = charge_range_ah(r);
+  if (!(moved_ah > most_capacities * cell.capacity_ah)) return;
+  const double step_s = usual_step_s(r);
+  if (step_s >= millisecond_step_s) {
+    r.warnings.push_back(
+        {"time_in_ms", fmt::format("the usual time step is {:g} and the current moves {:.3g} Ah, the cell has {:g} Ah: "
+                                   "the times look like milliseconds, expected seconds",
+                                   step_s, moved_ah, cell.capacity_ah)});
+    return;
+  }
+  r.warnings.push_back(
+      {"charge_exceeds_capacity",
+       fmt::format("the current moves {:.3g} Ah, the cell has {:g} Ah: the current has another unit or "
+                   "an offset, or the cell file is of another cell",
+                   moved_ah, cell.capacity_ah)});
+}
+
 }  // namespace
+
+double usual_step_s(const Recording& r) {
+  std::vector<double> steps;
+  steps.reserve(r.rows());
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    if (const double step = r.time_s[k] - r.time_s[k - 1]; step > 0) steps.push_back(step);
+  }
+  return upper_median(steps);
+}
 
 void check_recording(Recording& r) {
   check_time(r);
@@ -118,6 +155,7 @@ void check_recording(Recording& r) {
 void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
   check_voltage(r, cell.limits);
   check_current(r, cell);
+  check_charge(r, cell);
   warn_outside(r, count_outside(r.temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c),
                "temperatures", cell.limits.temperature_min_c, cell.limits.temperature_max_c, "degrees C");
 }

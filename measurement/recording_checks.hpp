@@ -7,15 +7,27 @@
 //   soc_ref_in_percent    has a soc_ref far outside 0 .. 1                          check_recording
 //   voltage_in_mv         has voltages that only make sense in millivolts           compare_with_cell
 //   current_in_ma         has currents that only make sense in milliamperes         compare_with_cell
+//   time_in_ms            has times that only make sense in milliseconds            compare_with_cell
+//   charge_exceeds_capacity
+//                         moves more charge in one direction than the cell has      compare_with_cell
 //   outside_cell_range    has values outside the limits of the cell file            compare_with_cell
 //   ignored_column        has columns that are not used                             files::parse_recording
 //   missing_reading       has readings that are 'nan'                               files::parse_recording
 #pragma once
 
+#include <cstddef>
+
 #include "measurement/recording.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms::measurement {
+
+/// Limit of a recording, and of all samples of a CAN log: 116 days at one sample per second. A replay needs about 260
+/// bytes of memory per row, so 2.6 GB at most.
+inline constexpr std::size_t most_rows = 10'000'000;
+
+/// Median of the time steps above 0; NaN if no step is.
+double usual_step_s(const Recording& recording);
 
 /// Adds the warnings that need no cell: time, sign of the current, unit of soc_ref.
 void check_recording(Recording& recording);

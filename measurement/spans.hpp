@@ -35,6 +35,15 @@ inline std::vector<double> time_steps(std::span<const double> time_s) {
   return steps_s;
 }
 
+/// Rows that come more than limit_s after the row before.
+inline std::vector<std::size_t> rows_after_gaps(std::span<const double> time_s, double limit_s) {
+  std::vector<std::size_t> rows;
+  for (std::size_t k = 1; k < time_s.size(); ++k) {
+    if (time_s[k] - time_s[k - 1] > limit_s) rows.push_back(k);
+  }
+  return rows;
+}
+
 /// How the voltage moves with the current, over the rows in which the current steps.
 struct StepCorrelation {
   double product = 0;  ///< sum of current step times voltage step

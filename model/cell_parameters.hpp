@@ -37,7 +37,7 @@ struct Range {
 inline constexpr Range capacity_ah{0.01, 1'000};
 inline constexpr Range reference_temperature_c{-40, 80};
 inline constexpr Range voltage_v{0.5, 5};             ///< limits of use, and the OCV from SOC 0 to 1
-inline constexpr Range current_a{1e-3, 2'000};        ///< limits of use
+inline constexpr Range current_a{1e-3, 2'000};        ///< limits of use; a reading ends at 2,147 A
 inline constexpr Range slope_v{1e-6, 60};             ///< slope of the OCV, per unit of SOC
 inline constexpr Range resistance_ohm{1e-5, 0.5};     ///< R0 and R1
 inline constexpr Range capacitance_f{100, 100'000};   ///< C1
@@ -143,9 +143,9 @@ constexpr CellFault fault_of(const Limits& l) {
   if (beyond(l.voltage_min_v, accepted::voltage_v)) return {"limits.voltage_min_v", 0, "0.5 to 5 V"};
   if (outside(l.voltage_max_v, l.voltage_min_v + 0.1, accepted::voltage_v.high))
     return {"limits.voltage_max_v", 0, "voltage_min_v + 0.1 to 5 V"};
-  if (beyond(l.charge_current_max_a, accepted::current_a)) return {"limits.charge_current_max_a", 0, "0.001 to 2000 A"};
-  if (beyond(l.discharge_current_max_a, accepted::current_a))
-    return {"limits.discharge_current_max_a", 0, "0.001 to 2000 A"};
+  constexpr const char* current = "0.001 to 2000 A, so that an overload is within a reading (2147 A)";
+  if (beyond(l.charge_current_max_a, accepted::current_a)) return {"limits.charge_current_max_a", 0, current};
+  if (beyond(l.discharge_current_max_a, accepted::current_a)) return {"limits.discharge_current_max_a", 0, current};
   if (outside(l.temperature_min_c, -60, 100)) return {"limits.temperature_min_c", 0, "-60 to 100 degrees C"};
   if (outside(l.temperature_max_c, l.temperature_min_c, 150))
     return {"limits.temperature_max_c", 0, "temperature_min_c to 150 degrees C"};

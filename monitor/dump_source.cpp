@@ -17,7 +17,8 @@ namespace bms::monitor {
 
 namespace {
 
-constexpr std::uint64_t most_lines_without_frame = 1'000'000;  // a file without frames is rejected early
+// a file without frames is rejected early: an endless one, or a small one that decompresses to many gigabytes
+constexpr std::uint64_t most_lines_without_frame = 1'000'000, most_bytes_without_frame = 64U << 20;
 
 /// The bytes of a file or pipe, decompressed if they start with the gzip magic number. read() never waits longer than
 /// requested, so that a pipe can be followed.
@@ -111,6 +112,8 @@ class Dump : public FrameSource {
     if (taken > 0 || ended_) return taken;
     size_ = file_.read(text_, wait_ms);
     used_ = 0;
+    bytes_ += size_;
+    if (!any_ && bytes_ > most_bytes_without_frame) reject();
     taken = decode(room);
     if (size_ == 0 && file_.state() != Decompressed::State::open) taken += finish(room[0]);
     return taken;
@@ -156,7 +159,7 @@ class Dump : public FrameSource {
   DumpLines lines_;
   std::array<char, 16'384> text_{};
   std::size_t used_ = 0, size_ = 0;
-  std::uint64_t count_ = 0;
+  std::uint64_t count_ = 0, bytes_ = 0;
   bool any_ = false, ended_ = false;
 };
 

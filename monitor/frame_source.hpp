@@ -1,4 +1,4 @@
-// Sources of CAN frames behind one interface:
+// Sources of CAN frames behind one interface, which can also send if they are a bus:
 //
 //   can0, vcan0, ...        SocketCAN: raw socket with kernel time stamps, error frames and the kernel's count of
 //                           dropped frames
@@ -40,6 +40,9 @@ class FrameSource {
   virtual bool ended() const = 0;
   /// Returns true if times are those of this machine's clock, false if they are those of a log.
   virtual bool live() const = 0;
+
+  /// Sends a frame. Returns false if the source cannot send: it is a log, or the bus does not take the frame.
+  virtual bool send(const can::Frame&) { return false; }
 
   std::uint64_t malformed() const { return malformed_; }  ///< lines that are not frames
   std::uint64_t dropped() const { return dropped_; }      ///< frames that the kernel dropped

@@ -7,12 +7,13 @@
 #include <condition_variable>
 #include <iterator>
 #include <mutex>
+#include <string_view>
 #include <thread>
 #include <utility>
 
 #include <fmt/format.h>
-#include <httplib.h>
 
+#include "monitor/bounded_server.hpp"
 #include "monitor/frame_source.hpp"
 
 namespace bms::monitor {
@@ -20,7 +21,6 @@ namespace bms::monitor {
 namespace {
 
 constexpr int most_streams = 6;
-constexpr std::size_t longest_request_body = 1'024;
 constexpr int forbidden = 403, method_not_allowed = 405, service_unavailable = 503;  // HTTP
 
 void append(std::string& text, const HistoryPoint& p) {
@@ -41,9 +41,9 @@ void append(std::string& text, const HistoryPoint& p) {
 }  // namespace
 
 struct LivePage::Server {
-  std::string html;
+  std::string html, policy;
   int port = 0;
-  httplib::Server http;
+  BoundedServer http;
   std::thread thread;
   std::atomic<int> streams{0};
 
@@ -89,9 +89,7 @@ struct LivePage::Server {
 
   /// Sets the headers of the response. Returns true if the request is rejected.
   bool reject(const httplib::Request& request, httplib::Response& response) const {
-    response.set_header("Content-Security-Policy",
-                        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
-                        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response.set_header("Content-Security-Policy", policy + "; frame-ancestors 'none'");
     response.set_header("Cross-Origin-Resource-Policy", "same-origin");
     response.set_header("X-Content-Type-Options", "nosniff");
     response.set_header("Referrer-Policy", "no-referrer");
@@ -105,7 +103,19 @@ struct LivePage::Server {
     return true;
   }
 
-  void stream(httplib::Response& response) {
+  /// Returns true if the page of another site sent the request: it could not read the events, but take the streams.
+  bool is_foreign(const httplib::Request& request) const {
+    const std::string origin = request.get_header_value("Origin"), site = request.get_header_value("Sec-Fetch-Site");
+    constexpr std::string_view scheme = "http://";
+    const bool own_origin = origin.starts_with(scheme) && is_own_host(origin.substr(scheme.size()));
+    return (!origin.empty() && !own_origin) || !(site.empty() || site == "same-origin" || site == "none");
+  }
+
+  void stream(const httplib::Request& request, httplib::Response& response) {
+    if (is_foreign(request)) {
+      response.status = forbidden;
+      return;
+    }
     if (streams.fetch_add(1) >= most_streams) {
       --streams;
       response.status = service_unavailable;
@@ -126,18 +136,15 @@ struct LivePage::Server {
   }
 };
 
-LivePage::LivePage(std::string html, int port) : server_(std::make_unique<Server>()) {
+LivePage::LivePage(std::string html, std::string policy, int port) : server_(std::make_unique<Server>()) {
   Server& s = *server_;
   s.html = std::move(html);
-  s.http.new_task_queue = [] {
-    return new httplib::ThreadPool(most_streams + 2);
-  };  // NOLINT(cppcoreguidelines-owning-memory): the server owns it
+  s.policy = std::move(policy);
   s.http.set_socket_options([](socket_t socket) {
     const int on = 1;
     // not SO_REUSEPORT: binding to a port in use must fail
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   });
-  s.http.set_payload_max_length(longest_request_body);
   s.http.set_pre_routing_handler([&s](const httplib::Request& request, httplib::Response& response) {
     return s.reject(request, response) ? httplib::Server::HandlerResponse::Handled
                                        : httplib::Server::HandlerResponse::Unhandled;
@@ -145,7 +152,8 @@ LivePage::LivePage(std::string html, int port) : server_(std::make_unique<Server
   s.http.Get("/", [&s](const httplib::Request&, httplib::Response& response) {
     response.set_content(s.html, "text/html; charset=utf-8");
   });
-  s.http.Get("/events", [&s](const httplib::Request&, httplib::Response& response) { s.stream(response); });
+  s.http.Get("/events",
+             [&s](const httplib::Request& request, httplib::Response& response) { s.stream(request, response); });
   if (port <= 0)
     s.port = s.http.bind_to_any_port("127.0.0.1");
   else

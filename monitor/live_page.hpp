@@ -8,8 +8,8 @@
 //
 // Only this machine and its user have access. Methods other than GET are rejected (405), and so is a foreign Host
 // header (403), which a page of another domain that resolves to 127.0.0.1 would send. Other pages can neither read nor
-// frame the page, and its Content-Security-Policy lets it fetch only from this server. At most six streams; the next
-// gets 503.
+// frame the page nor open the stream (403), and its Content-Security-Policy lets it fetch only from this server. At
+// most six streams; the next gets 503. Memory and waiting are bounded: monitor/bounded_server.hpp.
 #pragma once
 
 #include <memory>
@@ -21,8 +21,9 @@ namespace bms::monitor {
 
 class LivePage {
  public:
-  /// Starts the server. Port 0: any free port. Throws SourceError if the port is in use.
-  LivePage(std::string html, int port);
+  /// Starts the server. policy: Content-Security-Policy of the page. Port 0: any free port. Throws SourceError if the
+  /// port is in use.
+  LivePage(std::string html, std::string policy, int port);
   ~LivePage();
   LivePage(const LivePage&) = delete;
   LivePage& operator=(const LivePage&) = delete;

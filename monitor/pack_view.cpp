@@ -111,6 +111,7 @@ PackView pack_view(const BusState& bus) {
     if (std::isfinite(value)) v.soc_quality_value = static_cast<int>(value);
   });
   v.voltage_v = bus.reading("PackElectrical", "Voltage");
+  if (!v.voltage_v.known()) v.voltage_v = bus.reading("PackVoltage", "Voltage");  // more than 16 cells
   v.current_a = bus.reading("PackElectrical", "Current");
   v.temperature_c = bus.reading("PackElectrical", "Temperature");
   v.discharge_now_a = bus.reading("CurrentLimits", "DischargeNow");
@@ -131,13 +132,15 @@ PackView pack_view(const BusState& bus) {
       text = fmt::format("{} {}", signal.name, text);
     v.contactor.push_back({text, signal.comment, stale});
   });
-  v.faults_received = each_signal(bus, "Faults", [&](const SignalInfo& signal, double value, bool stale) {
+  const auto add_fault = [&](const SignalInfo& signal, double value, bool stale) {
     if (!std::isfinite(value) || value == 0) return;
     if (signal.layout.bits == 1)
       v.faults.push_back({signal.name, signal.comment, stale});
     else
       v.fault_details.push_back({fmt::format("{} {}", signal.name, text_of(signal, value)), signal.comment, stale});
-  });
+  };
+  v.faults_received = each_signal(bus, "Faults", add_fault);
+  each_signal(bus, "MoreFaults", add_fault);
   v.flags = flag_items(bus.reading("Status", "Flags"));
   return v;
 }

@@ -26,7 +26,7 @@ struct PackView {
   std::vector<Reading> cells_v;         ///< CellVoltages*.Cell1, Cell2, ... up to the highest that was received
   std::vector<TextItem> contactor;      ///< ContactorState: its State, the bits that are set, its other signals
   bool faults_received = false;         ///< a message Faults was received
-  std::vector<TextItem> faults;         ///< the bits of Faults that are set
+  std::vector<TextItem> faults;         ///< the bits of Faults and MoreFaults that are set
   std::vector<TextItem> fault_details;  ///< the other signals of Faults that are not zero
   std::vector<TextItem> flags;          ///< the bits of Status.Flags that are set: limitations of the estimate
 

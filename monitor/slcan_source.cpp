@@ -55,21 +55,27 @@ class Slcan : public FrameSource {
     return decode(room);
   }
   bool ended() const override { return ended_; }
+  bool send(const can::Frame& frame) override {
+    std::array<char, hal::slcan::longest_frame> text;
+    return send(hal::slcan::encode(frame, text));
+  }
   bool live() const override { return true; }
 
  private:
   static constexpr int most_tries = 100, retry_us = 10'000;
 
-  void send(std::string_view text) const {
+  /// Returns false if the adapter did not take the text within a second.
+  bool send(std::string_view text) const {
     for (int tries = 0; tries < most_tries && !text.empty(); ++tries) {
       const ssize_t n = write(fd_, text.data(), text.size());
       if (n > 0)
         text.remove_prefix(static_cast<std::size_t>(n));
       else if (n < 0 && errno != EAGAIN && errno != EINTR)
-        return;
+        return false;
       else
         usleep(retry_us);
     }
+    return text.empty();
   }
   std::size_t decode(std::span<BusFrame> room) {
     std::size_t taken = 0;

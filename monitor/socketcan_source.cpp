@@ -70,6 +70,13 @@ class SocketCan : public FrameSource {
     return taken;
   }
   bool ended() const override { return ended_; }
+  bool send(const can::Frame& frame) override {
+    can_frame raw{};
+    raw.can_id = frame.id | (frame.long_id ? CAN_EFF_FLAG : 0U);
+    raw.can_dlc = frame.length;
+    std::memcpy(raw.data, frame.data.data(), frame.length);
+    return write(fd_, &raw, sizeof raw) == static_cast<ssize_t>(sizeof raw);
+  }
   bool live() const override { return true; }
 
  private:

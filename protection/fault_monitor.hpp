@@ -46,7 +46,7 @@ struct FirstCause {
 class FaultMonitor {
  public:
   /// rules: must outlive this object. latched: latched() of the last run, from storage.
-  constexpr FaultMonitor(const Rules& rules, std::uint32_t latched)
+  constexpr FaultMonitor(const Rules& rules, FaultSet latched)
       : rules_(&rules),
         service_faults_(faults_with(rules, Recovery::service)),
         active_(latched & service_faults_),
@@ -54,17 +54,16 @@ class FaultMonitor {
 
   /// step_us: time since the last call. may_clear_latched: no contactor has closed since the start. Returns the faults
   /// that this sample raised, one bit each.
-  constexpr std::uint32_t update(const Quantities& quantities, std::uint32_t step_us, std::uint64_t time_us,
-                                 Clear clear, bool may_clear_latched) {
+  constexpr FaultSet update(const Quantities& quantities, std::uint32_t step_us, std::uint64_t time_us, Clear clear,
+                            bool may_clear_latched) {
     const Clear pressed = clear_before_ == Clear::none ? clear : Clear::none;  // a held key clears once
     clear_before_ = clear;
     if (!may_clear_latched) clearable_ = 0;
-    const std::uint32_t before = active_.value();
-    std::uint32_t now = before;
-    for (std::size_t k = 0; k < fault_count; ++k) {
+    const FaultSet before = active_.value();
+    FaultSet now = before, mask = 1;
+    for (std::size_t k = 0; k < fault_count; ++k, mask <<= 1) {
       const std::int32_t value = at(quantities, (*rules_)[k].quantity);
       if (value == measurement::no_reading) continue;
-      const std::uint32_t mask = 1U << k;
       if ((now & mask) == 0) {
         if (is_raised((*rules_)[k], timer_[k], value, step_us)) now |= mask;
       } else if (is_cleared((*rules_)[k], timer_[k], value, step_us, pressed, (clearable_ & mask) != 0)) {
@@ -72,8 +71,8 @@ class FaultMonitor {
       }
     }
     active_.set(now);
-    const std::uint32_t raised = now & ~before;
-    if (pressed != Clear::none && (first_.fault >= fault_count || (now >> first_.fault & 1) == 0)) {
+    const FaultSet raised = now & ~before;
+    if (pressed != Clear::none && (first_.fault >= fault_count || !is_first(now))) {
       first_ = {};
       update_first_cause(before & now, 0, time_us);  // faults that the command could not end
     }
@@ -81,12 +80,12 @@ class FaultMonitor {
     return raised;
   }
 
-  constexpr std::uint32_t active() const { return active_.value(); }
-  constexpr std::uint32_t latched() const { return active_.value() & service_faults_; }
+  constexpr FaultSet active() const { return active_.value(); }
+  constexpr FaultSet latched() const { return active_.value() & service_faults_; }
   constexpr const FirstCause& first() const { return first_; }
   constexpr bool intact() const { return active_.intact(); }
   /// Call if not intact(): sets every fault that any copy contains, and an internal fault.
-  constexpr void fail_safe() { active_.set(active_.any() | bit(Fault::internal_fault)); }
+  constexpr void fail_safe() { active_.set((active_.any() & all_faults) | bit(Fault::internal_fault)); }
 
  private:
   /// Inactive fault: how long its quantity has been beyond the threshold. Active fault: how long it has been good.
@@ -128,25 +127,25 @@ class FaultMonitor {
     t.runs = true;
   }
 
-  constexpr void update_first_cause(std::uint32_t raised, std::uint32_t still, std::uint64_t time_us) {
+  constexpr bool is_first(FaultSet faults) const { return has(faults, static_cast<Fault>(first_.fault)); }
+
+  constexpr void update_first_cause(FaultSet raised, FaultSet still, std::uint64_t time_us) {
     if (raised == 0) return;
     std::size_t most_severe = fault_count;
-    for (std::size_t k = 0; k < fault_count; ++k) {
-      if ((raised >> k & 1) != 0 &&
-          (most_severe == fault_count || (*rules_)[k].reaction > (*rules_)[most_severe].reaction))
+    for (std::size_t k = 0; k < fault_count; ++k, raised >>= 1) {
+      if ((raised & 1) != 0 && (most_severe == fault_count || (*rules_)[k].reaction > (*rules_)[most_severe].reaction))
         most_severe = k;
     }
     const auto mild = [&](std::size_t k) { return (*rules_)[k].reaction <= Reaction::derate; };
-    if (first_.fault < fault_count && (still >> first_.fault & 1) != 0 && (!mild(first_.fault) || mild(most_severe)))
-      return;
+    if (first_.fault < fault_count && is_first(still) && (!mild(first_.fault) || mild(most_severe))) return;
     first_ = {static_cast<std::uint8_t>(most_severe), time_us};
   }
 
   const Rules* rules_;
-  std::uint32_t service_faults_;
+  FaultSet service_faults_;
   std::array<Timer, fault_count> timer_{};
-  Guarded active_;
-  std::uint32_t clearable_;  ///< latched before the start: a service command may end them
+  GuardedWord<FaultSet> active_;
+  FaultSet clearable_;  ///< latched before the start: a service command may end them
   FirstCause first_;
   Clear clear_before_ = Clear::none;
 };

@@ -1,7 +1,8 @@
 // Faults of a pack: one bit each, and the name that the bus, the README and people use.
 //
-// The order is the order of the bits in frame Faults of can/greybox_bms.dbc. It never changes; new faults are added at
-// the end. The names become the DBC's signal names (joined words in capitals) and stand in its table of first causes.
+// The order is the order of the bits in the frames Faults (bits 0 to 31) and MoreFaults (from bit 32 on) of
+// can/greybox_bms.dbc. It never changes; new faults are added at the end. The names become the DBC's signal names
+// (joined words in capitals) and stand in its table of first causes.
 #pragma once
 
 #include <array>
@@ -43,9 +44,19 @@ enum class Fault : std::uint8_t {
   samples_missing,
   internal_fault,
   storage_fault,
+  second_line_tripped,
+  second_line_failed,
+  current_sensors_differ,
+  temperature_unknown,
+  current_unrequested,
+  allowed_current_exceeded,
 };
 
-inline constexpr std::size_t fault_count = 32;
+/// One bit for each fault: bit k is Fault k.
+using FaultSet = std::uint64_t;
+
+inline constexpr std::size_t fault_count = 38;
+static_assert(fault_count <= 62, "signal Faults.FirstCause has six bits and a value for not known");
 inline constexpr std::uint8_t no_fault = 0xFF;
 
 inline constexpr std::array<const char*, fault_count> fault_names = {"cell overvoltage warning",
@@ -79,10 +90,18 @@ inline constexpr std::array<const char*, fault_count> fault_names = {"cell overv
                                                                      "contactor not closed",
                                                                      "samples missing",
                                                                      "internal fault",
-                                                                     "storage fault"};
+                                                                     "storage fault",
+                                                                     "second line tripped",
+                                                                     "second line failed",
+                                                                     "current sensors differ",
+                                                                     "temperature unknown",
+                                                                     "current unrequested",
+                                                                     "allowed current exceeded"};
 
 constexpr const char* name_of(Fault f) { return fault_names[static_cast<std::size_t>(f)]; }
-constexpr std::uint32_t bit(Fault f) { return 1U << static_cast<unsigned>(f); }
+constexpr FaultSet bit(Fault f) { return FaultSet{1} << static_cast<unsigned>(f); }
+inline constexpr FaultSet all_faults = (FaultSet{1} << fault_count) - 1;
+constexpr bool has(FaultSet faults, Fault f) { return (faults & bit(f)) != 0; }
 
 /// What the firmware does while a fault is active, in the order of severity.
 enum class Reaction : std::uint8_t {

@@ -8,22 +8,26 @@
 
 namespace bms::protection {
 
-class Guarded {
+/// Word: an unsigned type of 32 or 64 bits.
+template <class Word>
+class GuardedWord {
  public:
-  constexpr explicit Guarded(std::uint32_t value) { set(value); }
-  constexpr void set(std::uint32_t value) {
+  constexpr explicit GuardedWord(Word value) { set(value); }
+  constexpr void set(Word value) {
     value_ = value;
     inverted_ = ~value;
     pattern_ = value ^ xor_pattern;
   }
-  constexpr std::uint32_t value() const { return value_; }  ///< valid only while intact()
+  constexpr Word value() const { return value_; }  ///< valid only while intact()
   constexpr bool intact() const { return value_ == ~inverted_ && value_ == (pattern_ ^ xor_pattern); }
   /// Bits that are set in any of the three copies.
-  constexpr std::uint32_t any() const { return value_ | ~inverted_ | (pattern_ ^ xor_pattern); }
+  constexpr Word any() const { return value_ | ~inverted_ | (pattern_ ^ xor_pattern); }
 
  private:
-  static constexpr std::uint32_t xor_pattern = 0x5A3C'96A5;
-  std::uint32_t value_, inverted_, pattern_;
+  static constexpr auto xor_pattern = static_cast<Word>(0x5A3C'96A5'5A3C'96A5);
+  Word value_, inverted_, pattern_;
 };
+
+using Guarded = GuardedWord<std::uint32_t>;
 
 }  // namespace bms::protection

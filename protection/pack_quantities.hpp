@@ -26,13 +26,26 @@ namespace bms::protection {
 /// Limits of a pack as integers.
 struct PackLimits {
   std::int32_t charge_ua_256th, discharge_ua_256th;  ///< 1.05 x continuous limit / 256
+  std::int32_t common_range_ua;                      ///< that both current sensors can measure, at most 1,000 A
+  std::int32_t gain_error_256ths;                    ///< of both current sensors together
   std::uint8_t temperatures;
 };
 
 constexpr PackLimits pack_limits(const PackDesign& d) {
   const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
   return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a),
+          in_micro(std::min({d.current_range_a, d.second_current_range_a, 1'000.0})),
+          static_cast<std::int32_t>(256 * d.current_gain_error + 0.5),
           std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures)};
+}
+
+/// Magnitude of the difference of two current readings, less the part that the error of their gains explains [uA]. May
+/// be negative; unknown without both readings. Each reading counts as at most the range that both sensors have.
+constexpr std::int32_t current_difference_ua(const PackLimits& limits, std::int32_t first_ua, std::int32_t second_ua) {
+  if (first_ua == measurement::no_reading || second_ua == measurement::no_reading) return measurement::no_reading;
+  const std::int32_t most = limits.common_range_ua, a = std::clamp(first_ua, -most, most),
+                     b = std::clamp(second_ua, -most, most);
+  return magnitude(a - b) - std::max(magnitude(a), magnitude(b)) / 256 * limits.gain_error_256ths;
 }
 
 /// Returns true for a possible cell voltage. A reversed cell reads a little below 0.
@@ -137,7 +150,7 @@ class PackQuantities {
   }
 
   /// times_256: current / limit in 1/256, negative in the other direction. Above ten it counts as ten, which is a short
-  /// circuit anyway.
+  /// circuit anyway. A reading at the end of the sensor's range counts as this current.
   static constexpr void integrate_overload(std::int32_t& overload_i2t_us, std::int32_t times_256,
                                            std::uint32_t step_us) {
     const std::int32_t clamped = std::clamp(times_256, std::int32_t{0}, std::int32_t{10 * 256});
@@ -158,6 +171,7 @@ class PackQuantities {
       low = low == measurement::no_reading ? all[k] : std::min<std::int32_t>(low, all[k]);
     }
     at(q, Quantity::temperatures_missing) = limits_.temperatures - known;
+    at(q, Quantity::temperatures_unknown) = known == 0 && limits_.temperatures > 0;
     at(q, Quantity::highest_cdegc) = high;
     at(q, Quantity::lowest_cdegc) = low;
     std::int32_t count = 0;

@@ -16,6 +16,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "measurement/pack_sample.hpp"
 #include "protection/balancing.hpp"
@@ -23,6 +24,7 @@
 #include "protection/derating.hpp"
 #include "protection/fault_monitor.hpp"
 #include "protection/pack_quantities.hpp"
+#include "protection/second_line.hpp"
 #include "protection/table.hpp"
 
 namespace bms::protection {
@@ -30,18 +32,21 @@ namespace bms::protection {
 struct ProtectionPlan {
   Rules rules;
   // Faults with this reaction, one bit each. Faults that open are also in both `forbid` masks.
-  std::uint32_t derates, forbid_charge, forbid_discharge, open, open_now;
+  FaultSet derates, forbid_charge, forbid_discharge, open, open_now;
   PackLimits limits;
   DeratingPlan derating;
   ContactorPlan contactors;
   BalancingPlan balancing;
   std::uint8_t cells;
-  std::uint32_t start_us;  ///< time limit of the first sample
+  std::uint32_t start_us;    ///< time limit of the first sample
+  std::int32_t recovery_ua;  ///< largest charge current with severe undervoltage
+
+  constexpr const Rule& rule(Fault f) const { return rules[static_cast<std::size_t>(f)]; }
 };
 
 constexpr ProtectionPlan protection_plan(const PackDesign& design) {
   const Rules rules = rules_of(protection_table(design));
-  const std::uint32_t open_now = faults_with(rules, Reaction::open_now), open = faults_with(rules, Reaction::open);
+  const FaultSet open_now = faults_with(rules, Reaction::open_now), open = faults_with(rules, Reaction::open);
   return {.rules = rules,
           .derates = faults_with(rules, Reaction::derate),
           .forbid_charge = faults_with(rules, Reaction::forbid_charge) | open | open_now,
@@ -53,7 +58,8 @@ constexpr ProtectionPlan protection_plan(const PackDesign& design) {
           .contactors = contactor_plan(design),
           .balancing = balancing_plan(design),
           .cells = design.cells,
-          .start_us = in_us(design.start_s)};
+          .start_us = in_us(design.start_s),
+          .recovery_ua = in_micro(design.recovery_c_rate * design.capacity_ah)};
 }
 
 /// Estimates that go with a sample; measurement::no_reading: unknown.
@@ -71,17 +77,24 @@ struct PackEstimate {
 /// Requests and commands from the bus, and results of the board's self-tests.
 struct ExternalInputs {
   Request request = Request::none;
-  Clear clear = Clear::none;                          ///< as long as the key is pressed
-  std::int32_t dc_link_uv = measurement::no_reading;  ///< load side of the contactors
-  bool board_fault = false;                           ///< failed self-test; with the first sample, a watchdog reset
+  Clear clear = Clear::none;  ///< as long as the key is pressed
+  /// L+ and L-, the load side of the contactors, against the negative end of the cells.
+  std::int32_t link_plus_uv = measurement::no_reading, link_minus_uv = measurement::no_reading;
+  AuxiliaryContacts auxiliary = {};
+  bool contact_lost = false;  ///< a main contact has opened by itself, perhaps only for a moment
+  bool board_fault = false;   ///< failed self-test; with the first sample, a watchdog reset
   bool storage_fault = false;
+  std::uint32_t second_line = 0;                             ///< trips of the front end: protection/second_line.hpp
+  std::int32_t second_current_ua = measurement::no_reading;  ///< of the second current sensor, if one is fitted
 };
 
 struct Decision {
-  std::uint32_t faults = 0, raised = 0;  ///< one bit each (Fault): active, and raised by this step
-  std::uint32_t latched = 0;             ///< to be stored for the next start
+  FaultSet faults = 0, raised = 0;  ///< active, and raised by this step
+  FaultSet latched = 0;             ///< to be stored for the next start
   FirstCause first;
   ContactorState state = ContactorState::off;
+  Pole welded_pole = Pole::none;  ///< found since the start, not necessarily a fault
+  AuxiliaryContacts auxiliary = {};
   Outputs outputs;
   AllowedCurrent allowed;
   std::uint32_t bleed = 0;  ///< one bit per cell
@@ -95,7 +108,7 @@ class Protection {
   static constexpr std::uint8_t ignored_samples = 5;
 
   /// plan: must outlive this object. latched: Decision::latched of the last run, from storage.
-  constexpr explicit Protection(const ProtectionPlan& plan, std::uint32_t latched = 0)
+  constexpr explicit Protection(const ProtectionPlan& plan, FaultSet latched = 0)
       : plan_(&plan),
         quantities_(plan.limits),
         monitor_(plan.rules, latched),
@@ -110,6 +123,7 @@ class Protection {
   constexpr const Decision& update(const measurement::PackSample<Cells>& sample, const PackEstimate<Cells>& estimate,
                                    const ExternalInputs& inputs) {
     decision_.raised = 0;
+    second_line_ |= inputs.second_line;
     if (started_ && !is_later(sample.time_us, sample_us_)) {
       if (ignored_ < ignored_samples) ++ignored_;
       return ignored_ < ignored_samples ? decision_ : update_without_readings(elapsed_us(sample.time_us), most_age_us);
@@ -129,24 +143,30 @@ class Protection {
     at(q, Quantity::estimator_contradiction) = estimate.voltage_rejected;
     at(q, Quantity::storage_failed) = inputs.storage_fault;
     at(q, Quantity::sample_age_us) = static_cast<std::int32_t>(age_us);
+    update_current_quantities(q, sample.current_ua, inputs.second_current_ua);
+    update_second_line(q);
     clear_ = inputs.clear;
     update_faults(q, step_us, inputs);
-    const std::uint32_t faults = monitor_.active();
+    const FaultSet faults = acting_faults(inputs, sample.current_ua);
 
     const bool temperature_unknown =
-        (faults & bit(Fault::temperature_lost)) != 0 && at(q, Quantity::highest_cdegc) == measurement::no_reading;
+        has(faults, Fault::temperature_lost) && at(q, Quantity::highest_cdegc) == measurement::no_reading;
     const bool no_charge = (faults & plan_->forbid_charge) != 0 || temperature_unknown,
-               no_discharge = (faults & plan_->forbid_discharge) != 0;
+               no_discharge = (monitor_.active() & plan_->forbid_discharge) != 0;
     update_allowed_currents(q, estimate, no_charge, no_discharge, step_us);
     const std::int32_t pack_uv =
         at(q, Quantity::pack_uv) != measurement::no_reading ? at(q, Quantity::pack_uv) : quantities_.sum_uv();
     switch_contactors({.request = inputs.request,
                        .charge_forbidden = no_charge,
                        .discharge_forbidden = no_discharge,
+                       .contact_lost = inputs.contact_lost,
                        .current_ua = sample.current_ua,
                        .pack_uv = pack_uv,
-                       .dc_link_uv = inputs.dc_link_uv,
-                       .step_us = step_us});
+                       .link_plus_uv = inputs.link_plus_uv,
+                       .link_minus_uv = inputs.link_minus_uv,
+                       .auxiliary = inputs.auxiliary,
+                       .step_us = step_us},
+                      faults);
     if (!may_drive()) decision_.allowed = {};
     decision_.bleed = balancing_.update({.cell_uv = sample.cell_uv,
                                          .soc_ppb = estimate.cell_soc_ppb,
@@ -154,7 +174,7 @@ class Protection {
                                          .mean_soc_ppb = estimate.soc_ppb,
                                          .current_ua = sample.current_ua,
                                          .highest_cdegc = at(q, Quantity::highest_cdegc),
-                                         .allowed = (faults & (plan_->open | plan_->open_now)) == 0},
+                                         .allowed = (monitor_.active() & (plan_->open | plan_->open_now)) == 0},
                                         step_us);
     decision_.bleed_left_s = balancing_.left_s(at(q, Quantity::lowest_cell_uv));
     return decision_;
@@ -210,6 +230,41 @@ class Protection {
     return step_us;
   }
 
+  /// Quantities of a known current that depend on the state of the contactors or on the second current sensor.
+  constexpr void update_current_quantities(Quantities& q, std::int32_t current_ua, std::int32_t second_ua) const {
+    at(q, Quantity::current_difference_ua) = current_difference_ua(plan_->limits, current_ua, second_ua);
+    if (current_ua == measurement::no_reading) return;
+    const std::int32_t rest_ua = plan_->contactors.rest_ua;
+    const auto exceeds = [rest_ua](std::int32_t ua, std::int32_t allowed_ua) {
+      return ua > 0 && ua - allowed_ua > allowed_ua / 10 + rest_ua;
+    };
+    at(q, Quantity::exceeds_allowed) =
+        exceeds(current_ua, decision_.allowed.charge_ua) || exceeds(-current_ua, decision_.allowed.discharge_ua);
+    at(q, Quantity::flows_unrequested) =
+        contactors_.state() == ContactorState::unloading && magnitude(current_ua) > rest_ua;
+  }
+
+  /// Trips since the last call. A short circuit counts as the largest current, because it may be over before a reading.
+  constexpr void update_second_line(Quantities& q) {
+    at(q, Quantity::second_line_trips) = (second_line_ & second_line::trips) != 0;
+    at(q, Quantity::second_line_broken) = (second_line_ & second_line::failures) != 0;
+    if ((second_line_ & second_line::short_circuit) != 0)
+      at(q, Quantity::current_magnitude_ua) = std::numeric_limits<std::int32_t>::max();
+    second_line_ = 0;
+  }
+
+  /// Active faults whose reactions apply. After a clear command, a pack with severe undervoltage may be charged: the
+  /// fault then does not open and does not forbid charging, as long as no request to drive comes and no current above
+  /// twice the recovery current flows.
+  constexpr FaultSet acting_faults(const ExternalInputs& inputs, std::int32_t current_ua) {
+    const FaultSet faults = monitor_.active();
+    const bool slow =
+        current_ua != measurement::no_reading && magnitude(current_ua) / 2 <= plan_->recovery_ua;  // no overflow
+    recovers_ = has(faults, Fault::cell_undervoltage_severe) && slow && inputs.request != Request::drive &&
+                (recovers_ || inputs.clear != Clear::none);
+    return recovers_ ? faults & ~bit(Fault::cell_undervoltage_severe) : faults;
+  }
+
   constexpr void update_faults(Quantities& q, std::uint32_t step_us, const ExternalInputs& inputs) {
     // A plan for another number of cells is an internal fault, too.
     const bool intact = monitor_.intact() && contactors_.intact() && plan_->cells == Cells;
@@ -240,13 +295,16 @@ class Protection {
                                           .charge_forbidden = no_charge || !closed,
                                           .discharge_forbidden = no_discharge || !closed},
                                          step_us);
+    if (recovers_) decision_.allowed.charge_ua = std::min(decision_.allowed.charge_ua, plan_->recovery_ua);
   }
 
-  constexpr void switch_contactors(ContactorInput in) {
-    in.open = (monitor_.active() & plan_->open) != 0;
-    in.open_now = (monitor_.active() & plan_->open_now) != 0;
+  constexpr void switch_contactors(ContactorInput in, FaultSet faults) {
+    in.open = (faults & plan_->open) != 0;
+    in.open_now = (faults & plan_->open_now) != 0;
     decision_.outputs = contactors_.update(in);
     decision_.state = contactors_.state();
+    decision_.welded_pole = contactors_.welded_pole();
+    decision_.auxiliary = in.auxiliary;
     closed_once_ = closed_once_ || decision_.outputs.any_closed();
   }
 
@@ -255,8 +313,9 @@ class Protection {
                                                     bool board_fault = false) {
     Quantities q = unknown_quantities();
     at(q, Quantity::sample_age_us) = age_us;
+    if (second_line_ != 0) update_second_line(q);
     update_faults(q, step_us, {.clear = clear_, .board_fault = board_fault});
-    switch_contactors({.step_us = step_us});
+    switch_contactors({.step_us = step_us}, monitor_.active());
     decision_.allowed = derating_.update({.charge_forbidden = true, .discharge_forbidden = true}, step_us);
     decision_.bleed = 0;
     balancing_.stop();
@@ -273,7 +332,8 @@ class Protection {
   std::uint64_t sample_us_ = 0, evaluated_us_ = 0;
   Clear clear_ = Clear::none;
   std::uint8_t ignored_ = 0;
-  bool started_ = false, sampled_ = false, closed_once_ = false;
+  std::uint32_t second_line_ = 0;  ///< trips that the table has not seen yet
+  bool started_ = false, sampled_ = false, closed_once_ = false, recovers_ = false;
 };
 
 }  // namespace bms::protection

@@ -31,7 +31,7 @@ enum class Quantity : std::uint8_t {
   pack_uv,
   charge_overload_i2t_us,  ///< overload integral I2t of the charge current
   discharge_overload_i2t_us,
-  current_magnitude_ua,
+  current_magnitude_ua,  ///< the largest reading, if the front end reports a short circuit
   highest_cdegc,
   lowest_cdegc,
   opposite_shift_uv,        ///< two neighbouring cells shifted from the mean in opposite directions
@@ -46,11 +46,17 @@ enum class Quantity : std::uint8_t {
   precharge_off_curve,  ///< 0 or 1; this and the next two come from the contactors
   welded,
   not_closed,
-  sample_age_us,    ///< since the last usable sample
-  integrity_error,  ///< 0 or 1
-  storage_failed,   ///< 0 or 1
+  sample_age_us,      ///< since the last usable sample
+  integrity_error,    ///< 0 or 1
+  storage_failed,     ///< 0 or 1
+  second_line_trips,  ///< 0 or 1, as all that follow but the difference of the sensors
+  second_line_broken,
+  current_difference_ua,  ///< magnitude, less the share of the current that the gains explain
+  temperatures_unknown,   ///< no sensor has a reading
+  flows_unrequested,      ///< a current flows while the contactors wait for its end
+  exceeds_allowed,        ///< the current is above the allowed current
 };
-inline constexpr std::size_t quantity_count = 23;
+inline constexpr std::size_t quantity_count = 29;
 
 enum class Sense : std::uint8_t { above, below };
 
@@ -104,10 +110,6 @@ constexpr Row row(const Protected& p) {
 using Table = std::array<Row, fault_count>;
 using Rules = std::array<Rule, fault_count>;
 
-/// Ratio of current to limit above which the current is an overload: allows for the errors of a 1 % sensor and a
-/// controller.
-inline constexpr double overcurrent_from = 1.05;
-
 constexpr Table protection_table(const PackDesign& d) {
   using enum Fault;
   using enum Quantity;
@@ -116,13 +118,13 @@ constexpr Table protection_table(const PackDesign& d) {
   using enum Reaction;
   const model::Limits& l = d.limits;
   const double span_v = l.voltage_max_v - l.voltage_min_v, cells = d.cells;
+  const double sum_error_v = cells * d.cell_error_v + d.pack_error_v;
   const double most_a = std::max(l.charge_current_max_a, l.discharge_current_max_a);
   const auto high_v = [&](double of_span) { return in_micro(l.voltage_max_v + of_span * span_v); };
   const auto low_v = [&](double of_span) { return in_micro(l.voltage_min_v + of_span * span_v); };
   const auto pack_high_v = [&](double of_span) { return in_micro(cells * (l.voltage_max_v + of_span * span_v)); };
   const auto pack_low_v = [&](double of_span) { return in_micro(cells * (l.voltage_min_v + of_span * span_v)); };
   const auto span = [&](double of_span) { return in_micro(of_span * span_v); };
-  const auto cell_count = static_cast<std::int32_t>(d.cells);
   const auto hot_c = [&](double above_max) { return in_centi(l.temperature_max_c + above_max); };
   const auto cold_c = [&](double above_min) { return in_centi(l.temperature_min_c + above_min); };
   const double freezing_c = std::max(l.temperature_min_c, 0.0);
@@ -156,7 +158,8 @@ constexpr Table protection_table(const PackDesign& d) {
            .raised = {.quantity = lowest_cell_uv, .sense = below, .threshold = low_v(-0.12), .delay_s = 0.2},
            .released = {.threshold = low_v(0), .after_s = 10, .recovery = on_clear},
            .reaction = open_now,
-           .why = "two samples at 10 Hz; released at the limit, so that an empty pack can be charged"}),
+           .why =
+               "two samples at 10 Hz; released at the limit, up to which a pack is charged with a recovery current"}),
       row({.fault = pack_overvoltage,
            .raised = {.quantity = pack_uv, .sense = above, .threshold = pack_high_v(0.02), .delay_s = 2},
            .released = {.threshold = pack_high_v(-0.06), .after_s = 60, .recovery = automatic},
@@ -178,8 +181,10 @@ constexpr Table protection_table(const PackDesign& d) {
            .reaction = forbid_discharge,
            .why = "as for the charge current"}),
       row({.fault = short_circuit,
-           .raised =
-               {.quantity = current_magnitude_ua, .sense = above, .threshold = in_micro(5 * most_a), .delay_s = 0},
+           .raised = {.quantity = current_magnitude_ua,
+                      .sense = above,
+                      .threshold = in_micro(short_circuit_a(d)),
+                      .delay_s = 0},
            .released = {.threshold = in_micro(most_a), .after_s = 10, .recovery = service},
            .reaction = open_now,
            .why = "no delay: fuse and comparator are faster, this fault keeps the contactors open"}),
@@ -224,8 +229,13 @@ constexpr Table protection_table(const PackDesign& d) {
            .reaction = derate,
            .why = "model errors have a correlation time of about a minute"}),
       row({.fault = sum_mismatch,
-           .raised = {.quantity = sum_error_uv, .sense = above, .threshold = cell_count * span(0.03), .delay_s = 1},
-           .released = {.threshold = cell_count * span(0.015), .after_s = 10, .recovery = on_clear},
+           .raised = {.quantity = sum_error_uv,
+                      .sense = above,
+                      .threshold = in_micro(std::min(sum_error_v + cells * d.cell_skew_v, 0.03 * cells * span_v)),
+                      .delay_s = 1},
+           .released = {.threshold = in_micro(std::min(sum_error_v, 0.015 * cells * span_v)),
+                        .after_s = 10,
+                        .recovery = on_clear},
            .reaction = open,
            .why = "cells and pack are not sampled at the same moment of a current step"}),
       row({.fault = voltage_missing,
@@ -293,6 +303,39 @@ constexpr Table protection_table(const PackDesign& d) {
            .released = {.threshold = 0, .after_s = 0, .recovery = on_clear},
            .reaction = warn,
            .why = "no delay: the storage has already tried again"}),
+      row({.fault = second_line_tripped,
+           .raised = {.quantity = second_line_trips, .sense = above, .threshold = 0, .delay_s = 0},
+           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .reaction = open_now,
+           .why = "no delay: the front end has waited, and has already opened"}),
+      row({.fault = second_line_failed,
+           .raised = {.quantity = second_line_broken, .sense = above, .threshold = 0, .delay_s = 0.2},
+           .released = {.threshold = 0, .after_s = 10, .recovery = service},
+           .reaction = open_now,
+           .why = "two samples at 10 Hz, so that a single wrong reading does not need service"}),
+      row({.fault = current_sensors_differ,
+           .raised = {.quantity = current_difference_ua,
+                      .sense = above,
+                      .threshold = in_micro(d.second_current_offset_a),
+                      .delay_s = 2},
+           .released = {.threshold = in_micro(0.5 * d.second_current_offset_a), .after_s = 10, .recovery = on_clear},
+           .reaction = open,
+           .why = "the sensors do not average over the same time; a lift changes the current for a second"}),
+      row({.fault = temperature_unknown,
+           .raised = {.quantity = temperatures_unknown, .sense = above, .threshold = 0, .delay_s = 60},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
+           .reaction = open,
+           .why = "at 5C a cell warms up by less than 10 K in a minute, and currents are a quarter by then"}),
+      row({.fault = current_unrequested,
+           .raised = {.quantity = flows_unrequested, .sense = above, .threshold = 0, .delay_s = 60},
+           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .reaction = open,
+           .why = "a lifted load can be lowered within a minute"}),
+      row({.fault = allowed_current_exceeded,
+           .raised = {.quantity = exceeds_allowed, .sense = above, .threshold = 0, .delay_s = 10},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
+           .reaction = warn,
+           .why = "a truck reduces its current within one second; lifting a load takes seconds"}),
   }};
 }
 
@@ -304,14 +347,14 @@ constexpr Rules rules_of(const Table& table) {
 }
 
 /// One bit for each fault with this reaction.
-constexpr std::uint32_t faults_with(const Rules& rules, Reaction reaction) {
-  std::uint32_t all = 0;
+constexpr FaultSet faults_with(const Rules& rules, Reaction reaction) {
+  FaultSet all = 0;
   for (const Rule& r : rules) all |= r.reaction == reaction ? bit(r.fault) : 0;
   return all;
 }
 /// One bit for each fault with this recovery.
-constexpr std::uint32_t faults_with(const Rules& rules, Recovery recovery) {
-  std::uint32_t all = 0;
+constexpr FaultSet faults_with(const Rules& rules, Recovery recovery) {
+  FaultSet all = 0;
   for (const Rule& r : rules) all |= r.recovery == recovery ? bit(r.fault) : 0;
   return all;
 }

@@ -45,6 +45,37 @@ struct QuantityText {
   double scale = 1;  ///< integer units per unit
   int digits = 0;
 };
+/// Quantities of contactors, firmware and front end.
+constexpr QuantityText text_of_event(Quantity q) {
+  switch (q) {
+    case Quantity::precharge_off_curve:
+      return {"precharge below its curve"};
+    case Quantity::welded:
+      return {"DC link stays up, or current flows, while open"};
+    case Quantity::not_closed:
+      return {"DC link below the pack while closed"};
+    case Quantity::sample_age_us:
+      return {"time since the last sample", "s", 1e6, 1};
+    case Quantity::integrity_error:
+      return {"corrupted state, failed self-test, or watchdog reset"};
+    case Quantity::storage_failed:
+      return {"storage reports a failure"};
+    case Quantity::second_line_trips:
+      return {"a protection of the front end, other than short circuit, has opened"};
+    case Quantity::second_line_broken:
+      return {"the front end reports a permanent failure, or its enable pins do not follow"};
+    case Quantity::current_difference_ua:
+      return {"difference of the two current sensors that their gains do not explain", "A", 1e6, 1};
+    case Quantity::temperatures_unknown:
+      return {"no temperature of any sensor"};
+    case Quantity::flows_unrequested:
+      return {"current flows after the request has ended"};
+    case Quantity::exceeds_allowed:
+      return {"current above 1.1 times the allowed current plus the rest current"};
+    default:
+      return {};
+  }
+}
 constexpr QuantityText text_of(Quantity q) {
   switch (q) {
     case Quantity::highest_cell_uv:
@@ -81,20 +112,9 @@ constexpr QuantityText text_of(Quantity q) {
       return {"sensors missing"};
     case Quantity::temperatures_stuck:
       return {"sensors stuck"};
-    case Quantity::precharge_off_curve:
-      return {"precharge below its curve"};
-    case Quantity::welded:
-      return {"DC link stays up, or current flows, while open"};
-    case Quantity::not_closed:
-      return {"DC link below the pack while closed"};
-    case Quantity::sample_age_us:
-      return {"time since the last sample", "s", 1e6, 1};
-    case Quantity::integrity_error:
-      return {"corrupted state, failed self-test, or watchdog reset"};
-    case Quantity::storage_failed:
-      return {"storage reports a failure"};
+    default:
+      return text_of_event(q);
   }
-  return {};
 }
 
 /// The rows of a table with a header.

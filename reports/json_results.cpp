@@ -23,6 +23,12 @@ std::string json_of(const host_sim::ReplayResult& r, const std::string& trace_sh
                  {"within_2_sigma", optional(r.soc.within_2_sigma)},
                  {"current_offset_a", optional(r.soc.current_offset_a)},
                  {"current_offset_sigma_a", optional(r.soc.current_offset_sigma_a)}};
+  json["reliable"] = r.doubts.empty();
+  json["doubts"] = r.doubts;
+  if (r.runs > 0) {
+    json["run"] = r.run;
+    json["runs"] = r.runs;
+  }
   json["voltage"] = {{"prediction_rmse_v", optional(r.voltage.prediction_rmse_v)},
                      {"prediction_max_v", optional(r.voltage.prediction_max_v)},
                      {"open_loop_rmse_v", optional(r.voltage.open_loop_rmse_v)},

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "files/text_file.hpp"
 #include "reports/embedded_files.hpp"
 
 namespace bms::reports {
@@ -133,11 +134,22 @@ std::string filled(std::string_view page, const std::function<std::string(std::s
   return out += page;
 }
 
+/// Says first that the result is not reliable, and why.
+std::string doubtful(const host_sim::ReplayResult& r) {
+  if (r.doubts.empty()) return "";
+  std::string reasons;
+  for (const std::string& doubt : r.doubts) reasons += (reasons.empty() ? "" : "; ") + doubt;
+  return fmt::format("The result is not reliable: {}. ", reasons);
+}
+
 }  // namespace
 
 std::string statement(const host_sim::ReplayResult& r) {
-  std::string text = fmt::format("After {:.1f} hours the battery is at {:.1f} % (standard deviation {:.1f} %).",
-                                 r.recording.duration_s() / 3600, 100 * r.soc.final, 100 * r.soc.final_sigma);
+  std::string text = doubtful(r);
+  text += fmt::format("After {:.1f} hours the battery is at {:.1f} % (standard deviation {:.1f} %).",
+                      r.recording.duration_s() / 3600, 100 * r.soc.final, 100 * r.soc.final_sigma);
+  if (!r.track.rows.empty() && (r.track.rows.back().flags & estimator::soc_ambiguous) != 0)
+    text += " More than one state of charge still fits the voltages.";
   if (r.soc.rmse) {
     text += fmt::format(
         " Its error against the reference was {:.2f} % RMS, {:.2f} % at most; the reference is within two sigma for "
@@ -157,9 +169,57 @@ std::string statement(const host_sim::ReplayResult& r) {
   return text;
 }
 
-std::string page(std::string_view body, std::string_view script, std::string_view title, const std::string& data) {
-  return filled(embedded::page_html, [&](std::string_view place) -> std::string {
-    if (place == "TITLE") return std::string(title);
+std::string in_markup(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+namespace {
+
+constexpr std::string_view script_begin = "<script>", script_end = "</script>", policy_place = "@POLICY@";
+
+/// Allows the scripts of the page, by their hashes; styles, because charts set them; and nothing else.
+std::string policy_for(std::string_view page, Connections connections) {
+  std::string policy = "default-src 'none'; script-src";
+  for (std::size_t at = 0; (at = page.find(script_begin, at)) != std::string_view::npos;) {
+    at += script_begin.size();
+    const std::size_t end = page.find(script_end, at);
+    policy += " 'sha256-" + files::sha256_base64(page.substr(at, end - at)) + "'";
+    at = end;
+  }
+  policy += "; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+  if (connections == Connections::own_server) policy += "; connect-src 'self'";
+  return policy;
+}
+
+}  // namespace
+
+std::string page(std::string_view body, std::string_view script, std::string_view title, const std::string& data,
+                 Connections connections) {
+  std::string text = filled(embedded::page_html, [&](std::string_view place) -> std::string {
+    if (place == "POLICY") return std::string(policy_place);
+    if (place == "TITLE") return in_markup(title);
     if (place == "BODY") return std::string(body);
     if (place == "DYGRAPH_CSS") return std::string(embedded::dygraph_css);
     if (place == "DYGRAPH_JS") return std::string(embedded::dygraph_js);
@@ -170,6 +230,14 @@ std::string page(std::string_view body, std::string_view script, std::string_vie
     if (place == "DATA") return data;
     return "";
   });
+  const std::string policy = policy_for(text, connections);
+  return text.replace(text.find(policy_place), policy_place.size(), policy);  // its first place is in the head
+}
+
+std::string policy_in(std::string_view page) {
+  constexpr std::string_view before = "http-equiv=\"Content-Security-Policy\" content=\"";
+  const std::size_t begin = page.find(before) + before.size();
+  return std::string(page.substr(begin, page.find('"', begin) - begin));
 }
 
 namespace {

@@ -15,8 +15,20 @@ std::string replay_report(const host_sim::ReplayResult& result);
 /// A page of tables and charts, one below the other.
 std::string page_of(const files::PageContent& content);
 
-/// The frame of every page (page/page.html) around a body and its script. data: JSON, which the script has as `report`.
-std::string page(std::string_view body, std::string_view script, std::string_view title, const std::string& data);
+/// What a page may connect to while it is open.
+enum class Connections { none, own_server };
+
+/// The frame of every page (page/page.html) around a body and its script. title: any text. data: JSON, which the script
+/// has as `report`; in_script() of it. The Content-Security-Policy of the page allows only its own scripts, by their
+/// SHA-256, and no other source of anything.
+std::string page(std::string_view body, std::string_view script, std::string_view title, const std::string& data,
+                 Connections connections = Connections::none);
+
+/// The Content-Security-Policy of a page that page() has made, for the header of a server.
+std::string policy_in(std::string_view page);
+
+/// The text as content of an element or of an attribute: no character of it is markup.
+std::string in_markup(std::string_view text);
 
 /// JSON that is safe inside a script element.
 std::string in_script(std::string json);

@@ -16,6 +16,7 @@ using hal::put_bytes;
 constexpr std::uint16_t longest_record = 1 + max_payload_bytes / line_bytes;
 constexpr std::array<std::uint8_t, 4> zeros{};
 constexpr int tries_in_a_sector = 3, max_scans = 16;
+constexpr std::size_t max_reserve_bytes = 64;  // with its copy less than longest_record
 
 /// Comparison of numbers that wrap.
 constexpr bool later(std::uint32_t a, std::uint32_t b) { return static_cast<std::int32_t>(a - b) > 0; }
@@ -207,6 +208,11 @@ StoreResult Log::store(Kind kind, std::span<const std::uint8_t> payload) {
   return move(kind, payload);
 }
 
+StoreResult Log::store_in_reserve(Kind kind, std::span<const std::uint8_t> payload) {
+  if (payload.size() > max_reserve_bytes || !secure_last_record()) return StoreResult::rejected;
+  return append(kind, payload, lines_of(payload.size()));  // and a copy of it, which the next boot may need
+}
+
 bool Log::secure_last_record() {
   for (int k = 0; k < max_scans && !last_record_secured_; ++k) {
     std::array<std::uint8_t, max_payload_bytes> payload;
@@ -334,6 +340,8 @@ bool Log::needs_erase() const {
   }
   return false;
 }
+
+bool Log::has_erased_sector() const { return std::ranges::count(state_, Sector::erased) > 0; }
 
 bool Log::erase_next_sector() {
   if (!needs_erase() || !secure_last_record()) return true;

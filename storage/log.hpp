@@ -79,6 +79,9 @@ class Log {
 
   /// payload: at most max_payload_bytes. Never erases.
   StoreResult store(Kind kind, std::span<const std::uint8_t> payload);
+  /// For one last record after store() has returned `needs_erase`: writes it into the lines that store() leaves free.
+  /// Call it once, with at most 64 bytes.
+  StoreResult store_in_reserve(Kind kind, std::span<const std::uint8_t> payload);
 
   /// Returns true if a sector can be erased in advance.
   bool needs_erase() const;
@@ -86,6 +89,7 @@ class Log {
   bool erase_next_sector();
 
   std::uint32_t sectors() const { return size_.sectors; }
+  bool has_erased_sector() const;      ///< there is room beyond the active sector
   std::uint32_t broken() const;        ///< sectors that failed to erase or to store since open()
   bool operational() const;            ///< at least two good sectors, which the log needs
   std::uint32_t erase_cycles() const;  ///< erase cycles of each sector so far, from the record numbers

@@ -1,17 +1,21 @@
 // What the battery stores, and when. The policy bounds the wear of the flash in all cases:
 //
 //   charge    at most once a minute, if soc has moved by 0.1 % or its sigma by a tenth; after an hour if any charge
-//             flowed
+//             flowed. In the last sector, without an erased one, at most every ten minutes
 //   cells     at most every half hour, if one has moved by 0.1 %
 //   health    at most every hour, if one value has moved by 0.1 %
 //   events    a fault at once: sixteen in a row, then one every ten minutes. Starts and resets with the first minute of
 //             a run, so a battery that restarts repeatedly writes nothing.
 //   settings  when set
+//   extremes  at most every ten minutes, if one has changed
 //   all       power_failing() writes all changes at once
 //
 // A failed write is tried again a minute later. The caller decides when to erase: start() erases before anything runs,
-// later erase_next_sector() when the core may stop for half a second (hal/flash.hpp), e.g. with open contactors or
-// without current.
+// later erase_next_sector() when the core may stop for half a second (hal/flash.hpp), with open contactors. When the
+// log is full, the last record of charge says that soc is unknown from that minute.
+//
+// A copy of the charge, updated every minute in RAM that a reset of the core does not change, is newer than the record
+// when no write was due or possible. It is used after a reset if its CRC is right.
 //
 // Time is the samples' time. Cost per sample: counting its charge, about thirty instructions; less without flash.
 #pragma once
@@ -38,9 +42,11 @@ struct EstimatorSnapshot {
 
 class Persistence {
  public:
-  /// Call at boot: reads the stored records and erases sectors in advance. calendar_s: hal/calendar.hpp.
+  static constexpr std::size_t retained_bytes = 36;
+  /// Call at boot: reads the stored records and erases sectors in advance. calendar_s: hal/calendar.hpp. retained: RAM
+  /// that a reset does not change (hal/retained.hpp), or nothing.
   void start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,
-             std::optional<std::uint32_t> calendar_s);
+             std::optional<std::uint32_t> calendar_s, std::span<std::uint8_t> retained = {});
 
   /// Starting point of the estimator, if any: the stored one, with a sigma widened for the time off and for the last
   /// minute before the record.
@@ -63,25 +69,34 @@ class Persistence {
   /// Writes the records that are due.
   void store(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
-  /// Records a fault. code: not 0, defined by the caller.
-  void fault(std::uint16_t code);
-  /// Stores a setting. Returns false if there is no room for another key.
+  /// Call with every sample, before fault(): the readings that a fault is stored with.
+  void observe(const Readings& readings);
+  /// Records a fault with its time and the readings. code: 1 to 127, defined by the caller.
+  void fault(std::uint16_t code, std::optional<std::uint32_t> calendar_s = std::nullopt);
+  /// Stores a setting. Returns false if it is not stored: there is no room for another key, or the write failed. After
+  /// a failed write the value is valid in this run, and the write is tried again every minute.
   bool set(std::uint16_t key, std::int32_t value);
-  /// Call before the battery is switched off: writes charge first, 0.2 ms; everything takes 2 ms, at most 12 ms.
+  bool settings_stored() const { return !settings_changed_; }  ///< no write of a setting has failed
+  /// Call before the battery is switched off: writes charge first, 0.2 ms; everything takes 3 ms, at most 16 ms.
   void power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   /// Call when the supply falls, which may be temporary: writes charge alone, 0.2 ms; at most 1.2 ms if its sector has
-  /// room, otherwise at most 20 ms.
+  /// room, otherwise at most 24 ms.
   void supply_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
 
   bool needs_erase() const { return log_.needs_erase(); }
   void erase_next_sector() { log_.erase_next_sector(); }
+  /// Returns true if the last write found no room; see erase_next_sector().
+  bool full() const { return full_ && log_.needs_erase(); }
+  /// Returns true after an hour of full().
+  bool full_for_long() const { return full() && full_minutes_ >= 60; }
 
   const ChargeRecord& charge() const { return charge_; }
   const CellsRecord& cells() const { return cells_; }
   const std::optional<HealthRecord>& health() const { return health_; }
   const EventsRecord& events() const { return events_; }
   const SettingsRecord& settings() const { return settings_; }
+  const ExtremesRecord& extremes() const { return extremes_; }
   const Log& log() const { return log_; }
   /// Number of records of a newer firmware, which are preserved but cannot be read.
   std::uint32_t newer_records() const;
@@ -90,14 +105,20 @@ class Persistence {
  private:
   static constexpr std::uint32_t minute_us = 60'000'000;
 
+  template <class R>
+  bool put(const R& record);
+  bool put(Kind kind, Bytes payload);
   void advance_time();
-  void store_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
-                    std::optional<std::uint32_t> calendar_s);
+  void read_retained();
+  void set_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
+                  std::optional<std::uint32_t> calendar_s);
+  void store_charge();
   void store_cells(std::span<const CellsRecord::Cell> now);
   void store_health(const HealthRecord& now);
   void store_events();
   void store_events_in_turn();
   void store_settings();
+  void store_extremes();
 
   Log log_;
   ChargeRecord charge_, charge_stored_;
@@ -105,6 +126,10 @@ class Persistence {
   std::optional<HealthRecord> health_;
   EventsRecord events_;
   SettingsRecord settings_;
+  ExtremesRecord extremes_, extremes_stored_;
+  Readings readings_;
+  std::span<std::uint8_t> retained_;
+  bool full_ = false;
   bool charge_known_ = false;  ///< charge_stored_ was read from a record
   bool events_changed_ = false, settings_changed_ = false, stored_in_this_run_ = false;
   std::optional<std::uint32_t> off_s_;
@@ -113,7 +138,8 @@ class Persistence {
   bool counting_ = false;
   std::uint64_t time_us_ = 0, charged_uaus_ = 0, discharged_uaus_ = 0;
   std::uint32_t since_us_ = 0, us_ = 0;
-  std::uint16_t charge_minutes_ = 0, cells_minutes_ = 0, health_minutes_ = 0, fault_minutes_ = 0;
+  std::uint16_t charge_minutes_ = 0, cells_minutes_ = 0, health_minutes_ = 0, fault_minutes_ = 0, extremes_minutes_ = 0,
+                full_minutes_ = 0, covered_minutes_ = 1;
   std::uint8_t faults_at_once_ = 16;
 };
 

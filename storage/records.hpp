@@ -6,8 +6,10 @@
 //             1       8      (older) state of charge alone
 //   cells     1       1+4n   each cell relative to the mean
 //   health    1       16     capacity and resistance
-//   events    1       118    starts, resets by cause, the last sixteen faults
+//   events    2       230    starts, resets by cause, the last sixteen faults with readings of the pack
+//             1       118    (older) without readings
 //   settings  1       3+6n   values by key
+//   extremes  1       12     lowest and highest readings so far
 #pragma once
 
 #include <algorithm>
@@ -129,7 +131,7 @@ constexpr bool decode(Bytes from, std::uint8_t layout, ChargeRecord& r) {
 
 struct CellsRecord {
   static constexpr Kind kind{2, 1};
-  static constexpr std::size_t max_cells = 16;
+  static constexpr std::size_t max_cells = 24;
   struct Cell {
     std::int16_t soc = 0;     ///< minus the mean, in 1e-5: +-0.32
     std::uint16_t sigma = 0;  ///< in 1e-5
@@ -188,14 +190,63 @@ constexpr bool decode(Bytes from, std::uint8_t layout, HealthRecord& r) {
   return true;
 }
 
+/// Lowest and highest readings of the cells, the temperature sensors and the current.
+struct ReadingRange {
+  enum Quantity : std::uint8_t {
+    voltage,      ///< of a cell [mV], at most 8190
+    temperature,  ///< in degrees C above -60, at most 254
+    current,      ///< in 0.25 A, > 0 charges, at most 8191 either way
+  };
+  using Values = std::array<std::int16_t, 3>;
+  static constexpr Values unknown{8191, 255, -8192};
+
+  Values lowest = unknown, highest = unknown;
+
+  [[gnu::noinline]] constexpr void add(std::size_t quantity, std::int16_t value) {
+    if (value == unknown[quantity]) return;
+    const bool first = lowest[quantity] == unknown[quantity];
+    if (first || value < lowest[quantity]) lowest[quantity] = value;
+    if (first || value > highest[quantity]) highest[quantity] = value;
+  }
+  constexpr void add(const ReadingRange& other) {
+    for (std::size_t k = 0; k < unknown.size(); ++k) {
+      add(k, other.lowest[k]);
+      add(k, other.highest[k]);
+    }
+  }
+  constexpr bool operator==(const ReadingRange&) const = default;
+};
+
+/// Readings of the pack at one time. The lowest and the highest current are equal.
+struct Readings {
+  std::uint8_t soc = 255;  ///< in 0.5 %; 255: not known
+  ReadingRange range;
+  constexpr bool operator==(const Readings&) const = default;
+};
+
+/// All readings in one word, the raw values of the signals of StoredFaultPack and StoredFaultCells in
+/// can/greybox_bms.dbc. From the lowest bit: soc 8 bits, current 14, highest and lowest temperature 8 each, highest and
+/// lowest voltage 13 each.
+constexpr std::uint64_t packed(const Readings& r) {
+  const auto low = [&r](std::size_t k) { return static_cast<std::uint32_t>(r.range.lowest[k]); };
+  const auto high = [&r](std::size_t k) { return static_cast<std::uint32_t>(r.range.highest[k]); };
+  using enum ReadingRange::Quantity;
+  return (r.soc | (low(current) & 0x3FFFU) << 8 | high(temperature) << 22) |
+         static_cast<std::uint64_t>(low(temperature) | high(voltage) << 8) << 30 |
+         static_cast<std::uint64_t>(low(voltage)) << 51;
+}
+
 struct EventsRecord {
-  static constexpr Kind kind{4, 1};
+  static constexpr Kind kind{4, 2};
   static constexpr std::size_t causes = 7, max_faults = 16;
+  static constexpr std::uint16_t processor_fault_code = 0xFF00;  ///< plus the exception number, at most 127
   struct Fault {
-    std::uint16_t code = 0;         ///< 0: no fault
-    std::uint32_t operating_s = 0;  ///< time of the fault
+    std::uint16_t code = 0;      ///< 1 to 127, or a processor fault; 0: no fault
+    std::uint32_t time_s = 0;    ///< since 1970, if the calendar clock ran (from first_unix_s on); else in operation
+    std::uint64_t readings = 0;  ///< packed(Readings)
     constexpr bool operator==(const Fault&) const = default;
   };
+  static constexpr std::uint32_t first_unix_s = 946'684'800;  ///< 2000-01-01: 30 years of operation
 
   std::uint32_t starts = 0;
   std::array<std::uint16_t, causes> resets{};  ///< by hal::ResetCause; saturates at 65,535
@@ -210,24 +261,58 @@ struct EventsRecord {
   constexpr bool operator==(const EventsRecord&) const = default;
 };
 
+/// The code of a fault in seven bits; bit 7 marks a processor fault.
+constexpr std::uint8_t short_code(std::uint16_t code) {
+  return static_cast<std::uint8_t>((code & 0x7F) | (code >= EventsRecord::processor_fault_code ? 0x80 : 0));
+}
+
 constexpr Bytes encode(const EventsRecord& r, Payload into) {
   Encoder e(into);
   e.put(r.starts);
   for (const auto n : r.resets) e.put(n);
   e.put(r.faults);
-  for (const auto& f : r.fault) e.put(f.code).put(f.operating_s);
+  for (const auto& f : r.fault) e.put(short_code(f.code)).put(f.time_s).put(f.readings);
   return e.bytes();
 }
 
 constexpr bool decode(Bytes from, std::uint8_t layout, EventsRecord& r) {
-  if (layout != 1 || from.size() != 118) return false;
+  const bool older = layout == 1 && from.size() == 118;
+  if (!older && (layout != 2 || from.size() != 230)) return false;
   Decoder d(from);
   d.get(r.starts);
   for (auto& n : r.resets) d.get(n);
   d.get(r.faults);
   for (auto& f : r.fault) {
-    d.get(f.code);
-    d.get(f.operating_s);
+    d.get(f.code, older ? 2 : 1);
+    if (!older && f.code >= 0x80)
+      f.code = static_cast<std::uint16_t>(EventsRecord::processor_fault_code + f.code - 0x80);
+    d.get(f.time_s);
+    f.readings = packed({});
+    if (!older) d.get(f.readings);
+  }
+  return true;
+}
+
+/// Lowest and highest readings so far.
+struct ExtremesRecord {
+  static constexpr Kind kind{6, 1};
+  ReadingRange range;
+  constexpr bool operator==(const ExtremesRecord&) const = default;
+};
+
+constexpr Bytes encode(const ExtremesRecord& r, Payload into) {
+  Encoder e(into);
+  for (const auto* values : {&r.range.lowest, &r.range.highest}) {
+    for (const std::int16_t value : *values) e.put(value);
+  }
+  return e.bytes();
+}
+
+constexpr bool decode(Bytes from, std::uint8_t layout, ExtremesRecord& r) {
+  if (layout != 1 || from.size() != 12) return false;
+  Decoder d(from);
+  for (auto* values : {&r.range.lowest, &r.range.highest}) {
+    for (std::int16_t& value : *values) d.get(value);
   }
   return true;
 }

@@ -95,6 +95,10 @@ class DiagnoseCommand final : public Command {
 
   int run() override {
     output_.set_own(out_);
+    std::vector<std::string> inputs = {o_.cell};
+    inputs.insert(inputs.end(), o_.recordings.begin(), o_.recordings.end());
+    inputs.insert(inputs.end(), o_.holdouts.begin(), o_.holdouts.end());
+    output_.protect(inputs);
     diagnosis::Options options;
     options.progress = progress_on_terminal(0.1, progress_line);
     workflow::DiagnoseResult result = workflow::diagnose_recordings(workflow::read_diagnose_input(o_), options);

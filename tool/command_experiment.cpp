@@ -109,6 +109,7 @@ class ExperimentCommand final : public Command {
 
   int run() override {
     o_.output.set_own(o_.out);
+    o_.output.protect({});
     const experiments::Experiment& design = experiment_named(o_.name);
     const auto rows = *experiments::experiment(o_.name, {.capacity_ah = o_.capacity_ah,
                                                          .seed = o_.seed,

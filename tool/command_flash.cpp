@@ -15,6 +15,7 @@ namespace {
 
 struct FlashOptions {
   std::string board = "stm32f405_forklift", cell;  ///< cell empty: the board's own
+  std::size_t cells = 0;                           ///< in series; 0: the board's own number
   std::string probe, serial;                       ///< probe empty: the board's own (BMS_PROBE in board.cmake)
   bool dry_run = false;
 };
@@ -25,6 +26,17 @@ std::string quoted(const std::string& word) {
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return text + "'";
+}
+
+/// Both become words of OpenOCD's language, where brackets and quotes run commands. A probe is a file of interface/,
+/// also in a folder of it.
+void check_probe(const images::Probe& probe) {
+  constexpr const char* letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+  const bool plain = probe.interface.find_first_not_of(std::string(letters) + "/") == std::string::npos;
+  if (!plain || probe.interface.starts_with('/') || probe.interface.find("..") != std::string::npos)
+    throw files::BadInput("--probe", 1, "'" + probe.interface + "' is not a probe, expected a name as stlink");
+  if (probe.serial.find_first_not_of(letters) != std::string::npos)
+    throw files::BadInput("--serial", 1, "'" + probe.serial + "' is not a serial number, expected letters and digits");
 }
 
 /// Writes each part to a file next to the image.
@@ -43,13 +55,14 @@ std::vector<images::PartFile> write_parts(const std::filesystem::path& image,
 int flash(const FlashOptions& o) {
   images::Probe probe{o.probe, images::board_setting(o.board, "BMS_PROBE_TARGET"), o.serial};
   if (probe.interface.empty()) probe.interface = images::board_setting(o.board, "BMS_PROBE");
+  check_probe(probe);
   if (!o.dry_run && !images::in_path("openocd")) {
     throw files::BadInput("openocd", 1,
                           "not installed, expected OpenOCD (Debian: apt-get install openocd; ./bms flash installs it)");
   }
   const auto image = images::firmware_image(
       o.board, files::read_cell(o.cell.empty() ? images::board_setting(o.board, "BMS_DEFAULT_CELL") : o.cell),
-      images::chip_image(o.board));
+      images::chip_image(o.board), "none", o.cells);
   const images::ImageFile file(image);
   const auto storage = images::storage_of(file);
   const auto parts = write_parts(image, images::parts_to_write(file.parts(), storage));
@@ -83,6 +96,7 @@ class FlashCommand final : public Command {
     c.add_option("--board", o_.board, "folder in boards/")->capture_default_str();
     c.add_option("--cell", o_.cell, "cell file, or name of a built-in cell; the board's own if not given")
         ->type_name("CELL");
+    c.add_option("--cells", o_.cells, "cells in series; the board's own number if not given");
     c.add_option("--probe", o_.probe,
                  "debug probe: stlink, cmsis-dap, jlink, ... (a file of OpenOCD's interface/); the board's own if not "
                  "given");

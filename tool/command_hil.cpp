@@ -25,6 +25,7 @@ struct HilOptions {
   std::string board = "netduinoplus2";
   std::string port;  ///< of a real board; empty: emulated
   std::string cell = "table9", board_cell;
+  std::size_t cells = 0;           ///< in series; 0: the board's own number
   std::string profile, recording;  ///< one of the two
   double initial_soc = 0.9;
   std::optional<double> announced_soc;
@@ -168,7 +169,7 @@ hil::SessionPlan read(const HilOptions& options) {
       files::read_recording(input, plan.replayed ? files::VoltageColumn::required : files::VoltageColumn::optional);
   measurement::compare_with_cell(plan.profile, plan.cell.parameters);
   for (const measurement::Warning& w : plan.profile.warnings) warn(input + ": " + w.text);
-  plan.cells = images::board_cells(options.board);
+  plan.cells = options.cells != 0 ? options.cells : images::board_cells(options.board);
   plan.initial_soc = options.initial_soc;
   plan.announced_soc = options.announced_soc;
   plan.sample_period_s = options.sample_period_s;
@@ -180,10 +181,11 @@ hil::SessionPlan read(const HilOptions& options) {
 /// dump: takes the board's frames in candump format if the options ask for them.
 hil::SessionResult compute(const HilOptions& options, const hil::SessionPlan& plan, std::string& dump) {
   const files::CellFile board_cell = options.board_cell.empty() ? plan.cell : files::read_cell(options.board_cell);
-  const auto link =
-      options.port.empty()
-          ? hil::emulated_link(options.board, images::firmware_image(options.board, board_cell, images::Image::hil))
-          : hil::serial_link(options.port);
+  const auto link = options.port.empty()
+                        ? hil::emulated_link(
+                              options.board,
+                              images::firmware_image(options.board, board_cell, images::Image::hil, "none", plan.cells))
+                        : hil::serial_link(options.port);
   const auto record = [&](double time_s, const can::Frame& f) {
     if (options.candump.empty()) return;
     monitor::append_dump_line(dump, monitor::to_bus_frame(f, std::llround(1e6 * time_s)), "can0");
@@ -237,6 +239,8 @@ class HilCommand final : public Command {
         ->capture_default_str();
     c.add_option("--port", o_.port, "serial port of a board that speaks SLCAN")->type_name("DEVICE");
     c.add_option("--cell", o_.cell, cell_help("cells of the simulated pack"))->capture_default_str();
+    c.add_option("--cells", o_.cells, "cells in series; the board's own number if not given")
+        ->check(Within(1, hil::max_cells));
     c.add_option("--board-cell", o_.board_cell, "cell file for the board's firmware if it is not --cell")
         ->type_name("CELL");
     c.add_option("--profile", o_.profile, "current of the load: time_s, current_a, optionally temperature_c")
@@ -262,6 +266,7 @@ class HilCommand final : public Command {
 
   int run() override {
     o_.output.set_own(o_.candump);
+    o_.output.protect({o_.recording, o_.profile, o_.cell, o_.board_cell});
     const hil::SessionPlan plan = read(o_);
     std::string dump;
     const hil::SessionResult result = compute(o_, plan, dump);

@@ -74,8 +74,22 @@ class IdentifyCommand final : public Command {
 
   int run() override {
     output_.set_own(o_.out);
+    std::vector<std::string> inputs = {o_.start};
+    for (const auto* files : {&o_.recordings, &o_.ocv, &o_.validate})
+      inputs.insert(inputs.end(), files->begin(), files->end());
+    output_.protect(inputs);
     parse();
-    const workflow::IdentifyResult result = workflow::identify_cell(o_);
+    try {
+      return write(workflow::identify_cell(o_));
+    } catch (const workflow::FailedFit& failed) {
+      fmt::print(stderr, "{}\n", files::printable(failed.what()));
+      return 1;
+    }
+  }
+
+ private:
+  /// Returns the exit code: 1 if there is no cell file.
+  int write(const workflow::IdentifyResult& result) const {
     if (result.cell_file) write_output(o_.out, files::cell_text(*result.cell_file));
     for (const measurement::Warning& w : result.warnings) warn(w.text);
     if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
@@ -84,7 +98,6 @@ class IdentifyCommand final : public Command {
     return result.cell_file ? 0 : 1;
   }
 
- private:
   void add_inputs(CLI::App& c) {
     c.add_option("--recording", o_.recordings, "recordings to identify from")->required()->type_name("FILE");
     c.add_option("--ocv", o_.ocv, "slow charge and discharge (C/10 or slower) that give the OCV and the capacity")

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -44,16 +45,20 @@ struct MonitorOptions {
   Output output;
 };
 
-/// A file that is written while the monitor runs, so that a power cut loses at most a second of it.
+/// A file that is written while the monitor runs, so that a power cut loses at most a second of it. An older file of
+/// that name is emptied by the first write(): a source without frames costs nothing.
 class GrowingFile {
  public:
   explicit GrowingFile(const std::string& name) : name_(name) {
     if (name.empty()) return;
-    file_ = name == "-" ? stdout : std::fopen(name.c_str(), "we");
+    is_new_ = name != "-" && access(name.c_str(), F_OK) != 0;
+    file_ = name == "-" ? stdout : std::fopen(name.c_str(), "ae");
     if (file_ == nullptr) refuse();
   }
   ~GrowingFile() {
-    if (file_ != nullptr && file_ != stdout) std::fclose(file_);
+    if (file_ == nullptr || file_ == stdout) return;
+    std::fclose(file_);
+    if (is_new_ && !written_) unlink(name_.c_str());
   }
   GrowingFile(const GrowingFile&) = delete;
   GrowingFile& operator=(const GrowingFile&) = delete;
@@ -63,6 +68,9 @@ class GrowingFile {
   /// Writes the text so far; unless `all` is set, only once the buffer is full.
   void write(bool all) {
     if (file_ == nullptr || (!all && text_.size() < buffer_bytes)) return;
+    if (!written_ && file_ != stdout && ftruncate(fileno(file_), 0) != 0 && errno != EINVAL)
+      refuse();  // not of a device
+    written_ = true;
     if (std::fwrite(text_.data(), 1, text_.size(), file_) != text_.size() || std::fflush(file_) != 0) refuse();
     text_.clear();
   }
@@ -74,6 +82,7 @@ class GrowingFile {
   }
   std::string name_, text_;
   std::FILE* file_ = nullptr;
+  bool is_new_ = false, written_ = false;
 };
 
 /// A timer that is due once per period. The time is passed in: of this computer or of a log.
@@ -95,7 +104,11 @@ class Timer {
 std::string live_page_html() {
   const std::string body =
       "<style>\n" + std::string(reports::embedded::live_css) + "</style>\n" + std::string(reports::embedded::live_html);
-  return reports::page(body, reports::embedded::live_js, "bms monitor", "null");
+  return reports::page(body, reports::embedded::live_js, "bms monitor", "null", reports::Connections::own_server);
+}
+
+std::unique_ptr<LivePage> serve(const std::string& html, int port) {
+  return std::make_unique<LivePage>(html, reports::policy_in(html), port);
 }
 
 class Monitor {
@@ -110,7 +123,7 @@ class Monitor {
     facts_.blocks = Terminal::shows_utf8();
     csv_.text() += csv_.is_open() ? csv_head() : "";
     shown_ = !options.output.quiet && !options.output.uses_standard_output();
-    if (options.serve_port) page_ = std::make_unique<LivePage>(live_page_html(), *options.serve_port);
+    if (options.serve_port) page_ = serve(live_page_html(), *options.serve_port);
     if (page_) fmt::print(options.output.uses_standard_output() ? stderr : stdout, "Page: {}\n", page_->url());
     std::fflush(stdout);
     if (shown_ && isatty(STDOUT_FILENO)) terminal_ = std::make_unique<Terminal>();
@@ -180,8 +193,10 @@ class Monitor {
         facts_.frames_per_second = static_cast<double>(bus_.frames() - rated_) / since_s;
       rated_ = bus_.frames();
       rated_s_ = now_s;
-      record_.write(true);
-      csv_.write(true);
+      if (bus_.frames() > 0) {
+        record_.write(true);
+        csv_.write(true);
+      }
     }
     if (page_ && page_timer_.due(now_s)) page_->publish(json_of(as_of_now(), facts_, silent_s()));
     if (terminal_) {
@@ -273,6 +288,8 @@ class MonitorCommand final : public Command {
   int run() override {
     o_.output.set_own(o_.csv);
     if (serve_->count() > 0 && !o_.serve_port) o_.serve_port = 0;
+    constexpr std::string_view file = "file:";
+    o_.output.protect({o_.source.starts_with(file) ? o_.source.substr(file.size()) : o_.source}, {o_.record});
     if (o_.record == "-") throw files::BadInput("--record", 1, "standard output is not supported, expected a file");
     try {
       return std::make_unique<Monitor>(o_)->run();

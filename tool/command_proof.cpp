@@ -67,6 +67,13 @@ void check(const ProofOptions& options) {
   }
 }
 
+std::vector<std::string> files_in(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder, error)) files.push_back(entry.path());
+  return files;
+}
+
 class ProofCommand final : public Command {
  public:
   CLI::App* add(CLI::App& app) override {
@@ -84,6 +91,7 @@ class ProofCommand final : public Command {
   int run() override {
     o_.output.set_own("");
     check(o_);
+    o_.output.protect(files_in(o_.data));
     const proof::ProofResult result = proof::prove(o_.data, o_.only, progress_on_terminal(0.2, proof_progress));
     if (!o_.output.json.empty()) write_output(o_.output.json, reports::json_of(result));
     if (!o_.output.report.empty()) write_output(o_.output.report, reports::proof_report(result));

@@ -7,6 +7,7 @@
 #include "files/recording.hpp"
 #include "files/text_file.hpp"
 #include "host_sim/can_log.hpp"
+#include "host_sim/judgement.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/simulation.hpp"
 #include "images/emulator.hpp"
@@ -29,6 +30,7 @@ struct ReplayOptions {
   std::string scalar = "float";
   std::optional<double> initial_soc;
   double initial_soc_sigma = 0.02;
+  std::optional<std::size_t> run;  ///< of a CAN log, from 1; not given: the last
   bool verify = false;
   std::string trace;
   Output output;
@@ -81,6 +83,31 @@ std::string not_estimated(const files::CellFile& cell) {
   return ids;
 }
 
+std::string duration_text(const host_sim::CanLog& log) {
+  return fmt::format("{:.2f} h", log.recording.duration_s() / 3'600);
+}
+
+/// Reads a CAN log and chooses one of its runs.
+host_sim::CanLog read_log(const ReplayOptions& options, host_sim::ReplayResult& result) {
+  std::vector<host_sim::CanLog> logs = host_sim::read_can_log(options.recording);
+  result.runs = logs.size();
+  result.run = options.run.value_or(logs.size());
+  if (result.run > logs.size())
+    throw files::BadInput(options.recording, 1,
+                          fmt::format("no run {} of the firmware, expected --run 1 to {}", result.run, logs.size()));
+  std::string durations;
+  for (const host_sim::CanLog& log : logs) durations += (durations.empty() ? "" : ", ") + duration_text(log);
+  host_sim::CanLog chosen = std::move(logs[result.run - 1]);
+  if (result.runs > 1) {
+    chosen.recording.warnings.insert(
+        chosen.recording.warnings.begin(),
+        {"several_runs", fmt::format("the firmware was restarted, or its time jumps: the log has {} runs ({}), this is "
+                                     "the estimate of run {}; choose another one with --run",
+                                     result.runs, durations, result.run)});
+  }
+  return chosen;
+}
+
 void add_warnings(const ReplayOptions& options, ReplayRun& run) {
   std::vector<measurement::Warning>& warnings = run.result.recording.warnings;
   if (const std::string ids = not_estimated(run.result.cell); !ids.empty()) {
@@ -107,7 +134,10 @@ ReplayRun read(const ReplayOptions& options) {
   if (options.verify && run.board == nullptr)
     throw files::BadInput("--verify", 1, "no board to compare the host with, expected --target with a board");
   result.cell = files::read_cell(options.cell);
-  if (host_sim::is_can_log(options.recording)) run.log = host_sim::read_can_log(options.recording);
+  if (host_sim::is_can_log(options.recording))
+    run.log = read_log(options, result);
+  else if (options.run)
+    throw files::BadInput("--run", 1, "the recording is not a CAN log, expected no --run");
   result.recording = run.log ? run.log->recording : files::read_recording(options.recording);
   measurement::compare_with_cell(result.recording, result.cell.parameters);
   add_warnings(options, run);
@@ -121,6 +151,16 @@ ReplayRun read(const ReplayOptions& options) {
                   : host_sim::starting_point(result.prior,
                                              host_sim::value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
   return run;
+}
+
+/// An impossible estimate is an error, unless the question was whether a board computes the same.
+void judge(const ReplayOptions& options, host_sim::ReplayResult& result) {
+  host_sim::Judgement judgement = host_sim::judge(result);
+  result.doubts = std::move(judgement.doubts);
+  if (!judgement.impossible) return;
+  if (!result.verified_against && !result.difference)
+    throw files::BadInput(options.recording, 1, *judgement.impossible + "; expected a recording of this cell");
+  result.doubts.insert(result.doubts.begin(), *judgement.impossible);
 }
 
 void compute(const ReplayOptions& options, ReplayRun& run) {
@@ -146,17 +186,22 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
     result.difference = host_sim::difference_to_log(*run.log, result.track, run.compared);
     if (!result.difference && run.compared > 0) result.verified_against = "log";
   }
+  judge(options, result);
   host_sim::evaluate(result);
 }
 
+std::string voltage_text(const host_sim::VoltageFigures& v) {
+  std::string text = v.prediction_rmse_v
+                         ? fmt::format("One-step voltage prediction {:.2f} mV RMS", 1e3 * *v.prediction_rmse_v)
+                         : std::string("No voltage was compared with its prediction");
+  if (v.open_loop_rmse_v && v.open_loop_fit_percent)
+    text += fmt::format("; open loop {:.2f} mV RMS, fit {:.1f} %", 1e3 * *v.open_loop_rmse_v, *v.open_loop_fit_percent);
+  return text + ".";
+}
+
 std::string summary(const host_sim::ReplayResult& r) {
-  return reports::statement(r) +
-         fmt::format(
-             "\nOne-step voltage prediction {:.2f} mV RMS; open loop {:.2f} mV RMS, fit {:.1f} %. {:.2f} million "
-             "steps/s ({}, {}).",
-             1e3 * r.voltage.prediction_rmse_v.value_or(0), 1e3 * r.voltage.open_loop_rmse_v.value_or(0),
-             r.voltage.open_loop_fit_percent.value_or(0), r.track.steps_per_second / 1e6, r.target,
-             host_sim::name_of(r.scalar));
+  return reports::statement(r) + fmt::format("\n{} {:.2f} million steps/s ({}, {}).", voltage_text(r.voltage),
+                                             r.track.steps_per_second / 1e6, r.target, host_sim::name_of(r.scalar));
 }
 
 /// Returns the exit code.
@@ -199,6 +244,10 @@ class ReplayCommand final : public Command {
     c.add_option("--initial-soc-sigma", o_.initial_soc_sigma, "standard deviation of --initial-soc")
         ->check(Within(1e-4, 1.0))
         ->capture_default_str();
+    c.add_option("--run", o_.run,
+                 "of a CAN log with several runs of the firmware: which one, from 1; the last if not given")
+        ->check(CLI::PositiveNumber)
+        ->type_name("N");
     c.add_option("--target", o_.target, "host, or an emulated board by its folder in boards/: netduinoplus2, microbit")
         ->capture_default_str();
     c.add_option("--scalar", o_.scalar, "arithmetic: float, fixed or double")
@@ -217,6 +266,7 @@ class ReplayCommand final : public Command {
 
   int run() override {
     o_.output.set_own(o_.trace);
+    o_.output.protect({o_.recording, o_.cell, o_.board_cell});
     ReplayRun run = read(o_);
     compute(o_, run);
     return write(o_, run);

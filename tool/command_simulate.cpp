@@ -1,4 +1,5 @@
 // bms simulate: the model's voltage for the current of a recording or a profile, open loop.
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <iterator>
@@ -33,6 +34,9 @@ struct SimulateOptions {
 
   const std::string& input() const { return recording.empty() ? profile : recording; }
 };
+
+/// A simulation beyond these states of charge has left the cell; the same range as the estimator's.
+constexpr double lowest_soc = -0.25, highest_soc = 1.25;
 
 /// What was read, and what has been computed.
 struct SimulationRun {
@@ -111,6 +115,24 @@ SimulationRun read(const SimulateOptions& options) {
   return run;
 }
 
+/// Throws BadInput with the likely cause if the state of charge leaves the cell.
+void check_range(const SimulateOptions& options, const SimulationRun& run) {
+  const auto outside = std::find_if(run.rows.begin(), run.rows.end(), [](const host_sim::SimulatedRow& row) {
+    return !(row.soc >= lowest_soc && row.soc <= highest_soc);
+  });
+  if (outside == run.rows.end()) return;
+  const auto k = static_cast<std::size_t>(outside - run.rows.begin());
+  std::string cause = "the current, the initial state of charge or the capacity of the cell is wrong";
+  for (const measurement::Warning& w : run.recording.warnings) {
+    if (w.id == "time_in_ms" || w.id == "current_in_ma" || w.id == "charge_exceeds_capacity") cause = w.text;
+  }
+  throw files::BadInput(
+      options.input(), 1,
+      fmt::format("the state of charge leaves {:g} to {:g} % after {:g} s; likely cause: {}; expected "
+                  "a current that the cell can deliver",
+                  100 * lowest_soc, 100 * highest_soc, run.recording.time_s[k] - run.recording.time_s.front(), cause));
+}
+
 void compute(const SimulateOptions& options, SimulationRun& run) {
   const auto cell = model::prepare<double, model::max_intervals>(run.cell.parameters);
   const auto begin = std::chrono::steady_clock::now();
@@ -122,6 +144,7 @@ void compute(const SimulateOptions& options, SimulationRun& run) {
                                  .temperature_c = run.recording.temperature_c,
                                  .initial_soc = options.initial_soc});
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  check_range(options, run);
   run.result = {.cell = run.cell.name,
                 .input = options.input(),
                 .out = options.out,
@@ -212,6 +235,7 @@ class SimulateCommand final : public Command {
 
   int run() override {
     o_.output.set_own(o_.out);
+    o_.output.protect({o_.cell, o_.input()});
     SimulationRun run = read(o_);
     compute(o_, run);
     write(o_, run);

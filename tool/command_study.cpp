@@ -84,21 +84,37 @@ study::StudyProgress study_progress() {
   };
 }
 
-study::StudyResult compute(const StudyOptions& options, const files::CellFile& cell) {
-  if (options.recordings.empty()) return study::study_plant(cell.parameters, options.seed, study_progress());
+/// The recordings of the folder, sorted by name; none if there is no folder.
+std::vector<std::string> recordings_of(const StudyOptions& options) {
+  std::vector<std::string> paths;
+  if (options.recordings.empty()) return paths;
   std::error_code error;
   if (!std::filesystem::is_directory(options.recordings, error))
     throw files::BadInput(options.recordings, 1, "no folder, expected one with recordings in CSV");
-  std::vector<std::string> paths;
   for (const auto& entry : std::filesystem::directory_iterator(options.recordings)) {
     if (entry.path().extension() == ".csv") paths.push_back(entry.path().string());
   }
   std::sort(paths.begin(), paths.end());
-  return study::study_recordings(cell.parameters, paths, study_progress());
+  return paths;
 }
 
-void write(const StudyOptions& options, const study::StudyResult& result) {
+/// Files of the folder of results that do not depend on the tables.
+std::vector<std::string> files_of_results(const StudyOptions& options) {
   const std::filesystem::path folder = options.out;
+  return {(folder / "study.json").string(), (folder / "study.html").string()};
+}
+
+study::StudyResult compute(const StudyOptions& options, const files::CellFile& cell,
+                           const std::vector<std::string>& recordings) {
+  if (options.recordings.empty()) return study::study_plant(cell.parameters, options.seed, study_progress());
+  return study::study_recordings(cell.parameters, recordings, study_progress());
+}
+
+void write(const StudyOptions& options, const std::vector<std::string>& recordings, const study::StudyResult& result) {
+  const std::filesystem::path folder = options.out;
+  std::vector<std::string> outputs = files_of_results(options);
+  for (const files::PageTable& table : result.tables) outputs.push_back((folder / (table.id + ".csv")).string());
+  options.output.protect(recordings, outputs);
   for (const files::PageTable& table : result.tables)
     write_output((folder / (table.id + ".csv")).string(), csv_of(table));
   const std::string json = reports::json_of(result), page = page_of_study(result);
@@ -131,13 +147,17 @@ class StudyCommand final : public Command {
 
   int run() override {
     o_.output.set_own("");
+    const std::vector<std::string> recordings = recordings_of(o_);
+    std::vector<std::string> inputs = recordings;
+    inputs.push_back(o_.cell);
+    o_.output.protect(inputs, files_of_results(o_));
     const files::CellFile cell = files::read_cell(o_.cell);
     std::error_code error;
     std::filesystem::create_directories(o_.out, error);
     if (error) {
       throw files::BadInput(o_.out, 1, "cannot be created (" + error.message() + "), expected a folder to write to");
     }
-    write(o_, compute(o_, cell));
+    write(o_, recordings, compute(o_, cell, recordings));
     return 0;
   }
 

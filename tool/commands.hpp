@@ -17,5 +17,6 @@ std::unique_ptr<Command> proof_command();       ///< the diagnosis of real recor
 std::unique_ptr<Command> hil_command();         ///< a board in the loop with a simulated pack or a recording
 std::unique_ptr<Command> flash_command();       ///< writes a board's image onto the chip
 std::unique_ptr<Command> monitor_command();     ///< CAN frames as a screen, a log, a page
+std::unique_ptr<Command> log_command();         ///< what a battery has stored, read over CAN
 
 }  // namespace bms::tool

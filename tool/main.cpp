@@ -1,13 +1,20 @@
 // The command line of bms: it parses the arguments, runs one command and returns the exit code.
 //
 //   0 done; 1 done, and the answer is no; 2 bad usage or bad input; 3 a fault of the program
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
 #include <cstdio>
 #include <exception>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "files/bad_input.hpp"
 #include "tool/commands.hpp"
+#include "tool/output.hpp"
 
 namespace {
 
@@ -17,21 +24,51 @@ using namespace bms::tool;
 std::vector<std::unique_ptr<Command>> all_commands() {
   std::vector<std::unique_ptr<Command>> commands;
   for (const auto make : {replay_command, simulate_command, experiment_command, identify_command, diagnose_command,
-                          study_command, proof_command, hil_command, flash_command, monitor_command})
+                          study_command, proof_command, hil_command, flash_command, monitor_command, log_command})
     commands.push_back(make());
   return commands;
 }
 
 /// Prints the help, or a usage error on one line. Returns the exit code.
 int refuse(const CLI::App& app, const CLI::ParseError& error) {
-  if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-  std::fprintf(stderr, "bms: %s (see bms --help)\n", error.what());
+  if (error.get_exit_code() == 0) {  // --help, --version
+    app.exit(error);
+    check_standard_output();
+    return 0;
+  }
+  std::fprintf(stderr, "bms: %s (see bms --help)\n", bms::files::printable(error.what()).c_str());
   return 2;
+}
+
+/// A file that is opened must not become a closed standard output, or results would be mixed. A closed pipe is an error
+/// like a full disk, not the end of the process.
+void prepare_standard_streams() {
+  constexpr std::array modes = {O_RDONLY, O_RDONLY, O_WRONLY};  // of /dev/null; writing to fd 1 fails and is noticed
+  for (int fd = 0; fd < 3; ++fd) {
+    if (fcntl(fd, F_GETFD) < 0) open("/dev/null", modes[static_cast<std::size_t>(fd)]);
+  }
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+int run(CLI::App& app, const std::vector<std::pair<CLI::App*, Command*>>& entries, int argc, char** argv) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return refuse(app, error);
+  }
+  for (const auto& [entry, command] : entries) {
+    if (!entry->parsed()) continue;
+    const int code = command->run();
+    check_standard_output();
+    return code;
+  }
+  return 3;  // require_subcommand has refused this
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  prepare_standard_streams();
   const auto commands = all_commands();
   CLI::App app{"greybox-bms: a battery model inside a battery management system, and the same model over recordings"};
   app.name("bms");
@@ -43,18 +80,15 @@ int main(int argc, char** argv) {
   std::vector<std::pair<CLI::App*, Command*>> entries;
   for (const auto& command : commands) entries.emplace_back(command->add(app), command.get());
   try {
-    app.parse(argc, argv);
-    for (const auto& [entry, command] : entries) {
-      if (entry->parsed()) return command->run();
-    }
-    return 3;  // require_subcommand has refused this
-  } catch (const CLI::ParseError& error) {
-    return refuse(app, error);
+    return run(app, entries, argc, argv);
   } catch (const bms::files::BadInput& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;
+  } catch (const std::system_error& error) {  // printing may fail before check_standard_output() is called
+    std::fprintf(stderr, "bms: %s\n", bms::files::printable(error.what()).c_str());
+    return std::ferror(stdout) != 0 ? 2 : 3;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "bms: %s\n", error.what());
+    std::fprintf(stderr, "bms: %s\n", bms::files::printable(error.what()).c_str());
     return 3;
   }
 }

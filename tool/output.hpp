@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "workflow/progress.hpp"
 
@@ -16,19 +17,26 @@ struct Output {
 
   /// Sets the command's own file. Throws BadInput if more than one result goes to standard output.
   void set_own(const std::string& file);
+  /// Throws BadInput if a result would overwrite one of the `inputs`, also through a link, or another result. To be
+  /// called after set_own() and before anything is written. more: further files that the command writes.
+  void protect(const std::vector<std::string>& inputs, const std::vector<std::string>& more = {}) const;
   bool uses_standard_output() const { return json == "-" || report == "-" || own == "-"; }
 };
 
 /// Writes `text` to the file, or to standard output for "-". Throws BadInput when it cannot be written.
 void write_output(const std::string& file, const std::string& text);
 
-/// Prints a summary for a person, unless --quiet is given or standard output carries a result.
+/// Prints a summary for a person, unless --quiet is given or standard output carries a result. Throws BadInput when it
+/// cannot be printed.
 void print_summary(const Output& output, const std::string& text);
 
 /// Shows progress on one line of the terminal, at most every `every_s` seconds; shows nothing if standard error is not
 /// a terminal. line: text for the share done (0..1), the time left in s (infinite at first) and the current part.
 workflow::Progress progress_on_terminal(
     double every_s, std::function<std::string(double done, double left_s, const std::string& what)> line);
+
+/// Throws BadInput if something that was printed on standard output did not get there: a full disk, a closed pipe.
+void check_standard_output();
 
 /// Prints a warning as one line on standard error.
 void warn(const std::string& text);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,12 @@
 #include "workflow/identification_data.hpp"
 
 namespace bms::workflow {
+
+/// The data were good, but no parameters follow from them: exit code 1, and nothing is written.
+class FailedFit : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 struct IdentifyOptions {
   std::vector<std::string> recordings;               ///< files to identify from; at least one
@@ -50,7 +57,8 @@ struct IdentifyResult {
 };
 
 /// Reads the recordings and identifies a cell. Writes and prints nothing. Throws files::BadInput for files that cannot
-/// be read, for data that do not determine the parameters, and for a grey box whose cell is out of range.
+/// be read, for data that do not determine the parameters, and for a grey box whose cell is out of range. Throws
+/// FailedFit if a figure of the fit is not a number, or if the model follows the voltage no better than its mean.
 IdentifyResult identify_cell(const IdentifyOptions& options);
 
 /// "nlgr", "tf", "oe" or "hw".

@@ -7,6 +7,8 @@ set(BMS_EMULATED ON)
 set(BMS_CAN slcan)
 set(BMS_SAMPLES emulated)
 set(BMS_CELLS 1)
+set(BMS_FEWEST_CELLS 1)
+set(BMS_MOST_CELLS 1)
 set(BMS_SAMPLE_PERIOD_S 1.0)
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
 # sample [ms] (tests/firmware/board_budget.hpp).

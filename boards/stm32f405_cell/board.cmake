@@ -5,12 +5,16 @@ set(BMS_DEFAULT_CELL table9)
 set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/../stm32f405_forklift/memory.ld)  # the same chip and memory layout
 set(BMS_CHIP stm32f4)
 set(BMS_CELLS 1)
+set(BMS_FEWEST_CELLS 1)
+set(BMS_MOST_CELLS 1)
 set(BMS_SAMPLE_PERIOD_S 0.1)
+set(BMS_CURRENT_RANGE_A 41)  # 1.65 V / (20 x 2 mohm): hal/adc/cell_readings.hpp
 set(BMS_EMULATED OFF)
 set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)
 set(BMS_CAN_DEFINITION BMS_CAN_BIT_RATE=250000)
 set(BMS_SAMPLES adc)
+set(BMS_DC_LINK false)
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
 # sample [ms] (tests/firmware/board_budget.hpp).
 set(BMS_BUDGET_FLASH 65536)

@@ -1,16 +1,20 @@
-# STM32F405RG, Cortex-M4F, on the board of a forklift with 16 cells. No emulator has its CAN controller; tests/firmware
-# runs the image on a model of it.
+# STM32F405RG, Cortex-M4F, on the board of a forklift with 8 to 16 cells. No emulator has its CAN controller;
+# tests/firmware runs the image on a model of it.
 set(BMS_SCALAR_DEFINITION "")
 set(BMS_DEFAULT_CELL table9)
 set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/memory.ld)
 set(BMS_CHIP stm32f4)
-set(BMS_CELLS 16)
+set(BMS_CELLS 16)  # another number: -DBMS_CELLS=N
+set(BMS_FEWEST_CELLS 8)
+set(BMS_MOST_CELLS 16)
 set(BMS_SAMPLE_PERIOD_S 0.1)
+set(BMS_CURRENT_RANGE_A 2000)  # 200 mV at 0.1 mohm
 set(BMS_EMULATED OFF)
 set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)
 set(BMS_CAN_DEFINITION BMS_CAN_BIT_RATE=250000)
 set(BMS_SAMPLES bq76952)
+set(BMS_AUXILIARY_CONTACTS stm32f4)  # absent: a truck whose main contactors have none
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
 # sample [ms] (tests/firmware/board_budget.hpp).
 set(BMS_BUDGET_FLASH 65536)

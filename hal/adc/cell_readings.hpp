@@ -96,14 +96,13 @@ constexpr void read(const AdcCounts& c, std::uint32_t reference_at_3v3, const An
   const std::int64_t most = full_scale * c.n;
   const auto pin_nv = [&](std::uint32_t sum) { return rounded_quotient(1'000 * supply_uv * sum, most); };
   const std::int64_t cell_uv = rounded_quotient(pin_nv(c.voltage) * front_end.divider_ppm, 1'000'000'000);
-  into.voltage_uv = static_cast<std::int32_t>(
-      cell_uv + rounded_quotient(cell_uv * calibration.voltage_gain_ppm, 1'000'000) + calibration.voltage_offset_uv);
+  into.voltage_uv =
+      static_cast<std::int32_t>(corrected(cell_uv, calibration.voltage_gain_ppm, calibration.voltage_offset_uv));
   const std::int64_t shunt_nv = pin_nv(c.current) - 500 * supply_uv;
   const std::int64_t current_ua =
       rounded_quotient(1'000 * shunt_nv, std::int64_t{front_end.amplifier} * front_end.shunt_uohm);
   into.current_ua =
-      static_cast<std::int32_t>(current_ua + rounded_quotient(current_ua * calibration.current_gain_ppm, 1'000'000) +
-                                calibration.current_offset_ua);
+      static_cast<std::int32_t>(corrected(current_ua, calibration.current_gain_ppm, calibration.current_offset_ua));
   into.temperature_cdegc = temperature_of(static_cast<std::int32_t>(1'000'000LL * c.temperature / most));
 }
 

@@ -53,7 +53,10 @@ void convert(adc::AdcCounts& sums) {
 
 }  // namespace
 
-void calibrate(const SensorCalibration& calibration) { correction = calibration; }
+bool calibrate(const SensorCalibration& calibration) {
+  correction = calibration;
+  return true;
+}
 
 const measurement::PackSample<1>* next_sample() {
   if (!started) {
@@ -62,9 +65,12 @@ const measurement::PackSample<1>* next_sample() {
     due_us = now_us() + period_us;
   }
   adc::AdcCounts sums;
+  std::uint64_t round_us = now_us();
   for (receive_frames(); now_us() < due_us; receive_frames()) {
     wait_for_interrupt();
+    if (now_us() < round_us) continue;  // another interrupt within the millisecond
     convert(sums);
+    round_us += 1'000;
   }
   measurement::Sample sample;
   sample.time_us = now_us();
@@ -79,6 +85,6 @@ const measurement::PackSample<1>* next_sample() {
 }
 
 void power_path_set(const PowerPath& wanted) { contactor_pins_set(wanted); }
-std::int32_t dc_link_uv() { return measurement::no_reading; }
+LinkVoltages link_voltages() { return {}; }
 
 }  // namespace bms::hal

@@ -1,23 +1,25 @@
 #include "hal/bq76952/front_end.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
-#include "hal/bq76952/registers.hpp"
 #include "hal/bytes.hpp"
 #include "hal/clock.hpp"
+#include "hal/second_line.hpp"
 
 namespace bms::hal::bq76952 {
 
 namespace {
 
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
-constexpr std::size_t settings_per_sample = 8;
+constexpr std::size_t settings_per_sample = 11;
 constexpr std::uint8_t max_wait_samples = 5;   // until a mode is entered or left
 constexpr std::uint8_t max_failures = 2;       // samples in a row
 constexpr std::uint8_t max_scan_age = 2;       // samples without a complete scan
 constexpr std::uint8_t max_charge_still = 15;  // samples: 1.5 s of a counter of seconds
 constexpr std::uint64_t refresh_interval_us = 5'000'000;
+constexpr int max_move = 127;  // of a word between two samples; a torn word is off by 256
 
 /// Waits until the chip has processed what was written.
 void settle() {
@@ -43,16 +45,25 @@ void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   into = {};
   into.time_us = time_us;
   dc_link_uv_ = measurement::no_reading;
-  if (state_ == State::measure) {
-    if (measure(into))
+  trips_ = 0;
+  interrupted_ = interrupted_ || silent();
+  const bool measuring = state_ == State::measure;
+  bool complete = false;
+  if (measuring) {
+    complete = measure(into);
+    if (complete)
       failures_ = 0;
     else if (state_ == State::measure && ++failures_ >= max_failures)
       reset_measurement();
     if (into.current_ua == measurement::no_reading) mean_current_.reset();
-    return;
+  } else if (state_ != State::absent || now_us() >= next_try_us_) {
+    complete = advance();
+    if (!complete) rest();
   }
-  if (state_ == State::absent && now_us() < next_try_us_) return;
-  if (!advance()) rest();
+  if (complete) answered_us_ = now_us();
+  if (interrupted_) trips_ |= host_silence;
+  if (measuring && complete) interrupted_ = false;
+  if (trips_ != 0) ++counters_.trips;
 }
 
 /// One step towards measuring. Returns false if the chip is missing or not as expected.
@@ -84,6 +95,7 @@ void FrontEnd::reset_measurement() {
   rest_us_ = 0;
   next_try_us_ = 0;
   failures_ = 0;
+  clear_latch_ = false;
 }
 
 bool FrontEnd::detect() {
@@ -115,15 +127,16 @@ bool FrontEnd::detect() {
 /// Compares the data memory, block by block, with the settings. Returns false if it could not be read.
 bool FrontEnd::compare_memory(bool& matches) {
   matches = true;
-  for (std::size_t k = 0; k < settings_.size();) {
-    const std::uint16_t begin = settings_[k].address;
+  const std::span<const Setting> settings = configuration_->settings;
+  for (std::size_t k = 0; k < settings.size();) {
+    const std::uint16_t begin = settings[k].address;
     std::array<std::uint8_t, buffer_bytes> block{};
     if (!wire_.select(begin)) return false;
     settle();
     if (!wire_.fetch(begin, block)) return false;
-    for (; k < settings_.size() && settings_[k].address + settings_[k].bytes <= begin + buffer_bytes; ++k) {
-      if (get_bytes<std::uint32_t>(block, static_cast<std::size_t>(settings_[k].address - begin), settings_[k].bytes) !=
-          settings_[k].value)
+    for (; k < settings.size() && settings[k].address + settings[k].bytes <= begin + buffer_bytes; ++k) {
+      if (get_bytes<std::uint32_t>(block, static_cast<std::size_t>(settings[k].address - begin), settings[k].bytes) !=
+          settings[k].value)
         matches = false;
     }
   }
@@ -133,7 +146,9 @@ bool FrontEnd::compare_memory(bool& matches) {
 bool FrontEnd::compare() {
   std::uint16_t status = 0;
   bool matches = false;
-  if (!wire_.detect(status) || !compare_memory(matches)) return false;
+  // Balancing of a former run ends here: it is not certain that the chip ends it by itself.
+  constexpr std::array<std::uint8_t, 2> none{};
+  if (!wire_.detect(status) || !wire_.send(balance_cells, none) || !compare_memory(matches)) return false;
   waited_ = 0;
   swapped_ = false;
   next_setting_ = 0;
@@ -142,6 +157,7 @@ bool FrontEnd::compare() {
     return true;
   }
   state_ = State::enter;
+  interrupted_ = ran_;  // its pins are low until it is configured
   return wire_.select(set_config_update);
 }
 
@@ -154,14 +170,15 @@ bool FrontEnd::enter() {
 }
 
 bool FrontEnd::write() {
-  for (std::size_t k = 0; k < settings_per_sample && next_setting_ < settings_.size(); ++k, ++next_setting_) {
-    const Setting& s = settings_[next_setting_];
+  const std::span<const Setting> settings = configuration_->settings;
+  for (std::size_t k = 0; k < settings_per_sample && next_setting_ < settings.size(); ++k, ++next_setting_) {
+    const Setting& s = settings[next_setting_];
     std::array<std::uint8_t, 4> bytes{};
     put_bytes(bytes, 0, s.value);
     if (!wire_.send(s.address, std::span(bytes).first(s.bytes))) return false;
     settle();
   }
-  if (next_setting_ < settings_.size()) return true;
+  if (next_setting_ < settings.size()) return true;
   bool matches = false;
   if (!compare_memory(matches)) return false;
   if (!matches) {
@@ -183,6 +200,11 @@ bool FrontEnd::leave() {
     swapped_ = true;
     return wire_.select(swap_comm_mode);
   }
+  // After Alarm Raw Status comes Alarm Enable, whose content is known.
+  std::array<std::uint8_t, 4> raw_and_enable{};
+  wire_.by_words = false;
+  if (!wire_.read(alarm_raw_status, raw_and_enable)) return false;
+  wire_.by_words = get_bytes<std::uint16_t>(raw_and_enable, 2) != default_alarm_mask;
   state_ = State::measure;
   failures_ = 0;
   rest_us_ = 0;
@@ -196,8 +218,10 @@ bool FrontEnd::leave() {
 bool FrontEnd::no_reset() {
   std::uint16_t status = 0;
   if (!wire_.read_word(battery_status, status)) return false;
+  failed_permanently_ = (status & failed_permanently) != 0;
   if ((status & (was_reset | in_config_update)) == 0) return true;
   ++counters_.resets;
+  interrupted_ = ran_;
   reset_measurement();
   return false;
 }
@@ -208,31 +232,52 @@ bool FrontEnd::measure(measurement::PackSample<cell_inputs>& into) {
   if (!wire_.select(get_currents)) return false;
   if (!read_scan(into)) return false;
   if (!read_current(into)) return false;
-  std::array<std::uint8_t, 5> safety{};  // status A, alert B, status B, alert C, status C
-  if (!wire_.read(safety_status_a, safety)) return false;
-  if ((safety[0] | safety[2] | safety[4]) != 0) ++counters_.trips;
+  if (!read_second_line()) return false;
+  if (clear_latch_ && !wire_.select(recover_short_circuit_latch)) return false;
+  clear_latch_ = false;
   return refresh_balancing();
+}
+
+/// Reads words at `command`. The high byte of a word can be newer than its low byte (E2E 1328137). So if one from byte
+/// `from` on differs much from `last`, all are read again; the chip has not updated the same word twice meanwhile.
+bool FrontEnd::read_words(std::uint8_t command, std::span<std::uint8_t> into, std::span<std::uint8_t> last,
+                          std::size_t from) {
+  if (!wire_.read(command, into)) return false;
+  for (std::size_t k = from; k < into.size(); k += 2) {
+    const int move = get_bytes<std::int16_t>(into, k) - get_bytes<std::int16_t>(last, k);
+    if (move <= max_move && move >= -max_move) continue;
+    if (!wire_.read(command, into)) return false;
+    break;
+  }
+  std::memcpy(last.data(), into.data(), into.size());
+  return true;
 }
 
 bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   // The alarm bits come first, so the values read after them are at least as fresh as they state.
   std::array<std::uint8_t, hdq_temperature + 2 - alarm_status> alarm_and_temperatures;
-  if (!wire_.read(alarm_status, alarm_and_temperatures)) return false;
-  const auto alarm = get_bytes<std::uint16_t>(alarm_and_temperatures, 0);
+  if (!read_words(alarm_status, alarm_and_temperatures, temperatures_, cfetoff_temperature - alarm_status))
+    return false;
+  // Trips stay until read_second_line() has seen them, also if a transfer before it fails.
+  alarm_ = static_cast<std::uint16_t>((alarm_ & (tripped_a | tripped_bc)) |
+                                      get_bytes<std::uint16_t>(alarm_and_temperatures, 0));
   std::array<std::uint8_t, 2> seen{};
-  put_bytes(seen, 0, static_cast<std::uint16_t>(alarm & (cells_scanned | all_scanned)));
+  put_bytes(seen, 0, static_cast<std::uint16_t>(alarm_ & (cells_scanned | all_scanned | tripped_a | tripped_bc)));
   if (!wire_.write(alarm_status, seen)) return false;
   std::array<std::uint8_t, ld_voltage + 2 - first_cell> voltages;
-  if (!wire_.read(first_cell, voltages)) return false;
+  if (!read_words(first_cell, voltages, voltages_, 0)) return false;
 
-  scan_age_ = (alarm & all_scanned) != 0 ? std::uint8_t{0}
-                                         : static_cast<std::uint8_t>(std::min(scan_age_ + 1, int{max_scan_age}));
-  fresh_ = (alarm & cells_scanned) != 0;
+  scan_age_ = (alarm_ & all_scanned) != 0 ? std::uint8_t{0}
+                                          : static_cast<std::uint8_t>(std::min(scan_age_ + 1, int{max_scan_age}));
+  fresh_ = (alarm_ & cells_scanned) != 0;
   if (!fresh_) {
     ++counters_.not_fresh;
     return true;
   }
-  for (std::size_t k = 0; k < cell_inputs; ++k) into.cell_uv[k] = cell_uv(get_bytes<std::int16_t>(voltages, 2 * k));
+  for (std::size_t n = 0; n < configuration_->cells; ++n) {
+    const std::size_t k = configuration_->input_of_cell[n];
+    into.cell_uv[k] = cell_uv(get_bytes<std::int16_t>(voltages, 2 * k));
+  }
   if (scan_age_ >= max_scan_age) return true;
   into.pack_uv = get_bytes<std::int16_t>(voltages, stack_voltage - first_cell) * voltage_step_uv;
   dc_link_uv_ = get_bytes<std::int16_t>(voltages, ld_voltage - first_cell) * voltage_step_uv;
@@ -244,8 +289,23 @@ bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   return true;
 }
 
+/// Current of CC3 in its two forms, limited to the range; no_reading if they contradict each other. `steps` is not
+/// defined outside of 16 bits.
+std::int32_t FrontEnd::current_ua(std::int32_t counts, std::int16_t steps) {
+  const std::int32_t end = configuration_->current_end_ua;
+  const std::int64_t ua = std::int64_t{counts} * configuration_->current_na_per_count / 1'000;
+  if (ua >= end) return end;
+  if (ua <= -end) return -end;
+  const auto current = static_cast<std::int32_t>(ua);
+  const std::int32_t off = current / configuration_->current_step_ua - steps,
+                     most = 2 + (steps < 0 ? -steps : steps) / 256;
+  if (off >= -most && off <= most) return current;
+  ++counters_.current_differs;
+  return measurement::no_reading;
+}
+
 bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
-  std::array<std::uint8_t, cc3_current_at + 2> currents;
+  std::array<std::uint8_t, cc3_counts_at + 4> currents;
   std::array<std::uint8_t, charge_time_at + 4> charge;
   if (!wire_.fetch(get_currents, currents) || !wire_.select(get_charge) || !wire_.fetch(get_charge, charge))
     return false;
@@ -255,14 +315,21 @@ bool FrontEnd::read_current(measurement::PackSample<cell_inputs>& into) {
   else if (fresh_ && charge_still_ < max_charge_still)
     ++charge_still_;
   charge_time_s_ = time_s;
-  const auto steps = get_bytes<std::int16_t>(currents, cc3_current_at);
-  constexpr auto limits = std::numeric_limits<std::int16_t>{};
-  if (!fresh_ || charge_still_ >= max_charge_still || steps == limits.min() || steps == limits.max())
-    return true;  // no conversion, or outside its range
+  if (!fresh_ || charge_still_ >= max_charge_still) return true;
+  const std::int32_t cc3 =
+      current_ua(get_bytes<std::int32_t>(currents, cc3_counts_at), get_bytes<std::int16_t>(currents, cc3_current_at));
+  const std::int32_t end = configuration_->current_end_ua;
+  into.current_ua = cc3;
+  if (cc3 == measurement::no_reading) return true;
+  if (cc3 >= end || cc3 <= -end) {
+    mean_current_.reset();
+    return true;
+  }
   const auto counted =
       static_cast<std::int64_t>(static_cast<std::uint64_t>(get_bytes<std::uint32_t>(charge, charge_at)) << 32 |
                                 get_bytes<std::uint32_t>(charge, charge_fraction_at));
-  into.current_ua = mean_current_.update(steps * current_step_ua, counted, into.time_us);
+  const std::int64_t counted_uas = MeanCurrent::charge_uas(counted, configuration_->current_step_ua);
+  into.current_ua = std::clamp(mean_current_.update(cc3, counted_uas, into.time_us, end), -end, end);
   return true;
 }
 

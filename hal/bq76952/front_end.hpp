@@ -6,8 +6,8 @@
 //   compare     if the data memory has the right content and the chip was not reset (only this core restarted), it
 //               measures at once
 //   enter       CONFIG_UPDATE mode: no measurement, no protections of the chip
-//   write       8 settings per sample; then all are read back. A setting that differs leads to absent.
-//   leave       waits for the end of CONFIG_UPDATE mode and switches the CRC on
+//   write       11 settings per sample; then all are read back. A setting that differs leads to absent.
+//   leave       waits for the end of CONFIG_UPDATE mode, switches the CRC on, finds out how much a read returns
 //   measure
 //
 // One state per sample. Only fresh values become readings: cells only if the chip has measured all of them since the
@@ -16,7 +16,10 @@
 // readings and all later ones of the sample are measurement::no_reading. A reset of the chip or two failed samples in a
 // row lead to absent, and the next sample tries again.
 //
-// Time: 10 transfers, 8.9 ms; 14 while balancing is sent and read back (README.md). Memory: 200 bytes.
+// A current beyond the range reads as the end of the range with its sign. The current comes from CC3's 32-bit counts,
+// which do not wrap; it must agree with the 16 bits of CC3, or it is no_reading.
+//
+// Time: 11 transfers, 8.9 ms; 15 while balancing is sent and read back (README.md). Memory: 270 bytes.
 #pragma once
 
 #include <array>
@@ -25,12 +28,11 @@
 
 #include "hal/bq76952/configuration.hpp"
 #include "hal/bq76952/mean_current.hpp"
+#include "hal/bq76952/registers.hpp"
 #include "hal/bq76952/wire.hpp"
 #include "measurement/pack_sample.hpp"
 
 namespace bms::hal::bq76952 {
-
-inline constexpr std::size_t cell_inputs = 16;
 
 class FrontEnd {
  public:
@@ -41,20 +43,35 @@ class FrontEnd {
     std::uint32_t lost = 0;    ///< times that measuring ended
     std::uint32_t resets = 0;  ///< of the chip, detected while measuring
     std::uint32_t wrong_device = 0, sealed = 0;
-    std::uint32_t wrong_setting = 0;  ///< settings that read back differently
-    std::uint32_t not_fresh = 0;      ///< samples for which the chip had only old values
-    std::uint32_t bleed_wrong = 0;    ///< times that the chip bled other cells than requested
-    std::uint32_t trips = 0;          ///< samples in which one of the chip's own protections had tripped
+    std::uint32_t wrong_setting = 0;    ///< settings that read back differently
+    std::uint32_t not_fresh = 0;        ///< samples for which the chip had only old values
+    std::uint32_t bleed_wrong = 0;      ///< times that the chip bled other cells than requested
+    std::uint32_t trips = 0;            ///< samples in which one of the chip's own protections had tripped
+    std::uint32_t current_differs = 0;  ///< samples in which the two forms of the current contradicted each other
   };
 
-  /// settings: in the order of addresses; must outlive this object. configuration.hpp computes them at compile time.
-  explicit constexpr FrontEnd(std::span<const Setting> settings) : settings_(settings) {}
+  /// All zero, so that it needs no space in flash; use() it before the first read().
+  constexpr FrontEnd() = default;
+  explicit constexpr FrontEnd(const Configuration& configuration) { use(configuration); }
 
-  /// Call once per sample, with into.time_us set. Writes the fresh readings; all other fields are no_reading.
+  /// configuration: must outlive this object.
+  constexpr void use(const Configuration& configuration) { configuration_ = &configuration; }
+
+  /// Call once per sample, with into.time_us set. Writes the fresh readings, cells at the place of their input; all
+  /// other fields are no_reading.
   void read(measurement::PackSample<cell_inputs>& into);
 
-  /// cells: one bit per cell to bleed from the next read() on. Refreshed every 5 s, because the chip stops after 20 s.
-  void bleed(std::uint32_t cells) { bleed_ = static_cast<std::uint16_t>(cells); }
+  /// inputs: one bit per input whose cell is to be bled from the next read() on. Refreshed every 5 s, because the chip
+  /// stops after 20 s.
+  void bleed(std::uint32_t inputs) { bleed_ = static_cast<std::uint16_t>(inputs); }
+
+  /// SecondLineTrip bits of the last read().
+  std::uint32_t trips() const { return trips_; }
+  /// Ends a latched short circuit with the next read(). Has no effect unless the chip is measuring.
+  void clear_latch() { clear_latch_ = state_ == State::measure; }
+  /// Returns true if the chip has received nothing for so long that its host watchdog may have acted. The next transfer
+  /// ends that, so the contactors must be open before it.
+  bool silent() const;
 
   /// DC link of the last read() [uV], or no_reading.
   std::int32_t dc_link_uv() const { return dc_link_uv_; }
@@ -73,13 +90,17 @@ class FrontEnd {
   bool advance();
   bool compare_memory(bool& matches);
   bool no_reset();
-  bool read_current(measurement::PackSample<cell_inputs>& into);
   bool read_scan(measurement::PackSample<cell_inputs>& into);
+  bool read_words(std::uint8_t command, std::span<std::uint8_t> into, std::span<std::uint8_t> last, std::size_t from);
+  bool read_current(measurement::PackSample<cell_inputs>& into);
+  std::int32_t current_ua(std::int32_t counts, std::int16_t steps);
+  bool read_second_line();
+  bool pins_follow(std::uint8_t safety_a, std::uint8_t safety_c, std::uint8_t fets);
   bool refresh_balancing();
   void rest();
   void reset_measurement();
 
-  std::span<const Setting> settings_;
+  const Configuration* configuration_ = nullptr;
   Wire wire_;
   MeanCurrent mean_current_;
   Counters counters_;
@@ -89,12 +110,24 @@ class FrontEnd {
   std::size_t next_setting_ = 0;
   std::uint8_t waited_ = 0, failures_ = 0;
   bool swapped_ = false, fresh_ = false;
-  std::int32_t dc_link_uv_ = measurement::no_reading;
+  std::int32_t dc_link_uv_ = 0;
   std::uint8_t scan_age_ = 0;  ///< samples since all inputs were measured
   std::uint32_t charge_time_s_ = 0;
   std::uint8_t charge_still_ = 0;  ///< samples since the charge counter's time advanced
   std::uint16_t bleed_ = 0, sent_bleed_ = 0;
   std::uint64_t sent_bleed_us_ = 0;
+  std::array<std::uint8_t, ld_voltage + 2 - first_cell> voltages_{};
+  std::array<std::uint8_t, hdq_temperature + 2 - alarm_status> temperatures_{};  ///< alarm_status first
+
+  // second line
+  std::uint32_t trips_ = 0;
+  std::uint64_t answered_us_ = 0;              ///< time of the last complete exchange
+  std::uint16_t alarm_ = 0;                    ///< Alarm Status of this sample, and trips not yet reported
+  std::uint8_t safety_a_ = 0, safety_bc_ = 0;  ///< of the last sample
+  std::uint8_t pins_wrong_ = 0;                ///< samples in a row
+  bool failed_permanently_ = false, latched_ = false, clear_latch_ = false;
+  bool ran_ = false;          ///< has measured since boot
+  bool interrupted_ = false;  ///< since the last complete sample the chip had no host or no settings
 };
 
 }  // namespace bms::hal::bq76952

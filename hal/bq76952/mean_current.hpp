@@ -23,9 +23,17 @@ namespace bms::hal::bq76952 {
 
 class MeanCurrent {
  public:
-  /// Returns the current to publish [uA]. counted: charge in 2^-32 charge_step_uas. Both readings are of the same time.
-  constexpr std::int32_t update(std::int32_t cc3_ua, std::int64_t counted, std::uint64_t time_us) {
-    const std::int64_t counted_uas = charge_uas(counted);
+  /// Charge [uA s] of the chip's counter: in 2^-32 userAh, an hour of a step of the current.
+  static constexpr std::int64_t charge_uas(std::int64_t counted, std::int32_t current_step_ua) {
+    const std::int64_t step_uas = std::int64_t{3'600} * current_step_ua;
+    return (counted >> 32) * step_uas +
+           static_cast<std::int64_t>(
+               (static_cast<std::uint64_t>(counted) & 0xFFFF'FFFFU) * static_cast<std::uint64_t>(step_uas) >> 32);
+  }
+
+  /// Returns the current to publish [uA]. Both readings are of the same time. end_ua: full scale of cc3_ua.
+  constexpr std::int32_t update(std::int32_t cc3_ua, std::int64_t counted_uas, std::uint64_t time_us,
+                                std::int32_t end_ua) {
     if (!running_ || time_us - time_us_ > max_step_us) return begin(cc3_ua, counted_uas, time_us);
     const auto step_us = static_cast<std::int64_t>(time_us - time_us_);
     time_us_ = time_us;
@@ -40,6 +48,7 @@ class MeanCurrent {
       else
         deficit_uaus_ = given / 2;  // the comparison begins here
       comparable_ = true;
+      const std::int64_t max_deficit_uaus = std::int64_t{end_ua} * 500'000;
       if (deficit_then > max_deficit_uaus || deficit_then < -max_deficit_uaus) {
         ++restarts_;
         running_ = false;
@@ -49,7 +58,7 @@ class MeanCurrent {
     return current_ua;
   }
 
-  /// Call if there is no reading. The next reading starts a new comparison.
+  /// Call if there is no reading, or one at the end of the range. The next reading starts a new comparison.
   constexpr void reset() {
     if (running_) ++restarts_;
     running_ = false;
@@ -60,14 +69,6 @@ class MeanCurrent {
  private:
   static constexpr std::int64_t time_constant_us = 64'000'000;
   static constexpr std::uint64_t max_step_us = 500'000;
-  static constexpr std::int64_t max_deficit_uaus = 327'000'000LL * 500'000;
-
-  static constexpr std::int64_t charge_uas(std::int64_t counted) {
-    constexpr std::int64_t step_uas = 36'000'000;
-    return (counted >> 32) * step_uas +
-           static_cast<std::int64_t>(
-               (static_cast<std::uint64_t>(counted) & 0xFFFF'FFFFU) * static_cast<std::uint64_t>(step_uas) >> 32);
-  }
 
   constexpr std::int32_t begin(std::int32_t cc3_ua, std::int64_t counted_uas, std::uint64_t time_us) {
     running_ = true;

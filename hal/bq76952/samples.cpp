@@ -4,25 +4,29 @@
 //
 // If the core was stopped (an erase of flash) and a sample is late, the next period starts at this sample; the
 // following samples are not early.
+//
+// The chip opens main plus when its host is silent and would close it again at the next transfer. So after such a
+// silence the outputs are switched off before that transfer; protection then receives host_silence.
 #include "hal/samples.hpp"
 #include "hal/bq76952/front_end.hpp"
+#include "hal/bq76952/pack_readings.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
 #include "hal/frame_dispatch.hpp"
 #include "hal/i2c.hpp"
 #include "hal/power_path.hpp"
+#include "hal/second_line.hpp"
 
 namespace bms::hal {
 
 namespace {
 
-static_assert(pack_cells == bq76952::cell_inputs);
 constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
 
-constexpr auto settings = bq76952::settings(bq76952::Board{});
-bq76952::FrontEnd front_end{settings};
+bq76952::FrontEnd front_end;
 measurement::PackSample<pack_cells> sample;
+SensorCalibration correction;
 std::uint64_t due_us = 0;
 bool started = false;
 
@@ -36,20 +40,41 @@ void receive_frames() {
 const measurement::PackSample<pack_cells>* next_sample() {
   if (!started) {
     i2c_start();
+    front_end.use(bq76952::board_configuration);
     started = true;
     due_us = now_us() + period_us;
   }
   for (receive_frames(); now_us() < due_us; receive_frames()) wait_for_interrupt();
-  sample.time_us = now_us();
-  due_us = sample.time_us - due_us < period_us ? due_us + period_us : sample.time_us + period_us;
-  front_end.read(sample);
+  measurement::PackSample<bq76952::cell_inputs> inputs;
+  inputs.time_us = now_us();
+  due_us = inputs.time_us - due_us < period_us ? due_us + period_us : inputs.time_us + period_us;
+  if (front_end.silent()) [[unlikely]]
+    contactor_pins_set({});
+  front_end.read(inputs);
+  bq76952::read_pack(inputs, bq76952::board_configuration, correction, sample);
   return &sample;
+}
+
+bool calibrate(const SensorCalibration& calibration) {
+  correction = calibration;
+  return true;
+}
+
+std::uint32_t second_line_trips() { return front_end.trips(); }
+void second_line_clear() { front_end.clear_latch(); }
+FrontEndHealth front_end_health() {
+  using State = bq76952::FrontEnd::State;
+  const State state = front_end.state();
+  FrontEndHealth health{FrontEndState::configuring, front_end.counters().lost, front_end.counters().resets,
+                        front_end.wire().bad_crc};
+  if (state == State::absent) health.state = FrontEndState::absent;
+  if (state == State::measure) health.state = FrontEndState::measuring;
+  return health;
 }
 
 void power_path_set(const PowerPath& wanted) {
   contactor_pins_set(wanted);
-  front_end.bleed(wanted.bleed);
+  front_end.bleed(bq76952::inputs_of(bq76952::board_configuration, wanted.bleed));
 }
-std::int32_t dc_link_uv() { return front_end.dc_link_uv(); }
 
 }  // namespace bms::hal

@@ -5,8 +5,13 @@
 //   plain     no CRC, as the chip starts; the transfer buffer has a checksum, which is verified in both modes
 //
 // A transfer is repeated once if it was not acknowledged, failed its check, or found a stuck bus that could be freed.
-// It is not repeated after a clock that was stretched for too long. After a result of false, `into` is undefined. Time:
-// at most twice i2c_time_us(), and i2c_recover().
+// It is not repeated after a clock that was stretched for too long. After a result of false, `into` is undefined. Time
+// of a transfer: at most twice i2c_time_us(), and i2c_recover().
+//
+// Two properties of the chip are not certain (README.md), so they are found out:
+//   by_words   a read returns one direct command of two bytes only; then longer reads are split
+//   checksum   the blocks DASTATUS have another checksum than the manual's. If it has never been right, a second read
+//              with the same bytes replaces it; the CRCs protect the wire.
 #pragma once
 
 #include <array>
@@ -33,6 +38,7 @@ class Wire {
   static constexpr std::size_t most_bytes = 40;  ///< in one read
 
   Check check = Check::plain;
+  bool by_words = false;
 
   /// Direct command: reads into.size() bytes, at most most_bytes.
   bool read(std::uint8_t command, std::span<std::uint8_t> into);
@@ -59,10 +65,15 @@ class Wire {
  private:
   bool transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> in);
   bool read_once(std::uint8_t command, std::span<std::uint8_t> into);
+  bool read_or_repeat(std::uint8_t command, std::span<std::uint8_t> into);
+  bool has_another_checksum();
+  bool same_again(std::span<const std::uint8_t> block);
   bool fail(std::uint32_t& counter);
 
   WireCounters counters_;
-  bool retry_useful_ = false;  ///< a second attempt may succeed
+  bool retry_useful_ = false;           ///< a second attempt may succeed
+  bool status_checksum_right_ = false;  ///< once at least
+  std::uint8_t status_checksum_wrong_ = 0;
 };
 
 }  // namespace bms::hal::bq76952

@@ -65,4 +65,10 @@ consteval BitTiming bit_timing(std::uint32_t clock_hz, std::uint32_t bits_per_se
   return best;
 }
 
+/// Longest recovery after bus-off [us]: 128 sequences of 11 recessive bits (32.7.6). On a full bus there is one at the
+/// end of each frame, and a frame has at most 160 bits (extended, 8 bytes, all stuff bits, intermission).
+constexpr std::uint32_t longest_recovery_us(std::uint32_t bits_per_second) {
+  return static_cast<std::uint32_t>(std::uint64_t{128 * 160} * 1'000'000 / bits_per_second);
+}
+
 }  // namespace bms::hal::bxcan

@@ -3,9 +3,10 @@
 // frames, remote requests and all others.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace bms::hal::bxcan {
 
@@ -16,20 +17,26 @@ struct FilterBank {
 /// Identifier in bits 15:5. RTR, IDE and the bits of a 29-bit identifier are 0, so the filter requires 0 there.
 constexpr std::uint32_t filter_of(std::uint16_t id) { return static_cast<std::uint32_t>(id) << 5; }
 
-void identifier_exceeds_11_bits();  // not defined: a call stops the compilation
+/// CAN1 has the first 14 of the 28 banks by default (CAN_FMR, CAN2SB).
+inline constexpr std::size_t ids_per_bank = 4, max_ids = 14 * ids_per_bank;
 
-/// CAN1 has the first 14 of the 28 banks by default (CAN_FMR, CAN2SB). Unused entries repeat the last identifier.
-template <std::size_t Ids>
-consteval std::array<FilterBank, (Ids + 3) / 4> filter_banks(const std::array<std::uint16_t, Ids>& ids) {
-  static_assert(Ids > 0 && Ids <= 4 * 14);
-  std::array<FilterBank, (Ids + 3) / 4> banks{};
-  const auto at = [&](std::size_t k) { return filter_of(ids[k < Ids ? k : Ids - 1]); };
-  for (const std::uint16_t id : ids) {
-    if (id > 0x7FF) identifier_exceeds_11_bits();
-  }
-  for (std::size_t k = 0; k < banks.size(); ++k)
-    banks[k] = {at(4 * k) | at(4 * k + 1) << 16, at(4 * k + 2) | at(4 * k + 3) << 16};
-  return banks;
+/// Returns true if the banks have room for all identifiers, and each has 11 bits.
+constexpr bool fits(std::span<const std::uint16_t> ids) {
+  return !ids.empty() && ids.size() <= max_ids &&
+         std::all_of(ids.begin(), ids.end(), [](std::uint16_t id) { return id <= 0x7FF; });
+}
+
+constexpr std::size_t bank_count(std::span<const std::uint16_t> ids) {
+  return (ids.size() + ids_per_bank - 1) / ids_per_bank;
+}
+
+/// Bank k of a list that fits. Unused entries repeat the last identifier.
+constexpr FilterBank filter_bank(std::span<const std::uint16_t> ids, std::size_t k) {
+  const auto pair_from = [&](std::size_t first) {
+    const std::size_t last = ids.size() - 1;
+    return filter_of(ids[std::min(first, last)]) | filter_of(ids[std::min(first + 1, last)]) << 16;
+  };
+  return {pair_from(ids_per_bank * k), pair_from(ids_per_bank * k + 2)};
 }
 
 }  // namespace bms::hal::bxcan

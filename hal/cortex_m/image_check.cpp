@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <iterator>
 
 extern "C" {
 // defined by the linker script
@@ -38,13 +39,39 @@ std::uint32_t update_crc(std::uint32_t crc, const std::uint8_t* begin, const std
   return crc;
 }
 
+struct Part {
+  const std::uint8_t *begin, *end;
+};
+
+const std::uint8_t* position = image_vectors;
+std::uint32_t part = 0, crc = 0xFFFF'FFFF;
+bool intact = true;
+
 }  // namespace
 
-bool image_intact() {
-  std::uint32_t crc = update_crc(0xFFFF'FFFF, image_vectors, image_vectors_end);
-  crc = update_crc(crc, image_code_begin, image_code_end);
-  crc = ~update_crc(crc, image_data_load, image_data_load + (image_data_end - image_data_begin));
-  return crc == check.crc && ~crc == check.inverse;
+bool image_intact(std::uint32_t bytes) {
+  const Part parts[] = {{image_vectors, image_vectors_end},
+                        {image_code_begin, image_code_end},
+                        {image_data_load, image_data_load + (image_data_end - image_data_begin)}};
+  while (true) {
+    const std::uint8_t* const end = parts[part].end;
+    const auto left = static_cast<std::uint32_t>(end - position);
+    if (bytes < left) {
+      crc = update_crc(crc, position, position + bytes);
+      position += bytes;
+      return intact;
+    }
+    crc = update_crc(crc, position, end);
+    bytes -= left;
+    const bool last = ++part == std::size(parts);
+    if (last) {
+      intact = intact && ~crc == check.crc && crc == check.inverse;
+      crc = 0xFFFF'FFFF;
+      part = 0;
+    }
+    position = parts[part].begin;
+    if (last) return intact;
+  }
 }
 
 }  // namespace bms::hal::cortex_m

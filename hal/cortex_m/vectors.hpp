@@ -18,7 +18,7 @@ void fault_handler();
 namespace bms::hal::cortex_m {
 
 using Handler = void (*)();
-inline constexpr std::size_t core_exceptions = 16, systick = 15;
+inline constexpr std::size_t core_exceptions = 16, nmi = 2, systick = 15;
 
 template <std::size_t Interrupts>
 struct VectorTable {

@@ -32,7 +32,8 @@ const measurement::PackSample<pack_cells>* next_sample() {
   }
 }
 
+std::optional<measurement::StartingPoint> starting_point() { return frames.starting_point(); }
 void power_path_set(const PowerPath&) {}  // the simulated load receives it as a CAN frame
-std::int32_t dc_link_uv() { return frames.dc_link_uv(); }
+LinkVoltages link_voltages() { return {frames.link_plus_uv(), frames.link_minus_uv()}; }
 
 }  // namespace bms::hal

@@ -6,6 +6,7 @@
 // (2 s, at least 1.36 s by its oscillator) is fed by work instead of waiting. The time continues from the sender's last
 // time. If a sender's time falls back by more than the timeout, the sender has restarted; its time continues as well.
 #include "hal/samples.hpp"
+#include "hal/accepted_frames.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/frame_dispatch.hpp"
@@ -56,7 +57,9 @@ const measurement::PackSample<pack_cells>* next_sample() {
   }
 }
 
+std::optional<measurement::StartingPoint> starting_point() { return frames.starting_point(); }
+std::span<const std::uint16_t> accepted_ids() { return request_and_sample_ids; }
 void power_path_set(const PowerPath&) {}
-std::int32_t dc_link_uv() { return frames.dc_link_uv(); }
+LinkVoltages link_voltages() { return {frames.link_plus_uv(), frames.link_minus_uv()}; }
 
 }  // namespace bms::hal

@@ -1,6 +1,7 @@
-// ADC1, one conversion at a time (RM0090, 13): PA1 current, PA2 voltage, PA3 temperature, channel 17 the internal
-// reference. Sampling takes 84 cycles of 21 MHz, 4 us, in which a source of 50 kohm settles (datasheet DS8626, ADC
-// characteristics, R_AIN). The reference needs 10 us (13.3, t_S_vrefint); 480 cycles are 23 us.
+// ADC1, one conversion at a time (RM0090, 13): PA1 current, PA2 voltage, PA3 temperature, PC0 and PC1 DC link at main
+// minus and main plus, channel 17 the internal reference. Sampling takes 84 cycles of 21 MHz, 4 us, in which a source
+// of 50 kohm settles (datasheet DS8626, ADC characteristics, R_AIN). The reference needs 10 us (13.3, t_S_vrefint); 480
+// cycles are 23 us.
 #include "hal/adc.hpp"
 
 #include "hal/stm32f4/registers.hpp"
@@ -23,6 +24,10 @@ constexpr std::uint32_t channel(AnalogInput input) {
       return 2;
     case AnalogInput::temperature:
       return 3;
+    case AnalogInput::link_plus:
+      return 11;
+    case AnalogInput::link_minus:
+      return 10;
     case AnalogInput::reference:
       break;
   }
@@ -32,14 +37,15 @@ constexpr std::uint32_t channel(AnalogInput input) {
 }  // namespace
 
 void adc_start() {
-  rcc_ahb1enr() = rcc_ahb1enr() | 1U << 0;     // GPIOA
-  rcc_apb2enr() = rcc_apb2enr() | 1U << 8;     // ADC1
-  gpioa_moder() = gpioa_moder() | 0xFCU;       // PA1 to PA3 analog
-  adc_ccr() = 1U << 16 | 1U << 23;             // APB2 / 4 = 21 MHz; reference on
-  adc1_smpr1() = 7U << 21;                     // channel 17: 480 cycles
-  adc1_smpr2() = 4U << 3 | 4U << 6 | 4U << 9;  // channels 1 to 3: 84 cycles
-  adc1_cr1() = 0;                              // 12 bits
-  adc1_cr2() = on;                             // ready in 3 us, the reference in 10
+  rcc_ahb1enr() = rcc_ahb1enr() | 1U << 0 | 1U << 2;  // GPIOA, GPIOC
+  rcc_apb2enr() = rcc_apb2enr() | 1U << 8;            // ADC1
+  gpioa_moder() = gpioa_moder() | 0xFCU;              // PA1 to PA3 analog
+  gpioc_moder() = gpioc_moder() | 0xFU;               // PC0, PC1 analog
+  adc_ccr() = 1U << 16 | 1U << 23;                    // APB2 / 4 = 21 MHz; reference on
+  adc1_smpr1() = 7U << 21 | 4U << 3 | 4U << 0;        // channel 17: 480 cycles; 10 and 11: 84
+  adc1_smpr2() = 4U << 3 | 4U << 6 | 4U << 9;         // channels 1 to 3: 84 cycles
+  adc1_cr1() = 0;                                     // 12 bits
+  adc1_cr2() = on;                                    // ready in 3 us, the reference in 10
 }
 
 std::optional<std::uint16_t> adc_convert(AnalogInput input) {

@@ -4,7 +4,7 @@
 // same order. If a more urgent frame finds all mailboxes taken, the least urgent one is aborted and returns to the
 // queue. Two frames with the same identifier are never in mailboxes together, because the controller would send them by
 // mailbox number instead of age.
-// Reception: filters for accepted_ids (standard frames), the controller's FIFO of three, an interrupt, a ring of 64.
+// Reception: filters for accepted_ids() (standard frames), the controller's FIFO of three, an interrupt, a ring of 64.
 //
 // Going on the bus (32.4) and recovery after bus-off (32.7.6) are phases that service() checks. Each has a timeout
 // after which it is tried again later; no function waits in a loop for the bus.
@@ -13,9 +13,11 @@
 //                   ms.
 //   no progress     frames wait and none was sent for 100 ms (no acknowledge, stuck wire, full bus): drops the waiting
 //                   frames. can_listening() is false for a second or until a frame arrives; then sending starts again.
-//   no idle bus     100 ms after the request: counts a failed start and tries again after the rest
+//   no idle bus     100 ms after the request (longer below 250 kbit/s, where a recovery on a full bus needs it): counts
+//                   a failed start and tries again after the rest
 //   no crystal      never on the bus: the internal oscillator has an error of up to 8 % (datasheet, HSI), a bit allows
 //                   0.5 %
+#include <algorithm>
 #include <array>
 #include <atomic>
 
@@ -35,9 +37,11 @@ namespace {
 using namespace stm32f4;
 
 constexpr bxcan::BitTiming timing = bxcan::bit_timing(crystal_apb1_hz, BMS_CAN_BIT_RATE);
-constexpr auto banks = bxcan::filter_banks(accepted_ids);
+static_assert(bxcan::fits(request_ids) && bxcan::fits(request_and_sample_ids));
 
-constexpr std::uint64_t phase_timeout_us = 100'000, no_progress_us = 100'000, pause_us = 1'000'000;
+constexpr std::uint32_t recovery_us = bxcan::longest_recovery_us(BMS_CAN_BIT_RATE), margin_us = recovery_us / 5;
+constexpr std::uint64_t phase_timeout_us = std::max<std::uint64_t>(100'000, recovery_us + margin_us),
+                        no_progress_us = 100'000, pause_us = 1'000'000;
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
 
 constexpr std::uint32_t mcr_inrq = 1U << 0, mcr_rflm = 1U << 3, mcr_reset = 1U << 15, msr_inak = 1U << 0;
@@ -172,14 +176,17 @@ void configure() {
   can1_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO discards new frames instead of old ones
   can1_btr() = timing.btr();
   can1_fmr() = can1_fmr() | 1U;
-  constexpr std::uint32_t all = (1U << banks.size()) - 1;
+  const auto ids = accepted_ids();
+  const std::size_t banks = bxcan::bank_count(ids);
+  const std::uint32_t all = (1U << banks) - 1;
   can1_fa1r() = 0;
   can1_fs1r() = 0;    // 16 bits
   can1_fm1r() = all;  // lists
   can1_ffa1r() = 0;   // FIFO 0
-  for (std::uint32_t k = 0; k < banks.size(); ++k) {
-    can1_filter_bank(k).fr1 = banks[k].fr1;
-    can1_filter_bank(k).fr2 = banks[k].fr2;
+  for (std::uint32_t k = 0; k < banks; ++k) {
+    const bxcan::FilterBank bank = bxcan::filter_bank(ids, k);
+    can1_filter_bank(k).fr1 = bank.fr1;
+    can1_filter_bank(k).fr2 = bank.fr2;
   }
   can1_fa1r() = all;
   can1_fmr() = can1_fmr() & ~1U;
@@ -267,6 +274,8 @@ void can_start() {
   gpiob_pupdr() = (gpiob_pupdr() & ~(3U << 16)) | 1U << 16;  // recessive if there is no transceiver
   gpiob_afrh() = (gpiob_afrh() & ~255U) | 0x99U;
   gpiob_moder() = (gpiob_moder() & ~(15U << 16)) | 10U << 16;
+  nvic_priority(can1_tx_interrupt) = communication_priority;
+  nvic_priority(can1_rx0_interrupt) = communication_priority;
   nvic_iser0() = 1U << can1_tx_interrupt | 1U << can1_rx0_interrupt;
   ask_for_initialisation();
 }

@@ -2,8 +2,8 @@
 // the 32,768 Hz crystal, which VBAT also supplies. Without a crystal it runs on the internal oscillator of 32 kHz (17
 // to 47 kHz), which VBAT does not supply, so after a loss of power its time is invalid.
 //
-// A mark in a backup register records which oscillator the clock had when it was set. The mark and the time are lost
-// with the backup supply.
+// A mark in backup register 0 records which oscillator the clock had when it was set. The mark, the time and the words
+// of backup_word(), which are in the registers after it, are lost with the backup supply.
 #include "hal/calendar.hpp"
 
 #include "hal/clock.hpp"
@@ -96,5 +96,8 @@ bool calendar_set(std::uint32_t unix_s) {
   rtc_wpr() = 0xFF;  // locked
   return may;
 }
+
+std::uint32_t backup_word(std::size_t k) { return (&rtc_bkp0r())[1 + k]; }
+void set_backup_word(std::size_t k, std::uint32_t value) { (&rtc_bkp0r())[1 + k] = value; }
 
 }  // namespace bms::hal

@@ -23,15 +23,16 @@ bool wait_for(Register& reg, std::uint32_t mask, std::uint32_t value) {
 }  // namespace
 
 Clocks start_clocks() {
-  constexpr std::uint32_t hse_on = 1U << 16, hse_ready = 1U << 17, pll_on = 1U << 24, pll_ready = 1U << 25;
+  constexpr std::uint32_t hse_on = 1U << 16, hse_ready = 1U << 17, security_on = 1U << 19, pll_on = 1U << 24,
+                          pll_ready = 1U << 25;
   rcc_cr() = rcc_cr() | hse_on;
   if (!wait_for(rcc_cr(), hse_ready, hse_ready)) return reached;
 
   rcc_apb1enr() = rcc_apb1enr() | 1U << 28;  // power interface, then voltage scale 1, needed above 144 MHz
   pwr_cr() = pwr_cr() | 1U << 14;
 
-  // 25 MHz / 25 * 336 / 2 = 168 MHz; / 7 = 48 MHz
-  rcc_pllcfgr() = 25U | 336U << 6 | 0U << 16 | 1U << 22 | 7U << 24;
+  // 25 MHz / 25 * 336 / 2 = 168 MHz; / 7 = 48 MHz. Bit 29 is reserved and 1 after a reset.
+  rcc_pllcfgr() = 25U | 336U << 6 | 0U << 16 | 1U << 22 | 7U << 24 | 1U << 29;
   rcc_cr() = rcc_cr() | pll_on;
   if (!wait_for(rcc_cr(), pll_ready, pll_ready)) return reached;
 
@@ -42,6 +43,7 @@ Clocks start_clocks() {
     rcc_cfgr() = 0;  // the internal oscillator, undivided, as in `reached`
     return reached;
   }
+  rcc_cr() = rcc_cr() | security_on;  // a crystal that stops raises the NMI (7.2.7)
   return reached = crystal_and_pll;
 }
 

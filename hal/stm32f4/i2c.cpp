@@ -143,7 +143,10 @@ class Transfer {
     while (true) {
       const std::uint32_t status = i2c1_sr1();
       if ((status & sr1_no_acknowledge) != 0) return I2cResult::no_acknowledge;
-      if ((status & (sr1_bus_error | sr1_arbitration)) != 0) return I2cResult::bus_stuck;
+      if ((status & sr1_arbitration) != 0) return I2cResult::bus_stuck;
+      // A misplaced start or stop does not change the transfer of a master (27.3.4, bus error); the check code of the
+      // device finds a wrong byte. The controller may also report it without a cause (ES0182).
+      if ((status & sr1_bus_error) != 0) i2c1_sr1() = ~sr1_bus_error;
       if ((status & flag) != 0) return I2cResult::done;
       if (now_us() > until_us_) return I2cResult::timed_out;
     }

@@ -40,6 +40,7 @@ inline Register& gpiob_bsrr() { return at<0x40020418>(); }
 // GPIOC [8.4]
 inline Register& gpioc_moder() { return at<0x40020800>(); }
 inline Register& gpioc_otyper() { return at<0x40020804>(); }
+inline Register& gpioc_odr() { return at<0x40020814>(); }
 inline Register& gpioc_bsrr() { return at<0x40020818>(); }
 
 // ADC1 [13.13]
@@ -61,6 +62,15 @@ inline Register& i2c1_sr1() { return at<0x40005414>(); }
 inline Register& i2c1_sr2() { return at<0x40005418>(); }
 inline Register& i2c1_ccr() { return at<0x4000541C>(); }
 inline Register& i2c1_trise() { return at<0x40005420>(); }
+
+// timer 5 [18.4]
+inline Register& tim5_cr1() { return at<0x40000C00>(); }
+inline Register& tim5_dier() { return at<0x40000C0C>(); }
+inline Register& tim5_ccmr2() { return at<0x40000C1C>(); }
+inline Register& tim5_ccer() { return at<0x40000C20>(); }
+inline Register& tim5_ccr4() { return at<0x40000C40>(); }
+inline Register& tim5_or() { return at<0x40000C50>(); }
+inline constexpr unsigned tim5_interrupt = 50;
 
 // USART1 [30.6]
 inline Register& usart1_sr() { return at<0x40011000>(); }
@@ -93,11 +103,12 @@ struct CanFilterBank {
 inline CanFilterBank& can1_filter_bank(std::uint32_t k) { return reinterpret_cast<CanFilterBank*>(0x40006640)[k]; }
 inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20;
 
-// external interrupts [12.3]
+// external interrupts [12.3], their ports [9.2]
+inline Register& syscfg_exticr4() { return at<0x40013814>(); }
 inline Register& exti_imr() { return at<0x40013C00>(); }
 inline Register& exti_rtsr() { return at<0x40013C08>(); }
 inline Register& exti_pr() { return at<0x40013C14>(); }
-inline constexpr unsigned pvd_interrupt = 1;
+inline constexpr unsigned pvd_interrupt = 1, exti15_10_interrupt = 40;
 
 // real-time clock [26.6]
 inline Register& rtc_tr() { return at<0x40002800>(); }
@@ -105,12 +116,21 @@ inline Register& rtc_dr() { return at<0x40002804>(); }
 inline Register& rtc_isr() { return at<0x4000280C>(); }
 inline Register& rtc_prer() { return at<0x40002810>(); }
 inline Register& rtc_wpr() { return at<0x40002824>(); }
+/// Backup register 0; 19 more follow.
 inline Register& rtc_bkp0r() { return at<0x40002850>(); }
 
 // independent watchdog [21.4]
 inline Register& iwdg_kr() { return at<0x40003000>(); }
 inline Register& iwdg_pr() { return at<0x40003004>(); }
 inline Register& iwdg_rlr() { return at<0x40003008>(); }
+inline Register& iwdg_sr() { return at<0x4000300C>(); }
+
+/// Priority of an interrupt [ARMv7-M B3.4.9], four bits: 0x00 is the most urgent and that of every interrupt in reset.
+inline volatile std::uint8_t& nvic_priority(unsigned interrupt) {
+  return reinterpret_cast<volatile std::uint8_t*>(0xE000E400)[interrupt];
+}
+/// Of the interrupts that serve a bus or a serial line. Supply and clock supervision interrupt their handlers.
+inline constexpr std::uint8_t communication_priority = 0x10;
 
 // SysTick [ARMv7-M B3.3]
 inline Register& syst_csr() { return at<0xE000E010>(); }

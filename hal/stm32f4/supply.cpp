@@ -35,6 +35,11 @@ void supply_start() {
   nvic_iser0() = 1U << pvd_interrupt;
 }
 
+void open_contactors() {
+  gpioc_bsrr() = 15U << 22;  // PC6 to PC9 low (hal/stm32f4/contactor_pins.cpp)
+  falls = falls + 1;
+}
+
 bool supply_low() { return (pwr_csr() & output) != 0; }
 
 bool brown_out_reset_low() { return (flash_optcr() & brown_out_level) != 0; }
@@ -43,11 +48,9 @@ bool brown_out_reset_low() { return (flash_optcr() & brown_out_level) != 0; }
 
 }  // namespace bms::hal
 
-/// Opens all contactors. It writes the register itself, because main() may be in the middle of contactor_pins_set().
 extern "C" void pvd_interrupt() {
   using namespace bms::hal;
   stm32f4::exti_pr() = 1U << 16;
-  stm32f4::gpioc_bsrr() = 15U << 22;  // PC6 to PC9 low (hal/stm32f4/contactor_pins.cpp)
+  stm32f4::open_contactors();
   fell = true;
-  falls = falls + 1;
 }

@@ -17,6 +17,11 @@ void supply_start();
 /// Returns true while the supply is below the detector's threshold.
 bool supply_low();
 
+/// Call in the handler of an interrupt of the most urgent priority: opens all contactors by the registers of the pins,
+/// because main() may be in the middle of contactor_pins_set(). The outputs stay open until the firmware acknowledges
+/// it like a fall of the supply (hal/supply.hpp).
+void open_contactors();
+
 /// Returns true if the option bytes select another level than 3.
 bool brown_out_reset_low();
 

@@ -23,6 +23,7 @@ void uart_start(std::uint32_t baud) {
   gpiob_afrl() = (gpiob_afrl() & ~(255U << 24)) | 0x77U << 24;
   usart1_brr() = (clocks().apb2_hz + baud / 2) / baud;
   usart1_cr1() = 1U << 13 | 1U << 5 | 1U << 3 | 1U << 2;  // on, receive interrupt, transmitter, receiver
+  nvic_priority(usart1_interrupt) = communication_priority;
   cortex_m::nvic_iser1() = 1U << (usart1_interrupt - 32);
 }
 

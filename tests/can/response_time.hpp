@@ -93,13 +93,24 @@ inline constexpr double sample_to_queue_s = 2e-3;
 enum class Cells { measured_by_the_board, measured_by_another_node };
 /// Additional messages of the image (build option BMS_VEHICLE_PROFILE).
 enum class Profile { none, cia418, j1939 };
-inline constexpr std::size_t cells_of_a_pack = 16;
+
+/// Packs of more than 16 cells have more messages, and more frames of a sample.
+enum class Pack { of_16_cells, of_24_cells };
+inline bool sends(Pack pack, std::uint32_t id) {
+  const bool above_16 = id == can::CellVoltages5::id || id == can::CellVoltages6::id || id == can::PackVoltage::id;
+  return pack == Pack::of_24_cells || !above_16;
+}
+template <std::size_t Cells>
+void add_frames_of_a_sample(double samples_per_second, std::vector<Message>& to) {
+  for (const can::Frame& f : hal::frames_of(measurement::PackSample<Cells>{}, 0, 0))
+    to.push_back({"(of a sample)", f.id, f.length, 1 / samples_per_second, 0});
+}
 
 /// All messages of the DBC file. Without a cycle time, a message counts with every sample (also one that is sent once).
 /// Added are the frames that bring a sample, if they come over the bus, and those of the profile. The sender of samples
 /// keeps their order, so the latest bound holds for all of its frames. jitter_s: from a complete sample to the queue.
 inline std::vector<Message> messages_on_the_bus(double samples_per_second, double jitter_s, Cells cells,
-                                                Profile profile = Profile::none) {
+                                                Profile profile = Profile::none, Pack pack = Pack::of_16_cells) {
   std::vector<Message> all;
   std::apply(
       [&](auto... m) {
@@ -108,10 +119,11 @@ inline std::vector<Message> messages_on_the_bus(double samples_per_second, doubl
          ...);
       },
       can::Messages{});
-  if (cells == Cells::measured_by_another_node) {
-    for (const can::Frame& f : hal::frames_of(measurement::PackSample<cells_of_a_pack>{}, 0, 0))
-      all.push_back({"(of a sample)", f.id, f.length, 1 / samples_per_second, 0});
-  }
+  std::erase_if(all, [&](const Message& m) { return !sends(pack, m.id); });
+  if (cells == Cells::measured_by_another_node && pack == Pack::of_24_cells)
+    add_frames_of_a_sample<24>(samples_per_second, all);
+  else if (cells == Cells::measured_by_another_node)
+    add_frames_of_a_sample<16>(samples_per_second, all);
   if (profile == Profile::cia418) {
     all.push_back({"(heartbeat)", firmware::canopen::heartbeat_id + hal::canopen_node, 1,
                    1e-6 * firmware::canopen::Node::heartbeat_us, jitter_s});

@@ -28,13 +28,18 @@ TEST(ResponseTime, IsInfiniteOnAFullBusAndAFrameHasAtMost135Bits) {
 
 TEST(ResponseTime, CoversEveryMessageOfTheDbcFile) {
   const std::size_t in_the_file = std::tuple_size_v<can::Messages>;
-  EXPECT_EQ(messages_on_the_bus(10, 0, Cells::measured_by_the_board).size(), in_the_file);
+  EXPECT_EQ(messages_on_the_bus(10, 0, Cells::measured_by_the_board, Profile::none, Pack::of_24_cells).size(),
+            in_the_file);
+  EXPECT_EQ(messages_on_the_bus(10, 0, Cells::measured_by_the_board).size(), in_the_file - 3)
+      << "without cells 17 to 24 and the voltage of a large pack";
   const auto with_samples = messages_on_the_bus(10, 0, Cells::measured_by_another_node);
-  EXPECT_EQ(with_samples.size(), in_the_file + 13)
+  EXPECT_EQ(with_samples.size(), in_the_file - 3 + 13)
       << "check, current and voltage, DC link, eight of cells, temperatures, time";
-  std::set<std::uint32_t> ids;
-  for (const Message& m : with_samples)
-    EXPECT_TRUE(ids.insert(m.id).second) << "two messages with the identifier of " << m.name;
+  for (const Profile profile : {Profile::none, Profile::cia418, Profile::j1939}) {
+    std::set<std::uint32_t> ids;
+    for (const Message& m : messages_on_the_bus(10, 0, Cells::measured_by_another_node, profile, Pack::of_24_cells))
+      EXPECT_TRUE(ids.insert(m.id).second) << "two messages with the identifier of " << m.name;
+  }
 }
 
 TEST(ResponseTime, StaysBelowThePeriodAndTheLoadBelow30PercentWithEitherProfile) {
@@ -54,6 +59,16 @@ TEST(ResponseTime, StaysBelowThePeriodAndTheLoadBelow30PercentWithEitherProfile)
   const auto all = judge(Profile::j1939, 6, 7 * 160);
   for (std::size_t k = 0; k < all.size(); ++k)
     EXPECT_EQ(all[k].long_id, k + 6 >= all.size()) << all[k].name << ": the battery's own messages are sent first";
+}
+
+TEST(ResponseTime, OfAPackOf24CellsStaysBelowThePeriodAndTheLoadBelow30Percent) {
+  for (const Profile profile : {Profile::none, Profile::cia418, Profile::j1939}) {
+    const auto all =
+        messages_on_the_bus(10, sample_to_queue_s, Cells::measured_by_another_node, profile, Pack::of_24_cells);
+    EXPECT_LT(load(all, 250e3), 0.3);
+    for (std::size_t k = 0; k < all.size(); ++k)
+      EXPECT_LE(response_on_the_bus_s(all, k, 250e3), all[k].period_s) << all[k].name;
+  }
 }
 
 }  // namespace

@@ -55,6 +55,20 @@ TEST_F(Hil, ADriveWithoutFaultsRaisesNoFaultAndPublishesTheTrueSoc) {
   EXPECT_GT(j["frames"], 30'000);
 }
 
+TEST_F(Hil, APackOfEightCellsDrivesWithoutFaults) {
+  const auto r = loop("--cells 8 --initial-soc 0.6 --announced-soc 0.6");
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const Json j = of(r);
+  EXPECT_EQ(j["cells"], 8);
+  EXPECT_TRUE(j["faults"].empty()) << j["faults"].dump();
+  EXPECT_EQ(j["unanswered"], 0);
+  EXPECT_LT(j["driving_after_s"], 10);
+  EXPECT_LT(j["soc"]["rmse"], 0.01);
+  const auto refused = loop("--cells 7");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("7 cells, expected 8 to 16"));
+}
+
 TEST_F(Hil, IsReproducible) {
   const auto run = [&] {
     Json j = of(loop("--fault drop=0.01@0 --seed 5 --candump " + (folder_.path() / "dump").string()));

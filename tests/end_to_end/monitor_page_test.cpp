@@ -98,6 +98,66 @@ TEST_F(ServedPage, ServesOnlyThisComputerAndOnlyReads) {
   EXPECT_THAT(get("GET", "/../etc/passwd", own), StartsWith("HTTP/1.1 404"));
 }
 
+TEST_F(ServedPage, APageOfAnotherSiteCannotTakeAStream) {
+  const auto stream = [&](const std::string& header) {
+    return answer("GET /events HTTP/1.1\r\nHost: " + own_host() + "\r\n" + header + "\r\n\r\n", 100);
+  };
+  EXPECT_THAT(stream("Origin: http://evil.example"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(stream("Origin: null"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(stream("Sec-Fetch-Site: cross-site"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(stream("Origin: http://" + own_host()), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(stream("Sec-Fetch-Site: same-origin"), StartsWith("HTTP/1.1 200"));
+}
+
+/// Resident memory of the tool in kB.
+long resident_kb(pid_t pid) {
+  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmRSS:")) return std::stol(line.substr(6));
+  }
+  return -1;
+}
+
+TEST_F(ServedPage, AnEndlessHeadIsRefusedAndTakesNoMemory) {
+  const long before_kb = resident_kb(tool_->pid());
+  const std::string block(1'000'000, 'A');
+  for (const std::string& begin : {std::string("GET / HTTP/1.1\r\nX: "), std::string("GET /")}) {
+    const int line = connect();
+    send(line, begin.data(), begin.size(), MSG_NOSIGNAL);
+    std::size_t sent = 0;
+    while (sent < 100 * block.size()) {
+      const ssize_t n = send(line, block.data(), block.size(), MSG_NOSIGNAL);
+      if (n <= 0) break;
+      sent += static_cast<std::size_t>(n);
+    }
+    EXPECT_LT(sent, 20 * block.size()) << "the connection is closed";
+    close(line);
+  }
+  EXPECT_LT(resident_kb(tool_->pid()), before_kb + 10'000);
+}
+
+TEST_F(ServedPage, SlowConnectionsDoNotStopThePage) {
+  std::vector<int> slow;
+  for (int k = 0; k < 12; ++k) {
+    slow.push_back(connect());
+    send(slow.back(), "GET / HTTP/1.1\r\nX", 17, MSG_NOSIGNAL);
+  }
+  EXPECT_THAT(answer("GET / HTTP/1.1\r\nHost: " + own_host() + "\r\n\r\n", 100), StartsWith("HTTP/1.1 200"));
+  // each is closed although it sends a byte from time to time
+  char byte = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  const timeval wait{1, 0};
+  setsockopt(slow[0], SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait);
+  bool closed = false;
+  while (!closed && std::chrono::steady_clock::now() - begin < std::chrono::seconds(120)) {
+    send(slow[0], "a", 1, MSG_NOSIGNAL);
+    const ssize_t n = recv(slow[0], &byte, 1, 0);
+    closed = n == 0 || (n < 0 && errno != EAGAIN);
+  }
+  EXPECT_TRUE(closed);
+  for (const int line : slow) close(line);
+}
+
 TEST_F(ServedPage, AStreamBeginsWithTheWholeHistoryAndTheSeventhIsRefused) {
   const std::string request = "GET /events HTTP/1.1\r\nHost: " + own_host() + "\r\n\r\n";
   const std::string first = answer(request, 60'000);

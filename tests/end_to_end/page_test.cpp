@@ -13,10 +13,11 @@ using ::testing::HasSubstr;
 std::string document_of(const std::filesystem::path& page, const std::filesystem::path& folder) {
   std::string html = content(page);
   const std::string listener =
-      "<script>window.addEventListener('error', e => { const p = document.createElement('p'); p.textContent = 'SCRIPT "
-      "ERROR ' + e.message; "
-      "document.documentElement.appendChild(p); });</script>";
-  html.insert(html.find("<style>"), listener);
+      "<script>const complain = text => { const p = document.createElement('p'); p.textContent = 'SCRIPT ERROR ' + "
+      "text; document.documentElement.appendChild(p); };"
+      "window.addEventListener('error', e => complain(e.message));"
+      "document.addEventListener('securitypolicyviolation', e => complain(e.violatedDirective));</script>";
+  html.insert(html.find("<meta http-equiv"), listener);  // the page's policy applies to what follows
   const auto watched = folder / "watched.html", out = folder / "dom";
   std::ofstream(watched) << html;
   const std::string command =

@@ -30,8 +30,8 @@ class Tool : public ::testing::Test {
 
 TEST_F(Tool, HelpOfEveryCommandShowsAnExample) {
   EXPECT_THAT(run_tool("--help").out, HasSubstr("replay"));
-  for (const char* command :
-       {"replay", "simulate", "experiment", "identify", "diagnose", "study", "proof", "hil", "flash", "monitor"}) {
+  for (const char* command : {"replay", "simulate", "experiment", "identify", "diagnose", "study", "proof", "hil",
+                              "flash", "monitor", "log"}) {
     const ToolRun run = run_tool(std::string(command) + " --help");
     EXPECT_EQ(run.exit_code, 0);
     EXPECT_THAT(run.out, HasSubstr(std::string("Example: bms ") + command));

@@ -37,8 +37,8 @@ model::CellParameters<double> random_cell(Random& random) {
   p.capacity_ah = over_decades(random, 0.01, 1'000);
   p.limits.voltage_min_v = between(random, 0.5, 4);
   p.limits.voltage_max_v = between(random, p.limits.voltage_min_v + 0.1, 5);
-  p.limits.charge_current_max_a = over_decades(random, 1e-3, 2'000);
-  p.limits.discharge_current_max_a = over_decades(random, 1e-3, 2'000);
+  p.limits.charge_current_max_a = over_decades(random, 1e-3, model::accepted::current_a.high);
+  p.limits.discharge_current_max_a = over_decades(random, 1e-3, model::accepted::current_a.high);
   p.limits.temperature_min_c = -20;
   p.limits.temperature_max_c = 60;
   const std::size_t pieces = 1 + random() % 8;

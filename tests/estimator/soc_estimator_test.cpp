@@ -3,6 +3,7 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -83,6 +84,16 @@ TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   e = sure.step(cell, {0, 0, 3'300'000, 2'500});
   EXPECT_NEAR(e.soc, 0.65, 1e-6);
   EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
+}
+
+TEST(SocEstimator, AStartingPointBeyondTheEndsIsClampedToThem) {
+  const std::vector<measurement::Sample> no_voltage = {{0, 0, measurement::no_reading, 2'500}};
+  const auto first = [&](const measurement::StartingPoint& from) {
+    return run<float>(no_voltage, SocEstimator<float>(from)).front();
+  };
+  EXPECT_EQ(first({2'000'000'000, 1}).soc, first({1'000'000'000, 1}).soc);
+  EXPECT_EQ(first({-300'000'000, 1}).soc, first({0, 1}).soc);
+  EXPECT_EQ(first({500'000'000, -20'000'000}).soc_sigma, first({500'000'000, 0}).soc_sigma);
 }
 
 TEST(SocEstimator, AWidePriorAndTheFirstVoltageAreCombined) {
@@ -217,6 +228,29 @@ TEST(SocEstimator, AGapIsFlaggedOnceAndMakesSigmaGrow) {
   EXPECT_EQ(e[601].flags, 0U);
   EXPECT_EQ(e[599].flags, 0U);
   EXPECT_GT(e[600].soc_sigma, e[599].soc_sigma);
+}
+
+/// A recorder that sleeps for exactly a minute leaves as much unknown as one that sleeps for 60 and 61 s in turn.
+TEST(SocEstimator, GapsOfEqualLengthAreGaps) {
+  const auto sigma_after_gaps = [](std::uint64_t longer_us, int& gaps) {
+    auto samples = work(630);
+    std::uint64_t late_us = 0;
+    for (std::size_t k = 600; k < samples.size(); ++k) {
+      late_us += 59'000'000 + (k % 2) * longer_us;
+      samples[k].time_us += late_us;
+      samples[k].current_ua = 0;
+      samples[k].voltage_uv = measurement::no_reading;
+    }
+    const auto e = run<float>(samples, SocEstimator<float>(starting_at(0.8, 0.005)));
+    gaps = static_cast<int>(
+        std::count_if(e.begin(), e.end(), [](const auto& estimate) { return (estimate.flags & time_gap) != 0; }));
+    return static_cast<double>(e.back().soc_sigma);
+  };
+  int equal = 0, different = 0;
+  const double equal_sigma = sigma_after_gaps(0, equal), different_sigma = sigma_after_gaps(1'000'000, different);
+  EXPECT_GT(equal, 1);
+  EXPECT_EQ(equal, different);
+  EXPECT_NEAR(equal_sigma, different_sigma, 0.05 * different_sigma);
 }
 
 TEST(SocEstimator, IgnoresASampleThatIsNotLater) {

@@ -236,6 +236,20 @@ TEST(CellFile, MechanismsAreInCatalogueOrderAndMissingParametersAreNeutral) {
   EXPECT_TRUE(read_cell("table9").mechanisms.empty());
 }
 
+/// Its state would have neither a variance nor noise. Host and generator of the firmware's header both ask on_board().
+TEST(CellFile, AMechanismWithStatesAndWithoutStrengthIsNotComputed) {
+  const std::string base = read_cell("table9").text;
+  for (const char* table :
+       {"[mechanism.ocv_hysteresis]\n", "[mechanism.ocv_hysteresis]\nhalf_gap_v = 0.0\ninitial = 1.0\n",
+        "[mechanism.slow_polarisation]\ntime_constant_s = 900.0\n", "[mechanism.self_heating]\n"}) {
+    const CellFile cell = parse_cell(base + "\n" + table, "c.toml");
+    EXPECT_EQ(cell.mechanisms.size(), 1U) << table;
+    EXPECT_TRUE(on_board(cell.mechanisms).empty()) << table;
+  }
+  const CellFile cell = parse_cell(base + "\n[mechanism.ocv_hysteresis]\nhalf_gap_v = 0.001\n", "c.toml");
+  EXPECT_EQ(on_board(cell.mechanisms).size(), 1U);
+}
+
 TEST(CellFile, EveryMechanismIsWrittenAndReadBackBitForBit) {
   CellFile cell = read_cell("table9");
   for (std::size_t index = model::mechanism_count; index-- > 0;) {

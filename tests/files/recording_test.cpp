@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
 #include <functional>
 #include <random>
 
@@ -185,6 +186,42 @@ TEST(Recording, WarnsOfImplausibleValues) {
   EXPECT_THAT(warnings(millivolts), ElementsAre("voltage_in_mv"));
   EXPECT_THAT(warnings(milliamperes), ElementsAre("current_in_ma"));
   EXPECT_THAT(warnings(percent), ElementsAre("soc_ref_in_percent"));
+}
+
+TEST(Recording, RejectsWhatNoInstrumentMeasures) {
+  EXPECT_THAT(refusal(header + rows() + "20,1,1e308\n"),
+              HasSubstr("log.csv:22: '1e308' in column 'voltage_v' is impossible"));
+  EXPECT_THAT(refusal(header + rows() + "20,-1e12,3.3\n"), HasSubstr("'-1e12' in column 'current_a' is impossible"));
+  std::string still = header;
+  for (int k = 0; k < 20; ++k) still += "7,1,3.3\n";
+  EXPECT_THAT(refusal(still), HasSubstr("all rows have the same time, expected times that increase"));
+}
+
+TEST(Recording, WarnsOfMillisecondsAndOfMoreChargeThanTheCellHas) {
+  std::string milliseconds = header, large = header;
+  for (int k = 0; k < 3'600; ++k) {
+    const double i = k % 100 < 50 ? -6 : 2;
+    milliseconds += std::to_string(1'000 * k) + "," + std::to_string(i) + "," + std::to_string(3.3 + 0.01 * i) + "\n";
+    large += std::to_string(k) + "," + std::to_string(10 * i) + "," + std::to_string(3.3 + 0.001 * i) + "\n";
+  }
+  EXPECT_THAT(warnings(milliseconds), ::testing::ElementsAre("time_in_ms"));
+  EXPECT_THAT(warnings(large), ::testing::ElementsAre("outside_cell_range", "charge_exceeds_capacity"));
+}
+
+/// Quadratic time would be half a minute.
+TEST(Recording, ManyColumnsAreReadInProportionToTheirNumber) {
+  std::string text = "time_s,current_a,voltage_v", more;
+  for (int k = 0; k < 200'000; ++k) {
+    text += ",x";
+    more += ",1";
+  }
+  text += "\n";
+  for (int k = 0; k < 12; ++k) text += std::to_string(k) + ",1,3.3" + more + "\n";
+  const auto begin = std::clock();
+  const Recording r = parse_recording(text, "log.csv");
+  EXPECT_LT(std::clock() - begin, 5 * CLOCKS_PER_SEC);
+  EXPECT_THAT(r.warnings.front().text, HasSubstr("and 199990 more"));
+  EXPECT_LT(r.warnings.front().text.size(), 200U);
 }
 
 TEST(Recording, AnyBytesAreEitherReadOrRejected) {

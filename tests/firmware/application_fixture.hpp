@@ -41,7 +41,7 @@ class TelemetryTest : public ::testing::Test {
   void SetUp() override {
     begin();
     estimator_hangs_back = false;
-    dc_link_reading_uv = measurement::no_reading;
+    link_readings = {};
     cause = hal::ResetCause::watchdog;
   }
   void send_command(std::uint32_t code, std::uint32_t argument, std::uint8_t counter) {
@@ -71,7 +71,7 @@ class PackWith : public TelemetryTest {
 
   void SetUp() override {
     TelemetryTest::SetUp();
-    dc_link_reading_uv = 0;
+    set_link(1e-6 * reading.pack_uv, 0);
     cause = hal::ResetCause::power_on;
     for (std::size_t k = 0; k < 16; ++k) reading.cell_uv[k] = 3'280'000 + static_cast<std::int32_t>(k) * 100;
     reading.pack_uv = 16 * 3'280'750;
@@ -92,7 +92,7 @@ class PackWith : public TelemetryTest {
       dc_link_v += (pack_v - dc_link_v) * (1 - std::exp(-1 / 0.5));
     else
       dc_link_v *= std::exp(-0.2);
-    dc_link_reading_uv = static_cast<std::int32_t>(1e6 * dc_link_v);
+    set_link(pack_v, dc_link_v);
     pack.process_sample(reading);
   }
   bool driving() const { return switched.main_plus && switched.main_minus; }

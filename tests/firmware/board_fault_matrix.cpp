@@ -21,6 +21,10 @@ void bring_about(std::size_t k, std::int32_t value, BoardTruck& truck, measureme
                  PackEstimate<16>& e) {
   if (k == charge_overload || k == discharge_overload) {
     s.current_ua = value;
+  } else if (k == exceeded) {
+    // 1.1 times the allowed current plus the rest current of 2 % of 6 Ah
+    s.current_ua =
+        static_cast<std::int32_t>(-1e6 * (1.1 * static_cast<double>(truck.allowed.discharge) + 0.12)) - value;
   } else if (k == implausible) {
     for (auto& uv : s.cell_uv) uv -= value > 0 && uv != measurement::no_reading ? 300'000 : 0;
   } else {
@@ -30,6 +34,7 @@ void bring_about(std::size_t k, std::int32_t value, BoardTruck& truck, measureme
 std::int32_t level(std::size_t k, bool above) {
   if (k == charge_overload) return above ? 12'000'000 : 6'270'000;
   if (k == discharge_overload) return above ? -12'000'000 : -6'270'000;
+  if (k == exceeded) return above ? 50'000 : -50'000;  // the message has steps of 20 mA
   return above ? levels(expected_rows[k]).just_above : levels(expected_rows[k]).just_below;
 }
 /// Keeps the condition of fault k, beyond its threshold by up to three sigma of noise. A constant reading would be
@@ -96,6 +101,9 @@ class Matrix {
                        [k, other](MatrixResult& r) { during(k, other, r); }});
       }
     }
+    for (const bool past : {false, true})
+      all.push_back({fmt::format("just {} {}", past ? "above" : "below", expected_rows[unrequested].name),
+                     [past](MatrixResult& r) { without_request(past, r); }});
     const std::vector<std::size_t> harmless = {0, 3, 11, 13, 15, 17, 23};  // the contactors close in spite of these
     for (const std::size_t k : contactor_rows) {
       const std::string name = expected_rows[k].name;
@@ -139,8 +147,8 @@ class Matrix {
       is(second);
       for (int tenth = 0; tenth < 10; ++tenth) {
         truck.step();
-        if (truck.faults != 0) return truck.complain(fmt::format("published faults {:08x}", truck.faults));
-        if (truck.expected != 0) return truck.complain(fmt::format("the oracle has faults {:08x}", truck.expected));
+        if (truck.faults != 0) return truck.complain(fmt::format("published faults {:010x}", truck.faults));
+        if (truck.expected != 0) return truck.complain(fmt::format("the oracle has faults {:010x}", truck.expected));
         if (!truck.is_closed()) return truck.complain("stopped driving");
       }
     }
@@ -158,7 +166,7 @@ class Matrix {
   }
 
   static std::nullopt_t missed(BoardTruck& truck) {
-    truck.complain(fmt::format("missed, faults {:08x}, contactors {}, flags of the estimate {:x}", truck.faults,
+    truck.complain(fmt::format("missed, faults {:010x}, contactors {}, flags of the estimate {:x}", truck.faults,
                                truck.contactors.state, truck.flags));
     return std::nullopt;
   }
@@ -234,10 +242,15 @@ class Matrix {
   }
 
   static void during(std::size_t k, std::size_t other, MatrixResult& result) {
-    BoardTruck truck(1'000 + 32 * k + other, result);
+    BoardTruck truck(1'000 + 64 * k + other, result);
     if (!truck.drive_off()) return truck.complain("does not start to drive");
     for (int t = 0; t < delay_ms(other) + 500; t += step_ms) {
-      truck.step([&](auto& s, auto& e, auto&) { keep(other, truck, s, e); });
+      truck.step([&](auto& s, auto& e, auto&) {
+        // until then the truck obeys, also while the allowed current changes
+        if (k == exceeded)
+          s.current_ua = std::max(s.current_ua, static_cast<std::int32_t>(-1e6F * truck.allowed.discharge));
+        keep(other, truck, s, e);
+      });
     }
     if (!has(truck.faults, other)) return truck.complain("the other fault is not active");
     // after a turning point the other readings change far enough
@@ -255,17 +268,41 @@ class Matrix {
   }
   /// Returns true if the same readings cause both faults, or if one needs a reading that the other removes.
   static bool shares(std::size_t k, std::size_t other) {
-    const auto overload_or_current = [](std::size_t r) {
-      return r == charge_overload || r == discharge_overload || r == 10 || r == 22;
-    };
+    const auto overload_or_current = [](std::size_t r) { return of_the_current(r) || r == 10 || r == 22; };
     const auto cells = [](std::size_t r) {
       return r <= 7 || r == 16 || r == 17 || r == 19 || r == 20 || r == 21 || r == 25 || r == implausible;
     };
-    const auto warm = [](std::size_t r) { return (r >= 11 && r <= 15) || r == 23 || r == 24; };
+    const auto warm = [](std::size_t r) { return (r >= 11 && r <= 15) || r == 23 || r == 24 || r == 35; };
     const bool open_already =
         k == implausible || (overload_or_current(k) && opens(other));  // without current there is no overcurrent
     return open_already || (overload_or_current(k) && overload_or_current(other)) || (cells(k) && cells(other)) ||
            (warm(k) && warm(other));
+  }
+
+  /// The request ends, and the load goes on until just before the delay is over, or beyond it.
+  static void without_request(bool past, MatrixResult& result) {
+    BoardTruck truck(past ? 5 : 4, result);
+    if (!truck.drive_off()) return truck.complain("does not start to drive");
+    truck.inputs.request = Request::none;  // received within a second
+    for (int k = 0; k < 20 && truck.contactors.state != can::ContactorState::state_unloading; ++k) truck.step();
+    const int delay = delay_ms(unrequested), load_ends_ms = past ? delay + opens_within_ms + 1'000 : delay;
+    int published_ms = -1, opened_ms = -1;
+    for (int t = 0; t < delay + opens_within_ms + 1'000; t += step_ms) {
+      truck.step([&](auto& s, auto&, auto&) { s.current_ua = t < load_ends_ms ? s.current_ua : 0; });
+      if (published_ms < 0 && has(truck.faults, unrequested)) published_ms = t;
+      if (opened_ms < 0 && !truck.is_closed()) opened_ms = t;
+    }
+    if (!past) {
+      if (published_ms >= 0 || opened_ms < load_ends_ms) truck.complain("opened a load that ended in time");
+      if (truck.wrong == 0) ++result.rows[unrequested].silent;
+      return;
+    }
+    if (published_ms < delay || published_ms > delay + step_ms)
+      truck.complain(fmt::format("published after {} ms", published_ms));
+    if (opened_ms < published_ms || opened_ms > published_ms + opens_within_ms)
+      truck.complain(fmt::format("opened {} ms after the message", opened_ms - published_ms));
+    result.rows[unrequested].above.add(published_ms);
+    result.rows[unrequested].opened.add(opened_ms);
   }
 
   /// A fault of precharge or contactors, caused by the DC-link voltage, or missing samples.
@@ -279,44 +316,53 @@ class Matrix {
     }
   };
 
-  /// Just above the lowest voltage that the curve allows, or just below it, from half a time constant on.
-  static std::int32_t link_of_precharge(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+  /// Poles of a DC link with this voltage, where the commanded contactors connect them.
+  static plant::LinkPoles poles(const BoardTruck& truck, std::int32_t pack_uv, double dc_link_uv) {
+    const Outputs o = truck.outputs();
+    return plant::link_poles(o.main_plus || o.precharge, o.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
+  }
+  /// Just above the lowest voltage that the curve allows, or just below it, from half a time constant on. The curve
+  /// starts at an empty DC link and has 1.5 times the time constant, minus a fifth of the pack.
+  static double link_of_precharge(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
     if (!truck.outputs().precharge || !truck.outputs().main_minus) return truck.is_closed() ? pack_uv : 0;
     ++c.in_precharge;
     const int halves = c.in_precharge * step_ms / 250;
     if (c.above) c.condition_holds(halves >= 1);
-    const double least = 1 - std::exp(-0.5 * halves) - 0.2;
+    const double least = 1 - std::exp(-0.5 * halves / 1.5) - 0.2;
     if (!c.above && halves >= 11) return pack_uv;
-    return static_cast<std::int32_t>(pack_uv * std::max(0.0, least + (c.above ? -0.002 : 0.002)));
+    return pack_uv * std::max(0.0, least + (c.above ? -0.002 : 0.002));
   }
-  static std::int32_t precharged(ContactorCase& c, std::int32_t pack_uv) {
+  static double precharged(ContactorCase& c, std::int32_t pack_uv) {
     ++c.in_precharge;
-    return static_cast<std::int32_t>(pack_uv * (1 - std::exp(-0.2 * c.in_precharge)));
+    return pack_uv * (1 - std::exp(-0.2 * c.in_precharge));
   }
-  /// The DC link rises to an eighth with the precharge contactor alone.
-  static std::int32_t link_of_welded(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+  /// The DC link rises by an eighth with the precharge contactor alone.
+  static double link_of_welded(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
     const Outputs o = truck.outputs();
     if (o.precharge && !o.main_minus) {
       c.condition_holds(c.above);
       return pack_uv / 8 + (c.above ? 1 : 0);
     }
-    if (o.precharge && o.main_minus) return precharged(c, pack_uv);
+    if (o.precharge && o.main_minus && !o.main_plus) return precharged(c, pack_uv);
     return truck.is_closed() ? pack_uv : 0;
   }
-  /// The DC link is a sixteenth below the pack voltage with both contactors closed.
-  static std::int32_t link_of_not_closed(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+  /// L+ is a sixteenth below the pack voltage with both contactors closed.
+  static double link_of_not_closed(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
     const Outputs o = truck.outputs();
-    if (o.precharge && o.main_minus) return precharged(c, pack_uv);
+    if (o.precharge && o.main_minus && !o.main_plus) return precharged(c, pack_uv);
     if (!truck.is_closed()) return 0;
     c.condition_holds(c.above);
-    return static_cast<std::int32_t>(std::int64_t{pack_uv} * 960 / 1024) - (c.above ? 1 : 0);
+    return pack_uv - pack_uv / 16 - (c.above ? 1 : 0);
   }
   static void set_link(ContactorCase& c, BoardTruck& truck) {
-    if (c.fault == precharge)
-      truck.link = [&](const TruckPack& t) { return link_of_precharge(c, truck, t.sample.pack_uv); };
-    if (c.fault == welded) truck.link = [&](const TruckPack& t) { return link_of_welded(c, truck, t.sample.pack_uv); };
-    if (c.fault == not_closed)
-      truck.link = [&](const TruckPack& t) { return link_of_not_closed(c, truck, t.sample.pack_uv); };
+    const auto from = [&](double (*link_of)(ContactorCase&, const BoardTruck&, std::int32_t)) {
+      truck.link = [&c, &truck, link_of](const TruckPack& t) {
+        return poles(truck, t.sample.pack_uv, link_of(c, truck, t.sample.pack_uv));
+      };
+    };
+    if (c.fault == precharge) from(link_of_precharge);
+    if (c.fault == welded) from(link_of_welded);
+    if (c.fault == not_closed) from(link_of_not_closed);
   }
 
   /// Starts to drive, then makes a pause of half a second between two samples, or stops the samples.

@@ -25,18 +25,25 @@
 namespace bms::protection {
 
 inline constexpr std::size_t charge_overload = 8, discharge_overload = 9, implausible = 18, precharge = 26, welded = 27,
-                             not_closed = 28, no_samples = 29, internal_error = 30, failed_storage = 31;
+                             not_closed = 28, no_samples = 29, internal_error = 30, failed_storage = 31,
+                             tripped_line = 32, failed_line = 33, other_sensor = 34, unrequested = 36, exceeded = 37;
 /// Faults of precharge, contactors and missing samples: cases of their own.
 inline constexpr std::array contactor_rows{precharge, welded, not_closed, no_samples};
 /// Returns true if frames can cause fault k; the others are tested on the boards in Unicorn.
-constexpr bool in_frames(std::size_t k) { return k != internal_error && k != failed_storage; }
-/// Returns true if a change of the truck's samples can cause fault k.
-constexpr bool on_the_truck(std::size_t k) {
-  return visible_in_samples(k) || k == charge_overload || k == discharge_overload;
+constexpr bool in_frames(std::size_t k) {
+  return k != internal_error && k != failed_storage && k != tripped_line && k != failed_line && k != other_sensor;
 }
+/// Rows whose condition is the current.
+constexpr bool of_the_current(std::size_t k) {
+  return k == charge_overload || k == discharge_overload || k == exceeded;
+}
+/// Returns true if a change of the truck's samples can cause fault k.
+constexpr bool on_the_truck(std::size_t k) { return visible_in_samples(k) || of_the_current(k); }
 constexpr bool every_row_has_a_case() {
   for (std::size_t k = 0; k < fault_count; ++k) {
-    if (in_frames(k) && !on_the_truck(k) && std::ranges::find(contactor_rows, k) == contactor_rows.end()) return false;
+    if (in_frames(k) && !on_the_truck(k) && k != unrequested &&
+        std::ranges::find(contactor_rows, k) == contactor_rows.end())
+      return false;
   }
   return true;
 }
@@ -73,10 +80,11 @@ class BoardTruck : public TruckPack {
 
   void step(const Change& change = {}) {
     measure(outputs(), change);
-    if (link) inputs.dc_link_uv = link(*this);
+    if (link) set_link(link(*this));
     std::vector<can::Frame> frames;
     if (steps() % 10 == 1) frames.push_back(request());
-    const auto measured = hal::frames_of(sample, inputs.dc_link_uv, static_cast<std::uint16_t>(steps()));
+    const auto measured =
+        hal::frames_of(sample, inputs.link_plus_uv, static_cast<std::uint16_t>(steps()), inputs.link_minus_uv);
     frames.insert(frames.end(), measured.begin(), measured.end());
     received_faults_ = false;
     receive(link_->exchange(1e-6 * (static_cast<double>(sample.time_us) + 0.5), frames));
@@ -106,10 +114,10 @@ class BoardTruck : public TruckPack {
       result_.wrong.push_back(fmt::format("{} at {:.1f} s", what, 0.1 * static_cast<double>(steps())));
   }
 
-  std::function<std::int32_t(const TruckPack&)> link;  ///< DC link instead of that of the truck
-  std::uint32_t faults = 0, expected = 0;
-  std::uint32_t not_judged = 0;  ///< rows that the oracle cannot judge in this case
-  std::uint32_t flags = 0;       ///< of the estimate
+  std::function<plant::LinkPoles(const TruckPack&)> link;  ///< DC link instead of that of the truck
+  FaultSet faults = 0, expected = 0;
+  FaultSet not_judged = 0;  ///< rows that the oracle cannot judge in this case
+  std::uint32_t flags = 0;  ///< of the estimate
   bool contradicts() const { return (flags & estimator::voltage_rejected) != 0; }
   can::ContactorState contactors;
   can::AllowedCurrent allowed;
@@ -126,9 +134,11 @@ class BoardTruck : public TruckPack {
   void receive(const std::vector<can::Frame>& frames) {
     for (const can::Frame& f : frames) {
       if (f.id == can::Faults::id) {
-        faults = hal::get_bytes<std::uint32_t>(f.data, 2);  // bits 16 to 47
+        faults = (faults >> 32 << 32) | hal::get_bytes<std::uint32_t>(f.data, 2);  // bits 16 to 47
         received_faults_ = true;
       }
+      if (f.id == can::MoreFaults::id)
+        faults = FaultSet{hal::get_bytes<std::uint32_t>(f.data, 2)} << 32 | (faults & 0xFFFF'FFFF);
       if (f.id == can::ContactorState::id) contactors = can::ContactorState::of(f);
       if (f.id == can::AllowedCurrent::id) allowed = can::AllowedCurrent::of(f);
       if (f.id == can::Status::id) flags = can::Status::of(f).flags;

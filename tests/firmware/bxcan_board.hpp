@@ -85,7 +85,8 @@ inline void queue_for(UnicornBoard& board, const std::vector<Input>& inputs) {
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const std::uint64_t due = board.can.now_bit + bits_between_samples * (k + 1);
     if (inputs[k].command) board.can.others.push_back({wire_frame(*inputs[k].command), due - bits_between_samples / 2});
-    for (const can::Frame& f : hal::frames_of(inputs[k].pack, inputs[k].dc_link_uv, static_cast<std::uint16_t>(k)))
+    for (const can::Frame& f :
+         hal::frames_of(inputs[k].pack, inputs[k].link.plus_uv, static_cast<std::uint16_t>(k), inputs[k].link.minus_uv))
       board.can.others.push_back({wire_frame(f), due, true});
   }
 }

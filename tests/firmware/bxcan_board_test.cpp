@@ -18,7 +18,8 @@ std::vector<Input> start_of_a_drive(HostBoard& host) {
   bool driving = false;
   for (const Pack& recorded : part_of_the_shift(70)) {
     const std::size_t k = inputs.size();
-    Input in{recorded, static_cast<std::int32_t>(1e6 * dc_link_v), {}};
+    host_hal::set_link(1e-6 * recorded.pack_uv, dc_link_v);
+    Input in{recorded, host_hal::link_readings, {}};
     in.pack.time_us = 1'000'000 + 100'000 * k;
     if (!driving) in.pack.current_ua = 0;
     if (k % 20 == 3) {

@@ -130,26 +130,28 @@ TEST_F(BxcanBoard, AFullFifoAndAFullRingAreCountedAndTheNextSampleIsReceived) {
 TEST_F(BxcanBoard, OnlyAcceptedIdentifiersAreReceived) {
   run_until_it_listens(board);
   for (std::uint32_t id = 0; id < 0x800; id += 7) {
-    const bool accepted = std::find(hal::accepted_ids.begin(), hal::accepted_ids.end(), id) != hal::accepted_ids.end();
+    const bool accepted = std::find(hal::request_and_sample_ids.begin(), hal::request_and_sample_ids.end(), id) !=
+                          hal::request_and_sample_ids.end();
     if (!accepted) board.can.others.push_back({{id, false, false, 8, {}}, 0});
   }
-  for (const std::uint32_t id : hal::accepted_ids) {
+  for (const std::uint32_t id : hal::request_and_sample_ids) {
     board.can.others.push_back({{id, false, true, 8, {}}, 0});  // remote request
     for (std::uint32_t tail : {0U, 1U, 0x3FFFFU})
       board.can.others.push_back({{id << 18 | tail, true, false, 8, {}}, 0});  // 29 bits
     for (std::uint32_t bit = 0; bit < 11; ++bit) {
       const std::uint32_t near = id ^ 1U << bit;
-      if (std::find(hal::accepted_ids.begin(), hal::accepted_ids.end(), near) == hal::accepted_ids.end())
+      if (std::find(hal::request_and_sample_ids.begin(), hal::request_and_sample_ids.end(), near) ==
+          hal::request_and_sample_ids.end())
         board.can.others.push_back({{near, false, false, 8, {}}, 0});
     }
   }
   ASSERT_TRUE(board.run_until([&] { return board.can.others.empty(); }, 1'000));
   board.run_for_ms(2);
   EXPECT_EQ(board.can_health().received, 0U);
-  for (const std::uint32_t id : hal::accepted_ids) board.can.others.push_back({{id, false, false, 8, {}}, 0});
+  for (const std::uint32_t id : hal::request_and_sample_ids) board.can.others.push_back({{id, false, false, 8, {}}, 0});
   ASSERT_TRUE(board.run_until([&] { return board.can.others.empty(); }, 100));
   board.run_for_ms(2);
-  EXPECT_EQ(board.can_health().received, hal::accepted_ids.size());
+  EXPECT_EQ(board.can_health().received, hal::request_and_sample_ids.size());
 }
 
 TEST_F(BxcanBoard, ErrorsLeadToWarningAndPassiveAndBackWithoutLossOfAFrame) {

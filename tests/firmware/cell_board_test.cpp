@@ -2,7 +2,6 @@
 // cell are on the CAN bus, a correction changes them, and a converter that hangs stops its readings but not the
 // firmware.
 #include <cmath>
-#include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +10,7 @@
 #include "estimator/estimate.hpp"
 #include "files/cell_file.hpp"
 #include "images/firmware_image.hpp"
-#include "tests/firmware/unicorn_board.hpp"
+#include "tests/firmware/converter_model.hpp"
 #include "tests/hal/thermistor.hpp"
 
 namespace bms::firmware {
@@ -19,62 +18,18 @@ namespace {
 
 using ::testing::IsEmpty;
 
-/// Register model of ADC1 (RM0090, 13) with inputs in volts and ohms and a noise of one count.
-class Converter : public UnicornBoard::Peripheral {
- public:
-  static constexpr std::uint32_t base = 0x40012000;
-  double supply_v = 3.27, cell_v = 3.3, current_a = 0, celsius = 25;
-  bool hangs = false;
-  unsigned conversions = 0;
-  std::vector<std::string> violations;
+/// The cell, the shunt with its amplifier and the thermistor at PA2, PA1 and PA3.
+struct Converter : ConverterModel {
+  double cell_v = 3.3, current_a = 0, celsius = 25;
 
-  std::uint32_t read(std::uint32_t at, double now_us) override {
-    switch (at) {
-      case 0x00:
-        return begun_ && !hangs && now_us >= ready_us_ ? 2U : 0U;
-      case 0x4C:
-        if (!begun_ || now_us < ready_us_) violations.push_back("DR is read before the end of the conversion");
-        begun_ = false;
-        return value_;
-      default:
-        return registers_[at];
-    }
+  Converter() {
+    input_v = [this](std::uint32_t channel) {
+      const double ohm = thermistor_ohm(celsius);
+      if (channel == 1) return supply_v / 2 + 20 * 0.002 * current_a;
+      if (channel == 2) return cell_v / 2;
+      return channel == 3 ? supply_v * ohm / (ohm + 10'000) : 0;
+    };
   }
-  void write(std::uint32_t at, std::uint32_t value, double now_us) override {
-    registers_[at] = value;
-    if (at == 0x08 && (value & 1U << 30) != 0) begin(now_us);
-  }
-
- private:
-  void begin(double now_us) {
-    if ((registers_[0x08] & 1) == 0) violations.push_back("a conversion while the converter is off");
-    const std::uint32_t channel = registers_[0x34] & 31;
-    constexpr double cycles[] = {3, 15, 28, 56, 84, 112, 144, 480};
-    const double sampling =
-        cycles[channel < 10 ? registers_[0x10] >> (3 * channel) & 7 : registers_[0x0C] >> (3 * (channel - 10)) & 7];
-    const double mhz = 84.0 / (2 * ((registers_[0x304] >> 16 & 3) + 1));
-    if (mhz > 36) violations.push_back("a clock above 36 MHz (datasheet, ADC characteristics)");
-    if (channel == 17 && ((registers_[0x304] & 1U << 23) == 0 || sampling / mhz < 10))
-      violations.push_back("the reference is off, or sampled for less than 10 us");
-    const double ohm = thermistor_ohm(celsius);
-    double pin_v = 0;
-    if (channel == 1) pin_v = supply_v / 2 + 20 * 0.002 * current_a;
-    if (channel == 2) pin_v = cell_v / 2;
-    if (channel == 3) pin_v = supply_v * ohm / (ohm + 10'000);
-    if (channel == 17) pin_v = 1.21;
-    value_ =
-        static_cast<std::uint32_t>(std::clamp(std::lround(4'095 * pin_v / supply_v + noise_(random_)), 0L, 4'095L));
-    ready_us_ = now_us + (sampling + 12) / mhz;
-    begun_ = true;
-    ++conversions;
-  }
-
-  std::map<std::uint32_t, std::uint32_t> registers_;
-  std::mt19937 random_{1};
-  std::normal_distribution<double> noise_{0, 1};
-  double ready_us_ = 0;
-  std::uint32_t value_ = 0;
-  bool begun_ = false;
 };
 
 class CellBoard : public ::testing::Test {
@@ -176,6 +131,30 @@ TEST_F(CellBoard, AHangingConverterStopsOnlyItsReadings) {
   converter.hangs = false;
   board.run_for_ms(300);
   EXPECT_NEAR(last<can::PackElectrical>().voltage, 3.3, 0.003);
+}
+
+/// The board has one switch, at the output of main plus, and no DC link.
+TEST_F(CellBoard, ClosesItsSwitchForATruckThatDrivesAndOpensItAtTheEndOfTheRequest) {
+  const auto output = [&] { return (board.register_value(0x40020818) >> 6 & 1) != 0; };  // GPIOC_BSRR: PC6
+  EXPECT_FALSE(output());
+  EXPECT_EQ(command(can::Command::code_request, 1), can::CommandAnswer::result_done);
+  EXPECT_TRUE(output());
+  EXPECT_EQ(last<can::ContactorState>().state, can::ContactorState::state_drive);
+  EXPECT_EQ(last<can::ContactorState>().precharge, 0U);
+  converter.current_a = -4;
+  board.run_for_ms(2'000);
+  EXPECT_TRUE(output());
+  EXPECT_EQ(last<can::Faults>().first_cause, 0U);
+  EXPECT_GT(last<can::AllowedCurrent>().discharge, 1);
+  EXPECT_EQ(command(can::Command::code_request, 0), can::CommandAnswer::result_done);
+  EXPECT_TRUE(output()) << "not under load";
+  converter.current_a = 0;
+  board.run_for_ms(1'000);
+  EXPECT_FALSE(output());
+  EXPECT_EQ(last<can::Faults>().first_cause, 0U);
+  converter.current_a = -4;
+  board.run_for_ms(1'000);
+  EXPECT_EQ(last<can::Faults>().contactor_welded, 1U) << "current flows through an open switch";
 }
 
 TEST_F(CellBoard, ItsPinsAreAnalog) {

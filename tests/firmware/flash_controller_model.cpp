@@ -9,7 +9,6 @@ namespace {
 constexpr std::uint32_t pg = 1U << 0, ser = 1U << 1, mer = 1U << 2, strt = 1U << 16,
                         lock = 1U << 31;                                       // FLASH_CR, 3.9.6
 constexpr std::uint32_t pgperr = 1U << 6, pgserr = 1U << 7, wrperr = 1U << 4;  // FLASH_SR, 3.9.5
-constexpr double word_us = 16, erase_us = 250'000;  // datasheet DS8626, flash memory programming, x32, usual
 
 }  // namespace
 

@@ -31,6 +31,8 @@ class FlashControllerModel {
   std::uint32_t option_bytes = 0x0FFFAAED & ~(3U << 2);  ///< FLASH_OPTCR as delivered, except brown-out reset level 3
   std::vector<std::string> violations;
   unsigned words_programmed = 0, sectors_erased = 0;
+  /// Datasheet DS8626, flash memory programming, x32: usual times. An erase of 16 KiB takes at most 500 ms.
+  double word_us = 16, erase_us = 250'000;
   bool worn_out = false;  ///< programming has no effect and sets no error flag
 
  private:

@@ -23,8 +23,8 @@ struct ForkliftCell : host_hal::Table9Board<Pack::cells> {
 /// Input of the board for one sample.
 struct Input {
   Pack pack;
-  std::int32_t dc_link_uv = 0;
-  std::optional<can::Frame> command;  ///< received before the sample
+  hal::LinkVoltages link{0, 0};
+  std::optional<can::Frame> command = std::nullopt;  ///< received before the sample
 };
 
 /// All sectors, one after the other.
@@ -63,12 +63,19 @@ class HostBoard {
   HostBoard& operator=(const HostBoard&) = delete;
 
   void process_sample(const Input& in) {
-    host_hal::dc_link_reading_uv = in.dc_link_uv;
+    host_hal::link_readings = in.link;
     if (in.command) host_hal::requests.push_back(*in.command);
     application_->process_sample(in.pack);
   }
   void shut_down() { application_->shut_down(); }
   std::vector<std::uint8_t> flash() { return bytes_of(flash_); }
+  /// From now on no word can be programmed and no sector erased.
+  void wear_out_flash() {
+    for (std::uint32_t k = 0; k < sectors; ++k) {
+      flash_.wear_out(k, FlashModel::Wear::bits_stuck_at_one);
+      flash_.wear_out(k, FlashModel::Wear::erase_fails);
+    }
+  }
   const storage::Persistence& persistence() const { return persistence_; }
 
  private:

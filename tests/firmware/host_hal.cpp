@@ -1,5 +1,7 @@
 #include "tests/firmware/host_hal.hpp"
 
+#include "plant/link_poles.hpp"
+
 namespace bms {
 
 void host_hal::begin() {
@@ -8,15 +10,31 @@ void host_hal::begin() {
   requests.clear();
   recorded.clear();
   switched = {};
-  dc_link_reading_uv = 0;
+  link_readings = {0, 0};
+  contacts = {};
+  second_line = 0;
+  front_end = {};
+  second_current_reading_ua = measurement::no_reading;
   cause = hal::ResetCause::power_on;
   fault.reset();
   fed = 0;
   board_state = {};
   supply_falls = supply_acknowledged = 0;
+  calendar.reset();
+  backup = {};
+  backup_supplied = true;
+  can_health = {};
   calendar_was_set_to = 0;
   calendar_accepts = true;
   calibrated = {};
+  calibration_accepts = true;
+  second_line_cleared = 0;
+}
+
+void host_hal::set_link(double pack_v, double dc_link_v) {
+  const plant::LinkPoles poles =
+      plant::link_poles(switched.main_plus || switched.precharge, switched.main_minus, pack_v, dc_link_v);
+  link_readings = {static_cast<std::int32_t>(1e6 * poles.plus_v), static_cast<std::int32_t>(1e6 * poles.minus_v)};
 }
 
 namespace hal {
@@ -36,10 +54,20 @@ void record_estimate(std::span<const std::uint32_t> words) {
   host_hal::recorded.emplace_back(words.begin(), words.end());
 }
 void power_path_set(const PowerPath& wanted) { host_hal::switched = wanted; }
-std::int32_t dc_link_uv() { return host_hal::dc_link_reading_uv; }
+LinkVoltages link_voltages() { return host_hal::link_readings; }
+AuxiliaryContacts auxiliary_contacts() { return host_hal::contacts; }
+void acknowledge_contact_losses(std::uint32_t losses) { host_hal::contacts.losses -= losses; }
+std::uint32_t second_line_trips() { return host_hal::second_line; }
+FrontEndHealth front_end_health() { return host_hal::front_end; }
+std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }
-std::optional<std::uint32_t> calendar_s() { return std::nullopt; }
+std::optional<std::uint32_t> calendar_s() { return host_hal::calendar; }
+std::uint32_t backup_word(std::size_t k) { return host_hal::backup[k]; }
+void set_backup_word(std::size_t k, std::uint32_t value) {
+  if (host_hal::backup_supplied) host_hal::backup[k] = value;
+}
+CanHealth can_health() { return host_hal::can_health; }
 void watchdog_feed() { ++host_hal::fed; }
 std::uint32_t supply_falls() { return host_hal::supply_falls; }
 void supply_acknowledge(std::uint32_t falls) {
@@ -52,7 +80,11 @@ bool calendar_set(std::uint32_t unix_s) {
   host_hal::calendar_was_set_to = unix_s;
   return host_hal::calendar_accepts;
 }
-void calibrate(const SensorCalibration& c) { host_hal::calibrated = c; }
+bool calibrate(const SensorCalibration& c) {
+  if (host_hal::calibration_accepts) host_hal::calibrated = c;
+  return host_hal::calibration_accepts;
+}
+void second_line_clear() { ++host_hal::second_line_cleared; }
 
 }  // namespace hal
 }  // namespace bms

@@ -3,6 +3,7 @@
 // tests/storage/flash_model.hpp). Also: the application's Board with the cell table9.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -11,6 +12,8 @@
 #include "files/cell_file.hpp"
 #include "firmware/application.hpp"
 #include "hal/power.hpp"
+#include "hal/power_path.hpp"
+#include "hal/second_current.hpp"
 
 namespace bms::host_hal {
 
@@ -19,18 +22,31 @@ inline std::vector<can::Frame> sent;
 inline std::deque<can::Frame> requests;
 inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
-inline std::int32_t dc_link_reading_uv = 0;
+inline hal::LinkVoltages link_readings{0, 0};
+inline hal::AuxiliaryContacts contacts;
+inline std::uint32_t second_line = 0;
+inline hal::FrontEndHealth front_end;
+inline std::int32_t second_current_reading_ua = measurement::no_reading;
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;
 inline hal::BoardState board_state;
 inline std::uint32_t supply_falls = 0, supply_acknowledged = 0;
+inline std::optional<std::uint32_t> calendar;
+inline std::array<std::uint32_t, hal::backup_words> backup{};
+inline bool backup_supplied = true;  ///< the backup words can be written
+inline hal::CanHealth can_health;
 inline std::uint32_t calendar_was_set_to = 0;
 inline bool calendar_accepts = true;
 inline hal::SensorCalibration calibrated;
+inline bool calibration_accepts = true;
+inline int second_line_cleared = 0;
 
 /// Resets all variables.
 void begin();
+
+/// Sets the readings of the DC link, with ideal contactors as commanded last.
+void set_link(double pack_v, double dc_link_v);
 
 /// The last sent frame of a message.
 template <class Message>

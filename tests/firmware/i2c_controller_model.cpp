@@ -23,6 +23,12 @@ void I2cControllerModel::update(double now_us) {
         address_done();
         break;
       case Phase::sending:
+        if (bytes_until_refused >= 0 && bytes_until_refused-- == 0) {
+          refused_ = true;
+          out_.pop_back();
+          empty_ = dr_waits_ = false;
+          break;
+        }
         if (!dr_waits_) break;
         dr_waits_ = false;
         out_.push_back(dr_);
@@ -39,6 +45,17 @@ void I2cControllerModel::update(double now_us) {
 }
 
 void I2cControllerModel::address_done() {
+  if (bus_errors > 0) {  // 27.3.4: in master mode the lines are not released, and the transmission goes on
+    --bus_errors;
+    bus_error_ = true;
+  }
+  if (arbitrations_lost > 0) {  // 27.3.4: the controller goes back to slave mode
+    --arbitrations_lost;
+    arbitration_ = true;
+    phase_ = Phase::idle;
+    out_.clear();
+    return;
+  }
   reading_ = (address_byte_ & 1) != 0;
   bool acknowledged = !chip_.gone && address_byte_ >> 1 == 0x08;
   if (reading_ && acknowledged) {
@@ -110,7 +127,8 @@ std::uint32_t I2cControllerModel::read(std::uint32_t offset, double now_us) {
       status_read_ = true;
       const bool finished = phase_ == Phase::sending ? ready_us_ == 0 && !dr_waits_ && empty_ : shift_full_;
       return (sb_ ? 1U : 0U) | (address_ ? 2U : 0U) | (finished ? 4U : 0U) | (received_ ? 1U << 6 : 0U) |
-             (empty_ ? 1U << 7 : 0U) | (refused_ ? 1U << 10 : 0U);
+             (empty_ ? 1U << 7 : 0U) | (bus_error_ ? 1U << 8 : 0U) | (arbitration_ ? 1U << 9 : 0U) |
+             (refused_ ? 1U << 10 : 0U);
     }
     case 0x18:
       if (address_ && status_read_) {
@@ -134,6 +152,7 @@ void I2cControllerModel::write_cr1(std::uint32_t value, double now_us) {
   if ((value & reset) != 0 || (value & on) == 0) {
     phase_ = Phase::idle;
     sb_ = address_ = received_ = shift_full_ = empty_ = refused_ = stop_wanted_ = dr_waits_ = false;
+    bus_error_ = arbitration_ = false;
     out_.clear();
     ready_us_ = 0;
     cr1_ = value & ~(start | stop_bit);
@@ -183,6 +202,8 @@ void I2cControllerModel::write(std::uint32_t offset, std::uint32_t value, double
       }
       return;
     case 0x14:
+      if ((value & 1U << 8) == 0) bus_error_ = false;
+      if ((value & 1U << 9) == 0) arbitration_ = false;
       if ((value & 1U << 10) == 0) refused_ = false;
       return;
     case 0x1C:

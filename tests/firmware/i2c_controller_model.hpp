@@ -2,8 +2,9 @@
 // a clock that is stretched while the program neither reads nor writes, and the acknowledge that the program must
 // withdraw in time. The device on the bus is tests/hal/bq76952_model.
 //
-// A write reaches the device when it ends; a refused byte within a write is not modelled. `violations` lists driver
-// errors.
+// A write reaches the device when it ends, as far as its bytes were acknowledged. A test can disturb the bus: a
+// misplaced start or stop (BERR), a lost arbitration (ARLO), a written byte that is not acknowledged (AF). `violations`
+// lists driver errors.
 #pragma once
 
 #include <array>
@@ -25,6 +26,9 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
   std::uint32_t read(std::uint32_t offset, double now_us) override;
   void write(std::uint32_t offset, std::uint32_t value, double now_us) override;
 
+  unsigned bus_errors = 0;         ///< number of the next addresses with a misplaced start or stop
+  unsigned arbitrations_lost = 0;  ///< number of the next addresses at which the controller loses the bus
+  int bytes_until_refused = -1;    ///< written bytes that are acknowledged before one is not; -1: all are
   std::vector<std::string> violations;
   unsigned transfers = 0;
   std::uint32_t ccr = 0, trise = 0, frequency_mhz = 0;
@@ -48,7 +52,8 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
   std::uint32_t cr1_ = 0, cr2_ = 0;
   double ready_us_ = 0, freed_us_ = 0;
   bool sb_ = false, address_ = false, received_ = false, shift_full_ = false, empty_ = false, refused_ = false,
-       status_read_ = false, stop_wanted_ = false, reading_ = false, last_acked_ = false, dr_waits_ = false;
+       bus_error_ = false, arbitration_ = false, status_read_ = false, stop_wanted_ = false, reading_ = false,
+       last_acked_ = false, dr_waits_ = false;
   std::uint8_t address_byte_ = 0, dr_ = 0, shift_ = 0;
   std::vector<std::uint8_t> out_;
   std::array<std::uint8_t, 96> in_{};

@@ -2,53 +2,15 @@
 // service faults, corrections.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
-#include "tests/firmware/host_board.hpp"
-#include "tests/starting_point.hpp"
+#include "tests/firmware/stored_state_fixture.hpp"
 
 namespace bms::firmware {
 namespace {
 
 using host_hal::last;
-
-class StoredStateTest : public ::testing::Test {
- protected:
-  void SetUp() override { host_hal::begin(); }
-  void TearDown() override { host_hal::begin(); }
-
-  /// The next sample, a second later: 2 A discharge; the fifth of sixteen cells is 30 mV above the others.
-  Input second() {
-    ++seconds_;
-    Input in;
-    in.pack.time_us = 1'000'000ULL * seconds_;
-    in.pack.current_ua = -2'000'000 + static_cast<std::int32_t>(10'000 * (seconds_ % 3));
-    in.pack.cell_uv.fill(3'240'000 + static_cast<std::int32_t>(500 * (seconds_ % 2)));
-    in.pack.cell_uv[4] += 30'000;
-    in.pack.pack_uv = 16 * in.pack.cell_uv[0] + 30'000;
-    in.pack.temperature_cdegc.fill(2'500);
-    return in;
-  }
-  void run(HostBoard& board, int count) {
-    for (int k = 0; k < count; ++k) board.process_sample(second());
-  }
-  void send_command(HostBoard& board, std::uint32_t code, std::uint32_t argument) {
-    can::Command command;
-    command.code = code;
-    command.argument = argument;
-    Input in = second();
-    in.command = command.frame(counter_ = can::next(counter_));
-    board.process_sample(in);
-  }
-
-  const std::vector<std::uint8_t> new_chip =
-      std::vector<std::uint8_t>(HostBoard::sectors * HostBoard::sector_bytes, 0xFF);
-  const measurement::StartingPoint start = starting_at(0.6, 0.02);
-
- private:
-  unsigned seconds_ = 0;
-  std::uint8_t counter_ = 0;
-};
 
 TEST_F(StoredStateTest, ARunContinuesFromTheEndOfThePreviousOne) {
   std::vector<std::uint8_t> kept;
@@ -121,9 +83,33 @@ TEST_F(StoredStateTest, AShortCircuitStaysUntilAWorkshopClearsIt) {
   send_command(board, can::Command::code_clear_faults, 0);
   run(board, 2);
   EXPECT_EQ(last<can::Faults>()->short_circuit, 1U) << "a driver cannot clear it";
+  EXPECT_EQ(host_hal::second_line_cleared, 0);
   send_command(board, can::Command::code_clear_faults, 1);
   run(board, 2);
   EXPECT_EQ(last<can::Faults>()->short_circuit, 0U);
+  EXPECT_EQ(host_hal::second_line_cleared, 1) << "the front end's latch ends with the fault";
+}
+
+TEST_F(StoredStateTest, AFailedSecondLineStaysUntilAWorkshopClearsIt) {
+  std::vector<std::uint8_t> kept;
+  {
+    HostBoard board(new_chip, start);
+    run(board, 5);
+    host_hal::second_line = hal::permanent_failure;
+    run(board, 2);
+    EXPECT_EQ(last<can::MoreFaults>()->second_line_failed, 1U);
+    kept = board.flash();
+    host_hal::second_line = 0;
+  }
+  HostBoard board(kept, start);
+  run(board, 20);
+  EXPECT_EQ(last<can::MoreFaults>()->second_line_failed, 1U);
+  EXPECT_EQ(last<can::Faults>()->short_circuit, 0U);
+  const auto& last_faults = board.persistence().events().fault;
+  EXPECT_TRUE(std::any_of(last_faults.begin(), last_faults.end(), [](const auto& f) { return f.code == 34; }));
+  send_command(board, can::Command::code_clear_faults, 1);
+  run(board, 2);
+  EXPECT_EQ(last<can::MoreFaults>()->second_line_failed, 0U);
 }
 
 TEST_F(StoredStateTest, ACorrectionIsAppliedAtOnceAndStored) {
@@ -138,6 +124,26 @@ TEST_F(StoredStateTest, ACorrectionIsAppliedAtOnceAndStored) {
   HostBoard board(kept, start);
   EXPECT_EQ(stored_calibration(board.persistence()).voltage_offset_uv, -1'500);
   EXPECT_EQ(stored_calibration(board.persistence()).current_gain_ppm, 0);
+}
+
+/// Another firmware has left so many settings that there is room for one more key: the hash of the cell file.
+TEST_F(StoredStateTest, ASettingWithoutRoomIsAStorageFault) {
+  std::vector<std::uint8_t> kept;
+  {
+    FlashModel flash({HostBoard::sectors, HostBoard::sector_bytes}, 2);
+    plug_in(&flash);
+    storage::Persistence persistence;
+    persistence.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
+    std::uint16_t key = 1'000;
+    for (std::size_t k = 1; k < storage::SettingsRecord::max_settings; ++k) ASSERT_TRUE(persistence.set(key++, 1));
+    kept = bytes_of(flash);
+  }
+  HostBoard board(kept, start);
+  run(board, 2);
+  EXPECT_EQ(last<can::Faults>()->storage_fault, 0U);
+  send_command(board, can::Command::code_voltage_offset, 1'000);
+  run(board, 2);
+  EXPECT_EQ(last<can::Faults>()->storage_fault, 1U) << "the correction is lost at the next start";
 }
 
 TEST_F(StoredStateTest, ValuesOutOfRangeAreStoredClamped) {

@@ -56,6 +56,30 @@ TEST_F(PackTest, AfterAWatchdogResetNothingClosesBeforeFaultsAreCleared) {
   EXPECT_EQ(last<can::Faults>().value().internal_fault, 1U);
 }
 
+TEST_F(PackTest, ATripOfTheFrontEndOpensAndIsPublishedAtOnceWithItsCause) {
+  std::uint8_t counter = 0;
+  for (int k = 0; k < 20 && !driving(); ++k) {
+    send_command(can::Command::code_request, 1, counter = can::next(counter));
+    second();
+  }
+  ASSERT_TRUE(driving());
+  EXPECT_EQ(last<can::MoreFaults>()->second_line_tripped, 0U);
+  host_hal::second_line = hal::cell_overvoltage;
+  front_end = {hal::FrontEndState::measuring, 3, 300, 70'000};
+  second();
+  EXPECT_FALSE(driving());
+  EXPECT_EQ(last<can::MoreFaults>()->second_line_tripped, 1U);
+  EXPECT_EQ(last<can::MoreFaults>()->allowed_current_exceeded, 0U);
+  EXPECT_EQ(last<can::Faults>()->first_cause, 33U);
+  const auto chip = last<can::FrontEnd>().value();
+  EXPECT_EQ(chip.cell_overvoltage, 1U);
+  EXPECT_EQ(chip.cell_undervoltage + chip.short_circuit + chip.pins_wrong, 0U);
+  EXPECT_EQ(chip.state, can::FrontEnd::state_measuring);
+  EXPECT_EQ(chip.lost, 3U);
+  EXPECT_EQ(chip.resets, 255U) << "saturated";
+  EXPECT_EQ(chip.crc_errors, 65'535U);
+}
+
 TEST_F(PackTest, ADipOfTheSupplyBetweenTwoSamplesOpensUntilFaultsAreCleared) {
   std::uint8_t counter = 0;
   const auto request_s = [&](int seconds) {
@@ -88,8 +112,9 @@ TEST_F(PackTest, AnUnfitBoardClosesNothing) {
       second();
     }
   };
-  for (const auto condition : {&hal::BoardState::ram_failed, &hal::BoardState::image_failed,
-                               &hal::BoardState::stack_overrun, &hal::BoardState::supply_low}) {
+  for (const auto condition :
+       {&hal::BoardState::ram_failed, &hal::BoardState::image_failed, &hal::BoardState::stack_overrun,
+        &hal::BoardState::clock_failed, &hal::BoardState::supply_low}) {
     host_hal::board_state = {};
     host_hal::board_state.*condition = true;
     drive_s(5);

@@ -6,6 +6,9 @@ namespace {
 
 constexpr std::uint32_t lse_on = 1, lse_ready = 2, enabled = 1U << 15, domain_reset = 1U << 16;  // RCC_BDCR, 7.3.20
 
+constexpr std::uint32_t first_backup = 0x50;  // RTC_BKP0R to RTC_BKP19R, 26.6.20
+bool is_backup(std::uint32_t at) { return at >= first_backup && at < first_backup + 4 * 20; }
+
 std::uint32_t digits(int n) { return static_cast<std::uint32_t>(n / 10 * 16 + n % 10); }
 int number(std::uint32_t d) { return static_cast<int>(d / 16 * 10 + d % 16); }
 
@@ -29,7 +32,7 @@ void RtcModel::reset_domain() {
   bdcr = 0;
   date = {};
   prer_ = 0x007F00FF;
-  mark_ = 0;
+  backup_ = {};
   crystal_on_us_ = -1;
   initialising_ = synchronised_ = dr_locked_ = false;
 }
@@ -38,7 +41,7 @@ double RtcModel::hz() const {
   if ((bdcr & enabled) == 0 || initialising_) return 0;
   const std::uint32_t selected = bdcr >> 8 & 3;
   double source = 0;
-  if (selected == 1 && (bdcr & lse_ready) != 0) source = 32'768;
+  if (selected == 1 && (bdcr & lse_ready) != 0) source = crystal_hz;
   if (selected == 2) source = 32'000;
   return source / ((prer_ >> 16 & 0x7F) + 1) / ((prer_ & 0x7FFF) + 1);
 }
@@ -97,10 +100,8 @@ std::uint32_t RtcModel::read(std::uint32_t at, double now_us) {
       return (date.year != 0 ? 1U << 4 : 0U) | (synchronised_ ? 1U << 5 : 0U) | (initialising_ ? 3U << 6 : 0U) | 7U;
     case 0x10:
       return prer_;
-    case 0x50:
-      return mark_;
     default:
-      return 0;
+      return is_backup(at) ? backup_[(at - first_backup) / 4] : 0;
   }
 }
 
@@ -112,8 +113,8 @@ void RtcModel::write(std::uint32_t at, std::uint32_t value, double now_us) {
     if (value == 0xCA) keys_ = 1;
     return;
   }
-  if (at == 0x50) {
-    mark_ = value;
+  if (is_backup(at)) {
+    backup_[(at - first_backup) / 4] = value;
     return;
   }
   if (keys_ != 2) {

@@ -3,6 +3,7 @@
 // two.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -27,8 +28,11 @@ class RtcModel {
   /// A reset of the core: the shadow registers are loaded again.
   void core_reset() { synchronised_ = false; }
 
+  /// Output of the crystal oscillator. LSE_READY stays set if the crystal stops later.
+  double lse_hz() const { return crystal && (bdcr & 2) != 0 ? crystal_hz : 0; }
+
   bool crystal = true;
-  double crystal_after_us = 2e6;
+  double crystal_after_us = 2e6, crystal_hz = 32'768;
   std::uint32_t bdcr = 0;
   struct Date {
     int year = 0, month = 1, day = 1, hour = 0, minute = 0, second = 0;  ///< year of the century
@@ -43,7 +47,8 @@ class RtcModel {
   void reset_domain();
 
   double at_us_ = 0, fraction_s_ = 0, crystal_on_us_ = -1;
-  std::uint32_t prer_ = 0x007F00FF, mark_ = 0, dr_shadow_ = 0;
+  std::uint32_t prer_ = 0x007F00FF, dr_shadow_ = 0;
+  std::array<std::uint32_t, 20> backup_{};
   int keys_ = 0, prescaler_writes_ = 0;
   bool initialising_ = false, synchronised_ = false, dr_locked_ = false;
 };

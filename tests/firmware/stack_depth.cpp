@@ -252,9 +252,13 @@ StackDepth stack_depth(const std::filesystem::path& image) {
   depth.reset = deepest.from(vectors.at(1) & ~1U);
   std::set<std::uint32_t> handlers(vectors.begin() + 2, vectors.end());
   for (const std::uint32_t handler : handlers) {
-    if (handler == 0 || functions.at(handler & ~1U).name == "fault_handler") continue;
+    if (handler == 0) continue;
+    const std::string& name = functions.at(handler & ~1U).name;
+    if (one_of(name, {"fault_handler", "clock_failure_interrupt"})) continue;
     Depth d = deepest.from(handler & ~1U);
-    if (d.bytes > depth.interrupt.bytes) depth.interrupt = std::move(d);
+    Depth& level = one_of(name, {"can1_tx_interrupt", "can1_rx0_interrupt", "usart1_interrupt"}) ? depth.low_interrupt
+                                                                                                 : depth.interrupt;
+    if (d.bytes >= level.bytes) level = std::move(d);
   }
   depth.frame =
       4 * (text.find("\tvmsr\t") != std::string::npos || text.find("\tvldr\t") != std::string::npos ? 26 + 1 : 8 + 1);

@@ -1,11 +1,12 @@
 // Worst-case stack depth of an image, from its instructions: the stack of each function and its calls, including
 // library functions.
 //
-//   worst = deepest path from reset + frame of an interrupt + deepest path from an interrupt handler
-//           + frame of a fault in it
+//   worst = deepest path from reset + frame of an interrupt + deepest path from a handler of low priority
+//           + frame of an interrupt + deepest path from a handler of high priority + frame of a fault in it
 //
-// Interrupts have one priority (tests/firmware/unicorn_board.hpp), so at most one is on the stack. The fault handler
-// starts again at the top of the stack. A function counts with its deepest point, wherever the call is: an upper bound.
+// On the STM32F405 the handlers of buses and serial lines have a low priority (hal/stm32f4/registers.hpp,
+// communication_priority), all others a high one; other chips have one priority. The fault handler and that of the NMI
+// start again at the top of the stack. A function counts with its deepest point, wherever the call is: an upper bound.
 // Input is the text of arm-none-eabi-objdump (Thumb, ARMv6-M and ARMv7-M). Throws std::runtime_error if the depth
 // cannot be determined: recursion, a call by pointer from a function that `by_pointer` does not name, a computed stack
 // pointer.
@@ -40,10 +41,13 @@ using ByPointer = std::map<std::string, std::vector<std::string>>;
 Depth depth_from(const Functions& functions, std::uint32_t root, const ByPointer& by_pointer);
 
 struct StackDepth {
-  Depth reset, interrupt;
+  Depth reset, low_interrupt, interrupt;
   /// Bytes that the core stacks (ARMv7-M, B1.5.6): 8 words, 26 with an FPU, plus one for alignment.
   std::uint32_t frame = 0;
-  std::uint32_t worst() const { return reset.bytes + interrupt.bytes + 2 * frame; }
+  std::uint32_t worst() const {
+    const std::uint32_t nested = low_interrupt.path.empty() ? 0 : frame + low_interrupt.bytes;
+    return reset.bytes + nested + interrupt.bytes + 2 * frame;
+  }
 };
 StackDepth stack_depth(const std::filesystem::path& image);
 

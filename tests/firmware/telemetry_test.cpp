@@ -16,36 +16,36 @@ TEST_F(TelemetryTest, EverySampleIsPublishedAndRecordedAndFeedsTheWatchdog) {
   sample.voltage_uv = 3'301'499;
   sample.temperature_cdegc = -1'234;
   application.process_sample(estimator::single_cell_pack(sample));
-  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x197, 0x19F, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x1B9, 0x19D, 0x19E,
-                                          0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
-  const auto state = can::PackState::of(sent[15]);
+  EXPECT_EQ(ids(), (std::vector<unsigned>{0x196, 0x1A2, 0x197, 0x19F, 0x1A3, 0x183, 0x186, 0x187, 0x188, 0x1B8, 0x1B9,
+                                          0x19D, 0x19E, 0x199, 0x19A, 0x19B, 0x19C, 0x180, 0x181, 0x189, 0x182}));
+  const auto state = can::PackState::of(sent[17]);
   EXPECT_NEAR(state.soc, 54.321, 0.0011);
   EXPECT_NEAR(state.soc_sigma, 1, 0.0011);
   EXPECT_NEAR(state.soc_display, 54.321, 0.0011);
   EXPECT_EQ(state.soc_quality, can::PackState::soc_quality_carried_by_counting);
-  const auto electrical = can::PackElectrical::of(sent[16]);
+  const auto electrical = can::PackElectrical::of(sent[18]);
   EXPECT_NEAR(electrical.voltage, 3.301, 1e-5);
   EXPECT_NEAR(electrical.current, -12.34, 1e-4);
   EXPECT_NEAR(electrical.temperature, -12.34, 1e-4);
-  const auto detail = can::ModelDetail::of(sent[17]);
+  const auto detail = can::ModelDetail::of(sent[19]);
   EXPECT_NEAR(detail.voltage_rc, -0.0123456, 1e-6);
   EXPECT_NEAR(detail.voltage_predicted, 3.2999, 1e-6);
-  const auto status = can::Status::of(sent[18]);
+  const auto status = can::Status::of(sent[20]);
   EXPECT_EQ(status.flags, estimator::voltage_stuck);
   EXPECT_EQ(status.sample_counter, 1U);
   EXPECT_EQ(status.reset_cause, 4U);
-  const auto identity = can::Identity::of(sent[3]);
+  const auto identity = can::Identity::of(sent[5]);
   EXPECT_EQ(identity.cell_hash, 0xCE110001U);
   EXPECT_EQ(identity.version_major, 1U);
   EXPECT_EQ(identity.version_minor, 2U);
   EXPECT_EQ(identity.version_patch, 3U);
-  const auto limits = can::CurrentLimits::of(sent[4]);
+  const auto limits = can::CurrentLimits::of(sent[6]);
   EXPECT_NEAR(limits.discharge_now, 6, 0.11) << "what the cell file allows";
   EXPECT_GE(limits.charge_now, limits.charge_ten_seconds);
-  EXPECT_NEAR(can::Health::of(sent[5]).capacity, 100, 0.03);
-  EXPECT_NEAR(can::Health::of(sent[5]).resistance_sigma, 30, 0.03);
-  EXPECT_EQ(can::SocAnchor::of(sent[6]).observable, 0U);
-  EXPECT_EQ(can::Storage::of(sent[7]).state, can::Storage::state_no_flash);
+  EXPECT_NEAR(can::Health::of(sent[7]).capacity, 100, 0.03);
+  EXPECT_NEAR(can::Health::of(sent[7]).resistance_sigma, 30, 0.03);
+  EXPECT_EQ(can::SocAnchor::of(sent[8]).observable, 0U);
+  EXPECT_EQ(can::Storage::of(sent[9]).state, can::Storage::state_no_flash);
   EXPECT_EQ(recorded.size(), 1U);
   EXPECT_EQ(fed, 1);
 }
@@ -196,11 +196,17 @@ TEST_F(TelemetryTest, ACorrectionIsStoredAndAppliedAtOnceAndOneOutOfRangeRefused
   EXPECT_EQ(stored_calibration(persistence).current_gain_ppm, 0);
 }
 
+TEST_F(TelemetryTest, ACorrectionThatTheMeasuringChainCannotApplyIsRefusedAndNotStored) {
+  calibration_accepts = false;
+  send_command(can::Command::code_current_gain, 1'000, 1);
+  application.process_sample(estimator::single_cell_pack(sample));
+  EXPECT_EQ(last<can::CommandAnswer>()->result, can::CommandAnswer::result_refused);
+  EXPECT_EQ(stored_calibration(persistence).current_gain_ppm, 0);
+}
+
 TEST_F(TelemetryTest, SelfDiagnosisOfTheBoardIsPublished) {
-  host_hal::board_state = {.brown_out_reset_low = true,
-                           .clock_failed = true,
-                           .calendar = hal::CalendarState::runs_roughly,
-                           .stack_free = 1'234};
+  host_hal::board_state = {
+      .brown_out_reset_low = true, .calendar = hal::CalendarState::runs_roughly, .stack_free = 1'234};
   fault = hal::FaultRecord{.exception = 4};
   application.process_sample(estimator::single_cell_pack(sample));
   auto board = last<can::Board>();
@@ -209,17 +215,18 @@ TEST_F(TelemetryTest, SelfDiagnosisOfTheBoardIsPublished) {
       board->ram_failed | board->image_failed | board->stack_overrun | board->cell_file_changed | board->supply_low,
       0U);
   EXPECT_EQ(board->brown_out_reset_low, 1U);
-  EXPECT_EQ(board->clock_failed, 1U);
+  EXPECT_EQ(board->clock_failed, 0U);
   EXPECT_EQ(board->calendar, can::Board::calendar_runs_roughly);
   EXPECT_EQ(board->last_exception, 4U);
   EXPECT_EQ(board->stack_free, 1'234);
   sent.clear();
   sample.time_us += 100'000;
-  host_hal::board_state.stack_overrun = true;
+  host_hal::board_state.stack_overrun = host_hal::board_state.clock_failed = true;
   application.process_sample(estimator::single_cell_pack(sample));
   board = last<can::Board>();
   ASSERT_TRUE(board) << "at once, not after a second";
   EXPECT_EQ(board->stack_overrun, 1U);
+  EXPECT_EQ(board->clock_failed, 1U);
 }
 
 TEST_F(TelemetryTest, AtMostFourCommandsAreHandledPerSample) {

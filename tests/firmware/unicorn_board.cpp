@@ -18,8 +18,10 @@ namespace bms::firmware {
 
 namespace {
 
-constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, systick_exception = 15, pvd = 16 + 1,
-                        can_tx = 16 + 19, can_rx0 = 16 + 20, untouched = 0xA5A5A5A5;
+constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, untouched = 0xA5A5A5A5;
+constexpr std::uint32_t nmi = 2, systick_exception = 15, pvd = 16 + 1, can_tx = 16 + 19, can_rx0 = 16 + 20,
+                        timer_5 = 16 + TimerModel::interrupt_number;
+constexpr std::uint32_t apb1enr = 0x40023840, pwr_cr = 0x40007000;
 constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends call()
 
 void must(uc_err error, const char* what) {
@@ -29,7 +31,8 @@ void must(uc_err error, const char* what) {
 }  // namespace
 
 UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal)
-    : symbols_(symbols_of(image)), random_(seed), crystal_(crystal) {
+    : symbols_(symbols_of(image)), random_(seed) {
+  rcc.crystal = crystal;
   must(uc_open(UC_ARCH_ARM, static_cast<uc_mode>(UC_MODE_THUMB | UC_MODE_MCLASS), &core_), "open");
   must(uc_ctl_set_cpu_model(core_, UC_CPU_ARM_CORTEX_M4), "model");
   constexpr std::uint32_t stored = FlashControllerModel::memory,
@@ -61,9 +64,9 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
                return static_cast<UnicornBoard*>(self)->peripheral_read(Base + static_cast<std::uint32_t>(at));
              },
              this,
-             [](uc_engine*, std::uint64_t at, unsigned, std::uint64_t value, void* self) {
+             [](uc_engine*, std::uint64_t at, unsigned bytes, std::uint64_t value, void* self) {
                static_cast<UnicornBoard*>(self)->peripheral_write(Base + static_cast<std::uint32_t>(at),
-                                                                  static_cast<std::uint32_t>(value));
+                                                                  static_cast<std::uint32_t>(value), bytes);
              },
              this),
          "registers");
@@ -83,6 +86,7 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
 }
 
 void UnicornBoard::start() {
+  watchdog.reset(now_us(), (flash.option_bytes & 1U << 5) == 0);
   std::array<std::uint32_t, 2> vectors{};
   must(uc_mem_read(core_, 0x08000000, vectors.data(), sizeof vectors), "vectors");
   set_reg(UC_ARM_REG_SP, vectors[0]);
@@ -93,15 +97,18 @@ void UnicornBoard::start() {
 /// RM0090, 7.1.1: resets everything except the backup domain and the reset flags.
 void UnicornBoard::start_again(std::uint32_t flags) {
   resets.push_back(flags);
-  reset_flags = flags;
+  rcc.reset();
+  rcc.reset_flags = flags;
   registers_.clear();
   ended_.clear();
-  handling_ = sleeping_ = systick_pending_ = supply_pending_ = false;
-  exception_ = systick_csr_ = systick_rvr_ = 0;
+  sleeping_ = systick_pending_ = supply_pending_ = false;
+  active_.clear();
+  priorities_.fill(0);
+  systick_csr_ = systick_rvr_ = 0;
   enabled_ = 0;
-  fed_at_ = watchdog_ticks_ = 0;
   can.write(0, 1U << 15);
   flash.reset();
+  timer.reset();
   for (const auto& [base, peripheral] : plugged) peripheral->chip_reset();
   set_reg(UC_ARM_REG_CONTROL, 0);
   set_reg(UC_ARM_REG_PRIMASK, 0);
@@ -185,40 +192,31 @@ std::uint32_t UnicornBoard::word(std::uint32_t address) const {
   return value;
 }
 
-std::uint32_t UnicornBoard::core_hz() const { return (register_value(0x40023808) & 3) == 2 ? 168'000'000 : 16'000'000; }
-
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
-  if (a >= BxcanModel::base && a < BxcanModel::base + 0x400)
-    return (register_value(0x40023840) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
-  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400)
-    return flash.read(a - FlashControllerModel::registers);
-  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400)
-    return rtc->read(a - RtcModel::base, 1e3 * now_ms());
+  const auto of = [&](std::uint32_t base) { return a >= base && a < base + 0x400; };
+  if (of(BxcanModel::base)) return (register_value(apb1enr) & 1U << 25) != 0 ? can.read(a - BxcanModel::base) : 0;
+  if (of(FlashControllerModel::registers)) return flash.read(a - FlashControllerModel::registers);
+  if (of(RccModel::base) && RccModel::has(a - RccModel::base)) return rcc.read(a - RccModel::base, now_us());
+  if (of(WatchdogModel::base)) return watchdog.read(a - WatchdogModel::base, now_us());
+  if (of(TimerModel::base)) return timer.read(a - TimerModel::base);
+  if (rtc != nullptr && of(RtcModel::base)) return rtc->read(a - RtcModel::base, now_us());
   if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end())
-    return found->second->read(a & 0x3FF, 1e3 * now_ms());
-  std::uint32_t value = register_value(a);
+    return found->second->read(a & 0x3FF, now_us());
   switch (a) {
-    case 0x40023800:
-      return value | ((value & 1U << 16) != 0 && crystal_ ? 1U << 17 : 0U) | (value & 1U << 24 ? 1U << 25 : 0U) |
-             3U;  // RCC_CR: what is on is ready at once
-    case 0x40023808:
-      return (value & ~12U) | (value & 3) << 2;  // RCC_CFGR: the clock switches at once
     case 0x40007004:
-      return supply_low_ && (register_value(0x40007000) & 1U << 4) != 0
-                 ? 4U
-                 : 0U;  // PWR_CSR: PVDO, while the detector is on
+      return supply_low_ && (register_value(pwr_cr) & 1U << 4) != 0 ? 4U : 0U;  // PWR_CSR: PVDO, while it is on
     case 0x40023870:
-      return rtc != nullptr ? rtc->read_bdcr(1e3 * now_ms()) : 0;
-    case 0x40023874:
-      return reset_flags | (value & 1) | (value & 1) << 1;  // RCC_CSR: the slow oscillator is ready at once
+      return rtc != nullptr ? rtc->read_bdcr(now_us()) : 0;
     case scs + 0xD04:
-      return exception_;
+      return handling() ? active_.back() : 0;
     case scs + 0x010:
       return systick_csr_;
     case scs + 0x014:
       return systick_rvr_;
     case scs + 0x018:
-      return static_cast<std::uint32_t>(next_systick_ > ticks_ ? (next_systick_ - ticks_) / ticks_a_cycle() : 0);
+      return next_systick_ > ticks_ && !core_stopped()
+                 ? static_cast<std::uint32_t>(static_cast<double>(next_systick_ - ticks_) / ticks_a_cycle())
+                 : 0;
     case scs + 0x100:
     case scs + 0x180:
       return static_cast<std::uint32_t>(enabled_);
@@ -226,111 +224,153 @@ std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
     case scs + 0x184:
       return static_cast<std::uint32_t>(enabled_ >> 32);
     default:
-      return value;
+      return register_value(a);
   }
 }
 
-/// IWDG_KR: 0xCCCC starts the watchdog, 0xAAAA feeds it.
-void UnicornBoard::write_watchdog(std::uint32_t key) {
-  if (key == 0xCCCC) watchdog_ticks_ = 1;
-  if (key != 0xAAAA) return;
-  ++watchdog_feeds;
-  if (fed_at_ != 0)
-    longest_unfed_ms = std::max(longest_unfed_ms, static_cast<double>(ticks_ - fed_at_) / (ticks_per_second / 1e3));
-  fed_at_ = ticks_;
-  watchdog_ticks_ = register_value(0x40003008) * (ticks_per_second / 500);  // a count is 2 ms
-}
-
-void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value) {
-  if (a >= BxcanModel::base && a < BxcanModel::base + 0x400) {
-    if ((register_value(0x40023840) & 1U << 25) != 0)
-      can.write(a - BxcanModel::base, value);
-    else
-      can.violations.push_back("bxCAN is written without its clock");
-    return;
+void UnicornBoard::peripheral_write(std::uint32_t a, std::uint32_t value, unsigned size) {
+  const auto of = [&](std::uint32_t base) { return a >= base && a < base + 0x400; };
+  if (of(BxcanModel::base)) {
+    if ((register_value(apb1enr) & 1U << 25) == 0)
+      return can.violations.push_back("bxCAN is written without its clock");
+    return can.write(a - BxcanModel::base, value);
   }
-  if (a >= FlashControllerModel::registers && a < FlashControllerModel::registers + 0x400)
-    return flash.write(a - FlashControllerModel::registers, value);
-  if (rtc != nullptr && a >= RtcModel::base && a < RtcModel::base + 0x400)
-    return rtc->write(a - RtcModel::base, value, 1e3 * now_ms());
+  if (of(FlashControllerModel::registers)) {
+    flash.write(a - FlashControllerModel::registers, value);
+    return rcc.check(flash.read(0), register_value(pwr_cr));
+  }
+  if (of(RccModel::base) && RccModel::has(a - RccModel::base)) {
+    rcc.write(a - RccModel::base, value, now_us());
+    return rcc.check(flash.read(0), register_value(pwr_cr));
+  }
+  if (of(WatchdogModel::base)) return watchdog.write(a - WatchdogModel::base, value, now_us());
+  if (of(TimerModel::base)) {
+    if ((register_value(apb1enr) & 1U << 3) == 0) timer.violations.push_back("TIM5 is written without its clock");
+    return timer.write(a - TimerModel::base, value);
+  }
+  if (rtc != nullptr && of(RtcModel::base)) return rtc->write(a - RtcModel::base, value, now_us());
   if (const auto found = plugged.find(a & ~0x3FFU); found != plugged.end())
-    return found->second->write(a & 0x3FF, value, 1e3 * now_ms());
+    return found->second->write(a & 0x3FF, value, now_us());
+  if (a >= scs && write_core_register(a - scs, value, size)) return;
   switch (a) {
-    case 0x40003000:
-      return write_watchdog(value);
     case 0x40013C14:
       if ((value & 1U << 16) != 0) supply_pending_ = false;
       return;
     case 0x40023870:
-      if (rtc != nullptr) rtc->write_bdcr(value, (register_value(0x40007000) & 1U << 8) != 0, 1e3 * now_ms());
-      return;
-    case 0x40023874:
-      if ((value & 1U << 24) != 0) reset_flags = 0;  // RMVF
-      registers_[a] = value & 1;
-      return;
-    case scs + 0xD28:
-      registers_[a] &= ~value;
-      return;
-    case scs + 0x010:
-      if ((value & 1) != 0 && (systick_csr_ & 1) == 0)
-        next_systick_ = ticks_ + (systick_rvr_ + std::uint64_t{1}) * ticks_a_cycle();
-      systick_csr_ = value;
-      return;
-    case scs + 0x014:
-      systick_rvr_ = value;
-      return;
-    case scs + 0x100:
-      enabled_ |= value;
-      return;
-    case scs + 0x180:
-      enabled_ &= ~std::uint64_t{value};
-      return;
-    case scs + 0x104:
-      enabled_ |= std::uint64_t{value} << 32;
-      return;
-    case scs + 0x184:
-      enabled_ &= ~(std::uint64_t{value} << 32);
-      return;
-    case scs + 0xD0C:
-      if ((value & 4) != 0) ended_ = "the firmware has reset the core";
-      if (!ended_.empty()) uc_emu_stop(core_);
+      if (rtc != nullptr) rtc->write_bdcr(value, (register_value(pwr_cr) & 1U << 8) != 0, now_us());
       return;
     default:
       registers_[a] = value;
   }
 }
 
-void UnicornBoard::pass(std::uint64_t ticks) {
-  const std::uint64_t until = ticks_ + ticks, bit_ticks = ticks_per_second / can.bits_per_second;
-  if (next_bit_ == 0) next_bit_ = bit_ticks;
-  for (; next_bit_ <= until; next_bit_ += bit_ticks) can.bit(core_hz() == 168'000'000 ? 42'000'000 : 16'000'000);
-  ticks_ = until;
-  if ((systick_csr_ & 1) == 0) return;
-  while (next_systick_ <= ticks_) {
-    systick_pending_ = true;
-    next_systick_ += (systick_rvr_ + std::uint64_t{1}) * ticks_a_cycle();
+/// ARMv7-M, B3.2 to B3.4. Returns false for a register without an effect here.
+bool UnicornBoard::write_core_register(std::uint32_t at, std::uint32_t value, unsigned size) {
+  const bool of_interrupt = at >= 0x400 && at < 0x400 + 96, of_system = at >= 0xD18 && at < 0xD24;
+  if (of_interrupt || of_system) {
+    const std::uint32_t first = of_interrupt ? 16 + at - 0x400 : 4 + at - 0xD18;
+    for (unsigned k = 0; k < size; ++k)
+      priorities_[first + k] = static_cast<std::uint8_t>(value >> (8 * k) & 0xF0);  // four bits (PM0214, 4.3.7)
+    return true;
+  }
+  switch (at) {
+    case 0xD28:
+      registers_[scs + at] &= ~value;
+      return true;
+    case 0x010:
+      if ((value & 1) != 0 && (systick_csr_ & 1) == 0)
+        next_systick_ = ticks_ + static_cast<std::uint64_t>((systick_rvr_ + 1.0) * ticks_a_cycle());
+      systick_csr_ = value;
+      return true;
+    case 0x014:
+      systick_rvr_ = value;
+      return true;
+    case 0x100:
+      enabled_ |= value;
+      return true;
+    case 0x180:
+      enabled_ &= ~std::uint64_t{value};
+      return true;
+    case 0x104:
+      enabled_ |= std::uint64_t{value} << 32;
+      return true;
+    case 0x184:
+      enabled_ &= ~(std::uint64_t{value} << 32);
+      return true;
+    case 0xD0C:
+      if ((value & 4) != 0) ended_ = "the firmware has reset the core";
+      if (!ended_.empty()) uc_emu_stop(core_);
+      return true;
+    default:
+      return false;
   }
 }
 
-int UnicornBoard::pending_exception() const {
-  if (systick_pending_ && (systick_csr_ & 2) != 0) return systick_exception;
-  if ((enabled_ & 1U << 1) != 0 && supply_pending_) return pvd;
-  if ((enabled_ & 1U << 19) != 0 && can.transmit_interrupt()) return can_tx;
-  if (!receive_interrupt_held && (enabled_ & 1U << 20) != 0 && can.receive_interrupt()) return can_rx0;
-  for (const auto& [base, peripheral] : plugged) {
-    const int number = peripheral->interrupt(1e3 * now_ms());
-    if (number >= 0 && (enabled_ >> number & 1) != 0) return 16 + number;
+void UnicornBoard::pass(std::uint64_t ticks) {
+  const std::uint64_t until = ticks_ + ticks, bit_ticks = ticks_per_second / can.bits_per_second;
+  const double us = 1e6 * static_cast<double>(ticks) / static_cast<double>(ticks_per_second);
+  const double lse_hz = rtc != nullptr ? rtc->lse_hz() : 0;
+  timer.pass(us, rcc.apb1_timer_hz(), rcc.lsi_hz_now(now_us()), lse_hz);
+  const auto apb1_hz = static_cast<std::uint32_t>(rcc.apb1_hz());
+  if (next_bit_ == 0) next_bit_ = bit_ticks;
+  for (; next_bit_ <= until; next_bit_ += bit_ticks) can.bit(apb1_hz);
+  if (core_stopped()) next_systick_ += ticks;
+  ticks_ = until;
+  rcc.advance(now_us());
+  if (const double hz = rcc.core_hz(); hz != core_hz_) {
+    if (next_systick_ > ticks_ && hz > 0 && !core_stopped())
+      next_systick_ = ticks_ + static_cast<std::uint64_t>(static_cast<double>(next_systick_ - ticks_) * core_hz_ / hz);
+    core_hz_ = hz;
   }
-  return 0;
+  if ((systick_csr_ & 1) == 0 || core_stopped()) return;
+  while (next_systick_ <= ticks_) {
+    systick_pending_ = true;
+    next_systick_ += static_cast<std::uint64_t>((systick_rvr_ + 1.0) * ticks_a_cycle());
+  }
+}
+
+/// B1.5.4: a lower number is more urgent. Faults and NMI have fixed ones.
+int UnicornBoard::priority(std::uint32_t exception) const {
+  if (exception == nmi) return -2;
+  if (exception == 3) return -1;
+  return priorities_.at(exception);
+}
+
+/// The most urgent enabled exception that is pending, or 0. Of equal ones that with the lowest number.
+std::uint32_t UnicornBoard::pending_exception() const {
+  if (rcc.failure_interrupt()) return nmi;
+  std::uint32_t most_urgent = 0;
+  const auto requests = [&](std::uint32_t exception) {
+    if (most_urgent == 0 || priority(exception) < priority(most_urgent)) most_urgent = exception;
+  };
+  const auto enabled = [&](std::uint32_t exception) { return (enabled_ >> (exception - 16) & 1) != 0; };
+  if (systick_pending_ && (systick_csr_ & 2) != 0) requests(systick_exception);
+  if (enabled(pvd) && supply_pending_) requests(pvd);
+  if (enabled(can_tx) && can.transmit_interrupt()) requests(can_tx);
+  if (!receive_interrupt_held && enabled(can_rx0) && can.receive_interrupt()) requests(can_rx0);
+  for (const auto& [base, peripheral] : plugged) {
+    const int number = peripheral->interrupt(now_us());
+    if (number >= 0 && enabled(16 + static_cast<std::uint32_t>(number)))
+      requests(16 + static_cast<std::uint32_t>(number));
+  }
+  if (enabled(timer_5) && timer.interrupt()) requests(timer_5);
+  return most_urgent;
 }
 
 void UnicornBoard::deliver_interrupt() {
-  const int exception = pending_exception();
-  if (exception == 0) return;
+  const std::uint32_t exception = pending_exception();
+  if (exception == 0 || core_stopped()) return;
   sleeping_ = false;
-  if (handling_ || reg(UC_ARM_REG_PRIMASK) != 0) return;
+  if (handling() && priority(exception) >= priority(active_.back())) return;
+  if (exception != nmi && reg(UC_ARM_REG_PRIMASK) != 0) return;
   if (exception == systick_exception) systick_pending_ = false;
-  enter(static_cast<std::uint32_t>(exception));
+  enter(exception);
+}
+
+void UnicornBoard::refuse_violations() const {
+  for (const auto* list : {&rcc.violations, &watchdog.violations, &timer.violations}) {
+    if (!list->empty()) throw std::runtime_error(list->front());
+  }
 }
 
 /// ARMv7-M, B1.5.6: stacks the frame, with the FPU part if the program has used the FPU.
@@ -356,19 +396,21 @@ void UnicornBoard::enter(std::uint32_t exception) {
     exception = 5;
   }
   set_reg(UC_ARM_REG_SP, sp);
-  set_reg(UC_ARM_REG_LR, fpu ? 0xFFFFFFE9 : 0xFFFFFFF9);
+  const std::uint32_t return_to = handling() ? 0xFFFFFFF1 : 0xFFFFFFF9;  // table B1-8
+  set_reg(UC_ARM_REG_LR, fpu ? return_to & ~16U : return_to);
   set_reg(UC_ARM_REG_CONTROL, control & ~4U);
   set_reg(UC_ARM_REG_XPSR, 1U << 24);  // outside an IT block
   std::uint32_t handler = 0;
   must(uc_mem_read(core_, 0x08000000 + 4 * exception, &handler, 4), "vector");
   set_reg(UC_ARM_REG_PC, handler | 1);
-  handling_ = true;
-  exception_ = exception;
+  active_.push_back(exception);
   ++interrupts_taken;
 }
 
 void UnicornBoard::leave(std::uint32_t exc_return) {
-  if (!handling_) throw std::runtime_error("return from an exception that was not");
+  if (!handling()) throw std::runtime_error("return from an exception that was not");
+  active_.pop_back();
+  if (((exc_return & 8) == 0) != handling()) throw std::runtime_error("return to the wrong mode");
   const bool fpu = (exc_return & 16) == 0;
   std::vector<std::uint32_t> frame(fpu ? 26 : 8);
   const std::uint32_t sp = reg(UC_ARM_REG_SP);
@@ -385,8 +427,6 @@ void UnicornBoard::leave(std::uint32_t exc_return) {
   set_reg(UC_ARM_REG_XPSR, frame[7] & ~(1U << 9));
   const std::uint32_t control = reg(UC_ARM_REG_CONTROL);
   set_reg(UC_ARM_REG_CONTROL, fpu ? control | 4U : control & ~4U);
-  handling_ = false;
-  exception_ = 0;
 }
 
 /// Where Unicorn stops, a chip takes the exception of the fault, with its cause in CFSR (ARMv7-M, B3.2.15).
@@ -455,17 +495,19 @@ void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
 }
 
 void UnicornBoard::slice() {
-  if (sleeping_ || (program_held && !handling_)) {
+  if (sleeping_ || core_stopped() || (program_held && !handling())) {
     // to the next bit or tick, whichever comes first
     pass(std::min(next_systick_ > ticks_ ? next_systick_ - ticks_ : 1, next_bit_ > ticks_ ? next_bit_ - ticks_ : 1));
   } else {
     const auto count = static_cast<std::size_t>(1 + random_() % 200);
     execute(reg(UC_ARM_REG_PC), count);
     const double waits_us = flash.take_stall_us() + std::exchange(stall_us, 0);
-    pass(count * ticks_a_cycle() + static_cast<std::uint64_t>(waits_us * (ticks_per_second / 1e6)));
+    pass(static_cast<std::uint64_t>(static_cast<double>(count) * ticks_a_cycle()) +
+         static_cast<std::uint64_t>(waits_us * (ticks_per_second / 1e6)));
   }
+  refuse_violations();
   deliver_interrupt();
-  const bool watchdog_expired = watchdog_ticks_ > 1 && ticks_ - fed_at_ > watchdog_ticks_;
+  const bool watchdog_expired = watchdog.expired(now_us());
   if (watchdog_expired) ended_ = "the watchdog has reset the core";
   if (ended_.empty()) return;
   if (!may_start_again) throw std::runtime_error(ended_);
@@ -487,7 +529,7 @@ bool UnicornBoard::run_until(const std::function<bool()>& becomes, double within
 }
 
 std::vector<std::uint32_t> UnicornBoard::call(const std::string& function, std::size_t words) {
-  while (handling_) slice();
+  while (handling()) slice();
   uc_context* context = nullptr;
   must(uc_context_alloc(core_, &context), "context");
   must(uc_context_save(core_, context), "context");
@@ -508,6 +550,14 @@ hal::CanHealth UnicornBoard::can_health() {
   hal::CanHealth health;
   std::memcpy(static_cast<void*>(&health), words.data(), sizeof health);
   return health;
+}
+
+hal::BoardState UnicornBoard::board_state() {
+  static_assert(sizeof(hal::BoardState) <= 12);
+  const auto words = call("bms::hal::board_state()", 3);
+  hal::BoardState state;
+  std::memcpy(static_cast<void*>(&state), words.data(), sizeof state);
+  return state;
 }
 
 void UnicornBoard::supply(bool low) {

@@ -1,10 +1,13 @@
 // Runs the firmware image of a board on this machine. Unicorn executes the instructions of the Cortex-M4F. This class
-// adds exception entry and return with the FPU frame (ARMv7-M, B1.5), faults, interrupt enables, SysTick, sleep until
-// an interrupt, and of the chip: clock tree, watchdog, reset, bxCAN (bxcan_model.hpp) and flash interface
-// (flash_controller_model.hpp). Interrupts come between instructions, after a seeded random number of them.
+// adds exception entry and return with the FPU frame (ARMv7-M, B1.5), faults, interrupt enables and priorities,
+// SysTick, sleep until an interrupt, reset, and models of the chip: clock tree (rcc_model.hpp), watchdog
+// (watchdog_model.hpp), timer 5 (timer_model.hpp), bxCAN (bxcan_model.hpp) and flash interface
+// (flash_controller_model.hpp). Interrupts come between instructions, after a seeded random number of them; a more
+// urgent one interrupts the handler of another.
 //
-// Time: an instruction takes one core cycle; sleep advances the time to the next event; while flash is programmed or
-// erased the core is stopped. All interrupts have the same priority, as the firmware sets them, so they do not nest.
+// Time: an instruction takes one core cycle of the clock that the registers give; sleep advances the time to the next
+// event; while flash is programmed or erased the core is stopped. A clock tree, watchdog or timer that is used in a way
+// that the manual forbids ends the run with std::runtime_error.
 #pragma once
 
 #include <array>
@@ -16,11 +19,15 @@
 #include <string>
 #include <vector>
 
+#include "hal/board_state.hpp"
 #include "hal/can.hpp"
 #include "tests/firmware/bxcan_model.hpp"
 #include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/flash_controller_model.hpp"
+#include "tests/firmware/rcc_model.hpp"
 #include "tests/firmware/rtc_model.hpp"
+#include "tests/firmware/timer_model.hpp"
+#include "tests/firmware/watchdog_model.hpp"
 
 struct uc_struct;
 
@@ -39,16 +46,24 @@ class UnicornBoard {
   /// Returns false if the condition did not become true in time.
   bool run_until(const std::function<bool()>& becomes, double within_ms);
 
+  RccModel rcc;
+  WatchdogModel watchdog{rcc};
+  TimerModel timer;
   double now_ms() const { return static_cast<double>(ticks_) / (ticks_per_second / 1e3); }
   double ms_at_bit(std::uint64_t bit) const { return 1e3 * static_cast<double>(bit) / can.bits_per_second; }
   hal::CanHealth can_health();
+  hal::BoardState board_state();
   std::uint32_t register_value(std::uint32_t address) const;
+  /// Changes a register that is not part of a model, as a disturbance does.
+  void disturb_register(std::uint32_t address, std::uint32_t value) { registers_[address] = value; }
+  /// The exception whose handler runs, 0 for none.
+  std::uint32_t exception() const { return active_.empty() ? 0 : active_.back(); }
   /// Reads a word of the memory.
   std::uint32_t word(std::uint32_t address) const;
   /// Bytes of stack that were written at least once.
   std::uint32_t stack_used() const;
 
-  std::uint32_t reset_flags = 0x0E000000;  ///< RCC_CSR: power on
+  std::uint32_t& reset_flags = rcc.reset_flags;  ///< RCC_CSR
   /// Faults are handled, and a reset starts the firmware again as on a chip: RAM keeps its content, peripherals do not.
   bool may_start_again = false;
   std::vector<std::uint32_t> resets;  ///< reset flags of each reset
@@ -95,8 +110,8 @@ class UnicornBoard {
   bool receive_interrupt_held = false;  ///< the CAN receive interrupt waits, as after a long interrupt
   bool program_held = false;            ///< main() is stopped, interrupts are handled
   unsigned estimates = 0;               ///< calls of estimator_step()
-  unsigned watchdog_feeds = 0;
-  double longest_unfed_ms = 0;
+  const unsigned& watchdog_feeds = watchdog.feeds;
+  const double& longest_unfed_ms = watchdog.longest_unfed_ms;
   std::uint64_t interrupts_taken = 0, instructions = 0;
 
  private:
@@ -113,12 +128,16 @@ class UnicornBoard {
   void start_again(std::uint32_t flags);
   bool take_fault(int error);
   void leave(std::uint32_t exc_return);
-  int pending_exception() const;
+  std::uint32_t pending_exception() const;
+  int priority(std::uint32_t exception) const;
   std::uint32_t peripheral_read(std::uint32_t address);
-  void peripheral_write(std::uint32_t address, std::uint32_t value);
-  void write_watchdog(std::uint32_t key);
-  std::uint32_t core_hz() const;
-  std::uint64_t ticks_a_cycle() const { return ticks_per_second / core_hz(); }
+  void peripheral_write(std::uint32_t address, std::uint32_t value, unsigned size);
+  bool write_core_register(std::uint32_t offset, std::uint32_t value, unsigned size);
+  void refuse_violations() const;
+  double now_us() const { return 1e3 * now_ms(); }
+  bool core_stopped() const { return core_hz_ < 1; }
+  double ticks_a_cycle() const { return core_stopped() ? 0 : ticks_per_second / core_hz_; }
+  bool handling() const { return !active_.empty(); }
   std::uint32_t reg(int id) const;
   void set_reg(int id, std::uint32_t value);
   void execute(std::uint32_t from, std::size_t count);
@@ -130,14 +149,15 @@ class UnicornBoard {
   std::map<std::uint32_t, std::uint32_t> it_blocks_;  ///< first instruction after the IT -> first one after the block
   std::vector<std::pair<std::uint32_t, Instructions>> patched_;
   std::mt19937 random_;
-  bool crystal_, handling_ = false, sleeping_ = false, systick_pending_ = false, supply_low_ = false,
-                 supply_pending_ = false;
+  bool sleeping_ = false, systick_pending_ = false, supply_low_ = false, supply_pending_ = false;
   std::map<std::uint32_t, std::uint32_t> registers_;
   std::uint32_t systick_csr_ = 0, systick_rvr_ = 0;
-  std::uint64_t enabled_ = 0;  ///< interrupts 0 to 63
-  std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0, fed_at_ = 0, watchdog_ticks_ = 0;
+  std::uint64_t enabled_ = 0;                       ///< interrupts 0 to 63
+  std::array<std::uint8_t, 16 + 96> priorities_{};  ///< by exception number
+  std::vector<std::uint32_t> active_;               ///< exceptions that are handled, the most urgent last
+  std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0;
+  double core_hz_ = 16e6;
   std::string ended_;
-  std::uint32_t exception_ = 0;
   struct Stuck {
     std::uint32_t address = 0;
     unsigned bit = 0;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "firmware/cia418_profile.hpp"
@@ -82,6 +83,17 @@ class ChargerTest : public PackWith<Cia418Profile> {
       second();
     }
   }
+  /// One second with a heartbeat of the charger, and a request of the truck if there is one.
+  void second_with(std::optional<int> heartbeat, std::optional<std::uint32_t> truck = std::nullopt) {
+    if (heartbeat) requests.push_back({0x70A, 1, {static_cast<std::uint8_t>(*heartbeat)}});
+    if (truck) send_command(can::Command::code_request, *truck, counter_ = can::next(counter_));
+    second();
+  }
+  void seconds_with(int seconds, std::optional<int> heartbeat, std::optional<std::uint32_t> truck = std::nullopt) {
+    for (int k = 0; k < seconds; ++k) second_with(heartbeat, truck);
+  }
+  bool any_closed() const { return switched.main_plus || switched.main_minus || switched.precharge; }
+  std::uint32_t state() const { return last<can::ContactorState>().value().state; }
   void send_nmt(std::uint8_t command, std::uint8_t node) { requests.push_back({0x000, 2, {command, node}}); }
   /// Answer of the SDO server to a request; empty without an answer.
   Bytes sdo_answer(std::array<std::uint8_t, 8> request) {
@@ -173,6 +185,124 @@ TEST_F(ChargerTest, SdoServerAnswersTheObjectsOfABatteryModuleAndRefusesOthers) 
   sent.clear();
   second();
   EXPECT_TRUE(frames_of(0x581).empty()) << "29 bits";
+}
+
+// The states are those of CiA 301: 0 boot-up, 4 stopped, 5 operational, 127 pre-operational.
+
+TEST_F(ChargerTest, AnOperationalChargerChargesWithoutTheTruckUntilItsHeartbeatEnds) {
+  seconds_with(5, std::nullopt);
+  EXPECT_FALSE(any_closed());
+  second_with(0);
+  seconds_with(20, 5);
+  ASSERT_TRUE(switched.charge_enable);
+  EXPECT_EQ(state(), can::ContactorState::state_charge);
+  EXPECT_EQ(last<can::Faults>().value().first_cause, 0U);
+  seconds_with(2, std::nullopt);
+  EXPECT_TRUE(switched.charge_enable) << "two lost heartbeats";
+  seconds_with(1, 5);
+  EXPECT_TRUE(switched.charge_enable);
+  seconds_with(6, std::nullopt);
+  EXPECT_FALSE(any_closed()) << "pulled out";
+  seconds_with(20, 5);
+  EXPECT_TRUE(switched.charge_enable) << "plugged in again";
+}
+
+TEST_F(ChargerTest, AChargerThatReportsAnotherStateEndsTheCharge) {
+  for (const int state : {0, 4, 127}) {
+    seconds_with(20, 5);
+    ASSERT_TRUE(switched.charge_enable) << state;
+    seconds_with(3, state);
+    EXPECT_FALSE(any_closed()) << state;
+    seconds_with(10, state);
+    EXPECT_FALSE(any_closed()) << state;
+  }
+}
+
+TEST_F(ChargerTest, OneHeartbeatOrThatOfAnotherNodeStartsNothing) {
+  second_with(5);
+  seconds_with(10, std::nullopt);
+  EXPECT_FALSE(any_closed());
+  for (int k = 0; k < 20; ++k) {
+    requests.push_back({0x70B, 1, {5}});
+    requests.push_back({0x70A, 1, {5}, true});
+    requests.push_back({0x70A, 8, {5}});
+    second();
+    ASSERT_FALSE(any_closed());
+  }
+  for (int k = 0; k < 20; ++k) second_with(k % 2 == 0 ? 5 : 127);
+  EXPECT_FALSE(any_closed()) << "never operational twice in a row";
+}
+
+/// CiA 301 leaves the time between heartbeats to the device; in answers to node guarding bit 7 alternates.
+TEST_F(ChargerTest, HeartbeatsMayBeSlowOrHaveAlternatingBit7) {
+  for (int k = 0; k < 24; ++k) second_with(k % 2 == 0 ? std::optional(5) : std::nullopt);
+  EXPECT_TRUE(switched.charge_enable) << "every two seconds";
+  seconds_with(10, std::nullopt);
+  ASSERT_FALSE(any_closed());
+  for (int k = 0; k < 20; ++k) second_with(k % 2 == 0 ? 5 : 0x85);
+  EXPECT_TRUE(switched.charge_enable);
+}
+
+/// No public text says what the bits of object 6001 mean, so no value may change the charge.
+TEST_F(ChargerTest, NoValueOfTheChargersStatusObjectStartsOrEndsACharge) {
+  const Bytes statuses = {0x00, 0x01, 0x02, 0x80, 0xFF};
+  for (const std::uint8_t status : statuses) {
+    EXPECT_EQ(sdo_answer({0x2F, 0x01, 0x60, 0, status}), (Bytes{0x60, 0x01, 0x60, 0, 0, 0, 0, 0}));
+    seconds_with(10, std::nullopt);
+    EXPECT_FALSE(any_closed()) << int{status};
+  }
+  seconds_with(20, 5);
+  for (const std::uint8_t status : statuses) {
+    sdo_answer({0x2F, 0x01, 0x60, 0, status});
+    seconds_with(3, 5);
+    EXPECT_TRUE(switched.charge_enable) << int{status};
+  }
+}
+
+/// EN 1175: no traction while a charger is connected. A stopped charger counts as not connected.
+TEST_F(ChargerTest, ATruckDoesNotDriveWhileAChargerIsPresent) {
+  for (const int charger : {5, 127, 0}) {
+    seconds_with(20, charger, 1);
+    EXPECT_FALSE(any_closed()) << charger;
+    seconds_with(10, 4);
+  }
+  seconds_with(20, 4, 1);
+  EXPECT_EQ(state(), can::ContactorState::state_drive);
+  seconds_with(10, 4);
+  EXPECT_FALSE(any_closed());
+}
+
+TEST_F(ChargerTest, AChargerThatIsPluggedInEndsTheDriveWhenTheCurrentIsZeroAndThenCharges) {
+  seconds_with(20, std::nullopt, 1);
+  ASSERT_EQ(state(), can::ContactorState::state_drive);
+  reading.current_ua = -3'000'000;
+  seconds_with(10, 5, 1);
+  EXPECT_TRUE(driving()) << "not under load";
+  EXPECT_EQ(state(), can::ContactorState::state_unloading);
+  reading.current_ua = 0;
+  seconds_with(20, 5, 1);
+  EXPECT_FALSE(any_closed()) << "truck and charger contradict each other";
+  seconds_with(30, 5);
+  EXPECT_TRUE(switched.charge_enable) << "the truck has withdrawn its request";
+  seconds_with(10, 5, 1);
+  EXPECT_FALSE(any_closed()) << "a truck that wants to drive ends the charge";
+}
+
+TEST_F(ChargerTest, AfterAFaultAChargerMustEndItsRequestBeforeItChargesAgain) {
+  seconds_with(20, 5);
+  ASSERT_TRUE(switched.charge_enable);
+  const std::int32_t before_uv = reading.cell_uv[7];
+  reading.cell_uv[7] = 4'000'000;
+  seconds_with(10, 5);
+  EXPECT_FALSE(any_closed());
+  reading.cell_uv[7] = before_uv;
+  seconds_with(70, 5);  // charging is allowed again after a minute
+  send_command(can::Command::code_clear_faults, 0, 14);
+  seconds_with(10, 5);
+  EXPECT_FALSE(any_closed());
+  seconds_with(5, std::nullopt);
+  seconds_with(20, 5);
+  EXPECT_TRUE(switched.charge_enable);
 }
 
 }  // namespace

@@ -57,11 +57,11 @@ class Truck {
     for (std::size_t k = 0; k < 4; ++k)
       sample.temperature_cdegc[k] =
           static_cast<std::int16_t>(2'500 + static_cast<int>((static_cast<std::size_t>(samples_) + k) % 3));
-    const double target_v = switched.main_plus || (switched.precharge && switched.main_minus) ? pack_v : 0;
+    const double target_v = switched.precharge && switched.main_minus ? pack_v : 0;
     dc_link_v_ = switched.main_plus && switched.main_minus
                      ? pack_v
                      : target_v + (dc_link_v_ - target_v) * std::exp(-period_s / precharge_s);
-    dc_link_reading_uv = static_cast<std::int32_t>(1e6 * dc_link_v_);
+    set_link(pack_v, dc_link_v_);
     application_.process_sample(sample);
     receive();
   }

@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     now_us += static_cast<std::uint64_t>(data[1]) << data[3] % 40;
     if ((data[3] & 0xC0) != 0) {  // most commands have a valid CRC
       can::Command c = can::Command::of(frame);
-      c.code %= 8;
+      c.code %= 10;
       if ((data[3] & 0x40) != 0) c.argument %= 4;
       const auto id = frame.id;
       frame = c.frame(data[2] >> 4);
@@ -27,10 +27,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     const firmware::Requested before = requested;
     const auto answer = commands.handle(frame, now_us, requested);
+    require(requested.stored_end <= firmware::stored_parts);
     require(static_cast<unsigned>(requested.power) <= 2 && static_cast<unsigned>(requested.clear) <= 2);
     const bool same = requested.log_samples == before.log_samples && requested.unix_time_s == before.unix_time_s &&
                       requested.clear == before.clear && requested.power == before.power &&
-                      requested.power_at_us == before.power_at_us;
+                      requested.power_at_us == before.power_at_us && requested.stored_next == before.stored_next &&
+                      requested.stored_end == before.stored_end;
     if (!answer) {
       require(same);
       continue;

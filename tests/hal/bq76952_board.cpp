@@ -8,6 +8,15 @@
 
 namespace bms {
 
+namespace {
+
+constexpr auto settings_under_test = hal::bq76952::settings(board_under_test);
+
+}  // namespace
+
+constexpr hal::bq76952::Configuration hal::bq76952::board_configuration =
+    hal::bq76952::configuration(board_under_test, settings_under_test);
+
 Bq76952Model* chip = nullptr;
 std::vector<can::Frame> arriving;
 std::vector<hal::PowerPath> switched;

@@ -4,11 +4,22 @@
 
 #include <vector>
 
+#include "hal/bq76952/configuration.hpp"
 #include "hal/can.hpp"
 #include "hal/power_path.hpp"
 #include "tests/hal/bq76952_model.hpp"
 
 namespace bms {
+
+/// 16 cells LiFePO4 with a range of 327 A; all thresholds are beyond what a test without a fault reaches.
+inline constexpr hal::bq76952::Board board_under_test{.overvoltage_v = 3.8,
+                                                      .undervoltage_v = 2.0,
+                                                      .voltage_delay_s = 1,
+                                                      .overcurrent_a = 350,
+                                                      .overcurrent_delay_s = 0.42,
+                                                      .high_overcurrent_a = 450,
+                                                      .high_overcurrent_delay_s = 0.3,
+                                                      .short_circuit_a = 600};
 
 extern Bq76952Model* chip;                    ///< at the end of the I2C bus; set by each test
 extern std::vector<can::Frame> arriving;      ///< frames that can_receive() returns

@@ -186,6 +186,16 @@ TEST_F(ChipModel, CellVoltageFaultsRecoverBeyondTheirHysteresisAfterTheRecoveryT
   EXPECT_EQ(safety_a(), 0U);
 }
 
+TEST_F(ChipModel, AnInputWithoutACellHasNoProtection) {
+  configure_outputs({{bq::enabled_protections_a, bq::cuv | bq::cov}, {bq::vcell_mode, 0xFFBF}});
+  set_cell(in, 0);  // cell 7, between two inputs that are connected to each other
+  wait_s(2);
+  EXPECT_EQ(safety_a(), 0U);
+  in.cell_v[7] = 0;
+  wait_s(2);
+  EXPECT_EQ(safety_a(), bq::cuv);
+}
+
 TEST_F(ChipModel, AShortCircuitRecoversByTimeAndTripsAgainWhileItLasts) {
   configure_outputs({{bq::enabled_protections_a, bq::scd}, {bq::scd_recovery_time, 5}});
   set_shunt_mv(in, -20);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace bms::bq {
 
@@ -10,8 +11,18 @@ namespace {
 constexpr std::uint64_t never = std::numeric_limits<std::uint64_t>::max();
 constexpr double cell_step_v = 0.0506, shunt_step_v = 0.002;
 
-double max_cell_v(const Bq76952Inputs& in) { return *std::max_element(in.cell_v.begin(), in.cell_v.end()); }
-double min_cell_v(const Bq76952Inputs& in) { return *std::min_element(in.cell_v.begin(), in.cell_v.end()); }
+/// Protections act on the cells of Vcell Mode, on all if it is 0 (SLUUCF2C and SLUUBY2B, 13.3.2.19).
+std::pair<double, double> range_of_cells(const Memory& memory, const Bq76952Inputs& in) {
+  const std::uint32_t mode = memory[vcell_mode];
+  std::pair<double, double> range{1e3, -1e3};
+  for (std::size_t k = 0; k < in.cell_v.size(); ++k) {
+    if (mode != 0 && (mode >> k & 1) == 0) continue;
+    range = {std::min(range.first, in.cell_v[k]), std::max(range.second, in.cell_v[k])};
+  }
+  return range;
+}
+double min_cell_v(const Memory& memory, const Bq76952Inputs& in) { return range_of_cells(memory, in).first; }
+double max_cell_v(const Memory& memory, const Bq76952Inputs& in) { return range_of_cells(memory, in).second; }
 std::uint64_t seconds(std::uint32_t s) { return 1'000'000ULL * s; }
 /// 3.3 ms x (2 + setting); 0 disables the protection.
 std::uint64_t comparator_us(std::uint32_t setting) { return setting == 0 ? never : 3'300ULL * (2 + setting); }
@@ -57,16 +68,16 @@ std::uint64_t common_recovery_us(const Memory& m) { return seconds(m[recovery_ti
 // use the comparators of OCC with the other sign; recovery by OCD:Recovery Threshold, SLUUBY1B, 13.6. The mean current
 // is CC1.
 const std::array<Protections::Rule, 14> Protections::rules{{
-    {a, cuv, [](const Context& x) { return min_cell_v(x.in) <= cell_step_v * x.memory[cuv_threshold]; },
+    {a, cuv, [](const Context& x) { return min_cell_v(x.memory, x.in) <= cell_step_v * x.memory[cuv_threshold]; },
      [](const Memory& m) { return comparator_us(m[cuv_delay]); },
      [](const Context& x) {
-       return min_cell_v(x.in) >= cell_step_v * (x.memory[cuv_threshold] + x.memory[cuv_hysteresis]);
+       return min_cell_v(x.memory, x.in) >= cell_step_v * (x.memory[cuv_threshold] + x.memory[cuv_hysteresis]);
      },
      common_recovery_us},
-    {a, cov, [](const Context& x) { return max_cell_v(x.in) > cell_step_v * x.memory[cov_threshold]; },
+    {a, cov, [](const Context& x) { return max_cell_v(x.memory, x.in) > cell_step_v * x.memory[cov_threshold]; },
      [](const Memory& m) { return comparator_us(m[cov_delay]); },
      [](const Context& x) {
-       return max_cell_v(x.in) <= cell_step_v * (x.memory[cov_threshold] - x.memory[cov_hysteresis]);
+       return max_cell_v(x.memory, x.in) <= cell_step_v * (x.memory[cov_threshold] - x.memory[cov_hysteresis]);
      },
      common_recovery_us},
     {a, occ, [](const Context& x) { return x.in.shunt_v > shunt_step_v * x.memory[occ_threshold]; },
@@ -138,9 +149,11 @@ const std::array<Protections::Rule, 14> Protections::rules{{
 
 // SLUUBY2B, 13.7, and SLUUCG7, 13.7 (SUV: less than or equal): measured values, for a time in s, without recovery.
 const std::array<Protections::Rule, 6> Protections::permanent_rules{{
-    {a, pf_suv, [](const Context& x) { return 1e3 * min_cell_v(x.in) <= x.memory.signed_value(suv_threshold); },
+    {a, pf_suv,
+     [](const Context& x) { return 1e3 * min_cell_v(x.memory, x.in) <= x.memory.signed_value(suv_threshold); },
      [](const Memory& m) { return seconds(m[suv_delay]); }, nullptr, nullptr},
-    {a, pf_sov, [](const Context& x) { return 1e3 * max_cell_v(x.in) >= x.memory.signed_value(sov_threshold); },
+    {a, pf_sov,
+     [](const Context& x) { return 1e3 * max_cell_v(x.memory, x.in) >= x.memory.signed_value(sov_threshold); },
      [](const Memory& m) { return seconds(m[sov_delay]); }, nullptr, nullptr},
     {a, pf_socc,
      [](const Context& x) {
@@ -166,7 +179,7 @@ const std::array<Protections::Rule, 6> Protections::permanent_rules{{
 const std::array<Protections::Latch, 3> Protections::latches{{
     {a, cov, covl, covl_latch_limit, covl_counter_dec_delay, covl_recovery_time,
      [](const Context& x) {
-       return max_cell_v(x.in) <= cell_step_v * (x.memory[cov_threshold] - x.memory[cov_hysteresis]);
+       return max_cell_v(x.memory, x.in) <= cell_step_v * (x.memory[cov_threshold] - x.memory[cov_hysteresis]);
      }},
     {a, ocd1 | ocd2, ocdl, ocdl_latch_limit, ocdl_counter_dec_delay, ocdl_recovery_time,
      [](const Context& x) {

@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "hal/calibration.hpp"
 #include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
+#include "hal/second_line.hpp"
 #include "tests/hal/bq76952_board.hpp"
 
 namespace bms {
@@ -13,7 +15,7 @@ namespace {
 
 using ::testing::IsEmpty;
 
-// hal/bq76952/samples.cpp has a single front end for the whole program, so one test covers all of it.
+// hal/bq76952/samples.cpp has a single front end for the whole program, so each test continues with its state.
 TEST(Bq76952Samples, ComeEvery100msWithOrWithoutTheChipReceiveRequestsAndSwitchContactors) {
   Bq76952Model model{variant_under_test()};
   chip = &model;
@@ -39,11 +41,9 @@ TEST(Bq76952Samples, ComeEvery100msWithOrWithoutTheChipReceiveRequestsAndSwitchC
     }
     if (k == 49) {
       EXPECT_EQ(s->cell_uv[3], 3'300'000);
-      EXPECT_EQ(hal::dc_link_uv(), 40'000'000);
     }
   }
-  ASSERT_TRUE(hal::starting_point().has_value());
-  EXPECT_EQ(hal::starting_point()->soc_ppb, 500'000'000);
+  EXPECT_FALSE(hal::starting_point()) << "a board that measures itself takes no state of charge from the bus";
   can::Frame request;
   ASSERT_TRUE(hal::next_request(request));
   EXPECT_TRUE(request.long_id) << "a 29-bit frame is not the starting point";
@@ -63,6 +63,81 @@ TEST(Bq76952Samples, ComeEvery100msWithOrWithoutTheChipReceiveRequestsAndSwitchC
   const std::uint64_t late_us = hal::next_sample()->time_us;
   EXPECT_NEAR(static_cast<double>(hal::next_sample()->time_us - late_us), 100'000, 1'001);
   EXPECT_THAT(model.violations, IsEmpty());
+}
+
+/// A new chip behind the back end, measuring.
+class Bq76952SecondLine : public ::testing::Test {
+ protected:
+  Bq76952SecondLine() {
+    chip = &model;
+    model.cell_v.fill(3.3);
+    model.stack_v = 52.8;
+    for (int k = 0; k < 50; ++k) sample = hal::next_sample();
+  }
+  ~Bq76952SecondLine() override { hal::calibrate({}); }
+
+  Bq76952Model model{variant_under_test()};
+  const measurement::PackSample<16>* sample = nullptr;
+};
+
+TEST_F(Bq76952SecondLine, ACalibrationChangesTheReadings) {
+  model.current_a = 100;
+  for (int k = 0; k < 1'500; ++k) hal::next_sample();  // more than two time constants of the counted charge
+  const std::int32_t before_ua = hal::next_sample()->current_ua;
+  EXPECT_NEAR(before_ua, 100e6, 0.1e6);
+  EXPECT_TRUE(hal::calibrate({.current_gain_ppm = 60'000}));
+  EXPECT_NEAR(hal::next_sample()->current_ua, 106e6, 0.1e6) << "a shunt that is 6 % too small";
+  EXPECT_TRUE(hal::calibrate({2'000, -1'000, 0, 250'000}));
+  sample = hal::next_sample();
+  EXPECT_NEAR(sample->current_ua, 100.25e6, 0.1e6);
+  EXPECT_EQ(sample->cell_uv[15], 3'305'600) << "0.2 % more, and -1 mV";
+  EXPECT_EQ(sample->pack_uv, 52'889'600) << "0.2 % more, and 16 times -1 mV";
+}
+
+TEST_F(Bq76952SecondLine, TripsHealthAndClearAreThoseOfTheChip) {
+  EXPECT_EQ(hal::second_line_trips(), 0U);
+  EXPECT_EQ(hal::front_end_health().state, hal::FrontEndState::measuring);
+  model.current_a = -700;
+  model.advance(1'000);
+  model.current_a = 0;
+  hal::next_sample();
+  EXPECT_EQ(hal::second_line_trips(), hal::short_circuit);
+  for (int k = 0; k < 100; ++k) hal::next_sample();
+  EXPECT_FALSE(model.ddsg());
+  hal::second_line_clear();
+  hal::next_sample();
+  EXPECT_TRUE(model.ddsg());
+  const auto health = hal::front_end_health();
+  model.gone = true;
+  for (int k = 0; k < 3; ++k) hal::next_sample();
+  EXPECT_EQ(hal::front_end_health().state, hal::FrontEndState::absent);
+  EXPECT_EQ(hal::front_end_health().lost, health.lost + 1);
+}
+
+TEST_F(Bq76952SecondLine, AfterASilenceTheOutputsAreOffBeforeTheChipEnablesThemAgain) {
+  hal::PowerPath closed;
+  closed.main_plus = closed.main_minus = true;
+  hal::power_path_set(closed);
+  hal::next_sample();
+  ASSERT_TRUE(model.ddsg());
+  model.gone = true;  // the wires are broken for longer than the chip's host watchdog waits
+  for (int k = 0; k < 29; ++k) {
+    hal::next_sample();
+    hal::power_path_set(closed);  // current flows, so protection grants some time
+  }
+  model.advance(200'000);
+  ASSERT_FALSE(model.ddsg()) << "the chip has opened main plus";
+  model.gone = false;
+  switched.clear();
+  for (int k = 0; k < 30; ++k) {
+    hal::next_sample();
+    if (!model.ddsg()) continue;
+    ASSERT_FALSE(switched.empty()) << "main plus must not close by itself";
+    EXPECT_FALSE(switched.back().main_plus || switched.back().main_minus);
+    EXPECT_NE(hal::second_line_trips() & hal::host_silence, 0U) << "and protection knows of it";
+    return;
+  }
+  FAIL() << "DDSG does not return";
 }
 
 }  // namespace

@@ -83,13 +83,33 @@ TEST(BitTiming, IsTheBestOfASearchOverAllRegisterValues) {
   is_the_best(25'000'000, 250'000, bit_timing(25'000'000, 250'000, anywhere));
 }
 
+/// 128 frames of 160 bits (29-bit identifier, 8 bytes, 29 stuff bits, intermission), by hand.
+TEST(BitTiming, GivesTheRecoveryOnAFullBusItsTime) {
+  EXPECT_EQ(longest_recovery_us(125'000), 163'840U);
+  EXPECT_EQ(longest_recovery_us(250'000), 81'920U);
+  EXPECT_EQ(longest_recovery_us(1'000'000), 20'480U);
+}
+
 TEST(FilterBanks, ContainEachIdentifierOnceInBits15To5AndRepeatTheLast) {
-  constexpr auto banks = filter_banks(std::array<std::uint16_t, 5>{0x310, 0x311, 0x312, 0x7FF, 0x001});
-  ASSERT_EQ(banks.size(), 2U);
-  EXPECT_EQ(banks[0].fr1, 0x62206200U);
-  EXPECT_EQ(banks[0].fr2, 0xFFE06240U);
-  EXPECT_EQ(banks[1].fr1, 0x00200020U);
-  EXPECT_EQ(banks[1].fr2, 0x00200020U);
+  constexpr std::array<std::uint16_t, 5> ids{0x310, 0x311, 0x312, 0x7FF, 0x001};
+  ASSERT_EQ(bank_count(ids), 2U);
+  EXPECT_EQ(filter_bank(ids, 0).fr1, 0x62206200U);
+  EXPECT_EQ(filter_bank(ids, 0).fr2, 0xFFE06240U);
+  EXPECT_EQ(filter_bank(ids, 1).fr1, 0x00200020U);
+  EXPECT_EQ(filter_bank(ids, 1).fr2, 0x00200020U);
+  EXPECT_FALSE(fits(std::array<std::uint16_t, 1>{0x800}));
+  EXPECT_TRUE(fits(std::array<std::uint16_t, 56>{}));
+  EXPECT_FALSE(fits(std::array<std::uint16_t, 57>{}));
+}
+
+/// On a CANopen bus, 0x310 to 0x31D are the process data of other devices (receive PDO 2 of nodes 16 to 29).
+TEST(AcceptedFrames, OfABoardThatMeasuresItselfAreCommandsButNoFramesOfSamples) {
+  EXPECT_EQ(std::ranges::count(request_ids, 0x1A0), 1);
+  EXPECT_EQ(std::ranges::count(request_and_sample_ids, 0x1A0), 1);
+  for (int id = 0x310; id <= 0x31D; ++id) {
+    EXPECT_EQ(std::ranges::count(request_ids, id), 0) << id;
+    EXPECT_EQ(std::ranges::count(request_and_sample_ids, id), 1) << id;
+  }
 }
 
 /// ISO 11898-1, 10.4.2, bit by bit: eleven bits, then RTR and IDE of a standard frame (both 0), or SRR and IDE of a

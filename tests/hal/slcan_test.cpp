@@ -96,10 +96,35 @@ TEST(SampleFrames, CarryASampleAndAStartingPoint) {
   EXPECT_EQ(received.sample().cell_uv[0], measurement::no_reading);
   EXPECT_EQ(received.sample().temperature_cdegc[0], -4'000);
   const can::Frame start = frame_of(measurement::StartingPoint{800'000'000, 20'000'000});
-  EXPECT_TRUE(is_starting_point(start));
-  EXPECT_EQ(starting_point_of(start).soc_ppb, 800'000'000);
-  EXPECT_EQ(starting_point_of(start).soc_sigma_ppb, 20'000'000);
-  EXPECT_FALSE(is_starting_point({start.id, 7, start.data}));
+  EXPECT_FALSE(received.receive(start));
+  ASSERT_TRUE(received.starting_point());
+  EXPECT_EQ(received.starting_point()->soc_ppb, 800'000'000);
+  EXPECT_EQ(received.starting_point()->soc_sigma_ppb, 20'000'000);
+}
+
+TEST(SampleFrames, IgnoreAStartingPointThatIsOutOfRange) {
+  const std::vector<can::Frame> of_others = {
+      {0x310, 8, {0x00, 0x94, 0x35, 0x77, 0x01, 0x00, 0x00, 0x00}},  // process data: would be 200 %, sigma 1e-9
+      frame_of({1'000'000'001, 20'000'000}),
+      frame_of({-1, 20'000'000}),
+      frame_of({500'000'000, 999'999}),
+      frame_of({500'000'000, 289'000'001}),
+      frame_of({500'000'000, 0}),
+      frame_of({500'000'000, -20'000'000}),
+      {0x310, 7, frame_of({500'000'000, 20'000'000}).data},
+      {0x310, 8, frame_of({500'000'000, 20'000'000}).data, true},
+      {0x311, 8, frame_of({500'000'000, 20'000'000}).data}};
+  SampleFrames<1> received;
+  for (const can::Frame& frame : of_others) {
+    received.receive(frame);
+    EXPECT_FALSE(received.starting_point());
+  }
+  for (const measurement::StartingPoint at_the_end :
+       {measurement::StartingPoint{0, 1'000'000}, {1'000'000'000, 289'000'000}}) {
+    SampleFrames<1> others;
+    others.receive(frame_of(at_the_end));
+    EXPECT_TRUE(others.starting_point());
+  }
 }
 
 measurement::PackSample<16> some_pack() {
@@ -116,7 +141,7 @@ measurement::PackSample<16> some_pack() {
 TEST(SampleFrames, CarryAPack) {
   const auto sent = some_pack();
   SampleFrames<16> received;
-  const auto frames = frames_of(sent, 51'000'000, 7);
+  const auto frames = frames_of(sent, 51'000'000, 7, -2'000'000);
   EXPECT_TRUE(std::ranges::is_sorted(frames, {}, &can::Frame::id)) << "a node that sends by identifier keeps the order";
   for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(received.receive(frames[k]), k + 1 == frames.size()) << k;
   EXPECT_EQ(received.sample().time_us, sent.time_us);
@@ -124,8 +149,52 @@ TEST(SampleFrames, CarryAPack) {
   EXPECT_EQ(received.sample().pack_uv, sent.pack_uv);
   EXPECT_EQ(received.sample().cell_uv, sent.cell_uv);
   EXPECT_EQ(received.sample().temperature_cdegc, sent.temperature_cdegc);
-  EXPECT_EQ(received.dc_link_uv(), 51'000'000);
+  EXPECT_EQ(received.link_plus_uv(), 51'000'000);
+  EXPECT_EQ(received.link_minus_uv(), -2'000'000);
   EXPECT_EQ(received.rejected(), 0U);
+}
+
+template <std::size_t Cells>
+measurement::PackSample<Cells> pack_of() {
+  measurement::PackSample<Cells> p;
+  p.time_us = 987'654'321;
+  p.current_ua = 12'345'678;
+  p.pack_uv = 3'300'000 * static_cast<std::int32_t>(Cells);
+  for (std::size_t k = 0; k < Cells; ++k) p.cell_uv[k] = 3'300'000 + static_cast<std::int32_t>(k);
+  p.temperature_cdegc = {2'500, 2'600, 2'700, 2'800};
+  return p;
+}
+
+template <std::size_t Cells>
+void expect_carried(const std::vector<std::uint32_t>& expected_ids) {
+  const auto frames = frames_of(pack_of<Cells>(), 51'000'000, 7);
+  std::vector<std::uint32_t> ids;
+  SampleFrames<Cells> received;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    ids.push_back(frames[k].id);
+    EXPECT_EQ(received.receive(frames[k]), k + 1 == frames.size()) << k;
+  }
+  EXPECT_EQ(ids, expected_ids) << Cells;
+  EXPECT_EQ(received.sample().time_us, 987'654'321U);
+  EXPECT_EQ(received.sample().cell_uv, pack_of<Cells>().cell_uv);
+  EXPECT_EQ(received.sample().temperature_cdegc, pack_of<Cells>().temperature_cdegc);
+}
+
+TEST(SampleFrames, CarryPacksOf8And15And24CellsWithoutFramesOfAbsentCells) {
+  expect_carried<8>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x31C, 0x31D});
+  expect_carried<15>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B, 0x31C, 0x31D});
+  expect_carried<24>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B, 0x31C, 0x31E, 0x31F,
+                      0x320, 0x321, 0x322});
+}
+
+TEST(SampleFrames, OfASmallPackCompleteNoSampleOfALargeOneNorTheOtherWayRound) {
+  SampleFrames<24> large;
+  for (const can::Frame& frame : frames_of(pack_of<16>(), 0, 1)) EXPECT_FALSE(large.receive(frame));
+  SampleFrames<16> small;
+  for (const can::Frame& frame : frames_of(pack_of<24>(), 0, 1)) EXPECT_FALSE(small.receive(frame));
+  for (const can::Frame& frame : frames_of(pack_of<16>(), 0, 2)) small.receive(frame);
+  EXPECT_EQ(small.sample().cell_uv, pack_of<16>().cell_uv);
+  EXPECT_EQ(small.rejected(), 0U);
 }
 
 TEST(SampleFrames, ACheckedSampleWithAFlippedBitOrALostFrameIsRejected) {

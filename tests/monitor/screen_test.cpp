@@ -59,6 +59,22 @@ TEST(Screen, On80x24ShowsTheBatteryAndTheMessages) {
               ::testing::Contains(StartsWith("PackState             1.0   0.0 s       61     0     0     0      0")));
 }
 
+TEST(Screen, ShowsTheFaultsOfBothMessages) {
+  BusState bus = after(3);
+  can::Faults faults;
+  faults.short_circuit = 1;
+  faults.first_cause = 33;
+  can::MoreFaults more;
+  more.second_line_tripped = 1;
+  bus.receive(to_bus_frame(faults.frame(0), 3'000'000));
+  bus.receive(to_bus_frame(more.frame(0), 3'000'000));
+  std::string all;
+  for (const std::string& row : rows(bus, {80, 24})) all += row + '\n';
+  EXPECT_THAT(all, HasSubstr("Faults   ShortCircuit"));
+  EXPECT_THAT(all, HasSubstr("SecondLineTripped"));
+  EXPECT_THAT(all, HasSubstr("FirstCause second line tripped"));
+}
+
 TEST(Screen, On40x10ShowsTheMostImportantLines) {
   const auto r = rows(after(61), {40, 10});
   ASSERT_LE(r.size(), 10U);

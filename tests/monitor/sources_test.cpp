@@ -119,6 +119,16 @@ TEST_F(Dump, WithoutAFrameIsRejected) {
   EXPECT_THAT(rejection(), HasSubstr("no frame"));
 }
 
+/// /dev/zero never ends, and a gzip file of three megabytes can hold gigabytes of zeros.
+TEST_F(Dump, EndlessBytesWithoutALineAreRejected) {
+  const auto source = open_source("file:/dev/zero");
+  std::vector<BusFrame> frames(256);
+  const auto read_on = [&] {
+    for (int k = 0; k < 20'000 && !source->ended(); ++k) source->read(frames, 0);
+  };
+  EXPECT_THROW(read_on(), SourceError);
+}
+
 TEST(Source, ThatDoesNotExistIsRejected) {
   for (const char* name : {"", "nonesuch0", "can 0", "slcan:/nonesuch", "slcan:/dev/null", "file:/nonesuch",
                            "file:/tmp", "usb:0", "../can0", "lo", "a_name_that_no_interface_can_have"}) {

@@ -19,7 +19,7 @@ inline constexpr PackDesign forklift{.limits = table9_limits, .capacity_ah = 6, 
 
 struct ExpectedRow {
   const char* name;
-  const char* signal;  ///< signal of frame Faults
+  const char* signal;  ///< signal of frame Faults, from row 32 on of MoreFaults
   char beyond;         ///< '>' or '<'
   std::int32_t threshold;
   int delay_ms;
@@ -49,7 +49,7 @@ inline constexpr ExpectedRow expected_rows[] = {
     {"open wire", "OpenWire", '>', 247'500, 500, 99'000, 10'000, 'c', "open"},
     {"imbalance", "Imbalance", '>', 330'000, 30'000, 198'000, 60'000, 'a', "warn"},
     {"current implausible", "CurrentImplausible", '>', 0, 60'000, 0, 60'000, 'a', "derate"},
-    {"sum mismatch", "SumMismatch", '>', 792'000, 1'000, 396'000, 10'000, 'c', "open"},
+    {"sum mismatch", "SumMismatch", '>', 440'000, 1'000, 280'000, 10'000, 'c', "open"},
     {"voltage missing", "VoltageMissing", '>', 0, 500, 0, 5'000, 'a', "open"},
     {"voltage stuck", "VoltageStuck", '>', 0, 1'000, 0, 10'000, 'c', "open"},
     {"current missing", "CurrentMissing", '>', 0, 500, 0, 5'000, 'a', "open"},
@@ -62,6 +62,12 @@ inline constexpr ExpectedRow expected_rows[] = {
     {"samples missing", "SamplesMissing", '>', 500'000, 0, 200'000, 1'000, 'a', "open now"},
     {"internal fault", "InternalFault", '>', 0, 0, 0, 0, 'c', "open now"},
     {"storage fault", "StorageFault", '>', 0, 0, 0, 0, 'c', "warn"},
+    {"second line tripped", "SecondLineTripped", '>', 0, 0, 0, 10'000, 'c', "open now"},
+    {"second line failed", "SecondLineFailed", '>', 0, 200, 0, 10'000, 's', "open now"},
+    {"current sensors differ", "CurrentSensorsDiffer", '>', 20'000'000, 2'000, 10'000'000, 10'000, 'c', "open"},
+    {"temperature unknown", "TemperatureUnknown", '>', 0, 60'000, 0, 10'000, 'a', "open"},
+    {"current unrequested", "CurrentUnrequested", '>', 0, 60'000, 0, 10'000, 'c', "open"},
+    {"allowed current exceeded", "AllowedCurrentExceeded", '>', 0, 10'000, 0, 10'000, 'a', "warn"},
 };
 
 }  // namespace bms::protection

@@ -148,7 +148,7 @@ TEST_P(ServicedProtection, IsLatchedOverAPowerCycleAndEndedByServiceBeforeAConta
   FaultRig first;
   first.set(row, levels(row).just_above);
   first.run(row.delay_ms + 2 * step_ms);
-  ASSERT_EQ(first.monitor.latched(), 1U << GetParam());
+  ASSERT_EQ(first.monitor.latched(), FaultSet{1} << GetParam());
   for (const bool closed_before : {false, true}) {
     FaultMonitor next(forklift_plan.rules, first.monitor.latched());
     FaultRig good;
@@ -213,7 +213,7 @@ TEST_P(EveryProtection, IsNeitherRaisedNorEndedWhileItsQuantityIsUnknown) {
 }
 
 TEST(ProtectionTable, LatchesOnlyServiceFaultsOverAPowerCycle) {
-  const FaultMonitor m(forklift_plan.rules, 0xFFFF'FFFF);
+  const FaultMonitor m(forklift_plan.rules, ~FaultSet{0});
   for (std::size_t k = 0; k < fault_count; ++k)
     EXPECT_EQ(has(m.active(), k), expected_rows[k].recovery == 's') << expected_rows[k].name;
 }

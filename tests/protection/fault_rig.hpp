@@ -30,7 +30,7 @@ class FaultRig {
   void set(const ExpectedRow& e, std::int32_t value) { at(values, of(e)) = value; }
 
   /// One sample. Compares the active faults with the oracle of every row.
-  std::uint32_t step(Clear clear = Clear::none, bool may_serve = false) {
+  FaultSet step(Clear clear = Clear::none, bool may_serve = false) {
     time_us += step_us;
     const bool pressed = clear != Clear::none && before_ == Clear::none;
     before_ = clear;
@@ -54,7 +54,7 @@ class FaultRig {
   }
 
   Quantities values = unknown_quantities();
-  std::uint32_t latched = 0;
+  FaultSet latched = 0;
   FaultMonitor monitor{forklift_plan.rules, 0};
   std::uint64_t time_us = 0;
   bool wrong = false;

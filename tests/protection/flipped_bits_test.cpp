@@ -54,16 +54,18 @@ TEST(Protection, EndsInSafeWithAnInternalFaultAfterAnyOneOrTwoFlippedBitsOfTheSt
 TEST(Protection, EndsInSafeWithAnInternalFaultAfterAnyFlippedBitOfTheSetOfFaults) {
   ProtectionBench closed;
   closed.drive_off();
-  using Words = std::array<std::uint32_t, sizeof(Protection<16>) / 4>;
+  using Words = std::array<FaultSet, sizeof(Protection<16>) / 8>;
   Words words{};
   std::memcpy(words.data(), static_cast<void*>(&closed.protection), sizeof words);
   std::size_t at = 0;  // no fault, its inverse, and its xor with the pattern
-  while (at + 2 < words.size() && !(words[at] == 0 && words[at + 1] == ~0U && words[at + 2] == 0x5A3C'96A5)) ++at;
+  while (at + 2 < words.size() &&
+         !(words[at] == 0 && words[at + 1] == ~FaultSet{0} && words[at + 2] == 0x5A3C'96A5'5A3C'96A5))
+    ++at;
   ASSERT_LT(at + 2, words.size());
-  for (std::size_t a = 0; a < 96; ++a) {
+  for (std::size_t a = 0; a < 192; ++a) {
     ProtectionBench copy = closed;
     Words flipped = words;
-    flipped[at + a / 32] ^= 1U << (a % 32);
+    flipped[at + a / 64] ^= FaultSet{1} << (a % 64);
     std::memcpy(static_cast<void*>(&copy.protection), flipped.data(), sizeof flipped);
     const Decision& d = copy.step();
     EXPECT_EQ(d.state, ContactorState::opening) << a;
@@ -83,12 +85,12 @@ TEST(Protection, LosesNoFaultByAFlippedBit) {
   b.step();
   b.inputs.storage_fault = false;  // the fault stays until it is cleared
   b.step();
-  constexpr std::uint32_t there = bit(Fault::storage_fault);
-  std::array<std::uint32_t, sizeof(Protection<16>) / 4> words{};
+  constexpr FaultSet there = bit(Fault::storage_fault);
+  std::array<FaultSet, sizeof(Protection<16>) / 8> words{};
   std::memcpy(words.data(), static_cast<void*>(&b.protection), sizeof words);
   std::size_t at = 0;
   while (at + 2 < words.size() &&
-         !(words[at] == there && words[at + 1] == ~there && words[at + 2] == (there ^ 0x5A3C'96A5)))
+         !(words[at] == there && words[at + 1] == ~there && words[at + 2] == (there ^ 0x5A3C'96A5'5A3C'96A5)))
     ++at;
   ASSERT_LT(at + 2, words.size());
   for (std::size_t copy = 0; copy < 3; ++copy) {
@@ -97,6 +99,20 @@ TEST(Protection, LosesNoFaultByAFlippedBit) {
     with_flip[at + copy] ^= there;
     std::memcpy(static_cast<void*>(&flipped.protection), with_flip.data(), sizeof with_flip);
     EXPECT_EQ(flipped.step().faults, there | bit(Fault::internal_fault)) << copy;
+  }
+}
+
+/// The outputs are not stored redundantly: each sample derives them from the guarded state.
+TEST(Protection, RepairsFlippedOutputsWithTheNextSample) {
+  ProtectionBench closed;
+  closed.drive_off();
+  const Outputs expected = closed.protection.decision().outputs;
+  for (unsigned bits = 1; bits < 16; ++bits) {
+    ProtectionBench copy = closed;
+    auto* byte = reinterpret_cast<unsigned char*>(const_cast<Outputs*>(&copy.protection.contactors().outputs()));
+    *byte = static_cast<unsigned char>(*byte ^ bits);
+    EXPECT_NE(copy.protection.contactors().outputs(), expected) << bits;
+    EXPECT_EQ(copy.step().outputs, expected) << bits;
   }
 }
 

@@ -57,8 +57,8 @@ class RowOracle {
   bool active_ = false;
 };
 
-/// Quantity of every row, from samples of sixteen cells and four temperatures; nullopt for rows of overload integrals
-/// and contactors.
+/// Quantity of every row, from samples of sixteen cells and four temperatures; nullopt for rows that samples alone do
+/// not show.
 class QuantityOracle {
  public:
   using Sample16 = measurement::PackSample<16>;
@@ -96,6 +96,7 @@ class QuantityOracle {
     q[22] = amps ? 0 : 1;
     q[23] = static_cast<std::int64_t>(4 - warm.size());
     q[24] = warm.size() > 1 ? Value(stuck_temperatures()) : std::nullopt;
+    q[35] = warm.empty() ? 1 : 0;
     return q;
   }
 

@@ -1,17 +1,27 @@
 // A pack on a bench whose state a test sets, with protection and a simulated DC link.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 
 #include <gtest/gtest.h>
 
+#include "plant/link_poles.hpp"
 #include "protection/protection.hpp"
 #include "tests/protection/expected_rows.hpp"
 
 namespace bms::protection {
 
 inline constexpr ProtectionPlan forklift_plan = protection_plan(forklift);
+
+/// Sets the poles of a DC link where these contactors connect them.
+inline void set_poles(ExternalInputs& inputs, const Outputs& closed, double pack_uv, double dc_link_uv) {
+  const plant::LinkPoles poles =
+      plant::link_poles(closed.main_plus || closed.precharge, closed.main_minus, 1e-6 * pack_uv, 1e-6 * dc_link_uv);
+  inputs.link_plus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.plus_v));
+  inputs.link_minus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.minus_v));
+}
 
 /// A pack in a state that the test sets. Its readings always change a little.
 struct ProtectionBench {
@@ -33,14 +43,16 @@ struct ProtectionBench {
     if (change) change(sample);
     std::int64_t sum = 0;
     for (const std::int32_t uv : sample.cell_uv) sum += uv;
-    sample.pack_uv = static_cast<std::int32_t>(sum);
+    sample.pack_uv = static_cast<std::int32_t>(sum) + pack_error_uv;
     if (closed)
       dc_link_uv = static_cast<double>(sample.pack_uv);
     else if (out.precharge && out.main_minus)
       dc_link_uv += (static_cast<double>(sample.pack_uv) - dc_link_uv) * 0.18;
     else
       dc_link_uv *= 0.97;
-    inputs.dc_link_uv = static_cast<std::int32_t>(dc_link_uv);
+    const Outputs connected{
+        .main_plus = out.main_plus || plus_welded, .main_minus = out.main_minus, .precharge = out.precharge};
+    set_poles(inputs, connected, sample.pack_uv, dc_link_uv);
     return protection.update(sample, estimate, inputs);
   }
   void run(int steps) {
@@ -61,9 +73,9 @@ struct ProtectionBench {
   ExternalInputs inputs;
   std::uint64_t time_us;
   std::uint32_t period, count = 0;
-  std::int32_t base_uv = 3'300'000, load_ua = 0;
+  std::int32_t base_uv = 3'300'000, load_ua = 0, pack_error_uv = 0;  ///< error: of the pack's own measurement
   double dc_link_uv = 0;
-  bool closed = false;
+  bool closed = false, plus_welded = false;
   std::function<void(measurement::PackSample<16>&)> change;
 };
 

@@ -87,7 +87,7 @@ TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
   ProtectionBench failed;
   failed.inputs.request = Request::drive;
   for (int k = 0; k < 60; ++k) {
-    failed.dc_link_uv = 0;
+    failed.dc_link_uv = 0;  // a short circuit
     failed.step();
   }
   EXPECT_NE(failed.protection.decision().faults & bit(Fault::precharge_failed), 0U);
@@ -97,18 +97,17 @@ TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
   welded.drive_off();
   welded.load_ua = 0;
   welded.inputs.request = Request::none;
-  for (int k = 0; k < 80; ++k) {
-    welded.step();
-    welded.dc_link_uv = 52.8e6;
-  }
+  welded.plus_welded = true;
+  welded.run(20);
   EXPECT_EQ(welded.protection.decision().latched, bit(Fault::contactor_welded));
+  EXPECT_EQ(welded.protection.decision().welded_pole, Pole::plus);
 
   ProtectionBench apart;
   apart.drive_off();
   std::uint64_t from = apart.time_us;
   for (int k = 0; k < 10 && apart.protection.decision().outputs.any_closed(); ++k) {
     apart.step();
-    apart.inputs.dc_link_uv = 40'000'000;
+    apart.inputs.link_plus_uv = 45'000'000;
     apart.sample.time_us = apart.time_us += apart.period;
     apart.protection.update(apart.sample, apart.estimate, apart.inputs);
   }
@@ -246,15 +245,16 @@ TEST(Protection, ServiceEndsAFaultLatchedBeforeTheStartAndNoLaterOne) {
 TEST(Protection, UsesTheSumOfTheCellsIfThePackReadingIsMissing) {
   ProtectionBench b;
   b.inputs.request = Request::drive;
-  while (b.protection.decision().state != ContactorState::precharge && b.count < 100) b.step();
+  while (b.dc_link_uv < 45e6 && b.count < 100) b.step();
+  ASSERT_EQ(b.protection.decision().state, ContactorState::precharge);
   b.sample.time_us += b.period;
   b.sample.pack_uv = measurement::no_reading;
   std::int32_t sum_uv = 0;
   for (const std::int32_t uv : b.sample.cell_uv) sum_uv += uv;
-  b.inputs.dc_link_uv = sum_uv / 16 * 15 - 16;
+  b.inputs.link_plus_uv = sum_uv / 50 * 49 - 50;
   EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.inputs).state, ContactorState::precharge);
   b.sample.time_us += b.period;
-  b.inputs.dc_link_uv = sum_uv / 16 * 15 + 16;
+  b.inputs.link_plus_uv = sum_uv / 50 * 49 + 50;
   EXPECT_EQ(b.protection.update(b.sample, b.estimate, b.inputs).state, ContactorState::drive);
 }
 
@@ -278,7 +278,7 @@ TEST(Protection, OpensForAPackOfOneCell) {
       dc_link_uv = s.pack_uv;
     else
       dc_link_uv = out.precharge && out.main_minus ? dc_link_uv + (s.pack_uv - dc_link_uv) * 0.18 : dc_link_uv * 0.9;
-    inputs.dc_link_uv = static_cast<std::int32_t>(dc_link_uv);
+    set_poles(inputs, out, s.pack_uv, dc_link_uv);
     p.update(s, e, inputs);
     if (k == 79) {
       ASSERT_EQ(p.decision().state, ContactorState::drive);
@@ -324,7 +324,7 @@ TEST(Protection, IsSilentOverTheShippedShiftWithThreeSigmaNoise) {
       dc_link_v = sum_v;
     else
       dc_link_v = out.precharge && out.main_minus ? dc_link_v + (sum_v - dc_link_v) * 0.39 : dc_link_v * 0.9;
-    inputs.dc_link_uv = static_cast<std::int32_t>(1e6 * dc_link_v);
+    set_poles(inputs, out, 1e6 * sum_v, 1e6 * dc_link_v);
     const Decision& d = p.update(s, PackEstimate<16>{}, inputs);
     ASSERT_EQ(d.faults, 0U) << row.time_s << " s";
     driven += d.state == ContactorState::drive ? 1U : 0U;

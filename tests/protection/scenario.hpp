@@ -24,7 +24,8 @@ class Scenario {
       const Decision& d = step(protection, sample, estimate, inputs);
       outputs_ = d.outputs;
       for (const std::uint32_t word :
-           {d.faults, static_cast<std::uint32_t>(d.state), static_cast<std::uint32_t>(d.allowed.charge_ua),
+           {static_cast<std::uint32_t>(d.faults), static_cast<std::uint32_t>(d.faults >> 32),
+            static_cast<std::uint32_t>(d.state), static_cast<std::uint32_t>(d.allowed.charge_ua),
             static_cast<std::uint32_t>(d.allowed.discharge_ua), d.bleed, d.bleed_left_s,
             static_cast<std::uint32_t>(d.first.fault), static_cast<std::uint32_t>(d.first.time_us),
             static_cast<std::uint32_t>(d.outputs.any_closed())}) {
@@ -75,7 +76,14 @@ class Scenario {
       dc_link_uv_ += (sum - dc_link_uv_) / 5;
     else
       dc_link_uv_ -= dc_link_uv_ / 16;
-    inputs.dc_link_uv = dc_link_uv_;
+    // Poles of the DC link as the wiring gives them: at the pack, at 0 V, or floating.
+    if (outputs_.main_minus)
+      inputs.link_minus_uv = 0;
+    else if (outputs_.main_plus || outputs_.precharge)
+      inputs.link_minus_uv = sum - dc_link_uv_;
+    else
+      inputs.link_minus_uv = 1'278'000 - dc_link_uv_ / 5 * 3;
+    inputs.link_plus_uv = inputs.link_minus_uv + dc_link_uv_;
   }
 
   std::uint32_t state_ = 1;
@@ -83,7 +91,7 @@ class Scenario {
   Outputs outputs_;
 };
 
-inline constexpr std::uint32_t expected_scenario_hash = 3935384279U;
+inline constexpr std::uint32_t expected_scenario_hash = 4099162431U;
 
 inline std::uint32_t scenario_hash(int samples) {
   Scenario s;

@@ -10,6 +10,7 @@
 #include <functional>
 #include <optional>
 
+#include "plant/link_poles.hpp"
 #include "plant/random.hpp"
 #include "protection/protection.hpp"
 #include "tests/protection/oracle.hpp"
@@ -19,7 +20,7 @@ namespace bms::protection {
 inline constexpr int step_ms = 100;
 inline constexpr std::uint32_t step_us = 100'000;
 
-constexpr bool has(std::uint32_t faults, std::size_t k) { return (faults >> k & 1) != 0; }
+constexpr bool has(FaultSet faults, std::size_t k) { return (faults >> k & 1) != 0; }
 
 /// Values around a threshold. noise: three sigma. All in the unit of the quantity.
 struct Levels {
@@ -40,7 +41,7 @@ constexpr std::int32_t measured_noise(std::size_t k) {
 
 /// Rows whose quantity comes from samples, without the overload integrals.
 
-constexpr bool visible_in_samples(std::size_t k) { return k < 26 && k != 8 && k != 9; }
+constexpr bool visible_in_samples(std::size_t k) { return (k < 26 && k != 8 && k != 9) || k == 35; }
 /// Stuck readings are detected only after the others have moved.
 constexpr bool waits_for_others(std::size_t k) { return k == 21 || k == 24; }
 
@@ -92,8 +93,13 @@ class TruckPack {
       dc_link_uv_ += (stack_v - dc_link_uv_) * 0.18;
     else
       dc_link_uv_ *= 0.97;
-    inputs.dc_link_uv = static_cast<std::int32_t>(dc_link_uv_);
-    if (closed && sample.pack_uv != measurement::no_reading) inputs.dc_link_uv = sample.pack_uv;
+    const double pack_uv = closed && sample.pack_uv != measurement::no_reading ? sample.pack_uv : stack_v;
+    set_link(plant::link_poles(out.main_plus || out.precharge, out.main_minus, 1e-6 * pack_uv,
+                               closed ? 1e-6 * pack_uv : 1e-6 * dc_link_uv_));
+  }
+  void set_link(const plant::LinkPoles& poles) {
+    inputs.link_plus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.plus_v));
+    inputs.link_minus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.minus_v));
   }
 
   std::uint64_t steps() const { return step_; }
@@ -116,18 +122,13 @@ class TruckPack {
 class TruckOracle {
  public:
   /// Returns one bit per active fault; 0 for other rows.
-  std::uint32_t check(const measurement::PackSample<16>& sample, bool voltage_rejected) {
+  FaultSet check(const measurement::PackSample<16>& sample, bool voltage_rejected) {
     values = quantities_.check(sample, voltage_rejected);
-    std::uint32_t there = 0;
-    for (std::size_t k = 0; k < 26; ++k) {
-      if (visible_in_samples(k) && rows_[k].check(values[k], step_ms, false)) there |= 1U << k;
+    FaultSet there = 0;
+    for (std::size_t k = 0; k < fault_count; ++k) {
+      if (visible_in_samples(k) && rows_[k].check(values[k], step_ms, false)) there |= FaultSet{1} << k;
     }
     return there;
-  }
-  static constexpr std::uint32_t rows() {
-    std::uint32_t all = 0;
-    for (std::size_t k = 0; k < 26; ++k) all |= visible_in_samples(k) ? 1U << k : 0;
-    return all;
   }
 
   std::array<Value, fault_count> values;
@@ -212,6 +213,9 @@ inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurem
       break;
     case 24:
       if (value > 0) s.temperature_cdegc[0] = 2'345;
+      break;
+    case 35:
+      if (value > 0) s.temperature_cdegc.fill(measurement::no_temperature);
       break;
     default:
       inject_voltage(k, value, truck, s);

@@ -28,7 +28,8 @@ class PersistenceTest : public ::testing::Test {
                     bool processor_fault = false) {
     time_us = 0;
     p = {};
-    p.start(cause, processor_fault ? std::optional(hal::FaultRecord{.exception = 5}) : std::nullopt, calendar);
+    p.start(cause, processor_fault ? std::optional(hal::FaultRecord{.exception = 5}) : std::nullopt, calendar,
+            retained);
     p.count(measurement::Sample{});  // time counts from here
     return p;
   }
@@ -43,6 +44,11 @@ class PersistenceTest : public ::testing::Test {
       p.store(now(), calendar_s);
       if (erases_allowed) p.erase_next_sector();
     }
+  }
+  /// Drives until no record finds room; erases_allowed should be false.
+  void drive_until_full() {
+    for (int k = 0; k < 5'000 && !p.full(); ++k) drive(1, -6'000'000, k % 2 == 0 ? -2'000'000 : 2'000'000);
+    ASSERT_TRUE(p.full());
   }
   EstimatorSnapshot now() { return {known ? std::optional(pack) : std::nullopt, cells, health}; }
   /// Number of the newest record of a kind, if any.
@@ -76,6 +82,7 @@ class PersistenceTest : public ::testing::Test {
   std::vector<CellsRecord::Cell> cells;
   storage::HealthRecord health{1'000'000, 100'000, 1'000'000, 300'000};
   std::optional<std::uint32_t> calendar_s;
+  std::vector<std::uint8_t> retained;  ///< RAM that a reset does not change; empty: none
   bool known = true, erases_allowed = true;
 };
 

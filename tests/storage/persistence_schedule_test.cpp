@@ -73,7 +73,9 @@ TEST_F(PersistenceTest, CellsAreWrittenEveryHalfHourIfOneHasMoved) {
   }
   cells.resize(15);
   EXPECT_EQ(written<CellsRecord>(40, [](int) {}).size(), 1U) << "another number of cells";
-  cells.assign(17, {1'000, 0});
+  cells.assign(24, {1'000, 0});
+  EXPECT_EQ(written<CellsRecord>(40, [](int) {}).size(), 1U);
+  cells.assign(25, {2'000, 0});
   EXPECT_EQ(written<CellsRecord>(40, [](int) {}), Minutes{}) << "more cells than a record can store";
 }
 
@@ -121,21 +123,20 @@ TEST_F(PersistenceTest, AFailedWriteIsRepeatedEveryMinute) {
   cells.assign(16, {});
   drive(61);
   erases_allowed = false;
-  int minutes = 0;
-  for (std::uint64_t before = ~0ULL; before != steps() && minutes < 5'000; ++minutes) {
-    before = steps();
-    drive(1, -6'000'000, minutes % 2 == 0 ? -2'000'000 : 2'000'000);
-  }
+  drive_until_full();
+  drive(20, -6'000'000, -2'000'000);  // the last record of charge
   const auto before = steps();
   cells[3].soc = 500;
   health.capacity_ppm -= 50'000;
   pack.soc_ppb += 5'000'000;
   p.fault(77);
-  EXPECT_TRUE(p.set(9, 99));
+  EXPECT_FALSE(p.set(9, 99)) << "not stored";
+  EXPECT_FALSE(p.settings_stored());
   drive(70);
   EXPECT_EQ(steps(), before);
   p.erase_next_sector();
   drive(1);
+  EXPECT_TRUE(p.settings_stored());
   boot(ResetCause::software);
   EXPECT_EQ(p.starting_point()->soc_ppb, pack.soc_ppb);
   EXPECT_EQ(p.cells().cell[3].soc, 500);
@@ -190,7 +191,7 @@ TEST_F(PersistenceTest, AtAShutdownAllChangesAreWrittenBeforeTheyAreDue) {
     cells[7].soc = static_cast<std::int16_t>(200 * k);
     health.resistance_ppm += 10'000;
     pack.soc_ppb -= 1;
-    for (int faults = 0; faults < 20; ++faults) p.fault(static_cast<std::uint16_t>(0x100 * k + faults));
+    for (int faults = 0; faults < 20; ++faults) p.fault(static_cast<std::uint16_t>(40 * k + faults));
     p.set(8, k);
     p.power_failing(now(), std::nullopt);
     const auto stored = std::tuple{p.cells(), p.health(), p.events().last(0), p.settings().get(8), pack.soc_ppb};
@@ -236,13 +237,14 @@ TEST_F(PersistenceTest, ManyFaultsAndManyStartsWriteLittle) {
   const auto before = steps();
   for (int k = 0; k < 10'000; ++k) p.fault(9);
   const auto burst = steps() - before;
-  EXPECT_LE(burst, 16 * 40U);
+  EXPECT_LE(burst, 16 * 70U);
   for (int minute = 0; minute < 24 * 60; ++minute) {
     p.fault(9);
     drive(1);
   }
-  // Sixteen records and one every ten minutes, 34 words each; charge once.
-  EXPECT_LE(steps() - before, burst + (24 * 6 + 2) * 34U + 100) << "a day";
+  // Sixteen records and one every ten minutes, 62 words each (a header of 4, 230 bytes); charge once. Every 63 records,
+  // 1,008 lines, move the others of at most 25 lines into the next sector.
+  EXPECT_LE(steps() - before, burst + (24 * 6 + 2) * 62U + 3 * 100 + 100) << "a day";
   boot();
   drive(1);
   const auto started = steps();
@@ -266,23 +268,61 @@ TEST_F(PersistenceTest, ABatteryAtRestIsWrittenOnce) {
   EXPECT_LE(steps() - before, 8U) << "health, after an hour";
 }
 
-TEST_F(PersistenceTest, WithoutErasesTheReserveLastsMoreThan11HoursAndThenNothingIsLost) {
+TEST_F(PersistenceTest, WithoutErasesNothingStoredIsLost) {
   boot();
   erases_allowed = false;
   const auto erases = flash.erases();
-  int minutes = 0;
-  for (std::uint64_t before = ~0ULL; before != steps() && minutes < 5'000; ++minutes) {
-    before = steps();
-    drive(1, -6'000'000, minutes % 2 == 0 ? -2'000'000 : 2'000'000);
-  }
-  std::printf("%d minutes without an erase\n", minutes);
-  EXPECT_GT(minutes, 11 * 60);
-  EXPECT_LT(minutes, 5'000);
+  EXPECT_FALSE(p.full());
+  drive_until_full();
   EXPECT_EQ(flash.erases(), erases);
   EXPECT_TRUE(p.needs_erase());
   EXPECT_TRUE(p.log().operational());
-  EXPECT_EQ(boot(ResetCause::watchdog).starting_point()->soc_ppb / 1'000'000, minutes % 2 == 0 ? 598 : 600)
-      << "the last written minute";
+  const auto last_soc_ppb = pack.soc_ppb;
+  drive(200, -6'000'000, -2'000'000);
+  EXPECT_EQ(boot(ResetCause::watchdog).starting_point()->soc_ppb, last_soc_ppb) << "the last written minute";
+}
+
+/// Two shifts of sixteen hours, from any filling of the active sector, with everything that a pack stores.
+TEST_F(PersistenceTest, WithoutErasesTheReserveLastsAtLeast32Hours) {
+  int least = 10'000;
+  for (int before = 0; before < 360; before += 40) {
+    flash = FlashModel(chip, 1);
+    boot();
+    cells.assign(16, {});
+    const auto minutes = [&](int until, const auto& stop) {
+      int k = 0;
+      for (; k < until && !stop(); ++k) {
+        for (auto& c : cells) c.soc = static_cast<std::int16_t>(k % 3'000 - 1'500);
+        health.resistance_ppm = 1'000'000 + k % 300 * 1'000;
+        drive(1, -6'000'000, k % 2 == 0 ? -2'000'000 : 2'000'000);
+      }
+      return k;
+    };
+    erases_allowed = true;
+    minutes(200 + before, [] { return false; });
+    erases_allowed = false;
+    least = std::min(least, minutes(5'000, [&] { return p.full(); }));
+  }
+  std::printf("at least %d minutes without an erase\n", least);
+  EXPECT_GE(least, 32 * 60);
+  EXPECT_LT(least, 5'000);
+}
+
+TEST_F(PersistenceTest, AFullLogIsReportedAtOnceAndAsAFaultAfterAnHour) {
+  boot();
+  erases_allowed = false;
+  drive_until_full();
+  EXPECT_TRUE(p.full());
+  EXPECT_FALSE(p.full_for_long());
+  drive(59, -6'000'000, -2'000'000);
+  EXPECT_FALSE(p.full_for_long());
+  drive(2, -6'000'000, -2'000'000);
+  EXPECT_TRUE(p.full_for_long());
+  p.erase_next_sector();
+  EXPECT_TRUE(p.full()) << "one of two";
+  p.erase_next_sector();
+  EXPECT_FALSE(p.full());
+  EXPECT_FALSE(p.full_for_long());
 }
 
 /// A truck that never rests: soc, cells and health move all the time, so the policy alone limits the writes.

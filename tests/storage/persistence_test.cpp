@@ -112,7 +112,7 @@ TEST_F(PersistenceTest, AllRecordsAreRestored) {
   boot(ResetCause::watchdog);
   drive(120, 6'000'000);
   drive(60, -12'000'000);
-  p.fault(0x0102);
+  p.fault(102);
   EXPECT_TRUE(p.set(40, -5));
   p.power_failing(now(), std::nullopt);
   boot(ResetCause::power_on);
@@ -123,8 +123,8 @@ TEST_F(PersistenceTest, AllRecordsAreRestored) {
   ASSERT_EQ(p.cells().count, 16);
   EXPECT_TRUE(std::equal(cells.begin(), cells.end(), p.cells().cell.begin()));
   EXPECT_EQ(p.health(), health);
-  EXPECT_EQ(p.events().last(0).code, 0x0102);
-  EXPECT_EQ(p.events().last(0).operating_s, 180U * 60);
+  EXPECT_EQ(p.events().last(0).code, 102);
+  EXPECT_EQ(p.events().last(0).time_s, 180U * 60) << "in operation: no calendar clock";
   EXPECT_EQ(p.events().starts, 2U);
   EXPECT_EQ(p.events().resets[static_cast<std::size_t>(ResetCause::watchdog)], 1U);
   EXPECT_EQ(p.settings().get(40), -5);
@@ -309,7 +309,7 @@ TEST_F(PersistenceTest, WithoutFlashItRunsAndReportsIt) {
   EXPECT_FALSE(p.starting_point());
   drive(2, 1'000'000);
   p.fault(1);
-  EXPECT_TRUE(p.set(1, 2));
+  EXPECT_FALSE(p.set(1, 2)) << "not stored";
   p.power_failing(now(), std::nullopt);
   EXPECT_EQ(p.log().sectors(), 0U);
   EXPECT_FALSE(p.log().operational());

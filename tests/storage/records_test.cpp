@@ -19,11 +19,21 @@ Raw bytes_of(const R& record) {
   return {bytes.begin(), bytes.end()};
 }
 
+/// Different in every field, with both signs of the current.
+Readings some_readings(int k) {
+  Readings r;
+  r.soc = static_cast<std::uint8_t>(k);
+  const auto current = static_cast<std::int16_t>(k % 2 == 0 ? -8'000 + k : 8'000 - k);
+  r.range.lowest = {static_cast<std::int16_t>(100 + k), static_cast<std::int16_t>(20 + k), current};
+  r.range.highest = {static_cast<std::int16_t>(8'000 + k), static_cast<std::int16_t>(200 - k), current};
+  return r;
+}
+
 EventsRecord full_events() {
   EventsRecord e;
   e.starts = 0x01020304;
   for (std::size_t k = 0; k < e.resets.size(); ++k) e.resets[k] = static_cast<std::uint16_t>(1000 + k);
-  for (std::uint16_t k = 1; k <= 20; ++k) e.add({k, 100'000U * k});
+  for (std::uint16_t k = 1; k <= 20; ++k) e.add({k, 100'000U * k, packed(some_readings(k))});
   return e;
 }
 
@@ -34,10 +44,10 @@ SettingsRecord full_settings() {
   return s;
 }
 
-CellsRecord full_cells() {
+CellsRecord cells_record(std::uint8_t count) {
   CellsRecord c;
-  c.count = 16;
-  for (std::size_t k = 0; k < 16; ++k)
+  c.count = count;
+  for (std::size_t k = 0; k < count; ++k)
     c.cell[k] = {static_cast<std::int16_t>(-3000 + 400 * static_cast<int>(k)), static_cast<std::uint16_t>(40'000 + k)};
   return c;
 }
@@ -59,8 +69,9 @@ TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   EXPECT_EQ(ChargeRecord::kind, (Kind{1, 2}));
   EXPECT_EQ(CellsRecord::kind, (Kind{2, 1}));
   EXPECT_EQ(HealthRecord::kind, (Kind{3, 1}));
-  EXPECT_EQ(EventsRecord::kind, (Kind{4, 1}));
+  EXPECT_EQ(EventsRecord::kind, (Kind{4, 2}));
   EXPECT_EQ(SettingsRecord::kind, (Kind{5, 1}));
+  EXPECT_EQ(ExtremesRecord::kind, (Kind{6, 1}));
   CellsRecord cells;
   cells.count = 2;
   cells.cell[0] = {-2, 0x0102};
@@ -71,15 +82,27 @@ TEST(Records, KeepTheirTypeNumbersAndFieldOrder) {
   EventsRecord events;
   events.starts = 9;
   events.resets[6] = 0x0807;
-  events.add({0x0605, 0x04030201});
-  Raw expected(118, 0);
+  Readings readings;
+  readings.soc = 0x11;
+  readings.range.lowest = {0x0666, 0x44, -2};
+  readings.range.highest = {0x1555, 0x33, -2};
+  events.add({0x65, 0x04030201, packed(readings)});
+  Raw expected(230, 0);
   expected[0] = 9;
   expected[16] = 7;
   expected[17] = 8;
   expected[18] = 1;
-  const Raw event = {5, 6, 1, 2, 3, 4};
+  // After code and time one word, from its lowest bit: soc 8 bits, current 14, highest and lowest temperature 8 each,
+  // highest and lowest voltage 13 each.
+  const std::uint64_t word = 0x11 | 0x3FFEULL << 8 | 0x33ULL << 22 | 0x44ULL << 30 | 0x1555ULL << 38 | 0x0666ULL << 51;
+  Raw event = {0x65, 1, 2, 3, 4};
+  for (int k = 0; k < 8; ++k) event.push_back(static_cast<std::uint8_t>(word >> (8 * k)));
   std::copy(event.begin(), event.end(), expected.begin() + 22);
   EXPECT_EQ(bytes_of(events), expected);
+  ExtremesRecord extremes;
+  extremes.range.lowest = {0x0102, 3, -2};
+  extremes.range.highest = {0x0405, 6, 0x0708};
+  EXPECT_EQ(bytes_of(extremes), (Raw{2, 1, 3, 0, 0xFE, 0xFF, 5, 4, 6, 0, 8, 7}));
   SettingsRecord settings;
   EXPECT_TRUE(settings.set(0x0102, -2));
   EXPECT_EQ(bytes_of(settings), (Raw{1, 0, 1, 2, 1, 0xFE, 0xFF, 0xFF, 0xFF}));
@@ -89,7 +112,10 @@ TEST(Records, OfANewBatteryAreEmpty) {
   EXPECT_EQ(bytes_of(ChargeRecord{}), Raw(32, 0));
   EXPECT_EQ(bytes_of(CellsRecord{}), Raw(1, 0));
   EXPECT_EQ(bytes_of(HealthRecord{}), Raw(16, 0));
-  EXPECT_EQ(bytes_of(EventsRecord{}), Raw(118, 0));
+  EXPECT_EQ(bytes_of(EventsRecord{}), Raw(230, 0));
+  const Raw unknown{0xFF, 0x1F, 0xFF, 0, 0, 0xE0, 0xFF, 0x1F, 0xFF, 0, 0, 0xE0};
+  EXPECT_EQ(bytes_of(ExtremesRecord{}), unknown);
+  EXPECT_EQ(packed({}), 0xFF | 0x2000ULL << 8 | 0xFFFFULL << 22 | 0x3FF'FFFFULL << 38) << "no reading is known";
   EXPECT_EQ(bytes_of(SettingsRecord{}), Raw(3, 0));
   EXPECT_EQ(SettingsRecord::Setting{}, (SettingsRecord::Setting{0, 0}));
   EXPECT_EQ(CellsRecord::Cell{}, (CellsRecord::Cell{0, 0}));
@@ -121,12 +147,30 @@ TEST(Records, AreDecodedAsEncodedAndOnlyFromTheirLength) {
   charge.pack = {987'654'321, 12'345'678};
   charge.charged_uah = 123'456'789'012;
   is_decoded_as_encoded(charge);
-  is_decoded_as_encoded(full_cells());
+  for (const std::uint8_t count : {std::uint8_t{8}, std::uint8_t{15}, std::uint8_t{16}, std::uint8_t{24}}) {
+    is_decoded_as_encoded(cells_record(count));
+    EXPECT_EQ(bytes_of(cells_record(count)).size(), 1U + 4U * count);
+  }
   is_decoded_as_encoded(CellsRecord{});
   is_decoded_as_encoded(HealthRecord{912'000, 3'000, 1'430'000, 20'000});
   is_decoded_as_encoded(full_events());
+  EventsRecord with_processor_fault = full_events();
+  with_processor_fault.add({0xFF62, 5, packed(some_readings(1))});  // the last interrupt of an STM32F405
+  with_processor_fault.add({127, 0xFFFFFFFF, {}});
+  is_decoded_as_encoded(with_processor_fault);
+  ExtremesRecord extremes;
+  extremes.range.add(some_readings(5).range);
+  is_decoded_as_encoded(extremes);
+  is_decoded_as_encoded(ExtremesRecord{});
   is_decoded_as_encoded(full_settings());
   is_decoded_as_encoded(SettingsRecord{});
+}
+
+TEST(CellsRecord, OfMoreThan24CellsIsNotDecoded) {
+  Raw bytes(1 + 4 * 25, 1);
+  bytes[0] = 25;
+  CellsRecord cells;
+  EXPECT_FALSE(decode(bytes, CellsRecord::kind.layout, cells));
 }
 
 TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithTheSigmaOfAMinute) {
@@ -139,6 +183,43 @@ TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithTheSigmaOfAMinute) {
   EXPECT_EQ(r.moved_ppb, 16'666'667U) << "1C for a minute";
   EXPECT_EQ(r.charged_uah, 0U);
   EXPECT_FALSE(decode(layout_1, 2, r));
+}
+
+/// The layout before readings were added, as that firmware wrote it.
+TEST(EventsRecord, OfTheOlderLayoutIsReadWithoutReadings) {
+  Raw older(118, 0);
+  older[0] = 3;
+  older[18] = 2;
+  const Raw faults = {29, 0, 1, 2, 3, 4, 0x05, 0xFF, 9, 0, 0, 0};
+  std::copy(faults.begin(), faults.end(), older.begin() + 22);
+  EventsRecord e = full_events();
+  ASSERT_TRUE(decode(older, 1, e));
+  EXPECT_EQ(e.starts, 3U);
+  EXPECT_EQ(e.faults, 2U);
+  EXPECT_EQ(e.last(1), (EventsRecord::Fault{29, 0x04030201, packed({})}));
+  EXPECT_EQ(e.last(0), (EventsRecord::Fault{0xFF05, 9, packed({})})) << "a bus fault of the processor";
+  EXPECT_EQ(e.last(2).code, 0);
+  EXPECT_FALSE(decode(older, 2, e));
+}
+
+TEST(ReadingRange, WidensWithEveryKnownReading) {
+  using enum ReadingRange::Quantity;
+  ReadingRange range;
+  range.add(ReadingRange{});
+  EXPECT_EQ(range, ReadingRange{});
+  range.add(voltage, 3'300);
+  EXPECT_EQ(range.lowest, (ReadingRange::Values{3'300, 255, -8'192})) << "no temperature and no current so far";
+  EXPECT_EQ(range.highest, range.lowest);
+  ReadingRange later;
+  later.lowest = {3'200, 40, -1'200};
+  later.highest = {3'250, 80, -1'200};
+  range.add(later);
+  later.lowest = {3'250, 50, 400};
+  later.highest = {3'400, 90, 400};
+  range.add(later);
+  range.add(ReadingRange{});
+  EXPECT_EQ(range.lowest, (ReadingRange::Values{3'200, 40, -1'200}));
+  EXPECT_EQ(range.highest, (ReadingRange::Values{3'400, 90, 400}));
 }
 
 TEST(ChargeRecord, AnImpossibleSocIsNotAccepted) {
@@ -163,9 +244,10 @@ TEST(EventsRecord, ContainsTheLastSixteenFaultsNewestFirst) {
   EXPECT_EQ(e.faults, 20U);
   EXPECT_EQ(e.last(0).code, 20);
   EXPECT_EQ(e.last(15).code, 5);
-  EXPECT_EQ(e.last(15).operating_s, 500'000U);
+  EXPECT_EQ(e.last(15).time_s, 500'000U);
+  EXPECT_EQ(e.last(15).readings, packed(some_readings(5)));
   EventsRecord few;
-  few.add({3, 4});
+  few.add({3, 4, {}});
   EXPECT_EQ(few.last(0).code, 3);
   EXPECT_EQ(few.last(1).code, 0);
 }
@@ -186,7 +268,7 @@ TEST(SettingsRecord, StoresAValueByKeyAndReportsWhenItIsFull) {
 TEST(Records, OfRandomBytesAreReadSafely) {
   std::mt19937 random(1);
   for (int k = 0; k < 100'000; ++k) {
-    Raw bytes(random() % 160);
+    Raw bytes(random() % 240);
     for (auto& b : bytes) b = static_cast<std::uint8_t>(random());
     const auto layout = static_cast<std::uint8_t>(random() % 4);
     ChargeRecord charge;
@@ -199,6 +281,8 @@ TEST(Records, OfRandomBytesAreReadSafely) {
     EXPECT_TRUE(!decode(bytes, layout, settings) || settings.count <= SettingsRecord::max_settings);
     decode(bytes, layout, health);
     if (decode(bytes, layout, events)) events.add(events.last(3));
+    ExtremesRecord extremes;
+    decode(bytes, layout, extremes);
   }
 }
 

@@ -1,0 +1,31 @@
+// Settings of the measuring chip for this image: its board and its cell file.
+#include <bit>
+
+#include "firmware/board_design.hpp"
+#include "firmware/front_end/second_line.hpp"
+
+namespace bms {
+
+namespace {
+
+using namespace firmware;
+
+constexpr protection::Rules rules = protection::rules_of(protection::protection_table(board_design()));
+constexpr hal::bq76952::Board board = front_end_board(rules, hal::pack_cells);
+constexpr auto board_settings = hal::bq76952::settings(board);
+constexpr SecondLine chip = second_line(board_settings, board.shunt_mohm);
+
+static_assert(hal::bq76952::possible(board), "the chip cannot have a threshold or a delay that this cell file needs");
+static_assert(current_is_in_range(board, rules), "the shunt cannot measure the current of the row short circuit");
+static_assert(overvoltage_is_wider_and_slower(chip, rules, hal::sample_period_s));
+static_assert(undervoltage_is_wider_and_slower(chip, rules, hal::sample_period_s));
+static_assert(overcurrent_is_wider_and_slower(chip, rules, hal::sample_period_s));
+static_assert(host_silence_is_slower(chip, rules));
+static_assert(std::popcount(board.cell_inputs) == hal::pack_cells);
+
+}  // namespace
+
+constexpr hal::bq76952::Configuration hal::bq76952::board_configuration =
+    hal::bq76952::configuration(board, board_settings);
+
+}  // namespace bms

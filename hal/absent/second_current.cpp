@@ -1,0 +1,10 @@
+// No second current sensor.
+#include "hal/second_current.hpp"
+
+#include "measurement/sample.hpp"
+
+namespace bms::hal {
+
+std::int32_t second_current_ua() { return measurement::no_reading; }
+
+}  // namespace bms::hal

@@ -1,0 +1,87 @@
+#include "host_sim/judgement.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace bms::host_sim {
+
+namespace {
+
+/// The estimator keeps the state of charge inside; near the end of that range nothing is known.
+constexpr double lowest_soc = -0.25, highest_soc = 1.25, soc_margin = 1e-3;
+constexpr double most_at_the_end = 0.1;      ///< share of the estimates that may be at the end of the range
+constexpr double most_rejected = 0.1;        ///< share of the voltages that the filter may reject
+constexpr double fewest_voltages = 0.5;      ///< share of the samples whose voltage can be used
+constexpr double unknown_soc_sigma = 0.289;  ///< of a state of charge anywhere between 0 and 1: 1 / sqrt(12)
+
+constexpr std::uint32_t voltage_unusable =
+    estimator::voltage_missing | estimator::voltage_implausible | estimator::voltage_stuck;
+
+/// Warnings of a recording that explain an impossible estimate, the most likely first.
+constexpr std::array<std::string_view, 5> causes = {"time_in_ms", "current_in_ma", "voltage_in_mv", "current_inverted",
+                                                    "charge_exceeds_capacity"};
+/// Those that make every estimate doubtful.
+constexpr std::array<std::string_view, 4> severe = {"time_in_ms", "current_in_ma", "voltage_in_mv", "current_inverted"};
+
+bool at_the_end(const EstimateRow& e) { return e.soc < lowest_soc + soc_margin || e.soc > highest_soc - soc_margin; }
+
+std::string likely_cause(const ReplayResult& result) {
+  for (const std::string_view id : causes) {
+    for (const measurement::Warning& w : result.recording.warnings) {
+      if (w.id == id) return w.text;
+    }
+  }
+  return result.prior ? "the initial state of charge or the cell file does not fit the recording"
+                      : "the cell file does not fit the recording";
+}
+
+void check_numbers(const std::vector<EstimateRow>& rows) {
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (!std::isfinite(rows[k].soc) || !std::isfinite(rows[k].soc_sigma))
+      throw std::runtime_error(fmt::format("the estimate is not a number from sample {} on", k + 1));
+  }
+}
+
+std::size_t count(const std::vector<EstimateRow>& rows, std::uint32_t flags) {
+  return static_cast<std::size_t>(
+      std::count_if(rows.begin(), rows.end(), [flags](const EstimateRow& e) { return (e.flags & flags) != 0; }));
+}
+
+std::vector<std::string> doubts_of(const ReplayResult& result) {
+  std::vector<std::string> doubts;
+  for (const measurement::Warning& w : result.recording.warnings) {
+    if (std::find(severe.begin(), severe.end(), w.id) != severe.end()) doubts.push_back(w.text);
+  }
+  const std::vector<EstimateRow>& rows = result.track.rows;
+  const std::size_t used = rows.size() - count(rows, voltage_unusable);
+  const std::size_t rejected = count(rows, estimator::voltage_rejected);
+  if (static_cast<double>(used) < fewest_voltages * static_cast<double>(rows.size()))
+    doubts.push_back(fmt::format("only {} of {} voltages can be used", used, rows.size()));
+  if (static_cast<double>(rejected) > most_rejected * static_cast<double>(used))
+    doubts.push_back(fmt::format("{} of {} voltages contradict the cell file", rejected, used));
+  if (rows.back().soc_sigma > unknown_soc_sigma) doubts.emplace_back("the state of charge is not known at all");
+  return doubts;
+}
+
+}  // namespace
+
+Judgement judge(const ReplayResult& result) {
+  const std::vector<EstimateRow>& rows = result.track.rows;
+  check_numbers(rows);
+  Judgement judgement;
+  const auto outside = static_cast<double>(std::count_if(rows.begin(), rows.end(), at_the_end));
+  if (at_the_end(rows.back()) || outside > most_at_the_end * static_cast<double>(rows.size())) {
+    judgement.impossible =
+        fmt::format("the state of charge leaves {:g} to {:g} % ({:.1f} % at the end); likely cause: {}",
+                    100 * lowest_soc, 100 * highest_soc, 100 * rows.back().soc, likely_cause(result));
+  }
+  judgement.doubts = doubts_of(result);
+  return judgement;
+}
+
+}  // namespace bms::host_sim

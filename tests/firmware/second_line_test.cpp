@@ -1,0 +1,130 @@
+// Thresholds of the measuring chip's own protections for cells of several chemistries. Expected registers are computed
+// by hand from the limits of the cell: severe rows are 10 % of the span above and 12 % below the limits, a short
+// circuit is five times the larger continuous current.
+#include "firmware/front_end/second_line.hpp"
+
+#include <bit>
+
+#include <gtest/gtest.h>
+
+#include "tests/cells.hpp"
+
+namespace bms::firmware {
+namespace {
+
+constexpr double period_s = 0.1;
+
+struct Chip {
+  constexpr explicit Chip(const model::Limits& limits, double capacity_ah, std::uint8_t cells = 16)
+      : rules(protection::rules_of(protection::protection_table(
+            {.limits = limits, .capacity_ah = capacity_ah, .cells = cells, .temperatures = 4}))),
+        board(front_end_board(rules, cells)),
+        settings(hal::bq76952::settings(board)),
+        line(second_line(settings, board.shunt_mohm)) {}
+
+  constexpr bool wider_and_slower() const {
+    return overvoltage_is_wider_and_slower(line, rules, period_s) &&
+           undervoltage_is_wider_and_slower(line, rules, period_s) &&
+           overcurrent_is_wider_and_slower(line, rules, period_s) && host_silence_is_slower(line, rules) &&
+           current_is_in_range(board, rules) && hal::bq76952::possible(board);
+  }
+  constexpr std::uint32_t at(std::uint16_t address) const { return hal::bq76952::value_of(settings, address); }
+
+  protection::Rules rules;
+  hal::bq76952::Board board;
+  decltype(hal::bq76952::settings(hal::bq76952::Board{})) settings;
+  SecondLine line;
+};
+
+constexpr model::Limits nmc{.voltage_min_v = 3.0,
+                            .voltage_max_v = 4.2,
+                            .charge_current_max_a = 50,
+                            .discharge_current_max_a = 100,
+                            .temperature_min_c = -20,
+                            .temperature_max_c = 60};
+constexpr model::Limits lto{.voltage_min_v = 1.5,
+                            .voltage_max_v = 2.8,
+                            .charge_current_max_a = 60,
+                            .discharge_current_max_a = 60,
+                            .temperature_min_c = -30,
+                            .temperature_max_c = 55};
+constexpr model::Limits lfp_200ah{.voltage_min_v = 2.5,
+                                  .voltage_max_v = 3.65,
+                                  .charge_current_max_a = 200,
+                                  .discharge_current_max_a = 200,
+                                  .temperature_min_c = -20,
+                                  .temperature_max_c = 60};
+
+constexpr Chip table9(tests::table9.limits, tests::table9.capacity_ah), a123(tests::a123_26650.limits, 2.58),
+    of_nmc(nmc, 50), of_lto(lto, 30), of_lfp_200ah(lfp_200ah, 200);
+static_assert(table9.wider_and_slower());
+static_assert(a123.wider_and_slower());
+static_assert(of_nmc.wider_and_slower());
+static_assert(of_lto.wider_and_slower());
+static_assert(of_lfp_200ah.wider_and_slower());
+
+TEST(SecondLineOfTheFrontEnd, FollowsTheVoltagesOfTheCell) {
+  // 3.65 + 0.165 + 0.02 V in steps of 50.6 mV: 75.8; 2.0 - 0.198 - 0.02 V: 35.2
+  EXPECT_EQ(table9.at(0x9278), 76U);
+  EXPECT_EQ(table9.at(0x9275), 35U);
+  // 4.2 + 0.12 + 0.02 V: 85.8; 3.0 - 0.144 - 0.02 V: 56.05
+  EXPECT_EQ(of_nmc.at(0x9278), 86U);
+  EXPECT_EQ(of_nmc.at(0x9275), 56U);
+  // 2.8 + 0.13 + 0.02 V: 58.3; 1.5 - 0.156 - 0.02 V: 26.2
+  EXPECT_EQ(of_lto.at(0x9278), 59U);
+  EXPECT_EQ(of_lto.at(0x9275), 26U);
+  for (const Chip* chip : {&table9, &of_nmc, &of_lto}) {
+    EXPECT_NEAR(chip->line.overvoltage_s, 1.0, 0.004) << "0.8 s more than 0.2 s";
+    EXPECT_NEAR(chip->line.undervoltage_s, 1.0, 0.004);
+  }
+}
+
+TEST(SecondLineOfTheFrontEnd, FollowsTheCurrentsOfTheCell) {
+  // 6 A: short circuit at 30 A; 36 A and 45 A are 3.6 and 4.5 mV in steps of 2 mV; 600 A of the inrush are 60 mV
+  EXPECT_EQ(table9.at(0x9282), 2U);
+  EXPECT_EQ(table9.at(0x9284), 3U);
+  EXPECT_EQ(table9.at(0x9286), 3U);
+  EXPECT_EQ(table9.at(0x9261), 0xFCU) << "all of them";
+  EXPECT_EQ(hal::bq76952::current_step_ua(table9.board), 10'000);
+  // 200 A: 1,000 A; 1,200 A are 120 mV, beyond the 62 steps of OCC; 1,500 A are 150 mV; 2,000 A are 200 mV
+  EXPECT_EQ(of_lfp_200ah.at(0x9282), 60U);
+  EXPECT_EQ(of_lfp_200ah.at(0x9280), 60U);
+  EXPECT_EQ(of_lfp_200ah.at(0x9284), 75U);
+  EXPECT_EQ(of_lfp_200ah.at(0x9286), 9U);
+  EXPECT_EQ(hal::bq76952::current_step_ua(of_lfp_200ah.board), 100'000);
+  EXPECT_DOUBLE_EQ(hal::bq76952::current_end_a(of_lfp_200ah.board), 2'000) << "200 mV at 0.1 mOhm";
+  EXPECT_NEAR(of_lfp_200ah.line.overcurrent_s, 0.42, 0.002);
+  EXPECT_NEAR(of_lfp_200ah.line.high_overcurrent_s, 0.35, 0.002);
+}
+
+TEST(SecondLineOfTheFrontEnd, AnOvercurrentBeyondTheComparatorIsLeftToTheOthers) {
+  model::Limits limits = lfp_200ah;
+  limits.charge_current_max_a = limits.discharge_current_max_a = 300;
+  const Chip chip(limits, 300);
+  // 1,500 A: 1,800 A are 90 steps, OCC ends at 62; 2,250 A are 113 steps, OCD2 ends at 100
+  EXPECT_EQ(chip.at(0x9261), 0xACU) << "SCD, OCD1, COV, CUV";
+  EXPECT_TRUE(chip.wider_and_slower());
+}
+
+TEST(SecondLineOfTheFrontEnd, ABoardWithOtherThresholdsIsNotWiderAndSlower) {
+  // What a fixed 3.8 V and 2.0 V for 1 s would be: with this cell the first line opens at 3.815 V and 1.802 V.
+  hal::bq76952::Board fixed = table9.board;
+  fixed.overvoltage_v = 3.79;
+  fixed.undervoltage_v = 2.0;
+  const auto settings = hal::bq76952::settings(fixed);
+  const SecondLine line = second_line(settings, fixed.shunt_mohm);
+  EXPECT_FALSE(overvoltage_is_wider_and_slower(line, table9.rules, period_s));
+  EXPECT_FALSE(undervoltage_is_wider_and_slower(line, table9.rules, period_s));
+  hal::bq76952::Board fast = table9.board;
+  fast.overcurrent_delay_s = 0.2;
+  EXPECT_FALSE(overcurrent_is_wider_and_slower(second_line(hal::bq76952::settings(fast), 0.1), table9.rules, period_s));
+}
+
+TEST(SecondLineOfTheFrontEnd, APackOfFewerCellsHasItsInputs) {
+  EXPECT_EQ(Chip(nmc, 50, 8).at(0x9304), 0x807FU);
+  EXPECT_EQ(Chip(nmc, 50, 15).at(0x9304), 0xBFFFU);
+  EXPECT_EQ(table9.at(0x9304), 0xFFFFU);
+}
+
+}  // namespace
+}  // namespace bms::firmware
