@@ -329,8 +329,8 @@ std::vector<TruckWorld::Closing> TruckWorld::closings_below_v(double volt, std::
 
 std::vector<std::string> TruckWorld::violations() const {
   std::vector<std::string> all = i2c_.violations();
-  for (const auto* more : {&chip.violations, &board.can.violations, &board.flash.violations, &adc.violations,
-                           &port_a.violations, &port_b.violations, &port_c.violations}) {
+  for (const auto* more : {&chip.violations, &board.can.violations, &board.rcc.violations, &board.flash.violations,
+                           &adc.violations, &port_a.violations, &port_b.violations, &port_c.violations}) {
     all.insert(all.end(), more->begin(), more->end());
   }
   return all;

@@ -66,7 +66,7 @@ TEST(AdcModel, ConvertsASequenceInTheTimesOfTheManual) {
   AdcModel adc(board);
   adc.noise_lsb = 0;
   adc.pin_v = [](unsigned channel) { return channel == 11 ? 1.65 : 0.33; };
-  const double mhz = (board.register_value(0x40023808) & 3) == 2 ? 84 : 16;
+  const double mhz = 1e-6 * board.rcc.apb2_hz();
   adc.write(0x04, 1U << 8, 0);        // SCAN
   adc.write(0x2C, 1U << 20, 0);       // two conversions
   adc.write(0x34, 11 | 10U << 5, 0);  // L+, L-
