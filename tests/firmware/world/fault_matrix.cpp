@@ -1,6 +1,7 @@
 // Every protection of the published table, caused at its physical source: just below its threshold, just above, with
 // noise, and during another fault, in each operating state. Reaction times count to the physical opening of a main
 // contact.
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -264,6 +265,8 @@ Result run_fault_matrix(const Extent& extent) {
   for (const Operating state :
        {Operating::off, Operating::standby, Operating::drive, Operating::recuperate, Operating::charge}) {
     const std::vector<Case> list = cases_in(state, rows, causes, background);
+    const auto named = [&](const Case& c) { return fmt::format("{}: {}", name_of(state), c.name); };
+    if (std::none_of(list.begin(), list.end(), [&](const Case& c) { return extent.has(named(c)); })) continue;
     TruckWorld world(pack.image, typical_setup(pack, extent.seed));
     if (const std::string problem = bring_to(world, pack, state); !problem.empty()) {
       broken.emplace_back().name = name_of(state);
@@ -275,7 +278,7 @@ Result run_fault_matrix(const Extent& extent) {
     std::size_t left = extent.count == 0 ? list.size() : extent.count / 5;
     const double share = static_cast<double>(left) / static_cast<double>(list.size());
     for (const Case& c : list) {
-      const std::string name = fmt::format("{}: {}", name_of(state), c.name);
+      const std::string name = named(c);
       if (!extent.has(name) || left == 0 || (extent.count != 0 && random.uniform() > share)) continue;
       --left;
       world.run_ms(37 * random.uniform());  // any phase of the sample
