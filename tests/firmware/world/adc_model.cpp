@@ -35,10 +35,7 @@ void AdcModel::reset() {
 /// Sampling time and 12 cycles; ADCCLK is PCLK2 divided by 2, 4, 6 or 8 (RM0090, 13.5 and 13.13.16).
 double AdcModel::conversion_us(unsigned channel) const {
   constexpr std::array<int, 8> cycles{3, 15, 28, 56, 84, 112, 144, 480};
-  const std::uint32_t cfgr = board_.register_value(0x40023808);
-  double pclk2_mhz = (cfgr & 3) == 2 ? 168 : 16;
-  if ((cfgr >> 13 & 4) != 0) pclk2_mhz /= 2 << (cfgr >> 13 & 3);
-  const double clock_mhz = pclk2_mhz / (2.0 * (1 + (ccr_ >> 16 & 3)));
+  const double clock_mhz = 1e-6 * board_.rcc.apb2_hz() / (2.0 * (1 + (ccr_ >> 16 & 3)));
   const unsigned code =
       channel >= 10 ? smpr_[0] >> 3 * (channel - 10) & 7 : smpr_[1] >> 3 * channel & 7;  // SMPR1 is first
   return (cycles[code] + 12) / clock_mhz;
@@ -89,7 +86,8 @@ void AdcModel::ends(bool injected) {
   const unsigned code = convert(s.channel[s.at]);
   const bool last = s.at + 1 == s.length;
   if (injected) {
-    injected_[s.at] = static_cast<std::uint32_t>(static_cast<int>(code) - static_cast<int>(offsets_[s.at] & 0xFFF)) & 0xFFFF;
+    injected_[s.at] =
+        static_cast<std::uint32_t>(static_cast<int>(code) - static_cast<int>(offsets_[s.at] & 0xFFF)) & 0xFFFF;
     if (last) sr_ |= jeoc;
   } else {
     const bool each = (cr2_ & eocs) != 0;

@@ -1,8 +1,10 @@
-// Register model of the ADC1 of the STM32F405. Written only from RM0090, 13, and the datasheet DS8626, 5.3.20 and 5.3.24: regular and
-// injected sequences, single, scan and continuous conversion, sampling times, the end-of-conversion flags, overrun.
-// Conversion to 6, 8 and 10 bits, the watchdog, DMA and external triggers are not modelled and are violations.
+// Register model of the ADC1 of the STM32F405. Written only from RM0090, 13, and the datasheet DS8626, 5.3.20 and
+// 5.3.24: regular and injected sequences, single, scan and continuous conversion, sampling times, the end-of-conversion
+// flags, overrun. Conversion to 6, 8 and 10 bits, the watchdog, DMA and external triggers are not modelled and are
+// violations.
 //
-// While the program polls the status register, the time until the end of the conversion is skipped. The reference is VDDA, so a reading is the ratio of a pin to VDDA. `violations` lists driver errors.
+// While the program polls the status register, the time until the end of the conversion is skipped. The reference is
+// VDDA, so a reading is the ratio of a pin to VDDA. `violations` lists driver errors.
 #pragma once
 
 #include <array>

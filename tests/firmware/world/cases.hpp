@@ -1,5 +1,5 @@
-// Cases that run in child processes: a child is a copy of this process with the world as it is at that moment, so a world is
-// started once and continued in many ways.
+// Cases that run in child processes: a child is a copy of this process with the world as it is at that moment, so a
+// world is started once and continued in many ways.
 #pragma once
 
 #include <cstddef>

@@ -52,11 +52,13 @@ std::vector<Cause> other_causes() {
   list.push_back({20, "a cell register reads 0", [](TruckWorld& w) { w.chip.zero_cells = 1U << 6; }, 0.3, true,
                   fault(3) | fault(4) | fault(5) | fault(16) | fault(17) | fault(19) | fault(25) | second_line});
   list.push_back({21, "a cell register is stuck", [](TruckWorld& w) { w.chip.stale_cells = 1U << 6; }, 3, false,
-                  fault(16) | fault(19), [](TruckWorld& w) {
+                  fault(16) | fault(19),
+                  [](TruckWorld& w) {
                     static int turn = 0;
                     for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, ++turn / 16 % 2 == 0 ? 3.30 : 3.36);
                   }});
-  list.push_back({22, "current beyond the range of the sensor", [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; }, 0.4, true,
+  list.push_back({22, "current beyond the range of the sensor", [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; },
+                  0.4, true,
                   fault(8) | fault(9) | fault(10) | fault(18) | fault(34) | fault(37) | fault(27) | second_line});
   for (std::size_t sensor = 0; sensor < 4; ++sensor) {
     for (const double ohm : {Bq76952Inputs::open_ohm, 0.0}) {
@@ -64,11 +66,14 @@ std::vector<Cause> other_causes() {
                       [=](TruckWorld& w) { w.set_thermistor_ohm(sensor, ohm); }, 0.7});
     }
   }
-  list.push_back({24, "thermistor 1 stuck", [](TruckWorld& w) {
+  list.push_back({24, "thermistor 1 stuck",
+                  [](TruckWorld& w) {
                     for (std::size_t k = 1; k < 4; ++k) w.set_temperature(k, 25);
                   },
-                  8, false, 0, [](TruckWorld& w) {
-                    for (std::size_t k = 1; k < 4; ++k) w.set_temperature(k, std::min(38.0, w.temperature_c(k) + 2.5 + 0.2 * static_cast<double>(k)));
+                  8, false, 0,
+                  [](TruckWorld& w) {
+                    for (std::size_t k = 1; k < 4; ++k)
+                      w.set_temperature(k, std::min(38.0, w.temperature_c(k) + 2.5 + 0.2 * static_cast<double>(k)));
                   }});
   return list;
 }

@@ -1,4 +1,5 @@
-// Physical causes of the published protections: what has to happen at a cell, the shunt, a sensor, a wire or the front end.
+// Physical causes of the published protections: what has to happen at a cell, the shunt, a sensor, a wire or the front
+// end.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +23,9 @@ struct Cause {
   unsigned bit;
   std::string name;
   std::function<void(TruckWorld&)> happens;
-  double within_s;                       ///< until the fault must be published, without the delay of its row
-  bool blind = false;                    ///< the front end does not measure any more
-  std::uint64_t also = 0;                ///< faults that may follow from the same cause
+  double within_s;         ///< until the fault must be published, without the delay of its row
+  bool blind = false;      ///< the front end does not measure any more
+  std::uint64_t also = 0;  ///< faults that may follow from the same cause
   std::function<void(TruckWorld&)> each_second = {};
 };
 std::vector<Cause> other_causes();

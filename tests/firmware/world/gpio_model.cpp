@@ -25,9 +25,7 @@ Level GpioPort::driven(unsigned pin) const {
   return (open_drain_ >> pin & 1) != 0 ? Level::floating : Level::high;
 }
 
-void GpioPort::set_outside(unsigned pin, bool high) {
-  outside_ = (outside_ & ~(1U << pin)) | (high ? 1U << pin : 0U);
-}
+void GpioPort::set_outside(unsigned pin, bool high) { outside_ = (outside_ & ~(1U << pin)) | (high ? 1U << pin : 0U); }
 
 std::uint32_t GpioPort::read(std::uint32_t offset, double) {
   if ((board_.register_value(ahb1_clocks) >> port_ & 1) == 0) return 0;

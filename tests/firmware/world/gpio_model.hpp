@@ -1,5 +1,5 @@
-// Register model of a GPIO port and of the interrupt lines EXTI0 to EXTI16 of the STM32F405. Written only from RM0090, 8.4, 9.2.4
-// and 12.3.
+// Register model of a GPIO port and of the interrupt lines EXTI0 to EXTI16 of the STM32F405. Written only from RM0090,
+// 8.4, 9.2.4 and 12.3.
 //
 // A pin that is not an output floats: the pull-downs of the drivers decide its level. `violations` lists driver errors.
 #pragma once

@@ -79,7 +79,9 @@ const char* name_of(Operating state) {
   return names[static_cast<std::size_t>(state)];
 }
 
-void set_drive_a(TruckWorld& world, double current_a) { world.truck.set_drive({.power_w = 0, .current_a = -current_a}); }
+void set_drive_a(TruckWorld& world, double current_a) {
+  world.truck.set_drive({.power_w = 0, .current_a = -current_a});
+}
 
 void set_charger_a(TruckWorld& world, double current_a) {
   world.truck.set_charger({.on = current_a > 0, .voltage_v = 58.4, .current_a = current_a});
@@ -93,7 +95,8 @@ std::string bring_to(TruckWorld& world, const Pack& pack, Operating state) {
   const bool charge = state == Operating::charge;
   world.vehicle.request = charge ? Request::charge : Request::drive;
   const auto ready = [&] { return world.both_mains_closed() && (!charge || world.closed(Relay::charge)); };
-  if (world.run_until(ready, start_limit_ms) < 0) return fmt::format("{}: does not close ({})", name_of(state), summary(world));
+  if (world.run_until(ready, start_limit_ms) < 0)
+    return fmt::format("{}: does not close ({})", name_of(state), summary(world));
   world.run_ms(1'500);
   if (charge) set_charger_a(world, 0.5 * pack.limit_a);
   if (state == Operating::drive) set_drive_a(world, -0.5 * pack.limit_a);
@@ -114,8 +117,8 @@ std::string summary(const TruckWorld& world) {
   std::string text = fmt::format("faults {}, first cause {}, state {}", fault_names(world.vehicle.faults()),
                                  world.vehicle.first_cause(), world.vehicle.state());
   for (const auto& closing : world.closings_below_v(closing_limit_v)) {
-    text += fmt::format(", contact {} closes over {:.1f} V with {:.0f} A at {:.0f} ms",
-                        static_cast<int>(closing.relay), closing.across_v, closing.peak_a, closing.at_ms);
+    text += fmt::format(", contact {} closes over {:.1f} V with {:.0f} A at {:.0f} ms", static_cast<int>(closing.relay),
+                        closing.across_v, closing.peak_a, closing.at_ms);
   }
   return text;
 }

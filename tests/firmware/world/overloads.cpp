@@ -81,12 +81,14 @@ Result run_overloads(const Extent& extent) {
     }
   }
   Result result{"overloads", "", cases.finish()};
-  result.table = "| pack and current | largest current [A] | contacts open after [s] | allowed [s] | published | |\n|---|---|---|---|---|---|\n";
+  result.table =
+      "| pack and current | largest current [A] | contacts open after [s] | allowed [s] | published | "
+      "|\n|---|---|---|---|---|---|\n";
   for (const Outcome& o : result.outcomes) {
     const double opened = o.value("opened", -1);
     result.table += fmt::format("| {} | {:.0f} | {} | {:.2f} | {} | {} |\n", o.name, o.value("current", 0),
-                                opened < 0 ? "not" : fmt::format("{:.3f}", opened), o.value("promised", 0), o.text("published"),
-                                o.good ? "" : "**deviation**");
+                                opened < 0 ? "not" : fmt::format("{:.3f}", opened), o.value("promised", 0),
+                                o.text("published"), o.good ? "" : "**deviation**");
   }
   result.outcomes.insert(result.outcomes.end(), broken.begin(), broken.end());
   return result;

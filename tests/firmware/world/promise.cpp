@@ -95,8 +95,8 @@ double Judge::value(const Row& row) const {
   if (q == "pack") return world_.pack_v();
   if (q == "magnitude of the current") return std::abs(world_.truck.current_a());
   if (q == "highest minus lowest cell") return world_.highest_cell_v() - world_.lowest_cell_v();
-  if (begins(q, "overload integral I²t of charging")) return charge_heat_s_;
-  if (begins(q, "overload integral I²t of discharging")) return discharge_heat_s_;
+  if (begins(q, "overload integral I²t of charging")) return charge_overload_s_;
+  if (begins(q, "overload integral I²t of discharging")) return discharge_overload_s_;
   if (q == "sum of cells minus pack") {
     double sum_v = -s.stack_error_v;
     for (const double v : s.cell_error_v) sum_v += v;
@@ -146,9 +146,9 @@ void Judge::watch(const Row& row, Watch& w, double now_s, double step_s) {
   w.recent.emplace_back(now_s, w.perhaps_s);
   while (w.recent.front().first < now_s - 1.0) w.recent.pop_front();
   const bool published = world_.vehicle.fault(row.bit);
-  if (published) w.told = false;
-  if (w.beyond_s > row.delay_s * (1 + more_delay_share) + chain_s && !published && !w.told) {
-    w.told = true;
+  if (published) w.reported = false;
+  if (w.beyond_s > row.delay_s * (1 + more_delay_share) + chain_s && !published && !w.reported) {
+    w.reported = true;
     ++missed_;
     find(fmt::format("missed: {} ({} is {:.3f} for {:.2f} s)", row.name, row.quantity, v, w.beyond_s));
   }
@@ -167,8 +167,8 @@ void Judge::check_raised(std::uint64_t raised, double now_s) {
     }
     if (right) continue;
     ++falsely_;
-    find(fmt::format("false: {} at {:.2f} s (true value {:.3f}, for {:.2f} s)", fault_names(std::uint64_t{1} << bit), now_s,
-                     v, longest_s));
+    find(fmt::format("false: {} at {:.2f} s (true value {:.3f}, for {:.2f} s)", fault_names(std::uint64_t{1} << bit),
+                     now_s, v, longest_s));
   }
 }
 
@@ -180,7 +180,11 @@ void Judge::check_open(double now_s) {
     if (row.reaction == Reaction::open_now) allowed_s = 0;
     if (row.reaction == Reaction::open) allowed_s = std::min(allowed_s, grace_s);
   }
-  if (!std::isfinite(allowed_s) || world_.isolated()) {
+  bool driven = false;  // a weld keeps a contact closed although its output is low
+  for (const plant::Relay relay : {plant::Relay::main_plus, plant::Relay::main_minus, plant::Relay::precharge}) {
+    driven = driven || world_.pin(relay) == Level::high;
+  }
+  if (!std::isfinite(allowed_s) || world_.isolated() || !driven) {
     opening_since_s_ = -1;
     return;
   }
@@ -194,9 +198,9 @@ void Judge::step() {
   const double now_s = world_.now_s(), step_s = now_s - last_s_;
   last_s_ = now_s;
   const double ratio = world_.truck.current_a() / limit_a_, heating = ratio * ratio - 1;
-  double& heat_s = ratio > 0 ? charge_heat_s_ : discharge_heat_s_;
-  double& other_s = ratio > 0 ? discharge_heat_s_ : charge_heat_s_;
-  heat_s = std::max(0.0, heat_s + (std::abs(ratio) > 1.05 || heating < 0 ? heating : 0) * step_s);
+  double& overload_s = ratio > 0 ? charge_overload_s_ : discharge_overload_s_;
+  double& other_s = ratio > 0 ? discharge_overload_s_ : charge_overload_s_;
+  overload_s = std::max(0.0, overload_s + (std::abs(ratio) > 1.05 || heating < 0 ? heating : 0) * step_s);
   other_s = std::max(0.0, other_s - step_s);
   for (std::size_t k = 0; k < rows_.size(); ++k) watch(rows_[k], watches_[k], now_s, step_s);
   const std::uint64_t faults = world_.vehicle.faults();

@@ -1,14 +1,14 @@
 // What the firmware promises, and a judge of whether it does it.
 //
-// The promise is the table of protections in protection/README.md, read as text. The judge knows the true voltages, currents and
-// temperatures, and compares with them what is published on the bus:
+// The promise is the table of protections in protection/README.md, read as text. The judge knows the true voltages,
+// currents and temperatures, and compares with them what is published on the bus:
 //
 //   missed   a quantity was beyond its threshold by more than the tolerance of its measurement, without a break, for
 //            the delay of the row and the time of the measuring chain, and the fault is not published
 //   false    a fault is published although its quantity was not beyond the threshold, less the tolerance, for its delay
 //
-// Rows that the truth does not determine (contactors, missing readings, internal faults) are faults that a case has to expect or
-// to allow.
+// Rows that the truth does not determine (contactors, missing readings, internal faults) are faults that a case has to
+// expect or to allow.
 #pragma once
 
 #include <cstdint>
@@ -34,8 +34,8 @@ struct Row {
   Reaction reaction = Reaction::warn;
 };
 
-/// Thresholds of currents are multiplied by `current_factor`. Throws std::runtime_error if the file has no such table, or
-/// a row cannot be read.
+/// Thresholds of currents are multiplied by `current_factor`. Throws std::runtime_error if the file has no such table,
+/// or a row cannot be read.
 std::vector<Row> promised_rows(const std::filesystem::path& readme, double current_factor = 1);
 
 /// Time of the measuring chain: a scan of the front end, a sample period, processing and the bus.
@@ -52,11 +52,11 @@ class Judge {
   /// At the end of each step.
   void step();
 
-  std::uint64_t expected = 0;  ///< faults that a case causes, other than by quantities
-  std::uint64_t allowed = 0;   ///< faults that may also be published
-  bool blind = false;          ///< the front end does not measure: nothing can be missed
+  std::uint64_t expected = 0;                         ///< faults that a case causes, other than by quantities
+  std::uint64_t allowed = 0;                          ///< faults that may also be published
+  bool blind = false;                                 ///< the front end does not measure: nothing can be missed
   double more_tolerance_v = 0, more_tolerance_a = 0;  ///< of the noise
-  double more_delay_share = 0;  ///< noise delays a fault by so much of its delay
+  double more_delay_share = 0;                        ///< noise delays a fault by so much of its delay
 
   const std::vector<std::string>& findings() const { return findings_; }
   unsigned missed() const { return missed_; }
@@ -67,10 +67,10 @@ class Judge {
 
  private:
   struct Watch {
-    double beyond_s = 0;   ///< surely beyond the threshold, without a break
-    double perhaps_s = 0;  ///< counts up and down
+    double beyond_s = 0;                           ///< surely beyond the threshold, without a break
+    double perhaps_s = 0;                          ///< counts up and down
     std::deque<std::pair<double, double>> recent;  ///< time, perhaps_s
-    bool told = false;
+    bool reported = false;
   };
   double value(const Row& row) const;
   double tolerance(const Row& row) const;
@@ -82,7 +82,7 @@ class Judge {
   TruckWorld& world_;
   std::vector<Row> rows_;
   std::vector<Watch> watches_;
-  double limit_a_, last_s_, charge_heat_s_ = 0, discharge_heat_s_ = 0, opening_since_s_ = -1;
+  double limit_a_, last_s_, charge_overload_s_ = 0, discharge_overload_s_ = 0, opening_since_s_ = -1;
   std::uint64_t before_;
   unsigned missed_ = 0, falsely_ = 0;
   std::vector<std::string> findings_;

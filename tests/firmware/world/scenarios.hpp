@@ -18,15 +18,15 @@ struct Result {
 };
 
 struct Extent {
-  std::size_t count = 0;     ///< 0: all
+  std::size_t count = 0;  ///< 0: all
   std::uint64_t seed = 1;
-  std::string only;          ///< cases whose name contains this text; empty: all
-  double minutes = 10;       ///< of the shift
+  std::string only;     ///< cases whose name contains this text; empty: all
+  double minutes = 10;  ///< of the shift
   unsigned at_once = 2;
   bool has(const std::string& name) const;  ///< `only` selects the case
 };
 
-Result run_starts(const Extent& extent);           ///< key on, drive, recuperate, charge, key off, restart
+Result run_starts(const Extent& extent);            ///< key on, drive, recuperate, charge, key off, restart
 Result run_contact_failures(const Extent& extent);  ///< failures of contactors, resistor, wires
 Result run_supply_dips(const Extent& extent);
 Result run_fault_matrix(const Extent& extent);

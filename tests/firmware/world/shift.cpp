@@ -1,5 +1,5 @@
-// A working day with noise on all readings: driving, lifting, recuperation, pauses and charging at random. No fault may be
-// published, and the contacts may open only when the key is off.
+// A working day with noise on all readings: driving, lifting, recuperation, pauses and charging at random. No fault may
+// be published, and the contacts may open only when the key is off.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -109,7 +109,8 @@ Result run_shift(const Extent& extent) {
   const double minutes = extent.minutes / static_cast<double>(trucks);
   for (std::size_t k = 0; k < trucks; ++k) {
     const std::uint64_t seed = extent.seed + k;
-    cases.start(fmt::format("truck {}", seed), [&, seed](Outcome& outcome) { Shift(pack, seed, outcome).run(minutes); });
+    cases.start(fmt::format("truck {}", seed),
+                [&, seed](Outcome& outcome) { Shift(pack, seed, outcome).run(minutes); });
   }
   Result result{"shift", "", cases.finish()};
   double samples = 0, starts = 0, done = 0, soc_error = 0;
@@ -119,9 +120,10 @@ Result run_shift(const Extent& extent) {
     done += o.value("minutes", 0);
     soc_error = std::max(soc_error, o.value("soc error", 0));
   }
-  result.table = fmt::format("| trucks | minutes | samples | starts | faults | error of the state of charge at the end |\n"
-                             "|---|---|---|---|---|---|\n| {} | {:.0f} | {:.0f} | {:.0f} | {} | {:.1f} % |\n",
-                             trucks, done, samples, starts, result.failed(), soc_error);
+  result.table = fmt::format(
+      "| trucks | minutes | samples | starts | faults | error of the state of charge at the end |\n"
+      "|---|---|---|---|---|---|\n| {} | {:.0f} | {:.0f} | {:.0f} | {} | {:.1f} % |\n",
+      trucks, done, samples, starts, result.failed(), soc_error);
   return result;
 }
 

@@ -32,11 +32,13 @@ class Start {
       restarts();
     } catch (const Stop&) {
     }
-    if (const auto closings = world_.closings_below_v(closing_limit_v); !closings.empty()) outcome_.fail(summary(world_));
+    if (const auto closings = world_.closings_below_v(closing_limit_v); !closings.empty())
+      outcome_.fail(summary(world_));
     for (const std::string& violation : world_.violations()) outcome_.texts[violation] = "violation";
     double inrush_a = 0;
     for (const auto& e : world_.truck.events()) {
-      if (e.closes && (e.relay == Relay::main_plus || e.relay == Relay::main_minus)) inrush_a = std::max(inrush_a, e.peak_a);
+      if (e.closes && (e.relay == Relay::main_plus || e.relay == Relay::main_minus))
+        inrush_a = std::max(inrush_a, e.peak_a);
     }
     outcome_.values["inrush"] = inrush_a;
   }
@@ -49,8 +51,8 @@ class Start {
   }
   void drives(const std::string& name) {
     world_.vehicle.request = Request::drive;
-    const double ms = world_.run_until([&] { return world_.both_mains_closed() && world_.vehicle.allowed_discharge_a() > 0; },
-                                       start_limit_ms);
+    const double ms = world_.run_until(
+        [&] { return world_.both_mains_closed() && world_.vehicle.allowed_discharge_a() > 0; }, start_limit_ms);
     must(ms >= 0, name + ": does not drive");
     outcome_.values[name] = 1e-3 * ms;
     world_.run_ms(500);
@@ -70,8 +72,8 @@ class Start {
   }
   void charges() {
     world_.vehicle.request = Request::charge;
-    const double ms = world_.run_until(
-        [&] { return world_.both_mains_closed() && world_.closed(Relay::charge); }, start_limit_ms);
+    const double ms =
+        world_.run_until([&] { return world_.both_mains_closed() && world_.closed(Relay::charge); }, start_limit_ms);
     must(ms >= 0, "charge: does not close");
     outcome_.values["charge"] = 1e-3 * ms;
     set_charger_a(world_, 0.5 * pack_.limit_a);
@@ -121,8 +123,9 @@ Result run_starts(const Extent& extent) {
     inrush_a = std::max(inrush_a, o.value("inrush", 0));
     for (const auto& [violation, kind] : o.texts) ++violations[violation];
   }
-  result.table += fmt::format("\n{} worlds, {} complete the whole sequence. Largest current at the closing of a main contact: {:.0f} A.\n",
-                              count, count - result.failed(), inrush_a);
+  result.table += fmt::format(
+      "\n{} worlds, {} complete the whole sequence. Largest current at the closing of a main contact: {:.0f} A.\n",
+      count, count - result.failed(), inrush_a);
   for (const auto& [violation, worlds] : violations) {
     result.table += fmt::format("\nAgainst the manual, in {} worlds: {}.\n", worlds, violation);
     result.outcomes.emplace_back().name = "violations of a manual";

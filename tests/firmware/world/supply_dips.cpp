@@ -1,7 +1,7 @@
-// Dips of the controller's supply and of the coils' supply at random times, in every state. No main contact may close on a DC link
-// far below the pack, neither at once nor at the next start.
-#include <cmath>
+// Dips of the controller's supply and of the coils' supply at random times, in every state. No main contact may close
+// on a DC link far below the pack, neither at once nor at the next start.
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -54,8 +54,8 @@ void survive(TruckWorld& world, const Dip& dip, Outcome& outcome) {
   const auto closings = world.closings_below_v(closing_limit_v, before);
   outcome.values["closings"] = static_cast<double>(closings.size());
   if (!closings.empty()) {
-    outcome.fail(fmt::format("{} dip of {:.1f} ms by {:.2f} V at {:.1f} ms: {}", dip.coils ? "coil" : "VDDA", dip.duration_ms,
-                             dip.depth_v, start_ms, summary(world)));
+    outcome.fail(fmt::format("{} dip of {:.1f} ms by {:.2f} V at {:.1f} ms: {}", dip.coils ? "coil" : "VDDA",
+                             dip.duration_ms, dip.depth_v, start_ms, summary(world)));
   }
   outcome.values["faults"] = static_cast<double>(world.vehicle.faults_seen());
 }
@@ -64,7 +64,12 @@ void survive(TruckWorld& world, const Dip& dip, Outcome& outcome) {
 class Timeline {
  public:
   Timeline(const Pack& pack, std::uint64_t seed, std::size_t dips, Cases& cases)
-      : pack_(pack), setup_(random_setup(pack, seed)), world_(pack.image, setup_), random_(seed + 99), dips_(dips), cases_(cases) {}
+      : pack_(pack),
+        setup_(random_setup(pack, seed)),
+        world_(pack.image, setup_),
+        random_(seed + 99),
+        dips_(dips),
+        cases_(cases) {}
 
   /// Returns why the run had to end, or "".
   std::string run() {
@@ -156,10 +161,13 @@ Result run_supply_dips(const Extent& extent) {
     line.closings += o.value("closings", 0) > 0 ? 1 : 0;
     line.stuck += !o.good && o.value("closings", 0) == 0 ? 1 : 0;
   }
-  result.table = "| state | dips | of the coil supply | with a reset | closings on a DC link 8 V below the pack | do not drive again |\n"
-                 "|---|---|---|---|---|---|\n";
+  result.table =
+      "| state | dips | of the coil supply | with a reset | closings on a DC link 8 V below the pack | do not drive "
+      "again |\n"
+      "|---|---|---|---|---|---|\n";
   for (const auto& [state, l] : lines) {
-    result.table += fmt::format("| {} | {} | {} | {} | {} | {} |\n", state, l.dips, l.coils, l.resets, l.closings, l.stuck);
+    result.table +=
+        fmt::format("| {} | {} | {} | {} | {} | {} |\n", state, l.dips, l.coils, l.resets, l.closings, l.stuck);
   }
   result.outcomes.insert(result.outcomes.end(), broken.begin(), broken.end());
   return result;

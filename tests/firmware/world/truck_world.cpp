@@ -15,11 +15,11 @@ using plant::Relay;
 namespace {
 
 constexpr unsigned i2c_clock = 6, i2c_data = 7, alert = 5, plus_auxiliary = 14, minus_auxiliary = 15, port_of_b = 1;
-constexpr double settle_s = 0.03;        ///< the capacitors at the pins charge before the firmware starts
-constexpr double switching_ms = 30;      ///< a contactor moves and bounces
-constexpr double reset_delay_ms = 1.5;   ///< t_RSTTEMPO, DS8626, table 23
+constexpr double settle_s = 0.03;       ///< the capacitors at the pins charge before the firmware starts
+constexpr double switching_ms = 30;     ///< a contactor moves and bounces
+constexpr double reset_delay_ms = 1.5;  ///< t_RSTTEMPO, DS8626, table 23
 constexpr std::uint32_t brown_out = 1U << 25 | 1U << 26, power_on = brown_out | 1U << 27;
-constexpr double power_down_v = 1.68;    ///< power-down reset
+constexpr double power_down_v = 1.68;  ///< power-down reset
 constexpr std::array thermistor_pin{ThermistorPin::ts1, ThermistorPin::ts3, ThermistorPin::hdq, ThermistorPin::cfetoff};
 
 /// Thresholds of the supply detector by PLS, falling and rising (DS8626, table 23, typical).
@@ -290,7 +290,9 @@ void TruckWorld::set_thermistor_ohm(std::size_t sensor, double ohm) {
 
 // ---- what happened ----
 
-bool TruckWorld::isolated() const { return !both_mains_closed() && !(closed(Relay::precharge) && closed(Relay::main_minus)); }
+bool TruckWorld::isolated() const {
+  return !both_mains_closed() && !(closed(Relay::precharge) && closed(Relay::main_minus));
+}
 
 double TruckWorld::highest_cell_v() const {
   double v = 0;
@@ -327,9 +329,8 @@ std::vector<TruckWorld::Closing> TruckWorld::closings_below_v(double volt, std::
 
 std::vector<std::string> TruckWorld::violations() const {
   std::vector<std::string> all = i2c_.violations();
-  for (const auto* more :
-       {&chip.violations, &board.can.violations, &board.flash.violations, &adc.violations, &port_a.violations, &port_b.violations,
-        &port_c.violations}) {
+  for (const auto* more : {&chip.violations, &board.can.violations, &board.rcc.violations, &board.flash.violations,
+                           &adc.violations, &port_a.violations, &port_b.violations, &port_c.violations}) {
     all.insert(all.end(), more->begin(), more->end());
   }
   return all;

@@ -1,5 +1,6 @@
-// The flashed image of the forklift board in a truck: the emulated core with its ports, ADC, I2C and CAN, the model of the front
-// end, and the circuit of battery, contactors and truck (plant/circuit). Wired as boards/stm32f405_forklift/README.md says.
+// The flashed image of the forklift board in a truck: the emulated core with its ports, ADC, I2C and CAN, the model of
+// the front end, and the circuit of battery, contactors and truck (plant/circuit). Wired as
+// boards/stm32f405_forklift/README.md says.
 //
 // Nothing here knows states, thresholds or sequences of the firmware: it sees levels of pins and frames on the bus. One
 // step is at most 1 ms while something switches, and at most 5 ms otherwise. A step ends when the firmware writes to
@@ -28,7 +29,7 @@ namespace bms::world {
 
 struct WorldSetup {
   plant::TruckParameters truck = plant::typical_world();
-  double detector_error_v = 0;                ///< of the supply detector, within +-0.07 V (DS8626, table 23)
+  double detector_error_v = 0;                 ///< of the supply detector, within +-0.07 V (DS8626, table 23)
   double reset_v = 2.83, reset_ends_v = 2.92;  ///< brown-out reset, level 3 (DS8626, table 23)
   double adc_offset_lsb = 0;
   double cell_noise_v = 0, shunt_noise_v = 0;  ///< standard deviations of what the front end converts
@@ -45,7 +46,8 @@ struct SensorFaults {
 /// I2C of the board. A reset of the chip resets it. While the program polls a byte on the wire, the time is skipped.
 class WorldI2c : public firmware::UnicornBoard::Peripheral {
  public:
-  WorldI2c(firmware::UnicornBoard& board, Bq76952Model& chip) : board_(board), chip_(chip), model_(std::in_place, chip) {}
+  WorldI2c(firmware::UnicornBoard& board, Bq76952Model& chip)
+      : board_(board), chip_(chip), model_(std::in_place, chip) {}
   std::uint32_t read(std::uint32_t offset, double now_us) override;
   void write(std::uint32_t offset, std::uint32_t value, double now_us) override;
   void chip_reset() override;

@@ -46,7 +46,8 @@ constexpr std::array names{"cell overvoltage warning",
                            "temperature unknown",
                            "current unrequested",
                            "allowed current exceeded"};
-constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F, pack_state_id = 0x180;
+constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F,
+                        pack_state_id = 0x180;
 constexpr double request_period_ms = 1'000;
 constexpr std::size_t most_seen = 4'096;
 
@@ -78,7 +79,7 @@ void Vehicle::send(std::uint32_t code, std::uint32_t argument) {
 
 void Vehicle::clear_faults(bool service) { send(can::Command::code_clear_faults, service ? 1 : 0); }
 
-double Vehicle::silent_ms() const { return board_.now_ms() - heard_ms_; }
+double Vehicle::silent_ms() const { return board_.now_ms() - received_ms_; }
 
 void Vehicle::publish(std::uint64_t faults, double at_ms) {
   if (faults == faults_) return;
@@ -91,7 +92,7 @@ void Vehicle::read(const can::Frame& frame, double at_ms) {
   ++frames[frame.id & 0x7FF];
   switch (frame.id) {
     case faults_id:
-      heard_ms_ = at_ms;
+      received_ms_ = at_ms;
       first_cause_ = static_cast<unsigned>(field(frame, 48, 6));
       publish((faults_ & ~std::uint64_t{0xFFFFFFFF}) | field(frame, 16, 32), at_ms);
       break;

@@ -54,7 +54,7 @@ class Vehicle {
 
   firmware::UnicornBoard& board_;
   std::size_t read_ = 0;
-  double next_request_ms_ = 0, heard_ms_ = 0;
+  double next_request_ms_ = 0, received_ms_ = 0;
   std::uint8_t counter_ = 0;
   Request sent_ = Request::none;
   std::uint64_t faults_ = 0, seen_ = 0;

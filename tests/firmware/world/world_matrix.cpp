@@ -27,8 +27,9 @@ struct Scenario {
   const char* name;
   Result (*run)(const Extent&);
 };
-constexpr Scenario scenarios[] = {{"starts", run_starts},       {"contacts", run_contact_failures}, {"dips", run_supply_dips},
-                                  {"faults", run_fault_matrix}, {"overloads", run_overloads},       {"shift", run_shift}};
+constexpr Scenario scenarios[] = {{"starts", run_starts},       {"contacts", run_contact_failures},
+                                  {"dips", run_supply_dips},    {"faults", run_fault_matrix},
+                                  {"overloads", run_overloads}, {"shift", run_shift}};
 
 struct Options {
   Extent extent;
@@ -74,7 +75,8 @@ int main(int count, char** words) {
       const Result result = scenario.run(options.extent);
       failed += result.failed();
       cases += static_cast<unsigned>(result.outcomes.size());
-      fmt::print("\n{}: {} cases, {} failed\n\n{}\n", result.name, result.outcomes.size(), result.failed(), result.table);
+      fmt::print("\n{}: {} cases, {} failed\n\n{}\n", result.name, result.outcomes.size(), result.failed(),
+                 result.table);
       std::fflush(stdout);
       if (options.write) {
         bms::files::replace_figures(BMS_SOURCE_DIR "/tests/firmware/world/README.md", result.name, result.table);

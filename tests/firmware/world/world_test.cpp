@@ -1,5 +1,5 @@
-// The flashed image of the forklift board in the circuit of a truck: a few cases of each scenario of `./bms world`, and the models of
-// the ports and of the ADC against the reference manual.
+// The flashed image of the forklift board in the circuit of a truck: a few cases of each scenario of `./bms world`, and
+// the models of the ports and of the ADC against the reference manual.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -66,12 +66,12 @@ TEST(AdcModel, ConvertsASequenceInTheTimesOfTheManual) {
   AdcModel adc(board);
   adc.noise_lsb = 0;
   adc.pin_v = [](unsigned channel) { return channel == 11 ? 1.65 : 0.33; };
-  const double mhz = (board.register_value(0x40023808) & 3) == 2 ? 84 : 16;
-  adc.write(0x04, 1U << 8, 0);              // SCAN
-  adc.write(0x2C, 1U << 20, 0);             // two conversions
-  adc.write(0x34, 11 | 10U << 5, 0);        // L+, L-
-  adc.write(0x0C, 7U << 3 | 7, 0);          // 480 cycles
-  adc.write(0x08, 1 | 1U << 10, 0);         // ADON, EOCS
+  const double mhz = 1e-6 * board.rcc.apb2_hz();
+  adc.write(0x04, 1U << 8, 0);        // SCAN
+  adc.write(0x2C, 1U << 20, 0);       // two conversions
+  adc.write(0x34, 11 | 10U << 5, 0);  // L+, L-
+  adc.write(0x0C, 7U << 3 | 7, 0);    // 480 cycles
+  adc.write(0x08, 1 | 1U << 10, 0);   // ADON, EOCS
   adc.write(0x08, 1 | 1U << 10 | 1U << 30, 10);
   const double one_us = (480 + 12) / (mhz / 2);
   EXPECT_EQ(adc.read(0x00, 10 + 0.98 * one_us) & 2, 0U);
