@@ -4,7 +4,8 @@
 //
 //   chip                  threshold                                  delay
 //   cell overvoltage      20 mV above cell overvoltage severe        0.8 s more than that row
-//   cell undervoltage     20 mV below cell undervoltage severe       the same
+//   cell undervoltage     20 mV below deep discharge, so that a       the same
+//                         recovery charge is possible above it
 //   overcurrent           1.2 times short circuit                    0.42 s, both directions
 //   high overcurrent      1.5 times short circuit                    0.35 s, discharge
 //   short circuit         2 times short circuit, at least 600 A      0.45 ms, discharge
@@ -46,7 +47,7 @@ constexpr hal::bq76952::Board front_end_board(const protection::Rules& rules, st
   return {.current_range_a = std::max(327.0, range_ratio * short_a),
           .cell_inputs = hal::bq76952::inputs_of_pack(cells),
           .overvoltage_v = 1e-6 * high.threshold + voltage_margin_v,
-          .undervoltage_v = 1e-6 * low.threshold - voltage_margin_v,
+          .undervoltage_v = 1e-6 * rule_of(rules, deep_discharge).threshold - voltage_margin_v,
           .voltage_delay_s = 1e-6 * std::max(high.delay_us, low.delay_us) + slower_by_s,
           .overcurrent_a = overcurrent_ratio * short_a,
           .overcurrent_delay_s = overcurrent_delay_s,
