@@ -44,7 +44,7 @@ TEST(World, ProtectionsActOnPhysicalCauses) {
   expect_good(run_fault_matrix(some(0, "off: I2C")));
 }
 
-TEST(World, AShiftWithNoiseHasNoFault) { expect_good(run_shift({.minutes = 3, .at_once = 2})); }
+TEST(World, AShiftWithNoiseHasNoFault) { expect_good(run_shift({.only = "", .minutes = 3, .at_once = 2})); }
 
 /// The promise is read from the page as it is printed.
 TEST(Promise, ThePublishedTableHasTheRowsOfTheDbcFileInOrder) {
