@@ -12,8 +12,7 @@ namespace bms::host_sim {
 
 namespace {
 
-/// The estimator keeps the state of charge inside; near the end of that range nothing is known.
-constexpr double lowest_soc = -0.25, highest_soc = 1.25, soc_margin = 1e-3;
+constexpr double soc_margin = 1e-3;          ///< to the ends of the estimator's range, where nothing is known
 constexpr double most_at_the_end = 0.1;      ///< share of the estimates that may be at the end of the range
 constexpr double most_rejected = 0.1;        ///< share of the voltages that the filter may reject
 constexpr double fewest_voltages = 0.5;      ///< share of the samples whose voltage can be used
@@ -28,7 +27,9 @@ constexpr std::array<std::string_view, 5> causes = {"time_in_ms", "current_in_ma
 /// Those that make every estimate doubtful.
 constexpr std::array<std::string_view, 4> severe = {"time_in_ms", "current_in_ma", "voltage_in_mv", "current_inverted"};
 
-bool at_the_end(const EstimateRow& e) { return e.soc < lowest_soc + soc_margin || e.soc > highest_soc - soc_margin; }
+bool at_the_end(const EstimateRow& e) {
+  return e.soc < model::min_soc + soc_margin || e.soc > model::max_soc - soc_margin;
+}
 
 std::string likely_cause(const ReplayResult& result) {
   for (const std::string_view id : causes) {
@@ -78,7 +79,7 @@ Judgement judge(const ReplayResult& result) {
   if (at_the_end(rows.back()) || outside > most_at_the_end * static_cast<double>(rows.size())) {
     judgement.impossible =
         fmt::format("the state of charge leaves {:g} to {:g} % ({:.1f} % at the end); likely cause: {}",
-                    100 * lowest_soc, 100 * highest_soc, 100 * rows.back().soc, likely_cause(result));
+                    100 * model::min_soc, 100 * model::max_soc, 100 * rows.back().soc, likely_cause(result));
   }
   judgement.doubts = doubts_of(result);
   return judgement;

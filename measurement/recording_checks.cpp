@@ -120,14 +120,14 @@ void check_charge(Recording& r, const model::CellParameters<>& cell) {
   const double step_s = usual_step_s(r);
   if (step_s >= millisecond_step_s) {
     r.warnings.push_back(
-        {"time_in_ms", fmt::format("the usual time step is {:g} and the current moves {:.3g} Ah, the cell has {:g} Ah: "
+        {"time_in_ms", fmt::format("the usual time step is {:g} and the current moves {:.1f} Ah, the cell has {:g} Ah: "
                                    "the times look like milliseconds, expected seconds",
                                    step_s, moved_ah, cell.capacity_ah)});
     return;
   }
   r.warnings.push_back(
       {"charge_exceeds_capacity",
-       fmt::format("the current moves {:.3g} Ah, the cell has {:g} Ah: the current has another unit or "
+       fmt::format("the current moves {:.1f} Ah, the cell has {:g} Ah: the current has another unit or "
                    "an offset, or the cell file is of another cell",
                    moved_ah, cell.capacity_ah)});
 }

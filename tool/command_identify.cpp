@@ -82,6 +82,7 @@ class IdentifyCommand final : public Command {
     try {
       return write(workflow::identify_cell(o_));
     } catch (const workflow::FailedFit& failed) {
+      for (const measurement::Warning& w : failed.warnings) warn(w.text);
       fmt::print(stderr, "{}\n", files::printable(failed.what()));
       return 1;
     }

@@ -35,9 +35,6 @@ struct SimulateOptions {
   const std::string& input() const { return recording.empty() ? profile : recording; }
 };
 
-/// A simulation beyond these states of charge has left the cell; the same range as the estimator's.
-constexpr double lowest_soc = -0.25, highest_soc = 1.25;
-
 /// What was read, and what has been computed.
 struct SimulationRun {
   files::CellFile cell;
@@ -118,7 +115,7 @@ SimulationRun read(const SimulateOptions& options) {
 /// Throws BadInput with the likely cause if the state of charge leaves the cell.
 void check_range(const SimulateOptions& options, const SimulationRun& run) {
   const auto outside = std::find_if(run.rows.begin(), run.rows.end(), [](const host_sim::SimulatedRow& row) {
-    return !(row.soc >= lowest_soc && row.soc <= highest_soc);
+    return !(row.soc > model::min_soc && row.soc < model::max_soc);  // the simulation holds it there
   });
   if (outside == run.rows.end()) return;
   const auto k = static_cast<std::size_t>(outside - run.rows.begin());
@@ -130,7 +127,8 @@ void check_range(const SimulateOptions& options, const SimulationRun& run) {
       options.input(), 1,
       fmt::format("the state of charge leaves {:g} to {:g} % after {:g} s; likely cause: {}; expected "
                   "a current that the cell can deliver",
-                  100 * lowest_soc, 100 * highest_soc, run.recording.time_s[k] - run.recording.time_s.front(), cause));
+                  100 * model::min_soc, 100 * model::max_soc, run.recording.time_s[k] - run.recording.time_s.front(),
+                  cause));
 }
 
 void compute(const SimulateOptions& options, SimulationRun& run) {

@@ -129,7 +129,8 @@ std::string out_of_range(const model::CellFault& fault) {
 }
 
 /// Throws FailedFit for a fit that means nothing.
-void check_fit(const IdentifyOptions& options, const id::Identification& found) {
+void check_fit(const IdentifyOptions& options, const IdentifyResult& result) {
+  const id::Identification& found = result.identification;
   const id::FitStatistics& fit = found.estimation;
   bool finite = std::isfinite(fit.rmse_v) && std::isfinite(fit.fit_percent);
   for (const id::Parameter& p : found.parameters) finite = finite && std::isfinite(p.value) && std::isfinite(p.std);
@@ -138,7 +139,8 @@ void check_fit(const IdentifyOptions& options, const id::Identification& found) 
   text += finite ? fmt::format("the model is off by {:.0f} mV RMS and follows the voltage no better than its mean",
                                1e3 * fit.rmse_v)
                  : std::string("its residuals are not numbers");
-  throw FailedFit(text + "; expected a recording of this cell with a voltage that follows the current");
+  throw FailedFit(text + "; expected a recording of this cell with a voltage that follows the current",
+                  result.warnings);
 }
 
 // ---- linear models: one recording, one node
@@ -153,9 +155,9 @@ void identify_linear_cell(const IdentifyOptions& options, StartCell start, const
   } catch (const std::invalid_argument& error) {
     throw files::BadInput(options.recordings.front(), 1, error.what());
   }
-  check_fit(options, found.identification);
   result.identification = found.identification;
   for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
+  check_fit(options, result);
   if (options.recordings.size() > 1) {
     result.warnings.push_back(
         {"first_recording_only", "a linear model is identified from one recording; only the first was used"});
@@ -249,8 +251,8 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
     result.identification =
         id::identify_grey_box(id::started_from_rests(p, main.data_sets.front().data, grey_box.bounds), main.data_sets,
                               grey_box, options.method);
-    check_fit(options, result.identification);
     for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
+    check_fit(options, result);
     if (groups.size() > 1)
       start.cell.at_temperature = temperature_tables(options, groups, main_group, grey_box, result);
   } catch (const std::invalid_argument& error) {

@@ -15,9 +15,10 @@
 namespace bms::workflow {
 
 /// The data were good, but no parameters follow from them: exit code 1, and nothing is written.
-class FailedFit : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
+struct FailedFit : std::runtime_error {
+  FailedFit(const std::string& what, std::vector<measurement::Warning> found)
+      : std::runtime_error(what), warnings(std::move(found)) {}
+  std::vector<measurement::Warning> warnings;  ///< of recordings and fit: they may name the cause
 };
 
 struct IdentifyOptions {
