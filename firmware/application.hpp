@@ -91,6 +91,7 @@ class Application {
     observe(pack, estimate);
     protect(pack, estimate, request);
     publish(pack, mean, estimate);
+    store_decision();
     handle_requests(pack.time_us);
     estimate_ = estimate;
     if (persistence_.count(mean)) [[unlikely]]
@@ -178,7 +179,6 @@ class Application {
     inputs.storage_fault = persistence_.log().sectors() > 0 &&
                            (setting_lost_ || !persistence_.log().operational() || persistence_.full_for_long());
     first_ = false;
-    const protection::FaultSet latched_before = protection_.decision().latched;
     const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
@@ -186,12 +186,18 @@ class Application {
       hal::supply_acknowledge(supply_falls);
       hal::acknowledge_contact_losses(contacts.losses);
     }
+  }
+
+  /// After the messages, because a write of flash takes milliseconds.
+  void store_decision() {
+    const protection::Decision& decision = protection_.decision();
     if (decision.raised != 0) [[unlikely]]
       store_faults(decision.raised);
-    if (decision.latched != latched_before) [[unlikely]]
-      setting_lost_ = !latched_faults_.store(decision.latched) || setting_lost_;
-    if ((latched_before & ~decision.latched) != 0) [[unlikely]]
-      hal::second_line_clear();
+    const protection::FaultSet stored = latched_faults_.faults();
+    if (decision.latched == stored) [[likely]]
+      return;
+    setting_lost_ = !latched_faults_.store(decision.latched) || setting_lost_;
+    if ((stored & ~decision.latched) != 0) hal::second_line_clear();
   }
 
   /// A setting without room is a storage fault until the next start.

@@ -15,7 +15,7 @@ enum class AnalogInput : std::uint8_t {
   link_minus,
 };
 
-/// Configures pins and converter. Call once, before the first conversion.
+/// Configures pins and converter and waits until it is stable, 11 us. Call once, after clock_start().
 void adc_start();
 
 /// Returns 0 to 4,095, or nothing if the conversion does not finish. Takes 5 us, for the reference 24 us, at most 50

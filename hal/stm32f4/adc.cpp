@@ -4,6 +4,7 @@
 // cycles are 23 us.
 #include "hal/adc.hpp"
 
+#include "hal/clock.hpp"
 #include "hal/stm32f4/registers.hpp"
 
 namespace bms::hal {
@@ -15,6 +16,7 @@ using namespace stm32f4;
 constexpr std::uint32_t converted = 1U << 1, on = 1U << 0, begin = 1U << 30;
 /// About 6 cycles each: 36 us at 168 MHz, more at 16 MHz. The longest conversion takes 23.4 us.
 constexpr unsigned max_polls = 1'000;
+constexpr std::uint64_t stable_us = 10;  ///< until the reference is stable; the converter needs 3 (datasheet, t_STAB)
 
 constexpr std::uint32_t channel(AnalogInput input) {
   switch (input) {
@@ -45,7 +47,10 @@ void adc_start() {
   adc1_smpr1() = 7U << 21 | 4U << 3 | 4U << 0;        // channel 17: 480 cycles; 10 and 11: 84
   adc1_smpr2() = 4U << 3 | 4U << 6 | 4U << 9;         // channels 1 to 3: 84 cycles
   adc1_cr1() = 0;                                     // 12 bits
-  adc1_cr2() = on;                                    // ready in 3 us, the reference in 10
+  adc1_cr2() = on;
+  const std::uint64_t since_us = now_us();
+  while (now_us() - since_us <= stable_us) {
+  }
 }
 
 std::optional<std::uint16_t> adc_convert(AnalogInput input) {
