@@ -21,6 +21,7 @@ class ContactorPort : public UnicornBoard::Peripheral {
     else
       registers_[offset / 4] = value;
   }
+  void chip_reset() override { registers_ = {}; }
   std::uint32_t output() const { return registers_[0x14 / 4]; }
   std::uint32_t mode() const { return registers_[0]; }
 
