@@ -64,7 +64,7 @@ std::string set(const char* name, std::uint32_t& value, const can::SignalLayout&
     value = static_cast<std::uint32_t>(chance() % (std::uint64_t{most} + 1));
   const bool known = !s.has_invalid || (value <= most && value != static_cast<std::uint32_t>(s.invalid));
   if (s.bits <= 24) return entry(name, known, fmt::format("{}", std::min(value, most)));
-  const double factor = s.factor == 1 ? 1 : 1e-3;  // more than 24 bits with a factor: the value is raw in C++
+  const double factor = s.factor;  // more than 24 bits with a factor: the value is raw in C++
   return entry(name, known, fmt::format("{}", static_cast<double>(value) * factor + static_cast<double>(s.offset)));
 }
 

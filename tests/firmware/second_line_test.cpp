@@ -64,15 +64,15 @@ static_assert(of_lto.wider_and_slower());
 static_assert(of_lfp_200ah.wider_and_slower());
 
 TEST(SecondLineOfTheFrontEnd, FollowsTheVoltagesOfTheCell) {
-  // 3.65 + 0.165 + 0.02 V in steps of 50.6 mV: 75.8; 2.0 - 0.198 - 0.02 V: 35.2
+  // 3.65 + 0.165 + 0.02 V in steps of 50.6 mV: 75.8; 0.75 * 2.0 - 0.02 V: 29.2
   EXPECT_EQ(table9.at(0x9278), 76U);
-  EXPECT_EQ(table9.at(0x9275), 35U);
-  // 4.2 + 0.12 + 0.02 V: 85.8; 3.0 - 0.144 - 0.02 V: 56.05
+  EXPECT_EQ(table9.at(0x9275), 29U);
+  // 4.2 + 0.12 + 0.02 V: 85.8; 0.75 * 3.0 - 0.02 V: 44.1
   EXPECT_EQ(of_nmc.at(0x9278), 86U);
-  EXPECT_EQ(of_nmc.at(0x9275), 56U);
-  // 2.8 + 0.13 + 0.02 V: 58.3; 1.5 - 0.156 - 0.02 V: 26.2
+  EXPECT_EQ(of_nmc.at(0x9275), 44U);
+  // 2.8 + 0.13 + 0.02 V: 58.3; 0.75 * 1.5 - 0.02 V: 21.8
   EXPECT_EQ(of_lto.at(0x9278), 59U);
-  EXPECT_EQ(of_lto.at(0x9275), 26U);
+  EXPECT_EQ(of_lto.at(0x9275), 21U);
   for (const Chip* chip : {&table9, &of_nmc, &of_lto}) {
     EXPECT_NEAR(chip->line.overvoltage_s, 1.0, 0.004) << "0.8 s more than 0.2 s";
     EXPECT_NEAR(chip->line.undervoltage_s, 1.0, 0.004);
