@@ -64,7 +64,8 @@ std::string set(const char* name, std::uint32_t& value, const can::SignalLayout&
     value = static_cast<std::uint32_t>(chance() % (std::uint64_t{most} + 1));
   const bool known = !s.has_invalid || (value <= most && value != static_cast<std::uint32_t>(s.invalid));
   if (s.bits <= 24) return entry(name, known, fmt::format("{}", std::min(value, most)));
-  const double factor = s.factor;  // more than 24 bits with a factor: the value is raw in C++
+  // more than 24 bits with a factor: the value is raw in C++; the factor is a decimal number, which a float is not
+  const double factor = std::round(1e6 * static_cast<double>(s.factor)) / 1e6;
   return entry(name, known, fmt::format("{}", static_cast<double>(value) * factor + static_cast<double>(s.offset)));
 }
 
