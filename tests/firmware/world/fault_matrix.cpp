@@ -46,7 +46,7 @@ class FaultCase {
 
   void run() {
     world_.vehicle.forget();
-    judge_.allowed = second_line;
+    judge_.allowed = second_line | repeats;
     world_.each_step = [this] { judge_.step(); };
     if (noise()) add_noise();
     if (case_.background != nullptr) {
@@ -67,6 +67,8 @@ class FaultCase {
   }
 
  private:
+  /// Voltage stuck, temperature stuck: a cell that is held, or a thermistor without noise, repeats its reading exactly.
+  static constexpr std::uint64_t repeats = std::uint64_t{1} << 21 | std::uint64_t{1} << 24;
   static constexpr std::uint64_t second_line = std::uint64_t{1} << 32 | std::uint64_t{1} << 28;
 
   bool noise() const { return case_.kind == Kind::noise_above || case_.kind == Kind::noise_below; }
