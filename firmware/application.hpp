@@ -36,17 +36,6 @@
 
 namespace bms::firmware {
 
-namespace second_line = protection::second_line;
-static_assert(second_line::cell_undervoltage == hal::cell_undervoltage &&
-                  second_line::cell_overvoltage == hal::cell_overvoltage &&
-                  second_line::charge_overcurrent == hal::charge_overcurrent &&
-                  second_line::discharge_overcurrent == hal::discharge_overcurrent &&
-                  second_line::short_circuit == hal::short_circuit && second_line::temperature == hal::temperature &&
-                  second_line::host_silence == hal::host_silence &&
-                  second_line::permanent_failure == hal::permanent_failure &&
-                  second_line::pins_wrong == hal::pins_wrong,
-              "protection/second_line.hpp and hal/second_line.hpp number the trips differently");
-
 /// Only the battery's own messages. Other profiles: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
 struct WithoutVehicleProfile {
   template <class Estimator, std::size_t Cells>

@@ -196,7 +196,7 @@ constexpr BitMessage<can::Faults> faults(const protection::Decision& d) {
 }
 constexpr BitMessage<can::MoreFaults> more_faults(const protection::Decision& d) { return {d.faults >> 32}; }
 
-/// trips: hal::SecondLineTrip, in the order of the signals. Counters saturate.
+/// trips: measurement::SecondLineTrip, in the order of the signals. Counters saturate.
 constexpr BitMessage<can::FrontEnd> front_end(std::uint32_t trips, const hal::FrontEndHealth& health) {
   using M = can::FrontEnd;
   static_assert(M::state_layout.start == 12 && M::lost_layout.start == 32 && M::resets_layout.start == 40 &&

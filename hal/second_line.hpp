@@ -4,20 +4,12 @@
 
 #include <cstdint>
 
+#include "measurement/second_line.hpp"
+
 namespace bms::hal {
 
-/// One bit each.
-enum SecondLineTrip : std::uint32_t {
-  cell_undervoltage = 1,
-  cell_overvoltage = 2,
-  charge_overcurrent = 4,
-  discharge_overcurrent = 8,
-  short_circuit = 16,
-  temperature = 32,
-  host_silence = 64,  ///< the chip had no host or no settings for a time: it was silent to it, was reset or configured
-  permanent_failure = 128,
-  pins_wrong = 256,  ///< the enable outputs do not follow the protections
-};
+using measurement::SecondLineTrip;
+using enum measurement::SecondLineTrip;
 
 /// Trips of the last sample and of all samples since the last call of next_sample(), bits of SecondLineTrip; 0: none. A
 /// trip that came and went between two samples is included. A latched short circuit is included when it is first seen.

@@ -19,12 +19,12 @@
 #include <limits>
 
 #include "measurement/pack_sample.hpp"
+#include "measurement/second_line.hpp"
 #include "protection/balancing.hpp"
 #include "protection/contactors.hpp"
 #include "protection/derating.hpp"
 #include "protection/fault_monitor.hpp"
 #include "protection/pack_quantities.hpp"
-#include "protection/second_line.hpp"
 #include "protection/table.hpp"
 
 namespace bms::protection {
@@ -84,7 +84,7 @@ struct ExternalInputs {
   bool contact_lost = false;  ///< a main contact has opened by itself, perhaps only for a moment
   bool board_fault = false;   ///< failed self-test; with the first sample, a watchdog reset
   bool storage_fault = false;
-  std::uint32_t second_line = 0;                             ///< trips of the front end: protection/second_line.hpp
+  std::uint32_t second_line = 0;                             ///< trips of the front end: measurement::SecondLineTrip
   std::int32_t second_current_ua = measurement::no_reading;  ///< of the second current sensor, if one is fitted
 };
 
@@ -246,9 +246,10 @@ class Protection {
 
   /// Trips since the last call. A short circuit counts as the largest current, because it may be over before a reading.
   constexpr void update_second_line(Quantities& q) {
-    at(q, Quantity::second_line_trips) = (second_line_ & second_line::trips) != 0;
-    at(q, Quantity::second_line_broken) = (second_line_ & second_line::failures) != 0;
-    if ((second_line_ & second_line::short_circuit) != 0)
+    constexpr std::uint32_t failures = measurement::permanent_failure | measurement::pins_wrong;
+    at(q, Quantity::second_line_trips) = (second_line_ & ~(failures | measurement::short_circuit)) != 0;
+    at(q, Quantity::second_line_broken) = (second_line_ & failures) != 0;
+    if ((second_line_ & measurement::short_circuit) != 0)
       at(q, Quantity::current_magnitude_ua) = std::numeric_limits<std::int32_t>::max();
     second_line_ = 0;
   }

@@ -8,7 +8,7 @@
 namespace bms {
 namespace {
 
-using enum hal::SecondLineTrip;
+using enum measurement::SecondLineTrip;
 
 class SecondLine : public Bq76952 {
  protected:
