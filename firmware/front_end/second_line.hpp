@@ -8,7 +8,8 @@
 //                         recovery charge is possible above it
 //   overcurrent           1.2 times short circuit                    0.42 s, both directions
 //   high overcurrent      1.5 times short circuit                    0.35 s, discharge
-//   short circuit         2 times short circuit, at least 600 A      0.45 ms, discharge
+//   short circuit         2 times short circuit, at least the         0.45 ms, discharge
+//                         current that main plus makes
 //
 // The first line needs at most first_line_s for the row short circuit: two means of 100.5 ms, as its filter is not
 // synchronous to the current, a sample period and the processing of a sample.
@@ -24,8 +25,6 @@ namespace bms::firmware {
 inline constexpr double voltage_margin_v = 0.02, slower_by_s = 0.8;
 inline constexpr double overcurrent_ratio = 1.2, high_overcurrent_ratio = 1.5, short_circuit_ratio = 2;
 inline constexpr double overcurrent_delay_s = 0.42, high_overcurrent_delay_s = 0.35;
-/// Peak of the current, for some 0.1 ms, while main plus closes onto the precharged DC link.
-inline constexpr double inrush_a = 600;
 /// A calibration may lower a reading by 5 %; the row must still be reached at the end of the sensor's range.
 inline constexpr double range_ratio = 1.06;
 
@@ -38,14 +37,14 @@ constexpr const protection::Rule& rule_of(const protection::Rules& rules, protec
   return rules[static_cast<std::size_t>(fault)];
 }
 
-/// Board around the chip for a pack of `cells` cells with these rules.
-constexpr hal::bq76952::Board front_end_board(const protection::Rules& rules, std::size_t cells) {
+/// Board around the chip for this pack. rules: those of its table.
+constexpr hal::bq76952::Board front_end_board(const protection::PackDesign& pack, const protection::Rules& rules) {
   using enum protection::Fault;
   const protection::Rule &high = rule_of(rules, cell_overvoltage_severe),
                          &low = rule_of(rules, cell_undervoltage_severe);
   const double short_a = 1e-6 * rule_of(rules, short_circuit).threshold;
   return {.current_range_a = std::max(327.0, range_ratio * short_a),
-          .cell_inputs = hal::bq76952::inputs_of_pack(cells),
+          .cell_inputs = hal::bq76952::inputs_of_pack(pack.cells),
           .overvoltage_v = 1e-6 * high.threshold + voltage_margin_v,
           .undervoltage_v = 1e-6 * rule_of(rules, deep_discharge).threshold - voltage_margin_v,
           .voltage_delay_s = 1e-6 * std::max(high.delay_us, low.delay_us) + slower_by_s,
@@ -53,7 +52,7 @@ constexpr hal::bq76952::Board front_end_board(const protection::Rules& rules, st
           .overcurrent_delay_s = overcurrent_delay_s,
           .high_overcurrent_a = high_overcurrent_ratio * short_a,
           .high_overcurrent_delay_s = high_overcurrent_delay_s,
-          .short_circuit_a = std::max(short_circuit_ratio * short_a, inrush_a)};
+          .short_circuit_a = std::max(short_circuit_ratio * short_a, pack.closing_current_max_a)};
 }
 
 /// What the chip will do, as its settings say: thresholds and delays in SI units. A protection that is off never trips.

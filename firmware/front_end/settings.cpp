@@ -11,7 +11,7 @@ namespace {
 using namespace firmware;
 
 constexpr protection::Rules rules = protection::rules_of(protection::protection_table(board_design()));
-constexpr hal::bq76952::Board board = front_end_board(rules, hal::pack_cells);
+constexpr hal::bq76952::Board board = front_end_board(board_design(), rules);
 constexpr auto board_settings = hal::bq76952::settings(board);
 constexpr SecondLine chip = second_line(board_settings, board.shunt_mohm);
 

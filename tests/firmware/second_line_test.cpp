@@ -16,9 +16,9 @@ constexpr double period_s = 0.1;
 
 struct Chip {
   constexpr explicit Chip(const model::Limits& limits, double capacity_ah, std::uint8_t cells = 16)
-      : rules(protection::rules_of(protection::protection_table(
-            {.limits = limits, .capacity_ah = capacity_ah, .cells = cells, .temperatures = 4}))),
-        board(front_end_board(rules, cells)),
+      : pack{.limits = limits, .capacity_ah = capacity_ah, .cells = cells, .temperatures = 4},
+        rules(protection::rules_of(protection::protection_table(pack))),
+        board(front_end_board(pack, rules)),
         settings(hal::bq76952::settings(board)),
         line(second_line(settings, board.shunt_mohm)) {}
 
@@ -30,6 +30,7 @@ struct Chip {
   }
   constexpr std::uint32_t at(std::uint16_t address) const { return hal::bq76952::value_of(settings, address); }
 
+  protection::PackDesign pack;
   protection::Rules rules;
   hal::bq76952::Board board;
   decltype(hal::bq76952::settings(hal::bq76952::Board{})) settings;
