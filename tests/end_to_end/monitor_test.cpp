@@ -1,12 +1,8 @@
 // bms monitor from the outside: logs, a serial adapter (a pseudo-terminal), the terminal it draws on, hostile input,
 // files it writes.
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <pty.h>
 #include <signal.h>
-#include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <termios.h>
 #include <unistd.h>
@@ -22,6 +18,7 @@
 #include "monitor/candump_line.hpp"
 #include "tests/end_to_end/run_tool.hpp"
 #include "tests/monitor/traffic.hpp"
+#include "tests/pseudo_terminal.hpp"
 
 namespace bms {
 namespace {
@@ -32,6 +29,7 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
+using tests::PseudoTerminal;
 
 std::string dump_of(int samples) {
   monitor::Traffic traffic(1'000'000'000);
@@ -183,60 +181,6 @@ TEST_F(Monitor, CountsHostileLinesOfALogAndReadsTheValidOnes) {
   EXPECT_EQ(p["frames"], 1'600);
   EXPECT_EQ(p["messages"]["PackState"]["lost"], 0);
 }
-
-/// A terminal of a given size for the tool's standard output, or the line to an adapter.
-class PseudoTerminal {
- public:
-  explicit PseudoTerminal(unsigned short columns = 80, unsigned short rows = 24) {
-    winsize size{rows, columns, 0, 0};
-    EXPECT_EQ(openpty(&master_, &slave_, name_, nullptr, &size), 0);
-    fcntl(master_, F_SETFD, FD_CLOEXEC);
-    fcntl(slave_, F_SETFD, FD_CLOEXEC);
-    fcntl(master_, F_SETFL, O_NONBLOCK);
-  }
-  ~PseudoTerminal() {
-    close(master_);
-    close(slave_);
-  }
-  const char* name() const { return name_; }
-  int slave() const { return slave_; }
-
-  void write(const std::string& text) const {
-    for (std::size_t at = 0; at < text.size();) {
-      const ssize_t n = ::write(master_, text.data() + at, text.size() - at);
-      if (n > 0)
-        at += static_cast<std::size_t>(n);
-      else
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-  }
-  /// Reads the line until `what` appears, for at most two minutes: a limit for a failure, not for a slow machine.
-  std::string read_until(
-      const std::string& what, std::function<void()> meanwhile = [] {}) const {
-    std::string text;
-    for (int tries = 0; tries < 12'000 && text.find(what) == std::string::npos; ++tries) {
-      meanwhile();
-      pollfd p{master_, POLLIN, 0};
-      char bytes[4096];
-      const ssize_t n = poll(&p, 1, 10) > 0 ? ::read(master_, bytes, sizeof bytes) : 0;
-      if (n > 0) text.append(bytes, static_cast<std::size_t>(n));
-    }
-    return text;
-  }
-  void resize(unsigned short columns, unsigned short rows) const {
-    const winsize size{rows, columns, 0, 0};
-    ioctl(master_, TIOCSWINSZ, &size);
-  }
-  termios settings() const {
-    termios now{};
-    tcgetattr(slave_, &now);
-    return now;
-  }
-
- private:
-  int master_ = -1, slave_ = -1;
-  char name_[64] = {};
-};
 
 /// The tool on a terminal of its own, with an adapter that the test simulates.
 class LiveScreen : public ::testing::Test {

@@ -1,9 +1,7 @@
 // bms log and the application image in the emulator: a fault is read back as it happened. The test is the line between
 // them; it loses frames. And batteries that cannot answer.
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <pty.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,6 +14,7 @@
 #include "hal/slcan/codec.hpp"
 #include "images/firmware_image.hpp"
 #include "tests/firmware/slcan_board.hpp"
+#include "tests/pseudo_terminal.hpp"
 
 namespace bms::firmware {
 namespace {
@@ -24,34 +23,11 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 
 /// The line to an adapter: the tool opens its name.
-class AdapterLine {
+class AdapterLine : public tests::PseudoTerminal {
  public:
-  AdapterLine() {
-    EXPECT_EQ(openpty(&master_, &slave_, name_, nullptr, nullptr), 0);
-    fcntl(master_, F_SETFD, FD_CLOEXEC);
-    fcntl(slave_, F_SETFD, FD_CLOEXEC);
-    fcntl(master_, F_SETFL, O_NONBLOCK);
-  }
-  ~AdapterLine() {
-    close(master_);
-    close(slave_);
-  }
-  std::string name() const { return name_; }
-
-  void write(const std::string& text) const {
-    for (std::size_t at = 0; at < text.size();) {
-      const ssize_t n = ::write(master_, text.data() + at, text.size() - at);
-      if (n > 0)
-        at += static_cast<std::size_t>(n);
-      else
-        usleep(1'000);
-    }
-  }
   /// The lines that the tool has sent since the last call; frames only.
   std::vector<std::string> frames() {
-    std::array<char, 4096> bytes;
-    const ssize_t n = ::read(master_, bytes.data(), bytes.size());
-    if (n > 0) received_.append(bytes.data(), static_cast<std::size_t>(n));
+    received_ += read();
     std::vector<std::string> lines;
     for (std::size_t end = 0; (end = received_.find('\r')) != std::string::npos; received_.erase(0, end + 1)) {
       if (received_[0] == 't') lines.push_back(received_.substr(0, end));
@@ -60,8 +36,6 @@ class AdapterLine {
   }
 
  private:
-  int master_ = -1, slave_ = -1;
-  char name_[64] = {};
   std::string received_;
 };
 
@@ -69,7 +43,8 @@ class LogTool : public ::testing::Test {
  protected:
   std::string path(const char* name) const { return (folder_.path() / name).string(); }
   std::vector<std::string> command() const {
-    return {BMS_TOOL, "log", "slcan:" + line_.name(), "--out", path("faults.csv"), "--json", path("log.json")};
+    return {BMS_TOOL, "log",           std::string("slcan:") + line_.name(), "--out", path("faults.csv"),
+            "--json", path("log.json")};
   }
   static std::filesystem::path image() {
     return images::firmware_image("netduinoplus2", files::read_cell("table9"), images::Image::application);
@@ -165,7 +140,7 @@ TEST_F(LogTool, SaysInOneLineThatAnOldFirmwareCannotAnswer) {
     usleep(10'000);
   }
   EXPECT_EQ(tool.wait(), 1);
-  EXPECT_EQ(files::read_file(path("out")), "slcan:" + line_.name() +
+  EXPECT_EQ(files::read_file(path("out")), std::string("slcan:") + line_.name() +
                                                ": the firmware of this battery cannot send its stored data; update the "
                                                "firmware\n");
   EXPECT_FALSE(std::filesystem::exists(path("faults.csv"))) << "nothing incomplete is written";
@@ -175,7 +150,7 @@ TEST_F(LogTool, SaysInOneLineThatNothingArrives) {
   images::ChildProcess tool(command(), path("out"));
   EXPECT_EQ(tool.wait(), 1);
   EXPECT_EQ(files::read_file(path("out")),
-            "slcan:" + line_.name() +
+            std::string("slcan:") + line_.name() +
                 ": no frames received; check that the battery is switched on, the wiring and the bit rate\n");
 }
 
