@@ -245,7 +245,7 @@ TEST(BranchTemperature, MovesTheBranchesApartByArrhenius) {
   const double half_gap_v = 0.022;
   const std::array<double, 13> p{1, 0.4, 0.2, 0.3, 0.018, 0.004, 0.001, -0.003, 80'000, 50'000, 30'000, 32'000, 25};
   const BranchTemperature::Law<double> growth(p, capacity_ah);
-  const OcvHysteresis::Law<double> hysteresis({half_gap_v, 40, 0, 0, 1}, capacity_ah);
+  const OcvHysteresis::Law<double> hysteresis(std::array<double, 5>{half_gap_v, 40, 0, 0, 1}, capacity_ah);
   struct Node {
     double soc, gap, shift_v, energy;
   };
