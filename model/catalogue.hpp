@@ -34,12 +34,13 @@
 
 namespace bms::model {
 
-using Catalogue = std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,  // readings
-                             InitialSoc, CapacityChange, CoulombicLoss, Leakage,                           // charge
-                             SlowPolarisation, FastPolarisation, BranchTemperature, OcvHysteresis, SelfHeating,  // states
-                             ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance,
-                             ChargeTransfer, ContactStep, ContactIntermittent, OcvShape, EntropicOcv,  // tables
-                             VoltageOffset, VoltageGain>;  // the reading of the voltage
+using Catalogue =
+    std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,        // readings
+               InitialSoc, CapacityChange, CoulombicLoss, Leakage,                                 // charge
+               SlowPolarisation, FastPolarisation, BranchTemperature, OcvHysteresis, SelfHeating,  // states
+               ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance, ChargeTransfer,
+               ContactStep, ContactIntermittent, OcvShape, EntropicOcv,  // tables
+               VoltageOffset, VoltageGain>;                              // the reading of the voltage
 
 inline constexpr std::size_t mechanism_count = std::tuple_size_v<Catalogue>;
 
