@@ -64,6 +64,7 @@ MECHANISMS = (  # all of the catalogue, with values that a cell of 6 Ah might ha
     "direction_asymmetry:charge_fraction=0.2", "contact_step:resistance_ohm=0.003,onset_s=60",
     "temperature_resistance:r0_activation_j_per_mol=40000,r1_activation_j_per_mol=35000,reference_c=23,r0_share=0.4",
     "charge_transfer:r0_share=0.4,r1_share=0.6,exchange_current_a=2", "ocv_shape:slide_at_20=0.03,slide_at_80=-0.02",
+    "branch_temperature:gap_at_10=0.9,gap_at_50=0.25,shift_at_10_v=0.006,energy_at_10_j_per_mol=60000,reference_c=23",
     "entropic_ocv:at_10_v_per_k=1e-4,at_40_v_per_k=-2e-4,at_70_v_per_k=1e-4,at_95_v_per_k=2e-4,reference_c=24",
     "contact_intermittent:resistance_ohm=0.01,share=0.1", "voltage_offset:offset_v=0.004",
     "voltage_gain:gain_error=0.002")

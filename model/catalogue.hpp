@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "model/mechanisms/branch_temperature.hpp"
 #include "model/mechanisms/capacity_change.hpp"
 #include "model/mechanisms/channel_skew.hpp"
 #include "model/mechanisms/charge_transfer.hpp"
@@ -33,12 +34,13 @@
 
 namespace bms::model {
 
-using Catalogue = std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,  // readings
-                             InitialSoc, CapacityChange, CoulombicLoss, Leakage,                           // charge
-                             SlowPolarisation, FastPolarisation, OcvHysteresis, SelfHeating,               // states
-                             ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance,
-                             ChargeTransfer, ContactStep, ContactIntermittent, OcvShape, EntropicOcv,  // tables
-                             VoltageOffset, VoltageGain>;  // the reading of the voltage
+using Catalogue =
+    std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,        // readings
+               InitialSoc, CapacityChange, CoulombicLoss, Leakage,                                 // charge
+               SlowPolarisation, FastPolarisation, BranchTemperature, OcvHysteresis, SelfHeating,  // states
+               ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance, ChargeTransfer,
+               ContactStep, ContactIntermittent, OcvShape, EntropicOcv,  // tables
+               VoltageOffset, VoltageGain>;                              // the reading of the voltage
 
 inline constexpr std::size_t mechanism_count = std::tuple_size_v<Catalogue>;
 

@@ -100,7 +100,7 @@ constexpr Parameter reference_temperature(std::string_view meaning) {
   return p;
 }
 
-inline constexpr std::size_t max_mechanism_parameters = 5;
+inline constexpr std::size_t max_mechanism_parameters = 13;
 inline constexpr std::size_t max_mechanism_states = 2;
 
 /// Where a mechanism acts: in the cell, in the measuring chain, or on the initial state.

@@ -24,16 +24,21 @@ constexpr Factor<S> exponential(const Exponent<S>& x) {
   return ratio<Factor<S>>(Fraction<S>(1), remaining);
 }
 
+/// (T_ref - T) / T with T in kelvin; 0 for what is not a temperature.
+template <class S>
+constexpr Fraction<S> colder(const Temperature<S>& reference_c, const Temperature<S>& temperature_c) {
+  const Temperature<S> kelvin = temperature_c + Temperature<S>(273.15);
+  if (kelvin < Temperature<S>(150)) return Fraction<S>(0);
+  return ratio<Fraction<S>>(Temperature<S>(reference_c - temperature_c), kelvin);
+}
+
 /// Arrhenius factor of a resistance with this activation energy, relative to reference_c. energy_over_rt: E / (R
 /// T_ref).
 ///   exp(E / R (1 / T - 1 / T_ref)) = exp((E / (R T_ref)) (T_ref - T) / T)
 template <class S>
 constexpr Factor<S> arrhenius(const Factor<S>& energy_over_rt, const Temperature<S>& reference_c,
                               const Temperature<S>& temperature_c) {
-  const Temperature<S> kelvin = temperature_c + Temperature<S>(273.15);
-  if (kelvin < Temperature<S>(150)) return Factor<S>(1);  // not a temperature
-  const auto relative = ratio<Fraction<S>>(Temperature<S>(reference_c - temperature_c), kelvin);
-  return exponential<S>(Exponent<S>(energy_over_rt * relative));
+  return exponential<S>(Exponent<S>(energy_over_rt * colder<S>(reference_c, temperature_c)));
 }
 
 inline constexpr double gas_constant_j_per_mol_k = 8.314462618;

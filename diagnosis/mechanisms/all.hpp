@@ -1,6 +1,7 @@
 // What is known of each mechanism of the catalogue. A mechanism whose file is not included here has the defaults.
 #pragma once
 
+#include "diagnosis/mechanisms/branch_temperature.hpp"
 #include "diagnosis/mechanisms/capacity_change.hpp"
 #include "diagnosis/mechanisms/channel_skew.hpp"
 #include "diagnosis/mechanisms/charge_transfer.hpp"

@@ -5,6 +5,7 @@
 
 #include "arithmetic/exponential.hpp"
 #include "model/mechanism.hpp"
+#include "model/soc_nodes.hpp"
 
 namespace bms::model {
 
@@ -24,36 +25,21 @@ struct EntropicOcv {
   template <class S>
   struct Law {
     static constexpr LawMembers members = law_member::tables;
-    std::array<Voltage<S>, 4> v_per_k;
-    std::array<Voltage<S>, 3> delta_v_per_k;
-    std::array<Soc<S>, 4> node = {Soc<S>(0.10), Soc<S>(0.40), Soc<S>(0.70), Soc<S>(0.95)};
-    std::array<Coupling<S>, 3> per_width = {Coupling<S>(1 / 0.30), Coupling<S>(1 / 0.30), Coupling<S>(1 / 0.25)};
+    SocNodes<S, Voltage<S>, 4> v_per_k;
     Temperature<S> reference_c;
 
     template <class Real>
     constexpr Law(const std::array<Real, 5>& p, double)
-        : v_per_k{Voltage<S>(p[0]), Voltage<S>(p[1]), Voltage<S>(p[2]), Voltage<S>(p[3])},
-          delta_v_per_k{Voltage<S>(p[1] - p[0]), Voltage<S>(p[2] - p[1]), Voltage<S>(p[3] - p[2])},
+        : v_per_k({0.10, 0.40, 0.70, 0.95}, std::array<Real, 4>{p[0], p[1], p[2], p[3]}),
           reference_c(Temperature<S>(p[4])) {}
 
     constexpr void tables(TablePoint<S>& at, const Soc<S>& soc, const StepInput<S>& input) const {
       const Temperature<S> warmer_k = input.temperature_c - reference_c;
-      Voltage<S> here = v_per_k[3];
-      if (soc < node[0]) {
-        here = v_per_k[0];
-      } else {
-        for (std::size_t k = 0; k < 3; ++k) {
-          if (!(soc < node[k + 1])) continue;
-          const Fraction<S> t = Soc<S>(soc - node[k]) * per_width[k];
-          here = v_per_k[k] + t * delta_v_per_k[k];
-          if constexpr (!Dual<S>) {  // per interval of the tables; a dual number contains it already
-            const VoltagePerSoc<S> slope_v = Voltage<S>(delta_v_per_k[k] * per_width[k]) * warmer_k;
-            at.ocv_delta_v = at.ocv_delta_v + ratio<Voltage<S>>(slope_v, at.per_width);
-          }
-          break;
-        }
+      const auto here = v_per_k.at(soc);
+      if constexpr (!Dual<S>) {  // per interval of the tables; a dual number contains it already
+        at.ocv_delta_v = at.ocv_delta_v + ratio<Voltage<S>>(VoltagePerSoc<S>(here.slope * warmer_k), at.per_width);
       }
-      at.ocv_v = at.ocv_v + here * warmer_k;
+      at.ocv_v = at.ocv_v + here.value * warmer_k;
     }
   };
 };

@@ -176,7 +176,9 @@ std::string mechanism_cost() {
       slow{"slow_polarisation", {0.004}}, fast{"fast_polarisation", {0.002}},
       warm{"temperature_resistance", {15'000, 30'000}}, heat{"self_heating", {1}}, shape{"ocv_shape", {0.02, -0.01}},
       entropic{"entropic_ocv", {1e-4, 2e-4, -1e-4, 1e-4}}, transfer{"charge_transfer", {0.3, 0.5}},
-      offset{"current_offset", {0.02}}, gain{"voltage_gain", {0.001}};
+      offset{"current_offset", {0.02}}, gain{"voltage_gain", {0.001}},
+      branches{"branch_temperature", {0.1, 0.1, 0.15, 0.2, 1e-3, 1e-3, 5e-4, -2e-3, 7e4, 5e4, 4e4, 4e4}},
+      cold{"temperature_resistance", {45'000, 30'000, 25, 0.3, 0.9, 0.6, -0.3, 0.8}};
   const auto all = measurement::samples(files::read_recording(shift));
   const images::EmulatedBoard& board = images::emulated_boards().front();
   std::string table = "| table9 with | step, mean [instructions] | step, longest |\n|---|---|---|\n";
@@ -200,10 +202,12 @@ std::string mechanism_cost() {
                                          {hysteresis},
                                          {fast},
                                          {slow},
+                                         {branches},
                                          {hysteresis, slow},
                                          {hysteresis, slow, warm, offset}})
     row(set, false);
-  for (const Set& set : std::vector<Set>{{}, {hysteresis, warm}}) row(set, true);
+  for (const Set& set : std::vector<Set>{{}, {hysteresis, warm}, {slow, branches, hysteresis, cold, entropic}})
+    row(set, true);
   return table;
 }
 

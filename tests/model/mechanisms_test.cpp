@@ -240,6 +240,32 @@ TEST(Laws, KnownAtCompileTimeGiveTheSameDigitsAsChosenAtRunTime) {
   }
 }
 
+/// The change of both branches by this formula, from slow runs of a cell at several temperatures.
+TEST(BranchTemperature, MovesTheBranchesApartByArrhenius) {
+  const double half_gap_v = 0.022;
+  const std::array<double, 13> p{1, 0.4, 0.2, 0.3, 0.018, 0.004, 0.001, -0.003, 80'000, 50'000, 30'000, 32'000, 25};
+  const BranchTemperature::Law<double> growth(p, capacity_ah);
+  const OcvHysteresis::Law<double> hysteresis(std::array<double, 5>{half_gap_v, 40, 0, 0, 1}, capacity_ah);
+  struct Node {
+    double soc, gap, shift_v, energy;
+  };
+  for (const Node& n : {Node{0.05, 1, 0.018, 80'000}, Node{0.175, 0.7, 0.011, 65'000}, Node{0.5, 0.2, 0.001, 30'000},
+                        Node{0.95, 0.3, -0.003, 32'000}}) {
+    for (const double c : {45.0, 25.0, 5.0, -15.0}) {
+      const double factor = std::exp(std::min(4.5, n.energy / 8.314462618 * (1 / (c + 273.15) - 1 / 298.15))) - 1;
+      for (const double h : {-1.0, 0.3, 1.0}) {
+        TablePoint<double> at{};
+        at.ocv_v = 3.3;
+        growth.tables(at, n.soc, {-1, 1, c});
+        hysteresis.apply_state(at, half_gap_v * h, {-1, 1, c});
+        // the state itself is added with the other voltage states
+        EXPECT_NEAR(at.ocv_v - 3.3, h * half_gap_v * n.gap * factor - n.shift_v * factor, 1e-9)
+            << n.soc << ' ' << c << ' ' << h;
+      }
+    }
+  }
+}
+
 TEST(OcvHysteresis, SaturatesAtTheBranchesAndForgetsNothingAtRest) {
   const OcvHysteresis::Law<double> law(std::array<double, 5>{0.01, 40, 0, 0, 0}, capacity_ah);
   const TablePoint<double> at{};
@@ -433,7 +459,7 @@ TEST(SelfHeating, TakesTheReferenceTemperatureOfTheCell) {
 }
 
 TEST(TemperatureResistance, LeavesTheShareOfContactsAndFoilsAlone) {
-  const TemperatureResistance::Law<double> law(std::array<double, 4>{50'000, 40'000, 25, 0.3}, capacity_ah);
+  const TemperatureResistance::Law<double> law(std::array<double, 8>{50'000, 40'000, 25, 0.3, 0, 0, 0, 1}, capacity_ah);
   for (const double c : {-20.0, 0.0, 25.0, 45.0}) {
     TablePoint<double> at{};
     at.r0_ohm = 0.01;
