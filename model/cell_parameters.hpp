@@ -109,7 +109,7 @@ struct Noise {
 
 /// resistance_per_ev of a file that does not state it, measured on recordings at other temperatures than those of the
 /// identification (estimator/README.md).
-inline constexpr double default_resistance_per_ev = 0.1;
+inline constexpr double default_resistance_per_ev = 0.15;
 
 /// Accuracy of the calibration; only a larger difference is a mismatch.
 struct Tolerance {
