@@ -35,6 +35,10 @@ class Initialiser {
   void table(const std::string& key) {
     text_ += (std::exchange(inside_, true) ? "},\n" : "\n") + ("    ." + key + " = {");
   }
+  bool optional_table(const std::string& key, bool known) {
+    if (known) table(key);
+    return known;
+  }
   void number(const std::string& key, double value) { text_ += "." + key + " = " + literal(value) + ", "; }
   void optional_number(const std::string& key, double value, double /*omitted*/ = 0) { number(key, value); }
   void optional_flag(const std::string& key, bool value) {

@@ -98,8 +98,21 @@ class SocBank {
     const Variance finest = Variance(Variance(step * step) * Fraction(1.0 / 12));
     BankUpdate bank_update{true, Soc(mean - mean_), Variance(arithmetic::ratio<Soc>(second_, weights_) - mean * mean)};
     bank_update.variance = bank_update.variance < Variance(0) ? finest : Variance(bank_update.variance + finest);
-    mean_ = mean;
     return bank_update;
+  }
+
+  /// The SOC of the filter was changed by `by` other than by counted charge.
+  constexpr void follow(const Soc& by) { mean_ = Soc(mean_ + by); }
+  /// Misfit of the hypothesis next to soc, or of one of its neighbours, above the smallest one; after a step that is
+  /// ready. filter_soc: as in step().
+  constexpr Misfit misfit_at(const Soc& soc, const Soc& filter_soc) const {
+    const Soc on_grid = Soc(soc - (filter_soc - mean_));
+    Misfit least(2'000);
+    for (int k = 0; k < points; ++k) {
+      const Misfit m = misfit_[static_cast<std::size_t>(k)];
+      if (arithmetic::magnitude(Soc(grid(k) - on_grid)) < Soc(2.0 / points) && m < least) least = m;
+    }
+    return Misfit(least - least_);
   }
 
   static constexpr Soc grid(int k) { return Soc(arithmetic::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }

@@ -42,6 +42,9 @@ constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at
 
 inline constexpr int start_points = 256;
 
+/// A prior may be entirely wrong: a voltage that clearly contradicts it wins.
+inline constexpr double start_is_wrong_misfit = 4.5;
+
 /// Misfit of a SOC to a reading of the OCV, to a prior, or to both; >= 0.
 template <class S, class Cell>
 struct StartMisfit {
@@ -50,6 +53,8 @@ struct StartMisfit {
   arithmetic::Variance<S> variance_v2;  ///< of the reading
   const SocDistribution<S>*
       before;  ///< the prior, with a standard deviation of two points' spacing or more; nullptr if it is missing
+  /// Largest misfit to the prior: one prior in about e to the power of this is entirely wrong.
+  double wrong_misfit = start_is_wrong_misfit;
 
   /// half_step: half the spacing of the points for which this is called.
   constexpr arithmetic::Exponent<S> operator()(const arithmetic::Soc<S>& soc, const arithmetic::Fraction<S>& half_step,
@@ -67,7 +72,7 @@ struct StartMisfit {
     if (before == nullptr) return misfit;
     const Soc<S> off = soc - before->soc;
     const auto of_prior = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
-    const Exponent<S> most(8);  // one prior in 3,000 is entirely wrong: a voltage that clearly contradicts it wins
+    const Exponent<S> most(wrong_misfit);
     return Exponent<S>(misfit + (of_prior < most ? of_prior : most));
   }
 };

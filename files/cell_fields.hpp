@@ -17,8 +17,18 @@ void visit_rc(Visitor& visitor, Table& rc) {
   visitor.optional_column("c1_std_f", rc.c1_std_f);
 }
 
+/// Returns true if the range states anything.
+inline bool is_known(const model::IdentifiedRange& r) {
+  for (const double v :
+       {r.temperature_min_c, r.temperature_max_c, r.soc_min, r.soc_max, r.current_max_a, r.duration_s}) {
+    if (v != model::IdentifiedRange::unknown) return true;
+  }
+  return false;
+}
+
 /// Calls visitor.number(key, double&), .column(key, Column&), .optional_number (with the value of a file
-/// without the key, 0 if not given), .optional_column, .optional_flag, and .table(key) before the keys of a table.
+/// without the key, 0 if not given), .optional_column, .optional_flag, .table(key) before the keys of a table, and
+/// .optional_table(key, known), which returns true if the keys of that table follow.
 template <class Visitor, class Parameters>
 void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("capacity_ah", p.capacity_ah);
@@ -61,6 +71,17 @@ void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("resistance_fraction", p.tolerance.resistance_fraction);
   visitor.number("initial_soc", p.tolerance.initial_soc);
   visitor.number("drift_v", p.tolerance.drift_v);
+  visitor.optional_number("resistance_per_ev", p.tolerance.resistance_per_ev, model::default_resistance_per_ev);
+
+  if (visitor.optional_table("range", is_known(p.range))) {
+    constexpr double unknown = model::IdentifiedRange::unknown;
+    visitor.optional_number("temperature_min_c", p.range.temperature_min_c, unknown);
+    visitor.optional_number("temperature_max_c", p.range.temperature_max_c, unknown);
+    visitor.optional_number("soc_min", p.range.soc_min, unknown);
+    visitor.optional_number("soc_max", p.range.soc_max, unknown);
+    visitor.optional_number("current_max_a", p.range.current_max_a, unknown);
+    visitor.optional_number("duration_s", p.range.duration_s, unknown);
+  }
 }
 
 }  // namespace bms::files

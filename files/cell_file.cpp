@@ -73,6 +73,11 @@ class Reader {
     inner_.emplace(top_.table(key));
     (*sources_)[key] = inner_->text("source");
   }
+  bool optional_table(const std::string& key, bool /*known*/) {
+    if (!top_.has(key)) return false;
+    table(key);
+    return true;
+  }
   void number(const std::string& key, double& into) { into = current().number(key); }
   void optional_number(const std::string& key, double& into, double /*omitted*/ = 0) {
     if (current().has(key)) number(key, into);
@@ -108,6 +113,10 @@ class Writer {
   void table(const std::string& key) {
     const auto source = sources_.find(key);
     text_ += fmt::format("\n[{}]\nsource = {}\n", key, quoted(source == sources_.end() ? "" : source->second));
+  }
+  bool optional_table(const std::string& key, bool known) {
+    if (known) table(key);
+    return known;
   }
   void number(const std::string& key, double value) { text_ += key + " = " + literal(value) + "\n"; }
   void optional_number(const std::string& key, double value, double omitted = 0) {

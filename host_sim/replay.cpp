@@ -55,16 +55,16 @@ std::optional<measurement::StartingPoint> starting_point(const std::optional<Soc
 }
 
 Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sample>& samples,
-                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar) {
+                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar, Timing timing) {
   Track track = [&] {
     switch (scalar) {
       case ScalarKind::fixed:
         files::reject_if_fpu_needed(cell);
-        return run<arithmetic::FixedPoint>(cell, samples, start);
+        return run<arithmetic::FixedPoint>(cell, samples, start, timing);
       case ScalarKind::float64:
-        return run<double>(cell, samples, start);
+        return run<double>(cell, samples, start, timing);
       default:
-        return run<float>(cell, samples, start);
+        return run<float>(cell, samples, start, timing);
     }
   }();
   name_states(track, cell);

@@ -46,10 +46,13 @@ std::optional<measurement::StartingPoint> starting_point(const std::optional<Soc
 std::size_t state_count(const files::CellFile& cell);
 void name_states(Track& track, const files::CellFile& cell);
 
-/// Runs the estimator on this machine. The run is repeated to measure its speed. Throws BadInput if the cell file
-/// cannot be computed with this scalar.
+/// Whether a run is repeated until its speed is known.
+enum class Timing { measured, none };
+
+/// Runs the estimator on this machine. Throws BadInput if the cell file cannot be computed with this scalar.
 Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sample>& samples,
-                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar);
+                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar,
+                  Timing timing = Timing::measured);
 
 /// Computes the numbers of the states from their words.
 void number_states(Track& track, ScalarKind scalar);

@@ -50,7 +50,7 @@ template <class Estimator, class Cell>
 
 template <class Estimator, class Cell>
 Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& samples,
-                    const std::optional<measurement::StartingPoint>& start, std::size_t extra) {
+                    const std::optional<measurement::StartingPoint>& start, std::size_t extra, Timing timing) {
   using S = typename Estimator::Scalar;
   std::vector<typename Estimator::Result> estimates(samples.size());
   double best_s = std::numeric_limits<double>::infinity(), total_s = 0;
@@ -63,7 +63,7 @@ Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& sa
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     best_s = std::min(best_s, seconds);
     total_s += seconds;
-  } while (total_s < timing_s);
+  } while (timing == Timing::measured && total_s < timing_s);
 
   Track track;
   track.steps_per_second = static_cast<double>(samples.size()) / best_s;
@@ -88,50 +88,53 @@ Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& sa
 template <class S, bool Errors, std::size_t Voltages = 0>
 Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell,
                    const std::vector<measurement::Sample>& samples,
-                   const std::optional<measurement::StartingPoint>& start) {
+                   const std::optional<measurement::StartingPoint>& start, Timing timing) {
   using Laws = model::ChosenLaws<S>;
   if constexpr (Voltages < Laws::most_voltage_states) {
-    if (cell.laws.voltage_states() > Voltages) return run_extended<S, Errors, Voltages + 1>(cell, samples, start);
+    if (cell.laws.voltage_states() > Voltages)
+      return run_extended<S, Errors, Voltages + 1>(cell, samples, start, timing);
   }
   return run_estimator<estimator::SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>>(
-      cell, samples, start, (Errors ? error_values : 0) + cell.laws.states());
+      cell, samples, start, (Errors ? error_values : 0) + cell.laws.states(), timing);
 }
 
 /// errors: sensor errors are states of the filter.
 template <class S>
 Track run_with_mechanisms(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, bool errors,
                           const std::vector<measurement::Sample>& samples,
-                          const std::optional<measurement::StartingPoint>& start) {
-  return errors ? run_extended<S, true>(cell, samples, start) : run_extended<S, false>(cell, samples, start);
+                          const std::optional<measurement::StartingPoint>& start, Timing timing) {
+  return errors ? run_extended<S, true>(cell, samples, start, timing)
+                : run_extended<S, false>(cell, samples, start, timing);
 }
 
 using FixedExtendedCell =
     model::ExtendedCell<arithmetic::FixedPoint, model::max_intervals, model::ChosenLaws<arithmetic::FixedPoint>>;
 extern template Track run_with_mechanisms<arithmetic::FixedPoint>(
     const FixedExtendedCell& cell, bool errors, const std::vector<measurement::Sample>& samples,
-    const std::optional<measurement::StartingPoint>& start);
+    const std::optional<measurement::StartingPoint>& start, Timing timing);
 
 }  // namespace replay_detail
 
 template <class S>
 Track run(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
-          const std::optional<measurement::StartingPoint>& start) {
+          const std::optional<measurement::StartingPoint>& start, Timing timing) {
   const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
   const auto mechanisms = files::on_board(file.mechanisms);
   const bool errors = file.parameters.noise.errors_are_states;
   if (mechanisms.empty() && !errors)
-    return replay_detail::run_estimator<estimator::SocEstimator<S>>(cell, samples, start, 0);
+    return replay_detail::run_estimator<estimator::SocEstimator<S>>(cell, samples, start, 0, timing);
   const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> extended{
       cell, model::chosen<S>(mechanisms, file.parameters.capacity_ah)};
-  return replay_detail::run_with_mechanisms<S>(extended, errors, samples, start);
+  return replay_detail::run_with_mechanisms<S>(extended, errors, samples, start, timing);
 }
 
 extern template Track run<float>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
-                                 const std::optional<measurement::StartingPoint>& start);
+                                 const std::optional<measurement::StartingPoint>& start, Timing timing);
 extern template Track run<double>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
-                                  const std::optional<measurement::StartingPoint>& start);
+                                  const std::optional<measurement::StartingPoint>& start, Timing timing);
 extern template Track run<arithmetic::FixedPoint>(const files::CellFile& file,
                                                   const std::vector<measurement::Sample>& samples,
-                                                  const std::optional<measurement::StartingPoint>& start);
+                                                  const std::optional<measurement::StartingPoint>& start,
+                                                  Timing timing);
 
 }  // namespace bms::host_sim

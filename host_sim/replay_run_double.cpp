@@ -3,6 +3,6 @@
 namespace bms::host_sim {
 
 template Track run<double>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
-                           const std::optional<measurement::StartingPoint>& start);
+                           const std::optional<measurement::StartingPoint>& start, Timing timing);
 
 }  // namespace bms::host_sim

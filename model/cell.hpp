@@ -62,13 +62,22 @@ struct RestingCurrent {
   std::int32_t still_ua = 0;    ///< by which a resting reading may move
 };
 
+/// Temperatures of the identification, and how the error of the overpotential grows outside of them.
+template <class S>
+struct IdentifiedTemperatures {
+  std::int16_t min_cdegc = 0, max_cdegc = 0;
+  Temperature<S> min_c{}, max_c{};
+  Factor<S> per_colder{}, per_hotter{};  ///< tolerance.resistance_per_ev / (k T_edge): times (T_edge - T) / T
+};
+
 /// Noise in the filter's units.
 template <class S>
 struct FilterNoise {
   Variance<S> voltage_v2{};           ///< white, per sample
   Variance<S> model_v2{};             ///< the part of Interval::error_v2 that does not depend on the SOC
   Duration<S> model_correlation_s{};  ///< correlation time of Interval::error_v2 and of the resistance error
-  Fraction<S> resistance_error{};     ///< relative standard deviation of R0 + R1
+  Fraction<S> resistance_error{};     ///< relative standard deviation of the overpotential
+  IdentifiedTemperatures<S> identified;
   Variance<S> v_rc_v2{};              ///< in the steady state
   Variance<S> rest_v2{};
   Soc<S> white_soc_per_s{};       ///< current_a over the capacity
@@ -286,6 +295,17 @@ constexpr ChargeScale<S> charge_scale(double capacity_as) {
   return c;
 }
 
+/// A file that does not state its range was identified at the temperature of its tables.
+template <class S, class Real>
+constexpr IdentifiedTemperatures<S> identified_temperatures(const CellParameters<Real>& p) {
+  constexpr double kelvin_per_ev = 11'604.518;
+  const auto edge = [&](double c) { return c == IdentifiedRange::unknown ? p.reference_temperature_c : c; };
+  const auto cdegc = [](double c) { return static_cast<std::int16_t>(100 * c + (c < 0 ? -0.5 : 0.5)); };
+  const auto per = [&](double c) { return Factor<S>(p.tolerance.resistance_per_ev * kelvin_per_ev / (c + 273.15)); };
+  const double min_c = edge(p.range.temperature_min_c), max_c = edge(p.range.temperature_max_c);
+  return {cdegc(min_c), cdegc(max_c), Temperature<S>(min_c), Temperature<S>(max_c), per(min_c), per(max_c)};
+}
+
 template <class S, class Real>
 constexpr FilterNoise<S> filter_noise(const CellParameters<Real>& p, double capacity_as) {
   FilterNoise<S> f;
@@ -295,6 +315,7 @@ constexpr FilterNoise<S> filter_noise(const CellParameters<Real>& p, double capa
   f.model_v2 = Variance<S>(square(n.model_v));
   f.model_correlation_s = Duration<S>(n.model_correlation_s);
   f.resistance_error = Fraction<S>(p.tolerance.resistance_fraction);
+  f.identified = identified_temperatures<S>(p);
   f.v_rc_v2 = Variance<S>(square(n.v_rc_v));
   f.rest_v2 = Variance<S>(square(n.rest_v));
   f.white_soc_per_s = Soc<S>(n.current_a / capacity_as);

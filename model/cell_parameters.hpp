@@ -45,7 +45,7 @@ inline constexpr Range time_constant_s{0.2, 50'000};  ///< R1 C1
 inline constexpr double least_width = 0.0005;         ///< of SOC, between any two edges or nodes
 inline constexpr Range lasts_s{0, 86'400};            ///< noise.model_correlation_s
 inline constexpr Range unknown_c{1e-3, 10};           ///< noise.current_unknown_a over the 1C current
-inline constexpr double most_gain = 0.2, most_resistance_error = 1;
+inline constexpr double most_gain = 0.2, most_resistance_error = 1, most_resistance_per_ev = 1;
 
 }  // namespace accepted
 
@@ -107,12 +107,28 @@ struct Noise {
   bool errors_are_states = false;
 };
 
+/// resistance_per_ev of a file that does not state it, measured on recordings at other temperatures than those of the
+/// identification (estimator/README.md).
+inline constexpr double default_resistance_per_ev = 0.15;
+
 /// Accuracy of the calibration; only a larger difference is a mismatch.
 struct Tolerance {
   double ocv_v = 0;
   double resistance_fraction = 0;  ///< of R0 and R1; increases the voltage noise of the estimator under current
   double initial_soc = 0;          ///< of the tables' SOC axis; increases the voltage noise where the OCV is steep
   double drift_v = 0;
+  /// Increase of resistance_fraction outside of range.temperature_*, per |1 / kT - 1 / kT_edge| [eV].
+  double resistance_per_ev = default_resistance_per_ev;
+};
+
+/// Where the parameters were identified. A value of `unknown` stands for a missing key.
+struct IdentifiedRange {
+  static constexpr double unknown = -1'000;
+
+  double temperature_min_c = unknown, temperature_max_c = unknown;
+  double soc_min = unknown, soc_max = unknown;
+  double current_max_a = unknown;  ///< either sign
+  double duration_s = unknown;     ///< longest time under load: slower processes were not seen
 };
 
 template <class Real = double>
@@ -124,6 +140,7 @@ struct CellParameters {
   RcTable<Real> rc;
   Noise noise;
   Tolerance tolerance;
+  IdentifiedRange range{};
 };
 
 /// Why a set of parameters is refused; what is nullptr if it is accepted.
@@ -242,6 +259,21 @@ constexpr CellFault fault_of(const Tolerance& t) {
     return {"tolerance.resistance_fraction", 0, "0 to 1"};
   if (outside(t.initial_soc, 0, 1)) return {"tolerance.initial_soc", 0, "0 to 1"};
   if (outside(t.drift_v, 0, 0.1)) return {"tolerance.drift_v", 0, "0 to 0.1 V"};
+  if (outside(t.resistance_per_ev, 0, accepted::most_resistance_per_ev))
+    return {"tolerance.resistance_per_ev", 0, "0 to 1 eV"};
+  return {};
+}
+
+constexpr CellFault fault_of(const IdentifiedRange& r) {
+  constexpr double unknown = IdentifiedRange::unknown;
+  const auto bad = [](double v, double low, double high) { return v != unknown && outside(v, low, high); };
+  if (bad(r.temperature_min_c, -60, 100)) return {"range.temperature_min_c", 0, "-60 to 100 degrees C"};
+  if (bad(r.temperature_max_c, r.temperature_min_c == unknown ? -60 : r.temperature_min_c, 100))
+    return {"range.temperature_max_c", 0, "temperature_min_c to 100 degrees C"};
+  if (bad(r.soc_min, 0, 1)) return {"range.soc_min", 0, "0 to 1"};
+  if (bad(r.soc_max, r.soc_min == unknown ? 0 : r.soc_min, 1)) return {"range.soc_max", 0, "soc_min to 1"};
+  if (bad(r.current_max_a, 0, accepted::current_a.high)) return {"range.current_max_a", 0, "0 to 2000 A"};
+  if (bad(r.duration_s, 0, 1e9)) return {"range.duration_s", 0, "0 to 1e9 s"};
   return {};
 }
 
@@ -254,7 +286,8 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (d::beyond(p.reference_temperature_c, accepted::reference_temperature_c))
     return {"reference_temperature_c", 0, "-40 to 80 degrees C"};
   for (const CellFault& fault : {d::fault_of(p.limits), d::fault_of(p.ocv), d::fault_of(p.rc, p.ocv),
-                                 d::fault_of(p.noise, p.capacity_ah), d::fault_of(p.tolerance)}) {
+                                 d::fault_of(p.noise, p.capacity_ah), d::fault_of(p.tolerance),
+                                 d::fault_of(p.range)}) {
     if (fault.what != nullptr) return fault;
   }
   return {};

@@ -42,6 +42,42 @@ std::string json_of(const host_sim::ReplayResult& r, const std::string& trace_sh
   return text_of(json);
 }
 
+std::string json_of(const host_sim::CutResult& r) {
+  Json json;
+  json["command"] = "replay";
+  json["recording"] = r.recording;
+  json["cell"] = r.cell;
+  json["cuts"] = r.cuts;
+  json["from_s"] = host_sim::cut_from_s;
+  json["starts"] = Json::array();
+  for (const host_sim::CutFigures& f : r.starts) {
+    Json start = {{"start", f.start.id},
+                  {"median_rmse", f.median_rmse},
+                  {"worst_rmse", f.worst_rmse},
+                  {"max_error", f.largest},
+                  {"median_rmse_after_knee", f.median_rmse_after_knee},
+                  {"within_sigmas", f.inside},
+                  {"worst_within_2_sigma", f.worst_inside},
+                  {"median_error_over_sigma", f.median_ratio},
+                  {"median_sigma", f.median_sigma},
+                  {"recovered", f.recovered}};
+    for (const host_sim::CutRun& run : f.runs) {
+      start["runs"].push_back({{"from_s", run.from_s},
+                               {"duration_s", run.duration_s},
+                               {"rmse", run.rmse},
+                               {"rmse_after_knee", run.rmse_after_knee},
+                               {"max_error", run.largest},
+                               {"within_sigmas", run.inside},
+                               {"median_error_over_sigma", run.median_ratio},
+                               {"median_sigma", run.median_sigma},
+                               {"knee_s", optional(run.knee_s)},
+                               {"recovered_s", optional(run.recovered_s)}});
+    }
+    json["starts"].push_back(std::move(start));
+  }
+  return text_of(json);
+}
+
 std::string json_of(const host_sim::SimulationResult& r) {
   return text_of({{"command", "simulate"},
                   {"cell", r.cell},

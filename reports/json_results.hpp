@@ -4,6 +4,7 @@
 #include <string>
 
 #include "experiments/profile_figures.hpp"
+#include "host_sim/cuts.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/simulation_result.hpp"
 #include "proof/proof.hpp"
@@ -14,6 +15,7 @@
 namespace bms::reports {
 
 std::string json_of(const host_sim::ReplayResult& result, const std::string& trace_sha256);
+std::string json_of(const host_sim::CutResult& result);
 std::string json_of(const host_sim::SimulationResult& result);
 std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& figures);
 std::string json_of(const workflow::IdentifyResult& result);

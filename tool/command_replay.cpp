@@ -7,6 +7,7 @@
 #include "files/recording.hpp"
 #include "files/text_file.hpp"
 #include "host_sim/can_log.hpp"
+#include "host_sim/cuts.hpp"
 #include "host_sim/judgement.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/simulation.hpp"
@@ -32,6 +33,7 @@ struct ReplayOptions {
   double initial_soc_sigma = 0.02;
   std::optional<std::size_t> run;  ///< of a CAN log, from 1; not given: the last
   bool verify = false;
+  std::size_t cuts = 0;  ///< 0: no trials
   std::string trace;
   Output output;
 };
@@ -227,6 +229,18 @@ int write(const ReplayOptions& options, const ReplayRun& run) {
   return 0;
 }
 
+/// Returns the exit code.
+int run_cut_trials(const ReplayOptions& options) {
+  const files::CellFile cell = files::read_cell(options.cell);
+  measurement::Recording recording = files::read_recording(options.recording);
+  measurement::compare_with_cell(recording, cell.parameters);
+  for (const measurement::Warning& warning : recording.warnings) warn(options.recording + ": " + warning.text);
+  const host_sim::CutResult result = host_sim::run_cuts(cell, recording, options.cuts, scalar_of(options.scalar));
+  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
+  print_summary(options.output, host_sim::cut_heading() + host_sim::cut_rows(result));
+  return 0;
+}
+
 class ReplayCommand final : public Command {
  public:
   CLI::App* add(CLI::App& app) override {
@@ -259,14 +273,22 @@ class ReplayCommand final : public Command {
     c.add_option("--board-cell", o_.board_cell,
                  "cell file for the board's firmware if it is not --cell; shows that --verify finds the difference")
         ->type_name("CELL");
+    auto& cuts = *c.add_option("--cuts", o_.cuts,
+                               "start at N places of a CSV file with soc_ref, each right, 20 and 30 % wrong, wrong and "
+                               "confident, and unknown; print how fast and how honestly the estimate recovers")
+                      ->check(CLI::Range(std::size_t{1}, std::size_t{1'000}))
+                      ->type_name("N");
+    for (const char* other : {"--initial-soc", "--run", "--target", "--verify", "--board-cell"}) cuts.excludes(other);
     c.add_option("--trace", o_.trace, "write every estimate to a CSV file")->type_name("FILE");
     add_output(c, o_.output);
+    for (const char* other : {"--trace", "--report"}) cuts.excludes(other);
     return &c;
   }
 
   int run() override {
     o_.output.set_own(o_.trace);
     o_.output.protect({o_.recording, o_.cell, o_.board_cell});
+    if (o_.cuts > 0) return run_cut_trials(o_);
     ReplayRun run = read(o_);
     compute(o_, run);
     return write(o_, run);

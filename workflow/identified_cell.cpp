@@ -368,6 +368,7 @@ namespace {
 
 struct Rounding {
   static void table(const char*) {}
+  static bool optional_table(const char*, bool known) { return known; }
   static void number(const char*, double& value) { value = std::stod(fmt::format("{:.7g}", value)); }
   static void optional_number(const char* key, double& value, double /*omitted*/ = 0) { number(key, value); }
   static void optional_flag(const char*, bool&) {}
