@@ -268,7 +268,7 @@ class Build:
         for w in words:
             if skip:
                 skip = False
-            elif w in ("-MF", "-MT", "-o", "-c"):
+            elif w in ("-MF", "-MT", "-o", "-c", "-include"):
                 skip = True
             elif w.endswith(("ccache", "c++", "g++")) or w in ("-MD", "-g", "-DNDEBUG") or re.match(r"-O|-W", w):
                 continue
