@@ -87,7 +87,7 @@ constexpr QuantityText text_of(Quantity q) {
     case Quantity::charge_overload_i2t_us:
       return {"overload integral I²t of charging, above 1.05 of the limit", "s", 1e6, 0};
     case Quantity::discharge_overload_i2t_us:
-      return {"overload integral I²t of discharging", "s", 1e6, 0};
+      return {"overload integral I²t of discharging, above 1.05 of the limit", "s", 1e6, 0};
     case Quantity::current_magnitude_ua:
       return {"magnitude of the current", "A", 1e6, 1};
     case Quantity::highest_cdegc:
