@@ -51,7 +51,7 @@ constexpr QuantityText text_of_event(Quantity q) {
     case Quantity::precharge_off_curve:
       return {"precharge below its curve"};
     case Quantity::welded:
-      return {"DC link stays up, or current flows, while open"};
+      return {"a pole of the DC link stays connected, or current flows, while open"};
     case Quantity::not_closed:
       return {"DC link below the pack while closed"};
     case Quantity::sample_age_us:

@@ -38,6 +38,7 @@ class Cases {
   std::vector<Outcome> finish();
   /// Good outcomes are written to this folder, and a case whose outcome is there is not run again. Empty: none.
   std::filesystem::path kept;
+  bool only_kept = false;  ///< runs nothing
   /// Prints each outcome that is not good as soon as it is known.
   bool talks = true;
 

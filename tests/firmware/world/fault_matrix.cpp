@@ -292,6 +292,7 @@ Result run_fault_matrix(const Extent& extent) {
   const std::vector<Background> background = backgrounds();
   Cases cases(extent.at_once);
   cases.kept = extent.kept("faults", pack);
+  cases.only_kept = extent.only_kept;
   std::vector<Outcome> broken;
   plant::Random random(extent.seed);
   for (const Operating state :

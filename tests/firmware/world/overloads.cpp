@@ -68,6 +68,7 @@ Result run_overloads(const Extent& extent) {
       if (const std::string problem = bring_to(world, pack, Operating::drive); !problem.empty())
         throw std::runtime_error(problem);
       cases.kept = extent.kept("overloads", pack);
+      cases.only_kept = extent.only_kept;
       for (const double factor : {1.2, 1.5, 2.0, 3.0, 4.0, 5.5, 8.0, 12.0, 20.0}) {
         for (const bool charges : {false, true}) {
           const std::string name = fmt::format("{:.0f} Ah, {} times the limit, {}", capacity_ah, factor,

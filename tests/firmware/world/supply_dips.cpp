@@ -145,6 +145,7 @@ Result run_supply_dips(const Extent& extent) {
   const std::size_t count = extent.count == 0 ? 1'000 : extent.count, worlds = std::max<std::size_t>(1, count / 60);
   Cases cases(extent.at_once);
   cases.kept = extent.kept(fmt::format("dips_{}", count), pack);
+  cases.only_kept = extent.only_kept;
   std::vector<Outcome> broken;
   for (std::size_t k = 0; k < worlds; ++k) {
     const std::string problem = Timeline(pack, extent.seed + k, count / worlds, cases).run();
