@@ -67,7 +67,8 @@ class Application {
     if constexpr (cells > 1) restore_cells(cells_, persistence.cells());
   }
 
-  void process_sample(const measurement::PackSample<cells>& pack) {
+  /// acquisition_us: time that the acquisition of the sample took, part of Board.LongestSample
+  void process_sample(const measurement::PackSample<cells>& pack, std::uint32_t acquisition_us = 0) {
     const std::uint64_t began_us = hal::now_us();
     board_.state = hal::board_state();
     const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
@@ -85,7 +86,7 @@ class Application {
     estimate_ = estimate;
     if (persistence_.count(mean)) [[unlikely]]
       store_state();
-    const auto took_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(hal::now_us() - began_us, 0xFFFF'FFFF));
+    const auto took_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(hal::now_us() - began_us + acquisition_us, 0xFFFF'FFFF));
     board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
     if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.published()}))
       hal::watchdog_feed();

@@ -38,7 +38,7 @@ int main() {
       given_start ? given_start : stored_starting_point(persistence, identity().cell_hash), identity(), capacity_ah(),
       persistence);
   running = &application;
-  for (; sample != nullptr; sample = hal::next_sample()) application.process_sample(*sample);
+  for (; sample != nullptr; sample = hal::next_sample()) application.process_sample(*sample, hal::acquisition_us());
   application.shut_down();
   return 0;
 }

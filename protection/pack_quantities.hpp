@@ -6,8 +6,9 @@
 //   opposite shift    a broken sense wire floats between its neighbours: one cell reads low, the next equally high.
 //                     Counts if the two shifts differ by less than half of the smaller.
 //   stuck             a cell repeats its reading exactly for five samples or more while the other cells moved by 20 mV;
-//                     a temperature, while the others moved by 5 K. The others: their mean without highest and lowest;
-//                     with less than four cells, the pack's own reading.
+//                     a temperature, while the others moved by 5 K. The others: the mean without highest and lowest, so
+//                     that one that moves alone does not count; with less than four cells the pack's own reading, with
+//                     two sensors the other one.
 //
 // A quantity that cannot be computed is unknown (measurement::no_reading). Memory: 9 bytes per cell. Cost: README.md.
 #pragma once
@@ -176,8 +177,8 @@ class PackQuantities {
     at(q, Quantity::lowest_cdegc) = low;
     std::int32_t count = 0;
     for (std::size_t k = 0; k < limits_.temperatures && known > 1; ++k) {
-      if (measurement::temperature_possible(all[k]) &&
-          stuck(temperature_[k], all[k], (sum - all[k]) / (known - 1), stuck_move_cdegc))
+      const std::int32_t others = known > 2 ? (sum - high - low) / (known - 2) : sum - all[k];
+      if (measurement::temperature_possible(all[k]) && stuck(temperature_[k], all[k], others, stuck_move_cdegc))
         ++count;
     }
     at(q, Quantity::temperatures_stuck) = known > 1 ? count : measurement::no_reading;

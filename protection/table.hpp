@@ -174,7 +174,7 @@ constexpr Table protection_table(const PackDesign& d) {
            .raised = {.quantity = charge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
            .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},
            .reaction = forbid_charge,
-           .why = "the integral is the delay: 10 s at twice the limit, 24 s at 1.5 times the limit"}),
+           .why = "the integral is the delay: 11 s at twice the limit, 29 s at 1.5 times the limit"}),
       row({.fault = discharge_overcurrent,
            .raised = {.quantity = discharge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
            .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},

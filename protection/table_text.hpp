@@ -51,7 +51,7 @@ constexpr QuantityText text_of_event(Quantity q) {
     case Quantity::precharge_off_curve:
       return {"precharge below its curve"};
     case Quantity::welded:
-      return {"DC link stays up, or current flows, while open"};
+      return {"a pole of the DC link stays connected, or current flows, while open"};
     case Quantity::not_closed:
       return {"DC link below the pack while closed"};
     case Quantity::sample_age_us:
@@ -87,7 +87,7 @@ constexpr QuantityText text_of(Quantity q) {
     case Quantity::charge_overload_i2t_us:
       return {"overload integral I²t of charging, above 1.05 of the limit", "s", 1e6, 0};
     case Quantity::discharge_overload_i2t_us:
-      return {"overload integral I²t of discharging", "s", 1e6, 0};
+      return {"overload integral I²t of discharging, above 1.05 of the limit", "s", 1e6, 0};
     case Quantity::current_magnitude_ua:
       return {"magnitude of the current", "A", 1e6, 1};
     case Quantity::highest_cdegc:

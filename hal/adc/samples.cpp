@@ -25,6 +25,7 @@ constexpr std::uint32_t currents_per_round = 4;
 SensorCalibration correction;
 measurement::PackSample<1> pack;
 std::uint64_t due_us = 0;
+std::uint32_t acquired_us = 0;
 bool started = false;
 
 void receive_frames() {
@@ -81,8 +82,11 @@ const measurement::PackSample<1>* next_sample() {
   pack.current_ua = sample.current_ua;
   pack.cell_uv[0] = pack.pack_uv = sample.voltage_uv;
   pack.temperature_cdegc[0] = sample.temperature_cdegc;
+  acquired_us = static_cast<std::uint32_t>(now_us() - sample.time_us);
   return &pack;
 }
+
+std::uint32_t acquisition_us() { return acquired_us; }
 
 void power_path_set(const PowerPath& wanted) { contactor_pins_set(wanted); }
 LinkVoltages link_voltages() { return {}; }

@@ -28,6 +28,7 @@ bq76952::FrontEnd front_end;
 measurement::PackSample<pack_cells> sample;
 SensorCalibration correction;
 std::uint64_t due_us = 0;
+std::uint32_t acquired_us = 0;
 bool started = false;
 
 void receive_frames() {
@@ -52,8 +53,11 @@ const measurement::PackSample<pack_cells>* next_sample() {
     contactor_pins_set({});
   front_end.read(inputs);
   bq76952::read_pack(inputs, bq76952::board_configuration, correction, sample);
+  acquired_us = static_cast<std::uint32_t>(now_us() - inputs.time_us);
   return &sample;
 }
+
+std::uint32_t acquisition_us() { return acquired_us; }
 
 bool calibrate(const SensorCalibration& calibration) {
   correction = calibration;

@@ -32,6 +32,7 @@ const measurement::PackSample<pack_cells>* next_sample() {
   }
 }
 
+std::uint32_t acquisition_us() { return 0; }
 std::optional<measurement::StartingPoint> starting_point() { return frames.starting_point(); }
 void power_path_set(const PowerPath&) {}  // the simulated load receives it as a CAN frame
 LinkVoltages link_voltages() { return {frames.link_plus_uv(), frames.link_minus_uv()}; }

@@ -88,4 +88,6 @@ void record_estimate(std::span<const std::uint32_t> words) {
   estimate_size += words.size();
 }
 
+std::uint32_t acquisition_us() { return 0; }
+
 }  // namespace bms::hal

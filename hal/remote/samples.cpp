@@ -57,6 +57,7 @@ const measurement::PackSample<pack_cells>* next_sample() {
   }
 }
 
+std::uint32_t acquisition_us() { return 0; }
 std::optional<measurement::StartingPoint> starting_point() { return frames.starting_point(); }
 std::span<const std::uint16_t> accepted_ids() { return request_and_sample_ids; }
 void power_path_set(const PowerPath&) {}

@@ -280,6 +280,26 @@ void BxcanModel::bit(std::uint32_t clock_hz) {
   recessive_bit();
 }
 
+std::uint64_t BxcanModel::quiet_bits() const {
+  constexpr std::uint64_t long_time = 1U << 20;
+  if (stuck_dominant || was_stuck_) return 0;
+  if (busy_bits_ > 0) return busy_bits_ - 1;
+  const bool changes = mode_ == Mode::joining || recovering_ || suspended_bits_ > 0 || (mcr_ & 3) == 1;
+  return changes || !others.empty() || (on_the_bus() && scheduled() >= 0) ? 0 : long_time;
+}
+
+void BxcanModel::pass_quiet(std::uint64_t count) {
+  if (count == 0) return;
+  now_bit += count;
+  dominant_run_ = 0;
+  if (busy_bits_ > 0) {
+    busy_bits_ -= static_cast<unsigned>(count);
+    recessive_run_ = 0;
+  } else {
+    recessive_run_ += static_cast<unsigned>(count);
+  }
+}
+
 void BxcanModel::recessive_bit() {
   ++recessive_run_;
   if ((mcr_ & 3) == 1 && mode_ == Mode::normal) mode_ = Mode::initialisation;

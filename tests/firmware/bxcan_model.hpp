@@ -45,6 +45,11 @@ class BxcanModel {
   /// One bit time of the wire passes. clock_hz: of the peripheral.
   void bit(std::uint32_t clock_hz);
 
+  /// Number of bits from now on in which nothing changes but counters: the rest of a frame, or an idle bus.
+  std::uint64_t quiet_bits() const;
+  /// As many calls of bit(). count: at most quiet_bits()
+  void pass_quiet(std::uint64_t count);
+
   bool transmit_interrupt() const;
   bool receive_interrupt() const;
 

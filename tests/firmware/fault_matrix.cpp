@@ -1,4 +1,4 @@
-// Runs the whole fault matrix on the image of the forklift board: ./bms faults [TEXT]
+// Runs the whole fault matrix in the HIL image of the forklift board: ./bms faults [TEXT]
 //
 //   --write        writes the table to protection/README.md
 //   --only TEXT    runs the cases whose names contain TEXT, and prints every sample

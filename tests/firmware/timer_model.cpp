@@ -1,6 +1,8 @@
 #include "tests/firmware/timer_model.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -54,13 +56,25 @@ void TimerModel::edge(double count) {
   ++captures;
 }
 
+double TimerModel::input_hz(double lsi_hz, double lse_hz) const {
+  const auto found = registers_.find(option);
+  const std::uint32_t source = found == registers_.end() ? 0 : found->second >> 6 & 3;  // 18.4.20, TI4_RMP
+  if (source == 1) return lsi_hz;
+  return source == 2 ? lse_hz : 0;
+}
+
+double TimerModel::capture_after_us(double lsi_hz, double lse_hz) const {
+  const double hz = input_hz(lsi_hz, lse_hz);
+  const auto channel = registers_.find(ccmr2);
+  if (hz <= 0 || channel == registers_.end()) return std::numeric_limits<double>::infinity();
+  const double edges = (1U << (channel->second >> 10 & 3)) - static_cast<double>(edges_) - phase_;
+  return std::max(0.0, edges) / hz * 1e6;
+}
+
 void TimerModel::pass(double us, double clock_hz, double lsi_hz, double lse_hz) {
-  const std::uint32_t source = registers_[option] >> 6 & 3;  // 18.4.20, TI4_RMP
-  double input_hz = 0;
-  if (source == 1) input_hz = lsi_hz;
-  if (source == 2) input_hz = lse_hz;
   const bool on = (registers_[cr1] & counts) != 0;
-  const double per_us = on ? 1e-6 * clock_hz / (registers_[psc] + 1) : 0, edges = us * 1e-6 * input_hz;
+  const double per_us = on ? 1e-6 * clock_hz / (registers_[psc] + 1) : 0;
+  const double edges = us * 1e-6 * input_hz(lsi_hz, lse_hz);
   for (double next = std::floor(phase_) + 1; next <= phase_ + edges; next += 1)
     edge(count_ + (next - phase_) / edges * us * per_us);
   phase_ = std::fmod(phase_ + edges, 1);

@@ -20,6 +20,8 @@ class TimerModel {
   /// Time passes. clock_hz: of the timer; lsi_hz, lse_hz: of the slow oscillators, 0 while one does not run.
   void pass(double us, double clock_hz, double lsi_hz, double lse_hz);
   bool interrupt() const;
+  /// Time until the next capture at these frequencies, or infinity.
+  double capture_after_us(double lsi_hz, double lse_hz) const;
   void reset() { *this = TimerModel(); }
 
   unsigned captures = 0;
@@ -27,6 +29,7 @@ class TimerModel {
 
  private:
   void edge(double count);
+  double input_hz(double lsi_hz, double lse_hz) const;
 
   std::map<std::uint32_t, std::uint32_t> registers_;
   double count_ = 0, phase_ = 0;

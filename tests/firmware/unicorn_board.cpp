@@ -313,7 +313,12 @@ void UnicornBoard::pass(std::uint64_t ticks) {
   timer.pass(us, rcc.apb1_timer_hz(), rcc.lsi_hz_now(now_us()), lse_hz);
   const auto apb1_hz = static_cast<std::uint32_t>(rcc.apb1_hz());
   if (next_bit_ == 0) next_bit_ = bit_ticks;
-  for (; next_bit_ <= until; next_bit_ += bit_ticks) can.bit(apb1_hz);
+  while (next_bit_ <= until) {
+    const std::uint64_t quiet = std::min(can.quiet_bits(), (until - next_bit_) / bit_ticks);
+    can.pass_quiet(quiet);
+    can.bit(apb1_hz);
+    next_bit_ += (quiet + 1) * bit_ticks;
+  }
   if (core_stopped()) next_systick_ += ticks;
   ticks_ = until;
   rcc.advance(now_us());
@@ -494,10 +499,23 @@ void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
   sleeping_ = last == 0xBF30;  // wfi
 }
 
+/// To the next bit or tick, whichever comes first; in fast runs over bits that change nothing.
+std::uint64_t UnicornBoard::sleep_ticks() const {
+  const std::uint64_t to_tick = next_systick_ > ticks_ ? next_systick_ - ticks_ : 1;
+  const std::uint64_t to_bit = next_bit_ > ticks_ ? next_bit_ - ticks_ : 1;
+  if (longest_sleep_us <= 0) return std::min(to_tick, to_bit);
+  constexpr double ticks_a_us = ticks_per_second / 1e6;
+  const double lse_hz = rtc != nullptr ? rtc->lse_hz() : 0;
+  const double us = std::min(longest_sleep_us, timer.capture_after_us(rcc.lsi_hz_now(now_us()), lse_hz));
+  const std::uint64_t to_event = static_cast<std::uint64_t>(us * ticks_a_us) + 1;
+  const std::uint64_t to_change = to_bit + can.quiet_bits() * (ticks_per_second / can.bits_per_second);
+  const std::uint64_t to_end = run_until_ticks_ > ticks_ ? run_until_ticks_ - ticks_ : 1;
+  return std::min({to_tick, to_event, to_change, to_end});
+}
+
 void UnicornBoard::slice() {
   if (sleeping_ || core_stopped() || (program_held && !handling())) {
-    // to the next bit or tick, whichever comes first
-    pass(std::min(next_systick_ > ticks_ ? next_systick_ - ticks_ : 1, next_bit_ > ticks_ ? next_bit_ - ticks_ : 1));
+    pass(sleep_ticks());
   } else {
     const auto count = static_cast<std::size_t>(1 + random_() % 200);
     execute(reg(UC_ARM_REG_PC), count);
@@ -515,12 +533,13 @@ void UnicornBoard::slice() {
 }
 
 void UnicornBoard::run_for_ms(double ms) {
-  const std::uint64_t until = ticks_ + static_cast<std::uint64_t>(ms * (ticks_per_second / 1e3));
+  const std::uint64_t until = run_until_ticks_ = ticks_ + static_cast<std::uint64_t>(ms * (ticks_per_second / 1e3));
   while (ticks_ < until) slice();
 }
 
 bool UnicornBoard::run_until(const std::function<bool()>& becomes, double within_ms) {
-  const std::uint64_t until = ticks_ + static_cast<std::uint64_t>(within_ms * (ticks_per_second / 1e3));
+  const std::uint64_t until = run_until_ticks_ =
+      ticks_ + static_cast<std::uint64_t>(within_ms * (ticks_per_second / 1e3));
   while (!becomes()) {
     if (ticks_ >= until) return false;
     slice();

@@ -46,6 +46,10 @@ class UnicornBoard {
   /// Returns false if the condition did not become true in time.
   bool run_until(const std::function<bool()>& becomes, double within_ms);
 
+  /// For long runs: sleep is passed in steps of up to so many microseconds, which end at SysTick, at a capture of timer
+  /// 5 and when the bus changes. Peripherals are asked for interrupts at their ends. 0: a step is a bit of the bus.
+  double longest_sleep_us = 0;
+
   RccModel rcc;
   WatchdogModel watchdog{rcc};
   TimerModel timer;
@@ -120,8 +124,8 @@ class UnicornBoard {
 
   void load(const std::filesystem::path& image);
   void slice();
-  void sleep();
   void pass(std::uint64_t ticks);
+  std::uint64_t sleep_ticks() const;
   void deliver_interrupt();
   void enter(std::uint32_t exception);
   void start();
@@ -157,6 +161,7 @@ class UnicornBoard {
   std::vector<std::uint32_t> active_;               ///< exceptions that are handled, the most urgent last
   std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0;
   double core_hz_ = 16e6;
+  std::uint64_t run_until_ticks_ = 0;
   std::string ended_;
   struct Stuck {
     std::uint32_t address = 0;

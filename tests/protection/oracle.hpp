@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <deque>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -161,13 +162,15 @@ class QuantityOracle {
     for (std::size_t k = 0; k < 4; ++k) {
       const auto reading = [&](std::size_t i) { return history_[i].temperature_cdegc[k]; };
       const auto others = [&](std::size_t i) {
-        std::int64_t sum = 0, n = 0;
-        for (std::size_t o = 0; o < 4; ++o) {
-          if (o == k || history_[i].temperature_cdegc[o] == measurement::no_temperature) continue;
-          sum += history_[i].temperature_cdegc[o];
-          ++n;
+        std::vector<std::int64_t> known;
+        for (const std::int16_t t : history_[i].temperature_cdegc) {
+          if (t != measurement::no_temperature) known.push_back(t);
         }
-        return n > 0 ? sum / n : 0;
+        std::sort(known.begin(), known.end());
+        if (known.size() < 2) return std::int64_t{0};
+        if (known.size() == 2) return known[0] + known[1] - history_[i].temperature_cdegc[k];
+        const std::int64_t sum = std::accumulate(known.begin() + 1, known.end() - 1, std::int64_t{0});
+        return sum / static_cast<std::int64_t>(known.size() - 2);
       };
       count += stuck(
                    reading, [](std::int16_t t) { return t != measurement::no_temperature; }, others, 500)

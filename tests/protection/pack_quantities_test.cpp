@@ -164,6 +164,28 @@ TEST(Quantities, IgnoreSensorsThatAreNotFitted) {
   EXPECT_EQ(pack_limits(d).temperatures, 4) << "limited to the sensors of a sample";
 }
 
+/// A sensor that warms alone, next to a burning terminal, does not make the constant ones stuck; a sensor that stays
+/// while two others or more warm is stuck.
+TEST(Quantities, OfATemperatureThatMovesAloneCallNoOtherStuck) {
+  for (const int fitted : {2, 3, 4}) {
+    for (int moving = 1; moving < fitted; ++moving) {
+      PackDesign d = forklift;
+      d.temperatures = fitted;
+      PackQuantities<16> quantities(pack_limits(d));
+      Quantities q = unknown_quantities();
+      measurement::PackSample<16> s;
+      s.temperature_cdegc = {2'500, 2'500, 2'500, 2'500};
+      for (int k = 0; k < 30; ++k) {
+        for (int warm = 0; warm < moving; ++warm)
+          s.temperature_cdegc[static_cast<std::size_t>(warm)] = static_cast<std::int16_t>(2'500 + 50 * k + warm);
+        quantities.update(s, step_us, q);
+      }
+      const bool found = moving >= 2 || fitted == 2;
+      EXPECT_EQ(at(q, Quantity::temperatures_stuck), found ? fitted - moving : 0) << moving << " of " << fitted;
+    }
+  }
+}
+
 /// Integral of (I / limit)^2 - 1 with 1.05 times the continuous limit; not below 0, saturated at ten times the limit.
 TEST(OverloadIntegral, ACurrentIntegratesItsSquareOverTheLimit) {
   for (const double limit_a : {6.0, 300.0}) {

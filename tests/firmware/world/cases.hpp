@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <string>
@@ -35,6 +36,9 @@ class Cases {
   void start(const std::string& name, const std::function<void(Outcome&)>& body);
   /// Waits for all children. The outcomes are in the order of start().
   std::vector<Outcome> finish();
+  /// Good outcomes are written to this folder, and a case whose outcome is there is not run again. Empty: none.
+  std::filesystem::path kept;
+  bool only_kept = false;  ///< runs nothing
   /// Prints each outcome that is not good as soon as it is known.
   bool talks = true;
 
@@ -46,6 +50,8 @@ class Cases {
   };
   void wait_for(std::size_t most);
   void ended(Child& child);
+  std::filesystem::path file_of(const std::string& name) const;
+  bool known(const std::string& name);
 
   unsigned at_once_;
   std::vector<Child> running_;

@@ -27,6 +27,7 @@ struct Cause {
   bool blind = false;      ///< the front end does not measure any more
   std::uint64_t also = 0;  ///< faults that may follow from the same cause
   std::function<void(TruckWorld&)> each_second = {};
+  bool needs_current = false;  ///< has no effect while no current flows
 };
 std::vector<Cause> other_causes();
 

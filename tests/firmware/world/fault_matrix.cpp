@@ -47,7 +47,11 @@ class FaultCase {
   void run() {
     world_.vehicle.forget();
     judge_.allowed = second_line | repeats;
-    world_.each_step = [this] { judge_.step(); };
+    watched_s_ = world_.now_s();
+    world_.each_step = [this] {
+      judge_.step();
+      watch_currents();
+    };
     if (noise()) add_noise();
     if (case_.background != nullptr) {
       judge_.allowed |= case_.background->faults;
@@ -94,7 +98,8 @@ class FaultCase {
     world_.fine_steps(3'000, 1);
     set_drive_a(world_, a);
     const double f = std::abs(case_.current_share);
-    world_.run_ms(f < 1.05 ? 12'000 : 1e3 * (30 / (f * f - 1) * 1.3 + grace_s + 1.5));
+    const double over = f / 1.05;  // the integral begins at 1.05 of the limit
+    world_.run_ms(f < 1.05 ? 12'000 : 1e3 * (30 / (over * over - 1) * 1.3 + grace_s + 1.5));
   }
 
   void by_cause(const Cause& cause) {
@@ -116,10 +121,33 @@ class FaultCase {
 
   unsigned bit() const { return case_.cause != nullptr ? case_.cause->bit : case_.row->bit; }
 
-  /// Current in the direction that a fault forbids.
+  /// Current in the direction that a fault forbids, while the fault was published.
   bool forbidden_current(Reaction reaction) const {
-    if (reaction == Reaction::forbid_charge) return state_ == Operating::charge || state_ == Operating::recuperate;
-    return reaction == Reaction::forbid_discharge && state_ == Operating::drive;
+    if (reaction == Reaction::forbid_charge) return charged_;
+    return reaction == Reaction::forbid_discharge && discharged_;
+  }
+  /// The grace time has passed with such a current.
+  bool forbidden_for_long(Reaction reaction) const {
+    if (reaction == Reaction::forbid_charge) return longest_charged_s_ > grace_s + chain_s;
+    return reaction == Reaction::forbid_discharge && longest_discharged_s_ > grace_s + chain_s;
+  }
+
+  void watch_currents() {
+    const double now_s = world_.now_s(), step_s = now_s - watched_s_, a = world_.truck.current_a();
+    watched_s_ = now_s;
+    bool no_charge = false, no_discharge = false;
+    for (const Row& row : judge_.rows()) {
+      if (!world_.vehicle.fault(row.bit)) continue;
+      no_charge = no_charge || row.reaction == Reaction::forbid_charge;
+      no_discharge = no_discharge || row.reaction == Reaction::forbid_discharge;
+    }
+    const double rest_a = 0.1 * pack_.limit_a;
+    charged_ = charged_ || (no_charge && a > rest_a);
+    discharged_ = discharged_ || (no_discharge && a < -rest_a);
+    charged_s_ = no_charge && a > rest_a ? charged_s_ + step_s : 0;
+    discharged_s_ = no_discharge && a < -rest_a ? discharged_s_ + step_s : 0;
+    longest_charged_s_ = std::max(longest_charged_s_, charged_s_);
+    longest_discharged_s_ = std::max(longest_discharged_s_, discharged_s_);
   }
 
   void judge() {
@@ -134,10 +162,9 @@ class FaultCase {
     bool must_open = false, may_open = false;
     for (const Row& row : judge_.rows()) {
       if ((world_.vehicle.faults_seen() >> row.bit & 1) == 0) continue;
-      const bool opens =
-          row.reaction == Reaction::open || row.reaction == Reaction::open_now || forbidden_current(row.reaction);
-      may_open = may_open || opens;
-      must_open = must_open || (opens && row.bit == bit() && !silent());
+      const bool opens = row.reaction == Reaction::open || row.reaction == Reaction::open_now;
+      may_open = may_open || opens || forbidden_current(row.reaction);
+      must_open = must_open || ((opens || forbidden_for_long(row.reaction)) && row.bit == bit() && !silent());
     }
     may_open = may_open || (world_.vehicle.faults_seen() >> 32) != 0;
     if (was_closed_ && must_open && !opened) outcome_.fail("not opened: " + summary(world_));
@@ -153,8 +180,9 @@ class FaultCase {
   Operating state_;
   const Case& case_;
   Outcome& outcome_;
-  double begun_ms_ = 0;
-  bool was_closed_ = false;
+  double begun_ms_ = 0, watched_s_ = 0, charged_s_ = 0, discharged_s_ = 0, longest_charged_s_ = 0,
+         longest_discharged_s_ = 0;
+  bool was_closed_ = false, charged_ = false, discharged_ = false;
 };
 
 void add_quantity_cases(const std::vector<Row>& rows, const std::vector<Background>& background,
@@ -190,6 +218,7 @@ std::vector<Case> cases_in(Operating state, const std::vector<Row>& rows, const 
   std::vector<Case> list;
   add_quantity_cases(rows, background, list);
   for (std::size_t k = 0; k < causes.size(); ++k) {
+    if (causes[k].needs_current && (state == Operating::off || state == Operating::standby)) continue;
     list.push_back({.name = causes[k].name, .cause = &causes[k]});
     list.push_back({.name = causes[k].name + ", during worn-out flash",
                     .kind = Kind::during,
@@ -262,6 +291,8 @@ Result run_fault_matrix(const Extent& extent) {
   const std::vector<Cause> causes = other_causes();
   const std::vector<Background> background = backgrounds();
   Cases cases(extent.at_once);
+  cases.kept = extent.kept("faults", pack);
+  cases.only_kept = extent.only_kept;
   std::vector<Outcome> broken;
   plant::Random random(extent.seed);
   for (const Operating state :

@@ -50,6 +50,9 @@ Row row_of(const std::vector<std::string>& c) {
   return row;
 }
 
+constexpr double overload_from = 1.05;       ///< of the continuous limit, as the table says
+constexpr double rest_current_share = 0.02;  ///< rest current at 1C
+
 bool begins(const std::string& text, const char* with) { return text.rfind(with, 0) == 0; }
 
 }  // namespace
@@ -95,6 +98,11 @@ double Judge::value(const Row& row) const {
   if (q == "pack") return world_.pack_v();
   if (q == "magnitude of the current") return std::abs(world_.truck.current_a());
   if (q == "highest minus lowest cell") return world_.highest_cell_v() - world_.lowest_cell_v();
+  if (begins(q, "current above 1.1 times the allowed current")) {
+    const double a = world_.truck.current_a();
+    return std::abs(a) - 1.1 * (a > 0 ? world_.vehicle.allowed_charge_a() : world_.vehicle.allowed_discharge_a()) -
+           rest_current_share * limit_a_;
+  }
   if (begins(q, "overload integral I²t of charging")) return charge_overload_s_;
   if (begins(q, "overload integral I²t of discharging")) return discharge_overload_s_;
   if (q == "sum of cells minus pack") {
@@ -134,6 +142,7 @@ double Judge::tolerance(const Row& row) const {
   if (q == "sum of cells minus pack") return 0.06 + 4 * more_tolerance_v;
   if (q == "opposite shift of neighbours") return 0.03 + 2 * more_tolerance_v;
   if (begins(q, "overload integral")) return 0.2 * row.threshold;
+  if (begins(q, "current above")) return 0.03 * limit_a_ + more_tolerance_a;
   return 0.7;
 }
 
@@ -197,10 +206,10 @@ void Judge::check_open(double now_s) {
 void Judge::step() {
   const double now_s = world_.now_s(), step_s = now_s - last_s_;
   last_s_ = now_s;
-  const double ratio = world_.truck.current_a() / limit_a_, heating = ratio * ratio - 1;
+  const double ratio = world_.truck.current_a() / (overload_from * limit_a_), heating = ratio * ratio - 1;
   double& overload_s = ratio > 0 ? charge_overload_s_ : discharge_overload_s_;
   double& other_s = ratio > 0 ? discharge_overload_s_ : charge_overload_s_;
-  overload_s = std::max(0.0, overload_s + (std::abs(ratio) > 1.05 || heating < 0 ? heating : 0) * step_s);
+  overload_s = std::max(0.0, overload_s + heating * step_s);
   other_s = std::max(0.0, other_s - step_s);
   for (std::size_t k = 0; k < rows_.size(); ++k) watch(rows_[k], watches_[k], now_s, step_s);
   const std::uint64_t faults = world_.vehicle.faults();

@@ -1,4 +1,9 @@
 #include <algorithm>
+#include <functional>
+
+#include <fmt/format.h>
+
+#include "files/text_file.hpp"
 
 #include "tests/firmware/world/scenarios.hpp"
 
@@ -10,5 +15,11 @@ unsigned Result::failed() const {
 }
 
 bool Extent::has(const std::string& name) const { return only.empty() || name.find(only) != std::string::npos; }
+
+std::filesystem::path Extent::kept(const std::string& scenario, const Pack& pack) const {
+  if (!continues) return {};
+  const std::size_t image = std::hash<std::string>{}(files::read_file(pack.image));
+  return std::filesystem::path(BMS_SOURCE_DIR "/build/world") / fmt::format("{}_{:016x}_{}", scenario, image, seed);
+}
 
 }  // namespace bms::world

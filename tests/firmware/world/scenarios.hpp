@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,10 @@ struct Extent {
   std::string only;     ///< cases whose name contains this text; empty: all
   double minutes = 10;  ///< of the shift
   unsigned at_once = 2;
+  bool continues = false;  ///< good outcomes of an earlier run with the same image and seed count
+  bool only_kept = false;  ///< runs nothing: the table of the outcomes that are known
+  /// Folder for the outcomes of a scenario, or empty.
+  std::filesystem::path kept(const std::string& scenario, const Pack& pack) const;
   bool has(const std::string& name) const;  ///< `only` selects the case
 };
 

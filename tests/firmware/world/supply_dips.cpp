@@ -35,17 +35,21 @@ void survive(TruckWorld& world, const Dip& dip, Outcome& outcome) {
   } else {
     world.dip_vdda(0.5, dip.duration_ms, dip.depth_v);
   }
-  world.run_ms(dip.duration_ms + 4'000);
+  world.run_ms(dip.duration_ms + 300);
+  world.run_until([&] { return world.both_mains_closed(); }, 3'700);
+  world.run_ms(200);
   outcome.values["state after"] = world.vehicle.state();
   outcome.values["resets"] = static_cast<double>(world.board.resets.size());
   // the driver turns the key, faults are cleared, and the truck is to drive again
   set_drive_a(world, 0);
   set_charger_a(world, 0);
   world.vehicle.request = Request::none;
-  world.run_ms(2'500);
-  for (int k = 0; k < 12; ++k) {
-    if (k % 4 == 0) world.vehicle.clear_faults();
-    world.run_ms(1'000);
+  world.run_until([&] { return !world.any_main_closed(); }, 2'500);
+  world.run_ms(300);
+  const auto ready = [&] { return world.vehicle.faults() == 0 && world.vehicle.state() == 0; };
+  for (int k = 0; k < 3 && (k == 0 || !ready()); ++k) {
+    world.vehicle.clear_faults();
+    world.run_until(ready, 4'000);
   }
   world.vehicle.request = Request::drive;
   const double ms = world.run_until([&] { return world.both_mains_closed(); }, 12'000);
@@ -140,6 +144,8 @@ Result run_supply_dips(const Extent& extent) {
   const Pack pack = pack_of(truck_ah);
   const std::size_t count = extent.count == 0 ? 1'000 : extent.count, worlds = std::max<std::size_t>(1, count / 60);
   Cases cases(extent.at_once);
+  cases.kept = extent.kept(fmt::format("dips_{}", count), pack);
+  cases.only_kept = extent.only_kept;
   std::vector<Outcome> broken;
   for (std::size_t k = 0; k < worlds; ++k) {
     const std::string problem = Timeline(pack, extent.seed + k, count / worlds, cases).run();

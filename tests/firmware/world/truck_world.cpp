@@ -15,6 +15,8 @@ using plant::Relay;
 namespace {
 
 constexpr unsigned i2c_clock = 6, i2c_data = 7, alert = 5, plus_auxiliary = 14, minus_auxiliary = 15, port_of_b = 1;
+constexpr double longest_sleep_us = 100;  ///< the front end and the converter are asked for interrupts so often
+constexpr double least_step_ms = 1e-3;
 constexpr double settle_s = 0.03;       ///< the capacitors at the pins charge before the firmware starts
 constexpr double switching_ms = 30;     ///< a contactor moves and bounces
 constexpr double reset_delay_ms = 1.5;  ///< t_RSTTEMPO, DS8626, table 23
@@ -82,6 +84,7 @@ TruckWorld::TruckWorld(const std::filesystem::path& image, const WorldSetup& set
   held_v_.fill(std::nan(""));
   for (std::size_t k = 0; k < 4; ++k) set_temperature(k, 25);
   board.may_start_again = true;
+  board.longest_sleep_us = longest_sleep_us;
   board.plugged = {{firmware::I2cControllerModel::base, &i2c_},
                    {GpioPort::base(0), &port_a},
                    {GpioPort::base(port_of_b), &port_b},
@@ -111,15 +114,24 @@ double TruckWorld::step_ms() const {
   const double now = now_ms();
   double ms = now < switching_until_ms_ ? 1 : 5;
   if (now < fine_until_ms_) ms = std::min(ms, fine_step_ms_);
+  if (late_ms_ > 0) ms = std::min(ms, late_edge_ms_ - now);
   for (const double edge : edges_ms_) {
     if (edge > now + 1e-6) ms = std::min(ms, edge - now);
   }
-  return std::max(ms, 1e-3);
+  return std::max(ms, least_step_ms);
+}
+
+void TruckWorld::update_lateness() {
+  if (late_ms_ <= 0 || held_in_reset_ || now_ms() < late_edge_ms_) return;
+  late_ = !late_;
+  late_edge_ms_ = now_ms() + (late_ ? 1 : 2) * late_ms_ * noise_.uniform();
+  board.program_held = late_;
 }
 
 void TruckWorld::step(double limit_ms) {
+  update_lateness();
   const std::uint64_t writes = port_c.writes;
-  board.run_until([&] { return port_c.writes != writes; }, std::min(limit_ms, step_ms()));
+  board.run_until([&] { return port_c.writes != writes; }, std::max(least_step_ms, std::min(limit_ms, step_ms())));
   const double behind_s = truck_start_s_ + now_s() - truck.time_s();
   if (behind_s > 0) truck.advance(behind_s);
   if (any_held_) update_held_cells();
@@ -131,7 +143,7 @@ void TruckWorld::step(double limit_ms) {
 
 void TruckWorld::run_ms(double ms) {
   const double until = now_ms() + ms;
-  while (now_ms() < until - 1e-6) step(until - now_ms());
+  while (now_ms() < until - least_step_ms) step(until - now_ms());
 }
 
 double TruckWorld::run_until(const std::function<bool()>& holds, double within_ms) {

@@ -88,6 +88,8 @@ class TruckWorld {
     setup_.cell_noise_v = cell_v;
     setup_.shunt_noise_v = shunt_v;
   }
+  /// main() stands still again and again for up to `most_ms`, as behind long interrupts, so samples are that late.
+  void make_late(double most_ms) { late_ms_ = most_ms; }
   /// Steps of `step_ms` for the given time, for fast events.
   void fine_steps(double duration_ms, double step_ms = 0.2);
 
@@ -130,13 +132,15 @@ class TruckWorld {
   void update_supply(double vdda_v);
   void update_chip();
   void update_held_cells();
+  void update_lateness();
   void update_auxiliary(unsigned pin, double pin_v, double vdda_v);
 
   WorldSetup setup_;
   WorldI2c i2c_;
   plant::Random noise_;
   double truck_start_s_ = 0, fine_until_ms_ = 0, fine_step_ms_ = 1, switching_until_ms_ = 0, opened_ms_ = -1;
-  double released_ms_ = never;
+  double released_ms_ = never, late_ms_ = 0, late_edge_ms_ = 0;
+  bool late_ = false;
   bool held_in_reset_ = false, supply_low_ = false, detected_ = false, were_closed_ = false;
   std::size_t seen_events_ = 0;
   std::uint64_t seen_writes_ = 0;

@@ -47,7 +47,7 @@ constexpr std::array names{"cell overvoltage warning",
                            "current unrequested",
                            "allowed current exceeded"};
 constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F,
-                        pack_state_id = 0x180;
+                        pack_state_id = 0x180, board_id = 0x1B9;
 constexpr double request_period_ms = 1'000;
 constexpr std::size_t most_seen = 4'096;
 
@@ -109,6 +109,9 @@ void Vehicle::read(const can::Frame& frame, double at_ms) {
       break;
     case pack_state_id:
       soc_percent_ = 0.002 * static_cast<double>(field(frame, 16, 16));
+      break;
+    case board_id:
+      longest_sample_ms_ = 0.01 * static_cast<double>(field(frame, 48, 16));
       break;
     default:
       break;

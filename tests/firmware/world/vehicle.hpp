@@ -32,6 +32,7 @@ class Vehicle {
   bool charge_enabled() const { return charge_enabled_; }
   double allowed_charge_a() const { return allowed_charge_a_; }
   double allowed_discharge_a() const { return allowed_discharge_a_; }
+  double longest_sample_ms() const { return longest_sample_ms_; }  ///< Board.LongestSample; negative: not published
   double soc_percent() const { return soc_percent_; }
   double silent_ms() const;  ///< since the last Faults message
   /// All faults that were published since the start or since forget().
@@ -60,7 +61,7 @@ class Vehicle {
   std::uint64_t faults_ = 0, seen_ = 0;
   unsigned first_cause_ = 0, state_ = 15;
   bool charge_enabled_ = false;
-  double allowed_charge_a_ = 0, allowed_discharge_a_ = 0, soc_percent_ = -1;
+  double allowed_charge_a_ = 0, allowed_discharge_a_ = 0, soc_percent_ = -1, longest_sample_ms_ = -1;
   std::vector<Change> changes_;
 };
 

@@ -6,6 +6,8 @@
 //   --only TEXT      cases whose names contain TEXT
 //   --minutes N      duration of the shift
 //   --jobs N         cases at a time
+//   --continue       takes the good outcomes of earlier runs with this option, of the same image and seed
+//   --known          with --continue: runs nothing, the table of the known outcomes
 //   --write          writes the tables to tests/firmware/world/README.md
 //
 // Exit code 1 if a case failed.
@@ -47,6 +49,10 @@ Options read_options(const std::vector<std::string>& words) {
     };
     if (words[k] == "--write") {
       options.write = true;
+    } else if (words[k] == "--continue") {
+      options.extent.continues = true;
+    } else if (words[k] == "--known") {
+      options.extent.only_kept = true;
     } else if (words[k] == "--count") {
       options.extent.count = std::stoul(value());
     } else if (words[k] == "--seed") {

@@ -88,7 +88,30 @@ TEST(GpioModel, APinDrivesOnlyAsAnOutput) {
   world.run_ms(2'500);
   EXPECT_EQ(world.pin(Relay::main_plus), Level::low);
   EXPECT_EQ(world.pin(Relay::charge), Level::low);
+  world.dip_vdda(1, 20, 3.3);
+  world.run_ms(10);
+  EXPECT_EQ(world.pin(Relay::main_plus), Level::floating) << "in reset";
+  world.run_ms(2'500);
+  EXPECT_EQ(world.pin(Relay::main_plus), Level::low);
   EXPECT_THAT(world.violations(), IsEmpty());
+}
+
+/// A remainder below a tick of the emulated clock once repeated the same step for ever.
+TEST(TruckWorld, PassesTimesThatAreNoMultipleOfAClockTick) {
+  TruckWorld world(pack().image, typical_setup(pack()));
+  world.run_ms(1);
+  plant::Random random(3);
+  for (int k = 0; k < 20'000; ++k) world.run_ms(0.01 + 0.05 * random.uniform());
+  EXPECT_NEAR(world.now_ms(), 701, 25);
+}
+
+/// Board.LongestSample counts from the first transfer of the front end to the last message of the sample.
+TEST(World, ASampleWithItsAcquisitionStaysWithinTheBudget) {
+  TruckWorld world(pack().image, typical_setup(pack()));
+  ASSERT_EQ(bring_to(world, pack(), Operating::drive), "");
+  world.run_ms(20'000);
+  EXPECT_LT(world.vehicle.longest_sample_ms(), 50) << "BMS_SAMPLE_BUDGET_MS of board.cmake";
+  EXPECT_GT(world.vehicle.longest_sample_ms(), 9) << "the transfers alone take this time";
 }
 
 }  // namespace
