@@ -412,7 +412,7 @@ void run() {
 int main(int argc, char** argv) {
   try {
     if (argc > 1 && std::string_view(argv[1]) == "step")
-      fmt::print("{}\n{}\n{}\n{}", bms::step_cost(), bms::microbit_cost(), bms::filter_forms(), bms::mechanism_cost());
+      fmt::print("{}\n{}\n{}", bms::step_cost(), bms::microbit_cost(), bms::filter_forms());
     else if (argc > 1 && std::string_view(argv[1]) == "filter")
       bms::files::replace_figures(bms::source / "estimator/README.md", "filter forms", bms::filter_forms());
     else if (argc > 1 && std::string_view(argv[1]) == "readme")
