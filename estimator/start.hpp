@@ -30,10 +30,12 @@ struct StartPolarisation {
   arithmetic::Variance<S> charged_before_v2{};  ///< that part if the current before charged the cell
 };
 
+inline constexpr double rests_below_c = 0.01;  ///< current of a cell at rest, in capacities per hour
+
 /// Nobody knows how long the present current has flowed. The RC branch is assumed to be charged to half of its final
 /// voltage, with a standard deviation of the same size; the current before that adds to it (noise.current_unknown_a).
 /// In the cold, chargers reduce their current at least as the resistance increases, so a charge leaves no larger
-/// voltage than at the reference temperature: a cell that reads far above its plateau is full.
+/// voltage than at the reference temperature: a cell at rest that reads far above its plateau is full.
 template <class S>
 constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at,
                                                   const arithmetic::Current<S>& current_a,
@@ -41,8 +43,9 @@ constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at
   using namespace model;
   const Voltage<S> half_v = at.r1_ohm * Fraction<S>(0.5) * current_a;
   const Voltage<S> before_v = at.r1_ohm * noise.unknown_a;
+  const bool rests = magnitude(current_a) < Current<S>(noise.one_c_a * Fraction<S>(rests_below_c));
   const auto charged_v =
-      at.activation > Factor<S>(1) ? ratio<Voltage<S>>(before_v, Voltage<S>(at.activation)) : before_v;
+      rests && at.activation > Factor<S>(1) ? ratio<Voltage<S>>(before_v, Voltage<S>(at.activation)) : before_v;
   const Variance<S> before_v2 = before_v * before_v;
   return {half_v, Variance<S>(half_v * half_v) + before_v2, before_v2, charged_v * charged_v};
 }
