@@ -127,6 +127,9 @@ class SocEstimator {
 
   static constexpr int longest_gap_counts = 1'000;  ///< of longest_count_us: 23 days; nothing is known after that
 
+  /// Variance of the model's error in the bank after a contradiction, in addition to the expected one: the model may be
+  /// three times as wrong as its file says.
+  static constexpr double model_may_be_off = 8;
   /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
   static constexpr double wider_sigma = 3, least_sigma = 0.05;
 
@@ -211,7 +214,8 @@ class SocEstimator {
         Voltage(Errors::without_error(state_, predicted_v) - at.ocv_v), constants_.consistency_share());
     if (ambiguous_.open()) [[unlikely]] {
       if (correct_from_bank(cell, input.current_a, input.temperature_c, soc, innovation_v, overpotential_v2)) {
-        flags |= contradicted_ ? soc_ambiguous | soc_contradicted : soc_ambiguous;
+        flags |= soc_ambiguous;
+        if (contradicted_) flags |= soc_contradicted;
         return;
       }
     }
@@ -222,8 +226,8 @@ class SocEstimator {
         return;
       }
     }
-    Variance error_v2 = Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell, at); });
-    if (error_v2 < consistency_.variance()) error_v2 = consistency_.variance();
+    const Variance error_v2 =
+        Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell, at); });
     const Variance model_v2 = Variance(arithmetic::product<Variance>(error_v2, constants_.correlated_samples()) +
                                        arithmetic::product<Variance>(overpotential_v2, constants_.resistance_noise()));
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
@@ -251,10 +255,10 @@ class SocEstimator {
                                                    overpotential_error_v2(overpotential_v2)));
     const Variance expected_v2 = Variance(Variance(of_model_v2 + of_soc_v2) + cell.noise.voltage_v2);
     if (consistency_.is_inconsistent(expected_v2, constants_.consistency_share()) && !ambiguous_.open()) {
-      estimate_again(cell, soc, variance);
+      estimate_again(cell, soc, variance, of_model_v2);
       return soc_ambiguous | soc_contradicted;
     }
-    return OutlierGate<S>::is_outlier(innovation_v, expected_v2) ? voltage_rejected : 0;
+    return OutlierGate<S>::is_outlier(innovation_v, expected_v2) ? std::uint32_t{voltage_rejected} : 0;
   }
 
   constexpr Variance overpotential_error_v2(const Variance& overpotential_v2) const {
@@ -264,15 +268,17 @@ class SocEstimator {
 
   /// Opens the bank around the present SOC, with a wider sigma.
   template <class Cell>
-  constexpr void estimate_again(const Cell& cell, const Soc& soc, const Variance& variance) {
+  constexpr void estimate_again(const Cell& cell, const Soc& soc, const Variance& variance,
+                                const Variance& of_model_v2) {
     const Variance wider = arithmetic::product<Variance>(variance, arithmetic::Count<S>(wider_sigma * wider_sigma));
-    const Variance least(least_sigma * least_sigma);
+    const auto least = Variance(least_sigma * least_sigma);
     const SocDistribution<S> before{soc, wider < least ? least : wider};
     contradicted_ = true;
     state_.covariance.template reset<Model::soc>(before.variance);
-    ambiguous_.open_at(cell, state_, soc,
-                       StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before, start_is_wrong_misfit}, false,
-                       consistency_.variance());
+    const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, arithmetic::Count<S>(model_may_be_off)),
+                   seen_v2 = consistency_.variance();
+    ambiguous_.open_at(cell, state_, soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &before}, false,
+                       seen_v2 < more_v2 ? seen_v2 : more_v2);
     consistency_.reset();
   }
 
@@ -368,8 +374,9 @@ class SocEstimator {
           voltage ? Voltage(Model::true_voltage(laws_of(cell), arithmetic::from_micro<Voltage>(*voltage_uv)) - load_v)
                   : Voltage(0);
       const SocDistribution<S> before = soc;
-      const StartMisfit<S, decltype(tables)> misfit{tables, voltage ? &ocv_v : nullptr, reading_v2,
-                                                    has_start_ ? &before : nullptr, start_is_wrong_misfit};
+      const StartMisfit<S, decltype(tables)> misfit{
+          tables, voltage ? &ocv_v : nullptr, reading_v2,
+          Variance(Variance(reading_v2 - rc.before_v2) + rc.charged_before_v2), has_start_ ? &before : nullptr};
       if (voltage) soc = soc_from(misfit);
       const bool ambiguous = soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma);
       if (ambiguous || has_start_) {

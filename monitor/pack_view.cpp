@@ -25,7 +25,9 @@ constexpr std::pair<estimator::Flag, const char*> flag_texts[] = {
     {estimator::time_not_increasing, "time not increasing"},
     {estimator::not_started, "not started"},
     {estimator::soc_ambiguous, "more than one state of charge fits"},
-    {estimator::voltage_rejected, "voltage rejected"}};
+    {estimator::voltage_rejected, "voltage rejected"},
+    {estimator::soc_contradicted, "voltages contradicted the state of charge"},
+    {estimator::current_beyond_limits, "current beyond the limits of the cell file"}};
 
 std::vector<TextItem> flag_items(const Reading& flags) {
   std::vector<TextItem> set;

@@ -144,6 +144,22 @@ TEST(CellFile, RejectsValuesOutOfRangeAndNamesKeyLineAndRange) {
   EXPECT_THAT(cell_refusal(replaced(good, "voltage_v = 0.001", "voltage_v = 0.0")), HasSubstr("'noise.voltage_v'"));
 }
 
+TEST(CellFile, KnowsWhereItWasIdentifiedIfItStatesIt) {
+  CellFile cell = read_cell("table9");
+  EXPECT_EQ(cell.parameters.range.temperature_min_c, model::IdentifiedRange::unknown);
+  EXPECT_EQ(cell_text(cell).find("[range]"), std::string::npos);
+  cell.parameters.range.temperature_min_c = -5;
+  cell.parameters.range.duration_s = 3'600;
+  cell.parameters.tolerance.resistance_per_ev = 0.07;
+  const CellFile again = parse_cell(cell_text(cell), "again");
+  EXPECT_EQ(again.parameters.range.temperature_min_c, -5);
+  EXPECT_EQ(again.parameters.range.temperature_max_c, model::IdentifiedRange::unknown);
+  EXPECT_EQ(again.parameters.range.duration_s, 3'600);
+  EXPECT_EQ(again.parameters.tolerance.resistance_per_ev, 0.07);
+  cell.parameters.range.temperature_max_c = -10;
+  EXPECT_THROW(parse_cell(cell_text(cell), "wrong"), BadInput) << "the maximum is below the minimum";
+}
+
 TEST(CellFile, RejectsABinaryFile) {
   EXPECT_THAT(cell_refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a control character"));
 }
