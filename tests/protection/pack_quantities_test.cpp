@@ -170,7 +170,7 @@ TEST(Quantities, OfATemperatureThatMovesAloneCallNoOtherStuck) {
   for (const int fitted : {2, 3, 4}) {
     for (int moving = 1; moving < fitted; ++moving) {
       PackDesign d = forklift;
-      d.temperatures = fitted;
+      d.temperatures = static_cast<std::uint8_t>(fitted);
       PackQuantities<16> quantities(pack_limits(d));
       Quantities q = unknown_quantities();
       measurement::PackSample<16> s;

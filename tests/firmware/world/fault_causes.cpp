@@ -1,5 +1,6 @@
 #include "tests/firmware/world/fault_causes.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bms::world {
@@ -57,8 +58,9 @@ std::vector<Cause> other_causes() {
   list.push_back({21, "a cell register is stuck", [](TruckWorld& w) { w.chip.stale_cells = 1U << 6; }, 3, false,
                   fault(16) | fault(19),
                   [](TruckWorld& w) {
-                    static int turn = 0;
-                    for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, ++turn / 16 % 2 == 0 ? 3.30 : 3.36);
+                    static int seconds = 0;  // others that return each second would look like noise
+                    const double v = 3.30 + 0.02 * std::min(seconds++, 4);
+                    for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, v);
                   }});
   // the converter saturates at the end of its range, which is a large current
   list.push_back({10, "current beyond the range of the sensor", [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; },
