@@ -177,7 +177,7 @@ TEST(Quantities, OfATemperatureThatMovesAloneCallNoOtherStuck) {
       s.temperature_cdegc = {2'500, 2'500, 2'500, 2'500};
       for (int k = 0; k < 30; ++k) {
         for (int warm = 0; warm < moving; ++warm)
-          s.temperature_cdegc[static_cast<std::size_t>(warm)] = static_cast<std::int16_t>(2'500 + 50 * k + warm);
+          s.temperature_cdegc[static_cast<std::size_t>(warm)] = static_cast<std::int16_t>(2'500 + 100 * k + warm);
         quantities.update(s, step_us, q);
       }
       const bool found = moving >= 2 || fitted == 2;
