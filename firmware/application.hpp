@@ -86,7 +86,8 @@ class Application {
     estimate_ = estimate;
     if (persistence_.count(mean)) [[unlikely]]
       store_state();
-    const auto took_us = static_cast<std::uint32_t>(std::min<std::uint64_t>(hal::now_us() - began_us + acquisition_us, 0xFFFF'FFFF));
+    const auto took_us =
+        static_cast<std::uint32_t>(std::min<std::uint64_t>(hal::now_us() - began_us + acquisition_us, 0xFFFF'FFFF));
     board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
     if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.published()}))
       hal::watchdog_feed();

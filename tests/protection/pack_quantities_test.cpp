@@ -170,14 +170,14 @@ TEST(Quantities, OfATemperatureThatMovesAloneCallNoOtherStuck) {
   for (const int fitted : {2, 3, 4}) {
     for (int moving = 1; moving < fitted; ++moving) {
       PackDesign d = forklift;
-      d.temperatures = fitted;
+      d.temperatures = static_cast<std::uint8_t>(fitted);
       PackQuantities<16> quantities(pack_limits(d));
       Quantities q = unknown_quantities();
       measurement::PackSample<16> s;
       s.temperature_cdegc = {2'500, 2'500, 2'500, 2'500};
       for (int k = 0; k < 30; ++k) {
         for (int warm = 0; warm < moving; ++warm)
-          s.temperature_cdegc[static_cast<std::size_t>(warm)] = static_cast<std::int16_t>(2'500 + 50 * k + warm);
+          s.temperature_cdegc[static_cast<std::size_t>(warm)] = static_cast<std::int16_t>(2'500 + 100 * k + warm);
         quantities.update(s, step_us, q);
       }
       const bool found = moving >= 2 || fitted == 2;

@@ -1,5 +1,6 @@
 #include "tests/firmware/world/fault_causes.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bms::world {
@@ -51,19 +52,25 @@ std::vector<Cause> other_causes() {
   list.push_back({29, "front end stops measuring", [](TruckWorld& w) { w.chip.frozen = true; }, 0.7, true,
                   fault(20) | fault(22) | fault(23) | fault(21) | second_line});
   // 0 V is a valid code: the stack, measured by itself, contradicts it
-  list.push_back({19, "a cell register reads 0", [](TruckWorld& w) { w.chip.zero_cells = 1U << 6; }, 0.3, true,
-                  fault(3) | fault(4) | fault(5) | fault(16) | fault(17) | fault(20) | fault(21) | fault(25) |
-                      second_line});
+  list.push_back(
+      {19, "a cell register reads 0", [](TruckWorld& w) { w.chip.zero_cells = 1U << 6; }, 0.3, true,
+       fault(3) | fault(4) | fault(5) | fault(16) | fault(17) | fault(20) | fault(21) | fault(25) | second_line});
   list.push_back({21, "a cell register is stuck", [](TruckWorld& w) { w.chip.stale_cells = 1U << 6; }, 3, false,
                   fault(16) | fault(19),
                   [](TruckWorld& w) {
-                    static int turn = 0;
-                    for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, ++turn / 16 % 2 == 0 ? 3.30 : 3.36);
+                    static int seconds = 0;  // others that return each second would look like noise
+                    const double v = 3.30 + 0.02 * std::min(seconds++, 4);
+                    for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, v);
                   }});
   // the converter saturates at the end of its range, which is a large current
-  list.push_back({10, "current beyond the range of the sensor", [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; },
-                  0.4, true, fault(8) | fault(9) | fault(18) | fault(34) | fault(36) | fault(37) | fault(27) | second_line,
-                  {}, true});
+  list.push_back({10,
+                  "current beyond the range of the sensor",
+                  [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; },
+                  0.4,
+                  true,
+                  fault(8) | fault(9) | fault(18) | fault(34) | fault(36) | fault(37) | fault(27) | second_line,
+                  {},
+                  true});
   for (std::size_t sensor = 0; sensor < 4; ++sensor) {
     for (const double ohm : {Bq76952Inputs::open_ohm, 0.0}) {
       list.push_back({23, "thermistor " + std::to_string(sensor + 1) + (ohm == 0 ? " shorted" : " broken"),

@@ -47,7 +47,7 @@ void survive(TruckWorld& world, const Dip& dip, Outcome& outcome) {
   world.run_until([&] { return !world.any_main_closed(); }, 2'500);
   world.run_ms(300);
   const auto ready = [&] { return world.vehicle.faults() == 0 && world.vehicle.state() == 0; };
-  for (int k = 0; k < 3 && (k == 0 || !ready()); ++k) {
+  for (int k = 0; k < 4 && (k == 0 || !ready()); ++k) {
     world.vehicle.clear_faults();
     world.run_until(ready, 4'000);
   }

@@ -99,10 +99,16 @@ TEST(GpioModel, APinDrivesOnlyAsAnOutput) {
 /// A remainder below a tick of the emulated clock once repeated the same step for ever.
 TEST(TruckWorld, PassesTimesThatAreNoMultipleOfAClockTick) {
   TruckWorld world(pack().image, typical_setup(pack()));
-  world.run_ms(1);
+  world.run_ms(2'500);  // the erases of the first start are over
+  const double begun_ms = world.now_ms();
   plant::Random random(3);
-  for (int k = 0; k < 20'000; ++k) world.run_ms(0.01 + 0.05 * random.uniform());
-  EXPECT_NEAR(world.now_ms(), 701, 25);
+  double sum_ms = 0;
+  for (int k = 0; k < 20'000; ++k) {
+    const double ms = 0.01 + 0.05 * random.uniform();
+    sum_ms += ms;
+    world.run_ms(ms);
+  }
+  EXPECT_NEAR(world.now_ms() - begun_ms, sum_ms, 150) << "a wait for I2C or the converter takes up to 50 us";
 }
 
 /// Board.LongestSample counts from the first transfer of the front end to the last message of the sample.
@@ -110,6 +116,7 @@ TEST(World, ASampleWithItsAcquisitionStaysWithinTheBudget) {
   TruckWorld world(pack().image, typical_setup(pack()));
   ASSERT_EQ(bring_to(world, pack(), Operating::drive), "");
   world.run_ms(20'000);
+  RecordProperty("longest_sample_us", static_cast<int>(1e3 * world.vehicle.longest_sample_ms()));
   EXPECT_LT(world.vehicle.longest_sample_ms(), 50) << "BMS_SAMPLE_BUDGET_MS of board.cmake";
   EXPECT_GT(world.vehicle.longest_sample_ms(), 9) << "the transfers alone take this time";
 }
