@@ -8,6 +8,7 @@ std::string json_of(const host_sim::ReplayResult& r, const std::string& trace_sh
   Json json;
   json["command"] = "replay";
   json["recording"] = r.recording.path;
+  json["read_as"] = read_as(r.recording.read_as);
   json["samples"] = r.track.rows.size();
   json["duration_s"] = r.recording.duration_s();
   json["target"] = r.target;
@@ -42,10 +43,23 @@ std::string json_of(const host_sim::ReplayResult& r, const std::string& trace_sh
   return text_of(json);
 }
 
+std::string json_of(const measurement::Recording& r, const std::string& out) {
+  return text_of({{"command", "import"},
+                  {"recording", r.path},
+                  {"read_as", read_as(r.read_as)},
+                  {"out", out},
+                  {"rows", r.rows()},
+                  {"duration_s", r.duration_s()},
+                  {"cells", r.cell_voltage_v.size()},
+                  {"read_mb_per_second", r.read_mb_per_second},
+                  {"warnings", warnings_of(r.warnings)}});
+}
+
 std::string json_of(const host_sim::SimulationResult& r) {
   return text_of({{"command", "simulate"},
                   {"cell", r.cell},
                   {"input", r.input},
+                  {"read_as", read_as(r.read_as)},
                   {"out", r.out},
                   {"samples", r.samples},
                   {"duration_s", r.duration_s},
@@ -124,6 +138,7 @@ std::string json_of(const workflow::IdentifyResult& r) {
   const identification::Identification& i = r.identification;
   Json json;
   json["command"] = "identify";
+  json["read_as"] = r.read_as;
   json["model"] = r.model;
   json["optimizer"] = r.optimizer;
   json["cell"] = r.cell;

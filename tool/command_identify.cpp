@@ -68,6 +68,7 @@ class IdentifyCommand final : public Command {
     add_method(c);
     c.add_option("--name", o_.name, "name of the cell; that of the output file if not given");
     c.add_option("--out", o_.out, "cell file to write")->required()->type_name("C.toml");
+    add_reading(c, o_.reading);
     add_output(c, output_);
     return &c;
   }
@@ -78,6 +79,7 @@ class IdentifyCommand final : public Command {
     for (const auto* files : {&o_.recordings, &o_.ocv, &o_.validate})
       inputs.insert(inputs.end(), files->begin(), files->end());
     output_.protect(inputs);
+    complete_reading(o_.reading);
     parse();
     try {
       return write(workflow::identify_cell(o_));
@@ -92,6 +94,9 @@ class IdentifyCommand final : public Command {
   /// Returns the exit code: 1 if there is no cell file.
   int write(const workflow::IdentifyResult& result) const {
     if (result.cell_file) write_output(o_.out, files::cell_text(*result.cell_file));
+    for (const std::string& text : result.read_as) {
+      if (!output_.quiet) fmt::print(stderr, "{}\n", files::printable(text));
+    }
     for (const measurement::Warning& w : result.warnings) warn(w.text);
     if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
     if (!output_.report.empty()) write_output(output_.report, reports::identify_report(result));

@@ -33,6 +33,7 @@ struct ReplayOptions {
   std::optional<std::size_t> run;  ///< of a CAN log, from 1; not given: the last
   bool verify = false;
   std::string trace;
+  files::ReadOptions reading;
   Output output;
 };
 
@@ -134,12 +135,17 @@ ReplayRun read(const ReplayOptions& options) {
   if (options.verify && run.board == nullptr)
     throw files::BadInput("--verify", 1, "no board to compare the host with, expected --target with a board");
   result.cell = files::read_cell(options.cell);
-  if (host_sim::is_can_log(options.recording))
+  const bool foreign = !options.reading.dbc.empty() || !options.reading.format.empty();
+  if (!foreign && host_sim::is_can_log(options.recording))
     run.log = read_log(options, result);
   else if (options.run)
     throw files::BadInput("--run", 1, "the recording is not a CAN log, expected no --run");
-  result.recording = run.log ? run.log->recording : files::read_recording(options.recording);
+  result.recording = run.log
+                         ? run.log->recording
+                         : files::read_recording(options.recording, files::VoltageColumn::required, options.reading);
+  print_read_as(options.output, result.recording);
   measurement::compare_with_cell(result.recording, result.cell.parameters);
+  refuse_contradiction(result.recording);
   add_warnings(options, run);
   run.samples = run.log ? run.log->samples : measurement::samples(result.recording);
   if (options.initial_soc) {
@@ -260,11 +266,13 @@ class ReplayCommand final : public Command {
                  "cell file for the board's firmware if it is not --cell; shows that --verify finds the difference")
         ->type_name("CELL");
     c.add_option("--trace", o_.trace, "write every estimate to a CSV file")->type_name("FILE");
+    add_reading(c, o_.reading);
     add_output(c, o_.output);
     return &c;
   }
 
   int run() override {
+    complete_reading(o_.reading);
     o_.output.set_own(o_.trace);
     o_.output.protect({o_.recording, o_.cell, o_.board_cell});
     ReplayRun run = read(o_);

@@ -17,6 +17,7 @@ struct OcvResult {
   std::optional<double> coulombic_efficiency;          ///< discharged over charged; needs a charge and a discharge
   std::vector<identification::GapAtTemperature> gaps;  ///< at each temperature with a charge and a discharge
   std::vector<measurement::Warning> warnings;
+  std::vector<std::string> read_as;  ///< "FILE: how it was read", of files that are not in the project's own format
 };
 
 /// Writes OCV, gap and capacity of slow charge and discharge recordings into `cell`. The OCV has the fewest straight
@@ -24,8 +25,8 @@ struct OcvResult {
 /// warning says so. Of several temperatures, the one nearest to the cell's reference temperature gives the
 /// curve. both_branches: the pieces
 /// also follow the gap. Throws BadInput if the recordings are not slow runs.
-OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
-                       files::CellFile& cell);
+OcvResult identify_ocv(const std::vector<std::string>& paths, const files::ReadOptions& reading, double max_error_v,
+                       bool both_branches, files::CellFile& cell);
 
 /// Adds the hysteresis between the measured curves of charge and discharge as a mechanism, if there are both.
 void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell);

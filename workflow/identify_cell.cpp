@@ -65,7 +65,8 @@ StartCell read_start(const IdentifyOptions& options) {
   start.capacity_ah = start.cell.parameters.capacity_ah;
   model::CellParameters<>& p = start.cell.parameters;
   p.reference_temperature_c = options.reference_temperature_c.value_or(p.reference_temperature_c);
-  if (!options.ocv.empty()) start.ocv = identify_ocv(options.ocv, options.ocv_error_v, options.extend, start.cell);
+  if (!options.ocv.empty())
+    start.ocv = identify_ocv(options.ocv, options.reading, options.ocv_error_v, options.extend, start.cell);
   if (options.capacity_ah > 0) p.capacity_ah = options.capacity_ah;
   if (options.extend) identify_hysteresis(start.ocv, start.cell);
   start.has_hysteresis = options.extend && !start.cell.mechanisms.empty();
@@ -94,13 +95,16 @@ void filter(const IdentifyOptions& options, const std::string& path, id::Data& d
   }
 }
 
-Inputs read_inputs(const IdentifyOptions& options, const StartCell& start,
-                   std::vector<measurement::Warning>& warnings) {
+Inputs read_inputs(const IdentifyOptions& options, const StartCell& start, std::vector<measurement::Warning>& warnings,
+                   std::vector<std::string>& read_as) {
   Inputs inputs;
   inputs.options = {options.initial_soc, options.window, start.cell.parameters};
   for (const std::string& path : options.recordings) {
-    measurement::Recording& r = inputs.recordings.emplace_back(files::read_recording(path));
+    measurement::Recording& r =
+        inputs.recordings.emplace_back(files::read_recording(path, files::VoltageColumn::required, options.reading));
+    if (!r.read_as.empty()) read_as.push_back(path + ": " + r.read_as);
     measurement::compare_with_cell(r, start.cell.parameters);
+    if (const std::string what = measurement::contradiction(r); !what.empty()) throw files::BadInput(path, 1, what);
     for (const measurement::Warning& w : r.warnings) warnings.push_back({w.id, path + ": " + w.text});
     IdentificationData d = identification_data(r, inputs.options);
     filter(options, path, d.record.data, warnings);
@@ -117,7 +121,8 @@ template <class Statistics>
 void validate(const IdentifyOptions& options, DataOptions data, Statistics statistics, IdentifyResult& result) {
   data.window = options.validate_window.value_or(options.window);
   for (const std::string& path : options.validate) {
-    const id::DataSet data_set = identification_data(files::read_recording(path), data).record;
+    const id::DataSet data_set =
+        identification_data(files::read_recording(path, files::VoltageColumn::required, options.reading), data).record;
     result.validations.emplace_back(path, statistics(data_set));
     result.data.push_back(data_set.data);
   }
@@ -350,7 +355,8 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
   StartCell start = read_start(options);
   result.coulombic_efficiency = start.ocv.coulombic_efficiency;
   result.warnings = start.ocv.warnings;
-  const Inputs inputs = read_inputs(options, start, result.warnings);
+  result.read_as = start.ocv.read_as;
+  const Inputs inputs = read_inputs(options, start, result.warnings, result.read_as);
   if (options.linear)
     identify_linear_cell(options, std::move(start), inputs, result);
   else

@@ -22,6 +22,7 @@ struct FailedFit : std::runtime_error {
 };
 
 struct IdentifyOptions {
+  files::ReadOptions reading;                        ///< of all recordings
   std::vector<std::string> recordings;               ///< files to identify from; at least one
   std::vector<std::string> ocv;                      ///< files with slow charge and discharge; empty: OCV of `start`
   std::optional<identification::LinearKind> linear;  ///< not given: the nonlinear grey box
@@ -46,7 +47,8 @@ struct IdentifyOptions {
 
 struct IdentifyResult {
   std::string model, optimizer, out;
-  std::string cell;  ///< name of the cell; empty: no cell file, because a parameter is out of range
+  std::string cell;                  ///< name of the cell; empty: no cell file, because a parameter is out of range
+  std::vector<std::string> read_as;  ///< "FILE: how it was read", of files that are not in the project's own format
   std::optional<files::CellFile> cell_file;
   identification::Identification identification;
   std::optional<identification::FitStatistics> validation;  ///< of the first validation recording
