@@ -131,6 +131,25 @@ class IdentifyCommand final : public Command {
         ->check(Within(model::accepted::reference_temperature_c.low, model::accepted::reference_temperature_c.high));
     c.add_option("--capacity-ah", o_.capacity_ah, "capacity in Ah; that of the OCV recordings if not given")
         ->check(Within(0.01, 1000.0));
+    c.add_flag("--ocv-from-rests", o_.ocv_from_rests,
+               "take the OCV from the rests of the recordings (ten minutes or more; a pulse test) instead of --ocv");
+    add_limits(c);
+  }
+
+  void add_limits(CLI::App& c) {
+    const std::string group = "Limits of use (those of --start for a cell of its size; otherwise derived and named)";
+    c.add_option("--chemistry", o_.chemistry, "LFP, NMC, NCA or LTO; by the voltages if not given")
+        ->check(CLI::IsMember({"LFP", "NMC", "NCA", "LTO"}))
+        ->group(group);
+    const auto add = [&](const char* name, std::optional<double>& value, const char* help, double low, double high) {
+      c.add_option(name, value, help)->check(Within(low, high))->group(group);
+    };
+    add("--voltage-min-v", o_.limits.voltage_min_v, "in V", 0.5, 5);
+    add("--voltage-max-v", o_.limits.voltage_max_v, "in V", 0.5, 5);
+    add("--charge-current-max-a", o_.limits.charge_current_max_a, "continuous, in A", 1e-3, 2'000);
+    add("--discharge-current-max-a", o_.limits.discharge_current_max_a, "continuous, in A", 1e-3, 2'000);
+    add("--temperature-min-c", o_.limits.temperature_min_c, "in degrees C", -60, 100);
+    add("--temperature-max-c", o_.limits.temperature_max_c, "in degrees C", -60, 150);
   }
 
   void add_method(CLI::App& c) {

@@ -17,6 +17,7 @@
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
+#include "tool/pack_cells.hpp"
 
 namespace bms::tool {
 
@@ -43,7 +44,8 @@ struct ReplayRun {
   std::optional<host_sim::CanLog> log;
   std::vector<measurement::Sample> samples;
   std::optional<measurement::StartingPoint> start;
-  std::size_t compared = 0;  ///< samples of the log whose estimates were compared
+  std::size_t compared = 0;     ///< samples of the log whose estimates were compared
+  std::vector<PackCell> cells;  ///< of a pack recording
   host_sim::ReplayResult result;
 };
 
@@ -194,6 +196,7 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
   }
   judge(options, result);
   host_sim::evaluate(result);
+  if (!result.recording.cell_voltage_v.empty()) run.cells = replay_cells(result, run.start);
 }
 
 std::string voltage_text(const host_sim::VoltageFigures& v) {
@@ -216,12 +219,16 @@ int write(const ReplayOptions& options, const ReplayRun& run) {
   const std::string trace = host_sim::trace_csv(result);
   if (!options.trace.empty()) write_output(options.trace, trace);
   if (!options.output.report.empty()) write_output(options.output.report, reports::replay_report(result));
-  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result, files::sha256(trace)));
+  if (!options.output.json.empty()) {
+    const std::string json = reports::json_of(result, files::sha256(trace));
+    write_output(options.output.json, run.cells.empty() ? json : with_cells(json, run.cells));
+  }
   if (result.difference) {
     fmt::print(stderr, "{}: {}\n", options.recording, *result.difference);
     return 1;
   }
   print_summary(options.output, summary(result));
+  if (!run.cells.empty()) print_summary(options.output, cells_text(run.cells));
   if (result.verified_against) {
     const bool log = run.compared > 0;
     print_summary(

@@ -14,6 +14,7 @@
 #include "host_sim/simulation.hpp"
 #include "identification/ocv_pieces.hpp"
 #include "workflow/reference_temperature.hpp"
+#include "workflow/slow_parts.hpp"
 
 namespace bms::workflow {
 
@@ -40,8 +41,7 @@ std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths, const fil
   for (const TemperatureGroup& like : group_by_temperature(recordings, reference_c)) {
     SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
     for (const std::size_t k : like.recordings) {
-      const measurement::Recording& r = recordings[k];
-      runs.runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
+      for (const id::SlowRun& run : runs_of(recordings[k])) runs.runs.push_back(run);
       runs.files += (runs.files.empty() ? "" : ", ") + std::filesystem::path(paths[k]).filename().string();
     }
   }

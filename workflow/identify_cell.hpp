@@ -10,6 +10,7 @@
 #include "files/cell_file.hpp"
 #include "identification/identify.hpp"
 #include "identification/linear_models.hpp"
+#include "workflow/cell_size.hpp"
 #include "workflow/identification_data.hpp"
 
 namespace bms::workflow {
@@ -41,6 +42,9 @@ struct IdentifyOptions {
   bool extend = false;                            ///< add the mechanisms and error states that an estimator needs
   std::optional<double> reference_temperature_c;  ///< of the cell file; not given: that of `start`
   double capacity_ah = 0;                         ///< 0: of the OCV recordings, else of `start`
+  bool ocv_from_rests = false;                    ///< OCV from the rests of `recordings`
+  std::string chemistry;                          ///< "LFP", "NMC", "NCA", "LTO"; empty: by the voltages
+  StatedLimits limits;                            ///< what is not given is derived, if `start` is another cell
   std::string name;                               ///< of the cell
   std::string out;                                ///< file that the caller will write; used in messages only
 };

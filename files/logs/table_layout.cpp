@@ -133,6 +133,13 @@ class HeaderFinder {
         throw BadInput(path_, 1, "column " + in_quotes(layout.headings[k]) + " twice, expected each column once");
       }
     }
+    const bool one_cell = std::any_of(maps_.begin(), maps_.end(),
+                                      [](const auto& map) { return map.first.quantity == Quantity::voltage; });
+    if (one_cell) {  // --map voltage_v=v_7: that cell of a pack, not the pack
+      std::erase_if(layout.columns, [](const SourceColumn& c) {
+        return c.target.quantity == Quantity::cell_voltage || c.target.quantity == Quantity::cell_temperature;
+      });
+    }
     layout.own = nothing_mapped;
     layout.format = log_format("csv");
     return complete(layout) && (options_.format.empty() || options_.format == "csv");

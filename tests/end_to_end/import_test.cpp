@@ -189,6 +189,28 @@ TEST_F(ImportFiles, EveryCommandThatReadsARecordingTakesTheSameOptions) {
   EXPECT_EQ(inverted.exit_code, 2);
 }
 
+/// Four cells of table9's kind at different states of charge, where its OCV is steep.
+TEST_F(ImportFiles, APackIsReplayedAsItsMeanAndCellByCell) {
+  std::string text = "time_s,current_a,v_1,v_2,v_3,v_4\n";
+  for (int k = 0; k < 1'200; ++k) {
+    text += std::to_string(k) + ",0";
+    for (const double soc : {0.93, 0.95, 0.97, 0.99}) text += "," + std::to_string(2.126 + 1.33 * soc);
+    text += "\n";
+  }
+  const std::string pack = write("pack.csv", text);
+  const ToolRun all = run_tool("replay " + pack);
+  EXPECT_THAT(all.out, ::testing::ContainsRegex(
+                           "Cells at the end: 9[23]\\.[0-9] % \\(cell 1\\) to 9[89]\\.[0-9] % \\(cell 4\\)"));
+  EXPECT_THAT(all.out, HasSubstr("at 96."));
+  const ToolRun one = run_tool("replay " + pack + " --map voltage_v=v_1");
+  EXPECT_THAT(one.out, ::testing::ContainsRegex("at 9[23]\\.[0-9] %"));
+  EXPECT_THAT(one.out, Not(HasSubstr("Cells at the end")));
+  EXPECT_EQ(run_tool("simulate --cell table9 --recording " + pack + " --initial-soc 0.93 --map voltage_v=v_1 --out " +
+                     path("s.csv"))
+                .exit_code,
+            0);
+}
+
 TEST_F(ImportFiles, WithoutTheOptionItIsAnErrorAndWithConfirmationItIsRead) {
   std::string text = "time_s,current_a,voltage_v\n";
   for (const Row& r : log_samples::signal())
