@@ -119,13 +119,17 @@ std::string read_file(const std::filesystem::path& path) {
 }
 
 void write_file(const std::filesystem::path& wanted, std::string_view content) {
+  write_file(wanted, [&](const Sink& sink) { sink(content); });
+}
+
+void write_file(const std::filesystem::path& wanted, const std::function<void(const Sink&)>& produce) {
   std::error_code error;
   const auto status = std::filesystem::status(wanted, error);
   const bool special = std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) &&
                        !std::filesystem::is_directory(status);
   if (special) {  // a pipe or a device cannot be renamed
     std::ofstream out(wanted, std::ios::binary);
-    out.write(content.data(), static_cast<std::streamsize>(content.size()));
+    produce([&](std::string_view piece) { out.write(piece.data(), static_cast<std::streamsize>(piece.size())); });
     out.close();
     if (!out) refuse_to_write(wanted, system_message());
     return;
@@ -133,7 +137,7 @@ void write_file(const std::filesystem::path& wanted, std::string_view content) {
   constexpr mode_t usual_mode = 0666;  // the umask applies
   NewFile file(target_of(wanted), usual_mode);
   if (std::filesystem::is_regular_file(status)) file.set_mode(static_cast<mode_t>(status.permissions()));
-  file.write(content);
+  produce([&](std::string_view piece) { file.write(piece); });
   file.rename();
 }
 

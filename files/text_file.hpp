@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -20,6 +21,11 @@ std::string read_file(const std::filesystem::path& path);
 /// permissions. A path that is not a regular file (a pipe, /dev/stdout) is written directly. Throws BadInput if it
 /// cannot be written.
 void write_file(const std::filesystem::path& path, std::string_view content);
+
+/// Takes the next piece of a file's content.
+using Sink = std::function<void(std::string_view piece)>;
+/// The same for a content that is produced piece by piece and need not fit into memory.
+void write_file(const std::filesystem::path& path, const std::function<void(const Sink&)>& produce);
 
 /// SHA-256 in lower-case hexadecimal.
 std::string sha256(std::string_view content);

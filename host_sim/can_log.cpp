@@ -101,9 +101,9 @@ class Runs {
   }
 
   void add(double received_s) {
-    if (++count_ > measurement::most_rows) {
-      throw files::BadInput(path_, 1,
-                            fmt::format("more samples, expected at most {}: split the log", measurement::most_rows));
+    if (++count_ > measurement::most_log_samples) {
+      throw files::BadInput(
+          path_, 1, fmt::format("more samples, expected at most {}: split the log", measurement::most_log_samples));
     }
     if (begins_a_run(received_s)) {
       drop_short();

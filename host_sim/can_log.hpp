@@ -33,7 +33,7 @@ bool is_can_log(const std::string& path);
 
 /// The runs of a log, the earliest first, at least one. A run of less than ten samples, or whose time does not
 /// increase, is left out. Throws BadInput if the file cannot be read, has no run, or has more than
-/// measurement::most_rows samples.
+/// measurement::most_log_samples samples.
 std::vector<CanLog> read_can_log(const std::string& path);
 
 /// Compares a replay of log.samples with the estimates of the firmware. Returns nothing if all that can be compared is

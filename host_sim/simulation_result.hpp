@@ -12,6 +12,7 @@ namespace bms::host_sim {
 struct SimulationResult {
   std::string cell;        ///< name of the cell
   std::string input, out;  ///< files read and written
+  std::string read_as;     ///< of the input
   std::size_t samples = 0;
   double duration_s = 0, initial_soc = 0, final_soc = 0, final_voltage_v = 0;
   double steps_per_second = 0;

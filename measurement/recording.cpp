@@ -39,4 +39,19 @@ std::vector<Sample> samples(const Recording& r) {
   return out;
 }
 
+Recording cell(const Recording& pack, std::size_t index) {
+  Recording one = pack;
+  one.voltage_v = pack.cell_voltage_v[index];
+  if (!pack.cell_temperature_c.empty()) {
+    // sensors are spread evenly over the cells
+    one.temperature_c = pack.cell_temperature_c[index * pack.cell_temperature_c.size() / pack.cell_voltage_v.size()];
+  }
+  one.cell_voltage_v.clear();
+  one.cell_temperature_c.clear();
+  one.pack_voltage_v = {};
+  one.soc_ref = {};  // of the pack
+  one.voltage_ref_v = {};
+  return one;
+}
+
 }  // namespace bms::measurement

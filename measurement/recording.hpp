@@ -24,21 +24,37 @@ struct Warning {
   std::string text;  ///< one sentence for the user
 };
 
+/// A column without a meaning here, kept for the file that it is written to again.
+struct OtherColumn {
+  std::string name;
+  std::vector<std::string> text;  ///< as in the file
+};
+
+/// A pack of N cells in series has the mean of its cells in voltage_v and temperature_c, and each reading in a column
+/// of its own; cell() makes a recording of one cell.
 struct Recording {
-  std::string path;  ///< for messages
-  Column time_s;     ///< does not decrease
+  std::string path;     ///< for messages
+  std::string read_as;  ///< format, columns, units and sign as detected or as the user named them; one line
+  Column time_s;        ///< does not decrease
   Column current_a;
-  Column voltage_v;      ///< empty: a profile
-  Column temperature_c;  ///< empty: not recorded
-  Column soc_ref;        ///< reference state of charge, 0 .. 1; empty: unknown
-  Column current_ref_a;  ///< NaN: no reading; empty: no such column
-  Column voltage_ref_v;  ///< NaN: no reading; empty: no such column
+  Column voltage_v;                        ///< empty: a profile
+  Column temperature_c;                    ///< empty: not recorded
+  Column soc_ref;                          ///< reference state of charge, 0 .. 1; empty: unknown
+  Column current_ref_a;                    ///< NaN: no reading; empty: no such column
+  Column voltage_ref_v;                    ///< NaN: no reading; empty: no such column
+  std::vector<Column> cell_voltage_v;      ///< of a pack: one column for each cell
+  std::vector<Column> cell_temperature_c;  ///< of a pack: one column for each sensor
+  Column pack_voltage_v;                   ///< of a pack; empty: not recorded
+  std::vector<OtherColumn> others;         ///< only if the reader was asked to keep them
   std::vector<Warning> warnings;
   double read_mb_per_second = 0;  ///< speed of reading and parsing the file
 
   std::size_t rows() const { return time_s.size(); }
   double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }
 };
+
+/// One cell of a pack recording, from 0: its voltage, the temperature of the nearest sensor, the current of the pack.
+Recording cell(const Recording& pack, std::size_t index);
 
 /// The recording as the estimator receives it: integers in micro-units, time from the first row. A voltage that may be
 /// a reference source's is left out.

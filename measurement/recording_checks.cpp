@@ -17,6 +17,7 @@ constexpr double gap_steps = 10;               ///< a longer step is a gap, in m
 constexpr double inverted_correlation = -0.3;  ///< of the steps of current and voltage
 constexpr double soc_ref_min = -0.5, soc_ref_max = 1.5;
 constexpr double millivolt_factor = 100;   ///< median voltage over the cell's largest voltage
+constexpr double pack_factor = 1.5;        ///< the same, of cells in series
 constexpr double milliampere_factor = 20;  ///< median current over the cell's largest current
 constexpr double largest_c_rate = 60;      ///< [1/h] no cell sustains more
 constexpr double voltage_margin_v = 0.05;  ///< beyond the limits of the cell file
@@ -70,6 +71,14 @@ void check_voltage(Recording& r, const model::Limits& limits) {
     r.warnings.push_back(
         {"voltage_in_mv",
          fmt::format("voltages around {:g} look like millivolts, expected volts; they are not used", usual_v)});
+    return;
+  }
+  if (usual_v > pack_factor * limits.voltage_max_v) {
+    const double cells = std::max(2.0, std::round(2 * usual_v / (limits.voltage_min_v + limits.voltage_max_v)));
+    r.warnings.push_back(
+        {"pack_voltage", fmt::format("voltages around {:g} V look like those of about {:.0f} cells in series, expected "
+                                     "one cell of at most {:g} V",
+                                     usual_v, cells, limits.voltage_max_v)});
     return;
   }
   warn_outside(
@@ -158,6 +167,15 @@ void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
   check_charge(r, cell);
   warn_outside(r, count_outside(r.temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c),
                "temperatures", cell.limits.temperature_min_c, cell.limits.temperature_max_c, "degrees C");
+}
+
+std::string contradiction(const Recording& r) {
+  for (const Warning& w : r.warnings) {
+    if (w.id == "voltage_in_mv") return w.text + ": --unit voltage_v=mV";
+    if (w.id == "current_in_ma") return w.text + ": --unit current_a=mA";
+    if (w.id == "pack_voltage") return w.text + ": --map pack_voltage_v=COLUMN --series N, or the columns of the cells";
+  }
+  return {};
 }
 
 }  // namespace bms::measurement

@@ -6,13 +6,15 @@
 //   current_inverted      has a voltage that falls where the current rises          check_recording
 //   soc_ref_in_percent    has a soc_ref far outside 0 .. 1                          check_recording
 //   voltage_in_mv         has voltages that only make sense in millivolts           compare_with_cell
+//   pack_voltage          has voltages of several cells in series                   compare_with_cell
 //   current_in_ma         has currents that only make sense in milliamperes         compare_with_cell
 //   time_in_ms            has times that only make sense in milliseconds            compare_with_cell
 //   charge_exceeds_capacity
 //                         moves more charge in one direction than the cell has      compare_with_cell
 //   outside_cell_range    has values outside the limits of the cell file            compare_with_cell
 //   ignored_column        has columns that are not used                             files::parse_recording
-//   missing_reading       has readings that are 'nan'                               files::parse_recording
+//   missing_reading       has readings that are empty or 'nan'                      files::parse_recording
+//   truncated_line        breaks off in its last line                               files::parse_recording
 #pragma once
 
 #include <cstddef>
@@ -22,9 +24,10 @@
 
 namespace bms::measurement {
 
-/// Limit of a recording, and of all samples of a CAN log: 116 days at one sample per second. A replay needs about 260
-/// bytes of memory per row, so 2.6 GB at most.
-inline constexpr std::size_t most_rows = 10'000'000;
+/// Limit of a recording: 347 days at one sample per second. Reading needs 8 bytes of memory for each number.
+inline constexpr std::size_t most_rows = 30'000'000;
+/// Limit of all samples of a CAN log: 116 days. A replay needs about 260 bytes of memory per sample, so 2.6 GB at most.
+inline constexpr std::size_t most_log_samples = 10'000'000;
 
 /// Median of the time steps above 0; NaN if no step is.
 double usual_step_s(const Recording& recording);
@@ -34,5 +37,8 @@ void check_recording(Recording& recording);
 
 /// Adds the warnings that need the limits and the capacity of a cell: units, values outside its range.
 void compare_with_cell(Recording& recording, const model::CellParameters<>& cell);
+
+/// The text of the first warning that no reading of this cell can explain: another unit, or a pack. Empty: none.
+std::string contradiction(const Recording& recording);
 
 }  // namespace bms::measurement

@@ -144,6 +144,9 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                       {"fast_excess", number(d.fast_excess)}, {"far_out", number(d.far_out)}};
   json["out"] = r.out;
   json["wall_s"] = r.wall_s;
+  Json recordings = Json::array();
+  for (const workflow::RecordingComparison& of : r.recordings) recordings.push_back(read_as(of.recording.read_as));
+  json["read_as"] = recordings;
   json["warnings"] = warnings_of(r.warnings);
   return text_of(json);
 }

@@ -25,6 +25,9 @@ inline Json warnings_of(const std::vector<measurement::Warning>& warnings) {
   return list;
 }
 
+/// How a file was read; of the project's own format the name of the format.
+inline Json read_as(const std::string& text) { return text.empty() ? Json("recording") : Json(text); }
+
 inline std::string text_of(const Json& json) { return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 }  // namespace bms::reports

@@ -8,6 +8,7 @@ std::string json_of(const host_sim::ReplayResult& r, const std::string& trace_sh
   Json json;
   json["command"] = "replay";
   json["recording"] = r.recording.path;
+  json["read_as"] = read_as(r.recording.read_as);
   json["samples"] = r.track.rows.size();
   json["duration_s"] = r.recording.duration_s();
   json["target"] = r.target;
@@ -78,10 +79,43 @@ std::string json_of(const host_sim::CutResult& r) {
   return text_of(json);
 }
 
+std::string json_of(const measurement::Recording& r, const std::string& out) {
+  return text_of({{"command", "import"},
+                  {"recording", r.path},
+                  {"read_as", read_as(r.read_as)},
+                  {"out", out},
+                  {"rows", r.rows()},
+                  {"duration_s", r.duration_s()},
+                  {"cells", r.cell_voltage_v.size()},
+                  {"read_mb_per_second", r.read_mb_per_second},
+                  {"warnings", warnings_of(r.warnings)}});
+}
+
+std::string json_of(const files::CellFile& cell, const std::vector<std::string>& doubts) {
+  const model::CellParameters<>& p = cell.parameters;
+  Json nodes = Json::array();
+  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
+    nodes.push_back(
+        {{"soc", p.rc.soc[k]}, {"r0_ohm", p.rc.r0_ohm[k]}, {"r1_ohm", p.rc.r1_ohm[k]}, {"c1_f", p.rc.c1_f[k]}});
+  }
+  return text_of({{"command", "cell"},
+                  {"cell", cell.name},
+                  {"chemistry", cell.chemistry},
+                  {"capacity_ah", p.capacity_ah},
+                  {"limits",
+                   {{"voltage_min_v", p.limits.voltage_min_v},
+                    {"voltage_max_v", p.limits.voltage_max_v},
+                    {"charge_current_max_a", p.limits.charge_current_max_a},
+                    {"discharge_current_max_a", p.limits.discharge_current_max_a}}},
+                  {"rc", nodes},
+                  {"doubts", doubts}});
+}
+
 std::string json_of(const host_sim::SimulationResult& r) {
   return text_of({{"command", "simulate"},
                   {"cell", r.cell},
                   {"input", r.input},
+                  {"read_as", read_as(r.read_as)},
                   {"out", r.out},
                   {"samples", r.samples},
                   {"duration_s", r.duration_s},
@@ -160,6 +194,7 @@ std::string json_of(const workflow::IdentifyResult& r) {
   const identification::Identification& i = r.identification;
   Json json;
   json["command"] = "identify";
+  json["read_as"] = r.read_as;
   json["model"] = r.model;
   json["optimizer"] = r.optimizer;
   json["cell"] = r.cell;

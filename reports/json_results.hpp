@@ -16,6 +16,10 @@ namespace bms::reports {
 
 std::string json_of(const host_sim::ReplayResult& result, const std::string& trace_sha256);
 std::string json_of(const host_sim::CutResult& result);
+/// Of bms import; out: the file that was written, or empty.
+std::string json_of(const measurement::Recording& recording, const std::string& out);
+/// Of bms cell.
+std::string json_of(const files::CellFile& cell, const std::vector<std::string>& doubts);
 std::string json_of(const host_sim::SimulationResult& result);
 std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& figures);
 std::string json_of(const workflow::IdentifyResult& result);

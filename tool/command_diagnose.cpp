@@ -89,6 +89,8 @@ class DiagnoseCommand final : public Command {
                  "of soc_ref, or else an estimate from the first voltage")
         ->check(Within(0.0, 1.0));
     c.add_option("--out", out_, "cell file to write, with the findings")->type_name("EXTENDED.toml");
+    add_reading(c, o_.reading);
+    o_.reading.refuse_doubtful = false;  // a fault of the data is an answer of the diagnosis
     add_output(c, output_);
     return &c;
   }
@@ -99,12 +101,14 @@ class DiagnoseCommand final : public Command {
     inputs.insert(inputs.end(), o_.recordings.begin(), o_.recordings.end());
     inputs.insert(inputs.end(), o_.holdouts.begin(), o_.holdouts.end());
     output_.protect(inputs);
+    complete_reading(o_.reading);
     diagnosis::Options options;
     options.progress = progress_on_terminal(0.1, progress_line);
     workflow::DiagnoseResult result = workflow::diagnose_recordings(workflow::read_diagnose_input(o_), options);
     workflow::add_next_experiment(result);
     workflow::add_holdout_warnings(result);
     result.out = out_;
+    for (const workflow::RecordingComparison& of : result.recordings) print_read_as(output_, of.recording);
     for (const measurement::Warning& w : result.warnings) warn(w.text);
     if (!out_.empty()) write_output(out_, files::cell_text(result.extended_cell));
     if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));

@@ -33,6 +33,7 @@ struct HilOptions {
   unsigned seed = 1;
   std::vector<std::string> faults;
   std::string candump;
+  files::ReadOptions reading;
   Output output;
 };
 
@@ -165,8 +166,9 @@ hil::SessionPlan read(const HilOptions& options) {
   plan.cell = files::read_cell(options.cell);
   plan.replayed = options.profile.empty();
   const std::string& input = plan.replayed ? options.recording : options.profile;
-  plan.profile =
-      files::read_recording(input, plan.replayed ? files::VoltageColumn::required : files::VoltageColumn::optional);
+  plan.profile = files::read_recording(
+      input, plan.replayed ? files::VoltageColumn::required : files::VoltageColumn::optional, options.reading);
+  print_read_as(options.output, plan.profile);
   measurement::compare_with_cell(plan.profile, plan.cell.parameters);
   for (const measurement::Warning& w : plan.profile.warnings) warn(input + ": " + w.text);
   plan.cells = options.cells != 0 ? options.cells : images::board_cells(options.board);
@@ -260,11 +262,13 @@ class HilCommand final : public Command {
     c.add_option("--seed", o_.seed, "seed of the cells' spread and of the sensor noise")->capture_default_str();
     c.add_option("--fault", o_.faults, "fault to inject; may be repeated")->type_name("NAME[=VALUE]@START[-END]");
     c.add_option("--candump", o_.candump, "write the board's frames in the format of candump -L")->type_name("FILE");
+    add_reading(c, o_.reading);
     add_output(c, o_.output);
     return &c;
   }
 
   int run() override {
+    complete_reading(o_.reading);
     o_.output.set_own(o_.candump);
     o_.output.protect({o_.recording, o_.profile, o_.cell, o_.board_cell});
     const hil::SessionPlan plan = read(o_);

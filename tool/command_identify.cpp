@@ -68,6 +68,7 @@ class IdentifyCommand final : public Command {
     add_method(c);
     c.add_option("--name", o_.name, "name of the cell; that of the output file if not given");
     c.add_option("--out", o_.out, "cell file to write")->required()->type_name("C.toml");
+    add_reading(c, o_.reading);
     add_output(c, output_);
     return &c;
   }
@@ -78,6 +79,7 @@ class IdentifyCommand final : public Command {
     for (const auto* files : {&o_.recordings, &o_.ocv, &o_.validate})
       inputs.insert(inputs.end(), files->begin(), files->end());
     output_.protect(inputs);
+    complete_reading(o_.reading);
     parse();
     try {
       return write(workflow::identify_cell(o_));
@@ -92,6 +94,9 @@ class IdentifyCommand final : public Command {
   /// Returns the exit code: 1 if there is no cell file.
   int write(const workflow::IdentifyResult& result) const {
     if (result.cell_file) write_output(o_.out, files::cell_text(*result.cell_file));
+    for (const std::string& text : result.read_as) {
+      if (!output_.quiet) fmt::print(stderr, "{}\n", files::printable(text));
+    }
     for (const measurement::Warning& w : result.warnings) warn(w.text);
     if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
     if (!output_.report.empty()) write_output(output_.report, reports::identify_report(result));
@@ -126,6 +131,25 @@ class IdentifyCommand final : public Command {
         ->check(Within(model::accepted::reference_temperature_c.low, model::accepted::reference_temperature_c.high));
     c.add_option("--capacity-ah", o_.capacity_ah, "capacity in Ah; that of the OCV recordings if not given")
         ->check(Within(0.01, 1000.0));
+    c.add_flag("--ocv-from-rests", o_.ocv_from_rests,
+               "take the OCV from the rests of the recordings (ten minutes or more; a pulse test) instead of --ocv");
+    add_limits(c);
+  }
+
+  void add_limits(CLI::App& c) {
+    const std::string group = "Limits of use (those of --start for a cell of its size; otherwise derived and named)";
+    c.add_option("--chemistry", o_.chemistry, "LFP, NMC, NCA or LTO; by the voltages if not given")
+        ->check(CLI::IsMember({"LFP", "NMC", "NCA", "LTO"}))
+        ->group(group);
+    const auto add = [&](const char* name, std::optional<double>& value, const char* help, double low, double high) {
+      c.add_option(name, value, help)->check(Within(low, high))->group(group);
+    };
+    add("--voltage-min-v", o_.limits.voltage_min_v, "in V", 0.5, 5);
+    add("--voltage-max-v", o_.limits.voltage_max_v, "in V", 0.5, 5);
+    add("--charge-current-max-a", o_.limits.charge_current_max_a, "continuous, in A", 1e-3, 2'000);
+    add("--discharge-current-max-a", o_.limits.discharge_current_max_a, "continuous, in A", 1e-3, 2'000);
+    add("--temperature-min-c", o_.limits.temperature_min_c, "in degrees C", -60, 100);
+    add("--temperature-max-c", o_.limits.temperature_max_c, "in degrees C", -60, 150);
   }
 
   void add_method(CLI::App& c) {

@@ -18,6 +18,7 @@
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
+#include "tool/pack_cells.hpp"
 
 namespace bms::tool {
 
@@ -35,6 +36,7 @@ struct ReplayOptions {
   bool verify = false;
   std::size_t cuts = 0;  ///< 0: no trials
   std::string trace;
+  files::ReadOptions reading;
   Output output;
 };
 
@@ -44,7 +46,8 @@ struct ReplayRun {
   std::optional<host_sim::CanLog> log;
   std::vector<measurement::Sample> samples;
   std::optional<measurement::StartingPoint> start;
-  std::size_t compared = 0;  ///< samples of the log whose estimates were compared
+  std::size_t compared = 0;     ///< samples of the log whose estimates were compared
+  std::vector<PackCell> cells;  ///< of a pack recording
   host_sim::ReplayResult result;
 };
 
@@ -136,12 +139,17 @@ ReplayRun read(const ReplayOptions& options) {
   if (options.verify && run.board == nullptr)
     throw files::BadInput("--verify", 1, "no board to compare the host with, expected --target with a board");
   result.cell = files::read_cell(options.cell);
-  if (host_sim::is_can_log(options.recording))
+  const bool foreign = !options.reading.dbc.empty() || !options.reading.format.empty();
+  if (!foreign && host_sim::is_can_log(options.recording))
     run.log = read_log(options, result);
   else if (options.run)
     throw files::BadInput("--run", 1, "the recording is not a CAN log, expected no --run");
-  result.recording = run.log ? run.log->recording : files::read_recording(options.recording);
+  result.recording = run.log
+                         ? run.log->recording
+                         : files::read_recording(options.recording, files::VoltageColumn::required, options.reading);
+  print_read_as(options.output, result.recording);
   measurement::compare_with_cell(result.recording, result.cell.parameters);
+  refuse_contradiction(result.recording);
   add_warnings(options, run);
   run.samples = run.log ? run.log->samples : measurement::samples(result.recording);
   if (options.initial_soc) {
@@ -190,6 +198,7 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
   }
   judge(options, result);
   host_sim::evaluate(result);
+  if (!result.recording.cell_voltage_v.empty()) run.cells = replay_cells(result, run.start);
 }
 
 std::string voltage_text(const host_sim::VoltageFigures& v) {
@@ -212,12 +221,16 @@ int write(const ReplayOptions& options, const ReplayRun& run) {
   const std::string trace = host_sim::trace_csv(result);
   if (!options.trace.empty()) write_output(options.trace, trace);
   if (!options.output.report.empty()) write_output(options.output.report, reports::replay_report(result));
-  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result, files::sha256(trace)));
+  if (!options.output.json.empty()) {
+    const std::string json = reports::json_of(result, files::sha256(trace));
+    write_output(options.output.json, run.cells.empty() ? json : with_cells(json, run.cells));
+  }
   if (result.difference) {
     fmt::print(stderr, "{}: {}\n", options.recording, *result.difference);
     return 1;
   }
   print_summary(options.output, summary(result));
+  if (!run.cells.empty()) print_summary(options.output, cells_text(run.cells));
   if (result.verified_against) {
     const bool log = run.compared > 0;
     print_summary(
@@ -280,12 +293,14 @@ class ReplayCommand final : public Command {
                       ->type_name("N");
     for (const char* other : {"--initial-soc", "--run", "--target", "--verify", "--board-cell"}) cuts.excludes(other);
     c.add_option("--trace", o_.trace, "write every estimate to a CSV file")->type_name("FILE");
+    add_reading(c, o_.reading);
     add_output(c, o_.output);
     for (const char* other : {"--trace", "--report"}) cuts.excludes(other);
     return &c;
   }
 
   int run() override {
+    complete_reading(o_.reading);
     o_.output.set_own(o_.trace);
     o_.output.protect({o_.recording, o_.cell, o_.board_cell});
     if (o_.cuts > 0) return run_cut_trials(o_);

@@ -30,6 +30,7 @@ struct SimulateOptions {
   double noise_v = 0, noise_a = 0;  ///< standard deviations
   unsigned long seed = 1;
   std::string out;
+  files::ReadOptions reading;
   Output output;
 
   const std::string& input() const { return recording.empty() ? profile : recording; }
@@ -102,8 +103,11 @@ SimulationRun read(const SimulateOptions& options) {
   for (const std::string& mechanism : options.with)
     files::put_mechanism(run.cell, mechanism_of(mechanism, run.cell.parameters));
   run.recording = files::read_recording(
-      options.input(), options.recording.empty() ? files::VoltageColumn::optional : files::VoltageColumn::required);
+      options.input(), options.recording.empty() ? files::VoltageColumn::optional : files::VoltageColumn::required,
+      options.reading);
+  print_read_as(options.output, run.recording);
   measurement::compare_with_cell(run.recording, run.cell.parameters);
+  refuse_contradiction(run.recording);
   if (bursts_unknown(run.cell)) {
     run.recording.warnings.push_back(
         {"bursts_unknown", "contact_intermittent has no effect: a cell file does not contain the times of its bursts"});
@@ -146,6 +150,7 @@ void compute(const SimulateOptions& options, SimulationRun& run) {
   run.result = {.cell = run.cell.name,
                 .input = options.input(),
                 .out = options.out,
+                .read_as = run.recording.read_as,
                 .samples = run.rows.size(),
                 .duration_s = run.recording.duration_s(),
                 .initial_soc = options.initial_soc,
@@ -227,11 +232,13 @@ class SimulateCommand final : public Command {
     c.add_option("--out", o_.out, "CSV file to write: time_s, current_a, voltage_v, soc")
         ->required()
         ->type_name("FILE");
+    add_reading(c, o_.reading);
     add_output(c, o_.output);
     return &c;
   }
 
   int run() override {
+    complete_reading(o_.reading);
     o_.output.set_own(o_.out);
     o_.output.protect({o_.cell, o_.input()});
     SimulationRun run = read(o_);

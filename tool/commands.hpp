@@ -7,10 +7,12 @@
 
 namespace bms::tool {
 
+std::unique_ptr<Command> import_command();      ///< a log of a tester, a logger or a CAN bus as a recording
 std::unique_ptr<Command> replay_command();      ///< estimates for a recording, on the host or an emulated board
 std::unique_ptr<Command> simulate_command();    ///< model voltage for a current, open loop
 std::unique_ptr<Command> experiment_command();  ///< a current profile by name
 std::unique_ptr<Command> identify_command();    ///< recordings in, cell file out
+std::unique_ptr<Command> cell_command();        ///< checks, shows, scales and plots a cell file
 std::unique_ptr<Command> diagnose_command();    ///< where a cell file and recordings disagree, and why
 std::unique_ptr<Command> study_command();       ///< the paper's comparison of models, optimisers and experiments
 std::unique_ptr<Command> proof_command();       ///< the diagnosis of real recordings against measurements

@@ -5,6 +5,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "files/read_options.hpp"
+#include "measurement/recording.hpp"
 #include "tool/output.hpp"
 
 namespace bms::tool {
@@ -21,6 +23,16 @@ const CLI::Validator& not_empty();
 void add_json(CLI::App& command, Output& output, const std::string& quiet = "print no summary");
 /// --json, --report and --quiet.
 void add_output(CLI::App& command, Output& output);
+
+/// How recordings are read: --map, --unit, --discharge-positive, --format and the others of files::ReadOptions.
+/// Doubtful readings are errors.
+void add_reading(CLI::App& command, files::ReadOptions& options);
+/// Adds the lines of --map-file to `map`. To be called before a recording is read.
+void complete_reading(files::ReadOptions& options);
+/// Prints what was detected in a recording, if it is not in the project's own format.
+void print_read_as(const Output& output, const measurement::Recording& recording);
+/// Throws BadInput if the readings contradict the cell that they were compared with.
+void refuse_contradiction(const measurement::Recording& recording);
 
 /// `what`, followed by what is accepted: a file, or one of the built-in cells.
 std::string cell_help(const std::string& what = "");

@@ -47,9 +47,9 @@ std::optional<StartSoc> estimated_start(const measurement::Recording& r, const f
 enum class Priority { user_first, reference_first };
 
 /// Reads one recording and determines its start.
-RecordingComparison read(const std::string& path, const std::optional<double>& given, Priority priority,
-                         DiagnoseInput& input) {
-  measurement::Recording r = files::read_recording(path);
+RecordingComparison read(const std::string& path, const files::ReadOptions& reading, const std::optional<double>& given,
+                         Priority priority, DiagnoseInput& input) {
+  measurement::Recording r = files::read_recording(path, files::VoltageColumn::required, reading);
   measurement::compare_with_cell(r, input.cell.parameters);
   for (const measurement::Warning& w : r.warnings) input.warnings.push_back({w.id, path + ": " + w.text});
   const auto reference = reference_start(r, input.cell);
@@ -107,9 +107,11 @@ DiagnoseInput read_diagnose_input(const DiagnoseOptions& options) {
   DiagnoseInput input;
   input.cell = files::read_cell(options.cell);
   for (const std::string& path : options.recordings)
-    input.recordings.push_back(read(path, given(input.recordings.size()), Priority::user_first, input));
+    input.recordings.push_back(
+        read(path, options.reading, given(input.recordings.size()), Priority::user_first, input));
   for (const std::string& path : options.holdouts) {
-    input.holdouts.push_back(read(path, soc.size() == 1 ? given(0) : std::nullopt, Priority::reference_first, input));
+    input.holdouts.push_back(
+        read(path, options.reading, soc.size() == 1 ? given(0) : std::nullopt, Priority::reference_first, input));
   }
   return input;
 }

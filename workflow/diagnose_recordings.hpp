@@ -23,6 +23,7 @@ RecordingComparison prepared(measurement::Recording recording, const std::string
                              const StartSoc& start);
 
 struct DiagnoseOptions {
+  files::ReadOptions reading;           ///< of all recordings
   std::string cell;                     ///< cell file, or name of a built-in cell
   std::vector<std::string> recordings;  ///< files, the earliest first
   std::vector<std::string> holdouts;    ///< files of later recordings, for comparison only

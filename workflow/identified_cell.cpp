@@ -14,6 +14,7 @@
 #include "host_sim/simulation.hpp"
 #include "identification/ocv_pieces.hpp"
 #include "workflow/reference_temperature.hpp"
+#include "workflow/slow_parts.hpp"
 
 namespace bms::workflow {
 
@@ -29,15 +30,18 @@ struct SlowRuns {
 };
 
 /// Ordered by their distance to the reference temperature, the nearest first.
-std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths, double reference_c) {
+std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths, const files::ReadOptions& reading,
+                                double reference_c, std::vector<std::string>& read_as) {
   std::vector<measurement::Recording> recordings;
-  for (const std::string& path : paths) recordings.push_back(files::read_recording(path));
+  for (const std::string& path : paths) {
+    recordings.push_back(files::read_recording(path, files::VoltageColumn::required, reading));
+    if (!recordings.back().read_as.empty()) read_as.push_back(path + ": " + recordings.back().read_as);
+  }
   std::vector<SlowRuns> all;
   for (const TemperatureGroup& like : group_by_temperature(recordings, reference_c)) {
     SlowRuns& runs = all.emplace_back(SlowRuns{like.temperature_c, {}, {}});
     for (const std::size_t k : like.recordings) {
-      const measurement::Recording& r = recordings[k];
-      runs.runs.push_back({{r.time_s, r.current_a, r.voltage_v, 0}, r.soc_ref});
+      for (const id::SlowRun& run : runs_of(recordings[k])) runs.runs.push_back(run);
       runs.files += (runs.files.empty() ? "" : ", ") + std::filesystem::path(paths[k]).filename().string();
     }
   }
@@ -92,10 +96,10 @@ std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement
   return groups;
 }
 
-OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
-                       files::CellFile& cell) {
+OcvResult identify_ocv(const std::vector<std::string>& paths, const files::ReadOptions& reading, double max_error_v,
+                       bool both_branches, files::CellFile& cell) {
   OcvResult taken;
-  const auto groups = slow_runs(paths, cell.parameters.reference_temperature_c);
+  const auto groups = slow_runs(paths, reading, cell.parameters.reference_temperature_c, taken.read_as);
   const std::string& files = groups.front().files;
   std::vector<id::CurveAtTemperature> curves;
   try {

@@ -18,15 +18,15 @@ struct OcvResult {
   std::optional<identification::BranchLaws> branches;  ///< from slow runs at three temperatures or more
   std::size_t temperatures = 0;                        ///< of slow runs
   std::vector<measurement::Warning> warnings;
+  std::vector<std::string> read_as;  ///< "FILE: how it was read", of files that are not in the project's own format
 };
 
 /// Writes OCV, gap and capacity of slow charge and discharge recordings into `cell`. The OCV has the fewest straight
 /// pieces with an error of at most max_error_v, in V; if the cell has no room for them, the error is larger and a
 /// warning says so. Of several temperatures, the one nearest to the cell's reference temperature gives the
-/// curve, moved exactly to it by the other temperatures. both_branches: the
-/// pieces also follow the gap. Throws BadInput if the recordings are not slow runs.
-OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
-                       files::CellFile& cell);
+/// curve, moved exactly to it by the other temperatures. both_branches: the pieces also follow the gap. Throws BadInput if the recordings are not slow runs.
+OcvResult identify_ocv(const std::vector<std::string>& paths, const files::ReadOptions& reading, double max_error_v,
+                       bool both_branches, files::CellFile& cell);
 
 /// Adds the hysteresis between the measured curves of charge and discharge as a mechanism, if there are both, and how
 /// both depend on the temperature, if that was measured.

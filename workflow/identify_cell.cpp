@@ -15,20 +15,13 @@
 #include "measurement/recording_checks.hpp"
 #include "workflow/identified_cell.hpp"
 #include "workflow/reference_temperature.hpp"
+#include "workflow/start_cell.hpp"
 
 namespace bms::workflow {
 
 namespace {
 
 namespace id = identification;
-
-/// The cell file to start from, with the OCV, and what the slow recordings say.
-struct StartCell {
-  files::CellFile cell;
-  double capacity_ah = 0;  ///< before the OCV was identified
-  OcvResult ocv;
-  bool has_hysteresis = false;
-};
 
 /// The recordings to identify from, by their place in the list.
 struct Inputs {
@@ -59,20 +52,6 @@ measurement::Warning warning_of(const std::string& warning, const std::string& b
   return {warning.substr(0, colon), before + warning.substr(colon + 2)};
 }
 
-StartCell read_start(const IdentifyOptions& options) {
-  StartCell start;
-  start.cell = files::read_cell(options.start);
-  start.capacity_ah = start.cell.parameters.capacity_ah;
-  model::CellParameters<>& p = start.cell.parameters;
-  p.reference_temperature_c = options.reference_temperature_c.value_or(p.reference_temperature_c);
-  if (!options.ocv.empty()) start.ocv = identify_ocv(options.ocv, options.ocv_error_v, options.extend, start.cell);
-  if (options.capacity_ah > 0) p.capacity_ah = options.capacity_ah;
-  if (options.extend) identify_hysteresis(start.ocv, start.cell);
-  start.has_hysteresis = options.extend && !start.cell.mechanisms.empty();
-  if (options.ocv_branch && p.ocv.half_gap_v.size > 0) p = id::with_ocv_branch(p, *options.ocv_branch);
-  return start;
-}
-
 /// Offset removal and low-pass of the current.
 void filter(const IdentifyOptions& options, const std::string& path, id::Data& data,
             std::vector<measurement::Warning>& warnings) {
@@ -94,13 +73,18 @@ void filter(const IdentifyOptions& options, const std::string& path, id::Data& d
   }
 }
 
-Inputs read_inputs(const IdentifyOptions& options, const StartCell& start,
-                   std::vector<measurement::Warning>& warnings) {
+Inputs read_inputs(const IdentifyOptions& options, StartCell& start, std::vector<measurement::Warning>& warnings,
+                   std::vector<std::string>& read_as) {
   Inputs inputs;
+  for (const std::string& path : options.recordings)
+    inputs.recordings.push_back(files::read_recording(path, files::VoltageColumn::required, options.reading));
+  adapt_start(options, inputs.recordings, start, warnings);
   inputs.options = {options.initial_soc, options.window, start.cell.parameters};
-  for (const std::string& path : options.recordings) {
-    measurement::Recording& r = inputs.recordings.emplace_back(files::read_recording(path));
+  for (measurement::Recording& r : inputs.recordings) {
+    const std::string& path = r.path;
+    if (!r.read_as.empty()) read_as.push_back(path + ": " + r.read_as);
     measurement::compare_with_cell(r, start.cell.parameters);
+    check_size(options, start, r);
     for (const measurement::Warning& w : r.warnings) warnings.push_back({w.id, path + ": " + w.text});
     IdentificationData d = identification_data(r, inputs.options);
     filter(options, path, d.record.data, warnings);
@@ -117,7 +101,8 @@ template <class Statistics>
 void validate(const IdentifyOptions& options, DataOptions data, Statistics statistics, IdentifyResult& result) {
   data.window = options.validate_window.value_or(options.window);
   for (const std::string& path : options.validate) {
-    const id::DataSet data_set = identification_data(files::read_recording(path), data).record;
+    const id::DataSet data_set =
+        identification_data(files::read_recording(path, files::VoltageColumn::required, options.reading), data).record;
     result.validations.emplace_back(path, statistics(data_set));
     result.data.push_back(data_set.data);
   }
@@ -125,7 +110,8 @@ void validate(const IdentifyOptions& options, DataOptions data, Statistics stati
 }
 
 std::string out_of_range(const model::CellFault& fault) {
-  return fmt::format("the identified cell is invalid: '{}' is out of range, expected {}", fault.key, fault.what);
+  return fmt::format("the identified cell is invalid: '{}' (entry {}) is out of range, expected {}", fault.key,
+                     fault.index + 1, fault.what);
 }
 
 /// Throws FailedFit for a fit that means nothing.
@@ -313,8 +299,19 @@ void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, con
   identify_noise(inputs.recordings, result.validation ? *result.validation : result.identification.estimation,
                  result.identification.parameters, cell.parameters);
   write_sources(options, result, cell);
-  noise.current_offset_a *= cell.parameters.capacity_ah / start.capacity_ah;
-  noise.current_unknown_a *= cell.parameters.capacity_ah / start.capacity_ah;
+  if (start.ocv_error_v > noise.model_v) {  // the recordings need not have shown it, and it lasts
+    noise.model_v = std::min(start.ocv_error_v, 0.2);
+    noise.model_correlation_s = std::max(noise.model_correlation_s, 3'000.0);
+  }
+  if (!start.limits_source.empty()) {
+    cell.sources["limits"] = start.limits_source;
+    cell.source =
+        fmt::format("identified from {}; initial values from {}", file_names(options.recordings), options.start);
+  }
+  if (!start.other_cell) {  // otherwise they are scaled already
+    noise.current_offset_a *= cell.parameters.capacity_ah / start.capacity_ah;
+    noise.current_unknown_a *= cell.parameters.capacity_ah / start.capacity_ah;
+  }
   state_reference(cell, !options.ocv.empty());
   if (options.extend) extend(inputs.measured, cell);
   check_reference(cell, identified_c, options.extend, result.warnings);
@@ -350,7 +347,8 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
   StartCell start = read_start(options);
   result.coulombic_efficiency = start.ocv.coulombic_efficiency;
   result.warnings = start.ocv.warnings;
-  const Inputs inputs = read_inputs(options, start, result.warnings);
+  result.read_as = start.ocv.read_as;
+  const Inputs inputs = read_inputs(options, start, result.warnings, result.read_as);
   if (options.linear)
     identify_linear_cell(options, std::move(start), inputs, result);
   else

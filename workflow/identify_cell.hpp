@@ -10,6 +10,7 @@
 #include "files/cell_file.hpp"
 #include "identification/identify.hpp"
 #include "identification/linear_models.hpp"
+#include "workflow/cell_size.hpp"
 #include "workflow/identification_data.hpp"
 
 namespace bms::workflow {
@@ -22,6 +23,7 @@ struct FailedFit : std::runtime_error {
 };
 
 struct IdentifyOptions {
+  files::ReadOptions reading;                        ///< of all recordings
   std::vector<std::string> recordings;               ///< files to identify from; at least one
   std::vector<std::string> ocv;                      ///< files with slow charge and discharge; empty: OCV of `start`
   std::optional<identification::LinearKind> linear;  ///< not given: the nonlinear grey box
@@ -40,13 +42,17 @@ struct IdentifyOptions {
   bool extend = false;                            ///< add the mechanisms and error states that an estimator needs
   std::optional<double> reference_temperature_c;  ///< of the cell file; not given: that of `start`
   double capacity_ah = 0;                         ///< 0: of the OCV recordings, else of `start`
+  bool ocv_from_rests = false;                    ///< OCV from the rests of `recordings`
+  std::string chemistry;                          ///< "LFP", "NMC", "NCA", "LTO"; empty: by the voltages
+  StatedLimits limits;                            ///< what is not given is derived, if `start` is another cell
   std::string name;                               ///< of the cell
   std::string out;                                ///< file that the caller will write; used in messages only
 };
 
 struct IdentifyResult {
   std::string model, optimizer, out;
-  std::string cell;  ///< name of the cell; empty: no cell file, because a parameter is out of range
+  std::string cell;                  ///< name of the cell; empty: no cell file, because a parameter is out of range
+  std::vector<std::string> read_as;  ///< "FILE: how it was read", of files that are not in the project's own format
   std::optional<files::CellFile> cell_file;
   identification::Identification identification;
   std::optional<identification::FitStatistics> validation;  ///< of the first validation recording

@@ -114,9 +114,12 @@ TEST_F(IdentifyTool, WarnsOfAnInvertedCurrent) {
           << "\n";
   }
   out.close();
-  const ToolRun run =
-      run_tool("identify --recording " + path("inverted.csv") + " --window 0.6:0.5 --out " + path("c.toml"));
-  EXPECT_THAT(run.err, HasSubstr("the sign of the current looks inverted"));
+  const std::string command =
+      "identify --recording " + path("inverted.csv") + " --window 0.6:0.5 --out " + path("c.toml");
+  const ToolRun refused = run_tool(command);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("the sign of the current looks inverted"));
+  const ToolRun run = run_tool(command + " --charge-positive");
   EXPECT_THAT(run.err, HasSubstr("ended at its bound"));
 }
 

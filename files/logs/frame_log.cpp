@@ -1,0 +1,247 @@
+#include "files/logs/frame_log.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "files/logs/dbc.hpp"
+#include "files/logs/frame_text.hpp"
+#include "files/logs/table_layout.hpp"
+#include "files/logs/table_reader.hpp"
+#include "files/logs/text_lines.hpp"
+
+namespace bms::files {
+
+namespace {
+
+constexpr std::array frame_formats = {"candump", "battery-emulator", "asc", "gvret"};
+constexpr std::size_t sniffed_lines = 20;
+constexpr std::size_t fewest_rows = 10;
+constexpr double stale_s = 10;  ///< an older value is missing
+
+/// A signal and the column that it fills.
+struct MappedSignal {
+  DbcSignal signal;
+  const DbcSignal* multiplexor = nullptr;
+  Target target;
+  Scale scale;
+  double value = std::numeric_limits<double>::quiet_NaN();
+  double received_s = 0;
+  std::size_t count = 0;
+};
+
+class FrameLog {
+ public:
+  FrameLog(std::string path, const ReadOptions& options) : path_(std::move(path)), options_(options) {
+    if (options.dbc.empty()) {
+      throw BadInput(path_, 1,
+                     "a log of CAN frames, expected --dbc with the file that describes them, and --map "
+                     "current_a=SIGNAL, --map voltage_v=SIGNAL");
+    }
+    dbc_ = read_dbc(options.dbc);
+    for (const std::string& text : options.map) map(text);
+    if (index_of(Quantity::current) == signals_.size())
+      throw BadInput("--map", 1, "no signal for current_a, expected --map current_a=SIGNAL with a signal of the DBC");
+  }
+
+  measurement::Recording read(std::size_t& bytes) {
+    TextLines lines(path_);
+    FrameText text(is_frame_format(options_.format) ? options_.format : std::string{});
+    std::string_view line;
+    TextFrame frame;
+    while (lines.next(line)) {
+      if (text.parse(line, frame)) receive(frame);
+    }
+    bytes = lines.bytes();
+    return finish(text.format(), lines.encoding());
+  }
+
+  static bool is_frame_format(const std::string& name) {
+    return std::find(frame_formats.begin(), frame_formats.end(), name) != frame_formats.end();
+  }
+
+ private:
+  void map(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    const auto target = target_of(text.substr(0, equals));
+    if (equals == std::string::npos || !target || target->quantity == Quantity::time)
+      throw BadInput("--map", 1, in_quotes(text) + ": expected current_a=SIGNAL or another column of a recording");
+    const std::string name = text.substr(equals + 1);
+    const DbcSignal* found = nullptr;
+    for (const DbcSignal& s : dbc_) {
+      if (s.name != name && s.message + "." + s.name != name) continue;
+      if (found != nullptr)
+        throw BadInput(options_.dbc, 1, in_quotes(name) + " is in several messages, expected MESSAGE.SIGNAL");
+      found = &s;
+    }
+    if (found == nullptr)
+      throw BadInput(options_.dbc, 1, "no signal " + in_quotes(name) + ", expected one of this file");
+    MappedSignal mapped;
+    mapped.signal = *found;
+    mapped.target = *target;
+    std::string unit = found->unit;
+    for (const std::string& stated : options_.unit) {
+      if (stated.starts_with(name_of(*target) + "=")) unit = stated.substr(stated.find('=') + 1);
+    }
+    if (const auto scale = scale_of(target->quantity, unit)) mapped.scale = *scale;
+    if (mapped.signal.multiplexed_by >= 0) {
+      const auto at = std::find_if(dbc_.begin(), dbc_.end(), [&](const DbcSignal& s) {
+        return s.id == found->id && s.long_id == found->long_id && s.multiplexor;
+      });
+      if (at != dbc_.end()) mapped.multiplexor = &*at;
+    }
+    signals_.push_back(mapped);
+  }
+
+  std::size_t index_of(Quantity quantity) const {
+    return static_cast<std::size_t>(std::find_if(signals_.begin(), signals_.end(),
+                                                 [&](const MappedSignal& s) { return s.target.quantity == quantity; }) -
+                                    signals_.begin());
+  }
+
+  void receive(const TextFrame& frame) {
+    const std::span<const std::uint8_t> data(frame.data.data(), frame.length);
+    bool current = false;
+    for (MappedSignal& m : signals_) {
+      if (m.signal.id != frame.id || m.signal.long_id != frame.long_id || !fits(m.signal, frame.length)) continue;
+      if (m.multiplexor != nullptr &&
+          raw_value(*m.multiplexor, data) != static_cast<std::uint64_t>(m.signal.multiplexed_by))
+        continue;
+      m.value = m.scale(value_of(m.signal, data));
+      m.received_s = frame.time_s;
+      ++m.count;
+      current = current || m.target.quantity == Quantity::current;
+    }
+    if (current) add_row(frame.time_s);
+  }
+
+  void add_row(double time_s) {
+    if (time_s_.empty()) columns_.resize(signals_.size());
+    if (!time_s_.empty() && time_s < time_s_.back()) {
+      throw BadInput(path_, 1,
+                     fmt::format("time goes back from {:g} s to {:g} s, expected times that do not decrease",
+                                 time_s_.back(), time_s));
+    }
+    const bool started = std::all_of(signals_.begin(), signals_.end(), [](const auto& m) { return m.count > 0; });
+    if (!started && time_s_.empty() && time_s - first_s(time_s) < stale_s) return;  // before the first of each signal
+    time_s_.push_back(time_s);
+    for (std::size_t k = 0; k < signals_.size(); ++k) {
+      const MappedSignal& m = signals_[k];
+      const bool fresh = m.count > 0 && time_s - m.received_s <= stale_s;
+      columns_[k].push_back(fresh ? m.value : std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+
+  double first_s(double time_s) {
+    if (std::isnan(first_s_)) first_s_ = time_s;
+    return first_s_;
+  }
+
+  measurement::Recording finish(const std::string& format, const std::string& encoding) {
+    measurement::Recording r;
+    r.path = path_;
+    r.read_as = format + (encoding.empty() ? "" : ", " + encoding) + " with " + options_.dbc;
+    for (const MappedSignal& m : signals_) {
+      if (m.count == 0) {
+        throw BadInput(path_, 1,
+                       fmt::format("no frame with {}.{} (id {:X}), expected a log of the bus that {} describes",
+                                   m.signal.message, m.signal.name, m.signal.id, options_.dbc));
+      }
+      r.read_as += fmt::format("; {} from {}.{} in {}", name_of(m.target), m.signal.message, m.signal.name,
+                               m.signal.unit.empty() ? "a unit that is not stated" : m.signal.unit);
+    }
+    if (time_s_.size() < fewest_rows)
+      throw BadInput(path_, 1, fmt::format("{} rows, expected {} or more", time_s_.size(), fewest_rows));
+    r.time_s = std::move(time_s_);
+    for (std::size_t k = 0; k < signals_.size(); ++k) put(r, signals_[k].target, std::move(columns_[k]));
+    const bool inverted = options_.sign == CurrentSign::discharge_positive;
+    for (double& a : r.current_a.edit()) a = inverted ? -a : a;
+    r.read_as += inverted ? "; a discharge is positive, inverted" : "; > 0 charges";
+    complete_pack(r, options_);
+    if (r.voltage_v.empty())
+      throw BadInput("--map", 1, "no signal for voltage_v, expected --map voltage_v=SIGNAL, or v_1, v_2 and so on");
+    return r;
+  }
+
+  static void put(measurement::Recording& r, const Target& target, std::vector<double> values) {
+    const auto numbered = [&](std::vector<measurement::Column>& columns) {
+      if (columns.size() < target.number) columns.resize(target.number, std::vector<double>(r.rows(), std::nan("")));
+      columns[target.number - 1] = std::move(values);
+    };
+    switch (target.quantity) {
+      case Quantity::current:
+        r.current_a = std::move(values);
+        break;
+      case Quantity::voltage:
+        r.voltage_v = std::move(values);
+        break;
+      case Quantity::temperature:
+        r.temperature_c = std::move(values);
+        break;
+      case Quantity::soc_ref:
+        r.soc_ref = std::move(values);
+        break;
+      case Quantity::cell_voltage:
+        numbered(r.cell_voltage_v);
+        break;
+      case Quantity::cell_temperature:
+        numbered(r.cell_temperature_c);
+        break;
+      case Quantity::pack_voltage:
+        r.pack_voltage_v = std::move(values);
+        break;
+      case Quantity::current_ref:
+        r.current_ref_a = std::move(values);
+        break;
+      default:
+        r.voltage_ref_v = std::move(values);
+    }
+  }
+
+  std::string path_;
+  const ReadOptions& options_;
+  std::vector<DbcSignal> dbc_;
+  std::vector<MappedSignal> signals_;
+  std::vector<double> time_s_;
+  std::vector<std::vector<double>> columns_;
+  double first_s_ = std::numeric_limits<double>::quiet_NaN();
+};
+
+}  // namespace
+
+std::optional<std::string> frame_format_of(const std::string& path, const ReadOptions& options) {
+  if (FrameLog::is_frame_format(options.format)) return options.format;
+  if (!options.format.empty()) return std::nullopt;
+  TextLines lines(path);
+  FrameText text;
+  TextFrame frame;
+  std::string_view line;
+  for (std::size_t k = 0; k < sniffed_lines && text.format().empty() && lines.next(line); ++k) text.parse(line, frame);
+  return text.format().empty() ? std::nullopt : std::optional(text.format());
+}
+
+measurement::Recording read_frame_log(const std::string& path, const ReadOptions& options, std::size_t& bytes) {
+  return FrameLog(path, options).read(bytes);
+}
+
+std::vector<std::string> read_map_file(const std::string& path) {
+  TextLines lines(path);
+  std::vector<std::string> map;
+  std::string_view line;
+  while (lines.next(line)) {
+    const std::string_view content = trimmed(line);
+    if (content.empty() || content.front() == '#') continue;
+    const std::size_t equals = content.find('=');
+    if (equals == std::string_view::npos)
+      throw BadInput(path, lines.number(), in_quotes(content) + " has no '=', expected NAME=COLUMN");
+    map.push_back(std::string(trimmed(content.substr(0, equals))) + "=" +
+                  std::string(trimmed(content.substr(equals + 1))));
+  }
+  return map;
+}
+
+}  // namespace bms::files

@@ -1,0 +1,23 @@
+// Recordings from logs of foreign CAN frames: a DBC file describes the frames, the user names the signals.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "files/read_options.hpp"
+#include "measurement/recording.hpp"
+
+namespace bms::files {
+
+/// Name of the format if the file begins like a log of CAN frames (files/logs/frame_text.hpp), or if the options name
+/// one. Throws BadInput if the file cannot be read.
+std::optional<std::string> frame_format_of(const std::string& path, const ReadOptions& options);
+
+/// Each frame with the current makes a row: its time, its current, and the last value of every other signal. bytes:
+/// gets the size of the text. Throws BadInput if there is no DBC file, a signal is unknown, or its frames are missing.
+measurement::Recording read_frame_log(const std::string& path, const ReadOptions& options, std::size_t& bytes);
+
+/// The lines "NAME=VALUE" of a mapping file; comments begin with '#'. Throws BadInput.
+std::vector<std::string> read_map_file(const std::string& path);
+
+}  // namespace bms::files

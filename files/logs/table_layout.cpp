@@ -1,0 +1,319 @@
+#include "files/logs/table_layout.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "files/logs/time_text.hpp"
+#include "files/text_file.hpp"
+
+namespace bms::files {
+
+namespace {
+
+constexpr std::size_t most_preamble_lines = 300;  ///< before the header: an EC-Lab file has about 60
+constexpr std::size_t longest_quote = 40;         ///< characters
+
+char separator_of(std::string_view line, const ReadOptions& options) {
+  if (options.separator == "tab" || options.separator == "\\t") return '\t';
+  if (!options.separator.empty()) return options.separator.front();
+  if (line.find('\t') != std::string_view::npos) return '\t';
+  return line.find(';') != std::string_view::npos ? ';' : ',';
+}
+
+/// "current_a=I_batt" as target and the rest.
+std::pair<Target, std::string> assignment(const std::string& text, const std::string& option) {
+  const std::size_t equals = text.find('=');
+  const auto target = target_of(trimmed(std::string_view(text).substr(0, equals)));
+  if (equals == std::string::npos || !target) {
+    throw BadInput(option, 1,
+                   in_quotes(text) +
+                       " names no column of a recording, expected NAME=... with time_s, current_a, "
+                       "voltage_v, temperature_c, soc_ref, pack_voltage_v, v_1, t_1 or another of them");
+  }
+  return {*target, std::string(trimmed(std::string_view(text).substr(equals + 1)))};
+}
+
+/// Finds the header and assigns columns to quantities.
+class HeaderFinder {
+ public:
+  HeaderFinder(std::string path, bool voltage, const ReadOptions& options)
+      : path_(std::move(path)), voltage_(voltage), options_(options) {
+    for (const std::string& text : options.map) maps_.push_back(assignment(text, "--map"));
+    for (const std::string& text : options.unit) {
+      const auto& [target, unit] = units_.emplace_back(assignment(text, "--unit"));
+      if (scale_of(target.quantity, unit) || (target.quantity == Quantity::time && is_clock_unit(unit))) continue;
+      throw BadInput("--unit", 1,
+                     fmt::format("{} is not a unit of {}, expected one of: {}", in_quotes(unit), name_of(target),
+                                 units_of(target.quantity)));
+    }
+    if (!options.format.empty() && log_format(options.format) == nullptr) {
+      throw BadInput("--format", 1,
+                     in_quotes(options.format) + " is not a format, expected one of: " + log_format_names());
+    }
+  }
+
+  std::optional<TableLayout> header(std::string_view line) const {
+    TableLayout layout;
+    layout.separator = separator_of(line, options_);
+    for (const std::string_view part : split(line, layout.separator)) layout.headings.emplace_back(part);
+    if (!take_maps(layout)) return std::nullopt;
+    if (own_names(layout)) return finished(std::move(layout));
+    for (const LogFormat& format : log_formats()) {
+      if (!options_.format.empty() && format.name != options_.format) continue;
+      if (options_.format.empty() && !format.marks.empty() && !marked(format, layout)) continue;
+      TableLayout tried = layout;
+      tried.format = &format;
+      tried.own = false;
+      detect(tried);
+      if (complete(tried)) return finished(std::move(tried));
+    }
+    return std::nullopt;
+  }
+
+  /// Says what the line lacks as a header.
+  [[noreturn]] void refuse(std::string_view line, std::size_t number) const {
+    for (const auto& [target, column] : maps_) {
+      throw BadInput(path_, number,
+                     fmt::format("no column {} in {}, expected the column that --map {} names", in_quotes(column),
+                                 in_quotes(line), name_of(target)));
+    }
+    TableLayout layout;
+    layout.separator = separator_of(line, options_);
+    for (const std::string_view part : split(line, layout.separator)) layout.headings.emplace_back(part);
+    own_names(layout);
+    const char* missing = "voltage_v";
+    if (layout.find(Quantity::current) == nullptr) missing = "current_a";
+    if (layout.find(Quantity::time) == nullptr) missing = "time_s";
+    throw BadInput(path_, number,
+                   fmt::format("no column '{}' in {}, expected a header with time_s, current_a, voltage_v, or with "
+                               "names and units that are known; --map {}=COLUMN names it",
+                               missing, in_quotes(line), missing));
+  }
+
+ private:
+  /// Returns false if the line lacks a column that the user named.
+  bool take_maps(TableLayout& layout) const {
+    for (const auto& [target, column] : maps_) {
+      const auto at = std::find(layout.headings.begin(), layout.headings.end(), column);
+      if (at == layout.headings.end()) return false;
+      add(layout, static_cast<std::size_t>(at - layout.headings.begin()), target);
+    }
+    return true;
+  }
+
+  void add(TableLayout& layout, std::size_t index, const Target& target) const {
+    const Heading heading = heading_of(layout.headings[index]);
+    SourceColumn column{index, target, layout.headings[index], heading.unit, {}, is_clock_unit(heading.unit)};
+    if (target_of(layout.headings[index]) == target)
+      column.unit.clear();
+    else if (const auto scale = scale_of(target.quantity, heading.unit))
+      column.scale = *scale;
+    layout.columns.push_back(column);
+  }
+
+  static bool has(const TableLayout& layout, const Target& target) {
+    return std::any_of(layout.columns.begin(), layout.columns.end(),
+                       [&](const SourceColumn& c) { return c.target == target; });
+  }
+
+  /// Columns with the project's own names. Returns true if no other is needed.
+  bool own_names(TableLayout& layout) const {
+    const bool nothing_mapped = layout.columns.empty();
+    for (std::size_t k = 0; k < layout.headings.size(); ++k) {
+      const auto target = target_of(layout.headings[k]);
+      const bool used = std::any_of(layout.columns.begin(), layout.columns.end(),
+                                    [&](const SourceColumn& c) { return c.index == k; });
+      if (!target || target->quantity == Quantity::state || (used && !nothing_mapped)) continue;
+      if (!has(layout, *target)) {
+        add(layout, k, *target);
+      } else if (nothing_mapped) {
+        throw BadInput(path_, 1, "column " + in_quotes(layout.headings[k]) + " twice, expected each column once");
+      }
+    }
+    const bool one_cell = std::any_of(maps_.begin(), maps_.end(),
+                                      [](const auto& map) { return map.first.quantity == Quantity::voltage; });
+    if (one_cell) {  // --map voltage_v=v_7: that cell of a pack, not the pack
+      std::erase_if(layout.columns, [](const SourceColumn& c) {
+        return c.target.quantity == Quantity::cell_voltage || c.target.quantity == Quantity::cell_temperature;
+      });
+    }
+    layout.own = nothing_mapped;
+    layout.format = log_format("csv");
+    return complete(layout) && (options_.format.empty() || options_.format == "csv");
+  }
+
+  static bool marked(const LogFormat& format, const TableLayout& layout) {
+    return std::any_of(layout.headings.begin(), layout.headings.end(), [&](const std::string& heading) {
+      const std::string name = normalised(heading);
+      return !name.empty() && format.marks.find("|" + name + "|") != std::string_view::npos;
+    });
+  }
+
+  /// True if values of this column have a known unit: in its heading, by the format, or by the user.
+  bool unit_known(const TableLayout& layout, Quantity quantity, const Heading& heading) const {
+    for (const auto& [target, unit] : units_) {
+      if (target.quantity == quantity) return true;
+    }
+    if (scale_of(quantity, heading.unit)) return true;
+    if (quantity == Quantity::time) return heading.unit.empty() || is_clock_unit(heading.unit);
+    if (quantity == Quantity::state) return true;
+    return heading.unit.empty() &&
+           (layout.format->base_units || scale_of(quantity, heading.base) || quantity == Quantity::temperature);
+  }
+
+  void detect(TableLayout& layout) const {
+    std::vector<Quantity> wanted = {Quantity::time, Quantity::current, Quantity::voltage, Quantity::temperature,
+                                    Quantity::pack_voltage};
+    if (layout.format->state_column) wanted.push_back(Quantity::state);
+    for (const Quantity quantity : wanted) {
+      if (has(layout, {quantity, 0})) continue;
+      int best = -1;
+      std::size_t at = 0;
+      for (std::size_t k = 0; k < layout.headings.size(); ++k) {
+        const Heading heading = heading_of(layout.headings[k]);
+        const int rank = rank_of(quantity, heading.base);
+        if (rank < 0 || (best >= 0 && rank >= best) || !unit_known(layout, quantity, heading)) continue;
+        best = rank;
+        at = k;
+      }
+      if (best >= 0) add(layout, at, {quantity, 0});
+    }
+    for (const Quantity quantity : {Quantity::cell_voltage, Quantity::cell_temperature}) {
+      for (std::size_t k = 0; k < layout.headings.size(); ++k) {
+        const Heading heading = heading_of(layout.headings[k]);
+        const Target target{quantity, cell_number(quantity, heading.base)};
+        const bool used = std::any_of(layout.columns.begin(), layout.columns.end(),
+                                      [&](const SourceColumn& c) { return c.index == k; });
+        if (target.number > 0 && !used && !has(layout, target) && scale_of(quantity, heading.unit))
+          add(layout, k, target);
+      }
+    }
+    if (layout.count(Quantity::cell_voltage) == 0)
+      std::erase_if(layout.columns, [](const auto& c) { return c.target.quantity == Quantity::cell_temperature; });
+  }
+
+  bool complete(const TableLayout& layout) const {
+    if (layout.find(Quantity::time) == nullptr || layout.find(Quantity::current) == nullptr) return false;
+    return !voltage_ || layout.find(Quantity::voltage) != nullptr || layout.count(Quantity::cell_voltage) > 0 ||
+           layout.find(Quantity::pack_voltage) != nullptr;
+  }
+
+  std::optional<TableLayout> finished(TableLayout layout) const {
+    for (const auto& [target, unit] : units_) {
+      const auto scale = scale_of(target.quantity, unit);
+      for (SourceColumn& column : layout.columns) {
+        if (column.target != target) continue;
+        column.unit = unit;
+        column.scale = scale.value_or(Scale{});
+        column.clock = !scale;
+        layout.own = false;
+      }
+    }
+    std::sort(layout.columns.begin(), layout.columns.end(),
+              [](const SourceColumn& a, const SourceColumn& b) { return a.index < b.index; });
+    for (std::size_t k = 0, c = 0; k < layout.headings.size(); ++k) {
+      while (c < layout.columns.size() && layout.columns[c].index < k) ++c;
+      if (c == layout.columns.size() || layout.columns[c].index != k) layout.unused.push_back(k);
+    }
+    layout.decimal_comma = options_.decimal_comma;
+    return layout;
+  }
+
+  std::string path_;
+  bool voltage_;
+  const ReadOptions& options_;
+  std::vector<std::pair<Target, std::string>> maps_, units_;
+};
+
+}  // namespace
+
+std::string in_quotes(std::string_view text) {
+  std::string out;
+  for (const char c : text.substr(0, longest_quote)) out += c >= ' ' && c <= '~' ? c : '?';
+  return "'" + out + (text.size() > longest_quote ? "..." : "") + "'";
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  return text;
+}
+
+std::vector<std::string_view> split(std::string_view line, char separator) {
+  std::vector<std::string_view> parts;
+  const bool quotes = line.find('"') != std::string_view::npos;
+  std::size_t begin = 0;
+  bool quoted = false;
+  for (std::size_t k = 0; k <= line.size(); ++k) {
+    if (k < line.size() && quotes && line[k] == '"') quoted = !quoted;
+    if (k < line.size() && (quoted || line[k] != separator)) continue;
+    parts.push_back(trimmed(line.substr(begin, k - begin)));
+    begin = k + 1;
+  }
+  return parts;
+}
+
+const SourceColumn* TableLayout::find(Quantity quantity) const {
+  const auto at = std::find_if(columns.begin(), columns.end(),
+                               [&](const SourceColumn& c) { return c.target.quantity == quantity; });
+  return at == columns.end() ? nullptr : &*at;
+}
+
+std::size_t TableLayout::count(Quantity quantity) const {
+  return static_cast<std::size_t>(std::count_if(columns.begin(), columns.end(),
+                                                [&](const SourceColumn& c) { return c.target.quantity == quantity; }));
+}
+
+namespace {
+
+/// Headings with the units of the row below, as one line: "Time" and "s" are "Time (s)". Empty if the row has no units.
+std::string with_units(std::string_view headings, std::string_view units, char separator) {
+  const std::vector<std::string_view> names = split(headings, separator), below = split(units, separator);
+  if (names.size() != below.size()) return {};
+  std::string line;
+  bool time = false;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const bool number = std::any_of(below[k].begin(), below[k].end(), [](char c) { return c >= '0' && c <= '9'; });
+    if (number) return {};
+    time = time || scale_of(Quantity::time, below[k]);
+    if (k > 0) line += separator;
+    line += std::string(names[k]) + (below[k].empty() ? "" : " (" + std::string(below[k]) + ")");
+  }
+  return time ? line : std::string{};
+}
+
+}  // namespace
+
+TableLayout find_header(TextLines& lines, const std::string& path, bool voltage, const ReadOptions& options) {
+  const HeaderFinder finder(path, voltage, options);
+  std::string first, previous;
+  std::size_t first_number = 0;
+  std::string_view line;
+  for (std::size_t k = 0; k < most_preamble_lines && lines.next(line);) {
+    const std::string_view content = trimmed(line);
+    if (content.empty()) continue;
+    if (auto layout = finder.header(content.front() == '#' ? std::string_view{} : line)) return *layout;
+    if (content.front() == '~' || content.front() == '#') continue;
+    const std::string both = with_units(previous, line, separator_of(line, options));
+    if (!both.empty()) {
+      if (auto layout = finder.header(both)) return *layout;
+    }
+    previous = line;
+    if (first.empty()) {
+      first = line;
+      first_number = lines.number();
+    }
+    ++k;
+  }
+  if (first.empty()) {
+    if (lines.number() == 0) throw BadInput(path, 1, "the file is empty, expected a header line and rows");
+    throw BadInput(path, lines.number(), "only comments, expected a header line and rows");
+  }
+  finder.refuse(first, first_number);
+}
+
+}  // namespace bms::files

@@ -1,0 +1,54 @@
+// Where the columns of a table are: its header line, separator, units and sign. Detected, or as the user named them.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "files/logs/log_formats.hpp"
+#include "files/logs/text_lines.hpp"
+#include "files/read_options.hpp"
+
+namespace bms::files {
+
+/// One column of a file that is used.
+struct SourceColumn {
+  std::size_t index = 0;  ///< in the file
+  Target target;
+  std::string heading;
+  std::string unit;  ///< as stated; empty: not stated
+  Scale scale;
+  bool clock = false;  ///< times as h:mm:ss
+};
+
+struct TableLayout {
+  const LogFormat* format = nullptr;
+  bool own = false;  ///< the project's own names, so nothing was detected
+  char separator = ',';
+  bool decimal_comma = false;
+  std::vector<SourceColumn> columns;  ///< ascending by index
+  std::vector<std::string> headings;  ///< of all columns
+  std::vector<std::size_t> unused;    ///< indices of columns that are not used
+
+  const SourceColumn* find(Quantity quantity) const;
+  std::size_t count(Quantity quantity) const;
+};
+
+/// Reads the lines up to the header, skipping comments and the preamble of a tester. A quantity is required: time,
+/// current, and with `voltage` a cell voltage. Throws BadInput if no line is a header, naming what is missing.
+TableLayout find_header(TextLines& lines, const std::string& path, bool voltage, const ReadOptions& options);
+
+/// Uses the first line of values: a row of units, the decimal comma. Returns true if the line was a row of units.
+bool settle(TableLayout& layout, std::string_view line, const std::string& path, std::size_t number,
+            const ReadOptions& options);
+
+/// "table, ';' separated, decimal comma; time 'Zeit [s]' in s; ...": one line for the user.
+std::string text_of(const TableLayout& layout, const ReadOptions& options, const std::string& encoding);
+
+/// Splits a line at the separator, also if it has quotes. The parts are trimmed and without quotes.
+std::vector<std::string_view> split(std::string_view line, char separator);
+std::string_view trimmed(std::string_view text);
+/// Text of the file for a message: short and printable.
+std::string in_quotes(std::string_view text);
+
+}  // namespace bms::files

@@ -1,0 +1,20 @@
+// The rows of a table as a recording.
+#pragma once
+
+#include "files/logs/text_lines.hpp"
+#include "files/recording.hpp"
+
+namespace bms::files {
+
+/// Reads all lines. Throws BadInput. The recording is not checked for plausibility yet.
+measurement::Recording read_table(TextLines& lines, const std::string& path, VoltageColumn voltage,
+                                  const ReadOptions& options);
+
+/// Voltage and temperature of a pack from its cells, or from the pack voltage and the number of cells, where they were
+/// not recorded. Throws BadInput if there is only a pack voltage.
+void complete_pack(measurement::Recording& recording, const ReadOptions& options);
+
+/// Reserves memory for the columns of a table of this size, from the length of its first line.
+std::size_t expected_rows(std::size_t bytes, std::size_t line_length);
+
+}  // namespace bms::files

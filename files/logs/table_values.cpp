@@ -1,0 +1,115 @@
+// What the first line of values shows, and the sentence about all that was detected.
+#include <algorithm>
+#include <cctype>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "files/logs/number.hpp"
+#include "files/logs/table_layout.hpp"
+#include "files/logs/time_text.hpp"
+
+namespace bms::files {
+
+namespace {
+
+bool has_letter_only(std::string_view text) {
+  return !text.empty() && std::none_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+/// "3,3" but not "1,234.5".
+bool has_decimal_comma(std::string_view text) {
+  const auto commas = std::count(text.begin(), text.end(), ',');
+  return commas == 1 && text.find('.') == std::string_view::npos && text.find(':') == std::string_view::npos;
+}
+
+/// Unit of a number that can only be a time since 1970, between 2001 and 2096; nullptr for others.
+const char* epoch_unit(std::string_view text) {
+  const auto value = number(text);
+  const auto within = [&](double unit) { return *value >= 1e9 * unit && *value < 4e9 * unit; };
+  if (!value) return nullptr;
+  if (within(1)) return "s";
+  if (within(1e3)) return "ms";
+  return within(1e6) ? "us" : nullptr;
+}
+
+std::string separator_name(char separator) {
+  if (separator == '\t') return "tab";
+  return fmt::format("'{}'", separator);
+}
+
+std::string column_text(const SourceColumn& column, bool base_units) {
+  std::string text = name_of(column.target) + " from " + in_quotes(column.heading);
+  if (column.target.quantity == Quantity::state) return text + " (D discharges)";
+  if (column.clock) return text + " as h:mm:ss or a date";
+  if (!column.unit.empty()) return text + " in " + unit_name(column.target.quantity, column.unit);
+  return base_units ? text + " without a unit, taken as " + std::string(units_of(column.target.quantity)).substr(0, 1)
+                    : text;
+}
+
+}  // namespace
+
+bool settle(TableLayout& layout, std::string_view line, const std::string& path, std::size_t number,
+            const ReadOptions& options) {
+  const std::vector<std::string_view> fields = split(line, layout.separator);
+  const auto field = [&](const SourceColumn& c) { return c.index < fields.size() ? fields[c.index] : ""; };
+  const bool units = std::all_of(layout.columns.begin(), layout.columns.end(), [&](const SourceColumn& c) {
+    const Heading heading = heading_of("x (" + std::string(field(c)) + ")");
+    return field(c).empty() || scale_of(c.target.quantity, field(c)) || scale_of(c.target.quantity, heading.unit) ||
+           (c.target.quantity == Quantity::state && has_letter_only(field(c)));
+  });
+  const SourceColumn* time = layout.find(Quantity::time);
+  if (units && scale_of(Quantity::time, field(*time))) {
+    for (SourceColumn& column : layout.columns) {
+      const bool stated = std::any_of(options.unit.begin(), options.unit.end(), [&](const std::string& text) {
+        return text.starts_with(name_of(column.target) + "=");
+      });
+      if (stated || field(column).empty() || column.target.quantity == Quantity::state) continue;
+      column.unit = field(column);
+      column.scale = *scale_of(column.target.quantity, column.unit);
+    }
+    layout.own = false;
+    return true;
+  }
+  for (SourceColumn& column : layout.columns) {
+    const std::string_view value = field(column);
+    if (column.target.quantity == Quantity::time && (clock_s(value) || date_s(value, options.day_first)))
+      column.clock = true;
+    else if (layout.separator != ',' && has_decimal_comma(value))
+      layout.decimal_comma = true;
+  }
+  time = layout.find(Quantity::time);
+  const bool has_unit = !time->unit.empty() || target_of(time->heading).has_value();
+  if (!has_unit && !time->clock && epoch_unit(field(*time))) {
+    SourceColumn& column = *std::find_if(layout.columns.begin(), layout.columns.end(),
+                                         [&](const SourceColumn& c) { return c.target == time->target; });
+    const char* const unit = epoch_unit(field(*time));
+    column.scale = *scale_of(Quantity::time, unit);
+    column.unit = std::string(unit) + " of the epoch";
+    return false;
+  }
+  const bool named = std::any_of(options.map.begin(), options.map.end(),
+                                 [](const std::string& text) { return text.starts_with("time_s="); });
+  if (!has_unit && !time->clock && !named) {
+    throw BadInput(path, number,
+                   fmt::format("the times {} in column {} have no unit, expected --unit time_s=s or another of: {}",
+                               in_quotes(field(*time)), in_quotes(time->heading), units_of(Quantity::time)));
+  }
+  return false;
+}
+
+std::string text_of(const TableLayout& layout, const ReadOptions& options, const std::string& encoding) {
+  std::string text(layout.format->title);
+  if (!encoding.empty()) text += ", " + encoding;
+  text += ", " + separator_name(layout.separator) + " separated";
+  if (layout.decimal_comma) text += ", decimal comma";
+  constexpr std::size_t most_named = 12;
+  for (std::size_t k = 0; k < std::min(most_named, layout.columns.size()); ++k)
+    text += "; " + column_text(layout.columns[k], layout.format->base_units);
+  if (layout.columns.size() > most_named) text += fmt::format("; and {} more", layout.columns.size() - most_named);
+  if (options.sign == CurrentSign::discharge_positive) return text + "; a discharge is positive, inverted";
+  if (layout.find(Quantity::state) != nullptr) return text + "; the sign is that of the state";
+  return text + "; > 0 charges";
+}
+
+}  // namespace bms::files

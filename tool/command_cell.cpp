@@ -1,0 +1,171 @@
+// bms cell: checks, shows, scales and plots a cell file.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "files/bad_input.hpp"
+#include "files/cell_file.hpp"
+#include "reports/json_results.hpp"
+#include "reports/report_page.hpp"
+#include "tool/commands.hpp"
+#include "tool/options.hpp"
+#include "workflow/cell_size.hpp"
+
+namespace bms::tool {
+
+namespace {
+
+double ocv_at(const model::OcvTable<double>& ocv, std::size_t edge) {
+  const std::size_t k = std::min(edge, ocv.b0_v.size - 1);
+  return ocv.b0_v[k] + ocv.b1_v[k] * ocv.soc[edge];
+}
+
+/// What is accepted but unusual, each with a likely cause.
+std::vector<std::string> doubts_of(const files::CellFile& cell) {
+  const model::CellParameters<>& p = cell.parameters;
+  std::vector<std::string> doubts;
+  const double most_a = std::max(p.limits.charge_current_max_a, p.limits.discharge_current_max_a);
+  if (most_a < 0.2 * p.capacity_ah || most_a > 30 * p.capacity_ah) {
+    doubts.push_back(fmt::format("the limits allow {:g} A, the cell has {:g} Ah: they look like those of another cell",
+                                 most_a, p.capacity_ah));
+  }
+  const double empty_v = ocv_at(p.ocv, 0), full_v = ocv_at(p.ocv, p.ocv.soc.size - 1);
+  if (full_v > p.limits.voltage_max_v + 0.05 || empty_v < p.limits.voltage_min_v - 0.05) {
+    doubts.push_back(fmt::format("the OCV is {:.3f} to {:.3f} V, the limits are {:g} to {:g} V", empty_v, full_v,
+                                 p.limits.voltage_min_v, p.limits.voltage_max_v));
+  }
+  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
+    const double drop_v = p.capacity_ah * (p.rc.r0_ohm[k] + p.rc.r1_ohm[k]);
+    if (drop_v > 1 || drop_v < 1e-3) {
+      doubts.push_back(
+          fmt::format("at {:.0f} % the 1C current drops {:.3g} V over R0 and R1: the resistances look like "
+                      "those of a cell of another size",
+                      100 * p.rc.soc[k], drop_v));
+      break;
+    }
+  }
+  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
+    if (p.rc.c1_f[k] < model::accepted::capacitance_f.high) continue;
+    doubts.push_back(fmt::format("at {:.0f} % C1 is at the largest value that a cell file accepts, {:g} F",
+                                 100 * p.rc.soc[k], model::accepted::capacitance_f.high));
+    break;
+  }
+  return doubts;
+}
+
+std::string shown(const files::CellFile& cell) {
+  const model::CellParameters<>& p = cell.parameters;
+  std::string text = fmt::format("{}: {}, {:g} Ah at {:g} degrees C. {}\n", cell.name, cell.chemistry, p.capacity_ah,
+                                 p.reference_temperature_c, cell.source);
+  const model::Limits& l = p.limits;
+  text += fmt::format("  limits  {:g} to {:g} V, {:g} A charging, {:g} A discharging, {:g} to {:g} degrees C\n",
+                      l.voltage_min_v, l.voltage_max_v, l.charge_current_max_a, l.discharge_current_max_a,
+                      l.temperature_min_c, l.temperature_max_c);
+  text += fmt::format("  OCV     {:.3f} V empty, {:.3f} V full, {} straight pieces{}\n", ocv_at(p.ocv, 0),
+                      ocv_at(p.ocv, p.ocv.soc.size - 1), p.ocv.b0_v.size,
+                      p.ocv.half_gap_v.size > 0 ? ", with the gap between charge and discharge" : "");
+  text += "  soc     R0, mOhm   R1, mOhm      C1, F   R1 C1, s\n";
+  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
+    text += fmt::format("  {:3.0f} % {:10.4g} {:10.4g} {:10.4g} {:10.3g}\n", 100 * p.rc.soc[k], 1e3 * p.rc.r0_ohm[k],
+                        1e3 * p.rc.r1_ohm[k], p.rc.c1_f[k], p.rc.r1_ohm[k] * p.rc.c1_f[k]);
+  }
+  for (const model::MechanismSetting& m : cell.mechanisms)
+    text += fmt::format("  {}\n", files::table_of(model::catalogue[m.index]));
+  text.pop_back();
+  return text;
+}
+
+files::PageContent plotted(const files::CellFile& cell) {
+  const model::CellParameters<>& p = cell.parameters;
+  files::PageChart ocv{"Open-circuit voltage over state of charge, %", {"OCV, V"}, {}, {{}}};
+  const bool gap = p.ocv.half_gap_v.size > 0;
+  if (gap) {
+    ocv.labels = {"OCV, V", "slow charge, V", "slow discharge, V"};
+    ocv.columns.resize(3);
+  }
+  for (std::size_t k = 0; k < p.ocv.soc.size; ++k) {
+    const double v = ocv_at(p.ocv, k);
+    ocv.time_s.push_back(100 * p.ocv.soc[k]);
+    ocv.columns[0].push_back(v);
+    if (!gap) continue;
+    ocv.columns[1].push_back(v + (1 - p.ocv.lean) * p.ocv.half_gap_v[k]);
+    ocv.columns[2].push_back(v - (1 + p.ocv.lean) * p.ocv.half_gap_v[k]);
+  }
+  files::PageChart resistance{"Resistances over state of charge, %", {"R0, mOhm", "R1, mOhm"}, {}, {{}, {}}};
+  files::PageChart capacitance{"C1 over state of charge, %", {"C1, F"}, {}, {{}}};
+  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
+    resistance.time_s.push_back(100 * p.rc.soc[k]);
+    capacitance.time_s.push_back(100 * p.rc.soc[k]);
+    resistance.columns[0].push_back(1e3 * p.rc.r0_ohm[k]);
+    resistance.columns[1].push_back(1e3 * p.rc.r1_ohm[k]);
+    capacitance.columns[0].push_back(p.rc.c1_f[k]);
+  }
+  return {"Cell " + cell.name,
+          fmt::format("{}, {:g} Ah. {}", cell.chemistry, p.capacity_ah, cell.source),
+          {},
+          {},
+          {ocv, resistance, capacitance}};
+}
+
+class CellCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c = *app.add_subcommand("cell", "Check, show, scale or plot a cell file");
+    c.footer("Example: bms cell scale table9 --capacity-ah 100 --out my_cell.toml");
+    c.add_option("action", action_, "check: what is unusual in it; show: its values; scale: to another capacity; plot")
+        ->required()
+        ->check(CLI::IsMember({"check", "show", "scale", "plot"}));
+    c.add_option("file", cell_, cell_help())->required();
+    c.add_option("--capacity-ah", capacity_ah_, "scale: capacity in Ah of the new cell")->check(Within(0.01, 1000.0));
+    c.add_option("--out", out_, "scale: cell file to write")->check(not_empty())->type_name("C.toml");
+    add_output(c, output_);
+    return &c;
+  }
+
+  int run() override {
+    output_.set_own(out_);
+    output_.protect({cell_});
+    files::CellFile cell = files::read_cell(cell_);
+    if (action_ == "scale") return scale(cell);
+    if (action_ == "plot" && output_.report.empty())
+      throw files::BadInput("bms cell plot", 1, "no page, expected --report FILE.html");
+    if (!output_.report.empty()) write_output(output_.report, reports::page_of(plotted(cell)));
+    const std::vector<std::string> doubts = doubts_of(cell);
+    if (!output_.json.empty()) write_output(output_.json, reports::json_of(cell, doubts));
+    if (action_ == "show") print_summary(output_, shown(cell));
+    if (action_ == "plot") print_summary(output_, "Page: " + output_.report);
+    if (action_ != "check") return 0;
+    std::string text = fmt::format("{}: {} doubt{}", cell_, doubts.size(), doubts.size() == 1 ? "" : "s");
+    for (const std::string& doubt : doubts) text += "\n  " + doubt;
+    print_summary(output_, text);
+    return doubts.empty() ? 0 : 1;
+  }
+
+ private:
+  int scale(files::CellFile& cell) const {
+    if (capacity_ah_ <= 0 || out_.empty())
+      throw files::BadInput("bms cell scale", 1, "no size or no file, expected --capacity-ah and --out");
+    const double before_ah = cell.parameters.capacity_ah;
+    for (const std::string& key : workflow::scale_to(capacity_ah_, cell)) {
+      if (!key.empty()) warn(key + ": a scaled value is beyond what a cell file accepts; the bound is used");
+    }
+    cell.source = fmt::format("{} of {:g} Ah, scaled to {:g} Ah: {}", cell.name, before_ah, capacity_ah_, cell.source);
+    const std::string text = files::cell_text(cell);
+    files::parse_cell(text, out_);  // throws if it is not valid
+    write_output(out_, text);
+    if (!output_.json.empty()) write_output(output_.json, reports::json_of(cell, doubts_of(cell)));
+    print_summary(output_, "Cell file: " + out_);
+    return 0;
+  }
+
+  std::string action_, cell_, out_;
+  double capacity_ah_ = 0;
+  Output output_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> cell_command() { return std::make_unique<CellCommand>(); }
+
+}  // namespace bms::tool

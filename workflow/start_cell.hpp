@@ -1,0 +1,36 @@
+// The cell that an identification starts from: the user's start file, moved to the size and the chemistry of the cell.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "files/cell_file.hpp"
+#include "workflow/identified_cell.hpp"
+#include "workflow/identify_cell.hpp"
+
+namespace bms::workflow {
+
+/// The cell file to start from, with the OCV, and what the slow recordings say.
+struct StartCell {
+  files::CellFile cell;
+  double capacity_ah = 0;  ///< of the start file
+  OcvResult ocv;
+  bool has_hysteresis = false;
+  double ocv_error_v = 0;  ///< of an OCV from rests, between them; 0: no such OCV
+  bool other_cell =
+      false;  ///< the start file is of another size or chemistry: it is scaled, and its limits are not used
+  std::string limits_source;  ///< empty: the limits are those of the start file
+};
+
+/// Reads the start file and the OCV recordings. A capacity that differs by more than a fifth makes it another cell.
+/// Throws BadInput; also if the OCV recordings contradict a stated capacity.
+StartCell read_start(const IdentifyOptions& options);
+
+/// What follows from the recordings to identify from: limits of use of another cell, and the OCV from their rests.
+void adapt_start(const IdentifyOptions& options, const std::vector<measurement::Recording>& recordings,
+                 StartCell& start, std::vector<measurement::Warning>& warnings);
+
+/// Throws BadInput if a recording that was compared with the cell contradicts it, or its capacity.
+void check_size(const IdentifyOptions& options, const StartCell& start, const measurement::Recording& recording);
+
+}  // namespace bms::workflow
