@@ -23,6 +23,8 @@ enum Flag : std::uint32_t {
   soc_ambiguous = 1U << 9,        ///< more than one state of charge fits the voltages so far; soc_sigma spans them
   /// Far from every voltage that the model can explain, so not used. If this persists, the SOC is estimated again.
   voltage_rejected = 1U << 10,
+  /// A result was not a number. The estimator started again from the counted charge, with an unknown SOC.
+  not_a_number = 1U << 11,
 };
 
 template <class S>

@@ -62,9 +62,11 @@ class SocEstimator {
 
   constexpr SocEstimator() = default;
 
-  /// Starts from a known state of charge instead of the first voltage. Both values are clamped to 0 to 1.
+  /// Starts from a known state of charge instead of the first voltage. Both values are clamped to 0 to 1, sigma to at
+  /// least 1e-6: nothing is certain.
   constexpr explicit SocEstimator(const measurement::StartingPoint& from)
-      : from_{clamped_to_one(from.soc_ppb), clamped_to_one(from.soc_sigma_ppb)}, has_start_{true} {}
+      : from_{clamped_to_one(from.soc_ppb), std::max(clamped_to_one(from.soc_sigma_ppb), least_start_sigma_ppb)},
+        has_start_{true} {}
 
   /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
@@ -104,6 +106,10 @@ class SocEstimator {
     estimate.voltage_predicted_v = predicted_v;
     estimate.flags = flags;
     report_state(cell, estimate);
+    if constexpr (std::floating_point<S>) {
+      if (!finite(estimate)) [[unlikely]]
+        start_again(cell, estimate);
+    }
     errors_.bound_gain_error(estimate.soc, estimate.soc_sigma, cell.noise.gain);
     return estimate;
   }
@@ -127,6 +133,7 @@ class SocEstimator {
 
   static constexpr int temperature_bin_bits = 8;  ///< a bin of temperatures is 2.56 K wide
   static constexpr std::int16_t no_temperature_bin = 0x7FFF;
+  static constexpr std::int32_t least_start_sigma_ppb = 1'000;
 
   template <class Cell>
   constexpr auto operating_point(const Cell& cell, const StepInput& input) const {
@@ -269,6 +276,36 @@ class SocEstimator {
       for (std::size_t k = Model::first_mechanism_state; k < Model::values; ++k)
         estimate.extra[next++] = state_.model_state[k];
     }
+  }
+
+  /// Whether every number of the estimate is finite and sigma is above 0. Not-a-number and infinity times 0 are
+  /// not-a-number, so one comparison decides.
+  static constexpr bool finite(const Result& e) {
+    S sum = e.voltage_predicted_v + e.v_rc_v;
+    if constexpr (extra_values > 0) {
+      for (const S& value : e.extra) sum += value;
+    }
+    return e.soc_sigma + sum * S(0) > S(0) && e.soc_sigma < S(1e3);
+  }
+
+  /// After a result that was not a number: the charge, counted in integers, stays; all else is unknown.
+  template <class Cell>
+  [[gnu::noinline]] constexpr void start_again(const Cell& cell, Result& estimate) {
+    constexpr double anything = 0.289;  // standard deviation of a SOC from 0 to 1: 1 / sqrt(12)
+    typename Model::Variances unknown{};
+    unknown.fill(Variance(anything * anything));
+    state_.model_state = {};
+    state_.covariance.set_diagonal(unknown);
+    errors_ = {};
+    gate_ = {};
+    ambiguous_ = {};
+    const std::uint32_t flags = estimate.flags;
+    estimate = {};
+    estimate.flags = flags | not_a_number;
+    report_state(cell, estimate);
+    errors_.start(estimate.soc);
+    const SocDistribution<S> before{estimate.soc, Variance(anything * anything)};
+    ambiguous_.open_at(cell, state_, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
   }
 
   /// The present estimate, for a sample that is not later than the last one.

@@ -25,7 +25,8 @@ constexpr std::pair<estimator::Flag, const char*> flag_texts[] = {
     {estimator::time_not_increasing, "time not increasing"},
     {estimator::not_started, "not started"},
     {estimator::soc_ambiguous, "more than one state of charge fits"},
-    {estimator::voltage_rejected, "voltage rejected"}};
+    {estimator::voltage_rejected, "voltage rejected"},
+    {estimator::not_a_number, "not a number"}};
 
 std::vector<TextItem> flag_items(const Reading& flags) {
   std::vector<TextItem> set;

@@ -11,6 +11,7 @@
 
 #include "files/cell_file.hpp"
 #include "firmware/application.hpp"
+#include "hal/device_key.hpp"
 #include "hal/power.hpp"
 #include "hal/power_path.hpp"
 #include "hal/second_current.hpp"
@@ -41,6 +42,9 @@ inline bool calendar_accepts = true;
 inline hal::SensorCalibration calibrated;
 inline bool calibration_accepts = true;
 inline int second_line_cleared = 0;
+inline std::optional<std::array<std::uint8_t, 16>> key;  ///< of the device
+inline bool development = true;
+inline std::uint32_t random_seed = 1;  ///< 0: no random numbers
 
 /// Resets all variables.
 void begin();

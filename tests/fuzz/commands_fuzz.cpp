@@ -26,7 +26,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame.id = id;
     }
     const firmware::Requested before = requested;
-    const auto answer = commands.handle(frame, now_us, requested);
+    const bool allowed = (data[3] & 0x20) != 0;
+    const auto answer = commands.handle(frame, now_us, requested, [allowed](firmware::Privilege) { return allowed; });
     require(requested.stored_end <= firmware::stored_parts);
     require(static_cast<unsigned>(requested.power) <= 2 && static_cast<unsigned>(requested.clear) <= 2);
     const bool same = requested.log_samples == before.log_samples && requested.unix_time_s == before.unix_time_s &&

@@ -107,7 +107,7 @@ class StoredDataOnTheBus : public ::testing::Test {
     if (result != can::CommandAnswer::result_done) return;
     const std::uint32_t first = command.argument & 0xFF, count = command.argument >> 8;
     asked.emplace_back(first, count);
-    for (std::uint32_t k = first; k < (count == 0 ? 23 : first + count); ++k) {
+    for (std::uint32_t k = first; k < (count == 0 ? 39 : first + count); ++k) {
       for (const can::Frame& f : battery.part(k)) {
         now_s += 0.03;
         if (!lost(k, f)) receive(f);
