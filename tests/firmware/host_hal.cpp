@@ -10,6 +10,7 @@ void host_hal::begin() {
   listening = true;
   sent.clear();
   requests.clear();
+  queue = nullptr;
   recorded.clear();
   switched = {};
   link_readings = {0, 0};
@@ -50,6 +51,7 @@ bool can_send(const can::Frame& frame) {
   return true;
 }
 bool next_request(can::Frame& frame) {
+  if (host_hal::queue != nullptr) return host_hal::queue->pop(frame);
   if (host_hal::requests.empty()) return false;
   frame = host_hal::requests.front();
   host_hal::requests.pop_front();

@@ -14,6 +14,7 @@
 #include "hal/device_key.hpp"
 #include "hal/power.hpp"
 #include "hal/power_path.hpp"
+#include "hal/request_queue.hpp"
 #include "hal/second_current.hpp"
 
 namespace bms::host_hal {
@@ -21,6 +22,7 @@ namespace bms::host_hal {
 inline bool listening = true;
 inline std::vector<can::Frame> sent;
 inline std::deque<can::Frame> requests;
+inline hal::RequestQueue* queue = nullptr;  ///< used instead of `requests` if it is set
 inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
 inline hal::LinkVoltages link_readings{0, 0};

@@ -50,6 +50,24 @@ class Battery {
       send(cells);
       return frames;
     }
+    if (k >= 23) {
+      can::StoredAction action;
+      can::StoredActionDetail detail;
+      action.index = detail.index = k - 23;
+      if (k == 23) {
+        action.code = can::StoredAction::code_clear_faults;
+        action.time = 1'790'000'060;
+        detail.operator_number = 4'711;
+        detail.argument = 1;
+      } else if (k == 24) {
+        action.code = can::StoredAction::code_session_opened;
+        action.time = 1'790'000'050;
+        detail.operator_number = 4'711;
+      }
+      send(action);
+      send(detail);
+      return frames;
+    }
     send(counts_of(k - 16));
     if (k == 16) {
       can::StoredUse use;
@@ -203,6 +221,27 @@ TEST_F(StoredDataOnTheBus, AFaultThatIsStoredMeanwhileStartsThemAgain) {
   answer(*request.due(now_s), can::CommandAnswer::result_done, nothing_lost);
   EXPECT_EQ(request.state(), StoredDataRequest::State::complete);
   EXPECT_EQ(request.data().fault_count, 3);
+}
+
+TEST_F(StoredDataOnTheBus, WhatServiceSessionsHaveDoneIsShownWithWhoDidIt) {
+  answer(*request.due(now_s), can::CommandAnswer::result_done, nothing_lost);
+  const auto actions = request.data().stored_actions();
+  ASSERT_EQ(actions.size(), 2U);
+  EXPECT_EQ(actions[0].name, "session opened");
+  EXPECT_EQ(actions[1].name, "clear faults");
+  EXPECT_EQ(actions[1].operator_number, 4'711U);
+  EXPECT_THAT(summary_of(request.data()),
+              HasSubstr("clear faults                 2026-09-21 14:14:20 UTC        operator 4711, argument 1"));
+  EXPECT_EQ(nlohmann::json::parse(json_of(request.data(), "can0"))["actions"][1]["operator"], 4'711);
+}
+
+TEST_F(StoredDataOnTheBus, OfFirmwareWithoutServiceSessionsAreCompleteWithoutThem) {
+  answer(*request.due(now_s), can::CommandAnswer::result_done,
+         [](std::uint32_t k, const can::Frame&) { return k >= 23; });
+  EXPECT_EQ(request.state(), StoredDataRequest::State::waiting);
+  now_s += 2.6;
+  answer(*request.due(now_s), can::CommandAnswer::result_refused, nothing_lost);
+  EXPECT_EQ(request.state(), StoredDataRequest::State::complete);
 }
 
 TEST_F(StoredDataOnTheBus, AnOldFirmwareAndARefusalEndTheRequest) {
