@@ -91,9 +91,12 @@ class Commands {
     if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id))
       return std::nullopt;
     const std::uint8_t counter = can::counter_of(frame);
-    if (counter >= can::counters || counter == last_counter_) return std::nullopt;
-    last_counter_ = counter;
+    if (counter >= can::counters) return std::nullopt;
     const auto command = can::Command::of(frame);
+    // also with the counter of the last command: another node may have sent that one
+    if (command.code == can::Command::code_request && command.argument == 0) requested.stop(now_us);
+    if (counter == last_counter_) return std::nullopt;
+    last_counter_ = counter;
     can::CommandAnswer answer;
     answer.code = command.code;
     answer.command_counter = counter;
@@ -123,10 +126,7 @@ class Commands {
         return A::result_done;
       case can::Command::code_request:
         if (command.argument > static_cast<std::uint32_t>(protection::Request::charge)) return A::result_refused;
-        if (command.argument == 0) {
-          requested.stop(now_us);
-          return A::result_done;
-        }
+        if (command.argument == 0) return A::result_done;  // stopped above
         if (!may(Privilege::drive)) return A::result_not_authorised;
         return requested.ask(static_cast<protection::Request>(command.argument), now_us) ? A::result_done
                                                                                          : A::result_refused;

@@ -48,10 +48,11 @@ class DriveRequests {
     return true;
   }
 
-  can::RequestChallenge message() const {
+  /// Nothing if everybody's requests are followed.
+  std::optional<can::RequestChallenge> message() const {
+    if (!needed_) return std::nullopt;
     can::RequestChallenge m;
     m.state = mac_ ? can::RequestChallenge::state_drive_request : can::RequestChallenge::state_no_key;
-    if (!needed_) m.state = can::RequestChallenge::state_all;
     m.challenge_low = static_cast<std::uint32_t>(challenge_);
     m.challenge_high = static_cast<std::uint32_t>(challenge_ >> 32);
     return m;

@@ -145,8 +145,8 @@ inline void StoredData::send(std::uint32_t part, const storage::Persistence& sto
   constexpr std::uint32_t faults = storage::EventsRecord::max_faults;
   if (part < faults) return send_fault(part, events);
   const std::uint32_t cause = part - faults;
-  if (cause >= storage::EventsRecord::causes)
-    return send_action(cause - storage::EventsRecord::causes, stored.actions());
+  constexpr std::uint32_t causes = storage::EventsRecord::causes;
+  if (cause >= causes) return send_action(cause - causes, stored.actions());
   put<N::cause_layout>(cause);
   put<N::resets_layout>(events.resets[cause]);
   put<N::faults_layout>(events.faults);

@@ -46,7 +46,7 @@ class Telemetry {
     send_if_due<can::SocAnchor>([&] { return messages::soc_anchor(now.condition); });
     if constexpr (Estimator::Model::errors_are_states)
       send_if_due<can::SensorErrors>([&] { return messages::sensor_errors(now.estimate, now.capacity_ah); });
-    send_if_due<can::RequestChallenge>([&] { return now.request_challenge; });
+    if (now.request_challenge) send_if_due<can::RequestChallenge>([&] { return *now.request_challenge; });
     send_if_due<can::Storage>([&] { return messages::storage(now.persistence); });
     send_if_due_or_changed<can::Board>(now.board.alarming() != published_alarming_, [&] {
       return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);

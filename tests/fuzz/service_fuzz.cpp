@@ -29,7 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (std::size_t k = 0; k < 8; ++k) frame.data[k] = data[4 + k];
     const Challenge shown = session.message();
     const std::uint64_t challenge = shown.challenge_low | static_cast<std::uint64_t>(shown.challenge_high) << 32;
-    const can::RequestChallenge of_requests = requests.message();
+    const can::RequestChallenge of_requests = requests.message().value();
     const std::uint64_t request_challenge =
         of_requests.challenge_low | static_cast<std::uint64_t>(of_requests.challenge_high) << 32;
     switch (data[0] % 8) {

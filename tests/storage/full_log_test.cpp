@@ -78,7 +78,7 @@ TEST_F(FullLog, HasRoomForLatchedFaultsAndForTheLastCharge) {
     work(3);
     p.supply_failing(now(), std::nullopt);
   }
-  boot(ResetCause::brown_out);
+  boot(ResetCause::pin);  // takes no time
   EXPECT_EQ(p.settings().get(1), 1'024);
   EXPECT_EQ(p.starting_point()->soc_ppb, pack.soc_ppb);
 }
