@@ -2,7 +2,7 @@
 // the round keys one after the other, so that 32 bytes of stack are enough.
 //
 // The table is read at places that depend on the key. On a controller whose table lies in flash behind a cache, the
-// time of a run depends on them a little. Who measures that time on a wire needs to see runs of 1 us apart, while the
+// time of a run depends on them a little. An attacker would have to measure 1 us on a wire, while the
 // answers leave with the samples, 100 ms apart (docs/safety/threats.md).
 #pragma once
 
@@ -22,8 +22,8 @@ constexpr std::uint8_t doubled(std::uint8_t x) {
   return static_cast<std::uint8_t>((x << 1) ^ ((x & 0x80) != 0 ? 0x1B : 0));
 }
 
-/// The S-box (5.1.1): the inverse in GF(2^8), then an affine map. p runs through all elements, q through their inverses:
-/// 3 generates the field.
+/// The S-box (5.1.1): the inverse in GF(2^8), then an affine map. p runs through all elements, q through their
+/// inverses: 3 generates the field.
 constexpr std::array<std::uint8_t, 256> make_s_box() {
   std::array<std::uint8_t, 256> box{};
   const auto rotated = [](std::uint8_t x, int by) { return static_cast<std::uint8_t>((x << by) | (x >> (8 - by))); };
@@ -63,12 +63,12 @@ constexpr Block substituted_and_shifted(const Block& state) {
 /// MixColumns (5.1.3).
 constexpr void mix_columns(Block& state) {
   for (std::size_t c = 0; c < 16; c += 4) {
-    const std::uint8_t first = state[c], all = static_cast<std::uint8_t>(state[c] ^ state[c + 1] ^ state[c + 2] ^
-                                                                         state[c + 3]);
+    const std::uint8_t first = state[c],
+                       all = static_cast<std::uint8_t>(state[c] ^ state[c + 1] ^ state[c + 2] ^ state[c + 3]);
     for (std::size_t k = 0; k < 4; ++k) {
       const std::uint8_t next = k == 3 ? first : state[c + k + 1];
-      state[c + k] = static_cast<std::uint8_t>(state[c + k] ^ all ^
-                                               doubled(static_cast<std::uint8_t>(state[c + k] ^ next)));
+      state[c + k] =
+          static_cast<std::uint8_t>(state[c + k] ^ all ^ doubled(static_cast<std::uint8_t>(state[c + k] ^ next)));
     }
   }
 }

@@ -23,8 +23,7 @@
 // Voltage noise: it is larger where the OCV is steep, because the SOC axis of the table has an uncertainty of
 // tolerance.initial_soc, and under current, because R0 and R1 have one of tolerance.resistance_fraction.
 //
-// Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost in instructions:
-// estimator/README.md.
+// Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost: estimator/README.md.
 #pragma once
 
 #include <algorithm>
@@ -62,11 +61,9 @@ class SocEstimator {
 
   constexpr SocEstimator() = default;
 
-  /// Starts from a known state of charge instead of the first voltage. Both values are clamped to 0 to 1, sigma to at
-  /// least 1e-6: nothing is certain.
+  /// Starts from a known state of charge instead of the first voltage, clamped to 0 to 1; its sigma to 1e-6 to 1.
   constexpr explicit SocEstimator(const measurement::StartingPoint& from)
-      : from_{clamped_to_one(from.soc_ppb), std::max(clamped_to_one(from.soc_sigma_ppb), least_start_sigma_ppb)},
-        has_start_{true} {}
+      : from_{clamped_to_one(from.soc_ppb), std::max(clamped_to_one(from.soc_sigma_ppb), 1'000)}, has_start_{true} {}
 
   /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
@@ -107,7 +104,7 @@ class SocEstimator {
     estimate.flags = flags;
     report_state(cell, estimate);
     if constexpr (std::floating_point<S>) {
-      if (!finite(estimate)) [[unlikely]]
+      if (!is_finite(estimate)) [[unlikely]]
         start_again(cell, estimate);
     }
     errors_.bound_gain_error(estimate.soc, estimate.soc_sigma, cell.noise.gain);
@@ -133,7 +130,6 @@ class SocEstimator {
 
   static constexpr int temperature_bin_bits = 8;  ///< a bin of temperatures is 2.56 K wide
   static constexpr std::int16_t no_temperature_bin = 0x7FFF;
-  static constexpr std::int32_t least_start_sigma_ppb = 1'000;
 
   template <class Cell>
   constexpr auto operating_point(const Cell& cell, const StepInput& input) const {
@@ -278,34 +274,22 @@ class SocEstimator {
     }
   }
 
-  /// Whether every number of the estimate is finite and sigma is above 0. Not-a-number and infinity times 0 are
-  /// not-a-number, so one comparison decides.
-  static constexpr bool finite(const Result& e) {
-    S sum = e.voltage_predicted_v + e.v_rc_v;
-    if constexpr (extra_values > 0) {
-      for (const S& value : e.extra) sum += value;
-    }
-    return e.soc_sigma + sum * S(0) > S(0) && e.soc_sigma < S(1e3);
-  }
-
   /// After a result that was not a number: the charge, counted in integers, stays; all else is unknown.
   template <class Cell>
   [[gnu::noinline]] constexpr void start_again(const Cell& cell, Result& estimate) {
-    constexpr double anything = 0.289;  // standard deviation of a SOC from 0 to 1: 1 / sqrt(12)
+    const auto anything = Variance(0.289 * 0.289);  // of a SOC from 0 to 1: 1 / 12
     typename Model::Variances unknown{};
-    unknown.fill(Variance(anything * anything));
+    unknown.fill(anything);
     state_.model_state = {};
     state_.covariance.set_diagonal(unknown);
     errors_ = {};
     gate_ = {};
     ambiguous_ = {};
-    const std::uint32_t flags = estimate.flags;
-    estimate = {};
-    estimate.flags = flags | not_a_number;
+    estimate.voltage_predicted_v = Voltage(0);
+    estimate.flags |= not_a_number;
     report_state(cell, estimate);
-    errors_.start(estimate.soc);
-    const SocDistribution<S> before{estimate.soc, Variance(anything * anything)};
-    ambiguous_.open_at(cell, state_, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
+    const SocDistribution<S> soc{estimate.soc, anything};
+    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &soc});
   }
 
   /// The present estimate, for a sample that is not later than the last one.

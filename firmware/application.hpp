@@ -178,8 +178,8 @@ class Application {
     inputs.second_line = hal::second_line_trips();
     inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
-    inputs.board_fault = !is_number || (estimate.flags & estimator::not_a_number) != 0 || board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
-                         latched_faults_.endangered() ||
+    inputs.board_fault = !is_number || (estimate.flags & estimator::not_a_number) != 0 || board_.unfit() ||
+                         board_.state.supply_low || supply_falls != 0 || latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     inputs.storage_fault = persistence_.log().sectors() > 0 &&
                            (setting_lost_ || !persistence_.log().operational() || persistence_.full_for_long());
@@ -293,8 +293,8 @@ class Application {
     return true;
   }
 
-  /// Returns false if the measuring chain cannot be calibrated, or not now; then nothing is stored. While a contactor is
-  /// closed, the readings that protect must not change.
+  /// Returns false if the measuring chain cannot be calibrated, or not now; then nothing is stored. While a contactor
+  /// is closed, the readings that protect must not change.
   [[gnu::noinline]] bool apply_calibration(const Requested::CalibrationChange& change) {
     if (protection_.decision().outputs.any_closed() || !persistence_.may_set()) return false;
     if (!hal::calibrate(stored_calibration(persistence_, change))) return false;

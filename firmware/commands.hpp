@@ -3,7 +3,7 @@
 //
 // A frame with a wrong CRC, another identifier or the counter of the previous command is ignored. An invalid argument
 // is answered "refused", an unknown code "no such command", one without the authority that it needs "not authorised";
-// none of them changes anything. A stop needs no authority, and nothing that arrives with the same sample outlives it.
+// such a command changes nothing. A stop needs no authority, and nothing that arrives with the same sample outlives it.
 #pragma once
 
 #include <algorithm>

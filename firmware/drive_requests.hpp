@@ -21,7 +21,7 @@ class DriveRequests {
  public:
   static constexpr std::uint16_t last_freshness = 0xFF00;  ///< then a new challenge follows
 
-  /// drive_key: nothing if there is none. needed: plain requests for power are refused.
+  /// drive_key: nothing if the battery has no key. needed: plain requests for power are refused.
   DriveRequests(const std::optional<authentication::Key>& drive_key, bool needed) : needed_(needed) {
     if (drive_key) mac_.emplace(*drive_key);
   }

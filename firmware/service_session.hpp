@@ -1,5 +1,5 @@
-// A service session: who wants to clear faults, calibrate or set the time first proves that he has this pack's service
-// key, then proves it again with every command (authentication/codes.hpp).
+// A service session: a node that clears faults, calibrates or sets the time first proves that it has this pack's
+// service key, then proves it again with every command (authentication/codes.hpp).
 //
 //   closed --challenge wanted--> challenge --right response--> open --close, or 60 s without a command--> closed
 //                                          --third wrong one--> locked for ten minutes, then one attempt each
@@ -26,7 +26,8 @@ class ServiceSession {
   static constexpr std::uint64_t challenge_us = 10'000'000, idle_us = 60'000'000, locked_us = 600'000'000;
   static constexpr unsigned most_wrong_responses = 3, most_wrong_commands = 16;
 
-  /// service_key: nothing if there is none. needed: commands need a session. locked: the last run ended locked.
+  /// service_key: nothing if the battery has no key. needed: commands need a session. locked: the last run ended
+  /// locked.
   constexpr ServiceSession(const std::optional<authentication::Key>& service_key, bool needed, bool locked)
       : has_key_(service_key.has_value()),
         needed_(needed),
@@ -65,9 +66,9 @@ class ServiceSession {
     authority_.reset();
     if (state_ != Challenge::state_open || !authority || authority->sequence <= sequence_) return false;
     const auto sequence = static_cast<std::uint16_t>(authority->sequence);
-    if (!authentication::equal_codes(authentication::command_code(authentication::Cmac(key_), challenge_, sequence,
-                                                                  command.data),
-                                     authority->code)) {
+    if (!authentication::equal_codes(
+            authentication::command_code(authentication::Cmac(key_), challenge_, sequence, command.data),
+            authority->code)) {
       wrong(most_wrong_commands, now_us);
       return false;
     }

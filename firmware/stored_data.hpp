@@ -52,8 +52,8 @@ class StoredData {
   std::array<std::uint8_t, counters> counter_{};
 };
 
-static_assert(stored_parts == storage::EventsRecord::max_faults + storage::EventsRecord::causes +
-                                  storage::ActionsRecord::max_actions);
+static_assert(stored_parts ==
+              storage::EventsRecord::max_faults + storage::EventsRecord::causes + storage::ActionsRecord::max_actions);
 
 // The records contain the raw values of the signals, so the frames are made of integers.
 

@@ -17,8 +17,8 @@ inline constexpr std::uint16_t stop_frame_id = 0x0A0, command_frame_id = 0x1A0, 
                                command_authority_frame_id = 0x1B1, drive_request_frame_id = 0x1B2;
 inline constexpr std::uint32_t request_code = 4;  ///< of a Command: a request for power
 
-/// Stops, commands, the frames of service sessions, requests; network management, requests to the battery's SDO server and the charger's heartbeat in an image that is a
-/// CANopen node (firmware/cia418_profile.hpp).
+/// Stops, commands, the frames of service sessions, requests; network management, requests to the battery's SDO server
+/// and the charger's heartbeat in an image that is a CANopen node (firmware/cia418_profile.hpp).
 inline constexpr auto request_ids = [] {
   if constexpr (vehicle_profile == VehicleProfile::cia418)
     return std::array<std::uint16_t, 8>{stop_frame_id,

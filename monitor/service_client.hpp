@@ -1,5 +1,5 @@
-// One service session with a battery (firmware/service_session.hpp): asks for a challenge, answers it, sends one command
-// with its authority, closes the session. A battery that needs no session gets the command alone. Time is this
+// One service session with a battery (firmware/service_session.hpp): asks for a challenge, answers it, sends one
+// command with its authority, closes the session. A battery that needs no session gets the command alone. Time is this
 // computer's, in seconds from any origin.
 #pragma once
 

@@ -267,8 +267,9 @@ std::string summary_of(const StoredData& data) {
                                     : fmt::format("Faults       {:.0f} so far, the last {} are stored:\n",
                                                   data.fault_count, faults.size());
   for (auto f = faults.rbegin(); f != faults.rend(); ++f)
-    text += fmt::format("  {:<28} {:<30} {} %  {} A  cells {} to {} V\n", f->name, when(f->time_s), or_dash(100 * f->soc, 1),
-                        or_dash(f->current_a, 2), or_dash(f->cell_voltage_min_v, 3), or_dash(f->cell_voltage_max_v, 3));
+    text += fmt::format("  {:<28} {:<30} {} %  {} A  cells {} to {} V\n", f->name, when(f->time_s),
+                        or_dash(100 * f->soc, 1), or_dash(f->current_a, 2), or_dash(f->cell_voltage_min_v, 3),
+                        or_dash(f->cell_voltage_max_v, 3));
   text +=
       fmt::format("Use          {:.1f} h in operation, {:.1f} full cycles\n", data.operating_s / 3'600, data.cycles);
   text += fmt::format("Throughput   {:.1f} Ah charged, {:.1f} Ah discharged\n", data.charged_ah, data.discharged_ah);

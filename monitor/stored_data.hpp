@@ -37,8 +37,8 @@ struct StoredFault {
 
 /// What somebody has done in a service session.
 struct StoredAction {
-  std::uint32_t code = 0;  ///< of the message StoredAction; 0: none
-  std::string name;        ///< "clear faults"
+  std::uint32_t code = 0;                                       ///< of the message StoredAction; 0: none
+  std::string name;                                             ///< "clear faults"
   std::uint32_t time_s = 0, operator_number = 0, argument = 0;  ///< time as that of a fault
 };
 
@@ -73,7 +73,7 @@ class StoredData {
   // Valid when complete().
   std::vector<StoredFault> stored_faults() const;    ///< oldest first
   std::vector<StoredAction> stored_actions() const;  ///< oldest first
-  double fault_count = not_known;                  ///< of all faults so far
+  double fault_count = not_known;                    ///< of all faults so far
   double operating_s = not_known, cycles = not_known, charged_ah = not_known, discharged_ah = not_known;
   StoredExtreme lowest, highest;
   std::array<StoredCount, causes> resets;

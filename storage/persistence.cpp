@@ -21,7 +21,7 @@ constexpr std::uint8_t most_faults_at_once = 16, most_settings_at_once = 8, most
                        grant_every_minutes = 60;
 constexpr std::uint64_t uaus_per_uah = 3'600'000'000;
 
-constexpr std::array known_kinds{ChargeRecord::kind,   CellsRecord::kind,    HealthRecord::kind,  EventsRecord::kind,
+constexpr std::array known_kinds{ChargeRecord::kind,   CellsRecord::kind,    HealthRecord::kind,   EventsRecord::kind,
                                  SettingsRecord::kind, SettingsRecord::copy, ExtremesRecord::kind, ActionsRecord::kind};
 
 template <class R>
@@ -63,8 +63,7 @@ void Persistence::read_settings() {
   const bool second = get(log_, copy, SettingsRecord::copy);
   const bool newer = static_cast<std::int16_t>(copy.revision - settings_.revision) > 0;
   if (second && (!first || newer)) settings_ = copy;
-  settings_changed_ = first != second || (first && copy.revision != settings_.revision) ||
-                      (second && newer);
+  settings_changed_ = first != second || (first && copy.revision != settings_.revision) || (second && newer);
 }
 
 void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,

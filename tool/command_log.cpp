@@ -95,7 +95,8 @@ class LogCommand final : public Command {
  public:
   CLI::App* add(CLI::App& app) override {
     CLI::App& c = *app.add_subcommand(
-        "log", "Read what a battery has stored: fault history with readings, use, extremes, resets, CAN errors, service "
+        "log",
+        "Read what a battery has stored: fault history with readings, use, extremes, resets, CAN errors, service "
         "sessions");
     c.footer("Example: bms log can0 --out faults.csv");
     c.add_option("source", o_.source,

@@ -31,11 +31,13 @@ struct ServiceOptions {
 };
 
 const std::map<std::string, std::uint32_t>& commands() {
-  static const std::map<std::string, std::uint32_t> all{
-      {"clear-faults", can::Command::code_clear_faults},     {"clear-latched", can::Command::code_clear_faults},
-      {"set-time", can::Command::code_set_time},             {"voltage-gain", can::Command::code_voltage_gain},
-      {"voltage-offset", can::Command::code_voltage_offset}, {"current-gain", can::Command::code_current_gain},
-      {"current-offset", can::Command::code_current_offset}};
+  static const std::map<std::string, std::uint32_t> all{{"clear-faults", can::Command::code_clear_faults},
+                                                        {"clear-latched", can::Command::code_clear_faults},
+                                                        {"set-time", can::Command::code_set_time},
+                                                        {"voltage-gain", can::Command::code_voltage_gain},
+                                                        {"voltage-offset", can::Command::code_voltage_offset},
+                                                        {"current-gain", can::Command::code_current_gain},
+                                                        {"current-offset", can::Command::code_current_offset}};
   return all;
 }
 
@@ -48,9 +50,7 @@ std::uint32_t argument_of(const ServiceOptions& o) {
   return static_cast<std::uint32_t>(o.value);
 }
 
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 class ServiceCommand final : public Command {
  public:
@@ -81,8 +81,7 @@ class ServiceCommand final : public Command {
                          argument_of(o_));
     try {
       const auto source = open_source(o_.source);
-      if (!source->live())
-        throw files::BadInput(o_.source, 1, "is a recording, expected a bus with the battery");
+      if (!source->live()) throw files::BadInput(o_.source, 1, "is a recording, expected a bus with the battery");
       if (!talk(*source, client)) return 1;
     } catch (const SourceError& error) {
       throw files::BadInput(error.source, error.line, error.what());
@@ -99,7 +98,8 @@ class ServiceCommand final : public Command {
     while (client.state() == ServiceClient::State::working && !source.ended()) {
       for (const can::Frame& frame : client.due(now_s())) {
         if (source.send(frame)) continue;
-        fmt::print(stderr, "{}: the frames cannot be sent; check that the interface is up and not in listen-only mode\n",
+        fmt::print(stderr,
+                   "{}: the frames cannot be sent; check that the interface is up and not in listen-only mode\n",
                    o_.source);
         return false;
       }

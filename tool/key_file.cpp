@@ -15,8 +15,7 @@ authentication::Key read_key(const std::string& path) {
   authentication::Key key{};
   bool good = text.size() == 2 * key.size();
   for (std::size_t k = 0; good && k < text.size(); ++k) {
-    const std::size_t digit =
-        digits.find(static_cast<char>(std::tolower(static_cast<unsigned char>(text[k]))));
+    const std::size_t digit = digits.find(static_cast<char>(std::tolower(static_cast<unsigned char>(text[k]))));
     good = digit != std::string_view::npos;
     key[k / 2] = static_cast<std::uint8_t>(16 * key[k / 2] + digit);
   }

@@ -35,8 +35,8 @@ void hysteresis_without_a_gap() {
     hysteresis.value[0] = 0;
     hysteresis.value[4] = measured;
     const std::vector<model::MechanismSetting> all{hysteresis};
-    const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> cell{
-        tests::prepared<S>(), model::chosen<S>(all, capacity_ah)};
+    const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> cell{tests::prepared<S>(),
+                                                                                  model::chosen<S>(all, capacity_ah)};
     SocEstimator<S, model::ExtendedRc<1, mechanism_states>::template Of> estimator;
     for (int k = 0; k < 600; ++k) {
       const auto e = estimator.step(cell, discharge(k));

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "hal/request_queue.hpp"
+#include "monitor/service_client.hpp"
 #include "tests/firmware/service_fixture.hpp"
 #include "tests/firmware/stored_state_fixture.hpp"
 
@@ -83,11 +83,15 @@ TEST_F(ServiceTest, OnlyASessionClearsAShortCircuitAndItIsRecorded) {
 TEST_F(ServiceTest, EveryCommandThatClearsCalibratesOrSetsTheTimeNeedsASession) {
   HostBoard board(new_chip, start);
   run(board, 3);
-  const std::pair<std::uint32_t, std::uint32_t> commands[] = {
-      {can::Command::code_clear_faults, 0},   {can::Command::code_clear_faults, 1},
-      {can::Command::code_set_time, 1'900'000'000}, {can::Command::code_voltage_gain, 100},
-      {can::Command::code_voltage_offset, 100}, {can::Command::code_current_gain, 100},
-      {can::Command::code_current_offset, 100}, {can::Command::code_request, 1}, {can::Command::code_request, 2}};
+  const std::pair<std::uint32_t, std::uint32_t> commands[] = {{can::Command::code_clear_faults, 0},
+                                                              {can::Command::code_clear_faults, 1},
+                                                              {can::Command::code_set_time, 1'900'000'000},
+                                                              {can::Command::code_voltage_gain, 100},
+                                                              {can::Command::code_voltage_offset, 100},
+                                                              {can::Command::code_current_gain, 100},
+                                                              {can::Command::code_current_offset, 100},
+                                                              {can::Command::code_request, 1},
+                                                              {can::Command::code_request, 2}};
   for (const auto& [code, argument] : commands) {
     EXPECT_EQ(result_of(board, std::array{workshop.command(code, argument)[1]}),
               can::CommandAnswer::result_not_authorised)
@@ -224,6 +228,40 @@ TEST_F(ServiceTest, TheCalibrationThatBoardsCannotApplyIsNotStored) {
   EXPECT_EQ(result_of(board, workshop.command(can::Command::code_voltage_offset, 5)),
             can::CommandAnswer::result_refused);
   EXPECT_EQ(stored_calibration(board.persistence()), hal::SensorCalibration{});
+}
+
+/// `bms service` against the application: one frame exchange a second.
+TEST_F(ServiceTest, TheToolClearsWithTheRightKeyAndSaysWhyItCannot) {
+  using monitor::ServiceClient;
+  const auto ends = [&](HostBoard& board, const authentication::Key& key) {
+    ServiceClient client(key, somebody, can::Command::code_clear_faults, 1);
+    for (double now_s = 0; client.state() == ServiceClient::State::working && now_s < 60; now_s += 1) {
+      for (const can::Frame& frame : client.due(now_s)) host_hal::requests.push_back(frame);
+      host_hal::sent.clear();
+      run(board, 1);
+      for (const can::Frame& frame : host_hal::sent) client.receive(frame, now_s);
+    }
+    run(board, 2);
+    return client.state();
+  };
+  const auto kept = after_a_short_circuit();
+  HostBoard board(kept, start);
+  run(board, 5);
+  EXPECT_EQ(ends(board, authentication::development_key), ServiceClient::State::wrong_key);
+  EXPECT_TRUE(short_circuit_latched());
+  EXPECT_EQ(ends(board, own_key), ServiceClient::State::done);
+  EXPECT_FALSE(short_circuit_latched());
+  EXPECT_EQ(board.persistence().actions().last(0).operator_number, somebody);
+  for (int k = 0; k < 3; ++k) ends(board, authentication::development_key);
+  EXPECT_EQ(ends(board, own_key), ServiceClient::State::locked);
+  host_hal::key.reset();
+  HostBoard without(kept, start);
+  run(without, 3);
+  EXPECT_EQ(ends(without, own_key), ServiceClient::State::no_key);
+  host_hal::development = true;
+  HostBoard open_to_all(kept, start);
+  run(open_to_all, 3);
+  EXPECT_EQ(ends(open_to_all, own_key), ServiceClient::State::done) << "no session is needed";
 }
 
 }  // namespace

@@ -51,34 +51,18 @@ class Battery {
       return frames;
     }
     if (k >= 23) {
-      can::StoredAction action;
-      can::StoredActionDetail detail;
-      action.index = detail.index = k - 23;
-      if (k == 23) {
-        action.code = can::StoredAction::code_clear_faults;
-        action.time = 1'790'000'060;
-        detail.operator_number = 4'711;
-        detail.argument = 1;
-      } else if (k == 24) {
-        action.code = can::StoredAction::code_session_opened;
-        action.time = 1'790'000'050;
-        detail.operator_number = 4'711;
-      }
-      send(action);
-      send(detail);
-      return frames;
+      send(action(k - 23));
+      send(detail(k - 23));
+    } else {
+      send(counts_of(k - 16));
     }
-    send(counts_of(k - 16));
     if (k == 16) {
       can::StoredUse use;
       use.operating_time = 360'000;
       use.cycles = 12.5F;
       send(use);
     } else if (k == 17) {
-      can::StoredThroughput throughput;
-      throughput.charged = 25'003;
-      throughput.discharged = 25'000;
-      send(throughput);
+      send(throughput());
     } else if (k == 18 || k == 19) {
       can::StoredExtremes extremes;
       extremes.kind = k - 18;
@@ -98,6 +82,27 @@ class Battery {
   std::uint32_t faults = 2;
 
  private:
+  static can::StoredThroughput throughput() {
+    can::StoredThroughput m;
+    m.charged = 25'003;
+    m.discharged = 25'000;
+    return m;
+  }
+  static can::StoredAction action(std::uint32_t index) {
+    can::StoredAction m;
+    m.index = index;
+    if (index == 0) m.code = can::StoredAction::code_clear_faults;
+    if (index == 1) m.code = can::StoredAction::code_session_opened;
+    if (index < 2) m.time = 1'790'000'060 - 10 * index;
+    return m;
+  }
+  static can::StoredActionDetail detail(std::uint32_t index) {
+    can::StoredActionDetail m;
+    m.index = index;
+    if (index < 2) m.operator_number = 4'711;
+    if (index == 0) m.argument = 1;
+    return m;
+  }
   can::StoredCounts counts_of(std::uint32_t cause) const {
     can::StoredCounts counts;
     counts.cause = cause;

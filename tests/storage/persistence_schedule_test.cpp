@@ -190,7 +190,8 @@ TEST_F(PersistenceTest, SettingsSurviveTheLossOfEitherRecord) {
       const auto place = std::ranges::find_if(records, [&](const auto& r) { return r.kind == lost; });
       ASSERT_NE(place, records.end());
       auto bytes = flash.bytes(place->sector);
-      const std::size_t at = place->line * storage::line_bytes + static_cast<std::size_t>(flip * 29) % (storage::line_bytes + place->length);
+      const std::size_t at = place->line * storage::line_bytes +
+                             static_cast<std::size_t>(flip * 29) % (storage::line_bytes + place->length);
       bytes[at] = static_cast<std::uint8_t>(bytes[at] ^ 1 << flip % 8);
       flash.fill(place->sector, bytes);
       boot();
