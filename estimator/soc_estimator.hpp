@@ -63,7 +63,7 @@ class SocEstimator {
 
   /// Starts from a known state of charge instead of the first voltage, clamped to 0 to 1; its sigma to 1e-6 to 1.
   constexpr explicit SocEstimator(const measurement::StartingPoint& from)
-      : from_{clamped_to_one(from.soc_ppb), std::max(clamped_to_one(from.soc_sigma_ppb), 1'000)}, has_start_{true} {}
+      : from_{clamped_to_one(from.soc_ppb), clamped_to_one(from.soc_sigma_ppb, 1'000)}, has_start_{true} {}
 
   /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
@@ -370,8 +370,8 @@ class SocEstimator {
     return at;
   }
 
-  static constexpr std::int32_t clamped_to_one(std::int32_t ppb) {
-    return std::clamp<std::int32_t>(ppb, 0, 1'000'000'000);
+  static constexpr std::int32_t clamped_to_one(std::int32_t ppb, std::int32_t least = 0) {
+    return std::clamp<std::int32_t>(ppb, least, 1'000'000'000);
   }
   constexpr SocDistribution<S> given_soc() const {
     const Soc sigma = soc_of_ppb(from_.soc_sigma_ppb);

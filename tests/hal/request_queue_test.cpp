@@ -33,7 +33,7 @@ TEST(RequestQueue, TakesOnlyWholeStandardFramesWithTheRightCrcAndCounter) {
       f.data[bit / 8] = static_cast<std::uint8_t>(f.data[bit / 8] ^ 1 << bit % 8);
       queue.push(f);
     }
-    for (const std::uint8_t length : {0, 7}) {
+    for (const std::uint8_t length : std::array<std::uint8_t, 2>{0, 7}) {
       can::Frame f = frame(id, 0);
       f.length = length;
       queue.push(f);
