@@ -157,7 +157,7 @@ constexpr R from_centi(std::int16_t centi) {
     return R(static_cast<double>(centi) * 0.01);
 }
 
-/// The nearest integer in micro-units, clamped to +-2,147 of the quantity's units.
+/// The nearest integer in micro-units, clamped to +-2,147 of the quantity's units. Not-a-number becomes 0.
 template <class T>
 constexpr std::int32_t to_micro(const T& x) {
   if constexpr (is_q<T>) {
@@ -166,7 +166,7 @@ constexpr std::int32_t to_micro(const T& x) {
     const std::int64_t micro = (static_cast<std::int64_t>(x.raw()) * 1'000'000 + half) >> T::fraction_bits;
     return static_cast<std::int32_t>(arithmetic::clamped(micro, most));
   } else if constexpr (std::floating_point<T>) {
-    const T clamped = arithmetic::clamped(x, T(2'147));
+    const T clamped = arithmetic::clamped(x == x ? x : T(0), T(2'147));
     return static_cast<std::int32_t>(clamped * T(1'000'000) + (clamped < T(0) ? T(-0.5) : T(0.5)));
   } else {
     return to_micro(x.a);  // a dual number

@@ -55,6 +55,8 @@ SAFETY_CLEAN = {
     "docs/safety/hazards.md": "| H-01 | fire | S2 | F2 | P1 | d | No fire. | open | 60 s |\n",
     "docs/safety/assumptions.md": "| A-01 | fuse | It melts. |\n| L-01 | It is slow. | late |\n",
     "docs/safety/failures.md": "| F-01 | wire | none | *hot*, `Row.Opens` | 5 s | open | - |\n",
+    "docs/safety/threats.md": "| AS-01 | opening | severe |\n| AT-1 | a node | frames |\n"
+    "| T-01 | AS-01 | forged | AT-1, none | high | 5 | a code | `protection/table.hpp:rows` | `Row.Opens` | 1 |\n",
     "docs/safety/traceability.md": "".join(f"<!-- figures: {name} -->\n<!-- end of figures -->\n"
                                           for name in ("rows", "hazards", "requirements")),
 }
@@ -82,6 +84,11 @@ SAFETY_BREACHES = [  # file, what is added or replaced, what the check must say
     ("docs/safety/assumptions.md", "| A-02 | fan | It turns. |\n", "assumptions.md:3: no requirement names A-02"),
     ("docs/safety/assumptions.md", "| L-01 | Again. | - |\n", "assumptions.md:3: L-01 is there twice"),
     ("docs/safety/failures.md", ("*hot*", "*warm*"), "failures.md:1: F-01 names the protection row warm"),
+    ("docs/safety/threats.md", ("table.hpp:rows", "table.hpp:warm"), "T-01 names protection/table.hpp:warm"),
+    ("docs/safety/threats.md", ("`Row.Opens`", "`Row.Shuts`"), "threats.md:3: T-01 names Row.Shuts: neither a test"),
+    ("docs/safety/threats.md", ("`Row.Opens`", "-"), "threats.md:3: T-01 has no tests"),
+    ("docs/safety/threats.md", ("AT-1, none", "AT-2"), "threats.md:3: T-01 names AT-2, which does not exist"),
+    ("docs/safety/threats.md", "| AS-02 | closing | major |\n", "threats.md:4: no threat names AS-02"),
 ]
 LONG_FUNCTION = "void steps() {\n" + "  step();\n" * 59 + "}\n"
 BREACHES = [  # check, file, what is added to it, what the check must say

@@ -10,6 +10,7 @@ requirements.toml connects each row of the protection table with hazards, code a
   a hazard, an assumption or a known limit that no requirement names
   a PLr that does not follow from S, F and P by the risk graph of EN ISO 13849-1, annex A
   a failure in failures.md that names an unknown protection row or an unknown test
+  a threat in threats.md without an asset, an attacker, code or a test that exist; an asset that no threat names
   tables in traceability.md that are not those of the data; --write writes them
 
 Exit code: 0 no fault, 1 faults, 2 a file of the safety file is missing or unreadable.
@@ -23,8 +24,8 @@ sys.dont_write_bytecode = True  # no __pycache__ in the source tree
 import sources
 
 FOLDER = "docs/safety"
-DATA, HAZARDS, ASSUMPTIONS, FAILURES, TRACE = (f"{FOLDER}/{name}" for name in (
-    "requirements.toml", "hazards.md", "assumptions.md", "failures.md", "traceability.md"))
+DATA, HAZARDS, ASSUMPTIONS, FAILURES, TRACE, THREATS = (f"{FOLDER}/{name}" for name in (
+    "requirements.toml", "hazards.md", "assumptions.md", "failures.md", "traceability.md", "threats.md"))
 FAULTS, TABLE = "protection/faults.hpp", "protection/README.md"
 RISK_GRAPH = {("S1", "F1", "P1"): "a", ("S1", "F1", "P2"): "b", ("S1", "F2", "P1"): "b", ("S1", "F2", "P2"): "c",
               ("S2", "F1", "P1"): "c", ("S2", "F1", "P2"): "d", ("S2", "F2", "P1"): "d", ("S2", "F2", "P2"): "e"}
@@ -60,6 +61,9 @@ class SafetyFile:
         self.assumptions = list(table_rows(sources.read(root, ASSUMPTIONS), r"A-\d+"))
         self.limits = list(table_rows(sources.read(root, ASSUMPTIONS), r"L-\d+"))
         self.failures = list(table_rows(sources.read(root, FAILURES), r"F-\d+"))
+        threats = sources.read(root, THREATS)
+        self.assets, self.attackers, self.threats = (
+            list(table_rows(threats, pattern)) for pattern in (r"AS-\d+", r"AT-\d+", r"T-\d+"))
         self.tests = {f"{suite}.{name}": path for path in sources.paths(os.path.join(root, "tests"), (".cpp",))
                       for suite, name in TEST.findall(sources.read(root, os.path.join("tests", path)))}
 
@@ -147,6 +151,31 @@ def faults_of_tables(safety):
                 yield f"{FAILURES}:{line}: {cells[0]} names {wrong}"
 
 
+def faults_of_threats(safety):
+    """Yields the faults of threats.md."""
+    ids = [cells[0] for _, cells in safety.assets + safety.attackers + safety.threats]
+    attackers = {cells[0] for _, cells in safety.attackers} | {"none"}
+    for line, cells in safety.threats:
+        place = f"{THREATS}:{line}: {cells[0]}"
+        if len(cells) != 10 or ids.count(cells[0]) > 1:
+            yield f"{place}: expected ten columns, and once"
+            continue
+        code, tests = (re.findall(r"`([^`]+)`", cell) for cell in cells[7:9])
+        for key, found in (("treatment", cells[6]), ("code", code), ("tests", tests)):
+            if not found:
+                yield f"{place} has no {key}"
+        for name in [cells[1], *cells[3].split(", ")]:
+            if name not in ids and name not in attackers:
+                yield f"{place} names {name}, which does not exist"
+        for wrong in [missing_code(safety.root, item) for item in code] + [missing_test(safety, t) for t in tests]:
+            if wrong:
+                yield f"{place} names {wrong}"
+    named = {cells[1] for _, cells in safety.threats if len(cells) > 1}
+    for line, cells in safety.assets:
+        if cells[0] not in named:
+            yield f"{THREATS}:{line}: no threat names {cells[0]}"
+
+
 def all_faults(safety):
     ids = [r.get("id") for r in safety.requirements]
     for r in safety.requirements:
@@ -165,6 +194,7 @@ def all_faults(safety):
         if fault not in safety.rows:
             yield f"{TABLE}:1: the generated table has no row for {fault}"
     yield from faults_of_tables(safety)
+    yield from faults_of_threats(safety)
 
 
 def joined(items):

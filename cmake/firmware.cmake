@@ -23,6 +23,9 @@
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (can/messages.md): cia418 for a CANopen charger, with the
 # nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
 #
+# BMS_PRODUCTION=ON builds images for a product: without a device key, or with the one for development, no contactor
+# closes and no service session opens (docs/safety/commands.md).
+#
 # BMS_CELLS is the number of cells in series: that of board.cmake, or another one within the range that board.cmake
 # states, as -DBMS_CELLS=N.
 #
@@ -49,6 +52,11 @@ set(BMS_CANOPEN_CHARGER 10 CACHE STRING "CANopen node of the charger")
 if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939)$")
   message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418 or j1939")
 endif()
+option(BMS_PRODUCTION "an image for a product: nothing works without a device key of its own" OFF)
+set(development true)
+if(BMS_PRODUCTION)
+  set(development false)
+endif()
 if(NOT BMS_CURRENT_RANGE_A)
   set(BMS_CURRENT_RANGE_A 2147)  # the end of the range of a reading
 endif()
@@ -62,7 +70,8 @@ endif()
 bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
   CELLS ${BMS_CELLS} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK}
-  VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
+  VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER}
+  DEVELOPMENT ${development})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
 set(BMS_CELL_HEADER_TOOL "" CACHE FILEPATH "cell_header of a host build; empty: build it")
@@ -137,11 +146,17 @@ if(EXISTS ${chip}/board_state.cpp)
   set(chip_calendar ${chip}/calendar.cpp)
   set(chip_state ${chip}/board_state.cpp ${chip}/supply.cpp ${core}/image_check.cpp)
 endif()
+set(chip_secrets ${absent_hal}/device_key.cpp ${absent_hal}/random.cpp)
+if(EXISTS ${chip}/device_key.cpp)
+  set(chip_secrets ${chip}/device_key.cpp ${chip}/random.cpp)
+endif()
 bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/retained.cpp
   ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
 bms_objects(hal_clock -Os ${chip}/clock.cpp)
-bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar})
-bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation})
+bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar}
+  ${chip_secrets})
+bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation} ${absent_hal}/device_key.cpp
+  ${absent_hal}/random.cpp)
 # Back ends by BMS_CAN and BMS_SAMPLES.
 set(auxiliary_contacts ${absent_hal}/auxiliary_contacts.cpp)
 if(DEFINED BMS_AUXILIARY_CONTACTS)

@@ -67,12 +67,19 @@ class Charge {
  private:
   static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
     const Soc most(model::max_soc);
-    const Soc clamped = arithmetic::clamped(delta, most);
+    const Soc clamped = limited(delta, most);
     if constexpr (arithmetic::is_q<Soc>) {
       return Soc(clamped * scale.counts_per_soc).raw();
     } else {
       return static_cast<std::int32_t>(clamped * scale.counts_per_soc + half_signed(clamped));
     }
+  }
+
+  /// Within +-most; not-a-number becomes 0.
+  static constexpr Soc limited(const Soc& delta, const Soc& most) {
+    if (!(delta <= most)) [[unlikely]]
+      return delta > most ? most : Soc(0);
+    return delta < -most ? Soc(-most) : delta;
   }
 
   /// 1/2 with the sign of x. A builtin copies the sign without a branch; a branch on noise would be mispredicted every

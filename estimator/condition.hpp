@@ -33,8 +33,8 @@ class Condition {
     const auto& laws = laws_of(cell);
     const auto& x = state.model_state;
     constexpr std::uint32_t unmeasured = current_missing | current_implausible,
-                            unread =
-                                voltage_missing | voltage_implausible | voltage_stuck | voltage_rejected | not_started;
+                            unread = voltage_missing | voltage_implausible | voltage_stuck | voltage_rejected |
+                                     not_started | not_a_number;
     const bool measured = (estimate.flags & unmeasured) == 0 && sample.current_ua != measurement::no_reading;
     const Current<S> current_a = measured ? Current<S>(laws.true_current(Model::without_offset(
                                                 from_micro<Current<S>>(sample.current_ua), x, cell.noise)))

@@ -26,6 +26,8 @@ enum Flag : std::uint32_t {
   voltage_rejected = 1U << 10,
   /// The voltages of the last half hour contradicted the state of charge, which is being estimated again.
   soc_contradicted = 1U << 11,
+  /// A result was not a number. The estimator started again from the counted charge, with an unknown SOC.
+  not_a_number = 1U << 12,
 };
 
 template <class S>
@@ -44,6 +46,20 @@ template <class S, std::size_t N>
 struct ExtendedEstimate : Estimate<S> {
   std::array<arithmetic::Voltage<S>, N> extra{};
 };
+
+/// Whether every number of an estimate in floating point is finite, and sigma above 0. Not-a-number and infinity times
+/// 0 are not-a-number, so one comparison decides.
+template <class S>
+constexpr bool is_finite(const Estimate<S>& e, const S& more = S(0)) {
+  const S sum = e.voltage_predicted_v + e.v_rc_v + more;
+  return e.soc_sigma > (sum + e.soc_sigma) * S(0);
+}
+template <class S, std::size_t N>
+constexpr bool is_finite(const ExtendedEstimate<S, N>& e) {
+  S sum(0);
+  for (const S& value : e.extra) sum += value;
+  return is_finite<S>(static_cast<const Estimate<S>&>(e), sum);
+}
 
 /// Number of 32-bit words of an estimate, and their names in that order: host and board are compared word by word.
 inline constexpr std::size_t estimate_words = 5;

@@ -14,17 +14,18 @@ class OutlierGate {
   static constexpr double max_sigmas = 8;
   /// Smallest standard deviation of any model's voltage [V], whatever its cell file says.
   static constexpr double min_error_v = 0.01;
-  /// Returns true if the innovation is so large that is_outlier() has to decide. Costs one comparison.
+  /// Returns true if the innovation is so large, or not a number, that is_outlier() has to decide. Costs one
+  /// comparison.
   static constexpr bool is_suspect(const arithmetic::Voltage<S>& innovation_v) {
-    return arithmetic::magnitude(innovation_v) > arithmetic::Voltage<S>(max_sigmas * min_error_v);
+    return !(arithmetic::magnitude(innovation_v) <= arithmetic::Voltage<S>(max_sigmas * min_error_v));
   }
 
-  /// innovation_v2: variance of the innovation.
+  /// innovation_v2: variance of the innovation. Not-a-number is an outlier.
   static constexpr bool is_outlier(const arithmetic::Voltage<S>& innovation_v,
                                    const arithmetic::Variance<S>& innovation_v2) {
     using Variance = arithmetic::Variance<S>;
-    return Variance(innovation_v * innovation_v) >
-           Variance(innovation_v2 * arithmetic::Count<S>(max_sigmas * max_sigmas));
+    return !(Variance(innovation_v * innovation_v) <=
+             Variance(innovation_v2 * arithmetic::Count<S>(max_sigmas * max_sigmas)));
   }
 };
 

@@ -23,8 +23,7 @@
 // Voltage noise: it is larger where the OCV is steep, because the SOC axis of the table has an uncertainty of
 // tolerance.initial_soc, and under current, because R0 and R1 have one of tolerance.resistance_fraction.
 //
-// Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost in instructions:
-// estimator/README.md.
+// Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost: estimator/README.md.
 #pragma once
 
 #include <algorithm>
@@ -63,9 +62,9 @@ class SocEstimator {
 
   constexpr SocEstimator() = default;
 
-  /// Starts from a known state of charge instead of the first voltage. Both values are clamped to 0 to 1.
+  /// Starts from a known state of charge instead of the first voltage, clamped to 0 to 1; its sigma to 1e-6 to 1.
   constexpr explicit SocEstimator(const measurement::StartingPoint& from)
-      : from_{clamped_to_one(from.soc_ppb), clamped_to_one(from.soc_sigma_ppb)}, has_start_{true} {}
+      : from_{clamped_to_one(from.soc_ppb), clamped_to_one(from.soc_sigma_ppb, 1'000)}, has_start_{true} {}
 
   /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
@@ -106,6 +105,10 @@ class SocEstimator {
     estimate.voltage_predicted_v = predicted_v;
     estimate.flags = flags;
     report_state(cell, estimate);
+    if constexpr (std::floating_point<S>) {
+      if (!is_finite(estimate)) [[unlikely]]
+        start_again(cell, estimate);
+    }
     errors_.bound_gain_error(estimate.soc, estimate.soc_sigma, cell.noise.gain);
     return estimate;
   }
@@ -312,6 +315,24 @@ class SocEstimator {
     }
   }
 
+  /// After a result that was not a number: the charge, counted in integers, stays; all else is unknown.
+  template <class Cell>
+  [[gnu::noinline]] constexpr void start_again(const Cell& cell, Result& estimate) {
+    const auto anything = Variance(0.289 * 0.289);  // of a SOC from 0 to 1: 1 / 12
+    typename Model::Variances unknown{};
+    unknown.fill(anything);
+    state_.model_state = {};
+    state_.covariance.set_diagonal(unknown);
+    errors_ = {};
+    gate_ = {};
+    ambiguous_ = {};
+    estimate.voltage_predicted_v = Voltage(0);
+    estimate.flags |= not_a_number;
+    report_state(cell, estimate);
+    const SocDistribution<S> soc{estimate.soc, anything};
+    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &soc});
+  }
+
   /// The present estimate, for a sample that is not later than the last one.
   template <class Cell>
   [[gnu::noinline]] constexpr Result repeated_estimate(const Cell& cell, std::uint32_t flags) const {
@@ -392,8 +413,8 @@ class SocEstimator {
     return at;
   }
 
-  static constexpr std::int32_t clamped_to_one(std::int32_t ppb) {
-    return std::clamp<std::int32_t>(ppb, 0, 1'000'000'000);
+  static constexpr std::int32_t clamped_to_one(std::int32_t ppb, std::int32_t least = 0) {
+    return std::clamp<std::int32_t>(ppb, least, 1'000'000'000);
   }
   constexpr SocDistribution<S> given_soc() const {
     const Soc sigma = soc_of_ppb(from_.soc_sigma_ppb);

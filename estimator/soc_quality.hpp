@@ -52,8 +52,8 @@ class SocQuality {
   }
 
  private:
-  static constexpr std::uint32_t unobservable_flags =
-      voltage_missing | voltage_implausible | voltage_stuck | not_started | soc_ambiguous | voltage_rejected;
+  static constexpr std::uint32_t unobservable_flags = voltage_missing | voltage_implausible | voltage_stuck |
+                                                      not_started | soc_ambiguous | voltage_rejected | not_a_number;
 
   Result result_;
   std::uint32_t part_of_second_ms_ = 0;

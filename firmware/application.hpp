@@ -15,6 +15,7 @@
 
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
+#include "firmware/access.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/latched_faults.hpp"
 #include "firmware/progress.hpp"
@@ -60,6 +61,7 @@ class Application {
         telemetry_{identity, start},
         capacity_ah_{capacity_ah},
         persistence_{persistence},
+        access_{persistence},
         cell_hash_{identity.cell_hash} {
     board_.cell_file_changed = stored_for_another_cell_file(persistence, cell_hash_);
     if (board_.cell_file_changed) return;
@@ -80,6 +82,7 @@ class Application {
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
     observe(pack, estimate);
     protect(pack, estimate, request);
+    access_.drive.renew(pack.time_us, access_.source);
     publish(pack, mean, estimate);
     store_decision();
     handle_requests(pack.time_us);
@@ -121,7 +124,8 @@ class Application {
                                          .board = board_,
                                          .capacity_ah = capacity_ah_,
                                          .log_samples = requested_.log_samples,
-                                         .stored_part = requested_.next_stored_part()};
+                                         .stored_part = requested_.next_stored_part(),
+                                         .request_challenge = access_.drive.message()};
     telemetry_.publish(now);
     vehicle_profile_.publish(now);
   }
@@ -137,7 +141,8 @@ class Application {
 
   void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
     protection::PackEstimate<cells> known;
-    if ((estimate.flags & estimator::not_started) == 0) {
+    const bool is_number = messages::is_number(estimate);
+    if ((estimate.flags & estimator::not_started) == 0 && is_number) {
       known.soc_ppb = messages::ppb(estimate.soc);
       known.soc_sigma_ppb = messages::ppb(estimate.soc_sigma);
       known.voltage_rejected = (estimate.flags & estimator::voltage_rejected) != 0;
@@ -164,8 +169,8 @@ class Application {
     inputs.second_line = hal::second_line_trips();
     inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
-    inputs.board_fault = board_.unfit() || board_.state.supply_low || supply_falls != 0 ||
-                         latched_faults_.endangered() ||
+    inputs.board_fault = !is_number || (estimate.flags & estimator::not_a_number) != 0 || board_.unfit() ||
+                         board_.state.supply_low || supply_falls != 0 || latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     inputs.storage_fault = persistence_.log().sectors() > 0 &&
                            (setting_lost_ || !persistence_.log().operational() || persistence_.full_for_long());
@@ -208,24 +213,81 @@ class Application {
     }
   }
 
+  /// Stops and drive requests are bounded by their places (hal/request_queue.hpp), all else by max_requests.
   void handle_requests(std::uint64_t now_us) {
     can::Frame frame;
-    for (int k = 0; k < max_requests && hal::next_request(frame); ++k) {
-      if (auto answer = commands_.handle(frame, now_us, requested_)) {
-        if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time))
-          answer->result = can::CommandAnswer::result_refused;
-        if (const auto change = std::exchange(requested_.calibration_change, std::nullopt);
-            change && !apply_calibration(*change))
-          answer->result = can::CommandAnswer::result_refused;
-        telemetry_.answer(*answer);
-      } else {
-        vehicle_profile_.receive(frame, now_us);
+    for (int k = 0; k < max_requests && hal::next_request(frame);) {
+      if (frame.id == can::Stop::id || frame.id == can::DriveRequest::id) {
+        if (!frame.long_id) handle_power(frame, now_us);
+        continue;
       }
+      ++k;
+      if (!handle_session(frame, now_us) && !handle_command(frame, now_us)) vehicle_profile_.receive(frame, now_us);
     }
+    for (int k = 0; k < max_requests && hal::next_network_frame(frame); ++k) vehicle_profile_.receive(frame, now_us);
   }
 
-  /// Returns false if the measuring chain cannot be calibrated; then nothing is stored.
+  void handle_power(const can::Frame& frame, std::uint64_t now_us) {
+    if (!can::intact(frame, static_cast<std::uint16_t>(frame.id))) return;
+    const auto request = can::DriveRequest::of(frame);
+    if (frame.id == can::Stop::id || request.request == can::DriveRequest::request_none)
+      requested_.stop(now_us);
+    else if (const auto wanted = access_.drive.receive(request))
+      requested_.ask(*wanted, now_us);
+  }
+
+  /// Returns false if the frame is not one of a service session.
+  [[gnu::noinline]] bool handle_session(const can::Frame& frame, std::uint64_t now_us) {
+    const bool opening = frame.id == can::ServiceRequest::id;
+    if (frame.long_id || (!opening && frame.id != can::CommandAuthority::id)) return false;
+    if (!can::intact(frame, static_cast<std::uint16_t>(frame.id))) return true;
+    if (!opening) {
+      access_.session.receive(can::CommandAuthority::of(frame));
+      return true;
+    }
+    const std::uint32_t before = access_.session.state();
+    const std::uint32_t after = access_.session.receive(can::ServiceRequest::of(frame), now_us, access_.source);
+    if (after != before) record_session(after);
+    telemetry_.answer(access_.session.message());
+    return true;
+  }
+
+  void record_session(std::uint32_t state) {
+    if (state == can::ServiceChallenge::state_open) record_action(can::StoredAction::code_session_opened, 0);
+    if (state == can::ServiceChallenge::state_locked) record_action(can::StoredAction::code_session_locked, 0);
+  }
+  void record_action(std::uint32_t code, std::uint32_t argument) {
+    persistence_.action({static_cast<std::uint8_t>(code), access_.session.operator_number(), argument, 0},
+                        hal::calendar_s());
+  }
+
+  /// Returns false if the frame is not a command.
+  bool handle_command(const can::Frame& frame, std::uint64_t now_us) {
+    bool serviced = false;
+    const auto may = [&](Privilege privilege) {
+      if (privilege == Privilege::drive) return !access_.drive.needed();
+      const std::uint32_t before = access_.session.state();
+      serviced = access_.session.authorises(frame, now_us);
+      if (access_.session.state() != before) record_session(access_.session.state());
+      return serviced;
+    };
+    auto answer = commands_.handle(frame, now_us, requested_, may);
+    if (!answer) return false;
+    if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time))
+      answer->result = can::CommandAnswer::result_refused;
+    if (const auto change = std::exchange(requested_.calibration_change, std::nullopt);
+        change && !apply_calibration(*change))
+      answer->result = can::CommandAnswer::result_refused;
+    if (serviced && answer->result == can::CommandAnswer::result_done)
+      record_action(answer->code, can::Command::of(frame).argument);
+    telemetry_.answer(*answer);
+    return true;
+  }
+
+  /// Returns false if the measuring chain cannot be calibrated, or not now; then nothing is stored. While a contactor
+  /// is closed, the readings that protect must not change.
   [[gnu::noinline]] bool apply_calibration(const Requested::CalibrationChange& change) {
+    if (protection_.decision().outputs.any_closed() || !persistence_.may_set()) return false;
     if (!hal::calibrate(stored_calibration(persistence_, change))) return false;
     store_setting(static_cast<std::uint16_t>(first_calibration_key + change.which),
                   static_cast<std::uint32_t>(change.value));
@@ -252,6 +314,7 @@ class Application {
   Result estimate_{};
   Progress progress_;
   storage::Persistence& persistence_;
+  Access access_;
   std::uint32_t cell_hash_;
   BoardStatus board_;
   bool first_ = true, setting_lost_ = false;

@@ -2,7 +2,8 @@
 // answer to each.
 //
 // A frame with a wrong CRC, another identifier or the counter of the previous command is ignored. An invalid argument
-// is answered "refused", an unknown code "no such command"; neither changes anything.
+// is answered "refused", an unknown code "no such command", one without the authority that it needs "not authorised";
+// such a command changes nothing. A stop needs no authority, and nothing that arrives with the same sample outlives it.
 #pragma once
 
 #include <algorithm>
@@ -16,10 +17,27 @@
 
 namespace bms::firmware {
 
-static_assert(can::Command::id == hal::command_frame_id, "the acceptance filter of a real bus would reject commands");
+static_assert(can::Command::id == hal::command_frame_id && can::Stop::id == hal::stop_frame_id &&
+                  can::ServiceRequest::id == hal::service_request_frame_id &&
+                  can::CommandAuthority::id == hal::command_authority_frame_id &&
+                  can::DriveRequest::id == hal::drive_request_frame_id,
+              "the acceptance filter of a real bus would reject commands");
+static_assert(can::Command::data_id == can::Command::id && can::Stop::data_id == can::Stop::id &&
+                  can::ServiceRequest::data_id == can::ServiceRequest::id &&
+                  can::CommandAuthority::data_id == can::CommandAuthority::id &&
+                  can::DriveRequest::data_id == can::DriveRequest::id &&
+                  can::Command::code_request == hal::request_code,
+              "hal/request_queue.hpp checks the CRC with the identifier");
 
-/// Parts of the stored data that are sent one by one: sixteen faults, then a reset cause each, with other counters.
-inline constexpr std::uint32_t stored_parts = 16 + 7;
+/// Parts of the stored data that are sent one by one: sixteen faults, then a reset cause each, with other counters,
+/// then sixteen actions of service sessions.
+inline constexpr std::uint32_t stored_parts = 16 + 7 + 16;
+
+/// What a command may need beyond a right CRC.
+enum class Privilege : std::uint8_t {
+  drive,    ///< to close contactors
+  service,  ///< to clear faults, calibrate or set the time
+};
 
 /// What the commands have requested so far.
 struct Requested {
@@ -36,6 +54,21 @@ struct Requested {
   std::uint8_t stored_next = 0, stored_end = 0;         ///< items of the stored data to be sent
   protection::Request power = protection::Request::none;
   std::uint64_t power_at_us = 0;  ///< time of the last request for power
+  bool stopped = false;           ///< with the sample of power_at_us; no other request of that sample counts
+
+  constexpr void stop(std::uint64_t now_us) {
+    power = protection::Request::none;
+    power_at_us = now_us;
+    stopped = true;
+  }
+  /// Returns false if a stop arrived with the same sample.
+  constexpr bool ask(protection::Request wanted, std::uint64_t now_us) {
+    if (stopped && power_at_us == now_us) return false;
+    power = wanted;
+    power_at_us = now_us;
+    stopped = false;
+    return true;
+  }
 
   /// Returns the request for power. It expires if the vehicle does not repeat it.
   constexpr protection::Request active_request(std::uint64_t now_us) const {
@@ -51,27 +84,35 @@ struct Requested {
 class Commands {
  public:
   /// Executes a command and returns the answer, or nothing if the frame is ignored. now_us: time of the sample.
+  /// may(Privilege): whether this frame has that privilege; asked at most once.
+  template <class May>
   constexpr std::optional<can::CommandAnswer> handle(const can::Frame& frame, std::uint64_t now_us,
-                                                     Requested& requested) {
+                                                     Requested& requested, May&& may) {
     if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id))
       return std::nullopt;
     const std::uint8_t counter = can::counter_of(frame);
-    if (counter >= can::counters || counter == last_counter_) return std::nullopt;
-    last_counter_ = counter;
+    if (counter >= can::counters) return std::nullopt;
     const auto command = can::Command::of(frame);
+    // also with the counter of the last command: another node may have sent that one
+    if (command.code == can::Command::code_request && command.argument == 0) requested.stop(now_us);
+    if (counter == last_counter_) return std::nullopt;
+    last_counter_ = counter;
     can::CommandAnswer answer;
     answer.code = command.code;
     answer.command_counter = counter;
-    answer.result = execute(command, now_us, requested);
+    answer.result = execute(command, now_us, requested, may);
     return answer;
   }
 
  private:
-  static constexpr std::uint32_t execute(const can::Command& command, std::uint64_t now_us, Requested& requested) {
+  template <class May>
+  static constexpr std::uint32_t execute(const can::Command& command, std::uint64_t now_us, Requested& requested,
+                                         May&& may) {
     using A = can::CommandAnswer;
     switch (command.code) {
       case can::Command::code_clear_faults:
         if (command.argument > 1) return A::result_refused;
+        if (!may(Privilege::service)) return A::result_not_authorised;
         requested.clear = command.argument == 1 ? protection::Clear::service : protection::Clear::user;
         return A::result_done;
       case can::Command::code_log_of_samples:
@@ -80,13 +121,15 @@ class Commands {
         return A::result_done;
       case can::Command::code_set_time:
         if (command.argument == 0) return A::result_refused;
+        if (!may(Privilege::service)) return A::result_not_authorised;
         requested.unix_time_s = command.argument;
         return A::result_done;
       case can::Command::code_request:
         if (command.argument > static_cast<std::uint32_t>(protection::Request::charge)) return A::result_refused;
-        requested.power = static_cast<protection::Request>(command.argument);
-        requested.power_at_us = now_us;
-        return A::result_done;
+        if (command.argument == 0) return A::result_done;  // stopped above
+        if (!may(Privilege::drive)) return A::result_not_authorised;
+        return requested.ask(static_cast<protection::Request>(command.argument), now_us) ? A::result_done
+                                                                                         : A::result_refused;
       case can::Command::code_stored_data: {
         const std::uint32_t first = command.argument & 0xFF, count = command.argument >> 8;
         if (first >= stored_parts || count > stored_parts) return A::result_refused;
@@ -104,6 +147,7 @@ class Commands {
         const auto which = static_cast<std::uint16_t>(command.code - can::Command::code_voltage_gain);
         const auto value = static_cast<std::int32_t>(command.argument);
         if (value < -most[which] || value > most[which]) return A::result_refused;
+        if (!may(Privilege::service)) return A::result_not_authorised;
         requested.calibration_change = Requested::CalibrationChange{which, value};
         return A::result_done;
       }

@@ -40,7 +40,8 @@ class LatchedFaults {
     bool stored = true;
     for (std::size_t k = 0; k < keys.size(); ++k, faults >>= 32) {
       words_[k] = static_cast<std::uint32_t>(faults);
-      if (words_[k] != setting(k)) stored = persistence_.set(keys[k], static_cast<std::int32_t>(words_[k])) && stored;
+      if (words_[k] != setting(k))
+        stored = persistence_.set(keys[k], static_cast<std::int32_t>(words_[k]), storage::Urgency::safety) && stored;
     }
     store_in_backup();
     return stored;

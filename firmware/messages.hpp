@@ -29,6 +29,13 @@ constexpr float percent(const T& fraction) {
   return 100.0F * number(fraction);
 }
 
+/// Whether an estimate can be used at all: finite, and not certain.
+template <class Estimate>
+constexpr bool is_number(const Estimate& e) {
+  const float sum = number(e.soc) + number(e.soc_sigma);
+  return sum - sum == 0 && number(e.soc_sigma) > 0;
+}
+
 /// Converts to units of 1e-9. Clamped to -2..2; not-a-number becomes 0.
 template <class T>
 constexpr std::int32_t ppb(const T& value) {
@@ -279,6 +286,7 @@ constexpr can::SocAnchor soc_anchor(const Condition& condition) {
 }
 
 inline std::uint32_t storing_state(const storage::Persistence& persistence) {
+  if (!persistence.settings_stored()) return can::Storage::state_a_record_was_turned_down;
   return persistence.full() ? can::Storage::state_full : can::Storage::state_works;
 }
 

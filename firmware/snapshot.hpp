@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
 #include "hal/board_state.hpp"
@@ -39,6 +40,7 @@ struct Snapshot {
   float capacity_ah;                        ///< of the cell file
   bool log_samples;                         ///< SampleCurrent to EstimateHash are sent, too
   std::optional<std::uint8_t> stored_part;  ///< part of the stored data to be sent (firmware/stored_data.hpp)
+  std::optional<can::RequestChallenge> request_challenge{};  ///< if requests for power need a key
 
   constexpr bool soc_known() const { return (estimate.flags & estimator::not_started) == 0; }
 };

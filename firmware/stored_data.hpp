@@ -1,5 +1,6 @@
 // The stored data as frames (Command: stored data). They are sent in parts, one with each sample: first the sixteen
-// faults with three frames each, then for each cause of a reset its number and one more frame.
+// faults with three frames each, then for each cause of a reset its number and one more frame, then the sixteen actions
+// of service sessions with two frames each.
 #pragma once
 
 #include <algorithm>
@@ -22,6 +23,7 @@ class StoredData {
   static constexpr std::uint16_t first_id = can::StoredFault::id;
 
   void send_fault(std::uint32_t index, const storage::EventsRecord& events);
+  void send_action(std::uint32_t index, const storage::ActionsRecord& actions);
   void send_extreme(const storage::ReadingRange& range, std::uint32_t kind);
   void send_can_errors();
 
@@ -37,17 +39,21 @@ class StoredData {
   void put(unsigned start, std::uint32_t raw);
   template <class Message>
   void send() {
-    static_assert(Message::id - first_id < counters && Message::data_id == Message::id);
-    send(Message::id);
+    static_assert(Message::data_id == Message::id);
+    if constexpr (Message::id == can::StoredAction::id || Message::id == can::StoredActionDetail::id)
+      send(Message::id, counter_[first_action + Message::id - can::StoredAction::id]);
+    else
+      send(Message::id, counter_[Message::id - first_id]);
   }
-  void send(std::uint16_t id);
+  void send(std::uint16_t id, std::uint8_t& counter);
 
-  static constexpr std::size_t counters = 8;
+  static constexpr std::size_t first_action = 8, counters = first_action + 2;
   std::uint64_t bits_ = 0;  ///< of the frame that is being made
   std::array<std::uint8_t, counters> counter_{};
 };
 
-static_assert(stored_parts == storage::EventsRecord::max_faults + storage::EventsRecord::causes);
+static_assert(stored_parts ==
+              storage::EventsRecord::max_faults + storage::EventsRecord::causes + storage::ActionsRecord::max_actions);
 
 // The records contain the raw values of the signals, so the frames are made of integers.
 
@@ -55,11 +61,10 @@ static_assert(stored_parts == storage::EventsRecord::max_faults + storage::Event
   bits_ |= std::uint64_t{raw} << start;
 }
 
-inline void StoredData::send(std::uint16_t id) {
+inline void StoredData::send(std::uint16_t id, std::uint8_t& counter) {
   can::Frame frame{id, 8, {}, false};
   can::set_bits(frame, bits_);
   bits_ = 0;
-  std::uint8_t& counter = counter_[id - first_id];
   can::protect(frame, id, counter);
   counter = can::next(counter);
   hal::can_send(frame);
@@ -89,6 +94,21 @@ inline void StoredData::send_fault(std::uint32_t index, const storage::EventsRec
   put<C::highest_voltage_layout>(high >> 6);
   put<C::number_layout>(number);
   send<C>();
+}
+
+inline void StoredData::send_action(std::uint32_t index, const storage::ActionsRecord& actions) {
+  using A = can::StoredAction;
+  using D = can::StoredActionDetail;
+  const storage::ActionsRecord::Action action = actions.last(index);
+  put<A::index_layout>(index);
+  put<A::code_layout>(action.code);
+  put<A::time_layout>(action.time_s);
+  put<A::number_layout>((actions.actions - index) & 0xFF);
+  send<A>();
+  put<D::index_layout>(index);
+  put<D::operator_number_layout>(action.operator_number);
+  put<D::argument_layout>(action.argument);
+  send<D>();
 }
 
 inline void StoredData::send_extreme(const storage::ReadingRange& range, std::uint32_t kind) {
@@ -125,6 +145,8 @@ inline void StoredData::send(std::uint32_t part, const storage::Persistence& sto
   constexpr std::uint32_t faults = storage::EventsRecord::max_faults;
   if (part < faults) return send_fault(part, events);
   const std::uint32_t cause = part - faults;
+  constexpr std::uint32_t causes = storage::EventsRecord::causes;
+  if (cause >= causes) return send_action(cause - causes, stored.actions());
   put<N::cause_layout>(cause);
   put<N::resets_layout>(events.resets[cause]);
   put<N::faults_layout>(events.faults);

@@ -46,6 +46,7 @@ class Telemetry {
     send_if_due<can::SocAnchor>([&] { return messages::soc_anchor(now.condition); });
     if constexpr (Estimator::Model::errors_are_states)
       send_if_due<can::SensorErrors>([&] { return messages::sensor_errors(now.estimate, now.capacity_ah); });
+    if (now.request_challenge) send_if_due<can::RequestChallenge>([&] { return *now.request_challenge; });
     send_if_due<can::Storage>([&] { return messages::storage(now.persistence); });
     send_if_due_or_changed<can::Board>(now.board.alarming() != published_alarming_, [&] {
       return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
@@ -69,6 +70,7 @@ class Telemetry {
   std::uint32_t published() const { return published_; }
 
   void answer(const can::CommandAnswer& answer) { send(answer); }
+  void answer(const can::ServiceChallenge& answer) { send(answer); }
 
  private:
   /// Time of the last frame of a message, and its counter.

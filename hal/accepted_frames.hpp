@@ -12,15 +12,26 @@
 
 namespace bms::hal {
 
-inline constexpr std::uint16_t command_frame_id = 0x1A0;  // firmware/commands.hpp compares it with the DBC file
+// firmware/commands.hpp compares these with the DBC file; the data id of each is its identifier
+inline constexpr std::uint16_t stop_frame_id = 0x0A0, command_frame_id = 0x1A0, service_request_frame_id = 0x1B0,
+                               command_authority_frame_id = 0x1B1, drive_request_frame_id = 0x1B2;
+inline constexpr std::uint32_t request_code = 4;  ///< of a Command: a request for power
 
-/// Commands; network management, requests to the battery's SDO server and the charger's heartbeat in an image that is a
-/// CANopen node (firmware/cia418_profile.hpp).
+/// Stops, commands, the frames of service sessions, requests; network management, requests to the battery's SDO server
+/// and the charger's heartbeat in an image that is a CANopen node (firmware/cia418_profile.hpp).
 inline constexpr auto request_ids = [] {
   if constexpr (vehicle_profile == VehicleProfile::cia418)
-    return std::array<std::uint16_t, 4>{command_frame_id, 0x000, 0x600 + canopen_node, 0x700 + canopen_charger};
+    return std::array<std::uint16_t, 8>{stop_frame_id,
+                                        command_frame_id,
+                                        service_request_frame_id,
+                                        command_authority_frame_id,
+                                        drive_request_frame_id,
+                                        0x000,
+                                        0x600 + canopen_node,
+                                        0x700 + canopen_charger};
   else
-    return std::array<std::uint16_t, 1>{command_frame_id};
+    return std::array<std::uint16_t, 5>{stop_frame_id, command_frame_id, service_request_frame_id,
+                                        command_authority_frame_id, drive_request_frame_id};
 }();
 
 /// Also the identifiers of hal/sample_frames.hpp, for an image without a measuring chain of its own.

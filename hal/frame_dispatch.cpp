@@ -19,5 +19,6 @@ bool dispatch_frame(const can::Frame& frame) {
 }
 
 bool next_request(can::Frame& frame) { return requests.pop(frame); }
+bool next_network_frame(can::Frame& frame) { return requests.pop_network(frame); }
 
 }  // namespace bms::hal

@@ -18,6 +18,9 @@ void ReceivedState::receive(double time_s, const can::Frame& frame) {
     case can::AllowedCurrent::id:
       allowed = can::AllowedCurrent::of(frame);
       break;
+    case can::RequestChallenge::id:
+      request_challenge = can::RequestChallenge::of(frame);
+      break;
     case can::Status::id:
       status_received = true;
       break;

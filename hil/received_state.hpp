@@ -23,6 +23,7 @@ class ReceivedState {
   can::PackState pack;
   can::ContactorState contactors;
   can::AllowedCurrent allowed;
+  can::RequestChallenge request_challenge;
   bool pack_received = false, status_received = false;  ///< since the caller last reset them
   std::vector<FaultEvent> faults;
 

@@ -226,7 +226,22 @@ class Session {
   can::Frame next_request(const Step& step) {
     const bool released = step.shutting_down && profile_s_ <= profile_.duration_s() + reclose_request_s;
     request_counter_ = can::next(request_counter_);
+    if (plan_.key && !released) return drive_request();
     return request(released ? protection::Request::none : protection::Request::drive, request_counter_);
+  }
+
+  /// With the key of the board; the freshness starts again with each challenge.
+  can::Frame drive_request() {
+    const can::RequestChallenge& now = received_.request_challenge;
+    const std::uint64_t challenge = now.challenge_low | static_cast<std::uint64_t>(now.challenge_high) << 32;
+    if (challenge != challenge_) freshness_ = 0;
+    challenge_ = challenge;
+    can::DriveRequest m;
+    m.request = can::DriveRequest::request_drive;
+    m.freshness = ++freshness_;
+    const authentication::Cmac drive(authentication::role_key(*plan_.key, authentication::Role::drive));
+    m.code = authentication::drive_code(drive, challenge_, freshness_, can::DriveRequest::request_drive);
+    return m.frame(request_counter_);
   }
 
   std::vector<can::Frame> sample_frames(const Measured& measured, std::uint64_t k) const {
@@ -280,6 +295,8 @@ class Session {
   SessionResult result_;
   double profile_s_ = 0, replayed_dc_link_v_ = 0;
   std::uint8_t request_counter_ = 0;
+  std::uint64_t challenge_ = 0;
+  std::uint16_t freshness_ = 0;
 };
 
 }  // namespace

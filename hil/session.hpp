@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "authentication/codes.hpp"
 #include "hil/board_link.hpp"
 #include "hil/injection.hpp"
 #include "hil/received_state.hpp"
@@ -27,6 +28,7 @@ struct SessionPlan {
   double initial_soc = 0.9;  ///< of the pack
   std::optional<double> announced_soc;  ///< sent to the board at the start; empty: the board estimates it
   double sample_period_s = 0.1;
+  std::optional<authentication::Key> key;  ///< of the board; with it, requests for power are DriveRequests
   PackSpread spread;
   std::vector<Injection> injections;
 };

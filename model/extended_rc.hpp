@@ -230,7 +230,7 @@ struct ExtendedRc {
             [&](std::size_t) { return of.v_rc_v2; });
 #pragma GCC unroll 8
         for (std::size_t k = 0; k < Voltages; ++k)
-          q[first_voltage + k] = steady_state_noise(steady[k], discretisation.mechanism[k].error_decay);
+          q[first_voltage + k] = steady_state_noise(uncertain(steady[k]), discretisation.mechanism[k].error_decay);
       }
       if constexpr (Errors) {
         q[voltage_error] = steady_state_noise(of.model_v2, discretisation.error_decay.voltage_error);
@@ -262,11 +262,16 @@ struct ExtendedRc {
               x[first_mechanism_state + k] = Voltage<S>(discretisation[k].target * Fraction<S>(0.5));
               return Variance<S>(of.v_rc_v2 + x[first_mechanism_state + k] * x[first_mechanism_state + k]);
             });
-        for (std::size_t k = 0; k < Voltages; ++k) variances[first_voltage + k] = first[k];
+        for (std::size_t k = 0; k < Voltages; ++k) variances[first_voltage + k] = uncertain(first[k]);
       }
     }
 
    private:
+    /// At least (1 uV)^2: a mechanism of strength 0 would make its state certain, and the filter divide 0 by 0.
+    static constexpr Variance<S> uncertain(const Variance<S>& variance) {
+      const auto least = Variance<S>(1e-12);
+      return variance < least ? least : variance;
+    }
     static constexpr Variance<S> steady_state_noise(const Variance<S>& steady, const Fraction<S>& alpha) {
       return product<Variance<S>>(steady, Fraction<S>(alpha * Fraction<S>(Fraction<S>(2) - alpha)));
     }

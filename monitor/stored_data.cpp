@@ -50,10 +50,10 @@ std::string utc(std::uint32_t unix_s) {
                      parts.tm_hour, parts.tm_min, parts.tm_sec);
 }
 
-/// Time of a fault for a person.
-std::string when(const StoredFault& fault) {
-  if (fault.has_calendar_time()) return utc(fault.time_s) + " UTC";
-  return fmt::format("after {:.1f} h of operation", fault.time_s / 3'600.0);
+/// Time of a fault or an action for a person.
+std::string when(std::uint32_t time_s) {
+  if (StoredFault{.name = {}, .time_s = time_s}.has_calendar_time()) return utc(time_s) + " UTC";
+  return fmt::format("after {:.1f} h of operation", time_s / 3'600.0);
 }
 
 /// Empty if it is not known.
@@ -66,7 +66,7 @@ std::string field(double value, int digits) {
 bool StoredData::receive(const BusState& bus, std::size_t message) {
   if (message >= messages().size()) return false;
   const std::string_view name = messages()[message].name;
-  if (receive_fault(bus, name)) return true;
+  if (receive_fault(bus, name) || receive_action(bus, name)) return true;
   if (name == "StoredCounts") {
     receive_count(bus);
   } else if (name == "StoredUse") {
@@ -126,6 +126,24 @@ bool StoredData::receive_fault(const BusState& bus, std::string_view message) {
   return true;
 }
 
+bool StoredData::receive_action(const BusState& bus, std::string_view message) {
+  const bool first = message == "StoredAction";
+  if (!first && message != "StoredActionDetail") return false;
+  const std::uint32_t index = integer_of(bus, message, "Index");
+  if (index >= actions) return true;
+  CollectedAction& c = action_[index];
+  c.frames.set(first ? 0 : 1);
+  if (first) {
+    c.action.code = integer_of(bus, message, "Code");
+    c.action.name = name_in(message, "Code", c.action.code);
+    c.action.time_s = integer_of(bus, message, "Time");
+  } else {
+    c.action.operator_number = integer_of(bus, message, "OperatorNumber");
+    c.action.argument = integer_of(bus, message, "Argument");
+  }
+  return true;
+}
+
 void StoredData::receive_count(const BusState& bus) {
   const std::uint32_t cause = integer_of(bus, "StoredCounts", "Cause");
   if (cause >= causes) return;
@@ -136,6 +154,7 @@ void StoredData::receive_count(const BusState& bus) {
 
 bool StoredData::has(std::size_t part) const {
   if (part < faults) return fault_[part].frames.all();
+  if (part >= first_action) return action_[part - first_action].frames.all();
   const std::size_t cause = part - faults;
   return counts_[cause] && (cause >= others_.size() || others_[cause]);
 }
@@ -150,6 +169,11 @@ std::optional<StoredData::Parts> StoredData::missing() const {
   return range;
 }
 
+bool StoredData::complete_but_for_actions() const {
+  const auto range = missing();
+  return !range || range->first >= first_action;
+}
+
 std::size_t StoredData::missing_parts() const {
   std::size_t count = 0;
   for (std::size_t k = 0; k < parts; ++k) count += has(k) ? 0U : 1U;
@@ -160,6 +184,14 @@ std::vector<StoredFault> StoredData::stored_faults() const {
   std::vector<StoredFault> all;
   for (auto c = fault_.rbegin(); c != fault_.rend(); ++c) {
     if (c->fault.code != 0) all.push_back(c->fault);
+  }
+  return all;
+}
+
+std::vector<StoredAction> StoredData::stored_actions() const {
+  std::vector<StoredAction> all;
+  for (auto c = action_.rbegin(); c != action_.rend(); ++c) {
+    if (c->action.code != 0) all.push_back(c->action);
   }
   return all;
 }
@@ -194,6 +226,14 @@ std::string json_of(const StoredData& data, const std::string& source) {
                       {"temperature_max_c", number(f.temperature_max_c)},
                       {"temperature_min_c", number(f.temperature_min_c)}});
   }
+  Json actions = Json::array();
+  for (const StoredAction& a : data.stored_actions()) {
+    actions.push_back({{"name", a.name},
+                       {"code", a.code},
+                       {"time_s", a.time_s},
+                       {"operator", a.operator_number},
+                       {"argument", a.argument}});
+  }
   const auto extreme = [&](const StoredExtreme& e) {
     return Json{{"cell_voltage_v", number(e.cell_voltage_v)},
                 {"temperature_c", number(e.temperature_c)},
@@ -213,6 +253,7 @@ std::string json_of(const StoredData& data, const std::string& source) {
                      {"lowest", extreme(data.lowest)},
                      {"highest", extreme(data.highest)},
                      {"resets", resets},
+                     {"actions", actions},
                      {"can", {{"state", data.can_state}, {"errors", errors}}}};
   return json.dump(1) + "\n";
 }
@@ -226,8 +267,9 @@ std::string summary_of(const StoredData& data) {
                                     : fmt::format("Faults       {:.0f} so far, the last {} are stored:\n",
                                                   data.fault_count, faults.size());
   for (auto f = faults.rbegin(); f != faults.rend(); ++f)
-    text += fmt::format("  {:<28} {:<30} {} %  {} A  cells {} to {} V\n", f->name, when(*f), or_dash(100 * f->soc, 1),
-                        or_dash(f->current_a, 2), or_dash(f->cell_voltage_min_v, 3), or_dash(f->cell_voltage_max_v, 3));
+    text += fmt::format("  {:<28} {:<30} {} %  {} A  cells {} to {} V\n", f->name, when(f->time_s),
+                        or_dash(100 * f->soc, 1), or_dash(f->current_a, 2), or_dash(f->cell_voltage_min_v, 3),
+                        or_dash(f->cell_voltage_max_v, 3));
   text +=
       fmt::format("Use          {:.1f} h in operation, {:.1f} full cycles\n", data.operating_s / 3'600, data.cycles);
   text += fmt::format("Throughput   {:.1f} Ah charged, {:.1f} Ah discharged\n", data.charged_ah, data.discharged_ah);
@@ -247,6 +289,11 @@ std::string summary_of(const StoredData& data) {
     }
     text += "\n";
   };
+  const auto actions = data.stored_actions();
+  if (!actions.empty()) text += "Service      what sessions have done, the newest first:\n";
+  for (auto a = actions.rbegin(); a != actions.rend(); ++a)
+    text += fmt::format("  {:<28} {:<30} operator {}, argument {}\n", a->name, when(a->time_s), a->operator_number,
+                        static_cast<std::int32_t>(a->argument));
   list("Resets", data.resets);
   list("CAN errors", data.can_errors);
   return text + fmt::format("CAN state    {}", data.can_state);

@@ -3,7 +3,8 @@
 // in can/greybox_bms.dbc).
 //
 // Part k below 16 is fault k, 0 the newest, in three frames. Part 16 + c is the number of resets of cause c, with one
-// more frame in the first five. A fault that is stored meanwhile shifts the others; their numbers show it, and the
+// more frame in the first five. Part 23 + k is action k of a service session in two frames; older firmware has none. A
+// fault that is stored meanwhile shifts the others; their numbers show it, and the
 // faults are then collected again.
 #pragma once
 
@@ -34,6 +35,13 @@ struct StoredFault {
   bool has_calendar_time() const { return time_s >= 946'684'800; }
 };
 
+/// What somebody has done in a service session.
+struct StoredAction {
+  std::uint32_t code = 0;                                       ///< of the message StoredAction; 0: none
+  std::string name;                                             ///< "clear faults"
+  std::uint32_t time_s = 0, operator_number = 0, argument = 0;  ///< time as that of a fault
+};
+
 struct StoredExtreme {
   double cell_voltage_v = not_known, temperature_c = not_known, current_a = not_known;
 };
@@ -46,12 +54,15 @@ struct StoredCount {
 
 class StoredData {
  public:
-  static constexpr std::size_t faults = 16, causes = 7, parts = faults + causes;
+  static constexpr std::size_t faults = 16, causes = 7, actions = 16, first_action = faults + causes,
+                               parts = first_action + actions;
 
   /// message: what bus.receive() has returned. Returns true for a message of the stored data.
   bool receive(const BusState& bus, std::size_t message);
 
   bool complete() const { return !missing(); }
+  /// All that firmware without service sessions has.
+  bool complete_but_for_actions() const;
   struct Parts {
     std::size_t first = 0, count = 0;
   };
@@ -60,8 +71,9 @@ class StoredData {
   std::size_t missing_parts() const;
 
   // Valid when complete().
-  std::vector<StoredFault> stored_faults() const;  ///< oldest first
-  double fault_count = not_known;                  ///< of all faults so far
+  std::vector<StoredFault> stored_faults() const;    ///< oldest first
+  std::vector<StoredAction> stored_actions() const;  ///< oldest first
+  double fault_count = not_known;                    ///< of all faults so far
   double operating_s = not_known, cycles = not_known, charged_ah = not_known, discharged_ah = not_known;
   StoredExtreme lowest, highest;
   std::array<StoredCount, causes> resets;
@@ -76,9 +88,15 @@ class StoredData {
   };
   bool has(std::size_t part) const;
   bool receive_fault(const BusState& bus, std::string_view message);
+  bool receive_action(const BusState& bus, std::string_view message);
   void receive_count(const BusState& bus);
 
+  struct CollectedAction {
+    StoredAction action;
+    std::bitset<2> frames;  ///< received
+  };
   std::array<Collected, faults> fault_;
+  std::array<CollectedAction, actions> action_;
   std::optional<std::uint32_t> newest_;  ///< number of fault 0
   std::bitset<causes> counts_;
   std::bitset<5> others_;  ///< use, throughput, lowest, highest, CAN errors

@@ -40,7 +40,9 @@ void StoredDataRequest::receive_answer(const BusState& bus) {
   if (value("Code") != can::Command::code_stored_data || value("CommandCounter") != counter_) return;
   answered_ = true;
   if (value("Result") == can::CommandAnswer::result_no_such_command) state_ = State::unsupported;
-  if (value("Result") == can::CommandAnswer::result_refused) state_ = State::refused;
+  // firmware without service sessions refuses the parts that it does not have
+  if (value("Result") == can::CommandAnswer::result_refused)
+    state_ = data_.complete_but_for_actions() ? State::complete : State::refused;
 }
 
 }  // namespace bms::monitor

@@ -16,6 +16,7 @@ using hal::put_bytes;
 constexpr std::uint16_t longest_record = 1 + max_payload_bytes / line_bytes;
 constexpr std::array<std::uint8_t, 4> zeros{};
 constexpr int tries_in_a_sector = 3, max_scans = 16;
+constexpr std::uint16_t most_reserve_lines = 96;
 constexpr std::size_t max_reserve_bytes = 64;  // with its copy less than longest_record
 
 /// Comparison of numbers that wrap.
@@ -194,7 +195,14 @@ std::optional<std::span<const std::uint8_t>> Log::read(const RecordLocation& rec
   return payload;
 }
 
-StoreResult Log::store(Kind kind, std::span<const std::uint8_t> payload) {
+/// Lines that a record of this urgency leaves free.
+std::uint16_t Log::reserve(Urgency urgency) const {
+  if (urgency == Urgency::safety || has_erased_sector()) return 0;
+  const std::uint16_t all = std::min<std::uint16_t>(most_reserve_lines, static_cast<std::uint16_t>(lines_ / 8));
+  return urgency == Urgency::usual ? all : static_cast<std::uint16_t>(all - all / 3);
+}
+
+StoreResult Log::store(Kind kind, std::span<const std::uint8_t> payload, Urgency urgency) {
   if (payload.size() > max_payload_bytes || (kind.type & copy_bit) != 0) return StoreResult::rejected;
   if (!secure_last_record()) return StoreResult::rejected;
   std::uint32_t together = lines_of(payload.size()), records = 1;
@@ -204,7 +212,8 @@ StoreResult Log::store(Kind kind, std::span<const std::uint8_t> payload) {
     ++records;
   }
   if (together > lines_ / 2U || records > max_records) return StoreResult::rejected;  // without flash, lines_ is 0
-  if (append(kind, payload, longest_record) == StoreResult::stored) return StoreResult::stored;
+  const auto spare = static_cast<std::uint16_t>(longest_record + reserve(urgency));
+  if (append(kind, payload, spare) == StoreResult::stored) return StoreResult::stored;
   return move(kind, payload);
 }
 

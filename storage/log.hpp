@@ -47,6 +47,14 @@ enum class StoreResult : std::uint8_t {
   rejected,     ///< no flash, no good sector, or more than the log can store
 };
 
+/// Which lines of the last sector a record may use while no other one is erased. The reserve is an eighth of a sector,
+/// at most 96 lines; a third of it is for the last charge, the rest for what protects.
+enum class Urgency : std::uint8_t {
+  usual,        ///< leaves the reserve free
+  last_charge,  ///< written when the supply falls
+  safety,       ///< latched faults
+};
+
 /// type: 0 to 127. layout: version of the payload; newer layouts have higher numbers.
 struct Kind {
   std::uint8_t type, layout;
@@ -78,7 +86,7 @@ class Log {
   std::span<const RecordLocation> current_records() const { return std::span(records_).first(record_count_); }
 
   /// payload: at most max_payload_bytes. Never erases.
-  StoreResult store(Kind kind, std::span<const std::uint8_t> payload);
+  StoreResult store(Kind kind, std::span<const std::uint8_t> payload, Urgency urgency = Urgency::usual);
   /// For one last record after store() has returned `needs_erase`: writes it into the lines that store() leaves free.
   /// Call it once, with at most 64 bytes.
   StoreResult store_in_reserve(Kind kind, std::span<const std::uint8_t> payload);
@@ -132,6 +140,7 @@ class Log {
   void copy_records_from(std::uint8_t sector);
   StoreResult append(Kind kind, std::span<const std::uint8_t> payload, std::uint16_t spare);
   StoreResult move(Kind kind, std::span<const std::uint8_t> payload);
+  std::uint16_t reserve(Urgency urgency) const;
   bool move_into(std::uint8_t sector, std::uint32_t base, Kind kind, std::span<const std::uint8_t> payload);
   bool write(const RecordLocation& record, bool copy, std::span<const std::uint8_t> payload) const;
   std::uint8_t after(std::uint32_t steps) const;

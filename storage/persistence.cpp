@@ -17,16 +17,17 @@ constexpr std::int32_t moved_cell = 100, moved_health_ppm = 1'000;  // 0.1 % eac
 constexpr std::uint16_t charge_at_least_minutes = 60, cells_every_minutes = 30, health_every_minutes = 60,
                         fault_every_minutes = 10, extremes_every_minutes = 10, charge_in_last_sector_minutes = 10;
 constexpr std::uint32_t unknown_moved_ppb = 289'000'000;  // sigma of an unknown soc
-constexpr std::uint8_t most_faults_at_once = 16;
+constexpr std::uint8_t most_faults_at_once = 16, most_settings_at_once = 8, most_actions_at_once = 16,
+                       grant_every_minutes = 60;
 constexpr std::uint64_t uaus_per_uah = 3'600'000'000;
 
-constexpr std::array known_kinds{ChargeRecord::kind, CellsRecord::kind,    HealthRecord::kind,
-                                 EventsRecord::kind, SettingsRecord::kind, ExtremesRecord::kind};
+constexpr std::array known_kinds{ChargeRecord::kind,   CellsRecord::kind,    HealthRecord::kind,   EventsRecord::kind,
+                                 SettingsRecord::kind, SettingsRecord::copy, ExtremesRecord::kind, ActionsRecord::kind};
 
 template <class R>
-bool get(Log& log, R& record) {
+bool get(Log& log, R& record, Kind kind = R::kind) {
   std::array<std::uint8_t, max_payload_bytes> bytes;
-  const auto found = log.load(R::kind.type, R::kind.layout, bytes);
+  const auto found = log.load(kind.type, kind.layout, bytes);
   return found && decode(found->payload, found->layout, record);
 }
 
@@ -43,16 +44,26 @@ constexpr bool power_stayed_on(hal::ResetCause cause) {
 
 }  // namespace
 
-bool Persistence::put(Kind kind, Bytes payload) {
-  const StoreResult result = log_.store(kind, payload);
+bool Persistence::put(Kind kind, Bytes payload, Urgency urgency) {
+  const StoreResult result = log_.store(kind, payload, urgency);
   full_ = result == StoreResult::needs_erase;
   return result == StoreResult::stored;
 }
 
 template <class R>
-bool Persistence::put(const R& record) {
+bool Persistence::put(const R& record, Urgency urgency, Kind kind) {
   std::array<std::uint8_t, max_payload_bytes> bytes;
-  return put(R::kind, encode(record, bytes));
+  return put(kind, encode(record, bytes), urgency);
+}
+
+/// The newer one of the two copies. If they differ, both are written again with the first minute.
+void Persistence::read_settings() {
+  const bool first = get(log_, settings_);
+  SettingsRecord copy;
+  const bool second = get(log_, copy, SettingsRecord::copy);
+  const bool newer = static_cast<std::int16_t>(copy.revision - settings_.revision) > 0;
+  if (second && (!first || newer)) settings_ = copy;
+  settings_changed_ = first != second || (first && copy.revision != settings_.revision) || (second && newer);
 }
 
 void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRecord>& processor_fault,
@@ -66,7 +77,8 @@ void Persistence::start(hal::ResetCause cause, const std::optional<hal::FaultRec
   get(log_, cells_);
   if (HealthRecord health; get(log_, health)) health_ = health;
   get(log_, events_);
-  get(log_, settings_);
+  read_settings();
+  get(log_, actions_);
   get(log_, extremes_);
   extremes_stored_ = extremes_;
   if (power_stayed_on(cause))
@@ -128,6 +140,7 @@ void Persistence::store(const EstimatorSnapshot& now, std::optional<std::uint32_
     fault_minutes_ = 0;
     ++faults_at_once_;
   }
+  grant();
   if (now.pack) {
     const auto moved_ppb = static_cast<std::uint32_t>(std::abs(std::int64_t{now.pack->soc_ppb} - soc_before_ppb_));
     soc_before_ppb_ = now.pack->soc_ppb;
@@ -151,7 +164,19 @@ void Persistence::store(const EstimatorSnapshot& now, std::optional<std::uint32_
   if (health_minutes_ >= health_every_minutes) store_health(now.health);
   if (events_changed_) store_events_in_turn();
   if (settings_changed_) store_settings();
+  if (actions_changed_ && actions_at_once_ > 0) {
+    actions_changed_ = !put(actions_);
+    if (!actions_changed_) --actions_at_once_;
+  }
   if (extremes_minutes_ >= extremes_every_minutes) store_extremes();
+}
+
+/// Once an hour, one more setting and one more record of actions may be written.
+void Persistence::grant() {
+  if (++grant_minutes_ < grant_every_minutes) return;
+  grant_minutes_ = 0;
+  if (settings_at_once_ < most_settings_at_once) ++settings_at_once_;
+  if (actions_at_once_ < most_actions_at_once) ++actions_at_once_;
 }
 
 void Persistence::power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s) {
@@ -159,12 +184,13 @@ void Persistence::power_failing(const EstimatorSnapshot& now, std::optional<std:
   if (now.pack) {
     set_charge(*now.pack, 0, calendar_s);
     covered_minutes_ = 1;
-    store_charge();
+    store_charge(Urgency::last_charge);
   }
   if (events_changed_) store_events();
   store_cells(now.cells);
   store_health(now.health);
   if (settings_changed_) store_settings();
+  if (actions_changed_ && actions_at_once_ > 0) actions_changed_ = !put(actions_);
   store_extremes();
 }
 
@@ -173,7 +199,7 @@ void Persistence::supply_failing(const EstimatorSnapshot& now, std::optional<std
   if (now.pack) {
     set_charge(*now.pack, 0, calendar_s);
     covered_minutes_ = 1;
-    store_charge();
+    store_charge(Urgency::last_charge);
   }
 }
 
@@ -188,12 +214,26 @@ void Persistence::fault(std::uint16_t code, std::optional<std::uint32_t> calenda
   store_events_in_turn();
 }
 
-bool Persistence::set(std::uint16_t key, std::int32_t value) {
+bool Persistence::set(std::uint16_t key, std::int32_t value, Urgency urgency) {
   const std::uint16_t before = settings_.revision;
+  const bool known = settings_.get(key) == value;
+  if (!known && urgency == Urgency::usual && !may_set()) return false;
   if (!settings_.set(key, value)) return false;
-  settings_changed_ = settings_changed_ || settings_.revision != before;
+  if (settings_.revision != before) {
+    settings_changed_ = true;
+    if (urgency == Urgency::usual)
+      --settings_at_once_;
+    else
+      settings_urgency_ = urgency;
+  }
   if (settings_changed_) store_settings();
   return settings_stored();
+}
+
+void Persistence::action(ActionsRecord::Action action, std::optional<std::uint32_t> calendar_s) {
+  action.time_s = calendar_s.value_or(charge_.operating_s);
+  actions_.add(action);
+  actions_changed_ = true;
 }
 
 /// Sets the charge to be stored, and its copy in the retained RAM.
@@ -209,9 +249,9 @@ void Persistence::set_charge(const estimator::StoredEstimate& now, std::uint32_t
   hal::put_bytes(retained_, content.size(), crc32(content));
 }
 
-void Persistence::store_charge() {
+void Persistence::store_charge(Urgency urgency) {
   ChargeRecord stored = charge_;
-  if (!put(stored)) {
+  if (!put(stored, urgency)) {
     // The last record of a full log must not look like a recent one. It is written once.
     if (!full_ || charge_stored_.moved_ppb == unknown_moved_ppb) return;
     stored.moved_ppb = unknown_moved_ppb;
@@ -253,7 +293,11 @@ void Persistence::store_events_in_turn() {
   store_events();
   if (!events_changed_) --faults_at_once_;
 }
-void Persistence::store_settings() { settings_changed_ = !put(settings_); }
+void Persistence::store_settings() {
+  settings_changed_ = !put(settings_, settings_urgency_);
+  settings_changed_ = !put(settings_, settings_urgency_, SettingsRecord::copy) || settings_changed_;
+  if (!settings_changed_) settings_urgency_ = Urgency::usual;
+}
 void Persistence::store_extremes() {
   if (extremes_ == extremes_stored_ || !put(extremes_)) return;
   extremes_stored_ = extremes_;

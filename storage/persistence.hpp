@@ -6,7 +6,9 @@
 //   health    at most every hour, if one value has moved by 0.1 %
 //   events    a fault at once: sixteen in a row, then one every ten minutes. Starts and resets with the first minute of
 //             a run, so a battery that restarts repeatedly writes nothing.
-//   settings  when set
+//   settings  when set, twice: eight in a row, then one an hour, beyond which they are refused. Latched faults are
+//             written always, and have lines of their own in a full log
+//   actions   of service sessions: with the next minute, sixteen in a row, then one an hour
 //   extremes  at most every ten minutes, if one has changed
 //   all       power_failing() writes all changes at once
 //
@@ -28,6 +30,7 @@
 #include "estimator/restart.hpp"
 #include "hal/power.hpp"
 #include "measurement/sample.hpp"
+#include "storage/actions_record.hpp"
 #include "storage/log.hpp"
 #include "storage/records.hpp"
 
@@ -73,9 +76,12 @@ class Persistence {
   void observe(const Readings& readings);
   /// Records a fault with its time and the readings. code: 1 to 127, defined by the caller.
   void fault(std::uint16_t code, std::optional<std::uint32_t> calendar_s = std::nullopt);
-  /// Stores a setting. Returns false if it is not stored: there is no room for another key, or the write failed. After
-  /// a failed write the value is valid in this run, and the write is tried again every minute.
-  bool set(std::uint16_t key, std::int32_t value);
+  /// Stores a setting. Returns false if it is not stored: there is no room for another key, the write failed, or there
+  /// were too many. After a failed write the value is valid in this run, and the write is tried again every minute.
+  bool set(std::uint16_t key, std::int32_t value, Urgency urgency = Urgency::usual);
+  bool may_set() const { return settings_at_once_ > 0; }  ///< not too many settings so far
+  /// Records what a service session has done; its time_s is set here.
+  void action(ActionsRecord::Action action, std::optional<std::uint32_t> calendar_s);
   bool settings_stored() const { return !settings_changed_; }  ///< no write of a setting has failed
   /// Call before the battery is switched off: writes charge first, 0.2 ms; everything takes 3 ms, at most 16 ms.
   void power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);
@@ -96,6 +102,7 @@ class Persistence {
   const std::optional<HealthRecord>& health() const { return health_; }
   const EventsRecord& events() const { return events_; }
   const SettingsRecord& settings() const { return settings_; }
+  const ActionsRecord& actions() const { return actions_; }
   const ExtremesRecord& extremes() const { return extremes_; }
   const Log& log() const { return log_; }
   /// Number of records of a newer firmware, which are preserved but cannot be read.
@@ -106,13 +113,15 @@ class Persistence {
   static constexpr std::uint32_t minute_us = 60'000'000;
 
   template <class R>
-  bool put(const R& record);
-  bool put(Kind kind, Bytes payload);
+  bool put(const R& record, Urgency urgency = Urgency::usual, Kind kind = R::kind);
+  bool put(Kind kind, Bytes payload, Urgency urgency);
+  void read_settings();
+  void grant();
   void advance_time();
   void read_retained();
   void set_charge(const estimator::StoredEstimate& now, std::uint32_t moved_ppb,
                   std::optional<std::uint32_t> calendar_s);
-  void store_charge();
+  void store_charge(Urgency urgency = Urgency::usual);
   void store_cells(std::span<const CellsRecord::Cell> now);
   void store_health(const HealthRecord& now);
   void store_events();
@@ -126,12 +135,14 @@ class Persistence {
   std::optional<HealthRecord> health_;
   EventsRecord events_;
   SettingsRecord settings_;
+  ActionsRecord actions_;
   ExtremesRecord extremes_, extremes_stored_;
   Readings readings_;
   std::span<std::uint8_t> retained_;
   bool full_ = false;
   bool charge_known_ = false;  ///< charge_stored_ was read from a record
-  bool events_changed_ = false, settings_changed_ = false, stored_in_this_run_ = false;
+  bool events_changed_ = false, settings_changed_ = false, actions_changed_ = false, stored_in_this_run_ = false;
+  Urgency settings_urgency_ = Urgency::usual;
   std::optional<std::uint32_t> off_s_;
   std::int32_t soc_before_ppb_ = 0;
 
@@ -140,7 +151,7 @@ class Persistence {
   std::uint32_t since_us_ = 0, us_ = 0;
   std::uint16_t charge_minutes_ = 0, cells_minutes_ = 0, health_minutes_ = 0, fault_minutes_ = 0, extremes_minutes_ = 0,
                 full_minutes_ = 0, covered_minutes_ = 1;
-  std::uint8_t faults_at_once_ = 16;
+  std::uint8_t faults_at_once_ = 16, settings_at_once_ = 8, actions_at_once_ = 16, grant_minutes_ = 0;
 };
 
 }  // namespace bms::storage

@@ -10,6 +10,8 @@
 //             1       118    (older) without readings
 //   settings  1       3+6n   values by key
 //   extremes  1       12     lowest and highest readings so far
+//   actions   1       180    what service sessions have done (actions_record.hpp)
+//   copy      1       3+6n   the settings once more: they contain what protects, and are written rarely
 #pragma once
 
 #include <algorithm>
@@ -319,7 +321,7 @@ constexpr bool decode(Bytes from, std::uint8_t layout, ExtremesRecord& r) {
 
 /// Values set in the field, by key; a missing key has its default. The meaning of a key never changes.
 struct SettingsRecord {
-  static constexpr Kind kind{5, 1};
+  static constexpr Kind kind{5, 1}, copy{8, 1};
   static constexpr std::size_t max_settings = 24;
   struct Setting {
     std::uint16_t key = 0;

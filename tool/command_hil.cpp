@@ -13,6 +13,7 @@
 #include "monitor/candump_line.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
+#include "tool/key_file.hpp"
 #include "tool/options.hpp"
 
 namespace bms::tool {
@@ -32,7 +33,7 @@ struct HilOptions {
   double sample_period_s = 0.1;
   unsigned seed = 1;
   std::vector<std::string> faults;
-  std::string candump;
+  std::string candump, key;
   files::ReadOptions reading;
   Output output;
 };
@@ -261,6 +262,9 @@ class HilCommand final : public Command {
         ->capture_default_str();
     c.add_option("--seed", o_.seed, "seed of the cells' spread and of the sensor noise")->capture_default_str();
     c.add_option("--fault", o_.faults, "fault to inject; may be repeated")->type_name("NAME[=VALUE]@START[-END]");
+    c.add_option("--key", o_.key, "device key of the board, 32 hexadecimal digits; needed if it has one")
+        ->check(not_empty())
+        ->type_name("FILE");
     c.add_option("--candump", o_.candump, "write the board's frames in the format of candump -L")->type_name("FILE");
     add_reading(c, o_.reading);
     add_output(c, o_.output);
@@ -271,7 +275,8 @@ class HilCommand final : public Command {
     complete_reading(o_.reading);
     o_.output.set_own(o_.candump);
     o_.output.protect({o_.recording, o_.profile, o_.cell, o_.board_cell});
-    const hil::SessionPlan plan = read(o_);
+    hil::SessionPlan plan = read(o_);
+    if (!o_.key.empty()) plan.key = read_key(o_.key);
     std::string dump;
     const hil::SessionResult result = compute(o_, plan, dump);
     if (!o_.candump.empty()) write_output(o_.candump, dump);

@@ -43,6 +43,7 @@ class LogReader {
     }
     if (progress) progress(1, "");
     if (request_.state() == StoredDataRequest::State::complete) return true;
+    if (!source_->live() && data().complete_but_for_actions()) return true;
     fmt::print(stderr, "{}: {}\n", name_, failure());
     return false;
   }
@@ -94,7 +95,9 @@ class LogCommand final : public Command {
  public:
   CLI::App* add(CLI::App& app) override {
     CLI::App& c = *app.add_subcommand(
-        "log", "Read what a battery has stored: fault history with readings, use, extremes, resets, CAN errors");
+        "log",
+        "Read what a battery has stored: fault history with readings, use, extremes, resets, CAN errors, service "
+        "sessions");
     c.footer("Example: bms log can0 --out faults.csv");
     c.add_option("source", o_.source,
                  "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter; file:DUMP.log: a log of candump -L "

@@ -20,5 +20,6 @@ std::unique_ptr<Command> hil_command();         ///< a board in the loop with a 
 std::unique_ptr<Command> flash_command();       ///< writes a board's image onto the chip
 std::unique_ptr<Command> monitor_command();     ///< CAN frames as a screen, a log, a page
 std::unique_ptr<Command> log_command();         ///< what a battery has stored, read over CAN
+std::unique_ptr<Command> service_command();     ///< a command that needs a service session
 
 }  // namespace bms::tool

@@ -17,7 +17,7 @@ set(BMS_SAMPLES bq76952)
 set(BMS_AUXILIARY_CONTACTS stm32f4)  # absent: a truck whose main contactors have none
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
 # sample [ms] (tests/firmware/board_budget.hpp).
-set(BMS_BUDGET_FLASH 65536)
+set(BMS_BUDGET_FLASH 81920)  # service sessions and stored actions took 6.6 KB; the chip has 1 MiB
 set(BMS_BUDGET_RAM 16384)
 set(BMS_BUDGET_STACK 4096)
 set(BMS_BUDGET_SAMPLE_MS 50)

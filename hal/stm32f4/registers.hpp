@@ -13,6 +13,7 @@ inline Register& rcc_cr() { return at<0x40023800>(); }
 inline Register& rcc_pllcfgr() { return at<0x40023804>(); }
 inline Register& rcc_cfgr() { return at<0x40023808>(); }
 inline Register& rcc_ahb1enr() { return at<0x40023830>(); }
+inline Register& rcc_ahb2enr() { return at<0x40023834>(); }
 inline Register& rcc_apb1enr() { return at<0x40023840>(); }
 inline Register& rcc_apb2enr() { return at<0x40023844>(); }
 inline Register& rcc_bdcr() { return at<0x40023870>(); }
@@ -26,6 +27,11 @@ inline Register& flash_cr() { return at<0x40023C10>(); }
 inline Register& flash_optcr() { return at<0x40023C14>(); }
 inline Register& pwr_cr() { return at<0x40007000>(); }
 inline Register& pwr_csr() { return at<0x40007004>(); }
+
+// random number generator [24.4]
+inline Register& rng_cr() { return at<0x50060800>(); }
+inline Register& rng_sr() { return at<0x50060804>(); }
+inline Register& rng_dr() { return at<0x50060808>(); }
 
 // GPIOA, GPIOB [8.4]
 inline Register& gpioa_moder() { return at<0x40020000>(); }

@@ -1,5 +1,7 @@
 #include "tests/firmware/host_hal.hpp"
 
+#include "hal/random.hpp"
+#include "hal/requests.hpp"
 #include "plant/link_poles.hpp"
 
 namespace bms {
@@ -8,6 +10,7 @@ void host_hal::begin() {
   listening = true;
   sent.clear();
   requests.clear();
+  queue = nullptr;
   recorded.clear();
   switched = {};
   link_readings = {0, 0};
@@ -29,6 +32,9 @@ void host_hal::begin() {
   calibrated = {};
   calibration_accepts = true;
   second_line_cleared = 0;
+  key.reset();
+  development = true;
+  random_seed = 1;
 }
 
 void host_hal::set_link(double pack_v, double dc_link_v) {
@@ -45,10 +51,18 @@ bool can_send(const can::Frame& frame) {
   return true;
 }
 bool next_request(can::Frame& frame) {
+  if (host_hal::queue != nullptr) return host_hal::queue->pop(frame);
   if (host_hal::requests.empty()) return false;
   frame = host_hal::requests.front();
   host_hal::requests.pop_front();
   return true;
+}
+bool next_network_frame(can::Frame&) { return false; }
+std::optional<std::array<std::uint8_t, 16>> device_key() { return host_hal::key; }
+bool development_image() { return host_hal::development; }
+std::uint32_t random_word() {
+  host_hal::random_seed = host_hal::random_seed * 1'664'525 + (host_hal::random_seed != 0 ? 1'013'904'223 : 0);
+  return host_hal::random_seed;
 }
 void record_estimate(std::span<const std::uint32_t> words) {
   host_hal::recorded.emplace_back(words.begin(), words.end());

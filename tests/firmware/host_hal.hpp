@@ -11,8 +11,10 @@
 
 #include "files/cell_file.hpp"
 #include "firmware/application.hpp"
+#include "hal/device_key.hpp"
 #include "hal/power.hpp"
 #include "hal/power_path.hpp"
+#include "hal/request_queue.hpp"
 #include "hal/second_current.hpp"
 
 namespace bms::host_hal {
@@ -20,6 +22,7 @@ namespace bms::host_hal {
 inline bool listening = true;
 inline std::vector<can::Frame> sent;
 inline std::deque<can::Frame> requests;
+inline hal::RequestQueue* queue = nullptr;  ///< used instead of `requests` if it is set
 inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
 inline hal::LinkVoltages link_readings{0, 0};
@@ -41,6 +44,9 @@ inline bool calendar_accepts = true;
 inline hal::SensorCalibration calibrated;
 inline bool calibration_accepts = true;
 inline int second_line_cleared = 0;
+inline std::optional<std::array<std::uint8_t, 16>> key;  ///< of the device
+inline bool development = true;
+inline std::uint32_t random_seed = 1;  ///< 0: no random numbers
 
 /// Resets all variables.
 void begin();

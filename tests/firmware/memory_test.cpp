@@ -135,7 +135,8 @@ TEST_F(StoredStateTest, ASettingWithoutRoomIsAStorageFault) {
     storage::Persistence persistence;
     persistence.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
     std::uint16_t key = 1'000;
-    for (std::size_t k = 1; k < storage::SettingsRecord::max_settings; ++k) ASSERT_TRUE(persistence.set(key++, 1));
+    for (std::size_t k = 1; k < storage::SettingsRecord::max_settings; ++k)
+      ASSERT_TRUE(persistence.set(key++, 1, storage::Urgency::safety));
     kept = bytes_of(flash);
   }
   HostBoard board(kept, start);

@@ -25,7 +25,7 @@ std::vector<Message> all() {
 
 class StoredDataTest : public StoredStateTest {
  protected:
-  static constexpr std::uint32_t parts = 16 + 7;
+  static constexpr std::uint32_t parts = 16 + 7 + 16;
 
   /// Requests parts and collects the frames of the samples that follow.
   std::uint32_t request(HostBoard& board, std::uint32_t argument, int samples = parts + 2) {
@@ -234,9 +234,10 @@ TEST_F(StoredDataTest, APartCanBeRequestedAlone) {
   EXPECT_TRUE(all<can::StoredCounts>().empty());
   request(board, 20);
   EXPECT_EQ(all<can::StoredCounts>().size(), 3U) << "the rest from part 20 on";
-  request(board, 22 | 9 << 8);
-  EXPECT_EQ(all<can::StoredCounts>().size(), 1U) << "there are fewer";
-  for (const std::uint32_t invalid : {23U, 255U, 24U << 8, 1U << 16, 0xFFFF'FFFFU}) {
+  EXPECT_EQ(all<can::StoredAction>().size(), 16U);
+  request(board, 38 | 9 << 8);
+  EXPECT_EQ(all<can::StoredActionDetail>().size(), 1U) << "there are fewer";
+  for (const std::uint32_t invalid : {39U, 255U, 40U << 8, 1U << 16, 0xFFFF'FFFFU}) {
     EXPECT_EQ(request(board, invalid), can::CommandAnswer::result_refused) << invalid;
     EXPECT_TRUE(all<can::StoredFault>().empty());
     EXPECT_TRUE(all<can::StoredCounts>().empty());
@@ -249,18 +250,19 @@ TEST_F(StoredDataTest, NoMessageIsSentTwiceWithASampleAndAtMostThreeAre) {
   run(board, 2);
   send_command(board, can::Command::code_stored_data, 0);
   std::size_t frames = 0;
-  for (int k = 0; k < 30; ++k) {
+  for (int k = 0; k < 45; ++k) {
     sent.clear();
     run(board, 1);
     std::set<std::uint32_t> ids;
     for (const can::Frame& frame : sent) {
-      const bool of_the_stored_data = frame.id >= 0x1A4 && frame.id <= 0x1AB;
+      const bool of_the_stored_data =
+          (frame.id >= 0x1A4 && frame.id <= 0x1AB) || frame.id == 0x1B4 || frame.id == 0x1B5;
       EXPECT_TRUE(!of_the_stored_data || ids.insert(frame.id).second) << frame.id;
     }
     EXPECT_LE(ids.size(), 3U);
     frames += ids.size();
   }
-  EXPECT_EQ(frames, 16U * 3 + 7 + 5);
+  EXPECT_EQ(frames, 16U * 3 + 7 + 5 + 16 * 2);
 }
 
 TEST_F(StoredDataTest, CountersOfTheFramesFollowEachOther) {
@@ -282,9 +284,10 @@ TEST_F(StoredDataTest, AFullLogIsReportedUntilASectorIsErased) {
   storage::Persistence persistence;
   persistence.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
   EXPECT_EQ(messages::storage(persistence).state, can::Storage::state_works);
-  for (int k = 0; k < 10'000 && !persistence.full(); ++k) persistence.set(9, k);
-  EXPECT_EQ(messages::storage(persistence).state, can::Storage::state_full);
+  for (int k = 0; k < 10'000 && !persistence.full(); ++k) persistence.set(9, k, storage::Urgency::safety);
+  EXPECT_EQ(messages::storage(persistence).state, can::Storage::state_a_record_was_turned_down);
   while (persistence.needs_erase()) persistence.erase_next_sector();
+  EXPECT_TRUE(persistence.set(9, 1, storage::Urgency::safety));
   EXPECT_EQ(messages::storage(persistence).state, can::Storage::state_works);
   plug_in(nullptr);
 }

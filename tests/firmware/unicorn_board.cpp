@@ -72,6 +72,7 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
          "registers");
   };
   map(std::integral_constant<std::uint32_t, 0x40000000>{}, 0x30000);
+  map(std::integral_constant<std::uint32_t, 0x50060000>{}, 0x1000);  // random number generator
   map(std::integral_constant<std::uint32_t, scs>{}, 0x1000);
   const std::vector<std::uint32_t> paint(ccm_size / 4, untouched);
   must(uc_mem_write(core_, ccm, paint.data(), ccm_size), "paint");
@@ -207,6 +208,10 @@ std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
       return supply_low_ && (register_value(pwr_cr) & 1U << 4) != 0 ? 4U : 0U;  // PWR_CSR: PVDO, while it is on
     case 0x40023870:
       return rtc != nullptr ? rtc->read_bdcr(now_us()) : 0;
+    case 0x50060804:
+      return 1;  // RNG_SR: a number is ready
+    case 0x50060808:
+      return static_cast<std::uint32_t>(random_());
     case scs + 0xD04:
       return handling() ? active_.back() : 0;
     case scs + 0x010:

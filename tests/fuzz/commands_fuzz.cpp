@@ -26,15 +26,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame.id = id;
     }
     const firmware::Requested before = requested;
-    const auto answer = commands.handle(frame, now_us, requested);
+    const bool allowed = (data[3] & 0x20) != 0;
+    const auto answer = commands.handle(frame, now_us, requested, [allowed](firmware::Privilege) { return allowed; });
     require(requested.stored_end <= firmware::stored_parts);
     require(static_cast<unsigned>(requested.power) <= 2 && static_cast<unsigned>(requested.clear) <= 2);
     const bool same = requested.log_samples == before.log_samples && requested.unix_time_s == before.unix_time_s &&
                       requested.clear == before.clear && requested.power == before.power &&
                       requested.power_at_us == before.power_at_us && requested.stored_next == before.stored_next &&
                       requested.stored_end == before.stored_end;
-    if (!answer) {
-      require(same);
+    if (!answer) {  // a stop counts also if it is not answered
+      const auto command = can::Command::of(frame);
+      require(same || (command.code == can::Command::code_request && command.argument == 0 &&
+                       requested.power == protection::Request::none));
       continue;
     }
     require(frame.id == can::Command::id && can::intact(frame, can::Command::data_id) &&

@@ -50,17 +50,19 @@ class Battery {
       send(cells);
       return frames;
     }
-    send(counts_of(k - 16));
+    if (k >= 23) {
+      send(action(k - 23));
+      send(detail(k - 23));
+    } else {
+      send(counts_of(k - 16));
+    }
     if (k == 16) {
       can::StoredUse use;
       use.operating_time = 360'000;
       use.cycles = 12.5F;
       send(use);
     } else if (k == 17) {
-      can::StoredThroughput throughput;
-      throughput.charged = 25'003;
-      throughput.discharged = 25'000;
-      send(throughput);
+      send(throughput());
     } else if (k == 18 || k == 19) {
       can::StoredExtremes extremes;
       extremes.kind = k - 18;
@@ -80,6 +82,27 @@ class Battery {
   std::uint32_t faults = 2;
 
  private:
+  static can::StoredThroughput throughput() {
+    can::StoredThroughput m;
+    m.charged = 25'003;
+    m.discharged = 25'000;
+    return m;
+  }
+  static can::StoredAction action(std::uint32_t index) {
+    can::StoredAction m;
+    m.index = index;
+    if (index == 0) m.code = can::StoredAction::code_clear_faults;
+    if (index == 1) m.code = can::StoredAction::code_session_opened;
+    if (index < 2) m.time = 1'790'000'060 - 10 * index;
+    return m;
+  }
+  static can::StoredActionDetail detail(std::uint32_t index) {
+    can::StoredActionDetail m;
+    m.index = index;
+    if (index < 2) m.operator_number = 4'711;
+    if (index == 0) m.argument = 1;
+    return m;
+  }
   can::StoredCounts counts_of(std::uint32_t cause) const {
     can::StoredCounts counts;
     counts.cause = cause;
@@ -107,7 +130,7 @@ class StoredDataOnTheBus : public ::testing::Test {
     if (result != can::CommandAnswer::result_done) return;
     const std::uint32_t first = command.argument & 0xFF, count = command.argument >> 8;
     asked.emplace_back(first, count);
-    for (std::uint32_t k = first; k < (count == 0 ? 23 : first + count); ++k) {
+    for (std::uint32_t k = first; k < (count == 0 ? 39 : first + count); ++k) {
       for (const can::Frame& f : battery.part(k)) {
         now_s += 0.03;
         if (!lost(k, f)) receive(f);
@@ -203,6 +226,27 @@ TEST_F(StoredDataOnTheBus, AFaultThatIsStoredMeanwhileStartsThemAgain) {
   answer(*request.due(now_s), can::CommandAnswer::result_done, nothing_lost);
   EXPECT_EQ(request.state(), StoredDataRequest::State::complete);
   EXPECT_EQ(request.data().fault_count, 3);
+}
+
+TEST_F(StoredDataOnTheBus, WhatServiceSessionsHaveDoneIsShownWithWhoDidIt) {
+  answer(*request.due(now_s), can::CommandAnswer::result_done, nothing_lost);
+  const auto actions = request.data().stored_actions();
+  ASSERT_EQ(actions.size(), 2U);
+  EXPECT_EQ(actions[0].name, "session opened");
+  EXPECT_EQ(actions[1].name, "clear faults");
+  EXPECT_EQ(actions[1].operator_number, 4'711U);
+  EXPECT_THAT(summary_of(request.data()),
+              HasSubstr("clear faults                 2026-09-21 14:14:20 UTC        operator 4711, argument 1"));
+  EXPECT_EQ(nlohmann::json::parse(json_of(request.data(), "can0"))["actions"][1]["operator"], 4'711);
+}
+
+TEST_F(StoredDataOnTheBus, OfFirmwareWithoutServiceSessionsAreCompleteWithoutThem) {
+  answer(*request.due(now_s), can::CommandAnswer::result_done,
+         [](std::uint32_t k, const can::Frame&) { return k >= 23; });
+  EXPECT_EQ(request.state(), StoredDataRequest::State::waiting);
+  now_s += 2.6;
+  answer(*request.due(now_s), can::CommandAnswer::result_refused, nothing_lost);
+  EXPECT_EQ(request.state(), StoredDataRequest::State::complete);
 }
 
 TEST_F(StoredDataOnTheBus, AnOldFirmwareAndARefusalEndTheRequest) {

@@ -65,6 +65,24 @@ TEST_F(FullLog, AfterALossOfPowerTheTruthIsInsideTwoSigmaAtEveryTime) {
   EXPECT_TRUE(p.full());
 }
 
+/// Nobody erases, nobody opens; then a short circuit and a loss of power.
+TEST_F(FullLog, HasRoomForLatchedFaultsAndForTheLastCharge) {
+  boot();
+  work(100 * 60);
+  ASSERT_TRUE(p.full());
+  EXPECT_FALSE(p.set(9, 1)) << "no room for other settings";
+  EXPECT_FALSE(p.settings_stored()) << "which is reported";
+  EXPECT_TRUE(p.set(1, 1'024, storage::Urgency::safety));
+  EXPECT_TRUE(p.settings_stored());
+  for (int dips = 0; dips < 3; ++dips) {
+    work(3);
+    p.supply_failing(now(), std::nullopt);
+  }
+  boot(ResetCause::pin);  // takes no time
+  EXPECT_EQ(p.settings().get(1), 1'024);
+  EXPECT_EQ(p.starting_point()->soc_ppb, pack.soc_ppb);
+}
+
 TEST_F(FullLog, AfterAnEraseSocIsKnownAgain) {
   boot();
   work(100 * 60);

@@ -154,9 +154,65 @@ TEST_F(PersistenceTest, ASettingIsWrittenAtOnceAndOnlyIfItChanges) {
   EXPECT_EQ(steps(), before);
   EXPECT_TRUE(p.set(3, 6));
   EXPECT_EQ(boot().settings().get(3), 6);
-  for (std::uint16_t key = 100; key < 123; ++key) EXPECT_TRUE(p.set(key, 1));
+  for (std::uint16_t key = 100; key < 123; ++key) EXPECT_TRUE(p.set(key, 1, storage::Urgency::safety));
   EXPECT_FALSE(p.set(200, 1)) << "no room for another key";
   EXPECT_TRUE(p.set(3, 7));
+}
+
+TEST_F(PersistenceTest, SettingsAreLimitedToEightAndThenOneAnHourButThoseThatProtectAreNot) {
+  boot();
+  for (int k = 0; k < 8; ++k) EXPECT_TRUE(p.set(3, k)) << k;
+  const auto before = steps();
+  EXPECT_FALSE(p.set(3, 99));
+  EXPECT_FALSE(p.may_set());
+  EXPECT_EQ(steps(), before) << "nothing is written";
+  EXPECT_EQ(p.settings().get(3), 7) << "nor changed";
+  EXPECT_TRUE(p.settings_stored());
+  for (int k = 0; k < 30; ++k) EXPECT_TRUE(p.set(1, k, storage::Urgency::safety));
+  drive(59);
+  EXPECT_FALSE(p.set(3, 99));
+  drive(1);
+  EXPECT_TRUE(p.set(3, 99));
+  EXPECT_FALSE(p.set(3, 100));
+}
+
+/// The older copy of each setting: the newest record of its type is made unreadable, bit by bit.
+TEST_F(PersistenceTest, SettingsSurviveTheLossOfEitherRecord) {
+  for (const storage::Kind lost : {storage::SettingsRecord::kind, storage::SettingsRecord::copy}) {
+    for (int flip = 0; flip < 40; ++flip) {
+      plug_in(nullptr);
+      flash = FlashModel(chip, 1);
+      plug_in(&flash);
+      boot();
+      EXPECT_TRUE(p.set(1, 5, storage::Urgency::safety));
+      EXPECT_TRUE(p.set(1, 1'024, storage::Urgency::safety));
+      const auto records = p.log().current_records();
+      const auto place = std::ranges::find_if(records, [&](const auto& r) { return r.kind == lost; });
+      ASSERT_NE(place, records.end());
+      auto bytes = flash.bytes(place->sector);
+      const std::size_t at = place->line * storage::line_bytes +
+                             static_cast<std::size_t>(flip * 29) % (storage::line_bytes + place->length);
+      bytes[at] = static_cast<std::uint8_t>(bytes[at] ^ 1 << flip % 8);
+      flash.fill(place->sector, bytes);
+      boot();
+      EXPECT_EQ(p.settings().get(1), 1'024) << flip;
+      drive(1);
+      EXPECT_TRUE(p.settings_stored()) << "both are whole again";
+    }
+  }
+}
+
+TEST_F(PersistenceTest, ActionsAreStoredWithTheNextMinuteAndAtMostSixteenAndThenOneAnHour) {
+  boot();
+  p.action({1, 4'711, 1, 0}, 1'790'000'000);
+  drive(1);
+  boot();
+  EXPECT_EQ(p.actions().last(0), (storage::ActionsRecord::Action{1, 4'711, 1, 1'790'000'000}));
+  const auto minutes = written<storage::ActionsRecord>(300, [&](int minute) {
+    p.action({3, 1, static_cast<std::uint32_t>(minute), 0}, std::nullopt);
+  });
+  EXPECT_GE(minutes.size(), 16U);
+  EXPECT_LE(minutes.size(), 16U + 5);
 }
 
 TEST_F(PersistenceTest, WhenTheSupplyFallsOnlyChargeIsWritten) {
