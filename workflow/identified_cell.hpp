@@ -24,7 +24,8 @@ struct OcvResult {
 /// Writes OCV, gap and capacity of slow charge and discharge recordings into `cell`. The OCV has the fewest straight
 /// pieces with an error of at most max_error_v, in V; if the cell has no room for them, the error is larger and a
 /// warning says so. Of several temperatures, the one nearest to the cell's reference temperature gives the
-/// curve, moved exactly to it by the other temperatures. both_branches: the pieces also follow the gap. Throws BadInput if the recordings are not slow runs.
+/// curve, moved exactly to it by the other temperatures. both_branches: the pieces also follow the gap. Throws BadInput
+/// if the recordings are not slow runs.
 OcvResult identify_ocv(const std::vector<std::string>& paths, const files::ReadOptions& reading, double max_error_v,
                        bool both_branches, files::CellFile& cell);
 
