@@ -60,6 +60,8 @@ class UnicornBoard {
   std::uint32_t register_value(std::uint32_t address) const;
   /// Changes a register that is not part of a model, as a disturbance does.
   void disturb_register(std::uint32_t address, std::uint32_t value) { registers_[address] = value; }
+  /// main() waits for an interrupt.
+  bool sleeping() const { return sleeping_; }
   /// The exception whose handler runs, 0 for none.
   std::uint32_t exception() const { return active_.empty() ? 0 : active_.back(); }
   /// Reads a word of the memory.

@@ -40,9 +40,8 @@ double margin_of(const Row& row, Kind kind) {
 
 class FaultCase {
  public:
-  FaultCase(TruckWorld& world, const std::vector<Row>& rows, const Pack& pack, Operating state, const Case& c,
-            Outcome& outcome)
-      : world_(world), judge_(world, rows, pack.limit_a), pack_(pack), state_(state), case_(c), outcome_(outcome) {}
+  FaultCase(TruckWorld& world, const std::vector<Row>& rows, const Pack& pack, const Case& c, Outcome& outcome)
+      : world_(world), judge_(world, rows, pack.limit_a), pack_(pack), case_(c), outcome_(outcome) {}
 
   void run() {
     world_.vehicle.forget();
@@ -177,7 +176,6 @@ class FaultCase {
   TruckWorld& world_;
   Judge judge_;
   const Pack& pack_;
-  Operating state_;
   const Case& case_;
   Outcome& outcome_;
   double begun_ms_ = 0, watched_s_ = 0, charged_s_ = 0, discharged_s_ = 0, longest_charged_s_ = 0,
@@ -315,7 +313,7 @@ Result run_fault_matrix(const Extent& extent) {
       if (!extent.has(name) || left == 0 || (extent.count != 0 && random.uniform() > share)) continue;
       --left;
       world.run_ms(37 * random.uniform());  // any phase of the sample
-      cases.start(name, [&](Outcome& outcome) { FaultCase(world, rows, pack, state, c, outcome).run(); });
+      cases.start(name, [&](Outcome& outcome) { FaultCase(world, rows, pack, c, outcome).run(); });
     }
   }
   Result result{"fault matrix", "", cases.finish()};

@@ -11,7 +11,7 @@ namespace bms::world {
 
 namespace {
 
-constexpr double cell_noise_v = 0.0015, shunt_noise_v = 5e-6, late_ms = 5;
+constexpr double cell_noise_v = 0.0015, shunt_noise_v = 5e-6;
 
 class Shift {
  public:
@@ -22,7 +22,6 @@ class Shift {
         random_(seed + 7),
         outcome_(outcome) {
     world_.set_noise(cell_noise_v, shunt_noise_v);
-    world_.make_late(late_ms);
     world_.each_step = [this] { judge_.step(); };
   }
 

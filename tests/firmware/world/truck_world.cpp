@@ -114,7 +114,7 @@ double TruckWorld::step_ms() const {
   const double now = now_ms();
   double ms = now < switching_until_ms_ ? 1 : 5;
   if (now < fine_until_ms_) ms = std::min(ms, fine_step_ms_);
-  if (late_ms_ > 0) ms = std::min(ms, late_edge_ms_ - now);
+  if (late_ms_ > 0 && late_edge_ms_ > now) ms = std::min(ms, late_edge_ms_ - now);
   for (const double edge : edges_ms_) {
     if (edge > now + 1e-6) ms = std::min(ms, edge - now);
   }
@@ -123,6 +123,7 @@ double TruckWorld::step_ms() const {
 
 void TruckWorld::update_lateness() {
   if (late_ms_ <= 0 || held_in_reset_ || now_ms() < late_edge_ms_) return;
+  if (!late_ && !board.sleeping()) return;  // no interrupt of the firmware is as long as a transfer
   late_ = !late_;
   late_edge_ms_ = now_ms() + (late_ ? 1 : 2) * late_ms_ * noise_.uniform();
   board.program_held = late_;

@@ -88,7 +88,7 @@ class TruckWorld {
     setup_.cell_noise_v = cell_v;
     setup_.shunt_noise_v = shunt_v;
   }
-  /// main() stands still again and again for up to `most_ms`, as behind long interrupts, so samples are that late.
+  /// main() wakes up to `most_ms` late again and again, so samples are that late.
   void make_late(double most_ms) { late_ms_ = most_ms; }
   /// Steps of `step_ms` for the given time, for fast events.
   void fine_steps(double duration_ms, double step_ms = 0.2);
