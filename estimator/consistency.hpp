@@ -43,13 +43,13 @@ class Consistency {
   }
   constexpr Variance variance() const { return mean_v_ * mean_v_; }
 
-  /// Returns true if the mean is so large that is_inconsistent() has to decide. Costs one comparison.
-  constexpr bool is_suspect() const { return arithmetic::magnitude(mean_v_) > Voltage(max_sigmas * min_error_v); }
+  /// Returns true if the mean is so large, or not a number, that is_inconsistent() has to decide. Costs one comparison.
+  constexpr bool is_suspect() const { return !(arithmetic::magnitude(mean_v_) <= Voltage(max_sigmas * min_error_v)); }
   /// expected_v2: variance that the filter expects of a deviation that lasts.
   constexpr bool is_inconsistent(const Variance& expected_v2, const Fraction& share) {
     expected_v2_ = Variance(expected_v2_ - arithmetic::product<Variance>(expected_v2_, share));
     if (expected_v2_ < expected_v2) expected_v2_ = expected_v2;
-    return variance() > arithmetic::product<Variance>(expected_v2_, arithmetic::Count<S>(max_sigmas * max_sigmas));
+    return !(variance() <= arithmetic::product<Variance>(expected_v2_, arithmetic::Count<S>(max_sigmas * max_sigmas)));
   }
   constexpr void reset() {
     mean_v_ = Voltage(0);

@@ -324,13 +324,14 @@ class SocEstimator {
     state_.model_state = {};
     state_.covariance.set_diagonal(unknown);
     errors_ = {};
-    gate_ = {};
+    consistency_ = {};
+    contradicted_ = false;
     ambiguous_ = {};
     estimate.voltage_predicted_v = Voltage(0);
     estimate.flags |= not_a_number;
     report_state(cell, estimate);
     const SocDistribution<S> soc{estimate.soc, anything};
-    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &soc});
+    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &soc});
   }
 
   /// The present estimate, for a sample that is not later than the last one.
