@@ -6,7 +6,6 @@
 //   correct   with the voltage, if the checks accept it; otherwise the prediction stands and sigma grows
 //
 // The parts, each with its own header:
-//
 //   input_check.hpp         which readings are used
 //   step_constants.hpp      what depends on the time step and the temperature alone
 //   persistent_errors.hpp   errors that last for hours: as noise or as states
@@ -22,7 +21,6 @@
 //
 // Voltage noise: it is larger where the OCV is steep, because the SOC axis of the table has an uncertainty of
 // tolerance.initial_soc, and under current, because R0 and R1 have one of tolerance.resistance_fraction.
-//
 // Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost: estimator/README.md.
 #pragma once
 
