@@ -6,7 +6,6 @@
 //   correct   with the voltage, if the checks accept it; otherwise the prediction stands and sigma grows
 //
 // The parts, each with its own header:
-//
 //   input_check.hpp         which readings are used
 //   step_constants.hpp      what depends on the time step and the temperature alone
 //   persistent_errors.hpp   errors that last for hours: as noise or as states
@@ -22,7 +21,6 @@
 //
 // Voltage noise: it is larger where the OCV is steep, because the SOC axis of the table has an uncertainty of
 // tolerance.initial_soc, and under current, because R0 and R1 have one of tolerance.resistance_fraction.
-//
 // Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost: estimator/README.md.
 #pragma once
 
@@ -107,7 +105,7 @@ class SocEstimator {
     report_state(cell, estimate);
     if constexpr (std::floating_point<S>) {
       if (!is_finite(estimate)) [[unlikely]]
-        start_again(cell, estimate);
+        return start_again(cell, flags);
     }
     errors_.bound_gain_error(estimate.soc, estimate.soc_sigma, cell.noise.gain);
     return estimate;
@@ -317,7 +315,7 @@ class SocEstimator {
 
   /// After a result that was not a number: the charge, counted in integers, stays; all else is unknown.
   template <class Cell>
-  [[gnu::noinline]] constexpr void start_again(const Cell& cell, Result& estimate) {
+  [[gnu::noinline]] constexpr Result start_again(const Cell& cell, std::uint32_t flags) {
     const auto anything = Variance(0.289 * 0.289);  // of a SOC from 0 to 1: 1 / 12
     typename Model::Variances unknown{};
     unknown.fill(anything);
@@ -327,11 +325,13 @@ class SocEstimator {
     consistency_ = {};
     contradicted_ = false;
     ambiguous_ = {};
-    estimate.voltage_predicted_v = Voltage(0);
-    estimate.flags |= not_a_number;
+    Result estimate;
+    estimate.flags = flags | not_a_number;
     report_state(cell, estimate);
+    errors_.start(estimate.soc);
     const SocDistribution<S> soc{estimate.soc, anything};
     ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &soc});
+    return estimate;
   }
 
   /// The present estimate, for a sample that is not later than the last one.
