@@ -299,8 +299,8 @@ void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, con
   identify_noise(inputs.recordings, result.validation ? *result.validation : result.identification.estimation,
                  result.identification.parameters, cell.parameters);
   write_sources(options, result, cell);
-  if (start.ocv_error_v > noise.model_v) {  // the recordings need not have shown it, and it lasts
-    noise.model_v = std::min(start.ocv_error_v, 0.2);
+  if (start.ocv_error_v > 0) {  // an error of the curve lasts as long as the state of charge stays near it
+    noise.model_v = std::clamp(start.ocv_error_v, noise.model_v, 0.2);
     noise.model_correlation_s = std::max(noise.model_correlation_s, 3'000.0);
   }
   if (!start.limits_source.empty()) {

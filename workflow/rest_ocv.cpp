@@ -94,10 +94,9 @@ RestedOcv move_ocv_to(std::vector<RestedPoint> all, files::CellFile& cell) {
   RestedOcv result{points.size(), std::max(0.0, points.front().soc), std::min(1.0, points.back().soc), 0};
   for (std::size_t k = 1; k + 1 < points.size(); ++k) {
     const double part = (points[k].soc - points[k - 1].soc) / (points[k + 1].soc - points[k - 1].soc);
-    const double error_v = shift[k] - (shift[k - 1] + part * (shift[k + 1] - shift[k - 1]));
-    result.error_v += error_v * error_v / static_cast<double>(points.size() - 2);
+    const double predicted_v = shift[k - 1] + part * (shift[k + 1] - shift[k - 1]);
+    result.error_v = std::max(result.error_v, std::abs(shift[k] - predicted_v));
   }
-  result.error_v = std::sqrt(result.error_v) / 2;  // the points are half as far apart
   // edges: those of the start cell, and the points
   std::vector<double> edges(before.soc.value.begin(), before.soc.value.begin() + static_cast<long>(before.soc.size));
   for (const RestedPoint& p : points) {

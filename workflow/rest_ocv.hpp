@@ -20,7 +20,7 @@ std::vector<RestedPoint> rested_points(const measurement::Recording& recording, 
 struct RestedOcv {
   std::size_t points = 0;
   double soc_min = 0, soc_max = 0;  ///< that the rests cover
-  double error_v = 0;  ///< between the points: half the error with which their neighbours predict each of them
+  double error_v = 0;               ///< between the points: the largest error with which its neighbours predict a point
 };
 
 /// Moves the OCV of the cell to the points: between them the shape of the cell's own curve, bent linearly; beyond them

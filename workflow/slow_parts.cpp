@@ -30,6 +30,13 @@ std::vector<RowRange> one_direction(const measurement::Recording& r) {
     parts.back().moved_as += std::abs(a) * (r.time_s[k] - r.time_s[k - 1]);
   }
   parts.back().rows.count = r.rows() - parts.back().rows.first;
+  constexpr double other_share = 0.01;  ///< of the charge, against the direction of a slow run
+  double charged_as = 0, discharged_as = 0;
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    const double as = r.current_a[k] * (r.time_s[k] - r.time_s[k - 1]);
+    if (std::isfinite(as)) (as > 0 ? charged_as : discharged_as) += std::abs(as);
+  }
+  if (std::min(charged_as, discharged_as) <= other_share * std::max(charged_as, discharged_as)) return {{0, r.rows()}};
   double most_as = 0, all_as = 0, kept_as = 0;
   for (const Part& part : parts) {
     most_as = std::max(most_as, part.moved_as);

@@ -14,7 +14,9 @@ namespace bms::workflow {
 
 namespace {
 
-constexpr double same_size = 0.2;  ///< of the capacity: a worn cell, another measurement; not another cell
+constexpr double least_of_start = 0.7,
+                 most_of_start = 1.4;  ///< capacity of a worn cell, or of a new one; not of another
+constexpr double same_capacity = 0.2;  ///< between a stated capacity and the charge of slow runs
 
 void derive(const IdentifyOptions& options, const std::vector<measurement::Recording>& recordings, StartCell& start,
             std::vector<measurement::Warning>& warnings) {
@@ -68,7 +70,7 @@ StartCell read_start(const IdentifyOptions& options) {
   p.reference_temperature_c = options.reference_temperature_c.value_or(p.reference_temperature_c);
   if (!options.ocv.empty()) {
     start.ocv = identify_ocv(options.ocv, options.reading, options.ocv_error_v, options.extend, start.cell);
-    if (options.capacity_ah > 0 && std::abs(p.capacity_ah / options.capacity_ah - 1) > same_size) {
+    if (options.capacity_ah > 0 && std::abs(p.capacity_ah / options.capacity_ah - 1) > same_capacity) {
       throw files::BadInput(options.ocv.front(), 1,
                             fmt::format("the slow runs move {:.4g} Ah, expected the {:g} Ah of --capacity-ah",
                                         p.capacity_ah, options.capacity_ah));
@@ -84,7 +86,8 @@ StartCell read_start(const IdentifyOptions& options) {
             p.capacity_ah, options.capacity_ah, 100 * p.capacity_ah / options.capacity_ah));
   }
   const double capacity_ah = options.capacity_ah > 0 ? options.capacity_ah : p.capacity_ah;
-  start.other_cell = std::abs(capacity_ah / start.capacity_ah - 1) > same_size || !options.chemistry.empty();
+  const double of_start = capacity_ah / start.capacity_ah;
+  start.other_cell = of_start < least_of_start || of_start > most_of_start || !options.chemistry.empty();
   p.capacity_ah = start.other_cell ? start.capacity_ah : capacity_ah;
   if (start.other_cell) scale_to(capacity_ah, start.cell);
   if (options.extend) identify_hysteresis(start.ocv, start.cell);

@@ -22,8 +22,8 @@ struct StartCell {
   std::string limits_source;  ///< empty: the limits are those of the start file
 };
 
-/// Reads the start file and the OCV recordings. A capacity that differs by more than a fifth makes it another cell.
-/// Throws BadInput; also if the OCV recordings contradict a stated capacity.
+/// Reads the start file and the OCV recordings. A capacity below 0.7 or above 1.4 of the start file's, or a stated
+/// chemistry, makes it another cell. Throws BadInput; also if the OCV recordings contradict a stated capacity.
 StartCell read_start(const IdentifyOptions& options);
 
 /// What follows from the recordings to identify from: limits of use of another cell, and the OCV from their rests.
