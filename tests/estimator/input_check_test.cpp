@@ -29,7 +29,7 @@ TEST(InputCheck, UsesACurrentBeyondTheLimitsThatLastsAndFlagsIt) {
     const AcceptedCurrent a = check.current(-90'000'000 + k, plausible, flags);
     EXPECT_EQ(a.measured, k >= 5);
     EXPECT_EQ(flags, k >= 5 ? current_beyond_limits : current_implausible);
-    if (k >= 5) EXPECT_EQ(a.ua, -90'000'000 + k);
+    EXPECT_EQ(a.ua, k >= 5 ? -90'000'000 + k : 0);
   }
 }
 
@@ -38,7 +38,9 @@ TEST(InputCheck, SpikesOfEitherSignOrBetweenGoodReadingsDoNotLast) {
   for (int k = 0; k < 20; ++k) {
     std::uint32_t flags = 0;
     EXPECT_FALSE(check.current(k % 2 == 0 ? 90'000'000 : -90'000'000, plausible, flags).measured);
-    if (k % 3 == 0) EXPECT_TRUE(check.current(1'000'000, plausible, flags).measured);
+    if (k % 3 == 0) {
+      EXPECT_TRUE(check.current(1'000'000, plausible, flags).measured);
+    }
   }
 }
 
