@@ -207,6 +207,8 @@ OcvCurve ocv_curve(const std::vector<SlowRun>& slow_runs) {
   if (!charged.empty() && !discharged.empty()) curve.coulombic_efficiency = mean_of(discharged) / mean_of(charged);
 
   const auto up = averaged(runs, true), down = averaged(runs, false);
+  curve.charge_v = up;
+  curve.discharge_v = down;
   curve.half_gap_v = half_gap(up, down);
   curve.ocv_v = middle(up, down, curve.half_gap_v);
   constexpr std::size_t bend = grid / 100;

@@ -97,16 +97,17 @@ OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v
   OcvResult taken;
   const auto groups = slow_runs(paths, cell.parameters.reference_temperature_c);
   const std::string& files = groups.front().files;
-  std::vector<id::OcvCurve> curves;
+  std::vector<id::CurveAtTemperature> curves;
   try {
-    for (const SlowRuns& group : groups) {
-      curves.push_back(id::ocv_curve(group.runs));
-      if (const auto gap_v = id::plateau_half_gap_v(curves.back())) taken.gaps.push_back({group.temperature_c, *gap_v});
-    }
+    for (const SlowRuns& group : groups) curves.push_back({group.temperature_c, id::ocv_curve(group.runs)});
   } catch (const std::invalid_argument& error) {
     throw files::BadInput(paths.front(), 1, error.what());
   }
-  const id::OcvCurve& curve = curves.front();
+  const double reference_c = cell.parameters.reference_temperature_c;
+  taken.temperatures = curves.size();
+  if (both_branches) taken.branches = id::fit_branches(curves, reference_c);
+  const id::OcvCurve curve =
+      taken.branches ? id::moved_to_reference(curves.front(), *taken.branches) : curves.front().curve;
   double error_v = max_error_v;
   auto pieces = id::fewest_pieces(curve, error_v);
   while (!pieces || pieces->soc.size() > model::max_ocv_edges) {
@@ -226,17 +227,15 @@ double mean_of(const model::Column<double, model::max_rc_nodes>& column) {
   return sum / static_cast<double>(column.size);
 }
 
-/// From the resistances at several temperatures, or from the gap of slow runs at several temperatures. Nothing if there
-/// is only one temperature. Its reference is the temperature of [rc]. source: gets the origin of the values.
-std::optional<model::MechanismSetting> temperature_dependence(const files::CellFile& cell,
-                                                              const std::optional<id::SlowGap>& gap,
-                                                              std::string& source) {
+/// From the resistances at several temperatures. Nothing if there is only one temperature. Its reference is the
+/// temperature of [rc]. source: gets the origin of the values.
+std::optional<model::MechanismSetting> temperature_dependence(const files::CellFile& cell, std::string& source) {
   const std::vector<files::TemperatureTable>& tables = cell.at_temperature;
   const double reference_c = cell.parameters.reference_temperature_c;
   model::MechanismSetting setting = default_mechanism("temperature_resistance", cell.parameters);
   // typical for a lithium iron phosphate cell: activation energy of the reactions in R0, and their share of R0
   constexpr double typical_j_per_mol = 50'000, typical_share = 0.3;
-  setting.value = {typical_j_per_mol, 0, reference_c, typical_share, 0};
+  setting.value = {typical_j_per_mol, 0, reference_c, typical_share, 0, 0, 0, 1};
   if (tables.size() > 1) {
     setting.value[1] = activation_j_per_mol(tables, 90'000, [](const auto& rc) { return mean_of(rc.r1_ohm); });
     // the share by least squares, with the typical energy
@@ -261,11 +260,6 @@ std::optional<model::MechanismSetting> temperature_dependence(const files::CellF
                          tables.size());
     return setting;
   }
-  if (gap && gap->overvoltage_v > 0) {
-    setting.value[1] = gap->activation_j_per_mol;
-    source = "overvoltage in the gap of slow runs at several temperatures; typical values for R0";
-    return setting;
-  }
   return std::nullopt;
 }
 
@@ -275,19 +269,25 @@ void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell) {
   const model::CellParameters<>& p = cell.parameters;
   const double between_v = model::plateau_half_gap_v(p.ocv);
   if (!(between_v > 0)) return;
-  const auto gap = id::slow_gap(ocv.gaps, p.reference_temperature_c);
-  // overvoltage of the slow current (C/30 to C/35): over R0 and R1, or the part of the gap that grows in the cold
-  const double over_v = gap ? gap->overvoltage_v : p.capacity_ah / 30 * (mean_of(p.rc.r0_ohm) + mean_of(p.rc.r1_ohm));
+  // overvoltage of the slow current (C/30 to C/35)
+  const double over_v = p.capacity_ah / 30 * (mean_of(p.rc.r0_ohm) + mean_of(p.rc.r1_ohm));
   model::MechanismSetting setting = default_mechanism("ocv_hysteresis", p);
   setting.value[0] = std::clamp(between_v - over_v, 0.1 * between_v, 0.07);
   setting.value[4] = 1;
   files::put_mechanism(cell, setting);
   cell.sources["mechanism.ocv_hysteresis"] =
-      gap ? fmt::format(
-                "gap of slow runs at {} temperatures, less an overvoltage of {:.1f} mV with an activation energy of "
-                "{:.0f} kJ/mol",
-                ocv.gaps.size(), 1e3 * over_v, 1e-3 * gap->activation_j_per_mol)
-          : fmt::format("gap of slow charge and discharge, less {:.1f} mV over R0 and R1", 1e3 * over_v);
+      fmt::format("gap of slow charge and discharge, less {:.1f} mV over R0 and R1", 1e3 * over_v);
+  if (!ocv.branches) return;
+  const auto put = [&](std::string_view mechanism, const auto& values) {
+    model::MechanismSetting with_values = default_mechanism(mechanism, p);
+    std::copy(values.begin(), values.end(), with_values.value.begin());
+    files::put_mechanism(cell, with_values);
+    cell.sources[fmt::format("mechanism.{}", mechanism)] =
+        fmt::format("slow runs at {} temperatures; {:.1f} mV RMS between law and runs", ocv.temperatures,
+                    1e3 * ocv.branches->residual_v);
+  };
+  put("branch_temperature", id::for_half_gap(*ocv.branches, setting.value[0]));
+  put("entropic_ocv", ocv.branches->entropic);
 }
 
 id::DataSet without_mechanisms(const files::CellFile& cell, const IdentificationData& of) {
@@ -308,11 +308,11 @@ id::DataSet without_mechanisms(const files::CellFile& cell, const Identification
   return record;
 }
 
-void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell) {
+void extend(const std::vector<IdentificationData>& data, files::CellFile& cell) {
   model::CellParameters<>& p = cell.parameters;
   const double capacity_ah = p.capacity_ah;
   std::string source;
-  if (const auto setting = temperature_dependence(cell, id::slow_gap(ocv.gaps, p.reference_temperature_c), source)) {
+  if (const auto setting = temperature_dependence(cell, source)) {
     files::put_mechanism(cell, *setting);
     if (const double identified_c = setting->value[2]; identified_c != p.reference_temperature_c) {
       move_resistances(cell, p.reference_temperature_c);

@@ -7,7 +7,7 @@
 
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
-#include "identification/hysteresis_gap.hpp"
+#include "identification/branch_temperature.hpp"
 #include "identification/identify.hpp"
 #include "workflow/identification_data.hpp"
 
@@ -15,19 +15,21 @@ namespace bms::workflow {
 
 struct OcvResult {
   std::optional<double> coulombic_efficiency;          ///< discharged over charged; needs a charge and a discharge
-  std::vector<identification::GapAtTemperature> gaps;  ///< at each temperature with a charge and a discharge
+  std::optional<identification::BranchLaws> branches;  ///< from slow runs at three temperatures or more
+  std::size_t temperatures = 0;                        ///< of slow runs
   std::vector<measurement::Warning> warnings;
 };
 
 /// Writes OCV, gap and capacity of slow charge and discharge recordings into `cell`. The OCV has the fewest straight
 /// pieces with an error of at most max_error_v, in V; if the cell has no room for them, the error is larger and a
 /// warning says so. Of several temperatures, the one nearest to the cell's reference temperature gives the
-/// curve. both_branches: the pieces
-/// also follow the gap. Throws BadInput if the recordings are not slow runs.
+/// curve, moved exactly to it by the other temperatures. both_branches: the
+/// pieces also follow the gap. Throws BadInput if the recordings are not slow runs.
 OcvResult identify_ocv(const std::vector<std::string>& paths, double max_error_v, bool both_branches,
                        files::CellFile& cell);
 
-/// Adds the hysteresis between the measured curves of charge and discharge as a mechanism, if there are both.
+/// Adds the hysteresis between the measured curves of charge and discharge as a mechanism, if there are both, and how
+/// both depend on the temperature, if that was measured.
 void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell);
 
 /// The data set with the effect of the cell's mechanisms subtracted from its voltage, to identify the circuit alone.
@@ -42,7 +44,7 @@ inline constexpr const char* extended_noise =
 /// Adds what an estimator needs in addition: resistances that depend on the temperature, persistent errors as states of
 /// the filter, and the noise that belongs to them. data: the recordings that the cell was identified from, as measured.
 /// The resistances move to the cell's reference temperature if it is known how they depend on the temperature.
-void extend(const OcvResult& ocv, const std::vector<IdentificationData>& data, files::CellFile& cell);
+void extend(const std::vector<IdentificationData>& data, files::CellFile& cell);
 
 /// Writes noise and tolerance into `p`: noise of the measuring chain from the rests of the recordings, noise of the
 /// model from the residual `judge` and from the gap between the OCV branches.

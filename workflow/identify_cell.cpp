@@ -316,7 +316,7 @@ void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, con
   noise.current_offset_a *= cell.parameters.capacity_ah / start.capacity_ah;
   noise.current_unknown_a *= cell.parameters.capacity_ah / start.capacity_ah;
   state_reference(cell, !options.ocv.empty());
-  if (options.extend) extend(start.ocv, inputs.measured, cell);
+  if (options.extend) extend(inputs.measured, cell);
   check_reference(cell, identified_c, options.extend, result.warnings);
   if (const model::CellFault fault = model::first_fault(cell.parameters); fault.what != nullptr) {
     throw files::BadInput(options.out, 1,

@@ -252,7 +252,8 @@ TEST(BranchTemperature, MovesTheBranchesApartByArrhenius) {
   for (const Node& n : {Node{0.05, 1, 0.018, 80'000}, Node{0.175, 0.7, 0.011, 65'000}, Node{0.5, 0.2, 0.001, 30'000},
                         Node{0.95, 0.3, -0.003, 32'000}}) {
     for (const double c : {45.0, 25.0, 5.0, -15.0}) {
-      const double factor = std::exp(n.energy / 8.314462618 * (1 / (c + 273.15) - 1 / 298.15)) - 1;
+      const double factor =
+          std::exp(std::min(4.5, n.energy / 8.314462618 * (1 / (c + 273.15) - 1 / 298.15))) - 1;
       for (const double h : {-1.0, 0.3, 1.0}) {
         TablePoint<double> at{};
         at.ocv_v = 3.3;
