@@ -63,11 +63,17 @@ struct JointModel {
   std::vector<JointUnknown> unknowns;
 };
 
+/// Place of a mechanism in the model. Throws std::invalid_argument if it is missing.
+std::size_t place_of(const JointModel& model, std::size_t mechanism);
+
+/// Mean of a column of [rc].
+double mean_of(const model::Column<double, model::max_rc_nodes>& column);
+
 struct JointFit {
-  Eigen::VectorXd value, std;            ///< of the unknowns; std counts a run of residuals once
-  Eigen::VectorXi at_bound;              ///< -1 lower, 1 upper, 0 inside
-  std::vector<RecordingState> states;    ///< of the recordings
-  std::vector<double> rmse_v;            ///< of the recordings, all rows that count
+  Eigen::VectorXd value, std;          ///< of the unknowns; std counts a run of residuals once
+  Eigen::VectorXi at_bound;            ///< -1 lower, 1 upper, 0 inside
+  std::vector<RecordingState> states;  ///< of the recordings
+  std::vector<double> rmse_v;          ///< of the recordings, all rows that count
   Optimum optimum;
 };
 
