@@ -208,6 +208,26 @@ ModelErrors errors_of(const std::vector<LeftOutError>& all) {
   return errors;
 }
 
+IdentifiedExtent extent_of(const JointModel& model, std::span<const JointRecording> recordings) {
+  IdentifiedExtent e;
+  for (const JointRecording& r : recordings) {
+    if (const auto c = mean_temperature_c(r)) {
+      e.temperature_min_c = std::min(e.temperature_min_c.value_or(*c), *c);
+      e.temperature_max_c = std::max(e.temperature_max_c.value_or(*c), *c);
+    }
+    const std::vector<double> soc = simulate(model, r, {}).soc;
+    for (std::size_t k = 0; k < r.data.size(); ++k) {
+      if (!std::isfinite(r.data.voltage_v[k])) continue;
+      e.soc_min = std::min(e.soc_min, soc[k]);
+      e.soc_max = std::max(e.soc_max, soc[k]);
+      if (std::isfinite(r.data.current_a[k]))
+        e.current_max_a = std::max(e.current_max_a, std::abs(r.data.current_a[k]));
+    }
+    e.duration_s = std::max(e.duration_s, r.data.time_s.back() - r.data.time_s.front());
+  }
+  return e;
+}
+
 }  // namespace
 
 std::vector<std::vector<std::size_t>> by_temperature(std::span<const JointRecording> recordings) {
@@ -274,6 +294,7 @@ StructureChoice choose_structure(const std::vector<JointCandidate>& candidates,
     }
   }
   choice.errors = errors_of(choice.left_outs);
+  choice.extent = extent_of(choice.model, recordings);
   for (Tried& t : tried) choice.candidates.push_back(std::move(t.result));
   return choice;
 }

@@ -62,6 +62,14 @@ struct ModelErrors {
   double initial_soc = 0, model_v = 0, correlation_s = 0;
 };
 
+/// Where the recordings of a fit have been: rows whose voltage counts.
+struct IdentifiedExtent {
+  std::optional<double> temperature_min_c, temperature_max_c;
+  double soc_min = 1, soc_max = 0;
+  double current_max_a = 0;  ///< either sign
+  double duration_s = 0;     ///< of the longest recording
+};
+
 struct StructureChoice {
   std::string left_out;            ///< what a part is: "temperature", "recording", "second half"
   std::vector<std::string> parts;  ///< names of the left-out parts
@@ -71,6 +79,7 @@ struct StructureChoice {
   JointFit fit;                         ///< of the chosen candidate to all recordings
   std::vector<LeftOutError> left_outs;  ///< of the chosen candidate
   ModelErrors errors;
+  IdentifiedExtent extent;
 };
 
 /// Throws as fit_joint() does.

@@ -168,6 +168,13 @@ Json joint_of(const std::optional<workflow::JointResult>& joint) {
                     {"initial_soc", errors.initial_soc},
                     {"model_v", errors.model_v},
                     {"correlation_s", errors.correlation_s}};
+  const identification::IdentifiedExtent& extent = choice.extent;
+  json["extent"] = {{"temperature_min_c", optional(extent.temperature_min_c)},
+                    {"temperature_max_c", optional(extent.temperature_max_c)},
+                    {"soc_min", extent.soc_min},
+                    {"soc_max", extent.soc_max},
+                    {"current_max_a", extent.current_max_a},
+                    {"duration_s", extent.duration_s}};
   return json;
 }
 

@@ -184,8 +184,7 @@ void put(const JointResult& joint, files::CellFile& cell) {
   const id::StructureChoice& choice = joint.choice;
   put_values(choice, cell);
   put_noise(choice.errors, cell.parameters);
-  // Place of the range in which the model was identified ([range], tolerance.resistance_per_ev): its values are
-  // choice.errors.resistance_per_ev and the extremes of the recordings.
+  // Place of [range] and tolerance.resistance_per_ev of the cell file: choice.extent, choice.errors.resistance_per_ev.
   const id::CandidateResult& winner = choice.candidates[choice.chosen];
   const std::string what = fmt::format(
       "{}: one fit of all recordings at {} temperature{}, {:.1f} mV RMS; {:.1f} mV where one {} was left out",
