@@ -190,6 +190,66 @@ Json matrix_of(const Eigen::MatrixXd& matrix) {
 
 }  // namespace
 
+namespace {
+
+Json left_out_of(const identification::LeftOutError& e) {
+  return {{"recording", e.name},
+          {"temperature_c", optional(e.temperature_c)},
+          {"rmse_v", e.rmse_v},
+          {"resistance_error", e.resistance_error},
+          {"soc_error", e.soc_error},
+          {"rest_v", e.rest_v},
+          {"correlation_s", e.correlation_s},
+          {"beyond_per_ev", e.beyond_per_ev}};
+}
+
+/// Null without --extend.
+Json joint_of(const std::optional<workflow::JointResult>& joint) {
+  if (!joint) return nullptr;
+  const identification::StructureChoice& choice = joint->choice;
+  Json json = {{"left_out", choice.left_out}, {"parts", choice.parts}};
+  for (const identification::CandidateResult& c : choice.candidates) {
+    json["candidates"].push_back({{"name", c.name},
+                                  {"unknowns", c.unknowns},
+                                  {"fitted_rmse_v", c.fitted_rmse_v},
+                                  {"left_out_rmse_v", c.left_out_rmse_v},
+                                  {"left_out_v", c.left_out_v},
+                                  {"chosen", c.chosen}});
+  }
+  for (std::size_t k = 0; k < choice.model.unknowns.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    json["parameters"].push_back({{"name", choice.model.unknowns[k].name()},
+                                  {"value", choice.fit.value[i]},
+                                  {"std", choice.fit.std[i]},
+                                  {"at_bound", choice.fit.at_bound[i] != 0}});
+  }
+  for (std::size_t k = 0; k < joint->recordings.size(); ++k) {
+    json["recordings"].push_back({{"recording", joint->recordings[k]},
+                                  {"rmse_v", choice.fit.rmse_v[k]},
+                                  {"r0_change", choice.fit.states[k].r0_change},
+                                  {"branch_position", choice.fit.states[k].branch_position}});
+  }
+  json["left_outs"] = json["held_out"] = Json::array();
+  for (const identification::LeftOutError& e : choice.left_outs) json["left_outs"].push_back(left_out_of(e));
+  for (const identification::LeftOutError& e : joint->held_out) json["held_out"].push_back(left_out_of(e));
+  const identification::ModelErrors& errors = choice.errors;
+  json["errors"] = {{"resistance_fraction", errors.resistance_fraction},
+                    {"resistance_per_ev", errors.resistance_per_ev},
+                    {"initial_soc", errors.initial_soc},
+                    {"model_v", errors.model_v},
+                    {"correlation_s", errors.correlation_s}};
+  const identification::IdentifiedExtent& extent = choice.extent;
+  json["extent"] = {{"temperature_min_c", optional(extent.temperature_min_c)},
+                    {"temperature_max_c", optional(extent.temperature_max_c)},
+                    {"soc_min", extent.soc_min},
+                    {"soc_max", extent.soc_max},
+                    {"current_max_a", extent.current_max_a},
+                    {"duration_s", extent.duration_s}};
+  return json;
+}
+
+}  // namespace
+
 std::string json_of(const workflow::IdentifyResult& r) {
   const identification::Identification& i = r.identification;
   Json json;
@@ -215,6 +275,7 @@ std::string json_of(const workflow::IdentifyResult& r) {
   json["initial_state"] = i.initial.empty() ? Json(nullptr) : state(i.initial.front());
   json["initial_states"] = Json::array();
   for (const identification::InitialState& s : i.initial) json["initial_states"].push_back(state(s));
+  json["joint"] = joint_of(r.joint);
   json["coulombic_efficiency"] = optional(r.coulombic_efficiency);
   json["iterations"] = i.optimum.iterations;
   json["evaluations"] = i.optimum.evaluations;

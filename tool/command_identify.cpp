@@ -41,6 +41,33 @@ id::Method method_of(const std::string& name) {
   throw files::BadInput("--optimizer", 1, "no such optimiser '" + name + "', expected one of: gn, agn, lm, sd, nls");
 }
 
+/// Candidates with their errors on left-out parts, the chosen circuit, and the held-out recordings.
+std::string joint_summary(const workflow::JointResult& joint) {
+  const id::StructureChoice& choice = joint.choice;
+  std::string text =
+      fmt::format("Circuit over all recordings, RMSE in mV with each {} left out in turn:\n", choice.left_out);
+  text +=
+      fmt::format("  {:5} {:>8} {:>8} {:>8}  {}\n", "", "unknowns", "fit", "left out", fmt::join(choice.parts, ", "));
+  for (const id::CandidateResult& c : choice.candidates) {
+    text += fmt::format("  {:5} {:8} {:8.2f} {:8.2f} ", c.chosen ? "->" : "", c.unknowns, 1e3 * c.fitted_rmse_v,
+                        1e3 * c.left_out_v);
+    for (const double v : c.left_out_rmse_v) text += fmt::format(" {:.2f}", 1e3 * v);
+    text += "  " + c.name + "\n";
+  }
+  for (std::size_t k = 0; k < choice.model.unknowns.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    text += fmt::format("  {:50} {:10.5g} +- {:.2g}{}\n", choice.model.unknowns[k].name(), choice.fit.value[i],
+                        choice.fit.std[i], choice.fit.at_bound[i] != 0 ? "  at its bound" : "");
+  }
+  for (std::size_t k = 0; k < joint.recordings.size(); ++k) {
+    text += fmt::format("  {}: {:.2f} mV, R0 {:+.0f} %\n", joint.recordings[k], 1e3 * choice.fit.rmse_v[k],
+                        100 * choice.fit.states[k].r0_change);
+  }
+  for (const id::LeftOutError& e : joint.held_out)
+    text += fmt::format("Held out {}: {:.2f} mV RMS.\n", e.name, 1e3 * e.rmse_v);
+  return text;
+}
+
 std::string summary(const workflow::IdentifyResult& result) {
   const id::Identification& found = result.identification;
   std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n",
@@ -53,6 +80,7 @@ std::string summary(const workflow::IdentifyResult& result) {
   }
   for (const auto& [path, fit] : result.validations)
     text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
+  if (result.joint) text += joint_summary(*result.joint);
   return text + (result.cell.empty() ? "No cell file was written." : "Cell file: " + result.out);
 }
 
@@ -76,7 +104,7 @@ class IdentifyCommand final : public Command {
   int run() override {
     output_.set_own(o_.out);
     std::vector<std::string> inputs = {o_.start};
-    for (const auto* files : {&o_.recordings, &o_.ocv, &o_.validate})
+    for (const auto* files : {&o_.recordings, &o_.ocv, &o_.validate, &o_.hold_out})
       inputs.insert(inputs.end(), files->begin(), files->end());
     output_.protect(inputs);
     complete_reading(o_.reading);
@@ -168,6 +196,10 @@ class IdentifyCommand final : public Command {
     c.add_flag("--extend", o_.extend,
                "add what an estimator needs: hysteresis between slow charge and discharge, resistances that depend on "
                "the temperature, sensor and model errors as states of the filter");
+    c.add_option("--hold-out", o_.hold_out,
+                 "with --extend: recordings whose prediction is reported; nothing is identified from them")
+        ->needs("--extend")
+        ->type_name("FILE");
     c.add_option("--branch-position,--lean", o_.ocv_branch,
                  "position of the OCV between slow discharge (-1) and slow charge (1); identified if not given")
         ->check(Within(-1.0, 1.0));

@@ -12,6 +12,7 @@
 #include "files/cell_fields.hpp"
 #include "files/recording.hpp"
 #include "host_sim/simulation.hpp"
+#include "identification/joint_fit.hpp"
 #include "identification/ocv_pieces.hpp"
 #include "workflow/reference_temperature.hpp"
 #include "workflow/slow_parts.hpp"
@@ -210,63 +211,6 @@ model::MechanismSetting default_mechanism(std::string_view id, const model::Cell
   return model::default_setting(model::mechanism_index(id), cell);
 }
 
-/// Activation energy in J/mol of a column of the tables: least squares of ln R over 1 / T, clamped to 0 .. most.
-template <class Value>
-double activation_j_per_mol(const std::vector<files::TemperatureTable>& tables, double most, Value value) {
-  double x = 0, y = 0, xx = 0, xy = 0;
-  const auto n = static_cast<double>(tables.size());
-  for (const files::TemperatureTable& t : tables) {
-    const double inverse = 1 / (t.temperature_c + 273.15), log = std::log(value(t.rc));
-    x += inverse;
-    y += log;
-    xx += inverse * inverse;
-    xy += inverse * log;
-  }
-  return std::clamp(model::mechanism_detail::gas_constant_j_per_mol_k * (n * xy - x * y) / (n * xx - x * x), 0.0, most);
-}
-
-double mean_of(const model::Column<double, model::max_rc_nodes>& column) {
-  double sum = 0;
-  for (std::size_t k = 0; k < column.size; ++k) sum += column[k];
-  return sum / static_cast<double>(column.size);
-}
-
-/// From the resistances at several temperatures. Nothing if there is only one temperature. Its reference is the
-/// temperature of [rc]. source: gets the origin of the values.
-std::optional<model::MechanismSetting> temperature_dependence(const files::CellFile& cell, std::string& source) {
-  const std::vector<files::TemperatureTable>& tables = cell.at_temperature;
-  const double reference_c = cell.parameters.reference_temperature_c;
-  model::MechanismSetting setting = default_mechanism("temperature_resistance", cell.parameters);
-  // typical for a lithium iron phosphate cell: activation energy of the reactions in R0, and their share of R0
-  constexpr double typical_j_per_mol = 50'000, typical_share = 0.3;
-  setting.value = {typical_j_per_mol, 0, reference_c, typical_share, 0, 0, 0, 1};
-  if (tables.size() > 1) {
-    setting.value[1] = activation_j_per_mol(tables, 90'000, [](const auto& rc) { return mean_of(rc.r1_ohm); });
-    // the share by least squares, with the typical energy
-    const auto nearest = std::min_element(tables.begin(), tables.end(), [&](const auto& a, const auto& b) {
-      return std::abs(a.temperature_c - reference_c) < std::abs(b.temperature_c - reference_c);
-    });
-    const auto increase = [&](double temperature_c) {
-      return std::exp(model::mechanism_detail::energy_over_rt(typical_j_per_mol, reference_c) *
-                      (reference_c - temperature_c) / (temperature_c + 273.15)) -
-             1;
-    };
-    double xx = 0, xy = 0;
-    for (const files::TemperatureTable& t : tables) {
-      const double x = increase(t.temperature_c) - increase(nearest->temperature_c);
-      const double y = mean_of(t.rc.r0_ohm) / mean_of(nearest->rc.r0_ohm) - 1;
-      xx += x * x;
-      xy += x * y;
-    }
-    setting.value[2] = nearest->temperature_c;
-    setting.value[3] = std::clamp(xy / xx, 0.02, 1.0);
-    source = fmt::format("resistances identified at {} temperatures; the activation energy of R0 is a typical value",
-                         tables.size());
-    return setting;
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell) {
@@ -274,7 +218,7 @@ void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell) {
   const double between_v = model::plateau_half_gap_v(p.ocv);
   if (!(between_v > 0)) return;
   // overvoltage of the slow current (C/30 to C/35)
-  const double over_v = p.capacity_ah / 30 * (mean_of(p.rc.r0_ohm) + mean_of(p.rc.r1_ohm));
+  const double over_v = p.capacity_ah / 30 * (id::mean_of(p.rc.r0_ohm) + id::mean_of(p.rc.r1_ohm));
   model::MechanismSetting setting = default_mechanism("ocv_hysteresis", p);
   setting.value[0] = std::clamp(between_v - over_v, 0.1 * between_v, 0.07);
   setting.value[4] = 1;
@@ -310,62 +254,6 @@ id::DataSet without_mechanisms(const files::CellFile& cell, const Identification
   for (std::size_t k = 0; k < record.data.size(); ++k)
     record.data.voltage_v.edit()[k] -= with[k].voltage_v - without[k].voltage_v;
   return record;
-}
-
-void extend(const std::vector<IdentificationData>& data, files::CellFile& cell) {
-  model::CellParameters<>& p = cell.parameters;
-  const double capacity_ah = p.capacity_ah;
-  std::string source;
-  if (const auto setting = temperature_dependence(cell, source)) {
-    files::put_mechanism(cell, *setting);
-    if (const double identified_c = setting->value[2]; identified_c != p.reference_temperature_c) {
-      move_resistances(cell, p.reference_temperature_c);
-      cell.sources["rc"] += fmt::format("; moved from {:g} to {:g} degrees C by mechanism.temperature_resistance",
-                                        identified_c, p.reference_temperature_c);
-    }
-    cell.sources["mechanism.temperature_resistance"] = source;
-  }
-  const double half_gap_v = host_sim::value_of(cell.mechanisms, "ocv_hysteresis", 0);
-  // residual of longer than ten minutes, and a minor hysteresis loop that the recordings need not have shown
-  constexpr double lasting_s = 600, least_v = 0.003;
-  const auto tables = model::prepare<double, model::max_intervals>(p);
-  double squares_v2 = 0;
-  std::size_t count = 0;
-  for (const IdentificationData& of : data) {
-    const id::Data& d = of.record.data;
-    const auto rows = host_sim::simulate({.cell = tables,
-                                          .capacity_ah = capacity_ah,
-                                          .mechanisms = cell.mechanisms,
-                                          .time_s = d.time_s,
-                                          .current_a = d.current_a,
-                                          .temperature_c = of.temperature_c,
-                                          .initial_soc = of.record.initial_soc});
-    double sum_v = 0;
-    std::size_t in_sum = 0;
-    const auto add_mean = [&] {
-      if (in_sum > 0) squares_v2 += sum_v * sum_v / static_cast<double>(in_sum);
-      count += in_sum;
-      sum_v = 0;
-      in_sum = 0;
-    };
-    for (std::size_t k = 0; k < d.size(); ++k) {
-      if (k > 0 && std::floor(d.time_s[k] / lasting_s) != std::floor(d.time_s[k - 1] / lasting_s)) add_mean();
-      if (!std::isfinite(d.voltage_v[k])) continue;
-      sum_v += d.voltage_v[k] - rows[k].voltage_v;
-      ++in_sum;
-    }
-    add_mean();
-  }
-  const double residual_v = count > 0 ? std::sqrt(squares_v2 / static_cast<double>(count)) : 0;
-  p.noise.model_v = std::clamp(std::hypot(residual_v, half_gap_v / 4), least_v, 0.2);
-  p.noise.model_correlation_s = 3'000;  // until the current has reversed for a large part of an hour
-  p.noise.rest_v = std::max(p.noise.model_v, 0.01);
-  // a current sensor with an offset of up to a hundredth of the 1C current, constant over a working day
-  p.noise.current_offset_a = 0.01 * capacity_ah;
-  p.noise.current_offset_correlation_s = 36'000;
-  p.noise.current_at_rest_a = 0.002 * capacity_ah;
-  p.noise.current_gain = 0.007;
-  p.noise.errors_are_states = true;
 }
 
 namespace {

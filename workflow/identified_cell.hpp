@@ -36,16 +36,10 @@ void identify_hysteresis(const OcvResult& ocv, files::CellFile& cell);
 /// The data set with the effect of the cell's mechanisms subtracted from its voltage, to identify the circuit alone.
 identification::DataSet without_mechanisms(const files::CellFile& cell, const IdentificationData& of);
 
-/// Source of the noise that extend() writes.
+/// Source of the noise of an extended cell file.
 inline constexpr const char* extended_noise =
-    "model: residual of longer than ten minutes, and a minor loop of the hysteresis; current offset: up to a hundredth "
-    "of the 1C current, constant over a working day; at rest: a fifth of that; gain: half a percent of the reading and "
-    "half a percent of the capacity";
-
-/// Adds what an estimator needs in addition: resistances that depend on the temperature, persistent errors as states of
-/// the filter, and the noise that belongs to them. data: the recordings that the cell was identified from, as measured.
-/// The resistances move to the cell's reference temperature if it is known how they depend on the temperature.
-void extend(const std::vector<IdentificationData>& data, files::CellFile& cell);
+    "model: prediction of left-out recordings; current offset: up to a hundredth of the 1C current, constant over a "
+    "working day; at rest: a fifth of that; gain: half a percent of the reading and half a percent of the capacity";
 
 /// Writes noise and tolerance into `p`: noise of the measuring chain from the rests of the recordings, noise of the
 /// model from the residual `judge` and from the gap between the OCV branches.

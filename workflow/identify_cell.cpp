@@ -96,15 +96,14 @@ Inputs read_inputs(const IdentifyOptions& options, StartCell& start, std::vector
   return inputs;
 }
 
-/// Compares with the validation recordings. statistics: FitStatistics of a data set.
+/// Compares with the validation recordings. statistics: FitStatistics of their data.
 template <class Statistics>
 void validate(const IdentifyOptions& options, DataOptions data, Statistics statistics, IdentifyResult& result) {
   data.window = options.validate_window.value_or(options.window);
   for (const std::string& path : options.validate) {
-    const id::DataSet data_set =
-        identification_data(files::read_recording(path, files::VoltageColumn::required, options.reading), data).record;
-    result.validations.emplace_back(path, statistics(data_set));
-    result.data.push_back(data_set.data);
+    const IdentificationData measured = identification_data(files::read_recording(path, files::VoltageColumn::required, options.reading), data);
+    result.validations.emplace_back(path, statistics(measured));
+    result.data.push_back(measured.record.data);
   }
   if (!result.validations.empty()) result.validation = result.validations.front().second;
 }
@@ -151,7 +150,10 @@ void identify_linear_cell(const IdentifyOptions& options, StartCell start, const
   result.data = {data_set.data};
   validate(
       options, inputs.options,
-      [&](const id::DataSet& d) { return id::validate(found.model, d.data, found.identification.fading); }, result);
+      [&](const IdentificationData& d) {
+        return id::validate(found.model, d.record.data, found.identification.fading);
+      },
+      result);
 
   files::CellFile& cell = start.cell;
   const auto& p = result.identification.parameters;  // b1, R0, R1, C1
@@ -239,7 +241,7 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
                               grey_box, options.method);
     for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
     check_fit(options, result);
-    if (groups.size() > 1)
+    if (groups.size() > 1 && !options.extend)
       start.cell.at_temperature = temperature_tables(options, groups, main_group, grey_box, result);
   } catch (const std::invalid_argument& error) {
     throw files::BadInput(options.recordings.front(), 1, error.what());
@@ -272,11 +274,11 @@ void write_sources(const IdentifyOptions& options, const IdentifyResult& result,
 }
 
 /// Warns if [rc] is not at the temperature that the cell file states. identified_c: temperature of its recordings.
-void check_reference(const files::CellFile& cell, double identified_c, bool extended,
+/// moved: recordings at several temperatures have moved it there.
+void check_reference(const files::CellFile& cell, double identified_c, bool moved,
                      std::vector<measurement::Warning>& warnings) {
   constexpr double near_k = 5;  // as far apart as recordings of one temperature can be
   const double reference_c = cell.parameters.reference_temperature_c;
-  const bool moved = extended && cell.at_temperature.size() > 1;
   if (moved || std::abs(identified_c - reference_c) <= near_k) return;
   warnings.push_back({"reference_temperature",
                       fmt::format("R0, R1, C1 were identified at {:g} degrees C, but the reference temperature of the "
@@ -285,14 +287,33 @@ void check_reference(const files::CellFile& cell, double identified_c, bool exte
                                   identified_c, reference_c, identified_c)});
 }
 
+/// One fit over all recordings, and the prediction of those that were held out.
+void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs, IdentifyResult& result,
+                            files::CellFile& cell) {
+  const double capacity_ah = cell.parameters.capacity_ah;
+  std::vector<id::JointRecording> recordings;
+  for (std::size_t k = 0; k < inputs.measured.size(); ++k) {
+    const IdentificationData& of = inputs.measured[k];
+    recordings.push_back(joint_recording(inputs.recordings[k], of, of.record.initial_soc, capacity_ah));
+  }
+  JointResult joint = identify_jointly(cell, covers_both_directions(recordings), recordings);
+  hold_out(options.hold_out, inputs.options, joint);
+  for (const measurement::Warning& w : warnings_of(joint)) result.warnings.push_back(w);
+  put(joint, cell);
+  result.joint = std::move(joint);
+}
+
 void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, const Inputs& inputs,
                             IdentifyResult& result) {
   const double identified_c = fit_grey_box(options, start, inputs, result);
-  validate(
-      options, inputs.options,
-      [&](const id::DataSet& d) { return id::validate(result.identification.cell, d, result.identification.fading); },
-      result);
-
+  if (!options.extend) {
+    validate(
+        options, inputs.options,
+        [&](const IdentificationData& d) {
+          return id::validate(result.identification.cell, d.record, result.identification.fading);
+        },
+        result);
+  }
   files::CellFile& cell = start.cell;
   cell.parameters = result.identification.cell;
   auto& noise = cell.parameters.noise;
@@ -313,8 +334,13 @@ void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, con
     noise.current_unknown_a *= cell.parameters.capacity_ah / start.capacity_ah;
   }
   state_reference(cell, !options.ocv.empty());
-  if (options.extend) extend(inputs.measured, cell);
-  check_reference(cell, identified_c, options.extend, result.warnings);
+  if (options.extend) {
+    identify_joint_circuit(options, inputs, result, cell);
+    const double fading = result.identification.fading;
+    validate(
+        options, inputs.options, [&](const IdentificationData& d) { return compare(cell, d, fading); }, result);
+  }
+  check_reference(cell, identified_c, result.joint && result.joint->temperatures > 1, result.warnings);
   if (const model::CellFault fault = model::first_fault(cell.parameters); fault.what != nullptr) {
     throw files::BadInput(options.out, 1,
                           out_of_range(fault) + "; more or other recordings, or fewer --nodes, may help");

@@ -12,6 +12,7 @@
 #include "identification/linear_models.hpp"
 #include "workflow/cell_size.hpp"
 #include "workflow/identification_data.hpp"
+#include "workflow/joint_identification.hpp"
 
 namespace bms::workflow {
 
@@ -32,6 +33,7 @@ struct IdentifyOptions {
   InitialSoc initial_soc;
   SocWindow window;                               ///< samples that count
   std::vector<std::string> validate;              ///< files that are only compared with
+  std::vector<std::string> hold_out;              ///< with `extend`: files whose prediction is reported
   std::optional<SocWindow> validate_window;       ///< not given: `window`
   std::vector<double> nodes;                      ///< SOC nodes of R0, R1, C1; empty: by the range of the recordings
   double filter_hz = 0;                           ///< cut-off frequency of the low-pass on the current; 0: no filter
@@ -58,6 +60,7 @@ struct IdentifyResult {
   std::optional<identification::FitStatistics> validation;  ///< of the first validation recording
   std::vector<std::pair<std::string, identification::FitStatistics>> validations;  ///< of all, by path
   std::vector<identification::Data> data;  ///< the first that was identified from, then the validation data
+  std::optional<JointResult> joint;        ///< with `extend`
   std::optional<double> coulombic_efficiency;
   double wall_s = 0;
   std::vector<measurement::Warning> warnings;

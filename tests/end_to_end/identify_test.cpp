@@ -216,7 +216,7 @@ TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
   const std::string cell = content(path("cell.toml"));
   EXPECT_THAT(cell, HasSubstr("\nreference_temperature_c = 20.0\n"));
   EXPECT_THAT(cell, HasSubstr("\nreference_c = 20.0\n"));
-  EXPECT_THAT(cell, HasSubstr("moved from 18.5 to 20 degrees C"));
+  EXPECT_THAT(cell, HasSubstr("one fit of all recordings at 2 temperatures"));
   const auto of_rc = [](const std::string& text, const std::string& key) {
     return std::stod(text.substr(text.find(key + " = [", text.find("[rc]")) + key.size() + 4));
   };

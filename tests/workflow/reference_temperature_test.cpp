@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "host_sim/simulation.hpp"
-
 namespace bms::workflow {
 namespace {
 
@@ -21,43 +19,6 @@ files::CellFile warm_cell() {
   s.value[3] = 0.3;
   files::put_mechanism(cell, s);
   return cell;
-}
-
-std::vector<double> voltages(const files::CellFile& cell) {
-  const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
-  std::vector<double> time_s, current_a, temperature_c, v;
-  for (int k = 0; k < 3'000; ++k) {
-    time_s.push_back(k);
-    current_a.push_back(k / 100 % 3 == 0 ? 0 : 6 - k / 100 % 5 * 3);
-    temperature_c.push_back(-10 + k * 0.02);
-  }
-  for (const auto& row : host_sim::simulate({.cell = tables,
-                         .capacity_ah = cell.parameters.capacity_ah,
-                         .mechanisms = cell.mechanisms,
-                         .time_s = time_s,
-                         .current_a = current_a,
-                         .temperature_c = temperature_c,
-                         .initial_soc = 0.6}))
-    v.push_back(row.voltage_v);
-  return v;
-}
-
-TEST(ReferenceTemperature, MovedResistancesGiveTheSameVoltages) {
-  const files::CellFile before = warm_cell();
-  for (const double c : {20.0, 33.0}) {
-    files::CellFile after = before;
-    move_resistances(after, c);
-    EXPECT_NE(after.parameters.rc.r0_ohm[4], before.parameters.rc.r0_ohm[4]);
-    EXPECT_EQ(after.mechanisms[0].value[2], c);
-    const auto v = voltages(after), expected = voltages(before);
-    for (std::size_t k = 0; k < v.size(); ++k) ASSERT_NEAR(v[k], expected[k], 1e-12) << k;
-  }
-}
-
-TEST(ReferenceTemperature, WithoutTheMechanismNothingMoves) {
-  files::CellFile cell = files::read_cell("table9");
-  move_resistances(cell, -10);
-  EXPECT_EQ(files::cell_text(cell), files::cell_text(files::read_cell("table9")));
 }
 
 TEST(ReferenceTemperature, IdentifiedTablesChangeTheReferenceOfWhatBelongsToThem) {
