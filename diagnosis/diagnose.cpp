@@ -124,10 +124,16 @@ const char* name_of(Verdict verdict) {
   return "";
 }
 
-std::vector<MechanismSetting> later_recording(const Hypothesis& extended) {
+std::vector<MechanismSetting> later_recording(const Hypothesis& extended, double initial_soc) {
   std::vector<MechanismSetting> later;
-  for (MechanismSetting s : extended.settings) {
-    if (knowledge_of(s.index).carry_over(s)) later.push_back(s);
+  for (std::size_t k = 0; k < extended.settings.size(); ++k) {
+    MechanismSetting s = extended.settings[k];
+    if (!knowledge_of(s.index).carry_over(s)) continue;
+    if (k < extended.own)
+      s = extended.settings[k];
+    else if (initial_soc > thresholds.facts.charged_soc)
+      knowledge_of(s.index).after_full_charge(s);
+    later.push_back(s);
   }
   return later;
 }

@@ -23,8 +23,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
                    std::vector<PreparedRecording> records, const Options& options = {});
 
 /// What holds for a later recording of the same cell and instruments: a contact that has changed stays so; when bursts
-/// fell and where the first recording began does not hold.
-std::vector<MechanismSetting> later_recording(const Hypothesis& extended);
+/// fell and where the first recording began does not hold. initial_soc: at its start; a cell that is full was charged
+/// last.
+std::vector<MechanismSetting> later_recording(const Hypothesis& extended, double initial_soc = 0);
 
 /// Voltage that would be read in open loop from the record's initial soc [V]. soc: filled in unless nullptr.
 std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,
