@@ -16,6 +16,7 @@ namespace bms::diagnosis {
 struct Options {
   std::size_t most_mechanisms = 6;
   Progress progress;
+  Stopped stopped;  ///< asked between fits; the diagnosis then ends with what it knows so far
 };
 
 /// own: mechanisms of the cell file. records: as read, in order of time; readings that cannot be used are removed here.

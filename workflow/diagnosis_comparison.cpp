@@ -151,7 +151,7 @@ files::CellFile extended_cell(const DiagnoseResult& r) {
   for (const char* table : {"ocv", "rc"})
     cell.sources[table] += fmt::format("; adjusted within its tolerance to {}, together with the findings", files);
   for (const Finding& f : r.diagnosis.findings) add_finding(r, files, f, cell);
-  widen_tolerance(r, files, cell);
+  if (!r.diagnosis.interrupted) widen_tolerance(r, files, cell);
   return cell;
 }
 
