@@ -99,7 +99,7 @@ Outcome run_case(const truth::Case& c) {
 
   std::vector<double> holdout_v;
   if (!c.holdout.time_s.empty()) {
-    holdout_v = diagnosis::predict(d.cell, diagnosis::later_recording(d.extended),
+    holdout_v = diagnosis::predict(d.cell, diagnosis::later_recording(d.extended, c.holdout_initial_soc),
                                    record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
   compare(o, c, d.spans, holdout_v);

@@ -78,6 +78,22 @@ void Calibration::add_ocv(const model::CellParameters<>& cell, SocRange range) {
   }
 }
 
+namespace {
+
+/// Returns true if the identification knew R0 and R1 so badly that only their sum is known.
+bool known_as_sum(const model::CellParameters<>& cell) {
+  const auto& rc = cell.rc;
+  if (rc.r0_std_ohm.size == 0 || rc.r1_std_ohm.size == 0) return false;
+  for (std::size_t k = 0; k < rc.soc.size; ++k) {
+    if (rc.r0_std_ohm[k] > calibration_limits.known_alone * rc.r0_ohm[k] &&
+        rc.r1_std_ohm[k] > calibration_limits.known_alone * rc.r1_ohm[k])
+      return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 void Calibration::add_resistances(const model::CellParameters<>& cell, SocRange range) {
   const double fraction = std::max(cell.tolerance.resistance_fraction, calibration_limits.resistance_at_least);
   const double first_node = std::min(cell.rc.soc[0], calibration_limits.first_node_soc),
@@ -85,21 +101,32 @@ void Calibration::add_resistances(const model::CellParameters<>& cell, SocRange 
   const auto tolerance_at = [&](double soc) {
     return fraction * (1 + std::max({0.0, first_node - soc, soc - last_node}) / calibration_limits.beyond_nodes_soc);
   };
+  const auto identified = [&](const auto& value, const auto& deviation, double soc) {
+    return deviation.size == 0 ? 0.0
+                               : model::cell_detail::rc_value(cell.rc, deviation, soc) /
+                                     model::cell_detail::rc_value(cell.rc, value, soc);
+  };
+  const bool sum_alone = known_as_sum(cell);
   // the tolerance, or the identification's own standard deviation if it is larger
-  const auto sigma_of = [&](const auto& value, const auto& deviation, double times) {
-    return [&, times](double soc) {
-      const double identified = deviation.size == 0 ? 0.0
-                                                    : model::cell_detail::rc_value(cell.rc, deviation, soc) /
-                                                          model::cell_detail::rc_value(cell.rc, value, soc);
-      return std::max(times * tolerance_at(soc), identified);
+  const auto sigma_of = [&](const auto& value, const auto& deviation, double times, bool in_sum = false) {
+    return [&, times, in_sum](double soc) {
+      return std::max(times * tolerance_at(soc), in_sum ? 0.0 : identified(value, deviation, soc));
     };
   };
   const auto knots = [&](double step) { return even_knots(range.low, range.high, step); };
-  r0_ = hat_functions(knots(calibration_limits.r0_knots_soc), sigma_of(cell.rc.r0_ohm, cell.rc.r0_std_ohm, 1));
-  r1_ = hat_functions(knots(calibration_limits.rc_knots_soc),
-                      sigma_of(cell.rc.r1_ohm, cell.rc.r1_std_ohm, calibration_limits.r1_times));
+  r0_ =
+      hat_functions(knots(calibration_limits.r0_knots_soc), sigma_of(cell.rc.r0_ohm, cell.rc.r0_std_ohm, 1, sum_alone));
+  r1_ = hat_functions(
+      knots(calibration_limits.rc_knots_soc),
+      sigma_of(cell.rc.r1_ohm, cell.rc.r1_std_ohm, sum_alone ? 1 : calibration_limits.r1_times, sum_alone));
   c1_ = hat_functions(knots(calibration_limits.rc_knots_soc),
                       sigma_of(cell.rc.c1_f, cell.rc.c1_std_f, calibration_limits.c1_times));
+  if (!sum_alone) return;
+  share_ = hat_functions(knots(calibration_limits.rc_knots_soc), [&](double soc) {
+    const double r0 = identified(cell.rc.r0_ohm, cell.rc.r0_std_ohm, soc),
+                 r1 = identified(cell.rc.r1_ohm, cell.rc.r1_std_ohm, soc);
+    return std::min(std::hypot(r0, r1), calibration_limits.share_sigma_at_most);
+  });
 }
 
 void Calibration::add_record(const model::CellParameters<>& cell, const PreparedRecording& r) {
@@ -113,21 +140,29 @@ void Calibration::add_record(const model::CellParameters<>& cell, const Prepared
   offset_.push_back(hat_functions(std::move(at), [&](double) { return offset_a_; }));
 }
 
-Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records)
+Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch)
     : offset_a_(std::min(cell.noise.current_offset_a, calibration_limits.offset_at_most_c * cell.capacity_ah)) {
   const SocRange range = counted_range(cell, records);
   add_ocv(cell, range);
   add_resistances(cell, range);
   capacity_ = size_++;
   gain_ = size_++;
-  for (const PreparedRecording& r : records) add_record(cell, r);
+  for (const PreparedRecording& r : records) {
+    add_record(cell, r);
+    if (branch) branch_.push_back(size_++);
+  }
 }
 
-model::TablePoint<double> Calibration::change_at(double soc, const std::vector<double>& u) const {
+model::TablePoint<double> Calibration::change_at(double soc, const std::vector<double>& u, double r0_ohm,
+                                                 double r1_ohm) const {
   model::TablePoint<double> point;
   point.ocv_v = 0;
-  point.r0_ohm = point.r1_ohm = point.c1_f = 1;
+  point.c1_f = 1;
+  point.r0_ohm = r0_ohm;
+  point.r1_ohm = r1_ohm;
   adjust(point, soc, u);
+  point.r0_ohm /= r0_ohm;
+  point.r1_ohm /= r1_ohm;
   return point;
 }
 
@@ -167,7 +202,7 @@ model::RcTable<double> Calibration::moved_rc(const model::RcTable<double>& rc, c
   };
   model::RcTable<double> moved;
   for (const double soc : merged(values_of(rc.soc), r0_.knots(), table_limits.nodes_apart_soc, model::max_rc_nodes)) {
-    const model::TablePoint<double> by = change_at(soc, u);
+    const model::TablePoint<double> by = change_at(soc, u, value(rc.r0_ohm, soc), value(rc.r1_ohm, soc));
     moved.soc.push_back(soc);
     moved.r0_ohm.push_back(resistance(rc.r0_ohm, soc, by.r0_ohm));
     moved.r1_ohm.push_back(resistance(rc.r1_ohm, soc, by.r1_ohm));

@@ -11,7 +11,10 @@
 //               standard deviation if that is larger; more beyond the table's nodes, where it is only extrapolated:
 //               towards empty, resistances grow
 //   capacity    one unknown;  gain of the current sensor  one unknown
-//   per record  initial soc; a slow wander of the current sensor's zero, over hours
+//   share       R0's share in R0 + R1, where an identification knew both so badly that only their sum is known (rows
+//               too far apart): the sum stays
+//   per record  initial soc; the branch position of a hysteresis at the start; a slow wander of the current sensor's
+//               zero, over hours
 #pragma once
 
 #include <algorithm>
@@ -77,10 +80,11 @@ class HatFunctions {
   std::size_t first_ = 0;
 };
 
-/// What the base parameters change in a row: the OCV; fractions of R0, R1, C1; the current sensor's zero; fractions of
-/// the capacity and of the gain. Each unknown but the initial soc acts through exactly one of these levers.
+/// What the base parameters change in a row: the OCV; fractions of R0, R1, C1; R0's share in R0 + R1; the current
+/// sensor's zero; fractions of the capacity and of the gain. Each unknown but the initial soc acts through exactly one
+/// of these levers.
 struct Lever {
-  enum : std::size_t { ocv, r0, r1, c1, zero, capacity, gain, count };
+  enum : std::size_t { ocv, r0, r1, c1, share, zero, capacity, gain, count };
 };
 
 class Calibration {
@@ -92,8 +96,8 @@ class Calibration {
     }
   };
 
-  /// records: one at least, none empty.
-  Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records);
+  /// records: one at least, none empty. branch: each recording has a branch position of its own.
+  Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch = false);
 
   /// Number of unknowns: the OCV's first, those of single recordings last.
   std::size_t size() const { return size_; }
@@ -111,6 +115,11 @@ class Calibration {
     at.r0_ohm *= factor(pulled(Lever::r0, r0_.at(soc, u)));
     at.r1_ohm *= factor(pulled(Lever::r1, r1_.at(soc, u)));
     at.c1_f *= factor(pulled(Lever::c1, c1_.at(soc, u)));
+    if (share_.size() == 0) return;
+    using std::exp;
+    const S sum_ohm = at.r0_ohm + at.r1_ohm, odds_ohm = at.r0_ohm * exp(S(pulled(Lever::share, share_.at(soc, u))));
+    at.r0_ohm = sum_ohm * odds_ohm / (odds_ohm + at.r1_ohm);
+    at.r1_ohm = sum_ohm - at.r0_ohm;
   }
   /// f(lever, unknown, change of the lever per unit of the unknown), for all that act on a row. The OCV's come first
   /// among the unknowns because they change no state.
@@ -127,6 +136,7 @@ class Calibration {
     r0_.each(soc, through(Lever::r0));
     r1_.each(soc, through(Lever::r1));
     c1_.each(soc, through(Lever::c1));
+    if (share_.size() > 0) share_.each(soc, through(Lever::share));
     offset_[record].each(time_s, through(Lever::zero));
     f(Lever::capacity, capacity_, thresholds.calibration.capacity_sigma);
     f(Lever::gain, gain_, thresholds.calibration.gain_sigma);
@@ -143,6 +153,13 @@ class Calibration {
   S initial_soc_shift(std::size_t record, const std::vector<S>& u) const {
     return u[initial_soc_[record]] * initial_soc_size(record);
   }
+  /// Of the branch position at the start of a recording.
+  template <class S>
+  S branch_shift(std::size_t record, const std::vector<S>& u) const {
+    return branch_.empty() ? S(0) : S(u[branch_[record]] * thresholds.calibration.branch_sigma);
+  }
+  /// Empty if no recording has a branch position of its own.
+  const std::vector<std::size_t>& branch_unknowns() const { return branch_; }
   double initial_soc_size(std::size_t record) const { return initial_soc_sigma_[record]; }
   template <class S>
   S capacity_loss(const std::vector<S>& u) const {
@@ -185,14 +202,16 @@ class Calibration {
   void add_record(const model::CellParameters<>& cell, const PreparedRecording& r);
   model::OcvTable<double> moved_ocv(const model::OcvTable<double>& ocv, const std::vector<double>& u) const;
   model::RcTable<double> moved_rc(const model::RcTable<double>& rc, const std::vector<double>& u) const;
-  /// Change of the OCV, factors of R0, R1, C1.
-  model::TablePoint<double> change_at(double soc, const std::vector<double>& u) const;
+  /// Change of the OCV, factors of R0, R1, C1. r0_ohm, r1_ohm: of the cell at this soc.
+  model::TablePoint<double> change_at(double soc, const std::vector<double>& u, double r0_ohm = 1,
+                                      double r1_ohm = 1) const;
 
-  HatFunctions ocv_, r0_, r1_, c1_;
+  HatFunctions ocv_, r0_, r1_, c1_, share_;
   std::vector<Corner> corners_;
   std::vector<HatFunctions> offset_;  ///< by record
   std::vector<std::size_t> initial_soc_;
   std::vector<double> initial_soc_sigma_;
+  std::vector<std::size_t> branch_;
   std::size_t capacity_ = 0, gain_ = 0, size_ = 0;
   double offset_a_ = 0;
 };

@@ -39,6 +39,16 @@ struct OnLevers : AtUnknowns<S> {
   }
 };
 
+/// For derivatives of the initial states by the branch position: lane 0.
+template <class S>
+struct FromBranch : AtUnknowns<S> {
+  S branch_shift(std::size_t record) const {
+    S shift = AtUnknowns<S>::branch_shift(record);
+    shift.v[0] += 1;
+    return shift;
+  }
+};
+
 /// The hypothesis' settings as dual numbers.
 template <class Jet>
 std::vector<model::MechanismValues<Jet>> dual_values(const Hypothesis& h) {
@@ -69,6 +79,10 @@ class CarriedStates {
   void restart(Eigen::Index initial_soc_unknown, double initial_soc_size) {
     states_.setZero();
     states_(0, initial_soc_unknown - still_) = initial_soc_size;
+  }
+  /// start: derivatives of the initial states by an unknown.
+  void set_start(Eigen::Index unknown, const Eigen::VectorXd& start) {
+    states_.col(unknown - still_).head(start.size()) = start;
   }
   /// The row's voltage by all unknowns, into out; then the states after the row.
   template <class Out>
@@ -158,6 +172,15 @@ void LikelihoodModel::carry(const Hypothesis& h, const Eigen::VectorXd& u, Colum
   for (std::size_t r = 0; r < records_.size(); ++r) {
     const PreparedRecording& record = records_[r];
     states.restart(static_cast<Eigen::Index>(calibration_.initial_soc_unknown(r)), calibration_.initial_soc_size(r));
+    if (!calibration_.branch_unknowns().empty()) {
+      const SimulationSetup<Jet> setup = setup_for<Jet>(values, h, FromBranch<Jet>{{calibration_, unknowns}}, r);
+      model::OpenLoopSimulation<Jet> simulation(tables_, cell_.capacity_ah, setup.laws, setup.initial_soc);
+      Eigen::VectorXd start = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(Lanes - Lever::count));
+      Eigen::Index count = 0;
+      simulation.each_state([&](const Jet& state) { start[count++] = state.v[0]; });
+      states.set_start(static_cast<Eigen::Index>(calibration_.branch_unknowns()[r]),
+                       thresholds.calibration.branch_sigma * start);
+    }
     run<Jet>(
         values, h, base, r,
         [&](std::size_t k, const Jet& v, auto& simulation) {

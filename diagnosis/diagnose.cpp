@@ -51,9 +51,13 @@ std::vector<DetectionLimit> detection_limits(LikelihoodModel& likelihood, const 
   return limits;
 }
 
-Verdict verdict_of(const Adequacy& adequacy, const std::vector<Finding>& findings) {
+Verdict verdict_of(const Adequacy& adequacy, const std::vector<Finding>& findings, const Contributions& contributed,
+                   double file_error_v) {
   if (adequacy.unknown) return Verdict::unknown;
+  // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
+  if (!adequacy.found && file_error_v > thresholds.decision.gross_v) return Verdict::unknown;
   if (!adequacy.found) return Verdict::no_mismatch;
+  if (contributed.explained_where_it_acts < thresholds.decision.cause_explains) return Verdict::unknown;
   if (findings.size() > 1) return Verdict::causes;
   return findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
 }
@@ -75,7 +79,7 @@ void add_numbers(const Adequacy& adequacy, const NoiseModel& nominal, Diagnosis&
 /// Where the mismatch lies, how much of it is explained, and the voltages for plots.
 void add_location(const LikelihoodModel& likelihood, const HypothesisFit& best, const Contributions& contributed,
                   const Adequacy& adequacy, Diagnosis& d) {
-  const bool unexplained = adequacy.unknown || !adequacy.found;
+  const bool unexplained = d.verdict == Verdict::unknown || !adequacy.found;
   d.explained_share = contributed.explained_share;
   d.unexplained_rmse_v = contributed.remaining_rmse_v;
   d.unexplained_share = 1 - contributed.explained_share;
@@ -124,10 +128,16 @@ const char* name_of(Verdict verdict) {
   return "";
 }
 
-std::vector<MechanismSetting> later_recording(const Hypothesis& extended) {
+std::vector<MechanismSetting> later_recording(const Hypothesis& extended, double initial_soc) {
   std::vector<MechanismSetting> later;
-  for (MechanismSetting s : extended.settings) {
-    if (knowledge_of(s.index).carry_over(s)) later.push_back(s);
+  for (std::size_t k = 0; k < extended.settings.size(); ++k) {
+    MechanismSetting s = extended.settings[k];
+    if (!knowledge_of(s.index).carry_over(s)) continue;
+    if (k < extended.own)
+      s = extended.settings[k];
+    else if (initial_soc > thresholds.facts.charged_soc)
+      knowledge_of(s.index).after_full_charge(s);
+    later.push_back(s);
   }
   return later;
 }
@@ -149,7 +159,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   const Scope scope = scope_of(likelihood);
   d.not_testable = scope.not_testable;
 
-  Search search(likelihood, options.progress);
+  Search search(likelihood, options.progress, options.stopped);
   const HypothesisFit control = search.with_own_noise(likelihood.fit(likelihood.base()));
   search.report("calibration");
   const Grown grown = grow(search, control, scope, options.most_mechanisms);
@@ -161,7 +171,10 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   const Contributions contributed = contributions(likelihood, control, survivors.best);
   d.findings = findings_of(search, survivors, contributed);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors);
-  d.verdict = verdict_of(adequacy, d.findings);
+  d.verdict = verdict_of(adequacy, d.findings, contributed, plain_error_v(likelihood, likelihood.base()));
+  d.interrupted = search.stopped();
+  // that nothing was found yet does not mean that nothing is there
+  if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
   add_numbers(adequacy, search.nominal_noise(), d);
   add_location(likelihood, survivors.best, contributed, adequacy, d);
   add_extended_cell(likelihood, survivors.best, d);

@@ -16,6 +16,7 @@ namespace bms::diagnosis {
 struct Options {
   std::size_t most_mechanisms = 6;
   Progress progress;
+  Stopped stopped;  ///< asked between fits; the diagnosis then ends with what it knows so far
 };
 
 /// own: mechanisms of the cell file. records: as read, in order of time; readings that cannot be used are removed here.
@@ -23,8 +24,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
                    std::vector<PreparedRecording> records, const Options& options = {});
 
 /// What holds for a later recording of the same cell and instruments: a contact that has changed stays so; when bursts
-/// fell and where the first recording began does not hold.
-std::vector<MechanismSetting> later_recording(const Hypothesis& extended);
+/// fell and where the first recording began does not hold. initial_soc: at its start; a cell that is full was charged
+/// last.
+std::vector<MechanismSetting> later_recording(const Hypothesis& extended, double initial_soc = 0);
 
 /// Voltage that would be read in open loop from the record's initial soc [V]. soc: filled in unless nullptr.
 std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,

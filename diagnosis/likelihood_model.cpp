@@ -15,6 +15,14 @@ namespace {
 
 constexpr const Thresholds::Noise& noise_limits = thresholds.noise;
 
+/// A hysteresis of the cell file begins each recording at a position of its own, one that is found begins each later
+/// recording so.
+bool has_own_branch(const std::vector<MechanismSetting>& own, const std::vector<PreparedRecording>& records) {
+  constexpr std::size_t hysteresis = model::mechanism_index_of<model::OcvHysteresis>;
+  return records.size() > 1 ||
+         std::any_of(own.begin(), own.end(), [](const MechanismSetting& s) { return s.index == hysteresis; });
+}
+
 }  // namespace
 
 LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
@@ -24,7 +32,7 @@ LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vecto
       own_(std::move(own)),
       records_(std::move(records)),
       facts_(recording_facts(cell, records_)),
-      calibration_(cell, records_) {
+      calibration_(cell, records_, has_own_branch(own_, records_)) {
   for (const PreparedRecording& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording with fewer than two rows");
     samples_ += r.size();

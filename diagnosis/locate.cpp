@@ -52,6 +52,12 @@ std::vector<Axis> axes_of(const LikelihoodModel& likelihood, const HypothesisFit
   return {soc_axis, current, temperature, since_edge};
 }
 
+/// The largest energy, but for single outliers.
+double peak_of(std::vector<double> energy) {
+  if (energy.empty()) return 0;
+  return measurement::order_statistic(energy, energy.size() - 1 - energy.size() / location_limits.rows_per_outlier);
+}
+
 /// The range of an axis in which the energy is most concentrated.
 std::optional<Regime> sharpest_range(const Axis& axis, const std::vector<double>& weight, double total) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -88,6 +94,25 @@ std::optional<Regime> sharpest_range(const Axis& axis, const std::vector<double>
   return sharpest > location_limits.regime_sharper ? std::optional(best) : std::nullopt;
 }
 
+/// Share of the squared error, less noise, that is gone in the rows with energy.
+double explained_where(const LikelihoodModel& likelihood, const HypothesisFit& base, const HypothesisFit& fit,
+                       const std::vector<std::vector<double>>& energy) {
+  double before = 0, after = 0, white = 0;
+  for (std::size_t r = 0; r < energy.size(); ++r) {
+    const double enough = peak_of(energy[r]) / location_limits.peak_over_energy;
+    const std::vector<double> without_v = likelihood.voltage(base.hypothesis, base.calibration, r),
+                              with_v = likelihood.voltage(fit.hypothesis, fit.calibration, r);
+    for (std::size_t k = 0; k < energy[r].size(); ++k) {
+      if (!(energy[r][k] > 0 && energy[r][k] >= enough) || likelihood.usable(r)[k] == 0) continue;
+      const double v = likelihood.records()[r].voltage_v[k];
+      before += (v - without_v[k]) * (v - without_v[k]);
+      after += (v - with_v[k]) * (v - with_v[k]);
+      white += likelihood.noise().white_v * likelihood.noise().white_v;
+    }
+  }
+  return before > white ? std::clamp((before - after) / (before - white), 0.0, 1.0) : 1;
+}
+
 }  // namespace
 
 Contributions contributions(const LikelihoodModel& likelihood, const HypothesisFit& base, const HypothesisFit& fit) {
@@ -113,16 +138,15 @@ Contributions contributions(const LikelihoodModel& likelihood, const HypothesisF
     }
   }
   for (auto& [m, sum] : c.rms_v) sum = std::sqrt(sum / static_cast<double>(likelihood.readings()));
+  c.explained_where_it_acts = explained_where(likelihood, base, fit, c.energy);
   c.spans = strongest_spans(likelihood.records().front(), c.energy.front());
   return c;
 }
 
 std::vector<model::Span> strongest_spans(const PreparedRecording& r, const std::vector<double>& energy) {
-  std::vector<double> sorted = energy;
-  if (sorted.empty() || !(*std::max_element(sorted.begin(), sorted.end()) > 0)) return {};
-  const double peak =
-      measurement::order_statistic(sorted, sorted.size() - 1 - sorted.size() / location_limits.rows_per_outlier);
-  const double enough = peak / location_limits.peak_over_energy, apart_s = location_limits.spans_apart * r.duration_s();
+  if (energy.empty() || !(*std::max_element(energy.begin(), energy.end()) > 0)) return {};
+  const double enough = peak_of(energy) / location_limits.peak_over_energy,
+               apart_s = location_limits.spans_apart * r.duration_s();
   std::vector<model::Span> spans;
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (energy[k] < enough) continue;

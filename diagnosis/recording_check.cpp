@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/noise.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
@@ -111,8 +112,48 @@ void check_spikes(Record& r, const Cell& cell, RecordingCheck& found) {
   }
 }
 
+/// The currents of some rows, missing readings left out.
+struct CurrentRange {
+  double low_a = std::numeric_limits<double>::infinity(), high_a = -std::numeric_limits<double>::infinity();
+  bool falls = true;  ///< from one part of the stretch to the next, on average: a reading's noise does not count
+
+  CurrentRange(const Record& r, std::size_t from, std::size_t end) {
+    for (std::size_t k = from; k < end; ++k) {
+      const double a = r.current_a[k];
+      if (!std::isfinite(a)) continue;
+      low_a = std::min(low_a, a);
+      high_a = std::max(high_a, a);
+    }
+    double before_a = std::numeric_limits<double>::infinity();
+    for (std::size_t q = 0; q < fault_limits.charge_parts; ++q) {
+      const std::size_t first = from + q * (end - from) / fault_limits.charge_parts,
+                        last = from + (q + 1) * (end - from) / fault_limits.charge_parts;
+      double sum_a = 0;
+      for (std::size_t k = first; k < last; ++k) sum_a += std::isfinite(r.current_a[k]) ? r.current_a[k] : 0;
+      const double mean_a = sum_a / static_cast<double>(std::max<std::size_t>(last - first, 1));
+      falls = falls && mean_a < before_a;
+      before_a = mean_a;
+    }
+  }
+  double swing_a() const { return high_a - low_a; }
+};
+
+/// Charging at constant voltage: the charger lets the current fall and holds the voltage.
+bool is_constant_voltage_charge(const CurrentRange& current, double c_rate_a) {
+  return current.low_a > -fault_limits.charge_zero_c * c_rate_a && current.high_a > fault_limits.charge_c * c_rate_a &&
+         current.falls;
+}
+
+/// Largest change of the current [A] that may leave the voltage's last digit as it is.
+double invisible_swing_a(const Record& r, const Cell& cell) {
+  double r0_ohm = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < cell.rc.soc.size; ++k) r0_ohm = std::min(r0_ohm, cell.rc.r0_ohm[k]);
+  return quantisation_step(r.voltage_v) / r0_ohm;
+}
+
 /// Stretches where the voltage does not change although the cell is loaded and unloaded, or its noise should show.
-std::vector<model::Span> stuck_spans(const Record& r, double c_rate_a) {
+std::vector<model::Span> stuck_spans(const Record& r, const Cell& cell) {
+  const double c_rate_a = cell.capacity_ah, invisible_a = invisible_swing_a(r, cell);
   // a converter whose last digit flickers does not stand still for long: how long, its other readings show
   std::vector<double> runs;
   double length = 1;
@@ -131,26 +172,22 @@ std::vector<model::Span> stuck_spans(const Record& r, double c_rate_a) {
   std::size_t from = 0;
   for (std::size_t k = 1; k <= r.size(); ++k) {
     if (k < r.size() && r.voltage_v[k] == r.voltage_v[from]) continue;
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (std::size_t j = from; j < k; ++j) {
-      if (!std::isfinite(r.current_a[j])) continue;
-      low = std::min(low, r.current_a[j]);
-      high = std::max(high, r.current_a[j]);
-    }
+    const CurrentRange current(r, from, k);
     const std::size_t rows = k - from;
     const bool under_load =
-                   rows >= fault_limits.stuck_rows_loaded && high - low > fault_limits.stuck_swing_c * c_rate_a,
+                   rows >= fault_limits.stuck_rows_loaded && current.swing_a() > fault_limits.stuck_swing_c * c_rate_a,
                for_long = rows >= fault_limits.stuck_rows &&
                           static_cast<double>(rows) > fault_limits.stuck_times_usual * usual &&
-                          high - low > fault_limits.stuck_small_swing_c * c_rate_a;
-    if (under_load || for_long) spans.push_back({r.time_s[from], r.time_s[k - 1]});
+                          current.swing_a() > fault_limits.stuck_small_swing_c * c_rate_a;
+    if ((under_load || for_long) && current.swing_a() > invisible_a && !is_constant_voltage_charge(current, c_rate_a))
+      spans.push_back({r.time_s[from], r.time_s[k - 1]});
     from = k;
   }
   return spans;
 }
 
 void check_stuck_voltage(Record& r, const Cell& cell, RecordingCheck& found) {
-  const std::vector<model::Span> stuck = stuck_spans(r, cell.capacity_ah);
+  const std::vector<model::Span> stuck = stuck_spans(r, cell);
   if (total_s(stuck) > std::max(fault_limits.stuck_at_most_s, fault_limits.stuck_at_most_share * r.duration_s())) {
     found.faults.push_back(
         {"stuck_voltage",
@@ -176,11 +213,12 @@ void check_stuck_voltage(Record& r, const Cell& cell, RecordingCheck& found) {
 void check_gaps(Record& r, const Cell& cell, RecordingCheck& found) {
   const double usual_step_s = measurement::upper_median(measurement::time_steps(r.time_s));
   const auto load_a = [&](std::size_t k) { return std::isfinite(r.current_a[k]) ? std::abs(r.current_a[k]) : 0; };
+  const double unchanged_s = longest_unchanged_s(r.time_s, r.current_a, cell.capacity_ah);
   std::vector<model::Span> gaps;
   double lost_soc = 0;
   for (const std::size_t k : measurement::rows_after_gaps(r.time_s, fault_limits.gap_steps * usual_step_s)) {
     const double dt_s = r.time_s[k] - r.time_s[k - 1];
-    if (dt_s < fault_limits.gap_at_least_s) continue;
+    if (dt_s < fault_limits.gap_at_least_s || dt_s <= unchanged_s) continue;
     const double a = std::max(load_a(k), load_a(k - 1));
     if (a < fault_limits.gap_load_c * cell.capacity_ah) continue;
     gaps.push_back({r.time_s[k - 1], r.time_s[k]});
@@ -213,6 +251,23 @@ void check_sign(Record& r, const Cell& cell, RecordingCheck& found) {
 }
 
 }  // namespace
+
+double longest_unchanged_s(std::span<const double> time_s, std::span<const double> current_a, double capacity_ah) {
+  const double usual_step_s = measurement::upper_median(measurement::time_steps(time_s));
+  std::size_t steps = 0, unchanged = 0;
+  double longest_s = 0;
+  for (const std::size_t k : measurement::rows_after_gaps(time_s, fault_limits.gap_steps * usual_step_s)) {
+    const double dt_s = time_s[k] - time_s[k - 1];
+    if (dt_s < fault_limits.gap_at_least_s) continue;
+    ++steps;
+    if (!(std::abs(current_a[k] - current_a[k - 1]) < fault_limits.unchanged_c * capacity_ah)) continue;
+    ++unchanged;
+    longest_s = std::max(longest_s, dt_s);
+  }
+  const bool on_change = unchanged >= fault_limits.unchanged_steps &&
+                         static_cast<double>(unchanged) >= fault_limits.unchanged_share * static_cast<double>(steps);
+  return on_change ? longest_s * fault_limits.unchanged_longer : 0;
+}
 
 RecordingCheck check_recording(PreparedRecording& r, const model::CellParameters<>& cell) {
   RecordingCheck found;

@@ -4,6 +4,7 @@
 // Faults of the whole recording end the diagnosis (DATA_FAULT). Single bad readings are removed and reported.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,11 @@ struct RecordingCheck {
   std::vector<DataFault> faults;      ///< that prevent a diagnosis
   std::vector<std::string> warnings;  ///< readings that were removed
 };
+
+/// The longest time [s] between rows in which nothing changed, if the logger writes rows on change; else 0. Such a
+/// logger makes many long steps, and the current is the same at both ends of nearly all of them. One that stops in a
+/// drive comes back at another current.
+double longest_unchanged_s(std::span<const double> time_s, std::span<const double> current_a, double capacity_ah);
 
 /// Removes unusable readings from the record (NaN) and reports what it found.
 RecordingCheck check_recording(PreparedRecording& record, const model::CellParameters<>& cell);

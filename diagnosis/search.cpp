@@ -184,7 +184,7 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
   std::vector<HypothesisFit> fits;
   std::set<std::size_t> tried;
   for (const NoiseModel& noise : {nominal_, around.noise}) {
-    if (!fits.empty() && alike(noise, nominal_)) break;
+    if (stopped() || (!fits.empty() && alike(noise, nominal_))) break;
     likelihood_.set_noise(noise);
     const HypothesisFit from =
         noise == around.noise ? around
@@ -229,7 +229,10 @@ std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std
                                           double hopeless) {
   std::vector<HypothesisFit> fits;
   if (!around.hypothesis.added().empty()) likelihood_.linearise(around.hypothesis, around.calibration);
-  for (const Candidate& c : candidates) fits.push_back(fit_with(around, c, hopeless));
+  for (const Candidate& c : candidates) {
+    if (stopped()) break;
+    fits.push_back(fit_with(around, c, hopeless));
+  }
   std::stable_sort(fits.begin(), fits.end(),
                    [](const HypothesisFit& a, const HypothesisFit& b) { return a.cost < b.cost; });
   for (std::size_t k = 0; k < fits.size() && k < search_numerics.fits_with_own_noise; ++k) {

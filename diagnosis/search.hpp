@@ -16,6 +16,8 @@ namespace bms::diagnosis {
 
 /// Receives the share that is done, 0..1, and what was done last.
 using Progress = std::function<void(double, const std::string&)>;
+/// Returns true once the search is to end with what it knows.
+using Stopped = std::function<bool()>;
 
 /// RMS of measured less predicted [V] by a hypothesis with the cell file's own base parameters: what an extended cell
 /// file would achieve.
@@ -23,9 +25,9 @@ double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h);
 
 class Search {
  public:
-  /// Both must outlive it. Its noise model is taken as the nominal one.
-  Search(LikelihoodModel& likelihood, const Progress& progress)
-      : likelihood_(likelihood), progress_(progress), nominal_(likelihood.noise()) {}
+  /// All must outlive it. Its noise model is taken as the nominal one.
+  Search(LikelihoodModel& likelihood, const Progress& progress, const Stopped& stopped)
+      : likelihood_(likelihood), progress_(progress), stopped_(stopped), nominal_(likelihood.noise()) {}
 
   const NoiseModel& nominal_noise() const { return nominal_; }
 
@@ -60,6 +62,9 @@ class Search {
   /// The rest of a fit without a mechanism, fitted again from where it was.
   HypothesisFit without_one(const HypothesisFit& f, std::size_t mechanism);
 
+  /// Returns true once the search is to end: no further fit begins.
+  bool stopped() const { return stopped_ && stopped_(); }
+
   /// Reports progress by one step.
   void report(std::string_view what);
 
@@ -84,6 +89,7 @@ class Search {
 
   LikelihoodModel& likelihood_;
   const Progress& progress_;
+  const Stopped& stopped_;
   NoiseModel nominal_;
   std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
   int steps_ = 0;

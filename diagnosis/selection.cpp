@@ -1,6 +1,7 @@
 #include "diagnosis/selection.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "diagnosis/locate.hpp"
 #include "diagnosis/testability.hpp"
@@ -13,6 +14,54 @@ namespace {
 constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
+
+/// Returns true if a mechanism's own strength does not carry it: each of its strengths is at a bound or within two of
+/// its standard deviations of none. One without a standard deviation was searched, and counts.
+bool is_weak(const HypothesisFit& f, std::size_t mechanism) {
+  const std::vector<ParameterRef> sought = f.hypothesis.sought();
+  bool has_strength = false;
+  for (std::size_t j = 0; j < sought.size(); ++j) {
+    const MechanismSetting& s = f.hypothesis.settings[sought[j].setting];
+    const model::Parameter& p = model::catalogue[s.index].parameter[sought[j].parameter];
+    if (s.index != mechanism || p.role != model::Role::strength) continue;
+    has_strength = true;
+    const double value = s.value[sought[j].parameter], sigma = s.deviation[sought[j].parameter];
+    const bool known = std::isfinite(sigma) && sigma > 0;
+    if (f.at_bound[j] == 0 && (!known || std::abs(value) >= selection_limits.own_sigmas * sigma)) return false;
+  }
+  return has_strength;
+}
+
+/// Returns true if a cell does not age so: much of its capacity is gone, its resistance is as it was.
+bool is_implausible(const HypothesisFit& f, std::size_t mechanism) {
+  if (mechanism != model::mechanism_index_of<model::CapacityChange>) return false;
+  const auto growth = [&](std::size_t of) {
+    const MechanismSetting* s = f.hypothesis.find(of);
+    return s == nullptr ? 0 : s->value[0];
+  };
+  return f.hypothesis.find(mechanism)->value[0] > selection_limits.capacity_lost_alone &&
+         growth(model::mechanism_index_of<model::ResistanceGrowth>) < selection_limits.resistance_grown &&
+         growth(model::mechanism_index_of<model::PolarisationGrowth>) < selection_limits.resistance_grown;
+}
+
+/// The other mechanism whose strength is correlated most with this one's; no_mechanism if none is by much.
+std::size_t partner_of(const HypothesisFit& f, std::size_t mechanism) {
+  const std::vector<ParameterRef> sought = f.hypothesis.sought();
+  double most = selection_limits.trades;
+  std::size_t partner = no_mechanism;
+  const auto index = [&](std::size_t j) { return f.hypothesis.settings[sought[j].setting].index; };
+  for (std::size_t a = 0; a < sought.size(); ++a) {
+    for (std::size_t b = 0; b < sought.size(); ++b) {
+      if (index(a) != mechanism || index(b) == mechanism) continue;
+      const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
+      const double c = std::abs(f.covariance(i, j)) / std::sqrt(f.covariance(i, i) * f.covariance(j, j));
+      if (!(c > most)) continue;
+      most = c;
+      partner = index(b);
+    }
+  }
+  return partner;
+}
 
 /// The elimination in progress.
 class Elimination {
@@ -29,6 +78,7 @@ class Elimination {
 
   /// Returns true if the best hypothesis has changed: then everything is compared again.
   bool round() {
+    if (search_.stopped()) return false;
     found_.rivals.clear();
     found_.gains.clear();
     const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
@@ -38,7 +88,8 @@ class Elimination {
       const bool alone = found_.best.hypothesis.added().size() == 1;
       const HypothesisFit without = alone ? control_ : search_.without_one(found_.best, m);
       const double gain = found_.gains[m] = search_.gain(without, found_.best);
-      if (gain < selection_limits.detected || !(alone || counts(gain, all_gain, rms_v.at(m))))
+      const bool credible = !is_weak(found_.best, m) && !is_implausible(found_.best, m);
+      if (gain < selection_limits.detected || !credible || !(alone || counts(gain, all_gain, rms_v.at(m))))
         reduced.emplace_back(gain, without);
       else if (compare_with_rivals(m, without))
         return true;
@@ -50,6 +101,8 @@ class Elimination {
   }
 
   Survivors survivors() && {
+    while (drop_one_not_credible()) {
+    }
     for (const std::size_t m : found_.best.hypothesis.added()) {
       if (!found_.gains.contains(m)) found_.gains[m] = search_.gain(search_.without_one(found_.best, m), found_.best);
     }
@@ -57,6 +110,35 @@ class Elimination {
   }
 
  private:
+  /// The rounds are limited, and end with mechanisms that may not stay: one that is larger than the error, which
+  /// another one cancels, or one without a strength of its own. Of two that cancel each other one stays, with the other
+  /// as its rival: the recordings know their sum alone. Returns false if all may stay.
+  bool drop_one_not_credible() {
+    const std::vector<std::size_t> added = found_.best.hypothesis.added();
+    const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
+    std::size_t worst = no_mechanism;
+    for (const std::size_t m : added) {
+      const bool too_large = added.size() > 1 && rms_v.at(m) > selection_limits.larger_than_error * error_v_;
+      if (!too_large && !is_weak(found_.best, m) && !is_implausible(found_.best, m)) continue;
+      if (worst == no_mechanism || rms_v.at(m) > rms_v.at(worst)) worst = m;
+    }
+    if (worst == no_mechanism) return false;
+    const std::size_t partner = partner_of(found_.best, worst);
+    HypothesisFit without = added.size() == 1 ? control_ : search_.without_one(found_.best, worst);
+    found_.rivals.clear();
+    found_.gains.clear();
+    if (partner != no_mechanism) {
+      HypothesisFit swapped = search_.without_one(found_.best, partner);
+      const bool swap = search_.score(swapped) < search_.score(without);
+      const std::size_t kept = swap ? worst : partner, other = swap ? partner : worst;
+      if (swap) std::swap(swapped, without);
+      found_.rivals[kept].push_back(std::move(swapped));
+      found_.alike[{kept, other}] = 1;
+    }
+    found_.best = std::move(without);
+    return true;
+  }
+
   /// One of several mechanisms must be seen, and must not be larger than the error: such ones cancel each other. Of
   /// these the one goes that is missed less.
   bool counts(double gain, double all_gain, double rms_v) const {
@@ -118,7 +200,7 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
   std::vector<std::size_t> steady = scope.searched;
   std::erase_if(steady, comes_and_goes);
   bool all = false;
-  while (current.hypothesis.added().size() < most) {
+  while (current.hypothesis.added().size() < most && !search.stopped()) {
     std::vector<HypothesisFit> fits = search.one_more(current, all ? scope.searched : steady);
     if (current.hypothesis.added().empty()) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
     std::erase_if(fits, [&](const HypothesisFit& f) { return !search.carries(current, f); });

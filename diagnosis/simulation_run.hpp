@@ -18,6 +18,7 @@ struct AtUnknowns {
   const std::vector<double>& u;
 
   S initial_soc_shift(std::size_t record) const { return S(calibration.initial_soc_shift(record, u)); }
+  S branch_shift(std::size_t record) const { return S(calibration.branch_shift(record, u)); }
   S capacity_loss() const { return S(calibration.capacity_loss(u)); }
   S gain_error() const { return S(calibration.gain_error(u)); }
   S offset_a(std::size_t record, double time_s) const { return S(calibration.offset_a(record, time_s, u)); }
@@ -33,12 +34,15 @@ SimulationSetup<S> LikelihoodModel::setup_for(const std::vector<model::Mechanism
                            .record = record,
                            .capacity_ah = cell_.capacity_ah,
                            .bursts = {},
+                           .own = false,
                            .initial_soc = S(r.initial_soc),
+                           .branch_shift = base.branch_shift(record),
                            .capacity_loss = base.capacity_loss(),
                            .gain_error = base.gain_error()};
   if (record < h.bursts.size()) setup.bursts = h.bursts[record];
   setup.initial_soc += base.initial_soc_shift(record);
   for (std::size_t k = 0; k < h.settings.size(); ++k) {
+    setup.own = k < h.own;
     model::visit_mechanism(h.settings[k].index,
                            [&]<class M>(std::type_identity<M>) { Knowledge<M>::template set_up<S>(setup, values[k]); });
   }

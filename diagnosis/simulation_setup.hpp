@@ -17,7 +17,9 @@ struct SimulationSetup {
   std::size_t record = 0;  ///< place among the recordings, which are in order of time
   double capacity_ah = 1;
   std::span<const model::Span> bursts;  ///< of a loose contact, in this recording
+  bool own = false;                     ///< the setting that is set up is the cell file's own, not a finding
   S initial_soc;
+  S branch_shift;          ///< of the branch position at the start of this recording
   S capacity_loss;         ///< share of the cell file's capacity that is gone
   S gain_error;            ///< of the current sensor
   S current_delay_s{0};    ///< by which the current is read behind the voltage

@@ -120,9 +120,10 @@ std::string no_mismatch_text(const Diagnosis& d, const RecordingFacts& facts) {
 
 std::string cause_text(const Diagnosis& d, const RecordingFacts& facts) {
   const Finding& f = d.findings.front();
-  return fmt::format("{} This explains {} of the model's error of {}; the probability is {}. {}",
+  return fmt::format("{} This explains {} of the model's error of {}, {} remain; the probability is {}. {}",
                      capitalised(claim(f.setting)) + ".", percent(d.explained_share), millivolts(facts.error_v),
-                     percent(f.probability), text_of_mechanism(f.setting.index).action);
+                     millivolts(d.unexplained_rmse_v), percent(f.probability),
+                     text_of_mechanism(f.setting.index).action);
 }
 
 std::string ambiguous_text(const Diagnosis& d, const RecordingFacts& facts) {
@@ -146,8 +147,9 @@ std::string causes_text(const Diagnosis& d, const RecordingFacts& facts) {
     part += rivals.empty() ? ")" : "; or " + joined(rivals, "or") + ")";
     parts.push_back(std::move(part));
   }
-  return fmt::format("{} {} together explain {} of it: {}. Begin with the first: {}", model_error(facts),
-                     count[std::min(parts.size(), count.size() - 1)], percent(d.explained_share), joined(parts, "and"),
+  return fmt::format("{} {} together explain {} of it, {} remain: {}. Begin with the first: {}", model_error(facts),
+                     count[std::min(parts.size(), count.size() - 1)], percent(d.explained_share),
+                     millivolts(d.unexplained_rmse_v), joined(parts, "and"),
                      text_of_mechanism(d.findings.front().setting.index).action);
 }
 
@@ -235,7 +237,8 @@ void describe(Diagnosis& d, const model::CellParameters<>& cell, const std::vect
     }
   }
   facts.error_v = error.root();
-  if (d.statement.empty()) d.statement = statement(d, facts);
+  if (d.statement.empty())
+    d.statement = (d.interrupted ? "Stopped before the end; known so far: " : "") + statement(d, facts);
   for (Finding& f : d.findings) {
     if (f.because.empty()) f.because = because(d, f, facts);
   }

@@ -34,6 +34,15 @@ struct Thresholds {
     std::size_t runs_for_usual = 200;    ///< runs needed to know it
     double stuck_at_most_s = 45;         ///< [s] in total, or
     double stuck_at_most_share = 0.004;  ///< of the recording; more is a fault
+    double charge_c = 0.02;              ///< [C] a charge at constant voltage begins above it
+    double charge_zero_c = 0.002;        ///< [C] and ends at 0: a reading may lie so far below
+    std::size_t charge_parts = 4;        ///< of the stretch, from one to the next of which its mean current falls
+    double unchanged_c = 0.01;           ///< [C] by which the current differs at both ends of a step in which a logger
+                                         ///< that writes on change saw none
+    std::size_t unchanged_steps = 20;    ///< such steps needed,
+    double unchanged_share = 0.95;       ///< and share of all long steps: a logger that stops in a drive comes back at
+                                         ///< another current
+    double unchanged_longer = 1.05;      ///< times the longest such step: the logger's clock is not exact
     double gap_steps = 10;               ///< a step of the clock longer than this times the median is a gap,
     double gap_at_least_s = 5;           ///< [s] if it is this long
     double gap_load_c = 0.05;            ///< [C] current next to it from which charge is lost
@@ -114,6 +123,11 @@ struct Thresholds {
     double offset_at_most_c = 1e-3;      ///< [C] sigma of the wander of the current sensor's zero, at most
     double offset_knots = 12;            ///< per recording at most
     double initial_soc_at_least = 1e-4;  ///< sigma of the start at least
+    double branch_sigma = 0.577;         ///< of the branch position at the start of a recording: of a uniform
+                                         ///< distribution between -1 and 1
+    double known_alone = 0.5;  ///< identified standard deviation of R0 and of R1 over their value above which only
+                               ///< their sum is known: rows too far apart to distinguish them
+    double share_sigma_at_most = 3;  ///< of R0's share in the sum, in its logit
   };
 
   /// Moved base parameters written back into a cell file's tables.
@@ -131,6 +145,7 @@ struct Thresholds {
     double edge_c = 0.05;      ///< [C] step of the current
     double rate_c = 0.05;      ///< [C] above it currents are sorted by size; in wording only
     double rate_ratio = 1.33;  ///< of two sizes of current; in wording only
+    double charged_soc = 0.9;  ///< a later recording that begins above it was charged last
     double turn_soc = 0.01;    ///< charge that goes back before its direction has turned; in wording only
     double rail_c = 0.2;       ///< [C] the largest current at least, to see a sensor's end
     double rail_share = 0.9;   ///< of the largest current that is near the end
@@ -179,26 +194,32 @@ struct Thresholds {
 
   /// Model selection.
   struct Decision {
-    double detected = 26;            ///< gain over the calibration that chance reaches in 1 of 216 healthy
-                                     ///< recordings (development split)
-    double per_unknown = 3;          ///< cost of every unknown after the first
-    double per_burst = 12;           ///< cost of every burst: its two ends were sought
-    double hopeless = 80;            ///< a rival this far behind the best is not fitted to the end
-    double tie = 7;                  ///< rivals this close cannot be distinguished
-    double inseparable = 0.97;       ///< correlation of signatures above which two mechanisms are one class
-    double tie_inseparable = 30;     ///< within a class rivals this close are all named: they differ by how well
-                                     ///< an equation fits, not by what was seen
-    double better_start = 1;         ///< by which the same mechanisms from another start must be better
-    double better_rival = 0.5;       ///< by which another mechanism must be better to replace one
-    double faint = 52;               ///< gain, twice `detected`, below which a cause must explain its share: 2 of
-                                     ///< 144 healthy recordings had such a finding (development split)
-    double noticeable = 0.02;        ///< share of the error by which one of several causes moves the voltage, or
-    double noticeable_gain = 0.05;   ///< of the gain of all together: the mean square of a short effect is small
-    double larger_than_error = 3;    ///< one of several causes moves the voltage by no more times the error: two
-                                     ///< that cancel each other are larger
-    double error_may_grow = 1.15;    ///< of the error without the start's and the sensor's own unknowns, by adding
-                                     ///< a cause,
-    double error_may_grow_v = 3e-4;  ///< [V] plus this
+    double detected = 26;              ///< gain over the calibration that chance reaches in 1 of 216 healthy
+                                       ///< recordings (development split)
+    double per_unknown = 3;            ///< cost of every unknown after the first
+    double per_burst = 12;             ///< cost of every burst: its two ends were sought
+    double hopeless = 80;              ///< a rival this far behind the best is not fitted to the end
+    double tie = 7;                    ///< rivals this close cannot be distinguished
+    double inseparable = 0.97;         ///< correlation of signatures above which two mechanisms are one class
+    double tie_inseparable = 30;       ///< within a class rivals this close are all named: they differ by how well
+                                       ///< an equation fits, not by what was seen
+    double better_start = 1;           ///< by which the same mechanisms from another start must be better
+    double better_rival = 0.5;         ///< by which another mechanism must be better to replace one
+    double faint = 52;                 ///< gain, twice `detected`, below which a cause must explain its share: 2 of
+                                       ///< 144 healthy recordings had such a finding (development split)
+    double noticeable = 0.02;          ///< share of the error by which one of several causes moves the voltage, or
+    double noticeable_gain = 0.05;     ///< of the gain of all together: the mean square of a short effect is small
+    double larger_than_error = 3;      ///< one of several causes moves the voltage by no more times the error: two
+                                       ///< that cancel each other are larger
+    double own_sigmas = 2;             ///< a strength within so many of its standard deviations of none is not named
+    double capacity_lost_alone = 0.3;  ///< loss of capacity that no ageing makes without
+    double resistance_grown = 0.1;     ///< so much more resistance or polarisation
+    double trades = 0.8;               ///< correlation of two strengths of which the recordings know the sum alone
+    double cause_explains = 0.1;       ///< share of the squared error, where it acts, that a cause explains at least
+    double gross_v = 0.1;              ///< [V] RMS error of the cell file that no tolerance makes a healthy one
+    double error_may_grow = 1.15;      ///< of the error without the start's and the sensor's own unknowns, by adding
+                                       ///< a cause,
+    double error_may_grow_v = 3e-4;    ///< [V] plus this
   };
 
   /// Is what was found enough?

@@ -74,6 +74,7 @@ struct Diagnosis {
   std::string statement;           ///< what is wrong, how sure, what to do next
   std::vector<model::Span> spans;  ///< of the first record
   std::vector<Regime> regimes;     ///< the sharpest first
+  bool interrupted = false;        ///< Options::stopped: later fits might have changed the verdict
   double explained_share = 0;
   std::vector<Finding> findings;   ///< the largest gain first
   std::vector<Ranked> candidates;  ///< the largest gain first

@@ -1,5 +1,6 @@
 // bms diagnose: where a calibrated cell and its recordings disagree, and which physics or instrument fault causes it.
 #include <cmath>
+#include <csignal>
 
 #include <fmt/format.h>
 
@@ -14,6 +15,14 @@
 namespace bms::tool {
 
 namespace {
+
+volatile std::sig_atomic_t interrupts = 0;
+
+/// The first Ctrl-C ends the search with what is known, the second one the program.
+void on_interrupt(int) {
+  interrupts = 1;
+  static_cast<void>(std::signal(SIGINT, SIG_DFL));
+}
 
 std::string progress_line(double done, double left_s, const std::string& what) {
   return std::isfinite(left_s) ? fmt::format("{:3.0f} %, about {:.0f} s left: {:40}", 100 * done, left_s, what) : "";
@@ -104,8 +113,15 @@ class DiagnoseCommand final : public Command {
     complete_reading(o_.reading);
     diagnosis::Options options;
     options.progress = progress_on_terminal(0.1, progress_line);
+    options.stopped = [] { return interrupts != 0; };
+    static_cast<void>(std::signal(SIGINT, on_interrupt));
     workflow::DiagnoseResult result = workflow::diagnose_recordings(workflow::read_diagnose_input(o_), options);
-    workflow::add_next_experiment(result);
+    if (result.diagnosis.interrupted) {
+      result.warnings.push_back(
+          {"interrupted", "stopped by Ctrl-C: later steps of the search might have changed this result"});
+    } else {
+      workflow::add_next_experiment(result);
+    }
     workflow::add_holdout_warnings(result);
     result.out = out_;
     for (const workflow::RecordingComparison& of : result.recordings) print_read_as(output_, of.recording);

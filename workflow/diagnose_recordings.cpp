@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "diagnosis/next_experiment.hpp"
+#include "diagnosis/recording_check.hpp"
 #include "diagnosis/reference.hpp"
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
@@ -44,12 +45,48 @@ std::optional<StartSoc> estimated_start(const measurement::Recording& r, const f
   return StartSoc{row.soc, row.soc_sigma, false};
 }
 
+/// Of a logger that writes rows on change: the current of the row before holds until a row with another one. A row of
+/// a recording has the mean current since the row before, so one without a voltage is added just before each change.
+void add_rows_before_changes(measurement::Recording& r, const files::CellFile& cell) {
+  const double unchanged_s = diagnosis::longest_unchanged_s(r.time_s, r.current_a, cell.parameters.capacity_ah),
+               step_s = measurement::usual_step_s(r);
+  if (!(unchanged_s > 0)) return;
+  std::vector<std::size_t> changes;
+  for (std::size_t k = 1; k < r.rows(); ++k) {
+    const double dt_s = r.time_s[k] - r.time_s[k - 1];
+    if (dt_s > 2 * step_s && dt_s <= unchanged_s && r.current_a[k] != r.current_a[k - 1]) changes.push_back(k);
+  }
+  const auto with_rows = [&](measurement::Column& column, auto value) {
+    if (column.empty()) return;
+    std::vector<double> values;
+    auto next = changes.begin();
+    for (std::size_t k = 0; k < column.size(); ++k) {
+      if (next != changes.end() && *next == k) {
+        values.push_back(value(column, k));
+        ++next;
+      }
+      values.push_back(column[k]);
+    }
+    column = std::move(values);
+  };
+  const auto missing = [](const measurement::Column&, std::size_t) { return std::nan(""); };
+  const auto before = [](const measurement::Column& c, std::size_t k) { return c[k - 1]; };
+  with_rows(r.time_s, [&](const measurement::Column& c, std::size_t k) { return c[k] - step_s; });
+  with_rows(r.current_a, before);
+  with_rows(r.temperature_c, before);
+  with_rows(r.soc_ref, [](const measurement::Column& c, std::size_t k) { return c[k]; });
+  for (auto column : {&measurement::Recording::voltage_v, &measurement::Recording::current_ref_a,
+                      &measurement::Recording::voltage_ref_v})
+    with_rows(r.*column, missing);
+}
+
 enum class Priority { user_first, reference_first };
 
 /// Reads one recording and determines its start.
 RecordingComparison read(const std::string& path, const files::ReadOptions& reading, const std::optional<double>& given,
                          Priority priority, DiagnoseInput& input) {
   measurement::Recording r = files::read_recording(path, files::VoltageColumn::required, reading);
+  add_rows_before_changes(r, input.cell);
   measurement::compare_with_cell(r, input.cell.parameters);
   for (const measurement::Warning& w : r.warnings) input.warnings.push_back({w.id, path + ": " + w.text});
   const auto reference = reference_start(r, input.cell);

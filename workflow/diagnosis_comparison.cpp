@@ -43,13 +43,15 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
 void compare(DiagnoseResult& r) {
   const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
   const auto simulate = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h,
-                            std::vector<RecordingComparison>& list, std::vector<double> RecordingComparison::*into) {
+                            std::vector<RecordingComparison>& list, std::vector<double> RecordingComparison::*into,
+                            bool later = false) {
     for (RecordingComparison& c : list) {
       diagnosis::Hypothesis here = h;
       here.bursts.clear();
       if (&list == &r.recordings && h.bursts.size() == list.size())
         here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
       const diagnosis::LikelihoodModel likelihood(cell, own, {c.record}, {});
+      if (later) here.settings = diagnosis::later_recording(r.diagnosis.extended, c.record.initial_soc);
       c.*into = likelihood.voltage(here, likelihood.unchanged(), 0);
     }
   };
@@ -58,8 +60,7 @@ void compare(DiagnoseResult& r) {
   simulate(r.cell.parameters, base, r.recordings, &RecordingComparison::base_v);
   simulate(r.cell.parameters, base, r.holdouts, &RecordingComparison::base_v);
   simulate(r.diagnosis.cell, extended, r.recordings, &RecordingComparison::extended_v);
-  if (r.named()) extended.settings = diagnosis::later_recording(r.diagnosis.extended);
-  simulate(r.diagnosis.cell, extended, r.holdouts, &RecordingComparison::extended_v);
+  simulate(r.diagnosis.cell, extended, r.holdouts, &RecordingComparison::extended_v, r.named());
 }
 
 std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& list,
@@ -96,16 +97,19 @@ std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
 
 namespace {
 
-/// Adds a finding to the cell file with its source. A step of the contact resistance is there from the start.
+/// Adds a finding to the cell file with its source. What belongs to the recording is left out: its start, the branch on
+/// which it began, the moment of a contact's change.
 void add_finding(const DiagnoseResult& r, const std::string& files, const Finding& f, files::CellFile& cell) {
   const double capacity_ah = r.cell.parameters.capacity_ah;
   const model::MechanismInfo& info = catalogue[f.setting.index];
+  if (info.domain == model::Domain::start) return;
   model::MechanismSetting setting = f.setting;
+  if (model::MechanismSetting later = setting; diagnosis::knowledge_of(setting.index).carry_over(later))
+    setting = later;
   std::string source = fmt::format("bms diagnose of {}: {:.2f} mV RMS of the voltage, gain {:.0f}", files,
                                    1e3 * f.rms_contribution_v, f.gain);
   if (info.id == model::ContactStep::id) {
-    source += fmt::format("; since {:.0f} s of {}", setting.value[1], r.recordings.front().record.name);
-    setting.value[1] = 0;
+    source += fmt::format("; since {:.0f} s of {}", f.setting.value[1], r.recordings.front().record.name);
   }
   if (!f.equivalent_to.empty()) source += "; these recordings cannot distinguish it from " + ids_of(f.equivalent_to);
   for (std::size_t k = 0; k < info.parameters; ++k) {
@@ -147,7 +151,7 @@ files::CellFile extended_cell(const DiagnoseResult& r) {
   for (const char* table : {"ocv", "rc"})
     cell.sources[table] += fmt::format("; adjusted within its tolerance to {}, together with the findings", files);
   for (const Finding& f : r.diagnosis.findings) add_finding(r, files, f, cell);
-  widen_tolerance(r, files, cell);
+  if (!r.diagnosis.interrupted) widen_tolerance(r, files, cell);
   return cell;
 }
 

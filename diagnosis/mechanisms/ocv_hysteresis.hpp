@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/dual.hpp"
 #include "diagnosis/mechanism.hpp"
 #include "model/mechanisms/ocv_hysteresis.hpp"
 
@@ -26,7 +27,6 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static constexpr double probing_share = 0.02;  ///< of the largest half gap: small enough to be linear
   static constexpr double smallest_start_v = 0.001, largest_start_v = 0.06;  ///< [V] half gap where a fit begins
   static constexpr double smallest_throughput_soc = 0.03;                    ///< charge moved, over the capacity
-  static constexpr double charged_soc = 0.9;  ///< a later recording that begins above it was charged last
 
   static std::string claim(const MechanismSetting& s) {
     return fmt::format(
@@ -55,12 +55,23 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static bool expected(const model::CellParameters<>& cell, const RecordingFacts&) {
     return cell.ocv.half_gap_v.size > 0;
   }
+  /// The branch position at the start belongs to the recording.
+  static bool carry_over(MechanismSetting& s) {
+    s.value[initial] = s.deviation[initial] = 0;
+    return true;
+  }
   static void after_full_charge(MechanismSetting& s) { s.value[initial] = 1; }
+  /// A finding's `initial` is the first recording's; each other recording has a start of its own.
   template <class S>
   static void set_up(SimulationSetup<S>& setup, model::MechanismValues<S> value) {
-    if (setup.record > 0 && setup.recording.initial_soc > charged_soc) {
+    if (setup.record > 0 && setup.recording.initial_soc > thresholds.facts.charged_soc) {
       value[initial] = S(1);
       value[measured] = S(0);
+    } else if (setup.own || setup.record > 0) {
+      S start = setup.branch_shift + (setup.own ? number(value[initial]) : 0);
+      if (number(start) > 1) start = S(1);
+      if (number(start) < -1) start = S(-1);
+      value[initial] = start;
     }
     setup.template choose<model::OcvHysteresis>(value);
   }

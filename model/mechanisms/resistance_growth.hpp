@@ -10,7 +10,8 @@ struct ResistanceGrowth {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"fraction", "1", Role::strength, 0, -0.6, 5, Per::cell, "relative increase of R0"},
+      Parameter{"fraction", "1", Role::strength, 0, -0.6, 20, Per::cell,
+                "relative increase of R0; a bad contact has several times the R0 of a cell"},
   };
 
   template <class S>

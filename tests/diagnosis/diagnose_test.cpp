@@ -6,7 +6,10 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/model_tolerance.hpp"
+#include "diagnosis/prepare.hpp"
 #include "diagnosis/screen.hpp"
+#include "diagnosis/selection.hpp"
+#include "diagnosis/texts.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
@@ -159,6 +162,98 @@ TEST(Diagnose, AShortEffectIsFoundTogetherWithALargePermanentOne) {
   const Diagnosis d = diagnose(test::table9(), {}, {r});
   EXPECT_EQ(d.findings.size(), 2U);
   EXPECT_THAT(ids_of(d), Contains("channel_skew"));
+}
+
+/// A hysteresis of the cell file, which begins each recording on a branch of its own.
+TEST(Diagnose, WhereARecordingBeganIsNoPropertyOfTheCell) {
+  const model::CellParameters<> cell = test::table9();
+  MechanismSetting truth = model::default_setting(model::mechanism_index("ocv_hysteresis"), cell);
+  truth.value = {0.02, 20, 0, -0.8, 0};
+  const PreparedRecording plain = test::recorded(test::drive(2, 41), 0.7, 41);
+  const auto measured = [&](const MechanismSetting& s) {
+    PreparedRecording r = plain;
+    const std::vector<double> with = predict(cell, {s}, plain), without = predict(cell, {}, plain);
+    for (std::size_t k = 0; k < r.size(); ++k) r.voltage_v.edit()[k] += with[k] - without[k];
+    return r;
+  };
+  MechanismSetting file = truth;
+  file.value[3] = 1;
+  EXPECT_EQ(diagnose(cell, {file}, {measured(truth)}).verdict, Verdict::no_mismatch);
+  const Hypothesis found{{truth}, 0, {}};
+  EXPECT_EQ(later_recording(found).front().value[3], 0) << "a later recording begins elsewhere";
+  EXPECT_EQ(later_recording(found, 0.97).front().value[3], 1) << "it was charged last";
+  EXPECT_EQ(later_recording({{truth}, 1, {}}).front().value[3], -0.8) << "a file that has it keeps it";
+}
+
+/// Rows far apart: R0 and R1 are identified as 13 +- 60 mohm each, their sum to a few per cent.
+TEST(Diagnose, TolerancesOfR0AndR1DoNotHideAContact) {
+  model::CellParameters<> cell = test::table9();
+  for (std::size_t k = 0; k < cell.rc.soc.size; ++k) {
+    cell.rc.r0_std_ohm.push_back(5 * cell.rc.r0_ohm[k]);
+    cell.rc.r1_std_ohm.push_back(5 * cell.rc.r1_ohm[k]);
+  }
+  EXPECT_EQ(diagnose(cell, {}, {test::recorded(test::drive(0.7, 42), 0.7, 42)}).verdict, Verdict::no_mismatch);
+  const auto contact = [](std::size_t, double current_a, double) { return 0.12 * current_a; };
+  const Diagnosis d = diagnose(cell, {}, {test::recorded(test::drive(0.7, 42), 0.7, 42, contact)});
+  ASSERT_TRUE(names(d.verdict)) << name_of(d.verdict);
+  EXPECT_THAT(ids_of(d), ElementsAre("resistance_growth"));
+  EXPECT_NEAR(d.findings.front().setting.value[0], 0.12 / 0.0133, 1.5);
+  EXPECT_EQ(d.findings.front().at_bound[0], 0);
+}
+
+TEST(Diagnose, AGrossErrorIsNeverHealthy) {
+  model::CellParameters<> cell = test::table9();
+  cell.tolerance = {0.4, 0.05, 0.02, 0.4};
+  const Diagnosis d = diagnose(
+      cell, {}, {test::recorded(test::drive(2, 43), 0.7, 43, [](std::size_t, double, double) { return 0.2; })});
+  EXPECT_NE(d.verdict, Verdict::no_mismatch);
+}
+
+/// Offset and gain of the voltage cancel on the flat part of the curve: the recording knows their sum alone.
+TEST(Diagnose, OfTwoThatCancelOneIsNamedWithTheOtherAsItsRival) {
+  const LikelihoodModel made(
+      test::table9(), {},
+      {test::recorded(test::drive(2, 44), 0.7, 44, [](std::size_t, double, double) { return 0.015; })}, {});
+  LikelihoodModel likelihood = likelihood_model_of(test::table9(), {}, made.records());
+  const Progress progress;
+  const Stopped stopped;
+  Search search(likelihood, progress, stopped);
+  const HypothesisFit control = search.with_own_noise(likelihood.fit(likelihood.base()));
+  Hypothesis both = with(likelihood.base(), model::mechanism_index("voltage_offset"), likelihood.cell());
+  both = with(both, model::mechanism_index("voltage_gain"), likelihood.cell());
+  both.settings[0].value[0] = 0.1;
+  both.settings[1].value[0] = -0.027;
+  const HypothesisFit fit = likelihood.fit(both, control.calibration, 1);
+  const Scope scope = scope_of(likelihood);
+  const Survivors survivors = eliminate(search, likelihood, control, fit, scope);
+  const std::vector<std::size_t> left = survivors.best.hypothesis.added();
+  ASSERT_EQ(left.size(), 1U);
+  const std::size_t other = left.front() == model::mechanism_index("voltage_offset")
+                                ? model::mechanism_index("voltage_gain")
+                                : model::mechanism_index("voltage_offset");
+  ASSERT_TRUE(survivors.rivals.contains(left.front()));
+  EXPECT_THAT(survivors.rivals.at(left.front()),
+              Contains(testing::Truly([&](const HypothesisFit& f) { return f.hypothesis.find(other) != nullptr; })));
+}
+
+TEST(Diagnose, WhenStoppedItSaysWhatIsKnownSoFar) {
+  const PreparedRecording r = test::recorded(test::drive(2, 12), 0.7, 12,
+                                             [](std::size_t, double current_a, double) { return 0.003 * current_a; });
+  int asked = 0;
+  const auto after = [&](int fits) {
+    asked = 0;
+    Options options;
+    options.stopped = [&asked, fits] { return ++asked > fits; };
+    Diagnosis d = diagnose(test::table9(), {}, {r}, options);
+    describe(d, test::table9(), {r});
+    return d;
+  };
+  const Diagnosis nothing = after(0), some = after(6);
+  EXPECT_TRUE(nothing.interrupted);
+  EXPECT_NE(nothing.verdict, Verdict::no_mismatch) << "nothing was tried";
+  EXPECT_THAT(nothing.statement, testing::StartsWith("Stopped before the end"));
+  EXPECT_TRUE(some.interrupted);
+  EXPECT_THAT(ids_of(some), Contains("resistance_growth"));
 }
 
 TEST(Diagnose, ToleranceIsWidenedUntilOwnRecordingsShowNothing) {

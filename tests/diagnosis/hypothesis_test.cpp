@@ -64,6 +64,31 @@ TEST(Hypothesis, DerivativesEqualFiniteDifferences) {
   }
 }
 
+/// What belongs to a recording, and what an identification knows as a sum alone.
+TEST(Hypothesis, DerivativesByBranchPositionAndShareEqualFiniteDifferences) {
+  model::CellParameters<> cell = without_steps(test::table9());
+  for (std::size_t k = 0; k < cell.rc.soc.size; ++k) {
+    cell.rc.r0_std_ohm.push_back(2 * cell.rc.r0_ohm[k]);
+    cell.rc.r1_std_ohm.push_back(2 * cell.rc.r1_ohm[k]);
+  }
+  model::MechanismSetting own = model::default_setting(model::mechanism_index("ocv_hysteresis"), cell);
+  own.value = {0.02, 40, 0.2, -0.4, 0};
+  const LikelihoodModel likelihood(cell, {own}, {test::recorded(test::drive(0.5, 8), 0.7, 8)}, NoiseModel{});
+  Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(likelihood.calibration().size()), 0.2);
+  const Hypothesis base = likelihood.base();
+  const Columns exact = likelihood.calibration_derivatives(base, u);
+  ASSERT_EQ(likelihood.calibration().branch_unknowns().size(), 1U);
+  for (Eigen::Index j = 0; j < u.size(); ++j) {
+    Eigen::VectorXd more = u, less = u;
+    more[j] += 1e-5;
+    less[j] -= 1e-5;
+    const Eigen::VectorXd difference = (likelihood.residual(base, less) - likelihood.residual(base, more)) / 2e-5;
+    EXPECT_LT((difference - exact.col(j)).norm(), 0.01 * exact.col(j).norm() + 1e-4) << j;
+  }
+  const auto branch = static_cast<Eigen::Index>(likelihood.calibration().branch_unknowns().front());
+  EXPECT_GT(exact.col(branch).norm(), 1);
+}
+
 /// By every base parameter, as a dual number through the whole recording: slow but simple. One record, one mechanism.
 Columns plain_calibration_derivatives(const LikelihoodModel& likelihood, const Hypothesis& h,
                                       const Eigen::VectorXd& at) {

@@ -1,0 +1,81 @@
+#include "benchmark/injected_faults.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bms::benchmark {
+
+namespace {
+
+using measurement::Recording;
+
+double as_it_is(double size, double) { return size; }
+double per_ah(double size, double capacity_ah) { return size * capacity_ah; }
+double times_ah(double size, double capacity_ah) { return size / capacity_ah; }
+
+void voltage_offset(Recording& r, double size, double) {
+  for (double& v : r.voltage_v.edit()) v += size;
+}
+
+void voltage_gain(Recording& r, double size, double) {
+  for (double& v : r.voltage_v.edit()) v *= 1 + size;
+}
+
+void current_offset(Recording& r, double size, double capacity_ah) {
+  for (double& a : r.current_a.edit()) a += size * capacity_ah;
+}
+
+void current_gain(Recording& r, double size, double) {
+  for (double& a : r.current_a.edit()) a *= 1 + size;
+}
+
+void clipping(Recording& r, double share, double) {
+  double largest_a = 0;
+  for (const double a : r.current_a) largest_a = std::max(largest_a, std::abs(a));
+  for (double& a : r.current_a.edit()) a = std::clamp(a, -share * largest_a, share * largest_a);
+}
+
+/// The current is read some time behind the voltage: between two rows it is that of the row before for this time.
+void late_current(Recording& r, double delay_s, double) {
+  const std::vector<double> true_a = r.current_a.copy();
+  std::vector<double>& read_a = r.current_a.edit();
+  std::size_t from = 0;
+  for (std::size_t k = 1; k < true_a.size(); ++k) {
+    const double at_s = r.time_s[k] - delay_s;
+    while (from + 1 < k && r.time_s[from + 1] < at_s) ++from;
+    // the current of row n flows from row n - 1 to row n
+    read_a[k] = at_s <= r.time_s[0] ? true_a[0] : true_a[std::min(from + 1, k)];
+  }
+}
+
+/// A contact that changes in the middle.
+void contact(Recording& r, double size, double capacity_ah) {
+  std::vector<double>& v = r.voltage_v.edit();
+  for (std::size_t k = r.rows() / 2; k < r.rows(); ++k) v[k] += size / capacity_ah * r.current_a[k];
+}
+
+/// Open for 12 of every 400 rows, at moments that do not follow the load.
+void loose_contact(Recording& r, double size, double capacity_ah) {
+  constexpr std::size_t period = 400, open = 12, first = 170;
+  std::vector<double>& v = r.voltage_v.edit();
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    const std::size_t jitter = (k / period * 37) % 200;
+    const std::size_t at = k % period;
+    if (at >= first + jitter && at < first + jitter + open) v[k] += size / capacity_ah * r.current_a[k];
+  }
+}
+
+}  // namespace
+
+const std::array<InjectedFault, 8> injected_faults = {{
+    {"voltage_offset", {0.008, 0.015, 0.03}, voltage_offset, as_it_is},
+    {"voltage_gain", {0.003, 0.006, 0.012}, voltage_gain, as_it_is},
+    {"current_offset", {0.01, 0.02, 0.04}, current_offset, per_ah},
+    {"current_gain", {0.02, 0.04, 0.08}, current_gain, as_it_is},
+    {"current_clipping", {0.8, 0.6, 0.4}, clipping, nullptr},
+    {"channel_skew", {1, 2, 4}, late_current, as_it_is},
+    {"contact_step", {0.0025, 0.005, 0.01}, contact, times_ah},
+    {"contact_intermittent", {0.01, 0.02, 0.04}, loose_contact, times_ah},
+}};
+
+}  // namespace bms::benchmark

@@ -1,0 +1,23 @@
+// Instrument and contact faults of known size, put into a real recording.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include "measurement/recording.hpp"
+
+namespace bms::benchmark {
+
+/// A fault of the catalogue with three sizes. Sizes scale with the capacity where their unit is that of a current
+/// (per Ah) or of a resistance (times Ah).
+struct InjectedFault {
+  std::string_view id;         ///< of the mechanism that is right
+  std::array<double, 3> size;  ///< of its first parameter; of clipping: share of the largest current that is read
+  void (*put)(measurement::Recording& recording, double size, double capacity_ah);
+  double (*first_parameter)(double size, double capacity_ah);  ///< nullptr: the size is not compared
+};
+
+extern const std::array<InjectedFault, 8> injected_faults;
+
+}  // namespace bms::benchmark
