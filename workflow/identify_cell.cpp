@@ -101,7 +101,8 @@ template <class Statistics>
 void validate(const IdentifyOptions& options, DataOptions data, Statistics statistics, IdentifyResult& result) {
   data.window = options.validate_window.value_or(options.window);
   for (const std::string& path : options.validate) {
-    const IdentificationData measured = identification_data(files::read_recording(path, files::VoltageColumn::required, options.reading), data);
+    const IdentificationData measured =
+        identification_data(files::read_recording(path, files::VoltageColumn::required, options.reading), data);
     result.validations.emplace_back(path, statistics(measured));
     result.data.push_back(measured.record.data);
   }
