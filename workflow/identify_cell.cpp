@@ -298,7 +298,7 @@ void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs
     recordings.push_back(joint_recording(inputs.recordings[k], of, of.record.initial_soc, capacity_ah));
   }
   JointResult joint = identify_jointly(cell, covers_both_directions(recordings), recordings);
-  hold_out(options.hold_out, inputs.options, joint);
+  hold_out(options.hold_out, options.reading, inputs.options, joint);
   for (const measurement::Warning& w : warnings_of(joint)) result.warnings.push_back(w);
   put(joint, cell);
   result.joint = std::move(joint);

@@ -127,10 +127,10 @@ JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
   return joint;
 }
 
-void hold_out(const std::vector<std::string>& paths, const DataOptions& options, JointResult& joint) {
+void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, const DataOptions& options,
+              JointResult& joint) {
   for (const std::string& path : paths) {
-    const measurement::Recording recording =
-        files::read_recording(path, files::VoltageColumn::required, options.reading);
+    const measurement::Recording recording = files::read_recording(path, files::VoltageColumn::required, reading);
     const IdentificationData of = identification_data(recording, options);
     const auto r = joint_recording(recording, of, of.record.initial_soc, joint.choice.model.cell.capacity_ah);
     joint.held_out.push_back(id::left_out_error(joint.choice.model, r, {}));

@@ -35,7 +35,8 @@ JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
                              const std::vector<identification::JointRecording>& recordings);
 
 /// Predicts recordings that did not enter the fit.
-void hold_out(const std::vector<std::string>& paths, const DataOptions& options, JointResult& joint);
+void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, const DataOptions& options,
+              JointResult& joint);
 
 /// Unknowns at a bound, and a search that did not converge.
 std::vector<measurement::Warning> warnings_of(const JointResult& joint);
