@@ -1,4 +1,5 @@
 // The back end hal/bq76952/samples.cpp: period, received frames, contactors and balancing.
+#include "can/codec.hpp"
 #include "hal/samples.hpp"
 
 #include <gmock/gmock.h>
