@@ -78,7 +78,7 @@ struct FilterNoise {
   Duration<S> model_correlation_s{};  ///< correlation time of Interval::error_v2 and of the resistance error
   Fraction<S> resistance_error{};     ///< relative standard deviation of the overpotential
   IdentifiedTemperatures<S> identified;
-  Variance<S> v_rc_v2{};              ///< in the steady state
+  Variance<S> v_rc_v2{};  ///< in the steady state
   Variance<S> rest_v2{};
   Soc<S> white_soc_per_s{};       ///< current_a over the capacity
   Variance<S> walk_soc2_per_s{};  ///< slow current error: 2 offset^2 correlation / capacity^2

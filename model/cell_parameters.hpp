@@ -286,8 +286,7 @@ constexpr CellFault first_fault(const CellParameters<double>& p) {
   if (d::beyond(p.reference_temperature_c, accepted::reference_temperature_c))
     return {"reference_temperature_c", 0, "-40 to 80 degrees C"};
   for (const CellFault& fault : {d::fault_of(p.limits), d::fault_of(p.ocv), d::fault_of(p.rc, p.ocv),
-                                 d::fault_of(p.noise, p.capacity_ah), d::fault_of(p.tolerance),
-                                 d::fault_of(p.range)}) {
+                                 d::fault_of(p.noise, p.capacity_ah), d::fault_of(p.tolerance), d::fault_of(p.range)}) {
     if (fault.what != nullptr) return fault;
   }
   return {};

@@ -87,8 +87,8 @@ void each_soc_trial(const std::filesystem::path& data, const std::function<void(
   };
   for (const char* name : {"udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"})
     run("a123_26650", name, {&with_sensor_errors, &from_full});
-  for (const char* name : {"dyn10_N15_A002", "dyn10_N05_A002", "dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002",
-                           "dyn10_P45_A002"})
+  for (const char* name :
+       {"dyn10_N15_A002", "dyn10_N05_A002", "dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002", "dyn10_P45_A002"})
     run("a123_26650", name, {&with_sensor_errors, &from_the_middle});
   for (const char* name : {"dyn50_P25", "dyn45_P05", "dyn30_N05"})
     run("a123_esctoolbox", name, {&with_sensor_errors, &from_full, &from_the_middle});
