@@ -71,14 +71,15 @@ class AmbiguousSoc {
     if (!result.ready) return BankEvent::none;
     const bool narrow = result.variance < Variance(SocBank<S>::close_below_sigma * SocBank<S>::close_below_sigma);
     if (in_background_) {
+      bank_.follow(Soc(-result.moved));
       if (!(bank_.misfit_at(soc, soc) > arithmetic::Current<S>(replaces_above))) {
         if (narrow) bank_.close();
         return BankEvent::none;
       }
       in_background_ = false;
+      bank_.follow(result.moved);
     }
     state.charge.correct(result.moved, cell.charge);
-    bank_.follow(result.moved);
     state.covariance.template reset<Model::soc>(result.variance);
     if (narrow) bank_.close();
     return BankEvent::estimated;

@@ -98,10 +98,12 @@ class SocBank {
     const Variance finest = Variance(Variance(step * step) * Fraction(1.0 / 12));
     BankUpdate bank_update{true, Soc(mean - mean_), Variance(arithmetic::ratio<Soc>(second_, weights_) - mean * mean)};
     bank_update.variance = bank_update.variance < Variance(0) ? finest : Variance(bank_update.variance + finest);
+    mean_ = mean;
     return bank_update;
   }
 
-  /// The SOC of the filter was changed by `by` other than by counted charge.
+  /// The SOC of the filter was changed by `by` other than by counted charge, or was not moved to
+  /// the mean of the last step: then by is minus BankUpdate::moved.
   constexpr void follow(const Soc& by) { mean_ = Soc(mean_ + by); }
   /// Misfit of the hypothesis next to soc, or of one of its neighbours, above the smallest one; after a step that is
   /// ready. filter_soc: as in step().
