@@ -19,6 +19,7 @@
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
+#include "measurement/statistics.hpp"
 #include "workflow/diagnose_recordings.hpp"
 #include "workflow/identify_cell.hpp"
 
@@ -130,7 +131,11 @@ Result diagnose(const RealSet& set, const Prepared& p, const Recording& recordin
       bms::workflow::prepared(recording, set.name, p.cell, bms::workflow::given_start(p.cell, start)));
   bms::diagnosis::PreparedRecording record = input.recordings.front().record;
   const bms::diagnosis::Diagnosis d = bms::diagnosis::diagnose(p.cell.parameters, p.cell.mechanisms, {record});
-  Result r{set.name, fault == nullptr ? "" : std::string(fault->id), size, bms::diagnosis::name_of(d.verdict)};
+  Result r;
+  r.set = set.name;
+  r.fault = fault == nullptr ? "" : std::string(fault->id);
+  r.size = size;
+  r.verdict = bms::diagnosis::name_of(d.verdict);
   r.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.hours = recording.duration_s() / 3'600;
   r.detected = d.verdict != bms::diagnosis::Verdict::no_mismatch;

@@ -62,7 +62,7 @@ TEST(RecordingCheck, AVoltageThatStandsStillInADriveOrADischargeIsStuck) {
 
 TEST(RecordingCheck, ARestingVoltageStandsOnTheConvertersLastDigit) {
   PreparedRecording r = healthy();
-  for (double& v : r.voltage_v.edit()) v = std::round(100 * v) / 100;  // 10 mV; R0 of the cell is 13 mohm
+  for (double& v : r.voltage_v.edit()) v = std::round(200 * v) / 200;  // 5 mV; R0 of the cell is 13 mohm
   for (int k = 0; k < 1'200; ++k) {
     append(r, 1, 0.1 * std::sin(0.1 * k), 3.3);
     r.voltage_v.edit().back() = 3.3;
