@@ -102,21 +102,6 @@ class SocBank {
     return bank_update;
   }
 
-  /// The SOC of the filter was changed by `by` other than by counted charge, or was not moved to
-  /// the mean of the last step: then by is minus BankUpdate::moved.
-  constexpr void follow(const Soc& by) { mean_ = Soc(mean_ + by); }
-  /// Misfit of the hypothesis next to soc, or of one of its neighbours, above the smallest one; after a step that is
-  /// ready. filter_soc: as in step().
-  constexpr Misfit misfit_at(const Soc& soc, const Soc& filter_soc) const {
-    const Soc on_grid = Soc(soc - (filter_soc - mean_));
-    Misfit least(2'000);
-    for (int k = 0; k < points; ++k) {
-      const Misfit m = misfit_[static_cast<std::size_t>(k)];
-      if (arithmetic::magnitude(Soc(grid(k) - on_grid)) < Soc(2.0 / points) && m < least) least = m;
-    }
-    return Misfit(least - least_);
-  }
-
   static constexpr Soc grid(int k) { return Soc(arithmetic::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }
 
  private:

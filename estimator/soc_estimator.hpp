@@ -33,7 +33,6 @@
 
 #include "estimator/ambiguous_soc.hpp"
 #include "estimator/cell_state.hpp"
-#include "estimator/consistency.hpp"
 #include "estimator/estimate.hpp"
 #include "estimator/input_check.hpp"
 #include "estimator/outlier_gate.hpp"
@@ -97,8 +96,7 @@ class SocEstimator {
     const Voltage predicted_v = Model::voltage(laws, state_.model_state, at, input);
     errors_.update_offset_at_rest(state_, cell, current, step_us, constants_.duration_s());
     if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * input.current_a), cell.plausible, flags))
-      correct(cell, at, input, soc, predicted_v, arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v,
-              flags);
+      correct(cell, at, input, soc, arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v, flags);
     Result estimate;
     estimate.voltage_predicted_v = predicted_v;
     estimate.flags = flags;
@@ -127,12 +125,6 @@ class SocEstimator {
   using TimeStep = arithmetic::TimeStep<S>;
 
   static constexpr int longest_gap_counts = 1'000;  ///< of longest_count_us: 23 days; nothing is known after that
-
-  /// Variance of the model's error in the bank after a contradiction, in addition to the expected one: the model may be
-  /// three times as wrong as its file says.
-  static constexpr double model_may_be_off = 8;
-  /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
-  static constexpr double wider_sigma = 3, least_sigma = 0.05;
 
   static constexpr int temperature_bin_bits = 8;  ///< a bin of temperatures is 2.56 K wide
   static constexpr std::int16_t no_temperature_bin = 0x7FFF;
@@ -207,97 +199,64 @@ class SocEstimator {
     noise[0] = Variance(noise[0] + unknown_v * unknown_v);
   }
 
-  /// predicted_v: before the correction.
   template <class Cell>
   constexpr void correct(const Cell& cell, const At& at, const StepInput& input, const Soc& soc,
-                         const Voltage& predicted_v, const Voltage& innovation_v, std::uint32_t& flags) {
-    const Variance overpotential_v2 = consistency_.lasting_overpotential_v2(
-        Voltage(Errors::without_error(state_, predicted_v) - at.ocv_v), constants_.consistency_share());
+                         const Voltage& innovation_v, std::uint32_t& flags) {
+    const Voltage drop_v = steady_state_drop_v<S>(at, input.current_a);
+    const Variance drop_v2 = drop_v * drop_v;
     if (ambiguous_.open()) [[unlikely]] {
-      if (correct_from_bank(cell, input.current_a, input.temperature_c, soc, innovation_v, overpotential_v2)) {
-        flags |= soc_ambiguous;
-        if (contradicted_) flags |= soc_contradicted;
+      flags |= soc_ambiguous;
+      return correct_from_bank(cell, input.current_a, input.temperature_c, soc, innovation_v);
+    }
+    if (OutlierGate<S>::is_suspect(innovation_v)) [[unlikely]] {
+      if (reject_outlier(cell, input.current_a, input.temperature_c, soc, innovation_v)) {
+        flags |= voltage_rejected;
         return;
       }
     }
-    consistency_.add(Errors::with_error(state_, innovation_v), constants_.consistency_share());
-    if (consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v)) [[unlikely]] {
-      if (const std::uint32_t found = check_consistency(cell, input, soc, overpotential_v2, innovation_v); found != 0) {
-        flags |= found;
-        return;
-      }
-    }
-    const Variance error_v2 =
-        Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell, at); });
-    const Variance model_v2 = Variance(arithmetic::product<Variance>(error_v2, constants_.correlated_samples()) +
-                                       arithmetic::product<Variance>(overpotential_v2, constants_.resistance_noise()));
+    const Variance model_v2 =
+        Variance(arithmetic::product<Variance>(
+                     Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell, at); }),
+                     constants_.correlated_samples()) +
+                 arithmetic::product<Variance>(drop_v2, constants_.resistance_noise()));
     const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
     state_.apply(
         state_.covariance.observe(Model::measurement_jacobian(laws_of(cell), at, input), noise_v2, innovation_v),
         cell.charge);
-    if (ambiguous_.open()) [[unlikely]]
-      ambiguous_.follow(Soc(state_.charge.soc(cell.charge) - soc));
   }
 
-  // These take their arguments by value: an argument passed by address would be kept in memory in every step.
+  // These two take their arguments by value: an argument passed by address would be kept in memory in every step.
 
-  /// Returns the flags of a voltage that is not used: an outlier, or one that shows that the state is inconsistent.
+  /// Returns true if the voltage was rejected. After OutlierGate::restart_after_us of rejections the bank is opened
+  /// around the present SOC, which estimates it again from the voltages.
   template <class Cell>
-  [[gnu::noinline]] constexpr std::uint32_t check_consistency(const Cell& cell, StepInput input, Soc soc,
-                                                              Variance overpotential_v2, Voltage innovation_v) {
+  [[gnu::noinline]] constexpr bool reject_outlier(const Cell& cell, Current current_a, Temperature temperature_c,
+                                                  Soc soc, Voltage innovation_v) {
+    const StepInput input{current_a, constants_.duration_s(), temperature_c};
     std::uint8_t interval = interval_;
     const At at = look_up(operating_point(cell, input), soc, interval);
     const auto h = Model::measurement_jacobian(laws_of(cell), at, input);
     const Variance variance = state_.soc_variance();
     const Variance of_soc_v2 =
         arithmetic::product<Variance>(arithmetic::product<Variance>(variance, h[Model::soc]), h[Model::soc]);
-    const Variance of_model_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) +
-                                          Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state_) +
-                                                   overpotential_error_v2(overpotential_v2)));
-    const Variance expected_v2 = Variance(Variance(of_model_v2 + of_soc_v2) + cell.noise.voltage_v2);
-    if (consistency_.is_inconsistent(expected_v2, constants_.consistency_share()) && !ambiguous_.open()) {
-      estimate_again(cell, soc, variance, of_model_v2);
-      return soc_ambiguous | soc_contradicted;
+    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) +
+                                       Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state_) +
+                                                drop_variance_v2<S>(at, current_a, constants_.resistance_error())));
+    const Variance innovation_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
+    if (!OutlierGate<S>::is_outlier(innovation_v, innovation_v2)) return false;
+    if (gate_.has_persisted(time_us_, constants_.step_us())) {
+      const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points));
+      const SocDistribution<S> before{soc, variance < finest ? finest : variance};
+      ambiguous_.open_at(cell, state_, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
     }
-    return OutlierGate<S>::is_outlier(innovation_v, expected_v2) ? std::uint32_t{voltage_rejected} : 0;
+    return true;
   }
 
-  constexpr Variance overpotential_error_v2(const Variance& overpotential_v2) const {
-    return arithmetic::product<Variance>(arithmetic::product<Variance>(overpotential_v2, constants_.resistance_error()),
-                                         constants_.resistance_error());
-  }
-
-  /// Opens the bank around the present SOC, with a wider sigma.
   template <class Cell>
-  constexpr void estimate_again(const Cell& cell, const Soc& soc, const Variance& variance,
-                                const Variance& of_model_v2) {
-    const Variance wider = arithmetic::product<Variance>(variance, arithmetic::Count<S>(wider_sigma * wider_sigma));
-    const auto least = Variance(least_sigma * least_sigma);
-    const SocDistribution<S> before{soc, wider < least ? least : wider};
-    contradicted_ = true;
-    state_.covariance.template reset<Model::soc>(before.variance);
-    const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, arithmetic::Count<S>(model_may_be_off)),
-                   seen_v2 = consistency_.variance();
-    ambiguous_.open_at(cell, state_, soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &before}, false,
-                       seen_v2 < more_v2 ? seen_v2 : more_v2);
-    consistency_.reset();
-  }
-
-  /// Returns true if the bank has the SOC; false while it only watches.
-  template <class Cell>
-  [[gnu::noinline]] constexpr bool correct_from_bank(const Cell& cell, Current current_a, Temperature temperature_c,
-                                                     Soc soc, Voltage innovation_v, Variance overpotential_v2) {
+  [[gnu::noinline]] constexpr void correct_from_bank(const Cell& cell, Current current_a, Temperature temperature_c,
+                                                     Soc soc, Voltage innovation_v) {
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
-    const bool watched = ambiguous_.in_background();
-    ambiguous_.update(cell, input, constants_, soc, innovation_v, overpotential_error_v2(overpotential_v2), interval_,
-                      state_);
-    if (watched && !ambiguous_.in_background()) {
-      contradicted_ = true;
-      consistency_.reset();
-    }
-    const bool from_bank = !ambiguous_.in_background();
-    if (!ambiguous_.open()) contradicted_ = false;
-    return from_bank;
+    ambiguous_.update(cell, input, constants_, soc, innovation_v, interval_, state_);
   }
 
   template <class Cell>
@@ -322,15 +281,14 @@ class SocEstimator {
     state_.model_state = {};
     state_.covariance.set_diagonal(unknown);
     errors_ = {};
-    consistency_ = {};
-    contradicted_ = false;
+    gate_ = {};
     ambiguous_ = {};
     Result estimate;
     estimate.flags = flags | not_a_number;
     report_state(cell, estimate);
     errors_.start(estimate.soc);
     const SocDistribution<S> soc{estimate.soc, anything};
-    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &soc});
+    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &soc});
     return estimate;
   }
 
@@ -396,14 +354,12 @@ class SocEstimator {
           voltage ? Voltage(Model::true_voltage(laws_of(cell), arithmetic::from_micro<Voltage>(*voltage_uv)) - load_v)
                   : Voltage(0);
       const SocDistribution<S> before = soc;
-      const StartMisfit<S, decltype(tables)> misfit{
-          tables, voltage ? &ocv_v : nullptr, reading_v2,
-          Variance(Variance(reading_v2 - rc.before_v2) + rc.charged_before_v2), has_start_ ? &before : nullptr};
+      const StartMisfit<S, decltype(tables)> misfit{tables, voltage ? &ocv_v : nullptr, reading_v2,
+                                                    has_start_ ? &before : nullptr};
       if (voltage) soc = soc_from(misfit);
-      const bool ambiguous = soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma);
-      if (ambiguous || has_start_) {
+      if (soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma)) {
         state_.covariance.set_diagonal(variances);  // the bank needs the variances of the other states
-        ambiguous_.open_at(cell, state_, soc.soc, misfit, !ambiguous);
+        ambiguous_.open_at(cell, state_, soc.soc, misfit);
       }
       at = look_up(tables, soc.soc, interval_);
     }
@@ -436,8 +392,8 @@ class SocEstimator {
   StepConstants<S, Model, Errors> constants_;
   AmbiguousSoc<S, ModelOf> ambiguous_;
   measurement::StartingPoint from_;
-  Consistency<S> consistency_;
-  bool has_start_ = false, started_ = false, contradicted_ = false;
+  OutlierGate<S> gate_;
+  bool has_start_ = false, started_ = false;
 };
 
 }  // namespace bms::estimator

@@ -26,16 +26,10 @@ template <class S>
 struct StartPolarisation {
   arithmetic::Voltage<S> v_rc_v;
   arithmetic::Variance<S> variance_v2;
-  arithmetic::Variance<S> before_v2{};          ///< part of variance_v2 that is from the current before
-  arithmetic::Variance<S> charged_before_v2{};  ///< that part if the current before charged the cell
 };
-
-inline constexpr double rests_below_c = 0.01;  ///< current of a cell at rest, in capacities per hour
 
 /// Nobody knows how long the present current has flowed. The RC branch is assumed to be charged to half of its final
 /// voltage, with a standard deviation of the same size; the current before that adds to it (noise.current_unknown_a).
-/// In the cold, chargers reduce their current at least as the resistance increases, so a charge leaves no larger
-/// voltage than at the reference temperature: a cell at rest that reads far above its plateau is full.
 template <class S>
 constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at,
                                                   const arithmetic::Current<S>& current_a,
@@ -43,17 +37,10 @@ constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at
   using namespace model;
   const Voltage<S> half_v = at.r1_ohm * Fraction<S>(0.5) * current_a;
   const Voltage<S> before_v = at.r1_ohm * noise.unknown_a;
-  const bool rests = magnitude(current_a) < Current<S>(noise.one_c_a * Fraction<S>(rests_below_c));
-  const auto charged_v =
-      rests && at.activation > Factor<S>(1) ? ratio<Voltage<S>>(before_v, Voltage<S>(at.activation)) : before_v;
-  const Variance<S> before_v2 = before_v * before_v;
-  return {half_v, Variance<S>(half_v * half_v) + before_v2, before_v2, charged_v * charged_v};
+  return {half_v, Variance<S>(half_v * half_v) + Variance<S>(before_v * before_v)};
 }
 
 inline constexpr int start_points = 256;
-
-/// A prior may be entirely wrong: a voltage that clearly contradicts it wins.
-inline constexpr double start_is_wrong_misfit = 4.5;
 
 /// Misfit of a SOC to a reading of the OCV, to a prior, or to both; >= 0.
 template <class S, class Cell>
@@ -61,7 +48,6 @@ struct StartMisfit {
   const Cell& cell;
   const arithmetic::Voltage<S>* ocv_v;  ///< the reading; nullptr if it is missing
   arithmetic::Variance<S> variance_v2;  ///< of the reading
-  arithmetic::Variance<S> above_v2;     ///< the same for a reading above the curve
   const SocDistribution<S>*
       before;  ///< the prior, with a standard deviation of two points' spacing or more; nullptr if it is missing
 
@@ -73,16 +59,15 @@ struct StartMisfit {
     if (ocv_v != nullptr) {
       const auto at = look_up(cell, soc, interval);
       const Voltage<S> off_v = *ocv_v - at.ocv_v;
-      const Variance<S> one_v2 = off_v > Voltage<S>(0) ? above_v2 : variance_v2;
       // half a point's width on the curve counts as uncertainty as well: steep parts have few points
       const Voltage<S> half_width_v = product<Voltage<S>>(ocv_slope<S>(at), half_step);
-      const Variance<S> two_variances = one_v2 + one_v2 + product<Variance<S>>(half_width_v, half_width_v);
+      const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
       misfit = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
     }
     if (before == nullptr) return misfit;
     const Soc<S> off = soc - before->soc;
     const auto of_prior = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
-    const auto most = Exponent<S>(start_is_wrong_misfit);
+    const Exponent<S> most(8);  // one prior in 3,000 is entirely wrong: a voltage that clearly contradicts it wins
     return Exponent<S>(misfit + (of_prior < most ? of_prior : most));
   }
 };

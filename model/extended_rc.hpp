@@ -12,8 +12,8 @@
 //   values       v_rc, voltage error, current offset, mechanisms' states             (the SOC is counted separately)
 //
 // A mechanism's state depends on itself and on the current only: x' = x + alpha (target - x), d x' / d x = 1 - alpha,
-// no derivative by SOC. The laws' effect on the tables enters through the tables' own derivatives. ExtendedRc<0, 0> is
-// OneRc.
+// no derivative by SOC (that of a resistance that follows the SOC is neglected). The laws' effect on the tables enters
+// through the tables' own derivatives. ExtendedRc<0, 0> is OneRc.
 //
 // The laws come with the cell: a Cell has no laws, an ExtendedCell has those of its file.
 #pragma once

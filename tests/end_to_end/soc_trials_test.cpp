@@ -65,7 +65,7 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
           << "7 to 9 mA are read while nothing flows";
     }
   });
-  EXPECT_EQ(trials, 108U);
+  EXPECT_EQ(trials, 90U);
   EXPECT_GT(inside / samples_seen, 0.95);
   const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
   std::nth_element(sigmas.begin(), middle, sigmas.end());

@@ -396,7 +396,6 @@ void run() {
   if (std::filesystem::exists(data)) {
     files::replace_figures(trials, "real", real_accuracy());
     files::replace_figures(trials, "trials", soc_trials(data));
-    files::replace_figures(trials, "cuts", soc_cuts(data, shift));
     files::replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
   } else {
     fmt::print(stderr, "{} does not exist: the figures of real recordings stay unchanged\n", data.string());
