@@ -269,7 +269,11 @@ void add_uncertainty(const JointModel& m, const JointProblem& problem, JointFit&
   VectorXd residuals;
   MatrixXd jacobian;
   if (!problem.evaluate(fit.optimum.x, residuals, &jacobian)) return;
-  const Uncertainty u = uncertainty(residuals, jacobian, problem.data_rows(), fit.optimum.at_bound, 0);
+  const Index data = problem.data_rows();
+  Uncertainty u = uncertainty(residuals, jacobian, data, fit.optimum.at_bound, 0);
+  // a prior has the weight of its standard deviation against runs of residuals as long as they have turned out to be
+  jacobian.bottomRows(jacobian.rows() - data) *= std::sqrt(u.output_variance_v2 * u.correlation_length) / prior_weight;
+  u = uncertainty(residuals, jacobian, data, fit.optimum.at_bound, 0);
   for (Index k = 0; k < fit.std.size(); ++k)
     fit.std[k] = u.std(k) * (m.unknowns[static_cast<std::size_t>(k)].positive ? fit.value[k] : 1);
 }

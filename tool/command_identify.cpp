@@ -68,8 +68,7 @@ std::string joint_summary(const workflow::JointResult& joint) {
   return text;
 }
 
-std::string summary(const workflow::IdentifyResult& result) {
-  const id::Identification& found = result.identification;
+std::string grey_box_summary(const id::Identification& found) {
   std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n",
                                  found.estimation.samples, 1e3 * found.estimation.rmse_v, found.estimation.fit_percent,
                                  found.estimation.one_step_fit_percent, found.optimum.reason);
@@ -78,9 +77,13 @@ std::string summary(const workflow::IdentifyResult& result) {
                         p.temperature_c ? fmt::format(" {:5.1f} C", *p.temperature_c) : "", p.value, p.std,
                         p.at_bound ? "  at its bound" : "");
   }
+  return text;
+}
+
+std::string summary(const workflow::IdentifyResult& result) {
+  std::string text = result.joint ? joint_summary(*result.joint) : grey_box_summary(result.identification);
   for (const auto& [path, fit] : result.validations)
     text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
-  if (result.joint) text += joint_summary(*result.joint);
   return text + (result.cell.empty() ? "No cell file was written." : "Cell file: " + result.out);
 }
 

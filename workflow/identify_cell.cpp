@@ -240,7 +240,9 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
     result.identification =
         id::identify_grey_box(id::started_from_rests(p, main.data_sets.front().data, grey_box.bounds), main.data_sets,
                               grey_box, options.method);
-    for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
+    if (!options.extend) {  // else the joint fit replaces it
+      for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
+    }
     check_fit(options, result);
     if (groups.size() > 1 && !options.extend)
       start.cell.at_temperature = temperature_tables(options, groups, main_group, grey_box, result);

@@ -147,8 +147,8 @@ TEST(JointFit, AChangedContactStaysWithItsRecording) {
     const double expected = truth.r0_ohm * (k == 2 ? 1.3 : 1) * (1 - 0.4 + 0.4 * arrhenius(45'000, 25));
     EXPECT_NEAR(r0_ohm * (1 + fit.states[k].r0_change) / expected, 1, 0.02) << k;
   }
-  // the others are the majority: the cell's R0 moves by less than the mean of the changes
-  EXPECT_NEAR(r0_ohm / truth.r0_ohm, 1, 0.07);
+  // four recordings of 1 and one of 1.3: the squares of the relative changes are least at sum of squares over sum
+  EXPECT_NEAR(r0_ohm / truth.r0_ohm, (4 + 1.3 * 1.3) / (4 + 1.3), 0.02);
 }
 
 TEST(JointFit, TheInitialBranchBelongsToTheRecordingAndThePlayToTheCell) {
