@@ -18,7 +18,12 @@ namespace {
 struct Fold {
   std::string name;
   std::vector<JointRecording> fit, left_out;
-  bool same_recordings = false;  ///< left_out are later parts of fit: their states are known
+  /// For each of left_out, its place in fit if it is a part of the same recording, whose state is then known; or empty.
+  std::vector<std::size_t> same_as;
+
+  RecordingState state(std::size_t left_out_index, const JointFit& of_fit) const {
+    return same_as.empty() ? RecordingState{} : of_fit.states[same_as[left_out_index]];
+  }
 };
 
 /// The recording with the voltages of one half of those it has.
@@ -34,8 +39,19 @@ JointRecording half_of(const JointRecording& recording, bool second) {
   return half;
 }
 
+/// The recording with the voltages of every second of a few blocks of its rows.
+JointRecording blocks_of(const JointRecording& recording, bool odd) {
+  constexpr std::size_t blocks = 8;
+  JointRecording part = recording;
+  const std::size_t rows = recording.data.size();
+  for (std::size_t k = 0; k < rows; ++k) {
+    if ((k * blocks / rows % 2 == 1) != odd) part.data.voltage_v.edit()[k] = std::numeric_limits<double>::quiet_NaN();
+  }
+  return part;
+}
+
 Fold without(std::span<const JointRecording> recordings, const std::vector<std::size_t>& left_out, std::string name) {
-  Fold fold{std::move(name), {}, {}, false};
+  Fold fold{std::move(name), {}, {}, {}};
   for (std::size_t k = 0; k < recordings.size(); ++k) {
     const bool out = std::find(left_out.begin(), left_out.end(), k) != left_out.end();
     (out ? fold.left_out : fold.fit).push_back(recordings[k]);
@@ -43,15 +59,37 @@ Fold without(std::span<const JointRecording> recordings, const std::vector<std::
   return fold;
 }
 
+/// Leaves blocks of these recordings out.
+Fold without_blocks(std::span<const JointRecording> recordings, const std::vector<std::size_t>& of, std::string name) {
+  Fold fold{std::move(name), {}, {}, {}};
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    const bool partly = std::find(of.begin(), of.end(), k) != of.end();
+    fold.fit.push_back(partly ? blocks_of(recordings[k], false) : recordings[k]);
+    if (!partly) continue;
+    fold.left_out.push_back(blocks_of(recordings[k], true));
+    fold.same_as.push_back(k);
+  }
+  return fold;
+}
+
+std::string text_of_temperature(std::span<const JointRecording> recordings, const std::vector<std::size_t>& group) {
+  return fmt::format("{:.0f} degrees C", *mean_temperature_c(recordings[group[0]]));
+}
+
+/// By what a candidate is chosen: how well it predicts inside of the range of the recordings. The coldest and the
+/// warmest temperature are its edges; of them, blocks are left out.
 std::vector<Fold> folds_of(std::span<const JointRecording> recordings, std::string& kind) {
   const auto groups = by_temperature(recordings);
   std::vector<Fold> folds;
   const bool each_twice = std::all_of(groups.begin(), groups.end(), [](const auto& group) { return group.size() > 1; });
   if (groups.size() > 2) {
     kind = "temperature";
-    for (const auto& group : groups)
-      folds.push_back(
-          without(recordings, group, fmt::format("{:.0f} degrees C", *mean_temperature_c(recordings[group[0]]))));
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const std::string name = text_of_temperature(recordings, groups[g]);
+      const bool edge = g == 0 || g + 1 == groups.size();
+      folds.push_back(edge ? without_blocks(recordings, groups[g], "parts of " + name)
+                           : without(recordings, groups[g], name));
+    }
   } else if (each_twice) {
     kind = "recording";
     for (std::size_t k = 0; k < recordings.size(); ++k) folds.push_back(without(recordings, {k}, recordings[k].name));
@@ -59,10 +97,10 @@ std::vector<Fold> folds_of(std::span<const JointRecording> recordings, std::stri
     kind = "second half";
     Fold& fold = folds.emplace_back();
     fold.name = kind;
-    fold.same_recordings = true;
-    for (const JointRecording& r : recordings) {
-      fold.fit.push_back(half_of(r, false));
-      fold.left_out.push_back(half_of(r, true));
+    for (std::size_t k = 0; k < recordings.size(); ++k) {
+      fold.fit.push_back(half_of(recordings[k], false));
+      fold.left_out.push_back(half_of(recordings[k], true));
+      fold.same_as.push_back(k);
     }
   }
   return folds;
@@ -106,6 +144,16 @@ struct Tried {
   std::vector<JointFit> fold_fits;
 };
 
+/// From the fit of all recordings it is not far.
+JointOptions quick_fit(const JointOptions& options) {
+  JointOptions quick = options;
+  quick.rows = std::min<std::size_t>(options.rows, 1'500);
+  quick.uncertainty = false;
+  quick.stopping.cost = std::max(options.stopping.cost, 1e-4);
+  quick.stopping.iterations = std::min(options.stopping.iterations, 12);
+  return quick;
+}
+
 Tried try_candidate(const JointCandidate& candidate, std::span<const JointRecording> recordings,
                     const std::vector<Fold>& folds, const JointOptions& options, const Eigen::VectorXd& start) {
   Tried tried;
@@ -113,18 +161,13 @@ Tried try_candidate(const JointCandidate& candidate, std::span<const JointRecord
   tried.result.unknowns = candidate.model.unknowns.size();
   tried.fit = fit_joint(candidate.model, recordings, options, start);
   tried.result.fitted_rmse_v = rms(tried.fit.rmse_v);
-  JointOptions quick = options;  // from the fit of all recordings it is not far
-  quick.rows = std::min<std::size_t>(options.rows, 1'500);
-  quick.uncertainty = false;
-  quick.stopping.cost = std::max(options.stopping.cost, 1e-4);
-  quick.stopping.iterations = std::min(options.stopping.iterations, 12);
+  const JointOptions quick = quick_fit(options);
   for (const Fold& fold : folds) {
     const JointFit& fit = tried.fold_fits.emplace_back(fit_joint(candidate.model, fold.fit, quick, tried.fit.value));
     const JointModel found = with_values(candidate.model, fit.value);
     std::vector<double> own;
     for (std::size_t k = 0; k < fold.left_out.size(); ++k) {
-      const RecordingState state = fold.same_recordings ? fit.states[k] : RecordingState{};
-      const auto simulated = simulate(found, fold.left_out[k], state);
+      const auto simulated = simulate(found, fold.left_out[k], fold.state(k, fit));
       if (folds.size() == 1)
         add_stretches(fold.left_out[k], simulated.voltage_v, tried.result.left_out_rmse_v);
       else
@@ -180,6 +223,24 @@ double beyond_per_ev(const JointRecording& left_out, const std::vector<JointReco
     high = std::max(high, *there);
   }
   return std::max({0.0, low - *at, *at - high});
+}
+
+/// The edges of the range, each left out whole: how fast errors grow outside.
+std::vector<Fold> outside_of(std::span<const JointRecording> recordings) {
+  const auto groups = by_temperature(recordings);
+  std::vector<Fold> folds;
+  if (groups.size() < 3) return folds;
+  for (const auto& group : {groups.front(), groups.back()})
+    folds.push_back(without(recordings, group, text_of_temperature(recordings, group)));
+  return folds;
+}
+
+void add_left_out(const JointModel& model, const Fold& fold, const JointFit& fit, std::vector<LeftOutError>& errors) {
+  const JointModel found = with_values(model, fit.value);
+  for (std::size_t k = 0; k < fold.left_out.size(); ++k) {
+    LeftOutError& e = errors.emplace_back(left_out_error(found, fold.left_out[k], fold.state(k, fit)));
+    e.beyond_per_ev = beyond_per_ev(fold.left_out[k], fold.fit);
+  }
 }
 
 ModelErrors errors_of(const std::vector<LeftOutError>& all) {
@@ -284,15 +345,9 @@ StructureChoice choose_structure(const std::vector<JointCandidate>& candidates,
   const JointModel& model = candidates[choice.chosen].model;
   choice.fit = fit_joint(model, recordings, options, winner.fit.value);
   choice.model = with_values(model, choice.fit.value);
-  for (std::size_t f = 0; f < folds.size(); ++f) {
-    const JointFit& fit = winner.fold_fits[f];
-    const JointModel found = with_values(model, fit.value);
-    for (std::size_t k = 0; k < folds[f].left_out.size(); ++k) {
-      const RecordingState state = folds[f].same_recordings ? fit.states[k] : RecordingState{};
-      LeftOutError& e = choice.left_outs.emplace_back(left_out_error(found, folds[f].left_out[k], state));
-      e.beyond_per_ev = beyond_per_ev(folds[f].left_out[k], folds[f].fit);
-    }
-  }
+  for (std::size_t f = 0; f < folds.size(); ++f) add_left_out(model, folds[f], winner.fold_fits[f], choice.left_outs);
+  for (const Fold& fold : outside_of(recordings))
+    add_left_out(model, fold, fit_joint(model, fold.fit, quick_fit(options), choice.fit.value), choice.left_outs);
   choice.errors = errors_of(choice.left_outs);
   choice.extent = extent_of(choice.model, recordings);
   for (Tried& t : tried) choice.candidates.push_back(std::move(t.result));

@@ -21,9 +21,11 @@ measurement::Recording read(int minutes) {
   for (int k = 1; k < minutes; ++k) out << (time_s += 60) << ",-1.5,3.27\n";
   out << (time_s += 60) << ",0,3.3\n";
   out.close();
-  return read_diagnose_input({.cell = "table9", .recordings = {path}, .holdouts = {}, .initial_soc = {0.9}})
-      .recordings.front()
-      .recording;
+  DiagnoseOptions options;
+  options.cell = "table9";
+  options.recordings = {path};
+  options.initial_soc = {0.9};
+  return read_diagnose_input(options).recordings.front().recording;
 }
 
 double charge_ah(const measurement::Recording& r) {
