@@ -252,9 +252,12 @@ class Application {
     return true;
   }
 
+  /// Of lock-outs one after the other only the first is stored: an attacker must not wear out the flash by them.
   void record_session(std::uint32_t state) {
-    if (state == can::ServiceChallenge::state_open) record_action(can::StoredAction::code_session_opened, 0);
-    if (state == can::ServiceChallenge::state_locked) record_action(can::StoredAction::code_session_locked, 0);
+    using Action = can::StoredAction;
+    if (state == can::ServiceChallenge::state_open) record_action(Action::code_session_opened, 0);
+    const bool again = persistence_.actions().last(0).code == Action::code_session_locked;
+    if (state == can::ServiceChallenge::state_locked && !again) record_action(Action::code_session_locked, 0);
   }
   void record_action(std::uint32_t code, std::uint32_t argument) {
     persistence_.action({static_cast<std::uint8_t>(code), access_.session.operator_number(), argument, 0},

@@ -220,15 +220,18 @@ TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
   const auto of_rc = [](const std::string& text, const std::string& key) {
     return std::stod(text.substr(text.find(key + " = [", text.find("[rc]")) + key.size() + 4));
   };
-  const double by = 1 / 8.314462618 * (1 / 293.15 - 1 / 298.15), at_10_k = 1 / 8.314462618 * (1 / 291.65 - 1 / 293.15);
-  // table9 at 45 and 55 % is the cell that was simulated
+  const double by = 1 / 8.314462618 * (1 / 293.15 - 1 / 298.15);
+  // table9 at 45 and 55 % is the cell that was simulated; a contact may differ by a fifth from recording to recording,
+  // so two recordings determine R0 to some 10 %. At -10 degrees C it is 1.4 times as large.
   const double r0_ohm = of_rc(cell, "r0_ohm");
-  EXPECT_NEAR(r0_ohm / (0.013237 * (0.7 + 0.3 * std::exp(50'000 * by))), 1, 0.02);
+  EXPECT_NEAR(r0_ohm / (0.013237 * (0.7 + 0.3 * std::exp(50'000 * by))), 1, 0.1);
 
   // without --extend nothing is known of other temperatures: the resistances are those of the nearest recordings
   const json plain = result(recordings + "--reference-temperature 20");
   EXPECT_THAT(content(path("cell.toml")), HasSubstr("\nreference_temperature_c = 20.0\n"));
-  EXPECT_NEAR(of_rc(content(path("cell.toml")), "r1_ohm") / of_rc(cell, "r1_ohm"), std::exp(40'000 * at_10_k), 0.01);
+  const double at_18_5 = 1 / 8.314462618 * (1 / 291.65 - 1 / 298.15);
+  EXPECT_NEAR(of_rc(content(path("cell.toml")), "r0_ohm") / (0.013237 * (0.7 + 0.3 * std::exp(50'000 * at_18_5))), 1,
+              0.02);
   EXPECT_THAT(plain["warnings"].dump(), Not(HasSubstr("reference_temperature")));
 
   const json far = result("--recording " + cold + " --initial-soc 0.6 --nodes 0.5");
@@ -246,7 +249,7 @@ TEST_F(IdentifyTool, TheGeneratedHeaderHasTheReferenceTemperature) {
       std::string("\"") + BMS_CELL_HEADER_TOOL + "\" " + path("cold.toml") + " " + path("h.hpp");
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_THAT(content(path("h.hpp")), HasSubstr(".reference_temperature_c = -5.0, "));
-  EXPECT_THAT(content(path("h.hpp")), HasSubstr("std::array<double, 4>{0.0, 40000.0, -5.0, 1.0}"));
+  EXPECT_THAT(content(path("h.hpp")), HasSubstr("std::array<double, 8>{0.0, 40000.0, -5.0, 1.0, 0.0, 0.0, 0.0, 1.0}"));
 }
 
 TEST_F(IdentifyTool, StudyWritesTablesAndAPageAndFindsTheOrderOfThePaper) {

@@ -41,9 +41,9 @@ TEST_P(Budgets, CoverTwoMinutesOfARun) {
 INSTANTIATE_TEST_SUITE_P(Of, Budgets, ::testing::ValuesIn(images::board_names()),
                          [](const auto& board) { return board.param; });
 
-TEST(ForkliftBudgets, Are64KilobytesOfFlashAnd16OfRam) {
+TEST(ForkliftBudgets, Are80KilobytesOfFlashAnd16OfRam) {
   const BoardBudget b = budget_of("stm32f405_forklift");
-  EXPECT_EQ(b.flash, 64U * 1024);
+  EXPECT_EQ(b.flash, 80U * 1024);
   EXPECT_EQ(b.ram, 16U * 1024);
 }
 

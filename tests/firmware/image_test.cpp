@@ -26,7 +26,7 @@ TEST(Image, HasTheSameBytesFromAnotherFolder) {
   const fs::path sources = folder.path() / "other sources", build = folder.path() / "other build";
   fs::create_directory(sources);
   for (const char* name : {"CMakeLists.txt", "cmake", "boards", "can", "hal", "storage", "firmware", "estimator",
-                           "model", "protection", "arithmetic", "measurement"}) {
+                           "model", "protection", "arithmetic", "authentication", "measurement"}) {
     fs::copy(fs::path(BMS_SOURCE_DIR) / name, sources / name, fs::copy_options::recursive);
   }
   images::output_of({"cmake", "-S", sources, "-B", build, "-G", "Ninja", "-DBMS_BOARD=stm32f405_forklift",
