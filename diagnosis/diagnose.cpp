@@ -51,22 +51,28 @@ std::vector<DetectionLimit> detection_limits(LikelihoodModel& likelihood, const 
   return limits;
 }
 
+/// file_error_v: RMSE of the cell file; tolerated_v: RMSE that its noise and the tolerance of its OCV explain.
 Verdict verdict_of(const Adequacy& adequacy, const std::vector<Finding>& findings, const Contributions& contributed,
-                   double file_error_v) {
+                   double file_error_v, double tolerated_v) {
   if (adequacy.unknown) return Verdict::unknown;
   // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
   if (!adequacy.found && file_error_v > thresholds.decision.gross_v) return Verdict::unknown;
   if (!adequacy.found) return Verdict::no_mismatch;
-  if (contributed.explained_where_it_acts < thresholds.decision.cause_explains) return Verdict::unknown;
+  if (contributed.explained_where_it_acts < thresholds.decision.cause_explains &&
+      contributed.remaining_rmse_v > tolerated_v)
+    return Verdict::unknown;
   if (findings.size() > 1) return Verdict::causes;
   return findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
+}
+
+double noise_floor_v(const NoiseModel& noise) {
+  return std::sqrt(noise.white_v * noise.white_v + noise.fast_v * noise.fast_v + noise.slow_v * noise.slow_v);
 }
 
 /// The numbers behind the verdict.
 void add_numbers(const Adequacy& adequacy, const NoiseModel& nominal, Diagnosis& d) {
   d.noise = nominal;
-  d.noise_floor_v =
-      std::sqrt(nominal.white_v * nominal.white_v + nominal.fast_v * nominal.fast_v + nominal.slow_v * nominal.slow_v);
+  d.noise_floor_v = noise_floor_v(nominal);
   d.base_cost = adequacy.control_cost;
   d.best_cost = adequacy.best_cost;
   d.remaining = adequacy.residual.gain;
@@ -171,7 +177,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   const Contributions contributed = contributions(likelihood, control, survivors.best);
   d.findings = findings_of(search, survivors, contributed);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors);
-  d.verdict = verdict_of(adequacy, d.findings, contributed, plain_error_v(likelihood, likelihood.base()));
+  const double tolerated_v = std::hypot(noise_floor_v(search.nominal_noise()), cell.tolerance.ocv_v);
+  d.verdict = verdict_of(adequacy, d.findings, contributed, plain_error_v(likelihood, likelihood.base()), tolerated_v);
   d.interrupted = search.stopped();
   // that nothing was found yet does not mean that nothing is there
   if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
