@@ -181,11 +181,30 @@ void put_noise(const id::ModelErrors& errors, model::CellParameters<>& p) {
   p.noise.errors_are_states = true;
 }
 
+namespace {
+
+/// Where the circuit was identified, and how fast its error grows outside, if that was measured.
+void put_range(const id::StructureChoice& choice, files::CellFile& cell) {
+  const id::IdentifiedExtent& extent = choice.extent;
+  model::IdentifiedRange& range = cell.parameters.range;
+  range.temperature_min_c = extent.temperature_min_c.value_or(model::IdentifiedRange::unknown);
+  range.temperature_max_c = extent.temperature_max_c.value_or(model::IdentifiedRange::unknown);
+  range.soc_min = std::clamp(extent.soc_min, 0.0, 1.0);
+  range.soc_max = std::clamp(extent.soc_max, 0.0, 1.0);
+  range.current_max_a = extent.current_max_a;
+  range.duration_s = extent.duration_s;
+  cell.sources["range"] = "the recordings of [rc]";
+  if (choice.errors.resistance_per_ev > 0)
+    cell.parameters.tolerance.resistance_per_ev = std::min(choice.errors.resistance_per_ev, 1.0);
+}
+
+}  // namespace
+
 void put(const JointResult& joint, files::CellFile& cell) {
   const id::StructureChoice& choice = joint.choice;
   put_values(choice, cell);
   put_noise(choice.errors, cell.parameters);
-  // Place of [range] and tolerance.resistance_per_ev of the cell file: choice.extent, choice.errors.resistance_per_ev.
+  put_range(choice, cell);
   const id::CandidateResult& winner = choice.candidates[choice.chosen];
   const std::string what = fmt::format(
       "{}: one fit of all recordings at {} temperature{}, {:.1f} mV RMS; {:.1f} mV where one {} was left out",

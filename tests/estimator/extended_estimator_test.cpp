@@ -71,8 +71,9 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
     const auto moved = JetModel::advance(y, at_j, discretisation_j, input_j);
     const Jet v = JetModel::voltage(jets.laws, y, at_j, input_j);
     EXPECT_NEAR(v.a, Model::voltage(cell.laws, x, at, input), 1e-12);
-    // the filter neglects that mechanisms' resistances change with the SOC: far below the slope of the OCV
-    constexpr double neglected_v = 0.002;
+    // the filter neglects that resistances of mechanisms change with the SOC: within a long step, half of the flattest
+    // OCV
+    constexpr double neglected_v = 0.005;
     for (std::size_t j = 0; j < states; ++j) {
       for (std::size_t i = 0; i + 1 < states; ++i) {
         const double allowed = i > 0 && j + 1 == states ? neglected_v : 1e-12 * (1 + std::abs(f[i][j]));
