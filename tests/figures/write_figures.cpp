@@ -7,6 +7,7 @@
 //   board         figures that depend on the code alone, not on recordings or the machine
 //   protection    instructions of the protection
 //   budgets       flash, RAM and stack of the boards
+//   trials        state of charge on real recordings
 //   fixed         fixed point against double, and the microbit against the host
 //
 // Figures of recordings that are missing stay unchanged. Speeds are those of this machine.
@@ -387,15 +388,22 @@ void write_board() {
   files::replace_figures(source / "boards/README.md", "budgets", firmware::board_table());
 }
 
+/// State of charge on real recordings; unchanged if they are missing.
+void write_trials() {
+  if (!std::filesystem::exists(data)) return;
+  const auto trials = source / "docs/figures/soc_trials.md";
+  files::replace_figures(trials, "real", real_accuracy());
+  files::replace_figures(trials, "trials", soc_trials(data));
+}
+
 void run() {
-  const auto estimator = source / "estimator/README.md", trials = source / "docs/figures/soc_trials.md";
+  const auto estimator = source / "estimator/README.md";
   write_board();
   write_front_page();
   files::replace_figures(estimator, "shift", shift_accuracy());
   files::replace_figures(estimator, "duty", thousand_hours());
   if (std::filesystem::exists(data)) {
-    files::replace_figures(trials, "real", real_accuracy());
-    files::replace_figures(trials, "trials", soc_trials(data));
+    write_trials();
     files::replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
   } else {
     fmt::print(stderr, "{} does not exist: the figures of real recordings stay unchanged\n", data.string());
@@ -423,6 +431,8 @@ int main(int argc, char** argv) {
       bms::files::replace_figures(bms::source / "boards/README.md", "budgets", bms::firmware::board_table());
     else if (argc > 1 && std::string_view(argv[1]) == "protection")
       bms::files::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
+    else if (argc > 1 && std::string_view(argv[1]) == "trials")
+      bms::write_trials();
     else if (argc > 1 && std::string_view(argv[1]) == "fixed")
       bms::files::replace_figures(bms::source / "boards/microbit/README.md", "fixed", bms::fixed_point());
     else
