@@ -97,6 +97,11 @@ RestedOcv move_ocv_to(std::vector<RestedPoint> all, files::CellFile& cell) {
     const double predicted_v = shift[k - 1] + part * (shift[k + 1] - shift[k - 1]);
     result.error_v = std::max(result.error_v, std::abs(shift[k] - predicted_v));
   }
+  // a knee of the curve may lie anywhere between two rests
+  double widest = 0;
+  for (std::size_t k = 1; k < points.size(); ++k) widest = std::max(widest, points[k].soc - points[k - 1].soc);
+  double& axis = cell.parameters.tolerance.initial_soc;
+  axis = std::max(axis, std::min(widest, 1.0) / std::sqrt(12));
   // edges: those of the start cell, and the points
   std::vector<double> edges(before.soc.value.begin(), before.soc.value.begin() + static_cast<long>(before.soc.size));
   for (const RestedPoint& p : points) {

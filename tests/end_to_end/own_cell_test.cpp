@@ -200,7 +200,7 @@ TEST_F(OwnCell, WithoutASlowTestTheRestsGiveTheOcv) {
   EXPECT_THAT(run.err, HasSubstr("OCV from "));
   const ToolRun replay = run_tool("replay " + in + "truck.csv --cell " + in + "rests.toml --initial-soc 0.95 --json -");
   const json soc = json::parse(replay.out)["soc"];
-  EXPECT_NEAR(soc["final"], end_soc, 3 * soc["final_sigma"].get<double>()) << "a coarse OCV is stated as such";
+  EXPECT_NEAR(soc["final"], end_soc, 2 * soc["final_sigma"].get<double>()) << "a coarse OCV is stated as such";
   EXPECT_NEAR(soc["final"], end_soc, 0.05);
 }
 
