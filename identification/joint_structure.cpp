@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "identification/residuals.hpp"
+#include "measurement/statistics.hpp"
 
 namespace bms::identification {
 
@@ -119,12 +120,6 @@ Eigen::VectorXd carried_over(const JointModel& of, const JointModel& from, const
   return start;
 }
 
-double rms(std::span<const double> values) {
-  double squares = 0;
-  for (const double v : values) squares += v * v;
-  return values.empty() ? 0 : std::sqrt(squares / static_cast<double>(values.size()));
-}
-
 /// RMSE of a few stretches of the rows with a voltage: a single fold has several parts to be judged by.
 void add_stretches(const JointRecording& r, std::span<const double> simulated_v, std::vector<double>& rmse) {
   constexpr std::size_t stretches = 4;
@@ -134,7 +129,7 @@ void add_stretches(const JointRecording& r, std::span<const double> simulated_v,
   }
   const std::size_t length = (errors.size() + stretches - 1) / stretches;
   for (std::size_t from = 0; from < errors.size(); from += length)
-    rmse.push_back(rms(std::span(errors).subspan(from, std::min(length, errors.size() - from))));
+    rmse.push_back(measurement::rms(std::span(errors).subspan(from, std::min(length, errors.size() - from))));
 }
 
 /// A candidate with its fits.
@@ -160,7 +155,7 @@ Tried try_candidate(const JointCandidate& candidate, std::span<const JointRecord
   tried.result.name = candidate.name;
   tried.result.unknowns = candidate.model.unknowns.size();
   tried.fit = fit_joint(candidate.model, recordings, options, start);
-  tried.result.fitted_rmse_v = rms(tried.fit.rmse_v);
+  tried.result.fitted_rmse_v = measurement::rms(tried.fit.rmse_v);
   const JointOptions quick = quick_fit(options);
   for (const Fold& fold : folds) {
     const JointFit& fit = tried.fold_fits.emplace_back(fit_joint(candidate.model, fold.fit, quick, tried.fit.value));
@@ -173,7 +168,7 @@ Tried try_candidate(const JointCandidate& candidate, std::span<const JointRecord
       else
         own.push_back(rmse_v(fold.left_out[k].data, simulated.voltage_v));
     }
-    if (folds.size() > 1) tried.result.left_out_rmse_v.push_back(rms(own));
+    if (folds.size() > 1) tried.result.left_out_rmse_v.push_back(measurement::rms(own));
   }
   double logs = 0;
   for (const double v : tried.result.left_out_rmse_v) logs += std::log(v);
@@ -255,9 +250,9 @@ ModelErrors errors_of(const std::vector<LeftOutError>& all) {
     correlation.push_back(e.correlation_s);
   }
   ModelErrors errors;
-  errors.resistance_fraction = rms(resistance);
-  errors.initial_soc = rms(soc);
-  errors.model_v = rms(rest);
+  errors.resistance_fraction = measurement::rms(resistance);
+  errors.initial_soc = measurement::rms(soc);
+  errors.model_v = measurement::rms(rest);
   errors.correlation_s =
       std::accumulate(correlation.begin(), correlation.end(), 0.0) / static_cast<double>(correlation.size());
   std::vector<double> per_ev;
@@ -265,7 +260,7 @@ ModelErrors errors_of(const std::vector<LeftOutError>& all) {
     const double more = std::pow(e.resistance_error, 2) - std::pow(errors.resistance_fraction, 2);
     if (e.beyond_per_ev > 0) per_ev.push_back(std::sqrt(std::max(0.0, more)) / e.beyond_per_ev);
   }
-  errors.resistance_per_ev = rms(per_ev);
+  errors.resistance_per_ev = measurement::rms(per_ev);
   return errors;
 }
 
@@ -293,36 +288,14 @@ IdentifiedExtent extent_of(const JointModel& model, std::span<const JointRecordi
 
 std::vector<std::vector<std::size_t>> by_temperature(std::span<const JointRecording> recordings) {
   constexpr double near_k = 5;  // as far apart as recordings of one temperature can be
-  std::vector<std::pair<double, std::size_t>> order;
-  std::vector<std::size_t> all;
-  for (std::size_t k = 0; k < recordings.size(); ++k) {
-    all.push_back(k);
-    if (const auto c = mean_temperature_c(recordings[k])) order.emplace_back(*c, k);
-  }
-  if (order.size() < recordings.size()) return {all};
-  std::sort(order.begin(), order.end());
-  std::vector<std::vector<std::size_t>> groups;
-  double begin_c = 0;
-  for (const auto& [c, k] : order) {
-    if (groups.empty() || c - begin_c > near_k) {
-      groups.emplace_back();
-      begin_c = c;
-    }
-    groups.back().push_back(k);
-  }
-  return groups;
+  std::vector<double> means_c;
+  for (const JointRecording& r : recordings) means_c.push_back(measurement::mean(r.temperature_c));
+  return measurement::groups_within(means_c, near_k);
 }
 
 std::optional<double> mean_temperature_c(const JointRecording& recording) {
-  double sum = 0;
-  std::size_t count = 0;
-  for (const double c : recording.temperature_c) {
-    if (!std::isfinite(c)) continue;
-    sum += c;
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  return sum / static_cast<double>(count);
+  const double c = measurement::mean(recording.temperature_c);
+  return std::isnan(c) ? std::nullopt : std::optional(c);
 }
 
 StructureChoice choose_structure(const std::vector<JointCandidate>& candidates,

@@ -44,6 +44,33 @@ Real median(std::vector<Real> values) {
   return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
+/// Mean of the finite values; NaN if there is none.
+inline double mean(std::span<const double> values) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const double v : values) {
+    if (!std::isfinite(v)) continue;
+    sum += v;
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Indices of the values in groups, ascending by value: a group contains what is at most `span` above its smallest
+/// value. One group of all in their order if a value is missing.
+inline std::vector<std::vector<std::size_t>> groups_within(std::span<const double> values, double span) {
+  std::vector<std::size_t> order(values.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+  if (std::any_of(values.begin(), values.end(), [](double v) { return std::isnan(v); })) return {order};
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+  std::vector<std::vector<std::size_t>> groups;
+  for (const std::size_t k : order) {
+    if (groups.empty() || values[k] - values[groups.back().front()] > span) groups.emplace_back();
+    groups.back().push_back(k);
+  }
+  return groups;
+}
+
 /// Root mean square. 0 if there is no value.
 inline double rms(std::span<const double> values) {
   double squares = 0;

@@ -249,7 +249,6 @@ constexpr ChargeScale<S> charge_scale(double capacity_as) {
   return c;
 }
 
-/// A file that does not state its range was identified at the temperature of its tables.
 constexpr PlausibleRange plausible_range(const Limits& l) {
   PlausibleRange r;
   // half a volt and ten times the current beyond the limits of use: a reading there can still be right

@@ -60,6 +60,7 @@ constexpr std::int32_t micro_a(double a) {
   return static_cast<std::int32_t>(1e6 * (a < max_current_a ? a : max_current_a));
 }
 
+/// A file that does not state its range was identified at the temperature of its tables.
 template <class S, class Real>
 constexpr IdentifiedTemperatures<S> identified_temperatures(const CellParameters<Real>& p) {
   constexpr double kelvin_per_ev = 11'604.518;

@@ -14,6 +14,7 @@
 #include "host_sim/simulation.hpp"
 #include "identification/joint_fit.hpp"
 #include "identification/ocv_pieces.hpp"
+#include "measurement/statistics.hpp"
 #include "workflow/reference_temperature.hpp"
 #include "workflow/slow_parts.hpp"
 
@@ -52,47 +53,21 @@ std::vector<SlowRuns> slow_runs(const std::vector<std::string>& paths, const fil
   return all;
 }
 
-/// Mean of the recorded temperatures; nothing if no temperature was recorded.
-std::optional<double> mean_temperature_c(const measurement::Recording& recording) {
-  double sum = 0;
-  std::size_t count = 0;
-  for (const double t : recording.temperature_c) {
-    if (!std::isfinite(t)) continue;
-    sum += t;
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  return sum / static_cast<double>(count);
-}
-
 }  // namespace
 
 std::vector<TemperatureGroup> group_by_temperature(const std::vector<measurement::Recording>& recordings,
                                                    double reference_c) {
   constexpr double largest_span_k = 5;
-  std::vector<std::pair<double, std::size_t>> means;
-  std::vector<std::size_t> all;
-  for (std::size_t k = 0; k < recordings.size(); ++k) {
-    all.push_back(k);
-    if (const auto mean_c = mean_temperature_c(recordings[k])) means.emplace_back(*mean_c, k);
-  }
-  if (means.size() < recordings.size()) return {{reference_c, all}};
-  std::sort(means.begin(), means.end());
+  std::vector<double> means_c;
+  for (const measurement::Recording& r : recordings) means_c.push_back(measurement::mean(r.temperature_c));
+  const bool known = std::none_of(means_c.begin(), means_c.end(), [](double c) { return std::isnan(c); });
   std::vector<TemperatureGroup> groups;
-  double begin_c = 0;
-  for (const auto& [temperature_c, k] : means) {
-    if (groups.empty() || temperature_c - begin_c > largest_span_k) {
-      groups.push_back({0, {}});
-      begin_c = temperature_c;
-    }
-    TemperatureGroup& group = groups.back();
-    const auto n = static_cast<double>(group.recordings.size());
-    group.temperature_c = (group.temperature_c * n + temperature_c) / (n + 1);
-    group.recordings.push_back(k);
-  }
-  for (TemperatureGroup& group : groups) {
-    group.temperature_c = std::round(10 * group.temperature_c) / 10;
-    std::sort(group.recordings.begin(), group.recordings.end());
+  for (std::vector<std::size_t>& like : measurement::groups_within(means_c, largest_span_k)) {
+    double sum_c = 0;
+    for (const std::size_t k : like) sum_c += means_c[k];
+    const double mean_c = std::round(10 * sum_c / static_cast<double>(like.size())) / 10;
+    std::sort(like.begin(), like.end());
+    groups.push_back({known ? mean_c : reference_c, std::move(like)});
   }
   return groups;
 }

@@ -12,7 +12,8 @@ namespace {
 /// 200 s of pulses of 6 A with a row each second, then -1.5 A with a row each minute. The row with 0 A comes at the end
 /// of the last minute, in which 1.5 A flowed.
 measurement::Recording read(int minutes) {
-  const std::string path = testing::TempDir() + "rows_on_change.csv";
+  const images::TemporaryFolder folder;
+  const std::string path = (folder.path() / "rows_on_change.csv";
   std::ofstream out(path);
   out << "time_s,current_a,voltage_v\n0,0,3.3\n";
   double time_s = 0;
