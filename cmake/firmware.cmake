@@ -29,7 +29,9 @@
 # BMS_CELLS is the number of cells in series: that of board.cmake, or another one within the range that board.cmake
 # states, as -DBMS_CELLS=N.
 #
-# Whatever does not depend on the cell is compiled once for all images.
+# Whatever does not depend on the cell is compiled once for all images of this build. Builds of the same board with other
+# cells link it from there: -DBMS_SHARED_OBJECTS=FOLDER, a build with the same options, in which target IMAGE_shared
+# compiles what an image takes.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
 set(cells_wanted ${BMS_CELLS})
@@ -127,6 +129,23 @@ function(bms_objects name optimisation)
   target_compile_options(${name} PRIVATE ${optimisation})
 endfunction()
 
+set(BMS_SHARED_OBJECTS "" CACHE PATH "build of this board whose objects are linked if no cell decides on them")
+set(shared_objects "")
+# bms_shared_objects(NAME OPTIMISATION SOURCE...): no source depends on the cell. NAME.objects lists them for others.
+function(bms_shared_objects name optimisation)
+  if(BMS_SHARED_OBJECTS)
+    set(list ${BMS_SHARED_OBJECTS}/${name}.objects)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
+    file(STRINGS ${list} objects)
+    add_library(${name} OBJECT IMPORTED)
+    set_target_properties(${name} PROPERTIES IMPORTED_OBJECTS "${objects}")
+  else()
+    bms_objects(${name} ${optimisation} ${ARGN})
+    set(shared_objects ${shared_objects} ${name} PARENT_SCOPE)
+    file(GENERATE OUTPUT ${build}/${name}.objects CONTENT "$<JOIN:$<TARGET_OBJECTS:${name}>,\n>\n")
+  endif()
+endfunction()
+
 set(hal ${root}/hal)
 set(chip ${hal}/${BMS_CHIP})
 set(core ${hal}/cortex_m)
@@ -150,12 +169,12 @@ set(chip_secrets ${absent_hal}/device_key.cpp ${absent_hal}/random.cpp)
 if(EXISTS ${chip}/device_key.cpp)
   set(chip_secrets ${chip}/device_key.cpp ${chip}/random.cpp)
 endif()
-bms_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/retained.cpp
+bms_shared_objects(hal_core -Os ${core}/startup.cpp ${core}/stack.cpp ${core}/fault_record.cpp ${core}/retained.cpp
   ${core}/${BMS_CORE}.cpp ${chip}/vectors.cpp ${chip}/power.cpp)
-bms_objects(hal_clock -Os ${chip}/clock.cpp)
-bms_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar}
+bms_shared_objects(hal_clock -Os ${chip}/clock.cpp)
+bms_shared_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} ${chip_calendar}
   ${chip_secrets})
-bms_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation} ${absent_hal}/device_key.cpp
+bms_shared_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation} ${absent_hal}/device_key.cpp
   ${absent_hal}/random.cpp)
 # Back ends by BMS_CAN and BMS_SAMPLES.
 set(auxiliary_contacts ${absent_hal}/auxiliary_contacts.cpp)
@@ -174,25 +193,32 @@ set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp
 set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
   ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
   ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts})
-bms_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
-bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
-bms_objects(hal_remote_samples -Os ${samples_remote})
-target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
+bms_shared_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
+bms_shared_objects(hal_remote_samples -Os ${samples_remote})
 if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
-  target_sources(hal_samples PRIVATE ${absent_hal}/starting_point.cpp)
+  list(APPEND samples_${BMS_SAMPLES} ${absent_hal}/starting_point.cpp)
 endif()
-bms_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
+if(BMS_SAMPLES STREQUAL "bq76952")
+  bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
+else()
+  bms_shared_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
+endif()
+bms_shared_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
 set(no_hardware watchdog flash calendar board_state supply)
 list(TRANSFORM no_hardware PREPEND ${absent_hal}/)
 list(TRANSFORM no_hardware APPEND .cpp)
-bms_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
+bms_shared_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
   ${absent_hal}/requests.cpp ${no_hardware} ${no_chain})
-target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
-bms_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp ${no_hardware})
+bms_shared_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp
+  ${no_hardware})
+bms_shared_objects(storage -Os ${root}/storage/log.cpp ${root}/storage/persistence.cpp)
+if(NOT BMS_SHARED_OBJECTS)
+  target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
+  target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
+endif()
 
 # The cell file decides which model these compile.
 set(generated_headers ${cell_header} ${can_messages} ${j1939_messages})
-bms_objects(storage -Os ${root}/storage/log.cpp ${root}/storage/persistence.cpp)
 bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cell.cpp ${generated_headers})
 bms_objects(estimator_step -O2 ${root}/firmware/estimator_step.cpp ${generated_headers})
 math(EXPR version "(${PROJECT_VERSION_MAJOR} << 16) + (${PROJECT_VERSION_MINOR} << 8) + ${PROJECT_VERSION_PATCH}"
@@ -204,6 +230,12 @@ target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
 # before the objects compiled for size.
 set(linker_script ${BMS_LINKER_SCRIPT})
 function(bms_image name)
+  add_custom_target(${name}_shared)
+  foreach(objects ${ARGN})
+    if(objects IN_LIST shared_objects)
+      add_dependencies(${name}_shared ${objects})
+    endif()
+  endforeach()
   list(TRANSFORM ARGN PREPEND "$<TARGET_OBJECTS:" OUTPUT_VARIABLE objects)
   list(TRANSFORM objects APPEND ">")
   add_executable(${name} ${objects})

@@ -29,14 +29,14 @@ def output(*command, given=""):
 
 
 def linked(map_file):
-    """Archives with their linked members, and the project's own objects."""
+    """Archives with their linked members, and the sources of the project's own objects."""
     with open(map_file) as f:
         text = f.read()
     included = text[: text.find("Discarded input sections")] if "Discarded input sections" in text else text
     archives = {}
     for path, member in re.findall(r"^(/\S+\.a)\(([^)]+)\)$", included, re.M):
         archives.setdefault(os.path.normpath(path), set()).add(member)
-    return archives, sorted(set(re.findall(r"^LOAD (?!/)(\S+\.obj?)$", text, re.M)))
+    return archives, sorted(set(re.findall(r"^LOAD (?:\S*/)?CMakeFiles/[^/]*\.dir/(\S+)\.obj?$", text, re.M)))
 
 
 def versions(compiler):
@@ -70,10 +70,9 @@ def components_of(archives, versions_of, cell, image):
 
 def main():
     name, version, compiler, cell, map_file, image = sys.argv[1:]
-    archives, objects = linked(map_file)
+    archives, own_sources = linked(map_file)
     of = versions(compiler)
     components = components_of(archives, of, cell, image)
-    own_sources = [re.sub(r"^CMakeFiles/[^/]*\.dir/(.*)\.obj?$", r"\1", o) for o in objects]
     bom = {
         "bomFormat": "CycloneDX", "specVersion": "1.5", "version": 1,
         "metadata": {

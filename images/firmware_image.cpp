@@ -37,18 +37,20 @@ std::filesystem::path board_file(const std::string& board) {
   return file;
 }
 
-/// Locks a build folder: two runs at once would overwrite each other's files.
+/// Creates and locks a build folder: two runs at once would overwrite each other's files.
 class Lock {
  public:
-  explicit Lock(const std::filesystem::path& path) : fd_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
-    if (fd_ < 0 || flock(fd_, LOCK_EX) != 0) throw std::runtime_error("cannot lock " + path.string());
+  explicit Lock(const std::filesystem::path& folder) {
+    std::filesystem::create_directories(folder);
+    fd_ = open((folder / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (fd_ < 0 || flock(fd_, LOCK_EX) != 0) throw std::runtime_error("cannot lock " + folder.string());
   }
   ~Lock() { close(fd_); }
   Lock(const Lock&) = delete;
   Lock& operator=(const Lock&) = delete;
 
  private:
-  int fd_;
+  int fd_ = -1;
 };
 
 void run_step(const std::vector<std::string>& argv, const std::filesystem::path& log) {
@@ -112,45 +114,85 @@ Image chip_image(const std::string& board) {
 
 std::size_t board_cells(const std::string& board) { return std::stoul(board_setting(board, "BMS_CELLS")); }
 
+namespace {
+
+/// What decides on an image, apart from the cell.
+struct Variant {
+  std::string board, vehicle_profile;
+  std::size_t cells;  ///< 0: the board's own number
+
+  std::string ending() const {
+    return (vehicle_profile == "none" ? "" : "-" + vehicle_profile) +
+           (cells == 0 ? "" : fmt::format("-{}cells", cells));
+  }
+};
+
+/// A locked build folder of images.
+class BuildFolder {
+ public:
+  explicit BuildFolder(const std::string& name) : path_(source_tree() / "build" / "firmware" / name), lock_(path_) {}
+
+  bool is_new() const { return !std::filesystem::exists(path_ / "build.ninja"); }
+  const std::filesystem::path& path() const { return path_; }
+
+  void configure(const Variant& variant, const std::vector<std::string>& options) const {
+    std::vector<std::string> configure = {"cmake",
+                                          "-S",
+                                          source_tree().string(),
+                                          "-B",
+                                          path_.string(),
+                                          "-G",
+                                          "Ninja",
+                                          "-DBMS_BOARD=" + variant.board,
+                                          "-DBMS_VEHICLE_PROFILE=" + variant.vehicle_profile,
+                                          "--toolchain",
+                                          (source_tree() / "cmake" / "toolchain-arm-none-eabi.cmake").string(),
+                                          "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL};
+    if (variant.cells != 0) configure.push_back(fmt::format("-DBMS_CELLS={}", variant.cells));
+    configure.insert(configure.end(), options.begin(), options.end());
+    run_step(configure, log());
+  }
+
+  void build(const std::string& target) const { run_step({"ninja", "-C", path_.string(), target}, log()); }
+
+ private:
+  std::filesystem::path log() const { return path_ / "build.log"; }
+
+  std::filesystem::path path_;
+  Lock lock_;
+};
+
+/// Compiles what the cell does not decide on in an image. Returns the build folder.
+std::filesystem::path shared_objects(const Variant& variant, const std::string& image_name) {
+  const BuildFolder folder(variant.board + variant.ending());
+  if (folder.is_new()) folder.configure(variant, {});
+  folder.build(image_name + "_shared");
+  return folder.path();
+}
+
+}  // namespace
+
 std::filesystem::path firmware_image(const std::string& board, const files::CellFile& cell, Image image,
                                      const std::string& vehicle_profile, std::size_t cells) {
-  const auto root = source_tree();
   board_file(board);
   const bool other_cells = cells != 0 && cells != board_cells(board);
   if (other_cells) check_cells(board, cells);
-  const auto folder = root / "build" / "firmware" /
-                      fmt::format("{}-{}-{:08x}{}{}", board, cell.name, cell.hash,
-                                  vehicle_profile == "none" ? "" : "-" + vehicle_profile,
-                                  other_cells ? fmt::format("-{}cells", cells) : "");
   for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
     if (!in_path(tool)) throw files::BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
   }
-  std::filesystem::create_directories(folder);
-  const Lock lock(folder / "lock");
-  const auto cell_path = folder / "cell.toml", log = folder / "build.log";
+  const Variant variant{board, vehicle_profile, other_cells ? cells : 0};
+  const std::string image_name = fmt::format("bms_{}{}", board, ending(image));
+  const auto shared = shared_objects(variant, image_name);
+  const BuildFolder folder(fmt::format("{}-{}-{:08x}{}", board, cell.name, cell.hash, variant.ending()));
+  const auto cell_path = folder.path() / "cell.toml";
   if (!std::filesystem::exists(cell_path) || files::read_file(cell_path) != cell.text)
     files::write_file(cell_path, cell.text);
-  if (!std::filesystem::exists(folder / "build.ninja")) {
+  if (folder.is_new()) {
     if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", board, cell.name);
-    std::vector<std::string> configure = {"cmake",
-                                          "-S",
-                                          root.string(),
-                                          "-B",
-                                          folder.string(),
-                                          "-G",
-                                          "Ninja",
-                                          "-DBMS_BOARD=" + board,
-                                          "-DBMS_CELL=" + cell_path.string(),
-                                          "-DBMS_VEHICLE_PROFILE=" + vehicle_profile,
-                                          "--toolchain",
-                                          (root / "cmake" / "toolchain-arm-none-eabi.cmake").string(),
-                                          "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL};
-    if (other_cells) configure.push_back(fmt::format("-DBMS_CELLS={}", cells));
-    run_step(configure, log);
+    folder.configure(variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string()});
   }
-  const std::string name = fmt::format("bms_{}{}.elf", board, ending(image));
-  run_step({"cmake", "--build", folder.string(), "--target", name}, log);
-  return folder / name;
+  folder.build(image_name + ".elf");
+  return folder.path() / (image_name + ".elf");
 }
 
 }  // namespace bms::images

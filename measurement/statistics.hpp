@@ -44,7 +44,7 @@ Real median(std::vector<Real> values) {
   return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
-/// Mean of the finite values; NaN if there is none.
+/// Mean of the finite values; NaN without any.
 inline double mean(std::span<const double> values) {
   double sum = 0;
   std::size_t count = 0;

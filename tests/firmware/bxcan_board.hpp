@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "files/cell_file.hpp"
 #include "files/recording.hpp"
 #include "firmware/application.hpp"
 #include "images/firmware_image.hpp"
@@ -23,6 +24,16 @@ namespace bms::firmware {
 using namespace host_hal;
 using hal::CanState;
 using ::testing::IsEmpty;
+
+/// The cell of the images. After the first call, the application on this machine sends its hash.
+inline const files::CellFile& table9() {
+  static const files::CellFile cell = [] {
+    files::CellFile read = files::read_cell("table9");
+    cell_hash = read.hash;
+    return read;
+  }();
+  return cell;
+}
 
 inline const std::filesystem::path& image() {
   static const auto path = images::firmware_image("stm32f405_forklift", table9(), images::Image::remote);

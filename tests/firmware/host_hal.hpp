@@ -9,13 +9,13 @@
 #include <optional>
 #include <vector>
 
-#include "files/cell_file.hpp"
 #include "firmware/application.hpp"
 #include "hal/device_key.hpp"
 #include "hal/power.hpp"
 #include "hal/power_path.hpp"
 #include "hal/request_queue.hpp"
 #include "hal/second_current.hpp"
+#include "tests/cells.hpp"
 
 namespace bms::host_hal {
 
@@ -63,10 +63,7 @@ std::optional<Message> last() {
   return std::nullopt;
 }
 
-inline const files::CellFile& table9() {
-  static const files::CellFile cell = files::read_cell("table9");
-  return cell;
-}
+inline std::uint32_t cell_hash = 0x5EEDCE11;  ///< of the cell file, where the application is compared with an image
 
 /// The application's Board with the cell table9, except plan(), which the board of a test adds.
 template <std::size_t Cells>
@@ -75,7 +72,7 @@ struct Table9Board {
   static constexpr std::size_t cells = Cells;
 
   static const auto& tables() {
-    static const auto tables = model::prepare<float, model::max_intervals>(table9().parameters);
+    static const auto tables = model::prepare<float, model::max_intervals>(tests::table9);
     return tables;
   }
   static estimator::Estimate<float> step(Estimator& estimator, const measurement::Sample& sample) {
@@ -93,8 +90,8 @@ struct Table9Board {
   }
   static const model::PlausibleRange& plausible() { return tables().plausible; }
   static protection::PackDesign design(double sample_period_s) {
-    return {.limits = table9().parameters.limits,
-            .capacity_ah = table9().parameters.capacity_ah,
+    return {.limits = tests::table9.limits,
+            .capacity_ah = tests::table9.capacity_ah,
             .cells = Cells,
             .temperatures = Cells > 1 ? 4 : 1,
             .sample_period_s = sample_period_s};

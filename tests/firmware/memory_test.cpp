@@ -61,8 +61,7 @@ TEST_F(StoredStateTest, DataOfAnotherCellFileAreNotUsedAndFaultsMustBeCleared) {
   EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()), 0x12345678U);
   send_command(board, can::Command::code_clear_faults, 1);
   run(board, 2);
-  EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()),
-            host_hal::table9().hash);
+  EXPECT_EQ(static_cast<std::uint32_t>(board.persistence().settings().get(cell_file_key).value()), host_hal::cell_hash);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
 }
 

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "images/child_process.hpp"
 #include "workflow/diagnose_recordings.hpp"
 
 namespace bms::workflow {
@@ -13,7 +14,7 @@ namespace {
 /// of the last minute, in which 1.5 A flowed.
 measurement::Recording read(int minutes) {
   const images::TemporaryFolder folder;
-  const std::string path = (folder.path() / "rows_on_change.csv";
+  const std::string path = (folder.path() / "rows_on_change.csv").string();
   std::ofstream out(path);
   out << "time_s,current_a,voltage_v\n0,0,3.3\n";
   double time_s = 0;
