@@ -29,9 +29,9 @@
 # BMS_CELLS is the number of cells in series: that of board.cmake, or another one within the range that board.cmake
 # states, as -DBMS_CELLS=N.
 #
-# Whatever does not depend on the cell is compiled once for all images of this build. Builds of the same board with other
-# cells link it from there: -DBMS_SHARED_OBJECTS=FOLDER, a build with the same options, in which target IMAGE_shared
-# compiles what an image takes.
+# Whatever does not depend on the cell is compiled once for all images of this build. Builds of the same board with
+# other cells link it from there: -DBMS_SHARED_OBJECTS=FOLDER, a build with the same options, in which target
+# IMAGE_shared compiles what an image takes.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
 set(cells_wanted ${BMS_CELLS})
