@@ -5,18 +5,20 @@
 //                     after IEC 60255-149, without its exponential. At rest 30 s of overload decay in 30 s.
 //   opposite shift    a broken sense wire floats between its neighbours: one cell reads low, the next equally high.
 //                     Counts if the two shifts differ by less than half of the smaller.
-//   stuck             a cell repeats its reading exactly for five samples or more while the other cells moved by 20 mV;
-//                     a temperature, while the others moved by 5 K. The others: the mean without highest and lowest, so
-//                     that one that moves alone does not count; with less than four cells the pack's own reading, with
-//                     two sensors the other one.
+//   stuck             a cell repeats its reading exactly for five samples or more while the other cells moved by 20 mV:
+//                     their mean without highest and lowest, so that one that moves alone does not count; with less
+//                     than four cells the pack's own reading. A temperature, while most of the others moved by 5 K: the
+//                     second lowest and the second highest of all; with two sensors the other one. So two warm sensors
+//                     of four do not make the constant ones stuck.
 //
-// A quantity that cannot be computed is unknown (measurement::no_reading). Memory: 9 bytes per cell. Cost: README.md.
+// A quantity that cannot be computed is unknown (measurement::no_reading). Memory: 12 bytes per cell. Cost: README.md.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "measurement/pack_sample.hpp"
 #include "protection/fault_monitor.hpp"
@@ -51,6 +53,20 @@ constexpr std::int32_t current_difference_ua(const PackLimits& limits, std::int3
 
 /// Returns true for a possible cell voltage. A reversed cell reads a little below 0.
 constexpr bool cell_possible(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
+
+/// The two lowest and the two highest of the values that were added. Of a single value the second ones stay at their
+/// initial value.
+struct TwoEnds {
+  std::int32_t lowest = std::numeric_limits<std::int32_t>::max(), second_lowest = lowest,
+               highest = std::numeric_limits<std::int32_t>::min(), second_highest = highest;
+
+  constexpr void add(std::int32_t value) {
+    second_lowest = std::min(second_lowest, std::max(lowest, value));
+    lowest = std::min(lowest, value);
+    second_highest = std::max(second_highest, std::min(highest, value));
+    highest = std::max(highest, value);
+  }
+};
 
 template <std::size_t Cells>
 class PackQuantities {
@@ -163,30 +179,32 @@ class PackQuantities {
 
   constexpr void update_temperatures(const std::array<std::int16_t, measurement::max_temperatures>& all,
                                      Quantities& q) {
-    std::int32_t high = measurement::no_reading, low = measurement::no_reading, sum = 0, known = 0;
+    TwoEnds ends;
+    std::int32_t sum = 0, known = 0;
     for (std::size_t k = 0; k < limits_.temperatures; ++k) {
       if (!measurement::temperature_possible(all[k])) continue;
       ++known;
       sum += all[k];
-      high = std::max<std::int32_t>(high, all[k]);
-      low = low == measurement::no_reading ? all[k] : std::min<std::int32_t>(low, all[k]);
+      ends.add(all[k]);
     }
     at(q, Quantity::temperatures_missing) = limits_.temperatures - known;
     at(q, Quantity::temperatures_unknown) = known == 0 && limits_.temperatures > 0;
-    at(q, Quantity::highest_cdegc) = high;
-    at(q, Quantity::lowest_cdegc) = low;
+    at(q, Quantity::highest_cdegc) = known > 0 ? ends.highest : measurement::no_reading;
+    at(q, Quantity::lowest_cdegc) = known > 0 ? ends.lowest : measurement::no_reading;
     std::int32_t count = 0;
     for (std::size_t k = 0; k < limits_.temperatures && known > 1; ++k) {
-      const std::int32_t others = known > 2 ? (sum - high - low) / (known - 2) : sum - all[k];
-      if (measurement::temperature_possible(all[k]) && stuck(temperature_[k], all[k], others, stuck_move_cdegc))
-        ++count;
+      if (!measurement::temperature_possible(all[k])) continue;
+      const std::int32_t other = sum - all[k];
+      const bool low = stuck(temperature_[k][0], all[k], known > 2 ? ends.second_lowest : other, stuck_move_cdegc);
+      const bool high = stuck(temperature_[k][1], all[k], known > 2 ? ends.second_highest : other, stuck_move_cdegc);
+      if (low && high) ++count;
     }
     at(q, Quantity::temperatures_stuck) = known > 1 ? count : measurement::no_reading;
   }
 
   PackLimits limits_;
   std::array<Repeats, Cells> cell_{};
-  std::array<Repeats, measurement::max_temperatures> temperature_{};
+  std::array<std::array<Repeats, 2>, measurement::max_temperatures> temperature_{};  ///< against the two middle ones
   std::int32_t charge_overload_i2t_us_ = 0, discharge_overload_i2t_us_ = 0, sum_uv_ = measurement::no_reading;
 };
 

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <deque>
-#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -157,25 +156,26 @@ class QuantityOracle {
     }
     return count;
   }
+  /// Sorted readings of all sensors but the outermost ones; of two sensors that of the other one.
+  std::vector<std::int64_t> inner_temperatures(std::size_t at, std::size_t sensor) const {
+    std::vector<std::int64_t> known;
+    for (const std::int16_t t : history_[at].temperature_cdegc) {
+      if (t != measurement::no_temperature) known.push_back(t);
+    }
+    std::sort(known.begin(), known.end());
+    if (known.size() < 2) return {0};
+    if (known.size() == 2) return {known[0] + known[1] - history_[at].temperature_cdegc[sensor]};
+    return {known.begin() + 1, known.end() - 1};
+  }
+  /// A sensor is stuck if the lower and the upper of the inner ones have both moved by more than 5 K.
   std::int64_t stuck_temperatures() const {
     std::int64_t count = 0;
     for (std::size_t k = 0; k < 4; ++k) {
       const auto reading = [&](std::size_t i) { return history_[i].temperature_cdegc[k]; };
-      const auto others = [&](std::size_t i) {
-        std::vector<std::int64_t> known;
-        for (const std::int16_t t : history_[i].temperature_cdegc) {
-          if (t != measurement::no_temperature) known.push_back(t);
-        }
-        std::sort(known.begin(), known.end());
-        if (known.size() < 2) return std::int64_t{0};
-        if (known.size() == 2) return known[0] + known[1] - history_[i].temperature_cdegc[k];
-        const std::int64_t sum = std::accumulate(known.begin() + 1, known.end() - 1, std::int64_t{0});
-        return sum / static_cast<std::int64_t>(known.size() - 2);
-      };
-      count += stuck(
-                   reading, [](std::int16_t t) { return t != measurement::no_temperature; }, others, 500)
-                   ? 1
-                   : 0;
+      const auto there = [](std::int16_t t) { return t != measurement::no_temperature; };
+      const auto lower = [&](std::size_t i) { return inner_temperatures(i, k).front(); };
+      const auto upper = [&](std::size_t i) { return inner_temperatures(i, k).back(); };
+      count += stuck(reading, there, lower, 500) && stuck(reading, there, upper, 500) ? 1 : 0;
     }
     return count;
   }
