@@ -82,6 +82,17 @@ std::filesystem::path Cases::file_of(const std::string& name) const {
   return kept / file;
 }
 
+std::vector<Outcome> Cases::all_kept() const {
+  std::vector<Outcome> all;
+  if (!std::filesystem::exists(kept)) return all;
+  for (const auto& file : std::filesystem::directory_iterator(kept)) {
+    all.emplace_back().name = file.path().filename();
+    read_report(files::read_file(file.path()), all.back());
+  }
+  std::sort(all.begin(), all.end(), [](const Outcome& a, const Outcome& b) { return a.name < b.name; });
+  return all;
+}
+
 bool Cases::known(const std::string& name) {
   if (kept.empty() || !std::filesystem::exists(file_of(name))) return false;
   Outcome outcome;
@@ -120,7 +131,7 @@ void Cases::ended(Child& child) {
   waitpid(child.pid, nullptr, 0);
   Outcome& outcome = outcomes_[child.number];
   read_report(child.text, outcome);
-  if (outcome.good && !kept.empty()) {
+  if (!kept.empty()) {
     std::filesystem::create_directories(kept);
     std::ofstream(file_of(outcome.name)) << child.text;
   }

@@ -36,9 +36,11 @@ class Cases {
   void start(const std::string& name, const std::function<void(Outcome&)>& body);
   /// Waits for all children. The outcomes are in the order of start().
   std::vector<Outcome> finish();
-  /// Good outcomes are written to this folder, and a case whose outcome is there is not run again. Empty: none.
+  /// Outcomes are written to this folder, and a case whose good outcome is there is not run again. Empty: none.
   std::filesystem::path kept;
   bool only_kept = false;  ///< runs nothing
+  /// All outcomes in `kept`, by name.
+  std::vector<Outcome> all_kept() const;
   /// Prints each outcome that is not good as soon as it is known.
   bool talks = true;
 

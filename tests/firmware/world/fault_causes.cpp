@@ -43,12 +43,13 @@ SetQuantity actuator_of(const Row& row) {
 std::vector<Cause> other_causes() {
   std::vector<Cause> list;
   list.push_back({29, "I2C: front end does not answer", [](TruckWorld& w) { w.chip.gone = true; }, 0.5, true,
-                  fault(20) | fault(22) | fault(23) | fault(36) | second_line});
+                  fault(20) | fault(22) | fault(23) | second_line});
   list.push_back({29, "I2C: clock held low", [](TruckWorld& w) { w.chip.hung = true; }, 0.7, true,
                   fault(20) | fault(22) | fault(23) | second_line});
   list.push_back({29, "front end resets", [](TruckWorld& w) { w.chip.reset(); }, 0.7, true,
                   fault(20) | fault(22) | fault(23) | second_line | fault(33)});
-  // SLUUBY2B, 4.5.1: a scan that ends is reported; without one there is no sample
+  // The chip reports each complete scan in Alarm Status (TI in E2E 1401615; SLUUBY2B, 12.2, not at hand). Without a
+  // report its registers may keep old values, so there is no sample.
   list.push_back({29, "front end stops measuring", [](TruckWorld& w) { w.chip.frozen = true; }, 0.7, true,
                   fault(20) | fault(22) | fault(23) | fault(21) | second_line});
   // 0 V is a valid code: the stack, measured by itself, contradicts it
@@ -68,7 +69,7 @@ std::vector<Cause> other_causes() {
                   [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; },
                   0.4,
                   true,
-                  fault(8) | fault(9) | fault(18) | fault(34) | fault(36) | fault(37) | fault(27) | second_line,
+                  fault(8) | fault(9) | fault(34) | fault(37) | fault(27) | second_line,
                   {},
                   true});
   for (std::size_t sensor = 0; sensor < 4; ++sensor) {
@@ -86,6 +87,30 @@ std::vector<Cause> other_causes() {
                     for (std::size_t k = 1; k < 4; ++k)
                       w.set_temperature(k, std::min(38.0, w.temperature_c(k) + 2.5 + 0.2 * static_cast<double>(k)));
                   }});
+  list.push_back({34,
+                  "Hall sensor reads 36 A too much",
+                  [](TruckWorld& w) { w.sensors.hall_error_v = 0.06; },
+                  0.4,
+                  false,
+                  0,
+                  {},
+                  true});
+  list.push_back({35, "all thermistors broken",
+                  [](TruckWorld& w) {
+                    for (std::size_t k = 0; k < 4; ++k) w.set_thermistor_ohm(k, Bq76952Inputs::open_ohm);
+                  },
+                  0.4, false, fault(23)});
+  list.push_back({36,
+                  "current flows after the request has ended",
+                  [](TruckWorld& w) { w.vehicle.request = Request::none; },
+                  0.4,
+                  false,
+                  0,
+                  {},
+                  true});
+  // a record of the charge is due each minute, and is tried again
+  list.push_back(
+      {31, "flash wears out", [](TruckWorld& w) { w.board.flash.worn_out = true; }, 130, false, fault(30), {}, true});
   return list;
 }
 

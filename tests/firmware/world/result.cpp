@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <functional>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -14,7 +15,13 @@ unsigned Result::failed() const {
       std::count_if(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return !o.good; }));
 }
 
-bool Extent::has(const std::string& name) const { return only.empty() || name.find(only) != std::string::npos; }
+bool Extent::has(const std::string& name) const {
+  std::istringstream texts(only);
+  for (std::string text; std::getline(texts, text, '|');) {
+    if (name.find(text) != std::string::npos) return true;
+  }
+  return only.empty();
+}
 
 std::filesystem::path Extent::kept(const std::string& scenario, const Pack& pack) const {
   if (!continues) return {};

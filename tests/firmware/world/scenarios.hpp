@@ -21,7 +21,7 @@ struct Result {
 struct Extent {
   std::size_t count = 0;  ///< 0: all
   std::uint64_t seed = 1;
-  std::string only;     ///< cases whose name contains this text; empty: all
+  std::string only;     ///< cases whose name contains one of these texts, separated by |; empty: all
   double minutes = 10;  ///< of the shift
   unsigned at_once = 2;
   bool continues = false;  ///< good outcomes of an earlier run with the same image and seed count

@@ -11,7 +11,7 @@ namespace bms::world {
 
 namespace {
 
-constexpr double cell_noise_v = 0.0015, shunt_noise_v = 5e-6;
+constexpr double cell_noise_v = 0.0015, shunt_noise_v = 5e-6, latest_ms = 5;
 
 class Shift {
  public:
@@ -22,6 +22,7 @@ class Shift {
         random_(seed + 7),
         outcome_(outcome) {
     world_.set_noise(cell_noise_v, shunt_noise_v);
+    world_.make_late(latest_ms);
     world_.each_step = [this] { judge_.step(); };
   }
 
@@ -39,6 +40,8 @@ class Shift {
       check();
     }
     outcome_.values["samples"] = world_.vehicle.frames[0x180];
+    outcome_.values["shortest"] = world_.vehicle.shortest_cycle_ms;
+    outcome_.values["longest"] = world_.vehicle.longest_cycle_ms;
     outcome_.values["starts"] = starts_;
     outcome_.values["minutes"] = world_.now_ms() / 60e3;
     outcome_.values["soc error"] = std::abs(world_.vehicle.soc_percent() - 100 * mean_soc());
@@ -113,17 +116,21 @@ Result run_shift(const Extent& extent) {
                 [&, seed](Outcome& outcome) { Shift(pack, seed, outcome).run(minutes); });
   }
   Result result{"shift", "", cases.finish()};
-  double samples = 0, starts = 0, done = 0, soc_error = 0;
+  double samples = 0, starts = 0, done = 0, soc_error = 0, shortest = 1e9, longest = 0;
   for (const Outcome& o : result.outcomes) {
     samples += o.value("samples", 0);
     starts += o.value("starts", 0);
     done += o.value("minutes", 0);
+    shortest = std::min(shortest, o.value("shortest", 1e9));
+    longest = std::max(longest, o.value("longest", 0));
     soc_error = std::max(soc_error, o.value("soc error", 0));
   }
   result.table = fmt::format(
-      "| trucks | minutes | samples | starts | faults | error of the state of charge at the end |\n"
-      "|---|---|---|---|---|---|\n| {} | {:.0f} | {:.0f} | {:.0f} | {} | {:.1f} % |\n",
-      trucks, done, samples, starts, result.failed(), soc_error);
+      "| trucks | minutes | samples | time between two samples [ms] | starts | trucks with a fault | error of the "
+      "state "
+      "of charge at the end |\n"
+      "|---|---|---|---|---|---|---|\n| {} | {:.0f} | {:.0f} | {:.1f} to {:.1f} | {:.0f} | {} | {:.1f} % |\n",
+      trucks, done, samples, shortest, longest, starts, result.failed(), soc_error);
   return result;
 }
 

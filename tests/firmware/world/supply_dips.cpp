@@ -11,6 +11,8 @@ namespace bms::world {
 
 namespace {
 
+constexpr double restarted_share = 0.35;
+
 struct Dip {
   bool coils = false;
   double duration_ms = 0, depth_v = 0;
@@ -27,20 +29,8 @@ Dip random_dip(plant::Random& random, const TruckWorld& world, double coil_v) {
   return dip;
 }
 
-void survive(TruckWorld& world, const Dip& dip, Outcome& outcome) {
-  const std::size_t before = world.truck.events().size();
-  const double start_ms = world.now_ms();
-  if (dip.coils) {
-    world.dip_coil_supply(0.5, dip.duration_ms, dip.depth_v);
-  } else {
-    world.dip_vdda(0.5, dip.duration_ms, dip.depth_v);
-  }
-  world.run_ms(dip.duration_ms + 300);
-  world.run_until([&] { return world.both_mains_closed(); }, 3'700);
-  world.run_ms(200);
-  outcome.values["state after"] = world.vehicle.state();
-  outcome.values["resets"] = static_cast<double>(world.board.resets.size());
-  // the driver turns the key, faults are cleared, and the truck is to drive again
+/// The driver turns the key, faults are cleared, and the truck is to drive again.
+void restart(TruckWorld& world, Outcome& outcome) {
   set_drive_a(world, 0);
   set_charger_a(world, 0);
   world.vehicle.request = Request::none;
@@ -55,9 +45,31 @@ void survive(TruckWorld& world, const Dip& dip, Outcome& outcome) {
   const double ms = world.run_until([&] { return world.both_mains_closed(); }, 12'000);
   if (ms < 0) outcome.fail("does not drive again: " + summary(world));
   world.run_ms(200);
-  const auto closings = world.closings_below_v(closing_limit_v, before);
-  outcome.values["closings"] = static_cast<double>(closings.size());
-  if (!closings.empty()) {
+  outcome.values["restarted"] = 1;
+}
+
+/// The request goes on for four seconds after the dip.
+void survive(TruckWorld& world, const Dip& dip, bool restarts, Outcome& outcome) {
+  const std::size_t before = world.truck.events().size();
+  const double start_ms = world.now_ms();
+  if (dip.coils) {
+    world.dip_coil_supply(0.5, dip.duration_ms, dip.depth_v);
+  } else {
+    world.dip_vdda(0.5, dip.duration_ms, dip.depth_v);
+  }
+  world.run_ms(dip.duration_ms + 300);
+  world.run_until([&] { return world.both_mains_closed(); }, 3'700);
+  world.run_ms(200);
+  outcome.values["state after"] = world.vehicle.state();
+  outcome.values["resets"] = static_cast<double>(world.board.resets.size());
+  if (restarts) restart(world, outcome);
+  int below = 0, above = 0;
+  for (const auto& closing : world.closings_below_v(closing_limit_v, before)) {
+    ++(closing.dc_link_v < world.pack_v() ? below : above);
+  }
+  outcome.values["below"] = below;
+  outcome.values["above"] = above;
+  if (below + above > 0) {
     outcome.fail(fmt::format("{} dip of {:.1f} ms by {:.2f} V at {:.1f} ms: {}", dip.coils ? "coil" : "VDDA",
                              dip.duration_ms, dip.depth_v, start_ms, summary(world)));
   }
@@ -103,10 +115,11 @@ class Timeline {
   void dip(const std::string& state) {
     if (started_ >= dips_) return;
     const Dip falls = random_dip(random_, world_, setup_.truck.supply.coil_v);
+    const bool restarts = random_.uniform() < restarted_share;
     cases_.start(fmt::format("{} {} {}", state, setup_.seed, started_++), [&](Outcome& outcome) {
       outcome.texts["state"] = state;
       outcome.values["coils"] = falls.coils;
-      survive(world_, falls, outcome);
+      survive(world_, falls, restarts, outcome);
     });
   }
   /// `weight` is the number of dips of about 100.
@@ -142,21 +155,21 @@ class Timeline {
 
 Result run_supply_dips(const Extent& extent) {
   const Pack pack = pack_of(truck_ah);
-  const std::size_t count = extent.count == 0 ? 1'000 : extent.count, worlds = std::max<std::size_t>(1, count / 60);
+  const std::size_t count = extent.count == 0 ? 1'000 : extent.count, worlds = std::max<std::size_t>(1, count / 50);
   Cases cases(extent.at_once);
   cases.kept = extent.kept(fmt::format("dips_{}", count), pack);
   cases.only_kept = extent.only_kept;
   std::vector<Outcome> broken;
-  for (std::size_t k = 0; k < worlds; ++k) {
+  for (std::size_t k = 0; k < worlds && !extent.only_kept; ++k) {
     const std::string problem = Timeline(pack, extent.seed + k, count / worlds, cases).run();
     if (problem.empty()) continue;
     broken.emplace_back().name = fmt::format("world {}", extent.seed + k);
     broken.back().fail(problem);
     fmt::print("FAILED {}: {}\n", broken.back().name, problem);
   }
-  Result result{"supply dips", "", cases.finish()};
+  Result result{"supply dips", "", extent.only_kept ? cases.all_kept() : cases.finish()};
   struct Line {
-    int dips = 0, coils = 0, resets = 0, closings = 0, stuck = 0;
+    int dips = 0, coils = 0, resets = 0, below = 0, above = 0, restarts = 0, stuck = 0;
   };
   std::map<std::string, Line> lines;
   for (const Outcome& o : result.outcomes) {
@@ -164,17 +177,22 @@ Result run_supply_dips(const Extent& extent) {
     ++line.dips;
     line.coils += o.value("coils", 0) > 0 ? 1 : 0;
     line.resets += o.value("resets", 0) > 0 ? 1 : 0;
-    line.closings += o.value("closings", 0) > 0 ? 1 : 0;
-    line.stuck += !o.good && o.value("closings", 0) == 0 ? 1 : 0;
+    line.below += o.value("below", 0) > 0 ? 1 : 0;
+    line.above += o.value("above", 0) > 0 ? 1 : 0;
+    line.restarts += o.value("restarted", 0) > 0 ? 1 : 0;
+    line.stuck += !o.good && o.value("below", 0) + o.value("above", 0) == 0 ? 1 : 0;
   }
   result.table =
-      "| state | dips | of the coil supply | with a reset | closings on a DC link 8 V below the pack | do not drive "
-      "again |\n"
-      "|---|---|---|---|---|---|\n";
+      "| state | dips | of the coil supply | with a reset | closings on a DC link 8 V below the pack | 8 V above it | "
+      "started again | do not start |\n"
+      "|---|---|---|---|---|---|---|---|\n";
+  int all = 0;
   for (const auto& [state, l] : lines) {
-    result.table +=
-        fmt::format("| {} | {} | {} | {} | {} | {} |\n", state, l.dips, l.coils, l.resets, l.closings, l.stuck);
+    result.table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", state, l.dips, l.coils, l.resets,
+                                l.below, l.above, l.restarts, l.stuck);
+    all += l.dips;
   }
+  result.table += fmt::format("\n{} dips.\n", all);
   result.outcomes.insert(result.outcomes.end(), broken.begin(), broken.end());
   return result;
 }

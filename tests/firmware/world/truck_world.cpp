@@ -94,7 +94,7 @@ TruckWorld::TruckWorld(const std::filesystem::path& image, const WorldSetup& set
   adc.offset_lsb = setup.adc_offset_lsb;
   adc.pin_v = [this](unsigned channel) {
     const plant::PinVoltages v = truck.pins();
-    const std::array<double, 4> wired{v.pa1_v, v.pa2_v, v.pc0_v, v.pc1_v};
+    const std::array<double, 4> wired{v.pa1_v + sensors.hall_error_v, v.pa2_v, v.pc0_v, v.pc1_v};
     const std::array<unsigned, 4> channels{1, 2, 10, 11};
     const auto found = std::find(channels.begin(), channels.end(), channel);
     return found == channels.end() ? 0.0 : wired[static_cast<std::size_t>(found - channels.begin())];

@@ -41,6 +41,7 @@ struct SensorFaults {
   std::array<double, 16> cell_error_v{};
   double stack_error_v = 0;
   double shunt_factor = 1;  ///< 0: a wire of the shunt is off
+  double hall_error_v = 0;  ///< at PA1
 };
 
 /// I2C of the board. A reset of the chip resets it. While the program polls a byte on the wire, the time is skipped.

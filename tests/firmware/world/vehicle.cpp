@@ -1,5 +1,7 @@
 #include "tests/firmware/world/vehicle.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
@@ -108,6 +110,11 @@ void Vehicle::read(const can::Frame& frame, double at_ms) {
       allowed_discharge_a_ = 0.02 * static_cast<double>(field(frame, 32, 16));
       break;
     case pack_state_id:
+      if (pack_state_ms_ >= 0) {
+        shortest_cycle_ms = std::min(shortest_cycle_ms, at_ms - pack_state_ms_);
+        longest_cycle_ms = std::max(longest_cycle_ms, at_ms - pack_state_ms_);
+      }
+      pack_state_ms_ = at_ms;
       soc_percent_ = 0.002 * static_cast<double>(field(frame, 16, 16));
       break;
     case board_id:

@@ -34,6 +34,8 @@ class Vehicle {
   double allowed_discharge_a() const { return allowed_discharge_a_; }
   double longest_sample_ms() const { return longest_sample_ms_; }  ///< Board.LongestSample; negative: not published
   double soc_percent() const { return soc_percent_; }
+  /// Shortest and longest time between two PackState messages, one of each sample [ms].
+  double shortest_cycle_ms = 1e9, longest_cycle_ms = 0;
   double silent_ms() const;  ///< since the last Faults message
   /// All faults that were published since the start or since forget().
   std::uint64_t faults_seen() const { return seen_; }
@@ -55,7 +57,7 @@ class Vehicle {
 
   firmware::UnicornBoard& board_;
   std::size_t read_ = 0;
-  double next_request_ms_ = 0, received_ms_ = 0;
+  double next_request_ms_ = 0, received_ms_ = 0, pack_state_ms_ = -1;
   std::uint8_t counter_ = 0;
   Request sent_ = Request::none;
   std::uint64_t faults_ = 0, seen_ = 0;

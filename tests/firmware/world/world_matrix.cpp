@@ -3,7 +3,7 @@
 //   SCENARIO         starts, contacts, dips, faults, overloads or shift; all of them if not given
 //   --count N        so many worlds or cases instead of all
 //   --seed N         of the random worlds
-//   --only TEXT      cases whose names contain TEXT
+//   --only TEXT      cases whose names contain TEXT, or one of several texts, separated by |
 //   --minutes N      duration of the shift
 //   --jobs N         cases at a time
 //   --continue       takes the good outcomes of earlier runs with this option, of the same image and seed

@@ -27,21 +27,17 @@ Extent some(std::size_t count, const std::string& only = "") { return {.count = 
 TEST(World, ATruckWithRandomComponentsDrivesChargesAndRestartsWithAChargedDcLink) { expect_good(run_starts(some(3))); }
 
 TEST(World, AWeldedMainContactorIsFoundBeforeTheNextStart) {
-  expect_good(run_contact_failures(some(0, "K1 welds while driving")));
-  expect_good(run_contact_failures(some(0, "K2 welds while driving")));
+  expect_good(run_contact_failures(some(0, "K1 welds while driving|K2 welds while driving")));
 }
 
 TEST(World, ABurntOrShortedPrechargeResistorIsFound) {
-  expect_good(run_contact_failures(some(0, "resistor burnt")));
-  expect_good(run_contact_failures(some(0, "resistor shorted")));
+  expect_good(run_contact_failures(some(0, "resistor burnt|resistor shorted")));
 }
 
 TEST(World, DipsOfTheSupplyNeverCloseAMainContactOnAnEmptyDcLink) { expect_good(run_supply_dips(some(12))); }
 
 TEST(World, ProtectionsActOnPhysicalCauses) {
-  expect_good(run_fault_matrix(some(0, "drive: cell overvoltage severe, ")));
-  expect_good(run_fault_matrix(some(0, "drive: cell undervoltage severe, ")));
-  expect_good(run_fault_matrix(some(0, "off: I2C")));
+  expect_good(run_fault_matrix(some(0, "drive: cell overvoltage severe, |drive: cell undervoltage severe, |off: I2C")));
 }
 
 TEST(World, AShiftWithNoiseHasNoFault) { expect_good(run_shift({.only = "", .minutes = 3, .at_once = 2})); }
@@ -109,6 +105,28 @@ TEST(TruckWorld, PassesTimesThatAreNoMultipleOfAClockTick) {
     world.run_ms(ms);
   }
   EXPECT_NEAR(world.now_ms() - begun_ms, sum_ms, 150) << "a wait for I2C or the converter takes up to 50 us";
+}
+
+/// hal/i2c.hpp allows 2 ms in each transfer for clock stretching and interrupts.
+TEST(World, ADelayOfMainWithinATransferLosesNoReading) {
+  TruckWorld world(pack().image, typical_setup(pack()));
+  ASSERT_EQ(bring_to(world, pack(), Operating::standby), "");
+  world.run_ms(2'000);
+  plant::Random random(5);
+  world.fine_steps(60'000, 0.5);
+  unsigned within = 0;
+  for (int k = 0; k < 60; ++k) {
+    world.run_until([&] { return !world.board.sleeping(); }, 200);
+    world.run_ms(8 * random.uniform());
+    within += world.board.sleeping() ? 0 : 1;
+    world.board.program_held = true;
+    world.run_ms(1.9);
+    world.board.program_held = false;
+    world.run_until([&] { return world.board.sleeping(); }, 30);
+    world.run_ms(70);
+  }
+  EXPECT_GT(within, 30U);
+  EXPECT_EQ(fault_names(world.vehicle.faults_seen()), "none");
 }
 
 /// Board.LongestSample counts from the first transfer of the front end to the last message of the sample.
