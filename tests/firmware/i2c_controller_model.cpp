@@ -36,7 +36,7 @@ void I2cControllerModel::update(double now_us) {
         ready_us_ = then + byte_us;
         break;
       case Phase::receiving:
-        byte_received();
+        byte_received(then);
         break;
       default:
         break;
@@ -74,7 +74,9 @@ void I2cControllerModel::address_done() {
 
 void I2cControllerModel::begin_reception(double now_us) { ready_us_ = now_us + byte_us; }
 
-void I2cControllerModel::byte_received() {
+/// The next byte follows at once. The chip's own time is ahead by the whole transfer, which it has answered at its
+/// address.
+void I2cControllerModel::byte_received(double then_us) {
   const std::uint8_t byte = in_[at_++ % in_.size()];
   last_acked_ = (cr1_ & ack) != 0 || ((cr1_ & pos) != 0 && at_ == 1);
   if (!received_) {
@@ -83,7 +85,7 @@ void I2cControllerModel::byte_received() {
     if (stop_wanted_)
       stop();
     else if (last_acked_)
-      begin_reception(static_cast<double>(chip_.time_us));
+      begin_reception(then_us);
   } else {
     shift_ = byte;
     shift_full_ = true;

@@ -41,7 +41,7 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
 
   void update(double now_us);
   void address_done();
-  void byte_received();
+  void byte_received(double then_us);
   void begin_reception(double now_us);
   void stop();
   void write_cr1(std::uint32_t value, double now_us);
