@@ -9,6 +9,7 @@
 #   bms_<board>_pack.elf        tests/firmware/pack_image.cpp, built on request
 #   bms_<board>_filter_forms.elf  tests/firmware/filter_forms_image.cpp, built on request, needs Eigen
 #   bms_<board>_protection.elf  tests/firmware/protection_image.cpp, built on request
+#   bms_<board>_remote_product.elf  the remote image as BMS_PRODUCTION=ON builds it, built on request
 #
 # A board that QEMU emulates (BMS_EMULATED ON) has all but the remote image. Another board has the first two, and the
 # hil image for an emulated board with the same chip (BMS_LOOP_BOARD). Next to each image lies its bill of materials,
@@ -55,10 +56,6 @@ if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939)$")
   message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418 or j1939")
 endif()
 option(BMS_PRODUCTION "an image for a product: nothing works without a device key of its own" OFF)
-set(development true)
-if(BMS_PRODUCTION)
-  set(development false)
-endif()
 if(NOT BMS_CURRENT_RANGE_A)
   set(BMS_CURRENT_RANGE_A 2147)  # the end of the range of a reading
 endif()
@@ -72,8 +69,7 @@ endif()
 bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
   CELLS ${BMS_CELLS} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK}
-  VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER}
-  DEVELOPMENT ${development})
+  VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
 set(BMS_CELL_HEADER_TOOL "" CACHE FILEPATH "cell_header of a host build; empty: build it")
@@ -176,6 +172,12 @@ bms_shared_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} 
   ${chip_secrets})
 bms_shared_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation} ${absent_hal}/device_key.cpp
   ${absent_hal}/random.cpp)
+bms_objects(development_image -Os ${hal}/image_kind/development.cpp)
+bms_objects(product_image -Os ${hal}/image_kind/product.cpp)
+set(image_kind development_image)
+if(BMS_PRODUCTION)
+  set(image_kind product_image)
+endif()
 # Back ends by BMS_CAN and BMS_SAMPLES.
 set(auxiliary_contacts ${absent_hal}/auxiliary_contacts.cpp)
 if(DEFINED BMS_AUXILIARY_CONTACTS)
@@ -251,7 +253,8 @@ function(bms_image name)
 endfunction()
 
 set(on_chip hal_core hal_clock hal_chip hal_board)
-set(portable estimator_step storage application)
+set(program estimator_step storage application)
+set(portable ${program} ${image_kind})
 if(NOT BMS_EMULATED)
   bms_image(bms_${BMS_BOARD} ${on_chip} hal_samples ${portable})
   bms_image(bms_${BMS_BOARD}_remote ${on_chip} hal_remote_samples ${portable})
@@ -259,6 +262,9 @@ if(NOT BMS_EMULATED)
     # can_health() is called by debuggers and by tests/firmware
     target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)
   endforeach()
+  bms_image(bms_${BMS_BOARD}_remote_product ${on_chip} hal_remote_samples ${program} product_image)
+  target_link_options(bms_${BMS_BOARD}_remote_product PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)
+  set_target_properties(bms_${BMS_BOARD}_remote_product PROPERTIES EXCLUDE_FROM_ALL ON)
   set(linker_script ${root}/boards/${BMS_LOOP_BOARD}/memory.ld)
   bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil ${portable})
   return()

@@ -13,6 +13,7 @@ namespace bms::hal {
 std::optional<std::array<std::uint8_t, 16>> device_key();
 
 /// Returns true if this image was built for development (BMS_PRODUCTION off). Only such an image works without a key.
+/// Back ends: image_kind/development, image_kind/product.
 bool development_image();
 
 }  // namespace bms::hal

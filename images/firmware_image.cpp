@@ -62,6 +62,8 @@ const char* ending(Image image) {
   switch (image) {
     case Image::remote:
       return "_remote";
+    case Image::remote_product:
+      return "_remote_product";
     case Image::replay:
       return "_replay";
     case Image::hil:

@@ -11,7 +11,7 @@
 namespace bms::images {
 
 /// Purpose of an image: the end of its name after "bms_<board>" (cmake/firmware.cmake).
-enum class Image { application, remote, replay, hil, bench, fault, pack, protection, filter_forms };
+enum class Image { application, remote, remote_product, replay, hil, bench, fault, pack, protection, filter_forms };
 
 /// Builds `image` of `board` with the tables of `cell`, if it is not there yet, and returns its path. vehicle_profile:
 /// BMS_VEHICLE_PROFILE of cmake/firmware.cmake. cells: BMS_CELLS; 0 for the board's own number. Needs the source tree,

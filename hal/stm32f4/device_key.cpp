@@ -7,7 +7,6 @@
 // boards/stm32f405_forklift/README.md says how it is written. Read-out protection (RDP) keeps it from a debug probe.
 #include "hal/device_key.hpp"
 
-#include "board_config.hpp"  // generated from boards/<board>/board.cmake and the build options
 #include "hal/bytes.hpp"
 
 namespace bms::hal {
@@ -42,7 +41,5 @@ std::optional<std::array<std::uint8_t, 16>> device_key() {
   if (get_bytes<std::uint32_t>(all, key.size()) != crc32_of(key)) return std::nullopt;
   return key;
 }
-
-bool development_image() { return development; }
 
 }  // namespace bms::hal

@@ -23,6 +23,7 @@ constexpr std::uint32_t nmi = 2, systick_exception = 15, pvd = 16 + 1, can_tx = 
                         timer_5 = 16 + TimerModel::interrupt_number;
 constexpr std::uint32_t apb1enr = 0x40023840, pwr_cr = 0x40007000;
 constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends call()
+constexpr std::uint32_t one_time_memory = 0x1FFF7800;
 
 void must(uc_err error, const char* what) {
   if (error != UC_ERR_OK) throw std::runtime_error(fmt::format("{}: {}", what, uc_strerror(error)));
@@ -55,6 +56,8 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
   must(uc_mem_map(core_, 0x20000000, 0x20000, UC_PROT_READ | UC_PROT_WRITE), "RAM");
   must(uc_mem_map(core_, ccm, ccm_size, UC_PROT_READ | UC_PROT_WRITE), "core-coupled RAM");
   must(uc_mem_map(core_, 0x1FFF7000, 0x1000, UC_PROT_READ), "system memory");
+  const std::vector<std::uint8_t> erased(0x210, 0xFF);  // one-time programmable memory and its lock bytes
+  must(uc_mem_write(core_, one_time_memory, erased.data(), erased.size()), "system memory");
   const std::uint16_t reference = 1'502;  // VREFINT_CAL: 1.21 V of 3.3 V (datasheet, internal reference voltage)
   must(uc_mem_write(core_, 0x1FFF7A2A, &reference, 2), "system memory");
   const auto map = [&]<std::uint32_t Base>(std::integral_constant<std::uint32_t, Base>, std::size_t size) {
@@ -159,6 +162,13 @@ void UnicornBoard::flip_bit(std::uint32_t address, unsigned bit) {
   byte = static_cast<std::uint8_t>(byte ^ 1U << bit);
   must(uc_mem_write(core_, address, &byte, 1), "memory");
   uc_ctl_remove_cache(core_, address & ~1U, (address & ~1U) + 2);
+}
+
+void UnicornBoard::write_one_time_memory(std::span<const std::uint8_t> bytes) {
+  std::vector<std::uint8_t> content(bytes.size());
+  must(uc_mem_read(core_, one_time_memory, content.data(), content.size()), "one-time memory");
+  for (std::size_t k = 0; k < bytes.size(); ++k) content[k] &= bytes[k];
+  must(uc_mem_write(core_, one_time_memory, content.data(), content.size()), "one-time memory");
 }
 
 UnicornBoard::~UnicornBoard() { uc_close(core_); }

@@ -16,6 +16,7 @@
 #include <functional>
 #include <map>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -83,6 +84,8 @@ class UnicornBoard {
       undefined{0xDE00, 0xDE00};  ///< wfi, b to it; bx lr; udf #0
   std::uint32_t address_of(const std::string& function) const;
   void flip_bit(std::uint32_t address, unsigned bit);
+  /// Programs the one-time programmable memory from its beginning: bits become 0 and stay so (RM0090, 3.6.5).
+  void write_one_time_memory(std::span<const std::uint8_t> bytes);
   /// Makes a bit of the RAM stuck.
   void stick(std::uint32_t address, unsigned bit, bool at);
 
