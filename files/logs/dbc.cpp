@@ -1,6 +1,7 @@
 #include "files/logs/dbc.hpp"
 
 #include <bit>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <regex>
@@ -14,6 +15,8 @@ namespace bms::files {
 namespace {
 
 constexpr std::uint32_t long_id_bit = 0x8000'0000U;
+/// Of lines with signals and messages: the library's regular expressions need some hundred bytes of stack a character.
+constexpr std::size_t longest_line = 4'096;
 
 /// Names of a group of digits in " SG_ Name m3 : 8|16@1- (0.1,-40) [0|0] "degC" ...".
 const std::regex& signal_pattern() {
@@ -37,7 +40,8 @@ std::optional<DbcSignal> signal_of(const std::string& line) {
   s.factor = std::stod(m[7]);
   s.offset = std::stod(m[8]);
   s.unit = m[9];
-  if (s.length < 1 || s.length > 64 || s.start > 511) return std::nullopt;
+  if (s.length < 1 || s.length > 64 || s.start > 511 || !std::isfinite(s.factor) || !std::isfinite(s.offset))
+    return std::nullopt;
   return s;
 }
 
@@ -63,7 +67,10 @@ std::vector<DbcSignal> read_dbc(const std::string& path) {
     std::smatch m;
     static const std::regex message_pattern(R"(^BO_\s+(\d+)\s+(\w+)\s*:)");
     static const std::regex type_pattern(R"(^SIG_VALTYPE_\s+(\d+)\s+(\w+)\s*:?\s*([12]))");
+    const bool used = text.starts_with("SG_") || text.starts_with("BO_ ") || text.starts_with("SIG_VALTYPE_");
+    if (!used) continue;
     try {
+      if (text.size() > longest_line) throw std::invalid_argument(text);
       if (std::regex_search(text, m, message_pattern)) {
         id = static_cast<std::uint32_t>(std::stoul(m[1]));
         message = m[2];

@@ -13,6 +13,7 @@
 #include "files/logs/table_layout.hpp"
 #include "files/logs/table_reader.hpp"
 #include "files/logs/text_lines.hpp"
+#include "measurement/recording_checks.hpp"
 
 namespace bms::files {
 
@@ -68,7 +69,8 @@ class FrameLog {
   void map(const std::string& text) {
     const std::size_t equals = text.find('=');
     const auto target = target_of(text.substr(0, equals));
-    if (equals == std::string::npos || !target || target->quantity == Quantity::time)
+    if (equals == std::string::npos || !target || target->quantity == Quantity::time ||
+        target->quantity == Quantity::state)
       throw BadInput("--map", 1, in_quotes(text) + ": expected current_a=SIGNAL or another column of a recording");
     const std::string name = text.substr(equals + 1);
     const DbcSignal* found = nullptr;
@@ -109,9 +111,15 @@ class FrameLog {
     for (MappedSignal& m : signals_) {
       if (m.signal.id != frame.id || m.signal.long_id != frame.long_id || !fits(m.signal, frame.length)) continue;
       if (m.multiplexor != nullptr &&
-          raw_value(*m.multiplexor, data) != static_cast<std::uint64_t>(m.signal.multiplexed_by))
+          (!fits(*m.multiplexor, frame.length) ||
+           raw_value(*m.multiplexor, data) != static_cast<std::uint64_t>(m.signal.multiplexed_by)))
         continue;
       m.value = m.scale(value_of(m.signal, data));
+      if (std::abs(m.value) > largest_reading) {
+        throw BadInput(path_, 1,
+                       fmt::format("{} = {:g} at {:g} s is impossible, expected values from -{:g} to {:g}",
+                                   in_quotes(m.signal.name), m.value, frame.time_s, largest_reading, largest_reading));
+      }
       m.received_s = frame.time_s;
       ++m.count;
       current = current || m.target.quantity == Quantity::current;
@@ -125,6 +133,12 @@ class FrameLog {
       throw BadInput(path_, 1,
                      fmt::format("time goes back from {:g} s to {:g} s, expected times that do not decrease",
                                  time_s_.back(), time_s));
+    }
+    if (time_s - first_s(time_s) > longest_s)
+      throw BadInput(path_, 1, fmt::format("a time of {:g} s, expected a recording of less than ten years", time_s));
+    if (time_s_.size() == measurement::most_rows) {
+      throw BadInput(path_, 1,
+                     fmt::format("more rows, expected at most {}: split the recording", measurement::most_rows));
     }
     const bool started = std::all_of(signals_.begin(), signals_.end(), [](const auto& m) { return m.count > 0; });
     if (!started && time_s_.empty() && time_s - first_s(time_s) < stale_s) return;  // before the first of each signal
@@ -156,6 +170,8 @@ class FrameLog {
     }
     if (time_s_.size() < fewest_rows)
       throw BadInput(path_, 1, fmt::format("{} rows, expected {} or more", time_s_.size(), fewest_rows));
+    if (time_s_.back() <= time_s_.front())
+      throw BadInput(path_, 1, "all rows have the same time, expected times that increase");
     r.time_s = std::move(time_s_);
     for (std::size_t k = 0; k < signals_.size(); ++k) put(r, signals_[k].target, std::move(columns_[k]));
     const bool inverted = options_.sign == CurrentSign::discharge_positive;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 
 #include "files/logs/number.hpp"
 #include "files/logs/units.hpp"
@@ -75,14 +76,14 @@ bool FrameText::parse(std::string_view line, TextFrame& frame) {
 bool FrameText::parse_dump(TextFrame& frame) {
   if (words_.size() < 3 || !words_[0].starts_with('(') || !words_[0].ends_with(')')) return false;
   const auto time = number(words_[0].substr(1, words_[0].size() - 2));
-  if (!time) return false;
+  if (!time || std::isnan(*time)) return false;
   frame.time_s = *time;
   const std::size_t hash = words_[2].find('#');
   if (hash == std::string_view::npos) {
     if (words_.size() < 4 || !words_[3].starts_with('[') || !set_id(words_[2], 16, words_[2].size() == 8, frame))
       return false;
     std::uint32_t length = 0;
-    if (!number_in(words_[3].substr(1, words_[3].size() - 2), 10, length) || words_.size() < 4 + length) return false;
+    if (!number_in(words_[3].substr(1, words_[3].size() - 2), 10, length) || words_.size() - 4 < length) return false;
     for (std::size_t k = 0; k < length; ++k) {
       if (!add_byte(words_[4 + k], 16, frame)) return false;
     }
@@ -105,7 +106,7 @@ bool FrameText::parse_asc(std::string_view line, TextFrame& frame) {
     return false;
   }
   const auto time = number(words_[0]);
-  if (!time || words_.size() < 6 || words_[4] != "d") return false;
+  if (!time || std::isnan(*time) || words_.size() < 6 || words_[4] != "d") return false;
   last_s_ = relative_ ? last_s_ + *time : *time;
   frame.time_s = last_s_;
   const int base = decimal_ ? 10 : 16;
@@ -113,7 +114,7 @@ bool FrameText::parse_asc(std::string_view line, TextFrame& frame) {
   const bool long_id = id.ends_with('x');
   if (long_id) id.remove_suffix(1);
   std::uint32_t length = 0;
-  if (!set_id(id, base, long_id, frame) || !number_in(words_[5], 16, length) || words_.size() < 6 + length)
+  if (!set_id(id, base, long_id, frame) || !number_in(words_[5], 16, length) || words_.size() - 6 < length)
     return false;
   for (std::size_t k = 0; k < length; ++k) {
     if (!add_byte(words_[6 + k], base, frame)) return false;
@@ -133,7 +134,7 @@ bool FrameText::parse_gvret(std::string_view line, TextFrame& frame) {
   for (std::size_t k = 0; k < std::min(columns_.size(), fields.size()); ++k) {
     if (columns_[k] == "time stamp") {
       const auto us = number(fields[k]);
-      if (!us) return false;
+      if (!us || std::isnan(*us)) return false;
       frame.time_s = *us / 1e6;
     } else if (columns_[k] == "id") {
       has_id = set_id(fields[k], 16, false, frame);

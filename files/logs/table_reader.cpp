@@ -20,8 +20,6 @@ using measurement::Recording;
 namespace {
 
 constexpr std::size_t minimum_rows = 10;
-constexpr double longest_s = 3.2e8;      ///< ten years
-constexpr double largest_reading = 1e9;  ///< in any unit from microvolts to amperes
 constexpr double first_epoch_ms = 9e11;  ///< no log in seconds begins there
 constexpr std::size_t most_ignored_named = 10;
 const double missing_value = std::numeric_limits<double>::quiet_NaN();

@@ -6,6 +6,9 @@
 
 namespace bms::files {
 
+inline constexpr double longest_s = 3.2e8;      ///< of a recording: ten years
+inline constexpr double largest_reading = 1e9;  ///< in any unit from microvolts to amperes
+
 /// Reads all lines. Throws BadInput. The recording is not checked for plausibility yet.
 measurement::Recording read_table(TextLines& lines, const std::string& path, VoltageColumn voltage,
                                   const ReadOptions& options);
