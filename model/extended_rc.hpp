@@ -227,7 +227,7 @@ struct ExtendedRc {
         std::array<Variance<S>, Voltages> steady{};
         laws.variances(
             steady, [](const auto& law) -> decltype(law.steady_state_sigma_v()) { return law.steady_state_sigma_v(); },
-            [&](std::size_t) { return of.v_rc_v2; });
+            [&](std::size_t, const auto& law) { return error_of(law, of.v_rc_v2); });
 #pragma GCC unroll 8
         for (std::size_t k = 0; k < Voltages; ++k)
           q[first_voltage + k] = steady_state_noise(uncertain(steady[k]), discretisation.mechanism[k].error_decay);
@@ -258,9 +258,10 @@ struct ExtendedRc {
         std::array<Variance<S>, Voltages> first{};
         laws.variances(
             first, [](const auto& law) -> decltype(law.initial_sigma_v()) { return law.initial_sigma_v(); },
-            [&](std::size_t k) {
+            [&](std::size_t k, const auto& law) {
               x[first_mechanism_state + k] = Voltage<S>(discretisation[k].target * Fraction<S>(0.5));
-              return Variance<S>(of.v_rc_v2 + x[first_mechanism_state + k] * x[first_mechanism_state + k]);
+              return Variance<S>(error_of(law, of.v_rc_v2) +
+                                 x[first_mechanism_state + k] * x[first_mechanism_state + k]);
             });
         for (std::size_t k = 0; k < Voltages; ++k) variances[first_voltage + k] = uncertain(first[k]);
       }
@@ -271,6 +272,17 @@ struct ExtendedRc {
     static constexpr Variance<S> uncertain(const Variance<S>& variance) {
       const auto least = Variance<S>(1e-12);
       return variance < least ? least : variance;
+    }
+    /// noise.v_rc_v for the states of this law.
+    template <class Law>
+    static constexpr Variance<S> error_of(const Law& law, const Variance<S>& v_rc_v2) {
+      if constexpr (requires { law.most_sigma_v(); }) {
+        const Voltage<S> most_v = law.most_sigma_v();
+        const auto most_v2 = Variance<S>(most_v * most_v);
+        return most_v2 < v_rc_v2 ? most_v2 : v_rc_v2;
+      } else {
+        return v_rc_v2;
+      }
     }
     static constexpr Variance<S> steady_state_noise(const Variance<S>& steady, const Fraction<S>& alpha) {
       return product<Variance<S>>(steady, Fraction<S>(alpha * Fraction<S>(Fraction<S>(2) - alpha)));

@@ -200,7 +200,7 @@ class LawSet {
     });
     return r;
   }
-  /// Variances of the voltage states: the law's own sigma if it has one, else otherwise(state).
+  /// Variances of the voltage states: the law's own sigma if it has one, else otherwise(state, law).
   template <class Variances, class Own, class Otherwise>
   constexpr void variances(Variances& out, Own own, Otherwise otherwise) const {
     each_with_states([&](const auto& law, std::size_t first) {
@@ -210,7 +210,7 @@ class LawSet {
           const Voltage<S> error_v = own(law);
           out[first + i] = Variance<S>(error_v * error_v);
         } else {
-          out[first + i] = otherwise(first + i);
+          out[first + i] = otherwise(first + i, law);
         }
       }
     });

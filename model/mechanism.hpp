@@ -23,6 +23,8 @@
 //   Voltage<S> initial_sigma_v(), steady_state_sigma_v()           standard deviations of its voltage states, for the
 //                                                                  filter; default: half of the voltage that the
 //                                                                  current can have built up, and noise.v_rc_v
+//   Voltage<S> most_sigma_v()                                      largest standard deviation that noise.v_rc_v means
+//                                                                  for its voltage states
 //   void at(double time_s)                                         host only: time in the recording at the end of a
 //                                                                  step
 //   states, voltage_states, state_unit, resistances_follow_temperature     static constants

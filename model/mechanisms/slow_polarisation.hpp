@@ -32,24 +32,33 @@ struct SlowPolarisation {
                 "t_lag: under a constant current the surface is ahead by the charge of this time", 0, 0, 200},
   };
 
+  /// Largest standard deviation of the surface's lead [SOC] by noise.v_rc_v: what 3 mV mean where 1C drops 10 mV and
+  /// the lag is 200 s.
+  static constexpr double most_lead_sigma = 0.02;
+
   template <class S>
   struct Law {
     static constexpr LawMembers members = law_member::soc_shift_per_v | law_member::states |
-                                          law_member::voltage_states | law_member::initial | law_member::relaxation;
+                                          law_member::voltage_states | law_member::initial | law_member::relaxation |
+                                          law_member::most_sigma_v;
     static constexpr std::size_t states = 2;
     static constexpr bool voltage_states = true;
     std::array<Resistance<S>, 2> r_ohm{};
     std::array<Rate<S>, 2> rate_per_s{};
     Coupling<S> surface_per_v{0};
+    Voltage<S> most_error_v{1};
 
     template <class Real>
     constexpr Law(const std::array<Real, 4>& p, double capacity_ah) {
-      // the lag is a multiple of the modes' voltages, so R must not be 0
-      constexpr double least_ohm_ah = 1e-6;
+      // the lag is a multiple of the modes' voltages, so R must not be 0: 0.1 mV at 1C is less than any sensor sees,
+      // and far above the smallest standard deviation of a state
+      constexpr double least_ohm_ah = 1e-4;
       const Real r = p[3] > Real(0) ? p[0] + Real(least_ohm_ah / capacity_ah) : p[0];
       r_ohm = {Resistance<S>(r * (Real(1) - p[2])), Resistance<S>(r * p[2])};
       rate_per_s = {Rate<S>(Real(1) / p[1]), Rate<S>(Real(9) / p[1])};
       if (r > Real(0)) surface_per_v = Coupling<S>(p[3] / (Real(3'600 * capacity_ah) * r));
+      const Real most_v_s = Real(3'600 * capacity_ah * most_lead_sigma) * r;
+      if (p[3] > most_v_s) most_error_v = Voltage<S>(most_v_s / p[3]);
     }
 
     constexpr Voltage<S> initial(std::size_t) const { return Voltage<S>(0); }
@@ -58,6 +67,9 @@ struct SlowPolarisation {
               Voltage<S>(Resistance<S>(r_ohm[i] * at.activation) * input.current_a)};
     }
     constexpr Coupling<S> soc_shift_per_v() const { return surface_per_v; }
+    /// noise.v_rc_v is an error of the drop. Where the drop is small and the lag is long, the surface would become as
+    /// uncertain as all of the SOC, and no voltage would correct it.
+    constexpr Voltage<S> most_sigma_v() const { return most_error_v; }
   };
 };
 

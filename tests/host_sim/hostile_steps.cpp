@@ -1,7 +1,7 @@
 // The estimator against cell files with mechanisms at their bounds and in random sets, and against samples that no
 // sensor should give, in float, double and fixed point. Each life: blows, then twelve hours of honest data from the
 // model itself. Prints a line for each scalar; exit code 1 if a result is not a number, a sigma is not above 0, or a
-// life with a cell file without mechanisms is not back within 5 %.
+// life is not back within 5 %. Each life that is not back is printed with its mechanisms.
 //
 //   hostile_steps STEPS [SEED]      STEPS: of the estimator, in all
 #include <cmath>
@@ -26,7 +26,8 @@ constexpr int honest_s = 12 * 3'600;
 constexpr double back_within = 0.05;
 
 struct Tally {
-  std::uint64_t lives = 0, steps = 0, not_finite = 0, certain = 0, started_again = 0, not_back = 0, not_back_plain = 0;
+  std::uint64_t lives = 0, steps = 0, not_finite = 0, certain = 0, started_again = 0;
+  std::uint64_t not_back = 0, and_certain = 0;  ///< beyond 5 %; and beyond two sigma as well
   double least_sigma = 1, worst = 0;
 };
 
@@ -117,7 +118,10 @@ void strike(Random& random, std::uint64_t kind, measurement::Sample& s, double& 
 
 Life random_life(Random& random, const files::CellFile& cell) {
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
-  const auto mechanisms = files::on_board(cell.mechanisms);
+  auto mechanisms = files::on_board(cell.mechanisms);
+  for (model::MechanismSetting& m : mechanisms) {  // a board has no time of a recording: a step acts from the start
+    if (m.index == model::mechanism_index_of<model::ContactStep>) m.value[1] = -1e12;
+  }
   model::OpenLoopSimulation<double> plant(tables, cell.parameters.capacity_ah,
                                           model::chosen<double>(mechanisms, cell.parameters.capacity_ah),
                                           between(random, 0.1, 0.9));
@@ -178,9 +182,14 @@ void live(Random& random, ScalarKind scalar, Tally& tally) {
   tally.worst = std::max(tally.worst, error);
   if (error < back_within) return;
   ++tally.not_back;
-  if (files::on_board(cell.mechanisms).empty()) ++tally.not_back_plain;
+  if (error > 2 * track.rows.back().soc_sigma) ++tally.and_certain;
   std::string names;
-  for (const auto& m : cell.mechanisms) names += fmt::format(" {}", model::catalogue[m.index].id);
+  for (const model::MechanismSetting& m : cell.mechanisms) {
+    const model::MechanismInfo& info = model::catalogue[m.index];
+    names += fmt::format("\n    {}", info.id);
+    for (std::size_t k = 0; k < info.parameters; ++k)
+      names += fmt::format(" {}={:g}", info.parameter[k].name, m.value[k]);
+  }
   fmt::print("  life {}: soc {:.3f} +- {:.3f}, truth {:.3f}, flags {:#x}, errors as states {},{}\n", tally.lives,
              track.rows.back().soc, track.rows.back().soc_sigma, life.soc, track.rows.back().flags,
              cell.parameters.noise.errors_are_states, names);
@@ -195,10 +204,10 @@ int run(std::uint64_t steps, std::uint64_t seed) {
     while (t.steps < steps / 3) live(random, scalar, t);
     fmt::print(
         "{}: {} lives, {} steps; not finite {}, sigma 0 {}, started again {}; least sigma {:.2g}; not back within 5 % "
-        "after 12 h {} (without mechanisms {}), worst {:.3f}\n",
-        name, t.lives, t.steps, t.not_finite, t.certain, t.started_again, t.least_sigma, t.not_back, t.not_back_plain,
+        "after 12 h {}, of these beyond two sigma {}, worst {:.3f}\n",
+        name, t.lives, t.steps, t.not_finite, t.certain, t.started_again, t.least_sigma, t.not_back, t.and_certain,
         t.worst);
-    good = good && t.not_finite + t.certain + t.not_back_plain == 0;
+    good = good && t.not_finite + t.certain + t.not_back == 0;
   }
   return good ? 0 : 1;
 }
