@@ -12,6 +12,7 @@
 
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "files/bad_input.hpp"
+#include "files/logs/text_lines.hpp"
 #include "measurement/recording_checks.hpp"
 #include "monitor/frame_source.hpp"
 
@@ -210,7 +211,15 @@ bool is_can_log(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   std::array<char, 2> first{};
   in.read(first.data(), 2);
-  return in && (first[0] == '(' || (first[0] == '\x1f' && first[1] == '\x8b'));
+  const bool compressed = first[0] == '\x1f' && first[1] == '\x8b';
+  if (!in || !compressed) return in && first[0] == '(';
+  try {
+    files::TextLines lines(path);
+    std::string_view line;
+    return !lines.next(line) || line.starts_with('(');
+  } catch (const files::BadInput&) {
+    return true;  // damaged; who reads it says so
+  }
 }
 
 std::vector<CanLog> read_can_log(const std::string& path) {

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <optional>
+#include <string_view>
 
 #include "can_messages.hpp"
 #include "files/bad_input.hpp"
@@ -177,6 +179,32 @@ TEST(CanLogRuns, WithoutARunThatCanBeReplayedTheLogIsRefused) {
     restarting.samples(5);
   }
   EXPECT_THAT(restarting.refusal(), HasSubstr("5 samples in the longest run of the firmware, expected 10 or more"));
+}
+
+/// A compressed table is a recording like any other.
+TEST(CanLogFile, IsOneByItsFirstLineAlsoIfItIsCompressed) {
+  const auto is_log = [](std::string_view bytes) {
+    const std::string path = (std::filesystem::temp_directory_path() / "can_log_file.gz").string();
+    files::write_file(path, std::string(bytes));
+    const bool found = is_can_log(path);
+    std::filesystem::remove(path);
+    return found;
+  };
+  // "time_s,current_a,voltage_v\n0,1,3.3\n" and "(1.000000) can0 182#00\n" by Python's gzip
+  constexpr std::string_view table(
+      "\x1f\x8b\x08\x00\x00\x00\x00\x00\x02\x03\x2b\xc9\xcc\x4d\x8d\x2f\xd6\x49\x2e\x2d\x2a\x4a\xcd\x2b\x89"
+      "\x4f\xd4\x29\xcb\xcf\x29\x49\x4c\x4f\x8d\x2f\xe3\x32\xd0\x31\xd4\x31\xd6\x33\xe6\x02\x00\x95\xd5\xe6"
+      "\x9e\x23\x00\x00\x00",
+      55);
+  constexpr std::string_view frames(
+      "\x1f\x8b\x08\x00\x00\x00\x00\x00\x02\x03\xd3\x30\xd4\x33\x00\x03\x4d\x85\xe4\xc4\x3c\x03\x05\x43\x0b"
+      "\x23\x65\x03\x03\x2e\x00\x3a\xb4\xff\x28\x17\x00\x00\x00",
+      39);
+  EXPECT_FALSE(is_log(table));
+  EXPECT_TRUE(is_log(frames));
+  EXPECT_TRUE(is_log(frames.substr(0, 12))) << "damaged: the reader of logs says so";
+  EXPECT_TRUE(is_log("(1.000000) can0 182#00\n"));
+  EXPECT_FALSE(is_log("time_s,current_a,voltage_v\n"));
 }
 
 TEST(CanLogRuns, RepeatedTimesAreAWarningAsInARecording) {
