@@ -218,7 +218,7 @@ bool is_can_log(const std::string& path) {
     std::string_view line;
     return !lines.next(line) || line.starts_with('(');
   } catch (const files::BadInput&) {
-    return true;  // damaged; who reads it says so
+    return true;  // damaged: read_can_log() reports it
   }
 }
 
