@@ -14,13 +14,12 @@
 namespace bms::estimator {
 namespace {
 
-constexpr std::size_t voltage_states = 2, mechanism_states = model::ChosenLaws<double>::most_states;
-
 /// Largest error of the SOC from the sixth to the twelfth hour between 6 and 97 % after
 /// minutes without a current, and the largest
 /// in standard deviations.
 template <class S>
 std::pair<double, double> largest_error(double resistance_ohm, double time_constant_s, double lag_s) {
+  constexpr std::size_t modes = 2, states = model::ChosenLaws<double>::most_states;
   const auto& parameters = tests::table9;
   model::MechanismSetting slow = model::default_setting(model::mechanism_index("slow_polarisation"), parameters);
   slow.value[0] = resistance_ohm;
@@ -33,7 +32,7 @@ std::pair<double, double> largest_error(double resistance_ohm, double time_const
                                           model::chosen<double>(all, parameters.capacity_ah), 0.7);
   const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>> cell{
       tests::prepared<S>(), model::chosen<S>(all, parameters.capacity_ah)};
-  SocEstimator<S, model::ExtendedRc<voltage_states, mechanism_states>::template Of> estimator;
+  SocEstimator<S, model::ExtendedRc<modes, states>::template Of> estimator;
   std::mt19937 random(1);
   std::normal_distribution<double> noise_v(0, 0.001);
   std::uniform_real_distribution<double> any_a(-parameters.capacity_ah, parameters.capacity_ah);

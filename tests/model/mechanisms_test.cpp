@@ -386,7 +386,7 @@ TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
   OpenLoopSimulation<double> with(cell, capacity_ah, chosen<double>(slow, capacity_ah), 0.3),
       without(cell, capacity_ah, ChosenLaws<double>{}, 0.3);
   const auto no_change = [](TablePoint<double>&, double) {};
-  const double r_ohm = 0.003 + 1e-6 / capacity_ah, soc_shift_per_v = 8 * 0.003 / r_ohm;
+  const double r_ohm = 0.003 + 1e-4 / capacity_ah, soc_shift_per_v = 8 * 0.003 / r_ohm;
   double u_v = 0;
   for (int k = 0; k < 3'000; ++k) {
     const double a = k < 1'000 ? -3 : 0, dt = k == 0 ? 0 : 1;
