@@ -26,7 +26,7 @@
 //   precharge   with `gap` = difference between pack and DC link, at first `gap_0`, and the time constant RC:
 //               full       gap <= 2 % of the pack; or after 3 RC, when the DC link moves by less than 0.5 % of the pack
 //                          in half an RC, because a load divides the voltage with the resistor. In both cases gap <=
-//                          closing current x closing loop.
+//                          closing current x closing loop, or half of it if a drive holds the DC link above the pack.
 //               too slow   gap > gap_0 exp(-2 t / 3 RC) + a fifth of the pack, at the last half RC that is over; or
 //                          not full after 7 RC. The resistor would burn.
 //               too fast   gap < gap_0 / 8 within half an RC: a quarter of the time constant, the resistor is shorted.
@@ -290,7 +290,10 @@ class Contactors {
       last_gap_uv_ = gap_uv;
       last_half_ = static_cast<std::uint8_t>(half);
     }
-    if ((still || gap_uv <= pack_uv / 50) && gap_uv <= plan_->max_closing_gap_uv && link.minus_at_zero()) close(in);
+    // above the pack half: the dividers' range may end there, and the DC link be higher
+    const std::int32_t most_uv = plan_->max_closing_gap_uv;
+    const bool near = gap_uv <= (link.link_uv() > pack_uv ? most_uv / 2 : most_uv);
+    if ((still || gap_uv <= pack_uv / 50) && near && link.minus_at_zero()) close(in);
   }
 
   constexpr void closed(const ContactorInput& in, const DcLink& link, Request mine) {

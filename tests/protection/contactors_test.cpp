@@ -229,6 +229,19 @@ TEST(Precharge, FailsWhenTheDcLinkLeavesItsCurveOrEndsTooFarBelowThePack) {
   }
 }
 
+TEST(Precharge, ClosesOnALinkThatADriveHoldsAbovePackByHalfTheDifferenceBelowIt) {
+  for (const double above : {0.07, 0.1, 0.15}) {
+    ContactorBench b;
+    b.load_fraction = -above;
+    b.dc_link_v = 1e-6 * rested_pack_uv * (1 + above);
+    b.discharge_s = 1e6;
+    b.in.request = Request::drive;
+    const bool closes = above < 0.08;  // 3.7 V, else 5.3 and 7.9 V
+    EXPECT_GE(b.until(closes ? drive : opening, 8), 0) << above;
+    EXPECT_EQ(b.seen.precharge_failed, !closes) << above;
+  }
+}
+
 TEST(Precharge, FailsBeforeTheRestIfTheRelayOrItsResistorDoesNotConduct) {
   ContactorBench b;
   b.resistor_open = true;

@@ -40,8 +40,9 @@ SetQuantity actuator_of(const Row& row) {
   return {};
 }
 
-std::vector<Cause> other_causes() {
-  std::vector<Cause> list;
+namespace {
+
+void add_front_end_causes(std::vector<Cause>& list) {
   list.push_back({29, "I2C: front end does not answer", [](TruckWorld& w) { w.chip.gone = true; }, 0.5, true,
                   fault(20) | fault(22) | fault(23) | second_line});
   list.push_back({29, "I2C: clock held low", [](TruckWorld& w) { w.chip.hung = true; }, 0.7, true,
@@ -72,6 +73,9 @@ std::vector<Cause> other_causes() {
                   fault(8) | fault(9) | fault(34) | fault(37) | fault(27) | second_line,
                   {},
                   true});
+}
+
+void add_temperature_causes(std::vector<Cause>& list) {
   for (std::size_t sensor = 0; sensor < 4; ++sensor) {
     for (const double ohm : {Bq76952Inputs::open_ohm, 0.0}) {
       list.push_back({23, "thermistor " + std::to_string(sensor + 1) + (ohm == 0 ? " shorted" : " broken"),
@@ -87,6 +91,19 @@ std::vector<Cause> other_causes() {
                     for (std::size_t k = 1; k < 4; ++k)
                       w.set_temperature(k, std::min(38.0, w.temperature_c(k) + 2.5 + 0.2 * static_cast<double>(k)));
                   }});
+  list.push_back({35, "all thermistors broken",
+                  [](TruckWorld& w) {
+                    for (std::size_t k = 0; k < 4; ++k) w.set_thermistor_ohm(k, Bq76952Inputs::open_ohm);
+                  },
+                  0.4, false, fault(23)});
+}
+
+}  // namespace
+
+std::vector<Cause> other_causes() {
+  std::vector<Cause> list;
+  add_front_end_causes(list);
+  add_temperature_causes(list);
   list.push_back({34,
                   "Hall sensor reads 36 A too much",
                   [](TruckWorld& w) { w.sensors.hall_error_v = 0.06; },
@@ -95,11 +112,6 @@ std::vector<Cause> other_causes() {
                   0,
                   {},
                   true});
-  list.push_back({35, "all thermistors broken",
-                  [](TruckWorld& w) {
-                    for (std::size_t k = 0; k < 4; ++k) w.set_thermistor_ohm(k, Bq76952Inputs::open_ohm);
-                  },
-                  0.4, false, fault(23)});
   list.push_back({36,
                   "current flows after the request has ended",
                   [](TruckWorld& w) { w.vehicle.request = Request::none; },
