@@ -25,10 +25,27 @@ TEST(CurrentAtRest, OneThatMovesOrIsTooLargeForAnOffsetDoesNot) {
   CurrentAtRest r;
   EXPECT_TRUE(after(r, 100, 30'000));
   EXPECT_FALSE(r.is_at_rest(56'000, second_us, resting)) << "more than an offset drifts";
-  EXPECT_FALSE(after(r, 59, 56'000)) << "the minute starts again";
-  EXPECT_TRUE(after(r, 2, 56'000));
+  EXPECT_FALSE(after(r, 1'000, 56'000)) << "it was switched on";
+  EXPECT_FALSE(after(r, 1'000, 30'000)) << "and reduced";
   EXPECT_FALSE(after(r, 1'000, 81'000));
   EXPECT_FALSE(after(r, 1'000, -81'000));
+}
+
+TEST(CurrentAtRest, AfterALoadTheMinuteStartsAgain) {
+  CurrentAtRest r;
+  EXPECT_TRUE(after(r, 100, 30'000));
+  EXPECT_FALSE(after(r, 5, -4'000'000));
+  EXPECT_FALSE(after(r, 60, 30'000));
+  EXPECT_TRUE(after(r, 2, 30'000));
+}
+
+/// The end of a charge at constant voltage: by and by, 2 mA a second and less.
+TEST(CurrentAtRest, ACurrentThatSlidesIntoTheRangeOfAnOffsetDoesNotRest) {
+  CurrentAtRest r;
+  EXPECT_FALSE(after(r, 100, 2'000'000));
+  for (double a = 1; a > 0.002; a *= 0.998)
+    ASSERT_FALSE(r.is_at_rest(static_cast<std::int32_t>(1e6 * a), second_us, resting)) << a;
+  EXPECT_FALSE(after(r, 3'600, 2'000));
 }
 
 TEST(CurrentAtRest, AMissingReadingEndsIt) {
