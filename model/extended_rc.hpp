@@ -200,6 +200,13 @@ struct ExtendedRc {
       MeasurementJacobian h{};
 #pragma GCC unroll 8
       for (std::size_t k = 0; k < soc; ++k) h[k] = base[0];
+      if constexpr (Voltages > 0 && SomeLaws::scales_states) {
+        std::array<Factor<S>, Voltages> per_state{};
+        per_state.fill(Factor<S>(1));
+        laws.voltage_per_state(at, per_state);
+#pragma GCC unroll 8
+        for (std::size_t k = 0; k < Voltages; ++k) h[first_voltage + k] = VoltagePerSoc<S>(per_state[k]);
+      }
       if constexpr (Voltages > 0 && SomeLaws::shifts_ocv_soc) {
         std::array<Coupling<S>, Voltages> ahead{};
         laws.soc_shift_per_v(ahead);

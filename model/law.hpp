@@ -40,9 +40,10 @@ enum Bit : LawMembers {
   relaxation = 1U << 13,
   initial_sigma_v = 1U << 14,
   steady_state_sigma_v = 1U << 15,
-  most_sigma_v = 1U << 19,
   resistances_follow_temperature = 1U << 16,
   at = 1U << 17,
+  voltage_per_state = 1U << 18,
+  most_sigma_v = 1U << 19,
 };
 
 /// The members that law L for scalar S has, with the arguments that LawSet passes.
@@ -94,13 +95,15 @@ constexpr LawMembers found_in() {
       requires { bool{L::resistances_follow_temperature}; }, resistances_follow_temperature);
   add(
       requires(L & l, double time_s) { l.at(time_s); }, at);
+  add(
+      requires(L l, TablePoint<S> t) { Factor<S>(l.voltage_per_state(t)); }, voltage_per_state);
   return found;
 }
 
 /// Returns true if the members fit together: what concerns states needs states, and states need to start and to move.
 constexpr bool complete(LawMembers members) {
   constexpr LawMembers of_states = voltage_states | state_unit | initial | relaxation | apply_state | soc_shift_per_v |
-                                   initial_sigma_v | steady_state_sigma_v | most_sigma_v;
+                                   initial_sigma_v | steady_state_sigma_v | most_sigma_v | voltage_per_state;
   constexpr LawMembers needed_by_states = voltage_states | initial | relaxation;
   const bool has_states = (members & states) != 0;
   if (!has_states) return (members & of_states) == 0;

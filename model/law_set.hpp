@@ -42,6 +42,10 @@ constexpr bool shifts_ocv_soc() {
   return requires(Law law, Soc<S> soc) { law.ocv_soc(soc); }
   || requires(Law law) { law.soc_shift_per_v(); };
 }
+template <class Law, class S>
+constexpr bool scales_state() {
+  return requires(Law law, TablePoint<S> at) { law.voltage_per_state(at); };
+}
 template <class Law>
 constexpr std::size_t states_of() {
   if constexpr (requires { Law::states; })
@@ -70,6 +74,8 @@ class LawSet {
       (std::size_t{0} + ... + extended_detail::voltage_states_of<typename extended_detail::LawIn<Slots>::type>());
   static constexpr bool shifts_ocv_soc =
       (false || ... || extended_detail::shifts_ocv_soc<typename extended_detail::LawIn<Slots>::type, S>());
+  static constexpr bool scales_states =
+      (false || ... || extended_detail::scales_state<typename extended_detail::LawIn<Slots>::type, S>());
   using States = std::array<Voltage<S>, most_states>;
   using Relaxations = std::array<Relaxation<S>, most_states>;
 
@@ -128,6 +134,16 @@ class LawSet {
       if constexpr (requires { law.soc_shift_per_v(); }) {
         for (std::size_t i = 0; i < states_of(law) && first + i < out.size(); ++i)
           out[first + i] = law.soc_shift_per_v();
+      }
+    });
+  }
+  /// d voltage / d state of the voltage states of which it is not 1.
+  template <class Factors>
+  constexpr void voltage_per_state(const TablePoint<S>& at, Factors& out) const {
+    each_with_states([&](const auto& law, std::size_t first) {
+      if constexpr (requires { law.voltage_per_state(at); }) {
+        for (std::size_t i = 0; i < states_of(law) && first + i < out.size(); ++i)
+          out[first + i] = law.voltage_per_state(at);
       }
     });
   }

@@ -41,7 +41,7 @@ struct OcvHysteresis {
   struct Law {
     static constexpr LawMembers members = law_member::apply_state | law_member::states | law_member::voltage_states |
                                           law_member::initial | law_member::relaxation | law_member::initial_sigma_v |
-                                          law_member::steady_state_sigma_v;
+                                          law_member::steady_state_sigma_v | law_member::voltage_per_state;
     static constexpr std::size_t states = 1;
     static constexpr bool voltage_states = true;
     Voltage<S> half_gap_v, ocv_at_v, initial_v;
@@ -75,6 +75,7 @@ struct OcvHysteresis {
     constexpr Voltage<S> steady_state_sigma_v() const {
       return Voltage<S>(half_gap_v * Fraction<S>(0.25));
     }  // one state does not describe minor loops
+    constexpr Factor<S> voltage_per_state(const TablePoint<S>& at) const { return measured ? at.gap : Factor<S>(1); }
     constexpr void apply_state(TablePoint<S>& at, const Voltage<S>& state_v, const StepInput<S>&) const {
       if (!measured) {
         at.ocv_v = at.ocv_v - ocv_at_v;

@@ -31,7 +31,8 @@ Cells<S> table9_with(const std::vector<MechanismSetting>& mechanisms) {
 
 /// All that a board runs.
 /// Without energies that follow the SOC: what they change in polarisations, the filter's transition neglects.
-std::vector<MechanismSetting> everything() {
+/// measured: the hysteresis between the cell file's curves.
+std::vector<MechanismSetting> everything(bool measured = false) {
   std::vector<std::string_view> ids;
   for (const MechanismInfo& info : catalogue) {
     if (info.on_board) ids.push_back(info.id);
@@ -40,6 +41,7 @@ std::vector<MechanismSetting> everything() {
   for (MechanismSetting& m : all) {
     for (std::size_t k = 0; k < catalogue[m.index].parameters; ++k) {
       if (catalogue[m.index].parameter[k].name.starts_with("more_at")) m.value[k] = 0;
+      if (catalogue[m.index].parameter[k].name == "measured") m.value[k] = measured ? 1 : 0;
     }
   }
   return all;
@@ -86,6 +88,33 @@ TEST(ExtendedModel, TransitionAndSensitivityAreTheDerivativesAt1000RandomStates)
       ASSERT_NEAR(h[j], v.v[static_cast<int>(j)], 1e-10 * (1 + std::abs(h[j])))
           << j << " soc " << soc << " current " << input.current_a;
     }
+  }
+}
+
+/// Where the hysteresis lies between measured curves, a state of 1 mV is `gap` mV of voltage.
+TEST(ExtendedModel, TheSensitivityToAMeasuredHysteresisIsTheDerivative) {
+  constexpr std::size_t voltages = HostLaws<double>::most_voltage_states, states = voltages + 2;
+  using Jet = ceres::Jet<double, static_cast<int>(states)>;
+  using Model = ExtendedRc<voltages, mechanism_state_count>::Of<double>;
+  using JetModel = ExtendedRc<voltages, mechanism_state_count>::Of<Jet>;
+  const auto cell = table9_with<double>(everything(true));
+  const auto jets = table9_with<Jet>(everything(true));
+  for (int k = 0; k < 100; ++k) {
+    const StepInput<double> input{-3, 1, -20.0 + 0.5 * k};
+    const StepInput<Jet> input_j{Jet(input.current_a), Jet(input.duration_s), Jet(input.temperature_c)};
+    typename JetModel::State y;
+    for (std::size_t j = 0; j < y.size(); ++j) y[j] = j <= voltages ? Jet(0.01, static_cast<int>(j)) : Jet(0.01);
+    Model::State x{};
+    x.fill(0.01);
+    std::uint8_t interval = 0;
+    const double soc = 0.01 * k;
+    const auto at = look_up(OperatingPoint{cell, input, Model::mechanism_states(x)}, soc, interval);
+    const auto at_j = look_up(OperatingPoint{jets, input_j, JetModel::mechanism_states(y)},
+                              Jet(soc, static_cast<int>(states - 1)), interval);
+    const auto h = Model::measurement_jacobian(cell.laws, at, input);
+    const Jet v = JetModel::voltage(jets.laws, y, at_j, input_j);
+    for (std::size_t j = 0; j < states; ++j)
+      ASSERT_NEAR(h[j], v.v[static_cast<int>(j)], 1e-10 * (1 + std::abs(h[j]))) << j << " soc " << soc;
   }
 }
 
