@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 constexpr int most_bisections = 10;  // if the step is still too long, J has lost rank
 
 VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
-  const Eigen::JacobiSVD<MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::BDCSVD<MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
   const VectorXd& values = svd.singularValues();
   const VectorXd along = svd.matrixU().transpose() * b;
   VectorXd p = VectorXd::Zero(a.cols());

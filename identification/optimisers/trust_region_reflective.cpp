@@ -44,7 +44,7 @@ class ScaledModel {
     MatrixXd both = MatrixXd::Zero(2 * n, n);
     both.topRows(n) = run.factor() * scaling_.asDiagonal();
     both.bottomRows(n).diagonal() = curvature_.cwiseSqrt();
-    const Eigen::JacobiSVD<MatrixXd> svd(both, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::BDCSVD<MatrixXd> svd(both, Eigen::ComputeThinU | Eigen::ComputeThinV);
     values_ = svd.singularValues();
     vectors_ = svd.matrixV();
     along_ = svd.matrixU().topRows(n).transpose() * run.rotated();
