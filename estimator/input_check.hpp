@@ -8,7 +8,7 @@
 //   gap           a time step more than `gap_factor` times the usual one
 //
 // A current that fails is replaced by the last accepted one. Its uncertainty is then current_unknown_a of the cell
-// file. An implausible current that lasts is used, with a flag of its own.
+// file.
 //
 // Current and voltage are checked in two calls, the voltage after the prediction: the check for a stuck voltage needs
 // the model's drop. Checking all of a sample at once before the prediction costs 18 instructions a step.
@@ -31,10 +31,7 @@ struct AcceptedCurrent {
 template <class S>
 class InputCheck {
  public:
-  static constexpr std::uint8_t stuck_after = 5;  ///< samples
-  /// Samples in a row beyond the plausible range, with the same sign, after which a current is used: the limits of the
-  /// cell file may be those of another cell.
-  static constexpr std::uint8_t lasts_after = 5;
+  static constexpr std::uint8_t stuck_after = 5;   ///< samples
   static constexpr std::uint32_t gap_factor = 10;  ///< times the usual step
   static constexpr double stuck_move_v = 0.02;     ///< far above the step of any ADC, below the effect of any load
 
@@ -42,12 +39,6 @@ class InputCheck {
   constexpr AcceptedCurrent current(std::int32_t current_ua, const model::PlausibleRange& plausible,
                                     std::uint32_t& flags) {
     if (within(current_ua, -plausible.current_max_ua, plausible.current_max_ua)) [[likely]] {
-      current_ua_ = current_ua;
-      beyond_ = 0;
-      return {current_ua, true};
-    }
-    if (lasts_beyond_limits(current_ua)) {
-      flags |= current_beyond_limits;
       current_ua_ = current_ua;
       return {current_ua, true};
     }
@@ -106,19 +97,6 @@ class InputCheck {
   }
 
  private:
-  /// Counts readings beyond the plausible range: up for a charge, down for a discharge.
-  [[gnu::noinline]] constexpr bool lasts_beyond_limits(std::int32_t current_ua) {
-    if (current_ua == measurement::no_reading) {
-      beyond_ = 0;
-      return false;
-    }
-    if (current_ua > 0)
-      beyond_ = static_cast<std::int8_t>(beyond_ < 0 ? 1 : beyond_ + (beyond_ < lasts_after ? 1 : 0));
-    else
-      beyond_ = static_cast<std::int8_t>(beyond_ > 0 ? -1 : beyond_ - (beyond_ > -lasts_after ? 1 : 0));
-    return beyond_ >= lasts_after || beyond_ <= -lasts_after;
-  }
-
   static constexpr std::uint8_t stuck = 0xFF;
 
   static constexpr bool within(std::int32_t value, std::int32_t low, std::int32_t high) {
@@ -130,7 +108,6 @@ class InputCheck {
   std::int32_t current_ua_ = 0;
   std::int32_t voltage_uv_ = measurement::no_reading;
   arithmetic::Voltage<S> drop_at_change_v_{};
-  std::int8_t beyond_ = 0;    ///< currents beyond the plausible range in a row, with their sign
   std::uint8_t repeats_ = 0;  ///< of the same voltage, or `stuck`
 };
 

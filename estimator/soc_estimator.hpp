@@ -33,7 +33,6 @@
 
 #include "estimator/ambiguous_soc.hpp"
 #include "estimator/cell_state.hpp"
-#include "estimator/consistency.hpp"
 #include "estimator/estimate.hpp"
 #include "estimator/input_check.hpp"
 #include "estimator/outlier_gate.hpp"
@@ -88,7 +87,7 @@ class SocEstimator {
     const auto discretisation = Model::discretise(laws, state_.model_state, at, input, constants_.error_decay());
     auto noise = Model::noise(laws, discretisation, cell.noise);
     noise[Model::soc] = constants_.soc_noise();
-    if ((flags & unmeasured) != 0) [[unlikely]]
+    if ((flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]]
       add_unknown_current(cell, at, input, flags, noise);
     errors_.add_gain_error(noise[Model::soc], soc, cell.noise.gain);
     state_.covariance.propagate(Model::state_transition(state_.model_state, at, discretisation, input), noise);
@@ -97,8 +96,7 @@ class SocEstimator {
     const Voltage predicted_v = Model::voltage(laws, state_.model_state, at, input);
     errors_.update_offset_at_rest(state_, cell, current, step_us, constants_.duration_s());
     if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * input.current_a), cell.plausible, flags))
-      correct(cell, at, input, soc, predicted_v, arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v,
-              flags);
+      correct(cell, at, input, soc, arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v, flags);
     Result estimate;
     estimate.voltage_predicted_v = predicted_v;
     estimate.flags = flags;
@@ -127,14 +125,6 @@ class SocEstimator {
   using TimeStep = arithmetic::TimeStep<S>;
 
   static constexpr int longest_gap_counts = 1'000;  ///< of longest_count_us: 23 days; nothing is known after that
-
-  /// Variance of the model's error in the bank after a contradiction, in addition to the expected one: the model may be
-  /// three times as wrong as its file says.
-  static constexpr double model_may_be_off = 8;
-  /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
-  static constexpr double wider_sigma = 3, least_sigma = 2 * SocBank<S>::close_below_sigma;
-  static constexpr std::uint32_t unmeasured = time_gap | current_missing | current_implausible;
-  static constexpr std::uint32_t voltage_was_used = 1U << 31;  ///< of check_voltage(); not a Flag
 
   static constexpr int temperature_bin_bits = 8;  ///< a bin of temperatures is 2.56 K wide
   static constexpr std::int16_t no_temperature_bin = 0x7FFF;
@@ -209,128 +199,64 @@ class SocEstimator {
     noise[0] = Variance(noise[0] + unknown_v * unknown_v);
   }
 
-  /// predicted_v: before the correction.
   template <class Cell>
   constexpr void correct(const Cell& cell, const At& at, const StepInput& input, const Soc& soc,
-                         const Voltage& predicted_v, const Voltage& innovation_v, std::uint32_t& flags) {
-    if (consistency_.is_due() || OutlierGate<S>::is_suspect(innovation_v)) [[unlikely]] {
-      const std::uint32_t found = check_voltage(cell, input, soc, predicted_v, innovation_v, flags);
-      flags |= found & ~voltage_was_used;
-      if (found != 0) return;
-    }
-    observe(cell, at, input, innovation_v);
-  }
-
-  template <class Cell>
-  [[gnu::always_inline]] constexpr void observe(const Cell& cell, const At& at, const StepInput& input,
-                                                const Voltage& innovation_v) {
+                         const Voltage& innovation_v, std::uint32_t& flags) {
     const Voltage drop_v = steady_state_drop_v<S>(at, input.current_a);
-    const Variance error_v2 =
-        Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell.noise, at); });
+    const Variance drop_v2 = drop_v * drop_v;
+    if (ambiguous_.open()) [[unlikely]] {
+      flags |= soc_ambiguous;
+      return correct_from_bank(cell, input.current_a, input.temperature_c, soc, innovation_v);
+    }
+    if (OutlierGate<S>::is_suspect(innovation_v)) [[unlikely]] {
+      if (reject_outlier(cell, input.current_a, input.temperature_c, soc, innovation_v)) {
+        flags |= voltage_rejected;
+        return;
+      }
+    }
     const Variance model_v2 =
-        Variance(arithmetic::product<Variance>(error_v2, constants_.correlated_samples()) +
-                 arithmetic::product<Variance>(Variance(drop_v * drop_v), constants_.resistance_noise()));
-    const Variance noise_v2 = Variance(lasting_noise_v2_ + model_v2);
+        Variance(arithmetic::product<Variance>(
+                     Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell, at); }),
+                     constants_.correlated_samples()) +
+                 arithmetic::product<Variance>(drop_v2, constants_.resistance_noise()));
+    const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
     state_.apply(
         state_.covariance.observe(Model::measurement_jacobian(laws_of(cell), at, input), noise_v2, innovation_v),
         cell.charge);
   }
 
-  // These take their arguments by value: an argument passed by address would be kept in memory in every step.
+  // These two take their arguments by value: an argument passed by address would be kept in memory in every step.
 
-  /// What is done once in StepConstants::samples_per_check() samples, with a suspect voltage, and while the bank is
-  /// open. Returns 0 if the voltage is good and not used yet; else flags of this step, or voltage_was_used.
+  /// Returns true if the voltage was rejected. After OutlierGate::restart_after_us of rejections the bank is opened
+  /// around the present SOC, which estimates it again from the voltages.
   template <class Cell>
-  [[gnu::noinline]] constexpr std::uint32_t check_voltage(const Cell& cell, StepInput input, Soc soc,
-                                                          Voltage predicted_v, Voltage innovation_v,
-                                                          std::uint32_t flags) {
+  [[gnu::noinline]] constexpr bool reject_outlier(const Cell& cell, Current current_a, Temperature temperature_c,
+                                                  Soc soc, Voltage innovation_v) {
+    const StepInput input{current_a, constants_.duration_s(), temperature_c};
     std::uint8_t interval = interval_;
     const At at = look_up(operating_point(cell, input), soc, interval);
-    const Voltage overpotential_v = Voltage(Errors::without_error(state_, predicted_v) - at.ocv_v);
-    const Variance overpotential_v2 = watch(cell, overpotential_v, innovation_v, flags);
-    if (ambiguous_.open() && correct_from_bank(cell, input, soc, innovation_v, overpotential_v2))
-      return contradicted_ ? soc_ambiguous | soc_contradicted : std::uint32_t{soc_ambiguous};
-    if (consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v)) {
-      const std::uint32_t found = judge(cell, at, input, soc, overpotential_v2, innovation_v);
-      if (found != 0) return found;
-    }
-    if (!ambiguous_.open()) return 0;
-    observe(cell, at, input, innovation_v);
-    ambiguous_.follow(Soc(state_.charge.soc(cell.charge) - soc));
-    return voltage_was_used;
-  }
-
-  /// Updates the means over half an hour. Returns the square of the overpotential as its error counts.
-  template <class Cell>
-  constexpr Variance watch(const Cell& cell, const Voltage& overpotential_v, const Voltage& innovation_v,
-                           std::uint32_t flags) {
-    const Variance present_v2 = overpotential_v * overpotential_v;
-    const bool one = ambiguous_.open();  // then every sample is checked
-    if (consistency_.begin_turn(one ? 1 : constants_.samples_per_check()) && (flags & unmeasured) == 0) {
-      const Fraction share = one ? constants_.sample_share() : constants_.check_share();
-      consistency_.add(Errors::with_error(state_, innovation_v), present_v2, share);
-    }
-    lasting_noise_v2_ = Variance(cell.noise.voltage_v2 + arithmetic::product<Variance>(consistency_.overpotential_v2(),
-                                                                                       constants_.resistance_noise()));
-    return Variance(present_v2 + consistency_.overpotential_v2());
-  }
-
-  /// Returns the flags of a voltage that is not used: an outlier, or one that shows that the state is inconsistent.
-  template <class Cell>
-  constexpr std::uint32_t judge(const Cell& cell, const At& at, const StepInput& input, const Soc& soc,
-                                const Variance& overpotential_v2, const Voltage& innovation_v) {
     const auto h = Model::measurement_jacobian(laws_of(cell), at, input);
     const Variance variance = state_.soc_variance();
     const Variance of_soc_v2 =
         arithmetic::product<Variance>(arithmetic::product<Variance>(variance, h[Model::soc]), h[Model::soc]);
-    const Variance of_model_v2 =
-        Variance(Variance(soc_axis_variance<S>(operating_point(cell, input), cell.noise, at, soc, innovation_v) +
-                          Errors::model_error_beyond_states(cell.noise)) +
-                 Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state_, h) +
-                          overpotential_error_v2(overpotential_v2)));
-    const Variance expected_v2 = Variance(Variance(of_model_v2 + of_soc_v2) + cell.noise.voltage_v2);
-    if (consistency_.is_inconsistent(expected_v2, constants_.check_share()) && !ambiguous_.open()) {
-      estimate_again(cell, soc, variance, of_model_v2);
-      return soc_ambiguous | soc_contradicted;
+    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) +
+                                       Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state_) +
+                                                drop_variance_v2<S>(at, current_a, constants_.resistance_error())));
+    const Variance innovation_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
+    if (!OutlierGate<S>::is_outlier(innovation_v, innovation_v2)) return false;
+    if (gate_.has_persisted(time_us_, constants_.step_us())) {
+      const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points));
+      const SocDistribution<S> before{soc, variance < finest ? finest : variance};
+      ambiguous_.open_at(cell, state_, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
     }
-    return OutlierGate<S>::is_outlier(innovation_v, expected_v2) ? std::uint32_t{voltage_rejected} : 0;
+    return true;
   }
 
-  constexpr Variance overpotential_error_v2(const Variance& overpotential_v2) const {
-    return arithmetic::product<Variance>(arithmetic::product<Variance>(overpotential_v2, constants_.resistance_error()),
-                                         constants_.resistance_error());
-  }
-
-  /// Opens the bank around the present SOC, with a wider sigma.
   template <class Cell>
-  constexpr void estimate_again(const Cell& cell, const Soc& soc, const Variance& variance,
-                                const Variance& of_model_v2) {
-    const Variance wider = arithmetic::product<Variance>(variance, arithmetic::Count<S>(wider_sigma * wider_sigma));
-    const auto least = Variance(least_sigma * least_sigma);
-    const SocDistribution<S> before{soc, wider < least ? least : wider};
-    contradicted_ = true;
-    state_.covariance.template reset<Model::soc>(before.variance);
-    const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, arithmetic::Count<S>(model_may_be_off)),
-                   seen_v2 = consistency_.variance();
-    ambiguous_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &before}, false,
-                       seen_v2 < more_v2 ? seen_v2 : more_v2);
-    consistency_.reset();
-  }
-
-  /// Returns true if the bank has the SOC; false while it only watches.
-  template <class Cell>
-  constexpr bool correct_from_bank(const Cell& cell, const StepInput& input, const Soc& soc,
-                                   const Voltage& innovation_v, const Variance& overpotential_v2) {
-    const bool watched = ambiguous_.in_background();
-    ambiguous_.update(cell, input, constants_, soc, Errors::with_error(state_, innovation_v),
-                      overpotential_error_v2(overpotential_v2), interval_, state_);
-    if (watched && !ambiguous_.in_background()) {
-      contradicted_ = true;
-      consistency_.reset();
-    }
-    const bool from_bank = !ambiguous_.in_background();
-    if (!ambiguous_.open()) contradicted_ = false;
-    return from_bank;
+  [[gnu::noinline]] constexpr void correct_from_bank(const Cell& cell, Current current_a, Temperature temperature_c,
+                                                     Soc soc, Voltage innovation_v) {
+    const StepInput input{current_a, constants_.duration_s(), temperature_c};
+    ambiguous_.update(cell, input, constants_, soc, innovation_v, interval_, state_);
   }
 
   template <class Cell>
@@ -355,15 +281,14 @@ class SocEstimator {
     state_.model_state = {};
     state_.covariance.set_diagonal(unknown);
     errors_ = {};
-    consistency_ = {};
-    contradicted_ = false;
+    gate_ = {};
     ambiguous_ = {};
     Result estimate;
     estimate.flags = flags | not_a_number;
     report_state(cell, estimate);
     errors_.start(estimate.soc);
     const SocDistribution<S> soc{estimate.soc, anything};
-    ambiguous_.open_at(soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &soc});
+    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &soc});
     return estimate;
   }
 
@@ -409,19 +334,17 @@ class SocEstimator {
   constexpr At start_state(const Cell& cell, const StepInput& input, bool current_measured,
                            const std::int32_t* voltage_uv) {
     SocDistribution<S> soc = given_soc();
-    if (!has_start_) soc.soc = Soc(0.5);
     const auto tables = operating_point(cell, input);
-    At at = look_up(tables, soc.soc, interval_);
+    At at = look_up(tables, has_start_ ? soc.soc : Soc(0.5), interval_);
     const StartPolarisation<S> rc = start_polarisation<S>(at, input.current_a, cell.noise);
     typename Model::Variances variances{};
     variances[0] = cell.noise.v_rc_v2 + rc.variance_v2;
     Model::start(laws_of(cell), state_.model_state, variances, at, input, cell.noise);
-    typename Model::Variances variances_above = variances;
-    add_polarisation_before(cell, input, soc.soc, variances, variances_above);
     // a start that is finer than the points of the grid needs no help from a voltage
     if (!has_start_ || soc_of_ppb(from_.soc_sigma_ppb) > Soc(2.0 / start_points)) {
       const Voltage load_v = rc.v_rc_v + Model::sum_v(state_.model_state) + at.r0_ohm * input.current_a;
       Variance reading_v2 = cell.noise.rest_v2 + rc.variance_v2;
+      for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
       if (!current_measured) {
         const Voltage unknown_v = at.r0_ohm * cell.noise.unknown_a;
         reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
@@ -431,24 +354,12 @@ class SocEstimator {
           voltage ? Voltage(Model::true_voltage(laws_of(cell), arithmetic::from_micro<Voltage>(*voltage_uv)) - load_v)
                   : Voltage(0);
       const SocDistribution<S> before = soc;
-      const auto of_mechanisms_v2 = [&](const At& there, bool above) {
-        return sum_variance<Model>(above ? variances_above : variances,
-                                   Model::measurement_jacobian(laws_of(cell), there, input),
-                                   [](std::size_t k) { return k >= Model::first_voltage; });
-      };
-      StartMisfit<S, decltype(tables), decltype(of_mechanisms_v2)> misfit{
-          tables,
-          voltage ? &ocv_v : nullptr,
-          reading_v2,
-          Variance(Variance(reading_v2 - rc.before_v2) + rc.charged_before_v2),
-          has_start_ ? &before : nullptr,
-          of_mechanisms_v2};
+      const StartMisfit<S, decltype(tables)> misfit{tables, voltage ? &ocv_v : nullptr, reading_v2,
+                                                    has_start_ ? &before : nullptr};
       if (voltage) soc = soc_from(misfit);
-      const bool ambiguous = soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma);
-      if (ambiguous || has_start_) {
+      if (soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma)) {
         state_.covariance.set_diagonal(variances);  // the bank needs the variances of the other states
-        misfit.wrong = ambiguous ? WrongPrior::one_in_a_hundred : WrongPrior::even_odds;
-        ambiguous_.open_at(soc.soc, misfit, !ambiguous);
+        ambiguous_.open_at(cell, state_, soc.soc, misfit);
       }
       at = look_up(tables, soc.soc, interval_);
     }
@@ -457,30 +368,6 @@ class SocEstimator {
     variances[Model::soc] = soc.variance;
     state_.covariance.set_diagonal(variances);
     return at;
-  }
-
-  /// Adds what an unknown current before may have left in the mechanisms' polarisations. above: for a reading above the
-  /// curve. In the cold, chargers reduce their current as the resistance increases (start_polarisation).
-  template <class Cell>
-  constexpr void add_polarisation_before(const Cell& cell, const StepInput& input, const Soc& soc,
-                                         typename Model::Variances& variances, typename Model::Variances& above) const {
-    if constexpr (Model::first_voltage < Model::soc) {
-      const auto& laws = laws_of(cell);
-      const bool warm = input.temperature_c > cell.reference.c || !rests<S>(input.current_a, cell.noise);
-      const auto left_v = [&](const Temperature& c) {
-        const StepInput unknown{cell.noise.unknown_a, input.duration_s, c};
-        std::uint8_t interval = 0;
-        return Model::final_voltages(laws, state_.model_state, look_up(operating_point(cell, unknown), soc, interval),
-                                     unknown);
-      };
-      const auto below_v = left_v(input.temperature_c), above_v = left_v(warm ? input.temperature_c : cell.reference.c);
-      for (std::size_t k = 0; Model::first_voltage + k < Model::soc; ++k) {
-        if (!Model::is_polarisation(laws, Model::first_voltage + k)) continue;
-        Variance &b = variances[Model::first_voltage + k], &a = above[Model::first_voltage + k];
-        b = Variance(b + below_v[1 + k] * below_v[1 + k]);
-        a = Variance(a + above_v[1 + k] * above_v[1 + k]);
-      }
-    }
   }
 
   static constexpr std::int32_t clamped_to_one(std::int32_t ppb, std::int32_t least = 0) {
@@ -505,9 +392,8 @@ class SocEstimator {
   StepConstants<S, Model, Errors> constants_;
   AmbiguousSoc<S, ModelOf> ambiguous_;
   measurement::StartingPoint from_;
-  Consistency<S> consistency_;
-  Variance lasting_noise_v2_{};  ///< of a reading: its own, and the error of the overpotential of the last half hour
-  bool has_start_ = false, started_ = false, contradicted_ = false;
+  OutlierGate<S> gate_;
+  bool has_start_ = false, started_ = false;
 };
 
 }  // namespace bms::estimator

@@ -8,7 +8,6 @@
 #include <concepts>
 #include <cstdint>
 
-#include "estimator/consistency.hpp"
 #include "estimator/soc_bank.hpp"
 #include "measurement/sample.hpp"
 #include "model/extended_rc.hpp"
@@ -25,7 +24,6 @@ class StepConstants {
   using Coupling = arithmetic::Coupling<S>;
   using Temperature = arithmetic::Temperature<S>;
   using Factor = arithmetic::Factor<S>;
-  using TimeStep = arithmetic::TimeStep<S>;
 
  public:
   /// Range of TimeStep. The RC branch has settled after that.
@@ -39,10 +37,6 @@ class StepConstants {
   constexpr const Coupling& resistance_error() const { return resistance_error_; }
   /// Variance of R0 + R1, relative, times correlated_samples.
   constexpr const Coupling& resistance_noise() const { return resistance_noise_; }
-  /// For Consistency: samples from check to check; share of its mean that one check or one sample has, 1 at most.
-  constexpr std::uint8_t samples_per_check() const { return samples_per_check_; }
-  constexpr const Fraction& check_share() const { return check_share_; }
-  constexpr const Fraction& sample_share() const { return sample_share_; }
   constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
   constexpr const typename Model::OptionalErrorDecay& error_decay() const { return error_decay_; }
 
@@ -56,7 +50,6 @@ class StepConstants {
     const auto correlated_samples = arithmetic::ratio<Count>(noise.model_correlation_s, duration_s_);
     correlated_samples_ = correlated_samples > Count(1) ? correlated_samples : Count(1);
     update_resistance_noise();
-    update_checks();
     bank_share_ = correlated_samples > Count(SocBank<S>::points)
                       ? arithmetic::ratio<Fraction>(Count(2 * SocBank<S>::points), correlated_samples)
                       : Fraction(SocBank<S>::max_share);
@@ -65,21 +58,16 @@ class StepConstants {
     error_decay_ = Model::error_decay(noise, duration_s_);
   }
 
-  /// Outside of the temperatures of the identification the overpotential is less certain. In the cold, resistances are
-  /// also larger than a cell file says that does not follow the temperature: the filter adds that increase
-  /// (model::assumed_activation_j_per_mol).
+  /// In the cold, resistances are larger than a cell file says that does not follow the temperature. The filter adds
+  /// the increase to their uncertainty (model::assumed_activation_j_per_mol).
   template <class Cell>
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     resistance_error_ = Coupling(cell.noise.resistance_error);
-    if (measurement::temperature_possible(cdegc)) {
-      const auto c = arithmetic::from_centi<Temperature>(cdegc);
-      if (laws_of(cell).resistances_follow_temperature())
-        resistance_error_ = Coupling(resistance_error_ + extrapolation_error(cell.noise.identified, cdegc, c));
-      else if (cdegc < cell.reference.cdegc)
-        resistance_error_ =
-            Coupling(resistance_error_ + Coupling(model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt,
-                                                                                        cell.reference.c, c) -
-                                                  Factor(1)));
+    if (measurement::temperature_possible(cdegc) && cdegc < cell.reference.cdegc &&
+        !laws_of(cell).resistances_follow_temperature()) {
+      const auto factor = model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c,
+                                                                arithmetic::from_centi<Temperature>(cdegc));
+      resistance_error_ = Coupling(resistance_error_ + Coupling(factor - Factor(1)));
     }
     update_resistance_noise();
   }
@@ -93,30 +81,6 @@ class StepConstants {
   }
 
  private:
-  /// Relative error of the overpotential: tolerance.resistance_per_ev times |1 / kT - 1 / kT_edge|.
-  static constexpr Coupling extrapolation_error(const model::IdentifiedTemperatures<S>& identified, std::int16_t cdegc,
-                                                const Temperature& c) {
-    const bool colder = cdegc<identified.min_cdegc, hotter = cdegc> identified.max_cdegc;
-    if (!colder && !hotter) return Coupling(0);
-    const Temperature kelvin = c + Temperature(273.15);
-    const Temperature beyond = colder ? Temperature(identified.min_c - c) : Temperature(c - identified.max_c);
-    return Coupling(
-        Factor((colder ? identified.per_colder : identified.per_hotter) * arithmetic::ratio<Fraction>(beyond, kelvin)));
-  }
-
-  constexpr void update_checks() {
-    using Watch = Consistency<S>;
-    const auto share_of = [&](const TimeStep& seconds) {
-      return seconds < TimeStep(Watch::mean_over_s) ? Fraction(seconds * Fraction(1 / Watch::mean_over_s))
-                                                    : Fraction(1);
-    };
-    const std::uint32_t fitting = Watch::check_after_us / capped(step_us_);
-    const std::uint32_t samples = fitting < Watch::max_samples_per_check ? fitting : Watch::max_samples_per_check;
-    samples_per_check_ = static_cast<std::uint8_t>(samples > 1 ? samples : 1);
-    sample_share_ = share_of(duration_s_);
-    check_share_ = share_of(arithmetic::seconds<S>(samples_per_check_ * capped(step_us_)));
-  }
-
   constexpr void update_resistance_noise() {
     resistance_noise_ =
         arithmetic::product<Coupling>(Coupling(resistance_error_ * resistance_error_), correlated_samples_);
@@ -136,8 +100,7 @@ class StepConstants {
   Variance soc_noise_{};
   Count correlated_samples_{1};
   Coupling resistance_error_{}, resistance_noise_{};
-  std::uint8_t samples_per_check_ = 1;
-  Fraction bank_share_{}, check_share_{}, sample_share_{};
+  Fraction bank_share_{};
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
 };
 

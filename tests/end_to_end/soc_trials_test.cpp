@@ -69,7 +69,7 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
   });
   EXPECT_GE(std::accumulate(of_cuts.begin(), of_cuts.end(), 0.0), 0.9 * static_cast<double>(of_cuts.size()))
       << "wrong starts in the middle of the plateau";
-  EXPECT_EQ(trials, 108U);
+  EXPECT_EQ(trials, 90U);
   EXPECT_GT(inside / samples_seen, 0.95);
   const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
   std::nth_element(sigmas.begin(), middle, sigmas.end());

@@ -35,17 +35,10 @@ class ReferenceFilter {
     x_ = Model::advance(x_, at, discretisation, input);
 
     const S correlated = cell.noise.model_correlation_s / duration_s, samples = correlated > S(1) ? correlated : S(1);
-    const S predicted_v = Model::voltage(laws, x_, at, input), overpotential_v = predicted_v - at.ocv_v;
-    const S square_v2 = overpotential_v * overpotential_v, error = cell.noise.resistance_error;
-    const S drop_v2 = estimator::drop_variance_v2<S>(at, current_a, error);
-    if (--samples_left_ == 0) {
-      samples_left_ = checked_samples;
-      mean_square_v2_ += (square_v2 - mean_square_v2_) * (S(checked_samples) * duration_s * S(1.0 / 1'800));
-    }
-    const auto correction =
-        covariance_.observe(Model::measurement_jacobian(laws, at, input),
-                            cell.noise.voltage_v2 + (at.error_v2 + drop_v2 + mean_square_v2_ * error * error) * samples,
-                            voltage_v - predicted_v);
+    const S drop_v2 = estimator::drop_variance_v2<S>(at, current_a, cell.noise.resistance_error);
+    const auto correction = covariance_.observe(Model::measurement_jacobian(laws, at, input),
+                                                cell.noise.voltage_v2 + (at.error_v2 + drop_v2) * samples,
+                                                voltage_v - Model::voltage(laws, x_, at, input));
     x_[0] += correction[0];
     soc_ += correction[Model::soc];
     return soc_;
@@ -55,12 +48,9 @@ class ReferenceFilter {
   S v_rc_v() const { return x_[0]; }
 
  private:
-  static constexpr int checked_samples = 37;  ///< of which one enters the mean over half an hour; at 1 s
-
   Covariance covariance_;
   typename Model::State x_{};
-  S soc_, mean_square_v2_{};
-  int samples_left_ = 1;
+  S soc_;
   std::uint8_t interval_ = 0;
 };
 

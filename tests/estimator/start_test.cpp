@@ -17,8 +17,7 @@ TYPED_TEST_SUITE(StartOfEveryScalar, Scalars);
 template <class Cell, class V>
 auto read(const Cell& cell, const V& ocv_v, double sigma_v) {
   using S = typename Cell::Scalar;
-  const auto variance_v2 = arithmetic::Variance<S>(sigma_v * sigma_v);
-  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, variance_v2, variance_v2, nullptr});
+  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, arithmetic::Variance<S>(sigma_v * sigma_v), nullptr});
 }
 
 template <class S>

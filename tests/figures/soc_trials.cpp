@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "files/recording.hpp"
-#include "host_sim/cuts.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms {
@@ -87,8 +86,7 @@ void each_soc_trial(const std::filesystem::path& data, const std::function<void(
   };
   for (const char* name : {"udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"})
     run("a123_26650", name, {&with_sensor_errors, &from_full});
-  for (const char* name :
-       {"dyn10_N15_A002", "dyn10_N05_A002", "dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002", "dyn10_P45_A002"})
+  for (const char* name : {"dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002", "dyn10_P45_A002"})
     run("a123_26650", name, {&with_sensor_errors, &from_the_middle});
   for (const char* name : {"dyn50_P25", "dyn45_P05", "dyn30_N05"})
     run("a123_esctoolbox", name, {&with_sensor_errors, &from_full, &from_the_middle});
@@ -103,21 +101,6 @@ std::string soc_trials(const std::filesystem::path& data) {
   return table + fmt::format("| all | | | | | {:.1f} % | {:.2f} % | |\n",
                              100 * all.inside / static_cast<double>(all.samples),
                              100 * measurement::upper_median(all.sigmas));
-}
-
-std::string soc_cuts(const std::filesystem::path& data, const std::string& shift) {
-  constexpr std::size_t cuts = 30;
-  std::string table = host_sim::cut_heading();
-  const auto add = [&](const char* cell, const std::string& recording) {
-    table += host_sim::cut_rows(host_sim::run_cuts(files::read_cell(cell), files::read_recording(recording), cuts));
-  };
-  for (const char* name : {"dyn10_N15_A002", "dyn10_N05_A002", "dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002",
-                           "dyn10_P45_A002", "udds_P25_A002"})
-    add("a123_26650_extended", (data / "a123_26650" / (std::string(name) + ".csv")).string());
-  for (const char* name : {"dyn30_N05", "dyn45_P05", "dyn50_P25"})
-    add("a123_esctoolbox_extended", (data / "a123_esctoolbox" / (std::string(name) + ".csv")).string());
-  add("table9", shift);
-  return table;
 }
 
 }  // namespace bms

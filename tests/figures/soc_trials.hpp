@@ -26,8 +26,4 @@ void each_soc_trial(const std::filesystem::path& data, const std::function<void(
 /// Markdown: one row for each trial; the last one over all trials.
 std::string soc_trials(const std::filesystem::path& data);
 
-/// Markdown: recordings cut at 30 places, each start right, wrong and unknown (host_sim/cuts.hpp). shift: the recording
-/// of this repository.
-std::string soc_cuts(const std::filesystem::path& data, const std::string& shift);
-
 }  // namespace bms

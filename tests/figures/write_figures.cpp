@@ -394,7 +394,6 @@ void write_trials() {
   const auto trials = source / "docs/figures/soc_trials.md";
   files::replace_figures(trials, "real", real_accuracy());
   files::replace_figures(trials, "trials", soc_trials(data));
-  files::replace_figures(trials, "cuts", soc_cuts(data, shift));
 }
 
 void run() {
