@@ -90,34 +90,6 @@ void check_cells(const std::string& board, std::size_t cells) {
     throw files::BadInput(board, 1, fmt::format("{} cells, expected {} to {}", cells, fewest, most));
 }
 
-}  // namespace
-
-std::vector<std::string> board_names() {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(source_tree() / "boards")) {
-    if (std::filesystem::exists(entry.path() / "board.cmake")) names.push_back(entry.path().filename());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-std::string board_setting(const std::string& board, const std::string& name) {
-  const std::regex line("(^|\n)set\\(" + name + " ([^ )]*)\\)");
-  const std::string text = files::read_file(board_file(board));
-  std::smatch found;
-  if (!std::regex_search(text, found, line))
-    throw std::runtime_error("no " + name + " in " + board_file(board).string());
-  return found[2];
-}
-
-Image chip_image(const std::string& board) {
-  return board_setting(board, "BMS_EMULATED") == "ON" ? Image::bench : Image::application;
-}
-
-std::size_t board_cells(const std::string& board) { return std::stoul(board_setting(board, "BMS_CELLS")); }
-
-namespace {
-
 /// What decides on an image, apart from the cell.
 struct Variant {
   std::string board, vehicle_profile;
@@ -173,6 +145,30 @@ std::filesystem::path shared_objects(const Variant& variant, const std::string& 
 }
 
 }  // namespace
+
+std::vector<std::string> board_names() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(source_tree() / "boards")) {
+    if (std::filesystem::exists(entry.path() / "board.cmake")) names.push_back(entry.path().filename());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string board_setting(const std::string& board, const std::string& name) {
+  const std::regex line("(^|\n)set\\(" + name + " ([^ )]*)\\)");
+  const std::string text = files::read_file(board_file(board));
+  std::smatch found;
+  if (!std::regex_search(text, found, line))
+    throw std::runtime_error("no " + name + " in " + board_file(board).string());
+  return found[2];
+}
+
+Image chip_image(const std::string& board) {
+  return board_setting(board, "BMS_EMULATED") == "ON" ? Image::bench : Image::application;
+}
+
+std::size_t board_cells(const std::string& board) { return std::stoul(board_setting(board, "BMS_CELLS")); }
 
 std::filesystem::path firmware_image(const std::string& board, const files::CellFile& cell, Image image,
                                      const std::string& vehicle_profile, std::size_t cells) {
