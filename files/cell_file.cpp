@@ -10,6 +10,7 @@
 #include "files/cell_fields.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
+#include "model/possible_cell.hpp"
 
 namespace bms::files {
 
@@ -282,6 +283,17 @@ TemperatureTable read_temperature_table(TomlTable& table, const CellFile& file) 
   return at;
 }
 
+/// Each parameter of a mechanism is within its bounds here.
+void reject_impossible_ocv(const TomlTable& top, const CellFile& file) {
+  const std::optional<model::OcvShift> bad = model::first_impossible_ocv(file.parameters, file.mechanisms);
+  if (!bad) return;
+  throw BadInput(
+      file.path, top.line("mechanism"),
+      fmt::format("the mechanisms together move the voltage at rest by {:.2f} V at {:.0f} % and {:g} degrees "
+                  "C, expected at most {:g} V",
+                  bad->shift_v, 100 * bad->soc, bad->temperature_c, model::most_ocv_shift_v));
+}
+
 }  // namespace
 
 CellFile parse_cell(const std::string& text, const std::string& path) {
@@ -305,6 +317,7 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
                    std::string("'") + fault.key + "' is out of range, expected " + fault.what);
   }
   read_mechanisms(top, file);
+  reject_impossible_ocv(top, file);
   return file;
 }
 

@@ -327,6 +327,17 @@ TEST(CellFile, RejectsAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable
   EXPECT_THAT(line, HasSubstr("cell.toml:" + std::to_string(number) + ":"));
 }
 
+TEST(CellFile, RejectsMechanismsThatTogetherAreNoCell) {
+  const std::string branch = table9_text() + "\n[mechanism.branch_temperature]\nshift_at_50_v = 0.05\n" +
+                             "energy_at_50_j_per_mol = 100000.0\nreference_c = ";
+  EXPECT_THAT(cell_refusal(branch + "25.0\n"),
+              HasSubstr("the mechanisms together move the voltage at rest by -1.26 V"));
+  EXPECT_THAT(cell_refusal(branch + "25.0\n"), HasSubstr("at 35 % and -20 degrees C, expected at most 0.5 V"));
+  // one energy lower and the shift of a real cell
+  const std::string real = replaced(replaced(branch, "0.05", "0.001"), "100000.0", "40000.0");
+  EXPECT_NO_THROW(parse_cell(real + "25.0\n", "cell.toml"));
+}
+
 TEST(CellFile, AMissingFileIsRejectedWithTheNamesOfTheBuiltInCells) {
   try {
     read_cell("table10");

@@ -14,7 +14,7 @@
 
 #include "files/cell_file.hpp"
 #include "host_sim/replay.hpp"
-#include "model/extended.hpp"
+#include "model/possible_cell.hpp"
 
 namespace bms {
 namespace {
@@ -53,7 +53,7 @@ double value_of(Random& random, double usual, double low, double high) {
   }
 }
 
-/// Up to seven mechanisms, each once, that run on a board with this scalar.
+/// Up to seven mechanisms, each once, that run on a board with this scalar and that a cell file may have together.
 std::vector<model::MechanismSetting> random_mechanisms(Random& random, const files::CellFile& cell, ScalarKind scalar) {
   std::vector<model::MechanismSetting> all;
   const double capacity_ah = cell.parameters.capacity_ah;
@@ -68,6 +68,7 @@ std::vector<model::MechanismSetting> random_mechanisms(Random& random, const fil
     }
     if (model::first_fault(setting, capacity_ah) == info.parameters) all.push_back(setting);
   }
+  if (model::first_impossible_ocv(cell.parameters, all)) return random_mechanisms(random, cell, scalar);
   return all;
 }
 

@@ -1,0 +1,60 @@
+// Checks that the mechanisms of a cell file together still describe a cell. Each parameter can be within its bounds
+// while all of them together move the open-circuit voltage by volts (an activation energy, far from its reference
+// temperature). With such a file the estimator is wrong and certain, so that it must be rejected.
+#pragma once
+
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "model/extended.hpp"
+
+namespace bms::model {
+
+/// Allowed distance of the voltage at rest from the OCV table [V]. Measured: 0.27 V at most, at -30 degrees C and 10 %
+/// (a123_26650_extended), which is 8 times the gap at 25 degrees C.
+inline constexpr double most_ocv_shift_v = 0.5;
+
+/// Where the mechanisms move the voltage at rest too far.
+struct OcvShift {
+  double soc = 0, temperature_c = 0;
+  double shift_v = 0;  ///< voltage at rest minus the OCV of the table
+};
+
+/// Voltage at rest [V] on the branch to which a current of this sign leads, before any sensor.
+inline double voltage_at_rest(const Cell<double, max_intervals>& cell, const ChosenLaws<double>& laws, double soc,
+                              double temperature_c, double sign) {
+  constexpr double hardly_a = 1e-9, duration_s = 1;
+  const StepInput<double> input{sign * hardly_a, duration_s, temperature_c};
+  std::uint8_t interval = 0;
+  auto x = laws.initial();
+  TablePoint<double> at = look_up(cell, soc, interval);
+  const auto relaxations = laws.discretise(x, at, input);
+  for (std::size_t k = 0; k < laws.states(); ++k) x[k] = relaxations[k].target;
+  at.ocv_v = look_up(cell, laws.ocv_soc(soc, x), interval).ocv_v;
+  laws.tables(at, soc, input, x);
+  return at.ocv_v + laws.advance(x, at, input, false);
+}
+
+/// The first place, over SOC, the temperatures that the file allows and both branches, at which the mechanisms move the
+/// voltage at rest by more than most_ocv_shift_v; none if the mechanisms describe a cell. `cell` has been accepted by
+/// first_fault().
+inline std::optional<OcvShift> first_impossible_ocv(const CellParameters<>& cell,
+                                                    std::span<const MechanismSetting> mechanisms) {
+  const auto tables = prepare<double, max_intervals>(cell);
+  const auto laws = chosen<double>(mechanisms, cell.capacity_ah);
+  for (const double c : {cell.reference_temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c}) {
+    for (int percent = 0; percent <= 100; percent += 5) {
+      const double soc = percent / 100.0;
+      std::uint8_t interval = 0;
+      const double table_v = look_up(tables, soc, interval).ocv_v;
+      for (const double sign : {-1.0, 1.0}) {
+        const double shift_v = voltage_at_rest(tables, laws, soc, c, sign) - table_v;
+        if (!(std::abs(shift_v) <= most_ocv_shift_v)) return OcvShift{soc, c, shift_v};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace bms::model
