@@ -21,7 +21,7 @@ namespace bms::monitor {
 namespace {
 
 constexpr int most_streams = 6;
-constexpr int forbidden = 403, method_not_allowed = 405, service_unavailable = 503;  // HTTP
+constexpr int bad_request = 400, forbidden = 403, method_not_allowed = 405, service_unavailable = 503;  // HTTP
 
 void append(std::string& text, const HistoryPoint& p) {
   auto out = std::back_inserter(text);
@@ -87,14 +87,17 @@ struct LivePage::Server {
     return host == fmt::format("127.0.0.1:{}", port) || host == fmt::format("localhost:{}", port);
   }
 
-  /// Sets the headers of the response. Returns true if the request is rejected.
+  /// Sets the headers of the response. Returns true if the request is rejected. Two Host headers are rejected, because
+  /// another program on the way may have checked the other one (RFC 9112, section 3.2).
   bool reject(const httplib::Request& request, httplib::Response& response) const {
     response.set_header("Content-Security-Policy", policy + "; frame-ancestors 'none'");
     response.set_header("Cross-Origin-Resource-Policy", "same-origin");
     response.set_header("X-Content-Type-Options", "nosniff");
     response.set_header("Referrer-Policy", "no-referrer");
     response.set_header("Cache-Control", "no-store");
-    if (!is_own_host(request.get_header_value("Host")))
+    if (request.get_header_value_count("Host") > 1)
+      response.status = bad_request;
+    else if (!is_own_host(request.get_header_value("Host")))
       response.status = forbidden;
     else if (request.method != "GET")
       response.status = method_not_allowed;

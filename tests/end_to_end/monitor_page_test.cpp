@@ -93,6 +93,8 @@ TEST_F(ServedPage, ServesOnlyThisComputerAndOnlyReads) {
     EXPECT_THAT(get("GET", "/", host), StartsWith("HTTP/1.1 403")) << host;
     EXPECT_THAT(get("GET", "/events", host), StartsWith("HTTP/1.1 403")) << host;
   }
+  EXPECT_THAT(get("GET", "/", own + "\r\nHost: evil.example"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(get("GET", "/", "evil.example\r\nHost: " + own), StartsWith("HTTP/1.1 400"));
   for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS", "HEAD", "PATCH"})
     EXPECT_THAT(get(method, "/", own), StartsWith("HTTP/1.1 405")) << method;
   EXPECT_THAT(get("GET", "/../etc/passwd", own), StartsWith("HTTP/1.1 404"));
