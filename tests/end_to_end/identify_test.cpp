@@ -145,6 +145,27 @@ std::string values_of(const std::string& cell) {
   return values;
 }
 
+/// Compares two cell files word by word, numbers to 6 digits: the last ones depend on the processor's instructions.
+void expect_same_values(const std::string& made, const std::string& expected) {
+  constexpr double relative = 1e-6;
+  std::istringstream made_words(made), expected_words(expected);
+  std::string a, b;
+  while (expected_words >> b) {
+    ASSERT_TRUE(made_words >> a) << "ends before " << b;
+    std::erase(a, '[');  // a number follows
+    std::erase(b, '[');
+    char *end_a = nullptr, *end_b = nullptr;
+    const double number_a = std::strtod(a.c_str(), &end_a), number_b = std::strtod(b.c_str(), &end_b);
+    if (end_a != a.c_str() && end_b != b.c_str()) {
+      EXPECT_NEAR(number_a, number_b, relative * std::abs(number_b));
+      EXPECT_STREQ(end_a, end_b);
+    } else {
+      EXPECT_EQ(a, b);
+    }
+  }
+  EXPECT_FALSE(made_words >> a) << a;
+}
+
 /// The larger one, a123_26650_extended, takes minutes: its command is at the head of its file.
 TEST_F(IdentifyTool, ReproducesABuiltInExtendedCell) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "the real recordings are not there: " << data;
@@ -160,11 +181,11 @@ TEST_F(IdentifyTool, ReproducesABuiltInExtendedCell) {
     return values_of(content(path("made.toml")));
   };
   const std::filesystem::path cells = BMS_SOURCE_DIR "/model/cells";
-  EXPECT_EQ(made("--ocv" +
-                 all(other, {"ocv_N05_chg", "ocv_N05_dis", "ocv_P05_chg", "ocv_P05_dis", "ocv_P25_chg", "ocv_P25_dis",
-                             "ocv_P45_chg", "ocv_P45_dis"}) +
-                 " --recording" + all(other, {"dyn30_N05", "dyn45_P05", "dyn50_P25"})),
-            values_of(content(cells / "a123_esctoolbox_extended.toml")));
+  expect_same_values(made("--ocv" +
+                          all(other, {"ocv_N05_chg", "ocv_N05_dis", "ocv_P05_chg", "ocv_P05_dis", "ocv_P25_chg",
+                                      "ocv_P25_dis", "ocv_P45_chg", "ocv_P45_dis"}) +
+                          " --recording" + all(other, {"dyn30_N05", "dyn45_P05", "dyn50_P25"})),
+                     values_of(content(cells / "a123_esctoolbox_extended.toml")));
 }
 
 TEST_F(IdentifyTool, SeveralTemperaturesGiveOneTableEach) {
