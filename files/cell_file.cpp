@@ -1,6 +1,7 @@
 #include "files/cell_file.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 
@@ -236,7 +237,7 @@ std::vector<model::MechanismSetting> on_board(const std::vector<model::Mechanism
 void reject_if_fpu_needed(const CellFile& file) {
   for (const model::MechanismSetting& m : on_board(file.mechanisms)) {
     const model::MechanismInfo& info = model::catalogue[m.index];
-    if (info.needs_fpu)
+    if (info.needs_fpu || !info.fits_fixed_point(m.value, file.parameters.capacity_ah))
       throw BadInput(
           file.path, 1,
           fmt::format("'{}' cannot be computed in fixed point, expected a cell without it or arithmetic in float",
@@ -285,13 +286,16 @@ TemperatureTable read_temperature_table(TomlTable& table, const CellFile& file) 
 
 /// Each parameter of a mechanism is within its bounds here.
 void reject_impossible_ocv(const TomlTable& top, const CellFile& file) {
-  const std::optional<model::OcvShift> bad = model::first_impossible_ocv(file.parameters, file.mechanisms);
+  const std::optional<model::ImpossibleOcv> bad = model::first_impossible_ocv(file.parameters, file.mechanisms);
   if (!bad) return;
+  const bool too_far = !(std::abs(bad->shift_v) <= model::most_ocv_shift_v);
   throw BadInput(
       file.path, top.line("mechanism"),
-      fmt::format("the mechanisms together move the voltage at rest by {:.2f} V at {:.0f} % and {:g} degrees "
-                  "C, expected at most {:g} V",
-                  bad->shift_v, 100 * bad->soc, bad->temperature_c, model::most_ocv_shift_v));
+      fmt::format("at {:.0f} % and {:g} degrees C the mechanisms together {}", 100 * bad->soc, bad->temperature_c,
+                  too_far ? fmt::format("move the voltage at rest by {:.2f} V, expected at most {:g} V", bad->shift_v,
+                                        model::most_ocv_shift_v)
+                          : fmt::format("put the charge branch {:.1f} mV below the discharge branch, expected above it",
+                                        -1'000 * bad->gap_v)));
 }
 
 }  // namespace

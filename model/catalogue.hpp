@@ -53,14 +53,25 @@ struct MechanismInfo {
   std::size_t parameters = 0;
   std::size_t states = 0;
   StateUnit state_unit{"v", 1};
+  /// Returns false if fixed point rounds these values too much (capacity in Ah).
+  bool (*fits_fixed_point)(const std::array<double, max_mechanism_parameters>& values, double capacity_ah) = nullptr;
 };
 
 namespace mechanism_detail {
 
 template <class M>
+constexpr bool fits_fixed_point(const std::array<double, max_mechanism_parameters>& values, double capacity_ah) {
+  if constexpr (requires { M::fits_fixed_point(values, capacity_ah); })
+    return M::fits_fixed_point(values, capacity_ah);
+  else
+    return true;
+}
+
+template <class M>
 constexpr MechanismInfo info() {
   MechanismInfo i{M::id, M::domain, M::on_board, false, {}, M::parameters.size(), 0, {"v", 1}};
   for (std::size_t k = 0; k < M::parameters.size(); ++k) i.parameter[k] = M::parameters[k];
+  i.fits_fixed_point = fits_fixed_point<M>;
   if constexpr (requires { M::needs_fpu; }) i.needs_fpu = M::needs_fpu;
   if constexpr (requires { M::template Law<double>::states; }) i.states = M::template Law<double>::states;
   if constexpr (requires { M::template Law<double>::state_unit; }) i.state_unit = M::template Law<double>::state_unit;

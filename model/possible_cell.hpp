@@ -15,10 +15,11 @@ namespace bms::model {
 /// (a123_26650_extended), which is 8 times the gap at 25 degrees C.
 inline constexpr double most_ocv_shift_v = 0.5;
 
-/// Where the mechanisms move the voltage at rest too far.
-struct OcvShift {
+/// A place at which the voltage at rest is impossible.
+struct ImpossibleOcv {
   double soc = 0, temperature_c = 0;
-  double shift_v = 0;  ///< voltage at rest minus the OCV of the table
+  double shift_v = 0;  ///< voltage at rest minus the OCV of the table, on the branch that is farther away
+  double gap_v = 0;    ///< charge minus discharge branch; below 0: the branches are exchanged
 };
 
 /// Voltage at rest [V] on the branch to which a current of this sign leads, before any sensor.
@@ -36,11 +37,12 @@ inline double voltage_at_rest(const Cell<double, max_intervals>& cell, const Cho
   return at.ocv_v + laws.advance(x, at, input, false);
 }
 
-/// The first place, over SOC, the temperatures that the file allows and both branches, at which the mechanisms move the
-/// voltage at rest by more than most_ocv_shift_v; none if the mechanisms describe a cell. `cell` has been accepted by
-/// first_fault().
-inline std::optional<OcvShift> first_impossible_ocv(const CellParameters<>& cell,
-                                                    std::span<const MechanismSetting> mechanisms) {
+/// The first place, over SOC and the temperatures that the file allows, at which the mechanisms move the voltage at
+/// rest by more than most_ocv_shift_v or exchange the branches; none if the mechanisms describe a cell. `cell` has been
+/// accepted by first_fault().
+inline std::optional<ImpossibleOcv> first_impossible_ocv(const CellParameters<>& cell,
+                                                         std::span<const MechanismSetting> mechanisms) {
+  constexpr double rounding_v = 1e-6;
   const auto tables = prepare<double, max_intervals>(cell);
   const auto laws = chosen<double>(mechanisms, cell.capacity_ah);
   for (const double c : {cell.reference_temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c}) {
@@ -48,10 +50,11 @@ inline std::optional<OcvShift> first_impossible_ocv(const CellParameters<>& cell
       const double soc = percent / 100.0;
       std::uint8_t interval = 0;
       const double table_v = look_up(tables, soc, interval).ocv_v;
-      for (const double sign : {-1.0, 1.0}) {
-        const double shift_v = voltage_at_rest(tables, laws, soc, c, sign) - table_v;
-        if (!(std::abs(shift_v) <= most_ocv_shift_v)) return OcvShift{soc, c, shift_v};
-      }
+      const double discharge_v = voltage_at_rest(tables, laws, soc, c, -1) - table_v;
+      const double charge_v = voltage_at_rest(tables, laws, soc, c, 1) - table_v;
+      const double shift_v = std::abs(charge_v) > std::abs(discharge_v) ? charge_v : discharge_v;
+      const double gap_v = charge_v - discharge_v;
+      if (!(std::abs(shift_v) <= most_ocv_shift_v && gap_v > -rounding_v)) return ImpossibleOcv{soc, c, shift_v, gap_v};
     }
   }
   return std::nullopt;

@@ -36,6 +36,27 @@ struct SlowPolarisation {
   /// the lag is 200 s.
   static constexpr double most_lead_sigma = 0.02;
 
+  /// R of both modes, at least the one that a surface lag needs: the lag is a multiple of the modes' voltages.
+  template <class Real>
+  static constexpr Real used_ohm(const Real& resistance_ohm, const Real& surface_lag_s, double capacity_ah) {
+    // 0.1 mV at 1C is less than any sensor sees, and far above the smallest standard deviation of a state
+    constexpr double least_ohm_ah = 1e-4;
+    return surface_lag_s > Real(0) ? resistance_ohm + Real(least_ohm_ah / capacity_ah) : resistance_ohm;
+  }
+
+  /// Returns false if fixed point rounds a resistance that scales a surface lag by more than 5 %.
+  static constexpr bool fits_fixed_point(const std::array<double, max_mechanism_parameters>& p, double capacity_ah) {
+    constexpr double most_rounding = 0.05;
+    if (p[3] == 0) return true;
+    const double r = used_ohm(p[0], p[3], capacity_ah);
+    bool fits = true;
+    for (const double ohm : {r * (1 - p[2]), r * p[2]}) {
+      const double error_ohm = static_cast<double>(Resistance<FixedPoint>(ohm)) - ohm;
+      fits = fits && error_ohm <= most_rounding * ohm && error_ohm >= -most_rounding * ohm;
+    }
+    return fits;
+  }
+
   template <class S>
   struct Law {
     static constexpr LawMembers members = law_member::soc_shift_per_v | law_member::states |
@@ -50,10 +71,7 @@ struct SlowPolarisation {
 
     template <class Real>
     constexpr Law(const std::array<Real, 4>& p, double capacity_ah) {
-      // the lag is a multiple of the modes' voltages, so R must not be 0: 0.1 mV at 1C is less than any sensor sees,
-      // and far above the smallest standard deviation of a state
-      constexpr double least_ohm_ah = 1e-4;
-      const Real r = p[3] > Real(0) ? p[0] + Real(least_ohm_ah / capacity_ah) : p[0];
+      const Real r = used_ohm(p[0], p[3], capacity_ah);
       r_ohm = {Resistance<S>(r * (Real(1) - p[2])), Resistance<S>(r * p[2])};
       rate_per_s = {Rate<S>(Real(1) / p[1]), Rate<S>(Real(9) / p[1])};
       if (r > Real(0)) surface_per_v = Coupling<S>(p[3] / (Real(3'600 * capacity_ah) * r));

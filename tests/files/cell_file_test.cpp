@@ -330,12 +330,16 @@ TEST(CellFile, RejectsAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable
 TEST(CellFile, RejectsMechanismsThatTogetherAreNoCell) {
   const std::string branch = table9_text() + "\n[mechanism.branch_temperature]\nshift_at_50_v = 0.05\n" +
                              "energy_at_50_j_per_mol = 100000.0\nreference_c = ";
-  EXPECT_THAT(cell_refusal(branch + "25.0\n"),
-              HasSubstr("the mechanisms together move the voltage at rest by -1.26 V"));
-  EXPECT_THAT(cell_refusal(branch + "25.0\n"), HasSubstr("at 35 % and -20 degrees C, expected at most 0.5 V"));
+  EXPECT_THAT(cell_refusal(branch + "25.0\n"), HasSubstr("at 35 % and -20 degrees C the mechanisms together move the "
+                                                         "voltage at rest by -1.26 V, expected at most 0.5 V"));
   // one energy lower and the shift of a real cell
   const std::string real = replaced(replaced(branch, "0.05", "0.001"), "100000.0", "40000.0");
   EXPECT_NO_THROW(parse_cell(real + "25.0\n", "cell.toml"));
+  // a gap that is four times as large in the cold of -40 degrees C: three times as large, and negative, without it
+  const std::string exchanged =
+      table9_text() + "\n[mechanism.branch_temperature]\ngap_at_50 = 4.0\n" +
+      "reference_c = -40.0\n\n[mechanism.ocv_hysteresis]\nhalf_gap_v = 0.02\nmeasured = 1.0\n";
+  EXPECT_THAT(cell_refusal(exchanged), HasSubstr("below the discharge branch, expected above it"));
 }
 
 TEST(CellFile, AMissingFileIsRejectedWithTheNamesOfTheBuiltInCells) {
