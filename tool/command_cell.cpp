@@ -1,11 +1,13 @@
-// bms cell: checks, shows, scales and plots a cell file.
+// bms cell: checks, shows, scales and plots a cell file, and writes it as a header for firmware.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
+#include "files/cell_header.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
@@ -108,17 +110,41 @@ files::PageContent plotted(const files::CellFile& cell) {
           {ocv, resistance, capacitance}};
 }
 
+/// Accepts the argument of an #include: a path in brackets or in quotes.
+CLI::Validator quoted() {
+  return CLI::Validator(
+      [](std::string& text) -> std::string {
+        const auto path = [](char c) {
+          return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '.' || c == '/';
+        };
+        const bool marks = text.size() > 2 &&
+                           ((text.front() == '<' && text.back() == '>') || (text.front() == '"' && text.back() == '"'));
+        if (marks && std::all_of(text.begin() + 1, text.end() - 1, path)) return "";
+        return "no argument of an #include, expected <FILE> or \"FILE\"";
+      },
+      "<FILE>", "include");
+}
+
 class CellCommand final : public Command {
  public:
   CLI::App* add(CLI::App& app) override {
-    CLI::App& c = *app.add_subcommand("cell", "Check, show, scale or plot a cell file");
+    CLI::App& c =
+        *app.add_subcommand("cell", "Check, show, scale or plot a cell file, or write its header for firmware");
     c.footer("Example: bms cell scale table9 --capacity-ah 100 --out my_cell.toml");
-    c.add_option("action", action_, "check: what is unusual in it; show: its values; scale: to another capacity; plot")
+    c.add_option("action", action_,
+                 "check: what is unusual in it; show: its values; scale: to another capacity; plot; header: its "
+                 "constants for the estimator in firmware of your own")
         ->required()
-        ->check(CLI::IsMember({"check", "show", "scale", "plot"}));
+        ->check(CLI::IsMember({"check", "show", "scale", "plot", "header"}));
     c.add_option("file", cell_, cell_help())->required();
     c.add_option("--capacity-ah", capacity_ah_, "scale: capacity in Ah of the new cell")->check(Within(0.01, 1000.0));
-    c.add_option("--out", out_, "scale: cell file to write")->check(not_empty())->type_name("C.toml");
+    c.add_option("--out,-o", out_, "scale: cell file to write; header: C++ header to write")
+        ->check(not_empty())
+        ->type_name("FILE");
+    c.add_flag("--fixed", fixed_, "header: for a core without an FPU; refuses what needs one");
+    c.add_option("--include", include_,
+                 "header: what it includes instead of <greybox/model.hpp>, for example '\"greybox_single.hpp\"'")
+        ->check(quoted());
     add_output(c, output_);
     return &c;
   }
@@ -128,6 +154,7 @@ class CellCommand final : public Command {
     output_.protect({cell_});
     files::CellFile cell = files::read_cell(cell_);
     if (action_ == "scale") return scale(cell);
+    if (action_ == "header") return header(cell);
     if (action_ == "plot" && output_.report.empty())
       throw files::BadInput("bms cell plot", 1, "no page, expected --report FILE.html");
     if (!output_.report.empty()) write_output(output_.report, reports::page_of(plotted(cell)));
@@ -159,7 +186,17 @@ class CellCommand final : public Command {
     return 0;
   }
 
-  std::string action_, cell_, out_;
+  int header(const files::CellFile& cell) const {
+    if (out_.empty()) throw files::BadInput("bms cell header", 1, "no file, expected --out FILE.hpp");
+    if (fixed_) files::reject_if_fpu_needed(cell);
+    write_output(out_, files::cell_header(cell, include_));
+    if (!output_.json.empty()) write_output(output_.json, reports::json_of(cell, doubts_of(cell)));
+    if (out_ != "-") print_summary(output_, "Header: " + out_);
+    return 0;
+  }
+
+  std::string action_, cell_, out_, include_ = files::installed_model;
+  bool fixed_ = false;
   double capacity_ah_ = 0;
   Output output_;
 };

@@ -1,0 +1,40 @@
+# Copies the headers that other projects include into one folder, under the prefix greybox/.
+#
+#   greybox_headers(FOLDER)   FOLDER/greybox/estimator.hpp and, below it, everything that these include
+#
+# In the copies "estimator/charge.hpp" is "greybox/estimator/charge.hpp", so the names of the rooms cannot collide with
+# those of folders of the other project. A file is written only if it has changed.
+function(greybox_copy_header root path folder)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${root}/${path})
+  file(READ ${root}/${path} text)
+  set(included "(library/)?([a-z_/]+/[a-z0-9_]+[.]hp?p?)")
+  string(REGEX REPLACE "#include \"${included}\"" "#include \"greybox/\\2\"" text "${text}")
+  string(REPLACE "\"greybox/greybox/" "\"greybox/" text "${text}")
+  string(REGEX REPLACE "^library/greybox/" "" name ${path})
+  set(copy ${folder}/greybox/${name})
+  set(before "")
+  if(EXISTS ${copy})
+    file(READ ${copy} before)
+  endif()
+  if(NOT text STREQUAL before)
+    file(WRITE ${copy} "${text}")
+  endif()
+endfunction()
+
+function(greybox_headers folder)
+  get_filename_component(root ${CMAKE_CURRENT_FUNCTION_LIST_DIR} DIRECTORY)
+  file(GLOB waiting CONFIGURE_DEPENDS RELATIVE ${root} ${root}/library/greybox/*.h ${root}/library/greybox/*.hpp)
+  set(done "")
+  while(waiting)
+    list(POP_FRONT waiting path)
+    list(APPEND done ${path})
+    greybox_copy_header(${root} ${path} ${folder})
+    file(STRINGS ${root}/${path} includes REGEX "^#include \"")
+    foreach(include ${includes})
+      string(REGEX REPLACE "^#include \"([^\"]+)\".*" "\\1" included ${include})
+      if(NOT included IN_LIST done AND NOT included IN_LIST waiting)
+        list(APPEND waiting ${included})
+      endif()
+    endforeach()
+  endwhile()
+endfunction()

@@ -1,0 +1,3 @@
+#include "model/cell.hpp"
+
+int plain() { return consumer::cells; }
