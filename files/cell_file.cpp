@@ -235,14 +235,19 @@ std::vector<model::MechanismSetting> on_board(const std::vector<model::Mechanism
 }
 
 void reject_if_fpu_needed(const CellFile& file) {
-  for (const model::MechanismSetting& m : on_board(file.mechanisms)) {
+  const std::vector<model::MechanismSetting> acting = on_board(file.mechanisms);
+  for (const model::MechanismSetting& m : acting) {
     const model::MechanismInfo& info = model::catalogue[m.index];
-    if (info.needs_fpu || !info.fits_fixed_point(m.value, file.parameters.capacity_ah))
+    if (info.needs_fpu)
       throw BadInput(
           file.path, 1,
           fmt::format("'{}' cannot be computed in fixed point, expected a cell without it or arithmetic in float",
                       table_of(info)));
   }
+  if (!model::fits_fixed_point(file.parameters, acting))
+    throw BadInput(file.path, 1,
+                   "the mechanisms make a resistance too large or too small for fixed point, expected arithmetic in "
+                   "float");
 }
 
 namespace {

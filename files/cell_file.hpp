@@ -54,7 +54,7 @@ std::string cell_text(const CellFile& file);
 /// left out: it has no effect, and a state without variance and noise would make the filter divide 0 by 0.
 std::vector<model::MechanismSetting> on_board(const std::vector<model::MechanismSetting>& mechanisms);
 
-/// Throws BadInput if one of those needs an FPU, or its values are too small for fixed point.
+/// Throws BadInput if one of those needs an FPU, or if fixed point does not hold their resistances.
 void reject_if_fpu_needed(const CellFile& file);
 
 struct BuiltInCell {

@@ -22,9 +22,13 @@ struct ImpossibleOcv {
   double gap_v = 0;    ///< charge minus discharge branch; below 0: the branches are exchanged
 };
 
-/// Voltage at rest [V] on the branch to which a current of this sign leads, before any sensor.
-inline double voltage_at_rest(const Cell<double, max_intervals>& cell, const ChosenLaws<double>& laws, double soc,
-                              double temperature_c, double sign) {
+struct AtRest {
+  double voltage_v = 0, r0_ohm = 0, r1_ohm = 0;
+};
+
+/// The cell at rest on the branch to which a current of this sign leads, before any sensor.
+inline AtRest at_rest(const Cell<double, max_intervals>& cell, const ChosenLaws<double>& laws, double soc,
+                      double temperature_c, double sign) {
   constexpr double hardly_a = 1e-9, duration_s = 1;
   const StepInput<double> input{sign * hardly_a, duration_s, temperature_c};
   std::uint8_t interval = 0;
@@ -34,7 +38,17 @@ inline double voltage_at_rest(const Cell<double, max_intervals>& cell, const Cho
   for (std::size_t k = 0; k < laws.states(); ++k) x[k] = relaxations[k].target;
   at.ocv_v = look_up(cell, laws.ocv_soc(soc, x), interval).ocv_v;
   laws.tables(at, soc, input, x);
-  return at.ocv_v + laws.advance(x, at, input, false);
+  return {at.ocv_v + laws.advance(x, at, input, false), at.r0_ohm, at.r1_ohm};
+}
+
+/// Calls f(soc, temperature_c) over SOC and the temperatures that the file allows, until it returns false.
+template <class F>
+void for_each_condition(const CellParameters<>& cell, F&& f) {
+  for (const double c : {cell.reference_temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c}) {
+    for (int percent = 0; percent <= 100; percent += 5) {
+      if (!f(percent / 100.0, c)) return;
+    }
+  }
 }
 
 /// The first place, over SOC and the temperatures that the file allows, at which the mechanisms move the voltage at
@@ -45,19 +59,37 @@ inline std::optional<ImpossibleOcv> first_impossible_ocv(const CellParameters<>&
   constexpr double rounding_v = 1e-6;
   const auto tables = prepare<double, max_intervals>(cell);
   const auto laws = chosen<double>(mechanisms, cell.capacity_ah);
-  for (const double c : {cell.reference_temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c}) {
-    for (int percent = 0; percent <= 100; percent += 5) {
-      const double soc = percent / 100.0;
-      std::uint8_t interval = 0;
-      const double table_v = look_up(tables, soc, interval).ocv_v;
-      const double discharge_v = voltage_at_rest(tables, laws, soc, c, -1) - table_v;
-      const double charge_v = voltage_at_rest(tables, laws, soc, c, 1) - table_v;
-      const double shift_v = std::abs(charge_v) > std::abs(discharge_v) ? charge_v : discharge_v;
-      const double gap_v = charge_v - discharge_v;
-      if (!(std::abs(shift_v) <= most_ocv_shift_v && gap_v > -rounding_v)) return ImpossibleOcv{soc, c, shift_v, gap_v};
+  std::optional<ImpossibleOcv> first;
+  for_each_condition(cell, [&](double soc, double c) {
+    std::uint8_t interval = 0;
+    const double table_v = look_up(tables, soc, interval).ocv_v;
+    const double discharge_v = at_rest(tables, laws, soc, c, -1).voltage_v - table_v;
+    const double charge_v = at_rest(tables, laws, soc, c, 1).voltage_v - table_v;
+    const double shift_v = std::abs(charge_v) > std::abs(discharge_v) ? charge_v : discharge_v;
+    const double gap_v = charge_v - discharge_v;
+    if (!(std::abs(shift_v) <= most_ocv_shift_v && gap_v > -rounding_v)) first = {soc, c, shift_v, gap_v};
+    return !first;
+  });
+  return first;
+}
+
+/// Returns true if fixed point holds these mechanisms: no value is rounded too much, and no resistance saturates at a
+/// temperature that the file allows.
+inline bool fits_fixed_point(const CellParameters<>& cell, std::span<const MechanismSetting> mechanisms) {
+  bool fits = true;
+  for (const MechanismSetting& m : mechanisms)
+    fits = fits && catalogue[m.index].fits_fixed_point(m.value, cell.capacity_ah);
+  const double most_ohm = static_cast<double>(Resistance<FixedPoint>::highest());
+  const auto tables = prepare<double, max_intervals>(cell);
+  const auto laws = chosen<double>(mechanisms, cell.capacity_ah);
+  for_each_condition(cell, [&](double soc, double c) {
+    for (const double sign : {-1.0, 1.0}) {
+      const AtRest rest = at_rest(tables, laws, soc, c, sign);
+      fits = fits && rest.r0_ohm < most_ohm && rest.r1_ohm < most_ohm;
     }
-  }
-  return std::nullopt;
+    return fits;
+  });
+  return fits;
 }
 
 }  // namespace bms::model

@@ -66,10 +66,10 @@ std::vector<model::MechanismSetting> random_mechanisms(Random& random, const fil
       setting.value[i] = value_of(random, setting.value[i], info.parameter[i].lower(capacity_ah),
                                   info.parameter[i].upper(capacity_ah));
     }
-    if (scalar == ScalarKind::fixed && !info.fits_fixed_point(setting.value, capacity_ah)) continue;
     if (model::first_fault(setting, capacity_ah) == info.parameters) all.push_back(setting);
   }
-  if (model::first_impossible_ocv(cell.parameters, all)) return random_mechanisms(random, cell, scalar);
+  const bool computable = scalar != ScalarKind::fixed || model::fits_fixed_point(cell.parameters, all);
+  if (!computable || model::first_impossible_ocv(cell.parameters, all)) return random_mechanisms(random, cell, scalar);
   return all;
 }
 
