@@ -44,11 +44,14 @@ struct SlowPolarisation {
     return surface_lag_s > Real(0) ? resistance_ohm + Real(least_ohm_ah / capacity_ah) : resistance_ohm;
   }
 
-  /// Returns false if fixed point rounds a resistance that scales a surface lag by more than 5 %.
+  /// Returns false if fixed point loses a surface lag: it rounds a resistance by more than 5 %, or a current of 1C
+  /// moves a mode by less than 100 steps of a voltage in a second.
   static constexpr bool fits_fixed_point(const std::array<double, max_mechanism_parameters>& p, double capacity_ah) {
-    constexpr double most_rounding = 0.05;
+    constexpr double most_rounding = 0.05, least_steps = 100;
+    constexpr double step_v = 1.0 / (std::uint64_t{1} << Voltage<FixedPoint>::fraction_bits);
     if (p[3] == 0) return true;
     const double r = used_ohm(p[0], p[3], capacity_ah);
+    if (r * capacity_ah / p[1] < least_steps * step_v) return false;
     bool fits = true;
     for (const double ohm : {r * (1 - p[2]), r * p[2]}) {
       const double error_ohm = static_cast<double>(Resistance<FixedPoint>(ohm)) - ohm;

@@ -347,6 +347,7 @@ TEST(CellFile, FixedPointRefusesResistancesThatItDoesNotHold) {
   const std::string lag = "\n[mechanism.slow_polarisation]\nsurface_lag_s = 200.0\nresistance_ohm = ";
   EXPECT_NO_THROW(reject_if_fpu_needed(cell(lag + "0.002\n")));
   EXPECT_THROW(reject_if_fpu_needed(cell(lag + "1e-14\nfaster_share = 1e-5\n")), BadInput) << "rounds to nothing";
+  EXPECT_THROW(reject_if_fpu_needed(cell(lag + "0.0\ntime_constant_s = 20000.0\n")), BadInput) << "5 nV a second";
   const std::string cold = "\n[mechanism.temperature_resistance]\nr0_activation_j_per_mol = ";
   EXPECT_NO_THROW(reject_if_fpu_needed(cell(cold + "30000.0\nreference_c = 25.0\n")));
   EXPECT_THROW(reject_if_fpu_needed(cell(cold + "60000.0\nreference_c = 80.0\n")), BadInput) << "more than 1 ohm";
