@@ -38,6 +38,7 @@ std::vector<measurement::Sample> two_minutes() {
 
 BudgetRun run_in_unicorn(const std::string& board_name) {
   UnicornBoard board(images::firmware_image(board_name, files::read_cell("table9"), images::Image::remote));
+  board.by_instructions = true;
   if (!board.run_until([&] { return board.can.on_the_bus(); }, 3'000))
     throw std::runtime_error(board_name + " does not start");
   std::uint16_t counter = 0;

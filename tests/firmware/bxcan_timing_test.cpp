@@ -39,6 +39,7 @@ TEST_F(BxcanBoard, EveryFrameArrivesWithinTheTimeThatTheAnalysisAllows) {
 /// The time from sample to queue, which the analysis takes for granted. Here an instruction takes one cycle. The chip
 /// is given two, because of misses of its flash accelerator.
 TEST_F(BxcanBoard, ASampleIsInTheQueueWithinTheTimeThatTheAnalysisTakesForGranted) {
+  board.by_instructions = true;
   run_until_it_listens(board);
   double longest_ms = 0, minute_ms = 0;
   std::size_t n = 0;
@@ -63,6 +64,7 @@ TEST_F(BxcanBoard, ASampleIsInTheQueueWithinTheTimeThatTheAnalysisTakesForGrante
 
 TEST_F(BxcanBoard, FitsIntoTheBudgetsOfFlashRamAndStack) {
   const ImageSize size = expect_within_budgets(image());
+  board.by_instructions = true;
   ASSERT_TRUE(board.run_until([&] { return board.can.on_the_bus(); }, 100));
   const double on_the_bus_ms = board.now_ms();
   queue(part_of_the_shift(20));

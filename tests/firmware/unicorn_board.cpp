@@ -4,9 +4,8 @@
 #include <unicorn/unicorn.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cstring>
-#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -22,11 +21,16 @@ constexpr std::uint32_t ccm = 0x10000000, ccm_size = 0x10000, scs = 0xE000E000, 
 constexpr std::uint32_t nmi = 2, systick_exception = 15, pvd = 16 + 1, can_tx = 16 + 19, can_rx0 = 16 + 20,
                         timer_5 = 16 + TimerModel::interrupt_number;
 constexpr std::uint32_t apb1enr = 0x40023840, pwr_cr = 0x40007000;
-constexpr std::uint32_t return_of_call = 0xFFFFFF00;  // no code there: ends call()
+constexpr double longest_run_us = 20;  ///< peripherals are asked for interrupts so often
 constexpr std::uint32_t one_time_memory = 0x1FFF7800;
 
-void must(uc_err error, const char* what) {
-  if (error != UC_ERR_OK) throw std::runtime_error(fmt::format("{}: {}", what, uc_strerror(error)));
+constexpr std::uint32_t longest_slice = 200;  ///< instructions between an event and its interrupt
+
+template <class Words>
+std::vector<std::uint8_t> bytes_of(const Words& words) {
+  std::vector<std::uint8_t> bytes(words.size() * sizeof words[0]);
+  std::memcpy(bytes.data(), words.data(), bytes.size());
+  return bytes;
 }
 
 }  // namespace
@@ -34,68 +38,42 @@ void must(uc_err error, const char* what) {
 UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal)
     : symbols_(symbols_of(image)), random_(seed) {
   rcc.crystal = crystal;
-  must(uc_open(UC_ARCH_ARM, static_cast<uc_mode>(UC_MODE_THUMB | UC_MODE_MCLASS), &core_), "open");
-  must(uc_ctl_set_cpu_model(core_, UC_CPU_ARM_CORTEX_M4), "model");
   constexpr std::uint32_t stored = FlashControllerModel::memory,
                           stored_bytes = FlashControllerModel::sectors * FlashControllerModel::sector_bytes,
                           code = stored + stored_bytes;
-  must(uc_mem_map(core_, 0x08000000, stored - 0x08000000, UC_PROT_READ | UC_PROT_EXEC), "vectors");
-  must(uc_mem_map(core_, code, 0x08100000 - code, UC_PROT_READ | UC_PROT_EXEC), "flash");
-  must(uc_mmio_map(
-           core_, stored, stored_bytes,
-           [](uc_engine*, std::uint64_t at, unsigned size, void* self) -> std::uint64_t {
-             return static_cast<UnicornBoard*>(self)->flash.read_memory(static_cast<std::uint32_t>(at), size);
-           },
-           this,
-           [](uc_engine*, std::uint64_t at, unsigned size, std::uint64_t value, void* self) {
-             static_cast<UnicornBoard*>(self)->flash.write_memory(static_cast<std::uint32_t>(at), size,
-                                                                  static_cast<std::uint32_t>(value));
-           },
-           this),
-       "storage");
-  must(uc_mem_map(core_, 0x20000000, 0x20000, UC_PROT_READ | UC_PROT_WRITE), "RAM");
-  must(uc_mem_map(core_, ccm, ccm_size, UC_PROT_READ | UC_PROT_WRITE), "core-coupled RAM");
-  must(uc_mem_map(core_, 0x1FFF7000, 0x1000, UC_PROT_READ), "system memory");
-  const std::vector<std::uint8_t> erased(0x210, 0xFF);  // one-time programmable memory and its lock bytes
-  must(uc_mem_write(core_, one_time_memory, erased.data(), erased.size()), "system memory");
-  const std::uint16_t reference = 1'502;  // VREFINT_CAL: 1.21 V of 3.3 V (datasheet, internal reference voltage)
-  must(uc_mem_write(core_, 0x1FFF7A2A, &reference, 2), "system memory");
-  const auto map = [&]<std::uint32_t Base>(std::integral_constant<std::uint32_t, Base>, std::size_t size) {
-    must(uc_mmio_map(
-             core_, Base, size,
-             [](uc_engine*, std::uint64_t at, unsigned, void* self) -> std::uint64_t {
-               return static_cast<UnicornBoard*>(self)->peripheral_read(Base + static_cast<std::uint32_t>(at));
-             },
-             this,
-             [](uc_engine*, std::uint64_t at, unsigned bytes, std::uint64_t value, void* self) {
-               static_cast<UnicornBoard*>(self)->peripheral_write(Base + static_cast<std::uint32_t>(at),
-                                                                  static_cast<std::uint32_t>(value), bytes);
-             },
-             this),
-         "registers");
+  using enum UnicornCore::Access;
+  core_.map(0x08000000, stored - 0x08000000, read_and_execute);
+  core_.map(code, 0x08100000 - code, read_and_execute);
+  core_.map(0x20000000, 0x20000, read_and_write);
+  core_.map(ccm, ccm_size, read_and_write);
+  core_.map(0x1FFF7000, 0x1000, read);
+  core_.map_registers(stored, stored_bytes);
+  core_.map_registers(0x40000000, 0x30000);
+  core_.map_registers(0x50060000, 0x1000);  // random number generator
+  core_.map_registers(scs, 0x1000);
+  core_.on_read = [this](std::uint32_t address, unsigned size) { return core_read(address, size); };
+  core_.on_write = [this](std::uint32_t address, std::uint32_t value, unsigned size) {
+    core_write(address, value, size);
   };
-  map(std::integral_constant<std::uint32_t, 0x40000000>{}, 0x30000);
-  map(std::integral_constant<std::uint32_t, 0x50060000>{}, 0x1000);  // random number generator
-  map(std::integral_constant<std::uint32_t, scs>{}, 0x1000);
-  const std::vector<std::uint32_t> paint(ccm_size / 4, untouched);
-  must(uc_mem_write(core_, ccm, paint.data(), ccm_size), "paint");
+  core_.write(one_time_memory, std::vector<std::uint8_t>(0x210, 0xFF));  // and its lock bytes
+  constexpr std::uint16_t reference = 1'502;  // VREFINT_CAL: 1.21 V of 3.3 V (datasheet, internal reference voltage)
+  core_.write(0x1FFF7A2A, std::array<std::uint8_t, 2>{reference & 0xFF, reference >> 8});
+  core_.write(ccm, std::vector<std::uint8_t>(ccm_size, untouched & 0xFF));
   load(image);
-  find_it_blocks();
-  const std::uint64_t step = symbol_named(symbols_, "bms::firmware::estimator_step(").address & ~std::uint64_t{1};
-  uc_hook hook = 0;
-  const auto count =
-      +[](uc_engine*, std::uint64_t, std::uint32_t, void* self) { ++static_cast<UnicornBoard*>(self)->estimates; };
-  must(uc_hook_add(core_, &hook, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, step, step), "hook");
+  core_.find_instructions(symbols_);
+  core_.on_entry = [this] {
+    ++estimates;
+    core_.set_limit(core_.executed());
+  };
+  core_.watch_entry(address_of("bms::firmware::estimator_step("));
   start();
 }
 
 void UnicornBoard::start() {
   watchdog.reset(now_us(), (flash.option_bytes & 1U << 5) == 0);
-  std::array<std::uint32_t, 2> vectors{};
-  must(uc_mem_read(core_, 0x08000000, vectors.data(), sizeof vectors), "vectors");
-  set_reg(UC_ARM_REG_SP, vectors[0]);
+  set_reg(UC_ARM_REG_SP, core_.word(0x08000000));
   set_reg(UC_ARM_REG_LR, 0xFFFFFFFF);
-  set_reg(UC_ARM_REG_PC, vectors[1] | 1);
+  set_reg(UC_ARM_REG_PC, core_.word(0x08000004) | 1);
 }
 
 /// RM0090, 7.1.1: resets everything except the backup domain and the reset flags.
@@ -121,19 +99,13 @@ void UnicornBoard::start_again(std::uint32_t flags) {
 }
 
 void UnicornBoard::patch(const std::string& function, Instructions with) {
-  const std::uint32_t at = address_of(function);
-  Instructions before{};
-  must(uc_mem_read(core_, at, before.data(), sizeof before), "patch");
-  patched_.emplace_back(at, before);
-  must(uc_mem_write(core_, at, with.data(), sizeof with), "patch");
-  uc_ctl_remove_cache(core_, at, at + sizeof with);
+  const std::uint32_t at = address_of(function), before = core_.word(at);
+  patched_.push_back({at, {static_cast<std::uint16_t>(before & 0xFFFF), static_cast<std::uint16_t>(before >> 16)}});
+  core_.write(at, bytes_of(with));
 }
 
 void UnicornBoard::unpatch() {
-  for (const auto& [at, before] : patched_) {
-    must(uc_mem_write(core_, at, before.data(), sizeof before), "patch");
-    uc_ctl_remove_cache(core_, at, at + sizeof before);
-  }
+  for (const auto& [at, before] : patched_) core_.write(at, bytes_of(before));
   patched_.clear();
 }
 
@@ -143,64 +115,64 @@ std::uint32_t UnicornBoard::address_of(const std::string& function) const {
 
 void UnicornBoard::stick(std::uint32_t address, unsigned bit, bool at) {
   stuck_ = {address, bit, at};
-  uc_hook hook = 0;
-  const auto before_reading = +[](uc_engine* core, uc_mem_type, std::uint64_t, int, std::int64_t, void* self) {
-    const Stuck& s = static_cast<UnicornBoard*>(self)->stuck_;
-    std::uint8_t byte = 0;
-    uc_mem_read(core, s.address, &byte, 1);
-    byte = static_cast<std::uint8_t>(s.at ? byte | 1U << s.bit : byte & ~(1U << s.bit));
-    uc_mem_write(core, s.address, &byte, 1);
+  core_.before_word = [this] {
+    std::array<std::uint8_t, 1> byte{};
+    core_.read(stuck_.address, byte);
+    const unsigned mask = 1U << stuck_.bit;
+    byte[0] = static_cast<std::uint8_t>(stuck_.at ? byte[0] | mask : byte[0] & ~mask);
+    core_.write(stuck_.address, byte);
   };
-  must(uc_hook_add(core_, &hook, UC_HOOK_MEM_READ, reinterpret_cast<void*>(before_reading), this, address & ~3U,
-                   address | 3U),
-       "hook");
+  core_.watch_word(address);
 }
 
 void UnicornBoard::flip_bit(std::uint32_t address, unsigned bit) {
-  std::uint8_t byte = 0;
-  must(uc_mem_read(core_, address, &byte, 1), "memory");
-  byte = static_cast<std::uint8_t>(byte ^ 1U << bit);
-  must(uc_mem_write(core_, address, &byte, 1), "memory");
-  uc_ctl_remove_cache(core_, address & ~1U, (address & ~1U) + 2);
+  std::array<std::uint8_t, 1> byte{};
+  if (!core_.read(address, byte)) throw std::runtime_error(fmt::format("no memory at {:08x}", address));
+  byte[0] = static_cast<std::uint8_t>(byte[0] ^ 1U << bit);
+  core_.write(address, byte);
 }
 
 void UnicornBoard::write_one_time_memory(std::span<const std::uint8_t> bytes) {
   std::vector<std::uint8_t> content(bytes.size());
-  must(uc_mem_read(core_, one_time_memory, content.data(), content.size()), "one-time memory");
+  core_.read(one_time_memory, content);
   for (std::size_t k = 0; k < bytes.size(); ++k) content[k] &= bytes[k];
-  must(uc_mem_write(core_, one_time_memory, content.data(), content.size()), "one-time memory");
+  core_.write(one_time_memory, content);
 }
-
-UnicornBoard::~UnicornBoard() { uc_close(core_); }
 
 void UnicornBoard::load(const std::filesystem::path& image) {
   const std::string bytes = files::read_file(image);
+  const std::span<const std::uint8_t> all(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   Elf32_Ehdr head{};
   std::memcpy(&head, bytes.data(), sizeof head);
   for (unsigned k = 0; k < head.e_phnum; ++k) {
     Elf32_Phdr part{};
     std::memcpy(&part, bytes.data() + head.e_phoff + k * sizeof part, sizeof part);
-    if (part.p_type == PT_LOAD && part.p_filesz > 0)
-      must(uc_mem_write(core_, part.p_paddr, bytes.data() + part.p_offset, part.p_filesz), "load");
+    if (part.p_type != PT_LOAD || part.p_filesz == 0) continue;
+    if (!core_.write(part.p_paddr, all.subspan(part.p_offset, part.p_filesz)))
+      throw std::runtime_error(fmt::format("{}: no memory at {:08x}", image.string(), part.p_paddr));
   }
 }
-
-std::uint32_t UnicornBoard::reg(int id) const {
-  std::uint32_t value = 0;
-  must(uc_reg_read(core_, id, &value), "register");
-  return value;
-}
-void UnicornBoard::set_reg(int id, std::uint32_t value) { must(uc_reg_write(core_, id, &value), "register"); }
 
 std::uint32_t UnicornBoard::register_value(std::uint32_t address) const {
   const auto found = registers_.find(address);
   return found == registers_.end() ? 0 : found->second;
 }
 
-std::uint32_t UnicornBoard::word(std::uint32_t address) const {
-  std::uint32_t value = 0;
-  must(uc_mem_read(core_, address, &value, sizeof value), "memory");
+std::uint32_t UnicornBoard::core_read(std::uint32_t a, unsigned size) {
+  if (a < ccm) return flash.read_memory(a - FlashControllerModel::memory, size);
+  if (core_.in_blocks() && core_.executed() > passed_ + longest_slice) pass_instructions(core_.executed() - passed_);
+  const std::uint32_t value = peripheral_read(a);
+  if (stall_us > 0) core_.set_limit(core_.executed());
   return value;
+}
+
+/// What is written can request an interrupt. It comes after a random number of instructions.
+void UnicornBoard::core_write(std::uint32_t a, std::uint32_t value, unsigned size) {
+  if (core_.in_blocks() && !std::exchange(soon_ends_, true))
+    core_.set_limit(core_.executed() + random_() % longest_slice);
+  if (a < ccm) return flash.write_memory(a - FlashControllerModel::memory, size, value);
+  if (core_.in_blocks() && core_.executed() > passed_ + longest_slice) pass_instructions(core_.executed() - passed_);
+  peripheral_write(a, value, size);
 }
 
 std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
@@ -314,7 +286,7 @@ bool UnicornBoard::write_core_register(std::uint32_t at, std::uint32_t value, un
       return true;
     case 0xD0C:
       if ((value & 4) != 0) ended_ = "the firmware has reset the core";
-      if (!ended_.empty()) uc_emu_stop(core_);
+      if (!ended_.empty()) core_.stop();
       return true;
     default:
       return false;
@@ -410,7 +382,7 @@ void UnicornBoard::enter(std::uint32_t exception) {
     frame[24] = reg(UC_ARM_REG_FPSCR);
   }
   sp = (sp & ~4U) - static_cast<std::uint32_t>(4 * frame.size());
-  if (uc_mem_write(core_, sp, frame.data(), 4 * frame.size()) != UC_ERR_OK) {  // B1.5.6: this is a bus fault
+  if (!core_.write(sp, bytes_of(frame))) {  // B1.5.6: this is a bus fault
     if (!may_start_again) throw std::runtime_error("no stack for an interrupt");
     registers_[scs + 0xD28] |= 1U << 12;
     exception = 5;
@@ -420,9 +392,7 @@ void UnicornBoard::enter(std::uint32_t exception) {
   set_reg(UC_ARM_REG_LR, fpu ? return_to & ~16U : return_to);
   set_reg(UC_ARM_REG_CONTROL, control & ~4U);
   set_reg(UC_ARM_REG_XPSR, 1U << 24);  // outside an IT block
-  std::uint32_t handler = 0;
-  must(uc_mem_read(core_, 0x08000000 + 4 * exception, &handler, 4), "vector");
-  set_reg(UC_ARM_REG_PC, handler | 1);
+  set_reg(UC_ARM_REG_PC, core_.word(0x08000000 + 4 * exception) | 1);
   active_.push_back(exception);
   ++interrupts_taken;
 }
@@ -434,7 +404,7 @@ void UnicornBoard::leave(std::uint32_t exc_return) {
   const bool fpu = (exc_return & 16) == 0;
   std::vector<std::uint32_t> frame(fpu ? 26 : 8);
   const std::uint32_t sp = reg(UC_ARM_REG_SP);
-  must(uc_mem_read(core_, sp, frame.data(), 4 * frame.size()), "the stack of an interrupt");
+  for (std::size_t k = 0; k < frame.size(); ++k) frame[k] = core_.word(sp + static_cast<std::uint32_t>(4 * k));
   const std::array<int, 6> core{UC_ARM_REG_R0, UC_ARM_REG_R1,  UC_ARM_REG_R2,
                                 UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR};
   for (std::size_t k = 0; k < core.size(); ++k) set_reg(core[k], frame[k]);
@@ -464,54 +434,15 @@ bool UnicornBoard::take_fault(int error) {
   return true;
 }
 
-void UnicornBoard::find_it_blocks() {
-  std::map<std::uint32_t, bool> regions;  // from this address on: code, or data (AAELF32, mapping symbols)
-  for (const Symbol& s : symbols_) {
-    if (s.address < 0x08000000 || s.address >= 0x08100000) continue;
-    if (s.name.starts_with("$t") || s.name.starts_with("$d"))
-      regions[static_cast<std::uint32_t>(s.address)] = s.name[1] == 't';
+void UnicornBoard::ended(const UnicornCore::Run& run) {
+  instructions += run.instructions;
+  if ((run.pc & 0xFFFFFFE0) == 0xFFFFFFE0) return leave(run.pc | 1);
+  if (run.error != UC_ERR_OK && take_fault(run.error)) return;
+  if (run.error != UC_ERR_OK) {
+    throw std::runtime_error(
+        fmt::format("the firmware stops at {:08x}: {}", run.pc, uc_strerror(static_cast<uc_err>(run.error))));
   }
-  const auto half = [&](std::uint32_t at) {
-    std::uint16_t h = 0;
-    return uc_mem_read(core_, at, &h, 2) == UC_ERR_OK ? h : std::uint16_t{0};
-  };
-  const auto bytes = [&](std::uint32_t at) { return half(at) >= 0xE800 ? 4U : 2U; };
-  for (auto r = regions.begin(); r != regions.end() && std::next(r) != regions.end(); ++r) {
-    for (std::uint32_t at = r->first; r->second && at < std::next(r)->first; at += bytes(at)) {
-      const unsigned mask = half(at) & 15U;
-      if ((half(at) & 0xFF00) != 0xBF00 || mask == 0) continue;
-      std::uint32_t end = at + 2;
-      for (int left = 4 - std::countr_zero(mask); left > 0; --left) end += bytes(end);
-      it_blocks_[at + 2] = end;
-    }
-  }
-  if (it_blocks_.empty()) throw std::runtime_error("an image without mapping symbols");
-}
-
-/// If Unicorn 2.0.1 is stopped within an IT block, it finishes the block. If a translation block begins inside, it
-/// leaves the program counter within the IT block although EPSR.IT is that of its end, and the last instruction would
-/// run twice. A regular stop within an IT block has the state of the block.
-std::uint32_t UnicornBoard::behind_it_block(std::uint32_t pc) const {
-  if ((reg(UC_ARM_REG_XPSR) & 0x0600FC00) != 0) return pc;
-  const auto next = it_blocks_.upper_bound(pc);
-  return next != it_blocks_.begin() && pc < std::prev(next)->second ? std::prev(next)->second : pc;
-}
-
-void UnicornBoard::execute(std::uint32_t from, std::size_t count) {
-  const uc_err error = uc_emu_start(core_, from | 1, 0xFFFFFFFE, 0, count);
-  instructions += count;
-  std::uint32_t pc = reg(UC_ARM_REG_PC);
-  if (error == UC_ERR_OK) {
-    if (const std::uint32_t behind = behind_it_block(pc); behind != pc) set_reg(UC_ARM_REG_PC, (pc = behind) | 1);
-  }
-  if ((pc & 0xFFFFFFE0) == 0xFFFFFFE0) return leave(pc | 1);
-  if (pc >= return_of_call) return;
-  if (error != UC_ERR_OK && take_fault(error)) return;
-  if (error != UC_ERR_OK)
-    throw std::runtime_error(fmt::format("the firmware stops at {:08x}: {}", pc, uc_strerror(error)));
-  std::uint16_t last = 0;
-  must(uc_mem_read(core_, pc - 2, &last, 2), "code");
-  sleeping_ = last == 0xBF30;  // wfi
+  sleeping_ = !run.at_limit && core_.half_word(run.pc - 2) == 0xBF30;  // wfi
 }
 
 /// To the next bit or tick, whichever comes first; in fast runs over bits that change nothing.
@@ -528,12 +459,49 @@ std::uint64_t UnicornBoard::sleep_ticks() const {
   return std::min({to_tick, to_event, to_change, to_end});
 }
 
+void UnicornBoard::pass_instructions(std::uint64_t count) {
+  passed_ += count;
+  pass(static_cast<std::uint64_t>(static_cast<double>(count) * ticks_a_cycle()));
+}
+
+/// Instructions that end before the next event. An interrupt is then never late in the eyes of its program.
+std::uint64_t UnicornBoard::instructions_to_event() const {
+  constexpr double ticks_a_us = ticks_per_second / 1e6;
+  const std::uint64_t bit_ticks = ticks_per_second / can.bits_per_second;
+  const std::uint64_t to_bit = next_bit_ > ticks_ ? next_bit_ - ticks_ : 1;
+  const double lse_hz = rtc != nullptr ? rtc->lse_hz() : 0;
+  const double us = std::min(longest_run_us, timer.capture_after_us(rcc.lsi_hz_now(now_us()), lse_hz));
+  std::uint64_t ticks = std::min(static_cast<std::uint64_t>(us * ticks_a_us), to_bit + can.quiet_bits() * bit_ticks);
+  if (run_until_ticks_ > ticks_) ticks = std::min(ticks, run_until_ticks_ - ticks_);
+  if ((systick_csr_ & 1) != 0 && next_systick_ > ticks_) ticks = std::min(ticks, next_systick_ - ticks_);
+  return static_cast<std::uint64_t>(static_cast<double>(ticks - std::min<std::uint64_t>(ticks, 1)) / ticks_a_cycle());
+}
+
+std::uint64_t UnicornBoard::run_by_instructions() {
+  const std::uint64_t count = 1 + random_() % longest_slice;
+  ended(core_.run_instructions(reg(UC_ARM_REG_PC), count));
+  return count;
+}
+
+std::uint64_t UnicornBoard::run_by_blocks() {
+  const std::uint64_t limit = instructions_to_event();
+  passed_ = 0;
+  soon_ends_ = false;
+  const UnicornCore::Run run = core_.run_blocks(reg(UC_ARM_REG_PC), limit);
+  ended(run);
+  const std::uint64_t left = run.instructions - passed_;
+  const bool to_event = run.at_limit && !soon_ends_ && stall_us <= 0;
+  if (!to_event && run.instructions > 0) return left;
+  pass_instructions(left);
+  return run_by_instructions();
+}
+
 void UnicornBoard::slice() {
   if (sleeping_ || core_stopped() || (program_held && !handling())) {
     pass(sleep_ticks());
   } else {
-    const auto count = static_cast<std::size_t>(1 + random_() % 200);
-    execute(reg(UC_ARM_REG_PC), count);
+    const bool exactly = by_instructions || pending_exception() != 0;
+    const std::uint64_t count = exactly ? run_by_instructions() : run_by_blocks();
     const double waits_us = flash.take_stall_us() + std::exchange(stall_us, 0);
     pass(static_cast<std::uint64_t>(static_cast<double>(count) * ticks_a_cycle()) +
          static_cast<std::uint64_t>(waits_us * (ticks_per_second / 1e6)));
@@ -564,17 +532,10 @@ bool UnicornBoard::run_until(const std::function<bool()>& becomes, double within
 
 std::vector<std::uint32_t> UnicornBoard::call(const std::string& function, std::size_t words) {
   while (handling()) slice();
-  uc_context* context = nullptr;
-  must(uc_context_alloc(core_, &context), "context");
-  must(uc_context_save(core_, context), "context");
   const std::uint32_t result = ccm + 64;  // the lowest words of the stack
-  set_reg(UC_ARM_REG_R0, result);
-  set_reg(UC_ARM_REG_LR, return_of_call | 1);
-  uc_emu_start(core_, address_of(function) | 1, return_of_call, 0, 1'000'000);
+  core_.call(address_of(function), result);
   std::vector<std::uint32_t> returned(words);
-  must(uc_mem_read(core_, result, returned.data(), 4 * words), "result");
-  must(uc_context_restore(core_, context), "context");
-  uc_context_free(context);
+  for (std::size_t k = 0; k < words; ++k) returned[k] = core_.word(result + static_cast<std::uint32_t>(4 * k));
   return returned;
 }
 
@@ -602,11 +563,9 @@ void UnicornBoard::supply(bool low) {
 }
 
 std::uint32_t UnicornBoard::stack_used() const {
-  std::vector<std::uint32_t> words(ccm_size / 4);
-  must(uc_mem_read(core_, ccm, words.data(), ccm_size), "stack");
-  std::size_t free = 64;  // below: results of call()
-  while (free < words.size() && words[free] == untouched) ++free;
-  return static_cast<std::uint32_t>(ccm_size - 4 * free);
+  std::uint32_t free = 4 * 64;  // below: results of call()
+  while (free < ccm_size && core_.word(ccm + free) == untouched) free += 4;
+  return ccm_size - free;
 }
 
 }  // namespace bms::firmware

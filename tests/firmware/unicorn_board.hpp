@@ -1,9 +1,12 @@
-// Runs the firmware image of a board on this machine. Unicorn executes the instructions of the Cortex-M4F. This class
-// adds exception entry and return with the FPU frame (ARMv7-M, B1.5), faults, interrupt enables and priorities,
-// SysTick, sleep until an interrupt, reset, and models of the chip: clock tree (rcc_model.hpp), watchdog
-// (watchdog_model.hpp), timer 5 (timer_model.hpp), bxCAN (bxcan_model.hpp) and flash interface
+// Runs the firmware image of a board on this machine. Unicorn executes the instructions of the Cortex-M4F
+// (unicorn_core.hpp). This class adds exception entry and return with the FPU frame (ARMv7-M, B1.5), faults, interrupt
+// enables and priorities, SysTick, sleep until an interrupt, reset, and models of the chip: clock tree (rcc_model.hpp),
+// watchdog (watchdog_model.hpp), timer 5 (timer_model.hpp), bxCAN (bxcan_model.hpp) and flash interface
 // (flash_controller_model.hpp). Interrupts come between instructions, after a seeded random number of them; a more
 // urgent one interrupts the handler of another.
+//
+// The core runs by blocks to the next event, and by instructions behind it, up to the interrupt. An event is a tick of
+// SysTick, a capture of timer 5, a change of the bus, a write to a register, and the end of `longest_run_us`.
 //
 // Time: an instruction takes one core cycle of the clock that the registers give; sleep advances the time to the next
 // event; while flash is programmed or erased the core is stopped. A clock tree, watchdog or timer that is used in a way
@@ -28,16 +31,15 @@
 #include "tests/firmware/rcc_model.hpp"
 #include "tests/firmware/rtc_model.hpp"
 #include "tests/firmware/timer_model.hpp"
+#include "tests/firmware/unicorn_core.hpp"
 #include "tests/firmware/watchdog_model.hpp"
-
-struct uc_struct;
 
 namespace bms::firmware {
 
 class UnicornBoard {
  public:
   explicit UnicornBoard(const std::filesystem::path& image, std::uint32_t seed = 1, bool crystal = true);
-  ~UnicornBoard();
+  ~UnicornBoard() = default;
   UnicornBoard(const UnicornBoard&) = delete;
   UnicornBoard& operator=(const UnicornBoard&) = delete;
 
@@ -50,6 +52,9 @@ class UnicornBoard {
   /// For long runs: sleep is passed in steps of up to so many microseconds, which end at SysTick, at a capture of timer
   /// 5 and when the bus changes. Peripherals are asked for interrupts at their ends. 0: a step is a bit of the bus.
   double longest_sleep_us = 0;
+  /// Counts each instruction, and a part of a run that ends early as a whole one. Peripherals see the time at its
+  /// begin.
+  bool by_instructions = false;
 
   RccModel rcc;
   WatchdogModel watchdog{rcc};
@@ -66,7 +71,7 @@ class UnicornBoard {
   /// The exception whose handler runs, 0 for none.
   std::uint32_t exception() const { return active_.empty() ? 0 : active_.back(); }
   /// Reads a word of the memory.
-  std::uint32_t word(std::uint32_t address) const;
+  std::uint32_t word(std::uint32_t address) const { return core_.word(address); }
   /// Bytes of stack that were written at least once.
   std::uint32_t stack_used() const;
 
@@ -129,6 +134,12 @@ class UnicornBoard {
 
   void load(const std::filesystem::path& image);
   void slice();
+  std::uint64_t run_by_instructions();
+  std::uint64_t run_by_blocks();
+  void pass_instructions(std::uint64_t count);
+  std::uint64_t instructions_to_event() const;
+  std::uint32_t core_read(std::uint32_t address, unsigned size);
+  void core_write(std::uint32_t address, std::uint32_t value, unsigned size);
   void pass(std::uint64_t ticks);
   std::uint64_t sleep_ticks() const;
   void deliver_interrupt();
@@ -147,15 +158,12 @@ class UnicornBoard {
   bool core_stopped() const { return core_hz_ < 1; }
   double ticks_a_cycle() const { return core_stopped() ? 0 : ticks_per_second / core_hz_; }
   bool handling() const { return !active_.empty(); }
-  std::uint32_t reg(int id) const;
-  void set_reg(int id, std::uint32_t value);
-  void execute(std::uint32_t from, std::size_t count);
-  void find_it_blocks();
-  std::uint32_t behind_it_block(std::uint32_t pc) const;
+  std::uint32_t reg(int id) const { return core_.reg(id); }
+  void set_reg(int id, std::uint32_t value) { core_.set_reg(id, value); }
+  void ended(const UnicornCore::Run& run);
 
-  uc_struct* core_ = nullptr;
+  UnicornCore core_;
   std::vector<Symbol> symbols_;
-  std::map<std::uint32_t, std::uint32_t> it_blocks_;  ///< first instruction after the IT -> first one after the block
   std::vector<std::pair<std::uint32_t, Instructions>> patched_;
   std::mt19937 random_;
   bool sleeping_ = false, systick_pending_ = false, supply_low_ = false, supply_pending_ = false;
@@ -167,6 +175,8 @@ class UnicornBoard {
   std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0;
   double core_hz_ = 16e6;
   std::uint64_t run_until_ticks_ = 0;
+  std::uint64_t passed_ = 0;  ///< instructions of this run whose time has passed
+  bool soon_ends_ = false;    ///< this run has written to a register
   std::string ended_;
   struct Stuck {
     std::uint32_t address = 0;
