@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "measurement/recording.hpp"
 
 namespace bms::files {
 
@@ -28,6 +31,7 @@ struct ReadOptions {
   std::size_t cells_in_series = 0;  ///< divides a pack voltage; 0: unknown
   bool refuse_doubtful = false;     ///< an inverted current and impossible readings are errors, not warnings
   bool keep_all = false;            ///< columns without a meaning here are kept in Recording::others
+  std::map<std::string, measurement::Recording> in_memory;  ///< by path: used in place of such a file
 };
 
 }  // namespace bms::files

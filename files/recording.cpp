@@ -88,6 +88,11 @@ Recording parse_recording(const std::string& text, const std::string& path, Volt
 }
 
 Recording read_recording(const std::string& path, VoltageColumn voltage, const ReadOptions& options) {
+  if (const auto given = options.in_memory.find(path); given != options.in_memory.end()) {
+    Recording recording = given->second;
+    check(recording, options);
+    return recording;
+  }
   const auto begin = std::chrono::steady_clock::now();
   std::size_t bytes = 0;
   Recording recording;

@@ -28,13 +28,18 @@ bool is_voltage_of_the_cell(const Recording& r, std::size_t row) {
 
 }  // namespace
 
+Sample sample_of(double time_s, double current_a, double voltage_v, double temperature_c) {
+  return {static_cast<std::uint64_t>(std::llround(time_s * 1e6)), micro(current_a), micro(voltage_v),
+          centidegrees(temperature_c)};
+}
+
 std::vector<Sample> samples(const Recording& r) {
+  constexpr double missing = std::numeric_limits<double>::quiet_NaN();
   std::vector<Sample> out(r.rows());
   for (std::size_t k = 0; k < r.rows(); ++k) {
-    out[k].time_us = static_cast<std::uint64_t>(std::llround((r.time_s[k] - r.time_s.front()) * 1e6));
-    out[k].current_ua = micro(r.current_a[k]);
-    if (!r.voltage_v.empty() && is_voltage_of_the_cell(r, k)) out[k].voltage_uv = micro(r.voltage_v[k]);
-    if (!r.temperature_c.empty()) out[k].temperature_cdegc = centidegrees(r.temperature_c[k]);
+    const bool voltage = !r.voltage_v.empty() && is_voltage_of_the_cell(r, k);
+    out[k] = sample_of(r.time_s[k] - r.time_s.front(), r.current_a[k], voltage ? r.voltage_v[k] : missing,
+                       r.temperature_c.empty() ? missing : r.temperature_c[k]);
   }
   return out;
 }

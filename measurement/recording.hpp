@@ -60,4 +60,7 @@ Recording cell(const Recording& pack, std::size_t index);
 /// a reference source's is left out.
 std::vector<Sample> samples(const Recording& recording);
 
+/// One of these samples. time_s: since the first; a reading that is NaN is missing.
+Sample sample_of(double time_s, double current_a, double voltage_v, double temperature_c);
+
 }  // namespace bms::measurement

@@ -142,7 +142,7 @@ DiagnoseInput read_diagnose_input(const DiagnoseOptions& options) {
     return soc.empty() ? std::nullopt : std::optional(soc[std::min(n, soc.size() - 1)]);
   };
   DiagnoseInput input;
-  input.cell = files::read_cell(options.cell);
+  input.cell = options.cell_file ? *options.cell_file : files::read_cell(options.cell);
   for (const std::string& path : options.recordings)
     input.recordings.push_back(
         read(path, options.reading, given(input.recordings.size()), Priority::user_first, input));

@@ -23,10 +23,11 @@ RecordingComparison prepared(measurement::Recording recording, const std::string
                              const StartSoc& start);
 
 struct DiagnoseOptions {
-  files::ReadOptions reading;           ///< of all recordings
-  std::string cell;                     ///< cell file, or name of a built-in cell
-  std::vector<std::string> recordings;  ///< files, the earliest first
-  std::vector<std::string> holdouts;    ///< files of later recordings, for comparison only
+  files::ReadOptions reading;                ///< of all recordings
+  std::string cell;                          ///< cell file, or name of a built-in cell
+  std::optional<files::CellFile> cell_file;  ///< its content; not given: it is read
+  std::vector<std::string> recordings;       ///< files, the earliest first
+  std::vector<std::string> holdouts;         ///< files of later recordings, for comparison only
   std::vector<double> initial_soc;  ///< one for all or one for each recording; empty: the first value of soc_ref, else
                                     ///< estimated from the first voltage
 };

@@ -29,7 +29,8 @@ struct IdentifyOptions {
   std::vector<std::string> ocv;                      ///< files with slow charge and discharge; empty: OCV of `start`
   std::optional<identification::LinearKind> linear;  ///< not given: the nonlinear grey box
   identification::Method method = identification::Method::trust_region_reflective;
-  std::string start = "table9";  ///< cell file with the initial values, and with what is not identified
+  std::string start = "table9";               ///< cell file with the initial values, and with what is not identified
+  std::optional<files::CellFile> start_cell;  ///< its content; not given: it is read
   InitialSoc initial_soc;
   SocWindow window;                               ///< samples that count
   std::vector<std::string> validate;              ///< files that are only compared with

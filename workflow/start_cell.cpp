@@ -64,7 +64,7 @@ void take_ocv_from_rests(const IdentifyOptions& options, const std::vector<measu
 
 StartCell read_start(const IdentifyOptions& options) {
   StartCell start;
-  start.cell = files::read_cell(options.start);
+  start.cell = options.start_cell ? *options.start_cell : files::read_cell(options.start);
   start.capacity_ah = start.cell.parameters.capacity_ah;
   model::CellParameters<>& p = start.cell.parameters;
   p.reference_temperature_c = options.reference_temperature_c.value_or(p.reference_temperature_c);

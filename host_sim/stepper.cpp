@@ -1,0 +1,51 @@
+#include "host_sim/stepper.hpp"
+
+#include "host_sim/replay_run.hpp"
+#include "host_sim/simulation.hpp"
+
+namespace bms::host_sim {
+
+namespace {
+
+using Extended = model::ExtendedCell<float, model::max_intervals, model::ChosenLaws<float>>;
+
+template <class Estimator, class Cell>
+class SteppedEstimator final : public Stepper {
+ public:
+  SteppedEstimator(const Cell& cell, const std::optional<measurement::StartingPoint>& start)
+      : cell_(cell), estimator_(start ? Estimator(*start) : Estimator()) {}
+
+  EstimateRow step(const measurement::Sample& sample) override {
+    return replay_detail::row_of<float>(estimator_.step(cell_, sample));
+  }
+
+ private:
+  Cell cell_;
+  Estimator estimator_;
+};
+
+/// With as many states as the mechanisms of the cell have voltages.
+template <bool Errors, std::size_t Voltages = 0>
+std::unique_ptr<Stepper> extended(const Extended& cell, const std::optional<measurement::StartingPoint>& start) {
+  using Laws = model::ChosenLaws<float>;
+  if constexpr (Voltages < Laws::most_voltage_states) {
+    if (cell.laws.voltage_states() > Voltages) return extended<Errors, Voltages + 1>(cell, start);
+  }
+  using Estimator = estimator::SocEstimator<float, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>;
+  return std::make_unique<SteppedEstimator<Estimator, Extended>>(cell, start);
+}
+
+}  // namespace
+
+std::unique_ptr<Stepper> make_stepper(const files::CellFile& file,
+                                      const std::optional<measurement::StartingPoint>& start) {
+  const auto cell = model::prepare<float, model::max_intervals>(file.parameters);
+  const auto mechanisms = files::on_board(file.mechanisms);
+  const bool errors = file.parameters.noise.errors_are_states;
+  if (mechanisms.empty() && !errors)
+    return std::make_unique<SteppedEstimator<estimator::SocEstimator<float>, HostCell<float>>>(cell, start);
+  const Extended with_laws{cell, model::chosen<float>(mechanisms, file.parameters.capacity_ah)};
+  return errors ? extended<true>(with_laws, start) : extended<false>(with_laws, start);
+}
+
+}  // namespace bms::host_sim
