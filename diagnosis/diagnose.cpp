@@ -1,5 +1,6 @@
 #include "diagnosis/diagnose.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -49,6 +50,23 @@ std::vector<DetectionLimit> detection_limits(LikelihoodModel& likelihood, const 
     if (c.limit > 0) limits.push_back({c.mechanism, 0, c.limit});
   }
   return limits;
+}
+
+/// Strengths that a technician can judge, around the result.
+std::vector<ChangeEstimate> estimates_of(LikelihoodModel& likelihood, const NoiseModel& nominal,
+                                         const HypothesisFit& best, const Scope& scope) {
+  std::vector<std::size_t> over;
+  for (const std::size_t m : scope.searched) {
+    if (knowledge_of(m).report_limit) over.push_back(m);
+  }
+  likelihood.set_noise(nominal);
+  std::vector<ChangeEstimate> estimates;
+  const Screen screen(likelihood, best, over);
+  for (const Candidate& c : screen.candidates()) {
+    if (c.sigma > 0) estimates.push_back({c.mechanism, c.estimate, c.sigma});
+  }
+  std::sort(estimates.begin(), estimates.end(), [](const auto& a, const auto& b) { return a.mechanism < b.mechanism; });
+  return estimates;
 }
 
 /// file_error_v: RMSE of the cell file; tolerated_v: RMSE that its noise and the tolerance of its OCV explain.
@@ -185,6 +203,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   add_numbers(adequacy, search.nominal_noise(), d);
   add_location(likelihood, survivors.best, contributed, adequacy, d);
   add_extended_cell(likelihood, survivors.best, d);
+  d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);
   if (options.progress) options.progress(1, "done");
   return d;
 }

@@ -55,14 +55,16 @@ void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
   auto c = std::find_if(candidates_.begin(), candidates_.end(),
                         [&](const Candidate& other) { return other.mechanism == mechanism; });
   if (c == candidates_.end()) {
-    candidates_.push_back({mechanism, p.setting, {}, -std::numeric_limits<double>::infinity(), 0});
+    candidates_.push_back({mechanism, p.setting, {}, -std::numeric_limits<double>::infinity(), 0, 0, 0});
     best_.push_back(p);
     c = candidates_.end() - 1;
   }
-  const double limit = screening_limits.limit_sigma * sigma_of(p);
+  const double sigma = sigma_of(p), limit = screening_limits.limit_sigma * sigma;
   if (c->limit == 0 || limit < c->limit) c->limit = limit;
   if (gain <= c->gain || std::isnan(gain)) return;
   c->gain = gain;
+  c->estimate = found[0] + p.setting.value[p.parameters[0]];
+  c->sigma = sigma;
   c->start = knowledge_of(mechanism).start({p.setting, p.parameters, found, capacity_ah});
   best_[static_cast<std::size_t>(c - candidates_.begin())] = p;
 }
@@ -79,7 +81,7 @@ void Screen::judge_bursts(const LikelihoodModel& likelihood, const HypothesisFit
   likelihood.whiten(bursts.column);
   const ResidualProjection::Products one = projection.of(bursts.column);
   const double g = one.gram(0, 0), b = one.toward[0];
-  Candidate c{mechanism, {mechanism, {}, {}}, std::move(bursts.spans), 0, 0};
+  Candidate c{mechanism, {mechanism, {}, {}}, std::move(bursts.spans), 0, 0, 0, 0};
   if (g > 0 && b > 0) c.gain = b * b / g - thresholds.decision.per_burst * static_cast<double>(bursts.count);
   c.start.value[contact_resistance] = bursts.resistance_ohm;
   c.start.value[burst_share] = bursts.covered_s / std::max(likelihood.records().front().duration_s(), 1.0);

@@ -23,6 +23,7 @@ struct Candidate {
   std::vector<std::vector<model::Span>> bursts;  ///< by record; of a loose contact only
   double gain = 0;                               ///< less what its number of unknowns gains on noise
   double limit = 0;                              ///< of its first strength, in its unit; 0: not estimated
+  double estimate = 0, sigma = 0;                ///< of its first strength, to first order; sigma 0: not estimated
 };
 
 class Screen {

@@ -59,6 +59,14 @@ struct DetectionLimit {
   double value = 0;  ///< in the parameter's unit
 };
 
+/// Strength of a mechanism that was not found, in its parameter's unit. Faint changes of one recording become a trend
+/// over many.
+struct ChangeEstimate {
+  std::size_t mechanism = 0;
+  double value = 0;  ///< to first order around the result, base parameters marginalised; may lie beyond its bounds
+  double std = 0;    ///< includes the tolerance of the cell file; above 0
+};
+
 struct NotTestable {
   std::size_t mechanism = 0;
   std::string reason;
@@ -81,6 +89,7 @@ struct Diagnosis {
   double noise_floor_v = 0;
   double unexplained_rmse_v = 0, unexplained_share = 0;
   std::vector<DetectionLimit> limits;
+  std::vector<ChangeEstimate> estimates;  ///< of what a technician can judge
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;

@@ -93,6 +93,19 @@ Json limits_of(const diagnosis::Diagnosis& d) {
   return list;
 }
 
+Json estimates_of(const diagnosis::Diagnosis& d) {
+  Json list = Json::array();
+  for (const diagnosis::ChangeEstimate& e : d.estimates) {
+    const model::MechanismInfo& info = model::catalogue[e.mechanism];
+    list.push_back({{"id", info.id},
+                    {"parameter", info.parameter[0].name},
+                    {"value", number(e.value)},
+                    {"std", number(e.std)},
+                    {"unit", info.parameter[0].unit}});
+  }
+  return list;
+}
+
 Json experiment_of(const diagnosis::NextExperiment& next) {
   return {{"profile", next.profile},
           {"separates", ids_of(next.separates)},
@@ -132,6 +145,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["noise_floor_v"] = number(d.noise_floor_v);
   json["unexplained"] = {{"rmse_v", number(d.unexplained_rmse_v)}, {"share", number(d.unexplained_share)}};
   json["detection_limits"] = limits_of(d);
+  json["estimates"] = estimates_of(d);
   json["not_testable"] = Json::array();
   for (const diagnosis::NotTestable& n : d.not_testable)
     json["not_testable"].push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});
