@@ -24,8 +24,8 @@ using namespace bms::tool;
 std::vector<std::unique_ptr<Command>> all_commands() {
   std::vector<std::unique_ptr<Command>> commands;
   for (const auto make : {import_command, replay_command, simulate_command, experiment_command, identify_command,
-                          cell_command, diagnose_command, study_command, proof_command, hil_command, flash_command,
-                          monitor_command, log_command, service_command})
+                          cell_command, diagnose_command, fleet_command, study_command, proof_command, hil_command,
+                          flash_command, monitor_command, log_command, service_command})
     commands.push_back(make());
   return commands;
 }
