@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "files/text_file.hpp"
 #include "tests/end_to_end/run_tool.hpp"
 
 namespace bms {
@@ -126,6 +127,42 @@ TEST_F(Package, AMissingToolIsNamed) {
   run("! cmake -G Ninja -S " + consumer_.string() + " -B " + build_.string() +
       " -DGREYBOX_BY=subdirectory -DGREYBOX_SOURCE=" BMS_SOURCE_DIR " -DGREYBOX_BMS=");
   EXPECT_THAT(content(folder_.path() / "out"), HasSubstr("the tool bms is missing"));
+}
+
+TEST_F(Package, SingleHeaderHasTheSameEstimates) {
+  configure_and_build("-DGREYBOX_BY=subdirectory");
+  const std::string f = folder_.path().string();
+  std::filesystem::create_directories(folder_.path() / "single/greybox");
+  run("/usr/bin/python3 " BMS_SOURCE_DIR "/library/amalgamate.py " + f + "/single/greybox_single.hpp");
+  run("echo '#include \"greybox_single.hpp\"' >" + f + "/single/greybox/estimator.hpp");
+  run(BMS_TOOL " cell header " + f + "/consumer/my_cell.toml --include '\"greybox_single.hpp\"' -o " + f +
+      "/single/my_cell.hpp");
+  run("g++ -std=c++20 -O1 -ffp-contract=off -Wall -Wextra -Werror -I " + f +
+      "/single " BMS_SOURCE_DIR "/library/examples/estimator.cpp -o " + f + "/build/single");
+  EXPECT_EQ(output_of("single"), output_of("in_cpp"));
+  const std::string single = content(f + "/single/greybox_single.hpp");
+  EXPECT_NE(single.find("MIT"), std::string::npos);
+  EXPECT_EQ(single.find("\n#include \""), std::string::npos);
+  EXPECT_EQ(single.find(BMS_SOURCE_DIR), std::string::npos);
+}
+
+TEST_F(Package, SingleHeaderCompilesForACortexM0) {
+  const std::string f = folder_.path().string();
+  run("/usr/bin/python3 " BMS_SOURCE_DIR "/library/amalgamate.py " + f + "/greybox_single.hpp");
+  run(BMS_TOOL " cell header table9 --fixed --include '\"greybox_single.hpp\"' -o " + f + "/my_cell.hpp");
+  files::write_file(f + "/m0.cpp",
+                    "#include \"my_cell.hpp\"\n"
+                    "greybox::Estimator<greybox::FixedPoint, bms::generated::Model> e;\n"
+                    "bool step(const greybox::Sample& s) {\n"
+                    "  return e.step(bms::generated::cell<greybox::FixedPoint>, s).flags == 0;\n}\n");
+  run("arm-none-eabi-g++ -mcpu=cortex-m0 -mthumb -std=c++20 -Os -fno-exceptions -fno-rtti -c " + f + "/m0.cpp -o " + f +
+      "/m0.o && arm-none-eabi-nm " + f + "/m0.o");
+  EXPECT_THAT(content(folder_.path() / "out"), Not(HasSubstr("__aeabi_d")));
+}
+
+TEST_F(Package, FootprintIsThatOfTheReadme) {
+  run("/usr/bin/python3 " BMS_SOURCE_DIR "/library/footprint.py " BMS_TOOL " " BMS_BUILD_DIR
+      "/library/include --check");
 }
 
 TEST(CellHeader, IsThatOfTheBuildExceptForItsInclude) {
