@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <regex>
 #include <stdexcept>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -19,10 +20,35 @@ namespace bms::images {
 
 namespace {
 
-/// The source tree: BMS_ROOT, or the folder from which the tool was built.
+/// Where the tool is installed; empty if it runs from its build folder.
+std::filesystem::path installed() {
+  std::error_code failed;
+  const auto prefix = std::filesystem::read_symlink("/proc/self/exe", failed).parent_path().parent_path();
+  return !failed && std::filesystem::exists(prefix / "share/greybox/source/CMakeLists.txt") ? prefix
+                                                                                            : std::filesystem::path();
+}
+
+/// The source tree: BMS_ROOT, or what is installed with the tool, or the folder from which the tool was built.
 std::filesystem::path source_tree() {
-  const char* root = std::getenv("BMS_ROOT");
-  return root != nullptr ? root : BMS_SOURCE_DIR;
+  if (const char* root = std::getenv("BMS_ROOT"); root != nullptr) return root;
+  const auto prefix = installed();
+  return prefix.empty() ? std::filesystem::path(BMS_SOURCE_DIR) : prefix / "share/greybox/source";
+}
+
+/// Images of an installed tool are built in the user's cache.
+std::filesystem::path build_folder() {
+  if (std::getenv("BMS_ROOT") != nullptr || installed().empty()) return source_tree() / "build" / "firmware";
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache == '/')
+    return std::filesystem::path(cache) / "greybox-bms";
+  const char* home = std::getenv("HOME");
+  if (home == nullptr || *home != '/')
+    throw files::BadInput("HOME", 1, "no folder for firmware images, expected HOME or XDG_CACHE_HOME");
+  return std::filesystem::path(home) / ".cache" / "greybox-bms";
+}
+
+std::string cell_header_tool() {
+  const auto prefix = installed();
+  return prefix.empty() ? BMS_CELL_HEADER_TOOL : (prefix / "libexec/greybox/cell_header").string();
 }
 
 std::filesystem::path board_file(const std::string& board) {
@@ -104,7 +130,7 @@ struct Variant {
 /// A locked build folder of images.
 class BuildFolder {
  public:
-  explicit BuildFolder(const std::string& name) : path_(source_tree() / "build" / "firmware" / name), lock_(path_) {}
+  explicit BuildFolder(const std::string& name) : path_(build_folder() / name), lock_(path_) {}
 
   bool is_new() const { return !std::filesystem::exists(path_ / "build.ninja"); }
   const std::filesystem::path& path() const { return path_; }
@@ -121,7 +147,7 @@ class BuildFolder {
                                           "-DBMS_VEHICLE_PROFILE=" + variant.vehicle_profile,
                                           "--toolchain",
                                           (source_tree() / "cmake" / "toolchain-arm-none-eabi.cmake").string(),
-                                          "-DBMS_CELL_HEADER_TOOL=" BMS_CELL_HEADER_TOOL};
+                                          "-DBMS_CELL_HEADER_TOOL=" + cell_header_tool()};
     if (variant.cells != 0) configure.push_back(fmt::format("-DBMS_CELLS={}", variant.cells));
     configure.insert(configure.end(), options.begin(), options.end());
     run_step(configure, log());
