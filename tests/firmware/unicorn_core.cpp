@@ -1,5 +1,6 @@
 #include "tests/firmware/unicorn_core.hpp"
 
+#include <dlfcn.h>
 #include <unicorn/unicorn.h>
 
 #include <bit>
@@ -30,6 +31,12 @@ constexpr std::array core_registers{
     UC_ARM_REG_R7,      UC_ARM_REG_R8,      UC_ARM_REG_R9,      UC_ARM_REG_R10,       UC_ARM_REG_R11,   UC_ARM_REG_R12,
     UC_ARM_REG_SP,      UC_ARM_REG_LR,      UC_ARM_REG_PC,      UC_ARM_REG_XPSR};
 constexpr int double_registers = 16;
+
+unsigned version() {
+  static const unsigned loaded = uc_version(nullptr, nullptr) >> 8;
+  return loaded;
+}
+constexpr unsigned with_useless_locks = 0x020001;
 
 }  // namespace
 
@@ -272,3 +279,19 @@ void UnicornCore::call(std::uint32_t function, std::uint32_t result) {
 }
 
 }  // namespace bms::firmware
+
+// Unicorn 2.0.1 locks the pages of translated code at each store to memory, although it runs in one thread: a tree on
+// the heap for each store, which costs twice as much as the rest of it. These two functions are found before those of
+// the library and do nothing. With another version they call the library's own.
+
+extern "C" void* page_collection_lock_arm(void* core, std::uintptr_t begin, std::uintptr_t end) {
+  using Lock = void* (*)(void*, std::uintptr_t, std::uintptr_t);
+  static const auto own = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "page_collection_lock_arm"));
+  return bms::firmware::version() == bms::firmware::with_useless_locks ? nullptr : own(core, begin, end);
+}
+
+extern "C" void page_collection_unlock_arm(void* pages) {
+  using Unlock = void (*)(void*);
+  static const auto own = reinterpret_cast<Unlock>(dlsym(RTLD_NEXT, "page_collection_unlock_arm"));
+  if (bms::firmware::version() != bms::firmware::with_useless_locks) own(pages);
+}
