@@ -98,13 +98,21 @@ bool Cases::known(const std::string& name) {
   Outcome outcome;
   outcome.name = name;
   read_report(files::read_file(file_of(name)), outcome);
-  if (outcome.good) outcomes_.push_back(outcome);
-  return outcome.good;
+  if (!outcome.good && !only_kept) return false;
+  outcomes_.push_back(outcome);
+  return true;
+}
+
+bool Cases::over() const {
+  const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begun_;
+  return only_kept || (largest > 0 && run_ >= largest) || (most_minutes > 0 && passed.count() > 60 * most_minutes);
 }
 
 void Cases::start(const std::string& name, const std::function<void(Outcome&)>& body) {
-  if (known(name) || only_kept) return;
+  const bool of_another_part = seen_++ < first;
+  if (known(name) || of_another_part || over()) return;
   wait_for(at_once_ - 1);
+  ++run_;
   int ends[2];
   if (pipe(ends) != 0) throw std::runtime_error("no pipe");
   std::fflush(nullptr);

@@ -252,8 +252,7 @@ Result run_contact_failures(const Extent& extent) {
   std::vector<Failure> failures = contactor_failures();
   for (Failure& failure : other_failures()) failures.push_back(std::move(failure));
   Cases cases(extent.at_once);
-  cases.kept = extent.kept("contacts", pack);
-  cases.only_kept = extent.only_kept;
+  extent.set(cases, "contacts", pack);
   for (const Failure& failure : failures) {
     if (!extent.has(failure.name)) continue;
     WorldSetup setup = typical_setup(pack, extent.seed);

@@ -343,15 +343,14 @@ Result run_fault_matrix(const Extent& extent) {
   const std::vector<Cause> causes = other_causes();
   const std::vector<Background> background = backgrounds();
   Cases cases(extent.at_once);
-  cases.kept = extent.kept("faults", pack);
-  cases.only_kept = extent.only_kept;
+  extent.set(cases, "faults", pack);
   std::vector<Outcome> broken;
   plant::Random random(extent.seed);
   for (const Operating state :
        {Operating::off, Operating::standby, Operating::drive, Operating::recuperate, Operating::charge}) {
     const std::vector<Case> list = cases_in(state, rows, causes, background);
     const auto named = [&](const Case& c) { return fmt::format("{}: {}", name_of(state), c.name); };
-    if (extent.only_kept || std::none_of(list.begin(), list.end(), [&](const Case& c) { return extent.has(named(c)); }))
+    if (cases.over() || std::none_of(list.begin(), list.end(), [&](const Case& c) { return extent.has(named(c)); }))
       continue;
     TruckWorld world(pack.image, typical_setup(pack, extent.seed));
     if (const std::string problem = bring_to(world, pack, state); !problem.empty()) {
@@ -371,7 +370,8 @@ Result run_fault_matrix(const Extent& extent) {
       cases.start(name, [&](Outcome& outcome) { FaultCase(world, rows, pack, c, outcome).run(); });
     }
   }
-  Result result{"fault matrix", "", extent.only_kept ? cases.all_kept() : cases.finish()};
+  Result result{"fault matrix", "", cases.finish()};
+  if (!cases.kept.empty()) result.outcomes = cases.all_kept();
   result.table = table_of(rows, result.outcomes);
   result.outcomes.insert(result.outcomes.end(), broken.begin(), broken.end());
   return result;

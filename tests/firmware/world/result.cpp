@@ -23,10 +23,15 @@ bool Extent::has(const std::string& name) const {
   return only.empty();
 }
 
-std::filesystem::path Extent::kept(const std::string& scenario, const Pack& pack) const {
-  if (!continues) return {};
+void Extent::set(Cases& cases, const std::string& scenario, const Pack& pack) const {
+  cases.only_kept = only_kept;
+  cases.first = from;
+  cases.largest = most;
+  cases.most_minutes = within_minutes;
+  if (!continues && !only_kept) return;
   const std::size_t image = std::hash<std::string>{}(files::read_file(pack.image));
-  return std::filesystem::path(BMS_SOURCE_DIR "/build/world") / fmt::format("{}_{:016x}_{}", scenario, image, seed);
+  cases.kept =
+      std::filesystem::path(BMS_SOURCE_DIR "/build/world") / fmt::format("{}_{:016x}_{}", scenario, image, seed);
 }
 
 }  // namespace bms::world

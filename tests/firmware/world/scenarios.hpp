@@ -24,10 +24,13 @@ struct Extent {
   std::string only;     ///< cases whose name contains one of these texts, separated by |; empty: all
   double minutes = 10;  ///< of the shift
   unsigned at_once = 2;
-  bool continues = false;  ///< good outcomes of an earlier run with the same image and seed count
-  bool only_kept = false;  ///< runs nothing: the table of the outcomes that are known
-  /// Folder for the outcomes of a scenario, or empty.
-  std::filesystem::path kept(const std::string& scenario, const Pack& pack) const;
+  bool continues = false;     ///< good outcomes of an earlier run with the same image and seed count
+  bool only_kept = false;     ///< runs nothing: the table of the outcomes that are known
+  std::size_t from = 0;       ///< leaves so many cases to other parts
+  std::size_t most = 0;       ///< runs at most so many cases; 0: any number
+  double within_minutes = 0;  ///< starts no case later; 0: at any time
+  /// Gives the cases of a scenario their folder and their part.
+  void set(Cases& cases, const std::string& scenario, const Pack& pack) const;
   bool has(const std::string& name) const;  ///< `only` selects the case
 };
 

@@ -110,6 +110,7 @@ Result run_shift(const Extent& extent) {
   Cases cases(extent.at_once);
   const std::size_t trucks = extent.count == 0 ? extent.at_once : extent.count;
   const double minutes = extent.minutes / static_cast<double>(trucks);
+  extent.set(cases, fmt::format("shift_{:.0f}s", 60 * minutes), pack);
   for (std::size_t k = 0; k < trucks; ++k) {
     const std::uint64_t seed = extent.seed + k;
     cases.start(fmt::format("truck {}", seed),
@@ -130,7 +131,7 @@ Result run_shift(const Extent& extent) {
       "state "
       "of charge at the end |\n"
       "|---|---|---|---|---|---|---|\n| {} | {:.0f} | {:.0f} | {:.1f} to {:.1f} | {:.0f} | {} | {:.1f} % |\n",
-      trucks, done, samples, shortest, longest, starts, result.failed(), soc_error);
+      result.outcomes.size(), done, samples, shortest, longest, starts, result.failed(), soc_error);
   return result;
 }
 

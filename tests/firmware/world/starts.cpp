@@ -101,6 +101,7 @@ class Start {
 Result run_starts(const Extent& extent) {
   const Pack pack = pack_of(truck_ah);
   Cases cases(extent.at_once);
+  extent.set(cases, "starts", pack);
   const std::size_t count = extent.count == 0 ? 50 : extent.count;
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint64_t seed = extent.seed + k;
@@ -125,7 +126,7 @@ Result run_starts(const Extent& extent) {
   }
   result.table += fmt::format(
       "\n{} worlds, {} complete the whole sequence. Largest current at the closing of a main contact: {:.0f} A.\n",
-      count, count - result.failed(), inrush_a);
+      result.outcomes.size(), result.outcomes.size() - result.failed(), inrush_a);
   for (const auto& [violation, worlds] : violations) {
     result.table += fmt::format("\nAgainst the manual, in {} worlds: {}.\n", worlds, violation);
     result.outcomes.emplace_back().name = "violations of a manual";

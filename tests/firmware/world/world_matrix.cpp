@@ -7,7 +7,10 @@
 //   --minutes N      duration of the shift
 //   --jobs N         cases at a time
 //   --continue       takes the good outcomes of earlier runs with this option, of the same image and seed
-//   --known          with --continue: runs nothing, the table of the known outcomes
+//   --from N         leaves the first N cases to other parts
+//   --most N         runs at most N cases
+//   --within N       starts no case after N minutes
+//   --known          runs nothing, the table of the outcomes of earlier runs with --continue
 //   --write          writes the tables to tests/firmware/world/README.md
 //
 // Exit code 1 if a case failed.
@@ -53,6 +56,12 @@ Options read_options(const std::vector<std::string>& words) {
       options.extent.continues = true;
     } else if (words[k] == "--known") {
       options.extent.only_kept = true;
+    } else if (words[k] == "--from") {
+      options.extent.from = std::stoul(value());
+    } else if (words[k] == "--most") {
+      options.extent.most = std::stoul(value());
+    } else if (words[k] == "--within") {
+      options.extent.within_minutes = std::stod(value());
     } else if (words[k] == "--count") {
       options.extent.count = std::stoul(value());
     } else if (words[k] == "--seed") {
