@@ -9,8 +9,10 @@
 
 #include "files/bad_input.hpp"
 #include "files/cell_fields.hpp"
+#include "files/healthy_table.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
+#include "files/toml_text.hpp"
 #include "model/possible_cell.hpp"
 
 namespace bms::files {
@@ -144,23 +146,7 @@ class Writer {
     if (values.size > 0) column(key, values);
   }
 
-  static std::string quoted(const std::string& text) {
-    std::string out = "\"";
-    for (const char c : text) {
-      if (c == '"' || c == '\\') out += '\\';
-      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-    return out + "\"";
-  }
-
  private:
-  /// The shortest digits that give back the same double; a float in TOML needs a point or an exponent.
-  static std::string literal(double value) {
-    std::string text = fmt::format("{}", value);
-    if (text.find_first_of(".en") == std::string::npos) text += ".0";
-    return text;
-  }
-
   std::string& text_;
   const std::map<std::string, std::string>& sources_;
 };
@@ -168,8 +154,8 @@ class Writer {
 }  // namespace
 
 std::string cell_text(const CellFile& file) {
-  std::string text = fmt::format("name = {}\nchemistry = {}\nsource = {}\n", Writer::quoted(file.name),
-                                 Writer::quoted(file.chemistry), Writer::quoted(file.source));
+  std::string text = fmt::format("name = {}\nchemistry = {}\nsource = {}\n", quoted(file.name), quoted(file.chemistry),
+                                 quoted(file.source));
   Writer writer(text, file.sources);
   visit_cell(writer, file.parameters);
   for (const TemperatureTable& at : file.at_temperature) {
@@ -182,14 +168,15 @@ std::string cell_text(const CellFile& file) {
     const std::string name = table_of(info);
     text += fmt::format("\n[{}]\n", name);
     if (const auto source = file.sources.find(name); source != file.sources.end())
-      text += fmt::format("source = {}\n", Writer::quoted(source->second));
+      text += fmt::format("source = {}\n", quoted(source->second));
     for (std::size_t k = 0; k < info.parameters; ++k) {
       const std::string key(info.parameter[k].name);
       writer.number(key, setting.value[k]);
       writer.optional_number(key + "_std", setting.deviation[k]);
     }
   }
-  return text;
+  const auto source = file.sources.find("healthy");
+  return text + healthy_text(file.healthy, source == file.sources.end() ? "" : source->second);
 }
 
 std::string table_of(const model::MechanismInfo& mechanism) {
@@ -318,6 +305,11 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   reader.finish();
   for (TomlTable& table : top.tables("at_temperature"))
     file.at_temperature.push_back(read_temperature_table(table, file));
+  if (top.has("healthy")) {
+    TomlTable healthy = top.table("healthy");
+    file.sources["healthy"] = healthy.text("source");
+    file.healthy = read_healthy(healthy);
+  }
   for (const char* kind : {"mechanism", "instrument"}) top.has(kind);  // known; read once the capacity is checked
   top.finish();
 

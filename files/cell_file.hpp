@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "measurement/healthy_data.hpp"
 #include "model/cell_parameters.hpp"
 #include "model/extended.hpp"
 
@@ -29,7 +30,8 @@ struct CellFile {
   model::CellParameters<> parameters;
   std::vector<TemperatureTable> at_temperature;  ///< ascending by temperature; empty: unknown
   std::vector<model::MechanismSetting>
-      mechanisms;  ///< effects that the 1RC model does not contain; ascending index, each once
+      mechanisms;                    ///< effects that the 1RC model does not contain; ascending index, each once
+  measurement::HealthyData healthy;  ///< what healthy recordings of the cell leave unexplained; empty: unknown
 };
 
 /// Name of the table of a mechanism: "mechanism.ID" or "instrument.ID".

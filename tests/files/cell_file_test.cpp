@@ -364,5 +364,69 @@ TEST(CellFile, AMissingFileIsRejectedWithTheNamesOfTheBuiltInCells) {
   EXPECT_THROW(read_cell("/tmp"), BadInput);
 }
 
+constexpr const char* healthy = R"(
+[healthy]
+source = "two blocks of drive.csv"
+
+[[healthy.block]]
+recording = "drive.csv"
+start_s = 0.0
+duration_s = 1800.5
+error_v = 0.004
+soc = [0.4, 0.7]
+current_a = [-5.0, 2.0]
+causes = ["voltage_gain", "unknown"]
+gains = [123.4, 5.0]
+
+[[healthy.block]]
+recording = "drive.csv"
+start_s = 1800.5
+duration_s = 1800.0
+error_v = 0.003
+soc = [0.3, 0.4]
+current_a = [-5.0, 2.0]
+temperature_c = [21.0, 24.5]
+causes = []
+gains = []
+
+[[healthy.regime]]
+axis = "soc"
+from = 0.3
+to = 0.4
+hours = 0.5
+bias_v = -0.001
+rms_v = 0.003
+spread_v = 0.0005
+)";
+
+TEST(CellFile, HealthyDataAreReadAndWrittenAgain) {
+  const CellFile cell = parse_cell(table9_text() + healthy, "x");
+  ASSERT_EQ(cell.healthy.blocks.size(), 2U);
+  EXPECT_NEAR(cell.healthy.hours(), 1.0001, 0.0001);
+  EXPECT_EQ(cell.healthy.recordings(), 1U);
+  EXPECT_EQ(cell.healthy.blocks[0].gains[0].cause, "voltage_gain");
+  EXPECT_EQ(cell.healthy.blocks[0].gains[0].gain, 123.4);
+  EXPECT_FALSE(cell.healthy.blocks[0].temperature_c.known());
+  EXPECT_EQ(cell.healthy.blocks[1].temperature_c.high, 24.5);
+  EXPECT_TRUE(cell.healthy.blocks[1].gains.empty());
+  EXPECT_EQ(cell.healthy.regimes.at(0).bias_v, -0.001);
+  const std::string text = cell_text(cell);
+  EXPECT_EQ(text.substr(text.find("\n[healthy]")), healthy);
+  EXPECT_THAT(cell_text(parse_cell(table9_text(), "x")), Not(HasSubstr("healthy")));
+}
+
+TEST(CellFile, BadHealthyDataAreRejected) {
+  const auto with = [&](const std::string& what, const std::string& by) {
+    return cell_refusal(table9_text() + replaced(healthy, what, by));
+  };
+  EXPECT_THAT(with("gains = [123.4, 5.0]", "gains = [123.4]"), HasSubstr("expected 2 numbers"));
+  EXPECT_THAT(with("123.4", "-1.0"), HasSubstr("numbers of 0 or more"));
+  EXPECT_THAT(with("soc = [0.4, 0.7]", "soc = [0.7, 0.4]"), HasSubstr("the smallest and the largest value"));
+  EXPECT_THAT(with("duration_s = 1800.5", "duration_s = 0.0"), HasSubstr("more than 0 s"));
+  EXPECT_THAT(with("error_v = 0.004", "eror_v = 0.004"), HasSubstr("error_v"));
+  EXPECT_THAT(with("to = 0.4", "to = 0.2"), HasSubstr("more than 'from'"));
+  EXPECT_THAT(with("[[healthy.regime]]", "[[healthy.regimes]]"), HasSubstr("unknown key 'healthy.regimes'"));
+}
+
 }  // namespace
 }  // namespace bms::files
