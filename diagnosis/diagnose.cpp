@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "diagnosis/adequacy.hpp"
+#include "diagnosis/block_covariance.hpp"
 #include "diagnosis/findings.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/screen.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"
+#include "diagnosis/withhold.hpp"
 
 namespace bms::diagnosis {
 
@@ -69,22 +72,50 @@ std::vector<ChangeEstimate> estimates_of(LikelihoodModel& likelihood, const Nois
   return estimates;
 }
 
-/// file_error_v: RMSE of the cell file; tolerated_v: RMSE that its noise and the tolerance of its OCV explain.
-Verdict verdict_of(const Adequacy& adequacy, const std::vector<Finding>& findings, const Contributions& contributed,
-                   double file_error_v, double tolerated_v) {
-  if (adequacy.unknown) return Verdict::unknown;
-  // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
-  if (!adequacy.found && file_error_v > thresholds.decision.gross_v) return Verdict::unknown;
-  if (!adequacy.found) return Verdict::no_mismatch;
-  if (contributed.explained_where_it_acts < thresholds.decision.cause_explains &&
-      contributed.remaining_rmse_v > tolerated_v)
-    return Verdict::unknown;
-  if (findings.size() > 1) return Verdict::causes;
-  return findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
+/// Gain of an unknown cause if no mechanism is named.
+double unknown_gain_of(LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& control) {
+  const NoiseModel own = likelihood.noise();
+  likelihood.set_noise(nominal);
+  const HypothesisFit fit = likelihood.fit(control.hypothesis, control.calibration, numerics.fit.nominal_iterations);
+  const double gain = unknown_gain(test_residual(likelihood, fit));
+  likelihood.set_noise(own);
+  return gain;
 }
 
 double noise_floor_v(const NoiseModel& noise) {
   return std::sqrt(noise.white_v * noise.white_v + noise.fast_v * noise.fast_v + noise.slow_v * noise.slow_v);
+}
+
+/// RMS errors of a cell file [V].
+struct Errors {
+  double file_v = 0;       ///< on the recordings
+  double tolerated_v = 0;  ///< that noise, the tolerance of the OCV and healthy recordings explain
+  double gross_v = 0;      ///< above it the file does not describe the cell, whatever its tolerance says
+};
+
+Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const measurement::HealthyData& healthy) {
+  double largest_v = 0;
+  for (const measurement::HealthyBlock& b : healthy.blocks) largest_v = std::max(largest_v, b.error_v);
+  const double healthy_v = thresholds.healthy.gross_times * largest_v,
+               tolerated_v = std::hypot(noise_floor_v(search.nominal_noise()), likelihood.cell().tolerance.ocv_v);
+  return {plain_error_v(likelihood, likelihood.base()), std::max(tolerated_v, healthy_v),
+          std::max(thresholds.decision.gross_v, healthy_v)};
+}
+
+Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contributions& contributed,
+                   const Errors& errors) {
+  const std::vector<Finding>& findings = d.findings;
+  if (adequacy.unknown) return Verdict::unknown;
+  // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
+  const bool covered =
+      std::none_of(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) { return w.not_covered; });
+  if (!adequacy.found && covered && errors.file_v > errors.gross_v) return Verdict::unknown;
+  if (!adequacy.found) return more_healthy_data_would_decide(d) ? Verdict::not_testable : Verdict::no_mismatch;
+  if (contributed.explained_where_it_acts < thresholds.decision.cause_explains &&
+      contributed.remaining_rmse_v > errors.tolerated_v)
+    return Verdict::unknown;
+  if (findings.size() > 1) return Verdict::causes;
+  return findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
 }
 
 /// The numbers behind the verdict.
@@ -190,13 +221,28 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.limits = detection_limits(likelihood, search.nominal_noise(), control, scope);
   search.report("noise");
   Survivors survivors = eliminate(search, likelihood, control, grown.fit, scope);
-  const Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
+  d.gains = gains_of(grown, survivors);
+  std::optional<HealthyJudge> judge_healthy;
+  if (options.healthy.known) {
+    judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
+    survivors = judge_healthy->without_withheld(std::move(survivors));
+  }
+  Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
+  d.unknown_gain = unknown_gain(adequacy.residual);
+  if (options.learns && adequacy.found)
+    d.unknown_gain = std::max(d.unknown_gain, unknown_gain_of(likelihood, search.nominal_noise(), control));
+  if (judge_healthy) {
+    judge_healthy->withhold_unknown(adequacy);
+    d.healthy = judge_healthy->basis();
+    d.withheld = judge_healthy->withheld();
+    d.limits = judge_healthy->raised(d.limits);
+    include_model_error(likelihood, survivors.best);
+  }
 
   const Contributions contributed = contributions(likelihood, control, survivors.best);
   d.findings = findings_of(search, survivors, contributed);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors);
-  const double tolerated_v = std::hypot(noise_floor_v(search.nominal_noise()), cell.tolerance.ocv_v);
-  d.verdict = verdict_of(adequacy, d.findings, contributed, plain_error_v(likelihood, likelihood.base()), tolerated_v);
+  d.verdict = verdict_of(adequacy, d, contributed, errors_of(search, likelihood, options.healthy));
   d.interrupted = search.stopped();
   // that nothing was found yet does not mean that nothing is there
   if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;

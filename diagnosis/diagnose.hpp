@@ -9,12 +9,17 @@
 #include "diagnosis/prepared_recording.hpp"
 #include "diagnosis/search.hpp"
 #include "diagnosis/verdict.hpp"
+#include "measurement/healthy_data.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms::diagnosis {
 
 struct Options {
   std::size_t most_mechanisms = 6;
+  measurement::HealthyData healthy;  ///< of the cell; if it is not known, nothing is withheld
+  bool learns = false;  ///< the recordings are healthy: Diagnosis::unknown_gain is the larger one of that with
+                        ///< and that without the findings
+  double false_alarm_rate = 0.01;  ///< with `healthy`: how often a healthy recording may be blamed
   Progress progress;
   Stopped stopped;  ///< asked between fits; the diagnosis then ends with what it knows so far
 };

@@ -191,11 +191,13 @@ Scope scope_of(const LikelihoodModel& likelihood) {
 }
 
 Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std::size_t most) {
-  Grown grown{control, {}};
+  Grown grown{control, {}, {}};
   HypothesisFit& current = grown.fit;
   for (const std::size_t m : scope.expected) {
     const std::vector<HypothesisFit> fits = search.one_more(current, {m});
-    if (!fits.empty() && search.gain(current, fits.front()) > selection_limits.detected) current = fits.front();
+    if (fits.empty()) continue;
+    const double gain = grown.gains[m] = search.gain(current, fits.front());
+    if (gain > selection_limits.detected) current = fits.front();
   }
   std::vector<std::size_t> steady = scope.searched;
   std::erase_if(steady, comes_and_goes);
@@ -204,6 +206,10 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
     std::vector<HypothesisFit> fits = search.one_more(current, all ? scope.searched : steady);
     if (current.hypothesis.added().empty()) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
     std::erase_if(fits, [&](const HypothesisFit& f) { return !search.carries(current, f); });
+    for (const HypothesisFit& f : fits) {
+      double& gain = grown.gains[f.hypothesis.settings.back().index];
+      gain = std::max(gain, search.gain(current, f));
+    }
     const bool gains = !fits.empty() && search.gain(current, fits.front()) >= selection_limits.detected;
     if (gains)
       current = fits.front();

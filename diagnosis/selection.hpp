@@ -26,7 +26,8 @@ Scope scope_of(const LikelihoodModel& likelihood);
 /// Result of the forward selection.
 struct Grown {
   HypothesisFit fit;
-  std::vector<HypothesisFit> singles;  ///< all that was tried alone
+  std::vector<HypothesisFit> singles;   ///< all that was tried alone
+  std::map<std::size_t, double> gains;  ///< by mechanism: the largest gain by adding it
 };
 /// Adds the mechanism that explains most, then the next, as long as chance would not gain as much. Mechanisms that are
 /// free to come and go come after all others. most: of mechanisms.

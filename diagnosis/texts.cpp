@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "diagnosis/thresholds.hpp"
+#include "diagnosis/withheld_text.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
@@ -178,19 +179,20 @@ std::string claim(const MechanismSetting& s) { return knowledge_of(s.index).clai
 std::string statement(const Diagnosis& d, const RecordingFacts& facts) {
   switch (d.verdict) {
     case Verdict::no_mismatch:
-      return no_mismatch_text(d, facts);
+      return d.withheld.empty() ? no_mismatch_text(d, facts) : withheld_text(d, model_error(facts));
     case Verdict::cause:
-      return cause_text(d, facts);
+      return cause_text(d, facts) + also_withheld_text(d);
     case Verdict::ambiguous:
-      return ambiguous_text(d, facts);
+      return ambiguous_text(d, facts) + also_withheld_text(d);
     case Verdict::causes:
-      return causes_text(d, facts);
+      return causes_text(d, facts) + also_withheld_text(d);
     case Verdict::unknown:
       return unknown_text(d, facts);
     case Verdict::data_fault:
       return d.faults.empty() ? "The recording is not plausible." : d.faults.front().text;
     case Verdict::not_testable:
-      return "No diagnosis is possible from this recording.";
+      return d.withheld.empty() ? "No diagnosis is possible from this recording."
+                                : withheld_text(d, model_error(facts));
   }
   return "";
 }

@@ -295,6 +295,20 @@ struct Thresholds {
     double initial_soc_at_least = 1e-4;            ///< sigma of the start
   };
 
+  /// Comparison with healthy recordings of the same cell (healthy_null.hpp).
+  struct Healthy {
+    double log_spread_at_least = 0.5;  ///< standard deviation, in ln, of the gain on healthy blocks: that of the
+                                       ///< square of an effect that differs by a quarter. A few blocks may agree by
+                                       ///< chance
+    double block_h = 0.5;              ///< [h] expected of a block, without any block
+    double blocks_at_least = 3;        ///< for a Student distribution
+    double soc_beyond = 0.05;          ///< soc beyond that of the healthy blocks which they still stand for
+    double temperature_beyond_k = 5;   ///< [K]
+    double current_beyond = 1.25;      ///< times their largest current
+    double covered_at_least = 0.5;     ///< share of a recording's rows that the healthy blocks stand for
+    double gross_times = 2;            ///< RMS error over the largest of a healthy block, above which it is gross
+  };
+
   /// Tolerances of an extended cell file are widened by one of these factors (model_tolerance.hpp).
   struct ModelTolerance {
     std::array<double, 7> factors = {1, 1.5, 2, 3, 4, 6, 8};
@@ -318,6 +332,7 @@ struct Thresholds {
   Location location;
   References references;
   Design design;
+  Healthy healthy;
   ModelTolerance model_tolerance;
 };
 

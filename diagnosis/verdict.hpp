@@ -1,12 +1,15 @@
 // The result of a diagnosis.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "diagnosis/healthy_null.hpp"
 #include "diagnosis/hypothesis.hpp"
 #include "diagnosis/noise.hpp"
 #include "diagnosis/recording_check.hpp"
@@ -72,6 +75,29 @@ struct NotTestable {
   std::string reason;
 };
 
+/// Gain of one mechanism, >= 0: the largest gain that it had when it was added or taken away.
+struct MechanismGain {
+  std::size_t mechanism = 0;
+  double gain = 0;
+};
+
+/// What would have been named without healthy recordings to compare with.
+struct Withheld {
+  std::size_t mechanism = no_mechanism;  ///< no_mechanism: an unknown cause
+  MechanismSetting setting;              ///< values and standard deviations; of a mechanism
+  double gain = 0;
+  HealthyComparison healthy;
+  bool not_covered = false;  ///< the recordings go where the healthy ones did not
+};
+
+/// The healthy data that a diagnosis was compared with.
+struct HealthyBasis {
+  double hours = 0;
+  std::size_t recordings = 0, blocks = 0;
+  double false_alarm_rate = 0;
+  double covered = 1;  ///< share of the rows at charges, temperatures and currents of the healthy blocks
+};
+
 /// For plots, one value per row.
 struct RecordingView {
   std::vector<double> base_v, extended_v, soc;
@@ -93,7 +119,11 @@ struct Diagnosis {
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;
-  Hypothesis extended;               ///< the cell's own mechanisms and those found
+  std::vector<MechanismGain> gains;     ///< of all mechanisms with any; before anything was withheld
+  double unknown_gain = 0;              ///< that something else is there, before anything was withheld
+  std::optional<HealthyBasis> healthy;  ///< nothing: the cell file has no healthy data
+  std::vector<Withheld> withheld;       ///< the largest gain first
+  Hypothesis extended;                  ///< the cell's own mechanisms and those found
   model::CellParameters<> cell;      ///< base parameters moved, within their tolerance, to where they fit together with
                                      ///< the findings; as given without findings
   Eigen::MatrixXd covariance;        ///< of the estimated parameters of `extended`
@@ -103,5 +133,12 @@ struct Diagnosis {
   std::string remaining_goes_with;  ///< what the unexplained residual depends on, if there is much of it
   double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, far_out = 0;
 };
+
+/// Returns true if nothing was named, and more healthy data would decide whether a cause that was withheld is one.
+inline bool more_healthy_data_would_decide(const Diagnosis& d) {
+  return d.findings.empty() && std::any_of(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) {
+           return w.healthy.hours_needed.has_value() || w.not_covered;
+         });
+}
 
 }  // namespace bms::diagnosis

@@ -1,0 +1,49 @@
+#include "diagnosis/block_covariance.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace bms::diagnosis {
+
+Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
+  const Columns base = likelihood.calibration_derivatives(fit.hypothesis, fit.calibration);
+  Columns own = likelihood.derivatives(fit.hypothesis, fit.calibration, fit.hypothesis.sought());
+  const Eigen::MatrixXd normal =
+      base.transpose() * base + Eigen::MatrixXd::Identity(base.cols(), base.cols());  // with its prior
+  const Eigen::MatrixXd follow = normal.ldlt().solve(base.transpose() * own);
+  own -= base * follow;
+  Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(own.cols(), own.cols());
+  Eigen::Index first = 0;
+  double blocks = 0;
+  for (const PreparedRecording& r : likelihood.records()) {
+    const auto rows = static_cast<Eigen::Index>(r.size());
+    for (Eigen::Index b = 0; b < covariance_blocks; ++b) {
+      const Eigen::Index from = first + rows * b / covariance_blocks, to = first + rows * (b + 1) / covariance_blocks;
+      ++blocks;
+      const Eigen::VectorXd pull = own.middleRows(from, to - from).transpose() * fit.residual.segment(from, to - from);
+      pulls += pull * pull.transpose();
+    }
+    first += rows;
+  }
+  // the prior of the base parameters pulls as it is assumed to
+  const Eigen::MatrixXd all = blocks / (blocks - 1) * pulls + follow.transpose() * follow;
+  return fit.covariance * all * fit.covariance;
+}
+
+void include_model_error(const LikelihoodModel& likelihood, HypothesisFit& fit) {
+  const std::vector<ParameterRef> sought = fit.hypothesis.sought();
+  if (sought.empty()) return;
+  const Eigen::MatrixXd wide = block_covariance(likelihood, fit);
+  Eigen::VectorXd times(wide.rows());
+  for (Eigen::Index j = 0; j < wide.rows(); ++j) {
+    const double ratio = wide(j, j) / fit.covariance(j, j);
+    times[j] = std::isfinite(ratio) ? std::sqrt(std::max(ratio, 1.0)) : 1;
+    const ParameterRef& p = sought[static_cast<std::size_t>(j)];
+    fit.hypothesis.settings[p.setting].deviation[p.parameter] *= times[j];
+  }
+  fit.covariance = times.asDiagonal() * fit.covariance * times.asDiagonal();
+}
+
+}  // namespace bms::diagnosis

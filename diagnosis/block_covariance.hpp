@@ -1,0 +1,25 @@
+// Uncertainty that contains the error of the model.
+//
+// The inverse of the normal matrix assumes a whitened residual that is white. What a model lacks is not: it pulls the
+// parameters in one direction for minutes. The sandwich estimate takes the pulls of whole blocks of time as they were.
+// H. White, Econometrica 48 (1980) 817; K.-Y. Liang, S. Zeger, Biometrika 73 (1986) 13.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "diagnosis/likelihood_model.hpp"
+
+namespace bms::diagnosis {
+
+/// Blocks of a recording: each lasts many times a pull, and there are enough to know their spread to a quarter.
+inline constexpr Eigen::Index covariance_blocks = 12;
+
+/// Covariance of the estimated parameters of a fit, the base parameters marginalised, from the pulls of equal blocks of
+/// time in each recording. The likelihood has the noise model of the fit.
+Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const HypothesisFit& fit);
+
+/// Raises the standard deviations of the settings, and the covariance, to those of block_covariance() where it is
+/// larger.
+void include_model_error(const LikelihoodModel& likelihood, HypothesisFit& fit);
+
+}  // namespace bms::diagnosis

@@ -1,0 +1,58 @@
+#include "diagnosis/withheld_text.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "diagnosis/texts.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+std::string hours_text(double hours) { return fmt::format("{:.{}f} h", hours, hours < 2 ? 1 : 0); }
+
+std::string name_of(const Withheld& w) {
+  return w.mechanism == no_mechanism ? "an unknown cause" : std::string(text_of_mechanism(w.mechanism).name);
+}
+
+}  // namespace
+
+std::string reason_of(const Withheld& w, const HealthyBasis& healthy) {
+  if (w.not_covered)
+    return fmt::format(
+        "only {:.0f} % of the recording lies at states of charge, temperatures and currents of the healthy "
+        "recordings",
+        100 * healthy.covered);
+  if (w.healthy.hours_needed)
+    return fmt::format("{} of healthy recordings are too little, about {} would do", hours_text(healthy.hours),
+                       hours_text(*w.healthy.hours_needed));
+  return "healthy recordings show as much";
+}
+
+std::string withheld_text(const Diagnosis& d, const std::string& error) {
+  // what more data would decide first
+  const auto undecided = std::find_if(d.withheld.begin(), d.withheld.end(),
+                                      [](const Withheld& w) { return w.not_covered || w.healthy.hours_needed; });
+  if (undecided == d.withheld.end())
+    return fmt::format(
+        "{} Healthy recordings of this cell differ from the model as much, so no cause is named. Without "
+        "them, {} would have been named. No action is needed.",
+        error, name_of(d.withheld.front()));
+  const std::string action = undecided->not_covered
+                                 ? "Identify the cell again with healthy recordings there (bms identify --healthy)."
+                                 : "Add healthy recordings of this cell (bms identify --healthy).";
+  return fmt::format(
+      "Not enough healthy data to blame anything: {}. {} Without a comparison {} would have been named. {}",
+      reason_of(*undecided, *d.healthy), error, name_of(*undecided), action);
+}
+
+std::string also_withheld_text(const Diagnosis& d) {
+  if (d.withheld.empty()) return "";
+  std::vector<std::string> names;
+  for (const Withheld& w : d.withheld) names.push_back(name_of(w));
+  return fmt::format(" Not named, because healthy recordings do not exclude as much: {}.", joined(names, "and"));
+}
+
+}  // namespace bms::diagnosis

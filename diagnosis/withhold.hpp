@@ -1,0 +1,57 @@
+// Compares what was found with healthy recordings of the same cell, and takes back what they show as well.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "diagnosis/adequacy.hpp"
+#include "diagnosis/selection.hpp"
+#include "diagnosis/verdict.hpp"
+
+namespace bms::diagnosis {
+
+/// Gain of every mechanism that was added or has survived.
+std::vector<MechanismGain> gains_of(const Grown& grown, const Survivors& survivors);
+
+/// Gain of an unknown cause, on the scale of a mechanism's gain.
+double unknown_gain(const ResidualTest& residual);
+
+class HealthyJudge {
+ public:
+  /// All must outlive it.
+  HealthyJudge(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control, const Scope& scope,
+               const measurement::HealthyData& healthy, double false_alarm_rate);
+
+  const HealthyBasis& basis() const { return basis_; }
+  std::vector<Withheld> withheld() const;
+
+  /// Removes mechanisms that do not stand out, the least one first, each time with the others fitted again. What is
+  /// left is compared with its rivals again.
+  Survivors without_withheld(Survivors found);
+
+  /// Limits at which a mechanism would stand out; without those of mechanisms that could not.
+  std::vector<DetectionLimit> raised(const std::vector<DetectionLimit>& limits) const;
+
+  /// Takes back an unknown cause that does not stand out.
+  void withhold_unknown(Adequacy& adequacy);
+
+ private:
+  /// Returns true if the healthy blocks stand for enough of the recordings.
+  bool is_covered() const;
+  HealthyComparison compare(std::size_t mechanism, double gain) const;
+  /// The mechanism that stands out least; nothing if all stand out.
+  std::optional<Withheld> least_of(const Survivors& found) const;
+  /// The rest fitted again, with its gains.
+  Survivors without(const Survivors& found, std::size_t mechanism) const;
+
+  Search& search_;
+  const LikelihoodModel& likelihood_;
+  const HypothesisFit& control_;
+  Scope scope_;  ///< without what was withheld
+  HealthyBasis basis_;
+  HealthyNull null_;
+  std::vector<Withheld> withheld_;
+};
+
+}  // namespace bms::diagnosis
