@@ -327,6 +327,15 @@ StructureChoice choose_structure(const std::vector<JointCandidate>& candidates,
   return choice;
 }
 
+StructureChoice fitted_again(const StructureChoice& choice, std::span<const JointRecording> recordings,
+                             const JointOptions& options) {
+  StructureChoice again = choice;
+  again.fit = fit_joint(choice.model, recordings, options, choice.fit.value);
+  again.model = with_values(choice.model, again.fit.value);
+  again.extent = extent_of(again.model, recordings);
+  return again;
+}
+
 LeftOutError left_out_error(const JointModel& model, const JointRecording& recording, const RecordingState& state) {
   constexpr double usual_resistance_error = 0.3, usual_soc_error = 0.05, independent_s = 1'800;
   const JointSimulation s = simulate(model, recording, state);

@@ -86,6 +86,11 @@ struct StructureChoice {
 StructureChoice choose_structure(const std::vector<JointCandidate>& candidates,
                                  std::span<const JointRecording> recordings, const JointOptions& options);
 
+/// The chosen circuit fitted to other recordings, from where it was; the errors to expect are those of `choice`. Throws
+/// as fit_joint() does.
+StructureChoice fitted_again(const StructureChoice& choice, std::span<const JointRecording> recordings,
+                             const JointOptions& options);
+
 /// Error of a prediction, separated by least squares. model: at its fit.
 LeftOutError left_out_error(const JointModel& model, const JointRecording& recording, const RecordingState& state);
 

@@ -1,4 +1,5 @@
 #include "diagnosis/texts.hpp"
+#include "diagnosis/withheld_text.hpp"
 #include "reports/json_parts.hpp"
 #include "reports/json_results.hpp"
 
@@ -106,6 +107,39 @@ Json estimates_of(const diagnosis::Diagnosis& d) {
   return list;
 }
 
+Json healthy_of(const diagnosis::Diagnosis& d) {
+  const diagnosis::HealthyBasis h = d.healthy.value_or(diagnosis::HealthyBasis{});
+  return {{"hours", number(h.hours)},
+          {"recordings", h.recordings},
+          {"blocks", h.blocks},
+          {"false_alarm_rate", d.healthy ? number(h.false_alarm_rate) : Json(nullptr)},
+          {"covered", d.healthy ? number(h.covered) : Json(nullptr)}};
+}
+
+Json withheld_of(const diagnosis::Diagnosis& d) {
+  Json list = Json::array();
+  for (const diagnosis::Withheld& w : d.withheld) {
+    Json parameters = Json::array();
+    const bool known = w.mechanism != diagnosis::no_mechanism;
+    for (std::size_t k = 0; known && k < model::catalogue[w.mechanism].parameters; ++k) {
+      const model::Parameter& p = model::catalogue[w.mechanism].parameter[k];
+      parameters.push_back({{"name", p.name},
+                            {"value", number(w.setting.value[k])},
+                            {"std", number(w.setting.deviation[k])},
+                            {"unit", p.unit}});
+    }
+    const auto& needed = w.healthy.hours_needed;
+    list.push_back({{"id", known ? std::string(model::catalogue[w.mechanism].id) : measurement::unknown_cause},
+                    {"parameters", std::move(parameters)},
+                    {"gain", number(w.gain)},
+                    {"healthy_gain", number(w.healthy.healthy_gain)},
+                    {"false_alarm", number(w.healthy.false_alarm)},
+                    {"hours_needed", needed ? number(*needed) : Json(nullptr)},
+                    {"reason", reason_of(w, *d.healthy)}});
+  }
+  return list;
+}
+
 Json experiment_of(const diagnosis::NextExperiment& next) {
   return {{"profile", next.profile},
           {"separates", ids_of(next.separates)},
@@ -137,6 +171,8 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   if (r.named()) {
     for (const diagnosis::Finding& f : d.findings) json["mechanisms"].push_back(mechanism_of(f));
   }
+  json["healthy"] = healthy_of(d);
+  json["withheld"] = withheld_of(d);
   json["candidates"] = candidates_of(d);
   json["baseline"] = {{"recording", figures_of(r.baseline)}, {"holdout", figures_of(r.baseline_holdout)}};
   json["extended"] = {{"recording", figures_of(r.extended)}, {"holdout", figures_of(r.extended_holdout)}};

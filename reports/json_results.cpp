@@ -275,6 +275,9 @@ std::string json_of(const workflow::IdentifyResult& r) {
   json["initial_state"] = i.initial.empty() ? Json(nullptr) : state(i.initial.front());
   json["initial_states"] = Json::array();
   for (const identification::InitialState& s : i.initial) json["initial_states"].push_back(state(s));
+  const measurement::HealthyData healthy = r.cell_file ? r.cell_file->healthy : measurement::HealthyData{};
+  json["healthy"] = {
+      {"hours", number(healthy.hours())}, {"recordings", healthy.recordings()}, {"blocks", healthy.blocks.size()}};
   json["joint"] = joint_of(r.joint);
   json["coulombic_efficiency"] = optional(r.coulombic_efficiency);
   json["iterations"] = i.optimum.iterations;

@@ -98,6 +98,10 @@ class DiagnoseCommand final : public Command {
                  "of soc_ref, or else an estimate from the first voltage")
         ->check(Within(0.0, 1.0));
     c.add_option("--out", out_, "cell file to write, with the findings")->type_name("EXTENDED.toml");
+    c.add_option("--false-alarm-rate", false_alarm_rate_,
+                 "how often a healthy recording may be blamed; for a cell file with [healthy] (bms identify --healthy)")
+        ->check(Within(1e-4, 0.5))
+        ->capture_default_str();
     add_reading(c, o_.reading);
     o_.reading.refuse_doubtful = false;  // a fault of the data is an answer of the diagnosis
     add_output(c, output_);
@@ -113,6 +117,7 @@ class DiagnoseCommand final : public Command {
     complete_reading(o_.reading);
     diagnosis::Options options;
     options.progress = progress_on_terminal(0.1, progress_line);
+    options.false_alarm_rate = false_alarm_rate_;
     options.stopped = [] { return interrupts != 0; };
     static_cast<void>(std::signal(SIGINT, on_interrupt));
     workflow::DiagnoseResult result = workflow::diagnose_recordings(workflow::read_diagnose_input(o_), options);
@@ -136,6 +141,7 @@ class DiagnoseCommand final : public Command {
  private:
   workflow::DiagnoseOptions o_;
   std::string out_;
+  double false_alarm_rate_ = 0.01;
   Output output_;
 };
 

@@ -9,6 +9,7 @@
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "workflow/identify_cell.hpp"
+#include "workflow/learn_healthy.hpp"
 
 namespace bms::tool {
 
@@ -84,6 +85,8 @@ std::string summary(const workflow::IdentifyResult& result) {
   std::string text = result.joint ? joint_summary(*result.joint) : grey_box_summary(result.identification);
   for (const auto& [path, fit] : result.validations)
     text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
+  if (result.cell_file && !result.cell_file->healthy.blocks.empty())
+    text += "Healthy data: " + workflow::healthy_summary(result.cell_file->healthy) + ".\n";
   return text + (result.cell.empty() ? "No cell file was written." : "Cell file: " + result.out);
 }
 
@@ -107,7 +110,7 @@ class IdentifyCommand final : public Command {
   int run() override {
     output_.set_own(o_.out);
     std::vector<std::string> inputs = {o_.start};
-    for (const auto* files : {&o_.recordings, &o_.ocv, &o_.validate, &o_.hold_out})
+    for (const auto* files : {&o_.recordings, &o_.ocv, &o_.validate, &o_.hold_out, &o_.healthy})
       inputs.insert(inputs.end(), files->begin(), files->end());
     output_.protect(inputs);
     complete_reading(o_.reading);
@@ -199,6 +202,11 @@ class IdentifyCommand final : public Command {
     c.add_flag("--extend", o_.extend,
                "add what an estimator needs: hysteresis between slow charge and discharge, resistances that depend on "
                "the temperature, sensor and model errors as states of the filter");
+    c.add_option(
+         "--healthy", o_.healthy,
+         "recordings of the healthy cell, also those of --recording: what the model leaves unexplained of each, "
+         "identified without it, goes into the cell file, and bms diagnose blames nothing for as much")
+        ->type_name("FILE");
     c.add_option("--hold-out", o_.hold_out,
                  "with --extend: recordings whose prediction is reported; nothing is identified from them")
         ->needs("--extend")

@@ -85,8 +85,7 @@ enum class Priority { user_first, reference_first };
 /// Reads one recording and determines its start.
 RecordingComparison read(const std::string& path, const files::ReadOptions& reading, const std::optional<double>& given,
                          Priority priority, DiagnoseInput& input) {
-  measurement::Recording r = files::read_recording(path, files::VoltageColumn::required, reading);
-  add_rows_before_changes(r, input.cell);
+  measurement::Recording r = read_for_diagnosis(path, reading, input.cell);
   measurement::compare_with_cell(r, input.cell.parameters);
   for (const measurement::Warning& w : r.warnings) input.warnings.push_back({w.id, path + ": " + w.text});
   const auto reference = reference_start(r, input.cell);
@@ -109,6 +108,18 @@ RecordingComparison read(const std::string& path, const files::ReadOptions& read
 }
 
 }  // namespace
+
+StartSoc start_of(const measurement::Recording& r, const files::CellFile& cell) {
+  if (const auto reference = reference_start(r, cell)) return *reference;
+  return estimated_start(r, cell).value_or(StartSoc{});
+}
+
+measurement::Recording read_for_diagnosis(const std::string& path, const files::ReadOptions& reading,
+                                          const files::CellFile& cell) {
+  measurement::Recording r = files::read_recording(path, files::VoltageColumn::required, reading);
+  add_rows_before_changes(r, cell);
+  return r;
+}
 
 StartSoc given_start(const files::CellFile& cell, double soc) {
   return {soc, std::max(cell.parameters.tolerance.initial_soc, least_start_sigma), true};
@@ -162,7 +173,9 @@ DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options
   r.warnings = std::move(input.warnings);
   std::vector<diagnosis::PreparedRecording> records;
   for (const RecordingComparison& c : r.recordings) records.push_back(c.record);
-  r.diagnosis = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, records, options);
+  diagnosis::Options with_healthy = options;
+  with_healthy.healthy = r.cell.healthy;
+  r.diagnosis = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, records, with_healthy);
   diagnosis::describe(r.diagnosis, r.cell.parameters, records);
   for (const std::string& text : r.diagnosis.warnings) r.warnings.push_back({"readings", text});
   compare(r);

@@ -18,6 +18,13 @@ struct StartSoc {
 /// A start that is known to the tolerance of the cell file.
 StartSoc given_start(const files::CellFile& cell, double soc);
 
+/// The first value of soc_ref, or else what the estimator concludes from the first voltage.
+StartSoc start_of(const measurement::Recording& recording, const files::CellFile& cell);
+
+/// A recording as a diagnosis reads it: a logger that writes rows on change gets the rows that it left out.
+measurement::Recording read_for_diagnosis(const std::string& path, const files::ReadOptions& reading,
+                                          const files::CellFile& cell);
+
 /// A recording ready to be diagnosed or to be compared with, with the readings of trusted instruments averaged.
 RecordingComparison prepared(measurement::Recording recording, const std::string& name, const files::CellFile& cell,
                              const StartSoc& start);

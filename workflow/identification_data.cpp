@@ -89,6 +89,14 @@ IdentificationData identification_data(const measurement::Recording& recording, 
   return d;
 }
 
+void leave_out(const LeftOutTime& time, measurement::Recording& r) {
+  if (time.to_s < time.from_s) return;
+  std::vector<double>& voltage_v = r.voltage_v.edit();
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    if (r.time_s[k] >= time.from_s && r.time_s[k] <= time.to_s) voltage_v[k] = std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
 InitialSoc initial_soc_of(const std::string& text) {
   if (text.empty()) return {};
   if (text == "estimate") return {std::nullopt, true};

@@ -38,6 +38,14 @@ struct IdentificationData {
 /// samples lie in the window.
 IdentificationData identification_data(const measurement::Recording& recording, const DataOptions& options);
 
+/// A stretch of the recordings whose voltage does not count.
+struct LeftOutTime {
+  double from_s = 0, to_s = -1;  ///< in the recordings' clock; empty by default
+};
+
+/// Removes the voltage in that time; the current still flows.
+void leave_out(const LeftOutTime& time, measurement::Recording& recording);
+
 /// Parses "estimate", a number from 0 to 1, or an empty text. Throws BadInput.
 InitialSoc initial_soc_of(const std::string& text);
 

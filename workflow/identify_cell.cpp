@@ -14,6 +14,7 @@
 #include "identification/prefilter.hpp"
 #include "measurement/recording_checks.hpp"
 #include "workflow/identified_cell.hpp"
+#include "workflow/learn_healthy.hpp"
 #include "workflow/reference_temperature.hpp"
 #include "workflow/start_cell.hpp"
 
@@ -76,8 +77,10 @@ void filter(const IdentifyOptions& options, const std::string& path, id::Data& d
 Inputs read_inputs(const IdentifyOptions& options, StartCell& start, std::vector<measurement::Warning>& warnings,
                    std::vector<std::string>& read_as) {
   Inputs inputs;
-  for (const std::string& path : options.recordings)
+  for (const std::string& path : options.recordings) {
     inputs.recordings.push_back(files::read_recording(path, files::VoltageColumn::required, options.reading));
+    leave_out(options.left_out, inputs.recordings.back());
+  }
   adapt_start(options, inputs.recordings, start, warnings);
   inputs.options = {options.initial_soc, options.window, start.cell.parameters};
   for (measurement::Recording& r : inputs.recordings) {
@@ -299,7 +302,8 @@ void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs
     const IdentificationData& of = inputs.measured[k];
     recordings.push_back(joint_recording(inputs.recordings[k], of, of.record.initial_soc, capacity_ah));
   }
-  JointResult joint = identify_jointly(cell, covers_both_directions(recordings), recordings);
+  JointResult joint = options.circuit ? identified_again(*options.circuit, recordings)
+                                      : identify_jointly(cell, covers_both_directions(recordings), recordings);
   hold_out(options.hold_out, options.reading, inputs.options, joint);
   for (const measurement::Warning& w : warnings_of(joint)) result.warnings.push_back(w);
   put(joint, cell);
@@ -382,6 +386,11 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
     identify_linear_cell(options, std::move(start), inputs, result);
   else
     identify_grey_box_cell(options, std::move(start), inputs, result);
+  if (result.cell_file && !options.healthy.empty()) {
+    files::CellFile& cell = *result.cell_file;
+    cell.healthy = learn_healthy(options, cell, result.joint, result.warnings);
+    cell.sources["healthy"] = healthy_summary(cell.healthy) + "; each diagnosed with a cell identified without it";
+  }
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

@@ -34,6 +34,9 @@ struct IdentifyOptions {
   InitialSoc initial_soc;
   SocWindow window;                               ///< samples that count
   std::vector<std::string> validate;              ///< files that are only compared with
+  std::vector<std::string> healthy;               ///< files from which [healthy] is learned
+  LeftOutTime left_out;                           ///< of `recordings`
+  std::optional<JointResult> circuit;             ///< with `extend`: the circuit is known, only its values are fitted
   std::vector<std::string> hold_out;              ///< with `extend`: files whose prediction is reported
   std::optional<SocWindow> validate_window;       ///< not given: `window`
   std::vector<double> nodes;                      ///< SOC nodes of R0, R1, C1; empty: by the range of the recordings

@@ -127,6 +127,19 @@ JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
   return joint;
 }
 
+JointResult identified_again(const JointResult& joint, const std::vector<id::JointRecording>& recordings) {
+  JointResult again;
+  again.keeps_shape = joint.keeps_shape;
+  again.temperatures = joint.temperatures;
+  for (const id::JointRecording& r : recordings) again.recordings.push_back(r.name);
+  try {
+    again.choice = id::fitted_again(joint.choice, recordings, {});
+  } catch (const std::invalid_argument& error) {
+    throw files::BadInput(recordings.front().name, 1, error.what());
+  }
+  return again;
+}
+
 void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, const DataOptions& options,
               JointResult& joint) {
   for (const std::string& path : paths) {

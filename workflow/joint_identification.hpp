@@ -34,6 +34,9 @@ bool covers_both_directions(const std::vector<identification::JointRecording>& r
 JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
                              const std::vector<identification::JointRecording>& recordings);
 
+/// The circuit of `joint` fitted to other recordings of the same cell. Throws BadInput.
+JointResult identified_again(const JointResult& joint, const std::vector<identification::JointRecording>& recordings);
+
 /// Predicts recordings that did not enter the fit.
 void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, const DataOptions& options,
               JointResult& joint);

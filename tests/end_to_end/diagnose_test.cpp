@@ -307,5 +307,46 @@ TEST_F(DiagnoseTool, IsReproducible) {
   EXPECT_EQ(page, content(path("x.html")));
 }
 
+/// Half of a real drive: header and rows from a share of all on.
+std::string half_of(const std::filesystem::path& file, bool second) {
+  std::istringstream lines(content(file.string()));
+  std::vector<std::string> rows;
+  std::string header, text;
+  for (std::string line; std::getline(lines, line);) {
+    if (header.empty() && !line.starts_with("#"))
+      header = line;
+    else if (!line.starts_with("#"))
+      rows.push_back(line);
+  }
+  const std::size_t middle = rows.size() / 2;
+  text = header + "\n";
+  for (std::size_t k = second ? middle : 0; k < (second ? rows.size() : middle); ++k) text += rows[k] + "\n";
+  return text;
+}
+
+TEST_F(DiagnoseTool, AHealthySecondHalfOfARealDriveIsNotBlamed) {
+  const std::filesystem::path a123 = data / "a123_26650";
+  if (!std::filesystem::exists(a123)) GTEST_SKIP() << "the real recordings are not there: " << data;
+  std::ofstream(path("first.csv")) << half_of(a123 / "udds_P25_A002.csv", false);
+  std::ofstream(path("second.csv")) << half_of(a123 / "udds_P25_A002.csv", true);
+  const auto identify = [&](const std::string& healthy, const std::string& out) {
+    const ToolRun run = run_tool("identify --quiet --start a123_26650 --ocv " + (a123 / "ocv_P25_dis.csv").string() +
+                                 " " + (a123 / "ocv_P25_chg.csv").string() + " --recording " + path("first.csv") +
+                                 healthy + " --out " + path(out));
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  };
+  identify(" --healthy " + path("first.csv"), "healthy.toml");
+  EXPECT_THAT(content(path("healthy.toml")), HasSubstr("[[healthy.block]]"));
+  const json with = result("--cell " + path("healthy.toml") + " --recording " + path("second.csv"));
+  EXPECT_EQ(with["verdict"], "NOT_TESTABLE");
+  EXPECT_TRUE(with["mechanisms"].empty());
+  EXPECT_THAT(with["statement"].get<std::string>(), HasSubstr("Not enough healthy data to blame anything"));
+  EXPECT_FALSE(with["withheld"].empty());
+  EXPECT_GT(with["healthy"]["hours"], 0.3);
+  EXPECT_EQ(with["healthy"]["recordings"], 1);
+  EXPECT_EQ(with["healthy"]["false_alarm_rate"], 0.01);
+  EXPECT_EQ(run_tool("diagnose --cell table9 --recording x.csv --false-alarm-rate 0").exit_code, 2);
+}
+
 }  // namespace
 }  // namespace bms

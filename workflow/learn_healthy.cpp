@@ -1,0 +1,197 @@
+#include "workflow/learn_healthy.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "diagnosis/healthy_block.hpp"
+#include "files/bad_input.hpp"
+#include "workflow/diagnose_recordings.hpp"
+#include "workflow/residual_regimes.hpp"
+
+namespace bms::workflow {
+
+namespace {
+
+using measurement::HealthyBlock;
+using measurement::Recording;
+
+constexpr double blocks_wanted = 10;  ///< of all recordings together; a recording that is short enough is one block
+constexpr double shortest_block_s = 600;
+
+double in_short(double value) { return std::isfinite(value) ? std::stod(fmt::format("{:.4g}", value)) : value; }
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  return a == b || std::filesystem::equivalent(a, b, error);
+}
+
+/// Some rows of a recording.
+struct Rows {
+  std::size_t first = 0, count = 0;
+};
+
+/// Returns true if the load changes, as a diagnosis needs it.
+bool is_loaded(const Recording& r, const Rows& rows, double capacity_ah) {
+  constexpr double span_c = 0.02, loaded_c = 0.02;
+  constexpr std::size_t loaded_rows = 10;
+  measurement::HealthyRange current_a;
+  std::size_t loaded = 0;
+  for (std::size_t k = rows.first; k < rows.first + rows.count; ++k) {
+    current_a.add(r.current_a[k]);
+    loaded += std::abs(r.current_a[k]) > loaded_c * capacity_ah ? 1 : 0;
+  }
+  return loaded >= loaded_rows && current_a.high - current_a.low > span_c * capacity_ah;
+}
+
+/// Parts of about block_s. One in which the load does not change belongs to the next one, at the end to the one before.
+std::vector<Rows> blocks_of(const Recording& r, double block_s, double capacity_ah) {
+  const double parts = std::max(1.0, std::round(r.duration_s() / block_s));
+  std::vector<Rows> blocks;
+  std::size_t first = 0;
+  for (double part = 1; part <= parts; ++part) {
+    const double end_s = r.time_s.front() + r.duration_s() * part / parts;
+    std::size_t end = first;
+    while (end < r.rows() && (r.time_s[end] < end_s || part == parts)) ++end;
+    const Rows rows{first, end - first};
+    const bool last = part == parts;
+    if (is_loaded(r, rows, capacity_ah) || (last && blocks.empty())) {
+      blocks.push_back(rows);
+      first = end;
+    } else if (last) {
+      blocks.back().count = end - blocks.back().first;
+    }
+  }
+  return blocks;
+}
+
+Recording part_of(const Recording& r, const Rows& rows) {
+  Recording part = r;
+  for (auto column : {&Recording::time_s, &Recording::current_a, &Recording::voltage_v, &Recording::temperature_c,
+                      &Recording::soc_ref, &Recording::current_ref_a, &Recording::voltage_ref_v}) {
+    if (!(r.*column).empty()) part.*column = (r.*column).part(rows.first, rows.count);
+  }
+  return part;
+}
+
+/// The start of a block as a diagnosis of it alone would have it.
+StartSoc start_of_block(const IdentifyOptions& options, const Recording& whole, const Recording& block,
+                        const files::CellFile& cell) {
+  if (!options.initial_soc.value) return start_of(block, cell);
+  double soc = *options.initial_soc.value;
+  for (std::size_t k = 1; k < whole.rows() && whole.time_s[k] <= block.time_s.front(); ++k) {
+    if (std::isfinite(whole.current_a[k]))
+      soc += whole.current_a[k] * (whole.time_s[k] - whole.time_s[k - 1]) / (3'600 * cell.parameters.capacity_ah);
+  }
+  return given_start(cell, soc);
+}
+
+/// The learning in progress.
+class Learning {
+ public:
+  Learning(const IdentifyOptions& options, const files::CellFile& cell, const std::optional<JointResult>& circuit,
+           std::vector<measurement::Warning>& warnings)
+      : options_(options), cell_(cell), circuit_(circuit), warnings_(warnings) {
+    for (const std::string& path : options.healthy)
+      recordings_.push_back(read_for_diagnosis(path, options.reading, cell));
+  }
+
+  measurement::HealthyData run() {
+    double total_s = 0;
+    for (const Recording& r : recordings_) total_s += r.duration_s();
+    const double block_s = std::max(shortest_block_s, total_s / blocks_wanted);
+    for (std::size_t n = 0; n < recordings_.size(); ++n) learn(n, block_s);
+    data_.known = true;
+    data_.regimes = regimes_.regimes();
+    for (measurement::HealthyRegime& r : data_.regimes) {
+      for (double* v : {&r.hours, &r.bias_v, &r.rms_v, &r.spread_v}) *v = in_short(*v);
+    }
+    return std::move(data_);
+  }
+
+ private:
+  void learn(std::size_t n, double block_s) {
+    const Recording& whole = recordings_[n];
+    const std::string& path = options_.healthy[n];
+    IdentifyOptions without = options_;
+    without.healthy.clear();
+    without.circuit = circuit_;
+    without.validate.clear();
+    without.hold_out.clear();
+    std::erase_if(without.recordings, [&](const std::string& other) { return same_file(path, other); });
+    const bool seen = without.recordings.size() < options_.recordings.size(), only = without.recordings.empty();
+    try {
+      std::optional<files::CellFile> again;
+      if (seen && !only) again = identified(without);
+      for (const Rows& rows : blocks_of(whole, block_s, cell_.parameters.capacity_ah)) {
+        if (only) {
+          without.recordings = {path};
+          without.left_out = {whole.time_s[rows.first], whole.time_s[rows.first + rows.count - 1]};
+          again = identified(without);
+        }
+        add_block(whole, rows, again ? *again : cell_);
+      }
+    } catch (const FailedFit& failed) {
+      warn(whole, failed.what());
+    } catch (const files::BadInput& bad) {
+      warn(whole, bad.what());
+    }
+  }
+
+  static files::CellFile identified(const IdentifyOptions& options) {
+    IdentifyResult result = identify_cell(options);
+    if (!result.cell_file) throw FailedFit("no cell file without a part of the recordings", {});
+    return *std::move(result.cell_file);
+  }
+
+  void warn(const Recording& r, const std::string& why) {
+    warnings_.push_back({"healthy", fmt::format("{}: not used as healthy data: {}", r.path, why)});
+  }
+
+  void add_block(const Recording& whole, const Rows& rows, const files::CellFile& cell) {
+    Recording recording = part_of(whole, rows);
+    const std::string name = std::filesystem::path(whole.path).filename().string();
+    const StartSoc start = start_of_block(options_, whole, recording, cell);
+    const diagnosis::PreparedRecording record = prepared(std::move(recording), name, cell, start).record;
+    diagnosis::Options options;
+    options.learns = true;
+    const diagnosis::Diagnosis d = diagnosis::diagnose(cell.parameters, cell.mechanisms, {record}, options);
+    if (!diagnosis::is_usable_as_healthy(d)) {
+      warnings_.push_back({"healthy", fmt::format("{}: {:.0f} to {:.0f} s not used as healthy data: {}", whole.path,
+                                                  record.time_s.front(), record.time_s.back(), d.statement)});
+      return;
+    }
+    data_.blocks.push_back(diagnosis::healthy_block(record, d));
+    regimes_.add_block(record, d.views.front().base_v, cell.parameters.capacity_ah);
+  }
+
+  const IdentifyOptions& options_;
+  const files::CellFile& cell_;
+  const std::optional<JointResult>& circuit_;
+  std::vector<measurement::Warning>& warnings_;
+  std::vector<Recording> recordings_;
+  measurement::HealthyData data_;
+  ResidualRegimes regimes_;
+};
+
+}  // namespace
+
+measurement::HealthyData learn_healthy(const IdentifyOptions& options, const files::CellFile& cell,
+                                       const std::optional<JointResult>& circuit,
+                                       std::vector<measurement::Warning>& warnings) {
+  return Learning(options, cell, circuit, warnings).run();
+}
+
+std::string healthy_summary(const measurement::HealthyData& healthy) {
+  std::map<std::string, std::size_t> blocks;
+  for (const HealthyBlock& b : healthy.blocks) ++blocks[b.recording];
+  std::string text;
+  for (const auto& [name, count] : blocks)
+    text += fmt::format("{}{} block{} of {}", text.empty() ? "" : ", ", count, count == 1 ? "" : "s", name);
+  return text + fmt::format(", {:.2g} h", healthy.hours());
+}
+
+}  // namespace bms::workflow
