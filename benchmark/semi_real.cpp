@@ -2,13 +2,18 @@
 // that is left out. The left-out part is diagnosed as it is (a null), and with a fault of known size put into it.
 //
 // Exit code: 0 done; 2 bad usage or a file that cannot be read; 3 internal error
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <functional>
+#include <limits>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -32,21 +37,28 @@ using bms::measurement::Recording;
 
 struct Options {
   std::string data = "../shared/data", list = "benchmark/semi_real.toml", only, json;
-  bool nulls_only = false;
+  std::vector<std::string> faults;  ///< empty: all
+  double false_alarm_rate = 0.01;
+  bool nulls_only = false, without_healthy = false;
 };
 
 struct RealSet {
-  std::string name, start, calibration, test;
-  std::vector<std::string> ocv;
+  std::string name, cell, start, chemistry, test;
+  double capacity_ah = 0;
+  bool held_out = false;  ///< the rules were not developed on this cell
+  bool ocv_from_rests = false;
+  std::vector<std::string> calibration, healthy, ocv;
 };
 
 /// One diagnosis.
 struct Result {
   std::string set, fault;  ///< fault empty: a null
+  bool held_out = false;
   double size = 0;
-  std::string verdict, found;
-  bool detected = false, first_right = false;
-  std::optional<double> sigmas;  ///< of the found size from the true one
+  std::string verdict, found, withheld;
+  bool detected = false, first_right = false, named = false;
+  std::optional<double> over_limit;  ///< size over the stated detection limit
+  std::optional<double> sigmas;      ///< of the found size from the true one
   double error_v = 0, remaining_v = 0, wall_s = 0, hours = 0;
 };
 
@@ -54,7 +66,17 @@ std::vector<RealSet> read_sets(const Options& o) {
   std::vector<RealSet> sets;
   bms::files::TomlTable top = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
   for (bms::files::TomlTable& t : top.tables("set")) {
-    RealSet s{t.text("name"), t.text("start"), t.text("calibration"), "", t.texts("ocv")};
+    RealSet s;
+    s.name = t.text("name");
+    s.cell = t.text("cell");
+    s.start = t.text("start");
+    s.calibration = t.texts("calibration");
+    s.held_out = t.flag("held_out");
+    if (t.has("healthy")) s.healthy = t.texts("healthy");
+    if (t.has("ocv")) s.ocv = t.texts("ocv");
+    if (t.has("ocv_from_rests")) s.ocv_from_rests = t.flag("ocv_from_rests");
+    if (t.has("chemistry")) s.chemistry = t.text("chemistry");
+    if (t.has("capacity_ah")) s.capacity_ah = t.number("capacity_ah");
     if (t.has("test")) s.test = t.text("test");
     t.finish();
     if (s.name.find(o.only) != std::string::npos) sets.push_back(std::move(s));
@@ -98,17 +120,23 @@ Prepared prepare(const Options& o, const RealSet& set) {
   bms::workflow::IdentifyOptions options;
   options.start = set.start;
   for (const std::string& slow : set.ocv) options.ocv.push_back(path(slow));
+  options.chemistry = set.chemistry;
+  options.capacity_ah = set.capacity_ah;
+  options.ocv_from_rests = set.ocv_from_rests;
   Prepared p;
-  const Recording whole = bms::files::read_recording(path(set.calibration));
   const std::filesystem::path half = std::filesystem::temp_directory_path() / "semi_real_calibration.csv";
   if (set.test.empty()) {
+    const Recording whole = bms::files::read_recording(path(set.calibration.front()));
     bms::files::write_file(half.string(), csv_of(part(whole, 0, whole.rows() / 2)));
     options.recordings = {half.string()};
     p.test = part(whole, whole.rows() / 2, whole.rows());
   } else {
-    options.recordings = {path(set.calibration)};
+    for (const std::string& name : set.calibration) options.recordings.push_back(path(name));
     p.test = bms::files::read_recording(path(set.test));
   }
+  for (const std::string& name : set.healthy) options.healthy.push_back(path(name));
+  if (set.healthy.empty()) options.healthy = options.recordings;
+  if (o.without_healthy) options.healthy.clear();
   options.name = "calibrated";
   p.cell = *bms::workflow::identify_cell(options).cell_file;
   std::filesystem::remove(half);
@@ -122,23 +150,48 @@ std::optional<double> sigmas_of(const Finding& f, const InjectedFault& fault, do
   return (std::abs(f.setting.value[0]) - fault.first_parameter(size, capacity_ah)) / f.setting.deviation[0];
 }
 
-Result diagnose(const RealSet& set, const Prepared& p, const Recording& recording, const InjectedFault* fault,
-                double size) {
+bms::diagnosis::Diagnosis diagnose(const Options& o, const Prepared& p,
+                                   const bms::diagnosis::PreparedRecording& record) {
+  bms::diagnosis::Options options;
+  options.healthy = p.cell.healthy;
+  options.false_alarm_rate = o.false_alarm_rate;
+  return bms::diagnosis::diagnose(p.cell.parameters, p.cell.mechanisms, {record}, options);
+}
+
+std::string id_of(std::size_t mechanism) {
+  return mechanism == bms::diagnosis::no_mechanism ? bms::measurement::unknown_cause
+                                                   : std::string(bms::model::catalogue[mechanism].id);
+}
+
+std::string withheld_of(const bms::diagnosis::Diagnosis& d) {
+  std::string text;
+  for (const bms::diagnosis::Withheld& w : d.withheld)
+    text += fmt::format("{}{} p {:.2g}", text.empty() ? "" : ", ", id_of(w.mechanism), w.healthy.false_alarm);
+  return text;
+}
+
+Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const Recording& recording,
+                const InjectedFault* fault, double size, std::map<std::string, double>& limits) {
   const auto begin = std::chrono::steady_clock::now();
-  bms::workflow::DiagnoseInput input{p.cell, {}, {}, {}};
-  const double start = recording.soc_ref.empty() ? 0.5 : recording.soc_ref.front();
-  input.recordings.push_back(
-      bms::workflow::prepared(recording, set.name, p.cell, bms::workflow::given_start(p.cell, start)));
-  bms::diagnosis::PreparedRecording record = input.recordings.front().record;
-  const bms::diagnosis::Diagnosis d = bms::diagnosis::diagnose(p.cell.parameters, p.cell.mechanisms, {record});
+  const bms::diagnosis::PreparedRecording record =
+      bms::workflow::prepared(recording, set.name, p.cell, bms::workflow::start_of(recording, p.cell)).record;
+  const bms::diagnosis::Diagnosis d = diagnose(o, p, record);
   Result r;
   r.set = set.name;
   r.fault = fault == nullptr ? "" : std::string(fault->id);
+  r.held_out = set.held_out;
   r.size = size;
+  if (fault == nullptr) {
+    for (const bms::diagnosis::DetectionLimit& l : d.limits) limits[id_of(l.mechanism)] = l.value;
+  } else if (fault->first_parameter != nullptr && limits.contains(std::string(fault->id))) {
+    r.over_limit = fault->first_parameter(size, p.cell.parameters.capacity_ah) / limits.at(std::string(fault->id));
+  }
+  r.withheld = withheld_of(d);
+  r.named = bms::diagnosis::names(d.verdict);
   r.verdict = bms::diagnosis::name_of(d.verdict);
   r.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.hours = recording.duration_s() / 3'600;
-  r.detected = d.verdict != bms::diagnosis::Verdict::no_mismatch;
+  r.detected = r.named || d.verdict == bms::diagnosis::Verdict::unknown;
   r.remaining_v = d.unexplained_rmse_v;
   bms::measurement::MeanSquare error;
   for (std::size_t k = 0; !d.views.empty() && k < record.size(); ++k) {
@@ -161,13 +214,16 @@ Result diagnose(const RealSet& set, const Prepared& p, const Recording& recordin
 }
 
 std::string line_of(const Result& r) {
-  return fmt::format("{:50} {:20} {:<7.3g} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}\n", r.set,
-                     r.fault.empty() ? "(healthy)" : r.fault, r.size, r.verdict, 1e3 * r.error_v, 1e3 * r.remaining_v,
-                     r.wall_s, r.found);
+  return fmt::format("{:40} {:20} {:<7.3g} {:6} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}{}\n", r.set,
+                     r.fault.empty() ? "(healthy)" : r.fault, r.size,
+                     r.over_limit ? fmt::format("{:.2g} L", *r.over_limit) : "-", r.verdict, 1e3 * r.error_v,
+                     1e3 * r.remaining_v, r.wall_s, r.found, r.withheld.empty() ? "" : " | withheld: " + r.withheld);
 }
 
+using Which = std::function<bool(const Result&)>;
+
 /// "3 of 12".
-std::string share(const std::vector<Result>& results, bool (*counts)(const Result&), bool (*yes)(const Result&)) {
+std::string share(const std::vector<Result>& results, const Which& counts, const Which& yes) {
   std::size_t of = 0, n = 0;
   for (const Result& r : results) {
     if (!counts(r)) continue;
@@ -177,33 +233,52 @@ std::string share(const std::vector<Result>& results, bool (*counts)(const Resul
   return fmt::format("{} of {}", n, of);
 }
 
+std::string hours_of(const std::vector<Result>& results, bool held_out) {
+  double hours = 0;
+  for (const Result& r : results) hours += r.fault.empty() && r.held_out == held_out ? r.hours : 0;
+  return fmt::format("{:.1f} h", hours);
+}
+
 std::string table_of(const std::vector<Result>& results) {
-  const auto healthy = [](const Result& r) { return r.fault.empty(); };
-  const auto faulty = [](const Result& r) { return !r.fault.empty(); };
-  const auto named = [](const Result& r) { return r.verdict.starts_with("CAUSE") || r.verdict == "AMBIGUOUS"; };
-  double hours = 0, slowest_s = 0;
-  for (const Result& r : results) {
-    hours += r.fault.empty() ? r.hours : 0;
-    slowest_s = std::max(slowest_s, r.wall_s);
-  }
-  std::string text = "\n| figure | value |\n|---|---|\n";
-  text +=
-      fmt::format("| healthy, left out: a cause is named | {} in {:.1f} h |\n", share(results, healthy, named), hours);
-  text += "| healthy, left out: UNKNOWN or a data fault | " +
-          share(results, healthy,
-                [](const Result& r) {
-                  return r.verdict == "UNKNOWN" || r.verdict == "DATA_FAULT" || r.verdict == "NOT_TESTABLE";
-                }) +
-          " |\n";
-  text += "| faults: detected | " + share(results, faulty, [](const Result& r) { return r.detected; }) + " |\n";
-  text +=
-      "| faults: first name right | " + share(results, faulty, [](const Result& r) { return r.first_right; }) + " |\n";
-  text += "| size within two of its standard deviations | " +
-          share(
-              results, [](const Result& r) { return r.sigmas.has_value(); },
-              [](const Result& r) { return std::abs(*r.sigmas) <= 2; }) +
-          " |\n";
-  return text + fmt::format("| slowest diagnosis | {:.0f} s |\n", slowest_s);
+  std::string text = "\n| figure | development cells | held-out cells |\n|---|---|---|\n";
+  const auto row = [&](const char* name, const Which& counts, const Which& yes) {
+    text += fmt::format("| {} |", name);
+    for (const bool held_out : {false, true})
+      text += " " +
+              share(
+                  results, [&](const Result& r) { return r.held_out == held_out && counts(r); }, yes) +
+              " |";
+    text += "\n";
+  };
+  const Which healthy = [](const Result&r) { return r.fault.empty(); }, named = [](const Result&r) { return r.named; },
+              right = [](const Result&r) { return r.first_right; },
+              wrong = [](const Result&r) { return r.named && !r.first_right; };
+  const auto verdict = [](std::string_view what) -> Which {
+    return [what](const Result& r) { return r.verdict == what; };
+  };
+  const auto limits = [](double low, double high) -> Which {
+    return [=](const Result& r) {
+      return !r.fault.empty() && r.over_limit && *r.over_limit >= low && *r.over_limit < high;
+    };
+  };
+  const double no_end = std::numeric_limits<double>::infinity();
+  text += fmt::format("| healthy, left out | {} | {} |\n", hours_of(results, false), hours_of(results, true));
+  row("a cause is named", healthy, named);
+  row("UNKNOWN", healthy, verdict("UNKNOWN"));
+  row("not enough healthy data, or not testable", healthy, verdict("NOT_TESTABLE"));
+  row("data fault", healthy, verdict("DATA_FAULT"));
+  row("fault of twice its detection limit and above: first name right", limits(2, no_end), right);
+  row("the same: another name first", limits(2, no_end), wrong);
+  row("of half to twice the limit: first name right", limits(0.5, 2), right);
+  row("of half the limit and below: another name first", limits(0, 0.5), wrong);
+  row(
+      "without a limit: another name first", [](const Result& r) { return !r.fault.empty() && !r.over_limit; }, wrong);
+  row(
+      "size within two of its standard deviations", [](const Result& r) { return r.sigmas.has_value(); },
+      [](const Result& r) { return std::abs(*r.sigmas) <= 2; });
+  double slowest_s = 0;
+  for (const Result& r : results) slowest_s = std::max(slowest_s, r.wall_s);
+  return text + fmt::format("\nSlowest diagnosis: {:.0f} s.\n", slowest_s);
 }
 
 std::string json_of(const std::vector<Result>& results) {
@@ -212,8 +287,11 @@ std::string json_of(const std::vector<Result>& results) {
     list.push_back({{"set", r.set},
                     {"fault", r.fault},
                     {"size", r.size},
+                    {"held_out", r.held_out},
                     {"verdict", r.verdict},
                     {"found", r.found},
+                    {"withheld", r.withheld},
+                    {"over_limit", r.over_limit ? nlohmann::ordered_json(*r.over_limit) : nlohmann::ordered_json()},
                     {"first_right", r.first_right},
                     {"sigmas", r.sigmas ? nlohmann::ordered_json(*r.sigmas) : nlohmann::ordered_json()},
                     {"error_v", r.error_v},
@@ -230,15 +308,26 @@ void run(const Options& o) {
     std::fflush(stdout);
     results.push_back(std::move(r));
   };
+  const auto wanted = [&](std::string_view id) {
+    return o.faults.empty() || std::find(o.faults.begin(), o.faults.end(), id) != o.faults.end();
+  };
   for (const RealSet& set : read_sets(o)) {
-    const Prepared p = prepare(o, set);
-    add(diagnose(set, p, p.test, nullptr, 0));
+    Prepared p;
+    try {
+      p = prepare(o, set);
+    } catch (const std::runtime_error& error) {  // no cell file, no case
+      fmt::print("{:40} no cell file: {}\n", set.name, error.what());
+      continue;
+    }
+    std::map<std::string, double> limits;
+    add(diagnose(o, set, p, p.test, nullptr, 0, limits));
     if (o.nulls_only) continue;
     for (const InjectedFault& fault : injected_faults) {
       for (const double size : fault.size) {
+        if (!wanted(fault.id)) continue;
         Recording r = p.test;
         fault.put(r, size, p.cell.parameters.capacity_ah);
-        add(diagnose(set, p, r, &fault, size));
+        add(diagnose(o, set, p, r, &fault, size, limits));
       }
     }
   }
@@ -257,6 +346,10 @@ int main(int argc, char** argv) {
   app.add_option("--list", o.list, "sets of recordings")->capture_default_str()->type_name("FILE");
   app.add_option("--only", o.only, "run only sets whose name contains TEXT")->type_name("TEXT");
   app.add_option("--json", o.json, "write every result to FILE")->type_name("FILE");
+  app.add_option("--faults", o.faults, "kinds of fault to put in, for example channel_skew; all if not given")
+      ->type_name("ID");
+  app.add_option("--false-alarm-rate", o.false_alarm_rate, "as of bms diagnose")->capture_default_str();
+  app.add_flag("--without-healthy", o.without_healthy, "learn nothing from the healthy recordings");
   app.add_flag("--nulls-only", o.nulls_only, "put in no faults");
   try {
     app.parse(argc, argv);
