@@ -62,7 +62,7 @@ TEST_F(Installed, ToolBuildsFirmwareFromWhatIsInstalled) {
   EXPECT_THAT(output(), HasSubstr("every bit equal on netduinoplus2"));
   const std::string built = content(cache + "/greybox-bms/netduinoplus2/build.ninja");
   EXPECT_THAT(built,
-              AllOf(HasSubstr(path("share/greybox/source/estimator")), Not(HasSubstr(BMS_SOURCE_DIR "/estimator"))));
+              AllOf(HasSubstr(path("share/greybox/source/firmware")), Not(HasSubstr(BMS_SOURCE_DIR "/firmware"))));
   EXPECT_FALSE(std::filesystem::exists(path("share/greybox/source/build")));
 }
 
