@@ -1,0 +1,183 @@
+#!/usr/bin/env bash
+# The ways to use greybox-bms elsewhere, each in a Debian that has never seen the project. What is committed is tried.
+#
+#   bare_debian.sh FOLDER package|install|find|subdirectory|cores|python
+#
+#   package       makes the Debian package, installs it in another bare Debian, and uses tool, manual and completions
+#   install       cmake --install into a prefix of its own; sources and build are then hidden
+#   find          a project with find_package(greybox), with the package
+#   subdirectory  a project with add_subdirectory(), and one with FetchContent
+#   cores         the first project for a Cortex-M4F and a Cortex-M0, and the firmware of an emulated board
+#   python        pip install --no-build-isolation with Debian's packages; the tests of the module
+#
+# FOLDER is made once by debootstrap, from this machine's package sources; each way works on a copy. package comes
+# first: the others use its package from FOLDER. Prints seconds of each step. Needs root and debootstrap.
+set -euo pipefail
+[ $# -eq 2 ] || { sed -n '2,15s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+project=$(cd "$(dirname "$0")/../.." && pwd)
+folder=$(realpath -m "$1") way=$2
+base=$folder/bare deb=$folder/greybox-bms.deb
+say() { echo "bare_debian: $*" >&2; }
+[ "$(id -u)" = 0 ] || { say "not root, which a chroot needs"; exit 2; }
+case $way in
+  package) ;;
+  install | find | subdirectory | cores | python) [ -f "$deb" ] || { say "no $deb, run package first"; exit 2; } ;;
+  *) say "no such way '$way', expected package, install, find, subdirectory, cores or python"; exit 2 ;;
+esac
+
+make_base() {
+  local url
+  [ ! -x "$base/usr/bin/git" ] || return 0
+  mkdir -p "$folder"
+  url=$(sed -n 's/^URIs: *//p' /etc/apt/sources.list.d/debian.sources | head -1)
+  debootstrap --variant=minbase --include=git,ca-certificates bookworm "$base" "$url" >"$folder/debootstrap.log" 2>&1 ||
+    { tail -5 "$folder/debootstrap.log" >&2; exit 3; }
+  rm -f "$base/etc/apt/sources.list"
+  cp -a /etc/apt/sources.list.d/debian.sources "$base/etc/apt/sources.list.d/"
+  grep -ls Acquire /etc/apt/apt.conf.d/* | xargs -r -I{} cp -a {} "$base/etc/apt/apt.conf.d/"
+  cp -a /usr/share/keyrings/. "$base/usr/share/keyrings/"
+  cp -a /etc/ssl/certs "$base/etc/ssl/" 2>/dev/null || true
+}
+
+mounted=()
+release() {
+  local root mount
+  for root in "${mounted[@]}"; do
+    for mount in sys dev proc; do umount -l "$root/$mount" 2>/dev/null || true; done
+    # never delete through a mount that would not come off
+    if ! grep -q " $root/" /proc/mounts; then rm -rf --one-file-system "$root"; fi
+  done
+}
+trap release EXIT
+
+open_root() {
+  local mount
+  mounted+=("$1")
+  cp /etc/resolv.conf "$1/etc/resolv.conf" 2>/dev/null || true
+  for mount in proc dev sys; do mount --bind "/$mount" "$1/$mount"; done
+}
+
+# fresh NAME: a copy of the bare Debian with the project in /opt/project; sets root
+fresh() {
+  root=$folder/$1
+  rm -rf --one-file-system "$root"
+  cp -a "$base" "$root"
+  git clone -q "$project" "$root/opt/project"
+  cp "$deb" "$root/opt/" 2>/dev/null || true
+  open_root "$root"
+}
+
+# step NAME: runs the commands of standard input in the root, in /opt/project
+step() {
+  local start=$SECONDS name=$1
+  # shellcheck disable=SC2046
+  env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root TERM=dumb LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
+    $(env | grep -iE '^(https?_proxy|no_proxy|SSL_CERT_FILE)=' || true) \
+    chroot "$root" bash -c 'cd /opt/project && set -euo pipefail && . /dev/stdin' >"$folder/$way.log" 2>&1 ||
+    { tail -20 "$folder/$way.log" >&2; say "$way: $name failed, its output is $folder/$way.log"; exit 1; }
+  echo "$way: $name: $((SECONDS - start)) s"
+}
+
+# packages NAME...: installs them in the root
+packages() {
+  step "packages" <<<"apt-get update && apt-get install -y --no-install-recommends $*"
+}
+
+consumer='cp -r tests/package/consumer /opt/consumer && cp model/cells/table9.toml /opt/consumer/my_cell.toml'
+# consume NAME OPTIONS: configures and builds the project of another
+consume() {
+  step "$1" <<<"$consumer; cmake -G Ninja -S /opt/consumer -B /opt/build_$1 -DGREYBOX_SOURCE=/opt/project \
+    -DEXAMPLES=/opt/project/library/examples $2 && cmake --build /opt/build_$1"
+}
+
+way_package() {
+  fresh building
+  step "build, with the packages that it needs" <<<'./bms package'
+  cp "$root"/opt/project/build/host/package/*.deb "$deb"
+  fresh using
+  step "installation" <<<'rm -rf /opt/project/*; apt-get update &&
+    apt-get install -y --no-install-recommends /opt/*.deb'
+  step "use" <<'COMMANDS'
+cd /
+bms --version
+bms replay /usr/share/greybox/recordings/forklift_shift.csv --report /tmp/shift.html --json /tmp/shift.json
+bms cell header table9 --out /tmp/cell.hpp && grep -q greybox/model.hpp /tmp/cell.hpp
+test -s /tmp/shift.html && cd /usr/share/greybox && test -f can/greybox_bms.dbc && test -f cells/table9.toml
+! readelf -S /usr/bin/bms 2>/dev/null | grep -q debug_info
+COMMANDS
+  packages man-db bash-completion zsh fish
+  step "manual and completions" <<'COMMANDS'
+# a bare Debian leaves man pages out; taken from the package itself
+dpkg-deb -x /opt/*.deb /tmp/content
+test -z "$(man --warnings -l /tmp/content/usr/share/man/man1/bms-replay.1 2>&1 >/dev/null)"
+man -l /tmp/content/usr/share/man/man1/bms.1 | grep -q bms-replay
+. /usr/share/bash-completion/completions/bms
+COMP_WORDS=(bms replay --scalar '') COMP_CWORD=3
+_bms && [ "${COMPREPLY[*]}" = "float fixed double" ]
+fish -c 'complete -C "bms rep"' | grep -q '^replay'
+fish -c 'complete -C "bms replay --scalar d"' | grep -q '^double'
+zsh -n /usr/share/zsh/vendor-completions/_bms
+zsh -c 'autoload -U compinit && compinit -u && [[ $_comps[bms] = _bms ]]'
+COMMANDS
+}
+
+# Installs the same build into a prefix and hides sources and build: nothing may be taken from there.
+way_install() {
+  fresh installing
+  step "build, with the packages that it needs" <<<'./bms cell show table9 &&
+    cmake --build build/host --target manual'
+  step "cmake --install" <<<'cmake --install build/host --prefix /opt/prefix && mv /opt/project /opt/hidden &&
+    mkdir /opt/project'
+  step "use" <<'COMMANDS'
+cd /
+export PATH=/opt/prefix/bin:$PATH
+bms replay /opt/prefix/share/greybox/recordings/forklift_shift.csv --quiet --report /tmp/shift.html
+[ "$(stat -c %s /opt/prefix/bin/bms)" -lt 20000000 ]
+test -f /opt/prefix/share/man/man1/bms-replay.1
+test -f /opt/prefix/share/bash-completion/completions/bms
+test -f /opt/prefix/share/cmake/greybox/greyboxConfig.cmake
+COMMANDS
+}
+
+way_find() {
+  fresh finding
+  packages /opt/greybox-bms.deb cmake ninja-build g++
+  consume find -DGREYBOX_BY=find
+  step "examples" <<<'cd /opt/build_find && test "$(./in_c)" = "$(./in_cpp)" && ./in_c | grep "60 s"'
+}
+
+way_subdirectory() {
+  fresh adding
+  packages /opt/greybox-bms.deb cmake ninja-build g++
+  consume subdirectory -DGREYBOX_BY=subdirectory
+  step "examples" <<<'cd /opt/build_subdirectory && test "$(./in_c)" = "$(./in_cpp)" && ./in_c | grep "60 s"'
+  step "remove" <<<'rm -r /opt/consumer'
+  consume fetch -DGREYBOX_BY=fetch
+}
+
+way_cores() {
+  local toolchain="--toolchain /opt/project/cmake/toolchain-arm-none-eabi.cmake" m4f m0
+  m4f="-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16" m0="-mcpu=cortex-m0 -mthumb"
+  fresh crossing
+  packages /opt/greybox-bms.deb cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi \
+    libstdc++-arm-none-eabi-newlib qemu-system-arm python3-canmatrix
+  consume m4f "-DGREYBOX_BY=find -DCMAKE_FIND_ROOT_PATH=/usr -DCMAKE_C_FLAGS='$m4f' -DCMAKE_CXX_FLAGS='$m4f' $toolchain"
+  step "remove" <<<'rm -r /opt/consumer'
+  consume m0 "-DGREYBOX_BY=find -DCMAKE_FIND_ROOT_PATH=/usr -DBMS_FIXED=FIXED -DCMAKE_C_FLAGS='$m0' \
+    -DCMAKE_CXX_FLAGS='$m0' $toolchain"
+  step "firmware of an emulated board by the installed tool" <<<'rm -rf /opt/project/*; cd / && bms replay \
+    /usr/share/greybox/recordings/forklift_shift.csv --target netduinoplus2 --verify'
+}
+
+way_python() {
+  fresh python
+  packages /opt/greybox-bms.deb pybind11-dev python3-dev python3-numpy python3-setuptools python3-wheel python3-pip \
+    "$(sed -n '/^host_packages="/,/"$/s/^\([a-z0-9+.-]*\):.*/\1/p' "$project/bms" | tr '\n' ' ')"
+  step "pip install" <<<'cd python && pip install --no-build-isolation --no-index --break-system-packages .'
+  step "tests of the module" <<<'cd / && BMS_TOOL=/usr/bin/bms BMS_SOURCE_DIR=/opt/project \
+    python3 /opt/project/tests/python/module_test.py'
+}
+
+make_base
+"way_$way"
+say "$way: done in $SECONDS s"
