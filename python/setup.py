@@ -2,6 +2,7 @@
 import os
 import pathlib
 import re
+import shlex
 import subprocess
 import sys
 
@@ -19,7 +20,8 @@ class CMakeBuild(build_ext):
         build.mkdir(parents=True, exist_ok=True)
         generator = ["-G", "Ninja"] if self.has("ninja") else []
         self.run_step(["cmake", "-S", ROOT, "-B", build, *generator, "-DBMS_PYTHON_MODULE=ON", "-DBMS_TESTS=OFF",
-                       "-DCMAKE_BUILD_TYPE=Release", f"-DPython3_EXECUTABLE={sys.executable}"])
+                       "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG",
+                       f"-DPython3_EXECUTABLE={sys.executable}", *shlex.split(os.environ.get("CMAKE_ARGS", ""))])
         jobs = os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or str(os.cpu_count() or 1)
         self.run_step(["cmake", "--build", build, "--target", "bms_python", "--parallel", jobs])
         target = pathlib.Path(self.get_ext_fullpath(ext.name)).resolve()
