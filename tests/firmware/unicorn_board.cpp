@@ -470,7 +470,8 @@ std::uint64_t UnicornBoard::instructions_to_event() const {
   const std::uint64_t bit_ticks = ticks_per_second / can.bits_per_second;
   const std::uint64_t to_bit = next_bit_ > ticks_ ? next_bit_ - ticks_ : 1;
   const double lse_hz = rtc != nullptr ? rtc->lse_hz() : 0;
-  const double us = std::min(longest_run_us, timer.capture_after_us(rcc.lsi_hz_now(now_us()), lse_hz));
+  const double most_us = longest_sleep_us > 0 ? longest_sleep_us : longest_run_us;
+  const double us = std::min(most_us, timer.capture_after_us(rcc.lsi_hz_now(now_us()), lse_hz));
   std::uint64_t ticks = std::min(static_cast<std::uint64_t>(us * ticks_a_us), to_bit + can.quiet_bits() * bit_ticks);
   if (run_until_ticks_ > ticks_) ticks = std::min(ticks, run_until_ticks_ - ticks_);
   if ((systick_csr_ & 1) != 0 && next_systick_ > ticks_) ticks = std::min(ticks, next_systick_ - ticks_);
@@ -483,17 +484,14 @@ std::uint64_t UnicornBoard::run_by_instructions() {
   return count;
 }
 
+/// Where the next block would reach beyond the event, single instructions do.
 std::uint64_t UnicornBoard::run_by_blocks() {
-  const std::uint64_t limit = instructions_to_event();
   passed_ = 0;
   soon_ends_ = false;
-  const UnicornCore::Run run = core_.run_blocks(reg(UC_ARM_REG_PC), limit);
+  const UnicornCore::Run run = core_.run_blocks(reg(UC_ARM_REG_PC), instructions_to_event());
+  if (run.at_limit && run.instructions == 0) return run_by_instructions();
   ended(run);
-  const std::uint64_t left = run.instructions - passed_;
-  const bool to_event = run.at_limit && !soon_ends_ && stall_us <= 0;
-  if (!to_event && run.instructions > 0) return left;
-  pass_instructions(left);
-  return run_by_instructions();
+  return run.instructions - passed_;
 }
 
 void UnicornBoard::slice() {
