@@ -17,7 +17,12 @@ namespace fs = std::filesystem;
 using files::BadInput;
 using Json = nlohmann::ordered_json;
 
-/// Quotes what a shell would not take as one word.
+Json settings_of(const Depot& depot) {
+  return {{"task", name_of(depot.task)}, {"arguments", depot.arguments}, {"pages", name_of(depot.pages)}};
+}
+
+}  // namespace
+
 std::string shell_word(const std::string& text) {
   constexpr std::string_view plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=:,+%@";
   if (!text.empty() && text.find_first_not_of(plain) == std::string::npos) return text;
@@ -25,12 +30,6 @@ std::string shell_word(const std::string& text) {
   for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return quoted + "'";
 }
-
-Json settings_of(const Depot& depot) {
-  return {{"task", name_of(depot.task)}, {"arguments", depot.arguments}, {"pages", name_of(depot.pages)}};
-}
-
-}  // namespace
 
 Task task_of(const std::string& name) {
   for (const Task task : {Task::replay, Task::identify, Task::diagnose}) {

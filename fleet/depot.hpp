@@ -57,6 +57,8 @@ Depot read_depot(const std::filesystem::path& folder, const std::string& version
 /// Arguments of the tool for a unit, without its program. json: "-" prints it. page: empty for none.
 std::vector<std::string> arguments_of(const Depot& depot, const Unit& unit, const std::string& json,
                                       const std::string& page, const std::string& identified);
+/// Quotes what a shell would not take as one word.
+std::string shell_word(const std::string& text);
 /// A command that repeats a unit, for a shell.
 std::string command_of(const Depot& depot, const Unit& unit);
 

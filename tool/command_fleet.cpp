@@ -8,8 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "files/bad_input.hpp"
+#include "fleet/analysis.hpp"
 #include "fleet/run.hpp"
+#include "fleet/slurm.hpp"
 #include "fleet/table.hpp"
+#include "reports/fleet_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 
@@ -37,6 +40,10 @@ struct FleetOptions {
   std::string manifest, task, out, cell = "table9", pages = "all", part;
   std::vector<std::string> arguments;
   std::size_t jobs = std::max(1U, std::thread::hardware_concurrency());
+  std::string engine = "local";
+  bool dry_run = false;
+  fleet::SlurmOptions slurm;
+  fleet::AnalysisOptions analysis;
   Output output;
 };
 
@@ -84,17 +91,21 @@ class RunAction {
     c.add_option("--out", o_.out, "folder of the results")->required()->check(not_empty())->type_name("DIR");
     c.add_option("--cell", o_.cell, cell_help("of recordings for which the manifest names no cell"))
         ->capture_default_str();
-    c.add_option("--jobs", o_.jobs, "recordings at a time")->check(CLI::Range(1, 1'024))->capture_default_str();
+    jobs_ = c.add_option("--jobs", o_.jobs, "recordings at a time; with slurm 1 if not given")
+                ->check(CLI::Range(1, 1'024))
+                ->capture_default_str();
     c.add_option("--pages", o_.pages, "recordings with a page of their own: all, those with a finding, or none")
         ->check(CLI::IsMember({"all", "found", "none"}))
         ->capture_default_str();
     c.add_option("--part", o_.part, "only every N-th recording, from the K-th; does not merge")->type_name("K/N");
     c.add_option("arguments", o_.arguments, "options of the task, after --");
+    add_slurm(c);
     add_json(c, o_.output);
     return &c;
   }
 
   int run() {
+    if (o_.engine == "slurm") return run_slurm();
     fleet::RunOptions options;
     set_part(o_.part, options);
     const fleet::Depot depot = depot_of(o_);
@@ -117,6 +128,53 @@ class RunAction {
   }
 
  private:
+  void add_slurm(CLI::App& c) {
+    c.add_option("--engine", o_.engine, "local: this computer; slurm: a job array and a job that merges")
+        ->check(CLI::IsMember({"local", "slurm"}))
+        ->capture_default_str();
+    c.add_flag("--dry-run", o_.dry_run, "slurm: print the scripts and submit nothing");
+    c.add_option("--units-per-task", o_.slurm.units_per_task, "slurm: recordings for each task of the array")
+        ->check(CLI::Range(1, 1'000'000))
+        ->capture_default_str();
+    c.add_option("--most-tasks", o_.slurm.most_tasks, "slurm: largest array that the cluster takes")
+        ->check(CLI::Range(1, 1'000'000))
+        ->capture_default_str();
+    c.add_option("--at-once", o_.slurm.at_once, "slurm: tasks at the same time; 0: no limit");
+    c.add_option("--partition", o_.slurm.partition, "slurm: partition");
+    c.add_option("--time", o_.slurm.time_limit, "slurm: limit of a task, such as 02:00:00");
+    c.add_option("--memory", o_.slurm.memory, "slurm: memory of a task, such as 2G");
+    c.add_option("--module", o_.slurm.modules, "slurm: module to load, repeatable")
+        ->allow_extra_args(false)
+        ->take_all();
+    c.add_option("--sbatch", o_.slurm.sbatch, "slurm: further option of sbatch, such as --sbatch=--account=bms")
+        ->allow_extra_args(false)
+        ->take_all();
+  }
+
+  int run_slurm() {
+    if (!o_.part.empty()) throw BadInput("--part", 1, "set by the job array, expected no --part");
+    const fleet::Depot depot = depot_of(o_);
+    open_depot(depot);
+    const std::size_t units = fleet::write_manifest(o_.manifest, o_.cell, depot.manifest());
+    // one process at a time is what a cluster counts on
+    o_.slurm.jobs = jobs_->count() > 0 ? o_.jobs : 1;
+    const fleet::SlurmScripts scripts =
+        slurm_scripts(depot, std::filesystem::read_symlink("/proc/self/exe"), units, o_.slurm);
+    if (o_.dry_run) {
+      print_summary(o_.output, scripts.units + "\n" + scripts.merge);
+      return 0;
+    }
+    const fleet::SlurmJobs jobs = submit(depot, scripts);
+    const nlohmann::ordered_json json = {{"command", "fleet run"},  {"engine", "slurm"},
+                                         {"recordings", units},     {"tasks", scripts.tasks},
+                                         {"array_job", jobs.array}, {"merge_job", jobs.merge}};
+    if (!o_.output.json.empty()) write_output(o_.output.json, json.dump(1) + "\n");
+    print_summary(o_.output,
+                  fmt::format("{} recordings in {} tasks: job {}; job {} merges them into {}.", units, scripts.tasks,
+                              jobs.array, jobs.merge, (depot.folder / "fleet.sqlite").string()));
+    return 0;
+  }
+
   int report(const fleet::Depot& depot, const fleet::RunCounts& counts, const fleet::MergeCounts& merged) {
     const nlohmann::ordered_json json = {
         {"command", "fleet run"},     {"task", name_of(depot.task)},       {"out", depot.folder.string()},
@@ -136,6 +194,7 @@ class RunAction {
   }
 
   FleetOptions& o_;
+  CLI::Option* jobs_ = nullptr;
 };
 
 class FleetCommand final : public Command {
@@ -149,12 +208,54 @@ class FleetCommand final : public Command {
     merge_->footer("Example: bms fleet merge depot");
     merge_->add_option("folder", o_.out, "folder of the results")->required()->check(not_empty())->type_name("DIR");
     add_json(*merge_, o_.output);
+    report_ = c.add_subcommand("report", "Say what to visit first and why, how cells age, and list every recording");
+    report_->footer("Example: bms fleet report depot --report depot.html");
+    report_->add_option("folder", o_.out, "folder of the results")->required()->check(not_empty())->type_name("DIR");
+    report_
+        ->add_option("--false-discovery-rate", o_.analysis.false_discovery_rate,
+                     "share of the places to visit that may be healthy")
+        ->check(Within(1e-6, 0.5))
+        ->capture_default_str();
+    report_->add_option("--resistance-limit", o_.analysis.resistance_limit, "growth at which a cell is replaced")
+        ->check(Within(0.01, 10.0))
+        ->capture_default_str();
+    report_->add_option("--capacity-limit", o_.analysis.capacity_limit, "loss at which a cell is replaced")
+        ->check(Within(0.01, 0.9))
+        ->capture_default_str();
+    add_output(*report_, o_.output);
     return &c;
   }
 
-  int run() override { return run_->parsed() ? action_.run() : run_merge(); }
+  int run() override {
+    if (run_->parsed()) return action_.run();
+    return report_->parsed() ? run_report() : run_merge();
+  }
 
  private:
+  int run_report() {
+    const fleet::Depot depot = fleet::read_depot(std::filesystem::absolute(o_.out).lexically_normal(), BMS_VERSION);
+    const auto table = depot.folder / "fleet.sqlite";
+    o_.output.set_own("");
+    o_.output.protect({table.string(), (depot.folder / "fleet.csv").string(), depot.manifest().string()});
+    if (depot.task != fleet::Task::diagnose)
+      throw BadInput(depot.folder.string(), 1,
+                     std::string("holds results of the task ") + name_of(depot.task) + ", expected those of diagnose");
+    const fleet::History history = fleet::read_history(table);
+    const fleet::Analysis analysis = analyse(history, o_.analysis);
+    if (!o_.output.json.empty()) write_output(o_.output.json, reports::json_of(history, analysis));
+    if (!o_.output.report.empty()) {
+      const auto from = std::filesystem::absolute(o_.output.report).lexically_normal().parent_path();
+      write_output(o_.output.report,
+                   reports::fleet_report(history, analysis, depot.folder.lexically_relative(from).string()));
+    }
+    std::string text;
+    for (const fleet::Issue& issue : analysis.issues) {
+      if (issue.confirmed) text += reports::statement(history, issue) + "\n";
+    }
+    print_summary(o_.output, text.empty() ? "No battery needs a visit." : text.substr(0, text.size() - 1));
+    return 0;
+  }
+
   /// Exit code 1 if a recording has no result.
   int run_merge() {
     const fleet::Depot depot = fleet::read_depot(std::filesystem::absolute(o_.out).lexically_normal(), BMS_VERSION);
@@ -172,6 +273,7 @@ class FleetCommand final : public Command {
   RunAction action_{o_};
   CLI::App* run_ = nullptr;
   CLI::App* merge_ = nullptr;
+  CLI::App* report_ = nullptr;
 };
 
 }  // namespace
