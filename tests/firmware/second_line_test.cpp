@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/board_design.hpp"
+#include "protection/contactor_plan.hpp"
 #include "tests/cells.hpp"
 
 namespace bms::firmware {
@@ -119,6 +121,29 @@ TEST(SecondLineOfTheFrontEnd, ABoardWithOtherThresholdsIsNotWiderAndSlower) {
   hal::bq76952::Board fast = table9.board;
   fast.overcurrent_delay_s = 0.2;
   EXPECT_FALSE(overcurrent_is_wider_and_slower(second_line(hal::bq76952::settings(fast), 0.1), table9.rules, period_s));
+}
+
+/// This test is compiled for another truck than the forklift board's: bms_board_of_another_truck in
+/// tests/CMakeLists.txt.
+TEST(BoardDesign, TakesTheTruckFromTheSettingsOfTheBoard) {
+  const protection::PackDesign design = board_design(lfp_200ah, 200);
+  const protection::ContactorPlan plan = protection::contactor_plan(design);
+  EXPECT_EQ(design.cells, 8U);
+  EXPECT_EQ(plan.half_time_constant_us, 500'000U);
+  EXPECT_EQ(plan.max_closing_gap_uv, 8'000'000) << "400 A through 20 mohm";
+  EXPECT_TRUE(possible_truck(design));
+  const protection::Rules rules = protection::rules_of(protection::protection_table(design));
+  EXPECT_DOUBLE_EQ(front_end_board(design, rules).short_circuit_a, 2'000) << "more than main plus makes";
+}
+
+TEST(BoardDesign, RefusesATruckForWhichThePrechargeCannotBeChecked) {
+  const protection::PackDesign design = board_design(lfp_200ah, 200);
+  protection::PackDesign quick = design, slow = design, open = design, far = design;
+  quick.precharge_time_constant_s = 0.1;
+  slow.precharge_time_constant_s = 5;
+  open.closing_current_max_a = 0;
+  far.closing_loop_ohm = 0.04;
+  for (const protection::PackDesign& truck : {quick, slow, open, far}) EXPECT_FALSE(possible_truck(truck));
 }
 
 TEST(SecondLineOfTheFrontEnd, APackOfFewerCellsHasItsInputs) {
