@@ -4,6 +4,10 @@
 #include "firmware/front_end/second_line.hpp"
 
 #include <bit>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -98,6 +102,24 @@ TEST(SecondLineOfTheFrontEnd, FollowsTheCurrentsOfTheCell) {
   EXPECT_DOUBLE_EQ(hal::bq76952::current_end_a(of_lfp_200ah.board), 2'000) << "200 mV at 0.1 mOhm";
   EXPECT_NEAR(of_lfp_200ah.line.overcurrent_s, 0.42, 0.002);
   EXPECT_NEAR(of_lfp_200ah.line.high_overcurrent_s, 0.35, 0.002);
+}
+
+/// The table in the README of the driver, which is written by hand.
+TEST(SecondLineOfTheFrontEnd, IsThatOfTheReadme) {
+  std::ifstream file(BMS_SOURCE_DIR "/hal/bq76952/README.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  const auto has = [&](const char* row, double threshold, double delay) {
+    char text[100];
+    std::snprintf(text, sizeof text, row, threshold, delay);
+    EXPECT_NE(page.find(text), page.npos) << text;
+  };
+  const SecondLine& line = table9.line;
+  has("| COV | DCHG | %.3f V | %.1f s |", line.overvoltage_v, line.overvoltage_s);
+  has("| CUV | DDSG | %.3f V | %.1f s |", line.undervoltage_v, line.undervoltage_s);
+  has("| OCC | DCHG | %.0f A | %.2f s |", line.charge_overcurrent_a, line.charge_overcurrent_s);
+  has("| OCD1 | DDSG | %.0f A | %.2f s |", line.overcurrent_a, line.overcurrent_s);
+  has("| OCD2 | DDSG | %.0f A | %.2f s |", line.high_overcurrent_a, line.high_overcurrent_s);
+  has("| SCD | both | %.0f A | %.2f ms |", line.short_circuit_a, 0.45);
 }
 
 TEST(SecondLineOfTheFrontEnd, AnOvercurrentBeyondTheComparatorIsLeftToTheOthers) {
